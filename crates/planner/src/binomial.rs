@@ -1,9 +1,10 @@
-//! Exact bounds for shares of views.
+//! Exact bounds for shares of views. Shares and error rates are from 0 to 1. NaN decides "not over" and gives no bound.
 
 /// The most views of one percentile that are asked for.
 const MAX_VIEWS: usize = 4096;
 
-/// The probability that of `count` views at most `over` are over, where a share of `share` is.
+/// The probability that of `count` views at most `over` are over, where a share of `share` is. Shares outside 0 to 1 count
+/// as the nearest of them; NaN gives NaN where `over` is below `count`.
 #[must_use]
 pub fn at_most_over(count: usize, over: usize, share: f64) -> f64 {
     if over >= count || share <= 0.0 {
@@ -19,24 +20,25 @@ pub fn at_most_over(count: usize, over: usize, share: f64) -> f64 {
         log_term += ((count - k) as f64 / (k + 1) as f64).ln() + odds;
         sum += log_term.exp();
     }
-    sum.min(1.0)
+    // `min` would make 1 of NaN.
+    if sum > 1.0 { 1.0 } else { sum }
 }
 
-/// The most of `count` views that may be over for a share of at most `share` to be over, wrong with a probability of at
-/// most `error_rate`. `None`: there are too few views.
+/// The most of `count` views that may be over where at most a share of `share` may be. The bound is wrong with a
+/// probability of at most `error_rate`, from 0 to 1. `None`: there are too few views, or a value is NaN.
 #[must_use]
 pub fn most_over(count: usize, share: f64, error_rate: f64) -> Option<usize> {
     (0..count).take_while(|&over| at_most_over(count, over, share) <= error_rate).last()
 }
 
-/// The views that are needed where `over` of them are over; `None` above 4096.
+/// The views that are needed where `over` of them are over. `None`: more than 4096, or a value is NaN.
 #[must_use]
 pub fn views_needed(over: usize, share: f64, error_rate: f64) -> Option<usize> {
     (over + 1..=MAX_VIEWS).find(|&count| at_most_over(count, over, share) <= error_rate)
 }
 
-/// Whether more than a share of `share` is over, where `over` of `count` views are; wrong with a probability of at most
-/// `error_rate`.
+/// Whether more than a share of `share` is over, where `over` of `count` views are. The answer is wrong with a probability
+/// of at most `error_rate`, from 0 to 1. NaN decides "not over".
 #[must_use]
 pub fn is_over(count: usize, over: usize, share: f64, error_rate: f64) -> bool {
     over > 0 && 1.0 - at_most_over(count, over - 1, share) <= error_rate

@@ -19,7 +19,8 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Of values in any order.
+    /// The moments of finite values in any order. A value that is not finite makes the bounds NaN, which decides "not over"
+    /// and gives no certificate.
     #[must_use]
     pub fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
         let count = values.clone().count();
@@ -28,14 +29,15 @@ impl Moments {
         Self { count, mean, deviation: (squares / count.saturating_sub(1).max(1) as f64).sqrt() }
     }
 
-    /// The bound that the expected value exceeds with a probability of at most `error_rate`, by Student's t. `None` below
-    /// two values. Skewed values exceed it more often.
+    /// The bound that the expected value exceeds with a probability of at most `error_rate`, by Student's t. The rate is above
+    /// 0 and at most 0.5. `None` below two values. Skewed values exceed it more often.
     #[must_use]
     pub fn upper_bound(&self, error_rate: f64) -> Option<f64> {
         Some(self.mean + self.half_width(error_rate)?)
     }
 
-    /// The same from below.
+    /// The bound that the expected value is below with a probability of at most `error_rate`. Its ranges are those
+    /// of [`Self::upper_bound`].
     #[must_use]
     pub fn lower_bound(&self, error_rate: f64) -> Option<f64> {
         Some(self.mean - self.half_width(error_rate)?)
@@ -47,8 +49,8 @@ impl Moments {
     }
 }
 
-/// The error rate of a round of certification, from 0. Each round has half of the one before, and together they have
-/// [`ERROR_RATE`]: whatever is certified in any round holds with 95 % confidence.
+/// The error rate of a round of certification, a number from 0 to [`MAX_ROUNDS`] − 1. Each round has half the rate of the one
+/// before. Together the rounds of one plan have [`ERROR_RATE`].
 #[must_use]
 pub fn round_error_rate(round: u32) -> f64 {
     let shares: f64 = (0..MAX_ROUNDS).map(|round| 0.5_f64.powi(round as i32)).sum();

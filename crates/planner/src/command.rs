@@ -10,7 +10,7 @@ use crate::view::ProbeView;
 #[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs, reason = "self-naming fields")]
 pub enum Command {
-    /// Measure the errors of a row on these views, and its costs.
+    /// Measure the errors of a row on these views, and its costs in the light of the session.
     Probe {
         id: ProbeId,
         /// The row's place in the ladder.
@@ -31,8 +31,8 @@ pub enum Command {
 /// The use of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
-    /// It compares rows. Geometry decides: light may be left out.
+    /// It compares rows. Geometry decides: errors may be measured without light. Costs always include the session's light.
     Screening,
-    /// It is the base of a promise, in the light of the session.
+    /// It is the base of a promise: errors are measured in the light of the session.
     Certification,
 }

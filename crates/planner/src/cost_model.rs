@@ -1,8 +1,8 @@
 //! Costs of rows that were not measured, from rows that were.
 //!
-//! Each cost is a product: a constant of the sampling method, one of the reconstruction method, and powers of S, of the
-//! sample images' side and of a view's pixels. Its logarithm is linear, and is fitted by least squares. A weak prior says
-//! what the methods' loops say, so that few rows suffice and no input is degenerate.
+//! Each cost is a product of a constant of the sampling method, one of the reconstruction method, and three powers. Their
+//! bases are S, the sample images' side and a view's pixels. The logarithm is linear, and is fitted by least squares. A weak
+//! prior holds the exponents of the methods' loops, so that few rows suffice and no input is degenerate.
 
 use std::collections::BTreeSet;
 
@@ -14,9 +14,9 @@ use crate::least_squares::LeastSquares;
 const LEAST_COST_S: f64 = 1e-9;
 /// Logarithms of predicted costs in s stay within this.
 const MOST_LOG: f64 = 20.0;
-/// The weight of the prior on the common constant, on the three exponents, and on the methods' constants: the variance of a
-/// measured logarithm, 0.1², over that of each of them. Exponents are within 0.5 of the prior's, constants within a factor
-/// of 2.7.
+/// The weights of the prior on the common constant, on the three exponents, and on the methods' constants. A weight is the
+/// variance of a measured logarithm, 0.1², over the variance of the coefficient. Exponents are within 0.5 of the prior's,
+/// constants within a factor of 2.7.
 const WEIGHTS: [f64; 3] = [1e-6, 0.04, 0.01];
 /// The prior's exponents of S, side and pixels, of g_s, d and c.
 const EXPONENTS: [[f64; 3]; 3] = [[0.0, 2.0, 1.0], [1.0, 2.0, 1.0], [0.5, 0.3, 1.0]];
@@ -45,7 +45,8 @@ pub struct CostModel {
 }
 
 impl CostModel {
-    /// Fits the measured rows, none to all of them, for predictions of `rows`. Costs that are not finite count as the least.
+    /// Fits the measured rows, none to all of them, for predictions of `rows`. All rows must be valid by [`Row::validate`].
+    /// Costs that are not finite, or below 10⁻⁹ s, count as that. Pixels that are not finite, or below 1, count as 1.
     #[must_use]
     pub fn fit(rows: &[Row], timed: &[TimedRow]) -> Self {
         let all = || rows.iter().chain(timed.iter().map(|timed| &timed.row));
@@ -63,7 +64,7 @@ impl CostModel {
         Self { samplings, methods, fit, coefficients }
     }
 
-    /// The predicted costs of a row, always finite and above 0.
+    /// The predicted costs of a valid row, always finite and from e⁻²⁰ to e²⁰ s.
     #[must_use]
     pub fn predict(&self, row: &Row, view_pixels: f64) -> RowCosts {
         let x = columns(&self.samplings, &self.methods, row, view_pixels);

@@ -8,7 +8,7 @@ use crate::ladder::Row;
 /// Costs of a row on one device, in s.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RowCosts {
-    /// g_s: one sample image, its lighting included.
+    /// g_s: one sample image, always in the light of the session.
     pub sample_image_s: f64,
     /// d: one sample set on a compositor.
     pub load_set_s: f64,
@@ -18,7 +18,7 @@ pub struct RowCosts {
 
 impl RowCosts {
     /// # Errors
-    /// For a cost that is not finite or is negative, by its field.
+    /// For a cost that is not from 0 to 10⁶ s, by its field.
     pub fn validate(&self) -> Result<(), InvalidField> {
         seconds(self.sample_image_s, "sample_image_s")?;
         seconds(self.load_set_s, "load_set_s")?;
@@ -26,7 +26,7 @@ impl RowCosts {
     }
 }
 
-/// What serving costs.
+/// The price of serving a representation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Price {
     /// The nodes' time for a view, sampling and loading included, in s. The least is chosen.
@@ -36,7 +36,7 @@ pub struct Price {
 }
 
 /// The prices of representations. The cluster's come from its schedule, a study's from a cluster of one node. Equal
-/// arguments give equal prices; prices that are not finite exclude a row.
+/// arguments give equal prices. A price is finite and at least 0 in both fields: a row with any other price is not chosen.
 pub trait Pricing {
     /// The price of a row with these costs.
     fn row(&self, row: &Row, costs: &RowCosts) -> Price;

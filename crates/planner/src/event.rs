@@ -27,7 +27,7 @@ pub struct ProbeId {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Event {
-    /// What is known from earlier plans, maybe nothing. It is the first event, and starts the plan.
+    /// Measurements of earlier plans, maybe none. It is the first event, and starts the plan.
     Remembered(Kept),
     /// The answer to [`Probe`](crate::Command::Probe).
     Probed(Probed),
@@ -58,6 +58,7 @@ pub struct Probed {
     pub row: usize,
     /// The errors of every view that was asked for, in that order.
     pub views: Vec<(ProbeView, ViewErrors)>,
+    /// The row's costs, always in the light of the session.
     pub costs: RowCosts,
     /// The node's time for all of it, truth and comparison included, in s.
     pub busy_s: f64,

@@ -1,4 +1,4 @@
-//! What the errors of some views say about one term of a budget.
+//! Evidence from the errors of some views about one term of a budget.
 
 use crate::binomial::{at_most_over, is_over, most_over, views_needed};
 use crate::bounds::Moments;

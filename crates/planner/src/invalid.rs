@@ -30,9 +30,12 @@ pub(crate) fn within<T: PartialOrd + ToString>(
     if range.contains(&value) { Ok(()) } else { Err(InvalidField::new(field, value, allowed)) }
 }
 
-/// A finite number of seconds that is not negative.
+/// The most seconds of a field, far from overflow in sums and products.
+const MOST_SECONDS: f64 = 1e6;
+
+/// A number of seconds from 0 to 10⁶.
 pub(crate) fn seconds(value: f64, field: &'static str) -> Result<(), InvalidField> {
-    within(value, 0.0..=f64::MAX, field, "finite and not negative")
+    within(value, 0.0..=MOST_SECONDS, field, "from 0 to 10^6")
 }
 
 /// A text of 1 to 64 bytes.

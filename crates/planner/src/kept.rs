@@ -1,7 +1,7 @@
 //! Measurements that are kept between plans, as JSON.
 //!
-//! What was measured is kept, not what was concluded from it: another budget is answered from the same errors. Errors hold
-//! on every device; costs carry the names of their device and program.
+//! Measurements are kept, conclusions are not: another budget is answered from the same errors. Errors hold on every device;
+//! costs carry the names of their device and program.
 
 use serde::de::{Deserializer, Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,7 @@ pub struct KeptKey {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Kept {
-    /// What the errors depend on.
+    /// The scene and the settings that the errors depend on.
     pub key: KeptKey,
     /// Fresh views that certificates have used: they are never drawn again.
     pub fresh_views_drawn: u64,
@@ -60,7 +60,8 @@ pub struct KeptRow {
     /// Budgets that the row was certified to keep.
     #[serde(deserialize_with = "bounded::<_, _, MAX_CERTIFICATES>")]
     pub certificates: Vec<Certificate>,
-    /// Budgets at which certification ended without the row: it is not tried again at them, nor at stricter ones.
+    /// Budgets at which the row, or a safer one before it, failed its certificate and the row has none. It is not tried again
+    /// at them, nor at stricter ones.
     #[serde(deserialize_with = "bounded::<_, _, MAX_CERTIFICATES>")]
     pub rejected: Vec<Budget>,
     /// Costs by device and program.
@@ -76,6 +77,8 @@ pub struct Certificate {
     pub budget: Budget,
     /// Fresh views that counted.
     pub views: usize,
+    /// Fresh views that were skipped, as they show next to nothing.
+    pub skipped_views: usize,
     /// The error on these views, as a ratio.
     pub expected_ratio: f64,
     /// The bound on the error, as a ratio.
@@ -146,9 +149,7 @@ impl Kept {
     /// # Errors
     /// For a value that its field does not allow.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        for (text, field) in self.key.texts().into_iter().zip(KEY_FIELDS) {
-            name(text, field)?;
-        }
+        self.key.validate()?;
         // Far more than any program draws, and far from overflow.
         within(self.fresh_views_drawn, 0..=1 << 48, "fresh_views_drawn", "at most 2^48")?;
         within(self.rows.len(), 0..=MAX_ROWS, "rows", "at most 220")?;
@@ -157,6 +158,10 @@ impl Kept {
 }
 
 impl KeptKey {
+    pub(crate) fn validate(&self) -> Result<(), InvalidField> {
+        self.texts().into_iter().zip(KEY_FIELDS).try_for_each(|(text, field)| name(text, field))
+    }
+
     fn texts(&self) -> [&str; 5] {
         [&self.scene, &self.cell, &self.lighting, &self.view_size, &self.ladder_version]
     }
@@ -198,6 +203,7 @@ impl Certificate {
 
     fn validate(&self) -> Result<(), InvalidField> {
         within(self.views, 1..=4096, "views", "from 1 to 4096")?;
+        within(self.skipped_views, 0..=4096, "skipped_views", "at most 4096")?;
         within(self.expected_ratio, 0.0..=1.0, "expected_ratio", "from 0 to 1")?;
         let most = self.budget.error().map_or(0.0, |term| term.most_ratio());
         within(self.bound_ratio, 0.0..=most, "bound_ratio", "from 0 to the budget's limit")?;

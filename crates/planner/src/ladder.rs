@@ -50,7 +50,7 @@ impl Row {
         within(self.side_ratio, 0.01..=16.0, "side_ratio", "from 0.01 to 16")
     }
 
-    /// What tells one row from another.
+    /// The fields by which rows differ.
     fn identity(&self) -> (&str, &str, u32, u64) {
         (&self.sampling, &self.method, self.camera_count, self.side_ratio.to_bits())
     }

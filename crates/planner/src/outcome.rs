@@ -47,11 +47,11 @@ pub struct PruningCheck {
     pub pruned: usize,
     /// Rows that would have been, and were screened all the same.
     pub tested: usize,
-    /// Of these, rows that passed.
+    /// The tested rows that passed.
     pub wrong: usize,
 }
 
-/// What is known of a row.
+/// The state and the measurements of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RowSummary {
     /// The state of the row.

@@ -41,7 +41,7 @@ pub struct PlanRequest {
     pub plan: u64,
     /// The budget to keep.
     pub budget: Budget,
-    /// What errors depend on.
+    /// The scene and the settings that errors depend on.
     pub key: KeptKey,
     /// The device that measures costs.
     pub device: String,
@@ -53,7 +53,7 @@ pub struct PlanRequest {
     pub allowance_s: f64,
     /// Rows of a round of certificates, 1 to 8: fewer where light is expensive.
     pub most_certified: usize,
-    /// The seed of fresh views and of tests of pruning.
+    /// The seed of fresh views and of tests of pruning, which draw different numbers from it.
     pub seed: u64,
 }
 
@@ -80,6 +80,7 @@ pub struct Planner<P> {
 
 impl PlanRequest {
     fn validate(&self) -> Result<(), InvalidField> {
+        self.key.validate()?;
         name(&self.device, "device")?;
         name(&self.program_version, "program_version")?;
         within(self.view_pixels, 1.0..=1e9, "view_pixels", "from 1 to 10^9")?;

@@ -1,7 +1,6 @@
 //! Random numbers from a seed: SplitMix64 (Steele, Lea, Flood 2014), the same on every platform.
 //!
-//! A number is a function of a seed and a place in its sequence: no state is kept, and numbers can be asked for in any
-//! order.
+//! A number is a function of a seed and a place in its sequence. No state is kept, and numbers come in any order.
 
 /// The number at a place of the sequence of a seed.
 pub(crate) fn mixed(seed: u64, place: u64) -> u64 {
@@ -11,7 +10,7 @@ pub(crate) fn mixed(seed: u64, place: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// The same, from 0 to below 1.
+/// The number as a fraction from 0 to below 1.
 pub(crate) fn unit(seed: u64, place: u64) -> f64 {
     (mixed(seed, place) >> 11) as f64 / (1_u64 << 53) as f64
 }

@@ -1,7 +1,7 @@
-//! Certificates on fresh views: what seems to be the best of many by one sample needs another sample for a promise.
+//! Certificates on fresh views: a row that seems to be the best of many by one sample needs another sample for a promise.
 //!
-//! Rows are tested in a fixed sequence, from the safest to the cheapest, and the first failure ends it: whatever passed holds
-//! together (fixed-sequence testing, as in Angelopoulos et al. 2021, "Learn then Test").
+//! Rows are tested in a fixed sequence, from the safest to the cheapest, and the first failure ends it. All certificates of
+//! a sequence hold together: this is fixed-sequence testing (Angelopoulos et al. 2021, "Learn then Test").
 
 use super::stage::{Round, Work};
 use super::{Planner, TOLERANCES};
@@ -65,8 +65,8 @@ impl<P: Pricing> Planner<P> {
         }
     }
 
-    /// Whether a further round follows one that failed: its rows are then judged by all views that are known, and the next
-    /// round draws others.
+    /// Whether a further round follows one that failed. The row that failed is then judged by its fresh errors alone, as
+    /// those of screening may be without light. The next round draws other views.
     pub(super) fn reconsider(&mut self) -> bool {
         if !self.round.has_failed || self.round.number + 1 >= MAX_ROUNDS {
             return false;
@@ -74,7 +74,7 @@ impl<P: Pricing> Planner<P> {
         self.round.number += 1;
         for row in std::mem::take(&mut self.round.sequence) {
             let Some(term) = self.term().filter(|_| self.rows[row].status == RowStatus::Rejected) else { continue };
-            let is_over = self.evidence(row, term).is_over(1.0, ERROR_RATE);
+            let is_over = Evidence { term, errors: self.rows[row].fresh() }.is_over(1.0, ERROR_RATE);
             self.rows[row].status = if is_over { RowStatus::Over } else { RowStatus::Passed };
         }
         true
@@ -106,8 +106,8 @@ impl<P: Pricing> Planner<P> {
             .filter(|&row| self.rows[row].status == RowStatus::Certified && self.is_clearly_in_time(row));
         let certified_s = certified.map(|row| self.prices[row].node_s * (1.0 - WORTHWHILE));
         let direct_s = self.direct_in_time().map_or(f64::INFINITY, |direct| direct.node_s);
-        // The cheapest assured row is in the sequence.
-        let assured_s = self.cheapest_assured_s() * (1.0 + f64::EPSILON);
+        // The cheapest assured row is in the sequence, also at a price of 0.
+        let assured_s = (self.cheapest_assured_s() * (1.0 + f64::EPSILON)).max(f64::MIN_POSITIVE);
         certified_s.fold(direct_s.min(assured_s), f64::min)
     }
 
@@ -156,13 +156,18 @@ impl<P: Pricing> Planner<P> {
         (bound_ratio <= evidence.term.most_ratio()).then(|| Certificate {
             budget: self.request.budget,
             views: evidence.count(),
+            skipped_views: errors.len() - evidence.count(),
             expected_ratio: evidence.estimate(),
             bound_ratio: bound_ratio.max(0.0),
             foreground_ratio: foreground.clamp(0.0, 1.0),
         })
     }
 
+    /// Ends the round at a row that failed, and at all rows behind it.
     fn reject(&mut self, row: usize) {
+        for &row in &self.round.sequence[self.round.position..] {
+            self.rows[row].has_failed_certificate = true;
+        }
         self.rows[row].status = RowStatus::Rejected;
         self.rows[row].errors.extend(self.round.errors.iter());
         self.round.has_failed = true;

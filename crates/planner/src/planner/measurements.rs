@@ -1,7 +1,7 @@
 //! Answers to measurements: they must be what was asked for.
 
-use super::Planner;
 use super::stage::{Stage, Work};
+use super::{Planner, TIMED_REPEATS, TIMED_VIEWS};
 use crate::cost_model::{CostModel, TimedRow};
 use crate::costs::{Price, Pricing, RowCosts};
 use crate::event::{ProbeId, Probed, Timed};
@@ -43,10 +43,14 @@ impl<P: Pricing> Planner<P> {
             return Err(other("rows", "others", "those that were asked for"));
         }
         self.finish(timed.busy_s);
+        // Rows that are timed for the prediction of costs were not timed in turn with other finalists.
+        let is_settled = self.stage == Stage::Timing;
         for (row, costs) in &timed.rows {
-            (self.rows[*row].costs, self.rows[*row].is_settled) = (Some(*costs), true);
+            let state = &mut self.rows[*row];
+            (state.costs, state.is_settled) = (Some(*costs), is_settled);
+            state.timed_views = TIMED_VIEWS * TIMED_REPEATS;
         }
-        self.finalists_were_timed |= self.stage == Stage::Timing;
+        self.finalists_were_timed |= is_settled;
         self.predict();
         Ok(())
     }
@@ -99,9 +103,9 @@ impl<P: Pricing> Planner<P> {
     fn price(&self, row: usize) -> Price {
         let costs = self.rows[row].costs.unwrap_or_else(|| self.model.predict(self.row(row), self.request.view_pixels));
         let price = self.pricing.row(self.row(row), &costs);
-        // What has no price is never the cheapest.
-        let finite = |seconds: f64| if seconds.is_finite() { seconds } else { f64::INFINITY };
-        Price { node_s: finite(price.node_s), view_s: finite(price.view_s) }
+        // A row without a valid price is never the cheapest.
+        let is_valid = [price.node_s, price.view_s].iter().all(|seconds| seconds.is_finite() && *seconds >= 0.0);
+        if is_valid { price } else { Price { node_s: f64::INFINITY, view_s: f64::INFINITY } }
     }
 
     fn timed_row(&self, row: usize, costs: RowCosts) -> TimedRow {

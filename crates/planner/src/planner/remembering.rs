@@ -41,19 +41,10 @@ impl<P: Pricing> Planner<P> {
         }
     }
 
-    /// Whether certification came to its end without this row, which it would have preferred: its failure, or that of a safer
-    /// one, ended the sequence.
-    fn ended_without(&self, row: usize) -> bool {
-        let status = self.rows[row].status;
-        let chosen = self.outcome.as_ref().filter(|_| self.round.is_over() && self.term().is_some());
-        let is_better = chosen.is_some_and(|chosen| self.prices[row].node_s < chosen.price.node_s);
-        status == RowStatus::Rejected || (status == RowStatus::Passed && is_better)
-    }
-
     fn row_from(&self, kept: KeptRow) -> RowState {
         let term = self.term();
         let is_certified = term.is_some_and(|term| kept.certificates.iter().any(|own| own.serves(&term)));
-        // What failed at a budget fails at a stricter one.
+        // A row that failed at a budget fails at a stricter one.
         let fails = |budget: &Budget| term.zip(budget.error()).is_some_and(|(term, failed)| term.implies(&failed));
         let status = match (is_certified, kept.rejected.iter().any(fails)) {
             (true, _) => RowStatus::Certified,
@@ -87,7 +78,8 @@ impl<P: Pricing> Planner<P> {
             is_settled: state.is_settled,
             costs,
         });
-        let rejected = self.ended_without(row).then_some(self.request.budget);
+        let is_rejected = state.has_failed_certificate && state.status != RowStatus::Certified;
+        let rejected = is_rejected.then_some(self.request.budget);
         let rejected = rejected.filter(|budget| !state.rejected.contains(budget));
         let kept = KeptRow::new(self.row(row).clone(), state.screening().to_vec());
         KeptRow {

@@ -1,4 +1,4 @@
-//! What is known of a row.
+//! The measurements and the state of a row.
 
 use crate::budget::Budget;
 use crate::costs::RowCosts;
@@ -22,6 +22,8 @@ pub(super) struct RowState {
     pub(super) is_settled: bool,
     pub(super) certificates: Vec<Certificate>,
     pub(super) rejected: Vec<Budget>,
+    /// A certificate failed for the row, or for a safer one before it in the sequence. A further round leaves it so.
+    pub(super) has_failed_certificate: bool,
     /// Costs on other devices or by other programs, for the next plans there.
     pub(super) foreign_costs: Vec<KeptCosts>,
 }
@@ -29,6 +31,11 @@ pub(super) struct RowState {
 impl RowState {
     pub(super) fn screening(&self) -> &[ViewErrors] {
         &self.errors[..self.screening_views]
+    }
+
+    /// The errors of certificates of this plan that failed.
+    pub(super) fn fresh(&self) -> &[ViewErrors] {
+        &self.errors[self.screening_views..]
     }
 
     /// Takes the mean over all views that were timed.

@@ -14,8 +14,8 @@ use crate::view::ProbeView;
 
 /// Numbers of views after which a row may be dropped.
 const LEVELS: [usize; 4] = [4, 8, 16, MAX_SCREENING_VIEWS];
-/// Measured rows from which costs of others are predicted: as many as a ladder of three sampling methods and six
-/// reconstructions has unknowns, which are 3 + 6 − 1 constants and two exponents.
+/// Measured rows from which costs of others are predicted. A ladder of three sampling methods and six reconstructions has as
+/// many unknowns: 3 + 6 − 1 constants and two exponents.
 const MODEL_ROWS: usize = 10;
 /// A row fails clearly where it is over so many times the budget: then worse ones of its kind are not measured.
 const CLEARLY_OVER: f64 = 1.1;

@@ -1,6 +1,5 @@
 //! The stages of a plan, and the measurement that is asked for.
 
-use crate::bounds::MAX_ROUNDS;
 use crate::view::ProbeView;
 use crate::view_errors::ViewErrors;
 
@@ -50,11 +49,5 @@ impl Round {
     /// The row that is being certified.
     pub(super) fn row(&self) -> Option<usize> {
         self.sequence.get(self.position).copied().filter(|_| !self.has_failed)
-    }
-
-    /// No further row of any round is certified.
-    pub(super) fn is_over(&self) -> bool {
-        let is_last = self.number + 1 == MAX_ROUNDS;
-        if self.has_failed { is_last } else { self.position >= self.sequence.len() }
     }
 }

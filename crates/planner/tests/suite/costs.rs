@@ -52,8 +52,8 @@ fn known_exponents_are_recovered() {
     }
 }
 
-/// Errors of c, as shares of it, in the median and at the 90th percentile, over all rows of 60 subjects: so many rows were
-/// chosen one after another by what is known least.
+/// Errors of c over all rows of 60 subjects, as shares of it: the median and the 90th percentile. `timed_count` rows are
+/// timed, each the one of which least is known.
 fn prediction_errors(timed_count: usize) -> [f64; 2] {
     let mut errors = Vec::new();
     for seed in 0..60 {

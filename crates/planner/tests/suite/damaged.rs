@@ -1,16 +1,16 @@
 //! Kept measurements as JSON, whole and damaged.
 
 use planner::{
-    Certificate, Event, Kept, KeptCosts, KeptError, KeptKey, KeptRow, MAX_KEPT_BYTES, MAX_SCREENING_VIEWS, Purpose,
-    RowCosts, ViewErrors,
+    Certificate, Command, Event, Kept, KeptCosts, KeptError, KeptKey, KeptRow, MAX_KEPT_BYTES, MAX_SCREENING_VIEWS,
+    Purpose, RowCosts, ViewErrors,
 };
 
-use crate::made_up::{Subject, key, plan};
+use crate::made_up::{Subject, answer, key, plan, planner, request};
 use crate::random::Random;
 
 const DAMAGED: u64 = 2_000;
 
-/// What a plan keeps.
+/// Measurements that a plan keeps.
 fn kept() -> Kept {
     let subject = Subject::new(5).with_direct(1.0);
     let mut flip = subject.flip.clone();
@@ -128,6 +128,7 @@ fn impossible_measurements_are_refused_by_field() {
     let certificate = Certificate {
         budget: "flip 0.05".parse().unwrap(),
         views: 64,
+        skipped_views: 0,
         expected_ratio: 0.04,
         bound_ratio: 0.05,
         foreground_ratio: 0.5,
@@ -152,23 +153,53 @@ fn impossible_measurements_are_refused_by_field() {
         Kept { rows: vec![bad], ..Kept::empty(key()) }.validate()
     };
     assert_eq!(with(&|_| ()), Ok(()));
-    let cases: [(&str, Change); 10] = [
+    let cases: [(&str, Change); 12] = [
         ("side_ratio", &|row| row.row.side_ratio = f64::NAN),
         ("flip", &|row| row.screening[0].flip = 2.0),
         ("screening", &|row| *row = KeptRow::new(row.row.clone(), vec![errors(0.0); 33])),
         ("sums", &|row| row.sums[1] = f64::NAN),
         ("views", &|row| row.certificates[0].views = 0),
+        ("skipped_views", &|row| row.certificates[0].skipped_views = usize::MAX),
         ("expected_ratio", &|row| row.certificates[0].expected_ratio = f64::NAN),
         ("bound_ratio", &|row| row.certificates[0].bound_ratio = 0.051),
         ("foreground_ratio", &|row| row.certificates[0].foreground_ratio = -1.0),
         ("device", &|row| row.costs[0].device = String::new()),
         ("load_set_s", &|row| row.costs[0].costs.load_set_s = -1.0),
+        ("load_set_s", &|row| row.costs[0].costs.load_set_s = f64::MAX),
     ];
     for (field, change) in cases {
         assert_eq!(with(change).expect_err(field).field, field);
     }
     let drawn = Kept { fresh_views_drawn: u64::MAX, ..Kept::empty(key()) };
     assert_eq!(drawn.validate().unwrap_err().field, "fresh_views_drawn");
+}
+
+/// The greatest costs that answers may name, for every row: their means stay within the limit.
+#[test]
+fn costs_at_their_limit_are_read_back() {
+    let subject = Subject::new(5).with_direct(1.0);
+    let mut planner = planner(&subject, request("flip 0.03", 5));
+    let mut next = Some(Event::Remembered(Kept::empty(key())));
+    let mut kept = None;
+    while let Some(event) = next.take() {
+        let commands = planner.step(event);
+        kept = commands
+            .iter()
+            .find_map(|command| if let Command::Keep(kept) = command { Some(kept.clone()) } else { None });
+        next = commands.iter().find_map(|command| answer(&subject, command)).map(|mut event| {
+            let most = RowCosts { sample_image_s: 1e6, load_set_s: 1e6, reconstruct_view_s: 1e6 };
+            match &mut event {
+                Event::Probed(probed) => probed.costs = most,
+                Event::Timed(timed) => timed.rows.iter_mut().for_each(|(_, costs)| *costs = most),
+                _ => (),
+            }
+            event
+        });
+    }
+    let kept = kept.expect("kept measurements");
+    assert!(kept.rows.iter().any(|row| row.costs[0].costs.load_set_s == 1e6));
+    let json = kept.to_json().unwrap();
+    assert_eq!(Kept::from_json(json.as_bytes(), &key()).unwrap(), *kept);
 }
 
 #[test]

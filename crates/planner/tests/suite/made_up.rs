@@ -100,7 +100,7 @@ impl Subject {
         }
     }
 
-    /// The same, where direct drawing takes so long.
+    /// The subject with another time of direct drawing.
     pub fn with_direct(self, direct_s: f64) -> Self {
         Self { direct_s, ..self }
     }
@@ -180,7 +180,7 @@ pub fn planner(subject: &Subject, request: PlanRequest) -> Planner<Subject> {
     Planner::new(request, subject.ladder.clone(), subject.clone()).unwrap()
 }
 
-/// What a plan asked for, and its end.
+/// The events and the commands of a plan.
 #[derive(Debug, Clone, Default)]
 pub struct Run {
     pub events: Vec<Event>,
