@@ -17,7 +17,8 @@ const ALARM: f64 = 1_000.0;
 const LEAST_VIEWS: u64 = 16;
 /// Views at which the interval is narrowest for what is known.
 const TUNED_AT_VIEWS: f64 = 100.0;
-/// Bets on such views are so many times lower: they are rare, and one of them would pay for too much.
+/// The factor by which bets on views over a percentile's limit are lower: such views are rare, and one would raise the
+/// evidence too far.
 const RARE_OVER: f64 = 3.0;
 
 /// The audited views of one promise.

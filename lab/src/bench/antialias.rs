@@ -223,7 +223,7 @@ impl Subject {
         }
     }
 
-    /// The same views from sample images whose colours are means of so many positions around a texel's centre.
+    /// The same views from sample images whose colours are means over `antialias` positions around a texel's centre.
     fn filtered(&self, engine: &Arc<GpuEngine>, antialias: Antialias) -> anyhow::Result<Self> {
         let args = SceneArgs { sampling: SamplingMethod::Conventional(antialias), ..self.args.clone() };
         let Setup { scene, around, samples, offer } = &self.setup;
@@ -283,7 +283,7 @@ impl Subject {
         rows
     }
 
-    /// The errors of all views, which took so many seconds.
+    /// The errors of all views; `seconds` is the time that they took.
     fn row(&self, maker: Maker, antialias: Antialias, seconds: f64) -> anyhow::Result<Row> {
         let views = self.views(maker, ViewPlanes { antialias, ..ViewPlanes::ALL })?;
         Row::of(maker, antialias, seconds * 1e3 / views.len() as f64, &self.truth, &views)

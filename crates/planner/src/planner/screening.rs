@@ -17,7 +17,7 @@ const LEVELS: [usize; 4] = [4, 8, 16, MAX_SCREENING_VIEWS];
 /// Measured rows from which costs of others are predicted. A ladder of three sampling methods and six reconstructions has as
 /// many unknowns: 3 + 6 − 1 constants and two exponents.
 const MODEL_ROWS: usize = 10;
-/// A row fails clearly where it is over so many times the budget: then worse ones of its kind are not measured.
+/// A row whose error is above this multiple of the budget fails clearly. Worse rows of its kind are then not measured.
 const CLEARLY_OVER: f64 = 1.1;
 /// The chance of a certificate from which more expensive rows are not measured, by round. After the last there is only
 /// direct drawing; and the best of many by a sample is not as good as it seems.

@@ -8,7 +8,7 @@ use planner::{
 use crate::random::Random;
 
 pub const VIEW_PIXELS: f64 = 30_000.0;
-/// The scene is sampled for so many views.
+/// The number of views that one sample set serves.
 const VIEWS_PER_SET: f64 = 290.0;
 
 const SAMPLINGS: [&str; 3] = ["plain", "thrifty", "peeled"];

@@ -15,7 +15,7 @@ const CELL: Cell = Cell { eye: Vec3::new(0.0, 0.0, 4.0), target: Vec3::new(0.0, 
 /// The distance of the poles, and one between them and the wall.
 const POLES_M: f32 = 5.0;
 const BETWEEN_M: f32 = 6.0;
-/// Poles of some texels.
+/// The radius of poles that are some texels wide.
 const RADIUS_M: f32 = 0.12;
 /// Thin poles, in texels of a sample image.
 const THIN_RADIUS_PX: f64 = 0.6;
