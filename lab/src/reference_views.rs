@@ -105,6 +105,18 @@ impl ReferenceViews {
         self.reconstruct_at(&self.cameras, method, planes)
     }
 
+    /// As [`ReferenceViews::reconstruct`], each position within a pixel by itself.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub(crate) fn reconstruct_whole(
+        &self,
+        method: ReconstructionMethod,
+        planes: ViewPlanes,
+    ) -> anyhow::Result<Vec<View>> {
+        Ok(self.engine.reconstructor.reconstruct_whole(&self.set, &self.cameras, method, planes)?)
+    }
+
     /// Reconstructs the views of other cameras.
     ///
     /// # Errors

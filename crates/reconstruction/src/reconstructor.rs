@@ -35,8 +35,19 @@ struct Request<'r> {
     /// Of the set, where the method draws it.
     mesh: Option<&'r Mesh>,
     planes: ViewPlanes,
+    /// How the positions within a pixel are found.
+    positions: Positions,
     turn: Turn,
     count_fetches: bool,
+}
+
+/// How the positions within a pixel are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Positions {
+    /// Where the method can, later positions are shared from the first.
+    Shared,
+    /// Each is reconstructed by itself.
+    Whole,
 }
 
 impl Reconstructor {
@@ -101,7 +112,24 @@ impl Reconstructor {
         planes: ViewPlanes,
         turn: Turn,
     ) -> Result<Vec<View>, ReconstructionError> {
-        self.reconstruct_counted(set, cameras, method, planes, (turn, false)).map(|(views, _)| views)
+        let output = (planes, Positions::Shared, false);
+        self.reconstruct_counted(set, cameras, method, output, turn).map(|(views, _)| views)
+    }
+
+    /// As [`Reconstructor::reconstruct`], but each position within a pixel is reconstructed by itself: what views whose positions
+    /// share a surface are compared with.
+    ///
+    /// # Errors
+    /// As [`Reconstructor::reconstruct`].
+    pub fn reconstruct_whole(
+        &self,
+        set: &SampleSet,
+        cameras: &[PinholeCamera],
+        method: ReconstructionMethod,
+        planes: ViewPlanes,
+    ) -> Result<Vec<View>, ReconstructionError> {
+        let output = (planes, Positions::Whole, false);
+        self.reconstruct_counted(set, cameras, method, output, Turn::default()).map(|(views, _)| views)
     }
 
     /// As [`Reconstructor::reconstruct`], and what it cost; counting fetches slows it down.
@@ -116,7 +144,7 @@ impl Reconstructor {
         planes: ViewPlanes,
         count_fetches: bool,
     ) -> Result<(Vec<View>, Statistics), ReconstructionError> {
-        self.reconstruct_counted(set, cameras, method, planes, (Turn::default(), count_fetches))
+        self.reconstruct_counted(set, cameras, method, (planes, Positions::Shared, count_fetches), Turn::default())
     }
 
     fn reconstruct_counted(
@@ -124,8 +152,8 @@ impl Reconstructor {
         set: &SampleSet,
         cameras: &[PinholeCamera],
         method: ReconstructionMethod,
-        planes: ViewPlanes,
-        (turn, count_fetches): (Turn, bool),
+        (planes, positions, count_fetches): (ViewPlanes, Positions, bool),
+        turn: Turn,
     ) -> Result<(Vec<View>, Statistics), ReconstructionError> {
         for (index, camera) in cameras.iter().enumerate() {
             camera.validate().map_err(|source| ReconstructionError::Camera { index, source })?;
@@ -133,7 +161,7 @@ impl Reconstructor {
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;
-        let request = Request { set, method, mesh: mesh.as_deref(), planes, turn, count_fetches };
+        let request = Request { set, method, mesh: mesh.as_deref(), planes, positions, turn, count_fetches };
         let mut views = Vec::with_capacity(cameras.len());
         let mut statistics = Statistics::default();
         let mut in_flight: Option<InFlight<'_>> = None;
@@ -186,7 +214,10 @@ impl Reconstructor {
         let mut offsets_px = request.planes.antialias.offsets_px();
         recording.go_to(offsets_px.next().unwrap_or_default());
         self.record_position(request, recording, None)?;
-        let rough = request.method.share_positions(recording)?;
+        let rough = match request.positions {
+            Positions::Shared => request.method.share_positions(recording)?,
+            Positions::Whole => None,
+        };
         if rough.is_none() {
             antialias::record(recording, Sums::Begun, None)?;
         }

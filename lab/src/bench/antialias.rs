@@ -289,16 +289,6 @@ impl Subject {
         Row::of(maker, antialias, seconds * 1e3 / views.len() as f64, &self.truth, &views)
     }
 
-    /// The mean of four whole reconstructions, each of one position.
-    fn four_whole(&self, method: ReconstructionMethod) -> anyhow::Result<Vec<View>> {
-        let four = Antialias::of(4).context("four samples are offered")?;
-        let whole = |offset_px| {
-            let cameras: Vec<_> = self.reference.cameras.iter().map(|camera| camera.with_offset(offset_px)).collect();
-            self.reference.reconstruct_at(&cameras, method, ViewPlanes::ALL)
-        };
-        Ok(mean_of(&four.offsets_px().map(whole).collect::<anyhow::Result<Vec<_>>>()?))
-    }
-
     fn checks(&self, name: &str, flip_bar: Option<&f64>, rows: &[Row]) -> anyhow::Result<Vec<Check>> {
         let Maker::Reconstructed(method) = rows[0].maker else { anyhow::bail!("the first rows are reconstructed") };
         let of = |samples: u32| {
@@ -306,7 +296,9 @@ impl Subject {
             found.context("a number of samples is missing")
         };
         let (one, four) = (of(1)?, of(4)?);
-        let whole = Row::of(four.maker, four.antialias, f64::NAN, &self.truth, &self.four_whole(method)?)?;
+        let planes = ViewPlanes { antialias: four.antialias, ..ViewPlanes::ALL };
+        let whole = self.reference.reconstruct_whole(method, planes)?;
+        let whole = Row::of(four.maker, four.antialias, f64::NAN, &self.truth, &whole)?;
         let flip = flip_bar.map(|&bar| {
             Check::new(format!("{name}: FLIP, 4 samples over 1"), four.flip / one.flip, "×", Bar::AtMost(bar))
                 .with_foreground(four.foreground_flip / one.foreground_flip)
