@@ -2,6 +2,7 @@
 
 mod backoff;
 mod channel;
+mod liveness;
 mod reflection;
 mod services;
 

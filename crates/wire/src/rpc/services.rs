@@ -12,6 +12,7 @@ use tonic::transport::Channel;
 use tonic::{Request, Response, Status, Streaming, async_trait};
 
 use super::MAX_MESSAGE_BYTES;
+use super::liveness::{WatchedChannel, begun, with_signs, without_signs};
 use crate::convert::Convert;
 use crate::proto;
 use crate::proto::compositor_service_client::CompositorServiceClient;
@@ -40,6 +41,16 @@ fn each<P: 'static, D: 'static>(
     convert: fn(P) -> Result<D, Status>,
 ) -> Messages<D> {
     Box::pin(stream.map(move |message| message.and_then(convert)))
+}
+
+/// A server's stream as messages.
+fn sent<P: Default + Send + 'static, D: Convert<P> + 'static>(items: Messages<D>) -> Messages<P> {
+    Box::pin(with_signs(items.map(|item| item.map(D::write))))
+}
+
+/// A server's messages as what they say.
+fn received<P: Default + PartialEq + Send + 'static, D: Convert<P> + 'static>(messages: Streaming<P>) -> Messages<D> {
+    each(without_signs(messages), answered)
 }
 
 /// A service: its trait, the adapter of the trait to messages, its server, and its client.
@@ -79,7 +90,7 @@ macro_rules! service {
                 request: Request<proto::$opening>,
             ) -> Result<Response<Self::$stream_type>, Status> {
                 let items = self.0.$stream(checked(request.into_inner())?).await?;
-                Ok(Response::new(each(items, |item| Ok(item.write()))))
+                Ok(Response::new(sent(items)))
             })*
         }
 
@@ -90,13 +101,13 @@ macro_rules! service {
 
         #[doc = concat!("Calls a [`", stringify!($trait), "`].")]
         #[derive(Debug, Clone)]
-        pub struct $client($generated_client<Channel>);
+        pub struct $client($generated_client<WatchedChannel>);
 
         impl $client {
             /// Over a connection.
             #[must_use]
             pub fn new(channel: Channel) -> Self {
-                Self(capped!($generated_client::new(channel)))
+                Self(capped!($generated_client::new(WatchedChannel(channel))))
             }
 
             $($(#[$of_call])*
@@ -114,7 +125,7 @@ macro_rules! service {
             /// The service's.
             pub async fn $stream(&self, request: $wanted) -> Result<Messages<$item>, Status> {
                 let message: proto::$opening = request.write();
-                Ok(each(self.0.clone().$stream(message).await?.into_inner(), answered))
+                Ok(received(begun(self.0.clone().$stream(message)).await?.into_inner()))
             })*
         }
     };
@@ -196,7 +207,7 @@ impl<C: Compositor> CompositorService for CompositorAdapter<C> {
         request: Request<Streaming<proto::RenderViewsRequest>>,
     ) -> Result<Response<Self::RenderViewsStream>, Status> {
         let frames = self.0.render_views(each(request.into_inner(), checked)).await?;
-        Ok(Response::new(each(frames, |part| Ok(part.write()))))
+        Ok(Response::new(sent(frames)))
     }
 }
 
@@ -207,13 +218,13 @@ pub fn compositor_server<C: Compositor>(compositor: C) -> CompositorServiceServe
 
 /// Calls a [`Compositor`].
 #[derive(Debug, Clone)]
-pub struct CompositorClient(CompositorServiceClient<Channel>);
+pub struct CompositorClient(CompositorServiceClient<WatchedChannel>);
 
 impl CompositorClient {
     /// Over a connection.
     #[must_use]
     pub fn new(channel: Channel) -> Self {
-        Self(capped!(CompositorServiceClient::new(channel)))
+        Self(capped!(CompositorServiceClient::new(WatchedChannel(channel))))
     }
 
     /// See [`Compositor::render_views`].
@@ -225,6 +236,6 @@ impl CompositorClient {
         requests: impl Stream<Item = RenderViews> + Send + 'static,
     ) -> Result<Messages<FramePart>, Status> {
         let requests = requests.map(Convert::<proto::RenderViewsRequest>::write);
-        Ok(each(self.0.clone().render_views(requests).await?.into_inner(), answered))
+        Ok(received(begun(self.0.clone().render_views(requests)).await?.into_inner()))
     }
 }
