@@ -19,8 +19,8 @@ use crate::frames::{FrameRoom, FrameSink};
 
 /// The time that a compositor is passed over after a failure, where there are others.
 const OPEN_FOR: Duration = Duration::from_secs(10);
-/// The time that a compositor may be silent while frames are due: samplers on slow devices take minutes.
-const SILENCE: Duration = Duration::from_secs(600);
+/// The time without a frame that is due, on a stream that is alive: samplers on slow devices take minutes.
+const MOST_WAIT: Duration = Duration::from_secs(600);
 
 /// The circuit breaker of one compositor; clones share it.
 #[derive(Debug, Clone, Default)]
@@ -146,10 +146,10 @@ impl FrameStream {
     }
 
     async fn next_part(&mut self, peer: &Peer) -> Result<Option<FramePart>, Failure> {
-        match tokio::time::timeout(SILENCE, self.parts.next()).await {
+        match tokio::time::timeout(MOST_WAIT, self.parts.next()).await {
             Ok(part) => part.transpose().map_err(|status| Failure::of_status(peer, &status)),
             Err(_) => {
-                let reason = format!("no frame was received for {} s", SILENCE.as_secs());
+                let reason = format!("no frame was received for {} s", MOST_WAIT.as_secs());
                 Err(Failure::of_peer(peer, peer.error(reason)))
             }
         }

@@ -34,7 +34,8 @@ pub(super) fn with_signs<P: Default + Send + 'static>(
     stream.timeout_repeating(signs).map(|next| next.unwrap_or_else(|_| Ok(P::default())))
 }
 
-/// A client's stream, without the empty messages.
+/// A client's stream, without the empty messages. No other message of a stream is empty: each names its scenes, its event or its
+/// bytes.
 pub(super) fn without_signs<P: Default + PartialEq + Send + 'static>(
     stream: impl Stream<Item = Result<P, Status>> + Send + 'static,
 ) -> impl Stream<Item = Result<P, Status>> + Send + 'static {
@@ -167,7 +168,7 @@ mod tests {
 
     use super::*;
 
-    /// Pieces of an answer, each so many milliseconds after the one before, up to its end or its failure.
+    /// Receives an answer in pieces. Each piece comes with the delay before it, in ms. `None`: the answer ends well.
     async fn failure_of(pieces: &'static [(u64, &'static [u8])]) -> Option<Status> {
         struct Pieces(ReceiverStream<Bytes>);
         impl http_body::Body for Pieces {
