@@ -6,6 +6,7 @@ use clap::Subcommand;
 use crate::bench::{self, BenchArgs};
 use crate::demo::{self, DemoArgs};
 use crate::failures::command::{self as failures, FailuresArgs};
+use crate::fronts::command::{self as fronts, FrontsArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
 
 /// A subcommand that measures.
@@ -33,6 +34,12 @@ pub enum StudyCommand {
     ///
     /// Errors of pictures are those of the foreground: of the pixels that show a surface.
     Failures(FailuresArgs),
+    /// Charts cost against error of every representation among which a budget chooses
+    ///
+    /// A row of the ladder is a sampling method, a number of sample cameras, a size of their images and a reconstruction
+    /// method. For each subject the report has a table of all rows, charts with the front of the best, direct drawing and
+    /// what `myriorama plan` chooses. docs/fronts.md explains how to read them.
+    Fronts(FrontsArgs),
 }
 
 impl LabCommand {
@@ -46,6 +53,7 @@ impl LabCommand {
             Self::Bench(args) => bench::run(args),
             Self::Study(StudyCommand::Sampling(args)) => sampling::run(args),
             Self::Study(StudyCommand::Failures(args)) => failures::run(args),
+            Self::Study(StudyCommand::Fronts(args)) => fronts::run(args),
         }
     }
 }

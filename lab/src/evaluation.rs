@@ -176,7 +176,7 @@ pub fn mean_errors(references: &[View], tests: &[View]) -> anyhow::Result<[Pictu
 }
 
 /// The depth of a view, unknown where it was filled in.
-fn known_depth(view: &View) -> anyhow::Result<Vec<f32>> {
+pub(crate) fn known_depth(view: &View) -> anyhow::Result<Vec<f32>> {
     let mut plane = view.inverse_depth_per_m.clone().context("a view without depth")?;
     for (inverse, provenance) in plane.iter_mut().zip(view.provenance.iter().flatten()) {
         if provenance.kind() == ProvenanceKind::Filled {

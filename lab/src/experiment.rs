@@ -126,7 +126,7 @@ impl Experiment {
     /// Settings for `views` of one set, with everything else from the scene's arguments.
     #[must_use]
     pub fn delivery(&self, policy: PolicyChoice, views: usize) -> DeliverySettings {
-        DeliverySettings { lighting: self.args.lighting, policy, method: self.args.method, views, sets: 1 }
+        DeliverySettings { lighting: self.args.lighting, policy, method: self.args.method(), views, sets: 1 }
     }
 
     /// Delivers views of a new sample set. The time excludes the coordinator's measurements.

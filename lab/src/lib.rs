@@ -13,6 +13,7 @@ mod demo;
 mod evaluation;
 mod experiment;
 mod failures;
+mod fronts;
 mod lighting_study;
 mod load;
 mod memory;

@@ -2,9 +2,7 @@
 
 use app_core::setup::SceneArgs;
 use app_core::sizes::SampleSize;
-use reconstruction::ReconstructionMethod;
 use render::Lighting;
-use sampling::SamplingMethod;
 use scene::{MissingTextures, SceneSpec, UpAxis};
 
 /// A scene with all other arguments by default.
@@ -18,8 +16,8 @@ pub fn scene_args(scene: SceneSpec) -> SceneArgs {
         lighting: Lighting::default(),
         lights: Vec::new(),
         environment: None,
-        method: ReconstructionMethod::default(),
-        sampling: SamplingMethod::default(),
+        method: None,
+        sampling: None,
         sample_size: SampleSize::default(),
         samples: None,
     }

@@ -138,7 +138,7 @@ fn a_package_loads_as_the_scene_does() {
 #[test]
 fn a_cluster_gives_what_one_engine_gives() {
     let (engine, args, setup, reference) = reference("uv-sphere", 16);
-    let alone = reference.reconstruct(args.method, ViewPlanes::ALL).unwrap();
+    let alone = reference.reconstruct(args.method(), ViewPlanes::ALL).unwrap();
     let mut delivered = runtime().unwrap().block_on(async {
         let listener = listen(([127, 0, 0, 1], 0).into(), false).await.unwrap();
         let cluster =

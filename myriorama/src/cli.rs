@@ -4,7 +4,7 @@ use app_core::exit::Outcome;
 use app_core::process::runtime;
 use clap::{Parser, Subcommand};
 
-use crate::commands::{coordinator, gateway, health, node, replay, status, up, view};
+use crate::commands::{coordinator, gateway, health, node, plan, replay, status, up, view};
 
 /// Many views of one scene from a few depth images.
 ///
@@ -47,6 +47,8 @@ pub enum Command {
     Gateway(gateway::GatewayArgs),
     /// Asks a cluster for views and writes them as pictures
     View(view::ViewArgs),
+    /// Finds the cheapest representation of a scene that keeps an error budget
+    Plan(plan::PlanArgs),
     /// Shows the nodes of a cluster, their roles, and the reason of the plan
     Status(status::StatusArgs),
     /// Replays a coordinator's recorded events through the schedule
@@ -77,6 +79,7 @@ impl Command {
                 runtime.shutdown_background();
                 outcome
             }
+            Self::Plan(args) => plan::run(&args),
             Self::Status(args) => runtime()?.block_on(status::run(&args)),
             Self::Replay(args) => replay::run(&args),
             Self::Health(args) => runtime()?.block_on(health::run(&args)),

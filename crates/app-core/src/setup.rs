@@ -64,14 +64,14 @@ pub struct SceneArgs {
     /// the background, too. Its bright parts cast shadows with the rays of "soft N" or else of "occlusion N"
     #[arg(long, value_name = "V[/V]|FILE.hdr")]
     pub environment: Option<EnvironmentSpec>,
-    /// The reconstruction method
-    #[arg(long, visible_alias = "reconstruction", default_value_t, value_name = "NAME",
-        help = format!("How views are reconstructed. {}", ReconstructionMethod::help()))]
-    pub method: ReconstructionMethod,
-    /// The sampling method
-    #[arg(long, default_value_t, value_name = "NAME",
-        help = format!("Which samples are taken. {}", SamplingMethod::help()))]
-    pub sampling: SamplingMethod,
+    /// The reconstruction method; `None` where the user names none
+    #[arg(long, visible_alias = "reconstruction", value_name = "NAME",
+        help = format!("How views are reconstructed. {} [default: {}]", ReconstructionMethod::help(), ReconstructionMethod::default()))]
+    pub method: Option<ReconstructionMethod>,
+    /// The sampling method; `None` where the user names none
+    #[arg(long, value_name = "NAME",
+        help = format!("Which samples are taken. {} [default: {}]", SamplingMethod::help(), SamplingMethod::default()))]
+    pub sampling: Option<SamplingMethod>,
     /// Size of the sample images, or auto: as in --samples, or from a quarter to twice the pixels of 400x300, so that they
     /// are about twice as dense as each session's views
     #[arg(long, default_value_t, value_name = "WxH|auto")]
@@ -103,6 +103,18 @@ fn offer_name(scene: &SceneSpec) -> String {
 }
 
 impl SceneArgs {
+    /// The reconstruction method.
+    #[must_use]
+    pub fn method(&self) -> ReconstructionMethod {
+        self.method.unwrap_or_default()
+    }
+
+    /// The sampling method.
+    #[must_use]
+    pub fn sampling(&self) -> SamplingMethod {
+        self.sampling.unwrap_or_default()
+    }
+
     /// Loads the scene and places its sample cameras.
     ///
     /// # Errors
@@ -119,7 +131,7 @@ impl SceneArgs {
         let mut scene = self.load_scene()?;
         change(&mut scene);
         let around = self.sample_cameras(&scene)?;
-        let samples = self.sampling.cameras(around.clone());
+        let samples = self.sampling().cameras(around.clone());
         let package = scene::pack(&scene);
         let offer = SceneOffer {
             name: offer_name(&self.scene),
@@ -132,8 +144,8 @@ impl SceneArgs {
             illumination: scene.illumination.clone(),
             origin_in_source: scene.origin_in_source,
             settings: OfferSettings {
-                method: Some(self.method.to_string()),
-                sampling: Some(self.sampling.to_string()),
+                method: Some(self.method().to_string()),
+                sampling: Some(self.sampling().to_string()),
                 lighting: Some(self.lighting.to_string()),
             },
             period_s: scene.period_s().map(f64::from),

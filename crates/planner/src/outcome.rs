@@ -1,5 +1,7 @@
 //! The result of a plan.
 
+use std::fmt;
+
 use crate::costs::Price;
 use crate::kept::Certificate;
 
@@ -84,4 +86,18 @@ pub enum RowStatus {
     Rejected,
     /// It could not be measured.
     Failed,
+}
+
+impl fmt::Display for RowStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Open => "open",
+            Self::Over => "over",
+            Self::Pruned => "excluded",
+            Self::Passed => "passed",
+            Self::Certified => "certified",
+            Self::Rejected => "not certified",
+            Self::Failed => "failed",
+        })
+    }
 }

@@ -8,7 +8,7 @@ use crate::random::unit;
 const BASES: [u64; 3] = [2, 3, 5];
 
 /// A view on which a row is measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ProbeView {
     /// One of the common views on which all rows are compared.

@@ -151,7 +151,7 @@ fn defaults(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> a
         let subject = Subject::new(args, engine, scene_args(SceneSpec::File(path)))?;
         let four = Antialias::of(4).context("four samples are offered")?;
         let row =
-            |subject: &Subject, antialias| subject.row(Maker::Reconstructed(args.scene.method), antialias, f64::NAN);
+            |subject: &Subject, antialias| subject.row(Maker::Reconstructed(args.scene.method()), antialias, f64::NAN);
         let (now, before) =
             (row(&subject, four)?, row(&subject.resampled(engine, FIXED_SAMPLES_PX)?, Antialias::NONE)?);
         let cells = [before.foreground_psnr_db, now.foreground_psnr_db, before.foreground_flip, now.foreground_flip];
@@ -186,7 +186,7 @@ impl Subject {
         views: Vec<PinholeCamera>,
     ) -> anyhow::Result<Self> {
         // The planes of the hybrid mesh are enough for all methods.
-        let scene = SceneArgs { method: HYBRID.parse()?, ..scene };
+        let scene = SceneArgs { method: Some(HYBRID.parse()?), ..scene };
         let reference = ReferenceViews::draw(engine, &setup, &scene, views)?;
         let mut subject = Self { setup, args: scene, reference, truth: Vec::new() };
         subject.truth = subject.drawn_with_64()?;
@@ -225,7 +225,7 @@ impl Subject {
 
     /// The same views from sample images whose colours are means over `antialias` positions around a texel's centre.
     fn filtered(&self, engine: &Arc<GpuEngine>, antialias: Antialias) -> anyhow::Result<Self> {
-        let args = SceneArgs { sampling: SamplingMethod::Conventional(antialias), ..self.args.clone() };
+        let args = SceneArgs { sampling: Some(SamplingMethod::Conventional(antialias)), ..self.args.clone() };
         let Setup { scene, around, samples, offer } = &self.setup;
         let setup =
             Setup { scene: scene.clone(), around: around.clone(), samples: samples.clone(), offer: offer.clone() };
@@ -249,10 +249,10 @@ impl Subject {
         })?;
         let mut rows = Vec::with_capacity(subjects.len());
         for (subject, seconds) in subjects.iter().zip(seconds) {
-            let row = subject.row(Maker::Reconstructed(args.scene.method), four, f64::NAN)?;
+            let row = subject.row(Maker::Reconstructed(args.scene.method()), four, f64::NAN)?;
             let ms = seconds * 1e3 / subject.setup.samples.len() as f64;
             let numbers = [ms, row.foreground_psnr_db, row.psnr_db, row.foreground_flip, row.flip];
-            let positions = subject.args.sampling.antialias().samples();
+            let positions = subject.args.sampling().antialias().samples();
             let names = [name.into(), (if positions > 1 { positions } else { 0 }).into()];
             table.push(names.into_iter().chain(numbers.map(Into::into)))?;
             rows.push(row);
@@ -264,7 +264,7 @@ impl Subject {
 
     fn rows(&self, args: &BenchArgs) -> anyhow::Result<Vec<Row>> {
         let hybrid = Maker::Reconstructed(HYBRID.parse()?);
-        let makers = [Maker::Reconstructed(args.scene.method), hybrid, Maker::Direct];
+        let makers = [Maker::Reconstructed(args.scene.method()), hybrid, Maker::Direct];
         let counts = [1, 2, 4, 8, 16].into_iter().filter_map(Antialias::of);
         let works: Vec<(Maker, Antialias)> =
             makers.into_iter().flat_map(|maker| counts.clone().map(move |antialias| (maker, antialias))).collect();
@@ -325,7 +325,7 @@ impl Subject {
             let cameras = cameras.iter().copied().cycle().take(TIMED_VIEWS).collect::<Vec<_>>();
             let seconds = in_turn(&[Antialias::NONE, four], args.runs().max(5), |antialias| {
                 let planes = ViewPlanes { antialias, ..ViewPlanes::COLOR };
-                self.reference.reconstruct_at(&cameras, args.scene.method, planes).map(drop)
+                self.reference.reconstruct_at(&cameras, args.scene.method(), planes).map(drop)
             })?;
             let name = format!("{name}, {}x{}: c, 4 samples over 1 (aim 2.5)", size_px.x, size_px.y);
             anyhow::Ok(Check::new(name, seconds[1] / seconds[0], "×", Bar::AtMost(3.0)))

@@ -29,7 +29,7 @@ pub fn compare(name: &str, reference: &ReferenceViews, args: &BenchArgs, report:
     progress.finish_and_clear();
     report.tables.push(sweep::table(&format!("Error against time, {name}"), &rows)?);
     report.charts.extend(sweep::charts(name, &rows).into_iter().map(Into::into));
-    report.checks.extend(checks(name, &rows, args.scene.method));
+    report.checks.extend(checks(name, &rows, args.scene.method()));
     Ok(())
 }
 

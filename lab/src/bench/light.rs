@@ -64,7 +64,7 @@ pub fn reference(args: &BenchArgs, experiment: &Experiment, report: &mut Report)
     let (unlit, fine) = (take(Lighting::UNLIT)?, take(FINE.parse()?)?);
     let converged = fine.drawn(&experiment.setup, CONVERGED.parse()?)?;
     progress.finish_and_clear();
-    let reconstructed = |reference: &ReferenceViews| reference.reconstruct(args.scene.method, Default::default());
+    let reconstructed = |reference: &ReferenceViews| reference.reconstruct(args.scene.method(), Default::default());
     let shared = mean_errors(&converged, &reconstructed(&fine)?)?;
     let drawn = mean_errors(&converged, &fine.views)?;
     let geometry = mean_errors(&unlit.views, &reconstructed(&unlit)?)?;
@@ -92,7 +92,7 @@ fn ms_in_turn(args: &BenchArgs, both: [&ReferenceViews; 2]) -> anyhow::Result<[f
     let mut ms = [Vec::new(), Vec::new()];
     for _ in 0..args.runs().max(RUNS_OF_NEAR_TIMES) {
         for (ms, reference) in ms.iter_mut().zip(both) {
-            ms.push(reference.ms_a_view(args.scene.method, PAPER_VIEWS, 1)?);
+            ms.push(reference.ms_a_view(args.scene.method(), PAPER_VIEWS, 1)?);
         }
     }
     Ok(ms.map(median))

@@ -50,7 +50,7 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
     let (scene, setup) = scene(folder)?;
     let views = views(args, &setup, folder)?;
     let reference = ReferenceViews::draw(engine, &setup, &scene, views)?;
-    let row = reference.evaluate(args.scene.method, args.runs())?;
+    let row = reference.evaluate(args.scene.method(), args.runs())?;
     report.tables.push(sweep::table("Peer scene", std::slice::from_ref(&row))?);
     report.checks.extend(COMPARISONS.map(|(name, unit, bar, foreground, whole)| {
         let check = Check::new(name, whole(&row), unit, bar);

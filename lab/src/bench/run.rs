@@ -87,7 +87,7 @@ fn new_report(args: &BenchArgs, device: &str) -> Report {
     let mut report = Report::new("Myriorama bench", device);
     report.version("myriorama", env!("CARGO_PKG_VERSION"));
     report.parameter("scene", args.scene.scene.to_string());
-    report.parameter("method", args.scene.method.to_string());
+    report.parameter("method", args.scene.method().to_string());
     report.parameter("nodes P", u32::from(args.nodes));
     report.parameter("repeats", args.runs());
     report.parameter("quick", args.quick);

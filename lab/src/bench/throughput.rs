@@ -55,7 +55,7 @@ pub fn nanoseconds(
     report: &mut Report,
 ) -> anyhow::Result<()> {
     let pixels = reference.cameras.first().map_or(1, PinholeCamera::pixel_count) as f64;
-    let c_ns = reference.ms_a_view(args.scene.method, PAPER_VIEWS, args.runs())? * 1e6 / pixels;
+    let c_ns = reference.ms_a_view(args.scene.method(), PAPER_VIEWS, args.runs())? * 1e6 / pixels;
     let g_ns = direct_s_a_view(reference, experiment, args.runs())? * 1e9 / pixels;
     let mut table = Table::new("Device time", &[("what", ""), ("time a pixel", "ns"), ("time a view", "ms")]);
     for (what, ns) in [("c: reconstruct", c_ns), ("g_v: draw from the scene", g_ns)] {

@@ -22,7 +22,7 @@ pub fn show(args: &DemoArgs, experiment: &Experiment, report: &mut Report) -> an
         let lit = SceneArgs { lighting: finest.lighting, ..experiment.args.clone() };
         let reference =
             ReferenceViews::draw(&experiment.engine, &experiment.setup, &lit, experiment.views(COMPARED_VIEWS)?)?;
-        let views = reference.reconstruct(args.scene.method, ViewPlanes::ALL)?;
+        let views = reference.reconstruct(args.scene.method(), ViewPlanes::ALL)?;
         pictures::contact_sheet(&frames, &finest.lighting, report);
         pictures::comparisons(&reference, &views, report)?;
     }

@@ -87,7 +87,7 @@ fn new_report(args: &DemoArgs, experiment: &Experiment) -> Report {
         .parameter("sample size", experiment.setup.samples.first().map(|c| format!("{}x{}", c.size_px.x, c.size_px.y)));
     report.parameter("nodes P", u32::from(args.nodes));
     report.parameter("lighting", args.scene.lighting.to_string());
-    report.parameter("method", args.scene.method.to_string());
+    report.parameter("method", args.scene.method().to_string());
     report.parameter("quick", args.quick);
     report
 }

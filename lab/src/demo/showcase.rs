@@ -76,7 +76,7 @@ fn first_page(engine: &Arc<GpuEngine>, setup: Setup, args: &SceneArgs) -> anyhow
     let camera = viewpoint.camera(VIEW_PX.into());
     let denser_px = (camera.size_px.as_vec2() * DENSITY).as_uvec2();
     let around = viewpoint.samples(args.sample_size.fixed_px().unwrap_or(denser_px));
-    let setup = Setup { samples: args.sampling.cameras(around.clone()), around, ..setup };
+    let setup = Setup { samples: args.sampling().cameras(around.clone()), around, ..setup };
     let start = Instant::now();
     let reference = ReferenceViews::draw(engine, &setup, &args, vec![camera.resized(WARM_UP_PX)])?;
     let samples_s = start.elapsed().as_secs_f64();
@@ -95,8 +95,8 @@ fn timed_views(
     let planes = ViewPlanes { antialias, ..ViewPlanes::ALL };
     let (direct, direct_s) = timed(|| reference.drawn_from(setup, args.lighting, &[camera], planes))?;
     // The first reconstruction of a size also makes its buffers.
-    reference.reconstruct_at(&[camera], args.method, planes)?;
-    let (view, reconstruct_s) = timed(|| reference.reconstruct_at(&[camera], args.method, planes))?;
+    reference.reconstruct_at(&[camera], args.method(), planes)?;
+    let (view, reconstruct_s) = timed(|| reference.reconstruct_at(&[camera], args.method(), planes))?;
     Ok(([direct, view], [direct_s, reconstruct_s]))
 }
 

@@ -61,7 +61,7 @@ pub fn measure(experiment: &Experiment, quick: bool) -> anyhow::Result<Times> {
         pipelines: Vec::new(),
         direct: Vec::new(),
     };
-    for method in compared(experiment.args.method) {
+    for method in compared(experiment.args.method()) {
         let mut runs = Vec::new();
         for &count in &counts {
             runs.push(deliver(experiment, PolicyChoice::Pipeline, method, count)?);
@@ -69,7 +69,7 @@ pub fn measure(experiment: &Experiment, quick: bool) -> anyhow::Result<Times> {
         times.pipelines.push((method.to_string(), runs));
     }
     for count in DIRECT_VIEWS {
-        times.direct.push(deliver(experiment, PolicyChoice::Direct, experiment.args.method, count)?);
+        times.direct.push(deliver(experiment, PolicyChoice::Direct, experiment.args.method(), count)?);
     }
     let assignment = times.direct.first().map(|run| &run.plan.assignment);
     times.nodes = assignment.map_or(0, |assignment| assignment.compositors.len());

@@ -4,6 +4,7 @@ use depth_image::{Aabb, DepthImage, Environment, Illumination, PinholeCamera, Vi
 use glam::{UVec2, Vec3};
 use reconstruction::{ErrorBound, ReconstructionMethod, SampleSet, SetDescription};
 use render::{GpuScene, Lighting, SamplePlanes};
+use sampling::nested_places;
 use scene::Scene;
 
 use super::stand::Stand;
@@ -114,9 +115,6 @@ pub struct Cell {
     pub half_m: f32,
 }
 
-/// A fixed nested order of sample cameras, in halves of the cell: corners, centre, edge middles.
-const PLACES: [[f32; 2]; 9] =
-    [[-1.0, -1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [0.0, 0.0], [0.0, -1.0], [0.0, 1.0], [-1.0, 0.0], [1.0, 0.0]];
 /// Views within the cell.
 const VIEWS: [[f32; 2]; 3] = [[0.23, -0.31], [-0.58, 0.44], [0.71, 0.52]];
 const FOV_DEG: f32 = 45.0;
@@ -132,9 +130,7 @@ impl Cell {
     }
 
     pub fn samples(&self, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
-        // One camera stands in the middle.
-        let skipped = if count == 1 { 4 } else { 0 };
-        PLACES.iter().skip(skipped).take(count).map(|&place| self.camera(place, size_px)).collect()
+        nested_places(count).iter().map(|place| self.camera(place.to_array(), size_px)).collect()
     }
 
     pub fn views(&self, size_px: UVec2) -> Vec<PinholeCamera> {

@@ -64,8 +64,11 @@ fn of_method(
     };
     let views = subject.between(if quick { 2 } else { VIEWS }, VIEW_PX);
     // The planes of the hybrid mesh are enough for all reconstructions.
-    let args =
-        SceneArgs { sampling, method: ReconstructionMethod::HybridMesh { merged: None }, ..subject.args.clone() };
+    let args = SceneArgs {
+        sampling: Some(sampling),
+        method: Some(ReconstructionMethod::HybridMesh { merged: None }),
+        ..subject.args.clone()
+    };
     let reference = ReferenceViews::draw(&subject.engine, &setup, &args, views)?;
     let samples = reference.images.iter().flat_map(|image| &image.inverse_depth_per_m).filter(|&&d| d > 0.0).count();
     let rows = reconstruction_names()

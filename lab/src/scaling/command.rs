@@ -94,7 +94,7 @@ impl ScalingArgs {
 pub fn run(args: &ScalingArgs) -> anyhow::Result<Outcome> {
     let request = args.request()?;
     create_dir_all(&args.out).with_context(|| format!("cannot write to {}", args.out.display()))?;
-    let scene = SceneArgs { method: args.method, ..scene_args(args.scene.clone()) };
+    let scene = SceneArgs { method: Some(args.method), ..scene_args(args.scene.clone()) };
     let subject = Subject::load(&scene)?;
     let measured = runtime()?.block_on(take(&request, &subject))?;
     println!("simulating up to {} nodes", args.simulate_to);

@@ -79,7 +79,7 @@ impl Subject {
             scene: offer.scene(),
             sample_cameras: offer.rig.clone(),
             cell_first_indices: Vec::new(),
-            sampling: self.args.sampling.to_string(),
+            sampling: self.args.sampling().to_string(),
             lighting: lighting.to_string(),
             planes: SamplePlanes::default(),
             volume: offer.volume,
@@ -90,7 +90,7 @@ impl Subject {
         };
         MeasureCosts {
             workload,
-            method: self.args.method.to_string(),
+            method: self.args.method().to_string(),
             codec: CODEC.to_owned(),
             typical_views,
             batch_count,

@@ -4,6 +4,7 @@ pub mod coordinator;
 pub mod gateway;
 pub mod health;
 pub mod node;
+pub mod plan;
 pub mod replay;
 pub mod status;
 pub mod up;

@@ -87,6 +87,10 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 4] = [
     },
 ];
 
+/// The steps of the search, and the bound of merged quads in pixels, among which budgets choose.
+const LADDER_STEPS: u32 = 64;
+const LADDER_BOUND_PX: f64 = 0.5;
+
 /// The templates of all methods.
 pub(crate) const SHADERS: [(&str, &str); 6] = wgsl_files! {
     "joint_carve.wgsl", "joint_carve/march.wgsl", "joint_carve/smooth.wgsl", "light_field_search.wgsl", "mesh.wgsl", "hybrid_mesh.wgsl"
@@ -116,6 +120,22 @@ impl ReconstructionMethod {
         match self {
             LightFieldSearch { .. } | JointCarve { .. } | Mesh => RequiredPlanes::default(),
             HybridMesh { .. } => CornerPlanes::REQUIRED,
+        }
+    }
+
+    /// The settings of all methods among which budgets choose. Those of one method follow each other, by rising effort.
+    pub fn ladder() -> impl Iterator<Item = Self> {
+        METHODS.into_iter().flat_map(|row| row.method.by_effort())
+    }
+
+    fn by_effort(self) -> Vec<Self> {
+        match self {
+            JointCarve { .. } => vec![JointCarve { stop_level: 1 }, JointCarve { stop_level: 0 }],
+            LightFieldSearch { .. } => vec![LightFieldSearch { steps: LADDER_STEPS }],
+            Mesh => vec![Mesh],
+            HybridMesh { .. } => {
+                vec![HybridMesh { merged: ErrorBound::from_px(LADDER_BOUND_PX) }, HybridMesh { merged: None }]
+            }
         }
     }
 

@@ -95,6 +95,38 @@ impl SamplingMethod {
         })
     }
 
+    /// The names of the methods among which budgets choose, each with the least number of images of a set. With fewer the
+    /// first method has the same samples. Samples that depend on the planned views serve no others, and are not among them.
+    pub fn ladder() -> impl Iterator<Item = (&'static str, u32)> {
+        METHODS.into_iter().filter_map(|row| row.method.least_images().map(|images| (row.name, images)))
+    }
+
+    fn least_images(self) -> Option<u32> {
+        match self {
+            Conventional(_) => Some(1),
+            NonRedundant(_) | DepthPeeling { .. } => Some(2),
+            Useful(_) => None,
+        }
+    }
+
+    /// The number of images of a set, where it is part of the method.
+    #[must_use]
+    pub fn own_image_count(self) -> Option<u32> {
+        match self {
+            DepthPeeling { layers } => Some(layers),
+            Conventional(_) | NonRedundant(_) | Useful(_) => None,
+        }
+    }
+
+    /// The method for sets of so many images.
+    #[must_use]
+    pub fn with_images(self, count: u32) -> Self {
+        match self {
+            DepthPeeling { .. } => DepthPeeling { layers: count },
+            Conventional(_) | NonRedundant(_) | Useful(_) => self,
+        }
+    }
+
     /// The cameras that images are taken with, for a rig of these cameras.
     #[must_use]
     pub fn cameras(self, rig: Vec<PinholeCamera>) -> Vec<PinholeCamera> {

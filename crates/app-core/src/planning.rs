@@ -1,0 +1,216 @@
+//! The representations among which a budget chooses for a scene, and the terms of a plan on one device.
+
+use anyhow::Context as _;
+use cluster::SceneHash;
+use codec::FrameCodec;
+use coordinator::fitting_size_px;
+use coordinator::schedule::{Load, NodeCosts, pipeline_s};
+use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
+use glam::{UVec2, Vec2};
+use planner::{KeptKey, Ladder, Price, Pricing, Row, RowCosts};
+use probe::{DirectCosts, Representation, Subject};
+use reconstruction::ReconstructionMethod;
+use render::Lighting;
+use sampling::{SamplingMethod, nested_places};
+
+use crate::setup::{SceneArgs, Setup};
+
+/// Numbers of sample cameras.
+const CAMERA_COUNTS: [u32; 4] = [1, 2, 4, 8];
+/// Sides of sample images, as shares of the side that `--sample-size auto` chooses.
+const SIDE_RATIOS: [f64; 3] = [0.5, 0.71, 1.0];
+/// Steps of a cell's size in which its places are named.
+const CELL_STEPS: f32 = 100.0;
+
+/// The views to plan for.
+#[derive(Debug, Clone, Copy)]
+pub struct PlannedViews {
+    /// Columns and rows.
+    pub size_px: UVec2,
+    /// How a view's colour is sampled.
+    pub planes: ViewPlanes,
+    /// How views are delivered.
+    pub codec: FrameCodec,
+    /// The moment.
+    pub scene_time_s: f32,
+    /// The seed of views that are drawn at random.
+    pub seed: u64,
+}
+
+/// A scene, its ladder, and the views to plan for.
+#[derive(Debug, Clone)]
+pub struct Planning {
+    /// The rows.
+    pub ladder: Ladder,
+    /// The representation of each row, in order.
+    pub representations: Vec<Representation>,
+    /// What is measured.
+    pub subject: Subject,
+}
+
+impl Planning {
+    /// The ladder of a scene. What the user names (methods, size of sample images, sample cameras) is the same in all rows.
+    ///
+    /// # Errors
+    /// The scene has no sample cameras, or the user's choices leave no row.
+    pub fn new(setup: &Setup, args: &SceneArgs, views: &PlannedViews) -> anyhow::Result<Self> {
+        let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
+        let view = cell.camera_at(Vec2::ZERO, views.size_px);
+        let rig: Vec<Camera> = setup.around.iter().copied().map(Camera::Pinhole).collect();
+        let fixed_px = args.sample_size.fixed_px();
+        let whole_px = fixed_px.or_else(|| fitting_size_px(&rig, &view)).context("the views have no size")?;
+        let rows = rows(args, setup.around.len() as u32, fixed_px.is_some());
+        let cameras = Cameras { cell: &cell, whole_px, given: args.samples.is_some().then_some(&setup.around) };
+        let representations = rows.iter().map(|row| cameras.representation(row)).collect::<anyhow::Result<_>>()?;
+        let screening = if args.lighting.is_traced() { Lighting::default() } else { args.lighting };
+        let subject = Subject {
+            scene_hash: setup.offer.hash.to_string(),
+            volume: setup.offer.volume,
+            background: setup.offer.background,
+            illumination: setup.offer.illumination.clone(),
+            lighting: args.lighting.to_string(),
+            screening_lighting: screening.to_string(),
+            scene_time_s: views.scene_time_s,
+            cell,
+            view_px: views.size_px,
+            planes: views.planes,
+            codec: views.codec,
+            seed: views.seed,
+        };
+        Ok(Self { ladder: Ladder::new(rows)?, representations, subject })
+    }
+
+    /// The name of the measurements that this plan may use.
+    #[must_use]
+    pub fn key(&self) -> KeptKey {
+        let Subject { scene_hash, lighting, view_px, planes, scene_time_s, .. } = &self.subject;
+        let light = format!("{lighting}; screened in {}; at {scene_time_s} s", self.subject.screening_lighting);
+        let rows = format!("{:?}", self.ladder.rows());
+        KeptKey {
+            scene: scene_hash.clone(),
+            cell: hash(&cell_text(&self.subject.cell)),
+            lighting: hash(&light),
+            view_size: format!("{}x{}, {} samples a pixel", view_px.x, view_px.y, planes.antialias.samples()),
+            ladder_version: hash(&rows),
+        }
+    }
+}
+
+/// The program's version, whose costs are comparable.
+pub const PROGRAM_VERSION: &str = env!("CARGO_PKG_VERSION");
+
+fn hash(text: &str) -> String {
+    SceneHash::of(text.as_bytes()).to_string()
+}
+
+/// The cell to about 1 % of its size.
+fn cell_text(cell: &ViewCell) -> String {
+    let corners = [Vec2::splat(-1.0), Vec2::new(1.0, -1.0), Vec2::ONE].map(|place| cell.camera_at(place, UVec2::ONE));
+    let step_m = (corners[0].eye_in_world - corners[2].eye_in_world).length().max(f32::MIN_POSITIVE) / CELL_STEPS;
+    let text = |camera: &PinholeCamera| {
+        let eye = (camera.eye_in_world / step_m).round();
+        let forward = (camera.forward_in_world() * CELL_STEPS).round();
+        format!("{eye} {forward} {:.2}", camera.focal_px.y)
+    };
+    corners.each_ref().map(text).join("; ")
+}
+
+fn rows(args: &SceneArgs, given_cameras: u32, is_size_fixed: bool) -> Vec<Row> {
+    let samplings: Vec<(String, u32)> = match args.sampling {
+        Some(sampling) => vec![(sampling.to_string(), 1)],
+        None => SamplingMethod::ladder().map(|(name, images)| (name.to_owned(), images)).collect(),
+    };
+    let methods: Vec<ReconstructionMethod> = match args.method {
+        Some(method) => vec![method],
+        None => ReconstructionMethod::ladder().collect(),
+    };
+    let own_count = args.sampling.and_then(SamplingMethod::own_image_count);
+    let counts = match (own_count, args.samples.is_some()) {
+        (Some(count), _) => vec![count],
+        (None, true) => vec![given_cameras],
+        (None, false) => CAMERA_COUNTS.to_vec(),
+    };
+    let sides = if is_size_fixed { &SIDE_RATIOS[2..] } else { &SIDE_RATIOS[..] };
+    let mut rows = Vec::new();
+    for (sampling, least_images) in &samplings {
+        for &camera_count in counts.iter().filter(|&count| count >= least_images) {
+            for &side_ratio in sides {
+                rows.extend(methods.iter().enumerate().map(|(place, method)| Row {
+                    sampling: sampling.clone(),
+                    method: method.to_string(),
+                    camera_count,
+                    side_ratio,
+                    kind: format!("{} {}", without_setting(sampling), without_setting(&method.to_string())),
+                    rank: rank(&methods, place),
+                }));
+            }
+        }
+    }
+    rows
+}
+
+/// The place of a setting among those of its method.
+fn rank(methods: &[ReconstructionMethod], place: usize) -> u32 {
+    let is_same =
+        |other: &&ReconstructionMethod| std::mem::discriminant(*other) == std::mem::discriminant(&methods[place]);
+    methods[..place].iter().filter(is_same).count() as u32
+}
+
+fn without_setting(method: &str) -> &str {
+    method.split(':').next().unwrap_or(method)
+}
+
+/// The places of a ladder's sample cameras.
+struct Cameras<'a> {
+    cell: &'a ViewCell,
+    /// The size of images at a side ratio of 1.
+    whole_px: UVec2,
+    /// Those of the user.
+    given: Option<&'a Vec<PinholeCamera>>,
+}
+
+impl Cameras<'_> {
+    fn representation(&self, row: &Row) -> anyhow::Result<Representation> {
+        let size_px = (self.whole_px.as_vec2() * row.side_ratio as f32).round().as_uvec2().max(UVec2::ONE);
+        let rig = match self.given {
+            Some(given) => given.iter().map(|camera| camera.resized(size_px)).collect(),
+            None => {
+                let places = nested_places(row.camera_count as usize);
+                places.iter().map(|&place| self.cell.camera_at(place, size_px)).collect()
+            }
+        };
+        let sampling = row.sampling.parse::<SamplingMethod>()?.with_images(row.camera_count);
+        let sample_cameras = sampling.cameras(rig).into_iter().map(Camera::Pinhole).collect();
+        Ok(Representation { sampling: sampling.to_string(), method: row.method.clone(), sample_cameras })
+    }
+}
+
+/// Prices on a cluster of one node, as the schedule predicts them.
+#[derive(Debug, Clone, Copy)]
+pub struct OneNode {
+    /// V: the views of a sample set.
+    pub views_a_set: usize,
+    /// What drawing directly and encoding cost.
+    pub direct: DirectCosts,
+}
+
+impl Pricing for OneNode {
+    fn row(&self, row: &Row, costs: &RowCosts) -> Price {
+        let costs = cluster::Costs {
+            sample_image_s: costs.sample_image_s,
+            load_set_s: costs.load_set_s,
+            reconstruct_view_s: costs.reconstruct_view_s,
+            encode_view_s: self.direct.encode_view_s,
+            ..cluster::Costs::default()
+        };
+        let node = NodeCosts { costs, transfer_image_s: None };
+        let load = Load { images: row.camera_count as usize, views: self.views_a_set, ..Load::default() };
+        let set_s = pipeline_s(&load, &[node], &[true]);
+        Price { node_s: set_s / self.views_a_set.max(1) as f64, view_s: node.view_s() }
+    }
+
+    fn direct(&self) -> Price {
+        let view_s = self.direct.direct_view_s + self.direct.encode_view_s;
+        Price { node_s: view_s, view_s }
+    }
+}

@@ -1,0 +1,349 @@
+//! The errors and the costs of representations, measured on one device.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use codec::{DecodeError, DecodeLimits, FrameError, PlaneSet, decode_depth_image, encode_depth_image, encode_view};
+use depth_image::{DepthImage, DepthImageError, PinholeCamera, View, ViewPlanes};
+use metrics::MetricsError;
+use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, own_time};
+use planner::{ProbeView, RowCosts, ViewErrors};
+use rayon::prelude::*;
+
+use crate::errors_of_views::view_errors;
+use crate::representation::Representation;
+use crate::sets::{SampledSet, SetKey, Sets};
+use crate::subject::{Light, Subject};
+
+/// Views that are timed at once, at least, unless they are large: a batch has fixed costs.
+const TIMED_VIEWS: usize = 16;
+/// Times that views are drawn directly for their cost.
+const DIRECT_RUNS: usize = 3;
+/// The most pixels of views that are only timed.
+const TIMED_PIXELS: usize = 1 << 20;
+/// The most bytes of true views in memory; beyond, they are drawn again when they are needed.
+const MAX_TRUTH_BYTES: usize = 512 << 20;
+
+/// Why a representation cannot be measured.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming")]
+pub enum ProbeError {
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    #[error("a sample image cannot be encoded: {0}")]
+    Encode(#[from] DepthImageError),
+    #[error("a sample image cannot be decoded: {0}")]
+    Decode(#[from] DecodeError),
+    #[error("codec: {0}")]
+    Frame(#[from] FrameError),
+    #[error("views cannot be compared: {0}")]
+    Metrics(#[from] MetricsError),
+}
+
+/// The costs of views that are drawn from the scene, in s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DirectCosts {
+    /// g_v.
+    pub direct_view_s: f64,
+    /// e.
+    pub encode_view_s: f64,
+}
+
+/// Views of a representation, with what they were made of.
+#[derive(Debug, Clone)]
+pub struct Measured {
+    /// The views, with depth and provenance.
+    pub views: Vec<View>,
+    /// The sample images as compositors decode them.
+    pub sample_images: Vec<DepthImage>,
+    /// Bytes of the encoded set.
+    pub set_bytes: usize,
+    /// The costs, with g_s in the light of the images.
+    pub costs: RowCosts,
+}
+
+/// Measures representations of one subject. Work is in `turn` among other work of the device, and the time for which it
+/// waits does not count.
+pub struct Prober<'a> {
+    engine: &'a dyn Engine,
+    subject: Subject,
+    turn: Turn,
+    truths: BTreeMap<(Light, ProbeView), Arc<View>>,
+    sets: Sets,
+    /// Shaders that are built: the first run of an operation is not timed.
+    warm: BTreeSet<String>,
+}
+
+impl<'a> Prober<'a> {
+    /// A prober of a subject whose scene is loaded.
+    #[must_use]
+    pub fn new(engine: &'a dyn Engine, subject: Subject, turn: Turn) -> Self {
+        let (truths, sets, warm) = Default::default();
+        Self { engine, subject, turn, truths, sets, warm }
+    }
+
+    /// The subject.
+    #[must_use]
+    pub fn subject(&self) -> &Subject {
+        &self.subject
+    }
+
+    /// The errors of a representation on some views in a light, and its costs in the light of the session.
+    ///
+    /// # Errors
+    /// The device fails, or refuses the representation.
+    pub fn probe(
+        &mut self,
+        of: &Representation,
+        light: Light,
+        views: &[ProbeView],
+    ) -> Result<(Vec<ViewErrors>, RowCosts), ProbeError> {
+        let truths = self.truths(light, views)?;
+        let measured = self.measure(of, light, views)?;
+        let pairs: Vec<_> = views.iter().zip(&truths).zip(&measured.views).collect();
+        let errors = pairs.into_par_iter().map(|((view, truth), made)| {
+            view_errors(&self.subject.camera(*view), truth, made, &measured.sample_images)
+        });
+        let errors = errors.collect::<Result<_, _>>()?;
+        let sample_image_s = self.sample_image_s(of, light, measured.costs.sample_image_s)?;
+        Ok((errors, RowCosts { sample_image_s, ..measured.costs }))
+    }
+
+    /// Views of a representation in a light, and its costs in that light.
+    ///
+    /// # Errors
+    /// As [`Prober::probe`].
+    pub fn measure(&mut self, of: &Representation, light: Light, views: &[ProbeView]) -> Result<Measured, ProbeError> {
+        let sampled = self.sampled(of, light)?;
+        let images = &sampled.images[..of.sample_cameras.len()];
+        let (set, load_set_s) = self.loaded(of, light, images)?;
+        let cameras: Vec<PinholeCamera> = views.iter().map(|&view| self.subject.camera(view)).collect();
+        let work = self.view_work(of, self.timed_cameras(&cameras), self.subject.compared_planes());
+        let (made, seconds) = self.timed(|engine, turn| engine.reconstruct(set.as_ref(), &work, turn))?;
+        let reconstruct_view_s = seconds / made.len().max(1) as f64;
+        let mut views = made;
+        views.truncate(cameras.len());
+        Ok(Measured {
+            views,
+            sample_images: images.to_vec(),
+            set_bytes: sampled.encoded_bytes[..images.len()].iter().sum(),
+            costs: RowCosts { sample_image_s: sampled.sample_image_s, load_set_s, reconstruct_view_s },
+        })
+    }
+
+    /// The median costs of representations that are timed in turn, in the light of the session. Nothing is kept from
+    /// earlier measurements.
+    ///
+    /// # Errors
+    /// As [`Prober::probe`].
+    pub fn time(
+        &mut self,
+        all: &[Representation],
+        view_count: usize,
+        repeats: usize,
+    ) -> Result<Vec<RowCosts>, ProbeError> {
+        let views: Vec<ProbeView> = (0..view_count as u32).map(ProbeView::Screening).collect();
+        let mut costs = vec![Vec::with_capacity(repeats); all.len()];
+        for _ in 0..repeats.max(1) {
+            for (of, costs) in all.iter().zip(&mut costs) {
+                self.sets = Sets::default();
+                costs.push(self.measure(of, Light::Session, &views)?.costs);
+            }
+        }
+        Ok(costs.iter().map(|costs| median_costs(costs)).collect())
+    }
+
+    /// The same views drawn from the scene, with depth.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn truths(&mut self, light: Light, views: &[ProbeView]) -> Result<Vec<Arc<View>>, ProbeError> {
+        let light = self.same_light(light);
+        let missing: Vec<ProbeView> =
+            views.iter().copied().filter(|view| !self.truths.contains_key(&(light, *view))).collect();
+        let bytes = |views: usize| views * self.subject.view_px.element_product() as usize * 7;
+        if bytes(self.truths.len() + missing.len()) > MAX_TRUTH_BYTES {
+            self.truths.retain(|(_, view), _| views.contains(view));
+        }
+        if !missing.is_empty() {
+            let work = self.direct_work(light, &missing, ViewPlanes { inverse_depth: true, ..self.subject.planes });
+            let drawn = self.engine.draw_direct(&work, self.turn)?;
+            self.truths.extend(missing.into_iter().map(|view| (light, view)).zip(drawn.into_iter().map(Arc::new)));
+        }
+        Ok(views.iter().map(|view| self.truths[&(light, *view)].clone()).collect())
+    }
+
+    /// The costs of drawing views directly in the light of the session, and of encoding them.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn direct_costs(&mut self) -> Result<DirectCosts, ProbeError> {
+        let work = |views: usize| {
+            let views: Vec<ProbeView> = (0..views as u32).map(ProbeView::Screening).collect();
+            self.direct_work(Light::Session, &views, self.subject.planes)
+        };
+        let (_, alone_s) = self.median_s(|engine, turn| engine.draw_direct(&work(1), turn))?;
+        // About a second of drawing at most.
+        let batch = work(((1.0 / alone_s.max(1e-3)) as usize).clamp(1, TIMED_VIEWS));
+        let (drawn, direct_s) = self.median_s(|engine, turn| engine.draw_direct(&batch, turn))?;
+        let codec = self.subject.codec;
+        let (encoded, encode_s) =
+            own_time(self.engine, || drawn.iter().try_for_each(|view| encode_view(view, codec).map(drop)));
+        encoded?;
+        let of_view = |seconds: f64| seconds / drawn.len().max(1) as f64;
+        Ok(DirectCosts { direct_view_s: of_view(direct_s), encode_view_s: of_view(encode_s) })
+    }
+
+    /// The median time of some runs after a warm-up, in which shaders are built.
+    fn median_s<T>(&self, run: impl Fn(&dyn Engine, Turn) -> Result<T, EngineError>) -> Result<(T, f64), ProbeError> {
+        let done = run(self.engine, self.turn)?;
+        let mut seconds = Vec::with_capacity(DIRECT_RUNS);
+        for _ in 0..DIRECT_RUNS {
+            seconds.push(self.timed(&run)?.1);
+        }
+        Ok((done, median(seconds)))
+    }
+
+    /// g_s in the light of the session, from as few images as possible if another light was measured.
+    fn sample_image_s(&mut self, of: &Representation, light: Light, measured_s: f64) -> Result<f64, ProbeError> {
+        if self.same_light(light) == Light::Session {
+            return Ok(measured_s);
+        }
+        let work = self.fewest(self.sample_work(of, Light::Session)?)?;
+        if self.is_first(&format!("sample {} {:?} {}", of.sampling, work.planes, work.lighting)) {
+            self.engine.sample(&work, self.turn)?;
+        }
+        let (images, seconds) = self.timed(|engine, turn| engine.sample(&work, turn))?;
+        images.iter().try_for_each(|image| encode_depth_image(image, PlaneSet::ALL).map(drop))?;
+        Ok(seconds / images.len().max(1) as f64)
+    }
+
+    /// The fewest images of a set that can be sampled alone.
+    fn fewest(&self, work: SampleWork) -> Result<SampleWork, ProbeError> {
+        let is_independent = self.engine.images_are_independent(&work.sampling)?;
+        Ok(if is_independent { SampleWork { wanted: vec![0], ..work } } else { work })
+    }
+
+    /// The set of a representation, at least.
+    fn sampled(&mut self, of: &Representation, light: Light) -> Result<Arc<SampledSet>, ProbeError> {
+        let work = self.sample_work(of, light)?;
+        let key = SetKey { sampling: of.sampling.clone(), planes: work.planes, light: self.same_light(light) };
+        let is_independent = self.engine.images_are_independent(&of.sampling)?;
+        if let Some(set) = self.sets.find(&key, &of.sample_cameras, is_independent) {
+            return Ok(set);
+        }
+        if self.is_first(&format!("sample {} {:?} {}", of.sampling, work.planes, work.lighting)) {
+            self.engine.sample(&self.fewest(work.clone())?, self.turn)?;
+        }
+        let (encoded, seconds) = own_time(self.engine, || {
+            let images = self.engine.sample(&work, self.turn)?;
+            let encoded = images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL));
+            Ok::<_, ProbeError>(encoded.collect::<Result<Vec<_>, _>>()?)
+        });
+        let encoded = encoded?;
+        let decoded = encoded.iter().zip(&of.sample_cameras).map(|(image, camera)| {
+            decode_depth_image(&image.header, *camera, &image.payload, &DecodeLimits::default())
+        });
+        let set = Arc::new(SampledSet {
+            images: decoded.collect::<Result<_, _>>()?,
+            encoded_bytes: encoded.iter().map(|image| image.payload.len()).collect(),
+            sample_image_s: seconds / encoded.len().max(1) as f64,
+        });
+        self.sets.keep(key, set.clone());
+        Ok(set)
+    }
+
+    /// The set on the device, and d: its upload, and what its first view costs more than others, such as quads.
+    fn loaded(
+        &mut self,
+        of: &Representation,
+        light: Light,
+        images: &[DepthImage],
+    ) -> Result<(Arc<dyn UploadedSet>, f64), ProbeError> {
+        let sample_set = SampleSet {
+            scene_hash: self.subject.scene_hash.clone(),
+            images: images.to_vec(),
+            volume: self.subject.volume,
+            background: self.subject.background,
+            illumination: self.subject.illumination.clone(),
+            lighting: self.subject.lighting(light).to_owned(),
+        };
+        let camera = self.subject.camera(ProbeView::Screening(0));
+        let one = self.view_work(of, vec![camera], self.subject.compared_planes());
+        if self.is_first(&format!("view {} {}", of.method, images.len())) {
+            let set = self.engine.upload(&sample_set, self.turn)?;
+            self.engine.reconstruct(set.as_ref(), &one, self.turn)?;
+        }
+        let (set, upload_s) = self.timed(|engine, turn| engine.upload(&sample_set, turn))?;
+        let mut view_s = [0.0; 2];
+        for seconds in &mut view_s {
+            *seconds = self.timed(|engine, turn| engine.reconstruct(set.as_ref(), &one, turn))?.1;
+        }
+        let [first_s, next_s] = view_s;
+        Ok((set, upload_s + (first_s - next_s).max(0.0)))
+    }
+
+    /// The cameras, repeated until a batch of them can be timed.
+    fn timed_cameras(&self, cameras: &[PinholeCamera]) -> Vec<PinholeCamera> {
+        let pixels = self.subject.view_px.element_product().max(1) as usize;
+        let count = TIMED_VIEWS.min(TIMED_PIXELS / pixels).max(cameras.len());
+        cameras.iter().copied().cycle().take(count).collect()
+    }
+
+    fn sample_work(&self, of: &Representation, light: Light) -> Result<SampleWork, ProbeError> {
+        Ok(SampleWork {
+            scene_hash: self.subject.scene_hash.clone(),
+            cameras: of.sample_cameras.clone(),
+            wanted: (0..of.sample_cameras.len() as u32).collect(),
+            sampling: of.sampling.clone(),
+            planes: self.engine.sample_planes(&of.method)?,
+            lighting: self.subject.lighting(light).to_owned(),
+            scene_time_s: self.subject.scene_time_s,
+            temporal_reference_s: None,
+            refinement: cluster::Refinement::default(),
+        })
+    }
+
+    fn view_work(&self, of: &Representation, cameras: Vec<PinholeCamera>, planes: ViewPlanes) -> ViewWork {
+        ViewWork { cameras, method: of.method.clone(), planes }
+    }
+
+    fn direct_work(&self, light: Light, views: &[ProbeView], planes: ViewPlanes) -> DirectWork {
+        DirectWork {
+            scene_hash: self.subject.scene_hash.clone(),
+            cameras: views.iter().map(|&view| self.subject.camera(view)).collect(),
+            lighting: self.subject.lighting(light).to_owned(),
+            scene_time_s: self.subject.scene_time_s,
+            planes,
+        }
+    }
+
+    /// Two lights of one text are one light.
+    fn same_light(&self, light: Light) -> Light {
+        if self.subject.lighting == self.subject.screening_lighting { Light::Session } else { light }
+    }
+
+    fn is_first(&mut self, operation: &str) -> bool {
+        self.warm.insert(operation.to_owned())
+    }
+
+    fn timed<T>(&self, run: impl FnOnce(&dyn Engine, Turn) -> Result<T, EngineError>) -> Result<(T, f64), ProbeError> {
+        let (done, seconds) = own_time(self.engine, || run(self.engine, self.turn));
+        Ok((done?, seconds))
+    }
+}
+
+fn median_costs(costs: &[RowCosts]) -> RowCosts {
+    let of = |cost: fn(&RowCosts) -> f64| median(costs.iter().map(cost).collect());
+    RowCosts {
+        sample_image_s: of(|costs| costs.sample_image_s),
+        load_set_s: of(|costs| costs.load_set_s),
+        reconstruct_view_s: of(|costs| costs.reconstruct_view_s),
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
+}

@@ -1,0 +1,121 @@
+//! `myriorama study fronts`.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use anyhow::Context as _;
+use app_core::exit::{BadInput, Outcome};
+use app_core::setup::DeviceArgs;
+use clap::Args;
+use depth_image::Antialias;
+use engine::GpuEngine;
+use node::Engine as _;
+use planner::ProbeView;
+use study::{Bar, Check, Report};
+
+use super::checks::checks;
+use super::conditions::{self, Conditions};
+use super::measure::{Front, Limits};
+use super::report::add_to;
+use super::subject::Subject;
+use crate::progress::bar;
+
+/// Views that rows are measured on, in the quick form and in the full one.
+const VIEWS: [u32; 2] = [8, 32];
+/// What a run is given for reports and the like, beyond `--time`.
+const GRACE_S: f64 = 15.0;
+/// The longest quick run.
+const QUICK_S: f64 = 600.0;
+
+/// Measures cost and error of all rows of the ladder on the subjects of study/conditions.toml, and charts the fronts.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  myriorama study fronts --quick --strict   four subjects, every second number of cameras and size
+  myriorama study fronts --time 60          what a minute allows, spread over all rows; the report says what is missing
+  myriorama study fronts --subject urban    one subject, all rows")]
+pub struct FrontsArgs {
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// Where the report goes
+    #[arg(long, default_value = "out/study/fronts", value_name = "DIR")]
+    out: PathBuf,
+    /// Measures four subjects, every second number of cameras and size, and fewer views
+    #[arg(long)]
+    quick: bool,
+    /// Measuring ends after about so many seconds, and what was measured by then is reported
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    time: Option<u32>,
+    /// Only subjects whose names contain this text, in any case
+    #[arg(long = "subject", value_name = "TEXT")]
+    subjects: Vec<String>,
+    /// Subjects from a file in the form of study/conditions.toml, in place of its own
+    #[arg(long, value_name = "FILE")]
+    conditions: Option<PathBuf>,
+    /// Exit status 1 when a check falls short
+    #[arg(long)]
+    strict: bool,
+}
+
+impl FrontsArgs {
+    fn wanted(&self) -> anyhow::Result<Vec<Conditions>> {
+        let is_wanted = |subject: &Conditions| {
+            let name = subject.name.to_lowercase();
+            let is_named = self.subjects.iter().any(|text| name.contains(&text.to_lowercase()));
+            if self.subjects.is_empty() { !self.quick || subject.quick } else { is_named }
+        };
+        let all = conditions::read(self.conditions.as_deref())?;
+        let wanted: Vec<Conditions> = all.into_iter().filter(is_wanted).collect();
+        if wanted.is_empty() {
+            return Err(BadInput(format!("no subject's name contains {:?}", self.subjects)).into());
+        }
+        Ok(wanted)
+    }
+
+    /// The share of the time that is left for the next of `subjects` subjects.
+    fn limits(&self, start: Instant, subjects: usize) -> Limits {
+        let end = self.time.map(|seconds| {
+            let left = Duration::from_secs(u64::from(seconds)).saturating_sub(start.elapsed());
+            Instant::now() + left / subjects.max(1) as u32
+        });
+        let views = (0..VIEWS[usize::from(!self.quick)]).map(ProbeView::Screening).collect();
+        Limits { end, views, every_second: self.quick }
+    }
+}
+
+/// Measures all subjects and writes the report.
+///
+/// # Errors
+/// A subject cannot be used, the device fails, or the folder cannot be written.
+pub fn run(args: &FrontsArgs) -> anyhow::Result<Outcome> {
+    let (start, wanted) = (Instant::now(), args.wanted()?);
+    let engine = GpuEngine::shared(args.device.device)?;
+    let mut fronts = Vec::with_capacity(wanted.len());
+    for (place, conditions) in wanted.iter().enumerate() {
+        let limits = args.limits(start, wanted.len() - place);
+        fronts.push(front(&engine, conditions, &limits).with_context(|| format!("subject {:?}", conditions.name))?);
+    }
+    let mut report = Report::new("Myriorama study: fronts", engine.device_name());
+    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    report.parameter("views a row", VIEWS[usize::from(!args.quick)] as usize);
+    for front in &fronts {
+        add_to(&mut report, front)?;
+    }
+    report.checks.extend(checks(&fronts));
+    let seconds = start.elapsed().as_secs_f64();
+    let most_s = args.time.map_or(QUICK_S, |seconds| f64::from(seconds) + GRACE_S);
+    if args.quick || args.time.is_some() {
+        report.checks.push(Check::new("time of the run", seconds, "s", Bar::AtMost(most_s)));
+    }
+    let ok = report.finish(&args.out)?;
+    Ok(Outcome::of(ok || !args.strict))
+}
+
+fn front(engine: &Arc<GpuEngine>, conditions: &Conditions, limits: &Limits) -> anyhow::Result<Front> {
+    let subject = Subject::load(engine, conditions)?;
+    let planning = subject.planning(Antialias::NONE, conditions.seed)?;
+    let progress = bar(format!("rows, {}", conditions.name), planning.ladder.rows().len());
+    let front = Front::measure(&subject, &planning, limits, || progress.inc(1))?;
+    progress.finish_and_clear();
+    Ok(front)
+}

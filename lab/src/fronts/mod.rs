@@ -1,0 +1,10 @@
+//! `myriorama study fronts`: cost against error of every representation among which a budget chooses.
+
+mod checks;
+pub mod command;
+mod conditions;
+mod measure;
+mod order;
+mod report;
+pub(crate) mod row;
+pub(crate) mod subject;

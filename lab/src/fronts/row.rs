@@ -1,0 +1,90 @@
+//! The figures of one row on one subject.
+
+use std::sync::Arc;
+
+use depth_image::View;
+use metrics::{DepthErrors, depth_errors};
+use planner::{Metric, Price, Pricing, ProbeView, Row, RowCosts, ViewErrors};
+use probe::{Light, Prober, Representation, view_errors};
+use rayon::prelude::*;
+
+use crate::evaluation::known_depth;
+
+/// A measured row.
+#[derive(Debug, Clone)]
+pub struct MeasuredRow {
+    /// The place in the ladder.
+    pub place: usize,
+    pub row: Row,
+    pub costs: RowCosts,
+    pub price: Price,
+    /// Bytes of an encoded set.
+    pub set_bytes: usize,
+    /// Texels of a set that hold a sample.
+    pub samples: usize,
+    /// Of each view.
+    pub errors: Vec<ViewErrors>,
+    /// Hits off by more than 1 % in depth, of all hits.
+    pub wrong_hits: f64,
+    /// Pixels that are filled without a sample, of all.
+    pub filled: f64,
+}
+
+impl MeasuredRow {
+    /// Measures a row on views.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn measure(
+        prober: &mut Prober<'_>,
+        (place, row): (usize, &Row),
+        representation: &Representation,
+        views: &[ProbeView],
+        pricing: &impl Pricing,
+    ) -> anyhow::Result<Self> {
+        let truths = prober.truths(Light::Session, views)?;
+        let measured = prober.measure(representation, Light::Session, views)?;
+        let subject = prober.subject();
+        let pairs: Vec<_> = views.iter().zip(&truths).zip(&measured.views).collect();
+        let of_view = |((view, truth), made): ((&ProbeView, &Arc<View>), &View)| {
+            let errors = view_errors(&subject.camera(*view), truth, made, &measured.sample_images)?;
+            let depth = depth_errors(&known_depth(truth)?, &known_depth(made)?, None)?;
+            anyhow::Ok((errors, depth))
+        };
+        let of_views = pairs.into_par_iter().map(of_view).collect::<anyhow::Result<Vec<_>>>()?;
+        let sum = |of: fn(&DepthErrors) -> usize| of_views.iter().map(|(_, depth)| of(depth)).sum::<usize>() as f64;
+        let depths = measured.sample_images.iter().flat_map(|image| &image.inverse_depth_per_m);
+        Ok(Self {
+            place,
+            row: row.clone(),
+            costs: measured.costs,
+            price: pricing.row(row, &measured.costs),
+            set_bytes: measured.set_bytes,
+            samples: depths.filter(|&&inverse| inverse > 0.0).count(),
+            errors: of_views.iter().map(|(errors, _)| *errors).collect(),
+            wrong_hits: sum(|depth| depth.wrong_hit_px) / sum(|depth| depth.hit_px).max(1.0),
+            filled: sum(|depth| depth.unknown_px) / sum(|depth| depth.pixels).max(1.0),
+        })
+    }
+
+    /// The error in the mean over the foreground of all views.
+    #[must_use]
+    pub fn error_ratio(&self, metric: Metric) -> f64 {
+        mean_error(&self.errors, metric)
+    }
+
+    /// PSNR of the mean squared error over the foreground, in dB; at most that of reports.
+    #[must_use]
+    pub fn psnr_db(&self) -> f64 {
+        (-10.0 * self.error_ratio(Metric::Psnr).log10()).min(metrics::PSNR_CAP_DB)
+    }
+}
+
+/// The mean error over the pixels that count, of all views.
+#[must_use]
+pub fn mean_error(errors: &[ViewErrors], metric: Metric) -> f64 {
+    let (sum, weight) = errors
+        .iter()
+        .fold((0.0, 0.0), |(sum, weight), view| (sum + view.excess(metric, 0.0), weight + view.weight(metric)));
+    if weight > 0.0 { sum / weight } else { 0.0 }
+}

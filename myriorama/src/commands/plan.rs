@@ -1,0 +1,160 @@
+//! `myriorama plan`: the cheapest representation of a scene that keeps an error budget.
+
+mod output;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use app_core::exit::Outcome;
+use app_core::plan_files::PlanFiles;
+use app_core::planning::{OneNode, PROGRAM_VERSION, PlannedViews, Planning};
+use app_core::setup::{DeviceArgs, SceneArgs, Setup};
+use app_core::sizes::SizePx;
+use clap::Args;
+use codec::FrameCodec;
+use depth_image::{Antialias, ViewPlanes};
+use engine::GpuEngine;
+use indicatif::ProgressBar;
+use node::{Engine as _, Turn, WorkClass};
+use output::Output;
+use planner::{Budget, Kept, PlanRequest, Planner, Pricing as _, PromiseState};
+use probe::Prober;
+
+/// Seconds for which a viewer is shown one set of a still scene, as far as costs are concerned.
+const STILL_SET_S: f64 = 60.0;
+/// Rows of a round of certificates; fewer where every true view is expensive.
+const MOST_CERTIFIED: usize = 8;
+const MOST_CERTIFIED_TRACED: usize = 3;
+
+/// Finds the cheapest representation of a scene that keeps a budget: how it is sampled, from how many cameras, in images of
+/// which size, and how views are reconstructed. Prints the choice, the reason, the front of cost against error, and the
+/// flags that repeat it. Writes rows.csv and samples.json, the sample cameras in the transforms.json convention, to --out.
+/// docs/planner.md says what is promised.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct PlanArgs {
+    /// The most error, and the most time of a view: METRIC [p95] LIMIT, time LIMIT, or both with a comma between. Metrics
+    /// are flip, flip whole, psnr and disocclusion; with p95 the limit is on 95 views in 100, otherwise on the mean
+    #[arg(long, value_name = "BUDGET")]
+    budget: Budget,
+    #[command(flatten)]
+    device: DeviceArgs,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Size of the views
+    #[arg(long, default_value = "200x150", value_name = "WxH")]
+    size: SizePx,
+    /// Samples a pixel of the views: 1, 2, 4, 8 or 16
+    #[arg(long, default_value = "4", value_name = "N")]
+    antialias: Antialias,
+    /// The codec of frames, whose time counts: lz4 or png (lossless), or jpeg:QUALITY
+    #[arg(long, default_value = "lz4", value_name = "NAME")]
+    codec: FrameCodec,
+    /// Views of a sample set, which share its cost
+    #[arg(long, default_value_t = 290, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    views: u32,
+    /// Poses a second of a moving viewer, in place of --views: a set of a still scene serves 60 s of them
+    #[arg(long, value_name = "HZ", conflicts_with = "views", value_parser = rate)]
+    rate: Option<f64>,
+    /// The most time of measuring
+    #[arg(long, default_value_t = 300.0, value_name = "S", value_parser = allowance)]
+    allowance: f64,
+    /// The seed of the random views
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    seed: u64,
+    /// The folder of measurements, which later plans use again [default: myriorama/plans in the folder for caches]
+    #[arg(long, value_name = "DIR")]
+    plans: Option<PathBuf>,
+    /// The folder of samples.json and rows.csv
+    #[arg(long, default_value = "out/plan", value_name = "DIR")]
+    out: PathBuf,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  myriorama plan --scene urban --budget \"disocclusion 0.5%\"
+  myriorama plan --scene tree-terrain-125k --budget \"flip p95 0.06, time 8ms\"
+  myriorama plan --scene helmet.gltf --budget \"psnr 32\" --rate 30 --method mesh
+
+Exit status: 0 the budget is kept; 1 nothing keeps it; 2 arguments or input that cannot be used; 3 a failure.";
+
+fn rate(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|hz| (0.01..=1000.0).contains(hz)).ok_or_else(|| "expected 0.01 to 1000".to_owned())
+}
+
+fn allowance(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|s| (1.0..=1e6).contains(s)).ok_or_else(|| "expected 1 to 1000000".to_owned())
+}
+
+impl PlanArgs {
+    /// V: the views that share the cost of a set.
+    fn views_a_set(&self, setup: &Setup) -> usize {
+        match self.rate {
+            None => self.views as usize,
+            // Each pose of a moving scene is of another moment.
+            Some(_) if setup.offer.period_s.is_some() => 1,
+            Some(hz) => (hz * STILL_SET_S).ceil() as usize,
+        }
+    }
+
+    fn request(&self, planning: &Planning, device: String) -> PlanRequest {
+        let is_traced = self.scene.lighting.is_traced();
+        PlanRequest {
+            plan: 1,
+            budget: self.budget,
+            key: planning.key(),
+            device,
+            program_version: PROGRAM_VERSION.to_owned(),
+            view_pixels: f64::from(self.size.0.element_product()),
+            allowance_s: self.allowance,
+            most_certified: if is_traced { MOST_CERTIFIED_TRACED } else { MOST_CERTIFIED },
+            seed: self.seed,
+        }
+    }
+
+    fn plan_files(&self) -> Option<PlanFiles> {
+        self.plans.clone().or_else(PlanFiles::default_folder).map(PlanFiles::at)
+    }
+}
+
+/// Plans, prints and writes.
+///
+/// # Errors
+/// The scene cannot be used, the device fails, or the folder cannot be written.
+pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
+    let setup = args.scene.load()?;
+    let engine = GpuEngine::shared(args.device.device)?;
+    engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
+    let views = PlannedViews {
+        size_px: args.size.0,
+        planes: ViewPlanes { antialias: args.antialias, ..ViewPlanes::COLOR },
+        codec: args.codec,
+        scene_time_s: 0.0,
+        seed: args.seed,
+    };
+    let planning = Planning::new(&setup, &args.scene, &views)?;
+    let mut prober = Prober::new(engine.as_ref(), planning.subject.clone(), Turn::of(WorkClass::Batch));
+    let pricing = OneNode { views_a_set: args.views_a_set(&setup), direct: prober.direct_costs()? };
+    let request = args.request(&planning, device_name(&engine));
+    let files = args.plan_files();
+    let remembered = files.as_ref().map_or_else(|| Kept::empty(planning.key()), |files| files.read(&planning.key()));
+    let mut planner = Planner::new(request, planning.ladder.clone(), pricing)?;
+    let progress = ProgressBar::new_spinner();
+    progress.enable_steady_tick(Duration::from_millis(200));
+    let observe = |planner: &Planner<OneNode>| progress.set_message(planner.outcome().reason);
+    let (outcome, kept) = probe::plan(&mut planner, &mut prober, &planning.representations, remembered, observe);
+    progress.finish_and_clear();
+    if let Some(files) = files {
+        // The plan is made, whether a later one can use what was measured or not.
+        files.write(&kept).unwrap_or_else(|error| eprintln!("warning: measurements are not kept: {error}"));
+    }
+    let output = Output { args, setup: &setup, planning: &planning, outcome: &outcome };
+    output.write(&planner.summaries(), pricing.direct())?;
+    println!("\n{:.1} s of measuring; all rows are in {}", planner.spent_s(), args.out.join("rows.csv").display());
+    Ok(Outcome::of(outcome.state == PromiseState::Kept))
+}
+
+/// The device's name, as far as kept measurements have room for it.
+fn device_name(engine: &GpuEngine) -> String {
+    engine.device_name().chars().take(64).filter(char::is_ascii).collect()
+}

@@ -1,0 +1,141 @@
+//! What a plan prints and writes.
+
+use std::path::Path;
+
+use anyhow::Context as _;
+use app_core::camera_record::{self, NamedCamera};
+use app_core::planning::Planning;
+use app_core::setup::Setup;
+use depth_image::Camera;
+use planner::{Choice, Metric, Outcome, Price, RowSummary};
+use probe::Representation;
+use serde_json::Map;
+use table::{Cell, Table};
+
+use super::PlanArgs;
+
+/// A plan that is made.
+pub(super) struct Output<'a> {
+    pub(super) args: &'a PlanArgs,
+    pub(super) setup: &'a Setup,
+    pub(super) planning: &'a Planning,
+    pub(super) outcome: &'a Outcome,
+}
+
+/// A line of the table.
+struct Line {
+    name: String,
+    state: String,
+    error_ratio: Option<f64>,
+    price: Price,
+    is_measured: bool,
+    views: usize,
+}
+
+impl Output<'_> {
+    /// Prints the choice, its reason, the front and the flags; writes the files.
+    pub(super) fn write(&self, rows: &[RowSummary], direct: Price) -> anyhow::Result<()> {
+        let lines = self.lines(rows, direct);
+        let out = &self.args.out;
+        std::fs::create_dir_all(out).with_context(|| format!("cannot create {}", out.display()))?;
+        let csv = out.join("rows.csv");
+        let all = self.table("all rows", lines.iter())?.to_csv()?;
+        std::fs::write(&csv, all).with_context(|| format!("cannot write {}", csv.display()))?;
+        println!("{}\n", self.outcome.reason);
+        println!("{}", self.table("Front of cost against error", front(&lines).into_iter())?.to_text());
+        if let Choice::Row(row) = self.outcome.choice {
+            let chosen = &self.planning.representations[row];
+            let cameras = out.join("samples.json");
+            self.write_cameras(&cameras, chosen)?;
+            println!("\nThe flags that repeat it, for up, coordinator and demo:\n  {}", flags(chosen, &cameras));
+        }
+        Ok(())
+    }
+
+    /// All rows and direct drawing, the cheapest first.
+    fn lines(&self, rows: &[RowSummary], direct: Price) -> Vec<Line> {
+        let line = |(place, (row, summary)): (usize, (&planner::Row, &RowSummary))| {
+            let is_chosen = self.outcome.choice == Choice::Row(place);
+            Line {
+                name: row.to_string(),
+                state: if is_chosen { "chosen".to_owned() } else { summary.status.to_string() },
+                error_ratio: summary.error_ratio,
+                price: summary.price,
+                is_measured: summary.is_measured,
+                views: summary.screening_views,
+            }
+        };
+        let mut lines: Vec<Line> = self.planning.ladder.rows().iter().zip(rows).enumerate().map(line).collect();
+        let is_chosen = self.outcome.choice == Choice::Direct;
+        lines.push(Line {
+            name: "direct".to_owned(),
+            state: if is_chosen { "chosen" } else { "open" }.to_owned(),
+            error_ratio: Some(0.0),
+            price: direct,
+            is_measured: true,
+            views: 0,
+        });
+        lines.sort_by(|a, b| a.price.node_s.total_cmp(&b.price.node_s));
+        lines
+    }
+
+    fn table<'a>(&self, name: &str, lines: impl Iterator<Item = &'a Line>) -> anyhow::Result<Table> {
+        let error = match self.args.budget.error().map(|term| term.metric()) {
+            None | Some(Metric::Flip) => "FLIP of the foreground",
+            Some(Metric::FlipWhole) => "FLIP",
+            Some(Metric::Psnr) => "mean squared error",
+            Some(Metric::Disocclusion) => "disocclusion",
+        };
+        let columns = [
+            ("representation", ""),
+            ("state", ""),
+            (error, ""),
+            ("cost of a view", "ms"),
+            ("time of a view", "ms"),
+            ("costs are", ""),
+            ("views", ""),
+        ];
+        let mut table = Table::new(name, &columns);
+        for line in lines {
+            table.push([
+                Cell::from(line.name.clone()),
+                line.state.clone().into(),
+                line.error_ratio.unwrap_or(f64::NAN).into(),
+                (line.price.node_s * 1e3).into(),
+                (line.price.view_s * 1e3).into(),
+                if line.is_measured { "measured" } else { "predicted" }.into(),
+                line.views.into(),
+            ])?;
+        }
+        Ok(table)
+    }
+
+    fn write_cameras(&self, path: &Path, chosen: &Representation) -> anyhow::Result<()> {
+        let named = |(index, Camera::Pinhole(camera)): (usize, &Camera)| NamedCamera {
+            file_path: format!("sample_{index:04}.png"),
+            camera: *camera,
+            more: Map::new(),
+        };
+        let cameras = chosen.sample_cameras.iter().enumerate().map(named);
+        Ok(camera_record::write(path, cameras, self.setup.offer.origin_in_source, Map::new())?)
+    }
+}
+
+/// The lines with an error below that of every cheaper one.
+fn front(by_price: &[Line]) -> Vec<&Line> {
+    let mut least = f64::INFINITY;
+    let mut improves = |line: &&Line| {
+        let is_less = line.error_ratio.is_some_and(|error| error < least);
+        least = line.error_ratio.map_or(least, |error| error.min(least));
+        is_less
+    };
+    by_price.iter().filter(&mut improves).collect()
+}
+
+fn flags(chosen: &Representation, cameras: &Path) -> String {
+    let Representation { sampling, method, sample_cameras } = chosen;
+    let size = sample_cameras.first().map_or(String::new(), |Camera::Pinhole(camera)| {
+        format!(" --sample-size {}x{}", camera.size_px.x, camera.size_px.y)
+    });
+    format!("--sampling {sampling} --method {method}{size} --samples {}", cameras.display())
+}
