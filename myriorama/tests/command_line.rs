@@ -18,7 +18,7 @@ fn help_teaches_every_command() {
     let text = String::from_utf8_lossy(&help.stdout).into_owned();
     assert!(help.status.success());
     let lab: &[&str] = if cfg!(feature = "lab") { &["demo", "bench", "study"] } else { &[] };
-    for command in ["up", "coordinator", "node", "view", "status", "health", "replay"].iter().chain(lab) {
+    for command in ["up", "coordinator", "node", "view", "plan", "status", "health", "replay"].iter().chain(lab) {
         assert!(text.contains(&format!("\n  {command} ")), "{command} in {text}");
         assert!(myriorama(&[command, "--help"]).status.success(), "{command} --help");
     }
@@ -35,7 +35,15 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
     std::fs::write(&cameras, b"{\"frames\": [{}]}").unwrap();
     let (broken, cameras) = (broken.to_str().unwrap(), cameras.to_str().unwrap());
     let folder = folder.path().to_str().unwrap();
-    let cases: [(&[&str], &str); 13] = [
+    let many = vec!["flip 0.1"; 200].join(", ");
+    let cases: [(&[&str], &str); 20] = [
+        (&["plan", "--scene", "quad"], "--budget"),
+        (&["plan", "--scene", "quad", "--budget", "blur 3"], "blur"),
+        (&["plan", "--scene", "quad", "--budget", "flip NaN"], "flip NaN"),
+        (&["plan", "--scene", "quad", "--budget", "flip 0"], "above 0"),
+        (&["plan", "--scene", "quad", "--budget", &many], "at most one error term"),
+        (&["plan", "--scene", "quad", "--budget", "flip 0.1", "--rate", "0"], "0.01 to 1000"),
+        (&["plan", "--scene", broken, "--budget", "flip 0.1"], "broken.glb"),
         (&["up", "--scene", broken], "broken.glb"),
         (&["coordinator", "--scene", broken], "broken.glb"),
         (&["coordinator", "--scene", "quad", "--scene", "quad"], "scene quad is given twice"),
@@ -61,7 +69,9 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
 #[test]
 fn input_of_the_lab_that_cannot_be_used_is_named_with_status_2() {
     assert!(myriorama(&["bench", "scaling", "--help"]).status.success(), "bench scaling --help");
-    let cases: [(&[&str], &str); 2] = [
+    let cases: [(&[&str], &str); 4] = [
+        (&["study", "fronts", "--subject", "nowhere"], "nowhere"),
+        (&["study", "fronts", "--conditions", "/nowhere/absent.toml"], "absent.toml"),
         (&["bench", "scaling", "--quota", "0"], "0.01 to 64"),
         (&["demo", "--scene", "/nowhere/absent.glb"], "absent.glb"),
     ];

@@ -214,3 +214,114 @@ impl Pricing for OneNode {
         Price { node_s: view_s, view_s }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use codec::FrameCodec;
+    use planner::MAX_ROWS;
+
+    use super::*;
+    use crate::sizes::SampleSize;
+
+    /// The arguments of a scene, as from a command line.
+    fn args(more: &[&str]) -> SceneArgs {
+        use clap::{Args as _, FromArgMatches as _};
+        let command = SceneArgs::augment_args(clap::Command::new("test"));
+        let matches = command.get_matches_from(["test", "--scene", "blocks"].iter().chain(more));
+        SceneArgs::from_arg_matches(&matches).unwrap()
+    }
+
+    fn planning(more: &[&str]) -> Planning {
+        let args = args(more);
+        let size_px = UVec2::new(200, 150);
+        let (planes, codec) = (ViewPlanes::COLOR, FrameCodec::default());
+        let views = PlannedViews { size_px, planes, codec, scene_time_s: 0.0, seed: 0 };
+        Planning::new(&args.load().unwrap(), &args, &views).unwrap()
+    }
+
+    fn distinct<T: Ord>(planning: &Planning, of: impl Fn(&Row) -> T) -> BTreeSet<T> {
+        planning.ladder.rows().iter().map(of).collect()
+    }
+
+    #[test]
+    fn the_ladder_has_every_method_and_the_default_representation() {
+        let planning = planning(&[]);
+        let rows = planning.ladder.rows();
+        assert!(rows.len() == 180 && rows.len() <= MAX_ROWS);
+        let samplings: BTreeSet<String> = SamplingMethod::ladder().map(|(name, _)| name.to_owned()).collect();
+        assert_eq!(distinct(&planning, |row| row.sampling.clone()), samplings);
+        let methods: BTreeSet<String> = ReconstructionMethod::ladder().map(|method| method.to_string()).collect();
+        assert_eq!(distinct(&planning, |row| row.method.clone()), methods);
+        assert!(methods.len() <= 6);
+        let default = (SamplingMethod::default().to_string(), ReconstructionMethod::default().to_string());
+        let is_default = |row: &&Row| {
+            (row.sampling.clone(), row.method.clone()) == default && row.camera_count == 4 && row.side_ratio == 1.0
+        };
+        assert_eq!(rows.iter().filter(is_default).count(), 1);
+    }
+
+    #[test]
+    fn effort_rises_by_rank_within_a_method() {
+        let planning = planning(&[]);
+        let kinds = distinct(&planning, |row| row.kind.clone());
+        for kind in kinds {
+            let ranks: BTreeSet<(String, u32)> = planning
+                .ladder
+                .rows()
+                .iter()
+                .filter(|row| row.kind == kind)
+                .map(|row| (row.method.clone(), row.rank))
+                .collect();
+            let numbers: BTreeSet<u32> = ranks.iter().map(|(_, rank)| *rank).collect();
+            assert_eq!(numbers, (0..ranks.len() as u32).collect(), "{kind}: {ranks:?}");
+        }
+    }
+
+    #[test]
+    fn representations_have_the_cameras_and_sizes_of_their_rows() {
+        let planning = planning(&[]);
+        for (row, representation) in planning.ladder.rows().iter().zip(&planning.representations) {
+            assert_eq!(representation.sample_cameras.len(), row.camera_count as usize, "{row}");
+            let Camera::Pinhole(camera) = representation.sample_cameras[0];
+            assert_eq!(camera.size_px.x, (400.0 * row.side_ratio).round() as u32, "{row}");
+            let sampling: SamplingMethod = representation.sampling.parse().unwrap();
+            sampling.check(&representation.sample_cameras).unwrap();
+        }
+        let of = |count: u32| {
+            let place = planning.ladder.rows().iter().position(|row| row.camera_count == count).unwrap();
+            planning.representations[place].sample_cameras.clone()
+        };
+        assert!(of(8).starts_with(&of(4)) && of(4).starts_with(&of(2)), "sets share their images");
+        assert_eq!(of(1)[0], of(8)[4], "one camera stands in the middle");
+    }
+
+    #[test]
+    fn what_the_user_names_is_the_same_in_all_rows() {
+        let default = ReconstructionMethod::default().to_string();
+        let one = planning(&["--method", &default]);
+        assert_eq!(distinct(&one, |row| row.method.clone()), BTreeSet::from([default]));
+        let sized = planning(&["--sample-size", "320x240"]);
+        let Camera::Pinhole(camera) = sized.representations[0].sample_cameras[0];
+        assert_eq!((camera.size_px, sized.ladder.rows().len()), (UVec2::new(320, 240), 60));
+        assert_eq!(args(&["--sample-size", "320x240"]).sample_size, SampleSize::Fixed(UVec2::new(320, 240)));
+        for sampling in SamplingMethod::all() {
+            let fixed = planning(&["--sampling", &sampling.to_string()]);
+            let counts = distinct(&fixed, |row| row.camera_count);
+            let expected =
+                sampling.own_image_count().map_or(BTreeSet::from(CAMERA_COUNTS), |own| BTreeSet::from([own]));
+            assert_eq!(counts, expected, "{sampling}");
+            assert!(fixed.representations.iter().all(|of| of.sampling == sampling.to_string()));
+        }
+    }
+
+    #[test]
+    fn measurements_of_another_light_ladder_or_cell_have_another_name() {
+        let key = planning(&[]).key();
+        assert_eq!(key, planning(&[]).key());
+        let differing: [&[&str]; 3] =
+            [&["--lighting", "unlit"], &["--sample-size", "320x240"], &["--lighting", "soft 4"]];
+        assert!(differing.iter().all(|more| planning(more).key() != key));
+    }
+}

@@ -32,3 +32,76 @@ pub fn view_errors(
         disoccluded_ratio: if shown == 0 { 0.0 } else { unheld * surfaces as f64 / shown as f64 },
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use depth_image::Camera;
+    use glam::{UVec2, Vec3};
+
+    use super::*;
+
+    fn camera() -> PinholeCamera {
+        PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(16))
+    }
+
+    /// Of a surface one metre away in the upper half, and nothing below.
+    fn view(grey: u8, lower: u8) -> View {
+        View {
+            size_px: UVec2::splat(16),
+            srgb8: (0..768).map(|byte| if byte < 384 { grey } else { lower }).collect(),
+            inverse_depth_per_m: Some((0..256).map(|pixel| if pixel < 128 { 1.0 } else { 0.0 }).collect()),
+            provenance: None,
+        }
+    }
+
+    fn image(rows: usize) -> DepthImage {
+        DepthImage {
+            camera: Camera::Pinhole(camera()),
+            inverse_depth_per_m: (0..256).map(|texel| if texel < 16 * rows { 1.0 } else { 0.0 }).collect(),
+            color_rgb9e5: vec![0; 256],
+            normal_oct16: None,
+            surface_id: None,
+            specular: None,
+            passed: None,
+            corner_inverse_depth_per_m: None,
+        }
+    }
+
+    fn errors(test: &View, images: &[DepthImage]) -> ViewErrors {
+        view_errors(&camera(), &view(100, 0), test, images).unwrap()
+    }
+
+    #[test]
+    fn equal_views_have_no_error() {
+        let errors = errors(&view(100, 0), &[image(8)]);
+        let expected =
+            ViewErrors { foreground_ratio: 0.5, flip: 0.0, flip_whole: 0.0, mean_square: 0.0, disoccluded_ratio: 0.0 };
+        assert_eq!(errors, expected);
+    }
+
+    #[test]
+    fn a_step_of_grey_is_its_square_over_the_foreground() {
+        let errors = errors(&view(151, 0), &[image(8)]);
+        assert!((errors.mean_square - 0.04).abs() < 1e-12, "{errors:?}");
+        assert!(errors.flip > 1.5 * errors.flip_whole && errors.flip_whole > 0.0, "{errors:?}");
+    }
+
+    #[test]
+    fn disocclusion_is_the_share_of_the_foreground_that_no_image_holds() {
+        assert_eq!(errors(&view(100, 0), &[image(2)]).disoccluded_ratio, 0.75);
+        assert_eq!(errors(&view(100, 0), &[]).disoccluded_ratio, 1.0);
+        // A test that shows something everywhere has twice the foreground.
+        let errors = errors(&view(100, 9), &[image(2)]);
+        assert_eq!((errors.foreground_ratio, errors.disoccluded_ratio), (1.0, 0.375));
+    }
+
+    #[test]
+    fn a_view_of_nothing_has_no_error_and_one_of_another_size_is_refused() {
+        let empty = View { srgb8: vec![0; 768], inverse_depth_per_m: Some(vec![0.0; 256]), ..view(0, 0) };
+        let errors = view_errors(&camera(), &empty, &empty, &[]).unwrap();
+        assert!(errors.validate().is_ok() && errors.foreground_ratio == 0.0 && errors.disoccluded_ratio == 0.0);
+        let other = View { size_px: UVec2::splat(8), srgb8: vec![0; 192], ..empty.clone() };
+        assert!(view_errors(&camera(), &empty, &other, &[]).is_err());
+        assert!(view_errors(&camera(), &View { inverse_depth_per_m: None, ..empty.clone() }, &empty, &[]).is_err());
+    }
+}

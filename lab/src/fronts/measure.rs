@@ -44,8 +44,10 @@ impl Limits {
 pub struct Planned {
     pub budget: Budget,
     pub choice: Choice,
-    /// Its price, and its error on the budget's views.
+    /// The choice as users read it.
+    pub name: String,
     pub price: Price,
+    /// The FLIP of the foreground on the views of its certificate; 0 of direct drawing.
     pub error_ratio: f64,
     pub spent_s: f64,
 }
@@ -169,5 +171,10 @@ fn planned(subject: &Subject, planning: &Planning, pricing: OneNode, budget: Bud
     let nothing = Kept::empty(planning.key());
     let (outcome, _) = probe::plan(&mut planner, &mut prober, &planning.representations, nothing, |_| ());
     let error_ratio = outcome.certificate.map_or(0.0, |certificate| certificate.expected_ratio);
-    Ok(Planned { budget, choice: outcome.choice, price: outcome.price, error_ratio, spent_s: planner.spent_s() })
+    let name = match outcome.choice {
+        Choice::Row(row) => planning.ladder.rows()[row].to_string(),
+        Choice::Direct => "direct".to_owned(),
+    };
+    let (choice, price, spent_s) = (outcome.choice, outcome.price, planner.spent_s());
+    Ok(Planned { budget, choice, name, price, error_ratio, spent_s })
 }

@@ -8,3 +8,5 @@ mod order;
 mod report;
 pub(crate) mod row;
 pub(crate) mod subject;
+#[cfg(test)]
+mod tests;

@@ -14,6 +14,8 @@ struct Figure {
     of: fn(&MeasuredRow) -> f64,
     /// That of direct drawing; `None` where it has none.
     direct: Option<f64>,
+    /// That of a plan, on views of its own; `None` where it measures none.
+    planned: Option<fn(&Planned) -> f64>,
 }
 
 const FIGURES: [Figure; 4] = [
@@ -23,14 +25,23 @@ const FIGURES: [Figure; 4] = [
         better: Better::Low,
         of: |row| row.error_ratio(Metric::Flip),
         direct: Some(0.0),
+        planned: Some(|planned| planned.error_ratio),
     },
-    Figure { name: "Foreground PSNR", unit: "dB", better: Better::High, of: MeasuredRow::psnr_db, direct: None },
+    Figure {
+        name: "Foreground PSNR",
+        unit: "dB",
+        better: Better::High,
+        of: MeasuredRow::psnr_db,
+        direct: None,
+        planned: None,
+    },
     Figure {
         name: "Disocclusion",
         unit: "%",
         better: Better::Low,
         of: |row| 100.0 * row.error_ratio(Metric::Disocclusion),
         direct: Some(0.0),
+        planned: None,
     },
     Figure {
         name: "Bytes of a set",
@@ -38,6 +49,7 @@ const FIGURES: [Figure; 4] = [
         better: Better::Low,
         of: |row| row.set_bytes as f64 / 1e3,
         direct: Some(0.0),
+        planned: None,
     },
 ];
 
@@ -123,7 +135,7 @@ fn planned_table(front: &Front) -> anyhow::Result<Table> {
     for planned in &front.planned {
         table.push([
             Cell::from(planned.budget.to_string()),
-            choice(front, planned).into(),
+            planned.name.clone().into(),
             (planned.price.node_s * 1e3).into(),
             planned.error_ratio.into(),
             planned.spent_s.into(),
@@ -131,17 +143,6 @@ fn planned_table(front: &Front) -> anyhow::Result<Table> {
         ])?;
     }
     Ok(table)
-}
-
-fn choice(front: &Front, planned: &Planned) -> String {
-    match planned.choice {
-        Choice::Direct => "direct".to_owned(),
-        Choice::Row(place) => front
-            .rows
-            .iter()
-            .find(|row| row.place == place)
-            .map_or_else(|| format!("row {place}, which was left out here"), |row| row.row.to_string()),
-    }
 }
 
 /// The cost of the cheapest row within a budget, or of direct drawing.
@@ -165,9 +166,9 @@ fn chart(front: &Front, figure: &Figure) -> XyChart {
         chart = chart.with(Series::points("direct", [(front.direct.node_s * 1e3, direct)]));
     }
     let taken = front.planned.iter().filter_map(|planned| {
-        let Choice::Row(place) = planned.choice else { return None };
-        let row = front.rows.iter().find(|row| row.place == place)?;
-        Some(Point::labelled(row.price.node_s * 1e3, (figure.of)(row), planned.budget.to_string()))
+        let row = front.rows.iter().find(|row| planned.choice == Choice::Row(row.place));
+        let y = figure.planned.map(|of| of(planned)).or_else(|| row.map(figure.of))?;
+        Some(Point::labelled(planned.price.node_s * 1e3, y, planned.budget.to_string()))
     });
     chart = chart.with(Series::points("chosen by the planner", taken)).with_front(Better::Low, figure.better);
     chart.note = format!("Direct drawing costs {:.2} ms a view.", front.direct.node_s * 1e3);

@@ -148,7 +148,7 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
         // The plan is made, whether a later one can use what was measured or not.
         files.write(&kept).unwrap_or_else(|error| eprintln!("warning: measurements are not kept: {error}"));
     }
-    let output = Output { args, setup: &setup, planning: &planning, outcome: &outcome };
+    let output = Output { budget: args.budget, out: &args.out, setup: &setup, planning: &planning, outcome: &outcome };
     output.write(&planner.summaries(), pricing.direct())?;
     println!("\n{:.1} s of measuring; all rows are in {}", planner.spent_s(), args.out.join("rows.csv").display());
     Ok(Outcome::of(outcome.state == PromiseState::Kept))

@@ -7,16 +7,16 @@ use app_core::camera_record::{self, NamedCamera};
 use app_core::planning::Planning;
 use app_core::setup::Setup;
 use depth_image::Camera;
-use planner::{Choice, Metric, Outcome, Price, RowSummary};
+use planner::{Budget, Choice, Metric, Outcome, Price, RowSummary};
 use probe::Representation;
 use serde_json::Map;
 use table::{Cell, Table};
 
-use super::PlanArgs;
-
 /// A plan that is made.
 pub(super) struct Output<'a> {
-    pub(super) args: &'a PlanArgs,
+    pub(super) budget: Budget,
+    /// The folder of the files.
+    pub(super) out: &'a Path,
     pub(super) setup: &'a Setup,
     pub(super) planning: &'a Planning,
     pub(super) outcome: &'a Outcome,
@@ -36,7 +36,7 @@ impl Output<'_> {
     /// Prints the choice, its reason, the front and the flags; writes the files.
     pub(super) fn write(&self, rows: &[RowSummary], direct: Price) -> anyhow::Result<()> {
         let lines = self.lines(rows, direct);
-        let out = &self.args.out;
+        let out = self.out;
         std::fs::create_dir_all(out).with_context(|| format!("cannot create {}", out.display()))?;
         let csv = out.join("rows.csv");
         let all = self.table("all rows", lines.iter())?.to_csv()?;
@@ -80,7 +80,7 @@ impl Output<'_> {
     }
 
     fn table<'a>(&self, name: &str, lines: impl Iterator<Item = &'a Line>) -> anyhow::Result<Table> {
-        let error = match self.args.budget.error().map(|term| term.metric()) {
+        let error = match self.budget.error().map(|term| term.metric()) {
             None | Some(Metric::Flip) => "FLIP of the foreground",
             Some(Metric::FlipWhole) => "FLIP",
             Some(Metric::Psnr) => "mean squared error",

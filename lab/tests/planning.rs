@@ -1,0 +1,167 @@
+//! Plans on the device: what is promised holds on views that the plan never saw.
+#![allow(clippy::unwrap_used)]
+
+use std::sync::Arc;
+
+use app_core::planning::{OneNode, PROGRAM_VERSION, PlannedViews, Planning};
+use app_core::setup::{SceneArgs, Setup};
+use codec::FrameCodec;
+use depth_image::ViewPlanes;
+use engine::GpuEngine;
+use glam::UVec2;
+use gpu::DevicePreference;
+use lab::scene_args;
+use node::{Turn, WorkClass};
+use planner::{
+    Budget, Choice, Command, Event, Kept, Metric, Outcome, PlanRequest, Planner, Price, Pricing as _, ProbeId,
+    ProbeView, PromiseState, Purpose, Row, RowCosts,
+};
+use probe::{DirectCosts, Light, Prober, Representation};
+
+const VIEW_PX: UVec2 = UVec2::new(64, 48);
+
+/// A scene on the device.
+struct Stand {
+    engine: Arc<GpuEngine>,
+    setup: Setup,
+    args: SceneArgs,
+}
+
+impl Stand {
+    fn new(scene: &str, lighting: &str) -> Self {
+        let engine = GpuEngine::shared(DevicePreference::Any).unwrap();
+        let args = SceneArgs { lighting: lighting.parse().unwrap(), ..scene_args(scene.parse().unwrap()) };
+        let setup = args.load().unwrap();
+        engine.put_scene(setup.offer.hash.as_str(), &setup.scene).unwrap();
+        Self { engine, setup, args }
+    }
+
+    fn planning(&self, seed: u64) -> Planning {
+        let (planes, codec) = (ViewPlanes::COLOR, FrameCodec::default());
+        let views = PlannedViews { size_px: VIEW_PX, planes, codec, scene_time_s: 0.0, seed };
+        Planning::new(&self.setup, &self.args, &views).unwrap()
+    }
+
+    fn prober(&self, planning: &Planning) -> Prober<'_> {
+        Prober::new(self.engine.as_ref(), planning.subject.clone(), Turn::of(WorkClass::Batch))
+    }
+}
+
+/// Direct drawing costs more than any row: what is chosen does not depend on this machine.
+const DEAR: OneNode = OneNode { views_a_set: 290, direct: DirectCosts { direct_view_s: 1e3, encode_view_s: 1e-3 } };
+
+fn plan(planning: &Planning, prober: &mut Prober<'_>, budget: Budget, kept: Kept) -> (Outcome, Kept, f64) {
+    let request = PlanRequest {
+        plan: 1,
+        budget,
+        key: planning.key(),
+        device: "a device".to_owned(),
+        program_version: PROGRAM_VERSION.to_owned(),
+        view_pixels: f64::from(VIEW_PX.element_product()),
+        allowance_s: 600.0,
+        most_certified: 8,
+        seed: planning.subject.seed,
+    };
+    let mut planner = Planner::new(request, planning.ladder.clone(), DEAR).unwrap();
+    let (outcome, kept) = probe::plan(&mut planner, prober, &planning.representations, kept, |_| ());
+    (outcome, kept, planner.spent_s())
+}
+
+#[test]
+fn a_plan_keeps_its_budget_on_views_that_it_never_saw() {
+    let stand = Stand::new("blocks", "phong");
+    let planning = stand.planning(1);
+    let mut prober = stand.prober(&planning);
+    let budget: Budget = "flip 0.12".parse().unwrap();
+    let (outcome, kept, spent_s) = plan(&planning, &mut prober, budget, Kept::empty(planning.key()));
+    assert_eq!(outcome.state, PromiseState::Kept, "{}", outcome.reason);
+    let Choice::Row(row) = outcome.choice else { panic!("{}", outcome.reason) };
+    assert!(spent_s > 0.0 && !kept.rows.is_empty());
+
+    let unseen = stand.planning(2);
+    let views: Vec<ProbeView> = (0..64).map(ProbeView::Fresh).collect();
+    let (errors, _) = stand.prober(&unseen).probe(&unseen.representations[row], Light::Session, &views).unwrap();
+    let excess = errors.iter().map(|errors| errors.excess(Metric::Flip, 0.12)).sum::<f64>();
+    assert!(excess <= 0.0, "{} is over on other views: {excess}", outcome.reason);
+
+    // A plan of the same budget has its certificate already: it chooses the same, and draws no view that has been used.
+    let drawn = kept.fresh_views_drawn;
+    let (again, kept, _) = plan(&planning, &mut prober, budget, kept);
+    assert_eq!(again.state, PromiseState::Kept, "{}", again.reason);
+    assert!(drawn > 0 && kept.fresh_views_drawn >= drawn);
+}
+
+#[test]
+fn errors_fall_with_cameras_and_texels_and_true_views_have_none() {
+    let stand = Stand::new("courtyard", "phong");
+    let planning = stand.planning(3);
+    let mut prober = stand.prober(&planning);
+    let views: Vec<ProbeView> = (0..8).map(ProbeView::Screening).collect();
+    let method = planning.representations[0].method.clone();
+    let mut error = |camera_count: u32, side_ratio: f64, metric: Metric| {
+        let is_row = |row: &Row| {
+            row.sampling == "conventional"
+                && row.method == method
+                && row.camera_count == camera_count
+                && row.side_ratio == side_ratio
+        };
+        let place = planning.ladder.rows().iter().position(is_row).unwrap();
+        let (errors, costs) = prober.probe(&planning.representations[place], Light::Session, &views).unwrap();
+        assert!(costs.validate().is_ok() && errors.iter().all(|errors| errors.validate().is_ok()));
+        errors.iter().map(|errors| errors.excess(metric, 0.0)).sum::<f64>()
+    };
+    let [one, four] = [1, 4].map(|cameras| error(cameras, 1.0, Metric::Disocclusion));
+    assert!(one > 2.0 * four, "disocclusion of one camera {one}, of four {four}");
+    let [half, whole] = [0.5, 1.0].map(|side| error(4, side, Metric::Flip));
+    assert!(half > 1.1 * whole && whole > 0.0, "FLIP at half the side {half}, at the whole {whole}");
+}
+
+/// Where light is expensive, images of screening are unlike those of the session, and costs are the session's.
+#[test]
+fn costs_of_screening_are_those_of_the_light_of_the_session() {
+    let stand = Stand::new("blocks", "soft 16, occlusion 64");
+    let planning = stand.planning(0);
+    let mut prober = stand.prober(&planning);
+    assert_ne!(planning.subject.screening_lighting, planning.subject.lighting);
+    let views = [ProbeView::Screening(0)];
+    let of = &planning.representations[planning.representations.len() - 1];
+    let screened = prober.probe(of, Light::Screening, &views).unwrap().1.sample_image_s;
+    let plain = prober.measure(of, Light::Screening, &views).unwrap().costs.sample_image_s;
+    assert!(screened > 2.0 * plain, "g_s {screened} s in soft light, {plain} s in plain light");
+    let [in_plain, in_soft] = [Light::Screening, Light::Session].map(|light| prober.truths(light, &views).unwrap());
+    assert_ne!(in_plain[0].srgb8, in_soft[0].srgb8);
+}
+
+#[test]
+fn a_representation_that_the_device_refuses_is_an_answer() {
+    let stand = Stand::new("blocks", "phong");
+    let planning = stand.planning(0);
+    let mut prober = stand.prober(&planning);
+    let broken = Representation { method: "guess".to_owned(), ..planning.representations[0].clone() };
+    let id = ProbeId { plan: 1, number: 1 };
+    let (row, views, purpose) = (0, vec![ProbeView::Screening(0)], Purpose::Screening);
+    let event = probe::answer(&mut prober, &[broken], Command::Probe { id, row, views, purpose }).unwrap();
+    let Event::Failed { id: answered, reason, .. } = &event else { panic!("{event:?}") };
+    assert!(*answered == id && reason.contains("guess"), "{reason}");
+    event.validate().unwrap();
+}
+
+#[test]
+fn the_price_on_one_node_is_the_set_shared_by_its_views_and_the_view() {
+    let row = Row {
+        sampling: "s".to_owned(),
+        method: "m".to_owned(),
+        camera_count: 4,
+        side_ratio: 1.0,
+        kind: "k".to_owned(),
+        rank: 0,
+    };
+    let costs = RowCosts { sample_image_s: 0.02, load_set_s: 0.01, reconstruct_view_s: 0.003 };
+    let direct = DirectCosts { direct_view_s: 0.05, encode_view_s: 0.001 };
+    let one_node = OneNode { views_a_set: 10, direct };
+    let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} is not {b}");
+    let Price { node_s, view_s } = one_node.row(&row, &costs);
+    close(node_s, (4.0 * 0.02 + 0.01) / 10.0 + 0.004);
+    close(view_s, 0.004);
+    close(one_node.direct().node_s, 0.051);
+}
