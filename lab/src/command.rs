@@ -7,6 +7,7 @@ use crate::bench::{self, BenchArgs};
 use crate::demo::{self, DemoArgs};
 use crate::failures::command::{self as failures, FailuresArgs};
 use crate::fronts::command::{self as fronts, FrontsArgs};
+use crate::planner_study::command::{self as planner_study, PlannerArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
 
 /// A subcommand that measures.
@@ -40,6 +41,8 @@ pub enum StudyCommand {
     /// method. For each subject the report has a table of all rows, charts with the front of the best, direct drawing and
     /// what `myriorama plan` chooses. docs/fronts.md explains how to read them.
     Fronts(FrontsArgs),
+    /// Plans on subjects that nothing was tuned on, and compares the choices with tables of all rows
+    Planner(PlannerArgs),
 }
 
 impl LabCommand {
@@ -54,6 +57,7 @@ impl LabCommand {
             Self::Study(StudyCommand::Sampling(args)) => sampling::run(args),
             Self::Study(StudyCommand::Failures(args)) => failures::run(args),
             Self::Study(StudyCommand::Fronts(args)) => fronts::run(args),
+            Self::Study(StudyCommand::Planner(args)) => planner_study::run(args),
         }
     }
 }

@@ -17,6 +17,7 @@ mod fronts;
 mod lighting_study;
 mod load;
 mod memory;
+mod planner_study;
 mod process;
 mod progress;
 pub mod reference_views;

@@ -2,7 +2,7 @@
 
 mod checks;
 pub mod command;
-mod conditions;
+pub(crate) mod conditions;
 mod measure;
 mod order;
 mod report;
