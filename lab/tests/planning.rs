@@ -126,7 +126,7 @@ fn costs_of_screening_are_those_of_the_light_of_the_session() {
     let views = [ProbeView::Screening(0)];
     let of = &planning.representations[planning.representations.len() - 1];
     let screened = prober.probe(of, Light::Screening, &views).unwrap().1.sample_image_s;
-    let plain = prober.measure(of, Light::Screening, &views).unwrap().costs.sample_image_s;
+    let plain = prober.measure(of, Light::Screening, &views, ViewPlanes::COLOR).unwrap().costs.sample_image_s;
     assert!(screened > 2.0 * plain, "g_s {screened} s in soft light, {plain} s in plain light");
     let [in_plain, in_soft] = [Light::Screening, Light::Session].map(|light| prober.truths(light, &views).unwrap());
     assert_ne!(in_plain[0].srgb8, in_soft[0].srgb8);

@@ -52,7 +52,7 @@ pub struct DirectCosts {
 /// Views of a representation, with what they were made of.
 #[derive(Debug, Clone)]
 pub struct Measured {
-    /// The views, with depth and provenance.
+    /// The views.
     pub views: Vec<View>,
     /// The sample images as compositors decode them.
     pub sample_images: Vec<DepthImage>,
@@ -99,7 +99,7 @@ impl<'a> Prober<'a> {
         views: &[ProbeView],
     ) -> Result<(Vec<ViewErrors>, RowCosts), ProbeError> {
         let truths = self.truths(light, views)?;
-        let measured = self.measure(of, light, views)?;
+        let measured = self.measure(of, light, views, self.subject.planes)?;
         let pairs: Vec<_> = views.iter().zip(&truths).zip(&measured.views).collect();
         let errors = pairs.into_par_iter().map(|((view, truth), made)| {
             view_errors(&self.subject.camera(*view), truth, made, &measured.sample_images)
@@ -109,16 +109,22 @@ impl<'a> Prober<'a> {
         Ok((errors, RowCosts { sample_image_s, ..measured.costs }))
     }
 
-    /// Views of a representation in a light, and its costs in that light.
+    /// Views of a representation in a light with some planes, and its costs in that light with these planes.
     ///
     /// # Errors
     /// As [`Prober::probe`].
-    pub fn measure(&mut self, of: &Representation, light: Light, views: &[ProbeView]) -> Result<Measured, ProbeError> {
+    pub fn measure(
+        &mut self,
+        of: &Representation,
+        light: Light,
+        views: &[ProbeView],
+        planes: ViewPlanes,
+    ) -> Result<Measured, ProbeError> {
         let sampled = self.sampled(of, light)?;
         let images = &sampled.images[..of.sample_cameras.len()];
-        let (set, load_set_s) = self.loaded(of, light, images)?;
+        let (set, load_set_s) = self.loaded(of, light, planes, images)?;
         let cameras: Vec<PinholeCamera> = views.iter().map(|&view| self.subject.camera(view)).collect();
-        let work = self.view_work(of, self.timed_cameras(&cameras), self.subject.compared_planes());
+        let work = self.view_work(of, self.timed_cameras(&cameras), planes);
         let (made, seconds) = self.timed(|engine, turn| engine.reconstruct(set.as_ref(), &work, turn))?;
         let reconstruct_view_s = seconds / made.len().max(1) as f64;
         let mut views = made;
@@ -147,7 +153,7 @@ impl<'a> Prober<'a> {
         for _ in 0..repeats.max(1) {
             for (of, costs) in all.iter().zip(&mut costs) {
                 self.sets = Sets::default();
-                costs.push(self.measure(of, Light::Session, &views)?.costs);
+                costs.push(self.measure(of, Light::Session, &views, self.subject.planes)?.costs);
             }
         }
         Ok(costs.iter().map(|costs| median_costs(costs)).collect())
@@ -258,6 +264,7 @@ impl<'a> Prober<'a> {
         &mut self,
         of: &Representation,
         light: Light,
+        planes: ViewPlanes,
         images: &[DepthImage],
     ) -> Result<(Arc<dyn UploadedSet>, f64), ProbeError> {
         let sample_set = SampleSet {
@@ -269,8 +276,8 @@ impl<'a> Prober<'a> {
             lighting: self.subject.lighting(light).to_owned(),
         };
         let camera = self.subject.camera(ProbeView::Screening(0));
-        let one = self.view_work(of, vec![camera], self.subject.compared_planes());
-        if self.is_first(&format!("view {} {}", of.method, images.len())) {
+        let one = self.view_work(of, vec![camera], planes);
+        if self.is_first(&format!("view {} {} {planes:?}", of.method, images.len())) {
             let set = self.engine.upload(&sample_set, self.turn)?;
             self.engine.reconstruct(set.as_ref(), &one, self.turn)?;
         }

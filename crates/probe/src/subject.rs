@@ -59,9 +59,4 @@ impl Subject {
             Light::Session => &self.lighting,
         }
     }
-
-    /// Colour as delivered, and what errors are computed from.
-    pub(crate) fn compared_planes(&self) -> ViewPlanes {
-        ViewPlanes { inverse_depth: true, provenance: true, ..self.planes }
-    }
 }

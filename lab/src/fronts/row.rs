@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use depth_image::View;
+use depth_image::{View, ViewPlanes};
 use metrics::{DepthErrors, depth_errors};
 use planner::{Metric, Price, Pricing, ProbeView, Row, RowCosts, ViewErrors};
 use probe::{Light, Prober, Representation, view_errors};
@@ -43,7 +43,11 @@ impl MeasuredRow {
         pricing: &impl Pricing,
     ) -> anyhow::Result<Self> {
         let truths = prober.truths(Light::Session, views)?;
-        let measured = prober.measure(representation, Light::Session, views)?;
+        // Delivered views have no depth, and cost less.
+        let delivered = prober.subject().planes;
+        let costs = prober.measure(representation, Light::Session, views, delivered)?.costs;
+        let with_depth = ViewPlanes { inverse_depth: true, provenance: true, ..delivered };
+        let measured = prober.measure(representation, Light::Session, views, with_depth)?;
         let subject = prober.subject();
         let pairs: Vec<_> = views.iter().zip(&truths).zip(&measured.views).collect();
         let of_view = |((view, truth), made): ((&ProbeView, &Arc<View>), &View)| {
@@ -57,8 +61,8 @@ impl MeasuredRow {
         Ok(Self {
             place,
             row: row.clone(),
-            costs: measured.costs,
-            price: pricing.row(row, &measured.costs),
+            costs,
+            price: pricing.row(row, &costs),
             set_bytes: measured.set_bytes,
             samples: depths.filter(|&&inverse| inverse > 0.0).count(),
             errors: of_views.iter().map(|(errors, _)| *errors).collect(),

@@ -1,7 +1,7 @@
 //! Prices in plain or in expensive light.
 
 use app_core::planning::OneNode;
-use depth_image::Antialias;
+use depth_image::{Antialias, ViewPlanes};
 use engine::GpuEngine;
 use planner::{Price, Pricing, ProbeView, Row, RowCosts};
 use probe::Light;
@@ -33,7 +33,8 @@ impl Priced {
         let planning = subject.planning(Antialias::NONE, conditions.seed)?;
         let mut prober = subject.prober(&planning);
         let (of, views) = (&planning.representations[0], [ProbeView::Screening(0)]);
-        let mut sample_s = |light: Light| anyhow::Ok(prober.measure(of, light, &views)?.costs.sample_image_s);
+        let mut sample_s =
+            |light: Light| anyhow::Ok(prober.measure(of, light, &views, ViewPlanes::COLOR)?.costs.sample_image_s);
         let sampling_factor = sample_s(Light::Session)? / sample_s(Light::Screening)?;
         Ok(Self { node: subject.pricing(&mut prober)?, sampling_factor })
     }
