@@ -7,7 +7,7 @@ use coordinator::fitting_size_px;
 use coordinator::schedule::{Load, NodeCosts, pipeline_s};
 use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use glam::{UVec2, Vec2};
-use planner::{KeptKey, Ladder, Price, Pricing, Row, RowCosts};
+use planner::{Budget, KeptKey, Ladder, PlanRequest, Price, Pricing, Row, RowCosts};
 use probe::{DirectCosts, Representation, Subject};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -19,8 +19,9 @@ use crate::setup::{SceneArgs, Setup};
 const CAMERA_COUNTS: [u32; 4] = [1, 2, 4, 8];
 /// Sides of sample images, as shares of the side that `--sample-size auto` chooses.
 const SIDE_RATIOS: [f64; 3] = [0.5, 0.71, 1.0];
-/// Steps of a cell's size in which its places are named.
-const CELL_STEPS: f32 = 100.0;
+/// Rows of a round of certificates; fewer where every true view is expensive.
+const MOST_CERTIFIED: usize = 8;
+const MOST_CERTIFIED_TRACED: usize = 3;
 
 /// The views to plan for.
 #[derive(Debug, Clone, Copy)]
@@ -85,34 +86,37 @@ impl Planning {
     pub fn key(&self) -> KeptKey {
         let Subject { scene_hash, lighting, view_px, planes, scene_time_s, .. } = &self.subject;
         let light = format!("{lighting}; screened in {}; at {scene_time_s} s", self.subject.screening_lighting);
-        let rows = format!("{:?}", self.ladder.rows());
+        // The sizes and places of sample cameras are the user's at times, and are no part of a row.
+        let rows = format!("{:?} {:?}", self.ladder.rows(), self.representations);
         KeptKey {
             scene: scene_hash.clone(),
-            cell: hash(&cell_text(&self.subject.cell)),
+            cell: hash(&format!("{:?}", self.subject.cell)),
             lighting: hash(&light),
             view_size: format!("{}x{}, {} samples a pixel", view_px.x, view_px.y, planes.antialias.samples()),
             ladder_version: hash(&rows),
         }
     }
-}
 
-/// The program's version, whose costs are comparable.
-pub const PROGRAM_VERSION: &str = env!("CARGO_PKG_VERSION");
+    /// The request of a plan on a device that may measure for `allowance_s` seconds.
+    #[must_use]
+    pub fn request(&self, budget: Budget, device: String, allowance_s: f64) -> PlanRequest {
+        let is_traced = self.subject.lighting != self.subject.screening_lighting;
+        PlanRequest {
+            plan: 1,
+            budget,
+            key: self.key(),
+            device,
+            program_version: env!("CARGO_PKG_VERSION").to_owned(),
+            view_pixels: f64::from(self.subject.view_px.element_product()),
+            allowance_s,
+            most_certified: if is_traced { MOST_CERTIFIED_TRACED } else { MOST_CERTIFIED },
+            seed: self.subject.seed,
+        }
+    }
+}
 
 fn hash(text: &str) -> String {
     SceneHash::of(text.as_bytes()).to_string()
-}
-
-/// The cell to about 1 % of its size.
-fn cell_text(cell: &ViewCell) -> String {
-    let corners = [Vec2::splat(-1.0), Vec2::new(1.0, -1.0), Vec2::ONE].map(|place| cell.camera_at(place, UVec2::ONE));
-    let step_m = (corners[0].eye_in_world - corners[2].eye_in_world).length().max(f32::MIN_POSITIVE) / CELL_STEPS;
-    let text = |camera: &PinholeCamera| {
-        let eye = (camera.eye_in_world / step_m).round();
-        let forward = (camera.forward_in_world() * CELL_STEPS).round();
-        format!("{eye} {forward} {:.2}", camera.focal_px.y)
-    };
-    corners.each_ref().map(text).join("; ")
 }
 
 fn rows(args: &SceneArgs, given_cameras: u32, is_size_fixed: bool) -> Vec<Row> {
@@ -323,5 +327,7 @@ mod tests {
         let differing: [&[&str]; 3] =
             [&["--lighting", "unlit"], &["--sample-size", "320x240"], &["--lighting", "soft 4"]];
         assert!(differing.iter().all(|more| planning(more).key() != key));
+        let sized = |size: &str| planning(&["--sample-size", size]).key();
+        assert_ne!(sized("320x240"), sized("640x480"), "equal rows of other images");
     }
 }

@@ -3,7 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use codec::{DecodeError, DecodeLimits, FrameError, PlaneSet, decode_depth_image, encode_depth_image, encode_view};
+use codec::{
+    DecodeError, DecodeLimits, EncodedDepthImage, FrameError, PlaneSet, decode_depth_image, encode_depth_image,
+    encode_view,
+};
 use depth_image::{DepthImage, DepthImageError, PinholeCamera, View, ViewPlanes};
 use metrics::MetricsError;
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, own_time};
@@ -219,9 +222,19 @@ impl<'a> Prober<'a> {
         if self.is_first(&format!("sample {} {:?} {}", of.sampling, work.planes, work.lighting)) {
             self.engine.sample(&work, self.turn)?;
         }
-        let (images, seconds) = self.timed(|engine, turn| engine.sample(&work, turn))?;
-        images.iter().try_for_each(|image| encode_depth_image(image, PlaneSet::ALL).map(drop))?;
-        Ok(seconds / images.len().max(1) as f64)
+        Ok(self.encoded(&work)?.1)
+    }
+
+    /// Images as they leave a sampler, and g_s.
+    fn encoded(&self, work: &SampleWork) -> Result<(Vec<EncodedDepthImage>, f64), ProbeError> {
+        let (encoded, seconds) = own_time(self.engine, || {
+            let images = self.engine.sample(work, self.turn)?;
+            let encoded = images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL));
+            Ok::<_, ProbeError>(encoded.collect::<Result<Vec<_>, _>>()?)
+        });
+        let encoded = encoded?;
+        let sample_image_s = seconds / encoded.len().max(1) as f64;
+        Ok((encoded, sample_image_s))
     }
 
     /// The fewest images of a set that can be sampled alone.
@@ -241,19 +254,14 @@ impl<'a> Prober<'a> {
         if self.is_first(&format!("sample {} {:?} {}", of.sampling, work.planes, work.lighting)) {
             self.engine.sample(&self.fewest(work.clone())?, self.turn)?;
         }
-        let (encoded, seconds) = own_time(self.engine, || {
-            let images = self.engine.sample(&work, self.turn)?;
-            let encoded = images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL));
-            Ok::<_, ProbeError>(encoded.collect::<Result<Vec<_>, _>>()?)
-        });
-        let encoded = encoded?;
+        let (encoded, sample_image_s) = self.encoded(&work)?;
         let decoded = encoded.iter().zip(&of.sample_cameras).map(|(image, camera)| {
             decode_depth_image(&image.header, *camera, &image.payload, &DecodeLimits::default())
         });
         let set = Arc::new(SampledSet {
             images: decoded.collect::<Result<_, _>>()?,
             encoded_bytes: encoded.iter().map(|image| image.payload.len()).collect(),
-            sample_image_s: seconds / encoded.len().max(1) as f64,
+            sample_image_s,
         });
         self.sets.keep(key, set.clone());
         Ok(set)

@@ -23,7 +23,7 @@ use crate::progress::bar;
 
 /// Views that rows are measured on, in the quick form and in the full one.
 const VIEWS: [u32; 2] = [8, 32];
-/// What a run is given for reports and the like, beyond `--time`.
+/// The time of a run beyond `--time`, for loading and the report.
 const GRACE_S: f64 = 15.0;
 /// The longest quick run.
 const QUICK_S: f64 = 600.0;
@@ -43,7 +43,7 @@ pub struct FrontsArgs {
     /// Measures four subjects, every second number of cameras and size, and fewer views
     #[arg(long)]
     quick: bool,
-    /// Measuring ends after about so many seconds, and what was measured by then is reported
+    /// The most seconds of measuring, about. Rows that are measured by then are reported
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     time: Option<u32>,
     /// Only subjects whose names contain this text, in any case
@@ -114,7 +114,8 @@ pub fn run(args: &FrontsArgs) -> anyhow::Result<Outcome> {
 fn front(engine: &Arc<GpuEngine>, conditions: &Conditions, limits: &Limits) -> anyhow::Result<Front> {
     let subject = Subject::load(engine, conditions)?;
     let planning = subject.planning(Antialias::NONE, conditions.seed)?;
-    let progress = bar(format!("rows, {}", conditions.name), planning.ladder.rows().len());
+    let count = planning.ladder.rows().iter().filter(|row| limits.include(row)).count();
+    let progress = bar(format!("rows, {}", conditions.name), count);
     let front = Front::measure(&subject, &planning, limits, || progress.inc(1))?;
     progress.finish_and_clear();
     Ok(front)

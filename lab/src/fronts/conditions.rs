@@ -24,7 +24,7 @@ pub struct Conditions {
     pub scene: String,
     /// The side of the view cell, over that of the scene's own sample cameras.
     #[serde(default = "one")]
-    pub cell: f32,
+    pub cell_ratio: f32,
     /// Columns and rows of a view.
     #[serde(default = "paper_size_px")]
     pub size_px: UVec2,
@@ -94,8 +94,8 @@ fn parsed(text: &str, file: &str) -> Result<Vec<Conditions>, BadInput> {
 
 impl Conditions {
     fn fault(&self) -> Option<String> {
-        if !CELL_SIDES.contains(&self.cell) {
-            return Some(format!("cell is {}, must be from 0.01 to 10", self.cell));
+        if !CELL_SIDES.contains(&self.cell_ratio) {
+            return Some(format!("cell_ratio is {}, must be from 0.01 to 10", self.cell_ratio));
         }
         if !(1..=1_000_000).contains(&self.views) {
             return Some(format!("views is {}, must be from 1 to 1000000", self.views));
@@ -128,8 +128,8 @@ mod tests {
             ("", "subject"),
             ("subject = []", "0 subjects"),
             ("[[subject]]\nname = \"a\"", "scene"),
-            ("[[subject]]\nname = \"a\"\nscene = \"b\"\ncell = -1.0", "cell is -1"),
-            ("[[subject]]\nname = \"a\"\nscene = \"b\"\ncell = nan", "cell is NaN"),
+            ("[[subject]]\nname = \"a\"\nscene = \"b\"\ncell_ratio = -1.0", "cell_ratio is -1"),
+            ("[[subject]]\nname = \"a\"\nscene = \"b\"\ncell_ratio = nan", "cell_ratio is NaN"),
             ("[[subject]]\nname = \"a\"\nscene = \"b\"\nviews = 0", "views is 0"),
             ("[[subject]]\nname = \"a\"\nscene = \"b\"\nsize_px = [0, 4]", "size_px is [0, 4]"),
             ("[[subject]]\nname = \"a\"\nscene = \"b\"\ncolour = 1", "colour"),

@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use app_core::planning::{OneNode, PROGRAM_VERSION, Planning};
+use app_core::planning::{OneNode, Planning};
 use depth_image::Antialias;
-use planner::{Budget, Choice, Kept, Metric, PlanRequest, Planner, Price, Pricing as _, ProbeView, Row};
+use planner::{Budget, Choice, Kept, Metric, Planner, Price, Pricing as _, ProbeView, Row};
 
 use super::conditions::Conditions;
 use super::order::order;
@@ -35,7 +35,8 @@ impl Limits {
         self.end.is_some_and(|end| Instant::now() >= end)
     }
 
-    fn take(&self, row: &Row) -> bool {
+    /// Whether a row is to be measured.
+    pub fn include(&self, row: &Row) -> bool {
         !self.every_second || (QUICK_CAMERAS.contains(&row.camera_count) && QUICK_SIDES.contains(&row.side_ratio))
     }
 }
@@ -81,7 +82,7 @@ impl Front {
         let mut prober = subject.prober(planning);
         let pricing = subject.pricing(&mut prober)?;
         let taken: Vec<usize> =
-            (0..planning.ladder.rows().len()).filter(|&place| limits.take(&planning.ladder.rows()[place])).collect();
+            (0..planning.ladder.rows().len()).filter(|&place| limits.include(&planning.ladder.rows()[place])).collect();
         let candidates: Vec<Row> = taken.iter().map(|&place| planning.ladder.rows()[place].clone()).collect();
         let mut rows = Vec::with_capacity(taken.len());
         for place in order(&candidates).into_iter().map(|place| taken[place]) {
@@ -155,17 +156,7 @@ impl Front {
 }
 
 fn planned(subject: &Subject, planning: &Planning, pricing: OneNode, budget: Budget) -> anyhow::Result<Planned> {
-    let request = PlanRequest {
-        plan: 1,
-        budget,
-        key: planning.key(),
-        device: "this device".to_owned(),
-        program_version: PROGRAM_VERSION.to_owned(),
-        view_pixels: f64::from(subject.conditions.size_px.element_product()),
-        allowance_s: ALLOWANCE_S,
-        most_certified: 8,
-        seed: subject.conditions.seed,
-    };
+    let request = planning.request(budget, "this device".to_owned(), ALLOWANCE_S);
     let mut planner = Planner::new(request, planning.ladder.clone(), pricing)?;
     let mut prober = subject.prober(planning);
     let nothing = Kept::empty(planning.key());

@@ -36,11 +36,11 @@ impl Subject {
         };
         let setup = args.load().with_context(of)?;
         engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
-        let around = scaled(&setup.around, conditions.cell);
+        let around = scaled(&setup.around, conditions.cell_ratio);
         Ok(Self { conditions: conditions.clone(), engine: engine.clone(), setup: Setup { around, ..setup }, args })
     }
 
-    /// The ladder, for views of so many samples a pixel. `seed` draws the views.
+    /// The ladder, for views with `antialias` samples a pixel. The seed draws the views.
     ///
     /// # Errors
     /// The subject has no ladder.

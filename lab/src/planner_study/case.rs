@@ -2,10 +2,8 @@
 
 use std::time::Instant;
 
-use app_core::planning::{PROGRAM_VERSION, Planning};
-use planner::{
-    Budget, Choice, ErrorTerm, Kept, Metric, Outcome, PlanRequest, Planner, Price, Pricing as _, ViewErrors,
-};
+use app_core::planning::Planning;
+use planner::{Budget, Choice, ErrorTerm, Kept, Metric, Outcome, Planner, Price, Pricing as _, ViewErrors};
 use probe::Prober;
 
 use super::evidence::{Evidence, over_ratio};
@@ -77,17 +75,7 @@ impl Cases<'_, '_> {
     /// Plans for a budget with what earlier plans kept.
     pub fn case(&mut self, budget: Budget, prober: &mut Prober<'_>, kept: &mut Kept) -> anyhow::Result<Case> {
         let (start, is_first) = (Instant::now(), kept.rows.is_empty());
-        let request = PlanRequest {
-            plan: 1,
-            budget,
-            key: self.planning.key(),
-            device: "this device".to_owned(),
-            program_version: PROGRAM_VERSION.to_owned(),
-            view_pixels: f64::from(self.planning.subject.view_px.element_product()),
-            allowance_s: ALLOWANCE_S,
-            most_certified: 8,
-            seed: self.planning.subject.seed,
-        };
+        let request = self.planning.request(budget, "this device".to_owned(), ALLOWANCE_S);
         let mut planner = Planner::new(request, self.planning.ladder.clone(), self.pricing)?;
         let representations = &self.planning.representations;
         let (outcome, measured) = probe::plan(&mut planner, prober, representations, kept.clone(), |_| ());

@@ -47,7 +47,7 @@ pub struct PlannerArgs {
     /// Measures four subjects in place of eight
     #[arg(long)]
     quick: bool,
-    /// Measures so many subjects
+    /// The number of subjects
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=12))]
     subjects: Option<u32>,
     /// Exit status 1 when a check falls short
@@ -68,7 +68,7 @@ pub fn run(args: &PlannerArgs) -> anyhow::Result<Outcome> {
     report.parameter("seed", args.seed.to_string());
     let mut cases = Vec::new();
     for (place, conditions) in subjects(args.seed, count).iter().enumerate() {
-        let about = format!("cell {:.2}, {} views a set", conditions.cell, conditions.views);
+        let about = format!("cell {:.2}, {} views a set", conditions.cell_ratio, conditions.views);
         report.parameter(conditions.name.clone(), about);
         // Every second subject is priced in expensive light.
         let of_subject = cases_of(&engine, conditions, place % 2 == 1);

@@ -37,7 +37,7 @@ fn conditions(seed: u64, place: usize) -> Conditions {
     Conditions {
         name: SCENES[place].to_owned(),
         scene: SCENES[place].to_owned(),
-        cell: between(CELLS, cell) as f32,
+        cell_ratio: between(CELLS, cell) as f32,
         size_px: VIEW_SIZE_PX,
         lighting: render::Lighting::default().to_string(),
         views: between(VIEWS, views) as usize,

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use app_core::exit::Outcome;
 use app_core::plan_files::PlanFiles;
-use app_core::planning::{OneNode, PROGRAM_VERSION, PlannedViews, Planning};
+use app_core::planning::{OneNode, PlannedViews, Planning};
 use app_core::setup::{DeviceArgs, SceneArgs, Setup};
 use app_core::sizes::SizePx;
 use clap::Args;
@@ -17,14 +17,13 @@ use engine::GpuEngine;
 use indicatif::ProgressBar;
 use node::{Engine as _, Turn, WorkClass};
 use output::Output;
-use planner::{Budget, Kept, PlanRequest, Planner, Pricing as _, PromiseState};
+use planner::{Budget, Kept, Planner, Pricing as _, PromiseState};
 use probe::Prober;
+
+use super::view::rate;
 
 /// Seconds for which a viewer is shown one set of a still scene, as far as costs are concerned.
 const STILL_SET_S: f64 = 60.0;
-/// Rows of a round of certificates; fewer where every true view is expensive.
-const MOST_CERTIFIED: usize = 8;
-const MOST_CERTIFIED_TRACED: usize = 3;
 
 /// Finds the cheapest representation of a scene that keeps a budget: how it is sampled, from how many cameras, in images of
 /// which size, and how views are reconstructed. Prints the choice, the reason, the front of cost against error, and the
@@ -78,10 +77,6 @@ Examples:
 
 Exit status: 0 the budget is kept; 1 nothing keeps it; 2 arguments or input that cannot be used; 3 a failure.";
 
-fn rate(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|hz| (0.01..=1000.0).contains(hz)).ok_or_else(|| "expected 0.01 to 1000".to_owned())
-}
-
 fn allowance(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|s| (1.0..=1e6).contains(s)).ok_or_else(|| "expected 1 to 1000000".to_owned())
 }
@@ -94,21 +89,6 @@ impl PlanArgs {
             // Each pose of a moving scene is of another moment.
             Some(_) if setup.offer.period_s.is_some() => 1,
             Some(hz) => (hz * STILL_SET_S).ceil() as usize,
-        }
-    }
-
-    fn request(&self, planning: &Planning, device: String) -> PlanRequest {
-        let is_traced = self.scene.lighting.is_traced();
-        PlanRequest {
-            plan: 1,
-            budget: self.budget,
-            key: planning.key(),
-            device,
-            program_version: PROGRAM_VERSION.to_owned(),
-            view_pixels: f64::from(self.size.0.element_product()),
-            allowance_s: self.allowance,
-            most_certified: if is_traced { MOST_CERTIFIED_TRACED } else { MOST_CERTIFIED },
-            seed: self.seed,
         }
     }
 
@@ -135,7 +115,7 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
     let planning = Planning::new(&setup, &args.scene, &views)?;
     let mut prober = Prober::new(engine.as_ref(), planning.subject.clone(), Turn::of(WorkClass::Batch));
     let pricing = OneNode { views_a_set: args.views_a_set(&setup), direct: prober.direct_costs()? };
-    let request = args.request(&planning, device_name(&engine));
+    let request = planning.request(args.budget, device_name(&engine), args.allowance);
     let files = args.plan_files();
     let remembered = files.as_ref().map_or_else(|| Kept::empty(planning.key()), |files| files.read(&planning.key()));
     let mut planner = Planner::new(request, planning.ladder.clone(), pricing)?;

@@ -23,6 +23,7 @@ use indicatif::ProgressBar;
 use tokio::runtime::Handle;
 
 pub use args::ViewArgs;
+pub(super) use args::rate;
 use comparing::compare;
 use file_names::remove_parts;
 use job::Job;

@@ -118,7 +118,7 @@ impl SamplingMethod {
         }
     }
 
-    /// The method for sets of so many images.
+    /// The method for sets of `count` images.
     #[must_use]
     pub fn with_images(self, count: u32) -> Self {
         match self {

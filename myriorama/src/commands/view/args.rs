@@ -109,7 +109,7 @@ impl ViewArgs {
     }
 }
 
-fn rate(text: &str) -> Result<f64, String> {
+pub(in crate::commands) fn rate(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|hz| (0.01..=1000.0).contains(hz)).ok_or_else(|| "expected 0.01 to 1000".to_owned())
 }
 
