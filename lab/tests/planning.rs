@@ -53,7 +53,7 @@ impl Stand {
 const DEAR: OneNode = OneNode { views_a_set: 290, direct: DirectCosts { direct_view_s: 1e3, encode_view_s: 1e-3 } };
 
 fn plan(planning: &Planning, prober: &mut Prober<'_>, budget: Budget, kept: Kept) -> (Outcome, Kept, f64) {
-    let request = planning.request(budget, "a device".to_owned(), 600.0);
+    let request = planning.request(budget, "a device".to_owned(), DEAR.views_a_set, 600.0);
     let mut planner = Planner::new(request, planning.ladder.clone(), DEAR).unwrap();
     let (outcome, kept) = probe::plan(&mut planner, prober, &planning.representations, kept, |_| ());
     (outcome, kept, planner.spent_s())

@@ -97,9 +97,9 @@ impl Planning {
         }
     }
 
-    /// The request of a plan on a device that may measure for `allowance_s` seconds.
+    /// The request of a plan for sets of `views_a_set` views, on a device that may measure for `allowance_s` seconds.
     #[must_use]
-    pub fn request(&self, budget: Budget, device: String, allowance_s: f64) -> PlanRequest {
+    pub fn request(&self, budget: Budget, device: String, views_a_set: usize, allowance_s: f64) -> PlanRequest {
         let is_traced = self.subject.lighting != self.subject.screening_lighting;
         PlanRequest {
             plan: 1,
@@ -107,7 +107,7 @@ impl Planning {
             key: self.key(),
             device,
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
-            view_pixels: f64::from(self.subject.view_px.element_product()),
+            pricing: format!("one node, {views_a_set} views a set"),
             allowance_s,
             most_certified: if is_traced { MOST_CERTIFIED_TRACED } else { MOST_CERTIFIED },
             seed: self.subject.seed,

@@ -1,113 +1,106 @@
 //! Costs of rows that were not measured, from rows that were.
 //!
-//! Each cost is a product of a constant of the sampling method, one of the reconstruction method, and three powers. Their
-//! bases are S, the sample images' side and a view's pixels. The logarithm is linear, and is fitted by least squares. A weak
-//! prior holds the exponents of the methods' loops, so that few rows suffice and no input is degenerate.
-
-use std::collections::BTreeSet;
+//! The logarithm of a cost is a Gaussian process over the ladder. Its prior mean is a product of powers of S and of the
+//! sample images' side, as the methods' loops have them. Rows differ from it alike that share a sampling method, a
+//! reconstruction method, or both, and are near in S and side.
 
 use crate::costs::RowCosts;
+use crate::gaussian_process::{GaussianProcess, dot};
 use crate::ladder::Row;
-use crate::least_squares::LeastSquares;
 
 /// Costs below count as this, in s: a logarithm needs a value above 0.
 const LEAST_COST_S: f64 = 1e-9;
 /// Logarithms of predicted costs in s stay within this.
 const MOST_LOG: f64 = 20.0;
-/// The weights of the prior on the common constant, on the three exponents, and on the methods' constants. A weight is the
-/// variance of a measured logarithm, 0.1², over the variance of the coefficient. Exponents are within 0.5 of the prior's,
-/// constants within a factor of 2.7.
-const WEIGHTS: [f64; 3] = [1e-6, 0.04, 0.01];
-/// The prior's exponents of S, side and pixels, of g_s, d and c.
-const EXPONENTS: [[f64; 3]; 3] = [[0.0, 2.0, 1.0], [1.0, 2.0, 1.0], [0.5, 0.3, 1.0]];
-/// Columns before those of methods: the constant, and the exponents.
-const FIRST_METHOD: usize = 4;
+/// The prior exponents of S and side, of g_s, d and c.
+const EXPONENTS: [[f64; 2]; 3] = [[0.0, 2.0], [1.0, 2.0], [0.5, 0.3]];
+/// The variance of a measured logarithm: two measurements differ by about 10 %.
+const NOISE: f64 = 0.01;
+/// Prior variances of logarithms: of the constant, which is not known, and of both exponents.
+const CONSTANT: f64 = 100.0;
+const EXPONENT: f64 = 0.25;
+/// Prior variances of what rows near in S and side share: all of them, those of one reconstruction method, of one sampling
+/// method, and of one pair.
+const SHARED: [f64; 4] = [0.05, 0.5, 0.2, 0.2];
+/// Distances at which rows are near: four times in S, twice in side.
+const NEAR: [f64; 2] = [2.0 * std::f64::consts::LN_2, std::f64::consts::LN_2];
 
 /// Measured costs of a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimedRow {
     /// The row.
     pub row: Row,
-    /// The pixels of a view.
-    pub view_pixels: f64,
     /// The row's costs.
     pub costs: RowCosts,
 }
 
-/// The fitted products.
+/// What the measured rows say about the others.
 #[derive(Debug, Clone)]
 pub struct CostModel {
-    samplings: Vec<String>,
-    methods: Vec<String>,
-    fit: LeastSquares,
-    /// Coefficients of g_s, d and c.
-    coefficients: [Vec<f64>; 3],
+    rows: Vec<Row>,
+    process: GaussianProcess,
+    /// Of g_s, d and c.
+    weights: [Vec<f64>; 3],
+    /// The variances that were found over those of the prior.
+    scales: [f64; 3],
 }
 
 impl CostModel {
-    /// Fits the measured rows, none to all of them, for predictions of `rows`. All rows must be valid by [`Row::validate`].
-    /// Costs that are not finite, or below 10⁻⁹ s, count as that. Pixels that are not finite, or below 1, count as 1.
+    /// From the measured rows, none to all. All rows must be valid by [`Row::validate`]. Costs that are not finite, or below
+    /// 10⁻⁹ s, count as that.
     #[must_use]
-    pub fn fit(rows: &[Row], timed: &[TimedRow]) -> Self {
-        let all = || rows.iter().chain(timed.iter().map(|timed| &timed.row));
-        let samplings = distinct(all().map(|row| &row.sampling));
-        let methods = distinct(all().map(|row| &row.method));
-        let x: Vec<Vec<f64>> =
-            timed.iter().map(|timed| columns(&samplings, &methods, &timed.row, timed.view_pixels)).collect();
-        let count = FIRST_METHOD + samplings.len() + methods.len();
-        let weights: Vec<f64> = (0..count).map(weight).collect();
-        let fit = LeastSquares::new(&x, &weights);
-        let coefficients = [0, 1, 2].map(|cost| {
-            let logs: Vec<f64> = timed.iter().map(|timed| log_costs(&timed.costs)[cost]).collect();
-            fit.solve(&x, &logs, &weights, &prior(cost, count))
+    pub fn fit(timed: &[TimedRow]) -> Self {
+        let process = GaussianProcess::new(timed.len(), |i, j| covariance(&timed[i].row, &timed[j].row), NOISE);
+        let residuals = [0, 1, 2].map(|cost| -> Vec<f64> {
+            timed.iter().map(|timed| log_costs(&timed.costs)[cost] - prior(&timed.row)[cost]).collect()
         });
-        Self { samplings, methods, fit, coefficients }
+        let weights = residuals.each_ref().map(|residuals| process.weights(residuals));
+        // The most likely scale, with the prior's as one more measurement.
+        let scale = |cost: usize| (1.0 + dot(&residuals[cost], &weights[cost])) / (1.0 + timed.len() as f64);
+        let scales = [0, 1, 2].map(scale);
+        Self { rows: timed.iter().map(|timed| timed.row.clone()).collect(), process, weights, scales }
     }
 
-    /// The predicted costs of a valid row, always finite and from e⁻²⁰ to e²⁰ s.
+    /// The predicted costs of a valid row, always finite and from e⁻²⁰ to e²⁰ s, less some standard deviations.
     #[must_use]
-    pub fn predict(&self, row: &Row, view_pixels: f64) -> RowCosts {
-        let x = columns(&self.samplings, &self.methods, row, view_pixels);
-        let [sample_image_s, load_set_s, reconstruct_view_s] = self.coefficients.each_ref().map(|coefficients| {
-            let log: f64 = x.iter().zip(coefficients).map(|(x, coefficient)| x * coefficient).sum();
-            log.clamp(-MOST_LOG, MOST_LOG).exp()
+    pub fn predict(&self, row: &Row, deviations: f64) -> RowCosts {
+        let covariances: Vec<f64> = self.rows.iter().map(|other| covariance(row, other)).collect();
+        let variance = self.process.variance(covariance(row, row), &covariances) + NOISE;
+        let prior = prior(row);
+        let [sample_image_s, load_set_s, reconstruct_view_s] = [0, 1, 2].map(|cost| {
+            let log = prior[cost] + dot(&covariances, &self.weights[cost]);
+            let deviation = (variance * self.scales[cost].max(0.0)).sqrt();
+            (log - deviations * deviation).clamp(-MOST_LOG, MOST_LOG).exp()
         });
         RowCosts { sample_image_s, load_set_s, reconstruct_view_s }
     }
 
-    /// How little the measured rows say about a row: the variance of its predicted logarithm, in units of that of a
-    /// measurement.
+    /// How little the measured rows say about a row: the variance of its predicted logarithm, at the prior's scale.
     #[must_use]
-    pub fn uncertainty(&self, row: &Row, view_pixels: f64) -> f64 {
-        self.fit.variance(&columns(&self.samplings, &self.methods, row, view_pixels))
+    pub fn uncertainty(&self, row: &Row) -> f64 {
+        let covariances: Vec<f64> = self.rows.iter().map(|other| covariance(row, other)).collect();
+        self.process.variance(covariance(row, row), &covariances)
     }
 }
 
-fn distinct<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
-    names.cloned().collect::<BTreeSet<_>>().into_iter().collect()
+/// The logarithms of S and side.
+fn logs(row: &Row) -> [f64; 2] {
+    [f64::from(row.camera_count).ln(), row.side_ratio.ln()]
 }
 
-/// The constant, the logarithms of S, side and pixels, and 1 at the methods of the row.
-fn columns(samplings: &[String], methods: &[String], row: &Row, view_pixels: f64) -> Vec<f64> {
-    let pixels = if view_pixels.is_finite() { view_pixels.max(1.0) } else { 1.0 };
-    let exponents = [1.0, f64::from(row.camera_count).ln(), row.side_ratio.ln(), pixels.ln()];
-    let is = |name: &String, of: &String| f64::from(u8::from(name == of));
-    let samplings = samplings.iter().map(|name| is(name, &row.sampling));
-    exponents.into_iter().chain(samplings).chain(methods.iter().map(|name| is(name, &row.method))).collect()
+fn covariance(a: &Row, b: &Row) -> f64 {
+    let (logs_a, logs_b) = (logs(a), logs(b));
+    let squares = [0, 1].map(|axis| ((logs_a[axis] - logs_b[axis]) / NEAR[axis]).powi(2));
+    let nearness = (-0.5 * (squares[0] + squares[1])).exp();
+    let (is_method, is_sampling) = (a.method == b.method, a.sampling == b.sampling);
+    let is_shared = [true, is_method, is_sampling, is_method && is_sampling];
+    let shared: f64 = SHARED.iter().zip(is_shared).map(|(variance, is)| if is { *variance } else { 0.0 }).sum();
+    CONSTANT + EXPONENT * dot(&logs_a, &logs_b) + nearness * shared
 }
 
-fn weight(column: usize) -> f64 {
-    match column {
-        0 => WEIGHTS[0],
-        1..FIRST_METHOD => WEIGHTS[1],
-        _ => WEIGHTS[2],
-    }
-}
-
-fn prior(cost: usize, count: usize) -> Vec<f64> {
-    let mut prior = vec![0.0; count];
-    prior[1..FIRST_METHOD].copy_from_slice(&EXPONENTS[cost]);
-    prior
+/// The prior means of the logarithms of g_s, d and c.
+fn prior(row: &Row) -> [f64; 3] {
+    EXPONENTS.map(|exponents| dot(&exponents, &logs(row)))
 }
 
 fn log_costs(costs: &RowCosts) -> [f64; 3] {

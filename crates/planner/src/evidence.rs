@@ -3,7 +3,6 @@
 use crate::binomial::{at_most_over, is_over, most_over, views_needed};
 use crate::bounds::Moments;
 use crate::budget::{ErrorTerm, MOST_OVER, Statistic};
-use crate::student::upper_quantile;
 use crate::view_errors::ViewErrors;
 
 /// Numbers of views on which a mean is certified.
@@ -116,9 +115,8 @@ impl Evidence<'_> {
         let counted = self.count().max(1) as f64;
         match self.term.statistic() {
             Statistic::Mean => {
-                let views_f = views as f64;
-                let needed = upper_quantile(views - 1, error_rate) / views_f.sqrt();
-                normal((margin - needed) / (views_f.recip() + counted.recip()).sqrt())
+                let needed = self.excess(self.term.most_ratio()).deviations_above(views, error_rate);
+                normal((margin - needed) / ((views as f64).recip() + counted.recip()).sqrt())
             }
             Statistic::P95 => {
                 let share_over = 1.0 - normal(margin + NORMAL_P95);

@@ -1,7 +1,7 @@
 //! Measurements that are kept between plans, as JSON.
 //!
-//! Measurements are kept, conclusions are not: another budget is answered from the same errors. Errors hold on every device;
-//! costs carry the names of their device and program.
+//! Measurements are kept, choices are not: another budget is answered from the same errors. Errors hold on every device;
+//! costs carry the names of their device and program. A search that has come to its end is not made again.
 
 use serde::de::{Deserializer, Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
@@ -18,6 +18,8 @@ pub const MAX_KEPT_BYTES: usize = 64 << 20;
 pub const MAX_SCREENING_VIEWS: usize = 32;
 /// The most certificates, failed certificates and devices of a row; more are dropped, oldest first.
 const MAX_CERTIFICATES: usize = 16;
+/// The most searches; the oldest are dropped.
+const MAX_SEARCHES: usize = 64;
 /// The greatest relative difference of a sum that was kept from the sum of its values, by rounding.
 const SUM_TOLERANCE: f64 = 1e-9;
 
@@ -44,6 +46,20 @@ pub struct Kept {
     /// Rows that were measured.
     #[serde(deserialize_with = "bounded::<_, _, MAX_ROWS>")]
     pub rows: Vec<KeptRow>,
+    /// Searches that have come to their end.
+    #[serde(deserialize_with = "bounded::<_, _, MAX_SEARCHES>")]
+    pub searches: Vec<KeptSearch>,
+}
+
+/// A search for the cheapest row that keeps a budget.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs, reason = "as the fields of a plan's request")]
+pub struct KeptSearch {
+    pub budget: Budget,
+    pub pricing: String,
+    pub device: String,
+    pub program_version: String,
 }
 
 /// The measurements of one row.
@@ -119,7 +135,7 @@ impl Kept {
     /// A key without measurements.
     #[must_use]
     pub fn empty(key: KeptKey) -> Self {
-        Self { key, fresh_views_drawn: 0, rows: Vec::new() }
+        Self { key, fresh_views_drawn: 0, rows: Vec::new(), searches: Vec::new() }
     }
 
     /// The measurements of `key` from JSON. Lists that are too long are refused before they are read to their end.
@@ -153,7 +169,23 @@ impl Kept {
         // Far more than any program draws, and far from overflow.
         within(self.fresh_views_drawn, 0..=1 << 48, "fresh_views_drawn", "at most 2^48")?;
         within(self.rows.len(), 0..=MAX_ROWS, "rows", "at most 220")?;
-        self.rows.iter().try_for_each(KeptRow::validate)
+        self.rows.iter().try_for_each(KeptRow::validate)?;
+        self.searches.iter().try_for_each(KeptSearch::validate)
+    }
+
+    /// Adds a search, as the newest.
+    pub(crate) fn add_search(&mut self, search: KeptSearch) {
+        self.searches.retain(|other| *other != search);
+        self.searches.push(search);
+        self.searches.drain(..self.searches.len().saturating_sub(MAX_SEARCHES));
+    }
+}
+
+impl KeptSearch {
+    fn validate(&self) -> Result<(), InvalidField> {
+        name(&self.pricing, "pricing")?;
+        name(&self.device, "device")?;
+        name(&self.program_version, "program_version")
     }
 }
 

@@ -15,10 +15,10 @@ mod cost_model;
 mod costs;
 mod event;
 mod evidence;
+mod gaussian_process;
 mod invalid;
 mod kept;
 mod ladder;
-mod least_squares;
 mod metric;
 mod outcome;
 mod planner;
@@ -36,7 +36,9 @@ pub use cost_model::{CostModel, TimedRow};
 pub use costs::{Price, Pricing, RowCosts};
 pub use event::{Event, MAX_PROBE_VIEWS, ProbeId, Probed, Timed};
 pub use invalid::InvalidField;
-pub use kept::{Certificate, Kept, KeptCosts, KeptError, KeptKey, KeptRow, MAX_KEPT_BYTES, MAX_SCREENING_VIEWS};
+pub use kept::{
+    Certificate, Kept, KeptCosts, KeptError, KeptKey, KeptRow, KeptSearch, MAX_KEPT_BYTES, MAX_SCREENING_VIEWS,
+};
 pub use ladder::{Ladder, MAX_ROWS, Row};
 pub use metric::{Metric, UnknownMetric};
 pub use outcome::{Choice, Outcome, PromiseState, PruningCheck, RowStatus, RowSummary};

@@ -21,7 +21,7 @@ use crate::costs::{Price, Pricing};
 use crate::event::{Event, ProbeId};
 use crate::evidence::Evidence;
 use crate::invalid::{InvalidField, name, seconds, within};
-use crate::kept::KeptKey;
+use crate::kept::{KeptKey, KeptSearch};
 use crate::ladder::{Ladder, Row};
 use crate::metric::Metric;
 use crate::outcome::{Outcome, RowSummary};
@@ -29,8 +29,10 @@ use crate::outcome::{Outcome, RowSummary};
 /// Views and repetitions with which finalists are timed.
 const TIMED_VIEWS: usize = 32;
 const TIMED_REPEATS: usize = 2;
-/// Predicted times may be wrong by so much, and measured ones.
-const TOLERANCES: [f64; 2] = [1.15, 1.02];
+/// A measured time may be wrong by this.
+const TOLERANCE: f64 = 1.02;
+/// The least that a time is predicted to be may be wrong by this.
+const PREDICTED_TOLERANCE: f64 = 1.15;
 /// A measured time below this share of its limit is within it.
 const CLEARLY_IN_TIME: f64 = 0.95;
 
@@ -47,8 +49,8 @@ pub struct PlanRequest {
     pub device: String,
     /// The version of the program that measures.
     pub program_version: String,
-    /// The pixels of a view.
-    pub view_pixels: f64,
+    /// What prices depend on beside costs, as a text: a search is not made again at the same prices.
+    pub pricing: String,
     /// The nodes' time that measuring may take in all, in s.
     pub allowance_s: f64,
     /// Rows of a round of certificates, 1 to 8: fewer where light is expensive.
@@ -66,12 +68,16 @@ pub struct Planner<P> {
     rows: Vec<RowState>,
     /// The prices of rows, from measured costs or predicted ones.
     prices: Vec<Price>,
+    /// The same; of predicted costs one standard deviation less.
+    least_prices: Vec<Price>,
     model: CostModel,
     stage: Stage,
     round: Round,
     pending: Option<(ProbeId, Work)>,
     probe_number: u64,
     fresh_views_drawn: u64,
+    /// Of earlier plans.
+    searches: Vec<KeptSearch>,
     finalists_were_timed: bool,
     spent_s: f64,
     allowance_s: f64,
@@ -83,7 +89,7 @@ impl PlanRequest {
         self.key.validate()?;
         name(&self.device, "device")?;
         name(&self.program_version, "program_version")?;
-        within(self.view_pixels, 1.0..=1e9, "view_pixels", "from 1 to 10^9")?;
+        name(&self.pricing, "pricing")?;
         within(self.most_certified, 1..=8, "most_certified", "from 1 to 8")?;
         seconds(self.allowance_s, "allowance_s")
     }
@@ -96,16 +102,18 @@ impl<P: Pricing> Planner<P> {
     /// For a value that its field does not allow.
     pub fn new(request: PlanRequest, ladder: Ladder, pricing: P) -> Result<Self, InvalidField> {
         request.validate()?;
-        let model = CostModel::fit(ladder.rows(), &[]);
+        let model = CostModel::fit(&[]);
         let mut planner = Self {
             rows: ladder.rows().iter().map(|_| RowState::default()).collect(),
             prices: Vec::new(),
+            least_prices: Vec::new(),
             model,
             stage: Stage::Waiting,
             round: Round::default(),
             pending: None,
             probe_number: 0,
             fresh_views_drawn: 0,
+            searches: Vec::new(),
             finalists_were_timed: false,
             spent_s: 0.0,
             allowance_s: request.allowance_s,
@@ -219,15 +227,15 @@ impl<P: Pricing> Planner<P> {
         Evidence { term, errors: &self.rows[row].errors }
     }
 
-    /// Whether a row may be within the budget's time; `tolerances` are those of predicted and of measured costs.
-    fn is_in_time(&self, row: usize, tolerances: [f64; 2]) -> bool {
-        let tolerance = tolerances[usize::from(self.rows[row].costs.is_some())];
-        self.request.budget.most_view_s().is_none_or(|limit| self.prices[row].view_s <= limit * tolerance)
+    /// Whether a row may be within the budget's time.
+    fn is_in_time(&self, row: usize, tolerance: f64) -> bool {
+        let tolerance = if self.rows[row].costs.is_some() { tolerance } else { PREDICTED_TOLERANCE };
+        self.request.budget.most_view_s().is_none_or(|limit| self.least_prices[row].view_s <= limit * tolerance)
     }
 
     /// Whether measured costs say that a row is within the budget's time.
     fn is_clearly_in_time(&self, row: usize) -> bool {
-        self.is_in_time(row, [0.0, CLEARLY_IN_TIME])
+        self.rows[row].costs.is_some() && self.is_in_time(row, CLEARLY_IN_TIME)
     }
 
     /// The cost of drawing directly; `None` where that takes longer than the budget allows.

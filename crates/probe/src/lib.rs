@@ -15,6 +15,6 @@ mod subject;
 
 pub use errors_of_views::view_errors;
 pub use plan::{answer, plan};
-pub use prober::{DirectCosts, Measured, ProbeError, Prober};
+pub use prober::{DirectCosts, Measured, ProbeError, Prober, median_costs};
 pub use representation::Representation;
 pub use subject::{Light, Subject};

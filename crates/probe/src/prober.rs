@@ -348,7 +348,9 @@ impl<'a> Prober<'a> {
     }
 }
 
-fn median_costs(costs: &[RowCosts]) -> RowCosts {
+/// The median of each cost.
+#[must_use]
+pub fn median_costs(costs: &[RowCosts]) -> RowCosts {
     let of = |cost: fn(&RowCosts) -> f64| median(costs.iter().map(cost).collect());
     RowCosts {
         sample_image_s: of(|costs| costs.sample_image_s),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use app_core::exit::{BadInput, Outcome};
+use app_core::exit::Outcome;
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use depth_image::Antialias;
@@ -59,17 +59,11 @@ pub struct FrontsArgs {
 
 impl FrontsArgs {
     fn wanted(&self) -> anyhow::Result<Vec<Conditions>> {
-        let is_wanted = |subject: &Conditions| {
-            let name = subject.name.to_lowercase();
-            let is_named = self.subjects.iter().any(|text| name.contains(&text.to_lowercase()));
-            if self.subjects.is_empty() { !self.quick || subject.quick } else { is_named }
-        };
         let all = conditions::read(self.conditions.as_deref())?;
-        let wanted: Vec<Conditions> = all.into_iter().filter(is_wanted).collect();
-        if wanted.is_empty() {
-            return Err(BadInput(format!("no subject's name contains {:?}", self.subjects)).into());
+        if !self.subjects.is_empty() {
+            return Ok(conditions::named(all, &self.subjects)?);
         }
-        Ok(wanted)
+        Ok(all.into_iter().filter(|subject| !self.quick || subject.quick).collect())
     }
 
     /// The share of the time that is left for the next of `subjects` subjects.

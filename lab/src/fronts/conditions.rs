@@ -79,6 +79,19 @@ pub fn read(path: Option<&Path>) -> Result<Vec<Conditions>, BadInput> {
     parsed(&text, &path.display().to_string())
 }
 
+/// The subjects whose names contain one of the texts, in any case.
+///
+/// # Errors
+/// There is none.
+pub fn named(all: Vec<Conditions>, texts: &[String]) -> Result<Vec<Conditions>, BadInput> {
+    let is_named = |subject: &Conditions| {
+        let name = subject.name.to_lowercase();
+        texts.iter().any(|text| name.contains(&text.to_lowercase()))
+    };
+    let named: Vec<Conditions> = all.into_iter().filter(is_named).collect();
+    if named.is_empty() { Err(BadInput(format!("no subject's name contains {texts:?}"))) } else { Ok(named) }
+}
+
 fn parsed(text: &str, file: &str) -> Result<Vec<Conditions>, BadInput> {
     let File { subject } = toml::from_str(text).map_err(|error| BadInput(format!("{file}: {error}")))?;
     if !(1..=MAX_SUBJECTS).contains(&subject.len()) {
@@ -93,6 +106,21 @@ fn parsed(text: &str, file: &str) -> Result<Vec<Conditions>, BadInput> {
 }
 
 impl Conditions {
+    /// A scene with the defaults of all else.
+    #[must_use]
+    pub fn of_scene(scene: &str) -> Self {
+        Self {
+            name: scene.to_owned(),
+            scene: scene.to_owned(),
+            cell_ratio: one(),
+            size_px: paper_size_px(),
+            lighting: plain(),
+            views: paper_views(),
+            seed: 0,
+            quick: false,
+        }
+    }
+
     fn fault(&self) -> Option<String> {
         if !CELL_SIDES.contains(&self.cell_ratio) {
             return Some(format!("cell_ratio is {}, must be from 0.01 to 10", self.cell_ratio));

@@ -156,7 +156,7 @@ impl Front {
 }
 
 fn planned(subject: &Subject, planning: &Planning, pricing: OneNode, budget: Budget) -> anyhow::Result<Planned> {
-    let request = planning.request(budget, "this device".to_owned(), ALLOWANCE_S);
+    let request = planning.request(budget, "this device".to_owned(), pricing.views_a_set, ALLOWANCE_S);
     let mut planner = Planner::new(request, planning.ladder.clone(), pricing)?;
     let mut prober = subject.prober(planning);
     let nothing = Kept::empty(planning.key());

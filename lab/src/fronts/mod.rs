@@ -5,7 +5,7 @@ pub mod command;
 pub(crate) mod conditions;
 mod measure;
 mod order;
-mod report;
+pub mod report;
 pub(crate) mod row;
 pub(crate) mod subject;
 #[cfg(test)]

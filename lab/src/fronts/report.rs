@@ -6,6 +6,12 @@ use study::{Axis, Better, Cell, Point, Report, Series, Table, XyChart};
 use super::measure::{Front, Planned};
 use super::row::MeasuredRow;
 
+/// What the names of tables of rows begin with, and columns that other commands read.
+pub const ROWS: &str = "Rows, ";
+pub const RECONSTRUCTION: &str = "reconstruction";
+pub const COST: &str = "cost of a view";
+pub const FOREGROUND_FLIP: &str = "foreground FLIP";
+
 /// A figure over which costs are charted.
 struct Figure {
     name: &'static str,
@@ -61,7 +67,7 @@ pub fn add_to(report: &mut Report, front: &Front) -> anyhow::Result<()> {
     let name = &front.conditions.name;
     report.parameter(format!("{name}: scene"), front.scene_hash.as_str());
     report.parameter(format!("{name}: rows left out"), front.left_out);
-    report.tables.push(rows_table(&format!("Rows, {name}"), &front.rows, front.direct)?);
+    report.tables.push(rows_table(&format!("{ROWS}{name}"), &front.rows, front.direct)?);
     if let Some(direct) = front.antialiased_direct {
         let title = format!("Rows of the front with four samples a pixel, {name}");
         report.tables.push(rows_table(&title, &front.antialiased, direct)?);
@@ -73,19 +79,23 @@ pub fn add_to(report: &mut Report, front: &Front) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn rows_table(name: &str, rows: &[MeasuredRow], direct: Price) -> anyhow::Result<Table> {
+/// The figures of rows, and of direct drawing.
+///
+/// # Errors
+/// A row that does not fit the table.
+pub fn rows_table(name: &str, rows: &[MeasuredRow], direct: Price) -> anyhow::Result<Table> {
     let columns = [
         ("sampling", ""),
         ("S", ""),
         ("side", ""),
-        ("reconstruction", ""),
-        ("cost of a view", "ms"),
+        (RECONSTRUCTION, ""),
+        (COST, "ms"),
         ("g_s", "ms"),
         ("d", "ms"),
         ("c", "ms"),
         ("set", "kB"),
         ("samples", ""),
-        ("foreground FLIP", ""),
+        (FOREGROUND_FLIP, ""),
         ("FLIP", ""),
         ("foreground PSNR", "dB"),
         ("disocclusion", "%"),

@@ -10,6 +10,9 @@ use rayon::prelude::*;
 
 use crate::evaluation::known_depth;
 
+/// The side of sample images that `--sample-size auto` chooses.
+const DEFAULT_SIDE_RATIO: f64 = 1.0;
+
 /// A measured row.
 #[derive(Debug, Clone)]
 pub struct MeasuredRow {
@@ -82,6 +85,14 @@ impl MeasuredRow {
     pub fn psnr_db(&self) -> f64 {
         (-10.0 * self.error_ratio(Metric::Psnr).log10()).min(metrics::PSNR_CAP_DB)
     }
+}
+
+/// Whether a row has the default methods and the largest images.
+#[must_use]
+pub fn is_default(row: &Row) -> bool {
+    row.sampling == sampling::METHODS[0].name
+        && row.method == reconstruction::METHODS[0].name
+        && row.side_ratio == DEFAULT_SIDE_RATIO
 }
 
 /// The mean error over the pixels that count, of all views.

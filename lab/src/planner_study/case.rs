@@ -8,14 +8,15 @@ use probe::Prober;
 
 use super::evidence::{Evidence, over_ratio};
 use super::pricing::Priced;
-use crate::fronts::row::MeasuredRow;
+use crate::fronts::row::{MeasuredRow, is_default};
+use crate::statistics::mean_and_variation;
 
 /// The share of a budget that the best row keeps, to which a plan's cost is compared.
 const COMPARED_SHARE: f64 = 0.95;
 /// Seconds of measuring that a plan may take.
 const ALLOWANCE_S: f64 = 300.0;
-/// The cameras and the side of the default representation.
-const DEFAULT: (u32, f64) = (4, 1.0);
+/// The cameras of the default representation.
+const DEFAULT_CAMERAS: u32 = 4;
 
 /// A plan and its figures; `None` where a figure does not apply.
 pub struct Case {
@@ -39,6 +40,10 @@ pub struct Case {
     /// From the first event to the outcome.
     pub plan_s: f64,
     pub spent_s: f64,
+    /// From the first event to the outcome of the same plan, made again.
+    pub again_s: f64,
+    /// Predicted prices of rows that the plan did not measure, over those of the table.
+    pub predictions: Vec<f64>,
 }
 
 /// Six budgets between what the rows of a table reach.
@@ -68,29 +73,45 @@ pub struct Cases<'a, 's> {
     pub is_lit: bool,
     pub planning: &'a Planning,
     pub pricing: Priced,
+    pub views_a_set: usize,
     pub evidence: &'a mut Evidence<'s>,
 }
 
 impl Cases<'_, '_> {
     /// Plans for a budget with what earlier plans kept.
     pub fn case(&mut self, budget: Budget, prober: &mut Prober<'_>, kept: &mut Kept) -> anyhow::Result<Case> {
-        let (start, is_first) = (Instant::now(), kept.rows.is_empty());
-        let request = self.planning.request(budget, "this device".to_owned(), ALLOWANCE_S);
+        let is_first = kept.rows.is_empty();
+        let (planner, outcome, plan_s) = self.planned(budget, prober, kept)?;
+        let (_, _, again_s) = self.planned(budget, prober, kept)?;
+        let case = self.judged(budget, &outcome)?;
+        let (spent_s, predictions) = (planner.spent_s(), self.predictions(&planner));
+        Ok(Case { is_first, plan_s, spent_s, again_s, predictions, ..case })
+    }
+
+    /// A plan, its outcome, and the seconds that it took.
+    fn planned(
+        &self,
+        budget: Budget,
+        prober: &mut Prober<'_>,
+        kept: &mut Kept,
+    ) -> anyhow::Result<(Planner<Priced>, Outcome, f64)> {
+        let start = Instant::now();
+        let request = self.planning.request(budget, "this device".to_owned(), self.views_a_set, ALLOWANCE_S);
         let mut planner = Planner::new(request, self.planning.ladder.clone(), self.pricing)?;
         let representations = &self.planning.representations;
         let (outcome, measured) = probe::plan(&mut planner, prober, representations, kept.clone(), |_| ());
         *kept = measured;
-        let (plan_s, spent_s) = (start.elapsed().as_secs_f64(), planner.spent_s());
-        self.judged(budget, &outcome, is_first, [plan_s, spent_s])
+        Ok((planner, outcome, start.elapsed().as_secs_f64()))
     }
 
-    fn judged(
-        &mut self,
-        budget: Budget,
-        outcome: &Outcome,
-        is_first: bool,
-        [plan_s, spent_s]: [f64; 2],
-    ) -> anyhow::Result<Case> {
+    fn predictions(&self, planner: &Planner<Priced>) -> Vec<f64> {
+        let rows = planner.summaries().into_iter().zip(&self.evidence.rows);
+        let predicted = rows.filter(|(summary, _)| !summary.is_measured);
+        predicted.map(|(summary, row)| summary.price.node_s / row.price.node_s).collect()
+    }
+
+    /// The figures of a choice; those of its plan are left out.
+    fn judged(&mut self, budget: Budget, outcome: &Outcome) -> anyhow::Result<Case> {
         let chosen = match outcome.choice {
             Choice::Row(row) => Some(row),
             Choice::Direct => None,
@@ -114,9 +135,11 @@ impl Cases<'_, '_> {
             over: over_errors.into_iter().chain(over_time).fold(0.0, f64::max),
             variation: errors.as_deref().map_or(0.0, |errors| variation(errors, budget.error())),
             over_default: price.node_s / self.default_s(budget),
-            is_first,
-            plan_s,
-            spent_s,
+            is_first: false,
+            plan_s: 0.0,
+            spent_s: 0.0,
+            again_s: 0.0,
+            predictions: Vec::new(),
         })
     }
 
@@ -136,12 +159,7 @@ impl Cases<'_, '_> {
 
     /// The default's cost, or that of direct drawing, whichever is less and keeps the budget.
     fn default_s(&mut self, budget: Budget) -> f64 {
-        let is_default = |row: &&MeasuredRow| {
-            let of = &row.row;
-            of.sampling == sampling::METHODS[0].name
-                && of.method == reconstruction::METHODS[0].name
-                && (of.camera_count, of.side_ratio) == DEFAULT
-        };
+        let is_default = |row: &&MeasuredRow| is_default(&row.row) && row.row.camera_count == DEFAULT_CAMERAS;
         let keeps = |row: &&MeasuredRow| {
             let keeps_error = budget.error().is_none_or(|term| over_ratio(&row.errors, term, 1.0) <= 1.0);
             keeps_error && budget.most_view_s().is_none_or(|limit| row.price.view_s <= limit)
@@ -153,8 +171,6 @@ impl Cases<'_, '_> {
 
 fn variation(errors: &[ViewErrors], term: Option<ErrorTerm>) -> f64 {
     let metric = term.map_or(Metric::Flip, |term| term.metric());
-    let values = || errors.iter().map(|errors| errors.error_ratio(metric));
-    let mean = values().sum::<f64>() / errors.len().max(1) as f64;
-    let square = values().map(|value| (value - mean).powi(2)).sum::<f64>() / errors.len().max(1) as f64;
-    if mean > 0.0 { square.sqrt() / mean } else { 0.0 }
+    let values: Vec<f64> = errors.iter().map(|errors| errors.error_ratio(metric)).collect();
+    mean_and_variation(&values).1
 }

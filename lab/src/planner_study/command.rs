@@ -11,8 +11,8 @@ use clap::Args;
 use depth_image::Antialias;
 use engine::GpuEngine;
 use node::Engine as _;
-use planner::Kept;
-use study::{Bar, Check, Report};
+use planner::{Kept, Pricing as _};
+use study::{Bar, Check, Report, Table};
 
 use super::case::{Case, Cases, budgets};
 use super::evidence::Evidence;
@@ -20,6 +20,7 @@ use super::pricing::Priced;
 use super::report::add_to;
 use super::subjects::subjects;
 use crate::fronts::conditions::Conditions;
+use crate::fronts::report::{ROWS, rows_table};
 use crate::fronts::subject::Subject;
 
 /// Subjects of the quick form and of the full one.
@@ -68,15 +69,17 @@ pub fn run(args: &PlannerArgs) -> anyhow::Result<Outcome> {
     report.parameter("seed", args.seed.to_string());
     let mut cases = Vec::new();
     for (place, conditions) in subjects(args.seed, count).iter().enumerate() {
+        // Every second subject is priced in expensive light.
+        let (of_subject, rows) =
+            cases_of(&engine, conditions, place % 2 == 1).with_context(|| format!("subject {:?}", conditions.name))?;
         let about = format!("cell {:.2}, {} views a set", conditions.cell_ratio, conditions.views);
         report.parameter(conditions.name.clone(), about);
-        // Every second subject is priced in expensive light.
-        let of_subject = cases_of(&engine, conditions, place % 2 == 1);
-        cases.extend(of_subject.with_context(|| format!("subject {:?}", conditions.name))?);
+        report.tables.push(rows);
+        cases.extend(of_subject);
+        // A run that is interrupted leaves the report of the subjects before.
+        with_cases(report.clone(), &cases)?.write(&args.out)?;
     }
-    add_to(&mut report, &cases)?;
-    let direct = cases.iter().filter(|case| case.is_direct).count();
-    report.parameter("cases that draw directly", direct);
+    let mut report = with_cases(report, &cases)?;
     if args.quick {
         report.checks.push(Check::new("time of the run", start.elapsed().as_secs_f64(), "s", Bar::AtMost(QUICK_S)));
     }
@@ -84,7 +87,14 @@ pub fn run(args: &PlannerArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::of(ok || !args.strict))
 }
 
-fn cases_of(engine: &Arc<GpuEngine>, conditions: &Conditions, is_lit: bool) -> anyhow::Result<Vec<Case>> {
+fn with_cases(mut report: Report, cases: &[Case]) -> anyhow::Result<Report> {
+    report.parameter("cases that draw directly", cases.iter().filter(|case| case.is_direct).count());
+    add_to(&mut report, cases)?;
+    Ok(report)
+}
+
+/// A subject's plans, and the table of its rows.
+fn cases_of(engine: &Arc<GpuEngine>, conditions: &Conditions, is_lit: bool) -> anyhow::Result<(Vec<Case>, Table)> {
     let subject = Subject::load(engine, conditions)?;
     let planning = subject.planning(Antialias::NONE, conditions.seed)?;
     let mut prober = subject.prober(&planning);
@@ -93,8 +103,10 @@ fn cases_of(engine: &Arc<GpuEngine>, conditions: &Conditions, is_lit: bool) -> a
     let unseen = subject.planning(Antialias::NONE, conditions.seed ^ TABLE_SEED)?;
     let mut evidence = Evidence::measure(&subject, unseen, &pricing)?;
     let budgets = budgets(&evidence.rows)?;
+    let table = rows_table(&format!("{ROWS}{}", conditions.name), &evidence.rows, pricing.direct())?;
     let mut kept = Kept::empty(planning.key());
     let (subject, planning, evidence) = (conditions.name.clone(), &planning, &mut evidence);
-    let mut cases = Cases { subject, is_lit, planning, pricing, evidence };
-    budgets.into_iter().map(|budget| cases.case(budget, &mut prober, &mut kept)).collect()
+    let mut cases = Cases { subject, is_lit, planning, pricing, views_a_set: conditions.views, evidence };
+    let cases = budgets.into_iter().map(|budget| cases.case(budget, &mut prober, &mut kept));
+    Ok((cases.collect::<anyhow::Result<_>>()?, table))
 }

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use anyhow::Context as _;
 use app_core::planning::Planning;
-use planner::{ErrorTerm, ProbeView, Statistic, ViewErrors};
-use probe::{Light, Prober};
+use planner::{ErrorTerm, Pricing as _, ProbeView, RowCosts, Statistic, ViewErrors};
+use probe::{Light, Prober, median_costs};
 
 use super::pricing::Priced;
 use crate::fronts::row::{MeasuredRow, mean_error};
@@ -15,6 +15,9 @@ use crate::progress::bar;
 /// Views of the table, and of confirmations.
 const TABLE_VIEWS: u64 = 32;
 const CONFIRMED_VIEWS: u64 = 256;
+/// Views with which rows are timed again, and times that a row is timed, each after all others: one is off by 10 % and more.
+const TIMED_VIEWS: usize = 16;
+const TIMED_REPEATS: usize = 3;
 /// The most views over a limit on 95 of 100 in confirmations: with 20 or more it is broken.
 const MOST_OVER: usize = 19;
 
@@ -31,12 +34,24 @@ impl<'s> Evidence<'s> {
     pub fn measure(subject: &'s Subject, planning: Planning, pricing: &Priced) -> anyhow::Result<Self> {
         let mut prober = subject.prober(&planning);
         let views: Vec<ProbeView> = (0..TABLE_VIEWS).map(ProbeView::Fresh).collect();
-        let progress = bar(format!("table, {}", subject.conditions.name), planning.ladder.rows().len());
-        let mut rows = Vec::with_capacity(planning.ladder.rows().len());
+        let row_count = planning.ladder.rows().len();
+        let progress = bar(format!("table, {}", subject.conditions.name), TIMED_REPEATS * row_count);
+        let mut rows = Vec::with_capacity(row_count);
         for (place, of) in planning.representations.iter().enumerate() {
             let row = (place, &planning.ladder.rows()[place]);
             rows.push(MeasuredRow::measure(&mut prober, row, of, &views, pricing)?);
             progress.inc(1);
+        }
+        let mut costs: Vec<Vec<RowCosts>> = rows.iter().map(|row| vec![row.costs]).collect();
+        for _ in 1..TIMED_REPEATS {
+            for (of, costs) in planning.representations.iter().zip(&mut costs) {
+                costs.extend(prober.time(std::slice::from_ref(of), TIMED_VIEWS, 1)?);
+                progress.inc(1);
+            }
+        }
+        for (row, costs) in rows.iter_mut().zip(&costs) {
+            row.costs = median_costs(costs);
+            row.price = pricing.row(&row.row, &row.costs);
         }
         progress.finish_and_clear();
         Ok(Self { prober, planning, rows, confirmed: BTreeMap::new() })

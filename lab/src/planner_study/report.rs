@@ -4,7 +4,7 @@ use planner::{ERROR_RATE, Statistic, is_over};
 use study::{Bar, Cell, Check, Report, Table};
 
 use super::case::Case;
-use crate::statistics::median;
+use crate::statistics::{median, quantile};
 
 /// Errors vary little up to this.
 const LOW_VARIATION: f64 = 0.3;
@@ -17,6 +17,7 @@ pub fn add_to(report: &mut Report, cases: &[Case]) -> anyhow::Result<()> {
     report.tables.push(table(cases)?);
     report.checks.extend(regrets(cases));
     report.checks.extend(promises(cases));
+    report.checks.extend(predictions(cases));
     report.checks.extend(times(cases));
     Ok(())
 }
@@ -35,6 +36,7 @@ fn table(cases: &[Case]) -> anyhow::Result<Table> {
         ("nothing kept", ""),
         ("plan", "s"),
         ("of that measuring", "s"),
+        ("the same plan again", "s"),
     ];
     let mut table = Table::new("Plans", &columns);
     for case in cases {
@@ -51,6 +53,7 @@ fn table(cases: &[Case]) -> anyhow::Result<Table> {
             Cell::Flag(case.is_first),
             case.plan_s.into(),
             case.spent_s.into(),
+            case.again_s.into(),
         ])?;
     }
     Ok(table)
@@ -86,16 +89,30 @@ fn promises(cases: &[Case]) -> Vec<Check> {
     ]
 }
 
+/// How far predicted prices of first plans are off.
+fn predictions(cases: &[Case]) -> Vec<Check> {
+    let first = cases.iter().filter(|case| case.is_first);
+    let off: Vec<f64> = first.flat_map(|case| case.predictions.iter().map(|ratio| (ratio - 1.0).abs())).collect();
+    let of = |share: f64| (!off.is_empty()).then(|| quantile(off.clone(), share));
+    let check = |name: &str, value, most| Check::maybe(name, value, "", Bar::AtMost(most), "no price was predicted");
+    vec![
+        check("error of predicted prices, median", of(0.5), 0.10),
+        check("error of predicted prices, 90 %", of(0.9), 0.25),
+    ]
+}
+
 fn times(cases: &[Case]) -> Vec<Check> {
     let mut seconds: Vec<f64> = cases.iter().map(|case| case.plan_s).collect();
     seconds.sort_by(f64::total_cmp);
     let percentile =
         |share: f64| seconds.get(((seconds.len() as f64 * share) as usize).min(seconds.len() - 1)).copied();
     let first = cases.iter().filter(|case| case.is_first).map(|case| case.plan_s).reduce(f64::max);
+    let again = cases.iter().map(|case| case.again_s).reduce(f64::max);
     vec![
         seconds_check("time of a plan, median", percentile(0.5), 25.0),
         seconds_check("time of a plan, 90 %", percentile(0.9), 60.0),
         seconds_check("time of a plan, nothing kept, longest", first, 70.0),
+        seconds_check("time of the same plan again, longest", again, 0.5),
     ]
 }
 

@@ -2,7 +2,6 @@
 
 use planner::ProbeView;
 
-use crate::experiment::VIEW_SIZE_PX;
 use crate::fronts::conditions::Conditions;
 
 const SCENES: [&str; 12] = [
@@ -35,14 +34,10 @@ fn conditions(seed: u64, place: usize) -> Conditions {
     let [_, cell, views] = draw(seed, place);
     let between = |[least, most]: [f64; 2], share: f64| least * (most / least).powf(share);
     Conditions {
-        name: SCENES[place].to_owned(),
-        scene: SCENES[place].to_owned(),
         cell_ratio: between(CELLS, cell) as f32,
-        size_px: VIEW_SIZE_PX,
-        lighting: render::Lighting::default().to_string(),
         views: between(VIEWS, views) as usize,
         seed,
-        quick: false,
+        ..Conditions::of_scene(SCENES[place])
     }
 }
 

@@ -115,7 +115,7 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
     let planning = Planning::new(&setup, &args.scene, &views)?;
     let mut prober = Prober::new(engine.as_ref(), planning.subject.clone(), Turn::of(WorkClass::Batch));
     let pricing = OneNode { views_a_set: args.views_a_set(&setup), direct: prober.direct_costs()? };
-    let request = planning.request(args.budget, device_name(&engine), args.allowance);
+    let request = planning.request(args.budget, device_name(&engine), pricing.views_a_set, args.allowance);
     let files = args.plan_files();
     let remembered = files.as_ref().map_or_else(|| Kept::empty(planning.key()), |files| files.read(&planning.key()));
     let mut planner = Planner::new(request, planning.ladder.clone(), pricing)?;

@@ -4,7 +4,7 @@
 //! a sequence hold together: this is fixed-sequence testing (Angelopoulos et al. 2021, "Learn then Test").
 
 use super::stage::{Round, Work};
-use super::{Planner, TOLERANCES};
+use super::{Planner, TOLERANCE};
 use crate::bounds::{ERROR_RATE, MAX_ROUNDS, round_error_rate};
 use crate::costs::Pricing;
 use crate::event::MAX_PROBE_VIEWS;
@@ -86,7 +86,7 @@ impl<P: Pricing> Planner<P> {
         let most_s = self.worthwhile_s();
         let is_candidate = |&row: &usize| {
             let is_passed = self.rows[row].status == RowStatus::Passed;
-            is_passed && self.prices[row].node_s < most_s && self.is_in_time(row, TOLERANCES)
+            is_passed && self.prices[row].node_s < most_s && self.is_in_time(row, TOLERANCE)
         };
         let mut rows: Vec<usize> = (0..self.rows.len()).filter(is_candidate).collect();
         rows.sort_by(|&a, &b| self.evidence(b, term).margin().total_cmp(&self.evidence(a, term).margin()));

@@ -1,14 +1,14 @@
 //! The choice.
 
 use super::stage::Stage;
-use super::{Planner, TOLERANCES};
+use super::{Planner, TOLERANCE};
 use crate::command::Command;
 use crate::costs::{Price, Pricing};
 use crate::kept::Certificate;
 use crate::outcome::{Choice, Outcome, PromiseState, RowStatus};
 
 /// The most that a measured time may be over its limit.
-const EXACT: [f64; 2] = [1.0, 1.0];
+const EXACT: f64 = 1.0;
 
 impl<P: Pricing> Planner<P> {
     pub(super) fn conclude(&mut self, is_spent: bool) -> Vec<Command> {
@@ -16,7 +16,7 @@ impl<P: Pricing> Planner<P> {
         let (choice, state) = self.choice();
         let outcome = self.outcome_of(choice, state, is_spent);
         self.outcome = Some(outcome.clone());
-        vec![Command::Keep(Box::new(self.kept())), Command::Conclude(Box::new(outcome))]
+        vec![Command::Keep(Box::new(self.kept(is_spent))), Command::Conclude(Box::new(outcome))]
     }
 
     pub(super) fn outcome_so_far(&self) -> Outcome {
@@ -79,7 +79,7 @@ impl<P: Pricing> Planner<P> {
 
     /// The row that comes nearest to the limit on errors, of those that may be in time.
     pub(super) fn nearest_to_error(&self) -> Option<usize> {
-        let is_known = |&row: &usize| !self.rows[row].errors.is_empty() && self.is_in_time(row, TOLERANCES);
+        let is_known = |&row: &usize| !self.rows[row].errors.is_empty() && self.is_in_time(row, TOLERANCE);
         let known = (0..self.rows.len()).filter(is_known);
         known.min_by(|&a, &b| self.error_ratio(a).total_cmp(&self.error_ratio(b)))
     }

@@ -1,7 +1,7 @@
 //! The last rows, which are timed in turn: what is timed beside other work is not timed alone.
 
 use super::stage::Work;
-use super::{Planner, TOLERANCES};
+use super::{Planner, TOLERANCE};
 use crate::costs::Pricing;
 use crate::outcome::RowStatus;
 
@@ -19,9 +19,9 @@ impl<P: Pricing> Planner<P> {
     }
 
     /// Rows that may be chosen, the best first.
-    pub(super) fn eligible(&self, tolerances: [f64; 2]) -> Vec<usize> {
+    pub(super) fn eligible(&self, tolerance: f64) -> Vec<usize> {
         let status = if self.term().is_some() { RowStatus::Certified } else { RowStatus::Passed };
-        let is_eligible = |&row: &usize| self.rows[row].status == status && self.is_in_time(row, tolerances);
+        let is_eligible = |&row: &usize| self.rows[row].status == status && self.is_in_time(row, tolerance);
         let mut rows: Vec<usize> = (0..self.rows.len()).filter(is_eligible).collect();
         rows.sort_by(|&a, &b| self.rank(a).total_cmp(&self.rank(b)));
         rows
@@ -33,7 +33,7 @@ impl<P: Pricing> Planner<P> {
     }
 
     fn finalists(&self) -> Vec<usize> {
-        let eligible = self.eligible(TOLERANCES);
+        let eligible = self.eligible(TOLERANCE);
         let Some(&best) = eligible.first() else { return eligible };
         let is_close =
             |&row: &usize| self.term().is_none() || self.prices[row].node_s <= CLOSE * self.prices[best].node_s;

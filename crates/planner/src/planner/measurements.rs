@@ -74,8 +74,8 @@ impl<P: Pricing> Planner<P> {
     pub(super) fn predict(&mut self) {
         let timed = |row: usize| Some(self.timed_row(row, self.rows[row].costs?));
         let timed: Vec<TimedRow> = (0..self.rows.len()).filter_map(timed).collect();
-        self.model = CostModel::fit(self.ladder.rows(), &timed);
-        self.prices = (0..self.rows.len()).map(|row| self.price(row)).collect();
+        self.model = CostModel::fit(&timed);
+        (self.prices, self.least_prices) = (0..self.rows.len()).map(|row| self.price_range(row)).unzip();
     }
 
     fn pending_work(&self, id: ProbeId) -> Result<&Work, InvalidField> {
@@ -96,20 +96,28 @@ impl<P: Pricing> Planner<P> {
         if is_first {
             self.predict();
         } else {
-            self.prices[row] = self.price(row);
+            (self.prices[row], self.least_prices[row]) = self.price_range(row);
         }
     }
 
-    fn price(&self, row: usize) -> Price {
-        let costs = self.rows[row].costs.unwrap_or_else(|| self.model.predict(self.row(row), self.request.view_pixels));
-        let price = self.pricing.row(self.row(row), &costs);
+    /// The price of a row, and the least that it may be.
+    fn price_range(&self, row: usize) -> (Price, Price) {
+        let of = |deviations: f64| {
+            let predicted = || self.model.predict(self.row(row), deviations);
+            self.price(row, &self.rows[row].costs.unwrap_or_else(predicted))
+        };
+        (of(0.0), of(1.0))
+    }
+
+    fn price(&self, row: usize, costs: &RowCosts) -> Price {
+        let price = self.pricing.row(self.row(row), costs);
         // A row without a valid price is never the cheapest.
         let is_valid = [price.node_s, price.view_s].iter().all(|seconds| seconds.is_finite() && *seconds >= 0.0);
         if is_valid { price } else { Price { node_s: f64::INFINITY, view_s: f64::INFINITY } }
     }
 
     fn timed_row(&self, row: usize, costs: RowCosts) -> TimedRow {
-        TimedRow { row: self.row(row).clone(), view_pixels: self.request.view_pixels, costs }
+        TimedRow { row: self.row(row).clone(), costs }
     }
 }
 

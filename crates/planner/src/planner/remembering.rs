@@ -6,7 +6,7 @@ use super::stage::Stage;
 use crate::budget::Budget;
 use crate::costs::Pricing;
 use crate::invalid::InvalidField;
-use crate::kept::{Kept, KeptCosts, KeptRow, newest};
+use crate::kept::{Kept, KeptCosts, KeptRow, KeptSearch, newest};
 use crate::outcome::RowStatus;
 
 impl<P: Pricing> Planner<P> {
@@ -27,18 +27,36 @@ impl<P: Pricing> Planner<P> {
         self.predict();
         (0..self.rows.len()).for_each(|row| self.assess(row));
         self.stage = Stage::Screening;
+        if kept.searches.contains(&self.search()) {
+            (self.stage, self.finalists_were_timed) = (Stage::Timing, true);
+        }
+        self.searches = kept.searches;
         Ok(())
     }
 
-    /// Everything that is known, for later plans.
-    pub(super) fn kept(&self) -> Kept {
+    fn search(&self) -> KeptSearch {
+        KeptSearch {
+            budget: self.request.budget,
+            pricing: self.request.pricing.clone(),
+            device: self.request.device.clone(),
+            program_version: self.request.program_version.clone(),
+        }
+    }
+
+    /// Everything that is known, for later plans. A search whose allowance was spent has not come to its end.
+    pub(super) fn kept(&self, is_spent: bool) -> Kept {
         let is_known = |state: &RowState| !state.errors.is_empty() || state.costs.is_some();
         let known = (0..self.rows.len()).filter(|&row| is_known(&self.rows[row]));
-        Kept {
+        let mut kept = Kept {
             key: self.request.key.clone(),
             fresh_views_drawn: self.fresh_views_drawn,
             rows: known.map(|row| self.kept_row(row)).collect(),
+            searches: self.searches.clone(),
+        };
+        if !is_spent {
+            kept.add_search(self.search());
         }
+        kept
     }
 
     fn row_from(&self, kept: KeptRow) -> RowState {

@@ -1,10 +1,11 @@
 //! Which rows seem to keep the budget, on common views.
 //!
-//! A limit on errors is searched from the cheapest row upwards, up to the first that will probably be certified. A limit on
-//! time is searched from the most expensive row downwards: a row that is worse than the best one so far is dropped.
+//! A limit on errors is searched from the cheapest row upwards, up to the first that will probably be certified. A row that
+//! was not measured counts as one standard deviation cheaper than predicted: else a cheap row that seems dear is missed. A
+//! limit on time is searched from the most expensive row downwards: a row that is worse than the best one so far is dropped.
 
 use super::stage::Work;
-use super::{Planner, TOLERANCES};
+use super::{Planner, TOLERANCE};
 use crate::bounds::{ERROR_RATE, MAX_ROUNDS, Moments, round_error_rate};
 use crate::costs::Pricing;
 use crate::kept::MAX_SCREENING_VIEWS;
@@ -14,9 +15,8 @@ use crate::view::ProbeView;
 
 /// Numbers of views after which a row may be dropped.
 const LEVELS: [usize; 4] = [4, 8, 16, MAX_SCREENING_VIEWS];
-/// Measured rows from which costs of others are predicted. A ladder of three sampling methods and six reconstructions has as
-/// many unknowns: 3 + 6 − 1 constants and two exponents.
-const MODEL_ROWS: usize = 10;
+/// Measured rows from which costs of others are predicted. The search measures more where predictions are uncertain.
+const MODEL_ROWS: usize = 16;
 /// A row whose error is above this multiple of the budget fails clearly. Worse rows of its kind are then not measured.
 const CLEARLY_OVER: f64 = 1.1;
 /// The chance of a certificate from which more expensive rows are not measured, by round. After the last there is only
@@ -99,7 +99,7 @@ impl<P: Pricing> Planner<P> {
             let may_be_chosen = [RowStatus::Open, RowStatus::Passed, RowStatus::Certified].contains(&state.status);
             state.costs.is_none() && may_be_chosen
         };
-        let uncertainty = |row: usize| self.model.uncertainty(self.row(row), self.request.view_pixels);
+        let uncertainty = |row: usize| self.model.uncertainty(self.row(row));
         let rows = (0..self.rows.len()).filter(is_useful).map(|row| (row, uncertainty(row)));
         let (row, _) = rows.min_by(|a, b| b.1.total_cmp(&a.1))?;
         Some(if self.rows[row].errors.is_empty() { self.screen(row) } else { Work::Time { rows: vec![row] } })
@@ -107,15 +107,15 @@ impl<P: Pricing> Planner<P> {
 
     /// The next row in the order of the search.
     fn next_candidate(&self) -> Option<usize> {
-        let is_open = |&row: &usize| self.rows[row].status == RowStatus::Open && self.is_in_time(row, TOLERANCES);
+        let is_open = |&row: &usize| self.rows[row].status == RowStatus::Open && self.is_in_time(row, TOLERANCE);
         let open = (0..self.rows.len()).filter(is_open);
-        let by_price = |a: &usize, b: &usize| self.prices[*a].node_s.total_cmp(&self.prices[*b].node_s);
         if self.term().is_none() {
-            return open.max_by(by_price);
+            return open.max_by(|&a, &b| self.prices[a].node_s.total_cmp(&self.prices[b].node_s));
         }
+        let least_s = |row: usize| self.least_prices[row].node_s;
         let direct_s = self.direct_in_time().map_or(f64::INFINITY, |direct| direct.node_s);
         let enough_s = self.cheapest_assured_s().min(direct_s);
-        open.min_by(by_price).filter(|&row| self.prices[row].node_s < enough_s)
+        open.min_by(|&a, &b| least_s(a).total_cmp(&least_s(b))).filter(|&row| least_s(row) < enough_s)
     }
 
     fn screen(&self, row: usize) -> Work {

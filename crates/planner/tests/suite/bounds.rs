@@ -48,8 +48,15 @@ fn few_values_have_no_bound_and_equal_ones_an_exact_one() {
     let bound = |values: &[f64]| Moments::of(values.iter().copied()).upper_bound(0.05);
     assert_eq!([bound(&[]), bound(&[0.3])], [None, None]);
     assert_eq!(bound(&[0.25; 4]), Some(0.25));
-    // 1, 2, 3: mean 2, deviation 1, t of 2 degrees of freedom 2.92.
+    // 1, 2, 3: mean 2, deviation 1, no skew, t of 2 degrees of freedom 2.92.
     assert!((bound(&[1.0, 2.0, 3.0]).unwrap() - (2.0 + 2.919_986 / 3_f64.sqrt())).abs() < 1e-5);
+    // 0, 0, 3: mean 1, deviation √3, third moment 2. The correction is 2/√27 · (1 + 2 t²) / 18 deviations.
+    let correction = 2.0 / 27_f64.sqrt() * (1.0 + 2.0 * 2.919_986_f64.powi(2)) / 18.0;
+    let above = 2.919_986 / 3_f64.sqrt() + correction;
+    assert!((bound(&[0.0, 0.0, 3.0]).unwrap() - (1.0 + 3_f64.sqrt() * above)).abs() < 1e-5);
+    let lower = |values: &[f64]| Moments::of(values.iter().copied()).lower_bound(0.05).unwrap();
+    assert!((lower(&[0.0, 0.0, 3.0]) - (1.0 - 2.919_986)).abs() < 1e-5, "it has no correction");
+    assert!((bound(&[3.0, 3.0, 0.0]).unwrap() - (2.0 + 2.919_986)).abs() < 1e-5, "nor has a short tail above");
 }
 
 /// The share of samples whose bound is on the right side of the expected value, 1.

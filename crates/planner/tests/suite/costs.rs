@@ -2,93 +2,93 @@
 
 use planner::{CostModel, Row, RowCosts, TimedRow};
 
-use crate::made_up::{Subject, VIEW_PIXELS, ladder};
+use crate::made_up::{Subject, ladder};
 use crate::random::Random;
 
-const SIZES: [f64; 3] = [30_000.0, 120_000.0, 480_000.0];
-
-/// Powers that the model has to find: of S, side and pixels.
-fn known(row: &Row, view_pixels: f64) -> RowCosts {
-    let (count, pixels) = (f64::from(row.camera_count), view_pixels / 1e5);
-    let constant = 1.0 + f64::from(row.rank) / 10.0 + row.sampling.len() as f64;
+/// Powers of S and side that differ by method, as between methods that draw and those that follow rays.
+fn known(row: &Row) -> RowCosts {
+    let (count, draws) = (f64::from(row.camera_count), row.method.len().is_multiple_of(2));
+    let constant = 2.0 + f64::from(row.rank) / 10.0 + row.sampling.len() as f64;
+    let (by_count, by_side) = if draws { (0.8, 1.0) } else { (0.25, 0.0) };
     RowCosts {
-        sample_image_s: 0.01 * constant.ln() * count.powf(-0.1) * row.side_ratio.powf(1.8) * pixels.powf(0.9),
-        load_set_s: 0.002 * count.powf(1.1) * row.side_ratio.powf(2.2) * pixels.powf(0.8),
-        reconstruct_view_s: 0.004 * count.powf(0.4) * row.side_ratio.powf(0.1) * pixels.powf(1.2),
+        sample_image_s: 0.01 * constant.ln() * count.powf(-0.1) * row.side_ratio.powf(1.8),
+        load_set_s: 0.002 * count.powf(1.1) * row.side_ratio.powf(2.2),
+        reconstruct_view_s: 0.004 * count.powf(by_count) * row.side_ratio.powf(by_side),
     }
 }
 
-fn timed(rows: &[Row], view_pixels: f64) -> impl Iterator<Item = TimedRow> + '_ {
-    rows.iter().map(move |row| TimedRow { row: row.clone(), view_pixels, costs: known(row, view_pixels) })
-}
-
-/// The exponent of a cost, from two predictions.
-fn exponent(of: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
-    (of(high) / of(low)).ln() / (high / low).ln()
+/// Errors of a prediction of the three costs, as shares of them.
+fn off(model: &CostModel, row: &Row, costs: &RowCosts) -> [f64; 3] {
+    let predicted = model.predict(row, 0.0);
+    [
+        predicted.sample_image_s / costs.sample_image_s,
+        predicted.load_set_s / costs.load_set_s,
+        predicted.reconstruct_view_s / costs.reconstruct_view_s,
+    ]
+    .map(|ratio| (ratio - 1.0).abs())
 }
 
 #[test]
-fn known_exponents_are_recovered() {
+fn powers_that_differ_by_method_are_found_between_the_measured_rows() {
     let ladder = ladder();
-    let all: Vec<TimedRow> = SIZES.iter().flat_map(|&pixels| timed(ladder.rows(), pixels)).collect();
-    let model = CostModel::fit(ladder.rows(), &all);
-    let row = ladder.rows()[0].clone();
-    let by_count = |count: f64| model.predict(&Row { camera_count: count as u32, ..row.clone() }, 1e5);
-    let by_side = |side_ratio: f64| model.predict(&Row { side_ratio, ..row.clone() }, 1e5);
-    let by_pixels = |pixels: f64| model.predict(&row, pixels);
-    for (of, expected) in [
-        ((|costs: RowCosts| costs.sample_image_s) as fn(RowCosts) -> f64, [-0.1, 1.8, 0.9]),
-        (|costs| costs.load_set_s, [1.1, 2.2, 0.8]),
-        (|costs| costs.reconstruct_view_s, [0.4, 0.1, 1.2]),
-    ] {
-        let found = [
-            exponent(|count| of(by_count(count)), 1.0, 8.0),
-            exponent(|side| of(by_side(side)), 0.5, 1.0),
-            exponent(|pixels| of(by_pixels(pixels)), 3e4, 3e5),
-        ];
-        for (found, expected) in found.into_iter().zip(expected) {
-            assert!((found - expected).abs() < 0.005, "{found} in place of {expected}");
-        }
+    let timed = ladder.rows().iter().map(|row| TimedRow { row: row.clone(), costs: known(row) });
+    let model = CostModel::fit(&timed.collect::<Vec<_>>());
+    for row in ladder.rows() {
+        let between = Row { side_ratio: row.side_ratio.sqrt(), ..row.clone() };
+        let errors = off(&model, &between, &known(&between));
+        assert!(errors.iter().all(|&error| error < 0.05), "{between}: {errors:?}");
     }
 }
 
-/// Errors of c over all rows of 60 subjects, as shares of it: the median and the 90th percentile. `timed_count` rows are
-/// timed, each the one of which least is known.
-fn prediction_errors(timed_count: usize) -> [f64; 2] {
-    let mut errors = Vec::new();
+/// Errors of c over all rows of 60 subjects, as shares of it: the median and the 90th percentile; then the share of rows that
+/// cost no less than one standard deviation below their prediction. `timed_count` rows are timed, each the one of which
+/// least is known.
+fn prediction_errors(timed_count: usize) -> [f64; 3] {
+    let (mut errors, mut above) = (Vec::new(), 0);
     for seed in 0..60 {
         let subject = Subject::new(seed);
         let rows = subject.ladder.rows();
         let mut timed: Vec<TimedRow> = Vec::new();
         for _ in 0..timed_count {
-            let model = CostModel::fit(rows, &timed);
-            let uncertainty = |row: usize| model.uncertainty(&rows[row], VIEW_PIXELS);
+            let model = CostModel::fit(&timed);
+            let uncertainty = |row: usize| model.uncertainty(&rows[row]);
             let next = (0..rows.len()).max_by(|&a, &b| uncertainty(a).total_cmp(&uncertainty(b))).expect("rows");
-            timed.push(TimedRow { row: rows[next].clone(), view_pixels: VIEW_PIXELS, costs: subject.costs[next] });
+            timed.push(TimedRow { row: rows[next].clone(), costs: subject.costs[next] });
         }
-        let model = CostModel::fit(rows, &timed);
-        errors.extend(rows.iter().zip(&subject.costs).map(|(row, costs)| {
-            let predicted = model.predict(row, VIEW_PIXELS).reconstruct_view_s;
-            (predicted / costs.reconstruct_view_s - 1.0).abs()
-        }));
+        let model = CostModel::fit(&timed);
+        let is_above =
+            |row: usize| subject.costs[row].reconstruct_view_s >= model.predict(&rows[row], 1.0).reconstruct_view_s;
+        above += (0..rows.len()).filter(|&row| is_above(row)).count();
+        errors.extend(rows.iter().zip(&subject.costs).map(|(row, costs)| off(&model, row, costs)[2]));
     }
     errors.sort_by(f64::total_cmp);
-    [0.5, 0.9].map(|share| errors[(errors.len() as f64 * share) as usize])
+    let [median, most] = [0.5, 0.9].map(|share| errors[(errors.len() as f64 * share) as usize]);
+    [median, most, above as f64 / errors.len() as f64]
 }
 
-/// The ladder has ten unknowns: eight rows leave some to the prior.
 #[test]
-fn ten_timed_rows_predict_the_others() {
-    let [eight, ten] = [8, 10].map(prediction_errors);
-    println!("c predicted: median and 90 % error {eight:.3?} from eight rows, {ten:.3?} from ten");
-    assert!(ten[0] <= 0.10 && ten[1] <= 0.25 && ten[1] < eight[1], "{eight:?} {ten:?}");
+fn more_timed_rows_predict_the_others_better() {
+    let counts = [16, 30, 90];
+    let errors = counts.map(prediction_errors);
+    counts.iter().zip(&errors).for_each(|(count, errors)| {
+        println!(
+            "c from {count} rows: off by {:.3} (median), {:.3} (90 %); {:.3} above",
+            errors[0], errors[1], errors[2]
+        );
+    });
+    assert!(errors[0][0] <= 0.12 && errors[0][1] <= 0.30, "{errors:?}");
+    assert!(errors.is_sorted_by(|a, b| a[0] > b[0] && a[1] > b[1]), "{errors:?}");
+    // 84 % of a normal distribution are above one standard deviation below the mean.
+    assert!(errors.iter().all(|errors| errors[2] >= 0.80), "{errors:?}");
 }
 
-fn assert_finite(model: &CostModel, row: &Row, view_pixels: f64) {
-    let costs = model.predict(row, view_pixels);
-    let all = [costs.sample_image_s, costs.load_set_s, costs.reconstruct_view_s];
-    assert!(all.iter().all(|cost| cost.is_finite() && *cost > 0.0), "{costs:?}");
-    let uncertainty = model.uncertainty(row, view_pixels);
+fn assert_finite(model: &CostModel, row: &Row) {
+    for deviations in [0.0, 1.0] {
+        let costs = model.predict(row, deviations);
+        let all = [costs.sample_image_s, costs.load_set_s, costs.reconstruct_view_s];
+        assert!(all.iter().all(|cost| cost.is_finite() && *cost > 0.0), "{costs:?}");
+    }
+    let uncertainty = model.uncertainty(row);
     assert!(uncertainty.is_finite() && uncertainty >= 0.0, "{uncertainty}");
 }
 
@@ -97,22 +97,18 @@ fn degenerate_measurements_give_finite_predictions() {
     let ladder = ladder();
     let row = &ladder.rows()[0];
     let costs = |cost: f64| RowCosts { sample_image_s: cost, load_set_s: cost, reconstruct_view_s: cost };
-    let timed = |cost: f64, view_pixels: f64| TimedRow { row: row.clone(), view_pixels, costs: costs(cost) };
+    let timed = |cost: f64| TimedRow { row: row.clone(), costs: costs(cost) };
     for set in [
         vec![],
-        vec![timed(0.0, 1.0)],
-        vec![timed(f64::NAN, f64::NAN), timed(f64::INFINITY, -1.0)],
-        vec![timed(1e-3, 3e4); 50],
-        vec![timed(1e300, 1e300), timed(1e-300, 1e-300)],
-        vec![TimedRow {
-            row: Row { sampling: "unknown".to_owned(), ..row.clone() },
-            view_pixels: 1.0,
-            costs: costs(1.0),
-        }],
+        vec![timed(0.0)],
+        vec![timed(f64::NAN), timed(f64::INFINITY)],
+        vec![timed(1e-3); 50],
+        vec![timed(1e300), timed(1e-300)],
+        vec![TimedRow { row: Row { sampling: "unknown".to_owned(), ..row.clone() }, costs: costs(1.0) }],
     ] {
-        let model = CostModel::fit(ladder.rows(), &set);
-        ladder.rows().iter().for_each(|row| assert_finite(&model, row, VIEW_PIXELS));
-        assert_finite(&model, &Row { method: "new".to_owned(), side_ratio: 1e300, ..row.clone() }, f64::INFINITY);
+        let model = CostModel::fit(&set);
+        ladder.rows().iter().for_each(|row| assert_finite(&model, row));
+        assert_finite(&model, &Row { method: "new".to_owned(), side_ratio: 16.0, ..row.clone() });
     }
 }
 
@@ -123,10 +119,8 @@ fn rows_of_measured_methods_are_less_uncertain() {
     let rows = ladder.rows();
     let mut random = Random(1);
     let first = random.below(rows.len());
-    let timed =
-        TimedRow { row: rows[first].clone(), view_pixels: VIEW_PIXELS, costs: known(&rows[first], VIEW_PIXELS) };
-    let model = CostModel::fit(rows, &[timed]);
-    let own = model.uncertainty(&rows[first], VIEW_PIXELS);
+    let model = CostModel::fit(&[TimedRow { row: rows[first].clone(), costs: known(&rows[first]) }]);
+    let own = model.uncertainty(&rows[first]);
     let others = rows.iter().filter(|row| row.method != rows[first].method);
-    assert!(others.map(|row| model.uncertainty(row, VIEW_PIXELS)).all(|other| other > 10.0 * own));
+    assert!(others.map(|row| model.uncertainty(row)).all(|other| other > 10.0 * own));
 }

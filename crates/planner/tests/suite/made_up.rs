@@ -7,7 +7,6 @@ use planner::{
 
 use crate::random::Random;
 
-pub const VIEW_PIXELS: f64 = 30_000.0;
 /// The number of views that one sample set serves.
 const VIEWS_PER_SET: f64 = 290.0;
 
@@ -169,7 +168,7 @@ pub fn request(budget: &str, seed: u64) -> PlanRequest {
         key: key(),
         device: "made up".to_owned(),
         program_version: "1".to_owned(),
-        view_pixels: VIEW_PIXELS,
+        pricing: "made up".to_owned(),
         allowance_s: 1e6,
         most_certified: 8,
         seed,

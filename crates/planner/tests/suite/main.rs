@@ -10,6 +10,7 @@ mod damaged;
 mod ladders;
 mod made_up;
 mod random;
+mod real_errors;
 mod remembered;
 mod rules;
 mod searches;
