@@ -4,11 +4,14 @@ use app_core::exit::Outcome;
 use clap::Subcommand;
 
 use crate::bench::{self, BenchArgs};
+use crate::compare::command::{self as compare, CompareArgs};
 use crate::demo::{self, DemoArgs};
 use crate::failures::command::{self as failures, FailuresArgs};
 use crate::fronts::command::{self as fronts, FrontsArgs};
 use crate::planner_study::command::{self as planner_study, PlannerArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
+use crate::stability::command::{self as stability, StabilityArgs};
+use crate::view_errors::{self, ErrorsArgs};
 
 /// A subcommand that measures.
 #[derive(Debug, Subcommand)]
@@ -43,6 +46,12 @@ pub enum StudyCommand {
     Fronts(FrontsArgs),
     /// Plans on subjects that nothing was tuned on, and compares the choices with tables of all rows
     Planner(PlannerArgs),
+    /// Measures how errors change from frame to frame, and the jump where samples change
+    Stability(StabilityArgs),
+    /// Compares two reports of `study fronts`
+    Compare(CompareArgs),
+    /// Measures the errors of many random views, on which the planner's bounds and audits are tested
+    Errors(ErrorsArgs),
 }
 
 impl LabCommand {
@@ -58,6 +67,9 @@ impl LabCommand {
             Self::Study(StudyCommand::Failures(args)) => failures::run(args),
             Self::Study(StudyCommand::Fronts(args)) => fronts::run(args),
             Self::Study(StudyCommand::Planner(args)) => planner_study::run(args),
+            Self::Study(StudyCommand::Stability(args)) => stability::run(args),
+            Self::Study(StudyCommand::Compare(args)) => compare::run(args),
+            Self::Study(StudyCommand::Errors(args)) => view_errors::run(args),
         }
     }
 }

@@ -8,6 +8,7 @@
 mod balance;
 mod bench;
 mod command;
+mod compare;
 mod cpu_share;
 mod demo;
 mod evaluation;
@@ -26,8 +27,10 @@ mod scaling;
 mod scene_args;
 mod section;
 mod sharing;
+mod stability;
 pub mod statistics;
 mod sweep;
+mod view_errors;
 mod viewer;
 
 pub use command::LabCommand;

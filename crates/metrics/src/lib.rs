@@ -15,6 +15,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod change_error;
 mod classes;
 mod color;
 mod convolution;
@@ -29,6 +30,7 @@ mod score_map;
 mod ssim;
 mod steps;
 
+pub use change_error::change_error_map;
 pub use classes::{PixelClass, class_mask, classify, unheld_rate};
 pub use depth_error::{DepthErrors, WRONG_HIT_RELATIVE, depth_errors};
 pub use error::MetricsError;

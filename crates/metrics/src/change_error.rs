@@ -1,0 +1,50 @@
+//! Errors of the change from frame to frame: what flickers, swims or jumps.
+
+use crate::{MetricsError, Rgb8Image, ScoreMap};
+
+/// |(T₁ − T₀) − (R₁ − R₀)| of each pixel, the mean over its channels, in shares of full scale: from 0, where both change
+/// alike, to 2.
+///
+/// # Errors
+/// Images differ in size.
+pub fn change_error_map(reference: [&Rgb8Image; 2], test: [&Rgb8Image; 2]) -> Result<ScoreMap, MetricsError> {
+    for image in [reference[1], test[0], test[1]] {
+        reference[0].expect_same_size(image)?;
+    }
+    let change =
+        |[from, to]: [&Rgb8Image; 2], index: usize| i32::from(to.srgb8()[index]) - i32::from(from.srgb8()[index]);
+    let off = |index: usize| (change(test, index) - change(reference, index)).abs();
+    let of_pixel = |pixel: usize| (3 * pixel..3 * pixel + 3).map(off).sum::<i32>() as f32 / (3.0 * 255.0);
+    let (width_px, height_px) = reference[0].size_px();
+    let values = (0..reference[0].pixel_count()).map(of_pixel).collect();
+    Ok(ScoreMap { width_px, height_px, border_px: 0, values })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flat(value: u8) -> Rgb8Image<'static> {
+        Rgb8Image::new(2, 2, vec![value; 12]).unwrap()
+    }
+
+    fn mean(reference: [u8; 2], test: [u8; 2]) -> f64 {
+        let [reference, test] = [reference, test].map(|values| values.map(flat));
+        let map = change_error_map(reference.each_ref(), test.each_ref()).unwrap();
+        map.mean(None).unwrap().unwrap()
+    }
+
+    #[test]
+    fn equal_changes_have_no_error_whatever_the_pictures_are() {
+        assert_eq!(mean([10, 90], [30, 110]), 0.0);
+        assert!((mean([10, 10], [0, 51]) - 0.2).abs() < 1e-7);
+        assert!((mean([51, 0], [0, 51]) - 0.4).abs() < 1e-7);
+        assert_eq!(mean([255, 0], [0, 255]), 2.0);
+    }
+
+    #[test]
+    fn images_of_different_sizes_are_refused() {
+        let (flat, other) = (flat(1), Rgb8Image::new(1, 2, vec![1; 6]).unwrap());
+        assert!(change_error_map([&flat, &flat], [&flat, &other]).is_err());
+    }
+}

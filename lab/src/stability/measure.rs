@@ -1,0 +1,109 @@
+//! The frames of a path on a device.
+
+use std::sync::Arc;
+
+use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes};
+use node::{DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass};
+use probe::{Representation, Subject};
+use rayon::prelude::*;
+
+use super::figures::{Compared, Figures};
+use super::paths::{Path, SetOfPath};
+
+/// The device, and a scene that it has loaded.
+pub struct Stand<'a> {
+    pub engine: &'a dyn Engine,
+    pub subject: &'a Subject,
+}
+
+/// A path with its frames: delivered views, the truth, and the figures of each frame from the second on.
+pub struct Measured {
+    pub path: Path,
+    pub views: Vec<View>,
+    pub truths: Vec<View>,
+    /// Of the frames from the second on.
+    pub figures: Vec<Figures>,
+}
+
+impl Stand<'_> {
+    const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
+
+    /// Makes and compares all frames.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn measure(&self, path: Path) -> anyhow::Result<Measured> {
+        let (mut views, mut truths, mut images) = (Vec::new(), Vec::new(), Vec::new());
+        for (place, set) in path.sets.iter().enumerate() {
+            // Frames of a set follow one another.
+            let frames = path.frames.iter().filter(|frame| frame.set == place);
+            let cameras: Vec<PinholeCamera> = frames.map(|frame| frame.camera).collect();
+            let sampled = Arc::new(self.sample(set)?);
+            let uploaded = self.upload(&sampled)?;
+            views.extend(self.views(uploaded.as_ref(), &set.representation, cameras.clone())?);
+            images.extend(std::iter::repeat_n(sampled, cameras.len()));
+            truths.extend(self.truths(cameras, set.time_s)?);
+        }
+        let compared = |frame: usize| Compared {
+            camera: path.frames[frame].camera,
+            truth: &truths[frame],
+            view: &views[frame],
+            sample_images: &images[frame],
+        };
+        let figures = (1..views.len()).into_par_iter().map(|frame| Figures::of(&compared(frame - 1), &compared(frame)));
+        let figures = figures.collect::<Result<_, _>>()?;
+        Ok(Measured { path, views, truths, figures })
+    }
+
+    /// The images of a set.
+    pub fn sample(&self, set: &SetOfPath) -> anyhow::Result<Vec<DepthImage>> {
+        let of = &set.representation;
+        Ok(self.engine.sample(
+            &SampleWork {
+                scene_hash: self.subject.scene_hash.clone(),
+                cameras: of.sample_cameras.clone(),
+                wanted: (0..of.sample_cameras.len() as u32).collect(),
+                sampling: of.sampling.clone(),
+                planes: self.engine.sample_planes(&of.method)?,
+                lighting: self.subject.lighting.clone(),
+                scene_time_s: set.time_s,
+                temporal_reference_s: None,
+                refinement: set.refinement,
+            },
+            Self::TURN,
+        )?)
+    }
+
+    pub fn upload(&self, images: &[DepthImage]) -> anyhow::Result<Arc<dyn UploadedSet>> {
+        let set = SampleSet {
+            scene_hash: self.subject.scene_hash.clone(),
+            images: images.to_vec(),
+            volume: self.subject.volume,
+            background: self.subject.background,
+            illumination: self.subject.illumination.clone(),
+            lighting: self.subject.lighting.clone(),
+        };
+        Ok(self.engine.upload(&set, Self::TURN)?)
+    }
+
+    pub fn views(
+        &self,
+        set: &dyn UploadedSet,
+        of: &Representation,
+        cameras: Vec<PinholeCamera>,
+    ) -> anyhow::Result<Vec<View>> {
+        let work = ViewWork { cameras, method: of.method.clone(), planes: self.subject.planes };
+        Ok(self.engine.reconstruct(set, &work, Self::TURN)?)
+    }
+
+    fn truths(&self, cameras: Vec<PinholeCamera>, scene_time_s: f32) -> anyhow::Result<Vec<View>> {
+        let work = DirectWork {
+            scene_hash: self.subject.scene_hash.clone(),
+            cameras,
+            lighting: self.subject.lighting.clone(),
+            scene_time_s,
+            planes: ViewPlanes { inverse_depth: true, ..self.subject.planes },
+        };
+        Ok(self.engine.draw_direct(&work, Self::TURN)?)
+    }
+}

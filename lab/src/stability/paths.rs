@@ -1,0 +1,183 @@
+//! Paths of a camera, with the sample set that each frame is made of.
+
+use anyhow::Context as _;
+use app_core::planning::Planning;
+use cluster::Refinement;
+use depth_image::{Camera, PinholeCamera, ViewGroup, nearest_set};
+use glam::{UVec2, Vec2};
+use planner::Row;
+use probe::Representation;
+
+use crate::fronts::row::is_default;
+
+/// The orbits' radius, as a share of the view cell.
+const RADIUS: f32 = 0.8;
+/// Frames of a second, where the scene moves.
+const FRAMES_PER_S: f32 = 30.0;
+/// Frames of a full circle where the camera walks around the scene.
+const CIRCLE_FRAMES: usize = 180;
+/// Sample cameras of a view cell.
+const CAMERAS: u32 = 4;
+/// The representation that replaces the default half-way.
+const REPLACEMENT: &str = "hybrid_mesh:0.5";
+
+/// Light, moment and representation of a sample set.
+#[derive(Debug, Clone)]
+pub struct SetOfPath {
+    pub representation: Representation,
+    pub time_s: f32,
+    pub refinement: Refinement,
+}
+
+/// A camera, and the place of its set among those of the path.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    pub camera: PinholeCamera,
+    pub set: usize,
+}
+
+/// What the frames of a path differ in beside the camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Switch {
+    None,
+    /// The scene moves: each frame has a set of its own.
+    Moment,
+    /// The camera goes from view cell to view cell.
+    Cell,
+    /// Half-way another representation takes over.
+    Representation,
+    /// Each frame's light is refined one step further.
+    Light,
+}
+
+/// The kind of a path: its subject and its frames.
+#[derive(Debug, Clone, Copy)]
+pub struct PathKind {
+    pub name: &'static str,
+    pub scene: &'static str,
+    pub lighting: &'static str,
+    pub switch: Switch,
+    /// The movement of a surface in the middle of the scene from frame to frame, if the camera did not turn, in pixels.
+    step_px: f32,
+}
+
+/// All paths.
+pub const PATHS: [PathKind; 8] = [
+    PathKind { name: "slow orbit", scene: "tree-terrain-30k", lighting: "phong", switch: Switch::None, step_px: 0.25 },
+    PathKind { name: "fast orbit", scene: "tree-terrain-30k", lighting: "phong", switch: Switch::None, step_px: 8.0 },
+    PathKind { name: "fast orbit in a city", scene: "urban", lighting: "phong", switch: Switch::None, step_px: 8.0 },
+    PathKind { name: "across cells of a tree", scene: "tree", lighting: "phong", switch: Switch::Cell, step_px: 0.0 },
+    PathKind { name: "across cells", scene: "blocks", lighting: "phong", switch: Switch::Cell, step_px: 0.0 },
+    PathKind {
+        name: "another representation",
+        scene: "tree-terrain-30k",
+        lighting: "phong",
+        switch: Switch::Representation,
+        step_px: 0.25,
+    },
+    PathKind { name: "wind", scene: "tree-terrain-30k-wind", lighting: "phong", switch: Switch::Moment, step_px: 0.0 },
+    PathKind { name: "light refined", scene: "courtyard", lighting: "soft 4", switch: Switch::Light, step_px: 0.0 },
+];
+
+/// The frames of a path, and its sets.
+pub struct Path {
+    pub kind: PathKind,
+    pub sets: Vec<SetOfPath>,
+    pub frames: Vec<Frame>,
+}
+
+impl Path {
+    /// `count` frames of a path on its subject.
+    ///
+    /// # Errors
+    /// The ladder lacks a representation, or the scene has no cells.
+    pub fn new(kind: PathKind, planning: &Planning, count: usize) -> anyhow::Result<Self> {
+        let usual = representation(planning, is_default)?;
+        let set = |time_s: f32, refinement: Refinement| SetOfPath { representation: usual.clone(), time_s, refinement };
+        let cameras = orbit(planning, kind.step_px, count);
+        let one_by = |of_frame: &dyn Fn(usize) -> usize| -> Vec<Frame> {
+            cameras.iter().enumerate().map(|(frame, &camera)| Frame { camera, set: of_frame(frame) }).collect()
+        };
+        let finished = Refinement::default();
+        let (sets, frames) = match kind.switch {
+            Switch::None => (vec![set(0.0, finished)], one_by(&|_| 0)),
+            Switch::Moment => {
+                let sets = (0..count).map(|frame| set(frame as f32 / FRAMES_PER_S, finished));
+                (sets.collect(), one_by(&|frame| frame))
+            }
+            Switch::Cell => across_cells(planning, &usual, count)?,
+            Switch::Representation => {
+                let replacement = Representation { method: REPLACEMENT.to_owned(), ..usual.clone() };
+                let sets = [usual.clone(), replacement].map(|representation| SetOfPath {
+                    representation,
+                    time_s: 0.0,
+                    refinement: finished,
+                });
+                (sets.to_vec(), one_by(&|frame| usize::from(frame >= count / 2)))
+            }
+            Switch::Light => {
+                let steps = count as u32;
+                let sets = (0..steps).map(|step| set(0.0, Refinement { step, steps }));
+                (sets.collect(), one_by(&|frame| frame))
+            }
+        };
+        Ok(Self { kind, sets, frames })
+    }
+
+    /// Whether a frame is made of another set than the one before.
+    pub fn is_switch(&self, frame: usize) -> bool {
+        frame > 0 && self.frames[frame].set != self.frames[frame - 1].set
+    }
+}
+
+fn representation(planning: &Planning, is: impl Fn(&Row) -> bool) -> anyhow::Result<Representation> {
+    let is_wanted = |row: &Row| is(row) && row.camera_count == CAMERAS;
+    let place = planning.ladder.rows().iter().position(is_wanted).context("the ladder lacks the default row")?;
+    Ok(planning.representations[place].clone())
+}
+
+/// Views on a circle in the cell. Without a step they all stand in its middle.
+fn orbit(planning: &Planning, step_px: f32, count: usize) -> Vec<PinholeCamera> {
+    let (cell, view_px) = (&planning.subject.cell, planning.subject.view_px);
+    let middle = cell.camera_at(Vec2::ZERO, view_px);
+    if step_px == 0.0 {
+        return vec![middle; count];
+    }
+    let distance_m = (planning.subject.volume.center() - middle.eye_in_world).length();
+    let half_m = (cell.camera_at(Vec2::X, view_px).eye_in_world - middle.eye_in_world).length();
+    let step = step_px * distance_m / (middle.focal_px.x * RADIUS * half_m);
+    let place = |frame: usize| Vec2::from_angle(step * frame as f32) * RADIUS;
+    (0..count).map(|frame| cell.camera_at(place(frame), view_px)).collect()
+}
+
+/// A walk around the scene, in which view cells follow one another as the coordinator places them.
+fn across_cells(
+    planning: &Planning,
+    usual: &Representation,
+    count: usize,
+) -> anyhow::Result<(Vec<SetOfPath>, Vec<Frame>)> {
+    let (cell, volume) = (&planning.subject.cell, &planning.subject.volume);
+    let circle = cell.around(volume.center(), CIRCLE_FRAMES, planning.subject.view_px);
+    let cameras = &circle[..count.min(CIRCLE_FRAMES)];
+    let mut groups = Vec::new();
+    ViewGroup::add(&mut groups, cameras, volume);
+    let Camera::Pinhole(sample) = usual.sample_cameras.first().context("no sample cameras")?;
+    let size_px: UVec2 = sample.size_px;
+    let cells: Vec<Vec<PinholeCamera>> = groups.iter().map(|group| group.sample_cameras(size_px)).collect();
+    let cell_of = |camera: &PinholeCamera| nearest_set(camera, cells.clone(), volume).context("no view cell");
+    let of_frames = cameras.iter().map(cell_of).collect::<anyhow::Result<Vec<usize>>>()?;
+    // In the order of the walk.
+    let mut order = of_frames.clone();
+    order.dedup();
+    let set_of = |cell: usize| order.iter().position(|other| *other == cell).unwrap_or_default();
+    let frames = cameras.iter().zip(&of_frames).map(|(&camera, &cell)| Frame { camera, set: set_of(cell) });
+    let sets = order.iter().map(|&cell| SetOfPath {
+        representation: Representation {
+            sample_cameras: cells[cell].iter().copied().map(Camera::Pinhole).collect(),
+            ..usual.clone()
+        },
+        time_s: 0.0,
+        refinement: Refinement::default(),
+    });
+    Ok((sets.collect(), frames.collect()))
+}

@@ -1,0 +1,95 @@
+//! Short paths of small views on the software device.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use app_core::planning::Planning;
+use depth_image::Antialias;
+use engine::GpuEngine;
+use glam::UVec2;
+use gpu::DevicePreference;
+use metrics::ScoreMap;
+use study::{Outcome, Report};
+
+use super::figures::Figures;
+use super::measure::{Measured, Stand};
+use super::paths::{PATHS, Path, PathKind, Switch};
+use super::report::add_to;
+use crate::fronts::conditions::Conditions;
+use crate::fronts::subject::Subject;
+
+fn kind(switch: Switch) -> PathKind {
+    PATHS.into_iter().find(|kind| kind.switch == switch).unwrap()
+}
+
+fn planning(engine: &Arc<GpuEngine>, scene: &str) -> Planning {
+    let conditions = Conditions { size_px: UVec2::new(64, 48), ..Conditions::of_scene(scene) };
+    Subject::load(engine, &conditions).unwrap().planning(Antialias::NONE, 0).unwrap()
+}
+
+fn engine() -> Arc<GpuEngine> {
+    GpuEngine::shared(DevicePreference::Software).unwrap()
+}
+
+#[test]
+fn frames_of_a_set_follow_one_another_and_paths_switch_as_they_say() {
+    let planning = planning(&engine(), "blocks");
+    for kind in PATHS {
+        let path = Path::new(kind, &planning, 24).unwrap();
+        let switches = (0..24).filter(|&frame| path.is_switch(frame)).count();
+        assert_eq!((path.frames.len(), switches + 1), (24, path.sets.len()), "{}", kind.name);
+        let expected = match kind.switch {
+            Switch::None => 0..=0,
+            Switch::Representation => 1..=1,
+            Switch::Cell => 1..=8,
+            Switch::Moment | Switch::Light => 23..=23,
+        };
+        assert!(expected.contains(&switches), "{}: {switches} switches", kind.name);
+        let sets: Vec<usize> = path.frames.iter().map(|frame| frame.set).collect();
+        assert!(sets.is_sorted(), "{}: {sets:?}", kind.name);
+    }
+}
+
+#[test]
+fn a_still_path_has_no_error_of_changes_and_a_moving_one_has() {
+    let engine = engine();
+    let planning = planning(&engine, "blocks");
+    let stand = Stand { engine: engine.as_ref(), subject: &planning.subject };
+    let path = Path::new(kind(Switch::None), &planning, 3).unwrap();
+    let still = Path { frames: vec![path.frames[0]; 3], sets: path.sets.clone(), kind: path.kind };
+    let still = stand.measure(still).unwrap();
+    assert!(still.figures.iter().all(|figures| figures.change_error == 0.0 && figures.flip > 0.0));
+    assert_eq!(still.jump(), None, "nothing switches");
+    let moving = stand.measure(path).unwrap();
+    assert!(moving.figures.iter().all(|figures| figures.change_error > 0.0 && figures.change_error < 0.5));
+    let mut report = Report::new("stability", "a device");
+    add_to(&mut report, &[still, moving]).unwrap();
+    assert_eq!((report.tables.len(), report.charts.len()), (1, 2));
+    assert!(report.checks.iter().all(|check| check.outcome() == Outcome::Holds));
+}
+
+/// Figures that are made up: a jump is the worst switch over the median of the other frames.
+#[test]
+fn a_jump_is_found_and_falls_short() {
+    let planning = planning(&engine(), "blocks");
+    let jump = |at_switch: f64| {
+        let path = Path::new(kind(Switch::Representation), &planning, 12).unwrap();
+        let map = ScoreMap { width_px: 1, height_px: 1, border_px: 0, values: vec![0.0] };
+        let of = |change_error: f64| Figures {
+            flip: 0.1,
+            change_error,
+            change_error_by_class: [None; 3],
+            change_error_map: map.clone(),
+        };
+        let figures = (1..12).map(|frame| of(if path.is_switch(frame) { at_switch } else { 0.02 })).collect();
+        let (views, truths) = (Vec::new(), Vec::new());
+        Measured { path, views, truths, figures }.jump().unwrap()
+    };
+    assert!((jump(0.02) - 1.0).abs() < 1e-12 && (jump(0.05) - 2.5).abs() < 1e-12);
+}
+
+#[test]
+fn paths_have_names_of_their_own() {
+    let names: BTreeSet<&str> = PATHS.iter().map(|kind| kind.name).collect();
+    assert_eq!(names.len(), PATHS.len());
+}
