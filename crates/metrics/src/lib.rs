@@ -38,7 +38,7 @@ pub use flip::{FLIP_PIXELS_PER_DEGREE, flip_map, flip_map_at};
 pub use foreground::{PictureErrors, foreground};
 pub use image::Rgb8Image;
 pub use pdiff::{PdiffMap, PdiffPrimaries, PdiffSettings, pdiff_map};
-pub use psnr::{PSNR_CAP_DB, psnr_db, temporal_psnr_db};
+pub use psnr::{PSNR_CAP_DB, psnr_db};
 pub use score_map::ScoreMap;
 pub use ssim::{SSIM_WINDOW_PX, ssim_map};
 pub use steps::{STEP_RELATIVE, step_pixels};

@@ -34,12 +34,12 @@ pub struct TimedRow {
     pub costs: RowCosts,
 }
 
-/// What the measured rows say about the others.
+/// Predictions from the measured rows.
 #[derive(Debug, Clone)]
 pub struct CostModel {
     rows: Vec<Row>,
     process: GaussianProcess,
-    /// Of g_s, d and c.
+    /// The weights of the measured rows in predictions of g_s, d and c.
     weights: [Vec<f64>; 3],
     /// The variances that were found over those of the prior.
     scales: [f64; 3],

@@ -60,6 +60,8 @@ pub struct KeptSearch {
     pub pricing: String,
     pub device: String,
     pub program_version: String,
+    /// The row that was chosen; `None` for direct drawing.
+    pub row: Option<Row>,
 }
 
 /// The measurements of one row.
@@ -175,17 +177,24 @@ impl Kept {
 
     /// Adds a search, as the newest.
     pub(crate) fn add_search(&mut self, search: KeptSearch) {
-        self.searches.retain(|other| *other != search);
+        self.searches.retain(|other| !other.is_like(&search));
         self.searches.push(search);
         self.searches.drain(..self.searches.len().saturating_sub(MAX_SEARCHES));
     }
 }
 
 impl KeptSearch {
+    /// Whether two searches are the same, whatever they chose.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        (self.budget, &self.pricing, &self.device, &self.program_version)
+            == (other.budget, &other.pricing, &other.device, &other.program_version)
+    }
+
     fn validate(&self) -> Result<(), InvalidField> {
         name(&self.pricing, "pricing")?;
         name(&self.device, "device")?;
-        name(&self.program_version, "program_version")
+        name(&self.program_version, "program_version")?;
+        self.row.as_ref().map_or(Ok(()), Row::validate)
     }
 }
 

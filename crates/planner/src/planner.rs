@@ -49,7 +49,8 @@ pub struct PlanRequest {
     pub device: String,
     /// The version of the program that measures.
     pub program_version: String,
-    /// What prices depend on beside costs, as a text: a search is not made again at the same prices.
+    /// The terms of prices beside costs, as a text. A search is not made again on the same terms, though drawing directly may
+    /// cost a little more or less.
     pub pricing: String,
     /// The nodes' time that measuring may take in all, in s.
     pub allowance_s: f64,
@@ -76,7 +77,7 @@ pub struct Planner<P> {
     pending: Option<(ProbeId, Work)>,
     probe_number: u64,
     fresh_views_drawn: u64,
-    /// Of earlier plans.
+    /// The searches of earlier plans.
     searches: Vec<KeptSearch>,
     finalists_were_timed: bool,
     spent_s: f64,
@@ -235,7 +236,12 @@ impl<P: Pricing> Planner<P> {
 
     /// Whether measured costs say that a row is within the budget's time.
     fn is_clearly_in_time(&self, row: usize) -> bool {
-        self.rows[row].costs.is_some() && self.is_in_time(row, CLEARLY_IN_TIME)
+        self.is_measured_for_time(row) && self.is_in_time(row, CLEARLY_IN_TIME)
+    }
+
+    /// Whether the costs of a row are measured, where the budget has a time.
+    fn is_measured_for_time(&self, row: usize) -> bool {
+        self.request.budget.most_view_s().is_none() || self.rows[row].costs.is_some()
     }
 
     /// The cost of drawing directly; `None` where that takes longer than the budget allows.

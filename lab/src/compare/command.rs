@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use app_core::exit::Outcome;
+use app_core::exit::{BadInput, Outcome};
 use clap::Args;
 use study::{Cell, Table};
 
@@ -27,9 +27,13 @@ pub struct CompareArgs {
 /// Prints the differences.
 ///
 /// # Errors
-/// A report cannot be read, or is no report of fronts.
+/// A report cannot be read or is no report of fronts, or both have no subject in common.
 pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
-    println!("{}", text(&read(&args.old)?, &read(&args.new)?)?);
+    let (old, new) = (read(&args.old)?, read(&args.new)?);
+    if old.keys().all(|subject| !new.contains_key(subject)) {
+        return Err(BadInput("the reports have no subject in common".to_owned()).into());
+    }
+    println!("{}", text(&old, &new)?);
     Ok(Outcome::of(true))
 }
 

@@ -1,5 +1,5 @@
-//! Piecewise cubic interpolation that rises and falls with its points (Fritsch and Carlson 1980, "Monotone Piecewise Cubic
-//! Interpolation").
+//! Piecewise cubic interpolation that rises and falls with its points (Fritsch and Butland 1984, "A Method for Constructing
+//! Local Monotone Piecewise Cubic Interpolants").
 
 /// The curve through some points.
 #[derive(Debug, Clone)]

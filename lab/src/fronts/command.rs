@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use app_core::exit::Outcome;
+use app_core::exit::{BadInput, Outcome};
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use depth_image::Antialias;
@@ -63,7 +63,8 @@ impl FrontsArgs {
         if !self.subjects.is_empty() {
             return Ok(conditions::named(all, &self.subjects)?);
         }
-        Ok(all.into_iter().filter(|subject| !self.quick || subject.quick).collect())
+        let wanted: Vec<Conditions> = all.into_iter().filter(|subject| !self.quick || subject.quick).collect();
+        if wanted.is_empty() { Err(BadInput("no subject is marked as quick".to_owned()).into()) } else { Ok(wanted) }
     }
 
     /// The share of the time that is left for the next of `subjects` subjects.

@@ -82,7 +82,7 @@ pub fn read(path: Option<&Path>) -> Result<Vec<Conditions>, BadInput> {
 /// The subjects whose names contain one of the texts, in any case.
 ///
 /// # Errors
-/// There is none.
+/// No subject's name contains any of the texts.
 pub fn named(all: Vec<Conditions>, texts: &[String]) -> Result<Vec<Conditions>, BadInput> {
     let is_named = |subject: &Conditions| {
         let name = subject.name.to_lowercase();

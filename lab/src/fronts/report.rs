@@ -6,7 +6,7 @@ use study::{Axis, Better, Cell, Point, Report, Series, Table, XyChart};
 use super::measure::{Front, Planned};
 use super::row::MeasuredRow;
 
-/// What the names of tables of rows begin with, and columns that other commands read.
+/// The beginning of the names of tables of rows, and their columns that other commands read.
 pub const ROWS: &str = "Rows, ";
 pub const RECONSTRUCTION: &str = "reconstruction";
 pub const COST: &str = "cost of a view";

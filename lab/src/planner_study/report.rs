@@ -102,10 +102,8 @@ fn predictions(cases: &[Case]) -> Vec<Check> {
 }
 
 fn times(cases: &[Case]) -> Vec<Check> {
-    let mut seconds: Vec<f64> = cases.iter().map(|case| case.plan_s).collect();
-    seconds.sort_by(f64::total_cmp);
-    let percentile =
-        |share: f64| seconds.get(((seconds.len() as f64 * share) as usize).min(seconds.len() - 1)).copied();
+    let seconds: Vec<f64> = cases.iter().map(|case| case.plan_s).collect();
+    let percentile = |share: f64| (!seconds.is_empty()).then(|| quantile(seconds.clone(), share));
     let first = cases.iter().filter(|case| case.is_first).map(|case| case.plan_s).reduce(f64::max);
     let again = cases.iter().map(|case| case.again_s).reduce(f64::max);
     vec![

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use app_core::exit::Outcome;
+use app_core::exit::{BadInput, Outcome};
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use depth_image::Antialias;
@@ -56,6 +56,9 @@ pub fn run(args: &StabilityArgs) -> anyhow::Result<Outcome> {
     let mut report = Report::new("Myriorama study: stability", engine.device_name());
     report.version("myriorama", env!("CARGO_PKG_VERSION"));
     let wanted: Vec<PathKind> = PATHS.into_iter().filter(|kind| kind.name.contains(&args.path)).collect();
+    if wanted.is_empty() {
+        return Err(BadInput(format!("no path's name contains {:?}", args.path)).into());
+    }
     let progress = bar("paths", wanted.len() + 1);
     let mut paths = Vec::with_capacity(wanted.len());
     for kind in wanted {

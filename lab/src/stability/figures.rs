@@ -26,13 +26,13 @@ pub struct Figures {
     pub flip: f64,
     /// In shares of full scale.
     pub change_error: f64,
-    /// Of each class in turn; `None` without such pixels.
+    /// The same over the pixels of each class; `None` without such pixels.
     pub change_error_by_class: [Option<f64>; CLASSES.len()],
     pub change_error_map: ScoreMap,
 }
 
 impl Figures {
-    /// Of a frame and the one before.
+    /// The figures of a frame, compared with the one before.
     ///
     /// # Errors
     /// The views differ in size.

@@ -21,7 +21,7 @@ pub struct Measured {
     pub path: Path,
     pub views: Vec<View>,
     pub truths: Vec<View>,
-    /// Of the frames from the second on.
+    /// The figures of the frames from the second on.
     pub figures: Vec<Figures>,
 }
 

@@ -7,6 +7,7 @@ use depth_image::{Camera, PinholeCamera, ViewGroup, nearest_set};
 use glam::{UVec2, Vec2};
 use planner::Row;
 use probe::Representation;
+use render::Lighting;
 
 use crate::fronts::row::is_default;
 
@@ -17,7 +18,7 @@ const FRAMES_PER_S: f32 = 30.0;
 /// Frames of a full circle where the camera walks around the scene.
 const CIRCLE_FRAMES: usize = 180;
 /// Sample cameras of a view cell.
-const CAMERAS: u32 = 4;
+pub const CAMERAS: u32 = 4;
 /// The representation that replaces the default half-way.
 const REPLACEMENT: &str = "hybrid_mesh:0.5";
 
@@ -36,7 +37,7 @@ pub struct Frame {
     pub set: usize,
 }
 
-/// What the frames of a path differ in beside the camera.
+/// The difference of a path's frames, beside the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Switch {
     None,
@@ -76,7 +77,7 @@ pub const PATHS: [PathKind; 8] = [
         step_px: 0.25,
     },
     PathKind { name: "wind", scene: "tree-terrain-30k-wind", lighting: "phong", switch: Switch::Moment, step_px: 0.0 },
-    PathKind { name: "light refined", scene: "courtyard", lighting: "soft 4", switch: Switch::Light, step_px: 0.0 },
+    PathKind { name: "light refined", scene: "courtyard", lighting: "soft 64", switch: Switch::Light, step_px: 0.0 },
 ];
 
 /// The frames of a path, and its sets.
@@ -116,9 +117,9 @@ impl Path {
                 (sets.to_vec(), one_by(&|frame| usize::from(frame >= count / 2)))
             }
             Switch::Light => {
-                let steps = count as u32;
+                let steps = kind.lighting.parse::<Lighting>()?.refinement_steps();
                 let sets = (0..steps).map(|step| set(0.0, Refinement { step, steps }));
-                (sets.collect(), one_by(&|frame| frame))
+                (sets.collect(), one_by(&|frame| frame.min(steps as usize - 1)))
             }
         };
         Ok(Self { kind, sets, frames })
@@ -166,14 +167,13 @@ fn across_cells(
     let cells: Vec<Vec<PinholeCamera>> = groups.iter().map(|group| group.sample_cameras(size_px)).collect();
     let cell_of = |camera: &PinholeCamera| nearest_set(camera, cells.clone(), volume).context("no view cell");
     let of_frames = cameras.iter().map(cell_of).collect::<anyhow::Result<Vec<usize>>>()?;
-    // In the order of the walk.
-    let mut order = of_frames.clone();
-    order.dedup();
-    let set_of = |cell: usize| order.iter().position(|other| *other == cell).unwrap_or_default();
-    let frames = cameras.iter().zip(&of_frames).map(|(&camera, &cell)| Frame { camera, set: set_of(cell) });
-    let sets = order.iter().map(|&cell| SetOfPath {
+    // Sets follow one another, also where the walk comes back to a cell.
+    let visits: Vec<&[usize]> = of_frames.chunk_by(|a, b| a == b).collect();
+    let set_of_frames = visits.iter().enumerate().flat_map(|(set, visit)| std::iter::repeat_n(set, visit.len()));
+    let frames = cameras.iter().zip(set_of_frames).map(|(&camera, set)| Frame { camera, set });
+    let sets = visits.iter().map(|visit| SetOfPath {
         representation: Representation {
-            sample_cameras: cells[cell].iter().copied().map(Camera::Pinhole).collect(),
+            sample_cameras: cells[visit[0]].iter().copied().map(Camera::Pinhole).collect(),
             ..usual.clone()
         },
         time_s: 0.0,

@@ -5,7 +5,7 @@ use cluster::Refinement;
 use glam::Vec2;
 
 use super::measure::Stand;
-use super::paths::SetOfPath;
+use super::paths::{CAMERAS, SetOfPath};
 
 /// Views of a batch beside the same view alone.
 const BATCH: usize = 3;
@@ -18,7 +18,7 @@ pub fn differing_rows(stand: &Stand<'_>, planning: &Planning) -> anyhow::Result<
     let camera = stand.subject.cell.camera_at(Vec2::new(0.3, -0.2), stand.subject.view_px);
     let (mut differing, mut count) = (Vec::new(), 0);
     for (row, of) in planning.ladder.rows().iter().zip(&planning.representations) {
-        if (row.camera_count, row.side_ratio) != (4, 1.0) {
+        if (row.camera_count, row.side_ratio) != (CAMERAS, 1.0) {
             continue;
         }
         let set = SetOfPath { representation: of.clone(), time_s: 0.0, refinement: Refinement::default() };
@@ -32,5 +32,6 @@ pub fn differing_rows(stand: &Stand<'_>, planning: &Planning) -> anyhow::Result<
             differing.push(row.to_string());
         }
     }
+    anyhow::ensure!(count > 0, "the ladder has no row of {CAMERAS} cameras");
     Ok((differing, count))
 }

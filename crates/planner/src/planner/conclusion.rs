@@ -16,7 +16,7 @@ impl<P: Pricing> Planner<P> {
         let (choice, state) = self.choice();
         let outcome = self.outcome_of(choice, state, is_spent);
         self.outcome = Some(outcome.clone());
-        vec![Command::Keep(Box::new(self.kept(is_spent))), Command::Conclude(Box::new(outcome))]
+        vec![Command::Keep(Box::new(self.kept(choice, is_spent))), Command::Conclude(Box::new(outcome))]
     }
 
     pub(super) fn outcome_so_far(&self) -> Outcome {
@@ -49,7 +49,7 @@ impl<P: Pricing> Planner<P> {
 
     fn choice(&self) -> (Choice, PromiseState) {
         let direct = self.direct_in_time();
-        let best = self.eligible(EXACT).first().copied();
+        let best = self.eligible(EXACT).into_iter().find(|&row| self.is_measured_for_time(row));
         match (self.term(), best, direct) {
             (Some(_), Some(row), Some(direct)) if direct.node_s <= self.prices[row].node_s => {
                 (Choice::Direct, PromiseState::Kept)

@@ -18,9 +18,14 @@ impl<P: Pricing> Planner<P> {
         is_needed.then_some(Work::Time { rows })
     }
 
+    /// The status of rows that may be chosen: nothing is certified for a budget of time alone.
+    pub(super) fn status_to_choose(&self) -> RowStatus {
+        if self.term().is_some() { RowStatus::Certified } else { RowStatus::Passed }
+    }
+
     /// Rows that may be chosen, the best first.
     pub(super) fn eligible(&self, tolerance: f64) -> Vec<usize> {
-        let status = if self.term().is_some() { RowStatus::Certified } else { RowStatus::Passed };
+        let status = self.status_to_choose();
         let is_eligible = |&row: &usize| self.rows[row].status == status && self.is_in_time(row, tolerance);
         let mut rows: Vec<usize> = (0..self.rows.len()).filter(is_eligible).collect();
         rows.sort_by(|&a, &b| self.rank(a).total_cmp(&self.rank(b)));
@@ -32,7 +37,7 @@ impl<P: Pricing> Planner<P> {
         if self.term().is_some() { self.prices[row].node_s } else { self.error_ratio(row) }
     }
 
-    fn finalists(&self) -> Vec<usize> {
+    pub(super) fn finalists(&self) -> Vec<usize> {
         let eligible = self.eligible(TOLERANCE);
         let Some(&best) = eligible.first() else { return eligible };
         let is_close =

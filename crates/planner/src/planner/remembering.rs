@@ -7,7 +7,8 @@ use crate::budget::Budget;
 use crate::costs::Pricing;
 use crate::invalid::InvalidField;
 use crate::kept::{Kept, KeptCosts, KeptRow, KeptSearch, newest};
-use crate::outcome::RowStatus;
+use crate::ladder::Row;
+use crate::outcome::{Choice, RowStatus};
 
 impl<P: Pricing> Planner<P> {
     pub(super) fn remember(&mut self, kept: Kept) -> Result<(), InvalidField> {
@@ -27,24 +28,41 @@ impl<P: Pricing> Planner<P> {
         self.predict();
         (0..self.rows.len()).for_each(|row| self.assess(row));
         self.stage = Stage::Screening;
-        if kept.searches.contains(&self.search()) {
-            (self.stage, self.finalists_were_timed) = (Stage::Timing, true);
-        }
         self.searches = kept.searches;
+        if self.is_searched() {
+            self.stage = Stage::Timing;
+            self.finalists_were_timed = self.finalists().iter().all(|&row| self.rows[row].costs.is_some());
+        }
         Ok(())
     }
 
-    fn search(&self) -> KeptSearch {
+    /// Whether an earlier plan has made this search to its end. Its row may have lost its certificate meanwhile.
+    fn is_searched(&self) -> bool {
+        let may_be_chosen = |row: &Row| {
+            let place = self.ladder.rows().iter().position(|other| other == row);
+            place.is_some_and(|row| self.rows[row].status == self.status_to_choose())
+        };
+        let own = self.search(Choice::Direct);
+        let made = self.searches.iter().find(|search| search.is_like(&own));
+        made.is_some_and(|search| search.row.as_ref().is_none_or(may_be_chosen))
+    }
+
+    fn search(&self, choice: Choice) -> KeptSearch {
         KeptSearch {
             budget: self.request.budget,
             pricing: self.request.pricing.clone(),
             device: self.request.device.clone(),
             program_version: self.request.program_version.clone(),
+            row: match choice {
+                Choice::Row(row) => Some(self.row(row).clone()),
+                Choice::Direct => None,
+            },
         }
     }
 
-    /// Everything that is known, for later plans. A search whose allowance was spent has not come to its end.
-    pub(super) fn kept(&self, is_spent: bool) -> Kept {
+    /// Everything that is known, for later plans. A search has not come to its end where the allowance was spent, or where a
+    /// row could not be measured.
+    pub(super) fn kept(&self, choice: Choice, is_spent: bool) -> Kept {
         let is_known = |state: &RowState| !state.errors.is_empty() || state.costs.is_some();
         let known = (0..self.rows.len()).filter(|&row| is_known(&self.rows[row]));
         let mut kept = Kept {
@@ -53,8 +71,8 @@ impl<P: Pricing> Planner<P> {
             rows: known.map(|row| self.kept_row(row)).collect(),
             searches: self.searches.clone(),
         };
-        if !is_spent {
-            kept.add_search(self.search());
+        if !is_spent && self.rows.iter().all(|row| row.status != RowStatus::Failed) {
+            kept.add_search(self.search(choice));
         }
         kept
     }

@@ -1,8 +1,8 @@
 //! Which rows seem to keep the budget, on common views.
 //!
 //! A limit on errors is searched from the cheapest row upwards, up to the first that will probably be certified. A row that
-//! was not measured counts as one standard deviation cheaper than predicted: else a cheap row that seems dear is missed. A
-//! limit on time is searched from the most expensive row downwards: a row that is worse than the best one so far is dropped.
+//! was not measured counts as one standard deviation cheaper than predicted, in each cost: else a cheap row that seems expensive is
+//! missed. A limit on time is searched from the most expensive row downwards: a row that is worse than the best one so far is dropped.
 
 use super::stage::Work;
 use super::{Planner, TOLERANCE};

@@ -40,7 +40,7 @@ fn powers_that_differ_by_method_are_found_between_the_measured_rows() {
     }
 }
 
-/// Errors of c over all rows of 60 subjects, as shares of it: the median and the 90th percentile; then the share of rows that
+/// Errors of c over the rows of 60 subjects that were not timed, as shares of it: the median and the 90th percentile; then the share of rows that
 /// cost no less than one standard deviation below their prediction. `timed_count` rows are timed, each the one of which
 /// least is known.
 fn prediction_errors(timed_count: usize) -> [f64; 3] {
@@ -58,8 +58,10 @@ fn prediction_errors(timed_count: usize) -> [f64; 3] {
         let model = CostModel::fit(&timed);
         let is_above =
             |row: usize| subject.costs[row].reconstruct_view_s >= model.predict(&rows[row], 1.0).reconstruct_view_s;
-        above += (0..rows.len()).filter(|&row| is_above(row)).count();
-        errors.extend(rows.iter().zip(&subject.costs).map(|(row, costs)| off(&model, row, costs)[2]));
+        let is_timed = |row: &Row| timed.iter().any(|timed| timed.row == *row);
+        let others = || (0..rows.len()).filter(|&row| !is_timed(&rows[row]));
+        above += others().filter(|&row| is_above(row)).count();
+        errors.extend(others().map(|row| off(&model, &rows[row], &subject.costs[row])[2]));
     }
     errors.sort_by(f64::total_cmp);
     let [median, most] = [0.5, 0.9].map(|share| errors[(errors.len() as f64 * share) as usize]);
@@ -78,8 +80,9 @@ fn more_timed_rows_predict_the_others_better() {
     });
     assert!(errors[0][0] <= 0.12 && errors[0][1] <= 0.30, "{errors:?}");
     assert!(errors.is_sorted_by(|a, b| a[0] > b[0] && a[1] > b[1]), "{errors:?}");
-    // 84 % of a normal distribution are above one standard deviation below the mean.
-    assert!(errors.iter().all(|errors| errors[2] >= 0.80), "{errors:?}");
+    // 84 % of a normal distribution are above one standard deviation below the mean. From many rows, the noise of a single
+    // row is most of the error.
+    assert!(errors.iter().all(|errors| errors[2] >= 0.75), "{errors:?}");
 }
 
 fn assert_finite(model: &CostModel, row: &Row) {
