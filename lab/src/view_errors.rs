@@ -8,12 +8,12 @@ use app_core::setup::DeviceArgs;
 use clap::Args;
 use depth_image::Antialias;
 use engine::GpuEngine;
-use planner::{ProbeView, Row, ViewErrors};
+use planner::{ProbeView, ViewErrors};
 use probe::Light;
 use study::{Cell, Table};
 
 use crate::fronts::conditions::{self, Conditions};
-use crate::fronts::row::is_default;
+use crate::fronts::row::default_place;
 use crate::fronts::subject::Subject;
 use crate::progress::bar;
 use crate::statistics::mean_and_variation;
@@ -84,8 +84,7 @@ pub fn run(args: &ErrorsArgs) -> anyhow::Result<Outcome> {
 fn errors(subject: &Subject, camera_count: u32, views: u32) -> anyhow::Result<Vec<ViewErrors>> {
     let Conditions { name, seed, .. } = &subject.conditions;
     let planning = subject.planning(Antialias::NONE, *seed)?;
-    let is_wanted = |row: &Row| is_default(row) && row.camera_count == camera_count;
-    let row = planning.ladder.rows().iter().position(is_wanted).context("the ladder lacks the default row")?;
+    let row = default_place(&planning.ladder, camera_count)?;
     let mut prober = subject.prober(&planning);
     let views: Vec<ProbeView> = (0..u64::from(views)).map(ProbeView::Fresh).collect();
     let progress = bar(format!("{name}, S = {camera_count}"), views.len());

@@ -9,7 +9,7 @@ use codec::{
 };
 use depth_image::{DepthImage, DepthImageError, PinholeCamera, View, ViewPlanes};
 use metrics::MetricsError;
-use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, own_time};
+use node::{DirectWork, Engine, EngineError, SampleWork, Turn, UploadedSet, ViewWork, own_time};
 use planner::{ProbeView, RowCosts, ViewErrors};
 use rayon::prelude::*;
 
@@ -275,14 +275,7 @@ impl<'a> Prober<'a> {
         planes: ViewPlanes,
         images: &[DepthImage],
     ) -> Result<(Arc<dyn UploadedSet>, f64), ProbeError> {
-        let sample_set = SampleSet {
-            scene_hash: self.subject.scene_hash.clone(),
-            images: images.to_vec(),
-            volume: self.subject.volume,
-            background: self.subject.background,
-            illumination: self.subject.illumination.clone(),
-            lighting: self.subject.lighting(light).to_owned(),
-        };
+        let sample_set = self.subject.sample_set(images, light);
         let camera = self.subject.camera(ProbeView::Screening(0));
         let one = self.view_work(of, vec![camera], planes);
         if self.is_first(&format!("view {} {} {planes:?}", of.method, images.len())) {
@@ -306,17 +299,7 @@ impl<'a> Prober<'a> {
     }
 
     fn sample_work(&self, of: &Representation, light: Light) -> Result<SampleWork, ProbeError> {
-        Ok(SampleWork {
-            scene_hash: self.subject.scene_hash.clone(),
-            cameras: of.sample_cameras.clone(),
-            wanted: (0..of.sample_cameras.len() as u32).collect(),
-            sampling: of.sampling.clone(),
-            planes: self.engine.sample_planes(&of.method)?,
-            lighting: self.subject.lighting(light).to_owned(),
-            scene_time_s: self.subject.scene_time_s,
-            temporal_reference_s: None,
-            refinement: cluster::Refinement::default(),
-        })
+        Ok(self.subject.sample_work(self.engine, of, light)?)
     }
 
     fn view_work(&self, of: &Representation, cameras: Vec<PinholeCamera>, planes: ViewPlanes) -> ViewWork {
@@ -324,13 +307,7 @@ impl<'a> Prober<'a> {
     }
 
     fn direct_work(&self, light: Light, views: &[ProbeView], planes: ViewPlanes) -> DirectWork {
-        DirectWork {
-            scene_hash: self.subject.scene_hash.clone(),
-            cameras: views.iter().map(|&view| self.subject.camera(view)).collect(),
-            lighting: self.subject.lighting(light).to_owned(),
-            scene_time_s: self.subject.scene_time_s,
-            planes,
-        }
+        self.subject.direct_work(views.iter().map(|&view| self.subject.camera(view)).collect(), light, planes)
     }
 
     /// Two lights of one text are one light.

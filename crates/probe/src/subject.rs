@@ -1,9 +1,13 @@
 //! The scene, and the views for which representations are measured.
 
+use cluster::Refinement;
 use codec::FrameCodec;
-use depth_image::{Aabb, Environment, Illumination, PinholeCamera, ViewCell, ViewPlanes};
+use depth_image::{Aabb, DepthImage, Environment, Illumination, PinholeCamera, ViewCell, ViewPlanes};
 use glam::{UVec2, Vec2};
+use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork};
 use planner::ProbeView;
+
+use crate::representation::Representation;
 
 /// What is measured: a scene that is loaded on the device, and views of it.
 #[derive(Debug, Clone)]
@@ -49,6 +53,54 @@ impl Subject {
     pub fn camera(&self, view: ProbeView) -> PinholeCamera {
         let [x, y, _] = view.place(self.seed);
         self.cell.camera_at(Vec2::new(x as f32, y as f32) * 2.0 - 1.0, self.view_px)
+    }
+
+    /// All images of a representation's set, with the planes of its method.
+    ///
+    /// # Errors
+    /// The engine does not know the method.
+    pub fn sample_work(
+        &self,
+        engine: &dyn Engine,
+        of: &Representation,
+        light: Light,
+    ) -> Result<SampleWork, EngineError> {
+        Ok(SampleWork {
+            scene_hash: self.scene_hash.clone(),
+            cameras: of.sample_cameras.clone(),
+            wanted: (0..of.sample_cameras.len() as u32).collect(),
+            sampling: of.sampling.clone(),
+            planes: engine.sample_planes(&of.method)?,
+            lighting: self.lighting(light).to_owned(),
+            scene_time_s: self.scene_time_s,
+            temporal_reference_s: None,
+            refinement: Refinement::default(),
+        })
+    }
+
+    /// A set of these images.
+    #[must_use]
+    pub fn sample_set(&self, images: &[DepthImage], light: Light) -> SampleSet {
+        SampleSet {
+            scene_hash: self.scene_hash.clone(),
+            images: images.to_vec(),
+            volume: self.volume,
+            background: self.background,
+            illumination: self.illumination.clone(),
+            lighting: self.lighting(light).to_owned(),
+        }
+    }
+
+    /// Views that are drawn from the scene.
+    #[must_use]
+    pub fn direct_work(&self, cameras: Vec<PinholeCamera>, light: Light, planes: ViewPlanes) -> DirectWork {
+        DirectWork {
+            scene_hash: self.scene_hash.clone(),
+            cameras,
+            lighting: self.lighting(light).to_owned(),
+            scene_time_s: self.scene_time_s,
+            planes,
+        }
     }
 
     /// The light as on the command line.

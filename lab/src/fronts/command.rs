@@ -18,6 +18,7 @@ use super::checks::checks;
 use super::conditions::{self, Conditions};
 use super::measure::{Front, Limits};
 use super::report::add_to;
+use super::row::REPEATS;
 use super::subject::Subject;
 use crate::progress::bar;
 
@@ -110,7 +111,8 @@ fn front(engine: &Arc<GpuEngine>, conditions: &Conditions, limits: &Limits) -> a
     let subject = Subject::load(engine, conditions)?;
     let planning = subject.planning(Antialias::NONE, conditions.seed)?;
     let count = planning.ladder.rows().iter().filter(|row| limits.include(row)).count();
-    let progress = bar(format!("rows, {}", conditions.name), count);
+    let passes = if limits.end.is_none() { 1 + REPEATS } else { 1 };
+    let progress = bar(format!("rows, {}", conditions.name), passes * count);
     let front = Front::measure(&subject, &planning, limits, || progress.inc(1))?;
     progress.finish_and_clear();
     Ok(front)

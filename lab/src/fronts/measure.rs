@@ -8,7 +8,7 @@ use planner::{Budget, Choice, Kept, Metric, Planner, Price, Pricing as _, ProbeV
 
 use super::conditions::Conditions;
 use super::order::order;
-use super::row::MeasuredRow;
+use super::row::{MeasuredRow, time_again};
 use super::subject::Subject;
 
 /// Levels of the planner's budgets between the least and the greatest error of a subject's rows, in equal ratios.
@@ -95,6 +95,9 @@ impl Front {
             done();
         }
         rows.sort_by_key(|row| row.place);
+        if limits.end.is_none() {
+            time_again(&mut prober, &mut rows, &planning.representations, &pricing, &mut done)?;
+        }
         let mut front = Self {
             conditions: subject.conditions.clone(),
             scene_hash: planning.subject.scene_hash.clone(),

@@ -2,16 +2,21 @@
 
 use std::sync::Arc;
 
+use anyhow::Context as _;
 use depth_image::{View, ViewPlanes};
 use metrics::{DepthErrors, depth_errors};
-use planner::{Metric, Price, Pricing, ProbeView, Row, RowCosts, ViewErrors};
-use probe::{Light, Prober, Representation, view_errors};
+use planner::{Ladder, Metric, Price, Pricing, ProbeView, Row, RowCosts, ViewErrors};
+use probe::{Light, Prober, Representation, median_costs, view_errors};
 use rayon::prelude::*;
 
 use crate::evaluation::known_depth;
 
 /// The side of sample images that `--sample-size auto` chooses.
 const DEFAULT_SIDE_RATIO: f64 = 1.0;
+
+/// Times that rows are timed again, and views with which they are.
+pub const REPEATS: usize = 2;
+const TIMED_VIEWS: usize = 16;
 
 /// A measured row.
 #[derive(Debug, Clone)]
@@ -87,12 +92,43 @@ impl MeasuredRow {
     }
 }
 
-/// Whether a row has the default methods and the largest images.
-#[must_use]
-pub fn is_default(row: &Row) -> bool {
-    row.sampling == sampling::METHODS[0].name
-        && row.method == reconstruction::METHODS[0].name
-        && row.side_ratio == DEFAULT_SIDE_RATIO
+/// Times rows again, each after all others, and takes the medians: a single timing is off by 10 % and more, and on a cold
+/// device by a fifth.
+///
+/// # Errors
+/// The device fails.
+pub fn time_again(
+    prober: &mut Prober<'_>,
+    rows: &mut [MeasuredRow],
+    representations: &[Representation],
+    pricing: &impl Pricing,
+    mut done: impl FnMut(),
+) -> anyhow::Result<()> {
+    let mut costs: Vec<Vec<RowCosts>> = rows.iter().map(|row| vec![row.costs]).collect();
+    for _ in 0..REPEATS {
+        for (row, costs) in rows.iter().zip(&mut costs) {
+            costs.extend(prober.time(std::slice::from_ref(&representations[row.place]), TIMED_VIEWS, 1)?);
+            done();
+        }
+    }
+    for (row, costs) in rows.iter_mut().zip(&costs) {
+        row.costs = median_costs(costs);
+        row.price = pricing.row(&row.row, &row.costs);
+    }
+    Ok(())
+}
+
+/// The place of the row with the default methods, the largest images and this number of cameras.
+///
+/// # Errors
+/// The ladder lacks it.
+pub fn default_place(ladder: &Ladder, camera_count: u32) -> anyhow::Result<usize> {
+    let is_default = |row: &Row| {
+        row.sampling == sampling::METHODS[0].name
+            && row.method == reconstruction::METHODS[0].name
+            && (row.side_ratio, row.camera_count) == (DEFAULT_SIDE_RATIO, camera_count)
+    };
+    ladder.rows().iter().position(is_default).context("the ladder lacks the default row")
 }
 
 /// The mean error over the pixels that count, of all views.

@@ -8,7 +8,7 @@ use probe::Prober;
 
 use super::evidence::{Evidence, over_ratio};
 use super::pricing::Priced;
-use crate::fronts::row::{MeasuredRow, is_default};
+use crate::fronts::row::{MeasuredRow, default_place};
 use crate::statistics::mean_and_variation;
 
 /// The share of a budget that the best row keeps, to which a plan's cost is compared.
@@ -159,12 +159,12 @@ impl Cases<'_, '_> {
 
     /// The default's cost, or that of direct drawing, whichever is less and keeps the budget.
     fn default_s(&mut self, budget: Budget) -> f64 {
-        let is_default = |row: &&MeasuredRow| is_default(&row.row) && row.row.camera_count == DEFAULT_CAMERAS;
         let keeps = |row: &&MeasuredRow| {
             let keeps_error = budget.error().is_none_or(|term| over_ratio(&row.errors, term, 1.0) <= 1.0);
             keeps_error && budget.most_view_s().is_none_or(|limit| row.price.view_s <= limit)
         };
-        let default = self.evidence.rows.iter().find(is_default).filter(keeps);
+        let place = default_place(&self.planning.ladder, DEFAULT_CAMERAS).ok();
+        let default = self.evidence.rows.iter().find(|row| Some(row.place) == place).filter(keeps);
         default.map_or(f64::INFINITY, |row| row.price.node_s).min(self.pricing.direct().node_s)
     }
 }

@@ -4,20 +4,17 @@ use std::collections::BTreeMap;
 
 use anyhow::Context as _;
 use app_core::planning::Planning;
-use planner::{ErrorTerm, Pricing as _, ProbeView, RowCosts, Statistic, ViewErrors};
-use probe::{Light, Prober, median_costs};
+use planner::{ErrorTerm, ProbeView, Statistic, ViewErrors};
+use probe::{Light, Prober};
 
 use super::pricing::Priced;
-use crate::fronts::row::{MeasuredRow, mean_error};
+use crate::fronts::row::{MeasuredRow, REPEATS, mean_error, time_again};
 use crate::fronts::subject::Subject;
 use crate::progress::bar;
 
 /// Views of the table, and of confirmations.
 const TABLE_VIEWS: u64 = 32;
 const CONFIRMED_VIEWS: u64 = 256;
-/// Views with which rows are timed again, and times that a row is timed, each after all others: one is off by 10 % and more.
-const TIMED_VIEWS: usize = 16;
-const TIMED_REPEATS: usize = 3;
 /// The most views over a limit on 95 of 100 in confirmations: with 20 or more it is broken.
 const MOST_OVER: usize = 19;
 
@@ -35,24 +32,14 @@ impl<'s> Evidence<'s> {
         let mut prober = subject.prober(&planning);
         let views: Vec<ProbeView> = (0..TABLE_VIEWS).map(ProbeView::Fresh).collect();
         let row_count = planning.ladder.rows().len();
-        let progress = bar(format!("table, {}", subject.conditions.name), TIMED_REPEATS * row_count);
+        let progress = bar(format!("table, {}", subject.conditions.name), (1 + REPEATS) * row_count);
         let mut rows = Vec::with_capacity(row_count);
         for (place, of) in planning.representations.iter().enumerate() {
             let row = (place, &planning.ladder.rows()[place]);
             rows.push(MeasuredRow::measure(&mut prober, row, of, &views, pricing)?);
             progress.inc(1);
         }
-        let mut costs: Vec<Vec<RowCosts>> = rows.iter().map(|row| vec![row.costs]).collect();
-        for _ in 1..TIMED_REPEATS {
-            for (of, costs) in planning.representations.iter().zip(&mut costs) {
-                costs.extend(prober.time(std::slice::from_ref(of), TIMED_VIEWS, 1)?);
-                progress.inc(1);
-            }
-        }
-        for (row, costs) in rows.iter_mut().zip(&costs) {
-            row.costs = median_costs(costs);
-            row.price = pricing.row(&row.row, &row.costs);
-        }
+        time_again(&mut prober, &mut rows, &planning.representations, pricing, || progress.inc(1))?;
         progress.finish_and_clear();
         Ok(Self { prober, planning, rows, confirmed: BTreeMap::new() })
     }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes};
-use node::{DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass};
-use probe::{Representation, Subject};
+use node::{DirectWork, Engine, SampleWork, Turn, UploadedSet, ViewWork, WorkClass};
+use probe::{Light, Representation, Subject};
 use rayon::prelude::*;
 
 use super::figures::{Compared, Figures};
@@ -57,33 +57,13 @@ impl Stand<'_> {
 
     /// The images of a set.
     pub fn sample(&self, set: &SetOfPath) -> anyhow::Result<Vec<DepthImage>> {
-        let of = &set.representation;
-        Ok(self.engine.sample(
-            &SampleWork {
-                scene_hash: self.subject.scene_hash.clone(),
-                cameras: of.sample_cameras.clone(),
-                wanted: (0..of.sample_cameras.len() as u32).collect(),
-                sampling: of.sampling.clone(),
-                planes: self.engine.sample_planes(&of.method)?,
-                lighting: self.subject.lighting.clone(),
-                scene_time_s: set.time_s,
-                temporal_reference_s: None,
-                refinement: set.refinement,
-            },
-            Self::TURN,
-        )?)
+        let finished = self.subject.sample_work(self.engine, &set.representation, Light::Session)?;
+        let work = SampleWork { scene_time_s: set.time_s, refinement: set.refinement, ..finished };
+        Ok(self.engine.sample(&work, Self::TURN)?)
     }
 
     pub fn upload(&self, images: &[DepthImage]) -> anyhow::Result<Arc<dyn UploadedSet>> {
-        let set = SampleSet {
-            scene_hash: self.subject.scene_hash.clone(),
-            images: images.to_vec(),
-            volume: self.subject.volume,
-            background: self.subject.background,
-            illumination: self.subject.illumination.clone(),
-            lighting: self.subject.lighting.clone(),
-        };
-        Ok(self.engine.upload(&set, Self::TURN)?)
+        Ok(self.engine.upload(&self.subject.sample_set(images, Light::Session), Self::TURN)?)
     }
 
     pub fn views(
@@ -97,13 +77,8 @@ impl Stand<'_> {
     }
 
     fn truths(&self, cameras: Vec<PinholeCamera>, scene_time_s: f32) -> anyhow::Result<Vec<View>> {
-        let work = DirectWork {
-            scene_hash: self.subject.scene_hash.clone(),
-            cameras,
-            lighting: self.subject.lighting.clone(),
-            scene_time_s,
-            planes: ViewPlanes { inverse_depth: true, ..self.subject.planes },
-        };
+        let planes = ViewPlanes { inverse_depth: true, ..self.subject.planes };
+        let work = DirectWork { scene_time_s, ..self.subject.direct_work(cameras, Light::Session, planes) };
         Ok(self.engine.draw_direct(&work, Self::TURN)?)
     }
 }

@@ -5,11 +5,10 @@ use app_core::planning::Planning;
 use cluster::Refinement;
 use depth_image::{Camera, PinholeCamera, ViewGroup, nearest_set};
 use glam::{UVec2, Vec2};
-use planner::Row;
 use probe::Representation;
 use render::Lighting;
 
-use crate::fronts::row::is_default;
+use crate::fronts::row::default_place;
 
 /// The orbits' radius, as a share of the view cell.
 const RADIUS: f32 = 0.8;
@@ -93,7 +92,7 @@ impl Path {
     /// # Errors
     /// The ladder lacks a representation, or the scene has no cells.
     pub fn new(kind: PathKind, planning: &Planning, count: usize) -> anyhow::Result<Self> {
-        let usual = representation(planning, is_default)?;
+        let usual = planning.representations[default_place(&planning.ladder, CAMERAS)?].clone();
         let set = |time_s: f32, refinement: Refinement| SetOfPath { representation: usual.clone(), time_s, refinement };
         let cameras = orbit(planning, kind.step_px, count);
         let one_by = |of_frame: &dyn Fn(usize) -> usize| -> Vec<Frame> {
@@ -129,12 +128,6 @@ impl Path {
     pub fn is_switch(&self, frame: usize) -> bool {
         frame > 0 && self.frames[frame].set != self.frames[frame - 1].set
     }
-}
-
-fn representation(planning: &Planning, is: impl Fn(&Row) -> bool) -> anyhow::Result<Representation> {
-    let is_wanted = |row: &Row| is(row) && row.camera_count == CAMERAS;
-    let place = planning.ladder.rows().iter().position(is_wanted).context("the ladder lacks the default row")?;
-    Ok(planning.representations[place].clone())
 }
 
 /// Views on a circle in the cell. Without a step they all stand in its middle.

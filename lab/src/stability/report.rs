@@ -19,13 +19,26 @@ impl Measured {
 
     /// The greatest error of a change at a switch, over the median of the changes without; `None` where either is missing.
     pub fn jump(&self) -> Option<f64> {
-        let errors = |at_switch: bool| {
-            let wanted = self.frames().filter(move |(frame, _)| self.path.is_switch(*frame) == at_switch);
-            wanted.map(|(_, figures)| figures.change_error)
-        };
-        let others: Vec<f64> = errors(false).collect();
-        let usual = (!others.is_empty()).then(|| median(others)).filter(|&usual| usual > 0.0)?;
-        Some(errors(true).reduce(f64::max)? / usual)
+        Some(self.errors(true).into_iter().reduce(f64::max)? / self.usual()?)
+    }
+
+    /// The errors of changes at switches, or without one.
+    fn errors(&self, at_switch: bool) -> Vec<f64> {
+        let wanted = self.frames().filter(|(frame, _)| self.path.is_switch(*frame) == at_switch);
+        wanted.map(|(_, figures)| figures.change_error).collect()
+    }
+
+    /// The median of the changes without a switch.
+    fn usual(&self) -> Option<f64> {
+        let others = self.errors(false);
+        (!others.is_empty()).then(|| median(others)).filter(|&usual| usual > 0.0)
+    }
+
+    /// The median of the changes at switches, and the greatest without one, over the median of those without.
+    fn median_jump_and_worst_other(&self) -> Option<[f64; 2]> {
+        let (switches, usual) = (self.errors(true), self.usual()?);
+        let median_jump = (!switches.is_empty()).then(|| median(switches))?;
+        Some([median_jump / usual, self.errors(false).into_iter().reduce(f64::max)? / usual])
     }
 
     fn mean(&self, of: impl Fn(&Figures) -> f64) -> f64 {
@@ -42,15 +55,17 @@ pub fn add_to(report: &mut Report, paths: &[Measured]) -> anyhow::Result<()> {
     for path in paths {
         report.charts.push(chart(path).into());
         report.pictures.extend(worst(path));
-        if path.path.kind.switch == Switch::Cell {
-            let name = format!("jump at a switch, {}", path.path.kind.name);
-            report.checks.push(Check::maybe(name, path.jump(), "×", Bar::AtMost(MOST_JUMP), "no frame switches"));
-        }
     }
-    let is_number = |path: &Measured| path.figures.iter().all(|figures| figures.change_error.is_finite());
-    let numbers = paths.iter().filter(|path| is_number(path)).count();
-    report.checks.push(Check::new("paths with numbers only", numbers as f64, "", Bar::AtLeast(paths.len() as f64)));
+    add_checks(report, paths);
     Ok(())
+}
+
+/// Adds a check of the jump of each path across cells.
+pub fn add_checks(report: &mut Report, paths: &[Measured]) {
+    for measured in paths.iter().filter(|measured| measured.path.kind.switch == Switch::Cell) {
+        let name = format!("jump at a switch, {}", measured.path.kind.name);
+        report.checks.push(Check::maybe(name, measured.jump(), "×", Bar::AtMost(MOST_JUMP), "no frame switches"));
+    }
 }
 
 fn table(paths: &[Measured]) -> anyhow::Result<Table> {
@@ -63,11 +78,14 @@ fn table(paths: &[Measured]) -> anyhow::Result<Table> {
         ("error of changes, mean", ""),
         ("error of changes, worst", ""),
         ("jump", "×"),
+        ("median switch", "×"),
+        ("worst other frame", "×"),
     ];
     let mut table = Table::new("Paths", &columns);
     for measured in paths {
         let path = &measured.path;
         let switches = (0..path.frames.len()).filter(|&frame| path.is_switch(frame)).count();
+        let others = measured.median_jump_and_worst_other();
         let worst = measured.figures.iter().map(|figures| figures.change_error).fold(0.0, f64::max);
         table.push([
             Cell::from(path.kind.name),
@@ -78,6 +96,8 @@ fn table(paths: &[Measured]) -> anyhow::Result<Table> {
             measured.mean(|figures| figures.change_error).into(),
             worst.into(),
             measured.jump().into(),
+            others.map(|[median_jump, _]| median_jump).into(),
+            others.map(|[_, worst_other]| worst_other).into(),
         ])?;
     }
     Ok(table)

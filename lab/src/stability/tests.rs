@@ -14,7 +14,7 @@ use study::{Outcome, Report};
 use super::figures::Figures;
 use super::measure::{Measured, Stand};
 use super::paths::{PATHS, Path, PathKind, Switch};
-use super::report::add_to;
+use super::report::{add_checks, add_to};
 use crate::fronts::conditions::Conditions;
 use crate::fronts::subject::Subject;
 
@@ -67,7 +67,7 @@ fn a_still_path_has_no_error_of_changes_and_a_moving_one_has() {
     let mut report = Report::new("stability", "a device");
     add_to(&mut report, &[still, moving]).unwrap();
     assert_eq!((report.tables.len(), report.charts.len()), (1, 2));
-    assert!(report.checks.iter().all(|check| check.outcome() == Outcome::Holds));
+    assert!(report.checks.is_empty(), "neither path has cells");
 }
 
 /// The figures are made up.
@@ -75,7 +75,7 @@ fn a_still_path_has_no_error_of_changes_and_a_moving_one_has() {
 fn a_jump_is_the_worst_switch_over_the_median_of_other_changes() {
     let planning = planning(&engine(), "blocks");
     let jump = |at_switch: f64| {
-        let path = Path::new(kind(Switch::Representation), &planning, 12).unwrap();
+        let path = Path::new(kind(Switch::Cell), &planning, 12).unwrap();
         let map = ScoreMap { width_px: 1, height_px: 1, border_px: 0, values: vec![0.0] };
         let of = |change_error: f64| Figures {
             flip: 0.1,
@@ -85,9 +85,15 @@ fn a_jump_is_the_worst_switch_over_the_median_of_other_changes() {
         };
         let figures = (1..12).map(|frame| of(if path.is_switch(frame) { at_switch } else { 0.02 })).collect();
         let (views, truths) = (Vec::new(), Vec::new());
-        Measured { path, views, truths, figures }.jump().unwrap()
+        let measured = Measured { path, views, truths, figures };
+        let mut report = Report::new("stability", "a device");
+        let jump = measured.jump().unwrap();
+        add_checks(&mut report, &[measured]);
+        (jump, report.checks[0].outcome())
     };
-    assert!((jump(0.02) - 1.0).abs() < 1e-12 && (jump(0.05) - 2.5).abs() < 1e-12);
+    let ((none, held), (some, fell)) = (jump(0.02), jump(0.05));
+    assert!((none - 1.0).abs() < 1e-12 && (some - 2.5).abs() < 1e-12, "{none} {some}");
+    assert_eq!((held, fell), (Outcome::Holds, Outcome::FallsShort));
 }
 
 #[test]

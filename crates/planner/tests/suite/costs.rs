@@ -40,9 +40,9 @@ fn powers_that_differ_by_method_are_found_between_the_measured_rows() {
     }
 }
 
-/// Errors of c over the rows of 60 subjects that were not timed, as shares of it: the median and the 90th percentile; then the share of rows that
-/// cost no less than one standard deviation below their prediction. `timed_count` rows are timed, each the one of which
-/// least is known.
+/// Errors of c over the rows of 60 subjects that were not timed, as shares of it: the median and the 90th percentile; then
+/// the share of rows that cost no less than one standard deviation below their prediction. `timed_count` rows are timed,
+/// each the one of which least is known.
 fn prediction_errors(timed_count: usize) -> [f64; 3] {
     let (mut errors, mut above) = (Vec::new(), 0);
     for seed in 0..60 {

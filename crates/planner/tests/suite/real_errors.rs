@@ -92,26 +92,32 @@ fn the_file_has_rows_of_high_and_of_low_variation() {
 fn bounds_on_means_hold() {
     const RUNS: usize = 10_000;
     let mut random = Random(5);
-    let covered: Vec<f64> = Stream::all()
+    let covered: Vec<[f64; 2]> = Stream::all()
         .iter()
         .map(|stream| {
             let mean = stream.mean();
-            let holds = |_: &usize| {
+            let (mut corrected, mut plain) = (0, 0);
+            for _ in 0..RUNS {
                 let excess: Vec<f64> = (0..64).map(|_| stream.view(&mut random).excess(Metric::Flip, mean)).collect();
-                Moments::of(excess.into_iter()).upper_bound(ERROR_RATE).expect("views") >= 0.0
-            };
-            let share = (0..RUNS).filter(holds).count() as f64 / RUNS as f64;
+                let moments = Moments::of(excess.into_iter());
+                let holds = |of: Moments| of.upper_bound(ERROR_RATE).expect("views") >= 0.0;
+                corrected += usize::from(holds(moments));
+                plain += usize::from(holds(Moments { skewness: 0.0, ..moments }));
+            }
+            let shares = [corrected, plain].map(|held| held as f64 / RUNS as f64);
             println!(
-                "{}: v {:.2}, the bound of 64 views holds in {:.1} %",
+                "{}: v {:.2}, the bound of 64 views holds in {:.1} %, without its correction in {:.1} %",
                 stream.name,
                 stream.variation(),
-                100.0 * share
+                100.0 * shares[0],
+                100.0 * shares[1]
             );
-            share
+            shares
         })
         .collect();
-    assert!(covered.iter().all(|share| *share >= 0.90), "{covered:?}");
-    assert!(covered.iter().sum::<f64>() / covered.len() as f64 >= 0.93, "{covered:?}");
+    let least = |of: usize| covered.iter().map(|shares| shares[of]).fold(1.0, f64::min);
+    assert!(least(0) >= 0.90 && least(1) < 0.90, "{covered:?}");
+    assert!(covered.iter().map(|shares| shares[0]).sum::<f64>() / covered.len() as f64 >= 0.93, "{covered:?}");
 }
 
 /// The limit is such that a little more than 5 % of the views are over: a bound that says otherwise is wrong.
