@@ -87,6 +87,7 @@ fn errors(subject: &Subject, camera_count: u32, views: u32) -> anyhow::Result<Ve
     let row = default_place(&planning.ladder, camera_count)?;
     let mut prober = subject.prober(&planning);
     let views: Vec<ProbeView> = (0..u64::from(views)).map(ProbeView::Fresh).collect();
+    let views = planning.viewpoints.cameras(&views);
     let progress = bar(format!("{name}, S = {camera_count}"), views.len());
     let mut errors = Vec::with_capacity(views.len());
     for chunk in views.chunks(CHUNK) {

@@ -4,10 +4,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use app_core::planning::{OneNode, PlannedViews, Planning};
+use app_core::planning::{PlannedViews, Planning, one_node};
 use app_core::setup::{SceneArgs, Setup};
 use cluster::SamplePlanes;
 use codec::FrameCodec;
+use coordinator::schedule::EqualNodes;
 use depth_image::{DepthImage, View, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
@@ -44,18 +45,20 @@ impl Stand {
         Planning::new(&self.setup, &self.args, &views).unwrap()
     }
 
-    fn prober(&self, planning: &Planning) -> Prober<'_> {
-        Prober::new(self.engine.as_ref(), planning.subject.clone(), Turn::of(WorkClass::Batch))
+    fn prober(&self, planning: &Planning) -> Prober {
+        Prober::new(self.engine.clone(), planning.subject.clone(), Turn::of(WorkClass::Batch))
     }
 }
 
 /// Direct drawing costs more than any row: what is chosen does not depend on this machine.
-const DEAR: OneNode = OneNode { views_a_set: 290, direct: DirectCosts { direct_view_s: 1e3, encode_view_s: 1e-3 } };
+const EXPENSIVE: EqualNodes =
+    EqualNodes { nodes: 1, cells: 1, views_a_set: 290, direct_view_s: Some(1e3), encode_view_s: 1e-3 };
 
-fn plan(planning: &Planning, prober: &mut Prober<'_>, budget: Budget, kept: Kept) -> (Outcome, Kept, f64) {
-    let request = planning.request(budget, "a device".to_owned(), DEAR.views_a_set, 600.0);
-    let mut planner = Planner::new(request, planning.ladder.clone(), DEAR).unwrap();
-    let (outcome, kept) = probe::plan(&mut planner, prober, &planning.representations, kept, |_| ());
+fn plan(planning: &Planning, prober: &mut Prober, budget: Budget, kept: Kept) -> (Outcome, Kept, f64) {
+    let request = planning.request(budget, "a device".to_owned(), EXPENSIVE.views_a_set, 600.0);
+    let mut planner = Planner::new(request, planning.ladder.clone(), EXPENSIVE).unwrap();
+    let (outcome, kept) =
+        probe::plan(&mut planner, prober, &planning.viewpoints, &planning.representations, kept, |_| ());
     (outcome, kept, planner.spent_s())
 }
 
@@ -71,7 +74,7 @@ fn a_plan_keeps_its_budget_on_views_that_it_never_saw() {
     assert!(spent_s > 0.0 && !kept.rows.is_empty());
 
     let unseen = stand.planning(2);
-    let views: Vec<ProbeView> = (0..64).map(ProbeView::Fresh).collect();
+    let views = unseen.viewpoints.cameras(&(0..64).map(ProbeView::Fresh).collect::<Vec<_>>());
     let (errors, _) = stand.prober(&unseen).probe(&unseen.representations[row], Light::Session, &views).unwrap();
     // The views of a certificate and these differ by chance, and times choose among rows: a tenth is far beyond chance.
     let excess = errors.iter().map(|errors| errors.excess(Metric::Flip, 1.1 * 0.12)).sum::<f64>();
@@ -89,7 +92,7 @@ fn errors_fall_with_cameras_and_texels_and_true_views_have_none() {
     let stand = Stand::new("courtyard", "phong");
     let planning = stand.planning(3);
     let mut prober = stand.prober(&planning);
-    let views: Vec<ProbeView> = (0..8).map(ProbeView::Screening).collect();
+    let views = planning.viewpoints.first(8);
     let method = planning.representations[0].method.clone();
     let mut error = |camera_count: u32, side_ratio: f64, metric: Metric| {
         let is_row = |row: &Row| {
@@ -169,9 +172,9 @@ fn costs_of_screening_are_those_of_the_light_of_the_session() {
     let stand = Stand::new("blocks", "soft 2");
     let planning = stand.planning(0);
     let engine = SlowInOtherLight(stand.engine.clone());
-    let mut prober = Prober::new(&engine, planning.subject.clone(), Turn::of(WorkClass::Batch));
+    let mut prober = Prober::new(Arc::new(engine), planning.subject.clone(), Turn::of(WorkClass::Batch));
     assert_eq!(planning.subject.screening_lighting, "phong");
-    let views = [ProbeView::Screening(0)];
+    let views = planning.viewpoints.first(1);
     // One camera: its image is the whole set.
     let screened = prober.probe(&planning.representations[0], Light::Screening, &views).unwrap().1;
     assert!(screened.sample_image_s >= SLOW.as_secs_f64(), "g_s is of another light: {screened:?}");
@@ -187,7 +190,8 @@ fn a_representation_that_the_device_refuses_is_an_answer() {
     let broken = Representation { method: "guess".to_owned(), ..planning.representations[0].clone() };
     let id = ProbeId { plan: 1, number: 1 };
     let (row, views, purpose) = (0, vec![ProbeView::Screening(0)], Purpose::Screening);
-    let event = probe::answer(&mut prober, &[broken], Command::Probe { id, row, views, purpose }).unwrap();
+    let event = probe::answer(&mut prober, &planning.viewpoints, &[broken], Command::Probe { id, row, views, purpose })
+        .unwrap();
     let Event::Failed { id: answered, reason, .. } = &event else { panic!("{event:?}") };
     assert!(*answered == id && reason.contains("guess"), "{reason}");
     event.validate().unwrap();
@@ -199,13 +203,14 @@ fn the_price_on_one_node_is_the_set_shared_by_its_views_and_the_view() {
         sampling: "s".to_owned(),
         method: "m".to_owned(),
         camera_count: 4,
+        place_count: 4,
         side_ratio: 1.0,
         kind: "k".to_owned(),
         rank: 0,
     };
     let costs = RowCosts { sample_image_s: 0.02, load_set_s: 0.01, reconstruct_view_s: 0.003 };
     let direct = DirectCosts { direct_view_s: 0.05, encode_view_s: 0.001 };
-    let one_node = OneNode { views_a_set: 10, direct };
+    let one_node = one_node(10, direct);
     let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} is not {b}");
     let Price { node_s, view_s } = one_node.row(&row, &costs);
     close(node_s, (4.0 * 0.02 + 0.01) / 10.0 + 0.004);

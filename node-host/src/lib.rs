@@ -10,6 +10,7 @@ use node::{
     DeviceMonitor, Engine, EngineError, NodeConfig, NodeMetrics, NodeService, OpenEngine, PlansInForce, Scenes,
     ServeError, health, keep_membership, with_reflection,
 };
+use probe::Probers;
 use sampler_node::SamplerService;
 use tokio::net::TcpListener;
 use tokio::time::Instant;
@@ -107,7 +108,8 @@ async fn serve_on(
     let (relay, done) = (compositor.relay(), metrics.done.clone());
     let sampler = SamplerService::new(scenes.clone(), plans.clone(), config, relay, metrics.clone(), shutdown.clone());
     monitor.set_memory(vec![compositor.memory(), sampler.memory()]);
-    let service = NodeService::new(plans.clone(), scenes.clone(), config.quotas, metrics);
+    let probers = Arc::new(Probers::new(engine.clone()));
+    let service = NodeService::new(plans.clone(), scenes.clone(), config.quotas, metrics, probers);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))

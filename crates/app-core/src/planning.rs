@@ -4,14 +4,14 @@ use anyhow::Context as _;
 use cluster::SceneHash;
 use codec::FrameCodec;
 use coordinator::fitting_size_px;
-use coordinator::schedule::{Load, NodeCosts, pipeline_s};
+use coordinator::schedule::EqualNodes;
 use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use glam::{UVec2, Vec2};
-use planner::{Budget, KeptKey, Ladder, PlanRequest, Price, Pricing, Row, RowCosts};
-use probe::{DirectCosts, Representation, Subject};
+use planner::{Budget, KeptKey, Ladder, PlanRequest, Row};
+use probe::{DirectCosts, Representation, Subject, Viewpoints};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
-use sampling::{SamplingMethod, nested_places};
+use sampling::SamplingMethod;
 
 use crate::setup::{SceneArgs, Setup};
 
@@ -47,6 +47,8 @@ pub struct Planning {
     pub representations: Vec<Representation>,
     /// What is measured.
     pub subject: Subject,
+    /// From where views are seen.
+    pub viewpoints: Viewpoints,
 }
 
 impl Planning {
@@ -72,25 +74,24 @@ impl Planning {
             lighting: args.lighting.to_string(),
             screening_lighting: screening.to_string(),
             scene_time_s: views.scene_time_s,
-            cell,
-            view_px: views.size_px,
             planes: views.planes,
             codec: views.codec,
-            seed: views.seed,
         };
-        Ok(Self { ladder: Ladder::new(rows)?, representations, subject })
+        let viewpoints = Viewpoints { cell, view_px: views.size_px, seed: views.seed };
+        Ok(Self { ladder: Ladder::new(rows)?, representations, subject, viewpoints })
     }
 
     /// The name of the measurements that this plan may use.
     #[must_use]
     pub fn key(&self) -> KeptKey {
-        let Subject { scene_hash, lighting, view_px, planes, scene_time_s, .. } = &self.subject;
+        let Subject { scene_hash, lighting, planes, scene_time_s, .. } = &self.subject;
+        let Viewpoints { cell, view_px, .. } = &self.viewpoints;
         let light = format!("{lighting}; screened in {}; at {scene_time_s} s", self.subject.screening_lighting);
         // The sizes and places of sample cameras are the user's at times, and are no part of a row.
         let rows = format!("{:?} {:?}", self.ladder.rows(), self.representations);
         KeptKey {
             scene: scene_hash.clone(),
-            cell: hash(&format!("{:?}", self.subject.cell)),
+            cell: hash(&format!("{cell:?}")),
             lighting: hash(&light),
             view_size: format!("{}x{}, {} samples a pixel", view_px.x, view_px.y, planes.antialias.samples()),
             ladder_version: hash(&rows),
@@ -110,7 +111,7 @@ impl Planning {
             pricing: format!("one node, {views_a_set} views a set"),
             allowance_s,
             most_certified: if is_traced { MOST_CERTIFIED_TRACED } else { MOST_CERTIFIED },
-            seed: self.subject.seed,
+            seed: self.viewpoints.seed,
         }
     }
 }
@@ -137,12 +138,14 @@ fn rows(args: &SceneArgs, given_cameras: u32, is_size_fixed: bool) -> Vec<Row> {
     let sides = if is_size_fixed { &SIDE_RATIOS[2..] } else { &SIDE_RATIOS[..] };
     let mut rows = Vec::new();
     for (sampling, least_images) in &samplings {
+        let is_of_layers = sampling.parse().is_ok_and(|method: SamplingMethod| method.own_image_count().is_some());
         for &camera_count in counts.iter().filter(|&count| count >= least_images) {
             for &side_ratio in sides {
                 rows.extend(methods.iter().enumerate().map(|(place, method)| Row {
                     sampling: sampling.clone(),
                     method: method.to_string(),
                     camera_count,
+                    place_count: if is_of_layers { 1 } else { camera_count },
                     side_ratio,
                     kind: format!("{} {}", without_setting(sampling), without_setting(&method.to_string())),
                     rank: rank(&methods, place),
@@ -175,48 +178,24 @@ struct Cameras<'a> {
 
 impl Cameras<'_> {
     fn representation(&self, row: &Row) -> anyhow::Result<Representation> {
-        let size_px = (self.whole_px.as_vec2() * row.side_ratio as f32).round().as_uvec2().max(UVec2::ONE);
-        let rig = match self.given {
-            Some(given) => given.iter().map(|camera| camera.resized(size_px)).collect(),
-            None => {
-                let places = nested_places(row.camera_count as usize);
-                places.iter().map(|&place| self.cell.camera_at(place, size_px)).collect()
-            }
-        };
         let sampling = row.sampling.parse::<SamplingMethod>()?.with_images(row.camera_count);
-        let sample_cameras = sampling.cameras(rig).into_iter().map(Camera::Pinhole).collect();
+        let cameras = match self.given {
+            Some(given) => {
+                let size_px = row.size_px(self.whole_px);
+                sampling.cameras(given.iter().map(|camera| camera.resized(size_px)).collect())
+            }
+            None => row.cameras(self.cell, self.whole_px),
+        };
+        let sample_cameras = cameras.into_iter().map(Camera::Pinhole).collect();
         Ok(Representation { sampling: sampling.to_string(), method: row.method.clone(), sample_cameras })
     }
 }
 
-/// Prices on a cluster of one node, as the schedule predicts them.
-#[derive(Debug, Clone, Copy)]
-pub struct OneNode {
-    /// V: the views of a sample set.
-    pub views_a_set: usize,
-    /// What drawing directly and encoding cost.
-    pub direct: DirectCosts,
-}
-
-impl Pricing for OneNode {
-    fn row(&self, row: &Row, costs: &RowCosts) -> Price {
-        let costs = cluster::Costs {
-            sample_image_s: costs.sample_image_s,
-            load_set_s: costs.load_set_s,
-            reconstruct_view_s: costs.reconstruct_view_s,
-            encode_view_s: self.direct.encode_view_s,
-            ..cluster::Costs::default()
-        };
-        let node = NodeCosts { costs, transfer_image_s: None };
-        let load = Load { images: row.camera_count as usize, views: self.views_a_set, ..Load::default() };
-        let set_s = pipeline_s(&load, &[node], &[true]);
-        Price { node_s: set_s / self.views_a_set.max(1) as f64, view_s: node.view_s() }
-    }
-
-    fn direct(&self) -> Price {
-        let view_s = self.direct.direct_view_s + self.direct.encode_view_s;
-        Price { node_s: view_s, view_s }
-    }
+/// Prices on a cluster of one node, for sets of `views_a_set` views.
+#[must_use]
+pub fn one_node(views_a_set: usize, direct: DirectCosts) -> EqualNodes {
+    let DirectCosts { direct_view_s, encode_view_s } = direct;
+    EqualNodes { nodes: 1, cells: 1, views_a_set, direct_view_s: Some(direct_view_s), encode_view_s }
 }
 
 #[cfg(test)]

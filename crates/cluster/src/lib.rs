@@ -11,6 +11,8 @@ mod costs;
 pub mod limits;
 mod node;
 mod policy;
+mod probing;
+mod promise;
 mod scene;
 mod session;
 mod status;
@@ -30,6 +32,8 @@ pub use check::{
 pub use costs::{Costs, MeasuredCosts, ROW_PARTS, TileCosts};
 pub use node::{JoinCluster, MeasureCosts, Measured, NodeStatus, Ready, SamplerReport, Welcome, WorkReport};
 pub use policy::{Policy, PolicyChoice, UnknownPolicy};
+pub use probing::{ProbeViews, ProbedView, ProbedViews};
+pub use promise::{BudgetRequest, Promise, PromiseState};
 pub use scene::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, ScenePart, SceneRef};
 pub use session::{ChangeSession, Quality, SessionEvent, SessionPlan, SessionRequest, SessionStage};
 pub use status::{AchievedTime, ClusterStatus, NodeCondition, OfferSettings, OfferStatus, WorkloadStatus};

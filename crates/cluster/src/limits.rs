@@ -32,6 +32,8 @@ pub const MAX_SCENES: usize = 64;
 pub const MAX_WORKLOADS: usize = 64;
 /// Views measured in one call.
 pub const MAX_BATCH: u32 = 64;
+/// Views probed in one call.
+pub const MAX_PROBE_VIEWS: usize = 64;
 /// The highest epoch that a member may join with: a coordinator goes on from there, which must leave room.
 pub const MAX_JOINING_EPOCH: u64 = 1 << 48;
 /// Bytes of a name, an address or a method.

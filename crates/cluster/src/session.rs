@@ -12,6 +12,7 @@ use crate::check_seconds;
 use crate::costs::Costs;
 use crate::limits::{MAX_FALLBACKS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS, MAX_VIEWS_PER_SET};
 use crate::policy::{Policy, PolicyChoice};
+use crate::promise::{BudgetRequest, Promise};
 use crate::timeline::Timeline;
 use crate::views::check_view_size;
 
@@ -60,6 +61,8 @@ pub struct SessionRequest {
     /// Viewpoints of the session, in place of `sample_cameras`: sample cameras are placed around them, in view cells where
     /// they are far apart.
     pub viewpoints: Vec<PinholeCamera>,
+    /// Its budget.
+    pub budget: BudgetRequest,
 }
 
 impl SessionRequest {
@@ -80,6 +83,7 @@ impl SessionRequest {
         at_most(self.fallbacks.len(), MAX_FALLBACKS, "fallbacks")?;
         self.fallbacks.iter().try_for_each(Quality::validate)?;
         self.forced_tile_count.map_or(Ok(()), tile_count)?;
+        self.budget.validate()?;
         viewpoints(&self.viewpoints)
     }
 }
@@ -169,8 +173,10 @@ pub struct SessionPlan {
     pub scene_load_s: f64,
     /// The number of the session's fallback in force, from 1; `None`: the quality that was asked for.
     pub fallback: Option<NonZeroU32>,
-    /// How views are reconstructed: under a fallback by every session, else by most.
+    /// How views are reconstructed: by most sessions, or by every session.
     pub method: String,
+    /// Every session's views are made by `method`: under a fallback, and by a representation that a budget chose.
+    pub is_method_for_all: bool,
     /// Pictures a second, of those asked for.
     pub frame_rate_ratio: f64,
     /// The exposure of sessions that leave it to the plan: measured when the workload was opened, and the same in all of its
@@ -235,4 +241,6 @@ pub enum SessionEvent {
     },
     /// A plan is in force.
     Plan(Box<SessionPlan>),
+    /// The promise to the session has changed.
+    Promise(Promise),
 }

@@ -8,6 +8,7 @@ use crate::costs::Costs;
 use crate::limits::{MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_SCENES, MAX_WORKLOADS};
 use crate::node::NodeStatus;
 use crate::policy::Policy;
+use crate::promise::Promise;
 use crate::scene::SceneRef;
 use crate::session::SessionPlan;
 
@@ -76,6 +77,8 @@ pub struct WorkloadStatus {
     pub achieved: Vec<AchievedTime>,
     /// The share of its nodes' time that its sessions' frame rates take; `None` without such sessions.
     pub utilisation: Option<f64>,
+    /// What is promised to its sessions; `None` without a budget.
+    pub promise: Option<Promise>,
     /// The share of all nodes' time that one more viewer would take: one like the mean of its viewers, or one of 10 views a
     /// second.
     pub one_more_viewer: f64,
@@ -86,6 +89,7 @@ impl WorkloadStatus {
         at_most(self.conditions.len(), MAX_NODES, "conditions")?;
         at_most(self.achieved.len(), MAX_POLICIES, "achieved_times")?;
         self.plan.as_ref().map_or(Ok(()), SessionPlan::validate)?;
+        self.promise.as_ref().map_or(Ok(()), Promise::validate)?;
         self.conditions.iter().try_for_each(NodeCondition::validate)?;
         self.achieved.iter().try_for_each(|achieved| finite_seconds(achieved.busy_s, "busy_s"))?;
         finite_seconds(self.utilisation, "utilisation_ratio")?;

@@ -41,5 +41,5 @@ pub use scalar::{
 pub use tiles::TileError;
 pub use tone::{Exposure, ExposureEv, ToneCurve, ToneError, ToneMapping};
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};
-pub use view_cell::ViewCell;
+pub use view_cell::{ViewCell, nested_places};
 pub use view_group::{ViewGroup, nearest_set};

@@ -13,6 +13,20 @@ const LEAST_TURN: f32 = 1e-2;
 /// Tolerance of equal fields of view.
 const ROUNDING: f32 = 1e-3;
 
+/// Places of sample cameras on the rectangle halfway between front and rear, in a fixed nested order: corners, the middle,
+/// middles of edges.
+const NESTED: [Vec2; 9] = [
+    Vec2::new(-1.0, -1.0),
+    Vec2::new(1.0, 1.0),
+    Vec2::new(1.0, -1.0),
+    Vec2::new(-1.0, 1.0),
+    Vec2::ZERO,
+    Vec2::new(0.0, -1.0),
+    Vec2::new(0.0, 1.0),
+    Vec2::new(-1.0, 0.0),
+    Vec2::new(1.0, 0.0),
+];
+
 /// A box of viewpoints and their common aim.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ViewCell {
@@ -69,6 +83,36 @@ impl ViewCell {
         places.map(|place| self.camera(place, focal_px, size_px)).collect()
     }
 
+    /// Up to nine cameras that together see the fields of view of all views of the cell, in a fixed nested order; one stands
+    /// in the middle. More cameras are the same and others, so that sets of several sizes share their images.
+    #[must_use]
+    pub fn nested_cameras(&self, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
+        let focal_px = (size_px.as_vec2() * 0.5 / self.half_sides).min_element();
+        nested_places(count).iter().map(|place| self.camera(place.extend(0.0), focal_px, size_px)).collect()
+    }
+
+    /// The view from a place of the box, -1 to 1 in all directions (to the right, up and back), with the size and the lens of
+    /// another.
+    #[must_use]
+    pub fn view_at(&self, place: Vec3, like: &PinholeCamera) -> PinholeCamera {
+        let eye_in_world = self.eye_at(place);
+        PinholeCamera { eye_in_world, world_from_camera: self.turn_at(eye_in_world), ..*like }
+    }
+
+    /// The cell with edges of at least this length, about the same middle. Views keep their aim.
+    #[must_use]
+    pub fn grown_to(&self, edge_m: f32) -> Self {
+        let axes = Mat3::from_quat(self.turn_at(self.center_in_world));
+        let mut grown = *self;
+        for (half, axis) in grown.half_edges_in_world.iter_mut().zip([axes.x_axis, axes.y_axis, axes.z_axis]) {
+            let half_m = 0.5 * edge_m;
+            if half.length() < half_m {
+                *half = half.try_normalize().unwrap_or(axis) * half_m;
+            }
+        }
+        grown
+    }
+
     /// Returns whether the sample images contain the field of view of a camera within the cell.
     pub(crate) fn sees_all_of(&self, camera: &PinholeCamera) -> bool {
         self.half_sides_of(camera).cmple(self.half_sides * (1.0 + ROUNDING)).all()
@@ -119,9 +163,13 @@ impl ViewCell {
         (0..count).map(turned).collect()
     }
 
-    fn camera(&self, place: Vec3, focal_px: f32, size_px: UVec2) -> PinholeCamera {
+    fn eye_at(&self, place: Vec3) -> Vec3 {
         let offsets = self.half_edges_in_world.iter().zip(place.to_array()).map(|(half, at)| *half * at);
-        let eye = self.center_in_world + offsets.sum::<Vec3>();
+        self.center_in_world + offsets.sum::<Vec3>()
+    }
+
+    fn camera(&self, place: Vec3, focal_px: f32, size_px: UVec2) -> PinholeCamera {
+        let eye = self.eye_at(place);
         PinholeCamera {
             eye_in_world: eye,
             world_from_camera: self.turn_at(eye),
@@ -153,6 +201,13 @@ impl ViewCell {
         let corners = [near, far, Vec2::new(near.x, far.y), Vec2::new(far.x, near.y)];
         corners.into_iter().map(slope).fold(Vec2::ZERO, Vec2::max).min(Vec2::splat(STEEPEST))
     }
+}
+
+/// The places of up to nine sample cameras on a rectangle, -1 to 1 in both directions, in a fixed nested order; one camera
+/// stands in the middle.
+#[must_use]
+pub fn nested_places(count: usize) -> &'static [Vec2] {
+    if count == 1 { &NESTED[4..5] } else { &NESTED[..count.min(NESTED.len())] }
 }
 
 /// Middle and half edges of the box in the cameras' orientation.

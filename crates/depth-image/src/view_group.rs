@@ -68,6 +68,18 @@ impl ViewGroup {
         self.cell.sample_cameras(SHORTEST_EDGE * self.distance_m, size_px)
     }
 
+    /// The box of the group's viewpoints.
+    #[must_use]
+    pub fn cell(&self) -> &ViewCell {
+        &self.cell
+    }
+
+    /// The box of viewpoints to which the group may grow about its middle.
+    #[must_use]
+    pub fn grown_cell(&self) -> ViewCell {
+        self.cell.grown_to(LONGEST_EDGE * self.distance_m)
+    }
+
     fn of(views: Vec<PinholeCamera>, scene: &Aabb) -> Option<Self> {
         let (bounds, distance_m) = (bounds(&views), least_distance_m(&views, scene));
         Some(Self { cell: ViewCell::between(&views)?, views, bounds, distance_m })

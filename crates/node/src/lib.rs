@@ -37,7 +37,7 @@ pub use plan::{CellPlan, PlansInForce, Relay, beyond_timeline, has_set};
 pub use port::Port;
 pub use scenes::Scenes;
 pub use server::{DRAIN, MAX_STREAMS, ServeError, health, serve, with_reflection};
-pub use service::NodeService;
+pub use service::{NodeService, ViewProbes};
 pub use set_bytes::{most_image_bytes, most_set_bytes, set_bytes};
 pub use set_memory::SetMemory;
 pub use streams::{next_within, until_drained, with_guard};

@@ -1,9 +1,10 @@
-//! The service of every node: it measures costs and takes plans.
+//! The service of every node: it measures costs and views, and takes plans.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use cluster::{ApplyPlan, Assignment, MeasureCosts, Measured, Ready};
+use cluster::{ApplyPlan, Assignment, MeasureCosts, Measured, ProbeViews, ProbedViews, Ready};
+use depth_image::ViewPlanes;
 use parking_lot::Mutex;
 use tonic::{Status, async_trait};
 use wire::rpc;
@@ -18,6 +19,15 @@ use crate::telemetry::NodeMetrics;
 /// Measured costs that are cached.
 const MAX_MEASURED: usize = 16;
 
+/// Measures views on the node's device. Calls block.
+pub trait ViewProbes: Send + Sync + 'static {
+    /// The errors of views, and their costs.
+    ///
+    /// # Errors
+    /// The device fails, or refuses the representation.
+    fn probe(&self, request: &ProbeViews) -> Result<ProbedViews, Status>;
+}
+
 /// The node's own service.
 pub struct NodeService {
     plans: PlansInForce,
@@ -26,13 +36,22 @@ pub struct NodeService {
     metrics: NodeMetrics,
     /// Measured costs, the oldest first: a coordinator that was restarted need not wait for them again.
     measured: Mutex<VecDeque<(MeasureCosts, Measured)>>,
+    /// One request at a time.
+    probes: tokio::sync::Mutex<Arc<dyn ViewProbes>>,
 }
 
 impl NodeService {
     /// The service of one node.
     #[must_use]
-    pub fn new(plans: PlansInForce, scenes: Arc<Scenes>, quotas: Quotas, metrics: NodeMetrics) -> Self {
-        Self { plans, scenes, quotas, metrics, measured: Mutex::default() }
+    pub fn new(
+        plans: PlansInForce,
+        scenes: Arc<Scenes>,
+        quotas: Quotas,
+        metrics: NodeMetrics,
+        probes: Arc<dyn ViewProbes>,
+    ) -> Self {
+        let probes = tokio::sync::Mutex::new(probes);
+        Self { plans, scenes, quotas, metrics, measured: Mutex::default(), probes }
     }
 
     async fn measure_now(&self, request: &MeasureCosts) -> Result<Measured, Status> {
@@ -65,6 +84,15 @@ impl rpc::Node for NodeService {
             cached.pop_front();
         }
         Ok(measured)
+    }
+
+    async fn probe_views(&self, request: ProbeViews) -> Result<ProbedViews, Status> {
+        let planes = ViewPlanes { antialias: request.antialias, inverse_depth: true, ..ViewPlanes::COLOR };
+        request.views.iter().try_for_each(|view| self.quotas.check_view(view, planes))?;
+        let probes = self.probes.lock().await;
+        self.scenes.ensure(&request.workload.scene).await?;
+        let probes = probes.clone();
+        blocking(move || probes.probe(&request)).await
     }
 
     async fn apply_assignment(&self, plan: ApplyPlan) -> Result<Ready, Status> {

@@ -40,6 +40,6 @@ pub struct Price {
 pub trait Pricing {
     /// The price of a row with these costs.
     fn row(&self, row: &Row, costs: &RowCosts) -> Price;
-    /// The price of drawing every view directly.
+    /// The price of drawing every view directly. Where views may not be drawn directly it is not finite.
     fn direct(&self) -> Price;
 }

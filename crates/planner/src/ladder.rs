@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
+use depth_image::{PinholeCamera, ViewCell};
+use glam::UVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::invalid::{InvalidField, name, within};
@@ -21,6 +23,8 @@ pub struct Row {
     pub method: String,
     /// S.
     pub camera_count: u32,
+    /// The places of the sample cameras: one for each camera, or a single one for all.
+    pub place_count: u32,
     /// The side of a sample image, as a share of the side that `--sample-size auto` chooses.
     pub side_ratio: f64,
     /// Rows of one kind differ in effort only.
@@ -47,7 +51,23 @@ impl Row {
         name(&self.method, "method")?;
         name(&self.kind, "kind")?;
         within(self.camera_count, 1..=MAX_CAMERAS, "camera_count", "from 1 to 64")?;
+        if self.place_count != 1 && self.place_count != self.camera_count {
+            return Err(InvalidField::new("place_count", self.place_count, "1 or camera_count"));
+        }
         within(self.side_ratio, 0.01..=16.0, "side_ratio", "from 0.01 to 16")
+    }
+
+    /// The sample cameras of the row in a view cell. `whole_px` is the size of images at a side ratio of 1.
+    #[must_use]
+    pub fn cameras(&self, cell: &ViewCell, whole_px: UVec2) -> Vec<PinholeCamera> {
+        let placed = cell.nested_cameras(self.place_count as usize, self.size_px(whole_px));
+        placed.iter().copied().cycle().take(self.camera_count as usize).collect()
+    }
+
+    /// The size of sample images, from their size at a side ratio of 1.
+    #[must_use]
+    pub fn size_px(&self, whole_px: UVec2) -> UVec2 {
+        (whole_px.as_vec2() * self.side_ratio as f32).round().as_uvec2().max(UVec2::ONE)
     }
 
     /// The fields by which rows differ.

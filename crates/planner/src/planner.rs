@@ -248,7 +248,7 @@ impl<P: Pricing> Planner<P> {
     fn direct_in_time(&self) -> Option<Price> {
         let direct = self.pricing.direct();
         let is_in_time = self.request.budget.most_view_s().is_none_or(|limit| direct.view_s <= limit);
-        is_in_time.then_some(direct)
+        (is_in_time && direct.node_s.is_finite()).then_some(direct)
     }
 
     fn summary(&self, row: usize) -> RowSummary {

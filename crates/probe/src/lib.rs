@@ -2,7 +2,8 @@
 //! scene, and its costs.
 //!
 //! A [`Prober`] measures any [`Representation`] of a [`Subject`], through [`node::Engine`]. [`answer`] measures what one
-//! command of a [`planner::Planner`] asks for, and [`plan`] makes a whole plan on this device alone. See `docs/planner.md`.
+//! command of a [`planner::Planner`] asks for, and [`plan`] makes a whole plan on this device alone. [`Probers`] measure for a
+//! coordinator. See `docs/planner.md`.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
@@ -10,6 +11,7 @@ mod errors_of_views;
 mod plan;
 mod prober;
 mod representation;
+mod service;
 mod sets;
 mod subject;
 
@@ -17,4 +19,5 @@ pub use errors_of_views::view_errors;
 pub use plan::{answer, plan};
 pub use prober::{DirectCosts, Measured, ProbeError, Prober, median_costs};
 pub use representation::Representation;
-pub use subject::{Light, Subject};
+pub use service::Probers;
+pub use subject::{Light, Subject, Viewpoints};

@@ -2,11 +2,12 @@
 
 use std::time::Instant;
 
-use planner::{Command, Event, Kept, Outcome, Planner, Pricing, ProbeId, Probed, Purpose, Timed};
+use depth_image::PinholeCamera;
+use planner::{Command, Event, Kept, Outcome, Planner, Pricing, ProbeId, Probed, Purpose, RowCosts, Timed};
 
-use crate::prober::{ProbeError, Prober};
+use crate::prober::{ProbeError, Prober, median_costs};
 use crate::representation::Representation;
-use crate::subject::Light;
+use crate::subject::{Light, Viewpoints};
 
 /// The longest reason of a failure that a planner takes, in bytes.
 const MAX_REASON_BYTES: usize = 1024;
@@ -15,7 +16,8 @@ const MAX_REASON_BYTES: usize = 1024;
 /// the planner after every measurement. The result has the measurements for later plans.
 pub fn plan<P: Pricing>(
     planner: &mut Planner<P>,
-    prober: &mut Prober<'_>,
+    prober: &mut Prober,
+    viewpoints: &Viewpoints,
     representations: &[Representation],
     remembered: Kept,
     mut observe: impl FnMut(&Planner<P>),
@@ -29,7 +31,8 @@ pub fn plan<P: Pricing>(
                 Command::Keep(measured) => kept = *measured,
                 Command::Conclude(outcome) => return (*outcome, kept),
                 command => {
-                    next = answer(prober, representations, command).map_or_else(Vec::new, |event| planner.step(event));
+                    next = answer(prober, viewpoints, representations, command)
+                        .map_or_else(Vec::new, |event| planner.step(event));
                     observe(planner);
                 }
             }
@@ -40,20 +43,26 @@ pub fn plan<P: Pricing>(
 }
 
 /// Measures what a command asks for; `None` for a command that asks for nothing. A measurement that fails is an answer, too.
-pub fn answer(prober: &mut Prober<'_>, representations: &[Representation], command: Command) -> Option<Event> {
+pub fn answer(
+    prober: &mut Prober,
+    viewpoints: &Viewpoints,
+    representations: &[Representation],
+    command: Command,
+) -> Option<Event> {
     let start = Instant::now();
     let (id, measured) = match command {
         Command::Probe { id, row, views, purpose } => {
             let light = if purpose == Purpose::Screening { Light::Screening } else { Light::Session };
-            let probed = prober.probe(&representations[row], light, &views).map(|(errors, costs)| {
+            let cameras = viewpoints.cameras(&views);
+            let probed = prober.probe(&representations[row], light, &cameras).map(|(errors, costs)| {
                 let views = views.into_iter().zip(errors).collect();
                 Event::Probed(Probed { id, row, views, costs, busy_s: start.elapsed().as_secs_f64() })
             });
             (id, probed)
         }
         Command::Time { id, rows, view_count, repeats } => {
-            let all: Vec<Representation> = rows.iter().map(|&row| representations[row].clone()).collect();
-            let timed = prober.time(&all, view_count, repeats).map(|costs| {
+            let cameras = viewpoints.first(view_count);
+            let timed = time(prober, &cameras, representations, &rows, repeats).map(|costs| {
                 let rows = rows.into_iter().zip(costs).collect();
                 Event::Timed(Timed { id, rows, busy_s: start.elapsed().as_secs_f64() })
             });
@@ -62,6 +71,23 @@ pub fn answer(prober: &mut Prober<'_>, representations: &[Representation], comma
         Command::Keep(_) | Command::Conclude(_) | Command::Refuse(_) => return None,
     };
     Some(measured.unwrap_or_else(|error| failed(id, &error, start.elapsed().as_secs_f64())))
+}
+
+/// The median costs of rows that are timed in turn.
+fn time(
+    prober: &mut Prober,
+    cameras: &[PinholeCamera],
+    representations: &[Representation],
+    rows: &[usize],
+    repeats: usize,
+) -> Result<Vec<RowCosts>, ProbeError> {
+    let mut costs = vec![Vec::with_capacity(repeats); rows.len()];
+    for _ in 0..repeats.max(1) {
+        for (&row, costs) in rows.iter().zip(&mut costs) {
+            costs.push(prober.time(&representations[row], cameras)?);
+        }
+    }
+    Ok(costs.iter().map(|costs| median_costs(costs)).collect())
 }
 
 fn failed(id: ProbeId, error: &ProbeError, busy_s: f64) -> Event {

@@ -1,7 +1,9 @@
 //! The errors and the costs of representations, measured on one device.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::time::Instant;
 
 use codec::{
     DecodeError, DecodeLimits, EncodedDepthImage, FrameError, PlaneSet, decode_depth_image, encode_depth_image,
@@ -9,14 +11,14 @@ use codec::{
 };
 use depth_image::{DepthImage, DepthImageError, PinholeCamera, View, ViewPlanes};
 use metrics::MetricsError;
-use node::{DirectWork, Engine, EngineError, SampleWork, Turn, UploadedSet, ViewWork, own_time};
-use planner::{ProbeView, RowCosts, ViewErrors};
+use node::{Engine, EngineError, SampleWork, Turn, UploadedSet, ViewWork};
+use planner::{RowCosts, ViewErrors};
 use rayon::prelude::*;
 
 use crate::errors_of_views::view_errors;
 use crate::representation::Representation;
 use crate::sets::{SampledSet, SetKey, Sets};
-use crate::subject::{Light, Subject};
+use crate::subject::{Light, Subject, Viewpoints};
 
 /// Views that are timed at once, at least, unless they are large: a batch has fixed costs.
 const TIMED_VIEWS: usize = 16;
@@ -24,6 +26,8 @@ const TIMED_VIEWS: usize = 16;
 const DIRECT_RUNS: usize = 3;
 /// The most pixels of views that are only timed.
 const TIMED_PIXELS: usize = 1 << 20;
+/// The bytes of a true view: colour and depth.
+const TRUTH_BYTES_PER_PIXEL: usize = 7;
 /// The most bytes of true views in memory; beyond, they are drawn again when they are needed.
 const MAX_TRUTH_BYTES: usize = 512 << 20;
 
@@ -66,23 +70,28 @@ pub struct Measured {
 }
 
 /// Measures representations of one subject. Work is in `turn` among other work of the device, and the time for which it
-/// waits does not count.
-pub struct Prober<'a> {
-    engine: &'a dyn Engine,
+/// waits does not count. The views of one call have one size.
+pub struct Prober {
+    engine: Arc<dyn Engine>,
     subject: Subject,
     turn: Turn,
-    truths: BTreeMap<(Light, ProbeView), Arc<View>>,
+    truths: BTreeMap<(Light, CameraBits), Arc<View>>,
     sets: Sets,
     /// Shaders that are built: the first run of an operation is not timed.
     warm: BTreeSet<String>,
+    /// The time for which work has waited for other work, in s.
+    waited_s: Cell<f64>,
 }
 
-impl<'a> Prober<'a> {
+/// A camera's numbers, bit by bit.
+type CameraBits = Vec<u32>;
+
+impl Prober {
     /// A prober of a subject whose scene is loaded.
     #[must_use]
-    pub fn new(engine: &'a dyn Engine, subject: Subject, turn: Turn) -> Self {
-        let (truths, sets, warm) = Default::default();
-        Self { engine, subject, turn, truths, sets, warm }
+    pub fn new(engine: Arc<dyn Engine>, subject: Subject, turn: Turn) -> Self {
+        let (truths, sets, warm, waited_s) = Default::default();
+        Self { engine, subject, turn, truths, sets, warm, waited_s }
     }
 
     /// The subject.
@@ -99,14 +108,14 @@ impl<'a> Prober<'a> {
         &mut self,
         of: &Representation,
         light: Light,
-        views: &[ProbeView],
+        cameras: &[PinholeCamera],
     ) -> Result<(Vec<ViewErrors>, RowCosts), ProbeError> {
-        let truths = self.truths(light, views)?;
-        let measured = self.measure(of, light, views, self.subject.planes)?;
-        let pairs: Vec<_> = views.iter().zip(&truths).zip(&measured.views).collect();
-        let errors = pairs.into_par_iter().map(|((view, truth), made)| {
-            view_errors(&self.subject.camera(*view), truth, made, &measured.sample_images)
-        });
+        let truths = self.truths(light, cameras)?;
+        let measured = self.measure(of, light, cameras, self.subject.planes)?;
+        let pairs: Vec<_> = cameras.iter().zip(&truths).zip(&measured.views).collect();
+        let errors = pairs
+            .into_par_iter()
+            .map(|((camera, truth), made)| view_errors(camera, truth, made, &measured.sample_images));
         let errors = errors.collect::<Result<_, _>>()?;
         let sample_image_s = self.sample_image_s(of, light, measured.costs.sample_image_s)?;
         Ok((errors, RowCosts { sample_image_s, ..measured.costs }))
@@ -120,14 +129,13 @@ impl<'a> Prober<'a> {
         &mut self,
         of: &Representation,
         light: Light,
-        views: &[ProbeView],
+        cameras: &[PinholeCamera],
         planes: ViewPlanes,
     ) -> Result<Measured, ProbeError> {
         let sampled = self.sampled(of, light)?;
         let images = &sampled.images[..of.sample_cameras.len()];
-        let (set, load_set_s) = self.loaded(of, light, planes, images)?;
-        let cameras: Vec<PinholeCamera> = views.iter().map(|&view| self.subject.camera(view)).collect();
-        let work = self.view_work(of, self.timed_cameras(&cameras), planes);
+        let (set, load_set_s) = self.loaded(of, light, planes, images, &cameras[..1])?;
+        let work = self.view_work(of, timed_cameras(cameras), planes);
         let (made, seconds) = self.timed(|engine, turn| engine.reconstruct(set.as_ref(), &work, turn))?;
         let reconstruct_view_s = seconds / made.len().max(1) as f64;
         let mut views = made;
@@ -140,64 +148,56 @@ impl<'a> Prober<'a> {
         })
     }
 
-    /// The median costs of representations that are timed in turn, in the light of the session. Nothing is kept from
-    /// earlier measurements.
+    /// The costs of a representation in the light of the session. Nothing is kept from earlier measurements.
     ///
     /// # Errors
     /// As [`Prober::probe`].
-    pub fn time(
-        &mut self,
-        all: &[Representation],
-        view_count: usize,
-        repeats: usize,
-    ) -> Result<Vec<RowCosts>, ProbeError> {
-        let views: Vec<ProbeView> = (0..view_count as u32).map(ProbeView::Screening).collect();
-        let mut costs = vec![Vec::with_capacity(repeats); all.len()];
-        for _ in 0..repeats.max(1) {
-            for (of, costs) in all.iter().zip(&mut costs) {
-                self.sets = Sets::default();
-                costs.push(self.measure(of, Light::Session, &views, self.subject.planes)?.costs);
-            }
-        }
-        Ok(costs.iter().map(|costs| median_costs(costs)).collect())
+    pub fn time(&mut self, of: &Representation, cameras: &[PinholeCamera]) -> Result<RowCosts, ProbeError> {
+        self.sets = Sets::default();
+        Ok(self.measure(of, Light::Session, cameras, self.subject.planes)?.costs)
     }
 
     /// The same views drawn from the scene, with depth.
     ///
     /// # Errors
     /// The device fails.
-    pub fn truths(&mut self, light: Light, views: &[ProbeView]) -> Result<Vec<Arc<View>>, ProbeError> {
+    pub fn truths(&mut self, light: Light, cameras: &[PinholeCamera]) -> Result<Vec<Arc<View>>, ProbeError> {
         let light = self.same_light(light);
-        let missing: Vec<ProbeView> =
-            views.iter().copied().filter(|view| !self.truths.contains_key(&(light, *view))).collect();
-        let bytes = |views: usize| views * self.subject.view_px.element_product() as usize * 7;
-        if bytes(self.truths.len() + missing.len()) > MAX_TRUTH_BYTES {
-            self.truths.retain(|(_, view), _| views.contains(view));
+        let keys: Vec<_> = cameras.iter().map(|camera| (light, bits(camera))).collect();
+        let is_missing = |key: &&(Light, CameraBits)| !self.truths.contains_key(*key);
+        let missing: BTreeMap<_, _> = keys.iter().zip(cameras).filter(|(key, _)| is_missing(key)).collect();
+        let missing: Vec<_> = missing.into_iter().map(|(key, camera)| (key.clone(), *camera)).collect();
+        let bytes = |camera: &PinholeCamera| camera.pixel_count() * TRUTH_BYTES_PER_PIXEL;
+        let kept_bytes =
+            self.truths.values().map(|view| view.size_px.element_product() as usize * TRUTH_BYTES_PER_PIXEL);
+        if kept_bytes.sum::<usize>() + missing.iter().map(|(_, camera)| bytes(camera)).sum::<usize>() > MAX_TRUTH_BYTES
+        {
+            self.truths.retain(|key, _| keys.contains(key));
         }
         if !missing.is_empty() {
-            let work = self.direct_work(light, &missing, ViewPlanes { inverse_depth: true, ..self.subject.planes });
+            let (missing, cameras) = missing.into_iter().unzip::<_, _, Vec<_>, Vec<_>>();
+            let planes = ViewPlanes { inverse_depth: true, ..self.subject.planes };
+            let work = self.subject.direct_work(cameras, light, planes);
             let drawn = self.engine.draw_direct(&work, self.turn)?;
-            self.truths.extend(missing.into_iter().map(|view| (light, view)).zip(drawn.into_iter().map(Arc::new)));
+            self.truths.extend(missing.into_iter().zip(drawn.into_iter().map(Arc::new)));
         }
-        Ok(views.iter().map(|view| self.truths[&(light, *view)].clone()).collect())
+        Ok(keys.iter().map(|key| self.truths[key].clone()).collect())
     }
 
     /// The costs of drawing views directly in the light of the session, and of encoding them.
     ///
     /// # Errors
     /// The device fails.
-    pub fn direct_costs(&mut self) -> Result<DirectCosts, ProbeError> {
-        let work = |views: usize| {
-            let views: Vec<ProbeView> = (0..views as u32).map(ProbeView::Screening).collect();
-            self.direct_work(Light::Session, &views, self.subject.planes)
-        };
+    pub fn direct_costs(&mut self, viewpoints: &Viewpoints) -> Result<DirectCosts, ProbeError> {
+        let work =
+            |views: usize| self.subject.direct_work(viewpoints.first(views), Light::Session, self.subject.planes);
         let (_, alone_s) = self.median_s(|engine, turn| engine.draw_direct(&work(1), turn))?;
         // About a second of drawing at most.
         let batch = work(((1.0 / alone_s.max(1e-3)) as usize).clamp(1, TIMED_VIEWS));
         let (drawn, direct_s) = self.median_s(|engine, turn| engine.draw_direct(&batch, turn))?;
         let codec = self.subject.codec;
         let (encoded, encode_s) =
-            own_time(self.engine, || drawn.iter().try_for_each(|view| encode_view(view, codec).map(drop)));
+            self.own_time(|| drawn.iter().try_for_each(|view| encode_view(view, codec).map(drop)));
         encoded?;
         let of_view = |seconds: f64| seconds / drawn.len().max(1) as f64;
         Ok(DirectCosts { direct_view_s: of_view(direct_s), encode_view_s: of_view(encode_s) })
@@ -205,7 +205,7 @@ impl<'a> Prober<'a> {
 
     /// The median time of some runs after a warm-up, in which shaders are built.
     fn median_s<T>(&self, run: impl Fn(&dyn Engine, Turn) -> Result<T, EngineError>) -> Result<(T, f64), ProbeError> {
-        let done = run(self.engine, self.turn)?;
+        let done = run(self.engine.as_ref(), self.turn)?;
         let mut seconds = Vec::with_capacity(DIRECT_RUNS);
         for _ in 0..DIRECT_RUNS {
             seconds.push(self.timed(&run)?.1);
@@ -227,7 +227,7 @@ impl<'a> Prober<'a> {
 
     /// Images as they leave a sampler, and g_s.
     fn encoded(&self, work: &SampleWork) -> Result<(Vec<EncodedDepthImage>, f64), ProbeError> {
-        let (encoded, seconds) = own_time(self.engine, || {
+        let (encoded, seconds) = self.own_time(|| {
             let images = self.engine.sample(work, self.turn)?;
             let encoded = images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL));
             Ok::<_, ProbeError>(encoded.collect::<Result<Vec<_>, _>>()?)
@@ -274,10 +274,10 @@ impl<'a> Prober<'a> {
         light: Light,
         planes: ViewPlanes,
         images: &[DepthImage],
+        first: &[PinholeCamera],
     ) -> Result<(Arc<dyn UploadedSet>, f64), ProbeError> {
         let sample_set = self.subject.sample_set(images, light);
-        let camera = self.subject.camera(ProbeView::Screening(0));
-        let one = self.view_work(of, vec![camera], planes);
+        let one = self.view_work(of, first.to_vec(), planes);
         if self.is_first(&format!("view {} {} {planes:?}", of.method, images.len())) {
             let set = self.engine.upload(&sample_set, self.turn)?;
             self.engine.reconstruct(set.as_ref(), &one, self.turn)?;
@@ -291,23 +291,12 @@ impl<'a> Prober<'a> {
         Ok((set, upload_s + (first_s - next_s).max(0.0)))
     }
 
-    /// The cameras, repeated until a batch of them can be timed.
-    fn timed_cameras(&self, cameras: &[PinholeCamera]) -> Vec<PinholeCamera> {
-        let pixels = self.subject.view_px.element_product().max(1) as usize;
-        let count = TIMED_VIEWS.min(TIMED_PIXELS / pixels).max(cameras.len());
-        cameras.iter().copied().cycle().take(count).collect()
-    }
-
     fn sample_work(&self, of: &Representation, light: Light) -> Result<SampleWork, ProbeError> {
-        Ok(self.subject.sample_work(self.engine, of, light)?)
+        Ok(self.subject.sample_work(self.engine.as_ref(), of, light)?)
     }
 
     fn view_work(&self, of: &Representation, cameras: Vec<PinholeCamera>, planes: ViewPlanes) -> ViewWork {
         ViewWork { cameras, method: of.method.clone(), planes }
-    }
-
-    fn direct_work(&self, light: Light, views: &[ProbeView], planes: ViewPlanes) -> DirectWork {
-        self.subject.direct_work(views.iter().map(|&view| self.subject.camera(view)).collect(), light, planes)
     }
 
     /// Two lights of one text are one light.
@@ -315,14 +304,53 @@ impl<'a> Prober<'a> {
         if self.subject.lighting == self.subject.screening_lighting { Light::Session } else { light }
     }
 
+    /// The result of measurements, and the seconds that they took, without those for which they waited for other work.
+    pub(crate) fn busy<T>(&mut self, measure: impl FnOnce(&mut Self) -> T) -> (T, f64) {
+        self.engine.take_waited_s();
+        self.waited_s.set(0.0);
+        let start = Instant::now();
+        let measured = measure(self);
+        self.note_waits();
+        (measured, (start.elapsed().as_secs_f64() - self.waited_s.get()).max(0.0))
+    }
+
+    /// As [`node::own_time`], which forgets earlier waits.
+    fn own_time<T>(&self, work: impl FnOnce() -> T) -> (T, f64) {
+        self.note_waits();
+        let start = Instant::now();
+        let done = work();
+        (done, (start.elapsed().as_secs_f64() - self.note_waits()).max(0.0))
+    }
+
+    /// Waits of this thread since they were last noted.
+    fn note_waits(&self) -> f64 {
+        let waited_s = self.engine.take_waited_s();
+        self.waited_s.set(self.waited_s.get() + waited_s);
+        waited_s
+    }
+
     fn is_first(&mut self, operation: &str) -> bool {
         self.warm.insert(operation.to_owned())
     }
 
     fn timed<T>(&self, run: impl FnOnce(&dyn Engine, Turn) -> Result<T, EngineError>) -> Result<(T, f64), ProbeError> {
-        let (done, seconds) = own_time(self.engine, || run(self.engine, self.turn));
+        let (done, seconds) = self.own_time(|| run(self.engine.as_ref(), self.turn));
         Ok((done?, seconds))
     }
+}
+
+/// The cameras, repeated until a batch of them can be timed.
+fn timed_cameras(cameras: &[PinholeCamera]) -> Vec<PinholeCamera> {
+    let pixels = cameras.first().map_or(1, PinholeCamera::pixel_count).max(1);
+    let count = TIMED_VIEWS.min(TIMED_PIXELS / pixels).max(cameras.len());
+    cameras.iter().copied().cycle().take(count).collect()
+}
+
+fn bits(camera: &PinholeCamera) -> CameraBits {
+    let PinholeCamera { eye_in_world, world_from_camera, focal_px, principal_px, size_px, near_m } = camera;
+    let lens = [focal_px.x, focal_px.y, principal_px.x, principal_px.y, *near_m];
+    let floats = eye_in_world.to_array().into_iter().chain(world_from_camera.to_array()).chain(lens);
+    floats.map(f32::to_bits).chain(size_px.to_array()).collect()
 }
 
 /// The median of each cost.

@@ -1,4 +1,4 @@
-//! The scene, and the views for which representations are measured.
+//! The scene, and the viewpoints for which representations are measured.
 
 use cluster::Refinement;
 use codec::FrameCodec;
@@ -9,8 +9,8 @@ use planner::ProbeView;
 
 use crate::representation::Representation;
 
-/// What is measured: a scene that is loaded on the device, and views of it.
-#[derive(Debug, Clone)]
+/// What is measured: a scene that is loaded on the device, and how views of it are made.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Subject {
     /// The scene.
     pub scene_hash: String,
@@ -26,16 +26,42 @@ pub struct Subject {
     pub screening_lighting: String,
     /// The moment.
     pub scene_time_s: f32,
-    /// The cell of the views.
-    pub cell: ViewCell,
-    /// Columns and rows of the views.
-    pub view_px: UVec2,
     /// How a view's colour is sampled.
     pub planes: ViewPlanes,
     /// The codec of delivered views; its loss does not count.
     pub codec: FrameCodec,
+}
+
+/// The viewpoints that are planned for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Viewpoints {
+    /// The cell of the views: all places of its middle rectangle are equally likely.
+    pub cell: ViewCell,
+    /// Columns and rows of the views.
+    pub view_px: UVec2,
     /// The seed of views that are drawn at random.
     pub seed: u64,
+}
+
+impl Viewpoints {
+    /// The camera of a view.
+    #[must_use]
+    pub fn camera(&self, view: ProbeView) -> PinholeCamera {
+        let [x, y, _] = view.place(self.seed);
+        self.cell.camera_at(Vec2::new(x as f32, y as f32) * 2.0 - 1.0, self.view_px)
+    }
+
+    /// The cameras of views.
+    #[must_use]
+    pub fn cameras(&self, views: &[ProbeView]) -> Vec<PinholeCamera> {
+        views.iter().map(|&view| self.camera(view)).collect()
+    }
+
+    /// The cameras of the first common views.
+    #[must_use]
+    pub fn first(&self, count: usize) -> Vec<PinholeCamera> {
+        (0..count as u32).map(|number| self.camera(ProbeView::Screening(number))).collect()
+    }
 }
 
 /// The light of a measurement.
@@ -48,13 +74,6 @@ pub enum Light {
 }
 
 impl Subject {
-    /// The camera of a view: all places of the cell are equally likely.
-    #[must_use]
-    pub fn camera(&self, view: ProbeView) -> PinholeCamera {
-        let [x, y, _] = view.place(self.seed);
-        self.cell.camera_at(Vec2::new(x as f32, y as f32) * 2.0 - 1.0, self.view_px)
-    }
-
     /// All images of a representation's set, with the planes of its method.
     ///
     /// # Errors

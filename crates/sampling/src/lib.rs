@@ -11,6 +11,6 @@ mod work;
 
 pub use error::SamplingError;
 pub use methods::{METHODS, Redundancy, SamplingMethod, UnknownSampling, templates};
-pub use rig::{Rig, RigError, nested_places};
+pub use rig::{Rig, RigError};
 pub use sampler::{Sampler, renderer};
 pub use work::SampleWork;

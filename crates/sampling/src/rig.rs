@@ -37,26 +37,6 @@ const THREE_QUARTER: Vec3 = Vec3::new(0.3660, 0.5, 0.7849);
 /// The least distance from an eye to a model's nearest point, in radii of the model.
 const LEAST_GAP_RADII: f32 = 0.5;
 
-/// Places of sample cameras on the rectangle, in a fixed nested order: corners, the middle, middles of edges.
-const NESTED: [Vec2; 9] = [
-    Vec2::new(-1.0, -1.0),
-    Vec2::new(1.0, 1.0),
-    Vec2::new(1.0, -1.0),
-    Vec2::new(-1.0, 1.0),
-    Vec2::ZERO,
-    Vec2::new(0.0, -1.0),
-    Vec2::new(0.0, 1.0),
-    Vec2::new(-1.0, 0.0),
-    Vec2::new(1.0, 0.0),
-];
-
-/// The places of up to nine sample cameras, -1 to 1 in both directions; one camera stands in the middle. More cameras are
-/// the same and others, so that sets of several sizes share their images.
-#[must_use]
-pub fn nested_places(count: usize) -> &'static [Vec2] {
-    if count == 1 { &NESTED[4..5] } else { &NESTED[..count.min(NESTED.len())] }
-}
-
 impl Rig {
     /// The rig of the paper: cameras above the corners of a block between two horizontal planes, looking at the
     /// middle of the tile. `height` is in halves of the block's width (the paper leaves it open).

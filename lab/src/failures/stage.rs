@@ -1,10 +1,9 @@
 //! A scene with sample images, views of it, and the places of cameras.
 
-use depth_image::{Aabb, DepthImage, Environment, Illumination, PinholeCamera, View, ViewPlanes};
+use depth_image::{Aabb, DepthImage, Environment, Illumination, PinholeCamera, View, ViewPlanes, nested_places};
 use glam::{UVec2, Vec3};
 use reconstruction::{ErrorBound, ReconstructionMethod, SampleSet, SetDescription};
 use render::{GpuScene, Lighting, SamplePlanes};
-use sampling::nested_places;
 use scene::Scene;
 
 use super::stand::Stand;

@@ -2,13 +2,14 @@
 
 use std::time::Instant;
 
-use app_core::planning::{OneNode, Planning};
+use app_core::planning::Planning;
+use coordinator::schedule::EqualNodes;
 use depth_image::Antialias;
 use planner::{Budget, Choice, Kept, Metric, Planner, Price, Pricing as _, ProbeView, Row};
 
 use super::conditions::Conditions;
 use super::order::order;
-use super::row::{MeasuredRow, time_again};
+use super::row::{MeasuredRow, TIMED_VIEWS, time_again};
 use super::subject::Subject;
 
 /// Levels of the planner's budgets between the least and the greatest error of a subject's rows, in equal ratios.
@@ -80,10 +81,11 @@ impl Front {
         mut done: impl FnMut(),
     ) -> anyhow::Result<Self> {
         let mut prober = subject.prober(planning);
-        let pricing = subject.pricing(&mut prober)?;
+        let pricing = subject.pricing(&mut prober, planning)?;
         let taken: Vec<usize> =
             (0..planning.ladder.rows().len()).filter(|&place| limits.include(&planning.ladder.rows()[place])).collect();
         let candidates: Vec<Row> = taken.iter().map(|&place| planning.ladder.rows()[place].clone()).collect();
+        let cameras = planning.viewpoints.cameras(&limits.views);
         let mut rows = Vec::with_capacity(taken.len());
         for place in order(&candidates).into_iter().map(|place| taken[place]) {
             if limits.are_reached() {
@@ -91,12 +93,13 @@ impl Front {
             }
             let row = (place, &planning.ladder.rows()[place]);
             let representation = &planning.representations[place];
-            rows.push(MeasuredRow::measure(&mut prober, row, representation, &limits.views, &pricing)?);
+            rows.push(MeasuredRow::measure(&mut prober, row, representation, &cameras, &pricing)?);
             done();
         }
         rows.sort_by_key(|row| row.place);
         if limits.end.is_none() {
-            time_again(&mut prober, &mut rows, &planning.representations, &pricing, &mut done)?;
+            let (of, cameras) = (&planning.representations[..], &planning.viewpoints.first(TIMED_VIEWS)[..]);
+            time_again(&mut prober, &mut rows, (of, cameras), &pricing, &mut done)?;
         }
         let mut front = Self {
             conditions: subject.conditions.clone(),
@@ -134,19 +137,25 @@ impl Front {
         let antialias = Antialias::of(SAMPLES).unwrap_or_default();
         let planning = subject.planning(antialias, subject.conditions.seed)?;
         let mut prober = subject.prober(&planning);
-        let pricing = subject.pricing(&mut prober)?;
+        let pricing = subject.pricing(&mut prober, &planning)?;
         let places: Vec<usize> = self.best(Metric::Flip).iter().map(|row| row.place).collect();
         for place in places {
             let row = (place, &planning.ladder.rows()[place]);
             let of = &planning.representations[place];
-            self.antialiased.push(MeasuredRow::measure(&mut prober, row, of, &limits.views, &pricing)?);
+            self.antialiased.push(MeasuredRow::measure(
+                &mut prober,
+                row,
+                of,
+                &planning.viewpoints.cameras(&limits.views),
+                &pricing,
+            )?);
         }
         self.antialiased_direct = Some(pricing.direct());
         Ok(())
     }
 
     /// Makes plans for budgets between the least and the greatest error of the rows.
-    fn plan(&mut self, subject: &Subject, planning: &Planning, pricing: OneNode) -> anyhow::Result<()> {
+    fn plan(&mut self, subject: &Subject, planning: &Planning, pricing: EqualNodes) -> anyhow::Result<()> {
         let errors = || self.rows.iter().map(|row| row.error_ratio(Metric::Flip));
         let (least, most) = (errors().fold(1.0, f64::min).max(1e-3), errors().fold(1e-3, f64::max));
         for level in BUDGET_LEVELS {
@@ -158,12 +167,13 @@ impl Front {
     }
 }
 
-fn planned(subject: &Subject, planning: &Planning, pricing: OneNode, budget: Budget) -> anyhow::Result<Planned> {
+fn planned(subject: &Subject, planning: &Planning, pricing: EqualNodes, budget: Budget) -> anyhow::Result<Planned> {
     let request = planning.request(budget, "this device".to_owned(), pricing.views_a_set, ALLOWANCE_S);
     let mut planner = Planner::new(request, planning.ladder.clone(), pricing)?;
     let mut prober = subject.prober(planning);
     let nothing = Kept::empty(planning.key());
-    let (outcome, _) = probe::plan(&mut planner, &mut prober, &planning.representations, nothing, |_| ());
+    let Planning { viewpoints, representations, .. } = planning;
+    let (outcome, _) = probe::plan(&mut planner, &mut prober, viewpoints, representations, nothing, |_| ());
     let error_ratio = outcome.certificate.map_or(0.0, |certificate| certificate.expected_ratio);
     let name = match outcome.choice {
         Choice::Row(row) => planning.ladder.rows()[row].to_string(),

@@ -46,6 +46,7 @@ mod tests {
                 sampling: format!("s{}", i / 20),
                 method: format!("m{}", i % 5),
                 camera_count: 1 + i as u32,
+                place_count: 1,
                 side_ratio: 1.0,
                 kind: "k".to_owned(),
                 rank: 0,

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use depth_image::{View, ViewPlanes};
+use depth_image::{PinholeCamera, View, ViewPlanes};
 use metrics::{DepthErrors, depth_errors};
-use planner::{Ladder, Metric, Price, Pricing, ProbeView, Row, RowCosts, ViewErrors};
+use planner::{Ladder, Metric, Price, Pricing, Row, RowCosts, ViewErrors};
 use probe::{Light, Prober, Representation, median_costs, view_errors};
 use rayon::prelude::*;
 
@@ -14,9 +14,10 @@ use crate::evaluation::known_depth;
 /// The side of sample images that `--sample-size auto` chooses.
 const DEFAULT_SIDE_RATIO: f64 = 1.0;
 
-/// Times that rows are timed again, and views with which they are.
+/// Times that rows are timed again.
 pub const REPEATS: usize = 2;
-const TIMED_VIEWS: usize = 16;
+/// Views with which rows are timed again.
+pub const TIMED_VIEWS: usize = 16;
 
 /// A measured row.
 #[derive(Debug, Clone)]
@@ -44,22 +45,21 @@ impl MeasuredRow {
     /// # Errors
     /// The device fails.
     pub fn measure(
-        prober: &mut Prober<'_>,
+        prober: &mut Prober,
         (place, row): (usize, &Row),
         representation: &Representation,
-        views: &[ProbeView],
+        cameras: &[PinholeCamera],
         pricing: &impl Pricing,
     ) -> anyhow::Result<Self> {
-        let truths = prober.truths(Light::Session, views)?;
+        let truths = prober.truths(Light::Session, cameras)?;
         // Delivered views have no depth, and cost less.
         let delivered = prober.subject().planes;
-        let costs = prober.measure(representation, Light::Session, views, delivered)?.costs;
+        let costs = prober.measure(representation, Light::Session, cameras, delivered)?.costs;
         let with_depth = ViewPlanes { inverse_depth: true, provenance: true, ..delivered };
-        let measured = prober.measure(representation, Light::Session, views, with_depth)?;
-        let subject = prober.subject();
-        let pairs: Vec<_> = views.iter().zip(&truths).zip(&measured.views).collect();
-        let of_view = |((view, truth), made): ((&ProbeView, &Arc<View>), &View)| {
-            let errors = view_errors(&subject.camera(*view), truth, made, &measured.sample_images)?;
+        let measured = prober.measure(representation, Light::Session, cameras, with_depth)?;
+        let pairs: Vec<_> = cameras.iter().zip(&truths).zip(&measured.views).collect();
+        let of_view = |((camera, truth), made): ((&PinholeCamera, &Arc<View>), &View)| {
+            let errors = view_errors(camera, truth, made, &measured.sample_images)?;
             let depth = depth_errors(&known_depth(truth)?, &known_depth(made)?, None)?;
             anyhow::Ok((errors, depth))
         };
@@ -98,16 +98,16 @@ impl MeasuredRow {
 /// # Errors
 /// The device fails.
 pub fn time_again(
-    prober: &mut Prober<'_>,
+    prober: &mut Prober,
     rows: &mut [MeasuredRow],
-    representations: &[Representation],
+    (representations, cameras): (&[Representation], &[PinholeCamera]),
     pricing: &impl Pricing,
     mut done: impl FnMut(),
 ) -> anyhow::Result<()> {
     let mut costs: Vec<Vec<RowCosts>> = rows.iter().map(|row| vec![row.costs]).collect();
     for _ in 0..REPEATS {
         for (row, costs) in rows.iter().zip(&mut costs) {
-            costs.extend(prober.time(std::slice::from_ref(&representations[row.place]), TIMED_VIEWS, 1)?);
+            costs.push(prober.time(&representations[row.place], cameras)?);
             done();
         }
     }

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use app_core::planning::{OneNode, PlannedViews, Planning};
+use app_core::planning::{PlannedViews, Planning, one_node};
 use app_core::setup::{SceneArgs, Setup};
 use codec::FrameCodec;
+use coordinator::schedule::EqualNodes;
 use depth_image::{Antialias, PinholeCamera, ViewCell, ViewPlanes};
 use engine::GpuEngine;
 use glam::Vec2;
@@ -56,16 +57,17 @@ impl Subject {
     }
 
     /// Measures rows of a ladder of this subject.
-    pub fn prober(&self, planning: &Planning) -> Prober<'_> {
-        Prober::new(self.engine.as_ref(), planning.subject.clone(), Turn::of(WorkClass::Batch))
+    pub fn prober(&self, planning: &Planning) -> Prober {
+        Prober::new(self.engine.clone(), planning.subject.clone(), Turn::of(WorkClass::Batch))
     }
 
     /// Prices on one node.
     ///
     /// # Errors
     /// The device fails.
-    pub fn pricing(&self, prober: &mut Prober<'_>) -> anyhow::Result<OneNode> {
-        Ok(OneNode { views_a_set: self.conditions.views, direct: prober.direct_costs()? })
+    pub fn pricing(&self, prober: &mut Prober, planning: &Planning) -> anyhow::Result<EqualNodes> {
+        let direct = prober.direct_costs(&planning.viewpoints)?;
+        Ok(one_node(self.conditions.views, direct))
     }
 }
 

@@ -68,18 +68,18 @@ pub fn budgets(rows: &[MeasuredRow]) -> anyhow::Result<Vec<Budget>> {
 }
 
 /// A subject's plans share their measurements: the first has none.
-pub struct Cases<'a, 's> {
+pub struct Cases<'a> {
     pub subject: String,
     pub is_lit: bool,
     pub planning: &'a Planning,
     pub pricing: Priced,
     pub views_a_set: usize,
-    pub evidence: &'a mut Evidence<'s>,
+    pub evidence: &'a mut Evidence,
 }
 
-impl Cases<'_, '_> {
+impl Cases<'_> {
     /// Plans for a budget with what earlier plans kept.
-    pub fn case(&mut self, budget: Budget, prober: &mut Prober<'_>, kept: &mut Kept) -> anyhow::Result<Case> {
+    pub fn case(&mut self, budget: Budget, prober: &mut Prober, kept: &mut Kept) -> anyhow::Result<Case> {
         let is_first = kept.rows.is_empty();
         let (planner, outcome, plan_s) = self.planned(budget, prober, kept)?;
         let (_, _, again_s) = self.planned(budget, prober, kept)?;
@@ -92,14 +92,14 @@ impl Cases<'_, '_> {
     fn planned(
         &self,
         budget: Budget,
-        prober: &mut Prober<'_>,
+        prober: &mut Prober,
         kept: &mut Kept,
     ) -> anyhow::Result<(Planner<Priced>, Outcome, f64)> {
         let start = Instant::now();
         let request = self.planning.request(budget, "this device".to_owned(), self.views_a_set, ALLOWANCE_S);
         let mut planner = Planner::new(request, self.planning.ladder.clone(), self.pricing)?;
-        let representations = &self.planning.representations;
-        let (outcome, measured) = probe::plan(&mut planner, prober, representations, kept.clone(), |_| ());
+        let Planning { viewpoints, representations, .. } = self.planning;
+        let (outcome, measured) = probe::plan(&mut planner, prober, viewpoints, representations, kept.clone(), |_| ());
         *kept = measured;
         Ok((planner, outcome, start.elapsed().as_secs_f64()))
     }

@@ -98,7 +98,7 @@ fn cases_of(engine: &Arc<GpuEngine>, conditions: &Conditions, is_lit: bool) -> a
     let subject = Subject::load(engine, conditions)?;
     let planning = subject.planning(Antialias::NONE, conditions.seed)?;
     let mut prober = subject.prober(&planning);
-    let plain = Priced::plain(subject.pricing(&mut prober)?);
+    let plain = Priced::plain(subject.pricing(&mut prober, &planning)?);
     let pricing = if is_lit { Priced::lit(engine, conditions)? } else { plain };
     let unseen = subject.planning(Antialias::NONE, conditions.seed ^ TABLE_SEED)?;
     let mut evidence = Evidence::measure(&subject, unseen, &pricing)?;

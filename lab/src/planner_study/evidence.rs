@@ -8,7 +8,7 @@ use planner::{ErrorTerm, ProbeView, Statistic, ViewErrors};
 use probe::{Light, Prober};
 
 use super::pricing::Priced;
-use crate::fronts::row::{MeasuredRow, REPEATS, mean_error, time_again};
+use crate::fronts::row::{MeasuredRow, REPEATS, TIMED_VIEWS, mean_error, time_again};
 use crate::fronts::subject::Subject;
 use crate::progress::bar;
 
@@ -19,18 +19,18 @@ const CONFIRMED_VIEWS: u64 = 256;
 const MOST_OVER: usize = 19;
 
 /// All rows of a subject, measured on views that no plan sees.
-pub struct Evidence<'s> {
-    prober: Prober<'s>,
+pub struct Evidence {
+    prober: Prober,
     planning: Planning,
     pub rows: Vec<MeasuredRow>,
     confirmed: BTreeMap<usize, Vec<ViewErrors>>,
 }
 
-impl<'s> Evidence<'s> {
+impl Evidence {
     /// Measures the table. The seed of its views is another than that of plans.
-    pub fn measure(subject: &'s Subject, planning: Planning, pricing: &Priced) -> anyhow::Result<Self> {
+    pub fn measure(subject: &Subject, planning: Planning, pricing: &Priced) -> anyhow::Result<Self> {
         let mut prober = subject.prober(&planning);
-        let views: Vec<ProbeView> = (0..TABLE_VIEWS).map(ProbeView::Fresh).collect();
+        let views = planning.viewpoints.cameras(&(0..TABLE_VIEWS).map(ProbeView::Fresh).collect::<Vec<_>>());
         let row_count = planning.ladder.rows().len();
         let progress = bar(format!("table, {}", subject.conditions.name), (1 + REPEATS) * row_count);
         let mut rows = Vec::with_capacity(row_count);
@@ -39,7 +39,8 @@ impl<'s> Evidence<'s> {
             rows.push(MeasuredRow::measure(&mut prober, row, of, &views, pricing)?);
             progress.inc(1);
         }
-        time_again(&mut prober, &mut rows, &planning.representations, pricing, || progress.inc(1))?;
+        let timed = (&planning.representations[..], &planning.viewpoints.first(TIMED_VIEWS)[..]);
+        time_again(&mut prober, &mut rows, timed, pricing, || progress.inc(1))?;
         progress.finish_and_clear();
         Ok(Self { prober, planning, rows, confirmed: BTreeMap::new() })
     }
@@ -47,10 +48,10 @@ impl<'s> Evidence<'s> {
     /// Errors of a row on the views of confirmations.
     pub fn confirmation(&mut self, row: usize) -> anyhow::Result<&[ViewErrors]> {
         if !self.confirmed.contains_key(&row) {
-            let views = (TABLE_VIEWS..TABLE_VIEWS + CONFIRMED_VIEWS).map(ProbeView::Fresh);
+            let views: Vec<_> = (TABLE_VIEWS..TABLE_VIEWS + CONFIRMED_VIEWS).map(ProbeView::Fresh).collect();
             let mut errors = Vec::with_capacity(CONFIRMED_VIEWS as usize);
-            for views in views.collect::<Vec<_>>().chunks(64) {
-                errors.extend(self.prober.probe(&self.planning.representations[row], Light::Session, views)?.0);
+            for cameras in self.planning.viewpoints.cameras(&views).chunks(64) {
+                errors.extend(self.prober.probe(&self.planning.representations[row], Light::Session, cameras)?.0);
             }
             self.confirmed.insert(row, errors);
         }

@@ -1,9 +1,9 @@
 //! Prices in plain or in expensive light.
 
-use app_core::planning::OneNode;
+use coordinator::schedule::EqualNodes;
 use depth_image::{Antialias, ViewPlanes};
 use engine::GpuEngine;
-use planner::{Price, Pricing, ProbeView, Row, RowCosts};
+use planner::{Price, Pricing, Row, RowCosts};
 use probe::Light;
 use std::sync::Arc;
 
@@ -16,13 +16,13 @@ pub const EXPENSIVE: &str = "soft 16, occlusion 16";
 /// Prices on one node. Where sampling is priced in another light than it is measured in, g_s has a factor.
 #[derive(Debug, Clone, Copy)]
 pub struct Priced {
-    node: OneNode,
+    node: EqualNodes,
     sampling_factor: f64,
 }
 
 impl Priced {
     /// Prices in the light of the conditions.
-    pub fn plain(node: OneNode) -> Self {
+    pub fn plain(node: EqualNodes) -> Self {
         Self { node, sampling_factor: 1.0 }
     }
 
@@ -32,11 +32,11 @@ impl Priced {
         let subject = Subject::load(engine, &conditions)?;
         let planning = subject.planning(Antialias::NONE, conditions.seed)?;
         let mut prober = subject.prober(&planning);
-        let (of, views) = (&planning.representations[0], [ProbeView::Screening(0)]);
+        let (of, cameras) = (&planning.representations[0], planning.viewpoints.first(1));
         let mut sample_s =
-            |light: Light| anyhow::Ok(prober.measure(of, light, &views, ViewPlanes::COLOR)?.costs.sample_image_s);
+            |light: Light| anyhow::Ok(prober.measure(of, light, &cameras, ViewPlanes::COLOR)?.costs.sample_image_s);
         let sampling_factor = sample_s(Light::Session)? / sample_s(Light::Screening)?;
-        Ok(Self { node: subject.pricing(&mut prober)?, sampling_factor })
+        Ok(Self { node: subject.pricing(&mut prober, &planning)?, sampling_factor })
     }
 }
 

@@ -132,7 +132,7 @@ impl Path {
 
 /// Views on a circle in the cell. Without a step they all stand in its middle.
 fn orbit(planning: &Planning, step_px: f32, count: usize) -> Vec<PinholeCamera> {
-    let (cell, view_px) = (&planning.subject.cell, planning.subject.view_px);
+    let (cell, view_px) = (&planning.viewpoints.cell, planning.viewpoints.view_px);
     let middle = cell.camera_at(Vec2::ZERO, view_px);
     if step_px == 0.0 {
         return vec![middle; count];
@@ -150,8 +150,8 @@ fn across_cells(
     usual: &Representation,
     count: usize,
 ) -> anyhow::Result<(Vec<SetOfPath>, Vec<Frame>)> {
-    let (cell, volume) = (&planning.subject.cell, &planning.subject.volume);
-    let circle = cell.around(volume.center(), CIRCLE_FRAMES, planning.subject.view_px);
+    let (cell, volume) = (&planning.viewpoints.cell, &planning.subject.volume);
+    let circle = cell.around(volume.center(), CIRCLE_FRAMES, planning.viewpoints.view_px);
     let cameras = &circle[..count.min(CIRCLE_FRAMES)];
     let mut groups = Vec::new();
     ViewGroup::add(&mut groups, cameras, volume);

@@ -7,11 +7,12 @@ use std::time::Duration;
 
 use app_core::exit::Outcome;
 use app_core::plan_files::PlanFiles;
-use app_core::planning::{OneNode, PlannedViews, Planning};
+use app_core::planning::{PlannedViews, Planning, one_node};
 use app_core::setup::{DeviceArgs, SceneArgs, Setup};
 use app_core::sizes::SizePx;
 use clap::Args;
 use codec::FrameCodec;
+use coordinator::schedule::EqualNodes;
 use depth_image::{Antialias, ViewPlanes};
 use engine::GpuEngine;
 use indicatif::ProgressBar;
@@ -113,16 +114,18 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
         seed: args.seed,
     };
     let planning = Planning::new(&setup, &args.scene, &views)?;
-    let mut prober = Prober::new(engine.as_ref(), planning.subject.clone(), Turn::of(WorkClass::Batch));
-    let pricing = OneNode { views_a_set: args.views_a_set(&setup), direct: prober.direct_costs()? };
+    let mut prober = Prober::new(engine.clone(), planning.subject.clone(), Turn::of(WorkClass::Batch));
+    let direct = prober.direct_costs(&planning.viewpoints)?;
+    let pricing = one_node(args.views_a_set(&setup), direct);
     let request = planning.request(args.budget, device_name(&engine), pricing.views_a_set, args.allowance);
     let files = args.plan_files();
     let remembered = files.as_ref().map_or_else(|| Kept::empty(planning.key()), |files| files.read(&planning.key()));
     let mut planner = Planner::new(request, planning.ladder.clone(), pricing)?;
     let progress = ProgressBar::new_spinner();
     progress.enable_steady_tick(Duration::from_millis(200));
-    let observe = |planner: &Planner<OneNode>| progress.set_message(planner.outcome().reason);
-    let (outcome, kept) = probe::plan(&mut planner, &mut prober, &planning.representations, remembered, observe);
+    let observe = |planner: &Planner<EqualNodes>| progress.set_message(planner.outcome().reason);
+    let Planning { viewpoints, representations, .. } = &planning;
+    let (outcome, kept) = probe::plan(&mut planner, &mut prober, viewpoints, representations, remembered, observe);
     progress.finish_and_clear();
     if let Some(files) = files {
         // The plan is made, whether a later one can use what was measured or not.

@@ -6,7 +6,7 @@ use crate::made_up::ladder;
 
 fn row(kind: &str, camera_count: u32, side_ratio: f64, rank: u32) -> Row {
     let (sampling, method) = ("plain".to_owned(), format!("{kind}:{rank}"));
-    Row { sampling, method, camera_count, side_ratio, kind: kind.to_owned(), rank }
+    Row { sampling, method, camera_count, place_count: camera_count, side_ratio, kind: kind.to_owned(), rank }
 }
 
 #[test]

@@ -30,6 +30,7 @@ pub fn ladder() -> Ladder {
                     sampling: sampling.to_owned(),
                     method: method.to_owned(),
                     camera_count,
+                    place_count: camera_count,
                     side_ratio,
                     kind: format!("{sampling} {kind}"),
                     rank,

@@ -1,8 +1,8 @@
 //! Members: joining, being measured and being ready; their reports, and the cluster's status.
 
-use cluster::limits::{MAX_BATCH, MAX_SCENES, MAX_VIEWPOINTS, MAX_WORKLOADS};
+use cluster::limits::{MAX_BATCH, MAX_PROBE_VIEWS, MAX_SCENES, MAX_VIEWPOINTS, MAX_WORKLOADS};
 use cluster::{
-    AchievedTime, ClusterStatus, JoinCluster, MeasureCosts, Measured, NodeCondition, NodeStatus, Ready, SamplerReport,
+    AchievedTime, ClusterStatus, JoinCluster, MeasureCosts, Measured, NodeCondition, NodeStatus, ProbeViews, ProbedView, ProbedViews, Ready, SamplerReport,
     Welcome, WorkReport, WorkloadStatus, at_most,
 };
 
@@ -22,6 +22,13 @@ messages! {
     MeasureCostsResponse = Measured {
         costs; planes: with_normals | with_corner_inverse_depths, auto_exposure: auto_exposure_ev
     };
+    ProbeViewsRequest = ProbeViews {
+        workload, compared_lighting, views, with_errors; method: reconstruction_method, codec: frame_codec,
+        antialias: antialias_sample_count
+    }, first |r| at_most(r.views.len(), MAX_PROBE_VIEWS, "views"), then ProbeViews::validate;
+    ProbedView = ProbedView { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio };
+    ProbeViewsResponse = ProbedViews { views, costs, busy_s },
+        first |r| at_most(r.views.len(), MAX_PROBE_VIEWS, "views"), then ProbedViews::validate;
     ApplyAssignmentResponse = Ready { plan_epoch, scene_load_s }, then Ready::validate;
     ReportWorkRequest = WorkReport {
         node_name, plan_epoch, workload_number, busy_s, viewpoints;
@@ -42,7 +49,7 @@ messages! {
         at_most(s.workloads.len(), MAX_WORKLOADS, "workloads")
     }, then ClusterStatus::validate;
     WorkloadStatus = WorkloadStatus {
-        plan, session_count, viewer_count, conditions;
+        plan, session_count, viewer_count, conditions, promise;
         number: workload_number, views_per_set: views_per_set_count, achieved: achieved_times,
         utilisation: utilisation_ratio, one_more_viewer: one_more_viewer_ratio
     };

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU32;
 
-use cluster::{InvalidField, MeasuredCosts, NodeStatus, OfferSettings, SamplePlanes, SceneHash, at_most};
+use cluster::{BudgetRequest, InvalidField, MeasuredCosts, NodeStatus, OfferSettings, SamplePlanes, SceneHash, at_most};
 use codec::{InverseDepthRange, SampleSetId};
 use depth_image::{Antialias, ExposureEv, PinholeCamera, ToneCurve, ToneMapping, ViewPlanes};
 use glam::{DVec3, UVec2};
@@ -207,6 +207,7 @@ flat! {
     SampleSetId { plan_epoch: u64, index: u64 }
     NodeStatus { node_name: String, address: String, device_name: String, is_software: bool }
     OfferSettings { method: String, sampling: String, lighting: String }
+    BudgetRequest { budget: String, names_method: bool, names_sampling: bool }
     MeasuredCosts {
         sample_image_s: Option<f64>, direct_view_s: Option<f64>, reconstruct_view_s: Option<f64>,
         load_set_s: Option<f64>, encode_view_s: Option<f64>, transfer_bytes_per_s: Option<f64>, image_bytes: Option<u64>

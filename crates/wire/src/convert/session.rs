@@ -2,7 +2,7 @@
 
 use cluster::limits::{MAX_FALLBACKS, MAX_SAMPLE_CAMERAS, MAX_VIEWPOINTS};
 use cluster::{
-    ChangeSession, OfferStatus, PolicyChoice, Quality, SessionEvent, SessionPlan, SessionRequest, SessionStage,
+    ChangeSession, OfferStatus, PolicyChoice, Promise, PromiseState, Quality, SessionEvent, SessionPlan, SessionRequest, SessionStage,
     at_most, reason,
 };
 
@@ -13,6 +13,7 @@ use crate::proto::{self, open_session_response::Event};
 enums! {
     PolicyChoice { Auto, Pipeline, Direct, TimeShare }
     SessionStage { Measuring, Planning, Preparing }
+    PromiseState { Measuring, Kept, Unreachable }
 }
 
 messages! {
@@ -27,7 +28,8 @@ messages! {
         method: reconstruction_method, sampling: sampling_method, codec: frame_codec,
         sample_size_px: sample_image_size, views_per_set: views_per_set_count,
         planes: antialias_sample_count | exposure_ev | tone_curve | with_inverse_depth | with_provenance,
-        auto_exposure: with_auto_exposure, policy: policy_choice, refinement_steps: refinement_step_count
+        auto_exposure: with_auto_exposure, policy: policy_choice, refinement_steps: refinement_step_count,
+        budget: budget | is_method_named | is_sampling_named
     }, with protocol_version = PROTOCOL_VERSION, first check_request, then SessionRequest::validate;
     Quality = Quality { lighting, sample_side_ratio, frame_rate_ratio; method: reconstruction_method };
     ChangeSessionRequest = ChangeSession {
@@ -36,8 +38,11 @@ messages! {
     SessionPlan = SessionPlan {
         assignment as "plan.assignment", costs as "plan.costs", reason, predicted_pipeline_s, predicted_direct_s,
         predicted_time_share_s, k_fd_sampler_count, predicted_k_fd_s, enumerated_sampler_count, predicted_enumerated_s,
-        scene_load_s, frame_rate_ratio; fallback: fallback_number, method: reconstruction_method, auto_exposure: auto_exposure_ev
+        scene_load_s, frame_rate_ratio, is_method_for_all; fallback: fallback_number, method: reconstruction_method, auto_exposure: auto_exposure_ev
     }, then SessionPlan::validate;
+    Promise = Promise {
+        budget, state, representation, expected_ratio, bound_ratio, probe_view_count, reason
+    }, then Promise::validate;
 }
 
 fn check_request(request: &mut proto::OpenSessionRequest) -> Result<(), WireError> {
@@ -58,6 +63,7 @@ impl Convert<proto::OpenSessionResponse> for SessionEvent {
             }
             Event::Plan(plan) => Self::Plan(Box::new(Convert::read(plan, "plan")?)),
             Event::Opened(opened) => Self::Opened { session: opened.session_number },
+            Event::Promise(promise) => Self::Promise(Convert::read(promise, "promise")?),
         })
     }
 
@@ -68,6 +74,7 @@ impl Convert<proto::OpenSessionResponse> for SessionEvent {
             }
             Self::Plan(plan) => Event::Plan(plan.write()),
             Self::Opened { session } => Event::Opened(proto::SessionOpened { session_number: session }),
+            Self::Promise(promise) => Event::Promise(promise.write()),
         };
         proto::OpenSessionResponse { event: Some(event) }
     }

@@ -3,7 +3,7 @@
 use std::pin::Pin;
 
 use cluster::{
-    ApplyPlan, ChangeSession, ClusterStatus, FetchImages, FetchScene, JoinCluster, MeasureCosts, Measured, Ready,
+    ApplyPlan, ChangeSession, ClusterStatus, FetchImages, FetchScene, JoinCluster, MeasureCosts, Measured, ProbeViews, ProbedViews, Ready,
     RenderViews, SamplerReport, ScenePart, SessionEvent, SessionRequest, Welcome, WorkReport,
 };
 use codec::{Chunk, FramePart};
@@ -171,6 +171,8 @@ service! {
         measure_costs(MeasureCostsRequest as MeasureCosts) -> MeasureCostsResponse as Measured;
         /// Takes a plan; answers when ready for it. `FAILED_PRECONDITION` for an epoch below the one it has.
         apply_assignment(ApplyAssignmentRequest as ApplyPlan) -> ApplyAssignmentResponse as Ready;
+        /// Measures views of a representation, after all other work.
+        probe_views(ProbeViewsRequest as ProbeViews) -> ProbeViewsResponse as ProbedViews;
     }
     streams {}
 }

@@ -1,0 +1,84 @@
+//! Promises: what a session's budget limits, and whether it is kept.
+
+use serde::{Deserialize, Serialize};
+
+use crate::check::{InvalidField, nonempty, reason, within};
+
+/// A session asks for the cheapest representation that keeps a budget. What its user named stays as it is.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct BudgetRequest {
+    /// The budget as on the command line; `None`: the coordinator's, if it has one.
+    pub budget: Option<String>,
+    /// The user named the reconstruction method.
+    pub names_method: bool,
+    /// The user named the sampling method.
+    pub names_sampling: bool,
+}
+
+/// What is promised to the sessions of a workload.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Promise {
+    /// The strictest budget of the sessions.
+    pub budget: String,
+    /// Whether it is kept.
+    pub state: PromiseState,
+    /// The representation in force.
+    pub representation: String,
+    /// The error of the representation on the views of its certificate, as a ratio; 0 without one.
+    pub expected_ratio: f64,
+    /// The bound on the error, as a ratio; 0 without a certificate.
+    pub bound_ratio: f64,
+    /// Views of the certificate.
+    pub probe_view_count: u32,
+    /// The reason in plain words, with the figures.
+    pub reason: String,
+}
+
+/// The state of a promise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PromiseState {
+    /// Representations are measured; the one in force has no certificate.
+    Measuring,
+    /// The representation in force keeps the budget.
+    Kept,
+    /// Nothing keeps the budget.
+    Unreachable,
+}
+
+impl std::fmt::Display for PromiseState {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Measuring => "measuring",
+            Self::Kept => "kept",
+            Self::Unreachable => "unreachable",
+        })
+    }
+}
+
+impl std::fmt::Display for Promise {
+    /// One line: the budget, the state, the representation and the reason.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { budget, state, representation, reason, .. } = self;
+        write!(f, "promise {budget}: {state}, {representation}: {reason}")
+    }
+}
+
+impl BudgetRequest {
+    /// # Errors
+    /// For a text that is too long.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        crate::check::text(self.budget.as_deref().unwrap_or_default(), "budget")
+    }
+}
+
+impl Promise {
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        nonempty(&self.budget, "promise.budget")?;
+        reason(&self.representation, "promise.representation")?;
+        within(self.expected_ratio, 0.0..=1.0, "promise.expected_ratio", "from 0 to 1")?;
+        within(self.bound_ratio, 0.0..=1.0, "promise.bound_ratio", "from 0 to 1")?;
+        reason(&self.reason, "promise.reason")
+    }
+}

@@ -1,0 +1,122 @@
+//! Probing as a service of a node.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+use cluster::{Costs, ProbeViews, ProbedView, ProbedViews};
+use depth_image::{PinholeCamera, ViewPlanes};
+use node::{Engine, EngineError, Turn, ViewProbes, WorkClass};
+use parking_lot::Mutex;
+use planner::{RowCosts, ViewErrors};
+use tonic::Status;
+
+use crate::prober::{ProbeError, Prober};
+use crate::representation::Representation;
+use crate::subject::{Light, Subject};
+
+/// Subjects whose true views and sets stay in memory.
+const MAX_SUBJECTS: usize = 2;
+
+/// Measures views on a node's device, after all its other work. One request is served at a time.
+pub struct Probers {
+    engine: Arc<dyn Engine>,
+    /// The last used is the last.
+    probers: Mutex<VecDeque<Prober>>,
+}
+
+impl Probers {
+    /// Without subjects.
+    #[must_use]
+    pub fn new(engine: Arc<dyn Engine>) -> Self {
+        Self { engine, probers: Mutex::default() }
+    }
+
+    /// A prober of the subject, as it was left or anew.
+    fn taken(&self, probers: &mut VecDeque<Prober>, subject: Subject) -> Prober {
+        let found = probers.iter().position(|prober| *prober.subject() == subject);
+        let turn = Turn { class: WorkClass::Background, flow: Turn::next_flow() };
+        found
+            .and_then(|place| probers.remove(place))
+            .unwrap_or_else(|| Prober::new(self.engine.clone(), subject, turn))
+    }
+}
+
+impl ViewProbes for Probers {
+    fn probe(&self, request: &ProbeViews) -> Result<ProbedViews, Status> {
+        let mut probers = self.probers.lock();
+        // Work that arrives meanwhile goes between slices of a measurement that nobody waits for.
+        let _cut = self.engine.live_stream();
+        let mut prober = self.taken(&mut probers, subject_of(request)?);
+        let (measured, busy_s) = prober.busy(|prober| measured(prober, request));
+        probers.push_back(prober);
+        while probers.len() > MAX_SUBJECTS {
+            probers.pop_front();
+        }
+        let (views, costs) = measured?;
+        Ok(ProbedViews { views: views.into_iter().map(probed).collect(), costs, busy_s })
+    }
+}
+
+/// The errors of the views in their order, and the mean costs of their cells.
+fn measured(prober: &mut Prober, request: &ProbeViews) -> Result<(Vec<ViewErrors>, Costs), Status> {
+    let mut of_cells: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (place, view) in request.views.iter().enumerate() {
+        of_cells.entry(request.workload.cell_of(view)).or_default().push(place);
+    }
+    let (mut errors, mut costs) = (vec![None; request.views.len()], Costs::default());
+    for (cell, places) in of_cells {
+        let cameras: Vec<PinholeCamera> = places.iter().map(|&place| request.views[place]).collect();
+        let of = representation(request, cell)?;
+        let (own_errors, own) = if request.with_errors {
+            prober.probe(&of, Light::Screening, &cameras).map_err(status)?
+        } else {
+            (Vec::new(), prober.time(&of, &cameras).map_err(status)?)
+        };
+        add(&mut costs, &own, cameras.len() as f64 / request.views.len() as f64);
+        places.iter().zip(own_errors).for_each(|(&place, own)| errors[place] = Some(own));
+    }
+    Ok((errors.into_iter().flatten().collect(), costs))
+}
+
+fn add(costs: &mut Costs, own: &RowCosts, share: f64) {
+    costs.sample_image_s += share * own.sample_image_s;
+    costs.load_set_s += share * own.load_set_s;
+    costs.reconstruct_view_s += share * own.reconstruct_view_s;
+}
+
+fn representation(request: &ProbeViews, cell: u32) -> Result<Representation, Status> {
+    let workload = request.workload.of_cell(cell as usize);
+    let workload = workload.ok_or_else(|| Status::invalid_argument(format!("views: there is no view cell {cell}")))?;
+    Ok(Representation {
+        sampling: workload.sampling,
+        method: request.method.clone(),
+        sample_cameras: workload.sample_cameras,
+    })
+}
+
+fn subject_of(request: &ProbeViews) -> Result<Subject, Status> {
+    let ProbeViews { workload, compared_lighting, antialias, codec, .. } = request;
+    Ok(Subject {
+        scene_hash: workload.scene.hash.to_string(),
+        volume: workload.volume,
+        background: workload.background,
+        illumination: workload.illumination.clone(),
+        lighting: workload.lighting.clone(),
+        screening_lighting: compared_lighting.clone(),
+        scene_time_s: workload.timeline.start_s as f32,
+        planes: ViewPlanes { antialias: *antialias, ..ViewPlanes::COLOR },
+        codec: codec.parse().map_err(|error| Status::invalid_argument(format!("frame_codec: {error}")))?,
+    })
+}
+
+fn probed(errors: ViewErrors) -> ProbedView {
+    let ViewErrors { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio } = errors;
+    ProbedView { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio }
+}
+
+fn status(error: ProbeError) -> Status {
+    match error {
+        ProbeError::Engine(error) => EngineError::into(error),
+        other => Status::internal(other.to_string()),
+    }
+}
