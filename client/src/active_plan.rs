@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use cluster::{Assignment, CompositorShare, RenderViews, SessionEvent, SessionPlan, SessionRequest};
+use cluster::{Assignment, CompositorShare, Promise, RenderViews, SessionEvent, SessionPlan, SessionRequest};
 use parking_lot::Mutex;
 use tokio::sync::{mpsc, watch};
 use tokio_stream::StreamExt as _;
@@ -78,14 +78,14 @@ impl ActivePlan {
         self.plan.assignment.plan_epoch
     }
 
-    /// A request without views, of set 0. Under a fallback the plan names the method.
+    /// A request without views, of set 0. The plan may name the method of all sessions.
     pub(crate) fn request(&self) -> RenderViews {
         let ViewSettings { method, codec, planes } = &self.settings;
         RenderViews {
             plan_epoch: self.plan_epoch(),
             workload_number: self.plan.assignment.workload_number,
             set_index: 0,
-            method: if self.plan.fallback.is_some() { self.plan.method.clone() } else { method.clone() },
+            method: self.plan.assignment.method.as_ref().unwrap_or(method).clone(),
             codec: *codec,
             planes: *planes,
             views: Vec::new(),
@@ -99,6 +99,8 @@ impl ActivePlan {
 pub(crate) struct SessionState {
     /// Its number at the coordinator.
     pub(crate) session: u64,
+    /// What is promised to it.
+    pub(crate) promise: Option<Promise>,
     pub(crate) active: Arc<ActivePlan>,
 }
 
@@ -158,6 +160,7 @@ fn take_over(event: SessionEvent, state: &watch::Sender<SessionState>, is_new_se
         SessionEvent::Opened { session } => state.send_modify(|state| state.session = session),
         SessionEvent::Progress { .. } => (),
         SessionEvent::Plan(plan) => put_in_force(*plan, state, std::mem::take(is_new_session)),
+        SessionEvent::Promise(promise) => state.send_modify(|state| state.promise = Some(promise)),
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use cluster::{ChangeSession, ClusterStatus, SessionEvent, SessionPlan, SessionRequest};
+use cluster::{ChangeSession, ClusterStatus, Promise, SessionEvent, SessionPlan, SessionRequest};
 use codec::FrameCodec;
 use depth_image::{PinholeCamera, ToneMapping, ViewPlanes};
 use parking_lot::Mutex;
@@ -81,7 +81,7 @@ impl Client {
         let invalid = |error| ClientError::Invalid { field: "codec", reason: format!("{error}") };
         let codec: FrameCodec = request.codec.parse().map_err(invalid)?;
         let mut events = coordinator.open_session(request.clone()).await.map_err(ClientError::coordinator)?;
-        let (session, plan) = plan_of(&mut events, progress).await?;
+        let Opened { session, promise, plan } = plan_of(&mut events, progress).await?;
         let (named_plans, to_follow) = mpsc::channel(NAMED_PLANS);
         let mut planes = request.planes;
         if request.auto_exposure {
@@ -89,7 +89,7 @@ impl Client {
         }
         let settings = ViewSettings { method: request.method.clone(), codec, planes };
         let active = Arc::new(ActivePlan::connect(plan, settings, named_plans).await?);
-        let (changes, state) = watch::channel(SessionState { session, active });
+        let (changes, state) = watch::channel(SessionState { session, promise, active });
         let request = Arc::new(Mutex::new(request));
         let mut following = JoinSet::new();
         following.spawn(follow_compositors(to_follow, changes.clone()));
@@ -158,6 +158,23 @@ impl Session {
         self.state.borrow().active.plan.clone()
     }
 
+    /// What is promised to the session; `None` without a budget.
+    #[must_use]
+    pub fn promise(&self) -> Option<Promise> {
+        self.state.borrow().promise.clone()
+    }
+
+    /// Waits for another promise than this one.
+    pub async fn another_promise(&self, promise: Option<&Promise>) -> Promise {
+        let mut state = self.state.clone();
+        let other = state.wait_for(|state| state.promise.is_some() && state.promise.as_ref() != promise).await;
+        match other.ok().and_then(|state| state.promise.clone()) {
+            Some(promise) => promise,
+            // The session has ended: no promise follows.
+            None => std::future::pending().await,
+        }
+    }
+
     /// Waits for a plan of another number.
     pub async fn another_plan(&self, plan_epoch: u64) -> SessionPlan {
         let mut state = self.state.clone();
@@ -214,18 +231,26 @@ impl Session {
     }
 }
 
+/// The beginning of a session.
+struct Opened {
+    session: u64,
+    promise: Option<Promise>,
+    plan: SessionPlan,
+}
+
 async fn plan_of(
     events: &mut Messages<SessionEvent>,
     mut progress: impl FnMut(&SessionEvent),
-) -> Result<(u64, SessionPlan), ClientError> {
-    let mut number = 0;
+) -> Result<Opened, ClientError> {
+    let (mut number, mut promised) = (0, None);
     while let Some(event) = events.next().await {
         let event = event.map_err(ClientError::coordinator)?;
         progress(&event);
         match event {
             SessionEvent::Opened { session } => number = session,
             SessionEvent::Progress { .. } => (),
-            SessionEvent::Plan(plan) => return Ok((number, *plan)),
+            SessionEvent::Promise(promise) => promised = Some(promise),
+            SessionEvent::Plan(plan) => return Ok(Opened { session: number, promise: promised, plan: *plan }),
         }
     }
     Err(ClientError::Coordinator { reason: "the session's stream ended before its plan".to_owned() })

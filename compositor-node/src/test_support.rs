@@ -32,5 +32,6 @@ pub(crate) fn assignment() -> Assignment {
         compositors: Vec::new(),
         tile_count: 1,
         relay_fanout: None,
+        method: None,
     }
 }

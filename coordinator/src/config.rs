@@ -5,10 +5,13 @@ use cluster::limits::MAX_SCENES;
 use cluster::{OfferSettings, OfferStatus, SceneHash, SceneRef};
 use depth_image::{Aabb, Camera, Environment, Illumination};
 use glam::DVec3;
+use planner::{Budget, Row};
 use tonic::Status;
 
+use crate::plan_files::PlanFiles;
+
 /// The coordinator's configuration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct CoordinatorConfig {
     /// Allows another bind address than loopback, without TLS.
     pub insecure_bind: bool,
@@ -18,11 +21,25 @@ pub struct CoordinatorConfig {
     pub max_sessions: usize,
     /// Workloads that may be open, from 1 to 64; more are refused with `RESOURCE_EXHAUSTED`.
     pub max_workloads: usize,
+    /// The budget of sessions that state none.
+    pub budget: Option<Budget>,
+    /// Where measurements for budgets are kept.
+    pub plan_files: Option<PlanFiles>,
+    /// A cheaper light in which representations are compared, for a light that is expensive.
+    pub screening_light: fn(&str) -> Option<String>,
 }
 
 impl Default for CoordinatorConfig {
     fn default() -> Self {
-        Self { insecure_bind: false, reflection: false, max_sessions: 1024, max_workloads: 8 }
+        Self {
+            insecure_bind: false,
+            reflection: false,
+            max_sessions: 1024,
+            max_workloads: 8,
+            budget: None,
+            plan_files: None,
+            screening_light: |_| None,
+        }
     }
 }
 
@@ -49,6 +66,10 @@ pub struct SceneOffer {
     pub origin_in_source: DVec3,
     /// Defaults of sessions.
     pub settings: OfferSettings,
+    /// The representations among which budgets choose.
+    pub rows: Vec<Row>,
+    /// Every row is sampled by the rig's own cameras.
+    pub keeps_cameras: bool,
     /// Seconds after which a scene that moves is as at its start; `None` for one that never moves.
     pub period_s: Option<f64>,
 }

@@ -12,6 +12,7 @@ use crate::grpc_status::{of_node, refusal, within};
 use crate::probe::probe;
 use crate::schedule::{Command, Event, Scheduler};
 use crate::shared::Shared;
+use crate::view_probes::{keep, probe_views, recall, represent};
 
 /// How long a node may take to load a scene and get ready.
 const READY_WITHIN: Duration = Duration::from_secs(300);
@@ -34,6 +35,24 @@ pub(crate) async fn execute(shared: Arc<Shared>) {
             }
             Command::Readmit { node_name, workload_number } => {
                 tracing::info!(node = node_name, workload_number, "readmitted");
+            }
+            Command::Recall { workload_number, key } => {
+                tokio::spawn(recall(shared.clone(), workload_number, key));
+            }
+            Command::ProbeViews(probe) => {
+                tokio::spawn(probe_views(shared.clone(), *probe));
+            }
+            Command::Keep(kept) => {
+                tokio::spawn(keep(shared.clone(), *kept));
+            }
+            Command::Represent { workload_number, plan, measurement } => {
+                tokio::spawn(represent(shared.clone(), workload_number, plan, *measurement));
+            }
+            Command::Promise { sessions, promise } => {
+                tracing::info!(%promise, "promise");
+                for session in sessions {
+                    shared.send(session, SessionEvent::Promise((*promise).clone()));
+                }
             }
             Command::Refuse { session, error } => shared.sessions.refuse(session, refusal(&error)),
         }

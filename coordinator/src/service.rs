@@ -40,15 +40,16 @@ pub async fn serve(
     observers: Observers,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
+    let (insecure_bind, reflection, max_workloads) = (config.insecure_bind, config.reflection, config.max_workloads);
     let shared = Arc::new(Shared::new(config, offers, observers));
-    shared.step(Event::Limits { max_workloads: config.max_workloads });
+    shared.step(Event::Limits { max_workloads });
     let mut running = JoinSet::new();
     running.spawn(execute(shared.clone()));
     running.spawn(tick(shared.clone()));
     running.spawn(measure_when_idle(shared.clone()));
     let service = CoordinatorService { shared, shutdown: shutdown.clone() };
     let routes = Routes::new(health(&["coordinator"]).await).add_service(coordinator_server(service));
-    node::serve(port, with_reflection(routes, config.reflection)?, config.insecure_bind, shutdown).await
+    node::serve(port, with_reflection(routes, reflection)?, insecure_bind, shutdown).await
 }
 
 async fn tick(shared: Arc<Shared>) {

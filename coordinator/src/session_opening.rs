@@ -9,6 +9,7 @@ use tonic::Status;
 use crate::grpc_status::refusal;
 use crate::measuring::{known, measured_on_present_nodes, send_progress};
 use crate::schedule::{Event, Opening, PolicyOverride};
+use crate::session_budget::budgeted;
 use crate::sessions::EventSender;
 use crate::shared::Shared;
 use crate::workload::workload_of;
@@ -42,7 +43,9 @@ async fn measured_opening(
     request: SessionRequest,
     events: &EventSender,
 ) -> Result<Opening, Status> {
-    let workload = workload_of(&request, shared.offers.find(request.scene.as_deref())?)?;
+    let offer = shared.offers.find(request.scene.as_deref())?;
+    let workload = workload_of(&request, offer)?;
+    let budgeted = budgeted(&request, &workload, offer, &shared.config)?;
     let measurement = MeasureCosts {
         // Costs are those of one image, and of one view, which is made from the images of one cell.
         workload: workload.of_cell(0).unwrap_or_else(|| workload.clone()),
@@ -56,7 +59,8 @@ async fn measured_opening(
     };
     let admits = || {
         let follows_viewers = !request.viewpoints.is_empty();
-        let admitted = shared.with_scheduler(|scheduler| scheduler.admits_workload(&workload, follows_viewers));
+        let admitted =
+            shared.with_scheduler(|scheduler| scheduler.admits_workload(&workload, budgeted.as_ref(), follows_viewers));
         admitted.map_err(|error| refusal(&error))
     };
     let Measured { costs, planes, auto_exposure } = costs_of(shared, measurement, events, admits).await?;
@@ -75,12 +79,13 @@ async fn measured_opening(
         costs,
         auto_exposure,
         viewpoints: request.viewpoints,
+        budgeted,
     })
 }
 
 /// Known costs; else they are measured, one session at a time. A session that would not be admitted is not measured for.
 /// A measurement that was begun ends, and its costs are kept, though its client may leave meanwhile.
-async fn costs_of(
+pub(crate) async fn costs_of(
     shared: &Arc<Shared>,
     measurement: MeasureCosts,
     events: &EventSender,

@@ -73,6 +73,7 @@ fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) -> Opening 
         viewpoints: Vec::new(),
         costs: WHOLE,
         auto_exposure: ExposureEv::ZERO,
+        budgeted: None,
     }
 }
 
@@ -139,6 +140,11 @@ impl Script {
                 }
                 Command::Probe(_) => (),
                 Command::Quarantine { .. } | Command::Readmit { .. } => panic!("no node is at fault"),
+                Command::Recall { .. }
+                | Command::ProbeViews(_)
+                | Command::Keep(_)
+                | Command::Represent { .. }
+                | Command::Promise { .. } => panic!("no session has a budget"),
             }
         }
     }

@@ -60,7 +60,9 @@ function originOf(header, lightSteps) {
 }
 
 function planRows(plan) {
-  return plan ? [["plan", `${plan.epoch}: ${plan.policy}`], ["reason", plan.reason, "text"]] : [["plan", "–"]];
+  if (!plan) return [["plan", "–"]];
+  const promise = plan.promise ? [["promise", plan.promise, "text"]] : [];
+  return [["plan", `${plan.epoch}: ${plan.policy}`], ["reason", plan.reason, "text"], ...promise];
 }
 
 export class Statistics {

@@ -93,7 +93,8 @@ function workloadSection(workload) {
     ["Utilisation", percent(workload.utilisation)], ...(plan ? planFigures(plan) : []),
   ]));
   numbers.className = "figures";
-  const section = element("section", name, numbers, ...(plan ? planParts(plan) : [element("p", "No plan is in force.")]));
+  const promise = workload.promise ? [element("p", workload.promise)] : [];
+  const section = element("section", name, numbers, ...promise, ...(plan ? planParts(plan) : [element("p", "No plan is in force.")]));
   section.className = "panel";
   return section;
 }

@@ -79,6 +79,7 @@ fn described_workload(workload: &WorkloadStatus) -> Value {
     json!({
         "number": workload.number, "sessions": workload.session_count, "viewers": workload.viewer_count,
         "views_per_set": workload.views_per_set, "utilisation": workload.utilisation,
+        "promise": workload.promise.as_ref().map(ToString::to_string),
         "plan": workload.plan.as_ref().map(|plan| described_plan(plan, &workload.achieved)),
     })
 }

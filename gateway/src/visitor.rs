@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use axum::extract::ws::WebSocket;
 use client::{ClientError, ClientId, EncodedFrame, PictureQuality, Session};
-use cluster::{Assignment, Policy, SessionPlan};
+use cluster::{Assignment, Policy, Promise, SessionPlan};
 use codec::FrameCodec;
 use depth_image::{Antialias, Camera};
 use glam::UVec2;
@@ -58,6 +58,7 @@ async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
         newest: None,
         sent: 0,
         plan_epoch: 0,
+        promise: None,
         rate: Rate::default(),
     };
     visitor.follow(page).await
@@ -99,8 +100,9 @@ struct Visitor {
     newest: Option<Pose>,
     /// The number of the last picture.
     sent: u64,
-    /// The last plan that the page was told of.
+    /// The last plan and promise that the page was told of.
     plan_epoch: u64,
+    promise: Option<Promise>,
     rate: Rate,
 }
 
@@ -173,6 +175,7 @@ impl Visitor {
         session: &Session,
         states: &mut watch::Receiver<SessionState>,
     ) -> Result<Option<ClientError>, End> {
+        self.promise = session.promise();
         self.tell_plan(page, &session.plan())?;
         let client = ClientId::new();
         let (mut motion, mut still) = (PictureStream::new(session, client), PictureStream::new(session, client));
@@ -201,6 +204,10 @@ impl Visitor {
                 plan = session.another_plan(self.plan_epoch) => {
                     self.tell_plan(page, &plan)?;
                     self.renew_still(&plan, &mut motion, &mut still)?;
+                }
+                promise = session.another_promise(self.promise.as_ref()) => {
+                    self.promise = Some(promise);
+                    self.tell_plan(page, &session.plan())?;
                 }
                 frame = motion.next() => match frame {
                     Ok((frame, asked)) => self.forward(page, session, &mut motion, frame, asked)?,
@@ -360,7 +367,8 @@ impl Visitor {
     fn tell_plan(&mut self, page: &Page, plan: &SessionPlan) -> Result<(), End> {
         self.plan_epoch = plan.assignment.plan_epoch;
         let (policy, reason) = (plan.assignment.policy.to_string(), plan.reason.clone());
-        page.tell(&ToPage::Plan { epoch: self.plan_epoch, policy, reason })
+        let promise = self.promise.as_ref().map(ToString::to_string);
+        page.tell(&ToPage::Plan { epoch: self.plan_epoch, policy, reason, promise })
     }
 
     /// Learns from a picture on the screen.

@@ -10,6 +10,7 @@ use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use client::{Client, Frame, Session};
 use cluster::{PolicyChoice, SessionPlan, SessionRequest, Timeline};
+use coordinator::CoordinatorConfig;
 use depth_image::{Camera, PinholeCamera, ViewCell};
 use engine::GpuEngine;
 use glam::UVec2;
@@ -104,7 +105,8 @@ impl Experiment {
             let listener = listen(([127, 0, 0, 1], 0).into(), false).await?;
             let configure = |config| NodeConfig { set_memory_bytes: set_memory_bytes(&setup), ..config };
             let open = engine.clone().opener();
-            let cluster = Cluster::start(configure, listener, setup.offer.clone().into(), open, nodes, false).await?;
+            let config = CoordinatorConfig::default();
+            let cluster = Cluster::start(configure, listener, config, setup.offer.clone().into(), open, nodes).await?;
             let client = cluster.client().await?;
             anyhow::Ok((cluster, client))
         })?;

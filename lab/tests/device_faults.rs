@@ -10,6 +10,7 @@ use app_core::setup::{SceneArgs, Setup};
 use app_core::sizes::SampleSize;
 use client::Session;
 use cluster::{PolicyChoice, SessionRequest};
+use coordinator::CoordinatorConfig;
 use depth_image::{PinholeCamera, View, ViewCell};
 use engine::GpuEngine;
 use glam::UVec2;
@@ -39,7 +40,9 @@ impl Bench {
     async fn cluster(&self, engine: Arc<GpuEngine>) -> (Cluster, Session) {
         let listener = listen(([127, 0, 0, 1], 0).into(), false).await.unwrap();
         let offers = self.setup.offer.clone().into();
-        let cluster = Cluster::start(|it| it, listener, offers, engine.opener(), NODES, false).await.unwrap();
+        let cluster = Cluster::start(|it| it, listener, CoordinatorConfig::default(), offers, engine.opener(), NODES)
+            .await
+            .unwrap();
         let client = cluster.client().await.unwrap();
         let request = request(self.setup.offer.settings.clone(), &self.views).unwrap();
         let request = SessionRequest { policy: PolicyChoice::Pipeline, ..request };

@@ -9,6 +9,7 @@ use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use app_core::sizes::SampleSize;
 use cluster::{PolicyChoice, SessionRequest};
+use coordinator::CoordinatorConfig;
 use depth_image::{Camera, Environment, PinholeCamera, ViewCell, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
@@ -141,8 +142,9 @@ fn a_cluster_gives_what_one_engine_gives() {
     let alone = reference.reconstruct(args.method(), ViewPlanes::ALL).unwrap();
     let mut delivered = runtime().unwrap().block_on(async {
         let listener = listen(([127, 0, 0, 1], 0).into(), false).await.unwrap();
+        let config = CoordinatorConfig::default();
         let cluster =
-            Cluster::start(|it| it, listener, setup.offer.clone().into(), engine.opener(), 3, false).await.unwrap();
+            Cluster::start(|it| it, listener, config, setup.offer.clone().into(), engine.opener(), 3).await.unwrap();
         let client = cluster.client().await.unwrap();
         let offer = client.status().await.unwrap().offers.remove(0);
         assert_eq!((&offer.sample_cameras, &offer.settings), (&setup.offer.rig, &setup.offer.settings));

@@ -4,6 +4,7 @@
 //! Each of [`commands`] is one subcommand of [`cli`].
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod budget;
 pub mod cli;
 pub mod commands;
 pub mod comparison;

@@ -84,7 +84,11 @@ impl Coordinator {
             match command {
                 Command::Apply { plan, .. } => self.apply(*plan),
                 Command::Refuse { error, .. } => self.refused = Some(error),
-                Command::Probe(_) | Command::Quarantine { .. } | Command::Readmit { .. } => (),
+                // Sessions here have no budget.
+                Command::Recall { .. } | Command::ProbeViews(_) | Command::Keep(_) | Command::Represent { .. } => (),
+                Command::Probe(_) | Command::Quarantine { .. } | Command::Readmit { .. } | Command::Promise { .. } => {
+                    ()
+                }
             }
         }
     }
@@ -167,6 +171,7 @@ fn open(cluster: &Cluster, demand: &Demand) -> Event {
         viewpoints: Vec::new(),
         costs: slowest,
         auto_exposure: ExposureEv::ZERO,
+        budgeted: None,
     }))
 }
 

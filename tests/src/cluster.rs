@@ -5,12 +5,13 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use client::{Client, ClientError, Session, ViewRequest};
-use cluster::{OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline};
+use cluster::{BudgetRequest, OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline};
 use codec::{FrameAssembly, FramePart, WholeFrame};
 use coordinator::{CoordinatorConfig, Observers, SceneOffer, SceneOffers};
 use depth_image::{Aabb, Camera, Environment, PinholeCamera, ViewPlanes};
 use glam::{DVec3, UVec2, Vec3};
 use node::{NodeConfig, NodeMetrics};
+use planner::Row;
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
 use tokio_stream::StreamExt as _;
@@ -121,6 +122,21 @@ pub fn rig() -> Vec<Camera> {
     [-0.6, 0.0, 0.6].map(|x| Camera::Pinhole(camera(x, UVec2::new(64, 48)))).to_vec()
 }
 
+/// Representations of the scalar device: one to four cameras.
+#[must_use]
+pub fn rows() -> Vec<Row> {
+    let row = |camera_count| Row {
+        sampling: "conventional".to_owned(),
+        method: "splat".to_owned(),
+        camera_count,
+        place_count: camera_count,
+        side_ratio: 1.0,
+        kind: "conventional splat".to_owned(),
+        rank: 0,
+    };
+    [1, 2, 4].map(row).to_vec()
+}
+
 /// The offer of a coordinator of the scalar device.
 #[must_use]
 pub fn offer() -> SceneOffer {
@@ -130,6 +146,8 @@ pub fn offer() -> SceneOffer {
         package: package(),
         fits_views: false,
         rig: rig(),
+        rows: rows(),
+        keeps_cameras: false,
         volume: Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) },
         background: Environment::uniform(SKY_LINEAR),
         illumination: illumination(),
@@ -184,6 +202,7 @@ pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {
         fallbacks: Vec::new(),
         viewpoints: Vec::new(),
         forced_tile_count: None,
+        budget: BudgetRequest::default(),
     }
 }
 

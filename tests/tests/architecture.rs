@@ -124,6 +124,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "network-proxy",
             "node",
             "node-host",
+            "planner",
             "wire",
         ],
     ),

@@ -146,7 +146,7 @@ async fn a_predicted_view_size_opens_at_once_and_is_measured_on_an_idle_node() {
     let mut stages = Vec::new();
     let note = |event: &SessionEvent| match event {
         SessionEvent::Progress { stage, .. } => stages.push(*stage),
-        SessionEvent::Opened { .. } | SessionEvent::Plan(_) => (),
+        SessionEvent::Opened { .. } | SessionEvent::Plan(_) | SessionEvent::Promise(_) => (),
     };
     let _predicted = cluster.client.open_session(larger, note).await.unwrap();
     assert!(!stages.is_empty() && !stages.contains(&SessionStage::Measuring), "{stages:?}");

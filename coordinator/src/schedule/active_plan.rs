@@ -46,10 +46,8 @@ impl ActivePlan {
 
     /// Whether another plan would change nothing: neither the roles of nodes nor the quality of views.
     pub(super) fn is_like(&self, other: &SessionPlan) -> bool {
-        // Without a fallback each session has its own method.
-        let quality = |plan: &SessionPlan| (plan.fallback, plan.fallback.map(|_| plan.method.clone()));
         let rate = |plan: &SessionPlan| plan.frame_rate_ratio.to_bits();
-        quality(&self.plan) == quality(other) && rate(&self.plan) == rate(other) && self.assigns(&other.assignment)
+        self.plan.fallback == other.fallback && rate(&self.plan) == rate(other) && self.assigns(&other.assignment)
     }
 
     /// Whether another plan would give every node the same roles.

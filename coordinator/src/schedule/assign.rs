@@ -54,6 +54,7 @@ pub(super) fn assignment(
         } else {
             None
         },
+        method: None,
     }
 }
 

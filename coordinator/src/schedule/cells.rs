@@ -2,7 +2,7 @@
 
 use cluster::Workload;
 use cluster::limits::MAX_CELLS;
-use depth_image::{Aabb, Camera, PinholeCamera, ViewGroup};
+use depth_image::{Aabb, Camera, PinholeCamera, ViewCell, ViewGroup};
 use glam::UVec2;
 
 /// The cells of one workload. A cell that still has viewpoints stays as it is, whatever changes elsewhere: its samples stay
@@ -18,6 +18,11 @@ impl Cells {
     /// No cells yet, for a workload whose sample cameras follow viewpoints.
     pub(super) fn of(workload: &Workload) -> Self {
         Self { groups: Vec::new(), size_px: sample_size_px(workload) }
+    }
+
+    /// The boxes that the cells may grow to, up to the limit of a plan.
+    pub(super) fn grown(&self) -> Vec<ViewCell> {
+        self.groups.iter().map(ViewGroup::grown_cell).take(MAX_CELLS).collect()
     }
 
     /// The number of cells.

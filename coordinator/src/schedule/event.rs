@@ -2,13 +2,14 @@
 
 use cluster::limits::{MAX_VIEWS_PER_SET, MAX_WORKLOADS};
 use cluster::{
-    Costs, InvalidField, JoinCluster, MeasuredCosts, Quality, SamplerReport, Workload, finite_seconds, frame_rate,
-    nonempty, viewpoints,
+    Costs, InvalidField, JoinCluster, MeasuredCosts, Quality, SamplePlanes, SamplerReport, Workload, finite_seconds,
+    frame_rate, nonempty, reason, viewpoints,
 };
 use depth_image::{ExposureEv, PinholeCamera};
+use planner::ProbeId;
 use serde::{Deserialize, Serialize};
 
-use super::PolicyOverride;
+use super::{Budgeted, PolicyOverride};
 
 /// An event of the cluster. Events of an epoch concern the plan of that epoch alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,6 +44,15 @@ pub enum Event {
     Reported(SamplerReport),
     /// The answer to a [`Probe`](super::Probe); `failure` is `None` where the node passed.
     Probed { plan_epoch: u64, node_name: String, incarnation: u64, kind: ProbeKind, failure: Option<String> },
+    /// An event of the planning for a workload's budget: measurements of earlier plans, or the answer to
+    /// [`Command::ProbeViews`](super::Command::ProbeViews).
+    Planned { workload_number: u64, event: Box<planner::Event> },
+    /// Nodes could not be asked to measure what a planner wants; they are asked again.
+    ProbeLost { workload_number: u64, id: ProbeId, reason: String },
+    /// The costs of a chosen representation are known.
+    Represented { workload_number: u64, plan: u64, costs: Costs, planes: SamplePlanes },
+    /// They cannot be measured.
+    Unrepresented { workload_number: u64, plan: u64, reason: String },
     /// A client left, or its session failed.
     Closed { session: u64 },
     /// Only time has passed.
@@ -84,6 +94,8 @@ pub struct Opening {
     /// The workload's sample cameras are the cells of these viewpoints, as if the session were alone. Empty: it brings
     /// sample cameras of its own.
     pub viewpoints: Vec<PinholeCamera>,
+    /// Its budget; `None`: it is shown what it asks for.
+    pub budgeted: Option<Budgeted>,
 }
 
 impl Event {
@@ -111,6 +123,11 @@ impl Event {
             | Self::Unready { node_name, .. }
             | Self::Probed { node_name, .. } => nonempty(node_name, "node_name"),
             Self::Reported(report) => report.validate(),
+            Self::Planned { event, .. } => {
+                event.validate().map_err(|error| InvalidField::out_of_range("event", error, "an answer to a planner"))
+            }
+            Self::ProbeLost { reason: why, .. } | Self::Unrepresented { reason: why, .. } => reason(why, "reason"),
+            Self::Represented { costs, .. } => costs.validate(),
             Self::Applied { .. } | Self::Closed { .. } | Self::Tick => Ok(()),
         }
     }
@@ -124,6 +141,7 @@ impl Opening {
         self.policy_override.validate()?;
         self.fallbacks.iter().try_for_each(Quality::validate)?;
         self.costs.validate()?;
+        self.budgeted.as_ref().map_or(Ok(()), Budgeted::validate)?;
         viewpoints(&self.viewpoints)
     }
 }

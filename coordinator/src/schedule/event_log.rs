@@ -11,10 +11,10 @@ use serde::{Deserialize, Serialize};
 use super::{Command, Event, Scheduler};
 
 /// Logs of other versions are refused.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const VERSION_KEY: &str = "version";
 /// A line that is longer is no event.
-const MAX_LINE_BYTES: u64 = 1 << 20;
+const MAX_LINE_BYTES: u64 = 16 << 20;
 
 /// Why a log cannot be replayed. Lines are counted from 1.
 #[derive(Debug, thiserror::Error)]
@@ -117,7 +117,7 @@ fn parse<'t, T: Deserialize<'t>>(text: &'t [u8], line: usize) -> Result<T, LogEr
     ron::de::from_bytes(text).map_err(|source| LogError::Malformed { line, source })
 }
 
-/// The first line: `{"version":4}`, as in all versions.
+/// The first line: `{"version":5}`, as in all versions.
 type Header = BTreeMap<String, u32>;
 
 /// An event, and the time since the coordinator started.

@@ -93,7 +93,12 @@ impl Faults {
                     assert!(self.quarantined.insert(node_name));
                 }
                 Command::Readmit { node_name, .. } => assert!(self.quarantined.remove(&node_name), "{node_name}"),
-                Command::Refuse { .. } => panic!("{command}"),
+                Command::Recall { .. }
+                | Command::ProbeViews(_)
+                | Command::Keep(_)
+                | Command::Represent { .. }
+                | Command::Promise { .. }
+                | Command::Refuse { .. } => panic!("{command}"),
             }
         }
     }

@@ -7,6 +7,8 @@
 mod active_plan;
 mod assign;
 mod balance;
+mod budget_plan;
+mod budgeted;
 mod cells;
 mod choose;
 mod command;
@@ -27,6 +29,7 @@ mod prices;
 mod reason;
 mod relay_tree;
 mod reports;
+mod representation;
 mod scheduler;
 mod search;
 mod session_mix;
@@ -34,6 +37,8 @@ mod sharing_hysteresis;
 mod smoothing;
 mod workload_state;
 
+#[cfg(test)]
+mod budget_tests;
 #[cfg(test)]
 mod cells_tests;
 #[cfg(test)]
@@ -48,10 +53,11 @@ mod workloads_tests;
 pub(crate) use test_support::workload as workload_for_tests;
 
 pub use balance::k_fd;
+pub use budgeted::Budgeted;
 pub(crate) use cells::first_indices;
 pub use choose::choose;
 pub use cluster::MeasuredCosts;
-pub use command::{Command, Probe, ProbedImage};
+pub use command::{Command, Probe, ProbedImage, ViewProbe};
 pub use demand::{Choice, ChoiceError, CurrentRoles, Demand, PolicyOverride, Predicted};
 pub use event::{Event, Opening, ProbeKind};
 pub use event_log::{LogError, Recorder, Step, replay};

@@ -1,6 +1,7 @@
 //! The cluster as a state machine: events in, commands out.
 
 mod admission;
+mod budgets;
 mod faults;
 mod planning;
 mod sessions;
@@ -20,6 +21,7 @@ use super::reports::SamplerReports;
 use super::sharing_hysteresis::SharingHysteresis;
 use super::workload_state::WorkloadState;
 use super::{Command, Event};
+use budgets::BudgetState;
 
 /// Workloads that may be open, unless an event says otherwise.
 const MAX_WORKLOADS: usize = 8;
@@ -37,6 +39,9 @@ pub struct Scheduler {
     max_workloads: usize,
     members: BTreeMap<String, Member>,
     workloads: BTreeMap<u64, WorkloadState>,
+    /// Of workloads with a budget.
+    budgets: BTreeMap<u64, BudgetState>,
+    last_budget_plan: u64,
     sharing: SharingHysteresis,
     reports: SamplerReports,
     liveness_probed_at: Duration,
@@ -55,6 +60,8 @@ impl Default for Scheduler {
             max_workloads: MAX_WORKLOADS,
             members: BTreeMap::new(),
             workloads: BTreeMap::new(),
+            budgets: BTreeMap::new(),
+            last_budget_plan: 0,
             sharing: SharingHysteresis::default(),
             reports: SamplerReports::default(),
             liveness_probed_at: Duration::ZERO,
@@ -69,6 +76,12 @@ impl Scheduler {
     /// as standing still.
     pub fn step(&mut self, now: Duration, event: Event) -> Vec<Command> {
         self.now = self.now.max(now);
+        let mut commands = self.take(event);
+        commands.extend(self.follow_budgets());
+        commands
+    }
+
+    fn take(&mut self, event: Event) -> Vec<Command> {
         match event {
             Event::Limits { max_workloads } => {
                 self.max_workloads = max_workloads;
@@ -95,6 +108,14 @@ impl Scheduler {
             Event::Reported(report) => self.reported(report),
             Event::Probed { plan_epoch, node_name, incarnation, kind, failure } => {
                 self.probed(plan_epoch, &node_name, incarnation, kind, failure)
+            }
+            Event::Planned { workload_number, event } => self.planned(workload_number, *event),
+            Event::ProbeLost { workload_number, id, reason } => self.probe_lost(workload_number, id, reason),
+            Event::Represented { workload_number, plan, costs, planes } => {
+                self.represented(workload_number, plan, costs, planes)
+            }
+            Event::Unrepresented { workload_number, plan, reason } => {
+                self.unrepresented(workload_number, plan, &reason)
             }
             Event::Closed { session } => self.closed(session),
             Event::Tick => self.tick(),

@@ -2,6 +2,7 @@
 
 use cluster::{Costs, Quality};
 use depth_image::PinholeCamera;
+use planner::Budget;
 
 use super::{Opening, PolicyOverride};
 
@@ -17,6 +18,7 @@ struct Session {
     method: String,
     /// As measured for its own views.
     costs: Costs,
+    budget: Option<Budget>,
 }
 
 impl Session {
@@ -41,6 +43,7 @@ impl SessionMix {
             viewpoints: opening.viewpoints.clone(),
             method: opening.method.clone(),
             costs: opening.costs,
+            budget: opening.budgeted.as_ref().map(|budgeted| budgeted.budget),
         });
     }
 
@@ -120,6 +123,11 @@ impl SessionMix {
     pub(super) fn usual_method(&self) -> Option<&str> {
         let count = |of: &Session| self.0.iter().filter(|session| session.method == of.method).count();
         self.0.iter().rev().max_by_key(|session| count(session)).map(|session| session.method.as_str())
+    }
+
+    /// The strictest budget of all sessions; those of one workload are comparable.
+    pub(super) fn budget(&self) -> Option<Budget> {
+        self.0.iter().filter_map(|session| session.budget).reduce(|a, b| a.and(&b).unwrap_or(a))
     }
 
     /// The qualities that every session with a rate falls back to, in the same order.

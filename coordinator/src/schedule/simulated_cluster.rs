@@ -127,6 +127,11 @@ impl World {
                     assert!(is_opening, "nobody is evicted: {session} by {event:?}");
                     self.sessions.remove(&session).expect("it was open");
                 }
+                Command::Recall { .. }
+                | Command::ProbeViews(_)
+                | Command::Keep(_)
+                | Command::Represent { .. }
+                | Command::Promise { .. } => panic!("no session has a budget"),
             }
         }
         self.check_always();

@@ -139,6 +139,7 @@ pub(super) fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) 
         viewpoints: Vec::new(),
         costs: COSTS,
         auto_exposure: ExposureEv::ZERO,
+        budgeted: None,
     }
 }
 

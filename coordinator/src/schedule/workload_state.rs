@@ -3,14 +3,16 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use cluster::{AchievedTime, Costs, Policy, PolicyChoice, Quality, Workload};
-use depth_image::{Camera, ExposureEv, PinholeCamera};
+use cluster::{AchievedTime, Costs, Policy, PolicyChoice, Promise, Quality, Workload};
+use depth_image::{Camera, ExposureEv, PinholeCamera, ViewCell};
 use glam::UVec2;
 
 use super::active_plan::ActivePlan;
+use super::budgeted::{Budgeted, planned_cells};
 use super::cells::Cells;
 use super::node_costs::view_s;
 use super::overload::Overload;
+use super::representation::Representation;
 use super::session_mix::SessionMix;
 use super::{Load, Opening, PolicyOverride};
 
@@ -29,6 +31,14 @@ pub(super) struct WorkloadState {
     /// As measured when it was opened: views of all cells, moments and plans have one exposure.
     pub(super) auto_exposure: ExposureEv,
     pub(super) sessions: SessionMix,
+    /// What budgets of its sessions choose among; `None`: its sessions have none.
+    pub(super) budgeted: Option<Budgeted>,
+    /// What budgets have chosen, in place of what sessions asked for.
+    pub(super) representation: Option<Representation>,
+    /// The promise that sessions know, and since when.
+    pub(super) announced: Option<(Duration, Promise)>,
+    /// Why no plan can be made for their budget.
+    pub(super) not_planned: Option<String>,
     /// The present fallback.
     pub(super) overload: Overload,
     /// The nodes that serve it.
@@ -66,6 +76,10 @@ impl WorkloadState {
             costs: opening.costs,
             auto_exposure: opening.auto_exposure,
             sessions: SessionMix::default(),
+            budgeted: opening.budgeted.clone(),
+            representation: None,
+            announced: None,
+            not_planned: None,
             overload: Overload::default(),
             nodes: BTreeSet::new(),
             excluded: BTreeMap::new(),
@@ -92,21 +106,66 @@ impl WorkloadState {
     /// Changes the sessions, and all that follows from them but the cells, which follow when that is due.
     pub(super) fn change(&mut self, now: Duration, change: impl FnOnce(&mut SessionMix)) {
         change(&mut self.sessions);
-        self.costs = self.sessions.costs(self.set_s()).unwrap_or(self.costs);
+        self.update_costs();
         self.overload.limit(now, self.sessions.fallbacks().len());
         self.note_movement(now);
     }
 
+    fn update_costs(&mut self) {
+        let asked = self.sessions.costs(self.set_s());
+        self.costs = asked.map_or(self.costs, |asked| self.represented(asked));
+    }
+
+    /// Costs of the representation in force, from those of what sessions asked for.
+    fn represented(&self, asked: Costs) -> Costs {
+        self.representation.as_ref().map_or(asked, |representation| representation.costs(&asked))
+    }
+
+    /// Puts a representation in force, in place of the one before.
+    pub(super) fn represent(&mut self, representation: Representation) {
+        self.representation = Some(representation);
+        self.update_costs();
+    }
+
+    /// What sessions force, and what the representation does.
+    pub(super) fn policy_override(&self) -> PolicyOverride {
+        let asked = self.sessions.policy_override();
+        self.representation.as_ref().map_or(asked, |representation| representation.policy_override(asked))
+    }
+
+    /// The view cells that budgets are planned for.
+    pub(super) fn planned_cells(&self) -> Vec<ViewCell> {
+        planned_cells(self.cells.as_ref(), &self.requested)
+    }
+
+    /// The workload in the representation in force.
+    fn in_representation(&self) -> Workload {
+        let row = self.representation.as_ref().and_then(Representation::row).zip(self.budgeted.as_ref());
+        let Some((row, budgeted)) = row else { return self.requested.clone() };
+        let mut workload = budgeted.sampled_as(row, &self.requested, &self.planned_cells());
+        if let Some(Representation::Row { planes, .. }) = self.representation {
+            workload.planes = planes;
+        }
+        workload
+    }
+
     pub(super) fn trigger(&self) -> PlanTrigger {
         PlanTrigger {
-            policy_override: self.sessions.policy_override(),
+            policy_override: self.policy_override(),
             sample_cameras: self.requested.sample_cameras.clone(),
             fallback: self.overload.step,
         }
     }
 
-    /// Whether a session asks for this workload; `follows_viewers`: its sample cameras are those of its viewpoints.
-    pub(super) fn is_shared_by(&self, asked: &Workload, follows_viewers: bool) -> bool {
+    /// Whether a session asks for this workload, with a budget that can be planned for together; `follows_viewers`: its sample cameras are those of its viewpoints.
+    pub(super) fn is_shared_by(&self, asked: &Workload, budgeted: Option<&Budgeted>, follows_viewers: bool) -> bool {
+        let has_same_budget = match (&self.budgeted, budgeted) {
+            (Some(own), Some(asked)) => own.is_shareable(asked),
+            (own, asked) => own.is_none() && asked.is_none(),
+        };
+        if !has_same_budget {
+            return false;
+        }
         let asked = self.with_planes(asked);
         match &self.cells {
             Some(cells) => follows_viewers && cells.are_shareable(&self.requested, &asked),
@@ -200,6 +259,17 @@ impl WorkloadState {
         self.load_with(self.sessions.views_at_once())
     }
 
+    /// Images of a set.
+    fn image_count(&self) -> usize {
+        let asked = self.requested.sample_cameras.len();
+        match (self.representation.as_ref().and_then(Representation::row), &self.budgeted) {
+            (Some(row), Some(budgeted)) if !budgeted.keeps_cameras => {
+                row.camera_count as usize * self.requested.cell_count()
+            }
+            _ => asked,
+        }
+    }
+
     /// The load of sessions with a rate alone.
     pub(super) fn rated_load(&self) -> Load {
         self.load_with(0)
@@ -209,7 +279,7 @@ impl WorkloadState {
         let timeline = &self.requested.timeline;
         let rated = (self.sessions.views_per_s() * self.frame_rate_ratio() * self.set_s()).ceil() as usize;
         Load {
-            images: self.requested.sample_cameras.len(),
+            images: self.image_count(),
             tiles: 1,
             cells: self.requested.cell_count(),
             // A static scene is one set, though it be refined: the sampler keeps its sums.
@@ -235,7 +305,9 @@ impl WorkloadState {
     /// A node's costs of the views of sessions with a rate, from those of the mean view: batches may ask for larger ones.
     /// How many of these the node makes is not known, so that a cost lies between the timed one and the one alone.
     pub(super) fn of_viewers(&self, node: &Costs) -> Costs {
-        let Some(rated) = self.sessions.rated_costs(self.set_s()) else { return *node };
+        let Some(rated) = self.sessions.rated_costs(self.set_s()).map(|asked| self.represented(asked)) else {
+            return *node;
+        };
         let of = |node_s: f64, rated_s: f64, mean_s: f64| {
             let ratio = rated_s / mean_s;
             let is_mixed = ratio.is_finite() && rated_s != mean_s;
@@ -255,12 +327,12 @@ impl WorkloadState {
     /// which depends on the number of nodes.
     pub(super) fn live_nodes(&self, mean: &Costs) -> f64 {
         let mean = &self.of_viewers(mean);
-        let is_direct = self.sessions.policy_override().policy == PolicyChoice::Direct;
+        let is_direct = self.policy_override().policy == PolicyChoice::Direct;
         let direct_s = mean.direct_view_s + mean.encode_view_s;
         let each_s = if is_direct { direct_s } else { direct_s.min(view_s(mean)) };
         let views_s = self.sessions.views_per_s() * self.frame_rate_ratio() * each_s;
         let samples = !is_direct && self.requested.timeline.moves() && views_s > 0.0;
-        let set_s = self.requested.sample_cameras.len() as f64 * mean.sample_image_s + mean.load_set_s;
+        let set_s = self.image_count() as f64 * mean.sample_image_s + mean.load_set_s;
         views_s + if samples { set_s / self.set_s() } else { 0.0 }
     }
 
@@ -281,23 +353,29 @@ impl WorkloadState {
         self.quality().map_or(1.0, |quality| quality.frame_rate_ratio)
     }
 
-    /// How views are reconstructed: under a fallback as it says, else as most sessions ask.
-    pub(super) fn method(&self) -> String {
-        let usual = || self.sessions.usual_method().unwrap_or_default();
-        self.quality().map_or_else(usual, |quality| quality.method.as_str()).to_owned()
+    /// How the views of all sessions are reconstructed: under a fallback, and in a representation.
+    pub(super) fn common_method(&self) -> Option<String> {
+        let chosen = self.representation.as_ref().and_then(Representation::row).map(|row| &row.method);
+        self.quality().map(|quality| &quality.method).or(chosen).cloned()
     }
 
-    /// The workload at the present fallback.
+    /// How views are reconstructed: those of all sessions, else those of most.
+    pub(super) fn method(&self) -> String {
+        self.common_method().unwrap_or_else(|| self.sessions.usual_method().unwrap_or_default().to_owned())
+    }
+
+    /// The workload in the representation in force, at the present fallback.
     pub(super) fn degraded(&self) -> Workload {
-        let Some(quality) = self.quality() else { return self.requested.clone() };
+        let workload = self.in_representation();
+        let Some(quality) = self.quality() else { return workload };
         let sized = |Camera::Pinhole(camera): &Camera| {
             let size_px = (camera.size_px.as_dvec2() * quality.sample_side_ratio).round().as_uvec2().max(UVec2::ONE);
             Camera::Pinhole(camera.resized(size_px))
         };
         Workload {
             lighting: quality.lighting.clone(),
-            sample_cameras: self.requested.sample_cameras.iter().map(sized).collect(),
-            ..self.requested.clone()
+            sample_cameras: workload.sample_cameras.iter().map(sized).collect(),
+            ..workload
         }
     }
 }

@@ -182,7 +182,7 @@ fn no_more_workloads_than_the_limit_are_opened() {
     cluster.open(of(3, 2));
     let refused = cluster.open(of(2, 3));
     assert_eq!(refusal(&refused).to_string(), "workloads: 2 are open, the limit of --max-workloads");
-    let admits = |workload| cluster.scheduler.admits_workload(&workload, false);
+    let admits = |workload| cluster.scheduler.admits_workload(&workload, None, false);
     assert_eq!(admits(workload(2)), Err(ChoiceError::Workloads { most: 2 }), "before its costs are measured");
     assert_eq!(admits(workload(3)), Ok(()));
     assert_eq!(applied(&cluster.open(of(3, 4))).len(), 1, "one that is open has room");

@@ -24,7 +24,7 @@ pub struct Cluster {
 }
 
 impl Cluster {
-    /// Starts a coordinator on `port` and `nodes` nodes, each with its configuration changed by `configure`, and waits
+    /// Starts a coordinator of this configuration on `port` and `nodes` nodes, each with its configuration changed by `configure`, and waits
     /// until all have joined. Nodes fetch scenes unless the engine that `open` gives has them.
     ///
     /// # Errors
@@ -32,15 +32,14 @@ impl Cluster {
     pub async fn start(
         configure: impl Fn(NodeConfig) -> NodeConfig,
         port: impl Into<Port>,
+        config: CoordinatorConfig,
         offers: SceneOffers,
         open: OpenEngine,
         nodes: usize,
-        insecure_bind: bool,
     ) -> anyhow::Result<Self> {
         let port = port.into();
         let address = format!("http://{}", loopback_of(&port.listener)?);
         let mut cluster = Self { address, shutdown: CancellationToken::new(), servers: JoinSet::new() };
-        let config = CoordinatorConfig { insecure_bind, ..CoordinatorConfig::default() };
         let (observers, shutdown) = (Observers::default(), cluster.shutdown.clone());
         cluster.servers.spawn(coordinator::serve(port, config, offers, observers, shutdown));
         for number in 0..nodes {

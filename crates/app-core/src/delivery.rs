@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use client::{Client, Frame, Session, ViewRequest};
 use cluster::limits::{MAX_VIEWPOINTS, MAX_VIEWS_PER_SET};
-use cluster::{OfferSettings, PolicyChoice, Quality, SessionRequest, Timeline};
+use cluster::{BudgetRequest, OfferSettings, PolicyChoice, Quality, SessionRequest, Timeline};
 use depth_image::{PinholeCamera, ViewPlanes};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -47,6 +47,7 @@ pub fn request(offered: OfferSettings, views: &[PinholeCamera]) -> anyhow::Resul
         fallbacks: Vec::new(),
         forced_tile_count: None,
         viewpoints: Vec::new(),
+        budget: BudgetRequest::default(),
     })
 }
 

@@ -7,7 +7,7 @@ use coordinator::fitting_size_px;
 use coordinator::schedule::EqualNodes;
 use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use glam::{UVec2, Vec2};
-use planner::{Budget, KeptKey, Ladder, PlanRequest, Row};
+use planner::{Budget, KeptKey, Ladder, PlanRequest, Row, most_certified};
 use probe::{DirectCosts, Representation, Subject, Viewpoints};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -19,9 +19,6 @@ use crate::setup::{SceneArgs, Setup};
 const CAMERA_COUNTS: [u32; 4] = [1, 2, 4, 8];
 /// Sides of sample images, as shares of the side that `--sample-size auto` chooses.
 const SIDE_RATIOS: [f64; 3] = [0.5, 0.71, 1.0];
-/// Rows of a round of certificates; fewer where every true view is expensive.
-const MOST_CERTIFIED: usize = 8;
-const MOST_CERTIFIED_TRACED: usize = 3;
 
 /// The views to plan for.
 #[derive(Debug, Clone, Copy)]
@@ -62,17 +59,17 @@ impl Planning {
         let rig: Vec<Camera> = setup.around.iter().copied().map(Camera::Pinhole).collect();
         let fixed_px = args.sample_size.fixed_px();
         let whole_px = fixed_px.or_else(|| fitting_size_px(&rig, &view)).context("the views have no size")?;
-        let rows = rows(args, setup.around.len() as u32, fixed_px.is_some());
+        let rows = rows(args, setup.around.len() as u32);
         let cameras = Cameras { cell: &cell, whole_px, given: args.samples.is_some().then_some(&setup.around) };
         let representations = rows.iter().map(|row| cameras.representation(row)).collect::<anyhow::Result<_>>()?;
-        let screening = if args.lighting.is_traced() { Lighting::default() } else { args.lighting };
+        let lighting = args.lighting.to_string();
         let subject = Subject {
             scene_hash: setup.offer.hash.to_string(),
             volume: setup.offer.volume,
             background: setup.offer.background,
             illumination: setup.offer.illumination.clone(),
-            lighting: args.lighting.to_string(),
-            screening_lighting: screening.to_string(),
+            screening_lighting: screening_light(&lighting).unwrap_or_else(|| lighting.clone()),
+            lighting,
             scene_time_s: views.scene_time_s,
             planes: views.planes,
             codec: views.codec,
@@ -110,17 +107,28 @@ impl Planning {
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
             pricing: format!("one node, {views_a_set} views a set"),
             allowance_s,
-            most_certified: if is_traced { MOST_CERTIFIED_TRACED } else { MOST_CERTIFIED },
+            most_certified: most_certified(is_traced),
             seed: self.viewpoints.seed,
         }
     }
+}
+
+/// The light in which rows are compared where rays are traced in the light of a session; `None` elsewhere, and for a light
+/// that is not known here.
+#[must_use]
+pub fn screening_light(lighting: &str) -> Option<String> {
+    let lighting: Lighting = lighting.parse().ok()?;
+    lighting.is_traced().then(|| Lighting::default().to_string())
 }
 
 fn hash(text: &str) -> String {
     SceneHash::of(text.as_bytes()).to_string()
 }
 
-fn rows(args: &SceneArgs, given_cameras: u32, is_size_fixed: bool) -> Vec<Row> {
+/// The rows that arguments leave, for `given_cameras` cameras of the user's file if there is one. What the user names (methods,
+/// size of sample images, sample cameras) is the same in all rows.
+pub(crate) fn rows(args: &SceneArgs, given_cameras: u32) -> Vec<Row> {
+    let is_size_fixed = args.sample_size.fixed_px().is_some();
     let samplings: Vec<(String, u32)> = match args.sampling {
         Some(sampling) => vec![(sampling.to_string(), 1)],
         None => SamplingMethod::ladder().map(|(name, images)| (name.to_owned(), images)).collect(),

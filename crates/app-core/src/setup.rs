@@ -15,6 +15,7 @@ use sampling::{Rig, SamplingMethod};
 use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec, UpAxis};
 
 use crate::camera_file::{self, Placement};
+use crate::planning::rows;
 use crate::sizes::SampleSize;
 
 /// The size of the sample images, as in the paper.
@@ -139,6 +140,8 @@ impl SceneArgs {
             package: package.into(),
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
             fits_views: self.sample_size == SampleSize::Auto && self.samples.is_none(),
+            rows: rows(self, around.len() as u32),
+            keeps_cameras: self.samples.is_some(),
             volume: scene.bounds(),
             background: scene.background,
             illumination: scene.illumination.clone(),

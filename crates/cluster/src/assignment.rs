@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 use codec::SampleSetId;
 use depth_image::{Camera, PinholeCamera};
 
-use crate::check::{InvalidField, tile_count};
+use crate::check::{InvalidField, text, tile_count};
 use crate::policy::Policy;
 use crate::workload::{SetContent, Workload};
 
@@ -53,6 +53,9 @@ pub struct Assignment {
     /// F: the first F compositors ask samplers for images and relay them to F others each, which relay them in turn.
     /// `None`: all ask samplers.
     pub relay_fanout: Option<NonZeroU32>,
+    /// How the views of all sessions are reconstructed: under a fallback, and in a representation that a budget chose. `None`: as
+    /// each session asks.
+    pub method: Option<String>,
 }
 
 /// A plan on its way to a node, and the workloads that are open when it is sent.
@@ -181,6 +184,7 @@ impl Assignment {
     /// For values that no peer may send: every image has one sampler a set, and there is a compositor.
     pub fn validate(&self) -> Result<(), InvalidField> {
         self.workload.validate()?;
+        text(self.method.as_deref().unwrap_or_default(), "assignment.reconstruction_method")?;
         tile_count(self.tile_count)?;
         let image_count = self.image_count();
         let mut sampled = vec![0u32; image_count];

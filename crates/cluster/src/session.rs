@@ -173,10 +173,8 @@ pub struct SessionPlan {
     pub scene_load_s: f64,
     /// The number of the session's fallback in force, from 1; `None`: the quality that was asked for.
     pub fallback: Option<NonZeroU32>,
-    /// How views are reconstructed: by most sessions, or by every session.
+    /// How views are reconstructed: as the assignment says, else by most sessions.
     pub method: String,
-    /// Every session's views are made by `method`: under a fallback, and by a representation that a budget chose.
-    pub is_method_for_all: bool,
     /// Pictures a second, of those asked for.
     pub frame_rate_ratio: f64,
     /// The exposure of sessions that leave it to the plan: measured when the workload was opened, and the same in all of its

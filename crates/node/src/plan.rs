@@ -321,6 +321,7 @@ pub(crate) mod tests {
             compositors: Vec::new(),
             tile_count: 1,
             relay_fanout: None,
+            method: None,
         }
     }
 

@@ -69,6 +69,25 @@ impl Budget {
         self.most_view_ms.map(|ms| ms / 1e3)
     }
 
+    /// The least strict budget whose keeping keeps both; `None` where the errors of both are not comparable.
+    #[must_use]
+    pub fn and(&self, other: &Self) -> Option<Self> {
+        let error = match (self.error, other.error) {
+            (Some(own), Some(other)) if own.implies(&other) => Some(own),
+            (Some(own), Some(other)) => Some(other).filter(|other| other.implies(&own)),
+            (own, other) => own.or(other),
+        };
+        let has_error = self.error.is_some() || other.error.is_some();
+        let least_ms = [self.most_view_ms, other.most_view_ms].into_iter().flatten().reduce(f64::min);
+        (error.is_some() == has_error).then_some(Self { error, most_view_ms: least_ms })
+    }
+
+    /// Whether what keeps this budget keeps the other as well.
+    #[must_use]
+    pub fn implies(&self, other: &Self) -> bool {
+        self.and(other).as_ref() == Some(self)
+    }
+
     fn add(&mut self, term: &str) -> Result<(), BudgetError> {
         let repeated = |kind| BudgetError::Repeated { term: shown(term), kind };
         match term.split_whitespace().collect::<Vec<_>>()[..] {

@@ -43,3 +43,25 @@ pub trait Pricing {
     /// The price of drawing every view directly. Where views may not be drawn directly it is not finite.
     fn direct(&self) -> Price;
 }
+
+/// The median of each cost.
+#[must_use]
+pub fn median_costs(costs: &[RowCosts]) -> RowCosts {
+    let of = |cost: fn(&RowCosts) -> f64| median(costs.iter().map(cost).collect());
+    RowCosts {
+        sample_image_s: of(|costs| costs.sample_image_s),
+        load_set_s: of(|costs| costs.load_set_s),
+        reconstruct_view_s: of(|costs| costs.reconstruct_view_s),
+    }
+}
+
+/// The median of numbers; 0 without any.
+#[must_use]
+pub fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
+}

@@ -38,10 +38,13 @@ pub(crate) fn seconds(value: f64, field: &'static str) -> Result<(), InvalidFiel
     within(value, 0.0..=MOST_SECONDS, field, "from 0 to 10^6")
 }
 
+/// The most bytes of a name.
+pub(crate) const MAX_NAME_BYTES: usize = 64;
+
 /// A text of 1 to 64 bytes.
 pub(crate) fn name(value: &str, field: &'static str) -> Result<(), InvalidField> {
     match value.len() {
-        1..=64 => Ok(()),
+        1..=MAX_NAME_BYTES => Ok(()),
         length => Err(InvalidField::new(field, format!("of {length} bytes"), "of 1 to 64 bytes")),
     }
 }

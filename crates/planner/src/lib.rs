@@ -33,7 +33,7 @@ pub use bounds::{ERROR_RATE, MAX_ROUNDS, Moments, round_error_rate};
 pub use budget::{Budget, BudgetError, ErrorTerm, Statistic};
 pub use command::{Command, Purpose};
 pub use cost_model::{CostModel, TimedRow};
-pub use costs::{Price, Pricing, RowCosts};
+pub use costs::{Price, Pricing, RowCosts, median, median_costs};
 pub use event::{Event, MAX_PROBE_VIEWS, ProbeId, Probed, Timed};
 pub use invalid::InvalidField;
 pub use kept::{
@@ -42,6 +42,6 @@ pub use kept::{
 pub use ladder::{Ladder, MAX_ROWS, Row};
 pub use metric::{Metric, UnknownMetric};
 pub use outcome::{Choice, Outcome, PromiseState, PruningCheck, RowStatus, RowSummary};
-pub use planner::{PlanRequest, Planner};
+pub use planner::{PlanRequest, Planner, device_name, most_certified};
 pub use view::ProbeView;
 pub use view_errors::ViewErrors;

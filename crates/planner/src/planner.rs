@@ -20,11 +20,11 @@ use crate::cost_model::CostModel;
 use crate::costs::{Price, Pricing};
 use crate::event::{Event, ProbeId};
 use crate::evidence::Evidence;
-use crate::invalid::{InvalidField, name, seconds, within};
-use crate::kept::{KeptKey, KeptSearch};
+use crate::invalid::{InvalidField, MAX_NAME_BYTES, name, seconds, within};
+use crate::kept::{Kept, KeptKey, KeptSearch};
 use crate::ladder::{Ladder, Row};
 use crate::metric::Metric;
-use crate::outcome::{Outcome, RowSummary};
+use crate::outcome::{Choice, Outcome, RowSummary};
 
 /// Views and repetitions with which finalists are timed.
 const TIMED_VIEWS: usize = 32;
@@ -35,6 +35,22 @@ const TOLERANCE: f64 = 1.02;
 const PREDICTED_TOLERANCE: f64 = 1.15;
 /// A measured time below this share of its limit is within it.
 const CLEARLY_IN_TIME: f64 = 0.95;
+
+/// Rows of a round of certificates; fewer where every true view is expensive.
+const MOST_CERTIFIED: usize = 8;
+const MOST_CERTIFIED_TRACED: usize = 3;
+
+/// The rows of a round of certificates, where rays of light are traced and elsewhere.
+#[must_use]
+pub fn most_certified(is_traced: bool) -> usize {
+    if is_traced { MOST_CERTIFIED_TRACED } else { MOST_CERTIFIED }
+}
+
+/// A device's name as plans have it: cut off where it is too long.
+#[must_use]
+pub fn device_name(name: &str) -> String {
+    name[..name.floor_char_boundary(MAX_NAME_BYTES)].to_owned()
+}
 
 /// A plan to make.
 #[derive(Debug, Clone, PartialEq)]
@@ -145,6 +161,12 @@ impl<P: Pricing> Planner<P> {
     #[must_use]
     pub fn summaries(&self) -> Vec<RowSummary> {
         (0..self.rows.len()).map(|row| self.summary(row)).collect()
+    }
+
+    /// What was measured so far, for later plans.
+    #[must_use]
+    pub fn measured(&self) -> Kept {
+        self.kept(Choice::Direct, true)
     }
 
     /// The nodes' time that measuring has taken, in s.

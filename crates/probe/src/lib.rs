@@ -17,7 +17,7 @@ mod subject;
 
 pub use errors_of_views::view_errors;
 pub use plan::{answer, plan};
-pub use prober::{DirectCosts, Measured, ProbeError, Prober, median_costs};
+pub use prober::{DirectCosts, Measured, ProbeError, Prober};
 pub use representation::Representation;
 pub use service::Probers;
 pub use subject::{Light, Subject, Viewpoints};

@@ -3,9 +3,11 @@
 use std::time::Instant;
 
 use depth_image::PinholeCamera;
-use planner::{Command, Event, Kept, Outcome, Planner, Pricing, ProbeId, Probed, Purpose, RowCosts, Timed};
+use planner::{
+    Command, Event, Kept, Outcome, Planner, Pricing, ProbeId, Probed, Purpose, RowCosts, Timed, median_costs,
+};
 
-use crate::prober::{ProbeError, Prober, median_costs};
+use crate::prober::{ProbeError, Prober};
 use crate::representation::Representation;
 use crate::subject::{Light, Viewpoints};
 

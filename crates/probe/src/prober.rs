@@ -12,7 +12,7 @@ use codec::{
 use depth_image::{DepthImage, DepthImageError, PinholeCamera, View, ViewPlanes};
 use metrics::MetricsError;
 use node::{Engine, EngineError, SampleWork, Turn, UploadedSet, ViewWork};
-use planner::{RowCosts, ViewErrors};
+use planner::{RowCosts, ViewErrors, median};
 use rayon::prelude::*;
 
 use crate::errors_of_views::view_errors;
@@ -351,21 +351,4 @@ fn bits(camera: &PinholeCamera) -> CameraBits {
     let lens = [focal_px.x, focal_px.y, principal_px.x, principal_px.y, *near_m];
     let floats = eye_in_world.to_array().into_iter().chain(world_from_camera.to_array()).chain(lens);
     floats.map(f32::to_bits).chain(size_px.to_array()).collect()
-}
-
-/// The median of each cost.
-#[must_use]
-pub fn median_costs(costs: &[RowCosts]) -> RowCosts {
-    let of = |cost: fn(&RowCosts) -> f64| median(costs.iter().map(cost).collect());
-    RowCosts {
-        sample_image_s: of(|costs| costs.sample_image_s),
-        load_set_s: of(|costs| costs.load_set_s),
-        reconstruct_view_s: of(|costs| costs.reconstruct_view_s),
-    }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
 }

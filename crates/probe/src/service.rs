@@ -35,9 +35,7 @@ impl Probers {
     fn taken(&self, probers: &mut VecDeque<Prober>, subject: Subject) -> Prober {
         let found = probers.iter().position(|prober| *prober.subject() == subject);
         let turn = Turn { class: WorkClass::Background, flow: Turn::next_flow() };
-        found
-            .and_then(|place| probers.remove(place))
-            .unwrap_or_else(|| Prober::new(self.engine.clone(), subject, turn))
+        found.and_then(|place| probers.remove(place)).unwrap_or_else(|| Prober::new(self.engine.clone(), subject, turn))
     }
 }
 

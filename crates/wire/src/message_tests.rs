@@ -2,13 +2,13 @@
 
 use std::num::NonZeroU32;
 
-use cluster::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
+use cluster::limits::{MAX_BATCH, MAX_JOINING_EPOCH, MAX_PROBE_VIEWS};
 use cluster::{
-    AchievedTime, ApplyPlan, Assignment, ChangeSession, ClusterStatus, CompositorShare, Costs, InvalidField,
-    JoinCluster, LiveRequest, MeasureCosts, Measured, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings,
-    OfferStatus, Policy, PolicyChoice, Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport, SamplerShare,
-    SceneHash, SceneRef, SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload,
-    WorkloadStatus,
+    AchievedTime, ApplyPlan, Assignment, BudgetRequest, ChangeSession, ClusterStatus, CompositorShare, Costs,
+    InvalidField, JoinCluster, LiveRequest, MeasureCosts, Measured, MeasuredCosts, NodeCondition, NodeStatus,
+    OfferSettings, OfferStatus, Policy, PolicyChoice, ProbeViews, ProbedView, ProbedViews, Promise, PromiseState,
+    Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport, SamplerShare, SceneHash, SceneRef, SessionEvent,
+    SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
 };
 use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
 use depth_image::{
@@ -92,6 +92,7 @@ fn assignment() -> Assignment {
         }],
         tile_count: 1,
         relay_fanout: None,
+        method: Some("joint_carve:1".to_owned()),
     }
 }
 
@@ -126,6 +127,19 @@ fn request() -> SessionRequest {
         }],
         forced_tile_count: Some(2),
         viewpoints: vec![camera(); 2],
+        budget: BudgetRequest { budget: Some("flip 0.05".to_owned()), names_method: true, names_sampling: false },
+    }
+}
+
+fn promise() -> Promise {
+    Promise {
+        budget: "flip 0.05".to_owned(),
+        state: PromiseState::Kept,
+        representation: "conventional, S = 4".to_owned(),
+        expected_ratio: 0.03,
+        bound_ratio: 0.04,
+        probe_view_count: 64,
+        reason: "it is the cheapest".to_owned(),
     }
 }
 
@@ -175,6 +189,7 @@ fn messages_survive_the_round_trip() {
         conditions: vec![condition],
         achieved: vec![AchievedTime { policy: Policy::TimeShare, busy_s: 0.3 }],
         utilisation: Some(0.6),
+        promise: Some(promise()),
         one_more_viewer: 0.02,
     };
     let waiting = WorkloadStatus { number: 4, ..WorkloadStatus::default() };
@@ -187,6 +202,8 @@ fn messages_survive_the_round_trip() {
         reason: "corrupt".to_owned(),
     };
     assert_eq!(read::<SamplerReport, _>(to_message::<proto::ReportSamplerRequest, _>(report.clone())), Ok(report));
+    let promised = SessionEvent::Promise(promise());
+    assert_eq!(read::<SessionEvent, _>(to_message::<proto::OpenSessionResponse, _>(promised.clone())), Ok(promised));
     let opened = SessionEvent::Opened { session: 7 };
     assert_eq!(read::<SessionEvent, _>(to_message::<proto::OpenSessionResponse, _>(opened.clone())), Ok(opened));
     let change =
@@ -512,6 +529,35 @@ fn zeros_and_empty_texts_of_the_wire_become_none() {
         assert_eq!(message.sample_row_shares, Some(proto::RowShares::default()));
         assert_eq!(read::<Costs, _>(message), Ok(costs));
     }
+}
+
+#[test]
+fn probes_survive_the_round_trip_and_impossible_ones_are_refused_by_field() {
+    let probe = |views: usize| ProbeViews {
+        workload: workload(),
+        method: "joint_carve".to_owned(),
+        codec: "lz4".to_owned(),
+        compared_lighting: "phong".to_owned(),
+        views: vec![camera(); views],
+        antialias: Antialias::MOST,
+        with_errors: true,
+    };
+    let sent = |probe: ProbeViews| read::<ProbeViews, _>(to_message::<proto::ProbeViewsRequest, _>(probe));
+    assert_eq!(sent(probe(MAX_PROBE_VIEWS)), Ok(probe(MAX_PROBE_VIEWS)));
+    for views in [0, MAX_PROBE_VIEWS + 1] {
+        assert!(sent(probe(views)).unwrap_err().to_string().contains("views"));
+    }
+    let view =
+        ProbedView { foreground_ratio: 0.5, flip: 0.1, flip_whole: 0.05, mean_square: 0.01, disoccluded_ratio: 0.02 };
+    let answer = |view| ProbedViews { views: vec![view; 2], costs: session_plan().costs, busy_s: 0.2 };
+    let answered = |answer| read::<ProbedViews, _>(to_message::<proto::ProbeViewsResponse, _>(answer));
+    assert_eq!(answered(answer(view)), Ok(answer(view)));
+    for flip in [f64::NAN, -0.1, 1.1] {
+        assert!(answered(answer(ProbedView { flip, ..view })).unwrap_err().to_string().contains("views.flip"));
+    }
+    let mean_square = f64::INFINITY;
+    let refused = answered(answer(ProbedView { mean_square, ..view })).unwrap_err();
+    assert!(refused.to_string().contains("views.mean_square"));
 }
 
 #[test]

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use anyhow::Context as _;
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use metrics::{DepthErrors, depth_errors};
-use planner::{Ladder, Metric, Price, Pricing, Row, RowCosts, ViewErrors};
-use probe::{Light, Prober, Representation, median_costs, view_errors};
+use planner::{Ladder, Metric, Price, Pricing, Row, RowCosts, ViewErrors, median_costs};
+use probe::{Light, Prober, Representation, view_errors};
 use rayon::prelude::*;
 
 use crate::evaluation::known_depth;

@@ -14,6 +14,7 @@ use coordinator::{CoordinatorConfig, CoordinatorMetrics, EventLog, Observers};
 use node::Telemetry;
 use tokio_util::sync::CancellationToken;
 
+use crate::budget::BudgetArgs;
 use crate::viewer::ViewerArgs;
 
 /// Serves a scene and plans the work of the nodes that join. A coordinator draws nothing and needs no device.
@@ -45,6 +46,8 @@ pub struct CoordinatorArgs {
     #[arg(long)]
     insecure_bind: bool,
     #[command(flatten)]
+    budget: BudgetArgs,
+    #[command(flatten)]
     viewer: ViewerArgs,
 }
 
@@ -61,12 +64,13 @@ pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
     }
     drop(scenes);
     let shutdown = CancellationToken::new();
-    let config = CoordinatorConfig {
+    let config = args.budget.configure(CoordinatorConfig {
         insecure_bind: args.insecure_bind,
         reflection: args.reflection,
         max_sessions: args.max_sessions,
         max_workloads: args.max_workloads,
-    };
+        ..CoordinatorConfig::default()
+    });
     let log = args.record.as_deref().map(event_log).transpose()?;
     let telemetry = Telemetry::default();
     let metrics = CoordinatorMetrics::new(&telemetry);

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use app_core::exit::Outcome;
-use app_core::plan_files::PlanFiles;
 use app_core::planning::{PlannedViews, Planning, one_node};
 use app_core::setup::{DeviceArgs, SceneArgs, Setup};
 use app_core::sizes::SizePx;
@@ -18,10 +17,11 @@ use engine::GpuEngine;
 use indicatif::ProgressBar;
 use node::{Engine as _, Turn, WorkClass};
 use output::Output;
-use planner::{Budget, Kept, Planner, Pricing as _, PromiseState};
+use planner::{Budget, Kept, Planner, Pricing as _, PromiseState, device_name};
 use probe::Prober;
 
 use super::view::rate;
+use crate::budget::PlansArgs;
 
 /// Seconds for which a viewer is shown one set of a still scene, as far as costs are concerned.
 const STILL_SET_S: f64 = 60.0;
@@ -62,9 +62,8 @@ pub struct PlanArgs {
     /// The seed of the random views
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u64,
-    /// The folder of measurements, which later plans use again [default: myriorama/plans in the folder for caches]
-    #[arg(long, value_name = "DIR")]
-    plans: Option<PathBuf>,
+    #[command(flatten)]
+    plans: PlansArgs,
     /// The folder of samples.json and rows.csv
     #[arg(long, default_value = "out/plan", value_name = "DIR")]
     out: PathBuf,
@@ -92,10 +91,6 @@ impl PlanArgs {
             Some(hz) => (hz * STILL_SET_S).ceil() as usize,
         }
     }
-
-    fn plan_files(&self) -> Option<PlanFiles> {
-        self.plans.clone().or_else(PlanFiles::default_folder).map(PlanFiles::at)
-    }
 }
 
 /// Plans, prints and writes.
@@ -117,8 +112,8 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
     let mut prober = Prober::new(engine.clone(), planning.subject.clone(), Turn::of(WorkClass::Batch));
     let direct = prober.direct_costs(&planning.viewpoints)?;
     let pricing = one_node(args.views_a_set(&setup), direct);
-    let request = planning.request(args.budget, device_name(&engine), pricing.views_a_set, args.allowance);
-    let files = args.plan_files();
+    let request = planning.request(args.budget, device_name(&engine.device_name()), pricing.views_a_set, args.allowance);
+    let files = args.plans.files();
     let remembered = files.as_ref().map_or_else(|| Kept::empty(planning.key()), |files| files.read(&planning.key()));
     let mut planner = Planner::new(request, planning.ladder.clone(), pricing)?;
     let progress = ProgressBar::new_spinner();
@@ -135,9 +130,4 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
     output.write(&planner.summaries(), pricing.direct())?;
     println!("\n{:.1} s of measuring; all rows are in {}", planner.spent_s(), args.out.join("rows.csv").display());
     Ok(Outcome::of(outcome.state == PromiseState::Kept))
-}
-
-/// The device's name, as far as kept measurements have room for it.
-fn device_name(engine: &GpuEngine) -> String {
-    engine.device_name().chars().take(64).filter(char::is_ascii).collect()
 }

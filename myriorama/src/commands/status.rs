@@ -131,7 +131,8 @@ fn workload_text(workload: &WorkloadStatus, nodes: &[NodeStatus]) -> anyhow::Res
         }
     }
     let why = workload.plan.as_ref().map_or("No plan: no node can serve it now.", |plan| &plan.reason);
-    Ok(format!("{}\n\n{why}\n{}", table.to_text(), achieved(workload)))
+    let promise = workload.promise.as_ref().map_or_else(String::new, |promise| format!("\n{promise}"));
+    Ok(format!("{}\n\n{why}{promise}\n{}", table.to_text(), achieved(workload)))
 }
 
 /// Times that policies achieved, and the load of the nodes.

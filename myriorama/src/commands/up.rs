@@ -10,10 +10,12 @@ use app_core::scenes::ScenesArgs;
 use app_core::setup::DeviceArgs;
 use app_core::view_limits::ViewLimitArgs;
 use clap::Args;
+use coordinator::CoordinatorConfig;
 use engine::GpuEngine;
 use node::{Engine as _, NodeConfig, Quotas};
 use tokio_util::sync::CancellationToken;
 
+use crate::budget::BudgetArgs;
 use crate::viewer::ViewerArgs;
 
 /// Serves until ctrl-c or SIGTERM, then drains for at most 10 s.
@@ -39,6 +41,8 @@ pub struct UpArgs {
     /// Serves without TLS on an address that others can reach
     #[arg(long)]
     insecure_bind: bool,
+    #[command(flatten)]
+    budget: BudgetArgs,
     #[command(flatten)]
     viewer: ViewerArgs,
 }
@@ -67,7 +71,9 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     };
     let device_name = engine.device_name();
     let (port, browsers) = args.viewer.share(listener);
-    let mut cluster = Cluster::start(configure, port, offers, engine.opener(), nodes, args.insecure_bind).await?;
+    let config = CoordinatorConfig { insecure_bind: args.insecure_bind, ..CoordinatorConfig::default() };
+    let config = args.budget.configure(config);
+    let mut cluster = Cluster::start(configure, port, config, offers, engine.opener(), nodes).await?;
     println!("{nodes} nodes on {device_name}, at {}", cluster.address);
     let viewer = args.viewer.serve(browsers, &cluster.address, CancellationToken::new());
     tokio::select! {

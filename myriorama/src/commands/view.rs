@@ -85,12 +85,13 @@ async fn pictures(args: &ViewArgs, signals: &StopSignals) -> anyhow::Result<Outc
         println!("{} views are in {} already", record.total(), args.out.display());
         record.save()?;
     }
+    let is_kept = record.unkept_promise().map_or(Ok(()), |promise| Err(anyhow::anyhow!("{promise}")));
     if !args.compare {
-        return Ok(Outcome::Done);
+        return is_kept.map(|()| Outcome::Done);
     }
     job.expose(&record);
     match until(&signals.first, compare(args, &job, record.total())).await? {
-        Some(outcome) => Ok(outcome),
+        Some(outcome) => is_kept.map(|()| outcome),
         None => {
             eprintln!("{}", how_to_resume(&record, &args.out));
             Ok(Outcome::Interrupted)
@@ -106,7 +107,12 @@ async fn write_missing(
     signals: &StopSignals,
 ) -> anyhow::Result<Ended> {
     let Some(session) = until(&signals.first, job.open()).await? else { return Ok(Ended::Stopped) };
+    let wait = job.wait_for_promise(&session, Duration::from_secs_f64(args.promise_wait));
+    if until(&signals.first, wait).await?.is_none() {
+        return Ok(Ended::Stopped);
+    }
     record.set_tone(session.tone());
+    record.set_promise(session.promise());
     // A record of other pictures does not outlive them.
     record.save()?;
     let progress = ProgressBar::new(record.total());
@@ -122,6 +128,7 @@ async fn write_missing(
         record.save_if_due()
     };
     let received = until(&signals.first, receive_requests(&session, missing, received)).await;
+    record.set_promise(session.promise());
     let finished = finish(&mut writer, record).await;
     progress.finish_and_clear();
     let seconds = received.and_then(|received| finished.map(|()| received))?;
@@ -158,6 +165,7 @@ async fn follow(args: &ViewArgs, session: &Session, path: Vec<PinholeCamera>) ->
     std::fs::write(&file, record.frames()?.to_csv()?).with_context(|| format!("cannot write {}", file.display()))?;
     let latencies = live::latencies("From pose to picture", record.shown.iter())?;
     println!("{}\n\n{}", latencies.to_text(), record.summary());
+    session.promise().into_iter().for_each(|promise| println!("{promise}"));
     if let Some(error) = record.error {
         return Err(error.into());
     }

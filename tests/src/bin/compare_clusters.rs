@@ -160,6 +160,7 @@ fn request(row: Row, typical_view: PinholeCamera) -> SessionRequest {
         fallbacks: Vec::new(),
         forced_tile_count: Some(row.tile_count),
         viewpoints: Vec::new(),
+        budget: cluster::BudgetRequest::default(),
     }
 }
 

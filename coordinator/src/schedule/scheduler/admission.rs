@@ -5,6 +5,7 @@ use cluster::limits::MAX_CELLS;
 use depth_image::PinholeCamera;
 
 use super::Scheduler;
+use crate::schedule::budgeted::Budgeted;
 use crate::schedule::choose::check;
 use crate::schedule::workload_state::WorkloadState;
 use crate::schedule::{ChoiceError, Demand, NodeCosts, Opening, PolicyOverride, choose};
@@ -64,8 +65,13 @@ impl Scheduler {
     ///
     /// # Errors
     /// Where it would be one workload too many.
-    pub fn admits_workload(&self, workload: &Workload, follows_viewers: bool) -> Result<(), ChoiceError> {
-        let is_open = self.workloads.values().any(|open| open.is_shared_by(workload, follows_viewers));
+    pub fn admits_workload(
+        &self,
+        workload: &Workload,
+        budgeted: Option<&Budgeted>,
+        follows_viewers: bool,
+    ) -> Result<(), ChoiceError> {
+        let is_open = self.workloads.values().any(|open| open.is_shared_by(workload, budgeted, follows_viewers));
         if is_open || self.workloads.len() < self.max_workloads {
             return Ok(());
         }
@@ -74,14 +80,16 @@ impl Scheduler {
 
     /// The workload that a session belongs to, if it is open.
     pub(super) fn workload_for(&self, opening: &Opening) -> Option<u64> {
-        let is_shared = |open: &WorkloadState| open.is_shared_by(&opening.workload, !opening.viewpoints.is_empty());
+        let is_shared = |open: &WorkloadState| {
+            open.is_shared_by(&opening.workload, opening.budgeted.as_ref(), !opening.viewpoints.is_empty())
+        };
         self.workloads.iter().find(|(_, workload)| is_shared(workload)).map(|(&number, _)| number)
     }
 
     /// Whether a session can be served.
     pub(super) fn check(&self, opening: &Opening) -> Result<(), ChoiceError> {
         let Some(number) = self.workload_for(opening) else {
-            self.admits_workload(&opening.workload, !opening.viewpoints.is_empty())?;
+            self.admits_workload(&opening.workload, opening.budgeted.as_ref(), !opening.viewpoints.is_empty())?;
             let alone = NodeCosts { costs: opening.costs, ..NodeCosts::default() };
             let nodes = vec![alone; self.usable().count()];
             return self.admit(&Change { before: None, after: WorkloadState::new(self.now, opening), nodes });
@@ -106,7 +114,7 @@ impl Scheduler {
     /// Whether a demand can be met; that of sessions with a rate, beside all others, at their last fallback.
     fn admit(&self, change: &Change<'_>) -> Result<(), ChoiceError> {
         let Change { before, after, nodes } = change;
-        let policy_override = after.sessions.policy_override();
+        let policy_override = after.policy_override();
         check(&Demand { load: after.load(), nodes, policy_override, current: None })?;
         if let Some(cells) = after.cell_count().filter(|&cells| cells > MAX_CELLS) {
             return Err(ChoiceError::Cells { cells });
@@ -141,7 +149,7 @@ fn promised(workload: &WorkloadState, nodes: &[NodeCosts]) -> f64 {
         return 0.0;
     }
     let load = workload.rated_load();
-    let policy_override = workload.sessions.policy_override().possible(&load, nodes.len());
+    let policy_override = workload.policy_override().possible(&load, nodes.len());
     let of_viewers = |node: &NodeCosts| NodeCosts { costs: workload.of_viewers(&node.costs), ..*node };
     let nodes: Vec<NodeCosts> = nodes.iter().map(of_viewers).collect();
     let choice = choose(&Demand { load, nodes: &nodes, policy_override, current: None });

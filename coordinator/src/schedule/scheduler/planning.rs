@@ -136,7 +136,7 @@ impl Scheduler {
             relay_fanout: active.plan.assignment.relay_fanout,
         });
         let load = workload.load();
-        let policy_override = workload.sessions.policy_override().possible(&load, names.len());
+        let policy_override = workload.policy_override().possible(&load, names.len());
         Some(PlanningSnapshot { names, nodes: self.costs_now(number), current, load, policy_override })
     }
 
@@ -217,7 +217,8 @@ impl Scheduler {
         let nodes = self.serving(workload).map(|(_, member)| &member.status).zip(self.costs_now(number));
         let candidates: Vec<_> = nodes.map(|(node, costs)| Candidate { node, costs }).collect();
         let members = self.serving(workload).map(|(name, member)| (name.clone(), member.incarnation)).collect();
-        let assignment = assignment(self.plan_epoch + 1, number, workload.degraded(), choice, &candidates);
+        let mut assignment = assignment(self.plan_epoch + 1, number, workload.degraded(), choice, &candidates);
+        assignment.method = workload.common_method();
         let old = workload.active_plan.as_ref();
         let slowest = candidates.iter().fold(Costs::default(), |slowest, node| slowest.max(node.costs.costs));
         let again = if old.is_some() { format!(" Planned again: {why}.") } else { String::new() };

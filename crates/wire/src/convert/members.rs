@@ -2,8 +2,8 @@
 
 use cluster::limits::{MAX_BATCH, MAX_PROBE_VIEWS, MAX_SCENES, MAX_VIEWPOINTS, MAX_WORKLOADS};
 use cluster::{
-    AchievedTime, ClusterStatus, JoinCluster, MeasureCosts, Measured, NodeCondition, NodeStatus, ProbeViews, ProbedView, ProbedViews, Ready, SamplerReport,
-    Welcome, WorkReport, WorkloadStatus, at_most,
+    AchievedTime, ClusterStatus, JoinCluster, MeasureCosts, Measured, NodeCondition, NodeStatus, ProbeViews,
+    ProbedView, ProbedViews, Ready, SamplerReport, Welcome, WorkReport, WorkloadStatus, at_most,
 };
 
 use crate::error::{PROTOCOL_VERSION, check_version};

@@ -2,7 +2,9 @@
 
 use std::num::NonZeroU32;
 
-use cluster::{BudgetRequest, InvalidField, MeasuredCosts, NodeStatus, OfferSettings, SamplePlanes, SceneHash, at_most};
+use cluster::{
+    BudgetRequest, InvalidField, MeasuredCosts, NodeStatus, OfferSettings, SamplePlanes, SceneHash, at_most,
+};
 use codec::{InverseDepthRange, SampleSetId};
 use depth_image::{Antialias, ExposureEv, PinholeCamera, ToneCurve, ToneMapping, ViewPlanes};
 use glam::{DVec3, UVec2};

@@ -2,8 +2,8 @@
 
 use cluster::limits::{MAX_FALLBACKS, MAX_SAMPLE_CAMERAS, MAX_VIEWPOINTS};
 use cluster::{
-    ChangeSession, OfferStatus, PolicyChoice, Promise, PromiseState, Quality, SessionEvent, SessionPlan, SessionRequest, SessionStage,
-    at_most, reason,
+    ChangeSession, OfferStatus, PolicyChoice, Promise, PromiseState, Quality, SessionEvent, SessionPlan,
+    SessionRequest, SessionStage, at_most, reason,
 };
 
 use super::{Convert, required};
@@ -38,7 +38,7 @@ messages! {
     SessionPlan = SessionPlan {
         assignment as "plan.assignment", costs as "plan.costs", reason, predicted_pipeline_s, predicted_direct_s,
         predicted_time_share_s, k_fd_sampler_count, predicted_k_fd_s, enumerated_sampler_count, predicted_enumerated_s,
-        scene_load_s, frame_rate_ratio, is_method_for_all; fallback: fallback_number, method: reconstruction_method, auto_exposure: auto_exposure_ev
+        scene_load_s, frame_rate_ratio; fallback: fallback_number, method: reconstruction_method, auto_exposure: auto_exposure_ev
     }, then SessionPlan::validate;
     Promise = Promise {
         budget, state, representation, expected_ratio, bound_ratio, probe_view_count, reason

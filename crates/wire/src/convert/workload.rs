@@ -28,7 +28,7 @@ messages! {
     }, then Workload::validate;
     Assignment = Assignment {
         plan_epoch, workload_number, policy, workload as "assignment.workload", samplers, compositors, tile_count;
-        relay_fanout: relay_fanout_count
+        relay_fanout: relay_fanout_count, method: reconstruction_method
     }, first |a| {
         a.tile_count = a.tile_count.max(1);
         at_most(a.samplers.len(), MAX_NODES, "samplers")?;

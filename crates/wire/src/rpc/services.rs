@@ -3,8 +3,8 @@
 use std::pin::Pin;
 
 use cluster::{
-    ApplyPlan, ChangeSession, ClusterStatus, FetchImages, FetchScene, JoinCluster, MeasureCosts, Measured, ProbeViews, ProbedViews, Ready,
-    RenderViews, SamplerReport, ScenePart, SessionEvent, SessionRequest, Welcome, WorkReport,
+    ApplyPlan, ChangeSession, ClusterStatus, FetchImages, FetchScene, JoinCluster, MeasureCosts, Measured, ProbeViews,
+    ProbedViews, Ready, RenderViews, SamplerReport, ScenePart, SessionEvent, SessionRequest, Welcome, WorkReport,
 };
 use codec::{Chunk, FramePart};
 use tokio_stream::{Stream, StreamExt as _};

@@ -11,6 +11,7 @@ use cluster::{OfferStatus, PolicyChoice};
 use codec::FrameCodec;
 use depth_image::{Antialias, Camera, PinholeCamera, ViewCell, ViewPlanes};
 use glam::{DVec3, Vec3};
+use planner::Budget;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 
@@ -77,6 +78,14 @@ pub struct ViewArgs {
     /// The policy: pipeline, direct, time-share, or auto (the fastest by prediction)
     #[arg(long, default_value = "auto", value_name = "NAME")]
     pub(super) policy: PolicyChoice,
+    /// The most error, and the most time of a view, as in "flip 0.05" (see `myriorama plan --help`): the cluster chooses what
+    /// is sampled, and how views are reconstructed unless --method says so. Pictures wait for the choice. Where it is not
+    /// kept, they are written all the same, and the exit status is 3 [default: the coordinator's]
+    #[arg(long, value_name = "BUDGET")]
+    pub(super) budget: Option<Budget>,
+    /// With --budget: the longest wait for the choice
+    #[arg(long, default_value_t = 60.0, value_name = "S", value_parser = wait)]
+    pub(super) promise_wait: f64,
     /// Tiles of every sample image, shared among samplers [default: the fastest by prediction]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16))]
     pub(super) tiles: Option<u32>,
@@ -111,6 +120,10 @@ impl ViewArgs {
 
 pub(in crate::commands) fn rate(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|hz| (0.01..=1000.0).contains(hz)).ok_or_else(|| "expected 0.01 to 1000".to_owned())
+}
+
+fn wait(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|s| (0.0..=86_400.0).contains(s)).ok_or_else(|| "expected 0 to 86400".to_owned())
 }
 
 fn duration(text: &str) -> Result<f64, String> {

@@ -4,7 +4,7 @@ use anyhow::Context as _;
 use app_core::delivery::{open, receive_requests, requests};
 use app_core::exit::Outcome;
 use client::Frame;
-use cluster::{DIRECT, PolicyChoice, SessionRequest};
+use cluster::{BudgetRequest, DIRECT, PolicyChoice, SessionRequest};
 use depth_image::ViewPlanes;
 
 use super::args::ViewArgs;
@@ -17,8 +17,9 @@ use crate::comparison;
 pub(super) async fn compare(args: &ViewArgs, job: &Job, views: u64) -> anyhow::Result<Outcome> {
     // Depth tells where a surface is.
     let planes = ViewPlanes { inverse_depth: true, ..job.request.planes };
+    let budget = BudgetRequest { budget: None, names_method: true, names_sampling: false };
     let direct =
-        SessionRequest { method: DIRECT.to_owned(), policy: PolicyChoice::Auto, planes, ..job.request.clone() };
+        SessionRequest { method: DIRECT.to_owned(), policy: PolicyChoice::Auto, planes, budget, ..job.request.clone() };
     let session = open(&job.client, direct).await?;
     let mut rows = Vec::with_capacity(views as usize);
     let received = async |frame: Frame| {

@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use app_core::delivery::{at_rate, open, request, viewpoints};
 use app_core::exit::BadInput;
 use client::{Client, Session};
-use cluster::{OfferStatus, SessionRequest, Timeline};
+use cluster::{BudgetRequest, OfferStatus, PromiseState, SessionRequest, Timeline};
 use depth_image::PinholeCamera;
 use render::Lighting;
 
@@ -49,6 +49,22 @@ impl Job {
         let plan = session.plan();
         println!("plan {}: {}", plan.assignment.plan_epoch, plan.reason);
         Ok(session)
+    }
+
+    /// Waits until the promise of a session with a budget is settled, or for the longest time.
+    pub(super) async fn wait_for_promise(&self, session: &Session, longest: Duration) -> anyhow::Result<()> {
+        if self.request.budget.budget.is_none() {
+            return Ok(());
+        }
+        let settled = async {
+            let mut promise = session.promise();
+            while promise.as_ref().is_none_or(|promise| promise.state == PromiseState::Measuring) {
+                promise = Some(session.another_promise(promise.as_ref()).await);
+            }
+        };
+        let _ = tokio::time::timeout(longest, settled).await;
+        session.promise().into_iter().for_each(|promise| println!("{promise}"));
+        Ok(())
     }
 
     /// Shows all views at one exposure, once it is known: those of later sessions, too.
@@ -102,7 +118,16 @@ fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamer
         ..request
     };
     // Metrics are of light as it is, unless the arguments say otherwise.
+    let request = with_budget(request, args);
     Ok(if args.compare { args.tone.for_metrics(request) } else { args.tone.for_people(request) })
+}
+
+/// A session with a budget has no fallbacks: it is promised what it gets.
+fn with_budget(request: SessionRequest, args: &ViewArgs) -> SessionRequest {
+    let budget = args.budget.map(|budget| budget.to_string());
+    let fallbacks = if budget.is_some() { Vec::new() } else { request.fallbacks.clone() };
+    let names_method = args.method.is_some();
+    SessionRequest { budget: BudgetRequest { budget, names_method, names_sampling: false }, fallbacks, ..request }
 }
 
 /// A picture that is refined stands still: motion would begin the refinement anew.

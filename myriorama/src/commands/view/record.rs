@@ -8,6 +8,7 @@ use app_core::camera_record::{self, NamedCamera};
 use app_core::delivery::requests;
 use app_core::exit::BadInput;
 use client::ViewRequest;
+use cluster::{Promise, PromiseState};
 use depth_image::{ExposureEv, PinholeCamera, ToneMapping, ViewPlanes};
 use glam::DVec3;
 use serde_json::{Map, Value, json};
@@ -37,6 +38,8 @@ pub(super) struct Record {
     planes: ViewPlanes,
     /// `None`: it is the plan's, and not known yet.
     exposure: Option<ExposureEv>,
+    /// What was promised when the last of these pictures came.
+    promise: Option<Promise>,
     /// The scale of each written view's depth picture, per metre; 0 without that picture. `None`: the view is not written.
     written: Vec<Option<f32>>,
     count: u64,
@@ -63,7 +66,7 @@ impl Record {
         }
         let (folder, written) = (folder.to_owned(), vec![None; total as usize]);
         let next_save = Instant::now() + PAUSE;
-        let exposure = None;
+        let (exposure, promise) = (None, None);
         Ok(Self {
             folder,
             origin_in_source,
@@ -72,6 +75,7 @@ impl Record {
             set_count,
             planes,
             exposure,
+            promise,
             written,
             count: 0,
             next_save,
@@ -97,6 +101,16 @@ impl Record {
     pub(super) fn set_tone(&mut self, tone: ToneMapping) {
         self.exposure = Some(tone.exposure);
         self.planes.tone = tone;
+    }
+
+    /// Notes what is promised.
+    pub(super) fn set_promise(&mut self, promise: Option<Promise>) {
+        self.promise = promise;
+    }
+
+    /// The promise, where it is not kept.
+    pub(super) fn unkept_promise(&self) -> Option<&Promise> {
+        self.promise.as_ref().filter(|promise| promise.state == PromiseState::Unreachable)
     }
 
     /// Requests of the views that are not written.
@@ -174,6 +188,9 @@ impl Record {
             let curve = self.planes.tone.curve.to_string();
             about.insert(TONE.to_owned(), json!({ "curve": curve, EXPOSURE_EV: exposure.ev() }));
         }
+        if let Some(promise) = &self.promise {
+            about.insert("promise".to_owned(), described(promise));
+        }
         let written = (0..).zip(&self.written);
         let cameras = written.filter_map(|(number, scale)| Some(self.named(number, (*scale)?)));
         camera_record::write(&self.folder.join(FILE_NAME), cameras, self.origin_in_source, about)?;
@@ -194,6 +211,14 @@ impl Record {
         }
         NamedCamera { file_path: files.color, camera: self.cameras[(number % views) as usize], more }
     }
+}
+
+fn described(promise: &Promise) -> Value {
+    json!({
+        "budget": promise.budget, "state": promise.state.to_string(), "representation": promise.representation,
+        "expected_ratio": promise.expected_ratio, "bound_ratio": promise.bound_ratio,
+        "probe_view_count": promise.probe_view_count, "reason": promise.reason,
+    })
 }
 
 /// The exposure that a record names; `None` for one that is out of its limits.

@@ -16,6 +16,7 @@ pub(super) fn of(request: &SessionRequest, offer: &OfferStatus) -> Map<String, V
         ("sampling", request.sampling.clone()),
         ("lighting", request.lighting.clone()),
         ("method", request.method.clone()),
+        ("budget", request.budget.budget.clone().unwrap_or_default()),
         ("policy", request.policy.to_string()),
         ("codec", request.codec.clone()),
         ("antialias", planes.antialias.to_string()),

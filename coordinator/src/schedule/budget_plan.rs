@@ -1,0 +1,336 @@
+//! The plan for a workload's budget: what is measured for it, and what it may cost.
+
+use std::time::Duration;
+
+use cluster::{InvalidField, MeasureCosts, ProbeViews, SceneHash, Workload};
+use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
+use glam::{DVec3, Vec3};
+use planner::{
+    Budget, Choice, Command as PlannerCommand, Event as PlannerEvent, Kept, KeptKey, Outcome, PlanRequest, Planner,
+    ProbeId, ProbeView, Purpose, Row, most_certified,
+};
+
+use super::budgeted::Budgeted;
+use super::prices::EqualNodes;
+use super::workload_state::WorkloadState;
+
+/// Measuring for a plan may take this long, or so many directly drawn views and sets as a plan needs.
+const LEAST_ALLOWANCE_S: f64 = 30.0;
+const ALLOWED_VIEWS: f64 = 100.0;
+const ALLOWED_SETS: f64 = 12.0;
+/// The share of the nodes' time that measuring may take beyond.
+const ALLOWED_SHARE: f64 = 0.05;
+/// While anybody is served, measuring takes this share of one node's time.
+const PROBING_SHARE: f64 = 0.2;
+/// A measurement is asked for again after this pause, and fails where nodes were lost so often.
+const PAUSE: Duration = Duration::from_secs(1);
+const MOST_LOST: u32 = 5;
+/// A still set serves a viewer for about so long, as far as costs are concerned.
+const STILL_SET_S: f64 = 60.0;
+/// Views of one measured call of the chosen representation's costs, at most.
+const MEASURED_BATCH: u32 = 32;
+
+/// A plan that is made or was made.
+#[derive(Debug, Clone)]
+pub(super) struct BudgetPlan {
+    /// No two plans have the same.
+    pub(super) number: u64,
+    pub(super) budget: Budget,
+    /// The device that measures.
+    pub(super) device_name: String,
+    pub(super) prices: EqualNodes,
+    pub(super) began: Duration,
+    /// The result, once there is one.
+    pub(super) outcome: Option<Outcome>,
+    budgeted: Budgeted,
+    /// The workload as sessions ask for it, and the cells that are planned for.
+    workload: Workload,
+    cells: Vec<ViewCell>,
+    planner: Planner<EqualNodes>,
+    allowance_s: f64,
+    /// The measurement that is asked for, and whether a node makes it.
+    asked: Option<PlannerCommand>,
+    is_running: bool,
+    not_before: Duration,
+    lost: u32,
+}
+
+/// Measurements that one node is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewProbe {
+    /// The workload.
+    pub workload_number: u64,
+    /// The measurement.
+    pub id: ProbeId,
+    /// The node that measures.
+    pub node_name: String,
+    /// Where the node is reached.
+    pub address: String,
+    /// Views that are compared, in the order of the request; none where rows are only timed.
+    pub views: Vec<ProbeView>,
+    /// Each row's place in the ladder, and its request. They are timed in turn.
+    pub requests: Vec<(usize, ProbeViews)>,
+    /// How often they are timed.
+    pub repeats: usize,
+}
+
+impl BudgetPlan {
+    /// A plan that waits for the measurements of earlier plans.
+    pub(super) fn begin(
+        now: Duration,
+        number: u64,
+        workload: &WorkloadState,
+        (budget, device_name): (Budget, &str),
+    ) -> Result<Self, InvalidField> {
+        let missing = || InvalidField::Missing { field: "budget" };
+        let budgeted = workload.budgeted.clone().ok_or_else(missing)?;
+        let (costs, cells) = (&workload.costs, workload.planned_cells());
+        if cells.is_empty() {
+            return Err(InvalidField::Missing { field: "viewpoints" });
+        }
+        let images = workload.requested.sample_cameras.len() as f64;
+        let needed_s = ALLOWED_VIEWS * costs.direct_view_s + ALLOWED_SETS * images * costs.sample_image_s;
+        let allowance_s = needed_s.max(LEAST_ALLOWANCE_S);
+        let prices = prices(workload);
+        let is_traced = budgeted.screening_lighting != workload.requested.lighting;
+        let request = PlanRequest {
+            plan: number,
+            budget,
+            key: key(&budgeted, &workload.requested, &cells),
+            device: planner::device_name(device_name),
+            program_version: env!("CARGO_PKG_VERSION").to_owned(),
+            pricing: format!("{} nodes, {} views a set", prices.nodes, prices.views_a_set),
+            allowance_s,
+            most_certified: most_certified(is_traced),
+            seed: 0,
+        };
+        let planner = Planner::new(request, budgeted.ladder()?, prices)
+            .map_err(|error| InvalidField::out_of_range("budget", error, "a plan"))?;
+        let (workload, device_name) = (workload.requested.clone(), device_name.to_owned());
+        let (asked, outcome, lost, is_running) = (None, None, 0, false);
+        let (began, not_before) = (now, now);
+        Ok(Self {
+            number,
+            budget,
+            device_name,
+            prices,
+            began,
+            outcome,
+            budgeted,
+            workload,
+            cells,
+            planner,
+            allowance_s,
+            asked,
+            is_running,
+            not_before,
+            lost,
+        })
+    }
+
+    pub(super) fn key(&self) -> KeptKey {
+        key(&self.budgeted, &self.workload, &self.cells)
+    }
+
+    /// What is known so far, in words.
+    pub(super) fn reason(&self) -> String {
+        self.outcome.as_ref().map_or_else(|| self.planner.outcome().reason, |outcome| outcome.reason.clone())
+    }
+
+    pub(super) fn row(&self, choice: Choice) -> Option<&Row> {
+        match choice {
+            Choice::Row(row) => self.budgeted.rows.get(row),
+            Choice::Direct => None,
+        }
+    }
+
+    /// What was measured so far, where the plan is not made yet: it would be lost otherwise.
+    pub(super) fn unfinished(&self) -> Option<Kept> {
+        let has_measured = self.outcome.is_none() && self.planner.spent_s() > 0.0;
+        has_measured.then(|| self.planner.measured())
+    }
+
+    pub(super) fn is_running(&self) -> bool {
+        self.is_running
+    }
+
+    /// Takes an event. Gives what was measured, to be kept, where the plan is made by it. Answers that nobody waits for
+    /// change nothing, and impossible ones are failures.
+    pub(super) fn take(&mut self, now: Duration, event: PlannerEvent, is_serving: bool) -> Option<Box<Kept>> {
+        let answered = answered(&event).map(|(id, busy_s)| (id, busy_s, self.asked.as_ref().and_then(asked_id)));
+        if let Some((id, busy_s, asked)) = answered {
+            if asked != Some(id) || !self.is_running {
+                return None;
+            }
+            let pause_s = if is_serving { busy_s * (1.0 / PROBING_SHARE - 1.0) } else { 0.0 };
+            (self.is_running, self.lost) = (false, 0);
+            self.not_before = now + Duration::try_from_secs_f64(pause_s).unwrap_or(PAUSE);
+        }
+        let is_first = matches!(event, PlannerEvent::Remembered(_));
+        let mut commands = self.planner.step(event);
+        if let [PlannerCommand::Refuse(error)] = &commands[..] {
+            let reason = error.to_string();
+            commands = match answered {
+                Some((id, busy_s, _)) => self.planner.step(PlannerEvent::Failed { id, reason, busy_s }),
+                None if is_first => self.planner.step(PlannerEvent::Remembered(Kept::empty(self.key()))),
+                None => Vec::new(),
+            };
+        }
+        self.follow(commands)
+    }
+
+    fn follow(&mut self, commands: Vec<PlannerCommand>) -> Option<Box<Kept>> {
+        let mut measured = None;
+        for command in commands {
+            match command {
+                PlannerCommand::Probe { .. } | PlannerCommand::Time { .. } => self.asked = Some(command),
+                PlannerCommand::Keep(kept) => measured = Some(kept),
+                PlannerCommand::Conclude(outcome) => (self.asked, self.outcome) = (None, Some(*outcome)),
+                PlannerCommand::Refuse(_) => (),
+            }
+        }
+        measured
+    }
+
+    /// A node was lost while it measured. The measurement fails where that happens again and again.
+    pub(super) fn lose(&mut self, now: Duration, id: ProbeId, reason: String) -> Option<Box<Kept>> {
+        if self.asked.as_ref().and_then(asked_id) != Some(id) || !self.is_running {
+            return None;
+        }
+        self.lost += 1;
+        if self.lost < MOST_LOST {
+            (self.is_running, self.not_before) = (false, now + PAUSE);
+            return None;
+        }
+        self.take(now, PlannerEvent::Failed { id, reason, busy_s: 0.0 }, false)
+    }
+
+    /// Raises what measuring may take, with time.
+    pub(super) fn allow(&mut self, now: Duration, plans: usize) -> Option<Box<Kept>> {
+        let since_s = now.saturating_sub(self.began).as_secs_f64();
+        let of_time_s = ALLOWED_SHARE * self.prices.nodes as f64 * since_s / plans.max(1) as f64;
+        let commands = self.planner.step(PlannerEvent::Allowed { allowance_s: self.allowance_s + of_time_s });
+        self.follow(commands)
+    }
+
+    /// Whether a node is to be asked now.
+    pub(super) fn is_due(&self, now: Duration) -> bool {
+        self.asked.is_some() && !self.is_running && now >= self.not_before
+    }
+
+    /// What a node is asked, once it is asked.
+    pub(super) fn probe(&mut self, workload_number: u64, node_name: &str, address: &str) -> Option<ViewProbe> {
+        let (node_name, address) = (node_name.to_owned(), address.to_owned());
+        let probe = match self.asked.as_ref()? {
+            PlannerCommand::Probe { id, row, views, purpose } => {
+                let light = match purpose {
+                    Purpose::Screening => &self.budgeted.screening_lighting,
+                    Purpose::Certification => &self.workload.lighting,
+                };
+                let requests = vec![(*row, self.request(*row, views, Some(light))?)];
+                let (id, views) = (*id, views.clone());
+                ViewProbe { workload_number, id, node_name, address, views, requests, repeats: 1 }
+            }
+            PlannerCommand::Time { id, rows, view_count, repeats } => {
+                let views: Vec<ProbeView> = (0..*view_count as u32).map(ProbeView::Screening).collect();
+                let request = |&row: &usize| Some((row, self.request(row, &views, None)?));
+                let requests = rows.iter().map(request).collect::<Option<Vec<_>>>()?;
+                let (id, views, repeats) = (*id, Vec::new(), *repeats);
+                ViewProbe { workload_number, id, node_name, address, views, requests, repeats }
+            }
+            PlannerCommand::Keep(_) | PlannerCommand::Conclude(_) | PlannerCommand::Refuse(_) => return None,
+        };
+        self.is_running = true;
+        Some(probe)
+    }
+
+    fn request(&self, row: usize, views: &[ProbeView], compared: Option<&String>) -> Option<ProbeViews> {
+        let row = self.budgeted.rows.get(row)?;
+        Some(ProbeViews {
+            workload: self.budgeted.sampled_as(row, &self.workload, &self.cells),
+            method: row.method.clone(),
+            codec: self.budgeted.codec.clone(),
+            compared_lighting: compared.unwrap_or(&self.workload.lighting).clone(),
+            views: views.iter().map(|&view| self.camera(view)).collect(),
+            antialias: self.budgeted.antialias(),
+            with_errors: compared.is_some(),
+        })
+    }
+
+    /// The camera of a view: all cells are equally likely, and all places of a cell.
+    fn camera(&self, view: ProbeView) -> PinholeCamera {
+        let number = match view {
+            ProbeView::Screening(number) => u64::from(number),
+            ProbeView::Fresh(number) => number,
+        };
+        let cell = &self.cells[(number % self.cells.len() as u64) as usize];
+        let place: Vec3 = (DVec3::from_array(view.place(0)) * 2.0 - 1.0).as_vec3();
+        cell.view_at(place, &self.budgeted.typical_view)
+    }
+
+    /// What nodes measure before a row is in force: its costs alone, tiles included.
+    pub(super) fn measurement(&self, row: &Row) -> MeasureCosts {
+        let workload = self.budgeted.sampled_as(row, &self.workload, &self.cells);
+        MeasureCosts {
+            workload: workload.of_cell(0).unwrap_or(workload),
+            method: row.method.clone(),
+            codec: self.budgeted.codec.clone(),
+            typical_views: vec![self.budgeted.typical_view],
+            batch_count: (self.prices.views_a_set as u32).clamp(1, MEASURED_BATCH),
+            planes: ViewPlanes { antialias: self.budgeted.antialias(), ..ViewPlanes::COLOR },
+            in_background: true,
+        }
+    }
+}
+
+/// Prices on the nodes that serve a workload.
+pub(super) fn prices(workload: &WorkloadState) -> EqualNodes {
+    let (load, costs) = (workload.load(), &workload.costs);
+    let shown = (workload.sessions.views_per_s() * STILL_SET_S) as usize;
+    let is_still = !workload.requested.timeline.moves();
+    let views_a_set = if is_still { workload.sessions.views_at_once() + shown } else { load.views };
+    let may_draw = workload.sessions.policy_override().may_draw_directly();
+    EqualNodes {
+        nodes: workload.nodes.len().max(1),
+        cells: workload.requested.cell_count(),
+        views_a_set: views_a_set.max(1),
+        direct_view_s: may_draw.then_some(costs.direct_view_s),
+        encode_view_s: costs.encode_view_s,
+    }
+}
+
+fn asked_id(command: &PlannerCommand) -> Option<ProbeId> {
+    match command {
+        PlannerCommand::Probe { id, .. } | PlannerCommand::Time { id, .. } => Some(*id),
+        PlannerCommand::Keep(_) | PlannerCommand::Conclude(_) | PlannerCommand::Refuse(_) => None,
+    }
+}
+
+/// The measurement that an event answers, and the node's time.
+fn answered(event: &PlannerEvent) -> Option<(ProbeId, f64)> {
+    match event {
+        PlannerEvent::Probed(probed) => Some((probed.id, probed.busy_s)),
+        PlannerEvent::Timed(timed) => Some((timed.id, timed.busy_s)),
+        PlannerEvent::Failed { id, busy_s, .. } => Some((*id, *busy_s)),
+        PlannerEvent::Remembered(_) | PlannerEvent::Allowed { .. } => None,
+    }
+}
+
+/// The name of the measurements that a plan may use.
+fn key(budgeted: &Budgeted, workload: &Workload, cells: &[ViewCell]) -> KeptKey {
+    let hash = |text: String| SceneHash::of(text.as_bytes()).to_string();
+    let Budgeted { rows, whole_px, keeps_cameras, typical_view, antialias_samples, screening_lighting, .. } = budgeted;
+    let light = format!(
+        "{}; screened in {screening_lighting}; at {} s; {:?}; {:?}",
+        workload.lighting, workload.timeline.start_s, workload.illumination, workload.background
+    );
+    let cameras = keeps_cameras.then_some(&workload.sample_cameras);
+    let [width_px, height_px] = typical_view.size_px.to_array();
+    KeptKey {
+        scene: workload.scene.hash.to_string(),
+        cell: hash(format!("{cells:?} {:?} {:?}", typical_view.focal_px, workload.volume)),
+        lighting: hash(light),
+        view_size: format!("{width_px}x{height_px}, {antialias_samples} samples a pixel"),
+        ladder_version: hash(format!("{rows:?} {whole_px} {cameras:?}")),
+    }
+}

@@ -1,0 +1,84 @@
+//! Budgets of sessions, and what the schedule needs to plan for one.
+
+use cluster::{InvalidField, Workload, nonempty};
+use depth_image::{Antialias, Camera, PinholeCamera, ViewCell};
+use glam::UVec2;
+use planner::{Budget, Ladder, Row};
+use serde::{Deserialize, Serialize};
+
+use super::cells::{Cells, first_indices};
+
+/// A session's budget, and the representations among which it chooses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Budgeted {
+    /// The budget.
+    pub budget: Budget,
+    /// The rows that the session's own choices leave, one to 220.
+    pub rows: Vec<Row>,
+    /// The size of sample images at a side ratio of 1.
+    pub whole_px: UVec2,
+    /// Every row is sampled by the workload's own cameras.
+    pub keeps_cameras: bool,
+    /// A view as most of the session's are.
+    pub typical_view: PinholeCamera,
+    /// Samples a pixel.
+    pub antialias_samples: u32,
+    /// How frames are encoded.
+    pub codec: String,
+    /// The light in which rows are compared: the session's, or a cheaper one where rays are traced.
+    pub screening_lighting: String,
+}
+
+impl Budgeted {
+    /// Whether sessions can share a representation: they choose among the same, and one of their budgets is the stricter.
+    pub(super) fn is_shareable(&self, other: &Self) -> bool {
+        let of_any_view = |of: &Self| Self {
+            budget: self.budget,
+            typical_view: self.typical_view,
+            codec: self.codec.clone(),
+            ..of.clone()
+        };
+        of_any_view(self) == of_any_view(other) && self.budget.and(&other.budget).is_some()
+    }
+
+    pub(super) fn ladder(&self) -> Result<Ladder, InvalidField> {
+        Ladder::new(self.rows.clone()).map_err(|error| InvalidField::out_of_range("rows", error, "a ladder"))
+    }
+
+    pub(super) fn antialias(&self) -> Antialias {
+        Antialias::of(self.antialias_samples).unwrap_or_default()
+    }
+
+    /// The workload as a row samples it, in these view cells.
+    pub(super) fn sampled_as(&self, row: &Row, workload: &Workload, cells: &[ViewCell]) -> Workload {
+        let resized = |Camera::Pinhole(camera): &Camera| camera.resized(row.size_px(self.whole_px));
+        let cameras: Vec<Vec<PinholeCamera>> = match self.keeps_cameras {
+            true => vec![workload.sample_cameras.iter().map(resized).collect()],
+            false => cells.iter().map(|cell| row.cameras(cell, self.whole_px)).collect(),
+        };
+        let is_split = !workload.cell_first_indices.is_empty();
+        Workload {
+            sampling: row.sampling.clone(),
+            cell_first_indices: if is_split { first_indices(&cameras) } else { Vec::new() },
+            sample_cameras: cameras.into_iter().flatten().map(Camera::Pinhole).collect(),
+            ..workload.clone()
+        }
+    }
+
+    pub(super) fn validate(&self) -> Result<(), InvalidField> {
+        self.ladder()?;
+        nonempty(&self.codec, "codec")?;
+        nonempty(&self.screening_lighting, "screening_lighting")?;
+        self.typical_view.validate().map_err(|source| InvalidField::Camera { field: "typical_view", source })
+    }
+}
+
+/// The view cells that are planned for: those that viewpoints may grow to, or the one between a workload's own sample cameras.
+pub(super) fn planned_cells(cells: Option<&Cells>, workload: &Workload) -> Vec<ViewCell> {
+    let own = || {
+        let cameras: Vec<PinholeCamera> =
+            workload.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+        ViewCell::between(&cameras).into_iter().collect()
+    };
+    cells.map_or_else(own, Cells::grown)
+}

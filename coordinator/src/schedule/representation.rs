@@ -1,0 +1,64 @@
+//! The representation that a budget has chosen for a workload.
+
+use cluster::{Costs, Policy, PolicyChoice, SamplePlanes};
+use planner::Row;
+
+use super::PolicyOverride;
+
+/// Direct drawing in words.
+pub(super) const DRAWN: &str = "every view drawn directly";
+
+/// A representation in force.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Representation {
+    /// A row of the ladder.
+    Row {
+        row: Row,
+        /// As measured for the workload's first session; those of drawing directly and encoding depend on sessions.
+        costs: Costs,
+        /// Planes of sample images that its method needs.
+        planes: SamplePlanes,
+    },
+    /// Every view is drawn from the scene.
+    Direct,
+}
+
+impl Representation {
+    pub(super) fn row(&self) -> Option<&Row> {
+        match self {
+            Self::Row { row, .. } => Some(row),
+            Self::Direct => None,
+        }
+    }
+
+    /// The costs of sessions whose own representation costs `asked`.
+    pub(super) fn costs(&self, asked: &Costs) -> Costs {
+        match self {
+            Self::Row { costs, .. } => {
+                Costs { direct_view_s: asked.direct_view_s, encode_view_s: asked.encode_view_s, ..*costs }
+            }
+            Self::Direct => *asked,
+        }
+    }
+
+    /// What sessions force, and the policy that the representation leaves.
+    pub(super) fn policy_override(&self, asked: PolicyOverride) -> PolicyOverride {
+        match (self, asked.policy) {
+            (Self::Direct, PolicyChoice::Auto) => {
+                PolicyOverride { policy: PolicyChoice::Direct, ..PolicyOverride::default() }
+            }
+            _ => asked,
+        }
+    }
+
+    /// The representation in words; `asked` names the one that sessions asked for.
+    pub(super) fn name(of: Option<&Self>, asked: impl FnOnce() -> String, policy: Option<Policy>) -> String {
+        let drawn = || DRAWN.to_owned();
+        match of {
+            _ if policy == Some(Policy::Direct) => drawn(),
+            Some(Self::Row { row, .. }) => row.to_string(),
+            Some(Self::Direct) => drawn(),
+            None => asked(),
+        }
+    }
+}

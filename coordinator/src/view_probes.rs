@@ -1,0 +1,145 @@
+//! What the planning for a budget asks of nodes and of files.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use cluster::{MeasureCosts, ProbeViews, ProbedView, ProbedViews};
+use node::blocking;
+use planner::{Event as PlannerEvent, Kept, KeptKey, ProbeId, Probed, RowCosts, Timed, ViewErrors, median_costs};
+use tokio::sync::mpsc;
+use tonic::{Code, Status};
+use wire::rpc::NodeClient;
+
+use crate::grpc_status::{of_node, within};
+use crate::schedule::{Event, ViewProbe};
+use crate::session_opening::costs_of;
+use crate::shared::Shared;
+
+/// How long a node may measure, waits for other work included.
+const PROBED_WITHIN: Duration = Duration::from_secs(300);
+/// Measurements of earlier plans with more bytes are not used: events are logged whole.
+const MOST_RECALLED_BYTES: usize = 8 << 20;
+/// The longest reason of an event, in bytes.
+const MAX_REASON_BYTES: usize = 1024;
+
+/// Finds the measurements of earlier plans.
+pub(crate) async fn recall(shared: Arc<Shared>, workload_number: u64, key: KeptKey) {
+    let files = shared.config.plan_files.clone();
+    let found = blocking(move || {
+        let kept = files.map_or_else(|| Kept::empty(key.clone()), |files| files.read(&key));
+        let is_small = kept.to_json().is_ok_and(|json| json.len() <= MOST_RECALLED_BYTES);
+        Ok::<_, Status>(if is_small { kept } else { Kept::empty(key) })
+    });
+    if let Ok(kept) = found.await {
+        planned(&shared, workload_number, PlannerEvent::Remembered(kept));
+    }
+}
+
+/// Keeps what was measured. The plan is made, whether a later one can use it or not.
+pub(crate) async fn keep(shared: Arc<Shared>, kept: Kept) {
+    let Some(files) = shared.config.plan_files.clone() else { return };
+    let written = blocking(move || files.write(&kept).map_err(|error| Status::internal(error.to_string()))).await;
+    if let Err(status) = written {
+        tracing::warn!(reason = status.message(), "measurements are not kept");
+    }
+}
+
+/// Has a node measure views.
+pub(crate) async fn probe_views(shared: Arc<Shared>, probe: ViewProbe) {
+    let (workload_number, id) = (probe.workload_number, probe.id);
+    match probed(&shared, probe).await {
+        Ok(event) => planned(&shared, workload_number, event),
+        Err(status) if is_refusal(&status) => {
+            let reason = shortened(status.message());
+            planned(&shared, workload_number, PlannerEvent::Failed { id, reason, busy_s: 0.0 });
+        }
+        Err(status) => {
+            let reason = shortened(status.message());
+            shared.step(Event::ProbeLost { workload_number, id, reason });
+        }
+    }
+}
+
+/// Has the costs of a chosen representation measured on a node of each device.
+pub(crate) async fn represent(shared: Arc<Shared>, workload_number: u64, plan: u64, measurement: MeasureCosts) {
+    // Nobody reads how the measuring goes on.
+    let (events, _progress) = mpsc::channel(1);
+    match costs_of(&shared, measurement, &events, || Ok(())).await {
+        Ok(measured) => {
+            let (costs, planes) = (measured.costs, measured.planes);
+            shared.step(Event::Represented { workload_number, plan, costs, planes });
+        }
+        Err(status) => {
+            let reason = shortened(status.message());
+            shared.step(Event::Unrepresented { workload_number, plan, reason });
+        }
+    }
+}
+
+fn planned(shared: &Shared, workload_number: u64, event: PlannerEvent) {
+    shared.step(Event::Planned { workload_number, event: Box::new(event) });
+}
+
+async fn probed(shared: &Shared, probe: ViewProbe) -> Result<PlannerEvent, Status> {
+    let ViewProbe { id, address, views, requests, repeats, .. } = probe;
+    let node = NodeClient::new(shared.connections.to(&address).await?);
+    let mut answers = vec![Vec::with_capacity(repeats); requests.len()];
+    for _ in 0..repeats {
+        for ((_, request), answers) in requests.iter().zip(&mut answers) {
+            answers.push(ask(&node, request, &address).await?);
+        }
+    }
+    let busy_s = answers.iter().flatten().map(|answer| answer.busy_s).sum();
+    let costs = |answers: &[ProbedViews]| median_costs(&answers.iter().map(row_costs).collect::<Vec<_>>());
+    if views.is_empty() {
+        let rows = requests.iter().zip(&answers).map(|((row, _), answers)| (*row, costs(answers))).collect();
+        return Ok(PlannerEvent::Timed(Timed { id, rows, busy_s }));
+    }
+    let (Some((row, _)), Some([answer])) = (requests.first(), answers.first().map(Vec::as_slice)) else {
+        return Err(Status::internal("a comparison is of one row"));
+    };
+    let views = views.into_iter().zip(answer.views.iter().map(errors)).collect();
+    let probed = Probed { id, row: *row, views, costs: row_costs(answer), busy_s };
+    Ok(check(id, PlannerEvent::Probed(probed)))
+}
+
+async fn ask(node: &NodeClient, request: &ProbeViews, address: &str) -> Result<ProbedViews, Status> {
+    let answer = within(PROBED_WITHIN, "measuring views", node.probe_views(request.clone())).await;
+    let answer = answer.map_err(|status| of_node(address, &status))?;
+    let wanted = if request.with_errors { request.views.len() } else { 0 };
+    match answer.views.len() == wanted {
+        true => Ok(answer),
+        false => Err(Status::internal(format!("{address} has compared {} views, not {wanted}", answer.views.len()))),
+    }
+}
+
+/// An answer that no planner takes is a failure.
+fn check(id: ProbeId, event: PlannerEvent) -> PlannerEvent {
+    match event.validate() {
+        Ok(()) => event,
+        Err(error) => PlannerEvent::Failed { id, reason: shortened(&error.to_string()), busy_s: 0.0 },
+    }
+}
+
+/// Whether the node answered, and would answer the same again.
+fn is_refusal(status: &Status) -> bool {
+    [Code::InvalidArgument, Code::Internal, Code::Unimplemented, Code::OutOfRange].contains(&status.code())
+}
+
+fn shortened(reason: &str) -> String {
+    reason[..reason.floor_char_boundary(MAX_REASON_BYTES)].to_owned()
+}
+
+fn row_costs(answer: &ProbedViews) -> RowCosts {
+    let costs = &answer.costs;
+    RowCosts {
+        sample_image_s: costs.sample_image_s,
+        load_set_s: costs.load_set_s,
+        reconstruct_view_s: costs.reconstruct_view_s,
+    }
+}
+
+fn errors(view: &ProbedView) -> ViewErrors {
+    let ProbedView { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio } = *view;
+    ViewErrors { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio }
+}
