@@ -234,7 +234,19 @@ impl Cluster {
         nodes: usize,
         change: impl Fn(NodeConfig) -> NodeConfig,
     ) -> Self {
-        let coordinator = Server::start(move |listener, shutdown| coordinate(config, listener, shutdown));
+        Self::start_observed(config, Observers::default(), nodes, change).await
+    }
+
+    /// As [`Cluster::start_limited`], with observers of the schedule.
+    pub async fn start_observed(
+        config: CoordinatorConfig,
+        observers: Observers,
+        nodes: usize,
+        change: impl Fn(NodeConfig) -> NodeConfig,
+    ) -> Self {
+        let coordinator = Server::start(move |listener, shutdown| {
+            coordinator::serve(listener, config, offer().into(), observers, shutdown)
+        });
         let client = connected(&coordinator.address).await;
         let mut cluster = Self { coordinator, nodes: Vec::new(), engines: Vec::new(), metrics: Vec::new(), client };
         for _ in 0..nodes {
@@ -266,7 +278,9 @@ impl Cluster {
     pub fn restart_coordinator(&mut self) {
         let address = self.coordinator.address.trim_start_matches("http://").to_owned();
         let config = CoordinatorConfig::default();
-        self.coordinator = Server::start_at(&address, move |listener, shutdown| coordinate(config, listener, shutdown));
+        self.coordinator = Server::start_at(&address, move |listener, shutdown| {
+            coordinator::serve(listener, config, offer().into(), Observers::default(), shutdown)
+        });
     }
 
     /// Opens a session, and resets the sample counts of the measurement.
@@ -314,14 +328,6 @@ pub async fn whole_frame(parts: &mut Messages<FramePart>) -> WholeFrame {
             return frame;
         }
     }
-}
-
-async fn coordinate(
-    config: CoordinatorConfig,
-    listener: TcpListener,
-    shutdown: CancellationToken,
-) -> Result<(), node::ServeError> {
-    coordinator::serve(listener, config, offer().into(), Observers::default(), shutdown).await
 }
 
 /// A client of a coordinator that starts soon.

@@ -112,7 +112,8 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
     let mut prober = Prober::new(engine.clone(), planning.subject.clone(), Turn::of(WorkClass::Batch));
     let direct = prober.direct_costs(&planning.viewpoints)?;
     let pricing = one_node(args.views_a_set(&setup), direct);
-    let request = planning.request(args.budget, device_name(&engine.device_name()), pricing.views_a_set, args.allowance);
+    let request =
+        planning.request(args.budget, device_name(&engine.device_name()), pricing.views_a_set, args.allowance);
     let files = args.plans.files();
     let remembered = files.as_ref().map_or_else(|| Kept::empty(planning.key()), |files| files.read(&planning.key()));
     let mut planner = Planner::new(request, planning.ladder.clone(), pricing)?;

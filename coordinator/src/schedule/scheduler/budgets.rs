@@ -204,7 +204,8 @@ impl Scheduler {
         let WorkloadState { announced, sessions, .. } = self.workloads.get_mut(&number)?;
         let known = |promise: &Promise| (promise.state, promise.budget.clone(), promise.representation.clone());
         let is_known = announced.as_ref().is_some_and(|(at, announced)| {
-            known(announced) == known(&promise) && (now.saturating_sub(*at) < NEWS || announced.reason == promise.reason)
+            known(announced) == known(&promise)
+                && (now.saturating_sub(*at) < NEWS || announced.reason == promise.reason)
         });
         if is_known {
             return None;

@@ -1,0 +1,180 @@
+//! Budgets of sessions on real nodes of the scalar device: promises that are kept, or cannot be.
+
+use std::io::Write;
+use std::sync::Arc;
+use std::time::Duration;
+
+use client::{ClientError, Session};
+use cluster::{BudgetRequest, PolicyChoice, Promise, PromiseState, SessionRequest, Timeline};
+use cluster_tests::cluster::{Cluster, request, views};
+use coordinator::schedule::{Command, Recorder, replay};
+use coordinator::{CoordinatorConfig, CoordinatorMetrics, Observers, PlanFiles};
+use parking_lot::Mutex;
+
+const DEADLINE: Duration = Duration::from_secs(60);
+/// Every picture keeps this budget, and none but directly drawn ones the other.
+const LOOSE: &str = "flip 0.99";
+const STRICT: &str = "flip 0.00001";
+
+/// A session with a budget. The pipeline is forced: the scalar device draws directly faster than it reconstructs.
+fn budgeted(budget: &str) -> SessionRequest {
+    let budget = BudgetRequest { budget: Some(budget.to_owned()), ..BudgetRequest::default() };
+    SessionRequest { budget, ..request(PolicyChoice::Pipeline, Timeline::still(0.0)) }
+}
+
+async fn settled(session: &Session) -> Promise {
+    let settled = async {
+        let mut promise = session.promise();
+        while promise.as_ref().is_none_or(|promise| promise.state == PromiseState::Measuring) {
+            promise = Some(session.another_promise(promise.as_ref()).await);
+        }
+        promise.unwrap()
+    };
+    tokio::time::timeout(DEADLINE, settled).await.expect("the promise is settled")
+}
+
+/// Frames that arrive for the views of one set.
+async fn delivered(session: &Session) -> usize {
+    let mut frames = session.render_views(views(1, 6)).unwrap();
+    let mut count = 0;
+    while let Some(frame) = frames.next().await {
+        frame.unwrap();
+        count += 1;
+    }
+    count
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_opens_at_once_and_switches_to_the_cheapest_representation_that_keeps_its_budget() {
+    let cluster = Cluster::start(2).await;
+    let session = cluster.session(budgeted(LOOSE)).await.unwrap();
+    let first = session.plan().assignment;
+    assert_eq!(first.workload.sample_cameras.len(), 3, "the rig, as without a budget");
+    assert_eq!(delivered(&session).await, 6);
+    let promise = settled(&session).await;
+    assert_eq!(promise.state, PromiseState::Kept, "{promise}");
+    assert!(promise.expected_ratio > 0.0 && promise.expected_ratio <= promise.bound_ratio, "{promise:?}");
+    assert!(promise.bound_ratio <= 0.99 && promise.probe_view_count >= 32, "{promise:?}");
+    let plan = session.another_plan(first.plan_epoch).await.assignment;
+    assert_eq!(plan.method.as_deref(), Some("splat"));
+    let cameras = plan.workload.sample_cameras.len();
+    assert!(promise.representation.contains(&format!("S = {cameras},")), "{promise}: {cameras}");
+    assert_eq!(delivered(&session).await, 6);
+    let status = cluster.client.status().await.unwrap();
+    assert_eq!(status.workloads[0].promise.as_ref().map(|shown| shown.state), Some(PromiseState::Kept));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_promise_that_nothing_keeps_is_said_to_be_unreachable_and_views_are_made() {
+    let cluster = Cluster::start(2).await;
+    let session = cluster.session(budgeted(STRICT)).await.unwrap();
+    let promise = settled(&session).await;
+    assert_eq!(promise.state, PromiseState::Unreachable, "{promise}");
+    assert_eq!(delivered(&session).await, 6);
+    // Where views may be drawn directly, they have no error.
+    let free = SessionRequest { policy: PolicyChoice::Auto, ..budgeted(STRICT) };
+    cluster.close(session).await;
+    let session = cluster.session(free).await.unwrap();
+    let promise = settled(&session).await;
+    assert_eq!(promise.state, PromiseState::Kept, "{promise}");
+    assert_eq!(delivered(&session).await, 6);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_text_that_is_no_budget_is_refused_by_its_term() {
+    let cluster = Cluster::start(1).await;
+    for wrong in ["flop 0.1", "flip NaN", "flip -1", "flip 0.1, flip 0.2", &"flip 1,".repeat(30)] {
+        let refused = cluster.session(budgeted(wrong)).await.unwrap_err();
+        assert!(matches!(&refused, ClientError::Coordinator { reason } if reason.contains("budget")), "{refused}");
+    }
+    let named = BudgetRequest { names_method: true, ..budgeted(LOOSE).budget };
+    let direct = SessionRequest { method: cluster::DIRECT.to_owned(), budget: named, ..budgeted(LOOSE) };
+    let refused = cluster.session(direct).await.unwrap_err();
+    assert!(refused.to_string().contains("leave no representation"), "{refused}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_coordinators_budget_is_that_of_sessions_that_state_none() {
+    let config = CoordinatorConfig { budget: Some(LOOSE.parse().unwrap()), ..CoordinatorConfig::default() };
+    let cluster = Cluster::start_limited(config, 1, |config| config).await;
+    let plain = request(PolicyChoice::Pipeline, Timeline::still(0.0));
+    let session = cluster.session(plain.clone()).await.unwrap();
+    assert_eq!(settled(&session).await.budget, LOOSE);
+    // A session that has its views drawn by name has nothing to be promised.
+    let budget = BudgetRequest { names_method: true, ..BudgetRequest::default() };
+    let direct = SessionRequest { method: cluster::DIRECT.to_owned(), policy: PolicyChoice::Auto, budget, ..plain };
+    let session = cluster.session(direct).await.unwrap();
+    assert_eq!(delivered(&session).await, 6);
+    assert_eq!(session.promise(), None);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn measurements_outlive_the_coordinator_and_are_used_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let config =
+        CoordinatorConfig { plan_files: Some(PlanFiles::at(folder.path().to_owned())), ..CoordinatorConfig::default() };
+    let mut all = Vec::new();
+    for _ in 0..2 {
+        let log = Shared::default();
+        let cluster = recorded(config.clone(), 1, &log).await;
+        let session = cluster.session(budgeted(LOOSE)).await.unwrap();
+        let promise = settled(&session).await;
+        drop(session);
+        all.push((promise.state, promise.representation, probes(&log)));
+    }
+    let [(first, chosen, measured), (second, again, more)] = &all[..] else { panic!("two coordinators") };
+    assert_eq!((first, chosen), (second, again));
+    assert!(*measured > 0 && *more == 0, "{measured} probes, then {more}");
+}
+
+/// The commands of a log, as the schedule gave them.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_recorded_log_replays_to_the_same_promise() {
+    let log = Shared::default();
+    let cluster = recorded(CoordinatorConfig::default(), 2, &log).await;
+    let session = cluster.session(budgeted(LOOSE)).await.unwrap();
+    let promise = settled(&session).await;
+    let commands = replay(&log.0.lock()[..]).unwrap().into_iter().flat_map(|step| step.commands);
+    let promises = commands.filter_map(|command| match command {
+        Command::Promise { promise, .. } => Some(*promise),
+        _ => None,
+    });
+    assert!(promises.into_iter().any(|replayed| replayed == promise), "{promise}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_that_is_lost_while_it_measures_is_replaced_by_another() {
+    let mut cluster = Cluster::start(3).await;
+    let session = cluster.session(budgeted(LOOSE)).await.unwrap();
+    cluster.nodes[0].kill();
+    let promise = settled(&session).await;
+    assert_eq!(promise.state, PromiseState::Kept, "{promise}");
+    assert_eq!(delivered(&session).await, 6);
+}
+
+/// A log that a test can read.
+#[derive(Clone, Default)]
+struct Shared(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Shared {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.lock().write(bytes)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+async fn recorded(config: CoordinatorConfig, nodes: usize, log: &Shared) -> Cluster {
+    let log = Recorder::new(Box::new(log.clone()) as Box<dyn Write + Send>).unwrap();
+    let observers = Observers { metrics: CoordinatorMetrics::default(), log: Some(log) };
+    Cluster::start_observed(config, observers, nodes, |config| config).await
+}
+
+/// Measurements that nodes were asked for.
+fn probes(log: &Shared) -> usize {
+    let steps = replay(&log.0.lock()[..]).unwrap();
+    let commands = steps.iter().flat_map(|step| &step.commands);
+    commands.filter(|command| matches!(command, Command::ProbeViews(_))).count()
+}
