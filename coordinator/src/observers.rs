@@ -3,13 +3,20 @@
 use std::io::Write;
 use std::time::Duration;
 
-use cluster::ClusterStatus;
+use cluster::{ClusterStatus, PromiseState};
 use node::Telemetry;
-use prometheus_client::metrics::{counter::Counter, gauge::Gauge};
+use prometheus_client::encoding::EncodeLabelSet;
+use prometheus_client::metrics::{counter::Counter, family::Family, gauge::Gauge};
 
 use crate::schedule::{Command, Event, Recorder};
 
-/// Registered gauges of the cluster's state, and a counter of its plans.
+/// The state of promises.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct State {
+    state: String,
+}
+
+/// Registered gauges of the cluster's state, and counters of plans and measurements.
 #[derive(Debug, Clone)]
 pub struct CoordinatorMetrics {
     nodes: Gauge,
@@ -19,6 +26,8 @@ pub struct CoordinatorMetrics {
     views_per_set: Gauge,
     plan_epoch: Gauge,
     plans: Counter,
+    promises: Family<State, Gauge>,
+    view_probes: Counter,
 }
 
 impl CoordinatorMetrics {
@@ -39,14 +48,25 @@ impl CoordinatorMetrics {
             views_per_set: gauge("cluster_views_per_set", "V: views of a sample set, of all workloads"),
             plan_epoch: gauge("cluster_plan_epoch", "The last plan"),
             plans: Counter::default(),
+            promises: Family::default(),
+            view_probes: Counter::default(),
         };
         registry.register("cluster_plans", "Plans made", metrics.plans.clone());
+        registry.register("cluster_promises", "Promises to the sessions of a workload", metrics.promises.clone());
+        registry.register("cluster_view_probes", "Measurements for budgets", metrics.view_probes.clone());
         metrics
     }
 
     pub(crate) fn show(&self, status: &ClusterStatus, commands: &[Command]) {
         let plans = commands.iter().filter(|command| matches!(command, Command::Apply { .. })).count();
         self.plans.inc_by(plans as u64);
+        let probes = commands.iter().filter(|command| matches!(command, Command::ProbeViews(_))).count();
+        self.view_probes.inc_by(probes as u64);
+        for state in [PromiseState::Measuring, PromiseState::Kept, PromiseState::Unreachable] {
+            let promises = status.workloads.iter().filter_map(|workload| workload.promise.as_ref());
+            let count = promises.filter(|promise| promise.state == state).count();
+            self.promises.get_or_create(&State { state: state.to_string() }).set(count as i64);
+        }
         let number = |count: u64| i64::try_from(count).unwrap_or(i64::MAX);
         self.nodes.set(number(status.nodes.len() as u64));
         self.workloads.set(number(status.workloads.len() as u64));

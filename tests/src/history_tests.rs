@@ -67,6 +67,7 @@ fn log(plan_epoch: u64) -> Vec<u8> {
         policy_override: PolicyOverride { policy: PolicyChoice::Pipeline, ..PolicyOverride::default() },
         costs,
         auto_exposure: ExposureEv::ZERO,
+        budgeted: None,
     };
     let left = Event::Left { incarnation: plan_epoch + 1, node_name: "b".to_owned() };
     let events = [joined("a", plan_epoch), joined("b", plan_epoch), Event::Opened(Box::new(opening)), left];

@@ -167,6 +167,7 @@ mod tests {
             compositors: Vec::new(),
             tile_count: 1,
             relay_fanout: None::<NonZeroU32>,
+            method: None,
         }
     }
 

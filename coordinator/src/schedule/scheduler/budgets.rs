@@ -157,7 +157,11 @@ impl Scheduler {
                 plan: state.plan.number,
                 measurement: Box::new(state.plan.measurement(row)),
             }),
-            None => commands.extend(self.represent(number, Representation::Direct)),
+            None if workload.sessions.policy_override().may_draw_directly() => {
+                commands.extend(self.represent(number, Representation::Direct));
+            }
+            // Nothing is better than what sessions ask for.
+            None => state.in_force = Some((state.plan.budget, outcome)),
         }
         commands
     }
@@ -169,7 +173,7 @@ impl Scheduler {
         row.map_or_else(Vec::new, |row| self.represent(number, Representation::Row { row, costs, planes }))
     }
 
-    /// The chosen row cannot be measured: views are drawn directly, where they may be.
+    /// The chosen row cannot be measured: what is in force stays.
     pub(super) fn unrepresented(&mut self, number: u64, plan: u64, reason: &str) -> Vec<Command> {
         let Some(state) = self.budgets.get_mut(&number).filter(|state| state.plan.number == plan) else {
             return Vec::new();
@@ -177,8 +181,9 @@ impl Scheduler {
         if let Some(outcome) = &mut state.plan.outcome {
             outcome.reason = format!("{} It cannot be put in force: {reason}", outcome.reason);
             (outcome.choice, outcome.state) = (Choice::Direct, planner::PromiseState::Unreachable);
+            state.in_force = Some((state.plan.budget, outcome.clone()));
         }
-        self.represent(number, Representation::Direct)
+        Vec::new()
     }
 
     /// Puts the choice of a workload's plan in force. Timings of another representation are of other work.

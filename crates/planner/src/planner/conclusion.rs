@@ -56,7 +56,7 @@ impl<P: Pricing> Planner<P> {
             }
             (None, _, Some(_)) | (_, None, Some(_)) => (Choice::Direct, PromiseState::Kept),
             (_, Some(row), _) => (Choice::Row(row), PromiseState::Kept),
-            (Some(_), None, None) => (Choice::Direct, PromiseState::Unreachable),
+            (Some(_), None, None) => (self.nearest(), PromiseState::Unreachable),
             (None, None, None) => self.nearest_to_time(),
         }
     }
@@ -75,6 +75,13 @@ impl<P: Pricing> Planner<P> {
         let fastest = usable().min_by(|&a, &b| self.prices[a].view_s.total_cmp(&self.prices[b].view_s));
         let fastest = fastest.filter(|&row| self.prices[row].view_s < self.pricing.direct().view_s);
         (fastest.map_or(Choice::Direct, Choice::Row), PromiseState::Unreachable)
+    }
+
+    /// Direct drawing has no error; where it is not allowed, the row with the least.
+    fn nearest(&self) -> Choice {
+        let is_allowed = self.pricing.direct().node_s.is_finite();
+        let row = if is_allowed { None } else { self.nearest_to_error() };
+        row.map_or(Choice::Direct, Choice::Row)
     }
 
     /// The row that comes nearest to the limit on errors, of those that may be in time.

@@ -42,12 +42,19 @@ impl<P: Pricing> Planner<P> {
             _ => format!("{}: the least FLIP, {:.4}", self.request.budget, self.error_ratio(row)),
         };
         format!(
-            "{} keeps {error}. It costs {} a view and takes {}; direct costs {}. {of}.",
+            "{} keeps {error}. It costs {} a view and takes {}; {}. {of}.",
             self.row(row),
             ms(price.node_s),
             ms(price.view_s),
-            ms(self.pricing.direct().node_s),
+            self.direct_costs(),
         )
+    }
+
+    fn direct_costs(&self) -> String {
+        match self.pricing.direct().node_s {
+            node_s if node_s.is_finite() => format!("direct costs {}", ms(node_s)),
+            _ => "views may not be drawn directly".to_owned(),
+        }
     }
 
     fn direct_keeps(&self, of: &str) -> String {
@@ -66,9 +73,7 @@ impl<P: Pricing> Planner<P> {
 
     /// By how much the budget is missed.
     fn unreachable(&self, choice: Choice) -> String {
-        let limit_s = self.request.budget.most_view_s().unwrap_or(f64::INFINITY);
-        let view_s = self.price_of(choice).view_s;
-        let over = format!("takes {} a view, {} too long", ms(view_s), ms(view_s - limit_s));
+        let over = self.over(choice);
         let nearest = match (self.term(), self.nearest_to_error()) {
             (Some(term), Some(row)) => {
                 format!(" In time, {} has the least error: {}.", self.row(row), shown(term, self.error_ratio(row)))
@@ -80,6 +85,17 @@ impl<P: Pricing> Planner<P> {
             Choice::Direct => "Direct drawing".to_owned(),
         };
         format!("Nothing keeps {}. {name} {over}.{nearest}", self.request.budget)
+    }
+
+    fn over(&self, choice: Choice) -> String {
+        let view_s = self.price_of(choice).view_s;
+        match self.request.budget.most_view_s() {
+            Some(limit_s) if view_s.is_finite() => {
+                format!("takes {} a view, {} too long", ms(view_s), ms(view_s - limit_s))
+            }
+            _ if choice == Choice::Direct => "is not allowed".to_owned(),
+            _ => format!("comes nearest; {}", self.direct_costs()),
+        }
     }
 }
 
