@@ -1,5 +1,7 @@
 //! The coordinator's configuration, and the scenes that it offers.
 
+use std::sync::Arc;
+
 use bytes::Bytes;
 use cluster::limits::MAX_SCENES;
 use cluster::{OfferSettings, OfferStatus, SceneHash, SceneRef};
@@ -8,7 +10,7 @@ use glam::DVec3;
 use planner::{Budget, Row};
 use tonic::Status;
 
-use crate::plan_files::PlanFiles;
+use crate::plan_store::PlanStore;
 
 /// The coordinator's configuration.
 #[derive(Debug, Clone)]
@@ -24,7 +26,7 @@ pub struct CoordinatorConfig {
     /// The budget of sessions that state none.
     pub budget: Option<Budget>,
     /// Where measurements for budgets are kept.
-    pub plan_files: Option<PlanFiles>,
+    pub plans: Option<Arc<dyn PlanStore>>,
     /// A cheaper light in which representations are compared, for a light that is expensive.
     pub screening_light: fn(&str) -> Option<String>,
 }
@@ -37,7 +39,7 @@ impl Default for CoordinatorConfig {
             max_sessions: 1024,
             max_workloads: 8,
             budget: None,
-            plan_files: None,
+            plans: None,
             screening_light: |_| None,
         }
     }

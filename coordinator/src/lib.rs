@@ -12,7 +12,7 @@ mod measuring;
 mod measuring_queue;
 mod membership;
 mod observers;
-mod plan_files;
+mod plan_store;
 mod probe;
 pub mod schedule;
 mod service;
@@ -25,6 +25,6 @@ mod workload;
 
 pub use config::{CoordinatorConfig, OfferError, SceneOffer, SceneOffers};
 pub use observers::{CoordinatorMetrics, EventLog, Observers};
-pub use plan_files::PlanFiles;
+pub use plan_store::PlanStore;
 pub use service::serve;
 pub use workload::fitting_size_px;

@@ -24,9 +24,9 @@ const MAX_REASON_BYTES: usize = 1024;
 
 /// Finds the measurements of earlier plans.
 pub(crate) async fn recall(shared: Arc<Shared>, workload_number: u64, key: KeptKey) {
-    let files = shared.config.plan_files.clone();
+    let store = shared.config.plans.clone();
     let found = blocking(move || {
-        let kept = files.map_or_else(|| Kept::empty(key.clone()), |files| files.read(&key));
+        let kept = store.map_or_else(|| Kept::empty(key.clone()), |store| store.read(&key));
         let is_small = kept.to_json().is_ok_and(|json| json.len() <= MOST_RECALLED_BYTES);
         Ok::<_, Status>(if is_small { kept } else { Kept::empty(key) })
     });
@@ -37,8 +37,8 @@ pub(crate) async fn recall(shared: Arc<Shared>, workload_number: u64, key: KeptK
 
 /// Keeps what was measured. The plan is made, whether a later one can use it or not.
 pub(crate) async fn keep(shared: Arc<Shared>, kept: Kept) {
-    let Some(files) = shared.config.plan_files.clone() else { return };
-    let written = blocking(move || files.write(&kept).map_err(|error| Status::internal(error.to_string()))).await;
+    let Some(store) = shared.config.plans.clone() else { return };
+    let written = blocking(move || store.write(&kept).map_err(|error| Status::internal(error.to_string()))).await;
     if let Err(status) = written {
         tracing::warn!(reason = status.message(), "measurements are not kept");
     }

@@ -1,10 +1,12 @@
 //! The budget of a coordinator's sessions.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
+use app_core::plan_files::PlanFiles;
 use app_core::planning::screening_light;
 use clap::Args;
-use coordinator::{CoordinatorConfig, PlanFiles};
+use coordinator::{CoordinatorConfig, PlanStore};
 use planner::Budget;
 
 /// Arguments of commands with a coordinator.
@@ -31,7 +33,8 @@ pub struct PlansArgs {
 impl BudgetArgs {
     /// A coordinator's configuration with this budget.
     pub fn configure(&self, config: CoordinatorConfig) -> CoordinatorConfig {
-        CoordinatorConfig { budget: self.budget, plan_files: self.plans.files(), screening_light, ..config }
+        let plans = self.plans.files().map(|files| Arc::new(files) as Arc<dyn PlanStore>);
+        CoordinatorConfig { budget: self.budget, plans, screening_light, ..config }
     }
 }
 

@@ -8,8 +8,9 @@ use client::{ClientError, Session};
 use cluster::{BudgetRequest, PolicyChoice, Promise, PromiseState, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, request, views};
 use coordinator::schedule::{Command, Recorder, replay};
-use coordinator::{CoordinatorConfig, CoordinatorMetrics, Observers, PlanFiles};
+use coordinator::{CoordinatorConfig, CoordinatorMetrics, Observers, PlanStore};
 use parking_lot::Mutex;
+use planner::{Kept, KeptKey};
 
 const DEADLINE: Duration = Duration::from_secs(60);
 /// Every picture keeps this budget, and none but directly drawn ones the other.
@@ -110,9 +111,7 @@ async fn the_coordinators_budget_is_that_of_sessions_that_state_none() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn measurements_outlive_the_coordinator_and_are_used_again() {
-    let folder = tempfile::tempdir().unwrap();
-    let config =
-        CoordinatorConfig { plan_files: Some(PlanFiles::at(folder.path().to_owned())), ..CoordinatorConfig::default() };
+    let config = CoordinatorConfig { plans: Some(Arc::new(Memory::default())), ..CoordinatorConfig::default() };
     let mut all = Vec::new();
     for _ in 0..2 {
         let log = Shared::default();
@@ -150,6 +149,22 @@ async fn a_node_that_is_lost_while_it_measures_is_replaced_by_another() {
     let promise = settled(&session).await;
     assert_eq!(promise.state, PromiseState::Kept, "{promise}");
     assert_eq!(delivered(&session).await, 6);
+}
+
+/// Measurements in memory.
+#[derive(Debug, Default)]
+struct Memory(Mutex<Vec<Kept>>);
+
+impl PlanStore for Memory {
+    fn read(&self, key: &KeptKey) -> Kept {
+        let found = self.0.lock().iter().rev().find(|kept| kept.key == *key).cloned();
+        found.unwrap_or_else(|| Kept::empty(key.clone()))
+    }
+
+    fn write(&self, kept: &Kept) -> std::io::Result<()> {
+        self.0.lock().push(kept.clone());
+        Ok(())
+    }
 }
 
 /// A log that a test can read.

@@ -11,6 +11,7 @@ use app_core::setup::{DeviceArgs, SceneArgs, Setup};
 use app_core::sizes::SizePx;
 use clap::Args;
 use codec::FrameCodec;
+use coordinator::PlanStore as _;
 use coordinator::schedule::EqualNodes;
 use depth_image::{Antialias, ViewPlanes};
 use engine::GpuEngine;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use cluster::SceneHash;
+use coordinator::PlanStore;
 use planner::{Kept, KeptKey, MAX_KEPT_BYTES};
 
 const ENDING: &str = "json";
@@ -29,39 +30,6 @@ impl PlanFiles {
         let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
         let caches = absolute("XDG_CACHE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".cache")))?;
         Some(caches.join("myriorama").join("plans"))
-    }
-
-    /// The measurements of a key; none where there is no file. A file that cannot be used is ignored with a warning.
-    #[must_use]
-    pub fn read(&self, key: &KeptKey) -> Kept {
-        let path = self.path(key);
-        let ignored = |reason: String| {
-            tracing::warn!("{} is ignored: {reason}", path.display());
-            Kept::empty(key.clone())
-        };
-        match fs::metadata(&path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Kept::empty(key.clone()),
-            Err(error) => ignored(error.to_string()),
-            Ok(file) if file.len() > MAX_KEPT_BYTES as u64 => ignored(format!("it has {} bytes", file.len())),
-            Ok(_) => match fs::read(&path) {
-                Ok(json) => Kept::from_json(&json, key).unwrap_or_else(|error| ignored(error.to_string())),
-                Err(error) => ignored(error.to_string()),
-            },
-        }
-    }
-
-    /// Writes the measurements of a key, whole or not at all. The files that were written longest ago are removed where all
-    /// together are too large.
-    ///
-    /// # Errors
-    /// The folder or the file cannot be written.
-    pub fn write(&self, kept: &Kept) -> io::Result<()> {
-        fs::create_dir_all(&self.folder)?;
-        let path = self.path(&kept.key);
-        let part = path.with_extension(format!("{}.part", std::process::id()));
-        fs::write(&part, kept.to_json().map_err(io::Error::other)?)?;
-        fs::rename(&part, &path)?;
-        self.remove_oldest(&path)
     }
 
     fn path(&self, key: &KeptKey) -> PathBuf {
@@ -88,6 +56,37 @@ impl PlanFiles {
             bytes -= file_bytes;
         }
         Ok(())
+    }
+}
+
+impl PlanStore for PlanFiles {
+    /// The measurements of a key; none where there is no file. A file that cannot be used is ignored with a warning.
+    fn read(&self, key: &KeptKey) -> Kept {
+        let path = self.path(key);
+        let ignored = |reason: String| {
+            tracing::warn!("{} is ignored: {reason}", path.display());
+            Kept::empty(key.clone())
+        };
+        match fs::metadata(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Kept::empty(key.clone()),
+            Err(error) => ignored(error.to_string()),
+            Ok(file) if file.len() > MAX_KEPT_BYTES as u64 => ignored(format!("it has {} bytes", file.len())),
+            Ok(_) => match fs::read(&path) {
+                Ok(json) => Kept::from_json(&json, key).unwrap_or_else(|error| ignored(error.to_string())),
+                Err(error) => ignored(error.to_string()),
+            },
+        }
+    }
+
+    /// Writes the measurements of a key, whole or not at all. The files that were written longest ago are removed where all
+    /// together are too large.
+    fn write(&self, kept: &Kept) -> io::Result<()> {
+        fs::create_dir_all(&self.folder)?;
+        let path = self.path(&kept.key);
+        let part = path.with_extension(format!("{}.part", std::process::id()));
+        fs::write(&part, kept.to_json().map_err(io::Error::other)?)?;
+        fs::rename(&part, &path)?;
+        self.remove_oldest(&path)
     }
 }
 
