@@ -55,6 +55,14 @@ pub(super) struct BudgetPlan {
     lost: u32,
 }
 
+/// A workload's budget: the last plan for it, and what is in force.
+#[derive(Debug, Clone)]
+pub(super) struct BudgetState {
+    pub(super) plan: BudgetPlan,
+    /// The budget that the representation in force was chosen for, and the choice.
+    pub(super) in_force: Option<(Budget, Outcome)>,
+}
+
 /// Measurements that one node is asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewProbe {

@@ -15,13 +15,13 @@ use std::time::Duration;
 use cluster::{JoinCluster, MeasuredCosts};
 
 use super::active_plan::ActivePlan;
+use super::budget_plan::BudgetState;
 use super::estimate::SampledParts;
 use super::member::Member;
 use super::reports::SamplerReports;
 use super::sharing_hysteresis::SharingHysteresis;
 use super::workload_state::WorkloadState;
 use super::{Command, Event};
-use budgets::BudgetState;
 
 /// Workloads that may be open, unless an event says otherwise.
 const MAX_WORKLOADS: usize = 8;

@@ -2,7 +2,8 @@
 //!
 //! [`setup`] makes a scene on offer out of arguments, and [`scenes`] several. [`cluster`] runs coordinator and nodes in one process.
 //! [`delivery`] opens sessions and receives views, and [`live`] follows a path with a moving camera. [`camera_file`]
-//! reads camera files, and [`camera_record`] writes those of views. [`planning`] has the terms of a plan, and [`plan_files`] what
+//! reads camera files, and [`camera_record`] writes those of views. [`ladder`] has the representations among which budgets
+//! choose, [`planning`] the terms of a plan, and [`plan_files`] what
 //! plans have measured. [`exit`] defines the exit status.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
@@ -11,6 +12,7 @@ pub mod camera_record;
 pub mod cluster;
 pub mod delivery;
 pub mod exit;
+pub mod ladder;
 pub mod live;
 pub mod memory;
 pub mod plan_files;

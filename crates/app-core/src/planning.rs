@@ -9,16 +9,11 @@ use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
 use glam::{UVec2, Vec2};
 use planner::{Budget, KeptKey, Ladder, PlanRequest, Row, most_certified};
 use probe::{DirectCosts, Representation, Subject, Viewpoints};
-use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::SamplingMethod;
 
+use crate::ladder::rows;
 use crate::setup::{SceneArgs, Setup};
-
-/// Numbers of sample cameras.
-const CAMERA_COUNTS: [u32; 4] = [1, 2, 4, 8];
-/// Sides of sample images, as shares of the side that `--sample-size auto` chooses.
-const SIDE_RATIOS: [f64; 3] = [0.5, 0.71, 1.0];
 
 /// The views to plan for.
 #[derive(Debug, Clone, Copy)]
@@ -59,7 +54,7 @@ impl Planning {
         let rig: Vec<Camera> = setup.around.iter().copied().map(Camera::Pinhole).collect();
         let fixed_px = args.sample_size.fixed_px();
         let whole_px = fixed_px.or_else(|| fitting_size_px(&rig, &view)).context("the views have no size")?;
-        let rows = rows(args, setup.around.len() as u32);
+        let rows = rows(&args.named(setup.around.len() as u32));
         let cameras = Cameras { cell: &cell, whole_px, given: args.samples.is_some().then_some(&setup.around) };
         let representations = rows.iter().map(|row| cameras.representation(row)).collect::<anyhow::Result<_>>()?;
         let lighting = args.lighting.to_string();
@@ -125,56 +120,6 @@ fn hash(text: &str) -> String {
     SceneHash::of(text.as_bytes()).to_string()
 }
 
-/// The rows that arguments leave, for `given_cameras` cameras of the user's file if there is one. What the user names (methods,
-/// size of sample images, sample cameras) is the same in all rows.
-pub(crate) fn rows(args: &SceneArgs, given_cameras: u32) -> Vec<Row> {
-    let is_size_fixed = args.sample_size.fixed_px().is_some();
-    let samplings: Vec<(String, u32)> = match args.sampling {
-        Some(sampling) => vec![(sampling.to_string(), 1)],
-        None => SamplingMethod::ladder().map(|(name, images)| (name.to_owned(), images)).collect(),
-    };
-    let methods: Vec<ReconstructionMethod> = match args.method {
-        Some(method) => vec![method],
-        None => ReconstructionMethod::ladder().collect(),
-    };
-    let own_count = args.sampling.and_then(SamplingMethod::own_image_count);
-    let counts = match (own_count, args.samples.is_some()) {
-        (Some(count), _) => vec![count],
-        (None, true) => vec![given_cameras],
-        (None, false) => CAMERA_COUNTS.to_vec(),
-    };
-    let sides = if is_size_fixed { &SIDE_RATIOS[2..] } else { &SIDE_RATIOS[..] };
-    let mut rows = Vec::new();
-    for (sampling, least_images) in &samplings {
-        let is_of_layers = sampling.parse().is_ok_and(|method: SamplingMethod| method.own_image_count().is_some());
-        for &camera_count in counts.iter().filter(|&count| count >= least_images) {
-            for &side_ratio in sides {
-                rows.extend(methods.iter().enumerate().map(|(place, method)| Row {
-                    sampling: sampling.clone(),
-                    method: method.to_string(),
-                    camera_count,
-                    place_count: if is_of_layers { 1 } else { camera_count },
-                    side_ratio,
-                    kind: format!("{} {}", without_setting(sampling), without_setting(&method.to_string())),
-                    rank: rank(&methods, place),
-                }));
-            }
-        }
-    }
-    rows
-}
-
-/// The place of a setting among those of its method.
-fn rank(methods: &[ReconstructionMethod], place: usize) -> u32 {
-    let is_same =
-        |other: &&ReconstructionMethod| std::mem::discriminant(*other) == std::mem::discriminant(&methods[place]);
-    methods[..place].iter().filter(is_same).count() as u32
-}
-
-fn without_setting(method: &str) -> &str {
-    method.split(':').next().unwrap_or(method)
-}
-
 /// The places of a ladder's sample cameras.
 struct Cameras<'a> {
     cell: &'a ViewCell,
@@ -213,7 +158,10 @@ mod tests {
     use codec::FrameCodec;
     use planner::MAX_ROWS;
 
+    use reconstruction::ReconstructionMethod;
+
     use super::*;
+    use crate::ladder::CAMERA_COUNTS;
     use crate::sizes::SampleSize;
 
     /// The arguments of a scene, as from a command line.

@@ -15,7 +15,7 @@ use sampling::{Rig, SamplingMethod};
 use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec, UpAxis};
 
 use crate::camera_file::{self, Placement};
-use crate::planning::rows;
+use crate::ladder::{Named, rows};
 use crate::sizes::SampleSize;
 
 /// The size of the sample images, as in the paper.
@@ -116,6 +116,16 @@ impl SceneArgs {
         self.sampling.unwrap_or_default()
     }
 
+    /// What the user names of representations, where the scene has `cameras` sample cameras.
+    pub(crate) fn named(&self, cameras: u32) -> Named {
+        Named {
+            sampling: self.sampling,
+            method: self.method,
+            has_size: self.sample_size.fixed_px().is_some(),
+            cameras: self.samples.is_some().then_some(cameras),
+        }
+    }
+
     /// Loads the scene and places its sample cameras.
     ///
     /// # Errors
@@ -140,7 +150,7 @@ impl SceneArgs {
             package: package.into(),
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
             fits_views: self.sample_size == SampleSize::Auto && self.samples.is_none(),
-            rows: rows(self, around.len() as u32),
+            rows: rows(&self.named(around.len() as u32)),
             keeps_cameras: self.samples.is_some(),
             volume: scene.bounds(),
             background: scene.background,

@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use cluster::{Costs, PolicyChoice, Promise, PromiseState, SamplePlanes};
-use planner::{Budget, Choice, Kept, Outcome, ProbeId};
+use planner::{Budget, Choice, Kept, ProbeId};
 
 use super::Scheduler;
-use crate::schedule::budget_plan::{BudgetPlan, prices};
+use crate::schedule::budget_plan::{BudgetPlan, BudgetState, prices};
 use crate::schedule::estimate::Estimate;
 use crate::schedule::member::Member;
 use crate::schedule::prices::EqualNodes;
@@ -22,14 +22,6 @@ const OTHER_DEMAND: f64 = 2.0;
 const NEWS: Duration = Duration::from_secs(5);
 /// A node that has worked within this time serves somebody.
 const RECENTLY: Duration = Duration::from_secs(2);
-
-/// A workload's budget: the last plan for it, and what is in force.
-#[derive(Debug, Clone)]
-pub(super) struct BudgetState {
-    plan: BudgetPlan,
-    /// The budget that the representation in force was chosen for, and the choice.
-    in_force: Option<(Budget, Outcome)>,
-}
 
 impl Scheduler {
     /// What follows for budgets from the event that has just been taken.

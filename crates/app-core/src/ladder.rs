@@ -1,0 +1,68 @@
+//! The representations among which budgets choose, from the methods that are known.
+
+use planner::Row;
+use reconstruction::ReconstructionMethod;
+use sampling::SamplingMethod;
+
+/// Numbers of sample cameras.
+pub(crate) const CAMERA_COUNTS: [u32; 4] = [1, 2, 4, 8];
+/// Sides of sample images, as shares of the side that `--sample-size auto` chooses.
+const SIDE_RATIOS: [f64; 3] = [0.5, 0.71, 1.0];
+
+/// What a user names.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Named {
+    /// The sampling method.
+    pub sampling: Option<SamplingMethod>,
+    /// The reconstruction method.
+    pub method: Option<ReconstructionMethod>,
+    /// The size of sample images is named.
+    pub has_size: bool,
+    /// The number of the user's own sample cameras.
+    pub cameras: Option<u32>,
+}
+
+/// The rows that a user's choices leave: what the user names is the same in all of them.
+#[must_use]
+pub fn rows(named: &Named) -> Vec<Row> {
+    let samplings: Vec<(String, u32)> = match named.sampling {
+        Some(sampling) => vec![(sampling.to_string(), 1)],
+        None => SamplingMethod::ladder().map(|(name, images)| (name.to_owned(), images)).collect(),
+    };
+    let methods: Vec<ReconstructionMethod> = match named.method {
+        Some(method) => vec![method],
+        None => ReconstructionMethod::ladder().collect(),
+    };
+    let own_count = named.sampling.and_then(SamplingMethod::own_image_count);
+    let counts = own_count.or(named.cameras).map_or_else(|| CAMERA_COUNTS.to_vec(), |count| vec![count]);
+    let sides = if named.has_size { &SIDE_RATIOS[2..] } else { &SIDE_RATIOS[..] };
+    let mut rows = Vec::new();
+    for (sampling, least_images) in &samplings {
+        let is_of_layers = sampling.parse().is_ok_and(|method: SamplingMethod| method.own_image_count().is_some());
+        for &camera_count in counts.iter().filter(|&count| count >= least_images) {
+            for &side_ratio in sides {
+                rows.extend(methods.iter().enumerate().map(|(place, method)| Row {
+                    sampling: sampling.clone(),
+                    method: method.to_string(),
+                    camera_count,
+                    place_count: if is_of_layers { 1 } else { camera_count },
+                    side_ratio,
+                    kind: format!("{} {}", without_setting(sampling), without_setting(&method.to_string())),
+                    rank: rank(&methods, place),
+                }));
+            }
+        }
+    }
+    rows
+}
+
+/// The place of a setting among those of its method.
+fn rank(methods: &[ReconstructionMethod], place: usize) -> u32 {
+    let is_same =
+        |other: &&ReconstructionMethod| std::mem::discriminant(*other) == std::mem::discriminant(&methods[place]);
+    methods[..place].iter().filter(is_same).count() as u32
+}
+
+fn without_setting(method: &str) -> &str {
+    method.split(':').next().unwrap_or(method)
+}
