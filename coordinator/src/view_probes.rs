@@ -24,15 +24,14 @@ const MAX_REASON_BYTES: usize = 1024;
 
 /// Finds the measurements of earlier plans.
 pub(crate) async fn recall(shared: Arc<Shared>, workload_number: u64, key: KeptKey) {
-    let store = shared.config.plans.clone();
+    let (store, nothing) = (shared.config.plans.clone(), Kept::empty(key.clone()));
     let found = blocking(move || {
-        let kept = store.map_or_else(|| Kept::empty(key.clone()), |store| store.read(&key));
-        let is_small = kept.to_json().is_ok_and(|json| json.len() <= MOST_RECALLED_BYTES);
-        Ok::<_, Status>(if is_small { kept } else { Kept::empty(key) })
+        let kept = store.map(|store| store.read(&key));
+        let is_small = |kept: &Kept| kept.to_json().is_ok_and(|json| json.len() <= MOST_RECALLED_BYTES);
+        Ok::<_, Status>(kept.filter(is_small))
     });
-    if let Ok(kept) = found.await {
-        planned(&shared, workload_number, PlannerEvent::Remembered(kept));
-    }
+    let kept = found.await.ok().flatten().unwrap_or(nothing);
+    planned(&shared, workload_number, PlannerEvent::Remembered(kept));
 }
 
 /// Keeps what was measured. The plan is made, whether a later one can use it or not.

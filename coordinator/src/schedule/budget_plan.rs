@@ -174,13 +174,15 @@ impl BudgetPlan {
             (self.is_running, self.lost) = (false, 0);
             self.not_before = now + Duration::try_from_secs_f64(pause_s).unwrap_or(PAUSE);
         }
-        let is_first = matches!(event, PlannerEvent::Remembered(_));
+        // Measurements that a plan before this one asked for.
+        if matches!(&event, PlannerEvent::Remembered(kept) if kept.key != self.key()) {
+            return None;
+        }
         let mut commands = self.planner.step(event);
         if let [PlannerCommand::Refuse(error)] = &commands[..] {
             let reason = error.to_string();
             commands = match answered {
                 Some((id, busy_s, _)) => self.planner.step(PlannerEvent::Failed { id, reason, busy_s }),
-                None if is_first => self.planner.step(PlannerEvent::Remembered(Kept::empty(self.key()))),
                 None => Vec::new(),
             };
         }

@@ -20,8 +20,6 @@ const DWELL: Duration = Duration::from_secs(60);
 const OTHER_DEMAND: f64 = 2.0;
 /// Sessions are told so often how measuring goes on.
 const NEWS: Duration = Duration::from_secs(5);
-/// A node that has worked within this time serves somebody.
-const RECENTLY: Duration = Duration::from_secs(2);
 
 impl Scheduler {
     /// What follows for budgets from the event that has just been taken.
@@ -112,10 +110,9 @@ impl Scheduler {
         Some((name.clone(), member.status.address.clone()))
     }
 
-    /// Whether some node works for a session.
+    /// Whether some node works for a session; measuring is no such work.
     fn is_serving(&self) -> bool {
-        let is_recent = |at: Duration| self.now.saturating_sub(at) < RECENTLY;
-        self.members.values().any(|member| member.activity.busy_at.is_some_and(is_recent))
+        self.members.values().any(|member| member.activity.busy_ratio(self.now) > 0.0)
     }
 
     /// Takes an event of a workload's plan.
