@@ -157,7 +157,9 @@ async fn reopen(
 
 fn take_over(event: SessionEvent, state: &watch::Sender<SessionState>, is_new_session: &mut bool) {
     match event {
-        SessionEvent::Opened { session } => state.send_modify(|state| state.session = session),
+        SessionEvent::Opened { session } => {
+            state.send_modify(|state| (state.session, state.promise) = (session, None));
+        }
         SessionEvent::Progress { .. } => (),
         SessionEvent::Plan(plan) => put_in_force(*plan, state, std::mem::take(is_new_session)),
         SessionEvent::Promise(promise) => state.send_modify(|state| state.promise = Some(promise)),

@@ -11,7 +11,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, Policy, RenderViews, RequestedView, SetContent};
+use cluster::{Assignment, DIRECT, Policy, RenderViews, RequestedView, SetContent};
 use node::{CellPlan, next_within, view_bytes};
 use tokio::sync::Semaphore;
 use tonic::Status;
@@ -147,10 +147,10 @@ impl<'a> LiveStream<'a> {
     }
 
     /// Accepts an acknowledgement, and a pose, which replaces an older one of its set.
-    fn accept(&mut self, request: RenderViews) -> Result<(), Status> {
+    fn accept(&mut self, mut request: RenderViews) -> Result<(), Status> {
         let live = request.live.ok_or_else(|| Status::invalid_argument("live: the stream's first request was"))?;
         self.client.outbox.acknowledge(live.acknowledged_frame);
-        let plan = self.plan_of(&request)?;
+        let plan = self.plan_of(&mut request)?;
         let Some(&view) = request.views.first() else {
             return Ok(());
         };
@@ -225,10 +225,17 @@ impl<'a> LiveStream<'a> {
         }
     }
 
-    /// The plan in force for a request. A stream goes on from plan to plan of its workload, whatever its cells and roles.
-    fn plan_of(&self, request: &RenderViews) -> Result<Arc<Assignment>, Status> {
+    /// The plan in force for a request. A stream goes on from plan to plan of its workload, whatever its cells and roles. A
+    /// request of the plan before does not know the method of a new one.
+    fn plan_of(&self, request: &mut RenderViews) -> Result<Arc<Assignment>, Status> {
         let shared = &self.client.shared;
-        shared.of_compositor(shared.plans.follow(request.workload_number, request.plan_epoch)?, &request.method)
+        let plan = shared.plans.follow(request.workload_number, request.plan_epoch)?;
+        if let Some(method) = plan.method.as_ref().filter(|_| plan.plan_epoch > request.plan_epoch)
+            && request.method != DIRECT
+        {
+            request.method.clone_from(method);
+        }
+        shared.of_compositor(plan, &request.method)
     }
 
     fn count_replaced(&self, older: Option<RequestedView>) {
@@ -269,9 +276,9 @@ impl<'a> LiveStream<'a> {
     /// A set that failed under a plan that was replaced is fetched under the plan in force. One that no pose waits for is
     /// fetched again when one does.
     fn not_loaded(&mut self, status: Status) -> Result<(), Status> {
-        let Some(pose) = self.loading.take().and_then(|fetch| fetch.pose) else { return Ok(()) };
+        let Some(mut pose) = self.loading.take().and_then(|fetch| fetch.pose) else { return Ok(()) };
         self.client.shared.metrics.wanted_fetches_ended.inc();
-        let plan = self.plan_of(&pose.request)?;
+        let plan = self.plan_of(&mut pose.request)?;
         if plan.plan_epoch == pose.plan.plan_epoch {
             return Err(status);
         }

@@ -4,7 +4,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use cluster::{Assignment, SetContent, Timeline, Workload};
+use cluster::{Assignment, Policy, SetContent, Timeline, Workload};
 use codec::EncodedDepthImage;
 use depth_image::{Camera, PinholeCamera, nearest_set};
 use node::{
@@ -85,9 +85,10 @@ impl Sets {
         Arc::new(self.cached.clone())
     }
 
-    /// Checks that a plan's samples have the planes that a method needs.
+    /// Checks that a plan's samples have the planes that a method needs, where there are samples.
     pub(crate) fn check_method(&self, plan: &Assignment, method: &str) -> Result<(), Status> {
-        if plan.workload.planes.contain(self.scenes.engine().sample_planes(method)?) {
+        let needed = self.scenes.engine().sample_planes(method)?;
+        if plan.policy == Policy::Direct || plan.workload.planes.contain(needed) {
             return Ok(());
         }
         let text = "needs planes that this workload does not sample; a session of this method does";

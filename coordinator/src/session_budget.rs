@@ -23,7 +23,8 @@ pub(crate) fn budgeted(
     let own = request.budget.budget.as_deref().map(str::parse::<Budget>).transpose();
     let own = own.map_err(|error| Status::invalid_argument(format!("budget: {error}")))?;
     let Some(budget) = own.or(config.budget) else { return Ok(None) };
-    let keeps_cameras = offer.keeps_cameras || !request.sample_cameras.is_empty();
+    let has_own = offer.keeps_cameras || !request.sample_cameras.is_empty();
+    let keeps_cameras = has_own && request.viewpoints.is_empty();
     let rows = rows(request, offer, keeps_cameras.then_some(workload.sample_cameras.len() as u32));
     let Some(Camera::Pinhole(first)) = workload.sample_cameras.first().filter(|_| !rows.is_empty()) else {
         return match own {
@@ -32,7 +33,7 @@ pub(crate) fn budgeted(
         };
     };
     let screening = (config.screening_light)(&workload.lighting);
-    Ok(Some(Budgeted {
+    let budgeted = Budgeted {
         budget,
         rows,
         whole_px: first.size_px,
@@ -41,12 +42,14 @@ pub(crate) fn budgeted(
         antialias_samples: request.planes.antialias.samples(),
         codec: request.codec.clone(),
         screening_lighting: screening.unwrap_or_else(|| workload.lighting.clone()),
-    }))
+    };
+    budgeted.validate().map_err(|error| Status::invalid_argument(format!("budget: {error}")))?;
+    Ok(Some(budgeted))
 }
 
 /// The offer's rows as far as the session has not named another method, another size or its own cameras.
 fn rows(request: &SessionRequest, offer: &SceneOffer, own_cameras: Option<u32>) -> Vec<Row> {
-    if request.budget.names_method && request.method == DIRECT {
+    if request.method == DIRECT {
         return Vec::new();
     }
     let has_size = request.sample_size_px.is_some() || !offer.fits_views;
@@ -59,6 +62,8 @@ fn rows(request: &SessionRequest, offer: &SceneOffer, own_cameras: Option<u32>) 
     }
     rows.retain(|row| !has_size || row.side_ratio == 1.0);
     if let Some(count) = own_cameras {
+        // Layers are of one place, and the cameras have several.
+        rows.retain(|row| row.place_count == row.camera_count);
         rows.iter_mut().for_each(|row| (row.camera_count, row.place_count) = (count, count));
     }
     let mut seen = BTreeSet::new();

@@ -75,7 +75,8 @@ async fn measured_opening(
             forced_samplers: request.forced_sampler_count.map(|count| count as usize),
             forced_tiles: request.forced_tile_count.map(|count| count as usize),
         },
-        fallbacks: request.fallbacks,
+        // What is promised is shown.
+        fallbacks: if budgeted.is_some() { Vec::new() } else { request.fallbacks },
         costs,
         auto_exposure,
         viewpoints: request.viewpoints,
@@ -85,7 +86,7 @@ async fn measured_opening(
 
 /// Known costs; else they are measured, one session at a time. A session that would not be admitted is not measured for.
 /// A measurement that was begun ends, and its costs are kept, though its client may leave meanwhile.
-pub(crate) async fn costs_of(
+async fn costs_of(
     shared: &Arc<Shared>,
     measurement: MeasureCosts,
     events: &EventSender,

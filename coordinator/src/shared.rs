@@ -27,6 +27,8 @@ pub(crate) struct Shared {
     /// Measurements that wait for idle nodes.
     pub(crate) to_measure: Mutex<MeasuringQueue>,
     pub(crate) costs: CostCache,
+    /// Measurements for budgets are read and written one after the other.
+    pub(crate) keeping: tokio::sync::Mutex<()>,
     pub(crate) commands: CommandQueue,
     pub(crate) membership: MembershipRegistry,
     pub(crate) sessions: SessionRegistry,
@@ -47,6 +49,7 @@ impl Shared {
             measuring: Arc::default(),
             to_measure: Mutex::default(),
             costs: CostCache::default(),
+            keeping: tokio::sync::Mutex::default(),
             commands: CommandQueue::default(),
             membership: MembershipRegistry::default(),
             sessions: SessionRegistry::default(),

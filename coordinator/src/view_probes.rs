@@ -1,7 +1,7 @@
 //! What the planning for a budget asks of nodes and of files.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use cluster::{MeasureCosts, ProbeViews, ProbedView, ProbedViews};
 use node::blocking;
@@ -11,8 +11,8 @@ use tonic::{Code, Status};
 use wire::rpc::NodeClient;
 
 use crate::grpc_status::{of_node, within};
+use crate::measuring::{known, measured_on_present_nodes};
 use crate::schedule::{Event, ViewProbe};
-use crate::session_opening::costs_of;
 use crate::shared::Shared;
 
 /// How long a node may measure, waits for other work included.
@@ -30,6 +30,7 @@ pub(crate) async fn recall(shared: Arc<Shared>, workload_number: u64, key: KeptK
         let is_small = |kept: &Kept| kept.to_json().is_ok_and(|json| json.len() <= MOST_RECALLED_BYTES);
         Ok::<_, Status>(kept.filter(is_small))
     });
+    let _one = shared.keeping.lock().await;
     let kept = found.await.ok().flatten().unwrap_or(nothing);
     planned(&shared, workload_number, PlannerEvent::Remembered(kept));
 }
@@ -37,6 +38,7 @@ pub(crate) async fn recall(shared: Arc<Shared>, workload_number: u64, key: KeptK
 /// Keeps what was measured. The plan is made, whether a later one can use it or not.
 pub(crate) async fn keep(shared: Arc<Shared>, kept: Kept) {
     let Some(store) = shared.config.plans.clone() else { return };
+    let _one = shared.keeping.lock().await;
     let written = blocking(move || store.write(&kept).map_err(|error| Status::internal(error.to_string()))).await;
     if let Err(status) = written {
         tracing::warn!(reason = status.message(), "measurements are not kept");
@@ -45,12 +47,18 @@ pub(crate) async fn keep(shared: Arc<Shared>, kept: Kept) {
 
 /// Has a node measure views.
 pub(crate) async fn probe_views(shared: Arc<Shared>, probe: ViewProbe) {
-    let (workload_number, id) = (probe.workload_number, probe.id);
-    match probed(&shared, probe).await {
+    let (workload_number, id, start) = (probe.workload_number, probe.id, Instant::now());
+    let asking = tokio::spawn({
+        let shared = shared.clone();
+        async move { probed(&shared, probe).await }
+    });
+    // Whatever becomes of the task, the schedule hears of it.
+    let answer = asking.await.unwrap_or_else(|error| Err(Status::unavailable(error.to_string())));
+    match answer {
         Ok(event) => planned(&shared, workload_number, event),
         Err(status) if is_refusal(&status) => {
-            let reason = shortened(status.message());
-            planned(&shared, workload_number, PlannerEvent::Failed { id, reason, busy_s: 0.0 });
+            let (reason, busy_s) = (shortened(status.message()), start.elapsed().as_secs_f64());
+            planned(&shared, workload_number, PlannerEvent::Failed { id, reason, busy_s });
         }
         Err(status) => {
             let reason = shortened(status.message());
@@ -63,7 +71,11 @@ pub(crate) async fn probe_views(shared: Arc<Shared>, probe: ViewProbe) {
 pub(crate) async fn represent(shared: Arc<Shared>, workload_number: u64, plan: u64, measurement: MeasureCosts) {
     // Nobody reads how the measuring goes on.
     let (events, _progress) = mpsc::channel(1);
-    match costs_of(&shared, measurement, &events, || Ok(())).await {
+    let measured = match known(&shared, &measurement) {
+        Some(known) => Ok(known),
+        None => measured_on_present_nodes(&shared, &measurement, &events).await,
+    };
+    match measured {
         Ok(measured) => {
             let (costs, planes) = (measured.costs, measured.planes);
             shared.step(Event::Represented { workload_number, plan, costs, planes });
@@ -92,10 +104,10 @@ async fn probed(shared: &Shared, probe: ViewProbe) -> Result<PlannerEvent, Statu
     let costs = |answers: &[ProbedViews]| median_costs(&answers.iter().map(row_costs).collect::<Vec<_>>());
     if views.is_empty() {
         let rows = requests.iter().zip(&answers).map(|((row, _), answers)| (*row, costs(answers))).collect();
-        return Ok(PlannerEvent::Timed(Timed { id, rows, busy_s }));
+        return Ok(check(id, PlannerEvent::Timed(Timed { id, rows, busy_s })));
     }
     let (Some((row, _)), Some([answer])) = (requests.first(), answers.first().map(Vec::as_slice)) else {
-        return Err(Status::internal("a comparison is of one row"));
+        return Err(Status::out_of_range("a comparison is of one row"));
     };
     let views = views.into_iter().zip(answer.views.iter().map(errors)).collect();
     let probed = Probed { id, row: *row, views, costs: row_costs(answer), busy_s };
@@ -108,7 +120,9 @@ async fn ask(node: &NodeClient, request: &ProbeViews, address: &str) -> Result<P
     let wanted = if request.with_errors { request.views.len() } else { 0 };
     match answer.views.len() == wanted {
         true => Ok(answer),
-        false => Err(Status::internal(format!("{address} has compared {} views, not {wanted}", answer.views.len()))),
+        false => {
+            Err(Status::out_of_range(format!("{address} has compared {} views, not {wanted}", answer.views.len())))
+        }
     }
 }
 
@@ -122,7 +136,7 @@ fn check(id: ProbeId, event: PlannerEvent) -> PlannerEvent {
 
 /// Whether the node answered, and would answer the same again.
 fn is_refusal(status: &Status) -> bool {
-    [Code::InvalidArgument, Code::Internal, Code::Unimplemented, Code::OutOfRange].contains(&status.code())
+    [Code::InvalidArgument, Code::Unimplemented, Code::OutOfRange].contains(&status.code())
 }
 
 fn shortened(reason: &str) -> String {

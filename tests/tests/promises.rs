@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use client::{ClientError, Session};
 use cluster::{BudgetRequest, PolicyChoice, Promise, PromiseState, SessionRequest, Timeline};
-use cluster_tests::cluster::{Cluster, request, views};
+use cluster_tests::cluster::{Cluster, camera, request, views};
 use coordinator::schedule::{Command, Recorder, replay};
 use coordinator::{CoordinatorConfig, CoordinatorMetrics, Observers, PlanStore};
 use parking_lot::Mutex;
@@ -88,8 +88,7 @@ async fn a_text_that_is_no_budget_is_refused_by_its_term() {
         let refused = cluster.session(budgeted(wrong)).await.unwrap_err();
         assert!(matches!(&refused, ClientError::Coordinator { reason } if reason.contains("budget")), "{refused}");
     }
-    let named = BudgetRequest { names_method: true, ..budgeted(LOOSE).budget };
-    let direct = SessionRequest { method: cluster::DIRECT.to_owned(), budget: named, ..budgeted(LOOSE) };
+    let direct = SessionRequest { method: cluster::DIRECT.to_owned(), ..budgeted(LOOSE) };
     let refused = cluster.session(direct).await.unwrap_err();
     assert!(refused.to_string().contains("leave no representation"), "{refused}");
 }
@@ -102,8 +101,7 @@ async fn the_coordinators_budget_is_that_of_sessions_that_state_none() {
     let session = cluster.session(plain.clone()).await.unwrap();
     assert_eq!(settled(&session).await.budget, LOOSE);
     // A session that has its views drawn by name has nothing to be promised.
-    let budget = BudgetRequest { names_method: true, ..BudgetRequest::default() };
-    let direct = SessionRequest { method: cluster::DIRECT.to_owned(), policy: PolicyChoice::Auto, budget, ..plain };
+    let direct = SessionRequest { method: cluster::DIRECT.to_owned(), policy: PolicyChoice::Auto, ..plain };
     let session = cluster.session(direct).await.unwrap();
     assert_eq!(delivered(&session).await, 6);
     assert_eq!(session.promise(), None);
@@ -165,6 +163,29 @@ impl PlanStore for Memory {
         self.0.lock().push(kept.clone());
         Ok(())
     }
+}
+
+/// A live view goes on while the representation changes.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_live_view_goes_on_while_the_representation_changes() {
+    let cluster = Cluster::start(2).await;
+    let request = SessionRequest { frames_per_s: Some(20.0), views_per_set: 1, ..budgeted(LOOSE) };
+    let session = cluster.session(request).await.unwrap();
+    let first = session.plan().assignment.plan_epoch;
+    let mut live = session.live();
+    let mut epochs = std::collections::BTreeSet::new();
+    let start = std::time::Instant::now();
+    while epochs.iter().all(|&epoch| epoch == first) {
+        assert!(start.elapsed() < DEADLINE, "the representation does not change");
+        live.set_pose(session_view(epochs.len()), 0).unwrap();
+        let frame = tokio::time::timeout(DEADLINE, live.next()).await.expect("a frame").unwrap();
+        epochs.insert(frame.frame.header.sample_set_id.plan_epoch);
+    }
+    assert_eq!(settled(&session).await.state, PromiseState::Kept);
+}
+
+fn session_view(step: usize) -> depth_image::PinholeCamera {
+    camera(0.1 + 0.01 * step as f32, glam::UVec2::new(48, 36))
 }
 
 /// A log that a test can read.

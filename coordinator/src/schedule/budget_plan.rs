@@ -20,8 +20,6 @@ const ALLOWED_VIEWS: f64 = 100.0;
 const ALLOWED_SETS: f64 = 12.0;
 /// The share of the nodes' time that measuring may take beyond.
 const ALLOWED_SHARE: f64 = 0.05;
-/// While anybody is served, measuring takes this share of one node's time.
-const PROBING_SHARE: f64 = 0.2;
 /// A measurement is asked for again after this pause, and fails where nodes were lost so often.
 const PAUSE: Duration = Duration::from_secs(1);
 const MOST_LOST: u32 = 5;
@@ -48,9 +46,8 @@ pub(super) struct BudgetPlan {
     cells: Vec<ViewCell>,
     planner: Planner<EqualNodes>,
     allowance_s: f64,
-    /// The measurement that is asked for, and whether a node makes it.
+    /// The measurement that is wanted.
     asked: Option<PlannerCommand>,
-    is_running: bool,
     not_before: Duration,
     lost: u32,
 }
@@ -59,8 +56,21 @@ pub(super) struct BudgetPlan {
 #[derive(Debug, Clone)]
 pub(super) struct BudgetState {
     pub(super) plan: BudgetPlan,
-    /// The budget that the representation in force was chosen for, and the choice.
-    pub(super) in_force: Option<(Budget, Outcome)>,
+    pub(super) in_force: Option<InForce>,
+    /// The choice could not be put in force, for a reason that may pass.
+    pub(super) is_to_be_tried_again: bool,
+}
+
+/// A choice in force.
+#[derive(Debug, Clone)]
+pub(super) struct InForce {
+    /// The budget that was planned for.
+    pub(super) budget: Budget,
+    pub(super) outcome: Outcome,
+    pub(super) since: Duration,
+    /// The first plan with it, and whether nodes and sessions have that plan.
+    pub(super) plan_epoch: u64,
+    pub(super) is_applied: bool,
 }
 
 /// Measurements that one node is asked for.
@@ -115,7 +125,7 @@ impl BudgetPlan {
         let planner = Planner::new(request, budgeted.ladder()?, prices)
             .map_err(|error| InvalidField::out_of_range("budget", error, "a plan"))?;
         let (workload, device_name) = (workload.requested.clone(), device_name.to_owned());
-        let (asked, outcome, lost, is_running) = (None, None, 0, false);
+        let (asked, outcome, lost) = (None, None, 0);
         let (began, not_before) = (now, now);
         Ok(Self {
             number,
@@ -130,7 +140,6 @@ impl BudgetPlan {
             planner,
             allowance_s,
             asked,
-            is_running,
             not_before,
             lost,
         })
@@ -158,22 +167,14 @@ impl BudgetPlan {
         has_measured.then(|| self.planner.measured())
     }
 
-    pub(super) fn is_running(&self) -> bool {
-        self.is_running
-    }
-
     /// Takes an event. Gives what was measured, to be kept, where the plan is made by it. Answers that nobody waits for
     /// change nothing, and impossible ones are failures.
-    pub(super) fn take(&mut self, now: Duration, event: PlannerEvent, is_serving: bool) -> Option<Box<Kept>> {
-        let answered = answered(&event).map(|(id, busy_s)| (id, busy_s, self.asked.as_ref().and_then(asked_id)));
-        if let Some((id, busy_s, asked)) = answered {
-            if asked != Some(id) || !self.is_running {
-                return None;
-            }
-            let pause_s = if is_serving { busy_s * (1.0 / PROBING_SHARE - 1.0) } else { 0.0 };
-            (self.is_running, self.lost) = (false, 0);
-            self.not_before = now + Duration::try_from_secs_f64(pause_s).unwrap_or(PAUSE);
+    pub(super) fn take(&mut self, event: PlannerEvent) -> Option<Box<Kept>> {
+        let answered = answered(&event).map(|(id, _)| id);
+        if answered.is_some() && answered != self.asked.as_ref().and_then(asked_id) {
+            return None;
         }
+        self.lost = 0;
         // Measurements that a plan before this one asked for.
         if matches!(&event, PlannerEvent::Remembered(kept) if kept.key != self.key()) {
             return None;
@@ -182,8 +183,8 @@ impl BudgetPlan {
         if let [PlannerCommand::Refuse(error)] = &commands[..] {
             let reason = error.to_string();
             commands = match answered {
-                Some((id, busy_s, _)) => self.planner.step(PlannerEvent::Failed { id, reason, busy_s }),
-                None => Vec::new(),
+                Some(id) => self.planner.step(PlannerEvent::Failed { id, reason, busy_s: 0.0 }),
+                None => self.planner.step(PlannerEvent::Remembered(Kept::empty(self.key()))),
             };
         }
         self.follow(commands)
@@ -204,15 +205,15 @@ impl BudgetPlan {
 
     /// A node was lost while it measured. The measurement fails where that happens again and again.
     pub(super) fn lose(&mut self, now: Duration, id: ProbeId, reason: String) -> Option<Box<Kept>> {
-        if self.asked.as_ref().and_then(asked_id) != Some(id) || !self.is_running {
+        if self.asked.as_ref().and_then(asked_id) != Some(id) {
             return None;
         }
         self.lost += 1;
         if self.lost < MOST_LOST {
-            (self.is_running, self.not_before) = (false, now + PAUSE);
+            self.not_before = now + PAUSE;
             return None;
         }
-        self.take(now, PlannerEvent::Failed { id, reason, busy_s: 0.0 }, false)
+        self.take(PlannerEvent::Failed { id, reason, busy_s: 0.0 })
     }
 
     /// Raises what measuring may take, with time.
@@ -225,13 +226,13 @@ impl BudgetPlan {
 
     /// Whether a node is to be asked now.
     pub(super) fn is_due(&self, now: Duration) -> bool {
-        self.asked.is_some() && !self.is_running && now >= self.not_before
+        self.asked.is_some() && now >= self.not_before
     }
 
-    /// What a node is asked, once it is asked.
-    pub(super) fn probe(&mut self, workload_number: u64, node_name: &str, address: &str) -> Option<ViewProbe> {
+    /// The measurement that is wanted, as a node is asked for it.
+    pub(super) fn probe(&self, workload_number: u64, node_name: &str, address: &str) -> Option<ViewProbe> {
         let (node_name, address) = (node_name.to_owned(), address.to_owned());
-        let probe = match self.asked.as_ref()? {
+        Some(match self.asked.as_ref()? {
             PlannerCommand::Probe { id, row, views, purpose } => {
                 let light = match purpose {
                     Purpose::Screening => &self.budgeted.screening_lighting,
@@ -249,9 +250,7 @@ impl BudgetPlan {
                 ViewProbe { workload_number, id, node_name, address, views, requests, repeats }
             }
             PlannerCommand::Keep(_) | PlannerCommand::Conclude(_) | PlannerCommand::Refuse(_) => return None,
-        };
-        self.is_running = true;
-        Some(probe)
+        })
     }
 
     fn request(&self, row: usize, views: &[ProbeView], compared: Option<&String>) -> Option<ProbeViews> {
@@ -269,12 +268,16 @@ impl BudgetPlan {
 
     /// The camera of a view: all cells are equally likely, and all places of a cell.
     fn camera(&self, view: ProbeView) -> PinholeCamera {
-        let number = match view {
-            ProbeView::Screening(number) => u64::from(number),
-            ProbeView::Fresh(number) => number,
+        let cells = self.cells.len() as u64;
+        // Common places are even within each cell.
+        let (number, placed) = match view {
+            ProbeView::Screening(number) => {
+                (u64::from(number), ProbeView::Screening((u64::from(number) / cells) as u32))
+            }
+            ProbeView::Fresh(number) => (number, view),
         };
-        let cell = &self.cells[(number % self.cells.len() as u64) as usize];
-        let place: Vec3 = (DVec3::from_array(view.place(0)) * 2.0 - 1.0).as_vec3();
+        let cell = &self.cells[(number % cells) as usize];
+        let place: Vec3 = (DVec3::from_array(placed.place(0)) * 2.0 - 1.0).as_vec3();
         cell.view_at(place, &self.budgeted.typical_view)
     }
 
@@ -317,7 +320,7 @@ fn asked_id(command: &PlannerCommand) -> Option<ProbeId> {
 }
 
 /// The measurement that an event answers, and the node's time.
-fn answered(event: &PlannerEvent) -> Option<(ProbeId, f64)> {
+pub(super) fn answered(event: &PlannerEvent) -> Option<(ProbeId, f64)> {
     match event {
         PlannerEvent::Probed(probed) => Some((probed.id, probed.busy_s)),
         PlannerEvent::Timed(timed) => Some((timed.id, timed.busy_s)),

@@ -76,6 +76,8 @@ struct Cluster {
     busy_s: f64,
     /// Probes are answered one by one.
     is_slow: bool,
+    /// Nodes never take a plan.
+    is_unapplied: bool,
 }
 
 impl Cluster {
@@ -92,6 +94,7 @@ impl Cluster {
             error_scale: 1.0,
             busy_s: 0.01,
             is_slow: false,
+            is_unapplied: false,
         };
         (0..nodes).for_each(|number| cluster.tell(join(&format!("n{number}"), number as u64 + 1, 0)));
         cluster
@@ -130,7 +133,11 @@ impl Cluster {
                 return Some(Event::Represented { workload_number, plan, costs, planes });
             }
             Command::Promise { sessions, promise } => self.promises.push((sessions, *promise)),
-            Command::Apply { plan, .. } => self.plans.push(*plan),
+            Command::Apply { plan, .. } => {
+                let plan_epoch = plan.assignment.plan_epoch;
+                self.plans.push(*plan);
+                return (!self.is_unapplied).then_some(Event::Applied { plan_epoch });
+            }
             _ => (),
         }
         None
@@ -211,6 +218,45 @@ fn a_session_opens_at_once_and_gets_the_cheapest_row_that_keeps_its_budget() {
     assert_eq!(assignment.workload.sample_cameras.len(), 4);
     assert!(assignment.workload.planes.normals, "planes of the method");
     assert!(!cluster.probes.is_empty() && cluster.kept.is_some());
+}
+
+#[test]
+fn a_budget_is_not_kept_before_sessions_have_the_plan_that_keeps_it() {
+    let mut cluster = Cluster::of(3);
+    cluster.is_unapplied = true;
+    cluster.open(viewer(1, "flip 0.06"));
+    cluster.wait(20);
+    assert_eq!(cluster.plan().assignment.method.as_deref(), Some("carve:4"));
+    assert_eq!(cluster.promise().state, PromiseState::Measuring);
+    let plan_epoch = cluster.plan().assignment.plan_epoch;
+    cluster.tell(Event::Applied { plan_epoch });
+    assert_eq!(cluster.promise().state, PromiseState::Kept);
+}
+
+#[test]
+fn another_policy_of_sessions_is_planned_for_anew() {
+    let mut cluster = Cluster::of(2);
+    cluster.open(viewer(1, "flip 0.01"));
+    cluster.wait(20);
+    assert_eq!(cluster.promise().state, PromiseState::Unreachable);
+    cluster.open(Opening { policy_override: PolicyOverride::default(), ..viewer(2, "flip 0.01") });
+    cluster.wait(20);
+    assert_eq!(cluster.promise().state, PromiseState::Kept, "{}", cluster.promise());
+    assert_eq!(cluster.plan().assignment.policy, Policy::Direct);
+}
+
+#[test]
+fn budgets_that_are_not_comparable_with_all_others_share_no_plan() {
+    let mut cluster = Cluster::of(20);
+    for (session, budget) in [(1, "time 80ms"), (2, "flip 0.05"), (3, "psnr 30")] {
+        cluster.open(viewer(session, budget));
+    }
+    assert_eq!(cluster.scheduler.status().workloads.len(), 2);
+    let mut larger = viewer(4, "time 80ms");
+    let budgeted = larger.budgeted.as_mut().unwrap();
+    budgeted.typical_view = budgeted.typical_view.resized(UVec2::splat(256));
+    cluster.open(larger);
+    assert_eq!(cluster.scheduler.status().workloads.len(), 3, "of views of another size");
 }
 
 #[test]

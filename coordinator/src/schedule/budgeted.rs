@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use super::cells::{Cells, first_indices};
 
+/// A promise holds for views of up to this many times the planned pixels, or of that share of them.
+const MOST_PIXELS: f64 = 2.0;
+
 /// A session's budget, and the representations among which it chooses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Budgeted {
@@ -30,7 +33,8 @@ pub struct Budgeted {
 }
 
 impl Budgeted {
-    /// Whether sessions can share a representation: they choose among the same, and one of their budgets is the stricter.
+    /// Whether sessions with comparable budgets can share a representation: they choose among the same, for views of about
+    /// one size.
     pub(super) fn is_shareable(&self, other: &Self) -> bool {
         let of_any_view = |of: &Self| Self {
             budget: self.budget,
@@ -38,7 +42,9 @@ impl Budgeted {
             codec: self.codec.clone(),
             ..of.clone()
         };
-        of_any_view(self) == of_any_view(other) && self.budget.and(&other.budget).is_some()
+        let pixels = |of: &Self| of.typical_view.pixel_count() as f64;
+        let is_of_size = (1.0 / MOST_PIXELS..=MOST_PIXELS).contains(&(pixels(other) / pixels(self)));
+        of_any_view(self) == of_any_view(other) && is_of_size
     }
 
     pub(super) fn ladder(&self) -> Result<Ladder, InvalidField> {
@@ -51,7 +57,7 @@ impl Budgeted {
 
     /// The workload as a row samples it, in these view cells.
     pub(super) fn sampled_as(&self, row: &Row, workload: &Workload, cells: &[ViewCell]) -> Workload {
-        let resized = |Camera::Pinhole(camera): &Camera| camera.resized(row.size_px(self.whole_px));
+        let resized = |Camera::Pinhole(camera): &Camera| camera.resized(row.size_px(camera.size_px));
         let cameras: Vec<Vec<PinholeCamera>> = match self.keeps_cameras {
             true => vec![workload.sample_cameras.iter().map(resized).collect()],
             false => cells.iter().map(|cell| row.cameras(cell, self.whole_px)).collect(),
@@ -65,7 +71,9 @@ impl Budgeted {
         }
     }
 
-    pub(super) fn validate(&self) -> Result<(), InvalidField> {
+    /// # Errors
+    /// For rows that are no ladder, and for texts and a view that cannot be used.
+    pub(crate) fn validate(&self) -> Result<(), InvalidField> {
         self.ladder()?;
         nonempty(&self.codec, "codec")?;
         nonempty(&self.screening_lighting, "screening_lighting")?;

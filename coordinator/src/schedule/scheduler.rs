@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use cluster::{JoinCluster, MeasuredCosts};
+use planner::ProbeId;
 
 use super::active_plan::ActivePlan;
 use super::budget_plan::BudgetState;
@@ -39,9 +40,12 @@ pub struct Scheduler {
     max_workloads: usize,
     members: BTreeMap<String, Member>,
     workloads: BTreeMap<u64, WorkloadState>,
-    /// Of workloads with a budget.
+    /// The budget of each workload that has one.
     budgets: BTreeMap<u64, BudgetState>,
     last_budget_plan: u64,
+    /// The measurement that a node makes for a budget, and the time before which no other begins.
+    running_probe: Option<ProbeId>,
+    probing_paused_until: Duration,
     sharing: SharingHysteresis,
     reports: SamplerReports,
     liveness_probed_at: Duration,
@@ -62,6 +66,8 @@ impl Default for Scheduler {
             workloads: BTreeMap::new(),
             budgets: BTreeMap::new(),
             last_budget_plan: 0,
+            running_probe: None,
+            probing_paused_until: Duration::ZERO,
             sharing: SharingHysteresis::default(),
             reports: SamplerReports::default(),
             liveness_probed_at: Duration::ZERO,
@@ -104,7 +110,10 @@ impl Scheduler {
             Event::Ready { plan_epoch, node_name } => self.ready(plan_epoch, node_name),
             Event::Rejected { plan_epoch, node_name, reason } => self.rejected(plan_epoch, node_name, reason),
             Event::Unready { plan_epoch, node_name, reason } => self.unready(plan_epoch, &node_name, &reason),
-            Event::Applied { plan_epoch } => self.applied(plan_epoch),
+            Event::Applied { plan_epoch } => {
+                self.note_applied(plan_epoch);
+                self.applied(plan_epoch)
+            }
             Event::Reported(report) => self.reported(report),
             Event::Probed { plan_epoch, node_name, incarnation, kind, failure } => {
                 self.probed(plan_epoch, &node_name, incarnation, kind, failure)

@@ -160,7 +160,10 @@ impl WorkloadState {
     /// Whether a session asks for this workload, with a budget that can be planned for together; `follows_viewers`: its sample cameras are those of its viewpoints.
     pub(super) fn is_shared_by(&self, asked: &Workload, budgeted: Option<&Budgeted>, follows_viewers: bool) -> bool {
         let has_same_budget = match (&self.budgeted, budgeted) {
-            (Some(own), Some(asked)) => own.is_shareable(asked),
+            (Some(own), Some(asked)) => {
+                let strictest = self.sessions.budget();
+                own.is_shareable(asked) && strictest.is_none_or(|budget| budget.and(&asked.budget).is_some())
+            }
             (own, asked) => own.is_none() && asked.is_none(),
         };
         if !has_same_budget {
@@ -264,7 +267,7 @@ impl WorkloadState {
         let asked = self.requested.sample_cameras.len();
         match (self.representation.as_ref().and_then(Representation::row), &self.budgeted) {
             (Some(row), Some(budgeted)) if !budgeted.keeps_cameras => {
-                row.camera_count as usize * self.requested.cell_count()
+                row.camera_count as usize * self.cells.as_ref().map_or(1, |cells| cells.grown().len())
             }
             _ => asked,
         }

@@ -68,12 +68,6 @@ impl ViewGroup {
         self.cell.sample_cameras(SHORTEST_EDGE * self.distance_m, size_px)
     }
 
-    /// The box of the group's viewpoints.
-    #[must_use]
-    pub fn cell(&self) -> &ViewCell {
-        &self.cell
-    }
-
     /// The box of viewpoints to which the group may grow about its middle.
     #[must_use]
     pub fn grown_cell(&self) -> ViewCell {

@@ -105,13 +105,21 @@ impl Quotas {
     /// # Errors
     /// `INVALID_ARGUMENT` for a view that takes more than all views together may.
     pub fn check_view(&self, camera: &PinholeCamera, planes: ViewPlanes) -> Result<(), Status> {
-        let (bytes, limit) = (view_bytes(camera, planes), self.view_bytes);
-        if bytes <= limit {
-            return Ok(());
-        }
+        self.check_views(std::slice::from_ref(camera), planes)
+    }
+
+    /// As [`Quotas::check_view`], for views that are made at once.
+    ///
+    /// # Errors
+    /// Names the quota.
+    pub fn check_views(&self, cameras: &[PinholeCamera], planes: ViewPlanes) -> Result<(), Status> {
+        let bytes = cameras.iter().map(|camera| view_bytes(camera, planes)).fold(0, usize::saturating_add);
+        let limit = self.view_bytes;
+        let Some(camera) = cameras.first().filter(|_| bytes > limit) else { return Ok(()) };
         let [width, height] = camera.size_px.to_array();
+        let views = if cameras.len() == 1 { "a view".to_owned() } else { format!("a batch of {}", cameras.len()) };
         Err(Status::invalid_argument(format!(
-            "size_px: a view of {width}×{height} takes {bytes} bytes with its frame, and view-memory of this node is {limit}"
+            "size_px: {views} of {width}×{height} takes {bytes} bytes with its frame, and view-memory of this node is {limit}"
         )))
     }
 }

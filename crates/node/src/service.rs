@@ -37,7 +37,7 @@ pub struct NodeService {
     /// Measured costs, the oldest first: a coordinator that was restarted need not wait for them again.
     measured: Mutex<VecDeque<(MeasureCosts, Measured)>>,
     /// One request at a time.
-    probes: tokio::sync::Mutex<Arc<dyn ViewProbes>>,
+    probes: Arc<tokio::sync::Mutex<Arc<dyn ViewProbes>>>,
 }
 
 impl NodeService {
@@ -50,7 +50,7 @@ impl NodeService {
         metrics: NodeMetrics,
         probes: Arc<dyn ViewProbes>,
     ) -> Self {
-        let probes = tokio::sync::Mutex::new(probes);
+        let probes = Arc::new(tokio::sync::Mutex::new(probes));
         Self { plans, scenes, quotas, metrics, measured: Mutex::default(), probes }
     }
 
@@ -88,10 +88,10 @@ impl rpc::Node for NodeService {
 
     async fn probe_views(&self, request: ProbeViews) -> Result<ProbedViews, Status> {
         let planes = ViewPlanes { antialias: request.antialias, inverse_depth: true, ..ViewPlanes::COLOR };
-        request.views.iter().try_for_each(|view| self.quotas.check_view(view, planes))?;
-        let probes = self.probes.lock().await;
+        self.quotas.check_views(&request.views, planes)?;
+        // A call that is cancelled is measured to its end, before the next.
+        let probes = self.probes.clone().lock_owned().await;
         self.scenes.ensure(&request.workload.scene).await?;
-        let probes = probes.clone();
         blocking(move || probes.probe(&request)).await
     }
 

@@ -49,6 +49,7 @@ pub fn most_certified(is_traced: bool) -> usize {
 /// A device's name as plans have it: cut off where it is too long.
 #[must_use]
 pub fn device_name(name: &str) -> String {
+    let name = if name.is_empty() { "unknown" } else { name };
     name[..name.floor_char_boundary(MAX_NAME_BYTES)].to_owned()
 }
 

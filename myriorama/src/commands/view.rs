@@ -85,7 +85,8 @@ async fn pictures(args: &ViewArgs, signals: &StopSignals) -> anyhow::Result<Outc
         println!("{} views are in {} already", record.total(), args.out.display());
         record.save()?;
     }
-    let is_kept = record.unkept_promise().map_or(Ok(()), |promise| Err(anyhow::anyhow!("{promise}")));
+    let unkept = record.unkept_promise().filter(|_| args.budget.is_some());
+    let is_kept = unkept.map_or(Ok(()), |promise| Err(anyhow::anyhow!(promise)));
     if !args.compare {
         return is_kept.map(|()| Outcome::Done);
     }
@@ -112,7 +113,6 @@ async fn write_missing(
         return Ok(Ended::Stopped);
     }
     record.set_tone(session.tone());
-    record.set_promise(session.promise());
     // A record of other pictures does not outlive them.
     record.save()?;
     let progress = ProgressBar::new(record.total());
@@ -128,7 +128,7 @@ async fn write_missing(
         record.save_if_due()
     };
     let received = until(&signals.first, receive_requests(&session, missing, received)).await;
-    record.set_promise(session.promise());
+    record.set_promise(session.promise().as_ref());
     let finished = finish(&mut writer, record).await;
     progress.finish_and_clear();
     let seconds = received.and_then(|received| finished.map(|()| received))?;

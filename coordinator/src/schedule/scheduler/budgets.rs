@@ -6,7 +6,7 @@ use cluster::{Costs, PolicyChoice, Promise, PromiseState, SamplePlanes};
 use planner::{Budget, Choice, Kept, ProbeId};
 
 use super::Scheduler;
-use crate::schedule::budget_plan::{BudgetPlan, BudgetState, prices};
+use crate::schedule::budget_plan::{BudgetPlan, BudgetState, InForce, answered, prices};
 use crate::schedule::estimate::Estimate;
 use crate::schedule::member::Member;
 use crate::schedule::prices::EqualNodes;
@@ -18,7 +18,9 @@ use crate::schedule::{Command, Load};
 const DWELL: Duration = Duration::from_secs(60);
 /// Demand that has changed by this ratio may have another cheapest representation.
 const OTHER_DEMAND: f64 = 2.0;
-/// Sessions are told so often how measuring goes on.
+/// While anybody is served, measuring takes this share of one node's time.
+const PROBING_SHARE: f64 = 0.2;
+/// The time between two reports to sessions of how measuring goes on.
 const NEWS: Duration = Duration::from_secs(5);
 
 impl Scheduler {
@@ -27,7 +29,7 @@ impl Scheduler {
         let mut commands = self.end_plans();
         let with_budget = self.workloads.iter().filter(|(_, workload)| workload.budgeted.is_some());
         let numbers: Vec<u64> = with_budget.map(|(&number, _)| number).collect();
-        commands.extend(numbers.iter().filter_map(|&number| self.plan_for_budget(number)));
+        commands.extend(numbers.iter().filter_map(|&number| self.plan_for_budget(number)).flatten());
         commands.extend(self.probe_views());
         commands.extend(numbers.into_iter().filter_map(|number| self.announce(number)));
         commands
@@ -42,7 +44,7 @@ impl Scheduler {
     }
 
     /// Begins a plan where there is none, or where the last one does not serve any more.
-    fn plan_for_budget(&mut self, number: u64) -> Option<Command> {
+    fn plan_for_budget(&mut self, number: u64) -> Option<Vec<Command>> {
         let workload = self.workloads.get(&number)?;
         let budget = workload.sessions.budget()?;
         let device_name = self.device_to_measure(workload)?;
@@ -56,20 +58,25 @@ impl Scheduler {
         self.workloads.get_mut(&number)?.not_planned = begun.as_ref().err().map(ToString::to_string);
         let plan = begun.ok()?;
         self.last_budget_plan = plan_number;
-        let key = plan.key();
-        match self.budgets.get_mut(&number) {
-            Some(state) => state.plan = plan,
-            None => drop(self.budgets.insert(number, BudgetState { plan, in_force: None })),
-        }
-        Some(Command::Recall { workload_number: number, key })
+        let recall = Command::Recall { workload_number: number, key: plan.key() };
+        let state = self.budgets.remove(&number);
+        let unfinished = state.as_ref().and_then(|state| state.plan.unfinished());
+        let in_force = state.and_then(|state| state.in_force);
+        self.budgets.insert(number, BudgetState { plan, in_force, is_to_be_tried_again: false });
+        let keep = unfinished.map(|kept| Command::Keep(Box::new(kept)));
+        Some(keep.into_iter().chain([recall]).collect())
     }
 
     fn is_outdated(&self, state: &BudgetState, workload: &WorkloadState, budget: Budget) -> bool {
         let BudgetPlan { budget: planned, device_name, prices: at, began, outcome, .. } = &state.plan;
         let has_device = self.serving(workload).any(|(_, member)| member.status.device_name == *device_name);
-        let is_lasting = self.now.saturating_sub(*began) >= DWELL && outcome.is_some();
-        let is_other = *planned != budget || is_other_demand(at, &prices(workload));
-        !planned.implies(&budget) || (outcome.is_none() && !has_device) || (is_lasting && is_other)
+        let since = state.in_force.as_ref().map_or(*began, |in_force| in_force.since.max(*began));
+        let is_lasting = self.now.saturating_sub(since) >= DWELL && outcome.is_some();
+        let prices = prices(workload);
+        let is_other = *planned != budget || is_other_demand(at, &prices) || state.is_to_be_tried_again;
+        let may_draw = |prices: &EqualNodes| prices.direct_view_s.is_some();
+        let is_wrong = !planned.implies(&budget) || may_draw(at) != may_draw(&prices);
+        is_wrong || (outcome.is_none() && !has_device) || (is_lasting && is_other)
     }
 
     /// The device of the least busy node that serves a workload.
@@ -84,21 +91,20 @@ impl Scheduler {
 
     /// Asks one node for the measurement that is due. There is one at a time, of all workloads.
     fn probe_views(&mut self) -> Vec<Command> {
-        if self.budgets.values().any(|state| state.plan.is_running()) {
+        let now = self.now;
+        if self.running_probe.is_some() || now < self.probing_paused_until {
             return Vec::new();
         }
-        let now = self.now;
         let plans = self.budgets.values().filter(|state| state.plan.outcome.is_none()).count();
-        let Some((&number, _)) = self.budgets.iter().find(|(_, state)| state.plan.is_due(now)) else {
-            return Vec::new();
-        };
+        let due = self.budgets.iter().filter(|(_, state)| state.plan.is_due(now));
+        let mut with_node = due.filter_map(|(&number, _)| Some((number, self.node_to_measure(number)?)));
+        let Some((number, (name, address))) = with_node.next() else { return Vec::new() };
         let Some(state) = self.budgets.get_mut(&number) else { return Vec::new() };
         if let Some(kept) = state.plan.allow(now, plans) {
             return self.concluded(number, kept);
         }
-        let Some((name, address)) = self.node_to_measure(number) else { return Vec::new() };
-        let state = self.budgets.get_mut(&number);
-        let probe = state.and_then(|state| state.plan.probe(number, &name, &address));
+        let probe = state.plan.probe(number, &name, &address);
+        self.running_probe = probe.as_ref().map(|probe| probe.id);
         probe.map(|probe| Command::ProbeViews(Box::new(probe))).into_iter().collect()
     }
 
@@ -117,14 +123,25 @@ impl Scheduler {
 
     /// Takes an event of a workload's plan.
     pub(super) fn planned(&mut self, number: u64, event: planner::Event) -> Vec<Command> {
-        let (now, is_serving) = (self.now, self.is_serving());
-        let state = self.budgets.get_mut(&number);
-        let measured = state.and_then(|state| state.plan.take(now, event, is_serving));
+        if let Some((id, busy_s)) = answered(&event) {
+            let share = if self.is_serving() { PROBING_SHARE } else { 1.0 };
+            self.probe_ended(id, busy_s * (1.0 / share - 1.0));
+        }
+        let measured = self.budgets.get_mut(&number).and_then(|state| state.plan.take(event));
         measured.map_or_else(Vec::new, |kept| self.concluded(number, kept))
+    }
+
+    /// Another measurement may begin after a pause.
+    fn probe_ended(&mut self, id: ProbeId, pause_s: f64) {
+        if self.running_probe == Some(id) {
+            self.running_probe = None;
+            self.probing_paused_until = self.now + Duration::try_from_secs_f64(pause_s).unwrap_or(DWELL);
+        }
     }
 
     pub(super) fn probe_lost(&mut self, number: u64, id: ProbeId, reason: String) -> Vec<Command> {
         let now = self.now;
+        self.probe_ended(id, 0.0);
         let measured = self.budgets.get_mut(&number).and_then(|state| state.plan.lose(now, id, reason));
         measured.map_or_else(Vec::new, |kept| self.concluded(number, kept))
     }
@@ -139,7 +156,7 @@ impl Scheduler {
         let in_force = workload.representation.as_ref();
         match state.plan.row(outcome.choice) {
             Some(row) if in_force.and_then(Representation::row) == Some(row) => {
-                state.in_force = Some((state.plan.budget, outcome));
+                state.in_force = in_force_now(state, self.now);
             }
             Some(row) => commands.push(Command::Represent {
                 workload_number: number,
@@ -150,7 +167,7 @@ impl Scheduler {
                 commands.extend(self.represent(number, Representation::Direct));
             }
             // Nothing is better than what sessions ask for.
-            None => state.in_force = Some((state.plan.budget, outcome)),
+            None => state.in_force = in_force_now(state, self.now),
         }
         commands
     }
@@ -170,7 +187,9 @@ impl Scheduler {
         if let Some(outcome) = &mut state.plan.outcome {
             outcome.reason = format!("{} It cannot be put in force: {reason}", outcome.reason);
             (outcome.choice, outcome.state) = (Choice::Direct, planner::PromiseState::Unreachable);
-            state.in_force = Some((state.plan.budget, outcome.clone()));
+            outcome.certificate = None;
+            state.in_force = in_force_now(state, self.now);
+            state.is_to_be_tried_again = true;
         }
         Vec::new()
     }
@@ -181,7 +200,7 @@ impl Scheduler {
             return Vec::new();
         };
         let budget = state.plan.budget;
-        state.in_force = state.plan.outcome.clone().map(|outcome| (budget, outcome));
+        state.in_force = in_force_now(state, self.now);
         workload.represent(representation);
         let costs = workload.costs;
         let estimates = self.members.values_mut().filter_map(|member| member.estimates.get_mut(&number));
@@ -189,7 +208,24 @@ impl Scheduler {
             Estimate::restart(estimate);
             estimate.rebase(&costs);
         });
-        self.replan(number, &format!("a representation was chosen for {budget}"))
+        let commands = self.replan(number, &format!("a representation was chosen for {budget}"));
+        let is_new = commands.iter().any(|command| matches!(command, Command::Apply { .. }));
+        let (plan_epoch, has_plan) = (self.plan_epoch, self.active_plan(number).is_some());
+        if let Some(in_force) = self.budgets.get_mut(&number).and_then(|state| state.in_force.as_mut()) {
+            // Without a plan, the next one is the first with it.
+            in_force.plan_epoch = if is_new { plan_epoch } else { plan_epoch + 1 };
+            in_force.is_applied = !is_new && has_plan;
+        }
+        commands
+    }
+
+    /// Nodes and sessions have a plan: promises hold from then on.
+    pub(super) fn note_applied(&mut self, plan_epoch: u64) {
+        let number = self.workload_of_plan(plan_epoch);
+        let state = number.and_then(|number| self.budgets.get_mut(&number));
+        if let Some(in_force) = state.and_then(|state| state.in_force.as_mut()) {
+            in_force.is_applied |= plan_epoch >= in_force.plan_epoch;
+        }
     }
 
     /// Tells sessions of a promise that has changed, and now and then how measuring goes on.
@@ -208,9 +244,10 @@ impl Scheduler {
         Some(Command::Promise { sessions: sessions.numbers(), promise: Box::new(promise) })
     }
 
-    /// Sessions of a workload are told its promise once more: one of them is new.
-    pub(super) fn forget_announcement(&mut self, number: u64) {
-        self.workloads.get_mut(&number).into_iter().for_each(|workload| workload.announced = None);
+    /// A session that has joined others is told what is promised to them.
+    pub(super) fn promise_to(&self, session: u64, number: u64) -> Option<Command> {
+        let (_, promise) = self.workloads.get(&number)?.announced.as_ref()?;
+        Some(Command::Promise { sessions: vec![session], promise: Box::new(promise.clone()) })
     }
 
     /// The promise to a workload's sessions; `None` without a budget.
@@ -220,12 +257,12 @@ impl Scheduler {
         if workload.sessions.policy_override().policy == PolicyChoice::Direct {
             return Some(drawn_directly(&budget, &workload.costs));
         }
-        if let Some(reason) = &workload.not_planned {
+        if let Some(reason) = workload.not_planned.as_ref().filter(|_| !self.budgets.contains_key(&number)) {
             return Some(without_figures(&budget, PromiseState::Unreachable, reason.clone()));
         }
         let state = self.budgets.get(&number)?;
-        let in_force = state.in_force.as_ref().filter(|(planned, _)| planned.implies(&budget));
-        let outcome = in_force.map(|(_, outcome)| outcome);
+        let holds = |in_force: &&InForce| in_force.is_applied && in_force.budget.implies(&budget);
+        let outcome = state.in_force.as_ref().filter(holds).map(|in_force| &in_force.outcome);
         let certificate = outcome.and_then(|outcome| outcome.certificate.as_ref());
         let asked = || {
             let Load { images, .. } = workload.load();
@@ -246,6 +283,13 @@ impl Scheduler {
             reason: outcome.map_or_else(|| state.plan.reason(), |outcome| outcome.reason.clone()),
         })
     }
+}
+
+/// A plan's choice, in force from now on; `None` where the plan is not made.
+fn in_force_now(state: &BudgetState, now: Duration) -> Option<InForce> {
+    let BudgetPlan { budget, outcome, .. } = &state.plan;
+    let outcome = outcome.clone()?;
+    Some(InForce { budget: *budget, outcome, since: now, plan_epoch: 0, is_applied: true })
 }
 
 /// The promise where sessions have every view drawn directly.

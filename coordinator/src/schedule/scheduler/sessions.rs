@@ -21,7 +21,7 @@ impl Scheduler {
         }
         let Some(number) = self.workload_for(opening) else { return self.begin(opening) };
         let mut commands = self.change(number, |sessions| sessions.add(opening));
-        self.forget_announcement(number);
+        commands.extend(self.promise_to(session, number));
         let is_announced = commands
             .iter()
             .any(|command| matches!(command, Command::Apply { plan, .. } if plan.assignment.workload_number == number));

@@ -76,7 +76,8 @@ impl<P: Pricing> Planner<P> {
         let over = self.over(choice);
         let nearest = match (self.term(), self.nearest_to_error()) {
             (Some(term), Some(row)) => {
-                format!(" In time, {} has the least error: {}.", self.row(row), shown(term, self.error_ratio(row)))
+                let in_time = if self.request.budget.most_view_s().is_some() { "In time, " } else { "" };
+                format!(" {in_time}{} has the least error: {}.", self.row(row), shown(term, self.error_ratio(row)))
             }
             _ => String::new(),
         };

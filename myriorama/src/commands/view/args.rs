@@ -79,8 +79,9 @@ pub struct ViewArgs {
     #[arg(long, default_value = "auto", value_name = "NAME")]
     pub(super) policy: PolicyChoice,
     /// The most error, and the most time of a view, as in "flip 0.05" (see `myriorama plan --help`): the cluster chooses what
-    /// is sampled, and how views are reconstructed unless --method says so. Pictures wait for the choice. Where it is not
-    /// kept, they are written all the same, and the exit status is 3 [default: the coordinator's]
+    /// is sampled, and how views are reconstructed unless --method says so. Pictures wait for the choice. Where nothing keeps
+    /// the budget, they are written all the same, and the exit status is 3. [default: the coordinator's, for which nothing
+    /// waits]
     #[arg(long, value_name = "BUDGET")]
     pub(super) budget: Option<Budget>,
     /// With --budget: the longest wait for the choice

@@ -22,6 +22,8 @@ pub(super) const FILE_NAME: &str = "cameras.json";
 /// The field that says how the pictures are shown, and its exposure.
 const TONE: &str = "tone_mapping";
 const EXPOSURE_EV: &str = "exposure_ev";
+/// The field of the promise.
+const PROMISE: &str = "promise";
 const DEPTH: &str = "16-bit: value / 65535 * inverse_depth_max_per_m, per metre; 0 is background";
 /// The time between two writings of the record, and its least multiple of the time that writing takes.
 const PAUSE: Duration = Duration::from_secs(5);
@@ -38,8 +40,8 @@ pub(super) struct Record {
     planes: ViewPlanes,
     /// `None`: it is the plan's, and not known yet.
     exposure: Option<ExposureEv>,
-    /// What was promised when the last of these pictures came.
-    promise: Option<Promise>,
+    /// The promise when these pictures came, as the record has it; one that was not kept stays.
+    promise: Option<Value>,
     /// The scale of each written view's depth picture, per metre; 0 without that picture. `None`: the view is not written.
     written: Vec<Option<f32>>,
     count: u64,
@@ -103,14 +105,20 @@ impl Record {
         self.planes.tone = tone;
     }
 
-    /// Notes what is promised.
-    pub(super) fn set_promise(&mut self, promise: Option<Promise>) {
-        self.promise = promise;
+    /// Notes the promise of the next pictures.
+    pub(super) fn set_promise(&mut self, promise: Option<&Promise>) {
+        if self.unkept_promise().is_none() {
+            self.promise = promise.map(described);
+        }
     }
 
     /// The promise, where it is not kept.
-    pub(super) fn unkept_promise(&self) -> Option<&Promise> {
-        self.promise.as_ref().filter(|promise| promise.state == PromiseState::Unreachable)
+    pub(super) fn unkept_promise(&self) -> Option<String> {
+        let text = |name: &str| self.promise.as_ref()?.get(name)?.as_str();
+        let is_unkept = text("state")? == PromiseState::Unreachable.to_string();
+        is_unkept.then(|| {
+            format!("the budget {} is not kept: {}", text("budget").unwrap_or("?"), text("reason").unwrap_or("?"))
+        })
     }
 
     /// Requests of the views that are not written.
@@ -140,6 +148,7 @@ impl Record {
         if let Some(about) = about {
             self.check_settings(&path, about.get("settings").unwrap_or(&Value::Null))?;
             self.exposure = about.get(TONE).and_then(exposure_of);
+            self.promise = about.get(PROMISE).cloned();
             found.into_iter().for_each(|(number, depth_scale)| self.add(number, depth_scale));
         }
         Ok(())
@@ -189,7 +198,7 @@ impl Record {
             about.insert(TONE.to_owned(), json!({ "curve": curve, EXPOSURE_EV: exposure.ev() }));
         }
         if let Some(promise) = &self.promise {
-            about.insert("promise".to_owned(), described(promise));
+            about.insert(PROMISE.to_owned(), promise.clone());
         }
         let written = (0..).zip(&self.written);
         let cameras = written.filter_map(|(number, scale)| Some(self.named(number, (*scale)?)));
