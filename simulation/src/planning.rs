@@ -84,11 +84,15 @@ impl Coordinator {
             match command {
                 Command::Apply { plan, .. } => self.apply(*plan),
                 Command::Refuse { error, .. } => self.refused = Some(error),
-                // Sessions here have no budget.
-                Command::Recall { .. } | Command::ProbeViews(_) | Command::Keep(_) | Command::Represent { .. } => (),
-                Command::Probe(_) | Command::Quarantine { .. } | Command::Readmit { .. } | Command::Promise { .. } => {
-                    ()
-                }
+                // Sessions here have no budget, and nodes no faults.
+                Command::Recall { .. }
+                | Command::ProbeViews(_)
+                | Command::Keep(_)
+                | Command::Represent { .. }
+                | Command::Promise { .. }
+                | Command::Probe(_)
+                | Command::Quarantine { .. }
+                | Command::Readmit { .. } => (),
             }
         }
     }
