@@ -79,7 +79,7 @@ fn calls_have_their_own_messages() {
             calls += 1;
         }
     }
-    assert_eq!(calls, 11);
+    assert_eq!(calls, 12);
 }
 
 #[test]
@@ -97,5 +97,5 @@ fn enums_are_prefixed_and_begin_unspecified() {
         assert!(kind.value.iter().all(|value| value.name().starts_with(prefix)));
         enums += 1;
     }
-    assert_eq!(enums, 6);
+    assert_eq!(enums, 7);
 }

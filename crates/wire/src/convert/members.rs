@@ -26,7 +26,10 @@ messages! {
         workload, compared_lighting, views, with_errors; method: reconstruction_method, codec: frame_codec,
         antialias: antialias_sample_count
     }, first |r| at_most(r.views.len(), MAX_PROBE_VIEWS, "views"), then ProbeViews::validate;
-    ProbedView = ProbedView { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio };
+    ProbedView = ProbedView {
+        foreground_ratio, disoccluded_ratio;
+        flip: flip_ratio, flip_whole: flip_whole_ratio, mean_square: mean_square_ratio
+    };
     ProbeViewsResponse = ProbedViews { views, costs, busy_s },
         first |r| at_most(r.views.len(), MAX_PROBE_VIEWS, "views"), then ProbedViews::validate;
     ApplyAssignmentResponse = Ready { plan_epoch, scene_load_s }, then Ready::validate;
