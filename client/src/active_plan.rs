@@ -99,7 +99,7 @@ impl ActivePlan {
 pub(crate) struct SessionState {
     /// Its number at the coordinator.
     pub(crate) session: u64,
-    /// What is promised to it.
+    /// The promise to it.
     pub(crate) promise: Option<Promise>,
     pub(crate) active: Arc<ActivePlan>,
 }

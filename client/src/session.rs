@@ -158,7 +158,7 @@ impl Session {
         self.state.borrow().active.plan.clone()
     }
 
-    /// What is promised to the session; `None` without a budget.
+    /// The promise to the session; `None` without a budget.
     #[must_use]
     pub fn promise(&self) -> Option<Promise> {
         self.state.borrow().promise.clone()

@@ -75,7 +75,7 @@ async fn measured_opening(
             forced_samplers: request.forced_sampler_count.map(|count| count as usize),
             forced_tiles: request.forced_tile_count.map(|count| count as usize),
         },
-        // What is promised is shown.
+        // A promise holds for all views: there is no lower quality.
         fallbacks: if budgeted.is_some() { Vec::new() } else { request.fallbacks },
         costs,
         auto_exposure,

@@ -1,4 +1,4 @@
-//! What the planning for a budget asks of nodes and of files.
+//! Requests of the planning for a budget to nodes and to the store of measurements.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

@@ -91,7 +91,7 @@ pub(crate) enum ToPage {
         policy: String,
         /// Why it is in force.
         reason: String,
-        /// What is promised to the sessions of the scene; `None` without a budget.
+        /// The promise to the sessions of the scene; `None` without a budget.
         promise: Option<String>,
     },
     /// The connection ends for a fault of the page's.

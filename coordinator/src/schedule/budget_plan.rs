@@ -14,13 +14,13 @@ use super::budgeted::Budgeted;
 use super::prices::EqualNodes;
 use super::workload_state::WorkloadState;
 
-/// Measuring for a plan may take this long, or so many directly drawn views and sets as a plan needs.
+/// Measuring for a plan may take this long, or as long as these numbers of directly drawn views and of sets.
 const LEAST_ALLOWANCE_S: f64 = 30.0;
 const ALLOWED_VIEWS: f64 = 100.0;
 const ALLOWED_SETS: f64 = 12.0;
 /// The share of the nodes' time that measuring may take beyond.
 const ALLOWED_SHARE: f64 = 0.05;
-/// A measurement is asked for again after this pause, and fails where nodes were lost so often.
+/// A measurement is asked for again after this pause, and fails after this number of lost nodes.
 const PAUSE: Duration = Duration::from_secs(1);
 const MOST_LOST: u32 = 5;
 /// A still set serves a viewer for about so long, as far as costs are concerned.
@@ -149,7 +149,7 @@ impl BudgetPlan {
         key(&self.budgeted, &self.workload, &self.cells)
     }
 
-    /// What is known so far, in words.
+    /// The knowledge so far, in words.
     pub(super) fn reason(&self) -> String {
         self.outcome.as_ref().map_or_else(|| self.planner.outcome().reason, |outcome| outcome.reason.clone())
     }
@@ -161,7 +161,7 @@ impl BudgetPlan {
         }
     }
 
-    /// What was measured so far, where the plan is not made yet: it would be lost otherwise.
+    /// The measurements of a plan that is not made yet: they would be lost otherwise.
     pub(super) fn unfinished(&self) -> Option<Kept> {
         let has_measured = self.outcome.is_none() && self.planner.spent_s() > 0.0;
         has_measured.then(|| self.planner.measured())
@@ -281,7 +281,7 @@ impl BudgetPlan {
         cell.view_at(place, &self.budgeted.typical_view)
     }
 
-    /// What nodes measure before a row is in force: its costs alone, tiles included.
+    /// The measurement before a row is in force: its costs alone, tiles included.
     pub(super) fn measurement(&self, row: &Row) -> MeasureCosts {
         let workload = self.budgeted.sampled_as(row, &self.workload, &self.cells);
         MeasureCosts {

@@ -41,7 +41,7 @@ impl Representation {
         }
     }
 
-    /// What sessions force, and the policy that the representation leaves.
+    /// Decisions of sessions, and the policy that the representation leaves.
     pub(super) fn policy_override(&self, asked: PolicyOverride) -> PolicyOverride {
         match (self, asked.policy) {
             (Self::Direct, PolicyChoice::Auto) => {

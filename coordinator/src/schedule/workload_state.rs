@@ -31,9 +31,9 @@ pub(super) struct WorkloadState {
     /// As measured when it was opened: views of all cells, moments and plans have one exposure.
     pub(super) auto_exposure: ExposureEv,
     pub(super) sessions: SessionMix,
-    /// What budgets of its sessions choose among; `None`: its sessions have none.
+    /// The representations among which budgets of its sessions choose; `None`: its sessions have no budget.
     pub(super) budgeted: Option<Budgeted>,
-    /// What budgets have chosen, in place of what sessions asked for.
+    /// The choice of budgets, in place of the sessions' own.
     pub(super) representation: Option<Representation>,
     /// The promise that sessions know, and since when.
     pub(super) announced: Option<(Duration, Promise)>,
@@ -127,7 +127,7 @@ impl WorkloadState {
         self.update_costs();
     }
 
-    /// What sessions force, and what the representation does.
+    /// Decisions of sessions and of the representation.
     pub(super) fn policy_override(&self) -> PolicyOverride {
         let asked = self.sessions.policy_override();
         self.representation.as_ref().map_or(asked, |representation| representation.policy_override(asked))

@@ -9,7 +9,7 @@ pub(crate) const CAMERA_COUNTS: [u32; 4] = [1, 2, 4, 8];
 /// Sides of sample images, as shares of the side that `--sample-size auto` chooses.
 const SIDE_RATIOS: [f64; 3] = [0.5, 0.71, 1.0];
 
-/// What a user names.
+/// The choices that a user names.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Named {
     /// The sampling method.
@@ -22,7 +22,7 @@ pub struct Named {
     pub cameras: Option<u32>,
 }
 
-/// The rows that a user's choices leave: what the user names is the same in all of them.
+/// The rows that a user's choices leave: a named choice is the same in all of them.
 #[must_use]
 pub fn rows(named: &Named) -> Vec<Row> {
     let samplings: Vec<(String, u32)> = match named.sampling {

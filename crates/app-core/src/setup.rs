@@ -116,7 +116,7 @@ impl SceneArgs {
         self.sampling.unwrap_or_default()
     }
 
-    /// What the user names of representations, where the scene has `cameras` sample cameras.
+    /// The named choices, where the scene has `cameras` sample cameras.
     pub(crate) fn named(&self, cameras: u32) -> Named {
         Named {
             sampling: self.sampling,

@@ -39,7 +39,7 @@ pub struct ProbedView {
     pub disoccluded_ratio: f64,
 }
 
-/// What a node has measured.
+/// The answer to [`ProbeViews`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProbedViews {
     /// The errors of the views, in their order; none where none were asked for.

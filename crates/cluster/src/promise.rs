@@ -1,4 +1,4 @@
-//! Promises: what a session's budget limits, and whether it is kept.
+//! Promises: a session's budget, and whether it is kept.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,7 @@ pub struct BudgetRequest {
     pub names_sampling: bool,
 }
 
-/// What is promised to the sessions of a workload.
+/// The promise to the sessions of a workload.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Promise {
     /// The strictest budget of the sessions.

@@ -77,7 +77,7 @@ pub struct WorkloadStatus {
     pub achieved: Vec<AchievedTime>,
     /// The share of its nodes' time that its sessions' frame rates take; `None` without such sessions.
     pub utilisation: Option<f64>,
-    /// What is promised to its sessions; `None` without a budget.
+    /// The promise to its sessions; `None` without a budget.
     pub promise: Option<Promise>,
     /// The share of all nodes' time that one more viewer would take: one like the mean of its viewers, or one of 10 views a
     /// second.

@@ -164,7 +164,7 @@ impl<P: Pricing> Planner<P> {
         (0..self.rows.len()).map(|row| self.summary(row)).collect()
     }
 
-    /// What was measured so far, for later plans.
+    /// The measurements so far, for later plans.
     #[must_use]
     pub fn measured(&self) -> Kept {
         self.kept(Choice::Direct, true)

@@ -9,7 +9,7 @@ use planner::ProbeView;
 
 use crate::representation::Representation;
 
-/// What is measured: a scene that is loaded on the device, and how views of it are made.
+/// A scene that is loaded on the device, and the way in which views of it are made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Subject {
     /// The scene.

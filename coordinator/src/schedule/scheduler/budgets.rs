@@ -24,7 +24,7 @@ const PROBING_SHARE: f64 = 0.2;
 const NEWS: Duration = Duration::from_secs(5);
 
 impl Scheduler {
-    /// What follows for budgets from the event that has just been taken.
+    /// Commands for budgets that follow from the event that has just been taken.
     pub(super) fn follow_budgets(&mut self) -> Vec<Command> {
         let mut commands = self.end_plans();
         let with_budget = self.workloads.iter().filter(|(_, workload)| workload.budgeted.is_some());
