@@ -55,10 +55,7 @@ fn rows(request: &SessionRequest, offer: &SceneOffer, own_cameras: Option<u32>) 
     let has_size = request.sample_size_px.is_some() || !offer.fits_views;
     let mut rows = offer.rows.clone();
     if request.budget.names_method {
-        rows = named(rows, &request.method, |row| &mut row.method);
-    }
-    if request.budget.names_sampling {
-        rows = named(rows, &request.sampling, |row| &mut row.sampling);
+        rows = with_method(rows, &request.method);
     }
     rows.retain(|row| !has_size || row.side_ratio == 1.0);
     if let Some(count) = own_cameras {
@@ -73,22 +70,17 @@ fn rows(request: &SessionRequest, offer: &SceneOffer, own_cameras: Option<u32>) 
     rows
 }
 
-/// The rows of the named setting; where there are none, those of the same method, or else all, with that setting.
-fn named(rows: Vec<Row>, setting: &str, of: fn(&mut Row) -> &mut String) -> Vec<Row> {
+/// The rows of a method with its setting; where the ladder has another setting or none of it, one row for each way to sample.
+fn with_method(rows: Vec<Row>, method: &str) -> Vec<Row> {
+    if rows.iter().any(|row| row.method == method) {
+        return rows.into_iter().filter(|row| row.method == method).collect();
+    }
     let base = |text: &str| text.split(':').next().unwrap_or_default().to_owned();
-    let matching = |is: &dyn Fn(&str) -> bool| -> Vec<Row> {
-        rows.iter().filter(|row| is(of(&mut (*row).clone()))).cloned().collect()
+    let renamed = |row: Row| Row {
+        method: method.to_owned(),
+        kind: format!("{} {}", base(&row.sampling), base(method)),
+        rank: 0,
+        ..row
     };
-    let exact = matching(&|text| text == setting);
-    if !exact.is_empty() {
-        return exact;
-    }
-    let alike = matching(&|text| base(text) == base(setting));
-    let mut rows = if alike.is_empty() { rows } else { alike };
-    for row in &mut rows {
-        *of(row) = setting.to_owned();
-        row.kind = format!("{} {}", base(&row.sampling), base(&row.method));
-        row.rank = 0;
-    }
-    rows
+    rows.into_iter().map(renamed).collect()
 }

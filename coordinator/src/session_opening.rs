@@ -8,15 +8,11 @@ use tonic::Status;
 
 use crate::grpc_status::refusal;
 use crate::measuring::{known, measured_on_present_nodes, send_progress};
-use crate::schedule::{Event, Opening, PolicyOverride};
+use crate::schedule::{Event, MEASURED_BATCH, Opening, PolicyOverride};
 use crate::session_budget::budgeted;
 use crate::sessions::EventSender;
 use crate::shared::Shared;
 use crate::workload::workload_of;
-
-/// Views of one measured call: as in a batch of real work, since fewer views cost more each. A slow device must not
-/// take minutes.
-const MEASURED_BATCH: u32 = 32;
 
 /// Measures the costs of a session, and hands it to the schedule; its plans come through `events`, as do refusals.
 pub(crate) async fn open(shared: Arc<Shared>, session: u64, request: SessionRequest, events: EventSender) {

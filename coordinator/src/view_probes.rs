@@ -5,7 +5,10 @@ use std::time::{Duration, Instant};
 
 use cluster::{MeasureCosts, ProbeViews, ProbedView, ProbedViews};
 use node::blocking;
-use planner::{Event as PlannerEvent, Kept, KeptKey, ProbeId, Probed, RowCosts, Timed, ViewErrors, median_costs};
+use planner::{
+    Event as PlannerEvent, Kept, KeptKey, MAX_PROBE_VIEWS, ProbeId, Probed, RowCosts, Timed, ViewErrors, median_costs,
+    shortened_reason,
+};
 use tokio::sync::mpsc;
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
@@ -19,8 +22,8 @@ use crate::shared::Shared;
 const PROBED_WITHIN: Duration = Duration::from_secs(300);
 /// Measurements of earlier plans with more bytes are not used: events are logged whole.
 const MOST_RECALLED_BYTES: usize = 8 << 20;
-/// The longest reason of an event, in bytes.
-const MAX_REASON_BYTES: usize = 1024;
+
+const _: () = assert!(MAX_PROBE_VIEWS <= cluster::limits::MAX_PROBE_VIEWS, "a planner's probe is one call");
 
 /// Finds the measurements of earlier plans.
 pub(crate) async fn recall(shared: Arc<Shared>, workload_number: u64, key: KeptKey) {
@@ -57,11 +60,11 @@ pub(crate) async fn probe_views(shared: Arc<Shared>, probe: ViewProbe) {
     match answer {
         Ok(event) => planned(&shared, workload_number, event),
         Err(status) if is_refusal(&status) => {
-            let (reason, busy_s) = (shortened(status.message()), start.elapsed().as_secs_f64());
+            let (reason, busy_s) = (shortened_reason(status.message()), start.elapsed().as_secs_f64());
             planned(&shared, workload_number, PlannerEvent::Failed { id, reason, busy_s });
         }
         Err(status) => {
-            let reason = shortened(status.message());
+            let reason = shortened_reason(status.message());
             shared.step(Event::ProbeLost { workload_number, id, reason });
         }
     }
@@ -81,7 +84,7 @@ pub(crate) async fn represent(shared: Arc<Shared>, workload_number: u64, plan: u
             shared.step(Event::Represented { workload_number, plan, costs, planes });
         }
         Err(status) => {
-            let reason = shortened(status.message());
+            let reason = shortened_reason(status.message());
             shared.step(Event::Unrepresented { workload_number, plan, reason });
         }
     }
@@ -130,17 +133,13 @@ async fn ask(node: &NodeClient, request: &ProbeViews, address: &str) -> Result<P
 fn check(id: ProbeId, event: PlannerEvent) -> PlannerEvent {
     match event.validate() {
         Ok(()) => event,
-        Err(error) => PlannerEvent::Failed { id, reason: shortened(&error.to_string()), busy_s: 0.0 },
+        Err(error) => PlannerEvent::Failed { id, reason: shortened_reason(&error.to_string()), busy_s: 0.0 },
     }
 }
 
 /// Whether the node answered, and would answer the same again.
 fn is_refusal(status: &Status) -> bool {
     [Code::InvalidArgument, Code::Unimplemented, Code::OutOfRange].contains(&status.code())
-}
-
-fn shortened(reason: &str) -> String {
-    reason[..reason.floor_char_boundary(MAX_REASON_BYTES)].to_owned()
 }
 
 fn row_costs(answer: &ProbedViews) -> RowCosts {

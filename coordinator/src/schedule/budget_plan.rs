@@ -11,7 +11,7 @@ use planner::{
 };
 
 use super::budgeted::Budgeted;
-use super::prices::EqualNodes;
+use super::prices::{EqualNodes, STILL_SET_S};
 use super::workload_state::WorkloadState;
 
 /// Measuring for a plan may take this long, or as long as these numbers of directly drawn views and of sets.
@@ -23,10 +23,9 @@ const ALLOWED_SHARE: f64 = 0.05;
 /// A measurement is asked for again after this pause, and fails after this number of lost nodes.
 const PAUSE: Duration = Duration::from_secs(1);
 const MOST_LOST: u32 = 5;
-/// A still set serves a viewer for about so long, as far as costs are concerned.
-const STILL_SET_S: f64 = 60.0;
-/// Views of one measured call of the chosen representation's costs, at most.
-const MEASURED_BATCH: u32 = 32;
+/// Views of one measured call: as in a batch of real work, since fewer views cost more each. A slow device must not
+/// take minutes.
+pub(crate) const MEASURED_BATCH: u32 = 32;
 
 /// A plan that is made or was made.
 #[derive(Debug, Clone)]
@@ -41,9 +40,10 @@ pub(super) struct BudgetPlan {
     /// The result, once there is one.
     pub(super) outcome: Option<Outcome>,
     budgeted: Budgeted,
-    /// The workload as sessions ask for it, and the cells that are planned for.
+    /// The workload as sessions ask for it, the cells that are planned for, and V of all sessions.
     workload: Workload,
     cells: Vec<ViewCell>,
+    views_per_set: usize,
     planner: Planner<EqualNodes>,
     allowance_s: f64,
     /// The measurement that is wanted.
@@ -102,14 +102,11 @@ impl BudgetPlan {
     ) -> Result<Self, InvalidField> {
         let missing = || InvalidField::Missing { field: "budget" };
         let budgeted = workload.budgeted.clone().ok_or_else(missing)?;
-        let (costs, cells) = (&workload.costs, workload.planned_cells());
+        let cells = workload.planned_cells();
         if cells.is_empty() {
             return Err(InvalidField::Missing { field: "viewpoints" });
         }
-        let images = workload.requested.sample_cameras.len() as f64;
-        let needed_s = ALLOWED_VIEWS * costs.direct_view_s + ALLOWED_SETS * images * costs.sample_image_s;
-        let allowance_s = needed_s.max(LEAST_ALLOWANCE_S);
-        let prices = prices(workload);
+        let (allowance_s, prices) = (allowance_s(workload), prices(workload));
         let is_traced = budgeted.screening_lighting != workload.requested.lighting;
         let request = PlanRequest {
             plan: number,
@@ -124,24 +121,22 @@ impl BudgetPlan {
         };
         let planner = Planner::new(request, budgeted.ladder()?, prices)
             .map_err(|error| InvalidField::out_of_range("budget", error, "a plan"))?;
-        let (workload, device_name) = (workload.requested.clone(), device_name.to_owned());
-        let (asked, outcome, lost) = (None, None, 0);
-        let (began, not_before) = (now, now);
         Ok(Self {
             number,
             budget,
-            device_name,
+            device_name: device_name.to_owned(),
             prices,
-            began,
-            outcome,
+            began: now,
+            outcome: None,
             budgeted,
-            workload,
+            workload: workload.requested.clone(),
             cells,
+            views_per_set: workload.sessions.views(),
             planner,
             allowance_s,
-            asked,
-            not_before,
-            lost,
+            asked: None,
+            not_before: now,
+            lost: 0,
         })
     }
 
@@ -174,11 +169,11 @@ impl BudgetPlan {
         if answered.is_some() && answered != self.asked.as_ref().and_then(asked_id) {
             return None;
         }
-        self.lost = 0;
         // Measurements that a plan before this one asked for.
         if matches!(&event, PlannerEvent::Remembered(kept) if kept.key != self.key()) {
             return None;
         }
+        self.lost = 0;
         let mut commands = self.planner.step(event);
         if let [PlannerCommand::Refuse(error)] = &commands[..] {
             let reason = error.to_string();
@@ -258,7 +253,6 @@ impl BudgetPlan {
         Some(ProbeViews {
             workload: self.budgeted.sampled_as(row, &self.workload, &self.cells),
             method: row.method.clone(),
-            codec: self.budgeted.codec.clone(),
             compared_lighting: compared.unwrap_or(&self.workload.lighting).clone(),
             views: views.iter().map(|&view| self.camera(view)).collect(),
             antialias: self.budgeted.antialias(),
@@ -289,11 +283,18 @@ impl BudgetPlan {
             method: row.method.clone(),
             codec: self.budgeted.codec.clone(),
             typical_views: vec![self.budgeted.typical_view],
-            batch_count: (self.prices.views_a_set as u32).clamp(1, MEASURED_BATCH),
+            batch_count: (self.views_per_set as u32).clamp(1, MEASURED_BATCH),
             planes: ViewPlanes { antialias: self.budgeted.antialias(), ..ViewPlanes::COLOR },
             in_background: true,
         }
     }
+}
+
+/// The nodes' time that measuring for a workload may take at once, in s.
+fn allowance_s(workload: &WorkloadState) -> f64 {
+    let (costs, images) = (&workload.costs, workload.requested.sample_cameras.len() as f64);
+    let needed_s = ALLOWED_VIEWS * costs.direct_view_s + ALLOWED_SETS * images * costs.sample_image_s;
+    needed_s.max(LEAST_ALLOWANCE_S)
 }
 
 /// Prices on the nodes that serve a workload.

@@ -6,7 +6,7 @@ use glam::UVec2;
 use planner::{Budget, Ladder, Row};
 use serde::{Deserialize, Serialize};
 
-use super::cells::{Cells, first_indices};
+use super::cells::first_indices;
 
 /// A promise holds for views of up to this many times the planned pixels, or of that share of them.
 const MOST_PIXELS: f64 = 2.0;
@@ -79,14 +79,4 @@ impl Budgeted {
         nonempty(&self.screening_lighting, "screening_lighting")?;
         self.typical_view.validate().map_err(|source| InvalidField::Camera { field: "typical_view", source })
     }
-}
-
-/// The view cells that are planned for: those that viewpoints may grow to, or the one between a workload's own sample cameras.
-pub(super) fn planned_cells(cells: Option<&Cells>, workload: &Workload) -> Vec<ViewCell> {
-    let own = || {
-        let cameras: Vec<PinholeCamera> =
-            workload.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
-        ViewCell::between(&cameras).into_iter().collect()
-    };
-    cells.map_or_else(own, Cells::grown)
 }

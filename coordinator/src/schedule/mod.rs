@@ -53,6 +53,7 @@ mod workloads_tests;
 pub(crate) use test_support::workload as workload_for_tests;
 
 pub use balance::k_fd;
+pub(crate) use budget_plan::MEASURED_BATCH;
 pub use budgeted::Budgeted;
 pub(crate) use cells::first_indices;
 pub use choose::choose;
@@ -64,6 +65,6 @@ pub use event_log::{LogError, Recorder, Step, replay};
 pub use load::Load;
 pub use node_costs::NodeCosts;
 pub use prediction::pipeline_s;
-pub use prices::EqualNodes;
+pub use prices::{EqualNodes, STILL_SET_S};
 pub use scheduler::Scheduler;
 pub use search::Division;

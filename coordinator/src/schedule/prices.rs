@@ -6,7 +6,10 @@ use planner::{Price, Pricing, Row, RowCosts};
 use super::prediction::time_share_s;
 use super::{Load, NodeCosts};
 
-/// Nodes with equal costs, and what they serve.
+/// A still set serves a viewer for this time, as far as costs are concerned.
+pub const STILL_SET_S: f64 = 60.0;
+
+/// Nodes with equal costs, and the work that they share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EqualNodes {
     /// P.

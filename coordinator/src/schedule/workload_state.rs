@@ -8,7 +8,7 @@ use depth_image::{Camera, ExposureEv, PinholeCamera, ViewCell};
 use glam::UVec2;
 
 use super::active_plan::ActivePlan;
-use super::budgeted::{Budgeted, planned_cells};
+use super::budgeted::Budgeted;
 use super::cells::Cells;
 use super::node_costs::view_s;
 use super::overload::Overload;
@@ -133,9 +133,12 @@ impl WorkloadState {
         self.representation.as_ref().map_or(asked, |representation| representation.policy_override(asked))
     }
 
-    /// The view cells that budgets are planned for.
+    /// The view cells that budgets are planned for: those that viewpoints may grow to, or the one between the sessions' own
+    /// sample cameras.
     pub(super) fn planned_cells(&self) -> Vec<ViewCell> {
-        planned_cells(self.cells.as_ref(), &self.requested)
+        let pinhole = |Camera::Pinhole(camera): &Camera| *camera;
+        let own = || ViewCell::between(&self.requested.sample_cameras.iter().map(pinhole).collect::<Vec<_>>());
+        self.cells.as_ref().map_or_else(|| own().into_iter().collect(), Cells::grown)
     }
 
     /// The workload in the representation in force.
@@ -157,22 +160,26 @@ impl WorkloadState {
         }
     }
 
-    /// Whether a session asks for this workload, with a budget that can be planned for together; `follows_viewers`: its sample cameras are those of its viewpoints.
+    /// Whether a session asks for this workload, with a budget that can be planned for together; `follows_viewers`: its
+    /// sample cameras are those of its viewpoints.
     pub(super) fn is_shared_by(&self, asked: &Workload, budgeted: Option<&Budgeted>, follows_viewers: bool) -> bool {
-        let has_same_budget = match (&self.budgeted, budgeted) {
-            (Some(own), Some(asked)) => {
-                let strictest = self.sessions.budget();
-                own.is_shareable(asked) && strictest.is_none_or(|budget| budget.and(&asked.budget).is_some())
-            }
-            (own, asked) => own.is_none() && asked.is_none(),
-        };
-        if !has_same_budget {
+        if !self.shares_budget(budgeted) {
             return false;
         }
         let asked = self.with_planes(asked);
         match &self.cells {
             Some(cells) => follows_viewers && cells.are_shareable(&self.requested, &asked),
             None => !follows_viewers && self.requested == asked,
+        }
+    }
+
+    fn shares_budget(&self, asked: Option<&Budgeted>) -> bool {
+        match (&self.budgeted, asked) {
+            (Some(own), Some(asked)) => {
+                let strictest = self.sessions.budget();
+                own.is_shareable(asked) && strictest.is_none_or(|budget| budget.and(&asked.budget).is_some())
+            }
+            (own, asked) => own.is_none() && asked.is_none(),
         }
     }
 

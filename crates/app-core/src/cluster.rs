@@ -24,8 +24,8 @@ pub struct Cluster {
 }
 
 impl Cluster {
-    /// Starts a coordinator of this configuration on `port` and `nodes` nodes, each with its configuration changed by `configure`, and waits
-    /// until all have joined. Nodes fetch scenes unless the engine that `open` gives has them.
+    /// Starts a coordinator of this configuration on `port` and `nodes` nodes, each with its configuration changed by
+    /// `configure`, and waits until all have joined. Nodes fetch scenes unless the engine that `open` gives has them.
     ///
     /// # Errors
     /// A port is not to be had, or nodes do not join.

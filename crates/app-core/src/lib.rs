@@ -3,8 +3,7 @@
 //! [`setup`] makes a scene on offer out of arguments, and [`scenes`] several. [`cluster`] runs coordinator and nodes in one process.
 //! [`delivery`] opens sessions and receives views, and [`live`] follows a path with a moving camera. [`camera_file`]
 //! reads camera files, and [`camera_record`] writes those of views. [`ladder`] has the representations among which budgets
-//! choose, [`planning`] the terms of a plan, and [`plan_files`] what
-//! plans have measured. [`exit`] defines the exit status.
+//! choose, [`planning`] the terms of a plan, and [`plan_files`] the measurements of plans. [`exit`] defines the exit status.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod camera_file;

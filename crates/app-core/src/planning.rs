@@ -41,6 +41,8 @@ pub struct Planning {
     pub subject: Subject,
     /// From where views are seen.
     pub viewpoints: Viewpoints,
+    /// How views are delivered.
+    pub codec: FrameCodec,
 }
 
 impl Planning {
@@ -67,10 +69,9 @@ impl Planning {
             lighting,
             scene_time_s: views.scene_time_s,
             planes: views.planes,
-            codec: views.codec,
         };
         let viewpoints = Viewpoints { cell, view_px: views.size_px, seed: views.seed };
-        Ok(Self { ladder: Ladder::new(rows)?, representations, subject, viewpoints })
+        Ok(Self { ladder: Ladder::new(rows)?, representations, subject, viewpoints, codec: views.codec })
     }
 
     /// The name of the measurements that this plan may use.

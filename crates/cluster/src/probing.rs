@@ -15,8 +15,6 @@ pub struct ProbeViews {
     pub workload: Workload,
     /// How views are reconstructed.
     pub method: String,
-    /// How frames are encoded.
-    pub codec: String,
     /// The light in which views are compared, cheaper than the workload's where geometry decides.
     pub compared_lighting: String,
     /// The views, each made from its own view cell: of one size, at least one.
@@ -56,7 +54,6 @@ impl ProbeViews {
     pub fn validate(&self) -> Result<(), InvalidField> {
         self.workload.validate()?;
         nonempty(&self.method, "reconstruction_method")?;
-        nonempty(&self.codec, "frame_codec")?;
         nonempty(&self.compared_lighting, "compared_lighting")?;
         if self.workload.sample_cameras.is_empty() {
             return Err(InvalidField::Missing { field: "sample_cameras" });

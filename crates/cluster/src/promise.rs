@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::check::{InvalidField, nonempty, reason, within};
+use crate::check::{InvalidField, nonempty, reason, text, within};
 
 /// A session asks for the cheapest representation that keeps a budget. What its user named stays as it is.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -11,8 +11,6 @@ pub struct BudgetRequest {
     pub budget: Option<String>,
     /// The user named the reconstruction method.
     pub names_method: bool,
-    /// The user named the sampling method.
-    pub names_sampling: bool,
 }
 
 /// The promise to the sessions of a workload.
@@ -56,10 +54,13 @@ impl std::fmt::Display for PromiseState {
 }
 
 impl std::fmt::Display for Promise {
-    /// One line: the budget, the state, the representation and the reason.
+    /// One line: the budget, the state and the reason; while representations are measured, also the one in force.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { budget, state, representation, reason, .. } = self;
-        write!(f, "promise {budget}: {state}, {representation}: {reason}")
+        match state {
+            PromiseState::Measuring => write!(f, "promise {budget}: {state}, now {representation}: {reason}"),
+            PromiseState::Kept | PromiseState::Unreachable => write!(f, "promise {budget}: {state}: {reason}"),
+        }
     }
 }
 
@@ -67,7 +68,7 @@ impl BudgetRequest {
     /// # Errors
     /// For a text that is too long.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        crate::check::text(self.budget.as_deref().unwrap_or_default(), "budget")
+        text(self.budget.as_deref().unwrap_or_default(), "budget")
     }
 }
 

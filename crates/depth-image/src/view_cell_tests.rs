@@ -111,3 +111,41 @@ fn diverging_views_give_valid_cameras() {
         sample.validate().unwrap();
     }
 }
+
+#[test]
+fn nested_cameras_are_prefixes_of_each_other_and_see_all_views() {
+    let corners = [(-0.5, -0.4), (0.5, -0.4), (-0.5, 0.4), (0.5, 0.4)];
+    let at = |(x, y): (f32, f32)| {
+        let eye = Vec3::new(x, y, 4.0);
+        PinholeCamera::looking_at(eye, Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(80, 60))
+    };
+    let rig = corners.map(at);
+    let cell = ViewCell::between(&rig).unwrap();
+    let size_px = UVec2::new(40, 30);
+    let nested = |count| cell.nested_cameras(count, size_px);
+    assert!(nested(8).starts_with(&nested(4)) && nested(4).starts_with(&nested(2)));
+    assert_eq!((nested(1)[0], nested(1).len()), (nested(8)[4], 1), "one camera stands in the middle");
+    for camera in nested(9) {
+        assert_eq!(camera.size_px, size_px);
+        assert!(rig.iter().all(|view| cell.sees_all_of(view)));
+    }
+    let eyes: Vec<Vec3> = nested(4).iter().map(|camera| camera.eye_in_world).collect();
+    assert!(rig.iter().all(|corner| eyes.iter().any(|eye| (*eye - corner.eye_in_world).length() < 1e-5)), "{eyes:?}");
+}
+
+#[test]
+fn a_cell_grows_about_its_middle_and_views_of_it_keep_their_aim() {
+    let view = PinholeCamera::looking_at(Vec3::new(0.0, 1.0, 4.0), Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(80, 60));
+    let one = ViewCell::between(&[view]).unwrap();
+    let grown = one.grown_to(0.6);
+    let at = |x, y, z| grown.view_at(Vec3::new(x, y, z), &view);
+    assert_eq!(at(0.0, 0.0, 0.0), view);
+    for (place, axis) in [(Vec3::X, Vec3::X), (Vec3::Y, Vec3::Y), (Vec3::Z, Vec3::Z)] {
+        let moved = grown.view_at(place, &view);
+        let step = moved.eye_in_world - view.eye_in_world;
+        assert!((step - view.world_from_camera * axis * 0.3).length() < 1e-5, "{step}");
+        assert_eq!((moved.focal_px, moved.size_px), (view.focal_px, view.size_px));
+    }
+    let wide = grown.grown_to(0.1);
+    assert_eq!(wide, grown, "edges that are long enough stay");
+}

@@ -14,6 +14,12 @@ pub const MAX_PROBE_VIEWS: usize = 64;
 /// The most bytes of a reason.
 const MAX_REASON_BYTES: usize = 1024;
 
+/// The beginning of a reason, as long as an event may have it.
+#[must_use]
+pub fn shortened_reason(reason: &str) -> String {
+    reason[..reason.floor_char_boundary(MAX_REASON_BYTES)].to_owned()
+}
+
 /// A measurement that a command asked for. Answers repeat it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ProbeId {

@@ -34,7 +34,7 @@ pub use budget::{Budget, BudgetError, ErrorTerm, Statistic};
 pub use command::{Command, Purpose};
 pub use cost_model::{CostModel, TimedRow};
 pub use costs::{Price, Pricing, RowCosts, median, median_costs};
-pub use event::{Event, MAX_PROBE_VIEWS, ProbeId, Probed, Timed};
+pub use event::{Event, MAX_PROBE_VIEWS, ProbeId, Probed, Timed, shortened_reason};
 pub use invalid::InvalidField;
 pub use kept::{
     Certificate, Kept, KeptCosts, KeptError, KeptKey, KeptRow, KeptSearch, MAX_KEPT_BYTES, MAX_SCREENING_VIEWS,

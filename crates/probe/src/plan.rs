@@ -5,14 +5,12 @@ use std::time::Instant;
 use depth_image::PinholeCamera;
 use planner::{
     Command, Event, Kept, Outcome, Planner, Pricing, ProbeId, Probed, Purpose, RowCosts, Timed, median_costs,
+    shortened_reason,
 };
 
 use crate::prober::{ProbeError, Prober};
 use crate::representation::Representation;
 use crate::subject::{Light, Viewpoints};
-
-/// The longest reason of a failure that a planner takes, in bytes.
-const MAX_REASON_BYTES: usize = 1024;
 
 /// Makes a plan from what earlier plans measured; `representations` are those of the ladder's rows, in order. `observe` sees
 /// the planner after every measurement. The result has the measurements for later plans.
@@ -93,7 +91,5 @@ fn time(
 }
 
 fn failed(id: ProbeId, error: &ProbeError, busy_s: f64) -> Event {
-    let mut reason = error.to_string();
-    reason.truncate(reason.floor_char_boundary(MAX_REASON_BYTES));
-    Event::Failed { id, reason, busy_s }
+    Event::Failed { id, reason: shortened_reason(&error.to_string()), busy_s }
 }

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use codec::{
-    DecodeError, DecodeLimits, EncodedDepthImage, FrameError, PlaneSet, decode_depth_image, encode_depth_image,
-    encode_view,
+    DecodeError, DecodeLimits, EncodedDepthImage, FrameCodec, FrameError, PlaneSet, decode_depth_image,
+    encode_depth_image, encode_view,
 };
 use depth_image::{DepthImage, DepthImageError, PinholeCamera, View, ViewPlanes};
 use metrics::MetricsError;
-use node::{Engine, EngineError, SampleWork, Turn, UploadedSet, ViewWork};
+use node::{Engine, EngineError, SampleWork, Turn, UploadedSet, ViewWork, own_time};
 use planner::{RowCosts, ViewErrors, median};
 use rayon::prelude::*;
 
@@ -188,14 +188,13 @@ impl Prober {
     ///
     /// # Errors
     /// The device fails.
-    pub fn direct_costs(&mut self, viewpoints: &Viewpoints) -> Result<DirectCosts, ProbeError> {
+    pub fn direct_costs(&mut self, viewpoints: &Viewpoints, codec: FrameCodec) -> Result<DirectCosts, ProbeError> {
         let work =
             |views: usize| self.subject.direct_work(viewpoints.first(views), Light::Session, self.subject.planes);
         let (_, alone_s) = self.median_s(|engine, turn| engine.draw_direct(&work(1), turn))?;
         // About a second of drawing at most.
         let batch = work(((1.0 / alone_s.max(1e-3)) as usize).clamp(1, TIMED_VIEWS));
         let (drawn, direct_s) = self.median_s(|engine, turn| engine.draw_direct(&batch, turn))?;
-        let codec = self.subject.codec;
         let (encoded, encode_s) =
             self.own_time(|| drawn.iter().try_for_each(|view| encode_view(view, codec).map(drop)));
         encoded?;
@@ -314,19 +313,18 @@ impl Prober {
         (measured, (start.elapsed().as_secs_f64() - self.waited_s.get()).max(0.0))
     }
 
-    /// As [`node::own_time`], which forgets earlier waits.
+    /// As [`node::own_time`], whose waits count for [`Prober::busy`].
     fn own_time<T>(&self, work: impl FnOnce() -> T) -> (T, f64) {
         self.note_waits();
         let start = Instant::now();
-        let done = work();
-        (done, (start.elapsed().as_secs_f64() - self.note_waits()).max(0.0))
+        let (done, own_s) = own_time(self.engine.as_ref(), work);
+        self.waited_s.set(self.waited_s.get() + start.elapsed().as_secs_f64() - own_s);
+        (done, own_s)
     }
 
-    /// Waits of this thread since they were last noted.
-    fn note_waits(&self) -> f64 {
-        let waited_s = self.engine.take_waited_s();
-        self.waited_s.set(self.waited_s.get() + waited_s);
-        waited_s
+    /// Adds the waits of this thread since they were last noted.
+    fn note_waits(&self) {
+        self.waited_s.set(self.waited_s.get() + self.engine.take_waited_s());
     }
 
     fn is_first(&mut self, operation: &str) -> bool {

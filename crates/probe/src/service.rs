@@ -44,7 +44,7 @@ impl ViewProbes for Probers {
         let mut probers = self.probers.lock();
         // Work that arrives meanwhile goes between slices of a measurement that nobody waits for.
         let _cut = self.engine.live_stream();
-        let mut prober = self.taken(&mut probers, subject_of(request)?);
+        let mut prober = self.taken(&mut probers, subject_of(request));
         let (measured, busy_s) = prober.busy(|prober| measured(prober, request));
         probers.push_back(prober);
         while probers.len() > MAX_SUBJECTS {
@@ -92,9 +92,9 @@ fn representation(request: &ProbeViews, cell: u32) -> Result<Representation, Sta
     })
 }
 
-fn subject_of(request: &ProbeViews) -> Result<Subject, Status> {
-    let ProbeViews { workload, compared_lighting, antialias, codec, .. } = request;
-    Ok(Subject {
+fn subject_of(request: &ProbeViews) -> Subject {
+    let ProbeViews { workload, compared_lighting, antialias, .. } = request;
+    Subject {
         scene_hash: workload.scene.hash.to_string(),
         volume: workload.volume,
         background: workload.background,
@@ -103,8 +103,7 @@ fn subject_of(request: &ProbeViews) -> Result<Subject, Status> {
         screening_lighting: compared_lighting.clone(),
         scene_time_s: workload.timeline.start_s as f32,
         planes: ViewPlanes { antialias: *antialias, ..ViewPlanes::COLOR },
-        codec: codec.parse().map_err(|error| Status::invalid_argument(format!("frame_codec: {error}")))?,
-    })
+    }
 }
 
 fn probed(errors: ViewErrors) -> ProbedView {

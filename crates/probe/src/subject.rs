@@ -1,7 +1,6 @@
 //! The scene, and the viewpoints for which representations are measured.
 
 use cluster::Refinement;
-use codec::FrameCodec;
 use depth_image::{Aabb, DepthImage, Environment, Illumination, PinholeCamera, ViewCell, ViewPlanes};
 use glam::{UVec2, Vec2};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork};
@@ -28,8 +27,6 @@ pub struct Subject {
     pub scene_time_s: f32,
     /// How a view's colour is sampled.
     pub planes: ViewPlanes,
-    /// The codec of delivered views; its loss does not count.
-    pub codec: FrameCodec,
 }
 
 /// The viewpoints that are planned for.

@@ -127,7 +127,7 @@ fn request() -> SessionRequest {
         }],
         forced_tile_count: Some(2),
         viewpoints: vec![camera(); 2],
-        budget: BudgetRequest { budget: Some("flip 0.05".to_owned()), names_method: true, names_sampling: false },
+        budget: BudgetRequest { budget: Some("flip 0.05".to_owned()), names_method: true },
     }
 }
 
@@ -536,7 +536,6 @@ fn probes_survive_the_round_trip_and_impossible_ones_are_refused_by_field() {
     let probe = |views: usize| ProbeViews {
         workload: workload(),
         method: "joint_carve".to_owned(),
-        codec: "lz4".to_owned(),
         compared_lighting: "phong".to_owned(),
         views: vec![camera(); views],
         antialias: Antialias::MOST,

@@ -66,7 +66,7 @@ impl Subject {
     /// # Errors
     /// The device fails.
     pub fn pricing(&self, prober: &mut Prober, planning: &Planning) -> anyhow::Result<EqualNodes> {
-        let direct = prober.direct_costs(&planning.viewpoints)?;
+        let direct = prober.direct_costs(&planning.viewpoints, planning.codec)?;
         Ok(one_node(self.conditions.views, direct))
     }
 }

@@ -12,7 +12,7 @@ use app_core::sizes::SizePx;
 use clap::Args;
 use codec::FrameCodec;
 use coordinator::PlanStore as _;
-use coordinator::schedule::EqualNodes;
+use coordinator::schedule::{EqualNodes, STILL_SET_S};
 use depth_image::{Antialias, ViewPlanes};
 use engine::GpuEngine;
 use indicatif::ProgressBar;
@@ -23,9 +23,6 @@ use probe::Prober;
 
 use super::view::rate;
 use crate::budget::PlansArgs;
-
-/// Seconds for which a viewer is shown one set of a still scene, as far as costs are concerned.
-const STILL_SET_S: f64 = 60.0;
 
 /// Finds the cheapest representation of a scene that keeps a budget: how it is sampled, from how many cameras, in images of
 /// which size, and how views are reconstructed. Prints the choice, the reason, the front of cost against error, and the
@@ -111,7 +108,7 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
     };
     let planning = Planning::new(&setup, &args.scene, &views)?;
     let mut prober = Prober::new(engine.clone(), planning.subject.clone(), Turn::of(WorkClass::Batch));
-    let direct = prober.direct_costs(&planning.viewpoints)?;
+    let direct = prober.direct_costs(&planning.viewpoints, planning.codec)?;
     let pricing = one_node(args.views_a_set(&setup), direct);
     let request =
         planning.request(args.budget, device_name(&engine.device_name()), pricing.views_a_set, args.allowance);

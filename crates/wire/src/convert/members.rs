@@ -23,8 +23,7 @@ messages! {
         costs; planes: with_normals | with_corner_inverse_depths, auto_exposure: auto_exposure_ev
     };
     ProbeViewsRequest = ProbeViews {
-        workload, compared_lighting, views, with_errors; method: reconstruction_method, codec: frame_codec,
-        antialias: antialias_sample_count
+        workload, compared_lighting, views, with_errors; method: reconstruction_method, antialias: antialias_sample_count
     }, first |r| at_most(r.views.len(), MAX_PROBE_VIEWS, "views"), then ProbeViews::validate;
     ProbedView = ProbedView {
         foreground_ratio, disoccluded_ratio;

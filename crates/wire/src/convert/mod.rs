@@ -209,7 +209,7 @@ flat! {
     SampleSetId { plan_epoch: u64, index: u64 }
     NodeStatus { node_name: String, address: String, device_name: String, is_software: bool }
     OfferSettings { method: String, sampling: String, lighting: String }
-    BudgetRequest { budget: String, names_method: bool, names_sampling: bool }
+    BudgetRequest { budget: String, names_method: bool }
     MeasuredCosts {
         sample_image_s: Option<f64>, direct_view_s: Option<f64>, reconstruct_view_s: Option<f64>,
         load_set_s: Option<f64>, encode_view_s: Option<f64>, transfer_bytes_per_s: Option<f64>, image_bytes: Option<u64>

@@ -29,7 +29,7 @@ messages! {
         sample_size_px: sample_image_size, views_per_set: views_per_set_count,
         planes: antialias_sample_count | exposure_ev | tone_curve | with_inverse_depth | with_provenance,
         auto_exposure: with_auto_exposure, policy: policy_choice, refinement_steps: refinement_step_count,
-        budget: budget | is_method_named | is_sampling_named
+        budget: budget | is_method_named
     }, with protocol_version = PROTOCOL_VERSION, first check_request, then SessionRequest::validate;
     Quality = Quality { lighting, sample_side_ratio, frame_rate_ratio; method: reconstruction_method };
     ChangeSessionRequest = ChangeSession {

@@ -17,7 +17,7 @@ use crate::comparison;
 pub(super) async fn compare(args: &ViewArgs, job: &Job, views: u64) -> anyhow::Result<Outcome> {
     // Depth tells where a surface is.
     let planes = ViewPlanes { inverse_depth: true, ..job.request.planes };
-    let budget = BudgetRequest { budget: None, names_method: true, names_sampling: false };
+    let budget = BudgetRequest::default();
     let direct =
         SessionRequest { method: DIRECT.to_owned(), policy: PolicyChoice::Auto, planes, budget, ..job.request.clone() };
     let session = open(&job.client, direct).await?;

@@ -114,20 +114,15 @@ fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamer
         policy: args.policy,
         planes: args.planes(),
         timeline: timeline(args.frames, args.frame_step, args.refine),
+        budget: BudgetRequest {
+            budget: args.budget.map(|budget| budget.to_string()),
+            names_method: args.method.is_some(),
+        },
         viewpoints: if args.cells || args.viewpoints.around.is_some() { viewpoints(cameras) } else { Vec::new() },
         ..request
     };
     // Metrics are of light as it is, unless the arguments say otherwise.
-    let request = with_budget(request, args);
     Ok(if args.compare { args.tone.for_metrics(request) } else { args.tone.for_people(request) })
-}
-
-/// A session with a budget has no fallbacks: it is promised what it gets.
-fn with_budget(request: SessionRequest, args: &ViewArgs) -> SessionRequest {
-    let budget = args.budget.map(|budget| budget.to_string());
-    let fallbacks = if budget.is_some() { Vec::new() } else { request.fallbacks.clone() };
-    let names_method = args.method.is_some();
-    SessionRequest { budget: BudgetRequest { budget, names_method, names_sampling: false }, fallbacks, ..request }
 }
 
 /// A picture that is refined stands still: motion would begin the refinement anew.
