@@ -10,6 +10,7 @@ use node::{DirectWork, Engine, NodeMetrics, Operation, Scenes, Turn, ViewWork, W
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::Status;
 
+use crate::auditor::Auditor;
 use crate::batch::{Source, Waiting};
 use crate::outbox::Output;
 use crate::queue::{Arrivals, Lane};
@@ -25,14 +26,17 @@ pub(crate) struct Rendering {
     metrics: NodeMetrics,
     times: Arc<ViewTimes>,
     encoders: Arc<Semaphore>,
+    auditor: Arc<Auditor>,
     /// The share of the time for views that are drawn from the scene while others are served.
     direct_share: f64,
 }
 
 impl Rendering {
-    pub(crate) fn new(scenes: Arc<Scenes>, metrics: NodeMetrics, times: Arc<ViewTimes>, direct_share: f64) -> Self {
+    pub(crate) fn new(auditor: Arc<Auditor>, times: Arc<ViewTimes>) -> Self {
+        let Auditor { scenes, metrics, direct_share, .. } = &*auditor;
+        let (scenes, metrics, direct_share) = (scenes.clone(), metrics.clone(), *direct_share);
         let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
-        Self { scenes, metrics, times, encoders, direct_share }
+        Self { scenes, metrics, times, encoders, auditor, direct_share }
     }
 
     /// Makes the views of one lane, until it is aborted.
@@ -78,6 +82,7 @@ impl Rendering {
                     metrics.view_s.observe(batch_s / batch.len() as f64);
                     metrics.queue_s.observe(start.saturating_duration_since(view.queued).as_secs_f64());
                 }
+                self.auditor.note(&batch);
                 tokio::spawn(self.clone().encode_all(batch, views, (start, batch_s), place));
                 busy_s
             }

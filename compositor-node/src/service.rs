@@ -5,12 +5,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use cluster::RenderViews;
 use codec::FramePart;
-use node::{CellPlan, NodeConfig, NodeMetrics, PlansInForce, Relay, Scenes, SetMemory, next_within, until_drained};
+use node::{
+    CellPlan, NodeConfig, NodeMetrics, PlansInForce, Relay, Scenes, SetMemory, ViewProbes, next_within, until_drained,
+};
+use parking_lot::Mutex;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, async_trait};
 use wire::rpc::{Compositor, Messages};
 
+use crate::auditor::Auditor;
 use crate::batch_stream::BatchStream;
 use crate::live_stream::LiveStream;
 use crate::outbox::{Outbox, Outgoing, Reply};
@@ -37,12 +41,21 @@ impl CompositorService {
         plans: PlansInForce,
         config: &NodeConfig,
         metrics: NodeMetrics,
+        probes: Arc<dyn ViewProbes>,
         shutdown: CancellationToken,
     ) -> Self {
         let arrivals = Arc::<Arrivals>::default();
         let mut rendering = JoinSet::new();
         let times = Arc::new(ViewTimes::new(config.max_view_s));
-        let renderer = Rendering::new(scenes.clone(), metrics.clone(), times.clone(), config.direct_share);
+        let auditor = Auditor {
+            scenes: scenes.clone(),
+            probes,
+            plans: plans.clone(),
+            metrics: metrics.clone(),
+            direct_share: config.direct_share,
+            choice: Mutex::default(),
+        };
+        let renderer = Rendering::new(Arc::new(auditor), times.clone());
         for lane in Lane::ALL {
             rendering.spawn(renderer.clone().run(arrivals.clone(), lane));
         }

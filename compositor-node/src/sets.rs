@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use cluster::{Assignment, Policy, SetContent, Timeline, Workload};
 use codec::EncodedDepthImage;
-use depth_image::{Camera, PinholeCamera, nearest_set};
+use depth_image::{Camera, DepthImage, PinholeCamera, nearest_set};
 use node::{
     ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet, Scenes,
     SetMemory, Turn, UploadedSet,
@@ -52,6 +52,8 @@ pub(crate) struct ReadySet {
     /// What its images show, whenever it is.
     subject: SetContent,
     cameras: Vec<PinholeCamera>,
+    /// Its images where audits compare views with them; else none.
+    pub(crate) sample_images: Arc<[DepthImage]>,
     /// Its images for other compositors, where they ask this one.
     relay: Option<RelayBuffer>,
 }
@@ -222,7 +224,8 @@ impl Sets {
         let relayed = plan.relays(&self.plans.node_name);
         let (illumination, cameras) = (&plan.workload.illumination, &*plan.workload.sample_cameras);
         let packed = if relayed { most_image_bytes(illumination, cameras) } else { 0 };
-        most_set_bytes(illumination, cameras) + packed
+        let copies = if compares_images(plan) { 2 } else { 1 };
+        copies * most_set_bytes(illumination, cameras) + packed
     }
 
     fn loading(
@@ -257,7 +260,9 @@ impl Sets {
         let subject = subject(plan).ok_or_else(|| beyond_timeline(set_index))?;
         let latest = SETS_IN_USE + sets_ahead(plan) as usize + EARLIER_SETS;
         self.cached.keep_latest(latest - 1, |set| set.subject == subject);
-        let bytes = set_bytes(&set.images) + relay.as_ref().map_or(0, RelayBuffer::bytes);
+        let sample_images: Arc<[DepthImage]> =
+            if compares_images(plan) { set.images.clone().into() } else { Arc::default() };
+        let bytes = set_bytes(&set.images) + set_bytes(&sample_images) + relay.as_ref().map_or(0, RelayBuffer::bytes);
         let fetched_s = start.elapsed().as_secs_f64();
         let set = Arc::new(set);
         let upload = move |engine: &dyn Engine| {
@@ -273,7 +278,8 @@ impl Sets {
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
         let moment = moment(plan, set_index).ok_or_else(|| beyond_timeline(set_index))?;
         let cameras = plan.workload.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
-        Ok((ReadySet { set, since: Instant::now(), content, cell: plan.cell, moment, subject, cameras, relay }, bytes))
+        let (since, cell) = (Instant::now(), plan.cell);
+        Ok((ReadySet { set, since, content, cell, moment, subject, cameras, sample_images, relay }, bytes))
     }
 
     async fn fetch(&self, request: &SetRequest) -> Result<(SampleSet, FetchTimes), Status> {
@@ -282,6 +288,10 @@ impl Sets {
             failed.status
         })
     }
+}
+
+fn compares_images(plan: &Assignment) -> bool {
+    plan.audit.is_some_and(|order| order.with_sample_images)
 }
 
 fn content_of(plan: &CellPlan, set_index: u32) -> Result<SetContent, Status> {

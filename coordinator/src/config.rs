@@ -25,6 +25,8 @@ pub struct CoordinatorConfig {
     pub max_workloads: usize,
     /// The budget of sessions that state none.
     pub budget: Option<Budget>,
+    /// The share of compositors' time that audits of promises may take, from 0 to 0.5.
+    pub audit_time_ratio: f64,
     /// Where measurements for budgets are kept.
     pub plans: Option<Arc<dyn PlanStore>>,
     /// A cheaper light in which representations are compared, for a light that is expensive.
@@ -39,6 +41,7 @@ impl Default for CoordinatorConfig {
             max_sessions: 1024,
             max_workloads: 8,
             budget: None,
+            audit_time_ratio: 0.01,
             plans: None,
             screening_light: |_| None,
         }

@@ -45,8 +45,8 @@ pub(crate) async fn execute(shared: Arc<Shared>) {
             Command::Keep(kept) => {
                 tokio::spawn(keep(shared.clone(), *kept));
             }
-            Command::Represent { workload_number, plan, measurement } => {
-                tokio::spawn(represent(shared.clone(), workload_number, plan, *measurement));
+            Command::Represent { workload_number, choice, measurement } => {
+                tokio::spawn(represent(shared.clone(), workload_number, choice, *measurement));
             }
             Command::Promise { sessions, promise } => {
                 tracing::info!(%promise, "promise");

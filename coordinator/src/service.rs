@@ -40,9 +40,9 @@ pub async fn serve(
     observers: Observers,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
-    let (insecure_bind, reflection, max_workloads) = (config.insecure_bind, config.reflection, config.max_workloads);
+    let CoordinatorConfig { insecure_bind, reflection, max_workloads, audit_time_ratio, .. } = config;
     let shared = Arc::new(Shared::new(config, offers, observers));
-    shared.step(Event::Limits { max_workloads });
+    shared.step(Event::Limits { max_workloads, audit_time_ratio });
     let mut running = JoinSet::new();
     running.spawn(execute(shared.clone()));
     running.spawn(tick(shared.clone()));
@@ -114,10 +114,13 @@ impl Coordinator for CoordinatorService {
     }
 
     async fn report_work(&self, request: WorkReport) -> Result<(), Status> {
-        let WorkReport { node_name, plan_epoch, workload_number, costs, busy_s, views, dropped_views, viewpoints } =
-            request;
-        if self.shared.with_scheduler(|scheduler| scheduler.follows_viewers(workload_number)) {
+        let WorkReport { node_name, plan_epoch, workload_number, costs, busy_s, views, dropped_views, .. } = request;
+        let WorkReport { viewpoints, audit, .. } = request;
+        if self.shared.with_scheduler(|scheduler| scheduler.wants_viewpoints(workload_number)) {
             self.shared.step(Event::ViewersMoved { workload_number, node_name: node_name.clone(), viewpoints });
+        }
+        if let Some(report) = audit {
+            self.shared.step(Event::Audited { workload_number, node_name: node_name.clone(), report });
         }
         self.shared.step(Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views });
         Ok(())

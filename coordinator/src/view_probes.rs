@@ -71,7 +71,7 @@ pub(crate) async fn probe_views(shared: Arc<Shared>, probe: ViewProbe) {
 }
 
 /// Has the costs of a chosen representation measured on a node of each device.
-pub(crate) async fn represent(shared: Arc<Shared>, workload_number: u64, plan: u64, measurement: MeasureCosts) {
+pub(crate) async fn represent(shared: Arc<Shared>, workload_number: u64, choice: u64, measurement: MeasureCosts) {
     // Nobody reads how the measuring goes on.
     let (events, _progress) = mpsc::channel(1);
     let measured = match known(&shared, &measurement) {
@@ -81,11 +81,11 @@ pub(crate) async fn represent(shared: Arc<Shared>, workload_number: u64, plan: u
     match measured {
         Ok(measured) => {
             let (costs, planes) = (measured.costs, measured.planes);
-            shared.step(Event::Represented { workload_number, plan, costs, planes });
+            shared.step(Event::Represented { workload_number, choice, costs, planes });
         }
         Err(status) => {
             let reason = shortened_reason(status.message());
-            shared.step(Event::Unrepresented { workload_number, plan, reason });
+            shared.step(Event::Unrepresented { workload_number, choice, reason });
         }
     }
 }

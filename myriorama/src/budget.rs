@@ -6,6 +6,7 @@ use std::sync::Arc;
 use app_core::plan_files::PlanFiles;
 use app_core::planning::screening_light;
 use clap::Args;
+use cluster::MAX_AUDIT_TIME_RATIO;
 use coordinator::{CoordinatorConfig, PlanStore};
 use planner::Budget;
 
@@ -17,8 +18,20 @@ pub struct BudgetArgs {
     /// as far as a session does not name it [default: none]
     #[arg(long, value_name = "BUDGET")]
     budget: Option<Budget>,
+    /// The share of a compositor's time that audits of promises may take, from 0 to 0.5: they draw some views directly as well,
+    /// and compare. 0 is off
+    #[arg(long, value_name = "RATIO", default_value_t = 0.01, value_parser = audit_ratio)]
+    audit: f64,
     #[command(flatten)]
     plans: PlansArgs,
+}
+
+fn audit_ratio(text: &str) -> Result<f64, String> {
+    let ratio: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    match (0.0..=MAX_AUDIT_TIME_RATIO).contains(&ratio) {
+        true => Ok(ratio),
+        false => Err("not from 0 to 0.5".to_owned()),
+    }
 }
 
 /// Where measurements are kept.
@@ -34,7 +47,7 @@ impl BudgetArgs {
     /// A coordinator's configuration with this budget.
     pub fn configure(&self, config: CoordinatorConfig) -> CoordinatorConfig {
         let plans = self.plans.files().map(|files| Arc::new(files) as Arc<dyn PlanStore>);
-        CoordinatorConfig { budget: self.budget, plans, screening_light, ..config }
+        CoordinatorConfig { budget: self.budget, audit_time_ratio: self.audit, plans, screening_light, ..config }
     }
 }
 

@@ -1,5 +1,7 @@
 //! The command line.
 
+use std::time::Duration;
+
 use app_core::exit::Outcome;
 use app_core::process::runtime;
 use clap::{Parser, Subcommand};
@@ -17,6 +19,10 @@ pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
 }
+
+/// Work on the device that goes on when nodes have ended, such as a measurement, may take so long. A device that hangs must
+/// not keep the process.
+const MEASURED_TO_END: Duration = Duration::from_secs(5);
 
 const EXAMPLES: &str = "\
 Examples:
@@ -68,17 +74,12 @@ impl Command {
     /// Input cannot be used, or the program fails at run time; [`app_core::exit::report`] separates the two.
     pub fn run(self) -> anyhow::Result<Outcome> {
         match self {
-            Self::Up(args) => runtime()?.block_on(up::run(args)),
-            Self::Coordinator(args) => runtime()?.block_on(coordinator::run(args)),
-            Self::Node(args) => runtime()?.block_on(node::run(args)),
+            Self::Up(args) => run_to_end(up::run(args), MEASURED_TO_END),
+            Self::Coordinator(args) => run_to_end(coordinator::run(args), MEASURED_TO_END),
+            Self::Node(args) => run_to_end(node::run(args), MEASURED_TO_END),
             Self::Gateway(args) => runtime()?.block_on(gateway::run(args)),
-            Self::View(args) => {
-                let runtime = runtime()?;
-                let outcome = runtime.block_on(view::run(args));
-                // A second signal does not wait for pictures that are being written.
-                runtime.shutdown_background();
-                outcome
-            }
+            // A second signal does not wait for pictures that are being written.
+            Self::View(args) => run_to_end(view::run(args), Duration::ZERO),
             Self::Plan(args) => plan::run(&args),
             Self::Status(args) => runtime()?.block_on(status::run(&args)),
             Self::Replay(args) => replay::run(&args),
@@ -87,4 +88,12 @@ impl Command {
             Self::Lab(command) => command.run(),
         }
     }
+}
+
+/// Runs a command. Work that it leaves on other threads may take `most` to end.
+fn run_to_end(command: impl Future<Output = anyhow::Result<Outcome>>, most: Duration) -> anyhow::Result<Outcome> {
+    let runtime = runtime()?;
+    let outcome = runtime.block_on(command);
+    runtime.shutdown_timeout(most);
+    outcome
 }

@@ -104,11 +104,18 @@ async fn serve_on(
         device_name: engine.device_name(),
         is_software: engine.is_software(),
     };
-    let compositor = CompositorService::new(scenes.clone(), plans.clone(), config, metrics.clone(), shutdown.clone());
+    let probers = Arc::new(Probers::new(engine.clone()));
+    let compositor = CompositorService::new(
+        scenes.clone(),
+        plans.clone(),
+        config,
+        metrics.clone(),
+        probers.clone(),
+        shutdown.clone(),
+    );
     let (relay, done) = (compositor.relay(), metrics.done.clone());
     let sampler = SamplerService::new(scenes.clone(), plans.clone(), config, relay, metrics.clone(), shutdown.clone());
     monitor.set_memory(vec![compositor.memory(), sampler.memory()]);
-    let probers = Arc::new(Probers::new(engine.clone()));
     let service = NodeService::new(plans.clone(), scenes.clone(), config.quotas, metrics, probers);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
         .add_service(node_server(service))

@@ -10,8 +10,9 @@ use cluster::{BudgetRequest, PolicyChoice, Promise, PromiseState, SessionRequest
 use cluster_tests::cluster::{Cluster, camera, request, views};
 use coordinator::schedule::{Command, Recorder, replay};
 use coordinator::{CoordinatorConfig, CoordinatorMetrics, Observers, PlanStore};
+use node::NodeConfig;
 use parking_lot::Mutex;
-use planner::{Kept, KeptKey};
+use planner::{Certificate, Kept, KeptKey, KeptRow, ViewErrors};
 
 const DEADLINE: Duration = Duration::from_secs(60);
 /// Every picture keeps this budget, and none but directly drawn ones the other.
@@ -187,6 +188,109 @@ async fn a_live_view_goes_on_while_the_representation_changes() {
 
 fn session_view(step: usize) -> depth_image::PinholeCamera {
     camera(0.1 + 0.01 * step as f32, glam::UVec2::new(48, 36))
+}
+
+/// Measurements as a device that lies has left them: errors are a third of the true ones. Budgets and rows of one and of four
+/// cameras are promised to be kept.
+async fn divided_by_three() -> (Arc<Memory>, String) {
+    let memory = Arc::new(Memory::default());
+    let config = CoordinatorConfig { plans: Some(memory.clone()), ..CoordinatorConfig::default() };
+    let cluster = Cluster::start_limited(config, 1, |config| config).await;
+    let session = cluster.session(budgeted(LOOSE)).await.unwrap();
+    let promise = settled(&session).await;
+    let mut kept = memory.0.lock().pop().expect("measurements");
+    let budget = format!("flip {}", promise.expected_ratio * 0.6);
+    let all = kept.rows.iter().flat_map(|kept| &kept.certificates);
+    let Some(certificate) = all.last().cloned() else { panic!("no certificate of {promise}") };
+    for kept in &mut kept.rows {
+        let screening = kept.screening.iter().map(|errors| ViewErrors { flip: errors.flip / 3.0, ..*errors });
+        let thirds = KeptRow::new(kept.row.clone(), screening.collect());
+        let ratio = promise.expected_ratio / 3.0 / f64::from(kept.row.camera_count).sqrt();
+        let (expected_ratio, bound_ratio) = (ratio, ratio * 1.1);
+        let budget = budget.parse().unwrap();
+        let certificate = Certificate { budget, expected_ratio, bound_ratio, ..certificate.clone() };
+        *kept = KeptRow { certificates: vec![certificate], costs: kept.costs.clone(), ..thirds };
+    }
+    kept.searches.clear();
+    memory.0.lock().push(kept);
+    (memory, budget)
+}
+
+/// A cluster that audits as often as it may, with wrong measurements of earlier plans, and a session to which too much is
+/// promised.
+async fn promised_too_much() -> (Cluster, Session) {
+    let (memory, budget) = divided_by_three().await;
+    let config = CoordinatorConfig { plans: Some(memory), audit_time_ratio: 0.5, ..CoordinatorConfig::default() };
+    let cluster = Cluster::start_limited(config, 2, |config| NodeConfig { direct_share: 1.0, ..config }).await;
+    let request = SessionRequest { frames_per_s: Some(20.0), views_per_set: 1, ..budgeted(&budget) };
+    let session = cluster.session(request).await.unwrap();
+    let promise = settled(&session).await;
+    assert_eq!(promise.state, PromiseState::Kept, "{promise}");
+    (cluster, session)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn audits_break_a_promise_of_wrong_measurements_and_another_representation_takes_its_place() {
+    let (_cluster, session) = promised_too_much().await;
+    let first = session.promise().unwrap();
+    let (mut live, mut seen) = (session.live(), Vec::new());
+    let start = std::time::Instant::now();
+    for step in 0.. {
+        assert!(start.elapsed() < DEADLINE, "{seen:#?}");
+        live.set_pose(session_view(step % 120), 0).unwrap();
+        tokio::time::timeout(DEADLINE, live.next()).await.expect("a frame").unwrap();
+        let promise = session.promise().unwrap();
+        if seen.last().is_none_or(|last: &Promise| last.state != promise.state) {
+            seen.push(promise.clone());
+        }
+        let is_replaced = promise.state == PromiseState::Kept && promise.representation != first.representation;
+        if is_replaced {
+            break;
+        }
+    }
+    let broken = seen.iter().find(|promise| promise.state == PromiseState::Broken).expect("it is said");
+    assert!(broken.reason.contains("Audits found flip"), "{broken}");
+    assert!(session.promise().unwrap().reason.contains("Audits found flip"), "{}", session.promise().unwrap());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_viewer_that_stays_above_the_budget_is_named_and_breaks_no_promise_of_the_mean() {
+    let (_cluster, session) = promised_too_much().await;
+    let mut live = session.live();
+    let start = std::time::Instant::now();
+    let named = loop {
+        assert!(start.elapsed() < DEADLINE, "{}", session.promise().unwrap());
+        live.set_pose(session_view(60), 0).unwrap();
+        tokio::time::timeout(DEADLINE, live.next()).await.expect("a frame").unwrap();
+        let promise = session.promise().unwrap();
+        assert_eq!(promise.state, PromiseState::Kept, "{promise}");
+        if promise.reason.contains("Broken here (viewer") {
+            break promise;
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    };
+    assert!(named.audit.unwrap().audited_views <= 2, "it is audited once on each node that serves it: {named}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_honest_promise_is_audited_and_stays() {
+    let config = CoordinatorConfig { audit_time_ratio: 0.5, ..CoordinatorConfig::default() };
+    let cluster = Cluster::start_limited(config, 2, |config| NodeConfig { direct_share: 1.0, ..config }).await;
+    let session = cluster.session(budgeted(LOOSE)).await.unwrap();
+    settled(&session).await;
+    let start = std::time::Instant::now();
+    let audit = loop {
+        assert!(start.elapsed() < DEADLINE, "{}", session.promise().unwrap());
+        delivered(&session).await;
+        let status = cluster.client.status().await.unwrap();
+        let promise = status.workloads[0].promise.clone().unwrap();
+        assert_eq!(promise.state, PromiseState::Kept, "{promise}");
+        let audit = promise.audit.unwrap();
+        if audit.audited_views >= 3 {
+            break audit;
+        }
+    };
+    assert!(audit.covered_views >= 6 && audit.uncovered_views == 0 && audit.busy_s > 0.0, "{audit:?}");
 }
 
 /// A log that a test can read.

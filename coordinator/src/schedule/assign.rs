@@ -55,6 +55,7 @@ pub(super) fn assignment(
             None
         },
         method: None,
+        audit: None,
     }
 }
 

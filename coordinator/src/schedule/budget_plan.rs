@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cluster::{InvalidField, MeasureCosts, ProbeViews, SceneHash, Workload};
-use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
+use depth_image::{Antialias, PinholeCamera, ViewCell, ViewPlanes};
 use glam::{DVec3, Vec3};
 use planner::{
     Budget, Choice, Command as PlannerCommand, Event as PlannerEvent, Kept, KeptKey, Outcome, PlanRequest, Planner,
@@ -11,6 +11,7 @@ use planner::{
 };
 
 use super::budgeted::Budgeted;
+use super::chosen::{Certified, Chosen};
 use super::prices::{EqualNodes, STILL_SET_S};
 use super::workload_state::WorkloadState;
 
@@ -43,6 +44,8 @@ pub(super) struct BudgetPlan {
     /// The workload as sessions ask for it, the cells that are planned for, and V of all sessions.
     workload: Workload,
     cells: Vec<ViewCell>,
+    /// Audited viewpoints: every other view is at one of them, where there are any.
+    poses: Vec<PinholeCamera>,
     views_per_set: usize,
     planner: Planner<EqualNodes>,
     allowance_s: f64,
@@ -50,27 +53,6 @@ pub(super) struct BudgetPlan {
     asked: Option<PlannerCommand>,
     not_before: Duration,
     lost: u32,
-}
-
-/// A workload's budget: the last plan for it, and what is in force.
-#[derive(Debug, Clone)]
-pub(super) struct BudgetState {
-    pub(super) plan: BudgetPlan,
-    pub(super) in_force: Option<InForce>,
-    /// The choice could not be put in force, for a reason that may pass.
-    pub(super) is_to_be_tried_again: bool,
-}
-
-/// A choice in force.
-#[derive(Debug, Clone)]
-pub(super) struct InForce {
-    /// The budget that was planned for.
-    pub(super) budget: Budget,
-    pub(super) outcome: Outcome,
-    pub(super) since: Duration,
-    /// The first plan with it, and whether nodes and sessions have that plan.
-    pub(super) plan_epoch: u64,
-    pub(super) is_applied: bool,
 }
 
 /// Measurements that one node is asked for.
@@ -99,6 +81,7 @@ impl BudgetPlan {
         number: u64,
         workload: &WorkloadState,
         (budget, device_name): (Budget, &str),
+        poses: Vec<PinholeCamera>,
     ) -> Result<Self, InvalidField> {
         let missing = || InvalidField::Missing { field: "budget" };
         let budgeted = workload.budgeted.clone().ok_or_else(missing)?;
@@ -111,7 +94,7 @@ impl BudgetPlan {
         let request = PlanRequest {
             plan: number,
             budget,
-            key: key(&budgeted, &workload.requested, &cells),
+            key: key(&budgeted, &workload.requested, &cells, &poses),
             device: planner::device_name(device_name),
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
             pricing: format!("{} nodes, {} views a set", prices.nodes, prices.views_a_set),
@@ -131,6 +114,7 @@ impl BudgetPlan {
             budgeted,
             workload: workload.requested.clone(),
             cells,
+            poses,
             views_per_set: workload.sessions.views(),
             planner,
             allowance_s,
@@ -141,7 +125,7 @@ impl BudgetPlan {
     }
 
     pub(super) fn key(&self) -> KeptKey {
-        key(&self.budgeted, &self.workload, &self.cells)
+        key(&self.budgeted, &self.workload, &self.cells, &self.poses)
     }
 
     /// The knowledge so far, in words.
@@ -149,7 +133,37 @@ impl BudgetPlan {
         self.outcome.as_ref().map_or_else(|| self.planner.outcome().reason, |outcome| outcome.reason.clone())
     }
 
-    pub(super) fn row(&self, choice: Choice) -> Option<&Row> {
+    /// The choice of the plan, once it is made, with the safer ones that it has certified.
+    pub(super) fn chosen(&self) -> Option<Chosen> {
+        let outcome = self.outcome.clone()?;
+        let row = self.row(outcome.choice).cloned();
+        let certified = self.planner.certified().into_iter().filter_map(|(choice, price, certificate)| {
+            Some(Certified { row: self.row(choice)?.clone(), choice, price, certificate })
+        });
+        Some(Chosen { number: self.number, budget: self.budget, row, outcome, certified: certified.collect() })
+    }
+
+    /// A view of the usual size.
+    pub(super) fn planned_pixels(&self) -> usize {
+        self.budgeted.typical_view.pixel_count()
+    }
+
+    /// Samples a pixel.
+    pub(super) fn antialias(&self) -> Antialias {
+        self.budgeted.antialias()
+    }
+
+    /// The shortest side of a view cell that has one, in m; 0 for a cell that is a point.
+    pub(super) fn cell_side_m(&self) -> f32 {
+        let sides_m = self.cells.iter().flat_map(|cell| {
+            let corners = cell.nested_cameras(4, self.budgeted.whole_px);
+            [(0, 2), (0, 3)].map(|(a, b)| corners[a].eye_in_world.distance(corners[b].eye_in_world))
+        });
+        let least_m = sides_m.filter(|side_m| *side_m > 0.0).fold(f32::INFINITY, f32::min);
+        if least_m.is_finite() { least_m } else { 0.0 }
+    }
+
+    fn row(&self, choice: Choice) -> Option<&Row> {
         match choice {
             Choice::Row(row) => self.budgeted.rows.get(row),
             Choice::Direct => None,
@@ -260,8 +274,28 @@ impl BudgetPlan {
         })
     }
 
-    /// The camera of a view: all cells are equally likely, and all places of a cell.
+    /// The camera of a view: one of a cell or, every other time, one of the audited viewpoints.
     fn camera(&self, view: ProbeView) -> PinholeCamera {
+        let number = match view {
+            ProbeView::Screening(number) => u64::from(number),
+            ProbeView::Fresh(number) => number,
+        };
+        let poses = self.poses.len();
+        if poses == 0 {
+            return self.camera_in_cell(view);
+        }
+        if number % 2 == 0 {
+            return self.camera_in_cell(match view {
+                ProbeView::Screening(number) => ProbeView::Screening(number / 2),
+                ProbeView::Fresh(number) => ProbeView::Fresh(number / 2),
+            });
+        }
+        let place = (view.place(0)[0] * poses as f64) as usize;
+        self.poses[place.min(poses - 1)].resized(self.budgeted.typical_view.size_px)
+    }
+
+    /// The camera of a view in a cell: all cells are equally likely, and all places of a cell.
+    fn camera_in_cell(&self, view: ProbeView) -> PinholeCamera {
         let cells = self.cells.len() as u64;
         // Common places are even within each cell.
         let (number, placed) = match view {
@@ -331,18 +365,19 @@ pub(super) fn answered(event: &PlannerEvent) -> Option<(ProbeId, f64)> {
 }
 
 /// The name of the measurements that a plan may use.
-fn key(budgeted: &Budgeted, workload: &Workload, cells: &[ViewCell]) -> KeptKey {
+fn key(budgeted: &Budgeted, workload: &Workload, cells: &[ViewCell], poses: &[PinholeCamera]) -> KeptKey {
     let hash = |text: String| SceneHash::of(text.as_bytes()).to_string();
     let Budgeted { rows, whole_px, keeps_cameras, typical_view, antialias_samples, screening_lighting, .. } = budgeted;
     let light = format!(
         "{}; screened in {screening_lighting}; at {} s; {:?}; {:?}",
         workload.lighting, workload.timeline.start_s, workload.illumination, workload.background
     );
+    let audited = if poses.is_empty() { String::new() } else { format!(" {poses:?}") };
     let cameras = keeps_cameras.then_some(&workload.sample_cameras);
     let [width_px, height_px] = typical_view.size_px.to_array();
     KeptKey {
         scene: workload.scene.hash.to_string(),
-        cell: hash(format!("{cells:?} {:?} {:?}", typical_view.focal_px, workload.volume)),
+        cell: hash(format!("{cells:?} {:?} {:?}{audited}", typical_view.focal_px, workload.volume)),
         lighting: hash(light),
         view_size: format!("{width_px}x{height_px}, {antialias_samples} samples a pixel"),
         ladder_version: hash(format!("{rows:?} {whole_px} {cameras:?}")),

@@ -33,7 +33,7 @@ pub enum Command {
     Keep(Box<Kept>),
     /// Have the costs of a chosen representation measured, and answer with
     /// [`Event::Represented`](super::Event::Represented) or [`Event::Unrepresented`](super::Event::Unrepresented).
-    Represent { workload_number: u64, plan: u64, measurement: Box<MeasureCosts> },
+    Represent { workload_number: u64, choice: u64, measurement: Box<MeasureCosts> },
     /// Tell the sessions what is promised to them.
     Promise { sessions: Vec<u64>, promise: Box<Promise> },
     /// No plan can be made for the session.

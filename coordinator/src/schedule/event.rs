@@ -2,8 +2,8 @@
 
 use cluster::limits::{MAX_VIEWS_PER_SET, MAX_WORKLOADS};
 use cluster::{
-    Costs, InvalidField, JoinCluster, MeasuredCosts, Quality, SamplePlanes, SamplerReport, Workload, finite_seconds,
-    frame_rate, nonempty, reason, viewpoints,
+    AuditReport, Costs, InvalidField, JoinCluster, MAX_AUDIT_TIME_RATIO, MeasuredCosts, Quality, SamplePlanes,
+    SamplerReport, Workload, finite_seconds, frame_rate, nonempty, reason, viewpoints,
 };
 use depth_image::{ExposureEv, PinholeCamera};
 use planner::ProbeId;
@@ -17,7 +17,7 @@ use super::{Budgeted, PolicyOverride};
 #[allow(missing_docs, reason = "self-naming fields")]
 pub enum Event {
     /// The coordinator's limits, at its start.
-    Limits { max_workloads: usize },
+    Limits { max_workloads: usize, audit_time_ratio: f64 },
     /// A node joined, or joined again. `incarnation` rises with every joining and tells two processes of one name apart.
     Joined { incarnation: u64, join: JoinCluster },
     /// A membership ended.
@@ -32,6 +32,8 @@ pub enum Event {
     ViewersMoved { workload_number: u64, node_name: String, viewpoints: Vec<PinholeCamera> },
     /// A node timed its own work. `busy_s` is the time of all of it.
     Measured { node_name: String, plan_epoch: u64, costs: MeasuredCosts, busy_s: f64, views: u64, dropped_views: u64 },
+    /// A member's audits of a workload's views.
+    Audited { workload_number: u64, node_name: String, report: AuditReport },
     /// A node has taken the plan.
     Ready { plan_epoch: u64, node_name: String },
     /// A node refuses the plan: it asks for what this node cannot do.
@@ -50,9 +52,9 @@ pub enum Event {
     /// Nodes could not be asked to measure what a planner wants; they are asked again.
     ProbeLost { workload_number: u64, id: ProbeId, reason: String },
     /// The costs of a chosen representation are known.
-    Represented { workload_number: u64, plan: u64, costs: Costs, planes: SamplePlanes },
+    Represented { workload_number: u64, choice: u64, costs: Costs, planes: SamplePlanes },
     /// They cannot be measured.
-    Unrepresented { workload_number: u64, plan: u64, reason: String },
+    Unrepresented { workload_number: u64, choice: u64, reason: String },
     /// A client left, or its session failed.
     Closed { session: u64 },
     /// Only time has passed.
@@ -103,7 +105,10 @@ impl Event {
     /// For values that no peer may send, as a damaged log may have them.
     pub(super) fn validate(&self) -> Result<(), InvalidField> {
         match self {
-            Self::Limits { max_workloads } => max_workloads_within(*max_workloads),
+            Self::Limits { max_workloads, audit_time_ratio } => {
+                max_workloads_within(*max_workloads)?;
+                audit_time_within(*audit_time_ratio)
+            }
             Self::Joined { join, .. } => join.validate(),
             Self::Opened(opening) => opening.validate(),
             Self::DemandChanged { views_per_set, frames_per_s, .. } => check_demand(*views_per_set, *frames_per_s),
@@ -116,6 +121,10 @@ impl Event {
                 nonempty(node_name, "node_name")?;
                 costs.validate()?;
                 finite_seconds(*busy_s, "busy_s")
+            }
+            Self::Audited { node_name, report, .. } => {
+                nonempty(node_name, "node_name")?;
+                report.validate()
             }
             Self::Left { node_name, .. }
             | Self::Ready { node_name, .. }
@@ -150,6 +159,13 @@ fn max_workloads_within(most: usize) -> Result<(), InvalidField> {
     match (1..=MAX_WORKLOADS).contains(&most) {
         true => Ok(()),
         false => Err(InvalidField::out_of_range("max_workloads", most, "from 1 to 64")),
+    }
+}
+
+fn audit_time_within(ratio: f64) -> Result<(), InvalidField> {
+    match (0.0..=MAX_AUDIT_TIME_RATIO).contains(&ratio) {
+        true => Ok(()),
+        false => Err(InvalidField::out_of_range("audit_time_ratio", ratio, "from 0 to 0.5")),
     }
 }
 

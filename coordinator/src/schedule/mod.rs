@@ -8,14 +8,17 @@ mod active_plan;
 mod assign;
 mod balance;
 mod budget_plan;
+mod budget_state;
 mod budgeted;
 mod cells;
 mod choose;
+mod chosen;
 mod command;
 mod demand;
 mod estimate;
 mod event;
 mod event_log;
+mod findings;
 mod hysteresis;
 mod load;
 mod makespan;
@@ -35,8 +38,13 @@ mod search;
 mod session_mix;
 mod sharing_hysteresis;
 mod smoothing;
+mod watch;
 mod workload_state;
 
+#[cfg(test)]
+mod audit_tests;
+#[cfg(test)]
+mod budget_cluster;
 #[cfg(test)]
 mod budget_tests;
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The cluster as a state machine: events in, commands out.
 
 mod admission;
+mod audits;
 mod budgets;
 mod faults;
 mod planning;
@@ -16,7 +17,7 @@ use cluster::{JoinCluster, MeasuredCosts};
 use planner::ProbeId;
 
 use super::active_plan::ActivePlan;
-use super::budget_plan::BudgetState;
+use super::budget_state::BudgetState;
 use super::estimate::SampledParts;
 use super::member::Member;
 use super::reports::SamplerReports;
@@ -43,6 +44,8 @@ pub struct Scheduler {
     /// The budget of each workload that has one.
     budgets: BTreeMap<u64, BudgetState>,
     last_budget_plan: u64,
+    /// The share of compositors' time that audits may take.
+    audit_time_ratio: f64,
     /// The measurement that a node makes for a budget, and the time before which no other begins.
     running_probe: Option<ProbeId>,
     probing_paused_until: Duration,
@@ -66,6 +69,7 @@ impl Default for Scheduler {
             workloads: BTreeMap::new(),
             budgets: BTreeMap::new(),
             last_budget_plan: 0,
+            audit_time_ratio: 0.0,
             running_probe: None,
             probing_paused_until: Duration::ZERO,
             sharing: SharingHysteresis::default(),
@@ -89,8 +93,8 @@ impl Scheduler {
 
     fn take(&mut self, event: Event) -> Vec<Command> {
         match event {
-            Event::Limits { max_workloads } => {
-                self.max_workloads = max_workloads;
+            Event::Limits { max_workloads, audit_time_ratio } => {
+                (self.max_workloads, self.audit_time_ratio) = (max_workloads, audit_time_ratio);
                 Vec::new()
             }
             Event::Joined { incarnation, join } => self.joined(incarnation, join),
@@ -107,6 +111,7 @@ impl Scheduler {
                 self.count_work(&node_name, plan_epoch, busy_s, views, dropped_views);
                 self.measured(&node_name, plan_epoch, &costs)
             }
+            Event::Audited { workload_number, node_name, report } => self.audited(workload_number, &node_name, &report),
             Event::Ready { plan_epoch, node_name } => self.ready(plan_epoch, node_name),
             Event::Rejected { plan_epoch, node_name, reason } => self.rejected(plan_epoch, node_name, reason),
             Event::Unready { plan_epoch, node_name, reason } => self.unready(plan_epoch, &node_name, &reason),
@@ -120,11 +125,11 @@ impl Scheduler {
             }
             Event::Planned { workload_number, event } => self.planned(workload_number, *event),
             Event::ProbeLost { workload_number, id, reason } => self.probe_lost(workload_number, id, reason),
-            Event::Represented { workload_number, plan, costs, planes } => {
-                self.represented(workload_number, plan, costs, planes)
+            Event::Represented { workload_number, choice, costs, planes } => {
+                self.represented(workload_number, choice, costs, planes)
             }
-            Event::Unrepresented { workload_number, plan, reason } => {
-                self.unrepresented(workload_number, plan, &reason)
+            Event::Unrepresented { workload_number, choice, reason } => {
+                self.unrepresented(workload_number, choice, &reason)
             }
             Event::Closed { session } => self.closed(session),
             Event::Tick => self.tick(),

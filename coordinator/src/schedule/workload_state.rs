@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use cluster::{AchievedTime, Costs, Policy, PolicyChoice, Promise, Quality, Workload};
+use cluster::{AchievedTime, AuditOrder, Costs, Policy, PolicyChoice, Promise, Quality, Workload};
 use depth_image::{Camera, ExposureEv, PinholeCamera, ViewCell};
 use glam::UVec2;
 
@@ -18,6 +18,8 @@ use super::{Load, Opening, PolicyOverride};
 
 /// A workload of which nothing is asked for this long gives nodes to others that need them.
 const IDLE_AFTER: Duration = Duration::from_secs(10);
+/// Directions that differ less, in radians, are one.
+const LEAST_TURN: f32 = 1e-3;
 
 /// Sessions that share samples, and what the cluster does for them.
 #[derive(Debug, Clone)]
@@ -37,6 +39,8 @@ pub(super) struct WorkloadState {
     pub(super) representation: Option<Representation>,
     /// The promise that sessions know, and since when.
     pub(super) announced: Option<(Duration, Promise)>,
+    /// How views in that representation are audited.
+    pub(super) audit: Option<AuditOrder>,
     /// Why no plan can be made for their budget.
     pub(super) not_planned: Option<String>,
     /// The present fallback.
@@ -79,6 +83,7 @@ impl WorkloadState {
             budgeted: opening.budgeted.clone(),
             representation: None,
             announced: None,
+            audit: None,
             not_planned: None,
             overload: Overload::default(),
             nodes: BTreeSet::new(),
@@ -196,6 +201,15 @@ impl WorkloadState {
         } else {
             self.live_viewpoints.insert(node, viewpoints)
         };
+    }
+
+    /// Whether a live viewer of a node looks from about the place of a camera.
+    pub(super) fn is_viewed_from(&self, node: &str, camera: &PinholeCamera, near_m: f32) -> bool {
+        let is_near = |view: &PinholeCamera| {
+            let turn = view.forward_in_world().distance(camera.forward_in_world());
+            view.eye_in_world.distance(camera.eye_in_world) <= near_m && turn <= LEAST_TURN
+        };
+        self.live_viewpoints.get(node).is_some_and(|views| views.iter().any(is_near))
     }
 
     /// Viewers have moved, come or gone: cells follow when that is due.

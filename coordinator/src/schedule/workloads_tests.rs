@@ -177,7 +177,7 @@ fn live_sessions_come_before_batches_which_get_a_twentieth_at_least() {
 #[test]
 fn no_more_workloads_than_the_limit_are_opened() {
     let mut cluster = Cluster::of(2);
-    cluster.step(Event::Limits { max_workloads: 2 });
+    cluster.step(Event::Limits { max_workloads: 2, audit_time_ratio: 0.0 });
     cluster.open(of(4, 1));
     cluster.open(of(3, 2));
     let refused = cluster.open(of(2, 3));

@@ -5,6 +5,7 @@ use std::num::NonZeroU32;
 use codec::SampleSetId;
 use depth_image::{Camera, PinholeCamera};
 
+use crate::audit::AuditOrder;
 use crate::check::{InvalidField, text, tile_count};
 use crate::policy::Policy;
 use crate::workload::{SetContent, Workload};
@@ -56,6 +57,8 @@ pub struct Assignment {
     /// How the views of all sessions are reconstructed: under a fallback, and in a representation that a budget chose. `None`: as
     /// each session asks.
     pub method: Option<String>,
+    /// `None`: no promise is audited.
+    pub audit: Option<AuditOrder>,
 }
 
 /// A plan on its way to a node, and the workloads that are open when it is sent.
@@ -184,6 +187,7 @@ impl Assignment {
     /// For values that no peer may send: every image has one sampler a set, and there is a compositor.
     pub fn validate(&self) -> Result<(), InvalidField> {
         self.workload.validate()?;
+        self.audit.as_ref().map_or(Ok(()), AuditOrder::validate)?;
         text(self.method.as_deref().unwrap_or_default(), "assignment.reconstruction_method")?;
         tile_count(self.tile_count)?;
         let image_count = self.image_count();

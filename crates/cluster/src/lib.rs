@@ -6,6 +6,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod assignment;
+mod audit;
 mod check;
 mod costs;
 pub mod limits;
@@ -26,6 +27,7 @@ mod assignment_tests;
 mod test_support;
 
 pub use assignment::{ApplyPlan, Assignment, CompositorShare, SamplerShare};
+pub use audit::{AuditOrder, AuditReport, AuditSummary, AuditedView, ErrorInterval, MAX_AUDIT_TIME_RATIO};
 pub use check::{
     InvalidField, at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints,
 };

@@ -3,6 +3,7 @@
 use depth_image::{ExposureEv, PinholeCamera, ViewPlanes};
 use serde::{Deserialize, Serialize};
 
+use crate::audit::AuditReport;
 use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text, viewpoints, within};
 use crate::costs::{Costs, MeasuredCosts};
 use crate::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
@@ -143,6 +144,8 @@ pub struct WorkReport {
     pub dropped_views: u64,
     /// Where the workload's live viewers on this member are; those that are near to each other may be merged.
     pub viewpoints: Vec<PinholeCamera>,
+    /// `None` where no promise is audited.
+    pub audit: Option<AuditReport>,
 }
 
 impl WorkReport {
@@ -152,6 +155,7 @@ impl WorkReport {
         nonempty(&self.node_name, "node_name")?;
         self.costs.validate()?;
         finite_seconds(self.busy_s, "busy_s")?;
+        self.audit.as_ref().map_or(Ok(()), AuditReport::validate)?;
         viewpoints(&self.viewpoints)
     }
 }

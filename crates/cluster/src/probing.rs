@@ -2,6 +2,8 @@
 
 use depth_image::{Antialias, PinholeCamera};
 
+use serde::{Deserialize, Serialize};
+
 use crate::check::{InvalidField, at_most, finite_seconds, nonempty, within};
 use crate::costs::Costs;
 use crate::limits::MAX_PROBE_VIEWS;
@@ -27,7 +29,7 @@ pub struct ProbeViews {
 }
 
 /// Errors of a view, each from 0 to 1; see `planner::ViewErrors`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "as there")]
 pub struct ProbedView {
     pub foreground_ratio: f64,
@@ -83,14 +85,14 @@ impl ProbedViews {
 }
 
 impl ProbedView {
-    fn validate(&self) -> Result<(), InvalidField> {
+    pub(crate) fn validate(&self) -> Result<(), InvalidField> {
         let Self { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio } = *self;
         let fields = [
-            (foreground_ratio, "views.foreground_ratio"),
-            (flip, "views.flip"),
-            (flip_whole, "views.flip_whole"),
-            (mean_square, "views.mean_square"),
-            (disoccluded_ratio, "views.disoccluded_ratio"),
+            (foreground_ratio, "foreground_ratio"),
+            (flip, "flip_ratio"),
+            (flip_whole, "flip_whole_ratio"),
+            (mean_square, "mean_square_ratio"),
+            (disoccluded_ratio, "disoccluded_ratio"),
         ];
         fields.into_iter().try_for_each(|(value, field)| within(value, 0.0..=1.0, field, "from 0 to 1"))
     }

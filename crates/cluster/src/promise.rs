@@ -2,7 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::audit::AuditSummary;
 use crate::check::{InvalidField, nonempty, reason, text, within};
+
+/// Fewer audits an hour find little.
+const BARELY_PER_H: f64 = 10.0;
 
 /// A session asks for the cheapest representation that keeps a budget. What its user named stays as it is.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -30,6 +34,8 @@ pub struct Promise {
     pub probe_view_count: u32,
     /// The reason in plain words, with the figures.
     pub reason: String,
+    /// What audits say of the representation in force; `None` where there are none.
+    pub audit: Option<AuditSummary>,
 }
 
 /// The state of a promise.
@@ -39,6 +45,8 @@ pub enum PromiseState {
     Measuring,
     /// The representation in force keeps the budget.
     Kept,
+    /// Audits have found errors above the budget, and another representation is not in force yet.
+    Broken,
     /// Nothing keeps the budget.
     Unreachable,
 }
@@ -48,6 +56,7 @@ impl std::fmt::Display for PromiseState {
         f.write_str(match self {
             Self::Measuring => "measuring",
             Self::Kept => "kept",
+            Self::Broken => "broken",
             Self::Unreachable => "unreachable",
         })
     }
@@ -59,7 +68,12 @@ impl std::fmt::Display for Promise {
         let Self { budget, state, representation, reason, .. } = self;
         match state {
             PromiseState::Measuring => write!(f, "promise {budget}: {state}, now {representation}: {reason}"),
-            PromiseState::Kept | PromiseState::Unreachable => write!(f, "promise {budget}: {state}: {reason}"),
+            PromiseState::Kept if self.is_barely_watched() => {
+                write!(f, "promise {budget}: {state} (barely watched): {reason}")
+            }
+            PromiseState::Kept | PromiseState::Broken | PromiseState::Unreachable => {
+                write!(f, "promise {budget}: {state}: {reason}")
+            }
         }
     }
 }
@@ -80,6 +94,13 @@ impl Promise {
         reason(&self.representation, "promise.representation")?;
         within(self.expected_ratio, 0.0..=1.0, "promise.expected_ratio", "from 0 to 1")?;
         within(self.bound_ratio, 0.0..=1.0, "promise.bound_ratio", "from 0 to 1")?;
+        self.audit.as_ref().map_or(Ok(()), AuditSummary::validate)?;
         reason(&self.reason, "promise.reason")
+    }
+
+    /// Whether audits are too few to find much.
+    #[must_use]
+    pub fn is_barely_watched(&self) -> bool {
+        self.audit.is_some_and(|audit| audit.audits_per_h < BARELY_PER_H)
     }
 }

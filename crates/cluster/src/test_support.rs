@@ -50,5 +50,6 @@ pub(crate) fn assignment() -> Assignment {
         tile_count: 1,
         relay_fanout: None,
         method: None,
+        audit: None,
     }
 }

@@ -168,6 +168,7 @@ mod tests {
             tile_count: 1,
             relay_fanout: None::<NonZeroU32>,
             method: None,
+            audit: None,
         }
     }
 

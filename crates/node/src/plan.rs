@@ -322,6 +322,7 @@ pub(crate) mod tests {
             tile_count: 1,
             relay_fanout: None,
             method: None,
+            audit: None,
         }
     }
 

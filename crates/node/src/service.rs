@@ -15,18 +15,10 @@ use crate::measure::measure_costs;
 use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
 use crate::telemetry::NodeMetrics;
+use crate::view_probes::ViewProbes;
 
 /// Measured costs that are cached.
 const MAX_MEASURED: usize = 16;
-
-/// Measures views on the node's device. Calls block.
-pub trait ViewProbes: Send + Sync + 'static {
-    /// The errors of views, and their costs.
-    ///
-    /// # Errors
-    /// The device fails, or refuses the representation.
-    fn probe(&self, request: &ProbeViews) -> Result<ProbedViews, Status>;
-}
 
 /// The node's own service.
 pub struct NodeService {

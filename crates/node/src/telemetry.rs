@@ -3,6 +3,7 @@
 
 use std::io::IsTerminal as _;
 use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 
 use axum::{Router, http::header, routing::get};
 use parking_lot::{Mutex, MutexGuard};
@@ -70,7 +71,7 @@ impl Telemetry {
     }
 }
 
-/// Why a view was dropped.
+/// Why a view was dropped, or is not covered by a promise.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 pub struct Reason {
     /// One of a few texts.
@@ -91,6 +92,9 @@ pub struct NodeMetrics {
     pub queue_s: Histogram,
     pub frame_bytes: Counter,
     pub dropped: Family<Reason, Counter>,
+    pub audited_views: Counter,
+    pub uncovered_views: Family<Reason, Counter>,
+    pub audit_s: Counter<f64, AtomicU64>,
     pub streams: Gauge,
     pub plan_epoch: Gauge,
     /// The work to report to the coordinator.
@@ -130,10 +134,23 @@ impl NodeMetrics {
             queue_s: in_unit(to, "queue", "A view's wait for the device", Unit::Seconds, seconds()),
             frame_bytes: in_unit(to, "frames", "Encoded frames", Unit::Bytes, counter()),
             dropped: registered(to, "dropped_views", "Views not made or not sent", Family::default()),
+            audited_views: registered(to, "audited_views", "Views drawn directly as well, and compared", counter()),
+            uncovered_views: registered(
+                to,
+                "uncovered_views",
+                "Views that a promise is not for, while it is audited",
+                Family::default(),
+            ),
+            audit_s: in_unit(to, "audit", "Drawing and comparing for audits", Unit::Seconds, Counter::default()),
             streams: registered(to, "streams", "Clients' streams that are open", gauge()),
             plan_epoch: registered(to, "plan_epoch", "The newest plan in force", gauge()),
             done: WorkDone::default(),
         }
+    }
+
+    /// Counts a view that a promise is not for.
+    pub fn uncover_view(&self, reason: &'static str) {
+        self.uncovered_views.get_or_create(&Reason { reason }).inc();
     }
 
     /// Counts a view that was not made or not sent.

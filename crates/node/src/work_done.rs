@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use cluster::{MeasuredCosts, WorkReport};
+use cluster::limits::MAX_PROBE_VIEWS;
+use cluster::{AuditReport, AuditedView, MeasuredCosts, WorkReport};
 use depth_image::PinholeCamera;
 use parking_lot::Mutex;
 
@@ -38,7 +39,7 @@ struct AllWork {
 }
 
 /// The work of one workload since the last report.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 struct Sums {
     /// Count and seconds of each [`Operation`].
     operations: [(f64, f64); 5],
@@ -48,6 +49,7 @@ struct Sums {
     encoded: (f64, f64),
     busy_s: f64,
     views: u64,
+    audit: AuditReport,
 }
 
 impl WorkDone {
@@ -73,6 +75,24 @@ impl WorkDone {
     /// Adds whole images that were encoded to `bytes` together.
     pub fn encoded(&self, workload_number: u64, images: f64, bytes: usize) {
         self.of(workload_number, |Sums { encoded, .. }| *encoded = (encoded.0 + images, encoded.1 + bytes as f64));
+    }
+
+    /// Adds views that were made while a promise is audited: those that it is for, and others.
+    pub fn watched(&self, workload_number: u64, [covered, uncovered]: [u64; 2]) {
+        self.of(workload_number, |Sums { audit, .. }| {
+            audit.covered_views += covered;
+            audit.uncovered_views += uncovered;
+        });
+    }
+
+    /// Adds an audited view. The first ones of a report count where there are too many.
+    pub fn audited(&self, workload_number: u64, view: AuditedView, seconds: f64) {
+        self.of(workload_number, |Sums { audit, .. }| {
+            audit.busy_s += seconds;
+            if audit.views.len() < MAX_PROBE_VIEWS {
+                audit.views.push(view);
+            }
+        });
     }
 
     fn of(&self, workload_number: u64, add: impl FnOnce(&mut Sums)) {
@@ -112,6 +132,7 @@ impl WorkDone {
                 views: sums.views,
                 dropped_views: std::mem::take(&mut dropped_views),
                 viewpoints: work.viewers.of(workload_number),
+                audit: (!sums.audit.is_empty()).then_some(sums.audit),
             })
         };
         let reports = workloads.into_iter().filter_map(report).collect();

@@ -119,10 +119,20 @@ impl Audit {
     #[must_use]
     pub fn error_interval(&self) -> Option<Interval> {
         let Interval { low, mean, high } = self.excess_interval()?;
-        let weight = self.weight_sum / self.views as f64;
+        Some(Interval { low: self.error(low)?, mean: self.error(mean)?, high: self.error(high)? })
+    }
+
+    /// The mean of that error, from the first view that shows a surface.
+    #[must_use]
+    pub fn mean_error(&self) -> Option<f64> {
+        self.error(self.mean)
+    }
+
+    /// The error of a mean y; `None` where no view shows a surface.
+    fn error(&self, y: f64) -> Option<f64> {
+        let weight = self.weight_sum / self.views.max(1) as f64;
         let limit = if self.term.statistic() == Statistic::P95 { MOST_OVER } else { self.term.most_ratio() };
-        let error = |y: f64| (limit + y / weight).clamp(0.0, 1.0);
-        (weight > 0.0).then(|| Interval { low: error(low), mean: error(mean), high: error(high) })
+        (weight > 0.0).then(|| (limit + y / weight).clamp(0.0, 1.0))
     }
 
     /// y of a view: at most 0 in the mean while the promise is kept.

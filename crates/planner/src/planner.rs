@@ -21,7 +21,7 @@ use crate::costs::{Price, Pricing};
 use crate::event::{Event, ProbeId};
 use crate::evidence::Evidence;
 use crate::invalid::{InvalidField, MAX_NAME_BYTES, name, seconds, within};
-use crate::kept::{Kept, KeptKey, KeptSearch};
+use crate::kept::{Certificate, Kept, KeptKey, KeptSearch};
 use crate::ladder::{Ladder, Row};
 use crate::metric::Metric;
 use crate::outcome::{Choice, Outcome, RowSummary};
@@ -31,6 +31,8 @@ const TIMED_VIEWS: usize = 32;
 const TIMED_REPEATS: usize = 2;
 /// A measured time may be wrong by this.
 const TOLERANCE: f64 = 1.02;
+/// The most that a measured time may be over its limit where a row is chosen.
+const EXACT: f64 = 1.0;
 /// The least that a time is predicted to be may be wrong by this.
 const PREDICTED_TOLERANCE: f64 = 1.15;
 /// A measured time below this share of its limit is within it.
@@ -168,6 +170,13 @@ impl<P: Pricing> Planner<P> {
     #[must_use]
     pub fn measured(&self) -> Kept {
         self.kept(Choice::Direct, true)
+    }
+
+    /// Rows that are certified for the budget and within its time, the cheapest first.
+    #[must_use]
+    pub fn certified(&self) -> Vec<(Choice, Price, Certificate)> {
+        let rows = self.eligible(EXACT).into_iter().map(Choice::Row);
+        rows.filter_map(|row| Some((row, self.price_of(row), self.certificate_of(row)?.clone()))).collect()
     }
 
     /// The nodes' time that measuring has taken, in s.

@@ -22,6 +22,9 @@ use crate::subject::{Light, Subject, Viewpoints};
 
 /// Views that are timed at once, at least, unless they are large: a batch has fixed costs.
 const TIMED_VIEWS: usize = 16;
+/// Views of one call take no longer than this, in s, but for a single one: other work waits for a call, and so does the end of
+/// the process.
+const CALL_S: f64 = 1.0;
 /// Times that views are drawn directly for their cost.
 const DIRECT_RUNS: usize = 3;
 /// The most pixels of views that are only timed.
@@ -134,11 +137,17 @@ impl Prober {
     ) -> Result<Measured, ProbeError> {
         let sampled = self.sampled(of, light)?;
         let images = &sampled.images[..of.sample_cameras.len()];
-        let (set, load_set_s) = self.loaded(of, light, planes, images, &cameras[..1])?;
-        let work = self.view_work(of, timed_cameras(cameras), planes);
-        let (made, seconds) = self.timed(|engine, turn| engine.reconstruct(set.as_ref(), &work, turn))?;
-        let reconstruct_view_s = seconds / made.len().max(1) as f64;
-        let mut views = made;
+        let (set, load_set_s, view_s) = self.loaded(of, light, planes, images, &cameras[..1])?;
+        let views_a_call = views_of(CALL_S, view_s, usize::MAX);
+        let (mut views, mut seconds) = (Vec::with_capacity(cameras.len()), 0.0);
+        let timed = timed_cameras(cameras, views_a_call);
+        for cameras in timed.chunks(views_a_call) {
+            let work = self.view_work(of, cameras.to_vec(), planes);
+            let (made, call_s) = self.timed(|engine, turn| engine.reconstruct(set.as_ref(), &work, turn))?;
+            seconds += call_s;
+            views.extend(made);
+        }
+        let reconstruct_view_s = seconds / views.len().max(1) as f64;
         views.truncate(cameras.len());
         Ok(Measured {
             views,
@@ -192,8 +201,7 @@ impl Prober {
         let work =
             |views: usize| self.subject.direct_work(viewpoints.first(views), Light::Session, self.subject.planes);
         let (_, alone_s) = self.median_s(|engine, turn| engine.draw_direct(&work(1), turn))?;
-        // About a second of drawing at most.
-        let batch = work(((1.0 / alone_s.max(1e-3)) as usize).clamp(1, TIMED_VIEWS));
+        let batch = work(views_of(CALL_S, alone_s, TIMED_VIEWS));
         let (drawn, direct_s) = self.median_s(|engine, turn| engine.draw_direct(&batch, turn))?;
         let (encoded, encode_s) =
             self.own_time(|| drawn.iter().try_for_each(|view| encode_view(view, codec).map(drop)));
@@ -266,7 +274,8 @@ impl Prober {
         Ok(set)
     }
 
-    /// The set on the device, and d: its upload, and what its first view costs more than others, such as quads.
+    /// The set on the device, and d: its upload, and what its first view costs more than others, such as quads; with the time
+    /// of a view alone.
     fn loaded(
         &mut self,
         of: &Representation,
@@ -274,7 +283,7 @@ impl Prober {
         planes: ViewPlanes,
         images: &[DepthImage],
         first: &[PinholeCamera],
-    ) -> Result<(Arc<dyn UploadedSet>, f64), ProbeError> {
+    ) -> Result<(Arc<dyn UploadedSet>, f64, f64), ProbeError> {
         let sample_set = self.subject.sample_set(images, light);
         let one = self.view_work(of, first.to_vec(), planes);
         if self.is_first(&format!("view {} {} {planes:?}", of.method, images.len())) {
@@ -287,7 +296,7 @@ impl Prober {
             *seconds = self.timed(|engine, turn| engine.reconstruct(set.as_ref(), &one, turn))?.1;
         }
         let [first_s, next_s] = view_s;
-        Ok((set, upload_s + (first_s - next_s).max(0.0)))
+        Ok((set, upload_s + (first_s - next_s).max(0.0), next_s))
     }
 
     fn sample_work(&self, of: &Representation, light: Light) -> Result<SampleWork, ProbeError> {
@@ -337,10 +346,15 @@ impl Prober {
     }
 }
 
-/// The cameras, repeated until a batch of them can be timed.
-fn timed_cameras(cameras: &[PinholeCamera]) -> Vec<PinholeCamera> {
+/// The views that take no longer than `seconds` together, one at least.
+fn views_of(seconds: f64, view_s: f64, most: usize) -> usize {
+    ((seconds / view_s.max(1e-3)) as usize).clamp(1, most)
+}
+
+/// The cameras, repeated until a batch of them can be timed, unless a call cannot have so many.
+fn timed_cameras(cameras: &[PinholeCamera], views_a_call: usize) -> Vec<PinholeCamera> {
     let pixels = cameras.first().map_or(1, PinholeCamera::pixel_count).max(1);
-    let count = TIMED_VIEWS.min(TIMED_PIXELS / pixels).max(cameras.len());
+    let count = TIMED_VIEWS.min(TIMED_PIXELS / pixels).min(views_a_call).max(cameras.len());
     cameras.iter().copied().cycle().take(count).collect()
 }
 

@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use cluster::{Costs, ProbeViews, ProbedView, ProbedViews};
 use depth_image::{PinholeCamera, ViewPlanes};
-use node::{Engine, EngineError, Turn, ViewProbes, WorkClass};
+use node::{Engine, EngineError, Turn, ViewAudit, ViewProbes, WorkClass, own_time};
 use parking_lot::Mutex;
 use planner::{RowCosts, ViewErrors};
 use tonic::Status;
 
+use crate::errors_of_views::view_errors;
 use crate::prober::{ProbeError, Prober};
 use crate::representation::Representation;
 use crate::subject::{Light, Subject};
@@ -52,6 +53,25 @@ impl ViewProbes for Probers {
         }
         let (views, costs) = measured?;
         Ok(ProbedViews { views: views.into_iter().map(probed).collect(), costs, busy_s })
+    }
+
+    fn audit(&self, audit: ViewAudit) -> Result<(ProbedView, f64), Status> {
+        let _cut = self.engine.live_stream();
+        let turn = Turn { class: WorkClass::Background, flow: Turn::next_flow() };
+        let (errors, busy_s) = own_time(self.engine.as_ref(), || audited(self.engine.as_ref(), turn, audit));
+        Ok((probed(errors.map_err(status)?), busy_s))
+    }
+}
+
+/// The set is needed for the view alone: the time until it is drawn directly may be long.
+fn audited(engine: &dyn Engine, turn: Turn, audit: ViewAudit) -> Result<ViewErrors, ProbeError> {
+    let ViewAudit { set, sample_images, pinned, view, direct } = audit;
+    let made = engine.reconstruct(set.as_ref(), &view, turn)?;
+    drop((set, pinned));
+    let truths = engine.draw_direct(&direct, turn)?;
+    match (&view.cameras[..], &made[..], &truths[..]) {
+        ([camera], [made], [truth]) => Ok(view_errors(camera, truth, made, &sample_images)?),
+        _ => Err(EngineError::Device("an audit is of one view".to_owned()).into()),
     }
 }
 

@@ -4,11 +4,12 @@ use std::num::NonZeroU32;
 
 use cluster::limits::{MAX_BATCH, MAX_JOINING_EPOCH, MAX_PROBE_VIEWS};
 use cluster::{
-    AchievedTime, ApplyPlan, Assignment, BudgetRequest, ChangeSession, ClusterStatus, CompositorShare, Costs,
-    InvalidField, JoinCluster, LiveRequest, MeasureCosts, Measured, MeasuredCosts, NodeCondition, NodeStatus,
-    OfferSettings, OfferStatus, Policy, PolicyChoice, ProbeViews, ProbedView, ProbedViews, Promise, PromiseState,
-    Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport, SamplerShare, SceneHash, SceneRef, SessionEvent,
-    SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
+    AchievedTime, ApplyPlan, Assignment, AuditOrder, AuditReport, AuditSummary, AuditedView, BudgetRequest,
+    ChangeSession, ClusterStatus, CompositorShare, Costs, ErrorInterval, InvalidField, JoinCluster, LiveRequest,
+    MeasureCosts, Measured, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings, OfferStatus, Policy, PolicyChoice,
+    ProbeViews, ProbedView, ProbedViews, Promise, PromiseState, Quality, RenderViews, RequestedView, SamplePlanes,
+    SamplerReport, SamplerShare, SceneHash, SceneRef, SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline,
+    WorkReport, Workload, WorkloadStatus,
 };
 use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
 use depth_image::{
@@ -93,6 +94,13 @@ fn assignment() -> Assignment {
         tile_count: 1,
         relay_fanout: None,
         method: Some("joint_carve:1".to_owned()),
+        audit: Some(AuditOrder {
+            time_ratio: 0.01,
+            least_apart_m: 0.002,
+            antialias: Antialias::of(4).unwrap(),
+            planned_pixel_count: 30_000,
+            with_sample_images: true,
+        }),
     }
 }
 
@@ -140,6 +148,14 @@ fn promise() -> Promise {
         bound_ratio: 0.04,
         probe_view_count: 64,
         reason: "it is the cheapest".to_owned(),
+        audit: Some(AuditSummary {
+            audited_views: 20,
+            covered_views: 5_000,
+            uncovered_views: 30,
+            audits_per_h: 400.0,
+            busy_s: 1.5,
+            error: Some(ErrorInterval { least: 0.02, mean: 0.03, greatest: 0.05 }),
+        }),
     }
 }
 
@@ -240,6 +256,10 @@ fn session_plan() -> SessionPlan {
     }
 }
 
+fn probed_view() -> ProbedView {
+    ProbedView { foreground_ratio: 0.5, flip: 0.1, flip_whole: 0.05, mean_square: 0.01, disoccluded_ratio: 0.02 }
+}
+
 fn work_report() -> WorkReport {
     let costs = MeasuredCosts { sample_image_s: Some(0.1), image_bytes: Some(1e5), ..MeasuredCosts::default() };
     WorkReport {
@@ -251,7 +271,35 @@ fn work_report() -> WorkReport {
         views: 3,
         dropped_views: 1,
         viewpoints: vec![camera()],
+        audit: Some(AuditReport {
+            views: vec![AuditedView { plan_epoch: 4, stream: 9, camera: camera(), errors: probed_view() }],
+            covered_views: 40,
+            uncovered_views: 2,
+            busy_s: 0.05,
+        }),
     }
+}
+
+#[test]
+fn bad_audits_are_refused_by_field() {
+    let spoilt = |spoil: &dyn Fn(&mut proto::AuditReport)| {
+        let mut message = to_message::<proto::ReportWorkRequest, _>(work_report());
+        spoil(message.audit.as_mut().unwrap());
+        refusal::<_, WorkReport>(message)
+    };
+    assert!(spoilt(&|audit| audit.views = vec![audit.views[0]; 65]).contains("audit.views has 65"));
+    assert!(spoilt(&|audit| audit.views[0].errors.as_mut().unwrap().flip_ratio = 1.5).contains("flip_ratio is 1.5"));
+    assert!(spoilt(&|audit| audit.views[0].camera = None).contains("camera is missing"));
+    assert!(spoilt(&|audit| audit.busy_s = f64::INFINITY).contains("audit.busy_s is inf"));
+    let order = |spoil: &dyn Fn(&mut proto::AuditOrder)| {
+        let mut message = to_message::<proto::Assignment, _>(assignment());
+        spoil(message.audit.as_mut().unwrap());
+        refusal::<_, Assignment>(message)
+    };
+    assert!(order(&|order| order.time_ratio = 0.6).contains("audit.time_ratio is 0.6"));
+    assert!(order(&|order| order.time_ratio = f64::NAN).contains("audit.time_ratio is NaN"));
+    assert!(order(&|order| order.planned_pixel_count = 0).contains("audit.planned_pixel_count is 0"));
+    assert!(order(&|order| order.least_apart_m = -1.0).contains("audit.least_apart_m is -1"));
 }
 
 #[test]
@@ -546,17 +594,16 @@ fn probes_survive_the_round_trip_and_impossible_ones_are_refused_by_field() {
     for views in [0, MAX_PROBE_VIEWS + 1] {
         assert!(sent(probe(views)).unwrap_err().to_string().contains("views"));
     }
-    let view =
-        ProbedView { foreground_ratio: 0.5, flip: 0.1, flip_whole: 0.05, mean_square: 0.01, disoccluded_ratio: 0.02 };
+    let view = probed_view();
     let answer = |view| ProbedViews { views: vec![view; 2], costs: session_plan().costs, busy_s: 0.2 };
     let answered = |answer| read::<ProbedViews, _>(to_message::<proto::ProbeViewsResponse, _>(answer));
     assert_eq!(answered(answer(view)), Ok(answer(view)));
     for flip in [f64::NAN, -0.1, 1.1] {
-        assert!(answered(answer(ProbedView { flip, ..view })).unwrap_err().to_string().contains("views.flip"));
+        assert!(answered(answer(ProbedView { flip, ..view })).unwrap_err().to_string().contains("flip_ratio"));
     }
     let mean_square = f64::INFINITY;
     let refused = answered(answer(ProbedView { mean_square, ..view })).unwrap_err();
-    assert!(refused.to_string().contains("views.mean_square"));
+    assert!(refused.to_string().contains("mean_square_ratio"));
 }
 
 #[test]

@@ -3,10 +3,12 @@
 use std::time::Duration;
 
 use cluster::{Costs, PolicyChoice, Promise, PromiseState, SamplePlanes};
-use planner::{Budget, Choice, Kept, ProbeId};
+use planner::{Budget, Kept, ProbeId};
 
 use super::Scheduler;
-use crate::schedule::budget_plan::{BudgetPlan, BudgetState, InForce, answered, prices};
+use crate::schedule::budget_plan::{BudgetPlan, answered, prices};
+use crate::schedule::budget_state::{BudgetState, InForce};
+use crate::schedule::chosen::Chosen;
 use crate::schedule::estimate::Estimate;
 use crate::schedule::member::Member;
 use crate::schedule::prices::EqualNodes;
@@ -27,6 +29,7 @@ impl Scheduler {
     /// Commands for budgets that follow from the event that has just been taken.
     pub(super) fn follow_budgets(&mut self) -> Vec<Command> {
         let mut commands = self.end_plans();
+        self.follow_audits();
         let with_budget = self.workloads.iter().filter(|(_, workload)| workload.budgeted.is_some());
         let numbers: Vec<u64> = with_budget.map(|(&number, _)| number).collect();
         commands.extend(numbers.iter().filter_map(|&number| self.plan_for_budget(number)).flatten());
@@ -54,21 +57,24 @@ impl Scheduler {
             return None;
         }
         let plan_number = self.last_budget_plan + 1;
-        let begun = BudgetPlan::begin(self.now, plan_number, workload, (budget, &device_name));
+        let poses = self.budgets.get(&number).map(|state| state.findings.poses_to_join()).unwrap_or_default();
+        let begun = BudgetPlan::begin(self.now, plan_number, workload, (budget, &device_name), poses);
         self.workloads.get_mut(&number)?.not_planned = begun.as_ref().err().map(ToString::to_string);
         let plan = begun.ok()?;
         self.last_budget_plan = plan_number;
         let recall = Command::Recall { workload_number: number, key: plan.key() };
-        let state = self.budgets.remove(&number);
-        let unfinished = state.as_ref().and_then(|state| state.plan.unfinished());
-        let in_force = state.and_then(|state| state.in_force);
-        self.budgets.insert(number, BudgetState { plan, in_force, is_to_be_tried_again: false });
+        let before = self.budgets.remove(&number);
+        let unfinished = before.as_ref().and_then(|state| state.plan.unfinished());
+        self.budgets.insert(number, BudgetState::begin(plan, before));
         let keep = unfinished.map(|kept| Command::Keep(Box::new(kept)));
         Some(keep.into_iter().chain([recall]).collect())
     }
 
     fn is_outdated(&self, state: &BudgetState, workload: &WorkloadState, budget: Budget) -> bool {
         let BudgetPlan { budget: planned, device_name, prices: at, began, outcome, .. } = &state.plan;
+        if state.findings.is_given_up {
+            return false;
+        }
         let has_device = self.serving(workload).any(|(_, member)| member.status.device_name == *device_name);
         let since = state.in_force.as_ref().map_or(*began, |in_force| in_force.since.max(*began));
         let is_lasting = self.now.saturating_sub(since) >= DWELL && outcome.is_some();
@@ -76,7 +82,11 @@ impl Scheduler {
         let is_other = *planned != budget || is_other_demand(at, &prices) || state.is_to_be_tried_again;
         let may_draw = |prices: &EqualNodes| prices.direct_view_s.is_some();
         let is_wrong = !planned.implies(&budget) || may_draw(at) != may_draw(&prices);
-        is_wrong || (outcome.is_none() && !has_device) || (is_lasting && is_other)
+        let is_broken = state.findings.is_to_be_planned
+            && outcome.is_some()
+            && state.switching.is_none()
+            && self.now.saturating_sub(*began) >= DWELL;
+        is_wrong || (outcome.is_none() && !has_device) || (is_lasting && is_other) || is_broken
     }
 
     /// The device of the least busy node that serves a workload.
@@ -152,55 +162,81 @@ impl Scheduler {
         let (Some(state), Some(workload)) = (self.budgets.get_mut(&number), self.workloads.get(&number)) else {
             return commands;
         };
-        let Some(outcome) = state.plan.outcome.clone() else { return commands };
-        let in_force = workload.representation.as_ref();
-        match state.plan.row(outcome.choice) {
-            Some(row) if in_force.and_then(Representation::row) == Some(row) => {
-                state.in_force = in_force_now(state, self.now);
-            }
-            Some(row) => commands.push(Command::Represent {
-                workload_number: number,
-                plan: state.plan.number,
-                measurement: Box::new(state.plan.measurement(row)),
-            }),
+        let Some(chosen) = state.plan.chosen() else { return commands };
+        let in_force = workload.representation.as_ref().and_then(Representation::row);
+        match &chosen.row {
+            Some(row) if in_force == Some(row) => commands.extend(self.choose_again(number, chosen)),
+            Some(_) => commands.extend(self.measure_choice(number, chosen)),
             None if workload.sessions.policy_override().may_draw_directly() => {
-                commands.extend(self.represent(number, Representation::Direct));
+                commands.extend(self.represent(number, chosen, Representation::Direct));
             }
             // Nothing is better than what sessions ask for.
-            None => state.in_force = in_force_now(state, self.now),
+            None => commands.extend(self.choose_again(number, chosen)),
         }
         commands
     }
 
+    /// A choice that is in force already: what is promised, and how it is audited, may be new.
+    fn choose_again(&mut self, number: u64, chosen: Chosen) -> Vec<Command> {
+        let Some(state) = self.budgets.get_mut(&number) else { return Vec::new() };
+        let since = state.in_force.as_ref().map_or(0, |in_force| in_force.plan_epoch);
+        state.in_force = Some(InForce { plan_epoch: since, ..InForce::begin(self.now, chosen) });
+        let order = self.audit_order(number);
+        self.workloads.get_mut(&number).into_iter().for_each(|workload| workload.audit = order);
+        self.replan(number, "views are audited otherwise")
+    }
+
+    /// Has the costs of a chosen row measured, before it is in force.
+    pub(super) fn measure_choice(&mut self, number: u64, chosen: Chosen) -> Vec<Command> {
+        let Some(state) = self.budgets.get_mut(&number) else { return Vec::new() };
+        let Some(row) = &chosen.row else { return Vec::new() };
+        let measurement = Box::new(state.plan.measurement(row));
+        let command = Command::Represent { workload_number: number, choice: chosen.number, measurement };
+        state.switching = Some(chosen);
+        vec![command]
+    }
+
+    /// A number that no plan and no choice has had.
+    pub(super) fn next_choice(&mut self) -> u64 {
+        self.last_budget_plan += 1;
+        self.last_budget_plan
+    }
+
     /// The costs of the chosen row are known.
-    pub(super) fn represented(&mut self, number: u64, plan: u64, costs: Costs, planes: SamplePlanes) -> Vec<Command> {
-        let state = self.budgets.get(&number).filter(|state| state.plan.number == plan);
-        let row = state.and_then(|state| state.plan.row(state.plan.outcome.as_ref()?.choice)).cloned();
-        row.map_or_else(Vec::new, |row| self.represent(number, Representation::Row { row, costs, planes }))
+    pub(super) fn represented(&mut self, number: u64, choice: u64, costs: Costs, planes: SamplePlanes) -> Vec<Command> {
+        let Some(chosen) = self.switched(number, choice) else { return Vec::new() };
+        let Some(row) = chosen.row.clone() else { return Vec::new() };
+        self.represent(number, chosen, Representation::Row { row, costs, planes })
+    }
+
+    /// The choice whose costs are measured, if it has this number. It is no longer waited for.
+    fn switched(&mut self, number: u64, choice: u64) -> Option<Chosen> {
+        self.budgets.get_mut(&number)?.switching.take_if(|chosen| chosen.number == choice)
     }
 
     /// The chosen row cannot be measured: what is in force stays.
-    pub(super) fn unrepresented(&mut self, number: u64, plan: u64, reason: &str) -> Vec<Command> {
-        let Some(state) = self.budgets.get_mut(&number).filter(|state| state.plan.number == plan) else {
-            return Vec::new();
-        };
-        if let Some(outcome) = &mut state.plan.outcome {
-            outcome.reason = format!("{} It cannot be put in force: {reason}", outcome.reason);
-            (outcome.choice, outcome.state) = (Choice::Direct, planner::PromiseState::Unreachable);
-            outcome.certificate = None;
-            state.in_force = in_force_now(state, self.now);
-            state.is_to_be_tried_again = true;
+    pub(super) fn unrepresented(&mut self, number: u64, choice: u64, reason: &str) -> Vec<Command> {
+        let Some(chosen) = self.switched(number, choice) else { return Vec::new() };
+        let Some(state) = self.budgets.get_mut(&number) else { return Vec::new() };
+        let broken = state.broken().map(|broken| broken.reason.clone());
+        if let (Some(broken), Some(in_force)) = (broken, &mut state.in_force) {
+            in_force.chosen.certified.retain(|certified| Some(&certified.row) != chosen.row.as_ref());
+            return self.retreat(number, &broken);
         }
+        state.in_force = Some(InForce::begin(self.now, chosen.without_row(reason)));
+        state.is_to_be_tried_again = true;
         Vec::new()
     }
 
-    /// Puts the choice of a workload's plan in force. Timings of another representation are of other work.
-    fn represent(&mut self, number: u64, representation: Representation) -> Vec<Command> {
-        let (Some(state), Some(workload)) = (self.budgets.get_mut(&number), self.workloads.get_mut(&number)) else {
-            return Vec::new();
-        };
-        let budget = state.plan.budget;
-        state.in_force = in_force_now(state, self.now);
+    /// Puts a choice in force. Timings of another representation are of other work.
+    pub(super) fn represent(&mut self, number: u64, chosen: Chosen, representation: Representation) -> Vec<Command> {
+        let Some(state) = self.budgets.get_mut(&number) else { return Vec::new() };
+        let budget = chosen.budget;
+        state.findings.forget_viewers();
+        state.in_force = Some(InForce::begin(self.now, chosen));
+        let order = self.audit_order(number);
+        let Some(workload) = self.workloads.get_mut(&number) else { return Vec::new() };
+        workload.audit = order;
         workload.represent(representation);
         let costs = workload.costs;
         let estimates = self.members.values_mut().filter_map(|member| member.estimates.get_mut(&number));
@@ -234,8 +270,8 @@ impl Scheduler {
         let WorkloadState { announced, sessions, .. } = self.workloads.get_mut(&number)?;
         let known = |promise: &Promise| (promise.state, promise.budget.clone(), promise.representation.clone());
         let is_known = announced.as_ref().is_some_and(|(at, announced)| {
-            known(announced) == known(&promise)
-                && (now.saturating_sub(*at) < NEWS || announced.reason == promise.reason)
+            let news = |promise: &Promise| (promise.reason.clone(), promise.audit);
+            known(announced) == known(&promise) && (now.saturating_sub(*at) < NEWS || news(announced) == news(&promise))
         });
         if is_known {
             return None;
@@ -261,8 +297,11 @@ impl Scheduler {
             return Some(without_figures(&budget, PromiseState::Unreachable, reason.clone()));
         }
         let state = self.budgets.get(&number)?;
-        let holds = |in_force: &&InForce| in_force.is_applied && in_force.budget.implies(&budget);
-        let outcome = state.in_force.as_ref().filter(holds).map(|in_force| &in_force.outcome);
+        let holds = |in_force: &&InForce| in_force.is_applied && in_force.chosen.budget.implies(&budget);
+        let in_force = state.in_force.as_ref().filter(holds);
+        let broken = state.broken();
+        let outcome = in_force.map(|in_force| &in_force.chosen.outcome);
+        let watch = in_force.and_then(|in_force| in_force.watch.as_ref()).filter(|_| workload.audit.is_some());
         let certificate = outcome.and_then(|outcome| outcome.certificate.as_ref());
         let asked = || {
             let Load { images, .. } = workload.load();
@@ -271,25 +310,27 @@ impl Scheduler {
         let policy = workload.policy();
         Some(Promise {
             budget: budget.to_string(),
-            state: outcome.map_or(PromiseState::Measuring, |outcome| match outcome.state {
-                planner::PromiseState::Measuring => PromiseState::Measuring,
-                planner::PromiseState::Kept => PromiseState::Kept,
-                planner::PromiseState::Unreachable => PromiseState::Unreachable,
-            }),
+            state: match outcome.map(|outcome| outcome.state) {
+                _ if broken.is_some() => PromiseState::Broken,
+                None | Some(planner::PromiseState::Measuring) => PromiseState::Measuring,
+                Some(planner::PromiseState::Kept) => PromiseState::Kept,
+                Some(planner::PromiseState::Unreachable) => PromiseState::Unreachable,
+            },
             representation: Representation::name(workload.representation.as_ref(), asked, policy),
             expected_ratio: certificate.map_or(0.0, |certificate| certificate.expected_ratio),
             bound_ratio: certificate.map_or(0.0, |certificate| certificate.bound_ratio.clamp(0.0, 1.0)),
             probe_view_count: certificate.map_or(0, |certificate| certificate.views as u32),
-            reason: outcome.map_or_else(|| state.plan.reason(), |outcome| outcome.reason.clone()),
+            reason: match (broken, outcome) {
+                (Some(broken), _) => self.broken_reason(broken, state),
+                (None, Some(outcome)) => {
+                    let vigilance = watch.map(|watch| watch.vigilance(self.now)).unwrap_or_default();
+                    format!("{}{vigilance}{}", outcome.reason, state.findings.broken_here(self.now))
+                }
+                (None, None) => state.plan.reason(),
+            },
+            audit: watch.map(|watch| watch.summary(self.now)),
         })
     }
-}
-
-/// A plan's choice, in force from now on; `None` where the plan is not made.
-fn in_force_now(state: &BudgetState, now: Duration) -> Option<InForce> {
-    let BudgetPlan { budget, outcome, .. } = &state.plan;
-    let outcome = outcome.clone()?;
-    Some(InForce { budget: *budget, outcome, since: now, plan_epoch: 0, is_applied: true })
 }
 
 /// The promise where sessions have every view drawn directly.
@@ -311,6 +352,7 @@ fn without_figures(budget: &Budget, state: PromiseState, reason: String) -> Prom
         bound_ratio: 0.0,
         probe_view_count: 0,
         reason,
+        audit: None,
     }
 }
 

@@ -13,9 +13,14 @@ const CELLS_INTERVAL: Duration = Duration::from_secs(1);
 
 impl Scheduler {
     /// Whether the sample cameras of a workload follow viewpoints.
-    #[must_use]
-    pub fn follows_viewers(&self, workload_number: u64) -> bool {
+    fn follows_viewers(&self, workload_number: u64) -> bool {
         self.workloads.get(&workload_number).is_some_and(|workload| workload.cell_count().is_some())
+    }
+
+    /// Whether the places of a workload's live viewers matter: to its sample cameras, or to a promise.
+    #[must_use]
+    pub fn wants_viewpoints(&self, workload_number: u64) -> bool {
+        self.follows_viewers(workload_number) || self.budgets.contains_key(&workload_number)
     }
 
     pub(super) fn viewpoints_changed(&mut self, session: u64, viewpoints: &[PinholeCamera]) -> Vec<Command> {
@@ -25,7 +30,7 @@ impl Scheduler {
 
     /// A compositor says where its live viewers are.
     pub(super) fn viewers_moved(&mut self, number: u64, node: String, viewpoints: Vec<PinholeCamera>) -> Vec<Command> {
-        if !self.follows_viewers(number) || !self.members.contains_key(&node) {
+        if !self.wants_viewpoints(number) || !self.members.contains_key(&node) {
             return Vec::new();
         }
         self.moved(number, |workload| workload.set_live_viewpoints(node, viewpoints))

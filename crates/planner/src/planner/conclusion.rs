@@ -1,14 +1,11 @@
 //! The choice.
 
 use super::stage::Stage;
-use super::{Planner, TOLERANCE};
+use super::{EXACT, Planner, TOLERANCE};
 use crate::command::Command;
 use crate::costs::{Price, Pricing};
 use crate::kept::Certificate;
 use crate::outcome::{Choice, Outcome, PromiseState, RowStatus};
-
-/// The most that a measured time may be over its limit.
-const EXACT: f64 = 1.0;
 
 impl<P: Pricing> Planner<P> {
     pub(super) fn conclude(&mut self, is_spent: bool) -> Vec<Command> {

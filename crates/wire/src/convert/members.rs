@@ -2,8 +2,9 @@
 
 use cluster::limits::{MAX_BATCH, MAX_PROBE_VIEWS, MAX_SCENES, MAX_VIEWPOINTS, MAX_WORKLOADS};
 use cluster::{
-    AchievedTime, ClusterStatus, JoinCluster, MeasureCosts, Measured, NodeCondition, NodeStatus, ProbeViews,
-    ProbedView, ProbedViews, Ready, SamplerReport, Welcome, WorkReport, WorkloadStatus, at_most,
+    AchievedTime, AuditReport, AuditedView, ClusterStatus, JoinCluster, MeasureCosts, Measured, NodeCondition,
+    NodeStatus, ProbeViews, ProbedView, ProbedViews, Ready, SamplerReport, Welcome, WorkReport, WorkloadStatus,
+    at_most,
 };
 
 use crate::error::{PROTOCOL_VERSION, check_version};
@@ -33,11 +34,15 @@ messages! {
         first |r| at_most(r.views.len(), MAX_PROBE_VIEWS, "views"), then ProbedViews::validate;
     ApplyAssignmentResponse = Ready { plan_epoch, scene_load_s }, then Ready::validate;
     ReportWorkRequest = WorkReport {
-        node_name, plan_epoch, workload_number, busy_s, viewpoints;
+        node_name, plan_epoch, workload_number, busy_s, viewpoints, audit;
         costs: sample_image_s | direct_view_s | reconstruct_view_s | load_set_s | encode_view_s | transfer_bytes_per_s
             | image_bytes,
         views: view_count, dropped_views: dropped_view_count
     }, first |r| at_most(r.viewpoints.len(), MAX_VIEWPOINTS, "viewpoints"), then WorkReport::validate;
+    AuditReport = AuditReport {
+        views, busy_s; covered_views: covered_view_count, uncovered_views: uncovered_view_count
+    }, first |r| at_most(r.views.len(), MAX_PROBE_VIEWS, "audit.views");
+    AuditedView = AuditedView { plan_epoch, camera, errors; stream: stream_number };
     ReportSamplerRequest = SamplerReport { plan_epoch, reason; compositor: compositor_name, sampler: sampler_name },
         then SamplerReport::validate;
     AchievedTime = AchievedTime { policy, busy_s };

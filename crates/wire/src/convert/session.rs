@@ -2,8 +2,8 @@
 
 use cluster::limits::{MAX_FALLBACKS, MAX_SAMPLE_CAMERAS, MAX_VIEWPOINTS};
 use cluster::{
-    ChangeSession, OfferStatus, PolicyChoice, Promise, PromiseState, Quality, SessionEvent, SessionPlan,
-    SessionRequest, SessionStage, at_most, reason,
+    AuditSummary, ChangeSession, ErrorInterval, OfferStatus, PolicyChoice, Promise, PromiseState, Quality,
+    SessionEvent, SessionPlan, SessionRequest, SessionStage, at_most, reason,
 };
 
 use super::{Convert, required};
@@ -13,7 +13,7 @@ use crate::proto::{self, open_session_response::Event};
 enums! {
     PolicyChoice { Auto, Pipeline, Direct, TimeShare }
     SessionStage { Measuring, Planning, Preparing }
-    PromiseState { Measuring, Kept, Unreachable }
+    PromiseState { Measuring, Kept, Broken, Unreachable }
 }
 
 messages! {
@@ -41,8 +41,13 @@ messages! {
         scene_load_s, frame_rate_ratio; fallback: fallback_number, method: reconstruction_method, auto_exposure: auto_exposure_ev
     }, then SessionPlan::validate;
     Promise = Promise {
-        budget, state, representation, expected_ratio, bound_ratio, probe_view_count, reason
+        budget, state, representation, expected_ratio, bound_ratio, probe_view_count, reason, audit
     }, then Promise::validate;
+    AuditSummary = AuditSummary {
+        audits_per_h, busy_s, error;
+        audited_views: audited_view_count, covered_views: covered_view_count, uncovered_views: uncovered_view_count
+    };
+    ErrorInterval = ErrorInterval { ; least: least_ratio, mean: mean_ratio, greatest: greatest_ratio };
 }
 
 fn check_request(request: &mut proto::OpenSessionRequest) -> Result<(), WireError> {

@@ -2,8 +2,8 @@
 
 use cluster::limits::{MAX_CELLS, MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_TILES, MAX_WORKLOADS};
 use cluster::{
-    ApplyPlan, Assignment, CompositorShare, Costs, FetchScene, InvalidField, Policy, SamplerShare, ScenePart, SceneRef,
-    TileCosts, Timeline, Workload, at_most, finite_seconds, nonempty,
+    ApplyPlan, Assignment, AuditOrder, CompositorShare, Costs, FetchScene, InvalidField, Policy, SamplerShare,
+    ScenePart, SceneRef, TileCosts, Timeline, Workload, at_most, finite_seconds, nonempty,
 };
 
 use super::Convert;
@@ -27,13 +27,16 @@ messages! {
         at_most(w.sample_cameras.len(), MAX_SAMPLE_CAMERAS * cells, "sample_cameras")
     }, then Workload::validate;
     Assignment = Assignment {
-        plan_epoch, workload_number, policy, workload as "assignment.workload", samplers, compositors, tile_count;
+        plan_epoch, workload_number, policy, workload as "assignment.workload", samplers, compositors, tile_count, audit;
         relay_fanout: relay_fanout_count, method: reconstruction_method
     }, first |a| {
         a.tile_count = a.tile_count.max(1);
         at_most(a.samplers.len(), MAX_NODES, "samplers")?;
         at_most(a.compositors.len(), MAX_NODES, "compositors")
     }, then Assignment::validate;
+    AuditOrder = AuditOrder {
+        time_ratio, least_apart_m, planned_pixel_count, with_sample_images; antialias: antialias_sample_count
+    }, then AuditOrder::validate;
     ApplyAssignmentRequest = ApplyPlan { assignment; open_workloads: open_workload_numbers },
         first |r| at_most(r.open_workload_numbers.len(), MAX_WORKLOADS, "open_workload_numbers");
     SamplerShare = SamplerShare { node_name, image_indices; address: node_address },

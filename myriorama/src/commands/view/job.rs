@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use app_core::delivery::{at_rate, open, request, viewpoints};
 use app_core::exit::BadInput;
 use client::{Client, Session};
-use cluster::{BudgetRequest, OfferStatus, PromiseState, SessionRequest, Timeline};
+use cluster::{BudgetRequest, OfferStatus, Promise, PromiseState, SessionRequest, Timeline};
 use depth_image::PinholeCamera;
 use render::Lighting;
 
@@ -58,7 +58,8 @@ impl Job {
         }
         let settled = async {
             let mut promise = session.promise();
-            while promise.as_ref().is_none_or(|promise| promise.state == PromiseState::Measuring) {
+            let is_open = |promise: &Promise| [PromiseState::Measuring, PromiseState::Broken].contains(&promise.state);
+            while promise.as_ref().is_none_or(is_open) {
                 promise = Some(session.another_promise(promise.as_ref()).await);
             }
         };

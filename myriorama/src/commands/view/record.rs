@@ -115,7 +115,8 @@ impl Record {
     /// The promise, where it is not kept.
     pub(super) fn unkept_promise(&self) -> Option<String> {
         let text = |name: &str| self.promise.as_ref()?.get(name)?.as_str();
-        let is_unkept = text("state")? == PromiseState::Unreachable.to_string();
+        let unkept = [PromiseState::Broken, PromiseState::Unreachable].map(|state| state.to_string());
+        let is_unkept = unkept.iter().any(|state| text("state") == Some(state));
         is_unkept.then(|| {
             format!("the budget {} is not kept: {}", text("budget").unwrap_or("?"), text("reason").unwrap_or("?"))
         })
@@ -227,6 +228,7 @@ fn described(promise: &Promise) -> Value {
         "budget": promise.budget, "state": promise.state.to_string(), "representation": promise.representation,
         "expected_ratio": promise.expected_ratio, "bound_ratio": promise.bound_ratio,
         "probe_view_count": promise.probe_view_count, "reason": promise.reason,
+        "audited_view_count": promise.audit.map(|audit| audit.audited_views),
     })
 }
 

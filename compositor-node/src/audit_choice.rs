@@ -1,0 +1,204 @@
+//! The choice of views to audit: at random, and as often as the share of audits allows.
+//!
+//! After an audit comes a random pause, whose mean gives audits their share of the time. The next audit is of a view that is
+//! made after it. The choice does not depend on what views show. One stream fills one audit in four at most while others
+//! move, and what was audited is not audited again.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use cluster::SetContent;
+use depth_image::PinholeCamera;
+
+/// Streams that were audited last, which wait for others.
+const RECENT_STREAMS: usize = 3;
+/// A stream that has made no view for so long is not waited for.
+const WAITED_FOR: Duration = Duration::from_secs(5);
+/// Audited views that are remembered.
+const MAX_AUDITED: usize = 256;
+/// Kinds of views that are remembered.
+const MAX_KINDS: usize = 16;
+/// The pause after the first audit of a kind, which may have built shaders, and after a failure.
+const FIRST_PAUSE: Duration = Duration::from_secs(1);
+const FAILED_PAUSE: Duration = Duration::from_secs(10);
+/// Directions that differ less, in radians, are one.
+const LEAST_TURN: f32 = 1e-3;
+
+/// A view that could be audited.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Candidate {
+    pub(crate) stream: u64,
+    /// A random number that depends on the plan, the stream and the number of the view.
+    pub(crate) random: u64,
+    pub(crate) set: SetContent,
+    pub(crate) camera: PinholeCamera,
+}
+
+/// The audits of one compositor so far, as far as they matter to the next.
+#[derive(Debug, Default)]
+pub(crate) struct AuditChoice {
+    is_auditing: bool,
+    due: Option<Instant>,
+    /// The streams of the last audits, the newest last.
+    recent: VecDeque<u64>,
+    /// When another stream made a view that could be audited.
+    other_at: Option<Instant>,
+    audited: VecDeque<(SetContent, PinholeCamera)>,
+    /// Kinds of views whose first audit has been made.
+    kinds: VecDeque<(u64, String)>,
+}
+
+impl AuditChoice {
+    /// The place of the view to audit now, if any. The audit is then under way until [`AuditChoice::end`].
+    pub(crate) fn choose(&mut self, now: Instant, views: &[Candidate], least_apart_m: f32) -> Option<usize> {
+        let is_new = |view: &Candidate| !self.audited.iter().any(|seen| is_near(seen, view, least_apart_m));
+        let is_other = |view: &Candidate| !self.recent.contains(&view.stream);
+        let new: Vec<usize> = (0..views.len()).filter(|&place| is_new(&views[place])).collect();
+        let mut eligible: Vec<usize> = new.iter().copied().filter(|&place| is_other(&views[place])).collect();
+        if !eligible.is_empty() {
+            self.other_at = Some(now);
+        }
+        let waits_for_others = self.other_at.is_some_and(|at| now.saturating_duration_since(at) < WAITED_FOR);
+        if eligible.is_empty() && !waits_for_others {
+            eligible = new;
+        }
+        if self.is_auditing || self.due.is_some_and(|due| now < due) {
+            return None;
+        }
+        let chosen = eligible.into_iter().min_by_key(|&place| views[place].random)?;
+        self.begin(&views[chosen]);
+        Some(chosen)
+    }
+
+    fn begin(&mut self, view: &Candidate) {
+        (self.is_auditing, self.other_at) = (true, None);
+        self.recent.push_back(view.stream);
+        if self.recent.len() > RECENT_STREAMS {
+            self.recent.pop_front();
+        }
+        self.audited.push_back((view.set, view.camera));
+        if self.audited.len() > MAX_AUDITED {
+            self.audited.pop_front();
+        }
+    }
+
+    /// The audit of a view of a kind has ended: it took `busy_s`, or failed. Audits may take `share` of the time.
+    pub(crate) fn end(&mut self, now: Instant, kind: (u64, String), busy_s: Option<f64>, share: f64, random: u64) {
+        self.is_auditing = false;
+        let is_first = !self.kinds.contains(&kind);
+        let pause = match busy_s {
+            None => FAILED_PAUSE,
+            Some(_) if is_first => FIRST_PAUSE,
+            Some(busy_s) => random_pause(busy_s, share, random),
+        };
+        if is_first && busy_s.is_some() {
+            self.kinds.push_back(kind);
+            if self.kinds.len() > MAX_KINDS {
+                self.kinds.pop_front();
+            }
+        }
+        self.due = Some(now + pause);
+    }
+}
+
+/// A pause after work of `busy_s` that takes `share` of the time in the mean: exponential, so that it does not fall into step
+/// with whoever moves.
+fn random_pause(busy_s: f64, share: f64, random: u64) -> Duration {
+    // Above 0 and at most 1.
+    let unit = ((random >> 11) + 1) as f64 / (1_u64 << 53) as f64;
+    Duration::try_from_secs_f64(busy_s * (share.recip() - 1.0) * -unit.ln()).unwrap_or(FAILED_PAUSE)
+}
+
+/// Whether a view was audited from the same set and about the same place.
+fn is_near((set, camera): &(SetContent, PinholeCamera), view: &Candidate, least_apart_m: f32) -> bool {
+    let turn = camera.forward_in_world().distance(view.camera.forward_in_world());
+    *set == view.set
+        && camera.eye_in_world.distance(view.camera.eye_in_world) <= least_apart_m
+        && turn <= LEAST_TURN
+        && camera.size_px == view.camera.size_px
+        && camera.focal_px == view.camera.focal_px
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{UVec2, Vec3};
+
+    use super::*;
+    use crate::test_support::set_content;
+
+    fn view(stream: u64, x_m: f32, random: u64) -> Candidate {
+        let eye = Vec3::new(x_m, 0.0, 5.0);
+        let camera = PinholeCamera::looking_at(eye, eye - Vec3::Z, Vec3::Y, 1.0, UVec2::splat(8));
+        Candidate { stream, random, set: set_content(0), camera }
+    }
+
+    fn kind() -> (u64, String) {
+        (1, "mesh".to_owned())
+    }
+
+    /// Audits `views` at a time, one after the other without pauses: the streams that were chosen.
+    fn streams_of(rounds: usize, views: impl Fn(usize) -> Vec<Candidate>) -> Vec<u64> {
+        let (mut choice, start) = (AuditChoice::default(), Instant::now());
+        let mut streams = Vec::new();
+        for round in 0..rounds {
+            let now = start + Duration::from_secs(2 * round as u64);
+            let views = views(round);
+            if let Some(chosen) = choice.choose(now, &views, 1e-3) {
+                streams.push(views[chosen].stream);
+                choice.end(now, kind(), Some(0.0), 0.01, 1);
+            }
+        }
+        streams
+    }
+
+    #[test]
+    fn the_least_random_number_of_a_batch_is_chosen_once() {
+        let (mut choice, now) = (AuditChoice::default(), Instant::now());
+        let views = [view(1, 0.0, 9), view(1, 1.0, 3), view(1, 2.0, 5)];
+        assert_eq!(choice.choose(now, &views, 1e-3), Some(1));
+        assert_eq!(choice.choose(now, &views, 1e-3), None, "one at a time");
+        choice.end(now, kind(), Some(0.02), 0.01, u64::MAX / 3);
+        let later = now + FIRST_PAUSE;
+        assert_eq!(choice.choose(now, &views, 1e-3), None, "not due");
+        assert_eq!(choice.choose(later, &views, 1e-3), Some(2), "the place of the first was audited");
+        let other_set = [Candidate { set: set_content(1), ..view(1, 1.0, 3) }];
+        choice.end(later, kind(), None, 0.01, 0);
+        assert_eq!(choice.choose(later + FAILED_PAUSE, &other_set, 1e-3), Some(0));
+    }
+
+    #[test]
+    fn a_stream_fills_one_audit_in_four_while_others_move() {
+        // Stream 0 makes ten times the views of each of the others.
+        let views = |round: usize| {
+            let place = round as f32;
+            let mut views: Vec<Candidate> = (0..10).map(|n| view(0, place + 0.01 * n as f32, n)).collect();
+            views.extend((1..5).map(|stream| view(stream, place + 0.5, 100 + stream)));
+            views
+        };
+        let streams = streams_of(100, views);
+        assert_eq!(streams.len(), 100);
+        assert!(streams.iter().filter(|&&stream| stream == 0).count() <= 26, "{streams:?}");
+        assert_eq!(streams_of(40, |round| vec![view(7, round as f32, 1)]), [7; 40], "alone, it has all");
+        // The other has left.
+        let streams = streams_of(40, |round| match round {
+            0 => vec![view(1, 0.0, 1), view(2, 0.0, 2)],
+            _ => vec![view(1, round as f32, 1)],
+        });
+        assert!(streams.len() >= 37, "{streams:?}");
+    }
+
+    #[test]
+    fn a_viewer_that_stays_is_audited_once() {
+        assert_eq!(streams_of(50, |_| vec![view(1, 0.0, 1)]), [1]);
+    }
+
+    #[test]
+    fn audits_take_their_share_of_the_time_in_the_mean() {
+        let (busy_s, share) = (0.03, 0.01);
+        let number = |place: u64| place.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let pauses_s = (0..10_000).map(|place| random_pause(busy_s, share, number(place)).as_secs_f64());
+        let mean_s = pauses_s.sum::<f64>() / 10_000.0;
+        assert!((busy_s / (busy_s + mean_s) / share - 1.0).abs() < 0.02, "{mean_s}");
+        assert!(random_pause(1.0, 0.01, 0) < Duration::from_secs(4_000) && random_pause(1.0, 0.5, u64::MAX).is_zero());
+    }
+}

@@ -1,0 +1,146 @@
+//! Audits: some of the views of a plan with a promise are made again, drawn directly as well, and compared.
+
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::sync::Arc;
+use std::time::Instant;
+
+use cluster::{Assignment, AuditOrder, AuditedView};
+use depth_image::{PinholeCamera, ViewPlanes};
+use node::{DirectWork, NodeMetrics, Pinned, PlansInForce, Scenes, ViewAudit, ViewProbes, ViewWork, blocking};
+use parking_lot::Mutex;
+use tonic::Status;
+
+use crate::audit_choice::{AuditChoice, Candidate};
+use crate::batch::{BatchKey, Source, Waiting};
+use crate::sets::ReadySet;
+
+/// A promise is for views of up to this many times the planned pixels, or of that share of them.
+const MOST_PIXELS: f64 = 2.0;
+
+/// The audits of one compositor. One is under way at a time.
+pub(crate) struct Auditor {
+    pub(crate) scenes: Arc<Scenes>,
+    pub(crate) probes: Arc<dyn ViewProbes>,
+    pub(crate) plans: PlansInForce,
+    pub(crate) metrics: NodeMetrics,
+    /// The share of the time for all views that are drawn beside a plan.
+    pub(crate) direct_share: f64,
+    pub(crate) choice: Mutex<AuditChoice>,
+}
+
+/// A view that was chosen.
+struct Chosen {
+    plan: Arc<Assignment>,
+    set: Pinned<ReadySet>,
+    stream: u64,
+    random: u64,
+    camera: PinholeCamera,
+    scene_time_s: f32,
+}
+
+impl Auditor {
+    /// Takes note of views that were made together, and begins the audit of one of them where that is due.
+    pub(crate) fn note(self: &Arc<Self>, made: &[Waiting]) {
+        let Some(key) = made.first().map(|waiting| &waiting.key) else { return };
+        let Some(plan) = self.plans.in_force(key.workload_number) else { return };
+        let Some(order) = plan.audit.filter(|_| key.sample_set_id.plan_epoch == plan.plan_epoch) else { return };
+        let is_covered = |waiting: &&Waiting| match uncovered(&plan, &order, waiting) {
+            None => true,
+            Some(reason) => {
+                self.metrics.uncover_view(reason);
+                false
+            }
+        };
+        let covered: Vec<&Waiting> = made.iter().filter(is_covered).collect();
+        let counts = [covered.len(), made.len() - covered.len()].map(|count| count as u64);
+        self.metrics.done.watched(plan.workload_number, counts);
+        if let Some(chosen) = self.choose(&plan, &order, &covered) {
+            tokio::spawn(self.clone().audit(chosen, order));
+        }
+    }
+
+    fn choose(&self, plan: &Arc<Assignment>, order: &AuditOrder, covered: &[&Waiting]) -> Option<Chosen> {
+        let candidates = covered.iter().filter_map(|waiting| {
+            let set = waiting.key.content?;
+            let (stream, camera) = (waiting.reply.outbox().stream, waiting.view.camera);
+            let random = random([plan.plan_epoch, stream, waiting.view.frame]);
+            Some(Candidate { stream, random, set, camera })
+        });
+        let candidates: Vec<Candidate> = candidates.collect();
+        let place = self.choice.lock().choose(Instant::now(), &candidates, order.least_apart_m as f32)?;
+        let (waiting, Candidate { stream, random, camera, .. }) = (covered[place], candidates[place]);
+        let Source::Set(set) = waiting.source.clone() else { return None };
+        let scene_time_s = plan.workload.timeline.time_s(set_index(&waiting.key))?;
+        Some(Chosen { plan: plan.clone(), set, stream, random, camera, scene_time_s })
+    }
+
+    async fn audit(self: Arc<Self>, chosen: Chosen, order: AuditOrder) {
+        let Chosen { plan, stream, random, camera, .. } = &chosen;
+        let (plan_epoch, workload_number, random) = (plan.plan_epoch, plan.workload_number, *random);
+        let kind = (workload_number, plan.method.clone().unwrap_or_default());
+        let (stream, camera) = (*stream, *camera);
+        let compared = self.compare(chosen, order).await;
+        let busy_s = match compared {
+            Ok((errors, busy_s)) => {
+                let view = AuditedView { plan_epoch, stream, camera, errors };
+                self.metrics.done.audited(workload_number, view, busy_s);
+                self.metrics.audited_views.inc();
+                self.metrics.audit_s.inc_by(busy_s);
+                Some(busy_s)
+            }
+            Err(status) => {
+                tracing::debug!(reason = status.message(), "a view is not audited");
+                None
+            }
+        };
+        let share = order.time_ratio.min(self.direct_share);
+        // Another number: the chosen one is the least of several.
+        let random = self::random([random, workload_number, plan_epoch]);
+        self.choice.lock().end(Instant::now(), kind, busy_s, share, random);
+    }
+
+    async fn compare(&self, chosen: Chosen, order: AuditOrder) -> Result<(cluster::ProbedView, f64), Status> {
+        let Chosen { plan, set, camera, scene_time_s, .. } = chosen;
+        self.scenes.ensure(&plan.workload.scene).await?;
+        // As a certificate's views are: without the exposure and the curve of a client.
+        let planes = ViewPlanes { antialias: order.antialias, ..ViewPlanes::COLOR };
+        let direct = DirectWork::of(&plan.workload, vec![camera], ViewPlanes { inverse_depth: true, ..planes });
+        let view = ViewAudit {
+            set: set.set.clone(),
+            sample_images: set.sample_images.clone(),
+            pinned: Box::new(set),
+            view: ViewWork { cameras: vec![camera], method: plan.method.clone().unwrap_or_default(), planes },
+            direct: DirectWork { scene_time_s, ..direct },
+        };
+        let probes = self.probes.clone();
+        blocking(move || probes.audit(view)).await
+    }
+}
+
+/// Why a promise is not for a view; `None` where it is.
+fn uncovered(plan: &Assignment, order: &AuditOrder, waiting: &Waiting) -> Option<&'static str> {
+    let key = &waiting.key;
+    let Source::Set(set) = &waiting.source else { return Some("drawn directly") };
+    let pixels = f64::from(key.size_px.element_product()) / f64::from(order.planned_pixel_count);
+    let refinement = plan.workload.refinement(set_index(key));
+    let reasons = [
+        (Some(&key.method) != plan.method.as_ref(), "another method"),
+        (waiting.place.is_neighbour, "another view cell's set"),
+        (refinement.step + 1 < refinement.steps, "unfinished light"),
+        (key.planes.antialias != order.antialias, "other samples a pixel"),
+        (!(MOST_PIXELS.recip()..=MOST_PIXELS).contains(&pixels), "another size"),
+        (order.with_sample_images && set.sample_images.is_empty(), "a set of an earlier plan"),
+    ];
+    reasons.into_iter().find_map(|(applies, reason)| applies.then_some(reason))
+}
+
+fn set_index(key: &BatchKey) -> u32 {
+    u32::try_from(key.sample_set_id.index).unwrap_or(u32::MAX)
+}
+
+/// The same numbers give the same on every node and in every run.
+fn random(numbers: [u64; 3]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    numbers.hash(&mut hasher);
+    hasher.finish()
+}

@@ -1,0 +1,67 @@
+//! A workload's budget: the last plan for it, and the choice in force.
+
+use std::time::Duration;
+
+use super::budget_plan::BudgetPlan;
+use super::chosen::Chosen;
+use super::findings::{Broken, Findings};
+use super::watch::Watch;
+
+/// The state of a workload's budget.
+#[derive(Debug, Clone)]
+pub(super) struct BudgetState {
+    pub(super) plan: BudgetPlan,
+    pub(super) in_force: Option<InForce>,
+    /// A row whose costs are measured before it is in force.
+    pub(super) switching: Option<Chosen>,
+    /// The choice could not be put in force, for a reason that may pass.
+    pub(super) is_to_be_tried_again: bool,
+    pub(super) findings: Findings,
+}
+
+/// A choice in force.
+#[derive(Debug, Clone)]
+pub(super) struct InForce {
+    pub(super) chosen: Chosen,
+    pub(super) since: Duration,
+    /// The first plan with it, and whether nodes and sessions have that plan.
+    pub(super) plan_epoch: u64,
+    pub(super) is_applied: bool,
+    /// The audits of its views, where it has a certificate.
+    pub(super) watch: Option<Watch>,
+}
+
+impl BudgetState {
+    /// With another plan than before. A choice of that plan that is not in force yet is given up.
+    pub(super) fn begin(plan: BudgetPlan, before: Option<Self>) -> Self {
+        let new = || Self {
+            plan: plan.clone(),
+            in_force: None,
+            switching: None,
+            is_to_be_tried_again: false,
+            findings: Findings::default(),
+        };
+        let Self { plan: last, in_force, switching, mut findings, .. } = before.unwrap_or_else(new);
+        findings.is_to_be_planned = false;
+        let switching = switching.filter(|chosen| chosen.number != last.number);
+        Self { plan, in_force, switching, is_to_be_tried_again: false, findings }
+    }
+
+    /// The broken promise, until another choice is in force and applied.
+    pub(super) fn broken(&self) -> Option<&Broken> {
+        let is_replaced = |broken: &&Broken| {
+            let other = self.in_force.as_ref().filter(|in_force| in_force.chosen.number != broken.choice_number);
+            other.is_some_and(|in_force| in_force.is_applied)
+        };
+        self.findings.broken.as_ref().filter(|broken| !is_replaced(broken))
+    }
+}
+
+impl InForce {
+    /// A choice that is in force from now on.
+    pub(super) fn begin(now: Duration, chosen: Chosen) -> Self {
+        let certificate = chosen.outcome.certificate.as_ref().filter(|_| chosen.row.is_some());
+        let watch = chosen.budget.error().zip(certificate).map(|(term, of)| Watch::begin(now, term, of));
+        Self { chosen, since: now, plan_epoch: 0, is_applied: true, watch }
+    }
+}

@@ -1,0 +1,113 @@
+//! Audits: promises that views in force do not keep, and what replaces a broken one.
+
+use cluster::{AuditOrder, AuditReport};
+use depth_image::PinholeCamera;
+use planner::{Metric, Pricing as _};
+
+use super::Scheduler;
+use crate::schedule::Command;
+use crate::schedule::budget_state::{BudgetState, InForce};
+use crate::schedule::chosen::Chosen;
+use crate::schedule::findings::Broken;
+use crate::schedule::representation::Representation;
+
+/// Views that are nearer to an audited one, as a share of a view cell's side, are not audited.
+const LEAST_APART: f64 = 1e-3;
+
+impl Scheduler {
+    /// How views are audited in the representation in force; `None` where nothing is promised for them.
+    pub(super) fn audit_order(&self, number: u64) -> Option<AuditOrder> {
+        let BudgetState { plan, in_force, .. } = self.budgets.get(&number)?;
+        let watched = in_force.as_ref().filter(|in_force| in_force.watch.is_some())?;
+        let metric = watched.chosen.budget.error()?.metric();
+        (self.audit_time_ratio > 0.0).then(|| AuditOrder {
+            time_ratio: self.audit_time_ratio,
+            least_apart_m: LEAST_APART * f64::from(plan.cell_side_m()),
+            antialias: plan.antialias(),
+            planned_pixel_count: u32::try_from(plan.planned_pixels()).unwrap_or(u32::MAX),
+            with_sample_images: metric == Metric::Disocclusion,
+        })
+    }
+
+    /// A member has audited views.
+    pub(super) fn audited(&mut self, number: u64, node: &str, report: &AuditReport) -> Vec<Command> {
+        let now = self.now;
+        let is_member = self.members.contains_key(node);
+        let Some(state) = self.budgets.get_mut(&number).filter(|_| is_member) else { return Vec::new() };
+        let Some(InForce { watch: Some(watch), plan_epoch, .. }) = &mut state.in_force else { return Vec::new() };
+        let plan_epoch = *plan_epoch;
+        for view in report.views.iter().filter(|view| view.plan_epoch >= plan_epoch) {
+            let error = watch.excess(view).map(|ratio| watch.shown(ratio));
+            state.findings.note(now, node, view, error);
+        }
+        let is_broken = watch.take(plan_epoch, report);
+        if is_broken && state.broken().is_none() { self.promise_broken(number) } else { Vec::new() }
+    }
+
+    /// The next safer choice takes the place of one whose promise is broken, and a plan for the audited viewpoints follows.
+    fn promise_broken(&mut self, number: u64) -> Vec<Command> {
+        let (now, may_draw) = (self.now, self.may_draw_directly(number));
+        let Some(state) = self.budgets.get_mut(&number) else { return Vec::new() };
+        let Some(InForce { chosen, watch: Some(watch), .. }) = &state.in_force else { return Vec::new() };
+        let (choice_number, row) = (chosen.number, chosen.row.as_ref().map(ToString::to_string).unwrap_or_default());
+        let reason = format!("Audits found {} with {row}.", watch.finding());
+        let is_last = state.findings.note_break(now) && may_draw;
+        (state.findings.is_given_up, state.findings.broken) =
+            (is_last, Some(Broken { choice_number, since: now, reason: reason.clone() }));
+        self.retreat(number, &reason)
+    }
+
+    /// Puts what is safer than the choice in force in its place: a certified row, else direct drawing, else nothing.
+    pub(super) fn retreat(&mut self, number: u64, reason: &str) -> Vec<Command> {
+        let may_draw = self.may_draw_directly(number);
+        let next_number = self.next_choice();
+        let Some(state) = self.budgets.get_mut(&number) else { return Vec::new() };
+        let Some(in_force) = &state.in_force else { return Vec::new() };
+        let safer = in_force.chosen.safer(next_number, reason).filter(|_| !state.findings.is_given_up);
+        if let Some(safer) = safer {
+            return self.measure_choice(number, safer);
+        }
+        if !may_draw {
+            return Vec::new();
+        }
+        let given_up = if state.findings.is_given_up {
+            " It is the third broken promise within ten minutes: views are drawn directly until the sessions end."
+        } else {
+            ""
+        };
+        let text = format!("Every view is drawn directly. {reason}{given_up}");
+        let direct = in_force.chosen.direct(next_number, state.plan.prices.direct(), text);
+        self.represent(number, direct, Representation::Direct)
+    }
+
+    /// What is done about a broken promise, in words.
+    pub(super) fn broken_reason(&self, broken: &Broken, state: &BudgetState) -> String {
+        let since_s = self.now.saturating_sub(broken.since).as_secs();
+        let next = match (&state.switching, &state.in_force) {
+            (Some(Chosen { row: Some(row), .. }), _) => format!("{row} is being put in force"),
+            (_, Some(in_force)) if in_force.chosen.number != broken.choice_number => {
+                "What replaces it is being put in force".to_owned()
+            }
+            _ => "Nothing safer is certified; a plan for the audited viewpoints follows".to_owned(),
+        };
+        format!("{} It is broken since {since_s} s. {next}.", broken.reason)
+    }
+
+    fn may_draw_directly(&self, number: u64) -> bool {
+        self.workloads.get(&number).is_some_and(|w| w.sessions.policy_override().may_draw_directly())
+    }
+
+    /// Follows viewers who stay where the error is above the budget, and forgets promises that are replaced.
+    pub(super) fn follow_audits(&mut self) {
+        let now = self.now;
+        for (number, state) in &mut self.budgets {
+            let Some(workload) = self.workloads.get(number) else { continue };
+            let near_m = LEAST_APART as f32 * state.plan.cell_side_m();
+            let is_there = |node: &str, camera: &PinholeCamera| workload.is_viewed_from(node, camera, near_m);
+            state.findings.follow_viewers(now, is_there);
+            if state.broken().is_none() {
+                state.findings.broken = None;
+            }
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! The audits of a representation in force.
+
+use std::time::Duration;
+
+use cluster::{AuditReport, AuditSummary, AuditedView, ErrorInterval, ProbedView};
+use planner::{Audit, Certificate, ErrorTerm, Interval, Statistic, ViewErrors};
+
+/// A rate is not known before.
+const RATE_AFTER: Duration = Duration::from_secs(60);
+/// The views in which twice the budget is found, 19 times in 20 (`docs/planner.md`).
+const VIEWS_TO_FIND_TWICE: f64 = 60.0;
+const HOUR_S: f64 = 3600.0;
+
+/// The audits of one promise.
+#[derive(Debug, Clone)]
+pub(super) struct Watch {
+    term: ErrorTerm,
+    audit: Audit,
+    began: Duration,
+    covered_views: u64,
+    uncovered_views: u64,
+    busy_s: f64,
+}
+
+impl Watch {
+    /// Without views yet.
+    pub(super) fn begin(now: Duration, term: ErrorTerm, certificate: &Certificate) -> Self {
+        let audit = Audit::new(term, certificate.foreground_ratio);
+        Self { term, audit, began: now, covered_views: 0, uncovered_views: 0, busy_s: 0.0 }
+    }
+
+    /// Takes a report, as far as its views are of plans since `plan_epoch`; whether the promise is broken.
+    pub(super) fn take(&mut self, plan_epoch: u64, report: &AuditReport) -> bool {
+        self.covered_views = self.covered_views.saturating_add(report.covered_views);
+        self.uncovered_views = self.uncovered_views.saturating_add(report.uncovered_views);
+        self.busy_s += report.busy_s;
+        let own = report.views.iter().filter(|view| view.plan_epoch >= plan_epoch);
+        own.for_each(|view| self.audit.observe(&errors(&view.errors)));
+        self.audit.is_alarmed()
+    }
+
+    /// The error of a view by itself, if it is above the budget.
+    pub(super) fn excess(&self, view: &AuditedView) -> Option<f64> {
+        let errors = errors(&view.errors);
+        let ratio = errors.error_ratio(self.term.metric());
+        (errors.counts_for(&self.term) && ratio > self.term.most_ratio()).then_some(ratio)
+    }
+
+    /// An error of this budget's metric in words.
+    pub(super) fn shown(&self, ratio: f64) -> String {
+        format!("{} {}", self.term.metric(), self.term.shown(ratio))
+    }
+
+    pub(super) fn summary(&self, now: Duration) -> AuditSummary {
+        let error = self.audit.error_interval();
+        AuditSummary {
+            audited_views: self.audit.views()[0],
+            covered_views: self.covered_views,
+            uncovered_views: self.uncovered_views,
+            audits_per_h: self.audits_per_h(now),
+            busy_s: self.busy_s,
+            error: error.map(|Interval { low, mean, high }| ErrorInterval { least: low, mean, greatest: high }),
+        }
+    }
+
+    /// The rate so far. In the first minute the rate is that of an audit a minute at least.
+    fn audits_per_h(&self, now: Duration) -> f64 {
+        let since = now.saturating_sub(self.began);
+        let audits = self.audit.views().iter().sum::<u64>();
+        let audits = if since < RATE_AFTER { audits.max(1) } else { audits };
+        audits as f64 * HOUR_S / since.max(RATE_AFTER).as_secs_f64()
+    }
+
+    /// What audits have found, in words.
+    pub(super) fn finding(&self) -> String {
+        let [audited, _] = self.audit.views();
+        let of = format!("{audited} of {} views", self.covered_views.max(audited));
+        let Some(mean) = self.audit.mean_error() else { return format!("nothing on {of}") };
+        let is_mean = self.term.statistic() == Statistic::Mean;
+        let shown = |ratio: f64| if is_mean { self.term.shown(ratio) } else { format!("{:.1} %", ratio * 100.0) };
+        let interval = self.audit.error_interval();
+        let interval = interval.map(|Interval { low, high, .. }| format!(" ({} to {})", shown(low), shown(high)));
+        let interval = interval.unwrap_or_default();
+        match is_mean {
+            true => format!("{}{interval} on {of}", self.shown(mean)),
+            false => format!("{}{interval} of views over {}, on {of}", shown(mean), self.term),
+        }
+    }
+
+    /// How closely the promise is watched, in words.
+    pub(super) fn vigilance(&self, now: Duration) -> String {
+        if self.audit.views() == [0, 0] {
+            return " Audits: none yet.".to_owned();
+        }
+        let per_h = self.audits_per_h(now);
+        let uncovered = self.summary(now).uncovered_ratio();
+        let not_covered =
+            if uncovered > 0.0 { format!(" Not covered: {:.0} % of views.", uncovered * 100.0) } else { String::new() };
+        let found_s = VIEWS_TO_FIND_TWICE / per_h.max(f64::MIN_POSITIVE) * HOUR_S;
+        format!(
+            " Audits: {}; {per_h:.0} an hour, which find twice the budget within {}.{not_covered}",
+            self.finding(),
+            duration(found_s)
+        )
+    }
+}
+
+/// A time in the unit in which a person says it.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 120.0 => format!("{s:.0} s"),
+        s if s < 2.0 * HOUR_S => format!("{:.0} min", s / 60.0),
+        s if s < 1000.0 * HOUR_S => format!("{:.0} h", s / HOUR_S),
+        _ => "months".to_owned(),
+    }
+}
+
+fn errors(view: &ProbedView) -> ViewErrors {
+    let ProbedView { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio } = *view;
+    ViewErrors { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio }
+}

@@ -1,0 +1,129 @@
+//! Audits of promises: compositors draw some of the views that they make directly as well, and compare them.
+
+use depth_image::{Antialias, PinholeCamera};
+use serde::{Deserialize, Serialize};
+
+use crate::check::{InvalidField, at_most, finite_seconds, within};
+use crate::limits::MAX_PROBE_VIEWS;
+use crate::probing::ProbedView;
+
+/// The greatest share of a compositor's time that audits may take.
+pub const MAX_AUDIT_TIME_RATIO: f64 = 0.5;
+/// More pixels than any view has.
+const MAX_PIXELS: u32 = 1 << 28;
+
+/// How the views of a plan are audited.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AuditOrder {
+    /// The share of a compositor's time, drawing and comparing included: above 0, at most 0.5.
+    pub time_ratio: f64,
+    /// A view that is nearer than this to an audited one of its set is not audited, in m.
+    pub least_apart_m: f64,
+    /// Samples a pixel of the views that the promise is for.
+    pub antialias: Antialias,
+    /// Pixels of a view as it was planned for.
+    pub planned_pixel_count: u32,
+    /// Views are compared with the sample images, too.
+    pub with_sample_images: bool,
+}
+
+/// The audits of a member since its last report.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct AuditReport {
+    /// Audited views.
+    pub views: Vec<AuditedView>,
+    /// Views that the promise is for, audited or not.
+    pub covered_views: u64,
+    /// Views that the promise is not for.
+    pub uncovered_views: u64,
+    /// The member's time for drawing and comparing, in s.
+    pub busy_s: f64,
+}
+
+/// A view that was drawn directly as well.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AuditedView {
+    /// The plan by which it was made.
+    pub plan_epoch: u64,
+    /// The stream of its client on the member.
+    pub stream: u64,
+    /// Its camera.
+    pub camera: PinholeCamera,
+    /// Its errors.
+    pub errors: ProbedView,
+}
+
+/// What audits say about a promise.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct AuditSummary {
+    /// Views that were audited since the representation is in force.
+    pub audited_views: u64,
+    /// Views that the promise is for, audited or not.
+    pub covered_views: u64,
+    /// Views that the promise is not for.
+    pub uncovered_views: u64,
+    /// Audits an hour.
+    pub audits_per_h: f64,
+    /// The nodes' time for drawing and comparing, in s.
+    pub busy_s: f64,
+    /// `None` for too few views.
+    pub error: Option<ErrorInterval>,
+}
+
+/// An error as a ratio. It lies in the interval with 95 % confidence, however often that is looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct ErrorInterval {
+    pub least: f64,
+    pub mean: f64,
+    pub greatest: f64,
+}
+
+impl AuditOrder {
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        if !(self.time_ratio > 0.0 && self.time_ratio <= MAX_AUDIT_TIME_RATIO) {
+            return Err(InvalidField::out_of_range("audit.time_ratio", self.time_ratio, "above 0 and at most 0.5"));
+        }
+        within(self.planned_pixel_count, 1..=MAX_PIXELS, "audit.planned_pixel_count", "from 1 to 2^28")?;
+        finite_seconds(self.least_apart_m, "audit.least_apart_m")
+    }
+}
+
+impl AuditReport {
+    /// Whether there is nothing to report.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.views.is_empty() && self.covered_views == 0 && self.uncovered_views == 0
+    }
+
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        at_most(self.views.len(), MAX_PROBE_VIEWS, "audit.views")?;
+        for AuditedView { camera, errors, .. } in &self.views {
+            camera.validate().map_err(|source| InvalidField::Camera { field: "audit.views", source })?;
+            errors.validate()?;
+        }
+        finite_seconds(self.busy_s, "audit.busy_s")
+    }
+}
+
+impl AuditSummary {
+    /// The share of views that the promise is not for.
+    #[must_use]
+    pub fn uncovered_ratio(&self) -> f64 {
+        self.uncovered_views as f64 / (self.covered_views + self.uncovered_views).max(1) as f64
+    }
+
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        finite_seconds(self.audits_per_h, "audit.audits_per_h")?;
+        finite_seconds(self.busy_s, "audit.busy_s")?;
+        let ratios = self.error.map(|ErrorInterval { least, mean, greatest }| [least, mean, greatest]);
+        let mut ratios = ratios.into_iter().flatten();
+        ratios.try_for_each(|ratio| within(ratio, 0.0..=1.0, "audit.error", "from 0 to 1"))
+    }
+}

@@ -1,0 +1,39 @@
+//! Measurements of views on a node's device, for budgets and for audits.
+
+use std::any::Any;
+use std::sync::Arc;
+
+use cluster::{ProbeViews, ProbedView, ProbedViews};
+use depth_image::DepthImage;
+use tonic::Status;
+
+use crate::engine::{DirectWork, UploadedSet, ViewWork};
+
+/// Measures views, after all other work of the device. Calls block.
+pub trait ViewProbes: Send + Sync + 'static {
+    /// The errors of views, and their costs.
+    ///
+    /// # Errors
+    /// The device fails, or refuses the representation.
+    fn probe(&self, request: &ProbeViews) -> Result<ProbedViews, Status>;
+
+    /// The errors of one view that is made again and drawn directly, and the seconds that this took without waits.
+    ///
+    /// # Errors
+    /// The device fails.
+    fn audit(&self, view: ViewAudit) -> Result<(ProbedView, f64), Status>;
+}
+
+/// A view to compare with the same view of the scene.
+pub struct ViewAudit {
+    /// The set that it is made from.
+    pub set: Arc<dyn UploadedSet>,
+    /// Its images where they are compared, too; else none.
+    pub sample_images: Arc<[DepthImage]>,
+    /// Keeps the set in memory until the view is made.
+    pub pinned: Box<dyn Any + Send>,
+    /// One view.
+    pub view: ViewWork,
+    /// The same from the scene, with depth.
+    pub direct: DirectWork,
+}
