@@ -98,8 +98,9 @@ impl Watch {
             if uncovered > 0.0 { format!(" Not covered: {:.0} % of views.", uncovered * 100.0) } else { String::new() };
         let found_s = VIEWS_TO_FIND_TWICE / per_h.max(f64::MIN_POSITIVE) * HOUR_S;
         format!(
-            " Audits: {}; {per_h:.0} an hour, which find twice the budget within {}.{not_covered}",
+            " Audits: {}, in {:.1} s of the nodes' time; {per_h:.0} an hour, which find twice the budget within {}.{not_covered}",
             self.finding(),
+            self.busy_s,
             duration(found_s)
         )
     }

@@ -7,6 +7,9 @@ use wgpu::{BufferUsages, LoadOp, Operations, RenderPassColorAttachment, RenderPa
 use crate::sharing::{Slot, Turn, Work, WorkKind};
 use crate::{device::Gpu, error::GpuError, pool::PooledBuffer};
 
+/// A slice that takes longer, though a live stream is open, is logged.
+const LONG_SLICE_S: f64 = 0.3;
+
 /// Work that is being recorded.
 pub struct Frame<'g> {
     gpu: &'g Gpu,
@@ -40,6 +43,7 @@ struct Timer {
 /// Work whose recording has ended.
 struct Recorded<'g> {
     gpu: &'g Gpu,
+    label: &'static str,
     pieces: VecDeque<Piece>,
     timer: Option<Timer>,
     reads: Vec<PooledBuffer>,
@@ -164,12 +168,12 @@ impl<'g> Frame<'g> {
     }
 
     fn end(self) -> Recorded<'g> {
-        let Self { gpu, mut encoder, work, ended: mut pieces, timer, reads, .. } = self;
+        let Self { gpu, label, mut encoder, work, ended: mut pieces, timer, reads, .. } = self;
         if let Some(timer) = &timer {
             timer.finish(&mut encoder);
         }
         pieces.push_back(Piece { commands: encoder.finish(), work });
-        Recorded { gpu, pieces, timer, reads }
+        Recorded { gpu, label, pieces, timer, reads }
     }
 }
 
@@ -183,18 +187,18 @@ impl<'g> Recorded<'g> {
             if self.pieces.is_empty() {
                 return self.submitted(slice, earlier_s);
             }
-            let (held, slice_s) = slice.ended(self.gpu)?;
+            let (held, slice_s) = slice.ended(self.gpu, self.label)?;
             earlier_s += slice_s;
             slot = held.next(predicted_s(self.gpu, &self.pieces));
         }
     }
 
     fn submitted(self, last: Slice<'g>, earlier_s: f64) -> Result<Submitted<'g>, GpuError> {
-        let Self { gpu, timer, reads, .. } = self;
+        let Self { gpu, label, timer, reads, .. } = self;
         let mapped = map(&reads, timer.as_ref());
         let mut submitted = Submitted { gpu, slice: None, earlier_s, timer, reads, mapped };
         if gpu.device_queue.cuts() {
-            submitted.earlier_s += last.ended(gpu)?.1;
+            submitted.earlier_s += last.ended(gpu, label)?.1;
         } else {
             submitted.slice = Some(last);
         }
@@ -255,10 +259,13 @@ impl<'g> Slice<'g> {
 
 impl<'g> Slice<'g> {
     /// Waits for the device and learns from the time that it took.
-    fn ended(self, gpu: &Gpu) -> Result<(Slot<'g>, f64), GpuError> {
+    fn ended(self, gpu: &Gpu, label: &str) -> Result<(Slot<'g>, f64), GpuError> {
         let Self { slot, index, work, started } = self;
         wait(gpu, index)?;
         let slice_s = started.elapsed().as_secs_f64();
+        if slice_s > LONG_SLICE_S {
+            tracing::debug!(label, slice_s, "other work waited for a long slice");
+        }
         gpu.device_queue.learn(&work, slice_s);
         Ok((slot, slice_s))
     }
