@@ -11,6 +11,8 @@ use crate::view_errors::ViewErrors;
 
 /// Bets on a broken promise, as shares of the greatest that cannot lose everything.
 const BETS: [f64; 3] = [0.1, 0.25, 0.5];
+/// Bets on models that fill less are no higher.
+const LEAST_FOREGROUND: f64 = 0.01;
 /// Evidence of an alarm.
 const ALARM: f64 = 1_000.0;
 /// Views that have to be there for an interval.
@@ -27,8 +29,8 @@ pub struct Audit {
     term: ErrorTerm,
     /// The bets' evidence.
     evidence: [f64; BETS.len()],
-    /// The greatest bet: λ = 1 / budget where the whole picture is foreground.
-    bet_scale: f64,
+    /// Bets are shares of 1 / (limit · this): the greatest share of foreground so far, at first that of the certificate.
+    bet_weight: f64,
     views: u64,
     skipped: u64,
     mean: f64,
@@ -47,20 +49,21 @@ pub struct Interval {
 
 impl Audit {
     /// An audit without views. `foreground_ratio`, from 0 to 1, is the mean share of foreground in the views of the
-    /// certificate. A value that is not finite counts as 1. Small models move y less, and bets on them are higher. Budgets of
-    /// whole views do not depend on the ratio.
+    /// certificate. A value that is not finite counts as 1. Small models move y less, and bets on them are higher: a bet
+    /// depends on views before it alone, so that the rate of false alarms holds. Budgets of whole views do not depend on the
+    /// ratio.
     #[must_use]
     pub fn new(term: ErrorTerm, foreground_ratio: f64) -> Self {
         let is_whole = term.metric() == Metric::FlipWhole || !foreground_ratio.is_finite();
         let foreground_ratio = if is_whole { 1.0 } else { foreground_ratio };
-        let (limit, weight) = match term.statistic() {
-            Statistic::Mean => (term.most_ratio(), foreground_ratio.clamp(BETS[2], 1.0)),
-            Statistic::P95 => (MOST_OVER, RARE_OVER),
+        let bet_weight = match term.statistic() {
+            Statistic::Mean => foreground_ratio.clamp(LEAST_FOREGROUND, 1.0),
+            Statistic::P95 => RARE_OVER,
         };
         Self {
             term,
             evidence: [1.0; BETS.len()],
-            bet_scale: 1.0 / (limit * weight),
+            bet_weight,
             views: 0,
             skipped: 0,
             mean: 0.0,
@@ -75,12 +78,15 @@ impl Audit {
             self.skipped += 1;
             return;
         }
-        let y = self.excess(errors);
+        let (y, weight) = (self.excess(errors), self.weight(errors));
+        let scale = 1.0 / (self.limit() * self.bet_weight);
         for (evidence, bet) in self.evidence.iter_mut().zip(BETS) {
-            *evidence = (evidence.max(1.0) * (1.0 + bet * self.bet_scale * y)).min(f64::MAX);
+            // Below 0 only for a view with twice the foreground of all before it.
+            *evidence = (evidence.max(1.0) * (1.0 + bet * scale * y).max(0.0)).min(f64::MAX);
         }
+        self.bet_weight = self.bet_weight.max(weight);
         self.views += 1;
-        self.weight_sum += self.weight(errors);
+        self.weight_sum += weight;
         let step = y - self.mean;
         self.mean += step / self.views as f64;
         self.squares += step * (y - self.mean);
@@ -131,8 +137,12 @@ impl Audit {
     /// The error of a mean y; `None` where no view shows a surface.
     fn error(&self, y: f64) -> Option<f64> {
         let weight = self.weight_sum / self.views.max(1) as f64;
-        let limit = if self.term.statistic() == Statistic::P95 { MOST_OVER } else { self.term.most_ratio() };
-        (weight > 0.0).then(|| (limit + y / weight).clamp(0.0, 1.0))
+        (weight > 0.0).then(|| (self.limit() + y / weight).clamp(0.0, 1.0))
+    }
+
+    /// The limit on the mean, or on the share of views over.
+    fn limit(&self) -> f64 {
+        if self.term.statistic() == Statistic::P95 { MOST_OVER } else { self.term.most_ratio() }
     }
 
     /// y of a view: at most 0 in the mean while the promise is kept.

@@ -140,8 +140,7 @@ fn bounds_on_percentiles_hold() {
     }
 }
 
-/// Models that fill a tenth of the pictures: broken promises about them are found later, as bets rise only as far as they can
-/// lose nothing. The limits of half a picture grow by the share, and by a fifth for its variation.
+/// Models that fill a tenth of the pictures.
 #[test]
 fn audits_find_broken_promises_and_rarely_alarm_at_the_budget() {
     for stream in Stream::all().iter().filter(|stream| stream.variation() <= 0.6) {
@@ -155,8 +154,7 @@ fn audits_find_broken_promises_and_rarely_alarm_at_the_budget() {
             stream.foreground(),
             100.0 * alarmed
         );
-        let later = 1.2 * 0.5 / stream.foreground();
-        assert!(twice as f64 <= 60.0 * later && half_more as f64 <= 140.0 * later, "{}", stream.name);
+        assert!(twice <= 60 && half_more <= 140, "{}: {twice}, {half_more}", stream.name);
         assert!(alarmed <= 0.04, "{}", stream.name);
     }
 }
