@@ -34,6 +34,19 @@ pub(crate) struct Candidate {
     pub(crate) camera: PinholeCamera,
 }
 
+/// The end of an audit.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Ended {
+    /// The workload and the method.
+    pub(crate) kind: (u64, String),
+    /// The time without waits; `None` for a failure.
+    pub(crate) busy_s: Option<f64>,
+    /// The time with waits.
+    pub(crate) wall_s: f64,
+    /// A random number for the pause that follows.
+    pub(crate) random: u64,
+}
+
 /// The audits of one compositor so far, as far as they matter to the next.
 #[derive(Debug, Default)]
 pub(crate) struct AuditChoice {
@@ -82,12 +95,13 @@ impl AuditChoice {
         }
     }
 
-    /// The audit of a view of a kind has ended: it took `busy_s`, or failed. Audits may take `share` of the time.
-    pub(crate) fn end(&mut self, now: Instant, kind: (u64, String), busy_s: Option<f64>, share: f64, random: u64) {
+    /// The audit has ended. Audits may take `share` of the time.
+    pub(crate) fn end(&mut self, now: Instant, ended: Ended, share: f64) {
+        let Ended { kind, busy_s, wall_s, random } = ended;
         self.is_auditing = false;
         let is_first = !self.kinds.contains(&kind);
         let pause = match busy_s {
-            None => FAILED_PAUSE,
+            None => random_pause(wall_s, share, random).max(FAILED_PAUSE),
             Some(_) if is_first => FIRST_PAUSE,
             Some(busy_s) => random_pause(busy_s, share, random),
         };
@@ -132,8 +146,8 @@ mod tests {
         Candidate { stream, random, set: set_content(0), camera }
     }
 
-    fn kind() -> (u64, String) {
-        (1, "mesh".to_owned())
+    fn ended(busy_s: Option<f64>, random: u64) -> Ended {
+        Ended { kind: (1, "mesh".to_owned()), busy_s, wall_s: 0.0, random }
     }
 
     /// Audits `views` at a time, one after the other without pauses: the streams that were chosen.
@@ -145,7 +159,7 @@ mod tests {
             let views = views(round);
             if let Some(chosen) = choice.choose(now, &views, 1e-3) {
                 streams.push(views[chosen].stream);
-                choice.end(now, kind(), Some(0.0), 0.01, 1);
+                choice.end(now, ended(Some(0.0), 1), 0.01);
             }
         }
         streams
@@ -157,12 +171,12 @@ mod tests {
         let views = [view(1, 0.0, 9), view(1, 1.0, 3), view(1, 2.0, 5)];
         assert_eq!(choice.choose(now, &views, 1e-3), Some(1));
         assert_eq!(choice.choose(now, &views, 1e-3), None, "one at a time");
-        choice.end(now, kind(), Some(0.02), 0.01, u64::MAX / 3);
+        choice.end(now, ended(Some(0.02), u64::MAX / 3), 0.01);
         let later = now + FIRST_PAUSE;
         assert_eq!(choice.choose(now, &views, 1e-3), None, "not due");
         assert_eq!(choice.choose(later, &views, 1e-3), Some(2), "the place of the first was audited");
         let other_set = [Candidate { set: set_content(1), ..view(1, 1.0, 3) }];
-        choice.end(later, kind(), None, 0.01, 0);
+        choice.end(later, ended(None, 0), 0.01);
         assert_eq!(choice.choose(later + FAILED_PAUSE, &other_set, 1e-3), Some(0));
     }
 

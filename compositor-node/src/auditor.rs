@@ -10,7 +10,7 @@ use node::{DirectWork, NodeMetrics, Pinned, PlansInForce, Scenes, ViewAudit, Vie
 use parking_lot::Mutex;
 use tonic::Status;
 
-use crate::audit_choice::{AuditChoice, Candidate};
+use crate::audit_choice::{AuditChoice, Candidate, Ended};
 use crate::batch::{BatchKey, Source, Waiting};
 use crate::sets::ReadySet;
 
@@ -79,7 +79,10 @@ impl Auditor {
         let (plan_epoch, workload_number, random) = (plan.plan_epoch, plan.workload_number, *random);
         let kind = (workload_number, plan.method.clone().unwrap_or_default());
         let (stream, camera) = (*stream, *camera);
-        let compared = self.compare(chosen, order).await;
+        let start = Instant::now();
+        // Whatever becomes of the task, the next audit follows.
+        let compared = tokio::spawn(self.clone().compare(chosen, order)).await;
+        let compared = compared.unwrap_or_else(|error| Err(Status::internal(error.to_string())));
         let busy_s = match compared {
             Ok((errors, busy_s)) => {
                 let view = AuditedView { plan_epoch, stream, camera, errors };
@@ -90,18 +93,26 @@ impl Auditor {
             }
             Err(status) => {
                 tracing::debug!(reason = status.message(), "a view is not audited");
+                self.metrics.failed_audits.inc();
                 None
             }
         };
         let share = order.time_ratio.min(self.direct_share);
         // Another number: the chosen one is the least of several.
         let random = self::random([random, workload_number, plan_epoch]);
-        self.choice.lock().end(Instant::now(), kind, busy_s, share, random);
+        let ended = Ended { kind, busy_s, wall_s: start.elapsed().as_secs_f64(), random };
+        self.choice.lock().end(Instant::now(), ended, share);
     }
 
-    async fn compare(&self, chosen: Chosen, order: AuditOrder) -> Result<(cluster::ProbedView, f64), Status> {
+    async fn compare(self: Arc<Self>, chosen: Chosen, order: AuditOrder) -> Result<(cluster::ProbedView, f64), Status> {
         let Chosen { plan, set, camera, scene_time_s, .. } = chosen;
-        self.scenes.ensure(&plan.workload.scene).await?;
+        let scene = &plan.workload.scene;
+        if !self.scenes.engine().has_scene(scene.hash.as_str()) {
+            // Loading may take minutes: the set is not kept for it.
+            drop(set);
+            self.scenes.ensure(scene).await?;
+            return Err(Status::unavailable("the scene was not loaded"));
+        }
         // As a certificate's views are: without the exposure and the curve of a client.
         let planes = ViewPlanes { antialias: order.antialias, ..ViewPlanes::COLOR };
         let direct = DirectWork::of(&plan.workload, vec![camera], ViewPlanes { inverse_depth: true, ..planes });

@@ -21,6 +21,7 @@ mod memory;
 mod planner_study;
 mod process;
 mod progress;
+mod promise;
 pub mod reference_views;
 pub mod sampling_study;
 mod scaling;

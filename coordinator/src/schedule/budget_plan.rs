@@ -290,6 +290,11 @@ impl BudgetPlan {
                 ProbeView::Fresh(number) => ProbeView::Fresh(number / 2),
             });
         }
+        let view = match view {
+            // Every second number of the sequence would be in one half of the places.
+            ProbeView::Screening(number) => ProbeView::Screening(number / 2),
+            fresh => fresh,
+        };
         let place = (view.place(0)[0] * poses as f64) as usize;
         self.poses[place.min(poses - 1)].resized(self.budgeted.typical_view.size_px)
     }

@@ -47,6 +47,21 @@ impl BudgetState {
         Self { plan, in_force, switching, is_to_be_tried_again: false, findings }
     }
 
+    /// Whether the plan began before the last promise was broken: it does not know the audited viewpoints.
+    pub(super) fn is_superseded(&self) -> bool {
+        self.findings.is_given_up || self.findings.last_break().is_some_and(|at| self.plan.began < at)
+    }
+
+    /// The choice in force, chosen again. Its audits go on, unless its promise is broken or another.
+    pub(super) fn again(&mut self, now: Duration, chosen: Chosen) -> InForce {
+        let is_broken = self.broken().is_some();
+        let again = InForce::begin(now, chosen);
+        let Some(before) = self.in_force.take() else { return again };
+        let is_same = before.chosen.row == again.chosen.row && before.chosen.budget == again.chosen.budget;
+        let watch = if is_same && !is_broken && again.watch.is_some() { before.watch } else { again.watch };
+        InForce { plan_epoch: before.plan_epoch, watch, chosen: again.chosen, since: again.since, is_applied: true }
+    }
+
     /// The broken promise, until another choice is in force and applied.
     pub(super) fn broken(&self) -> Option<&Broken> {
         let is_replaced = |broken: &&Broken| {

@@ -6,7 +6,7 @@ use cluster::{MeasuredCosts, Policy, PolicyChoice, PromiseState};
 use glam::UVec2;
 use planner::Event as PlannerEvent;
 
-use super::budget_cluster::{Cluster, planned, recorded, viewer};
+use super::budget_cluster_tests::{Cluster, planned, recorded, viewer};
 use super::{Command, Event, Opening, PolicyOverride, ViewProbe, replay};
 
 #[test]

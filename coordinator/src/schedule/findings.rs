@@ -1,13 +1,16 @@
-//! What audits have found for a workload, over all of its representations.
+//! Findings of audits for a workload, over all of its representations.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use cluster::AuditedView;
 use depth_image::PinholeCamera;
+use planner::Budget;
 
 /// Audited viewpoints that are remembered for the next plan.
-const MAX_POSES: usize = 256;
+const MAX_POSES: usize = 32;
+/// The beginning of a text about viewers that stay above the budget.
+pub(super) const BROKEN_HERE: &str = "Broken here";
 /// Viewers above the budget that are remembered.
 const MAX_VIEWERS: usize = 64;
 /// So many broken promises within this time are the last.
@@ -36,8 +39,9 @@ pub(super) struct Findings {
 /// A promise that audits have found to be broken.
 #[derive(Debug, Clone)]
 pub(super) struct Broken {
-    /// The choice that was promised.
+    /// The choice that was promised, and its budget.
     pub(super) choice_number: u64,
+    pub(super) budget: Budget,
     pub(super) since: Duration,
     /// The finding and its consequence in words.
     pub(super) reason: String,
@@ -65,8 +69,10 @@ impl Findings {
             return;
         };
         if self.viewers.len() < MAX_VIEWERS || self.viewers.contains_key(&viewer) {
-            let above = ViewerAbove { camera: view.camera, error, since: now, is_planned_for: false };
-            self.viewers.insert(viewer, above);
+            // A set of another moment is audited anew from the same place.
+            let before = self.viewers.get(&viewer).filter(|before| before.camera == view.camera);
+            let (since, is_planned_for) = before.map_or((now, false), |before| (before.since, before.is_planned_for));
+            self.viewers.insert(viewer, ViewerAbove { camera: view.camera, error, since, is_planned_for });
         }
     }
 
@@ -78,9 +84,23 @@ impl Findings {
         self.breaks.len() >= MOST_BREAKS
     }
 
-    /// The viewpoints that a plan has to be for, beside the view cells.
+    /// The time of the last broken promise.
+    pub(super) fn last_break(&self) -> Option<Duration> {
+        self.breaks.last().copied()
+    }
+
+    /// The viewpoints that a plan has to be for, beside the view cells: those of viewers above the budget, and the last.
     pub(super) fn poses_to_join(&self) -> Vec<PinholeCamera> {
-        if self.joins_poses { self.poses.iter().copied().collect() } else { Vec::new() }
+        if !self.joins_poses {
+            return Vec::new();
+        }
+        let above = self.viewers.values().map(|viewer| viewer.camera);
+        above.chain(self.poses.iter().copied()).collect()
+    }
+
+    /// View cells have moved: earlier viewpoints are of others.
+    pub(super) fn forget_poses(&mut self) {
+        self.poses.clear();
     }
 
     /// Forgets viewers that have moved on, as `is_there` says of a node and a camera, and asks for a plan for those that
@@ -106,6 +126,6 @@ impl Findings {
         let stays = self.viewers.iter().filter(|(_, viewer)| now.saturating_sub(viewer.since) >= STAYS_AFTER);
         let texts = stays.map(|((node, stream), viewer)| format!("viewer {stream} of {node}: {}", viewer.error));
         let texts: Vec<String> = texts.take(3).collect();
-        if texts.is_empty() { String::new() } else { format!(" Broken here ({}).", texts.join("; ")) }
+        if texts.is_empty() { String::new() } else { format!(" {BROKEN_HERE} ({}).", texts.join("; ")) }
     }
 }

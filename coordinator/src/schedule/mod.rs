@@ -44,7 +44,7 @@ mod workload_state;
 #[cfg(test)]
 mod audit_tests;
 #[cfg(test)]
-mod budget_cluster;
+mod budget_cluster_tests;
 #[cfg(test)]
 mod budget_tests;
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! The audits of a representation in force.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use cluster::{AuditReport, AuditSummary, AuditedView, ErrorInterval, ProbedView};
@@ -7,9 +8,14 @@ use planner::{Audit, Certificate, ErrorTerm, Interval, Statistic, ViewErrors};
 
 /// A rate is not known before.
 const RATE_AFTER: Duration = Duration::from_secs(60);
-/// The views in which twice the budget is found, 19 times in 20 (`docs/planner.md`).
+/// Audits within this time are the rate.
+const RATE_OVER: Duration = Duration::from_secs(600);
+/// The views in which twice the budget is found, 19 times in 20: of a mean, and of a share of views (`docs/planner.md`).
 const VIEWS_TO_FIND_TWICE: f64 = 60.0;
+const VIEWS_TO_FIND_TWICE_P95: f64 = 660.0;
 const HOUR_S: f64 = 3600.0;
+/// A view that shows less says little by itself.
+const LEAST_FOREGROUND: f64 = 0.01;
 
 /// The audits of one promise.
 #[derive(Debug, Clone)]
@@ -20,22 +26,32 @@ pub(super) struct Watch {
     covered_views: u64,
     uncovered_views: u64,
     busy_s: f64,
+    /// The times of reports of late, and their audits.
+    recent: VecDeque<(Duration, usize)>,
 }
 
 impl Watch {
     /// Without views yet.
     pub(super) fn begin(now: Duration, term: ErrorTerm, certificate: &Certificate) -> Self {
         let audit = Audit::new(term, certificate.foreground_ratio);
-        Self { term, audit, began: now, covered_views: 0, uncovered_views: 0, busy_s: 0.0 }
+        Self { term, audit, began: now, covered_views: 0, uncovered_views: 0, busy_s: 0.0, recent: VecDeque::new() }
     }
 
     /// Takes a report, as far as its views are of plans since `plan_epoch`; whether the promise is broken.
-    pub(super) fn take(&mut self, plan_epoch: u64, report: &AuditReport) -> bool {
+    pub(super) fn take(&mut self, now: Duration, plan_epoch: u64, report: &AuditReport) -> bool {
         self.covered_views = self.covered_views.saturating_add(report.covered_views);
         self.uncovered_views = self.uncovered_views.saturating_add(report.uncovered_views);
         self.busy_s += report.busy_s;
         let own = report.views.iter().filter(|view| view.plan_epoch >= plan_epoch);
-        own.for_each(|view| self.audit.observe(&errors(&view.errors)));
+        let mut count = 0;
+        for view in own {
+            self.audit.observe(&errors(&view.errors));
+            count += 1;
+        }
+        self.recent.push_back((now, count));
+        while self.recent.front().is_some_and(|(at, _)| now.saturating_sub(*at) > RATE_OVER) {
+            self.recent.pop_front();
+        }
         self.audit.is_alarmed()
     }
 
@@ -43,7 +59,8 @@ impl Watch {
     pub(super) fn excess(&self, view: &AuditedView) -> Option<f64> {
         let errors = errors(&view.errors);
         let ratio = errors.error_ratio(self.term.metric());
-        (errors.counts_for(&self.term) && ratio > self.term.most_ratio()).then_some(ratio)
+        let is_above = errors.foreground_ratio >= LEAST_FOREGROUND && ratio > self.term.most_ratio();
+        (errors.counts_for(&self.term) && is_above).then_some(ratio)
     }
 
     /// An error of this budget's metric in words.
@@ -57,21 +74,22 @@ impl Watch {
             audited_views: self.audit.views()[0],
             covered_views: self.covered_views,
             uncovered_views: self.uncovered_views,
-            audits_per_h: self.audits_per_h(now),
+            audits_per_s: self.audits_per_h(now) / HOUR_S,
             busy_s: self.busy_s,
             error: error.map(|Interval { low, mean, high }| ErrorInterval { least: low, mean, greatest: high }),
         }
     }
 
-    /// The rate so far. In the first minute the rate is that of an audit a minute at least.
+    /// The rate of late. In the first minute it is that of an audit a minute at least.
     fn audits_per_h(&self, now: Duration) -> f64 {
         let since = now.saturating_sub(self.began);
-        let audits = self.audit.views().iter().sum::<u64>();
+        let is_recent = |(at, _): &&(Duration, usize)| now.saturating_sub(*at) <= RATE_OVER;
+        let audits: usize = self.recent.iter().filter(is_recent).map(|(_, count)| count).sum();
         let audits = if since < RATE_AFTER { audits.max(1) } else { audits };
-        audits as f64 * HOUR_S / since.max(RATE_AFTER).as_secs_f64()
+        audits as f64 * HOUR_S / since.clamp(RATE_AFTER, RATE_OVER).as_secs_f64()
     }
 
-    /// What audits have found, in words.
+    /// The findings of the audits, in words.
     pub(super) fn finding(&self) -> String {
         let [audited, _] = self.audit.views();
         let of = format!("{audited} of {} views", self.covered_views.max(audited));
@@ -96,7 +114,9 @@ impl Watch {
         let uncovered = self.summary(now).uncovered_ratio();
         let not_covered =
             if uncovered > 0.0 { format!(" Not covered: {:.0} % of views.", uncovered * 100.0) } else { String::new() };
-        let found_s = VIEWS_TO_FIND_TWICE / per_h.max(f64::MIN_POSITIVE) * HOUR_S;
+        let is_mean = self.term.statistic() == Statistic::Mean;
+        let views = if is_mean { VIEWS_TO_FIND_TWICE } else { VIEWS_TO_FIND_TWICE_P95 };
+        let found_s = views / per_h.max(f64::MIN_POSITIVE) * HOUR_S;
         format!(
             " Audits: {}, in {:.1} s of the nodes' time; {per_h:.0} an hour, which find twice the budget within {}.{not_covered}",
             self.finding(),

@@ -9,6 +9,8 @@ use crate::probing::ProbedView;
 
 /// The greatest share of a compositor's time that audits may take.
 pub const MAX_AUDIT_TIME_RATIO: f64 = 0.5;
+/// More seconds than a report is of.
+const MAX_BUSY_S: f64 = 1e6;
 /// More pixels than any view has.
 const MAX_PIXELS: u32 = 1 << 28;
 
@@ -53,7 +55,7 @@ pub struct AuditedView {
     pub errors: ProbedView,
 }
 
-/// What audits say about a promise.
+/// The findings of the audits of a promise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct AuditSummary {
     /// Views that were audited since the representation is in force.
@@ -62,8 +64,8 @@ pub struct AuditSummary {
     pub covered_views: u64,
     /// Views that the promise is not for.
     pub uncovered_views: u64,
-    /// Audits an hour.
-    pub audits_per_h: f64,
+    /// Audits a second, of late.
+    pub audits_per_s: f64,
     /// The nodes' time for drawing and comparing, in s.
     pub busy_s: f64,
     /// `None` for too few views.
@@ -106,7 +108,7 @@ impl AuditReport {
             camera.validate().map_err(|source| InvalidField::Camera { field: "audit.views", source })?;
             errors.validate()?;
         }
-        finite_seconds(self.busy_s, "audit.busy_s")
+        within(self.busy_s, 0.0..=MAX_BUSY_S, "audit.busy_s", "from 0 to 1e6")
     }
 }
 
@@ -120,7 +122,7 @@ impl AuditSummary {
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        finite_seconds(self.audits_per_h, "audit.audits_per_h")?;
+        finite_seconds(self.audits_per_s, "audit.audits_per_s")?;
         finite_seconds(self.busy_s, "audit.busy_s")?;
         let ratios = self.error.map(|ErrorInterval { least, mean, greatest }| [least, mean, greatest]);
         let mut ratios = ratios.into_iter().flatten();

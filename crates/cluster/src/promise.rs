@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use crate::audit::AuditSummary;
 use crate::check::{InvalidField, nonempty, reason, text, within};
 
-/// Fewer audits an hour find little.
-const BARELY_PER_H: f64 = 10.0;
+/// Fewer audits a second, ten an hour, find little.
+const BARELY_PER_S: f64 = 10.0 / 3600.0;
 
 /// A session asks for the cheapest representation that keeps a budget. What its user named stays as it is.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -34,7 +34,7 @@ pub struct Promise {
     pub probe_view_count: u32,
     /// The reason in plain words, with the figures.
     pub reason: String,
-    /// What audits say of the representation in force; `None` where there are none.
+    /// The audits of the representation in force; `None` where there are none.
     pub audit: Option<AuditSummary>,
 }
 
@@ -101,6 +101,6 @@ impl Promise {
     /// Whether audits are too few to find much.
     #[must_use]
     pub fn is_barely_watched(&self) -> bool {
-        self.audit.is_some_and(|audit| audit.audits_per_h < BARELY_PER_H)
+        self.audit.is_some_and(|audit| audit.audits_per_s < BARELY_PER_S)
     }
 }

@@ -93,6 +93,7 @@ pub struct NodeMetrics {
     pub frame_bytes: Counter,
     pub dropped: Family<Reason, Counter>,
     pub audited_views: Counter,
+    pub failed_audits: Counter,
     pub uncovered_views: Family<Reason, Counter>,
     pub audit_s: Counter<f64, AtomicU64>,
     pub streams: Gauge,
@@ -135,6 +136,7 @@ impl NodeMetrics {
             frame_bytes: in_unit(to, "frames", "Encoded frames", Unit::Bytes, counter()),
             dropped: registered(to, "dropped_views", "Views not made or not sent", Family::default()),
             audited_views: registered(to, "audited_views", "Views drawn directly as well, and compared", counter()),
+            failed_audits: registered(to, "failed_audits", "Views that could not be compared", counter()),
             uncovered_views: registered(
                 to,
                 "uncovered_views",

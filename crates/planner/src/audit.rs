@@ -81,7 +81,7 @@ impl Audit {
         let (y, weight) = (self.excess(errors), self.weight(errors));
         let scale = 1.0 / (self.limit() * self.bet_weight);
         for (evidence, bet) in self.evidence.iter_mut().zip(BETS) {
-            // Below 0 only for a view with twice the foreground of all before it.
+            // Below 0 only for a view with twice the foreground of all before it and of the certificate.
             *evidence = (evidence.max(1.0) * (1.0 + bet * scale * y).max(0.0)).min(f64::MAX);
         }
         self.bet_weight = self.bet_weight.max(weight);

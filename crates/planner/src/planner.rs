@@ -175,7 +175,7 @@ impl<P: Pricing> Planner<P> {
     /// Rows that are certified for the budget and within its time, the cheapest first.
     #[must_use]
     pub fn certified(&self) -> Vec<(Choice, Price, Certificate)> {
-        let rows = self.eligible(EXACT).into_iter().map(Choice::Row);
+        let rows = self.eligible(EXACT).into_iter().filter(|&row| self.is_measured_for_time(row)).map(Choice::Row);
         rows.filter_map(|row| Some((row, self.price_of(row), self.certificate_of(row)?.clone()))).collect()
     }
 

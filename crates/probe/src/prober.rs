@@ -25,6 +25,8 @@ const TIMED_VIEWS: usize = 16;
 /// Views of one call take no longer than this, in s, but for a single one: other work waits for a call, and so does the end of
 /// the process.
 const CALL_S: f64 = 1.0;
+/// True views of one call, which may be lit by many rays.
+const TRUTHS_A_CALL: usize = 8;
 /// Times that views are drawn directly for their cost.
 const DIRECT_RUNS: usize = 3;
 /// The most pixels of views that are only timed.
@@ -186,9 +188,11 @@ impl Prober {
         if !missing.is_empty() {
             let (missing, cameras) = missing.into_iter().unzip::<_, _, Vec<_>, Vec<_>>();
             let planes = ViewPlanes { inverse_depth: true, ..self.subject.planes };
-            let work = self.subject.direct_work(cameras, light, planes);
-            let drawn = self.engine.draw_direct(&work, self.turn)?;
-            self.truths.extend(missing.into_iter().zip(drawn.into_iter().map(Arc::new)));
+            for (keys, cameras) in missing.chunks(TRUTHS_A_CALL).zip(cameras.chunks(TRUTHS_A_CALL)) {
+                let work = self.subject.direct_work(cameras.to_vec(), light, planes);
+                let drawn = self.engine.draw_direct(&work, self.turn)?;
+                self.truths.extend(keys.iter().cloned().zip(drawn.into_iter().map(Arc::new)));
+            }
         }
         Ok(keys.iter().map(|key| self.truths[key].clone()).collect())
     }

@@ -152,7 +152,7 @@ fn promise() -> Promise {
             audited_views: 20,
             covered_views: 5_000,
             uncovered_views: 30,
-            audits_per_h: 400.0,
+            audits_per_s: 0.11,
             busy_s: 1.5,
             error: Some(ErrorInterval { least: 0.02, mean: 0.03, greatest: 0.05 }),
         }),

@@ -6,6 +6,7 @@ use app_core::setup::{DeviceArgs, SceneArgs};
 use clap::{Args, Subcommand};
 
 use crate::load::command::LoadArgs;
+use crate::promise::command::PromiseArgs;
 use crate::scaling::command::ScalingArgs;
 use crate::sharing::command::SharingArgs;
 use crate::viewer::command::ViewerBenchArgs;
@@ -58,6 +59,8 @@ pub(super) enum Part {
     Load(LoadArgs),
     /// Measure how the cluster scales with nodes and views, on processes of equal CPU share and in simulation
     Scaling(ScalingArgs),
+    /// Measure what promises of budgets cost a viewer, and how soon a broken one is replaced
+    Promise(PromiseArgs),
     /// Measure a live viewer beside the batches of other clients
     Sharing(SharingArgs),
     /// Measure the viewer in a browser

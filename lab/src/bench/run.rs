@@ -14,7 +14,7 @@ use super::{
 use crate::experiment::Experiment;
 use crate::memory::peak_memory_mb;
 use crate::reference_views::ReferenceViews;
-use crate::{load, scaling, sharing, viewer};
+use crate::{load, promise, scaling, sharing, viewer};
 
 /// Measures everything and writes the report.
 ///
@@ -24,6 +24,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     match &args.part {
         Some(Part::Load(args)) => return load::command::run(args),
         Some(Part::Scaling(args)) => return scaling::command::run(args),
+        Some(Part::Promise(args)) => return promise::command::run(args),
         Some(Part::Sharing(args)) => return sharing::command::run(args),
         Some(Part::Viewer(args)) => return viewer::command::run(args),
         None if args.antialias => return alone(args, antialias::measure),

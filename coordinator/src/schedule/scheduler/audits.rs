@@ -40,7 +40,7 @@ impl Scheduler {
             let error = watch.excess(view).map(|ratio| watch.shown(ratio));
             state.findings.note(now, node, view, error);
         }
-        let is_broken = watch.take(plan_epoch, report);
+        let is_broken = watch.take(now, plan_epoch, report);
         if is_broken && state.broken().is_none() { self.promise_broken(number) } else { Vec::new() }
     }
 
@@ -51,9 +51,10 @@ impl Scheduler {
         let Some(InForce { chosen, watch: Some(watch), .. }) = &state.in_force else { return Vec::new() };
         let (choice_number, row) = (chosen.number, chosen.row.as_ref().map(ToString::to_string).unwrap_or_default());
         let reason = format!("Audits found {} with {row}.", watch.finding());
-        let is_last = state.findings.note_break(now) && may_draw;
-        (state.findings.is_given_up, state.findings.broken) =
-            (is_last, Some(Broken { choice_number, since: now, reason: reason.clone() }));
+        let budget = chosen.budget;
+        state.findings.is_given_up |= state.findings.note_break(now) && may_draw;
+        state.findings.broken = Some(Broken { choice_number, budget, since: now, reason: reason.clone() });
+        state.switching = None;
         self.retreat(number, &reason)
     }
 
@@ -80,7 +81,7 @@ impl Scheduler {
         self.represent(number, direct, Representation::Direct)
     }
 
-    /// What is done about a broken promise, in words.
+    /// A broken promise and its consequence, in words.
     pub(super) fn broken_reason(&self, broken: &Broken, state: &BudgetState) -> String {
         let since_s = self.now.saturating_sub(broken.since).as_secs();
         let next = match (&state.switching, &state.in_force) {
@@ -90,7 +91,7 @@ impl Scheduler {
             }
             _ => "Nothing safer is certified; a plan for the audited viewpoints follows".to_owned(),
         };
-        format!("{} It is broken since {since_s} s. {next}.", broken.reason)
+        format!("{} It has been broken for {since_s} s. {next}.", broken.reason)
     }
 
     fn may_draw_directly(&self, number: u64) -> bool {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cluster::{Costs, PolicyChoice, Promise, PromiseState, SamplePlanes};
+use cluster::{Costs, Policy, PolicyChoice, Promise, PromiseState, SamplePlanes};
 use planner::{Budget, Kept, ProbeId};
 
 use super::Scheduler;
@@ -10,6 +10,7 @@ use crate::schedule::budget_plan::{BudgetPlan, answered, prices};
 use crate::schedule::budget_state::{BudgetState, InForce};
 use crate::schedule::chosen::Chosen;
 use crate::schedule::estimate::Estimate;
+use crate::schedule::findings::BROKEN_HERE;
 use crate::schedule::member::Member;
 use crate::schedule::prices::EqualNodes;
 use crate::schedule::representation::{DRAWN, Representation};
@@ -24,6 +25,8 @@ const OTHER_DEMAND: f64 = 2.0;
 const PROBING_SHARE: f64 = 0.2;
 /// The time between two reports to sessions of how measuring goes on.
 const NEWS: Duration = Duration::from_secs(5);
+/// The same of figures of audits.
+const NEWS_OF_AUDITS: Duration = Duration::from_secs(60);
 
 impl Scheduler {
     /// Commands for budgets that follow from the event that has just been taken.
@@ -72,7 +75,7 @@ impl Scheduler {
 
     fn is_outdated(&self, state: &BudgetState, workload: &WorkloadState, budget: Budget) -> bool {
         let BudgetPlan { budget: planned, device_name, prices: at, began, outcome, .. } = &state.plan;
-        if state.findings.is_given_up {
+        if state.findings.is_given_up && workload.sessions.policy_override().may_draw_directly() {
             return false;
         }
         let has_device = self.serving(workload).any(|(_, member)| member.status.device_name == *device_name);
@@ -83,7 +86,7 @@ impl Scheduler {
         let may_draw = |prices: &EqualNodes| prices.direct_view_s.is_some();
         let is_wrong = !planned.implies(&budget) || may_draw(at) != may_draw(&prices);
         let is_broken = state.findings.is_to_be_planned
-            && outcome.is_some()
+            && (outcome.is_some() || state.is_superseded())
             && state.switching.is_none()
             && self.now.saturating_sub(*began) >= DWELL;
         is_wrong || (outcome.is_none() && !has_device) || (is_lasting && is_other) || is_broken
@@ -105,8 +108,9 @@ impl Scheduler {
         if self.running_probe.is_some() || now < self.probing_paused_until {
             return Vec::new();
         }
-        let plans = self.budgets.values().filter(|state| state.plan.outcome.is_none()).count();
-        let due = self.budgets.iter().filter(|(_, state)| state.plan.is_due(now));
+        let is_open = |state: &&BudgetState| !state.findings.is_given_up && state.plan.outcome.is_none();
+        let plans = self.budgets.values().filter(is_open).count();
+        let due = self.budgets.iter().filter(|(_, state)| !state.findings.is_given_up && state.plan.is_due(now));
         let mut with_node = due.filter_map(|(&number, _)| Some((number, self.node_to_measure(number)?)));
         let Some((number, (name, address))) = with_node.next() else { return Vec::new() };
         let Some(state) = self.budgets.get_mut(&number) else { return Vec::new() };
@@ -162,7 +166,7 @@ impl Scheduler {
         let (Some(state), Some(workload)) = (self.budgets.get_mut(&number), self.workloads.get(&number)) else {
             return commands;
         };
-        let Some(chosen) = state.plan.chosen() else { return commands };
+        let Some(chosen) = state.plan.chosen().filter(|_| !state.is_superseded()) else { return commands };
         let in_force = workload.representation.as_ref().and_then(Representation::row);
         match &chosen.row {
             Some(row) if in_force == Some(row) => commands.extend(self.choose_again(number, chosen)),
@@ -179,11 +183,21 @@ impl Scheduler {
     /// A choice that is in force already: what is promised, and how it is audited, may be new.
     fn choose_again(&mut self, number: u64, chosen: Chosen) -> Vec<Command> {
         let Some(state) = self.budgets.get_mut(&number) else { return Vec::new() };
-        let since = state.in_force.as_ref().map_or(0, |in_force| in_force.plan_epoch);
-        state.in_force = Some(InForce { plan_epoch: since, ..InForce::begin(self.now, chosen) });
+        state.switching = None;
+        state.in_force = Some(state.again(self.now, chosen));
+        self.order_audits(number)
+    }
+
+    /// Has views audited as the choice in force wants it, by another plan where that is new.
+    fn order_audits(&mut self, number: u64) -> Vec<Command> {
         let order = self.audit_order(number);
-        self.workloads.get_mut(&number).into_iter().for_each(|workload| workload.audit = order);
-        self.replan(number, "views are audited otherwise")
+        match self.workloads.get_mut(&number) {
+            Some(workload) if workload.audit != order => {
+                workload.audit = order;
+                self.replan(number, "views are audited otherwise")
+            }
+            _ => Vec::new(),
+        }
     }
 
     /// Has the costs of a chosen row measured, before it is in force.
@@ -221,17 +235,24 @@ impl Scheduler {
         let broken = state.broken().map(|broken| broken.reason.clone());
         if let (Some(broken), Some(in_force)) = (broken, &mut state.in_force) {
             in_force.chosen.certified.retain(|certified| Some(&certified.row) != chosen.row.as_ref());
+            state.is_to_be_tried_again = true;
             return self.retreat(number, &broken);
         }
-        state.in_force = Some(InForce::begin(self.now, chosen.without_row(reason)));
         state.is_to_be_tried_again = true;
-        Vec::new()
+        let keeps =
+            |in_force: &InForce| in_force.chosen.row.is_some() && in_force.chosen.budget.implies(&chosen.budget);
+        if state.in_force.as_ref().is_some_and(keeps) {
+            return Vec::new();
+        }
+        state.in_force = Some(InForce::begin(self.now, chosen.without_row(reason)));
+        self.order_audits(number)
     }
 
     /// Puts a choice in force. Timings of another representation are of other work.
     pub(super) fn represent(&mut self, number: u64, chosen: Chosen, representation: Representation) -> Vec<Command> {
         let Some(state) = self.budgets.get_mut(&number) else { return Vec::new() };
         let budget = chosen.budget;
+        state.switching = None;
         state.findings.forget_viewers();
         state.in_force = Some(InForce::begin(self.now, chosen));
         let order = self.audit_order(number);
@@ -268,10 +289,15 @@ impl Scheduler {
     fn announce(&mut self, number: u64) -> Option<Command> {
         let (promise, now) = (self.promise(number)?, self.now);
         let WorkloadState { announced, sessions, .. } = self.workloads.get_mut(&number)?;
-        let known = |promise: &Promise| (promise.state, promise.budget.clone(), promise.representation.clone());
+        let known = |promise: &Promise| {
+            let is_broken_here = promise.reason.contains(BROKEN_HERE);
+            (promise.state, promise.budget.clone(), promise.representation.clone(), is_broken_here)
+        };
+        let interval = if promise.state == PromiseState::Measuring { NEWS } else { NEWS_OF_AUDITS };
         let is_known = announced.as_ref().is_some_and(|(at, announced)| {
             let news = |promise: &Promise| (promise.reason.clone(), promise.audit);
-            known(announced) == known(&promise) && (now.saturating_sub(*at) < NEWS || news(announced) == news(&promise))
+            known(announced) == known(&promise)
+                && (now.saturating_sub(*at) < interval || news(announced) == news(&promise))
         });
         if is_known {
             return None;
@@ -297,11 +323,14 @@ impl Scheduler {
             return Some(without_figures(&budget, PromiseState::Unreachable, reason.clone()));
         }
         let state = self.budgets.get(&number)?;
-        let holds = |in_force: &&InForce| in_force.is_applied && in_force.chosen.budget.implies(&budget);
+        // Direct drawing keeps every budget on errors.
+        let serves = |in_force: &InForce| in_force.chosen.budget.implies(&budget) || state.findings.is_given_up;
+        let holds = |in_force: &&InForce| in_force.is_applied && serves(in_force);
         let in_force = state.in_force.as_ref().filter(holds);
-        let broken = state.broken();
+        let broken = state.broken().filter(|broken| budget.implies(&broken.budget));
         let outcome = in_force.map(|in_force| &in_force.chosen.outcome);
-        let watch = in_force.and_then(|in_force| in_force.watch.as_ref()).filter(|_| workload.audit.is_some());
+        let is_audited = workload.audit.is_some() && workload.policy() != Some(Policy::Direct);
+        let watch = in_force.and_then(|in_force| in_force.watch.as_ref()).filter(|_| is_audited);
         let certificate = outcome.and_then(|outcome| outcome.certificate.as_ref());
         let asked = || {
             let Load { images, .. } = workload.load();

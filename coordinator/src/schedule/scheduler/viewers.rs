@@ -66,6 +66,9 @@ impl Scheduler {
             return Vec::new();
         }
         self.cells_changed_at = Some(self.now);
+        for number in &changed {
+            self.budgets.get_mut(number).into_iter().for_each(|state| state.findings.forget_poses());
+        }
         changed.into_iter().flat_map(|number| self.replan(number, "sessions look from elsewhere")).collect()
     }
 }

@@ -1,0 +1,119 @@
+//! A cluster with a budget, and a live viewer of it.
+
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::Context as _;
+use app_core::delivery::{open, request};
+use app_core::live::{Drive, Record, drive};
+use client::{Client, Session};
+use cluster::{BudgetRequest, OfferStatus, PolicyChoice, Promise, PromiseState, SessionRequest};
+use depth_image::{Camera, ViewCell};
+use glam::UVec2;
+
+use crate::process::Process;
+
+const SIZE_PX: UVec2 = UVec2::new(200, 150);
+/// Poses of the path: no place comes twice within a measurement of a minute.
+const PATH_POSES: usize = 600;
+/// The longest time until a promise is kept.
+const PLANNED_WITHIN: Duration = Duration::from_secs(240);
+
+/// A running `myriorama up`, which ends when it is dropped.
+pub(super) struct Cluster {
+    client: Client,
+    offer: OfferStatus,
+    pub(super) device: String,
+    _process: Process,
+}
+
+/// A live viewer with a budget, or without one.
+pub(super) struct Viewer {
+    session: Session,
+    path: Vec<depth_image::PinholeCamera>,
+}
+
+impl Cluster {
+    /// A cluster for a scene that keeps its measurements in a folder, with further arguments.
+    ///
+    /// # Errors
+    /// It does not start.
+    pub(super) async fn start(scene: &str, plans: &Path, further: &[&str]) -> anyhow::Result<Self> {
+        let plans = plans.to_str().context("a folder whose name is no text")?;
+        let arguments = [&["--scene", scene, "--plans", plans][..], further].concat();
+        let mut process = Process::up(&arguments.into_iter().map(str::to_owned).collect::<Vec<_>>())?;
+        let client = Client::connect(&process.address()?).await?;
+        let status = client.status().await?;
+        let device = status.nodes.first().map_or_else(String::new, |node| node.device_name.clone());
+        let offer = status.offers.into_iter().next().context("no scene is on offer")?;
+        Ok(Self { client, offer, device, _process: process })
+    }
+
+    /// The nodes' time for audits so far.
+    ///
+    /// # Errors
+    /// The coordinator does not answer.
+    pub(super) async fn audit_s(&self) -> anyhow::Result<f64> {
+        let status = self.client.status().await?;
+        let promises = status.workloads.into_iter().filter_map(|workload| workload.promise);
+        Ok(promises.filter_map(|promise| Some(promise.audit?.busy_s)).sum())
+    }
+
+    /// A viewer that asks for poses at a rate.
+    ///
+    /// # Errors
+    /// The coordinator refuses.
+    pub(super) async fn viewer(
+        &self,
+        budget: Option<&str>,
+        policy: PolicyChoice,
+        rate_hz: f64,
+    ) -> anyhow::Result<Viewer> {
+        let samples: Vec<_> = self.offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+        let cell = ViewCell::between(&samples).context("no sample cameras")?;
+        let path = cell.orbit(PATH_POSES, SIZE_PX);
+        let asked = request(self.offer.settings.clone(), &path[..1])?;
+        let budget = BudgetRequest { budget: budget.map(str::to_owned), names_method: false };
+        let request = SessionRequest { policy, budget, frames_per_s: Some(rate_hz), ..asked };
+        Ok(Viewer { session: open(&self.client, request).await?, path })
+    }
+}
+
+impl Viewer {
+    /// Waits for the promise of a plan.
+    ///
+    /// # Errors
+    /// Nothing keeps the budget, or the plan takes too long.
+    pub(super) async fn kept(&self) -> anyhow::Result<Promise> {
+        let settled = async {
+            let mut promise = self.session.promise();
+            while promise.as_ref().is_none_or(|promise| promise.state == PromiseState::Measuring) {
+                promise = Some(self.session.another_promise(promise.as_ref()).await);
+            }
+            promise
+        };
+        let promise = tokio::time::timeout(PLANNED_WITHIN, settled).await.context("the plan takes too long")?;
+        let promise = promise.context("there is no promise")?;
+        anyhow::ensure!(promise.state == PromiseState::Kept, "{promise}");
+        Ok(promise)
+    }
+
+    /// The promise, where there is one.
+    pub(super) fn promise(&self) -> Option<Promise> {
+        self.session.promise()
+    }
+
+    /// Follows the path for some seconds, or until `stop` resolves.
+    ///
+    /// # Errors
+    /// The frames end by an error.
+    pub(super) async fn follow(&self, rate_hz: f64, seconds: f64, stop: impl Future) -> anyhow::Result<Record> {
+        let lasting = Duration::from_secs_f64(seconds);
+        let settings = Drive { path: self.path.clone(), rate_hz, lasting, set_step_s: 1.0, set_count: 1 };
+        let record = drive(&self.session, &settings, stop).await?;
+        match record.error.clone() {
+            Some(error) => Err(error).context("the viewer's frames have ended"),
+            None => Ok(record),
+        }
+    }
+}
