@@ -14,7 +14,7 @@ use tokio::sync::{Semaphore, SemaphorePermit};
 use crate::walk::State;
 
 /// The time within which a page does what it should, on a busy machine.
-pub const SOON: Duration = Duration::from_secs(20);
+pub const SOON: Duration = Duration::from_secs(60);
 
 /// Browsers at a time: each takes a core and some 300 MB.
 static PLACES: Semaphore = Semaphore::const_new(2);
