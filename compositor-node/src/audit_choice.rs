@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use cluster::SetContent;
+use cluster::{SetContent, is_one_place};
 use depth_image::PinholeCamera;
 
 /// Streams that were audited last, which wait for others.
@@ -18,11 +18,10 @@ const WAITED_FOR: Duration = Duration::from_secs(5);
 const MAX_AUDITED: usize = 256;
 /// Kinds of views that are remembered.
 const MAX_KINDS: usize = 16;
-/// The pause after the first audit of a kind, which may have built shaders, and after a failure.
+/// The pause after the first audit of a kind, which may have built shaders.
 const FIRST_PAUSE: Duration = Duration::from_secs(1);
+/// The least pause after a failure.
 const FAILED_PAUSE: Duration = Duration::from_secs(10);
-/// Directions that differ less, in radians, are one.
-const LEAST_TURN: f32 = 1e-3;
 
 /// A view that could be audited.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,8 +114,8 @@ impl AuditChoice {
     }
 }
 
-/// A pause after work of `busy_s` that takes `share` of the time in the mean: exponential, so that it does not fall into step
-/// with whoever moves.
+/// A pause after work of `busy_s` that takes `share` of the time in the mean. It is exponential: an even one could keep step
+/// with a path that repeats.
 fn random_pause(busy_s: f64, share: f64, random: u64) -> Duration {
     // Above 0 and at most 1.
     let unit = ((random >> 11) + 1) as f64 / (1_u64 << 53) as f64;
@@ -125,10 +124,8 @@ fn random_pause(busy_s: f64, share: f64, random: u64) -> Duration {
 
 /// Whether a view was audited from the same set and about the same place.
 fn is_near((set, camera): &(SetContent, PinholeCamera), view: &Candidate, least_apart_m: f32) -> bool {
-    let turn = camera.forward_in_world().distance(view.camera.forward_in_world());
     *set == view.set
-        && camera.eye_in_world.distance(view.camera.eye_in_world) <= least_apart_m
-        && turn <= LEAST_TURN
+        && is_one_place(camera, &view.camera, least_apart_m)
         && camera.size_px == view.camera.size_px
         && camera.focal_px == view.camera.focal_px
 }

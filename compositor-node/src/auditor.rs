@@ -4,7 +4,7 @@ use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, AuditOrder, AuditedView};
+use cluster::{Assignment, AuditOrder, AuditedView, MOST_PLANNED_PIXELS, ProbedView};
 use depth_image::{PinholeCamera, ViewPlanes};
 use node::{DirectWork, NodeMetrics, Pinned, PlansInForce, Scenes, ViewAudit, ViewProbes, ViewWork, blocking};
 use parking_lot::Mutex;
@@ -13,9 +13,6 @@ use tonic::Status;
 use crate::audit_choice::{AuditChoice, Candidate, Ended};
 use crate::batch::{BatchKey, Source, Waiting};
 use crate::sets::ReadySet;
-
-/// A promise is for views of up to this many times the planned pixels, or of that share of them.
-const MOST_PIXELS: f64 = 2.0;
 
 /// The audits of one compositor. One is under way at a time.
 pub(crate) struct Auditor {
@@ -59,19 +56,20 @@ impl Auditor {
         }
     }
 
+    /// The views are of one set, as views that are made together are.
     fn choose(&self, plan: &Arc<Assignment>, order: &AuditOrder, covered: &[&Waiting]) -> Option<Chosen> {
-        let candidates = covered.iter().filter_map(|waiting| {
-            let set = waiting.key.content?;
+        let first = covered.first()?;
+        let Source::Set(set) = &first.source else { return None };
+        let scene_time_s = plan.workload.timeline.time_s(set_index(&first.key))?;
+        let candidate = |waiting: &&Waiting| {
             let (stream, camera) = (waiting.reply.outbox().stream, waiting.view.camera);
             let random = random([plan.plan_epoch, stream, waiting.view.frame]);
-            Some(Candidate { stream, random, set, camera })
-        });
-        let candidates: Vec<Candidate> = candidates.collect();
+            Candidate { stream, random, set: set.content, camera }
+        };
+        let candidates: Vec<Candidate> = covered.iter().map(candidate).collect();
         let place = self.choice.lock().choose(Instant::now(), &candidates, order.least_apart_m as f32)?;
-        let (waiting, Candidate { stream, random, camera, .. }) = (covered[place], candidates[place]);
-        let Source::Set(set) = waiting.source.clone() else { return None };
-        let scene_time_s = plan.workload.timeline.time_s(set_index(&waiting.key))?;
-        Some(Chosen { plan: plan.clone(), set, stream, random, camera, scene_time_s })
+        let Candidate { stream, random, camera, .. } = candidates[place];
+        Some(Chosen { plan: plan.clone(), set: set.clone(), stream, random, camera, scene_time_s })
     }
 
     async fn audit(self: Arc<Self>, chosen: Chosen, order: AuditOrder) {
@@ -104,7 +102,7 @@ impl Auditor {
         self.choice.lock().end(Instant::now(), ended, share);
     }
 
-    async fn compare(self: Arc<Self>, chosen: Chosen, order: AuditOrder) -> Result<(cluster::ProbedView, f64), Status> {
+    async fn compare(self: Arc<Self>, chosen: Chosen, order: AuditOrder) -> Result<(ProbedView, f64), Status> {
         let Chosen { plan, set, camera, scene_time_s, .. } = chosen;
         let scene = &plan.workload.scene;
         if !self.scenes.engine().has_scene(scene.hash.as_str()) {
@@ -139,7 +137,7 @@ fn uncovered(plan: &Assignment, order: &AuditOrder, waiting: &Waiting) -> Option
         (waiting.place.is_neighbour, "another view cell's set"),
         (refinement.step + 1 < refinement.steps, "unfinished light"),
         (key.planes.antialias != order.antialias, "other samples a pixel"),
-        (!(MOST_PIXELS.recip()..=MOST_PIXELS).contains(&pixels), "another size"),
+        (!(MOST_PLANNED_PIXELS.recip()..=MOST_PLANNED_PIXELS).contains(&pixels), "another size"),
         (order.with_sample_images && set.sample_images.is_empty(), "a set of an earlier plan"),
     ];
     reasons.into_iter().find_map(|(applies, reason)| applies.then_some(reason))

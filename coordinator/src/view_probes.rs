@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use cluster::{MeasureCosts, ProbeViews, ProbedView, ProbedViews};
+use cluster::{MeasureCosts, ProbeViews, ProbedViews};
 use node::blocking;
 use planner::{
-    Event as PlannerEvent, Kept, KeptKey, MAX_PROBE_VIEWS, ProbeId, Probed, RowCosts, Timed, ViewErrors, median_costs,
+    Event as PlannerEvent, Kept, KeptKey, MAX_PROBE_VIEWS, ProbeId, Probed, RowCosts, Timed, median_costs,
     shortened_reason,
 };
 use tokio::sync::mpsc;
@@ -15,7 +15,7 @@ use wire::rpc::NodeClient;
 
 use crate::grpc_status::{of_node, within};
 use crate::measuring::{known, measured_on_present_nodes};
-use crate::schedule::{Event, ViewProbe};
+use crate::schedule::{Event, ViewProbe, view_errors};
 use crate::shared::Shared;
 
 /// How long a node may measure, waits for other work included.
@@ -112,7 +112,7 @@ async fn probed(shared: &Shared, probe: ViewProbe) -> Result<PlannerEvent, Statu
     let (Some((row, _)), Some([answer])) = (requests.first(), answers.first().map(Vec::as_slice)) else {
         return Err(Status::out_of_range("a comparison is of one row"));
     };
-    let views = views.into_iter().zip(answer.views.iter().map(errors)).collect();
+    let views = views.into_iter().zip(answer.views.iter().map(view_errors)).collect();
     let probed = Probed { id, row: *row, views, costs: row_costs(answer), busy_s };
     Ok(check(id, PlannerEvent::Probed(probed)))
 }
@@ -149,9 +149,4 @@ fn row_costs(answer: &ProbedViews) -> RowCosts {
         load_set_s: costs.load_set_s,
         reconstruct_view_s: costs.reconstruct_view_s,
     }
-}
-
-fn errors(view: &ProbedView) -> ViewErrors {
-    let ProbedView { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio } = *view;
-    ViewErrors { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio }
 }

@@ -215,6 +215,7 @@ fn a_viewer_that_stays_above_the_budget_is_named_and_planned_for_once() {
     cluster.wait(15);
     let promise = cluster.promise();
     assert!(promise.reason.contains("Broken here (viewer 3 of n0: flip 0.5000)"), "{promise}");
+    assert_eq!(promise.audit.unwrap().viewers_above, 1);
     assert_ne!(promise.state, PromiseState::Broken, "one view is no mean");
     let after = cluster.probes.len();
     assert!(after > before, "planned again");

@@ -1,15 +1,12 @@
 //! Budgets of sessions, and what the schedule needs to plan for one.
 
-use cluster::{InvalidField, Workload, nonempty};
+use cluster::{InvalidField, MOST_PLANNED_PIXELS, Workload, nonempty};
 use depth_image::{Antialias, Camera, PinholeCamera, ViewCell};
 use glam::UVec2;
 use planner::{Budget, Ladder, Row};
 use serde::{Deserialize, Serialize};
 
 use super::cells::first_indices;
-
-/// A promise holds for views of up to this many times the planned pixels, or of that share of them.
-const MOST_PIXELS: f64 = 2.0;
 
 /// A session's budget, and the representations among which it chooses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,7 +40,7 @@ impl Budgeted {
             ..of.clone()
         };
         let pixels = |of: &Self| of.typical_view.pixel_count() as f64;
-        let is_of_size = (1.0 / MOST_PIXELS..=MOST_PIXELS).contains(&(pixels(other) / pixels(self)));
+        let is_of_size = (MOST_PLANNED_PIXELS.recip()..=MOST_PLANNED_PIXELS).contains(&(pixels(other) / pixels(self)));
         of_any_view(self) == of_any_view(other) && is_of_size
     }
 

@@ -9,8 +9,6 @@ use planner::Budget;
 
 /// Audited viewpoints that are remembered for the next plan.
 const MAX_POSES: usize = 32;
-/// The beginning of a text about viewers that stay above the budget.
-pub(super) const BROKEN_HERE: &str = "Broken here";
 /// Viewers above the budget that are remembered.
 const MAX_VIEWERS: usize = 64;
 /// So many broken promises within this time are the last.
@@ -121,11 +119,20 @@ impl Findings {
         self.viewers.clear();
     }
 
-    /// Viewers that stay where the error is above the budget, in words; empty without any.
+    /// The number of viewers that stay where the error is above the budget.
+    pub(super) fn viewers_above(&self, now: Duration) -> u32 {
+        self.staying(now).count() as u32
+    }
+
+    fn staying(&self, now: Duration) -> impl Iterator<Item = (&(String, u64), &ViewerAbove)> {
+        self.viewers.iter().filter(move |(_, viewer)| now.saturating_sub(viewer.since) >= STAYS_AFTER)
+    }
+
+    /// These viewers in words; empty without any.
     pub(super) fn broken_here(&self, now: Duration) -> String {
-        let stays = self.viewers.iter().filter(|(_, viewer)| now.saturating_sub(viewer.since) >= STAYS_AFTER);
-        let texts = stays.map(|((node, stream), viewer)| format!("viewer {stream} of {node}: {}", viewer.error));
+        let texts =
+            self.staying(now).map(|((node, stream), viewer)| format!("viewer {stream} of {node}: {}", viewer.error));
         let texts: Vec<String> = texts.take(3).collect();
-        if texts.is_empty() { String::new() } else { format!(" {BROKEN_HERE} ({}).", texts.join("; ")) }
+        if texts.is_empty() { String::new() } else { format!(" Broken here ({}).", texts.join("; ")) }
     }
 }

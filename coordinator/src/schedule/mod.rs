@@ -76,3 +76,4 @@ pub use prediction::pipeline_s;
 pub use prices::{EqualNodes, STILL_SET_S};
 pub use scheduler::Scheduler;
 pub use search::Division;
+pub(crate) use watch::view_errors;

@@ -45,7 +45,7 @@ impl Watch {
         let own = report.views.iter().filter(|view| view.plan_epoch >= plan_epoch);
         let mut count = 0;
         for view in own {
-            self.audit.observe(&errors(&view.errors));
+            self.audit.observe(&view_errors(&view.errors));
             count += 1;
         }
         self.recent.push_back((now, count));
@@ -57,7 +57,7 @@ impl Watch {
 
     /// The error of a view by itself, if it is above the budget.
     pub(super) fn excess(&self, view: &AuditedView) -> Option<f64> {
-        let errors = errors(&view.errors);
+        let errors = view_errors(&view.errors);
         let ratio = errors.error_ratio(self.term.metric());
         let is_above = errors.foreground_ratio >= LEAST_FOREGROUND && ratio > self.term.most_ratio();
         (errors.counts_for(&self.term) && is_above).then_some(ratio)
@@ -77,6 +77,7 @@ impl Watch {
             audits_per_s: self.audits_per_h(now) / HOUR_S,
             busy_s: self.busy_s,
             error: error.map(|Interval { low, mean, high }| ErrorInterval { least: low, mean, greatest: high }),
+            viewers_above: 0,
         }
     }
 
@@ -136,7 +137,8 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-fn errors(view: &ProbedView) -> ViewErrors {
+/// Errors as planners have them.
+pub(crate) fn view_errors(view: &ProbedView) -> ViewErrors {
     let ProbedView { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio } = *view;
     ViewErrors { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio }
 }

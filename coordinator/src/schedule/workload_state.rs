@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use cluster::{AchievedTime, AuditOrder, Costs, Policy, PolicyChoice, Promise, Quality, Workload};
+use cluster::{AchievedTime, AuditOrder, Costs, Policy, PolicyChoice, Promise, Quality, Workload, is_one_place};
 use depth_image::{Camera, ExposureEv, PinholeCamera, ViewCell};
 use glam::UVec2;
 
@@ -18,8 +18,6 @@ use super::{Load, Opening, PolicyOverride};
 
 /// A workload of which nothing is asked for this long gives nodes to others that need them.
 const IDLE_AFTER: Duration = Duration::from_secs(10);
-/// Directions that differ less, in radians, are one.
-const LEAST_TURN: f32 = 1e-3;
 
 /// Sessions that share samples, and what the cluster does for them.
 #[derive(Debug, Clone)]
@@ -204,12 +202,9 @@ impl WorkloadState {
     }
 
     /// Whether a live viewer of a node looks from about the place of a camera.
-    pub(super) fn is_viewed_from(&self, node: &str, camera: &PinholeCamera, near_m: f32) -> bool {
-        let is_near = |view: &PinholeCamera| {
-            let turn = view.forward_in_world().distance(camera.forward_in_world());
-            view.eye_in_world.distance(camera.eye_in_world) <= near_m && turn <= LEAST_TURN
-        };
-        self.live_viewpoints.get(node).is_some_and(|views| views.iter().any(is_near))
+    pub(super) fn is_viewed_from(&self, node: &str, camera: &PinholeCamera, least_apart_m: f32) -> bool {
+        let views = self.live_viewpoints.get(node).into_iter().flatten();
+        views.into_iter().any(|view| is_one_place(view, camera, least_apart_m))
     }
 
     /// Viewers have moved, come or gone: cells follow when that is due.

@@ -9,6 +9,10 @@ use crate::probing::ProbedView;
 
 /// The greatest share of a compositor's time that audits may take.
 pub const MAX_AUDIT_TIME_RATIO: f64 = 0.5;
+/// A promise is for views of up to this many times the planned pixels, or of that share of them.
+pub const MOST_PLANNED_PIXELS: f64 = 2.0;
+/// Directions that differ less, in radians, are one.
+const LEAST_TURN: f32 = 1e-3;
 /// More seconds than a report is of.
 const MAX_BUSY_S: f64 = 1e6;
 /// More pixels than any view has.
@@ -70,6 +74,8 @@ pub struct AuditSummary {
     pub busy_s: f64,
     /// `None` for too few views.
     pub error: Option<ErrorInterval>,
+    /// Viewers that stay where the error is above the budget.
+    pub viewers_above: u32,
 }
 
 /// An error as a ratio. It lies in the interval with 95 % confidence, however often that is looked at.
@@ -79,6 +85,13 @@ pub struct ErrorInterval {
     pub least: f64,
     pub mean: f64,
     pub greatest: f64,
+}
+
+/// Whether two cameras are at one place, as far as audits are concerned: nearer than `least_apart_m`, in about one direction.
+#[must_use]
+pub fn is_one_place(a: &PinholeCamera, b: &PinholeCamera, least_apart_m: f32) -> bool {
+    let turn = a.forward_in_world().distance(b.forward_in_world());
+    a.eye_in_world.distance(b.eye_in_world) <= least_apart_m && turn <= LEAST_TURN
 }
 
 impl AuditOrder {

@@ -355,7 +355,7 @@ fn views_of(seconds: f64, view_s: f64, most: usize) -> usize {
     ((seconds / view_s.max(1e-3)) as usize).clamp(1, most)
 }
 
-/// The cameras, repeated until a batch of them can be timed, unless a call cannot have so many.
+/// The cameras, repeated up to the size of a timed batch, or to that of a call where it is smaller.
 fn timed_cameras(cameras: &[PinholeCamera], views_a_call: usize) -> Vec<PinholeCamera> {
     let pixels = cameras.first().map_or(1, PinholeCamera::pixel_count).max(1);
     let count = TIMED_VIEWS.min(TIMED_PIXELS / pixels).min(views_a_call).max(cameras.len());

@@ -155,6 +155,7 @@ fn promise() -> Promise {
             audits_per_s: 0.11,
             busy_s: 1.5,
             error: Some(ErrorInterval { least: 0.02, mean: 0.03, greatest: 0.05 }),
+            viewers_above: 1,
         }),
     }
 }

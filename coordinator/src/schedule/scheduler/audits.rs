@@ -1,4 +1,4 @@
-//! Audits: promises that views in force do not keep, and what replaces a broken one.
+//! Audits: promises that views in force do not keep, and their replacement.
 
 use cluster::{AuditOrder, AuditReport};
 use depth_image::PinholeCamera;
@@ -103,8 +103,8 @@ impl Scheduler {
         let now = self.now;
         for (number, state) in &mut self.budgets {
             let Some(workload) = self.workloads.get(number) else { continue };
-            let near_m = LEAST_APART as f32 * state.plan.cell_side_m();
-            let is_there = |node: &str, camera: &PinholeCamera| workload.is_viewed_from(node, camera, near_m);
+            let least_apart_m = LEAST_APART as f32 * state.plan.cell_side_m();
+            let is_there = |node: &str, camera: &PinholeCamera| workload.is_viewed_from(node, camera, least_apart_m);
             state.findings.follow_viewers(now, is_there);
             if state.broken().is_none() {
                 state.findings.broken = None;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cluster::{Costs, Policy, PolicyChoice, Promise, PromiseState, SamplePlanes};
+use cluster::{AuditSummary, Costs, Policy, PolicyChoice, Promise, PromiseState, SamplePlanes};
 use planner::{Budget, Kept, ProbeId};
 
 use super::Scheduler;
@@ -10,7 +10,6 @@ use crate::schedule::budget_plan::{BudgetPlan, answered, prices};
 use crate::schedule::budget_state::{BudgetState, InForce};
 use crate::schedule::chosen::Chosen;
 use crate::schedule::estimate::Estimate;
-use crate::schedule::findings::BROKEN_HERE;
 use crate::schedule::member::Member;
 use crate::schedule::prices::EqualNodes;
 use crate::schedule::representation::{DRAWN, Representation};
@@ -290,8 +289,8 @@ impl Scheduler {
         let (promise, now) = (self.promise(number)?, self.now);
         let WorkloadState { announced, sessions, .. } = self.workloads.get_mut(&number)?;
         let known = |promise: &Promise| {
-            let is_broken_here = promise.reason.contains(BROKEN_HERE);
-            (promise.state, promise.budget.clone(), promise.representation.clone(), is_broken_here)
+            let viewers_above = promise.audit.map_or(0, |audit| audit.viewers_above);
+            (promise.state, promise.budget.clone(), promise.representation.clone(), viewers_above)
         };
         let interval = if promise.state == PromiseState::Measuring { NEWS } else { NEWS_OF_AUDITS };
         let is_known = announced.as_ref().is_some_and(|(at, announced)| {
@@ -357,7 +356,10 @@ impl Scheduler {
                 }
                 (None, None) => state.plan.reason(),
             },
-            audit: watch.map(|watch| watch.summary(self.now)),
+            audit: watch.map(|watch| AuditSummary {
+                viewers_above: state.findings.viewers_above(self.now),
+                ..watch.summary(self.now)
+            }),
         })
     }
 }

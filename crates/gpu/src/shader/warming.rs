@@ -5,7 +5,6 @@
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Once};
-use std::time::Instant;
 
 use parking_lot::Mutex;
 use wgpu::{BindingResource, BindingType, BufferUsages, TextureFormat, TextureUsages, TextureView};
@@ -123,9 +122,7 @@ pub(super) fn warm(
         return;
     }
     // One shader is compiled at a time: on one core.
-    let asked = Instant::now();
     let mut count = gpu.compiled_outside.lock();
-    let waited_s = asked.elapsed().as_secs_f64();
     let done = Gpu::open(DevicePreference::Software).map_err(WarmingError::from).and_then(|second| {
         second.catching(|| {
             let twin = shader.on(&second)?;
@@ -136,8 +133,6 @@ pub(super) fn warm(
         })
     });
     // With the second device closed, the driver has written what it compiled.
-    let total_s = asked.elapsed().as_secs_f64();
-    tracing::debug!(waited_s, total_s, "compiled outside the queue");
     match done {
         Ok(()) => count.compiled += 1,
         Err(error) => {

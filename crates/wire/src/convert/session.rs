@@ -45,7 +45,8 @@ messages! {
     }, then Promise::validate;
     AuditSummary = AuditSummary {
         audits_per_s, busy_s, error;
-        audited_views: audited_view_count, covered_views: covered_view_count, uncovered_views: uncovered_view_count
+        audited_views: audited_view_count, covered_views: covered_view_count, uncovered_views: uncovered_view_count,
+        viewers_above: viewer_above_count
     };
     ErrorInterval = ErrorInterval { ; least: least_ratio, mean: mean_ratio, greatest: greatest_ratio };
 }
