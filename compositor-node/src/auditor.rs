@@ -50,7 +50,7 @@ impl Auditor {
         };
         let covered: Vec<&Waiting> = made.iter().filter(is_covered).collect();
         let counts = [covered.len(), made.len() - covered.len()].map(|count| count as u64);
-        self.metrics.done.watched(plan.workload_number, counts);
+        self.metrics.done.covered(plan.workload_number, counts);
         if let Some(chosen) = self.choose(&plan, &order, &covered) {
             tokio::spawn(self.clone().audit(chosen, order));
         }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use super::budget_plan::BudgetPlan;
 use super::chosen::Chosen;
 use super::findings::{Broken, Findings};
-use super::watch::Watch;
+use super::promise_audit::PromiseAudit;
 
 /// The state of a workload's budget.
 #[derive(Debug, Clone)]
@@ -28,22 +28,18 @@ pub(super) struct InForce {
     pub(super) plan_epoch: u64,
     pub(super) is_applied: bool,
     /// The audits of its views, where it has a certificate.
-    pub(super) watch: Option<Watch>,
+    pub(super) audit: Option<PromiseAudit>,
 }
 
 impl BudgetState {
     /// With another plan than before. A choice of that plan that is not in force yet is given up.
     pub(super) fn begin(plan: BudgetPlan, before: Option<Self>) -> Self {
-        let new = || Self {
-            plan: plan.clone(),
-            in_force: None,
-            switching: None,
-            is_to_be_tried_again: false,
-            findings: Findings::default(),
+        let Some(Self { plan: last, in_force, switching, mut findings, .. }) = before else {
+            let (in_force, switching, findings) = (None, None, Findings::default());
+            return Self { plan, in_force, switching, is_to_be_tried_again: false, findings };
         };
-        let Self { plan: last, in_force, switching, mut findings, .. } = before.unwrap_or_else(new);
-        findings.is_to_be_planned = false;
         let switching = switching.filter(|chosen| chosen.number != last.number);
+        findings.is_to_be_planned = false;
         Self { plan, in_force, switching, is_to_be_tried_again: false, findings }
     }
 
@@ -58,8 +54,8 @@ impl BudgetState {
         let again = InForce::begin(now, chosen);
         let Some(before) = self.in_force.take() else { return again };
         let is_same = before.chosen.row == again.chosen.row && before.chosen.budget == again.chosen.budget;
-        let watch = if is_same && !is_broken && again.watch.is_some() { before.watch } else { again.watch };
-        InForce { plan_epoch: before.plan_epoch, watch, chosen: again.chosen, since: again.since, is_applied: true }
+        let audit = if is_same && !is_broken && again.audit.is_some() { before.audit } else { again.audit };
+        InForce { plan_epoch: before.plan_epoch, audit, chosen: again.chosen, since: again.since, is_applied: true }
     }
 
     /// The broken promise, until another choice is in force and applied.
@@ -76,7 +72,7 @@ impl InForce {
     /// A choice that is in force from now on.
     pub(super) fn begin(now: Duration, chosen: Chosen) -> Self {
         let certificate = chosen.outcome.certificate.as_ref().filter(|_| chosen.row.is_some());
-        let watch = chosen.budget.error().zip(certificate).map(|(term, of)| Watch::begin(now, term, of));
-        Self { chosen, since: now, plan_epoch: 0, is_applied: true, watch }
+        let audit = chosen.budget.error().zip(certificate).map(|(term, of)| PromiseAudit::begin(now, term, of));
+        Self { chosen, since: now, plan_epoch: 0, is_applied: true, audit }
     }
 }

@@ -29,6 +29,7 @@ mod operations;
 mod overload;
 mod prediction;
 mod prices;
+mod promise_audit;
 mod reason;
 mod relay_tree;
 mod reports;
@@ -38,7 +39,6 @@ mod search;
 mod session_mix;
 mod sharing_hysteresis;
 mod smoothing;
-mod watch;
 mod workload_state;
 
 #[cfg(test)]
@@ -74,6 +74,6 @@ pub use load::Load;
 pub use node_costs::NodeCosts;
 pub use prediction::pipeline_s;
 pub use prices::{EqualNodes, STILL_SET_S};
+pub(crate) use promise_audit::view_errors;
 pub use scheduler::Scheduler;
 pub use search::Division;
-pub(crate) use watch::view_errors;

@@ -78,7 +78,7 @@ impl WorkDone {
     }
 
     /// Adds views that were made while a promise is audited: those that it is for, and others.
-    pub fn watched(&self, workload_number: u64, [covered, uncovered]: [u64; 2]) {
+    pub fn covered(&self, workload_number: u64, [covered, uncovered]: [u64; 2]) {
         self.of(workload_number, |Sums { audit, .. }| {
             audit.covered_views += covered;
             audit.uncovered_views += uncovered;

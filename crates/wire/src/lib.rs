@@ -12,6 +12,8 @@ mod refusal;
 pub mod rpc;
 
 #[cfg(test)]
+mod budget_message_tests;
+#[cfg(test)]
 mod conventions_tests;
 #[cfg(test)]
 mod message_tests;

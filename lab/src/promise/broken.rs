@@ -6,7 +6,7 @@ use cluster::{PolicyChoice, PromiseState};
 use study::{Bar, Cell, Check, Table};
 
 use super::forged::forge;
-use super::watched::{Cluster, Viewer};
+use super::live_viewer::{Cluster, Viewer};
 use crate::section::Section;
 
 const SCENE: &str = "courtyard";

@@ -8,7 +8,7 @@ use cluster::PolicyChoice;
 use scene::SceneSpec;
 use study::{Bar, Cell, Check, Table};
 
-use super::watched::Cluster;
+use super::live_viewer::Cluster;
 use crate::section::Section;
 use crate::statistics::{median, quantile};
 
@@ -67,7 +67,7 @@ pub(super) async fn measure(scenes: &[SceneSpec], alternations: usize) -> anyhow
         let mut seen: [Vec<Seen>; 4] = Default::default();
         for _ in 0..alternations {
             for (seen, (arrangement, _)) in seen.iter_mut().zip(ARRANGEMENTS) {
-                seen.push(watch(arrangement, &name, plans.path()).await?);
+                seen.push(seen_in(arrangement, &name, plans.path()).await?);
             }
         }
         add(&mut section, &name, &seen)?;
@@ -75,7 +75,7 @@ pub(super) async fn measure(scenes: &[SceneSpec], alternations: usize) -> anyhow
     Ok(section)
 }
 
-async fn watch(arrangement: Arrangement, scene: &str, plans: &Path) -> anyhow::Result<Seen> {
+async fn seen_in(arrangement: Arrangement, scene: &str, plans: &Path) -> anyhow::Result<Seen> {
     let empty = tempfile::tempdir()?;
     let (plans, audit) = match arrangement {
         Arrangement::Planning => (empty.path(), "0"),

@@ -18,8 +18,8 @@ impl Scheduler {
     /// How views are audited in the representation in force; `None` where nothing is promised for them.
     pub(super) fn audit_order(&self, number: u64) -> Option<AuditOrder> {
         let BudgetState { plan, in_force, .. } = self.budgets.get(&number)?;
-        let watched = in_force.as_ref().filter(|in_force| in_force.watch.is_some())?;
-        let metric = watched.chosen.budget.error()?.metric();
+        let audited = in_force.as_ref().filter(|in_force| in_force.audit.is_some())?;
+        let metric = audited.chosen.budget.error()?.metric();
         (self.audit_time_ratio > 0.0).then(|| AuditOrder {
             time_ratio: self.audit_time_ratio,
             least_apart_m: LEAST_APART * f64::from(plan.cell_side_m()),
@@ -34,13 +34,13 @@ impl Scheduler {
         let now = self.now;
         let is_member = self.members.contains_key(node);
         let Some(state) = self.budgets.get_mut(&number).filter(|_| is_member) else { return Vec::new() };
-        let Some(InForce { watch: Some(watch), plan_epoch, .. }) = &mut state.in_force else { return Vec::new() };
+        let Some(InForce { audit: Some(audit), plan_epoch, .. }) = &mut state.in_force else { return Vec::new() };
         let plan_epoch = *plan_epoch;
         for view in report.views.iter().filter(|view| view.plan_epoch >= plan_epoch) {
-            let error = watch.excess(view).map(|ratio| watch.shown(ratio));
+            let error = audit.excess(view).map(|ratio| audit.shown(ratio));
             state.findings.note(now, node, view, error);
         }
-        let is_broken = watch.take(now, plan_epoch, report);
+        let is_broken = audit.take(now, plan_epoch, report);
         if is_broken && state.broken().is_none() { self.promise_broken(number) } else { Vec::new() }
     }
 
@@ -48,9 +48,9 @@ impl Scheduler {
     fn promise_broken(&mut self, number: u64) -> Vec<Command> {
         let (now, may_draw) = (self.now, self.may_draw_directly(number));
         let Some(state) = self.budgets.get_mut(&number) else { return Vec::new() };
-        let Some(InForce { chosen, watch: Some(watch), .. }) = &state.in_force else { return Vec::new() };
+        let Some(InForce { chosen, audit: Some(audit), .. }) = &state.in_force else { return Vec::new() };
         let (choice_number, row) = (chosen.number, chosen.row.as_ref().map(ToString::to_string).unwrap_or_default());
-        let reason = format!("Audits found {} with {row}.", watch.finding());
+        let reason = format!("Audits found {} with {row}.", audit.finding());
         let budget = chosen.budget;
         state.findings.is_given_up |= state.findings.note_break(now) && may_draw;
         state.findings.broken = Some(Broken { choice_number, budget, since: now, reason: reason.clone() });

@@ -329,7 +329,7 @@ impl Scheduler {
         let broken = state.broken().filter(|broken| budget.implies(&broken.budget));
         let outcome = in_force.map(|in_force| &in_force.chosen.outcome);
         let is_audited = workload.audit.is_some() && workload.policy() != Some(Policy::Direct);
-        let watch = in_force.and_then(|in_force| in_force.watch.as_ref()).filter(|_| is_audited);
+        let audit = in_force.and_then(|in_force| in_force.audit.as_ref()).filter(|_| is_audited);
         let certificate = outcome.and_then(|outcome| outcome.certificate.as_ref());
         let asked = || {
             let Load { images, .. } = workload.load();
@@ -351,14 +351,14 @@ impl Scheduler {
             reason: match (broken, outcome) {
                 (Some(broken), _) => self.broken_reason(broken, state),
                 (None, Some(outcome)) => {
-                    let vigilance = watch.map(|watch| watch.vigilance(self.now)).unwrap_or_default();
-                    format!("{}{vigilance}{}", outcome.reason, state.findings.broken_here(self.now))
+                    let audits = audit.map(|audit| audit.in_words(self.now)).unwrap_or_default();
+                    format!("{}{audits}{}", outcome.reason, state.findings.broken_here(self.now))
                 }
                 (None, None) => state.plan.reason(),
             },
-            audit: watch.map(|watch| AuditSummary {
+            audit: audit.map(|audit| AuditSummary {
                 viewers_above: state.findings.viewers_above(self.now),
-                ..watch.summary(self.now)
+                ..audit.summary(self.now)
             }),
         })
     }

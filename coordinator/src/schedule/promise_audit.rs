@@ -1,4 +1,4 @@
-//! The audits of a representation in force.
+//! The audits of a promise: of the views of one representation in force.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -19,7 +19,7 @@ const LEAST_FOREGROUND: f64 = 0.01;
 
 /// The audits of one promise.
 #[derive(Debug, Clone)]
-pub(super) struct Watch {
+pub(super) struct PromiseAudit {
     term: ErrorTerm,
     audit: Audit,
     began: Duration,
@@ -30,7 +30,7 @@ pub(super) struct Watch {
     recent: VecDeque<(Duration, usize)>,
 }
 
-impl Watch {
+impl PromiseAudit {
     /// Without views yet.
     pub(super) fn begin(now: Duration, term: ErrorTerm, certificate: &Certificate) -> Self {
         let audit = Audit::new(term, certificate.foreground_ratio);
@@ -48,7 +48,9 @@ impl Watch {
             self.audit.observe(&view_errors(&view.errors));
             count += 1;
         }
-        self.recent.push_back((now, count));
+        if count > 0 {
+            self.recent.push_back((now, count));
+        }
         while self.recent.front().is_some_and(|(at, _)| now.saturating_sub(*at) > RATE_OVER) {
             self.recent.pop_front();
         }
@@ -106,8 +108,8 @@ impl Watch {
         }
     }
 
-    /// How closely the promise is watched, in words.
-    pub(super) fn vigilance(&self, now: Duration) -> String {
+    /// The findings and the rate of the audits, in words.
+    pub(super) fn in_words(&self, now: Duration) -> String {
         if self.audit.views() == [0, 0] {
             return " Audits: none yet.".to_owned();
         }
