@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cluster::{Assignment, AuditOrder, AuditedView, MOST_PLANNED_PIXELS, ProbedView};
-use depth_image::{PinholeCamera, ViewPlanes};
+use depth_image::{PinholeCamera, ViewPart, ViewPlanes};
+use glam::UVec2;
 use node::{DirectWork, NodeMetrics, Pinned, PlansInForce, Scenes, ViewAudit, ViewProbes, ViewWork, blocking};
 use parking_lot::Mutex;
 use tonic::Status;
@@ -13,6 +14,10 @@ use tonic::Status;
 use crate::audit_choice::{AuditChoice, Candidate, Ended};
 use crate::batch::{BatchKey, Source, Waiting};
 use crate::sets::ReadySet;
+
+/// Larger views are compared in a part, with sides of this many pixels.
+const MOST_WHOLE_PIXELS: u32 = 320 * 240;
+const PART_PX: u32 = 128;
 
 /// The audits of one compositor. One is under way at a time.
 pub(crate) struct Auditor {
@@ -76,14 +81,15 @@ impl Auditor {
         let Chosen { plan, stream, random, camera, .. } = &chosen;
         let (plan_epoch, workload_number, random) = (plan.plan_epoch, plan.workload_number, *random);
         let kind = (workload_number, plan.method.clone().unwrap_or_default());
-        let (stream, camera) = (*stream, *camera);
+        let (stream, camera, part) = (*stream, *camera, audited_part(camera.size_px, &order, random));
+        let is_part = part != ViewPart::whole(camera.size_px);
         let start = Instant::now();
         // Whatever becomes of the task, the next audit follows.
-        let compared = tokio::spawn(self.clone().compare(chosen, order)).await;
+        let compared = tokio::spawn(self.clone().compare(chosen, order, part)).await;
         let compared = compared.unwrap_or_else(|error| Err(Status::internal(error.to_string())));
         let busy_s = match compared {
             Ok((errors, busy_s)) => {
-                let view = AuditedView { plan_epoch, stream, camera, errors };
+                let view = AuditedView { plan_epoch, stream, camera, errors, is_part };
                 self.metrics.done.audited(workload_number, view, busy_s);
                 self.metrics.audited_views.inc();
                 self.metrics.audit_s.inc_by(busy_s);
@@ -102,7 +108,12 @@ impl Auditor {
         self.choice.lock().end(Instant::now(), ended, share);
     }
 
-    async fn compare(self: Arc<Self>, chosen: Chosen, order: AuditOrder) -> Result<(ProbedView, f64), Status> {
+    async fn compare(
+        self: Arc<Self>,
+        chosen: Chosen,
+        order: AuditOrder,
+        part: ViewPart,
+    ) -> Result<(ProbedView, f64), Status> {
         let Chosen { plan, set, camera, scene_time_s, .. } = chosen;
         let scene = &plan.workload.scene;
         if !self.scenes.engine().has_scene(scene.hash.as_str()) {
@@ -119,11 +130,23 @@ impl Auditor {
             sample_images: set.sample_images.clone(),
             pinned: Box::new(set),
             view: ViewWork { cameras: vec![camera], method: plan.method.clone().unwrap_or_default(), planes },
+            part,
             direct: DirectWork { scene_time_s, ..direct },
         };
         let probes = self.probes.clone();
         blocking(move || probes.audit(view)).await
     }
+}
+
+/// The part of a view that is compared. The square with a random pixel has the view's errors in the mean.
+fn audited_part(view_px: UVec2, order: &AuditOrder, random: u64) -> ViewPart {
+    if !order.in_parts || view_px.element_product() <= MOST_WHOLE_PIXELS {
+        return ViewPart::whole(view_px);
+    }
+    // Another number: the view was chosen because its own is the least.
+    let pixel = self::random([random, 0, 1]) % u64::from(view_px.element_product());
+    let pixel = UVec2::new(pixel as u32 % view_px.x, pixel as u32 / view_px.x);
+    ViewPart::square_of(pixel, PART_PX, view_px)
 }
 
 /// Why a promise is not for a view; `None` where it is.
@@ -152,4 +175,41 @@ fn random(numbers: [u64; 3]) -> u64 {
     let mut hasher = DefaultHasher::new();
     numbers.hash(&mut hasher);
     hasher.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use depth_image::Antialias;
+
+    use super::*;
+
+    fn order(in_parts: bool) -> AuditOrder {
+        let (antialias, planned_pixel_count) = (Antialias::NONE, 1);
+        AuditOrder {
+            time_ratio: 0.01,
+            least_apart_m: 0.0,
+            antialias,
+            planned_pixel_count,
+            with_sample_images: false,
+            in_parts,
+        }
+    }
+
+    #[test]
+    fn every_pixel_of_a_large_view_is_compared_equally_often() {
+        let view_px = UVec2::new(640, 360);
+        let parts = (0..20_000).map(|number| audited_part(view_px, &order(true), number));
+        // The lower right square has 128 x 104 pixels.
+        let last = parts.filter(|part| part.first_px == UVec2::new(512, 256)).count() as f64;
+        let expected = 20_000.0 * 128.0 * 104.0 / (640.0 * 360.0);
+        assert!((last / expected - 1.0).abs() < 0.1, "{last} of {expected}");
+    }
+
+    #[test]
+    fn small_views_and_those_of_a_promise_for_single_views_are_compared_as_a_whole() {
+        let (small, large) = (UVec2::new(320, 240), UVec2::new(640, 480));
+        assert_eq!(audited_part(small, &order(true), 1), ViewPart::whole(small));
+        assert_eq!(audited_part(large, &order(false), 1), ViewPart::whole(large));
+        assert_eq!(audited_part(large, &order(true), 1).size_px.max_element(), PART_PX);
+    }
 }

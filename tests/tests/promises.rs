@@ -274,6 +274,29 @@ async fn a_viewer_that_stays_above_the_budget_is_named_and_breaks_no_promise_of_
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn of_large_views_a_square_is_audited() {
+    let config = CoordinatorConfig { audit_time_ratio: 0.5, ..CoordinatorConfig::default() };
+    let cluster = Cluster::start_limited(config, 2, |config| NodeConfig { direct_share: 1.0, ..config }).await;
+    let typical_view = camera(0.5, glam::UVec2::new(360, 270));
+    let request = SessionRequest { typical_view, frames_per_s: Some(10.0), views_per_set: 1, ..budgeted(LOOSE) };
+    let session = cluster.session(request).await.unwrap();
+    settled(&session).await;
+    let (mut live, start) = (session.live(), std::time::Instant::now());
+    for step in 0.. {
+        let status = cluster.client.status().await.unwrap();
+        let promise = status.workloads[0].promise.clone().unwrap();
+        assert!(start.elapsed() < DEADLINE, "{promise}");
+        assert_eq!(promise.state, PromiseState::Kept, "{promise}");
+        if promise.audit.is_some_and(|audit| audit.audited_views >= 3) {
+            assert!(promise.reason.contains("on parts of"), "{promise}");
+            return;
+        }
+        live.set_pose(camera(0.1 + 0.01 * (step % 80) as f32, typical_view.size_px), 0).unwrap();
+        tokio::time::timeout(DEADLINE, live.next()).await.expect("a frame").unwrap();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn an_honest_promise_is_audited_and_stays() {
     let config = CoordinatorConfig { audit_time_ratio: 0.5, ..CoordinatorConfig::default() };
     let cluster = Cluster::start_limited(config, 2, |config| NodeConfig { direct_share: 1.0, ..config }).await;

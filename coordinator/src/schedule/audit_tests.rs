@@ -40,7 +40,13 @@ fn audited(cluster: &Cluster, place: usize, flip: f64) -> AuditedView {
         mean_square: flip / 10.0,
         disoccluded_ratio: 0.0,
     };
-    AuditedView { plan_epoch: cluster.plan().assignment.plan_epoch, stream: 3, camera: at(place), errors }
+    AuditedView {
+        plan_epoch: cluster.plan().assignment.plan_epoch,
+        stream: 3,
+        camera: at(place),
+        errors,
+        is_part: false,
+    }
 }
 
 /// Tells of audited views, one a second.
@@ -237,4 +243,42 @@ fn a_replayed_log_with_audits_gives_the_same_commands() {
     let report = AuditReport { views, ..AuditReport::default() };
     let nan = Event::Audited { workload_number: 1, node_name: "n0".to_owned(), report };
     assert!(replay(&recorded(&[(cluster.now, nan)])[..]).is_err(), "no node sends it");
+}
+
+#[test]
+fn squares_of_large_views_break_promises_and_name_no_viewer() {
+    let mut cluster = kept(viewer(1, BUDGET));
+    assert!(cluster.plan().assignment.audit.unwrap().in_parts);
+    let part = |place: usize, flip: f64| AuditedView { is_part: true, ..audited(&cluster, place, flip) };
+    // Half of the squares show far more than the budget, and half nothing.
+    let views: Vec<AuditedView> = (0..60).map(|place| part(place, if place % 2 == 0 { 0.1 } else { 0.0 })).collect();
+    for view in views.into_iter().take(20) {
+        let report = AuditReport { views: vec![view], covered_views: 10, uncovered_views: 0, busy_s: 0.02 };
+        cluster.tell(Event::Audited { workload_number: 1, node_name: "n0".to_owned(), report });
+        cluster.wait(1);
+    }
+    let shown = promise(&cluster);
+    assert_eq!(shown.state, PromiseState::Kept, "0.05 in the mean: {shown}");
+    assert!(shown.reason.contains("on parts of 20 of 200 views") && !shown.reason.contains("Broken here"), "{shown}");
+    assert_eq!(shown.audit.unwrap().viewers_above, 0);
+    for place in 0..120 {
+        let views = vec![AuditedView { is_part: true, ..audited(&cluster, place, 0.15) }];
+        let report = AuditReport { views, covered_views: 10, uncovered_views: 0, busy_s: 0.02 };
+        cluster.tell(Event::Audited { workload_number: 1, node_name: "n0".to_owned(), report });
+    }
+    cluster.wait(5);
+    assert!(promise(&cluster).reason.contains("Audits found"), "{}", promise(&cluster));
+}
+
+#[test]
+fn squares_say_nothing_of_a_percentile_of_views() {
+    let mut cluster = kept(viewer(1, "flip p95 0.06"));
+    assert!(!cluster.plan().assignment.audit.unwrap().in_parts);
+    for place in 0..50 {
+        let views = vec![AuditedView { is_part: true, ..audited(&cluster, place, 0.9) }];
+        let report = AuditReport { views, covered_views: 1, uncovered_views: 0, busy_s: 0.02 };
+        cluster.tell(Event::Audited { workload_number: 1, node_name: "n0".to_owned(), report });
+    }
+    cluster.wait(1);
+    assert_eq!(promise(&cluster).audit.unwrap().audited_views, 0, "{}", promise(&cluster));
 }

@@ -186,6 +186,12 @@ impl Cluster {
         &self.promises.last().unwrap().1
     }
 
+    /// The last promise to a session.
+    pub(super) fn promise_to(&self, session: u64) -> &Promise {
+        let to = self.promises.iter().rev().find(|(sessions, _)| sessions.contains(&session));
+        &to.unwrap().1
+    }
+
     pub(super) fn plan(&self) -> &SessionPlan {
         self.plans.last().unwrap()
     }

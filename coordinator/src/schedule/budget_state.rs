@@ -2,9 +2,12 @@
 
 use std::time::Duration;
 
+use planner::{Budget, PromiseState};
+
 use super::budget_plan::BudgetPlan;
 use super::chosen::Chosen;
 use super::findings::{Broken, Findings};
+use super::prices::EqualNodes;
 use super::promise_audit::PromiseAudit;
 
 /// The state of a workload's budget.
@@ -17,6 +20,18 @@ pub(super) struct BudgetState {
     /// The choice could not be put in force, for a reason that may pass.
     pub(super) is_to_be_tried_again: bool,
     pub(super) findings: Findings,
+    /// Budgets that plans have found to be kept by nothing.
+    unreachable: Vec<Unreachable>,
+}
+
+/// A budget that nothing keeps.
+#[derive(Debug, Clone)]
+pub(super) struct Unreachable {
+    pub(super) budget: Budget,
+    pub(super) since: Duration,
+    /// The prices of the plan that found it.
+    pub(super) prices: EqualNodes,
+    pub(super) reason: String,
 }
 
 /// A choice in force.
@@ -34,13 +49,25 @@ pub(super) struct InForce {
 impl BudgetState {
     /// With another plan than before. A choice of that plan that is not in force yet is given up.
     pub(super) fn begin(plan: BudgetPlan, before: Option<Self>) -> Self {
-        let Some(Self { plan: last, in_force, switching, mut findings, .. }) = before else {
-            let (in_force, switching, findings) = (None, None, Findings::default());
-            return Self { plan, in_force, switching, is_to_be_tried_again: false, findings };
+        let Some(Self { plan: last, in_force, switching, mut findings, mut unreachable, .. }) = before else {
+            let (in_force, switching, findings, unreachable) = Default::default();
+            return Self { plan, in_force, switching, is_to_be_tried_again: false, findings, unreachable };
         };
         let switching = switching.filter(|chosen| chosen.number != last.number);
         findings.is_to_be_planned = false;
-        Self { plan, in_force, switching, is_to_be_tried_again: false, findings }
+        unreachable.retain(|known| !plan.budget.implies(&known.budget));
+        Self { plan, in_force, switching, is_to_be_tried_again: false, findings, unreachable }
+    }
+
+    /// Nothing keeps a budget. What is known of stricter ones says no more.
+    pub(super) fn note_unreachable(&mut self, known: Unreachable) {
+        self.unreachable.retain(|other| !other.budget.implies(&known.budget));
+        self.unreachable.push(known);
+    }
+
+    /// The knowledge that nothing keeps a budget.
+    pub(super) fn unreachable_by(&self, budget: &Budget) -> Option<&Unreachable> {
+        self.unreachable.iter().find(|known| budget.implies(&known.budget))
     }
 
     /// Whether the plan began before the last promise was broken: it does not know the audited viewpoints.
@@ -69,6 +96,11 @@ impl BudgetState {
 }
 
 impl InForce {
+    /// Whether a budget is kept by it.
+    pub(super) fn keeps(&self, budget: &Budget) -> bool {
+        self.chosen.outcome.state == PromiseState::Kept && self.chosen.budget.implies(budget)
+    }
+
     /// A choice that is in force from now on.
     pub(super) fn begin(now: Duration, chosen: Chosen) -> Self {
         let certificate = chosen.outcome.certificate.as_ref().filter(|_| chosen.row.is_some());

@@ -126,8 +126,11 @@ fn sessions_with_comparable_budgets_share_the_strictest_and_others_do_not() {
     cluster.open(viewer(2, "flip 0.05"));
     cluster.wait(20);
     assert_eq!(cluster.plan().assignment.method.as_deref(), Some("carve:4"));
-    let (sessions, promise) = cluster.promises.last().unwrap();
-    assert_eq!((sessions.as_slice(), promise.budget.as_str()), (&[1, 2][..], "flip 0.05"));
+    for (session, budget) in [(1, "flip 0.1"), (2, "flip 0.05")] {
+        let promise = cluster.promise_to(session);
+        assert_eq!((promise.budget.as_str(), promise.state), (budget, PromiseState::Kept));
+        assert!((promise.expected_ratio - 0.04).abs() < 1e-9, "of the strictest: {promise:?}");
+    }
     cluster.open(viewer(3, "psnr 20"));
     let mut plain = viewer(4, "flip 0.05");
     plain.budgeted = None;
@@ -140,6 +143,50 @@ fn sessions_with_comparable_budgets_share_the_strictest_and_others_do_not() {
     assert_eq!(method(&cluster), "carve:4", "representations change seldom");
     cluster.wait(120);
     assert_eq!(method(&cluster), "carve:2");
+}
+
+#[test]
+fn a_budget_that_nothing_keeps_leaves_the_promises_of_other_sessions_as_they_are() {
+    for order in [[(1, "flip 0.06"), (2, "flip 0.01")], [(2, "flip 0.01"), (1, "flip 0.06")]] {
+        let mut cluster = Cluster::of(3);
+        for (session, budget) in order {
+            cluster.open(viewer(session, budget));
+            cluster.wait(20);
+        }
+        assert_eq!(cluster.promise_to(1).state, PromiseState::Kept, "{}", cluster.promise_to(1));
+        assert_eq!(cluster.plan().assignment.method.as_deref(), Some("carve:4"));
+        let refused = cluster.promise_to(2);
+        assert_eq!((refused.state, refused.budget.as_str()), (PromiseState::Unreachable, "flip 0.01"), "{refused}");
+        let shown = cluster.scheduler.status().workloads[0].promise.clone().unwrap();
+        assert_eq!(shown.state, PromiseState::Kept, "{shown}");
+        // Nothing is measured again and again.
+        let probes = cluster.probes.len();
+        cluster.wait(300);
+        assert_eq!((cluster.probes.len(), cluster.promise_to(1).state), (probes, PromiseState::Kept));
+        cluster.tell(Event::Closed { session: 1 });
+        cluster.wait(100);
+        assert_eq!(cluster.promise_to(2).state, PromiseState::Unreachable);
+    }
+}
+
+#[test]
+fn of_budgets_that_cannot_be_kept_together_those_that_came_first_are_kept() {
+    let (accurate, quick) = ("flip 0.05", "flip 0.1, time 4.5ms");
+    for order in [[accurate, quick], [quick, accurate]] {
+        let mut cluster = Cluster::of(3);
+        cluster.open(viewer(1, order[0]));
+        cluster.wait(20);
+        assert_eq!(cluster.promise_to(1).state, PromiseState::Kept, "{}", cluster.promise_to(1));
+        cluster.open(viewer(2, order[1]));
+        cluster.wait(20);
+        assert_eq!(cluster.promise_to(1).state, PromiseState::Kept, "{}", cluster.promise_to(1));
+        let second = cluster.promise_to(2);
+        assert_eq!(second.state, PromiseState::Unreachable, "{second}");
+        assert!(second.reason.contains("opened before") && second.reason.contains(order[0]), "{second}");
+        cluster.tell(Event::Closed { session: 1 });
+        cluster.wait(120);
+        assert_eq!(cluster.promise_to(2).state, PromiseState::Kept, "{}", cluster.promise_to(2));
+    }
 }
 
 #[test]

@@ -61,6 +61,9 @@ impl Findings {
         if self.poses.len() > MAX_POSES {
             self.poses.pop_front();
         }
+        if view.is_part {
+            return;
+        }
         let viewer = (node.to_owned(), view.stream);
         let Some(error) = error else {
             self.viewers.remove(&viewer);

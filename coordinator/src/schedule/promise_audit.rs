@@ -12,6 +12,8 @@ const RATE_AFTER: Duration = Duration::from_secs(60);
 const RATE_OVER: Duration = Duration::from_secs(600);
 /// The views in which twice the budget is found, 19 times in 20: of a mean, and of a share of views (`docs/planner.md`).
 const VIEWS_TO_FIND_TWICE: f64 = 60.0;
+/// The same in parts of views that show a surface.
+const PARTS_TO_FIND_TWICE: f64 = 70.0;
 const VIEWS_TO_FIND_TWICE_P95: f64 = 660.0;
 const HOUR_S: f64 = 3600.0;
 /// A view that shows less says little by itself.
@@ -26,6 +28,9 @@ pub(super) struct PromiseAudit {
     covered_views: u64,
     uncovered_views: u64,
     busy_s: f64,
+    /// Views of which a part was compared, and those whose part shows a surface.
+    parts: usize,
+    parts_of_surfaces: usize,
     /// The times of reports of late, and their audits.
     recent: VecDeque<(Duration, usize)>,
 }
@@ -34,7 +39,17 @@ impl PromiseAudit {
     /// Without views yet.
     pub(super) fn begin(now: Duration, term: ErrorTerm, certificate: &Certificate) -> Self {
         let audit = Audit::new(term, certificate.foreground_ratio);
-        Self { term, audit, began: now, covered_views: 0, uncovered_views: 0, busy_s: 0.0, recent: VecDeque::new() }
+        Self {
+            term,
+            audit,
+            began: now,
+            covered_views: 0,
+            uncovered_views: 0,
+            busy_s: 0.0,
+            parts: 0,
+            parts_of_surfaces: 0,
+            recent: VecDeque::new(),
+        }
     }
 
     /// Takes a report, as far as its views are of plans since `plan_epoch`; whether the promise is broken.
@@ -42,9 +57,16 @@ impl PromiseAudit {
         self.covered_views = self.covered_views.saturating_add(report.covered_views);
         self.uncovered_views = self.uncovered_views.saturating_add(report.uncovered_views);
         self.busy_s += report.busy_s;
-        let own = report.views.iter().filter(|view| view.plan_epoch >= plan_epoch);
+        let is_mean = self.term.statistic() == Statistic::Mean;
+        let own = report.views.iter().filter(|view| view.plan_epoch >= plan_epoch && (is_mean || !view.is_part));
         let mut count = 0;
         for view in own {
+            // A model may fill a square of a view in which it is small.
+            if view.is_part && self.audit.views() == [0, 0] {
+                self.audit = Audit::new(self.term, 1.0);
+            }
+            self.parts += usize::from(view.is_part);
+            self.parts_of_surfaces += usize::from(view.is_part && view.errors.foreground_ratio > 0.0);
             self.audit.observe(&view_errors(&view.errors));
             count += 1;
         }
@@ -57,8 +79,11 @@ impl PromiseAudit {
         self.audit.is_alarmed()
     }
 
-    /// The error of a view by itself, if it is above the budget.
+    /// The error of a view by itself, if it is above the budget. A part says nothing of its view.
     pub(super) fn excess(&self, view: &AuditedView) -> Option<f64> {
+        if view.is_part {
+            return None;
+        }
         let errors = view_errors(&view.errors);
         let ratio = errors.error_ratio(self.term.metric());
         let is_above = errors.foreground_ratio >= LEAST_FOREGROUND && ratio > self.term.most_ratio();
@@ -92,10 +117,20 @@ impl PromiseAudit {
         audits as f64 * HOUR_S / since.clamp(RATE_AFTER, RATE_OVER).as_secs_f64()
     }
 
+    /// Audits in which twice the budget is found.
+    fn views_to_find_twice(&self) -> f64 {
+        match self.term.statistic() {
+            Statistic::P95 => VIEWS_TO_FIND_TWICE_P95,
+            Statistic::Mean if self.parts == 0 => VIEWS_TO_FIND_TWICE,
+            Statistic::Mean => PARTS_TO_FIND_TWICE * self.parts as f64 / self.parts_of_surfaces.max(1) as f64,
+        }
+    }
+
     /// The findings of the audits, in words.
     pub(super) fn finding(&self) -> String {
         let [audited, _] = self.audit.views();
-        let of = format!("{audited} of {} views", self.covered_views.max(audited));
+        let parts = if self.parts > 0 { "parts of " } else { "" };
+        let of = format!("{parts}{audited} of {} views", self.covered_views.max(audited));
         let Some(mean) = self.audit.mean_error() else { return format!("nothing on {of}") };
         let is_mean = self.term.statistic() == Statistic::Mean;
         let shown = |ratio: f64| if is_mean { self.term.shown(ratio) } else { format!("{:.1} %", ratio * 100.0) };
@@ -117,9 +152,7 @@ impl PromiseAudit {
         let uncovered = self.summary(now).uncovered_ratio();
         let not_covered =
             if uncovered > 0.0 { format!(" Not covered: {:.0} % of views.", uncovered * 100.0) } else { String::new() };
-        let is_mean = self.term.statistic() == Statistic::Mean;
-        let views = if is_mean { VIEWS_TO_FIND_TWICE } else { VIEWS_TO_FIND_TWICE_P95 };
-        let found_s = views / per_h.max(f64::MIN_POSITIVE) * HOUR_S;
+        let found_s = self.views_to_find_twice() / per_h.max(f64::MIN_POSITIVE) * HOUR_S;
         format!(
             " Audits: {}, in {:.1} s of the nodes' time; {per_h:.0} an hour, which find twice the budget within {}.{not_covered}",
             self.finding(),

@@ -5,6 +5,7 @@ mod audits;
 mod budgets;
 mod faults;
 mod planning;
+mod promises;
 mod sessions;
 mod sharing;
 mod state;

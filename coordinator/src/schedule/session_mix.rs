@@ -125,9 +125,26 @@ impl SessionMix {
         self.0.iter().rev().max_by_key(|session| count(session)).map(|session| session.method.as_str())
     }
 
-    /// The strictest budget of all sessions; those of one workload are comparable.
-    pub(super) fn budget(&self) -> Option<Budget> {
-        self.0.iter().filter_map(|session| session.budget).reduce(|a, b| a.and(&b).unwrap_or(a))
+    /// The least strict budget whose keeping keeps those of as many sessions as may be kept together, the first of them
+    /// first; budgets of one workload are comparable.
+    pub(super) fn strictest_budget(&self, may_be_kept: impl Fn(&Budget) -> bool) -> Option<Budget> {
+        let budgets = self.0.iter().filter_map(|session| session.budget);
+        budgets.fold(None, |before: Option<Budget>, budget| {
+            let together = before.map_or(Some(budget), |before| before.and(&budget));
+            together.filter(&may_be_kept).or(before)
+        })
+    }
+
+    /// The sessions of each budget.
+    pub(super) fn budgets(&self) -> Vec<(Budget, Vec<u64>)> {
+        let mut of: Vec<(Budget, Vec<u64>)> = Vec::new();
+        for (budget, number) in self.0.iter().filter_map(|session| Some((session.budget?, session.number))) {
+            match of.iter_mut().find(|(other, _)| *other == budget) {
+                Some((_, numbers)) => numbers.push(number),
+                None => of.push((budget, vec![number])),
+            }
+        }
+        of
     }
 
     /// The qualities that every session with a rate falls back to, in the same order.

@@ -35,8 +35,8 @@ pub(super) struct WorkloadState {
     pub(super) budgeted: Option<Budgeted>,
     /// The choice of budgets, in place of the sessions' own.
     pub(super) representation: Option<Representation>,
-    /// The promise that sessions know, and since when.
-    pub(super) announced: Option<(Duration, Promise)>,
+    /// The promises that sessions know, one a budget, and since when.
+    pub(super) announced: Vec<(Duration, Promise)>,
     /// How views in that representation are audited.
     pub(super) audit: Option<AuditOrder>,
     /// Why no plan can be made for their budget.
@@ -80,7 +80,7 @@ impl WorkloadState {
             sessions: SessionMix::default(),
             budgeted: opening.budgeted.clone(),
             representation: None,
-            announced: None,
+            announced: Vec::new(),
             audit: None,
             not_planned: None,
             overload: Overload::default(),
@@ -179,7 +179,7 @@ impl WorkloadState {
     fn shares_budget(&self, asked: Option<&Budgeted>) -> bool {
         match (&self.budgeted, asked) {
             (Some(own), Some(asked)) => {
-                let strictest = self.sessions.budget();
+                let strictest = self.sessions.strictest_budget(|_| true);
                 own.is_shareable(asked) && strictest.is_none_or(|budget| budget.and(&asked.budget).is_some())
             }
             (own, asked) => own.is_none() && asked.is_none(),

@@ -31,6 +31,8 @@ pub struct AuditOrder {
     pub planned_pixel_count: u32,
     /// Views are compared with the sample images, too.
     pub with_sample_images: bool,
+    /// Of large views a part is compared: the promise is for means.
+    pub in_parts: bool,
 }
 
 /// The audits of a member since its last report.
@@ -57,6 +59,8 @@ pub struct AuditedView {
     pub camera: PinholeCamera,
     /// Its errors.
     pub errors: ProbedView,
+    /// They are those of a part of it, which was chosen at random.
+    pub is_part: bool,
 }
 
 /// The findings of the audits of a promise.

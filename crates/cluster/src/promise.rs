@@ -20,7 +20,7 @@ pub struct BudgetRequest {
 /// The promise to the sessions of a workload.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Promise {
-    /// The strictest budget of the sessions.
+    /// The session's budget; of a workload, the one that is planned for.
     pub budget: String,
     /// Whether it is kept.
     pub state: PromiseState,

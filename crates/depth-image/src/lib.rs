@@ -23,6 +23,7 @@ mod tone;
 mod view;
 mod view_cell;
 mod view_group;
+mod view_part;
 
 pub use antialias::{Antialias, AntialiasError};
 pub use bounds::Aabb;
@@ -43,3 +44,4 @@ pub use tone::{Exposure, ExposureEv, ToneCurve, ToneError, ToneMapping};
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};
 pub use view_cell::{ViewCell, nested_places};
 pub use view_group::{ViewGroup, nearest_set};
+pub use view_part::{VIEW_REACH_PX, ViewPart};

@@ -1,8 +1,8 @@
 //! Tiles of a sample image, one above the other. Each has its own camera, and together they are the image.
 
-use glam::{UVec2, Vec2};
+use glam::UVec2;
 
-use crate::{Camera, DepthImage, DepthImageError, PinholeCamera, SpecularPlanes};
+use crate::{Camera, DepthImage, DepthImageError, SpecularPlanes, ViewPart};
 
 /// Tiles that do not form an image; `tile` counts from the top.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -24,11 +24,8 @@ impl Camera {
         let Self::Pinhole(camera) = self;
         let row = |i: u32| (u64::from(i) * u64::from(camera.size_px.y) / u64::from(count.max(1))) as u32;
         let (first, end) = (row(tile), row(tile + 1));
-        Self::Pinhole(PinholeCamera {
-            size_px: UVec2::new(camera.size_px.x, end - first),
-            principal_px: camera.principal_px - Vec2::new(0.0, first as f32),
-            ..*camera
-        })
+        let part = ViewPart { first_px: UVec2::new(0, first), size_px: UVec2::new(camera.size_px.x, end - first) };
+        Self::Pinhole(camera.part(&part))
     }
 }
 

@@ -1,6 +1,7 @@
 use glam::Vec3;
 
 use super::*;
+use crate::PinholeCamera;
 
 fn camera() -> Camera {
     Camera::Pinhole(PinholeCamera::looking_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, Vec3::Y, 0.9, UVec2::new(7, 11)))

@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use depth_image::{PinholeCamera, View};
-use glam::{UVec2, Vec2};
-use reconstruction::VIEW_REACH_PX;
+use depth_image::{PinholeCamera, VIEW_REACH_PX, View, ViewPart};
+use glam::UVec2;
 
 /// The pixels of a band. Twelve times as many words fit the smallest buffers that are in use, of 128 MiB.
 pub(crate) const BAND_PIXELS: usize = 1 << 21;
@@ -76,12 +75,8 @@ fn bands(camera: &PinholeCamera, most_pixels: usize) -> Vec<Band> {
     let band = |first: u32| {
         let end = (first + rows).min(height);
         let (top, bottom) = (first.saturating_sub(VIEW_REACH_PX), (end + VIEW_REACH_PX).min(height));
-        let camera = PinholeCamera {
-            size_px: UVec2::new(columns, bottom - top),
-            principal_px: camera.principal_px - Vec2::new(0.0, top as f32),
-            ..*camera
-        };
-        Band { camera, rows: first - top..end - top }
+        let part = ViewPart { first_px: UVec2::new(0, top), size_px: UVec2::new(columns, bottom - top) };
+        Band { camera: camera.part(&part), rows: first - top..end - top }
     };
     (0..height).step_by(rows as usize).map(band).collect()
 }
@@ -91,6 +86,7 @@ mod tests {
     use std::convert::Infallible;
 
     use depth_image::Provenance;
+    use glam::Vec2;
     use glam::Vec3;
 
     use super::*;

@@ -1,12 +1,11 @@
 //! Views with more pixels than a device's buffers hold are made in bands, and are what they would be in one piece.
 
 use cluster::{Refinement, SamplePlanes};
-use depth_image::{Antialias, Camera, PinholeCamera, View, ViewPlanes};
+use depth_image::{Antialias, Camera, PinholeCamera, VIEW_REACH_PX, View, ViewPart, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec2, Vec3};
 use gpu::DevicePreference;
 use node::{DirectWork, Engine, SampleSet, SampleWork, Turn, ViewWork, WorkClass};
-use reconstruction::VIEW_REACH_PX;
 use scene::Scene;
 use scene::procedural::uv_sphere;
 
@@ -30,12 +29,8 @@ fn view_camera() -> PinholeCamera {
 
 /// The same rows, seen by a camera of their own.
 fn crop_camera() -> PinholeCamera {
-    let whole = view_camera();
-    PinholeCamera {
-        size_px: UVec2::new(SIZE_PX.x, CROP[1] - CROP[0]),
-        principal_px: whole.principal_px - Vec2::new(0.0, CROP[0] as f32),
-        ..whole
-    }
+    let size_px = UVec2::new(SIZE_PX.x, CROP[1] - CROP[0]);
+    view_camera().part(&ViewPart { first_px: UVec2::new(0, CROP[0]), size_px })
 }
 
 fn samples(engine: &GpuEngine, scene: &Scene) -> SampleSet {

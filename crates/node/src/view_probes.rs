@@ -4,7 +4,7 @@ use std::any::Any;
 use std::sync::Arc;
 
 use cluster::{ProbeViews, ProbedView, ProbedViews};
-use depth_image::DepthImage;
+use depth_image::{DepthImage, ViewPart};
 use tonic::Status;
 
 use crate::engine::{DirectWork, UploadedSet, ViewWork};
@@ -17,7 +17,7 @@ pub trait ViewProbes: Send + Sync + 'static {
     /// The device fails, or refuses the representation.
     fn probe(&self, request: &ProbeViews) -> Result<ProbedViews, Status>;
 
-    /// The errors of one view that is made again and drawn directly, and the seconds that this took without waits.
+    /// The errors of one view, or of a part of it, that is made again and drawn directly, and the seconds that this took without waits.
     ///
     /// # Errors
     /// The device fails.
@@ -34,6 +34,8 @@ pub struct ViewAudit {
     pub pinned: Box<dyn Any + Send>,
     /// One view.
     pub view: ViewWork,
+    /// The part of it that is compared.
+    pub part: ViewPart,
     /// The same from the scene, with depth.
     pub direct: DirectWork,
 }

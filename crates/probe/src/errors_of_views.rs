@@ -15,19 +15,35 @@ pub fn view_errors(
     view: &View,
     sample_images: &[DepthImage],
 ) -> Result<ViewErrors, MetricsError> {
+    errors_of_part(camera, truth, view, sample_images, &vec![true; camera.pixel_count()])
+}
+
+/// The same of the pixels in a mask.
+///
+/// # Errors
+/// As [`view_errors`]; or the mask has another size.
+pub fn errors_of_part(
+    camera: &PinholeCamera,
+    truth: &View,
+    view: &View,
+    sample_images: &[DepthImage],
+    part: &[bool],
+) -> Result<ViewErrors, MetricsError> {
     let (expected, actual) = (Rgb8Image::of_view(truth)?, Rgb8Image::of_view(view)?);
-    let mask = foreground(truth, &actual)?;
+    let mask: Vec<bool> = foreground(truth, &actual)?.iter().zip(part).map(|(&shown, &own)| shown && own).collect();
     let flip = flip_map(&expected, &actual)?;
     let depth = truth.inverse_depth_per_m.as_deref().unwrap_or_default();
-    let unheld = unheld_rate(camera, depth, sample_images)?.unwrap_or(0.0);
-    let shown = mask.iter().filter(|&&shown| shown).count();
+    let depth: Vec<f32> = depth.iter().zip(part).map(|(&inverse, &own)| if own { inverse } else { 0.0 }).collect();
+    let unheld = unheld_rate(camera, &depth, sample_images)?.unwrap_or(0.0);
+    let count = |mask: &[bool]| mask.iter().filter(|&&own| own).count();
+    let shown = count(&mask);
     let surfaces = depth.iter().filter(|&&inverse| inverse > 0.0).count();
     // An infinite ratio is an error of 0.
     let mean_square = psnr_db(&expected, &actual, Some(&mask))?.map_or(0.0, |db| 10_f64.powf(-db / 10.0));
     Ok(ViewErrors {
-        foreground_ratio: shown as f64 / mask.len() as f64,
+        foreground_ratio: shown as f64 / count(part).max(1) as f64,
         flip: flip.mean(Some(&mask))?.unwrap_or(0.0),
-        flip_whole: flip.mean(None)?.unwrap_or(0.0),
+        flip_whole: flip.mean(Some(part))?.unwrap_or(0.0),
         mean_square,
         disoccluded_ratio: if shown == 0 { 0.0 } else { unheld * surfaces as f64 / shown as f64 },
     })
@@ -93,6 +109,25 @@ mod tests {
         // A test that shows something everywhere has twice the foreground.
         let errors = errors(&view(100, 9), &[image(2)]);
         assert_eq!((errors.foreground_ratio, errors.disoccluded_ratio), (1.0, 0.375));
+    }
+
+    #[test]
+    fn errors_of_parts_add_up_to_those_of_the_view() {
+        let (truth, test, images) = (view(100, 0), view(151, 9), [image(2)]);
+        let whole = view_errors(&camera(), &truth, &test, &images).unwrap();
+        let mut sums = [0.0; 4];
+        for first_row in [0, 4, 8, 12] {
+            let part: Vec<bool> = (0..256).map(|pixel| (first_row..first_row + 4).contains(&(pixel / 16))).collect();
+            let own = errors_of_part(&camera(), &truth, &test, &images, &part).unwrap();
+            let of = own.foreground_ratio;
+            let parts = [of, of * own.flip, own.flip_whole, of * own.disoccluded_ratio];
+            sums.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part / 4.0);
+        }
+        let of = whole.foreground_ratio;
+        let expected = [of, of * whole.flip, whole.flip_whole, of * whole.disoccluded_ratio];
+        for (sum, expected) in sums.iter().zip(expected) {
+            assert!((sum - expected).abs() < 1e-6 && expected > 0.0, "{sums:?}: {expected:?}");
+        }
     }
 
     #[test]

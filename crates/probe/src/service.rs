@@ -4,13 +4,14 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use cluster::{Costs, ProbeViews, ProbedView, ProbedViews};
-use depth_image::{PinholeCamera, ViewPlanes};
+use depth_image::{PinholeCamera, VIEW_REACH_PX, ViewPlanes};
+use metrics::FLIP_REACH_PX;
 use node::{Engine, EngineError, Turn, ViewAudit, ViewProbes, WorkClass, own_time};
 use parking_lot::Mutex;
 use planner::{RowCosts, ViewErrors};
 use tonic::Status;
 
-use crate::errors_of_views::view_errors;
+use crate::errors_of_views::errors_of_part;
 use crate::prober::{ProbeError, Prober};
 use crate::representation::Representation;
 use crate::subject::{Light, Subject};
@@ -65,14 +66,22 @@ impl ViewProbes for Probers {
 
 /// The set is needed for the view alone: the time until it is drawn directly may be long.
 fn audited(engine: &dyn Engine, turn: Turn, audit: ViewAudit) -> Result<ViewErrors, ProbeError> {
-    let ViewAudit { set, sample_images, pinned, view, direct } = audit;
+    let ViewAudit { set, sample_images, pinned, mut view, part, mut direct } = audit;
+    let [camera] = view.cameras[..] else { return Err(not_one_view()) };
+    // As much of the view as its part depends on.
+    let outer = part.surrounded(VIEW_REACH_PX + FLIP_REACH_PX, camera.size_px);
+    let camera = camera.part(&outer);
+    (view.cameras, direct.cameras) = (vec![camera], vec![camera]);
     let made = engine.reconstruct(set.as_ref(), &view, turn)?;
     drop((set, pinned));
     let truths = engine.draw_direct(&direct, turn)?;
-    match (&view.cameras[..], &made[..], &truths[..]) {
-        ([camera], [made], [truth]) => Ok(view_errors(camera, truth, made, &sample_images)?),
-        _ => Err(EngineError::Device("an audit is of one view".to_owned()).into()),
-    }
+    let ([made], [truth]) = (&made[..], &truths[..]) else { return Err(not_one_view()) };
+    let part: Vec<bool> = part.mask_within(&outer).collect();
+    Ok(errors_of_part(&camera, truth, made, &sample_images, &part)?)
+}
+
+fn not_one_view() -> ProbeError {
+    EngineError::Device("an audit is of one view".to_owned()).into()
 }
 
 /// The errors of the views in their order, and the mean costs of their cells.

@@ -1,5 +1,6 @@
 //! Gives pixels that no camera knows the colour of the farther side of their gap.
 
+use depth_image::VIEW_REACH_PX;
 use gpu::{Binding, shader_variant};
 
 use crate::view_work::{ONE_VIEW, SetVariant};
@@ -7,8 +8,6 @@ use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Record
 
 /// The greatest distance of a known pixel, in steps along a row, column or diagonal.
 pub(crate) const REACH_PX: i32 = VIEW_REACH_PX as i32;
-/// A pixel of a view depends on no other that is farther away, along rows or columns.
-pub const VIEW_REACH_PX: u32 = 48;
 /// Inverse depths whose ratio is above this are one side of the gap.
 pub(crate) const SAME_SIDE: f32 = 0.95;
 /// Steps towards known pixels.

@@ -28,7 +28,6 @@ mod tile_start;
 mod view_work;
 
 pub use error::ReconstructionError;
-pub use fill::VIEW_REACH_PX;
 pub use in_flight::Statistics;
 pub use methods::{METHODS, ReconstructionMethod, UnknownMethod};
 pub use pyramid::CodedDepth;

@@ -100,6 +100,7 @@ pub(super) fn assignment() -> Assignment {
             antialias: Antialias::of(4).unwrap(),
             planned_pixel_count: 30_000,
             with_sample_images: true,
+            in_parts: true,
         }),
     }
 }
@@ -273,7 +274,13 @@ pub(super) fn work_report() -> WorkReport {
         dropped_views: 1,
         viewpoints: vec![camera()],
         audit: Some(AuditReport {
-            views: vec![AuditedView { plan_epoch: 4, stream: 9, camera: camera(), errors: probed_view() }],
+            views: vec![AuditedView {
+                plan_epoch: 4,
+                stream: 9,
+                camera: camera(),
+                errors: probed_view(),
+                is_part: true,
+            }],
             covered_views: 40,
             uncovered_views: 2,
             busy_s: 0.05,

@@ -6,7 +6,7 @@ use cluster::{PolicyChoice, PromiseState};
 use study::{Bar, Cell, Check, Table};
 
 use super::forged::forge;
-use super::live_viewer::{Cluster, Viewer};
+use super::live_viewer::{Asked, Cluster, Viewer};
 use crate::section::Section;
 
 const SCENE: &str = "courtyard";
@@ -26,13 +26,13 @@ const SHARE: &str = "0.2";
 pub(super) async fn measure() -> anyhow::Result<Section> {
     let [honest, forged] = [tempfile::tempdir()?, tempfile::tempdir()?];
     let cluster = Cluster::start(SCENE, honest.path(), &[]).await?;
-    cluster.viewer(Some(BUDGET), PolicyChoice::Pipeline, RATE_HZ).await?.kept().await?;
+    cluster.viewer(asked(&cluster, BUDGET, PolicyChoice::Pipeline)?).await?.kept().await?;
     // Measurements are written beside the promise.
     tokio::time::sleep(Duration::from_secs(2)).await;
     drop(cluster);
     let budget = forge(honest.path(), forged.path())?;
     let cluster = Cluster::start(SCENE, forged.path(), &["--audit", SHARE, "--direct-share", SHARE]).await?;
-    let viewer = cluster.viewer(Some(&budget), PolicyChoice::Auto, RATE_HZ).await?;
+    let viewer = cluster.viewer(asked(&cluster, &budget, PolicyChoice::Auto)?).await?;
     let promised = viewer.kept().await?.representation;
     let mut found = None;
     let (start, looks) = (Instant::now(), replaced(&viewer, &promised));
@@ -47,9 +47,13 @@ pub(super) async fn measure() -> anyhow::Result<Section> {
     section(cluster.device.clone(), [budget, promised, after], (is_said, replaced_s, longest_gap_s))
 }
 
+fn asked<'a>(cluster: &Cluster, budget: &'a str, policy: PolicyChoice) -> anyhow::Result<Asked<'a>> {
+    Ok(Asked { budget: Some(budget), policy, rate_hz: RATE_HZ, path: cluster.orbit()?, has_cells: false })
+}
+
 /// Waits until another representation is in force; whether the viewer was told why, in the state or in the reason. Direct
 /// drawing may be in force before anybody looks.
-async fn replaced(viewer: &Viewer, promised: &str) -> bool {
+pub(super) async fn replaced(viewer: &Viewer, promised: &str) -> bool {
     let mut is_said = false;
     loop {
         if let Some(promise) = viewer.promise() {

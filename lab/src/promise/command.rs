@@ -7,11 +7,11 @@ use app_core::process::runtime;
 use clap::{Args, ValueEnum};
 use scene::SceneSpec;
 
-use super::{broken, price};
+use super::{broken, price, walk};
 use crate::section::{finish, measure_parts, report};
 
 /// Measures what audits and planning cost a live viewer of 200×150, whose views are made by the policy `pipeline`, and how
-/// soon a promise of wrong measurements is broken and replaced.
+/// soon a promise is broken and replaced that wrong measurements, or a viewer outside its view cell, have made untrue.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: myriorama bench promise --quick --strict")]
 pub struct PromiseArgs {
@@ -39,6 +39,8 @@ enum Part {
     Price,
     /// A promise of measurements that are a third of the true ones
     Broken,
+    /// A viewer that walks out of its view cell, and one that has view cells where it walks
+    Walk,
 }
 
 /// Measures the parts and writes the report.
@@ -50,6 +52,7 @@ pub fn run(args: &PromiseArgs) -> anyhow::Result<Outcome> {
     let measure = async |part: &Part| match part {
         Part::Price => price::measure(&args.scene, alternations).await,
         Part::Broken => broken::measure().await,
+        Part::Walk => walk::measure().await,
     };
     let sections = runtime()?.block_on(measure_parts(&args.only, measure));
     let mut report = report("Myriorama bench promise", &sections);

@@ -4,11 +4,11 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use app_core::delivery::{open, request};
+use app_core::delivery::{open, request, viewpoints};
 use app_core::live::{Drive, Record, drive};
 use client::{Client, Session};
 use cluster::{BudgetRequest, OfferStatus, PolicyChoice, Promise, PromiseState, SessionRequest};
-use depth_image::{Camera, ViewCell};
+use depth_image::{Camera, PinholeCamera, ViewCell};
 use glam::UVec2;
 
 use crate::process::Process;
@@ -16,6 +16,9 @@ use crate::process::Process;
 const SIZE_PX: UVec2 = UVec2::new(200, 150);
 /// Poses of the path: no place comes twice within a measurement of a minute.
 const PATH_POSES: usize = 600;
+/// Places of half a circle around the scene, and those about its back that a viewer visits.
+const BACK: usize = 6000;
+const STAY: usize = 600;
 /// The longest time until a promise is kept.
 const PLANNED_WITHIN: Duration = Duration::from_secs(240);
 
@@ -27,10 +30,21 @@ pub(super) struct Cluster {
     _process: Process,
 }
 
+/// What a viewer asks for.
+pub(super) struct Asked<'a> {
+    pub(super) budget: Option<&'a str>,
+    pub(super) policy: PolicyChoice,
+    /// Poses a second.
+    pub(super) rate_hz: f64,
+    pub(super) path: Vec<PinholeCamera>,
+    /// Sample cameras stand in view cells along the path, not between the offered ones.
+    pub(super) has_cells: bool,
+}
+
 /// A live viewer with a budget, or without one.
 pub(super) struct Viewer {
     session: Session,
-    path: Vec<depth_image::PinholeCamera>,
+    path: Vec<PinholeCamera>,
 }
 
 impl Cluster {
@@ -59,22 +73,44 @@ impl Cluster {
         Ok(promises.filter_map(|promise| Some(promise.audit?.busy_s)).sum())
     }
 
+    /// Places on an ellipse between the sample cameras.
+    ///
+    /// # Errors
+    /// The scene has no sample cameras.
+    pub(super) fn orbit(&self) -> anyhow::Result<Vec<PinholeCamera>> {
+        Ok(self.cell()?.orbit(PATH_POSES, SIZE_PX))
+    }
+
+    /// A way around the scene to its back, and places about there.
+    ///
+    /// # Errors
+    /// As [`Cluster::orbit`].
+    pub(super) fn to_the_back(&self, poses_of_the_way: usize, poses: usize) -> anyhow::Result<Vec<PinholeCamera>> {
+        let circle = self.cell()?.around(self.offer.volume.center(), 2 * BACK, SIZE_PX);
+        // To and fro, so that places come again after a minute only.
+        let about_the_back = |pose: usize| BACK - STAY / 2 + (pose - poses_of_the_way) * STAY / poses;
+        let place = |pose: usize| match pose.checked_sub(poses_of_the_way) {
+            None => pose * BACK / poses_of_the_way,
+            Some(_) => about_the_back(pose),
+        };
+        Ok((0..poses).map(|pose| circle[place(pose)]).collect())
+    }
+
+    fn cell(&self) -> anyhow::Result<ViewCell> {
+        let samples: Vec<_> = self.offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+        ViewCell::between(&samples).context("no sample cameras")
+    }
+
     /// A viewer that asks for poses at a rate.
     ///
     /// # Errors
     /// The coordinator refuses.
-    pub(super) async fn viewer(
-        &self,
-        budget: Option<&str>,
-        policy: PolicyChoice,
-        rate_hz: f64,
-    ) -> anyhow::Result<Viewer> {
-        let samples: Vec<_> = self.offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
-        let cell = ViewCell::between(&samples).context("no sample cameras")?;
-        let path = cell.orbit(PATH_POSES, SIZE_PX);
-        let asked = request(self.offer.settings.clone(), &path[..1])?;
+    pub(super) async fn viewer(&self, asked: Asked<'_>) -> anyhow::Result<Viewer> {
+        let Asked { budget, policy, rate_hz, path, has_cells } = asked;
         let budget = BudgetRequest { budget: budget.map(str::to_owned), names_method: false };
-        let request = SessionRequest { policy, budget, frames_per_s: Some(rate_hz), ..asked };
+        let viewpoints = if has_cells { viewpoints(&path) } else { Vec::new() };
+        let plain = request(self.offer.settings.clone(), &path[..1])?;
+        let request = SessionRequest { policy, budget, frames_per_s: Some(rate_hz), viewpoints, ..plain };
         Ok(Viewer { session: open(&self.client, request).await?, path })
     }
 }

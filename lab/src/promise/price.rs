@@ -8,7 +8,7 @@ use cluster::PolicyChoice;
 use scene::SceneSpec;
 use study::{Bar, Cell, Check, Table};
 
-use super::live_viewer::Cluster;
+use super::live_viewer::{Asked, Cluster, Viewer};
 use crate::section::Section;
 use crate::statistics::{median, quantile};
 
@@ -62,7 +62,7 @@ pub(super) async fn measure(scenes: &[SceneSpec], alternations: usize) -> anyhow
         // The plan is made while nobody watches.
         let cluster = Cluster::start(&name, plans.path(), &[]).await?;
         section.device.clone_from(&cluster.device);
-        cluster.viewer(Some(BUDGET), PolicyChoice::Pipeline, RATE_HZ).await?.kept().await?;
+        viewer(&cluster, Some(BUDGET)).await?.kept().await?;
         drop(cluster);
         let mut seen: [Vec<Seen>; 4] = Default::default();
         for _ in 0..alternations {
@@ -75,6 +75,11 @@ pub(super) async fn measure(scenes: &[SceneSpec], alternations: usize) -> anyhow
     Ok(section)
 }
 
+async fn viewer(cluster: &Cluster, budget: Option<&str>) -> anyhow::Result<Viewer> {
+    let (policy, path) = (PolicyChoice::Pipeline, cluster.orbit()?);
+    cluster.viewer(Asked { budget, policy, rate_hz: RATE_HZ, path, has_cells: false }).await
+}
+
 async fn seen_in(arrangement: Arrangement, scene: &str, plans: &Path) -> anyhow::Result<Seen> {
     let empty = tempfile::tempdir()?;
     let (plans, audit) = match arrangement {
@@ -84,7 +89,7 @@ async fn seen_in(arrangement: Arrangement, scene: &str, plans: &Path) -> anyhow:
     };
     let budget = (arrangement != Arrangement::Unplanned).then_some(BUDGET);
     let cluster = Cluster::start(scene, plans, &["--audit", audit]).await?;
-    let viewer = cluster.viewer(budget, PolicyChoice::Pipeline, RATE_HZ).await?;
+    let viewer = viewer(&cluster, budget).await?;
     if matches!(arrangement, Arrangement::Audited | Arrangement::Unaudited) {
         viewer.kept().await?;
     }

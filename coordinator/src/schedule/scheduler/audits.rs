@@ -2,7 +2,7 @@
 
 use cluster::{AuditOrder, AuditReport};
 use depth_image::PinholeCamera;
-use planner::{Metric, Pricing as _};
+use planner::{Metric, Pricing as _, Statistic};
 
 use super::Scheduler;
 use crate::schedule::Command;
@@ -19,13 +19,14 @@ impl Scheduler {
     pub(super) fn audit_order(&self, number: u64) -> Option<AuditOrder> {
         let BudgetState { plan, in_force, .. } = self.budgets.get(&number)?;
         let audited = in_force.as_ref().filter(|in_force| in_force.audit.is_some())?;
-        let metric = audited.chosen.budget.error()?.metric();
+        let term = audited.chosen.budget.error()?;
         (self.audit_time_ratio > 0.0).then(|| AuditOrder {
             time_ratio: self.audit_time_ratio,
             least_apart_m: LEAST_APART * f64::from(plan.cell_side_m()),
             antialias: plan.antialias(),
             planned_pixel_count: u32::try_from(plan.planned_pixels()).unwrap_or(u32::MAX),
-            with_sample_images: metric == Metric::Disocclusion,
+            with_sample_images: term.metric() == Metric::Disocclusion,
+            in_parts: term.statistic() == Statistic::Mean,
         })
     }
 

@@ -1,20 +1,20 @@
-//! Budgets: plans for them, the representations that they choose, and the promises to sessions.
+//! Budgets: plans for them, and the representations that they choose.
 
 use std::time::Duration;
 
-use cluster::{AuditSummary, Costs, Policy, PolicyChoice, Promise, PromiseState, SamplePlanes};
-use planner::{Budget, Kept, ProbeId};
+use cluster::{Costs, PolicyChoice, SamplePlanes};
+use planner::{Budget, Kept, ProbeId, PromiseState};
 
 use super::Scheduler;
+use crate::schedule::Command;
 use crate::schedule::budget_plan::{BudgetPlan, answered, prices};
-use crate::schedule::budget_state::{BudgetState, InForce};
+use crate::schedule::budget_state::{BudgetState, InForce, Unreachable};
 use crate::schedule::chosen::Chosen;
 use crate::schedule::estimate::Estimate;
 use crate::schedule::member::Member;
 use crate::schedule::prices::EqualNodes;
-use crate::schedule::representation::{DRAWN, Representation};
+use crate::schedule::representation::Representation;
 use crate::schedule::workload_state::WorkloadState;
-use crate::schedule::{Command, Load};
 
 /// A representation stays in force for so long at least, unless its budget has become stricter.
 const DWELL: Duration = Duration::from_secs(60);
@@ -22,10 +22,6 @@ const DWELL: Duration = Duration::from_secs(60);
 const OTHER_DEMAND: f64 = 2.0;
 /// While anybody is served, measuring takes this share of one node's time.
 const PROBING_SHARE: f64 = 0.2;
-/// The time between two reports to sessions of how measuring goes on.
-const NEWS: Duration = Duration::from_secs(5);
-/// The same of figures of audits.
-const NEWS_OF_AUDITS: Duration = Duration::from_secs(60);
 
 impl Scheduler {
     /// Commands for budgets that follow from the event that has just been taken.
@@ -36,7 +32,7 @@ impl Scheduler {
         let numbers: Vec<u64> = with_budget.map(|(&number, _)| number).collect();
         commands.extend(numbers.iter().filter_map(|&number| self.plan_for_budget(number)).flatten());
         commands.extend(self.probe_views());
-        commands.extend(numbers.into_iter().filter_map(|number| self.announce(number)));
+        commands.extend(numbers.into_iter().flat_map(|number| self.announce(number)));
         commands
     }
 
@@ -51,7 +47,7 @@ impl Scheduler {
     /// Begins a plan where there is none, or where the last one does not serve any more.
     fn plan_for_budget(&mut self, number: u64) -> Option<Vec<Command>> {
         let workload = self.workloads.get(&number)?;
-        let budget = workload.sessions.budget()?;
+        let budget = self.planned_budget(number)?;
         let device_name = self.device_to_measure(workload)?;
         if workload.sessions.policy_override().policy == PolicyChoice::Direct
             || self.budgets.get(&number).is_some_and(|state| !self.is_outdated(state, workload, budget))
@@ -72,6 +68,20 @@ impl Scheduler {
         Some(keep.into_iter().chain([recall]).collect())
     }
 
+    /// The strictest budget of a workload's sessions that may be kept; `None` where nothing keeps any of them.
+    pub(super) fn planned_budget(&self, number: u64) -> Option<Budget> {
+        let workload = self.workloads.get(&number)?;
+        let (state, prices) = (self.budgets.get(&number), prices(workload));
+        let is_unreachable = |budget: &Budget| {
+            let known = state.and_then(|state| state.unreachable_by(budget));
+            known.is_some_and(|known| {
+                let is_recent = self.now.saturating_sub(known.since) < DWELL;
+                may_draw(&known.prices) == may_draw(&prices) && (is_recent || !is_other_demand(&known.prices, &prices))
+            })
+        };
+        workload.sessions.strictest_budget(|budget| !is_unreachable(budget))
+    }
+
     fn is_outdated(&self, state: &BudgetState, workload: &WorkloadState, budget: Budget) -> bool {
         let BudgetPlan { budget: planned, device_name, prices: at, began, outcome, .. } = &state.plan;
         if state.findings.is_given_up && workload.sessions.policy_override().may_draw_directly() {
@@ -82,8 +92,11 @@ impl Scheduler {
         let is_lasting = self.now.saturating_sub(since) >= DWELL && outcome.is_some();
         let prices = prices(workload);
         let is_other = *planned != budget || is_other_demand(at, &prices) || state.is_to_be_tried_again;
-        let may_draw = |prices: &EqualNodes| prices.direct_view_s.is_some();
-        let is_wrong = !planned.implies(&budget) || may_draw(at) != may_draw(&prices);
+        let is_kept = state.in_force.as_ref().is_some_and(|in_force| in_force.keeps(&budget));
+        let is_for_others = outcome.as_ref().is_some_and(|outcome| outcome.state == PromiseState::Unreachable)
+            && *planned != budget
+            && !is_kept;
+        let is_wrong = !planned.implies(&budget) || may_draw(at) != may_draw(&prices) || is_for_others;
         let is_broken = state.findings.is_to_be_planned
             && (outcome.is_some() || state.is_superseded())
             && state.switching.is_none()
@@ -161,11 +174,18 @@ impl Scheduler {
 
     /// A plan is made: a row's costs are measured before it is in force, unless it is in force already.
     fn concluded(&mut self, number: u64, kept: Box<Kept>) -> Vec<Command> {
-        let mut commands = vec![Command::Keep(kept)];
-        let (Some(state), Some(workload)) = (self.budgets.get_mut(&number), self.workloads.get(&number)) else {
-            return commands;
-        };
+        let (mut commands, now) = (vec![Command::Keep(kept)], self.now);
+        let Some(state) = self.budgets.get_mut(&number) else { return commands };
         let Some(chosen) = state.plan.chosen().filter(|_| !state.is_superseded()) else { return commands };
+        if chosen.outcome.state == PromiseState::Unreachable {
+            let (budget, prices, reason) = (chosen.budget, state.plan.prices, chosen.outcome.reason.clone());
+            state.note_unreachable(Unreachable { budget, since: now, prices, reason });
+            // Other sessions have what they had, or a plan of their own.
+            if self.planned_budget(number).is_some() {
+                return commands;
+            }
+        }
+        let Some(workload) = self.workloads.get(&number) else { return commands };
         let in_force = workload.representation.as_ref().and_then(Representation::row);
         match &chosen.row {
             Some(row) if in_force == Some(row) => commands.extend(self.choose_again(number, chosen)),
@@ -283,108 +303,10 @@ impl Scheduler {
             in_force.is_applied |= plan_epoch >= in_force.plan_epoch;
         }
     }
-
-    /// Tells sessions of a promise that has changed, and now and then how measuring goes on.
-    fn announce(&mut self, number: u64) -> Option<Command> {
-        let (promise, now) = (self.promise(number)?, self.now);
-        let WorkloadState { announced, sessions, .. } = self.workloads.get_mut(&number)?;
-        let known = |promise: &Promise| {
-            let viewers_above = promise.audit.map_or(0, |audit| audit.viewers_above);
-            (promise.state, promise.budget.clone(), promise.representation.clone(), viewers_above)
-        };
-        let interval = if promise.state == PromiseState::Measuring { NEWS } else { NEWS_OF_AUDITS };
-        let is_known = announced.as_ref().is_some_and(|(at, announced)| {
-            let news = |promise: &Promise| (promise.reason.clone(), promise.audit);
-            known(announced) == known(&promise)
-                && (now.saturating_sub(*at) < interval || news(announced) == news(&promise))
-        });
-        if is_known {
-            return None;
-        }
-        *announced = Some((now, promise.clone()));
-        Some(Command::Promise { sessions: sessions.numbers(), promise: Box::new(promise) })
-    }
-
-    /// A session that has joined others is told what is promised to them.
-    pub(super) fn promise_to(&self, session: u64, number: u64) -> Option<Command> {
-        let (_, promise) = self.workloads.get(&number)?.announced.as_ref()?;
-        Some(Command::Promise { sessions: vec![session], promise: Box::new(promise.clone()) })
-    }
-
-    /// The promise to a workload's sessions; `None` without a budget.
-    pub(super) fn promise(&self, number: u64) -> Option<Promise> {
-        let workload = self.workloads.get(&number)?;
-        let budget = workload.sessions.budget()?;
-        if workload.sessions.policy_override().policy == PolicyChoice::Direct {
-            return Some(drawn_directly(&budget, &workload.costs));
-        }
-        if let Some(reason) = workload.not_planned.as_ref().filter(|_| !self.budgets.contains_key(&number)) {
-            return Some(without_figures(&budget, PromiseState::Unreachable, reason.clone()));
-        }
-        let state = self.budgets.get(&number)?;
-        // Direct drawing keeps every budget on errors.
-        let serves = |in_force: &InForce| in_force.chosen.budget.implies(&budget) || state.findings.is_given_up;
-        let holds = |in_force: &&InForce| in_force.is_applied && serves(in_force);
-        let in_force = state.in_force.as_ref().filter(holds);
-        let broken = state.broken().filter(|broken| budget.implies(&broken.budget));
-        let outcome = in_force.map(|in_force| &in_force.chosen.outcome);
-        let is_audited = workload.audit.is_some() && workload.policy() != Some(Policy::Direct);
-        let audit = in_force.and_then(|in_force| in_force.audit.as_ref()).filter(|_| is_audited);
-        let certificate = outcome.and_then(|outcome| outcome.certificate.as_ref());
-        let asked = || {
-            let Load { images, .. } = workload.load();
-            format!("{}, S = {images}, {}", workload.requested.sampling, workload.method())
-        };
-        let policy = workload.policy();
-        Some(Promise {
-            budget: budget.to_string(),
-            state: match outcome.map(|outcome| outcome.state) {
-                _ if broken.is_some() => PromiseState::Broken,
-                None | Some(planner::PromiseState::Measuring) => PromiseState::Measuring,
-                Some(planner::PromiseState::Kept) => PromiseState::Kept,
-                Some(planner::PromiseState::Unreachable) => PromiseState::Unreachable,
-            },
-            representation: Representation::name(workload.representation.as_ref(), asked, policy),
-            expected_ratio: certificate.map_or(0.0, |certificate| certificate.expected_ratio),
-            bound_ratio: certificate.map_or(0.0, |certificate| certificate.bound_ratio.clamp(0.0, 1.0)),
-            probe_view_count: certificate.map_or(0, |certificate| certificate.views as u32),
-            reason: match (broken, outcome) {
-                (Some(broken), _) => self.broken_reason(broken, state),
-                (None, Some(outcome)) => {
-                    let audits = audit.map(|audit| audit.in_words(self.now)).unwrap_or_default();
-                    format!("{}{audits}{}", outcome.reason, state.findings.broken_here(self.now))
-                }
-                (None, None) => state.plan.reason(),
-            },
-            audit: audit.map(|audit| AuditSummary {
-                viewers_above: state.findings.viewers_above(self.now),
-                ..audit.summary(self.now)
-            }),
-        })
-    }
 }
 
-/// The promise where sessions have every view drawn directly.
-fn drawn_directly(budget: &Budget, costs: &Costs) -> Promise {
-    let view_s = costs.direct_view_s + costs.encode_view_s;
-    let is_kept = budget.most_view_s().is_none_or(|limit| view_s <= limit);
-    let state = if is_kept { PromiseState::Kept } else { PromiseState::Unreachable };
-    let reason = format!("Sessions have every view drawn directly, in {:.1} ms: there is no error.", view_s * 1e3);
-    Promise { representation: DRAWN.to_owned(), ..without_figures(budget, state, reason) }
-}
-
-/// The promise where nothing is measured.
-fn without_figures(budget: &Budget, state: PromiseState, reason: String) -> Promise {
-    Promise {
-        budget: budget.to_string(),
-        state,
-        representation: String::new(),
-        expected_ratio: 0.0,
-        bound_ratio: 0.0,
-        probe_view_count: 0,
-        reason,
-        audit: None,
-    }
+fn may_draw(prices: &EqualNodes) -> bool {
+    prices.direct_view_s.is_some()
 }
 
 /// Whether another representation may be the cheapest.

@@ -21,7 +21,8 @@ impl Scheduler {
         }
         let Some(number) = self.workload_for(opening) else { return self.begin(opening) };
         let mut commands = self.change(number, |sessions| sessions.add(opening));
-        commands.extend(self.promise_to(session, number));
+        let budget = opening.budgeted.as_ref().map(|budgeted| &budgeted.budget);
+        commands.extend(self.promise_to(session, budget, number));
         let is_announced = commands
             .iter()
             .any(|command| matches!(command, Command::Apply { plan, .. } if plan.assignment.workload_number == number));

@@ -47,7 +47,7 @@ impl Scheduler {
             conditions: self.conditions(number, workload),
             achieved: workload.achieved.clone(),
             utilisation: self.utilisation(number).filter(|&utilisation| utilisation > 0.0),
-            promise: self.promise(number),
+            promise: self.workload_promise(number),
             one_more_viewer: self.one_more_viewer(number, workload),
         }
     }

@@ -17,6 +17,8 @@ use kernels::{ACHROMATIC, BLUE_YELLOW, FeatureKernels, RED_GREEN, Sensitivity};
 
 /// The paper's viewer: 0.7 m from a display 0.7 m wide with 3840 columns, 0.7 · 3840 / 0.7 · π / 180.
 pub const FLIP_PIXELS_PER_DEGREE: f32 = 67.020_64;
+/// The error of a pixel depends on pixels up to so many away, for the default viewer.
+pub const FLIP_REACH_PX: u32 = 10;
 /// Differences are compressed by this power.
 const POWER: f32 = 0.7;
 /// Errors up to this share of the greatest error…
@@ -160,6 +162,33 @@ mod tests {
     fn blue_for_green_is_the_greatest_error() {
         let mean = flip_map(&flat([0, 255, 0]), &flat([0, 0, 255])).unwrap().mean(None).unwrap().unwrap();
         assert!((mean - 1.0).abs() < 1e-4, "{mean}");
+    }
+
+    #[test]
+    fn a_pixel_depends_on_its_surroundings_alone() {
+        const SIDE: usize = 64;
+        let byte = |index: usize, seed: usize| (index * 7919 + seed).wrapping_mul(2_654_435_761) as u8;
+        let crop = |pixels: &[u8], first: usize| -> Vec<u8> {
+            let rows = pixels.chunks(3 * SIDE).skip(first).take(SIDE - 2 * first);
+            rows.flat_map(|row| row[3 * first..3 * (SIDE - first)].to_vec()).collect()
+        };
+        let images = [1, 5].map(|seed| (0..3 * SIDE * SIDE).map(|index| byte(index, seed)).collect::<Vec<u8>>());
+        let map = |first: usize| {
+            let side = (SIDE - 2 * first) as u32;
+            let [a, b] = [0, 1].map(|image| Rgb8Image::new(side, side, crop(&images[image], first)).unwrap());
+            flip_map(&a, &b).unwrap().values
+        };
+        let (whole, part, reach) = (map(0), map(8), FLIP_REACH_PX as usize);
+        let mut differs_nearer = false;
+        for (y, x) in (0..48).flat_map(|y| (0..48).map(move |x| (y, x))) {
+            let [own, in_whole] = [part[48 * y + x], whole[SIDE * (y + 8) + x + 8]];
+            let to_border = x.min(y).min(47 - x).min(47 - y);
+            match to_border >= reach {
+                true => assert!((own - in_whole).abs() < 1e-4, "{x}, {y}: {own}, {in_whole}"),
+                false => differs_nearer |= (own - in_whole).abs() > 1e-3,
+            }
+        }
+        assert!(differs_nearer, "the border matters");
     }
 
     #[test]

@@ -73,6 +73,25 @@ fn broken_promises_of_small_models_are_found_as_fast() {
     }
 }
 
+/// Of a model that fills a share of the view, most squares show all or nothing.
+#[test]
+fn broken_promises_of_views_that_are_compared_by_squares_are_found() {
+    for (share, most) in [(1.0, 80), (0.3, 250), (0.1, 700)] {
+        let found = |seed: u64| {
+            let (mut random, mut audit) = (Random(seed + 1), Audit::new(term("flip 0.05"), 1.0));
+            (1..=1_000_u64).find(|_| {
+                let foreground_ratio = if random.unit() < share { random.between(0.5, 1.0) } else { 0.0 };
+                audit.observe(&view(foreground_ratio, 0.1 * random.gamma(1.0)));
+                audit.is_alarmed()
+            })
+        };
+        let mut found: Vec<u64> = (0..RUNS).map(|seed| found(seed).unwrap_or(1_001)).collect();
+        found.sort_unstable();
+        println!("squares, {share} with a surface, v 1: twice the budget within {} audits", most_of(&found));
+        assert!(most_of(&found) <= most, "{share}: {}", most_of(&found));
+    }
+}
+
 /// A certificate's views may show far less foreground than a viewer's, or more; views differ, too.
 #[test]
 fn kept_promises_of_views_unlike_those_of_the_certificate_are_rarely_alarmed() {

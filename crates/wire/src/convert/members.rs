@@ -42,7 +42,7 @@ messages! {
     AuditReport = AuditReport {
         views, busy_s; covered_views: covered_view_count, uncovered_views: uncovered_view_count
     }, first |r| at_most(r.views.len(), MAX_PROBE_VIEWS, "audit.views");
-    AuditedView = AuditedView { plan_epoch, camera, errors; stream: stream_number };
+    AuditedView = AuditedView { plan_epoch, camera, errors, is_part; stream: stream_number };
     ReportSamplerRequest = SamplerReport { plan_epoch, reason; compositor: compositor_name, sampler: sampler_name },
         then SamplerReport::validate;
     AchievedTime = AchievedTime { policy, busy_s };

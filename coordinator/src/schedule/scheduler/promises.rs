@@ -1,0 +1,163 @@
+//! Promises: what sessions are told of the budgets that they state.
+
+use std::time::Duration;
+
+use cluster::{AuditSummary, Costs, Policy, PolicyChoice, Promise, PromiseState};
+use planner::Budget;
+
+use super::Scheduler;
+use crate::schedule::budget_state::{BudgetState, InForce};
+use crate::schedule::representation::{DRAWN, Representation};
+use crate::schedule::workload_state::WorkloadState;
+use crate::schedule::{Command, Load};
+
+/// The time between two reports to sessions of how measuring goes on.
+const NEWS: Duration = Duration::from_secs(5);
+/// The same of figures of audits.
+const NEWS_OF_AUDITS: Duration = Duration::from_secs(60);
+
+impl Scheduler {
+    /// Tells sessions of promises that have changed, and now and then how measuring goes on.
+    pub(super) fn announce(&mut self, number: u64) -> Vec<Command> {
+        let Some(workload) = self.workloads.get(&number) else { return Vec::new() };
+        let budgets = workload.sessions.budgets();
+        let promises = budgets.into_iter().filter_map(|(budget, of)| Some((of, self.promise(number, &budget)?)));
+        let promises: Vec<(Vec<u64>, Promise)> = promises.collect();
+        let now = self.now;
+        let Some(WorkloadState { announced, .. }) = self.workloads.get_mut(&number) else { return Vec::new() };
+        announced.retain(|(_, known)| promises.iter().any(|(_, promise)| promise.budget == known.budget));
+        let mut commands = Vec::new();
+        for (sessions, promise) in promises {
+            if announced.iter().any(|known| !is_news(now, known, &promise)) {
+                continue;
+            }
+            announced.retain(|(_, known)| known.budget != promise.budget);
+            announced.push((now, promise.clone()));
+            commands.push(Command::Promise { sessions, promise: Box::new(promise) });
+        }
+        commands
+    }
+
+    /// A session that has joined others with its budget is told what is promised to them.
+    pub(super) fn promise_to(&self, session: u64, budget: Option<&Budget>, number: u64) -> Option<Command> {
+        let (known, budget) = (&self.workloads.get(&number)?.announced, budget?.to_string());
+        let (_, promise) = known.iter().find(|(_, promise)| promise.budget == budget)?;
+        Some(Command::Promise { sessions: vec![session], promise: Box::new(promise.clone()) })
+    }
+
+    /// The promise for the budget that is planned for, or for the strictest where nothing keeps any; `None` without a budget.
+    pub(super) fn workload_promise(&self, number: u64) -> Option<Promise> {
+        let strictest = || self.workloads.get(&number)?.sessions.strictest_budget(|_| true);
+        self.promise(number, &self.planned_budget(number).or_else(strictest)?)
+    }
+
+    /// The promise to a workload's sessions with a budget.
+    fn promise(&self, number: u64, budget: &Budget) -> Option<Promise> {
+        let workload = self.workloads.get(&number)?;
+        if workload.sessions.policy_override().policy == PolicyChoice::Direct {
+            return Some(drawn_directly(budget, &workload.costs));
+        }
+        if let Some(reason) = workload.not_planned.as_ref().filter(|_| !self.budgets.contains_key(&number)) {
+            return Some(without_figures(budget, PromiseState::Unreachable, reason.clone()));
+        }
+        let state = self.budgets.get(&number)?;
+        let representation = representation_in_words(workload);
+        // Direct drawing keeps every budget on errors.
+        let serves = |in_force: &&InForce| {
+            in_force.is_applied
+                && (in_force.keeps(budget) || in_force.chosen.budget == *budget || state.findings.is_given_up)
+        };
+        let in_force = state.in_force.as_ref().filter(serves);
+        if let Some(reason) = self.unreachable_reason(number, state, budget).filter(|_| in_force.is_none()) {
+            return Some(Promise { representation, ..without_figures(budget, PromiseState::Unreachable, reason) });
+        }
+        let broken = state.broken().filter(|broken| budget.implies(&broken.budget));
+        let outcome = in_force.map(|in_force| &in_force.chosen.outcome);
+        let is_audited = workload.audit.is_some() && workload.policy() != Some(Policy::Direct);
+        let audit = in_force.and_then(|in_force| in_force.audit.as_ref()).filter(|_| is_audited);
+        let certificate = outcome.and_then(|outcome| outcome.certificate.as_ref());
+        Some(Promise {
+            budget: budget.to_string(),
+            state: match outcome.map(|outcome| outcome.state) {
+                _ if broken.is_some() => PromiseState::Broken,
+                None | Some(planner::PromiseState::Measuring) => PromiseState::Measuring,
+                Some(planner::PromiseState::Kept) => PromiseState::Kept,
+                Some(planner::PromiseState::Unreachable) => PromiseState::Unreachable,
+            },
+            representation,
+            expected_ratio: certificate.map_or(0.0, |certificate| certificate.expected_ratio),
+            bound_ratio: certificate.map_or(0.0, |certificate| certificate.bound_ratio.clamp(0.0, 1.0)),
+            probe_view_count: certificate.map_or(0, |certificate| certificate.views as u32),
+            reason: match (broken, outcome) {
+                (Some(broken), _) => self.broken_reason(broken, state),
+                (None, Some(outcome)) => {
+                    let audits = audit.map(|audit| audit.in_words(self.now)).unwrap_or_default();
+                    format!("{}{audits}{}", outcome.reason, state.findings.broken_here(self.now))
+                }
+                (None, None) if state.plan.budget.implies(budget) => state.plan.reason(),
+                (None, None) => "A plan for it follows.".to_owned(),
+            },
+            audit: audit.map(|audit| AuditSummary {
+                viewers_above: state.findings.viewers_above(self.now),
+                ..audit.summary(self.now)
+            }),
+        })
+    }
+
+    /// Why a budget is not planned for; `None` where it is, or will be.
+    fn unreachable_reason(&self, number: u64, state: &BudgetState, budget: &Budget) -> Option<String> {
+        let planned = self.planned_budget(number);
+        if planned.is_some_and(|planned| planned.implies(budget)) {
+            return None;
+        }
+        if let Some(known) = state.unreachable_by(budget) {
+            return Some(known.reason.clone());
+        }
+        let (planned, together) = (planned?, planned?.and(budget)?);
+        let known = state.unreachable_by(&together)?;
+        Some(format!("Sessions that share the samples and were opened before want {planned}. {}", known.reason))
+    }
+}
+
+/// Whether sessions are told of a promise that they know in an earlier form.
+fn is_news(now: Duration, (at, known): &(Duration, Promise), promise: &Promise) -> bool {
+    let facts = |promise: &Promise| {
+        let viewers_above = promise.audit.map_or(0, |audit| audit.viewers_above);
+        (promise.state, promise.budget.clone(), promise.representation.clone(), viewers_above)
+    };
+    let figures = |promise: &Promise| (promise.reason.clone(), promise.audit);
+    let interval = if promise.state == PromiseState::Measuring { NEWS } else { NEWS_OF_AUDITS };
+    let is_due = now.saturating_sub(*at) >= interval;
+    facts(known) != facts(promise) || (is_due && figures(known) != figures(promise))
+}
+
+fn representation_in_words(workload: &WorkloadState) -> String {
+    let asked = || {
+        let Load { images, .. } = workload.load();
+        format!("{}, S = {images}, {}", workload.requested.sampling, workload.method())
+    };
+    Representation::name(workload.representation.as_ref(), asked, workload.policy())
+}
+
+/// The promise where sessions have every view drawn directly.
+fn drawn_directly(budget: &Budget, costs: &Costs) -> Promise {
+    let view_s = costs.direct_view_s + costs.encode_view_s;
+    let is_kept = budget.most_view_s().is_none_or(|limit| view_s <= limit);
+    let state = if is_kept { PromiseState::Kept } else { PromiseState::Unreachable };
+    let reason = format!("Sessions have every view drawn directly, in {:.1} ms: there is no error.", view_s * 1e3);
+    Promise { representation: DRAWN.to_owned(), ..without_figures(budget, state, reason) }
+}
+
+/// The promise where nothing is measured.
+fn without_figures(budget: &Budget, state: PromiseState, reason: String) -> Promise {
+    Promise {
+        budget: budget.to_string(),
+        state,
+        representation: String::new(),
+        expected_ratio: 0.0,
+        bound_ratio: 0.0,
+        probe_view_count: 0,
+        reason,
+        audit: None,
+    }
+}
