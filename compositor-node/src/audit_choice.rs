@@ -33,11 +33,13 @@ pub(crate) struct Candidate {
     pub(crate) camera: PinholeCamera,
 }
 
+/// The views of one workload by one method.
+pub(crate) type Kind = (u64, String);
+
 /// The end of an audit.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Ended {
-    /// The workload and the method.
-    pub(crate) kind: (u64, String),
+    pub(crate) kind: Kind,
     /// The time without waits; `None` for a failure.
     pub(crate) busy_s: Option<f64>,
     /// The time with waits.
@@ -55,15 +57,23 @@ pub(crate) struct AuditChoice {
     recent: VecDeque<u64>,
     /// When another stream made a view that could be audited.
     other_at: Option<Instant>,
-    audited: VecDeque<(SetContent, PinholeCamera)>,
+    audited: VecDeque<(Kind, SetContent, PinholeCamera)>,
     /// Kinds of views whose first audit has been made.
-    kinds: VecDeque<(u64, String)>,
+    kinds: VecDeque<Kind>,
 }
 
 impl AuditChoice {
     /// The place of the view to audit now, if any. The audit is then under way until [`AuditChoice::end`].
-    pub(crate) fn choose(&mut self, now: Instant, views: &[Candidate], least_apart_m: f32) -> Option<usize> {
-        let is_new = |view: &Candidate| !self.audited.iter().any(|seen| is_near(seen, view, least_apart_m));
+    pub(crate) fn choose(
+        &mut self,
+        now: Instant,
+        kind: &Kind,
+        views: &[Candidate],
+        least_apart_m: f32,
+    ) -> Option<usize> {
+        let seen = self.audited.iter().filter(|(of, ..)| of == kind);
+        let is_new =
+            |view: &Candidate| !seen.clone().any(|(_, set, camera)| is_near((set, camera), view, least_apart_m));
         let is_other = |view: &Candidate| !self.recent.contains(&view.stream);
         let new: Vec<usize> = (0..views.len()).filter(|&place| is_new(&views[place])).collect();
         let mut eligible: Vec<usize> = new.iter().copied().filter(|&place| is_other(&views[place])).collect();
@@ -78,17 +88,17 @@ impl AuditChoice {
             return None;
         }
         let chosen = eligible.into_iter().min_by_key(|&place| views[place].random)?;
-        self.begin(&views[chosen]);
+        self.begin(kind.clone(), &views[chosen]);
         Some(chosen)
     }
 
-    fn begin(&mut self, view: &Candidate) {
+    fn begin(&mut self, kind: Kind, view: &Candidate) {
         (self.is_auditing, self.other_at) = (true, None);
         self.recent.push_back(view.stream);
         if self.recent.len() > RECENT_STREAMS {
             self.recent.pop_front();
         }
-        self.audited.push_back((view.set, view.camera));
+        self.audited.push_back((kind, view.set, view.camera));
         if self.audited.len() > MAX_AUDITED {
             self.audited.pop_front();
         }
@@ -123,7 +133,7 @@ fn random_pause(busy_s: f64, share: f64, random: u64) -> Duration {
 }
 
 /// Whether a view was audited from the same set and about the same place.
-fn is_near((set, camera): &(SetContent, PinholeCamera), view: &Candidate, least_apart_m: f32) -> bool {
+fn is_near((set, camera): (&SetContent, &PinholeCamera), view: &Candidate, least_apart_m: f32) -> bool {
     *set == view.set
         && is_one_place(camera, &view.camera, least_apart_m)
         && camera.size_px == view.camera.size_px
@@ -143,8 +153,12 @@ mod tests {
         Candidate { stream, random, set: set_content(0), camera }
     }
 
+    fn kind() -> Kind {
+        (1, "mesh".to_owned())
+    }
+
     fn ended(busy_s: Option<f64>, random: u64) -> Ended {
-        Ended { kind: (1, "mesh".to_owned()), busy_s, wall_s: 0.0, random }
+        Ended { kind: kind(), busy_s, wall_s: 0.0, random }
     }
 
     /// Audits `views` at a time, one after the other without pauses: the streams that were chosen.
@@ -154,7 +168,7 @@ mod tests {
         for round in 0..rounds {
             let now = start + Duration::from_secs(2 * round as u64);
             let views = views(round);
-            if let Some(chosen) = choice.choose(now, &views, 1e-3) {
+            if let Some(chosen) = choice.choose(now, &kind(), &views, 1e-3) {
                 streams.push(views[chosen].stream);
                 choice.end(now, ended(Some(0.0), 1), 0.01);
             }
@@ -166,15 +180,19 @@ mod tests {
     fn the_least_random_number_of_a_batch_is_chosen_once() {
         let (mut choice, now) = (AuditChoice::default(), Instant::now());
         let views = [view(1, 0.0, 9), view(1, 1.0, 3), view(1, 2.0, 5)];
-        assert_eq!(choice.choose(now, &views, 1e-3), Some(1));
-        assert_eq!(choice.choose(now, &views, 1e-3), None, "one at a time");
+        assert_eq!(choice.choose(now, &kind(), &views, 1e-3), Some(1));
+        assert_eq!(choice.choose(now, &kind(), &views, 1e-3), None, "one at a time");
         choice.end(now, ended(Some(0.02), u64::MAX / 3), 0.01);
         let later = now + FIRST_PAUSE;
-        assert_eq!(choice.choose(now, &views, 1e-3), None, "not due");
-        assert_eq!(choice.choose(later, &views, 1e-3), Some(2), "the place of the first was audited");
+        assert_eq!(choice.choose(now, &kind(), &views, 1e-3), None, "not due");
+        assert_eq!(choice.choose(later, &kind(), &views, 1e-3), Some(2), "the place of the first was audited");
         let other_set = [Candidate { set: set_content(1), ..view(1, 1.0, 3) }];
         choice.end(later, ended(None, 0), 0.01);
-        assert_eq!(choice.choose(later + FAILED_PAUSE, &other_set, 1e-3), Some(0));
+        let at = later + FAILED_PAUSE;
+        assert_eq!(choice.choose(at, &kind(), &other_set, 1e-3), Some(0));
+        choice.end(at, ended(None, 0), 0.01);
+        let other_method = (1, "splat".to_owned());
+        assert_eq!(choice.choose(at + FAILED_PAUSE, &other_method, &other_set, 1e-3), Some(0), "other views");
     }
 
     #[test]

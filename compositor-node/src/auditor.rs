@@ -11,7 +11,7 @@ use node::{DirectWork, NodeMetrics, Pinned, PlansInForce, Scenes, ViewAudit, Vie
 use parking_lot::Mutex;
 use tonic::Status;
 
-use crate::audit_choice::{AuditChoice, Candidate, Ended};
+use crate::audit_choice::{AuditChoice, Candidate, Ended, Kind};
 use crate::batch::{BatchKey, Source, Waiting};
 use crate::sets::ReadySet;
 
@@ -72,7 +72,8 @@ impl Auditor {
             Candidate { stream, random, set: set.content, camera }
         };
         let candidates: Vec<Candidate> = covered.iter().map(candidate).collect();
-        let place = self.choice.lock().choose(Instant::now(), &candidates, order.least_apart_m as f32)?;
+        let mut choice = self.choice.lock();
+        let place = choice.choose(Instant::now(), &kind_of(plan), &candidates, order.least_apart_m as f32)?;
         let Candidate { stream, random, camera, .. } = candidates[place];
         Some(Chosen { plan: plan.clone(), set: set.clone(), stream, random, camera, scene_time_s })
     }
@@ -80,7 +81,7 @@ impl Auditor {
     async fn audit(self: Arc<Self>, chosen: Chosen, order: AuditOrder) {
         let Chosen { plan, stream, random, camera, .. } = &chosen;
         let (plan_epoch, workload_number, random) = (plan.plan_epoch, plan.workload_number, *random);
-        let kind = (workload_number, plan.method.clone().unwrap_or_default());
+        let kind = kind_of(plan);
         let (stream, camera, part) = (*stream, *camera, audited_part(camera.size_px, &order, random));
         let is_part = part != ViewPart::whole(camera.size_px);
         let start = Instant::now();
@@ -136,6 +137,10 @@ impl Auditor {
         let probes = self.probes.clone();
         blocking(move || probes.audit(view)).await
     }
+}
+
+fn kind_of(plan: &Assignment) -> Kind {
+    (plan.workload_number, plan.method.clone().unwrap_or_default())
 }
 
 /// The part of a view that is compared. The square with a random pixel has the view's errors in the mean.
