@@ -68,9 +68,16 @@ impl Cluster {
     /// # Errors
     /// The coordinator does not answer.
     pub(super) async fn audit_s(&self) -> anyhow::Result<f64> {
+        Ok(self.promise().await?.and_then(|promise| promise.audit).map_or(0.0, |audit| audit.busy_s))
+    }
+
+    /// The promise to the viewers, with its figures now.
+    ///
+    /// # Errors
+    /// As [`Cluster::audit_s`].
+    pub(super) async fn promise(&self) -> anyhow::Result<Option<Promise>> {
         let status = self.client.status().await?;
-        let promises = status.workloads.into_iter().filter_map(|workload| workload.promise);
-        Ok(promises.filter_map(|promise| Some(promise.audit?.busy_s)).sum())
+        Ok(status.workloads.into_iter().find_map(|workload| workload.promise))
     }
 
     /// Places on an ellipse between the sample cameras.

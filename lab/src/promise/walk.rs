@@ -26,6 +26,8 @@ struct Walked {
     replaced_s: Option<f64>,
     longest_gap_s: f64,
     shown: usize,
+    /// Views that were audited since the last representation is in force.
+    audited: u64,
     promise: Option<Promise>,
 }
 
@@ -39,6 +41,7 @@ pub(super) async fn measure() -> anyhow::Result<Section> {
         ("sample cameras", ""),
         ("poses shown", ""),
         ("longest gap", "s"),
+        ("audited views", ""),
         ("broken and replaced after", "s"),
         ("then", ""),
     ];
@@ -49,11 +52,11 @@ pub(super) async fn measure() -> anyhow::Result<Section> {
         section.device.clone_from(&cluster.device);
         let path = cluster.to_the_back(POSES_OF_THE_WAY, (MEASURED_S * RATE_HZ) as usize)?;
         let asked = Asked { budget: Some(BUDGET), policy: PolicyChoice::Auto, rate_hz: RATE_HZ, path, has_cells };
-        let walked = walk(&cluster.viewer(asked).await?).await?;
+        let walked = walk(&cluster, &cluster.viewer(asked).await?).await?;
         let replaced_s = walked.replaced_s.map_or_else(|| "never".to_owned(), |seconds| format!("{seconds:.1}"));
         let then = walked.promise.as_ref().map_or_else(String::new, ToString::to_string);
-        let figures = [(walked.shown as f64).into(), walked.longest_gap_s.into(), replaced_s.into(), then.into()];
-        table.push([Cell::from(name)].into_iter().chain(figures))?;
+        let numbers = [walked.shown as f64, walked.longest_gap_s, walked.audited as f64].map(Cell::from);
+        table.push([Cell::from(name)].into_iter().chain(numbers).chain([replaced_s.into(), then.into()]))?;
         section.checks.extend(checks(has_cells, &walked));
     }
     section.tables.push(table);
@@ -61,7 +64,7 @@ pub(super) async fn measure() -> anyhow::Result<Section> {
 }
 
 /// Follows the viewer's path until audits have had its promise replaced, or to its end.
-async fn walk(viewer: &Viewer) -> anyhow::Result<Walked> {
+async fn walk(cluster: &Cluster, viewer: &Viewer) -> anyhow::Result<Walked> {
     let mut promised = viewer.kept().await?.representation;
     let (start, mut replaced_s) = (Instant::now(), None);
     let stop = async {
@@ -74,21 +77,27 @@ async fn walk(viewer: &Viewer) -> anyhow::Result<Walked> {
     };
     let record = viewer.follow(RATE_HZ, MEASURED_S, stop).await?;
     let (longest_gap_s, _) = record.longest_gap_s(0.0);
-    Ok(Walked { replaced_s, longest_gap_s, shown: record.shown.len(), promise: viewer.promise() })
+    // Sessions are told of figures now and then.
+    let promise = cluster.promise().await?;
+    let audited = promise.as_ref().and_then(|promise| promise.audit).map_or(0, |audit| audit.audited_views);
+    Ok(Walked { replaced_s, longest_gap_s, shown: record.shown.len(), audited, promise })
 }
 
-fn checks(has_cells: bool, walked: &Walked) -> [Check; 2] {
+fn checks(has_cells: bool, walked: &Walked) -> Vec<Check> {
     let name = if has_cells { "view cells" } else { "fixed sample cameras" };
     let gap = Check::new(&format!("{name}: longest gap"), walked.longest_gap_s, "s", Bar::AtMost(1.0));
     let found = match has_cells {
         true => {
             let alarms = if walked.replaced_s.is_some() { 1.0 } else { 0.0 };
-            Check::new(&format!("{name}: broken promises"), alarms, "", Bar::AtMost(0.0))
+            vec![
+                Check::new(&format!("{name}: broken promises"), alarms, "", Bar::AtMost(0.0)),
+                Check::new(&format!("{name}: audited views"), walked.audited as f64, "", Bar::AtLeast(1.0)),
+            ]
         }
         false => {
             let replaced_s = walked.replaced_s.unwrap_or(f64::INFINITY);
-            Check::new(&format!("{name}: broken and replaced after"), replaced_s, "s", Bar::AtMost(30.0))
+            vec![Check::new(&format!("{name}: broken and replaced after"), replaced_s, "s", Bar::AtMost(30.0))]
         }
     };
-    [gap, found]
+    [gap].into_iter().chain(found).collect()
 }
