@@ -85,18 +85,18 @@ async fn walk(cluster: &Cluster, viewer: &Viewer) -> anyhow::Result<Walked> {
 
 fn checks(has_cells: bool, walked: &Walked) -> Vec<Check> {
     let name = if has_cells { "view cells" } else { "fixed sample cameras" };
-    let gap = Check::new(&format!("{name}: longest gap"), walked.longest_gap_s, "s", Bar::AtMost(1.0));
+    let gap = Check::new(format!("{name}: longest gap"), walked.longest_gap_s, "s", Bar::AtMost(1.0));
     let found = match has_cells {
         true => {
             let alarms = if walked.replaced_s.is_some() { 1.0 } else { 0.0 };
             vec![
-                Check::new(&format!("{name}: broken promises"), alarms, "", Bar::AtMost(0.0)),
-                Check::new(&format!("{name}: audited views"), walked.audited as f64, "", Bar::AtLeast(1.0)),
+                Check::new(format!("{name}: broken promises"), alarms, "", Bar::AtMost(0.0)),
+                Check::new(format!("{name}: audited views"), walked.audited as f64, "", Bar::AtLeast(1.0)),
             ]
         }
         false => {
             let replaced_s = walked.replaced_s.unwrap_or(f64::INFINITY);
-            vec![Check::new(&format!("{name}: broken and replaced after"), replaced_s, "s", Bar::AtMost(30.0))]
+            vec![Check::new(format!("{name}: broken and replaced after"), replaced_s, "s", Bar::AtMost(30.0))]
         }
     };
     [gap].into_iter().chain(found).collect()
