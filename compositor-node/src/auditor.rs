@@ -15,8 +15,9 @@ use crate::audit_choice::{AuditChoice, Candidate, Ended, Kind};
 use crate::batch::{BatchKey, Source, Waiting};
 use crate::sets::ReadySet;
 
-/// Larger views are compared in a part, with sides of this many pixels.
+/// Larger views are compared in a part.
 const MOST_WHOLE_PIXELS: u32 = 320 * 240;
+/// The sides of a part.
 const PART_PX: u32 = 128;
 
 /// The audits of one compositor. One is under way at a time.

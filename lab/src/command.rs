@@ -8,6 +8,7 @@ use crate::compare::command::{self as compare, CompareArgs};
 use crate::demo::{self, DemoArgs};
 use crate::failures::command::{self as failures, FailuresArgs};
 use crate::fronts::command::{self as fronts, FrontsArgs};
+use crate::placement::command::{self as placement, PlacementArgs};
 use crate::planner_study::command::{self as planner_study, PlannerArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
 use crate::stability::command::{self as stability, StabilityArgs};
@@ -46,6 +47,8 @@ pub enum StudyCommand {
     Fronts(FrontsArgs),
     /// Plans on subjects that nothing was tuned on, and compares the choices with tables of all rows
     Planner(PlannerArgs),
+    /// Measures what places of sample cameras that are chosen for a scene would gain over the fixed ones
+    Placement(PlacementArgs),
     /// Measures how errors change from frame to frame, and the jump where samples change
     Stability(StabilityArgs),
     /// Compares two reports of `study fronts`
@@ -67,6 +70,7 @@ impl LabCommand {
             Self::Study(StudyCommand::Failures(args)) => failures::run(args),
             Self::Study(StudyCommand::Fronts(args)) => fronts::run(args),
             Self::Study(StudyCommand::Planner(args)) => planner_study::run(args),
+            Self::Study(StudyCommand::Placement(args)) => placement::run(args),
             Self::Study(StudyCommand::Stability(args)) => stability::run(args),
             Self::Study(StudyCommand::Compare(args)) => compare::run(args),
             Self::Study(StudyCommand::Errors(args)) => view_errors::run(args),

@@ -18,6 +18,7 @@ mod fronts;
 mod lighting_study;
 mod load;
 mod memory;
+mod placement;
 mod planner_study;
 mod process;
 mod progress;

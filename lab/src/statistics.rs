@@ -16,6 +16,13 @@ pub fn mean_and_variation(numbers: &[f64]) -> (f64, f64) {
     (mean, if mean > 0.0 { square.sqrt() / mean } else { 0.0 })
 }
 
+/// The geometric mean of numbers above 0; `None` without any.
+#[must_use]
+pub fn geometric_mean(numbers: &[f64]) -> Option<f64> {
+    let mean = numbers.iter().map(|number| number.ln()).sum::<f64>() / numbers.len() as f64;
+    (!numbers.is_empty()).then(|| mean.exp())
+}
+
 /// The number that this share of all is at or below; NaN without any.
 #[must_use]
 pub fn quantile(mut numbers: Vec<f64>, share: f64) -> f64 {

@@ -9,17 +9,20 @@ use app_core::setup::{SceneArgs, Setup};
 use cluster::SamplePlanes;
 use codec::FrameCodec;
 use coordinator::schedule::EqualNodes;
-use depth_image::{DepthImage, View, ViewPlanes};
+use depth_image::{DepthImage, View, ViewPart, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
 use lab::scene_args;
-use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass};
+use node::{
+    DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewAudit, ViewProbes as _, ViewWork,
+    WorkClass,
+};
 use planner::{
     Budget, Choice, Command, Event, Kept, Metric, Outcome, Planner, Price, Pricing as _, ProbeId, ProbeView,
     PromiseState, Purpose, Row, RowCosts,
 };
-use probe::{DirectCosts, Light, Prober, Representation};
+use probe::{DirectCosts, Light, Prober, Probers, Representation, errors_of_part};
 
 const VIEW_PX: UVec2 = UVec2::new(64, 48);
 
@@ -216,4 +219,40 @@ fn the_price_on_one_node_is_the_set_shared_by_its_views_and_the_view() {
     close(node_s, (4.0 * 0.02 + 0.01) / 10.0 + 0.004);
     close(view_s, 0.004);
     close(one_node.direct().node_s, 0.051);
+}
+
+/// A part of a large view is drawn and made alone, with what is around it: its errors are those of the same pixels of the whole.
+#[test]
+fn an_audited_part_has_the_errors_of_its_pixels_in_the_whole_view() {
+    let stand = Stand::new("blocks", "phong");
+    let planning = stand.planning(1);
+    let (subject, engine, turn) = (&planning.subject, stand.engine.clone(), Turn::of(WorkClass::Batch));
+    let of =
+        planning.representations.iter().find(|of| of.method == "joint_carve" && of.sample_cameras.len() == 4).unwrap();
+    let images = engine.sample(&subject.sample_work(engine.as_ref(), of, Light::Session).unwrap(), turn).unwrap();
+    let set = engine.upload(&subject.sample_set(&images, Light::Session), turn).unwrap();
+    let camera = planning.viewpoints.first(3)[2].resized(UVec2::new(400, 300));
+    let view = ViewWork { cameras: vec![camera], method: of.method.clone(), planes: ViewPlanes::COLOR };
+    let direct = subject.direct_work(vec![camera], Light::Session, ViewPlanes::WITH_DEPTH);
+    let made = engine.reconstruct(set.as_ref(), &view, turn).unwrap().remove(0);
+    let truth = engine.draw_direct(&direct, turn).unwrap().remove(0);
+    let (set, whole) = (set, ViewPart::whole(camera.size_px));
+    for pixel in [UVec2::new(200, 150), UVec2::new(10, 10), UVec2::new(399, 299)] {
+        let part = ViewPart::square_of(pixel, 128, camera.size_px);
+        let mask: Vec<bool> = part.mask_within(&whole).collect();
+        let expected = errors_of_part(&camera, &truth, &made, &images, &mask).unwrap();
+        let audit = ViewAudit {
+            set: Arc::clone(&set),
+            sample_images: images.clone().into(),
+            pinned: Box::new(()),
+            view: view.clone(),
+            part,
+            direct: direct.clone(),
+        };
+        let (errors, _) = Probers::new(engine.clone()).audit(audit).unwrap();
+        println!("{part:?}: {errors:?}, in the whole {expected:?}");
+        assert!((errors.foreground_ratio - expected.foreground_ratio).abs() < 1e-3);
+        assert!((errors.flip - expected.flip).abs() < 0.01 * expected.flip + 1e-5, "{errors:?}: {expected:?}");
+        assert!((errors.disoccluded_ratio - expected.disoccluded_ratio).abs() < 1e-3);
+    }
 }

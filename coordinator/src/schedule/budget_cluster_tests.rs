@@ -78,6 +78,8 @@ pub(super) struct Cluster {
     pub(super) is_slow: bool,
     /// Nodes never take a plan.
     pub(super) is_unapplied: bool,
+    /// The method of a row whose costs cannot be measured.
+    pub(super) refused: Option<String>,
 }
 
 impl Cluster {
@@ -95,6 +97,7 @@ impl Cluster {
             busy_s: 0.01,
             is_slow: false,
             is_unapplied: false,
+            refused: None,
         };
         (0..nodes).for_each(|number| cluster.tell(join(&format!("n{number}"), number as u64 + 1, 0)));
         cluster
@@ -126,6 +129,11 @@ impl Cluster {
                 return Some(planned(probe.workload_number, event));
             }
             Command::Keep(kept) => self.kept = Some(*kept),
+            Command::Represent { workload_number, choice, measurement }
+                if self.refused == Some(measurement.method.clone()) =>
+            {
+                return Some(Event::Unrepresented { workload_number, choice, reason: "out of memory".to_owned() });
+            }
             Command::Represent { workload_number, choice, measurement } => {
                 let images = measurement.workload.sample_cameras.len() as f64;
                 let costs = Costs { reconstruct_view_s: COSTS.reconstruct_view_s * images, ..COSTS };

@@ -53,6 +53,8 @@ pub(super) struct BudgetPlan {
     asked: Option<PlannerCommand>,
     not_before: Duration,
     lost: u32,
+    /// A row failed since nodes were lost.
+    has_lost_rows: bool,
 }
 
 /// Measurements that one node is asked for.
@@ -121,6 +123,7 @@ impl BudgetPlan {
             asked: None,
             not_before: now,
             lost: 0,
+            has_lost_rows: false,
         })
     }
 
@@ -222,7 +225,13 @@ impl BudgetPlan {
             self.not_before = now + PAUSE;
             return None;
         }
+        self.has_lost_rows = true;
         self.take(PlannerEvent::Failed { id, reason, busy_s: 0.0 })
+    }
+
+    /// Whether another plan would find the same: all was measured that had to be.
+    pub(super) fn is_final(&self) -> bool {
+        !self.planner.is_spent() && !self.has_lost_rows
     }
 
     /// Raises what measuring may take, with time.

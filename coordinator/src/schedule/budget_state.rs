@@ -31,6 +31,8 @@ pub(super) struct Unreachable {
     pub(super) since: Duration,
     /// The prices of the plan that found it.
     pub(super) prices: EqualNodes,
+    /// Another plan would find the same.
+    pub(super) is_final: bool,
     pub(super) reason: String,
 }
 
@@ -70,6 +72,16 @@ impl BudgetState {
         self.unreachable.iter().find(|known| budget.implies(&known.budget))
     }
 
+    /// Whether the choice in force keeps a budget, as far as plans and audits know.
+    pub(super) fn keeps(&self, budget: &Budget) -> bool {
+        let is_kept = |in_force: &&InForce| {
+            let Chosen { outcome, budget: planned, .. } = &in_force.chosen;
+            outcome.state == PromiseState::Kept && planned.implies(budget) && self.unreachable_by(planned).is_none()
+        };
+        self.in_force.as_ref().is_some_and(|in_force| is_kept(&in_force))
+            && self.broken().is_none_or(|broken| !broken.is_of(budget))
+    }
+
     /// Whether the plan began before the last promise was broken: it does not know the audited viewpoints.
     pub(super) fn is_superseded(&self) -> bool {
         self.findings.is_given_up || self.findings.last_break().is_some_and(|at| self.plan.began < at)
@@ -96,11 +108,6 @@ impl BudgetState {
 }
 
 impl InForce {
-    /// Whether a budget is kept by it.
-    pub(super) fn keeps(&self, budget: &Budget) -> bool {
-        self.chosen.outcome.state == PromiseState::Kept && self.chosen.budget.implies(budget)
-    }
-
     /// A choice that is in force from now on.
     pub(super) fn begin(now: Duration, chosen: Chosen) -> Self {
         let certificate = chosen.outcome.certificate.as_ref().filter(|_| chosen.row.is_some());

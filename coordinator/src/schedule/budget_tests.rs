@@ -170,6 +170,63 @@ fn a_budget_that_nothing_keeps_leaves_the_promises_of_other_sessions_as_they_are
 }
 
 #[test]
+fn a_row_that_cannot_be_put_in_force_leaves_the_promises_of_other_sessions_as_they_are() {
+    let mut cluster = Cluster::of(3);
+    cluster.open(viewer(1, "flip 0.1"));
+    cluster.wait(20);
+    cluster.refused = Some("carve:4".to_owned());
+    cluster.open(viewer(2, "flip 0.05"));
+    cluster.wait(20);
+    assert_eq!(cluster.promise_to(1).state, PromiseState::Kept, "{}", cluster.promise_to(1));
+    let refused = cluster.promise_to(2);
+    assert_eq!(refused.state, PromiseState::Unreachable, "{refused}");
+    assert!(refused.reason.contains("out of memory"), "{refused}");
+    cluster.wait(200);
+    assert_eq!(cluster.promise_to(1).state, PromiseState::Kept, "{}", cluster.promise_to(1));
+    cluster.refused = None;
+    cluster.wait(200);
+    assert_eq!(cluster.promise_to(2).state, PromiseState::Kept, "{}", cluster.promise_to(2));
+    assert_eq!(cluster.plan().assignment.method.as_deref(), Some("carve:4"));
+}
+
+#[test]
+fn a_budget_that_nothing_keeps_has_the_nearest_row_again_when_others_have_left() {
+    let mut cluster = Cluster::of(3);
+    cluster.open(viewer(2, "flip 0.01"));
+    cluster.wait(20);
+    assert_eq!(cluster.plan().assignment.method.as_deref(), Some("carve:8"), "it comes nearest");
+    cluster.open(viewer(1, "flip 0.06"));
+    cluster.wait(80);
+    assert_eq!(cluster.plan().assignment.method.as_deref(), Some("carve:4"));
+    cluster.tell(Event::Closed { session: 1 });
+    cluster.wait(80);
+    assert_eq!(cluster.plan().assignment.method.as_deref(), Some("carve:8"));
+}
+
+#[test]
+fn what_direct_drawing_has_promised_is_not_promised_where_it_is_forbidden() {
+    let mut cluster = Cluster::of(3);
+    cluster.open(viewer(1, "flip 0.06"));
+    cluster.open(viewer(3, "flip 0.01"));
+    cluster.open(Opening { policy_override: PolicyOverride::default(), ..viewer(2, "flip 0.01") });
+    cluster.wait(20);
+    for session in [1, 2, 3] {
+        let promise = cluster.promise_to(session);
+        assert_eq!((promise.state, promise.representation.as_str()), (PromiseState::Kept, "every view drawn directly"));
+    }
+    cluster.tell(Event::Closed { session: 2 });
+    for _ in 0..80 {
+        cluster.wait_ticks(1);
+        let promise = cluster.promise_to(1);
+        let is_direct = promise.representation == "every view drawn directly";
+        let draws = cluster.plan().assignment.policy == Policy::Direct;
+        assert!(promise.state != PromiseState::Kept || is_direct == draws, "{promise}");
+    }
+    assert_eq!(cluster.promise_to(1).state, PromiseState::Kept, "{}", cluster.promise_to(1));
+    assert_eq!(cluster.promise_to(3).state, PromiseState::Unreachable, "{}", cluster.promise_to(3));
+}
+
+#[test]
 fn of_budgets_that_cannot_be_kept_together_those_that_came_first_are_kept() {
     let (accurate, quick) = ("flip 0.05", "flip 0.1, time 4.5ms");
     for order in [[accurate, quick], [quick, accurate]] {
@@ -182,7 +239,7 @@ fn of_budgets_that_cannot_be_kept_together_those_that_came_first_are_kept() {
         assert_eq!(cluster.promise_to(1).state, PromiseState::Kept, "{}", cluster.promise_to(1));
         let second = cluster.promise_to(2);
         assert_eq!(second.state, PromiseState::Unreachable, "{second}");
-        assert!(second.reason.contains("opened before") && second.reason.contains(order[0]), "{second}");
+        assert!(second.reason.contains("Other sessions") && second.reason.contains(order[0]), "{second}");
         cluster.tell(Event::Closed { session: 1 });
         cluster.wait(120);
         assert_eq!(cluster.promise_to(2).state, PromiseState::Kept, "{}", cluster.promise_to(2));

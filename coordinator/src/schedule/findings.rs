@@ -40,9 +40,19 @@ pub(super) struct Broken {
     /// The choice that was promised, and its budget.
     pub(super) choice_number: u64,
     pub(super) budget: Budget,
+    /// The mean error that was found; `None` where the budget is not of a mean.
+    pub(super) found_ratio: Option<f64>,
     pub(super) since: Duration,
     /// The finding and its consequence in words.
     pub(super) reason: String,
+}
+
+impl Broken {
+    /// Whether the promise of a budget is broken with it.
+    pub(super) fn is_of(&self, budget: &Budget) -> bool {
+        let is_above = |found: f64| budget.error().is_some_and(|term| term.most_ratio() < found);
+        budget.implies(&self.budget) || self.found_ratio.is_none_or(is_above)
+    }
 }
 
 /// A viewer whose last audited view is above the budget.
@@ -137,5 +147,26 @@ impl Findings {
             self.staying(now).map(|((node, stream), viewer)| format!("viewer {stream} of {node}: {}", viewer.error));
         let texts: Vec<String> = texts.take(3).collect();
         if texts.is_empty() { String::new() } else { format!(" Broken here ({}).", texts.join("; ")) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_broken_promise_is_one_of_looser_budgets_that_are_exceeded_as_well() {
+        let budget = |text: &str| text.parse::<Budget>().unwrap();
+        let broken = |found_ratio| Broken {
+            choice_number: 1,
+            budget: budget("flip 0.05"),
+            found_ratio,
+            since: Duration::ZERO,
+            reason: String::new(),
+        };
+        let is_of = |found, text: &str| broken(found).is_of(&budget(text));
+        assert_eq!(["flip 0.04", "flip 0.05", "flip 0.1"].map(|text| is_of(Some(0.07), text)), [true, true, false]);
+        assert_eq!(["flip 0.1", "flip 0.3"].map(|text| is_of(Some(0.2), text)), [true, false]);
+        assert!(is_of(None, "flip 0.1") && !is_of(Some(0.07), "time 8ms"));
     }
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use cluster::{AuditReport, AuditSummary, AuditedView, ErrorInterval, ProbedView};
-use planner::{Audit, Certificate, ErrorTerm, Interval, Statistic, ViewErrors};
+use planner::{Audit, Budget, Certificate, ErrorTerm, Interval, Metric, Statistic, ViewErrors};
 
 /// A rate is not known before.
 const RATE_AFTER: Duration = Duration::from_secs(60);
@@ -12,8 +12,8 @@ const RATE_AFTER: Duration = Duration::from_secs(60);
 const RATE_OVER: Duration = Duration::from_secs(600);
 /// The views in which twice the budget is found, 19 times in 20: of a mean, and of a share of views (`docs/planner.md`).
 const VIEWS_TO_FIND_TWICE: f64 = 60.0;
-/// The same in parts of views that show a surface.
-const PARTS_TO_FIND_TWICE: f64 = 70.0;
+/// The same in parts of views that show nothing but surfaces.
+const PARTS_TO_FIND_TWICE: f64 = 50.0;
 const VIEWS_TO_FIND_TWICE_P95: f64 = 660.0;
 const HOUR_S: f64 = 3600.0;
 /// A view that shows less says little by itself.
@@ -28,9 +28,9 @@ pub(super) struct PromiseAudit {
     covered_views: u64,
     uncovered_views: u64,
     busy_s: f64,
-    /// Views of which a part was compared, and those whose part shows a surface.
+    /// Views of which a part was compared, and the sum of these parts' shares of foreground.
     parts: usize,
-    parts_of_surfaces: usize,
+    parts_foreground: f64,
     /// The times of reports of late, and their audits.
     recent: VecDeque<(Duration, usize)>,
 }
@@ -47,7 +47,7 @@ impl PromiseAudit {
             uncovered_views: 0,
             busy_s: 0.0,
             parts: 0,
-            parts_of_surfaces: 0,
+            parts_foreground: 0.0,
             recent: VecDeque::new(),
         }
     }
@@ -62,11 +62,11 @@ impl PromiseAudit {
         let mut count = 0;
         for view in own {
             // A model may fill a square of a view in which it is small.
-            if view.is_part && self.audit.views() == [0, 0] {
-                self.audit = Audit::new(self.term, 1.0);
+            if view.is_part {
+                self.audit.expect_foreground(1.0);
+                self.parts += 1;
+                self.parts_foreground += view.errors.foreground_ratio;
             }
-            self.parts += usize::from(view.is_part);
-            self.parts_of_surfaces += usize::from(view.is_part && view.errors.foreground_ratio > 0.0);
             self.audit.observe(&view_errors(&view.errors));
             count += 1;
         }
@@ -122,7 +122,8 @@ impl PromiseAudit {
         match self.term.statistic() {
             Statistic::P95 => VIEWS_TO_FIND_TWICE_P95,
             Statistic::Mean if self.parts == 0 => VIEWS_TO_FIND_TWICE,
-            Statistic::Mean => PARTS_TO_FIND_TWICE * self.parts as f64 / self.parts_of_surfaces.max(1) as f64,
+            Statistic::Mean if self.term.metric() == Metric::FlipWhole => VIEWS_TO_FIND_TWICE,
+            Statistic::Mean => PARTS_TO_FIND_TWICE * self.parts as f64 / self.parts_foreground.max(LEAST_FOREGROUND),
         }
     }
 
@@ -143,10 +144,16 @@ impl PromiseAudit {
         }
     }
 
-    /// The findings and the rate of the audits, in words.
-    pub(super) fn in_words(&self, now: Duration) -> String {
+    /// The mean error that was found, where the promise is for one.
+    pub(super) fn found_ratio(&self) -> Option<f64> {
+        self.audit.mean_error().filter(|_| self.term.statistic() == Statistic::Mean)
+    }
+
+    /// The findings and the rate of the audits, in words; `other` is their budget where it is not the reader's.
+    pub(super) fn in_words(&self, now: Duration, other: Option<&Budget>) -> String {
+        let of = other.map(|budget| format!(" for {budget}")).unwrap_or_default();
         if self.audit.views() == [0, 0] {
-            return " Audits: none yet.".to_owned();
+            return format!(" Audits{of}: none yet.");
         }
         let per_h = self.audits_per_h(now);
         let uncovered = self.summary(now).uncovered_ratio();
@@ -154,7 +161,7 @@ impl PromiseAudit {
             if uncovered > 0.0 { format!(" Not covered: {:.0} % of views.", uncovered * 100.0) } else { String::new() };
         let found_s = self.views_to_find_twice() / per_h.max(f64::MIN_POSITIVE) * HOUR_S;
         format!(
-            " Audits: {}, in {:.1} s of the nodes' time; {per_h:.0} an hour, which find twice the budget within {}.{not_covered}",
+            " Audits{of}: {}, in {:.1} s of the nodes' time; {per_h:.0} an hour, which find twice the budget within {}.{not_covered}",
             self.finding(),
             self.busy_s,
             duration(found_s)

@@ -64,15 +64,32 @@ pub fn unheld_rate(
     reference_inverse_depth: &[f32],
     sample_images: &[DepthImage],
 ) -> Result<Option<f64>, MetricsError> {
-    expect_len("reference depth", reference_inverse_depth.len(), reference_camera.pixel_count())?;
-    let surfaces: Vec<(usize, f32)> =
-        reference_inverse_depth.iter().copied().enumerate().filter(|&(_, inverse_depth)| inverse_depth > 0.0).collect();
-    let is_unheld = |&&(index, inverse_depth): &&(usize, f32)| {
-        let point = surface_point(reference_camera, index, inverse_depth);
-        surface_class(point, sample_images) == PixelClass::Disoccluded
+    let surfaces = surface_points(reference_camera, reference_inverse_depth)?;
+    let unheld = surfaces.par_iter().filter(|&&point| surface_class(point, sample_images) == PixelClass::Disoccluded);
+    Ok((!surfaces.is_empty()).then(|| unheld.count() as f64 / surfaces.len() as f64))
+}
+
+/// The sample images that hold the surface of a pixel, one bit an image, for each pixel that shows one. At most the first 32
+/// images count.
+///
+/// # Errors
+/// Planes do not fit their cameras.
+pub fn holding_images(
+    reference_camera: &PinholeCamera,
+    reference_inverse_depth: &[f32],
+    sample_images: &[DepthImage],
+) -> Result<Vec<u32>, MetricsError> {
+    let held = |point: Vec3| {
+        let images = sample_images.iter().take(32).enumerate();
+        images.fold(0, |held, (bit, image)| held | u32::from(matches_sample(image, point)) << bit)
     };
-    let unheld = surfaces.par_iter().filter(is_unheld).count();
-    Ok((!surfaces.is_empty()).then(|| unheld as f64 / surfaces.len() as f64))
+    Ok(surface_points(reference_camera, reference_inverse_depth)?.into_par_iter().map(held).collect())
+}
+
+fn surface_points(camera: &PinholeCamera, inverse_depth: &[f32]) -> Result<Vec<Vec3>, MetricsError> {
+    expect_len("reference depth", inverse_depth.len(), camera.pixel_count())?;
+    let surfaces = inverse_depth.iter().enumerate().filter(|&(_, &inverse)| inverse > 0.0);
+    Ok(surfaces.map(|(index, &inverse)| surface_point(camera, index, inverse)).collect())
 }
 
 /// The pixels of one class, as a mask.
@@ -177,6 +194,18 @@ mod tests {
         let surfaces = depth.iter().filter(|&&depth| depth > 0.0).count() as f64;
         let unheld = unheld_rate(&camera, &depth, &[sample(0.4)]).unwrap().unwrap() * surfaces;
         assert!((unheld / f64::from(columns * rows) - 1.0).abs() < 0.1, "{unheld}: with what lies beside steps");
+    }
+
+    #[test]
+    fn images_that_hold_a_surface_are_told_apart() {
+        let (camera, depth) = card_before_wall(0.0);
+        let images = [sample(0.0), sample(0.4), sample(-0.4)];
+        let held = holding_images(&camera, &depth, &images).unwrap();
+        for (place, image) in images.iter().enumerate() {
+            let unheld = held.iter().filter(|&held| held & (1 << place) == 0).count() as f64 / held.len() as f64;
+            assert_eq!(unheld_rate(&camera, &depth, std::slice::from_ref(image)).unwrap(), Some(unheld));
+        }
+        assert!(held.iter().all(|held| held & 1 == 1) && held.contains(&0b011) && held.contains(&0b101));
     }
 
     #[test]

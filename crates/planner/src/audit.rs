@@ -32,6 +32,8 @@ pub struct Audit {
     /// Bets are shares of 1 / (limit · this): the greatest share of foreground so far, at first that of the certificate.
     bet_weight: f64,
     views: u64,
+    /// Views that show what is compared.
+    weighted: u64,
     skipped: u64,
     mean: f64,
     squares: f64,
@@ -65,10 +67,18 @@ impl Audit {
             evidence: [1.0; BETS.len()],
             bet_weight,
             views: 0,
+            weighted: 0,
             skipped: 0,
             mean: 0.0,
             squares: 0.0,
             weight_sum: 0.0,
+        }
+    }
+
+    /// Views may have this share of foreground from now on: bets on a mean are no higher than it allows.
+    pub fn expect_foreground(&mut self, foreground_ratio: f64) {
+        if self.term.statistic() == Statistic::Mean && foreground_ratio.is_finite() {
+            self.bet_weight = self.bet_weight.max(foreground_ratio.min(1.0));
         }
     }
 
@@ -86,6 +96,7 @@ impl Audit {
         }
         self.bet_weight = self.bet_weight.max(weight);
         self.views += 1;
+        self.weighted += u64::from(weight > 0.0);
         self.weight_sum += weight;
         let step = y - self.mean;
         self.mean += step / self.views as f64;
@@ -104,12 +115,12 @@ impl Audit {
         [self.views, self.skipped]
     }
 
-    /// The interval of y. `None` below 16 views. Known failure: where the first errors of a mean are all 0, its deviation is
+    /// The interval of y. `None` below 16 views that show a surface. Known failure: where the first errors of a mean are all 0, its deviation is
     /// 0 and the interval is a point. A percentile has the deviation of its limit at least, and its interval is too narrow
     /// where far more views are over.
     #[must_use]
     pub fn excess_interval(&self) -> Option<Interval> {
-        if self.views < LEAST_VIEWS {
+        if self.weighted < LEAST_VIEWS {
             return None;
         }
         let n = self.views as f64;
@@ -121,7 +132,7 @@ impl Audit {
     }
 
     /// The interval of the error, as a ratio: the mean over the foreground of all views, or the share of views over the
-    /// limit. `None` below 16 views, and where no view shows a surface.
+    /// limit. `None` below 16 views that show a surface.
     #[must_use]
     pub fn error_interval(&self) -> Option<Interval> {
         let Interval { low, mean, high } = self.excess_interval()?;

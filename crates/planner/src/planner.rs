@@ -199,8 +199,14 @@ impl<P: Pricing> Planner<P> {
         }
     }
 
+    /// Whether measuring has taken all the time that it may take.
+    #[must_use]
+    pub fn is_spent(&self) -> bool {
+        self.spent_s >= self.allowance_s
+    }
+
     fn advance(&mut self) -> Vec<Command> {
-        let is_spent = self.spent_s >= self.allowance_s;
+        let is_spent = self.is_spent();
         if self.stage.is_idle() || (self.pending.is_some() && !is_spent) {
             return Vec::new();
         }

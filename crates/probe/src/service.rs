@@ -16,6 +16,8 @@ use crate::prober::{ProbeError, Prober};
 use crate::representation::Representation;
 use crate::subject::{Light, Subject};
 
+/// A part of a view depends on so much around it. Views are made in tiles of 8 pixels a side, and parts begin with whole ones.
+const SURROUNDINGS_PX: u32 = (VIEW_REACH_PX + FLIP_REACH_PX).next_multiple_of(8);
 /// Subjects whose true views and sets stay in memory.
 const MAX_SUBJECTS: usize = 2;
 
@@ -68,8 +70,7 @@ impl ViewProbes for Probers {
 fn audited(engine: &dyn Engine, turn: Turn, audit: ViewAudit) -> Result<ViewErrors, ProbeError> {
     let ViewAudit { set, sample_images, pinned, mut view, part, mut direct } = audit;
     let [camera] = view.cameras[..] else { return Err(not_one_view()) };
-    // As much of the view as its part depends on.
-    let outer = part.surrounded(VIEW_REACH_PX + FLIP_REACH_PX, camera.size_px);
+    let outer = part.surrounded(SURROUNDINGS_PX, camera.size_px);
     let camera = camera.part(&outer);
     (view.cameras, direct.cameras) = (vec![camera], vec![camera]);
     let made = engine.reconstruct(set.as_ref(), &view, turn)?;

@@ -9,6 +9,7 @@ use study::{Cell, Table};
 
 use super::bd_time::bd_time;
 use super::fronts::{ALL, Methods, read};
+use crate::statistics::geometric_mean;
 
 /// Compares the fronts of two reports by BD-time: the mean ratio of costs at equal FLIP of the foreground.
 #[derive(Debug, Args)]
@@ -40,22 +41,22 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
 fn text(old: &BTreeMap<String, Methods>, new: &BTreeMap<String, Methods>) -> anyhow::Result<String> {
     let columns = [("subject", ""), ("reconstruction", ""), ("BD-time", "%")];
     let mut table = Table::new("BD-time, below 0 where the new report costs less", &columns);
-    let mut logs = Vec::new();
+    let mut ratios = Vec::new();
     for (subject, methods) in old {
         let Some(others) = new.get(subject) else { continue };
         for (method, points) in methods {
             let Some(other) = others.get(method) else { continue };
             let ratio = bd_time(points, other);
-            logs.extend(ratio.filter(|_| method == ALL).map(f64::ln_1p));
+            ratios.extend(ratio.filter(|_| method == ALL).map(|ratio| 1.0 + ratio));
             let shown =
                 ratio.map_or(Cell::from("not comparable"), |ratio| Cell::from(format!("{:+.1}", 100.0 * ratio)));
             table.push([subject.clone().into(), method.clone().into(), shown])?;
         }
     }
     let mut lines = vec![table.to_text()];
-    if !logs.is_empty() {
-        let mean = (logs.iter().sum::<f64>() / logs.len() as f64).exp_m1();
-        lines.push(format!("all methods, geometric mean of {} subjects: {:+.1} %", logs.len(), 100.0 * mean));
+    if let Some(mean) = geometric_mean(&ratios) {
+        let percent = 100.0 * (mean - 1.0);
+        lines.push(format!("all methods, geometric mean of {} subjects: {percent:+.1} %", ratios.len()));
     }
     lines.extend(alone(old, new).map(|subject| format!("only in the old report: {subject}")));
     lines.extend(alone(new, old).map(|subject| format!("only in the new report: {subject}")));

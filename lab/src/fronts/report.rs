@@ -4,7 +4,7 @@ use planner::{Choice, Metric, Price};
 use study::{Axis, Better, Cell, Point, Report, Series, Table, XyChart};
 
 use super::measure::{Front, Planned};
-use super::row::MeasuredRow;
+use super::row::{CLASSES, MeasuredRow};
 
 /// The beginning of the names of tables of rows, and their columns that other commands read.
 pub const ROWS: &str = "Rows, ";
@@ -98,6 +98,10 @@ pub fn rows_table(name: &str, rows: &[MeasuredRow], direct: Price) -> anyhow::Re
         (FOREGROUND_FLIP, ""),
         ("FLIP", ""),
         ("foreground PSNR", "dB"),
+        ("foreground SSIM", ""),
+        (CLASSES[0].1, ""),
+        (CLASSES[1].1, ""),
+        (CLASSES[2].1, ""),
         ("disocclusion", "%"),
         ("wrong hits", "%"),
         ("filled", "%"),
@@ -121,11 +125,12 @@ pub fn rows_table(name: &str, rows: &[MeasuredRow], direct: Price) -> anyhow::Re
             row.error_ratio(Metric::Flip),
             row.error_ratio(Metric::FlipWhole),
             row.psnr_db(),
-            100.0 * row.error_ratio(Metric::Disocclusion),
-            100.0 * row.wrong_hits,
-            100.0 * row.filled,
         ];
-        table.push(head.into_iter().chain(numbers.map(Cell::from)))?;
+        let pictures =
+            [row.ssim].into_iter().chain(row.class_flips).map(|figure| figure.map_or(Cell::Missing, Cell::from));
+        let shares = [row.error_ratio(Metric::Disocclusion), row.wrong_hits, row.filled];
+        let shares = shares.map(|share| Cell::from(100.0 * share));
+        table.push(head.into_iter().chain(numbers.map(Cell::from)).chain(pictures).chain(shares))?;
     }
     let direct = [Cell::from("direct"), Cell::Missing, Cell::Missing, Cell::Missing, (direct.node_s * 1e3).into()];
     table.push(direct.into_iter().chain(vec![Cell::Missing; columns.len() - 5]))?;

@@ -4,7 +4,7 @@ use planner::{ERROR_RATE, Statistic, is_over};
 use study::{Bar, Cell, Check, Report, Table};
 
 use super::case::Case;
-use crate::statistics::{median, quantile};
+use crate::statistics::{geometric_mean, median, quantile};
 
 /// Errors vary little up to this.
 const LOW_VARIATION: f64 = 0.3;
@@ -65,17 +65,13 @@ fn regrets(cases: &[Case]) -> Vec<Check> {
     let low: Vec<f64> =
         of_means().filter(|case| case.variation <= LOW_VARIATION).filter_map(|case| case.regret).collect();
     let all: Vec<f64> = of_means().filter_map(|case| case.regret).collect();
-    let lit: Vec<f64> = cases.iter().filter(|case| case.is_lit).map(|case| case.over_default.ln()).collect();
+    let lit: Vec<f64> = cases.iter().filter(|case| case.is_lit).map(|case| case.over_default).collect();
     vec![
         share("regret at most 1.10, means and times of low variation", &low, 1.10, 0.70),
         share("regret at most 1.25, means and times", &all, 1.25, 0.75),
         value("regret, median", (!all.is_empty()).then(|| median(all.clone())), 1.05),
         value("regret, worst", all.iter().copied().reduce(f64::max), 2.0),
-        value(
-            "cost over default or direct in soft light, geometric mean",
-            (!lit.is_empty()).then(|| (lit.iter().sum::<f64>() / lit.len() as f64).exp()),
-            0.8,
-        ),
+        value("cost over default or direct in soft light, geometric mean", geometric_mean(&lit), 0.8),
     ]
 }
 

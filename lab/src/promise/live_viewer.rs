@@ -16,7 +16,7 @@ use crate::process::Process;
 const SIZE_PX: UVec2 = UVec2::new(200, 150);
 /// Poses of the path: no place comes twice within a measurement of a minute.
 const PATH_POSES: usize = 600;
-/// Places of half a circle around the scene, and those about its back that a viewer visits.
+/// Places of half a circle around the scene, and those beyond its back that a viewer goes to slowly.
 const BACK: usize = 6000;
 const STAY: usize = 600;
 /// The longest time until a promise is kept.
@@ -88,17 +88,15 @@ impl Cluster {
         Ok(self.cell()?.orbit(PATH_POSES, SIZE_PX))
     }
 
-    /// A way around the scene to its back, and places about there.
+    /// A way around the scene to its back, and then slowly on.
     ///
     /// # Errors
     /// As [`Cluster::orbit`].
     pub(super) fn to_the_back(&self, poses_of_the_way: usize, poses: usize) -> anyhow::Result<Vec<PinholeCamera>> {
         let circle = self.cell()?.around(self.offer.volume.center(), 2 * BACK, SIZE_PX);
-        // To and fro, so that places come again after a minute only.
-        let about_the_back = |pose: usize| BACK - STAY / 2 + (pose - poses_of_the_way) * STAY / poses;
         let place = |pose: usize| match pose.checked_sub(poses_of_the_way) {
             None => pose * BACK / poses_of_the_way,
-            Some(_) => about_the_back(pose),
+            Some(stayed) => BACK + stayed * STAY / poses,
         };
         Ok((0..poses).map(|pose| circle[place(pose)]).collect())
     }

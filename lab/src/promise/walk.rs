@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use cluster::{PolicyChoice, Promise};
+use cluster::{PolicyChoice, Promise, PromiseState};
 use study::{Bar, Cell, Check, Table};
 
 use super::broken::replaced;
@@ -88,7 +88,10 @@ fn checks(has_cells: bool, walked: &Walked) -> Vec<Check> {
     let gap = Check::new(format!("{name}: longest gap"), walked.longest_gap_s, "s", Bar::AtMost(1.0));
     let found = match has_cells {
         true => {
-            let alarms = if walked.replaced_s.is_some() { 1.0 } else { 0.0 };
+            let is_broken =
+                |promise: &Promise| promise.state == PromiseState::Broken || promise.reason.contains("Audits found");
+            let is_alarmed = walked.replaced_s.is_some() || walked.promise.as_ref().is_some_and(is_broken);
+            let alarms = f64::from(u8::from(is_alarmed));
             vec![
                 Check::new(format!("{name}: broken promises"), alarms, "", Bar::AtMost(0.0)),
                 Check::new(format!("{name}: audited views"), walked.audited as f64, "", Bar::AtLeast(1.0)),

@@ -52,9 +52,9 @@ impl Scheduler {
         let Some(InForce { chosen, audit: Some(audit), .. }) = &state.in_force else { return Vec::new() };
         let (choice_number, row) = (chosen.number, chosen.row.as_ref().map(ToString::to_string).unwrap_or_default());
         let reason = format!("Audits found {} with {row}.", audit.finding());
-        let budget = chosen.budget;
+        let (budget, found_ratio) = (chosen.budget, audit.found_ratio());
         state.findings.is_given_up |= state.findings.note_break(now) && may_draw;
-        state.findings.broken = Some(Broken { choice_number, budget, since: now, reason: reason.clone() });
+        state.findings.broken = Some(Broken { choice_number, budget, found_ratio, since: now, reason: reason.clone() });
         state.switching = None;
         self.retreat(number, &reason)
     }

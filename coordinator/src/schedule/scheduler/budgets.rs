@@ -47,7 +47,7 @@ impl Scheduler {
     /// Begins a plan where there is none, or where the last one does not serve any more.
     fn plan_for_budget(&mut self, number: u64) -> Option<Vec<Command>> {
         let workload = self.workloads.get(&number)?;
-        let budget = self.planned_budget(number)?;
+        let budget = self.planned_budget(number).or_else(|| self.abandoned(number))?;
         let device_name = self.device_to_measure(workload)?;
         if workload.sessions.policy_override().policy == PolicyChoice::Direct
             || self.budgets.get(&number).is_some_and(|state| !self.is_outdated(state, workload, budget))
@@ -68,7 +68,8 @@ impl Scheduler {
         Some(keep.into_iter().chain([recall]).collect())
     }
 
-    /// The strictest budget of a workload's sessions that may be kept; `None` where nothing keeps any of them.
+    /// The budget of those sessions of a workload, the first of them first, that may be kept together; `None` where nothing
+    /// keeps any of them.
     pub(super) fn planned_budget(&self, number: u64) -> Option<Budget> {
         let workload = self.workloads.get(&number)?;
         let (state, prices) = (self.budgets.get(&number), prices(workload));
@@ -76,10 +77,20 @@ impl Scheduler {
             let known = state.and_then(|state| state.unreachable_by(budget));
             known.is_some_and(|known| {
                 let is_recent = self.now.saturating_sub(known.since) < DWELL;
-                may_draw(&known.prices) == may_draw(&prices) && (is_recent || !is_other_demand(&known.prices, &prices))
+                let is_valid = known.is_final && !is_other_demand(&known.prices, &prices);
+                may_draw(&known.prices) == may_draw(&prices) && (is_recent || is_valid)
             })
         };
         workload.sessions.strictest_budget(|budget| !is_unreachable(budget))
+    }
+
+    /// The strictest budget of sessions whose budgets nothing keeps, where what is in force is for others that have left.
+    fn abandoned(&self, number: u64) -> Option<Budget> {
+        let (workload, state) = (self.workloads.get(&number)?, self.budgets.get(&number)?);
+        let is_stated = |budget: &Budget| workload.sessions.budgets().iter().any(|(stated, _)| stated == budget);
+        let strictest = workload.sessions.strictest_budget(|_| true)?;
+        let is_for_others = |budget: &Budget| !is_stated(budget) && *budget != strictest;
+        is_for_others(&state.plan.budget).then_some(strictest)
     }
 
     fn is_outdated(&self, state: &BudgetState, workload: &WorkloadState, budget: Budget) -> bool {
@@ -92,10 +103,9 @@ impl Scheduler {
         let is_lasting = self.now.saturating_sub(since) >= DWELL && outcome.is_some();
         let prices = prices(workload);
         let is_other = *planned != budget || is_other_demand(at, &prices) || state.is_to_be_tried_again;
-        let is_kept = state.in_force.as_ref().is_some_and(|in_force| in_force.keeps(&budget));
-        let is_for_others = outcome.as_ref().is_some_and(|outcome| outcome.state == PromiseState::Unreachable)
-            && *planned != budget
-            && !is_kept;
+        // Nothing keeps the budget that was planned for, or it could not be put in force.
+        let is_for_others =
+            outcome.is_some() && *planned != budget && state.unreachable_by(planned).is_some() && !state.keeps(&budget);
         let is_wrong = !planned.implies(&budget) || may_draw(at) != may_draw(&prices) || is_for_others;
         let is_broken = state.findings.is_to_be_planned
             && (outcome.is_some() || state.is_superseded())
@@ -179,7 +189,8 @@ impl Scheduler {
         let Some(chosen) = state.plan.chosen().filter(|_| !state.is_superseded()) else { return commands };
         if chosen.outcome.state == PromiseState::Unreachable {
             let (budget, prices, reason) = (chosen.budget, state.plan.prices, chosen.outcome.reason.clone());
-            state.note_unreachable(Unreachable { budget, since: now, prices, reason });
+            let is_final = state.plan.is_final();
+            state.note_unreachable(Unreachable { budget, since: now, prices, is_final, reason });
             // Other sessions have what they had, or a plan of their own.
             if self.planned_budget(number).is_some() {
                 return commands;
@@ -258,12 +269,17 @@ impl Scheduler {
             return self.retreat(number, &broken);
         }
         state.is_to_be_tried_again = true;
-        let keeps =
-            |in_force: &InForce| in_force.chosen.row.is_some() && in_force.chosen.budget.implies(&chosen.budget);
-        if state.in_force.as_ref().is_some_and(keeps) {
+        let chosen = chosen.without_row(reason);
+        let (budget, prices, reason) = (chosen.budget, state.plan.prices, chosen.outcome.reason.clone());
+        state.note_unreachable(Unreachable { budget, since: self.now, prices, is_final: false, reason });
+        // Other sessions have what they had, or a plan of their own.
+        if self.planned_budget(number).is_some() {
             return Vec::new();
         }
-        state.in_force = Some(InForce::begin(self.now, chosen.without_row(reason)));
+        let now = self.now;
+        if let Some(state) = self.budgets.get_mut(&number) {
+            state.in_force = Some(InForce::begin(now, chosen));
+        }
         self.order_audits(number)
     }
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cluster::{AuditSummary, Costs, Policy, PolicyChoice, Promise, PromiseState};
-use planner::Budget;
+use planner::{Budget, Outcome};
 
 use super::Scheduler;
 use crate::schedule::budget_state::{BudgetState, InForce};
@@ -61,22 +61,42 @@ impl Scheduler {
             return Some(without_figures(budget, PromiseState::Unreachable, reason.clone()));
         }
         let state = self.budgets.get(&number)?;
-        let representation = representation_in_words(workload);
-        // Direct drawing keeps every budget on errors.
+        let in_force = state.in_force.as_ref().filter(|in_force| in_force.is_applied);
+        let is_direct = workload.policy() == Some(Policy::Direct);
+        if let (Some(Representation::Direct), Some(in_force), true) = (&workload.representation, in_force, is_direct) {
+            let Outcome { price, reason, .. } = &in_force.chosen.outcome;
+            return Some(direct(budget, price.view_s, reason.clone()));
+        }
+        let broken = state.broken().filter(|broken| broken.is_of(budget));
         let serves = |in_force: &&InForce| {
-            in_force.is_applied
-                && (in_force.keeps(budget) || in_force.chosen.budget == *budget || state.findings.is_given_up)
+            let is_own =
+                in_force.chosen.budget == *budget && in_force.chosen.outcome.state != planner::PromiseState::Kept;
+            broken.is_some() || is_own || (in_force.chosen.row.is_some() && state.keeps(budget))
         };
-        let in_force = state.in_force.as_ref().filter(serves);
+        let in_force = in_force.filter(serves);
         if let Some(reason) = self.unreachable_reason(number, state, budget).filter(|_| in_force.is_none()) {
+            let representation = representation_in_words(workload);
             return Some(Promise { representation, ..without_figures(budget, PromiseState::Unreachable, reason) });
         }
-        let broken = state.broken().filter(|broken| budget.implies(&broken.budget));
+        Some(self.promise_of_choice(workload, state, budget, in_force))
+    }
+
+    /// The promise for a budget by the choice in force that serves it, if any.
+    fn promise_of_choice(
+        &self,
+        workload: &WorkloadState,
+        state: &BudgetState,
+        budget: &Budget,
+        in_force: Option<&InForce>,
+    ) -> Promise {
+        let broken = state.broken().filter(|broken| broken.is_of(budget));
         let outcome = in_force.map(|in_force| &in_force.chosen.outcome);
         let is_audited = workload.audit.is_some() && workload.policy() != Some(Policy::Direct);
         let audit = in_force.and_then(|in_force| in_force.audit.as_ref()).filter(|_| is_audited);
+        // Viewers are compared with the budget in force.
+        let other = in_force.map(|in_force| &in_force.chosen.budget).filter(|other| *other != budget);
         let certificate = outcome.and_then(|outcome| outcome.certificate.as_ref());
-        Some(Promise {
+        Promise {
             budget: budget.to_string(),
             state: match outcome.map(|outcome| outcome.state) {
                 _ if broken.is_some() => PromiseState::Broken,
@@ -84,24 +104,25 @@ impl Scheduler {
                 Some(planner::PromiseState::Kept) => PromiseState::Kept,
                 Some(planner::PromiseState::Unreachable) => PromiseState::Unreachable,
             },
-            representation,
+            representation: representation_in_words(workload),
             expected_ratio: certificate.map_or(0.0, |certificate| certificate.expected_ratio),
             bound_ratio: certificate.map_or(0.0, |certificate| certificate.bound_ratio.clamp(0.0, 1.0)),
             probe_view_count: certificate.map_or(0, |certificate| certificate.views as u32),
             reason: match (broken, outcome) {
                 (Some(broken), _) => self.broken_reason(broken, state),
                 (None, Some(outcome)) => {
-                    let audits = audit.map(|audit| audit.in_words(self.now)).unwrap_or_default();
-                    format!("{}{audits}{}", outcome.reason, state.findings.broken_here(self.now))
+                    let audits = audit.map(|audit| audit.in_words(self.now, other)).unwrap_or_default();
+                    let here = if other.is_none() { state.findings.broken_here(self.now) } else { String::new() };
+                    format!("{}{audits}{here}", outcome.reason)
                 }
                 (None, None) if state.plan.budget.implies(budget) => state.plan.reason(),
                 (None, None) => "A plan for it follows.".to_owned(),
             },
             audit: audit.map(|audit| AuditSummary {
-                viewers_above: state.findings.viewers_above(self.now),
+                viewers_above: if other.is_none() { state.findings.viewers_above(self.now) } else { 0 },
                 ..audit.summary(self.now)
             }),
-        })
+        }
     }
 
     /// Why a budget is not planned for; `None` where it is, or will be.
@@ -115,7 +136,7 @@ impl Scheduler {
         }
         let (planned, together) = (planned?, planned?.and(budget)?);
         let known = state.unreachable_by(&together)?;
-        Some(format!("Sessions that share the samples and were opened before want {planned}. {}", known.reason))
+        Some(format!("Other sessions that share the samples are promised {planned}. {}", known.reason))
     }
 }
 
@@ -142,9 +163,17 @@ fn representation_in_words(workload: &WorkloadState) -> String {
 /// The promise where sessions have every view drawn directly.
 fn drawn_directly(budget: &Budget, costs: &Costs) -> Promise {
     let view_s = costs.direct_view_s + costs.encode_view_s;
+    direct(
+        budget,
+        view_s,
+        format!("Sessions have every view drawn directly, in {:.1} ms: there is no error.", view_s * 1e3),
+    )
+}
+
+/// The promise where every view is drawn directly, in `view_s` seconds: it has no error.
+fn direct(budget: &Budget, view_s: f64, reason: String) -> Promise {
     let is_kept = budget.most_view_s().is_none_or(|limit| view_s <= limit);
     let state = if is_kept { PromiseState::Kept } else { PromiseState::Unreachable };
-    let reason = format!("Sessions have every view drawn directly, in {:.1} ms: there is no error.", view_s * 1e3);
     Promise { representation: DRAWN.to_owned(), ..without_figures(budget, state, reason) }
 }
 
