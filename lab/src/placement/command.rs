@@ -76,7 +76,9 @@ pub fn run(args: &PlacementArgs) -> anyhow::Result<Outcome> {
     let mut report = Report::new("Myriorama study: placement", engine.device_name());
     report.version("myriorama", env!("CARGO_PKG_VERSION"));
     report.parameter("views", VIEWS);
-    report.tables.extend([subjects_table(&subjects)?, means_table(&subjects)?]);
+    let means = means_table(&subjects)?;
+    println!("{}", means.to_text());
+    report.tables.extend([subjects_table(&subjects)?, means]);
     Ok(Outcome::of(report.finish(&args.out)?))
 }
 
