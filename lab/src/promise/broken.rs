@@ -35,13 +35,14 @@ pub(super) async fn measure() -> anyhow::Result<Section> {
     let viewer = cluster.viewer(asked(&cluster, &budget, PolicyChoice::Auto)?).await?;
     let promised = viewer.kept().await?.representation;
     let mut found = None;
-    let (start, looks) = (Instant::now(), replaced(&viewer, &promised));
+    let start = Instant::now();
     let stop = async {
-        found = Some((looks.await, start.elapsed().as_secs_f64()));
+        replaced_by_audits(&viewer, promised.clone()).await;
+        found = Some(start.elapsed().as_secs_f64());
         tokio::time::sleep(AFTER).await;
     };
     let record = viewer.follow(RATE_HZ, LONGEST_S, stop).await?;
-    let (is_said, replaced_s) = found.unwrap_or((false, f64::INFINITY));
+    let (is_said, replaced_s) = (found.is_some(), found.unwrap_or(f64::INFINITY));
     let (longest_gap_s, _) = record.longest_gap_s(0.0);
     let after = viewer.promise().map_or_else(String::new, |promise| promise.to_string());
     section(cluster.device.clone(), [budget, promised, after], (is_said, replaced_s, longest_gap_s))
@@ -51,15 +52,18 @@ fn asked<'a>(cluster: &Cluster, budget: &'a str, policy: PolicyChoice) -> anyhow
     Ok(Asked { budget: Some(budget), policy, rate_hz: RATE_HZ, path: cluster.orbit()?, has_cells: false })
 }
 
-/// Waits until another representation is in force; whether the viewer was told why, in the state or in the reason. Direct
-/// drawing may be in force before anybody looks.
-pub(super) async fn replaced(viewer: &Viewer, promised: &str) -> bool {
-    let mut is_said = false;
+/// Waits until another representation is in force since audits found a promise broken, as the viewer is told. Direct drawing
+/// may be in force before anybody looks.
+pub(super) async fn replaced_by_audits(viewer: &Viewer, mut promised: String) {
     loop {
         if let Some(promise) = viewer.promise() {
-            is_said |= promise.state == PromiseState::Broken;
-            if promise.state == PromiseState::Kept && promise.representation != promised {
-                return is_said || promise.reason.contains("Audits found");
+            let is_other = promise.state == PromiseState::Kept && promise.representation != promised;
+            if is_other && promise.reason.contains("Audits found") {
+                return;
+            }
+            // Another choice for another reason is no finding.
+            if is_other {
+                promised = promise.representation;
             }
         }
         tokio::time::sleep(LOOK).await;

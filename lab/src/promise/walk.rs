@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use cluster::{PolicyChoice, Promise, PromiseState};
 use study::{Bar, Cell, Check, Table};
 
-use super::broken::replaced;
+use super::broken::replaced_by_audits;
 use super::live_viewer::{Asked, Cluster, Viewer};
 use crate::section::Section;
 
@@ -65,13 +65,10 @@ pub(super) async fn measure() -> anyhow::Result<Section> {
 
 /// Follows the viewer's path until audits have had its promise replaced, or to its end.
 async fn walk(cluster: &Cluster, viewer: &Viewer) -> anyhow::Result<Walked> {
-    let mut promised = viewer.kept().await?.representation;
+    let promised = viewer.kept().await?.representation;
     let (start, mut replaced_s) = (Instant::now(), None);
     let stop = async {
-        // Another choice for another reason is no finding.
-        while !replaced(viewer, &promised).await {
-            promised = viewer.promise().map(|promise| promise.representation).unwrap_or_default();
-        }
+        replaced_by_audits(viewer, promised).await;
         replaced_s = Some(start.elapsed().as_secs_f64());
         tokio::time::sleep(AFTER).await;
     };
