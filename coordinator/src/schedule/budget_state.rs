@@ -74,12 +74,10 @@ impl BudgetState {
 
     /// Whether the choice in force keeps a budget, as far as plans and audits know.
     pub(super) fn keeps(&self, budget: &Budget) -> bool {
-        let is_kept = |in_force: &&InForce| {
-            let Chosen { outcome, budget: planned, .. } = &in_force.chosen;
-            outcome.state == PromiseState::Kept && planned.implies(budget) && self.unreachable_by(planned).is_none()
-        };
-        self.in_force.as_ref().is_some_and(|in_force| is_kept(&in_force))
-            && self.broken().is_none_or(|broken| !broken.is_of(budget))
+        let Some(InForce { chosen, .. }) = &self.in_force else { return false };
+        let is_promised = chosen.outcome.state == PromiseState::Kept && chosen.budget.implies(budget);
+        let is_broken = self.broken().is_some_and(|broken| broken.is_of(budget));
+        is_promised && !is_broken && self.unreachable_by(&chosen.budget).is_none()
     }
 
     /// Whether the plan began before the last promise was broken: it does not know the audited viewpoints.

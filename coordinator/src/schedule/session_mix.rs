@@ -125,8 +125,8 @@ impl SessionMix {
         self.0.iter().rev().max_by_key(|session| count(session)).map(|session| session.method.as_str())
     }
 
-    /// The least strict budget whose keeping keeps those of all sessions, but for those with which nothing may be kept that the
-    /// sessions before them have; budgets of one workload are comparable.
+    /// The least strict budget that implies those of all sessions. A session is left out where its budget may not be kept
+    /// together with those before it. Budgets of one workload are comparable.
     pub(super) fn strictest_budget(&self, may_be_kept: impl Fn(&Budget) -> bool) -> Option<Budget> {
         let budgets = self.0.iter().filter_map(|session| session.budget);
         budgets.fold(None, |before: Option<Budget>, budget| {

@@ -4,7 +4,7 @@ use glam::UVec2;
 
 use crate::PinholeCamera;
 
-/// A pixel of a view depends on what is projected up to so many pixels away from it: holes are filled from there.
+/// The greatest distance between a pixel of a view and another that it depends on, in pixels: holes are filled from around.
 pub const VIEW_REACH_PX: u32 = 48;
 
 /// A rectangle of a view's pixels.

@@ -87,10 +87,10 @@ impl Scheduler {
     /// The strictest budget of sessions whose budgets nothing keeps, where what is in force is for others that have left.
     fn abandoned(&self, number: u64) -> Option<Budget> {
         let (workload, state) = (self.workloads.get(&number)?, self.budgets.get(&number)?);
-        let is_stated = |budget: &Budget| workload.sessions.budgets().iter().any(|(stated, _)| stated == budget);
+        let planned = state.plan.budget;
+        let is_stated = workload.sessions.budgets().iter().any(|(stated, _)| *stated == planned);
         let strictest = workload.sessions.strictest_budget(|_| true)?;
-        let is_for_others = |budget: &Budget| !is_stated(budget) && *budget != strictest;
-        is_for_others(&state.plan.budget).then_some(strictest)
+        (!is_stated && planned != strictest).then_some(strictest)
     }
 
     fn is_outdated(&self, state: &BudgetState, workload: &WorkloadState, budget: Budget) -> bool {

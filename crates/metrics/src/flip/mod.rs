@@ -17,7 +17,7 @@ use kernels::{ACHROMATIC, BLUE_YELLOW, FeatureKernels, RED_GREEN, Sensitivity};
 
 /// The paper's viewer: 0.7 m from a display 0.7 m wide with 3840 columns, 0.7 · 3840 / 0.7 · π / 180.
 pub const FLIP_PIXELS_PER_DEGREE: f32 = 67.020_64;
-/// The error of a pixel depends on pixels up to so many away, for the default viewer.
+/// The greatest distance between a pixel and another that its error depends on, in pixels, for the default viewer.
 pub const FLIP_REACH_PX: u32 = 10;
 /// Differences are compressed by this power.
 const POWER: f32 = 0.7;
