@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use client::{Client, Frame, Session, ViewRequest};
 use cluster::limits::{MAX_VIEWPOINTS, MAX_VIEWS_PER_SET};
-use cluster::{BudgetRequest, OfferSettings, PolicyChoice, Quality, SessionRequest, Timeline};
+use cluster::{BudgetRequest, DIRECT, OfferSettings, PolicyChoice, Quality, SessionRequest, Timeline};
 use depth_image::{PinholeCamera, ViewPlanes};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -25,11 +25,13 @@ const FRAME_RATE_RATIO: f64 = 0.8;
 /// There are no views.
 pub fn request(offered: OfferSettings, views: &[PinholeCamera]) -> anyhow::Result<SessionRequest> {
     let OfferSettings { method, sampling, lighting } = offered;
+    let lighting = lighting.unwrap_or_else(|| Lighting::default().to_string());
+    let reconstructed = || method.unwrap_or_else(|| ReconstructionMethod::default().to_string());
     Ok(SessionRequest {
         scene: None,
-        method: method.unwrap_or_else(|| ReconstructionMethod::default().to_string()),
+        method: if is_drawn_for_mirrors(&lighting) { DIRECT.to_owned() } else { reconstructed() },
         sampling: sampling.unwrap_or_else(|| SamplingMethod::default().to_string()),
-        lighting: lighting.unwrap_or_else(|| Lighting::default().to_string()),
+        lighting,
         codec: "lz4".to_owned(),
         sample_cameras: Vec::new(),
         sample_size_px: None,
@@ -51,6 +53,13 @@ pub fn request(offered: OfferSettings, views: &[PinholeCamera]) -> anyhow::Resul
     })
 }
 
+/// Whether a lighting has mirrors that show the scene. Views are then drawn directly: compositors do not follow rays off
+/// mirrors.
+#[must_use]
+pub fn is_drawn_for_mirrors(lighting: &str) -> bool {
+    lighting.parse().is_ok_and(|lighting: Lighting| lighting.reflections() > 0)
+}
+
 /// The same at a rate, with fallbacks under overload.
 #[must_use]
 pub fn at_rate(request: SessionRequest, frames_per_s: f64) -> SessionRequest {
@@ -58,20 +67,24 @@ pub fn at_rate(request: SessionRequest, frames_per_s: f64) -> SessionRequest {
     SessionRequest { frames_per_s: Some(frames_per_s), fallbacks, ..request }
 }
 
-/// Fallbacks under overload, in order: fewer rays of light, a coarser method, smaller sample images, fewer pictures a
-/// second. Each includes those before it. Steps that the lighting and the method do not have are skipped.
+/// Fallbacks under overload, in order: no mirror images of the scene, fewer rays of light, a coarser method, smaller sample
+/// images, fewer pictures a second. Each includes those before it. Steps that the lighting and the method do not have are skipped.
 fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
-    let fewer_rays = lighting.parse().ok().and_then(|lighting: Lighting| lighting.with_fewer_rays());
+    let whole: Option<Lighting> = lighting.parse().ok();
+    let unmirrored = whole.and_then(|lighting| lighting.without_reflections());
+    let fewer_rays = unmirrored.or(whole).and_then(|lighting| lighting.with_fewer_rays());
     let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.coarser());
     let (lighting, method) = (lighting.to_owned(), method.to_owned());
     let all = Quality { lighting, method, sample_side_ratio: 1.0, frame_rate_ratio: 1.0 };
-    let dim = fewer_rays.map(|lighting| Quality { lighting: lighting.to_string(), ..all.clone() });
-    let above = dim.clone().unwrap_or(all);
+    let plain = unmirrored.map(|lighting| Quality { lighting: lighting.to_string(), ..all.clone() });
+    let above = plain.clone().unwrap_or(all);
+    let dim = fewer_rays.map(|lighting| Quality { lighting: lighting.to_string(), ..above.clone() });
+    let above = dim.clone().unwrap_or(above);
     let coarse = fewer_steps.map(|method| Quality { method: method.to_string(), ..above.clone() });
     let above = coarse.clone().unwrap_or(above);
     let small = Quality { sample_side_ratio: SAMPLE_SIDE_RATIO, ..above };
     let slow = Quality { frame_rate_ratio: FRAME_RATE_RATIO, ..small.clone() };
-    dim.into_iter().chain(coarse).chain([small, slow]).collect()
+    plain.into_iter().chain(dim).chain(coarse).chain([small, slow]).collect()
 }
 
 /// Opens a session.
@@ -132,6 +145,19 @@ pub async fn receive_requests(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn views_with_mirror_images_are_drawn_directly_and_lose_them_first() {
+        let offered = OfferSettings { lighting: Some("shadows, reflections 2".to_owned()), ..OfferSettings::default() };
+        let view = PinholeCamera::looking_at(glam::Vec3::Z, glam::Vec3::ZERO, glam::Vec3::Y, 0.8, glam::UVec2::ONE);
+        let request = request(offered, &[view]).expect("a request");
+        assert_eq!(request.method, "direct");
+        let lightings: Vec<String> = fallbacks(&request.lighting, "direct").into_iter().map(|q| q.lighting).collect();
+        assert_eq!(lightings, ["shadows"; 3]);
+        let lightings: Vec<String> =
+            fallbacks("soft 8, reflections 1", "direct").into_iter().map(|q| q.lighting).collect();
+        assert_eq!(lightings, ["soft 8", "soft 2", "soft 2", "soft 2"]);
+    }
 
     #[test]
     fn light_is_reduced_first_and_the_frame_rate_last() {

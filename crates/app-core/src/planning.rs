@@ -51,6 +51,10 @@ impl Planning {
     /// # Errors
     /// The scene has no sample cameras, or the user's choices leave no row.
     pub fn new(setup: &Setup, args: &SceneArgs, views: &PlannedViews) -> anyhow::Result<Self> {
+        if args.lighting.reflections() > 0 {
+            let reason = "views with reflections are drawn directly: there is nothing to choose";
+            return Err(BadInput(format!("--lighting {}: {reason}", args.lighting)).into());
+        }
         let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
         let view = cell.camera_at(Vec2::ZERO, views.size_px);
         let rig: Vec<Camera> = setup.around.iter().copied().map(Camera::Pinhole).collect();

@@ -37,7 +37,8 @@ pub struct DeviceArgs {
 #[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
     /// A scene by name or a file (.gltf, .glb, .obj, .ply). Names: tree-terrain-30k, -125k, -500k, -2m (each also with
-    /// -wind), snake (animated), bird-nest, urban, tree, grass, grass:DENSITY, blocks, courtyard, uv-sphere, and more
+    /// -wind), snake (animated), bird-nest, urban, tree, grass, grass:DENSITY, blocks, courtyard, teapot-mirror, and
+    /// more
     #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
     pub scene: SceneSpec,
     /// What is done about textures that a scene's file names and that are not there: refuse the scene, or show grey
@@ -51,8 +52,8 @@ pub struct SceneArgs {
     #[arg(long, default_value_t, value_name = "x|y|z")]
     pub up: UpAxis,
     /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, or soft N (N rays
-    /// a light). Ambient occlusion: occlusion N [RADIUSm]. Rate: adaptive [TOLERANCE] traces rays only where light
-    /// changes
+    /// a light). Ambient occlusion: occlusion N [RADIUSm]. Mirrors that show the scene: reflections N (mirrors that a
+    /// ray meets, 1 to 8; such views are drawn directly). Rate: adaptive [TOLERANCE] traces rays only where light changes
     #[arg(long, default_value_t, value_name = "TERMS")]
     pub lighting: Lighting,
     /// A lamp in place of the scene's lamps, in the scene file's coordinates; may be repeated. Forms: "sun

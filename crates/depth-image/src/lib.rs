@@ -37,7 +37,8 @@ pub use light::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
 pub use method_table::{NamedMethod, Setting, method_forms, method_help, method_named};
 #[cfg(any(test, feature = "scalar"))]
 pub use scalar::{
-    Incident, Texel, disc_from_square, environment_highlight_linear, highlight_linear, tangents_of, unit_from_oct16,
+    Incident, Texel, disc_from_square, environment_highlight_linear, environment_reflectance_linear, highlight_linear,
+    tangents_of, unit_from_oct16,
 };
 pub use tiles::TileError;
 pub use tone::{Exposure, ExposureEv, ToneCurve, ToneError, ToneMapping};

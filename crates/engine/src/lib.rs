@@ -40,7 +40,11 @@ pub struct GpuEngine {
 }
 
 /// A sample set on this engine's device.
-struct Uploaded(reconstruction::SampleSet);
+struct Uploaded {
+    set: reconstruction::SampleSet,
+    /// Mirrors show the scene in this light.
+    has_mirrors: bool,
+}
 impl UploadedSet for Uploaded {}
 
 impl GpuEngine {
@@ -221,11 +225,18 @@ impl Engine for GpuEngine {
             environment: environment.as_ref(),
         };
         let upload = || self.reconstructor.upload_in_turn(&set.images, &description, device_turn(turn));
-        Ok(Arc::new(Uploaded(self.catching(|| upload().map_err(reconstruction_error))?)))
+        let set = self.catching(|| upload().map_err(reconstruction_error))?;
+        Ok(Arc::new(Uploaded { set, has_mirrors: lighting.reflections() > 0 }))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {
-        let Uploaded(set) = (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))?;
+        let Uploaded { set, has_mirrors } =
+            (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))?;
+        if *has_mirrors {
+            let reason =
+                "mirrors show the scene in views that are drawn directly alone; the method for them is `direct`";
+            return Err(invalid("reconstruction_method", reason));
+        }
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
         let turn = device_turn(turn);
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {

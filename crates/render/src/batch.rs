@@ -2,6 +2,7 @@
 
 use std::{ops::Range, sync::Arc};
 
+use bytemuck::Zeroable;
 use depth_image::{Antialias, PinholeCamera, ToneMapping};
 use glam::Vec2;
 use gpu::{BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVariant, WorkKind};
@@ -125,10 +126,7 @@ impl Batch<'_> {
 
     /// A uniform of the pieces with their cameras' places in the batch's planes, for each part of the rays.
     pub fn parts(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums) -> Vec<Part> {
-        let part = |rays: Rays| Part {
-            counts: [&rays.shadow, &rays.lamps, &rays.occlusion].map(|range| range.len() as u32),
-            cameras: self.uniform(gpu, pieces, sums, rays),
-        };
+        let part = |rays: Rays| Part { counts: rays.counts(), cameras: self.uniform(gpu, pieces, sums, rays) };
         let lamps = self.work.scene.traced_lamps(self.work.lighting);
         parts_of(&sums.rays, lamps, self.rays_around()).into_iter().map(part).collect()
     }
@@ -140,34 +138,47 @@ impl Batch<'_> {
         self.uniform(gpu, pieces, sums, Rays { shadow, lamps, occlusion })
     }
 
-    /// A uniform for these rays.
-    fn uniform(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums, rays: Rays) -> wgpu::Buffer {
-        let Rays { shadow, lamps, occlusion } = rays;
+    /// The same for a list with room for so many points, each of which has all `rays`.
+    pub fn parts_of_points(&self, gpu: &Gpu, rays: &[Range<u32>; 2], capacity: u32) -> Vec<Part> {
+        let list = PixelCamera { pixel_count: capacity, ..PixelCamera::zeroed() };
+        let part = |part: Rays| Part {
+            counts: part.counts(),
+            cameras: uniform(gpu, "points", std::iter::once(self.with_rays(list, &part, rays))),
+        };
+        let lamps = self.work.scene.traced_lamps(self.work.lighting);
+        parts_of(rays, lamps, self.rays_around()).into_iter().map(part).collect()
+    }
+
+    /// A camera with these rays, and those that its sums hold afterwards.
+    fn with_rays(&self, camera: PixelCamera, rays: &Rays, [shadow, occlusion]: &[Range<u32>; 2]) -> PixelCamera {
         let DrawWork { scene, lighting, .. } = self.work;
         let radius_m = lighting.occlusion.and_then(|occlusion| occlusion.radius_m);
         let diagonal_m = scene.bounds_in_world.size().length();
+        PixelCamera {
+            first_shadow_ray: rays.shadow.start,
+            shadow_rays: rays.shadow.end - rays.shadow.start,
+            first_light: rays.lamps.start,
+            end_light: rays.lamps.end,
+            first_occlusion_ray: rays.occlusion.start,
+            occlusion_rays: rays.occlusion.end - rays.occlusion.start,
+            // Without rays, all light is known at once.
+            shadow_rays_in_sum: shadow.end.max(1),
+            occlusion_rays_in_sum: occlusion.end.max(1),
+            occlusion_radius_m: radius_m.unwrap_or(diagonal_m * OCCLUSION_OF_DIAGONAL),
+            tolerance: if let Rate::Adaptive { tolerance } = lighting.rate { tolerance } else { 0.0 },
+            ..camera
+        }
+    }
+
+    /// A uniform for these rays.
+    fn uniform(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums, rays: Rays) -> wgpu::Buffer {
         let [planes, sum_planes] = [self.output.layout().count, self.output.sums.count()].map(|count| count as u32);
         let (mut first_word, mut first_sum) = (0, 0);
         let place = |camera: &PinholeCamera| {
-            let placed = PixelCamera {
-                first_word,
-                first_sum,
-                first_shadow_ray: shadow.start,
-                shadow_rays: shadow.end - shadow.start,
-                first_light: lamps.start,
-                end_light: lamps.end,
-                first_occlusion_ray: occlusion.start,
-                occlusion_rays: occlusion.end - occlusion.start,
-                // Without rays, all light is known at once.
-                shadow_rays_in_sum: sums.rays[0].end.max(1),
-                occlusion_rays_in_sum: sums.rays[1].end.max(1),
-                occlusion_radius_m: radius_m.unwrap_or(diagonal_m * OCCLUSION_OF_DIAGONAL),
-                tolerance: if let Rate::Adaptive { tolerance } = lighting.rate { tolerance } else { 0.0 },
-                ..PixelCamera::of(camera, self.position)
-            };
-            first_word += placed.pixel_count * planes;
-            first_sum += placed.pixel_count * sum_planes;
-            placed
+            let camera = PixelCamera { first_word, first_sum, ..PixelCamera::of(camera, self.position) };
+            first_word += camera.pixel_count * planes;
+            first_sum += camera.pixel_count * sum_planes;
+            self.with_rays(camera, &rays, &sums.rays)
         };
         let placed: Vec<PixelCamera> = self.cameras.iter().map(place).collect();
         let of_piece =
@@ -232,6 +243,12 @@ struct Rays {
     shadow: Range<u32>,
     lamps: Range<u32>,
     occlusion: Range<u32>,
+}
+
+impl Rays {
+    fn counts(&self) -> [u32; 3] {
+        [&self.shadow, &self.lamps, &self.occlusion].map(|range| range.len() as u32)
+    }
 }
 
 /// Rays to all lamps and of occlusion, cut into parts. A part traces at most [`RAYS_A_DISPATCH`] rays to lamps and as many

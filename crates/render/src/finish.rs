@@ -85,6 +85,7 @@ impl ShaderVariant for Finish {
             lit => self.lit,
             environment_map => self.environment_map,
             highlight => highlight.map(highlight_name),
+            mirrors => self.output.mirrors,
             surface_id => surface_id.is_some(),
             normal_plane => normal, reflector_plane => reflector, id_plane => surface_id, passed_plane => passed,
             averaged => antialias > Antialias::NONE, plane_count => count,
@@ -98,7 +99,11 @@ impl ShaderVariant for Finish {
         let colors = highlights.flat_map(|highlight| {
             [Antialias::NONE, Antialias::MOST].map(|antialias| Output { highlight, antialias, ..Output::default() })
         });
-        let views = colors.flat_map(Self::of_output);
+        let mirrored = |output: Output| {
+            let is_mirror = output.highlight == Some(Highlight::Ggx);
+            [Some(output), is_mirror.then_some(Output { mirrors: true, ..output })].into_iter().flatten()
+        };
+        let views = colors.flat_map(mirrored).flat_map(Self::of_output);
         let plain = Output::default();
         let images = [plain, Output { antialias: Antialias::MOST, ..plain }, Output { passed: true, ..plain }];
         views.chain(images.into_iter().flat_map(Self::of_images)).collect()
@@ -125,7 +130,12 @@ impl Planes {
 }
 
 /// Records one dispatch for each camera.
-pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces], planes: &Planes) -> Result<(), RenderError> {
+pub(crate) fn record(
+    recording: &mut Recording<'_>,
+    surfaces: &[Surfaces],
+    planes: &Planes,
+    reflected: Option<&Buffer>,
+) -> Result<(), RenderError> {
     let Recording { passes, gpu, batch, .. } = recording;
     let variant = Finish::of(batch);
     let pass = passes.get(&variant)?;
@@ -140,7 +150,7 @@ pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces], plane
     for (camera, target) in surfaces.iter().enumerate() {
         let Recording { batch, cameras, sums, .. } = recording;
         let scene = batch.work.scene;
-        let buffers: [&Buffer; 7] = [
+        let buffers: [&Buffer; 8] = [
             cameras,
             &planes.words,
             &sums.buffer,
@@ -148,6 +158,7 @@ pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces], plane
             &scene.background,
             &scene.illumination,
             planes.position_sums.as_deref().unwrap_or(&planes.words),
+            reflected.unwrap_or(&planes.words),
         ];
         let own = pass.bind(0, bindings(&variant, buffers, target, scene.environment.as_deref()))?;
         recording.dispatch(&variant, &pass, &[&own], (camera, 1));
@@ -157,7 +168,7 @@ pub(crate) fn record(recording: &mut Recording<'_>, surfaces: &[Surfaces], plane
 
 fn bindings<'r>(
     variant: &Finish,
-    [camera, words, sums, finish, background, illumination, position_sums]: [&'r Buffer; 7],
+    [camera, words, sums, finish, background, illumination, position_sums, reflected]: [&'r Buffer; 8],
     target: &'r Surfaces,
     map: Option<&'r GpuEnvironment>,
 ) -> Vec<Binding<'r>> {
@@ -173,6 +184,7 @@ fn bindings<'r>(
     }
     bindings.extend(target.bindings());
     bindings.extend(variant.output.highlight.map(|_| Binding::buffer("illumination", illumination)));
+    bindings.extend(variant.output.mirrors.then(|| Binding::buffer("reflected", reflected)));
     let is_averaged = variant.output.antialias > Antialias::NONE;
     bindings.extend(is_averaged.then(|| Binding::buffer("position_sums", position_sums)));
     let ids = target.surface_ids.as_ref().filter(|_| variant.output.surface_id);
@@ -192,7 +204,7 @@ mod tests {
         for variant in Finish::all() {
             let target = stage.surfaces(variant.by_rays, variant.output.surface_id);
             let map = variant.environment_map.then_some(&stage.environment);
-            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 7], &target, map));
+            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 8], &target, map));
         }
     }
 }

@@ -27,6 +27,10 @@
 {% if highlight %}
 @group(0) var<uniform> illumination: Illumination;
 {% endif %}
+{%- if mirrors %}
+// Red, green and blue of each pixel: linear light that mirrored rays bring.
+@group(0) var<storage, read> reflected: array<f32>;
+{%- endif %}
 {% if surface_id %}
 @group(0) var surface_ids: texture_2d<u32>;
 {% endif %}
@@ -49,17 +53,7 @@ fn front_at(texel: vec2u) -> f32 { return textureLoad(front_depth, texel, 0){{ "
 fn put(plane: u32, place: u32, word: u32) { words[camera.first_word + plane * camera.pixel_count + place] = word; }
 {% if visibility %}
 
-// Bytes of visibility: the environment's, then the lamps'.
-fn visibility_word(word: u32, place: u32, open: f32) -> u32 {
-    var shares = vec4f(0.0);
-    for (var i = 0u; i < 4u; i++) {
-        let plane = word * 4u + i;
-        if plane >= {{ light_count + 1 }}u { break; }
-        let rays = select(camera.shadow_rays_in_sum, camera.occlusion_rays_in_sum, plane == 0u);
-        shares[i] = sum_at(OPEN_TO_ENVIRONMENT + plane, place) * select(1.0, open, plane == 0u) / f32(rays);
-    }
-    return pack4x8unorm(shares);
-}
+{% include "visibility.wgsl" %}
 {% endif %}
 
 {% if averaged and samples %}
@@ -105,13 +99,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var hidden = met && front > depth; hidden; hidden = false) { met = is_useful(pixel, depth, front); }
 {% endif %}
 {% endif %}
-    let occluded = met && (surface.x & OCCLUDED) != 0u;
-    let open = select(1.0, bitcast<f32>(surface.y), occluded);
-    var light = vec3f(1.0);
-{% if lit %}
-    light = select(light_at(place, open), light, (surface.x & SHOWN_AS_IT_IS) != 0u);
-{% endif %}
-    var linear = albedo_linear(surface.x) * light + select(linear_from_rgb9e5(surface.y), vec3f(0.0), occluded);
+{% include "shaded.wgsl" %}
 {% if highlight %}
     for (var glossy = met && surface.w != 0u; glossy; glossy = false) {
         let direction = direction_of(pixel);
@@ -120,6 +108,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% for word in range(visibility_words) %}        visibility[{{ word }}] = visibility_word({{ word }}u, place, open);
 {% endfor %}
         linear += highlight(point, unit_from_oct16(surface.z), -normalize(direction), surface.w, visibility);
+{%- if mirrors %}
+        let first = 3u * (camera.first_word / {{ plane_count }}u + place);
+        linear += vec3f(reflected[first], reflected[first + 1u], reflected[first + 2u]);
+{%- endif %}
     }
 {% endif %}
     for (var open = !met; open; open = false) { linear = background_linear(direction_of(pixel)); }

@@ -1,15 +1,16 @@
 //! Light of lamps and the environment, summed over rays.
 
-use gpu::{Binding, DispatchSize, GpuEnvironment, ResourceTraits, ShaderVariant, WorkKind, switches};
+use gpu::{Binding, BoundGroup, DispatchSize, GpuEnvironment, ResourceTraits, ShaderVariant, WorkKind, switches};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
 use crate::rays::Traversal;
 use crate::{
     Direct, RenderError,
-    batch::{Part, Recording},
+    batch::{Batch, Part, Recording},
     pixel_camera::CAMERA_TRAITS,
     pixel_list::PixelList,
+    reflections::Rays,
     sums::SumPlanes,
     surfaces::Surfaces,
 };
@@ -33,6 +34,8 @@ pub(crate) struct Illuminate {
     /// The distance of the pixels that are lit, where they are not listed.
     step_px: u32,
     listed: bool,
+    /// Lit are listed points where mirrored rays end, not pixels.
+    bounces: bool,
     shadow_rays: ShadowRays,
     /// Rays look for surfaces that occlude the environment.
     occluded: bool,
@@ -51,6 +54,7 @@ impl Illuminate {
         by_rays: false,
         step_px: 1,
         listed: false,
+        bounces: false,
         shadow_rays: ShadowRays::None,
         occluded: false,
         continued: false,
@@ -69,6 +73,7 @@ impl ShaderVariant for Illuminate {
             by_rays => self.by_rays,
             step_px => self.step_px,
             listed => self.listed,
+            bounces => self.bounces,
             shadow_rays => match self.shadow_rays {
                 ShadowRays::None => "none",
                 ShadowRays::One => "one",
@@ -89,20 +94,48 @@ impl ShaderVariant for Illuminate {
         for [by_rays, occluded, continued, environment_map] in switches() {
             for (step_px, listed) in [(1, false), (GRID_PX, false), (1, true)] {
                 for shadow_rays in [ShadowRays::None, ShadowRays::One, ShadowRays::Many] {
-                    let is_traced = occluded || shadow_rays != ShadowRays::None;
-                    let each = |sums| {
-                        Traversal::ALL.map(|traversal| {
-                            let traversal = is_traced.then_some(traversal);
-                            let lit =
-                                Self { by_rays, step_px, listed, shadow_rays, occluded, continued, ..Self::UNLIT };
-                            Self { sums, environment_map, traversal, ..lit }
-                        })
-                    };
-                    variants.extend(SumPlanes::all().flat_map(each));
+                    let lit = Self { by_rays, step_px, listed, shadow_rays, occluded, continued, ..Self::UNLIT };
+                    variants.extend(Self { environment_map, ..lit }.with_all_sums());
                 }
             }
         }
+        for [occluded, continued, environment_map] in switches() {
+            for shadow_rays in [ShadowRays::One, ShadowRays::Many] {
+                let lit = Self { bounces: true, shadow_rays, occluded, continued, ..Self::UNLIT };
+                variants
+                    .extend(Self { environment_map, ..lit }.with_all_sums().into_iter().filter(|v| v.sums.visibility));
+            }
+        }
         variants
+    }
+}
+
+impl Illuminate {
+    /// With each kind of sums, and with each traversal where rays are traced.
+    fn with_all_sums(&self) -> Vec<Self> {
+        let is_traced = self.occluded || self.shadow_rays != ShadowRays::None;
+        let each =
+            |sums| Traversal::ALL.map(|traversal| Self { sums, traversal: is_traced.then_some(traversal), ..*self });
+        SumPlanes::all().flat_map(each).collect()
+    }
+
+    /// The variant for all pixels of a batch.
+    fn of(batch: &Batch<'_>) -> Self {
+        let lighting = batch.work.lighting;
+        let traced = batch.traced.as_deref().filter(|_| lighting.is_traced());
+        Self {
+            by_rays: batch.by_rays,
+            shadow_rays: match lighting.direct {
+                Direct::Unlit | Direct::Phong => ShadowRays::None,
+                Direct::Shadows => ShadowRays::One,
+                Direct::Soft(_) => ShadowRays::Many,
+            },
+            occluded: lighting.occlusion.is_some(),
+            sums: batch.output.sums,
+            environment_map: batch.work.scene.environment.is_some(),
+            traversal: traced.map(Traversal::of),
+            ..Self::UNLIT
+        }
     }
 }
 
@@ -118,28 +151,18 @@ pub(crate) fn record(
     let lighting = batch.work.lighting;
     let traced = batch.traced.as_deref().filter(|_| lighting.is_traced());
     for (number, part) in parts.iter().enumerate() {
-        let variant = Illuminate {
-            by_rays: batch.by_rays,
-            step_px,
-            listed: lists.is_some(),
-            shadow_rays: match lighting.direct {
-                Direct::Unlit | Direct::Phong => ShadowRays::None,
-                Direct::Shadows => ShadowRays::One,
-                Direct::Soft(_) => ShadowRays::Many,
-            },
-            occluded: lighting.occlusion.is_some(),
-            continued: number > 0 || recording.sums.rays.iter().any(|rays| rays.start > 0),
-            sums: batch.output.sums,
-            environment_map: batch.work.scene.environment.is_some(),
-            traversal: traced.map(Traversal::of),
-        };
+        let continued = number > 0 || recording.sums.rays.iter().any(|rays| rays.start > 0);
+        let variant = Illuminate { step_px, listed: lists.is_some(), continued, ..Illuminate::of(batch) };
         let pass = recording.passes.get(&variant)?;
         let rays = traced.map(|traced| pass.bind(1, traced.bindings())).transpose()?;
         let kind = WorkKind::new(batch.family(), &(variant.name(), part.counts));
         for (camera, target) in (first..).zip(surfaces) {
             let buffers = [&part.cameras, &batch.work.scene.illumination, &recording.sums.buffer];
             let map = batch.work.scene.environment.as_deref();
-            let bind = |list| pass.bind(0, bindings(buffers, list, target, map));
+            let bind = |list: Option<&PixelList>| {
+                let listed = list.into_iter().flat_map(PixelList::bindings);
+                pass.bind(0, bindings(buffers, map).chain(target.bindings()).chain(listed))
+            };
             let own = match lists {
                 Some(lists) => lists.iter().map(|list| bind(Some(list))).collect::<Result<Vec<_>, _>>()?,
                 None => vec![bind(None)?],
@@ -155,21 +178,36 @@ pub(crate) fn record(
     Ok(())
 }
 
+/// Records the light that arrives at the ends of mirrored rays, in parts of the rays of light.
+pub(crate) fn record_points(
+    recording: &mut Recording<'_>,
+    parts: &[Part],
+    points: Rays<'_>,
+    sums: &Buffer,
+) -> Result<(), RenderError> {
+    let batch = recording.batch;
+    let tree = batch.traced.as_deref();
+    for (number, part) in parts.iter().enumerate() {
+        let variant = Illuminate { by_rays: false, bounces: true, continued: number > 0, ..Illuminate::of(batch) };
+        let pass = recording.passes.get(&variant)?;
+        let buffers = [&part.cameras, &batch.work.scene.illumination, sums];
+        let own = bindings(buffers, batch.work.scene.environment.as_deref()).chain(points.bindings());
+        let own = pass.bind(0, own)?;
+        let tree = tree.map(|tree| pass.bind(1, tree.bindings())).transpose()?;
+        let groups: Vec<&BoundGroup> = std::iter::once(&own).chain(&tree).collect();
+        points.dispatch(recording, (&variant, part.counts), &pass, &groups);
+    }
+    Ok(())
+}
+
+/// Those of all variants.
 fn bindings<'r>(
     [camera, illumination, sums]: [&'r Buffer; 3],
-    list: Option<&'r PixelList>,
-    target: &'r Surfaces,
     map: Option<&'r GpuEnvironment>,
-) -> Vec<Binding<'r>> {
-    let mut bindings = vec![
-        Binding::buffer("camera", camera),
-        Binding::buffer("illumination", illumination),
-        Binding::buffer("sums", sums),
-    ];
-    bindings.extend(target.bindings());
-    bindings.extend(list.into_iter().flat_map(PixelList::bindings));
-    bindings.extend(map.into_iter().flat_map(GpuEnvironment::bindings));
-    bindings
+) -> impl Iterator<Item = Binding<'r>> {
+    let buffers = [("camera", camera), ("illumination", illumination), ("sums", sums)];
+    let buffers = buffers.into_iter().map(|(name, buffer)| Binding::buffer(name, buffer));
+    buffers.chain(map.into_iter().flat_map(GpuEnvironment::bindings))
 }
 
 #[cfg(test)]
@@ -177,17 +215,26 @@ mod tests {
     use gpu::BufferPool;
 
     use super::*;
-    use crate::test_support::TestStage;
+    use crate::{reflections::BounceList, test_support::TestStage};
 
     #[test]
     fn every_variant_is_bound_by_its_names() {
         let stage = TestStage::new();
         let (traced, buffer) = (stage.scene.rays.at(0.0).expect("a tree"), &stage.buffer);
         let list = PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), 1);
+        let bounces = BounceList::new(&stage.gpu);
+        let points = Rays { bounces: buffer, list: &bounces, units: 1, generation: 1 };
         for variant in Illuminate::all() {
             let target = stage.surfaces(variant.by_rays, false);
             let map = variant.environment_map.then_some(&stage.environment);
-            stage.check(&variant, 0, &bindings([buffer; 3], variant.listed.then_some(&list), &target, map));
+            let mut own: Vec<Binding<'_>> = bindings([buffer; 3], map).collect();
+            if variant.bounces {
+                own.extend(points.bindings());
+            } else {
+                own.extend(target.bindings());
+                own.extend(variant.listed.then(|| list.bindings()).into_iter().flatten());
+            }
+            stage.check(&variant, 0, &own);
             if variant.traversal.is_some() {
                 stage.check(&variant, 1, &traced.bindings());
             }

@@ -8,7 +8,11 @@
 {% include "table.wgsl" %}
 {% endif %}
 {% include "sequence.wgsl" %}
+{%- if bounces %}
+{% include "reflections/bounce.wgsl" %}
+{%- else %}
 {% include "surfaces.wgsl" %}
+{%- endif %}
 {% if traced %}
 {% include "rays/traverse.wgsl" %}
 {% endif %}
@@ -17,31 +21,26 @@
 // The sums of each camera, plane by plane (sums.wgsl).
 @group(0) var<storage, read_write> sums: array<f32>;
 {% include "sums.wgsl" %}
-{% if listed %}
+{% if bounces %}
+@group(0) var<storage, read> bounces: array<Bounce>;
+@group(0) var<storage, read> list: BounceList;
+{% elif listed %}
 struct List { workgroups: u32, y: u32, z: u32, count: u32 }
 @group(0) var<storage, read> listed_pixels: array<u32>;
 @group(0) var<storage, read> list: List;
 {% endif %}
 
-// Rays begin above the surface by this share of the pixel's footprint on it: less than can be seen, more than the
-// rounding of the point.
-const BIAS_FOOTPRINTS: f32 = 0.015625;
-// Rays also begin higher by the rounding of coordinates, relative to the greatest.
-const BIAS_ROUNDINGS: f32 = 4e-7;
+{% include "rise.wgsl" %}
+{%- if bounces %}
 
-struct Spot { point: vec3f, normal: vec3f, origin: vec3f, bias_m: f32, seed: u32 }
-
-fn spot_of(pixel: vec2u, depth: f32, surface: vec4u) -> Spot {
-    let planar_depth_m = camera.near_m / depth;
-    let offset = direction_of(pixel) * planar_depth_m;
-    let point = camera.eye_in_world + offset;
-    let normal = unit_from_oct16(surface.z);
-    let size = abs(camera.eye_in_world) + abs(offset);
-    let bias_m = BIAS_FOOTPRINTS * planar_depth_m * camera.footprint + BIAS_ROUNDINGS * max(max(size.x, size.y), size.z);
-    let from_axis = pixel + camera.first_from_axis;
-    let seed = hashed(camera.seed ^ hashed((from_axis.x & 0xffffu) | (from_axis.y << 16u)));
-    return Spot(point, normal, point + normal * bias_m, bias_m, seed);
+fn spot_of(bounce: Bounce) -> Spot {
+    let normal = unit_from_oct16(bounce.surface.z);
+    return Spot(bounce.point_in_world, normal, bounce.point_in_world + normal * bounce.bias_m, bounce.bias_m, bounce.seed);
 }
+{%- else %}
+
+{% include "spot.wgsl" %}
+{%- endif %}
 
 struct Arrival { linear: vec3f, open: f32 }
 
@@ -144,6 +143,17 @@ fn add_color(plane: u32, place: u32, linear: vec3f) {
     add(plane + 1u, place, linear.g);
     add(plane + 2u, place, linear.b);
 }
+{%- if bounces %}
+
+fn light_bounce(place: u32) {
+    let bounce = bounces[place];
+    var lamps_linear = vec3f(0.0);
+    var environment = Arrival(vec3f(0.0), 0.0);
+    for (var found = bounce.met != 0u; found; found = false) {
+        let spot = spot_of(bounce);
+{% if alpha_tested and mapped %}        ray_side_m = bounce.side_m;
+{% endif %}
+{%- else %}
 
 fn light_pixel(pixel: vec2u) {
     let place = place_of(pixel);
@@ -154,6 +164,7 @@ fn light_pixel(pixel: vec2u) {
         let spot = spot_of(pixel, depth, surface_at(pixel));
 {% if traced and alpha_tested and mapped %}        ray_side_m = camera.near_m / depth * camera.footprint;
 {% endif %}
+{%- endif %}
         environment = from_environment(spot);
 {% if visibility and not continued %}
         for (var number = 0u; number < illumination.light_count; number++) { add(OPEN_TO_LAMPS + number, place, 0.0); }
@@ -173,7 +184,13 @@ fn light_pixel(pixel: vec2u) {
 {% endif %}
 }
 
-{% if listed %}
+{% if bounces %}
+@compute @workgroup_size(LIST_WORKGROUP)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= list.count { return; }
+    light_bounce(id.x);
+}
+{% elif listed %}
 @compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= list.count { return; }

@@ -13,6 +13,7 @@ use crate::keep::Keep;
 use crate::known_samples::KnownCamera;
 use crate::pixel_camera::PixelCamera;
 use crate::raster::{RasterCamera, RasterVariant};
+use crate::reflections::{GpuBounce, Spawn};
 use crate::test_support::{TEST, test_templates};
 
 /// Fields with their offsets, and the size of the whole.
@@ -127,6 +128,27 @@ fn a_pixel_camera_has_the_wgsl_layout() {
         padding
     });
     assert_eq!(shader(&parsed(&Keep::all().remove(0)), "PixelCamera"), host);
+}
+
+#[test]
+fn a_bounce_has_the_wgsl_layout() {
+    let host = host!(GpuBounce {
+        point_in_world,
+        place,
+        direction,
+        seed,
+        throughput_linear,
+        side_m,
+        surface,
+        bias_m,
+        spread,
+        roughness,
+        curvature_per_m,
+        met,
+        near_m,
+        padding
+    });
+    assert_eq!(shader(&parsed(&Spawn::all().remove(0)), "Bounce"), host);
 }
 
 #[test]

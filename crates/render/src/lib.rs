@@ -30,6 +30,7 @@ mod planes;
 mod raster;
 mod rays;
 mod redundancy_test;
+mod reflections;
 mod renderer;
 #[cfg(feature = "scalar")]
 pub mod scalar;
@@ -46,7 +47,7 @@ mod work;
 pub use error::RenderError;
 pub use gpu_scene::GpuScene;
 pub use known_samples::{TemporalReference, view_cell_m};
-pub use lighting::{Direct, Lighting, MAX_RAYS, Occlusion, Rate, UnknownLighting};
+pub use lighting::{Direct, Lighting, MAX_RAYS, MAX_REFLECTIONS, Occlusion, Rate, UnknownLighting};
 pub use rays::AccelerationReport;
 pub use redundancy_test::{Evidence, RedundancyTest};
 pub use renderer::Renderer;

@@ -7,6 +7,9 @@ use depth_image::Highlight;
 /// Most rays a light, or of occlusion, a pixel.
 pub const MAX_RAYS: u32 = 4096;
 
+/// Most mirrors that a ray meets, one after the other.
+pub const MAX_REFLECTIONS: u32 = 8;
+
 /// A lighting, written as terms with commas between them: `soft 16, occlusion 16`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Lighting {
@@ -14,6 +17,8 @@ pub struct Lighting {
     pub direct: Direct,
     /// Rays that look for near surfaces in the way of the environment's light; without them all of it arrives.
     pub occlusion: Option<Occlusion>,
+    /// The mirrors that a ray meets, one after the other; without any, mirrors show lamps and the environment.
+    pub reflections: Option<NonZeroU32>,
     /// The pixels that get rays of their own.
     pub rate: Rate,
 }
@@ -62,11 +67,13 @@ const DEFAULT_TOLERANCE: f32 = 0.04;
 #[allow(missing_docs, reason = "self-naming variants")]
 pub enum UnknownLighting {
     #[error(
-        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, occlusion N, occlusion N RADIUSm, adaptive, adaptive TOLERANCE with commas between them"
+        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, occlusion N, occlusion N RADIUSm, reflections N, adaptive, adaptive TOLERANCE with commas between them"
     )]
     Term(String),
     #[error("lighting {0:?}: rays must be from 1 to {MAX_RAYS}")]
     Rays(String),
+    #[error("lighting {0:?}: reflections must be from 1 to {MAX_REFLECTIONS}")]
+    Reflections(String),
     #[error("lighting {0:?}: {1} must be a positive number")]
     Number(String, &'static str),
     #[error("lighting {0:?}: {1}")]
@@ -75,7 +82,7 @@ pub enum UnknownLighting {
 
 impl Lighting {
     /// Base colours as they are.
-    pub const UNLIT: Self = Self { direct: Direct::Unlit, occlusion: None, rate: Rate::Full };
+    pub const UNLIT: Self = Self { direct: Direct::Unlit, occlusion: None, reflections: None, rate: Rate::Full };
 
     /// Whether anything arrives at surfaces.
     #[must_use]
@@ -103,6 +110,18 @@ impl Lighting {
     #[must_use]
     pub fn occlusion_rays(&self) -> u32 {
         self.occlusion.map_or(0, |occlusion| occlusion.rays.get())
+    }
+
+    /// The mirrors that a ray meets.
+    #[must_use]
+    pub fn reflections(&self) -> u32 {
+        self.reflections.map_or(0, NonZeroU32::get)
+    }
+
+    /// Without mirror images of the scene; `None` where there are none.
+    #[must_use]
+    pub fn without_reflections(&self) -> Option<Self> {
+        self.reflections.is_some().then_some(Self { reflections: None, ..*self })
     }
 
     /// A quarter of the rays, at least one each; `None` where there are no fewer.
@@ -142,7 +161,7 @@ impl Lighting {
 impl FromStr for Lighting {
     type Err = UnknownLighting;
     fn from_str(text: &str) -> Result<Self, UnknownLighting> {
-        let (mut direct, mut occlusion, mut rate) = (None, None, None);
+        let (mut direct, mut occlusion, mut reflections, mut rate) = (None, None, None, None);
         for term in text.split(',').map(str::trim) {
             let words: Vec<&str> = term.split_whitespace().collect();
             let again = match words[..] {
@@ -155,6 +174,7 @@ impl FromStr for Lighting {
                     let radius_m = Some(positive(text, radius.strip_suffix('m').unwrap_or(radius), "the radius")?);
                     occlusion.replace(Occlusion { rays: rays(text, n)?, radius_m }).is_some()
                 }
+                ["reflections", n] => reflections.replace(mirrors(text, n)?).is_some(),
                 ["adaptive"] => rate.replace(Rate::Adaptive { tolerance: DEFAULT_TOLERANCE }).is_some(),
                 ["adaptive", n] => {
                     rate.replace(Rate::Adaptive { tolerance: positive(text, n, "the tolerance")? }).is_some()
@@ -165,9 +185,16 @@ impl FromStr for Lighting {
                 return Err(UnknownLighting::Conflict(text.to_owned(), "says one thing twice"));
             }
         }
-        let lighting = Self { direct: direct.unwrap_or_default(), occlusion, rate: rate.unwrap_or_default() };
+        let lighting =
+            Self { direct: direct.unwrap_or_default(), occlusion, reflections, rate: rate.unwrap_or_default() };
         if !lighting.is_lit() && occlusion.is_some() {
             return Err(UnknownLighting::Conflict(text.to_owned(), "unlit surfaces have no occlusion"));
+        }
+        if lighting.shadow_rays() == 0 && reflections.is_some() {
+            return Err(UnknownLighting::Conflict(
+                text.to_owned(),
+                "mirrors show the scene under shadows and soft N only",
+            ));
         }
         if !lighting.is_traced() && rate.is_some() {
             return Err(UnknownLighting::Conflict(text.to_owned(), "there are no rays to be adaptive with"));
@@ -179,6 +206,11 @@ impl FromStr for Lighting {
 fn rays(text: &str, number: &str) -> Result<NonZeroU32, UnknownLighting> {
     let rays = number.parse().ok().filter(|rays: &NonZeroU32| rays.get() <= MAX_RAYS);
     rays.ok_or_else(|| UnknownLighting::Rays(text.to_owned()))
+}
+
+fn mirrors(text: &str, number: &str) -> Result<NonZeroU32, UnknownLighting> {
+    let mirrors = number.parse().ok().filter(|mirrors: &NonZeroU32| mirrors.get() <= MAX_REFLECTIONS);
+    mirrors.ok_or_else(|| UnknownLighting::Reflections(text.to_owned()))
 }
 
 fn positive(text: &str, number: &str, what: &'static str) -> Result<f32, UnknownLighting> {
@@ -198,6 +230,9 @@ impl fmt::Display for Lighting {
             Some(Occlusion { rays, radius_m: Some(radius_m) }) => write!(f, ", occlusion {rays} {radius_m}m")?,
             Some(Occlusion { rays, radius_m: None }) => write!(f, ", occlusion {rays}")?,
             None => {}
+        }
+        if let Some(reflections) = self.reflections {
+            write!(f, ", reflections {reflections}")?;
         }
         match self.rate {
             Rate::Full => Ok(()),
@@ -222,6 +257,8 @@ mod tests {
             "phong, occlusion 4 0.5m",
             "shadows, occlusion 8, adaptive",
             "soft 4, adaptive 0.1",
+            "shadows, reflections 8",
+            "soft 16, occlusion 16, reflections 2, adaptive",
         ] {
             assert_eq!(name.parse::<Lighting>().expect(name).to_string(), name);
         }
@@ -230,18 +267,23 @@ mod tests {
 
     #[test]
     fn invalid_lightings_are_refused_with_the_reason() {
-        use UnknownLighting::{Conflict, Number, Rays, Term};
+        use UnknownLighting::{Conflict, Number, Rays, Reflections, Term};
         let parsed = |text: &str| text.parse::<Lighting>().expect_err(text);
         for text in ["soft 0", "soft -1", "soft 4097", "soft many", "occlusion 0", "soft 99999999999"] {
             assert!(matches!(parsed(text), Rays(_)), "{text}");
         }
-        for text in ["", "soft", "bright", "unlit;phong", "occlusion", "occlusion 1 2 3"] {
+        for text in ["shadows, reflections 0", "shadows, reflections 9", "shadows, reflections -1"] {
+            assert!(matches!(parsed(text), Reflections(_)), "{text}");
+        }
+        for text in ["", "soft", "reflections", "bright", "unlit;phong", "occlusion", "occlusion 1 2 3"] {
             assert!(matches!(parsed(text), Term(_)), "{text}");
         }
         for text in ["occlusion 4 -1m", "occlusion 4 NaN", "soft 4, adaptive inf", "soft 4, adaptive 0"] {
             assert!(matches!(parsed(text), Number(..)), "{text}");
         }
-        for text in ["unlit, phong", "unlit, occlusion 4", "phong, adaptive", "occlusion 4, occlusion 8"] {
+        let unmirrored = ["phong, reflections 1", "unlit, reflections 1", "reflections 2"];
+        let twice = ["unlit, phong", "occlusion 4, occlusion 8", "shadows, reflections 1, reflections 1"];
+        for text in [&unmirrored[..], &twice, &["unlit, occlusion 4", "phong, adaptive"]].concat() {
             assert!(matches!(parsed(text), Conflict(..)), "{text}");
         }
     }

@@ -20,6 +20,8 @@ pub(crate) struct Output {
     pub depth: bool,
     /// Highlights of a view, for its own eye.
     pub highlight: Option<Highlight>,
+    /// Mirrors of a view show the scene.
+    pub mirrors: bool,
     pub normal: bool,
     pub reflector: bool,
     pub surface_id: bool,

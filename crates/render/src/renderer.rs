@@ -334,7 +334,8 @@ fn corner_cameras(cameras: &[PinholeCamera]) -> Vec<PinholeCamera> {
 
 fn views_output(work: DrawWork<'_>) -> Output {
     let highlight = work.highlight();
-    Output { highlight, ..output(work, highlight.is_some()) }
+    let mirrors = highlight.is_some() && work.lighting.reflections() > 0;
+    Output { highlight, mirrors, ..output(work, highlight.is_some()) }
 }
 
 fn images_output(work: DrawWork<'_>, planes: SamplePlanes, test: Option<RedundancyTest>) -> Output {

@@ -15,6 +15,7 @@ use crate::{
     pixel_list::LIST_WORKGROUP,
     raster::RasterVariant,
     redundancy_test::RedundancyTest,
+    reflections::{Follow, Land, Spawn},
     sums::COLOR_SUMS,
     surfaces::NOTHING,
 };
@@ -27,6 +28,8 @@ const CLAMP: u32 = scene::Wrap::Clamp as u32;
 pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
     "raster.wgsl", "packed_surface.wgsl", "surfaces.wgsl", "albedo.wgsl", "camera.wgsl", "sequence.wgsl", "sums.wgsl",
     "illuminate.wgsl", "interpolate.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl", "hashed_alpha.wgsl",
+    "rise.wgsl", "spot.wgsl", "shaded.wgsl", "visibility.wgsl", "reflections/bounce.wgsl", "reflections/bounce_off.wgsl", "reflections/curvature.wgsl",
+    "reflections/spawn.wgsl", "reflections/follow.wgsl", "reflections/land.wgsl",
     "rays/traverse.wgsl", "rays/material.wgsl", "rays/primary.wgsl"
 };
 
@@ -46,7 +49,7 @@ pub fn shader_sources<'t>(
     templates: &'t Templates,
     tests: &'t [RedundancyTest],
 ) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    gpu::shader_sources!(templates, RasterVariant, Primary, Keep, Illuminate, Interpolate, Finish)
+    gpu::shader_sources!(templates, RasterVariant, Primary, Keep, Illuminate, Interpolate, Spawn, Follow, Land, Finish)
         .chain(RasterVariant::with_tests(tests).map(|variant| source(templates, &variant)))
         .chain(Primary::with_tests(tests).map(|variant| source(templates, &variant)))
         .chain(Finish::with_tests(tests).map(|variant| source(templates, &variant)))

@@ -9,6 +9,7 @@ use crate::batch::{Batch, Recording};
 use crate::finish::Planes;
 use crate::known_samples::{ImageSequence, Predecessors};
 use crate::pieces::{Piece, Pieces};
+use crate::reflections::{self, Reflections};
 use crate::surfaces::{SurfaceKind, SurfacePool, Surfaces};
 use crate::{Rate, RenderError, finish, illuminate, interpolate, keep, pixel_list::PixelList, raster::Raster};
 use crate::{rays::primary, redundancy_test::Evidence};
@@ -51,7 +52,9 @@ impl Stages {
         let sums = self.sums(batch)?;
         let Self { gpu, passes, pool, .. } = self;
         let slice_px = gpu.device_queue.slice_units(batch.family(), batch.unknown_slice_px());
-        let pieces = Pieces::of(batch.cameras, slice_px);
+        let most_px = if batch.output.mirrors { reflections::PIXELS_A_PIECE } else { u64::MAX };
+        let pieces = Pieces::of(batch.cameras, slice_px.min(most_px));
+        let mirrored = Reflections::lend(gpu, pool, batch, &pieces.all)?;
         let cameras = batch.uniform_of_all(gpu, &pieces, &sums);
         let shifted = batch.positions();
         let positions: Vec<Batch<'_>> = shifted.iter().map(|position| batch.at(position)).collect();
@@ -63,13 +66,13 @@ impl Stages {
         for position in &positions {
             recording.cameras = position.uniform_of_all(gpu, &recording.pieces, &recording.sums);
             recording.batch = position;
-            lists.extend(self.record_position(&mut recording, &surfaces, &planes)?);
+            lists.extend(self.record_position(&mut recording, &surfaces, &planes, mirrored.as_ref())?);
         }
         let Recording { sums, mut frame, .. } = recording;
         let bytes = batch.bytes(batch.output.layout().count);
         let read = frame.read_back(&planes.words, 0..bytes, pool.lend_host("planes read-back", bytes.max(4)));
         let result = frame.submit()?.wait()?;
-        drop((surfaces, lists, planes));
+        drop((surfaces, lists, planes, mirrored));
         if batch.work.refinement.goes_on() {
             self.accumulations.put(batch.key(), sums);
         }
@@ -87,19 +90,23 @@ impl Stages {
         Ok(kept.unwrap_or_else(|| Sums { buffer: buffer(), rays: wanted.map(|rays| 0..rays) }))
     }
 
-    /// Records one position within the pixels: which surface each shows, its light, and its planes.
+    /// Records one position within the pixels: which surface each shows, its light, what mirrors show, and its planes.
     fn record_position(
         &self,
         recording: &mut Recording<'_>,
         surfaces: &[Surfaces],
         planes: &Planes,
+        mirrored: Option<&Reflections>,
     ) -> Result<Vec<PixelList>, RenderError> {
         match recording.batch.sequence {
             Some(sequence) => self.find_in_sequence(recording, sequence, surfaces)?,
             None => self.find(recording, (0, surfaces), None)?,
         }
         let lists = if recording.batch.has_color() { self.light(recording, surfaces)? } else { Vec::new() };
-        finish::record(recording, surfaces, planes)?;
+        if let Some(mirrored) = mirrored.filter(|_| recording.batch.has_color()) {
+            mirrored.record(recording, surfaces)?;
+        }
+        finish::record(recording, surfaces, planes, mirrored.map(|mirrored| &*mirrored.reflected))?;
         Ok(lists)
     }
 

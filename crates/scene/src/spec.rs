@@ -10,7 +10,7 @@ use crate::{Limits, MissingTextures, Scene, SceneError, load_file};
 
 /// Names of the built-in scenes. A `tree-terrain-…` may have the suffix `-wind`, and `grass` a `:` with a
 /// [density](GrassDensity). A file of such a name is reached as `./name`.
-pub const BUILT_IN_NAMES: [&str; 16] = [
+pub const BUILT_IN_NAMES: [&str; 18] = [
     "tree-terrain-30k",
     "tree-terrain-125k",
     "tree-terrain-500k",
@@ -27,6 +27,8 @@ pub const BUILT_IN_NAMES: [&str; 16] = [
     "urban",
     "tree",
     "snake",
+    "teapot-mirror",
+    "mirror-pair",
 ];
 
 /// The name before the density of a meadow.

@@ -26,6 +26,8 @@ struct Mirror {
 /// most 1/(4 · 0.045⁴), some 60,000.
 const LEAST_ROUGHNESS: f32 = 0.045;
 const LEAST_COSINE: f32 = 1e-4;
+/// Up to the first roughness a ray brings all that a surface mirrors; from the second on, nothing.
+const MIRROR_ROUGHNESS: [f32; 2] = [0.1, 0.2];
 
 impl Reflector {
     /// The inverse of [`Reflector::pack`]; `None` for 0.
@@ -42,6 +44,14 @@ impl Reflector {
     #[must_use]
     pub fn phong_exponent(&self) -> f32 {
         (2.0 / self.roughness.powi(4).max(1e-6) - 2.0).clamp(EXPONENTS[0], EXPONENTS[1])
+    }
+
+    /// The share of the mirror direction's light that a ray brings, where lighting follows rays from mirrors; the rest is
+    /// the environment's.
+    #[must_use]
+    pub fn mirror_share(&self) -> f32 {
+        let [all, none] = MIRROR_ROUGHNESS;
+        ((none - self.roughness) / (none - all)).clamp(0.0, 1.0)
     }
 
     fn alpha(&self) -> f32 {
@@ -73,6 +83,19 @@ pub fn highlight_linear(
             lamps + mirror.environment(gradient) * visibility(0)
         }
     }
+}
+
+/// The share of the light of the mirror direction that a surface reflects under GGX: the surface's part of the split sum.
+/// The two directions are unit vectors.
+#[must_use]
+pub fn environment_reflectance_linear(
+    normal_in_world: Vec3,
+    towards_eye_in_world: Vec3,
+    reflector: &Reflector,
+) -> Vec3 {
+    let point_in_world = Vec3::ZERO;
+    Mirror { point_in_world, normal_in_world, towards_eye_in_world, reflector: *reflector }
+        .environment(|_, _| Vec3::ONE)
 }
 
 /// The highlight of an unoccluded environment map under GGX. The two directions are unit vectors.

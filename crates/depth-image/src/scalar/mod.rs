@@ -7,6 +7,6 @@ mod light;
 mod texel;
 
 pub use encoding::unit_from_oct16;
-pub use highlight::{environment_highlight_linear, highlight_linear};
+pub use highlight::{environment_highlight_linear, environment_reflectance_linear, highlight_linear};
 pub use light::{Incident, disc_from_square, tangents_of};
 pub use texel::Texel;

@@ -12,6 +12,11 @@ struct Mirror { point_in_world: vec3f, normal: vec3f, towards_eye: vec3f, reflec
 // Smoother than this counts as this: the peak of a highlight stays finite.
 const LEAST_ROUGHNESS: f32 = 0.045;
 const LEAST_COSINE: f32 = 1e-4;
+{%- if mirrors is defined and mirrors %}
+// Up to this roughness a ray brings all that a surface mirrors; from the other on, nothing.
+const ROUGHEST_MIRROR: f32 = 0.1;
+const ROUGHEST_MIXED: f32 = 0.2;
+{%- endif %}
 
 fn unpack_reflector(word: u32) -> Reflector {
     let bytes = unpack4x8unorm(word);
@@ -60,16 +65,40 @@ fn highlight_from_light(light: Light, mirror: Mirror) -> vec3f {
     let fresnel = schlick(mirror.reflector.reflectance_linear, max(dot(mirror.towards_eye, half_way), 0.0));
     return incident.irradiance_linear * fresnel * (lobe * n_l);
 }
+{%- if mirrors is defined and mirrors %}
+
+// The surface's part of the split sum, by Karis' fit: the share of the light of the mirror direction that is reflected.
+fn environment_reflectance(mirror: Mirror) -> vec3f {
+{%- else %}
 
 // The highlight of the environment, unoccluded: split sum, with Karis' fit for the surface's part.
 fn highlight_from_environment(mirror: Mirror) -> vec3f {
+{%- endif %}
     let n_v = clamp(dot(mirror.normal, mirror.towards_eye), 0.0, 1.0);
     let roughness = max(mirror.reflector.roughness, LEAST_ROUGHNESS);
     let r = roughness * vec4f(-1.0, -0.0275, -0.572, 0.022) + vec4f(1.0, 0.0425, 1.04, -0.04);
     let grazing = min(r.x * r.x, exp2(-9.28 * n_v)) * r.x + r.y;
     let brdf = mirror.reflector.reflectance_linear * (r.z - 1.04 * grazing) + (r.w + 1.04 * grazing);
+{%- if mirrors is defined and mirrors %}
+    return brdf;
+}
+
+// The share of the mirror direction's light that a ray brings: all of it for surfaces that are smooth, none for
+// rough ones, which mirror the environment alone.
+fn mirror_share(roughness: f32) -> f32 {
+    return clamp((ROUGHEST_MIXED - roughness) / (ROUGHEST_MIXED - ROUGHEST_MIRROR), 0.0, 1.0);
+}
+
+// The highlight of the environment, unoccluded, as far as no ray brings it.
+fn highlight_from_environment(mirror: Mirror) -> vec3f {
+    let roughness = max(mirror.reflector.roughness, LEAST_ROUGHNESS);
+    let arriving = environment_mirrored(reflect(-mirror.towards_eye, mirror.normal), roughness);
+    return arriving * environment_reflectance(mirror) * (1.0 - mirror_share(mirror.reflector.roughness));
+}
+{%- else %}
     return environment_mirrored(reflect(-mirror.towards_eye, mirror.normal), roughness) * brdf;
 }
+{%- endif %}
 {% else %}
 // The exponent whose lobe is as wide as a roughness' (Walter et al. 2007).
 fn phong_exponent(roughness: f32) -> f32 {

@@ -14,17 +14,17 @@ impl<P: Pricing> Planner<P> {
             (_, true) => format!(" Measuring ended early: its allowance of {:.1} s is spent.", self.allowance_s),
             (_, false) => String::new(),
         };
-        format!("{}{spent}", self.finding(choice, state))
+        format!("{}{spent}", self.finding(choice, state, is_spent))
     }
 
-    fn finding(&self, choice: Choice, state: PromiseState) -> String {
+    fn finding(&self, choice: Choice, state: PromiseState, is_spent: bool) -> String {
         let measured = self.rows.iter().filter(|row| !row.errors.is_empty()).count();
         let of = format!("{measured} of {} rows were measured", self.rows.len());
         match (state, choice) {
             (PromiseState::Measuring, _) => format!("{}: {of}.", self.request.budget),
             (PromiseState::Kept, Choice::Row(row)) => self.row_keeps(row, &of),
             (PromiseState::Kept, Choice::Direct) => self.direct_keeps(&of),
-            (PromiseState::Unreachable, _) => self.unreachable(choice),
+            (PromiseState::Unreachable, _) => self.unreachable(choice, is_spent),
         }
     }
 
@@ -71,8 +71,8 @@ impl<P: Pricing> Planner<P> {
         )
     }
 
-    /// By how much the budget is missed.
-    fn unreachable(&self, choice: Choice) -> String {
+    /// By how much the budget is missed, or that too little was measured to know.
+    fn unreachable(&self, choice: Choice, is_spent: bool) -> String {
         let over = self.over(choice);
         let nearest = match (self.term(), self.nearest_to_error()) {
             (Some(term), Some(row)) => {
@@ -85,7 +85,8 @@ impl<P: Pricing> Planner<P> {
             Choice::Row(row) => self.row(row).to_string(),
             Choice::Direct => "Direct drawing".to_owned(),
         };
-        format!("Nothing keeps {}. {name} {over}.{nearest}", self.request.budget)
+        let keeps = if is_spent { "is known to keep" } else { "keeps" };
+        format!("Nothing {keeps} {}. {name} {over}.{nearest}", self.request.budget)
     }
 
     fn over(&self, choice: Choice) -> String {

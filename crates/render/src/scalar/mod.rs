@@ -4,6 +4,7 @@
 pub mod hashed_alpha;
 mod nearest;
 pub mod rays;
+pub mod reflections;
 pub mod sequence;
 
 pub use crate::{

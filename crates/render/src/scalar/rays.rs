@@ -2,13 +2,15 @@
 //! A device may differ where WGSL leaves it open: in the last bits of quotients, and in whether a product
 //! and a sum are rounded once or twice.
 
-use depth_image::{PinholeCamera, Ray, SurfaceId, unit_from_oct16};
+use depth_image::{PinholeCamera, Ray, Reflector, SurfaceId, linear_from_srgb8, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
 use obvhs::cwbvh::node::CwBvhNode;
 use scene::Wrap;
 
 use super::hashed_alpha::hashed_cutoff;
-use crate::rays::flat::{ALPHA_HASHED, ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatDetail, FlatTriangle, FlatVertex};
+use crate::rays::flat::{
+    ALPHA_HASHED, ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatDetail, FlatTriangle, FlatVertex, SPECULAR, UNLIT,
+};
 use crate::rays::ray_scene::{HostTables, MATERIAL_TEXELS};
 use crate::rays::traversal::{BOX_SLACK, EDGE_ROUNDINGS};
 use crate::{GpuScene, RenderError, pixel_camera::PixelCamera};
@@ -39,6 +41,15 @@ pub struct Hit {
     pub barycentric: [f32; 2],
     /// Whether the front was met.
     pub front: bool,
+}
+
+/// What a surface shows, under GGX.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// The material's colour and the vertices', linear.
+    pub base_linear: Vec3,
+    /// `None` where there are no highlights.
+    pub reflector: Option<Reflector>,
 }
 
 /// The steps of a search.
@@ -174,6 +185,39 @@ impl Scene {
         let normals = corners.map(|number| unit_from_oct16(self.vertices[number as usize].normal_oct16));
         let normal = normals[0] * (1.0 - b - c) + normals[1] * b + normals[2] * c;
         normal.normalize_or_zero() * if hit.front { 1.0 } else { -1.0 }
+    }
+
+    /// The look of a triangle whose material has no textures.
+    #[must_use]
+    pub fn look(&self, hit: &Hit) -> Look {
+        let FlatTriangle { material, flags, .. } = self.triangles[hit.slot as usize];
+        let texel = |part: u32| self.materials[(material * MATERIAL_TEXELS + part) as usize].map(f32::from_bits);
+        let ([r, g, b, _], [metallic, roughness, ..], [dr, dg, db, _]) = (texel(0), texel(2), texel(3));
+        let (numbers, shares) = (self.numbers_of(hit), hit.shares());
+        let vertex_linear = |i: usize| {
+            let [r, g, b, _] = self.vertices[numbers[i]].color_srgba8;
+            Vec3::from([r, g, b].map(linear_from_srgb8)) * shares[i]
+        };
+        let base_linear = Vec3::new(r, g, b) * (0..3).map(vertex_linear).sum::<Vec3>();
+        let reflectance_linear = Vec3::new(dr, dg, db).lerp(base_linear, metallic);
+        let is_glossy = flags & SPECULAR != 0 && flags & UNLIT == 0;
+        Look {
+            base_linear,
+            // In the bits that a device has of it.
+            reflector: Reflector::unpack(Reflector { reflectance_linear, roughness }.pack()).filter(|_| is_glossy),
+        }
+    }
+
+    /// Mean curvature of a triangle's surface, by how its normal turns along the edges; positive where convex.
+    #[must_use]
+    pub fn curvature_per_m(&self, hit: &Hit) -> f32 {
+        let corners = self.corners_of(hit.slot);
+        let normals = self.numbers_of(hit).map(|number| unit_from_oct16(self.vertices[number].normal_oct16));
+        let turn = |i: usize| {
+            let (edge, next) = (corners[(i + 1) % 3] - corners[i], normals[(i + 1) % 3]);
+            (next - normals[i]).dot(edge) / edge.length_squared().max(1e-20)
+        };
+        (0..3).map(turn).sum::<f32>() / 3.0 * if hit.front { 1.0 } else { -1.0 }
     }
 
     /// Corners of all triangles.

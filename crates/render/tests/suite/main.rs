@@ -7,6 +7,7 @@ mod environment_map;
 mod light_failures;
 mod materials;
 mod raster;
+mod reflections;
 mod slices;
 mod stage;
 mod tone;

@@ -6,7 +6,8 @@ use depth_image::{Antialias, Camera, DepthImage, PinholeCamera, View, ViewPlanes
 use glam::{UVec2, Vec3};
 use gpu::{CompiledOutside, DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Refinement, Renderer, SamplePlanes, Visibility};
-use scene::procedural::courtyard;
+use scene::Scene;
+use scene::procedural::{courtyard, mirror_pair};
 
 const PLANES: SamplePlanes =
     SamplePlanes { antialias: Antialias::NONE, normal: true, surface_id: true, specular: true, corners: true };
@@ -23,14 +24,18 @@ struct Shared {
 
 impl Shared {
     fn new() -> Self {
-        let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
         let camera = |x: f32, size: [u32; 2]| {
             PinholeCamera::looking_at(Vec3::new(x, 2.0, 6.0), Vec3::Y, Vec3::Y, 0.9, UVec2::from(size))
         };
+        Self::of(&courtyard(), vec![camera(0.0, [67, 61]), camera(1.0, [40, 48])])
+    }
+
+    fn of(scene: &Scene, cameras: Vec<PinholeCamera>) -> Self {
+        let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
         Self {
             renderer: Renderer::new(&gpu, render::templates(&[]).expect("templates")),
-            scene: GpuScene::upload(&gpu, &courtyard()).expect("a scene"),
-            cameras: vec![camera(0.0, [67, 61]), camera(1.0, [40, 48])],
+            scene: GpuScene::upload(&gpu, scene).expect("a scene"),
+            cameras,
             gpu,
         }
     }
@@ -49,7 +54,10 @@ impl Shared {
     }
 
     fn views(&self, work: DrawWork<'_>) -> Vec<View> {
-        let planes = ViewPlanes::ALL;
+        self.views_with(work, ViewPlanes::ALL)
+    }
+
+    fn views_with(&self, work: DrawWork<'_>, planes: ViewPlanes) -> Vec<View> {
         self.renderer.draw_views(work, &self.cameras, planes).expect("views")
     }
 
@@ -80,6 +88,25 @@ fn a_picture_in_slices_is_the_whole_picture_with_every_light() {
             shared.check(&format!("views, {lighting}, {visibility}"), || shared.views(work));
             shared.check(&format!("images, {lighting}, {visibility}"), || shared.images(work));
         }
+    }
+}
+
+#[test]
+fn mirror_images_in_slices_are_the_whole_ones_with_several_samples_a_pixel() {
+    let camera = |x: f32, size: [u32; 2]| {
+        PinholeCamera::looking_at(Vec3::new(x, 1.9, 2.6), Vec3::new(0.6, 0.8, -0.4), Vec3::Y, 0.9, UVec2::from(size))
+    };
+    let shared = Shared::of(&mirror_pair(), vec![camera(-1.6, [67, 61]), camera(-1.2, [40, 48])]);
+    for visibility in [Visibility::Triangles, Visibility::Rays] {
+        let work = shared.work("soft 2, occlusion 2, reflections 3", visibility);
+        for antialias in [Antialias::NONE, Antialias::of(4).expect("four samples")] {
+            let planes = ViewPlanes { antialias, ..ViewPlanes::ALL };
+            shared.check(&format!("mirrors, {visibility}, {antialias}"), || shared.views_with(work, planes));
+        }
+        // A picture among others is the picture alone.
+        let together = shared.views(work);
+        let alone = shared.renderer.draw_views(work, &shared.cameras[1..], ViewPlanes::ALL).expect("a view");
+        assert!(together[1..] == alone, "{visibility}");
     }
 }
 

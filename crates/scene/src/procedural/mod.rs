@@ -8,9 +8,11 @@ mod blocks;
 mod geometry;
 mod grass;
 mod lone_tree;
+mod mirrors;
 mod random;
 mod shapes;
 mod snake;
+mod teapot;
 mod terrain;
 mod tree;
 mod tree_terrain;
@@ -20,6 +22,7 @@ pub use bird_nest::bird_nest;
 pub use blocks::{BlocksViewpoints, blocks, blocks_viewpoints};
 pub use grass::{GrassDensity, grass};
 pub use lone_tree::lone_tree;
+pub use mirrors::{mirror_pair, teapot_mirror};
 pub use shapes::{checker_sphere, courtyard, poles, quad, unit_cube, uv_sphere};
 pub use snake::snake;
 pub use tree_terrain::tree_terrain;
@@ -42,6 +45,8 @@ pub(crate) fn by_name(name: &str) -> Scene {
         "urban" => urban(),
         "tree" => lone_tree(),
         "snake" => snake(),
+        "teapot-mirror" => teapot_mirror(),
+        "mirror-pair" => mirror_pair(),
         _ => unit_cube(),
     }
 }

@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use app_core::delivery::{at_rate, open, request, viewpoints};
+use app_core::delivery::{at_rate, is_drawn_for_mirrors, open, request, viewpoints};
 use app_core::exit::BadInput;
 use client::{Client, Session};
-use cluster::{BudgetRequest, OfferStatus, Promise, PromiseState, SessionRequest, Timeline};
+use cluster::{BudgetRequest, OfferSettings, OfferStatus, Promise, PromiseState, SessionRequest, Timeline};
 use depth_image::PinholeCamera;
 use render::Lighting;
 
@@ -103,10 +103,16 @@ fn offered(offers: Vec<OfferStatus>, scene: Option<&str>) -> anyhow::Result<Offe
 
 fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamera]) -> anyhow::Result<SessionRequest> {
     let views = if args.live { &cameras[..1] } else { cameras };
-    let mut request = request(offer.settings.clone(), views)?;
+    let lighting = args.lighting.map(|lighting| lighting.to_string()).or(offer.settings.lighting.clone());
+    let mut request = request(OfferSettings { lighting, ..offer.settings.clone() }, views)?;
     request.scene = Some(offer.name.clone());
-    request.method = args.method.map_or(request.method, |method| method.to_string());
-    request.lighting = args.lighting.map_or(request.lighting, |lighting| lighting.to_string());
+    if let Some(method) = args.method {
+        if is_drawn_for_mirrors(&request.lighting) {
+            let reason = "mirrors show the scene in views that are drawn directly alone";
+            return Err(BadInput(format!("--method {method}: {reason} (lighting {})", request.lighting)).into());
+        }
+        request.method = method.to_string();
+    }
     let request = if args.live { at_rate(request, args.rate) } else { request };
     let request = SessionRequest {
         forced_tile_count: args.tiles,

@@ -1,0 +1,62 @@
+//! The surfaces where mirrored rays end.
+
+use depth_image::Highlight;
+use gpu::{ResourceTraits, ShaderVariant, highlight_name};
+use minijinja::{Value, context, value::merge_maps};
+
+use super::Rays;
+use crate::{RenderError, batch::Recording, rays::Traversal};
+
+#[derive(Debug)]
+pub(crate) struct Follow {
+    traversal: Traversal,
+}
+
+impl ShaderVariant for Follow {
+    const TEMPLATE: &'static str = "reflections/follow.wgsl";
+    const TRAITS: ResourceTraits = &[];
+
+    fn context(&self) -> Value {
+        let own = context! {
+            primary => true,
+            cone => true,
+            shading => highlight_name(Highlight::Ggx),
+            count_visits => false,
+        };
+        merge_maps([own, self.traversal.context()])
+    }
+
+    fn all() -> Vec<Self> {
+        Traversal::ALL.map(|traversal| Self { traversal }).into()
+    }
+}
+
+/// Records the pass over the rays off one mirror.
+pub(super) fn record(recording: &mut Recording<'_>, rays: Rays<'_>) -> Result<(), RenderError> {
+    // Lighting with mirrors has rays.
+    let Some(traced) = recording.batch.traced.clone() else { return Ok(()) };
+    let variant = Follow { traversal: Traversal::of(&traced) };
+    let pass = recording.passes.get(&variant)?;
+    let own = pass.bind(0, rays.bindings())?;
+    let tree = pass.bind(1, traced.bindings())?;
+    rays.dispatch(recording, (&variant, [0; 3]), &pass, &[&own, &tree]);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reflections::BounceList;
+    use crate::test_support::TestStage;
+
+    #[test]
+    fn every_variant_is_bound_by_its_names() {
+        let stage = TestStage::new();
+        let traced = stage.scene.rays.at(0.0).expect("a tree");
+        let list = BounceList::new(&stage.gpu);
+        for variant in Follow::all() {
+            stage.check(&variant, 0, &Rays { bounces: &stage.buffer, list: &list, units: 1, generation: 1 }.bindings());
+            stage.check(&variant, 1, &traced.bindings());
+        }
+    }
+}

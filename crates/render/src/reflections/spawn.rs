@@ -1,0 +1,105 @@
+//! Rays off the mirrors that a picture shows.
+
+use depth_image::Highlight;
+use gpu::{Binding, DispatchSize, ResourceTraits, ShaderVariant, WorkKind, highlight_name, light_slots};
+use minijinja::{Value, context, value::merge_maps};
+use wgpu::Buffer;
+
+use super::{BounceList, Reflections, units};
+use crate::{
+    RenderError, batch::Recording, pieces::Piece, pixel_camera::CAMERA_TRAITS, rays::Traversal, surfaces::Surfaces,
+};
+
+/// Planes of a view: colour and depth.
+const VIEW_PLANES: usize = 2;
+
+#[derive(Debug)]
+pub(crate) struct Spawn {
+    by_rays: bool,
+    traversal: Traversal,
+}
+
+impl ShaderVariant for Spawn {
+    const TEMPLATE: &'static str = "reflections/spawn.wgsl";
+    const TRAITS: ResourceTraits = CAMERA_TRAITS;
+
+    fn context(&self) -> Value {
+        let own = context! {
+            by_rays => self.by_rays,
+            primary => true,
+            cone => true,
+            shading => highlight_name(Highlight::Ggx),
+            count_visits => false,
+            plane_count => VIEW_PLANES,
+            highlight => highlight_name(Highlight::Ggx),
+            mirrors => true,
+            environment_map => false,
+            light_count => 0, light_slots => light_slots(0), visibility_words => 0,
+        };
+        merge_maps([own, self.traversal.context()])
+    }
+
+    fn all() -> Vec<Self> {
+        let each = |by_rays| Traversal::ALL.map(|traversal| Self { by_rays, traversal });
+        [false, true].into_iter().flat_map(each).collect()
+    }
+}
+
+/// Records the pass over a piece of a picture.
+pub(super) fn record(
+    recording: &mut Recording<'_>,
+    reflections: &Reflections,
+    (element, piece): (u32, Piece),
+    target: &Surfaces,
+    (next_bounces, next): (&Buffer, &BounceList),
+) -> Result<(), RenderError> {
+    let batch = recording.batch;
+    // Lighting with mirrors has rays.
+    let Some(traced) = batch.traced.as_deref() else { return Ok(()) };
+    let variant = Spawn { by_rays: batch.by_rays, traversal: Traversal::of(traced) };
+    debug_assert_eq!(batch.output.layout().count, VIEW_PLANES);
+    let pass = recording.passes.get(&variant)?;
+    let illumination = &batch.work.scene.illumination;
+    let buffers = [&recording.cameras, illumination, &*reflections.reflected, next_bounces];
+    let own = pass.bind(0, bindings(buffers, next, target))?;
+    let tree = pass.bind(1, traced.bindings())?;
+    let size = [batch.cameras[piece.camera].size_px.x, piece.end_row - piece.first_row, 1];
+    pass.dispatch_each(&mut recording.frame, &[&own, &tree], element..element + 1, DispatchSize::Invocations(size));
+    let kind = WorkKind::new(batch.family(), &variant.name());
+    let px = units(recording, piece);
+    recording.frame.cut(kind, px);
+    Ok(())
+}
+
+fn bindings<'r>(
+    [camera, illumination, reflected, next_bounces]: [&'r Buffer; 4],
+    next: &'r BounceList,
+    target: &'r Surfaces,
+) -> Vec<Binding<'r>> {
+    let mut bindings = vec![
+        Binding::buffer("camera", camera),
+        Binding::buffer("illumination", illumination),
+        Binding::buffer("reflected", reflected),
+        Binding::buffer("next_bounces", next_bounces),
+        next.binding("next"),
+    ];
+    bindings.extend(target.bindings());
+    bindings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_support::TestStage;
+
+    #[test]
+    fn every_variant_is_bound_by_its_names() {
+        let stage = TestStage::new();
+        let (list, traced) = (BounceList::new(&stage.gpu), stage.scene.rays.at(0.0).expect("a tree"));
+        for variant in Spawn::all() {
+            let target = stage.surfaces(variant.by_rays, false);
+            stage.check(&variant, 0, &bindings([&stage.buffer; 4], &list, &target));
+            stage.check(&variant, 1, &traced.bindings());
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Scenes with mirrors: a teapot before a dented mirror, and a ball between two plane mirrors.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::Vec3;
+
+use super::geometry::{MeshBuilder, matt, vertex};
+use super::random::Noise;
+use super::teapot::teapot;
+use crate::{Material, Scene};
+
+const LIGHT_CHECK: Vec3 = Vec3::splat(214.0);
+const DARK_CHECK: Vec3 = Vec3::new(54.0, 62.0, 74.0);
+/// The colour of a matt back.
+const BACK: Vec3 = Vec3::new(70.0, 66.0, 62.0);
+
+/// The pebble: its mean radius, and its middle. The teapot stands 4 m from its side.
+const PEBBLE_M: f32 = 3.0;
+const PEBBLE_MIDDLE: Vec3 = Vec3::new(0.0, 3.1, -4.5);
+const PEBBLE_COLUMNS: u32 = 200;
+const PEBBLE_ROWS: u32 = 100;
+/// The depth of its dents in radii, and their size.
+const DENT: f32 = 0.07;
+const DENT_SIZE: f32 = 1.6;
+const TEAPOT_FOOT: Vec3 = Vec3::new(0.0, 0.0, 4.5);
+/// The step to either side from which a normal is computed, radians.
+const STEP: f32 = 1e-3;
+
+/// The half distance of the two mirrors, and their half width and height, metres.
+const HALF_DISTANCE_M: f32 = 2.0;
+const HALF_WIDTH_M: f32 = 3.0;
+const HEIGHT_M: f32 = 3.0;
+
+/// [Newell's teapot](teapot) on a floor of 24 m with checks of 1 m, before a mirror of 39,600 triangles that is convex
+/// with dents.
+#[must_use]
+pub fn teapot_mirror() -> Scene {
+    let mut builder = MeshBuilder::default();
+    checks(&mut builder, 12);
+    teapot(&mut builder, TEAPOT_FOOT);
+    builder.finish_part(0);
+    pebble(&mut builder);
+    builder.finish_part(1);
+    builder.into_scene_of("teapot-mirror", vec![matt("matt"), mirror(0.9)]).with_default_background()
+}
+
+/// A ball and a post on a floor with checks of 1 m, between two plane mirrors of 6 × 3 m that face each other 4 m apart.
+#[must_use]
+pub fn mirror_pair() -> Scene {
+    let mut builder = MeshBuilder::default();
+    checks(&mut builder, 4);
+    ball(&mut builder, Vec3::new(-0.4, 0.9, 0.0), 0.6, Vec3::new(204.0, 92.0, 48.0));
+    builder.cuboid(Vec3::new(0.7, 0.0, -1.1), Vec3::new(1.0, 1.9, -0.8), Vec3::new(64.0, 130.0, 190.0));
+    let across = Vec3::Z * HALF_WIDTH_M;
+    let up = Vec3::Y * (HEIGHT_M * 0.5);
+    let place = |side: f32, behind_m: f32| Vec3::new(side * (HALF_DISTANCE_M + behind_m), HEIGHT_M * 0.5, 0.0);
+    for side in [1.0, -1.0] {
+        // The back.
+        builder.rectangle(place(side, 0.05), across * -side, up, BACK);
+    }
+    builder.finish_part(0);
+    for side in [1.0, -1.0] {
+        builder.rectangle(place(side, 0.0), across * side, up, Vec3::splat(255.0));
+    }
+    builder.finish_part(1);
+    builder.into_scene_of("mirror-pair", vec![matt("matt"), mirror(0.8)]).with_default_background()
+}
+
+/// A metal without roughness.
+fn mirror(reflectance: f32) -> Material {
+    let base_color_linear = [reflectance, reflectance, reflectance, 1.0];
+    Material { name: "mirror".into(), base_color_linear, metallic: 1.0, roughness: 0.0, ..Material::default() }
+}
+
+/// A floor of 1 m checks at the origin.
+fn checks(builder: &mut MeshBuilder, half_side_m: i32) {
+    for x in -half_side_m..half_side_m {
+        for z in -half_side_m..half_side_m {
+            let middle = Vec3::new(x as f32 + 0.5, 0.0, z as f32 + 0.5);
+            let color_srgb = if (x + z).rem_euclid(2) == 0 { LIGHT_CHECK } else { DARK_CHECK };
+            builder.rectangle(middle, Vec3::X * 0.5, Vec3::NEG_Z * 0.5, color_srgb);
+        }
+    }
+}
+
+fn ball(builder: &mut MeshBuilder, middle: Vec3, radius_m: f32, color_srgb: Vec3) {
+    star(builder, [64, 32], color_srgb, |out| middle + out * radius_m);
+}
+
+fn pebble(builder: &mut MeshBuilder) {
+    let noise = Noise::new(14);
+    let radius_m = |out: Vec3| PEBBLE_M * (1.0 + DENT * noise.in_space(out * DENT_SIZE + 3.3));
+    star(builder, [PEBBLE_COLUMNS, PEBBLE_ROWS], Vec3::splat(255.0), |out| PEBBLE_MIDDLE + out * radius_m(out));
+}
+
+/// A closed surface around a middle, with a point for each direction from there: `2 · columns · (rows - 1)` triangles.
+/// Normals are those of the smooth surface.
+fn star(builder: &mut MeshBuilder, [columns, rows]: [u32; 2], color_srgb: Vec3, point: impl Fn(Vec3) -> Vec3) {
+    let first = builder.vertices.len() as u32;
+    for row in 0..=rows {
+        for column in 0..columns {
+            let (azimuth, polar) = (TAU * column as f32 / columns as f32, PI * row as f32 / rows as f32);
+            // Each pole is one point.
+            let ring = if row % rows == 0 { 0.0 } else { polar.sin() };
+            let out = Vec3::new(ring * azimuth.sin(), polar.cos(), ring * azimuth.cos());
+            builder.push(vertex(point(out), normal_of(&point, out), color_srgb));
+        }
+    }
+    for cell in 0..rows * columns {
+        let (row, column) = (cell / columns, cell % columns);
+        let next = (column + 1) % columns;
+        let (above, below) = (first + row * columns, first + (row + 1) * columns);
+        if row > 0 {
+            builder.indices.extend([above + column, below + column, above + next]);
+        }
+        if row + 1 < rows {
+            builder.indices.extend([above + next, below + column, below + next]);
+        }
+    }
+}
+
+/// From differences to two sides.
+fn normal_of(point: &impl Fn(Vec3) -> Vec3, out: Vec3) -> Vec3 {
+    let right = out.any_orthonormal_vector();
+    let up = out.cross(right);
+    let beside = |aside: Vec3| point((out + aside * STEP).normalize_or(out));
+    let slope = |aside: Vec3| beside(aside) - beside(-aside);
+    slope(right).cross(slope(up)).normalize_or(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scenes_with_mirrors_have_the_triangles_that_they_promise() {
+        let triangles =
+            |scene: &Scene| -> Vec<u32> { scene.meshes[0].parts.iter().map(|part| part.index_count / 3).collect() };
+        assert_eq!(triangles(&teapot_mirror()), [2 * 24 * 24 + 16_384, 39_600]);
+        assert_eq!(triangles(&mirror_pair()), [2 * 8 * 8 + 2 * 64 * 31 + 12 + 4, 4]);
+    }
+
+    #[test]
+    fn the_pebble_is_concave_in_places_and_its_normals_are_those_of_its_facets() {
+        let mesh = &teapot_mirror().meshes[0];
+        let part = &mesh.parts[1];
+        let at = |index: u32| mesh.vertices[index as usize];
+        let (mut least, mut concave) = (1.0_f32, 0);
+        for corners in mesh.indices[part.first_index as usize..].chunks_exact(3) {
+            let [a, b, c] = [0, 1, 2].map(|i| Vec3::from(at(corners[i]).position));
+            let [m, n, o] = [0, 1, 2].map(|i| Vec3::from(at(corners[i]).normal));
+            let out = (b - a).cross(c - a).normalize_or((m + n + o).normalize_or(Vec3::Y));
+            least = least.min(out.dot(m)).min(out.dot(n)).min(out.dot(o));
+            concave += u32::from((n - m).dot(b - a) < 0.0 && (o - m).dot(c - a) < 0.0);
+        }
+        assert!(least > 0.95, "{least}");
+        assert!((200..12_000).contains(&concave), "{concave} of 39,600 triangles are concave");
+    }
+}
