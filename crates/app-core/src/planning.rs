@@ -12,6 +12,7 @@ use probe::{DirectCosts, Representation, Subject, Viewpoints};
 use render::Lighting;
 use sampling::SamplingMethod;
 
+use crate::exit::BadInput;
 use crate::ladder::rows;
 use crate::setup::{SceneArgs, Setup};
 

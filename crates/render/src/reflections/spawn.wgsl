@@ -18,7 +18,7 @@
 {% include "reflections/curvature.wgsl" %}
 
 // Depths of one surface, drawn or found by a ray, differ by less than this share.
-const SAME_DEPTH: f32 = 1e-3;
+const DEPTH_SLACK: f32 = 1e-3;
 
 // Of the triangle that a pixel shows. The neighbours' normals would do, but a tile of a picture does not have them all.
 fn curvature_at(direction: vec3f, planar_depth_m: f32) -> f32 {
@@ -27,7 +27,7 @@ fn curvature_at(direction: vec3f, planar_depth_m: f32) -> f32 {
     cone_spread = camera.footprint;
 {% endif %}
     let ray = ray_from(camera.eye_in_world, direction);
-    let hit = closest(ray, planar_depth_m * (1.0 - SAME_DEPTH), planar_depth_m * (1.0 + SAME_DEPTH));
+    let hit = closest(ray, planar_depth_m * (1.0 - DEPTH_SLACK), planar_depth_m * (1.0 + DEPTH_SLACK));
     var curvature_per_m = 0.0;
     for (var found = hit.slot != NOTHING; found; found = false) {
         curvature_per_m = curvature_of(hit.crossing, hit.slot) * select(-1.0, 1.0, hit.crossing.front);

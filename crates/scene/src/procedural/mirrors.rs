@@ -14,7 +14,7 @@ const DARK_CHECK: Vec3 = Vec3::new(54.0, 62.0, 74.0);
 /// The colour of a matt back.
 const BACK: Vec3 = Vec3::new(70.0, 66.0, 62.0);
 
-/// The pebble: its mean radius, and its middle. The teapot stands 4 m from its side.
+/// The pebble: its mean radius, and its middle. The middle of the teapot is 4 m from its side.
 const PEBBLE_M: f32 = 3.0;
 const PEBBLE_MIDDLE: Vec3 = Vec3::new(0.0, 3.1, -4.5);
 const PEBBLE_COLUMNS: u32 = 200;
@@ -22,7 +22,7 @@ const PEBBLE_ROWS: u32 = 100;
 /// The depth of its dents in radii, and their size.
 const DENT: f32 = 0.07;
 const DENT_SIZE: f32 = 1.6;
-const TEAPOT_FOOT: Vec3 = Vec3::new(0.0, 0.0, 4.5);
+const TEAPOT_FOOT: Vec3 = Vec3::new(0.0, 0.0, 2.5);
 /// The step to either side from which a normal is computed, radians.
 const STEP: f32 = 1e-3;
 
