@@ -235,6 +235,7 @@ fn surface(visited: &Visited, view: &View, at: UVec2, first_camera: usize) -> Op
         ProvenanceKind::Hit if cameras.is_empty() => "direct",
         ProvenanceKind::Hit => "cameras",
         ProvenanceKind::Filled => "filled",
+        ProvenanceKind::Guessed => "guessed",
     };
     Some(json!({
         "at": at.to_array(), "source": source, "cameras": cameras,

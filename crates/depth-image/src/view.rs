@@ -19,6 +19,8 @@ pub enum ProvenanceKind {
     Hit,
     /// A surface that no sample camera saw; its colour comes from the farther side of the gap.
     Filled,
+    /// A mirror whose image of the scene no sample camera knows; it shows lamps and the environment.
+    Guessed,
 }
 
 impl Provenance {
@@ -37,6 +39,7 @@ impl Provenance {
         match self.0 & 0xff {
             0 => ProvenanceKind::Empty,
             1 => ProvenanceKind::Hit,
+            3 => ProvenanceKind::Guessed,
             _ => ProvenanceKind::Filled,
         }
     }

@@ -30,6 +30,8 @@ enum Source {
     Direct,
     /// The surroundings of a hole.
     Fill,
+    /// A mirror that shows lamps and the environment alone.
+    Guess,
     Background,
 }
 
@@ -38,6 +40,7 @@ impl Source {
         match (provenance.kind(), provenance.camera_mask()) {
             (ProvenanceKind::Empty, _) => Self::Background,
             (ProvenanceKind::Filled, _) => Self::Fill,
+            (ProvenanceKind::Guessed, _) => Self::Guess,
             (ProvenanceKind::Hit, 0) => Self::Direct,
             (ProvenanceKind::Hit, mask) if mask.is_power_of_two() => Self::Sample(mask.trailing_zeros() as u8),
             (ProvenanceKind::Hit, _) => Self::Blend,
@@ -51,6 +54,7 @@ impl Source {
             Self::Blend => ("blended", [255, 255, 255]),
             Self::Direct => ("drawn directly", [150, 150, 160]),
             Self::Fill => ("filled", [255, 60, 60]),
+            Self::Guess => ("mirror, guessed", [255, 60, 220]),
             Self::Background => ("background", [40, 44, 52]),
         }
     }

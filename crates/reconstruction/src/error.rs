@@ -1,6 +1,6 @@
 //! Why views cannot be reconstructed.
 
-use crate::view_work::MAX_SAMPLE_CAMERAS;
+use crate::{bounce::MAX_MIRROR_CELLS, view_work::MAX_SAMPLE_CAMERAS};
 
 /// Why views cannot be reconstructed.
 #[derive(Debug, thiserror::Error)]
@@ -21,6 +21,8 @@ pub enum ReconstructionError {
     MissingPlane { index: usize, plane: &'static str },
     #[error("a sample set holds 1 to {MAX_SAMPLE_CAMERAS} images, not {0}")]
     SampleCount(usize),
+    #[error("views have at most {MAX_MIRROR_CELLS} mirror cells, not {0}")]
+    MirrorCells(usize),
     #[error("the volume of the sample set is empty or not finite")]
     Volume,
 }

@@ -7,6 +7,7 @@ use gpu::{GpuTone, ShaderSource};
 use naga::{Module, TypeInner};
 
 use crate::{
+    bounce::{GpuMirrorBox, GpuMirroredRay},
     pixel_list::GpuPixelList,
     quads::{GpuCutWork, GpuQuadWork},
     shaders::{shader_sources, templates},
@@ -73,6 +74,7 @@ fn shader(module: &Module, name: &str) -> Layout {
 fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
     let passes = BTreeSet::from([
         "antialias.wgsl",
+        "bounce/land.wgsl",
         "fill.wgsl",
         "joint_carve.wgsl",
         "light_field_search.wgsl",
@@ -150,8 +152,24 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
     let searches = ["joint_carve.wgsl", "light_field_search.wgsl", "resolve.wgsl"];
     let written = [&searches[..], &["joint_carve/march.wgsl", "joint_carve/smooth.wgsl"]].concat();
     assert_eq!(templates_that_agree("UndecidedList", &list), BTreeSet::from_iter(written));
-    let read = ["antialias.wgsl", "fill.wgsl", "joint_carve.wgsl", "joint_carve/march.wgsl", "specular.wgsl"];
+    let read = [
+        "antialias.wgsl",
+        "bounce/land.wgsl",
+        "fill.wgsl",
+        "joint_carve.wgsl",
+        "joint_carve/march.wgsl",
+        "specular.wgsl",
+    ];
     assert_eq!(templates_that_agree("PixelList", &list), BTreeSet::from(read));
+}
+
+#[test]
+fn mirrored_rays_and_mirror_boxes_agree_where_they_are_written_and_read() {
+    let ray = host!(GpuMirroredRay { origin_in_world, pixel, direction, guess, throughput_linear, side_m });
+    let passes = ["bounce/land.wgsl", "joint_carve.wgsl", "specular.wgsl"];
+    assert_eq!(templates_that_agree("MirroredRay", &ray), BTreeSet::from(passes));
+    let boxes = host!(GpuMirrorBox { min_in_world, first_listed, max_in_world, padding });
+    assert_eq!(templates_that_agree("MirrorBox", &boxes), BTreeSet::from(["bounce/land.wgsl", "specular.wgsl"]));
 }
 
 #[test]

@@ -5,6 +5,7 @@
 //! highlights for each position within the pixels, and their mean. Each method is one enum variant, one `.rs` and `.wgsl` pair in `methods`, and has a scalar twin.
 
 mod antialias;
+mod bounce;
 mod device;
 mod error;
 mod fill;
@@ -27,6 +28,7 @@ mod surface;
 mod tile_start;
 mod view_work;
 
+pub use bounce::{MAX_MIRROR_CELLS, MirrorCell, Mirrors};
 pub use error::ReconstructionError;
 pub use in_flight::Statistics;
 pub use methods::{METHODS, ReconstructionMethod, UnknownMethod};

@@ -8,6 +8,7 @@ use glam::Vec2;
 use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
+use crate::bounce::{self, Bounces, Mirrors};
 use crate::in_flight::{InFlight, Statistics};
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
@@ -32,6 +33,9 @@ pub struct Reconstructor {
 struct Request<'r> {
     set: &'r SampleSet,
     method: ReconstructionMethod,
+    mirrors: Mirrors<'r>,
+    /// The memory for rays off mirrors, while a batch is recorded.
+    bounces: Option<&'r Bounces<'r>>,
     /// Of the set, where the method draws it.
     mesh: Option<&'r Mesh>,
     planes: ViewPlanes,
@@ -112,8 +116,24 @@ impl Reconstructor {
         planes: ViewPlanes,
         turn: Turn,
     ) -> Result<Vec<View>, ReconstructionError> {
+        self.reconstruct_mirrored(set, Mirrors::default(), cameras, method, planes, turn)
+    }
+
+    /// As [`Reconstructor::reconstruct_in_turn`], with mirrors that show the scene.
+    ///
+    /// # Errors
+    /// As [`Reconstructor::reconstruct`], and too many mirror cells.
+    pub fn reconstruct_mirrored(
+        &self,
+        set: &SampleSet,
+        mirrors: Mirrors<'_>,
+        cameras: &[PinholeCamera],
+        method: ReconstructionMethod,
+        planes: ViewPlanes,
+        turn: Turn,
+    ) -> Result<Vec<View>, ReconstructionError> {
         let output = (planes, Positions::Shared, false);
-        self.reconstruct_counted(set, cameras, method, output, turn).map(|(views, _)| views)
+        self.reconstruct_counted((set, mirrors), cameras, method, output, turn).map(|(views, _)| views)
     }
 
     /// As [`Reconstructor::reconstruct`], but each position within a pixel is reconstructed by itself: what views whose positions
@@ -129,6 +149,7 @@ impl Reconstructor {
         planes: ViewPlanes,
     ) -> Result<Vec<View>, ReconstructionError> {
         let output = (planes, Positions::Whole, false);
+        let set = (set, Mirrors::default());
         self.reconstruct_counted(set, cameras, method, output, Turn::default()).map(|(views, _)| views)
     }
 
@@ -144,12 +165,13 @@ impl Reconstructor {
         planes: ViewPlanes,
         count_fetches: bool,
     ) -> Result<(Vec<View>, Statistics), ReconstructionError> {
+        let set = (set, Mirrors::default());
         self.reconstruct_counted(set, cameras, method, (planes, Positions::Shared, count_fetches), Turn::default())
     }
 
     fn reconstruct_counted(
         &self,
-        set: &SampleSet,
+        (set, mirrors): (&SampleSet, Mirrors<'_>),
         cameras: &[PinholeCamera],
         method: ReconstructionMethod,
         (planes, positions, count_fetches): (ViewPlanes, Positions, bool),
@@ -161,12 +183,14 @@ impl Reconstructor {
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;
-        let request = Request { set, method, mesh: mesh.as_deref(), planes, positions, turn, count_fetches };
+        let bounces = None;
+        let request =
+            Request { set, mirrors, bounces, method, mesh: mesh.as_deref(), planes, positions, turn, count_fetches };
         let mut views = Vec::with_capacity(cameras.len());
         let mut statistics = Statistics::default();
         let mut in_flight: Option<InFlight<'_>> = None;
         // The device works on one batch while the host takes the one before apart.
-        for batch in batches(cameras) {
+        for batch in batches(cameras, mirrors.reflections > 0) {
             let recording = self.record(request, batch)?;
             // Whoever holds the device asks for no other turn.
             let done = in_flight.take().map(InFlight::wait).transpose()?;
@@ -186,27 +210,34 @@ impl Reconstructor {
         request: Request<'r>,
         cameras: &[PinholeCamera],
     ) -> Result<Recording<'r>, ReconstructionError> {
-        let Request { set, method, planes, turn, count_fetches, .. } = request;
+        let Request { set, mirrors, method, planes, turn, count_fetches, .. } = request;
         let family = WorkKind::family(&("reconstruct", method, set.cameras.len()));
         let output = (planes, count_fetches);
         let mut recording = Recording::begin(&self.device, set, cameras, output, (family, turn))?;
+        let bounces = Bounces::lend(&self.device, mirrors, recording.batch.plane_bytes as usize / 4)?;
+        self.record_positions(Request { bounces: bounces.as_ref(), ..request }, &mut recording)?;
+        recording.batch.bounces = bounces.map_or(Vec::new(), Bounces::into_memory);
+        Ok(recording)
+    }
+
+    /// The passes over all positions within the pixels, and what they show together.
+    fn record_positions(&self, request: Request<'_>, recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
+        let Request { method, planes, .. } = request;
         // What a tile's start proves holds for every position within its pixels.
         if method.follows_rays() {
-            tile_start::record(&mut recording)?;
+            tile_start::record(recording)?;
         }
         if planes.antialias == Antialias::NONE {
-            self.record_position(request, &mut recording, None)?;
-            antialias::record(&mut recording, Sums::None, None)?;
-            return Ok(recording);
+            self.record_position(request, recording, None)?;
+            return antialias::record(recording, Sums::None, None);
         }
-        self.record_sums(request, &mut recording)?;
+        self.record_sums(request, recording)?;
         // Depth and provenance have no mean: they are the centre's.
         if planes.inverse_depth || planes.provenance {
             recording.go_to(Vec2::ZERO);
-            self.record_position(request, &mut recording, None)?;
+            self.record_position(request, recording, None)?;
         }
-        antialias::record(&mut recording, Sums::Read, None)?;
-        Ok(recording)
+        antialias::record(recording, Sums::Read, None)
     }
 
     /// The passes over all positions within the pixels. After the first, only the pixels that it leaves are found.
@@ -215,8 +246,9 @@ impl Reconstructor {
         recording.go_to(offsets_px.next().unwrap_or_default());
         self.record_position(request, recording, None)?;
         let rough = match request.positions {
-            Positions::Shared => request.method.share_positions(recording)?,
-            Positions::Whole => None,
+            Positions::Shared if request.bounces.is_none() => request.method.share_positions(recording)?,
+            // What a mirror shows is not shared.
+            Positions::Shared | Positions::Whole => None,
         };
         if rough.is_none() {
             antialias::record(recording, Sums::Begun, None)?;
@@ -238,7 +270,10 @@ impl Reconstructor {
     ) -> Result<(), ReconstructionError> {
         let unknown = request.method.record(&self.drawing, request.mesh, recording, listed)?;
         fill::record(recording, &unknown)?;
-        specular::record(recording, listed)
+        let Some(bounces) = request.bounces else { return specular::record(recording, listed, None) };
+        let first = bounces.next(&self.device, None);
+        specular::record(recording, listed, Some((bounces, &first)))?;
+        bounce::record(recording, bounces, first)
     }
 
     /// Statistics of the quads that a method draws; `None` for methods that draw none.

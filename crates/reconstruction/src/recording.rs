@@ -17,6 +17,8 @@ use crate::{quads::QuadTargets, sample_set::SampleSet};
 
 /// Bounds the memory of a batch: 20 bytes a pixel on the device, 32 with several positions a pixel, up to 12 on the host.
 const PIXELS_A_BATCH: usize = 1 << 20;
+/// The same where mirrors are followed: their rays take up to 200 bytes a pixel.
+const MIRRORED_PIXELS_A_BATCH: usize = 1 << 18;
 const MAX_VIEWS_A_BATCH: usize = 256;
 /// The pixels of a slice of views whose cost is unknown.
 const UNKNOWN_SLICE_PX: u64 = 1 << 14;
@@ -78,6 +80,8 @@ pub(crate) struct Batch {
     pub targets: Option<QuadTargets>,
     /// Fetches of each pixel, where they are counted.
     pub fetches: Option<PooledBuffer>,
+    /// The memory of mirrored rays, lent until the device is done with the batch.
+    pub bounces: Vec<PooledBuffer>,
 }
 
 impl<'r> Recording<'r> {
@@ -115,6 +119,7 @@ impl<'r> Recording<'r> {
             rough_pixels: (planes.antialias > Antialias::NONE).then(|| plane("pixels of further positions")),
             targets: None,
             fetches: count_fetches.then(|| plane("fetches")),
+            bounces: Vec::new(),
         };
         let mut frame = Frame::begin(&device.gpu, "reconstruct", turn);
         if let Some(fetches) = &batch.fetches {
@@ -180,6 +185,18 @@ impl<'r> Recording<'r> {
         });
     }
 
+    /// One dispatch over the `number`-th of some lists, of rays of any of the batch's pixels.
+    pub fn dispatch_listed(
+        &mut self,
+        variant: &impl ShaderVariant,
+        pass: &ComputePass,
+        bound: &BoundGroup,
+        (lists, number): (&wgpu::Buffer, usize),
+    ) {
+        pass.dispatch(&mut self.frame, &[bound], DispatchSize::Indirect(lists, number as u32));
+        self.frame.cut(WorkKind::new(self.family, &variant.name()), self.batch.plane_bytes / 4);
+    }
+
     /// One dispatch a tile of a piece.
     pub fn dispatch_tiles(&mut self, variant: &impl ShaderVariant, pass: &ComputePass, bound: &BoundGroup) {
         let [across, down] = [self.batch.size_px.x, self.batch.pieces.rows].map(|side| side.div_ceil(TILE_PX));
@@ -228,10 +245,11 @@ impl Pieces {
     }
 }
 
-/// Runs of views of one size, bounded in pixels.
-pub(crate) fn batches(cameras: &[PinholeCamera]) -> impl Iterator<Item = &[PinholeCamera]> {
-    cameras.chunk_by(|a, b| a.size_px == b.size_px).flat_map(|run| {
-        let views = (PIXELS_A_BATCH / run[0].pixel_count()).clamp(1, MAX_VIEWS_A_BATCH);
+/// Runs of views of one size, bounded in pixels; of fewer where mirrors are followed.
+pub(crate) fn batches(cameras: &[PinholeCamera], mirrored: bool) -> impl Iterator<Item = &[PinholeCamera]> {
+    let most_pixels = if mirrored { MIRRORED_PIXELS_A_BATCH } else { PIXELS_A_BATCH };
+    cameras.chunk_by(|a, b| a.size_px == b.size_px).flat_map(move |run| {
+        let views = (most_pixels / run[0].pixel_count()).clamp(1, MAX_VIEWS_A_BATCH);
         run.chunks(views)
     })
 }

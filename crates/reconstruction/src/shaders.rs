@@ -5,6 +5,7 @@ use gpu::{ShaderError, ShaderSource, Templates, wgsl_constants, wgsl_files};
 use minijinja::Value;
 
 use crate::antialias::Shown;
+use crate::bounce::{BOUNCE_LEVEL, Land, MAX_BOUNCE_MOVES, START_FOOTPRINTS};
 use crate::fill::{DIRECTIONS, Fill, REACH_PX, SAME_SIDE};
 use crate::pyramid::{BACKGROUND_CODE, FLAT_FOOTPRINTS, HOLE_CODE, SLOPE_SHARE};
 use crate::surface::{
@@ -16,13 +17,15 @@ use crate::view_work::{CELL_MARGIN_PX, FAR_AWAY, TILE_PX};
 use crate::{methods, pixel_list::LIST_WORKGROUP, quads, specular::Specular};
 
 /// Passes over whole views, and templates that several shaders include.
-const SHADERS: [(&str, &str); 8] = wgsl_files! {
-    "antialias.wgsl", "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "pixel_list.wgsl"
+const SHADERS: [(&str, &str); 13] = wgsl_files! {
+    "antialias.wgsl", "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "pixel_list.wgsl",
+    "gathered.wgsl", "gather_at.wgsl", "bounce/ray.wgsl", "bounce/spawn.wgsl", "bounce/land.wgsl"
 };
 
 const PROVENANCE_EMPTY: u32 = ProvenanceKind::Empty as u32;
 const PROVENANCE_HIT: u32 = ProvenanceKind::Hit as u32;
 const PROVENANCE_FILLED: u32 = ProvenanceKind::Filled as u32;
+const PROVENANCE_GUESSED: u32 = ProvenanceKind::Guessed as u32;
 
 /// The names and texts of all templates of this crate.
 #[must_use]
@@ -36,10 +39,10 @@ pub fn shaders() -> Vec<(&'static str, &'static str)> {
 /// When a text is not a template.
 pub fn templates() -> Result<Templates, ShaderError> {
     let constants = wgsl_constants! {
-        ANGLE_FLOOR, BACKGROUND_CODE, BORDER_PX, CARVING_SHARE, CELL_MARGIN_PX, FAR_AWAY, FLAT_FOOTPRINTS,
+        ANGLE_FLOOR, BACKGROUND_CODE, BORDER_PX, BOUNCE_LEVEL, CARVING_SHARE, CELL_MARGIN_PX, FAR_AWAY, FLAT_FOOTPRINTS,
         GREATEST_TILE_MOVE, HALF_CODE, HALF_DIAGONAL, HIDDEN_WEIGHT, HOLE_CODE, LEAST_SHARE, LEAST_TILE_MOVE,
-        LIST_WORKGROUP, MAX_TILE_MOVES, PROVENANCE_EMPTY, PROVENANCE_FILLED, PROVENANCE_HIT, REACH_PX, SAME_SIDE,
-        SLOPE_SHARE, SPLIT_SHIFT, THICKNESS_FOOTPRINTS, TILE_PX, WHOLE
+        LIST_WORKGROUP, MAX_TILE_MOVES, PROVENANCE_EMPTY, PROVENANCE_FILLED, PROVENANCE_GUESSED, PROVENANCE_HIT, REACH_PX, SAME_SIDE,
+        MAX_BOUNCE_MOVES, SLOPE_SHARE, SPLIT_SHIFT, START_FOOTPRINTS, THICKNESS_FOOTPRINTS, TILE_PX, WHOLE
     };
     let templates = Templates::new(&shaders())?
         .with_constants([("DIRECTIONS", Value::from_iter(DIRECTIONS.map(Value::from_iter)))]);
@@ -48,7 +51,7 @@ pub fn templates() -> Result<Templates, ShaderError> {
 
 /// The texts of all variants of all passes.
 pub fn shader_sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    gpu::shader_sources!(templates, TileStart, Fill, Specular, Shown)
+    gpu::shader_sources!(templates, TileStart, Fill, Specular, Land, Shown)
         .chain(quads::sources(templates))
         .chain(methods::sources(templates))
 }

@@ -6,11 +6,12 @@ use depth_image::Highlight;
 use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots};
 use minijinja::{Value, context};
 
+use crate::bounce::{Bounces, MAX_MIRROR_CELLS, RayLists};
 use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, reflectors::sample_texels};
 
 /// The switches of `specular.wgsl`.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Specular {
     set: SetVariant,
     highlight: Highlight,
@@ -21,6 +22,8 @@ pub(crate) struct Specular {
     listed: bool,
     /// The words that say which lights a sample sees; 0 where all samples see all.
     visibility_words: usize,
+    /// Mirrors list their rays; the number of mirror cells.
+    mirror_cells: Option<usize>,
 }
 
 impl ShaderVariant for Specular {
@@ -35,6 +38,8 @@ impl ShaderVariant for Specular {
             visibility_words => self.visibility_words,
             listed => self.listed,
             sample_texels => sample_texels(self.visibility_words),
+            mirrors => self.mirror_cells.is_some(),
+            mirror_cells => self.mirror_cells.unwrap_or(0),
             ..self.set.context()
         }
     }
@@ -45,15 +50,25 @@ impl ShaderVariant for Specular {
         let lit = kinds.flat_map(|kind| lights.map(|(lights, words)| (kind, lights, words)));
         lit.flat_map(|((highlight, environment_map), lights, visibility_words)| {
             SetVariant::all().into_iter().filter(|set| !set.count_fetches).flat_map(move |set| {
-                [false, true].map(|listed| Self { set, highlight, lights, environment_map, listed, visibility_words })
+                let mirrored =
+                    [Some(1), Some(MAX_MIRROR_CELLS)].into_iter().filter(move |_| highlight == Highlight::Ggx);
+                std::iter::once(None).chain(mirrored).flat_map(move |mirror_cells| {
+                    let with =
+                        Self { set, highlight, lights, environment_map, listed: false, visibility_words, mirror_cells };
+                    [false, true].map(|listed| Self { listed, ..with })
+                })
             })
         })
         .collect()
     }
 }
 
-/// Highlights are added after the fill, which would spread them.
-pub(crate) fn record(recording: &mut Recording<'_>, listed: Option<&PixelList>) -> Result<(), ReconstructionError> {
+/// Highlights are added after the fill, which would spread them. Mirrors list their rays, where they are to be followed.
+pub(crate) fn record(
+    recording: &mut Recording<'_>,
+    listed: Option<&PixelList>,
+    mirrored: Option<(&Bounces<'_>, &RayLists)>,
+) -> Result<(), ReconstructionError> {
     let Some(reflectors) = &recording.set.reflectors else { return Ok(()) };
     let mirrors = |_: &&Arc<GpuEnvironment>| reflectors.highlight == Highlight::Ggx;
     let environment = recording.set.environment.as_ref().filter(mirrors);
@@ -65,6 +80,7 @@ pub(crate) fn record(recording: &mut Recording<'_>, listed: Option<&PixelList>) 
         environment_map: environment.is_some(),
         listed: listed.is_some(),
         visibility_words: reflectors.visibility_words,
+        mirror_cells: mirrored.map(|(bounces, _)| bounces.cell_count()),
     };
     let pass = recording.device.passes.get(&variant)?;
     let mut bindings = recording.cell_bindings();
@@ -77,6 +93,7 @@ pub(crate) fn record(recording: &mut Recording<'_>, listed: Option<&PixelList>) 
     ]);
     bindings.extend(environment.into_iter().flat_map(|map| map.bindings()));
     bindings.extend(listed.map(PixelList::bindings).into_iter().flatten());
+    bindings.extend(mirrored.into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
     let bound = pass.bind(0, bindings)?;
     recording.dispatch_pixels(&variant, &pass, &bound, listed);
     Ok(())

@@ -17,6 +17,8 @@ pub(super) const MAX_STOP_LEVEL: u32 = 8;
 pub(crate) const MAX_MOVES: u32 = 24;
 /// Moves of a ray in a set with holes: texels that prove nothing are crossed one by one.
 pub(crate) const MAX_MOVES_AMONG_HOLES: u32 = 96;
+/// Between the codes of the background and of the farthest sample.
+pub(crate) const FIRST_SAMPLE: f32 = 1.5;
 /// A ray that leaves no node moves by this share of its way in the volume.
 pub(crate) const BLIND_MOVE: f32 = 0.01;
 /// The least move into the unknown, as a factor.
@@ -24,10 +26,12 @@ pub(crate) const LEAST_MOVE: f32 = 1.00001;
 
 /// The switches of `joint_carve.wgsl`.
 #[derive(Debug)]
-pub(super) struct Carve {
-    set: SetVariant,
+pub(crate) struct Carve {
+    pub set: SetVariant,
     /// The pyramid level at which the search ends; 0 is exact.
-    stop_level: u32,
+    pub stop_level: u32,
+    /// Mirrored rays are carved, from where they begin.
+    pub bounced: bool,
 }
 
 impl ShaderVariant for Carve {
@@ -35,11 +39,14 @@ impl ShaderVariant for Carve {
     const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
-        context! { stop_level => self.stop_level, ..self.set.context() }
+        context! { stop_level => self.stop_level, bounced => self.bounced, ..self.set.context() }
     }
 
     fn all() -> Vec<Self> {
-        let levels = |set| [0, 1, MAX_STOP_LEVEL].map(|stop_level| Self { set, stop_level });
+        let levels = |set| {
+            let plain = [0, 1, MAX_STOP_LEVEL].map(|stop_level| Self { set, stop_level, bounced: false });
+            plain.into_iter().chain([Self { set, stop_level: 0, bounced: true }])
+        };
         SetVariant::all().into_iter().flat_map(levels).collect()
     }
 }
@@ -59,5 +66,5 @@ pub(super) fn record(
         undecided = Some(surface::record(recording, &march, rays, &[])?);
     }
     let left = undecided.as_ref().map_or(Rays::All, Rays::Left);
-    surface::record(recording, &Carve { set, stop_level }, left, &[])
+    surface::record(recording, &Carve { set, stop_level, bounced: false }, left, &[])
 }

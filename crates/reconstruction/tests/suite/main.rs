@@ -8,6 +8,7 @@ mod holes_and_limits;
 mod merging;
 mod mesh_limits;
 mod meshes;
+mod mirrors;
 mod non_redundant;
 mod slices;
 mod specular;

@@ -45,6 +45,10 @@ pub fn reconstructor() -> &'static Reconstructor {
     &device().reconstructor
 }
 
+pub fn renderer() -> &'static Renderer {
+    &device().renderer
+}
+
 static DARK: Illumination = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
 
 /// A set in which nothing depends on the viewer.

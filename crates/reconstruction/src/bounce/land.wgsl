@@ -1,0 +1,63 @@
+// Adds the light at the ends of mirrored rays to the pixels that show the mirrors, and lists the rays off mirrors among
+// those ends.
+{% include "color.wgsl" %}
+{% include "normal.wgsl" %}
+{% include "light.wgsl" %}
+{% include "highlight.wgsl" %}
+{% include "view_work.wgsl" %}
+{% include "cell.wgsl" %}
+{% include "bounce/ray.wgsl" %}
+
+// Of the pixels: linear, as RGB9E5.
+@group(0) var<storage, read_write> out_color: array<u32>;
+@group(0) var<storage, read_write> out_provenance: array<u32>;
+// Of the rays.
+@group(0) var<storage, read> rays: array<MirroredRay>;
+@group(0) var<storage, read> ray_color: array<u32>;
+@group(0) var<storage, read> inverse_depth: array<f32>;
+@group(0) var<storage, read> provenance: array<u32>;
+@group(0) var<uniform> illumination: Illumination;
+{% if reflects %}
+{% include "gathered.wgsl" %}
+{% endif %}
+{% include "pixel_list.wgsl" %}
+{% if mirrors %}
+{% include "bounce/spawn.wgsl" %}
+{% endif %}
+
+// What a pixel shows of the surface at its ray's end.
+fn landed(index: u32, ray: MirroredRay, origin: u32) -> vec3f {
+    var shown = linear_from_rgb9e5(ray_color[index]) * ray.throughput_linear;
+{% if reflects %}
+    let point_in_world = ray.origin_in_world + ray.direction / inverse_depth[index];
+{% include "gather_at.wgsl" %}
+    for (var glossy = around.reflecting > 0.0; glossy; glossy = false) {
+        let throughput_linear = ray.throughput_linear * around.reflecting;
+        shown += throughput_linear * highlight(point_in_world, around.normal, -ray.direction, around.reflector, around.visibility);
+{% if mirrors %}
+        let mirror = Mirror(point_in_world, around.normal, -ray.direction, unpack_reflector(around.reflector));
+        let open = {{ "unpack4x8unorm(around.visibility[0]).x" if visibility_words > 0 else "1.0" }};
+        shown += bounce_off(mirror, ray.pixel, throughput_linear, open, 1.0 / (inverse_w * camera.focal_px));
+{% endif %}
+    }
+{% endif %}
+    return shown;
+}
+
+@compute @workgroup_size(LIST_WORKGROUP)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= lists[work.view.number].count { return; }
+    let index = listed_pixels[first_listed() + id.x];
+    let ray = rays[index];
+    let origin = provenance[index];
+    let kind = origin & 0xffu;
+    let guess = unpack4x8unorm(ray.guess);
+    let is_unknown = kind == PROVENANCE_FILLED;
+    // Where nothing is met the environment is seen; where no image knew, what the mirror shows without rays.
+    var shown = environment_mirrored(ray.direction, max(guess.y, LEAST_ROUGHNESS)) * ray.throughput_linear * select(1.0, guess.x, is_unknown);
+    for (var hit = kind == PROVENANCE_HIT; hit; hit = false) { shown = landed(index, ray, origin); }
+    out_color[ray.pixel] = rgb9e5_from_linear(linear_from_rgb9e5(out_color[ray.pixel]) + shown);
+    for (var guessed = is_unknown; guessed; guessed = false) {
+        out_provenance[ray.pixel] = (out_provenance[ray.pixel] & 0xffffff00u) | PROVENANCE_GUESSED;
+    }
+}

@@ -1,0 +1,321 @@
+//! Mirror images of the scene: rays off the mirrors that a view shows are followed in images of the mirrors' surroundings,
+//! mirror after mirror, and what they find is added to the pixels.
+
+use bytemuck::{Pod, Zeroable};
+use depth_image::{Aabb, Highlight};
+use gpu::{
+    Binding, GpuEnvironment, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, light_slots, uniform_elements,
+};
+use minijinja::{Value, context};
+use wgpu::{Buffer, BufferUsages};
+
+use crate::methods::joint_carve::Carve;
+use crate::pixel_list::{GpuPixelList, PixelList};
+use crate::reflectors::sample_texels;
+use crate::view_work::{GpuViewCamera, GpuViewWork, ONE_VIEW, SetVariant};
+use crate::{device::Device, error::ReconstructionError, recording::Recording, sample_set::SampleSet};
+
+/// Mirror cells of a view.
+pub const MAX_MIRROR_CELLS: usize = 8;
+/// Rays begin this many footprints above their mirror: its own samples lie below.
+pub(crate) const START_FOOTPRINTS: f32 = 3.0;
+/// The coarsest level at which a mirrored ray is searched: no tile has done the rest.
+pub(crate) const BOUNCE_LEVEL: u32 = 6;
+/// Moves of a mirrored ray.
+pub(crate) const MAX_BOUNCE_MOVES: u32 = 96;
+
+/// Mirrors within a box, and images of what they show.
+#[derive(Clone, Copy)]
+pub struct MirrorCell<'s> {
+    /// Holds the mirrors' surfaces. Of several boxes around a point the smallest counts.
+    pub bounds: Aabb,
+    /// The surroundings, as seen from within the box or from its corners.
+    pub surroundings: &'s SampleSet,
+}
+
+/// The mirrors of a scene, and how many of them a ray meets one after the other.
+#[derive(Clone, Copy, Default)]
+pub struct Mirrors<'s> {
+    /// At most [`MAX_MIRROR_CELLS`]. Mirrors in none of them show lamps and the environment.
+    pub cells: &'s [MirrorCell<'s>],
+    /// Without any, mirrors show lamps and the environment.
+    pub reflections: u32,
+}
+
+/// `MirrorBox` of `bounce/spawn.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuMirrorBox {
+    pub min_in_world: [f32; 3],
+    pub first_listed: u32,
+    pub max_in_world: [f32; 3],
+    pub padding: u32,
+}
+
+/// `MirroredRay` of `bounce/ray.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuMirroredRay {
+    pub origin_in_world: [f32; 3],
+    pub pixel: u32,
+    pub direction: [f32; 3],
+    pub guess: u32,
+    pub throughput_linear: [f32; 3],
+    pub side_m: f32,
+}
+
+/// The memory for the mirrored rays of a batch.
+pub(crate) struct Bounces<'s> {
+    /// Smallest first.
+    cells: Vec<MirrorCell<'s>>,
+    reflections: u32,
+    /// A `MirrorBox` for each cell.
+    boxes: Buffer,
+    /// A `ViewWork` for each cell.
+    works: Vec<Buffer>,
+    rays: [PooledBuffer; 2],
+    listed: [PooledBuffer; 3],
+    color: PooledBuffer,
+    inverse_depth_per_m: PooledBuffer,
+    provenance: PooledBuffer,
+}
+
+/// Rays off one mirror: the numbers of those of each cell.
+pub(crate) struct RayLists {
+    /// A [`GpuPixelList`] for each cell, and one more.
+    lists: Buffer,
+    /// Which of the two memories of rays holds them.
+    memory: usize,
+}
+
+impl<'s> Bounces<'s> {
+    /// Memory for the rays of so many pixels; none where there is nothing to follow.
+    pub fn lend(device: &Device, mirrors: Mirrors<'s>, pixels: usize) -> Result<Option<Self>, ReconstructionError> {
+        let mut cells = mirrors.cells.to_vec();
+        if cells.is_empty() || mirrors.reflections == 0 {
+            return Ok(None);
+        }
+        if cells.len() > MAX_MIRROR_CELLS {
+            return Err(ReconstructionError::MirrorCells(cells.len()));
+        }
+        let volume_m3 = |cell: &MirrorCell<'_>| cell.bounds.size().element_product();
+        cells.sort_by(|a, b| volume_m3(a).total_cmp(&volume_m3(b)));
+        let first_listed = |cell: usize| (cell * pixels) as u32;
+        let mirror_box = |(number, cell): (usize, &MirrorCell<'_>)| GpuMirrorBox {
+            min_in_world: cell.bounds.min.to_array(),
+            first_listed: first_listed(number),
+            max_in_world: cell.bounds.max.to_array(),
+            padding: 0,
+        };
+        let boxes: Vec<GpuMirrorBox> = cells.iter().enumerate().map(mirror_box).collect();
+        let work = |(number, cell): (usize, &MirrorCell<'_>)| {
+            let (number, first_pixel) = (number as u32, first_listed(number));
+            let view = GpuViewCamera { number, first_pixel, size_px: [1; 2], ..GpuViewCamera::zeroed() };
+            let work = GpuViewWork { view, volume: cell.surroundings.volume, ..GpuViewWork::zeroed() };
+            let bytes = [bytemuck::bytes_of(&work), bytemuck::cast_slice(&cell.surroundings.cameras)].concat();
+            device.gpu.buffer_with("mirror cell", &uniform_elements([bytes]), BufferUsages::UNIFORM)
+        };
+        let lend = |label: &'static str, bytes: usize| {
+            device.gpu.check_storage_bytes(label, bytes as u64)?;
+            Ok::<_, ReconstructionError>(device.buffers.lend_storage(label, bytes as u64))
+        };
+        let rays = || lend("mirrored rays", size_of::<GpuMirroredRay>() * pixels);
+        let listed = || lend("lists of mirrored rays", 4 * pixels * cells.len());
+        let plane = |label| lend(label, 4 * pixels);
+        Ok(Some(Self {
+            reflections: mirrors.reflections,
+            boxes: device.gpu.buffer_with("mirror boxes", &boxes, BufferUsages::UNIFORM),
+            works: cells.iter().enumerate().map(work).collect(),
+            rays: [rays()?, rays()?],
+            listed: [listed()?, listed()?, listed()?],
+            color: plane("mirrored colour")?,
+            inverse_depth_per_m: plane("mirrored depth")?,
+            provenance: plane("mirrored provenance")?,
+            cells,
+        }))
+    }
+
+    /// Empty lists for the rays that come after those of `before`.
+    pub fn next(&self, device: &Device, before: Option<&RayLists>) -> RayLists {
+        let empty = GpuPixelList { workgroups: [0, 1, 1], count: 0 };
+        let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT;
+        let lists = device.gpu.buffer_with("mirrored rays", &vec![empty; self.cells.len() + 1], usage);
+        RayLists { lists, memory: before.map_or(0, |before| 1 - before.memory) }
+    }
+
+    /// The resources of `bounce/spawn.wgsl`.
+    pub fn spawn_bindings<'b>(&'b self, next: &'b RayLists) -> [Binding<'b>; 4] {
+        [
+            Binding::buffer("mirror_boxes", &self.boxes),
+            Binding::buffer("next_rays", &self.rays[next.memory]),
+            Binding::buffer("next_listed", &self.listed[next.memory]),
+            Binding::buffer("next_lists", &next.lists),
+        ]
+    }
+
+    /// What must live until the device is done.
+    pub fn into_memory(self) -> Vec<PooledBuffer> {
+        let planes = [self.color, self.inverse_depth_per_m, self.provenance];
+        self.rays.into_iter().chain(self.listed).chain(planes).collect()
+    }
+
+    /// How many cells there are.
+    pub fn cell_count(&self) -> usize {
+        self.cells.len()
+    }
+
+    fn list_bindings<'b>(&'b self, lists: &'b RayLists) -> [Binding<'b>; 3] {
+        [
+            Binding::buffer("rays", &self.rays[lists.memory]),
+            Binding::buffer("listed_pixels", &self.listed[lists.memory]),
+            Binding::buffer("lists", &lists.lists),
+        ]
+    }
+}
+
+/// The switches of `bounce/land.wgsl`.
+#[derive(Debug)]
+pub(crate) struct Land {
+    set: SetVariant,
+    /// Mirrors among the ends of rays list the next rays; the number of mirror cells.
+    next_cells: Option<usize>,
+    /// The cell's images have reflectors.
+    reflects: bool,
+    lights: usize,
+    environment_map: bool,
+    visibility_words: usize,
+}
+
+impl ShaderVariant for Land {
+    const TEMPLATE: &'static str = "bounce/land.wgsl";
+    const TRAITS: ResourceTraits = ONE_VIEW;
+
+    fn context(&self) -> Value {
+        context! {
+            highlight => highlight_name(Highlight::Ggx),
+            mirrors => self.next_cells.is_some(),
+            mirror_cells => self.next_cells.unwrap_or(0),
+            reflects => self.reflects,
+            light_slots => light_slots(self.lights),
+            environment_map => self.environment_map,
+            visibility_words => self.visibility_words,
+            sample_texels => sample_texels(self.visibility_words),
+            ..self.set.context()
+        }
+    }
+
+    fn all() -> Vec<Self> {
+        let lights = [(0, 0), (3, 1), (255, 64)];
+        let cells = [(None, false), (None, true), (Some(1), true), (Some(MAX_MIRROR_CELLS), true)];
+        let sets = || SetVariant::all().into_iter().filter(|set| !set.count_fetches);
+        let each = move |(lights, visibility_words)| {
+            cells.into_iter().flat_map(move |(next_cells, reflects)| {
+                sets().flat_map(move |set| {
+                    [false, true].map(|environment_map| Self {
+                        set,
+                        next_cells,
+                        reflects,
+                        lights,
+                        environment_map,
+                        visibility_words,
+                    })
+                })
+            })
+        };
+        lights.into_iter().flat_map(each).collect()
+    }
+}
+
+/// Records the passes over the rays that the view's mirrors have listed, mirror after mirror.
+pub(crate) fn record(
+    recording: &mut Recording<'_>,
+    bounces: &Bounces<'_>,
+    first: RayLists,
+) -> Result<(), ReconstructionError> {
+    let mut lists = first;
+    for reflection in 1..=bounces.reflections {
+        let next = bounces.next(recording.device, Some(&lists));
+        let onward = (reflection < bounces.reflections).then_some(&next);
+        for cell in 0..bounces.cells.len() {
+            follow(recording, bounces, &lists, cell)?;
+            land(recording, bounces, (&lists, onward), cell)?;
+        }
+        lists = next;
+    }
+    Ok(())
+}
+
+/// Where the rays of a cell end, in its images.
+fn follow(
+    recording: &mut Recording<'_>,
+    bounces: &Bounces<'_>,
+    lists: &RayLists,
+    cell: usize,
+) -> Result<(), ReconstructionError> {
+    let set = bounces.cells[cell].surroundings;
+    let variant = Carve { set: set.variant(), stop_level: 0, bounced: true };
+    let pass = recording.device.passes.get(&variant)?;
+    let unknown = PixelList::empty(&recording.device.gpu, (*bounces.listed[2]).clone(), bounces.cells.len());
+    let mut bindings = set_bindings(set, &bounces.works[cell]);
+    bindings.extend([
+        Binding::texture("cell_colors", &set.cell_colors),
+        Binding::buffer("out_color", &bounces.color),
+        Binding::buffer("out_inverse_depth", &bounces.inverse_depth_per_m),
+        Binding::buffer("out_provenance", &bounces.provenance),
+        Binding::buffer("undecided_pixels", &unknown.pixels),
+        Binding::buffer("undecided", &unknown.lists),
+    ]);
+    bindings.extend(bounces.list_bindings(lists));
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_listed(&variant, &pass, &bound, (&lists.lists, cell));
+    Ok(())
+}
+
+/// Adds what the rays of a cell found to their pixels.
+fn land(
+    recording: &mut Recording<'_>,
+    bounces: &Bounces<'_>,
+    (lists, next): (&RayLists, Option<&RayLists>),
+    cell: usize,
+) -> Result<(), ReconstructionError> {
+    let set = bounces.cells[cell].surroundings;
+    // Rays come from reflectors.
+    let Some(view_reflectors) = &recording.set.reflectors else { return Ok(()) };
+    let reflectors = set.reflectors.as_ref();
+    let environment = recording.set.environment.as_deref();
+    let variant = Land {
+        set: set.variant(),
+        next_cells: next.filter(|_| reflectors.is_some()).map(|_| bounces.cells.len()),
+        reflects: reflectors.is_some(),
+        lights: view_reflectors.lights,
+        environment_map: environment.is_some(),
+        visibility_words: reflectors.map_or(0, |reflectors| reflectors.visibility_words),
+    };
+    let pass = recording.device.passes.get(&variant)?;
+    let mut bindings = set_bindings(set, &bounces.works[cell]);
+    bindings.extend([
+        Binding::buffer("out_color", &recording.batch.color),
+        Binding::buffer("out_provenance", &recording.batch.provenance),
+        Binding::buffer("ray_color", &bounces.color),
+        Binding::buffer("inverse_depth", &bounces.inverse_depth_per_m),
+        Binding::buffer("provenance", &bounces.provenance),
+        Binding::buffer("illumination", &view_reflectors.illumination),
+    ]);
+    bindings.extend(reflectors.map(|reflectors| Binding::texture("samples", &reflectors.samples)));
+    bindings.extend(environment.into_iter().flat_map(GpuEnvironment::bindings));
+    bindings.extend(bounces.list_bindings(lists));
+    let next = next.filter(|_| variant.next_cells.is_some());
+    bindings.extend(next.into_iter().flat_map(|next| bounces.spawn_bindings(next)));
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_listed(&variant, &pass, &bound, (&lists.lists, cell));
+    Ok(())
+}
+
+/// The resources of `view_work.wgsl` and `cell.wgsl` for a mirror cell.
+fn set_bindings<'b>(set: &'b SampleSet, work: &'b Buffer) -> Vec<Binding<'b>> {
+    vec![
+        Binding::buffer("work", work),
+        Binding::texture("nodes", &set.nodes),
+        Binding::texture("cell_codes", &set.cell_codes),
+    ]
+}

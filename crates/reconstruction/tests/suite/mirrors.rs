@@ -1,0 +1,210 @@
+//! Mirrors that show the scene: rays off them are followed in images of their surroundings, against direct drawing.
+
+use depth_image::{Aabb, Camera, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use glam::{UVec2, Vec3};
+use reconstruction::{MirrorCell, Mirrors, ReconstructionError, SampleSet, SetDescription};
+use render::{DrawWork, GpuScene, SamplePlanes, Visibility};
+use scene::Scene;
+use scene::procedural::{mirror_pair, teapot_mirror};
+
+use crate::stage::{CARVE, gpu, kinds, looking, reconstructor, renderer};
+
+const VIEW_PX: UVec2 = UVec2::new(128, 96);
+
+/// A scene on the device, the images that views are made from, and those of mirrors' surroundings.
+struct Hall {
+    on_device: GpuScene,
+    samples: SampleSet,
+    /// Boxes with their images.
+    cells: Vec<(Aabb, SampleSet)>,
+}
+
+/// Six images that see everything around a place, and overlap.
+fn six_faces(middle: Vec3, side_px: u32) -> Vec<PinholeCamera> {
+    let towards = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+    towards.into_iter().map(|towards| looking(middle, middle + towards, 94.0, UVec2::splat(side_px))).collect()
+}
+
+impl Hall {
+    fn new(scene: Scene, samples: &[PinholeCamera], cells: &[(Aabb, Vec<PinholeCamera>)]) -> Self {
+        let on_device = GpuScene::upload(gpu(), &scene).expect("a scene");
+        let set = |cameras: &[PinholeCamera]| {
+            let images = images(&on_device, cameras);
+            let description = SetDescription {
+                volume: scene.bounds(),
+                background: scene.background,
+                illumination: &scene.illumination,
+                highlight: Some(Highlight::Ggx),
+                environment: None,
+            };
+            reconstructor().upload(&images, &description).expect("a sample set")
+        };
+        let samples = set(samples);
+        let cells = cells.iter().map(|(bounds, cameras)| (*bounds, set(cameras))).collect();
+        Self { on_device, samples, cells }
+    }
+
+    fn view(&self, camera: &PinholeCamera, reflections: u32) -> View {
+        let cells: Vec<MirrorCell<'_>> =
+            self.cells.iter().map(|(bounds, surroundings)| MirrorCell { bounds: *bounds, surroundings }).collect();
+        let mirrors = Mirrors { cells: &cells, reflections };
+        let views = reconstructor().reconstruct_mirrored(
+            &self.samples,
+            mirrors,
+            &[*camera],
+            CARVE,
+            ViewPlanes::ALL,
+            Default::default(),
+        );
+        views.expect("a view").remove(0)
+    }
+
+    fn drawn(&self, camera: &PinholeCamera, reflections: u32) -> View {
+        let lighting =
+            if reflections == 0 { "shadows".to_owned() } else { format!("shadows, reflections {reflections}") };
+        let work = work(&self.on_device, &lighting);
+        renderer().draw_views(work, &[*camera], ViewPlanes::ALL).expect("a view").remove(0)
+    }
+}
+
+fn work<'a>(scene: &'a GpuScene, lighting: &str) -> DrawWork<'a> {
+    DrawWork {
+        scene,
+        lighting: lighting.parse().expect(lighting),
+        scene_time_s: 0.0,
+        visibility: Visibility::Rays,
+        refinement: Default::default(),
+        turn: Default::default(),
+    }
+}
+
+fn images(scene: &GpuScene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
+    let cameras: Vec<Camera> = cameras.iter().map(|camera| Camera::Pinhole(*camera)).collect();
+    let planes = SamplePlanes { specular: true, ..SamplePlanes::default() };
+    renderer().draw_depth_images(work(scene, "shadows"), &cameras, planes).expect("depth images")
+}
+
+/// The greatest difference of each pixel's channels, in codes.
+fn differences(a: &View, b: &View) -> Vec<u8> {
+    let of = |(a, b): (&[u8], &[u8])| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0);
+    a.srgb8.chunks_exact(3).zip(b.srgb8.chunks_exact(3)).map(of).collect()
+}
+
+fn mean_difference(a: &View, b: &View) -> f32 {
+    let differences = differences(a, b);
+    differences.iter().map(|&difference| f32::from(difference)).sum::<f32>() / differences.len() as f32
+}
+
+/// Whether the truth has a pixel's colour there or in a pixel beside it: mirrors shrink patterns to the size of pixels.
+fn is_near(view: &View, truth: &View, pixel: usize) -> bool {
+    let (width, place) = (view.size_px.x as i32, pixel as i32);
+    let color = |view: &View, at: i32| -> Option<[u8; 3]> {
+        view.srgb8.get(3 * usize::try_from(at).ok()?..)?.first_chunk().copied()
+    };
+    let own = color(view, place);
+    let beside = (-1..=1).flat_map(|row| (-1..=1).map(move |column| place + row * width + column));
+    beside.filter_map(|at| Some((own?, color(truth, at)?))).any(|(a, b)| (0..3).all(|i| a[i].abs_diff(b[i]) <= 16))
+}
+
+fn before_the_teapot() -> Hall {
+    let scene = teapot_mirror();
+    let middle = Vec3::new(0.0, 3.1, -4.5);
+    let bounds = Aabb { min: middle - 3.6, max: middle + 3.6 };
+    let eye = |x: f32, y: f32| {
+        looking(Vec3::new(9.0 + x, 7.0 + y, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, UVec2::new(200, 150))
+    };
+    let samples = [eye(-0.5, -0.5), eye(0.5, 0.5), eye(0.5, -0.5), eye(-0.5, 0.5)];
+    Hall::new(scene, &samples, &[(bounds, six_faces(middle, 192))])
+}
+
+#[test]
+fn a_dented_mirror_shows_the_teapot() {
+    let hall = before_the_teapot();
+    let camera = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, VIEW_PX);
+    let [plain, truth] = [0, 1].map(|reflections| hall.drawn(&camera, reflections));
+    // Pixels in which the scene differs from the environment.
+    let mirrored: Vec<usize> =
+        differences(&plain, &truth).iter().enumerate().filter(|(_, d)| **d > 8).map(|(i, _)| i).collect();
+    let share_near = |view: &View| {
+        mirrored.iter().filter(|&&pixel| is_near(view, &truth, pixel)).count() as f32 / mirrored.len() as f32
+    };
+    let (with, without) = (hall.view(&camera, 1), hall.view(&camera, 0));
+    let [with_near, without_near] = [&with, &without].map(share_near);
+    let guessed = kinds(&with).iter().filter(|&&kind| kind == ProvenanceKind::Guessed).count();
+    println!("{} pixels: {with_near} are near, {without_near} without rays, {guessed} guessed", mirrored.len());
+    assert!(mirrored.len() > 800, "{}", mirrored.len());
+    assert!(with_near > 0.8 && without_near < 0.3, "{with_near}, without {without_near}");
+    assert!(guessed * 20 < mirrored.len(), "{guessed} of {}", mirrored.len());
+}
+
+#[test]
+fn without_cells_nothing_changes() {
+    let mut hall = before_the_teapot();
+    let camera = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, VIEW_PX);
+    let without = hall.view(&camera, 0);
+    hall.cells.clear();
+    assert!(hall.view(&camera, 4) == without);
+}
+
+#[test]
+fn what_no_image_knows_is_guessed_and_said_to_be() {
+    let mut hall = before_the_teapot();
+    // Images that look away from everything.
+    let away = looking(Vec3::new(0.0, 60.0, 0.0), Vec3::new(0.0, 61.0, 0.1), 50.0, UVec2::new(32, 32));
+    let blind = Hall::new(teapot_mirror(), &[away], &[]).samples;
+    let camera = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, VIEW_PX);
+    let without = hall.view(&camera, 0);
+    hall.cells[0].1 = blind;
+    let view = hall.view(&camera, 1);
+    let kinds = kinds(&view);
+    let guessed = (0..kinds.len()).filter(|&i| kinds[i] == ProvenanceKind::Guessed);
+    let differences = differences(&view, &without);
+    let greatest = guessed.clone().map(|i| differences[i]).max();
+    assert!(guessed.count() > 800);
+    // The guess is the environment, as without rays: all but roundings of shared exponents.
+    assert!(greatest <= Some(6), "{greatest:?}");
+}
+
+#[test]
+fn two_mirrors_repeat_the_ball() {
+    let scene = mirror_pair();
+    let cell = |x: f32| {
+        let bounds = Aabb { min: Vec3::new(x - 0.05, -0.1, -3.1), max: Vec3::new(x + 0.05, 3.1, 3.1) };
+        // Before the mirror: its own plane is behind all images.
+        let middles = [Vec3::new(x, 1.5, -1.0), Vec3::new(x, 1.5, 1.2)];
+        let towards = Vec3::new(-x.signum(), 0.0, 0.0);
+        let cameras = middles.map(|middle| looking(middle, middle + towards, 120.0, UVec2::new(192, 192)));
+        (bounds, cameras.to_vec())
+    };
+    let eye = |x: f32, y: f32| {
+        looking(Vec3::new(-1.6 + x, 1.9 + y, 4.4), Vec3::new(2.0, 1.2, 1.2), 40.0, UVec2::new(200, 150))
+    };
+    let samples = [eye(-0.2, -0.2), eye(0.2, 0.2), eye(0.2, -0.2), eye(-0.2, 0.2)];
+    let hall = Hall::new(scene, &samples, &[cell(2.0), cell(-2.0)]);
+    let camera = looking(Vec3::new(-1.55, 1.95, 4.4), Vec3::new(2.0, 1.2, 1.2), 40.0, VIEW_PX);
+    let mut errors = Vec::new();
+    for reflections in 1..=4 {
+        errors.push(mean_difference(&hall.view(&camera, reflections), &hall.drawn(&camera, reflections)));
+    }
+    let without = mean_difference(&hall.view(&camera, 0), &hall.drawn(&camera, 4));
+    println!("mean difference in codes by reflections: {errors:?}, without {without}");
+    assert!(errors.iter().all(|error| *error < 0.75 * without), "{errors:?}, without {without}");
+}
+
+#[test]
+fn more_cells_than_the_limit_are_refused() {
+    let hall = before_the_teapot();
+    let camera = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, VIEW_PX);
+    let (bounds, surroundings) = (hall.cells[0].0, &hall.cells[0].1);
+    let cells = [MirrorCell { bounds, surroundings }; 9];
+    let mirrors = Mirrors { cells: &cells, reflections: 1 };
+    let views = reconstructor().reconstruct_mirrored(
+        &hall.samples,
+        mirrors,
+        &[camera],
+        CARVE,
+        ViewPlanes::ALL,
+        Default::default(),
+    );
+    assert!(matches!(views, Err(ReconstructionError::MirrorCells(9))));
+}
