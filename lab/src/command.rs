@@ -8,6 +8,7 @@ use crate::compare::command::{self as compare, CompareArgs};
 use crate::demo::{self, DemoArgs};
 use crate::failures::command::{self as failures, FailuresArgs};
 use crate::fronts::command::{self as fronts, FrontsArgs};
+use crate::impostors::command::{self as impostors, ImpostorsArgs};
 use crate::placement::command::{self as placement, PlacementArgs};
 use crate::planner_study::command::{self as planner_study, PlannerArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
@@ -49,6 +50,8 @@ pub enum StudyCommand {
     Planner(PlannerArgs),
     /// Measures what places of sample cameras that are chosen for a scene would gain over the fixed ones
     Placement(PlacementArgs),
+    /// Measures how well images of a mirror's surroundings answer its rays
+    Impostors(ImpostorsArgs),
     /// Measures how errors change from frame to frame, and the jump where samples change
     Stability(StabilityArgs),
     /// Compares two reports of `study fronts`
@@ -71,6 +74,7 @@ impl LabCommand {
             Self::Study(StudyCommand::Fronts(args)) => fronts::run(args),
             Self::Study(StudyCommand::Planner(args)) => planner_study::run(args),
             Self::Study(StudyCommand::Placement(args)) => placement::run(args),
+            Self::Study(StudyCommand::Impostors(args)) => impostors::run(args),
             Self::Study(StudyCommand::Stability(args)) => stability::run(args),
             Self::Study(StudyCommand::Compare(args)) => compare::run(args),
             Self::Study(StudyCommand::Errors(args)) => view_errors::run(args),

@@ -15,6 +15,7 @@ mod evaluation;
 mod experiment;
 mod failures;
 mod fronts;
+mod impostors;
 mod lighting_study;
 mod load;
 mod memory;

@@ -295,6 +295,7 @@ fn reconstruction_error(error: ReconstructionError) -> EngineError {
         ReconstructionError::Volume => invalid("volume", error),
         ReconstructionError::Gpu(error) => gpu_error(error),
         ReconstructionError::Shader(_) | ReconstructionError::MissingPlane { .. } => device(error),
+        ReconstructionError::MirrorCells(_) => invalid("mirror_cells", error),
     }
 }
 

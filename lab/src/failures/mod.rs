@@ -6,7 +6,7 @@ mod curves;
 mod measures;
 mod report;
 mod shape;
-mod stage;
-mod stand;
+pub mod stage;
+pub mod stand;
 #[cfg(test)]
 mod tests;

@@ -1,0 +1,5 @@
+//! `myriorama study impostors`: how well images of a mirror's surroundings answer its rays.
+
+mod candidates;
+pub mod command;
+mod measure;
