@@ -1,6 +1,6 @@
 //! Why views cannot be reconstructed.
 
-use crate::{bounce::MAX_MIRROR_CELLS, view_work::MAX_SAMPLE_CAMERAS};
+use crate::view_work::{MAX_MIRROR_CELLS, MAX_SAMPLE_CAMERAS};
 
 /// Why views cannot be reconstructed.
 #[derive(Debug, thiserror::Error)]

@@ -6,8 +6,8 @@ use depth_image::Highlight;
 use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots};
 use minijinja::{Value, context};
 
-use crate::bounce::{Bounces, MAX_MIRROR_CELLS, RayLists};
-use crate::view_work::{ONE_VIEW, SetVariant};
+use crate::bounce::{Bounces, RayLists};
+use crate::view_work::{MAX_MIRROR_CELLS, ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, reflectors::sample_texels};
 
 /// The switches of `specular.wgsl`.

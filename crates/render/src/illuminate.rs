@@ -10,7 +10,7 @@ use crate::{
     batch::{Batch, Part, Recording},
     pixel_camera::CAMERA_TRAITS,
     pixel_list::PixelList,
-    reflections::Rays,
+    reflections::bounces::Rays,
     sums::SumPlanes,
     surfaces::Surfaces,
 };
@@ -215,7 +215,7 @@ mod tests {
     use gpu::BufferPool;
 
     use super::*;
-    use crate::{reflections::BounceList, test_support::TestStage};
+    use crate::{reflections::bounces::BounceList, test_support::TestStage};
 
     #[test]
     fn every_variant_is_bound_by_its_names() {

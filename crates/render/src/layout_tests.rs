@@ -13,7 +13,7 @@ use crate::keep::Keep;
 use crate::known_samples::KnownCamera;
 use crate::pixel_camera::PixelCamera;
 use crate::raster::{RasterCamera, RasterVariant};
-use crate::reflections::{GpuBounce, Spawn};
+use crate::reflections::{Spawn, bounces::GpuBounce};
 use crate::test_support::{TEST, test_templates};
 
 /// Fields with their offsets, and the size of the whole.

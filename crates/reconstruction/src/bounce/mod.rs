@@ -12,11 +12,9 @@ use wgpu::{Buffer, BufferUsages};
 use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, PixelList};
 use crate::reflectors::sample_texels;
-use crate::view_work::{GpuViewCamera, GpuViewWork, ONE_VIEW, SetVariant};
+use crate::view_work::{GpuViewCamera, GpuViewWork, MAX_MIRROR_CELLS, ONE_VIEW, SetVariant};
 use crate::{device::Device, error::ReconstructionError, recording::Recording, sample_set::SampleSet};
 
-/// Mirror cells of a view.
-pub const MAX_MIRROR_CELLS: usize = 8;
 /// Rays begin this many footprints above their mirror: its own samples lie below.
 pub(crate) const START_FOOTPRINTS: f32 = 3.0;
 /// The coarsest level at which a mirrored ray is searched: no tile has done the rest.

@@ -4,7 +4,7 @@ use depth_image::Highlight;
 use gpu::{ResourceTraits, ShaderVariant, highlight_name};
 use minijinja::{Value, context, value::merge_maps};
 
-use super::Rays;
+use super::bounces::Rays;
 use crate::{RenderError, batch::Recording, rays::Traversal};
 
 #[derive(Debug)]
@@ -46,7 +46,7 @@ pub(super) fn record(recording: &mut Recording<'_>, rays: Rays<'_>) -> Result<()
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reflections::BounceList;
+    use crate::reflections::bounces::BounceList;
     use crate::test_support::TestStage;
 
     #[test]

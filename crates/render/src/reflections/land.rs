@@ -5,7 +5,7 @@ use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
-use super::{BounceList, Rays, Reflections};
+use super::bounces::{BounceList, Rays};
 use crate::{RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, sums::SumPlanes};
 
 #[derive(Debug)]
@@ -39,16 +39,15 @@ impl ShaderVariant for Land {
 /// Records the pass over the rays off one mirror; those off the next are listed, if there is to be one.
 pub(super) fn record(
     recording: &mut Recording<'_>,
-    reflections: &Reflections,
-    camera: &Buffer,
+    [camera, sums, reflected]: [&Buffer; 3],
     rays: Rays<'_>,
     next: Option<(&Buffer, &BounceList)>,
 ) -> Result<(), RenderError> {
-    let (scene, sums) = (recording.batch.work.scene, recording.batch.output.sums);
+    let scene = recording.batch.work.scene;
     let map = scene.environment.as_deref();
-    let variant = Land { mirrors: next.is_some(), environment_map: map.is_some(), sums };
+    let variant = Land { mirrors: next.is_some(), environment_map: map.is_some(), sums: recording.batch.output.sums };
     let pass = recording.passes.get(&variant)?;
-    let buffers = [camera, &scene.illumination, &*reflections.sums, &*reflections.reflected];
+    let buffers = [camera, &scene.illumination, sums, reflected];
     let own = pass.bind(0, bindings(buffers, rays, next, map))?;
     rays.dispatch(recording, (&variant, [0; 3]), &pass, &[&own]);
     Ok(())

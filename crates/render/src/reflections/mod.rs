@@ -1,20 +1,20 @@
 //! Mirror images of the scene in views: rays off the mirrors of a picture are followed, the points where they end are lit,
 //! and their light is added to the pixels. Mirrors among those points send rays on.
 
+pub(crate) mod bounces;
 mod follow;
 mod land;
 mod spawn;
 
 use std::ops::Range;
 
-use bytemuck::{Pod, Zeroable};
-use gpu::{Binding, BoundGroup, BufferPool, ComputePass, DispatchSize, Gpu, PooledBuffer, ShaderVariant, WorkKind};
-use wgpu::{Buffer, BufferUsages};
+use gpu::{BufferPool, Gpu, PooledBuffer};
 
 pub(crate) use follow::Follow;
 pub(crate) use land::Land;
 pub(crate) use spawn::Spawn;
 
+use self::bounces::{BounceList, GpuBounce, Rays};
 use crate::batch::{Batch, Part, Recording};
 use crate::pieces::Piece;
 use crate::surfaces::Surfaces;
@@ -22,26 +22,6 @@ use crate::{RenderError, illuminate};
 
 /// The pixels of a piece of a picture with mirrors: bounds the memory for rays.
 pub(crate) const PIXELS_A_PIECE: u64 = 1 << 18;
-
-/// `Bounce` of `reflections/bounce.wgsl`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(crate) struct GpuBounce {
-    pub point_in_world: [f32; 3],
-    pub place: u32,
-    pub direction: [f32; 3],
-    pub seed: u32,
-    pub throughput_linear: [f32; 3],
-    pub side_m: f32,
-    pub surface: [u32; 4],
-    pub bias_m: f32,
-    pub spread: f32,
-    pub roughness: f32,
-    pub curvature_per_m: f32,
-    pub met: u32,
-    pub near_m: f32,
-    pub padding: [u32; 2],
-}
 
 /// The memory for the mirror images of a batch: light for each pixel, and rays for one piece.
 pub(crate) struct Reflections {
@@ -53,24 +33,6 @@ pub(crate) struct Reflections {
     sums: PooledBuffer,
     /// Rays that there is room for.
     capacity: u32,
-}
-
-/// The arguments of the dispatches over the rays of one piece off one mirror.
-pub(crate) struct BounceList(Buffer);
-
-impl BounceList {
-    pub fn new(gpu: &Gpu) -> Self {
-        // Workgroups along x, y and z, and the list's length.
-        Self(gpu.buffer_with("mirrored rays", &[0u32, 1, 1, 0], BufferUsages::STORAGE | BufferUsages::INDIRECT))
-    }
-
-    pub fn size(&self) -> DispatchSize<'_> {
-        DispatchSize::Indirect(&self.0, 0)
-    }
-
-    pub fn binding(&self, name: &'static str) -> Binding<'_> {
-        Binding::buffer(name, &self.0)
-    }
 }
 
 impl Reflections {
@@ -129,7 +91,8 @@ impl Reflections {
     ) -> Result<(), RenderError> {
         let generations = recording.batch.work.lighting.reflections();
         let mut list = BounceList::new(recording.gpu);
-        spawn::record(recording, self, (element, piece), target, (&self.bounces[0], &list))?;
+        let next = (&*self.bounces[0], &list);
+        spawn::record(recording, &self.reflected, (element, piece, units(recording, piece)), target, next)?;
         for generation in 1..=generations {
             let [from, to] = if generation % 2 == 1 { [0, 1] } else { [1, 0] };
             let rays = Rays { bounces: &self.bounces[from], list: &list, units: units(recording, piece), generation };
@@ -137,41 +100,10 @@ impl Reflections {
             illuminate::record_points(recording, parts, rays, &self.sums)?;
             let next = BounceList::new(recording.gpu);
             let onward = (generation < generations).then_some((&*self.bounces[to], &next));
-            land::record(recording, self, &parts[0].cameras, rays, onward)?;
+            land::record(recording, [&parts[0].cameras, &self.sums, &self.reflected], rays, onward)?;
             list = next;
         }
         Ok(())
-    }
-}
-
-/// The rays of a piece off one mirror.
-#[derive(Clone, Copy)]
-pub(crate) struct Rays<'r> {
-    pub bounces: &'r Buffer,
-    pub list: &'r BounceList,
-    /// Pixels of the piece.
-    pub units: u64,
-    /// Mirrors on the way so far.
-    pub generation: u32,
-}
-
-impl Rays<'_> {
-    pub fn bindings(&self) -> [Binding<'_>; 2] {
-        [Binding::buffer("bounces", self.bounces), self.list.binding("list")]
-    }
-
-    /// Records a pass over them. `counts` are those of the rays of light that it traces.
-    pub fn dispatch(
-        &self,
-        recording: &mut Recording<'_>,
-        (variant, counts): (&impl ShaderVariant, [u32; 3]),
-        pass: &ComputePass,
-        groups: &[&BoundGroup],
-    ) {
-        pass.dispatch(&mut recording.frame, groups, self.list.size());
-        // Each mirror on the way leaves fewer rays.
-        let kind = WorkKind::new(recording.batch.family(), &(variant.name(), counts, self.generation));
-        recording.frame.cut(kind, self.units);
     }
 }
 

@@ -5,7 +5,7 @@ use gpu::{Binding, DispatchSize, ResourceTraits, ShaderVariant, WorkKind, highli
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
-use super::{BounceList, Reflections, units};
+use super::bounces::BounceList;
 use crate::{
     RenderError, batch::Recording, pieces::Piece, pixel_camera::CAMERA_TRAITS, rays::Traversal, surfaces::Surfaces,
 };
@@ -48,8 +48,8 @@ impl ShaderVariant for Spawn {
 /// Records the pass over a piece of a picture.
 pub(super) fn record(
     recording: &mut Recording<'_>,
-    reflections: &Reflections,
-    (element, piece): (u32, Piece),
+    reflected: &Buffer,
+    (element, piece, units): (u32, Piece, u64),
     target: &Surfaces,
     (next_bounces, next): (&Buffer, &BounceList),
 ) -> Result<(), RenderError> {
@@ -60,14 +60,13 @@ pub(super) fn record(
     debug_assert_eq!(batch.output.layout().count, VIEW_PLANES);
     let pass = recording.passes.get(&variant)?;
     let illumination = &batch.work.scene.illumination;
-    let buffers = [&recording.cameras, illumination, &*reflections.reflected, next_bounces];
+    let buffers = [&recording.cameras, illumination, reflected, next_bounces];
     let own = pass.bind(0, bindings(buffers, next, target))?;
     let tree = pass.bind(1, traced.bindings())?;
     let size = [batch.cameras[piece.camera].size_px.x, piece.end_row - piece.first_row, 1];
     pass.dispatch_each(&mut recording.frame, &[&own, &tree], element..element + 1, DispatchSize::Invocations(size));
     let kind = WorkKind::new(batch.family(), &variant.name());
-    let px = units(recording, piece);
-    recording.frame.cut(kind, px);
+    recording.frame.cut(kind, units);
     Ok(())
 }
 

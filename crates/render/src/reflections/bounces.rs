@@ -1,0 +1,76 @@
+//! Lists of rays off mirrors.
+
+use bytemuck::{Pod, Zeroable};
+use gpu::{Binding, BoundGroup, ComputePass, DispatchSize, Gpu, ShaderVariant, WorkKind};
+use wgpu::{Buffer, BufferUsages};
+
+use crate::batch::Recording;
+
+/// `Bounce` of `reflections/bounce.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuBounce {
+    pub point_in_world: [f32; 3],
+    pub place: u32,
+    pub direction: [f32; 3],
+    pub seed: u32,
+    pub throughput_linear: [f32; 3],
+    pub side_m: f32,
+    pub surface: [u32; 4],
+    pub bias_m: f32,
+    pub spread: f32,
+    pub roughness: f32,
+    pub curvature_per_m: f32,
+    pub met: u32,
+    pub near_m: f32,
+    pub padding: [u32; 2],
+}
+
+/// The arguments of the dispatches over the rays of one piece off one mirror.
+pub(crate) struct BounceList(Buffer);
+
+impl BounceList {
+    pub fn new(gpu: &Gpu) -> Self {
+        // Workgroups along x, y and z, and the list's length.
+        Self(gpu.buffer_with("mirrored rays", &[0u32, 1, 1, 0], BufferUsages::STORAGE | BufferUsages::INDIRECT))
+    }
+
+    pub fn size(&self) -> DispatchSize<'_> {
+        DispatchSize::Indirect(&self.0, 0)
+    }
+
+    pub fn binding(&self, name: &'static str) -> Binding<'_> {
+        Binding::buffer(name, &self.0)
+    }
+}
+
+/// The rays of a piece off one mirror.
+#[derive(Clone, Copy)]
+pub(crate) struct Rays<'r> {
+    pub bounces: &'r Buffer,
+    pub list: &'r BounceList,
+    /// Pixels of the piece.
+    pub units: u64,
+    /// Mirrors on the way so far.
+    pub generation: u32,
+}
+
+impl Rays<'_> {
+    pub fn bindings(&self) -> [Binding<'_>; 2] {
+        [Binding::buffer("bounces", self.bounces), self.list.binding("list")]
+    }
+
+    /// Records a pass over them. `counts` are those of the rays of light that it traces.
+    pub fn dispatch(
+        &self,
+        recording: &mut Recording<'_>,
+        (variant, counts): (&impl ShaderVariant, [u32; 3]),
+        pass: &ComputePass,
+        groups: &[&BoundGroup],
+    ) {
+        pass.dispatch(&mut recording.frame, groups, self.list.size());
+        // Each mirror on the way leaves fewer rays.
+        let kind = WorkKind::new(recording.batch.family(), &(variant.name(), counts, self.generation));
+        recording.frame.cut(kind, self.units);
+    }
+}
