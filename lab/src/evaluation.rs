@@ -1,7 +1,7 @@
 //! Reconstructed views against reference views, pixel by pixel.
 
 use anyhow::Context as _;
-use depth_image::{ProvenanceKind, View, ViewPlanes};
+use depth_image::{Provenance, ProvenanceKind, View, ViewPlanes};
 use metrics::{PictureErrors, PixelClass, Rgb8Image, class_mask, depth_errors, flip_map};
 use rayon::prelude::*;
 use reconstruction::ReconstructionMethod;
@@ -127,7 +127,7 @@ impl Errors {
             if *class == PixelClass::Disoccluded {
                 self.disoccluded += 1;
                 self.disoccluded_wrong += usize::from(wrong);
-                self.disoccluded_unmarked += usize::from(wrong && provenance.kind() != ProvenanceKind::Filled);
+                self.disoccluded_unmarked += usize::from(wrong && !is_marked(provenance));
             }
         }
         Ok(self)
@@ -173,6 +173,11 @@ pub fn mean_errors(references: &[View], tests: &[View]) -> anyhow::Result<[Pictu
         PictureErrors { psnr_db: mean(|e| e.psnr_db), ssim: mean(|e| e.ssim), flip: mean(|e| e.flip) }
     };
     Ok([mean(0), mean(1)])
+}
+
+/// Whether a pixel is said to be uncertain.
+fn is_marked(provenance: &Provenance) -> bool {
+    matches!(provenance.kind(), ProvenanceKind::Filled | ProvenanceKind::Guessed)
 }
 
 /// The depth of a view, unknown where it was filled in.

@@ -19,7 +19,7 @@ pub enum ProvenanceKind {
     Hit,
     /// A surface that no sample camera saw; its colour comes from the farther side of the gap.
     Filled,
-    /// A mirror whose image of the scene no sample camera knows; it shows lamps and the environment.
+    /// A mirror of which some ray ends where no sample camera sees; there it shows lamps and the environment.
     Guessed,
 }
 

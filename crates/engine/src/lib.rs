@@ -296,6 +296,7 @@ fn reconstruction_error(error: ReconstructionError) -> EngineError {
         ReconstructionError::Gpu(error) => gpu_error(error),
         ReconstructionError::Shader(_) | ReconstructionError::MissingPlane { .. } => device(error),
         ReconstructionError::MirrorCells(_) => invalid("mirror_cells", error),
+        ReconstructionError::Reflections(_) => invalid("reflections", error),
     }
 }
 

@@ -30,7 +30,7 @@ enum Source {
     Direct,
     /// The surroundings of a hole.
     Fill,
-    /// A mirror that shows lamps and the environment alone.
+    /// A mirror of which some ray ends where no camera sees.
     Guess,
     Background,
 }

@@ -1,6 +1,6 @@
 //! Why views cannot be reconstructed.
 
-use crate::view_work::{MAX_MIRROR_CELLS, MAX_SAMPLE_CAMERAS};
+use crate::view_work::{MAX_MIRROR_CELLS, MAX_REFLECTIONS, MAX_SAMPLE_CAMERAS};
 
 /// Why views cannot be reconstructed.
 #[derive(Debug, thiserror::Error)]
@@ -23,6 +23,8 @@ pub enum ReconstructionError {
     SampleCount(usize),
     #[error("views have at most {MAX_MIRROR_CELLS} mirror cells, not {0}")]
     MirrorCells(usize),
+    #[error("rays meet at most {MAX_REFLECTIONS} mirrors, not {0}")]
+    Reflections(u32),
     #[error("the volume of the sample set is empty or not finite")]
     Volume,
 }

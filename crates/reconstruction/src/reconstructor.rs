@@ -12,7 +12,7 @@ use crate::bounce::{self, Bounces, Mirrors};
 use crate::in_flight::{InFlight, Statistics};
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
-use crate::recording::{Recording, batches};
+use crate::recording::{MIRRORED_PIXELS_A_BATCH, MIRRORED_PIXELS_A_SLICE, PIXELS_A_BATCH, Recording, batches};
 use crate::sample_set::{SampleSet, SetDescription};
 use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
 use crate::{fill, shaders::templates, specular, tile_start};
@@ -180,6 +180,7 @@ impl Reconstructor {
         for (index, camera) in cameras.iter().enumerate() {
             camera.validate().map_err(|source| ReconstructionError::Camera { index, source })?;
         }
+        let mirrors = mirrors.checked_for(set)?;
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;
@@ -190,7 +191,7 @@ impl Reconstructor {
         let mut statistics = Statistics::default();
         let mut in_flight: Option<InFlight<'_>> = None;
         // The device works on one batch while the host takes the one before apart.
-        for batch in batches(cameras, mirrors.reflections > 0) {
+        for batch in batches(cameras, self.most_pixels(mirrors)) {
             let recording = self.record(request, batch)?;
             // Whoever holds the device asks for no other turn.
             let done = in_flight.take().map(InFlight::wait).transpose()?;
@@ -204,6 +205,15 @@ impl Reconstructor {
         Ok((views, statistics))
     }
 
+    /// The pixels of a batch. Rays off mirrors take memory, and are followed at once beside live streams.
+    fn most_pixels(&self, mirrors: Mirrors<'_>) -> usize {
+        match (mirrors.cells.is_empty(), self.device.gpu.device_queue.cuts()) {
+            (true, _) => PIXELS_A_BATCH,
+            (false, false) => MIRRORED_PIXELS_A_BATCH,
+            (false, true) => MIRRORED_PIXELS_A_SLICE,
+        }
+    }
+
     /// All passes over a batch.
     fn record<'r>(
         &'r self,
@@ -211,7 +221,7 @@ impl Reconstructor {
         cameras: &[PinholeCamera],
     ) -> Result<Recording<'r>, ReconstructionError> {
         let Request { set, mirrors, method, planes, turn, count_fetches, .. } = request;
-        let family = WorkKind::family(&("reconstruct", method, set.cameras.len()));
+        let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), mirrors.cells.len()));
         let output = (planes, count_fetches);
         let mut recording = Recording::begin(&self.device, set, cameras, output, (family, turn))?;
         let bounces = Bounces::lend(&self.device, mirrors, recording.batch.plane_bytes as usize / 4)?;
@@ -235,7 +245,9 @@ impl Reconstructor {
         // Depth and provenance have no mean: they are the centre's.
         if planes.inverse_depth || planes.provenance {
             recording.go_to(Vec2::ZERO);
-            self.record_position(request, recording, None)?;
+            // Of what mirrors show, provenance alone is the centre's.
+            let bounces = request.bounces.filter(|_| planes.provenance);
+            self.record_position(Request { bounces, ..request }, recording, None)?;
         }
         antialias::record(recording, Sums::Read, None)
     }

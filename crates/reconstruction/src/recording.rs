@@ -1,6 +1,7 @@
 //! Views of one size that are reconstructed together, on their way into a frame: whole, or in pieces of some rows each where
 //! the device is shared with live streams.
 
+use std::hash::Hash;
 use std::ops::Range;
 
 use depth_image::{Antialias, PinholeCamera, ViewPlanes};
@@ -16,9 +17,11 @@ use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
 use crate::{quads::QuadTargets, sample_set::SampleSet};
 
 /// Bounds the memory of a batch: 20 bytes a pixel on the device, 32 with several positions a pixel, up to 12 on the host.
-const PIXELS_A_BATCH: usize = 1 << 20;
-/// The same where mirrors are followed: their rays take up to 200 bytes a pixel.
-const MIRRORED_PIXELS_A_BATCH: usize = 1 << 18;
+pub(crate) const PIXELS_A_BATCH: usize = 1 << 20;
+/// The same where mirrors are followed: their rays take 108 bytes a pixel, and 12 more for each mirror cell.
+pub(crate) const MIRRORED_PIXELS_A_BATCH: usize = 1 << 18;
+/// The same beside live streams: the rays of a batch are followed in one slice.
+pub(crate) const MIRRORED_PIXELS_A_SLICE: usize = 1 << 14;
 const MAX_VIEWS_A_BATCH: usize = 256;
 /// The pixels of a slice of views whose cost is unknown.
 const UNKNOWN_SLICE_PX: u64 = 1 << 14;
@@ -185,16 +188,17 @@ impl<'r> Recording<'r> {
         });
     }
 
-    /// One dispatch over the `number`-th of some lists, of rays of any of the batch's pixels.
+    /// One dispatch over the `number`-th of some lists, of rays of any of the batch's pixels. Equal `what` cost the same.
     pub fn dispatch_listed(
         &mut self,
         variant: &impl ShaderVariant,
         pass: &ComputePass,
         bound: &BoundGroup,
         (lists, number): (&wgpu::Buffer, usize),
+        what: impl Hash,
     ) {
         pass.dispatch(&mut self.frame, &[bound], DispatchSize::Indirect(lists, number as u32));
-        self.frame.cut(WorkKind::new(self.family, &variant.name()), self.batch.plane_bytes / 4);
+        self.frame.cut(WorkKind::new(self.family, &(variant.name(), what)), self.batch.plane_bytes / 4);
     }
 
     /// One dispatch a tile of a piece.
@@ -245,9 +249,8 @@ impl Pieces {
     }
 }
 
-/// Runs of views of one size, bounded in pixels; of fewer where mirrors are followed.
-pub(crate) fn batches(cameras: &[PinholeCamera], mirrored: bool) -> impl Iterator<Item = &[PinholeCamera]> {
-    let most_pixels = if mirrored { MIRRORED_PIXELS_A_BATCH } else { PIXELS_A_BATCH };
+/// Runs of views of one size, bounded in pixels.
+pub(crate) fn batches(cameras: &[PinholeCamera], most_pixels: usize) -> impl Iterator<Item = &[PinholeCamera]> {
     cameras.chunk_by(|a, b| a.size_px == b.size_px).flat_map(move |run| {
         let views = (most_pixels / run[0].pixel_count()).clamp(1, MAX_VIEWS_A_BATCH);
         run.chunks(views)
@@ -269,7 +272,7 @@ fn works(
 fn view_works(set: &SampleSet, cameras: &[PinholeCamera], pieces: &Pieces, planes: ViewPlanes) -> Vec<Vec<u8>> {
     let volume = GpuVolume { position_share: (planes.antialias.samples() as f32).recip(), ..set.volume };
     let tone = planes.tone.into();
-    let sorted: Vec<_> = cameras.iter().map(|camera| nearest_first(set, camera)).collect();
+    let sorted: Vec<_> = cameras.iter().map(|camera| nearest_first(set, camera.eye_in_world)).collect();
     let work = |(number, &Piece { view, first_row }): (u32, &Piece)| {
         let end_row = (first_row + pieces.rows).min(cameras[view].size_px.y);
         let rows = rows_of(first_row..end_row);
@@ -280,11 +283,11 @@ fn view_works(set: &SampleSet, cameras: &[PinholeCamera], pieces: &Pieces, plane
     (0..).zip(&pieces.all).map(work).collect()
 }
 
-/// The sample cameras in the order of their distance from a view's.
-fn nearest_first(set: &SampleSet, camera: &PinholeCamera) -> Vec<GpuSampleCamera> {
+/// The sample cameras in the order of their distance from a place.
+pub(crate) fn nearest_first(set: &SampleSet, place_in_world: Vec3) -> Vec<GpuSampleCamera> {
     let mut nearest_first = set.cameras.clone();
     nearest_first.sort_by(|a, b| {
-        let distance = |c: &GpuSampleCamera| Vec3::from(c.eye_in_world).distance_squared(camera.eye_in_world);
+        let distance = |c: &GpuSampleCamera| Vec3::from(c.eye_in_world).distance_squared(place_in_world);
         // Images that prove nothing everywhere are no use to march in.
         let uncertain = |c: &GpuSampleCamera| set.uncertain[c.mask.trailing_zeros() as usize];
         uncertain(a).cmp(&uncertain(b)).then(distance(a).total_cmp(&distance(b)))

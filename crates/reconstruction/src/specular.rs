@@ -55,7 +55,9 @@ impl ShaderVariant for Specular {
                 std::iter::once(None).chain(mirrored).flat_map(move |mirror_cells| {
                     let with =
                         Self { set, highlight, lights, environment_map, listed: false, visibility_words, mirror_cells };
-                    [false, true].map(|listed| Self { listed, ..with })
+                    // Pixels that show mirrors are found anew at each position, not listed.
+                    let listed = if mirror_cells.is_some() { &[false][..] } else { &[false, true] };
+                    listed.iter().map(move |&listed| Self { listed, ..with })
                 })
             })
         })

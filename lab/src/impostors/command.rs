@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use app_core::exit::Outcome;
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use engine::GpuEngine;
 use node::Engine as _;
+use reconstruction::MAX_MIRROR_CELLS;
 use render::Lighting;
 use scene::{Limits, MissingTextures, SceneSpec};
 use study::{Cell, Report, Table};
@@ -26,7 +27,7 @@ const LIGHTING: [&str; 2] = ["soft 16, occlusion 16, reflections 1", "shadows, r
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   myriorama study impostors
-  myriorama study impostors --quick --scene mirror-pair")]
+  myriorama study impostors --quick")]
 pub struct ImpostorsArgs {
     #[command(flatten)]
     device: DeviceArgs,
@@ -49,6 +50,9 @@ pub fn run(args: &ImpostorsArgs) -> anyhow::Result<Outcome> {
     let scene = args.scene.load(&Limits::default(), MissingTextures::Refuse)?;
     let bounds = mirrors(&scene);
     let first = bounds.first().with_context(|| format!("{} has no mirrors", args.scene))?;
+    if bounds.len() > MAX_MIRROR_CELLS {
+        bail!("{} has {} parts with mirrors, at most {MAX_MIRROR_CELLS} can be followed", args.scene, bounds.len());
+    }
     let engine = GpuEngine::shared(args.device.device)?;
     let stand = Stand::new(&engine, false);
     let lighting: Lighting = LIGHTING[usize::from(args.quick)].parse()?;

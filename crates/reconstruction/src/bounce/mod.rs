@@ -4,20 +4,22 @@
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Aabb, Highlight};
 use gpu::{
-    Binding, GpuEnvironment, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, light_slots, uniform_elements,
+    Binding, GpuEnvironment, GpuError, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, light_slots,
+    uniform_elements,
 };
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
 use crate::methods::joint_carve::Carve;
-use crate::pixel_list::{GpuPixelList, PixelList};
-use crate::reflectors::sample_texels;
-use crate::view_work::{GpuViewCamera, GpuViewWork, MAX_MIRROR_CELLS, ONE_VIEW, SetVariant};
+use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList};
+use crate::recording::nearest_first;
+use crate::reflectors::{Reflectors, sample_texels};
+use crate::view_work::{GpuViewCamera, GpuViewWork, MAX_MIRROR_CELLS, MAX_REFLECTIONS, ONE_VIEW, SetVariant};
 use crate::{device::Device, error::ReconstructionError, recording::Recording, sample_set::SampleSet};
 
 /// Rays begin this many footprints above their mirror: its own samples lie below.
 pub(crate) const START_FOOTPRINTS: f32 = 3.0;
-/// The coarsest level at which a mirrored ray is searched: no tile has done the rest.
+/// The coarsest level at which a mirrored ray is searched: it has no tile start.
 pub(crate) const BOUNCE_LEVEL: u32 = 6;
 /// Moves of a mirrored ray.
 pub(crate) const MAX_BOUNCE_MOVES: u32 = 96;
@@ -25,9 +27,9 @@ pub(crate) const MAX_BOUNCE_MOVES: u32 = 96;
 /// Mirrors within a box, and images of what they show.
 #[derive(Clone, Copy)]
 pub struct MirrorCell<'s> {
-    /// Holds the mirrors' surfaces. Of several boxes around a point the smallest counts.
+    /// Holds the mirrors' surfaces, with room for the error of depths. Of several boxes around a point the smallest counts.
     pub bounds: Aabb,
-    /// The surroundings, as seen from within the box or from its corners.
+    /// The surroundings, as seen from within the box or from its corners, lit like the images of the views.
     pub surroundings: &'s SampleSet,
 }
 
@@ -38,6 +40,20 @@ pub struct Mirrors<'s> {
     pub cells: &'s [MirrorCell<'s>],
     /// Without any, mirrors show lamps and the environment.
     pub reflections: u32,
+}
+
+impl Mirrors<'_> {
+    /// Without cells where nothing is to be followed: no reflections, or a set without mirrors.
+    pub(crate) fn checked_for(self, set: &SampleSet) -> Result<Self, ReconstructionError> {
+        if self.cells.len() > MAX_MIRROR_CELLS {
+            return Err(ReconstructionError::MirrorCells(self.cells.len()));
+        }
+        if self.reflections > MAX_REFLECTIONS {
+            return Err(ReconstructionError::Reflections(self.reflections));
+        }
+        let has_mirrors = set.reflectors.as_ref().is_some_and(|of| of.highlight == Highlight::Ggx);
+        Ok(if self.reflections > 0 && has_mirrors { self } else { Self::default() })
+    }
 }
 
 /// `MirrorBox` of `bounce/spawn.wgsl`.
@@ -80,7 +96,7 @@ pub(crate) struct Bounces<'s> {
 
 /// Rays off one mirror: the numbers of those of each cell.
 pub(crate) struct RayLists {
-    /// A [`GpuPixelList`] for each cell, and one more.
+    /// A [`GpuPixelList`] for each cell, and one that counts all rays.
     lists: Buffer,
     /// Which of the two memories of rays holds them.
     memory: usize,
@@ -90,12 +106,12 @@ impl<'s> Bounces<'s> {
     /// Memory for the rays of so many pixels; none where there is nothing to follow.
     pub fn lend(device: &Device, mirrors: Mirrors<'s>, pixels: usize) -> Result<Option<Self>, ReconstructionError> {
         let mut cells = mirrors.cells.to_vec();
-        if cells.is_empty() || mirrors.reflections == 0 {
+        if cells.is_empty() {
             return Ok(None);
         }
-        if cells.len() > MAX_MIRROR_CELLS {
-            return Err(ReconstructionError::MirrorCells(cells.len()));
-        }
+        let limits = device.gpu.device.limits();
+        let most_rays = u64::from(limits.max_compute_workgroups_per_dimension) * u64::from(LIST_WORKGROUP);
+        GpuError::check_limit("the mirrored rays of a batch", pixels as u64, most_rays)?;
         let volume_m3 = |cell: &MirrorCell<'_>| cell.bounds.size().element_product();
         cells.sort_by(|a, b| volume_m3(a).total_cmp(&volume_m3(b)));
         let first_listed = |cell: usize| (cell * pixels) as u32;
@@ -110,7 +126,8 @@ impl<'s> Bounces<'s> {
             let (number, first_pixel) = (number as u32, first_listed(number));
             let view = GpuViewCamera { number, first_pixel, size_px: [1; 2], ..GpuViewCamera::zeroed() };
             let work = GpuViewWork { view, volume: cell.surroundings.volume, ..GpuViewWork::zeroed() };
-            let bytes = [bytemuck::bytes_of(&work), bytemuck::cast_slice(&cell.surroundings.cameras)].concat();
+            let cameras = nearest_first(cell.surroundings, cell.bounds.center());
+            let bytes = [bytemuck::bytes_of(&work), bytemuck::cast_slice(&cameras)].concat();
             device.gpu.buffer_with("mirror cell", &uniform_elements([bytes]), BufferUsages::UNIFORM)
         };
         let lend = |label: &'static str, bytes: usize| {
@@ -235,8 +252,8 @@ pub(crate) fn record(
         let next = bounces.next(recording.device, Some(&lists));
         let onward = (reflection < bounces.reflections).then_some(&next);
         for cell in 0..bounces.cells.len() {
-            follow(recording, bounces, &lists, cell)?;
-            land(recording, bounces, (&lists, onward), cell)?;
+            follow(recording, bounces, &lists, (cell, reflection))?;
+            land(recording, bounces, (&lists, onward), (cell, reflection))?;
         }
         lists = next;
     }
@@ -248,7 +265,7 @@ fn follow(
     recording: &mut Recording<'_>,
     bounces: &Bounces<'_>,
     lists: &RayLists,
-    cell: usize,
+    (cell, reflection): (usize, u32),
 ) -> Result<(), ReconstructionError> {
     let set = bounces.cells[cell].surroundings;
     let variant = Carve { set: set.variant(), stop_level: 0, bounced: true };
@@ -265,7 +282,7 @@ fn follow(
     ]);
     bindings.extend(bounces.list_bindings(lists));
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&variant, &pass, &bound, (&lists.lists, cell));
+    recording.dispatch_listed(&variant, &pass, &bound, (&lists.lists, cell), (cell, reflection));
     Ok(())
 }
 
@@ -274,12 +291,14 @@ fn land(
     recording: &mut Recording<'_>,
     bounces: &Bounces<'_>,
     (lists, next): (&RayLists, Option<&RayLists>),
-    cell: usize,
+    (cell, reflection): (usize, u32),
 ) -> Result<(), ReconstructionError> {
     let set = bounces.cells[cell].surroundings;
     // Rays come from reflectors.
     let Some(view_reflectors) = &recording.set.reflectors else { return Ok(()) };
-    let reflectors = set.reflectors.as_ref();
+    let is_lit_alike =
+        |of: &&Reflectors| of.highlight == view_reflectors.highlight && of.lights == view_reflectors.lights;
+    let reflectors = set.reflectors.as_ref().filter(is_lit_alike);
     let environment = recording.set.environment.as_deref();
     let variant = Land {
         set: set.variant(),
@@ -305,7 +324,7 @@ fn land(
     let next = next.filter(|_| variant.next_cells.is_some());
     bindings.extend(next.into_iter().flat_map(|next| bounces.spawn_bindings(next)));
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&variant, &pass, &bound, (&lists.lists, cell));
+    recording.dispatch_listed(&variant, &pass, &bound, (&lists.lists, cell), (cell, reflection));
     Ok(())
 }
 

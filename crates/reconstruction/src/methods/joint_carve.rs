@@ -45,7 +45,8 @@ impl ShaderVariant for Carve {
     fn all() -> Vec<Self> {
         let levels = |set| {
             let plain = [0, 1, MAX_STOP_LEVEL].map(|stop_level| Self { set, stop_level, bounced: false });
-            plain.into_iter().chain([Self { set, stop_level: 0, bounced: true }])
+            let bounced = (!set.count_fetches).then_some(Self { set, stop_level: 0, bounced: true });
+            plain.into_iter().chain(bounced)
         };
         SetVariant::all().into_iter().flat_map(levels).collect()
     }

@@ -1,5 +1,7 @@
 {% set eye = "ray.origin_in_world" if bounced else "work.view.eye_in_world" -%}
 {% set direction = "ray.direction" if bounced else "pixel.direction" -%}
+{% set near = "ray.side_m" if bounced else "work.view.near_m" -%}
+{% set own = "let ray = rays[index];" if bounced else "let pixel = pixel_of(place_of(index));" -%}
 // One ray, a pyramid for each camera, one parameter t. A camera that shows everything in the ray's node to
 // be farther away proves the way to the node's edge empty, and t moves there. Where all cameras show
 // everything nearer, nothing is known, and t moves on. Else a finer level decides; at the finest the ray
@@ -182,13 +184,8 @@ fn vote_of_cell(corners: Corners, codes: vec4f, gaps: vec4f, footprint: f32, at:
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= lists[work.view.number].count { return; }
     let index = listed_pixels[first_listed() + id.x];
-{%- if bounced %}
-    let ray = rays[index];
-    let span = span_in_volume(ray.origin_in_world, ray.direction, ray.side_m);
-{%- else %}
-    let pixel = pixel_of(place_of(index));
-    let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
-{%- endif %}
+    {{ own }}
+    let span = span_in_volume({{ eye }}, {{ direction }}, {{ near }});
 {% for k in range(cameras) %}
     // Loaded once: to the software device a word of a uniform is a load for each thread.
     let camera{{ k }} = work.cameras[{{ k }}];
@@ -222,10 +219,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         exit = min(exit, v{{ k }}.exit);
         undecided = undecided || v{{ k }}.undecided;
         vote += v{{ k }}.vote;
-{% endfor %}
-{%- if bounced %}
-        freed = freed || free_until > t;
-{%- endif %}
+{% endfor %}{{ "\n        freed = freed || free_until > t;" if bounced }}
         let descend = !free && level > STOP_LEVEL && undecided;
         let candidate = !free && !descend && penetration < THICKNESS_FOOTPRINTS;
         // First go to the very place, then let the cameras vote there.

@@ -1,6 +1,6 @@
 //! Mirrors that show the scene: rays off them are followed in images of their surroundings, against direct drawing.
 
-use depth_image::{Aabb, Camera, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use depth_image::{Aabb, Antialias, Camera, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use reconstruction::{MirrorCell, Mirrors, ReconstructionError, SampleSet, SetDescription};
 use render::{DrawWork, GpuScene, SamplePlanes, Visibility};
@@ -30,14 +30,7 @@ impl Hall {
         let on_device = GpuScene::upload(gpu(), &scene).expect("a scene");
         let set = |cameras: &[PinholeCamera]| {
             let images = images(&on_device, cameras);
-            let description = SetDescription {
-                volume: scene.bounds(),
-                background: scene.background,
-                illumination: &scene.illumination,
-                highlight: Some(Highlight::Ggx),
-                environment: None,
-            };
-            reconstructor().upload(&images, &description).expect("a sample set")
+            reconstructor().upload(&images, &description(&scene)).expect("a sample set")
         };
         let samples = set(samples);
         let cells = cells.iter().map(|(bounds, cameras)| (*bounds, set(cameras))).collect();
@@ -48,15 +41,7 @@ impl Hall {
         let cells: Vec<MirrorCell<'_>> =
             self.cells.iter().map(|(bounds, surroundings)| MirrorCell { bounds: *bounds, surroundings }).collect();
         let mirrors = Mirrors { cells: &cells, reflections };
-        let views = reconstructor().reconstruct_mirrored(
-            &self.samples,
-            mirrors,
-            &[*camera],
-            CARVE,
-            ViewPlanes::ALL,
-            Default::default(),
-        );
-        views.expect("a view").remove(0)
+        reconstruct(&self.samples, mirrors, &[*camera], ViewPlanes::ALL).expect("a view").remove(0)
     }
 
     fn drawn(&self, camera: &PinholeCamera, reflections: u32) -> View {
@@ -65,6 +50,25 @@ impl Hall {
         let work = work(&self.on_device, &lighting);
         renderer().draw_views(work, &[*camera], ViewPlanes::ALL).expect("a view").remove(0)
     }
+}
+
+fn description(scene: &Scene) -> SetDescription<'_> {
+    SetDescription {
+        volume: scene.bounds(),
+        background: scene.background,
+        illumination: &scene.illumination,
+        highlight: Some(Highlight::Ggx),
+        environment: None,
+    }
+}
+
+fn reconstruct(
+    set: &SampleSet,
+    mirrors: Mirrors<'_>,
+    cameras: &[PinholeCamera],
+    planes: ViewPlanes,
+) -> Result<Vec<View>, ReconstructionError> {
+    reconstructor().reconstruct_mirrored(set, mirrors, cameras, CARVE, planes, Default::default())
 }
 
 fn work<'a>(scene: &'a GpuScene, lighting: &str) -> DrawWork<'a> {
@@ -138,12 +142,52 @@ fn a_dented_mirror_shows_the_teapot() {
 }
 
 #[test]
-fn without_cells_nothing_changes() {
+fn mirrors_in_no_cell_show_the_environment() {
     let mut hall = before_the_teapot();
     let camera = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, VIEW_PX);
     let without = hall.view(&camera, 0);
+    hall.cells[0].0 = Aabb { min: Vec3::splat(50.0), max: Vec3::splat(51.0) };
+    let view = hall.view(&camera, 4);
+    assert!(differences(&view, &without).iter().all(|&difference| difference <= 2));
+    assert!(!kinds(&view).contains(&ProvenanceKind::Guessed));
     hall.cells.clear();
     assert!(hall.view(&camera, 4) == without);
+}
+
+#[test]
+fn sets_without_mirrors_are_what_they_are_without_cells() {
+    let hall = before_the_teapot();
+    let camera = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, VIEW_PX);
+    let scene = teapot_mirror();
+    for highlight in [None, Some(Highlight::BlinnPhong)] {
+        let images = images(&hall.on_device, &[camera]);
+        let description = SetDescription { highlight, ..description(&scene) };
+        let set = reconstructor().upload(&images, &description).expect("a sample set");
+        let [without, with] = [0, 2].map(|reflections| {
+            let (bounds, surroundings) = (hall.cells[0].0, &hall.cells[0].1);
+            let cells = [MirrorCell { bounds, surroundings }];
+            reconstruct(&set, Mirrors { cells: &cells, reflections }, &[camera], ViewPlanes::ALL).expect("a view")
+        });
+        assert!(with == without, "{highlight:?}");
+    }
+}
+
+#[test]
+fn views_with_several_samples_a_pixel_are_the_same_together_and_alone() {
+    let hall = before_the_teapot();
+    let camera = |x: f32| looking(Vec3::new(9.0 + x, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, UVec2::new(64, 48));
+    let cameras = [camera(-0.3), camera(0.1), camera(0.4)];
+    let (bounds, surroundings) = (hall.cells[0].0, &hall.cells[0].1);
+    // The smaller of two cells counts.
+    let around = Aabb { min: bounds.min - 1.0, max: bounds.max + 1.0 };
+    let cells = [MirrorCell { bounds: around, surroundings: &hall.samples }, MirrorCell { bounds, surroundings }];
+    let planes = ViewPlanes { antialias: Antialias::of(4).expect("four samples"), ..ViewPlanes::ALL };
+    let views = |cells: &[MirrorCell<'_>], cameras: &[PinholeCamera]| {
+        reconstruct(&hall.samples, Mirrors { cells, reflections: 2 }, cameras, planes).expect("views")
+    };
+    let together = views(&cells, &cameras);
+    let alone: Vec<View> = cameras.iter().map(|camera| views(&cells[1..], &[*camera]).remove(0)).collect();
+    assert!(together == alone);
 }
 
 #[test]
@@ -189,22 +233,20 @@ fn two_mirrors_repeat_the_ball() {
     let without = mean_difference(&hall.view(&camera, 0), &hall.drawn(&camera, 4));
     println!("mean difference in codes by reflections: {errors:?}, without {without}");
     assert!(errors.iter().all(|error| *error < 0.75 * without), "{errors:?}, without {without}");
+    // The second mirror's images answer the rays off the first.
+    let twice = hall.drawn(&camera, 2);
+    let [one, two] = [1, 2].map(|reflections| mean_difference(&hall.view(&camera, reflections), &twice));
+    assert!(two < 0.97 * one, "{two} by two mirrors, {one} by one");
 }
 
 #[test]
-fn more_cells_than_the_limit_are_refused() {
+fn more_than_the_limits_is_refused() {
     let hall = before_the_teapot();
-    let camera = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, VIEW_PX);
     let (bounds, surroundings) = (hall.cells[0].0, &hall.cells[0].1);
     let cells = [MirrorCell { bounds, surroundings }; 9];
-    let mirrors = Mirrors { cells: &cells, reflections: 1 };
-    let views = reconstructor().reconstruct_mirrored(
-        &hall.samples,
-        mirrors,
-        &[camera],
-        CARVE,
-        ViewPlanes::ALL,
-        Default::default(),
-    );
-    assert!(matches!(views, Err(ReconstructionError::MirrorCells(9))));
+    let refused = |cells: &[MirrorCell<'_>], reflections| {
+        reconstruct(&hall.samples, Mirrors { cells, reflections }, &[], ViewPlanes::ALL).expect_err("beyond the limits")
+    };
+    assert!(matches!(refused(&cells, 1), ReconstructionError::MirrorCells(9)));
+    assert!(matches!(refused(&cells[..8], 9), ReconstructionError::Reflections(9)));
 }
