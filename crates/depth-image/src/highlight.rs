@@ -23,6 +23,9 @@ pub struct Reflector {
     pub roughness: f32,
 }
 
+/// Most mirrors that a ray meets, one after the other.
+pub const MAX_REFLECTIONS: u32 = 8;
+
 /// Range of the exponents of Blinn-Phong lobes.
 pub(crate) const EXPONENTS: [f32; 2] = [1.0, 1024.0];
 

@@ -1,4 +1,4 @@
-    // Cameras are sorted: of those that contributed, the last to be chosen is the nearest. On the software device one
+{# Statements: the samples `around` point_in_world in the nearest camera of `origin`, and that `camera`. #}    // Cameras are sorted: of those that contributed, the last to be chosen is the nearest. On the software device one
     // camera by a variable index is cheaper than a choice among all.
     var nearest = 0u;
 {% for k in range(cameras) | reverse %}

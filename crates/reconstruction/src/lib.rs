@@ -2,7 +2,7 @@
 //!
 //! [`Reconstructor::upload`] puts one complete sample set on the device with a min-max pyramid a camera.
 //! [`Reconstructor::reconstruct`] draws views from it, many in one submission: tile starts, then the method, the fill and
-//! highlights for each position within the pixels, and their mean. Each method is one enum variant, one `.rs` and `.wgsl` pair in `methods`, and has a scalar twin.
+//! highlights for each position within the pixels, and their mean. [`Mirrors`] follow rays off mirrors in further sets. Each method is one enum variant, one `.rs` and `.wgsl` pair in `methods`, and has a scalar twin.
 
 mod antialias;
 mod bounce;
@@ -37,4 +37,4 @@ pub use quads::{ErrorBound, MeshStatistics, Quad, RequiredPlanes};
 pub use reconstructor::Reconstructor;
 pub use sample_set::{SampleSet, SetDescription};
 pub use shaders::{shader_sources, shaders, templates};
-pub use view_work::{MAX_MIRROR_CELLS, MAX_REFLECTIONS, MAX_SAMPLE_CAMERAS};
+pub use view_work::{MAX_MIRROR_CELLS, MAX_SAMPLE_CAMERAS};

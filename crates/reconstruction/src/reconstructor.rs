@@ -245,7 +245,7 @@ impl Reconstructor {
         // Depth and provenance have no mean: they are the centre's.
         if planes.inverse_depth || planes.provenance {
             recording.go_to(Vec2::ZERO);
-            // Of what mirrors show, provenance alone is the centre's.
+            // Mirrors count here for provenance alone: colour is the mean of the positions before.
             let bounces = request.bounces.filter(|_| planes.provenance);
             self.record_position(Request { bounces, ..request }, recording, None)?;
         }

@@ -12,8 +12,6 @@ use minijinja::{Value, context};
 pub const MAX_SAMPLE_CAMERAS: usize = 16;
 /// Boxes with mirrors that a view may have.
 pub const MAX_MIRROR_CELLS: usize = 8;
-/// Mirrors that a ray may meet, one after the other.
-pub const MAX_REFLECTIONS: u32 = 8;
 /// The sides of tiles; all rays of a tile start at one parameter.
 pub(crate) const TILE_PX: u32 = 8;
 /// Greater than every parameter and gap.

@@ -138,7 +138,7 @@ impl Batch<'_> {
         self.uniform(gpu, pieces, sums, Rays { shadow, lamps, occlusion })
     }
 
-    /// The same for a list with room for so many points, each of which has all `rays`.
+    /// A uniform for each part of `rays`, for a list with room for `capacity` points.
     pub fn parts_of_points(&self, gpu: &Gpu, rays: &[Range<u32>; 2], capacity: u32) -> Vec<Part> {
         let list = PixelCamera { pixel_count: capacity, ..PixelCamera::zeroed() };
         let part = |part: Rays| Part {

@@ -1,9 +1,9 @@
 //! Finished pictures of triangles: what sampling and direct rendering share.
 //!
 //! [`GpuScene`] holds a scene on the device. A [`Renderer`] makes views of it ([`Renderer::draw_views`], the method
-//! `direct`) or depth images ([`Renderer::draw_depth_images`]) in three stages, recorded together (`stages.rs`): the surface
+//! `direct`) or depth images ([`Renderer::draw_depth_images`]) in stages that are recorded together (`stages.rs`): the surface
 //! that each pixel shows, by drawing triangles or by rays ([`Visibility`]); the light that arrives there ([`Lighting`]), by
-//! rays where it is to be finer; and the planes that are asked for. Each pass is a file pair, and its variant says which
+//! rays where it is to be finer; what mirrors show, in views; and the planes that are asked for. Each pass is a file pair, and its variant says which
 //! switches its shader has.
 
 mod accumulation;
@@ -47,7 +47,7 @@ mod work;
 pub use error::RenderError;
 pub use gpu_scene::GpuScene;
 pub use known_samples::{TemporalReference, view_cell_m};
-pub use lighting::{Direct, Lighting, MAX_RAYS, MAX_REFLECTIONS, Occlusion, Rate, UnknownLighting};
+pub use lighting::{Direct, Lighting, MAX_RAYS, Occlusion, Rate, UnknownLighting};
 pub use rays::AccelerationReport;
 pub use redundancy_test::{Evidence, RedundancyTest};
 pub use renderer::Renderer;

@@ -2,13 +2,10 @@
 
 use std::{fmt, num::NonZeroU32, str::FromStr};
 
-use depth_image::Highlight;
+use depth_image::{Highlight, MAX_REFLECTIONS};
 
 /// Most rays a light, or of occlusion, a pixel.
 pub const MAX_RAYS: u32 = 4096;
-
-/// Most mirrors that a ray meets, one after the other.
-pub const MAX_REFLECTIONS: u32 = 8;
 
 /// A lighting, written as terms with commas between them: `soft 16, occlusion 16`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -1,4 +1,4 @@
-    let occluded = met && (surface.x & OCCLUDED) != 0u;
+{# Statements: the diffuse light of `surface` at `place`, if one is `met`, as `linear`, and the `open` share. #}    let occluded = met && (surface.x & OCCLUDED) != 0u;
     let open = select(1.0, bitcast<f32>(surface.y), occluded);
     var light = vec3f(1.0);
 {% if lit %}

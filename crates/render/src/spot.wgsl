@@ -1,3 +1,4 @@
+{# The surface of a pixel, from which rays of light begin. -#}
 fn spot_of(pixel: vec2u, depth: f32, surface: vec4u) -> Spot {
     let planar_depth_m = camera.near_m / depth;
     let offset = direction_of(pixel) * planar_depth_m;

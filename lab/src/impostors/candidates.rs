@@ -20,7 +20,7 @@ pub struct Candidate {
     pub cameras: Vec<PinholeCamera>,
 }
 
-/// Bounds of the triangles of each material that mirrors, in world space.
+/// Bounds of the triangles of each part of a smooth metal, in world space.
 pub fn mirrors(scene: &Scene) -> Vec<Aabb> {
     let is_mirror = |material: &Material| material.roughness < ROUGHEST && material.metallic > 0.5;
     let mut bounds = Vec::new();
@@ -55,7 +55,7 @@ pub fn candidates(mirror: &Aabb, seen: Vec3) -> Vec<Candidate> {
     ]
 }
 
-/// One of so many square images.
+/// A square image; `images` of its size have [`TEXELS`].
 fn camera(eye: Vec3, towards: Vec3, fov_deg: f32, images: u32) -> PinholeCamera {
     let side_px = ((TEXELS / images) as f32).sqrt() as u32;
     let up = if towards.y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y };

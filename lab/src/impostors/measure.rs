@@ -60,7 +60,7 @@ pub struct Figures {
 }
 
 impl<'s> Hall<'s> {
-    /// Draws the truth of so many views around a scene.
+    /// Draws the truth of `views` views on a circle around a scene. Views in which no mirror shows the scene are left out.
     ///
     /// # Errors
     /// The device fails, or no view shows a mirror.

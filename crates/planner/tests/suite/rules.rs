@@ -234,6 +234,16 @@ fn a_spent_allowance_ends_the_plan_with_the_best_so_far() {
     assert!(certified >= 3, "{certified} plans had certified a row");
 }
 
+/// Where too little was measured, nobody knows that no row keeps the budget.
+#[test]
+fn a_spent_allowance_does_not_say_that_nothing_keeps_a_budget() {
+    let subject = subject().with_direct(f64::INFINITY);
+    let request = PlanRequest { allowance_s: 0.0, ..request(&budget(&subject), 1) };
+    let outcome = run(&mut planner(&subject, request), &subject, Kept::empty(key())).outcome();
+    assert_eq!(outcome.state, PromiseState::Unreachable);
+    assert!(outcome.reason.starts_with("Nothing is known to keep "), "{}", outcome.reason);
+}
+
 #[test]
 fn an_allowance_of_zero_ends_a_plan_that_waits() {
     let subject = subject();

@@ -2,7 +2,7 @@
 //! mirror after mirror, and what they find is added to the pixels.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Aabb, Highlight};
+use depth_image::{Aabb, Highlight, MAX_REFLECTIONS};
 use gpu::{
     Binding, GpuEnvironment, GpuError, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, light_slots,
     uniform_elements,
@@ -14,7 +14,7 @@ use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList};
 use crate::recording::nearest_first;
 use crate::reflectors::{Reflectors, sample_texels};
-use crate::view_work::{GpuViewCamera, GpuViewWork, MAX_MIRROR_CELLS, MAX_REFLECTIONS, ONE_VIEW, SetVariant};
+use crate::view_work::{GpuViewCamera, GpuViewWork, MAX_MIRROR_CELLS, ONE_VIEW, SetVariant};
 use crate::{device::Device, error::ReconstructionError, recording::Recording, sample_set::SampleSet};
 
 /// Rays begin this many footprints above their mirror: its own samples lie below.
@@ -103,7 +103,7 @@ pub(crate) struct RayLists {
 }
 
 impl<'s> Bounces<'s> {
-    /// Memory for the rays of so many pixels; none where there is nothing to follow.
+    /// Lends the memory for one ray a pixel. `None` without mirror cells.
     pub fn lend(device: &Device, mirrors: Mirrors<'s>, pixels: usize) -> Result<Option<Self>, ReconstructionError> {
         let mut cells = mirrors.cells.to_vec();
         if cells.is_empty() {
@@ -247,15 +247,15 @@ pub(crate) fn record(
     bounces: &Bounces<'_>,
     first: RayLists,
 ) -> Result<(), ReconstructionError> {
-    let mut lists = first;
+    let mut listed = Some(first);
     for reflection in 1..=bounces.reflections {
-        let next = bounces.next(recording.device, Some(&lists));
-        let onward = (reflection < bounces.reflections).then_some(&next);
+        let Some(lists) = listed else { break };
+        let next = (reflection < bounces.reflections).then(|| bounces.next(recording.device, Some(&lists)));
         for cell in 0..bounces.cells.len() {
             follow(recording, bounces, &lists, (cell, reflection))?;
-            land(recording, bounces, (&lists, onward), (cell, reflection))?;
+            land(recording, bounces, (&lists, next.as_ref()), (cell, reflection))?;
         }
-        lists = next;
+        listed = next;
     }
     Ok(())
 }

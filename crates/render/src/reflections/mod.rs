@@ -90,18 +90,21 @@ impl Reflections {
         target: &Surfaces,
     ) -> Result<(), RenderError> {
         let generations = recording.batch.work.lighting.reflections();
-        let mut list = BounceList::new(recording.gpu);
-        let next = (&*self.bounces[0], &list);
-        spawn::record(recording, &self.reflected, (element, piece, units(recording, piece)), target, next)?;
+        let units = units(recording, piece);
+        let first = BounceList::new(recording.gpu);
+        let next = (&*self.bounces[0], &first);
+        spawn::record(recording, &self.reflected, (element, piece, units), target, next)?;
+        let mut listed = Some(first);
         for generation in 1..=generations {
+            let Some(list) = listed else { break };
             let [from, to] = if generation % 2 == 1 { [0, 1] } else { [1, 0] };
-            let rays = Rays { bounces: &self.bounces[from], list: &list, units: units(recording, piece), generation };
+            let rays = Rays { bounces: &self.bounces[from], list: &list, units, generation };
             follow::record(recording, rays)?;
             illuminate::record_points(recording, parts, rays, &self.sums)?;
-            let next = BounceList::new(recording.gpu);
-            let onward = (generation < generations).then_some((&*self.bounces[to], &next));
+            let next = (generation < generations).then(|| BounceList::new(recording.gpu));
+            let onward = next.as_ref().map(|next| (&*self.bounces[to], next));
             land::record(recording, [&parts[0].cameras, &self.sums, &self.reflected], rays, onward)?;
-            list = next;
+            listed = next;
         }
         Ok(())
     }

@@ -33,7 +33,7 @@ struct Place {
 }
 
 impl Scene {
-    /// The rays that follow a hit of a pixel's ray, off at most so many mirrors.
+    /// The mirrored rays after a pixel's ray has hit a surface: one for each mirror on the way, up to `mirrors`.
     #[must_use]
     pub fn bounces(&self, ray: &Ray, hit: Hit, mirrors: u32) -> Vec<Bounce> {
         let side_m = hit.t * self.footprint;

@@ -143,18 +143,24 @@ impl MeshBuilder {
 
     /// A lumpy ball, such as the crown of a far tree: `2 · columns · (rows - 1)` triangles.
     pub(super) fn lumpy_ball(&mut self, centre: Vec3, radii_m: Vec3, noise: &Noise, color_srgb: Vec3) {
-        let (columns, rows) = (7, 4);
+        self.closed([7, 4], |out| {
+            let lump = noise.in_space(out * 1.9 + centre);
+            let normal = (out / radii_m).normalize_or(Vec3::Y);
+            // Darker below, where the crown shades itself.
+            let shade = 0.82 + 0.16 * out.y + 0.16 * lump;
+            vertex(centre + out * radii_m * (1.0 + 0.24 * lump), normal, color_srgb * shade)
+        });
+    }
+
+    /// Adds a closed surface around a middle, with a vertex for each direction from there: `2 · columns · (rows - 1)` triangles.
+    pub(super) fn closed(&mut self, [columns, rows]: [u32; 2], vertex_towards: impl Fn(Vec3) -> Vertex) {
         let first = self.vertices.len() as u32;
         for row in 0..=rows {
             for column in 0..columns {
                 let (azimuth, polar) = (TAU * column as f32 / columns as f32, PI * row as f32 / rows as f32);
+                // Each pole is one point.
                 let ring = if row % rows == 0 { 0.0 } else { polar.sin() };
-                let out = Vec3::new(ring * azimuth.sin(), polar.cos(), ring * azimuth.cos());
-                let lump = noise.in_space(out * 1.9 + centre);
-                let normal = (out / radii_m).normalize_or(Vec3::Y);
-                // Darker below, where the crown shades itself.
-                let shade = 0.82 + 0.16 * out.y + 0.16 * lump;
-                self.push(vertex(centre + out * radii_m * (1.0 + 0.24 * lump), normal, color_srgb * shade));
+                self.push(vertex_towards(Vec3::new(ring * azimuth.sin(), polar.cos(), ring * azimuth.cos())));
             }
         }
         for row in 0..rows {

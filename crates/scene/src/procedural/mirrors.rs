@@ -1,7 +1,5 @@
 //! Scenes with mirrors: a teapot before a dented mirror, and a ball between two plane mirrors.
 
-use std::f32::consts::{PI, TAU};
-
 use glam::Vec3;
 
 use super::geometry::{MeshBuilder, matt, vertex};
@@ -93,30 +91,9 @@ fn pebble(builder: &mut MeshBuilder) {
     star(builder, [PEBBLE_COLUMNS, PEBBLE_ROWS], Vec3::splat(255.0), |out| PEBBLE_MIDDLE + out * radius_m(out));
 }
 
-/// A closed surface around a middle, with a point for each direction from there: `2 · columns · (rows - 1)` triangles.
-/// Normals are those of the smooth surface.
-fn star(builder: &mut MeshBuilder, [columns, rows]: [u32; 2], color_srgb: Vec3, point: impl Fn(Vec3) -> Vec3) {
-    let first = builder.vertices.len() as u32;
-    for row in 0..=rows {
-        for column in 0..columns {
-            let (azimuth, polar) = (TAU * column as f32 / columns as f32, PI * row as f32 / rows as f32);
-            // Each pole is one point.
-            let ring = if row % rows == 0 { 0.0 } else { polar.sin() };
-            let out = Vec3::new(ring * azimuth.sin(), polar.cos(), ring * azimuth.cos());
-            builder.push(vertex(point(out), normal_of(&point, out), color_srgb));
-        }
-    }
-    for cell in 0..rows * columns {
-        let (row, column) = (cell / columns, cell % columns);
-        let next = (column + 1) % columns;
-        let (above, below) = (first + row * columns, first + (row + 1) * columns);
-        if row > 0 {
-            builder.indices.extend([above + column, below + column, above + next]);
-        }
-        if row + 1 < rows {
-            builder.indices.extend([above + next, below + column, below + next]);
-        }
-    }
+/// A closed surface with a point for each direction from its middle, and the normals of the smooth surface.
+fn star(builder: &mut MeshBuilder, segments: [u32; 2], color_srgb: Vec3, point: impl Fn(Vec3) -> Vec3) {
+    builder.closed(segments, |out| vertex(point(out), normal_of(&point, out), color_srgb));
 }
 
 /// From differences to two sides.
