@@ -13,7 +13,7 @@ use tonic::Status;
 
 use crate::audit_choice::{AuditChoice, Candidate, Ended, Kind};
 use crate::batch::{BatchKey, Source, Waiting};
-use crate::sets::ReadySet;
+use crate::sets::{ReadySet, ViewSets};
 
 /// Larger views are compared in a part.
 const MOST_WHOLE_PIXELS: u32 = 320 * 240;
@@ -65,7 +65,7 @@ impl Auditor {
     /// The views are of one set, as views that are made together are.
     fn choose(&self, plan: &Arc<Assignment>, order: &AuditOrder, covered: &[&Waiting]) -> Option<Chosen> {
         let first = covered.first()?;
-        let Source::Set(set) = &first.source else { return None };
+        let Source::Sets(ViewSets { of_cell: set, .. }) = &first.source else { return None };
         let scene_time_s = plan.workload.timeline.time_s(set_index(&first.key))?;
         let candidate = |waiting: &&Waiting| {
             let (stream, camera) = (waiting.reply.outbox().stream, waiting.view.camera);
@@ -158,7 +158,7 @@ fn audited_part(view_px: UVec2, order: &AuditOrder, random: u64) -> ViewPart {
 /// Why a promise is not for a view; `None` where it is.
 fn uncovered(plan: &Assignment, order: &AuditOrder, waiting: &Waiting) -> Option<&'static str> {
     let key = &waiting.key;
-    let Source::Set(set) = &waiting.source else { return Some("drawn directly") };
+    let Source::Sets(ViewSets { of_cell: set, .. }) = &waiting.source else { return Some("drawn directly") };
     let pixels = f64::from(key.size_px.element_product()) / f64::from(order.planned_pixel_count);
     let refinement = plan.workload.refinement(set_index(key));
     let reasons = [

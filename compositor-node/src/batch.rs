@@ -7,11 +7,10 @@ use cluster::{Assignment, DIRECT, RenderViews, RequestedView, SceneRef, SetConte
 use codec::{FrameCodec, SampleSetId};
 use depth_image::ViewPlanes;
 use glam::UVec2;
-use node::Pinned;
 
 use crate::outbox::Reply;
 use crate::quota::Credit;
-use crate::sets::ReadySet;
+use crate::sets::ViewSets;
 use crate::view_times::ViewKind;
 
 /// Views of one call to the device.
@@ -50,8 +49,8 @@ impl BatchKey {
 /// The source of views.
 #[derive(Clone)]
 pub(crate) enum Source {
-    /// A complete sample set.
-    Set(Pinned<ReadySet>),
+    /// Complete sample sets.
+    Sets(ViewSets),
     /// The scene itself.
     Scene { plan: Arc<Assignment>, scene_time_s: f32 },
 }
@@ -60,7 +59,7 @@ impl Source {
     /// The scene that views are drawn from.
     pub(crate) fn scene(&self) -> Option<&SceneRef> {
         match self {
-            Self::Set(_) => None,
+            Self::Sets(_) => None,
             Self::Scene { plan, .. } => Some(&plan.workload.scene),
         }
     }
@@ -68,7 +67,7 @@ impl Source {
     /// The age of the set at `now`; 0 where views are drawn from the scene.
     pub(crate) fn age_s(&self, now: Instant) -> f64 {
         match self {
-            Self::Set(set) => now.saturating_duration_since(set.since).as_secs_f64(),
+            Self::Sets(sets) => now.saturating_duration_since(sets.of_cell.since).as_secs_f64(),
             Self::Scene { .. } => 0.0,
         }
     }

@@ -53,7 +53,7 @@ impl Pose {
     }
 
     fn has_cells(&self) -> bool {
-        self.plan.policy != Policy::Direct && self.plan.workload.cell_count() > 1
+        self.plan.policy != Policy::Direct && self.plan.workload.view_cell_count() > 1
     }
 }
 

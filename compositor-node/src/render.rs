@@ -103,9 +103,11 @@ impl Rendering {
         let count = cameras.len();
         let scene = source.scene().cloned();
         let make = move |engine: &dyn Engine| match &source {
-            Source::Set(set) => {
+            Source::Sets(sets) => {
                 let work = ViewWork { cameras: cameras.clone(), method: key.method.clone(), planes: key.planes };
-                engine.reconstruct(set.set.as_ref(), &work, turn).map(|views| (Operation::ReconstructView, views))
+                engine
+                    .reconstruct(sets.on_device.as_ref(), &work, turn)
+                    .map(|views| (Operation::ReconstructView, views))
             }
             Source::Scene { plan, scene_time_s } => {
                 let work = DirectWork::of(&plan.workload, cameras.clone(), key.planes);

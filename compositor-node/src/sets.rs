@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use cluster::{Assignment, Policy, SetContent, Timeline, Workload};
 use codec::EncodedDepthImage;
-use depth_image::{Camera, DepthImage, PinholeCamera, nearest_set};
+use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, nearest_set};
 use node::{
-    ByteCache, CellPlan, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet, Scenes,
-    SetMemory, Turn, UploadedSet,
+    ByteCache, CellPlan, Engine, MirrorSet, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet,
+    Scenes, SetMemory, Turn, UploadedSet,
 };
 use node::{WorkClass, beyond_timeline, most_image_bytes, most_set_bytes, own_time, set_bytes};
 use tonic::{Code, Status};
@@ -30,6 +30,8 @@ const SETS_AHEAD: u32 = 2;
 /// Sets of earlier moments that stay beside these: a client may ask again for what it has just seen. The next sets are made in
 /// the memory of older ones: the system clears new memory page by page, in the time of a software device.
 const EARLIER_SETS: usize = 4;
+/// Times that a view's sets are waited for, where others evict some of them meanwhile.
+const ATTEMPTS: usize = 8;
 /// A set that was used within this time is not evicted for that of another cell ahead: a viewer's next pose needs it.
 const RECENTLY: Duration = Duration::from_millis(500);
 
@@ -39,16 +41,16 @@ fn sets_ahead(plan: &Assignment) -> u32 {
     plan.sets_at_once().max(SETS_AHEAD).min(others)
 }
 
-/// A complete set on the device, ready to be reconstructed from.
+/// A complete set of one cell on the device.
 pub(crate) struct ReadySet {
     pub(crate) set: Arc<dyn UploadedSet>,
     /// The time at which it was ready.
     pub(crate) since: Instant,
     pub(crate) content: SetContent,
-    /// The view cell that it was loaded for, in the plan of that time.
+    /// The cell that it was loaded for, in the plan of that time.
     pub(crate) cell: u32,
-    /// What its images show, wherever their cameras are.
-    moment: SetContent,
+    /// What its images show, wherever their cameras are; `None` for a mirror cell's, from which alone no view is made.
+    moment: Option<SetContent>,
     /// What its images show, whenever it is.
     subject: SetContent,
     cameras: Vec<PinholeCamera>,
@@ -56,6 +58,16 @@ pub(crate) struct ReadySet {
     pub(crate) sample_images: Arc<[DepthImage]>,
     /// Its images for other compositors, where they ask this one.
     relay: Option<RelayBuffer>,
+}
+
+/// What views are reconstructed from. Clones share it.
+#[derive(Clone)]
+pub(crate) struct ViewSets {
+    /// The set of their view cell.
+    pub(crate) of_cell: Pinned<ReadySet>,
+    /// The same on the device, with those of the mirror cells.
+    pub(crate) on_device: Arc<dyn UploadedSet>,
+    _mirrors: Vec<Pinned<ReadySet>>,
 }
 
 /// The content of a set without its cameras: equal for the sets of all view cells at one moment.
@@ -145,9 +157,68 @@ impl Sets {
         Ok(images)
     }
 
-    /// Waits for a complete set; the sets after it are then fetched ahead, so that samplers work on them while this one is
-    /// shown.
-    pub(crate) async fn get(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<Pinned<ReadySet>, Status> {
+    /// Waits for the complete sets of a view cell and of all mirror cells. While it waits for one it keeps no other in
+    /// memory: two that wait never wait for each other.
+    pub(crate) async fn of_views(
+        self: &Arc<Self>,
+        plan: &Arc<Assignment>,
+        set_index: u32,
+        cell: u32,
+    ) -> Result<ViewSets, Status> {
+        let of_cell = CellPlan::of(plan, cell)?;
+        let mirrors = CellPlan::of_mirrors(plan);
+        self.check_room(&of_cell, &mirrors)?;
+        for _ in 0..ATTEMPTS {
+            // Samplers work on all of them at once, as far as memory has room.
+            for (_, mirror) in &mirrors {
+                self.begin_to_load(mirror, set_index, Duration::ZERO);
+            }
+            let set = self.get(&of_cell, set_index).await?;
+            if let Some(sets) = self.with_mirrors(set, plan, set_index)? {
+                mirrors.iter().for_each(|(_, mirror)| self.fetch_ahead(mirror, set_index));
+                return Ok(sets);
+            }
+            for (_, mirror) in &mirrors {
+                self.get(mirror, set_index).await?;
+            }
+        }
+        Err(Status::resource_exhausted(format!("set-memory: other views need the room of sample set {set_index}")))
+    }
+
+    /// A view's sets fit into memory together, or never will.
+    fn check_room(&self, of_cell: &CellPlan, mirrors: &[(Aabb, CellPlan)]) -> Result<(), Status> {
+        let cells = [of_cell].into_iter().chain(mirrors.iter().map(|(_, mirror)| mirror));
+        let (bytes, max_bytes) = (cells.map(|cell| self.most_bytes(cell)).sum::<usize>(), self.cached.max_bytes());
+        if mirrors.is_empty() || bytes <= max_bytes {
+            return Ok(());
+        }
+        let reason = format!("set-memory: {bytes} bytes of a view's sample sets exceed the {max_bytes} of this node");
+        Err(Status::resource_exhausted(reason))
+    }
+
+    /// A view cell's set with those of the mirror cells of its moment; `None` where one of these is not loaded.
+    pub(crate) fn with_mirrors(
+        &self,
+        of_cell: Pinned<ReadySet>,
+        plan: &Arc<Assignment>,
+        set_index: u32,
+    ) -> Result<Option<ViewSets>, Status> {
+        let loaded =
+            |(bounds, mirror): &(Aabb, CellPlan)| Some((*bounds, self.cached.loaded(&mirror.set_content(set_index)?)?));
+        let mirrors: Option<Vec<_>> = CellPlan::of_mirrors(plan).iter().map(loaded).collect();
+        let Some(mirrors) = mirrors else { return Ok(None) };
+        let sets: Vec<MirrorSet> = mirrors.iter().map(|(bounds, ready)| (*bounds, ready.set.clone())).collect();
+        let on_device = match sets.is_empty() {
+            true => of_cell.set.clone(),
+            false => self.scenes.engine().mirroring(of_cell.set.clone(), sets)?,
+        };
+        let mirrors = mirrors.into_iter().map(|(_, ready)| ready).collect();
+        Ok(Some(ViewSets { of_cell, on_device, _mirrors: mirrors }))
+    }
+
+    /// Waits for a complete set of one cell; the sets after it are then fetched ahead, so that samplers work on them while
+    /// this one is shown.
+    async fn get(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<Pinned<ReadySet>, Status> {
         let in_turn = plan.sets_at_once() > 1;
         if in_turn {
             self.fetch_ahead(plan, set_index);
@@ -167,7 +238,7 @@ impl Sets {
     /// The loaded set of the same moment whose cameras are nearest to a view.
     pub(crate) fn nearest(&self, plan: &Assignment, set_index: u32, view: &PinholeCamera) -> Option<Pinned<ReadySet>> {
         let moment = moment(plan, set_index)?;
-        let mut sets = self.cached.loaded_where(|set| set.moment == moment);
+        let mut sets = self.cached.loaded_where(|set| set.moment == Some(moment));
         let nearest = nearest_set(view, sets.iter().map(|set| set.cameras.clone()), &plan.workload.volume)?;
         Some(sets.swap_remove(nearest))
     }
@@ -276,7 +347,7 @@ impl Sets {
         self.metrics.sets_loaded.inc();
         self.metrics.set_s.observe(start.elapsed().as_secs_f64());
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
-        let moment = moment(plan, set_index).ok_or_else(|| beyond_timeline(set_index))?;
+        let moment = moment(plan, set_index).filter(|_| !plan.is_mirror);
         let cameras = plan.workload.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
         let (since, cell) = (Instant::now(), plan.cell);
         Ok((ReadySet { set, since, content, cell, moment, subject, cameras, sample_images, relay }, bytes))

@@ -7,14 +7,14 @@ use std::time::Instant;
 
 use cluster::{Assignment, DIRECT, Policy, RenderViews};
 use depth_image::PinholeCamera;
-use node::{CellPlan, Deadlines, NodeMetrics, PlansInForce, beyond_timeline};
+use node::{CellPlan, Deadlines, NodeMetrics, Pinned, PlansInForce, beyond_timeline};
 use tonic::Status;
 
 use crate::batch::{BatchKey, Loaded, Place, Source, Waiting};
 use crate::outbox::Outbox;
 use crate::queue::{Arrivals, Lane};
 use crate::quota::NodeQuota;
-use crate::sets::Sets;
+use crate::sets::{ReadySet, Sets, ViewSets};
 use crate::view_times::{ViewKind, ViewTimes};
 
 /// A live view that takes longer has a lane beside that of others.
@@ -126,9 +126,9 @@ impl Shared {
         let id = plan.sample_set_id(set_index).ok_or_else(|| beyond_timeline(set_index))?;
         let (source, content) = match plan.policy {
             Policy::Pipeline | Policy::TimeShare => {
-                let set = self.sets.get(&CellPlan::of(plan, cell)?, set_index).await?;
-                let content = set.content;
-                (Source::Set(set), Some(content))
+                let sets = self.sets.of_views(plan, set_index, cell).await?;
+                let content = sets.of_cell.content;
+                (Source::Sets(sets), Some(content))
             }
             Policy::Direct => (scene(plan, set_index)?, None),
         };
@@ -149,7 +149,7 @@ impl Shared {
     /// The source of a place, if it is still there; it is not waited for.
     pub(crate) fn source_at(&self, plan: &Arc<Assignment>, set_index: u32, place: Place) -> Option<Source> {
         match place.content {
-            Some(content) => self.sets.loaded(&content).map(Source::Set),
+            Some(content) => self.with_mirrors(self.sets.loaded(&content)?, plan, set_index).map(Source::Sets),
             None => scene(plan, set_index).ok(),
         }
     }
@@ -159,15 +159,20 @@ impl Shared {
         let id = plan.sample_set_id(set_index)?;
         let set = self.sets.loaded(&CellPlan::of(plan, cell).ok()?.set_content(set_index)?)?;
         let place = Place { id, cell, is_neighbour: false, content: Some(set.content) };
-        Some(Loaded { source: Source::Set(set), place, wait_s: 0.0 })
+        Some(Loaded { source: Source::Sets(self.with_mirrors(set, plan, set_index)?), place, wait_s: 0.0 })
+    }
+
+    /// A set with those of mirror cells; `None` where one is not loaded.
+    fn with_mirrors(&self, set: Pinned<ReadySet>, plan: &Arc<Assignment>, set_index: u32) -> Option<ViewSets> {
+        self.sets.with_mirrors(set, plan, set_index).ok().flatten()
     }
 
     /// The nearest loaded set of a view's moment.
-    pub(crate) fn nearest(&self, plan: &Assignment, set_index: u32, view: &PinholeCamera) -> Option<Loaded> {
+    pub(crate) fn nearest(&self, plan: &Arc<Assignment>, set_index: u32, view: &PinholeCamera) -> Option<Loaded> {
         let id = plan.sample_set_id(set_index).filter(|_| plan.policy != Policy::Direct)?;
         let set = self.sets.nearest(plan, set_index, view)?;
         let place = Place { id, cell: set.cell, is_neighbour: true, content: Some(set.content) };
-        Some(Loaded { source: Source::Set(set), place, wait_s: 0.0 })
+        Some(Loaded { source: Source::Sets(self.with_mirrors(set, plan, set_index)?), place, wait_s: 0.0 })
     }
 }
 

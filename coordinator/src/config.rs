@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use cluster::limits::MAX_SCENES;
-use cluster::{OfferSettings, OfferStatus, SceneHash, SceneRef};
+use cluster::{MirrorCell, OfferSettings, OfferStatus, SceneHash, SceneRef};
 use depth_image::{Aabb, Camera, Environment, Illumination};
 use glam::DVec3;
 use planner::{Budget, Row};
@@ -59,6 +59,8 @@ pub struct SceneOffer {
     pub package: Bytes,
     /// Sample cameras for sessions that bring none.
     pub rig: Vec<Camera>,
+    /// Its mirrors, and sample cameras for what they show, for sessions that follow mirrors.
+    pub mirrors: Vec<(MirrorCell, Vec<Camera>)>,
     /// The rig's images get the size that suits the views of a session that names none.
     pub fits_views: bool,
     /// The volume that is reconstructed, unless a session brings its own.

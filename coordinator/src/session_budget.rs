@@ -23,6 +23,12 @@ pub(crate) fn budgeted(
     let own = request.budget.budget.as_deref().map(str::parse::<Budget>).transpose();
     let own = own.map_err(|error| Status::invalid_argument(format!("budget: {error}")))?;
     let Some(budget) = own.or(config.budget) else { return Ok(None) };
+    if request.follows_mirrors {
+        return match own {
+            None => Ok(None),
+            Some(_) => Err(Status::invalid_argument("budget: none can be kept for mirrors that show the scene")),
+        };
+    }
     let has_own = offer.keeps_cameras || !request.sample_cameras.is_empty();
     let keeps_cameras = has_own && request.viewpoints.is_empty();
     let rows = rows(request, offer, keeps_cameras.then_some(workload.sample_cameras.len() as u32));

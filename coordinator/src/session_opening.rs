@@ -43,8 +43,8 @@ async fn measured_opening(
     let workload = workload_of(&request, offer)?;
     let budgeted = budgeted(&request, &workload, offer, &shared.config)?;
     let measurement = MeasureCosts {
-        // Costs are those of one image, and of one view, which is made from the images of one cell.
-        workload: workload.of_cell(0).unwrap_or_else(|| workload.clone()),
+        // Costs are those of one image, and of one view, which is made from the images of one view cell.
+        workload: workload.of_one_view(),
         method: request.method.clone(),
         codec: request.codec.clone(),
         typical_views: vec![request.typical_view],

@@ -1,19 +1,21 @@
 //! The workload of a session: its own settings, completed with those of its scene.
 
 use cluster::limits::MAX_CELLS;
-use cluster::{SamplePlanes, SessionRequest, Workload};
+use cluster::{DIRECT, MirrorCell, SamplePlanes, SessionRequest, Workload};
 use depth_image::{Aabb, Camera, PinholeCamera, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
 
 use crate::config::SceneOffer;
 use crate::grpc_status::refusal;
-use crate::schedule::{ChoiceError, first_indices};
+use crate::schedule::ChoiceError;
 
 /// Texels of a sample image a pixel of a view, each way: what brings most for its cost (docs/benchmarks.md).
 const SAMPLE_DENSITY: f32 = 2.0;
 /// The most texels of a set of images whose size follows the views: a software device samples them in about a second.
 const MAX_FITTING_TEXELS: usize = 1 << 20;
+/// Texels of all images of a mirror cell, over those of one sample image: a mirror shows all directions.
+const MIRROR_DENSITY: f32 = 2.2;
 /// Steps of √2 by which images are smaller than the offered ones at most.
 const LEAST_STEPS: f32 = -2.0;
 
@@ -24,23 +26,23 @@ const LEAST_STEPS: f32 = -2.0;
 pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Result<Workload, Status> {
     let volume = request.volume.unwrap_or(offer.volume);
     let cells = cells_of(request, offer, &volume)?;
-    let cell_first_indices = first_indices(&cells);
     let cameras = match (cells.is_empty(), request.sample_cameras.is_empty()) {
         (false, false) => return Err(Status::invalid_argument("viewpoints: sample_cameras are given, too")),
-        (false, true) => cells.concat(),
+        (false, true) => Vec::new(),
         (true, false) => request.sample_cameras.clone(),
         (true, true) => offer.rig.clone(),
     };
     let size_px = session_size_px(request, offer);
     let sized = |camera: &Camera| size_px.map_or(Ok(*camera), |size_px| resized(camera, size_px));
     let sample_cameras = cameras.iter().map(sized).collect::<Result<Vec<_>, _>>()?;
-    if sample_cameras.is_empty() {
+    if sample_cameras.is_empty() && cells.is_empty() {
         return Err(Status::invalid_argument("sample_cameras is missing, and the scene came without a rig"));
     }
-    Ok(Workload {
+    let workload = Workload {
         scene: offer.scene(),
         sample_cameras,
-        cell_first_indices,
+        cell_first_indices: Vec::new(),
+        mirror_cells: Vec::new(),
         sampling: request.sampling.clone(),
         lighting: request.lighting.clone(),
         planes: SamplePlanes::default(),
@@ -49,7 +51,32 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
         timeline: request.timeline,
         illumination: offer.illumination.clone(),
         refinement_steps: request.refinement_steps,
-    })
+    };
+    let workload = if cells.is_empty() { workload } else { workload.with_view_cells(cells) };
+    let mirrors = mirrors_of(request, offer, &workload)?;
+    Ok(workload.with_mirrors(mirrors))
+}
+
+/// The scene's mirrors, where the session follows them, with images of about [`MIRROR_DENSITY`].
+fn mirrors_of(
+    request: &SessionRequest,
+    offer: &SceneOffer,
+    workload: &Workload,
+) -> Result<Vec<(MirrorCell, Vec<Camera>)>, Status> {
+    if !request.follows_mirrors || request.method == DIRECT {
+        return Ok(Vec::new());
+    }
+    let image_texels = workload.sample_cameras.first().map_or(1, |Camera::Pinhole(camera)| camera.pixel_count());
+    let sized = |(cell, cameras): &(MirrorCell, Vec<Camera>)| {
+        let texels: usize = cameras.iter().map(|Camera::Pinhole(camera)| camera.pixel_count()).sum();
+        let scale = (image_texels as f32 * MIRROR_DENSITY / texels.max(1) as f32).sqrt();
+        let sized = |camera: &Camera| {
+            let Camera::Pinhole(PinholeCamera { size_px, .. }) = camera;
+            resized(camera, (size_px.as_vec2() * scale).ceil().as_uvec2().max(UVec2::ONE))
+        };
+        Ok((cell.clone(), cameras.iter().map(sized).collect::<Result<_, _>>()?))
+    };
+    offer.mirrors.iter().map(sized).collect()
 }
 
 /// The sample cameras of each view cell of the session's viewpoints, as if it were alone, in the size of the offered ones.

@@ -44,6 +44,7 @@ fn workload(images: usize, timeline: Timeline) -> Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
         sample_cameras: vec![Camera::Pinhole(camera); images],
         cell_first_indices: Vec::new(),
+        mirror_cells: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
         planes: SamplePlanes::default(),
@@ -310,7 +311,13 @@ fn animated() -> String {
 }
 
 fn quality(method: &str, frame_rate_ratio: f64) -> Quality {
-    Quality { lighting: "soft".to_owned(), method: method.to_owned(), sample_side_ratio: 0.5, frame_rate_ratio }
+    Quality {
+        follows_mirrors: false,
+        lighting: "soft".to_owned(),
+        method: method.to_owned(),
+        sample_side_ratio: 0.5,
+        frame_rate_ratio,
+    }
 }
 
 fn overload_of_a_static_scene() -> String {

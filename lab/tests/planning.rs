@@ -15,8 +15,8 @@ use glam::UVec2;
 use gpu::DevicePreference;
 use lab::scene_args;
 use node::{
-    DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewAudit, ViewProbes as _, ViewWork,
-    WorkClass,
+    DirectWork, Engine, EngineError, MirrorSet, SampleSet, SampleWork, Turn, UploadedSet, ViewAudit, ViewProbes as _,
+    ViewWork, WorkClass,
 };
 use planner::{
     Budget, Choice, Command, Event, Kept, Metric, Outcome, Planner, Price, Pricing as _, ProbeId, ProbeView,
@@ -158,6 +158,14 @@ impl Engine for SlowInOtherLight {
 
     fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
         self.0.upload(set, turn)
+    }
+
+    fn mirroring(
+        &self,
+        set: Arc<dyn UploadedSet>,
+        mirrors: Vec<MirrorSet>,
+    ) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        self.0.mirroring(set, mirrors)
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use client::{Client, ClientError, Session, ViewRequest};
-use cluster::{BudgetRequest, OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline};
+use cluster::{BudgetRequest, MirrorCell, OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline};
 use codec::{FrameAssembly, FramePart, WholeFrame};
 use coordinator::{CoordinatorConfig, Observers, SceneOffer, SceneOffers};
 use depth_image::{Aabb, Camera, Environment, PinholeCamera, ViewPlanes};
@@ -146,6 +146,7 @@ pub fn offer() -> SceneOffer {
         package: package(),
         fits_views: false,
         rig: rig(),
+        mirrors: mirrors(),
         rows: rows(),
         keeps_cameras: false,
         volume: Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) },
@@ -156,6 +157,18 @@ pub fn offer() -> SceneOffer {
         // Six moments of a viewer.
         period_s: Some(0.5),
     }
+}
+
+/// Two mirrors, whose images show the ball in their middle.
+fn mirrors() -> Vec<(MirrorCell, Vec<Camera>)> {
+    let mirror = |x_m: f32| {
+        let place = Vec3::new(x_m, 0.5, 2.0);
+        let towards = Vec3::new(0.0, 0.6, 0.0);
+        let camera = PinholeCamera::looking_at(place, towards, Vec3::Y, 0.6, UVec2::splat(16));
+        let bounds = Aabb { min: place - 0.1, max: place + 0.1 };
+        (MirrorCell { bounds, sampling: "conventional".to_owned() }, vec![Camera::Pinhole(camera)])
+    };
+    vec![mirror(-1.0), mirror(1.0)]
 }
 
 /// The name of the second scene of [`two_offers`].
@@ -186,6 +199,7 @@ pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {
         method: "splat".to_owned(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
+        follows_mirrors: false,
         codec: "lz4".to_owned(),
         sample_cameras: Vec::new(),
         sample_size_px: None,

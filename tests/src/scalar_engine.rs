@@ -15,7 +15,7 @@ use depth_image::{
     rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
-use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork};
+use node::{DirectWork, Engine, EngineError, MirrorSet, SampleSet, SampleWork, Turn, UploadedSet, ViewWork};
 use parking_lot::{Condvar, Mutex};
 
 /// The floor's colour.
@@ -223,8 +223,17 @@ fn averaged(camera: &PinholeCamera, planes: ViewPlanes, view_of: impl Fn(&Pinhol
     View { srgb8: (0..camera.pixel_count()).flat_map(shown).collect(), ..view_of(camera) }
 }
 
-struct Uploaded(SampleSet);
+struct Uploaded {
+    set: SampleSet,
+    /// What its mirror cells show.
+    mirrored: Vec<[u8; 3]>,
+}
 impl UploadedSet for Uploaded {}
+
+fn uploaded(set: &dyn UploadedSet) -> Result<&Uploaded, EngineError> {
+    let any: &dyn Any = set;
+    any.downcast_ref().ok_or_else(|| EngineError::Device("a set of another device".to_owned()))
+}
 
 fn known(field: &'static str, value: &str, known: &str) -> Result<(), EngineError> {
     if value == known {
@@ -401,20 +410,37 @@ impl Engine for ScalarEngine {
                 reason: "is not the scene's".to_owned(),
             });
         }
-        Ok(Arc::new(Uploaded(set.clone())))
+        Ok(Arc::new(Uploaded { set: set.clone(), mirrored: Vec::new() }))
+    }
+
+    /// The first pixels of its views show what the mirrors' images show in their middle, one pixel a mirror cell.
+    fn mirroring(
+        &self,
+        set: Arc<dyn UploadedSet>,
+        mirrors: Vec<MirrorSet>,
+    ) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        self.works()?;
+        let shown = |(_, mirror): &MirrorSet| {
+            let image = &uploaded(mirror.as_ref())?.set.images[0];
+            let middle = image.size_px() / 2;
+            Ok(srgb8(linear_from_rgb9e5(image.color_rgb9e5[(middle.y * image.size_px().x + middle.x) as usize])))
+        };
+        let mirrored = mirrors.iter().map(shown).collect::<Result<_, EngineError>>()?;
+        Ok(Arc::new(Uploaded { set: uploaded(set.as_ref())?.set.clone(), mirrored }))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, _: Turn) -> Result<Vec<View>, EngineError> {
         self.works()?;
         self.has_room_for(work.cameras.len())?;
         known("method", &work.method, "splat")?;
-        let any: &dyn Any = set;
-        let Uploaded(set) =
-            any.downcast_ref().ok_or_else(|| EngineError::Device("a set of another device".to_owned()))?;
+        let Uploaded { set, mirrored } = uploaded(set)?;
         self.wait_while(|holds| work.cameras.iter().any(|camera| holds.sizes_px.contains(&camera.size_px)));
         sleep(self.pace().view * work.cameras.len() as u32);
         self.reconstructed.fetch_add(work.cameras.len(), Ordering::Relaxed);
-        Ok(work.cameras.iter().map(|camera| averaged(camera, work.planes, |c| splat(set, c, work.planes))).collect())
+        let mut views: Vec<View> =
+            work.cameras.iter().map(|camera| averaged(camera, work.planes, |c| splat(set, c, work.planes))).collect();
+        views.iter_mut().for_each(|view| view.srgb8[..3 * mirrored.len()].copy_from_slice(mirrored.as_flattened()));
+        Ok(views)
     }
 
     fn draw_direct(&self, work: &DirectWork, _: Turn) -> Result<Vec<View>, EngineError> {

@@ -6,8 +6,6 @@ use glam::UVec2;
 use planner::{Budget, Ladder, Row};
 use serde::{Deserialize, Serialize};
 
-use super::cells::first_indices;
-
 /// A session's budget, and the representations among which it chooses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Budgeted {
@@ -59,12 +57,12 @@ impl Budgeted {
             true => vec![workload.sample_cameras.iter().map(resized).collect()],
             false => cells.iter().map(|cell| row.cameras(cell, self.whole_px)).collect(),
         };
-        let is_split = !workload.cell_first_indices.is_empty();
-        Workload {
-            sampling: row.sampling.clone(),
-            cell_first_indices: if is_split { first_indices(&cameras) } else { Vec::new() },
-            sample_cameras: cameras.into_iter().flatten().map(Camera::Pinhole).collect(),
-            ..workload.clone()
+        let cameras: Vec<Vec<Camera>> =
+            cameras.into_iter().map(|cell| cell.into_iter().map(Camera::Pinhole).collect()).collect();
+        let workload = Workload { sampling: row.sampling.clone(), ..workload.clone() };
+        match workload.cell_first_indices.is_empty() {
+            true => Workload { sample_cameras: cameras.concat(), ..workload },
+            false => workload.with_view_cells(cameras),
         }
     }
 

@@ -49,8 +49,8 @@ impl Cells {
         let cameras = |group: &ViewGroup| group.sample_cameras(self.size_px);
         let usable = |cameras: &Vec<PinholeCamera>| cameras.iter().all(|camera| camera.validate().is_ok());
         let cells: Vec<_> = self.groups.iter().map(cameras).filter(usable).take(MAX_CELLS).collect();
-        workload.cell_first_indices = first_indices(&cells);
-        workload.sample_cameras = cells.into_iter().flatten().map(Camera::Pinhole).collect();
+        let cameras = |cell: Vec<PinholeCamera>| cell.into_iter().map(Camera::Pinhole).collect();
+        *workload = workload.clone().with_view_cells(cells.into_iter().map(cameras).collect());
     }
 
     /// Whether sessions of two workloads can share cells.
@@ -62,12 +62,6 @@ impl Cells {
         };
         self.size_px == sample_size_px(other) && alike(own) == alike(other)
     }
-}
-
-/// The index of each cell's first camera.
-pub(crate) fn first_indices<T>(cells: &[Vec<T>]) -> Vec<u32> {
-    let first = |next: &mut u32, cameras: &Vec<T>| Some(std::mem::replace(next, *next + cameras.len() as u32));
-    cells.iter().scan(0, first).collect()
 }
 
 fn sample_size_px(workload: &Workload) -> UVec2 {

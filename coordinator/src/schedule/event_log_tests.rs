@@ -183,8 +183,8 @@ fn an_invalid_line_is_refused_with_its_number_and_field() {
 #[test]
 fn a_log_of_another_version_is_refused_by_its_version() {
     let old = b"{\"version\":2}\n{\"now_ns\":0,\"event\":\"tick\"}\n";
-    assert_eq!(refusal(old), "line 1: version is 2, must be 7");
-    assert_eq!(refusal(b"{\"version\":3}\n"), "line 1: version is 3, must be 7");
+    assert_eq!(refusal(old), "line 1: version is 2, must be 8");
+    assert_eq!(refusal(b"{\"version\":3}\n"), "line 1: version is 3, must be 8");
 }
 
 #[test]

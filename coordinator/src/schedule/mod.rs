@@ -63,7 +63,6 @@ pub(crate) use test_support::workload as workload_for_tests;
 pub use balance::k_fd;
 pub(crate) use budget_plan::MEASURED_BATCH;
 pub use budgeted::Budgeted;
-pub(crate) use cells::first_indices;
 pub use choose::choose;
 pub use cluster::MeasuredCosts;
 pub use command::{Command, Probe, ProbedImage, ViewProbe};

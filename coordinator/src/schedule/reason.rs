@@ -41,7 +41,7 @@ fn pipeline(demand: &Demand<'_>, mean: &Costs, samplers: usize, predicted: &Pred
         nodes => format!("K = {samplers} of {nodes} nodes, {in_turn}the others reconstruct"),
     };
     let tiled = if tiles > 1 { format!(" in {tiles} tiles each") } else { String::new() };
-    let near = if cells > 1 { format!(" for {cells} view cells") } else { String::new() };
+    let near = if cells > 1 { format!(" for {cells} cells") } else { String::new() };
     let once = if is_already_sampled { ", once," } else { "" };
     format!(
         "Pipeline: {} a set: {images} images{near}{tiled} of {} sampled{once} by {roles} {views} views of {} + {} to encode, after {} to \

@@ -275,7 +275,13 @@ fn rated(session: u64, frames_per_s: f64, fallbacks: Vec<Quality>) -> Event {
 }
 
 fn quality(method: &str, frame_rate_ratio: f64) -> Quality {
-    Quality { lighting: "unlit".to_owned(), method: method.to_owned(), sample_side_ratio: 0.5, frame_rate_ratio }
+    Quality {
+        follows_mirrors: false,
+        lighting: "unlit".to_owned(),
+        method: method.to_owned(),
+        sample_side_ratio: 0.5,
+        frame_rate_ratio,
+    }
 }
 
 #[test]

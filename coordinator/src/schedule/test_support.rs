@@ -110,6 +110,7 @@ pub(crate) fn workload(images: usize) -> Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
         sample_cameras: vec![Camera::Pinhole(camera); images],
         cell_first_indices: Vec::new(),
+        mirror_cells: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
         planes: SamplePlanes::default(),

@@ -391,6 +391,7 @@ impl WorkloadState {
             let size_px = (camera.size_px.as_dvec2() * quality.sample_side_ratio).round().as_uvec2().max(UVec2::ONE);
             Camera::Pinhole(camera.resized(size_px))
         };
+        let workload = if quality.follows_mirrors { workload } else { workload.without_mirrors() };
         Workload {
             lighting: quality.lighting.clone(),
             sample_cameras: workload.sample_cameras.iter().map(sized).collect(),

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use client::{Client, Frame, Session, ViewRequest};
 use cluster::limits::{MAX_VIEWPOINTS, MAX_VIEWS_PER_SET};
-use cluster::{BudgetRequest, DIRECT, OfferSettings, PolicyChoice, Quality, SessionRequest, Timeline};
+use cluster::{BudgetRequest, OfferSettings, PolicyChoice, Quality, SessionRequest, Timeline};
 use depth_image::{PinholeCamera, ViewPlanes};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -26,11 +26,11 @@ const FRAME_RATE_RATIO: f64 = 0.8;
 pub fn request(offered: OfferSettings, views: &[PinholeCamera]) -> anyhow::Result<SessionRequest> {
     let OfferSettings { method, sampling, lighting } = offered;
     let lighting = lighting.unwrap_or_else(|| Lighting::default().to_string());
-    let reconstructed = || method.unwrap_or_else(|| ReconstructionMethod::default().to_string());
     Ok(SessionRequest {
         scene: None,
-        method: if is_drawn_for_mirrors(&lighting) { DIRECT.to_owned() } else { reconstructed() },
+        method: method.unwrap_or_else(|| ReconstructionMethod::default().to_string()),
         sampling: sampling.unwrap_or_else(|| SamplingMethod::default().to_string()),
+        follows_mirrors: has_reflections(&lighting),
         lighting,
         codec: "lz4".to_owned(),
         sample_cameras: Vec::new(),
@@ -53,10 +53,8 @@ pub fn request(offered: OfferSettings, views: &[PinholeCamera]) -> anyhow::Resul
     })
 }
 
-/// Whether a lighting has mirrors that show the scene. Views are then drawn directly: compositors do not follow rays off
-/// mirrors.
-#[must_use]
-pub fn is_drawn_for_mirrors(lighting: &str) -> bool {
+/// Whether mirrors show the scene in a lighting.
+fn has_reflections(lighting: &str) -> bool {
     lighting.parse().is_ok_and(|lighting: Lighting| lighting.reflections() > 0)
 }
 
@@ -75,8 +73,10 @@ fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
     let fewer_rays = unmirrored.or(whole).and_then(|lighting| lighting.with_fewer_rays());
     let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.coarser());
     let (lighting, method) = (lighting.to_owned(), method.to_owned());
-    let all = Quality { lighting, method, sample_side_ratio: 1.0, frame_rate_ratio: 1.0 };
-    let plain = unmirrored.map(|lighting| Quality { lighting: lighting.to_string(), ..all.clone() });
+    let follows_mirrors = unmirrored.is_some();
+    let all = Quality { lighting, follows_mirrors, method, sample_side_ratio: 1.0, frame_rate_ratio: 1.0 };
+    let unmirrored = unmirrored.map(|lighting| lighting.to_string());
+    let plain = unmirrored.map(|lighting| Quality { lighting, follows_mirrors: false, ..all.clone() });
     let above = plain.clone().unwrap_or(all);
     let dim = fewer_rays.map(|lighting| Quality { lighting: lighting.to_string(), ..above.clone() });
     let above = dim.clone().unwrap_or(above);
@@ -147,13 +147,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn views_with_mirror_images_are_drawn_directly_and_lose_them_first() {
+    fn views_with_mirror_images_lose_them_first() {
         let offered = OfferSettings { lighting: Some("shadows, reflections 2".to_owned()), ..OfferSettings::default() };
         let view = PinholeCamera::looking_at(glam::Vec3::Z, glam::Vec3::ZERO, glam::Vec3::Y, 0.8, glam::UVec2::ONE);
         let request = request(offered, &[view]).expect("a request");
-        assert_eq!(request.method, "direct");
+        assert_eq!((request.method.as_str(), request.follows_mirrors), ("joint_carve", true));
         let lightings: Vec<String> = fallbacks(&request.lighting, "direct").into_iter().map(|q| q.lighting).collect();
         assert_eq!(lightings, ["shadows"; 3]);
+        assert!(fallbacks(&request.lighting, "direct").iter().all(|q| !q.follows_mirrors));
         let lightings: Vec<String> =
             fallbacks("soft 8, reflections 1", "direct").into_iter().map(|q| q.lighting).collect();
         assert_eq!(lightings, ["soft 8", "soft 2", "soft 2", "soft 2"]);

@@ -53,7 +53,7 @@ impl Planning {
     /// The scene has no sample cameras, or the user's choices leave no row.
     pub fn new(setup: &Setup, args: &SceneArgs, views: &PlannedViews) -> anyhow::Result<Self> {
         if args.lighting.reflections() > 0 {
-            let reason = "views with reflections are drawn directly: there is nothing to choose";
+            let reason = "no budget can be kept for mirrors that show the scene";
             return Err(BadInput(format!("--lighting {}: {reason}", args.lighting)).into());
         }
         let cell = ViewCell::between(&setup.around).context("no sample cameras")?;

@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::Args;
-use cluster::{OfferSettings, SceneHash};
+use cluster::{MirrorCell, OfferSettings, SceneHash};
 use coordinator::SceneOffer;
 use depth_image::{Camera, PinholeCamera};
 use glam::UVec2;
 use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
-use sampling::{Rig, SamplingMethod};
+use sampling::{Mirror, Rig, SamplingMethod};
 use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec, UpAxis};
 
 use crate::camera_file::{self, Placement};
@@ -53,7 +53,7 @@ pub struct SceneArgs {
     pub up: UpAxis,
     /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, or soft N (N rays
     /// a light). Ambient occlusion: occlusion N [RADIUSm]. Mirrors that show the scene: reflections N (mirrors that a
-    /// ray meets, 1 to 8; such views are drawn directly). Rate: adaptive [TOLERANCE] traces rays only where light changes
+    /// ray meets, 1 to 8). Rate: adaptive [TOLERANCE] traces rays only where light changes
     #[arg(long, default_value_t, value_name = "TERMS")]
     pub lighting: Lighting,
     /// A lamp in place of the scene's lamps, in the scene file's coordinates; may be repeated. Forms: "sun
@@ -94,6 +94,20 @@ pub struct Setup {
     pub samples: Vec<PinholeCamera>,
     /// The offer for a coordinator.
     pub offer: SceneOffer,
+}
+
+/// The scene's mirrors, as sessions follow them. Their images are taken from one place, so that they repeat little.
+fn mirrors_of(scene: &Scene) -> Vec<(MirrorCell, Vec<Camera>)> {
+    let (mirrors, beyond) = sampling::mirrors(scene);
+    if beyond > 0 {
+        tracing::info!(beyond, followed = mirrors.len(), "the smallest mirrors show the environment alone");
+    }
+    let sampling = SamplingMethod::default().to_string();
+    let cell = |mirror: Mirror| {
+        let cell = MirrorCell { bounds: mirror.bounds, sampling: sampling.clone() };
+        (cell, mirror.cameras.into_iter().map(Camera::Pinhole).collect())
+    };
+    mirrors.into_iter().map(cell).collect()
 }
 
 /// The name by which sessions ask for a scene: a built-in scene's own, or a file's without folder and ending.
@@ -149,6 +163,7 @@ impl SceneArgs {
             name: offer_name(&self.scene),
             hash: SceneHash::of(&package),
             package: package.into(),
+            mirrors: mirrors_of(&scene),
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
             fits_views: self.sample_size == SampleSize::Auto && self.samples.is_none(),
             rows: rows(&self.named(around.len() as u32)),

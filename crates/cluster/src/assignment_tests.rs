@@ -2,11 +2,11 @@
 
 use std::num::NonZeroU32;
 
-use depth_image::{Camera, Environment, PinholeCamera};
+use depth_image::{Aabb, Camera, Environment, PinholeCamera};
 use glam::Vec3;
 
 use crate::test_support::{assignment, camera, workload};
-use crate::{ApplyPlan, Assignment, CompositorShare, Policy, Refinement, SamplerShare, Timeline, Workload};
+use crate::{ApplyPlan, Assignment, CompositorShare, MirrorCell, Policy, Refinement, SamplerShare, Timeline, Workload};
 
 fn refusal(plan: &Assignment) -> String {
     plan.validate().expect_err("refused").to_string()
@@ -187,4 +187,76 @@ fn cells_that_are_empty_or_out_of_order_are_refused() {
         assert!(text.contains("cell_first_indices is ") && text.contains("of 4 sample_cameras"), "{text}");
     }
     assert!(spoilt(vec![0; 65]).contains("cell_first_indices has 65"));
+}
+
+/// A box around the mirrors of a mirror cell.
+fn mirror(x: f32) -> MirrorCell {
+    let bounds = Aabb { min: Vec3::new(x, 0.0, 0.0), max: Vec3::new(x + 1.0, 1.0, 0.0) };
+    MirrorCell { bounds, sampling: "all".to_owned() }
+}
+
+/// As [`of_cells`], with two mirror cells of two cameras and of one.
+fn with_mirrors() -> Assignment {
+    let mirrors = vec![
+        (mirror(0.0), vec![Camera::Pinhole(camera()); 2]),
+        (mirror(5.0), vec![Camera::Pinhole(PinholeCamera { eye_in_world: Vec3::Z * 7.0, ..camera() })]),
+    ];
+    let mut plan = of_cells();
+    plan.workload = plan.workload.with_mirrors(mirrors);
+    plan.samplers[1].image_indices.extend(8..14);
+    plan
+}
+
+#[test]
+fn mirror_cells_come_last_and_are_no_views() {
+    let (plan, view_cells) = (with_mirrors(), of_cells());
+    assert_eq!(plan.validate(), Ok(()));
+    assert_eq!((plan.workload.cell_count(), plan.workload.view_cell_count()), (5, 3));
+    assert_eq!(plan.workload.cell_first_indices, [0, 1, 3, 4, 6]);
+    let near_mirror = PinholeCamera { eye_in_world: Vec3::Z * 7.0, ..camera() };
+    assert_eq!(plan.cell_of(&near_mirror), view_cells.cell_of(&near_mirror));
+    assert_eq!((plan.workload.mirror_cell(2), plan.workload.mirror_cell(4)), (None, Some(&mirror(5.0))));
+    let of_mirror = plan.of_cell(3).unwrap();
+    assert_eq!((of_mirror.workload.sampling.as_str(), of_mirror.workload.mirror_cells.len()), ("all", 0));
+    assert_eq!(of_mirror.samplers[0].image_indices, [0, 1, 2, 3], "its own, tile by tile");
+    for cell in 0..3 {
+        let content = |plan: &Assignment| plan.of_cell(cell).unwrap().set_content(0);
+        assert_eq!(content(&plan), content(&view_cells), "views' images do not depend on mirrors");
+    }
+    assert_eq!(plan.workload.clone().without_mirrors(), view_cells.workload);
+    assert_eq!(view_cells.workload.clone().without_mirrors(), view_cells.workload);
+    assert_eq!(workload().with_mirrors(Vec::new()), workload());
+}
+
+#[test]
+fn mirror_cells_stay_when_view_cells_change() {
+    let plan = with_mirrors();
+    let moved = plan.workload.clone().with_view_cells(vec![vec![Camera::Pinhole(camera())]]);
+    assert_eq!((moved.cell_first_indices.clone(), moved.sample_cameras.len()), (vec![0, 1, 3], 4));
+    assert_eq!(moved.validate(), Ok(()));
+    let content = |workload: &Workload, cell: usize| {
+        Assignment { workload: workload.of_cell(cell).unwrap(), ..assignment() }.set_content(0)
+    };
+    assert_eq!([content(&moved, 1), content(&moved, 2)], [content(&plan.workload, 3), content(&plan.workload, 4)]);
+    let one = plan.workload.of_one_view();
+    assert_eq!((one.cell_first_indices.clone(), one.mirror_cells.len()), (vec![0, 1, 3], 2));
+    assert_eq!(of_cells().workload.of_one_view(), of_cells().workload.of_cell(0).unwrap());
+}
+
+#[test]
+fn mirror_cells_that_no_peer_may_send_are_refused() {
+    let spoilt = |spoil: &dyn Fn(&mut Workload)| {
+        let mut plan = with_mirrors();
+        spoil(&mut plan.workload);
+        refusal(&plan)
+    };
+    let many = |w: &mut Workload| w.mirror_cells = vec![mirror(0.0); 9];
+    assert!(spoilt(&many).contains("mirror_cells has 9, at most 8"));
+    let no_views = |w: &mut Workload| w.mirror_cells = vec![mirror(0.0); 5];
+    assert!(spoilt(&no_views).contains("mirror_cells is 5, must be fewer than cells"));
+    for bounds in [Aabb::EMPTY, Aabb { min: Vec3::ZERO, max: Vec3::INFINITY }, Aabb { min: Vec3::NAN, max: Vec3::ONE }]
+    {
+        assert!(spoilt(&|w| w.mirror_cells[0].bounds = bounds).contains("mirror_cells.bounds"), "{bounds:?}");
+    }
+    assert!(spoilt(&|w| w.mirror_cells[1].sampling.clear()).contains("mirror_cells.sampling_method is missing"));
 }

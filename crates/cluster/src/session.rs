@@ -27,6 +27,8 @@ pub struct SessionRequest {
     pub sampling: String,
     /// How samples are lit.
     pub lighting: String,
+    /// Mirrors in reconstructed views show the scene, as the lighting says: samples have mirror cells.
+    pub follows_mirrors: bool,
     /// How frames are encoded.
     pub codec: String,
     /// Empty: the rig that the coordinator was given with the scene.
@@ -93,6 +95,8 @@ impl SessionRequest {
 pub struct Quality {
     /// How samples are lit.
     pub lighting: String,
+    /// As [`SessionRequest::follows_mirrors`].
+    pub follows_mirrors: bool,
     /// How views are reconstructed.
     pub method: String,
     /// Sides of sample images, of those asked for: above 0, at most 1.

@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use depth_image::{Aabb, Camera, Environment, Illumination, MAX_LIGHTS, PinholeCamera, ViewGroup, nearest_set};
+use depth_image::{
+    Aabb, Camera, Environment, Illumination, MAX_LIGHTS, MAX_MIRROR_CELLS, PinholeCamera, ViewGroup, nearest_set,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::check::{InvalidField, at_most, nonempty, within};
@@ -18,8 +20,11 @@ pub struct Workload {
     pub scene: SceneRef,
     /// Every set has one image for each; cameras of a view cell stand next to each other.
     pub sample_cameras: Vec<Camera>,
-    /// Where each view cell's cameras begin, the first's at 0; empty: one cell has all.
+    /// Where each cell's cameras begin, the first's at 0; empty: one view cell has all.
     pub cell_first_indices: Vec<u32>,
+    /// The last cells are mirror cells: they depend on no viewer, and every view is made from all of them and from one view
+    /// cell.
+    pub mirror_cells: Vec<MirrorCell>,
     /// How images are sampled.
     pub sampling: String,
     /// How samples are lit.
@@ -36,6 +41,15 @@ pub struct Workload {
     pub illumination: Illumination,
     /// Steps in which a still picture is refined: from 1, finished at once, to [`MAX_REFINEMENT_STEPS`].
     pub refinement_steps: u32,
+}
+
+/// Mirrors within a box. The images of its cell show what they mirror.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MirrorCell {
+    /// Holds the mirrors' surfaces at all moments.
+    pub bounds: Aabb,
+    /// How its images are sampled.
+    pub sampling: String,
 }
 
 /// Planes of sample images that not every reconstruction method needs.
@@ -65,13 +79,25 @@ impl Workload {
         if self.timeline.moves() { last } else { Refinement { step: set_index.min(last.step), ..last } }
     }
 
-    /// View cells: each view is made from the images of one cell.
+    /// All cells: view cells, and after them mirror cells.
     #[must_use]
     pub fn cell_count(&self) -> usize {
         self.cell_first_indices.len().max(1)
     }
 
-    /// The range of sample cameras of a view cell; `None` beyond the last cell.
+    /// View cells: each view is made from the images of one of them.
+    #[must_use]
+    pub fn view_cell_count(&self) -> usize {
+        self.cell_count().saturating_sub(self.mirror_cells.len()).max(1)
+    }
+
+    /// The mirror cell of a cell's number; `None` for a view cell, and beyond the last.
+    #[must_use]
+    pub fn mirror_cell(&self, cell: usize) -> Option<&MirrorCell> {
+        self.mirror_cells.get(cell.checked_sub(self.view_cell_count())?)
+    }
+
+    /// The range of sample cameras of a cell; `None` beyond the last cell.
     #[must_use]
     pub fn cameras_of_cell(&self, cell: usize) -> Option<Range<usize>> {
         let firsts = if self.cell_first_indices.is_empty() { &[0][..] } else { &self.cell_first_indices };
@@ -79,20 +105,75 @@ impl Workload {
         Some(first(cell)?..first(cell + 1).unwrap_or(self.sample_cameras.len()))
     }
 
-    /// The workload of one view cell alone; `None` beyond the last.
+    /// The workload of one cell alone, without mirror cells; `None` beyond the last.
     #[must_use]
     pub fn of_cell(&self, cell: usize) -> Option<Self> {
         let sample_cameras = self.sample_cameras.get(self.cameras_of_cell(cell)?)?.to_vec();
-        Some(Self { sample_cameras, cell_first_indices: Vec::new(), ..self.clone() })
+        let sampling = self.mirror_cell(cell).map_or(&self.sampling, |mirror| &mirror.sampling).clone();
+        let (cell_first_indices, mirror_cells) = (Vec::new(), Vec::new());
+        Some(Self { sample_cameras, cell_first_indices, mirror_cells, sampling, ..self.clone() })
+    }
+
+    /// The workloads of all cells: view cells first, then mirror cells.
+    #[must_use]
+    pub fn cells(&self) -> Vec<Self> {
+        (0..self.cell_count()).filter_map(|cell| self.of_cell(cell)).collect()
+    }
+
+    /// The workload with other view cells, the cameras of each, and its own mirror cells.
+    #[must_use]
+    pub fn with_view_cells(self, cells: Vec<Vec<Camera>>) -> Self {
+        let mirrors = self.view_cell_count()..self.cell_count();
+        let cameras_of = |cell| Some((self.mirror_cell(cell)?.clone(), self.of_cell(cell)?.sample_cameras));
+        let mirrors: Vec<_> = mirrors.filter_map(cameras_of).collect();
+        let cell_first_indices = first_indices(&cells);
+        let sample_cameras = cells.concat();
+        Self { sample_cameras, cell_first_indices, mirror_cells: Vec::new(), ..self }.with_mirrors(mirrors)
+    }
+
+    /// The workload with further mirror cells, and the cameras of each.
+    #[must_use]
+    pub fn with_mirrors(mut self, mirrors: Vec<(MirrorCell, Vec<Camera>)>) -> Self {
+        if self.cell_first_indices.is_empty() && !mirrors.is_empty() {
+            self.cell_first_indices.push(0);
+        }
+        for (cell, cameras) in mirrors {
+            self.cell_first_indices.push(self.sample_cameras.len() as u32);
+            self.sample_cameras.extend(cameras);
+            self.mirror_cells.push(cell);
+        }
+        self
+    }
+
+    /// The workload without mirror cells.
+    #[must_use]
+    pub fn without_mirrors(mut self) -> Self {
+        let cells = self.view_cell_count();
+        self.mirror_cells.clear();
+        if let Some(&first) = self.cell_first_indices.get(cells) {
+            self.sample_cameras.truncate(first as usize);
+            self.cell_first_indices.truncate(cells);
+        }
+        self
+    }
+
+    /// The workload of one view, which stands for others: the first view cell and the mirror cells.
+    #[must_use]
+    pub fn of_one_view(&self) -> Self {
+        let first = self.of_cell(0).map_or_else(Vec::new, |first| first.sample_cameras);
+        if self.mirror_cells.is_empty() {
+            return self.of_cell(0).unwrap_or_else(|| self.clone());
+        }
+        self.clone().with_view_cells(vec![first])
     }
 
     /// The view cell that a view is in, or else nearest to.
     #[must_use]
     pub fn cell_of(&self, view: &PinholeCamera) -> u32 {
-        if self.cell_count() == 1 {
+        if self.view_cell_count() == 1 {
             return 0;
         }
-        let cells = (0..self.cell_count()).map(|cell| self.pinholes_of_cell(cell));
+        let cells = (0..self.view_cell_count()).map(|cell| self.pinholes_of_cell(cell));
         nearest_set(view, cells, &self.volume).unwrap_or(0) as u32
     }
 
@@ -117,6 +198,7 @@ impl Workload {
     pub fn validate(&self) -> Result<(), InvalidField> {
         self.scene.validate()?;
         self.check_cells()?;
+        self.check_mirrors()?;
         for Camera::Pinhole(camera) in &self.sample_cameras {
             camera.validate().map_err(|source| InvalidField::Camera { field: "sample_cameras", source })?;
         }
@@ -137,7 +219,8 @@ impl Workload {
 
     fn check_cells(&self) -> Result<(), InvalidField> {
         let firsts = &self.cell_first_indices;
-        at_most(firsts.len(), MAX_CELLS, "cell_first_indices")?;
+        at_most(self.mirror_cells.len(), MAX_MIRROR_CELLS, "mirror_cells")?;
+        at_most(firsts.len(), MAX_CELLS + self.mirror_cells.len(), "cell_first_indices")?;
         at_most(self.sample_cameras.len(), MAX_SAMPLE_CAMERAS * self.cell_count(), "sample_cameras")?;
         let ends = firsts.iter().skip(1).copied().chain([self.sample_cameras.len() as u32]);
         let is_cell = |(&first, end): (&u32, u32)| first < end && end - first <= MAX_SAMPLE_CAMERAS as u32;
@@ -151,6 +234,30 @@ impl Workload {
         }
         Ok(())
     }
+
+    fn check_mirrors(&self) -> Result<(), InvalidField> {
+        let mirrors = self.mirror_cells.len();
+        if mirrors > 0 && mirrors >= self.cell_first_indices.len() {
+            return Err(InvalidField::out_of_range(
+                "mirror_cells",
+                mirrors,
+                "fewer than cells: views have one at least",
+            ));
+        }
+        for MirrorCell { bounds, sampling } in &self.mirror_cells {
+            nonempty(sampling, "mirror_cells.sampling_method")?;
+            if bounds.is_empty() || !bounds.min.is_finite() || !bounds.max.is_finite() {
+                return Err(InvalidField::out_of_range("mirror_cells.bounds", "empty or not finite", "a finite box"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The index of each cell's first camera.
+fn first_indices(cells: &[Vec<Camera>]) -> Vec<u32> {
+    let first = |next: &mut u32, cameras: &Vec<Camera>| Some(std::mem::replace(next, *next + cameras.len() as u32));
+    cells.iter().scan(0, first).collect()
 }
 
 fn validate_illumination(illumination: &Illumination) -> Result<(), InvalidField> {

@@ -25,6 +25,8 @@ pub struct Reflector {
 
 /// Most mirrors that a ray meets, one after the other.
 pub const MAX_REFLECTIONS: u32 = 8;
+/// Mirror cells of a view.
+pub const MAX_MIRROR_CELLS: usize = 8;
 
 /// Range of the exponents of Blinn-Phong lobes.
 pub(crate) const EXPONENTS: [f32; 2] = [1.0, 1024.0];

@@ -7,13 +7,16 @@ use std::sync::{Arc, Weak};
 
 use bands::{BAND_PIXELS, views_in_bands};
 use cluster::{DIRECT, SamplePlanes};
-use depth_image::{DepthImage, View};
+use depth_image::{Aabb, DepthImage, View};
 use gpu::{DevicePreference, Gpu, GpuError};
 use node::{
-    DirectWork, Engine, EngineError, OpenEngine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass,
+    DirectWork, Engine, EngineError, MirrorSet, OpenEngine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork,
+    WorkClass,
 };
 use parking_lot::Mutex;
-use reconstruction::{ReconstructionError, ReconstructionMethod, Reconstructor, RequiredPlanes, SetDescription};
+use reconstruction::{
+    MirrorCell, Mirrors, ReconstructionError, ReconstructionMethod, Reconstructor, RequiredPlanes, SetDescription,
+};
 use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, Visibility};
 use sampling::{Sampler, SamplingError, SamplingMethod};
 use scene::{Limits, Scene};
@@ -41,11 +44,24 @@ pub struct GpuEngine {
 
 /// A sample set on this engine's device.
 struct Uploaded {
-    set: reconstruction::SampleSet,
-    /// Mirrors show the scene in this light.
-    has_mirrors: bool,
+    set: Arc<reconstruction::SampleSet>,
+    /// Mirrors that a ray meets one after the other in this light.
+    reflections: u32,
+    /// What mirrors show.
+    mirrors: Vec<(Aabb, Arc<reconstruction::SampleSet>)>,
 }
 impl UploadedSet for Uploaded {}
+
+impl Uploaded {
+    fn of(set: Arc<dyn UploadedSet>) -> Result<Arc<Self>, EngineError> {
+        let any: Arc<dyn Any + Send + Sync> = set;
+        any.downcast().map_err(|_| of_another_device())
+    }
+}
+
+fn of_another_device() -> EngineError {
+    device("a sample set of another device")
+}
 
 impl GpuEngine {
     /// Opens a device for this engine.
@@ -192,9 +208,12 @@ impl Engine for GpuEngine {
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError> {
         let scene = self.scene(&request.scene_hash)?;
         let cluster::Refinement { step, steps } = request.refinement;
+        let lighting: Lighting = parsed("lighting", &request.lighting)?;
+        // What mirrors show is each view's own.
+        let lighting = lighting.without_reflections().unwrap_or(lighting);
         let draw = DrawWork {
             refinement: Refinement { step, steps },
-            ..draw_work(&scene, parsed("lighting", &request.lighting)?, request.scene_time_s, turn)
+            ..draw_work(&scene, lighting, request.scene_time_s, turn)
         };
         let SamplePlanes { normals: normal, corner_inverse_depths: corners } = request.planes;
         let work = sampling::SampleWork {
@@ -226,21 +245,29 @@ impl Engine for GpuEngine {
         };
         let upload = || self.reconstructor.upload_in_turn(&set.images, &description, device_turn(turn));
         let set = self.catching(|| upload().map_err(reconstruction_error))?;
-        Ok(Arc::new(Uploaded { set, has_mirrors: lighting.reflections() > 0 }))
+        Ok(Arc::new(Uploaded { set: Arc::new(set), reflections: lighting.reflections(), mirrors: Vec::new() }))
+    }
+
+    fn mirroring(
+        &self,
+        set: Arc<dyn UploadedSet>,
+        mirrors: Vec<MirrorSet>,
+    ) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        let set = Uploaded::of(set)?;
+        let shown = |(bounds, mirror)| Ok((bounds, Uploaded::of(mirror)?.set.clone()));
+        let mirrors = mirrors.into_iter().map(shown).collect::<Result<_, EngineError>>()?;
+        Ok(Arc::new(Uploaded { set: set.set.clone(), reflections: set.reflections, mirrors }))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {
-        let Uploaded { set, has_mirrors } =
-            (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))?;
-        if *has_mirrors {
-            let reason =
-                "mirrors show the scene in views that are drawn directly alone; the method for them is `direct`";
-            return Err(invalid("reconstruction_method", reason));
-        }
+        let Uploaded { set, reflections, mirrors } = (set as &dyn Any).downcast_ref().ok_or_else(of_another_device)?;
+        let cells = mirrors.iter().map(|(bounds, shown)| MirrorCell { bounds: *bounds, surroundings: shown });
+        let cells: Vec<MirrorCell<'_>> = cells.collect();
+        let mirrors = Mirrors { cells: &cells, reflections: *reflections };
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
         let turn = device_turn(turn);
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
-            let make = || self.reconstructor.reconstruct_in_turn(set, cameras, method, work.planes, turn);
+            let make = || self.reconstructor.reconstruct_mirrored(set, mirrors, cameras, method, work.planes, turn);
             self.catching(|| make().map_err(reconstruction_error))
         })
     }

@@ -9,7 +9,7 @@ use depth_image::{DepthImage, PinholeCamera, View};
 use parking_lot::Mutex;
 use tokio::sync::watch;
 
-use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, UploadedSet, ViewWork};
+use crate::engine::{DirectWork, Engine, EngineError, MirrorSet, SampleSet, SampleWork, Turn, UploadedSet, ViewWork};
 use crate::set_memory::SetMemory;
 
 /// Calls that run out of memory one after the other, until the node leaves.
@@ -152,6 +152,14 @@ impl Engine for DeviceMonitor {
     fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
         let upload = || self.engine.upload(set, turn);
         self.relieved(upload, upload)
+    }
+
+    fn mirroring(
+        &self,
+        set: Arc<dyn UploadedSet>,
+        mirrors: Vec<MirrorSet>,
+    ) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        self.monitored(self.engine.mirroring(set, mirrors))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {

@@ -79,6 +79,13 @@ pub trait Engine: Send + Sync + 'static {
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError>;
     /// Uploads a set for reconstruction. Fails for images that the device cannot take.
     fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError>;
+    /// A set whose mirrors show what the sets of mirror cells hold, each with the bounds of its mirrors. It keeps these sets on
+    /// the device. Mirrors of other sets show lamps and the environment.
+    fn mirroring(
+        &self,
+        set: Arc<dyn UploadedSet>,
+        mirrors: Vec<MirrorSet>,
+    ) -> Result<Arc<dyn UploadedSet>, EngineError>;
     /// Reconstructs one view for each camera.
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError>;
     /// Draws one view for each camera from the scene itself.
@@ -87,6 +94,21 @@ pub trait Engine: Send + Sync + 'static {
 
 /// Opens the engine of a device, for a node's start and again after the device was lost. It blocks.
 pub type OpenEngine = Arc<dyn Fn() -> Result<Arc<dyn Engine>, EngineError> + Send + Sync>;
+
+/// The set of a view cell with those of mirror cells, from the sets of all cells of a workload [of one
+/// view](Workload::of_one_view).
+pub(crate) fn mirroring(
+    engine: &dyn Engine,
+    workload: &Workload,
+    sets: Vec<Arc<dyn UploadedSet>>,
+) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    let mut sets = sets.into_iter();
+    let reason = || EngineError::InvalidArgument { field: "sample_cameras", reason: "a view has none".to_owned() };
+    let set = sets.next().ok_or_else(reason)?;
+    let bounds = workload.mirror_cells.iter().map(|mirror| mirror.bounds);
+    let mirrors: Vec<MirrorSet> = bounds.zip(sets).collect();
+    if mirrors.is_empty() { Ok(set) } else { engine.mirroring(set, mirrors) }
+}
 
 /// The result of work on this thread, and the seconds that it took, without those for which it waited for others.
 pub fn own_time<T>(engine: &dyn Engine, work: impl FnOnce() -> T) -> (T, f64) {
@@ -99,6 +121,9 @@ pub fn own_time<T>(engine: &dyn Engine, work: impl FnOnce() -> T) -> (T, f64) {
 
 /// A sample set on the device; the engine downcasts it to its own type.
 pub trait UploadedSet: Any + Send + Sync {}
+
+/// The bounds of a mirror cell's mirrors, and its set.
+pub type MirrorSet = (Aabb, Arc<dyn UploadedSet>);
 
 /// Images to sample.
 #[derive(Debug, Clone, PartialEq)]
@@ -121,7 +146,7 @@ pub struct SampleWork {
 }
 
 impl SampleWork {
-    /// All images of a workload's first set, finished at once.
+    /// All images of the first set of a workload of one cell, finished at once.
     #[must_use]
     pub fn of(workload: &Workload) -> Self {
         Self {

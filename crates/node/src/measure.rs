@@ -11,7 +11,9 @@ use glam::UVec2;
 use tonic::Status;
 
 use crate::auto_exposure::auto_exposure;
-use crate::engine::{DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass, own_time};
+use crate::engine::{
+    DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass, mirroring, own_time,
+};
 
 /// Runs of one operation after a warm-up, in which shaders are built.
 const RUNS: usize = 3;
@@ -63,12 +65,20 @@ impl Measurement<'_> {
     fn costs(&self, request: &MeasureCosts) -> Result<Measured, Status> {
         let (engine, workload) = (self.engine, &request.workload);
         let planes = engine.sample_planes(&request.method)?;
-        let sample = SampleWork { planes, ..SampleWork::of(workload) };
-        let (encoded, sample_s) = self.timed(|| self.sampled(&sample))?;
-        let (set, load_set_s) = self.timed(|| Ok(engine.upload(&decoded(workload, &encoded)?, self.turn)?))?;
-        let sample_image_s = sample_s / encoded.len().max(1) as f64;
+        // Views are made from all of them: their own cell, and what mirrors show.
+        let cells = workload.cells();
+        let sample = |cell| SampleWork { planes, ..SampleWork::of(cell) };
+        let sampled = || cells.iter().map(|cell| self.sampled(&sample(cell))).collect::<Result<Vec<_>, _>>();
+        let (encoded, sample_s) = self.timed(sampled)?;
+        let upload = |(cell, images): (&Workload, &Vec<_>)| Ok(engine.upload(&decoded(cell, images)?, self.turn)?);
+        let upload_all = || cells.iter().zip(&encoded).map(upload).collect::<Result<Vec<_>, Status>>();
+        let (sets, load_s) = self.timed(upload_all)?;
+        let set = mirroring(engine, workload, sets)?;
+        let load_set_s = load_s / cells.len().max(1) as f64;
+        let sample_image_s = sample_s / workload.sample_cameras.len().max(1) as f64;
         let is_tileable = engine.images_are_independent(&workload.sampling)?;
-        let tiles = if is_tileable { self.tile_costs(&sample, sample_image_s)? } else { None };
+        let first = cells.first().filter(|_| is_tileable);
+        let tiles = first.map(|cell| self.tile_costs(&sample(cell), sample_image_s)).transpose()?.flatten();
         let (drawn, direct_view_s) = self.direct_view_s(request)?;
         let (made, reconstruct_view_s) = match request.method.as_str() {
             DIRECT => (drawn, direct_view_s),

@@ -9,7 +9,7 @@ use depth_image::{Aabb, DepthImage, Environment, Illumination, SpecularPlanes, V
 use glam::Vec3;
 
 use super::*;
-use crate::engine::EngineError;
+use crate::engine::{EngineError, MirrorSet};
 
 /// A device that sleeps and notes its calls.
 #[derive(Default)]
@@ -27,6 +27,8 @@ pub(crate) struct Calls {
     pub(crate) refinements: Vec<Refinement>,
     pub(crate) drawn_views: Vec<usize>,
     pub(crate) uploads: Vec<(Illumination, bool)>,
+    /// The bounds of the mirrors of each set that has some.
+    pub(crate) mirrors: Vec<Vec<Aabb>>,
 }
 
 struct Nothing;
@@ -111,6 +113,15 @@ impl Engine for Sleeper {
         Ok(Arc::new(Nothing))
     }
 
+    fn mirroring(
+        &self,
+        set: Arc<dyn UploadedSet>,
+        mirrors: Vec<MirrorSet>,
+    ) -> Result<Arc<dyn UploadedSet>, EngineError> {
+        self.calls.lock().unwrap().mirrors.push(mirrors.into_iter().map(|(bounds, _)| bounds).collect());
+        Ok(set)
+    }
+
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, _: Turn) -> Result<Vec<View>, EngineError> {
         let any: &dyn Any = set;
         assert!(any.is::<Nothing>());
@@ -132,6 +143,7 @@ pub(crate) fn request(batch_count: u32) -> MeasureCosts {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
         sample_cameras: vec![Camera::Pinhole(camera()); 2],
         cell_first_indices: Vec::new(),
+        mirror_cells: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "traced".to_owned(),
         planes: SamplePlanes::default(),
@@ -166,6 +178,20 @@ fn quick_operations_run_three_times_after_a_warm_up() {
     assert_eq!(calls.drawn_views, [1, 1, 1, 1, 32, 32, 32, 32, 1], "the last is for the exposure");
     assert!((1e-3..0.01).contains(&costs.direct_view_s), "{costs:?}");
     assert_eq!(calls.uploads, vec![(request(1).workload.illumination, true); 4], "with what highlights need");
+}
+
+#[test]
+fn costs_of_views_with_mirrors_are_those_of_all_their_images() {
+    let bounds = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
+    let mirror = cluster::MirrorCell { bounds, sampling: "conventional".to_owned() };
+    let plain = request(32);
+    let workload = plain.workload.clone().with_mirrors(vec![(mirror, vec![Camera::Pinhole(camera()); 6])]);
+    let engine = Sleeper { sample_s: 0.04, ..Sleeper::default() };
+    let costs = measure_costs(&engine, &MeasureCosts { workload, ..plain }).unwrap().costs;
+    let calls = engine.calls.into_inner().unwrap();
+    assert_eq!(calls.mirrors, [vec![bounds]]);
+    assert_eq!(calls.uploads.len(), 8, "both sets, four times");
+    assert!((0.01..0.02).contains(&costs.sample_image_s), "two calls for eight images: {costs:?}");
 }
 
 #[test]

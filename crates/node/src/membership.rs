@@ -13,7 +13,7 @@ use tonic::Status;
 use wire::rpc::{Backoff, CoordinatorClient, connect};
 
 use crate::blocking::blocking;
-use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, ViewWork, WorkClass};
+use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, ViewWork, WorkClass, mirroring};
 use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
 use crate::work_done::WorkDone;
@@ -135,12 +135,15 @@ async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plans: &PlansI
 /// Makes one small picture of each kind that the plan has, its views by `method`.
 fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), EngineError> {
     let turn = Turn::of(WorkClass::Batch);
-    let workload = small(&plan.workload.of_cell(0).unwrap_or_else(|| plan.workload.clone()));
+    let workload = small(&plan.workload.of_one_view());
     let Some(Camera::Pinhole(view)) = workload.sample_cameras.first().copied() else { return Ok(()) };
     if plan.policy == Policy::Direct {
         return engine.draw_direct(&DirectWork::of(&workload, vec![view], ViewPlanes::default()), turn).map(drop);
     }
-    let set = engine.upload(&SampleSet::of(&workload, engine.sample(&SampleWork::of(&workload), turn)?), turn)?;
+    let upload =
+        |cell: &Workload| engine.upload(&SampleSet::of(cell, engine.sample(&SampleWork::of(cell), turn)?), turn);
+    let sets = workload.cells().iter().map(upload).collect::<Result<Vec<_>, _>>()?;
+    let set = mirroring(engine, &workload, sets)?;
     let work = ViewWork { cameras: vec![view], method, planes: ViewPlanes::default() };
     engine.reconstruct(set.as_ref(), &work, turn).map(drop)
 }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use cluster::limits::MAX_WORKLOADS;
 use cluster::{ApplyPlan, Assignment, SetContent, Workload};
 use codec::EncodedDepthImage;
+use depth_image::Aabb;
 use parking_lot::Mutex;
 use tokio::sync::watch;
 use tonic::Status;
@@ -260,28 +261,36 @@ pub fn has_set(plan: &Arc<Assignment>, content: &SetContent, set_index: u32) -> 
     (0..plan.workload.cell_count()).any(|cell| of_cell(cell).as_ref() == Some(content))
 }
 
-/// The plan of one view cell, without the images of other cells. Clones share it.
+/// The plan of one cell, without the images of other cells. Clones share it.
 #[derive(Debug, Clone)]
 pub struct CellPlan {
     plan: Arc<Assignment>,
-    /// Index into the plan's view cells.
+    /// Index into the plan's cells.
     pub cell: u32,
-    /// The number of view cells of the whole plan.
-    pub cell_count: usize,
+    /// It is a mirror cell: views are not made from it alone.
+    pub is_mirror: bool,
 }
 
 impl CellPlan {
-    /// The part of `plan` for one view cell.
+    /// The part of `plan` for one cell.
     ///
     /// # Errors
     /// For a cell beyond the plan's last.
     pub fn of(plan: &Arc<Assignment>, cell: u32) -> Result<Self, Status> {
         let cell_count = plan.workload.cell_count();
+        let is_mirror = plan.workload.mirror_cell(cell as usize).is_some();
         if (cell, cell_count) == (0, 1) {
-            return Ok(Self { plan: plan.clone(), cell, cell_count });
+            return Ok(Self { plan: plan.clone(), cell, is_mirror });
         }
-        let beyond = || Status::invalid_argument(format!("cell_index {cell} is beyond {cell_count} view cells"));
-        Ok(Self { plan: Arc::new(plan.of_cell(cell).ok_or_else(beyond)?), cell, cell_count })
+        let beyond = || Status::invalid_argument(format!("cell_index {cell} is beyond {cell_count} cells"));
+        Ok(Self { plan: Arc::new(plan.of_cell(cell).ok_or_else(beyond)?), cell, is_mirror })
+    }
+
+    /// The parts of `plan` for all mirror cells, with the bounds of their mirrors.
+    pub fn of_mirrors(plan: &Arc<Assignment>) -> Vec<(Aabb, Self)> {
+        let first = plan.workload.view_cell_count();
+        let mirrors = plan.workload.mirror_cells.iter().enumerate();
+        mirrors.filter_map(|(at, mirror)| Some((mirror.bounds, Self::of(plan, (first + at) as u32).ok()?))).collect()
     }
 }
 

@@ -1,8 +1,8 @@
 //! Why views cannot be reconstructed.
 
-use depth_image::MAX_REFLECTIONS;
+use depth_image::{MAX_MIRROR_CELLS, MAX_REFLECTIONS};
 
-use crate::view_work::{MAX_MIRROR_CELLS, MAX_SAMPLE_CAMERAS};
+use crate::view_work::MAX_SAMPLE_CAMERAS;
 
 /// Why views cannot be reconstructed.
 #[derive(Debug, thiserror::Error)]

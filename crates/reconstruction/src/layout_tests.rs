@@ -165,7 +165,7 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
 
 #[test]
 fn mirrored_rays_and_mirror_boxes_agree_where_they_are_written_and_read() {
-    let ray = host!(GpuMirroredRay { origin_in_world, pixel, direction, guess, throughput_linear, side_m });
+    let ray = host!(GpuMirroredRay { origin_in_world, pixel, direction, guess, throughput_linear, near_m });
     let passes = ["bounce/land.wgsl", "joint_carve.wgsl", "specular.wgsl"];
     assert_eq!(templates_that_agree("MirroredRay", &ray), BTreeSet::from(passes));
     let boxes = host!(GpuMirrorBox { min_in_world, first_listed, max_in_world, padding });

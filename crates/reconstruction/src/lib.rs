@@ -37,4 +37,4 @@ pub use quads::{ErrorBound, MeshStatistics, Quad, RequiredPlanes};
 pub use reconstructor::Reconstructor;
 pub use sample_set::{SampleSet, SetDescription};
 pub use shaders::{shader_sources, shaders, templates};
-pub use view_work::{MAX_MIRROR_CELLS, MAX_SAMPLE_CAMERAS};
+pub use view_work::MAX_SAMPLE_CAMERAS;

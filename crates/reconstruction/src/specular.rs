@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use depth_image::Highlight;
+use depth_image::{Highlight, MAX_MIRROR_CELLS};
 use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots};
 use minijinja::{Value, context};
 
 use crate::bounce::{Bounces, RayLists};
-use crate::view_work::{MAX_MIRROR_CELLS, ONE_VIEW, SetVariant};
+use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, reflectors::sample_texels};
 
 /// The switches of `specular.wgsl`.

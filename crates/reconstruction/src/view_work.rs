@@ -10,8 +10,6 @@ use minijinja::{Value, context};
 
 /// Shaders name each camera; more would make them too long.
 pub const MAX_SAMPLE_CAMERAS: usize = 16;
-/// Boxes with mirrors that a view may have.
-pub const MAX_MIRROR_CELLS: usize = 8;
 /// The sides of tiles; all rays of a tile start at one parameter.
 pub(crate) const TILE_PX: u32 = 8;
 /// Greater than every parameter and gap.

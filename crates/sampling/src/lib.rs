@@ -2,6 +2,7 @@
 
 mod error;
 mod methods;
+mod mirrors;
 mod rig;
 mod sampler;
 #[cfg(feature = "scalar")]
@@ -11,6 +12,7 @@ mod work;
 
 pub use error::SamplingError;
 pub use methods::{METHODS, Redundancy, SamplingMethod, UnknownSampling, templates};
+pub use mirrors::{Mirror, faces, mirrors};
 pub use rig::{Rig, RigError};
 pub use sampler::{Sampler, renderer};
 pub use work::SampleWork;

@@ -6,10 +6,10 @@ use cluster::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
 use cluster::{
     AchievedTime, ApplyPlan, Assignment, AuditOrder, AuditReport, AuditSummary, AuditedView, BudgetRequest,
     ChangeSession, ClusterStatus, CompositorShare, Costs, ErrorInterval, InvalidField, JoinCluster, LiveRequest,
-    MeasureCosts, Measured, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings, OfferStatus, Policy, PolicyChoice,
-    ProbedView, Promise, PromiseState, Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport, SamplerShare,
-    SceneHash, SceneRef, SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport, Workload,
-    WorkloadStatus,
+    MeasureCosts, Measured, MeasuredCosts, MirrorCell, NodeCondition, NodeStatus, OfferSettings, OfferStatus, Policy,
+    PolicyChoice, ProbedView, Promise, PromiseState, Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport,
+    SamplerShare, SceneHash, SceneRef, SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport,
+    Workload, WorkloadStatus,
 };
 use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
 use depth_image::{
@@ -64,6 +64,7 @@ pub(super) fn workload() -> Workload {
         scene: SceneRef { hash: SceneHash::of(b"scene"), package_bytes: 5 },
         sample_cameras: vec![Camera::Pinhole(camera()); 2],
         cell_first_indices: Vec::new(),
+        mirror_cells: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "phong".to_owned(),
         planes: SamplePlanes::default(),
@@ -115,6 +116,7 @@ fn request() -> SessionRequest {
         method: "joint_carve".to_owned(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
+        follows_mirrors: true,
         codec: "raw".to_owned(),
         sample_cameras: vec![Camera::Pinhole(camera())],
         sample_size_px: Some(UVec2::new(8, 8)),
@@ -130,6 +132,7 @@ fn request() -> SessionRequest {
         frames_per_s: Some(25.0),
         fallbacks: vec![Quality {
             lighting: "unlit".to_owned(),
+            follows_mirrors: true,
             method: "joint_carve:1".to_owned(),
             sample_side_ratio: 0.5,
             frame_rate_ratio: 1.0,
@@ -181,6 +184,11 @@ fn messages_survive_the_round_trip() {
     cells.workload.cell_first_indices = vec![0, 1];
     cells.samplers[0].image_indices = vec![3, 1, 2, 0];
     assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(cells.clone())), Ok(cells));
+    let mut mirrors = assignment();
+    let cell = MirrorCell { bounds: mirrors.workload.volume, sampling: "all".to_owned() };
+    mirrors.workload = mirrors.workload.with_mirrors(vec![(cell, vec![Camera::Pinhole(camera())])]);
+    mirrors.samplers[0].image_indices = vec![0, 1, 2];
+    assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(mirrors.clone())), Ok(mirrors));
     let apply = ApplyPlan { assignment: assignment(), open_workloads: vec![3, 1] };
     assert_eq!(read::<ApplyPlan, _>(to_message::<proto::ApplyAssignmentRequest, _>(apply.clone())), Ok(apply));
     assert_eq!(read::<SessionRequest, _>(to_message::<proto::OpenSessionRequest, _>(request())), Ok(request()));
@@ -463,6 +471,18 @@ fn the_largest_number_of_lights_survives_the_round_trip() {
     let most = Illumination { lights: vec![light; MAX_LIGHTS], ..illumination() };
     assert_eq!(MAX_VISIBILITY_PLANES, 64);
     assert_eq!(read::<Illumination, _>(to_message::<proto::Illumination, _>(most.clone())), Ok(most));
+}
+
+#[test]
+fn bad_mirror_cells_are_refused_by_field() {
+    let spoilt = |cells: Vec<proto::MirrorCell>| {
+        let message = to_message::<proto::Assignment, _>(assignment());
+        let workload = message.workload.map(|workload| proto::Workload { mirror_cells: cells, ..workload });
+        refusal::<_, Assignment>(proto::Assignment { workload, ..message })
+    };
+    let cell = proto::MirrorCell { bounds: None, sampling_method: "all".to_owned() };
+    assert!(spoilt(vec![cell.clone()]).contains("mirror_cells.bounds is missing"));
+    assert!(spoilt(vec![cell; 9]).contains("mirror_cells has 9"));
 }
 
 #[test]

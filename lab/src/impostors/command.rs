@@ -2,19 +2,21 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
 use app_core::exit::Outcome;
 use app_core::setup::DeviceArgs;
 use clap::Args;
+use depth_image::Aabb;
 use engine::GpuEngine;
 use node::Engine as _;
-use reconstruction::MAX_MIRROR_CELLS;
 use render::Lighting;
-use scene::{Limits, MissingTextures, SceneSpec};
-use study::{Cell, Report, Table};
+use sampling::Mirror;
+use scene::{Limits, MissingTextures, Scene, SceneSpec};
+use study::{Bar, Cell, Check, Report, Table};
 
-use super::candidates::{candidates, mirrors};
-use super::measure::{Figures, Hall};
+use super::candidates::candidates;
+use super::costs::{self, Costs};
+use super::measure::{Answer, Figures, Hall, VIEW_PX, around};
+use super::orders;
 use crate::failures::stand::Stand;
 use crate::progress::bar;
 
@@ -23,11 +25,11 @@ const VIEWS: [usize; 2] = [24, 6];
 const LIGHTING: [&str; 2] = ["soft 16, occlusion 16, reflections 1", "shadows, reflections 1"];
 
 /// Follows the rays off a scene's mirrors in images of their surroundings, and compares the views with direct drawing.
-/// Errors are those of the pixels in which a mirror shows the scene.
+/// Errors are those of the pixels in which a mirror shows the scene, and those in which it shows an object.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   myriorama study impostors
-  myriorama study impostors --quick")]
+  myriorama study impostors --quick --strict   in hard shadows; exit status 1 if a bar is missed")]
 pub struct ImpostorsArgs {
     #[command(flatten)]
     device: DeviceArgs,
@@ -37,6 +39,9 @@ pub struct ImpostorsArgs {
     /// Six views in hard shadows, in place of 24 in soft light
     #[arg(long)]
     quick: bool,
+    /// Exit status 1 if a bar is missed
+    #[arg(long)]
+    strict: bool,
     /// Where the report goes
     #[arg(long, default_value = "out/study/impostors", value_name = "DIR")]
     out: PathBuf,
@@ -48,38 +53,48 @@ pub struct ImpostorsArgs {
 /// The scene cannot be used or has no mirrors, the device fails, or the folder cannot be written.
 pub fn run(args: &ImpostorsArgs) -> anyhow::Result<Outcome> {
     let scene = args.scene.load(&Limits::default(), MissingTextures::Refuse)?;
-    let bounds = mirrors(&scene);
-    let first = bounds.first().with_context(|| format!("{} has no mirrors", args.scene))?;
-    if bounds.len() > MAX_MIRROR_CELLS {
-        bail!("{} has {} parts with mirrors, at most {MAX_MIRROR_CELLS} can be followed", args.scene, bounds.len());
-    }
+    let (mirrors, _) = sampling::mirrors(&scene);
+    anyhow::ensure!(!mirrors.is_empty(), "{} has no mirrors", args.scene);
     let engine = GpuEngine::shared(args.device.device)?;
     let stand = Stand::new(&engine, false);
     let lighting: Lighting = LIGHTING[usize::from(args.quick)].parse()?;
-    let hall = Hall::new(&stand, &scene, lighting, VIEWS[usize::from(args.quick)])?;
-    // Candidates of the same name for each mirror.
-    let seen = scene.bounds().center();
-    let of_mirrors: Vec<_> = bounds.iter().map(|mirror| candidates(mirror, seen)).collect();
-    let count = candidates(first, seen).len();
-    let progress = bar("candidates", count + 1);
-    let mut rows = vec![("the environment alone", hall.figures(&bounds, &[])?)];
-    progress.inc(1);
-    let mut columns: Vec<_> = of_mirrors.into_iter().map(Vec::into_iter).collect();
-    for _ in 0..count {
-        let own: Vec<_> = columns.iter_mut().filter_map(Iterator::next).collect();
-        let name = own.first().map_or("", |candidate| candidate.name);
-        rows.push((name, hall.figures(&bounds, &own)?));
-        progress.inc(1);
-    }
-    progress.finish_and_clear();
+    let views = around(&scene.bounds(), VIEWS[usize::from(args.quick)]);
+    let hall = Hall::new(&stand, &scene, lighting, &views)?;
     let mut report = Report::new("Myriorama study: impostors", engine.device_name());
     report.version("myriorama", env!("CARGO_PKG_VERSION"));
     report.parameter("scene", args.scene.to_string());
     report.parameter("lighting", lighting.to_string());
-    let table = table(&rows)?;
-    println!("{}", table.to_text());
-    report.tables.push(table);
-    Ok(Outcome::of(report.finish(&args.out)?))
+    report.parameter("mirrored pixels that show an object (%)", hall.object_share() * 100.0);
+    let rows = compared(&hall, &scene, &mirrors)?;
+    report.tables.push(table(&rows)?);
+    report.checks.extend(error_checks(&rows));
+    let costs = costs::measure(&hall, &mirrors)?;
+    report.tables.push(cost_table(&costs)?);
+    report.checks.extend(cost_checks(&costs));
+    let (orders, growth) = orders::measure(&stand, lighting)?;
+    report.tables.push(orders);
+    report.checks.push(growth);
+    report.tables.iter().for_each(|table| println!("{}", table.to_text()));
+    let holds = report.finish(&args.out)?;
+    Ok(Outcome::of(holds || !args.strict))
+}
+
+/// The figures of the environment alone, and of each candidate for all mirrors.
+fn compared(hall: &Hall<'_>, scene: &Scene, mirrors: &[Mirror]) -> anyhow::Result<Vec<(&'static str, Figures)>> {
+    let seen = scene.bounds().center();
+    let bounds: Vec<Aabb> = mirrors.iter().map(|mirror| mirror.bounds).collect();
+    let mut columns: Vec<_> = mirrors.iter().map(|mirror| candidates(mirror, seen).into_iter()).collect();
+    let progress = bar("candidates", columns.first().map_or(0, ExactSizeIterator::len) + 1);
+    let mut rows = vec![("the environment alone", hall.figures(&bounds, &[])?)];
+    progress.inc(1);
+    loop {
+        let own: Vec<_> = columns.iter_mut().filter_map(Iterator::next).collect();
+        let Some(name) = own.first().map(|candidate| candidate.name) else { break };
+        rows.push((name, hall.figures(&bounds, &own)?));
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    Ok(rows)
 }
 
 fn table(rows: &[(&str, Figures)]) -> anyhow::Result<Table> {
@@ -87,26 +102,66 @@ fn table(rows: &[(&str, Figures)]) -> anyhow::Result<Table> {
         ("images of the surroundings", ""),
         ("images", ""),
         ("texels", ""),
-        ("sampled in", "ms"),
+        ("objects: FLIP", ""),
+        ("objects: PSNR", "dB"),
+        ("objects: guessed", "%"),
         ("FLIP", ""),
         ("PSNR", "dB"),
         ("guessed", "%"),
-        ("a view", "ms"),
-        ("over a view without mirrors", "×"),
     ];
-    let mut table = Table::new("Pixels in which a mirror shows the scene", &columns);
+    let mut table = Table::new("Pixels in which a mirror shows an object, and in which it shows the scene", &columns);
     for (name, figures) in rows {
-        let [with_s, without_s] = figures.view_s;
         let counts = [figures.images, figures.texels].map(Cell::from);
-        let numbers = [
-            figures.sample_s * 1e3,
-            figures.flip,
-            figures.psnr_db,
-            figures.guessed_ratio * 100.0,
-            with_s * 1e3,
-            with_s / without_s,
-        ];
-        table.push([Cell::from(*name)].into_iter().chain(counts).chain(numbers.map(Cell::from)))?;
+        let numbers = |answer: &Answer| [answer.flip, answer.psnr_db, answer.guessed_ratio * 100.0].map(Cell::from);
+        let both = numbers(&figures.of_objects).into_iter().chain(numbers(&figures.of_scene));
+        table.push([Cell::from(*name)].into_iter().chain(counts).chain(both))?;
     }
     Ok(table)
+}
+
+fn error_checks(rows: &[(&str, Figures)]) -> Vec<Check> {
+    let of = |wanted: &str| rows.iter().find(|(name, _)| *name == wanted).map(|(_, figures)| *figures);
+    let (Some(one), Some(chosen)) = (of("pinhole:1"), rows.last().map(|(_, figures)| *figures)) else {
+        return Vec::new();
+    };
+    let over = |of: fn(&Figures) -> f64| of(&chosen) / of(&one);
+    vec![
+        Check::new("objects in mirrors: FLIP over one pinhole's", over(|f| f.of_objects.flip), "×", Bar::AtMost(0.75)),
+        Check::new("objects in mirrors: FLIP", chosen.of_objects.flip, "", Bar::AtMost(0.1)),
+        Check::new("objects in mirrors: guessed", chosen.of_objects.guessed_ratio * 100.0, "%", Bar::AtMost(2.0)),
+        Check::new("mirrors: FLIP over one pinhole's", over(|f| f.of_scene.flip), "×", Bar::AtMost(1.0)),
+    ]
+}
+
+fn cost_table(costs: &Costs) -> anyhow::Result<Table> {
+    let columns = [
+        ("mirror", "%"),
+        ("images of views", "ms"),
+        ("images of mirrors", "ms"),
+        ("load", "ms"),
+        ("c without reflections", "ms"),
+        ("c, reflections 1", "ms"),
+        ("c, reflections 2", "ms"),
+        ("ns a ray", ""),
+        ("g_v, reflections 1", "ms"),
+    ];
+    let mut table = Table::new("Views of which the mirror fills two fifths, by images as in a cluster", &columns);
+    let [views_s, mirrors_s] = costs.sample_s;
+    let [plain_s, one_s, two_s] = costs.view_s;
+    let rays = costs.mirror_ratio * f64::from(VIEW_PX.element_product());
+    let milliseconds = [views_s, mirrors_s, costs.load_s, plain_s, one_s, two_s].map(|seconds| seconds * 1e3);
+    let last = [(one_s - plain_s) * 1e9 / rays, costs.direct_s * 1e3];
+    let numbers = [costs.mirror_ratio * 100.0].into_iter().chain(milliseconds).chain(last);
+    table.push(numbers.map(Cell::from))?;
+    Ok(table)
+}
+
+fn cost_checks(costs: &Costs) -> Vec<Check> {
+    let [plain_s, one_s, two_s] = costs.view_s;
+    vec![
+        Check::new("c with reflections 1 over c without", one_s / plain_s, "×", Bar::AtMost(2.0)),
+        Check::new("c with reflections 2 over c without", two_s / plain_s, "×", Bar::AtMost(3.0)),
+        Check::new("gain over direct that the parts allow, V = 290", costs.gain(290.0), "×", Bar::AtLeast(10.0)),
+        Check::new("gain over direct that the parts allow, V = 1000", costs.gain(1000.0), "×", Bar::AtLeast(18.0)),
+    ]
 }

@@ -1,7 +1,5 @@
 //! Views of a scene with mirrors: by images of their surroundings, and drawn directly.
 
-use std::time::Instant;
-
 use anyhow::Context as _;
 use depth_image::{Aabb, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use glam::{UVec2, Vec3};
@@ -11,13 +9,11 @@ use render::{GpuScene, Lighting, SamplePlanes};
 use scene::Scene;
 
 use super::candidates::Candidate;
+use super::objects::{is_of_object, painted};
 use crate::failures::stage::CARVE;
 use crate::failures::stand::Stand;
-use crate::statistics::median;
 
-const VIEW_PX: UVec2 = UVec2::new(200, 150);
-/// Times that a view is made; the median counts.
-const REPEATS: usize = 5;
+pub const VIEW_PX: UVec2 = UVec2::new(200, 150);
 /// A mirror shows the scene where it differs from the environment by more than this, in codes.
 const SEEN_CODES: u8 = 8;
 const PLANES: SamplePlanes = SamplePlanes {
@@ -35,66 +31,91 @@ struct Subject {
     truth: View,
     /// Pixels in which a mirror shows the scene.
     mirrored: Vec<bool>,
+    /// Those in which it shows an object, neither the ground nor the sky.
+    of_objects: Vec<bool>,
 }
 
 /// A scene on the device with its views.
 pub struct Hall<'s> {
-    stand: &'s Stand,
+    pub stand: &'s Stand,
     scene: &'s Scene,
-    on_device: GpuScene,
-    lighting: Lighting,
+    pub on_device: GpuScene,
+    painted: GpuScene,
+    pub lighting: Lighting,
     subjects: Vec<Subject>,
 }
 
-/// What a candidate costs and how well it answers.
+/// What a candidate's images show.
 #[derive(Debug, Clone, Copy)]
 pub struct Figures {
     pub images: usize,
     pub texels: usize,
-    pub sample_s: f64,
+    /// Over the pixels in which a mirror shows an object.
+    pub of_objects: Answer,
+    /// Over the pixels in which a mirror shows the scene.
+    pub of_scene: Answer,
+}
+
+/// Errors of pixels, and the share of them that no image knew.
+#[derive(Debug, Clone, Copy)]
+pub struct Answer {
     pub flip: f64,
     pub psnr_db: f64,
     pub guessed_ratio: f64,
-    /// A view with mirrors, and without.
-    pub view_s: [f64; 2],
 }
 
 impl<'s> Hall<'s> {
-    /// Draws the truth of `views` views on a circle around a scene. Views in which no mirror shows the scene are left out.
+    /// Draws the truth of views. Those in which no mirror shows an object are left out.
     ///
     /// # Errors
     /// The device fails, or no view shows a mirror.
-    pub fn new(stand: &'s Stand, scene: &'s Scene, lighting: Lighting, views: usize) -> anyhow::Result<Self> {
-        let on_device = stand.upload(scene)?;
-        let mut hall = Self { stand, scene, on_device, lighting, subjects: Vec::new() };
-        for camera in around(&scene.bounds(), views) {
-            hall.subjects.extend(hall.subject(camera)?);
+    pub fn new(
+        stand: &'s Stand,
+        scene: &'s Scene,
+        lighting: Lighting,
+        views: &[PinholeCamera],
+    ) -> anyhow::Result<Self> {
+        let (on_device, painted) = (stand.upload(scene)?, stand.upload(&painted(scene))?);
+        let mut hall = Self { stand, scene, on_device, painted, lighting, subjects: Vec::new() };
+        for camera in views {
+            hall.subjects.extend(hall.subject(*camera)?);
         }
-        anyhow::ensure!(!hall.subjects.is_empty(), "no view shows the scene in a mirror");
+        anyhow::ensure!(!hall.subjects.is_empty(), "no view shows an object in a mirror");
         Ok(hall)
     }
 
-    /// `None` where no mirror shows the scene.
+    /// Of the pixels in which mirrors show the scene, the share in which they show an object.
+    pub fn object_share(&self) -> f64 {
+        let count = |of: fn(&Subject) -> &Vec<bool>| {
+            self.subjects.iter().flat_map(of).filter(|is| **is).count() as f64
+        };
+        count(|subject| &subject.of_objects) / count(|subject| &subject.mirrored)
+    }
+
+    /// `None` where no mirror shows an object.
     fn subject(&self, camera: PinholeCamera) -> anyhow::Result<Option<Subject>> {
-        let unmirrored = self.lighting.without_reflections().unwrap_or(self.lighting);
-        let draw = |lighting| -> anyhow::Result<View> {
-            let views = self.stand.views(&self.on_device, lighting, &[camera], ViewPlanes::WITH_DEPTH)?;
+        let draw = |scene, lighting| -> anyhow::Result<View> {
+            let views = self.stand.views(scene, lighting, &[camera], ViewPlanes::WITH_DEPTH)?;
             views.into_iter().next().context("a view")
         };
-        let (truth, plain) = (draw(self.lighting)?, draw(unmirrored)?);
-        let pixels = truth.srgb8.chunks_exact(3).zip(plain.srgb8.chunks_exact(3));
-        let differs = |(a, b): (&[u8], &[u8])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > SEEN_CODES);
-        let mirrored: Vec<bool> = pixels.map(differs).collect();
+        let both = |scene| anyhow::Ok((draw(scene, self.lighting)?, draw(scene, plain(self.lighting))?));
+        let (truth, unmirrored) = both(&self.on_device)?;
+        let (in_paint, unmirrored_in_paint) = both(&self.painted)?;
+        let mirrored = changed(&unmirrored, &truth);
+        let of_objects: Vec<bool> = is_of_object(&unmirrored_in_paint, &in_paint)
+            .into_iter()
+            .zip(&mirrored)
+            .map(|(is, of)| is && *of)
+            .collect();
         let set = self.set(&self.images(&[camera])?)?;
-        Ok(mirrored.contains(&true).then_some(Subject { camera, set, truth, mirrored }))
+        Ok(of_objects.contains(&true).then_some(Subject { camera, set, truth, mirrored, of_objects }))
     }
 
-    fn images(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
-        let lighting = self.lighting.without_reflections().unwrap_or(self.lighting);
-        self.stand.images(&self.on_device, lighting, cameras, PLANES)
+    pub fn images(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
+        self.stand.images(&self.on_device, plain(self.lighting), cameras, PLANES)
     }
 
-    fn set(&self, images: &[DepthImage]) -> anyhow::Result<SampleSet> {
+    pub fn set(&self, images: &[DepthImage]) -> anyhow::Result<SampleSet> {
         let description = SetDescription {
             volume: self.scene.bounds(),
             background: self.scene.background,
@@ -110,80 +131,108 @@ impl<'s> Hall<'s> {
     /// # Errors
     /// The device fails.
     pub fn figures(&self, mirrors: &[Aabb], candidates: &[Candidate]) -> anyhow::Result<Figures> {
-        let cameras: Vec<&[PinholeCamera]> = candidates.iter().map(|candidate| &candidate.cameras[..]).collect();
-        let start = Instant::now();
-        let images = cameras.iter().map(|cameras| self.images(cameras)).collect::<anyhow::Result<Vec<_>>>()?;
-        let sample_s = start.elapsed().as_secs_f64();
+        let images = candidates.iter().map(|candidate| self.images(&candidate.cameras));
+        let images = images.collect::<anyhow::Result<Vec<_>>>()?;
         let sets = images.iter().map(|images| self.set(images)).collect::<anyhow::Result<Vec<_>>>()?;
-        let cell = |(bounds, surroundings)| MirrorCell { bounds, surroundings };
-        let cells: Vec<MirrorCell<'_>> = mirrors.iter().copied().zip(&sets).map(cell).collect();
-        let mirrors = Mirrors { cells: &cells, reflections: self.lighting.reflections() };
-        let mut answers = Vec::with_capacity(self.subjects.len());
-        for subject in &self.subjects {
-            answers.push(self.answer(subject, mirrors)?);
-        }
-        let mean = |of: fn(&Answer) -> f64| answers.iter().map(of).sum::<f64>() / answers.len() as f64;
+        let views = self.views(&cells(mirrors, &sets), self.lighting.reflections())?;
+        let answered = |of: fn(&Subject) -> &Vec<bool>| -> anyhow::Result<Answer> {
+            let each =
+                self.subjects.iter().zip(&views).map(|(subject, view)| answer(&subject.truth, view, of(subject)));
+            mean(&each.collect::<anyhow::Result<Vec<_>>>()?)
+        };
         let count = |of: fn(&DepthImage) -> usize| images.iter().flatten().map(of).sum();
         Ok(Figures {
             images: count(|_| 1),
             texels: count(|image| image.color_rgb9e5.len()),
-            sample_s,
-            flip: mean(|answer| answer.flip),
-            psnr_db: mean(|answer| answer.psnr_db),
-            guessed_ratio: mean(|answer| answer.guessed_ratio),
-            view_s: [0, 1].map(|with| median(answers.iter().map(|answer| answer.view_s[with]).collect())),
+            of_objects: answered(|subject| &subject.of_objects)?,
+            of_scene: answered(|subject| &subject.mirrored)?,
         })
     }
 
-    fn answer(&self, subject: &Subject, mirrors: Mirrors<'_>) -> anyhow::Result<Answer> {
-        let (view, with_s) = self.timed(subject, mirrors)?;
-        let (_, without_s) = self.timed(subject, Mirrors::default())?;
-        let [truth, picture] = [Rgb8Image::of_view(&subject.truth)?, Rgb8Image::of_view(&view)?];
-        let mask = Some(&subject.mirrored[..]);
-        let kinds = view.provenance.as_ref().context("provenance")?.iter().map(|provenance| provenance.kind());
-        let guessed =
-            kinds.zip(&subject.mirrored).filter(|(kind, is)| **is && *kind == ProvenanceKind::Guessed).count();
-        let pixels = subject.mirrored.iter().filter(|is| **is).count();
-        Ok(Answer {
-            flip: flip_map(&truth, &picture)?.mean(mask)?.context("mirrored pixels")?,
-            psnr_db: psnr_db(&truth, &picture, mask)?.context("mirrored pixels")?,
-            guessed_ratio: guessed as f64 / pixels as f64,
-            view_s: [with_s, without_s],
-        })
-    }
-
-    /// A view, and the median time of several.
-    fn timed(&self, subject: &Subject, mirrors: Mirrors<'_>) -> anyhow::Result<(View, f64)> {
-        let make = || -> anyhow::Result<(View, f64)> {
-            let start = Instant::now();
-            let (set, cameras, planes) = (&subject.set, [subject.camera], ViewPlanes::ALL);
-            let views = self.stand.reconstructor().reconstruct_mirrored(
-                set,
-                mirrors,
-                &cameras,
-                CARVE,
-                planes,
-                Default::default(),
-            )?;
-            Ok((views.into_iter().next().context("a view")?, start.elapsed().as_secs_f64()))
+    /// Its views, with these mirror cells.
+    fn views(&self, cells: &[MirrorCell<'_>], reflections: u32) -> anyhow::Result<Vec<View>> {
+        let mirrors = Mirrors { cells, reflections };
+        let view = |subject: &Subject| {
+            let (set, cameras, turn) = (&subject.set, [subject.camera], Default::default());
+            let reconstructor = self.stand.reconstructor();
+            let views = reconstructor.reconstruct_mirrored(set, mirrors, &cameras, CARVE, ViewPlanes::ALL, turn)?;
+            views.into_iter().next().context("a view")
         };
-        // The first builds shaders.
-        let (view, _) = make()?;
-        let times = (0..REPEATS).map(|_| Ok(make()?.1)).collect::<anyhow::Result<Vec<f64>>>()?;
-        Ok((view, median(times)))
+        self.subjects.iter().map(view).collect()
+    }
+
+    /// Errors of rays that meet `order` mirrors and no fewer, where some do: of views whose rays meet as many, and of views
+    /// whose rays meet none.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn order(&self, mirrors: &[Aabb], sets: &[SampleSet], order: u32) -> anyhow::Result<Option<[Answer; 2]>> {
+        let mut answers = [Vec::new(), Vec::new()];
+        let views = [order, 0].map(|reflections| self.views(&cells(mirrors, sets), reflections));
+        let [with, without] = views;
+        for ((subject, with), without) in self.subjects.iter().zip(with?).zip(without?) {
+            let truth = |reflections: u32| -> anyhow::Result<View> {
+                let lighting = reflecting(self.lighting, reflections)?;
+                let views = self.stand.views(&self.on_device, lighting, &[subject.camera], ViewPlanes::COLOR)?;
+                views.into_iter().next().context("a view")
+            };
+            let truth_of = truth(order)?;
+            let pixels = changed(&truth(order - 1)?, &truth_of);
+            if pixels.contains(&true) {
+                answers[0].push(answer(&truth_of, &with, &pixels)?);
+                answers[1].push(answer(&truth_of, &without, &pixels)?);
+            }
+        }
+        if answers[0].is_empty() { Ok(None) } else { Ok(Some([mean(&answers[0])?, mean(&answers[1])?])) }
     }
 }
 
-/// How one view is answered.
-struct Answer {
-    flip: f64,
-    psnr_db: f64,
-    guessed_ratio: f64,
-    view_s: [f64; 2],
+/// Cells of mirrors and the sets of their surroundings.
+pub fn cells<'s>(mirrors: &[Aabb], sets: &'s [SampleSet]) -> Vec<MirrorCell<'s>> {
+    mirrors.iter().zip(sets).map(|(bounds, surroundings)| MirrorCell { bounds: *bounds, surroundings }).collect()
+}
+
+/// A lighting whose mirrors show the environment.
+pub fn plain(lighting: Lighting) -> Lighting {
+    lighting.without_reflections().unwrap_or(lighting)
+}
+
+/// A lighting whose rays meet so many mirrors.
+pub fn reflecting(lighting: Lighting, reflections: u32) -> anyhow::Result<Lighting> {
+    let plain = plain(lighting);
+    if reflections == 0 { Ok(plain) } else { Ok(format!("{plain}, reflections {reflections}").parse()?) }
+}
+
+/// Pixels that differ.
+fn changed(before: &View, after: &View) -> Vec<bool> {
+    let pixels = before.srgb8.chunks_exact(3).zip(after.srgb8.chunks_exact(3));
+    pixels.map(|(a, b)| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > SEEN_CODES)).collect()
+}
+
+fn answer(truth: &View, view: &View, pixels: &[bool]) -> anyhow::Result<Answer> {
+    let [reference, picture] = [Rgb8Image::of_view(truth)?, Rgb8Image::of_view(view)?];
+    let kinds = view.provenance.as_ref().context("provenance")?.iter().map(|provenance| provenance.kind());
+    let guessed = kinds.zip(pixels).filter(|(kind, is)| **is && *kind == ProvenanceKind::Guessed).count();
+    let count = pixels.iter().filter(|is| **is).count();
+    Ok(Answer {
+        flip: flip_map(&reference, &picture)?.mean(Some(pixels))?.context("mirrored pixels")?,
+        psnr_db: psnr_db(&reference, &picture, Some(pixels))?.context("mirrored pixels")?,
+        guessed_ratio: guessed as f64 / count as f64,
+    })
+}
+
+fn mean(answers: &[Answer]) -> anyhow::Result<Answer> {
+    anyhow::ensure!(!answers.is_empty(), "no view has such pixels");
+    let mean = |of: fn(&Answer) -> f64| answers.iter().map(of).sum::<f64>() / answers.len() as f64;
+    Ok(Answer {
+        flip: mean(|answer| answer.flip),
+        psnr_db: mean(|answer| answer.psnr_db),
+        guessed_ratio: mean(|answer| answer.guessed_ratio),
+    })
 }
 
 /// Views on a circle around a scene, outside its bounds.
-fn around(bounds: &Aabb, views: usize) -> Vec<PinholeCamera> {
+pub fn around(bounds: &Aabb, views: usize) -> Vec<PinholeCamera> {
     let (middle, size) = (bounds.center(), bounds.size());
     let radius_m = 0.55 * size.x.hypot(size.z);
     let view = |number: usize| {

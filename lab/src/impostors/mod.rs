@@ -2,4 +2,7 @@
 
 mod candidates;
 pub mod command;
+mod costs;
 mod measure;
+mod objects;
+mod orders;

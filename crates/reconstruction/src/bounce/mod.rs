@@ -2,7 +2,7 @@
 //! mirror after mirror, and what they find is added to the pixels.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Aabb, Highlight, MAX_REFLECTIONS};
+use depth_image::{Aabb, Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS};
 use gpu::{
     Binding, GpuEnvironment, GpuError, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, light_slots,
     uniform_elements,
@@ -14,14 +14,20 @@ use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList};
 use crate::recording::nearest_first;
 use crate::reflectors::{Reflectors, sample_texels};
-use crate::view_work::{GpuViewCamera, GpuViewWork, MAX_MIRROR_CELLS, ONE_VIEW, SetVariant};
+use crate::view_work::{GpuViewCamera, GpuViewWork, ONE_VIEW, SetVariant};
 use crate::{device::Device, error::ReconstructionError, recording::Recording, sample_set::SampleSet};
 
-/// Rays begin this many footprints above their mirror: its own samples lie below.
+/// A ray meets nothing before it is this many footprints above its mirror: the mirror's own samples lie below.
 pub(crate) const START_FOOTPRINTS: f32 = 3.0;
+/// A ray at grazing incidence counts as rising by this sine at least.
+pub(crate) const LEAST_RISE: f32 = 0.25;
 /// The coarsest level at which a mirrored ray is searched: it has no tile start.
 pub(crate) const BOUNCE_LEVEL: u32 = 6;
-/// Moves of a mirrored ray.
+/// A ray passes from image to image around a mirror: the times that it is marched in each.
+pub(crate) const MARCH_ROUNDS: u32 = 2;
+/// A ray that got to the end of its way but for this share has ended.
+pub(crate) const LEAST_WAY: f32 = 1e-5;
+/// Moves of a mirrored ray after its marches.
 pub(crate) const MAX_BOUNCE_MOVES: u32 = 96;
 
 /// Mirrors within a box, and images of what they show.
@@ -75,7 +81,7 @@ pub(crate) struct GpuMirroredRay {
     pub direction: [f32; 3],
     pub guess: u32,
     pub throughput_linear: [f32; 3],
-    pub side_m: f32,
+    pub near_m: f32,
 }
 
 /// The memory for the mirrored rays of a batch.
@@ -88,7 +94,8 @@ pub(crate) struct Bounces<'s> {
     /// A `ViewWork` for each cell.
     works: Vec<Buffer>,
     rays: [PooledBuffer; 2],
-    listed: [PooledBuffer; 3],
+    /// Of the rays of this mirror and of the next, of those that the march leaves, and of those that stay unknown.
+    listed: [PooledBuffer; 4],
     color: PooledBuffer,
     inverse_depth_per_m: PooledBuffer,
     provenance: PooledBuffer,
@@ -142,7 +149,7 @@ impl<'s> Bounces<'s> {
             boxes: device.gpu.buffer_with("mirror boxes", &boxes, BufferUsages::UNIFORM),
             works: cells.iter().enumerate().map(work).collect(),
             rays: [rays()?, rays()?],
-            listed: [listed()?, listed()?, listed()?],
+            listed: [listed()?, listed()?, listed()?, listed()?],
             color: plane("mirrored colour")?,
             inverse_depth_per_m: plane("mirrored depth")?,
             provenance: plane("mirrored provenance")?,
@@ -185,6 +192,41 @@ impl<'s> Bounces<'s> {
             Binding::buffer("listed_pixels", &self.listed[lists.memory]),
             Binding::buffer("lists", &lists.lists),
         ]
+    }
+
+    /// The resources of `surface.wgsl` for the rays of a cell, which leave some to a list.
+    fn search_bindings<'b>(&'b self, cell: usize, left: &'b PixelList) -> Vec<Binding<'b>> {
+        let set = self.cells[cell].surroundings;
+        let mut bindings = set_bindings(set, &self.works[cell]);
+        bindings.extend([
+            Binding::texture("cell_colors", &set.cell_colors),
+            Binding::buffer("out_color", &self.color),
+            Binding::buffer("out_inverse_depth", &self.inverse_depth_per_m),
+            Binding::buffer("out_provenance", &self.provenance),
+            Binding::buffer("undecided_pixels", &left.pixels),
+            Binding::buffer("undecided", &left.lists),
+        ]);
+        bindings
+    }
+}
+
+/// The switches of `bounce/march.wgsl`.
+#[derive(Debug)]
+pub(crate) struct BounceMarch {
+    set: SetVariant,
+}
+
+impl ShaderVariant for BounceMarch {
+    const TEMPLATE: &'static str = "bounce/march.wgsl";
+    const TRAITS: ResourceTraits = ONE_VIEW;
+
+    fn context(&self) -> Value {
+        context! { bounced => true, ..self.set.context() }
+    }
+
+    fn all() -> Vec<Self> {
+        let sets = SetVariant::all().into_iter().filter(|set| !set.count_fetches);
+        sets.map(|set| Self { set }).collect()
     }
 }
 
@@ -267,22 +309,22 @@ fn follow(
     lists: &RayLists,
     (cell, reflection): (usize, u32),
 ) -> Result<(), ReconstructionError> {
-    let set = bounces.cells[cell].surroundings;
-    let variant = Carve { set: set.variant(), stop_level: 0, bounced: true };
-    let pass = recording.device.passes.get(&variant)?;
-    let unknown = PixelList::empty(&recording.device.gpu, (*bounces.listed[2]).clone(), bounces.cells.len());
-    let mut bindings = set_bindings(set, &bounces.works[cell]);
-    bindings.extend([
-        Binding::texture("cell_colors", &set.cell_colors),
-        Binding::buffer("out_color", &bounces.color),
-        Binding::buffer("out_inverse_depth", &bounces.inverse_depth_per_m),
-        Binding::buffer("out_provenance", &bounces.provenance),
-        Binding::buffer("undecided_pixels", &unknown.pixels),
-        Binding::buffer("undecided", &unknown.lists),
-    ]);
+    let set = bounces.cells[cell].surroundings.variant();
+    let [left, unknown] = [2, 3]
+        .map(|memory| PixelList::empty(&recording.device.gpu, (*bounces.listed[memory]).clone(), bounces.cells.len()));
+    let march = BounceMarch { set };
+    let pass = recording.device.passes.get(&march)?;
+    let mut bindings = bounces.search_bindings(cell, &left);
     bindings.extend(bounces.list_bindings(lists));
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&variant, &pass, &bound, (&lists.lists, cell), (cell, reflection));
+    recording.dispatch_listed(&march, &pass, &bound, (&lists.lists, cell), (cell, reflection));
+    let carve = Carve { set, stop_level: 0, bounced: true };
+    let pass = recording.device.passes.get(&carve)?;
+    let mut bindings = bounces.search_bindings(cell, &unknown);
+    bindings.push(Binding::buffer("rays", &bounces.rays[lists.memory]));
+    bindings.extend(left.bindings());
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_listed(&carve, &pass, &bound, (&left.lists, cell), (cell, reflection));
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 // A ray off a mirror, which is followed in the images of the mirror's surroundings.
 struct MirroredRay {
-    // Off the mirror along its normal.
+    // On the mirror.
     origin_in_world: vec3f,
     // The pixel that shows the mirror.
     pixel: u32,
@@ -10,6 +10,6 @@ struct MirroredRay {
     guess: u32,
     // The share of the light from the ray's end that the pixel shows.
     throughput_linear: vec3f,
-    // The side of a pixel's footprint where the ray begins.
-    side_m: f32,
+    // Nothing nearer is met.
+    near_m: f32,
 }

@@ -43,9 +43,9 @@ fn bounce_off(mirror: Mirror, pixel: u32, throughput_linear: vec3f, open: f32, s
         let entry = atomicAdd(&next_lists[cell].count, 1u);
         if entry % LIST_WORKGROUP == 0u { atomicAdd(&next_lists[cell].workgroups, 1u); }
         next_listed[mirror_boxes[cell].first_listed + entry] = number;
-        let origin_in_world = mirror.point_in_world + mirror.normal * (START_FOOTPRINTS * side_m);
+        let near_m = START_FOOTPRINTS * side_m / max(dot(mirror.normal, towards), LEAST_RISE);
         let guess = pack4x8unorm(vec4f(open, mirror.reflector.roughness, 0.0, 0.0));
-        next_rays[number] = MirroredRay(origin_in_world, pixel, towards, guess, passed, side_m);
+        next_rays[number] = MirroredRay(mirror.point_in_world, pixel, towards, guess, passed, near_m);
     }
     return vec3f(0.0);
 }

@@ -1,6 +1,6 @@
 {% set eye = "ray.origin_in_world" if bounced else "work.view.eye_in_world" -%}
 {% set direction = "ray.direction" if bounced else "pixel.direction" -%}
-{% set near = "ray.side_m" if bounced else "work.view.near_m" -%}
+{% set near = "ray.near_m" if bounced else "work.view.near_m" -%}
 {% set own = "let ray = rays[index];" if bounced else "let pixel = pixel_of(place_of(index));" -%}
 // One ray, a pyramid for each camera, one parameter t. A camera that shows everything in the ray's node to
 // be farther away proves the way to the node's edge empty, and t moves there. Where all cameras show
@@ -63,7 +63,19 @@ fn exit_of(ray: ImageRay, low: vec2f, high: vec2f) -> f32 {
     return clamp(exit, ray.t, ray.far);
 }
 
+{%- if bounced %}
+// Few of the images around a mirror see a point. A loop that no ray enters costs nothing, unlike a branch.
 fn evaluate_camera(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Evaluation {
+    let p = a + b * t;
+    let uv = p.xy / p.z - 0.5;
+    var evaluation = UNSEEN;
+    for (var sees = p.z > 0.0 && all(uv >= vec2f(0.0)) && all(uv < camera.cells); sees; sees = false) {
+        evaluation = evaluate_seen(camera, a, b, t, far, level);
+    }
+    return evaluation;
+}
+{% endif %}
+fn {{ "evaluate_seen" if bounced else "evaluate_camera" }}(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Evaluation {
     let p = a + b * t;
     let inverse_w = 1.0 / p.z;
     let uv = p.xy * inverse_w - 0.5;
@@ -193,9 +205,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let b{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f({{ direction }}, 0.0));
 {% endfor %}
 {%- if bounced %}
-    var t = span.near;
+    var t = out_inverse_depth[index];
     // A ray that begins on a surface which its images show does not meet it: the way must have been free.
-    var freed = false;
+    var freed = t > span.near;
 {%- else %}
     // The pass before left how far it got.
     var t = out_inverse_depth[index];

@@ -92,8 +92,8 @@ const LADDER_STEPS: u32 = 64;
 const LADDER_BOUND_PX: f64 = 0.5;
 
 /// The templates of all methods.
-pub(crate) const SHADERS: [(&str, &str); 6] = wgsl_files! {
-    "joint_carve.wgsl", "joint_carve/march.wgsl", "joint_carve/smooth.wgsl", "light_field_search.wgsl", "mesh.wgsl", "hybrid_mesh.wgsl"
+pub(crate) const SHADERS: [(&str, &str); 7] = wgsl_files! {
+    "joint_carve.wgsl", "joint_carve/march.wgsl", "joint_carve/march_image.wgsl", "joint_carve/smooth.wgsl", "light_field_search.wgsl", "mesh.wgsl", "hybrid_mesh.wgsl"
 };
 
 /// The numbers that methods share with their shaders.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use app_core::delivery::{at_rate, is_drawn_for_mirrors, open, request, viewpoints};
+use app_core::delivery::{at_rate, open, request, viewpoints};
 use app_core::exit::BadInput;
 use client::{Client, Session};
 use cluster::{BudgetRequest, OfferSettings, OfferStatus, Promise, PromiseState, SessionRequest, Timeline};
@@ -107,10 +107,6 @@ fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamer
     let mut request = request(OfferSettings { lighting, ..offer.settings.clone() }, views)?;
     request.scene = Some(offer.name.clone());
     if let Some(method) = args.method {
-        if is_drawn_for_mirrors(&request.lighting) {
-            let reason = "mirrors show the scene in views that are drawn directly alone";
-            return Err(BadInput(format!("--method {method}: {reason} (lighting {})", request.lighting)).into());
-        }
         request.method = method.to_string();
     }
     let request = if args.live { at_rate(request, args.rate) } else { request };

@@ -1,0 +1,291 @@
+//! Mirrors of a scene, and places of sample cameras for what they show.
+
+use depth_image::{Aabb, MAX_MIRROR_CELLS, PinholeCamera};
+use glam::{UVec2, UVec3, Vec3};
+use scene::{Material, Scene, Texture};
+
+/// Rougher surfaces show the environment alone.
+const ROUGHEST: f32 = 0.2;
+/// Mirrors belong together where they touch the same or neighbouring cells of a grid with so many along the scene's longest
+/// side.
+const GRID: f32 = 32.0;
+const SIDE: u32 = GRID as u32 + 1;
+/// Boxes are wider than their mirrors on each side, in diagonals: depths of samples have errors.
+const MARGIN: f32 = 0.01;
+/// The field of view of a face of the cube around a mirror's middle: neighbours overlap.
+const FACE_DEG: f32 = 94.0;
+/// The field of view of further images.
+const WIDE_DEG: f32 = 110.0;
+/// The sides of images, in proportion.
+const FACE_PX: UVec2 = UVec2::splat(148);
+const WIDE_PX: UVec2 = UVec2::splat(256);
+/// A mirror whose normals have a mean of this length is flat.
+const FLAT: f32 = 0.9;
+/// How far these lie from the mirror's middle, in half widths.
+const ASIDE: f32 = 0.6;
+/// Texels of a roughness map that are looked at, along each side.
+const TEXELS: u32 = 64;
+
+/// A group of mirrors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mirror {
+    /// Holds its surfaces at all moments.
+    pub bounds: Aabb,
+    /// For images of what it shows, of sizes in proportion. The mirror itself is not seen from within.
+    pub cameras: Vec<PinholeCamera>,
+}
+
+/// The mirrors of a scene, the largest first, at most [`MAX_MIRROR_CELLS`]; and the number of those beyond.
+#[must_use]
+pub fn mirrors(scene: &Scene) -> (Vec<Mirror>, usize) {
+    let volume = scene.bounds();
+    let mut groups = grouped(&patches_of_mirrors(scene), &volume);
+    groups.sort_by(|a, b| area_m2(&b.bounds).total_cmp(&area_m2(&a.bounds)));
+    let beyond = groups.split_off(groups.len().min(MAX_MIRROR_CELLS));
+    let mirror = |group: Patch| {
+        let facing = group.area_normal_m2 / group.area_m2.max(f32::MIN_POSITIVE);
+        let cameras = match facing.length() > FLAT {
+            true => before_flat(&group.bounds, facing.normalize_or(Vec3::Y)),
+            false => all_around(&group.bounds, volume.center()),
+        };
+        Mirror { bounds: group.bounds.padded(group.bounds.size().length() * MARGIN), cameras }
+    };
+    (groups.into_iter().map(mirror).collect(), beyond.len())
+}
+
+/// Four images from the quarters of a flat mirror: what stands close before it hides little from all of them. And four along
+/// it, from the middle.
+fn before_flat(bounds: &Aabb, facing: Vec3) -> Vec<PinholeCamera> {
+    let right = facing.any_orthonormal_vector();
+    let [right, up] = [right, facing.cross(right)];
+    let quarters = [-right - up, right + up, right - up, up - right]
+        .map(|aside| looking(bounds.center() + aside * bounds.size() * (0.5 * ASIDE), facing, WIDE_DEG, WIDE_PX));
+    let along = [right, -right, up, -up].map(|along| looking(bounds.center(), along, FACE_DEG, FACE_PX));
+    quarters.into_iter().chain(along).collect()
+}
+
+/// Six images in all directions from the middle, and two from opposite sides towards the scene's middle, which see what
+/// an object there hides.
+fn all_around(bounds: &Aabb, middle_of_scene: Vec3) -> Vec<PinholeCamera> {
+    let middle = bounds.center();
+    let towards = (middle_of_scene - middle).normalize_or(Vec3::Z);
+    let right = towards.any_orthonormal_vector();
+    let aside = (right + right.cross(towards)) * (0.5 * ASIDE * bounds.size().min_element());
+    let pair = [-aside, aside].map(|aside| looking(middle + aside, towards, WIDE_DEG, WIDE_PX));
+    faces(middle, FACE_PX).into_iter().chain(pair).collect()
+}
+
+/// Six images in all directions from one place.
+#[must_use]
+pub fn faces(eye_in_world: Vec3, size_px: UVec2) -> Vec<PinholeCamera> {
+    let directions = Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
+    directions.map(|towards| looking(eye_in_world, towards, FACE_DEG, size_px)).collect()
+}
+
+fn looking(eye: Vec3, towards: Vec3, fov_deg: f32, size_px: UVec2) -> PinholeCamera {
+    let up = if towards.y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y };
+    PinholeCamera::looking_at(eye, eye + towards, up, fov_deg.to_radians(), size_px)
+}
+
+/// Mirroring triangles, or a part of a mesh that moves.
+#[derive(Debug, Clone, Copy)]
+struct Patch {
+    bounds: Aabb,
+    area_m2: f32,
+    /// The sum of its normals, each as long as its area; zero where it moves.
+    area_normal_m2: Vec3,
+}
+
+impl Patch {
+    const NONE: Self = Self { bounds: Aabb::EMPTY, area_m2: 0.0, area_normal_m2: Vec3::ZERO };
+
+    fn of_triangle([a, b, c]: [Vec3; 3]) -> Self {
+        let area_normal_m2 = 0.5 * (b - a).cross(c - a);
+        Self { bounds: Aabb::around([a, b, c]), area_m2: area_normal_m2.length(), area_normal_m2 }
+    }
+
+    fn of_moving(bounds: Aabb) -> Self {
+        Self { bounds, area_m2: area_m2(&bounds), area_normal_m2: Vec3::ZERO }
+    }
+
+    fn and(self, other: &Self) -> Self {
+        Self {
+            bounds: Aabb::of_boxes(&[self.bounds, other.bounds]),
+            area_m2: self.area_m2 + other.area_m2,
+            area_normal_m2: self.area_normal_m2 + other.area_normal_m2,
+        }
+    }
+}
+
+/// Each mirroring triangle that stands still, and each part that moves.
+fn patches_of_mirrors(scene: &Scene) -> Vec<Patch> {
+    let is_mirror: Vec<bool> = scene.materials.iter().map(|material| mirrors_scene(scene, material)).collect();
+    let of_instances = scene.bounds_of_instances();
+    let mut patches = Vec::new();
+    for (number, (instance, bounds)) in scene.instances.iter().zip(of_instances).enumerate() {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let parts = mesh.parts.iter().filter(|part| is_mirror[part.material as usize]);
+        if moves(scene, number) {
+            patches.extend(parts.map(|_| Patch::of_moving(bounds)));
+            continue;
+        }
+        let corner = |&index: &u32| {
+            instance.world_from_mesh.transform_point3(Vec3::from(mesh.vertices[index as usize].position))
+        };
+        let indices = parts.flat_map(|part| &mesh.indices[part.first_index as usize..][..part.index_count as usize]);
+        let corners: Vec<Vec3> = indices.map(corner).collect();
+        patches.extend(corners.as_chunks::<3>().0.iter().copied().map(Patch::of_triangle));
+    }
+    patches
+}
+
+fn moves(scene: &Scene, instance: usize) -> bool {
+    let sways = || {
+        let mesh = scene.meshes.get(scene.instances[instance].mesh as usize);
+        mesh.is_some_and(|mesh| mesh.vertices.iter().any(|vertex| vertex.sway > 0.0))
+    };
+    let moving = scene.animation.iter().flat_map(|animation| &animation.moving);
+    moving.into_iter().any(|moving| moving.instance as usize == instance) || (scene.wind.is_some() && sways())
+}
+
+fn mirrors_scene(scene: &Scene, material: &Material) -> bool {
+    let map = material.metallic_roughness_texture.and_then(|map| scene.textures.get(map.texture as usize));
+    !material.unlit && material.roughness * map.map_or(1.0, least_roughness) < ROUGHEST
+}
+
+/// The least green of texels that are spread over a texture.
+fn least_roughness(texture: &Texture) -> f32 {
+    let [columns, rows] = [texture.width_px, texture.height_px].map(|side| side.clamp(1, TEXELS));
+    let texel = |at: u32| {
+        let x = (at % columns) * texture.width_px / columns;
+        let y = (at / columns) * texture.height_px / rows;
+        texture.srgba8.get(4 * (y * texture.width_px + x) as usize + 1).copied().unwrap_or(u8::MAX)
+    };
+    f32::from((0..columns * rows).map(texel).min().unwrap_or(u8::MAX)) / 255.0
+}
+
+/// The patches that belong together.
+fn grouped(patches: &[Patch], scene: &Aabb) -> Vec<Patch> {
+    let cell_m = (scene.size().max_element() / GRID).max(f32::MIN_POSITIVE);
+    let cell = |point: Vec3| ((point - scene.min) / cell_m).clamp(Vec3::ZERO, Vec3::splat(GRID)).as_uvec3();
+    let mut cells = vec![Cell::Empty; (SIDE * SIDE * SIDE) as usize];
+    for Patch { bounds, .. } in patches {
+        cells_between(cell(bounds.min), cell(bounds.max)).for_each(|at| cells[number(at)] = Cell::Occupied);
+    }
+    let mut groups = Vec::new();
+    for patch in patches {
+        let at = cell(patch.bounds.center());
+        if cells[number(at)] == Cell::Occupied {
+            fill(&mut cells, at, groups.len());
+            groups.push(Patch::NONE);
+        }
+        if let Cell::Of(group) = cells[number(at)] {
+            groups[group] = patch.and(&groups[group]);
+        }
+    }
+    groups
+}
+
+/// A cell of the grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cell {
+    Empty,
+    Occupied,
+    /// Occupied, and of this group.
+    Of(usize),
+}
+
+/// Gives all occupied cells that are connected with one to a group.
+fn fill(cells: &mut [Cell], from: UVec3, group: usize) {
+    let mut reached = vec![from];
+    while let Some(at) = reached.pop() {
+        if cells[number(at)] == Cell::Occupied {
+            cells[number(at)] = Cell::Of(group);
+            reached.extend(cells_between(at.saturating_sub(UVec3::ONE), (at + 1).min(UVec3::splat(SIDE - 1))));
+        }
+    }
+}
+
+fn cells_between(first: UVec3, last: UVec3) -> impl Iterator<Item = UVec3> {
+    let rows = (first.z..=last.z).flat_map(move |z| (first.y..=last.y).map(move |y| (y, z)));
+    rows.flat_map(move |(y, z)| (first.x..=last.x).map(move |x| UVec3::new(x, y, z)))
+}
+
+fn number(cell: UVec3) -> usize {
+    ((cell.z * SIDE + cell.y) * SIDE + cell.x) as usize
+}
+
+fn area_m2(bounds: &Aabb) -> f32 {
+    let size = bounds.size();
+    2.0 * (size.x * size.y + size.y * size.z + size.z * size.x)
+}
+
+#[cfg(test)]
+mod tests {
+    use scene::{Instance, Limits, MissingTextures, SceneSpec};
+
+    use super::*;
+
+    fn scene(name: &str) -> Scene {
+        let spec: SceneSpec = name.parse().expect("a name");
+        spec.load(&Limits::default(), MissingTextures::Refuse).expect("a scene")
+    }
+
+    #[test]
+    fn mirrors_apart_from_each_other_have_a_box_each() {
+        let (pebble, beyond) = mirrors(&scene("teapot-mirror"));
+        assert_eq!((pebble.len(), beyond), (1, 0));
+        let size = pebble[0].bounds.size();
+        assert!((5.0..7.0).contains(&size.x) && (5.0..7.0).contains(&size.y), "{size}");
+        let (pair, beyond) = mirrors(&scene("mirror-pair"));
+        assert_eq!((pair.len(), beyond), (2, 0));
+        assert!(pair.iter().all(|mirror| mirror.bounds.size().x < 0.3), "they are flat");
+        assert!(pair[0].bounds.center().x * pair[1].bounds.center().x < 0.0, "on both sides");
+        assert_eq!(mirrors(&scene("blocks")), (Vec::new(), 0));
+    }
+
+    #[test]
+    fn the_largest_mirrors_are_followed_and_the_others_are_counted() {
+        let mut many = scene("teapot-mirror");
+        let first = many.instances[0];
+        many.instances = (0..11)
+            .map(|number| {
+                let size = 1.0 - 0.05 * number as f32;
+                let place = glam::Affine3A::from_translation(Vec3::X * (30.0 * number as f32));
+                Instance { world_from_mesh: place * glam::Affine3A::from_scale(Vec3::splat(size)), ..first }
+            })
+            .collect();
+        let (followed, beyond) = mirrors(&many);
+        assert_eq!((followed.len(), beyond), (MAX_MIRROR_CELLS, 3));
+        let places: Vec<f32> = followed.iter().map(|mirror| (mirror.bounds.center().x / 30.0).round()).collect();
+        assert_eq!(places, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], "the largest first");
+    }
+
+    #[test]
+    fn six_faces_see_every_direction() {
+        let cameras = faces(Vec3::new(1.0, 2.0, 3.0), UVec2::splat(64));
+        let directions = (0..500).map(|i| {
+            let y = 1.0 - 2.0 * (i as f32 + 0.5) / 500.0;
+            let (sin, cos) = (i as f32 * 2.4).sin_cos();
+            Vec3::new(sin, 0.0, cos) * (1.0 - y * y).sqrt() + Vec3::Y * y
+        });
+        for direction in directions {
+            let point = Vec3::new(1.0, 2.0, 3.0) + direction * 5.0;
+            let sees = |camera: &&PinholeCamera| camera.project(point).is_some_and(|at| camera.contains(at.pixel));
+            assert!(cameras.iter().any(|camera| sees(&camera)), "{direction}");
+        }
+    }
+
+    #[test]
+    fn a_material_mirrors_where_its_roughness_map_is_smooth() {
+        let mut textured = scene("blocks");
+        let texels = [[0, 200, 0, 255]; 16].as_flattened().to_vec();
+        textured.textures.push(Texture { width_px: 4, height_px: 4, is_srgb: false, srgba8: texels });
+        let map = (textured.textures.len() as u32 - 1).into();
+        textured.materials[0].metallic_roughness_texture = Some(map);
+        textured.materials[0].roughness = 1.0;
+        assert_eq!(mirrors(&textured).0, []);
+        textured.textures.last_mut().expect("a texture").srgba8[4 * 5 + 1] = 20;
+        assert!(!mirrors(&textured).0.is_empty());
+    }
+}

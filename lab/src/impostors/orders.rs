@@ -1,0 +1,45 @@
+//! Mirrors in mirrors: how errors grow from one to the next.
+
+use depth_image::{Aabb, PinholeCamera};
+use glam::Vec3;
+use render::Lighting;
+use scene::{Limits, MissingTextures, SceneSpec};
+use study::{Bar, Cell, Check, Table};
+
+use super::candidates::in_a_cluster;
+use super::measure::{Hall, VIEW_PX};
+use crate::failures::stand::Stand;
+
+/// Two mirrors that face each other, and a ball between them.
+const SCENE: &str = "mirror-pair";
+const ORDERS: u32 = 4;
+
+/// A row for each number of mirrors that a ray meets, and the growth of errors as a check.
+///
+/// # Errors
+/// The device fails.
+pub fn measure(stand: &Stand, lighting: Lighting) -> anyhow::Result<(Table, Check)> {
+    let scene = SCENE.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?;
+    let views = [-0.3f32, 0.1, 0.4].map(|z_m| between(Vec3::new(1.2, 1.5, 2.2 + z_m)));
+    let hall = Hall::new(stand, &scene, lighting, &views)?;
+    let (mirrors, _) = sampling::mirrors(&scene);
+    let bounds: Vec<Aabb> = mirrors.iter().map(|mirror| mirror.bounds).collect();
+    let sets = mirrors.iter().map(|mirror| hall.set(&hall.images(&in_a_cluster(mirror))?));
+    let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
+    let columns =
+        [("mirrors on the way", ""), ("FLIP", ""), ("FLIP without rays", ""), ("PSNR", "dB"), ("guessed", "%")];
+    let mut table = Table::new("Pixels whose rays meet so many mirrors, and no fewer", &columns);
+    let mut errors = Vec::new();
+    for order in 1..=ORDERS {
+        let Some([with, without]) = hall.order(&bounds, &sets, order)? else { break };
+        errors.push(with.flip);
+        let numbers = [with.flip, without.flip, with.psnr_db, with.guessed_ratio * 100.0];
+        table.push([Cell::from(order as usize)].into_iter().chain(numbers.map(Cell::from)))?;
+    }
+    let growth = errors.windows(2).map(|pair| pair[1] / pair[0]).fold(f64::NAN, f64::max);
+    Ok((table, Check::new("error for each further mirror, most", growth, "×", Bar::AtMost(1.4))))
+}
+
+fn between(eye: Vec3) -> PinholeCamera {
+    PinholeCamera::looking_at(eye, Vec3::new(-2.0, 1.2, -0.6), Vec3::Y, 0.8, VIEW_PX)
+}
