@@ -86,9 +86,7 @@ impl<'s> Hall<'s> {
 
     /// Of the pixels in which mirrors show the scene, the share in which they show an object.
     pub fn object_share(&self) -> f64 {
-        let count = |of: fn(&Subject) -> &Vec<bool>| {
-            self.subjects.iter().flat_map(of).filter(|is| **is).count() as f64
-        };
+        let count = |of: fn(&Subject) -> &Vec<bool>| self.subjects.iter().flat_map(of).filter(|is| **is).count() as f64;
         count(|subject| &subject.of_objects) / count(|subject| &subject.mirrored)
     }
 
