@@ -31,7 +31,9 @@ const SETS_AHEAD: u32 = 2;
 /// the memory of older ones: the system clears new memory page by page, in the time of a software device.
 const EARLIER_SETS: usize = 4;
 /// Times that a view's sets are waited for, where others evict some of them meanwhile.
-const ATTEMPTS: usize = 8;
+const ATTEMPTS: usize = 16;
+/// The first of these, after which they take turns.
+const CALM_ATTEMPTS: usize = 3;
 /// A set that was used within this time is not evicted for that of another cell ahead: a viewer's next pose needs it.
 const RECENTLY: Duration = Duration::from_millis(500);
 
@@ -91,6 +93,8 @@ pub(crate) struct Sets {
     reports: Reports,
     cached: ByteCache<SetContent, ReadySet>,
     relays: RelayBuffers,
+    /// Held by a view that could not have all of its sets at once.
+    assembling: tokio::sync::Mutex<()>,
 }
 
 impl Sets {
@@ -124,6 +128,7 @@ impl Sets {
             // The other half is for packed images.
             cached: ByteCache::new("sample sets", config.set_memory_bytes / 2),
             relays: RelayBuffers::default(),
+            assembling: tokio::sync::Mutex::default(),
         }
     }
 
@@ -145,7 +150,7 @@ impl Sets {
         // The first request begins the loading, whose end the stream of images tells. The set stays while images are sent.
         tokio::spawn(async move {
             let is_sent = async {
-                let _in_use = sets.load(&plan, set_index).await?;
+                let _in_use = sets.load(&plan, set_index, &[]).await?;
                 relay.unwanted().await;
                 Ok::<_, Status>(())
             };
@@ -157,8 +162,9 @@ impl Sets {
         Ok(images)
     }
 
-    /// Waits for the complete sets of a view cell and of all mirror cells. While it waits for one it keeps no other in
-    /// memory: two that wait never wait for each other.
+    /// Waits for the complete sets of a view cell and of all mirror cells; the sets after them are then fetched ahead, so that
+    /// samplers work on them while these are shown. While it waits for one it keeps no other in memory: two that wait never
+    /// wait for each other.
     pub(crate) async fn of_views(
         self: &Arc<Self>,
         plan: &Arc<Assignment>,
@@ -166,34 +172,50 @@ impl Sets {
         cell: u32,
     ) -> Result<ViewSets, Status> {
         let of_cell = CellPlan::of(plan, cell)?;
-        let mirrors = CellPlan::of_mirrors(plan);
+        let mirrors: Vec<CellPlan> = CellPlan::of_mirrors(plan).into_iter().map(|(_, mirror)| mirror).collect();
         self.check_room(&of_cell, &mirrors)?;
-        for _ in 0..ATTEMPTS {
-            // Samplers work on all of them at once, as far as memory has room.
-            for (_, mirror) in &mirrors {
-                self.begin_to_load(mirror, set_index, Duration::ZERO);
+        // Where samplers take turns, those of later sets need not wait for this one's.
+        let in_turn = of_cell.sets_at_once() > 1;
+        if in_turn {
+            self.fetch_ahead(&of_cell, &mirrors, set_index);
+        }
+        let mut turn = None;
+        for attempt in 0..ATTEMPTS {
+            // Views that evict each other's sets go one after the other.
+            if attempt == CALM_ATTEMPTS {
+                turn = Some(self.assembling.lock().await);
             }
-            let set = self.get(&of_cell, set_index).await?;
+            let set = self.load(&of_cell, set_index, &mirrors).await?;
             if let Some(sets) = self.with_mirrors(set, plan, set_index)? {
-                mirrors.iter().for_each(|(_, mirror)| self.fetch_ahead(mirror, set_index));
+                if !in_turn {
+                    self.fetch_ahead(&of_cell, &mirrors, set_index);
+                }
                 return Ok(sets);
             }
-            for (_, mirror) in &mirrors {
-                self.get(mirror, set_index).await?;
+            for mirror in &mirrors {
+                self.load(mirror, set_index, &[]).await?;
             }
         }
+        drop(turn);
         Err(Status::resource_exhausted(format!("set-memory: other views need the room of sample set {set_index}")))
     }
 
     /// A view's sets fit into memory together, or never will.
-    fn check_room(&self, of_cell: &CellPlan, mirrors: &[(Aabb, CellPlan)]) -> Result<(), Status> {
-        let cells = [of_cell].into_iter().chain(mirrors.iter().map(|(_, mirror)| mirror));
-        let (bytes, max_bytes) = (cells.map(|cell| self.most_bytes(cell)).sum::<usize>(), self.cached.max_bytes());
+    fn check_room(&self, of_cell: &CellPlan, mirrors: &[CellPlan]) -> Result<(), Status> {
+        let (bytes, max_bytes) = (self.most_bytes_of_view(of_cell, mirrors), self.cached.max_bytes());
         if mirrors.is_empty() || bytes <= max_bytes {
             return Ok(());
         }
         let reason = format!("set-memory: {bytes} bytes of a view's sample sets exceed the {max_bytes} of this node");
         Err(Status::resource_exhausted(reason))
+    }
+
+    fn most_bytes_of_view(&self, of_cell: &CellPlan, mirrors: &[CellPlan]) -> usize {
+        self.most_bytes(of_cell) + self.most_bytes_of(mirrors)
+    }
+
+    fn most_bytes_of(&self, mirrors: &[CellPlan]) -> usize {
+        mirrors.iter().map(|mirror| self.most_bytes(mirror)).sum()
     }
 
     /// A view cell's set with those of the mirror cells of its moment; `None` where one of these is not loaded.
@@ -216,20 +238,6 @@ impl Sets {
         Ok(Some(ViewSets { of_cell, on_device, _mirrors: mirrors }))
     }
 
-    /// Waits for a complete set of one cell; the sets after it are then fetched ahead, so that samplers work on them while
-    /// this one is shown.
-    async fn get(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<Pinned<ReadySet>, Status> {
-        let in_turn = plan.sets_at_once() > 1;
-        if in_turn {
-            self.fetch_ahead(plan, set_index);
-        }
-        let set = self.load(plan, set_index).await?;
-        if !in_turn {
-            self.fetch_ahead(plan, set_index);
-        }
-        Ok(set)
-    }
-
     /// A set that is loaded already.
     pub(crate) fn loaded(&self, content: &SetContent) -> Option<Pinned<ReadySet>> {
         self.cached.loaded(content)
@@ -243,20 +251,25 @@ impl Sets {
         Some(sets.swap_remove(nearest))
     }
 
-    /// Where samplers take turns, those of later sets need not wait for this one's.
-    fn fetch_ahead(self: &Arc<Self>, plan: &CellPlan, set_index: u32) {
-        let last = plan.workload.timeline.set_count.saturating_sub(1);
-        let ahead = sets_ahead(plan).min(u32::try_from(self.room_ahead(plan)).unwrap_or(u32::MAX));
+    /// Begins to load the sets after one, moment by moment, as far as memory has room.
+    fn fetch_ahead(self: &Arc<Self>, of_cell: &CellPlan, mirrors: &[CellPlan], set_index: u32) {
+        let last = of_cell.workload.timeline.set_count.saturating_sub(1);
+        let room = self.cached.max_bytes() / self.most_bytes_of_view(of_cell, mirrors).max(1);
+        let ahead = sets_ahead(of_cell).min(u32::try_from(room.saturating_sub(SETS_IN_USE)).unwrap_or(u32::MAX));
         for next in set_index.saturating_add(1)..=last.min(set_index.saturating_add(ahead)) {
-            if plan.set_content(next) != plan.set_content(set_index) {
-                self.begin_to_load(plan, next, Duration::ZERO);
+            if of_cell.set_content(next) != of_cell.set_content(set_index) {
+                for cell in [of_cell].into_iter().chain(mirrors) {
+                    self.begin_to_load(cell, next, Duration::ZERO);
+                }
             }
         }
     }
 
-    /// The number of sets ahead for which memory has room: more would evict the sets in use.
-    pub(crate) fn room_ahead(&self, plan: &CellPlan) -> usize {
-        (self.cached.max_bytes() / self.most_bytes(plan).max(1)).saturating_sub(SETS_IN_USE)
+    /// The number of further view cells of a moment for which memory has room: more would evict the sets in use.
+    pub(crate) fn room_ahead(&self, of_cell: &CellPlan, mirrors: &[(Aabb, CellPlan)]) -> usize {
+        let of_mirrors: usize = mirrors.iter().map(|(_, mirror)| self.most_bytes(mirror)).sum();
+        let room = self.cached.max_bytes().saturating_sub(of_mirrors) / self.most_bytes(of_cell).max(1);
+        room.saturating_sub(SETS_IN_USE)
     }
 
     /// Begins to load the set of a cell that no view needs yet, where it has room; gives its content if it is loaded or
@@ -277,8 +290,19 @@ impl Sets {
     }
 
     /// A load that another workload's plan began may end with that plan. This plan, if it is in force, then begins its own.
-    async fn load(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Result<Pinned<ReadySet>, Status> {
+    /// The sets of `beside` are begun to be loaded meanwhile, as far as memory has room.
+    async fn load(
+        self: &Arc<Self>,
+        plan: &CellPlan,
+        set_index: u32,
+        beside: &[CellPlan],
+    ) -> Result<Pinned<ReadySet>, Status> {
         let content = content_of(plan, set_index)?;
+        // It is about to be used: what is loaded beside it must not evict it.
+        let _in_use = self.cached.loaded(&content);
+        for other in beside {
+            self.begin_to_load(other, set_index, Duration::ZERO);
+        }
         let load = || self.cached.get(content, self.most_bytes(plan), self.loading(plan, set_index, content));
         match load().await {
             Err(status) if status.code() == Code::FailedPrecondition && self.is_in_force(plan) => load().await,

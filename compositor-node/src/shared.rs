@@ -140,7 +140,8 @@ impl Shared {
     pub(crate) fn begin_to_load(&self, plan: &Arc<Assignment>, set_index: u32, cells: impl Iterator<Item = u32>) {
         if plan.policy != Policy::Direct {
             let plans = cells.map_while(|cell| CellPlan::of(plan, cell).ok());
-            let has_room = |(ahead, plan): &(usize, CellPlan)| *ahead <= self.sets.room_ahead(plan);
+            let mirrors = CellPlan::of_mirrors(plan);
+            let has_room = |(ahead, plan): &(usize, CellPlan)| *ahead <= self.sets.room_ahead(plan, &mirrors);
             let plans = plans.enumerate().take_while(has_room);
             plans.map_while(|(_, plan)| self.sets.load_ahead(&plan, set_index)).for_each(drop);
         }

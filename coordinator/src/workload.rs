@@ -1,6 +1,6 @@
 //! The workload of a session: its own settings, completed with those of its scene.
 
-use cluster::limits::MAX_CELLS;
+use cluster::limits::{MAX_CELLS, MAX_TILES};
 use cluster::{DIRECT, MirrorCell, SamplePlanes, SessionRequest, Workload};
 use depth_image::{Aabb, Camera, PinholeCamera, ViewGroup};
 use glam::UVec2;
@@ -16,6 +16,8 @@ const SAMPLE_DENSITY: f32 = 2.0;
 const MAX_FITTING_TEXELS: usize = 1 << 20;
 /// Texels of all images of a mirror cell, over those of one sample image: a mirror shows all directions.
 const MIRROR_DENSITY: f32 = 2.2;
+/// The same of all mirror cells together, which every view needs.
+const MIRRORS_DENSITY: f32 = 4.4;
 /// Steps of √2 by which images are smaller than the offered ones at most.
 const LEAST_STEPS: f32 = -2.0;
 
@@ -67,14 +69,14 @@ fn mirrors_of(
         return Ok(Vec::new());
     }
     let image_texels = workload.sample_cameras.first().map_or(1, |Camera::Pinhole(camera)| camera.pixel_count());
-    let sized = |(cell, cameras): &(MirrorCell, Vec<Camera>)| {
-        let texels: usize = cameras.iter().map(|Camera::Pinhole(camera)| camera.pixel_count()).sum();
-        let scale = (image_texels as f32 * MIRROR_DENSITY / texels.max(1) as f32).sqrt();
-        let sized = |camera: &Camera| {
-            let Camera::Pinhole(PinholeCamera { size_px, .. }) = camera;
-            resized(camera, (size_px.as_vec2() * scale).ceil().as_uvec2().max(UVec2::ONE))
+    let density = MIRROR_DENSITY.min(MIRRORS_DENSITY / offer.mirrors.len().max(1) as f32);
+    let sized = |(cell, cameras): &(MirrorCell, Vec<PinholeCamera>)| {
+        let cameras = PinholeCamera::resized_together(cameras, image_texels as f32 * density, MAX_TILES);
+        let checked = |camera: PinholeCamera| {
+            let usable = camera.validate().map(|()| Camera::Pinhole(camera));
+            usable.map_err(|error| Status::internal(format!("mirrors of scene {}: {error}", offer.name)))
         };
-        Ok((cell.clone(), cameras.iter().map(sized).collect::<Result<_, _>>()?))
+        Ok((cell.clone(), cameras.into_iter().map(checked).collect::<Result<_, Status>>()?))
     };
     offer.mirrors.iter().map(sized).collect()
 }

@@ -22,7 +22,7 @@ pub(crate) struct CamerasQuery {
     moment: u32,
 }
 
-/// `cameras.json`: the sample cameras of a scene's plan, as a `transforms.json` has them, each with its view cell.
+/// `cameras.json`: the sample cameras of views in a scene's plan, as a `transforms.json` has them, each with its view cell.
 pub(crate) async fn cameras(
     State(gateway): State<Arc<Gateway>>,
     Query(query): Query<CamerasQuery>,
@@ -31,7 +31,7 @@ pub(crate) async fn cameras(
     let shown = scene.session_of(query.moment);
     let _visit = shown.visits.begin();
     let workload = shown.opened().await?.plan().assignment.workload;
-    let cells = (0..workload.cell_count()).filter_map(|cell| Some((cell, workload.cameras_of_cell(cell)?)));
+    let cells = (0..workload.view_cell_count()).filter_map(|cell| Some((cell, workload.cameras_of_cell(cell)?)));
     let frames: Vec<Value> = cells
         .flat_map(|(cell, cameras)| workload.sample_cameras[cameras].iter().map(move |camera| (cell, camera)))
         .map(|(cell, Camera::Pinhole(camera))| {
@@ -102,7 +102,8 @@ fn described_plan(plan: &SessionPlan, achieved: &[AchievedTime]) -> Value {
         .collect();
     json!({
         "epoch": assignment.plan_epoch, "policy": assignment.policy.to_string(), "reason": plan.reason,
-        "samplers": samplers, "compositors": compositors, "cells": assignment.workload.cell_count(),
+        "samplers": samplers, "compositors": compositors, "cells": assignment.workload.view_cell_count(),
+        "mirror_cells": assignment.workload.mirror_cells.len(),
         "costs": described_costs(&plan.costs), "policies": policies,
     })
 }

@@ -33,15 +33,27 @@ fn ms(seconds: f64) -> String {
     format!("{:.3} ms", seconds * 1e3)
 }
 
+/// The cells that images belong to, where there are several.
+fn near(load: &Load) -> String {
+    let counted = |count: usize, of: &str| format!("{count} {of}{}", if count == 1 { "" } else { "s" });
+    match (load.cells, load.mirror_cells) {
+        (1, 0) => String::new(),
+        (cells, 0) => format!(" for {}", counted(cells, "view cell")),
+        (cells, mirrors) => {
+            format!(" for {} and {}", counted(cells, "view cell"), counted(mirrors, "mirror cell"))
+        }
+    }
+}
+
 fn pipeline(demand: &Demand<'_>, mean: &Costs, samplers: usize, predicted: &Predicted) -> String {
-    let Load { images, tiles, cells, views, images_are_sequential, is_already_sampled, .. } = demand.load;
+    let Load { images, tiles, views, images_are_sequential, is_already_sampled, .. } = demand.load;
     let in_turn = if images_are_sequential { "whole sets in turn, " } else { "" };
     let roles = match demand.nodes.len() {
         1 => "1 node in turn".to_owned(),
         nodes => format!("K = {samplers} of {nodes} nodes, {in_turn}the others reconstruct"),
     };
     let tiled = if tiles > 1 { format!(" in {tiles} tiles each") } else { String::new() };
-    let near = if cells > 1 { format!(" for {cells} cells") } else { String::new() };
+    let near = near(&demand.load);
     let once = if is_already_sampled { ", once," } else { "" };
     format!(
         "Pipeline: {} a set: {images} images{near}{tiled} of {} sampled{once} by {roles} {views} views of {} + {} to encode, after {} to \

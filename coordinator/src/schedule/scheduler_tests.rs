@@ -1,6 +1,6 @@
 use std::num::NonZeroU32;
 
-use cluster::{Assignment, Costs, Policy, PolicyChoice, Quality, SessionPlan, TileCosts, WorkloadStatus};
+use cluster::{Assignment, Costs, MirrorCell, Policy, PolicyChoice, Quality, SessionPlan, TileCosts, WorkloadStatus};
 use depth_image::Camera;
 
 use super::*;
@@ -317,6 +317,41 @@ fn sessions_beyond_the_nodes_time_are_refused() {
     );
     let batch = cluster.step(opened(4, PolicyChoice::Auto, 1000));
     assert!(!batch.iter().any(|command| matches!(command, Command::Refuse { .. })), "a batch waits for its turn");
+}
+
+/// The plans of a session with two mirror cells, whose sampler makes views slower than they were alone.
+#[test]
+fn mirror_cells_leave_with_the_first_fallback_and_plans_stay_whole() {
+    let mut cluster = Cluster::of(3);
+    let asked = opening(1, PolicyChoice::Pipeline, 1);
+    let mirror = MirrorCell { bounds: asked.workload.volume, sampling: "conventional".to_owned() };
+    let cameras = asked.workload.sample_cameras.clone();
+    let workload = asked.workload.clone().with_mirrors(vec![(mirror.clone(), cameras.clone()), (mirror, cameras)]);
+    let follows = Quality { follows_mirrors: true, sample_side_ratio: 1.0, ..quality("joint_carve", 1.0) };
+    let fallbacks = vec![Quality { follows_mirrors: false, ..follows.clone() }, quality("joint_carve:1", 0.8)];
+    let opening = Opening { workload, frames_per_s: Some(150.0), fallbacks, ..asked };
+    let commands = cluster.step(Event::Opened(Box::new(opening)));
+    let first = assignment_of(&commands);
+    assert_eq!((first.image_count(), first.workload.mirror_cells.len(), first.validate()), (12, 2, Ok(())));
+    let slow =
+        MeasuredCosts { reconstruct_view_s: Some(0.0145), encode_view_s: Some(0.001), ..MeasuredCosts::default() };
+    let mut plans = Vec::new();
+    for _ in 0..240 {
+        for name in ["n0", "n1", "n2"] {
+            let (node_name, plan_epoch) = (name.to_owned(), cluster.plan().plan_epoch);
+            cluster.step(Event::Ready { plan_epoch, node_name: node_name.clone() });
+            let (busy_s, views, dropped_views) = (0.5, 40, 0);
+            cluster.step(Event::Measured { node_name, plan_epoch, costs: slow, busy_s, views, dropped_views });
+        }
+        cluster.now += Duration::from_millis(500);
+        plans.extend(cluster.step(Event::Tick).into_iter().filter_map(|command| match command {
+            Command::Apply { plan, .. } => Some(plan.assignment),
+            _ => None,
+        }));
+    }
+    assert!(plans.iter().all(|plan| plan.validate().is_ok()), "{plans:?}");
+    let without = plans.iter().find(|plan| plan.workload.mirror_cells.is_empty()).expect("a fallback");
+    assert_eq!((without.image_count(), without.workload.cell_count()), (4, 1));
 }
 
 #[test]

@@ -96,17 +96,14 @@ pub struct Setup {
     pub offer: SceneOffer,
 }
 
-/// The scene's mirrors, as sessions follow them. Their images are taken from one place, so that they repeat little.
-fn mirrors_of(scene: &Scene) -> Vec<(MirrorCell, Vec<Camera>)> {
+/// The scene's mirrors, as sessions follow them.
+fn mirrors_of(scene: &Scene) -> Vec<(MirrorCell, Vec<PinholeCamera>)> {
     let (mirrors, beyond) = sampling::mirrors(scene);
     if beyond > 0 {
         tracing::info!(beyond, followed = mirrors.len(), "the smallest mirrors show the environment alone");
     }
     let sampling = SamplingMethod::default().to_string();
-    let cell = |mirror: Mirror| {
-        let cell = MirrorCell { bounds: mirror.bounds, sampling: sampling.clone() };
-        (cell, mirror.cameras.into_iter().map(Camera::Pinhole).collect())
-    };
+    let cell = |mirror: Mirror| (MirrorCell { bounds: mirror.bounds, sampling: sampling.clone() }, mirror.cameras);
     mirrors.into_iter().map(cell).collect()
 }
 

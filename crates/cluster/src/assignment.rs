@@ -133,7 +133,7 @@ impl Assignment {
         if self.policy == Policy::Direct { 0 } else { self.workload.cell_of(view) }
     }
 
-    /// The same plan for one view cell alone, its cameras and their samplers; `None` beyond the last cell.
+    /// The same plan for one cell alone, its cameras and their samplers; `None` beyond the last cell.
     #[must_use]
     pub fn of_cell(&self, cell: u32) -> Option<Self> {
         let cameras = self.workload.cameras_of_cell(cell as usize)?;
@@ -143,7 +143,13 @@ impl Assignment {
             SamplerShare { image_indices: of_cell.map(|image| image - images[0]).collect(), ..share.clone() }
         };
         let samplers = self.samplers.iter().map(own).filter(|share| !share.image_indices.is_empty()).collect();
-        Some(Self { workload: self.workload.of_cell(cell as usize)?, samplers, ..self.clone() })
+        Some(Self {
+            workload: self.workload.of_cell(cell as usize)?,
+            samplers,
+            compositors: self.compositors.clone(),
+            method: self.method.clone(),
+            ..*self
+        })
     }
 
     /// The number of images, or tiles of images, of a set.

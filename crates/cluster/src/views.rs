@@ -93,7 +93,7 @@ pub struct FetchImages {
     pub workload_number: u64,
     /// Index into the timeline.
     pub set_index: u32,
-    /// Index into the workload's view cells.
+    /// Index into the workload's cells.
     pub cell: u32,
     /// Indices into [`Assignment::sampled_cameras`](crate::Assignment::sampled_cameras) of the cell: images that the
     /// sampler samples, or that a relay relays.

@@ -91,6 +91,13 @@ impl Workload {
         self.cell_count().saturating_sub(self.mirror_cells.len()).max(1)
     }
 
+    /// Sample cameras of view cells; those of mirror cells come after them.
+    #[must_use]
+    pub fn view_camera_count(&self) -> usize {
+        let first_of_mirrors = self.cell_first_indices.get(self.view_cell_count());
+        first_of_mirrors.map_or(self.sample_cameras.len(), |&first| first as usize)
+    }
+
     /// The mirror cell of a cell's number; `None` for a view cell, and beyond the last.
     #[must_use]
     pub fn mirror_cell(&self, cell: usize) -> Option<&MirrorCell> {
@@ -108,10 +115,21 @@ impl Workload {
     /// The workload of one cell alone, without mirror cells; `None` beyond the last.
     #[must_use]
     pub fn of_cell(&self, cell: usize) -> Option<Self> {
-        let sample_cameras = self.sample_cameras.get(self.cameras_of_cell(cell)?)?.to_vec();
-        let sampling = self.mirror_cell(cell).map_or(&self.sampling, |mirror| &mirror.sampling).clone();
-        let (cell_first_indices, mirror_cells) = (Vec::new(), Vec::new());
-        Some(Self { sample_cameras, cell_first_indices, mirror_cells, sampling, ..self.clone() })
+        Some(Self {
+            // Not `..self.clone()`: a workload may have a thousand cameras, and a live view asks for its cell.
+            scene: self.scene.clone(),
+            sample_cameras: self.sample_cameras.get(self.cameras_of_cell(cell)?)?.to_vec(),
+            cell_first_indices: Vec::new(),
+            mirror_cells: Vec::new(),
+            sampling: self.mirror_cell(cell).map_or(&self.sampling, |mirror| &mirror.sampling).clone(),
+            lighting: self.lighting.clone(),
+            planes: self.planes,
+            volume: self.volume,
+            background: self.background,
+            timeline: self.timeline,
+            illumination: self.illumination.clone(),
+            refinement_steps: self.refinement_steps,
+        })
     }
 
     /// The workloads of all cells: view cells first, then mirror cells.
@@ -148,12 +166,10 @@ impl Workload {
     /// The workload without mirror cells.
     #[must_use]
     pub fn without_mirrors(mut self) -> Self {
-        let cells = self.view_cell_count();
+        let (cells, cameras) = (self.view_cell_count(), self.view_camera_count());
+        self.sample_cameras.truncate(cameras);
+        self.cell_first_indices.truncate(cells);
         self.mirror_cells.clear();
-        if let Some(&first) = self.cell_first_indices.get(cells) {
-            self.sample_cameras.truncate(first as usize);
-            self.cell_first_indices.truncate(cells);
-        }
         self
     }
 
@@ -269,7 +285,7 @@ fn validate_illumination(illumination: &Illumination) -> Result<(), InvalidField
     illumination.environment.validate().map_err(light_error("illumination.environment"))
 }
 
-/// The name of a sample set's content, of one view cell. It is equal for equal scene, time, cameras, sampling, lighting,
+/// The name of a sample set's content, of one cell. It is equal for equal scene, time, cameras, sampling, lighting,
 /// step of refinement, lights and volume, under any plan. Sets of equal content are not sampled again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SetContent([u8; 32]);

@@ -142,6 +142,19 @@ impl PinholeCamera {
         Self { size_px, focal_px: self.focal_px * scale, principal_px: self.principal_px * scale, ..*self }
     }
 
+    /// The same fields of view in sizes of the same proportions, which have about so many pixels together; each side has at
+    /// least `least_px`.
+    #[must_use]
+    pub fn resized_together(cameras: &[Self], pixels: f32, least_px: u32) -> Vec<Self> {
+        let all: usize = cameras.iter().map(Self::pixel_count).sum();
+        let scale = (pixels / all.max(1) as f32).sqrt();
+        let sized = |camera: &Self| {
+            let size_px = (camera.size_px.as_vec2() * scale).round().as_uvec2();
+            camera.resized(size_px.clamp(UVec2::splat(least_px), UVec2::splat(MAX_IMAGE_SIDE_PX)))
+        };
+        cameras.iter().map(sized).collect()
+    }
+
     /// The camera whose pixels' centres are those points of this one's pixels, in pixels from their centres.
     #[must_use]
     pub fn with_offset(&self, offset_px: Vec2) -> Self {

@@ -27,6 +27,8 @@ pub struct Reflector {
 pub const MAX_REFLECTIONS: u32 = 8;
 /// Mirror cells of a view.
 pub const MAX_MIRROR_CELLS: usize = 8;
+/// Perceptual roughness: smoother surfaces show the scene, the smoother the more of it. The shader has the same number.
+pub const ROUGHEST_MIRROR: f32 = 0.2;
 
 /// Range of the exponents of Blinn-Phong lobes.
 pub(crate) const EXPONENTS: [f32; 2] = [1.0, 1024.0];

@@ -31,7 +31,7 @@ pub use camera::{Camera, CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera, PixelDep
 pub use encoding::{linear_from_rgb9e5, linear_from_srgb8, oct16_from_unit, rgb9e5_from_linear, srgb8_from_linear};
 pub use environment_light::{BrightTexel, EnvironmentLight, LOBE_ROUGHNESS, LOBE_SIZE_PX, Lobe};
 pub use environment_map::{EnvironmentMap, EnvironmentMapError, MAX_ENVIRONMENT_SIZE_PX};
-pub use highlight::{Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS, Reflector};
+pub use highlight::{Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS, ROUGHEST_MIRROR, Reflector};
 pub use image::{BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId};
 pub use light::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
 pub use method_table::{NamedMethod, Setting, method_forms, method_help, method_named};

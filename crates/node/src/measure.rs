@@ -67,18 +67,21 @@ impl Measurement<'_> {
         let planes = engine.sample_planes(&request.method)?;
         // Views are made from all of them: their own cell, and what mirrors show.
         let cells = workload.cells();
-        let sample = |cell| SampleWork { planes, ..SampleWork::of(cell) };
-        let sampled = || cells.iter().map(|cell| self.sampled(&sample(cell))).collect::<Result<Vec<_>, _>>();
-        let (encoded, sample_s) = self.timed(sampled)?;
+        let sample = |cell: &Workload| SampleWork { planes, ..SampleWork::of(cell) };
+        let sampled = cells.iter().map(|cell| self.timed(|| self.sampled(&sample(cell))));
+        let (encoded, cells_s): (Vec<_>, Vec<f64>) = sampled.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let upload = |(cell, images): (&Workload, &Vec<_>)| Ok(engine.upload(&decoded(cell, images)?, self.turn)?);
         let upload_all = || cells.iter().zip(&encoded).map(upload).collect::<Result<Vec<_>, Status>>();
         let (sets, load_s) = self.timed(upload_all)?;
         let set = mirroring(engine, workload, sets)?;
         let load_set_s = load_s / cells.len().max(1) as f64;
-        let sample_image_s = sample_s / workload.sample_cameras.len().max(1) as f64;
+        let sample_image_s = cells_s.iter().sum::<f64>() / workload.sample_cameras.len().max(1) as f64;
         let is_tileable = engine.images_are_independent(&workload.sampling)?;
-        let first = cells.first().filter(|_| is_tileable);
-        let tiles = first.map(|cell| self.tile_costs(&sample(cell), sample_image_s)).transpose()?.flatten();
+        let first = cells.first().zip(cells_s.first()).filter(|_| is_tileable);
+        let tile_costs = |(cell, cell_s): (&Workload, &f64)| {
+            self.tile_costs(&sample(cell), cell_s / cell.sample_cameras.len().max(1) as f64)
+        };
+        let tiles = first.map(tile_costs).transpose()?.flatten();
         let (drawn, direct_view_s) = self.direct_view_s(request)?;
         let (made, reconstruct_view_s) = match request.method.as_str() {
             DIRECT => (drawn, direct_view_s),

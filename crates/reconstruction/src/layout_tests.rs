@@ -75,6 +75,7 @@ fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
     let passes = BTreeSet::from([
         "antialias.wgsl",
         "bounce/land.wgsl",
+        "bounce/march.wgsl",
         "fill.wgsl",
         "joint_carve.wgsl",
         "light_field_search.wgsl",
@@ -150,11 +151,13 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
     let fields = [("workgroups", first), ("y", first + 4), ("z", first + 8), ("count", count)];
     let list = Layout::new(fields, size_of::<GpuPixelList>());
     let searches = ["joint_carve.wgsl", "light_field_search.wgsl", "resolve.wgsl"];
-    let written = [&searches[..], &["joint_carve/march.wgsl", "joint_carve/smooth.wgsl"]].concat();
+    let marches = ["bounce/march.wgsl", "joint_carve/march.wgsl", "joint_carve/smooth.wgsl"];
+    let written = [&searches[..], &marches].concat();
     assert_eq!(templates_that_agree("UndecidedList", &list), BTreeSet::from_iter(written));
     let read = [
         "antialias.wgsl",
         "bounce/land.wgsl",
+        "bounce/march.wgsl",
         "fill.wgsl",
         "joint_carve.wgsl",
         "joint_carve/march.wgsl",
@@ -166,7 +169,7 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
 #[test]
 fn mirrored_rays_and_mirror_boxes_agree_where_they_are_written_and_read() {
     let ray = host!(GpuMirroredRay { origin_in_world, pixel, direction, guess, throughput_linear, near_m });
-    let passes = ["bounce/land.wgsl", "joint_carve.wgsl", "specular.wgsl"];
+    let passes = ["bounce/land.wgsl", "bounce/march.wgsl", "joint_carve.wgsl", "specular.wgsl"];
     assert_eq!(templates_that_agree("MirroredRay", &ray), BTreeSet::from(passes));
     let boxes = host!(GpuMirrorBox { min_in_world, first_listed, max_in_world, padding });
     assert_eq!(templates_that_agree("MirrorBox", &boxes), BTreeSet::from(["bounce/land.wgsl", "specular.wgsl"]));

@@ -1,11 +1,11 @@
 //! Mirrors of a scene, and places of sample cameras for what they show.
 
-use depth_image::{Aabb, MAX_MIRROR_CELLS, PinholeCamera};
+use std::collections::BTreeSet;
+
+use depth_image::{Aabb, MAX_MIRROR_CELLS, PinholeCamera, ROUGHEST_MIRROR};
 use glam::{UVec2, UVec3, Vec3};
 use scene::{Material, Scene, Texture};
 
-/// Rougher surfaces show the environment alone.
-const ROUGHEST: f32 = 0.2;
 /// Mirrors belong together where they touch the same or neighbouring cells of a grid with so many along the scene's longest
 /// side.
 const GRID: f32 = 32.0;
@@ -38,15 +38,20 @@ pub struct Mirror {
 /// The mirrors of a scene, the largest first, at most [`MAX_MIRROR_CELLS`]; and the number of those beyond.
 #[must_use]
 pub fn mirrors(scene: &Scene) -> (Vec<Mirror>, usize) {
-    let volume = scene.bounds();
-    let mut groups = grouped(&patches_of_mirrors(scene), &volume);
+    let is_mirror: Vec<bool> = scene.materials.iter().map(|material| mirrors_scene(scene, material)).collect();
+    if !is_mirror.contains(&true) {
+        return (Vec::new(), 0);
+    }
+    let of_instances = scene.bounds_of_instances();
+    let volume = Aabb::of_boxes(&of_instances);
+    let mut groups = grouped(&patches_of_mirrors(scene, &is_mirror, &of_instances), &volume);
     groups.sort_by(|a, b| area_m2(&b.bounds).total_cmp(&area_m2(&a.bounds)));
     let beyond = groups.split_off(groups.len().min(MAX_MIRROR_CELLS));
     let mirror = |group: Patch| {
         let facing = group.area_normal_m2 / group.area_m2.max(f32::MIN_POSITIVE);
         let cameras = match facing.length() > FLAT {
-            true => before_flat(&group.bounds, facing.normalize_or(Vec3::Y)),
-            false => all_around(&group.bounds, volume.center()),
+            true => before_flat(&group.bounds, facing.normalize_or(Vec3::Y), volume.near_m()),
+            false => all_around(&group.bounds, volume.center(), volume.near_m()),
         };
         Mirror { bounds: group.bounds.padded(group.bounds.size().length() * MARGIN), cameras }
     };
@@ -55,36 +60,39 @@ pub fn mirrors(scene: &Scene) -> (Vec<Mirror>, usize) {
 
 /// Four images from the quarters of a flat mirror: what stands close before it hides little from all of them. And four along
 /// it, from the middle.
-fn before_flat(bounds: &Aabb, facing: Vec3) -> Vec<PinholeCamera> {
+fn before_flat(bounds: &Aabb, facing: Vec3, near_m: f32) -> Vec<PinholeCamera> {
     let right = facing.any_orthonormal_vector();
-    let [right, up] = [right, facing.cross(right)];
+    // From the middle to the border of the mirror, which lies in its own plane however it is turned.
+    let [right, up] = [right, facing.cross(right)].map(|axis| axis * (0.5 * bounds.size().dot(axis.abs())));
     let quarters = [-right - up, right + up, right - up, up - right]
-        .map(|aside| looking(bounds.center() + aside * bounds.size() * (0.5 * ASIDE), facing, WIDE_DEG, WIDE_PX));
-    let along = [right, -right, up, -up].map(|along| looking(bounds.center(), along, FACE_DEG, FACE_PX));
+        .map(|aside| looking((bounds.center() + aside * ASIDE, near_m), facing, WIDE_DEG, WIDE_PX));
+    let along = [right, -right, up, -up]
+        .map(|along| looking((bounds.center(), near_m), along.normalize_or(facing), FACE_DEG, FACE_PX));
     quarters.into_iter().chain(along).collect()
 }
 
 /// Six images in all directions from the middle, and two from opposite sides towards the scene's middle, which see what
 /// an object there hides.
-fn all_around(bounds: &Aabb, middle_of_scene: Vec3) -> Vec<PinholeCamera> {
+fn all_around(bounds: &Aabb, middle_of_scene: Vec3, near_m: f32) -> Vec<PinholeCamera> {
     let middle = bounds.center();
     let towards = (middle_of_scene - middle).normalize_or(Vec3::Z);
     let right = towards.any_orthonormal_vector();
     let aside = (right + right.cross(towards)) * (0.5 * ASIDE * bounds.size().min_element());
-    let pair = [-aside, aside].map(|aside| looking(middle + aside, towards, WIDE_DEG, WIDE_PX));
-    faces(middle, FACE_PX).into_iter().chain(pair).collect()
+    let pair = [-aside, aside].map(|aside| looking((middle + aside, near_m), towards, WIDE_DEG, WIDE_PX));
+    faces(middle, near_m, FACE_PX).into_iter().chain(pair).collect()
 }
 
 /// Six images in all directions from one place.
 #[must_use]
-pub fn faces(eye_in_world: Vec3, size_px: UVec2) -> Vec<PinholeCamera> {
+pub fn faces(eye_in_world: Vec3, near_m: f32, size_px: UVec2) -> Vec<PinholeCamera> {
     let directions = Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
-    directions.map(|towards| looking(eye_in_world, towards, FACE_DEG, size_px)).collect()
+    directions.map(|towards| looking((eye_in_world, near_m), towards, FACE_DEG, size_px)).collect()
 }
 
-fn looking(eye: Vec3, towards: Vec3, fov_deg: f32, size_px: UVec2) -> PinholeCamera {
+fn looking((eye, near_m): (Vec3, f32), towards: Vec3, fov_deg: f32, size_px: UVec2) -> PinholeCamera {
     let up = if towards.y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y };
-    PinholeCamera::looking_at(eye, eye + towards, up, fov_deg.to_radians(), size_px)
+    let camera = PinholeCamera::looking_at(eye, eye + towards, up, fov_deg.to_radians(), size_px);
+    PinholeCamera { near_m, ..camera }
 }
 
 /// Mirroring triangles, or a part of a mesh that moves.
@@ -118,39 +126,36 @@ impl Patch {
 }
 
 /// Each mirroring triangle that stands still, and each part that moves.
-fn patches_of_mirrors(scene: &Scene) -> Vec<Patch> {
-    let is_mirror: Vec<bool> = scene.materials.iter().map(|material| mirrors_scene(scene, material)).collect();
-    let of_instances = scene.bounds_of_instances();
+fn patches_of_mirrors(scene: &Scene, is_mirror: &[bool], of_instances: &[Aabb]) -> Vec<Patch> {
+    let moving = scene.animation.iter().flat_map(|animation| &animation.moving);
+    let moving: BTreeSet<usize> = moving.map(|moving| moving.instance as usize).collect();
     let mut patches = Vec::new();
     for (number, (instance, bounds)) in scene.instances.iter().zip(of_instances).enumerate() {
         let mesh = &scene.meshes[instance.mesh as usize];
-        let parts = mesh.parts.iter().filter(|part| is_mirror[part.material as usize]);
-        if moves(scene, number) {
-            patches.extend(parts.map(|_| Patch::of_moving(bounds)));
+        let parts: Vec<_> = mesh.parts.iter().filter(|part| is_mirror[part.material as usize]).collect();
+        if parts.is_empty() {
             continue;
         }
-        let corner = |&index: &u32| {
-            instance.world_from_mesh.transform_point3(Vec3::from(mesh.vertices[index as usize].position))
+        let sways = || scene.wind.is_some() && mesh.vertices.iter().any(|vertex| vertex.sway > 0.0);
+        if moving.contains(&number) || sways() {
+            patches.push(Patch::of_moving(*bounds));
+            continue;
+        }
+        let corner = |index: &u32| {
+            instance.world_from_mesh.transform_point3(Vec3::from(mesh.vertices[*index as usize].position))
         };
-        let indices = parts.flat_map(|part| &mesh.indices[part.first_index as usize..][..part.index_count as usize]);
-        let corners: Vec<Vec3> = indices.map(corner).collect();
-        patches.extend(corners.as_chunks::<3>().0.iter().copied().map(Patch::of_triangle));
+        for part in parts {
+            let indices = &mesh.indices[part.first_index as usize..][..part.index_count as usize];
+            let triangles = indices.as_chunks::<3>().0.iter();
+            patches.extend(triangles.map(|triangle| Patch::of_triangle(triangle.each_ref().map(corner))));
+        }
     }
     patches
 }
 
-fn moves(scene: &Scene, instance: usize) -> bool {
-    let sways = || {
-        let mesh = scene.meshes.get(scene.instances[instance].mesh as usize);
-        mesh.is_some_and(|mesh| mesh.vertices.iter().any(|vertex| vertex.sway > 0.0))
-    };
-    let moving = scene.animation.iter().flat_map(|animation| &animation.moving);
-    moving.into_iter().any(|moving| moving.instance as usize == instance) || (scene.wind.is_some() && sways())
-}
-
 fn mirrors_scene(scene: &Scene, material: &Material) -> bool {
     let map = material.metallic_roughness_texture.and_then(|map| scene.textures.get(map.texture as usize));
-    !material.unlit && material.roughness * map.map_or(1.0, least_roughness) < ROUGHEST
+    material.is_specular() && material.roughness * map.map_or(1.0, least_roughness) < ROUGHEST_MIRROR
 }
 
 /// The least green of texels that are spread over a texture.
@@ -262,8 +267,26 @@ mod tests {
     }
 
     #[test]
+    fn images_of_a_flat_mirror_stand_in_its_plane_and_look_off_it() {
+        let mut turned = scene("mirror-pair");
+        for instance in &mut turned.instances {
+            instance.world_from_mesh = glam::Affine3A::from_rotation_y(0.6) * instance.world_from_mesh;
+        }
+        for mirror in mirrors(&turned).0 {
+            let facing = mirror.cameras[0].forward_in_world();
+            let middle = mirror.bounds.center();
+            for camera in &mirror.cameras {
+                let off_m = (camera.eye_in_world - middle).dot(facing);
+                assert!(off_m.abs() < 0.01, "{off_m} m off its plane");
+                assert!(camera.near_m < 0.02 && mirror.bounds.grown_to(camera.eye_in_world) == mirror.bounds);
+            }
+            assert!((middle + facing).length() < middle.length(), "towards the other mirror");
+        }
+    }
+
+    #[test]
     fn six_faces_see_every_direction() {
-        let cameras = faces(Vec3::new(1.0, 2.0, 3.0), UVec2::splat(64));
+        let cameras = faces(Vec3::new(1.0, 2.0, 3.0), 0.01, UVec2::splat(64));
         let directions = (0..500).map(|i| {
             let y = 1.0 - 2.0 * (i as f32 + 0.5) / 500.0;
             let (sin, cos) = (i as f32 * 2.4).sin_cos();

@@ -6,6 +6,8 @@ use sampling::{Mirror, faces};
 
 /// Texels of all images of a candidate, about.
 const TEXELS: u32 = 1 << 18;
+/// Nothing nearer is seen.
+const NEAR_M: f32 = 0.01;
 /// The field of view of images that look one way.
 const WIDE_DEG: f32 = 110.0;
 /// How far the corners of a square of cameras lie from its middle, in half widths of the mirror.
@@ -35,15 +37,12 @@ pub fn candidates(mirror: &Mirror, seen: Vec3) -> Vec<Candidate> {
     vec![
         Candidate { name: "pinhole:1", cameras: vec![looking(middle, 1)] },
         Candidate { name: "pinhole:4", cameras: square.map(|eye| looking(eye, 4)).to_vec() },
-        Candidate { name: "six faces", cameras: faces(middle, side_px(6)) },
+        Candidate { name: "six faces", cameras: faces(middle, NEAR_M, side_px(6)) },
         Candidate { name: "as in a cluster", cameras: in_a_cluster(mirror) },
     ]
 }
 
 /// The cameras of clusters, at [`TEXELS`].
 pub fn in_a_cluster(mirror: &Mirror) -> Vec<PinholeCamera> {
-    let texels: usize = mirror.cameras.iter().map(PinholeCamera::pixel_count).sum();
-    let scale = (TEXELS as f32 / texels as f32).sqrt();
-    let sized = |camera: &PinholeCamera| camera.resized((camera.size_px.as_vec2() * scale).as_uvec2());
-    mirror.cameras.iter().map(sized).collect()
+    PinholeCamera::resized_together(&mirror.cameras, TEXELS as f32, 1)
 }

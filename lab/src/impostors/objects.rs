@@ -1,6 +1,6 @@
 //! Which pixels of a mirror show an object: the scene is painted, objects in red and the ground in blue.
 
-use depth_image::{Environment, Illumination, View};
+use depth_image::{Environment, Illumination, ROUGHEST_MIRROR, View};
 use glam::Vec3;
 use scene::{Material, Scene};
 
@@ -8,8 +8,6 @@ const OBJECT_SRGBA8: [u8; 4] = [255, 0, 0, 255];
 const GROUND_SRGBA8: [u8; 4] = [0, 0, 255, 255];
 /// What rises from the lowest point by more than this share of the scene's height is no ground.
 const GROUND: f32 = 1e-3;
-/// Rougher surfaces are painted.
-const ROUGHEST: f32 = 0.2;
 /// More red than blue, in codes: neither ground nor sky.
 const LEAST_CODES: u8 = 8;
 
@@ -24,7 +22,7 @@ pub fn painted(scene: &Scene) -> Scene {
             vertex.color_srgba8 = if in_world.y > ground_y { OBJECT_SRGBA8 } else { GROUND_SRGBA8 };
         }
     }
-    for material in painted.materials.iter_mut().filter(|material| material.roughness >= ROUGHEST) {
+    for material in painted.materials.iter_mut().filter(|material| material.roughness >= ROUGHEST_MIRROR) {
         *material = Material { unlit: true, double_sided: material.double_sided, ..Material::default() };
     }
     painted.illumination = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };

@@ -9,7 +9,7 @@ use glam::{Vec3, Vec4};
 
 use super::Incident;
 use crate::{
-    EnvironmentLight, EnvironmentMap, Highlight, Illumination, Light, Reflector, highlight::EXPONENTS,
+    EnvironmentLight, EnvironmentMap, Highlight, Illumination, Light, ROUGHEST_MIRROR, Reflector, highlight::EXPONENTS,
     linear_from_srgb8,
 };
 
@@ -27,7 +27,7 @@ struct Mirror {
 const LEAST_ROUGHNESS: f32 = 0.045;
 const LEAST_COSINE: f32 = 1e-4;
 /// Up to the first roughness a ray brings all that a surface mirrors; from the second on, nothing.
-const MIRROR_ROUGHNESS: [f32; 2] = [0.1, 0.2];
+const MIRROR_ROUGHNESS: [f32; 2] = [0.1, ROUGHEST_MIRROR];
 
 impl Reflector {
     /// The inverse of [`Reflector::pack`]; `None` for 0.
