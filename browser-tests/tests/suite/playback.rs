@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 
 use browser_tests::visit::{Expected, Visit};
+use cluster::SessionRequest;
 
-use crate::scene::gateway;
+use crate::scene::{gateway_of, slow_request};
 
 /// The moments of the pictures so far: the end of their sets' names.
 const MOMENTS: &str = "myriorama.statistics.pictures.map((picture) => Number(picture.header.set.split('.')[1]))";
@@ -15,7 +16,8 @@ async fn moments(visit: &Visit) -> Vec<u32> {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_scene_plays_until_it_is_paused_and_shows_the_moment_of_the_slider() {
-    let (_bench, url) = gateway().await;
+    // All moments have sessions of their own, which a slow machine must admit together: small images are quick.
+    let (_bench, url) = gateway_of(SessionRequest { sample_size_px: None, ..slow_request() }).await;
     let visit = Visit::to(&url).await;
     visit.rested().await;
     assert_eq!(BTreeSet::from_iter(moments(&visit).await), BTreeSet::from([0]), "it stands still at first");

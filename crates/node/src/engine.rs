@@ -81,11 +81,7 @@ pub trait Engine: Send + Sync + 'static {
     fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError>;
     /// A set whose mirrors show what the sets of mirror cells hold, each with the bounds of its mirrors. It keeps these sets on
     /// the device. Mirrors of other sets show lamps and the environment.
-    fn mirroring(
-        &self,
-        set: Arc<dyn UploadedSet>,
-        mirrors: Vec<MirrorSet>,
-    ) -> Result<Arc<dyn UploadedSet>, EngineError>;
+    fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError>;
     /// Reconstructs one view for each camera.
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError>;
     /// Draws one view for each camera from the scene itself.
@@ -122,8 +118,11 @@ pub fn own_time<T>(engine: &dyn Engine, work: impl FnOnce() -> T) -> (T, f64) {
 /// A sample set on the device; the engine downcasts it to its own type.
 pub trait UploadedSet: Any + Send + Sync {}
 
+/// A sample set on the device, which the views of it share.
+pub type SharedSet = Arc<dyn UploadedSet>;
+
 /// The bounds of a mirror cell's mirrors, and its set.
-pub type MirrorSet = (Aabb, Arc<dyn UploadedSet>);
+pub type MirrorSet = (Aabb, SharedSet);
 
 /// Images to sample.
 #[derive(Debug, Clone, PartialEq)]

@@ -30,8 +30,8 @@ pub use config::{Deadlines, NodeConfig, Quotas, view_bytes};
 pub use connections::Connections;
 pub use device_monitor::DeviceMonitor;
 pub use engine::{
-    DirectWork, Engine, EngineError, MirrorSet, OpenEngine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork,
-    WorkClass, own_time,
+    DirectWork, Engine, EngineError, MirrorSet, OpenEngine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
+    ViewWork, WorkClass, own_time,
 };
 pub use membership::keep_membership;
 pub use plan::{CellPlan, PlansInForce, Relay, beyond_timeline, has_set};

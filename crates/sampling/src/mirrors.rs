@@ -10,6 +10,8 @@ use scene::{Material, Scene, Texture};
 /// side.
 const GRID: f32 = 32.0;
 const SIDE: u32 = GRID as u32 + 1;
+/// Times that a triangle which is larger than a cell of it is split into four.
+const SPLITS: u32 = 5;
 /// Boxes are wider than their mirrors on each side, in diagonals: depths of samples have errors.
 const MARGIN: f32 = 0.01;
 /// The field of view of a face of the cube around a mirror's middle: neighbours overlap.
@@ -44,7 +46,9 @@ pub fn mirrors(scene: &Scene) -> (Vec<Mirror>, usize) {
     }
     let of_instances = scene.bounds_of_instances();
     let volume = Aabb::of_boxes(&of_instances);
-    let mut groups = grouped(&patches_of_mirrors(scene, &is_mirror, &of_instances), &volume);
+    let cell_m = (volume.size().max_element() / GRID).max(f32::MIN_POSITIVE);
+    let patches = patches_of_mirrors(scene, &is_mirror, &of_instances, cell_m);
+    let mut groups = grouped(&patches, &volume, cell_m);
     groups.sort_by(|a, b| area_m2(&b.bounds).total_cmp(&area_m2(&a.bounds)));
     let beyond = groups.split_off(groups.len().min(MAX_MIRROR_CELLS));
     let mirror = |group: Patch| {
@@ -126,7 +130,7 @@ impl Patch {
 }
 
 /// Each mirroring triangle that stands still, and each part that moves.
-fn patches_of_mirrors(scene: &Scene, is_mirror: &[bool], of_instances: &[Aabb]) -> Vec<Patch> {
+fn patches_of_mirrors(scene: &Scene, is_mirror: &[bool], of_instances: &[Aabb], cell_m: f32) -> Vec<Patch> {
     let moving = scene.animation.iter().flat_map(|animation| &animation.moving);
     let moving: BTreeSet<usize> = moving.map(|moving| moving.instance as usize).collect();
     let mut patches = Vec::new();
@@ -146,11 +150,26 @@ fn patches_of_mirrors(scene: &Scene, is_mirror: &[bool], of_instances: &[Aabb]) 
         };
         for part in parts {
             let indices = &mesh.indices[part.first_index as usize..][..part.index_count as usize];
-            let triangles = indices.as_chunks::<3>().0.iter();
-            patches.extend(triangles.map(|triangle| Patch::of_triangle(triangle.each_ref().map(corner))));
+            for triangle in indices.as_chunks::<3>().0 {
+                split(triangle.each_ref().map(corner), cell_m, SPLITS, &mut patches);
+            }
         }
     }
     patches
+}
+
+/// A triangle in parts of about a cell: the box of a large one that is turned holds much that lies beside it.
+fn split(corners: [Vec3; 3], cell_m: f32, splits: u32, patches: &mut Vec<Patch>) {
+    let whole = Patch::of_triangle(corners);
+    if splits == 0 || whole.bounds.size().max_element() <= 2.0 * cell_m {
+        patches.push(whole);
+        return;
+    }
+    let [a, b, c] = corners;
+    let [ab, bc, ca] = [(a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
+    for part in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
+        split(part, cell_m, splits - 1, patches);
+    }
 }
 
 fn mirrors_scene(scene: &Scene, material: &Material) -> bool {
@@ -170,8 +189,7 @@ fn least_roughness(texture: &Texture) -> f32 {
 }
 
 /// The patches that belong together.
-fn grouped(patches: &[Patch], scene: &Aabb) -> Vec<Patch> {
-    let cell_m = (scene.size().max_element() / GRID).max(f32::MIN_POSITIVE);
+fn grouped(patches: &[Patch], scene: &Aabb, cell_m: f32) -> Vec<Patch> {
     let cell = |point: Vec3| ((point - scene.min) / cell_m).clamp(Vec3::ZERO, Vec3::splat(GRID)).as_uvec3();
     let mut cells = vec![Cell::Empty; (SIDE * SIDE * SIDE) as usize];
     for Patch { bounds, .. } in patches {
