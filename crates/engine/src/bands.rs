@@ -8,9 +8,6 @@ use glam::UVec2;
 /// The pixels of a band. Twelve times as many words fit the smallest buffers that are in use, of 128 MiB.
 pub(crate) const BAND_PIXELS: usize = 1 << 21;
 
-/// The same where mirrors are followed: the memory of rays off twice as many pixels is more than what stays free for the next.
-pub(crate) const MIRRORED_BAND_PIXELS: usize = 1 << 20;
-
 /// Some rows of a view, and the camera that sees them and those around that they depend on.
 #[derive(Debug, Clone, PartialEq)]
 struct Band {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::str::FromStr;
 use std::sync::{Arc, Weak};
 
-use bands::{BAND_PIXELS, MIRRORED_BAND_PIXELS, views_in_bands};
+use bands::{BAND_PIXELS, views_in_bands};
 use cluster::{DIRECT, SamplePlanes};
 use depth_image::{Aabb, DepthImage, View};
 use gpu::{DevicePreference, Gpu, GpuError};
@@ -266,8 +266,7 @@ impl Engine for GpuEngine {
         let mirrors = Mirrors { cells: &cells, reflections: *reflections };
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
         let turn = device_turn(turn);
-        let band_pixels = if cells.is_empty() { BAND_PIXELS } else { MIRRORED_BAND_PIXELS };
-        views_in_bands(&work.cameras, band_pixels, |cameras| {
+        views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
             let make = || self.reconstructor.reconstruct_mirrored(set, mirrors, cameras, method, work.planes, turn);
             self.catching(|| make().map_err(reconstruction_error))
         })

@@ -24,7 +24,7 @@ const WIDE_PX: UVec2 = UVec2::splat(256);
 /// A mirror whose normals have a mean of this length is flat.
 const FLAT: f32 = 0.9;
 /// How far these lie from the mirror's middle, in half widths.
-const ASIDE: f32 = 0.6;
+const ASIDE: f32 = 0.5;
 /// Texels of a roughness map that are looked at, along each side.
 const TEXELS: u32 = 64;
 
