@@ -23,8 +23,9 @@ const FACE_PX: UVec2 = UVec2::splat(148);
 const WIDE_PX: UVec2 = UVec2::splat(256);
 /// A mirror whose normals have a mean of this length is flat.
 const FLAT: f32 = 0.9;
-/// How far these lie from the mirror's middle, in half widths.
-const ASIDE: f32 = 0.5;
+/// How far these lie from a flat mirror's middle, in half widths, and from another's.
+const FLAT_ASIDE: f32 = 0.5;
+const ASIDE: f32 = 0.6;
 /// Texels of a roughness map that are looked at, along each side.
 const TEXELS: u32 = 64;
 
@@ -69,7 +70,7 @@ fn before_flat(bounds: &Aabb, facing: Vec3, near_m: f32) -> Vec<PinholeCamera> {
     // From the middle to the border of the mirror, which lies in its own plane however it is turned.
     let [right, up] = [right, facing.cross(right)].map(|axis| axis * (0.5 * bounds.size().dot(axis.abs())));
     let quarters = [-right - up, right + up, right - up, up - right]
-        .map(|aside| looking((bounds.center() + aside * ASIDE, near_m), facing, WIDE_DEG, WIDE_PX));
+        .map(|aside| looking((bounds.center() + aside * FLAT_ASIDE, near_m), facing, WIDE_DEG, WIDE_PX));
     let along = [right, -right, up, -up]
         .map(|along| looking((bounds.center(), near_m), along.normalize_or(facing), FACE_DEG, FACE_PX));
     quarters.into_iter().chain(along).collect()
