@@ -9,7 +9,7 @@ use codec::EncodedDepthImage;
 use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, nearest_set};
 use node::{
     ByteCache, CellPlan, Engine, MirrorSet, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet,
-    Scenes, SetMemory, Turn, UploadedSet,
+    Scenes, SetMemory, SharedSet, Turn,
 };
 use node::{WorkClass, beyond_timeline, most_image_bytes, most_set_bytes, own_time, set_bytes};
 use tonic::{Code, Status};
@@ -45,7 +45,7 @@ fn sets_ahead(plan: &Assignment) -> u32 {
 
 /// A complete set of one cell on the device.
 pub(crate) struct ReadySet {
-    pub(crate) set: Arc<dyn UploadedSet>,
+    pub(crate) set: SharedSet,
     /// The time at which it was ready.
     pub(crate) since: Instant,
     pub(crate) content: SetContent,
@@ -68,7 +68,7 @@ pub(crate) struct ViewSets {
     /// The set of their view cell.
     pub(crate) of_cell: Pinned<ReadySet>,
     /// The same on the device, with those of the mirror cells.
-    pub(crate) on_device: Arc<dyn UploadedSet>,
+    pub(crate) on_device: SharedSet,
     _mirrors: Vec<Pinned<ReadySet>>,
 }
 
@@ -172,37 +172,37 @@ impl Sets {
         cell: u32,
     ) -> Result<ViewSets, Status> {
         let of_cell = CellPlan::of(plan, cell)?;
-        let mirrors: Vec<CellPlan> = CellPlan::of_mirrors(plan).into_iter().map(|(_, mirror)| mirror).collect();
+        let mirrors = CellPlan::of_mirrors(plan);
         self.check_room(&of_cell, &mirrors)?;
         // Where samplers take turns, those of later sets need not wait for this one's.
         let in_turn = of_cell.sets_at_once() > 1;
         if in_turn {
             self.fetch_ahead(&of_cell, &mirrors, set_index);
         }
-        let mut turn = None;
+        let mut _turn = None;
         for attempt in 0..ATTEMPTS {
             // Views that evict each other's sets go one after the other.
             if attempt == CALM_ATTEMPTS {
-                turn = Some(self.assembling.lock().await);
+                _turn = Some(self.assembling.lock().await);
             }
             let set = self.load(&of_cell, set_index, &mirrors).await?;
-            if let Some(sets) = self.with_mirrors(set, plan, set_index)? {
+            if let Some(sets) = self.with_mirrors(set, &mirrors, set_index)? {
                 if !in_turn {
                     self.fetch_ahead(&of_cell, &mirrors, set_index);
                 }
                 return Ok(sets);
             }
-            for mirror in &mirrors {
+            for (_, mirror) in &mirrors {
                 self.load(mirror, set_index, &[]).await?;
             }
         }
-        drop(turn);
         Err(Status::resource_exhausted(format!("set-memory: other views need the room of sample set {set_index}")))
     }
 
     /// A view's sets fit into memory together, or never will.
-    fn check_room(&self, of_cell: &CellPlan, mirrors: &[CellPlan]) -> Result<(), Status> {
-        let (bytes, max_bytes) = (self.most_bytes_of_view(of_cell, mirrors), self.cached.max_bytes());
+    fn check_room(&self, of_cell: &CellPlan, mirrors: &[(Aabb, CellPlan)]) -> Result<(), Status> {
+        let bytes = self.most_bytes(of_cell) + self.most_bytes_of(mirrors);
+        let max_bytes = self.cached.max_bytes();
         if mirrors.is_empty() || bytes <= max_bytes {
             return Ok(());
         }
@@ -210,24 +210,20 @@ impl Sets {
         Err(Status::resource_exhausted(reason))
     }
 
-    fn most_bytes_of_view(&self, of_cell: &CellPlan, mirrors: &[CellPlan]) -> usize {
-        self.most_bytes(of_cell) + self.most_bytes_of(mirrors)
-    }
-
-    fn most_bytes_of(&self, mirrors: &[CellPlan]) -> usize {
-        mirrors.iter().map(|mirror| self.most_bytes(mirror)).sum()
+    fn most_bytes_of(&self, mirrors: &[(Aabb, CellPlan)]) -> usize {
+        mirrors.iter().map(|(_, mirror)| self.most_bytes(mirror)).sum()
     }
 
     /// A view cell's set with those of the mirror cells of its moment; `None` where one of these is not loaded.
     pub(crate) fn with_mirrors(
         &self,
         of_cell: Pinned<ReadySet>,
-        plan: &Arc<Assignment>,
+        mirrors: &[(Aabb, CellPlan)],
         set_index: u32,
     ) -> Result<Option<ViewSets>, Status> {
         let loaded =
             |(bounds, mirror): &(Aabb, CellPlan)| Some((*bounds, self.cached.loaded(&mirror.set_content(set_index)?)?));
-        let mirrors: Option<Vec<_>> = CellPlan::of_mirrors(plan).iter().map(loaded).collect();
+        let mirrors: Option<Vec<_>> = mirrors.iter().map(loaded).collect();
         let Some(mirrors) = mirrors else { return Ok(None) };
         let sets: Vec<MirrorSet> = mirrors.iter().map(|(bounds, ready)| (*bounds, ready.set.clone())).collect();
         let on_device = match sets.is_empty() {
@@ -252,13 +248,14 @@ impl Sets {
     }
 
     /// Begins to load the sets after one, moment by moment, as far as memory has room.
-    fn fetch_ahead(self: &Arc<Self>, of_cell: &CellPlan, mirrors: &[CellPlan], set_index: u32) {
+    fn fetch_ahead(self: &Arc<Self>, of_cell: &CellPlan, mirrors: &[(Aabb, CellPlan)], set_index: u32) {
         let last = of_cell.workload.timeline.set_count.saturating_sub(1);
-        let room = self.cached.max_bytes() / self.most_bytes_of_view(of_cell, mirrors).max(1);
+        let bytes = self.most_bytes(of_cell) + self.most_bytes_of(mirrors);
+        let room = self.cached.max_bytes() / bytes.max(1);
         let ahead = sets_ahead(of_cell).min(u32::try_from(room.saturating_sub(SETS_IN_USE)).unwrap_or(u32::MAX));
         for next in set_index.saturating_add(1)..=last.min(set_index.saturating_add(ahead)) {
             if of_cell.set_content(next) != of_cell.set_content(set_index) {
-                for cell in [of_cell].into_iter().chain(mirrors) {
+                for cell in [of_cell].into_iter().chain(mirrors.iter().map(|(_, mirror)| mirror)) {
                     self.begin_to_load(cell, next, Duration::ZERO);
                 }
             }
@@ -267,8 +264,8 @@ impl Sets {
 
     /// The number of further view cells of a moment for which memory has room: more would evict the sets in use.
     pub(crate) fn room_ahead(&self, of_cell: &CellPlan, mirrors: &[(Aabb, CellPlan)]) -> usize {
-        let of_mirrors: usize = mirrors.iter().map(|(_, mirror)| self.most_bytes(mirror)).sum();
-        let room = self.cached.max_bytes().saturating_sub(of_mirrors) / self.most_bytes(of_cell).max(1);
+        let free_bytes = self.cached.max_bytes().saturating_sub(self.most_bytes_of(mirrors));
+        let room = free_bytes / self.most_bytes(of_cell).max(1);
         room.saturating_sub(SETS_IN_USE)
     }
 
@@ -295,12 +292,12 @@ impl Sets {
         self: &Arc<Self>,
         plan: &CellPlan,
         set_index: u32,
-        beside: &[CellPlan],
+        beside: &[(Aabb, CellPlan)],
     ) -> Result<Pinned<ReadySet>, Status> {
         let content = content_of(plan, set_index)?;
         // It is about to be used: what is loaded beside it must not evict it.
         let _in_use = self.cached.loaded(&content);
-        for other in beside {
+        for (_, other) in beside {
             self.begin_to_load(other, set_index, Duration::ZERO);
         }
         let load = || self.cached.get(content, self.most_bytes(plan), self.loading(plan, set_index, content));

@@ -165,7 +165,7 @@ impl Shared {
 
     /// A set with those of mirror cells; `None` where one is not loaded.
     fn with_mirrors(&self, set: Pinned<ReadySet>, plan: &Arc<Assignment>, set_index: u32) -> Option<ViewSets> {
-        self.sets.with_mirrors(set, plan, set_index).ok().flatten()
+        self.sets.with_mirrors(set, &CellPlan::of_mirrors(plan), set_index).ok().flatten()
     }
 
     /// The nearest loaded set of a view's moment.

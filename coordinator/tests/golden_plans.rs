@@ -311,13 +311,7 @@ fn animated() -> String {
 }
 
 fn quality(method: &str, frame_rate_ratio: f64) -> Quality {
-    Quality {
-        follows_mirrors: false,
-        lighting: "soft".to_owned(),
-        method: method.to_owned(),
-        sample_side_ratio: 0.5,
-        frame_rate_ratio,
-    }
+    Quality { lighting: "soft".to_owned(), method: method.to_owned(), sample_side_ratio: 0.5, frame_rate_ratio }
 }
 
 fn overload_of_a_static_scene() -> String {

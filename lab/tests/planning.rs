@@ -15,8 +15,8 @@ use glam::UVec2;
 use gpu::DevicePreference;
 use lab::scene_args;
 use node::{
-    DirectWork, Engine, EngineError, MirrorSet, SampleSet, SampleWork, Turn, UploadedSet, ViewAudit, ViewProbes as _,
-    ViewWork, WorkClass,
+    DirectWork, Engine, EngineError, MirrorSet, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewAudit,
+    ViewProbes as _, ViewWork, WorkClass,
 };
 use planner::{
     Budget, Choice, Command, Event, Kept, Metric, Outcome, Planner, Price, Pricing as _, ProbeId, ProbeView,
@@ -156,15 +156,11 @@ impl Engine for SlowInOtherLight {
         self.0.sample_planes(method)
     }
 
-    fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn upload(&self, set: &SampleSet, turn: Turn) -> Result<SharedSet, EngineError> {
         self.0.upload(set, turn)
     }
 
-    fn mirroring(
-        &self,
-        set: Arc<dyn UploadedSet>,
-        mirrors: Vec<MirrorSet>,
-    ) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError> {
         self.0.mirroring(set, mirrors)
     }
 

@@ -15,7 +15,7 @@ use depth_image::{
     rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
-use node::{DirectWork, Engine, EngineError, MirrorSet, SampleSet, SampleWork, Turn, UploadedSet, ViewWork};
+use node::{DirectWork, Engine, EngineError, MirrorSet, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork};
 use parking_lot::{Condvar, Mutex};
 
 /// The floor's colour.
@@ -402,7 +402,7 @@ impl Engine for ScalarEngine {
         Ok(cameras.into_iter().map(image).collect())
     }
 
-    fn upload(&self, set: &SampleSet, _: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn upload(&self, set: &SampleSet, _: Turn) -> Result<SharedSet, EngineError> {
         self.works()?;
         if set.illumination != illumination() {
             return Err(EngineError::InvalidArgument {
@@ -414,11 +414,7 @@ impl Engine for ScalarEngine {
     }
 
     /// The first pixels of its views show what the mirrors' images show in their middle, one pixel a mirror cell.
-    fn mirroring(
-        &self,
-        set: Arc<dyn UploadedSet>,
-        mirrors: Vec<MirrorSet>,
-    ) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError> {
         self.works()?;
         let shown = |(_, mirror): &MirrorSet| {
             let image = &uploaded(mirror.as_ref())?.set.images[0];

@@ -52,13 +52,12 @@ impl Budgeted {
 
     /// The workload as a row samples it, in these view cells.
     pub(super) fn sampled_as(&self, row: &Row, workload: &Workload, cells: &[ViewCell]) -> Workload {
-        let resized = |Camera::Pinhole(camera): &Camera| camera.resized(row.size_px(camera.size_px));
-        let cameras: Vec<Vec<PinholeCamera>> = match self.keeps_cameras {
+        let resized = |Camera::Pinhole(camera): &Camera| Camera::Pinhole(camera.resized(row.size_px(camera.size_px)));
+        let of_cell = |cell| row.cameras(cell, self.whole_px).into_iter().map(Camera::Pinhole).collect();
+        let cameras: Vec<Vec<Camera>> = match self.keeps_cameras {
             true => vec![workload.sample_cameras.iter().map(resized).collect()],
-            false => cells.iter().map(|cell| row.cameras(cell, self.whole_px)).collect(),
+            false => cells.iter().map(of_cell).collect(),
         };
-        let cameras: Vec<Vec<Camera>> =
-            cameras.into_iter().map(|cell| cell.into_iter().map(Camera::Pinhole).collect()).collect();
         let workload = Workload { sampling: row.sampling.clone(), ..workload.clone() };
         match workload.cell_first_indices.is_empty() {
             true => Workload { sample_cameras: cameras.concat(), ..workload },

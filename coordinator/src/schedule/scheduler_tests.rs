@@ -275,13 +275,7 @@ fn rated(session: u64, frames_per_s: f64, fallbacks: Vec<Quality>) -> Event {
 }
 
 fn quality(method: &str, frame_rate_ratio: f64) -> Quality {
-    Quality {
-        follows_mirrors: false,
-        lighting: "unlit".to_owned(),
-        method: method.to_owned(),
-        sample_side_ratio: 0.5,
-        frame_rate_ratio,
-    }
+    Quality { lighting: "unlit".to_owned(), method: method.to_owned(), sample_side_ratio: 0.5, frame_rate_ratio }
 }
 
 #[test]
@@ -327,8 +321,8 @@ fn mirror_cells_leave_with_the_first_fallback_and_plans_stay_whole() {
     let mirror = MirrorCell { bounds: asked.workload.volume, sampling: "conventional".to_owned() };
     let cameras = asked.workload.sample_cameras.clone();
     let workload = asked.workload.clone().with_mirrors(vec![(mirror.clone(), cameras.clone()), (mirror, cameras)]);
-    let follows = Quality { follows_mirrors: true, sample_side_ratio: 1.0, ..quality("joint_carve", 1.0) };
-    let fallbacks = vec![Quality { follows_mirrors: false, ..follows.clone() }, quality("joint_carve:1", 0.8)];
+    let whole = Quality { sample_side_ratio: 1.0, ..quality("joint_carve", 1.0) };
+    let fallbacks = vec![whole, quality("joint_carve:1", 0.8)];
     let opening = Opening { workload, frames_per_s: Some(150.0), fallbacks, ..asked };
     let commands = cluster.step(Event::Opened(Box::new(opening)));
     let first = assignment_of(&commands);

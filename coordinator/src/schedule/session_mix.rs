@@ -196,7 +196,6 @@ mod tests {
 
     fn quality(lighting: &str) -> Quality {
         Quality {
-            follows_mirrors: false,
             lighting: lighting.to_owned(),
             method: "joint_carve".to_owned(),
             sample_side_ratio: 1.0,

@@ -280,8 +280,10 @@ impl WorkloadState {
 
     /// Images of a set.
     fn image_count(&self) -> usize {
-        let follows = self.follows_mirrors();
-        let asked = if follows { self.requested.sample_cameras.len() } else { self.requested.view_camera_count() };
+        let asked = match self.quality() {
+            None => self.requested.sample_cameras.len(),
+            Some(_) => self.requested.view_camera_count(),
+        };
         match (self.representation.as_ref().and_then(Representation::row), &self.budgeted) {
             (Some(row), Some(budgeted)) if !budgeted.keeps_cameras => {
                 row.camera_count as usize * self.cells.as_ref().map_or(1, |cells| cells.grown().len())
@@ -302,7 +304,7 @@ impl WorkloadState {
             images: self.image_count(),
             tiles: 1,
             cells: self.requested.view_cell_count(),
-            mirror_cells: if self.follows_mirrors() { self.requested.mirror_cells.len() } else { 0 },
+            mirror_cells: if self.quality().is_none() { self.requested.mirror_cells.len() } else { 0 },
             // A static scene is one set, though it be refined: the sampler keeps its sums.
             sets: if timeline.moves() { timeline.set_count as usize } else { 1 },
             views: views_at_once.saturating_add(rated),
@@ -365,11 +367,6 @@ impl WorkloadState {
         }
     }
 
-    /// Whether the present fallback leaves the mirror cells.
-    fn follows_mirrors(&self) -> bool {
-        self.quality().is_none_or(|quality| quality.follows_mirrors)
-    }
-
     fn quality(&self) -> Option<&Quality> {
         self.sessions.fallbacks().get(self.overload.step.checked_sub(1)?)
     }
@@ -398,7 +395,7 @@ impl WorkloadState {
             let size_px = (camera.size_px.as_dvec2() * quality.sample_side_ratio).round().as_uvec2().max(UVec2::ONE);
             Camera::Pinhole(camera.resized(size_px))
         };
-        let workload = if self.follows_mirrors() { workload } else { workload.without_mirrors() };
+        let workload = workload.without_mirrors();
         Workload {
             lighting: quality.lighting.clone(),
             sample_cameras: workload.sample_cameras.iter().map(sized).collect(),

@@ -357,7 +357,6 @@ fn methods_and_sizes_of_views_belong_to_sessions() {
 fn a_session_that_does_not_accept_the_fallback_in_force_is_refused_where_it_is_needed() {
     let mut cluster = Cluster::of(2);
     let quality = Quality {
-        follows_mirrors: false,
         lighting: "unlit".to_owned(),
         method: "joint_carve:1".to_owned(),
         sample_side_ratio: 1.0,
@@ -390,7 +389,6 @@ fn a_session_that_does_not_accept_the_fallback_in_force_is_refused_where_it_is_n
 #[test]
 fn viewers_keep_their_quality_beside_batches() {
     let quality = Quality {
-        follows_mirrors: false,
         lighting: "unlit".to_owned(),
         method: "joint_carve:1".to_owned(),
         sample_side_ratio: 1.0,
@@ -412,7 +410,6 @@ fn viewers_keep_their_quality_beside_batches() {
 fn a_batch_that_states_tiny_or_huge_views_and_asks_for_none_costs_viewers_nothing() {
     for reconstruct_view_s in [1e-6, 90.0] {
         let quality = Quality {
-            follows_mirrors: false,
             lighting: "unlit".to_owned(),
             method: "joint_carve:1".to_owned(),
             sample_side_ratio: 1.0,

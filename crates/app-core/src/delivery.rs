@@ -73,10 +73,8 @@ fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
     let fewer_rays = unmirrored.or(whole).and_then(|lighting| lighting.with_fewer_rays());
     let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.coarser());
     let (lighting, method) = (lighting.to_owned(), method.to_owned());
-    let follows_mirrors = unmirrored.is_some();
-    let all = Quality { lighting, follows_mirrors, method, sample_side_ratio: 1.0, frame_rate_ratio: 1.0 };
-    let unmirrored = unmirrored.map(|lighting| lighting.to_string());
-    let plain = unmirrored.map(|lighting| Quality { lighting, follows_mirrors: false, ..all.clone() });
+    let all = Quality { lighting, method, sample_side_ratio: 1.0, frame_rate_ratio: 1.0 };
+    let plain = unmirrored.map(|lighting| Quality { lighting: lighting.to_string(), ..all.clone() });
     let above = plain.clone().unwrap_or(all);
     let dim = fewer_rays.map(|lighting| Quality { lighting: lighting.to_string(), ..above.clone() });
     let above = dim.clone().unwrap_or(above);
@@ -154,7 +152,6 @@ mod tests {
         assert_eq!((request.method.as_str(), request.follows_mirrors), ("joint_carve", true));
         let lightings: Vec<String> = fallbacks(&request.lighting, "direct").into_iter().map(|q| q.lighting).collect();
         assert_eq!(lightings, ["shadows"; 3]);
-        assert!(fallbacks(&request.lighting, "direct").iter().all(|q| !q.follows_mirrors));
         let lightings: Vec<String> =
             fallbacks("soft 8, reflections 1", "direct").into_iter().map(|q| q.lighting).collect();
         assert_eq!(lightings, ["soft 8", "soft 2", "soft 2", "soft 2"]);

@@ -90,13 +90,11 @@ impl SessionRequest {
     }
 }
 
-/// A quality below the one that a session asked for.
+/// A quality below the one that a session asked for. It has no mirror cells.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// How samples are lit.
     pub lighting: String,
-    /// As [`SessionRequest::follows_mirrors`].
-    pub follows_mirrors: bool,
     /// How views are reconstructed.
     pub method: String,
     /// Sides of sample images, of those asked for: above 0, at most 1.

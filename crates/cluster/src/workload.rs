@@ -176,11 +176,11 @@ impl Workload {
     /// The workload of one view, which stands for others: the first view cell and the mirror cells.
     #[must_use]
     pub fn of_one_view(&self) -> Self {
-        let first = self.of_cell(0).map_or_else(Vec::new, |first| first.sample_cameras);
-        if self.mirror_cells.is_empty() {
-            return self.of_cell(0).unwrap_or_else(|| self.clone());
+        match self.of_cell(0) {
+            None => self.clone(),
+            Some(first) if self.mirror_cells.is_empty() => first,
+            Some(first) => self.clone().with_view_cells(vec![first.sample_cameras]),
         }
-        self.clone().with_view_cells(vec![first])
     }
 
     /// The view cell that a view is in, or else nearest to.

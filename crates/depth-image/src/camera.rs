@@ -142,8 +142,8 @@ impl PinholeCamera {
         Self { size_px, focal_px: self.focal_px * scale, principal_px: self.principal_px * scale, ..*self }
     }
 
-    /// The same fields of view in sizes of the same proportions, which have about so many pixels together; each side has at
-    /// least `least_px`.
+    /// The cameras at other sizes: their fields of view and the ratios of their sizes stay. All together have about `pixels`
+    /// pixels, and each side has at least `least_px`.
     #[must_use]
     pub fn resized_together(cameras: &[Self], pixels: f32, least_px: u32) -> Vec<Self> {
         let all: usize = cameras.iter().map(Self::pixel_count).sum();

@@ -10,8 +10,8 @@ use cluster::{DIRECT, SamplePlanes};
 use depth_image::{Aabb, DepthImage, View};
 use gpu::{DevicePreference, Gpu, GpuError};
 use node::{
-    DirectWork, Engine, EngineError, MirrorSet, OpenEngine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork,
-    WorkClass,
+    DirectWork, Engine, EngineError, MirrorSet, OpenEngine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
+    ViewWork, WorkClass,
 };
 use parking_lot::Mutex;
 use reconstruction::{
@@ -53,7 +53,7 @@ struct Uploaded {
 impl UploadedSet for Uploaded {}
 
 impl Uploaded {
-    fn of(set: Arc<dyn UploadedSet>) -> Result<Arc<Self>, EngineError> {
+    fn of(set: SharedSet) -> Result<Arc<Self>, EngineError> {
         let any: Arc<dyn Any + Send + Sync> = set;
         any.downcast().map_err(|_| of_another_device())
     }
@@ -227,7 +227,7 @@ impl Engine for GpuEngine {
         self.catching(|| self.sampler.sample(&work).map_err(sampling_error))
     }
 
-    fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn upload(&self, set: &SampleSet, turn: Turn) -> Result<SharedSet, EngineError> {
         let lighting: Lighting = parsed("lighting", &set.lighting)?;
         let environment = match set.illumination.environment.is_mapped {
             true => {
@@ -248,11 +248,7 @@ impl Engine for GpuEngine {
         Ok(Arc::new(Uploaded { set: Arc::new(set), reflections: lighting.reflections(), mirrors: Vec::new() }))
     }
 
-    fn mirroring(
-        &self,
-        set: Arc<dyn UploadedSet>,
-        mirrors: Vec<MirrorSet>,
-    ) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError> {
         let set = Uploaded::of(set)?;
         let shown = |(bounds, mirror)| Ok((bounds, Uploaded::of(mirror)?.set.clone()));
         let mirrors = mirrors.into_iter().map(shown).collect::<Result<_, EngineError>>()?;

@@ -1,11 +1,12 @@
 //! Views with more pixels than a device's buffers hold are made in bands, and are what they would be in one piece.
 
-use cluster::{Refinement, SamplePlanes};
-use depth_image::{Antialias, Camera, PinholeCamera, VIEW_REACH_PX, View, ViewPart, ViewPlanes};
+mod common;
+
+use depth_image::{Antialias, PinholeCamera, VIEW_REACH_PX, View, ViewPart, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec2, Vec3};
 use gpu::DevicePreference;
-use node::{DirectWork, Engine, SampleSet, SampleWork, Turn, ViewWork, WorkClass};
+use node::{DirectWork, Engine, SampleSet, Turn, ViewWork, WorkClass};
 use scene::Scene;
 use scene::procedural::uv_sphere;
 
@@ -34,26 +35,8 @@ fn crop_camera() -> PinholeCamera {
 }
 
 fn samples(engine: &GpuEngine, scene: &Scene) -> SampleSet {
-    let cameras = [-0.5, 0.5].map(|x| Camera::Pinhole(camera(x, UVec2::new(320, 240)))).to_vec();
-    let work = SampleWork {
-        scene_hash: HASH.to_owned(),
-        wanted: vec![0, 1],
-        cameras,
-        sampling: "conventional".to_owned(),
-        planes: SamplePlanes::default(),
-        lighting: LIGHTING.to_owned(),
-        scene_time_s: 0.0,
-        temporal_reference_s: None,
-        refinement: Refinement::default(),
-    };
-    SampleSet {
-        scene_hash: HASH.to_owned(),
-        images: engine.sample(&work, TURN).expect("images"),
-        volume: scene.bounds(),
-        background: scene.background,
-        illumination: scene.illumination.clone(),
-        lighting: LIGHTING.to_owned(),
-    }
+    let cameras = [-0.5, 0.5].map(|x| camera(x, UVec2::new(320, 240)));
+    common::sample_set(engine, (HASH, scene), &cameras, LIGHTING)
 }
 
 /// The share of the crop's bytes that differ by more than rounding, and how many pixels show the ball. What is beyond the

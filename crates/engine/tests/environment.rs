@@ -1,14 +1,15 @@
 //! An environment map goes with the scene's package to every engine: views from samples show and mirror it as direct ones
 //! do.
 
+mod common;
+
 use std::f32::consts::PI;
 
-use cluster::{Refinement, SamplePlanes};
-use depth_image::{Camera, EnvironmentMap, PinholeCamera, View, ViewPlanes};
+use depth_image::{EnvironmentMap, PinholeCamera, View, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use gpu::DevicePreference;
-use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, ViewWork, WorkClass};
+use node::{DirectWork, Engine, EngineError, Turn, ViewWork, WorkClass};
 use scene::procedural::uv_sphere;
 use scene::{Material, Scene, pack};
 
@@ -34,26 +35,8 @@ fn camera(x: f32) -> PinholeCamera {
 
 fn from_samples(engine: &GpuEngine, scene: &Scene) -> View {
     let turn = Turn::of(WorkClass::Batch);
-    let cameras: Vec<Camera> = [-0.4, -0.1, 0.2, 0.5].map(camera).map(Camera::Pinhole).to_vec();
-    let work = SampleWork {
-        scene_hash: HASH.to_owned(),
-        wanted: (0..cameras.len() as u32).collect(),
-        cameras,
-        sampling: "conventional".to_owned(),
-        planes: SamplePlanes::default(),
-        lighting: LIGHTING.to_owned(),
-        scene_time_s: 0.0,
-        temporal_reference_s: None,
-        refinement: Refinement::default(),
-    };
-    let set = SampleSet {
-        scene_hash: HASH.to_owned(),
-        images: engine.sample(&work, turn).expect("images"),
-        volume: scene.bounds(),
-        background: scene.background,
-        illumination: scene.illumination.clone(),
-        lighting: LIGHTING.to_owned(),
-    };
+    let cameras = [-0.4, -0.1, 0.2, 0.5].map(camera);
+    let set = common::sample_set(engine, (HASH, scene), &cameras, LIGHTING);
     let without_scene = GpuEngine::open(DevicePreference::Software).expect("an engine").upload(&set, turn).err();
     assert_eq!(without_scene, Some(EngineError::UnknownScene { hash: HASH.to_owned() }));
     let set = engine.upload(&set, turn).expect("a set");

@@ -1,13 +1,15 @@
 //! Views of sets with mirror cells show the scene in mirrors, about as views that are drawn directly do.
 
-use cluster::{Refinement, SamplePlanes};
-use depth_image::{Aabb, Camera, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+mod common;
+
+use std::sync::Arc;
+
+use depth_image::{PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use gpu::DevicePreference;
-use node::{DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass};
+use node::{DirectWork, Engine, MirrorSet, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
-use std::sync::Arc;
 
 const LIGHTING: &str = "shadows, reflections 1";
 const HASH: &str = "a teapot before a mirror";
@@ -28,30 +30,12 @@ impl Stand {
         Self { engine, scene }
     }
 
-    fn set(&self, cameras: &[PinholeCamera]) -> Arc<dyn UploadedSet> {
-        let work = SampleWork {
-            scene_hash: HASH.to_owned(),
-            cameras: cameras.iter().copied().map(Camera::Pinhole).collect(),
-            wanted: (0..cameras.len() as u32).collect(),
-            sampling: "conventional".to_owned(),
-            planes: SamplePlanes::default(),
-            lighting: LIGHTING.to_owned(),
-            scene_time_s: 0.0,
-            temporal_reference_s: None,
-            refinement: Refinement::default(),
-        };
-        let set = SampleSet {
-            scene_hash: HASH.to_owned(),
-            images: self.engine.sample(&work, TURN).expect("images"),
-            volume: self.scene.bounds(),
-            background: self.scene.background,
-            illumination: self.scene.illumination.clone(),
-            lighting: LIGHTING.to_owned(),
-        };
+    fn set(&self, cameras: &[PinholeCamera]) -> SharedSet {
+        let set = common::sample_set(&self.engine, (HASH, &self.scene), cameras, LIGHTING);
         self.engine.upload(&set, TURN).expect("a set")
     }
 
-    fn mirrors(&self) -> Vec<(Aabb, Arc<dyn UploadedSet>)> {
+    fn mirrors(&self) -> Vec<MirrorSet> {
         let (mirrors, beyond) = sampling::mirrors(&self.scene);
         assert_eq!((mirrors.len(), beyond), (1, 0));
         mirrors.into_iter().map(|mirror| (mirror.bounds, self.set(&mirror.cameras))).collect()

@@ -9,7 +9,9 @@ use depth_image::{DepthImage, PinholeCamera, View};
 use parking_lot::Mutex;
 use tokio::sync::watch;
 
-use crate::engine::{DirectWork, Engine, EngineError, MirrorSet, SampleSet, SampleWork, Turn, UploadedSet, ViewWork};
+use crate::engine::{
+    DirectWork, Engine, EngineError, MirrorSet, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork,
+};
 use crate::set_memory::SetMemory;
 
 /// Calls that run out of memory one after the other, until the node leaves.
@@ -149,16 +151,12 @@ impl Engine for DeviceMonitor {
         self.relieved(sample, sample)
     }
 
-    fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn upload(&self, set: &SampleSet, turn: Turn) -> Result<SharedSet, EngineError> {
         let upload = || self.engine.upload(set, turn);
         self.relieved(upload, upload)
     }
 
-    fn mirroring(
-        &self,
-        set: Arc<dyn UploadedSet>,
-        mirrors: Vec<MirrorSet>,
-    ) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError> {
         self.monitored(self.engine.mirroring(set, mirrors))
     }
 

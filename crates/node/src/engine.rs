@@ -78,7 +78,7 @@ pub trait Engine: Send + Sync + 'static {
     /// Samples the wanted images of a set, in their order.
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError>;
     /// Uploads a set for reconstruction. Fails for images that the device cannot take.
-    fn upload(&self, set: &SampleSet, turn: Turn) -> Result<Arc<dyn UploadedSet>, EngineError>;
+    fn upload(&self, set: &SampleSet, turn: Turn) -> Result<SharedSet, EngineError>;
     /// A set whose mirrors show what the sets of mirror cells hold, each with the bounds of its mirrors. It keeps these sets on
     /// the device. Mirrors of other sets show lamps and the environment.
     fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError>;
@@ -96,8 +96,8 @@ pub type OpenEngine = Arc<dyn Fn() -> Result<Arc<dyn Engine>, EngineError> + Sen
 pub(crate) fn mirroring(
     engine: &dyn Engine,
     workload: &Workload,
-    sets: Vec<Arc<dyn UploadedSet>>,
-) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    sets: Vec<SharedSet>,
+) -> Result<SharedSet, EngineError> {
     let mut sets = sets.into_iter();
     let reason = || EngineError::InvalidArgument { field: "sample_cameras", reason: "a view has none".to_owned() };
     let set = sets.next().ok_or_else(reason)?;

@@ -9,7 +9,7 @@ use depth_image::{Aabb, DepthImage, Environment, Illumination, SpecularPlanes, V
 use glam::Vec3;
 
 use super::*;
-use crate::engine::{EngineError, MirrorSet};
+use crate::engine::{EngineError, MirrorSet, SharedSet};
 
 /// A device that sleeps and notes its calls.
 #[derive(Default)]
@@ -107,17 +107,13 @@ impl Engine for Sleeper {
         Ok(request.cameras.iter().map(image).collect())
     }
 
-    fn upload(&self, set: &SampleSet, _: Turn) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn upload(&self, set: &SampleSet, _: Turn) -> Result<SharedSet, EngineError> {
         let shiny = set.images.iter().all(|image| image.specular.is_some());
         self.calls.lock().unwrap().uploads.push((set.illumination.clone(), shiny));
         Ok(Arc::new(Nothing))
     }
 
-    fn mirroring(
-        &self,
-        set: Arc<dyn UploadedSet>,
-        mirrors: Vec<MirrorSet>,
-    ) -> Result<Arc<dyn UploadedSet>, EngineError> {
+    fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError> {
         self.calls.lock().unwrap().mirrors.push(mirrors.into_iter().map(|(bounds, _)| bounds).collect());
         Ok(set)
     }

@@ -7,7 +7,7 @@ use cluster::{ProbeViews, ProbedView, ProbedViews};
 use depth_image::{DepthImage, ViewPart};
 use tonic::Status;
 
-use crate::engine::{DirectWork, UploadedSet, ViewWork};
+use crate::engine::{DirectWork, SharedSet, ViewWork};
 
 /// Measures views, after all other work of the device. Calls block.
 pub trait ViewProbes: Send + Sync + 'static {
@@ -27,7 +27,7 @@ pub trait ViewProbes: Send + Sync + 'static {
 /// A view to compare with the same view of the scene.
 pub struct ViewAudit {
     /// The set that it is made from.
-    pub set: Arc<dyn UploadedSet>,
+    pub set: SharedSet,
     /// Its images where they are compared, too; else none.
     pub sample_images: Arc<[DepthImage]>,
     /// Keeps the set in memory until the view is made.

@@ -11,7 +11,7 @@ use codec::{
 };
 use depth_image::{DepthImage, DepthImageError, PinholeCamera, View, ViewPlanes};
 use metrics::MetricsError;
-use node::{Engine, EngineError, SampleWork, Turn, UploadedSet, ViewWork, own_time};
+use node::{Engine, EngineError, SampleWork, SharedSet, Turn, ViewWork, own_time};
 use planner::{RowCosts, ViewErrors, median};
 use rayon::prelude::*;
 
@@ -287,7 +287,7 @@ impl Prober {
         planes: ViewPlanes,
         images: &[DepthImage],
         first: &[PinholeCamera],
-    ) -> Result<(Arc<dyn UploadedSet>, f64, f64), ProbeError> {
+    ) -> Result<(SharedSet, f64, f64), ProbeError> {
         let sample_set = self.subject.sample_set(images, light);
         let one = self.view_work(of, first.to_vec(), planes);
         if self.is_first(&format!("view {} {} {planes:?}", of.method, images.len())) {

@@ -12,7 +12,7 @@ mod work;
 
 pub use error::SamplingError;
 pub use methods::{METHODS, Redundancy, SamplingMethod, UnknownSampling, templates};
-pub use mirrors::{Mirror, faces, mirrors};
+pub use mirrors::{Mirror, faces, looking, mirrors};
 pub use rig::{Rig, RigError};
 pub use sampler::{Sampler, renderer};
 pub use work::SampleWork;

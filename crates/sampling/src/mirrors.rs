@@ -6,11 +6,10 @@ use depth_image::{Aabb, MAX_MIRROR_CELLS, PinholeCamera, ROUGHEST_MIRROR};
 use glam::{UVec2, UVec3, Vec3};
 use scene::{Material, Scene, Texture};
 
-/// Mirrors belong together where they touch the same or neighbouring cells of a grid with so many along the scene's longest
-/// side.
+/// Cells of a grid along the scene's longest side. Mirrors form one group where they touch the same cell or neighbouring cells.
 const GRID: f32 = 32.0;
 const SIDE: u32 = GRID as u32 + 1;
-/// Times that a triangle which is larger than a cell of it is split into four.
+/// A triangle that is larger than two cells is split into four, and each part again, at most this many times.
 const SPLITS: u32 = 5;
 /// Boxes are wider than their mirrors on each side, in diagonals: depths of samples have errors.
 const MARGIN: f32 = 0.01;
@@ -47,12 +46,10 @@ pub fn mirrors(scene: &Scene) -> (Vec<Mirror>, usize) {
     }
     let of_instances = scene.bounds_of_instances();
     let volume = Aabb::of_boxes(&of_instances);
-    let cell_m = (volume.size().max_element() / GRID).max(f32::MIN_POSITIVE);
-    let patches = patches_of_mirrors(scene, &is_mirror, &of_instances, cell_m);
-    let mut groups = grouped(&patches, &volume, cell_m);
+    let mut groups = groups(&volume, |each| for_each_surface(scene, &is_mirror, &of_instances, each));
     groups.sort_by(|a, b| area_m2(&b.bounds).total_cmp(&area_m2(&a.bounds)));
     let beyond = groups.split_off(groups.len().min(MAX_MIRROR_CELLS));
-    let mirror = |group: Patch| {
+    let mirror = |group: Group| {
         let facing = group.area_normal_m2 / group.area_m2.max(f32::MIN_POSITIVE);
         let cameras = match facing.length() > FLAT {
             true => before_flat(&group.bounds, facing.normalize_or(Vec3::Y), volume.near_m()),
@@ -94,56 +91,45 @@ pub fn faces(eye_in_world: Vec3, near_m: f32, size_px: UVec2) -> Vec<PinholeCame
     directions.map(|towards| looking((eye_in_world, near_m), towards, FACE_DEG, size_px)).collect()
 }
 
-fn looking((eye, near_m): (Vec3, f32), towards: Vec3, fov_deg: f32, size_px: UVec2) -> PinholeCamera {
+/// An image from an eye in a direction. Nothing nearer than `near_m` is seen.
+#[must_use]
+pub fn looking((eye, near_m): (Vec3, f32), towards: Vec3, fov_deg: f32, size_px: UVec2) -> PinholeCamera {
     let up = if towards.y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y };
     let camera = PinholeCamera::looking_at(eye, eye + towards, up, fov_deg.to_radians(), size_px);
     PinholeCamera { near_m, ..camera }
 }
 
-/// Mirroring triangles, or a part of a mesh that moves.
+/// A mirroring surface.
 #[derive(Debug, Clone, Copy)]
-struct Patch {
-    bounds: Aabb,
-    area_m2: f32,
-    /// The sum of its normals, each as long as its area; zero where it moves.
-    area_normal_m2: Vec3,
+enum Surface {
+    /// A triangle that stands still, by its corners.
+    Triangle([Vec3; 3]),
+    /// The box of an instance that moves, over all moments.
+    Moving(Aabb),
 }
 
-impl Patch {
-    const NONE: Self = Self { bounds: Aabb::EMPTY, area_m2: 0.0, area_normal_m2: Vec3::ZERO };
-
-    fn of_triangle([a, b, c]: [Vec3; 3]) -> Self {
-        let area_normal_m2 = 0.5 * (b - a).cross(c - a);
-        Self { bounds: Aabb::around([a, b, c]), area_m2: area_normal_m2.length(), area_normal_m2 }
-    }
-
-    fn of_moving(bounds: Aabb) -> Self {
-        Self { bounds, area_m2: area_m2(&bounds), area_normal_m2: Vec3::ZERO }
-    }
-
-    fn and(self, other: &Self) -> Self {
-        Self {
-            bounds: Aabb::of_boxes(&[self.bounds, other.bounds]),
-            area_m2: self.area_m2 + other.area_m2,
-            area_normal_m2: self.area_normal_m2 + other.area_normal_m2,
+impl Surface {
+    fn center(&self) -> Vec3 {
+        match self {
+            Self::Triangle([a, b, c]) => (a + b + c) / 3.0,
+            Self::Moving(bounds) => bounds.center(),
         }
     }
 }
 
-/// Each mirroring triangle that stands still, and each part that moves.
-fn patches_of_mirrors(scene: &Scene, is_mirror: &[bool], of_instances: &[Aabb], cell_m: f32) -> Vec<Patch> {
+/// Gives each mirroring surface of a scene to `each`.
+fn for_each_surface(scene: &Scene, is_mirror: &[bool], of_instances: &[Aabb], each: &mut dyn FnMut(Surface)) {
     let moving = scene.animation.iter().flat_map(|animation| &animation.moving);
     let moving: BTreeSet<usize> = moving.map(|moving| moving.instance as usize).collect();
-    let mut patches = Vec::new();
     for (number, (instance, bounds)) in scene.instances.iter().zip(of_instances).enumerate() {
         let mesh = &scene.meshes[instance.mesh as usize];
-        let parts: Vec<_> = mesh.parts.iter().filter(|part| is_mirror[part.material as usize]).collect();
-        if parts.is_empty() {
+        let mut parts = mesh.parts.iter().filter(|part| is_mirror[part.material as usize]).peekable();
+        if parts.peek().is_none() {
             continue;
         }
         let sways = || scene.wind.is_some() && mesh.vertices.iter().any(|vertex| vertex.sway > 0.0);
         if moving.contains(&number) || sways() {
-            patches.push(Patch::of_moving(*bounds));
+            each(Surface::Moving(*bounds));
             continue;
         }
         let corner = |index: &u32| {
@@ -151,25 +137,38 @@ fn patches_of_mirrors(scene: &Scene, is_mirror: &[bool], of_instances: &[Aabb], 
         };
         for part in parts {
             let indices = &mesh.indices[part.first_index as usize..][..part.index_count as usize];
-            for triangle in indices.as_chunks::<3>().0 {
-                split(triangle.each_ref().map(corner), cell_m, SPLITS, &mut patches);
-            }
+            let triangles = indices.as_chunks::<3>().0.iter();
+            triangles.for_each(|triangle| each(Surface::Triangle(triangle.each_ref().map(corner))));
         }
     }
-    patches
 }
 
-/// A triangle in parts of about a cell: the box of a large one that is turned holds much that lies beside it.
-fn split(corners: [Vec3; 3], cell_m: f32, splits: u32, patches: &mut Vec<Patch>) {
-    let whole = Patch::of_triangle(corners);
-    if splits == 0 || whole.bounds.size().max_element() <= 2.0 * cell_m {
-        patches.push(whole);
-        return;
-    }
-    let [a, b, c] = corners;
-    let [ab, bc, ca] = [(a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
-    for part in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
-        split(part, cell_m, splits - 1, patches);
+/// Surfaces that form one mirror.
+#[derive(Debug, Clone, Copy)]
+struct Group {
+    bounds: Aabb,
+    area_m2: f32,
+    /// The sum of the triangles' normals, each as long as the triangle's area.
+    area_normal_m2: Vec3,
+}
+
+impl Group {
+    const NONE: Self = Self { bounds: Aabb::EMPTY, area_m2: 0.0, area_normal_m2: Vec3::ZERO };
+
+    fn add(&mut self, surface: Surface) {
+        let bounds = match surface {
+            Surface::Triangle([a, b, c]) => {
+                let area_normal_m2 = 0.5 * (b - a).cross(c - a);
+                self.area_normal_m2 += area_normal_m2;
+                self.area_m2 += area_normal_m2.length();
+                Aabb::around([a, b, c])
+            }
+            Surface::Moving(bounds) => {
+                self.area_m2 += area_m2(&bounds);
+                bounds
+            }
+        };
+        self.bounds = Aabb::of_boxes(&[self.bounds, bounds]);
     }
 }
 
@@ -189,25 +188,29 @@ fn least_roughness(texture: &Texture) -> f32 {
     f32::from((0..columns * rows).map(texel).min().unwrap_or(u8::MAX)) / 255.0
 }
 
-/// The patches that belong together.
-fn grouped(patches: &[Patch], scene: &Aabb, cell_m: f32) -> Vec<Patch> {
-    let cell = |point: Vec3| ((point - scene.min) / cell_m).clamp(Vec3::ZERO, Vec3::splat(GRID)).as_uvec3();
-    let mut cells = vec![Cell::Empty; (SIDE * SIDE * SIDE) as usize];
-    for Patch { bounds, .. } in patches {
-        cells_between(cell(bounds.min), cell(bounds.max)).for_each(|at| cells[number(at)] = Cell::Occupied);
-    }
+/// The groups of surfaces. `for_each` gives each surface to a function; it is called twice, so that none is kept.
+fn groups(volume: &Aabb, for_each: impl Fn(&mut dyn FnMut(Surface))) -> Vec<Group> {
+    let mut grid = Grid::over(volume);
+    for_each(&mut |surface| match surface {
+        Surface::Triangle(corners) => grid.occupy_triangle(corners, SPLITS),
+        Surface::Moving(bounds) => grid.occupy(&bounds),
+    });
     let mut groups = Vec::new();
-    for patch in patches {
-        let at = cell(patch.bounds.center());
-        if cells[number(at)] == Cell::Occupied {
-            fill(&mut cells, at, groups.len());
-            groups.push(Patch::NONE);
+    for_each(&mut |surface| {
+        let number = grid.group_at(surface.center(), groups.len());
+        if number == groups.len() {
+            groups.push(Group::NONE);
         }
-        if let Cell::Of(group) = cells[number(at)] {
-            groups[group] = patch.and(&groups[group]);
-        }
-    }
+        groups[number].add(surface);
+    });
     groups
+}
+
+/// Which cells of a scene hold mirrors.
+struct Grid {
+    origin: Vec3,
+    cell_m: f32,
+    cells: Vec<Cell>,
 }
 
 /// A cell of the grid.
@@ -219,14 +222,48 @@ enum Cell {
     Of(usize),
 }
 
-/// Gives all occupied cells that are connected with one to a group.
-fn fill(cells: &mut [Cell], from: UVec3, group: usize) {
-    let mut reached = vec![from];
-    while let Some(at) = reached.pop() {
-        if cells[number(at)] == Cell::Occupied {
-            cells[number(at)] = Cell::Of(group);
-            reached.extend(cells_between(at.saturating_sub(UVec3::ONE), (at + 1).min(UVec3::splat(SIDE - 1))));
+impl Grid {
+    fn over(volume: &Aabb) -> Self {
+        let cell_m = (volume.size().max_element() / GRID).max(f32::MIN_POSITIVE);
+        Self { origin: volume.min, cell_m, cells: vec![Cell::Empty; (SIDE * SIDE * SIDE) as usize] }
+    }
+
+    fn cell(&self, point: Vec3) -> UVec3 {
+        ((point - self.origin) / self.cell_m).clamp(Vec3::ZERO, Vec3::splat(GRID)).as_uvec3()
+    }
+
+    fn occupy(&mut self, bounds: &Aabb) {
+        let cells = cells_between(self.cell(bounds.min), self.cell(bounds.max));
+        cells.for_each(|at| self.cells[number(at)] = Cell::Occupied);
+    }
+
+    /// In parts of about two cells: the box of a large triangle that is turned holds much that lies beside it.
+    fn occupy_triangle(&mut self, [a, b, c]: [Vec3; 3], splits: u32) {
+        let bounds = Aabb::around([a, b, c]);
+        if splits == 0 || bounds.size().max_element() <= 2.0 * self.cell_m {
+            return self.occupy(&bounds);
         }
+        let [ab, bc, ca] = [(a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
+        for part in [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]] {
+            self.occupy_triangle(part, splits - 1);
+        }
+    }
+
+    /// The group of the cells that are connected with a point's; `next` where they have none yet.
+    fn group_at(&mut self, point: Vec3, next: usize) -> usize {
+        let mut reached = vec![self.cell(point)];
+        if let Cell::Of(group) = self.cells[number(reached[0])] {
+            return group;
+        }
+        // The point's own cell counts, whatever rounding says.
+        self.cells[number(reached[0])] = Cell::Occupied;
+        while let Some(at) = reached.pop() {
+            if self.cells[number(at)] == Cell::Occupied {
+                self.cells[number(at)] = Cell::Of(next);
+                reached.extend(cells_between(at.saturating_sub(UVec3::ONE), (at + 1).min(UVec3::splat(SIDE - 1))));
+            }
+        }
+        next
     }
 }
 

@@ -132,7 +132,6 @@ fn request() -> SessionRequest {
         frames_per_s: Some(25.0),
         fallbacks: vec![Quality {
             lighting: "unlit".to_owned(),
-            follows_mirrors: true,
             method: "joint_carve:1".to_owned(),
             sample_side_ratio: 0.5,
             frame_rate_ratio: 1.0,

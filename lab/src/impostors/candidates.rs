@@ -2,7 +2,7 @@
 
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
-use sampling::{Mirror, faces};
+use sampling::{Mirror, faces, looking};
 
 /// Texels of all images of a candidate, about.
 const TEXELS: u32 = 1 << 18;
@@ -29,10 +29,7 @@ pub fn candidates(mirror: &Mirror, seen: Vec3) -> Vec<Candidate> {
     let half_m = 0.5 * bounds.size().min_element();
     let corner = |x: f32, y: f32| middle + (right * x + up * y) * (CORNER * half_m);
     let side_px = |images: u32| UVec2::splat(((TEXELS / images) as f32).sqrt() as u32);
-    let looking = |eye: Vec3, images: u32| {
-        let up = if towards.y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y };
-        PinholeCamera::looking_at(eye, eye + towards, up, WIDE_DEG.to_radians(), side_px(images))
-    };
+    let looking = |eye: Vec3, images: u32| looking((eye, NEAR_M), towards, WIDE_DEG, side_px(images));
     let square = [corner(-1.0, -1.0), corner(1.0, 1.0), corner(1.0, -1.0), corner(-1.0, 1.0)];
     vec![
         Candidate { name: "pinhole:1", cameras: vec![looking(middle, 1)] },

@@ -190,12 +190,12 @@ pub fn cells<'s>(mirrors: &[Aabb], sets: &'s [SampleSet]) -> Vec<MirrorCell<'s>>
     mirrors.iter().zip(sets).map(|(bounds, surroundings)| MirrorCell { bounds: *bounds, surroundings }).collect()
 }
 
-/// A lighting whose mirrors show the environment.
+/// The lighting without reflections.
 pub fn plain(lighting: Lighting) -> Lighting {
     lighting.without_reflections().unwrap_or(lighting)
 }
 
-/// A lighting whose rays meet so many mirrors.
+/// The lighting with this number of reflections.
 pub fn reflecting(lighting: Lighting, reflections: u32) -> anyhow::Result<Lighting> {
     let plain = plain(lighting);
     if reflections == 0 { Ok(plain) } else { Ok(format!("{plain}, reflections {reflections}").parse()?) }

@@ -28,7 +28,7 @@ pub fn measure(stand: &Stand, lighting: Lighting) -> anyhow::Result<(Table, Chec
     let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
     let columns =
         [("mirrors on the way", ""), ("FLIP", ""), ("FLIP without rays", ""), ("PSNR", "dB"), ("guessed", "%")];
-    let mut table = Table::new("Pixels whose rays meet so many mirrors, and no fewer", &columns);
+    let mut table = Table::new("Pixels by the number of mirrors that their rays meet", &columns);
     let mut errors = Vec::new();
     for order in 1..=ORDERS {
         let Some([with, without]) = hall.order(&bounds, &sets, order)? else { break };

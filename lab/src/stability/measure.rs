@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes};
-use node::{DirectWork, Engine, SampleWork, Turn, UploadedSet, ViewWork, WorkClass};
+use node::{DirectWork, Engine, SampleWork, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
 use probe::{Light, Representation, Subject};
 use rayon::prelude::*;
 
@@ -62,7 +62,7 @@ impl Stand<'_> {
         Ok(self.engine.sample(&work, Self::TURN)?)
     }
 
-    pub fn upload(&self, images: &[DepthImage]) -> anyhow::Result<Arc<dyn UploadedSet>> {
+    pub fn upload(&self, images: &[DepthImage]) -> anyhow::Result<SharedSet> {
         Ok(self.engine.upload(&self.subject.sample_set(images, Light::Session), Self::TURN)?)
     }
 

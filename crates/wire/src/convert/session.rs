@@ -31,7 +31,7 @@ messages! {
         auto_exposure: with_auto_exposure, policy: policy_choice, refinement_steps: refinement_step_count,
         budget: budget | is_method_named
     }, with protocol_version = PROTOCOL_VERSION, first check_request, then SessionRequest::validate;
-    Quality = Quality { lighting, follows_mirrors, sample_side_ratio, frame_rate_ratio; method: reconstruction_method };
+    Quality = Quality { lighting, sample_side_ratio, frame_rate_ratio; method: reconstruction_method };
     ChangeSessionRequest = ChangeSession {
         frames_per_s, viewpoints; session: session_number, views_per_set: views_per_set_count
     }, first |c| at_most(c.viewpoints.len(), MAX_VIEWPOINTS, "viewpoints"), then ChangeSession::validate;
