@@ -63,19 +63,7 @@ fn exit_of(ray: ImageRay, low: vec2f, high: vec2f) -> f32 {
     return clamp(exit, ray.t, ray.far);
 }
 
-{%- if bounced %}
-// Few of the images around a mirror see a point. A loop that no ray enters costs nothing, unlike a branch.
 fn evaluate_camera(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Evaluation {
-    let p = a + b * t;
-    let uv = p.xy / p.z - 0.5;
-    var evaluation = UNSEEN;
-    for (var sees = p.z > 0.0 && all(uv >= vec2f(0.0)) && all(uv < camera.cells); sees; sees = false) {
-        evaluation = evaluate_seen(camera, a, b, t, far, level);
-    }
-    return evaluation;
-}
-{% endif %}
-fn {{ "evaluate_seen" if bounced else "evaluate_camera" }}(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, far: f32, level: u32) -> Evaluation {
     let p = a + b * t;
     let inverse_w = 1.0 / p.z;
     let uv = p.xy * inverse_w - 0.5;
