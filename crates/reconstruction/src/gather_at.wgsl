@@ -1,13 +1,5 @@
-{# Statements: the samples `around` point_in_world in the nearest camera of `origin`, and that `camera`. #}    // Cameras are sorted: of those that contributed, the last to be chosen is the nearest. On the software device one
-    // camera by a variable index is cheaper than a choice among all.
-    var nearest = 0u;
-{% for k in range(cameras) | reverse %}
-    nearest = select(nearest, {{ k }}u, (work.cameras[{{ k }}].mask & (origin >> 8u)) != 0u);
-{% endfor %}
-    let camera = work.cameras[nearest];
-    let p = homogeneous(camera.homogeneous_pixel_from_world, vec4f(point_in_world, 1.0));
-    let inverse_w = safe_reciprocal(p.z);
-    let uv = clamp(p.xy * inverse_w - 0.5, vec2f(0.0), camera.cells - CELL_MARGIN_PX);
+{# Statements: the samples `around` point_in_world in the nearest camera of `origin`, and that `camera`. #}
+{%- include "nearest_at.wgsl" %}
     let cell = vec2u(uv);
     let at = uv - floor(uv);
     let cell_index = camera.first_cell + cell.y * camera.width_px + cell.x;

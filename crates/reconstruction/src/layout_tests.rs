@@ -112,7 +112,7 @@ fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
         width_px,
         stretch,
         mask,
-        padding
+        first_mip
     });
     assert_eq!(templates_that_agree("SampleCamera", &sample_camera), passes);
     let tone = host!(GpuTone { exposure_factor, curve, padding });
@@ -168,7 +168,8 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
 
 #[test]
 fn mirrored_rays_and_mirror_boxes_agree_where_they_are_written_and_read() {
-    let ray = host!(GpuMirroredRay { origin_in_world, pixel, direction, guess, throughput_linear, near_m });
+    let ray =
+        host!(GpuMirroredRay { origin_in_world, pixel, direction, guess, throughput_rgb9e5, near_m, width_m, spread });
     let passes = ["bounce/land.wgsl", "bounce/march.wgsl", "joint_carve.wgsl", "specular.wgsl"];
     assert_eq!(templates_that_agree("MirroredRay", &ray), BTreeSet::from(passes));
     let boxes = host!(GpuMirrorBox { min_in_world, first_listed, max_in_world, padding });

@@ -13,6 +13,7 @@ mod in_flight;
 #[cfg(test)]
 mod layout_tests;
 mod methods;
+mod mips;
 mod pixel_list;
 mod pyramid;
 mod quads;

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
 use depth_image::{Aabb, Camera, DepthImage, Environment, Highlight, Illumination, PinholeCamera};
-use glam::Vec2;
+use glam::{UVec2, Vec2};
 use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
 use wgpu::TextureFormat;
 
+use crate::mips::{mip_texels, mips};
 use crate::pyramid::{CodedDepth, Pyramid, is_among_holes};
 use crate::view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant};
 use crate::{error::ReconstructionError, quads::SetMeshes, reflectors::Reflectors};
@@ -30,6 +31,8 @@ pub struct SetDescription<'a> {
     pub highlight: Option<Highlight>,
     /// A map in the place of the background and of the lights' environment. The twin does not know it.
     pub environment: Option<&'a Arc<GpuEnvironment>>,
+    /// Colours have coarser levels, for mirrored rays that cover several texels.
+    pub mips: bool,
 }
 
 /// One complete sample set: what views are reconstructed from.
@@ -44,7 +47,7 @@ pub struct SampleSet {
     pub(crate) nodes: Table,
     /// See [`CodedDepth::cell_words`].
     pub(crate) cell_codes: Table,
-    /// RGB9E5 of each texel and of the one below it.
+    /// RGB9E5 of each texel and of the one below it; coarser levels follow those of all images.
     pub(crate) cell_colors: Table,
     pub(crate) reflectors: Option<Reflectors>,
     pub(crate) environment: Option<Arc<GpuEnvironment>>,
@@ -73,16 +76,16 @@ impl SampleSet {
         set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
-        check(tables, images, &set.volume)?;
+        check(tables, images, set)?;
         let among_holes = is_among_holes(images);
-        let coded = |image| CodedImage::of(image, among_holes);
+        let coded = |image| CodedImage::of(image, among_holes, set.mips);
         // One thread leaves the other cores to live streams.
         let is_shared = tables.gpu.device_queue.cuts();
         let coded: Vec<CodedImage> =
             if is_shared { images.iter().map(coded).collect() } else { images.par_iter().map(coded).collect() };
         let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(Vec::with_capacity);
-        let mut colors: Vec<[u32; 2]> = Vec::with_capacity(cell_count(images));
-        let mut cameras = Vec::with_capacity(images.len());
+        let mut colors: Vec<[u32; 2]> = Vec::with_capacity(color_count(images, set.mips));
+        let (mut cameras, mut levels) = (Vec::with_capacity(images.len()), Vec::with_capacity(images.len()));
         let uncertain = coded.iter().map(|coded| coded.uncertain).collect();
         for (image, coded) in images.iter().zip(coded) {
             cameras.push(GpuSampleCamera {
@@ -93,7 +96,12 @@ impl SampleSet {
             });
             nodes.extend(coded.nodes);
             codes.extend(coded.cells);
+            levels.push(coded.mips);
             colors.extend(with_below(&image.color_rgb9e5, image.size_px().x as usize));
+        }
+        for (camera, levels) in cameras.iter_mut().zip(levels).filter(|_| set.mips) {
+            camera.first_mip = colors.len() as u32;
+            levels.iter().for_each(|(size_px, level)| colors.extend(with_below(level, size_px.x as usize)));
         }
         Ok(Self {
             cameras,
@@ -117,10 +125,12 @@ struct CodedImage {
     camera: GpuSampleCamera,
     nodes: Vec<[u32; 2]>,
     cells: Vec<[u32; 2]>,
+    /// The coarser levels of its colours.
+    mips: Vec<(UVec2, Vec<u32>)>,
 }
 
 impl CodedImage {
-    fn of(image: &DepthImage, among_holes: bool) -> Self {
+    fn of(image: &DepthImage, among_holes: bool, with_mips: bool) -> Self {
         let depth = CodedDepth::in_set(image, among_holes);
         let pyramid = Pyramid::of(&depth);
         let Camera::Pinhole(camera) = &image.camera;
@@ -141,15 +151,16 @@ impl CodedImage {
             camera: gpu_camera,
             nodes: pyramid.words.iter().zip(pyramid.wide_words()).map(|(&range, wide)| [range, wide]).collect(),
             cells: depth.cell_words(),
+            mips: if with_mips { mips(image) } else { Vec::new() },
         }
     }
 }
 
-fn check(tables: &TablePool, images: &[DepthImage], volume: &Aabb) -> Result<(), ReconstructionError> {
+fn check(tables: &TablePool, images: &[DepthImage], set: &SetDescription<'_>) -> Result<(), ReconstructionError> {
     if images.is_empty() || images.len() > MAX_SAMPLE_CAMERAS {
         return Err(ReconstructionError::SampleCount(images.len()));
     }
-    if volume.is_empty() || !volume.size().is_finite() {
+    if set.volume.is_empty() || !set.volume.size().is_finite() {
         return Err(ReconstructionError::Volume);
     }
     for (index, image) in images.iter().enumerate() {
@@ -163,6 +174,7 @@ fn check(tables: &TablePool, images: &[DepthImage], volume: &Aabb) -> Result<(),
     }
     tables.gpu.check_table("depth pyramids", node_count(images))?;
     tables.gpu.check_table("cells", cell_count(images))?;
+    tables.gpu.check_table("sample colours", color_count(images, set.mips))?;
     Ok(())
 }
 
@@ -180,6 +192,12 @@ fn node_count(images: &[DepthImage]) -> usize {
 /// One cell a texel.
 fn cell_count(images: &[DepthImage]) -> usize {
     images.iter().map(|image| image.color_rgb9e5.len()).sum()
+}
+
+/// One colour a texel, and those of coarser levels.
+fn color_count(images: &[DepthImage], with_mips: bool) -> usize {
+    let coarser = if with_mips { images.iter().map(|image| mip_texels(image.size_px())).sum() } else { 0 };
+    cell_count(images) + coarser
 }
 
 /// `f √(1 + slope²)` at the corner farthest off the axis: a point that moves by r moves in the image by

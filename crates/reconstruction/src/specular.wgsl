@@ -48,7 +48,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var added = highlight(point_in_world, around.normal, towards_eye, around.reflector, around.visibility) * around.reflecting;
     let mirror = Mirror(point_in_world, around.normal, towards_eye, unpack_reflector(around.reflector));
     let open = {{ "unpack4x8unorm(around.visibility[0]).x" if visibility_words > 0 else "1.0" }};
-    added += bounce_off(mirror, index, vec3f(around.reflecting), open, 1.0 / (inverse_depth[index] * work.view.focal_px));
+    let side_m = 1.0 / (inverse_depth[index] * work.view.focal_px);
+    let curvature = select(0.0, curvature_at(camera, cell_index, 1.0 / (inverse_w * camera.focal_px)), corners.connected);
+    // Each of several positions within a pixel has a part of its footprint.
+    let width_m = side_m * sqrt(work.position_share);
+    let cone = cone_off(Cone(width_m, width_m / distance(point_in_world, work.view.eye_in_world)), curvature);
+    added += bounce_off(mirror, index, vec3f(around.reflecting), open, side_m, cone);
     out_color[index] = rgb9e5_from_linear(linear_from_rgb9e5(out_color[index]) + added);
 {%- else %}
     let added = highlight(point_in_world, around.normal, towards_eye, around.reflector, around.visibility);

@@ -56,18 +56,7 @@ fn write_found(index: u32, found: bool, t: f32, color_linear: vec3f, origin: u32
     if provenance == PROVENANCE_FILLED { leave_undecided(index); }
 }
 
-// The colours of a cell's corners, in their order.
-struct Colors { corners: array<vec3f, 4> }
-
-fn colors_of(cell_index: u32) -> Colors {
-{% if count_fetches %}    fetches += 2u;
-{% endif %}
-    let left = textureLoad(cell_colors, texel_at(cell_index), 0).xy;
-    let right = textureLoad(cell_colors, texel_at(cell_index + 1u), 0).xy;
-    return Colors(array(
-        linear_from_rgb9e5(left.x), linear_from_rgb9e5(right.x), linear_from_rgb9e5(left.y), linear_from_rgb9e5(right.y),
-    ));
-}
+{% include "colors.wgsl" %}
 
 {% if holes %}
 fn faded(share: f32) -> f32 { return clamp((share - LEAST_SHARE) / (1.0 - LEAST_SHARE), 0.0, 1.0); }

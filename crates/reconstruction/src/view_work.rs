@@ -57,7 +57,7 @@ pub(crate) struct GpuSampleCamera {
     pub width_px: u32,
     pub stretch: f32,
     pub mask: u32,
-    pub padding: u32,
+    pub first_mip: u32,
 }
 
 /// `ViewCamera` of the shader.

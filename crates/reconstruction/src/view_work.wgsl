@@ -27,7 +27,8 @@ struct SampleCamera {
     stretch: f32,
     // This camera's bit in provenance.
     mask: u32,
-    padding: u32,
+    // Where its coarser levels of colour begin; 0 where it has none.
+    first_mip: u32,
 }
 
 struct ViewCamera {

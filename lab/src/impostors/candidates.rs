@@ -13,10 +13,15 @@ const WIDE_DEG: f32 = 110.0;
 /// How far the corners of a square of cameras lie from its middle, in half widths of the mirror.
 const CORNER: f32 = 0.6;
 
+/// The images of clusters, without coarser levels of colour.
+pub const UNFILTERED: &str = "as in a cluster, unfiltered";
+
 /// Sample cameras for one mirror.
 pub struct Candidate {
     pub name: &'static str,
     pub cameras: Vec<PinholeCamera>,
+    /// Their colours have coarser levels.
+    pub mips: bool,
 }
 
 /// All candidates for a mirror, which faces `seen`; the last is that of clusters.
@@ -31,11 +36,13 @@ pub fn candidates(mirror: &Mirror, seen: Vec3) -> Vec<Candidate> {
     let side_px = |images: u32| UVec2::splat(((TEXELS / images) as f32).sqrt() as u32);
     let looking = |eye: Vec3, images: u32| looking((eye, NEAR_M), towards, WIDE_DEG, side_px(images));
     let square = [corner(-1.0, -1.0), corner(1.0, 1.0), corner(1.0, -1.0), corner(-1.0, 1.0)];
+    let of = |name, cameras| Candidate { name, cameras, mips: true };
     vec![
-        Candidate { name: "pinhole:1", cameras: vec![looking(middle, 1)] },
-        Candidate { name: "pinhole:4", cameras: square.map(|eye| looking(eye, 4)).to_vec() },
-        Candidate { name: "six faces", cameras: faces(middle, NEAR_M, side_px(6)) },
-        Candidate { name: "as in a cluster", cameras: in_a_cluster(mirror) },
+        of("pinhole:1", vec![looking(middle, 1)]),
+        of("pinhole:4", square.map(|eye| looking(eye, 4)).to_vec()),
+        of("six faces", faces(middle, NEAR_M, side_px(6))),
+        Candidate { mips: false, ..of(UNFILTERED, in_a_cluster(mirror)) },
+        of("as in a cluster", in_a_cluster(mirror)),
     ]
 }
 

@@ -13,7 +13,7 @@ use sampling::Mirror;
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 use study::{Bar, Cell, Check, Report, Table};
 
-use super::candidates::candidates;
+use super::candidates::{UNFILTERED, candidates};
 use super::costs::{self, Costs};
 use super::measure::{Answer, Figures, Hall, VIEW_PX, around};
 use super::orders;
@@ -108,28 +108,37 @@ fn table(rows: &[(&str, Figures)]) -> anyhow::Result<Table> {
         ("FLIP", ""),
         ("PSNR", "dB"),
         ("guessed", "%"),
+        ("64 rays: objects, FLIP", ""),
+        ("64 rays: FLIP", ""),
+        ("64 rays: PSNR", "dB"),
     ];
     let mut table = Table::new("Pixels in which a mirror shows an object, and in which it shows the scene", &columns);
     for (name, figures) in rows {
         let counts = [figures.images, figures.texels].map(Cell::from);
         let numbers = |answer: &Answer| [answer.flip, answer.psnr_db, answer.guessed_ratio * 100.0].map(Cell::from);
         let both = numbers(&figures.of_objects).into_iter().chain(numbers(&figures.of_scene));
-        table.push([Cell::from(*name)].into_iter().chain(counts).chain(both))?;
+        let [objects, scene] = figures.of_smooth;
+        let smooth = [objects.flip, scene.flip, scene.psnr_db].map(Cell::from);
+        table.push([Cell::from(*name)].into_iter().chain(counts).chain(both).chain(smooth))?;
     }
     Ok(table)
 }
 
 fn error_checks(rows: &[(&str, Figures)]) -> Vec<Check> {
     let of = |wanted: &str| rows.iter().find(|(name, _)| *name == wanted).map(|(_, figures)| *figures);
-    let (Some(one), Some(chosen)) = (of("pinhole:1"), rows.last().map(|(_, figures)| *figures)) else {
+    let (Some(one), Some(unfiltered), Some(chosen)) =
+        (of("pinhole:1"), of(UNFILTERED), rows.last().map(|(_, figures)| *figures))
+    else {
         return Vec::new();
     };
+    let filtered = chosen.of_smooth[1].flip / unfiltered.of_smooth[1].flip;
     let over = |of: fn(&Figures) -> f64| of(&chosen) / of(&one);
     vec![
         Check::new("objects in mirrors: FLIP over one pinhole's", over(|f| f.of_objects.flip), "×", Bar::AtMost(0.75)),
         Check::new("objects in mirrors: FLIP", chosen.of_objects.flip, "", Bar::AtMost(0.1)),
         Check::new("objects in mirrors: guessed", chosen.of_objects.guessed_ratio * 100.0, "%", Bar::AtMost(2.0)),
         Check::new("mirrors: FLIP over one pinhole's", over(|f| f.of_scene.flip), "×", Bar::AtMost(1.0)),
+        Check::new("mirrors against 64 rays: FLIP over the unfiltered", filtered, "×", Bar::AtMost(0.9)),
     ]
 }
 

@@ -66,7 +66,8 @@ pub fn measure(hall: &Hall<'_>, mirrors: &[Mirror]) -> anyhow::Result<Costs> {
     let (of_mirrors, mirrors_s) =
         timed(|| mirrors.iter().map(|mirror| hall.images(&in_a_cluster(mirror))).collect::<anyhow::Result<Vec<_>>>())?;
     let load = || -> anyhow::Result<(SampleSet, Vec<SampleSet>)> {
-        Ok((hall.set(&images)?, of_mirrors.iter().map(|images| hall.set(images)).collect::<anyhow::Result<_>>()?))
+        let of_mirrors = of_mirrors.iter().map(|images| hall.set(images, true));
+        Ok((hall.set(&images, true)?, of_mirrors.collect::<anyhow::Result<_>>()?))
     };
     let ((set, sets), load_s) = timed(load)?;
     let cells = cells(&bounds, &sets);

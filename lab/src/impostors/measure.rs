@@ -1,7 +1,10 @@
 //! Views of a scene with mirrors: by images of their surroundings, and drawn directly.
 
 use anyhow::Context as _;
-use depth_image::{Aabb, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use depth_image::{
+    Aabb, Antialias, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes, linear_from_srgb8,
+    srgb8_from_linear,
+};
 use glam::{UVec2, Vec3};
 use metrics::{Rgb8Image, flip_map, psnr_db};
 use reconstruction::{MirrorCell, Mirrors, SampleSet, SetDescription};
@@ -16,13 +19,11 @@ use crate::failures::stand::Stand;
 pub const VIEW_PX: UVec2 = UVec2::new(200, 150);
 /// A mirror shows the scene where it differs from the environment by more than this, in codes.
 const SEEN_CODES: u8 = 8;
-const PLANES: SamplePlanes = SamplePlanes {
-    antialias: depth_image::Antialias::NONE,
-    normal: false,
-    surface_id: false,
-    specular: true,
-    corners: false,
-};
+/// Views that are also compared with a truth of several rays a pixel, and how many these are.
+const SMOOTH: usize = 3;
+const RAYS: u32 = 64;
+const PLANES: SamplePlanes =
+    SamplePlanes { antialias: Antialias::NONE, normal: false, surface_id: false, specular: true, corners: false };
 
 /// A view, its own sample set, and the truth. The set's one image is the view's, so that errors are those of the mirror.
 struct Subject {
@@ -33,6 +34,8 @@ struct Subject {
     mirrored: Vec<bool>,
     /// Those in which it shows an object, neither the ground nor the sky.
     of_objects: Vec<bool>,
+    /// The truth with 64 rays a pixel, of some views.
+    smooth: Option<View>,
 }
 
 /// A scene on the device with its views.
@@ -54,6 +57,8 @@ pub struct Figures {
     pub of_objects: Answer,
     /// Over the pixels in which a mirror shows the scene.
     pub of_scene: Answer,
+    /// Over both kinds of pixels, against 64 rays a pixel.
+    pub of_smooth: [Answer; 2],
 }
 
 /// Errors of pixels, and the share of them that no image knew.
@@ -78,7 +83,8 @@ impl<'s> Hall<'s> {
         let (on_device, painted) = (stand.upload(scene)?, stand.upload(&painted(scene))?);
         let mut hall = Self { stand, scene, on_device, painted, lighting, subjects: Vec::new() };
         for camera in views {
-            hall.subjects.extend(hall.subject(*camera)?);
+            let is_smooth = hall.subjects.len() < SMOOTH;
+            hall.subjects.extend(hall.subject(*camera, is_smooth)?);
         }
         anyhow::ensure!(!hall.subjects.is_empty(), "no view shows an object in a mirror");
         Ok(hall)
@@ -91,7 +97,7 @@ impl<'s> Hall<'s> {
     }
 
     /// `None` where no mirror shows an object.
-    fn subject(&self, camera: PinholeCamera) -> anyhow::Result<Option<Subject>> {
+    fn subject(&self, camera: PinholeCamera, is_smooth: bool) -> anyhow::Result<Option<Subject>> {
         let draw = |scene, lighting| -> anyhow::Result<View> {
             let views = self.stand.views(scene, lighting, &[camera], ViewPlanes::WITH_DEPTH)?;
             views.into_iter().next().context("a view")
@@ -105,21 +111,36 @@ impl<'s> Hall<'s> {
             .zip(&mirrored)
             .map(|(is, of)| is && *of)
             .collect();
-        let set = self.set(&self.images(&[camera])?)?;
-        Ok(of_objects.contains(&true).then_some(Subject { camera, set, truth, mirrored, of_objects }))
+        if !of_objects.contains(&true) {
+            return Ok(None);
+        }
+        let set = self.set(&self.images(&[camera])?, false)?;
+        let smooth = is_smooth.then(|| self.smooth(&camera)).transpose()?;
+        Ok(Some(Subject { camera, set, truth, mirrored, of_objects, smooth }))
+    }
+
+    /// The truth, of 64 rays a pixel: four pixels of twice the size are averaged.
+    fn smooth(&self, camera: &PinholeCamera) -> anyhow::Result<View> {
+        let antialias = Antialias::of(RAYS / 4).context("a number of samples")?;
+        let planes = ViewPlanes { antialias, ..ViewPlanes::COLOR };
+        let twice = camera.resized(camera.size_px * 2);
+        let view = self.stand.views(&self.on_device, self.lighting, &[twice], planes)?.into_iter().next();
+        let view = view.context("a view")?;
+        Ok(View { size_px: camera.size_px, srgb8: halved(&view), ..view })
     }
 
     pub fn images(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
         self.stand.images(&self.on_device, plain(self.lighting), cameras, PLANES)
     }
 
-    pub fn set(&self, images: &[DepthImage]) -> anyhow::Result<SampleSet> {
+    pub fn set(&self, images: &[DepthImage], mips: bool) -> anyhow::Result<SampleSet> {
         let description = SetDescription {
             volume: self.scene.bounds(),
             background: self.scene.background,
             illumination: &self.scene.illumination,
             highlight: Some(Highlight::Ggx),
             environment: None,
+            mips,
         };
         Ok(self.stand.reconstructor().upload(images, &description)?)
     }
@@ -131,11 +152,17 @@ impl<'s> Hall<'s> {
     pub fn figures(&self, mirrors: &[Aabb], candidates: &[Candidate]) -> anyhow::Result<Figures> {
         let images = candidates.iter().map(|candidate| self.images(&candidate.cameras));
         let images = images.collect::<anyhow::Result<Vec<_>>>()?;
-        let sets = images.iter().map(|images| self.set(images)).collect::<anyhow::Result<Vec<_>>>()?;
+        let sets = candidates.iter().zip(&images).map(|(candidate, images)| self.set(images, candidate.mips));
+        let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
         let views = self.views(&cells(mirrors, &sets), self.lighting.reflections())?;
         let answered = |of: fn(&Subject) -> &Vec<bool>| -> anyhow::Result<Answer> {
             let each =
                 self.subjects.iter().zip(&views).map(|(subject, view)| answer(&subject.truth, view, of(subject)));
+            mean(&each.collect::<anyhow::Result<Vec<_>>>()?)
+        };
+        let smooth = |of: fn(&Subject) -> &Vec<bool>| -> anyhow::Result<Answer> {
+            let each = self.subjects.iter().zip(&views);
+            let each = each.filter_map(|(subject, view)| Some(answer(subject.smooth.as_ref()?, view, of(subject))));
             mean(&each.collect::<anyhow::Result<Vec<_>>>()?)
         };
         let count = |of: fn(&DepthImage) -> usize| images.iter().flatten().map(of).sum();
@@ -144,6 +171,7 @@ impl<'s> Hall<'s> {
             texels: count(|image| image.color_rgb9e5.len()),
             of_objects: answered(|subject| &subject.of_objects)?,
             of_scene: answered(|subject| &subject.mirrored)?,
+            of_smooth: [smooth(|subject| &subject.of_objects)?, smooth(|subject| &subject.mirrored)?],
         })
     }
 
@@ -199,6 +227,21 @@ pub fn plain(lighting: Lighting) -> Lighting {
 pub fn reflecting(lighting: Lighting, reflections: u32) -> anyhow::Result<Lighting> {
     let plain = plain(lighting);
     if reflections == 0 { Ok(plain) } else { Ok(format!("{plain}, reflections {reflections}").parse()?) }
+}
+
+/// The means of two rows and two columns each, of linear light.
+fn halved(view: &View) -> Vec<u8> {
+    let size_px = view.size_px / 2;
+    let color = |x: u32, y: u32| {
+        let first = 3 * (y * view.size_px.x + x) as usize;
+        Vec3::from_array([0, 1, 2].map(|channel| linear_from_srgb8(view.srgb8[first + channel])))
+    };
+    let mean = |index: u32| {
+        let place = UVec2::new(index % size_px.x, index / size_px.x) * 2;
+        let of = |x: u32, y: u32| color(place.x + x, place.y + y);
+        0.25 * (of(0, 0) + of(1, 0) + of(0, 1) + of(1, 1))
+    };
+    (0..size_px.element_product()).flat_map(|index| mean(index).to_array().map(srgb8_from_linear)).collect()
 }
 
 /// Pixels that differ.

@@ -24,7 +24,7 @@ pub fn measure(stand: &Stand, lighting: Lighting) -> anyhow::Result<(Table, Chec
     let hall = Hall::new(stand, &scene, lighting, &views)?;
     let (mirrors, _) = sampling::mirrors(&scene);
     let bounds: Vec<Aabb> = mirrors.iter().map(|mirror| mirror.bounds).collect();
-    let sets = mirrors.iter().map(|mirror| hall.set(&hall.images(&in_a_cluster(mirror))?));
+    let sets = mirrors.iter().map(|mirror| hall.set(&hall.images(&in_a_cluster(mirror))?, true));
     let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
     let columns =
         [("mirrors on the way", ""), ("FLIP", ""), ("FLIP without rays", ""), ("PSNR", "dB"), ("guessed", "%")];

@@ -11,6 +11,8 @@
 // Of the pixels: linear, as RGB9E5.
 @group(0) var<storage, read_write> out_color: array<u32>;
 @group(0) var<storage, read_write> out_provenance: array<u32>;
+// Of the images.
+@group(0) var cell_colors: texture_2d<u32>;
 // Of the rays.
 @group(0) var<storage, read> rays: array<MirroredRay>;
 @group(0) var<storage, read> ray_color: array<u32>;
@@ -25,19 +27,27 @@
 {% include "bounce/spawn.wgsl" %}
 {% endif %}
 
+{% include "colors.wgsl" %}
+{% include "bounce/mip.wgsl" %}
 // What a pixel shows of the surface at its ray's end.
 fn landed(index: u32, ray: MirroredRay, origin: u32) -> vec3f {
-    var shown = linear_from_rgb9e5(ray_color[index]) * ray.throughput_linear;
+    let throughput = linear_from_rgb9e5(ray.throughput_rgb9e5);
+    let way_m = 1.0 / inverse_depth[index];
+    let point_in_world = ray.origin_in_world + ray.direction * way_m;
+    let width_m = ray.width_m + ray.spread * way_m;
+{% include "gather_at.wgsl" if reflects else "nearest_at.wgsl" %}
+    let side_m = 1.0 / (inverse_w * camera.focal_px);
+    let color = filtered(camera, linear_from_rgb9e5(ray_color[index]), uv + 0.5, abs(width_m) / side_m);
+    var shown = color * throughput;
 {% if reflects %}
-    let point_in_world = ray.origin_in_world + ray.direction / inverse_depth[index];
-{% include "gather_at.wgsl" %}
     for (var glossy = around.reflecting > 0.0; glossy; glossy = false) {
-        let throughput_linear = ray.throughput_linear * around.reflecting;
+        let throughput_linear = throughput * around.reflecting;
         shown += throughput_linear * highlight(point_in_world, around.normal, -ray.direction, around.reflector, around.visibility);
 {% if mirrors %}
         let mirror = Mirror(point_in_world, around.normal, -ray.direction, unpack_reflector(around.reflector));
         let open = {{ "unpack4x8unorm(around.visibility[0]).x" if visibility_words > 0 else "1.0" }};
-        shown += bounce_off(mirror, ray.pixel, throughput_linear, open, 1.0 / (inverse_w * camera.focal_px));
+        let curvature = select(0.0, curvature_at(camera, cell_index, side_m), corners.connected);
+        shown += bounce_off(mirror, ray.pixel, throughput_linear, open, side_m, cone_off(Cone(width_m, ray.spread), curvature));
 {% endif %}
     }
 {% endif %}
@@ -54,7 +64,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let guess = unpack4x8unorm(ray.guess);
     let is_unknown = kind == PROVENANCE_FILLED;
     // Where nothing is met the environment is seen; where no image knew, what the mirror shows without rays.
-    var shown = environment_mirrored(ray.direction, max(guess.y, LEAST_ROUGHNESS)) * ray.throughput_linear * select(1.0, guess.x, is_unknown);
+    var shown = environment_mirrored(ray.direction, max(guess.y, LEAST_ROUGHNESS)) * linear_from_rgb9e5(ray.throughput_rgb9e5) * select(1.0, guess.x, is_unknown);
     for (var hit = kind == PROVENANCE_HIT; hit; hit = false) { shown = landed(index, ray, origin); }
     out_color[ray.pixel] = rgb9e5_from_linear(linear_from_rgb9e5(out_color[ray.pixel]) + shown);
     for (var guessed = is_unknown; guessed; guessed = false) {

@@ -80,8 +80,10 @@ pub(crate) struct GpuMirroredRay {
     pub pixel: u32,
     pub direction: [f32; 3],
     pub guess: u32,
-    pub throughput_linear: [f32; 3],
+    pub throughput_rgb9e5: u32,
     pub near_m: f32,
+    pub width_m: f32,
+    pub spread: f32,
 }
 
 /// The memory for the mirrored rays of a batch.
@@ -356,6 +358,7 @@ fn land(
         Binding::buffer("out_color", &recording.batch.color),
         Binding::buffer("out_provenance", &recording.batch.provenance),
         Binding::buffer("ray_color", &bounces.color),
+        Binding::texture("cell_colors", &set.cell_colors),
         Binding::buffer("inverse_depth", &bounces.inverse_depth_per_m),
         Binding::buffer("provenance", &bounces.provenance),
         Binding::buffer("illumination", &view_reflectors.illumination),

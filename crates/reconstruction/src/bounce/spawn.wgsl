@@ -28,9 +28,30 @@ fn mirror_cell_at(point_in_world: vec3f) -> u32 {
     return found;
 }
 
+// The mean curvature of a mirror in metres⁻¹, positive where convex: how much its normal turns along the image's own axes from
+// sample to sample. Slanting does not count, which lengthens the way and shows less of the turn.
+fn curvature_at(camera: SampleCamera, cell_index: u32, side_m: f32) -> f32 {
+    let forward = camera.homogeneous_pixel_from_world[2].xyz;
+    let column = camera.homogeneous_pixel_from_world[0].xyz;
+    let row = camera.homogeneous_pixel_from_world[1].xyz;
+    let normal = unit_from_oct16(sample_texel(cell_index, 0u).x);
+    let across = unit_from_oct16(sample_texel(cell_index + 1u, 0u).x) - normal;
+    let down = unit_from_oct16(sample_texel(cell_index + camera.width_px, 0u).x) - normal;
+    let right = unit_or_zero(column - forward * dot(column, forward));
+    let under = unit_or_zero(row - forward * dot(row, forward));
+    return 0.5 * (dot(across, right) + dot(down, under)) / side_m;
+}
+
+// A pixel's footprint on a mirror: its side, and what that grows by in a metre (Akenine-Möller et al. 2019).
+struct Cone { width_m: f32, spread: f32 }
+
+fn cone_off(before: Cone, curvature: f32) -> Cone {
+    return Cone(before.width_m, before.spread + 2.0 * curvature * before.width_m);
+}
+
 // Lists the ray off a mirror. Gives what the mirror shows of the environment where no cell knows its surroundings.
-// `open` is the share of the environment that reaches the mirror.
-fn bounce_off(mirror: Mirror, pixel: u32, throughput_linear: vec3f, open: f32, side_m: f32) -> vec3f {
+// `open` is the share of the environment that reaches the mirror; `side_m` is that of a sample.
+fn bounce_off(mirror: Mirror, pixel: u32, throughput_linear: vec3f, open: f32, side_m: f32, cone: Cone) -> vec3f {
     let share = mirror_share(mirror.reflector.roughness);
     let towards = reflect(-mirror.towards_eye, mirror.normal);
     let passed = throughput_linear * environment_reflectance(mirror) * share;
@@ -45,7 +66,7 @@ fn bounce_off(mirror: Mirror, pixel: u32, throughput_linear: vec3f, open: f32, s
         next_listed[mirror_boxes[cell].first_listed + entry] = number;
         let near_m = START_FOOTPRINTS * side_m / max(dot(mirror.normal, towards), LEAST_RISE);
         let guess = pack4x8unorm(vec4f(open, mirror.reflector.roughness, 0.0, 0.0));
-        next_rays[number] = MirroredRay(mirror.point_in_world, pixel, towards, guess, passed, near_m);
+        next_rays[number] = MirroredRay(mirror.point_in_world, pixel, towards, guess, rgb9e5_from_linear(passed), near_m, cone.width_m, cone.spread);
     }
     return vec3f(0.0);
 }

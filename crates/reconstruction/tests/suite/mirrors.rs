@@ -27,10 +27,14 @@ fn six_faces(middle: Vec3, side_px: u32) -> Vec<PinholeCamera> {
 
 impl Hall {
     fn new(scene: Scene, samples: &[PinholeCamera], cells: &[(Aabb, Vec<PinholeCamera>)]) -> Self {
+        Self::with_mips(scene, samples, cells, true)
+    }
+
+    fn with_mips(scene: Scene, samples: &[PinholeCamera], cells: &[(Aabb, Vec<PinholeCamera>)], mips: bool) -> Self {
         let on_device = GpuScene::upload(gpu(), &scene).expect("a scene");
         let set = |cameras: &[PinholeCamera]| {
-            let images = images(&on_device, cameras);
-            reconstructor().upload(&images, &description(&scene)).expect("a sample set")
+            let (images, described) = (images(&on_device, cameras), SetDescription { mips, ..description(&scene) });
+            reconstructor().upload(&images, &described).expect("a sample set")
         };
         let samples = set(samples);
         let cells = cells.iter().map(|(bounds, cameras)| (*bounds, set(cameras))).collect();
@@ -59,6 +63,7 @@ fn description(scene: &Scene) -> SetDescription<'_> {
         illumination: &scene.illumination,
         highlight: Some(Highlight::Ggx),
         environment: None,
+        mips: true,
     }
 }
 
@@ -111,6 +116,10 @@ fn is_near(view: &View, truth: &View, pixel: usize) -> bool {
 }
 
 fn before_the_teapot() -> Hall {
+    before_the_teapot_with_mips(true)
+}
+
+fn before_the_teapot_with_mips(mips: bool) -> Hall {
     let scene = teapot_mirror();
     let middle = Vec3::new(0.0, 3.1, -4.5);
     let bounds = Aabb { min: middle - 3.6, max: middle + 3.6 };
@@ -118,12 +127,13 @@ fn before_the_teapot() -> Hall {
         looking(Vec3::new(9.0 + x, 7.0 + y, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, UVec2::new(200, 150))
     };
     let samples = [eye(-0.5, -0.5), eye(0.5, 0.5), eye(0.5, -0.5), eye(-0.5, 0.5)];
-    Hall::new(scene, &samples, &[(bounds, six_faces(middle, 192))])
+    Hall::with_mips(scene, &samples, &[(bounds, six_faces(middle, 192))], mips)
 }
 
+/// Of one ray a pixel, as the truth has.
 #[test]
 fn a_dented_mirror_shows_the_teapot() {
-    let hall = before_the_teapot();
+    let hall = before_the_teapot_with_mips(false);
     let camera = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, VIEW_PX);
     let [plain, truth] = [0, 1].map(|reflections| hall.drawn(&camera, reflections));
     // Pixels in which the scene differs from the environment.
@@ -139,6 +149,35 @@ fn a_dented_mirror_shows_the_teapot() {
     assert!(mirrored.len() > 800, "{}", mirrored.len());
     assert!(with_near > 0.8 && without_near < 0.3, "{with_near}, without {without_near}");
     assert!(guessed * 20 < mirrored.len(), "{guessed} of {}", mirrored.len());
+}
+
+/// Against the mean of sixteen rays a pixel.
+#[test]
+fn what_a_mirror_shrinks_is_filtered() {
+    let camera = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, VIEW_PX);
+    let [filtered, unfiltered] = [true, false].map(before_the_teapot_with_mips);
+    let planes = ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::COLOR };
+    let work = work(&filtered.on_device, "shadows, reflections 1");
+    let truth = renderer().draw_views(work, &[camera], planes).expect("a view").remove(0);
+    let [plain, mirrored] = [0, 1].map(|reflections| filtered.drawn(&camera, reflections));
+    let shows_mirror: Vec<bool> = differences(&plain, &mirrored).iter().map(|difference| *difference > 8).collect();
+    let error = |hall: &Hall| {
+        let differences = differences(&hall.view(&camera, 1), &truth);
+        let squares = differences.iter().zip(&shows_mirror).filter(|(_, is)| **is).map(|(d, _)| f32::from(*d).powi(2));
+        squares.sum::<f32>().sqrt()
+    };
+    let [filtered, unfiltered] = [filtered, unfiltered].map(|hall| error(&hall));
+    assert!(filtered < 0.8 * unfiltered, "{filtered}, unfiltered {unfiltered}");
+}
+
+/// Its images have larger texels than the view has pixels, but of what is close to it.
+#[test]
+fn a_flat_mirror_that_enlarges_is_not_filtered() {
+    let [filtered, unfiltered] = [true, false].map(|mips| between_two_mirrors(mips).view(&facing_a_mirror(), 1));
+    let changed = differences(&filtered, &unfiltered).iter().filter(|difference| **difference > 0).count();
+    let pixels = VIEW_PX.element_product() as usize;
+    println!("{changed} of {pixels} pixels are filtered");
+    assert!(changed * 20 < pixels, "{changed} of {pixels}");
 }
 
 #[test]
@@ -209,8 +248,11 @@ fn what_no_image_knows_is_guessed_and_said_to_be() {
     assert!(greatest <= Some(6), "{greatest:?}");
 }
 
-#[test]
-fn two_mirrors_repeat_the_ball() {
+fn facing_a_mirror() -> PinholeCamera {
+    looking(Vec3::new(-1.55, 1.95, 4.4), Vec3::new(2.0, 1.2, 1.2), 40.0, VIEW_PX)
+}
+
+fn between_two_mirrors(mips: bool) -> Hall {
     let scene = mirror_pair();
     let cell = |x: f32| {
         let bounds = Aabb { min: Vec3::new(x - 0.05, -0.1, -3.1), max: Vec3::new(x + 0.05, 3.1, 3.1) };
@@ -224,8 +266,12 @@ fn two_mirrors_repeat_the_ball() {
         looking(Vec3::new(-1.6 + x, 1.9 + y, 4.4), Vec3::new(2.0, 1.2, 1.2), 40.0, UVec2::new(200, 150))
     };
     let samples = [eye(-0.2, -0.2), eye(0.2, 0.2), eye(0.2, -0.2), eye(-0.2, 0.2)];
-    let hall = Hall::new(scene, &samples, &[cell(2.0), cell(-2.0)]);
-    let camera = looking(Vec3::new(-1.55, 1.95, 4.4), Vec3::new(2.0, 1.2, 1.2), 40.0, VIEW_PX);
+    Hall::with_mips(scene, &samples, &[cell(2.0), cell(-2.0)], mips)
+}
+
+#[test]
+fn two_mirrors_repeat_the_ball() {
+    let (hall, camera) = (between_two_mirrors(true), facing_a_mirror());
     let mut errors = Vec::new();
     for reflections in 1..=4 {
         errors.push(mean_difference(&hall.view(&camera, reflections), &hall.drawn(&camera, reflections)));

@@ -112,6 +112,7 @@ impl Room {
             illumination: &self.illumination,
             highlight,
             environment: None,
+            mips: false,
         }
     }
 
