@@ -11,7 +11,7 @@ use glam::UVec2;
 use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
-use sampling::{Mirror, Rig, SamplingMethod};
+use sampling::{Impostors, Mirror, Rig, SamplingMethod};
 use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec, UpAxis};
 
 use crate::camera_file::{self, Placement};
@@ -78,6 +78,10 @@ pub struct SceneArgs {
     /// are about twice as dense as each session's views
     #[arg(long, default_value_t, value_name = "WxH|auto")]
     pub sample_size: SampleSize,
+    /// Images of what mirrors show, for lighting with reflections: auto[:UNSEEN], as few as see all but UNSEEN percent
+    /// of mirrored rays all the way; pinhole[:N], the N that see most; or none
+    #[arg(long, default_value_t, value_name = "NAME")]
+    pub impostors: Impostors,
     /// Sample cameras from a transforms.json, in the scene file's coordinates [default: four, placed from the scene's
     /// bounds]
     #[arg(long, value_name = "FILE")]
@@ -97,10 +101,14 @@ pub struct Setup {
 }
 
 /// The scene's mirrors, as sessions follow them.
-fn mirrors_of(scene: &Scene) -> Vec<(MirrorCell, Vec<PinholeCamera>)> {
-    let (mirrors, beyond) = sampling::mirrors(scene);
+fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<(MirrorCell, Vec<PinholeCamera>)> {
+    let (mirrors, beyond) = sampling::mirrors(scene, impostors);
     if beyond > 0 {
         tracing::info!(beyond, followed = mirrors.len(), "the smallest mirrors show the environment alone");
+    }
+    for mirror in &mirrors {
+        let (images, [chosen, fresh]) = (mirror.cameras.len(), mirror.unseen_ratio.unwrap_or([f32::NAN; 2]));
+        tracing::info!(images, unseen_ratio = chosen, unseen_ratio_of_other_rays = fresh, "a mirror's surroundings");
     }
     let sampling = SamplingMethod::default().to_string();
     let cell = |mirror: Mirror| (MirrorCell { bounds: mirror.bounds, sampling: sampling.clone() }, mirror.cameras);
@@ -160,7 +168,7 @@ impl SceneArgs {
             name: offer_name(&self.scene),
             hash: SceneHash::of(&package),
             package: package.into(),
-            mirrors: mirrors_of(&scene),
+            mirrors: mirrors_of(&scene, self.impostors),
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
             fits_views: self.sample_size == SampleSize::Auto && self.samples.is_none(),
             rows: rows(&self.named(around.len() as u32)),

@@ -9,6 +9,7 @@ use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use gpu::DevicePreference;
 use node::{DirectWork, Engine, MirrorSet, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
+use sampling::Impostors;
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 
 const LIGHTING: &str = "shadows, reflections 1";
@@ -36,7 +37,7 @@ impl Stand {
     }
 
     fn mirrors(&self) -> Vec<MirrorSet> {
-        let (mirrors, beyond) = sampling::mirrors(&self.scene);
+        let (mirrors, beyond) = sampling::mirrors(&self.scene, Impostors::default());
         assert_eq!((mirrors.len(), beyond), (1, 0));
         mirrors.into_iter().map(|mirror| (mirror.bounds, self.set(&mirror.cameras))).collect()
     }

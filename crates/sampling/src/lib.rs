@@ -1,6 +1,7 @@
 //! Sampling methods (scene to depth images) and sample-camera rigs.
 
 mod error;
+mod impostors;
 mod methods;
 mod mirrors;
 mod rig;
@@ -11,6 +12,7 @@ mod temporal_hysteresis;
 mod work;
 
 pub use error::SamplingError;
+pub use impostors::{Impostors, UnknownImpostors};
 pub use methods::{METHODS, Redundancy, SamplingMethod, UnknownSampling, templates};
 pub use mirrors::{Mirror, faces, looking, mirrors};
 pub use rig::{Rig, RigError};

@@ -9,6 +9,7 @@ use depth_image::Aabb;
 use engine::GpuEngine;
 use node::Engine as _;
 use render::Lighting;
+use sampling::Impostors;
 use sampling::Mirror;
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 use study::{Bar, Cell, Check, Report, Table};
@@ -36,6 +37,9 @@ pub struct ImpostorsArgs {
     /// A built-in scene with mirrors, or a file
     #[arg(long, default_value = "teapot-mirror", value_name = "SPEC")]
     scene: SceneSpec,
+    /// Images as in a cluster: auto[:UNSEEN] (percent), or pinhole[:N]
+    #[arg(long, default_value_t, value_name = "NAME")]
+    impostors: Impostors,
     /// Six views in hard shadows, in place of 24 in soft light
     #[arg(long)]
     quick: bool,
@@ -53,7 +57,7 @@ pub struct ImpostorsArgs {
 /// The scene cannot be used or has no mirrors, the device fails, or the folder cannot be written.
 pub fn run(args: &ImpostorsArgs) -> anyhow::Result<Outcome> {
     let scene = args.scene.load(&Limits::default(), MissingTextures::Refuse)?;
-    let (mirrors, _) = sampling::mirrors(&scene);
+    let (mirrors, _) = sampling::mirrors(&scene, args.impostors);
     anyhow::ensure!(!mirrors.is_empty(), "{} has no mirrors", args.scene);
     let engine = GpuEngine::shared(args.device.device)?;
     let stand = Stand::new(&engine, false);
@@ -65,13 +69,14 @@ pub fn run(args: &ImpostorsArgs) -> anyhow::Result<Outcome> {
     report.parameter("scene", args.scene.to_string());
     report.parameter("lighting", lighting.to_string());
     report.parameter("mirrored pixels that show an object (%)", hall.object_share() * 100.0);
+    report.checks.extend(mirrors.iter().filter_map(|mirror| mirror.unseen_ratio).map(unseen_check));
     let rows = compared(&hall, &scene, &mirrors)?;
     report.tables.push(table(&rows)?);
     report.checks.extend(error_checks(&rows));
     let costs = costs::measure(&hall, &mirrors)?;
     report.tables.push(cost_table(&costs)?);
     report.checks.extend(cost_checks(&costs));
-    let (orders, growth) = orders::measure(&stand, lighting)?;
+    let (orders, growth) = orders::measure(&stand, lighting, args.impostors)?;
     report.tables.push(orders);
     report.checks.push(growth);
     report.tables.iter().for_each(|table| println!("{}", table.to_text()));
@@ -122,6 +127,13 @@ fn table(rows: &[(&str, Figures)]) -> anyhow::Result<Table> {
         table.push([Cell::from(*name)].into_iter().chain(counts).chain(both).chain(smooth))?;
     }
     Ok(table)
+}
+
+/// Of the rays by which images were chosen, and of others: what the choice promises is true.
+fn unseen_check([chosen, fresh]: [f32; 2]) -> Check {
+    println!("mirrored rays that are not seen all the way: {:.2} %, of others {:.2} %", chosen * 100.0, fresh * 100.0);
+    let apart = f64::from((fresh - chosen).abs()) * 100.0;
+    Check::new("rays that images do not see: other rays less those that chose", apart, "points", Bar::AtMost(1.0))
 }
 
 fn error_checks(rows: &[(&str, Figures)]) -> Vec<Check> {

@@ -3,6 +3,7 @@
 use depth_image::{Aabb, PinholeCamera};
 use glam::Vec3;
 use render::Lighting;
+use sampling::Impostors;
 use scene::{Limits, MissingTextures, SceneSpec};
 use study::{Bar, Cell, Check, Table};
 
@@ -18,11 +19,11 @@ const ORDERS: u32 = 4;
 ///
 /// # Errors
 /// The device fails.
-pub fn measure(stand: &Stand, lighting: Lighting) -> anyhow::Result<(Table, Check)> {
+pub fn measure(stand: &Stand, lighting: Lighting, impostors: Impostors) -> anyhow::Result<(Table, Check)> {
     let scene = SCENE.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?;
     let views = [-0.3f32, 0.1, 0.4].map(|z_m| between(Vec3::new(1.2, 1.5, 2.2 + z_m)));
     let hall = Hall::new(stand, &scene, lighting, &views)?;
-    let (mirrors, _) = sampling::mirrors(&scene);
+    let (mirrors, _) = sampling::mirrors(&scene, impostors);
     let bounds: Vec<Aabb> = mirrors.iter().map(|mirror| mirror.bounds).collect();
     let sets = mirrors.iter().map(|mirror| hall.set(&hall.images(&in_a_cluster(mirror))?, true));
     let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;

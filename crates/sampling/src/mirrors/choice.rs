@@ -1,0 +1,159 @@
+//! Which images surround a mirror: few that see all the way of rays off it.
+
+use std::ops::Range;
+
+use depth_image::PinholeCamera;
+use glam::{UVec2, Vec3};
+
+use super::groups::Group;
+use super::rays::{PLACES, Triangles, Way};
+use super::{FACE_DEG, WIDE_DEG, looking};
+
+/// A mirror whose normals have a mean of this length is flat.
+const FLAT: f32 = 0.9;
+/// How far images lie from a flat mirror's middle, in half widths, and from another's.
+const FLAT_ASIDE: f32 = 0.5;
+const ASIDE: f32 = 0.6;
+/// So many images or more begin with those that are always taken.
+const LEAST_FOR_FIRST: usize = 4;
+/// The side of the image that shows most ends of rays best; sizes are in proportion.
+const SIDE_PX: f32 = 256.0;
+/// The least texels of an image over those of its fair share: it proves the way to the sky to be free.
+const LEAST_SHARE: f32 = 1.0 / 16.0;
+
+/// Images, and the shares of rays that they do not see all the way: see [`super::Mirror`].
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Choice {
+    pub cameras: Vec<PinholeCamera>,
+    /// Of the rays by which they were chosen, and of as many others.
+    pub unseen_ratio: [f32; 2],
+}
+
+/// Chooses by the rays off half of the mirror's points; the others tell how good the choice is. `None` where no eye sees a point.
+pub(super) fn choose(
+    group: &Group,
+    triangles: &Triangles,
+    (most, unseen_ratio): (usize, f32),
+    near_m: f32,
+) -> Option<Choice> {
+    let [deciding, fresh] = [0, 1].map(|first| {
+        let points = group.points.iter().enumerate().skip(first).step_by(2);
+        points.filter_map(|(number, point)| triangles.way(point, number)).collect::<Vec<Way>>()
+    });
+    if deciding.is_empty() {
+        return None;
+    }
+    let pool = pool(group, triangles.volume.center(), near_m);
+    let seen: Vec<Vec<bool>> = pool.cameras.iter().map(|camera| seen_by(camera, &deciding, triangles)).collect();
+    let first = if most >= LEAST_FOR_FIRST { pool.first.clone().collect() } else { Vec::new() };
+    let (chosen, unseen) = cover(&seen, first, most, unseen_ratio);
+    let cameras: Vec<PinholeCamera> = chosen.iter().map(|&camera| pool.cameras[camera]).collect();
+    let of_chosen: Vec<&[bool]> = chosen.iter().map(|&camera| seen[camera].as_slice()).collect();
+    let mut of_fresh = vec![true; fresh.len() * PLACES];
+    cameras.iter().for_each(|camera| strike(&mut of_fresh, &seen_by(camera, &fresh, triangles)));
+    let unseen_ratio = [&unseen, &of_fresh].map(|unseen| share_of_ways(unseen));
+    Some(Choice { cameras: sized(&cameras, &of_chosen, &deciding), unseen_ratio })
+}
+
+/// Adds to the first images the one that sees most places that none does yet, until the share of ways with an unseen place is
+/// at most `unseen_ratio` or there are `most` images. Gives the images and which places none of them sees.
+fn cover(seen: &[Vec<bool>], first: Vec<usize>, most: usize, unseen_ratio: f32) -> (Vec<usize>, Vec<bool>) {
+    let mut unseen = vec![true; seen[0].len()];
+    let mut chosen = first;
+    chosen.iter().for_each(|&camera| strike(&mut unseen, &seen[camera]));
+    while chosen.len() < most && (chosen.is_empty() || share_of_ways(&unseen) > unseen_ratio) {
+        let new = |camera: &usize| seen[*camera].iter().zip(&unseen).filter(|(seen, is)| **seen && **is).count();
+        // Of equals the first.
+        let best = (0..seen.len()).rev().max_by_key(new).filter(|best| new(best) > 0);
+        let Some(best) = best else { break };
+        strike(&mut unseen, &seen[best]);
+        chosen.push(best);
+    }
+    (chosen, unseen)
+}
+
+fn strike(unseen: &mut [bool], seen: &[bool]) {
+    unseen.iter_mut().zip(seen).for_each(|(unseen, seen)| *unseen &= !seen);
+}
+
+/// The share of ways of which some place is unseen.
+fn share_of_ways(unseen: &[bool]) -> f32 {
+    let ways = unseen.chunks(PLACES);
+    ways.clone().filter(|places| places.contains(&true)).count() as f32 / ways.len().max(1) as f32
+}
+
+/// Images to choose from.
+struct Pool {
+    cameras: Vec<PinholeCamera>,
+    /// Those that are always taken.
+    first: Range<usize>,
+}
+
+/// Images in many directions from five places on a flat mirror, or within another. Narrow ones come first: of equals the denser
+/// one is taken.
+fn pool(group: &Group, middle_of_scene: Vec3, near_m: f32) -> Pool {
+    let (middle, half) = (group.bounds.center(), 0.5 * group.bounds.size());
+    let facing = group.area_normal_m2 / group.area_m2.max(f32::MIN_POSITIVE);
+    let wide = |eye: Vec3, towards: Vec3| looking((eye, near_m), towards, WIDE_DEG, UVec2::splat(SIDE_PX as u32));
+    let face = |eye: Vec3, towards: Vec3| looking((eye, near_m), towards, FACE_DEG, UVec2::splat(SIDE_PX as u32));
+    if facing.length() > FLAT {
+        let facing = facing.normalize_or(Vec3::Y);
+        let right = facing.any_orthonormal_vector();
+        // From the middle to the border of the mirror, which lies in its own plane however it is turned.
+        let [right, up] = [right, facing.cross(right)].map(|axis| axis * half.dot(axis.abs()));
+        let places = places(middle, [right * FLAT_ASIDE, up * FLAT_ASIDE]);
+        let along = [right, -right, up, -up].map(|along| face(middle, along.normalize_or(facing)));
+        return Pool { cameras: places.map(|eye| wide(eye, facing)).into_iter().chain(along).collect(), first: 0..0 };
+    }
+    let aside_m = ASIDE * half.min_element();
+    let axes = Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
+    let towards = (middle_of_scene - middle).normalize_or(Vec3::Z);
+    let from = |towards: Vec3| {
+        let right = towards.any_orthonormal_vector();
+        places(middle, [right * aside_m, right.cross(towards) * aside_m])
+    };
+    let faces = axes.flat_map(|axis| from(axis).map(|eye| face(eye, axis)));
+    let cameras: Vec<PinholeCamera> = faces.chain(from(towards).map(|eye| wide(eye, towards))).collect();
+    // Two from opposite sides: what one sees past an edge, the other sees as well, so that the edge lies where it is.
+    let first = cameras.len() - 4..cameras.len() - 2;
+    Pool { cameras, first }
+}
+
+/// The middle and four corners around it.
+fn places(middle: Vec3, [right, up]: [Vec3; 2]) -> [Vec3; 5] {
+    [middle, middle - right - up, middle + right + up, middle + right - up, middle - right + up]
+}
+
+/// The depth at which an image shows a point if nothing hides it.
+fn depth_m(camera: &PinholeCamera, point: Vec3) -> Option<f32> {
+    camera.project(point).filter(|at| camera.contains(at.pixel)).map(|at| at.planar_depth_m)
+}
+
+/// Of each place of each way.
+fn seen_by(camera: &PinholeCamera, ways: &[Way], triangles: &Triangles) -> Vec<bool> {
+    let sees = |place: Vec3| depth_m(camera, place).is_some() && triangles.is_free(camera.eye_in_world, place);
+    ways.iter().flat_map(|way| way.places().map(sees)).collect()
+}
+
+/// Shares texels by how many surfaces each image shows best: n ∝ h to the power 2/3, which makes the mean side of their
+/// texels least.
+fn sized(cameras: &[PinholeCamera], seen: &[&[bool]], ways: &[Way]) -> Vec<PinholeCamera> {
+    let mut best_in = vec![0usize; cameras.len()];
+    for (number, way) in ways.iter().enumerate().filter(|(_, way)| way.ends_at_surface) {
+        let side_m = |camera: usize| {
+            let depth_m = depth_m(&cameras[camera], way.end()).filter(|_| seen[camera][(number + 1) * PLACES - 1])?;
+            Some((depth_m / cameras[camera].focal_px.min_element(), camera))
+        };
+        if let Some((_, camera)) = (0..cameras.len()).filter_map(side_m).min_by(|a, b| a.0.total_cmp(&b.0)) {
+            best_in[camera] += 1;
+        }
+    }
+    let all = best_in.iter().sum::<usize>().max(1) as f32;
+    let least = LEAST_SHARE / cameras.len() as f32;
+    let texels: Vec<f32> = best_in.iter().map(|&ways| (ways as f32 / all).powf(2.0 / 3.0).max(least)).collect();
+    let most = texels.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+    let sized = |(camera, texels): (&PinholeCamera, &f32)| {
+        camera.resized(UVec2::splat((SIDE_PX * (texels / most).sqrt()).round().max(2.0) as u32))
+    };
+    cameras.iter().zip(&texels).map(sized).collect()
+}

@@ -1,0 +1,225 @@
+//! Mirrors of a scene, and sample cameras for what they show.
+
+mod choice;
+mod groups;
+mod rays;
+
+use depth_image::{Aabb, MAX_MIRROR_CELLS, PinholeCamera, ROUGHEST_MIRROR};
+use glam::{UVec2, Vec3};
+use scene::{Material, Scene, Texture};
+
+use choice::{Choice, choose};
+use groups::{Group, area_m2, for_each_surface, groups};
+use rays::Triangles;
+
+use crate::impostors::Impostors;
+
+/// Boxes are wider than their mirrors on each side, in diagonals: depths of samples have errors.
+const MARGIN: f32 = 0.01;
+/// The field of view of a face of the cube around a mirror's middle: neighbours overlap.
+const FACE_DEG: f32 = 94.0;
+/// The field of view of further images.
+const WIDE_DEG: f32 = 110.0;
+/// The side of the faces around a mirror that moves.
+const FACE_PX: UVec2 = UVec2::splat(128);
+/// Texels of a roughness map that are looked at, along each side.
+const TEXELS: u32 = 64;
+
+/// A group of mirrors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mirror {
+    /// Holds its surfaces at all moments.
+    pub bounds: Aabb,
+    /// For images of what it shows, of sizes in proportion. The mirror itself is not seen from within.
+    pub cameras: Vec<PinholeCamera>,
+    /// The shares of mirrored rays that images do not see all the way: of those by which the images were chosen, and of as many
+    /// others. `None` where the mirror moves or nobody sees it; its images look in all directions.
+    pub unseen_ratio: Option<[f32; 2]>,
+}
+
+/// The mirrors of a scene with the images that are asked for, the largest first, at most [`MAX_MIRROR_CELLS`]; and the number of
+/// those beyond.
+#[must_use]
+pub fn mirrors(scene: &Scene, impostors: Impostors) -> (Vec<Mirror>, usize) {
+    let is_mirror: Vec<bool> = scene.materials.iter().map(|material| mirrors_scene(scene, material)).collect();
+    let Some(bounds) = impostors.bounds().filter(|_| is_mirror.contains(&true)) else {
+        return (Vec::new(), 0);
+    };
+    let of_instances = scene.bounds_of_instances();
+    let volume = Aabb::of_boxes(&of_instances);
+    let mut groups = groups(&volume, |each| for_each_surface(scene, &is_mirror, &of_instances, each));
+    groups.sort_by(|a, b| area_m2(&b.bounds).total_cmp(&area_m2(&a.bounds)));
+    let beyond = groups.split_off(groups.len().min(MAX_MIRROR_CELLS));
+    let triangles = Triangles::of(scene, volume);
+    let mirror = |group: Group| {
+        let near_m = volume.near_m();
+        let around = faces(group.bounds.center(), near_m, FACE_PX);
+        let chosen = (!group.moves).then(|| choose(&group, &triangles, bounds, near_m)).flatten();
+        let unseen_ratio = chosen.as_ref().map(|chosen| chosen.unseen_ratio);
+        let cameras = chosen.map_or(around, |Choice { cameras, .. }| cameras);
+        Mirror { bounds: group.bounds.padded(group.bounds.size().length() * MARGIN), cameras, unseen_ratio }
+    };
+    (groups.into_iter().map(mirror).collect(), beyond.len())
+}
+
+/// Six images in all directions from one place.
+#[must_use]
+pub fn faces(eye_in_world: Vec3, near_m: f32, size_px: UVec2) -> Vec<PinholeCamera> {
+    let directions = Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
+    directions.map(|towards| looking((eye_in_world, near_m), towards, FACE_DEG, size_px)).collect()
+}
+
+/// An image from an eye in a direction. Nothing nearer than `near_m` is seen.
+#[must_use]
+pub fn looking((eye, near_m): (Vec3, f32), towards: Vec3, fov_deg: f32, size_px: UVec2) -> PinholeCamera {
+    let up = if towards.y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y };
+    let camera = PinholeCamera::looking_at(eye, eye + towards, up, fov_deg.to_radians(), size_px);
+    PinholeCamera { near_m, ..camera }
+}
+
+fn mirrors_scene(scene: &Scene, material: &Material) -> bool {
+    let map = material.metallic_roughness_texture.and_then(|map| scene.textures.get(map.texture as usize));
+    material.is_specular() && material.roughness * map.map_or(1.0, least_roughness) < ROUGHEST_MIRROR
+}
+
+/// The least green of texels that are spread over a texture.
+fn least_roughness(texture: &Texture) -> f32 {
+    let [columns, rows] = [texture.width_px, texture.height_px].map(|side| side.clamp(1, TEXELS));
+    let texel = |at: u32| {
+        let x = (at % columns) * texture.width_px / columns;
+        let y = (at / columns) * texture.height_px / rows;
+        texture.srgba8.get(4 * (y * texture.width_px + x) as usize + 1).copied().unwrap_or(u8::MAX)
+    };
+    f32::from((0..columns * rows).map(texel).min().unwrap_or(u8::MAX)) / 255.0
+}
+
+#[cfg(test)]
+mod tests {
+    use scene::{Instance, Limits, MissingTextures, SceneSpec, Wind};
+
+    use super::*;
+
+    fn mirrors(scene: &Scene) -> (Vec<Mirror>, usize) {
+        super::mirrors(scene, Impostors::default())
+    }
+
+    fn scene(name: &str) -> Scene {
+        let spec: SceneSpec = name.parse().expect("a name");
+        spec.load(&Limits::default(), MissingTextures::Refuse).expect("a scene")
+    }
+
+    #[test]
+    fn mirrors_apart_from_each_other_have_a_box_each() {
+        let (pebble, beyond) = mirrors(&scene("teapot-mirror"));
+        assert_eq!((pebble.len(), beyond), (1, 0));
+        let size = pebble[0].bounds.size();
+        assert!((5.0..7.0).contains(&size.x) && (5.0..7.0).contains(&size.y), "{size}");
+        let (pair, beyond) = mirrors(&scene("mirror-pair"));
+        assert_eq!((pair.len(), beyond), (2, 0));
+        assert!(pair.iter().all(|mirror| mirror.bounds.size().x < 0.3), "they are flat");
+        assert!(pair[0].bounds.center().x * pair[1].bounds.center().x < 0.0, "on both sides");
+        assert_eq!(mirrors(&scene("blocks")), (Vec::new(), 0));
+    }
+
+    #[test]
+    fn the_largest_mirrors_are_followed_and_the_others_are_counted() {
+        let mut many = scene("teapot-mirror");
+        let first = many.instances[0];
+        many.instances = (0..11)
+            .map(|number| {
+                let size = 1.0 - 0.05 * number as f32;
+                let place = glam::Affine3A::from_translation(Vec3::X * (30.0 * number as f32));
+                Instance { world_from_mesh: place * glam::Affine3A::from_scale(Vec3::splat(size)), ..first }
+            })
+            .collect();
+        let (followed, beyond) = mirrors(&many);
+        assert_eq!((followed.len(), beyond), (MAX_MIRROR_CELLS, 3));
+        let places: Vec<f32> = followed.iter().map(|mirror| (mirror.bounds.center().x / 30.0).round()).collect();
+        assert_eq!(places, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0], "the largest first");
+    }
+
+    #[test]
+    fn images_of_a_flat_mirror_stand_in_its_plane_and_look_off_it() {
+        let mut turned = scene("mirror-pair");
+        for instance in &mut turned.instances {
+            instance.world_from_mesh = glam::Affine3A::from_rotation_y(0.6) * instance.world_from_mesh;
+        }
+        let across = glam::Quat::from_rotation_y(0.6) * Vec3::X;
+        for mirror in mirrors(&turned).0 {
+            let middle = mirror.bounds.center();
+            let facing = across * -middle.dot(across).signum();
+            for camera in &mirror.cameras {
+                let off_m = (camera.eye_in_world - middle).dot(facing);
+                assert!(off_m.abs() < 0.01, "{off_m} m off its plane");
+                assert!(camera.near_m < 0.02 && mirror.bounds.grown_to(camera.eye_in_world) == mirror.bounds);
+                assert!(camera.forward_in_world().dot(facing) > -0.01, "towards the other mirror");
+            }
+        }
+    }
+
+    #[test]
+    fn few_images_see_what_rays_off_a_mirror_meet() {
+        for name in ["teapot-mirror", "mirror-pair"] {
+            for mirror in mirrors(&scene(name)).0 {
+                let [chosen, fresh] = mirror.unseen_ratio.expect("it stands still");
+                println!("{name}: {} images leave {chosen}, of fresh rays {fresh}", mirror.cameras.len());
+                assert!((1..=8).contains(&mirror.cameras.len()) && chosen <= 0.02, "{name}: {chosen}");
+                assert!((fresh - chosen).abs() < 0.01, "{name}: {fresh}, promised {chosen}");
+            }
+        }
+    }
+
+    #[test]
+    fn images_are_as_many_as_asked_for() {
+        let teapot = scene("teapot-mirror");
+        assert_eq!(super::mirrors(&teapot, Impostors::None), (Vec::new(), 0));
+        let unseen = [1, 2, 4, 8].map(|images| {
+            let mirror = super::mirrors(&teapot, Impostors::Pinholes(images)).0.remove(0);
+            // An image that sees nothing new is left out.
+            assert!(mirror.cameras.len() == images as usize || images == 8);
+            mirror.unseen_ratio.expect("it stands still")[0]
+        });
+        println!("unseen by 1, 2, 4 and 8 images: {unseen:?}");
+        assert!(unseen.is_sorted_by(|a, b| a >= b) && unseen[0] > 0.2, "{unseen:?}");
+    }
+
+    #[test]
+    fn a_mirror_that_moves_has_images_in_all_directions() {
+        let mut moving = scene("teapot-mirror");
+        moving.wind =
+            Some(Wind { direction_in_world: Vec3::X, amplitude_m: 0.1, frequency_hz: 1.0, waves_per_m: Vec3::ZERO });
+        for vertex in moving.meshes.iter_mut().flat_map(|mesh| &mut mesh.vertices) {
+            vertex.sway = 0.1;
+        }
+        let mirror = mirrors(&moving).0.remove(0);
+        assert_eq!((mirror.unseen_ratio, mirror.cameras.len()), (None, 6));
+    }
+
+    #[test]
+    fn six_faces_see_every_direction() {
+        let cameras = faces(Vec3::new(1.0, 2.0, 3.0), 0.01, UVec2::splat(64));
+        let directions = (0..500).map(|i| {
+            let y = 1.0 - 2.0 * (i as f32 + 0.5) / 500.0;
+            let (sin, cos) = (i as f32 * 2.4).sin_cos();
+            Vec3::new(sin, 0.0, cos) * (1.0 - y * y).sqrt() + Vec3::Y * y
+        });
+        for direction in directions {
+            let point = Vec3::new(1.0, 2.0, 3.0) + direction * 5.0;
+            let sees = |camera: &&PinholeCamera| camera.project(point).is_some_and(|at| camera.contains(at.pixel));
+            assert!(cameras.iter().any(|camera| sees(&camera)), "{direction}");
+        }
+    }
+
+    #[test]
+    fn a_material_mirrors_where_its_roughness_map_is_smooth() {
+        let mut textured = scene("blocks");
+        let texels = [[0, 200, 0, 255]; 16].as_flattened().to_vec();
+        textured.textures.push(Texture { width_px: 4, height_px: 4, is_srgb: false, srgba8: texels });
+        let map = (textured.textures.len() as u32 - 1).into();
+        textured.materials[0].metallic_roughness_texture = Some(map);
+        textured.materials[0].roughness = 1.0;
+        assert_eq!(mirrors(&textured).0, []);
+        textured.textures.last_mut().expect("a texture").srgba8[4 * 5 + 1] = 20;
+        assert!(!mirrors(&textured).0.is_empty());
+    }
+}
