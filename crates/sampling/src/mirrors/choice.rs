@@ -5,9 +5,9 @@ use std::ops::Range;
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
 
+use super::directions::{FACE_DEG, WIDE_DEG, looking};
 use super::groups::Group;
 use super::rays::{PLACES, Triangles, Way};
-use super::{FACE_DEG, WIDE_DEG, looking};
 
 /// A mirror whose normals have a mean of this length is flat.
 const FLAT: f32 = 0.9;

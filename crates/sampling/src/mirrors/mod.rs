@@ -1,14 +1,16 @@
 //! Mirrors of a scene, and sample cameras for what they show.
 
 mod choice;
+mod directions;
 mod groups;
 mod rays;
 
 use depth_image::{Aabb, MAX_MIRROR_CELLS, PinholeCamera, ROUGHEST_MIRROR};
-use glam::{UVec2, Vec3};
+use glam::UVec2;
 use scene::{Material, Scene, Texture};
 
 use choice::{Choice, choose};
+pub use directions::{faces, looking};
 use groups::{Group, area_m2, for_each_surface, groups};
 use rays::Triangles;
 
@@ -16,10 +18,6 @@ use crate::impostors::Impostors;
 
 /// Boxes are wider than their mirrors on each side, in diagonals: depths of samples have errors.
 const MARGIN: f32 = 0.01;
-/// The field of view of a face of the cube around a mirror's middle: neighbours overlap.
-const FACE_DEG: f32 = 94.0;
-/// The field of view of further images.
-const WIDE_DEG: f32 = 110.0;
 /// The side of the faces around a mirror that moves.
 const FACE_PX: UVec2 = UVec2::splat(128);
 /// Texels of a roughness map that are looked at, along each side.
@@ -62,21 +60,6 @@ pub fn mirrors(scene: &Scene, impostors: Impostors) -> (Vec<Mirror>, usize) {
     (groups.into_iter().map(mirror).collect(), beyond.len())
 }
 
-/// Six images in all directions from one place.
-#[must_use]
-pub fn faces(eye_in_world: Vec3, near_m: f32, size_px: UVec2) -> Vec<PinholeCamera> {
-    let directions = Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
-    directions.map(|towards| looking((eye_in_world, near_m), towards, FACE_DEG, size_px)).collect()
-}
-
-/// An image from an eye in a direction. Nothing nearer than `near_m` is seen.
-#[must_use]
-pub fn looking((eye, near_m): (Vec3, f32), towards: Vec3, fov_deg: f32, size_px: UVec2) -> PinholeCamera {
-    let up = if towards.y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y };
-    let camera = PinholeCamera::looking_at(eye, eye + towards, up, fov_deg.to_radians(), size_px);
-    PinholeCamera { near_m, ..camera }
-}
-
 fn mirrors_scene(scene: &Scene, material: &Material) -> bool {
     let map = material.metallic_roughness_texture.and_then(|map| scene.textures.get(map.texture as usize));
     material.is_specular() && material.roughness * map.map_or(1.0, least_roughness) < ROUGHEST_MIRROR
@@ -95,6 +78,7 @@ fn least_roughness(texture: &Texture) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
     use scene::{Instance, Limits, MissingTextures, SceneSpec, Wind};
 
     use super::*;
