@@ -124,33 +124,28 @@ fn places(middle: Vec3, [right, up]: [Vec3; 2]) -> [Vec3; 5] {
     [middle, middle - right - up, middle + right + up, middle + right - up, middle - right + up]
 }
 
-/// The depth at which an image shows a point if nothing hides it.
-fn depth_m(camera: &PinholeCamera, point: Vec3) -> Option<f32> {
-    camera.project(point).filter(|at| camera.contains(at.pixel)).map(|at| at.planar_depth_m)
+fn is_within(camera: &PinholeCamera, point: Vec3) -> bool {
+    camera.project(point).is_some_and(|at| camera.contains(at.pixel))
 }
 
 /// Of each place of each way.
 fn seen_by(camera: &PinholeCamera, ways: &[Way], triangles: &Triangles) -> Vec<bool> {
-    let sees = |place: Vec3| depth_m(camera, place).is_some() && triangles.is_free(camera.eye_in_world, place);
+    let sees = |place: Vec3| is_within(camera, place) && triangles.is_free(camera.eye_in_world, place);
     ways.iter().flat_map(|way| way.places().map(sees)).collect()
 }
 
-/// Shares texels by how many surfaces each image shows best: n ∝ h to the power 2/3, which makes the mean side of their
-/// texels least.
+/// Shares texels by how many ends at surfaces each image shows, together with others or alone: n ∝ h to the power 2/3, which
+/// makes the mean side of their texels least.
 fn sized(cameras: &[PinholeCamera], seen: &[&[bool]], ways: &[Way]) -> Vec<PinholeCamera> {
-    let mut best_in = vec![0usize; cameras.len()];
-    for (number, way) in ways.iter().enumerate().filter(|(_, way)| way.ends_at_surface) {
-        let side_m = |camera: usize| {
-            let depth_m = depth_m(&cameras[camera], way.end()).filter(|_| seen[camera][(number + 1) * PLACES - 1])?;
-            Some((depth_m / cameras[camera].focal_px.min_element(), camera))
-        };
-        if let Some((_, camera)) = (0..cameras.len()).filter_map(side_m).min_by(|a, b| a.0.total_cmp(&b.0)) {
-            best_in[camera] += 1;
-        }
+    let mut shown = vec![0.0; cameras.len()];
+    for (number, _) in ways.iter().enumerate().filter(|(_, way)| way.ends_at_surface) {
+        let shows = |camera: &usize| seen[*camera][(number + 1) * PLACES - 1];
+        let of = (0..cameras.len()).filter(shows).count() as f32;
+        (0..cameras.len()).filter(shows).for_each(|camera| shown[camera] += 1.0 / of);
     }
-    let all = best_in.iter().sum::<usize>().max(1) as f32;
+    let all = shown.iter().sum::<f32>().max(1.0);
     let least = LEAST_SHARE / cameras.len() as f32;
-    let texels: Vec<f32> = best_in.iter().map(|&ways| (ways as f32 / all).powf(2.0 / 3.0).max(least)).collect();
+    let texels: Vec<f32> = shown.iter().map(|shown| (shown / all).powf(2.0 / 3.0).max(least)).collect();
     let most = texels.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
     let sized = |(camera, texels): (&PinholeCamera, &f32)| {
         camera.resized(UVec2::splat((SIDE_PX * (texels / most).sqrt()).round().max(2.0) as u32))

@@ -39,10 +39,6 @@ pub(super) struct Way {
 }
 
 impl Way {
-    pub fn end(&self) -> Vec3 {
-        self.origin_in_world + self.to_end
-    }
-
     /// Places along the way that must be seen to be free, and its end.
     pub fn places(&self) -> impl Iterator<Item = Vec3> {
         (1..=PLACES).map(|place| self.origin_in_world + self.to_end * (place as f32 / PLACES as f32))
