@@ -107,8 +107,12 @@ fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<(MirrorCell, Vec<Pinho
         tracing::info!(beyond, followed = mirrors.len(), "the smallest mirrors show the environment alone");
     }
     for mirror in &mirrors {
-        let (images, [chosen, fresh]) = (mirror.cameras.len(), mirror.unseen_ratio.unwrap_or([f32::NAN; 2]));
-        tracing::info!(images, unseen_ratio = chosen, unseen_ratio_of_other_rays = fresh, "a mirror's surroundings");
+        let images = mirror.cameras.len();
+        let of = |ratio: f32| format!("{:.1} %", ratio * 100.0);
+        match mirror.unseen_ratio.map(|ratios| ratios.map(of)) {
+            Some([unseen, checked]) => tracing::info!(images, %unseen, %checked, "a mirror's surroundings"),
+            None => tracing::info!(images, "a mirror's surroundings, in all directions"),
+        }
     }
     let sampling = SamplingMethod::default().to_string();
     let cell = |mirror: Mirror| (MirrorCell { bounds: mirror.bounds, sampling: sampling.clone() }, mirror.cameras);
