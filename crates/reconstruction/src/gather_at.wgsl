@@ -1,5 +1,5 @@
 {# Statements: the samples `around` point_in_world in the nearest camera of `origin`, and that `camera`. #}
-{%- include "nearest_at.wgsl" %}
+{% include "nearest_at.wgsl" %}
     let cell = vec2u(uv);
     let at = uv - floor(uv);
     let cell_index = camera.first_cell + cell.y * camera.width_px + cell.x;

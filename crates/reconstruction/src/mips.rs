@@ -21,8 +21,8 @@ pub(crate) fn mip_texels(size_px: UVec2) -> usize {
 }
 
 /// The colours of all levels, the finest first, row by row, as RGB9E5, and the sizes of levels. A texel is the mean over the
-/// samples of its square that show a surface. Where none does, it has the colour of the coarser texel around it:
-/// interpolation meets no black.
+/// samples of its square that show a surface. Where none does, it has the colour of the coarser texel around it, and on the
+/// coarsest level the mean of all: interpolation meets no black.
 pub(crate) fn mips(image: &DepthImage) -> Vec<(UVec2, Vec<u32>)> {
     let own = Level::of(image);
     let mut levels: Vec<Level> = Vec::new();
@@ -67,6 +67,14 @@ impl Level {
 }
 
 fn fill_from_coarser(levels: &mut [Level]) {
+    if let Some(coarsest) = levels.last_mut() {
+        let (sum, shares) = coarsest
+            .means
+            .iter()
+            .fold((Vec3::ZERO, 0.0), |(sum, shares), (color, share)| (sum + *color * *share, shares + *share));
+        let mean = sum / f32::max(shares, f32::MIN_POSITIVE);
+        coarsest.means.iter_mut().filter(|(_, share)| *share == 0.0).for_each(|(color, _)| *color = mean);
+    }
     for number in (1..levels.len()).rev() {
         let (finer, coarser) = levels.split_at_mut(number);
         let (finer, coarser) = (&mut finer[number - 1], &coarser[0]);
@@ -129,11 +137,11 @@ mod tests {
         }
     }
 
-    /// The left part has no surface, and a texel of its border one sample in two.
+    /// The left half has no surface, on no level.
     #[test]
     fn what_shows_no_surface_adds_no_light() {
         let red = Vec3::new(0.75, 0.0, 0.0);
-        let levels = mips(&image(UVec2::splat(16), |at| (at.x >= 7).then_some(red)));
+        let levels = mips(&image(UVec2::splat(16), |at| (at.x >= 8).then_some(red)));
         assert!(levels.iter().flat_map(|(_, colors)| colors).all(|&color| linear_from_rgb9e5(color) == red));
     }
 }

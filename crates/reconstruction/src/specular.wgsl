@@ -49,7 +49,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let mirror = Mirror(point_in_world, around.normal, towards_eye, unpack_reflector(around.reflector));
     let open = {{ "unpack4x8unorm(around.visibility[0]).x" if visibility_words > 0 else "1.0" }};
     let side_m = 1.0 / (inverse_depth[index] * work.view.focal_px);
-    let curvature = select(0.0, curvature_at(camera, cell_index, 1.0 / (inverse_w * camera.focal_px)), corners.connected);
+    let curvature = select(0.0, curvature_at(camera, cell_index, point_in_world, 1.0 / (inverse_w * camera.focal_px)), corners.connected);
     // Each of several positions within a pixel has a part of its footprint.
     let width_m = side_m * sqrt(work.position_share);
     let cone = cone_off(Cone(width_m, width_m / distance(point_in_world, work.view.eye_in_world)), curvature);

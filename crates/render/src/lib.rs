@@ -48,7 +48,7 @@ pub use error::RenderError;
 pub use gpu_scene::GpuScene;
 pub use known_samples::{TemporalReference, view_cell_m};
 pub use lighting::{Direct, Lighting, MAX_RAYS, Occlusion, Rate, UnknownLighting};
-pub use rays::AccelerationReport;
+pub use rays::{AccelerationReport, host_tree};
 pub use redundancy_test::{Evidence, RedundancyTest};
 pub use renderer::Renderer;
 pub use shaders::{SHADERS, shader_sources, templates};

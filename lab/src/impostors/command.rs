@@ -57,6 +57,7 @@ pub struct ImpostorsArgs {
 /// The scene cannot be used or has no mirrors, the device fails, or the folder cannot be written.
 pub fn run(args: &ImpostorsArgs) -> anyhow::Result<Outcome> {
     let scene = args.scene.load(&Limits::default(), MissingTextures::Refuse)?;
+    anyhow::ensure!(args.impostors != Impostors::None, "--impostors none leaves no images to measure");
     let (mirrors, _) = sampling::mirrors(&scene, args.impostors);
     anyhow::ensure!(!mirrors.is_empty(), "{} has no mirrors", args.scene);
     let engine = GpuEngine::shared(args.device.device)?;

@@ -69,6 +69,8 @@ pub fn measure(hall: &Hall<'_>, mirrors: &[Mirror]) -> anyhow::Result<Costs> {
         let of_mirrors = of_mirrors.iter().map(|images| hall.set(images, true));
         Ok((hall.set(&images, true)?, of_mirrors.collect::<anyhow::Result<_>>()?))
     };
+    // A cluster's later sets reuse the memory of earlier ones.
+    load()?;
     let ((set, sets), load_s) = timed(load)?;
     let cells = cells(&bounds, &sets);
     let view_s = |reflections| -> anyhow::Result<f64> {

@@ -35,7 +35,11 @@ fn landed(index: u32, ray: MirroredRay, origin: u32) -> vec3f {
     let way_m = 1.0 / inverse_depth[index];
     let point_in_world = ray.origin_in_world + ray.direction * way_m;
     let width_m = ray.width_m + ray.spread * way_m;
-{% include "gather_at.wgsl" if reflects else "nearest_at.wgsl" %}
+{% if reflects %}
+{% include "gather_at.wgsl" %}
+{% else %}
+{% include "nearest_at.wgsl" %}
+{% endif %}
     let side_m = 1.0 / (inverse_w * camera.focal_px);
     let color = filtered(camera, linear_from_rgb9e5(ray_color[index]), uv + 0.5, abs(width_m) / side_m);
     var shown = color * throughput;
@@ -46,7 +50,7 @@ fn landed(index: u32, ray: MirroredRay, origin: u32) -> vec3f {
 {% if mirrors %}
         let mirror = Mirror(point_in_world, around.normal, -ray.direction, unpack_reflector(around.reflector));
         let open = {{ "unpack4x8unorm(around.visibility[0]).x" if visibility_words > 0 else "1.0" }};
-        let curvature = select(0.0, curvature_at(camera, cell_index, side_m), corners.connected);
+        let curvature = select(0.0, curvature_at(camera, cell_index, point_in_world, side_m), corners.connected);
         shown += bounce_off(mirror, ray.pixel, throughput_linear, open, side_m, cone_off(Cone(width_m, ray.spread), curvature));
 {% endif %}
     }

@@ -27,6 +27,8 @@ pub(crate) const BOUNCE_LEVEL: u32 = 6;
 pub(crate) const MARCH_ROUNDS: u32 = 2;
 /// A ray that got to the end of its way but for this share has ended.
 pub(crate) const LEAST_WAY: f32 = 1e-5;
+/// The cosine between the normals of neighbouring samples below which an edge of the mirror runs between them.
+pub(crate) const EDGE_COSINE: f32 = 0.7;
 /// Moves of a mirrored ray after its marches.
 pub(crate) const MAX_BOUNCE_MOVES: u32 = 96;
 
@@ -251,6 +253,7 @@ impl ShaderVariant for Land {
 
     fn context(&self) -> Value {
         context! {
+            finest => true,
             highlight => highlight_name(Highlight::Ggx),
             mirrors => self.next_cells.is_some(),
             mirror_cells => self.next_cells.unwrap_or(0),

@@ -28,18 +28,28 @@ fn mirror_cell_at(point_in_world: vec3f) -> u32 {
     return found;
 }
 
-// The mean curvature of a mirror in metres⁻¹, positive where convex: how much its normal turns along the image's own axes from
-// sample to sample. Slanting does not count, which lengthens the way and shows less of the turn.
-fn curvature_at(camera: SampleCamera, cell_index: u32, side_m: f32) -> f32 {
+// The mean curvature of a mirror in metres⁻¹, positive where convex: how much its normal turns from sample to sample, across the
+// line of sight. Slanting does not count, which lengthens the way along it alone. Normals far apart are an edge, which counts
+// as flat.
+fn curvature_at(camera: SampleCamera, cell_index: u32, point_in_world: vec3f, side_m: f32) -> f32 {
+    let sight = unit_or_zero(point_in_world - camera.eye_in_world);
+    let normal = unit_from_oct16(sample_texel(cell_index, 0u).x);
+    let beside = unit_from_oct16(sample_texel(cell_index + 1u, 0u).x);
+    let below = unit_from_oct16(sample_texel(cell_index + camera.width_px, 0u).x);
     let forward = camera.homogeneous_pixel_from_world[2].xyz;
     let column = camera.homogeneous_pixel_from_world[0].xyz;
     let row = camera.homogeneous_pixel_from_world[1].xyz;
-    let normal = unit_from_oct16(sample_texel(cell_index, 0u).x);
-    let across = unit_from_oct16(sample_texel(cell_index + 1u, 0u).x) - normal;
-    let down = unit_from_oct16(sample_texel(cell_index + camera.width_px, 0u).x) - normal;
-    let right = unit_or_zero(column - forward * dot(column, forward));
-    let under = unit_or_zero(row - forward * dot(row, forward));
-    return 0.5 * (dot(across, right) + dot(down, under)) / side_m;
+    let turn = turn_across(beside - normal, column - forward * dot(column, forward), sight)
+        + turn_across(below - normal, row - forward * dot(row, forward), sight);
+    let is_smooth = min(dot(normal, beside), dot(normal, below)) > EDGE_COSINE;
+    return select(0.0, 0.5 * turn / side_m, is_smooth);
+}
+
+// The turn along an image axis, of which only the part across the line of sight is seen.
+fn turn_across(turn: vec3f, along: vec3f, sight: vec3f) -> f32 {
+    let axis = unit_or_zero(along);
+    let across = axis - sight * dot(axis, sight);
+    return dot(turn, across) / max(dot(across, across), 1e-6);
 }
 
 // A pixel's footprint on a mirror: its side, and what that grows by in a metre (Akenine-Möller et al. 2019).
@@ -50,7 +60,8 @@ fn cone_off(before: Cone, curvature: f32) -> Cone {
 }
 
 // Lists the ray off a mirror. Gives what the mirror shows of the environment where no cell knows its surroundings.
-// `open` is the share of the environment that reaches the mirror; `side_m` is that of a sample.
+// `open` is the share of the environment that reaches the mirror; `side_m` is a pixel's of the picture that shows the mirror,
+// above which the ray begins.
 fn bounce_off(mirror: Mirror, pixel: u32, throughput_linear: vec3f, open: f32, side_m: f32, cone: Cone) -> vec3f {
     let share = mirror_share(mirror.reflector.roughness);
     let towards = reflect(-mirror.towards_eye, mirror.normal);

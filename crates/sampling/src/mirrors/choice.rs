@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
+use rayon::prelude::*;
 
 use super::directions::{FACE_DEG, WIDE_DEG, looking};
 use super::groups::Group;
@@ -14,6 +15,10 @@ const FLAT: f32 = 0.9;
 /// How far images lie from a flat mirror's middle, in half widths, and from another's.
 const FLAT_ASIDE: f32 = 0.5;
 const ASIDE: f32 = 0.6;
+/// The middle and four corners.
+const PLACES_OF_EYES: usize = 5;
+/// Fewer rays do not choose.
+const LEAST_RAYS: usize = 512;
 /// So many images or more begin with those that are always taken.
 const LEAST_FOR_FIRST: usize = 4;
 /// The side of the image that shows most ends of rays best; sizes are in proportion.
@@ -25,34 +30,39 @@ const LEAST_SHARE: f32 = 1.0 / 16.0;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Choice {
     pub cameras: Vec<PinholeCamera>,
-    /// Of the rays by which they were chosen, and of as many others.
-    pub unseen_ratio: [f32; 2],
+    /// Of the rays by which they were chosen, and of as many others. `None` where rays did not choose.
+    pub unseen_ratio: Option<[f32; 2]>,
 }
 
-/// Chooses by the rays off half of the mirror's points; the others tell how good the choice is. `None` where no eye sees a point.
+/// Chooses by the rays off half of the mirror's points; the others tell how good the choice is. Where few eyes see the mirror, or
+/// where the scene has no tree for rays, the usual images are taken.
 pub(super) fn choose(
     group: &Group,
-    triangles: &Triangles,
+    triangles: Option<&Triangles>,
     (most, unseen_ratio): (usize, f32),
-    near_m: f32,
-) -> Option<Choice> {
+    (middle_of_scene, near_m): (Vec3, f32),
+) -> Choice {
+    let pool = pool(group, middle_of_scene, near_m);
     let [deciding, fresh] = [0, 1].map(|first| {
         let points = group.points.iter().enumerate().skip(first).step_by(2);
-        points.filter_map(|(number, point)| triangles.way(point, number)).collect::<Vec<Way>>()
+        let way = |(number, point)| triangles?.way(point, number);
+        points.filter_map(way).collect::<Vec<Way>>()
     });
-    if deciding.is_empty() {
-        return None;
-    }
-    let pool = pool(group, triangles.volume.center(), near_m);
-    let seen: Vec<Vec<bool>> = pool.cameras.iter().map(|camera| seen_by(camera, &deciding, triangles)).collect();
+    let Some(triangles) = triangles.filter(|_| deciding.len().min(fresh.len()) >= LEAST_RAYS) else {
+        return pool.usual(most);
+    };
+    let seen: Vec<Vec<bool>> = pool.cameras.par_iter().map(|camera| seen_by(camera, &deciding, triangles)).collect();
     let first = if most >= LEAST_FOR_FIRST { pool.first.clone().collect() } else { Vec::new() };
     let (chosen, unseen) = cover(&seen, first, most, unseen_ratio);
+    if chosen.is_empty() {
+        return pool.usual(most);
+    }
     let cameras: Vec<PinholeCamera> = chosen.iter().map(|&camera| pool.cameras[camera]).collect();
     let of_chosen: Vec<&[bool]> = chosen.iter().map(|&camera| seen[camera].as_slice()).collect();
     let mut of_fresh = vec![true; fresh.len() * PLACES];
     cameras.iter().for_each(|camera| strike(&mut of_fresh, &seen_by(camera, &fresh, triangles)));
-    let unseen_ratio = [&unseen, &of_fresh].map(|unseen| share_of_ways(unseen));
-    Some(Choice { cameras: sized(&cameras, &of_chosen, &deciding), unseen_ratio })
+    let unseen_ratio = Some([&unseen, &of_fresh].map(|unseen| share_of_ways(unseen)));
+    Choice { cameras: sized(&cameras, &of_chosen, &deciding), unseen_ratio }
 }
 
 /// Adds to the first images the one that sees most places that none does yet, until the share of ways with an unseen place is
@@ -87,13 +97,22 @@ struct Pool {
     cameras: Vec<PinholeCamera>,
     /// Those that are always taken.
     first: Range<usize>,
+    /// Those that are taken where rays do not choose.
+    usual: Vec<usize>,
+}
+
+impl Pool {
+    fn usual(&self, most: usize) -> Choice {
+        let cameras = self.usual.iter().take(most).map(|&camera| self.cameras[camera]).collect();
+        Choice { cameras, unseen_ratio: None }
+    }
 }
 
 /// Images in many directions from five places on a flat mirror, or within another. Narrow ones come first: of equals the denser
 /// one is taken.
 fn pool(group: &Group, middle_of_scene: Vec3, near_m: f32) -> Pool {
     let (middle, half) = (group.bounds.center(), 0.5 * group.bounds.size());
-    let facing = group.area_normal_m2 / group.area_m2.max(f32::MIN_POSITIVE);
+    let facing = group.area_normal_m2 / (group.area_m2 as f32).max(f32::MIN_POSITIVE);
     let wide = |eye: Vec3, towards: Vec3| looking((eye, near_m), towards, WIDE_DEG, UVec2::splat(SIDE_PX as u32));
     let face = |eye: Vec3, towards: Vec3| looking((eye, near_m), towards, FACE_DEG, UVec2::splat(SIDE_PX as u32));
     if facing.length() > FLAT {
@@ -103,7 +122,8 @@ fn pool(group: &Group, middle_of_scene: Vec3, near_m: f32) -> Pool {
         let [right, up] = [right, facing.cross(right)].map(|axis| axis * half.dot(axis.abs()));
         let places = places(middle, [right * FLAT_ASIDE, up * FLAT_ASIDE]);
         let along = [right, -right, up, -up].map(|along| face(middle, along.normalize_or(facing)));
-        return Pool { cameras: places.map(|eye| wide(eye, facing)).into_iter().chain(along).collect(), first: 0..0 };
+        let cameras: Vec<PinholeCamera> = places.map(|eye| wide(eye, facing)).into_iter().chain(along).collect();
+        return Pool { usual: (1..cameras.len()).collect(), cameras, first: 0..0 };
     }
     let aside_m = ASIDE * half.min_element();
     let axes = Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
@@ -116,11 +136,13 @@ fn pool(group: &Group, middle_of_scene: Vec3, near_m: f32) -> Pool {
     let cameras: Vec<PinholeCamera> = faces.chain(from(towards).map(|eye| wide(eye, towards))).collect();
     // Two from opposite sides: what one sees past an edge, the other sees as well, so that the edge lies where it is.
     let first = cameras.len() - 4..cameras.len() - 2;
-    Pool { cameras, first }
+    // From the middle to all sides, and these two.
+    let usual = (0..6).map(|axis| axis * PLACES_OF_EYES).chain(first.clone()).collect();
+    Pool { cameras, first, usual }
 }
 
 /// The middle and four corners around it.
-fn places(middle: Vec3, [right, up]: [Vec3; 2]) -> [Vec3; 5] {
+fn places(middle: Vec3, [right, up]: [Vec3; 2]) -> [Vec3; PLACES_OF_EYES] {
     [middle, middle - right - up, middle + right + up, middle + right - up, middle - right + up]
 }
 
@@ -143,9 +165,9 @@ fn sized(cameras: &[PinholeCamera], seen: &[&[bool]], ways: &[Way]) -> Vec<Pinho
         let of = (0..cameras.len()).filter(shows).count() as f32;
         (0..cameras.len()).filter(shows).for_each(|camera| shown[camera] += 1.0 / of);
     }
-    let all = shown.iter().sum::<f32>().max(1.0);
-    let least = LEAST_SHARE / cameras.len() as f32;
-    let texels: Vec<f32> = shown.iter().map(|shown| (shown / all).powf(2.0 / 3.0).max(least)).collect();
+    let wanted: Vec<f32> = shown.iter().map(|shown| shown.powf(2.0 / 3.0)).collect();
+    let least = LEAST_SHARE * wanted.iter().sum::<f32>() / cameras.len() as f32;
+    let texels: Vec<f32> = wanted.iter().map(|texels| texels.max(least)).collect();
     let most = texels.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
     let sized = |(camera, texels): (&PinholeCamera, &f32)| {
         camera.resized(UVec2::splat((SIDE_PX * (texels / most).sqrt()).round().max(2.0) as u32))

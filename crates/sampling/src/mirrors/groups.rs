@@ -17,8 +17,8 @@ const POINTS: usize = 8192;
 /// A mirroring surface.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Surface {
-    /// A triangle that stands still, by its corners.
-    Triangle([Vec3; 3]),
+    /// A triangle that stands still, by its corners; whether its back mirrors, too.
+    Triangle([Vec3; 3], bool),
     /// The box of an instance that moves, over all moments.
     Moving(Aabb),
 }
@@ -26,7 +26,7 @@ pub(super) enum Surface {
 impl Surface {
     fn center(&self) -> Vec3 {
         match self {
-            Self::Triangle([a, b, c]) => (a + b + c) / 3.0,
+            Self::Triangle([a, b, c], _) => (a + b + c) / 3.0,
             Self::Moving(bounds) => bounds.center(),
         }
     }
@@ -56,9 +56,10 @@ pub(super) fn for_each_surface(
             instance.world_from_mesh.transform_point3(Vec3::from(mesh.vertices[*index as usize].position))
         };
         for part in parts {
+            let double_sided = scene.materials[part.material as usize].double_sided;
             let indices = &mesh.indices[part.first_index as usize..][..part.index_count as usize];
             let triangles = indices.as_chunks::<3>().0.iter();
-            triangles.for_each(|triangle| each(Surface::Triangle(triangle.each_ref().map(corner))));
+            triangles.for_each(|triangle| each(Surface::Triangle(triangle.each_ref().map(corner), double_sided)));
         }
     }
 }
@@ -67,7 +68,7 @@ pub(super) fn for_each_surface(
 #[derive(Debug, Clone)]
 pub(super) struct Group {
     pub bounds: Aabb,
-    pub area_m2: f32,
+    pub area_m2: f64,
     /// The sum of the triangles' normals, each as long as the triangle's area.
     pub area_normal_m2: Vec3,
     /// Some part of it moves.
@@ -82,15 +83,15 @@ impl Group {
 
     fn add(&mut self, surface: Surface) {
         let bounds = match surface {
-            Surface::Triangle([a, b, c]) => {
+            Surface::Triangle([a, b, c], _) => {
                 let area_normal_m2 = 0.5 * (b - a).cross(c - a);
                 self.area_normal_m2 += area_normal_m2;
-                self.area_m2 += area_normal_m2.length();
+                self.area_m2 += f64::from(area_normal_m2.length());
                 Aabb::around([a, b, c])
             }
             Surface::Moving(bounds) => {
                 self.moves = true;
-                self.area_m2 += area_m2(&bounds);
+                self.area_m2 += f64::from(area_m2(&bounds));
                 bounds
             }
         };
@@ -98,16 +99,17 @@ impl Group {
     }
 
     /// Adds the points of a triangle: one for each step of area that ends in it. `passed_m2` is the area before it.
-    fn spread(&mut self, [a, b, c]: [Vec3; 3], passed_m2: &mut f64) {
+    fn spread(&mut self, [a, b, c]: [Vec3; 3], double_sided: bool, passed_m2: &mut f64) {
         let area_normal_m2 = 0.5 * (b - a).cross(c - a);
-        let step_m2 = f64::from(self.area_m2) / POINTS as f64;
+        let step_m2 = self.area_m2 / POINTS as f64;
         *passed_m2 += f64::from(area_normal_m2.length());
         while self.points.len() < POINTS && *passed_m2 > (self.points.len() as f64 + 0.5) * step_m2 {
             // Folded into the triangle.
             let [u, v] = spread_2d(self.points.len());
             let [u, v] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
             let normal = area_normal_m2.normalize_or(Vec3::Y);
-            self.points.push(SurfacePoint { point_in_world: a + (b - a) * u + (c - a) * v, normal });
+            let point_in_world = a + (b - a) * u + (c - a) * v;
+            self.points.push(SurfacePoint { point_in_world, normal, double_sided });
         }
     }
 }
@@ -117,6 +119,8 @@ impl Group {
 pub(super) struct SurfacePoint {
     pub point_in_world: Vec3,
     pub normal: Vec3,
+    /// Its back mirrors, too.
+    pub double_sided: bool,
 }
 
 /// Evenly spread numbers from 0 to 1 in pairs (Roberts 2018, R2).
@@ -124,29 +128,36 @@ pub(super) fn spread_2d(number: usize) -> [f32; 2] {
     [0.754_877_666, 0.569_840_296].map(|step: f64| ((number as f64 + 0.5) * step).fract() as f32)
 }
 
-/// The groups of surfaces. `for_each` gives each surface to a function; it is called three times, so that none is kept.
-pub(super) fn groups(volume: &Aabb, for_each: impl Fn(&mut dyn FnMut(Surface))) -> Vec<Group> {
+/// The largest groups of surfaces, at most `most`, and the number of those beyond. `for_each` gives each surface to a function; it
+/// is called three times, so that none is kept.
+pub(super) fn groups(volume: &Aabb, most: usize, for_each: impl Fn(&mut dyn FnMut(Surface))) -> (Vec<Group>, usize) {
     let mut grid = Grid::over(volume);
     for_each(&mut |surface| match surface {
-        Surface::Triangle(corners) => grid.occupy_triangle(corners, SPLITS),
+        Surface::Triangle(corners, _) => grid.occupy_triangle(corners, SPLITS),
         Surface::Moving(bounds) => grid.occupy(&bounds),
     });
     let mut groups = Vec::new();
     for_each(&mut |surface| {
         let number = grid.group_at(surface.center(), groups.len());
         if number == groups.len() {
-            groups.push(Group::NONE);
+            groups.push((number, Group::NONE));
         }
-        groups[number].add(surface);
+        groups[number].1.add(surface);
     });
-    let mut passed_m2 = vec![0.0; groups.len()];
+    let mut place_of = vec![None; groups.len()];
+    groups.sort_by(|(_, a), (_, b)| area_m2(&b.bounds).total_cmp(&area_m2(&a.bounds)));
+    let beyond = groups.split_off(groups.len().min(most)).len();
+    groups.iter().enumerate().for_each(|(place, (number, _))| place_of[*number] = Some(place));
+    let mut followed: Vec<(Group, f64)> = groups.into_iter().map(|(_, group)| (group, 0.0)).collect();
     for_each(&mut |surface| {
-        if let Surface::Triangle(corners) = surface {
-            let number = grid.group_at(surface.center(), groups.len());
-            groups[number].spread(corners, &mut passed_m2[number]);
+        if let Surface::Triangle(corners, double_sided) = surface
+            && let Some(place) = place_of[grid.group_at(surface.center(), place_of.len())]
+        {
+            let (group, passed_m2) = &mut followed[place];
+            group.spread(corners, double_sided, passed_m2);
         }
     });
-    groups
+    (followed.into_iter().map(|(group, _)| group).collect(), beyond)
 }
 
 /// Which cells of a scene hold mirrors.
@@ -219,7 +230,7 @@ fn number(cell: UVec3) -> usize {
     ((cell.z * SIDE + cell.y) * SIDE + cell.x) as usize
 }
 
-pub(super) fn area_m2(bounds: &Aabb) -> f32 {
+fn area_m2(bounds: &Aabb) -> f32 {
     let size = bounds.size();
     2.0 * (size.x * size.y + size.y * size.z + size.z * size.x)
 }

@@ -1,30 +1,33 @@
 //! Rays off mirrors through the triangles of a scene.
 
-use std::time::Duration;
-
 use depth_image::Aabb;
 use glam::{Vec3, Vec3A};
-use obvhs::BvhBuildParams;
-use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
+use obvhs::cwbvh::CwBvh;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
 use scene::Scene;
 
 use super::groups::{SurfacePoint, spread_2d};
 
+/// A tree over more triangles is not built.
+const MOST_TRIANGLES: u64 = 4_000_000;
 /// Eyes are spread over the scene's volume, made this many times as large.
 const EYES: f32 = 2.0;
 /// Eyes that are tried for a point; it is left out if none of them sees it.
 const TRIES: usize = 8;
+/// Rays begin this far off a surface, in diagonals of the scene.
+const OFF: f32 = 1e-4;
+/// The last part of a way, in which nothing hides its end.
+const LAST_PART: f32 = 0.01;
+/// Rays leave the scene this far beyond its volume, in diagonals.
+const BEYOND: f32 = 0.05;
 /// Places along a way, its end among them.
 pub(super) const PLACES: usize = 8;
-/// Rays begin this far off a surface, and end this far before another, in diagonals of the scene.
-const OFF: f32 = 1e-4;
 
 /// The triangles of a scene as it first is.
 pub(super) struct Triangles {
     tree: CwBvh,
-    triangles: Vec<Triangle>,
+    corners: Vec<[Vec3; 3]>,
     double_sided: Vec<bool>,
     pub volume: Aabb,
 }
@@ -46,65 +49,73 @@ impl Way {
 }
 
 impl Triangles {
-    pub fn of(scene: &Scene, volume: Aabb) -> Self {
-        let (mut triangles, mut double_sided) = (Vec::new(), Vec::new());
+    /// `None` where there are too many, or too many in one place.
+    pub fn of(scene: &Scene, volume: Aabb) -> Option<Self> {
+        if scene.triangle_count() > MOST_TRIANGLES {
+            return None;
+        }
+        let (mut corners, mut double_sided) = (Vec::new(), Vec::new());
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh as usize];
             let corner = |index: &u32| {
-                let in_mesh = Vec3A::from(mesh.vertices[*index as usize].position);
-                instance.world_from_mesh.transform_point3a(in_mesh)
+                instance.world_from_mesh.transform_point3(Vec3::from(mesh.vertices[*index as usize].position))
             };
             for part in &mesh.parts {
                 let indices = &mesh.indices[part.first_index as usize..][..part.index_count as usize];
-                let corners = indices.as_chunks::<3>().0.iter().map(|triangle| triangle.each_ref().map(corner));
-                triangles.extend(corners.map(|[v0, v1, v2]| Triangle { v0, v1, v2 }));
-                double_sided.resize(triangles.len(), scene.materials[part.material as usize].double_sided);
+                corners.extend(indices.as_chunks::<3>().0.iter().map(|triangle| triangle.each_ref().map(corner)));
+                double_sided.resize(corners.len(), scene.materials[part.material as usize].double_sided);
             }
         }
-        let tree = build_cwbvh_from_tris(&triangles, BvhBuildParams::fast_build(), &mut Duration::default());
-        Self { tree, triangles, double_sided, volume }
+        let tree = render::host_tree(&corners)?;
+        Some(Self { tree, corners, double_sided, volume })
     }
 
-    /// The way to the nearest surface, before `far_m`. Backs of single-sided ones are not there.
-    fn nearest_m(&self, origin_in_world: Vec3, direction: Vec3, far_m: f32) -> Option<f32> {
-        let ray = Ray::new(origin_in_world.into(), direction.into(), OFF * self.volume.size().length(), far_m);
-        let met = |ray: &Ray, slot: usize| {
-            let index = self.tree.primitive_indices[slot] as usize;
-            let triangle = &self.triangles[index];
-            let is_back = triangle.compute_normal().dot(ray.direction) > 0.0;
-            if is_back && !self.double_sided[index] { f32::INFINITY } else { triangle.intersect(ray) }
-        };
-        let mut hit = RayHit::none();
-        self.tree.ray_traverse(ray, &mut hit, met).then_some(hit.t)
+    fn ray(&self, origin_in_world: Vec3, direction: Vec3, far_m: f32) -> Ray {
+        Ray::new(origin_in_world.into(), direction.into(), OFF * self.volume.size().length(), far_m)
+    }
+
+    /// Where a ray meets a triangle. Backs of single-sided ones are not there.
+    fn met(&self, ray: &Ray, slot: usize) -> f32 {
+        let index = self.tree.primitive_indices[slot] as usize;
+        let [v0, v1, v2] = self.corners[index].map(Vec3A::from);
+        let triangle = Triangle { v0, v1, v2 };
+        let is_back = (v1 - v0).cross(v2 - v0).dot(ray.direction) > 0.0;
+        if is_back && !self.double_sided[index] { f32::INFINITY } else { triangle.intersect(ray) }
     }
 
     /// Whether nothing lies between two points.
     pub fn is_free(&self, from: Vec3, to: Vec3) -> bool {
         let way_m = from.distance(to);
-        let before_m = way_m - 10.0 * OFF * self.volume.size().length();
-        before_m <= 0.0 || self.nearest_m(from, (to - from) / way_m, before_m).is_none()
+        let ray = self.ray(from, (to - from) / way_m.max(f32::MIN_POSITIVE), way_m * (1.0 - LAST_PART));
+        ray.tmax <= ray.tmin || self.tree.ray_traverse_miss(ray, |ray, slot| self.met(ray, slot))
     }
 
     /// The way of a ray from an eye that sees a mirror's point. The number decides the eye. `None` where no eye sees it.
     pub fn way(&self, mirror: &SurfacePoint, number: usize) -> Option<Way> {
-        let (point, normal) = (mirror.point_in_world, mirror.normal);
+        let point = mirror.point_in_world;
         let eye = |attempt: usize| {
             let number = number * TRIES + attempt;
             let [x, y] = spread_2d(number);
             let z = (number as f32 * 0.381_966).fract();
             self.volume.center() + (Vec3::new(x, y, z) - 0.5) * self.volume.size() * EYES
         };
-        let sees = |eye: &Vec3| (*eye - point).dot(normal) > 0.0 && self.is_free(*eye, point);
-        let towards = (point - (0..TRIES).map(eye).find(sees)?).normalize_or(Vec3::NEG_Y);
-        let direction = towards - normal * (2.0 * towards.dot(normal));
-        let met_m = self.nearest_m(point, direction, f32::MAX);
-        let way_m = met_m.unwrap_or_else(|| self.way_out_m(point, direction));
-        Some(Way { origin_in_world: point, to_end: direction * way_m, ends_at_surface: met_m.is_some() })
+        let faces = |eye: Vec3| mirror.double_sided || (eye - point).dot(mirror.normal) > 0.0;
+        let eye = (0..TRIES).map(eye).find(|eye| faces(*eye) && self.is_free(*eye, point))?;
+        // A reflection does not depend on the normal's sign.
+        let direction = (point - eye).normalize_or(Vec3::NEG_Y).reflect(mirror.normal);
+        let ray = self.ray(point, direction, f32::MAX);
+        let mut hit = RayHit::none();
+        let ends_at_surface = self.tree.ray_traverse(ray, &mut hit, |ray, slot| self.met(ray, slot));
+        let way_m = if ends_at_surface { hit.t } else { self.way_out_m(point, direction) };
+        Some(Way { origin_in_world: point, to_end: direction * way_m, ends_at_surface })
     }
 
-    /// The way from a point within the volume to its border.
+    /// The way from a point within the volume to beyond its border.
     fn way_out_m(&self, point: Vec3, direction: Vec3) -> f32 {
-        let border = Vec3::select(direction.cmpgt(Vec3::ZERO), self.volume.max, self.volume.min);
-        ((border - point) / direction).abs().min_element().max(0.0)
+        let beyond = self.volume.padded(BEYOND * self.volume.size().length());
+        let border = Vec3::select(direction.cmpgt(Vec3::ZERO), beyond.max, beyond.min);
+        let ways = (border - point) / direction;
+        // A ray along a face never leaves through it.
+        Vec3::select(direction.abs().cmpgt(Vec3::splat(1e-6)), ways, Vec3::MAX).min_element().max(0.0)
     }
 }
