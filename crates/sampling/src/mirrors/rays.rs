@@ -17,10 +17,11 @@ const EYES: f32 = 2.0;
 const TRIES: usize = 8;
 /// Rays begin this far off a surface, in diagonals of the scene.
 const OFF: f32 = 1e-4;
-/// The last part of a way, in which nothing hides its end.
+/// The last part of a way, in which nothing hides its end: in diagonals of the scene, and at most this share of the way.
+const LAST: f32 = 1e-3;
 const LAST_PART: f32 = 0.01;
 /// Rays leave the scene this far beyond its volume, in diagonals.
-const BEYOND: f32 = 0.05;
+const BEYOND: f32 = 0.01;
 /// Places along a way, its end among them.
 pub(super) const PLACES: usize = 8;
 
@@ -86,7 +87,8 @@ impl Triangles {
     /// Whether nothing lies between two points.
     pub fn is_free(&self, from: Vec3, to: Vec3) -> bool {
         let way_m = from.distance(to);
-        let ray = self.ray(from, (to - from) / way_m.max(f32::MIN_POSITIVE), way_m * (1.0 - LAST_PART));
+        let last_m = (LAST * self.volume.size().length()).min(LAST_PART * way_m);
+        let ray = self.ray(from, (to - from) / way_m.max(f32::MIN_POSITIVE), way_m - last_m);
         ray.tmax <= ray.tmin || self.tree.ray_traverse_miss(ray, |ray, slot| self.met(ray, slot))
     }
 
