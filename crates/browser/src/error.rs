@@ -13,6 +13,9 @@ pub enum BrowserError {
     /// The driver has not said its port.
     #[error("chromedriver does not start: {0}")]
     Driver(String),
+    /// The driver has ended before it said its port.
+    #[error("chromedriver does not start: it has ended")]
+    Ended,
     /// A folder or a process cannot be made.
     #[error("{0}")]
     Io(#[from] std::io::Error),

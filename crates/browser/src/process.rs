@@ -2,7 +2,7 @@
 
 use std::io::{BufRead as _, BufReader};
 use std::os::unix::process::CommandExt as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
@@ -16,6 +16,9 @@ const STARTS_WITHIN: Duration = Duration::from_secs(20);
 /// The shell waits for the end of its input, which comes even when this program is killed. It then kills its group: itself, the
 /// driver, and the browser.
 const SCRIPT: &str = r#""$@" </dev/null & exec >&-; read -r _; kill -KILL 0"#;
+
+/// A driver takes a free port of IPv4 and the same of IPv6, and ends if another program has just taken that.
+const TRIES: u32 = 3;
 
 /// A `chromedriver` at a port of the system's choice. All processes of its group are killed when it is dropped.
 #[derive(Debug)]
@@ -33,6 +36,16 @@ impl DriverProcess {
     /// There is none on this machine, or it does not start.
     pub async fn start() -> Result<Self, BrowserError> {
         let driver = program("chromedriver")?;
+        let mut tries = 1;
+        loop {
+            match Self::start_once(&driver).await {
+                Err(BrowserError::Ended) if tries < TRIES => tries += 1,
+                started => return started,
+            }
+        }
+    }
+
+    async fn start_once(driver: &Path) -> Result<Self, BrowserError> {
         let mut command = Command::new("sh");
         command.args(["-c", SCRIPT, "sh"]).arg(driver).arg("--port=0").process_group(0);
         let mut shell = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn()?;
@@ -42,7 +55,7 @@ impl DriverProcess {
         std::thread::spawn(move || output.map(|output| read(output, send)));
         let port = tokio::time::timeout(STARTS_WITHIN, port).await;
         let port = port.map_err(|_| BrowserError::Driver(format!("no port within {STARTS_WITHIN:?}")))?;
-        let port = port.map_err(|_| BrowserError::Driver("it has ended".to_owned()))?;
+        let port = port.map_err(|_| BrowserError::Ended)?;
         process.address = format!("http://127.0.0.1:{port}");
         Ok(process)
     }
