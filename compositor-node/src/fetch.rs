@@ -46,7 +46,7 @@ impl Fetcher {
             relay.end(gathered.as_ref().map(drop).map_err(|failed| failed.status.clone()));
         }
         let (images, times) = gathered?;
-        Ok((SampleSet::of(&set.plan.workload, join_tiles(&set.plan, images).await?), times))
+        Ok((SampleSet::of(&set.plan.workload, join_tiles(&set.plan, images).await?, set.plan.is_mirror), times))
     }
 
     /// All images of a set, or their tiles, in their order.

@@ -8,7 +8,7 @@ use depth_image::{PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use gpu::DevicePreference;
-use node::{DirectWork, Engine, MirrorSet, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
+use node::{DirectWork, Engine, MirrorSet, SampleSet, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
 use sampling::Impostors;
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 
@@ -31,15 +31,15 @@ impl Stand {
         Self { engine, scene }
     }
 
-    fn set(&self, cameras: &[PinholeCamera]) -> SharedSet {
+    fn set(&self, cameras: &[PinholeCamera], is_mirror: bool) -> SharedSet {
         let set = common::sample_set(&self.engine, (HASH, &self.scene), cameras, LIGHTING);
-        self.engine.upload(&set, TURN).expect("a set")
+        self.engine.upload(&SampleSet { is_mirror, ..set }, TURN).expect("a set")
     }
 
     fn mirrors(&self) -> Vec<MirrorSet> {
         let (mirrors, beyond) = sampling::mirrors(&self.scene, Impostors::default());
         assert_eq!((mirrors.len(), beyond), (1, 0));
-        mirrors.into_iter().map(|mirror| (mirror.bounds, self.set(&mirror.cameras))).collect()
+        mirrors.into_iter().map(|mirror| (mirror.bounds, self.set(&mirror.cameras, true))).collect()
     }
 
     fn view(&self, set: &dyn UploadedSet) -> View {
@@ -85,7 +85,7 @@ fn views_of_sets_with_mirror_cells_show_the_scene_in_mirrors() {
     let mirrored: Vec<bool> = truth.srgb8.chunks_exact(3).zip(plain.srgb8.chunks_exact(3)).map(differs).collect();
     assert!(mirrored.iter().filter(|is| **is).count() > 500, "the mirror is seen");
     // The view's own image: its errors are those of the mirror.
-    let set = stand.set(&[camera()]);
+    let set = stand.set(&[camera()], false);
     let without = stand.view(set.as_ref());
     let with = stand.view(stand.engine.mirroring(set.clone(), stand.mirrors()).expect("a set").as_ref());
     let [before, after] = [&without, &with].map(|view| difference(view, &truth, &mirrored));
@@ -103,7 +103,7 @@ fn views_of_sets_with_mirror_cells_show_the_scene_in_mirrors() {
 #[test]
 fn sets_of_other_devices_are_refused_as_mirrors() {
     let stand = Stand::new();
-    let set = stand.set(&[camera()]);
+    let set = stand.set(&[camera()], false);
     struct Foreign;
     impl UploadedSet for Foreign {}
     let bounds = stand.scene.bounds();

@@ -177,12 +177,14 @@ pub struct SampleSet {
     pub illumination: Illumination,
     /// The lighting that the images were sampled with; highlights follow its formula.
     pub lighting: String,
+    /// Rays off a mirror are followed in it, and may cover several texels.
+    pub is_mirror: bool,
 }
 
 impl SampleSet {
-    /// A set of a workload.
+    /// A set of a workload of one cell.
     #[must_use]
-    pub fn of(workload: &Workload, images: Vec<DepthImage>) -> Self {
+    pub fn of(workload: &Workload, images: Vec<DepthImage>, is_mirror: bool) -> Self {
         Self {
             scene_hash: workload.scene.hash.to_string(),
             images,
@@ -190,6 +192,7 @@ impl SampleSet {
             background: workload.background,
             illumination: workload.illumination.clone(),
             lighting: workload.lighting.clone(),
+            is_mirror,
         }
     }
 }

@@ -6,7 +6,7 @@ use std::fmt::Display;
 use cluster::{Costs, DIRECT, MeasureCosts, Measured, ROW_PARTS, TileCosts, Workload};
 use codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet};
 use codec::{decode_depth_image, encode_depth_image, encode_view};
-use depth_image::{Camera, PinholeCamera, View};
+use depth_image::{Camera, DepthImage, PinholeCamera, View};
 use glam::UVec2;
 use tonic::Status;
 
@@ -70,8 +70,11 @@ impl Measurement<'_> {
         let sample = |cell: &Workload| SampleWork { planes, ..SampleWork::of(cell) };
         let sampled = cells.iter().map(|cell| self.timed(|| self.sampled(&sample(cell))));
         let (encoded, cells_s): (Vec<_>, Vec<f64>) = sampled.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
-        let upload = |(cell, images): (&Workload, &Vec<_>)| Ok(engine.upload(&decoded(cell, images)?, self.turn)?);
-        let upload_all = || cells.iter().zip(&encoded).map(upload).collect::<Result<Vec<_>, Status>>();
+        let upload = |(number, (cell, images)): (usize, (&Workload, &Vec<_>))| {
+            let set = SampleSet::of(cell, decoded(cell, images)?, workload.mirror_cell(number).is_some());
+            Ok(engine.upload(&set, self.turn)?)
+        };
+        let upload_all = || cells.iter().zip(&encoded).enumerate().map(upload).collect::<Result<Vec<_>, Status>>();
         let (sets, load_s) = self.timed(upload_all)?;
         let set = mirroring(engine, workload, sets)?;
         let load_set_s = load_s / cells.len().max(1) as f64;
@@ -189,13 +192,12 @@ fn direct_views(alone_s: f64, most: u32) -> u32 {
     ((DIRECT_CALL_S / alone_s) as u32).clamp(1, most.max(1))
 }
 
-fn decoded(workload: &Workload, encoded: &[EncodedDepthImage]) -> Result<SampleSet, Status> {
+fn decoded(workload: &Workload, encoded: &[EncodedDepthImage]) -> Result<Vec<DepthImage>, Status> {
     let limits = DecodeLimits::default();
     let decode = |(image, camera): (&EncodedDepthImage, &Camera)| {
         decode_depth_image(&image.header, *camera, &image.payload, &limits).map_err(codec)
     };
-    let images = encoded.iter().zip(&workload.sample_cameras).map(decode).collect::<Result<_, _>>()?;
-    Ok(SampleSet::of(workload, images))
+    encoded.iter().zip(&workload.sample_cameras).map(decode).collect()
 }
 
 /// The number of runs, by the time of the first.

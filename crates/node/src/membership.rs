@@ -140,9 +140,11 @@ fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), En
     if plan.policy == Policy::Direct {
         return engine.draw_direct(&DirectWork::of(&workload, vec![view], ViewPlanes::default()), turn).map(drop);
     }
-    let upload =
-        |cell: &Workload| engine.upload(&SampleSet::of(cell, engine.sample(&SampleWork::of(cell), turn)?), turn);
-    let sets = workload.cells().iter().map(upload).collect::<Result<Vec<_>, _>>()?;
+    let upload = |(number, cell): (usize, &Workload)| {
+        let (images, is_mirror) = (engine.sample(&SampleWork::of(cell), turn)?, workload.mirror_cell(number).is_some());
+        engine.upload(&SampleSet::of(cell, images, is_mirror), turn)
+    };
+    let sets = workload.cells().iter().enumerate().map(upload).collect::<Result<Vec<_>, _>>()?;
     let set = mirroring(engine, &workload, sets)?;
     let work = ViewWork { cameras: vec![view], method, planes: ViewPlanes::default() };
     engine.reconstruct(set.as_ref(), &work, turn).map(drop)

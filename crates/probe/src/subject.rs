@@ -104,6 +104,7 @@ impl Subject {
             background: self.background,
             illumination: self.illumination.clone(),
             lighting: self.lighting(light).to_owned(),
+            is_mirror: false,
         }
     }
 

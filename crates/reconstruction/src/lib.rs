@@ -13,7 +13,6 @@ mod in_flight;
 #[cfg(test)]
 mod layout_tests;
 mod methods;
-mod mips;
 mod pixel_list;
 mod pyramid;
 mod quads;

@@ -9,7 +9,7 @@ use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
 use wgpu::TextureFormat;
 
-use crate::mips::{mip_texels, mips};
+use crate::bounce::mips::{mip_texels, mips};
 use crate::pyramid::{CodedDepth, Pyramid, is_among_holes};
 use crate::view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant};
 use crate::{error::ReconstructionError, quads::SetMeshes, reflectors::Reflectors};

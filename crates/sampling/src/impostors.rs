@@ -14,10 +14,24 @@ const UNSEEN_PERCENT: f32 = 0.3;
 pub enum Impostors {
     /// None: mirrors show the environment alone.
     None,
-    /// As few as see all but this percentage of mirrored rays all the way, at most eight.
-    Auto(f32),
-    /// This number, those that see most; at most eight. An image that sees nothing new is left out.
-    Pinholes(u32),
+    /// As few as see mirrored rays all the way, at most eight.
+    Auto {
+        /// The percentage of rays that they need not see.
+        unseen_percent: f32,
+    },
+    /// A number of them, those that see most. An image that sees nothing new is left out.
+    Pinholes {
+        /// At most eight.
+        images: u32,
+    },
+}
+
+/// How many images a mirror has.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ImageLimits {
+    pub most: usize,
+    /// The share of rays that images need not see all the way: fewer will do.
+    pub unseen_ratio: f32,
 }
 
 /// A text that names no images.
@@ -29,19 +43,21 @@ pub struct UnknownImpostors {
 }
 
 impl Impostors {
-    /// The most images, and the share of rays below which fewer will do. `None` without images.
-    pub(crate) fn bounds(self) -> Option<(usize, f32)> {
+    /// `None` without images.
+    pub(crate) fn limits(self) -> Option<ImageLimits> {
         match self {
             Self::None => None,
-            Self::Auto(percent) => Some((MOST_IMAGES, percent / 100.0)),
-            Self::Pinholes(images) => Some((images as usize, 0.0)),
+            Self::Auto { unseen_percent } => {
+                Some(ImageLimits { most: MOST_IMAGES, unseen_ratio: unseen_percent / 100.0 })
+            }
+            Self::Pinholes { images } => Some(ImageLimits { most: images as usize, unseen_ratio: 0.0 }),
         }
     }
 }
 
 impl Default for Impostors {
     fn default() -> Self {
-        Self::Auto(UNSEEN_PERCENT)
+        Self::Auto { unseen_percent: UNSEEN_PERCENT }
     }
 }
 
@@ -49,8 +65,8 @@ impl fmt::Display for Impostors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::None => f.write_str("none"),
-            Self::Auto(percent) => write!(f, "auto:{percent}"),
-            Self::Pinholes(images) => write!(f, "pinhole:{images}"),
+            Self::Auto { unseen_percent } => write!(f, "auto:{unseen_percent}"),
+            Self::Pinholes { images } => write!(f, "pinhole:{images}"),
         }
     }
 }
@@ -63,14 +79,15 @@ impl FromStr for Impostors {
         match text.split_once(':') {
             None if text == "none" => Ok(Self::None),
             None if text == "auto" => Ok(Self::default()),
-            None if text == "pinhole" => Ok(Self::Pinholes(1)),
+            None if text == "pinhole" => Ok(Self::Pinholes { images: 1 }),
             Some(("auto", percent)) => {
-                let percent: f32 = percent.parse().map_err(|_| unknown())?;
-                (0.0..=100.0).contains(&percent).then_some(Self::Auto(percent)).ok_or_else(unknown)
+                let unseen_percent: f32 = percent.parse().map_err(|_| unknown())?;
+                let is_percent = (0.0..=100.0).contains(&unseen_percent);
+                is_percent.then_some(Self::Auto { unseen_percent }).ok_or_else(unknown)
             }
             Some(("pinhole", images)) => {
                 let images: u32 = images.parse().map_err(|_| unknown())?;
-                (1..=MOST_IMAGES as u32).contains(&images).then_some(Self::Pinholes(images)).ok_or_else(unknown)
+                (1..=MOST_IMAGES as u32).contains(&images).then_some(Self::Pinholes { images }).ok_or_else(unknown)
             }
             _ => Err(unknown()),
         }
@@ -87,7 +104,7 @@ mod tests {
             assert_eq!(text.parse::<Impostors>().map(|impostors| impostors.to_string()), Ok(text.to_owned()));
         }
         assert_eq!("auto".parse(), Ok(Impostors::default()));
-        assert_eq!("pinhole".parse(), Ok(Impostors::Pinholes(1)));
+        assert_eq!("pinhole".parse(), Ok(Impostors::Pinholes { images: 1 }));
         for text in ["", "all", "auto:", "auto:-1", "auto:101", "auto:NaN", "pinhole:0", "pinhole:9", "none:1"] {
             assert!(text.parse::<Impostors>().is_err(), "{text}");
         }

@@ -9,8 +9,7 @@ use depth_image::Aabb;
 use engine::GpuEngine;
 use node::Engine as _;
 use render::Lighting;
-use sampling::Impostors;
-use sampling::Mirror;
+use sampling::{Impostors, Mirror};
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 use study::{Bar, Cell, Check, Report, Table};
 

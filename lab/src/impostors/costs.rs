@@ -67,7 +67,7 @@ pub fn measure(hall: &Hall<'_>, mirrors: &[Mirror]) -> anyhow::Result<Costs> {
         timed(|| mirrors.iter().map(|mirror| hall.images(&in_a_cluster(mirror))).collect::<anyhow::Result<Vec<_>>>())?;
     let load = || -> anyhow::Result<(SampleSet, Vec<SampleSet>)> {
         let of_mirrors = of_mirrors.iter().map(|images| hall.set(images, true));
-        Ok((hall.set(&images, true)?, of_mirrors.collect::<anyhow::Result<_>>()?))
+        Ok((hall.set(&images, false)?, of_mirrors.collect::<anyhow::Result<_>>()?))
     };
     // A cluster's later sets reuse the memory of earlier ones.
     load()?;

@@ -28,7 +28,7 @@
 {% endif %}
 
 {% include "colors.wgsl" %}
-{% include "bounce/mip.wgsl" %}
+{% include "bounce/mips.wgsl" %}
 // What a pixel shows of the surface at its ray's end.
 fn landed(index: u32, ray: MirroredRay, origin: u32) -> vec3f {
     let throughput = linear_from_rgb9e5(ray.throughput_rgb9e5);

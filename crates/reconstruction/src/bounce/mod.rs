@@ -1,6 +1,8 @@
 //! Mirror images of the scene: rays off the mirrors that a view shows are followed in images of the mirrors' surroundings,
 //! mirror after mirror, and what they find is added to the pixels.
 
+pub(crate) mod mips;
+
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Aabb, Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS};
 use gpu::{
@@ -253,7 +255,6 @@ impl ShaderVariant for Land {
 
     fn context(&self) -> Value {
         context! {
-            finest => true,
             highlight => highlight_name(Highlight::Ggx),
             mirrors => self.next_cells.is_some(),
             mirror_cells => self.next_cells.unwrap_or(0),

@@ -6,6 +6,8 @@ use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
 use rayon::prelude::*;
 
+use crate::impostors::ImageLimits;
+
 use super::directions::{FACE_DEG, WIDE_DEG, looking};
 use super::groups::Group;
 use super::rays::{PLACES, Triangles, Way};
@@ -39,7 +41,7 @@ pub(super) struct Choice {
 pub(super) fn choose(
     group: &Group,
     triangles: Option<&Triangles>,
-    (most, unseen_ratio): (usize, f32),
+    limits: ImageLimits,
     (middle_of_scene, near_m): (Vec3, f32),
 ) -> Choice {
     let pool = pool(group, middle_of_scene, near_m);
@@ -49,13 +51,13 @@ pub(super) fn choose(
         points.filter_map(way).collect::<Vec<Way>>()
     });
     let Some(triangles) = triangles.filter(|_| deciding.len().min(fresh.len()) >= LEAST_RAYS) else {
-        return pool.usual(most);
+        return pool.usual(limits.most);
     };
     let seen: Vec<Vec<bool>> = pool.cameras.par_iter().map(|camera| seen_by(camera, &deciding, triangles)).collect();
-    let first = if most >= LEAST_FOR_FIRST { pool.first.clone().collect() } else { Vec::new() };
-    let (chosen, unseen) = cover(&seen, first, most, unseen_ratio);
+    let first = if limits.most >= LEAST_FOR_FIRST { pool.first.clone().collect() } else { Vec::new() };
+    let (chosen, unseen) = cover(&seen, first, limits);
     if chosen.is_empty() {
-        return pool.usual(most);
+        return pool.usual(limits.most);
     }
     let cameras: Vec<PinholeCamera> = chosen.iter().map(|&camera| pool.cameras[camera]).collect();
     let of_chosen: Vec<&[bool]> = chosen.iter().map(|&camera| seen[camera].as_slice()).collect();
@@ -66,12 +68,12 @@ pub(super) fn choose(
 }
 
 /// Adds to the first images the one that sees most places that none does yet, until the share of ways with an unseen place is
-/// at most `unseen_ratio` or there are `most` images. Gives the images and which places none of them sees.
-fn cover(seen: &[Vec<bool>], first: Vec<usize>, most: usize, unseen_ratio: f32) -> (Vec<usize>, Vec<bool>) {
+/// within the limit or there are as many images as may be. Gives the images and which places none of them sees.
+fn cover(seen: &[Vec<bool>], first: Vec<usize>, limits: ImageLimits) -> (Vec<usize>, Vec<bool>) {
     let mut unseen = vec![true; seen[0].len()];
     let mut chosen = first;
     chosen.iter().for_each(|&camera| strike(&mut unseen, &seen[camera]));
-    while chosen.len() < most && (chosen.is_empty() || share_of_ways(&unseen) > unseen_ratio) {
+    while chosen.len() < limits.most && (chosen.is_empty() || share_of_ways(&unseen) > limits.unseen_ratio) {
         let new = |camera: &usize| seen[*camera].iter().zip(&unseen).filter(|(seen, is)| **seen && **is).count();
         // Of equals the first.
         let best = (0..seen.len()).rev().max_by_key(new).filter(|best| new(best) > 0);

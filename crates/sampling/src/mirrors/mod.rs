@@ -37,7 +37,7 @@ pub struct Mirror {
 #[must_use]
 pub fn mirrors(scene: &Scene, impostors: Impostors) -> (Vec<Mirror>, usize) {
     let is_mirror: Vec<bool> = scene.materials.iter().map(|material| mirrors_scene(scene, material)).collect();
-    let Some(bounds) = impostors.bounds().filter(|_| is_mirror.contains(&true)) else {
+    let Some(limits) = impostors.limits().filter(|_| is_mirror.contains(&true)) else {
         return (Vec::new(), 0);
     };
     let of_instances = scene.bounds_of_instances();
@@ -48,7 +48,7 @@ pub fn mirrors(scene: &Scene, impostors: Impostors) -> (Vec<Mirror>, usize) {
     let triangles = stands.then(|| Triangles::of(scene, volume)).flatten();
     let mirror = |group: &Group| {
         let triangles = triangles.as_ref().filter(|_| !group.moves);
-        let Choice { cameras, unseen_ratio } = choose(group, triangles, bounds, (volume.center(), volume.near_m()));
+        let Choice { cameras, unseen_ratio } = choose(group, triangles, limits, (volume.center(), volume.near_m()));
         Mirror { bounds: group.bounds.padded(group.bounds.size().length() * MARGIN), cameras, unseen_ratio }
     };
     (groups.iter().map(mirror).collect(), beyond)
@@ -154,7 +154,7 @@ mod tests {
         let teapot = scene("teapot-mirror");
         assert_eq!(super::mirrors(&teapot, Impostors::None), (Vec::new(), 0));
         let unseen = [1, 2, 4, 8].map(|images| {
-            let mirror = super::mirrors(&teapot, Impostors::Pinholes(images)).0.remove(0);
+            let mirror = super::mirrors(&teapot, Impostors::Pinholes { images }).0.remove(0);
             // An image that sees nothing new is left out.
             assert!(mirror.cameras.len() == images as usize || images == 8);
             mirror.unseen_ratio.expect("it stands still")[0]
@@ -170,7 +170,7 @@ mod tests {
         for material in closed.materials.iter_mut().filter(|material| material.roughness < ROUGHEST_MIRROR) {
             material.double_sided = true;
         }
-        for (impostors, images) in [(Impostors::Pinholes(1), 1), (Impostors::default(), 8)] {
+        for (impostors, images) in [(Impostors::Pinholes { images: 1 }, 1), (Impostors::default(), 8)] {
             let mirror = super::mirrors(&closed, impostors).0.remove(0);
             assert_eq!(mirror.cameras.len(), images);
             assert!(mirror.unseen_ratio.is_none_or(|[chosen, _]| chosen > 0.9), "{:?}", mirror.unseen_ratio);
