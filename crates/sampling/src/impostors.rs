@@ -19,7 +19,7 @@ pub enum Impostors {
         /// The percentage of rays that they need not see.
         unseen_percent: f32,
     },
-    /// A number of them, those that see most. An image that sees nothing new is left out.
+    /// A number of them, in the same order. An image that sees nothing new is left out.
     Pinholes {
         /// At most eight.
         images: u32,
