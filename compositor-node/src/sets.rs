@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use cluster::{Assignment, Policy, SetContent, Timeline, Workload};
 use codec::EncodedDepthImage;
-use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, nearest_set};
+use depth_image::{Aabb, DepthImage, PinholeCamera, nearest_set};
 use node::{
     ByteCache, CellPlan, Engine, MirrorSet, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet,
     Scenes, SetMemory, SharedSet, Turn,
@@ -369,7 +369,7 @@ impl Sets {
         self.metrics.set_s.observe(start.elapsed().as_secs_f64());
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
         let moment = moment(plan, set_index).filter(|_| !plan.is_mirror);
-        let cameras = plan.workload.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+        let cameras = plan.workload.sample_cameras.iter().map(|camera| *camera.reference()).collect();
         let (since, cell) = (Instant::now(), plan.cell);
         Ok((ReadySet { set, since, content, cell, moment, subject, cameras, sample_images, relay }, bytes))
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use cluster::limits::MAX_SCENES;
 use cluster::{MirrorCell, OfferSettings, OfferStatus, SceneHash, SceneRef};
-use depth_image::{Aabb, Camera, Environment, Illumination, PinholeCamera};
+use depth_image::{Aabb, Camera, Environment, Illumination};
 use glam::DVec3;
 use planner::{Budget, Row};
 use tonic::Status;
@@ -60,7 +60,7 @@ pub struct SceneOffer {
     /// Sample cameras for sessions that bring none.
     pub rig: Vec<Camera>,
     /// Its mirrors, and sample cameras for what they show, of sizes in proportion, for sessions that follow mirrors.
-    pub mirrors: Vec<(MirrorCell, Vec<PinholeCamera>)>,
+    pub mirrors: Vec<(MirrorCell, Vec<Camera>)>,
     /// The rig's images get the size that suits the views of a session that names none.
     pub fits_views: bool,
     /// The volume that is reconstructed, unless a session brings its own.

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use cluster::{DIRECT, SessionRequest, Workload};
-use depth_image::Camera;
 use planner::{Budget, Row};
 use tonic::Status;
 
@@ -32,7 +31,7 @@ pub(crate) fn budgeted(
     let has_own = offer.keeps_cameras || !request.sample_cameras.is_empty();
     let keeps_cameras = has_own && request.viewpoints.is_empty();
     let rows = rows(request, offer, keeps_cameras.then_some(workload.sample_cameras.len() as u32));
-    let Some(Camera::Pinhole(first)) = workload.sample_cameras.first().filter(|_| !rows.is_empty()) else {
+    let Some(first) = workload.sample_cameras.first().filter(|_| !rows.is_empty()) else {
         return match own {
             None => Ok(None),
             Some(_) => Err(Status::invalid_argument("budget: the session's own choices leave no representation")),
@@ -42,7 +41,7 @@ pub(crate) fn budgeted(
     let budgeted = Budgeted {
         budget,
         rows,
-        whole_px: first.size_px,
+        whole_px: first.size_px(),
         keeps_cameras,
         typical_view: request.typical_view,
         antialias_samples: request.planes.antialias.samples(),

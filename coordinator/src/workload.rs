@@ -68,12 +68,12 @@ fn mirrors_of(
     if !request.follows_mirrors || request.method == DIRECT {
         return Ok(Vec::new());
     }
-    let image_texels = workload.sample_cameras.first().map_or(1, |Camera::Pinhole(camera)| camera.pixel_count());
+    let image_texels = workload.sample_cameras.first().map_or(1, Camera::pixel_count);
     let density = MIRROR_DENSITY.min(MIRRORS_DENSITY / offer.mirrors.len().max(1) as f32);
-    let sized = |(cell, cameras): &(MirrorCell, Vec<PinholeCamera>)| {
-        let cameras = PinholeCamera::resized_together(cameras, image_texels as f32 * density, MAX_TILES);
-        let checked = |camera: PinholeCamera| {
-            let usable = camera.validate().map(|()| Camera::Pinhole(camera));
+    let sized = |(cell, cameras): &(MirrorCell, Vec<Camera>)| {
+        let cameras = Camera::resized_together(cameras, image_texels as f32 * density, MAX_TILES);
+        let checked = |camera: Camera| {
+            let usable = camera.validate().map(|()| camera);
             usable.map_err(|error| Status::internal(format!("mirrors of scene {}: {error}", offer.name)))
         };
         Ok((cell.clone(), cameras.into_iter().map(checked).collect::<Result<_, Status>>()?))
@@ -83,7 +83,7 @@ fn mirrors_of(
 
 /// The sample cameras of each view cell of the session's viewpoints, as if it were alone, in the size of the offered ones.
 fn cells_of(request: &SessionRequest, offer: &SceneOffer, volume: &Aabb) -> Result<Vec<Vec<Camera>>, Status> {
-    let offered = offer.rig.first().map(|Camera::Pinhole(camera)| camera.size_px);
+    let offered = offer.rig.first().map(Camera::size_px);
     let size_px = session_size_px(request, offer).or(offered).unwrap_or(request.typical_view.size_px);
     let mut groups = Vec::new();
     ViewGroup::add(&mut groups, &request.viewpoints, volume);
@@ -108,7 +108,7 @@ fn session_size_px(request: &SessionRequest, offer: &SceneOffer) -> Option<UVec2
 /// apart, so that sessions of similar views share their samples. `None` without images or with a degenerate view.
 #[must_use]
 pub fn fitting_size_px(rig: &[Camera], view: &PinholeCamera) -> Option<UVec2> {
-    let Camera::Pinhole(offered) = rig.first()?;
+    let offered = rig.first()?.reference();
     let wanted = SAMPLE_DENSITY * view.focal_px.min_element() / offered.focal_px.min_element();
     let most = (MAX_FITTING_TEXELS as f32 / (offered.pixel_count() * rig.len()) as f32).log2().floor();
     let steps = (2.0 * wanted.log2()).round().max(LEAST_STEPS).min(most);
@@ -118,10 +118,9 @@ pub fn fitting_size_px(rig: &[Camera], view: &PinholeCamera) -> Option<UVec2> {
 
 /// The same field of view in another size.
 fn resized(camera: &Camera, size_px: UVec2) -> Result<Camera, Status> {
-    let Camera::Pinhole(camera) = camera;
     let camera = camera.resized(size_px);
     camera.validate().map_err(|error| Status::invalid_argument(format!("sample_image_size: {error}")))?;
-    Ok(Camera::Pinhole(camera))
+    Ok(camera)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Cameras as pages and links name them, and the sizes of pictures.
 
 use cluster::OfferStatus;
-use depth_image::{Camera, PinholeCamera, ViewCell};
+use depth_image::{PinholeCamera, ViewCell};
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -74,7 +74,7 @@ impl ViewSpace {
 
     /// A camera in front of the scene: in the middle of its sample cameras, looking at the scene's middle.
     pub(crate) fn home(&self, offer: &OfferStatus) -> PageCamera {
-        let samples: Vec<_> = offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+        let samples: Vec<_> = offer.sample_cameras.iter().map(|camera| *camera.reference()).collect();
         let middle = offer.volume.center();
         let middle_camera = ViewCell::between(&samples).map(|cell| cell.camera_at(Vec2::ZERO, UVec2::splat(2)));
         let (eye, target) = match middle_camera {

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use axum::extract::{Query, State};
 use axum::response::Response;
 use cluster::{AchievedTime, ClusterStatus, Costs, NodeStatus, Policy, SessionPlan, WorkloadStatus};
-use depth_image::Camera;
 use pictures::camera_frame;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -34,8 +33,8 @@ pub(crate) async fn cameras(
     let cells = (0..workload.view_cell_count()).filter_map(|cell| Some((cell, workload.cameras_of_cell(cell)?)));
     let frames: Vec<Value> = cells
         .flat_map(|(cell, cameras)| workload.sample_cameras[cameras].iter().map(move |camera| (cell, camera)))
-        .map(|(cell, Camera::Pinhole(camera))| {
-            let mut frame = camera_frame(camera, scene.offer.origin_in_source);
+        .map(|(cell, camera)| {
+            let mut frame = camera_frame(camera.reference(), scene.offer.origin_in_source);
             frame.insert("cell".to_owned(), json!(cell));
             Value::Object(frame)
         })

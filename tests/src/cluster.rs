@@ -160,13 +160,13 @@ pub fn offer() -> SceneOffer {
 }
 
 /// Two mirrors, whose images show the ball in their middle.
-fn mirrors() -> Vec<(MirrorCell, Vec<PinholeCamera>)> {
+fn mirrors() -> Vec<(MirrorCell, Vec<Camera>)> {
     let mirror = |x_m: f32| {
         let place = Vec3::new(x_m, 0.5, 2.0);
         let towards = Vec3::new(0.0, 0.6, 0.0);
         let camera = PinholeCamera::looking_at(place, towards, Vec3::Y, 0.6, UVec2::splat(16));
         let bounds = Aabb { min: place - 0.1, max: place + 0.1 };
-        (MirrorCell { bounds, sampling: "conventional".to_owned() }, vec![camera])
+        (MirrorCell { bounds, sampling: "conventional".to_owned() }, vec![camera.into()])
     };
     vec![mirror(-1.0), mirror(1.0)]
 }

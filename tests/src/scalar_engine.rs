@@ -121,9 +121,8 @@ fn pixels(size_px: UVec2) -> impl Iterator<Item = Vec2> {
 }
 
 fn depth_image(camera: &Camera, scene_time_s: f32, refinement: Refinement) -> DepthImage {
-    let Camera::Pinhole(pinhole) = camera;
-    let meets = |pixel| first_met(&pinhole.ray(pixel), scene_time_s, refinement);
-    let met: Vec<_> = pixels(pinhole.size_px).map(meets).collect();
+    let meets = |pixel| first_met(&camera.ray(pixel), scene_time_s, refinement);
+    let met: Vec<_> = pixels(camera.size_px()).map(meets).collect();
     DepthImage {
         camera: *camera,
         inverse_depth_per_m: met
@@ -390,12 +389,13 @@ impl Engine for ScalarEngine {
         self.images_are_sequential(&request.sampling)?;
         known("lighting", &request.lighting, "unlit")?;
         let cameras: Vec<&Camera> = request.wanted.iter().map(|&index| &request.cameras[index as usize]).collect();
-        for Camera::Pinhole(camera) in &cameras {
+        for camera in &cameras {
+            let camera = camera.reference();
             let eye = camera.eye_in_world.extend(camera.principal_px.y).to_array().map(f32::to_bits);
             let image = (eye, request.scene_time_s.to_bits(), request.refinement);
             *self.counts.lock().entry(image).or_default() += 1;
         }
-        let is_held = |Camera::Pinhole(camera): &&Camera, holds: &Holds| holds.eyes.contains(&camera.eye_in_world);
+        let is_held = |camera: &&Camera, holds: &Holds| holds.eyes.contains(&camera.reference().eye_in_world);
         self.wait_while(|holds| cameras.iter().any(|camera| is_held(camera, holds)));
         let image = |camera| depth_image(camera, request.scene_time_s, request.refinement);
         sleep(self.pace().image * cameras.len() as u32);

@@ -99,8 +99,7 @@ async fn cells_follow_a_viewer_that_walks_around() {
         // The cell of the live viewer's last pose stays until it has moved.
         let cells = || session.plan().assignment.workload.sample_cameras;
         let near = |camera: &depth_image::Camera| {
-            let depth_image::Camera::Pinhole(camera) = camera;
-            (camera.eye_in_world - view(azimuth).eye_in_world).length() < 1e-3
+            (camera.reference().eye_in_world - view(azimuth).eye_in_world).length() < 1e-3
         };
         cluster_tests::watcher::eventually("a cell here", Duration::from_secs(5), || cells().iter().any(near)).await;
         let number = live.set_pose(view(azimuth), 0).unwrap();

@@ -10,7 +10,6 @@ use cluster::{Assignment, FetchImages, PolicyChoice, RenderViews, RequestedView,
 use cluster_tests::cluster::{Cluster, request, rig, views};
 use cluster_tests::scalar_engine::ScalarEngine;
 use codec::FrameCodec;
-use depth_image::Camera;
 use node::{Deadlines, EngineError, NodeConfig, NodeMetrics, OpenEngine, ServeError};
 use tokio_stream::StreamExt as _;
 use tokio_util::sync::CancellationToken;
@@ -32,7 +31,7 @@ async fn ask(address: &str, request: RenderViews) -> Result<usize, tonic::Status
 }
 
 fn raw_request(session: &Session) -> RenderViews {
-    let Camera::Pinhole(camera) = rig()[0];
+    let camera = *rig()[0].reference();
     RenderViews {
         plan_epoch: session.plan().assignment.plan_epoch,
         workload_number: session.plan().assignment.workload_number,

@@ -130,7 +130,7 @@ async fn live_views_have_mirrors() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_view_whose_sets_exceed_the_memory_is_refused_by_its_name() {
-    let texels: usize = offer().rig.iter().map(|depth_image::Camera::Pinhole(camera)| camera.pixel_count()).sum();
+    let texels: usize = offer().rig.iter().map(depth_image::Camera::pixel_count).sum();
     // Room for a view cell's set and its packed images, not for the mirrors' beside it.
     let small = |config| node::NodeConfig { set_memory_bytes: texels * 45 * 2, ..config };
     let cluster = Cluster::start_with(2, small).await;

@@ -1,7 +1,7 @@
 //! Audits in the schedule: promises that views in force do not keep, and what replaces them.
 
 use cluster::{AuditReport, AuditedView, Policy, PolicyChoice, ProbedView, Promise, PromiseState};
-use depth_image::{Camera, PinholeCamera};
+use depth_image::PinholeCamera;
 use glam::Vec3;
 
 use super::budget_cluster_tests::{Cluster, recorded, rig, viewer};
@@ -28,7 +28,7 @@ fn free(session: u64, budget: &str) -> Opening {
 }
 
 fn at(place: usize) -> PinholeCamera {
-    let Camera::Pinhole(first) = rig()[0];
+    let first = *rig()[0].reference();
     PinholeCamera { eye_in_world: first.eye_in_world + Vec3::X * (0.9 * (place % 97) as f32 / 97.0), ..first }
 }
 

@@ -40,7 +40,7 @@ pub(super) fn rig() -> Vec<Camera> {
 }
 
 pub(super) fn budgeted(budget: &str) -> Budgeted {
-    let Camera::Pinhole(view) = rig()[0];
+    let view = *rig()[0].reference();
     Budgeted {
         budget: budget.parse().unwrap(),
         rows: rows(),

@@ -52,7 +52,7 @@ impl Budgeted {
 
     /// The workload as a row samples it, in these view cells.
     pub(super) fn sampled_as(&self, row: &Row, workload: &Workload, cells: &[ViewCell]) -> Workload {
-        let resized = |Camera::Pinhole(camera): &Camera| Camera::Pinhole(camera.resized(row.size_px(camera.size_px)));
+        let resized = |camera: &Camera| camera.resized(row.size_px(camera.size_px()));
         let of_cell = |cell| row.cameras(cell, self.whole_px).into_iter().map(Camera::Pinhole).collect();
         let cameras: Vec<Vec<Camera>> = match self.keeps_cameras {
             true => vec![workload.sample_cameras.iter().map(resized).collect()],

@@ -65,5 +65,5 @@ impl Cells {
 }
 
 fn sample_size_px(workload: &Workload) -> UVec2 {
-    workload.sample_cameras.first().map_or(UVec2::ONE, |Camera::Pinhole(camera)| camera.size_px)
+    workload.sample_cameras.first().map_or(UVec2::ONE, Camera::size_px)
 }

@@ -139,7 +139,7 @@ impl WorkloadState {
     /// The view cells that budgets are planned for: those that viewpoints may grow to, or the one between the sessions' own
     /// sample cameras.
     pub(super) fn planned_cells(&self) -> Vec<ViewCell> {
-        let pinhole = |Camera::Pinhole(camera): &Camera| *camera;
+        let pinhole = |camera: &Camera| *camera.reference();
         let own = || ViewCell::between(&self.requested.sample_cameras.iter().map(pinhole).collect::<Vec<_>>());
         self.cells.as_ref().map_or_else(|| own().into_iter().collect(), Cells::grown)
     }
@@ -391,9 +391,9 @@ impl WorkloadState {
     pub(super) fn degraded(&self) -> Workload {
         let workload = self.in_representation();
         let Some(quality) = self.quality() else { return workload };
-        let sized = |Camera::Pinhole(camera): &Camera| {
-            let size_px = (camera.size_px.as_dvec2() * quality.sample_side_ratio).round().as_uvec2().max(UVec2::ONE);
-            Camera::Pinhole(camera.resized(size_px))
+        let sized = |camera: &Camera| {
+            let size_px = (camera.size_px().as_dvec2() * quality.sample_side_ratio).round().as_uvec2().max(UVec2::ONE);
+            camera.resized(size_px)
         };
         let workload = workload.without_mirrors();
         Workload {

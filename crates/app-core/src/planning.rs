@@ -229,7 +229,7 @@ mod tests {
         let planning = planning(&[]);
         for (row, representation) in planning.ladder.rows().iter().zip(&planning.representations) {
             assert_eq!(representation.sample_cameras.len(), row.camera_count as usize, "{row}");
-            let Camera::Pinhole(camera) = representation.sample_cameras[0];
+            let camera = representation.sample_cameras[0].reference();
             assert_eq!(camera.size_px.x, (400.0 * row.side_ratio).round() as u32, "{row}");
             let sampling: SamplingMethod = representation.sampling.parse().unwrap();
             sampling.check(&representation.sample_cameras).unwrap();
@@ -248,7 +248,7 @@ mod tests {
         let one = planning(&["--method", &default]);
         assert_eq!(distinct(&one, |row| row.method.clone()), BTreeSet::from([default]));
         let sized = planning(&["--sample-size", "320x240"]);
-        let Camera::Pinhole(camera) = sized.representations[0].sample_cameras[0];
+        let camera = sized.representations[0].sample_cameras[0].reference();
         assert_eq!((camera.size_px, sized.ladder.rows().len()), (UVec2::new(320, 240), 60));
         assert_eq!(args(&["--sample-size", "320x240"]).sample_size, SampleSize::Fixed(UVec2::new(320, 240)));
         for sampling in SamplingMethod::all() {

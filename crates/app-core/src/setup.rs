@@ -101,12 +101,20 @@ pub struct Setup {
 }
 
 /// The scene's mirrors, as sessions follow them.
-fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<(MirrorCell, Vec<PinholeCamera>)> {
+fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<(MirrorCell, Vec<Camera>)> {
     let (mirrors, beyond) = sampling::mirrors(scene, impostors);
     if beyond > 0 {
         tracing::info!(beyond, followed = mirrors.len(), "the smallest mirrors show the environment alone");
     }
     for mirror in &mirrors {
+        for candidate in &mirror.candidates {
+            let mark = if candidate.is_chosen { ", chosen" } else { "" };
+            tracing::info!(
+                "images {}: {:.2} % of mirrored rays unseen{mark}",
+                candidate.name,
+                candidate.unseen_ratio * 100.0
+            );
+        }
         let images = mirror.cameras.len();
         let of = |ratio: f32| format!("{:.1} %", ratio * 100.0);
         match mirror.unseen_ratio.map(|ratios| ratios.map(of)) {

@@ -122,7 +122,7 @@ fn samplers_treat_tiles_as_images() {
     let other = SamplerShare { node_name: "c".to_owned(), image_indices: vec![1, 2], ..cut.samplers[0].clone() };
     cut.samplers.push(other);
     assert_eq!(cut.validate(), Ok(()));
-    let heights: Vec<u32> = cut.sampled_cameras().iter().map(|Camera::Pinhole(c)| c.size_px.y).collect();
+    let heights: Vec<u32> = cut.sampled_cameras().iter().map(|camera| camera.size_px().y).collect();
     assert_eq!((heights.len(), heights[0] + heights[1]), (4, camera().size_px.y));
     assert_eq!(cut.sets_at_once(), 1);
     assert_eq!(cut.set_content(0), assignment().set_content(0), "a set shows the same however it is cut");

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use depth_image::{CameraError, LightError, PinholeCamera};
+use depth_image::{Camera, CameraError, LightError, PinholeCamera};
 
 use crate::limits::{MAX_FRAMES_PER_S, MAX_REASON_BYTES, MAX_TEXT_BYTES, MAX_TILES, MAX_VIEWPOINTS};
 
@@ -137,4 +137,12 @@ pub fn viewpoints(viewpoints: &[PinholeCamera]) -> Result<(), InvalidField> {
         camera.validate().map_err(|source| InvalidField::Camera { field: "viewpoints", source })
     };
     viewpoints.iter().try_for_each(check)
+}
+
+/// Views are made from pinholes.
+pub(crate) fn pinholes(cameras: &[Camera]) -> Result<(), InvalidField> {
+    let bent = cameras.iter().find(|camera| camera.pinhole().is_none());
+    bent.map_or(Ok(()), |camera| {
+        Err(InvalidField::out_of_range("sample_cameras.model", camera.model_name(), "pinhole in view cells"))
+    })
 }

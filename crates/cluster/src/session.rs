@@ -7,7 +7,9 @@ use glam::UVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::assignment::Assignment;
-use crate::check::{InvalidField, at_most, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints, within};
+use crate::check::{
+    InvalidField, at_most, frame_rate, nonempty, pinholes, ratio, reason, text, tile_count, viewpoints, within,
+};
 use crate::check_seconds;
 use crate::costs::Costs;
 use crate::limits::{MAX_FALLBACKS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS, MAX_VIEWS_PER_SET};
@@ -79,6 +81,7 @@ impl SessionRequest {
         nonempty(&self.lighting, "lighting")?;
         nonempty(&self.codec, "frame_codec")?;
         at_most(self.sample_cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras")?;
+        pinholes(&self.sample_cameras)?;
         check_view_size(self.typical_view.size_px, "typical_view.size_px")?;
         self.timeline.validate()?;
         frame_rate(self.frames_per_s)?;

@@ -7,7 +7,7 @@ use depth_image::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::check::{InvalidField, at_most, nonempty, within};
+use crate::check::{InvalidField, at_most, nonempty, pinholes, within};
 use crate::limits::{MAX_CELLS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS};
 use crate::scene::SceneRef;
 use crate::timeline::{Refinement, Timeline};
@@ -206,7 +206,7 @@ impl Workload {
 
     fn pinholes_of_cell(&self, cell: usize) -> Vec<PinholeCamera> {
         let range = self.cameras_of_cell(cell).unwrap_or_default();
-        self.sample_cameras[range].iter().map(|Camera::Pinhole(camera)| *camera).collect()
+        self.sample_cameras[range].iter().map(|camera| *camera.reference()).collect()
     }
 
     /// # Errors
@@ -215,7 +215,8 @@ impl Workload {
         self.scene.validate()?;
         self.check_cells()?;
         self.check_mirrors()?;
-        for Camera::Pinhole(camera) in &self.sample_cameras {
+        self.check_models()?;
+        for camera in &self.sample_cameras {
             camera.validate().map_err(|source| InvalidField::Camera { field: "sample_cameras", source })?;
         }
         nonempty(&self.sampling, "sampling_method")?;
@@ -247,6 +248,21 @@ impl Workload {
                 given,
                 "rising from 0, by 1 to 16 cameras each",
             ));
+        }
+        Ok(())
+    }
+
+    /// Views are made from pinholes. The images of a mirror are of one model.
+    fn check_models(&self) -> Result<(), InvalidField> {
+        let (of_views, _) = self.sample_cameras.split_at_checked(self.view_camera_count()).unwrap_or_default();
+        pinholes(of_views)?;
+        for cell in self.view_cell_count()..self.cell_count() {
+            let cameras = self.cameras_of_cell(cell).and_then(|range| self.sample_cameras.get(range)).unwrap_or(&[]);
+            let is_other = |camera: &&Camera| camera.model_name() != cameras[0].model_name();
+            if let Some(other) = cameras.iter().find(is_other) {
+                let expected = "the model of the mirror cell's first camera";
+                return Err(InvalidField::out_of_range("sample_cameras.model", other.model_name(), expected));
+            }
         }
         Ok(())
     }

@@ -132,9 +132,8 @@ impl Packer {
 }
 
 fn check_camera(header: &ImageHeader, camera: &Camera) -> Result<(), DecodeError> {
-    let Camera::Pinhole(pinhole) = camera;
     let (width, height) = (header.width, header.height);
-    let [camera_width, camera_height] = pinhole.size_px.to_array();
+    let [camera_width, camera_height] = camera.size_px().to_array();
     if (width, height) == (camera_width, camera_height) {
         return Ok(());
     }

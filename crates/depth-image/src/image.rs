@@ -111,9 +111,7 @@ impl DepthImage {
     /// Columns and rows.
     #[must_use]
     pub fn size_px(&self) -> UVec2 {
-        match &self.camera {
-            Camera::Pinhole(camera) => camera.size_px,
-        }
+        self.camera.size_px()
     }
 
     /// The sample's point in world space; `None` without a sample.

@@ -16,8 +16,10 @@ mod highlight;
 mod image;
 mod light;
 mod method_table;
+mod pinhole;
 #[cfg(any(test, feature = "scalar"))]
 mod scalar;
+mod single_pole;
 mod tiles;
 mod tone;
 mod view;
@@ -27,7 +29,7 @@ mod view_part;
 
 pub use antialias::{Antialias, AntialiasError};
 pub use bounds::Aabb;
-pub use camera::{Camera, CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera, PixelDepth, Ray};
+pub use camera::{Camera, CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray};
 pub use encoding::{linear_from_rgb9e5, linear_from_srgb8, oct16_from_unit, rgb9e5_from_linear, srgb8_from_linear};
 pub use environment_light::{BrightTexel, EnvironmentLight, LOBE_ROUGHNESS, LOBE_SIZE_PX, Lobe};
 pub use environment_map::{EnvironmentMap, EnvironmentMapError, MAX_ENVIRONMENT_SIZE_PX};
@@ -35,11 +37,13 @@ pub use highlight::{Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS, ROUGHEST_MIRRO
 pub use image::{BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId};
 pub use light::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
 pub use method_table::{NamedMethod, Setting, method_forms, method_help, method_named};
+pub use pinhole::PinholeCamera;
 #[cfg(any(test, feature = "scalar"))]
 pub use scalar::{
     Incident, Texel, disc_from_square, environment_highlight_linear, environment_reflectance_linear, highlight_linear,
     tangents_of, unit_from_oct16,
 };
+pub use single_pole::SinglePoleCamera;
 pub use tiles::TileError;
 pub use tone::{Exposure, ExposureEv, ToneCurve, ToneError, ToneMapping};
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};

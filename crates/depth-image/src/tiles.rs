@@ -21,11 +21,10 @@ impl Camera {
     /// The camera of tile number `tile`, from the top, of `count`. With fewer rows than tiles, some tiles are empty.
     #[must_use]
     pub fn tile(&self, tile: u32, count: u32) -> Self {
-        let Self::Pinhole(camera) = self;
-        let row = |i: u32| (u64::from(i) * u64::from(camera.size_px.y) / u64::from(count.max(1))) as u32;
+        let size_px = self.size_px();
+        let row = |i: u32| (u64::from(i) * u64::from(size_px.y) / u64::from(count.max(1))) as u32;
         let (first, end) = (row(tile), row(tile + 1));
-        let part = ViewPart { first_px: UVec2::new(0, first), size_px: UVec2::new(camera.size_px.x, end - first) };
-        Self::Pinhole(camera.part(&part))
+        self.part(&ViewPart { first_px: UVec2::new(0, first), size_px: UVec2::new(size_px.x, end - first) })
     }
 }
 
@@ -37,9 +36,9 @@ impl DepthImage {
     pub fn from_tiles(camera: Camera, tiles: Vec<Self>) -> Result<Self, TileError> {
         let count = tiles.len() as u32;
         for (number, tile) in tiles.iter().enumerate() {
-            let Camera::Pinhole(expected) = camera.tile(number as u32, count);
-            if tile.size_px() != expected.size_px {
-                return Err(TileError::Size { tile: number, given: tile.size_px(), expected: expected.size_px });
+            let expected = camera.tile(number as u32, count).size_px();
+            if tile.size_px() != expected {
+                return Err(TileError::Size { tile: number, given: tile.size_px(), expected });
             }
             tile.validate().map_err(|source| TileError::Planes { tile: number, source })?;
         }

@@ -9,15 +9,14 @@ fn camera() -> Camera {
 
 /// Every texel encodes its ray, so that a test detects a row in the wrong place.
 fn image(camera: Camera) -> DepthImage {
-    let Camera::Pinhole(pinhole) = camera;
     let texels = |size: UVec2| (0..size.y).flat_map(move |y| (0..size.x).map(move |x| UVec2::new(x, y)));
     let encoded = |texel: UVec2| {
-        let direction = pinhole.ray(texel.as_vec2() + 0.5).direction_in_world;
+        let direction = camera.ray(texel.as_vec2() + 0.5).direction_in_world;
         (direction.dot(Vec3::new(3.0, 5.0, 7.0)) * 1000.0).round()
     };
     let corner =
-        |texel: UVec2| (pinhole.ray(texel.as_vec2()).direction_in_world.dot(Vec3::new(3.0, 5.0, 7.0)) * 1000.0).round();
-    let plane: Vec<f32> = texels(pinhole.size_px).map(encoded).collect();
+        |texel: UVec2| (camera.ray(texel.as_vec2()).direction_in_world.dot(Vec3::new(3.0, 5.0, 7.0)) * 1000.0).round();
+    let plane: Vec<f32> = texels(camera.size_px()).map(encoded).collect();
     DepthImage {
         camera,
         inverse_depth_per_m: plane.clone(),
@@ -29,7 +28,7 @@ fn image(camera: Camera) -> DepthImage {
             visibility8: vec![plane.iter().map(|v| v.to_bits() ^ 3).collect(); 2],
         }),
         passed: Some(plane.iter().map(|v| v.to_bits() & 1 == 1).collect()),
-        corner_inverse_depth_per_m: Some(texels(pinhole.size_px + 1).map(corner).collect()),
+        corner_inverse_depth_per_m: Some(texels(camera.size_px() + 1).map(corner).collect()),
     }
 }
 

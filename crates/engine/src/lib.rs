@@ -306,7 +306,7 @@ fn gpu_error(error: GpuError) -> EngineError {
 
 fn render_error(error: RenderError) -> EngineError {
     match error {
-        RenderError::Camera { .. } => invalid("camera", error),
+        RenderError::Camera { .. } | RenderError::Model { .. } => invalid("camera", error),
         RenderError::Gpu(error) => gpu_error(error),
         RenderError::Shader(_) => device(error),
     }
@@ -321,6 +321,7 @@ fn reconstruction_error(error: ReconstructionError) -> EngineError {
         ReconstructionError::Shader(_) | ReconstructionError::MissingPlane { .. } => device(error),
         ReconstructionError::MirrorCells(_) => invalid("mirror_cells", error),
         ReconstructionError::Reflections(_) => invalid("reflections", error),
+        ReconstructionError::Model { .. } | ReconstructionError::CurvedSearch { .. } => invalid("sample_images", error),
     }
 }
 

@@ -9,7 +9,7 @@ use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use gpu::DevicePreference;
 use node::{DirectWork, Engine, MirrorSet, SampleSet, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
-use sampling::Impostors;
+use sampling::{Impostors, Mirror};
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 
 const LIGHTING: &str = "shadows, reflections 1";
@@ -39,7 +39,8 @@ impl Stand {
     fn mirrors(&self) -> Vec<MirrorSet> {
         let (mirrors, beyond) = sampling::mirrors(&self.scene, Impostors::default());
         assert_eq!((mirrors.len(), beyond), (1, 0));
-        mirrors.into_iter().map(|mirror| (mirror.bounds, self.set(&mirror.cameras, true))).collect()
+        let pinholes = |mirror: &Mirror| mirror.cameras.iter().map(|camera| *camera.reference()).collect::<Vec<_>>();
+        mirrors.iter().map(|mirror| (mirror.bounds, self.set(&pinholes(mirror), true))).collect()
     }
 
     fn view(&self, set: &dyn UploadedSet) -> View {

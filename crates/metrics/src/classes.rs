@@ -110,7 +110,7 @@ fn surface_class(point_in_world: Vec3, sample_images: &[DepthImage]) -> PixelCla
 }
 
 fn matches_sample(image: &DepthImage, point_in_world: Vec3) -> bool {
-    let depth_image::Camera::Pinhole(camera) = &image.camera;
+    let camera = image.camera.reference();
     let Some(at) = camera.project(point_in_world).filter(|at| camera.contains(at.pixel)) else {
         return false;
     };

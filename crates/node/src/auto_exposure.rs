@@ -1,9 +1,7 @@
 //! The exposure of sessions that leave it to the plan.
 
 use cluster::Workload;
-use depth_image::{
-    Camera, ExposureEv, PinholeCamera, ToneCurve, ToneMapping, View, ViewCell, ViewPlanes, linear_from_srgb8,
-};
+use depth_image::{ExposureEv, PinholeCamera, ToneCurve, ToneMapping, View, ViewCell, ViewPlanes, linear_from_srgb8};
 use glam::{UVec2, Vec2};
 
 use crate::engine::{DirectWork, Engine, EngineError, Turn};
@@ -72,7 +70,7 @@ fn limited(ev: f32) -> ExposureEv {
 /// The view in the middle of the first view cell.
 fn default_view(workload: &Workload) -> Option<PinholeCamera> {
     let cameras = workload.sample_cameras.get(workload.cameras_of_cell(0)?)?;
-    let cameras: Vec<PinholeCamera> = cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+    let cameras: Vec<PinholeCamera> = cameras.iter().map(|camera| *camera.reference()).collect();
     Some(ViewCell::between(&cameras)?.camera_at(Vec2::ZERO, SIZE_PX))
 }
 

@@ -106,15 +106,15 @@ impl Measurement<'_> {
     /// The overhead of a tile, measured on a tile of one row, and the shares of rows, measured on quarters of the height.
     /// Each quarter is of another image, since images differ. Images of too few rows are not tileable.
     fn tile_costs(&self, whole: &SampleWork, sample_image_s: f64) -> Result<Option<TileCosts>, Status> {
-        let Some(Camera::Pinhole(first)) = whole.cameras.first().copied() else { return Ok(None) };
-        if whole.cameras.iter().any(|Camera::Pinhole(camera)| (camera.size_px.y as usize) < ROW_PARTS) {
+        let Some(first) = whole.cameras.first().copied() else { return Ok(None) };
+        if whole.cameras.iter().any(|camera| (camera.size_px().y as usize) < ROW_PARTS) {
             return Ok(None);
         }
         let tile_s = |camera: Camera| {
             let work = SampleWork { cameras: vec![camera], wanted: vec![0], ..whole.clone() };
             Ok::<f64, Status>(self.timed(|| self.sampled(&work))?.1)
         };
-        let row_s = tile_s(Camera::Pinhole(first).tile(0, first.size_px.y))?;
+        let row_s = tile_s(first.tile(0, first.size_px().y))?;
         let mut quarters_s = [0.0; ROW_PARTS];
         for (quarter, camera) in whole.cameras.iter().cycle().take(ROW_PARTS).enumerate() {
             quarters_s[quarter] = tile_s(camera.tile(quarter as u32, ROW_PARTS as u32))?;

@@ -39,7 +39,7 @@ fn camera() -> PinholeCamera {
 }
 
 fn image(camera: &Camera) -> DepthImage {
-    let Camera::Pinhole(PinholeCamera { size_px, .. }) = camera;
+    let size_px = camera.size_px();
     let texels = size_px.element_product() as usize;
     DepthImage {
         camera: *camera,
@@ -64,10 +64,10 @@ fn views(cameras: &[PinholeCamera]) -> Vec<View> {
 }
 
 impl Sleeper {
-    fn sample_parts_s(&self, Camera::Pinhole(part): &Camera) -> f64 {
+    fn sample_parts_s(&self, part: &Camera) -> f64 {
         let Some((image_s, rows_s)) = self.parts_s else { return 0.0 };
-        let first = (camera().principal_px.y - part.principal_px.y) as usize;
-        image_s + rows_s[first..first + part.size_px.y as usize].iter().sum::<f64>()
+        let first = (camera().principal_px.y - part.reference().principal_px.y) as usize;
+        image_s + rows_s[first..first + part.size_px().y as usize].iter().sum::<f64>()
     }
 }
 

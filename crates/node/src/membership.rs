@@ -136,7 +136,7 @@ async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plans: &PlansI
 fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), EngineError> {
     let turn = Turn::of(WorkClass::Batch);
     let workload = small(&plan.workload.of_one_view());
-    let Some(Camera::Pinhole(view)) = workload.sample_cameras.first().copied() else { return Ok(()) };
+    let Some(view) = workload.sample_cameras.first().map(|camera| *camera.reference()) else { return Ok(()) };
     if plan.policy == Policy::Direct {
         return engine.draw_direct(&DirectWork::of(&workload, vec![view], ViewPlanes::default()), turn).map(drop);
     }
@@ -151,7 +151,7 @@ fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), En
 }
 
 fn small(workload: &Workload) -> Workload {
-    let camera = |Camera::Pinhole(camera): &Camera| Camera::Pinhole(camera.resized(SIZE_PX));
+    let camera = |camera: &Camera| camera.resized(SIZE_PX);
     Workload { sample_cameras: workload.sample_cameras.iter().map(camera).collect(), ..workload.clone() }
 }
 
@@ -188,6 +188,6 @@ mod tests {
                 (sampled, sampled, drawn)
             );
         }
-        assert!(small(&request(1).workload).sample_cameras.iter().all(|Camera::Pinhole(c)| c.size_px == SIZE_PX));
+        assert!(small(&request(1).workload).sample_cameras.iter().all(|camera| camera.size_px() == SIZE_PX));
     }
 }

@@ -13,8 +13,8 @@ const PYRAMID_TEXEL_BYTES: usize = 11;
 #[must_use]
 pub fn most_image_bytes(illumination: &Illumination, cameras: &[Camera]) -> usize {
     let visibility_bytes = 4 * SpecularPlanes::visibility_planes(illumination.lights.len());
-    let bytes = |Camera::Pinhole(camera): &Camera| {
-        let corners = (camera.size_px.x as usize + 1) * (camera.size_px.y as usize + 1);
+    let bytes = |camera: &Camera| {
+        let corners = (camera.size_px().x as usize + 1) * (camera.size_px().y as usize + 1);
         camera.pixel_count() * (MOST_TEXEL_BYTES + visibility_bytes) + corners * CORNER_BYTES
     };
     cameras.iter().map(bytes).sum()
@@ -23,7 +23,7 @@ pub fn most_image_bytes(illumination: &Illumination, cameras: &[Camera]) -> usiz
 /// The most bytes of a set on a device.
 #[must_use]
 pub fn most_set_bytes(illumination: &Illumination, cameras: &[Camera]) -> usize {
-    let texels: usize = cameras.iter().map(|Camera::Pinhole(camera)| camera.pixel_count()).sum();
+    let texels: usize = cameras.iter().map(Camera::pixel_count).sum();
     most_image_bytes(illumination, cameras) + texels * PYRAMID_TEXEL_BYTES
 }
 

@@ -27,6 +27,13 @@ pub enum ReconstructionError {
     MirrorCells(usize),
     #[error("rays meet at most {MAX_REFLECTIONS} mirrors, not {0}")]
     Reflections(u32),
+    /// Views are reconstructed from pinhole images; others show what mirrors do.
+    #[error("images of {model} cameras are followed by mirrored rays alone")]
+    Model { model: &'static str },
+    #[error(
+        "steps of {coarse_px} and {fine_px} texels: fine ones are 0.0625 at least, coarse ones as long or longer, up to 64"
+    )]
+    CurvedSearch { coarse_px: f32, fine_px: f32 },
     #[error("the volume of the sample set is empty or not finite")]
     Volume,
 }

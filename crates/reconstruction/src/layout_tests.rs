@@ -11,6 +11,7 @@ use crate::{
     pixel_list::GpuPixelList,
     quads::{GpuCutWork, GpuQuadWork},
     shaders::{shader_sources, templates},
+    single_pole::GpuPole,
     view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume},
 };
 
@@ -74,6 +75,7 @@ fn shader(module: &Module, name: &str) -> Layout {
 fn views_and_sample_cameras_agree_in_every_pass_over_cameras() {
     let passes = BTreeSet::from([
         "antialias.wgsl",
+        "bounce/curved_search.wgsl",
         "bounce/land.wgsl",
         "bounce/march.wgsl",
         "fill.wgsl",
@@ -150,12 +152,13 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
     let count = offset_of!(GpuPixelList, count);
     let fields = [("workgroups", first), ("y", first + 4), ("z", first + 8), ("count", count)];
     let list = Layout::new(fields, size_of::<GpuPixelList>());
-    let searches = ["joint_carve.wgsl", "light_field_search.wgsl", "resolve.wgsl"];
+    let searches = ["bounce/curved_search.wgsl", "joint_carve.wgsl", "light_field_search.wgsl", "resolve.wgsl"];
     let marches = ["bounce/march.wgsl", "joint_carve/march.wgsl", "joint_carve/smooth.wgsl"];
     let written = [&searches[..], &marches].concat();
     assert_eq!(templates_that_agree("UndecidedList", &list), BTreeSet::from_iter(written));
     let read = [
         "antialias.wgsl",
+        "bounce/curved_search.wgsl",
         "bounce/land.wgsl",
         "bounce/march.wgsl",
         "fill.wgsl",
@@ -170,10 +173,18 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
 fn mirrored_rays_and_mirror_boxes_agree_where_they_are_written_and_read() {
     let ray =
         host!(GpuMirroredRay { origin_in_world, pixel, direction, guess, throughput_rgb9e5, near_m, width_m, spread });
-    let passes = ["bounce/land.wgsl", "bounce/march.wgsl", "joint_carve.wgsl", "specular.wgsl"];
+    let passes =
+        ["bounce/curved_search.wgsl", "bounce/land.wgsl", "bounce/march.wgsl", "joint_carve.wgsl", "specular.wgsl"];
     assert_eq!(templates_that_agree("MirroredRay", &ray), BTreeSet::from(passes));
     let boxes = host!(GpuMirrorBox { min_in_world, first_listed, max_in_world, padding });
     assert_eq!(templates_that_agree("MirrorBox", &boxes), BTreeSet::from(["bounce/land.wgsl", "specular.wgsl"]));
+}
+
+#[test]
+fn poles_agree_where_curved_rays_are_followed_and_land() {
+    let pole = host!(GpuPole { pole_px, bend_px_m, nearest_per_m, farthest_per_m, padding_0, padding_1, padding_2 });
+    let passes = ["bounce/curved_search.wgsl", "bounce/land.wgsl"];
+    assert_eq!(templates_that_agree("Pole", &pole), BTreeSet::from(passes));
 }
 
 #[test]

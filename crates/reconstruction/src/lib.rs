@@ -16,6 +16,7 @@ mod methods;
 mod pixel_list;
 mod pyramid;
 mod quads;
+mod ray_ends;
 mod reconstructor;
 mod recording;
 mod reflectors;
@@ -23,17 +24,19 @@ mod sample_set;
 #[cfg(feature = "scalar")]
 pub mod scalar;
 mod shaders;
+mod single_pole;
 mod specular;
 mod surface;
 mod tile_start;
 mod view_work;
 
-pub use bounce::{MirrorCell, Mirrors};
+pub use bounce::{CurvedSearch, MirrorCell, Mirrors};
 pub use error::ReconstructionError;
 pub use in_flight::Statistics;
 pub use methods::{METHODS, ReconstructionMethod, UnknownMethod};
 pub use pyramid::CodedDepth;
 pub use quads::{ErrorBound, MeshStatistics, Quad, RequiredPlanes};
+pub use ray_ends::{RayEnd, RayWork};
 pub use reconstructor::Reconstructor;
 pub use sample_set::{SampleSet, SetDescription};
 pub use shaders::{shader_sources, shaders, templates};

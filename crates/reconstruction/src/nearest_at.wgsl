@@ -7,4 +7,4 @@
     let camera = work.cameras[nearest];
     let p = homogeneous(camera.homogeneous_pixel_from_world, vec4f(point_in_world, 1.0));
     let inverse_w = safe_reciprocal(p.z);
-    let uv = clamp(p.xy * inverse_w - 0.5, vec2f(0.0), camera.cells - CELL_MARGIN_PX);
+    let uv = clamp({{ "moved(poles.cameras[nearest], p.xy * inverse_w, inverse_w)" if single_pole else "p.xy * inverse_w" }} - 0.5, vec2f(0.0), camera.cells - CELL_MARGIN_PX);

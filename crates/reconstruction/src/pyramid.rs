@@ -1,6 +1,6 @@
 //! Depth as 15-bit codes, which neighbours are one surface, and the min-max pyramid over them.
 
-use depth_image::{Camera, DepthImage};
+use depth_image::DepthImage;
 
 /// Code of a texel without a sample.
 pub(crate) const HOLE_CODE: u16 = 0;
@@ -46,7 +46,7 @@ impl CodedDepth {
             0.0 => BACKGROUND_CODE,
             _ => HOLE_CODE,
         };
-        let Camera::Pinhole(camera) = &image.camera;
+        let camera = image.camera.reference();
         let codes: Vec<u16> = image.inverse_depth_per_m.iter().map(code).collect();
         Self {
             size_px: image.size_px().to_array(),

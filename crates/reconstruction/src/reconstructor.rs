@@ -3,15 +3,16 @@
 
 use std::sync::Arc;
 
-use depth_image::{Antialias, DepthImage, PinholeCamera, View, ViewPlanes};
+use depth_image::{Antialias, DepthImage, PinholeCamera, Ray, View, ViewPlanes};
 use glam::Vec2;
 use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
-use crate::bounce::{self, Bounces, Mirrors};
+use crate::bounce::{self, Bounces, CurvedSearch, Mirrors};
 use crate::in_flight::{InFlight, Statistics};
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
+use crate::ray_ends::{RayEnd, RayWork, follow_rays};
 use crate::recording::{MIRRORED_PIXELS_A_BATCH, MIRRORED_PIXELS_A_SLICE, PIXELS_A_BATCH, Recording, batches};
 use crate::sample_set::{SampleSet, SetDescription};
 use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
@@ -224,7 +225,8 @@ impl Reconstructor {
         let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), mirrors.cells.len()));
         let output = (planes, count_fetches);
         let mut recording = Recording::begin(&self.device, set, cameras, output, (family, turn))?;
-        let bounces = Bounces::lend(&self.device, mirrors, recording.batch.plane_bytes as usize / 4)?;
+        let rays = recording.batch.plane_bytes as usize / 4;
+        let bounces = Bounces::lend(&self.device, mirrors, rays, CurvedSearch::default())?;
         self.record_positions(Request { bounces: bounces.as_ref(), ..request }, &mut recording)?;
         recording.batch.bounces = bounces.map_or(Vec::new(), Bounces::into_memory);
         Ok(recording)
@@ -286,6 +288,15 @@ impl Reconstructor {
         let first = bounces.next(&self.device, None);
         specular::record(recording, listed, Some((bounces, &first)))?;
         bounce::record(recording, bounces, first)
+    }
+
+    /// Where single rays end in images of a mirror's surroundings, followed as rays off mirrors are; also the seconds on the
+    /// device. Directions are of unit length.
+    ///
+    /// # Errors
+    /// Steps that cannot be used, too many rays, or the device.
+    pub fn follow(&self, work: RayWork<'_>, rays: &[Ray]) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
+        follow_rays(&self.device, work, rays)
     }
 
     /// Statistics of the quads that a method draws; `None` for methods that draw none.

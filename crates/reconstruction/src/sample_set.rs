@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
-use depth_image::{Aabb, Camera, DepthImage, Environment, Highlight, Illumination, PinholeCamera};
-use glam::{UVec2, Vec2};
+use depth_image::{Aabb, DepthImage, Environment, Highlight, Illumination, PinholeCamera};
+use glam::{UVec2, Vec2, Vec3};
 use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
 use wgpu::TextureFormat;
 
 use crate::bounce::mips::{mip_texels, mips};
 use crate::pyramid::{CodedDepth, Pyramid, is_among_holes};
+use crate::single_pole::{GpuPole, poles};
 use crate::view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant};
 use crate::{error::ReconstructionError, quads::SetMeshes, reflectors::Reflectors};
 
@@ -41,6 +42,8 @@ pub struct SampleSet {
     /// Images of which some texels prove nothing, by their bits in provenance.
     pub(crate) uncertain: Vec<bool>,
     pub(crate) volume: GpuVolume,
+    /// Of images of single-pole cameras: one for each; else none.
+    pub(crate) poles: Vec<GpuPole>,
     /// As `background.wgsl` reads it.
     pub(crate) background: wgpu::Buffer,
     /// Two words for each node of the pyramids.
@@ -60,6 +63,16 @@ impl SampleSet {
         SetVariant { cameras: self.cameras.len(), holes: self.uncertain.contains(&true), count_fetches: false }
     }
 
+    /// The eye of its first image.
+    pub(crate) fn eye_in_world(&self) -> Vec3 {
+        self.cameras[0].eye_in_world.into()
+    }
+
+    /// Its images are those of single-pole cameras.
+    pub(crate) fn is_single_pole(&self) -> bool {
+        !self.poles.is_empty()
+    }
+
     /// The resources of `background.wgsl`.
     pub(crate) fn background_bindings(&self) -> Vec<Binding<'_>> {
         match &self.environment {
@@ -77,6 +90,11 @@ impl SampleSet {
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
         check(tables, images, set)?;
+        let other_model = |index| ReconstructionError::Sample {
+            index,
+            reason: format!("a {} image, the first is of another model", images[index].camera.model_name()),
+        };
+        let poles = poles(images).map_err(other_model)?;
         let among_holes = is_among_holes(images);
         let coded = |image| CodedImage::of(image, among_holes, set.mips);
         // One thread leaves the other cores to live streams.
@@ -106,6 +124,7 @@ impl SampleSet {
         Ok(Self {
             cameras,
             uncertain,
+            poles,
             volume: gpu_volume(&searched_volume(&set.volume, images)),
             background: background_buffer(tables, &set.background),
             nodes: tables.upload("depth pyramids", TextureFormat::Rg32Uint, &nodes, turn)?,
@@ -133,7 +152,7 @@ impl CodedImage {
     fn of(image: &DepthImage, among_holes: bool, with_mips: bool) -> Self {
         let depth = CodedDepth::in_set(image, among_holes);
         let pyramid = Pyramid::of(&depth);
-        let Camera::Pinhole(camera) = &image.camera;
+        let camera = image.camera.reference();
         let gpu_camera = GpuSampleCamera {
             homogeneous_pixel_from_world: camera.homogeneous_pixel_from_world().map(|row| row.to_array()),
             eye_in_world: camera.eye_in_world.to_array(),
@@ -164,11 +183,11 @@ fn check(tables: &TablePool, images: &[DepthImage], set: &SetDescription<'_>) ->
         return Err(ReconstructionError::Volume);
     }
     for (index, image) in images.iter().enumerate() {
-        let Camera::Pinhole(camera) = &image.camera;
+        let camera = &image.camera;
         let wrong = |reason: String| ReconstructionError::Sample { index, reason };
         camera.validate().map_err(|error| wrong(error.to_string()))?;
         image.validate().map_err(|error| wrong(error.to_string()))?;
-        if camera.size_px.min_element() < 2 {
+        if camera.size_px().min_element() < 2 {
             return Err(wrong("an image of one row or column has no surface between samples".to_owned()));
         }
     }

@@ -6,8 +6,8 @@ use minijinja::Value;
 
 use crate::antialias::Shown;
 use crate::bounce::{
-    BOUNCE_LEVEL, BounceMarch, EDGE_COSINE, LEAST_RISE, LEAST_WAY, Land, MARCH_ROUNDS, MAX_BOUNCE_MOVES,
-    START_FOOTPRINTS,
+    BOUNCE_LEVEL, BounceMarch, CurvedWalk, EDGE_COSINE, LEAST_RISE, LEAST_WAY, Land, MARCH_ROUNDS, MAX_BOUNCE_MOVES,
+    MAX_WALK_STEPS, START_FOOTPRINTS,
 };
 use crate::fill::{DIRECTIONS, Fill, REACH_PX, SAME_SIDE};
 use crate::pyramid::{BACKGROUND_CODE, FLAT_FOOTPRINTS, HOLE_CODE, SLOPE_SHARE};
@@ -20,9 +20,9 @@ use crate::view_work::{CELL_MARGIN_PX, FAR_AWAY, TILE_PX};
 use crate::{methods, pixel_list::LIST_WORKGROUP, quads, specular::Specular};
 
 /// Passes over whole views, and templates that several shaders include.
-const SHADERS: [(&str, &str); 17] = wgsl_files! {
+const SHADERS: [(&str, &str); 19] = wgsl_files! {
     "antialias.wgsl", "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "pixel_list.wgsl",
-    "gathered.wgsl", "gather_at.wgsl", "nearest_at.wgsl", "colors.wgsl", "bounce/ray.wgsl", "bounce/spawn.wgsl", "bounce/march.wgsl", "bounce/mips.wgsl", "bounce/land.wgsl"
+    "gathered.wgsl", "gather_at.wgsl", "nearest_at.wgsl", "colors.wgsl", "bounce/ray.wgsl", "bounce/spawn.wgsl", "bounce/march.wgsl", "bounce/curved_search.wgsl", "single_pole.wgsl", "bounce/mips.wgsl", "bounce/land.wgsl"
 };
 
 const PROVENANCE_EMPTY: u32 = ProvenanceKind::Empty as u32;
@@ -45,7 +45,7 @@ pub fn templates() -> Result<Templates, ShaderError> {
         ANGLE_FLOOR, BACKGROUND_CODE, BORDER_PX, BOUNCE_LEVEL, CARVING_SHARE, CELL_MARGIN_PX, FAR_AWAY, FLAT_FOOTPRINTS,
         GREATEST_TILE_MOVE, HALF_CODE, HALF_DIAGONAL, HIDDEN_WEIGHT, HOLE_CODE, LEAST_SHARE, LEAST_TILE_MOVE,
         LIST_WORKGROUP, MAX_TILE_MOVES, PROVENANCE_EMPTY, PROVENANCE_FILLED, PROVENANCE_GUESSED, PROVENANCE_HIT, REACH_PX, SAME_SIDE,
-        EDGE_COSINE, LEAST_RISE, LEAST_WAY, MARCH_ROUNDS, MAX_BOUNCE_MOVES, SLOPE_SHARE, SPLIT_SHIFT, START_FOOTPRINTS, THICKNESS_FOOTPRINTS, TILE_PX, WHOLE
+        EDGE_COSINE, LEAST_RISE, LEAST_WAY, MARCH_ROUNDS, MAX_BOUNCE_MOVES, MAX_WALK_STEPS, SLOPE_SHARE, SPLIT_SHIFT, START_FOOTPRINTS, THICKNESS_FOOTPRINTS, TILE_PX, WHOLE
     };
     let templates = Templates::new(&shaders())?
         .with_constants([("DIRECTIONS", Value::from_iter(DIRECTIONS.map(Value::from_iter)))]);
@@ -54,7 +54,7 @@ pub fn templates() -> Result<Templates, ShaderError> {
 
 /// The texts of all variants of all passes.
 pub fn shader_sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    gpu::shader_sources!(templates, TileStart, Fill, Specular, BounceMarch, Land, Shown)
+    gpu::shader_sources!(templates, TileStart, Fill, Specular, BounceMarch, CurvedWalk, Land, Shown)
         .chain(quads::sources(templates))
         .chain(methods::sources(templates))
 }

@@ -32,6 +32,7 @@ impl ShaderVariant for Specular {
 
     fn context(&self) -> Value {
         context! {
+            single_pole => false,
             highlight => highlight_name(self.highlight),
             light_slots => light_slots(self.lights),
             environment_map => self.environment_map,

@@ -2,7 +2,7 @@
 
 use std::{array, collections::VecDeque, ops::Range};
 
-use depth_image::PinholeCamera;
+use depth_image::Camera;
 use gpu::PooledBuffer;
 use parking_lot::Mutex;
 
@@ -17,7 +17,7 @@ pub(crate) struct Key {
     pub scene: u64,
     pub lighting: Lighting,
     pub scene_time_s: f32,
-    pub cameras: Vec<PinholeCamera>,
+    pub cameras: Vec<Camera>,
     pub by_rays: bool,
     pub output: Output,
     /// The first image's.

@@ -3,7 +3,7 @@
 use std::{ops::Range, sync::Arc};
 
 use bytemuck::Zeroable;
-use depth_image::{Antialias, PinholeCamera, ToneMapping};
+use depth_image::{Antialias, Camera, ToneMapping};
 use glam::Vec2;
 use gpu::{BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVariant, WorkKind};
 
@@ -24,7 +24,8 @@ const UNKNOWN_SLICE_RAYS: u64 = 1 << 14;
 /// One submission's work, once it is known how surfaces are found.
 pub(crate) struct Batch<'a> {
     pub work: DrawWork<'a>,
-    pub cameras: &'a [PinholeCamera],
+    /// All of one model.
+    pub cameras: &'a [Camera],
     /// Surfaces are found by rays.
     pub by_rays: bool,
     /// The tree, where rays are traced.
@@ -62,7 +63,7 @@ pub(crate) struct Recording<'a> {
 }
 
 /// The number of a position, and the cameras whose pixels' centres are there.
-pub(crate) type Position = (u32, Vec<PinholeCamera>);
+pub(crate) type Position = (u32, Vec<Camera>);
 
 impl Batch<'_> {
     /// All positions within the pixels. The centre of a depth image comes first; that of a view last, for depth alone.
@@ -80,6 +81,11 @@ impl Batch<'_> {
         Batch { work, cameras, by_rays, traced: traced.clone(), output, tone, sequence, position: *position }
     }
 
+    /// Whether the rays of its pixels bend around a pole.
+    pub fn is_single_pole(&self) -> bool {
+        matches!(self.cameras.first(), Some(Camera::SinglePole(_)))
+    }
+
     /// Whether colour is wanted of this position.
     pub fn has_color(&self) -> bool {
         self.output.samples || self.position < self.output.antialias.samples()
@@ -87,7 +93,7 @@ impl Batch<'_> {
 
     /// The bytes of planes of all pixels.
     pub fn bytes(&self, planes: usize) -> u64 {
-        let pixels: usize = self.cameras.iter().map(PinholeCamera::pixel_count).sum();
+        let pixels: usize = self.cameras.iter().map(Camera::pixel_count).sum();
         4 * pixels as u64 * planes as u64
     }
 
@@ -96,8 +102,9 @@ impl Batch<'_> {
         let DrawWork { scene, lighting, scene_time_s, .. } = self.work;
         // The samples of a sequence's image depend on all cameras of its set, and on its place among them.
         let set = self.sequence.map_or(&[][..], |sequence| &sequence.known.cameras);
+        let set: Vec<Camera> = set.iter().copied().map(Camera::from).collect();
         let redundancy = self.sequence.map(|sequence| sequence.known.variant(sequence.first));
-        let (cameras, by_rays, output) = ([set, self.cameras].concat(), self.by_rays, self.output);
+        let (cameras, by_rays, output) = ([&set, self.cameras].concat(), self.by_rays, self.output);
         Key { scene: scene.identity, lighting, scene_time_s, cameras, by_rays, output, redundancy }
     }
 
@@ -174,7 +181,7 @@ impl Batch<'_> {
     fn uniform(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums, rays: Rays) -> wgpu::Buffer {
         let [planes, sum_planes] = [self.output.layout().count, self.output.sums.count()].map(|count| count as u32);
         let (mut first_word, mut first_sum) = (0, 0);
-        let place = |camera: &PinholeCamera| {
+        let place = |camera: &Camera| {
             let camera = PixelCamera { first_word, first_sum, ..PixelCamera::of(camera, self.position) };
             first_word += camera.pixel_count * planes;
             first_sum += camera.pixel_count * sum_planes;
@@ -212,7 +219,7 @@ impl Recording<'_> {
         camera: usize,
         of_piece: impl Fn(usize, Piece, u32) -> (Vec<&'b BoundGroup>, DispatchSize<'b>),
     ) {
-        let width_px = self.batch.cameras[camera].size_px.x;
+        let width_px = self.batch.cameras[camera].size_px().x;
         for (place, (element, piece)) in self.pieces.of_camera(camera).enumerate() {
             let (groups, size) = of_piece(place, piece, width_px);
             pass.dispatch_each(&mut self.frame, &groups, element..element + 1, size);
@@ -221,14 +228,14 @@ impl Recording<'_> {
     }
 }
 
-/// Runs of cameras, bounded in number and pixels; at least one camera each.
-pub(crate) fn batches(cameras: &[PinholeCamera], most_pixels: usize) -> impl Iterator<Item = &[PinholeCamera]> {
+/// Runs of cameras of one model, bounded in number and pixels; at least one camera each.
+pub(crate) fn batches(cameras: &[Camera], most_pixels: usize) -> impl Iterator<Item = &[Camera]> {
     let mut rest = cameras;
     std::iter::from_fn(move || {
         let mut pixels = 0;
-        let fits = |camera: &&PinholeCamera| {
+        let fits = |camera: &&Camera| {
             pixels += camera.pixel_count();
-            pixels <= most_pixels
+            pixels <= most_pixels && camera.model_name() == rest[0].model_name()
         };
         let count = rest.iter().take(CAMERAS_A_SUBMISSION).take_while(fits).count().max(1).min(rest.len());
         let (batch, others) = rest.split_at(count);

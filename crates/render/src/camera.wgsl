@@ -31,6 +31,12 @@ struct PixelCamera {
     // This dispatch's lamps.
     first_light: u32,
     end_light: u32,
+{%- if single_pole %}
+    pole_px: vec2f,
+    // The pixels that a point moves for each inverse metre of depth.
+    bend_px_m: f32,
+    farthest_m: f32,
+{%- endif %}
 }
 
 @group(0) var<uniform> camera: PixelCamera;
@@ -40,9 +46,13 @@ fn pixel_at(id: vec3u, step: u32) -> vec2u { return vec2u(id.x, id.y) * step + v
 
 fn is_beyond(pixel: vec2u) -> bool { return pixel.x >= camera.size_px.x || pixel.y >= camera.end_row; }
 
+{% if single_pole %}
+{% include "single_pole.wgsl" %}
+{%- else -%}
 fn direction_of(pixel: vec2u) -> vec3f {
     let center = vec2f(pixel) + 0.5;
     return camera.column_in_world * center.x + camera.row_in_world * center.y + camera.corner_in_world;
 }
+{% endif %}
 
 fn place_of(pixel: vec2u) -> u32 { return pixel.y * camera.size_px.x + pixel.x; }

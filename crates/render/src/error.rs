@@ -11,4 +11,7 @@ pub enum RenderError {
     /// A camera of the request is invalid.
     #[error("camera {index}: {source}")]
     Camera { index: usize, source: depth_image::CameraError },
+    /// Some pictures are taken by pinholes alone.
+    #[error("camera {index} is a {model}, must be a pinhole for {what}")]
+    Model { index: usize, model: &'static str, what: &'static str },
 }

@@ -34,6 +34,8 @@ pub(crate) struct GpuFinish {
 #[derive(Debug)]
 pub(crate) struct Finish {
     by_rays: bool,
+    /// Rays around a pole.
+    single_pole: bool,
     lit: bool,
     /// The environment is a map, which is the background, too.
     environment_map: bool,
@@ -47,7 +49,7 @@ impl Finish {
         let antialias = if is_averaged { Antialias::MOST } else { Antialias::NONE };
         let output = Output { depth: false, antialias, ..batch.output };
         let (lit, environment_map) = (batch.work.lighting.is_lit(), batch.work.scene.environment.is_some());
-        Self { by_rays: batch.by_rays, lit, environment_map, output }
+        Self { by_rays: batch.by_rays, single_pole: batch.is_single_pole(), lit, environment_map, output }
     }
 
     /// The variants with each usefulness test.
@@ -67,7 +69,13 @@ impl Finish {
     fn of_output(output: Output) -> impl Iterator<Item = Self> {
         let each = move |sums| {
             let output = Output { sums, ..output };
-            switches().map(move |[by_rays, lit, environment_map]| Self { by_rays, lit, environment_map, output })
+            switches().map(move |[by_rays, lit, environment_map]| Self {
+                by_rays,
+                single_pole: false,
+                lit,
+                environment_map,
+                output,
+            })
         };
         SumPlanes::all().flat_map(each)
     }
@@ -82,6 +90,7 @@ impl ShaderVariant for Finish {
         let PlaneLayout { normal, reflector, surface_id, passed, count } = self.output.layout();
         context! {
             by_rays => self.by_rays,
+            single_pole => self.single_pole,
             lit => self.lit,
             environment_map => self.environment_map,
             highlight => highlight.map(highlight_name),
@@ -106,7 +115,10 @@ impl ShaderVariant for Finish {
         let views = colors.flat_map(mirrored).flat_map(Self::of_output);
         let plain = Output::default();
         let images = [plain, Output { antialias: Antialias::MOST, ..plain }, Output { passed: true, ..plain }];
-        views.chain(images.into_iter().flat_map(Self::of_images)).collect()
+        // Views have one eye.
+        let bent = Self::of_images(plain).filter(|variant| variant.by_rays);
+        let bent = bent.map(|variant| Self { single_pole: true, ..variant });
+        views.chain(images.into_iter().flat_map(Self::of_images)).chain(bent).collect()
     }
 }
 

@@ -103,7 +103,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% if highlight %}
     for (var glossy = met && surface.w != 0u; glossy; glossy = false) {
         let direction = direction_of(pixel);
-        let point = camera.eye_in_world + direction * (camera.near_m / depth);
+        let point = {{ "origin_of(pixel)" if single_pole else "camera.eye_in_world" }} + direction * (camera.near_m / depth);
         var visibility: VisibilityWords;
 {% for word in range(visibility_words) %}        visibility[{{ word }}] = visibility_word({{ word }}u, place, open);
 {% endfor %}

@@ -31,6 +31,8 @@ enum ShadowRays {
 #[derive(Debug)]
 pub(crate) struct Illuminate {
     by_rays: bool,
+    /// The pixels' own rays lie around a pole.
+    single_pole: bool,
     /// The distance of the pixels that are lit, where they are not listed.
     step_px: u32,
     listed: bool,
@@ -52,6 +54,7 @@ impl Illuminate {
     /// The variant without any of the switches.
     const UNLIT: Self = Self {
         by_rays: false,
+        single_pole: false,
         step_px: 1,
         listed: false,
         bounces: false,
@@ -71,6 +74,7 @@ impl ShaderVariant for Illuminate {
     fn context(&self) -> Value {
         context! {
             by_rays => self.by_rays,
+            single_pole => self.single_pole,
             step_px => self.step_px,
             listed => self.listed,
             bounces => self.bounces,
@@ -99,6 +103,11 @@ impl ShaderVariant for Illuminate {
                 }
             }
         }
+        for (step_px, listed) in [(1, false), (GRID_PX, false), (1, true)] {
+            let bent = Self { by_rays: true, single_pole: true, step_px, listed, ..Self::UNLIT };
+            let lit = Self { shadow_rays: ShadowRays::Many, occluded: true, ..bent };
+            variants.extend([bent, lit].iter().flat_map(Self::with_all_sums));
+        }
         for [occluded, continued, environment_map] in switches() {
             for shadow_rays in [ShadowRays::One, ShadowRays::Many] {
                 let lit = Self { bounces: true, shadow_rays, occluded, continued, ..Self::UNLIT };
@@ -125,6 +134,7 @@ impl Illuminate {
         let traced = batch.traced.as_deref().filter(|_| lighting.is_traced());
         Self {
             by_rays: batch.by_rays,
+            single_pole: batch.is_single_pole(),
             shadow_rays: match lighting.direct {
                 Direct::Unlit | Direct::Phong => ShadowRays::None,
                 Direct::Shadows => ShadowRays::One,

@@ -11,6 +11,8 @@ use crate::{
 #[derive(Debug)]
 pub(crate) struct Interpolate {
     by_rays: bool,
+    /// Rays around a pole.
+    single_pole: bool,
     /// The distance of the pixels that are filled in.
     step_px: u32,
     /// Planes of a pixel.
@@ -22,13 +24,16 @@ impl ShaderVariant for Interpolate {
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
-        context! { by_rays => self.by_rays, step_px => self.step_px, sum_planes => self.sum_planes }
+        context! { by_rays => self.by_rays, single_pole => self.single_pole, step_px => self.step_px, sum_planes => self.sum_planes }
     }
 
     fn all() -> Vec<Self> {
         let each = |sums: SumPlanes| {
             let sum_planes = sums.count();
-            switches().map(move |[by_rays, coarse]| Self { by_rays, step_px: 1 + u32::from(coarse), sum_planes })
+            switches().map(move |[by_rays, coarse, bent]| {
+                // Only rays bend.
+                Self { by_rays, single_pole: by_rays && bent, step_px: 1 + u32::from(coarse), sum_planes }
+            })
         };
         SumPlanes::all().flat_map(each).collect()
     }
@@ -43,7 +48,8 @@ pub(crate) fn record(
     lists: &[PixelList],
 ) -> Result<(), RenderError> {
     let Recording { passes, batch, cameras, sums, .. } = recording;
-    let variant = Interpolate { by_rays: batch.by_rays, step_px, sum_planes: batch.output.sums.count() };
+    let (by_rays, single_pole) = (batch.by_rays, batch.is_single_pole());
+    let variant = Interpolate { by_rays, single_pole, step_px, sum_planes: batch.output.sums.count() };
     let pass = passes.get(&variant)?;
     let bound = lists.iter().map(|list| {
         let own = [Binding::buffer("camera", cameras), Binding::buffer("sums", &sums.buffer)];

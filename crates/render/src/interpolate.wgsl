@@ -21,7 +21,7 @@ const LEAST_LIGHT: f32 = 0.02;
 fn is_same_surface(point: vec3f, normal: vec3f, footprint_m: f32, other: vec2u) -> bool {
     let depth = reversed_depth_at(other);
     let z = camera.near_m / max(depth, 1e-30);
-    let offset = camera.eye_in_world + direction_of(other) * z - point;
+    let offset = {{ "origin_of(other)" if single_pole else "camera.eye_in_world" }} + direction_of(other) * z - point;
     let other_normal = unit_from_oct16(surface_at(other).z);
     let near_plane = abs(dot(normal, offset)) < SAME_PLANE * footprint_m * f32(2u * STEP);
     return depth > 0.0 && dot(normal, other_normal) > SAME_NORMAL && near_plane;
@@ -36,7 +36,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let depth = reversed_depth_at(pixel);
     if all((at & vec2u(1u)) == vec2u(0u)) || depth <= 0.0 { return; }
     let z = camera.near_m / depth;
-    let point = camera.eye_in_world + direction_of(pixel) * z;
+    let point = {{ "origin_of(pixel)" if single_pole else "camera.eye_in_world" }} + direction_of(pixel) * z;
     let normal = unit_from_oct16(surface_at(pixel).z);
     let low = (at & vec2u(0xfffffffeu)) * STEP;
     let high = min(low + 2u * STEP, camera.size_px - 1u);

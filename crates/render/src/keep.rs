@@ -15,7 +15,7 @@ impl ShaderVariant for Keep {
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
-        context! { by_rays => self.by_rays }
+        context! { by_rays => self.by_rays, single_pole => false }
     }
 
     fn all() -> Vec<Self> {

@@ -9,6 +9,7 @@ use naga::{TypeInner, valid::Capabilities};
 
 use crate::finish::{Finish, GpuFinish};
 use crate::gpu_scene::{GpuObject, GpuSurroundings};
+use crate::interpolate::Interpolate;
 use crate::keep::Keep;
 use crate::known_samples::KnownCamera;
 use crate::pixel_camera::PixelCamera;
@@ -125,9 +126,17 @@ fn a_pixel_camera_has_the_wgsl_layout() {
         end_row,
         first_light,
         end_light,
+        pole_px,
+        bend_px_m,
+        farthest_m,
         padding
     });
-    assert_eq!(shader(&parsed(&Keep::all().remove(0)), "PixelCamera"), host);
+    let bent = Interpolate::all()
+        .into_iter()
+        .find(|variant| variant.context().get_attr("single_pole").is_ok_and(|is| is.is_true()));
+    assert_eq!(shader(&parsed(&bent.expect("a variant")), "PixelCamera"), host);
+    let pinhole = shader(&parsed(&Keep::all().remove(0)), "PixelCamera");
+    assert_eq!(pinhole.fields, host.fields[..host.fields.len() - 3], "those of single poles come last");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use depth_image::PinholeCamera;
+use depth_image::Camera;
 
 /// Pieces begin with whole workgroups, and at rows of the grid of an adaptive rate.
 const ROWS_ALIGNED: u32 = 8;
@@ -23,7 +23,7 @@ pub(crate) struct Pieces {
 
 impl Pieces {
     /// Pieces of at most so many pixels, where that is more than a few rows.
-    pub fn of(cameras: &[PinholeCamera], most_px: u64) -> Self {
+    pub fn of(cameras: &[Camera], most_px: u64) -> Self {
         let pieces = cameras.iter().enumerate().flat_map(|(number, camera)| of_camera(number, camera, most_px));
         Self { all: pieces.collect() }
     }
@@ -34,32 +34,35 @@ impl Pieces {
     }
 }
 
-fn of_camera(camera: usize, PinholeCamera { size_px, .. }: &PinholeCamera, most_px: u64) -> Vec<Piece> {
+fn of_camera(number: usize, camera: &Camera, most_px: u64) -> Vec<Piece> {
+    let size_px = camera.size_px();
     let rows = Range { start: 0, end: size_px.y };
     let most_rows = (most_px / u64::from(size_px.x)).clamp(1, size_px.y.into()) as u32;
     let count = size_px.y.div_ceil(most_rows.max(ROWS_ALIGNED));
     let a_piece = size_px.y.div_ceil(count).next_multiple_of(ROWS_ALIGNED);
-    let piece = |first_row: u32| Piece { camera, first_row, end_row: (first_row + a_piece).min(size_px.y) };
+    let piece = |first_row: u32| Piece { camera: number, first_row, end_row: (first_row + a_piece).min(size_px.y) };
     rows.step_by(a_piece as usize).map(piece).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use depth_image::PinholeCamera;
     use glam::{UVec2, Vec3};
 
     use super::*;
 
     #[test]
     fn pieces_cover_every_row_of_every_picture_once() {
-        let camera =
-            |size: [u32; 2]| PinholeCamera::looking_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 0.8, UVec2::from(size));
+        let camera = |size: [u32; 2]| {
+            Camera::from(PinholeCamera::looking_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 0.8, UVec2::from(size)))
+        };
         let cameras = [[64, 48], [1, 1], [33, 21], [1280, 720]].map(camera);
         for (most_px, least_pieces) in [(u64::MAX, 4), (1, 6 + 1 + 3 + 90), (20_000, 4)] {
             let pieces = Pieces::of(&cameras, most_px);
             assert!(pieces.all.len() >= least_pieces, "{most_px}: {}", pieces.all.len());
             for (number, camera) in cameras.iter().enumerate() {
                 let rows: Vec<u32> = pieces.of_camera(number).flat_map(|(_, p)| p.first_row..p.end_row).collect();
-                assert_eq!(rows, (0..camera.size_px.y).collect::<Vec<_>>());
+                assert_eq!(rows, (0..camera.size_px().y).collect::<Vec<_>>());
                 assert!(pieces.of_camera(number).all(|(_, piece)| piece.first_row % ROWS_ALIGNED == 0));
             }
         }

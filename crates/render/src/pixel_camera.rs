@@ -1,7 +1,7 @@
 //! `PixelCamera` of `camera.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::PinholeCamera;
+use depth_image::Camera;
 use glam::Vec3;
 use gpu::{Gpu, ResourceTrait, ResourceTraits, uniform_elements};
 use wgpu::BufferUsages;
@@ -37,6 +37,10 @@ pub(crate) struct PixelCamera {
     /// The lamps of a dispatch.
     pub first_light: u32,
     pub end_light: u32,
+    /// Of a single-pole camera, and the fields that follow.
+    pub pole_px: [f32; 2],
+    pub bend_px_m: f32,
+    pub farthest_m: f32,
     pub padding: [u32; 2],
 }
 
@@ -47,7 +51,12 @@ impl PixelCamera {
     /// Rays' seeds are the camera's place, and the pixel's from the forward axis: noise does not swim while nothing moves,
     /// images that are blended do not share it, and a tile of an image has the image's. Positions within a pixel do not share it
     /// either.
-    pub fn of(camera: &PinholeCamera, position: u32) -> Self {
+    pub fn of(camera: &Camera, position: u32) -> Self {
+        let (pole_px, bend_px_m, farthest_m) = match camera {
+            Camera::Pinhole(_) => Default::default(),
+            Camera::SinglePole(camera) => (camera.pole_px.to_array(), camera.bend_px_m(), camera.farthest_m),
+        };
+        let camera = camera.reference();
         let column = camera.world_from_camera * Vec3::X / camera.focal_px.x;
         let row = camera.world_from_camera * Vec3::NEG_Y / camera.focal_px.y;
         let corner = camera.forward_in_world() - column * camera.principal_px.x - row * camera.principal_px.y;
@@ -70,6 +79,9 @@ impl PixelCamera {
             shadow_rays_in_sum: 1,
             occlusion_rays_in_sum: 1,
             end_row: camera.size_px.y,
+            pole_px,
+            bend_px_m,
+            farthest_m,
             ..Self::zeroed()
         }
     }

@@ -2,8 +2,7 @@
 //! and depth images.
 
 use depth_image::{
-    Antialias, Camera, DepthImage, Highlight, PinholeCamera, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId,
-    View, ViewPlanes,
+    Antialias, Camera, DepthImage, Highlight, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId, View, ViewPlanes,
 };
 
 use crate::sums::SumPlanes;
@@ -60,9 +59,9 @@ impl Output {
 }
 
 /// A camera and its planes.
-type Picture<'a> = (&'a PinholeCamera, Vec<&'a [u32]>);
+type Picture<'a> = (&'a Camera, Vec<&'a [u32]>);
 
-fn split<'a>(mut words: &'a [u32], planes: usize, cameras: &'a [PinholeCamera]) -> impl Iterator<Item = Picture<'a>> {
+fn split<'a>(mut words: &'a [u32], planes: usize, cameras: &'a [Camera]) -> impl Iterator<Item = Picture<'a>> {
     cameras.iter().map(move |camera| {
         let (own, rest) = words.split_at(camera.pixel_count() * planes);
         words = rest;
@@ -70,14 +69,14 @@ fn split<'a>(mut words: &'a [u32], planes: usize, cameras: &'a [PinholeCamera]) 
     })
 }
 
-pub(crate) fn views(words: &[u32], output: Output, cameras: &[PinholeCamera], planes: ViewPlanes) -> Vec<View> {
+pub(crate) fn views(words: &[u32], output: Output, cameras: &[Camera], planes: ViewPlanes) -> Vec<View> {
     let view = |(camera, own): Picture<'_>| {
         let inverse_depth: &[f32] = bytemuck::cast_slice(own[1]);
         let hit =
             |&inverse: &f32| if inverse > 0.0 { Provenance::new(ProvenanceKind::Hit, 0) } else { Provenance::EMPTY };
         let rgb = |word: &u32| word.to_le_bytes().into_iter().take(3);
         View {
-            size_px: camera.size_px,
+            size_px: camera.size_px(),
             srgb8: own[0].iter().flat_map(rgb).collect(),
             inverse_depth_per_m: planes.inverse_depth.then(|| inverse_depth.to_vec()),
             provenance: planes.provenance.then(|| inverse_depth.iter().map(hit).collect()),
@@ -86,7 +85,7 @@ pub(crate) fn views(words: &[u32], output: Output, cameras: &[PinholeCamera], pl
     split(words, output.layout().count, cameras).map(view).collect()
 }
 
-pub(crate) fn depth_images(words: &[u32], output: Output, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
+pub(crate) fn depth_images(words: &[u32], output: Output, cameras: &[Camera]) -> Vec<DepthImage> {
     let layout = output.layout();
     let image = |(camera, own): Picture<'_>| {
         let visibility = |reflector: usize| &own[reflector + 1..][..output.sums.visibility_words()];
@@ -96,7 +95,7 @@ pub(crate) fn depth_images(words: &[u32], output: Output, cameras: &[PinholeCame
         };
         let id = |(&instance, &primitive): (&u32, &u32)| SurfaceId { instance, primitive };
         DepthImage {
-            camera: Camera::Pinhole(*camera),
+            camera: *camera,
             inverse_depth_per_m: bytemuck::cast_slice(own[1]).to_vec(),
             color_rgb9e5: own[0].to_vec(),
             normal_oct16: layout.normal.map(|normal| own[normal].to_vec()),

@@ -3,7 +3,7 @@
 use std::{ops::Range, sync::Arc};
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Highlight, PinholeCamera};
+use depth_image::{Camera, Highlight, PinholeCamera};
 use glam::{Mat4, Vec4};
 use gpu::{
     Binding, BoundGroup, DrawPass, DrawState, DrawVariant, Frame, Gpu, PassCache, ResourceTrait, ResourceTraits,
@@ -166,7 +166,7 @@ impl Raster {
         let posed = scene.motion.as_ref().map(|motion| motion.at(batch.work.scene_time_s));
         let posed = posed.as_ref().map(|posed| posed.buffers(&self.gpu));
         for (place, (camera, target)) in (0..).zip(cameras.iter().zip(surfaces)) {
-            let view = View { scene, posed, place, camera, groups: groups.as_ref() };
+            let view = View { scene, posed, place, camera: camera.reference(), groups: groups.as_ref() };
             if predecessors.is_some() {
                 self.draw_in_slices(frame, &view, front, &[], &target.views.front_depth)?;
             }
@@ -262,11 +262,11 @@ impl Raster {
         &self,
         pass: &DrawPass,
         work: &DrawWork<'_>,
-        cameras: &[PinholeCamera],
+        cameras: &[Camera],
         predecessors: Option<&Predecessors>,
     ) -> Result<Groups, RenderError> {
         let scene = work.scene;
-        let cameras = cameras.iter().map(|camera| RasterCamera::of(camera, work.scene_time_s));
+        let cameras = cameras.iter().map(|camera| RasterCamera::of(camera.reference(), work.scene_time_s));
         let cameras = uniform(&self.gpu, "raster cameras", cameras);
         let textures = |textures: &[(wgpu::TextureView, wgpu::Sampler); 5]| {
             let bindings =

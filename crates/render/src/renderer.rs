@@ -1,6 +1,6 @@
 //! Views and depth images of scenes, in as few submissions as memory allows.
 
-use std::{collections::VecDeque, slice, sync::Arc};
+use std::{collections::VecDeque, sync::Arc};
 
 use depth_image::{Antialias, Camera, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};
 use glam::UVec2;
@@ -59,11 +59,12 @@ impl Renderer {
         cameras: &[PinholeCamera],
         planes: ViewPlanes,
     ) -> Result<Vec<View>, RenderError> {
-        self.check(cameras)?;
+        let cameras = as_cameras(cameras);
+        self.check(&cameras)?;
         let (antialias, depth) = (planes.antialias, planes.inverse_depth || planes.provenance);
         let output = Output { antialias, depth, ..views_output(work) };
-        let read = |words: &[u32], output, cameras: &[PinholeCamera]| planes::views(words, output, cameras, planes);
-        self.draw(work, cameras, (output, planes.tone), None, read)
+        let read = |words: &[u32], output, cameras: &[Camera]| planes::views(words, output, cameras, planes);
+        self.draw(work, &cameras, (output, planes.tone), None, read)
     }
 
     /// Depth images, in as few submissions as memory allows.
@@ -76,9 +77,8 @@ impl Renderer {
         cameras: &[Camera],
         planes: SamplePlanes,
     ) -> Result<Vec<DepthImage>, RenderError> {
-        let pinholes = pinholes(cameras);
-        self.check(&pinholes)?;
-        self.images(work, &pinholes, planes, None, [None; 2])
+        self.check(cameras)?;
+        self.images(work, cameras, planes, None, [None; 2])
     }
 
     /// As [`Renderer::draw_depth_images`] for the `wanted` of `cameras`, but each image omits the samples that are
@@ -99,12 +99,12 @@ impl Renderer {
         test: RedundancyTest,
         reference: Option<&TemporalReference>,
     ) -> Result<Vec<DepthImage>, RenderError> {
-        let all = pinholes(cameras);
-        self.check(&all)?;
+        let all = pinholes(cameras, "redundancy tests")?;
+        self.check(cameras)?;
         let known = |cameras: &[PinholeCamera], reference| {
             KnownSamples::of(&self.gpu, &self.layer_cache, cameras, test, reference)
         };
-        let pinholes: Vec<PinholeCamera> = wanted.iter().map(|&number| all[number as usize]).collect();
+        let own: Vec<Camera> = wanted.iter().map(|&number| cameras[number as usize]).collect();
         let samples = known(&all, reference)?;
         let sequence = ImageSequence { known: &samples, wanted, first: 0, kept: all.len().saturating_sub(1) };
         // Where pixels are compared with the same pixel, corners are compared with corners.
@@ -114,7 +114,7 @@ impl Renderer {
             Some(known) => ImageSequence { known, ..sequence },
             None => ImageSequence { kept: 0, ..sequence },
         };
-        self.images(work, &pinholes, planes, Some(test), [Some(sequence), Some(of_corners)])
+        self.images(work, &own, planes, Some(test), [Some(sequence), Some(of_corners)])
     }
 
     /// The samples of all images of a set, for a test that consults them.
@@ -127,12 +127,12 @@ impl Renderer {
         cameras: &[Camera],
         test: RedundancyTest,
     ) -> Result<TemporalReference, RenderError> {
-        let (work, cameras) = (work.unlit(), pinholes(cameras));
-        self.check(&cameras)?;
-        let known = KnownSamples::of(&self.gpu, &self.layer_cache, &cameras, test, None)?;
+        let (work, pinholes) = (work.unlit(), pinholes(cameras, "redundancy tests")?);
+        self.check(cameras)?;
+        let known = KnownSamples::of(&self.gpu, &self.layer_cache, &pinholes, test, None)?;
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
         let sequence = ImageSequence { known: &known, wanted: &wanted, first: 0, kept: cameras.len() };
-        self.images(work, &cameras, SamplePlanes::default(), Some(test), [Some(sequence), None])?;
+        self.images(work, cameras, SamplePlanes::default(), Some(test), [Some(sequence), None])?;
         Ok(known.into_reference())
     }
 
@@ -140,7 +140,7 @@ impl Renderer {
     fn images(
         &self,
         work: DrawWork<'_>,
-        cameras: &[PinholeCamera],
+        cameras: &[Camera],
         planes: SamplePlanes,
         test: Option<RedundancyTest>,
         [sequence, of_corners]: [Option<ImageSequence<'_>>; 2],
@@ -149,7 +149,8 @@ impl Renderer {
         let untoned = |output: Output| (output, ToneMapping::NONE);
         let mut images = self.draw(work, cameras, untoned(output), sequence, planes::depth_images)?;
         if planes.corners {
-            let (work, cameras) = (work.unlit(), corner_cameras(cameras));
+            let corners = corner_cameras(&pinholes(cameras, "depths at corners")?);
+            let (work, cameras) = (work.unlit(), as_cameras(&corners));
             self.check(&cameras)?;
             let output = images_output(work, SamplePlanes::default(), test);
             let corners = self.draw(work, &cameras, untoned(output), of_corners, planes::depth_images)?;
@@ -164,10 +165,10 @@ impl Renderer {
     fn draw<T>(
         &self,
         work: DrawWork<'_>,
-        cameras: &[PinholeCamera],
+        cameras: &[Camera],
         (output, tone): (Output, ToneMapping),
         sequence: Option<ImageSequence<'_>>,
-        read: impl Fn(&[u32], Output, &[PinholeCamera]) -> Vec<T>,
+        read: impl Fn(&[u32], Output, &[Camera]) -> Vec<T>,
     ) -> Result<Vec<T>, RenderError> {
         let mut pictures = Vec::with_capacity(cameras.len());
         for cameras in batches(cameras, self.most_pixels(output)) {
@@ -245,15 +246,16 @@ impl Renderer {
         scene_time_s: f32,
         turn: Turn,
     ) -> Result<Choice, RenderError> {
+        let cameras = [Camera::from(*camera)];
         let seconds = |visibility| {
             let (lighting, refinement) = (Lighting::UNLIT, Default::default());
             let work = DrawWork { scene, lighting, scene_time_s, visibility, refinement, turn };
             let run = || {
-                let batch = self.batch(work, slice::from_ref(camera), views_output(work), None)?;
+                let batch = self.batch(work, &cameras, views_output(work), None)?;
                 // Waiting for turns does not count.
                 Ok(self.stages.draw(&batch, None)?.0.device_s)
             };
-            self.check(slice::from_ref(camera))?;
+            self.check(&cameras)?;
             // Pipelines and trees are made by the first; of the others the quickest was disturbed least.
             run()?;
             (0..3).map(|_| run()).try_fold(f64::INFINITY, |least, s: Result<f64, RenderError>| s.map(|s| least.min(s)))
@@ -266,10 +268,10 @@ impl Renderer {
     /// # Errors
     /// A camera that is not valid, or the device.
     pub fn count_visits(&self, work: DrawWork<'_>, camera: &PinholeCamera) -> Result<Vec<[u32; 2]>, RenderError> {
-        let cameras = slice::from_ref(camera);
-        self.check(cameras)?;
+        let cameras = [Camera::from(*camera)];
+        self.check(&cameras)?;
         let work = DrawWork { visibility: Visibility::Rays, ..work.unlit() };
-        let batch = self.batch(work, cameras, views_output(work), None)?;
+        let batch = self.batch(work, &cameras, views_output(work), None)?;
         let pool = &self.stages.pool;
         let bytes = 8 * camera.pixel_count() as u64;
         let counts = pool.lend_storage("visits", bytes);
@@ -280,11 +282,11 @@ impl Renderer {
         Ok(result.with(read, |pairs: &[[u32; 2]]| pairs[..camera.pixel_count()].to_vec())?)
     }
 
-    fn check(&self, cameras: &[PinholeCamera]) -> Result<(), RenderError> {
+    fn check(&self, cameras: &[Camera]) -> Result<(), RenderError> {
         let limit = u64::from(self.gpu.device.limits().max_texture_dimension_2d);
         for (index, camera) in cameras.iter().enumerate() {
             camera.validate().map_err(|source| RenderError::Camera { index, source })?;
-            let side_px = u64::from(camera.size_px.max_element());
+            let side_px = u64::from(camera.size_px().max_element());
             GpuError::check_limit(&format!("camera {index}'s image side"), side_px, limit)?;
         }
         Ok(())
@@ -293,17 +295,21 @@ impl Renderer {
     fn batch<'a>(
         &self,
         work: DrawWork<'a>,
-        cameras: &'a [PinholeCamera],
+        cameras: &'a [Camera],
         output: Output,
         sequence: Option<ImageSequence<'a>>,
     ) -> Result<Batch<'a>, RenderError> {
         let by_rays = match work.visibility {
+            // Triangles are drawn through one eye.
+            _ if cameras[0].pinhole().is_none() => true,
             Visibility::Triangles => false,
             Visibility::Rays => true,
             Visibility::Measured if sequence.is_some_and(|sequence| sequence.known.test.traces_rays()) => true,
             // Each moment of a moving scene would need a tree that nothing else needs.
             Visibility::Measured if work.scene.animated && !work.lighting.is_traced() => false,
-            Visibility::Measured => self.is_by_rays(work.scene, &cameras[0], work.scene_time_s, work.turn)?,
+            Visibility::Measured => {
+                self.is_by_rays(work.scene, cameras[0].reference(), work.scene_time_s, work.turn)?
+            }
         };
         let needs_tree = by_rays || work.lighting.is_traced();
         let traced = needs_tree.then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
@@ -324,8 +330,15 @@ fn at_least(camera: &PinholeCamera, pixels: usize) -> PinholeCamera {
     if scale > 1.0 { camera.resized((camera.size_px.as_vec2() * scale).ceil().as_uvec2()) } else { *camera }
 }
 
-fn pinholes(cameras: &[Camera]) -> Vec<PinholeCamera> {
-    cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect()
+fn as_cameras(pinholes: &[PinholeCamera]) -> Vec<Camera> {
+    pinholes.iter().copied().map(Camera::from).collect()
+}
+
+fn pinholes(cameras: &[Camera], what: &'static str) -> Result<Vec<PinholeCamera>, RenderError> {
+    let pinhole = |(index, camera): (usize, &Camera)| {
+        camera.pinhole().copied().ok_or(RenderError::Model { index, model: camera.model_name(), what })
+    };
+    cameras.iter().enumerate().map(pinhole).collect()
 }
 
 fn corner_cameras(cameras: &[PinholeCamera]) -> Vec<PinholeCamera> {

@@ -2,7 +2,7 @@
 fn spot_of(pixel: vec2u, depth: f32, surface: vec4u) -> Spot {
     let planar_depth_m = camera.near_m / depth;
     let offset = direction_of(pixel) * planar_depth_m;
-    let point = camera.eye_in_world + offset;
+    let point = {{ "origin_of(pixel)" if single_pole else "camera.eye_in_world" }} + offset;
     let normal = unit_from_oct16(surface.z);
     let size = abs(camera.eye_in_world) + abs(offset);
     let bias_m = BIAS_FOOTPRINTS * planar_depth_m * camera.footprint + BIAS_ROUNDINGS * max(max(size.x, size.y), size.z);

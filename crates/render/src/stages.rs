@@ -119,7 +119,8 @@ impl Stages {
     ) -> Result<(), RenderError> {
         for (place, (camera, target)) in recording.batch.cameras.iter().zip(surfaces).enumerate() {
             let earlier = sequence.number(place);
-            let predecessors = (earlier > 0).then(|| sequence.known.predecessors(&self.gpu, earlier, camera));
+            let predecessors =
+                (earlier > 0).then(|| sequence.known.predecessors(&self.gpu, earlier, camera.reference()));
             self.find(recording, (place, slice::from_ref(target)), predecessors.as_ref())?;
             if let Some((held, _)) = sequence.layer(place, Evidence::Samples) {
                 keep::record(recording, (place, target), held)?;
@@ -144,7 +145,7 @@ impl Stages {
 
     fn lend(&self, batch: &Batch<'_>, place: usize) -> Surfaces {
         let kind = SurfaceKind {
-            size_px: batch.cameras[place].size_px,
+            size_px: batch.cameras[place].size_px(),
             by_rays: batch.by_rays,
             surface_id: batch.output.surface_id,
             front: batch.sequence.is_some_and(|sequence| sequence.number(place) > 0),
@@ -181,7 +182,7 @@ impl Stages {
 
     /// An empty list for each piece of a picture.
     fn lists(&self, recording: &Recording<'_>, camera: usize) -> Vec<PixelList> {
-        let width_px = recording.batch.cameras[camera].size_px.x;
+        let width_px = recording.batch.cameras[camera].size_px().x;
         let pixels = |(_, piece): (u32, Piece)| width_px * (piece.end_row - piece.first_row);
         let pieces = recording.pieces.of_camera(camera);
         pieces.map(|piece| PixelList::new(&self.gpu, &self.pool, pixels(piece))).collect()

@@ -5,6 +5,8 @@ use std::str::FromStr;
 
 /// The most images of a mirror.
 const MOST_IMAGES: usize = 8;
+/// The most single-pole images of a mirror: from two sides they show an object whole.
+const MOST_SINGLE_POLES: usize = 2;
 /// The share of mirrored rays that images need not see all the way, unless stated, in percent. Small objects are met by few
 /// rays: with one percent they would be seen badly.
 const UNSEEN_PERCENT: f32 = 0.3;
@@ -24,19 +26,35 @@ pub enum Impostors {
         /// At most eight.
         images: u32,
     },
+    /// Single-pole images of the object that most mirrored rays meet. Where there is none, the usual pinholes are taken.
+    SinglePoles {
+        /// One, or two from both sides.
+        images: u32,
+    },
 }
 
 /// How many images a mirror has.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ImageLimits {
+    pub models: Models,
     pub most: usize,
     /// The share of rays that images need not see all the way: fewer will do.
     pub unseen_ratio: f32,
 }
 
+/// The models of cameras that may be chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Models {
+    All,
+    Pinholes,
+    SinglePoles,
+}
+
 /// A text that names no images.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{text:?} is none of auto, auto:UNSEEN (percent, 0 to 100), pinhole:N (1 to {MOST_IMAGES}) and none")]
+#[error(
+    "{text:?} is none of auto, auto:UNSEEN (percent, 0 to 100), pinhole:N (1 to {MOST_IMAGES}), single_pole:N (1 or 2) and none"
+)]
 #[allow(missing_docs, reason = "self-naming fields")]
 pub struct UnknownImpostors {
     pub text: String,
@@ -48,9 +66,14 @@ impl Impostors {
         match self {
             Self::None => None,
             Self::Auto { unseen_percent } => {
-                Some(ImageLimits { most: MOST_IMAGES, unseen_ratio: unseen_percent / 100.0 })
+                Some(ImageLimits { models: Models::All, most: MOST_IMAGES, unseen_ratio: unseen_percent / 100.0 })
             }
-            Self::Pinholes { images } => Some(ImageLimits { most: images as usize, unseen_ratio: 0.0 }),
+            Self::Pinholes { images } => {
+                Some(ImageLimits { models: Models::Pinholes, most: images as usize, unseen_ratio: 0.0 })
+            }
+            Self::SinglePoles { images } => {
+                Some(ImageLimits { models: Models::SinglePoles, most: images as usize, unseen_ratio: 0.0 })
+            }
         }
     }
 }
@@ -67,6 +90,7 @@ impl fmt::Display for Impostors {
             Self::None => f.write_str("none"),
             Self::Auto { unseen_percent } => write!(f, "auto:{unseen_percent}"),
             Self::Pinholes { images } => write!(f, "pinhole:{images}"),
+            Self::SinglePoles { images } => write!(f, "single_pole:{images}"),
         }
     }
 }
@@ -80,14 +104,18 @@ impl FromStr for Impostors {
             None if text == "none" => Ok(Self::None),
             None if text == "auto" => Ok(Self::default()),
             None if text == "pinhole" => Ok(Self::Pinholes { images: 1 }),
+            None if text == "single_pole" => Ok(Self::SinglePoles { images: 1 }),
             Some(("auto", percent)) => {
                 let unseen_percent: f32 = percent.parse().map_err(|_| unknown())?;
                 let is_percent = (0.0..=100.0).contains(&unseen_percent);
                 is_percent.then_some(Self::Auto { unseen_percent }).ok_or_else(unknown)
             }
-            Some(("pinhole", images)) => {
+            Some((model @ ("pinhole" | "single_pole"), images)) => {
                 let images: u32 = images.parse().map_err(|_| unknown())?;
-                (1..=MOST_IMAGES as u32).contains(&images).then_some(Self::Pinholes { images }).ok_or_else(unknown)
+                let is_pinhole = model == "pinhole";
+                let most = if is_pinhole { MOST_IMAGES } else { MOST_SINGLE_POLES };
+                let of = if is_pinhole { Self::Pinholes { images } } else { Self::SinglePoles { images } };
+                (1..=most as u32).contains(&images).then_some(of).ok_or_else(unknown)
             }
             _ => Err(unknown()),
         }
@@ -100,12 +128,15 @@ mod tests {
 
     #[test]
     fn names_are_read_and_written() {
-        for text in ["none", "auto:1", "auto:0.5", "pinhole:1", "pinhole:8"] {
+        for text in ["none", "auto:1", "auto:0.5", "pinhole:1", "pinhole:8", "single_pole:2"] {
             assert_eq!(text.parse::<Impostors>().map(|impostors| impostors.to_string()), Ok(text.to_owned()));
         }
         assert_eq!("auto".parse(), Ok(Impostors::default()));
+        assert_eq!("single_pole".parse(), Ok(Impostors::SinglePoles { images: 1 }));
         assert_eq!("pinhole".parse(), Ok(Impostors::Pinholes { images: 1 }));
-        for text in ["", "all", "auto:", "auto:-1", "auto:101", "auto:NaN", "pinhole:0", "pinhole:9", "none:1"] {
+        for text in
+            ["", "all", "auto:", "auto:-1", "auto:101", "auto:NaN", "pinhole:0", "pinhole:9", "single_pole:3", "none:1"]
+        {
             assert!(text.parse::<Impostors>().is_err(), "{text}");
         }
     }

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use depth_image::{Camera, CameraError, DepthImage, ViewCell};
+use depth_image::{Camera, CameraError, DepthImage, PinholeCamera, ViewCell};
 use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, SamplePlanes, Visibility};
@@ -83,8 +83,7 @@ fn a_batch_equals_its_single_images() {
 #[test]
 fn an_invalid_camera_is_named_in_the_error() {
     let mut cameras = cameras();
-    let Camera::Pinhole(camera) = &mut cameras[3];
-    camera.eye_in_world = Vec3::NAN;
+    cameras[3] = PinholeCamera { eye_in_world: Vec3::NAN, ..*cameras[3].reference() }.into();
     let error = sample(&cameras, SamplePlanes::default()).expect_err("NaN");
     let SamplingError::Render(RenderError::Camera { index: 3, source: CameraError::NotFinite { .. } }) = error else {
         panic!("{error}");

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use depth_image::{Camera, DepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use depth_image::{DepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
 use reconstruction::{MeshStatistics, SampleSet, SetDescription};
@@ -61,7 +61,7 @@ fn cover(subject: &Subject, engine: &GpuEngine, table: &mut Table, report: &mut 
     let (mut samples, mut lost, mut covered) = (0, 0, 0);
     for image in &images {
         let set = upload(subject, engine, std::slice::from_ref(image))?;
-        let Camera::Pinhole(camera) = &image.camera;
+        let camera = image.camera.reference();
         let [mesh, hybrid] = ["mesh", "hybrid_mesh"].map(|method| view(engine, &set, camera, method));
         let (mesh, hybrid) = (hits(&mesh?), hits(&hybrid?));
         for ((&depth, mesh), hybrid) in image.inverse_depth_per_m.iter().zip(mesh).zip(hybrid) {

@@ -6,7 +6,7 @@ use reconstruction::{ErrorBound, ReconstructionMethod, SampleSet, SetDescription
 use render::{GpuScene, Lighting, SamplePlanes};
 use scene::Scene;
 
-use super::stand::Stand;
+use super::stand::{Stand, pinholes};
 
 /// The default method.
 pub const CARVE: ReconstructionMethod = ReconstructionMethod::JointCarve { stop_level: 0 };
@@ -57,13 +57,13 @@ impl<'s> Stage<'s> {
     ) -> anyhow::Result<Self> {
         let (lighting, volume, background) = (Lighting::default(), scene.bounds(), scene.background);
         let scene = stand.upload(scene)?;
-        let images = stand.images(&scene, lighting, cameras, planes)?;
+        let images = stand.images(&scene, lighting, &pinholes(cameras), planes)?;
         Ok(Self { stand, scene, lighting, background, images, volume })
     }
 
     /// The same with images in another light, which its true views have too.
     pub fn relit(self, lighting: Lighting, cameras: &[PinholeCamera]) -> anyhow::Result<Self> {
-        let images = self.stand.images(&self.scene, lighting, cameras, SamplePlanes::default())?;
+        let images = self.stand.images(&self.scene, lighting, &pinholes(cameras), SamplePlanes::default())?;
         Ok(Self { images, lighting, ..self })
     }
 

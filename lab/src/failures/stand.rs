@@ -59,10 +59,10 @@ impl Stand {
         &self,
         scene: &GpuScene,
         lighting: Lighting,
-        cameras: &[PinholeCamera],
+        cameras: &[Camera],
         planes: SamplePlanes,
     ) -> anyhow::Result<Vec<DepthImage>> {
-        Ok(self.engine.renderer.draw_depth_images(work(scene, lighting), &pinholes(cameras), planes)?)
+        Ok(self.engine.renderer.draw_depth_images(work(scene, lighting), cameras, planes)?)
     }
 
     /// Depth images of a sampling method, without light, with surface ids.
@@ -86,7 +86,7 @@ impl Stand {
     }
 }
 
-fn pinholes(cameras: &[PinholeCamera]) -> Vec<Camera> {
+pub fn pinholes(cameras: &[PinholeCamera]) -> Vec<Camera> {
     cameras.iter().copied().map(Camera::Pinhole).collect()
 }
 

@@ -1,6 +1,6 @@
 //! Images that may surround a mirror, at equal texels.
 
-use depth_image::PinholeCamera;
+use depth_image::{Camera, PinholeCamera};
 use glam::{UVec2, Vec3};
 use sampling::{Mirror, faces, looking};
 
@@ -19,7 +19,7 @@ pub const UNFILTERED: &str = "as in a cluster, unfiltered";
 /// Sample cameras for one mirror.
 pub struct Candidate {
     pub name: &'static str,
-    pub cameras: Vec<PinholeCamera>,
+    pub cameras: Vec<Camera>,
     /// Their colours have coarser levels.
     pub mips: bool,
 }
@@ -35,18 +35,19 @@ pub fn candidates(mirror: &Mirror, seen: Vec3) -> Vec<Candidate> {
     let corner = |x: f32, y: f32| middle + (right * x + up * y) * (CORNER * half_m);
     let side_px = |images: u32| UVec2::splat(((TEXELS / images) as f32).sqrt() as u32);
     let looking = |eye: Vec3, images: u32| looking((eye, NEAR_M), towards, WIDE_DEG, side_px(images));
+    let pinholes = |cameras: Vec<PinholeCamera>| cameras.into_iter().map(Camera::from).collect();
     let square = [corner(-1.0, -1.0), corner(1.0, 1.0), corner(1.0, -1.0), corner(-1.0, 1.0)];
     let of = |name, cameras| Candidate { name, cameras, mips: true };
     vec![
-        of("pinhole:1", vec![looking(middle, 1)]),
-        of("pinhole:4", square.map(|eye| looking(eye, 4)).to_vec()),
-        of("six faces", faces(middle, NEAR_M, side_px(6))),
+        of("pinhole:1", pinholes(vec![looking(middle, 1)])),
+        of("pinhole:4", pinholes(square.map(|eye| looking(eye, 4)).to_vec())),
+        of("six faces", pinholes(faces(middle, NEAR_M, side_px(6)))),
         Candidate { mips: false, ..of(UNFILTERED, in_a_cluster(mirror)) },
         of("as in a cluster", in_a_cluster(mirror)),
     ]
 }
 
 /// The cameras of clusters, at [`TEXELS`].
-pub fn in_a_cluster(mirror: &Mirror) -> Vec<PinholeCamera> {
-    PinholeCamera::resized_together(&mirror.cameras, TEXELS as f32, 1)
+pub fn in_a_cluster(mirror: &Mirror) -> Vec<Camera> {
+    Camera::resized_together(&mirror.cameras, TEXELS as f32, 1)
 }

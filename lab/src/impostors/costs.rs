@@ -57,7 +57,7 @@ pub fn measure(hall: &Hall<'_>, mirrors: &[Mirror]) -> anyhow::Result<Costs> {
     let bounds: Vec<Aabb> = mirrors.iter().map(|mirror| mirror.bounds).collect();
     let Some(near) = bounds.first() else { anyhow::bail!("the scene has no mirrors") };
     let places = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
-    let samples = places.map(|(x, y)| before(near, x * SPREAD_RAD, y * SPREAD_RAD).resized(VIEW_PX * DENSITY));
+    let samples = places.map(|(x, y)| before(near, x * SPREAD_RAD, y * SPREAD_RAD).resized(VIEW_PX * DENSITY).into());
     let views: Vec<PinholeCamera> =
         (0..BATCH).map(|at| before(near, SPREAD_RAD * (0.25 * at as f32 - 0.9), 0.02)).collect();
     // The first use of a light builds shaders.

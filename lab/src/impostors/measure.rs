@@ -2,7 +2,7 @@
 
 use anyhow::Context as _;
 use depth_image::{
-    Aabb, Antialias, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes, linear_from_srgb8,
+    Aabb, Antialias, Camera, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes, linear_from_srgb8,
     srgb8_from_linear,
 };
 use glam::{UVec2, Vec3};
@@ -114,7 +114,7 @@ impl<'s> Hall<'s> {
         if !of_objects.contains(&true) {
             return Ok(None);
         }
-        let set = self.set(&self.images(&[camera])?, false)?;
+        let set = self.set(&self.images(&[camera.into()])?, false)?;
         let smooth = is_smooth.then(|| self.smooth(&camera)).transpose()?;
         Ok(Some(Subject { camera, set, truth, mirrored, of_objects, smooth }))
     }
@@ -129,7 +129,7 @@ impl<'s> Hall<'s> {
         Ok(View { size_px: camera.size_px, srgb8: halved(&view), ..view })
     }
 
-    pub fn images(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
+    pub fn images(&self, cameras: &[Camera]) -> anyhow::Result<Vec<DepthImage>> {
         self.stand.images(&self.on_device, plain(self.lighting), cameras, PLANES)
     }
 

@@ -7,7 +7,7 @@ use app_core::delivery::{at_rate, open, request};
 use app_core::live::{Drive, Record, drive};
 use client::{Client, ClientError, LiveView, Session};
 use cluster::{PolicyChoice, SessionRequest};
-use depth_image::{Camera, PinholeCamera, ViewCell};
+use depth_image::{PinholeCamera, ViewCell};
 use glam::UVec2;
 use tokio::task::JoinSet;
 
@@ -51,7 +51,7 @@ impl Tour {
     pub async fn of(coordinator: &str, size_px: UVec2, rate_hz: f64) -> anyhow::Result<Self> {
         let status = Client::connect(coordinator).await?.status().await?;
         let offer = status.offers.into_iter().next().context("the coordinator does not say what it shows")?;
-        let samples: Vec<_> = offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+        let samples: Vec<_> = offer.sample_cameras.iter().map(|camera| *camera.reference()).collect();
         let path = ViewCell::between(&samples).context("no sample cameras")?.orbit(PATH_POSES, size_px);
         let request = at_rate(request(offer.settings, &path[..1])?, rate_hz);
         let request = SessionRequest { policy: PolicyChoice::Pipeline, ..request };

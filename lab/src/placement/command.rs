@@ -112,7 +112,7 @@ fn coverage(engine: &Arc<GpuEngine>, conditions: &Conditions) -> anyhow::Result<
 /// A conventional image from every place, as large as those of the default row.
 fn all_places(planning: &Planning) -> anyhow::Result<Representation> {
     let usual = &planning.representations[default_place(&planning.ladder, DEFAULT_CAMERAS)?];
-    let Camera::Pinhole(sample) = usual.sample_cameras.first().context("no sample cameras")?;
+    let sample = usual.sample_cameras.first().context("no sample cameras")?.reference();
     let cameras = planning.viewpoints.cell.nested_cameras(PLACES, sample.size_px);
     Ok(Representation { sample_cameras: cameras.into_iter().map(Camera::Pinhole).collect(), ..usual.clone() })
 }

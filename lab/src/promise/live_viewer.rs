@@ -8,7 +8,7 @@ use app_core::delivery::{open, request, viewpoints};
 use app_core::live::{Drive, Record, drive};
 use client::{Client, Session};
 use cluster::{BudgetRequest, OfferStatus, PolicyChoice, Promise, PromiseState, SessionRequest};
-use depth_image::{Camera, PinholeCamera, ViewCell};
+use depth_image::{PinholeCamera, ViewCell};
 use glam::UVec2;
 
 use crate::process::Process;
@@ -102,7 +102,7 @@ impl Cluster {
     }
 
     fn cell(&self) -> anyhow::Result<ViewCell> {
-        let samples: Vec<_> = self.offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+        let samples: Vec<_> = self.offer.sample_cameras.iter().map(|camera| *camera.reference()).collect();
         ViewCell::between(&samples).context("no sample cameras")
     }
 

@@ -1,6 +1,6 @@
 //! Surfaces that an image holds: pixel redundancy, the measure of sampling methods (Xie §6.1.2).
 
-use depth_image::{Camera, DepthImage, SurfaceId};
+use depth_image::{DepthImage, SurfaceId};
 use glam::{Vec3, Vec4};
 
 /// The surface ids of an image.
@@ -29,7 +29,7 @@ impl<'a> Held<'a> {
     /// The surfaces of an image; `None` without surface ids.
     #[must_use]
     pub fn of(image: &'a DepthImage) -> Option<Self> {
-        let Camera::Pinhole(camera) = &image.camera;
+        let camera = image.camera.reference();
         let size = camera.size_px.as_vec2();
         Some(Self {
             homogeneous_pixel_from_world: camera.homogeneous_pixel_from_world(),
@@ -79,7 +79,7 @@ mod tests {
         let camera = PinholeCamera::looking_at(Vec3::Z * 4.0, Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(16, 12));
         let id = |i: u32| SurfaceId { instance: 0, primitive: i };
         let mut image = DepthImage {
-            camera: Camera::Pinhole(camera),
+            camera: camera.into(),
             inverse_depth_per_m: vec![0.25; 192],
             color_rgb9e5: vec![0; 192],
             normal_oct16: None,

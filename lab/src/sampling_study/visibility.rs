@@ -1,6 +1,6 @@
 //! Metrics by visibility: independent of resolution, of seeded samples, by rays on the host.
 
-use depth_image::{Camera, DepthImage, PinholeCamera};
+use depth_image::{DepthImage, PinholeCamera};
 use rayon::prelude::*;
 use render::scalar::rays::Scene;
 use sampling::{SamplingMethod, scalar::is_visibility_redundant};
@@ -74,7 +74,7 @@ pub fn seen(
 }
 
 fn pinhole(image: &DepthImage) -> PinholeCamera {
-    let Camera::Pinhole(camera) = &image.camera;
+    let camera = image.camera.reference();
     *camera
 }
 

@@ -8,7 +8,7 @@ use app_core::delivery::{at_rate, open, request};
 use app_core::live::{Drive, Record, drive};
 use client::{Client, Session};
 use cluster::{Assignment, OfferStatus, PolicyChoice, SessionRequest};
-use depth_image::{Camera, PinholeCamera, ViewCell};
+use depth_image::{PinholeCamera, ViewCell};
 use glam::UVec2;
 use tokio::task::JoinHandle;
 
@@ -54,7 +54,7 @@ pub(super) struct Viewer {
 
 /// The views between the sample cameras of a scene.
 pub(super) fn path(offer: &OfferStatus, count: usize, size_px: UVec2) -> anyhow::Result<Vec<PinholeCamera>> {
-    let samples: Vec<_> = offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+    let samples: Vec<_> = offer.sample_cameras.iter().map(|camera| *camera.reference()).collect();
     Ok(ViewCell::between(&samples).context("no sample cameras")?.orbit(count, size_px))
 }
 

@@ -155,7 +155,7 @@ fn across_cells(
     let cameras = &circle[..count.min(CIRCLE_FRAMES)];
     let mut groups = Vec::new();
     ViewGroup::add(&mut groups, cameras, volume);
-    let Camera::Pinhole(sample) = usual.sample_cameras.first().context("no sample cameras")?;
+    let sample = usual.sample_cameras.first().context("no sample cameras")?.reference();
     let size_px: UVec2 = sample.size_px;
     let cells: Vec<Vec<PinholeCamera>> = groups.iter().map(|group| group.sample_cameras(size_px)).collect();
     let cell_of = |camera: &PinholeCamera| nearest_set(camera, cells.clone(), volume).context("no view cell");

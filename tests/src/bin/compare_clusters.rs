@@ -99,7 +99,7 @@ async fn views_between_samples(client: &Client, size_px: UVec2, count: usize) ->
         .into_iter()
         .next()
         .context("no scene on offer")?;
-    let samples: Vec<_> = offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+    let samples: Vec<_> = offer.sample_cameras.iter().map(|camera| *camera.reference()).collect();
     Ok(ViewCell::between(&samples).context("no sample cameras")?.spread(count, size_px))
 }
 

@@ -24,15 +24,14 @@ const AWAY_M: f32 = 3.0;
 /// The rig's cameras, shifted sideways.
 fn shifted_rig(x_m: f32) -> Vec<Camera> {
     let shifted = |camera: &Camera| {
-        let Camera::Pinhole(camera) = *camera;
+        let camera = *camera.reference();
         Camera::Pinhole(PinholeCamera { eye_in_world: camera.eye_in_world + Vec3::X * x_m, ..camera })
     };
     rig().iter().map(shifted).collect()
 }
 
 fn eye(camera: &Camera) -> Vec3 {
-    let Camera::Pinhole(camera) = camera;
-    camera.eye_in_world
+    camera.reference().eye_in_world
 }
 
 /// The next plan: with a second cell to the side, whose images all samplers share.

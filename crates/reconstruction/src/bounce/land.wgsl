@@ -7,6 +7,9 @@
 {% include "view_work.wgsl" %}
 {% include "cell.wgsl" %}
 {% include "bounce/ray.wgsl" %}
+{%- if single_pole %}
+{% include "single_pole.wgsl" %}
+{%- endif %}
 
 // Of the pixels: linear, as RGB9E5.
 @group(0) var<storage, read_write> out_color: array<u32>;

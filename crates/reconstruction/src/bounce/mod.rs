@@ -1,6 +1,7 @@
 //! Mirror images of the scene: rays off the mirrors that a view shows are followed in images of the mirrors' surroundings,
 //! mirror after mirror, and what they find is added to the pixels.
 
+mod curved_search;
 pub(crate) mod mips;
 
 use bytemuck::{Pod, Zeroable};
@@ -12,10 +13,14 @@ use gpu::{
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
+pub use curved_search::CurvedSearch;
+pub(crate) use curved_search::{CurvedWalk, MAX_WALK_STEPS};
+
 use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList};
 use crate::recording::nearest_first;
 use crate::reflectors::{Reflectors, sample_texels};
+use crate::single_pole::GpuPole;
 use crate::view_work::{GpuViewCamera, GpuViewWork, ONE_VIEW, SetVariant};
 use crate::{device::Device, error::ReconstructionError, recording::Recording, sample_set::SampleSet};
 
@@ -61,6 +66,9 @@ impl Mirrors<'_> {
         if self.reflections > MAX_REFLECTIONS {
             return Err(ReconstructionError::Reflections(self.reflections));
         }
+        if set.is_single_pole() {
+            return Err(ReconstructionError::Model { model: "single_pole" });
+        }
         let has_mirrors = set.reflectors.as_ref().is_some_and(|of| of.highlight == Highlight::Ggx);
         Ok(if self.reflections > 0 && has_mirrors { self } else { Self::default() })
     }
@@ -99,12 +107,16 @@ pub(crate) struct Bounces<'s> {
     boxes: Buffer,
     /// A `ViewWork` for each cell.
     works: Vec<Buffer>,
+    /// The `Poles` of each cell with images of single-pole cameras.
+    poles: Vec<Option<Buffer>>,
     rays: [PooledBuffer; 2],
     /// Of the rays of this mirror and of the next, of those that the march leaves, and of those that stay unknown.
     listed: [PooledBuffer; 4],
     color: PooledBuffer,
     inverse_depth_per_m: PooledBuffer,
     provenance: PooledBuffer,
+    /// The steps of each ray in images of single-pole cameras, where they are counted.
+    steps: Option<PooledBuffer>,
 }
 
 /// Rays off one mirror: the numbers of those of each cell.
@@ -117,7 +129,12 @@ pub(crate) struct RayLists {
 
 impl<'s> Bounces<'s> {
     /// Lends the memory for one ray a pixel. `None` without mirror cells.
-    pub fn lend(device: &Device, mirrors: Mirrors<'s>, pixels: usize) -> Result<Option<Self>, ReconstructionError> {
+    pub fn lend(
+        device: &Device,
+        mirrors: Mirrors<'s>,
+        pixels: usize,
+        curved_search: CurvedSearch,
+    ) -> Result<Option<Self>, ReconstructionError> {
         let mut cells = mirrors.cells.to_vec();
         if cells.is_empty() {
             return Ok(None);
@@ -154,11 +171,13 @@ impl<'s> Bounces<'s> {
             reflections: mirrors.reflections,
             boxes: device.gpu.buffer_with("mirror boxes", &boxes, BufferUsages::UNIFORM),
             works: cells.iter().enumerate().map(work).collect(),
+            poles: cells.iter().map(|cell| poles(device, cell, curved_search)).collect(),
             rays: [rays()?, rays()?],
             listed: [listed()?, listed()?, listed()?, listed()?],
             color: plane("mirrored colour")?,
             inverse_depth_per_m: plane("mirrored depth")?,
             provenance: plane("mirrored provenance")?,
+            steps: None,
             cells,
         }))
     }
@@ -181,9 +200,35 @@ impl<'s> Bounces<'s> {
         ]
     }
 
+    /// Lists rays of the first cell.
+    pub fn listing(&self, device: &Device, rays: &[GpuMirroredRay]) -> RayLists {
+        let count = rays.len() as u32;
+        device.gpu.queue.write_buffer(&self.rays[0], 0, bytemuck::cast_slice(rays));
+        let numbers: Vec<u32> = (0..count).collect();
+        device.gpu.queue.write_buffer(&self.listed[0], 0, bytemuck::cast_slice(&numbers));
+        let list = GpuPixelList { workgroups: [count.div_ceil(LIST_WORKGROUP), 1, 1], count };
+        let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT;
+        RayLists { lists: device.gpu.buffer_with("listed rays", &[list; 2], usage), memory: 0 }
+    }
+
+    /// Counts the steps of rays in images of single-pole cameras from now on.
+    pub fn count_steps(&mut self, device: &Device, pixels: usize) -> &Buffer {
+        self.steps.insert(device.buffers.lend_storage("steps", 4 * pixels as u64))
+    }
+
+    /// Colours, inverse ways and provenance of rays.
+    pub fn planes(&self) -> [&Buffer; 3] {
+        [&self.color, &self.inverse_depth_per_m, &self.provenance]
+    }
+
+    /// Of each ray, where they are counted.
+    pub fn steps(&self) -> Option<&Buffer> {
+        self.steps.as_deref()
+    }
+
     /// What must live until the device is done.
     pub fn into_memory(self) -> Vec<PooledBuffer> {
-        let planes = [self.color, self.inverse_depth_per_m, self.provenance];
+        let planes = [self.color, self.inverse_depth_per_m, self.provenance].into_iter().chain(self.steps);
         self.rays.into_iter().chain(self.listed).chain(planes).collect()
     }
 
@@ -198,6 +243,10 @@ impl<'s> Bounces<'s> {
             Binding::buffer("listed_pixels", &self.listed[lists.memory]),
             Binding::buffer("lists", &lists.lists),
         ]
+    }
+
+    fn pole_binding(&self, cell: usize) -> Option<Binding<'_>> {
+        self.poles[cell].as_ref().map(|poles| Binding::buffer("poles", poles))
     }
 
     /// The resources of `surface.wgsl` for the rays of a cell, which leave some to a list.
@@ -244,6 +293,8 @@ pub(crate) struct Land {
     next_cells: Option<usize>,
     /// The cell's images have reflectors.
     reflects: bool,
+    /// The cell's images are those of single-pole cameras.
+    single_pole: bool,
     lights: usize,
     environment_map: bool,
     visibility_words: usize,
@@ -259,6 +310,7 @@ impl ShaderVariant for Land {
             mirrors => self.next_cells.is_some(),
             mirror_cells => self.next_cells.unwrap_or(0),
             reflects => self.reflects,
+            single_pole => self.single_pole,
             light_slots => light_slots(self.lights),
             environment_map => self.environment_map,
             visibility_words => self.visibility_words,
@@ -278,6 +330,7 @@ impl ShaderVariant for Land {
                         set,
                         next_cells,
                         reflects,
+                        single_pole: reflects && next_cells == Some(1),
                         lights,
                         environment_map,
                         visibility_words,
@@ -309,12 +362,15 @@ pub(crate) fn record(
 }
 
 /// Where the rays of a cell end, in its images.
-fn follow(
+pub(crate) fn follow(
     recording: &mut Recording<'_>,
     bounces: &Bounces<'_>,
     lists: &RayLists,
     (cell, reflection): (usize, u32),
 ) -> Result<(), ReconstructionError> {
+    if bounces.poles[cell].is_some() {
+        return follow_curved(recording, bounces, lists, (cell, reflection));
+    }
     let set = bounces.cells[cell].surroundings.variant();
     let [left, unknown] = [2, 3]
         .map(|memory| PixelList::empty(&recording.device.gpu, (*bounces.listed[memory]).clone(), bounces.cells.len()));
@@ -331,6 +387,26 @@ fn follow(
     bindings.extend(left.bindings());
     let bound = pass.bind(0, bindings)?;
     recording.dispatch_listed(&carve, &pass, &bound, (&left.lists, cell), (cell, reflection));
+    Ok(())
+}
+
+/// Where the rays of a cell end, in its images of single-pole cameras.
+fn follow_curved(
+    recording: &mut Recording<'_>,
+    bounces: &Bounces<'_>,
+    lists: &RayLists,
+    (cell, reflection): (usize, u32),
+) -> Result<(), ReconstructionError> {
+    let count_fetches = bounces.steps.is_some();
+    let walk = CurvedWalk { set: SetVariant { count_fetches, ..bounces.cells[cell].surroundings.variant() } };
+    let unknown = PixelList::empty(&recording.device.gpu, (*bounces.listed[3]).clone(), bounces.cells.len());
+    let pass = recording.device.passes.get(&walk)?;
+    let mut bindings = bounces.search_bindings(cell, &unknown);
+    bindings.extend(bounces.pole_binding(cell));
+    bindings.extend(bounces.steps.as_ref().map(|steps| Binding::buffer("out_fetches", steps)));
+    bindings.extend(bounces.list_bindings(lists));
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_listed(&walk, &pass, &bound, (&lists.lists, cell), (cell, reflection));
     Ok(())
 }
 
@@ -352,12 +428,14 @@ fn land(
         set: set.variant(),
         next_cells: next.filter(|_| reflectors.is_some()).map(|_| bounces.cells.len()),
         reflects: reflectors.is_some(),
+        single_pole: set.is_single_pole(),
         lights: view_reflectors.lights,
         environment_map: environment.is_some(),
         visibility_words: reflectors.map_or(0, |reflectors| reflectors.visibility_words),
     };
     let pass = recording.device.passes.get(&variant)?;
     let mut bindings = set_bindings(set, &bounces.works[cell]);
+    bindings.extend(bounces.pole_binding(cell));
     bindings.extend([
         Binding::buffer("out_color", &recording.batch.color),
         Binding::buffer("out_provenance", &recording.batch.provenance),
@@ -375,6 +453,17 @@ fn land(
     let bound = pass.bind(0, bindings)?;
     recording.dispatch_listed(&variant, &pass, &bound, (&lists.lists, cell), (cell, reflection));
     Ok(())
+}
+
+/// `Poles` of `single_pole.wgsl`, in the order of the cell's cameras; `None` of pinholes.
+fn poles(device: &Device, cell: &MirrorCell<'_>, search: CurvedSearch) -> Option<Buffer> {
+    let of = &cell.surroundings.poles;
+    let sorted = nearest_first(cell.surroundings, cell.bounds.center()).into_iter();
+    let sorted: Vec<GpuPole> =
+        sorted.filter_map(|camera| of.get(camera.mask.trailing_zeros() as usize)).copied().collect();
+    let steps = [search.coarse_px, search.fine_px, 0.0, 0.0];
+    let bytes = [bytemuck::cast_slice(&steps), bytemuck::cast_slice(&sorted)].concat();
+    (!sorted.is_empty()).then(|| device.gpu.buffer_with::<u8>("poles", &bytes, BufferUsages::UNIFORM))
 }
 
 /// The resources of `view_work.wgsl` and `cell.wgsl` for a mirror cell.

@@ -2,7 +2,7 @@
 
 use std::{fmt, sync::Arc};
 
-use depth_image::{Camera, DepthImage, PinholeCamera};
+use depth_image::{DepthImage, PinholeCamera};
 use glam::Vec3;
 use gpu::{TablePool, Turn};
 use minijinja::{Value, context};
@@ -126,10 +126,7 @@ pub(crate) struct SetMeshes {
 impl SetMeshes {
     /// Planes go to the device where every image has them.
     pub fn upload(tables: &TablePool, images: &[DepthImage], turn: Turn) -> Result<Self, ReconstructionError> {
-        let camera = |image: &DepthImage| {
-            let Camera::Pinhole(camera) = &image.camera;
-            *camera
-        };
+        let camera = |image: &DepthImage| *image.camera.reference();
         let planes = match CornerPlanes::REQUIRED.missing(images) {
             Some(missing) => Err(missing),
             None => Ok(CornerPlanes::upload(tables, images, turn)?),

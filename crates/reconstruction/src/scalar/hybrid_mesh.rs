@@ -1,6 +1,6 @@
 //! Twin of `hybrid_mesh.wgsl` and `merge.wgsl`: each sample a quad of its texel, and flat rectangles of them merged.
 
-use depth_image::{Camera, DepthImage, PinholeCamera, unit_from_oct16};
+use depth_image::{DepthImage, PinholeCamera, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
 
 use crate::{
@@ -78,7 +78,7 @@ fn tamed(normal: Vec3, ray: Vec3) -> Vec3 {
 impl<'i> Cut<'i> {
     fn of(image: &'i DepthImage) -> Option<Self> {
         let (normals, corners) = (image.normal_oct16.as_ref()?, image.corner_inverse_depth_per_m.as_ref()?);
-        let Camera::Pinhole(camera) = &image.camera;
+        let camera = image.camera.reference();
         let (width, focal_px) = (camera.size_px.x, camera.focal_px.min_element());
         let texels = (0..camera.size_px.y).flat_map(|y| (0..width).map(move |x| UVec2::new(x, y)));
         let quad = |(index, texel): (usize, UVec2)| {

@@ -1,6 +1,6 @@
 //! Twin of `mesh.wgsl`: a quad between each four neighbouring samples of one surface.
 
-use depth_image::{Camera, DepthImage};
+use depth_image::DepthImage;
 use glam::{UVec2, Vec3};
 
 use crate::{pyramid::CodedDepth, quads::Quad};
@@ -8,7 +8,7 @@ use crate::{pyramid::CodedDepth, quads::Quad};
 /// In the order of their upper left samples.
 pub(super) fn quads(number: usize, image: &DepthImage) -> Vec<Quad> {
     let depth = CodedDepth::of(image);
-    let Camera::Pinhole(camera) = &image.camera;
+    let camera = image.camera.reference();
     let size_px = image.size_px();
     let point = |texel: UVec2| -> Vec3 {
         let inverse_depth = (f32::from(depth.at(texel.x, texel.y)) - depth.offset) / depth.scale;

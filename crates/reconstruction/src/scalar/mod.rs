@@ -3,6 +3,7 @@
 //! An oracle for tests, written to be read beside the shaders; it is slow and takes only what
 //! [`crate::Reconstructor::upload`] accepts.
 
+mod curved_search;
 mod draw;
 mod fill;
 mod hybrid_mesh;
@@ -18,6 +19,7 @@ mod surface;
 mod tile_start;
 mod view_ray;
 
+pub use self::curved_search::SinglePoleImages;
 use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 

@@ -1,6 +1,6 @@
 //! A sample image as the searches read it.
 
-use depth_image::{Camera, DepthImage, linear_from_rgb9e5};
+use depth_image::{DepthImage, linear_from_rgb9e5};
 use glam::{UVec2, Vec2, Vec3, Vec4};
 
 use crate::{
@@ -50,7 +50,7 @@ fn nearest_code(word: u32) -> f32 {
 
 impl SampleCamera {
     pub fn of(image: &DepthImage, mask: u32, among_holes: bool) -> Self {
-        let Camera::Pinhole(camera) = &image.camera;
+        let camera = image.camera.reference();
         let depth = CodedDepth::in_set(image, among_holes);
         let pyramid = Pyramid::of(&depth);
         Self {

@@ -84,14 +84,15 @@ impl ViewRays {
         let [column, row, corner] =
             [self.view.column_in_world, self.view.row_in_world, self.view.corner_in_world].map(Vec3::from);
         let direction = column * position_px.x + row * position_px.y + corner;
-        // No component may be 0: 0 · inf is NaN.
-        let d = direction.map(|c| if c.abs() < 1e-20 { 1e-20 } else { c });
-        let (a, b) = ((self.volume.min - self.eye()) / d, (self.volume.max - self.eye()) / d);
-        ViewRay {
-            eye: self.eye(),
-            direction,
-            near: a.min(b).max_element().max(self.near_m()),
-            far: a.max(b).min_element(),
-        }
+        let [near, far] = span_in(&self.volume, self.eye(), direction, self.near_m());
+        ViewRay { eye: self.eye(), direction, near, far }
     }
+}
+
+/// Where a ray is inside a volume; nowhere where the first is the greater.
+pub(super) fn span_in(volume: &Aabb, origin: Vec3, direction: Vec3, near: f32) -> [f32; 2] {
+    // No component may be 0: 0 · inf is NaN.
+    let d = direction.map(|c| if c.abs() < 1e-20 { 1e-20 } else { c });
+    let (a, b) = ((volume.min - origin) / d, (volume.max - origin) / d);
+    [a.min(b).max_element().max(near), a.max(b).min_element()]
 }

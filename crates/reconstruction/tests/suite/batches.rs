@@ -96,8 +96,8 @@ fn sets_that_cannot_be_used_are_refused() {
     short.images[1].inverse_depth_per_m.pop();
     assert!(matches!(refused(&short), ReconstructionError::Sample { index: 1, .. }));
     let mut nowhere = good.clone();
-    let depth_image::Camera::Pinhole(camera) = &mut nowhere.images[0].camera;
-    camera.eye_in_world.x = f32::NAN;
+    let eye_in_world = Vec3::NAN;
+    nowhere.images[0].camera = PinholeCamera { eye_in_world, ..*good.images[0].camera.reference() }.into();
     assert!(matches!(refused(&nowhere), ReconstructionError::Sample { index: 0, .. }));
     for volume in [Aabb::EMPTY, Aabb { min: Vec3::NAN, max: Vec3::NAN }, Aabb { min: Vec3::ZERO, max: Vec3::INFINITY }]
     {

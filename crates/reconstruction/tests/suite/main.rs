@@ -10,6 +10,7 @@ mod mesh_limits;
 mod meshes;
 mod mirrors;
 mod non_redundant;
+mod single_pole;
 mod slices;
 mod specular;
 mod stage;

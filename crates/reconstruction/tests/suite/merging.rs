@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use depth_image::{Camera, PinholeCamera};
+use depth_image::PinholeCamera;
 use glam::{UVec2, Vec2, Vec3};
 use reconstruction::Quad;
 
@@ -60,7 +60,7 @@ fn measured(stage: &Stage, px: f64) -> Found {
     let mut found = Found::default();
     let mut at_corners: HashMap<_, Vec2> = HashMap::new();
     for quad in &merged {
-        let Camera::Pinhole(camera) = &stage.images[quad.image].camera;
+        let camera = stage.images[quad.image].camera.reference();
         let block = Block::of(quad, camera);
         for texel in block.texels() {
             found.samples += 1;

@@ -1,8 +1,6 @@
 //! Quads cut from sample images: their twins, closed forms, and what merging gives up.
 
-use depth_image::{
-    BACKGROUND_INVERSE_DEPTH, Camera, HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, View, ViewPlanes,
-};
+use depth_image::{BACKGROUND_INVERSE_DEPTH, HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use reconstruction::{ErrorBound, Quad, ReconstructionMethod, scalar};
 use scene::procedural::{quad, tree_terrain, uv_sphere};
@@ -28,8 +26,7 @@ fn device_quads(stage: &Stage, method: ReconstructionMethod) -> Vec<Quad> {
 }
 
 fn camera_of(stage: &Stage, image: usize) -> PinholeCamera {
-    let Camera::Pinhole(camera) = stage.images[image].camera;
-    camera
+    *stage.images[image].camera.reference()
 }
 
 /// The greatest distance of corners, in parts of the distance from their eye.

@@ -169,7 +169,7 @@ fn each_eye_sees_its_own_highlight() {
             assert_eq!(count(&seen, ProvenanceKind::Hit), kinds(&seen).len(), "the wall is everywhere");
             let own = share_as_seen_from(&room, kind, &camera, camera.eye_in_world, &seen);
             // The nearest sample's highlight, as if it had been baked into its colours.
-            let Camera::Pinhole(baked) = images[usize::from(x > 0.0) * 2].camera;
+            let baked = *images[usize::from(x > 0.0) * 2].camera.reference();
             let others = share_as_seen_from(&room, kind, &camera, baked.eye_in_world, &seen);
             println!("{kind:?} at {x}: {own:.4} as seen from there, {others:.4} as seen from a sample");
             assert!(own > 0.995 && others < 0.9, "{kind:?} at {x}: {own} {others}");

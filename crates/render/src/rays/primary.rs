@@ -23,14 +23,20 @@ pub(crate) struct Primary {
     shading: Option<Highlight>,
     surface_id: bool,
     count_visits: bool,
+    /// Rays around a pole, in place of those through one eye.
+    single_pole: bool,
     redundancy: Option<RedundancyVariant>,
 }
 
 impl Primary {
+    /// Redundancy is tested between pinholes alone.
+    fn pinholes() -> impl Iterator<Item = Self> {
+        Self::all().into_iter().filter(|variant| !variant.single_pole)
+    }
+
     /// The variants with each redundancy test.
     pub fn with_tests(tests: &[RedundancyTest]) -> impl Iterator<Item = Self> {
-        let each =
-            |redundancy| Self::all().into_iter().map(move |variant| Self { redundancy: Some(redundancy), ..variant });
+        let each = |redundancy| Self::pinholes().map(move |variant| Self { redundancy: Some(redundancy), ..variant });
         RedundancyVariant::all(tests).into_iter().flat_map(each)
     }
 }
@@ -45,6 +51,7 @@ impl ShaderVariant for Primary {
             shading => self.shading.map_or("unlit", highlight_name),
             surface_id => self.surface_id,
             count_visits => self.count_visits,
+            single_pole => self.single_pole,
             ..merge_maps([self.traversal.context(), RedundancyVariant::context(self.redundancy, KNOWN_GROUP)])
         }
     }
@@ -52,8 +59,10 @@ impl ShaderVariant for Primary {
     fn all() -> Vec<Self> {
         let shadings = [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)];
         let each = |shading| {
-            switches().flat_map(move |[surface_id, count_visits]| {
-                Traversal::ALL.map(|traversal| Self { traversal, shading, surface_id, count_visits, redundancy: None })
+            switches().flat_map(move |[surface_id, count_visits, single_pole]| {
+                let plain =
+                    |traversal| Self { traversal, shading, surface_id, count_visits, single_pole, redundancy: None };
+                Traversal::ALL.map(plain)
             })
         };
         shadings.into_iter().flat_map(each).collect()
@@ -74,6 +83,7 @@ pub(crate) fn record(
         shading: batch.work.lighting.highlight(),
         surface_id: surfaces.iter().any(|target| target.surface_ids.is_some()),
         count_visits: visit_counts.is_some(),
+        single_pole: batch.is_single_pole(),
         redundancy: predecessors.map(|images| images.variant),
     };
     let pass = passes.get(&variant)?;
@@ -131,6 +141,8 @@ mod tests {
             let images = known.predecessors(&stage.gpu, 1, &camera);
             for variant in Primary::all() {
                 check(&stage, &traced, &variant);
+            }
+            for variant in Primary::pinholes() {
                 let variant = Primary { redundancy: Some(images.variant), ..variant };
                 check(&stage, &traced, &variant);
                 stage.check(&variant, KNOWN_GROUP, &images.bindings());

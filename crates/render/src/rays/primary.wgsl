@@ -39,7 +39,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let pixel = pixel_at(id, 1u);
     if is_beyond(pixel) { return; }
     let direction = direction_of(pixel);
-    let ray = ray_from(camera.eye_in_world, direction);
+    let ray = ray_from({{ "origin_of(pixel)" if single_pole else "camera.eye_in_world" }}, direction);
 {% if redundancy_test %}
     var hit = Hit(FARTHEST, NOTHING, Crossing(0.0, 0.0, 0.0, false, false, vec3u(0u)));
     var near = camera.near_m;
@@ -57,7 +57,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     hit.slot = select(hit.slot, NOTHING, searching);
     textureStore(front_depth, pixel, vec4f(front));
 {% else %}
-    let hit = closest(ray, camera.near_m, FARTHEST);
+    let hit = closest(ray, camera.near_m, {{ "farthest_of(pixel)" if single_pole else "FARTHEST" }});
 {% endif %}
     let met = hit.slot != NOTHING;
     var surface = vec4u(0u);

@@ -22,6 +22,7 @@ impl ShaderVariant for Land {
 
     fn context(&self) -> Value {
         let own = context! {
+            single_pole => false,
             mirrors => self.mirrors,
             environment_map => self.environment_map,
             highlight => highlight_name(Highlight::Ggx),

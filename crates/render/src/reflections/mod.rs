@@ -49,7 +49,7 @@ impl Reflections {
         if !batch.output.mirrors {
             return Ok(None);
         }
-        let pixels = |piece: &Piece| (piece.end_row - piece.first_row) * batch.cameras[piece.camera].size_px.x;
+        let pixels = |piece: &Piece| (piece.end_row - piece.first_row) * batch.cameras[piece.camera].size_px().x;
         let capacity = pieces.iter().map(pixels).max().unwrap_or(0).max(1);
         let lend = |label, bytes| {
             gpu.check_storage_bytes(label, bytes)?;
@@ -111,6 +111,6 @@ impl Reflections {
 }
 
 fn units(recording: &Recording<'_>, piece: Piece) -> u64 {
-    let width_px = recording.batch.cameras[piece.camera].size_px.x;
+    let width_px = recording.batch.cameras[piece.camera].size_px().x;
     u64::from(width_px) * u64::from(piece.end_row - piece.first_row)
 }

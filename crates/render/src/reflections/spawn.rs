@@ -25,6 +25,7 @@ impl ShaderVariant for Spawn {
 
     fn context(&self) -> Value {
         let own = context! {
+            single_pole => false,
             by_rays => self.by_rays,
             primary => true,
             cone => true,
@@ -63,7 +64,7 @@ pub(super) fn record(
     let buffers = [&recording.cameras, illumination, reflected, next_bounces];
     let own = pass.bind(0, bindings(buffers, next, target))?;
     let tree = pass.bind(1, traced.bindings())?;
-    let size = [batch.cameras[piece.camera].size_px.x, piece.end_row - piece.first_row, 1];
+    let size = [batch.cameras[piece.camera].size_px().x, piece.end_row - piece.first_row, 1];
     pass.dispatch_each(&mut recording.frame, &[&own, &tree], element..element + 1, DispatchSize::Invocations(size));
     let kind = WorkKind::new(batch.family(), &variant.name());
     recording.frame.cut(kind, units);

@@ -491,8 +491,8 @@ fn tiles_have_the_noise_of_their_image() {
     let lit = || work(&scene, "soft 1, occlusion 1");
     let whole = image(lit(), &camera);
     let tiles = (0..3).map(|tile| {
-        let Camera::Pinhole(tile) = Camera::Pinhole(camera).tile(tile, 3);
-        image(lit(), &tile)
+        let tile = Camera::Pinhole(camera).tile(tile, 3);
+        image(lit(), tile.reference())
     });
     let tiled = DepthImage::from_tiles(Camera::Pinhole(camera), tiles.collect()).expect("an image");
     let same = whole.color_rgb9e5.iter().zip(&tiled.color_rgb9e5).filter(|(a, b)| a == b).count();

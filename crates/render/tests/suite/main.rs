@@ -8,6 +8,7 @@ mod light_failures;
 mod materials;
 mod raster;
 mod reflections;
+mod single_pole;
 mod slices;
 mod stage;
 mod tone;

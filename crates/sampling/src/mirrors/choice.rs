@@ -2,38 +2,49 @@
 
 use std::ops::Range;
 
-use depth_image::PinholeCamera;
+use depth_image::{Camera, PinholeCamera};
 use glam::{UVec2, Vec3};
 use rayon::prelude::*;
 
-use crate::impostors::ImageLimits;
+use crate::impostors::{ImageLimits, Models};
 
-use super::directions::{FACE_DEG, WIDE_DEG, looking};
+use super::directions::{ASIDE, FACE_DEG, SIDE_PX, WIDE_DEG, looking};
 use super::groups::Group;
 use super::rays::{PLACES, Triangles, Way};
+use super::seen::{Images, Ways, seen_by, share_of_ways, strike};
+use super::single_pole;
 
 /// A mirror whose normals have a mean of this length is flat.
 const FLAT: f32 = 0.9;
-/// How far images lie from a flat mirror's middle, in half widths, and from another's.
+/// How far images lie from a flat mirror's middle, in half widths.
 const FLAT_ASIDE: f32 = 0.5;
-const ASIDE: f32 = 0.6;
 /// The middle and four corners.
 const PLACES_OF_EYES: usize = 5;
 /// Fewer rays do not choose.
 const LEAST_RAYS: usize = 512;
 /// So many images or more begin with those that are always taken.
 const LEAST_FOR_FIRST: usize = 4;
-/// The side of the image that shows most ends of rays best; sizes are in proportion.
-const SIDE_PX: f32 = 256.0;
 /// The least texels of an image over those of its fair share: it proves the way to the sky to be free.
 const LEAST_SHARE: f32 = 1.0 / 16.0;
 
 /// Images, and the shares of rays that they do not see all the way: see [`super::Mirror`].
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Choice {
-    pub cameras: Vec<PinholeCamera>,
+    pub cameras: Vec<Camera>,
+    pub candidates: Vec<Candidate>,
     /// Of the rays by which they were chosen, and of as many others. `None` where rays did not choose.
     pub unseen_ratio: Option<[f32; 2]>,
+}
+
+/// Images from which a choice is made, of equal texels together.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct Candidate {
+    /// As `--impostors` names it.
+    pub name: String,
+    /// The share of the deciding rays that it does not see all the way.
+    pub unseen_ratio: f32,
+    pub is_chosen: bool,
 }
 
 /// Chooses by the rays off half of the mirror's points; the others tell how good the choice is. Where few eyes see the mirror, or
@@ -53,26 +64,58 @@ pub(super) fn choose(
     let Some(triangles) = triangles.filter(|_| deciding.len().min(fresh.len()) >= LEAST_RAYS) else {
         return pool.usual(limits.most);
     };
-    let seen: Vec<Vec<bool>> = pool.cameras.par_iter().map(|camera| seen_by(camera, &deciding, triangles)).collect();
-    let first = if limits.most >= LEAST_FOR_FIRST { pool.first.clone().collect() } else { Vec::new() };
-    let (chosen, unseen) = cover(&seen, first, limits);
-    if chosen.is_empty() {
+    let ways = Ways { triangles, deciding, fresh };
+    let mut candidates = Vec::new();
+    let pinholes = pool.choose(&ways, limits, &mut candidates);
+    let bent: Vec<Images> = single_pole::candidates(group, &ways);
+    let ratio = |images: &Images| share_of_ways(&images.unseen);
+    candidates.extend(bent.iter().map(|images| Candidate {
+        name: format!("single_pole:{}", images.cameras.len()),
+        unseen_ratio: ratio(images),
+        is_chosen: false,
+    }));
+    // As few images as do; of as many, pinholes.
+    let is_enough = |images: &Images| ratio(images) <= limits.unseen_ratio;
+    let is_less = |images: &&Images| is_enough(images) && images.cameras.len() < pinholes.cameras.len();
+    let bent = match limits.models {
+        Models::Pinholes => None,
+        Models::All => bent.iter().find(is_less),
+        Models::SinglePoles => bent.iter().find(|images| images.cameras.len() == limits.most),
+    };
+    let chosen = bent.unwrap_or(&pinholes);
+    if chosen.cameras.is_empty() {
         return pool.usual(limits.most);
     }
-    let cameras: Vec<PinholeCamera> = chosen.iter().map(|&camera| pool.cameras[camera]).collect();
-    let of_chosen: Vec<&[bool]> = chosen.iter().map(|&camera| seen[camera].as_slice()).collect();
-    let mut of_fresh = vec![true; fresh.len() * PLACES];
-    cameras.iter().for_each(|camera| strike(&mut of_fresh, &seen_by(camera, &fresh, triangles)));
-    let unseen_ratio = Some([&unseen, &of_fresh].map(|unseen| share_of_ways(unseen)));
-    Choice { cameras: sized(&cameras, &of_chosen, &deciding), unseen_ratio }
+    mark(&mut candidates, chosen);
+    let mut of_fresh = vec![true; ways.fresh.len() * PLACES];
+    chosen.cameras.iter().for_each(|camera| strike(&mut of_fresh, &seen_by(camera, &ways.fresh, triangles)));
+    let unseen_ratio = Some([&chosen.unseen, &of_fresh].map(|unseen| share_of_ways(unseen)));
+    Choice { cameras: chosen.cameras.clone(), candidates, unseen_ratio }
+}
+
+fn mark(candidates: &mut [Candidate], chosen: &Images) {
+    let name = format!("{}:{}", chosen.cameras[0].model_name(), chosen.cameras.len());
+    candidates.iter_mut().for_each(|candidate| candidate.is_chosen = candidate.name == name);
 }
 
 /// Adds to the first images the one that sees most places that none does yet, until the share of ways with an unseen place is
-/// within the limit or there are as many images as may be. Gives the images and which places none of them sees.
-fn cover(seen: &[Vec<bool>], first: Vec<usize>, limits: ImageLimits) -> (Vec<usize>, Vec<bool>) {
+/// within the limit or there are as many images as may be. Gives the images and which places none of them sees; each step is a
+/// candidate.
+fn cover(
+    seen: &[Vec<bool>],
+    first: Vec<usize>,
+    limits: ImageLimits,
+    candidates: &mut Vec<Candidate>,
+) -> (Vec<usize>, Vec<bool>) {
     let mut unseen = vec![true; seen[0].len()];
     let mut chosen = first;
     chosen.iter().for_each(|&camera| strike(&mut unseen, &seen[camera]));
+    let candidate = |chosen: &[usize], unseen: &[bool]| Candidate {
+        name: format!("pinhole:{}", chosen.len()),
+        unseen_ratio: share_of_ways(unseen),
+        is_chosen: false,
+    };
+    candidates.extend((!chosen.is_empty()).then(|| candidate(&chosen, &unseen)));
     while chosen.len() < limits.most && (chosen.is_empty() || share_of_ways(&unseen) > limits.unseen_ratio) {
         let new = |camera: &usize| seen[*camera].iter().zip(&unseen).filter(|(seen, is)| **seen && **is).count();
         // Of equals the first.
@@ -80,18 +123,9 @@ fn cover(seen: &[Vec<bool>], first: Vec<usize>, limits: ImageLimits) -> (Vec<usi
         let Some(best) = best else { break };
         strike(&mut unseen, &seen[best]);
         chosen.push(best);
+        candidates.push(candidate(&chosen, &unseen));
     }
     (chosen, unseen)
-}
-
-fn strike(unseen: &mut [bool], seen: &[bool]) {
-    unseen.iter_mut().zip(seen).for_each(|(unseen, seen)| *unseen &= !seen);
-}
-
-/// The share of ways of which some place is unseen.
-fn share_of_ways(unseen: &[bool]) -> f32 {
-    let ways = unseen.chunks(PLACES);
-    ways.clone().filter(|places| places.contains(&true)).count() as f32 / ways.len().max(1) as f32
 }
 
 /// Images to choose from.
@@ -105,8 +139,20 @@ struct Pool {
 
 impl Pool {
     fn usual(&self, most: usize) -> Choice {
-        let cameras = self.usual.iter().take(most).map(|&camera| self.cameras[camera]).collect();
-        Choice { cameras, unseen_ratio: None }
+        let cameras = self.usual.iter().take(most).map(|&camera| self.cameras[camera].into()).collect();
+        Choice { cameras, candidates: Vec::new(), unseen_ratio: None }
+    }
+
+    /// As few images as the limits allow.
+    fn choose(&self, ways: &Ways<'_>, limits: ImageLimits, candidates: &mut Vec<Candidate>) -> Images {
+        let seen = |camera: &PinholeCamera| seen_by(&(*camera).into(), &ways.deciding, ways.triangles);
+        let seen: Vec<Vec<bool>> = self.cameras.par_iter().map(seen).collect();
+        let first = if limits.most >= LEAST_FOR_FIRST { self.first.clone().collect() } else { Vec::new() };
+        let (chosen, unseen) = cover(&seen, first, limits, candidates);
+        let cameras: Vec<PinholeCamera> = chosen.iter().map(|&camera| self.cameras[camera]).collect();
+        let of_chosen: Vec<&[bool]> = chosen.iter().map(|&camera| seen[camera].as_slice()).collect();
+        let cameras = sized(&cameras, &of_chosen, &ways.deciding).into_iter().map(Camera::from).collect();
+        Images { cameras, unseen }
     }
 }
 
@@ -146,16 +192,6 @@ fn pool(group: &Group, middle_of_scene: Vec3, near_m: f32) -> Pool {
 /// The middle and four corners around it.
 fn places(middle: Vec3, [right, up]: [Vec3; 2]) -> [Vec3; PLACES_OF_EYES] {
     [middle, middle - right - up, middle + right + up, middle + right - up, middle - right + up]
-}
-
-fn is_within(camera: &PinholeCamera, point: Vec3) -> bool {
-    camera.project(point).is_some_and(|at| camera.contains(at.pixel))
-}
-
-/// Of each place of each way.
-fn seen_by(camera: &PinholeCamera, ways: &[Way], triangles: &Triangles) -> Vec<bool> {
-    let sees = |place: Vec3| is_within(camera, place) && triangles.is_free(camera.eye_in_world, place);
-    ways.iter().flat_map(|way| way.places().map(sees)).collect()
 }
 
 /// Shares texels by how many ends at surfaces each image shows, together with others or alone: n ∝ h to the power 2/3, which

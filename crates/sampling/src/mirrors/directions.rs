@@ -5,6 +5,10 @@ use glam::{UVec2, Vec3};
 
 /// The field of view of a face of the cube around a mirror's middle: neighbours overlap.
 pub(super) const FACE_DEG: f32 = 94.0;
+/// How far images lie from the middle of a mirror that is not flat, in half widths.
+pub(super) const ASIDE: f32 = 0.6;
+/// The side of the image that shows most ends of rays best; sizes are in proportion.
+pub(super) const SIDE_PX: f32 = 256.0;
 /// The field of view of further images.
 pub(super) const WIDE_DEG: f32 = 110.0;
 

@@ -4,10 +4,13 @@ mod choice;
 mod directions;
 mod groups;
 mod rays;
+mod seen;
+mod single_pole;
 
-use depth_image::{Aabb, MAX_MIRROR_CELLS, PinholeCamera, ROUGHEST_MIRROR};
+use depth_image::{Aabb, Camera, MAX_MIRROR_CELLS, ROUGHEST_MIRROR};
 use scene::{Material, Scene, Texture};
 
+pub use choice::Candidate;
 use choice::{Choice, choose};
 pub use directions::{faces, looking};
 use groups::{Group, Surface, for_each_surface, groups};
@@ -26,7 +29,9 @@ pub struct Mirror {
     /// Holds its surfaces at all moments.
     pub bounds: Aabb,
     /// For images of what it shows, of sizes in proportion. The mirror itself is not seen from within.
-    pub cameras: Vec<PinholeCamera>,
+    pub cameras: Vec<Camera>,
+    /// What images were chosen from, as far as rays chose.
+    pub candidates: Vec<Candidate>,
     /// The shares of mirrored rays that images do not see all the way: of those by which the images were chosen, and of as many
     /// others. `None` where rays did not choose: the mirror moves, few eyes see it, or the scene has too many triangles.
     pub unseen_ratio: Option<[f32; 2]>,
@@ -48,8 +53,10 @@ pub fn mirrors(scene: &Scene, impostors: Impostors) -> (Vec<Mirror>, usize) {
     let triangles = stands.then(|| Triangles::of(scene, volume)).flatten();
     let mirror = |group: &Group| {
         let triangles = triangles.as_ref().filter(|_| !group.moves);
-        let Choice { cameras, unseen_ratio } = choose(group, triangles, limits, (volume.center(), volume.near_m()));
-        Mirror { bounds: group.bounds.padded(group.bounds.size().length() * MARGIN), cameras, unseen_ratio }
+        let Choice { cameras, candidates, unseen_ratio } =
+            choose(group, triangles, limits, (volume.center(), volume.near_m()));
+        let bounds = group.bounds.padded(group.bounds.size().length() * MARGIN);
+        Mirror { bounds, cameras, candidates, unseen_ratio }
     };
     (groups.iter().map(mirror).collect(), beyond)
 }
@@ -72,6 +79,7 @@ fn least_roughness(texture: &Texture) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use depth_image::PinholeCamera;
     use glam::{UVec2, Vec3};
     use scene::{Instance, Limits, MissingTextures, SceneSpec, Wind};
 
@@ -127,7 +135,7 @@ mod tests {
             let middle = mirror.bounds.center();
             let facing = across * -middle.dot(across).signum();
             assert!(!mirror.cameras.is_empty());
-            for camera in &mirror.cameras {
+            for camera in mirror.cameras.iter().map(Camera::reference) {
                 let off_m = (camera.eye_in_world - middle).dot(facing);
                 assert!(off_m.abs() < 0.01, "{off_m} m off its plane");
                 assert!(camera.near_m < 0.02 && mirror.bounds.grown_to(camera.eye_in_world) == mirror.bounds);
@@ -161,6 +169,38 @@ mod tests {
         });
         println!("unseen by 1, 2, 4 and 8 images: {unseen:?}");
         assert!(unseen.is_sorted_by(|a, b| a >= b) && unseen[0] > 0.2, "{unseen:?}");
+    }
+
+    #[test]
+    fn single_poles_see_more_of_an_object_than_pinholes() {
+        let teapot = scene("teapot-mirror");
+        let of = |images| super::mirrors(&teapot, Impostors::SinglePoles { images }).0.remove(0);
+        for (images, mirror) in [(1, of(1)), (2, of(2))] {
+            assert_eq!(mirror.cameras.len(), images);
+            for camera in &mirror.cameras {
+                let Camera::SinglePole(camera) = camera else { panic!("{camera:?}") };
+                camera.validate().expect("a camera");
+                // The pole is the middle of the teapot.
+                let middle_m = 0.5 * (camera.reference.near_m + camera.farthest_m);
+                let pole = camera.reference.ray(camera.pole_px).at(middle_m);
+                assert!(pole.distance(Vec3::new(0.0, 1.6, 2.0)) < 1.0, "{pole}");
+                // Two images without distortion may see as much from both sides.
+                assert!(images == 2 || camera.distortion_px > 0.0, "{camera:?}");
+            }
+            let [chosen, fresh] = mirror.unseen_ratio.expect("it stands still");
+            assert!((chosen - fresh).abs() < 0.03, "{chosen}, {fresh}");
+        }
+    }
+
+    #[test]
+    fn the_choice_says_what_it_was_made_from() {
+        let mirror = mirrors(&scene("teapot-mirror")).0.remove(0);
+        let names: Vec<&str> = mirror.candidates.iter().map(|candidate| candidate.name.as_str()).collect();
+        for name in ["pinhole:8", "single_pole:1", "single_pole:2"] {
+            assert!(names.contains(&name), "{names:?}");
+        }
+        let chosen = mirror.candidates.iter().find(|candidate| candidate.is_chosen).expect("one is chosen");
+        assert_eq!(Some(chosen.unseen_ratio), mirror.unseen_ratio.map(|ratio| ratio[0]));
     }
 
     /// Images from within a closed shell whose inside is seen show nothing else.

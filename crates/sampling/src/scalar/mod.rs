@@ -119,7 +119,7 @@ fn is_redundant(query: &Query<'_>, candidate: &Candidate, was_kept: bool, image:
             is_pixel_redundant(candidate, image)
         }
         SamplingMethod::NonRedundant(Redundancy::Visibility) | SamplingMethod::Useful(Redundancy::Visibility) => {
-            let Camera::Pinhole(camera) = &image.camera;
+            let camera = image.camera.reference();
             is_visibility_redundant(query.scene, candidate.point_in_world, candidate.footprint_m, camera)
         }
         SamplingMethod::NonRedundant(Redundancy::Tolerance) | SamplingMethod::Useful(Redundancy::Tolerance) => {

@@ -1,6 +1,6 @@
 //! The twin of `tolerance.wgsl`, and of the temporal reference in `known_samples.wgsl`.
 
-use depth_image::{Camera, DepthImage, unit_from_oct16};
+use depth_image::{DepthImage, unit_from_oct16};
 use glam::Vec3;
 use render::scalar::REFERENCE_FOOTPRINTS;
 
@@ -9,7 +9,7 @@ use crate::methods::non_redundant::{CLEARLY, CLEARLY_SAME_FACING, COARSER, DEPTH
 
 /// Whether an image has a sample where a candidate is.
 pub(super) fn was_kept(candidate: &Candidate, reference: &DepthImage) -> bool {
-    let Camera::Pinhole(camera) = &reference.camera;
+    let camera = reference.camera.reference();
     let (Some((pixel, depth_m)), Some(normals)) = (place(camera, candidate.point_in_world), &reference.normal_oct16)
     else {
         return false;
@@ -23,7 +23,7 @@ pub(super) fn was_kept(candidate: &Candidate, reference: &DepthImage) -> bool {
 }
 
 pub(super) fn is_tolerance_redundant(candidate: &Candidate, was_kept: bool, allowed: f32, image: &DepthImage) -> bool {
-    let Camera::Pinhole(camera) = &image.camera;
+    let camera = image.camera.reference();
     let (Some((pixel, depth_m)), Some(normals)) = (place(camera, candidate.point_in_world), &image.normal_oct16) else {
         return false;
     };

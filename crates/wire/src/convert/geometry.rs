@@ -1,12 +1,13 @@
 //! Cameras and bounds.
 
 use cluster::InvalidField;
-use depth_image::{Aabb, Camera, PinholeCamera};
+use depth_image::{Aabb, Camera, PinholeCamera, SinglePoleCamera};
 use glam::{Quat, UVec2, Vec2, Vec3};
 
 use super::{Convert, required};
 use crate::error::WireError;
 use crate::proto;
+use crate::proto::camera::Model;
 
 messages! {
     Vec2 = Vec2 { x, y };
@@ -61,14 +62,46 @@ impl Convert<proto::PinholeCamera> for PinholeCamera {
     }
 }
 
+impl Convert<proto::SinglePoleCamera> for SinglePoleCamera {
+    fn read(camera: proto::SinglePoleCamera, field: &'static str) -> Result<Self, WireError> {
+        let reference = required(camera.reference, "camera.single_pole.reference")?;
+        let camera = Self {
+            reference: PinholeCamera::read(reference, "camera.single_pole.reference")?,
+            pole_px: Convert::read(camera.pole_px, "camera.single_pole.pole_px")?,
+            distortion_px: camera.distortion_px,
+            farthest_m: camera.farthest_m,
+        };
+        camera.validate().map_err(|source| InvalidField::Camera { field, source })?;
+        // Tiles, which do not hold the pole of their image, do not travel.
+        if !camera.reference.contains(camera.pole_px) {
+            return Err(InvalidField::out_of_range("camera.single_pole.pole_px", camera.pole_px, "in the image").into());
+        }
+        Ok(camera)
+    }
+
+    fn write(self) -> proto::SinglePoleCamera {
+        proto::SinglePoleCamera {
+            reference: Some(self.reference.write()),
+            pole_px: self.pole_px.write(),
+            distortion_px: self.distortion_px,
+            farthest_m: self.farthest_m,
+        }
+    }
+}
+
 impl Convert<proto::Camera> for Camera {
     fn read(camera: proto::Camera, _: &'static str) -> Result<Self, WireError> {
-        let proto::camera::Model::Pinhole(pinhole) = required(camera.model, "camera.model")?;
-        PinholeCamera::read(pinhole, "camera.pinhole").map(Self::Pinhole)
+        match required(camera.model, "camera.model")? {
+            Model::Pinhole(pinhole) => PinholeCamera::read(pinhole, "camera.pinhole").map(Self::Pinhole),
+            Model::SinglePole(camera) => SinglePoleCamera::read(camera, "camera.single_pole").map(Self::SinglePole),
+        }
     }
 
     fn write(self) -> proto::Camera {
-        let Self::Pinhole(camera) = self;
-        proto::Camera { model: Some(proto::camera::Model::Pinhole(camera.write())) }
+        let model = match self {
+            Self::Pinhole(camera) => Model::Pinhole(camera.write()),
+            Self::SinglePole(camera) => Model::SinglePole(camera.write()),
+        };
+        proto::Camera { model: Some(model) }
     }
 }

@@ -122,7 +122,7 @@ fn floor(illumination: Illumination) -> Scene {
 }
 
 fn image(stand: &Stand, scene: &GpuScene, lighting: Lighting, camera: &PinholeCamera) -> anyhow::Result<DepthImage> {
-    Ok(stand.images(scene, lighting, &[*camera], SamplePlanes::default())?.remove(0))
+    Ok(stand.images(scene, lighting, &[(*camera).into()], SamplePlanes::default())?.remove(0))
 }
 
 /// Linear green light at each sample, with its place.

@@ -111,9 +111,9 @@ impl Output<'_> {
     }
 
     fn write_cameras(&self, path: &Path, chosen: &Representation) -> anyhow::Result<()> {
-        let named = |(index, Camera::Pinhole(camera)): (usize, &Camera)| NamedCamera {
+        let named = |(index, camera): (usize, &Camera)| NamedCamera {
             file_path: format!("sample_{index:04}.png"),
-            camera: *camera,
+            camera: *camera.reference(),
             more: Map::new(),
         };
         let cameras = chosen.sample_cameras.iter().enumerate().map(named);
@@ -134,8 +134,8 @@ fn front(by_price: &[Line]) -> Vec<&Line> {
 
 fn flags(chosen: &Representation, cameras: &Path) -> String {
     let Representation { sampling, method, sample_cameras } = chosen;
-    let size = sample_cameras.first().map_or(String::new(), |Camera::Pinhole(camera)| {
-        format!(" --sample-size {}x{}", camera.size_px.x, camera.size_px.y)
-    });
+    let size = sample_cameras
+        .first()
+        .map_or(String::new(), |camera| format!(" --sample-size {}x{}", camera.size_px().x, camera.size_px().y));
     format!("--sampling {sampling} --method {method}{size} --samples {}", cameras.display())
 }

@@ -9,7 +9,7 @@ use app_core::sizes::{SizePx, grid};
 use clap::Args;
 use cluster::{OfferStatus, PolicyChoice};
 use codec::FrameCodec;
-use depth_image::{Antialias, Camera, PinholeCamera, ViewCell, ViewPlanes};
+use depth_image::{Antialias, PinholeCamera, ViewCell, ViewPlanes};
 use glam::{DVec3, Vec3};
 use planner::Budget;
 use reconstruction::ReconstructionMethod;
@@ -169,7 +169,7 @@ impl Viewpoints {
         if let Some(text) = &self.camera {
             return Ok(vec![one_camera(text, placement, size)?]);
         }
-        let samples: Vec<_> = offer.sample_cameras.iter().map(|Camera::Pinhole(camera)| *camera).collect();
+        let samples: Vec<_> = offer.sample_cameras.iter().map(|camera| *camera.reference()).collect();
         let cell = ViewCell::between(&samples).context("the coordinator has no sample cameras: give --cameras")?;
         Ok(match (self.grid, self.views, self.around) {
             (Some([columns, rows]), ..) => cell.grid(columns, rows, size.0),

@@ -1,0 +1,56 @@
+//! The walk along curved rays in images of single-pole cameras: `curved_search.wgsl`.
+
+use gpu::{ResourceTraits, ShaderVariant};
+use minijinja::Value;
+
+use crate::error::ReconstructionError;
+use crate::view_work::{ONE_VIEW, SetVariant};
+
+/// Steps of a ray in one image: enough for any that crosses the largest image in steps of two texels.
+pub(crate) const MAX_WALK_STEPS: u32 = 16_384;
+
+const LEAST_FINE_PX: f32 = 0.0625;
+const MOST_COARSE_PX: f32 = 64.0;
+
+/// The steps of a walk (Rosen et al., section 7.2), in texels of an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurvedSearch {
+    /// Of the steps that are taken first.
+    pub coarse_px: f32,
+    /// Of those where a coarse step may meet the surface; at most `coarse_px`. As long as those, no step is refined.
+    pub fine_px: f32,
+}
+
+impl CurvedSearch {
+    /// Fails for steps of no length, too long ones, and fine ones that are longer than coarse ones.
+    pub(crate) fn checked(self) -> Result<Self, ReconstructionError> {
+        let Self { coarse_px, fine_px } = self;
+        let is_usable = fine_px >= LEAST_FINE_PX && fine_px <= coarse_px && coarse_px <= MOST_COARSE_PX;
+        is_usable.then_some(self).ok_or(ReconstructionError::CurvedSearch { coarse_px, fine_px })
+    }
+}
+
+impl Default for CurvedSearch {
+    fn default() -> Self {
+        Self { coarse_px: 6.0, fine_px: 1.0 }
+    }
+}
+
+/// The switches of `bounce/curved_search.wgsl`.
+#[derive(Debug)]
+pub(crate) struct CurvedWalk {
+    pub set: SetVariant,
+}
+
+impl ShaderVariant for CurvedWalk {
+    const TEMPLATE: &'static str = "bounce/curved_search.wgsl";
+    const TRAITS: ResourceTraits = ONE_VIEW;
+
+    fn context(&self) -> Value {
+        self.set.context()
+    }
+
+    fn all() -> Vec<Self> {
+        SetVariant::all().into_iter().map(|set| Self { set }).collect()
+    }
+}

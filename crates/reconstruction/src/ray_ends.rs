@@ -1,0 +1,100 @@
+//! Ends of single rays, for studies and tests of how rays off mirrors are followed.
+
+use depth_image::{Aabb, PinholeCamera, Provenance, ProvenanceKind, Ray, ViewPlanes, linear_from_rgb9e5};
+use glam::{UVec2, Vec3};
+use gpu::Turn;
+
+use crate::bounce::{Bounces, CurvedSearch, GpuMirroredRay, MirrorCell, Mirrors, follow};
+use crate::device::Device;
+use crate::error::ReconstructionError;
+use crate::recording::Recording;
+use crate::sample_set::SampleSet;
+
+/// The columns of the picture by whose pixels rays are numbered.
+const COLUMNS: u32 = 256;
+
+/// Where a ray ends in images of a mirror's surroundings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RayEnd {
+    /// A hit; empty where the ray is proven to meet nothing; filled where no image knows.
+    pub kind: ProvenanceKind,
+    /// The ray's parameter at a hit.
+    pub way: f32,
+    /// At a hit.
+    pub color_linear: Vec3,
+    /// Look-ups in images of single-pole cameras; 0 where they are not counted.
+    pub steps: u32,
+}
+
+/// How rays are followed.
+#[derive(Clone, Copy)]
+pub struct RayWork<'s> {
+    /// The images.
+    pub surroundings: &'s SampleSet,
+    /// Nothing is met before this parameter.
+    pub near: f32,
+    /// In images of single-pole cameras.
+    pub curved_search: CurvedSearch,
+    /// Counting slows it down.
+    pub count_steps: bool,
+}
+
+/// Follows rays with directions of unit length. Gives also the seconds on the device.
+pub(crate) fn follow_rays(
+    device: &Device,
+    work: RayWork<'_>,
+    rays: &[Ray],
+) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
+    let RayWork { surroundings, near, curved_search, count_steps } = work;
+    let cells = [MirrorCell { bounds: Aabb::around([surroundings.eye_in_world()]), surroundings }];
+    let mirrors = Mirrors { cells: &cells, reflections: 1 };
+    let size_px = UVec2::new(COLUMNS, (rays.len() as u32).div_ceil(COLUMNS).max(1));
+    let camera = PinholeCamera::looking_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 1.0, size_px);
+    let planes = (ViewPlanes::ALL, false);
+    let mut recording = Recording::begin(device, surroundings, &[camera], planes, (0, Turn::default()))?;
+    let Some(mut bounces) = Bounces::lend(device, mirrors, camera.pixel_count(), curved_search.checked()?)? else {
+        return Ok((Vec::new(), 0.0));
+    };
+    if count_steps {
+        let steps = bounces.count_steps(device, camera.pixel_count());
+        recording.frame.encoder.clear_buffer(steps, 0, None);
+    }
+    let of_ray = |(number, ray): (u32, &Ray)| GpuMirroredRay {
+        origin_in_world: ray.origin_in_world.to_array(),
+        pixel: number,
+        direction: ray.direction_in_world.to_array(),
+        near_m: near,
+        guess: 0,
+        throughput_rgb9e5: 0,
+        width_m: 0.0,
+        spread: 0.0,
+    };
+    let lists = bounces.listing(device, &(0..).zip(rays).map(of_ray).collect::<Vec<_>>());
+    follow(&mut recording, &bounces, &lists, (0, 1))?;
+    read(device, recording, &bounces, rays.len())
+}
+
+fn read(
+    device: &Device,
+    recording: Recording<'_>,
+    bounces: &Bounces<'_>,
+    count: usize,
+) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
+    let Recording { mut frame, batch, .. } = recording;
+    let bytes = 4 * count.max(1) as u64;
+    let mut read = |plane: &wgpu::Buffer| frame.read_back(plane, 0..bytes, device.buffers.lend_host("ends", bytes));
+    let [color, inverse_way, provenance] = bounces.planes().map(&mut read);
+    let steps = bounces.steps().map(read);
+    let result = frame.submit()?.wait()?;
+    drop(batch);
+    let words = |plane| result.with(plane, |words: &[u32]| words[..count].to_vec());
+    let [colors, inverse_ways, provenances] = [words(color)?, words(inverse_way)?, words(provenance)?];
+    let steps = steps.map(words).transpose()?.unwrap_or_else(|| vec![0; count]);
+    let end = |ray: usize| RayEnd {
+        kind: Provenance(provenances[ray] & 0xff).kind(),
+        way: f32::from_bits(inverse_ways[ray]).recip(),
+        color_linear: linear_from_rgb9e5(colors[ray]),
+        steps: steps[ray],
+    };
+    Ok(((0..count).map(end).collect(), result.device_s))
+}
