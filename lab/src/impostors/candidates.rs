@@ -24,8 +24,9 @@ pub struct Candidate {
     pub mips: bool,
 }
 
-/// All candidates for a mirror, which faces `seen`; the last is that of clusters.
-pub fn candidates(mirror: &Mirror, seen: Vec3) -> Vec<Candidate> {
+/// All candidates for a mirror, which faces `seen`; the last is that of clusters. `single_poles` has the mirror with one and with
+/// two single-pole images.
+pub fn candidates(mirror: &Mirror, seen: Vec3, single_poles: [&Mirror; 2]) -> Vec<Candidate> {
     let bounds = &mirror.bounds;
     let middle = bounds.center();
     let towards = (seen - middle).normalize_or(Vec3::Z);
@@ -38,7 +39,10 @@ pub fn candidates(mirror: &Mirror, seen: Vec3) -> Vec<Candidate> {
     let pinholes = |cameras: Vec<PinholeCamera>| cameras.into_iter().map(Camera::from).collect();
     let square = [corner(-1.0, -1.0), corner(1.0, 1.0), corner(1.0, -1.0), corner(-1.0, 1.0)];
     let of = |name, cameras| Candidate { name, cameras, mips: true };
+    let [one, two] = single_poles.map(in_a_cluster);
     vec![
+        of("single_pole:1", one),
+        of("single_pole:2", two),
         of("pinhole:1", pinholes(vec![looking(middle, 1)])),
         of("pinhole:4", pinholes(square.map(|eye| looking(eye, 4)).to_vec())),
         of("six faces", pinholes(faces(middle, NEAR_M, side_px(6)))),

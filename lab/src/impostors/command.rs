@@ -16,7 +16,7 @@ use study::{Bar, Cell, Check, Report, Table};
 use super::candidates::{UNFILTERED, candidates};
 use super::costs::{self, Costs};
 use super::measure::{Answer, Figures, Hall, VIEW_PX, around};
-use super::orders;
+use super::{orders, single_rays};
 use crate::failures::stand::Stand;
 use crate::progress::bar;
 
@@ -73,6 +73,7 @@ pub fn run(args: &ImpostorsArgs) -> anyhow::Result<Outcome> {
     let rows = compared(&hall, &scene, &mirrors)?;
     report.tables.push(table(&rows)?);
     report.checks.extend(error_checks(&rows));
+    single_rays::measure(&stand, args.quick, &mut report)?;
     let costs = costs::measure(&hall, &mirrors)?;
     report.tables.push(cost_table(&costs)?);
     report.checks.extend(cost_checks(&costs));
@@ -88,7 +89,11 @@ pub fn run(args: &ImpostorsArgs) -> anyhow::Result<Outcome> {
 fn compared(hall: &Hall<'_>, scene: &Scene, mirrors: &[Mirror]) -> anyhow::Result<Vec<(&'static str, Figures)>> {
     let seen = scene.bounds().center();
     let bounds: Vec<Aabb> = mirrors.iter().map(|mirror| mirror.bounds).collect();
-    let mut columns: Vec<_> = mirrors.iter().map(|mirror| candidates(mirror, seen).into_iter()).collect();
+    let single_poles = [1, 2].map(|images| sampling::mirrors(scene, Impostors::SinglePoles { images }).0);
+    let of_mirror = |(number, mirror): (usize, &Mirror)| {
+        candidates(mirror, seen, single_poles.each_ref().map(|mirrors| &mirrors[number])).into_iter()
+    };
+    let mut columns: Vec<_> = mirrors.iter().enumerate().map(of_mirror).collect();
     let progress = bar("candidates", columns.first().map_or(0, ExactSizeIterator::len) + 1);
     let mut rows = vec![("the environment alone", hall.figures(&bounds, &[])?)];
     progress.inc(1);

@@ -6,3 +6,4 @@ mod costs;
 mod measure;
 mod objects;
 mod orders;
+mod single_rays;

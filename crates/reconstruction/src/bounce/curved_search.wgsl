@@ -34,10 +34,10 @@ fn look_at(line: Line, s: f32, camera: SampleCamera, pole: Pole) -> Look {
     return Look(place, select(FAR_AWAY, gap, inside && surface >= FIRST_SAMPLE), code_above / camera.focal_px, corners.connected, inside);
 }
 
-// A coarse step does not meet the surface where both of its ends are well before it, or well behind it. It rises or falls by a
-// footprint in a texel at most: elsewhere fine steps tell.
+// A coarse step does not meet the surface where both of its ends are well before it, or well behind it: as far as a surface
+// that rises by a footprint in a texel may come near from the nearer end.
 fn may_meet(a: Look, b: Look, coarse_px: f32) -> bool {
-    let fuzzy = coarse_px * max(a.footprint, b.footprint);
+    let fuzzy = 0.5 * coarse_px * max(a.footprint, b.footprint);
     return min(a.gap, b.gap) <= fuzzy && max(a.gap, b.gap) >= -fuzzy;
 }
 

@@ -157,7 +157,7 @@ impl<'c> Seen<'c> {
 }
 
 fn may_meet(a: Look, b: Look, coarse_px: f32) -> bool {
-    let fuzzy = coarse_px * a.footprint.max(b.footprint);
+    let fuzzy = 0.5 * coarse_px * a.footprint.max(b.footprint);
     a.gap.min(b.gap) <= fuzzy && a.gap.max(b.gap) >= -fuzzy
 }
 

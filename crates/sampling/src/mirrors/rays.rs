@@ -105,11 +105,16 @@ impl Triangles {
         let eye = (0..TRIES).map(eye).find(|eye| faces(*eye) && self.is_free(*eye, point))?;
         // A reflection does not depend on the normal's sign.
         let direction = (point - eye).normalize_or(Vec3::NEG_Y).reflect(mirror.normal);
-        let ray = self.ray(point, direction, f32::MAX);
+        let met = self.first_met(point, direction);
+        let way_m = met.unwrap_or_else(|| self.way_out_m(point, direction));
+        Some(Way { origin_in_world: point, to_end: direction * way_m, ends_at_surface: met.is_some() })
+    }
+
+    /// The parameter at which a ray first meets a surface.
+    pub fn first_met(&self, origin_in_world: Vec3, direction: Vec3) -> Option<f32> {
         let mut hit = RayHit::none();
-        let ends_at_surface = self.tree.ray_traverse(ray, &mut hit, |ray, slot| self.met(ray, slot));
-        let way_m = if ends_at_surface { hit.t } else { self.way_out_m(point, direction) };
-        Some(Way { origin_in_world: point, to_end: direction * way_m, ends_at_surface })
+        let ray = self.ray(origin_in_world, direction, f32::MAX);
+        self.tree.ray_traverse(ray, &mut hit, |ray, slot| self.met(ray, slot)).then_some(hit.t)
     }
 
     /// The way from a point within the volume to beyond its border.

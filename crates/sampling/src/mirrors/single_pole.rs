@@ -1,7 +1,8 @@
 //! Single-pole images of the object that a mirror shows most.
 
 use depth_image::{Aabb, Camera, SinglePoleCamera};
-use glam::{UVec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::directions::{ASIDE, SIDE_PX};
 use super::groups::{Group, Surface, groups};
@@ -14,6 +15,8 @@ const DISTORTIONS: [f32; 6] = [0.0, 0.1, 0.2, 0.3, 0.45, 0.6];
 const GROUND: f32 = 0.01;
 /// An object's box is larger than what rays meet of it, in diagonals: few of them meet its edges.
 const MARGIN: f32 = 0.02;
+/// Neighbouring samples of one surface differ in depth by as many footprints, or fewer.
+const FLAT_FOOTPRINTS: f32 = 2.0;
 /// All of an object lies at this share of the depth of its middle at least: nothing of it is beside an eye on the mirror.
 const LEAST_DEPTH: f32 = 0.2;
 
@@ -55,16 +58,32 @@ fn object(middle: Vec3, ways: &Ways<'_>) -> Option<Aabb> {
     before.max_by_key(|bounds| ends(ways).filter(|end| bounds.grown_to(*end) == *bounds).count())
 }
 
-/// Cameras at these eyes, of the distortion at which one of them sees the most of `met`.
+/// Whether a camera sees a place of a surface, and its neighbouring pixels see the surface go on: steeper ones are cut apart.
+fn shows(camera: &SinglePoleCamera, place: Vec3, ways: &Ways<'_>) -> bool {
+    let Some(at) = camera.project(place) else { return false };
+    let tolerance_m = FLAT_FOOTPRINTS * at.planar_depth_m / camera.reference.focal_px.min_element();
+    let goes_on = |offset_px: Vec2| {
+        let ray = camera.ray(at.pixel + offset_px);
+        let from = ray.at(camera.reference.near_m);
+        let met = ways.triangles.first_met(from, ray.direction_in_world);
+        met.is_some_and(|t| (camera.reference.near_m + t - at.planar_depth_m).abs() <= tolerance_m)
+    };
+    sees(&Camera::SinglePole(*camera), place, ways.triangles)
+        && [Vec2::X, -Vec2::X, Vec2::Y, -Vec2::Y].into_iter().all(goes_on)
+}
+
+/// Cameras at these eyes, of the distortion at which one of them shows the most of `met`.
 fn around(bounds: &Aabb, eyes: &[Vec3], met: &[Vec3], ways: &Ways<'_>) -> Vec<Camera> {
-    let cameras = |distortion: f32| -> Vec<Camera> {
+    let cameras = |distortion: f32| -> Vec<SinglePoleCamera> {
         let at = |eye: &Vec3| {
             SinglePoleCamera::around(bounds, *eye, distortion * 0.5 * SIDE_PX, UVec2::splat(SIDE_PX as u32))
         };
-        eyes.iter().map(at).map(Camera::SinglePole).collect()
+        eyes.iter().map(at).collect()
     };
-    let is_seen = |cameras: &[Camera], end: Vec3| cameras.iter().any(|camera| sees(camera, end, ways.triangles));
-    let seen = |cameras: &Vec<Camera>| met.iter().filter(|end| is_seen(cameras, **end)).count();
-    // Of equals the least distorted.
-    DISTORTIONS.into_iter().rev().map(cameras).max_by_key(seen).unwrap_or_default()
+    let shown = |cameras: &Vec<SinglePoleCamera>| {
+        let is_shown = |end: &&Vec3| cameras.iter().any(|camera| shows(camera, **end, ways));
+        met.par_iter().filter(is_shown).count()
+    };
+    let best = DISTORTIONS.into_iter().map(cameras).max_by_key(shown).unwrap_or_default();
+    best.into_iter().map(Camera::SinglePole).collect()
 }

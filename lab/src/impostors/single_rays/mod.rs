@@ -1,0 +1,45 @@
+//! Single rays in images of the teapot: what pinholes and single-pole cameras show of it, and what the walk along curved rays
+//! costs (Rosen et al., sections 4 and 7.2).
+
+mod found;
+mod steps;
+mod teapot;
+
+use study::{Check, Report};
+
+use crate::failures::stand::Stand;
+use crate::progress::bar;
+use found::Figures;
+use teapot::{Teapot, off_mirror, off_patch};
+
+/// Rays off a flat patch, in full and in quick runs.
+const PATCH_RAYS: [usize; 2] = [40_000, 10_000];
+/// Views around the mirror whose rays are followed.
+const VIEWS: [usize; 2] = [12, 4];
+
+/// Adds all tables, charts and checks to a report.
+///
+/// # Errors
+/// The device fails.
+pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Result<()> {
+    let teapot = Teapot::new(stand)?;
+    let progress = bar("single rays", 4);
+    let patch = |ratio: f32| off_patch(&teapot, ratio, PATCH_RAYS[usize::from(is_quick)]);
+    let flat = found::compare(&teapot, &patch(1.0))?;
+    progress.inc(1);
+    let mirror = found::compare(&teapot, &off_mirror(&teapot, VIEWS[usize::from(is_quick)], steps::VIEW_PX)?)?;
+    progress.inc(1);
+    let curve = found::by_distortion(&teapot, patch)?;
+    progress.inc(1);
+    report.tables.push(found::table("Rays off a flat patch as wide as it is far that meet the teapot", &flat)?);
+    report.tables.push(found::table("Rays off the mirror of teapot-mirror that meet the teapot", &mirror)?);
+    report.charts.push(curve.into());
+    report.checks.extend(found_checks(&flat, &mirror));
+    steps::measure(&teapot, is_quick, report)?;
+    progress.finish_and_clear();
+    Ok(())
+}
+
+fn found_checks(flat: &[Figures], mirror: &[Figures]) -> Vec<Check> {
+    found::checks(flat).into_iter().chain(found::checks_of_mirror(mirror)).collect()
+}
