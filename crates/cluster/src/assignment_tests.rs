@@ -2,8 +2,8 @@
 
 use std::num::NonZeroU32;
 
-use depth_image::{Aabb, Camera, Environment, PinholeCamera};
-use glam::Vec3;
+use depth_image::{Aabb, Camera, Environment, PinholeCamera, SinglePoleCamera};
+use glam::{UVec2, Vec3};
 
 use crate::test_support::{assignment, camera, workload};
 use crate::{ApplyPlan, Assignment, CompositorShare, MirrorCell, Policy, Refinement, SamplerShare, Timeline, Workload};
@@ -241,6 +241,27 @@ fn mirror_cells_stay_when_view_cells_change() {
     let one = plan.workload.of_one_view();
     assert_eq!((one.cell_first_indices.clone(), one.mirror_cells.len()), (vec![0, 1, 3], 2));
     assert_eq!(of_cells().workload.of_one_view(), of_cells().workload.of_cell(0).unwrap());
+}
+
+#[test]
+fn only_mirror_cells_have_single_poles_and_each_has_one_model() {
+    let bounds = Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE };
+    let bent = Camera::SinglePole(SinglePoleCamera::around(&bounds, Vec3::Z * 5.0, 20.0, UVec2::splat(64)));
+    let with = |places: &[usize]| {
+        let mut plan = with_mirrors();
+        places.iter().for_each(|&place| plan.workload.sample_cameras[place] = bent);
+        plan.validate().err().map(|error| error.to_string())
+    };
+    // Cameras 0 to 3 are those of view cells, 4 and 5 of one mirror, 6 of another.
+    assert_eq!(with(&[4, 5]), None);
+    assert_eq!(with(&[6]), None);
+    for mixed in [4, 5] {
+        assert!(with(&[mixed]).is_some_and(|text| text.contains("sample_cameras.model")), "{mixed}");
+    }
+    for of_view in 0..4 {
+        let text = with(&[of_view]).unwrap_or_default();
+        assert!(text.contains("sample_cameras.model is single_pole, must be pinhole"), "{of_view}: {text}");
+    }
 }
 
 #[test]

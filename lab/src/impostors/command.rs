@@ -70,6 +70,7 @@ pub fn run(args: &ImpostorsArgs) -> anyhow::Result<Outcome> {
     report.parameter("lighting", lighting.to_string());
     report.parameter("mirrored pixels that show an object (%)", hall.object_share() * 100.0);
     report.checks.extend(mirrors.iter().filter_map(|mirror| mirror.unseen_ratio).map(unseen_check));
+    report.tables.push(choice_table(&mirrors)?);
     let rows = compared(&hall, &scene, &mirrors)?;
     report.tables.push(table(&rows)?);
     report.checks.extend(error_checks(&rows));
@@ -139,6 +140,20 @@ fn unseen_check([chosen, fresh]: [f32; 2]) -> Check {
     println!("mirrored rays that are not seen all the way: {:.2} %, of others {:.2} %", chosen * 100.0, fresh * 100.0);
     let apart = f64::from((fresh - chosen).abs()) * 100.0;
     Check::new("rays that images do not see: other rays less those that chose", apart, "points", Bar::AtMost(1.0))
+}
+
+/// What the images of each mirror were chosen from.
+fn choice_table(mirrors: &[Mirror]) -> anyhow::Result<Table> {
+    let columns = [("mirror", ""), ("images", ""), ("rays that they do not see", "%"), ("chosen", "")];
+    let mut table = Table::new("Images from which each mirror's were chosen, of equal texels", &columns);
+    for (number, mirror) in mirrors.iter().enumerate() {
+        for candidate in &mirror.candidates {
+            let unseen = f64::from(candidate.unseen_ratio) * 100.0;
+            let chosen = if candidate.is_chosen { "chosen" } else { "" };
+            table.push([(number + 1).into(), candidate.name.as_str().into(), unseen.into(), Cell::from(chosen)])?;
+        }
+    }
+    Ok(table)
 }
 
 fn error_checks(rows: &[(&str, Figures)]) -> Vec<Check> {

@@ -105,3 +105,41 @@ impl Convert<proto::Camera> for Camera {
         proto::Camera { model: Some(model) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> SinglePoleCamera {
+        let bounds = Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE };
+        SinglePoleCamera::around(&bounds, Vec3::Z * 5.0, 20.0, UVec2::new(64, 48))
+    }
+
+    #[test]
+    fn cameras_of_every_model_survive_the_round_trip() {
+        for camera in [Camera::Pinhole(camera().reference), Camera::SinglePole(camera())] {
+            assert_eq!(Camera::read(camera.write(), "camera"), Ok(camera));
+        }
+    }
+
+    #[test]
+    fn bad_single_pole_cameras_are_refused_by_field() {
+        let spoilt = |spoil: &dyn Fn(&mut proto::SinglePoleCamera)| {
+            let mut message = camera().write();
+            spoil(&mut message);
+            let refused = Camera::read(proto::Camera { model: Some(Model::SinglePole(message)) }, "camera");
+            refused.expect_err("a spoilt camera").to_string()
+        };
+        let pole_px = |x| Some(proto::Vec2 { x, y: 3.0 });
+        assert!(spoilt(&|m| m.reference = None).contains("single_pole.reference"));
+        assert!(spoilt(&|m| m.reference.as_mut().expect("one").near_m = 0.0).contains("near_m"));
+        assert!(spoilt(&|m| m.pole_px = None).contains("pole_px"));
+        assert!(spoilt(&|m| m.pole_px = pole_px(f32::NAN)).contains("pole_px"));
+        assert!(spoilt(&|m| m.pole_px = pole_px(65.0)).contains("pole_px"), "outside of the image");
+        assert!(spoilt(&|m| m.distortion_px = -1.0).contains("distortion_px"));
+        assert!(spoilt(&|m| m.distortion_px = f32::NAN).contains("distortion_px"));
+        assert!(spoilt(&|m| m.distortion_px = 20_000.0).contains("distortion_px"));
+        assert!(spoilt(&|m| m.farthest_m = 0.1).contains("farthest_m"));
+        assert!(spoilt(&|m| m.farthest_m = f32::INFINITY).contains("farthest_m"));
+    }
+}

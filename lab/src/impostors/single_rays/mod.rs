@@ -1,6 +1,8 @@
 //! Single rays in images of the teapot: what pinholes and single-pole cameras show of it, and what the walk along curved rays
 //! costs (Rosen et al., sections 4 and 7.2).
 
+mod bowl;
+mod choices;
 mod found;
 mod steps;
 mod teapot;
@@ -36,6 +38,10 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
     report.charts.push(curve.into());
     report.checks.extend(found_checks(&flat, &mirror));
     steps::measure(&teapot, is_quick, report)?;
+    report.checks.extend(bowl::measure(stand)?);
+    let (choices, checks) = choices::measure(stand)?;
+    report.tables.push(choices);
+    report.checks.extend(checks);
     progress.finish_and_clear();
     Ok(())
 }

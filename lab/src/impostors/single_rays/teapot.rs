@@ -1,6 +1,6 @@
 //! The teapot alone, rays towards it, and what they meet.
 
-use depth_image::{Aabb, Camera, DepthImage, Environment, Illumination, PinholeCamera, Ray, SinglePoleCamera};
+use depth_image::{Aabb, Camera, Environment, Illumination, PinholeCamera, Ray, SinglePoleCamera};
 use glam::{UVec2, Vec3};
 use rayon::prelude::*;
 use reconstruction::{SampleSet, SetDescription};
@@ -56,27 +56,31 @@ impl<'s> Teapot<'s> {
     }
 
     pub fn set(&self, cameras: &[Camera]) -> anyhow::Result<SampleSet> {
-        let images = self.stand.images(&self.on_device, Lighting::UNLIT, cameras, SamplePlanes::default())?;
-        self.upload(&images)
-    }
-
-    fn upload(&self, images: &[DepthImage]) -> anyhow::Result<SampleSet> {
-        let dark = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
-        let description = SetDescription {
-            volume: self.bounds,
-            background: Environment::uniform(Vec3::ZERO),
-            illumination: &dark,
-            highlight: None,
-            environment: None,
-            mips: false,
-        };
-        Ok(self.stand.reconstructor().upload(images, &description)?)
+        unlit_set(self.stand, &self.on_device, cameras, self.bounds)
     }
 
     fn truth(&self, rays: &[Ray]) -> Vec<Option<(f32, Vec3)>> {
         let met = |ray: &Ray| self.twin.closest(ray, NEAR).0.map(|hit| (hit.t, self.twin.look(&hit).base_linear));
         rays.par_iter().map(met).collect()
     }
+}
+
+/// Images of a scene in its own colours.
+///
+/// # Errors
+/// The device fails.
+pub fn unlit_set(stand: &Stand, scene: &GpuScene, cameras: &[Camera], volume: Aabb) -> anyhow::Result<SampleSet> {
+    let images = stand.images(scene, Lighting::UNLIT, cameras, SamplePlanes::default())?;
+    let dark = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
+    let description = SetDescription {
+        volume,
+        background: Environment::uniform(Vec3::ZERO),
+        illumination: &dark,
+        highlight: None,
+        environment: None,
+        mips: false,
+    };
+    Ok(stand.reconstructor().upload(&images, &description)?)
 }
 
 /// Nothing is met nearer to a reflector.
@@ -136,17 +140,22 @@ fn off_mirror_in(teapot: &Teapot<'_>, cameras: &[PinholeCamera], view_px: UVec2)
     let twin = scalar::rays::Scene::of(&whole, 0.0)?;
     let (mirrors, _) = sampling::mirrors(&teapot.whole, sampling::Impostors::Pinholes { images: 1 });
     let bounds = mirrors.first().map_or(teapot.bounds, |mirror| mirror.bounds);
-    let pixels: Vec<(usize, UVec2)> = (0..cameras.len())
-        .flat_map(|view| (0..view_px.y).flat_map(move |y| (0..view_px.x).map(move |x| (view, UVec2::new(x, y)))))
-        .collect();
-    let mirrored = |(view, pixel): &(usize, UVec2)| {
-        let camera = cameras[*view].resized(view_px);
-        let ray = scalar::rays::pixel_ray(&camera, *pixel);
-        let hit = twin.closest(&ray, camera.near_m).0?;
+    let rays = mirrored(&twin, cameras, view_px);
+    Ok(Rays { middle: bounds.center(), width_m: bounds.size().min_element(), truth: teapot.truth(&rays), rays })
+}
+
+/// The rays off the mirrors that these views show, at another size.
+pub fn mirrored(twin: &scalar::rays::Scene, cameras: &[PinholeCamera], view_px: UVec2) -> Vec<Ray> {
+    let places = |camera: &PinholeCamera| {
+        let camera = camera.resized(view_px);
+        let places = (0..view_px.y).flat_map(move |y| (0..view_px.x).map(move |x| UVec2::new(x, y)));
+        places.map(move |place| (scalar::rays::pixel_ray(&camera, place), camera.near_m)).collect::<Vec<_>>()
+    };
+    let off = |(ray, near_m): (Ray, f32)| {
+        let hit = twin.closest(&ray, near_m).0?;
         twin.look(&hit).reflector?;
         let towards = ray.direction_in_world.normalize_or_zero().reflect(twin.normal_in_world(&hit));
         Some(Ray { origin_in_world: ray.at(hit.t), direction_in_world: towards })
     };
-    let rays: Vec<Ray> = pixels.par_iter().filter_map(mirrored).collect();
-    Ok(Rays { middle: bounds.center(), width_m: bounds.size().min_element(), truth: teapot.truth(&rays), rays })
+    cameras.par_iter().flat_map(places).filter_map(off).collect()
 }
