@@ -419,6 +419,43 @@ fn every_crate_forbids_unsafe_code() {
     assert_eq!(setting("[package]\nname = \"x\"\n[lints.rust]\n", "lints", "workspace"), None);
 }
 
+/// A further camera model changes these files, and adds its own. "A camera model" in ARCHITECTURE.md lists them.
+#[test]
+fn camera_models_are_told_apart_in_few_files() {
+    const PLACES: [&str; 7] = [
+        "crates/depth-image/src/camera.rs",
+        "crates/reconstruction/src/single_pole.rs",
+        "crates/render/src/batch.rs",
+        "crates/render/src/pixel_camera.rs",
+        "crates/sampling/src/mirrors/seen.rs",
+        "crates/sampling/src/mirrors/single_pole.rs",
+        "crates/wire/src/convert/geometry.rs",
+    ];
+    const PROGRAMS: [&str; 9] = [
+        "client",
+        "compositor-node",
+        "coordinator",
+        "crates",
+        "gateway",
+        "myriorama/src",
+        "node-host",
+        "sampler-node",
+        "simulation",
+    ];
+    let is_test =
+        |path: &Path| path.components().any(|part| part.as_os_str() == "tests" || part.as_os_str() == "scalar");
+    let names = ["Camera::SinglePole", "Self::SinglePole("];
+    let product = |text: &str| text.split("#[cfg(test)]").next().unwrap_or_default().to_owned();
+    let files = PROGRAMS.into_iter().flat_map(|folder| sources(&root().join(folder), "rs"));
+    let files = files.filter(|(path, _)| !is_test(path) && !path.to_string_lossy().ends_with("_tests.rs"));
+    let mut found: Vec<PathBuf> =
+        files.filter(|(_, text)| !lines_with(&product(text), &names).is_empty()).map(|(path, _)| path).collect();
+    found.sort();
+    assert_eq!(found, PLACES.map(|place| root().join(place)));
+    let page = fs::read_to_string(root().join("ARCHITECTURE.md")).expect("ARCHITECTURE.md");
+    PLACES.iter().for_each(|place| assert!(page.contains(place), "ARCHITECTURE.md does not name {place}"));
+}
+
 /// Names of all methods.
 fn methods() -> Vec<&'static str> {
     let methods =

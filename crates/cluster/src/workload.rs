@@ -123,7 +123,8 @@ impl Workload {
             mirror_cells: Vec::new(),
             sampling: self.mirror_cell(cell).map_or(&self.sampling, |mirror| &mirror.sampling).clone(),
             lighting: self.lighting.clone(),
-            planes: self.planes,
+            // Rays off mirrors need no planes of their own.
+            planes: self.mirror_cell(cell).map_or(self.planes, |_| SamplePlanes::default()),
             volume: self.volume,
             background: self.background,
             timeline: self.timeline,
@@ -258,7 +259,7 @@ impl Workload {
         pinholes(of_views)?;
         for cell in self.view_cell_count()..self.cell_count() {
             let cameras = self.cameras_of_cell(cell).and_then(|range| self.sample_cameras.get(range)).unwrap_or(&[]);
-            let is_other = |camera: &&Camera| camera.model_name() != cameras[0].model_name();
+            let is_other = |camera: &&Camera| !camera.is_of_model(&cameras[0]);
             if let Some(other) = cameras.iter().find(is_other) {
                 let expected = "the model of the mirror cell's first camera";
                 return Err(InvalidField::out_of_range("sample_cameras.model", other.model_name(), expected));

@@ -77,6 +77,12 @@ impl Camera {
         }
     }
 
+    /// Whether both are of one model.
+    #[must_use]
+    pub fn is_of_model(&self, other: &Self) -> bool {
+        std::mem::discriminant(self) == std::mem::discriminant(other)
+    }
+
     /// Columns and rows.
     #[must_use]
     pub fn size_px(&self) -> UVec2 {

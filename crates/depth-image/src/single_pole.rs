@@ -28,7 +28,7 @@ pub struct SinglePoleCamera {
 }
 
 impl SinglePoleCamera {
-    /// The camera from an eye around a box, whose middle is the pole: of the largest scale at which no part of the box leaves the
+    /// The camera from an eye around a box, whose middle is the pole: of a large scale at which no part of the box leaves the
     /// image at this distortion. The eye lies outside of the box.
     #[must_use]
     pub fn around(bounds: &Aabb, eye: Vec3, distortion_px: f32, size_px: UVec2) -> Self {
@@ -69,12 +69,14 @@ impl SinglePoleCamera {
         }
         let pole = f64::from(self.pole_px.abs().max_element());
         let [distortion, farthest_m] = [self.distortion_px, self.farthest_m].map(f64::from);
+        let least_farthest_m = f64::from(self.reference.near_m) * (1.0 + f64::from(DEPTH_SLACK));
         // A tile of an image does not hold the image's pole.
         let checks = [
             ("pole_px", pole, pole < 1e6, "within a million pixels"),
             ("distortion_px", distortion, self.distortion_px >= 0.0, "at least 0"),
             ("distortion_px", distortion, distortion <= f64::from(MAX_IMAGE_SIDE_PX), "at most 16384"),
-            ("farthest_m", farthest_m, self.farthest_m > self.reference.near_m, "beyond near_m"),
+            ("near_m", f64::from(self.reference.near_m), self.reference.near_m >= 1e-6, "at least 1e-6"),
+            ("farthest_m", farthest_m, farthest_m >= least_farthest_m, "beyond near_m by a thousandth"),
         ];
         match checks.iter().find(|(_, _, ok, _)| !ok) {
             Some(&(field, value, _, allowed)) => Err(CameraError::OutOfRange { field, value, allowed }),
@@ -82,7 +84,7 @@ impl SinglePoleCamera {
         }
     }
 
-    /// The same field of view in another size.
+    /// The same field of view in another size. Of other proportions the distortion is that of the side that shrinks more.
     #[must_use]
     pub fn resized(&self, size_px: UVec2) -> Self {
         let scale = size_px.as_vec2() / self.reference.size_px.as_vec2();

@@ -85,6 +85,25 @@ fn it_sees_sides_that_turn_away_from_its_eye() {
     assert!(as_pinhole.direction_in_world.dot(Vec3::X) > 0.0);
 }
 
+/// Were triangles drawn through the bend, their edges would stay straight. The true ones bow, which is why images are taken by
+/// rays.
+#[test]
+fn an_edge_bows_by_the_square_of_its_length() {
+    let camera = around(120.0);
+    let depth_m = 0.5 * (camera.reference.near_m + camera.farthest_m);
+    let (rho_px, shift_px) = (100.0f32, camera.shift_px(depth_m.recip()));
+    for edge_px in [4.0f32, 8.0, 16.0, 32.0, 64.0] {
+        let point = |along_px: f32| {
+            let pixel = camera.pole_px + Vec2::new(rho_px, along_px);
+            camera.project(camera.reference.ray(pixel).at(depth_m)).expect("it is seen").pixel
+        };
+        let drawn = 0.5 * (point(-0.5 * edge_px) + point(0.5 * edge_px));
+        let bow_px = drawn.distance(point(0.0));
+        let expected_px = shift_px * edge_px * edge_px / (8.0 * rho_px * rho_px);
+        assert!((bow_px - expected_px).abs() < 0.2 * expected_px, "{edge_px} px: {bow_px}, {expected_px}");
+    }
+}
+
 #[test]
 fn rays_end_at_the_axis_of_the_pole() {
     let camera = around(60.0);
@@ -125,6 +144,8 @@ fn an_invalid_camera_is_refused_with_its_field() {
         (SinglePoleCamera { distortion_px: f32::NAN, ..good }, "distortion_px"),
         (SinglePoleCamera { distortion_px: 20_000.0, ..good }, "distortion_px"),
         (SinglePoleCamera { farthest_m: good.reference.near_m, ..good }, "farthest_m"),
+        (SinglePoleCamera { farthest_m: good.reference.near_m.next_up(), distortion_px: 0.0, ..good }, "farthest_m"),
+        (SinglePoleCamera { reference: PinholeCamera { near_m: 1e-40, ..good.reference }, ..good }, "near_m"),
         (SinglePoleCamera { farthest_m: f32::INFINITY, ..good }, "farthest_m"),
     ];
     for (camera, field) in bad {

@@ -111,7 +111,7 @@ fn surface_class(point_in_world: Vec3, sample_images: &[DepthImage]) -> PixelCla
 
 fn matches_sample(image: &DepthImage, point_in_world: Vec3) -> bool {
     let camera = image.camera.reference();
-    let Some(at) = camera.project(point_in_world).filter(|at| camera.contains(at.pixel)) else {
+    let Some(at) = image.camera.project(point_in_world).filter(|at| camera.contains(at.pixel)) else {
         return false;
     };
     let texel = at.pixel.as_uvec2().min(camera.size_px - 1);

@@ -67,8 +67,11 @@ impl Measurement<'_> {
         let planes = engine.sample_planes(&request.method)?;
         // Views are made from all of them: their own cell, and what mirrors show.
         let cells = workload.cells();
-        let sample = |cell: &Workload| SampleWork { planes, ..SampleWork::of(cell) };
-        let sampled = cells.iter().map(|cell| self.timed(|| self.sampled(&sample(cell))));
+        let sample = |(number, cell): (usize, &Workload)| match workload.mirror_cell(number) {
+            Some(_) => SampleWork::of(cell),
+            None => SampleWork { planes, ..SampleWork::of(cell) },
+        };
+        let sampled = cells.iter().enumerate().map(|cell| self.timed(|| self.sampled(&sample(cell))));
         let (encoded, cells_s): (Vec<_>, Vec<f64>) = sampled.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let upload = |(number, (cell, images)): (usize, (&Workload, &Vec<_>))| {
             let set = SampleSet::of(cell, decoded(cell, images)?, workload.mirror_cell(number).is_some());
@@ -82,7 +85,7 @@ impl Measurement<'_> {
         let is_tileable = engine.images_are_independent(&workload.sampling)?;
         let first = cells.first().zip(cells_s.first()).filter(|_| is_tileable);
         let tile_costs = |(cell, cell_s): (&Workload, &f64)| {
-            self.tile_costs(&sample(cell), cell_s / cell.sample_cameras.len().max(1) as f64)
+            self.tile_costs(&sample((0, cell)), cell_s / cell.sample_cameras.len().max(1) as f64)
         };
         let tiles = first.map(tile_costs).transpose()?.flatten();
         let (drawn, direct_view_s) = self.direct_view_s(request)?;

@@ -16,7 +16,8 @@ const COLUMNS: u32 = 256;
 /// Where a ray ends in images of a mirror's surroundings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RayEnd {
-    /// A hit; empty where the ray is proven to meet nothing; filled where no image knows.
+    /// A hit; empty where the ray is proven to meet nothing, which in images of single-pole cameras is only where it never comes
+    /// into the volume; filled where no image knows.
     pub kind: ProvenanceKind,
     /// The ray's parameter at a hit.
     pub way: f32,

@@ -308,6 +308,7 @@ impl Reconstructor {
         set: &SampleSet,
         method: ReconstructionMethod,
     ) -> Result<Option<MeshStatistics>, ReconstructionError> {
+        set.check_pinholes()?;
         Ok(method.mesh(&self.device, set, Turn::default())?.map(|mesh| mesh.statistics))
     }
 
@@ -316,6 +317,7 @@ impl Reconstructor {
     /// # Errors
     /// As [`Reconstructor::mesh_statistics`].
     pub fn read_quads(&self, set: &SampleSet, method: ReconstructionMethod) -> Result<Vec<Quad>, ReconstructionError> {
+        set.check_pinholes()?;
         let mesh = method.mesh(&self.device, set, Turn::default())?;
         mesh.map_or(Ok(Vec::new()), |mesh| quads::read(&self.device, &mesh, set))
     }

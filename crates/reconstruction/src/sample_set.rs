@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
-use depth_image::{Aabb, DepthImage, Environment, Highlight, Illumination, PinholeCamera};
+use depth_image::{Aabb, Camera, DepthImage, Environment, Highlight, Illumination, PinholeCamera};
 use glam::{UVec2, Vec2, Vec3};
 use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
@@ -71,6 +71,11 @@ impl SampleSet {
     /// Its images are those of single-pole cameras.
     pub(crate) fn is_single_pole(&self) -> bool {
         !self.poles.is_empty()
+    }
+
+    /// Views are reconstructed from pinholes alone.
+    pub(crate) fn check_pinholes(&self) -> Result<(), ReconstructionError> {
+        if self.is_single_pole() { Err(ReconstructionError::Model { model: "single_pole" }) } else { Ok(()) }
     }
 
     /// The resources of `background.wgsl`.
@@ -187,6 +192,11 @@ fn check(tables: &TablePool, images: &[DepthImage], set: &SetDescription<'_>) ->
         let wrong = |reason: String| ReconstructionError::Sample { index, reason };
         camera.validate().map_err(|error| wrong(error.to_string()))?;
         image.validate().map_err(|error| wrong(error.to_string()))?;
+        if let Camera::SinglePole(camera) = camera
+            && !camera.reference.contains(camera.pole_px)
+        {
+            return Err(wrong("the pole lies outside of the image".to_owned()));
+        }
         if camera.size_px().min_element() < 2 {
             return Err(wrong("an image of one row or column has no surface between samples".to_owned()));
         }

@@ -29,8 +29,7 @@ pub(crate) fn poles(images: &[DepthImage]) -> Result<Vec<GpuPole>, usize> {
         }),
     };
     let poles: Vec<GpuPole> = images.iter().filter_map(pole).collect();
-    let model = |image: &DepthImage| image.camera.model_name();
-    match images.iter().position(|image| model(image) != model(&images[0])) {
+    match images.iter().position(|image| !image.camera.is_of_model(&images[0].camera)) {
         Some(other) => Err(other),
         None => Ok(poles),
     }

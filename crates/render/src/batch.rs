@@ -81,7 +81,7 @@ impl Batch<'_> {
         Batch { work, cameras, by_rays, traced: traced.clone(), output, tone, sequence, position: *position }
     }
 
-    /// Whether the rays of its pixels bend around a pole.
+    /// Whether its cameras are single-pole cameras.
     pub fn is_single_pole(&self) -> bool {
         matches!(self.cameras.first(), Some(Camera::SinglePole(_)))
     }
@@ -235,7 +235,7 @@ pub(crate) fn batches(cameras: &[Camera], most_pixels: usize) -> impl Iterator<I
         let mut pixels = 0;
         let fits = |camera: &&Camera| {
             pixels += camera.pixel_count();
-            pixels <= most_pixels && camera.model_name() == rest[0].model_name()
+            pixels <= most_pixels && camera.is_of_model(&rest[0])
         };
         let count = rest.iter().take(CAMERAS_A_SUBMISSION).take_while(fits).count().max(1).min(rest.len());
         let (batch, others) = rest.split_at(count);

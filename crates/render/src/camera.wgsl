@@ -53,6 +53,6 @@ fn direction_of(pixel: vec2u) -> vec3f {
     let center = vec2f(pixel) + 0.5;
     return camera.column_in_world * center.x + camera.row_in_world * center.y + camera.corner_in_world;
 }
-{% endif %}
+{%- endif %}
 
 fn place_of(pixel: vec2u) -> u32 { return pixel.y * camera.size_px.x + pixel.x; }

@@ -30,9 +30,13 @@ impl ShaderVariant for Interpolate {
     fn all() -> Vec<Self> {
         let each = |sums: SumPlanes| {
             let sum_planes = sums.count();
-            switches().map(move |[by_rays, coarse, bent]| {
-                // Only rays bend.
-                Self { by_rays, single_pole: by_rays && bent, step_px: 1 + u32::from(coarse), sum_planes }
+            // Triangles are drawn through one eye.
+            let each = switches().filter(|[by_rays, _, single_pole]| *by_rays || !single_pole);
+            each.map(move |[by_rays, coarse, single_pole]| Self {
+                by_rays,
+                single_pole,
+                step_px: 1 + u32::from(coarse),
+                sum_planes,
             })
         };
         SumPlanes::all().flat_map(each).collect()

@@ -37,7 +37,7 @@ pub(crate) struct PixelCamera {
     /// The lamps of a dispatch.
     pub first_light: u32,
     pub end_light: u32,
-    /// Of a single-pole camera, and the fields that follow.
+    /// Of a single-pole camera, as the two numbers that follow.
     pub pole_px: [f32; 2],
     pub bend_px_m: f32,
     pub farthest_m: f32,

@@ -145,12 +145,12 @@ impl Renderer {
         test: Option<RedundancyTest>,
         [sequence, of_corners]: [Option<ImageSequence<'_>>; 2],
     ) -> Result<Vec<DepthImage>, RenderError> {
+        let corners = planes.corners.then(|| pinholes(cameras, "depths at corners")).transpose()?;
         let output = images_output(work, planes, test);
         let untoned = |output: Output| (output, ToneMapping::NONE);
         let mut images = self.draw(work, cameras, untoned(output), sequence, planes::depth_images)?;
-        if planes.corners {
-            let corners = corner_cameras(&pinholes(cameras, "depths at corners")?);
-            let (work, cameras) = (work.unlit(), as_cameras(&corners));
+        if let Some(pinholes) = corners {
+            let (work, cameras) = (work.unlit(), as_cameras(&corner_cameras(&pinholes)));
             self.check(&cameras)?;
             let output = images_output(work, SamplePlanes::default(), test);
             let corners = self.draw(work, &cameras, untoned(output), of_corners, planes::depth_images)?;

@@ -26,7 +26,8 @@ pub enum Impostors {
         /// At most eight.
         images: u32,
     },
-    /// Single-pole images of the object that most mirrored rays meet. Where there is none, the usual pinholes are taken.
+    /// Single-pole images of the object that most mirrored rays meet, which show nothing else. Where there is none, pinholes are
+    /// taken, as many as are needed.
     SinglePoles {
         /// One, or two from both sides.
         images: u32,
@@ -47,7 +48,8 @@ pub(crate) struct ImageLimits {
 pub(crate) enum Models {
     All,
     Pinholes,
-    SinglePoles,
+    /// As many single-pole images, where they can be.
+    SinglePoles(usize),
 }
 
 /// A text that names no images.
@@ -72,7 +74,8 @@ impl Impostors {
                 Some(ImageLimits { models: Models::Pinholes, most: images as usize, unseen_ratio: 0.0 })
             }
             Self::SinglePoles { images } => {
-                Some(ImageLimits { models: Models::SinglePoles, most: images as usize, unseen_ratio: 0.0 })
+                let models = Models::SinglePoles(images as usize);
+                Some(ImageLimits { models, most: MOST_IMAGES, unseen_ratio: UNSEEN_PERCENT / 100.0 })
             }
         }
     }

@@ -6,8 +6,10 @@ use minijinja::Value;
 use crate::error::ReconstructionError;
 use crate::view_work::{ONE_VIEW, SetVariant};
 
-/// Steps of a ray in one image: enough for any that crosses the largest image in steps of two texels.
+/// Steps of a ray in one image; the end of one that takes more is unknown.
 pub(crate) const MAX_WALK_STEPS: u32 = 16_384;
+/// The ends of a fine step on one surface are no farther apart, in fine steps.
+pub(crate) const LONGEST_STEP: f32 = 4.0;
 
 const LEAST_FINE_PX: f32 = 0.0625;
 const MOST_COARSE_PX: f32 = 64.0;

@@ -13,7 +13,7 @@
 struct Line { origin: vec3f, line: vec3f }
 
 // The image at a place of a line. `gap`, in codes, is positive before the surface, and FAR_AWAY where there is none.
-struct Look { place: vec2f, gap: f32, footprint: f32, connected: bool, inside: bool }
+struct Look { place: vec2f, gap: f32, footprint: f32, connected: bool }
 
 fn look_at(line: Line, s: f32, camera: SampleCamera, pole: Pole) -> Look {
     let at = line.origin + line.line * s;
@@ -31,7 +31,7 @@ fn look_at(line: Line, s: f32, camera: SampleCamera, pole: Pole) -> Look {
     let surface = select(own, bilinear(corners.codes, within), corners.connected);
     let code_above = camera.code_scale * at.z;
     let gap = HALF_CODE + code_above + camera.code_offset - surface;
-    return Look(place, select(FAR_AWAY, gap, inside && surface >= FIRST_SAMPLE), code_above / camera.focal_px, corners.connected, inside);
+    return Look(place, select(FAR_AWAY, gap, inside && surface >= FIRST_SAMPLE), code_above / camera.focal_px, inside && corners.connected);
 }
 
 // A coarse step does not meet the surface where both of its ends are well before it, or well behind it: as far as a surface
@@ -41,22 +41,25 @@ fn may_meet(a: Look, b: Look, coarse_px: f32) -> bool {
     return min(a.gap, b.gap) <= fuzzy && max(a.gap, b.gap) >= -fuzzy;
 }
 
-// A fine step meets a surface that goes on from end to end, or one whose sample it ends close behind.
-fn meets(a: Look, b: Look) -> bool {
+// A fine step meets a surface that goes on from end to end, or one whose sample it ends close behind. Around the pole a step may
+// leap from one side to the other.
+fn meets(a: Look, b: Look, fine_px: f32) -> bool {
     let close = b.gap >= -THICKNESS_FOOTPRINTS * b.footprint;
-    return a.gap > 0.0 && b.gap <= 0.0 && (close || (a.connected && b.connected));
+    let goes_on = a.connected && b.connected && distance(a.place, b.place) <= LONGEST_STEP * fine_px;
+    return a.gap > 0.0 && b.gap <= 0.0 && (close || goes_on);
 }
 
-// `free`: the ray is before all surfaces, up to its end.
-struct Walk { s: f32, met: bool, free: bool }
+struct Walk { s: f32, met: bool }
 
 fn walk(line: Line, camera: SampleCamera, pole: Pole) -> Walk {
     var here = look_at(line, 0.0, camera, pole);
-    let chord_px = distance(here.place, moved(pole, line.origin.xy + line.line.xy, line.origin.z + line.line.z) - 0.5);
+    let end = line.origin + line.line;
+    let chord_px = max(distance(here.place, moved(pole, end.xy, end.z) - 0.5), length(line.line.xy));
     let coarse_step = min(poles.coarse_px / max(chord_px, 1e-3), 1.0);
     let fine_steps = u32(ceil(poles.coarse_px / poles.fine_px));
+    let fine_px = poles.coarse_px / f32(fine_steps);
     let fine_step = coarse_step / f32(fine_steps);
-    var found = Walk(0.0, false, here.inside && here.gap > 0.0);
+    var found = Walk(0.0, false);
     // Fine steps to go: none while steps are coarse.
     var to_go = 0u;
     for (var i = 0u; i < MAX_WALK_STEPS && found.s < 1.0 && !found.met; i++) {
@@ -65,38 +68,50 @@ fn walk(line: Line, camera: SampleCamera, pole: Pole) -> Walk {
         let next = look_at(line, next_s, camera, pole);
         let refines = is_coarse && fine_steps > 1u && may_meet(here, next, poles.coarse_px);
         let is_tested = !refines && (!is_coarse || fine_steps == 1u);
-        found.met = is_tested && meets(here, next);
+        found.met = is_tested && meets(here, next, fine_px);
         let crossing = found.s + (next_s - found.s) * clamp(here.gap / max(here.gap - next.gap, 1e-9), 0.0, 1.0);
         to_go = select(max(to_go, 1u) - 1u, fine_steps, refines);
-        found.free = found.free && (refines || (next.inside && next.gap > 0.0));
         found.s = select(select(next_s, crossing, found.met), found.s, refines);
+        here.place = select(next.place, here.place, refines);
         here.gap = select(next.gap, here.gap, refines);
         here.footprint = select(next.footprint, here.footprint, refines);
         here.connected = select(next.connected, here.connected, refines);
     }
-    found.free = found.free && found.s >= 1.0;
     return found;
 }
 
-// A ray in an image, as far as it lies within the depths that the camera sees.
-struct Seen { line: Line, near: f32, far: f32, near_w: f32, far_w: f32, whole: bool }
+// A ray in an image, as far as it lies within the depths that the camera sees and before the image. The pole lies in the image,
+// so that nothing moves into it.
+struct Seen { line: Line, near: f32, far: f32, near_w: f32, far_w: f32 }
 
 fn seen_by(camera: SampleCamera, pole: Pole, ray: MirroredRay, span: Span) -> Seen {
     let a = homogeneous(camera.homogeneous_pixel_from_world, vec4f(ray.origin_in_world, 1.0));
     let b = homogeneous(camera.homogeneous_pixel_from_world, vec4f(ray.direction, 0.0));
-    let inverse = safe_reciprocal(b.z);
-    let ends = (1.0 / vec2f(pole.nearest_per_m, pole.farthest_per_m) - a.z) * inverse;
-    let near = max(span.near, min(ends.x, ends.y));
-    let far = min(span.far, max(ends.x, ends.y));
-    let p = a + b * near;
-    let q = a + b * max(far, near);
+    // The depth, and the homogeneous distances from the four borders, change by `by` along the ray; none may be negative.
+    let size_px = camera.cells + 1.0;
+    let depths = vec2f(a.z - 1.0 / pole.nearest_per_m, 1.0 / pole.farthest_per_m - a.z);
+    var within = Span(span.near, span.far);
+    within = cut(within, depths.x, b.z);
+    within = cut(within, depths.y, -b.z);
+    within = cut(within, a.x, b.x);
+    within = cut(within, a.y, b.y);
+    within = cut(within, size_px.x * a.z - a.x, size_px.x * b.z - b.x);
+    within = cut(within, size_px.y * a.z - a.y, size_px.y * b.z - b.y);
+    let p = a + b * within.near;
+    let q = a + b * max(within.far, within.near);
     let origin = vec3f(p.xy, 1.0) / max(p.z, 1e-20);
     let line = Line(origin, vec3f(q.xy, 1.0) / max(q.z, 1e-20) - origin);
-    return Seen(line, near, far, p.z, q.z, near <= span.near && far >= span.far);
+    return Seen(line, within.near, within.far, p.z, q.z);
+}
+
+// The part of a span in which `start + by · t` is not negative.
+fn cut(span: Span, start: f32, by: f32) -> Span {
+    let t = -start * safe_reciprocal(by);
+    return Span(select(span.near, max(span.near, t), by > 0.0), select(min(span.far, t), span.far, by > 0.0));
 }
 
 // The nearest end that any image shows.
-struct Found { t: f32, place: vec2f, image: u32, met: bool, free: bool }
+struct Found { t: f32, place: vec2f, image: u32, met: bool }
 
 fn nearer(found: Found, image: u32, ray: MirroredRay, span: Span) -> Found {
     let camera = work.cameras[image];
@@ -113,7 +128,6 @@ fn nearer(found: Found, image: u32, ray: MirroredRay, span: Span) -> Found {
         nearer.place = select(found.place, moved(pole, at.xy, at.z) - 0.5, ended.met);
         nearer.image = select(found.image, image, ended.met);
         nearer.met = found.met || ended.met;
-        nearer.free = found.free || (ended.free && seen.whole);
     }
     return nearer;
 }
@@ -136,7 +150,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let index = listed_pixels[first_listed() + id.x];
     let ray = rays[index];
     let span = span_in_volume(ray.origin_in_world, ray.direction, ray.near_m);
-    var found = Found(FAR_AWAY, vec2f(0.0), 0u, false, span.near >= span.far);
+    var found = Found(FAR_AWAY, vec2f(0.0), 0u, false);
     for (var image = 0u; image < {{ cameras }}u; image++) { found = nearer(found, image, ray, span); }
     let camera = work.cameras[found.image];
 {% if count_fetches %}
@@ -146,5 +160,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% if count_fetches %}
     fetches = steps;
 {% endif %}
-    write_found(index, found.met, found.t, color, origin_of(camera.mask, 0u), found.free && !found.met);
+    // Coarse steps prove nothing to be free: only what never comes into the volume meets nothing for certain.
+    write_found(index, found.met, found.t, color, origin_of(camera.mask, 0u), span.near >= span.far);
 }

@@ -14,7 +14,7 @@ use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
 pub use curved_search::CurvedSearch;
-pub(crate) use curved_search::{CurvedWalk, MAX_WALK_STEPS};
+pub(crate) use curved_search::{CurvedWalk, LONGEST_STEP, MAX_WALK_STEPS};
 
 use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList};
@@ -66,9 +66,7 @@ impl Mirrors<'_> {
         if self.reflections > MAX_REFLECTIONS {
             return Err(ReconstructionError::Reflections(self.reflections));
         }
-        if set.is_single_pole() {
-            return Err(ReconstructionError::Model { model: "single_pole" });
-        }
+        set.check_pinholes()?;
         let has_mirrors = set.reflectors.as_ref().is_some_and(|of| of.highlight == Highlight::Ggx);
         Ok(if self.reflections > 0 && has_mirrors { self } else { Self::default() })
     }
@@ -286,7 +284,7 @@ impl ShaderVariant for BounceMarch {
 }
 
 /// The switches of `bounce/land.wgsl`.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Land {
     set: SetVariant,
     /// Mirrors among the ends of rays list the next rays; the number of mirror cells.
@@ -330,7 +328,7 @@ impl ShaderVariant for Land {
                         set,
                         next_cells,
                         reflects,
-                        single_pole: reflects && next_cells == Some(1),
+                        single_pole: false,
                         lights,
                         environment_map,
                         visibility_words,
@@ -338,7 +336,10 @@ impl ShaderVariant for Land {
                 })
             })
         };
-        lights.into_iter().flat_map(each).collect()
+        let pinholes: Vec<Self> = lights.into_iter().flat_map(each).collect();
+        let single_poles = pinholes.iter().filter(|land| land.lights == 3 && !land.environment_map);
+        let single_poles: Vec<Self> = single_poles.map(|land| Self { single_pole: true, ..*land }).collect();
+        [pinholes, single_poles].concat()
     }
 }
 

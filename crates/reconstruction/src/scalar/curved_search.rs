@@ -7,6 +7,7 @@ use super::march::safe_reciprocal;
 use super::sample_camera::SampleCamera;
 use super::surface::{bilinear, bilinear_shares};
 use super::view_ray::span_in;
+use crate::bounce::{LONGEST_STEP, MAX_WALK_STEPS};
 use crate::methods::joint_carve::FIRST_SAMPLE;
 use crate::sample_set::searched_volume;
 use crate::surface::{HALF_CODE, THICKNESS_FOOTPRINTS};
@@ -49,18 +50,16 @@ impl SinglePoleImages {
     fn end(&self, ray: &Ray, near: f32, walk: impl Fn(&Seen<'_>) -> Walk) -> RayEnd {
         let span = span_in(&self.volume, ray.origin_in_world, ray.direction_in_world, near);
         let mut end = RayEnd { kind: ProvenanceKind::Filled, way: FAR_AWAY, color_linear: Vec3::ZERO, steps: 0 };
-        let mut is_free = span[0] >= span[1];
         for (camera, pole) in &self.cameras {
             let Some(seen) = Seen::of(camera, pole, ray, [span[0], span[1].min(end.way)]) else { continue };
             let walked = walk(&seen);
             end.steps += walked.steps;
-            is_free |= walked.free && seen.whole;
             if walked.met {
                 let (way, color_linear) = (seen.way(walked.s), seen.color(walked.s));
                 end = RayEnd { kind: ProvenanceKind::Hit, way, color_linear, ..end };
             }
         }
-        if is_free && end.kind != ProvenanceKind::Hit {
+        if span[0] >= span[1] {
             end.kind = ProvenanceKind::Empty;
         }
         end
@@ -76,22 +75,20 @@ struct Seen<'c> {
     line: Vec3,
     span: [f32; 2],
     depths_m: [f32; 2],
-    whole: bool,
 }
 
 /// The image at a place of a line: see the shader.
 #[derive(Clone, Copy)]
 struct Look {
+    place: Vec2,
     gap: f32,
     footprint: f32,
     connected: bool,
-    inside: bool,
 }
 
 struct Walk {
     s: f32,
     met: bool,
-    free: bool,
     steps: u32,
 }
 
@@ -99,16 +96,20 @@ impl<'c> Seen<'c> {
     fn of(camera: &'c SampleCamera, pole: &'c SinglePoleCamera, ray: &Ray, span: [f32; 2]) -> Option<Self> {
         let a = camera.homogeneous(ray.origin_in_world.extend(1.0));
         let b = camera.homogeneous(ray.direction_in_world.extend(0.0));
-        let inverse = safe_reciprocal(b.z);
-        let ends = [pole.reference.near_m, pole.farthest_m].map(|depth_m| (depth_m - a.z) * inverse);
-        let near = span[0].max(ends[0].min(ends[1]));
-        let far = span[1].min(ends[0].max(ends[1]));
+        let size_px = camera.cells + 1.0;
+        let borders = [
+            (a.z - pole.reference.near_m, b.z),
+            (pole.farthest_m - a.z, -b.z),
+            (a.x, b.x),
+            (a.y, b.y),
+            (size_px.x * a.z - a.x, size_px.x * b.z - b.x),
+            (size_px.y * a.z - a.y, size_px.y * b.z - b.y),
+        ];
+        let [near, far] = borders.into_iter().fold(span, cut);
         let [p, q] = [a + b * near, a + b * far.max(near)];
         let origin = p.xy().extend(1.0) / p.z.max(1e-20);
         let line = q.xy().extend(1.0) / q.z.max(1e-20) - origin;
-        let whole = near <= span[0] && far >= span[1];
-        let seen = Self { camera, pole, origin, line, span: [near, far], depths_m: [p.z, q.z], whole };
-        (near < far).then_some(seen)
+        (near < far).then_some(Self { camera, pole, origin, line, span: [near, far], depths_m: [p.z, q.z] })
     }
 
     /// In pixels from the middle of the first.
@@ -132,8 +133,8 @@ impl<'c> Seen<'c> {
         Look {
             gap: if is_surface { gap } else { FAR_AWAY },
             footprint: self.camera.code_above(inverse_depth) / self.camera.focal_px,
-            connected: corners.connected,
-            inside,
+            connected: inside && corners.connected,
+            place,
         }
     }
 
@@ -156,14 +157,21 @@ impl<'c> Seen<'c> {
     }
 }
 
+/// The part of a span in which `start + by · t` is not negative.
+fn cut([near, far]: [f32; 2], (start, by): (f32, f32)) -> [f32; 2] {
+    let t = -start * safe_reciprocal(by);
+    if by > 0.0 { [near.max(t), far] } else { [near, far.min(t)] }
+}
+
 fn may_meet(a: Look, b: Look, coarse_px: f32) -> bool {
     let fuzzy = 0.5 * coarse_px * a.footprint.max(b.footprint);
     a.gap.min(b.gap) <= fuzzy && a.gap.max(b.gap) >= -fuzzy
 }
 
-fn meets(a: Look, b: Look) -> bool {
+fn meets(a: Look, b: Look, fine_px: f32) -> bool {
     let is_close = b.gap >= -THICKNESS_FOOTPRINTS * b.footprint;
-    a.gap > 0.0 && b.gap <= 0.0 && (is_close || (a.connected && b.connected))
+    let goes_on = a.connected && b.connected && a.place.distance(b.place) <= LONGEST_STEP * fine_px;
+    a.gap > 0.0 && b.gap <= 0.0 && (is_close || goes_on)
 }
 
 fn crossing(here: Look, next: Look, s: f32, next_s: f32) -> f32 {
@@ -172,13 +180,13 @@ fn crossing(here: Look, next: Look, s: f32, next_s: f32) -> f32 {
 
 fn walk(seen: &Seen<'_>, CurvedSearch { coarse_px, fine_px }: CurvedSearch) -> Walk {
     let mut here = seen.look(0.0);
-    let chord_px = seen.place(0.0).distance(seen.place(1.0));
+    let chord_px = seen.place(0.0).distance(seen.place(1.0)).max(seen.line.xy().length());
     let coarse_step = (coarse_px / chord_px.max(1e-3)).min(1.0);
     let fine_steps = (coarse_px / fine_px).ceil() as u32;
-    let fine_step = coarse_step / fine_steps as f32;
-    let mut walk = Walk { s: 0.0, met: false, free: here.inside && here.gap > 0.0, steps: 1 };
+    let (fine_step, fine_px) = (coarse_step / fine_steps as f32, coarse_px / fine_steps as f32);
+    let mut walk = Walk { s: 0.0, met: false, steps: 1 };
     let mut to_go = 0;
-    while walk.s < 1.0 {
+    while walk.s < 1.0 && walk.steps <= MAX_WALK_STEPS {
         let is_coarse = to_go == 0;
         let next_s = (walk.s + if is_coarse { coarse_step } else { fine_step }).min(1.0);
         let next = seen.look(next_s);
@@ -188,8 +196,7 @@ fn walk(seen: &Seen<'_>, CurvedSearch { coarse_px, fine_px }: CurvedSearch) -> W
             continue;
         }
         to_go = u32::max(to_go, 1) - 1;
-        walk.free &= next.inside && next.gap > 0.0;
-        walk.met = (!is_coarse || fine_steps == 1) && meets(here, next);
+        walk.met = (!is_coarse || fine_steps == 1) && meets(here, next, fine_px);
         if walk.met {
             walk.s = crossing(here, next, walk.s, next_s);
             break;
@@ -197,13 +204,12 @@ fn walk(seen: &Seen<'_>, CurvedSearch { coarse_px, fine_px }: CurvedSearch) -> W
         walk.s = next_s;
         here = next;
     }
-    walk.free &= walk.s >= 1.0;
     walk
 }
 
 fn exhaustive(seen: &Seen<'_>) -> Walk {
     let mut here = seen.look(0.0);
-    let mut walk = Walk { s: 0.0, met: false, free: here.inside && here.gap > 0.0, steps: 1 };
+    let mut walk = Walk { s: 0.0, met: false, steps: 1 };
     let mut step = 1.0f32;
     while walk.s < 1.0 {
         let place = seen.place(walk.s);
@@ -214,14 +220,12 @@ fn exhaustive(seen: &Seen<'_>) -> Walk {
         let next_s = if walk.s + step > 1.0 - 1e-6 { 1.0 } else { walk.s + step };
         let next = seen.look(next_s);
         walk.steps += 1;
-        walk.free &= next.inside && next.gap > 0.0;
-        walk.met = meets(here, next);
+        walk.met = meets(here, next, EIGHTH_PX);
         if walk.met {
             walk.s = crossing(here, next, walk.s, next_s);
             break;
         }
         (walk.s, here) = (next_s, next);
     }
-    walk.free &= walk.s >= 1.0;
     walk
 }

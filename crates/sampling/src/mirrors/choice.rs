@@ -67,7 +67,10 @@ pub(super) fn choose(
     let ways = Ways { triangles, deciding, fresh };
     let mut candidates = Vec::new();
     let pinholes = pool.choose(&ways, limits, &mut candidates);
-    let bent: Vec<Images> = single_pole::candidates(group, &ways);
+    let bent = match limits.models {
+        Models::Pinholes => Vec::new(),
+        Models::All | Models::SinglePoles(_) => single_pole::candidates(group, &ways),
+    };
     let ratio = |images: &Images| share_of_ways(&images.unseen);
     candidates.extend(bent.iter().map(|images| Candidate {
         name: format!("single_pole:{}", images.cameras.len()),
@@ -77,11 +80,10 @@ pub(super) fn choose(
     // As few images as do; of as many, pinholes.
     let is_enough = |images: &Images| ratio(images) <= limits.unseen_ratio;
     let is_less = |images: &&Images| is_enough(images) && images.cameras.len() < pinholes.cameras.len();
-    let bent = match limits.models {
-        Models::Pinholes => None,
-        Models::All => bent.iter().find(is_less),
-        Models::SinglePoles => bent.iter().find(|images| images.cameras.len() == limits.most),
-    };
+    let bent = bent.iter().find(|images| match limits.models {
+        Models::SinglePoles(wanted) => images.cameras.len() == wanted,
+        Models::All | Models::Pinholes => is_less(images),
+    });
     let chosen = bent.unwrap_or(&pinholes);
     if chosen.cameras.is_empty() {
         return pool.usual(limits.most);

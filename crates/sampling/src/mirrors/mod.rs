@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn single_poles_see_more_of_an_object_than_pinholes() {
+    fn single_poles_stand_around_what_most_rays_meet() {
         let teapot = scene("teapot-mirror");
         let of = |images| super::mirrors(&teapot, Impostors::SinglePoles { images }).0.remove(0);
         for (images, mirror) in [(1, of(1)), (2, of(2))] {
@@ -188,7 +188,9 @@ mod tests {
                 assert!(images == 2 || camera.distortion_px > 0.0, "{camera:?}");
             }
             let [chosen, fresh] = mirror.unseen_ratio.expect("it stands still");
-            assert!((chosen - fresh).abs() < 0.03, "{chosen}, {fresh}");
+            println!("{images} single poles: {chosen} and {fresh} of rays unseen");
+            // Of all rays: those to the floor and to the sky are not seen.
+            assert!((chosen - fresh).abs() < 0.03 && chosen < 0.95, "{chosen}, {fresh}");
         }
     }
 

@@ -18,8 +18,14 @@ pub(super) struct Images {
     pub unseen: Vec<bool>,
 }
 
-/// Whether a camera sees a place: it is in the image, and the way of its pixel's ray is free.
+/// Whether a camera sees a place: it is in the image, and the way of its pixel's ray is free. What is nearer than a single-pole
+/// camera sees counts as free, as the walk along curved rays takes it.
 pub(super) fn sees(camera: &Camera, place: Vec3, triangles: &Triangles) -> bool {
+    if let Camera::SinglePole(bent) = camera
+        && bent.reference.project(place).is_some_and(|at| at.planar_depth_m < bent.reference.near_m)
+    {
+        return true;
+    }
     let Some(at) = camera.project(place).filter(|at| camera.reference().contains(at.pixel)) else { return false };
     let from = match camera {
         Camera::Pinhole(camera) => camera.eye_in_world,

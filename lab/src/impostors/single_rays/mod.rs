@@ -7,11 +7,10 @@ mod found;
 mod steps;
 mod teapot;
 
-use study::{Check, Report};
+use study::Report;
 
 use crate::failures::stand::Stand;
 use crate::progress::bar;
-use found::Figures;
 use teapot::{Teapot, off_mirror, off_patch};
 
 /// Rays off a flat patch, in full and in quick runs.
@@ -36,7 +35,8 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
     report.tables.push(found::table("Rays off a flat patch as wide as it is far that meet the teapot", &flat)?);
     report.tables.push(found::table("Rays off the mirror of teapot-mirror that meet the teapot", &mirror)?);
     report.charts.push(curve.into());
-    report.checks.extend(found_checks(&flat, &mirror));
+    report.checks.extend(found::checks(&flat)?);
+    report.checks.extend(found::checks_of_mirror(&mirror)?);
     steps::measure(&teapot, is_quick, report)?;
     report.checks.extend(bowl::measure(stand)?);
     let (choices, checks) = choices::measure(stand)?;
@@ -44,8 +44,4 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
     report.checks.extend(checks);
     progress.finish_and_clear();
     Ok(())
-}
-
-fn found_checks(flat: &[Figures], mirror: &[Figures]) -> Vec<Check> {
-    found::checks(flat).into_iter().chain(found::checks_of_mirror(mirror)).collect()
 }
