@@ -79,7 +79,8 @@ pub struct SceneArgs {
     #[arg(long, default_value_t, value_name = "WxH|auto")]
     pub sample_size: SampleSize,
     /// Images of what mirrors show, for lighting with reflections: auto[:UNSEEN], as few as see all but UNSEEN percent
-    /// of mirrored rays all the way; pinhole[:N], N in the same order; or none
+    /// of mirrored rays all the way; pinhole[:N], N in the same order; single_pole[:N], 1 or 2 around the object that
+    /// most rays meet; or none
     #[arg(long, default_value_t, value_name = "NAME")]
     pub impostors: Impostors,
     /// Sample cameras from a transforms.json, in the scene file's coordinates [default: four, placed from the scene's

@@ -6,7 +6,10 @@ use depth_image::{Aabb, Camera, Environment, PinholeCamera, SinglePoleCamera};
 use glam::{UVec2, Vec3};
 
 use crate::test_support::{assignment, camera, workload};
-use crate::{ApplyPlan, Assignment, CompositorShare, MirrorCell, Policy, Refinement, SamplerShare, Timeline, Workload};
+use crate::{
+    ApplyPlan, Assignment, CompositorShare, MirrorCell, Policy, Refinement, SamplePlanes, SamplerShare, Timeline,
+    Workload,
+};
 
 fn refusal(plan: &Assignment) -> String {
     plan.validate().expect_err("refused").to_string()
@@ -255,6 +258,11 @@ fn only_mirror_cells_have_single_poles_and_each_has_one_model() {
     // Cameras 0 to 3 are those of view cells, 4 and 5 of one mirror, 6 of another.
     assert_eq!(with(&[4, 5]), None);
     assert_eq!(with(&[6]), None);
+    // Planes of quads are those of view cells: no ray off a mirror reads them.
+    let mut plan = with_mirrors();
+    plan.workload.planes = SamplePlanes { normals: true, corner_inverse_depths: true };
+    let planes = |cell: usize| plan.workload.of_cell(cell).map(|workload| workload.planes);
+    assert_eq!([planes(0), planes(3)], [Some(plan.workload.planes), Some(SamplePlanes::default())]);
     for mixed in [4, 5] {
         assert!(with(&[mixed]).is_some_and(|text| text.contains("sample_cameras.model")), "{mixed}");
     }

@@ -4,12 +4,12 @@ mod common;
 
 use std::sync::Arc;
 
-use depth_image::{PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use depth_image::{Camera, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use gpu::DevicePreference;
 use node::{DirectWork, Engine, MirrorSet, SampleSet, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
-use sampling::{Impostors, Mirror};
+use sampling::Impostors;
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 
 const LIGHTING: &str = "shadows, reflections 1";
@@ -31,16 +31,15 @@ impl Stand {
         Self { engine, scene }
     }
 
-    fn set(&self, cameras: &[PinholeCamera], is_mirror: bool) -> SharedSet {
+    fn set(&self, cameras: &[impl Copy + Into<Camera>], is_mirror: bool) -> SharedSet {
         let set = common::sample_set(&self.engine, (HASH, &self.scene), cameras, LIGHTING);
         self.engine.upload(&SampleSet { is_mirror, ..set }, TURN).expect("a set")
     }
 
-    fn mirrors(&self) -> Vec<MirrorSet> {
-        let (mirrors, beyond) = sampling::mirrors(&self.scene, Impostors::default());
+    fn mirrors(&self, impostors: Impostors) -> Vec<MirrorSet> {
+        let (mirrors, beyond) = sampling::mirrors(&self.scene, impostors);
         assert_eq!((mirrors.len(), beyond), (1, 0));
-        let pinholes = |mirror: &Mirror| mirror.cameras.iter().map(|camera| *camera.reference()).collect::<Vec<_>>();
-        mirrors.iter().map(|mirror| (mirror.bounds, self.set(&pinholes(mirror), true))).collect()
+        mirrors.into_iter().map(|mirror| (mirror.bounds, self.set(&mirror.cameras, true))).collect()
     }
 
     fn view(&self, set: &dyn UploadedSet) -> View {
@@ -88,7 +87,8 @@ fn views_of_sets_with_mirror_cells_show_the_scene_in_mirrors() {
     // The view's own image: its errors are those of the mirror.
     let set = stand.set(&[camera()], false);
     let without = stand.view(set.as_ref());
-    let with = stand.view(stand.engine.mirroring(set.clone(), stand.mirrors()).expect("a set").as_ref());
+    let with =
+        stand.view(stand.engine.mirroring(set.clone(), stand.mirrors(Impostors::default())).expect("a set").as_ref());
     let [before, after] = [&without, &with].map(|view| difference(view, &truth, &mirrored));
     println!("mean difference in mirrors: {before:.1} codes without mirror cells, {after:.1} with");
     assert!(after < 0.6 * before, "{before} {after}");
@@ -97,8 +97,31 @@ fn views_of_sets_with_mirror_cells_show_the_scene_in_mirrors() {
     let kinds = with.provenance.as_ref().expect("provenance").iter().map(|provenance| provenance.kind());
     let guessed = kinds.zip(&mirrored).filter(|(kind, is)| **is && *kind == ProvenanceKind::Guessed).count();
     assert!(guessed * 50 < mirrored.iter().filter(|is| **is).count(), "{guessed} guessed");
-    let again = stand.view(stand.engine.mirroring(set, stand.mirrors()).expect("a set").as_ref());
+    let again = stand.view(stand.engine.mirroring(set, stand.mirrors(Impostors::default())).expect("a set").as_ref());
     assert_eq!(with.srgb8, again.srgb8);
+}
+
+/// Single-pole images show the teapot; the rest of the mirror stays.
+#[test]
+fn single_pole_images_show_the_object_in_mirrors() {
+    let stand = Stand::new();
+    let truth = stand.direct(LIGHTING);
+    let set = stand.set(&[camera()], false);
+    let without = stand.view(set.as_ref());
+    let mirrors = stand.mirrors(Impostors::SinglePoles { images: 2 });
+    let with = stand.view(stand.engine.mirroring(set.clone(), mirrors).expect("a set").as_ref());
+    let differs = |(a, b): (&[u8], &[u8])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 8);
+    let found: Vec<bool> = with.srgb8.chunks_exact(3).zip(without.srgb8.chunks_exact(3)).map(differs).collect();
+    let [before, after] = [&without, &with].map(|view| difference(view, &truth, &found));
+    let count = found.iter().filter(|is| **is).count();
+    println!("{count} pixels: mean difference {before:.1} codes without mirror cells, {after:.1} with");
+    assert!(count > 40 && after < 0.7 * before, "{count}: {before} {after}");
+    let refused = stand.engine.reconstruct(
+        stand.mirrors(Impostors::SinglePoles { images: 1 })[0].1.as_ref(),
+        &ViewWork { cameras: vec![camera()], method: "joint_carve".to_owned(), planes: ViewPlanes::COLOR },
+        TURN,
+    );
+    assert!(refused.is_err_and(|error| error.to_string().contains("single_pole")), "views are made from pinholes");
 }
 
 #[test]

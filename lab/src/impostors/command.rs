@@ -25,7 +25,8 @@ const VIEWS: [usize; 2] = [24, 6];
 const LIGHTING: [&str; 2] = ["soft 16, occlusion 16, reflections 1", "shadows, reflections 1"];
 
 /// Follows the rays off a scene's mirrors in images of their surroundings, and compares the views with direct drawing.
-/// Errors are those of the pixels in which a mirror shows the scene, and those in which it shows an object.
+/// Errors are those of the pixels in which a mirror shows the scene, and those in which it shows an object. Then follows single
+/// rays in images of pinholes and of single-pole cameras, off a flat patch, off mirrors and within a bowl.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   myriorama study impostors
@@ -36,7 +37,7 @@ pub struct ImpostorsArgs {
     /// A built-in scene with mirrors, or a file
     #[arg(long, default_value = "teapot-mirror", value_name = "SPEC")]
     scene: SceneSpec,
-    /// Images as in a cluster: auto[:UNSEEN] (percent), or pinhole[:N]
+    /// Images as in a cluster: auto[:UNSEEN] (percent), pinhole[:N] or single_pole[:N]
     #[arg(long, default_value_t, value_name = "NAME")]
     impostors: Impostors,
     /// Six views in hard shadows, in place of 24 in soft light

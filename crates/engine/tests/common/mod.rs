@@ -1,7 +1,7 @@
 //! Sample sets of whole scenes.
 
 use cluster::{Refinement, SamplePlanes};
-use depth_image::{Camera, PinholeCamera};
+use depth_image::Camera;
 use node::{Engine, SampleSet, SampleWork, Turn, WorkClass};
 use scene::Scene;
 
@@ -9,12 +9,12 @@ use scene::Scene;
 pub fn sample_set(
     engine: &dyn Engine,
     (hash, scene): (&str, &Scene),
-    cameras: &[PinholeCamera],
+    cameras: &[impl Copy + Into<Camera>],
     lighting: &str,
 ) -> SampleSet {
     let work = SampleWork {
         scene_hash: hash.to_owned(),
-        cameras: cameras.iter().copied().map(Camera::Pinhole).collect(),
+        cameras: cameras.iter().copied().map(Into::into).collect(),
         wanted: (0..cameras.len() as u32).collect(),
         sampling: "conventional".to_owned(),
         planes: SamplePlanes::default(),
