@@ -3,35 +3,7 @@
 use glam::{UVec2, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::{PinholeCamera, SinglePoleCamera, ViewPart};
-
-/// The largest image side that any part of the system accepts.
-pub const MAX_IMAGE_SIDE_PX: u32 = 16_384;
-
-/// A half-line: `origin + t · direction`, `t >= 0`. The direction need not have unit length.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(missing_docs, reason = "self-naming fields")]
-pub struct Ray {
-    pub origin_in_world: Vec3,
-    pub direction_in_world: Vec3,
-}
-
-impl Ray {
-    /// The point at parameter `t`.
-    #[must_use]
-    pub fn at(&self, t: f32) -> Vec3 {
-        self.origin_in_world + self.direction_in_world * t
-    }
-}
-
-/// A position in an image and the depth there.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PixelDepth {
-    /// Columns to the right, rows down; pixel centres at +0.5.
-    pub pixel: Vec2,
-    /// Along the camera's forward axis, metres, positive in front.
-    pub planar_depth_m: f32,
-}
+use crate::{CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera, PixelDepth, Ray, SinglePoleCamera, ViewPart};
 
 /// The map from an image to rays. A model is one variant: a file here, and one of the same name in the shaders of `render` and of
 /// `reconstruction`.
@@ -181,14 +153,4 @@ impl Camera {
             Self::SinglePole(camera) => camera.depths_m(pixel),
         }
     }
-}
-
-/// An unusable camera.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "self-naming fields")]
-pub enum CameraError {
-    #[error("camera {field} is not finite")]
-    NotFinite { field: &'static str },
-    #[error("camera {field} is {value}, must be {allowed}")]
-    OutOfRange { field: &'static str, value: f64, allowed: &'static str },
 }

@@ -17,6 +17,7 @@ mod image;
 mod light;
 mod method_table;
 mod pinhole;
+mod projection;
 #[cfg(any(test, feature = "scalar"))]
 mod scalar;
 mod single_pole;
@@ -29,7 +30,7 @@ mod view_part;
 
 pub use antialias::{Antialias, AntialiasError};
 pub use bounds::Aabb;
-pub use camera::{Camera, CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray};
+pub use camera::Camera;
 pub use encoding::{linear_from_rgb9e5, linear_from_srgb8, oct16_from_unit, rgb9e5_from_linear, srgb8_from_linear};
 pub use environment_light::{BrightTexel, EnvironmentLight, LOBE_ROUGHNESS, LOBE_SIZE_PX, Lobe};
 pub use environment_map::{EnvironmentMap, EnvironmentMapError, MAX_ENVIRONMENT_SIZE_PX};
@@ -38,6 +39,7 @@ pub use image::{BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVE
 pub use light::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
 pub use method_table::{NamedMethod, Setting, method_forms, method_help, method_named};
 pub use pinhole::PinholeCamera;
+pub use projection::{CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray};
 #[cfg(any(test, feature = "scalar"))]
 pub use scalar::{
     Incident, Texel, disc_from_square, environment_highlight_linear, environment_reflectance_linear, highlight_linear,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
-use depth_image::{Aabb, Camera, DepthImage, Environment, Highlight, Illumination, PinholeCamera};
+use depth_image::{Aabb, DepthImage, Environment, Highlight, Illumination, PinholeCamera};
 use glam::{UVec2, Vec2, Vec3};
 use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
@@ -95,11 +95,7 @@ impl SampleSet {
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
         check(tables, images, set)?;
-        let other_model = |index| ReconstructionError::Sample {
-            index,
-            reason: format!("a {} image, the first is of another model", images[index].camera.model_name()),
-        };
-        let poles = poles(images).map_err(other_model)?;
+        let poles = poles(images)?;
         let among_holes = is_among_holes(images);
         let coded = |image| CodedImage::of(image, among_holes, set.mips);
         // One thread leaves the other cores to live streams.
@@ -192,11 +188,6 @@ fn check(tables: &TablePool, images: &[DepthImage], set: &SetDescription<'_>) ->
         let wrong = |reason: String| ReconstructionError::Sample { index, reason };
         camera.validate().map_err(|error| wrong(error.to_string()))?;
         image.validate().map_err(|error| wrong(error.to_string()))?;
-        if let Camera::SinglePole(camera) = camera
-            && !camera.reference.contains(camera.pole_px)
-        {
-            return Err(wrong("the pole lies outside of the image".to_owned()));
-        }
         if camera.size_px().min_element() < 2 {
             return Err(wrong("an image of one row or column has no surface between samples".to_owned()));
         }

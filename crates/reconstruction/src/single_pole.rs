@@ -1,7 +1,9 @@
 //! Images of single-pole occlusion cameras on the device: `single_pole.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Camera, DepthImage};
+use depth_image::{Camera, DepthImage, SinglePoleCamera};
+
+use crate::error::ReconstructionError;
 
 /// `Pole` of the shader.
 #[repr(C)]
@@ -16,21 +18,31 @@ pub(crate) struct GpuPole {
     pub padding_2: f32,
 }
 
-/// The poles of all images; none of pinholes. `Err` has the first image of another model than the first's.
-pub(crate) fn poles(images: &[DepthImage]) -> Result<Vec<GpuPole>, usize> {
-    let pole = |image: &DepthImage| match image.camera {
-        Camera::Pinhole(_) => None,
-        Camera::SinglePole(camera) => Some(GpuPole {
+/// The poles of all images; none of pinholes. Fails for images of several models, and for a pole outside of its image.
+pub(crate) fn poles(images: &[DepthImage]) -> Result<Vec<GpuPole>, ReconstructionError> {
+    let mut poles = Vec::new();
+    for (index, image) in images.iter().enumerate() {
+        let wrong = |reason: String| Err(ReconstructionError::Sample { index, reason });
+        if !image.camera.is_of_model(&images[0].camera) {
+            return wrong(format!("a {} image, the first is of another model", image.camera.model_name()));
+        }
+        let Camera::SinglePole(camera) = image.camera else { continue };
+        if !camera.reference.contains(camera.pole_px) {
+            return wrong("the pole lies outside of the image".to_owned());
+        }
+        poles.push(GpuPole::of(&camera));
+    }
+    Ok(poles)
+}
+
+impl GpuPole {
+    fn of(camera: &SinglePoleCamera) -> Self {
+        Self {
             pole_px: camera.pole_px.to_array(),
             bend_px_m: camera.bend_px_m(),
             nearest_per_m: camera.reference.near_m.recip(),
             farthest_per_m: camera.farthest_m.recip(),
-            ..GpuPole::zeroed()
-        }),
-    };
-    let poles: Vec<GpuPole> = images.iter().filter_map(pole).collect();
-    match images.iter().position(|image| !image.camera.is_of_model(&images[0].camera)) {
-        Some(other) => Err(other),
-        None => Ok(poles),
+            ..Self::zeroed()
+        }
     }
 }

@@ -235,6 +235,11 @@ fn what_cannot_use_the_images_says_so() {
     let mixed = [images[0].clone(), pinhole];
     let error = reconstructor().upload(&mixed, &description(scene)).map(drop).expect_err("two models");
     assert!(matches!(error, ReconstructionError::Sample { index: 1, .. }), "{error}");
+    let Camera::SinglePole(camera) = images[0].camera else { panic!("a single-pole camera") };
+    let beside = Camera::SinglePole(SinglePoleCamera { pole_px: camera.pole_px * 3.0, ..camera });
+    let beside = DepthImage { camera: beside, ..images[0].clone() };
+    let error = reconstructor().upload(&[beside], &description(scene)).map(drop).expect_err("a pole outside");
+    assert!(error.to_string().contains("pole"), "{error}");
     for (coarse_px, fine_px) in [(0.0, 0.0), (1.0, 2.0), (f32::NAN, 1.0), (65.0, 1.0), (6.0, 0.01)] {
         let curved_search = CurvedSearch { coarse_px, fine_px };
         let work = RayWork { surroundings: &set, near: NEAR, curved_search, count_steps: false };
