@@ -11,9 +11,13 @@ use super::{
     view_ray::ViewRay,
 };
 use crate::{
-    methods::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL},
+    bounce::BOUNCE_LEVEL,
+    methods::joint_carve::{
+        FIRST_SAMPLE,
+        march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL},
+    },
     surface::HALF_CODE,
-    view_work::CELL_MARGIN_PX,
+    view_work::{CELL_MARGIN_PX, FAR_AWAY},
 };
 
 /// How far the way is free, and whether it ends at a surface.
@@ -66,16 +70,16 @@ pub(super) fn march(camera: &SampleCamera, ray: &ViewRay, near: f32) -> March {
     let inverse = line.xy().map(|c| if c.abs() < 1e-9 { 1e9 } else { c.recip() });
     let border = (Vec2::select(inverse.cmpgt(Vec2::ZERO), camera.cells, Vec2::ZERO) - origin.xy()) * inverse;
     let line = Line { origin, line, inverse, s_end: border.min_element().min(1.0) };
-    let (s, blocked) = march_nodes(camera, &line);
-    let (s, crossed) = if blocked { march_cells(camera, &line, s) } else { (s, false) };
+    let (s, blocked) = march_nodes(camera, &line, ray.is_mirrored);
+    let (s, crossed) = if blocked { march_cells(camera, &line, s, ray.is_mirrored) } else { (s, false) };
     // Back to the ray's own parameter: 1/w is linear in s.
     let share = s * p0.z / ((1.0 - s) * p1.z + s * p0.z);
     March { t: near + (end - near) * share, crossed }
 }
 
 /// Through nodes in which everything is farther away; ends before 2 × 2 cells that may hold a surface.
-fn march_nodes(camera: &SampleCamera, line: &Line) -> (f32, bool) {
-    let start_level = START_LEVEL.min(camera.top_level());
+fn march_nodes(camera: &SampleCamera, line: &Line, is_mirrored: bool) -> (f32, bool) {
+    let start_level = if is_mirrored { BOUNCE_LEVEL } else { START_LEVEL }.min(camera.top_level());
     let (mut s, mut level) = (0.0f32, start_level);
     for _ in 0..MAX_COARSE_MOVES {
         if s >= line.s_end {
@@ -86,7 +90,7 @@ fn march_nodes(camera: &SampleCamera, line: &Line) -> (f32, bool) {
         let side = (1u32 << level) as f32;
         let exit = line.exit(s, node.as_vec2() * side, side);
         let (nearest, _) = camera.range(level, node);
-        if at.z.min(line.at(exit).z) > nearest {
+        if at.z.min(line.at(exit).z) > nearest || (is_mirrored && nearest < FIRST_SAMPLE) {
             s = exit;
             level = (level + 1).min(start_level);
             continue;
@@ -104,7 +108,7 @@ fn march_nodes(camera: &SampleCamera, line: &Line) -> (f32, bool) {
 }
 
 /// From cell to cell, to where the ray crosses the surface or is found behind it.
-fn march_cells(camera: &SampleCamera, line: &Line, mut s: f32) -> (f32, bool) {
+fn march_cells(camera: &SampleCamera, line: &Line, mut s: f32, is_mirrored: bool) -> (f32, bool) {
     for _ in 0..MAX_FINE_MOVES {
         if s >= line.s_end {
             break;
@@ -117,8 +121,12 @@ fn march_cells(camera: &SampleCamera, line: &Line, mut s: f32) -> (f32, bool) {
         if !corners.certain {
             break;
         }
-        let here = HALF_CODE + at.z - surface_code(corners, at.xy() - cell);
-        let there = HALF_CODE + beyond.z - surface_code(corners, (beyond.xy() - cell).max(Vec2::ZERO).min(Vec2::ONE));
+        let surface = |at: Vec2| match surface_code(corners, at) {
+            code if is_mirrored && code < FIRST_SAMPLE => -FAR_AWAY,
+            code => code,
+        };
+        let here = HALF_CODE + at.z - surface(at.xy() - cell);
+        let there = HALF_CODE + beyond.z - surface((beyond.xy() - cell).max(Vec2::ZERO).min(Vec2::ONE));
         if here <= 0.0 {
             break;
         }

@@ -6,6 +6,7 @@
 mod curved_search;
 mod draw;
 mod fill;
+mod follow;
 mod hybrid_mesh;
 mod joint_carve;
 mod light_field_search;
@@ -20,6 +21,7 @@ mod tile_start;
 mod view_ray;
 
 pub use self::curved_search::SinglePoleImages;
+pub use self::follow::PinholeImages;
 use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 

@@ -24,6 +24,8 @@ pub(super) struct ViewRay {
     pub direction: Vec3,
     pub near: f32,
     pub far: f32,
+    /// Off a mirror: images are taken amid what it meets, and before their background all is free.
+    pub is_mirrored: bool,
 }
 
 impl ViewRay {
@@ -85,7 +87,7 @@ impl ViewRays {
             [self.view.column_in_world, self.view.row_in_world, self.view.corner_in_world].map(Vec3::from);
         let direction = column * position_px.x + row * position_px.y + corner;
         let [near, far] = span_in(&self.volume, self.eye(), direction, self.near_m());
-        ViewRay { eye: self.eye(), direction, near, far }
+        ViewRay { eye: self.eye(), direction, near, far, is_mirrored: false }
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use depth_image::{Aabb, Camera, DepthImage, ProvenanceKind, Ray, SinglePoleCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
-use reconstruction::scalar::SinglePoleImages;
+use reconstruction::scalar::{PinholeImages, SinglePoleImages};
 use reconstruction::{CurvedSearch, MirrorCell, Mirrors, RayEnd, RayWork, ReconstructionError, SetDescription};
 use render::{DrawWork, GpuScene, SamplePlanes, Visibility};
 use scene::Scene;
@@ -34,19 +34,23 @@ fn stand() -> &'static Stand {
     STAND.get_or_init(|| {
         let scene = teapot_mirror();
         let on_device = GpuScene::upload(gpu(), &scene).expect("a scene");
-        let work = DrawWork {
-            scene: &on_device,
-            lighting: "shadows".parse().expect("a lighting"),
-            scene_time_s: 0.0,
-            visibility: Visibility::Rays,
-            refinement: Default::default(),
-            turn: Default::default(),
-        };
+        let work = work(&on_device, "shadows");
         let planes = SamplePlanes { specular: true, ..SamplePlanes::default() };
         let cameras = [around(-1.0, 256, 0.3), around(1.0, 256, 0.3)];
         let images = renderer().draw_depth_images(work, &cameras, planes).expect("images");
         Stand { scene, images }
     })
+}
+
+fn work<'a>(scene: &'a GpuScene, lighting: &str) -> DrawWork<'a> {
+    DrawWork {
+        scene,
+        lighting: lighting.parse().expect(lighting),
+        scene_time_s: 0.0,
+        visibility: Visibility::Rays,
+        refinement: Default::default(),
+        turn: Default::default(),
+    }
 }
 
 fn description(scene: &Scene) -> SetDescription<'_> {
@@ -81,6 +85,37 @@ fn followed(images: &[DepthImage], search: CurvedSearch, rays: &[Ray]) -> Vec<Ra
 
 fn is_hit(end: &RayEnd) -> bool {
     end.kind == ProvenanceKind::Hit
+}
+
+/// March and carve in images of pinholes, of one and of many, which look one way and all ways.
+#[test]
+fn marched_and_carved_rays_end_where_their_twins_do() {
+    let Stand { scene, .. } = stand();
+    let on_device = GpuScene::upload(gpu(), scene).expect("a scene");
+    let six = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+    let six = six.map(|towards| Camera::from(looking(MIRROR, MIRROR + towards, 94.0, UVec2::splat(96))));
+    let aside = |x: f32, y: f32| {
+        let eye = MIRROR + Vec3::new(x, y, 0.0);
+        Camera::from(looking(eye, eye + Vec3::Z, 80.0, UVec2::splat(128)))
+    };
+    let four = [aside(-1.0, -1.0), aside(1.0, 1.0), aside(1.0, -1.0), aside(-1.0, 1.0)];
+    for cameras in [&four[..1], &four, &six] {
+        let planes = SamplePlanes::default();
+        let images = renderer().draw_depth_images(work(&on_device, "unlit"), cameras, planes).expect("images");
+        let rays = rays(6000);
+        let twin = PinholeImages::of(&images, &scene.bounds());
+        let ends = followed(&images, CurvedSearch::default(), &rays);
+        let agree = |(ray, end): (&Ray, &RayEnd)| {
+            let expected = twin.follow(ray, NEAR);
+            let near = !is_hit(end) || (end.way - expected.way).abs() <= 1e-3 * expected.way;
+            let color = !is_hit(end) || (end.color_linear - expected.color_linear).abs().max_element() < 0.02;
+            end.kind == expected.kind && near && color
+        };
+        let same = rays.iter().zip(&ends).filter(|pair| agree(*pair)).count() as f32 / rays.len() as f32;
+        let hits = ends.iter().filter(|end| is_hit(end)).count();
+        println!("{} pinholes: {same} of the rays end alike, {hits} hits", cameras.len());
+        assert!(same >= 0.995 && hits > 2000, "{same}, {hits}");
+    }
 }
 
 #[test]
@@ -254,14 +289,7 @@ fn a_view_shows_the_teapot_in_its_mirror() {
     let Stand { scene, images } = stand();
     let set = reconstructor().upload(images, &description(scene)).expect("a set");
     let on_device = GpuScene::upload(gpu(), scene).expect("a scene");
-    let work = DrawWork {
-        scene: &on_device,
-        lighting: "shadows".parse().expect("a lighting"),
-        scene_time_s: 0.0,
-        visibility: Visibility::Rays,
-        refinement: Default::default(),
-        turn: Default::default(),
-    };
+    let work = work(&on_device, "shadows");
     let view = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, UVec2::new(192, 144));
     let samples = Camera::from(view.resized(view.size_px * 2));
     let planes = SamplePlanes { specular: true, ..SamplePlanes::default() };
