@@ -112,11 +112,11 @@ impl Camera {
     /// The camera of a part of the image.
     #[must_use]
     pub fn part(&self, part: &ViewPart) -> Self {
-        match self.with_offset(part.first_px.as_vec2()) {
-            Self::Pinhole(camera) => Self::Pinhole(PinholeCamera { size_px: part.size_px, ..camera }),
+        match self {
+            Self::Pinhole(camera) => Self::Pinhole(camera.part(part)),
             Self::SinglePole(camera) => {
-                let reference = PinholeCamera { size_px: part.size_px, ..camera.reference };
-                Self::SinglePole(SinglePoleCamera { reference, ..camera })
+                let pole_px = camera.pole_px - part.first_px.as_vec2();
+                Self::SinglePole(SinglePoleCamera { reference: camera.reference.part(part), pole_px, ..*camera })
             }
         }
     }

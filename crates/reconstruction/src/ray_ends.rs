@@ -19,8 +19,8 @@ pub struct RayEnd {
     /// A hit; empty where the ray is proven to meet nothing, which in images of single-pole cameras is only where it never comes
     /// into the volume; filled where no image knows.
     pub kind: ProvenanceKind,
-    /// The ray's parameter at a hit.
-    pub way: f32,
+    /// From the ray's origin to a hit.
+    pub way_m: f32,
     /// At a hit.
     pub color_linear: Vec3,
     /// Look-ups in images of single-pole cameras; 0 where they are not counted.
@@ -32,8 +32,8 @@ pub struct RayEnd {
 pub struct RayWork<'s> {
     /// The images.
     pub surroundings: &'s SampleSet,
-    /// Nothing is met before this parameter.
-    pub near: f32,
+    /// Nothing is met nearer to a ray's origin.
+    pub near_m: f32,
     /// In images of single-pole cameras.
     pub curved_search: CurvedSearch,
     /// Counting slows it down.
@@ -46,7 +46,7 @@ pub(crate) fn follow_rays(
     work: RayWork<'_>,
     rays: &[Ray],
 ) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
-    let RayWork { surroundings, near, curved_search, count_steps } = work;
+    let RayWork { surroundings, near_m, curved_search, count_steps } = work;
     let cells = [MirrorCell { bounds: Aabb::around([surroundings.eye_in_world()]), surroundings }];
     let mirrors = Mirrors { cells: &cells, reflections: 1 };
     let size_px = UVec2::new(COLUMNS, (rays.len() as u32).div_ceil(COLUMNS).max(1));
@@ -64,7 +64,7 @@ pub(crate) fn follow_rays(
         origin_in_world: ray.origin_in_world.to_array(),
         pixel: number,
         direction: ray.direction_in_world.to_array(),
-        near_m: near,
+        near_m,
         guess: 0,
         throughput_rgb9e5: 0,
         width_m: 0.0,
@@ -93,7 +93,7 @@ fn read(
     let steps = steps.map(words).transpose()?.unwrap_or_else(|| vec![0; count]);
     let end = |ray: usize| RayEnd {
         kind: Provenance(provenances[ray] & 0xff).kind(),
-        way: f32::from_bits(inverse_ways[ray]).recip(),
+        way_m: f32::from_bits(inverse_ways[ray]).recip(),
         color_linear: linear_from_rgb9e5(colors[ray]),
         steps: steps[ray],
     };

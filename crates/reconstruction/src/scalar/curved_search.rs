@@ -34,29 +34,29 @@ impl SinglePoleImages {
         Self { cameras: (0..).zip(images).filter_map(of).collect(), volume: searched_volume(volume, images) }
     }
 
-    /// The end of a ray with a direction of unit length, from `near` on.
+    /// The end of a ray with a direction of unit length, from `near_m` on.
     #[must_use]
-    pub fn curved_search(&self, ray: &Ray, near: f32, search: CurvedSearch) -> RayEnd {
-        self.end(ray, near, |seen| walk(seen, search))
+    pub fn curved_search(&self, ray: &Ray, near_m: f32, search: CurvedSearch) -> RayEnd {
+        self.end(ray, near_m, |seen| walk(seen, search))
     }
 
     /// The same, in steps of an eighth of a texel along the curve.
     #[must_use]
-    pub fn every_eighth_texel(&self, ray: &Ray, near: f32) -> RayEnd {
-        self.end(ray, near, exhaustive)
+    pub fn every_eighth_texel(&self, ray: &Ray, near_m: f32) -> RayEnd {
+        self.end(ray, near_m, exhaustive)
     }
 
     /// The nearest end that any image shows.
-    fn end(&self, ray: &Ray, near: f32, walk: impl Fn(&Seen<'_>) -> Walk) -> RayEnd {
-        let span = span_in(&self.volume, ray.origin_in_world, ray.direction_in_world, near);
-        let mut end = RayEnd { kind: ProvenanceKind::Filled, way: FAR_AWAY, color_linear: Vec3::ZERO, steps: 0 };
+    fn end(&self, ray: &Ray, near_m: f32, walk: impl Fn(&Seen<'_>) -> Walk) -> RayEnd {
+        let span = span_in(&self.volume, ray.origin_in_world, ray.direction_in_world, near_m);
+        let mut end = RayEnd { kind: ProvenanceKind::Filled, way_m: FAR_AWAY, color_linear: Vec3::ZERO, steps: 0 };
         for (camera, pole) in &self.cameras {
-            let Some(seen) = Seen::of(camera, pole, ray, [span[0], span[1].min(end.way)]) else { continue };
+            let Some(seen) = Seen::of(camera, pole, ray, [span[0], span[1].min(end.way_m)]) else { continue };
             let walked = walk(&seen);
             end.steps += walked.steps;
             if walked.met {
-                let (way, color_linear) = (seen.way(walked.s), seen.color(walked.s));
-                end = RayEnd { kind: ProvenanceKind::Hit, way, color_linear, ..end };
+                let (way_m, color_linear) = (seen.way_m(walked.s), seen.color(walked.s));
+                end = RayEnd { kind: ProvenanceKind::Hit, way_m, color_linear, ..end };
             }
         }
         if span[0] >= span[1] {
@@ -139,7 +139,7 @@ impl<'c> Seen<'c> {
     }
 
     /// The ray's own parameter: 1/w is linear in s.
-    fn way(&self, s: f32) -> f32 {
+    fn way_m(&self, s: f32) -> f32 {
         let [near_m, far_m] = self.depths_m;
         let share = s * near_m / ((1.0 - s) * far_m + s * near_m);
         self.span[0] + (self.span[1] - self.span[0]) * share

@@ -33,10 +33,10 @@ impl PinholeImages {
         Self { cameras, volume: searched_volume(volume, images) }
     }
 
-    /// The end of a ray with a direction of unit length, from `near` on.
+    /// The end of a ray with a direction of unit length, from `near_m` on.
     #[must_use]
-    pub fn follow(&self, ray: &Ray, near: f32) -> RayEnd {
-        let [near, far] = span_in(&self.volume, ray.origin_in_world, ray.direction_in_world, near);
+    pub fn follow(&self, ray: &Ray, near_m: f32) -> RayEnd {
+        let [near, far] = span_in(&self.volume, ray.origin_in_world, ray.direction_in_world, near_m);
         let (eye, direction) = (ray.origin_in_world, ray.direction_in_world);
         let ray = ViewRay { eye, direction, near, far, is_mirrored: true };
         let found = self.marched(&ray);
@@ -50,7 +50,7 @@ impl PinholeImages {
         };
         RayEnd {
             kind: pixel.provenance.kind(),
-            way: pixel.inverse_depth_per_m.recip(),
+            way_m: pixel.inverse_depth_per_m.recip(),
             color_linear: pixel.color_linear,
             steps: 0,
         }

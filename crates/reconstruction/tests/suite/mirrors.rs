@@ -3,11 +3,11 @@
 use depth_image::{Aabb, Antialias, Camera, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use reconstruction::{MirrorCell, Mirrors, ReconstructionError, SampleSet, SetDescription};
-use render::{DrawWork, GpuScene, SamplePlanes, Visibility};
+use render::{GpuScene, SamplePlanes};
 use scene::Scene;
 use scene::procedural::{mirror_pair, teapot_mirror};
 
-use crate::stage::{CARVE, gpu, kinds, looking, reconstructor, renderer};
+use crate::stage::{CARVE, description, gpu, kinds, looking, reconstructor, renderer, work};
 
 const VIEW_PX: UVec2 = UVec2::new(128, 96);
 
@@ -56,17 +56,6 @@ impl Hall {
     }
 }
 
-fn description(scene: &Scene) -> SetDescription<'_> {
-    SetDescription {
-        volume: scene.bounds(),
-        background: scene.background,
-        illumination: &scene.illumination,
-        highlight: Some(Highlight::Ggx),
-        environment: None,
-        mips: true,
-    }
-}
-
 fn reconstruct(
     set: &SampleSet,
     mirrors: Mirrors<'_>,
@@ -74,17 +63,6 @@ fn reconstruct(
     planes: ViewPlanes,
 ) -> Result<Vec<View>, ReconstructionError> {
     reconstructor().reconstruct_mirrored(set, mirrors, cameras, CARVE, planes, Default::default())
-}
-
-fn work<'a>(scene: &'a GpuScene, lighting: &str) -> DrawWork<'a> {
-    DrawWork {
-        scene,
-        lighting: lighting.parse().expect(lighting),
-        scene_time_s: 0.0,
-        visibility: Visibility::Rays,
-        refinement: Default::default(),
-        turn: Default::default(),
-    }
 }
 
 fn images(scene: &GpuScene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {

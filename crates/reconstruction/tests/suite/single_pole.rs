@@ -5,17 +5,17 @@ use std::sync::OnceLock;
 use depth_image::{Aabb, Camera, DepthImage, ProvenanceKind, Ray, SinglePoleCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
 use reconstruction::scalar::{PinholeImages, SinglePoleImages};
-use reconstruction::{CurvedSearch, MirrorCell, Mirrors, RayEnd, RayWork, ReconstructionError, SetDescription};
-use render::{DrawWork, GpuScene, SamplePlanes, Visibility};
+use reconstruction::{CurvedSearch, MirrorCell, Mirrors, RayEnd, RayWork, ReconstructionError};
+use render::{DrawWork, GpuScene, SamplePlanes};
 use scene::Scene;
 use scene::procedural::teapot_mirror;
 
-use crate::stage::{CARVE, gpu, looking, reconstructor, renderer};
+use crate::stage::{CARVE, description, gpu, looking, reconstructor, renderer, work};
 
 const TEAPOT: Aabb = Aabb { min: Vec3::new(-3.2, 0.0, 0.5), max: Vec3::new(3.2, 3.2, 4.5) };
 const MIRROR: Vec3 = Vec3::new(0.0, 3.1, -4.5);
 /// Rays begin on the mirror.
-const NEAR: f32 = 1e-3;
+const NEAR_M: f32 = 1e-3;
 
 /// The teapot without its mirror, and images of it from both sides of the mirror.
 struct Stand {
@@ -42,28 +42,6 @@ fn stand() -> &'static Stand {
     })
 }
 
-fn work<'a>(scene: &'a GpuScene, lighting: &str) -> DrawWork<'a> {
-    DrawWork {
-        scene,
-        lighting: lighting.parse().expect(lighting),
-        scene_time_s: 0.0,
-        visibility: Visibility::Rays,
-        refinement: Default::default(),
-        turn: Default::default(),
-    }
-}
-
-fn description(scene: &Scene) -> SetDescription<'_> {
-    SetDescription {
-        volume: scene.bounds(),
-        background: scene.background,
-        illumination: &scene.illumination,
-        highlight: Some(depth_image::Highlight::Ggx),
-        environment: None,
-        mips: true,
-    }
-}
-
 /// From places on a square around the mirror's middle towards places around the teapot.
 fn rays(count: usize) -> Vec<Ray> {
     let spread = |number: usize, step: f64| (0.5 + step * number as f64).fract() as f32 - 0.5;
@@ -79,7 +57,7 @@ fn rays(count: usize) -> Vec<Ray> {
 
 fn followed(images: &[DepthImage], search: CurvedSearch, rays: &[Ray]) -> Vec<RayEnd> {
     let set = reconstructor().upload(images, &description(&stand().scene)).expect("a set");
-    let work = RayWork { surroundings: &set, near: NEAR, curved_search: search, count_steps: true };
+    let work = RayWork { surroundings: &set, near_m: NEAR_M, curved_search: search, count_steps: true };
     reconstructor().follow(work, rays).expect("ends").0
 }
 
@@ -106,8 +84,8 @@ fn marched_and_carved_rays_end_where_their_twins_do() {
         let twin = PinholeImages::of(&images, &scene.bounds());
         let ends = followed(&images, CurvedSearch::default(), &rays);
         let agree = |(ray, end): (&Ray, &RayEnd)| {
-            let expected = twin.follow(ray, NEAR);
-            let near = !is_hit(end) || (end.way - expected.way).abs() <= 1e-3 * expected.way;
+            let expected = twin.follow(ray, NEAR_M);
+            let near = !is_hit(end) || (end.way_m - expected.way_m).abs() <= 1e-3 * expected.way_m;
             let color = !is_hit(end) || (end.color_linear - expected.color_linear).abs().max_element() < 0.02;
             end.kind == expected.kind && near && color
         };
@@ -131,8 +109,8 @@ fn the_walk_ends_where_its_twin_does() {
         let twin = SinglePoleImages::of(images, &scene.bounds());
         let ends = followed(images, search, &rays);
         let agree = |(ray, end): (&Ray, &RayEnd)| {
-            let expected = twin.curved_search(ray, NEAR, search);
-            let near = !is_hit(end) || (end.way - expected.way).abs() <= 1e-3 * expected.way;
+            let expected = twin.curved_search(ray, NEAR_M, search);
+            let near = !is_hit(end) || (end.way_m - expected.way_m).abs() <= 1e-3 * expected.way_m;
             let color = !is_hit(end) || (end.color_linear - expected.color_linear).abs().max_element() < 0.02;
             end.kind == expected.kind && end.steps == expected.steps && near && color
         };
@@ -149,7 +127,7 @@ fn coarse_steps_miss_little() {
     let Stand { scene, images } = stand();
     let (images, rays) = (&images[..1], rays(3000));
     let twin = SinglePoleImages::of(images, &scene.bounds());
-    let exhaustive: Vec<RayEnd> = rays.iter().map(|ray| twin.every_eighth_texel(ray, NEAR)).collect();
+    let exhaustive: Vec<RayEnd> = rays.iter().map(|ray| twin.every_eighth_texel(ray, NEAR_M)).collect();
     let hits = exhaustive.iter().filter(|end| is_hit(end)).count() as f32;
     let mut found = Vec::new();
     for coarse_px in [2.0, 6.0, 24.0] {
@@ -157,7 +135,7 @@ fn coarse_steps_miss_little() {
         let both = ends
             .iter()
             .zip(&exhaustive)
-            .filter(|(a, b)| is_hit(a) && is_hit(b) && (a.way - b.way).abs() < 0.02 * b.way);
+            .filter(|(a, b)| is_hit(a) && is_hit(b) && (a.way_m - b.way_m).abs() < 0.02 * b.way_m);
         found.push(both.count() as f32 / hits);
         let steps = ends.iter().map(|end| end.steps as f32).sum::<f32>() / ends.len() as f32;
         println!("coarse {coarse_px}: {} of {hits} hits, {steps} steps a ray", found[found.len() - 1]);
@@ -211,10 +189,10 @@ fn coarse_steps_meet_a_thin_pole_as_often_as_they_look_at_it() {
         let lost = |fine_px: f32| 1.0 - 0.5 * fine_px / columns as f32;
         let coarse = |coarse_px: f32| {
             let search = CurvedSearch { coarse_px, fine_px: 1.0 };
-            found_of_pole(columns, |images, ray| images.curved_search(ray, NEAR, search))
+            found_of_pole(columns, |images, ray| images.curved_search(ray, NEAR_M, search))
         };
         let found = [1.0, 3.0, 6.0, 12.0].map(|coarse_px| (coarse_px, coarse(coarse_px)));
-        let all = found_of_pole(columns, |images, ray| images.every_eighth_texel(ray, NEAR));
+        let all = found_of_pole(columns, |images, ray| images.every_eighth_texel(ray, NEAR_M));
         println!("{columns} columns: {found:?}, in steps of an eighth {all}");
         assert!((all - lost(0.125)).abs() < 0.05, "{columns}: {all}");
         for (coarse_px, share) in found {
@@ -253,7 +231,7 @@ fn no_ray_ends_at_what_is_not_a_number() {
         from(TEAPOT.center(), Vec3::Y),
     ];
     for end in followed(images, CurvedSearch::default(), &rays) {
-        assert!(end.way.is_finite() || !is_hit(&end), "{end:?}");
+        assert!(end.way_m.is_finite() || !is_hit(&end), "{end:?}");
         assert!(end.color_linear.is_finite(), "{end:?}");
     }
 }
@@ -277,7 +255,7 @@ fn what_cannot_use_the_images_says_so() {
     assert!(error.to_string().contains("pole"), "{error}");
     for (coarse_px, fine_px) in [(0.0, 0.0), (1.0, 2.0), (f32::NAN, 1.0), (65.0, 1.0), (6.0, 0.01)] {
         let curved_search = CurvedSearch { coarse_px, fine_px };
-        let work = RayWork { surroundings: &set, near: NEAR, curved_search, count_steps: false };
+        let work = RayWork { surroundings: &set, near_m: NEAR_M, curved_search, count_steps: false };
         let error = reconstructor().follow(work, &rays(1)).expect_err("no such steps");
         assert!(matches!(error, ReconstructionError::CurvedSearch { .. }), "{error}");
     }

@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use depth_image::{
-    Aabb, Camera, DepthImage, Environment, Illumination, PinholeCamera, ProvenanceKind, View, ViewPlanes,
+    Aabb, Camera, DepthImage, Environment, Highlight, Illumination, PinholeCamera, ProvenanceKind, View, ViewPlanes,
 };
 use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
@@ -240,5 +240,22 @@ fn plainly_lit(scene: &GpuScene) -> DrawWork<'_> {
         visibility: Visibility::Triangles,
         refinement: Refinement::default(),
         turn: Default::default(),
+    }
+}
+
+/// A scene whose surfaces are found by rays, under a lighting.
+pub fn work<'a>(scene: &'a GpuScene, lighting: &str) -> DrawWork<'a> {
+    DrawWork { lighting: lighting.parse().expect(lighting), visibility: Visibility::Rays, ..plainly_lit(scene) }
+}
+
+/// Sets of a scene with mirrors.
+pub fn description(scene: &Scene) -> SetDescription<'_> {
+    SetDescription {
+        volume: scene.bounds(),
+        background: scene.background,
+        illumination: &scene.illumination,
+        highlight: Some(Highlight::Ggx),
+        environment: None,
+        mips: true,
     }
 }

@@ -57,15 +57,16 @@ pub fn measure(stand: &Stand) -> anyhow::Result<[Check; 2]> {
     let mirror = mirrors.first().ok_or_else(|| anyhow::anyhow!("the bowl is no mirror"))?;
     let set = unlit_set(stand, &on_device, &in_a_cluster(mirror), scene.bounds())?;
     let rays = mirrored(&twin, &views(), VIEW_PX);
-    let work = RayWork { surroundings: &set, near: NEAR_M, curved_search: CurvedSearch::default(), count_steps: false };
+    let work =
+        RayWork { surroundings: &set, near_m: NEAR_M, curved_search: CurvedSearch::default(), count_steps: false };
     let (ends, _) = stand.reconstructor().follow(work, &rays)?;
     let (mut second, mut found, mut own) = (0usize, 0usize, 0usize);
     for (ray, end) in rays.iter().zip(&ends) {
         let truth = twin.closest(ray, NEAR_M).0.map(|hit| hit.t);
         let is_hit = end.kind == ProvenanceKind::Hit;
         second += usize::from(truth.is_some());
-        found += usize::from(is_hit && truth.is_some_and(|way_m| (way_m - end.way).abs() <= RIGHT_M));
-        own += usize::from(is_hit && end.way < OWN_M && truth.is_none_or(|way_m| way_m > 2.0 * OWN_M));
+        found += usize::from(is_hit && truth.is_some_and(|way_m| (way_m - end.way_m).abs() <= RIGHT_M));
+        own += usize::from(is_hit && end.way_m < OWN_M && truth.is_none_or(|way_m| way_m > 2.0 * OWN_M));
     }
     anyhow::ensure!(second > 0, "no ray meets the bowl twice");
     let found_percent = 100.0 * found as f64 / second as f64;

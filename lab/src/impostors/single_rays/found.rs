@@ -5,7 +5,7 @@ use glam::Vec3;
 use reconstruction::{CurvedSearch, RayEnd, RayWork};
 use study::{Axis, Bar, Cell, Check, Series, Table, XyChart};
 
-use super::teapot::{ASIDE, NEAR, Rays, Teapot};
+use super::teapot::{ASIDE, NEAR_M, Rays, Teapot};
 
 /// The side of one image; several share its texels.
 pub const SIDE_PX: u32 = 512;
@@ -65,14 +65,15 @@ pub fn compare(teapot: &Teapot<'_>, rays: &Rays) -> anyhow::Result<Vec<Figures>>
 
 fn figures(teapot: &Teapot<'_>, rays: &Rays, name: &'static str, cameras: &[Camera]) -> anyhow::Result<Figures> {
     let set = teapot.set(cameras)?;
-    let work = RayWork { surroundings: &set, near: NEAR, curved_search: CurvedSearch::default(), count_steps: false };
+    let work =
+        RayWork { surroundings: &set, near_m: NEAR_M, curved_search: CurvedSearch::default(), count_steps: false };
     let (ends, _) = teapot.stand.reconstructor().follow(work, &rays.rays)?;
     let of_teapot = ends.iter().zip(&rays.truth).filter_map(|(end, truth)| truth.map(|truth| (end, truth)));
     let tolerance_m = RIGHT * teapot.bounds.size().max_element();
     let (mut count, mut found, mut wrong, mut error) = (0usize, 0usize, 0usize, 0.0);
     for (end, (way_m, color_linear)) in of_teapot {
         let is_hit = end.kind == ProvenanceKind::Hit;
-        let is_right = is_hit && (end.way - way_m).abs() <= tolerance_m;
+        let is_right = is_hit && (end.way_m - way_m).abs() <= tolerance_m;
         count += 1;
         found += usize::from(is_right);
         wrong += usize::from(is_hit && !is_right);

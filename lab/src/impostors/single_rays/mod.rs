@@ -11,7 +11,7 @@ use study::Report;
 
 use crate::failures::stand::Stand;
 use crate::progress::bar;
-use teapot::{Teapot, off_mirror, off_patch};
+use teapot::{Teapot, off_mirror, off_patch, views};
 
 /// Rays off a flat patch, in full and in quick runs.
 const PATCH_RAYS: [usize; 2] = [40_000, 10_000];
@@ -28,7 +28,8 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
     let patch = |ratio: f32| off_patch(&teapot, ratio, PATCH_RAYS[usize::from(is_quick)]);
     let flat = found::compare(&teapot, &patch(1.0))?;
     progress.inc(1);
-    let mirror = found::compare(&teapot, &off_mirror(&teapot, VIEWS[usize::from(is_quick)], steps::VIEW_PX)?)?;
+    let mirror =
+        found::compare(&teapot, &off_mirror(&teapot, &views(&teapot, VIEWS[usize::from(is_quick)]), steps::VIEW_PX)?)?;
     progress.inc(1);
     let curve = found::by_distortion(&teapot, patch)?;
     progress.inc(1);

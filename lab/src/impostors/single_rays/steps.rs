@@ -1,12 +1,14 @@
 //! What the walk costs, by its steps, the image's side and the number of rays (Rosen et al., section 7.2, Table 1).
 
+use std::slice;
+
 use depth_image::Camera;
 use glam::UVec2;
 use reconstruction::{CurvedSearch, RayWork, SampleSet};
 use study::{Bar, Cell, Check, Report, Table};
 
 use super::found::SIDE_PX;
-use super::teapot::{NEAR, Rays, Teapot, off_mirror};
+use super::teapot::{NEAR_M, Rays, Teapot, off_mirror, views};
 use crate::statistics::median;
 
 /// Of the views whose rays are followed.
@@ -20,6 +22,7 @@ const STEPS_PX: [[f32; 2]; 8] =
 const SIDES_PX: [u32; 4] = [128, 256, 512, 1024];
 /// Pictures and fine steps of Table 1.
 const PICTURES_PX: [UVec2; 3] = [UVec2::new(640, 480), UVec2::new(800, 600), UVec2::new(1024, 768)];
+const PATH_VIEWS: usize = 8;
 const FINE_PX: [f32; 3] = [1.0, 0.5, 0.25];
 
 /// Of all rays that come into the teapot's box.
@@ -33,7 +36,7 @@ struct Cost {
 /// # Errors
 /// The device fails.
 pub fn measure(teapot: &Teapot<'_>, is_quick: bool, report: &mut Report) -> anyhow::Result<()> {
-    let rays = in_box(teapot, off_mirror(teapot, if is_quick { 4 } else { 12 }, VIEW_PX)?);
+    let rays = in_box(teapot, off_mirror(teapot, &views(teapot, if is_quick { 4 } else { 12 }), VIEW_PX)?);
     let set = set(teapot, &rays, SIDE_PX)?;
     let costs = STEPS_PX.iter().map(|steps| cost(teapot, &set, &rays, *steps)).collect::<anyhow::Result<Vec<_>>>()?;
     let columns = [("coarse", "px"), ("fine", "px"), ("steps a ray", ""), ("ns a ray", ""), ("time over 6, 1", "×")];
@@ -74,7 +77,7 @@ fn set(teapot: &Teapot<'_>, rays: &Rays, side_px: u32) -> anyhow::Result<SampleS
 fn cost(teapot: &Teapot<'_>, set: &SampleSet, rays: &Rays, [coarse_px, fine_px]: [f32; 2]) -> anyhow::Result<Cost> {
     let work = |count_steps| {
         let curved_search = CurvedSearch { coarse_px, fine_px };
-        RayWork { surroundings: set, near: NEAR, curved_search, count_steps }
+        RayWork { surroundings: set, near_m: NEAR_M, curved_search, count_steps }
     };
     let follow = |count_steps| teapot.stand.reconstructor().follow(work(count_steps), &rays.rays);
     let steps: u64 = follow(true)?.0.iter().map(|end| u64::from(end.steps)).sum();
@@ -107,9 +110,8 @@ fn by_side(teapot: &Teapot<'_>, rays: &Rays) -> anyhow::Result<Table> {
     let mut before = None;
     for side_px in SIDES_PX {
         let cost = cost(teapot, &set(teapot, rays, side_px)?, rays, STEPS_PX[0])?;
-        let over = before.map_or(f64::NAN, |before| cost.ns_a_ray / before);
+        let over = before.map_or(Cell::from(""), |before| Cell::from(cost.ns_a_ray / before));
         before = Some(cost.ns_a_ray);
-        let over = if over.is_nan() { Cell::from("") } else { Cell::from(over) };
         table.push([Cell::from(side_px as usize), Cell::from(cost.steps), Cell::from(cost.ns_a_ray), over])?;
     }
     Ok(table)
@@ -121,7 +123,8 @@ fn by_picture(teapot: &Teapot<'_>) -> anyhow::Result<Table> {
         [("picture", ""), ("fine", "px"), ("mean", "ms"), ("least", "ms"), ("most", "ms"), ("steps a ray", "")];
     let mut table = Table::new("The walk for all mirrored rays of a picture, along a path of 8 views", &columns);
     for size_px in PICTURES_PX {
-        let views = (0..8).map(|view| Ok(in_box(teapot, super::teapot::off_mirror_of(teapot, (view, 8), size_px)?)));
+        let path = views(teapot, PATH_VIEWS);
+        let views = path.iter().map(|view| Ok(in_box(teapot, off_mirror(teapot, slice::from_ref(view), size_px)?)));
         let views = views.collect::<anyhow::Result<Vec<Rays>>>()?;
         let set = set(teapot, &views[0], SIDE_PX)?;
         for fine_px in FINE_PX {

@@ -60,7 +60,7 @@ impl<'s> Teapot<'s> {
     }
 
     fn truth(&self, rays: &[Ray]) -> Vec<Option<(f32, Vec3)>> {
-        let met = |ray: &Ray| self.twin.closest(ray, NEAR).0.map(|hit| (hit.t, self.twin.look(&hit).base_linear));
+        let met = |ray: &Ray| self.twin.closest(ray, NEAR_M).0.map(|hit| (hit.t, self.twin.look(&hit).base_linear));
         rays.par_iter().map(met).collect()
     }
 }
@@ -84,7 +84,7 @@ pub fn unlit_set(stand: &Stand, scene: &GpuScene, cameras: &[Camera], volume: Aa
 }
 
 /// Nothing is met nearer to a reflector.
-pub const NEAR: f32 = 0.02;
+pub const NEAR_M: f32 = 0.02;
 
 /// The part of the scene that is neither floor nor mirror.
 fn alone(whole: &Scene) -> Scene {
@@ -119,28 +119,21 @@ pub fn off_patch(teapot: &Teapot<'_>, ratio: f32, count: usize) -> Rays {
     Rays { middle, width_m, truth: teapot.truth(&rays), rays }
 }
 
-/// Rays off the scene's mirror, from views around the scene.
+/// Views on a circle around the scene.
+pub fn views(teapot: &Teapot<'_>, count: usize) -> Vec<PinholeCamera> {
+    around(&teapot.whole.bounds(), count)
+}
+
+/// Rays off the scene's mirror, from these views at another size.
 ///
 /// # Errors
 /// The device fails.
-pub fn off_mirror(teapot: &Teapot<'_>, views: usize, view_px: UVec2) -> anyhow::Result<Rays> {
-    off_mirror_in(teapot, &around(&teapot.whole.bounds(), views), view_px)
-}
-
-/// As [`off_mirror`], from one of so many views.
-///
-/// # Errors
-/// The device fails.
-pub fn off_mirror_of(teapot: &Teapot<'_>, (view, views): (usize, usize), view_px: UVec2) -> anyhow::Result<Rays> {
-    off_mirror_in(teapot, &around(&teapot.whole.bounds(), views)[view..=view], view_px)
-}
-
-fn off_mirror_in(teapot: &Teapot<'_>, cameras: &[PinholeCamera], view_px: UVec2) -> anyhow::Result<Rays> {
+pub fn off_mirror(teapot: &Teapot<'_>, views: &[PinholeCamera], view_px: UVec2) -> anyhow::Result<Rays> {
     let whole = teapot.stand.upload(&teapot.whole)?;
     let twin = scalar::rays::Scene::of(&whole, 0.0)?;
     let (mirrors, _) = sampling::mirrors(&teapot.whole, sampling::Impostors::Pinholes { images: 1 });
     let bounds = mirrors.first().map_or(teapot.bounds, |mirror| mirror.bounds);
-    let rays = mirrored(&twin, cameras, view_px);
+    let rays = mirrored(&twin, views, view_px);
     Ok(Rays { middle: bounds.center(), width_m: bounds.size().min_element(), truth: teapot.truth(&rays), rays })
 }
 
