@@ -35,7 +35,7 @@ pub(crate) async fn deliver(mut state: watch::Receiver<SessionState>, sink: Fram
             return;
         }
         let error = match call_all(&state, &active, &sink).await {
-            // Frames that are still missing will not come.
+            // All frames that were requested have been received.
             Ok(()) => return,
             Err(Failure::OfRequest(error) | Failure::Exhausted(error)) => error,
             // Calls of a caller that takes nothing end by themselves, and no compositor is to blame.
@@ -118,7 +118,11 @@ async fn receive_all(peer: Peer, (mut pump, messages): Started, sink: FrameSink)
             decoded.unwrap_or(Ok(()))?;
         }
     }
-    all(&mut decoding).await
+    all(&mut decoding).await?;
+    match pump.in_flight() {
+        0 => Ok(()),
+        views => Err(Failure::of_peer(&peer, peer.error(format!("ended its frames {views} views early")))),
+    }
 }
 
 /// Waits for a later plan for `delay`; gives an error where no plan is to be tried any more.

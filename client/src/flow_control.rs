@@ -50,10 +50,10 @@ impl FlowControl {
         self.in_flight += views;
     }
 
-    /// Whether no view is in flight.
+    /// Views that are requested and have not been received.
     #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.in_flight == 0
+    pub fn in_flight(&self) -> usize {
+        self.in_flight
     }
 
     /// Counts a view as received. A view that waited for its sample set does not show the compositor's speed.

@@ -1,4 +1,4 @@
-//! A proxy before a node that spoils the chunks of its answers.
+//! A proxy before a node that spoils the chunks of its answers and ends streams of frames early.
 
 use std::sync::Arc;
 
@@ -8,8 +8,8 @@ use node::{ServeError, serve};
 use parking_lot::Mutex;
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
-use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
+use tokio_stream::{Stream, StreamExt as _};
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tonic::service::Routes;
 use tonic::{Status, async_trait};
@@ -26,6 +26,8 @@ struct Orders {
     spoil: Option<Spoil>,
     /// Number of answers still to be corrupted.
     times: usize,
+    /// Number of streams of frames that still end after their first frame.
+    cut: usize,
 }
 
 /// A server that ends when it is dropped.
@@ -59,13 +61,19 @@ impl Mangler {
 
     /// Corrupts the next `times` answers.
     pub fn spoil(&self, times: usize, spoil: Spoil) {
-        *self.orders.lock() = Orders { spoil: Some(spoil), times };
+        *self.orders.lock() = Orders { spoil: Some(spoil), times, cut: 0 };
     }
 
-    /// The number of answers still to be corrupted.
+    /// Ends the next `streams` of frames after their first frame, as if they were complete.
+    pub fn cut(&self, streams: usize) {
+        self.orders.lock().cut = streams;
+    }
+
+    /// The number of answers still to be corrupted, or cut.
     #[must_use]
     pub fn left(&self) -> usize {
-        self.orders.lock().times
+        let orders = self.orders.lock();
+        orders.times + orders.cut
     }
 }
 
@@ -94,6 +102,22 @@ impl Front {
             spoil(chunks);
         }
     }
+
+    fn cuts(&self) -> bool {
+        let mut orders = self.orders.lock();
+        let cuts = orders.cut > 0;
+        orders.cut -= usize::from(cuts);
+        cuts
+    }
+}
+
+/// The parts up to the second header.
+fn first_frame(parts: Messages<FramePart>) -> impl Stream<Item = Result<FramePart, Status>> + Send {
+    let mut headers = 0;
+    parts.take_while(move |part| {
+        headers += usize::from(part.as_ref().is_ok_and(|part| part.header.is_some()));
+        headers < 2
+    })
 }
 
 #[async_trait]
@@ -135,6 +159,8 @@ impl Compositor for Front {
                 }
             }
         });
-        CompositorClient::new(connect(&self.node()).await?).render_views(ReceiverStream::new(passed)).await
+        let parts =
+            CompositorClient::new(connect(&self.node()).await?).render_views(ReceiverStream::new(passed)).await?;
+        Ok(if self.cuts() { Box::pin(first_frame(parts)) } else { parts })
     }
 }

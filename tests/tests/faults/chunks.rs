@@ -77,6 +77,21 @@ async fn corrupt_chunks_are_fetched_again() {
     assert_eq!(session.plan().assignment.plan_epoch, epoch, "no node was quarantined for it");
 }
 
+/// A changed byte on the way may end a stream as if it were complete.
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_of_a_stream_that_ends_early_are_asked_for_again() {
+    let (cluster, manglers) = start(2).await;
+    let session = session(&cluster).await;
+    show(&session, 0).await;
+    let compositor = number_of(&compositor_of(&session));
+    for (set_index, cut) in [(10, 1), (20, 2)] {
+        manglers[compositor].cut(cut);
+        let took = show(&session, set_index).await;
+        println!("{cut} streams that end early: frames after {:.2} s", took.as_secs_f64());
+        assert_eq!(manglers[compositor].left(), 0, "{cut} streams");
+    }
+}
+
 /// A sampler is replaced that sends nothing but spoilt chunks from now on.
 async fn replaced(nodes: usize, (what, spoil): (&str, Spoil), deadline: Duration) {
     let (cluster, manglers) = start(nodes).await;
