@@ -1,10 +1,12 @@
 //! Ends of single rays, for studies and tests of how rays off mirrors are followed.
 
-use depth_image::{Aabb, PinholeCamera, Provenance, ProvenanceKind, Ray, ViewPlanes, linear_from_rgb9e5};
+use depth_image::{
+    Aabb, PinholeCamera, Provenance, ProvenanceKind, Ray, ViewPlanes, linear_from_rgb9e5, rgb9e5_from_linear,
+};
 use glam::{UVec2, Vec3};
 use gpu::Turn;
 
-use crate::bounce::{Bounces, CurvedSearch, GpuMirroredRay, MirrorCell, Mirrors, follow};
+use crate::bounce::{Bounces, CurvedSearch, GpuMirroredRay, MirrorCell, Mirrors, follow, land};
 use crate::device::Device;
 use crate::error::ReconstructionError;
 use crate::recording::Recording;
@@ -38,6 +40,17 @@ pub struct RayWork<'s> {
     pub curved_search: CurvedSearch,
     /// Counting slows it down.
     pub count_steps: bool,
+    /// The side of each ray's footprint, at all places. Where it is more than 0, colours are those that a mirror shows: filtered. The
+    /// set has reflectors then, and no lights.
+    pub width_m: f32,
+}
+
+impl<'s> RayWork<'s> {
+    /// Rays without width, by the usual search.
+    #[must_use]
+    pub fn new(surroundings: &'s SampleSet, near_m: f32) -> Self {
+        Self { surroundings, near_m, curved_search: CurvedSearch::default(), count_steps: false, width_m: 0.0 }
+    }
 }
 
 /// Follows rays with directions of unit length. Gives also the seconds on the device.
@@ -46,7 +59,7 @@ pub(crate) fn follow_rays(
     work: RayWork<'_>,
     rays: &[Ray],
 ) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
-    let RayWork { surroundings, near_m, curved_search, count_steps } = work;
+    let RayWork { surroundings, near_m, curved_search, count_steps, width_m } = work;
     let cells = [MirrorCell { bounds: Aabb::around([surroundings.eye_in_world()]), surroundings }];
     let mirrors = Mirrors { cells: &cells, reflections: 1 };
     let size_px = UVec2::new(COLUMNS, (rays.len() as u32).div_ceil(COLUMNS).max(1));
@@ -66,25 +79,32 @@ pub(crate) fn follow_rays(
         direction: ray.direction_in_world.to_array(),
         near_m,
         guess: 0,
-        throughput_rgb9e5: 0,
-        width_m: 0.0,
+        throughput_rgb9e5: rgb9e5_from_linear(Vec3::ONE),
+        width_m,
         spread: 0.0,
     };
     let lists = bounces.listing(device, &(0..).zip(rays).map(of_ray).collect::<Vec<_>>());
     follow(&mut recording, &bounces, &lists, (0, 1))?;
-    read(device, recording, &bounces, rays.len())
+    if width_m > 0.0 {
+        let shown = (*recording.batch.color).clone();
+        recording.frame.encoder.clear_buffer(&shown, 0, None);
+        land(&mut recording, &bounces, (&lists, None), (0, 1))?;
+        return read(device, recording, &bounces, (&shown, rays.len()));
+    }
+    read(device, recording, &bounces, (bounces.planes()[0], rays.len()))
 }
 
 fn read(
     device: &Device,
     recording: Recording<'_>,
     bounces: &Bounces<'_>,
-    count: usize,
+    (color, count): (&wgpu::Buffer, usize),
 ) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
     let Recording { mut frame, batch, .. } = recording;
     let bytes = 4 * count.max(1) as u64;
     let mut read = |plane: &wgpu::Buffer| frame.read_back(plane, 0..bytes, device.buffers.lend_host("ends", bytes));
-    let [color, inverse_way, provenance] = bounces.planes().map(&mut read);
+    let [_, inverse_way, provenance] = bounces.planes();
+    let [color, inverse_way, provenance] = [color, inverse_way, provenance].map(&mut read);
     let steps = bounces.steps().map(read);
     let result = frame.submit()?.wait()?;
     drop(batch);

@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::Context as _;
 use depth_image::{Aabb, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
-use reconstruction::{Mirrors, SampleSet};
+use reconstruction::Mirrors;
 use sampling::Mirror;
 
 use super::candidates::in_a_cluster;
@@ -31,21 +31,22 @@ const SPREAD_RAD: f32 = 0.06;
 pub struct Costs {
     /// The four images of views, and those of mirrors.
     pub sample_s: [f64; 2],
-    /// Both sets, on the device.
-    pub load_s: f64,
+    /// Of both kinds, on the device.
+    pub load_s: [f64; 2],
     /// A view by the light of the views: without reflections, with one, with two.
     pub view_s: [f64; 3],
-    /// A view that is drawn directly, with one reflection.
-    pub direct_s: f64,
+    /// A view that is drawn directly, with as many.
+    pub direct_s: [f64; 3],
     /// The share of pixels from which rays are followed.
     pub mirror_ratio: f64,
 }
 
 impl Costs {
     /// The throughput of views from samples over that of directly drawn ones, as the parts allow it on one node.
-    pub fn gain(&self, views: f64) -> f64 {
-        let once_s = self.sample_s.iter().sum::<f64>() + self.load_s;
-        views * self.direct_s / (once_s + views * self.view_s[1])
+    pub fn gain(&self, views: f64, reflections: usize) -> f64 {
+        let kinds = if reflections > 0 { 2 } else { 1 };
+        let once_s: f64 = self.sample_s[..kinds].iter().chain(&self.load_s[..kinds]).sum();
+        views * self.direct_s[reflections] / (once_s + views * self.view_s[reflections])
     }
 }
 
@@ -65,13 +66,11 @@ pub fn measure(hall: &Hall<'_>, mirrors: &[Mirror]) -> anyhow::Result<Costs> {
     let (images, views_s) = timed(|| hall.images(&samples))?;
     let (of_mirrors, mirrors_s) =
         timed(|| mirrors.iter().map(|mirror| hall.images(&in_a_cluster(mirror))).collect::<anyhow::Result<Vec<_>>>())?;
-    let load = || -> anyhow::Result<(SampleSet, Vec<SampleSet>)> {
-        let of_mirrors = of_mirrors.iter().map(|images| hall.set(images, true));
-        Ok((hall.set(&images, false)?, of_mirrors.collect::<anyhow::Result<_>>()?))
-    };
+    let load = || hall.set(&images, false);
+    let load_mirrors = || of_mirrors.iter().map(|images| hall.set(images, true)).collect::<anyhow::Result<Vec<_>>>();
     // A cluster's later sets reuse the memory of earlier ones.
-    load()?;
-    let ((set, sets), load_s) = timed(load)?;
+    drop((load()?, load_mirrors()?));
+    let ((set, load_s), (sets, load_mirrors_s)) = (timed(load)?, timed(load_mirrors)?);
     let cells = cells(&bounds, &sets);
     let view_s = |reflections| -> anyhow::Result<f64> {
         let mirrors = Mirrors { cells: &cells, reflections };
@@ -82,11 +81,12 @@ pub fn measure(hall: &Hall<'_>, mirrors: &[Mirror]) -> anyhow::Result<Costs> {
         let times = (0..REPEATS).map(|_| Ok(timed(make)?.1 / BATCH as f64)).collect::<anyhow::Result<Vec<f64>>>()?;
         Ok(median(times))
     };
+    let direct_s = |reflections| direct_s(hall, &views[..DRAWN], reflections);
     Ok(Costs {
         sample_s: [views_s, mirrors_s],
-        load_s,
+        load_s: [load_s, load_mirrors_s],
         view_s: [view_s(0)?, view_s(1)?, view_s(2)?],
-        direct_s: direct_s(hall, &views[..DRAWN])?,
+        direct_s: [direct_s(0)?, direct_s(1)?, direct_s(2)?],
         mirror_ratio: mirror_ratio(hall, near, &views[0])?,
     })
 }
@@ -103,8 +103,8 @@ fn before(mirror: &Aabb, right_rad: f32, up_rad: f32) -> PinholeCamera {
     PinholeCamera::looking_at(middle + towards * distance_m, middle, Vec3::Y, FOV_Y_RAD, VIEW_PX)
 }
 
-fn direct_s(hall: &Hall<'_>, views: &[PinholeCamera]) -> anyhow::Result<f64> {
-    let lighting = reflecting(hall.lighting, 1)?;
+fn direct_s(hall: &Hall<'_>, views: &[PinholeCamera], reflections: u32) -> anyhow::Result<f64> {
+    let lighting = reflecting(hall.lighting, reflections)?;
     let draw = || hall.stand.views(&hall.on_device, lighting, views, ViewPlanes::COLOR);
     draw()?;
     Ok(timed(draw)?.1 / views.len() as f64)

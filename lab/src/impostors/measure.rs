@@ -133,14 +133,14 @@ impl<'s> Hall<'s> {
         self.stand.images(&self.on_device, plain(self.lighting), cameras, PLANES)
     }
 
-    pub fn set(&self, images: &[DepthImage], mips: bool) -> anyhow::Result<SampleSet> {
+    pub fn set(&self, images: &[DepthImage], of_mirror: bool) -> anyhow::Result<SampleSet> {
         let description = SetDescription {
             volume: self.scene.bounds(),
             background: self.scene.background,
             illumination: &self.scene.illumination,
             highlight: Some(Highlight::Ggx),
             environment: None,
-            mips,
+            of_mirror,
         };
         Ok(self.stand.reconstructor().upload(images, &description)?)
     }
@@ -176,7 +176,10 @@ impl<'s> Hall<'s> {
     }
 
     /// Its views, with these mirror cells.
-    fn views(&self, cells: &[MirrorCell<'_>], reflections: u32) -> anyhow::Result<Vec<View>> {
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn views(&self, cells: &[MirrorCell<'_>], reflections: u32) -> anyhow::Result<Vec<View>> {
         let mirrors = Mirrors { cells, reflections };
         let view = |subject: &Subject| {
             let (set, cameras, turn) = (&subject.set, [subject.camera], Default::default());
@@ -194,22 +197,25 @@ impl<'s> Hall<'s> {
     /// The device fails.
     pub fn order(&self, mirrors: &[Aabb], sets: &[SampleSet], order: u32) -> anyhow::Result<Option<[Answer; 2]>> {
         let mut answers = [Vec::new(), Vec::new()];
-        let views = [order, 0].map(|reflections| self.views(&cells(mirrors, sets), reflections));
-        let [with, without] = views;
-        for ((subject, with), without) in self.subjects.iter().zip(with?).zip(without?) {
-            let truth = |reflections: u32| -> anyhow::Result<View> {
-                let lighting = reflecting(self.lighting, reflections)?;
-                let views = self.stand.views(&self.on_device, lighting, &[subject.camera], ViewPlanes::COLOR)?;
-                views.into_iter().next().context("a view")
-            };
-            let truth_of = truth(order)?;
-            let pixels = changed(&truth(order - 1)?, &truth_of);
+        let [with, without] = [order, 0].map(|reflections| self.views(&cells(mirrors, sets), reflections));
+        let (truths, before) = (self.truths(order)?, self.truths(order - 1)?);
+        for (((truth, before), with), without) in truths.iter().zip(&before).zip(with?).zip(without?) {
+            let pixels = changed(before, truth);
             if pixels.contains(&true) {
-                answers[0].push(answer(&truth_of, &with, &pixels)?);
-                answers[1].push(answer(&truth_of, &without, &pixels)?);
+                answers[0].push(answer(truth, &with, &pixels)?);
+                answers[1].push(answer(truth, &without, &pixels)?);
             }
         }
         if answers[0].is_empty() { Ok(None) } else { Ok(Some([mean(&answers[0])?, mean(&answers[1])?])) }
+    }
+
+    /// Its views, drawn directly with this number of reflections.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn truths(&self, reflections: u32) -> anyhow::Result<Vec<View>> {
+        let cameras: Vec<PinholeCamera> = self.subjects.iter().map(|subject| subject.camera).collect();
+        self.stand.views(&self.on_device, reflecting(self.lighting, reflections)?, &cameras, ViewPlanes::COLOR)
     }
 }
 

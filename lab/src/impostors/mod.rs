@@ -6,4 +6,5 @@ mod costs;
 mod measure;
 mod objects;
 mod orders;
+mod reflectance;
 mod single_rays;

@@ -12,7 +12,7 @@ use super::measure::{Hall, VIEW_PX};
 use crate::failures::stand::Stand;
 
 /// Two mirrors that face each other, and a ball between them.
-const SCENE: &str = "mirror-pair";
+pub const SCENE: &str = "mirror-pair";
 const ORDERS: u32 = 4;
 
 /// A row for each number of mirrors that a ray meets, and the growth of errors as a check.
@@ -21,8 +21,7 @@ const ORDERS: u32 = 4;
 /// The device fails.
 pub fn measure(stand: &Stand, lighting: Lighting, impostors: Impostors) -> anyhow::Result<(Table, Check)> {
     let scene = SCENE.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?;
-    let views = [-0.3f32, 0.1, 0.4].map(|z_m| between(Vec3::new(1.2, 1.5, 2.2 + z_m)));
-    let hall = Hall::new(stand, &scene, lighting, &views)?;
+    let hall = Hall::new(stand, &scene, lighting, &views())?;
     let (mirrors, _) = sampling::mirrors(&scene, impostors);
     let bounds: Vec<Aabb> = mirrors.iter().map(|mirror| mirror.bounds).collect();
     let sets = mirrors.iter().map(|mirror| hall.set(&hall.images(&in_a_cluster(mirror))?, true));
@@ -39,6 +38,11 @@ pub fn measure(stand: &Stand, lighting: Lighting, impostors: Impostors) -> anyho
     }
     let growth = errors.windows(2).map(|pair| pair[1] / pair[0]).fold(f64::NAN, f64::max);
     Ok((table, Check::new("error for each further mirror, most", growth, "×", Bar::AtMost(1.4))))
+}
+
+/// Views from between the mirrors.
+pub fn views() -> [PinholeCamera; 3] {
+    [-0.3f32, 0.1, 0.4].map(|z_m| between(Vec3::new(1.2, 1.5, 2.2 + z_m)))
 }
 
 fn between(eye: Vec3) -> PinholeCamera {

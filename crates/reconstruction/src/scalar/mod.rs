@@ -12,6 +12,7 @@ mod joint_carve;
 mod light_field_search;
 mod march;
 mod mesh;
+mod mips;
 mod pixel;
 mod sample_camera;
 mod smooth;
@@ -22,6 +23,7 @@ mod view_ray;
 
 pub use self::curved_search::SinglePoleImages;
 pub use self::follow::PinholeImages;
+pub use self::mips::ColorMips;
 use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 

@@ -8,6 +8,7 @@ mod holes_and_limits;
 mod merging;
 mod mesh_limits;
 mod meshes;
+mod mips;
 mod mirrors;
 mod non_redundant;
 mod single_pole;

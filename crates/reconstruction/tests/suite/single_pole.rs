@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use depth_image::{Aabb, Camera, DepthImage, ProvenanceKind, Ray, SinglePoleCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
 use reconstruction::scalar::{PinholeImages, SinglePoleImages};
-use reconstruction::{CurvedSearch, MirrorCell, Mirrors, RayEnd, RayWork, ReconstructionError};
+use reconstruction::{CurvedSearch, MirrorCell, Mirrors, RayEnd, RayWork, ReconstructionError, plane_of};
 use render::{DrawWork, GpuScene, SamplePlanes};
 use scene::Scene;
 use scene::procedural::teapot_mirror;
@@ -57,7 +57,7 @@ fn rays(count: usize) -> Vec<Ray> {
 
 fn followed(images: &[DepthImage], search: CurvedSearch, rays: &[Ray]) -> Vec<RayEnd> {
     let set = reconstructor().upload(images, &description(&stand().scene)).expect("a set");
-    let work = RayWork { surroundings: &set, near_m: NEAR_M, curved_search: search, count_steps: true };
+    let work = RayWork { curved_search: search, count_steps: true, ..RayWork::new(&set, NEAR_M) };
     reconstructor().follow(work, rays).expect("ends").0
 }
 
@@ -77,9 +77,10 @@ fn marched_and_carved_rays_end_where_their_twins_do() {
         Camera::from(looking(eye, eye + Vec3::Z, 80.0, UVec2::splat(128)))
     };
     let four = [aside(-1.0, -1.0), aside(1.0, 1.0), aside(1.0, -1.0), aside(-1.0, 1.0)];
-    for cameras in [&four[..1], &four, &six] {
+    for (cameras, are_some_flat) in [(&four[..1], false), (&four, false), (&six, true)] {
         let planes = SamplePlanes::default();
         let images = renderer().draw_depth_images(work(&on_device, "unlit"), cameras, planes).expect("images");
+        assert_eq!(images.iter().any(|image| plane_of(image).is_some()), are_some_flat);
         let rays = rays(6000);
         let twin = PinholeImages::of(&images, &scene.bounds());
         let ends = followed(&images, CurvedSearch::default(), &rays);
@@ -255,7 +256,7 @@ fn what_cannot_use_the_images_says_so() {
     assert!(error.to_string().contains("pole"), "{error}");
     for (coarse_px, fine_px) in [(0.0, 0.0), (1.0, 2.0), (f32::NAN, 1.0), (65.0, 1.0), (6.0, 0.01)] {
         let curved_search = CurvedSearch { coarse_px, fine_px };
-        let work = RayWork { surroundings: &set, near_m: NEAR_M, curved_search, count_steps: false };
+        let work = RayWork { curved_search, ..RayWork::new(&set, NEAR_M) };
         let error = reconstructor().follow(work, &rays(1)).expect_err("no such steps");
         assert!(matches!(error, ReconstructionError::CurvedSearch { .. }), "{error}");
     }

@@ -112,7 +112,7 @@ impl Room {
             illumination: &self.illumination,
             highlight,
             environment: None,
-            mips: false,
+            of_mirror: false,
         }
     }
 

@@ -1,4 +1,4 @@
-//! Scenes with mirrors: a teapot before a dented mirror, and a ball between two plane mirrors.
+//! Scenes with mirrors: a teapot before a dented mirror, a ball between two plane mirrors, and two mirror balls in a hall.
 
 use glam::Vec3;
 
@@ -29,13 +29,16 @@ const HALF_DISTANCE_M: f32 = 2.0;
 const HALF_WIDTH_M: f32 = 3.0;
 const HEIGHT_M: f32 = 3.0;
 
+const HALL_HALF_SIDE_M: u32 = 4;
+const HALL_HEIGHT_M: u32 = 4;
+
 /// [Newell's teapot](teapot) on a floor of 24 m with checks of 1 m, before a mirror of 39,600 triangles that is convex
 /// with dents.
 #[must_use]
 pub fn teapot_mirror() -> Scene {
     let mut builder = MeshBuilder::default();
     checks(&mut builder, 12);
-    teapot(&mut builder, TEAPOT_FOOT);
+    teapot(&mut builder, TEAPOT_FOOT, 1.0);
     builder.finish_part(0);
     pebble(&mut builder);
     builder.finish_part(1);
@@ -64,6 +67,26 @@ pub fn mirror_pair() -> Scene {
     builder.into_scene_of("mirror-pair", vec![matt("matt"), mirror(0.8)]).with_default_background()
 }
 
+/// Two mirror balls of radius 1.5 m and a teapot of half its size in a hall of 8 × 4 × 8 m with checks of 1 m, open to the sky.
+#[must_use]
+pub fn mirror_hall() -> Scene {
+    let mut builder = MeshBuilder::default();
+    checks(&mut builder, HALL_HALF_SIDE_M);
+    let half_side_m = HALL_HALF_SIDE_M as f32;
+    for inwards in [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z] {
+        let right = Vec3::Y.cross(inwards);
+        let corner = -half_side_m * (inwards + right);
+        checked(&mut builder, corner, [right, Vec3::Y], [2 * HALL_HALF_SIDE_M, HALL_HEIGHT_M]);
+    }
+    teapot(&mut builder, Vec3::new(0.0, 0.0, 0.8), 0.5);
+    builder.finish_part(0);
+    for side in [-1.0, 1.0] {
+        ball(&mut builder, Vec3::new(2.0 * side, 1.5, -1.8), 1.5, Vec3::splat(255.0));
+    }
+    builder.finish_part(1);
+    builder.into_scene_of("mirror-hall", vec![matt("matt"), mirror(0.8)]).with_default_background()
+}
+
 /// A metal without roughness.
 fn mirror(reflectance: f32) -> Material {
     let base_color_linear = [reflectance, reflectance, reflectance, 1.0];
@@ -71,12 +94,18 @@ fn mirror(reflectance: f32) -> Material {
 }
 
 /// A floor of 1 m checks at the origin.
-fn checks(builder: &mut MeshBuilder, half_side_m: i32) {
-    for x in -half_side_m..half_side_m {
-        for z in -half_side_m..half_side_m {
-            let middle = Vec3::new(x as f32 + 0.5, 0.0, z as f32 + 0.5);
-            let color_srgb = if (x + z).rem_euclid(2) == 0 { LIGHT_CHECK } else { DARK_CHECK };
-            builder.rectangle(middle, Vec3::X * 0.5, Vec3::NEG_Z * 0.5, color_srgb);
+fn checks(builder: &mut MeshBuilder, half_side_m: u32) {
+    let corner = Vec3::new(-1.0, 0.0, -1.0) * half_side_m as f32;
+    checked(builder, corner, [Vec3::Z, Vec3::X], [2 * half_side_m; 2]);
+}
+
+/// Checks of 1 m from a corner on, to the right and up.
+fn checked(builder: &mut MeshBuilder, corner: Vec3, [right, up]: [Vec3; 2], [columns, rows]: [u32; 2]) {
+    for row in 0..rows {
+        for column in 0..columns {
+            let middle = corner + right * (column as f32 + 0.5) + up * (row as f32 + 0.5);
+            let color_srgb = if (row + column).is_multiple_of(2) { LIGHT_CHECK } else { DARK_CHECK };
+            builder.rectangle(middle, right * 0.5, up * 0.5, color_srgb);
         }
     }
 }
@@ -115,6 +144,18 @@ mod tests {
             |scene: &Scene| -> Vec<u32> { scene.meshes[0].parts.iter().map(|part| part.index_count / 3).collect() };
         assert_eq!(triangles(&teapot_mirror()), [2 * 24 * 24 + 16_384, 39_600]);
         assert_eq!(triangles(&mirror_pair()), [2 * 8 * 8 + 2 * 64 * 31 + 12 + 4, 4]);
+        assert_eq!(triangles(&mirror_hall()), [2 * 8 * (8 + 4 * 4) + 16_384, 2 * 2 * 64 * 31]);
+    }
+
+    /// Every wall's front is towards the middle of the hall.
+    #[test]
+    fn the_hall_is_seen_from_within() {
+        let mesh = &mirror_hall().meshes[0];
+        let walls = mesh.indices.as_chunks::<3>().0.iter().take(2 * 8 * (8 + 4 * 4));
+        for corners in walls {
+            let [a, b, c] = corners.map(|corner| Vec3::from(mesh.vertices[corner as usize].position));
+            assert!((b - a).cross(c - a).dot(Vec3::Y * 2.0 - a) > 0.0, "{a}");
+        }
     }
 
     #[test]

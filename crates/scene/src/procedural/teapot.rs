@@ -63,11 +63,12 @@ const TUBES: [[Section; 4]; 4] = [
     ],
 ];
 
-/// The teapot with its bottom's middle at `foot` and its spout towards +x, in a pattern of cubes: 16,384 triangles.
-pub(super) fn teapot(builder: &mut MeshBuilder, foot: Vec3) {
+/// The teapot with its bottom's middle at `foot` and its spout towards +x, in a pattern of cubes: 16,384 triangles. It is `scale`
+/// times as large as Newell's.
+pub(super) fn teapot(builder: &mut MeshBuilder, foot: Vec3, scale: f32) {
     for patch in patches() {
         for square in 0..SQUARES * SQUARES {
-            add_square(builder, &patch, [square / SQUARES, square % SQUARES], foot);
+            add_square(builder, &patch, [square / SQUARES, square % SQUARES], (foot, scale));
         }
     }
 }
@@ -103,11 +104,11 @@ fn mirrored(patch: Patch) -> Patch {
 }
 
 /// Two triangles of one colour.
-fn add_square(builder: &mut MeshBuilder, patch: &Patch, [row, column]: [u32; 2], foot: Vec3) {
+fn add_square(builder: &mut MeshBuilder, patch: &Patch, [row, column]: [u32; 2], (foot, scale): (Vec3, f32)) {
     let at = |r: u32, c: u32| Vec2::new((row + r) as f32, (column + c) as f32) / SQUARES as f32;
     let color_srgb = pattern(point(patch, (at(0, 0) + at(1, 1)) * 0.5));
     let corners = [at(0, 0), at(0, 1), at(1, 1), at(1, 0)]
-        .map(|place| builder.push(vertex(point(patch, place) + foot, normal(patch, place), color_srgb)));
+        .map(|place| builder.push(vertex(point(patch, place) * scale + foot, normal(patch, place), color_srgb)));
     builder.quad(corners);
 }
 
@@ -149,7 +150,7 @@ mod tests {
 
     fn triangles() -> Vec<([Vec3; 3], Vec3)> {
         let mut builder = MeshBuilder::default();
-        teapot(&mut builder, Vec3::ZERO);
+        teapot(&mut builder, Vec3::ZERO, 1.0);
         let mesh = builder.into_scene("teapot", Material::default()).meshes.remove(0);
         let of = |corners: &[u32]| {
             let at = |i: usize| mesh.vertices[corners[i] as usize];

@@ -2,7 +2,7 @@
 
 use depth_image::{PinholeCamera, ProvenanceKind};
 use glam::{UVec2, Vec3};
-use reconstruction::{CurvedSearch, RayWork};
+use reconstruction::RayWork;
 use render::scalar;
 use scene::procedural::uv_sphere;
 use scene::{Material, Scene};
@@ -55,10 +55,9 @@ pub fn measure(stand: &Stand) -> anyhow::Result<[Check; 2]> {
     let twin = scalar::rays::Scene::of(&on_device, 0.0)?;
     let (mirrors, _) = sampling::mirrors(&scene, sampling::Impostors::default());
     let mirror = mirrors.first().ok_or_else(|| anyhow::anyhow!("the bowl is no mirror"))?;
-    let set = unlit_set(stand, &on_device, &in_a_cluster(mirror), scene.bounds())?;
+    let set = unlit_set(stand, &on_device, &in_a_cluster(mirror), (scene.bounds(), true))?;
     let rays = mirrored(&twin, &views(), VIEW_PX);
-    let work =
-        RayWork { surroundings: &set, near_m: NEAR_M, curved_search: CurvedSearch::default(), count_steps: false };
+    let work = RayWork::new(&set, NEAR_M);
     let (ends, _) = stand.reconstructor().follow(work, &rays)?;
     let (mut second, mut found, mut own) = (0usize, 0usize, 0usize);
     for (ray, end) in rays.iter().zip(&ends) {

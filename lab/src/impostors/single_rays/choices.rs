@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use glam::{Affine3A, Quat, UVec2, Vec3};
-use reconstruction::{CurvedSearch, RayWork};
+use reconstruction::RayWork;
 use render::scalar;
 use sampling::{Impostors, Mirror};
 use scene::procedural::{quad, teapot_mirror, uv_sphere};
@@ -103,9 +103,8 @@ fn priced(stand: &Stand, scene: &Scene) -> anyhow::Result<(Mirror, f64, f64)> {
     let twin = scalar::rays::Scene::of(&on_device, 0.0)?;
     let rays = mirrored(&twin, &around(&scene.bounds(), VIEWS), VIEW_PX);
     let ns_a_ray = |mirror: &Mirror| -> anyhow::Result<f64> {
-        let set = unlit_set(stand, &on_device, &in_a_cluster(mirror), scene.bounds())?;
-        let work =
-            RayWork { surroundings: &set, near_m: NEAR_M, curved_search: CurvedSearch::default(), count_steps: false };
+        let set = unlit_set(stand, &on_device, &in_a_cluster(mirror), (scene.bounds(), true))?;
+        let work = RayWork::new(&set, NEAR_M);
         let seconds = || Ok(stand.reconstructor().follow(work, &rays)?.1);
         seconds()?;
         let times = (0..REPEATS).map(|_| seconds()).collect::<anyhow::Result<Vec<f64>>>()?;

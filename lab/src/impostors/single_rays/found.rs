@@ -2,7 +2,7 @@
 
 use depth_image::{Camera, ProvenanceKind, srgb8_from_linear};
 use glam::Vec3;
-use reconstruction::{CurvedSearch, RayEnd, RayWork};
+use reconstruction::{RayEnd, RayWork};
 use study::{Axis, Bar, Cell, Check, Series, Table, XyChart};
 
 use super::teapot::{ASIDE, NEAR_M, Rays, Teapot};
@@ -65,8 +65,7 @@ pub fn compare(teapot: &Teapot<'_>, rays: &Rays) -> anyhow::Result<Vec<Figures>>
 
 fn figures(teapot: &Teapot<'_>, rays: &Rays, name: &'static str, cameras: &[Camera]) -> anyhow::Result<Figures> {
     let set = teapot.set(cameras)?;
-    let work =
-        RayWork { surroundings: &set, near_m: NEAR_M, curved_search: CurvedSearch::default(), count_steps: false };
+    let work = RayWork::new(&set, NEAR_M);
     let (ends, _) = teapot.stand.reconstructor().follow(work, &rays.rays)?;
     let of_teapot = ends.iter().zip(&rays.truth).filter_map(|(end, truth)| truth.map(|truth| (end, truth)));
     let tolerance_m = RIGHT * teapot.bounds.size().max_element();
@@ -91,7 +90,7 @@ fn figures(teapot: &Teapot<'_>, rays: &Rays, name: &'static str, cameras: &[Came
 }
 
 /// Of sRGB from 0 to 1; rays that find nothing are black.
-fn squared_error(end: &RayEnd, truth_linear: Vec3) -> f64 {
+pub fn squared_error(end: &RayEnd, truth_linear: Vec3) -> f64 {
     let found = if end.kind == ProvenanceKind::Hit { end.color_linear } else { Vec3::ZERO };
     let apart = |channel: usize| {
         let [a, b] = [found, truth_linear].map(|color| f64::from(srgb8_from_linear(color[channel])) / 255.0);

@@ -77,7 +77,7 @@ fn set(teapot: &Teapot<'_>, rays: &Rays, side_px: u32) -> anyhow::Result<SampleS
 fn cost(teapot: &Teapot<'_>, set: &SampleSet, rays: &Rays, [coarse_px, fine_px]: [f32; 2]) -> anyhow::Result<Cost> {
     let work = |count_steps| {
         let curved_search = CurvedSearch { coarse_px, fine_px };
-        RayWork { surroundings: set, near_m: NEAR_M, curved_search, count_steps }
+        RayWork { curved_search, count_steps, ..RayWork::new(set, NEAR_M) }
     };
     let follow = |count_steps| teapot.stand.reconstructor().follow(work(count_steps), &rays.rays);
     let steps: u64 = follow(true)?.0.iter().map(|end| u64::from(end.steps)).sum();

@@ -56,7 +56,13 @@ impl<'s> Teapot<'s> {
     }
 
     pub fn set(&self, cameras: &[Camera]) -> anyhow::Result<SampleSet> {
-        unlit_set(self.stand, &self.on_device, cameras, self.bounds)
+        unlit_set(self.stand, &self.on_device, cameras, (self.bounds, true))
+    }
+
+    /// The cosine between a ray and the surface that it meets.
+    pub fn facing(&self, ray: &Ray) -> Option<f32> {
+        let hit = self.twin.closest(ray, NEAR_M).0?;
+        Some(self.twin.normal_in_world(&hit).dot(ray.direction_in_world.normalize_or_zero()).abs())
     }
 
     fn truth(&self, rays: &[Ray]) -> Vec<Option<(f32, Vec3)>> {
@@ -65,11 +71,16 @@ impl<'s> Teapot<'s> {
     }
 }
 
-/// Images of a scene in its own colours.
+/// Images of a scene in its own colours, as those of mirror cells or of view cells.
 ///
 /// # Errors
 /// The device fails.
-pub fn unlit_set(stand: &Stand, scene: &GpuScene, cameras: &[Camera], volume: Aabb) -> anyhow::Result<SampleSet> {
+pub fn unlit_set(
+    stand: &Stand,
+    scene: &GpuScene,
+    cameras: &[Camera],
+    (volume, of_mirror): (Aabb, bool),
+) -> anyhow::Result<SampleSet> {
     let images = stand.images(scene, Lighting::UNLIT, cameras, SamplePlanes::default())?;
     let dark = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
     let description = SetDescription {
@@ -78,7 +89,7 @@ pub fn unlit_set(stand: &Stand, scene: &GpuScene, cameras: &[Camera], volume: Aa
         illumination: &dark,
         highlight: None,
         environment: None,
-        mips: false,
+        of_mirror,
     };
     Ok(stand.reconstructor().upload(&images, &description)?)
 }
