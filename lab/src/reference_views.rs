@@ -50,7 +50,7 @@ impl ReferenceViews {
             illumination: &setup.offer.illumination,
             highlight: args.lighting.highlight(),
             environment: environment.as_ref(),
-            of_mirror: false,
+            mips: false,
         };
         let set = engine.reconstructor.upload(&images, &description)?;
         let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ViewPlanes::ALL), TURN)?;

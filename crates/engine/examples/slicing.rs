@@ -37,14 +37,8 @@ fn main() -> Outcome<()> {
     let samples = [-0.2, -0.05, 0.05, 0.2].map(|x| Camera::Pinhole(camera(x, UVec2::new(640, 480))));
     let images = renderer.draw_depth_images(draw("phong")?, &samples, planes)?;
     let (background, illumination) = (scene.background, &scene.illumination);
-    let set = SetDescription {
-        volume: bounds,
-        background,
-        illumination,
-        highlight: None,
-        environment: None,
-        of_mirror: false,
-    };
+    let set =
+        SetDescription { volume: bounds, background, illumination, highlight: None, environment: None, mips: false };
     let set = reconstructor.upload(&images, &set)?;
     let view = [camera(0.0, VIEW_PX)];
     let asked: Vec<String> = std::env::args().skip(1).collect();

@@ -242,7 +242,7 @@ impl Engine for GpuEngine {
             illumination: &set.illumination,
             highlight: lighting.highlight(),
             environment: environment.as_ref(),
-            of_mirror: set.is_mirror,
+            mips: set.is_mirror,
         };
         let upload = || self.reconstructor.upload_in_turn(&set.images, &description, device_turn(turn));
         let set = self.catching(|| upload().map_err(reconstruction_error))?;

@@ -30,7 +30,7 @@ mod surface;
 mod tile_start;
 mod view_work;
 
-pub use bounce::{CurvedSearch, MirrorCell, Mirrors, plane_of};
+pub use bounce::{CurvedSearch, MirrorCell, Mirrors};
 pub use error::ReconstructionError;
 pub use in_flight::Statistics;
 pub use methods::{METHODS, ReconstructionMethod, UnknownMethod};

@@ -10,7 +10,6 @@ use rayon::prelude::*;
 use wgpu::TextureFormat;
 
 use crate::bounce::mips::{mip_texels, mips};
-use crate::bounce::plane_of;
 use crate::pyramid::{CodedDepth, Pyramid, is_among_holes};
 use crate::single_pole::{GpuPole, poles};
 use crate::view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant};
@@ -33,9 +32,8 @@ pub struct SetDescription<'a> {
     pub highlight: Option<Highlight>,
     /// A map in the place of the background and of the lights' environment. The twin does not know it.
     pub environment: Option<&'a Arc<GpuEnvironment>>,
-    /// The images show what a mirror shows: colours have coarser levels, for mirrored rays that cover several texels, and rays meet
-    /// flat images in closed form.
-    pub of_mirror: bool,
+    /// Colours have coarser levels, for mirrored rays that cover several texels.
+    pub mips: bool,
 }
 
 /// One complete sample set: what views are reconstructed from.
@@ -46,8 +44,6 @@ pub struct SampleSet {
     pub(crate) volume: GpuVolume,
     /// Of images of single-pole cameras: one for each; else none.
     pub(crate) poles: Vec<GpuPole>,
-    /// Of images of what a mirror shows, the planes of flat ones.
-    pub(crate) planes: Vec<Option<Vec3>>,
     /// As `background.wgsl` reads it.
     pub(crate) background: wgpu::Buffer,
     /// Two words for each node of the pyramids.
@@ -101,16 +97,15 @@ impl SampleSet {
         check(tables, images, set)?;
         let poles = poles(images)?;
         let among_holes = is_among_holes(images);
-        let coded = |image| CodedImage::of(image, among_holes, set.of_mirror);
+        let coded = |image| CodedImage::of(image, among_holes, set.mips);
         // One thread leaves the other cores to live streams.
         let is_shared = tables.gpu.device_queue.cuts();
         let coded: Vec<CodedImage> =
             if is_shared { images.iter().map(coded).collect() } else { images.par_iter().map(coded).collect() };
         let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(Vec::with_capacity);
-        let mut colors: Vec<[u32; 2]> = Vec::with_capacity(color_count(images, set.of_mirror));
+        let mut colors: Vec<[u32; 2]> = Vec::with_capacity(color_count(images, set.mips));
         let (mut cameras, mut levels) = (Vec::with_capacity(images.len()), Vec::with_capacity(images.len()));
         let uncertain = coded.iter().map(|coded| coded.uncertain).collect();
-        let planes = coded.iter().map(|coded| coded.plane).collect();
         for (image, coded) in images.iter().zip(coded) {
             cameras.push(GpuSampleCamera {
                 mask: 1 << cameras.len(),
@@ -123,7 +118,7 @@ impl SampleSet {
             levels.push(coded.mips);
             colors.extend(with_below(&image.color_rgb9e5, image.size_px().x as usize));
         }
-        for (camera, levels) in cameras.iter_mut().zip(levels).filter(|_| set.of_mirror) {
+        for (camera, levels) in cameras.iter_mut().zip(levels).filter(|_| set.mips) {
             camera.first_mip = colors.len() as u32;
             levels.iter().for_each(|(size_px, level)| colors.extend(with_below(level, size_px.x as usize)));
         }
@@ -131,7 +126,6 @@ impl SampleSet {
             cameras,
             uncertain,
             poles,
-            planes,
             volume: gpu_volume(&searched_volume(&set.volume, images)),
             background: background_buffer(tables, &set.background),
             nodes: tables.upload("depth pyramids", TextureFormat::Rg32Uint, &nodes, turn)?,
@@ -153,11 +147,10 @@ struct CodedImage {
     cells: Vec<[u32; 2]>,
     /// The coarser levels of its colours.
     mips: Vec<(UVec2, Vec<u32>)>,
-    plane: Option<Vec3>,
 }
 
 impl CodedImage {
-    fn of(image: &DepthImage, among_holes: bool, of_mirror: bool) -> Self {
+    fn of(image: &DepthImage, among_holes: bool, with_mips: bool) -> Self {
         let depth = CodedDepth::in_set(image, among_holes);
         let pyramid = Pyramid::of(&depth);
         let camera = image.camera.reference();
@@ -178,8 +171,7 @@ impl CodedImage {
             camera: gpu_camera,
             nodes: pyramid.words.iter().zip(pyramid.wide_words()).map(|(&range, wide)| [range, wide]).collect(),
             cells: depth.cell_words(),
-            mips: if of_mirror { mips(image) } else { Vec::new() },
-            plane: if of_mirror { plane_of(image) } else { None },
+            mips: if with_mips { mips(image) } else { Vec::new() },
         }
     }
 }
@@ -202,7 +194,7 @@ fn check(tables: &TablePool, images: &[DepthImage], set: &SetDescription<'_>) ->
     }
     tables.gpu.check_table("depth pyramids", node_count(images))?;
     tables.gpu.check_table("cells", cell_count(images))?;
-    tables.gpu.check_table("sample colours", color_count(images, set.of_mirror))?;
+    tables.gpu.check_table("sample colours", color_count(images, set.mips))?;
     Ok(())
 }
 

@@ -20,9 +20,9 @@ use crate::view_work::{CELL_MARGIN_PX, FAR_AWAY, TILE_PX};
 use crate::{methods, pixel_list::LIST_WORKGROUP, quads, specular::Specular};
 
 /// Passes over whole views, and templates that several shaders include.
-const SHADERS: [(&str, &str); 20] = wgsl_files! {
+const SHADERS: [(&str, &str); 19] = wgsl_files! {
     "antialias.wgsl", "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "pixel_list.wgsl",
-    "gathered.wgsl", "gather_at.wgsl", "nearest_at.wgsl", "colors.wgsl", "bounce/ray.wgsl", "bounce/spawn.wgsl", "bounce/march.wgsl", "bounce/march_flat.wgsl", "bounce/curved_search.wgsl", "single_pole.wgsl", "bounce/mips.wgsl", "bounce/land.wgsl"
+    "gathered.wgsl", "gather_at.wgsl", "nearest_at.wgsl", "colors.wgsl", "bounce/ray.wgsl", "bounce/spawn.wgsl", "bounce/march.wgsl", "bounce/curved_search.wgsl", "single_pole.wgsl", "bounce/mips.wgsl", "bounce/land.wgsl"
 };
 
 const PROVENANCE_EMPTY: u32 = ProvenanceKind::Empty as u32;

@@ -123,7 +123,7 @@ fn upload(subject: &Subject, engine: &GpuEngine, images: &[DepthImage]) -> anyho
         illumination: &offer.illumination,
         highlight: None,
         environment: None,
-        of_mirror: false,
+        mips: false,
     };
     Ok(engine.reconstructor.upload(images, &description)?)
 }

@@ -69,7 +69,7 @@ impl<'s> Stage<'s> {
 
     pub fn description(&self) -> SetDescription<'static> {
         let (volume, background) = (self.volume, self.background);
-        SetDescription { volume, background, illumination: &DARK, highlight: None, environment: None, of_mirror: false }
+        SetDescription { volume, background, illumination: &DARK, highlight: None, environment: None, mips: false }
     }
 
     pub fn set(&self) -> anyhow::Result<SampleSet> {

@@ -133,14 +133,14 @@ impl<'s> Hall<'s> {
         self.stand.images(&self.on_device, plain(self.lighting), cameras, PLANES)
     }
 
-    pub fn set(&self, images: &[DepthImage], of_mirror: bool) -> anyhow::Result<SampleSet> {
+    pub fn set(&self, images: &[DepthImage], mips: bool) -> anyhow::Result<SampleSet> {
         let description = SetDescription {
             volume: self.scene.bounds(),
             background: self.scene.background,
             illumination: &self.scene.illumination,
             highlight: Some(Highlight::Ggx),
             environment: None,
-            of_mirror,
+            mips,
         };
         Ok(self.stand.reconstructor().upload(images, &description)?)
     }

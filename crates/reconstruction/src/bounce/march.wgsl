@@ -19,9 +19,6 @@ fn sees(camera: SampleCamera, p: vec3f) -> bool {
     let uv = p.xy / p.z - 0.5;
     return p.z > 0.0 && all(uv >= vec2f(0.0)) && all(uv < camera.cells);
 }
-{%- if flat %}
-{% include "bounce/march_flat.wgsl" %}
-{%- endif %}
 
 @compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -35,11 +32,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let b{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f(ray.direction, 0.0));
 {% endfor %}
     var found = March(span.near, false);
-{%- if flat %}
-{% for k in range(cameras) %}
-    found = march_flat(a{{ k }}, b{{ k }}, found, span.far, camera{{ k }}, planes.of_cameras[{{ k }}]);
-{% endfor %}
-{%- endif %}
     for (var round = 0u; round < MARCH_ROUNDS; round++) {
 {% for k in range(cameras) %}
         // Few of the images see a point. A loop that no ray enters costs nothing, unlike a branch.

@@ -2,7 +2,6 @@
 //! mirror after mirror, and what they find is added to the pixels.
 
 mod curved_search;
-pub(crate) mod flat;
 pub(crate) mod mips;
 
 use bytemuck::{Pod, Zeroable};
@@ -16,9 +15,7 @@ use wgpu::{Buffer, BufferUsages};
 
 pub use curved_search::CurvedSearch;
 pub(crate) use curved_search::{CurvedWalk, LONGEST_STEP, MAX_WALK_STEPS};
-pub use flat::plane_of;
 
-use self::flat::GpuPlane;
 use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList};
 use crate::recording::nearest_first;
@@ -110,8 +107,6 @@ pub(crate) struct Bounces<'s> {
     works: Vec<Buffer>,
     /// The `Poles` of each cell with images of single-pole cameras.
     poles: Vec<Option<Buffer>>,
-    /// The `Planes` of each cell with flat images.
-    planes: Vec<Option<Buffer>>,
     rays: [PooledBuffer; 2],
     /// Of the rays of this mirror and of the next, of those that the march leaves, and of those that stay unknown.
     listed: [PooledBuffer; 4],
@@ -175,7 +170,6 @@ impl<'s> Bounces<'s> {
             boxes: device.gpu.buffer_with("mirror boxes", &boxes, BufferUsages::UNIFORM),
             works: cells.iter().enumerate().map(work).collect(),
             poles: cells.iter().map(|cell| poles(device, cell, curved_search)).collect(),
-            planes: cells.iter().map(|cell| planes(device, cell)).collect(),
             rays: [rays()?, rays()?],
             listed: [listed()?, listed()?, listed()?, listed()?],
             color: plane("mirrored colour")?,
@@ -273,8 +267,6 @@ impl<'s> Bounces<'s> {
 #[derive(Debug)]
 pub(crate) struct BounceMarch {
     set: SetVariant,
-    /// Of some images the planes are known.
-    flat: bool,
 }
 
 impl ShaderVariant for BounceMarch {
@@ -282,12 +274,12 @@ impl ShaderVariant for BounceMarch {
     const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
-        context! { bounced => true, flat => self.flat, ..self.set.context() }
+        context! { bounced => true, ..self.set.context() }
     }
 
     fn all() -> Vec<Self> {
         let sets = SetVariant::all().into_iter().filter(|set| !set.count_fetches);
-        sets.flat_map(|set| [false, true].map(|flat| Self { set, flat })).collect()
+        sets.map(|set| Self { set }).collect()
     }
 }
 
@@ -383,11 +375,9 @@ pub(crate) fn follow(
     let set = bounces.cells[cell].surroundings.variant();
     let [left, unknown] = [2, 3]
         .map(|memory| PixelList::empty(&recording.device.gpu, (*bounces.listed[memory]).clone(), bounces.cells.len()));
-    let planes = bounces.planes[cell].as_ref();
-    let march = BounceMarch { set, flat: planes.is_some() };
+    let march = BounceMarch { set };
     let pass = recording.device.passes.get(&march)?;
     let mut bindings = bounces.search_bindings(cell, &left);
-    bindings.extend(planes.map(|planes| Binding::buffer("planes", planes)));
     bindings.extend(bounces.list_bindings(lists));
     let bound = pass.bind(0, bindings)?;
     recording.dispatch_listed(&march, &pass, &bound, (&lists.lists, cell), (cell, reflection));
@@ -466,22 +456,12 @@ pub(crate) fn land(
     Ok(())
 }
 
-/// What belongs to the cell's cameras, in their order.
-fn sorted<T: Copy>(cell: &MirrorCell<'_>, of_images: &[T]) -> Vec<T> {
-    let cameras = nearest_first(cell.surroundings, cell.bounds.center()).into_iter();
-    cameras.filter_map(|camera| of_images.get(camera.mask.trailing_zeros() as usize)).copied().collect()
-}
-
-/// `Planes` of `march_flat.wgsl`; `None` where no image is flat.
-fn planes(device: &Device, cell: &MirrorCell<'_>) -> Option<Buffer> {
-    let sorted = sorted(cell, &cell.surroundings.planes);
-    let planes: Vec<GpuPlane> = sorted.iter().copied().map(GpuPlane::of).collect();
-    sorted.iter().any(Option::is_some).then(|| device.gpu.buffer_with("planes", &planes, BufferUsages::UNIFORM))
-}
-
-/// `Poles` of `single_pole.wgsl`; `None` of pinholes.
+/// `Poles` of `single_pole.wgsl`, in the order of the cell's cameras; `None` of pinholes.
 fn poles(device: &Device, cell: &MirrorCell<'_>, search: CurvedSearch) -> Option<Buffer> {
-    let sorted: Vec<GpuPole> = sorted(cell, &cell.surroundings.poles);
+    let of = &cell.surroundings.poles;
+    let sorted = nearest_first(cell.surroundings, cell.bounds.center()).into_iter();
+    let sorted: Vec<GpuPole> =
+        sorted.filter_map(|camera| of.get(camera.mask.trailing_zeros() as usize)).copied().collect();
     let steps = [search.coarse_px, search.fine_px, 0.0, 0.0];
     let bytes = [bytemuck::cast_slice(&steps), bytemuck::cast_slice(&sorted)].concat();
     (!sorted.is_empty()).then(|| device.gpu.buffer_with::<u8>("poles", &bytes, BufferUsages::UNIFORM))

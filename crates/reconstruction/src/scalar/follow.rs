@@ -10,17 +10,13 @@ use super::sample_camera::SampleCamera;
 use super::surface::blend_two_best;
 use super::view_ray::{ViewRay, span_in};
 use crate::RayEnd;
-use crate::bounce::{LEAST_WAY, MARCH_ROUNDS, plane_of};
-use crate::methods::joint_carve::FIRST_SAMPLE;
+use crate::bounce::{LEAST_WAY, MARCH_ROUNDS};
 use crate::sample_set::searched_volume;
-use crate::view_work::CELL_MARGIN_PX;
 
 /// Images of pinholes around a mirror.
 pub struct PinholeImages {
     /// The nearest to the first image's eye comes first.
     cameras: Vec<SampleCamera>,
-    /// Of these, the planes of flat images.
-    planes: Vec<Option<Vec3>>,
     volume: Aabb,
 }
 
@@ -29,13 +25,12 @@ impl PinholeImages {
     #[must_use]
     pub fn of(images: &[DepthImage], volume: &Aabb) -> Self {
         let pinholes = (0..).zip(images).filter(|(_, image)| matches!(image.camera, Camera::Pinhole(_)));
-        let mut cameras: Vec<_> =
-            pinholes.map(|(bit, image)| (SampleCamera::of(image, 1 << bit, false), plane_of(image))).collect();
-        let middle = cameras.first().map_or(Vec3::ZERO, |(camera, _)| camera.eye_in_world);
-        let distance = |camera: &SampleCamera| camera.eye_in_world.distance_squared(middle);
-        cameras.sort_by(|(a, _), (b, _)| distance(a).total_cmp(&distance(b)));
-        let (cameras, planes) = cameras.into_iter().unzip();
-        Self { cameras, planes, volume: searched_volume(volume, images) }
+        let mut cameras: Vec<_> = pinholes.map(|(bit, image)| SampleCamera::of(image, 1 << bit, false)).collect();
+        let middle = cameras.first().map_or(Vec3::ZERO, |camera| camera.eye_in_world);
+        cameras.sort_by(|a, b| {
+            a.eye_in_world.distance_squared(middle).total_cmp(&b.eye_in_world.distance_squared(middle))
+        });
+        Self { cameras, volume: searched_volume(volume, images) }
     }
 
     /// The end of a ray with a direction of unit length, from `near_m` on.
@@ -65,28 +60,15 @@ impl PinholeImages {
     fn marched(&self, ray: &ViewRay) -> March {
         let mut found = March { t: ray.near, crossed: false };
         for _ in 0..MARCH_ROUNDS {
-            for (camera, plane) in self.cameras.iter().zip(&self.planes) {
+            for camera in &self.cameras {
                 let [a, b] = ray.in_image_of(camera);
                 if !found.crossed && found.t < ray.far && sees(camera, a + b * found.t) {
-                    let onto = plane.and_then(|plane| march_flat(camera, plane, [a, b], [found.t, ray.far]));
-                    found = onto.unwrap_or_else(|| march(camera, ray, found.t));
+                    found = march(camera, ray, found.t);
                 }
             }
         }
         found
     }
-}
-
-/// Twin of `bounce/march_flat.wgsl`.
-fn march_flat(camera: &SampleCamera, plane: Vec3, [a, b]: [Vec3; 2], [near, far]: [f32; 2]) -> Option<March> {
-    let before = 1.0 - plane.dot(a + b * near);
-    let t = near + before / plane.dot(b);
-    let p = a + b * t;
-    if before <= 0.0 || !t.is_finite() || t <= near || t >= far || !sees(camera, p) {
-        return None;
-    }
-    let corners = camera.corners((p.xy() / p.z - 0.5).clamp(Vec2::ZERO, camera.cells - CELL_MARGIN_PX).as_uvec2());
-    (corners.connected && corners.codes[0] >= FIRST_SAMPLE).then_some(March { t, crossed: true })
 }
 
 fn sees(camera: &SampleCamera, p: Vec3) -> bool {

@@ -102,7 +102,7 @@ fn light_beyond_white_counts_in_the_mean() {
         illumination: &dark,
         highlight: None,
         environment: None,
-        of_mirror: false,
+        mips: false,
     };
     let set = reconstructor().upload(&stage.images, &description).expect("a set");
     let planes = ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::COLOR };

@@ -57,7 +57,7 @@ fn wide_rays_have_the_colours_of_their_twin() {
                 illumination: &Illumination { lights: Vec::new(), environment: dark },
                 highlight: Some(Highlight::Ggx),
                 environment: None,
-                of_mirror: true,
+                mips: true,
             },
         )
         .expect("a set");

@@ -33,8 +33,7 @@ impl Hall {
     fn with_mips(scene: Scene, samples: &[PinholeCamera], cells: &[(Aabb, Vec<PinholeCamera>)], mips: bool) -> Self {
         let on_device = GpuScene::upload(gpu(), &scene).expect("a scene");
         let set = |cameras: &[PinholeCamera]| {
-            let (images, described) =
-                (images(&on_device, cameras), SetDescription { of_mirror: mips, ..description(&scene) });
+            let (images, described) = (images(&on_device, cameras), SetDescription { mips, ..description(&scene) });
             reconstructor().upload(&images, &described).expect("a sample set")
         };
         let samples = set(samples);

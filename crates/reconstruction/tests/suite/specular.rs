@@ -112,7 +112,7 @@ impl Room {
             illumination: &self.illumination,
             highlight,
             environment: None,
-            of_mirror: false,
+            mips: false,
         }
     }
 

@@ -53,7 +53,7 @@ static DARK: Illumination = Illumination { lights: Vec::new(), environment: Envi
 
 /// A set in which nothing depends on the viewer.
 pub fn matt(volume: Aabb, background: Environment) -> SetDescription<'static> {
-    SetDescription { volume, background, illumination: &DARK, highlight: None, environment: None, of_mirror: false }
+    SetDescription { volume, background, illumination: &DARK, highlight: None, environment: None, mips: false }
 }
 
 /// A scene and depth images of it.
@@ -256,6 +256,6 @@ pub fn description(scene: &Scene) -> SetDescription<'_> {
         illumination: &scene.illumination,
         highlight: Some(Highlight::Ggx),
         environment: None,
-        of_mirror: true,
+        mips: true,
     }
 }

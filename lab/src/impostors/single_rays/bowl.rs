@@ -55,7 +55,7 @@ pub fn measure(stand: &Stand) -> anyhow::Result<[Check; 2]> {
     let twin = scalar::rays::Scene::of(&on_device, 0.0)?;
     let (mirrors, _) = sampling::mirrors(&scene, sampling::Impostors::default());
     let mirror = mirrors.first().ok_or_else(|| anyhow::anyhow!("the bowl is no mirror"))?;
-    let set = unlit_set(stand, &on_device, &in_a_cluster(mirror), (scene.bounds(), true))?;
+    let set = unlit_set(stand, &on_device, &in_a_cluster(mirror), scene.bounds())?;
     let rays = mirrored(&twin, &views(), VIEW_PX);
     let work = RayWork::new(&set, NEAR_M);
     let (ends, _) = stand.reconstructor().follow(work, &rays)?;

@@ -103,7 +103,7 @@ fn priced(stand: &Stand, scene: &Scene) -> anyhow::Result<(Mirror, f64, f64)> {
     let twin = scalar::rays::Scene::of(&on_device, 0.0)?;
     let rays = mirrored(&twin, &around(&scene.bounds(), VIEWS), VIEW_PX);
     let ns_a_ray = |mirror: &Mirror| -> anyhow::Result<f64> {
-        let set = unlit_set(stand, &on_device, &in_a_cluster(mirror), (scene.bounds(), true))?;
+        let set = unlit_set(stand, &on_device, &in_a_cluster(mirror), scene.bounds())?;
         let work = RayWork::new(&set, NEAR_M);
         let seconds = || Ok(stand.reconstructor().follow(work, &rays)?.1);
         seconds()?;

@@ -1,7 +1,6 @@
 //! Single rays in images of the teapot: what pinholes and single-pole cameras show of it, and what the walk along curved rays
 //! costs (Rosen et al., sections 4 and 7.2).
 
-mod billboards;
 mod bow;
 mod bowl;
 mod choices;
@@ -48,9 +47,6 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
     report.checks.extend(found::checks_of_mirror(&mirror)?);
     steps::measure(&teapot, is_quick, report)?;
     report.checks.extend(bowl::measure(stand)?);
-    let (in_flat, saved) = billboards::measure(stand)?;
-    report.tables.push(in_flat);
-    report.checks.push(saved);
     let (choices, checks) = choices::measure(stand)?;
     report.tables.push(choices);
     report.checks.extend(checks);

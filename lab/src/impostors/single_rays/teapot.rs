@@ -56,7 +56,7 @@ impl<'s> Teapot<'s> {
     }
 
     pub fn set(&self, cameras: &[Camera]) -> anyhow::Result<SampleSet> {
-        unlit_set(self.stand, &self.on_device, cameras, (self.bounds, true))
+        unlit_set(self.stand, &self.on_device, cameras, self.bounds)
     }
 
     /// The cosine between a ray and the surface that it meets.
@@ -71,16 +71,11 @@ impl<'s> Teapot<'s> {
     }
 }
 
-/// Images of a scene in its own colours, as those of mirror cells or of view cells.
+/// Images of a scene in its own colours.
 ///
 /// # Errors
 /// The device fails.
-pub fn unlit_set(
-    stand: &Stand,
-    scene: &GpuScene,
-    cameras: &[Camera],
-    (volume, of_mirror): (Aabb, bool),
-) -> anyhow::Result<SampleSet> {
+pub fn unlit_set(stand: &Stand, scene: &GpuScene, cameras: &[Camera], volume: Aabb) -> anyhow::Result<SampleSet> {
     let images = stand.images(scene, Lighting::UNLIT, cameras, SamplePlanes::default())?;
     let dark = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
     let description = SetDescription {
@@ -89,7 +84,7 @@ pub fn unlit_set(
         illumination: &dark,
         highlight: None,
         environment: None,
-        of_mirror,
+        mips: false,
     };
     Ok(stand.reconstructor().upload(&images, &description)?)
 }
