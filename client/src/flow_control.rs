@@ -50,10 +50,10 @@ impl FlowControl {
         self.in_flight += views;
     }
 
-    /// Views that are requested and have not been received.
+    /// Whether no view is in flight.
     #[must_use]
-    pub fn in_flight(&self) -> usize {
-        self.in_flight
+    pub fn is_empty(&self) -> bool {
+        self.in_flight == 0
     }
 
     /// Counts a view as received. A view that waited for its sample set does not show the compositor's speed.

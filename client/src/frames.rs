@@ -141,6 +141,12 @@ impl FrameSink {
         let _ = self.received.try_send(Ok((Frame { request, view, header }, room)));
     }
 
+    /// The frames that are missing, as an error; `None` where all have been received.
+    pub(crate) fn missing(&self) -> Option<ClientError> {
+        let mut window = self.window.lock();
+        if window.is_complete() { None } else { window.finish().err() }
+    }
+
     /// Whether there is no room for another frame: the caller takes none.
     pub(crate) fn is_full(&self) -> bool {
         self.room.available_permits() < self.frame_units.load(Ordering::Relaxed) as usize

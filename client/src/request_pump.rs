@@ -59,7 +59,7 @@ impl RequestPump {
             let Some(views) = batch.views.lock().take_local(compositor, most) else { break };
             pump.request(views);
         }
-        (pump.in_flight() > 0).then(|| (pump, ReceiverStream::new(sent)))
+        (!pump.flow.is_empty()).then(|| (pump, ReceiverStream::new(sent)))
     }
 
     pub(crate) fn plan_epoch(&self) -> u64 {
@@ -76,11 +76,6 @@ impl RequestPump {
             };
             self.request(views);
         }
-    }
-
-    /// Views that were requested and have not been received.
-    pub(crate) fn in_flight(&self) -> usize {
-        self.flow.in_flight()
     }
 
     fn request(&mut self, requests: Vec<ViewRequest>) {
@@ -158,7 +153,7 @@ mod tests {
         assert_eq!(asked[..2], [(0, 32, 16), (0, 48, 2)]);
         let views: usize = asked.iter().map(|(_, _, views)| views).sum();
         assert_eq!(views, 18 + 18, "its own, and all that the slow one has not been asked for");
-        assert!(fast.0.messages.is_none() && fast.0.in_flight() == 0, "its stream ends");
+        assert!(fast.0.messages.is_none() && fast.0.flow.is_empty(), "its stream ends");
         assert_eq!(receive(&mut slow, 32, 100), []);
         assert!(slow.0.messages.is_none());
     }

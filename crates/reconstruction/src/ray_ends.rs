@@ -40,8 +40,8 @@ pub struct RayWork<'s> {
     pub curved_search: CurvedSearch,
     /// Counting slows it down.
     pub count_steps: bool,
-    /// The side of each ray's footprint, at all places. Where it is more than 0, colours are those that a mirror shows: filtered. The
-    /// set has reflectors then, and no lights.
+    /// The side of each ray's footprint, at all places. Where it is more than 0, colours are those that a mirror shows: filtered, and
+    /// with highlights. A set in which nothing reflects gives black.
     pub width_m: f32,
 }
 

@@ -31,7 +31,7 @@ const SPREAD_RAD: f32 = 0.06;
 pub struct Costs {
     /// The four images of views, and those of mirrors.
     pub sample_s: [f64; 2],
-    /// Of both kinds, on the device.
+    /// Until the set of views, and those of mirrors, are on the device.
     pub load_s: [f64; 2],
     /// A view by the light of the views: without reflections, with one, with two.
     pub view_s: [f64; 3],

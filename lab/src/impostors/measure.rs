@@ -19,8 +19,7 @@ use crate::failures::stand::Stand;
 pub const VIEW_PX: UVec2 = UVec2::new(200, 150);
 /// A mirror shows the scene where it differs from the environment by more than this, in codes.
 const SEEN_CODES: u8 = 8;
-/// Views that are also compared with a truth of several rays a pixel, and how many these are.
-const SMOOTH: usize = 3;
+/// Rays a pixel of the smooth truth.
 const RAYS: u32 = 64;
 const PLANES: SamplePlanes =
     SamplePlanes { antialias: Antialias::NONE, normal: false, surface_id: false, specular: true, corners: false };
@@ -70,20 +69,21 @@ pub struct Answer {
 }
 
 impl<'s> Hall<'s> {
-    /// Draws the truth of views. Those in which no mirror shows an object are left out.
+    /// Draws the truth of views, of the first `smooth` also with several rays a pixel. Those in which no mirror shows an object are left
+    /// out.
     ///
     /// # Errors
     /// The device fails, or no view shows a mirror.
     pub fn new(
         stand: &'s Stand,
         scene: &'s Scene,
-        lighting: Lighting,
+        (lighting, smooth): (Lighting, usize),
         views: &[PinholeCamera],
     ) -> anyhow::Result<Self> {
         let (on_device, painted) = (stand.upload(scene)?, stand.upload(&painted(scene))?);
         let mut hall = Self { stand, scene, on_device, painted, lighting, subjects: Vec::new() };
         for camera in views {
-            let is_smooth = hall.subjects.len() < SMOOTH;
+            let is_smooth = hall.subjects.len() < smooth;
             hall.subjects.extend(hall.subject(*camera, is_smooth)?);
         }
         anyhow::ensure!(!hall.subjects.is_empty(), "no view shows an object in a mirror");

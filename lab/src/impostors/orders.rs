@@ -21,7 +21,7 @@ const ORDERS: u32 = 4;
 /// The device fails.
 pub fn measure(stand: &Stand, lighting: Lighting, impostors: Impostors) -> anyhow::Result<(Table, Check)> {
     let scene = SCENE.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?;
-    let hall = Hall::new(stand, &scene, lighting, &views())?;
+    let hall = Hall::new(stand, &scene, (lighting, 0), &views())?;
     let (mirrors, _) = sampling::mirrors(&scene, impostors);
     let bounds: Vec<Aabb> = mirrors.iter().map(|mirror| mirror.bounds).collect();
     let sets = mirrors.iter().map(|mirror| hall.set(&hall.images(&in_a_cluster(mirror))?, true));

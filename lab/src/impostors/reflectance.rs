@@ -1,4 +1,4 @@
-//! The light that each further mirror on a ray's way adds, by the mirrors' reflectance: in views by images, and drawn directly.
+//! How views change with each further mirror on a ray's way, by the mirrors' reflectance: views by images, and directly drawn ones.
 
 use anyhow::Context as _;
 use depth_image::{Aabb, PinholeCamera, View, linear_from_srgb8};
@@ -21,12 +21,12 @@ const LIGHTING: &str = "shadows, reflections 8";
 /// Mirrors on the way.
 const ORDERS: u32 = 8;
 /// Colours of eight bits do not show less.
-const LEAST_LIGHT: f64 = 1e-5;
+const LEAST_CHANGE: f64 = 1e-5;
 /// The fall from one mirror to the next: of views by images over that of directly drawn ones.
 const BAR: Bar = Bar::AtMost(1.3);
 
-/// The light that each mirror adds to a pixel, of all views and pixels the mean: by images, and drawn directly.
-struct Added {
+/// How each mirror changes linear colours, of all views and pixels the mean of absolute values: by images, and drawn directly.
+struct Changes {
     ours: Vec<f64>,
     truth: Vec<f64>,
 }
@@ -36,35 +36,38 @@ struct Added {
 /// # Errors
 /// The device fails.
 pub fn measure(stand: &Stand, impostors: Impostors) -> anyhow::Result<(XyChart, Check)> {
-    let [x, y] = [Axis::linear("mirrors on the way", ""), Axis::log("light that the last one adds (linear)", "")];
-    let mut chart = XyChart::new("Light by the number of mirrors that a ray meets", x, y);
+    let [x, y] = [Axis::linear("mirrors on the way", ""), Axis::log("change by the last one, linear", "")];
+    let mut chart = XyChart::new("Change of colours by the number of mirrors that a ray meets, in hard shadows", x, y);
     let progress = bar("reflectances", REFLECTANCES.len() + 1);
-    let pair = added(stand, &load(orders::SCENE)?, &orders::views(), impostors)?;
+    let pair = changes(stand, &load(orders::SCENE)?, &orders::views(), impostors)?;
     progress.inc(1);
     let apart = falls(&pair).map(|ratio| ratio.max(ratio.recip())).fold(f64::NAN, f64::max);
     chart = charted(chart, orders::SCENE, pair);
     for reflectance in REFLECTANCES {
         let views = [-0.5f32, 0.0, 0.5].map(|x_m| before(Vec3::new(x_m, 1.9, 3.8)));
-        let light = added(stand, &hall_of(reflectance)?, &views, impostors)?;
-        chart = charted(chart, &format!("{SCENE}, reflectance {reflectance}"), light);
+        let changes = changes(stand, &hall_of(reflectance)?, &views, impostors)?;
+        chart = charted(chart, &format!("{SCENE}, reflectance {reflectance}"), changes);
         progress.inc(1);
     }
     progress.finish_and_clear();
-    Ok((chart, Check::new("light of each further mirror, its fall apart from direct drawing's", apart, "×", BAR)))
+    Ok((
+        chart,
+        Check::new("change by each further mirror: its fall, apart from that of direct drawing", apart, "×", BAR),
+    ))
 }
 
-fn charted(chart: XyChart, name: &str, Added { ours, truth }: Added) -> XyChart {
-    [("by images", ours), ("direct", truth)].into_iter().fold(chart, |chart, (way, light)| {
-        let points = (1..).map(f64::from).zip(light).filter(|(_, light)| *light > LEAST_LIGHT);
+fn charted(chart: XyChart, name: &str, Changes { ours, truth }: Changes) -> XyChart {
+    [("by images", ours), ("direct", truth)].into_iter().fold(chart, |chart, (way, changes)| {
+        let points = (1..).map(f64::from).zip(changes).filter(|(_, change)| *change > LEAST_CHANGE);
         chart.with(Series::line(format!("{name}, {way}"), points))
     })
 }
 
-/// The falls of one over those of the other, as long as both show light.
-fn falls(Added { ours, truth }: &Added) -> impl Iterator<Item = f64> {
+/// The falls of one over those of the other, as long as direct drawing shows a change.
+fn falls(Changes { ours, truth }: &Changes) -> impl Iterator<Item = f64> {
     let pairs = ours.windows(2).zip(truth.windows(2));
-    let shows = |pair: &[f64]| pair.iter().all(|light| *light > LEAST_LIGHT);
-    pairs.filter(move |(a, b)| shows(a) && shows(b)).map(|(a, b)| (a[1] / a[0]) / (b[1] / b[0]))
+    let shown = pairs.filter(|(_, truth)| truth.iter().all(|change| *change > LEAST_CHANGE));
+    shown.map(|(ours, truth)| (ours[1] / ours[0]) / (truth[1] / truth[0]))
 }
 
 fn load(name: &str) -> anyhow::Result<Scene> {
@@ -78,9 +81,9 @@ fn hall_of(reflectance: f32) -> anyhow::Result<Scene> {
     Ok(scene)
 }
 
-fn added(stand: &Stand, scene: &Scene, views: &[PinholeCamera], impostors: Impostors) -> anyhow::Result<Added> {
+fn changes(stand: &Stand, scene: &Scene, views: &[PinholeCamera], impostors: Impostors) -> anyhow::Result<Changes> {
     let lighting: Lighting = LIGHTING.parse()?;
-    let hall = Hall::new(stand, scene, lighting, views)?;
+    let hall = Hall::new(stand, scene, (lighting, 0), views)?;
     let (mirrors, _) = sampling::mirrors(scene, impostors);
     let bounds: Vec<Aabb> = mirrors.iter().map(|mirror| mirror.bounds).collect();
     let sets = mirrors.iter().map(|mirror| hall.set(&hall.images(&in_a_cluster(mirror))?, true));
@@ -91,7 +94,7 @@ fn added(stand: &Stand, scene: &Scene, views: &[PinholeCamera], impostors: Impos
         ours.push(hall.views(&cells, order)?);
         truth.push(hall.truths(order)?);
     }
-    Ok(Added { ours: differences(&ours), truth: differences(&truth) })
+    Ok(Changes { ours: differences(&ours), truth: differences(&truth) })
 }
 
 /// Of the views of each order from those of the order before.

@@ -88,6 +88,7 @@ async fn frames_of_a_stream_that_ends_early_are_asked_for_again() {
         manglers[compositor].cut(cut);
         let took = show(&session, set_index).await;
         println!("{cut} streams that end early: frames after {:.2} s", took.as_secs_f64());
+        assert!(took < CLOSED, "{took:?}");
         assert_eq!(manglers[compositor].left(), 0, "{cut} streams");
     }
 }

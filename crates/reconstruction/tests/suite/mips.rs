@@ -13,7 +13,7 @@ use crate::stage::{gpu, looking, reconstructor, renderer, work};
 const EYE: Vec3 = Vec3::new(6.0, 3.1, -4.5);
 const TOWARDS: Vec3 = Vec3::new(-0.9, -0.3, 1.0);
 const NEAR_M: f32 = 1e-3;
-/// Footprints: of a texel where rays end, of several, and of more than the image has.
+/// Footprints: far less than a texel where rays end, several, and more than the image has.
 const WIDTHS_M: [f32; 5] = [0.01, 0.2, 0.5, 1.7, 60.0];
 /// Colours are 9 bits.
 const ROUNDING: f32 = 0.01;
@@ -30,11 +30,12 @@ fn rays() -> Vec<Ray> {
     (0..4000).map(ray).collect()
 }
 
-/// The twin's colour at the end of a ray whose colour without width is known, and the level that counts.
+/// The twin's colour at the end of a ray whose colour without width is known.
 fn expected(image: &DepthImage, mips: &ColorMips, (ray, end): (&Ray, &RayEnd), width_m: f32) -> Option<Vec3> {
     let pinhole = image.camera.pinhole()?;
     let at = pinhole.project(ray.at(end.way_m))?;
-    let most = image.size_px().as_vec2() - 1.0;
+    // Between the corners of the last cell, as `nearest_at.wgsl` has it.
+    let most = image.size_px().as_vec2() - 0.51;
     let place_px = at.pixel.clamp(Vec2::splat(0.5), most);
     let side_m = at.planar_depth_m / pinhole.focal_px.min_element();
     Some(mips.filtered(end.color_linear, place_px, width_m / side_m))

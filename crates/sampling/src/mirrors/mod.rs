@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn few_images_see_what_rays_off_a_mirror_meet() {
-        for name in ["teapot-mirror", "mirror-pair"] {
+        for name in ["teapot-mirror", "mirror-pair", "mirror-hall"] {
             for mirror in mirrors(&scene(name)).0 {
                 let [chosen, fresh] = mirror.unseen_ratio.expect("it stands still");
                 println!("{name}: {} images leave {chosen}, of fresh rays {fresh}", mirror.cameras.len());

@@ -6,7 +6,7 @@ use glam::Vec2;
 use study::{Axis, Series, XyChart};
 
 /// Lengths of edges across the radius, and their distances from the pole.
-const EDGES_PX: [f32; 8] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0];
+const EDGES_PX: [f32; 6] = [4.0, 8.0, 16.0, 32.0, 64.0, 128.0];
 const FROM_POLE_PX: f32 = 100.0;
 
 /// Edges at the middle of the camera's depths.

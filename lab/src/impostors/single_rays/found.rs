@@ -16,7 +16,7 @@ const DISTORTIONS_PX: [f32; 8] = [0.0, 20.0, 40.0, 60.0, 80.0, 120.0, 160.0, 200
 /// Widths of patches, in distances.
 const RATIOS: [f32; 5] = [0.25, 0.5, 1.0, 2.0, 3.0];
 /// No two colours differ by less.
-const LEAST_ERROR: f64 = 1e-9;
+pub const LEAST_ERROR: f64 = 1e-9;
 
 /// Of rays that meet the teapot.
 pub struct Figures {

@@ -62,7 +62,7 @@ impl<'s> Teapot<'s> {
     /// The cosine between a ray and the surface that it meets.
     pub fn facing(&self, ray: &Ray) -> Option<f32> {
         let hit = self.twin.closest(ray, NEAR_M).0?;
-        Some(self.twin.normal_in_world(&hit).dot(ray.direction_in_world.normalize_or_zero()).abs())
+        Some(self.twin.normal_in_world(&hit).dot(ray.direction_in_world.normalize_or_zero()).abs().min(1.0))
     }
 
     fn truth(&self, rays: &[Ray]) -> Vec<Option<(f32, Vec3)>> {
