@@ -9,9 +9,10 @@ use glam::{UVec2, Vec3};
 use metrics::{Rgb8Image, flip_map, psnr_db};
 use reconstruction::{MirrorCell, Mirrors, SampleSet, SetDescription};
 use render::{GpuScene, Lighting, SamplePlanes};
+use sampling::Impostors;
 use scene::Scene;
 
-use super::candidates::Candidate;
+use super::candidates::{Candidate, in_a_cluster};
 use super::objects::{is_of_object, painted};
 use crate::failures::stage::CARVE;
 use crate::failures::stand::Stand;
@@ -143,6 +144,17 @@ impl<'s> Hall<'s> {
             mips,
         };
         Ok(self.stand.reconstructor().upload(images, &description)?)
+    }
+
+    /// The scene's mirrors and the sets of what they show, as in a cluster.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn surroundings(&self, impostors: Impostors) -> anyhow::Result<(Vec<Aabb>, Vec<SampleSet>)> {
+        let (mirrors, _) = sampling::mirrors(self.scene, impostors);
+        let set = |mirror| self.set(&self.images(&in_a_cluster(mirror))?, true);
+        let sets = mirrors.iter().map(set).collect::<anyhow::Result<Vec<_>>>()?;
+        Ok((mirrors.iter().map(|mirror| mirror.bounds).collect(), sets))
     }
 
     /// The figures of a candidate for each mirror of the scene; without candidates, of mirrors that show the environment.

@@ -1,13 +1,12 @@
 //! Mirrors in mirrors: how errors grow from one to the next.
 
-use depth_image::{Aabb, PinholeCamera};
+use depth_image::PinholeCamera;
 use glam::Vec3;
 use render::Lighting;
 use sampling::Impostors;
 use scene::{Limits, MissingTextures, SceneSpec};
 use study::{Bar, Cell, Check, Table};
 
-use super::candidates::in_a_cluster;
 use super::measure::{Hall, VIEW_PX};
 use crate::failures::stand::Stand;
 
@@ -22,10 +21,7 @@ const ORDERS: u32 = 4;
 pub fn measure(stand: &Stand, lighting: Lighting, impostors: Impostors) -> anyhow::Result<(Table, Check)> {
     let scene = SCENE.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?;
     let hall = Hall::new(stand, &scene, (lighting, 0), &views())?;
-    let (mirrors, _) = sampling::mirrors(&scene, impostors);
-    let bounds: Vec<Aabb> = mirrors.iter().map(|mirror| mirror.bounds).collect();
-    let sets = mirrors.iter().map(|mirror| hall.set(&hall.images(&in_a_cluster(mirror))?, true));
-    let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
+    let (bounds, sets) = hall.surroundings(impostors)?;
     let columns =
         [("mirrors on the way", ""), ("FLIP", ""), ("FLIP without rays", ""), ("PSNR", "dB"), ("guessed", "%")];
     let mut table = Table::new("Pixels by the number of mirrors that their rays meet", &columns);

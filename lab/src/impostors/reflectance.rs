@@ -1,14 +1,13 @@
 //! How views change with each further mirror on a ray's way, by the mirrors' reflectance: views by images, and directly drawn ones.
 
 use anyhow::Context as _;
-use depth_image::{Aabb, PinholeCamera, View, linear_from_srgb8};
+use depth_image::{PinholeCamera, View, linear_from_srgb8};
 use glam::Vec3;
 use render::Lighting;
 use sampling::Impostors;
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 use study::{Axis, Bar, Check, Series, XyChart};
 
-use super::candidates::in_a_cluster;
 use super::measure::{Hall, VIEW_PX, cells};
 use super::orders;
 use crate::failures::stand::Stand;
@@ -84,10 +83,7 @@ fn hall_of(reflectance: f32) -> anyhow::Result<Scene> {
 fn changes(stand: &Stand, scene: &Scene, views: &[PinholeCamera], impostors: Impostors) -> anyhow::Result<Changes> {
     let lighting: Lighting = LIGHTING.parse()?;
     let hall = Hall::new(stand, scene, (lighting, 0), views)?;
-    let (mirrors, _) = sampling::mirrors(scene, impostors);
-    let bounds: Vec<Aabb> = mirrors.iter().map(|mirror| mirror.bounds).collect();
-    let sets = mirrors.iter().map(|mirror| hall.set(&hall.images(&in_a_cluster(mirror))?, true));
-    let sets = sets.collect::<anyhow::Result<Vec<_>>>()?;
+    let (bounds, sets) = hall.surroundings(impostors)?;
     let cells = cells(&bounds, &sets);
     let (mut ours, mut truth) = (Vec::new(), Vec::new());
     for order in 0..=ORDERS {

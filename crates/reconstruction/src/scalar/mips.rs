@@ -17,8 +17,8 @@ impl ColorMips {
         Self(mips(image))
     }
 
-    /// The colour around a place in the image, of a ray that is so many texels wide there. `color_linear` is that of a ray without
-    /// width.
+    /// The colour that a ray shows where it ends, at a place in the image. The ray is `width_texels` wide there. `color_linear` is what
+    /// a ray without width shows.
     #[must_use]
     pub fn filtered(&self, color_linear: Vec3, place_px: Vec2, width_texels: f32) -> Vec3 {
         let level = (0.5 * width_texels).max(1.0).log2().min(self.0.len() as f32);

@@ -152,6 +152,7 @@ mod tests {
                 println!("{name}: {} images leave {chosen}, of fresh rays {fresh}", mirror.cameras.len());
                 // The ball between the two mirrors hides what is behind it.
                 assert!((1..=8).contains(&mirror.cameras.len()) && chosen <= 0.02, "{name}: {chosen}");
+                assert!(mirror.cameras.iter().all(|camera| camera.pinhole().is_some()), "{name}: no single pole");
                 assert!((fresh - chosen).abs() < 0.01, "{name}: {fresh}, promised {chosen}");
             }
         }
