@@ -54,6 +54,23 @@ pub fn oct16_from_unit(unit: Vec3) -> u32 {
     quantise(folded.x) | quantise(folded.y) << 16
 }
 
+/// Packs a unit vector in two signed bytes. Any other input unpacks to some unit vector, never NaN.
+#[must_use]
+pub fn oct8_from_unit(unit: Vec3) -> u16 {
+    let packed = oct16_from_unit(unit);
+    let quantise = |bits: u32| ((f32::from(bits as u16 as i16) / 32767.0 * 127.0).round() as i8) as u8;
+    u16::from_le_bytes([quantise(packed), quantise(packed >> 16)])
+}
+
+/// The inverse of [`oct8_from_unit`]; the result has unit length.
+#[must_use]
+pub fn unit_from_oct8(packed: u16) -> Vec3 {
+    let [x, y] = packed.to_le_bytes().map(|byte| (f32::from(byte as i8) / 127.0).max(-1.0));
+    let (flat, z) = (Vec2::new(x, y), 1.0 - x.abs() - y.abs());
+    let xy = if z < 0.0 { wrapped(flat) } else { flat };
+    xy.extend(z).try_normalize().unwrap_or(Vec3::Z)
+}
+
 /// The octahedron's lower half, turned outwards; its own inverse.
 pub(crate) fn wrapped(v: Vec2) -> Vec2 {
     let sign = |x: f32| if x >= 0.0 { 1.0 } else { -1.0 };
@@ -67,6 +84,20 @@ mod tests {
     #[test]
     fn srgb_round_trips_every_code() {
         assert!((0..=255).all(|code| srgb8_from_linear(linear_from_srgb8(code)) == code));
+    }
+
+    #[test]
+    fn a_normal_in_two_bytes_is_within_a_degree() {
+        for i in 0..4000 {
+            let (turn, up) = (i as f32 * 2.399_963, 1.0 - (i as f32 + 0.5) / 2000.0);
+            let unit = (Vec2::from_angle(turn) * (1.0 - up * up).max(0.0).sqrt()).extend(up);
+            let degrees = unit_from_oct8(oct8_from_unit(unit)).angle_between(unit).to_degrees();
+            assert!(degrees < 1.0, "{unit} {degrees}");
+        }
+        for axis in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z] {
+            assert_eq!(unit_from_oct8(oct8_from_unit(axis)), axis);
+        }
+        assert!(unit_from_oct8(oct8_from_unit(Vec3::NAN)).is_finite());
     }
 
     #[test]

@@ -9,13 +9,16 @@
 mod antialias;
 mod bounds;
 mod camera;
+mod cube_grid;
 mod encoding;
 mod environment_light;
 mod environment_map;
 mod highlight;
 mod image;
+mod layered;
 mod light;
 mod method_table;
+mod parallel;
 mod pinhole;
 mod projection;
 #[cfg(any(test, feature = "scalar"))]
@@ -31,13 +34,19 @@ mod view_part;
 pub use antialias::{Antialias, AntialiasError};
 pub use bounds::Aabb;
 pub use camera::Camera;
-pub use encoding::{linear_from_rgb9e5, linear_from_srgb8, oct16_from_unit, rgb9e5_from_linear, srgb8_from_linear};
+pub use cube_grid::{CUBE_SIDES, CubeGrid};
+pub use encoding::{
+    linear_from_rgb9e5, linear_from_srgb8, oct8_from_unit, oct16_from_unit, rgb9e5_from_linear, srgb8_from_linear,
+    unit_from_oct8,
+};
 pub use environment_light::{BrightTexel, EnvironmentLight, LOBE_ROUGHNESS, LOBE_SIZE_PX, Lobe};
 pub use environment_map::{EnvironmentMap, EnvironmentMapError, MAX_ENVIRONMENT_SIZE_PX};
 pub use highlight::{Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS, ROUGHEST_MIRROR, Reflector};
 pub use image::{BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId};
+pub use layered::{LayeredDepthImage, LayeredError, MAX_LAYERS};
 pub use light::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
 pub use method_table::{NamedMethod, Setting, method_forms, method_help, method_named};
+pub use parallel::ParallelCamera;
 pub use pinhole::PinholeCamera;
 pub use projection::{CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray};
 #[cfg(any(test, feature = "scalar"))]

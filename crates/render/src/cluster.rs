@@ -1,6 +1,6 @@
 //! Clusters: neighbouring triangles of one mesh part, small enough to be culled together.
 
-use depth_image::{Aabb, PinholeCamera};
+use depth_image::{Aabb, ParallelCamera, PinholeCamera};
 use glam::{Vec3, Vec4};
 use scene::{Mesh, MeshPart};
 
@@ -60,6 +60,7 @@ fn spread(v: u32) -> u32 {
 }
 
 /// The four sides and the near plane of a camera; a point is inside where all are positive.
+#[derive(Clone, Copy)]
 pub(crate) struct Frustum([Vec4; 5]);
 
 impl Frustum {
@@ -67,6 +68,20 @@ impl Frustum {
         let [u, v, w] = camera.homogeneous_pixel_from_world();
         let size = camera.size_px.as_vec2();
         Self([u, w * size.x - u, v, w * size.y - v, w - Vec4::W * camera.near_m])
+    }
+
+    /// The lines of a parallel camera, from its reference plane on.
+    pub fn of_lines(camera: &ParallelCamera) -> Self {
+        let [right, down, forward] = camera.axes_in_world();
+        let size_m = camera.size_px.as_vec2() * camera.spacing_m;
+        let beyond = |axis: Vec3, least_m: f32| axis.extend(-axis.dot(camera.corner_in_world) - least_m);
+        Self([
+            beyond(right, 0.0),
+            beyond(-right, -size_m.x),
+            beyond(down, 0.0),
+            beyond(-down, -size_m.y),
+            beyond(forward, 0.0),
+        ])
     }
 
     /// True for a box of which some may be seen.
@@ -93,5 +108,21 @@ mod tests {
         assert!(!frustum.may_see(&at(Vec3::new(0.0, 0.0, 2.0))));
         assert!(!frustum.may_see(&at(Vec3::new(5.0, 0.0, -2.0))));
         assert!(!frustum.may_see(&at(Vec3::new(0.0, -3.0, -2.0))));
+    }
+
+    #[test]
+    fn lines_meet_the_boxes_between_their_first_and_their_last() {
+        let camera = ParallelCamera {
+            corner_in_world: Vec3::new(-1.0, 2.0, 0.0),
+            world_from_camera: glam::Quat::IDENTITY,
+            spacing_m: 0.5,
+            size_px: UVec2::new(4, 8),
+            range_m: 10.0,
+        };
+        let frustum = Frustum::of_lines(&camera);
+        let may_see = |x, y, z| frustum.may_see(&Aabb { min: Vec3::new(x, y, z) - 0.1, max: Vec3::new(x, y, z) + 0.1 });
+        assert!(may_see(0.0, 0.0, -5.0) && may_see(0.95, -1.95, -0.1) && may_see(-1.05, 2.05, -5.0));
+        assert!(!may_see(1.2, 0.0, -5.0) && !may_see(-1.2, 0.0, -5.0));
+        assert!(!may_see(0.0, 2.2, -5.0) && !may_see(0.0, -2.2, -5.0) && !may_see(0.0, 0.0, 0.2));
     }
 }

@@ -36,7 +36,7 @@ pub(crate) struct Illuminate {
     /// The distance of the pixels that are lit, where they are not listed.
     step_px: u32,
     listed: bool,
-    /// Lit are listed points where mirrored rays end, not pixels.
+    /// Lit are listed points, such as those where mirrored rays end, not pixels.
     bounces: bool,
     shadow_rays: ShadowRays,
     /// Rays look for surfaces that occlude the environment.
@@ -109,10 +109,9 @@ impl ShaderVariant for Illuminate {
             variants.extend([bent, lit].iter().flat_map(Self::with_all_sums));
         }
         for [occluded, continued, environment_map] in switches() {
-            for shadow_rays in [ShadowRays::One, ShadowRays::Many] {
+            for shadow_rays in [ShadowRays::None, ShadowRays::One, ShadowRays::Many] {
                 let lit = Self { bounces: true, shadow_rays, occluded, continued, ..Self::UNLIT };
-                variants
-                    .extend(Self { environment_map, ..lit }.with_all_sums().into_iter().filter(|v| v.sums.visibility));
+                variants.extend(Self { environment_map, ..lit }.with_all_sums());
             }
         }
         variants

@@ -151,7 +151,7 @@ fn light_bounce(place: u32) {
     var environment = Arrival(vec3f(0.0), 0.0);
     for (var found = bounce.met != 0u; found; found = false) {
         let spot = spot_of(bounce);
-{% if alpha_tested and mapped %}        ray_side_m = bounce.side_m;
+{% if traced and alpha_tested and mapped %}        ray_side_m = bounce.side_m;
 {% endif %}
 {%- else %}
 

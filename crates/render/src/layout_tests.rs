@@ -12,6 +12,7 @@ use crate::gpu_scene::{GpuObject, GpuSurroundings};
 use crate::interpolate::Interpolate;
 use crate::keep::Keep;
 use crate::known_samples::KnownCamera;
+use crate::layered::{Crossing, GpuLines};
 use crate::pixel_camera::PixelCamera;
 use crate::raster::{RasterCamera, RasterVariant};
 use crate::reflections::{Spawn, bounces::GpuBounce};
@@ -77,6 +78,11 @@ fn structs_of_draws_have_the_wgsl_layout() {
         alpha_hashed,
         scale
     });
+    let lines = host!(GpuLines { forward_in_world, spacing_m, range_m, columns, least_share, capacity });
+    let crossing = host!(Crossing { line, planar_depth_m, plane_normal_oct16, padding, surface });
+    let appended = parsed(RasterVariant::all().last().expect("a variant"));
+    assert_eq!(lines, shader(&appended, "Lines"));
+    assert_eq!(crossing.bytes, shader(&appended, "Crossing").bytes);
     let surroundings = host!(GpuSurroundings { wind_direction, wind_amplitude_m, wind_waves_per_m, wind_frequency_hz });
     for (name, host) in [("RasterCamera", camera), ("Object", object), ("Surroundings", surroundings)] {
         assert_eq!(shader(&raster(), name), host, "{name}");

@@ -17,6 +17,7 @@ mod illuminate;
 mod interpolate;
 mod keep;
 mod known_samples;
+mod layered;
 mod layers;
 #[cfg(test)]
 mod layout_tests;
@@ -47,6 +48,7 @@ mod work;
 pub use error::RenderError;
 pub use gpu_scene::GpuScene;
 pub use known_samples::{TemporalReference, view_cell_m};
+pub use layered::Kept;
 pub use lighting::{Direct, Lighting, MAX_RAYS, Occlusion, Rate, UnknownLighting};
 pub use rays::{AccelerationReport, host_tree};
 pub use redundancy_test::{Evidence, RedundancyTest};

@@ -5,7 +5,7 @@ use depth_image::{
     Antialias, Camera, DepthImage, Highlight, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId, View, ViewPlanes,
 };
 
-use crate::sums::SumPlanes;
+use crate::{sums::SumPlanes, work::DrawWork};
 
 /// What a batch writes of each pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -42,6 +42,12 @@ pub(crate) struct PlaneLayout {
 }
 
 impl Output {
+    /// The planes that every picture of this work has; `reflects` where highlights need what rays met.
+    pub fn of(work: DrawWork<'_>, reflects: bool) -> Self {
+        let visibility = reflects && work.lighting.is_traced();
+        Self { sums: SumPlanes { light_count: work.scene.light_count, visibility }, ..Self::default() }
+    }
+
     /// The places of planes among those of a camera.
     pub fn layout(&self) -> PlaneLayout {
         let mut count = 2;

@@ -3,8 +3,8 @@
 use std::{ops::Range, sync::Arc};
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Camera, Highlight, PinholeCamera};
-use glam::{Mat4, Vec4};
+use depth_image::{Highlight, ParallelCamera, PinholeCamera};
+use glam::{Mat4, UVec2, Vec3, Vec4};
 use gpu::{
     Binding, BoundGroup, DrawPass, DrawState, DrawVariant, Frame, Gpu, PassCache, ResourceTrait, ResourceTraits,
     ShaderVariant, Templates, WorkKind, highlight_name, switches, uniform_stride,
@@ -19,8 +19,8 @@ use crate::{
     work::DrawWork,
 };
 
-/// The group of known samples.
-const KNOWN_GROUP: u32 = 3;
+/// The group of known samples, or of the memory of what lines meet.
+const OWN_GROUP: u32 = 3;
 /// The variables of the textures in the order of [`scene::Material::textures`], and of their samplers.
 const TEXTURES: [(&str, &str); 5] = [
     ("base_color_texture", "base_color_sampler"),
@@ -41,6 +41,8 @@ pub(crate) struct RasterVariant {
     depth_only: bool,
     wind: bool,
     redundancy: Option<RedundancyVariant>,
+    /// All that the lines of a parallel camera meet is kept.
+    appended: bool,
 }
 
 #[repr(C)]
@@ -59,7 +61,8 @@ struct Groups {
     scene: BoundGroup,
     object: BoundGroup,
     textures: Vec<BoundGroup>,
-    known: Option<BoundGroup>,
+    /// Known samples, or the memory of what lines meet.
+    own: Option<BoundGroup>,
 }
 
 pub(crate) struct Raster {
@@ -74,6 +77,10 @@ impl RasterVariant {
         let bases: Vec<_> = Self::all().into_iter().filter(|variant| !variant.depth_only).rev().take(4).collect();
         let each = move |test| bases.clone().into_iter().map(move |base| Self { redundancy: Some(test), ..base });
         RedundancyVariant::all(&tests).into_iter().flat_map(each)
+    }
+
+    fn has_own_group(&self) -> bool {
+        self.redundancy.is_some() || self.appended
     }
 }
 
@@ -97,9 +104,10 @@ impl ShaderVariant for RasterVariant {
             surface_id => self.surface_id,
             depth_only => self.depth_only,
             wind => self.wind,
+            appended => self.appended,
             double_sided, alpha_tested, textured, unlit, specular, mapped,
             coat_textured => coat_textured && self.shading == Some(Highlight::Ggx),
-            ..RedundancyVariant::context(self.redundancy, KNOWN_GROUP)
+            ..RedundancyVariant::context(self.redundancy, OWN_GROUP)
         }
     }
 
@@ -114,21 +122,25 @@ impl ShaderVariant for RasterVariant {
                     depth_only,
                     wind,
                     redundancy: None,
+                    appended: false,
                 })
             })
         };
-        shadings.into_iter().flat_map(each).collect()
+        let nearest: Vec<Self> = shadings.into_iter().flat_map(each).collect();
+        let appended = nearest.iter().filter(|variant| !variant.surface_id && !variant.depth_only);
+        let appended: Vec<Self> = appended.map(|variant| Self { appended: true, ..*variant }).collect();
+        [nearest, appended].concat()
     }
 }
 
 impl DrawVariant for RasterVariant {
     fn state(&self) -> DrawState {
         let mut color_formats = Vec::new();
-        color_formats.extend((!self.depth_only).then_some(SURFACE_FORMAT));
+        color_formats.extend((!self.depth_only && !self.appended).then_some(SURFACE_FORMAT));
         color_formats.extend((!self.depth_only && self.surface_id).then_some(SURFACE_ID_FORMAT));
-        let cull_mode = (!self.material.double_sided).then_some(wgpu::Face::Back);
+        let cull_mode = (!self.material.double_sided && !self.appended).then_some(wgpu::Face::Back);
         let vertices = [vertex_layout()].into_iter().chain(self.material.mapped.then(detail_layout)).collect();
-        DrawState { vertices, cull_mode, color_formats }
+        DrawState { vertices, cull_mode, color_formats, nearest_only: !self.appended }
     }
 }
 
@@ -155,18 +167,22 @@ impl Raster {
             depth_only: false,
             wind: scene.wind,
             redundancy: predecessors.map(|images| images.variant),
+            appended: false,
         };
         let front = RasterVariant { depth_only: true, redundancy: None, ..shown };
         let cameras = &batch.cameras[first..][..surfaces.len()];
         let groups = scene.draws.first().map(|draw| {
             let pass = self.passes.get(&RasterVariant { material: draw.material, ..shown })?;
-            self.groups(&pass, &batch.work, cameras, predecessors)
+            let own = predecessors.map(|images| pass.bind(OWN_GROUP, images.bindings())).transpose()?;
+            let cameras = cameras.iter().map(|camera| RasterCamera::of(camera.reference(), batch.work.scene_time_s));
+            self.groups(&pass, scene, cameras, own)
         });
         let groups = groups.transpose()?;
         let posed = scene.motion.as_ref().map(|motion| motion.at(batch.work.scene_time_s));
         let posed = posed.as_ref().map(|posed| posed.buffers(&self.gpu));
         for (place, (camera, target)) in (0..).zip(cameras.iter().zip(surfaces)) {
-            let view = View { scene, posed, place, camera: camera.reference(), groups: groups.as_ref() };
+            let (frustum, size_px) = (Frustum::of(camera.reference()), camera.size_px());
+            let view = View { scene, posed, place, size_px, frustum, groups: groups.as_ref() };
             if predecessors.is_some() {
                 self.draw_in_slices(frame, &view, front, &[], &target.views.front_depth)?;
             }
@@ -174,6 +190,39 @@ impl Raster {
             self.draw_in_slices(frame, &view, shown, &colors, &target.views.reversed_depth)?;
         }
         Ok(())
+    }
+
+    /// Records what the lines of a parallel camera meet. `depth` has the camera's size; it tests nothing.
+    pub fn record_lines(
+        &self,
+        frame: &mut Frame<'_>,
+        work: &DrawWork<'_>,
+        camera: &ParallelCamera,
+        memory: &[Binding<'_>],
+        depth: &wgpu::TextureView,
+    ) -> Result<(), RenderError> {
+        let scene = work.scene;
+        let variant = RasterVariant {
+            material: MaterialTraits::default(),
+            shading: work.lighting.highlight(),
+            surface_id: false,
+            depth_only: false,
+            wind: scene.wind,
+            redundancy: None,
+            appended: true,
+        };
+        let groups = scene.draws.first().map(|draw| {
+            let pass = self.passes.get(&RasterVariant { material: draw.material, ..variant })?;
+            let own = pass.bind(OWN_GROUP, memory.iter().cloned())?;
+            let cameras = std::iter::once(RasterCamera::of_lines(camera, work.scene_time_s));
+            self.groups(&pass, scene, cameras, Some(own))
+        });
+        let groups = groups.transpose()?;
+        let posed = scene.motion.as_ref().map(|motion| motion.at(work.scene_time_s));
+        let posed = posed.as_ref().map(|posed| posed.buffers(&self.gpu));
+        let (frustum, size_px) = (Frustum::of_lines(camera), camera.size_px);
+        let view = View { scene, posed, place: 0, size_px, frustum, groups: groups.as_ref() };
+        self.draw_in_slices(frame, &view, variant, &[], depth)
     }
 
     /// Draws a view in passes that each take about a slice: what is drawn stays in the targets.
@@ -185,8 +234,8 @@ impl Raster {
         colors: &[&wgpu::TextureView],
         reversed_depth: &wgpu::TextureView,
     ) -> Result<(), RenderError> {
-        let family = WorkKind::family(&("raster", view.scene.identity, view.camera.size_px));
-        let runs = visible_runs(view.scene, &Frustum::of(view.camera));
+        let family = WorkKind::family(&("raster", view.scene.identity, view.size_px));
+        let runs = visible_runs(view.scene, &view.frustum);
         let a_slice = self.gpu.device_queue.slice_units(family, UNKNOWN_SLICE_INDICES);
         for (number, runs) in slices(runs, a_slice).into_iter().enumerate() {
             self.announce(frame, view, variant, &runs)?;
@@ -208,11 +257,11 @@ impl Raster {
         runs: &[Run],
     ) -> Result<(), RenderError> {
         let Some(groups) = groups else { return Ok(()) };
-        let known = groups.known.as_ref().filter(|_| variant.redundancy.is_some());
+        let own = groups.own.as_ref().filter(|_| variant.has_own_group());
         for run in runs.chunk_by(|a, b| scene.draws[a.draw].is_like(&scene.draws[b.draw])) {
             let draw = &scene.draws[run[0].draw];
             let textures = &groups.textures[draw.texture as usize];
-            let bound: Vec<_> = [&groups.scene, &groups.object, textures].into_iter().chain(known).collect();
+            let bound: Vec<_> = [&groups.scene, &groups.object, textures].into_iter().chain(own).collect();
             self.passes.get(&RasterVariant { material: draw.material, ..variant })?.announce(frame, &bound);
         }
         Ok(())
@@ -221,18 +270,18 @@ impl Raster {
     fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        &View { scene, posed, place, camera, groups }: &View<'_>,
+        &View { scene, posed, place, size_px, groups, .. }: &View<'_>,
         variant: RasterVariant,
         runs: &[Run],
     ) -> Result<(), RenderError> {
         let Some(groups) = groups else { return Ok(()) };
         // Layers of a set are as large as its largest image.
-        let size = camera.size_px.as_vec2();
+        let size = size_px.as_vec2();
         pass.set_viewport(0.0, 0.0, size.x, size.y, 0.0, 1.0);
         pass.set_index_buffer(scene.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.set_bind_group(0, &*groups.scene, &[place * CAMERA_STRIDE]);
-        if let Some(known) = groups.known.as_ref().filter(|_| variant.redundancy.is_some()) {
-            pass.set_bind_group(KNOWN_GROUP, &**known, &[]);
+        if let Some(own) = groups.own.as_ref().filter(|_| variant.has_own_group()) {
+            pass.set_bind_group(OWN_GROUP, &**own, &[]);
         }
         let (mut material, mut texture, mut object, mut vertices) = (None, None, None, None);
         for run in runs {
@@ -261,12 +310,10 @@ impl Raster {
     fn groups(
         &self,
         pass: &DrawPass,
-        work: &DrawWork<'_>,
-        cameras: &[Camera],
-        predecessors: Option<&Predecessors>,
+        scene: &GpuScene,
+        cameras: impl Iterator<Item = RasterCamera>,
+        own: Option<BoundGroup>,
     ) -> Result<Groups, RenderError> {
-        let scene = work.scene;
-        let cameras = cameras.iter().map(|camera| RasterCamera::of(camera.reference(), work.scene_time_s));
         let cameras = uniform(&self.gpu, "raster cameras", cameras);
         let textures = |textures: &[(wgpu::TextureView, wgpu::Sampler); 5]| {
             let bindings =
@@ -275,12 +322,12 @@ impl Raster {
                 });
             pass.bind(2, bindings)
         };
-        let own = [Binding::buffer("camera", &cameras), Binding::buffer("surroundings", &scene.surroundings)];
+        let common = [Binding::buffer("camera", &cameras), Binding::buffer("surroundings", &scene.surroundings)];
         Ok(Groups {
-            scene: pass.bind(0, own)?,
+            scene: pass.bind(0, common)?,
             object: pass.bind(1, [Binding::buffer("object", &scene.objects)])?,
             textures: scene.textures.iter().map(textures).collect::<Result<_, _>>()?,
-            known: predecessors.map(|images| pass.bind(KNOWN_GROUP, images.bindings())).transpose()?,
+            own,
         })
     }
 }
@@ -299,6 +346,18 @@ impl RasterCamera {
             padding: [0; 2],
         }
     }
+
+    /// A pixel's side is the same at all depths.
+    fn of_lines(camera: &ParallelCamera, scene_time_s: f32) -> Self {
+        Self {
+            clip_from_world: clip_from_lines(camera).to_cols_array_2d(),
+            eye_in_world: camera.corner_in_world.to_array(),
+            scene_time_s,
+            near_m: 0.0,
+            footprint: camera.spacing_m,
+            padding: [0; 2],
+        }
+    }
 }
 
 /// A camera of a batch, and what is drawn into its targets.
@@ -308,7 +367,8 @@ struct View<'r> {
     posed: Option<[&'r wgpu::Buffer; 2]>,
     /// Among the cameras that are drawn together.
     place: u32,
-    camera: &'r PinholeCamera,
+    size_px: UVec2,
+    frustum: Frustum,
     groups: Option<&'r Groups>,
 }
 
@@ -351,6 +411,15 @@ fn slices(runs: Vec<Run>, most_indices: u64) -> Vec<Vec<Run>> {
         }
     }
     slices
+}
+
+/// Planar depth, 1 where the camera's range ends.
+fn clip_from_lines(camera: &ParallelCamera) -> Mat4 {
+    let [right, down, forward] = camera.axes_in_world();
+    let row = |axis: Vec3| axis.extend(-axis.dot(camera.corner_in_world));
+    let size_m = camera.size_px.as_vec2() * camera.spacing_m;
+    let [x, y] = [row(right) * (2.0 / size_m.x) - Vec4::W, Vec4::W - row(down) * (2.0 / size_m.y)];
+    Mat4::from_cols(x, y, row(forward) / camera.range_m, Vec4::W).transpose()
 }
 
 /// Reversed depth: `near / planar depth`, 1 at the near plane and 0 at infinity.

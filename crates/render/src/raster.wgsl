@@ -62,7 +62,7 @@ struct Varyings {
     @location(1) uv: vec2f,
     @location(2) color_linear: vec4f,
     @location(3) @interpolate(flat) first_primitive: u32,
-{% if redundancy_test %}    @location(4) position_in_world: vec3f,
+{% if redundancy_test or appended %}    @location(4) position_in_world: vec3f,
 {% endif %}
 {% if mapped %}    @location(5) second_uv: vec2f,
     @location(6) tangent_in_world: vec4f,
@@ -100,7 +100,7 @@ fn vertex(
     out.uv = uv;
     out.color_linear = vec4f(linear_from_srgb(color_srgb.rgb), color_srgb.a);
     out.first_primitive = first_primitive;
-{% if redundancy_test %}    out.position_in_world = position_in_world;
+{% if redundancy_test or appended %}    out.position_in_world = position_in_world;
 {% endif %}
 {% if mapped %}
     // Corners have unit vectors, as those of rays do.
@@ -125,7 +125,7 @@ fn uv_of(in: Varyings, number: u32) -> vec2f {
 fn is_there(in: Varyings, alpha: f32) -> bool {
     var cutoff = object.alpha_cutoff;
 {% if mapped %}
-    cutoff = select(cutoff, hashed_cutoff(in.place_m, camera.near_m / in.clip.z * camera.footprint), object.alpha_hashed != 0u);
+    cutoff = select(cutoff, hashed_cutoff(in.place_m, {{ "camera.footprint" if appended else "camera.near_m / in.clip.z * camera.footprint" }}), object.alpha_hashed != 0u);
 {% endif %}
     return alpha >= cutoff;
 }
@@ -156,14 +156,21 @@ fn fragment(in: Varyings) {
 }
 {% endif %}
 {% else %}
+{% if appended %}
+{% include "append.wgsl" %}
+{%- else -%}
 struct Planes {
     @location(0) surface: vec4u,
 {% if surface_id %}    @location(1) surface_id: vec2u,
 {% endif %}
 }
+{%- endif %}
 
 @fragment
-fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface_id or redundancy_test %}, @builtin(primitive_index) primitive: u32{% endif %}) -> Planes {
+fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface_id or redundancy_test %}, @builtin(primitive_index) primitive: u32{% endif %}) {{ "" if appended else "-> Planes " }}{
+{%- if appended %}
+    let slope = slope_of(dpdx(in.position_in_world), dpdy(in.position_in_world));
+{%- endif %}
     var base = object.base_color_linear * in.color_linear;
 {% if textured %}
     base *= textureSample(base_color_texture, base_color_sampler, uv_of(in, 0u));
@@ -189,15 +196,20 @@ fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface
     let map = textureSample(normal_texture, normal_sampler, uv_of(in, 2u)).xyz;
     shown_normal = mapped_normal(map, object.normal_scale, in.normal_in_world, in.tangent_in_world);
 {% endif %}
-    let facing = {% if double_sided %}select(-1.0, 1.0, front_facing){% else %}1.0{% endif %};
+    let facing = {% if double_sided and not appended %}select(-1.0, 1.0, front_facing){% else %}1.0{% endif %};
     let normal = normalize(in.normal_in_world) * facing;
 {% if redundancy_test %}
     if is_redundant(candidate_at(in, normal, primitive)) { discard; }
 {% endif %}
+{%- if appended %}
+    if slope.is_steep { discard; }
+    append(in, packed_surface(base.rgb, emissive_linear, shown_normal, coat), shown_normal, slope, front_facing);
+{%- else %}
     var out: Planes;
     out.surface = packed_surface(base.rgb, emissive_linear, shown_normal * facing, coat);
 {% if surface_id %}    out.surface_id = vec2u(object.instance, in.first_primitive + primitive);
 {% endif %}
     return out;
+{%- endif %}
 }
 {% endif %}

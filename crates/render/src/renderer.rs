@@ -2,20 +2,20 @@
 
 use std::{collections::VecDeque, sync::Arc};
 
-use depth_image::{Antialias, Camera, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};
+use depth_image::{
+    Antialias, Camera, DepthImage, LayeredDepthImage, ParallelCamera, PinholeCamera, ToneMapping, View, ViewPlanes,
+};
 use glam::UVec2;
 use gpu::{Frame, Gpu, GpuError, Templates, Turn, WorkClass};
 use parking_lot::Mutex;
 
 use crate::batch::{Batch, batches};
 use crate::known_samples::{ImageSequence, KnownSamples, TemporalReference};
+use crate::layered::{self, Kept};
 use crate::planes::{self, Output};
 use crate::visibility::{Choice, Costs, Visibility};
 use crate::work::{DrawWork, SamplePlanes};
-use crate::{
-    GpuScene, Lighting, RenderError, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages,
-    sums::SumPlanes,
-};
+use crate::{GpuScene, Lighting, RenderError, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages};
 
 /// Pixels in one submission: bounds the memory for surfaces, light and read-back.
 const PIXELS_A_SUBMISSION: usize = 1 << 20;
@@ -79,6 +79,23 @@ impl Renderer {
     ) -> Result<Vec<DepthImage>, RenderError> {
         self.check(cameras)?;
         self.images(work, cameras, planes, None, [None; 2])
+    }
+
+    /// All surfaces on the lines of a parallel camera, whichever lies before another. A camera's lines are drawn in one pass, in
+    /// bands of rows where they meet more than the device's buffers hold.
+    ///
+    /// # Errors
+    /// A camera that is not valid, or the device.
+    pub fn draw_layers(
+        &self,
+        work: DrawWork<'_>,
+        camera: &ParallelCamera,
+        kept: Kept,
+    ) -> Result<LayeredDepthImage, RenderError> {
+        camera.validate().map_err(|source| RenderError::Camera { index: 0, source })?;
+        let limit = u64::from(self.gpu.device.limits().max_texture_dimension_2d);
+        GpuError::check_limit("a layered image's side", camera.size_px.max_element().into(), limit)?;
+        layered::draw(&self.stages, work, camera, kept)
     }
 
     /// As [`Renderer::draw_depth_images`] for the `wanted` of `cameras`, but each image omits the samples that are
@@ -348,7 +365,7 @@ fn corner_cameras(cameras: &[PinholeCamera]) -> Vec<PinholeCamera> {
 fn views_output(work: DrawWork<'_>) -> Output {
     let highlight = work.highlight();
     let mirrors = highlight.is_some() && work.lighting.reflections() > 0;
-    Output { highlight, mirrors, ..output(work, highlight.is_some()) }
+    Output { highlight, mirrors, ..Output::of(work, highlight.is_some()) }
 }
 
 fn images_output(work: DrawWork<'_>, planes: SamplePlanes, test: Option<RedundancyTest>) -> Output {
@@ -362,11 +379,6 @@ fn images_output(work: DrawWork<'_>, planes: SamplePlanes, test: Option<Redundan
         surface_id: planes.surface_id,
         passed: test.is_some(),
         usefulness_test: test.and_then(|test| test.usefulness),
-        ..output(work, reflector)
+        ..Output::of(work, reflector)
     }
-}
-
-fn output(work: DrawWork<'_>, reflects: bool) -> Output {
-    let visibility = reflects && work.lighting.is_traced();
-    Output { sums: SumPlanes { light_count: work.scene.light_count, visibility }, ..Output::default() }
 }

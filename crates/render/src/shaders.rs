@@ -12,6 +12,7 @@ use crate::{
     illuminate::Illuminate,
     interpolate::Interpolate,
     keep::Keep,
+    layered::Lit,
     pixel_list::LIST_WORKGROUP,
     raster::RasterVariant,
     redundancy_test::RedundancyTest,
@@ -26,7 +27,7 @@ const CLAMP: u32 = scene::Wrap::Clamp as u32;
 
 /// The shader templates of this crate.
 pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
-    "raster.wgsl", "packed_surface.wgsl", "surfaces.wgsl", "albedo.wgsl", "camera.wgsl", "single_pole.wgsl", "sequence.wgsl", "sums.wgsl",
+    "raster.wgsl", "append.wgsl", "layered/lit.wgsl", "packed_surface.wgsl", "surfaces.wgsl", "albedo.wgsl", "camera.wgsl", "single_pole.wgsl", "sequence.wgsl", "sums.wgsl",
     "illuminate.wgsl", "interpolate.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl", "hashed_alpha.wgsl",
     "rise.wgsl", "spot.wgsl", "shaded.wgsl", "visibility.wgsl", "reflections/bounce.wgsl", "reflections/bounce_off.wgsl", "reflections/curvature.wgsl",
     "reflections/spawn.wgsl", "reflections/follow.wgsl", "reflections/land.wgsl",
@@ -49,8 +50,20 @@ pub fn shader_sources<'t>(
     templates: &'t Templates,
     tests: &'t [RedundancyTest],
 ) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    gpu::shader_sources!(templates, RasterVariant, Primary, Keep, Illuminate, Interpolate, Spawn, Follow, Land, Finish)
-        .chain(RasterVariant::with_tests(tests).map(|variant| source(templates, &variant)))
-        .chain(Primary::with_tests(tests).map(|variant| source(templates, &variant)))
-        .chain(Finish::with_tests(tests).map(|variant| source(templates, &variant)))
+    gpu::shader_sources!(
+        templates,
+        RasterVariant,
+        Primary,
+        Keep,
+        Illuminate,
+        Interpolate,
+        Spawn,
+        Follow,
+        Land,
+        Lit,
+        Finish
+    )
+    .chain(RasterVariant::with_tests(tests).map(|variant| source(templates, &variant)))
+    .chain(Primary::with_tests(tests).map(|variant| source(templates, &variant)))
+    .chain(Finish::with_tests(tests).map(|variant| source(templates, &variant)))
 }

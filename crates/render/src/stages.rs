@@ -19,13 +19,13 @@ const BATCHES_OF_A_CLASS: usize = 2;
 
 /// The passes of drawing, and the memory that they share.
 pub(crate) struct Stages {
-    gpu: Arc<Gpu>,
+    pub gpu: Arc<Gpu>,
     pub pool: BufferPool,
     surfaces: SurfacePool,
     accumulations: Accumulations,
-    raster: Raster,
-    passes: PassCache,
-    batches: JobLimit,
+    pub raster: Raster,
+    pub passes: PassCache,
+    pub batches: JobLimit,
 }
 
 impl Stages {

@@ -2,7 +2,7 @@
 
 use std::ops::Deref;
 
-use wgpu::{BufferUsages, RenderPipeline, ShaderStages, TextureFormat, TextureUsages};
+use wgpu::{BufferUsages, CompareFunction, RenderPipeline, ShaderStages, TextureFormat, TextureUsages};
 
 use super::bound_group::BoundGroup;
 use super::compiled::Shader;
@@ -27,6 +27,8 @@ pub struct DrawState {
     pub cull_mode: Option<wgpu::Face>,
     /// The colour targets, besides depth.
     pub color_formats: Vec<TextureFormat>,
+    /// Only what is nearest is drawn; else everything is, and depth stays as it was.
+    pub nearest_only: bool,
 }
 
 /// A variant of a drawing shader.
@@ -60,8 +62,12 @@ impl DrawPass {
             primitive: wgpu::PrimitiveState { cull_mode: state.cull_mode, ..Default::default() },
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: Self::DEPTH_FORMAT,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::Greater),
+                depth_write_enabled: Some(state.nearest_only),
+                depth_compare: Some(if state.nearest_only {
+                    CompareFunction::Greater
+                } else {
+                    CompareFunction::Always
+                }),
                 stencil: Default::default(),
                 bias: Default::default(),
             }),

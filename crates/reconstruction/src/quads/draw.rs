@@ -41,7 +41,7 @@ impl DrawVariant for DrawQuads {
             attributes: &INVERSE_DEPTH,
         };
         // Both faces: a view may see a surface from behind its sample camera.
-        DrawState { vertices: vec![vertices], cull_mode: None, color_formats: vec![SAMPLE_FORMAT] }
+        DrawState { vertices: vec![vertices], cull_mode: None, color_formats: vec![SAMPLE_FORMAT], nearest_only: true }
     }
 }
 

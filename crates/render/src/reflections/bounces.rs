@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use gpu::{Binding, BoundGroup, ComputePass, DispatchSize, Gpu, ShaderVariant, WorkKind};
 use wgpu::{Buffer, BufferUsages};
 
-use crate::batch::Recording;
+use crate::{batch::Recording, pixel_list::LIST_WORKGROUP};
 
 /// `Bounce` of `reflections/bounce.wgsl`.
 #[repr(C)]
@@ -33,6 +33,12 @@ impl BounceList {
     pub fn new(gpu: &Gpu) -> Self {
         // Workgroups along x, y and z, and the list's length.
         Self(gpu.buffer_with("mirrored rays", &[0u32, 1, 1, 0], BufferUsages::STORAGE | BufferUsages::INDIRECT))
+    }
+
+    /// The list of `count` points.
+    pub fn of(gpu: &Gpu, count: u32) -> Self {
+        let arguments = [count.div_ceil(LIST_WORKGROUP), 1, 1, count];
+        Self(gpu.buffer_with("listed points", &arguments, BufferUsages::STORAGE | BufferUsages::INDIRECT))
     }
 
     pub fn size(&self) -> DispatchSize<'_> {

@@ -1,0 +1,133 @@
+//! The grid of a layered depth cube: lines along three orthogonal axes, all of one spacing.
+
+use glam::{Mat3A, Quat, UVec2, UVec3, Vec3};
+
+use crate::{Aabb, CameraError, ParallelCamera};
+
+/// A box of cubic cells. Through the middle of each row of cells, along each of the three axes, runs a line on which a scene is
+/// sampled (Lischinski §3.1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CubeGrid {
+    /// The corner of the first cell.
+    pub corner_in_world: Vec3,
+    /// A unit quaternion.
+    pub world_from_cube: Quat,
+    /// The side of a cell, metres.
+    pub spacing_m: f32,
+    /// Cells along each axis.
+    pub size: UVec3,
+}
+
+/// The sides that a cube may have, in cells.
+pub const CUBE_SIDES: std::ops::RangeInclusive<u32> = 16..=4096;
+
+impl CubeGrid {
+    /// The grid around a box with `side` cells along its longest edge. Surfaces on the faces of the box lie within it.
+    ///
+    /// # Errors
+    /// A side beyond [`CUBE_SIDES`], and a box that is empty or not finite.
+    pub fn around(bounds: &Aabb, side: u32) -> Result<Self, CameraError> {
+        if !CUBE_SIDES.contains(&side) {
+            let value = f64::from(side);
+            return Err(CameraError::OutOfRange { field: "side", value, allowed: "from 16 to 4096" });
+        }
+        let extent_m = bounds.size().max_element();
+        if !(bounds.min.is_finite() && bounds.max.is_finite() && extent_m > 0.0) {
+            return Err(CameraError::NotFinite { field: "bounds" });
+        }
+        let spacing_m = extent_m / (side - 1) as f32;
+        // Half a cell of room on each side, and for the rounding of coordinates.
+        let size =
+            ((bounds.size() / spacing_m + 1.0 - 1e-3).ceil().as_uvec3()).clamp(UVec3::splat(2), UVec3::splat(side));
+        let corner_in_world = bounds.center() - size.as_vec3() * (0.5 * spacing_m);
+        Ok(Self { corner_in_world, world_from_cube: Quat::IDENTITY, spacing_m, size })
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// The first field that is not finite or out of range.
+    pub fn validate(&self) -> Result<(), CameraError> {
+        (0..3).try_for_each(|axis| self.camera(axis).validate())
+    }
+
+    /// The camera of the lines along an axis, 0 to 2, which looks against the axis. Its columns rise along the next axis, and
+    /// its rows fall along the one after that.
+    #[must_use]
+    pub fn camera(&self, axis: usize) -> ParallelCamera {
+        let axes = Mat3A::from_quat(self.world_from_cube);
+        let [own, columns, rows] = [0, 1, 2].map(|offset| (axis + offset) % 3);
+        let frame = Mat3A::from_cols(axes.col(columns), axes.col(rows), axes.col(own));
+        let edge_m = |axis: usize| self.size[axis] as f32 * self.spacing_m;
+        ParallelCamera {
+            corner_in_world: self.corner_in_world
+                + Vec3::from(axes.col(rows)) * edge_m(rows)
+                + Vec3::from(axes.col(own)) * edge_m(own),
+            world_from_camera: Quat::from_mat3a(&frame).normalize(),
+            spacing_m: self.spacing_m,
+            size_px: UVec2::new(self.size[columns], self.size[rows]),
+            range_m: edge_m(own),
+        }
+    }
+
+    /// The place of a line along `axis` among the cells, by the pixel of its camera: the coordinate along the axis is 0.
+    #[must_use]
+    pub fn line_cell(&self, axis: usize, pixel: UVec2) -> UVec3 {
+        let [columns, rows] = [(axis + 1) % 3, (axis + 2) % 3];
+        let mut cell = UVec3::ZERO;
+        cell[columns] = pixel.x;
+        cell[rows] = self.size[rows] - 1 - pixel.y;
+        cell
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec2;
+
+    use super::*;
+    use crate::PixelDepth;
+
+    #[test]
+    fn cameras_see_each_other_s_points_in_one_grid() {
+        let turned = Quat::from_rotation_y(0.4) * Quat::from_rotation_x(0.2);
+        let grid = CubeGrid { world_from_cube: turned, ..CubeGrid::around(&bounds(), 32).unwrap() };
+        let place = Vec3::new(3.25, 7.5, 2.75);
+        let point_in_world = grid.corner_in_world + turned * (place * grid.spacing_m);
+        for axis in 0..3 {
+            let PixelDepth { pixel, planar_depth_m } = grid.camera(axis).project(point_in_world).unwrap();
+            let cell = grid.line_cell(axis, pixel.as_uvec2());
+            let depth = grid.size[axis] as f32 - planar_depth_m / grid.spacing_m;
+            assert!((depth - place[axis]).abs() < 1e-3, "{axis}: {depth}");
+            for other in [(axis + 1) % 3, (axis + 2) % 3] {
+                assert_eq!(cell[other], place[other] as u32, "{axis} {other}");
+            }
+        }
+    }
+
+    #[test]
+    fn faces_of_the_box_lie_within_the_grid_and_its_longest_edge_has_the_asked_cells() {
+        let bounds = bounds();
+        for side in [16, 100, 512] {
+            let grid = CubeGrid::around(&bounds, side).unwrap();
+            assert_eq!(grid.size.max_element(), side);
+            let camera = grid.camera(1);
+            let seen = |point| camera.project(point).is_some_and(|at| at.pixel.cmpge(Vec2::splat(0.4)).all());
+            assert!(bounds.corners().into_iter().all(seen), "{side}");
+            assert_eq!(grid.validate(), Ok(()));
+        }
+    }
+
+    #[test]
+    fn impossible_grids_are_refused_by_name() {
+        assert!(matches!(CubeGrid::around(&bounds(), 15), Err(CameraError::OutOfRange { field: "side", .. })));
+        assert!(matches!(CubeGrid::around(&bounds(), 4097), Err(CameraError::OutOfRange { field: "side", .. })));
+        assert!(matches!(CubeGrid::around(&Aabb::EMPTY, 64), Err(CameraError::NotFinite { field: "bounds" })));
+        let point = Aabb { min: Vec3::ONE, max: Vec3::ONE };
+        assert!(matches!(CubeGrid::around(&point, 64), Err(CameraError::NotFinite { field: "bounds" })));
+    }
+
+    fn bounds() -> Aabb {
+        Aabb { min: Vec3::new(-4.0, 0.0, -3.0), max: Vec3::new(6.0, 3.0, 2.5) }
+    }
+}

@@ -1,0 +1,192 @@
+//! Layered depth images: all surfaces on each line of a parallel camera, not only the first.
+
+use glam::Vec3;
+
+use crate::{CameraError, ParallelCamera, SpecularPlanes};
+
+/// The most samples of one line; what lies behind them is not held.
+pub const MAX_LAYERS: u32 = 255;
+
+/// The samples of a parallel camera: line after line, from the first to the last surface of each (Lischinski §3.1). The planes are
+/// samples long.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LayeredDepthImage {
+    /// The sample camera; its pixels are the lines.
+    pub camera: ParallelCamera,
+    /// The number of the first sample of each line, and after the last line the number of all samples.
+    pub first: Vec<u32>,
+    /// Metres from the reference plane; does not fall along a line.
+    pub planar_depth_m: Vec<f32>,
+    /// Normals of the triangles, octahedral in two signed bytes, on the side that is sampled.
+    pub plane_normal_oct8: Vec<u16>,
+    /// Radiance that a sample sends to all sides alike, linear RGB9E5.
+    pub color_rgb9e5: Vec<u32>,
+    /// Smooth normals, octahedral in two signed 16-bit numbers, where anything reflects.
+    pub normal_oct16: Option<Vec<u32>>,
+    /// Inputs of highlights and mirrors; requires `normal_oct16`.
+    pub specular: Option<SpecularPlanes>,
+    /// Some line met more surfaces than [`MAX_LAYERS`]: nothing is known behind its last sample.
+    pub truncated: bool,
+}
+
+/// Samples that are not those of a camera's lines.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub enum LayeredError {
+    #[error("the camera of a layered image: {0}")]
+    Camera(#[from] CameraError),
+    #[error("layered image plane {plane} has {len} values, must have {expected}")]
+    Plane { plane: &'static str, len: usize, expected: usize },
+    #[error(
+        "line {line} of a layered image begins at sample {first}, must begin at {least} or later, and no line after {samples}"
+    )]
+    First { line: usize, first: u32, least: u32, samples: usize },
+    #[error("line {line} of a layered image has {layers} layers, must have at most {MAX_LAYERS}")]
+    Layers { line: usize, layers: u32 },
+    #[error(
+        "sample {layer} of line {line} of a layered image has depth {depth_m} m, must not be nearer than the one before, nor beyond {range_m} m"
+    )]
+    Depth { line: usize, layer: usize, depth_m: f32, range_m: f32 },
+}
+
+impl LayeredDepthImage {
+    /// Checks the camera, the sizes of all planes, the prefix sums, and the order of depths.
+    ///
+    /// # Errors
+    /// The first fault.
+    pub fn validate(&self) -> Result<(), LayeredError> {
+        self.camera.validate()?;
+        let samples = self.planar_depth_m.len();
+        let specular = self.specular.iter();
+        let visibilities =
+            specular.clone().flat_map(|s| &s.visibility8).map(|plane| ("visibility", plane.len(), samples));
+        let reflectances = specular.map(|s| ("reflectance", s.reflectance_srgb8_roughness8.len(), samples));
+        let planes = [
+            ("first", self.first.len(), self.camera.pixel_count() + 1),
+            ("plane_normal", self.plane_normal_oct8.len(), samples),
+            ("color", self.color_rgb9e5.len(), samples),
+            ("normal", self.normal_oct16.as_ref().map_or(samples, Vec::len), samples),
+        ];
+        let mut planes = planes.into_iter().chain(reflectances).chain(visibilities);
+        if let Some((plane, len, expected)) = planes.find(|(_, len, expected)| len != expected) {
+            return Err(LayeredError::Plane { plane, len, expected });
+        }
+        let (ends, mut least) = (&self.first[1..], 0);
+        for (line, &first) in self.first.iter().enumerate() {
+            if first < least || first as usize > samples || (line == 0 && first != 0) {
+                return Err(LayeredError::First { line, first, least, samples });
+            }
+            least = first;
+        }
+        if ends.last().is_some_and(|&end| end as usize != samples) {
+            return Err(LayeredError::First { line: ends.len(), first: least, least: samples as u32, samples });
+        }
+        (0..ends.len()).try_for_each(|line| self.validate_line(line))
+    }
+
+    fn validate_line(&self, line: usize) -> Result<(), LayeredError> {
+        let [first, end] = [self.first[line], self.first[line + 1]];
+        if end - first > MAX_LAYERS {
+            return Err(LayeredError::Layers { line, layers: end - first });
+        }
+        let (mut nearest_m, range_m) = (0.0, self.camera.range_m);
+        for (layer, &depth_m) in self.planar_depth_m[first as usize..end as usize].iter().enumerate() {
+            if !(nearest_m..=range_m).contains(&depth_m) {
+                return Err(LayeredError::Depth { line, layer, depth_m, range_m });
+            }
+            nearest_m = depth_m;
+        }
+        Ok(())
+    }
+
+    /// Number of samples.
+    #[must_use]
+    pub fn sample_count(&self) -> usize {
+        self.planar_depth_m.len()
+    }
+
+    /// The most samples of a line.
+    #[must_use]
+    pub fn layer_count(&self) -> u32 {
+        self.first.windows(2).map(|ends| ends[1] - ends[0]).max().unwrap_or(0)
+    }
+
+    /// The mean number of samples of a line.
+    #[must_use]
+    pub fn mean_layers(&self) -> f64 {
+        self.sample_count() as f64 / self.camera.pixel_count().max(1) as f64
+    }
+
+    /// The samples of a line.
+    #[must_use]
+    pub fn line(&self, line: usize) -> std::ops::Range<usize> {
+        self.first[line] as usize..self.first[line + 1] as usize
+    }
+
+    /// The normal of a sample's triangle.
+    #[must_use]
+    pub fn plane_normal_in_world(&self, sample: usize) -> Vec3 {
+        crate::unit_from_oct8(self.plane_normal_oct8[sample])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Quat, UVec2};
+
+    use super::*;
+
+    fn image() -> LayeredDepthImage {
+        LayeredDepthImage {
+            camera: ParallelCamera {
+                corner_in_world: Vec3::ZERO,
+                world_from_camera: Quat::IDENTITY,
+                spacing_m: 0.5,
+                size_px: UVec2::new(3, 1),
+                range_m: 4.0,
+            },
+            first: vec![0, 2, 2, 3],
+            planar_depth_m: vec![1.0, 1.5, 4.0],
+            plane_normal_oct8: vec![0; 3],
+            color_rgb9e5: vec![0; 3],
+            normal_oct16: None,
+            specular: None,
+            truncated: false,
+        }
+    }
+
+    #[test]
+    fn lines_have_their_samples() {
+        let image = image();
+        assert_eq!(image.validate(), Ok(()));
+        assert_eq!((image.line(0), image.line(1), image.line(2)), (0..2, 2..2, 2..3));
+        assert_eq!((image.sample_count(), image.layer_count(), image.mean_layers()), (3, 2, 1.0));
+    }
+
+    #[test]
+    fn faults_are_named() {
+        let good = image();
+        let first = |first: [u32; 4]| LayeredDepthImage { first: first.to_vec(), ..good.clone() }.validate();
+        assert!(matches!(first([0, 2, 1, 3]), Err(LayeredError::First { line: 2, first: 1, least: 2, .. })));
+        assert!(matches!(first([0, 4, 4, 4]), Err(LayeredError::First { line: 1, first: 4, samples: 3, .. })));
+        assert!(matches!(first([1, 2, 2, 3]), Err(LayeredError::First { line: 0, first: 1, .. })));
+        assert!(matches!(first([0, 1, 1, 2]), Err(LayeredError::First { line: 3, first: 2, .. })));
+        let depths =
+            |depths: [f32; 3]| LayeredDepthImage { planar_depth_m: depths.to_vec(), ..good.clone() }.validate();
+        assert!(matches!(depths([1.5, 1.0, 2.0]), Err(LayeredError::Depth { line: 0, layer: 1, .. })));
+        assert!(matches!(depths([1.0, f32::NAN, 2.0]), Err(LayeredError::Depth { line: 0, layer: 1, .. })));
+        assert!(matches!(depths([1.0, 1.5, 4.1]), Err(LayeredError::Depth { line: 2, layer: 0, .. })));
+        let short = LayeredDepthImage { color_rgb9e5: vec![0; 2], ..good.clone() };
+        assert!(matches!(short.validate(), Err(LayeredError::Plane { plane: "color", len: 2, expected: 3 })));
+        let short = LayeredDepthImage { first: vec![0, 3], ..good.clone() };
+        assert!(matches!(short.validate(), Err(LayeredError::Plane { plane: "first", len: 2, expected: 4 })));
+        let deep = LayeredDepthImage {
+            first: vec![0, 256, 256, 256],
+            planar_depth_m: vec![1.0; 256],
+            plane_normal_oct8: vec![0; 256],
+            color_rgb9e5: vec![0; 256],
+            ..good
+        };
+        assert!(matches!(deep.validate(), Err(LayeredError::Layers { line: 0, layers: 256 })));
+    }
+}

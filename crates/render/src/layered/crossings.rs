@@ -1,0 +1,223 @@
+//! Where the lines of a parallel camera meet surfaces: `append.wgsl`.
+
+use bytemuck::{Pod, Zeroable};
+use depth_image::{MAX_LAYERS, ParallelCamera, ViewPart};
+use glam::UVec2;
+use gpu::{Binding, BufferPool, DrawPass, Frame, Gpu, GpuError, PooledBuffer};
+use rayon::prelude::*;
+use wgpu::{BufferUsages, TextureUsages};
+
+use super::Kept;
+use crate::{RenderError, stages::Stages, work::DrawWork};
+
+/// Crossings of a line for which there is room at first.
+const EXPECTED_LAYERS: u64 = 4;
+/// Crossings that are drawn together take no more bytes than this.
+const MOST_BYTES: u64 = 128 << 20;
+
+/// Crossings that are written at once.
+const SIDES: u64 = 2;
+
+/// `Crossing` of the shader.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct Crossing {
+    pub line: u32,
+    pub planar_depth_m: f32,
+    pub plane_normal_oct16: u32,
+    pub padding: u32,
+    pub surface: [u32; 4],
+}
+
+/// `Lines` of the shader.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuLines {
+    pub forward_in_world: [f32; 3],
+    pub spacing_m: f32,
+    pub range_m: f32,
+    pub columns: u32,
+    pub least_share: f32,
+    pub capacity: u32,
+}
+
+/// The number of the first crossing of each line, and of all; the crossings, line after line by rising depth; and whether some
+/// line has met more than [`MAX_LAYERS`].
+pub(super) fn met(
+    stages: &Stages,
+    work: &DrawWork<'_>,
+    camera: &ParallelCamera,
+    kept: Kept,
+) -> Result<(Vec<u32>, Vec<Crossing>, bool), RenderError> {
+    let mut crossings = Vec::new();
+    draw_rows(stages, work, (camera, kept), 0..camera.size_px.y, &mut crossings)?;
+    Ok(by_line(camera.pixel_count(), &crossings))
+}
+
+/// Draws some rows, in halves where there is no room for all that they meet.
+fn draw_rows(
+    stages: &Stages,
+    work: &DrawWork<'_>,
+    (camera, kept): (&ParallelCamera, Kept),
+    rows: std::ops::Range<u32>,
+    crossings: &mut Vec<Crossing>,
+) -> Result<(), RenderError> {
+    let limits = stages.gpu.device.limits();
+    let most_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(MOST_BYTES);
+    let most = most_bytes / size_of::<Crossing>() as u64 - SIDES;
+    let size_px = UVec2::new(camera.size_px.x, rows.len() as u32);
+    let part = camera.part(&ViewPart { first_px: UVec2::new(0, rows.start), size_px });
+    let expected = (part.pixel_count() as u64 * EXPECTED_LAYERS).clamp(1024, most);
+    let drawn = Drawn::draw(stages, work, (&part, kept), expected)?;
+    let count = u64::from(drawn.count);
+    let first_line = rows.start * camera.size_px.x;
+    if count <= expected {
+        return drawn.read(stages, work, first_line, crossings);
+    }
+    if count <= most {
+        return Drawn::draw(stages, work, (&part, kept), count)?.read(stages, work, first_line, crossings);
+    }
+    if rows.len() == 1 {
+        return Err(GpuError::check_limit("the surfaces on one row of lines", count, most).err().map_or_else(
+            || GpuError::OutOfMemory("the surfaces on one row of lines".to_owned()).into(),
+            RenderError::from,
+        ));
+    }
+    let middle = rows.start + rows.len() as u32 / 2;
+    draw_rows(stages, work, (camera, kept), rows.start..middle, crossings)?;
+    draw_rows(stages, work, (camera, kept), middle..rows.end, crossings)
+}
+
+/// Crossings on the device.
+struct Drawn {
+    crossings: PooledBuffer,
+    count: u32,
+}
+
+impl Drawn {
+    /// Draws with room for `capacity` crossings; the count is that of all.
+    fn draw(
+        stages: &Stages,
+        work: &DrawWork<'_>,
+        (camera, kept): (&ParallelCamera, Kept),
+        capacity: u64,
+    ) -> Result<Self, RenderError> {
+        let Stages { gpu, pool, raster, .. } = stages;
+        let lines = GpuLines {
+            forward_in_world: camera.axes_in_world()[2].to_array(),
+            spacing_m: camera.spacing_m,
+            range_m: camera.range_m,
+            columns: camera.size_px.x,
+            least_share: kept.least_share(),
+            capacity: capacity as u32,
+        };
+        let lines = gpu.buffer_with("lines", &[lines], BufferUsages::UNIFORM);
+        let crossings = pool.lend_storage("crossings", (capacity + SIDES) * size_of::<Crossing>() as u64);
+        let counter = pool.lend_storage("number of crossings", 4);
+        let memory = [
+            Binding::buffer("lines", &lines),
+            Binding::buffer("crossings", &crossings),
+            Binding::buffer("crossing_count", &counter),
+        ];
+        let mut frame = Frame::begin(gpu, "layers", work.turn);
+        frame.encoder.clear_buffer(&counter, 0, None);
+        raster.record_lines(&mut frame, work, camera, &memory, &depth_target(gpu, camera.size_px))?;
+        let count = read_count(&mut frame, pool, &counter)?;
+        let result = frame.submit()?.wait()?;
+        Ok(Self { count: result.with(count, |words: &[u32]| words[0])?, crossings })
+    }
+
+    fn read(
+        &self,
+        stages: &Stages,
+        work: &DrawWork<'_>,
+        first_line: u32,
+        crossings: &mut Vec<Crossing>,
+    ) -> Result<(), RenderError> {
+        let bytes = u64::from(self.count) * size_of::<Crossing>() as u64;
+        if bytes == 0 {
+            return Ok(());
+        }
+        let mut frame = Frame::begin(&stages.gpu, "read layers", work.turn);
+        let read = frame.read_back(&self.crossings, 0..bytes, stages.pool.lend_host("crossings", bytes));
+        let own = |crossing: &Crossing| Crossing { line: crossing.line + first_line, ..*crossing };
+        let result = frame.submit()?.wait()?;
+        result.with(read, |all: &[Crossing]| crossings.extend(all[..self.count as usize].iter().map(own)))?;
+        Ok(())
+    }
+}
+
+fn read_count(frame: &mut Frame<'_>, pool: &BufferPool, counter: &wgpu::Buffer) -> Result<gpu::Readback, RenderError> {
+    Ok(frame.read_back(counter, 0..4, pool.lend_host("number of crossings", 4)))
+}
+
+/// A pass needs a target, though nothing is drawn into it.
+fn depth_target(gpu: &Gpu, size_px: UVec2) -> wgpu::TextureView {
+    let size = [size_px.x, size_px.y, 1];
+    gpu.texture("lines", size, DrawPass::DEPTH_FORMAT, TextureUsages::RENDER_ATTACHMENT)
+        .create_view(&Default::default())
+}
+
+/// Sorted by line and depth; of equal depths by their words, so that the order in which the device met them is no matter.
+fn by_line(lines: usize, crossings: &[Crossing]) -> (Vec<u32>, Vec<Crossing>, bool) {
+    let mut first = vec![0u32; lines + 1];
+    crossings.iter().for_each(|crossing| first[crossing.line as usize + 1] += 1);
+    let truncated = first.iter().any(|&layers| layers > MAX_LAYERS);
+    (0..lines).for_each(|line| first[line + 1] += first[line]);
+    let mut next = first.clone();
+    let mut sorted = vec![Crossing::zeroed(); crossings.len()];
+    for crossing in crossings {
+        let place = &mut next[crossing.line as usize];
+        sorted[*place as usize] = *crossing;
+        *place += 1;
+    }
+    let key = |c: &Crossing| (c.planar_depth_m.max(0.0).to_bits(), c.plane_normal_oct16, c.surface);
+    let mut rest = &mut *sorted;
+    let mut each: Vec<&mut [Crossing]> = Vec::with_capacity(lines);
+    for ends in first.windows(2) {
+        let (own, others) = rest.split_at_mut((ends[1] - ends[0]) as usize);
+        rest = others;
+        if own.len() > 1 {
+            each.push(own);
+        }
+    }
+    each.into_par_iter().for_each(|own| own.sort_unstable_by_key(key));
+    if !truncated {
+        return (first, sorted, false);
+    }
+    let kept = |ends: &[u32]| ends[0] as usize..ends[0] as usize + (ends[1] - ends[0]).min(MAX_LAYERS) as usize;
+    let shortened = first.windows(2).flat_map(|ends| sorted[kept(ends)].to_vec()).collect();
+    let mut sum = 0;
+    let lengths = first.windows(2).map(|ends| kept(ends).len() as u32);
+    let ends = lengths.map(|length| {
+        sum += length;
+        sum
+    });
+    (std::iter::once(0).chain(ends).collect(), shortened, true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn crossings_are_sorted_by_line_and_depth_in_whatever_order_they_came() {
+        let crossing =
+            |line, planar_depth_m, word| Crossing { line, planar_depth_m, surface: [word; 4], ..Crossing::zeroed() };
+        let mut all = vec![crossing(2, 1.0, 3), crossing(0, 2.0, 1), crossing(0, 0.5, 2), crossing(2, 1.0, 1)];
+        let (first, sorted, truncated) = by_line(4, &all);
+        assert_eq!((first, truncated), (vec![0, 2, 2, 4, 4], false));
+        assert_eq!(sorted.iter().map(|c| c.surface[0]).collect::<Vec<_>>(), [2, 1, 1, 3]);
+        all.reverse();
+        assert_eq!(by_line(4, &all).1, sorted);
+    }
+
+    #[test]
+    fn lines_keep_their_nearest_layers() {
+        let crossing = |line, depth: u32| Crossing { line, planar_depth_m: depth as f32, ..Crossing::zeroed() };
+        let all: Vec<Crossing> = (0..300).rev().map(|depth| crossing(1, depth)).chain([crossing(2, 7)]).collect();
+        let (first, sorted, truncated) = by_line(3, &all);
+        assert_eq!((first, truncated), (vec![0, 0, 255, 256], true));
+        assert_eq!((sorted[254].planar_depth_m, sorted[255].planar_depth_m), (254.0, 7.0));
+    }
+}

@@ -1,0 +1,197 @@
+//! The light of listed surfaces, as their colours and as the shares of lamps that they see.
+
+use bytemuck::Zeroable;
+use depth_image::{ParallelCamera, PixelDepth, ToneMapping};
+use glam::{UVec2, Vec2};
+use gpu::{Binding, Frame, ResourceTraits, ShaderVariant};
+use minijinja::{Value, context, value::merge_maps};
+
+use super::Crossing;
+use crate::accumulation::Sums;
+use crate::batch::{Batch, Part, Recording};
+use crate::pieces::Pieces;
+use crate::pixel_camera::CAMERA_TRAITS;
+use crate::planes::Output;
+use crate::reflections::bounces::{BounceList, GpuBounce, Rays};
+use crate::{RenderError, illuminate, stages::Stages, sums::SumPlanes, work::DrawWork};
+
+/// Surfaces that are lit together: bounds their memory.
+const POINTS_A_LIST: usize = 1 << 18;
+/// Rays begin above a surface by this share of the spacing of lines, and by this share of coordinates: the numbers of `rise.wgsl`.
+const BIAS_SPACINGS: f32 = 0.015_625;
+const BIAS_ROUNDINGS: f32 = 4e-7;
+
+#[derive(Debug)]
+pub(crate) struct Lit {
+    lit: bool,
+    sums: SumPlanes,
+}
+
+impl ShaderVariant for Lit {
+    const TEMPLATE: &'static str = "layered/lit.wgsl";
+    const TRAITS: ResourceTraits = CAMERA_TRAITS;
+
+    fn context(&self) -> Value {
+        merge_maps([context! { single_pole => false, lit => self.lit }, self.sums.context()])
+    }
+
+    fn all() -> Vec<Self> {
+        SumPlanes::all().flat_map(|sums| [false, true].map(|lit| Self { lit, sums })).collect()
+    }
+}
+
+/// What listed surfaces send to all sides, and see of lamps.
+#[derive(Default)]
+pub(super) struct Light {
+    pub color_rgb9e5: Vec<u32>,
+    /// As [`depth_image::SpecularPlanes::visibility8`].
+    pub visibility8: Vec<Vec<u32>>,
+}
+
+/// The light of the crossings of a camera's lines, given with the number of the first of each line.
+pub(super) fn light(
+    stages: &Stages,
+    work: DrawWork<'_>,
+    camera: &ParallelCamera,
+    (first, crossings): (&[u32], &[Crossing]),
+) -> Result<Light, RenderError> {
+    let traced = work.lighting.is_traced().then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
+    let output = Output { samples: true, ..Output::of(work, work.highlight().is_some()) };
+    let batch = Batch {
+        work,
+        cameras: &[],
+        by_rays: false,
+        traced,
+        output,
+        tone: ToneMapping::NONE,
+        sequence: None,
+        position: 0,
+    };
+    let points = Points::of(camera, first);
+    let mut light = Light { visibility8: vec![Vec::new(); output.sums.visibility_words()], ..Light::default() };
+    for (number, listed) in crossings.chunks(POINTS_A_LIST).enumerate() {
+        let first_point = number * POINTS_A_LIST;
+        let bounces: Vec<GpuBounce> =
+            (first_point..).zip(listed).map(|(place, crossing)| points.bounce(place, crossing)).collect();
+        light_list(stages, &batch, &bounces, &mut light)?;
+    }
+    Ok(light)
+}
+
+/// Lights one list of surfaces.
+fn light_list(stages: &Stages, batch: &Batch<'_>, bounces: &[GpuBounce], light: &mut Light) -> Result<(), RenderError> {
+    let Stages { gpu, pool, passes, .. } = stages;
+    let (count, sum_planes) = (bounces.len() as u32, batch.output.sums.count());
+    let plane_bytes = 4 * u64::from(count);
+    let _one = stages.batches.begin(batch.work.turn.class);
+    let lighting = batch.work.lighting;
+    let rays = [lighting.shadow_rays(), lighting.occlusion_rays()].map(|rays| 0..batch.work.refinement.share_of(rays));
+    let sums = pool.lend_storage("light of layers", plane_bytes * sum_planes as u64);
+    let memory = pool.lend_storage("surfaces of layers", size_of_val(bounces) as u64);
+    gpu.queue.write_buffer(&memory, 0, bytemuck::cast_slice(bounces));
+    let planes = 1 + batch.output.sums.visibility_words();
+    let words = pool.lend_storage("colours of layers", plane_bytes * planes as u64);
+    let parts = batch.parts_of_points(gpu, &rays, count);
+    let list = BounceList::of(gpu, count);
+    let points = Rays { bounces: &memory, list: &list, units: u64::from(count), generation: 1 };
+    let frame = Frame::begin(gpu, "light of layers", batch.work.turn);
+    let sum_buffer = (*sums).clone();
+    let (pieces, cameras) = (Pieces { all: Vec::new() }, parts[0].cameras.clone());
+    let sums = Sums { buffer: sums, rays };
+    let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, visit_counts: None, frame };
+    if lighting.is_lit() {
+        illuminate::record_points(&mut recording, &parts, points, &sum_buffer)?;
+    }
+    record(&mut recording, &parts, points, [&sum_buffer, &words])?;
+    let mut frame = recording.frame;
+    let bytes = plane_bytes * planes as u64;
+    let read = frame.read_back(&words, 0..bytes, pool.lend_host("colours of layers", bytes));
+    let result = frame.submit()?.wait()?;
+    result.with(read, |words: &[u32]| {
+        let mut planes = words.chunks(bounces.len());
+        light.color_rgb9e5.extend_from_slice(planes.next().unwrap_or_default());
+        light.visibility8.iter_mut().zip(planes).for_each(|(plane, own)| plane.extend_from_slice(own));
+    })?;
+    Ok(())
+}
+
+/// Records the pass that finishes the colours of listed surfaces.
+fn record(
+    recording: &mut Recording<'_>,
+    parts: &[Part],
+    points: Rays<'_>,
+    [sums, words]: [&wgpu::Buffer; 2],
+) -> Result<(), RenderError> {
+    let variant = Lit { lit: recording.batch.work.lighting.is_lit(), sums: recording.batch.output.sums };
+    let pass = recording.passes.get(&variant)?;
+    let own = bindings([&parts[0].cameras, sums, words], &points);
+    let own = pass.bind(0, own)?;
+    points.dispatch(recording, (&variant, [0; 3]), &pass, &[&own]);
+    Ok(())
+}
+
+fn bindings<'r>([camera, sums, words]: [&'r wgpu::Buffer; 3], points: &'r Rays<'r>) -> Vec<Binding<'r>> {
+    let buffers = [("camera", camera), ("sums", sums), ("words", words)];
+    buffers.into_iter().map(|(name, buffer)| Binding::buffer(name, buffer)).chain(points.bindings()).collect()
+}
+
+/// The surfaces of an image as points to be lit.
+struct Points<'a> {
+    camera: &'a ParallelCamera,
+    first: &'a [u32],
+    /// The number of the first line among those of the same spacing through all space: a part of an image has the noise of the whole.
+    first_line: UVec2,
+    seed: u32,
+}
+
+impl<'a> Points<'a> {
+    fn of(camera: &'a ParallelCamera, first: &'a [u32]) -> Self {
+        let [right, down, forward] = camera.axes_in_world();
+        let corner = Vec2::new(camera.corner_in_world.dot(right), camera.corner_in_world.dot(down)) / camera.spacing_m;
+        let seed = forward.to_array().iter().fold(1, |seed, c| mixed(seed ^ (c * 1024.0).round() as i32 as u32));
+        Self { camera, first, first_line: corner.round().as_ivec2().as_uvec2(), seed }
+    }
+
+    fn bounce(&self, place: usize, crossing: &Crossing) -> GpuBounce {
+        let Self { camera, first, first_line, seed } = *self;
+        let columns = camera.size_px.x;
+        let pixel = UVec2::new(crossing.line % columns, crossing.line / columns);
+        let (planar_depth_m, at) = (crossing.planar_depth_m, pixel.as_vec2() + 0.5);
+        let point = camera.unproject(PixelDepth { pixel: at, planar_depth_m });
+        let layer = place as u32 - first[crossing.line as usize];
+        let line = UVec2::new(first_line.x.wrapping_add(pixel.x), first_line.y.wrapping_add(pixel.y));
+        GpuBounce {
+            point_in_world: point.to_array(),
+            place: place as u32,
+            seed: mixed(mixed(seed ^ line.x) ^ line.y.rotate_left(16) ^ (layer << 8)),
+            side_m: camera.spacing_m,
+            surface: crossing.surface,
+            bias_m: BIAS_SPACINGS * camera.spacing_m + BIAS_ROUNDINGS * point.abs().max_element(),
+            met: 1,
+            ..GpuBounce::zeroed()
+        }
+    }
+}
+
+/// A permutation of all words (Wellons' `lowbias32`).
+fn mixed(word: u32) -> u32 {
+    let a = (word ^ word >> 16).wrapping_mul(0x7feb_352d);
+    let b = (a ^ a >> 15).wrapping_mul(0x846c_a68b);
+    b ^ b >> 16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_support::TestStage;
+
+    #[test]
+    fn every_variant_is_bound_by_its_names() {
+        let stage = TestStage::new();
+        let list = BounceList::new(&stage.gpu);
+        let points = Rays { bounces: &stage.buffer, list: &list, units: 1, generation: 1 };
+        for variant in Lit::all() {
+            stage.check(&variant, 0, &bindings([&stage.buffer; 3], &points));
+        }
+    }
+}
