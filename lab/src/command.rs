@@ -9,6 +9,7 @@ use crate::demo::{self, DemoArgs};
 use crate::failures::command::{self as failures, FailuresArgs};
 use crate::fronts::command::{self as fronts, FrontsArgs};
 use crate::impostors::command::{self as impostors, ImpostorsArgs};
+use crate::layered::command::{self as layered, LayeredArgs};
 use crate::placement::command::{self as placement, PlacementArgs};
 use crate::planner_study::command::{self as planner_study, PlannerArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
@@ -52,6 +53,8 @@ pub enum StudyCommand {
     Placement(PlacementArgs),
     /// Measures how well images of a mirror's surroundings answer its rays
     Impostors(ImpostorsArgs),
+    /// Measures views from layered depth cubes, which hold every surface once
+    Layered(LayeredArgs),
     /// Measures how errors change from frame to frame, and the jump where samples change
     Stability(StabilityArgs),
     /// Compares two reports of `study fronts`
@@ -75,6 +78,7 @@ impl LabCommand {
             Self::Study(StudyCommand::Planner(args)) => planner_study::run(args),
             Self::Study(StudyCommand::Placement(args)) => placement::run(args),
             Self::Study(StudyCommand::Impostors(args)) => impostors::run(args),
+            Self::Study(StudyCommand::Layered(args)) => layered::run(args),
             Self::Study(StudyCommand::Stability(args)) => stability::run(args),
             Self::Study(StudyCommand::Compare(args)) => compare::run(args),
             Self::Study(StudyCommand::Errors(args)) => view_errors::run(args),

@@ -16,6 +16,7 @@ mod experiment;
 mod failures;
 mod fronts;
 mod impostors;
+mod layered;
 mod lighting_study;
 mod load;
 mod memory;

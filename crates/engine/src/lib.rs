@@ -317,6 +317,7 @@ fn reconstruction_error(error: ReconstructionError) -> EngineError {
         ReconstructionError::Camera { .. } => invalid("camera", error),
         ReconstructionError::Sample { .. } | ReconstructionError::SampleCount(_) => invalid("sample_images", error),
         ReconstructionError::Volume => invalid("volume", error),
+        ReconstructionError::NoSamples { .. } => invalid("reconstruction_method", error),
         ReconstructionError::Gpu(error) => gpu_error(error),
         ReconstructionError::Shader(_) | ReconstructionError::MissingPlane { .. } => device(error),
         ReconstructionError::MirrorCells(_) => invalid("mirror_cells", error),

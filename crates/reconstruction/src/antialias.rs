@@ -46,7 +46,8 @@ impl ShaderVariant for Shown {
     fn all() -> Vec<Self> {
         let whole = [Sums::None, Sums::Begun, Sums::Continued, Sums::Read].map(|sums| (sums, false));
         let sums = whole.into_iter().chain([(Sums::Continued, true)]);
-        let sets = SetVariant::all().into_iter().filter(|set| !set.count_fetches && !set.holes);
+        let sets =
+            SetVariant::all().into_iter().filter(|set| !set.count_fetches && !set.holes).chain([SetVariant::CUBE]);
         let each = |set| {
             sums.clone().flat_map(move |(sums, listed)| {
                 [false, true].map(|environment_map| Self { set, sums, listed, environment_map })

@@ -2,7 +2,7 @@
 
 use depth_image::{MAX_MIRROR_CELLS, MAX_REFLECTIONS};
 
-use crate::view_work::MAX_SAMPLE_CAMERAS;
+use crate::{methods::ReconstructionMethod, view_work::MAX_SAMPLE_CAMERAS};
 
 /// Why views cannot be reconstructed.
 #[derive(Debug, thiserror::Error)]
@@ -34,6 +34,8 @@ pub enum ReconstructionError {
         "steps of {coarse_px} and {fine_px} texels: fine ones are 0.0625 at least, coarse ones as long or longer, up to 64"
     )]
     CurvedSearch { coarse_px: f32, fine_px: f32 },
+    #[error("{method} reconstructs views from {needed}, which the sample set lacks")]
+    NoSamples { method: ReconstructionMethod, needed: &'static str },
     #[error("the volume of the sample set is empty or not finite")]
     Volume,
 }

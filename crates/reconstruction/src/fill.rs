@@ -1,7 +1,8 @@
 //! Gives pixels that no camera knows the colour of the farther side of their gap.
 
 use depth_image::VIEW_REACH_PX;
-use gpu::{Binding, shader_variant};
+use gpu::{Binding, ResourceTraits, ShaderVariant};
+use minijinja::Value;
 
 use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
@@ -13,7 +14,22 @@ pub(crate) const SAME_SIDE: f32 = 0.95;
 /// Steps towards known pixels.
 pub(crate) const DIRECTIONS: [[i32; 2]; 8] = [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]];
 
-shader_variant!(Fill(SetVariant), "fill.wgsl", ONE_VIEW);
+/// The switches of `fill.wgsl`.
+#[derive(Debug)]
+pub(crate) struct Fill(SetVariant);
+
+impl ShaderVariant for Fill {
+    const TEMPLATE: &'static str = "fill.wgsl";
+    const TRAITS: ResourceTraits = ONE_VIEW;
+
+    fn context(&self) -> Value {
+        self.0.context()
+    }
+
+    fn all() -> Vec<Self> {
+        SetVariant::all().into_iter().chain([SetVariant::CUBE]).map(Self).collect()
+    }
+}
 
 pub(crate) fn record(recording: &mut Recording<'_>, unknown: &PixelList) -> Result<(), ReconstructionError> {
     let variant = Fill(recording.set.variant());

@@ -6,6 +6,7 @@
 
 mod antialias;
 mod bounce;
+mod cube;
 mod device;
 mod error;
 mod fill;

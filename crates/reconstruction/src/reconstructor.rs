@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use depth_image::{Antialias, DepthImage, PinholeCamera, Ray, View, ViewPlanes};
+use depth_image::{Antialias, CubeGrid, DepthImage, LayeredDepthImage, PinholeCamera, Ray, View, ViewPlanes};
 use glam::Vec2;
 use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
@@ -89,6 +89,19 @@ impl Reconstructor {
         turn: Turn,
     ) -> Result<SampleSet, ReconstructionError> {
         SampleSet::upload(&self.tables, images, set, turn)
+    }
+
+    /// Puts a layered depth cube on the device: the images of the lines along each axis of a grid.
+    ///
+    /// # Errors
+    /// Images that are not those of the grid's lines, a volume that cannot be used, or the device's limits.
+    pub fn upload_cube(
+        &self,
+        grid: &CubeGrid,
+        images: &[LayeredDepthImage; 3],
+        set: &SetDescription<'_>,
+    ) -> Result<SampleSet, ReconstructionError> {
+        SampleSet::upload_cube(&self.tables, grid, images, set, Turn::default())
     }
 
     /// One view a camera, in their order.
@@ -181,6 +194,7 @@ impl Reconstructor {
         for (index, camera) in cameras.iter().enumerate() {
             camera.validate().map_err(|source| ReconstructionError::Camera { index, source })?;
         }
+        set.check_method(method)?;
         let mirrors = mirrors.checked_for(set)?;
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
@@ -308,7 +322,7 @@ impl Reconstructor {
         set: &SampleSet,
         method: ReconstructionMethod,
     ) -> Result<Option<MeshStatistics>, ReconstructionError> {
-        set.check_pinholes()?;
+        set.check_method(method)?;
         Ok(method.mesh(&self.device, set, Turn::default())?.map(|mesh| mesh.statistics))
     }
 
@@ -317,7 +331,7 @@ impl Reconstructor {
     /// # Errors
     /// As [`Reconstructor::mesh_statistics`].
     pub fn read_quads(&self, set: &SampleSet, method: ReconstructionMethod) -> Result<Vec<Quad>, ReconstructionError> {
-        set.check_pinholes()?;
+        set.check_method(method)?;
         let mesh = method.mesh(&self.device, set, Turn::default())?;
         mesh.map_or(Ok(Vec::new()), |mesh| quads::read(&self.device, &mesh, set))
     }

@@ -163,7 +163,8 @@ impl<'r> Recording<'r> {
 
     /// The resources of `view_work.wgsl`.
     pub fn view_bindings(&self) -> Vec<Binding<'_>> {
-        vec![Binding::buffer("work", &self.batch.works), Binding::texture("nodes", &self.set.nodes)]
+        let nodes = (!self.set.cameras.is_empty()).then(|| Binding::texture("nodes", &self.set.nodes));
+        std::iter::once(Binding::buffer("work", &self.batch.works)).chain(nodes).collect()
     }
 
     /// The resources of `view_work.wgsl` and `cell.wgsl`.

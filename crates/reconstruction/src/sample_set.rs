@@ -3,17 +3,18 @@
 use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
-use depth_image::{Aabb, DepthImage, Environment, Highlight, Illumination, PinholeCamera};
+use depth_image::{Aabb, CubeGrid, DepthImage, Environment, Highlight, Illumination, LayeredDepthImage, PinholeCamera};
 use glam::{UVec2, Vec2, Vec3};
 use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
 use wgpu::TextureFormat;
 
 use crate::bounce::mips::{mip_texels, mips};
+use crate::cube::Cube;
 use crate::pyramid::{CodedDepth, Pyramid, is_among_holes};
 use crate::single_pole::{GpuPole, poles};
 use crate::view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant};
-use crate::{error::ReconstructionError, quads::SetMeshes, reflectors::Reflectors};
+use crate::{error::ReconstructionError, methods::ReconstructionMethod, quads::SetMeshes, reflectors::Reflectors};
 
 /// The padding of the volume, in parts of its longest edge. All cameras must still enter a surface on the very face of the
 /// volume, although their samples of a slope are steps.
@@ -55,6 +56,8 @@ pub struct SampleSet {
     pub(crate) reflectors: Option<Reflectors>,
     pub(crate) environment: Option<Arc<GpuEnvironment>>,
     pub(crate) meshes: SetMeshes,
+    /// All surfaces of the scene, where the set has them: instead of images, or beneath them.
+    pub(crate) cube: Option<Arc<Cube>>,
 }
 
 impl SampleSet {
@@ -73,9 +76,14 @@ impl SampleSet {
         !self.poles.is_empty()
     }
 
-    /// Views are reconstructed from pinholes alone.
-    pub(crate) fn check_pinholes(&self) -> Result<(), ReconstructionError> {
-        if self.is_single_pole() { Err(ReconstructionError::Model { model: "single_pole" }) } else { Ok(()) }
+    /// Views are reconstructed from pinholes or from a cube.
+    pub(crate) fn check_method(&self, method: ReconstructionMethod) -> Result<(), ReconstructionError> {
+        if self.is_single_pole() {
+            return Err(ReconstructionError::Model { model: "single_pole" });
+        }
+        let is_there = if method.walks_cube() { self.cube.is_some() } else { !self.cameras.is_empty() };
+        let needed = if method.walks_cube() { "a layered cube" } else { "depth images" };
+        if is_there { Ok(()) } else { Err(ReconstructionError::NoSamples { method, needed }) }
     }
 
     /// The resources of `background.wgsl`.
@@ -134,6 +142,33 @@ impl SampleSet {
             reflectors: Reflectors::upload(tables, images, set.illumination, set.highlight, turn)?,
             environment: set.environment.cloned(),
             meshes: SetMeshes::upload(tables, images, turn)?,
+            cube: None,
+        })
+    }
+
+    /// A layered depth cube, without any other image.
+    pub(crate) fn upload_cube(
+        tables: &TablePool,
+        grid: &CubeGrid,
+        images: &[LayeredDepthImage; 3],
+        set: &SetDescription<'_>,
+        turn: Turn,
+    ) -> Result<Self, ReconstructionError> {
+        check_volume(&set.volume)?;
+        let none = |label| tables.upload(label, TextureFormat::Rg32Uint, &[[0u32; 2]], turn);
+        Ok(Self {
+            cameras: Vec::new(),
+            uncertain: Vec::new(),
+            poles: Vec::new(),
+            volume: gpu_volume(&searched_volume(&set.volume, &[])),
+            background: background_buffer(tables, &set.background),
+            nodes: none("no pyramids")?,
+            cell_codes: none("no cells")?,
+            cell_colors: none("no colours")?,
+            reflectors: None,
+            environment: set.environment.cloned(),
+            meshes: SetMeshes::upload(tables, &[], turn)?,
+            cube: Some(Arc::new(Cube::upload(tables, grid, images, turn)?)),
         })
     }
 }
@@ -180,9 +215,7 @@ fn check(tables: &TablePool, images: &[DepthImage], set: &SetDescription<'_>) ->
     if images.is_empty() || images.len() > MAX_SAMPLE_CAMERAS {
         return Err(ReconstructionError::SampleCount(images.len()));
     }
-    if set.volume.is_empty() || !set.volume.size().is_finite() {
-        return Err(ReconstructionError::Volume);
-    }
+    check_volume(&set.volume)?;
     for (index, image) in images.iter().enumerate() {
         let camera = &image.camera;
         let wrong = |reason: String| ReconstructionError::Sample { index, reason };
@@ -196,6 +229,10 @@ fn check(tables: &TablePool, images: &[DepthImage], set: &SetDescription<'_>) ->
     tables.gpu.check_table("cells", cell_count(images))?;
     tables.gpu.check_table("sample colours", color_count(images, set.mips))?;
     Ok(())
+}
+
+fn check_volume(volume: &Aabb) -> Result<(), ReconstructionError> {
+    if volume.is_empty() || !volume.size().is_finite() { Err(ReconstructionError::Volume) } else { Ok(()) }
 }
 
 /// Each texel's colour and that of the texel below it. The last row is below itself.

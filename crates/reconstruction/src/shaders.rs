@@ -9,6 +9,7 @@ use crate::bounce::{
     BOUNCE_LEVEL, BounceMarch, CurvedWalk, EDGE_COSINE, LEAST_RISE, LEAST_WAY, LONGEST_STEP, Land, MARCH_ROUNDS,
     MAX_BOUNCE_MOVES, MAX_WALK_STEPS, START_FOOTPRINTS,
 };
+use crate::cube::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, HIT_SLACK, MAX_CUBE_STEPS, SQUARE_REACH, WALK_NUDGE};
 use crate::fill::{DIRECTIONS, Fill, REACH_PX, SAME_SIDE};
 use crate::pyramid::{BACKGROUND_CODE, FLAT_FOOTPRINTS, HOLE_CODE, SLOPE_SHARE};
 use crate::surface::{
@@ -20,8 +21,8 @@ use crate::view_work::{CELL_MARGIN_PX, FAR_AWAY, TILE_PX};
 use crate::{methods, pixel_list::LIST_WORKGROUP, quads, specular::Specular};
 
 /// Passes over whole views, and templates that several shaders include.
-const SHADERS: [(&str, &str); 19] = wgsl_files! {
-    "antialias.wgsl", "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "pixel_list.wgsl",
+const SHADERS: [(&str, &str); 22] = wgsl_files! {
+    "antialias.wgsl", "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "found.wgsl", "cube/walk.wgsl", "cube/colors.wgsl", "pixel_list.wgsl",
     "gathered.wgsl", "gather_at.wgsl", "nearest_at.wgsl", "colors.wgsl", "bounce/ray.wgsl", "bounce/spawn.wgsl", "bounce/march.wgsl", "bounce/curved_search.wgsl", "single_pole.wgsl", "bounce/mips.wgsl", "bounce/land.wgsl"
 };
 
@@ -44,6 +45,7 @@ pub fn templates() -> Result<Templates, ShaderError> {
     let constants = wgsl_constants! {
         ANGLE_FLOOR, BACKGROUND_CODE, BORDER_PX, BOUNCE_LEVEL, CARVING_SHARE, CELL_MARGIN_PX, FAR_AWAY, FLAT_FOOTPRINTS,
         GREATEST_TILE_MOVE, HALF_CODE, HALF_DIAGONAL, HIDDEN_WEIGHT, HOLE_CODE, LEAST_SHARE, LEAST_TILE_MOVE,
+        ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, HIT_SLACK, MAX_CUBE_STEPS, SQUARE_REACH, WALK_NUDGE,
         LIST_WORKGROUP, MAX_TILE_MOVES, PROVENANCE_EMPTY, PROVENANCE_FILLED, PROVENANCE_GUESSED, PROVENANCE_HIT, REACH_PX, SAME_SIDE,
         EDGE_COSINE, LEAST_RISE, LEAST_WAY, LONGEST_STEP, MARCH_ROUNDS, MAX_BOUNCE_MOVES, MAX_WALK_STEPS, SLOPE_SHARE, SPLIT_SHIFT, START_FOOTPRINTS, THICKNESS_FOOTPRINTS, TILE_PX, WHOLE
     };

@@ -22,6 +22,7 @@ pub(crate) const ONE_VIEW: ResourceTraits = &[("work", ResourceTrait::DynamicOff
 /// Switches of shaders that include `view_work.wgsl`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SetVariant {
+    /// None of a set that is a layered cube alone.
     pub cameras: usize,
     /// Some texels of the set prove nothing of the space before them.
     pub holes: bool,
@@ -33,6 +34,9 @@ impl SetVariant {
     pub fn context(self) -> Value {
         context! { cameras => self.cameras, holes => self.holes, count_fetches => self.count_fetches }
     }
+
+    /// A set of a layered cube alone.
+    pub const CUBE: Self = Self { cameras: 0, holes: false, count_fetches: false };
 
     pub fn all() -> Vec<Self> {
         let counts = [1, 2, 4, MAX_SAMPLE_CAMERAS].into_iter();

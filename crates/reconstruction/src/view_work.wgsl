@@ -60,12 +60,16 @@ struct ViewWork {
     padding: u32,
     // From a pixel's mean to what it shows.
     tone: Tone,
+{%- if cameras > 0 %}
     cameras: array<SampleCamera, {{ cameras }}>,
+{%- endif %}
 }
 
 @group(0) var<uniform> work: ViewWork;
+{%- if cameras > 0 %}
 // Nodes of the pyramids: a range (nearest code low, farthest high), and the nearest code of 2 × 2 nodes.
 @group(0) var nodes: texture_2d<u32>;
+{%- endif %}
 
 fn first_row() -> u32 { return work.view.rows & 0xffffu; }
 fn end_row() -> u32 { return work.view.rows >> 16u; }

@@ -91,7 +91,7 @@ pub fn pinholes(cameras: &[PinholeCamera]) -> Vec<Camera> {
 }
 
 /// By triangles, so that no measurement of times decides what is drawn.
-fn work(scene: &GpuScene, lighting: Lighting) -> DrawWork<'_> {
+pub fn work(scene: &GpuScene, lighting: Lighting) -> DrawWork<'_> {
     DrawWork {
         scene,
         lighting,

@@ -8,3 +8,5 @@ mod objects;
 mod orders;
 mod reflectance;
 mod single_rays;
+
+pub use measure::around;

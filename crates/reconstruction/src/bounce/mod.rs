@@ -66,7 +66,6 @@ impl Mirrors<'_> {
         if self.reflections > MAX_REFLECTIONS {
             return Err(ReconstructionError::Reflections(self.reflections));
         }
-        set.check_pinholes()?;
         let has_mirrors = set.reflectors.as_ref().is_some_and(|of| of.highlight == Highlight::Ggx);
         Ok(if self.reflections > 0 && has_mirrors { self } else { Self::default() })
     }

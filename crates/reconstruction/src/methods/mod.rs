@@ -5,6 +5,7 @@
 
 pub(crate) mod hybrid_mesh;
 pub(crate) mod joint_carve;
+pub(crate) mod layered;
 pub(crate) mod light_field_search;
 mod mesh;
 
@@ -42,12 +43,14 @@ pub enum ReconstructionMethod {
         /// Blocks of quads that are flat within this bound are merged; `None` merges none.
         merged: Option<ErrorBound>,
     },
+    /// Rays walk through a layered depth cube and meet the planes of its samples.
+    Layered,
 }
 
-use ReconstructionMethod::{HybridMesh, JointCarve, LightFieldSearch, Mesh};
+use ReconstructionMethod::{HybridMesh, JointCarve, Layered, LightFieldSearch, Mesh};
 
 /// All methods by name; the first is the default.
-pub const METHODS: [NamedMethod<ReconstructionMethod>; 4] = [
+pub const METHODS: [NamedMethod<ReconstructionMethod>; 5] = [
     NamedMethod {
         name: "joint_carve",
         method: JointCarve { stop_level: 0 },
@@ -85,6 +88,12 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 4] = [
         }),
         help: "draws a quad for each sample, and merges quads where nothing moves by more than PX pixels",
     },
+    NamedMethod {
+        name: "layered",
+        method: Layered,
+        setting: None,
+        help: "walks through a layered cube, and meets the planes of its samples",
+    },
 ];
 
 /// The steps of the search, and the bound of merged quads in pixels, among which budgets choose.
@@ -92,8 +101,8 @@ const LADDER_STEPS: u32 = 64;
 const LADDER_BOUND_PX: f64 = 0.5;
 
 /// The templates of all methods.
-pub(crate) const SHADERS: [(&str, &str); 7] = wgsl_files! {
-    "joint_carve.wgsl", "joint_carve/march.wgsl", "joint_carve/march_image.wgsl", "joint_carve/smooth.wgsl", "light_field_search.wgsl", "mesh.wgsl", "hybrid_mesh.wgsl"
+pub(crate) const SHADERS: [(&str, &str); 8] = wgsl_files! {
+    "joint_carve.wgsl", "joint_carve/march.wgsl", "joint_carve/march_image.wgsl", "joint_carve/smooth.wgsl", "light_field_search.wgsl", "mesh.wgsl", "hybrid_mesh.wgsl", "layered.wgsl"
 };
 
 /// The numbers that methods share with their shaders.
@@ -106,8 +115,14 @@ pub(crate) fn constants() -> [(&'static str, String); 15] {
 
 /// The texts of all variants of all methods' passes.
 pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    let searches =
-        shader_sources!(templates, joint_carve::march::March, Smooth, joint_carve::Carve, light_field_search::Search);
+    let searches = shader_sources!(
+        templates,
+        joint_carve::march::March,
+        Smooth,
+        joint_carve::Carve,
+        light_field_search::Search,
+        layered::Walk
+    );
     searches.chain(shader_sources!(templates, mesh::CutBetweenSamples, hybrid_mesh::CutTexels))
 }
 
@@ -118,7 +133,7 @@ impl ReconstructionMethod {
     #[must_use]
     pub fn required_planes(self) -> RequiredPlanes {
         match self {
-            LightFieldSearch { .. } | JointCarve { .. } | Mesh => RequiredPlanes::default(),
+            LightFieldSearch { .. } | JointCarve { .. } | Mesh | Layered => RequiredPlanes::default(),
             HybridMesh { .. } => CornerPlanes::REQUIRED,
         }
     }
@@ -133,6 +148,8 @@ impl ReconstructionMethod {
             JointCarve { .. } => vec![JointCarve { stop_level: 1 }, JointCarve { stop_level: 0 }],
             LightFieldSearch { .. } => vec![LightFieldSearch { steps: LADDER_STEPS }],
             Mesh => vec![Mesh],
+            // Budgets choose among sets of images.
+            Layered => Vec::new(),
             HybridMesh { .. } => {
                 vec![HybridMesh { merged: ErrorBound::from_px(LADDER_BOUND_PX) }, HybridMesh { merged: None }]
             }
@@ -145,8 +162,14 @@ impl ReconstructionMethod {
         match self {
             LightFieldSearch { steps } => (steps > 1).then_some(LightFieldSearch { steps: steps / 2 }),
             JointCarve { stop_level } if stop_level < MAX_STOP_LEVEL => Some(JointCarve { stop_level: stop_level + 1 }),
-            JointCarve { .. } | Mesh | HybridMesh { .. } => None,
+            JointCarve { .. } | Mesh | HybridMesh { .. } | Layered => None,
         }
+    }
+
+    /// Views come from a layered cube; those of other methods from depth images.
+    #[must_use]
+    pub fn walks_cube(self) -> bool {
+        matches!(self, Layered)
     }
 
     /// Rays are followed from where their tiles start; other methods draw.
@@ -167,6 +190,7 @@ impl ReconstructionMethod {
             LightFieldSearch { steps } => light_field_search::record(recording, steps),
             JointCarve { stop_level } => joint_carve::record(recording, stop_level, listed),
             Mesh | HybridMesh { .. } => quads::record(drawing, recording, mesh),
+            Layered => layered::record(recording, listed),
         }
     }
 
@@ -178,7 +202,7 @@ impl ReconstructionMethod {
     ) -> Result<Option<PixelList>, ReconstructionError> {
         match self {
             JointCarve { .. } => joint_carve::smooth::record(recording).map(Some),
-            LightFieldSearch { .. } | Mesh | HybridMesh { .. } => Ok(None),
+            LightFieldSearch { .. } | Mesh | HybridMesh { .. } | Layered => Ok(None),
         }
     }
 
@@ -190,7 +214,7 @@ impl ReconstructionMethod {
         turn: Turn,
     ) -> Result<Option<Arc<QuadMesh>>, ReconstructionError> {
         match self {
-            LightFieldSearch { .. } | JointCarve { .. } => Ok(None),
+            LightFieldSearch { .. } | JointCarve { .. } | Layered => Ok(None),
             Mesh => mesh::mesh(device, set, turn).map(Some),
             HybridMesh { merged } => hybrid_mesh::mesh(device, set, merged, turn).map(Some),
         }
@@ -201,7 +225,7 @@ impl ReconstructionMethod {
         match self {
             LightFieldSearch { steps } => Some(steps.to_string()),
             JointCarve { stop_level } => (stop_level > 0).then(|| stop_level.to_string()),
-            Mesh => None,
+            Mesh | Layered => None,
             HybridMesh { merged } => merged.map(|bound| bound.to_string()),
         }
     }

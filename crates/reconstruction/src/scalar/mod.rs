@@ -9,6 +9,7 @@ mod fill;
 mod follow;
 mod hybrid_mesh;
 mod joint_carve;
+mod layered;
 mod light_field_search;
 mod march;
 mod mesh;
@@ -23,6 +24,7 @@ mod view_ray;
 
 pub use self::curved_search::SinglePoleImages;
 pub use self::follow::PinholeImages;
+pub use self::layered::CubeTwin;
 pub use self::mips::ColorMips;
 use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};
 use glam::{UVec2, Vec3};
@@ -207,7 +209,9 @@ pub fn quads(images: &[DepthImage], method: ReconstructionMethod) -> Option<Vec<
         ReconstructionMethod::HybridMesh { merged } => {
             Some(images().flat_map(|(n, image)| hybrid_mesh::quads(n, image, merged)).collect())
         }
-        ReconstructionMethod::LightFieldSearch { .. } | ReconstructionMethod::JointCarve { .. } => None,
+        ReconstructionMethod::LightFieldSearch { .. }
+        | ReconstructionMethod::JointCarve { .. }
+        | ReconstructionMethod::Layered => None,
     }
 }
 
@@ -238,6 +242,7 @@ fn pixels_from(cameras: &[SampleCamera], rays: &ViewRays, starts: &[f32], method
                 ReconstructionMethod::Mesh | ReconstructionMethod::HybridMesh { .. } => {
                     unreachable!("meshes are drawn, not searched")
                 }
+                ReconstructionMethod::Layered => unreachable!("it walks through a cube, not through images"),
             }
         })
         .collect()

@@ -5,6 +5,7 @@ mod background;
 mod batches;
 mod closed_form;
 mod holes_and_limits;
+mod layered;
 mod merging;
 mod mesh_limits;
 mod meshes;

@@ -232,7 +232,7 @@ pub fn assert_sane(view: &View, what: &str) {
     assert!(depths(view).iter().all(|d| d.is_finite() && *d >= 0.0), "{what}: a depth is not one");
 }
 
-fn plainly_lit(scene: &GpuScene) -> DrawWork<'_> {
+pub fn plainly_lit(scene: &GpuScene) -> DrawWork<'_> {
     DrawWork {
         scene,
         lighting: Lighting::default(),

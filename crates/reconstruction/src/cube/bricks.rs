@@ -1,0 +1,118 @@
+//! A cube's samples in voxels, for rays: cells of 8 spacings, bricks of 4 × 4 × 4 voxels in those that have samples, and entries.
+
+use glam::UVec3;
+
+use super::distances::distances;
+use super::samples::CubeSamples;
+
+/// Steeper planes are no entries: another axis holds them. A sample is met where its normal has this share along the line at least.
+pub(crate) const LEAST_SHARE: f32 = 0.5;
+/// Planes reach no farther from their sample along the line, in spacings: `HALF_SQUARE` times the greatest sum of both slopes.
+const MOST_REACH: f32 = 1.4;
+/// An entry's depth is counted from this far below its voxel, in these steps, in spacings.
+pub(crate) const ENTRY_DEPTH_BELOW: f32 = MOST_REACH;
+pub(crate) const ENTRY_DEPTH_STEP: f32 = (2.0 * MOST_REACH + VOXEL) / 16383.0;
+/// The side of a voxel, in spacings.
+const VOXEL: f32 = 2.0;
+/// Samples reach over the square of their line a little; so do their planes.
+const HALF_SQUARE: f32 = 0.55;
+/// A cell that is a brick.
+const BRICK: u32 = 1 << 31;
+
+/// The tables of `cube/walk.wgsl`.
+pub(super) struct Bricks {
+    /// Of cells.
+    pub columns: u32,
+    pub rows: u32,
+    pub cells: Vec<u32>,
+    pub bricks: Vec<[u32; 4]>,
+    pub leaves: Vec<[u32; 2]>,
+    pub entries: Vec<[u32; 2]>,
+}
+
+/// A sample whose plane passes through a voxel.
+#[derive(Clone, Copy, Default)]
+struct Passage {
+    /// Within its brick.
+    voxel: u32,
+    words: [u32; 2],
+}
+
+impl Bricks {
+    pub fn of(samples: &CubeSamples) -> Self {
+        let size = samples.size.map(|side| side.div_ceil(8));
+        let (first, passages) = by_cell(samples, size);
+        let occupied: Vec<bool> = first.windows(2).map(|ends| ends[1] > ends[0]).collect();
+        let mut all = Self {
+            columns: size.x,
+            rows: size.y,
+            cells: distances(size, &occupied),
+            bricks: Vec::new(),
+            leaves: Vec::new(),
+            entries: passages.iter().map(|passage| passage.words).collect(),
+        };
+        for (cell, ends) in first.windows(2).enumerate().filter(|(_, ends)| ends[1] > ends[0]) {
+            all.cells[cell] = BRICK | all.bricks.len() as u32;
+            all.add_brick(ends[0], &passages[ends[0] as usize..ends[1] as usize]);
+        }
+        all
+    }
+
+    /// A brick of passages that are sorted by voxel.
+    fn add_brick(&mut self, mut first: u32, passages: &[Passage]) {
+        let mut mask = [0; 2];
+        let first_leaf = self.leaves.len() as u32;
+        for leaf in passages.chunk_by(|a, b| a.voxel == b.voxel) {
+            mask[leaf[0].voxel as usize / 32] |= 1 << (leaf[0].voxel % 32);
+            let end = first + leaf.len() as u32;
+            self.leaves.push([first, end]);
+            first = end;
+        }
+        self.bricks.push([mask[0], mask[1], first_leaf, 0]);
+    }
+}
+
+/// The first passage of each cell, and the passages, sorted by cell and voxel.
+fn by_cell(samples: &CubeSamples, size: UVec3) -> (Vec<u32>, Vec<Passage>) {
+    let mut first = vec![0u32; size.element_product() as usize + 1];
+    each_passage(samples, size, |cell, _| first[cell + 1] += 1);
+    (1..first.len()).for_each(|cell| first[cell] += first[cell - 1]);
+    let mut next = first.clone();
+    let mut passages = vec![Passage::default(); first.last().copied().unwrap_or(0) as usize];
+    each_passage(samples, size, |cell, passage| {
+        passages[next[cell] as usize] = passage;
+        next[cell] += 1;
+    });
+    for ends in first.windows(2) {
+        passages[ends[0] as usize..ends[1] as usize].sort_by_key(|passage| passage.voxel);
+    }
+    (first, passages)
+}
+
+/// Calls `take` for each voxel that a sample's plane passes through, with the voxel's cell.
+fn each_passage(samples: &CubeSamples, size: UVec3, mut take: impl FnMut(usize, Passage)) {
+    for sample in 0..samples.len() {
+        let line = samples.line[sample];
+        let axis = samples.axis_of(line);
+        if samples.normal[sample][axis].abs() < LEAST_SHARE {
+            continue;
+        }
+        let (place, depth) = (samples.place_of(axis, line), samples.depth[sample]);
+        let reach =
+            samples.slopes(sample, axis).iter().map(|slope| slope.abs() * HALF_SQUARE).sum::<f32>().min(MOST_REACH);
+        let last = (samples.size[axis] - 1) / 2;
+        let [from, to] = [depth - reach, depth + reach].map(|end| ((end / VOXEL).floor().max(0.0) as u32).min(last));
+        let mut voxel = UVec3::ZERO;
+        (voxel[(axis + 1) % 3], voxel[(axis + 2) % 3]) = (place.x / 2, place.y / 2);
+        let of_line = (place.x & 1) << (28 + (axis + 1) % 3) | (place.y & 1) << (28 + (axis + 2) % 3);
+        let normal = u32::from(samples.normal_oct8(sample)) | (axis as u32) << 30;
+        for along in from..=to {
+            voxel[axis] = along;
+            let below = (depth - along as f32 * VOXEL + ENTRY_DEPTH_BELOW) / ENTRY_DEPTH_STEP;
+            let words = [sample as u32 | of_line, normal | (below.round().clamp(0.0, 16383.0) as u32) << 16];
+            let (cell, within) = (voxel / 4, voxel % 4);
+            let number = within.x + 4 * within.y + 16 * within.z;
+            take((cell.x + size.x * (cell.y + size.y * cell.z)) as usize, Passage { voxel: number, words });
+        }
+    }
+}

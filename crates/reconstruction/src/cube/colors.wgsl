@@ -1,0 +1,39 @@
+// The colour of a layered depth cube's surface: between the four lines around a place, of the samples that lie on one surface.
+
+// Colour; how many samples before and after its own those on the same surface in the neighbouring lines along the next axis are, in
+// two halves; their numbers in the lines before and after along the axis after that.
+@group(0) var cube_samples: texture_2d<u32>;
+
+struct CubeSample { color_linear: vec3f, number: u32, links: vec3u }
+
+fn cube_sample(number: u32) -> CubeSample {
+{% if count_fetches %}    fetches += 1u;
+{% endif %}
+    let words = textureLoad(cube_samples, texel_at(number), 0);
+    return CubeSample(linear_from_rgb9e5(words.x), number, words.yzw);
+}
+
+// The sample of one surface on a neighbouring line; a sample is its own neighbour where there is none.
+fn beside(own: CubeSample, is_after: bool) -> CubeSample {
+    let distance = select(own.number - (own.links.x & 0xffffu), own.number + (own.links.x >> 16u), is_after);
+    return cube_sample(distance);
+}
+
+fn below(own: CubeSample, is_after: bool) -> CubeSample { return cube_sample(select(own.links.y, own.links.z, is_after)); }
+
+fn color_at(hit: CubeHit) -> vec3f {
+    // Within the line's square, from its middle.
+    let place = along(hit.axis, hit.off).yz;
+    let is_after = place > vec2f(0.0);
+    let own = cube_sample(hit.sample);
+    let column = beside(own, is_after.x);
+    let row = below(own, is_after.y);
+    let corner = below(column, is_after.y);
+    // What is not on the surface does not count.
+    let found = vec3<bool>(column.number != own.number, row.number != own.number, corner.number != column.number);
+    let at = min(abs(place), vec2f(0.5));
+    let shares = vec4f((1.0 - at.x) * (1.0 - at.y), at.x * (1.0 - at.y), (1.0 - at.x) * at.y, at.x * at.y)
+        * vec4f(1.0, select(0.0, 1.0, found.x), select(0.0, 1.0, found.y), select(0.0, 1.0, found.x && found.z));
+    let sum = own.color_linear * shares.x + column.color_linear * shares.y + row.color_linear * shares.z + corner.color_linear * shares.w;
+    return sum / dot(shares, vec4f(1.0));
+}

@@ -1,0 +1,124 @@
+//! A layered depth cube on the device: its samples as bricks for rays to walk through, and as lines for their colours.
+
+mod bricks;
+mod distances;
+mod links;
+mod samples;
+
+use bytemuck::{Pod, Zeroable};
+use depth_image::{CubeGrid, LayeredDepthImage};
+use glam::Vec3;
+use gpu::{Binding, GpuError, Table, TablePool, Turn};
+use wgpu::{BufferUsages, TextureFormat};
+
+#[cfg(feature = "scalar")]
+pub(crate) use bricks::LEAST_SHARE;
+pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP};
+#[cfg(feature = "scalar")]
+pub(crate) use links::Links;
+pub(crate) use links::links;
+pub(crate) use samples::CubeSamples;
+
+use self::bricks::Bricks;
+use crate::error::ReconstructionError;
+
+/// A ray steps this far into the next box, in spacings: more than the rounding of coordinates.
+pub(crate) const WALK_NUDGE: f32 = 2e-3;
+/// A surface that is met so far outside of its voxel counts, in spacings.
+pub(crate) const HIT_SLACK: f32 = 0.1;
+/// Samples reach a little over the middle between two lines, in spacings: no ray passes between two squares.
+pub(crate) const SQUARE_REACH: f32 = 0.55;
+/// Steps of a ray, of which each crosses a voxel or empty cells.
+pub(crate) const MAX_CUBE_STEPS: u32 = 4096;
+/// Samples of neighbouring lines are of one surface where one lies within this distance of the other's plane, in spacings.
+pub(crate) const SAME_PLANE: f32 = 0.75;
+/// Bits of an entry for a sample's number.
+const MAX_SAMPLES: usize = 1 << 28;
+
+/// `Cube` of `cube/walk.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuCube {
+    pub cube_from_world: [[f32; 4]; 3],
+    pub size: [u32; 3],
+    pub columns: u32,
+    pub rows: u32,
+    pub padding: [u32; 3],
+}
+
+/// A layered depth cube, ready to be walked through.
+pub(crate) struct Cube {
+    own: wgpu::Buffer,
+    cells: Table,
+    bricks: Table,
+    leaves: Table,
+    entries: Table,
+    samples: Table,
+    /// Some line has met more surfaces than it holds.
+    pub truncated: bool,
+}
+
+impl Cube {
+    /// Fails for images that are not those of the grid's lines, and beyond the device's limits.
+    pub fn upload(
+        tables: &TablePool,
+        grid: &CubeGrid,
+        images: &[LayeredDepthImage; 3],
+        turn: Turn,
+    ) -> Result<Self, ReconstructionError> {
+        check(grid, images)?;
+        let count: usize = images.iter().map(LayeredDepthImage::sample_count).sum();
+        GpuError::check_limit("the samples of a layered cube", count as u64, MAX_SAMPLES as u64)?;
+        tables.gpu.check_table("samples of a layered cube", count)?;
+        let samples = CubeSamples::of(grid, images);
+        let bricks = Bricks::of(&samples);
+        let words = samples.words(&links(&samples));
+        let cube = GpuCube {
+            cube_from_world: cube_from_world(grid),
+            size: grid.size.to_array(),
+            columns: bricks.columns,
+            rows: bricks.rows,
+            padding: [0; 3],
+        };
+        Ok(Self {
+            own: tables.gpu.buffer_with("cube", &[cube], BufferUsages::UNIFORM),
+            cells: tables.upload("cells of a cube", TextureFormat::R32Uint, &bricks.cells, turn)?,
+            bricks: tables.upload("bricks of a cube", TextureFormat::Rgba32Uint, &bricks.bricks, turn)?,
+            leaves: tables.upload("leaves of a cube", TextureFormat::Rg32Uint, &bricks.leaves, turn)?,
+            entries: tables.upload("entries of a cube", TextureFormat::Rg32Uint, &bricks.entries, turn)?,
+            samples: tables.upload("samples of a cube", TextureFormat::Rgba32Uint, &words, turn)?,
+            truncated: images.iter().any(|image| image.truncated),
+        })
+    }
+
+    /// The resources of `cube/walk.wgsl` and `cube/colors.wgsl`.
+    pub fn bindings(&self) -> [Binding<'_>; 6] {
+        [
+            Binding::buffer("cube", &self.own),
+            Binding::texture("cube_cells", &self.cells),
+            Binding::texture("cube_bricks", &self.bricks),
+            Binding::texture("cube_leaves", &self.leaves),
+            Binding::texture("cube_entries", &self.entries),
+            Binding::texture("cube_samples", &self.samples),
+        ]
+    }
+}
+
+fn check(grid: &CubeGrid, images: &[LayeredDepthImage; 3]) -> Result<(), ReconstructionError> {
+    for (index, image) in images.iter().enumerate() {
+        let wrong = |reason: String| ReconstructionError::Sample { index, reason };
+        image.validate().map_err(|error| wrong(error.to_string()))?;
+        if image.camera != grid.camera(index) {
+            return Err(wrong(format!("its lines are not those of the cube's grid along axis {index}")));
+        }
+    }
+    Ok(())
+}
+
+/// Rows that take a point of the world to the cube's space, in spacings from its corner.
+fn cube_from_world(grid: &CubeGrid) -> [[f32; 4]; 3] {
+    [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| {
+        let row = grid.world_from_cube * axis / grid.spacing_m;
+        row.extend(-row.dot(grid.corner_in_world)).to_array()
+    })
+}

@@ -1,0 +1,112 @@
+//! The samples of a cube's three images, in the cube's own space.
+
+use depth_image::{CubeGrid, LayeredDepthImage, oct8_from_unit};
+use glam::{UVec2, UVec3, Vec3};
+use rayon::prelude::*;
+
+use super::links::Links;
+
+/// The samples of all lines: those along the first axis, then the second, then the third; along each axis line after line, by the
+/// coordinate along the next axis first. Lengths are in spacings.
+pub(crate) struct CubeSamples {
+    /// Cells along each axis.
+    pub size: UVec3,
+    /// The number of the first line along each axis.
+    pub first_line: [u32; 3],
+    /// The first sample of each line, and at last the number of samples.
+    pub first: Vec<u32>,
+    /// Along the line's axis; does not fall along a line.
+    pub depth: Vec<f32>,
+    /// Unit normals in the cube's space.
+    pub normal: Vec<Vec3>,
+    pub color_rgb9e5: Vec<u32>,
+    /// The line of each sample.
+    pub line: Vec<u32>,
+}
+
+impl CubeSamples {
+    /// The samples of images along the grid's axes.
+    pub fn of(grid: &CubeGrid, images: &[LayeredDepthImage; 3]) -> Self {
+        let count = images.iter().map(LayeredDepthImage::sample_count).sum();
+        let lines: usize = images.iter().map(|image| image.camera.pixel_count()).sum();
+        let mut all = Self {
+            size: grid.size,
+            first_line: [0; 3],
+            first: Vec::with_capacity(lines + 1),
+            depth: Vec::with_capacity(count),
+            normal: Vec::with_capacity(count),
+            color_rgb9e5: Vec::with_capacity(count),
+            line: Vec::with_capacity(count),
+        };
+        (0..3).for_each(|axis| all.append(grid, axis, &images[axis]));
+        all.first.push(all.depth.len() as u32);
+        all
+    }
+
+    /// Lines look against their axis: their samples turn round.
+    fn append(&mut self, grid: &CubeGrid, axis: usize, image: &LayeredDepthImage) {
+        self.first_line[axis] = self.first.len() as u32;
+        let [columns, rows] = image.camera.size_px.to_array();
+        let cube_from_world = grid.world_from_cube.inverse();
+        let end = self.size[axis] as f32;
+        for row in (0..rows).rev() {
+            for column in 0..columns {
+                let line = self.first.len() as u32;
+                self.first.push(self.depth.len() as u32);
+                for sample in image.line((row * columns + column) as usize).rev() {
+                    self.depth.push((end - image.planar_depth_m[sample] / grid.spacing_m).clamp(0.0, end));
+                    self.normal.push(cube_from_world * image.plane_normal_in_world(sample));
+                    self.color_rgb9e5.push(image.color_rgb9e5[sample]);
+                    self.line.push(line);
+                }
+            }
+        }
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.depth.len()
+    }
+
+    /// The axis of a line.
+    pub fn axis_of(&self, line: u32) -> usize {
+        usize::from(line >= self.first_line[1]) + usize::from(line >= self.first_line[2])
+    }
+
+    /// The place of a line among those of its axis, along the next axis and the one after it.
+    pub fn place_of(&self, axis: usize, line: u32) -> UVec2 {
+        let (place, columns) = (line - self.first_line[axis], self.size[(axis + 1) % 3]);
+        UVec2::new(place % columns, place / columns)
+    }
+
+    /// The samples of a line.
+    pub fn on_line(&self, line: u32) -> std::ops::Range<usize> {
+        self.first[line as usize] as usize..self.first[line as usize + 1] as usize
+    }
+
+    /// The texels of `cube_samples` in `cube/colors.wgsl`.
+    pub(super) fn words(&self, links: &[Links]) -> Vec<[u32; 4]> {
+        let words = |sample: usize| {
+            let [before, after, above, below] = links[sample];
+            let beside = (sample as u32 - before) | (after - sample as u32) << 16;
+            [self.color_rgb9e5[sample], beside, above, below]
+        };
+        (0..self.len()).into_par_iter().map(words).collect()
+    }
+
+    /// Slopes of a sample's plane: how far it moves along its line from one line to the next, along the next axis and the one after
+    /// it.
+    pub(super) fn slopes(&self, sample: usize, axis: usize) -> [f32; 2] {
+        let normal = self.normal[sample];
+        let own = if normal[axis].abs() < LEAST_SHARE { LEAST_SHARE.copysign(normal[axis]) } else { normal[axis] };
+        [1, 2].map(|offset| -normal[(axis + offset) % 3] / own)
+    }
+
+    /// Octahedral in two bytes.
+    pub(super) fn normal_oct8(&self, sample: usize) -> u16 {
+        oct8_from_unit(self.normal[sample])
+    }
+}
+
+/// Steeper planes count as being as steep as this.
+const LEAST_SHARE: f32 = 1e-3;

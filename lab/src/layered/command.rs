@@ -1,0 +1,113 @@
+//! The command and its report.
+
+use std::path::PathBuf;
+
+use app_core::exit::Outcome;
+use app_core::setup::DeviceArgs;
+use clap::Args;
+use engine::GpuEngine;
+use node::Engine as _;
+use render::{Direct, Lighting, Rate};
+use study::{Bar, Check, Report, Table};
+
+use super::cubes;
+use super::subject::Subject;
+use super::views::{self, Figures};
+use crate::failures::stand::Stand;
+use crate::progress::bar;
+
+/// Sides of cubes, in texels of the longest edge. The one that holds and costs are measured of is the second.
+const SIDES: [u32; 3] = [256, 512, 1024];
+const SCENES: [&str; 6] = ["courtyard", "tree", "tree-terrain-500k", "grass", "urban", "bird-nest"];
+/// Scenes of a quick run.
+const QUICK: usize = 3;
+const VIEWS: [usize; 2] = [24, 6];
+const LIGHTING: Lighting = Lighting { direct: Direct::Phong, occlusion: None, reflections: None, rate: Rate::Full };
+/// The loads of a ray in a cube of 512².
+const MOST_LOADS: f64 = 30.0;
+const MOST_LOADS_IN_TREE: f64 = 40.0;
+/// PSNR of the views around `courtyard` from a cube of 1024², and of the worst of them.
+const LEAST_PSNR_DB: [f64; 2] = [33.0, 31.5];
+
+/// Samples scenes on the lines along three axes, all surfaces behind one another, and walks through these samples for views from
+/// all around. Compares the views with direct drawing, and with those of joint_carve from depth images near each view.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  myriorama study layered
+  myriorama study layered --quick --strict   fewer scenes and views; exit status 1 if a bar is missed")]
+pub struct LayeredArgs {
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// Three scenes in place of six, and six views of each in place of 24
+    #[arg(long)]
+    quick: bool,
+    /// Exit status 1 if a bar is missed
+    #[arg(long)]
+    strict: bool,
+    /// Where the report goes
+    #[arg(long, default_value = "out/study/layered", value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Measures all scenes and writes the report.
+///
+/// # Errors
+/// The device fails, or the folder cannot be written.
+pub fn run(args: &LayeredArgs) -> anyhow::Result<Outcome> {
+    let engine = GpuEngine::shared(args.device.device)?;
+    let stand = Stand::new(&engine, false);
+    let mut report = Report::new("Myriorama study: layered depth cubes", engine.device_name());
+    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    report.parameter("lighting", LIGHTING.to_string());
+    let scenes = &SCENES[..if args.quick { QUICK } else { SCENES.len() }];
+    let progress = bar("scenes", scenes.len() * (SIDES.len() + 1));
+    let (mut held, mut seen) = (cubes::table(), views::table());
+    for &name in scenes {
+        let subject = Subject::new(&stand, name, LIGHTING, VIEWS[usize::from(args.quick)])?;
+        let images = views::of_images(&subject)?;
+        seen.push(images.row(name, "joint_carve"))?;
+        progress.inc(1);
+        for side in SIDES {
+            let checks = of_side(&subject, side, &images, (&mut held, &mut seen))?;
+            report.checks.extend(checks);
+            progress.inc(1);
+        }
+    }
+    progress.finish_and_clear();
+    report.tables.extend([held, seen]);
+    report.tables.iter().for_each(|table| println!("{}", table.to_text()));
+    let holds = report.finish(&args.out)?;
+    Ok(Outcome::of(holds || !args.strict))
+}
+
+/// The rows and checks of a cube of one side.
+fn of_side(
+    subject: &Subject<'_>,
+    side: u32,
+    images: &Figures,
+    (held, seen): (&mut Table, &mut Table),
+) -> anyhow::Result<Vec<Check>> {
+    let (cube, mut checks) = match side == SIDES[1] {
+        true => cubes::measure(subject, side, held)?,
+        false => (subject.cube((side, render::Kept::Dominant), subject.lighting, 1)?, Vec::new()),
+    };
+    let walk = views::of_cube(subject, &subject.upload(&cube)?.0)?;
+    seen.push(walk.row(subject.name, &format!("layered, {side}²")))?;
+    checks.extend(views::cost_check(subject.name, side, &walk, images));
+    let name = subject.name;
+    if side == SIDES[1] {
+        let most = if name == "tree" { MOST_LOADS_IN_TREE } else { MOST_LOADS };
+        checks.push(Check::new(format!("{name}: loads a ray, {side}²"), walk.loads, "", Bar::AtMost(most)));
+    }
+    if (name, side) == ("courtyard", SIDES[2]) {
+        let [mean, worst] = LEAST_PSNR_DB;
+        checks.push(Check::new(
+            format!("{name}: PSNR of views around, {side}²"),
+            walk.psnr_db,
+            "dB",
+            Bar::AtLeast(mean),
+        ));
+        checks.push(Check::new(format!("{name}: the worst of them"), walk.worst_psnr_db, "dB", Bar::AtLeast(worst)));
+    }
+    Ok(checks)
+}

@@ -1,0 +1,68 @@
+//! What cubes hold and cost: samples, layers and seconds, with all surfaces of each line and with those of the dominant axis.
+
+use depth_image::LayeredDepthImage;
+use render::{Kept, Lighting};
+use study::{Bar, Cell, Check, Table};
+
+use super::subject::{Cube, Subject};
+
+/// The greatest share of the samples of all surfaces that those of the dominant axis may be.
+const MOST_SHARE: [(&str, f64); 4] = [("tree", 0.75), ("grass", 0.75), ("tree-terrain-500k", 0.75), ("bird-nest", 0.8)];
+/// For other scenes.
+const MOST_SHARE_ELSEWHERE: f64 = 1.0;
+/// The scene whose layers are timed, and the bound of their seconds without light.
+const TIMED: (&str, f64) = ("tree-terrain-500k", 1.0);
+/// Times that a cube is sampled; the fastest counts.
+const TIMES: usize = 3;
+
+pub fn table() -> Table {
+    let columns = [
+        ("scene", ""),
+        ("triangles", ""),
+        ("samples of all surfaces", ""),
+        ("samples", ""),
+        ("share", ""),
+        ("mean layers", ""),
+        ("most layers", ""),
+        ("layers", "s"),
+        ("with light", "s"),
+        ("load", "s"),
+    ];
+    Table::new("Cubes: samples on the lines along three axes, and seconds", &columns)
+}
+
+/// A row of the table, and its checks. Gives the cube with the light of the study.
+///
+/// # Errors
+/// The device fails.
+pub fn measure(subject: &Subject<'_>, side: u32, table: &mut Table) -> anyhow::Result<(Cube, Vec<Check>)> {
+    let all = subject.cube((side, Kept::All), Lighting::UNLIT, 1)?;
+    let layers = subject.cube((side, Kept::Dominant), Lighting::UNLIT, TIMES)?;
+    // The first use of a light builds shaders.
+    let cube = subject.cube((side, Kept::Dominant), subject.lighting, 2)?;
+    drop(subject.upload(&cube)?);
+    let load_s = subject.upload(&cube)?.1;
+    let share = cube.samples() as f64 / all.samples() as f64;
+    let lines: usize = cube.images.iter().map(|image| image.camera.pixel_count()).sum();
+    let most_layers = all.images.iter().map(LayeredDepthImage::layer_count).max().unwrap_or(0);
+    table.push([
+        Cell::from(subject.name),
+        Cell::from(subject.scene.triangle_count() as usize),
+        Cell::from(all.samples()),
+        Cell::from(cube.samples()),
+        Cell::from(share),
+        Cell::from(all.samples() as f64 / lines as f64),
+        Cell::from(most_layers),
+        Cell::from(layers.sample_s),
+        Cell::from(cube.sample_s),
+        Cell::from(load_s),
+    ])?;
+    let bar = MOST_SHARE.iter().find(|(name, _)| *name == subject.name).map_or(MOST_SHARE_ELSEWHERE, |(_, bar)| *bar);
+    let mut checks =
+        vec![Check::new(format!("{}: samples over those of all surfaces", subject.name), share, "", Bar::AtMost(bar))];
+    if subject.name == TIMED.0 {
+        let name = format!("{}: layers of a cube of {side}², without light", subject.name);
+        checks.push(Check::new(name, layers.sample_s, "s", Bar::AtMost(TIMED.1)));
+    }
+    Ok((cube, checks))
+}

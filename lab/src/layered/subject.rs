@@ -1,0 +1,91 @@
+//! A scene with its views, and cubes of it.
+
+use std::time::Instant;
+
+use anyhow::Context as _;
+use depth_image::{CubeGrid, LayeredDepthImage, PinholeCamera, View, ViewPlanes};
+use reconstruction::{SampleSet, SetDescription};
+use render::{GpuScene, Kept, Lighting};
+use scene::{Limits, MissingTextures, Scene, SceneSpec};
+
+use crate::failures::stand::{Stand, work};
+use crate::impostors::around;
+
+/// A scene on the device, and views around it, drawn directly.
+pub struct Subject<'s> {
+    pub stand: &'s Stand,
+    pub name: &'static str,
+    pub scene: Scene,
+    pub on_device: GpuScene,
+    pub lighting: Lighting,
+    pub views: Vec<PinholeCamera>,
+    pub truths: Vec<View>,
+}
+
+/// A layered depth cube of a scene, and the seconds that it took.
+pub struct Cube {
+    pub grid: CubeGrid,
+    pub images: [LayeredDepthImage; 3],
+    pub sample_s: f64,
+}
+
+impl<'s> Subject<'s> {
+    /// Loads a built-in scene and draws views on a circle around it.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn new(stand: &'s Stand, name: &'static str, lighting: Lighting, views: usize) -> anyhow::Result<Self> {
+        let scene = name.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?;
+        let on_device = stand.upload(&scene)?;
+        let views = around(&scene.bounds(), views);
+        let truths = stand.views(&on_device, lighting, &views, ViewPlanes::WITH_DEPTH)?;
+        Ok(Self { stand, name, scene, on_device, lighting, views, truths })
+    }
+
+    /// Samples and lights a cube; the fastest of several times counts.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn cube(&self, (side, kept): (u32, Kept), lighting: Lighting, times: usize) -> anyhow::Result<Cube> {
+        let grid = CubeGrid::around(&self.scene.bounds(), side)?;
+        let draw = || -> anyhow::Result<Cube> {
+            let start = Instant::now();
+            let image = |axis| {
+                self.stand.engine().renderer.draw_layers(work(&self.on_device, lighting), &grid.camera(axis), kept)
+            };
+            let images = [image(0)?, image(1)?, image(2)?];
+            Ok(Cube { grid, images, sample_s: start.elapsed().as_secs_f64() })
+        };
+        let all = (0..times).map(|_| draw()).collect::<anyhow::Result<Vec<Cube>>>()?;
+        all.into_iter().min_by(|a, b| a.sample_s.total_cmp(&b.sample_s)).context("a cube")
+    }
+
+    /// Puts a cube on the device. Gives also the seconds.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn upload(&self, cube: &Cube) -> anyhow::Result<(SampleSet, f64)> {
+        let start = Instant::now();
+        let set = self.stand.reconstructor().upload_cube(&cube.grid, &cube.images, &self.description())?;
+        Ok((set, start.elapsed().as_secs_f64()))
+    }
+
+    /// What all images of the scene share. Highlights are left away.
+    pub fn description(&self) -> SetDescription<'_> {
+        SetDescription {
+            volume: self.scene.bounds(),
+            background: self.scene.background,
+            illumination: &self.scene.illumination,
+            highlight: None,
+            environment: None,
+            mips: false,
+        }
+    }
+}
+
+impl Cube {
+    /// Samples of all three images.
+    pub fn samples(&self) -> usize {
+        self.images.iter().map(LayeredDepthImage::sample_count).sum()
+    }
+}
