@@ -193,6 +193,12 @@ impl Engine for GpuEngine {
             return Ok(SamplePlanes::default());
         }
         let method: ReconstructionMethod = parsed("reconstruction_method", method)?;
+        if method.walks_cube() {
+            return Err(invalid(
+                "reconstruction_method",
+                format!("{method} needs a layered cube, which clusters do not sample yet"),
+            ));
+        }
         let RequiredPlanes { normal, corner_inverse_depth } = method.required_planes();
         Ok(SamplePlanes { normals: normal, corner_inverse_depths: corner_inverse_depth })
     }

@@ -9,4 +9,4 @@
     let gaps = code_above + camera.code_offset - select(corners.codes, vec4f(bilinear(corners.codes, at)), corners.connected);
     let reach = vec4f(THICKNESS_FOOTPRINTS * code_above / camera.focal_px);
     let shares = select(vec4f(0.0), bilinear_shares(at), (abs(gaps) < reach) & (corners.codes > vec4f(1.5)));
-    let around = gathered(cell_index, camera.width_px, shares);
+    let around = gathered(cell_index + vec4u(0u, 1u, camera.width_px, camera.width_px + 1u), shares);

@@ -19,9 +19,8 @@ fn octahedral_from_oct16(packed: u32) -> vec3f {
     return vec3f(select(flat, oct_wrapped(flat), z < 0.0), z);
 }
 
-// The samples at a cell's corners, by their shares; `sample` is the upper left one's number. Means of encoded
-// numbers are encoded means: nothing but the mean is decoded.
-fn gathered(sample: u32, width_px: u32, shares: vec4f) -> Gathered {
+// Four samples by their shares. Means of encoded numbers are encoded means: nothing but the mean is decoded.
+fn gathered(places: vec4u, shares: vec4f) -> Gathered {
     var normal = vec3f(0.0);
     var reflector = vec4f(0.0);
     var reflecting = 0.0;
@@ -30,7 +29,7 @@ fn gathered(sample: u32, width_px: u32, shares: vec4f) -> Gathered {
 {% endfor %}
 {% for corner in range(4) %}
     {
-        let place = sample + {{ corner % 2 }}u + {{ corner // 2 }}u * width_px;
+        let place = places[{{ corner }}];
 {% for texel in range(sample_texels) %}
         let words{{ texel }} = sample_texel(place, {{ texel }}u);
 {% endfor %}

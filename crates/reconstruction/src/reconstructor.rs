@@ -3,12 +3,12 @@
 
 use std::sync::Arc;
 
-use depth_image::{Antialias, CubeGrid, DepthImage, LayeredDepthImage, PinholeCamera, Ray, View, ViewPlanes};
-use glam::Vec2;
+use depth_image::{Aabb, Antialias, CubeGrid, DepthImage, LayeredDepthImage, PinholeCamera, Ray, View, ViewPlanes};
+use glam::{Vec2, Vec3};
 use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
-use crate::bounce::{self, Bounces, CurvedSearch, Mirrors};
+use crate::bounce::{self, Bounces, CurvedSearch, MirrorCell, Mirrors};
 use crate::in_flight::{InFlight, Statistics};
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
@@ -195,6 +195,10 @@ impl Reconstructor {
             camera.validate().map_err(|source| ReconstructionError::Camera { index, source })?;
         }
         set.check_method(method)?;
+        // A cube shows what all of its mirrors do.
+        let everywhere = Aabb { min: Vec3::splat(f32::MIN), max: Vec3::splat(f32::MAX) };
+        let own = [MirrorCell { bounds: everywhere, surroundings: set }];
+        let mirrors = if method.walks_cube() { Mirrors { cells: &own, ..mirrors } } else { mirrors };
         let mirrors = mirrors.checked_for(set)?;
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
@@ -296,8 +300,11 @@ impl Reconstructor {
         recording: &mut Recording<'_>,
         listed: Option<&PixelList>,
     ) -> Result<(), ReconstructionError> {
-        let unknown = request.method.record(&self.drawing, request.mesh, recording, listed)?;
+        let unknown = request.method.record(&self.drawing, request.mesh, recording, listed, request.bounces)?;
         fill::record(recording, &unknown)?;
+        if request.method.walks_cube() {
+            return Ok(());
+        }
         let Some(bounces) = request.bounces else { return specular::record(recording, listed, None) };
         let first = bounces.next(&self.device, None);
         specular::record(recording, listed, Some((bounces, &first)))?;

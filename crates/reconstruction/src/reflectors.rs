@@ -1,10 +1,10 @@
 //! The light that the samples of a set reflect towards a viewer, on the device.
 
-use depth_image::{DepthImage, Highlight, Illumination, SpecularPlanes};
+use depth_image::{DepthImage, Highlight, Illumination, LayeredDepthImage, SpecularPlanes};
 use gpu::{GpuError, Table, TablePool, Turn, illumination_bytes};
 use wgpu::{BufferUsages, TextureFormat};
 
-use crate::error::ReconstructionError;
+use crate::{error::ReconstructionError, sample_set::SetDescription};
 
 /// A normal and a reflector stand before the words of visibility.
 const WORDS_BEFORE_VISIBILITY: usize = 2;
@@ -28,24 +28,50 @@ impl Reflectors {
         highlight: Option<Highlight>,
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
-        check(images, illumination)?;
-        let Some(highlight) = highlight.filter(|_| images.iter().any(reflects)) else { return Ok(None) };
+        let planes: Vec<Planes<'_>> = images.iter().map(Planes::of_image).collect();
+        check(&planes, illumination)?;
+        Self::of_planes(tables, &planes, (illumination, highlight), |_, words| words, turn)
+    }
+
+    /// `sorted` brings the words of samples, so many each, into the set's order.
+    fn of_planes(
+        tables: &TablePool,
+        planes: &[Planes<'_>],
+        (illumination, highlight): (&Illumination, Option<Highlight>),
+        sorted: impl FnOnce(usize, Vec<u32>) -> Vec<u32>,
+        turn: Turn,
+    ) -> Result<Option<Self>, ReconstructionError> {
+        let Some(highlight) = highlight.filter(|_| planes.iter().any(Planes::reflects)) else { return Ok(None) };
         let (gpu, bytes) = (&tables.gpu, illumination_bytes(illumination));
         let limit = gpu.device.limits().max_uniform_buffer_binding_size;
         GpuError::check_limit("the scene's lights (bytes)", bytes.len() as u64, limit)?;
-        let visibility_words = visibility_words(images);
+        let visibility_words = visibility_words(planes);
+        let words = sorted(4 * sample_texels(visibility_words), sample_words(planes, visibility_words));
         Ok(Some(Self {
             highlight,
             lights: illumination.lights.len(),
             visibility_words,
-            samples: tables.upload(
-                "reflectors",
-                TextureFormat::Rgba32Uint,
-                &sample_words(images, visibility_words),
-                turn,
-            )?,
+            samples: tables.upload("reflectors", TextureFormat::Rgba32Uint, &words, turn)?,
             illumination: gpu.buffer_with("illumination", &bytes, BufferUsages::UNIFORM),
         }))
+    }
+
+    /// As [`Reflectors::upload`], of a layered cube: its samples are in the order of `places` in their images, image after image.
+    pub fn of_cube(
+        tables: &TablePool,
+        (images, places): (&[LayeredDepthImage; 3], &[u32]),
+        set: &SetDescription<'_>,
+        turn: Turn,
+    ) -> Result<Option<Self>, ReconstructionError> {
+        let planes = images.each_ref().map(Planes::of_layers);
+        check(&planes, set.illumination)?;
+        let words = |stride: usize, words: Vec<u32>| {
+            let first = [0, images[0].sample_count(), images[0].sample_count() + images[1].sample_count()];
+            let image_of = |sample: usize| first.iter().rposition(|&first| sample >= first).unwrap_or(0);
+            let place = |(sample, &place): (usize, &u32)| (first[image_of(sample)] + place as usize) * stride;
+            places.iter().enumerate().flat_map(|at| words[place(at)..][..stride].iter().copied()).collect()
+        };
+        Self::of_planes(tables, &planes, (set.illumination, set.highlight), words, turn)
     }
 }
 
@@ -54,15 +80,34 @@ pub(crate) const fn sample_texels(visibility_words: usize) -> usize {
     (WORDS_BEFORE_VISIBILITY + visibility_words).div_ceil(4)
 }
 
-fn reflects(image: &DepthImage) -> bool {
-    image.specular.as_ref().is_some_and(|planes| planes.reflectance_srgb8_roughness8.iter().any(|&word| word != 0))
+/// The planes of an image from which compositors compute highlights.
+struct Planes<'i> {
+    samples: usize,
+    normal_oct16: Option<&'i [u32]>,
+    specular: Option<&'i SpecularPlanes>,
 }
 
-fn check(images: &[DepthImage], illumination: &Illumination) -> Result<(), ReconstructionError> {
+impl<'i> Planes<'i> {
+    fn of_image(image: &'i DepthImage) -> Self {
+        let (normal_oct16, specular) = (image.normal_oct16.as_deref(), image.specular.as_ref());
+        Self { samples: image.color_rgb9e5.len(), normal_oct16, specular }
+    }
+
+    fn of_layers(image: &'i LayeredDepthImage) -> Self {
+        let (normal_oct16, specular) = (image.normal_oct16.as_deref(), image.specular.as_ref());
+        Self { samples: image.sample_count(), normal_oct16, specular }
+    }
+
+    fn reflects(&self) -> bool {
+        self.specular.is_some_and(|planes| planes.reflectance_srgb8_roughness8.iter().any(|&word| word != 0))
+    }
+}
+
+fn check(images: &[Planes<'_>], illumination: &Illumination) -> Result<(), ReconstructionError> {
     let expected = SpecularPlanes::visibility_planes(illumination.lights.len());
     for (index, image) in images.iter().enumerate() {
         let wrong = |reason: String| Err(ReconstructionError::Sample { index, reason });
-        let Some(planes) = &image.specular else { continue };
+        let Some(planes) = image.specular else { continue };
         if image.normal_oct16.is_none() {
             return wrong("a highlight needs normals".to_owned());
         }
@@ -74,18 +119,17 @@ fn check(images: &[DepthImage], illumination: &Illumination) -> Result<(), Recon
     Ok(())
 }
 
-fn visibility_words(images: &[DepthImage]) -> usize {
-    images.iter().filter_map(|image| image.specular.as_ref()).map(|planes| planes.visibility8.len()).max().unwrap_or(0)
+fn visibility_words(images: &[Planes<'_>]) -> usize {
+    images.iter().filter_map(|image| image.specular).map(|planes| planes.visibility8.len()).max().unwrap_or(0)
 }
 
 /// Sample after sample, image after image; those of images without highlights reflect nothing.
-fn sample_words(images: &[DepthImage], visibility_words: usize) -> Vec<u32> {
+fn sample_words(images: &[Planes<'_>], visibility_words: usize) -> Vec<u32> {
     let stride = 4 * sample_texels(visibility_words);
-    let samples = |image: &DepthImage| image.color_rgb9e5.len();
-    let mut words = Vec::with_capacity(images.iter().map(samples).sum::<usize>() * stride);
+    let mut words = Vec::with_capacity(images.iter().map(|image| image.samples).sum::<usize>() * stride);
     for image in images {
-        let (Some(planes), Some(normals)) = (&image.specular, &image.normal_oct16) else {
-            words.resize(words.len() + samples(image) * stride, 0);
+        let (Some(planes), Some(normals)) = (image.specular, image.normal_oct16) else {
+            words.resize(words.len() + image.samples * stride, 0);
             continue;
         };
         for (index, (&normal, &reflector)) in normals.iter().zip(&planes.reflectance_srgb8_roughness8).enumerate() {

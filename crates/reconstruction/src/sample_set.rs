@@ -168,7 +168,7 @@ impl SampleSet {
             reflectors: None,
             environment: set.environment.cloned(),
             meshes: SetMeshes::upload(tables, &[], turn)?,
-            cube: Some(Arc::new(Cube::upload(tables, grid, images, turn)?)),
+            cube: Some(Arc::new(Cube::upload(tables, grid, images, set, turn)?)),
         })
     }
 }

@@ -66,7 +66,8 @@ impl Mirrors<'_> {
         if self.reflections > MAX_REFLECTIONS {
             return Err(ReconstructionError::Reflections(self.reflections));
         }
-        let has_mirrors = set.reflectors.as_ref().is_some_and(|of| of.highlight == Highlight::Ggx);
+        let reflectors = set.cube.as_ref().map_or(&set.reflectors, |cube| &cube.reflectors);
+        let has_mirrors = reflectors.as_ref().is_some_and(|of| of.highlight == Highlight::Ggx);
         Ok(if self.reflections > 0 && has_mirrors { self } else { Self::default() })
     }
 }
@@ -229,12 +230,28 @@ impl<'s> Bounces<'s> {
         self.rays.into_iter().chain(self.listed).chain(planes).collect()
     }
 
+    /// Mirrors that a ray meets.
+    pub fn reflections(&self) -> u32 {
+        self.reflections
+    }
+
+    /// The work of a cell.
+    pub fn work_binding(&self, cell: usize) -> Binding<'_> {
+        Binding::buffer("work", &self.works[cell])
+    }
+
+    /// The arguments of the dispatches over lists.
+    pub fn lists_of<'b>(&self, lists: &'b RayLists) -> &'b Buffer {
+        &lists.lists
+    }
+
     /// How many cells there are.
     pub fn cell_count(&self) -> usize {
         self.cells.len()
     }
 
-    fn list_bindings<'b>(&'b self, lists: &'b RayLists) -> [Binding<'b>; 3] {
+    /// The rays of a list.
+    pub fn list_bindings<'b>(&'b self, lists: &'b RayLists) -> [Binding<'b>; 3] {
         [
             Binding::buffer("rays", &self.rays[lists.memory]),
             Binding::buffer("listed_pixels", &self.listed[lists.memory]),

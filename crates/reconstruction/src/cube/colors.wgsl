@@ -1,4 +1,4 @@
-// The colour of a layered depth cube's surface: between the four lines around a place, of the samples that lie on one surface.
+// What a layered depth cube shows at a place: between the four lines around it, of the samples that lie on one surface.
 
 // Colour; how many samples before and after its own those on the same surface in the neighbouring lines along the next axis are, in
 // two halves; their numbers in the lines before and after along the axis after that.
@@ -15,13 +15,15 @@ fn cube_sample(number: u32) -> CubeSample {
 
 // The sample of one surface on a neighbouring line; a sample is its own neighbour where there is none.
 fn beside(own: CubeSample, is_after: bool) -> CubeSample {
-    let distance = select(own.number - (own.links.x & 0xffffu), own.number + (own.links.x >> 16u), is_after);
-    return cube_sample(distance);
+    return cube_sample(select(own.number - (own.links.x & 0xffffu), own.number + (own.links.x >> 16u), is_after));
 }
 
 fn below(own: CubeSample, is_after: bool) -> CubeSample { return cube_sample(select(own.links.y, own.links.z, is_after)); }
 
-fn color_at(hit: CubeHit) -> vec3f {
+// The samples around a place on a surface, their shares, and their colour.
+struct AroundHit { samples: vec4u, shares: vec4f, color_linear: vec3f }
+
+fn around_hit(hit: CubeHit) -> AroundHit {
     // Within the line's square, from its middle.
     let place = along(hit.axis, hit.off).yz;
     let is_after = place > vec2f(0.0);
@@ -35,5 +37,6 @@ fn color_at(hit: CubeHit) -> vec3f {
     let shares = vec4f((1.0 - at.x) * (1.0 - at.y), at.x * (1.0 - at.y), (1.0 - at.x) * at.y, at.x * at.y)
         * vec4f(1.0, select(0.0, 1.0, found.x), select(0.0, 1.0, found.y), select(0.0, 1.0, found.x && found.z));
     let sum = own.color_linear * shares.x + column.color_linear * shares.y + row.color_linear * shares.z + corner.color_linear * shares.w;
-    return sum / dot(shares, vec4f(1.0));
+    let all = dot(shares, vec4f(1.0));
+    return AroundHit(vec4u(own.number, column.number, row.number, corner.number), shares / all, sum / all);
 }

@@ -20,7 +20,7 @@ pub(crate) use links::links;
 pub(crate) use samples::CubeSamples;
 
 use self::bricks::Bricks;
-use crate::error::ReconstructionError;
+use crate::{error::ReconstructionError, reflectors::Reflectors, sample_set::SetDescription};
 
 /// A ray steps this far into the next box, in spacings: more than the rounding of coordinates.
 pub(crate) const WALK_NUDGE: f32 = 2e-3;
@@ -32,6 +32,8 @@ pub(crate) const SQUARE_REACH: f32 = 0.55;
 pub(crate) const MAX_CUBE_STEPS: u32 = 4096;
 /// Samples of neighbouring lines are of one surface where one lies within this distance of the other's plane, in spacings.
 pub(crate) const SAME_PLANE: f32 = 0.75;
+/// Rays off a surface meet nothing below this height, in spacings: samples of the surface itself may stand as high.
+const START_SPACINGS: f32 = 0.75;
 /// Bits of an entry for a sample's number.
 const MAX_SAMPLES: usize = 1 << 28;
 
@@ -43,7 +45,8 @@ pub(crate) struct GpuCube {
     pub size: [u32; 3],
     pub columns: u32,
     pub rows: u32,
-    pub padding: [u32; 3],
+    pub start_m: f32,
+    pub padding: [u32; 2],
 }
 
 /// A layered depth cube, ready to be walked through.
@@ -56,6 +59,7 @@ pub(crate) struct Cube {
     samples: Table,
     /// Some line has met more surfaces than it holds.
     pub truncated: bool,
+    pub reflectors: Option<Reflectors>,
 }
 
 impl Cube {
@@ -64,6 +68,7 @@ impl Cube {
         tables: &TablePool,
         grid: &CubeGrid,
         images: &[LayeredDepthImage; 3],
+        set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
         check(grid, images)?;
@@ -78,7 +83,8 @@ impl Cube {
             size: grid.size.to_array(),
             columns: bricks.columns,
             rows: bricks.rows,
-            padding: [0; 3],
+            start_m: START_SPACINGS * grid.spacing_m,
+            padding: [0; 2],
         };
         Ok(Self {
             own: tables.gpu.buffer_with("cube", &[cube], BufferUsages::UNIFORM),
@@ -87,6 +93,7 @@ impl Cube {
             leaves: tables.upload("leaves of a cube", TextureFormat::Rg32Uint, &bricks.leaves, turn)?,
             entries: tables.upload("entries of a cube", TextureFormat::Rg32Uint, &bricks.entries, turn)?,
             samples: tables.upload("samples of a cube", TextureFormat::Rgba32Uint, &words, turn)?,
+            reflectors: Reflectors::of_cube(tables, (images, &samples.place), set, turn)?,
             truncated: images.iter().any(|image| image.truncated),
         })
     }

@@ -22,6 +22,8 @@ pub(crate) struct CubeSamples {
     pub color_rgb9e5: Vec<u32>,
     /// The line of each sample.
     pub line: Vec<u32>,
+    /// The place of each sample among those of its image.
+    pub place: Vec<u32>,
 }
 
 impl CubeSamples {
@@ -37,6 +39,7 @@ impl CubeSamples {
             normal: Vec::with_capacity(count),
             color_rgb9e5: Vec::with_capacity(count),
             line: Vec::with_capacity(count),
+            place: Vec::with_capacity(count),
         };
         (0..3).for_each(|axis| all.append(grid, axis, &images[axis]));
         all.first.push(all.depth.len() as u32);
@@ -58,6 +61,7 @@ impl CubeSamples {
                     self.normal.push(cube_from_world * image.plane_normal_in_world(sample));
                     self.color_rgb9e5.push(image.color_rgb9e5[sample]);
                     self.line.push(line);
+                    self.place.push(sample as u32);
                 }
             }
         }

@@ -11,6 +11,8 @@ struct Cube {
     // Of the cells of 8 units.
     columns: u32,
     rows: u32,
+    // A ray off a surface meets nothing nearer, where it leaves straight up.
+    start_m: f32,
 }
 
 @group(0) var<uniform> cube: Cube;

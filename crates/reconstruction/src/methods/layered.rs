@@ -1,18 +1,73 @@
-//! A walk along each view ray through the samples of a layered depth cube.
+//! A walk along each ray through the samples of a layered depth cube.
 
-use gpu::{Binding, ResourceTraits, ShaderVariant};
+use std::sync::Arc;
+
+use depth_image::Highlight;
+use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots};
 use minijinja::{Value, context};
 
+use crate::bounce::{Bounces, RayLists};
+use crate::cube::Cube;
+use crate::reflectors::sample_texels;
 use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
 /// The switches of `layered.wgsl`.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Walk {
     set: SetVariant,
-    listed: bool,
+    rays: WalkRays,
     /// What a ray does not meet may be a surface that the cube does not hold.
     truncated: bool,
+    /// The formula of highlights, where samples have any.
+    highlight: Option<Highlight>,
+    /// Mirrors list the rays off them.
+    mirrors: bool,
+    lights: usize,
+    environment_map: bool,
+    visibility_words: usize,
+}
+
+/// The rays that walk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum WalkRays {
+    /// Of all pixels.
+    All,
+    /// Of listed pixels.
+    Listed,
+    /// Off mirrors.
+    Bounced,
+}
+
+impl Walk {
+    const PLAIN: Self = Self {
+        set: SetVariant::CUBE,
+        rays: WalkRays::All,
+        truncated: false,
+        highlight: None,
+        mirrors: false,
+        lights: 0,
+        environment_map: false,
+        visibility_words: 0,
+    };
+
+    fn of(recording: &Recording<'_>, cube: &Cube, rays: WalkRays, mirrors: bool) -> Self {
+        let reflectors = cube.reflectors.as_ref();
+        let highlight = reflectors.map(|reflectors| reflectors.highlight);
+        // Blinn-Phong surfaces mirror lamps only.
+        let is_mapped = highlight == Some(Highlight::Ggx) && recording.set.environment.is_some();
+        let count_fetches = rays != WalkRays::Bounced && recording.batch.fetches.is_some();
+        Self {
+            set: SetVariant { count_fetches, ..recording.set.variant() },
+            rays,
+            truncated: cube.truncated,
+            highlight,
+            mirrors,
+            lights: reflectors.map_or(0, |reflectors| reflectors.lights),
+            environment_map: is_mapped,
+            visibility_words: reflectors.map_or(0, |reflectors| reflectors.visibility_words),
+        }
+    }
 }
 
 impl ShaderVariant for Walk {
@@ -20,30 +75,73 @@ impl ShaderVariant for Walk {
     const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
-        context! { listed => self.listed, truncated => self.truncated, ..self.set.context() }
+        context! {
+            listed => self.rays == WalkRays::Listed,
+            bounced => self.rays == WalkRays::Bounced,
+            truncated => self.truncated,
+            reflects => self.highlight.is_some(),
+            highlight => highlight_name(self.highlight.unwrap_or(Highlight::Ggx)),
+            mirrors => self.mirrors,
+            mirror_cells => usize::from(self.mirrors),
+            light_slots => light_slots(self.lights),
+            environment_map => self.environment_map,
+            visibility_words => self.visibility_words,
+            sample_texels => sample_texels(self.visibility_words),
+            single_pole => false,
+            ..self.set.context()
+        }
     }
 
     fn all() -> Vec<Self> {
-        let counted = SetVariant { count_fetches: true, ..SetVariant::CUBE };
-        let sets = [SetVariant::CUBE, counted].into_iter();
-        let walks = sets.flat_map(|set| [false, true].map(|listed| Self { set, listed, truncated: false }));
-        let truncated = Self { set: SetVariant::CUBE, listed: false, truncated: true };
-        walks.chain([truncated]).collect()
+        let plain = [WalkRays::All, WalkRays::Listed].into_iter().flat_map(|rays| {
+            [false, true].map(|count_fetches| Self {
+                rays,
+                set: SetVariant { count_fetches, ..SetVariant::CUBE },
+                ..Self::PLAIN
+            })
+        });
+        let truncated = [Self { truncated: true, ..Self::PLAIN }];
+        let lights = [(0, 0), (3, 1), (255, 64)];
+        let reflecting = lights.into_iter().flat_map(|(lights, visibility_words)| {
+            let with = Self { lights, visibility_words, ..Self::PLAIN };
+            let ggx = Some(Highlight::Ggx);
+            [
+                Self { highlight: Some(Highlight::BlinnPhong), ..with },
+                Self { highlight: ggx, ..with },
+                Self { highlight: ggx, environment_map: true, ..with },
+                Self { highlight: ggx, mirrors: true, ..with },
+                Self { highlight: ggx, rays: WalkRays::Bounced, ..with },
+                Self { highlight: ggx, rays: WalkRays::Bounced, mirrors: true, ..with },
+                Self {
+                    highlight: ggx,
+                    rays: WalkRays::Bounced,
+                    mirrors: true,
+                    environment_map: true,
+                    truncated: true,
+                    ..with
+                },
+            ]
+        });
+        plain.chain(truncated).chain(reflecting).collect()
     }
 }
 
-/// Gives the pixels that stay unknown.
-pub(super) fn record(
+/// Records the walk of all pixels or of listed ones, and of the rays off the mirrors that they show. Gives the pixels that stay
+/// unknown.
+pub(crate) fn record(
     recording: &mut Recording<'_>,
     listed: Option<&PixelList>,
+    bounces: Option<&Bounces<'_>>,
 ) -> Result<PixelList, ReconstructionError> {
     let undecided = recording.empty_list();
     let Some(cube) = recording.set.cube.clone() else { return Ok(undecided) };
-    let variant = Walk { set: recording.variant(), listed: listed.is_some(), truncated: cube.truncated };
+    let mut next = bounces.map(|bounces| bounces.next(recording.device, None));
+    let rays = if listed.is_some() { WalkRays::Listed } else { WalkRays::All };
+    let variant = Walk::of(recording, &cube, rays, next.is_some());
     let pass = recording.device.passes.get(&variant)?;
     let batch = &recording.batch;
     let mut bindings = recording.view_bindings();
-    bindings.extend(cube.bindings());
+    bindings.extend(shared_bindings(recording, &cube, &variant));
     bindings.extend([
         Binding::buffer("out_color", &batch.color),
         Binding::buffer("out_inverse_depth", &batch.inverse_depth_per_m),
@@ -53,7 +151,48 @@ pub(super) fn record(
     ]);
     bindings.extend(batch.fetches.as_ref().map(|fetches| Binding::buffer("out_fetches", fetches)));
     bindings.extend(listed.map(PixelList::bindings).into_iter().flatten());
+    bindings.extend(bounces.zip(next.as_ref()).into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
     let bound = pass.bind(0, bindings)?;
     recording.dispatch_pixels(&variant, &pass, &bound, listed);
+    let Some(bounces) = bounces else { return Ok(undecided) };
+    for reflection in 1..=bounces.reflections() {
+        let Some(lists) = next else { break };
+        next = (reflection < bounces.reflections()).then(|| bounces.next(recording.device, Some(&lists)));
+        follow(recording, &cube, bounces, (&lists, next.as_ref()), reflection)?;
+    }
     Ok(undecided)
+}
+
+/// Records the walk of rays off one mirror, whose light is added to their pixels.
+fn follow(
+    recording: &mut Recording<'_>,
+    cube: &Arc<Cube>,
+    bounces: &Bounces<'_>,
+    (lists, next): (&RayLists, Option<&RayLists>),
+    reflection: u32,
+) -> Result<(), ReconstructionError> {
+    let variant = Walk::of(recording, cube, WalkRays::Bounced, next.is_some());
+    let pass = recording.device.passes.get(&variant)?;
+    let mut bindings = shared_bindings(recording, cube, &variant);
+    bindings.extend([
+        bounces.work_binding(0),
+        Binding::buffer("out_color", &recording.batch.color),
+        Binding::buffer("out_provenance", &recording.batch.provenance),
+    ]);
+    bindings.extend(bounces.list_bindings(lists));
+    bindings.extend(next.into_iter().flat_map(|next| bounces.spawn_bindings(next)));
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_listed(&variant, &pass, &bound, (bounces.lists_of(lists), 0), reflection);
+    Ok(())
+}
+
+fn shared_bindings<'b>(recording: &'b Recording<'_>, cube: &'b Cube, variant: &Walk) -> Vec<Binding<'b>> {
+    let mut bindings: Vec<Binding<'b>> = cube.bindings().into_iter().collect();
+    if let Some(reflectors) = &cube.reflectors {
+        bindings.push(Binding::buffer("illumination", &reflectors.illumination));
+        bindings.push(Binding::texture("samples", &reflectors.samples));
+    }
+    let map = recording.set.environment.as_deref().filter(|_| variant.environment_map);
+    bindings.extend(map.into_iter().flat_map(GpuEnvironment::bindings));
+    bindings
 }

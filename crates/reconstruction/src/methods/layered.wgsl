@@ -1,26 +1,93 @@
-// View rays through a layered depth cube: the nearest surface that its samples describe.
+// Rays through a layered depth cube: the nearest surface that its samples describe, and the light that it sends to the ray. Rays are
+// those of a view, or those off the mirrors that a view shows.
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
+{%- if reflects or bounced %}
+{% include "light.wgsl" %}
+{% include "highlight.wgsl" %}
+{%- endif %}
 {% include "view_work.wgsl" %}
+{%- if bounced %}
+@group(0) var<storage, read_write> out_color: array<u32>;
+@group(0) var<storage, read_write> out_provenance: array<u32>;
+{%- else %}
 {% include "found.wgsl" %}
+{%- endif %}
 {% include "cube/walk.wgsl" %}
 {% include "cube/colors.wgsl" %}
-{% if listed %}
+{%- if reflects or bounced %}
+@group(0) var<uniform> illumination: Illumination;
+{%- endif %}
+{%- if reflects %}
+{% include "gathered.wgsl" %}
+{%- endif %}
+{%- if listed or bounced %}
 {% include "pixel_list.wgsl" %}
-{% endif %}
+{%- endif %}
+{%- if mirrors or bounced %}
+{% include "bounce/ray.wgsl" %}
+{%- endif %}
+{%- if mirrors %}
+{% include "bounce/spawn.wgsl" %}
+{%- endif %}
+{%- if bounced %}
+@group(0) var<storage, read> rays: array<MirroredRay>;
+{%- endif %}
+
+// The light that a surface sends towards `towards_eye`, of which a pixel shows the share `throughput`. Mirrors list the rays off them.
+fn light_from(hit: CubeHit, point_in_world: vec3f, towards_eye: vec3f, pixel: u32, throughput: vec3f) -> vec3f {
+    let around = around_hit(hit);
+    var shown = around.color_linear * throughput;
+{%- if reflects %}
+    let glossy = gathered(around.samples, around.shares);
+    for (var reflects = glossy.reflecting > 0.0; reflects; reflects = false) {
+        let own = throughput * glossy.reflecting;
+        shown += own * highlight(point_in_world, glossy.normal, towards_eye, glossy.reflector, glossy.visibility);
+{%- if mirrors %}
+        let open = {{ "unpack4x8unorm(glossy.visibility[0]).x" if visibility_words > 0 else "1.0" }};
+        let mirror = Mirror(point_in_world, glossy.normal, towards_eye, unpack_reflector(glossy.reflector));
+        shown += bounce_off(mirror, pixel, own, open, cube.start_m / START_FOOTPRINTS, Cone(0.0, 0.0));
+{%- endif %}
+    }
+{%- endif %}
+    return shown;
+}
+{%- if bounced %}
+
+@compute @workgroup_size(LIST_WORKGROUP)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= lists[work.view.number].count { return; }
+    let ray = rays[listed_pixels[first_listed() + id.x]];
+    let throughput = linear_from_rgb9e5(ray.throughput_rgb9e5);
+    let hit = walk(cube_ray(ray.origin_in_world, ray.direction), ray.near_m);
+    // Where nothing is met the environment is seen.
+    var shown = environment_mirrored(ray.direction, max(unpack4x8unorm(ray.guess).y, LEAST_ROUGHNESS)) * throughput;
+    for (var met = hit.met; met; met = false) {
+        shown = light_from(hit, ray.origin_in_world + ray.direction * hit.t, -ray.direction, ray.pixel, throughput);
+    }
+    out_color[ray.pixel] = rgb9e5_from_linear(linear_from_rgb9e5(out_color[ray.pixel]) + shown);
+{%- if truncated %}
+    if !hit.met { out_provenance[ray.pixel] = (out_provenance[ray.pixel] & 0xffffff00u) | PROVENANCE_GUESSED; }
+{%- endif %}
+}
+{%- else %}
 
 @compute @workgroup_size({{ "LIST_WORKGROUP" if listed else "TILE_PX, TILE_PX" }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
-{% if listed %}
+{%- if listed %}
     if id.x >= lists[work.view.number].count { return; }
     let pixel = pixel_of(place_of(listed_pixels[first_listed() + id.x]));
-{% else %}
+{%- else %}
     let at = pixel_at(id);
     if any(at >= work.view.size_px) { return; }
     let pixel = pixel_of(at);
-{% endif %}
+{%- endif %}
     let hit = walk(cube_ray(work.view.eye_in_world, pixel.direction), work.view.near_m);
-    var color = vec3f(0.0);
-    for (var met = hit.met; met; met = false) { color = color_at(hit); }
-    write_found(pixel.index, hit.met, hit.t, color, origin_of(1u << hit.axis, 0u), {{ "false" if truncated else "true" }});
+    var shown = vec3f(0.0);
+    for (var met = hit.met; met; met = false) {
+        let point_in_world = work.view.eye_in_world + pixel.direction * hit.t;
+        shown = light_from(hit, point_in_world, -normalize(pixel.direction), pixel.index, vec3f(1.0));
+    }
+    write_found(pixel.index, hit.met, hit.t, shown, origin_of(1u << hit.axis, 0u), {{ "false" if truncated else "true" }});
 }
+{%- endif %}

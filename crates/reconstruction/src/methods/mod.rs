@@ -19,6 +19,7 @@ use self::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDG
 use self::joint_carve::smooth::{FAINT_HIGHLIGHT, OPEN_SHARE, SMOOTH_FOOTPRINTS, Smooth};
 use self::joint_carve::{BLIND_MOVE, FIRST_SAMPLE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_AMONG_HOLES, MAX_STOP_LEVEL};
 use self::light_field_search::{BISECTIONS, DEFAULT_STEPS, MAX_STEPS};
+use crate::bounce::Bounces;
 use crate::quads::{self, CornerPlanes, ErrorBound, Mesh as QuadMesh, QuadDrawing, RequiredPlanes};
 use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
 use crate::{recording::Recording, sample_set::SampleSet};
@@ -178,19 +179,20 @@ impl ReconstructionMethod {
     }
 
     /// Records the method's passes, for listed pixels or for all; gives the pixels that stay unknown. Lists come from
-    /// [`Self::share_positions`].
+    /// [`Self::share_positions`]. Methods that walk through a cube add highlights and what mirrors show, by `bounces`.
     pub(crate) fn record(
         self,
         drawing: &QuadDrawing,
         mesh: Option<&QuadMesh>,
         recording: &mut Recording<'_>,
         listed: Option<&PixelList>,
+        bounces: Option<&Bounces<'_>>,
     ) -> Result<PixelList, ReconstructionError> {
         match self {
             LightFieldSearch { steps } => light_field_search::record(recording, steps),
             JointCarve { stop_level } => joint_carve::record(recording, stop_level, listed),
             Mesh | HybridMesh { .. } => quads::record(drawing, recording, mesh),
-            Layered => layered::record(recording, listed),
+            Layered => layered::record(recording, listed, bounces),
         }
     }
 

@@ -1,13 +1,16 @@
 //! Views from layered depth cubes.
 
-use depth_image::{CubeGrid, LayeredDepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
-use glam::Vec3;
+use depth_image::{CubeGrid, Highlight, LayeredDepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use glam::{UVec2, Vec3};
+use gpu::Turn;
+use metrics::{Rgb8Image, psnr_db};
 use reconstruction::scalar::CubeTwin;
-use reconstruction::{ReconstructionError, ReconstructionMethod, SampleSet};
-use render::{GpuScene, Kept};
+use reconstruction::{Mirrors, ReconstructionError, ReconstructionMethod, SampleSet, SetDescription};
+use render::{DrawWork, GpuScene, Kept};
 use scene::Scene;
+use scene::procedural::mirror_box;
 
-use crate::stage::{Agreement, CARVE, Stage, corpus, count, gpu, matt, plainly_lit, reconstructor, renderer};
+use crate::stage::{Agreement, CARVE, Stage, corpus, count, gpu, looking, matt, plainly_lit, reconstructor, renderer};
 
 const LAYERED: ReconstructionMethod = ReconstructionMethod::Layered;
 
@@ -70,6 +73,58 @@ fn views_show_the_scene() {
     }
 }
 
+/// Seven mirrors on a ray's way: the ball and the post see one another, and both see the box.
+#[test]
+fn mirrors_show_what_direct_drawing_shows() {
+    let scene = mirror_box();
+    let on_device = GpuScene::upload(gpu(), &scene).expect("a scene");
+    let lit = |lighting: &str| DrawWork { lighting: lighting.parse().expect(lighting), ..plainly_lit(&on_device) };
+    let grid = CubeGrid::around(&scene.bounds(), 192).expect("a grid");
+    let images = [0, 1, 2]
+        .map(|axis| renderer().draw_layers(lit("shadows"), &grid.camera(axis), Kept::Dominant).expect("layers"));
+    let description = SetDescription {
+        illumination: &scene.illumination,
+        highlight: Some(Highlight::Ggx),
+        ..matt(scene.bounds(), scene.background)
+    };
+    let set = reconstructor().upload_cube(&grid, &images, &description).expect("a cube");
+    let camera = looking(Vec3::new(0.4, 2.0, 6.5), Vec3::Y * 1.2, 40.0, UVec2::new(120, 90));
+    let view = |reflections| {
+        let mirrors = Mirrors { cells: &[], reflections };
+        let views =
+            reconstructor().reconstruct_mirrored(&set, mirrors, &[camera], LAYERED, ViewPlanes::ALL, Turn::default());
+        views.expect("a view").remove(0)
+    };
+    let psnr = |a: &View, b: &View| {
+        let [a, b] = [a, b].map(|view| Rgb8Image::of_view(view).expect("a picture"));
+        psnr_db(&a, &b, None).expect("of one size").expect("pixels")
+    };
+    let direct =
+        |lighting: &str| renderer().draw_views(lit(lighting), &[camera], ViewPlanes::ALL).expect("a view").remove(0);
+    let [none, one, all] = [direct("shadows"), direct("shadows, reflections 1"), direct("shadows, reflections 7")];
+    let own = [psnr(&view(0), &none), psnr(&view(1), &one), psnr(&view(7), &all)];
+    let crossed = [psnr(&view(0), &all), psnr(&view(1), &all)];
+    println!("as many mirrors: {own:.1?} dB; fewer than the seven: {crossed:.1?} dB");
+    assert!(own.into_iter().all(|psnr_db| psnr_db > 25.0), "{own:?}");
+    assert!(own[2] > crossed[1] + 1.0 && crossed[1] > crossed[0] + 2.0, "{own:?} {crossed:?}");
+}
+
+#[test]
+fn loads_are_counted_and_several_views_are_those_of_each() {
+    let (_, scene, corners) = corpus().remove(4);
+    let set = CubeStage::new(scene, 64, Kept::Dominant).upload();
+    let cameras = [corners.view(), corners.camera(-0.5, 0.5, corners.view().size_px)];
+    let made = |cameras: &[PinholeCamera], counted| {
+        reconstructor().reconstruct_measured(&set, cameras, LAYERED, ViewPlanes::ALL, counted).expect("views")
+    };
+    let (both, statistics) = made(&cameras, true);
+    let loads = statistics.fetches_per_ray.expect("counted");
+    println!("{loads} loads a ray");
+    assert!((2.0..60.0).contains(&loads), "{loads}");
+    let each: Vec<View> = cameras.iter().flat_map(|camera| made(&[*camera], false).0).collect();
+    assert_eq!(both, each);
+}
+
 #[test]
 fn sets_and_methods_that_do_not_belong_together_are_refused() {
     let (_, scene, corners) = corpus().remove(0);
@@ -99,10 +154,8 @@ fn images_of_other_lines_are_refused_and_rays_from_anywhere_have_no_nan() {
     // From within a wall, along an axis, along a texel's edge.
     for eye in [center, stage.grid.corner_in_world, stage.grid.corner_in_world + 4.0 * stage.grid.spacing_m] {
         for towards in [Vec3::X, Vec3::NEG_Y, Vec3::Z, Vec3::ONE, Vec3::new(-1.0, 1e-8, 0.0)] {
-            let camera = PinholeCamera {
-                eye_in_world: eye,
-                ..crate::stage::looking(eye, eye + towards, 60.0, corners.view().size_px)
-            };
+            let camera =
+                PinholeCamera { eye_in_world: eye, ..looking(eye, eye + towards, 60.0, corners.view().size_px) };
             let view = stage.view(&camera);
             assert!(view.inverse_depth_per_m.iter().flatten().all(|depth| depth.is_finite()), "{eye} {towards}");
             assert_eq!(count(&view, ProvenanceKind::Filled), 0);

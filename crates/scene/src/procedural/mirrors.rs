@@ -1,5 +1,6 @@
-//! Scenes with mirrors: a teapot before a dented mirror, a ball between two plane mirrors, and two mirror balls in a hall.
+//! Scenes with mirrors: a teapot before a dented mirror, a ball between two plane mirrors, two mirror balls in a hall, and a box.
 
+use depth_image::Light;
 use glam::Vec3;
 
 use super::geometry::{MeshBuilder, matt, vertex};
@@ -28,6 +29,11 @@ const STEP: f32 = 1e-3;
 const HALF_DISTANCE_M: f32 = 2.0;
 const HALF_WIDTH_M: f32 = 3.0;
 const HEIGHT_M: f32 = 3.0;
+
+/// The half width of the box, its height, and the sides of its post.
+const BOX_HALF_M: f32 = 2.0;
+const BOX_HEIGHT_M: f32 = 3.0;
+const POST_SIDES: u32 = 64;
 
 const HALL_HALF_SIDE_M: u32 = 4;
 const HALL_HEIGHT_M: u32 = 4;
@@ -87,6 +93,52 @@ pub fn mirror_hall() -> Scene {
     builder.into_scene_of("mirror-hall", vec![matt("matt"), mirror(0.8)]).with_default_background()
 }
 
+/// A ball and a post that mirror, in a box of 4 × 3 × 4 m without a front and a ceiling, with coloured walls, a glossy floor and four
+/// lamps: after the first scene of Lischinski and Rappoport.
+#[must_use]
+pub fn mirror_box() -> Scene {
+    let mut builder = MeshBuilder::default();
+    let [right, up, back] = [Vec3::X * BOX_HALF_M, Vec3::Y * (BOX_HEIGHT_M * 0.5), Vec3::NEG_Z * BOX_HALF_M];
+    builder.rectangle(up + back, right, up, Vec3::new(206.0, 200.0, 188.0));
+    builder.rectangle(up - right, back, up, Vec3::new(188.0, 66.0, 52.0));
+    builder.rectangle(up + right, -back, up, Vec3::new(58.0, 96.0, 176.0));
+    builder.finish_part(0);
+    checked(&mut builder, back - right, [Vec3::Z, Vec3::X], [2 * BOX_HALF_M as u32; 2]);
+    builder.finish_part(1);
+    star(&mut builder, [128, 64], Vec3::splat(255.0), |out| Vec3::new(-0.75, 0.8, 0.3) + out * 0.8);
+    post(&mut builder, Vec3::new(0.95, 0.0, -0.75), 0.55, 1.9);
+    builder.finish_part(2);
+    let floor = Material { roughness: 0.4, ..matt("floor") };
+    let mut scene =
+        builder.into_scene_of("mirror-box", vec![matt("matt"), floor, mirror(0.85)]).with_default_background();
+    let lamp = |x: f32, z: f32| Light::Point {
+        position_in_world: Vec3::new(x, BOX_HEIGHT_M + 0.6, z),
+        intensity_linear: Vec3::splat(3.0),
+        radius_m: 0.1,
+    };
+    scene.illumination.lights = vec![lamp(-1.2, -1.2), lamp(1.2, -1.2), lamp(-1.2, 1.2), lamp(1.2, 1.2)];
+    scene
+}
+
+/// An upright cylinder with a lid, whose sides are smooth.
+fn post(builder: &mut MeshBuilder, foot: Vec3, radius_m: f32, height_m: f32) {
+    let white = Vec3::splat(255.0);
+    let out = |number: u32| {
+        let (sin, cos) = (std::f32::consts::TAU * number as f32 / POST_SIDES as f32).sin_cos();
+        Vec3::new(cos, 0.0, -sin)
+    };
+    let at = |number: u32, up_m: f32| foot + out(number) * radius_m + Vec3::Y * up_m;
+    for number in 0..POST_SIDES {
+        let places = [(number, 0.0), (number + 1, 0.0), (number + 1, height_m), (number, height_m)];
+        let corners = places.map(|(number, up_m)| builder.push(vertex(at(number, up_m), out(number), white)));
+        builder.quad(corners);
+    }
+    for first in (0..POST_SIDES).step_by(2) {
+        let middle = foot + Vec3::Y * height_m;
+        builder.facet([middle, at(first, height_m), at(first + 1, height_m), at(first + 2, height_m)], white);
+    }
+}
+
 /// A metal without roughness.
 fn mirror(reflectance: f32) -> Material {
     let base_color_linear = [reflectance, reflectance, reflectance, 1.0];
@@ -144,6 +196,7 @@ mod tests {
             |scene: &Scene| -> Vec<u32> { scene.meshes[0].parts.iter().map(|part| part.index_count / 3).collect() };
         assert_eq!(triangles(&teapot_mirror()), [2 * 24 * 24 + 16_384, 39_600]);
         assert_eq!(triangles(&mirror_pair()), [2 * 8 * 8 + 2 * 64 * 31 + 12 + 4, 4]);
+        assert_eq!(triangles(&mirror_box()), [6, 2 * 4 * 4, 2 * 128 * 63 + 2 * 64 + 64]);
         assert_eq!(triangles(&mirror_hall()), [2 * 8 * (8 + 4 * 4) + 16_384, 2 * 2 * 64 * 31]);
     }
 

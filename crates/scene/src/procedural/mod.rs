@@ -22,7 +22,7 @@ pub use bird_nest::bird_nest;
 pub use blocks::{BlocksViewpoints, blocks, blocks_viewpoints};
 pub use grass::{GrassDensity, grass};
 pub use lone_tree::lone_tree;
-pub use mirrors::{mirror_hall, mirror_pair, teapot_mirror};
+pub use mirrors::{mirror_box, mirror_hall, mirror_pair, teapot_mirror};
 pub use shapes::{checker_sphere, courtyard, poles, quad, unit_cube, uv_sphere};
 pub use snake::snake;
 pub use tree_terrain::tree_terrain;
@@ -48,6 +48,7 @@ pub(crate) fn by_name(name: &str) -> Scene {
         "teapot-mirror" => teapot_mirror(),
         "mirror-pair" => mirror_pair(),
         "mirror-hall" => mirror_hall(),
+        "mirror-box" => mirror_box(),
         _ => unit_cube(),
     }
 }
