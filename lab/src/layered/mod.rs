@@ -2,5 +2,6 @@
 
 pub mod command;
 mod cubes;
+mod mirrors;
 mod subject;
 mod views;

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use anyhow::Context as _;
-use depth_image::{CubeGrid, LayeredDepthImage, PinholeCamera, View, ViewPlanes};
+use depth_image::{Aabb, CubeGrid, LayeredDepthImage, PinholeCamera, View, ViewPlanes};
 use reconstruction::{SampleSet, SetDescription};
 use render::{GpuScene, Kept, Lighting};
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
@@ -35,9 +35,22 @@ impl<'s> Subject<'s> {
     /// # Errors
     /// The device fails.
     pub fn new(stand: &'s Stand, name: &'static str, lighting: Lighting, views: usize) -> anyhow::Result<Self> {
+        Self::of_views(stand, name, lighting, |bounds| around(bounds, views))
+    }
+
+    /// Loads a built-in scene and draws views of it, which its bounds place.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn of_views(
+        stand: &'s Stand,
+        name: &'static str,
+        lighting: Lighting,
+        views: impl Fn(&Aabb) -> Vec<PinholeCamera>,
+    ) -> anyhow::Result<Self> {
         let scene = name.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?;
         let on_device = stand.upload(&scene)?;
-        let views = around(&scene.bounds(), views);
+        let views = views(&scene.bounds());
         let truths = stand.views(&on_device, lighting, &views, ViewPlanes::WITH_DEPTH)?;
         Ok(Self { stand, name, scene, on_device, lighting, views, truths })
     }
@@ -70,13 +83,13 @@ impl<'s> Subject<'s> {
         Ok((set, start.elapsed().as_secs_f64()))
     }
 
-    /// What all images of the scene share. Highlights are left away.
+    /// What all images of the scene share.
     pub fn description(&self) -> SetDescription<'_> {
         SetDescription {
             volume: self.scene.bounds(),
             background: self.scene.background,
             illumination: &self.scene.illumination,
-            highlight: None,
+            highlight: self.lighting.highlight(),
             environment: None,
             mips: false,
         }
