@@ -2,7 +2,7 @@
 
 use depth_image::{MAX_MIRROR_CELLS, MAX_REFLECTIONS};
 
-use crate::{methods::ReconstructionMethod, view_work::MAX_SAMPLE_CAMERAS};
+use crate::view_work::MAX_SAMPLE_CAMERAS;
 
 /// Why views cannot be reconstructed.
 #[derive(Debug, thiserror::Error)]
@@ -35,7 +35,7 @@ pub enum ReconstructionError {
     )]
     CurvedSearch { coarse_px: f32, fine_px: f32 },
     #[error("{method} reconstructs views from {needed}, which the sample set lacks")]
-    NoSamples { method: ReconstructionMethod, needed: &'static str },
+    NoSamples { method: String, needed: &'static str },
     #[error("the volume of the sample set is empty or not finite")]
     Volume,
 }

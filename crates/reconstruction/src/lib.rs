@@ -24,6 +24,7 @@ mod reflectors;
 mod sample_set;
 #[cfg(feature = "scalar")]
 pub mod scalar;
+mod set_description;
 mod shaders;
 mod single_pole;
 mod specular;
@@ -39,6 +40,7 @@ pub use pyramid::CodedDepth;
 pub use quads::{ErrorBound, MeshStatistics, Quad, RequiredPlanes};
 pub use ray_ends::{RayEnd, RayWork};
 pub use reconstructor::Reconstructor;
-pub use sample_set::{SampleSet, SetDescription};
+pub use sample_set::SampleSet;
+pub use set_description::SetDescription;
 pub use shaders::{shader_sources, shaders, templates};
 pub use view_work::MAX_SAMPLE_CAMERAS;

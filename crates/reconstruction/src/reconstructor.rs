@@ -14,7 +14,8 @@ use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
 use crate::ray_ends::{RayEnd, RayWork, follow_rays};
 use crate::recording::{MIRRORED_PIXELS_A_BATCH, MIRRORED_PIXELS_A_SLICE, PIXELS_A_BATCH, Recording, batches};
-use crate::sample_set::{SampleSet, SetDescription};
+use crate::sample_set::SampleSet;
+use crate::set_description::SetDescription;
 use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
 use crate::{fill, shaders::templates, specular, tile_start};
 
@@ -194,7 +195,7 @@ impl Reconstructor {
         for (index, camera) in cameras.iter().enumerate() {
             camera.validate().map_err(|source| ReconstructionError::Camera { index, source })?;
         }
-        set.check_method(method)?;
+        check_samples(set, method)?;
         // A cube shows what all of its mirrors do.
         let everywhere = Aabb { min: Vec3::splat(f32::MIN), max: Vec3::splat(f32::MAX) };
         let own = [MirrorCell { bounds: everywhere, surroundings: set }];
@@ -329,7 +330,7 @@ impl Reconstructor {
         set: &SampleSet,
         method: ReconstructionMethod,
     ) -> Result<Option<MeshStatistics>, ReconstructionError> {
-        set.check_method(method)?;
+        check_samples(set, method)?;
         Ok(method.mesh(&self.device, set, Turn::default())?.map(|mesh| mesh.statistics))
     }
 
@@ -338,8 +339,20 @@ impl Reconstructor {
     /// # Errors
     /// As [`Reconstructor::mesh_statistics`].
     pub fn read_quads(&self, set: &SampleSet, method: ReconstructionMethod) -> Result<Vec<Quad>, ReconstructionError> {
-        set.check_method(method)?;
+        check_samples(set, method)?;
         let mesh = method.mesh(&self.device, set, Turn::default())?;
         mesh.map_or(Ok(Vec::new()), |mesh| quads::read(&self.device, &mesh, set))
     }
+}
+
+/// Views come from pinholes or from a cube, as the method needs.
+fn check_samples(set: &SampleSet, method: ReconstructionMethod) -> Result<(), ReconstructionError> {
+    if set.is_single_pole() {
+        return Err(ReconstructionError::Model { model: "single_pole" });
+    }
+    let (is_there, needed) = match method.walks_cube() {
+        true => (set.cube.is_some(), "a layered cube"),
+        false => (!set.cameras.is_empty(), "depth images"),
+    };
+    if is_there { Ok(()) } else { Err(ReconstructionError::NoSamples { method: method.to_string(), needed }) }
 }

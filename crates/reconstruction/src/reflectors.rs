@@ -4,7 +4,7 @@ use depth_image::{DepthImage, Highlight, Illumination, LayeredDepthImage, Specul
 use gpu::{GpuError, Table, TablePool, Turn, illumination_bytes};
 use wgpu::{BufferUsages, TextureFormat};
 
-use crate::{error::ReconstructionError, sample_set::SetDescription};
+use crate::{error::ReconstructionError, set_description::SetDescription};
 
 /// A normal and a reflector stand before the words of visibility.
 const WORDS_BEFORE_VISIBILITY: usize = 2;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
-use depth_image::{Aabb, CubeGrid, DepthImage, Environment, Highlight, Illumination, LayeredDepthImage, PinholeCamera};
+use depth_image::{Aabb, CubeGrid, DepthImage, Environment, LayeredDepthImage, PinholeCamera};
 use glam::{UVec2, Vec2, Vec3};
 use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
@@ -14,28 +14,11 @@ use crate::cube::Cube;
 use crate::pyramid::{CodedDepth, Pyramid, is_among_holes};
 use crate::single_pole::{GpuPole, poles};
 use crate::view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant};
-use crate::{error::ReconstructionError, methods::ReconstructionMethod, quads::SetMeshes, reflectors::Reflectors};
+use crate::{error::ReconstructionError, quads::SetMeshes, reflectors::Reflectors, set_description::SetDescription};
 
 /// The padding of the volume, in parts of its longest edge. All cameras must still enter a surface on the very face of the
 /// volume, although their samples of a slope are steps.
 pub(crate) const VOLUME_MARGIN: f32 = 0.005;
-
-/// The properties that all images of a sample set share.
-#[derive(Clone, Copy)]
-pub struct SetDescription<'a> {
-    /// Holds all geometry of the scene.
-    pub volume: Aabb,
-    /// Radiance of rays that leave the scene, by their direction.
-    pub background: Environment,
-    /// The scene's lights; they are seen in highlights only, since the samples' colours hold the rest.
-    pub illumination: &'a Illumination,
-    /// How surfaces reflect towards the viewer; `None` leaves highlights away, even where images have planes for them.
-    pub highlight: Option<Highlight>,
-    /// A map in the place of the background and of the lights' environment. The twin does not know it.
-    pub environment: Option<&'a Arc<GpuEnvironment>>,
-    /// Colours have coarser levels, for mirrored rays that cover several texels.
-    pub mips: bool,
-}
 
 /// One complete sample set: what views are reconstructed from.
 pub struct SampleSet {
@@ -74,16 +57,6 @@ impl SampleSet {
     /// Its images are those of single-pole cameras.
     pub(crate) fn is_single_pole(&self) -> bool {
         !self.poles.is_empty()
-    }
-
-    /// Views are reconstructed from pinholes or from a cube.
-    pub(crate) fn check_method(&self, method: ReconstructionMethod) -> Result<(), ReconstructionError> {
-        if self.is_single_pole() {
-            return Err(ReconstructionError::Model { model: "single_pole" });
-        }
-        let is_there = if method.walks_cube() { self.cube.is_some() } else { !self.cameras.is_empty() };
-        let needed = if method.walks_cube() { "a layered cube" } else { "depth images" };
-        if is_there { Ok(()) } else { Err(ReconstructionError::NoSamples { method, needed }) }
     }
 
     /// The resources of `background.wgsl`.

@@ -27,7 +27,8 @@ pub(super) struct Bricks {
     pub cells: Vec<u32>,
     pub bricks: Vec<[u32; 4]>,
     pub leaves: Vec<[u32; 2]>,
-    pub entries: Vec<[u32; 2]>,
+    /// Two a texel.
+    pub entries: Vec<[u32; 4]>,
 }
 
 /// A sample whose plane passes through a voxel.
@@ -49,24 +50,26 @@ impl Bricks {
             cells: distances(size, &occupied),
             bricks: Vec::new(),
             leaves: Vec::new(),
-            entries: passages.iter().map(|passage| passage.words).collect(),
+            entries: Vec::with_capacity(passages.len() / 2 + 1),
         };
         for (cell, ends) in first.windows(2).enumerate().filter(|(_, ends)| ends[1] > ends[0]) {
             all.cells[cell] = BRICK | all.bricks.len() as u32;
-            all.add_brick(ends[0], &passages[ends[0] as usize..ends[1] as usize]);
+            all.add_brick(&passages[ends[0] as usize..ends[1] as usize]);
         }
         all
     }
 
     /// A brick of passages that are sorted by voxel.
-    fn add_brick(&mut self, mut first: u32, passages: &[Passage]) {
+    fn add_brick(&mut self, passages: &[Passage]) {
         let mut mask = [0; 2];
         let first_leaf = self.leaves.len() as u32;
         for leaf in passages.chunk_by(|a, b| a.voxel == b.voxel) {
             mask[leaf[0].voxel as usize / 32] |= 1 << (leaf[0].voxel % 32);
-            let end = first + leaf.len() as u32;
-            self.leaves.push([first, end]);
-            first = end;
+            let first = self.entries.len() as u32;
+            // The last of an odd number is there twice, which changes nothing.
+            let pair = |two: &[Passage]| [two[0].words, two[two.len() - 1].words];
+            self.entries.extend(leaf.chunks(2).map(|two| bytemuck::cast::<[[u32; 2]; 2], [u32; 4]>(pair(two))));
+            self.leaves.push([first, self.entries.len() as u32]);
         }
         self.bricks.push([mask[0], mask[1], first_leaf, 0]);
     }

@@ -2,12 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::SAME_PLANE;
-use super::samples::CubeSamples;
+use super::samples::{CubeSamples, Links};
 
-/// The numbers of the samples on a sample's surface in the neighbouring lines: in the lines before and after along the next axis, and
-/// along the axis after that. A sample without such a neighbour has its own number.
-pub(crate) type Links = [u32; 4];
+/// Samples of neighbouring lines are of one surface where one lies within this distance of the other's plane, in spacings.
+const SAME_PLANE: f32 = 0.75;
 
 /// The links of all samples.
 pub(crate) fn links(samples: &CubeSamples) -> Vec<Links> {

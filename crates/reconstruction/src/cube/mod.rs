@@ -14,13 +14,13 @@ use wgpu::{BufferUsages, TextureFormat};
 #[cfg(feature = "scalar")]
 pub(crate) use bricks::LEAST_SHARE;
 pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP};
-#[cfg(feature = "scalar")]
-pub(crate) use links::Links;
 pub(crate) use links::links;
 pub(crate) use samples::CubeSamples;
+#[cfg(feature = "scalar")]
+pub(crate) use samples::Links;
 
 use self::bricks::Bricks;
-use crate::{error::ReconstructionError, reflectors::Reflectors, sample_set::SetDescription};
+use crate::{error::ReconstructionError, reflectors::Reflectors, set_description::SetDescription};
 
 /// A ray steps this far into the next box, in spacings: more than the rounding of coordinates.
 pub(crate) const WALK_NUDGE: f32 = 2e-3;
@@ -30,8 +30,6 @@ pub(crate) const HIT_SLACK: f32 = 0.1;
 pub(crate) const SQUARE_REACH: f32 = 0.55;
 /// Steps of a ray, of which each crosses a voxel or empty cells.
 pub(crate) const MAX_CUBE_STEPS: u32 = 4096;
-/// Samples of neighbouring lines are of one surface where one lies within this distance of the other's plane, in spacings.
-pub(crate) const SAME_PLANE: f32 = 0.75;
 /// Rays off a surface meet nothing below this height, in spacings: samples of the surface itself may stand as high.
 const START_SPACINGS: f32 = 0.75;
 /// Bits of an entry for a sample's number.
@@ -91,7 +89,7 @@ impl Cube {
             cells: tables.upload("cells of a cube", TextureFormat::R32Uint, &bricks.cells, turn)?,
             bricks: tables.upload("bricks of a cube", TextureFormat::Rgba32Uint, &bricks.bricks, turn)?,
             leaves: tables.upload("leaves of a cube", TextureFormat::Rg32Uint, &bricks.leaves, turn)?,
-            entries: tables.upload("entries of a cube", TextureFormat::Rg32Uint, &bricks.entries, turn)?,
+            entries: tables.upload("entries of a cube", TextureFormat::Rgba32Uint, &bricks.entries, turn)?,
             samples: tables.upload("samples of a cube", TextureFormat::Rgba32Uint, &words, turn)?,
             reflectors: Reflectors::of_cube(tables, (images, &samples.place), set, turn)?,
             truncated: images.iter().any(|image| image.truncated),

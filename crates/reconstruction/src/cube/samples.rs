@@ -4,7 +4,9 @@ use depth_image::{CubeGrid, LayeredDepthImage, oct8_from_unit};
 use glam::{UVec2, UVec3, Vec3};
 use rayon::prelude::*;
 
-use super::links::Links;
+/// The numbers of the samples on a sample's surface in the neighbouring lines: in the lines before and after along the next axis, and
+/// along the axis after that. A sample without such a neighbour has its own number.
+pub(crate) type Links = [u32; 4];
 
 /// The samples of all lines: those along the first axis, then the second, then the third; along each axis line after line, by the
 /// coordinate along the next axis first. Lengths are in spacings.

@@ -13,6 +13,7 @@ struct Cube {
     rows: u32,
     // A ray off a surface meets nothing nearer, where it leaves straight up.
     start_m: f32,
+    padding: vec2u,
 }
 
 @group(0) var<uniform> cube: Cube;
@@ -21,9 +22,9 @@ const IS_BRICK: u32 = 0x80000000u;
 @group(0) var cube_cells: texture_2d<u32>;
 // The mask of a brick's voxels in two words, and its first leaf.
 @group(0) var cube_bricks: texture_2d<u32>;
-// The first entry of a leaf and of the next.
+// The first pair of entries of a leaf, and the one after its last.
 @group(0) var cube_leaves: texture_2d<u32>;
-// A sample's number; a bit for each coordinate of its line among the voxel's four lines along an axis; its normal, its depth along
+// Two entries a texel. Each is a sample's number; a bit for each coordinate of its line among the voxel's four lines along an axis; its normal, its depth along
 // the axis, and the axis in the highest two bits.
 @group(0) var cube_entries: texture_2d<u32>;
 
@@ -117,15 +118,18 @@ fn met_in_leaf(ray: CubeRay, voxel: vec3i, cell: Cell, span: vec2f) -> CubeHit {
 {% endif %}
     let ends = textureLoad(cube_leaves, texel_at(cell.first_leaf + before), 0).xy;
     var hit = CubeHit(false, FAR_AWAY, 0u, 0u, vec3f(0.0));
-    for (var entry = ends.x; entry < ends.y; entry++) { hit = nearer_of(hit, ray, entry, vec3f(voxel * 2), span); }
+    for (var pair = ends.x; pair < ends.y; pair++) {
+{% if count_fetches %}        fetches += 1u;
+{% endif %}
+        let entries = textureLoad(cube_entries, texel_at(pair), 0);
+        hit = nearer_of(hit, ray, entries.xy, vec3f(voxel * 2), span);
+        hit = nearer_of(hit, ray, entries.zw, vec3f(voxel * 2), span);
+    }
     return hit;
 }
 
 // The nearer of a hit and of where the ray meets an entry's plane from its front, within the voxel and the line's square.
-fn nearer_of(hit: CubeHit, ray: CubeRay, entry: u32, voxel_least: vec3f, span: vec2f) -> CubeHit {
-{% if count_fetches %}    fetches += 1u;
-{% endif %}
-    let words = textureLoad(cube_entries, texel_at(entry), 0).xy;
+fn nearer_of(hit: CubeHit, ray: CubeRay, words: vec2u, voxel_least: vec3f, span: vec2f) -> CubeHit {
     let axis = words.y >> 30u;
     let is_along = vec3u(axis) == vec3u(0u, 1u, 2u);
     let depth = f32((words.y >> 16u) & 0x3fffu) * ENTRY_DEPTH_STEP - ENTRY_DEPTH_BELOW;

@@ -5,7 +5,7 @@ use glam::{IVec2, Vec2, Vec3};
 
 use super::{pixel::Pixel, view};
 use crate::cube::{CubeSamples, LEAST_SHARE, Links, SQUARE_REACH, links};
-use crate::sample_set::SetDescription;
+use crate::set_description::SetDescription;
 
 /// A layered depth cube without any order in space.
 pub struct CubeTwin {

@@ -30,7 +30,7 @@ use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, ToneMapping, View,
 use glam::{UVec2, Vec3};
 
 use self::{pixel::Pixel, sample_camera::SampleCamera, smooth::First, view_ray::ViewRays};
-use crate::{methods::ReconstructionMethod, pyramid::is_among_holes, quads::Quad, sample_set::SetDescription};
+use crate::{methods::ReconstructionMethod, pyramid::is_among_holes, quads::Quad, set_description::SetDescription};
 
 /// One view with depth and provenance.
 #[must_use]

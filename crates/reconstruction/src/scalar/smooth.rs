@@ -10,7 +10,7 @@ use super::{
     view_ray::{ViewRay, ViewRays},
 };
 use crate::methods::joint_carve::smooth::{FAINT_HIGHLIGHT, OPEN_SHARE, SMOOTH_FOOTPRINTS, from_first_px};
-use crate::{sample_set::SetDescription, view_work::CELL_MARGIN_PX};
+use crate::{set_description::SetDescription, view_work::CELL_MARGIN_PX};
 
 /// What the first position found, and how further ones follow from it.
 pub(super) struct First<'f> {

@@ -9,7 +9,7 @@ use super::{
     surface::{bilinear, bilinear_shares},
     view_ray::{ViewRay, ViewRays},
 };
-use crate::{sample_set::SetDescription, view_work::CELL_MARGIN_PX};
+use crate::{set_description::SetDescription, view_work::CELL_MARGIN_PX};
 
 /// The mean of the samples around a point.
 struct Gathered {

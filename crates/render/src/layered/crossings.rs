@@ -7,7 +7,7 @@ use gpu::{Binding, BufferPool, DrawPass, Frame, Gpu, GpuError, PooledBuffer};
 use rayon::prelude::*;
 use wgpu::{BufferUsages, TextureUsages};
 
-use super::Kept;
+use super::kept::Kept;
 use crate::{RenderError, stages::Stages, work::DrawWork};
 
 /// Crossings of a line for which there is room at first.

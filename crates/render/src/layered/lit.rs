@@ -6,7 +6,7 @@ use glam::{UVec2, Vec2};
 use gpu::{Binding, Frame, ResourceTraits, ShaderVariant};
 use minijinja::{Value, context, value::merge_maps};
 
-use super::Crossing;
+use super::crossings::Crossing;
 use crate::accumulation::Sums;
 use crate::batch::{Batch, Part, Recording};
 use crate::pieces::Pieces;

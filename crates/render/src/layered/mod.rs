@@ -1,41 +1,19 @@
 //! Layered depth images: all surfaces that the lines of a parallel camera meet, by drawing without a test of depth, and their light.
 
 mod crossings;
+mod kept;
 mod lit;
 
 use depth_image::{LayeredDepthImage, ParallelCamera, SpecularPlanes, oct8_from_unit};
 use glam::Vec3;
 use rayon::prelude::*;
 
-pub(crate) use crossings::Crossing;
 #[cfg(test)]
-pub(crate) use crossings::GpuLines;
+pub(crate) use crossings::{Crossing, GpuLines};
+pub use kept::Kept;
 pub(crate) use lit::Lit;
 
 use crate::{RenderError, stages::Stages, work::DrawWork};
-
-/// The surfaces that a layered image holds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Kept {
-    /// All that its lines meet (Lischinski §3.1).
-    All,
-    /// Those whose normal is largest along the lines, of the camera's three axes, or nearly so: images along all three axes hold
-    /// each surface on one of them at least.
-    Dominant,
-}
-
-/// A surface is kept along each axis in which its normal has at least this share of its largest component: neighbouring images
-/// overlap.
-const LEAST_DOMINANT_SHARE: f32 = 0.9;
-
-impl Kept {
-    fn least_share(self) -> f32 {
-        match self {
-            Self::All => 0.0,
-            Self::Dominant => LEAST_DOMINANT_SHARE,
-        }
-    }
-}
 
 /// All surfaces of a scene on the lines of a camera. What sides send to all directions alike is their colour.
 pub(crate) fn draw(
