@@ -70,6 +70,8 @@ fn views_show_the_scene() {
         let direct = Stage::new(scene, &corners.samples(1)).drawn_directly(&corners.view());
         let agreement = Agreement::of(&stage.view(&corners.view()), &direct);
         println!("{name}: {agreement:?}");
+        // Poles and leaves are thinner than a few spacings.
+        assert!(agreement.kind > 0.99 && agreement.hits > 500 && agreement.close > 0.75, "{name}: {agreement:?}");
     }
 }
 
