@@ -32,7 +32,7 @@ impl CubeGrid {
             return Err(CameraError::OutOfRange { field: "side", value, allowed: "from 16 to 4096" });
         }
         let extent_m = bounds.size().max_element();
-        if !(bounds.min.is_finite() && bounds.max.is_finite() && extent_m > 0.0) {
+        if !(bounds.min.is_finite() && bounds.max.is_finite() && extent_m.is_finite() && extent_m > 0.0) {
             return Err(CameraError::NotFinite { field: "bounds" });
         }
         let spacing_m = extent_m / (side - 1) as f32;
@@ -48,6 +48,17 @@ impl CubeGrid {
     /// # Errors
     /// The first field that is not finite or out of range.
     pub fn validate(&self) -> Result<(), CameraError> {
+        let length = f64::from(self.world_from_cube.length());
+        let side = f64::from(self.size.max_element());
+        if !(self.corner_in_world.is_finite() && length.is_finite()) {
+            return Err(CameraError::NotFinite { field: "corner_in_world or world_from_cube" });
+        }
+        if (length - 1.0).abs() >= 1e-3 {
+            return Err(CameraError::OutOfRange { field: "world_from_cube", value: length, allowed: "of unit length" });
+        }
+        if self.size.max_element() > *CUBE_SIDES.end() {
+            return Err(CameraError::OutOfRange { field: "size", value: side, allowed: "at most 4096" });
+        }
         (0..3).try_for_each(|axis| self.camera(axis).validate())
     }
 
@@ -69,16 +80,6 @@ impl CubeGrid {
             range_m: edge_m(own),
         }
     }
-
-    /// The place of a line along `axis` among the cells, by the pixel of its camera: the coordinate along the axis is 0.
-    #[must_use]
-    pub fn line_cell(&self, axis: usize, pixel: UVec2) -> UVec3 {
-        let [columns, rows] = [(axis + 1) % 3, (axis + 2) % 3];
-        let mut cell = UVec3::ZERO;
-        cell[columns] = pixel.x;
-        cell[rows] = self.size[rows] - 1 - pixel.y;
-        cell
-    }
 }
 
 #[cfg(test)]
@@ -96,12 +97,11 @@ mod tests {
         let point_in_world = grid.corner_in_world + turned * (place * grid.spacing_m);
         for axis in 0..3 {
             let PixelDepth { pixel, planar_depth_m } = grid.camera(axis).project(point_in_world).unwrap();
-            let cell = grid.line_cell(axis, pixel.as_uvec2());
+            let [columns, rows] = [(axis + 1) % 3, (axis + 2) % 3];
             let depth = grid.size[axis] as f32 - planar_depth_m / grid.spacing_m;
             assert!((depth - place[axis]).abs() < 1e-3, "{axis}: {depth}");
-            for other in [(axis + 1) % 3, (axis + 2) % 3] {
-                assert_eq!(cell[other], place[other] as u32, "{axis} {other}");
-            }
+            assert!((pixel.x - place[columns]).abs() < 1e-3, "{axis}: {pixel}");
+            assert!((grid.size[rows] as f32 - pixel.y - place[rows]).abs() < 1e-3, "{axis}: {pixel}");
         }
     }
 
@@ -125,6 +125,13 @@ mod tests {
         assert!(matches!(CubeGrid::around(&Aabb::EMPTY, 64), Err(CameraError::NotFinite { field: "bounds" })));
         let point = Aabb { min: Vec3::ONE, max: Vec3::ONE };
         assert!(matches!(CubeGrid::around(&point, 64), Err(CameraError::NotFinite { field: "bounds" })));
+        let endless = Aabb { min: Vec3::splat(-3e38), max: Vec3::splat(3e38) };
+        assert!(matches!(CubeGrid::around(&endless, 64), Err(CameraError::NotFinite { field: "bounds" })));
+        let good = CubeGrid::around(&bounds(), 64).unwrap();
+        let stretched = CubeGrid { world_from_cube: Quat::from_xyzw(0.0, 0.0, 0.0, 2.0), ..good };
+        assert!(matches!(stretched.validate(), Err(CameraError::OutOfRange { field: "world_from_cube", .. })));
+        let large = CubeGrid { size: UVec3::new(64, 5000, 64), ..good };
+        assert!(matches!(large.validate(), Err(CameraError::OutOfRange { field: "size", .. })));
     }
 
     fn bounds() -> Aabb {

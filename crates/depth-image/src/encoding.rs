@@ -57,7 +57,12 @@ pub fn oct16_from_unit(unit: Vec3) -> u32 {
 /// Packs a unit vector in two signed bytes. Any other input unpacks to some unit vector, never NaN.
 #[must_use]
 pub fn oct8_from_unit(unit: Vec3) -> u16 {
-    let packed = oct16_from_unit(unit);
+    oct8_from_oct16(oct16_from_unit(unit))
+}
+
+/// An octahedral vector in two signed bytes, of one in two signed 16-bit numbers.
+#[must_use]
+pub fn oct8_from_oct16(packed: u32) -> u16 {
     let quantise = |bits: u32| ((f32::from(bits as u16 as i16) / 32767.0 * 127.0).round() as i8) as u8;
     u16::from_le_bytes([quantise(packed), quantise(packed >> 16)])
 }

@@ -38,7 +38,7 @@ pub enum LayeredError {
     #[error("layered image plane {plane} has {len} values, must have {expected}")]
     Plane { plane: &'static str, len: usize, expected: usize },
     #[error(
-        "line {line} of a layered image begins at sample {first}, must begin at {least} or later, and no line after {samples}"
+        "line {line} of a layered image begins at sample {first}, must begin at {least} or later, the first line at 0, and none after {samples}"
     )]
     First { line: usize, first: u32, least: u32, samples: usize },
     #[error("line {line} of a layered image has {layers} layers, must have at most {MAX_LAYERS}")]
@@ -111,12 +111,6 @@ impl LayeredDepthImage {
         self.first.windows(2).map(|ends| ends[1] - ends[0]).max().unwrap_or(0)
     }
 
-    /// The mean number of samples of a line.
-    #[must_use]
-    pub fn mean_layers(&self) -> f64 {
-        self.sample_count() as f64 / self.camera.pixel_count().max(1) as f64
-    }
-
     /// The samples of a line.
     #[must_use]
     pub fn line(&self, line: usize) -> std::ops::Range<usize> {
@@ -160,7 +154,7 @@ mod tests {
         let image = image();
         assert_eq!(image.validate(), Ok(()));
         assert_eq!((image.line(0), image.line(1), image.line(2)), (0..2, 2..2, 2..3));
-        assert_eq!((image.sample_count(), image.layer_count(), image.mean_layers()), (3, 2, 1.0));
+        assert_eq!((image.sample_count(), image.layer_count()), (3, 2));
     }
 
     #[test]

@@ -36,8 +36,8 @@ pub use bounds::Aabb;
 pub use camera::Camera;
 pub use cube_grid::{CUBE_SIDES, CubeGrid};
 pub use encoding::{
-    linear_from_rgb9e5, linear_from_srgb8, oct8_from_unit, oct16_from_unit, rgb9e5_from_linear, srgb8_from_linear,
-    unit_from_oct8,
+    linear_from_rgb9e5, linear_from_srgb8, oct8_from_oct16, oct8_from_unit, oct16_from_unit, rgb9e5_from_linear,
+    srgb8_from_linear, unit_from_oct8,
 };
 pub use environment_light::{BrightTexel, EnvironmentLight, LOBE_ROUGHNESS, LOBE_SIZE_PX, Lobe};
 pub use environment_map::{EnvironmentMap, EnvironmentMapError, MAX_ENVIRONMENT_SIZE_PX};

@@ -34,8 +34,9 @@ pub enum ReconstructionError {
         "steps of {coarse_px} and {fine_px} texels: fine ones are 0.0625 at least, coarse ones as long or longer, up to 64"
     )]
     CurvedSearch { coarse_px: f32, fine_px: f32 },
-    #[error("{method} reconstructs views from {needed}, which the sample set lacks")]
-    NoSamples { method: String, needed: &'static str },
+    /// The set has other samples than a method, or rays off mirrors, need.
+    #[error("{what} needs {needed}, which the sample set lacks")]
+    NoSamples { what: String, needed: &'static str },
     #[error("the volume of the sample set is empty or not finite")]
     Volume,
 }

@@ -60,6 +60,9 @@ pub(crate) fn follow_rays(
     rays: &[Ray],
 ) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
     let RayWork { surroundings, near_m, curved_search, count_steps, width_m } = work;
+    if surroundings.cameras.is_empty() {
+        return Err(ReconstructionError::NoSamples { what: "a ray off a mirror".to_owned(), needed: "depth images" });
+    }
     let cells = [MirrorCell { bounds: Aabb::around([surroundings.eye_in_world()]), surroundings }];
     let mirrors = Mirrors { cells: &cells, reflections: 1 };
     let size_px = UVec2::new(COLUMNS, (rays.len() as u32).div_ceil(COLUMNS).max(1));

@@ -108,7 +108,7 @@ impl Reconstructor {
     /// One view a camera, in their order.
     ///
     /// # Errors
-    /// A camera that is not valid (all are checked first), or the device.
+    /// A camera that is not valid (all are checked first), a set without the samples that the method needs, or the device.
     pub fn reconstruct(
         &self,
         set: &SampleSet,
@@ -134,10 +134,11 @@ impl Reconstructor {
         self.reconstruct_mirrored(set, Mirrors::default(), cameras, method, planes, turn)
     }
 
-    /// As [`Reconstructor::reconstruct_in_turn`], with mirrors that show the scene.
+    /// As [`Reconstructor::reconstruct_in_turn`], with mirrors that show the scene. Those of a layered cube need no cells: they show the
+    /// cube.
     ///
     /// # Errors
-    /// As [`Reconstructor::reconstruct`], and too many mirror cells.
+    /// As [`Reconstructor::reconstruct`], too many mirror cells, and a cell without depth images.
     pub fn reconstruct_mirrored(
         &self,
         set: &SampleSet,
@@ -196,7 +197,7 @@ impl Reconstructor {
             camera.validate().map_err(|source| ReconstructionError::Camera { index, source })?;
         }
         check_samples(set, method)?;
-        // A cube shows what all of its mirrors do.
+        // All mirrors of a cube show the cube, whatever cells there are.
         let everywhere = Aabb { min: Vec3::splat(f32::MIN), max: Vec3::splat(f32::MAX) };
         let own = [MirrorCell { bounds: everywhere, surroundings: set }];
         let mirrors = if method.walks_cube() { Mirrors { cells: &own, ..mirrors } } else { mirrors };
@@ -354,5 +355,5 @@ fn check_samples(set: &SampleSet, method: ReconstructionMethod) -> Result<(), Re
         true => (set.cube.is_some(), "a layered cube"),
         false => (!set.cameras.is_empty(), "depth images"),
     };
-    if is_there { Ok(()) } else { Err(ReconstructionError::NoSamples { method: method.to_string(), needed }) }
+    if is_there { Ok(()) } else { Err(ReconstructionError::NoSamples { what: method.to_string(), needed }) }
 }

@@ -39,7 +39,7 @@ pub struct SampleSet {
     pub(crate) reflectors: Option<Reflectors>,
     pub(crate) environment: Option<Arc<GpuEnvironment>>,
     pub(crate) meshes: SetMeshes,
-    /// All surfaces of the scene, where the set has them: instead of images, or beneath them.
+    /// All surfaces of the scene, in place of images.
     pub(crate) cube: Option<Arc<Cube>>,
 }
 

@@ -16,12 +16,11 @@ struct Crossing {
     planar_depth_m: f32,
     // Of the triangle.
     plane_normal_oct16: u32,
-    padding: u32,
     surface: vec4u,
 }
 @group(3) var<uniform> lines: Lines;
 @group(3) var<storage, read_write> crossings: array<Crossing>;
-// Of those that were met, whether there was room for them or not.
+// The number of crossings, whether there was room for them or not.
 @group(3) var<storage, read_write> crossing_count: atomic<u32>;
 
 // Keeps both sides of what is seen from both.
@@ -31,15 +30,15 @@ fn append(in: Varyings, surface: vec4u, normal: vec3f, slope: Slope, front_facin
     let place = min(atomicAdd(&crossing_count, sides), lines.capacity);
     let pixel = vec2u(in.clip.xy);
     let line = pixel.y * lines.columns + pixel.x;
-    let depth_m = in.clip.z * lines.range_m;
+    let depth_m = clamp(in.clip.z, 0.0, 1.0) * lines.range_m;
     let front = select(-slope.towards, slope.towards, front_facing);
-    crossings[place] = Crossing(line, depth_m, oct16_from_unit(front), 0u, surface);
+    crossings[place] = Crossing(line, depth_m, oct16_from_unit(front), surface);
 {%- if double_sided %}
-    crossings[place + 1u] = Crossing(line, depth_m, oct16_from_unit(-front), 0u, vec4u(surface.xy, oct16_from_unit(-normal), surface.w));
+    crossings[place + 1u] = Crossing(line, depth_m, oct16_from_unit(-front), vec4u(surface.xy, oct16_from_unit(-normal), surface.w));
 {%- endif %}
 }
 
-// Of a triangle: the normal towards the camera, and whether its share along the lines is too small.
+// A triangle's normal towards the camera, and whether too little of it lies along the lines.
 struct Slope { towards: vec3f, is_steep: bool }
 
 fn slope_of(along_row: vec3f, along_column: vec3f) -> Slope {

@@ -48,7 +48,7 @@ mod work;
 pub use error::RenderError;
 pub use gpu_scene::GpuScene;
 pub use known_samples::{TemporalReference, view_cell_m};
-pub use layered::Kept;
+pub use layered::LayerSelection;
 pub use lighting::{Direct, Lighting, MAX_RAYS, Occlusion, Rate, UnknownLighting};
 pub use rays::{AccelerationReport, host_tree};
 pub use redundancy_test::{Evidence, RedundancyTest};

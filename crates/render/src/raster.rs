@@ -79,6 +79,12 @@ impl RasterVariant {
         RedundancyVariant::all(&tests).into_iter().flat_map(each)
     }
 
+    /// That of parallel cameras, of a plain material.
+    #[cfg(test)]
+    pub fn appended() -> Self {
+        Self::all().into_iter().find(|variant| variant.appended).expect("a variant")
+    }
+
     fn has_own_group(&self) -> bool {
         self.redundancy.is_some() || self.appended
     }

@@ -11,7 +11,7 @@ use parking_lot::Mutex;
 
 use crate::batch::{Batch, batches};
 use crate::known_samples::{ImageSequence, KnownSamples, TemporalReference};
-use crate::layered::{self, Kept};
+use crate::layered::{self, LayerSelection};
 use crate::planes::{self, Output};
 use crate::visibility::{Choice, Costs, Visibility};
 use crate::work::{DrawWork, SamplePlanes};
@@ -90,7 +90,7 @@ impl Renderer {
         &self,
         work: DrawWork<'_>,
         camera: &ParallelCamera,
-        kept: Kept,
+        kept: LayerSelection,
     ) -> Result<LayeredDepthImage, RenderError> {
         camera.validate().map_err(|source| RenderError::Camera { index: 0, source })?;
         let limit = u64::from(self.gpu.device.limits().max_texture_dimension_2d);

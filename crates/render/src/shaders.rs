@@ -12,7 +12,7 @@ use crate::{
     illuminate::Illuminate,
     interpolate::Interpolate,
     keep::Keep,
-    layered::Lit,
+    layered::{BIAS_FOOTPRINTS, BIAS_ROUNDINGS, Lit},
     pixel_list::LIST_WORKGROUP,
     raster::RasterVariant,
     redundancy_test::RedundancyTest,
@@ -40,7 +40,7 @@ pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
 /// When a text is not a template.
 pub fn templates(tests: &[(&'static str, &'static str)]) -> Result<Templates, ShaderError> {
     Ok(Templates::new(&[SHADERS, tests].concat())?.declaring(wgsl_constants! {
-        ALPHA_HASHED, ALPHA_TESTED, BOX_SLACK, CLAMP, COLOR_SUMS, DOUBLE_SIDED, EDGE_ROUNDINGS, LEAST_FACING, LIST_WORKGROUP, MATERIAL_TEXELS, MIRROR, MOST_LAYERS,
+        ALPHA_HASHED, ALPHA_TESTED, BIAS_FOOTPRINTS, BIAS_ROUNDINGS, BOX_SLACK, CLAMP, COLOR_SUMS, DOUBLE_SIDED, EDGE_ROUNDINGS, LEAST_FACING, LIST_WORKGROUP, MATERIAL_TEXELS, MIRROR, MOST_LAYERS,
         NOTHING, REFERENCE_FOOTPRINTS, SAME_SURFACE, SPECULAR, UNLIT, VERTEX
     }))
 }

@@ -91,7 +91,7 @@ fn of_side(
 ) -> anyhow::Result<Vec<Check>> {
     let (cube, mut checks) = match side == SIDES[1] {
         true => cubes::measure(subject, side, held)?,
-        false => (subject.cube((side, render::Kept::Dominant), subject.lighting, 1)?, Vec::new()),
+        false => (subject.cube((side, render::LayerSelection::Dominant), subject.lighting, 1)?, Vec::new()),
     };
     let walk = views::of_cube(subject, &subject.upload(&cube)?.0)?;
     seen.push(walk.row(subject.name, &format!("layered, {side}²")))?;

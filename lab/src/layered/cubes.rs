@@ -1,7 +1,7 @@
 //! What cubes hold and cost: samples, layers and seconds, with all surfaces of each line and with those of the dominant axis.
 
 use depth_image::LayeredDepthImage;
-use render::{Kept, Lighting};
+use render::{LayerSelection, Lighting};
 use study::{Bar, Cell, Check, Table};
 
 use super::subject::{Cube, Subject};
@@ -36,10 +36,10 @@ pub fn table() -> Table {
 /// # Errors
 /// The device fails.
 pub fn measure(subject: &Subject<'_>, side: u32, table: &mut Table) -> anyhow::Result<(Cube, Vec<Check>)> {
-    let all = subject.cube((side, Kept::All), Lighting::UNLIT, 1)?;
-    let layers = subject.cube((side, Kept::Dominant), Lighting::UNLIT, TIMES)?;
+    let all = subject.cube((side, LayerSelection::All), Lighting::UNLIT, 1)?;
+    let layers = subject.cube((side, LayerSelection::Dominant), Lighting::UNLIT, TIMES)?;
     // The first use of a light builds shaders.
-    let cube = subject.cube((side, Kept::Dominant), subject.lighting, 2)?;
+    let cube = subject.cube((side, LayerSelection::Dominant), subject.lighting, 2)?;
     drop(subject.upload(&cube)?);
     let load_s = subject.upload(&cube)?.1;
     let share = cube.samples() as f64 / all.samples() as f64;

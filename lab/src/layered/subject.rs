@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::Context as _;
 use depth_image::{Aabb, CubeGrid, LayeredDepthImage, PinholeCamera, View, ViewPlanes};
 use reconstruction::{SampleSet, SetDescription};
-use render::{GpuScene, Kept, Lighting};
+use render::{GpuScene, LayerSelection, Lighting};
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 
 use crate::failures::stand::{Stand, work};
@@ -59,7 +59,7 @@ impl<'s> Subject<'s> {
     ///
     /// # Errors
     /// The device fails.
-    pub fn cube(&self, (side, kept): (u32, Kept), lighting: Lighting, times: usize) -> anyhow::Result<Cube> {
+    pub fn cube(&self, (side, kept): (u32, LayerSelection), lighting: Lighting, times: usize) -> anyhow::Result<Cube> {
         let grid = CubeGrid::around(&self.scene.bounds(), side)?;
         let draw = || -> anyhow::Result<Cube> {
             let start = Instant::now();

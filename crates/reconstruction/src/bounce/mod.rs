@@ -66,6 +66,10 @@ impl Mirrors<'_> {
         if self.reflections > MAX_REFLECTIONS {
             return Err(ReconstructionError::Reflections(self.reflections));
         }
+        let is_own = |cell: &MirrorCell<'_>| std::ptr::eq(cell.surroundings, set);
+        if self.cells.iter().any(|cell| !is_own(cell) && cell.surroundings.cameras.is_empty()) {
+            return Err(ReconstructionError::NoSamples { what: "a mirror cell".to_owned(), needed: "depth images" });
+        }
         let reflectors = set.cube.as_ref().map_or(&set.reflectors, |cube| &cube.reflectors);
         let has_mirrors = reflectors.as_ref().is_some_and(|of| of.highlight == Highlight::Ggx);
         Ok(if self.reflections > 0 && has_mirrors { self } else { Self::default() })

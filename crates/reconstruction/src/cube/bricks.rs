@@ -6,22 +6,22 @@ use super::distances::distances;
 use super::samples::CubeSamples;
 
 /// Steeper planes are no entries: another axis holds them. A sample is met where its normal has this share along the line at least.
-pub(crate) const LEAST_SHARE: f32 = 0.5;
-/// Planes reach no farther from their sample along the line, in spacings: `HALF_SQUARE` times the greatest sum of both slopes.
+pub(crate) const LEAST_NORMAL_ALONG_LINE: f32 = 0.5;
+/// Planes reach no farther from their sample along the line, in spacings: `SQUARE_REACH` times the greatest sum of both slopes.
 const MOST_REACH: f32 = 1.4;
 /// An entry's depth is counted from this far below its voxel, in these steps, in spacings.
 pub(crate) const ENTRY_DEPTH_BELOW: f32 = MOST_REACH;
 pub(crate) const ENTRY_DEPTH_STEP: f32 = (2.0 * MOST_REACH + VOXEL) / 16383.0;
 /// The side of a voxel, in spacings.
 const VOXEL: f32 = 2.0;
-/// Samples reach over the square of their line a little; so do their planes.
-const HALF_SQUARE: f32 = 0.55;
+/// Samples reach a little over the middle between two lines, in spacings: no ray passes between two squares.
+pub(crate) const SQUARE_REACH: f32 = 0.55;
 /// A cell that is a brick.
 const BRICK: u32 = 1 << 31;
 
 /// The tables of `cube/walk.wgsl`.
 pub(super) struct Bricks {
-    /// Of cells.
+    /// Columns and rows of cells.
     pub columns: u32,
     pub rows: u32,
     pub cells: Vec<u32>,
@@ -97,12 +97,12 @@ fn each_passage(samples: &CubeSamples, size: UVec3, mut take: impl FnMut(usize, 
     for sample in 0..samples.len() {
         let line = samples.line[sample];
         let axis = samples.axis_of(line);
-        if samples.normal[sample][axis].abs() < LEAST_SHARE {
+        if samples.normal[sample][axis].abs() < LEAST_NORMAL_ALONG_LINE {
             continue;
         }
         let (place, depth) = (samples.place_of(axis, line), samples.depth[sample]);
         let reach =
-            samples.slopes(sample, axis).iter().map(|slope| slope.abs() * HALF_SQUARE).sum::<f32>().min(MOST_REACH);
+            samples.slopes(sample, axis).iter().map(|slope| slope.abs() * SQUARE_REACH).sum::<f32>().min(MOST_REACH);
         let last = (samples.size[axis] - 1) / 2;
         let [from, to] = [depth - reach, depth + reach].map(|end| ((end / VOXEL).floor().max(0.0) as u32).min(last));
         let mut voxel = UVec3::ZERO;

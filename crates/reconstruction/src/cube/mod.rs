@@ -12,8 +12,8 @@ use gpu::{Binding, GpuError, Table, TablePool, Turn};
 use wgpu::{BufferUsages, TextureFormat};
 
 #[cfg(feature = "scalar")]
-pub(crate) use bricks::LEAST_SHARE;
-pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP};
+pub(crate) use bricks::LEAST_NORMAL_ALONG_LINE;
+pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, SQUARE_REACH};
 pub(crate) use links::links;
 pub(crate) use samples::CubeSamples;
 #[cfg(feature = "scalar")]
@@ -22,15 +22,14 @@ pub(crate) use samples::Links;
 use self::bricks::Bricks;
 use crate::{error::ReconstructionError, reflectors::Reflectors, set_description::SetDescription};
 
-/// A ray steps this far into the next box, in spacings: more than the rounding of coordinates.
+/// A ray steps this far into the next box, in spacings: more than the rounding of coordinates within the largest cube.
 pub(crate) const WALK_NUDGE: f32 = 2e-3;
 /// A surface that is met so far outside of its voxel counts, in spacings.
 pub(crate) const HIT_SLACK: f32 = 0.1;
-/// Samples reach a little over the middle between two lines, in spacings: no ray passes between two squares.
-pub(crate) const SQUARE_REACH: f32 = 0.55;
 /// Steps of a ray, of which each crosses a voxel or empty cells.
-pub(crate) const MAX_CUBE_STEPS: u32 = 4096;
-/// Rays off a surface meet nothing below this height, in spacings: samples of the surface itself may stand as high.
+pub(crate) const MAX_CUBE_STEPS: u32 = 8192;
+/// Rays straight off a surface meet nothing below this height, in spacings, and slanting ones nothing within up to four times as much
+/// of their way: samples of the surface itself may stand there.
 const START_SPACINGS: f32 = 0.75;
 /// Bits of an entry for a sample's number.
 const MAX_SAMPLES: usize = 1 << 28;
@@ -70,6 +69,8 @@ impl Cube {
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
         check(grid, images)?;
+        let cells = grid.size.map(|side| side.div_ceil(8)).to_array().map(|side| side as usize);
+        tables.gpu.check_table("cells of a layered cube", cells.iter().product())?;
         let count: usize = images.iter().map(LayeredDepthImage::sample_count).sum();
         GpuError::check_limit("the samples of a layered cube", count as u64, MAX_SAMPLES as u64)?;
         tables.gpu.check_table("samples of a layered cube", count)?;
@@ -110,6 +111,8 @@ impl Cube {
 }
 
 fn check(grid: &CubeGrid, images: &[LayeredDepthImage; 3]) -> Result<(), ReconstructionError> {
+    let reason = |error: depth_image::CameraError| ReconstructionError::Sample { index: 0, reason: error.to_string() };
+    grid.validate().map_err(reason)?;
     for (index, image) in images.iter().enumerate() {
         let wrong = |reason: String| ReconstructionError::Sample { index, reason };
         image.validate().map_err(|error| wrong(error.to_string()))?;

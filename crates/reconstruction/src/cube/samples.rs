@@ -104,7 +104,11 @@ impl CubeSamples {
     /// it.
     pub(super) fn slopes(&self, sample: usize, axis: usize) -> [f32; 2] {
         let normal = self.normal[sample];
-        let own = if normal[axis].abs() < LEAST_SHARE { LEAST_SHARE.copysign(normal[axis]) } else { normal[axis] };
+        let own = if normal[axis].abs() < LEAST_SLOPE_DIVISOR {
+            LEAST_SLOPE_DIVISOR.copysign(normal[axis])
+        } else {
+            normal[axis]
+        };
         [1, 2].map(|offset| -normal[(axis + offset) % 3] / own)
     }
 
@@ -115,4 +119,4 @@ impl CubeSamples {
 }
 
 /// Steeper planes count as being as steep as this.
-const LEAST_SHARE: f32 = 1e-3;
+const LEAST_SLOPE_DIVISOR: f32 = 1e-3;

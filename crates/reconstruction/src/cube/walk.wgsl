@@ -11,7 +11,7 @@ struct Cube {
     // Of the cells of 8 units.
     columns: u32,
     rows: u32,
-    // A ray off a surface meets nothing nearer, where it leaves straight up.
+    // A ray that leaves a surface straight up meets nothing nearer.
     start_m: f32,
     padding: vec2u,
 }
@@ -38,8 +38,8 @@ fn cube_ray(origin_in_world: vec3f, direction_in_world: vec3f) -> CubeRay {
     return CubeRay(homogeneous(cube.cube_from_world, vec4f(origin_in_world, 1.0)), walked);
 }
 
-// What a ray meets at `t`: a sample, the axis of its line, and the way from the sample to the place.
-struct CubeHit { met: bool, t: f32, sample: u32, axis: u32, off: vec3f }
+// What a ray meets at `t`: a sample, the axis of its line, and the way from the sample to the place. `is_empty`: it meets nothing.
+struct CubeHit { met: bool, is_empty: bool, t: f32, sample: u32, axis: u32, off: vec3f }
 
 // The component along an axis first, then those along the two after it.
 fn along(axis: u32, v: vec3f) -> vec3f { return select(select(v.zxy, v.yzx, axis == 1u), v, axis == 0u); }
@@ -78,34 +78,42 @@ fn box_at(voxel: vec3i, cell: Cell) -> Box {
     return Box(vec3f(least), f32(select(16 * reach + 8, in_brick, is_brick)), is_leaf);
 }
 
-// The nearest surface from `near` on.
-fn walk(ray: CubeRay, near: f32) -> CubeHit {
-    let inverse = 1.0 / ray.direction;
-    let a = -ray.origin * inverse;
-    let b = (vec3f(cube.size) - ray.origin) * inverse;
+// The nearest surface on a ray, from `near` on.
+fn walk(from_eye: CubeRay, near: f32) -> CubeHit {
+    let inverse = 1.0 / from_eye.direction;
+    let a = -from_eye.origin * inverse;
+    let b = (vec3f(cube.size) - from_eye.origin) * inverse;
     let lower = min(a, b);
     let upper = max(a, b);
-    let end = min(min(upper.x, upper.y), upper.z);
+    let start = max(max(lower.x, lower.y), max(lower.z, near));
+    // The walk counts from where the ray comes into the cube: beside the way there a spacing may be less than a rounding.
+    let end = min(min(upper.x, upper.y), upper.z) - start;
+    let ray = CubeRay(from_eye.origin + from_eye.direction * start, from_eye.direction);
+    let from_face = -ray.origin * inverse;
     let nudge = WALK_NUDGE * inverseSqrt(dot(ray.direction, ray.direction));
     let slack = nudge * (HIT_SLACK / WALK_NUDGE);
     let last_voxel = (vec3i(cube.size) - 1) / 2;
-    var t = max(max(lower.x, lower.y), max(lower.z, near)) + nudge;
     let ahead = select(vec3f(0.0), vec3f(1.0), ray.direction > vec3f(0.0));
-    var hit = CubeHit(false, FAR_AWAY, 0u, 0u, vec3f(0.0));
+    // A place on a face belongs to the voxel that the ray goes into.
+    let into_voxel = (ahead * 2.0 - 1.0) * WALK_NUDGE;
+    var t = nudge;
+    var hit = CubeHit(false, false, FAR_AWAY, 0u, 0u, vec3f(0.0));
     var cell = Cell(vec3i(-1), 0u, vec2u(0u), 0u);
     for (var step = 0u; step < MAX_CUBE_STEPS && t < end && !hit.met; step++) {
-        let voxel = clamp(vec3i(floor((ray.origin + ray.direction * t) * 0.5)), vec3i(0), last_voxel);
+        let voxel = clamp(vec3i(floor((ray.origin + ray.direction * t + into_voxel) * 0.5)), vec3i(0), last_voxel);
         let place = voxel >> vec3u(2u);
         if any(place != cell.place) { cell = cell_at(place); }
         let around = box_at(voxel, cell);
         // Where the ray leaves the box.
-        let ends = (around.least + ahead * around.side) * inverse + a;
+        let ends = (around.least + ahead * around.side) * inverse + from_face;
         let out = min(min(ends.x, ends.y), ends.z);
         if around.is_leaf {
-            hit = met_in_leaf(ray, voxel, cell, vec2f(max(t - slack, near), out + slack));
+            hit = met_in_leaf(ray, voxel, cell, vec2f(max(t - slack, near - start), out + slack));
         }
         t = max(out, t) + nudge;
     }
+    hit.t += start;
+    hit.is_empty = !hit.met && t >= end;
     return hit;
 }
 
@@ -117,7 +125,7 @@ fn met_in_leaf(ray: CubeRay, voxel: vec3i, cell: Cell, span: vec2f) -> CubeHit {
 {% if count_fetches %}    fetches += 1u;
 {% endif %}
     let ends = textureLoad(cube_leaves, texel_at(cell.first_leaf + before), 0).xy;
-    var hit = CubeHit(false, FAR_AWAY, 0u, 0u, vec3f(0.0));
+    var hit = CubeHit(false, false, FAR_AWAY, 0u, 0u, vec3f(0.0));
     for (var pair = ends.x; pair < ends.y; pair++) {
 {% if count_fetches %}        fetches += 1u;
 {% endif %}

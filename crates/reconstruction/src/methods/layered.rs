@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use depth_image::Highlight;
-use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots};
+use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots, switches};
 use minijinja::{Value, context};
 
 use crate::bounce::{Bounces, RayLists};
@@ -16,7 +16,8 @@ use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Record
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Walk {
     set: SetVariant,
-    rays: WalkRays,
+    /// Rays are those off mirrors, not those of the view.
+    bounced: bool,
     /// What a ray does not meet may be a surface that the cube does not hold.
     truncated: bool,
     /// The formula of highlights, where samples have any.
@@ -28,21 +29,10 @@ pub(crate) struct Walk {
     visibility_words: usize,
 }
 
-/// The rays that walk.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum WalkRays {
-    /// Of all pixels.
-    All,
-    /// Of listed pixels.
-    Listed,
-    /// Off mirrors.
-    Bounced,
-}
-
 impl Walk {
     const PLAIN: Self = Self {
         set: SetVariant::CUBE,
-        rays: WalkRays::All,
+        bounced: false,
         truncated: false,
         highlight: None,
         mirrors: false,
@@ -51,15 +41,15 @@ impl Walk {
         visibility_words: 0,
     };
 
-    fn of(recording: &Recording<'_>, cube: &Cube, rays: WalkRays, mirrors: bool) -> Self {
+    fn of(recording: &Recording<'_>, cube: &Cube, bounced: bool, mirrors: bool) -> Self {
         let reflectors = cube.reflectors.as_ref();
         let highlight = reflectors.map(|reflectors| reflectors.highlight);
         // Blinn-Phong surfaces mirror lamps only.
         let is_mapped = highlight == Some(Highlight::Ggx) && recording.set.environment.is_some();
-        let count_fetches = rays != WalkRays::Bounced && recording.batch.fetches.is_some();
+        let count_fetches = !bounced && recording.batch.fetches.is_some();
         Self {
             set: SetVariant { count_fetches, ..recording.set.variant() },
-            rays,
+            bounced,
             truncated: cube.truncated,
             highlight,
             mirrors,
@@ -76,8 +66,7 @@ impl ShaderVariant for Walk {
 
     fn context(&self) -> Value {
         context! {
-            listed => self.rays == WalkRays::Listed,
-            bounced => self.rays == WalkRays::Bounced,
+            bounced => self.bounced,
             truncated => self.truncated,
             reflects => self.highlight.is_some(),
             highlight => highlight_name(self.highlight.unwrap_or(Highlight::Ggx)),
@@ -93,51 +82,36 @@ impl ShaderVariant for Walk {
     }
 
     fn all() -> Vec<Self> {
-        let plain = [WalkRays::All, WalkRays::Listed].into_iter().flat_map(|rays| {
-            [false, true].map(|count_fetches| Self {
-                rays,
-                set: SetVariant { count_fetches, ..SetVariant::CUBE },
-                ..Self::PLAIN
+        let lights = [(0, 0), (3, 1), (255, 64)];
+        let matt = switches().map(|[count_fetches, truncated]| Self {
+            set: SetVariant { count_fetches, ..SetVariant::CUBE },
+            truncated,
+            ..Self::PLAIN
+        });
+        let glossy = lights.into_iter().flat_map(|(lights, visibility_words)| {
+            switches().flat_map(move |[count_fetches, truncated, environment_map]| {
+                let set = SetVariant { count_fetches, ..SetVariant::CUBE };
+                let with = Self { set, truncated, lights, visibility_words, ..Self::PLAIN };
+                let ggx = Self { highlight: Some(Highlight::Ggx), environment_map, ..with };
+                let bounced = (!count_fetches).then_some(Self { bounced: true, ..ggx });
+                let blinn_phong = (!environment_map).then_some(Self { highlight: Some(Highlight::BlinnPhong), ..with });
+                let mirrored = [Some(ggx), bounced].into_iter().flatten();
+                mirrored.flat_map(|walk| [walk, Self { mirrors: true, ..walk }]).chain(blinn_phong)
             })
         });
-        let truncated = [Self { truncated: true, ..Self::PLAIN }];
-        let lights = [(0, 0), (3, 1), (255, 64)];
-        let reflecting = lights.into_iter().flat_map(|(lights, visibility_words)| {
-            let with = Self { lights, visibility_words, ..Self::PLAIN };
-            let ggx = Some(Highlight::Ggx);
-            [
-                Self { highlight: Some(Highlight::BlinnPhong), ..with },
-                Self { highlight: ggx, ..with },
-                Self { highlight: ggx, environment_map: true, ..with },
-                Self { highlight: ggx, mirrors: true, ..with },
-                Self { highlight: ggx, rays: WalkRays::Bounced, ..with },
-                Self { highlight: ggx, rays: WalkRays::Bounced, mirrors: true, ..with },
-                Self {
-                    highlight: ggx,
-                    rays: WalkRays::Bounced,
-                    mirrors: true,
-                    environment_map: true,
-                    truncated: true,
-                    ..with
-                },
-            ]
-        });
-        plain.chain(truncated).chain(reflecting).collect()
+        matt.chain(glossy).collect()
     }
 }
 
-/// Records the walk of all pixels or of listed ones, and of the rays off the mirrors that they show. Gives the pixels that stay
-/// unknown.
+/// Records the walk of all pixels, and of the rays off the mirrors that they show. Gives the pixels that stay unknown.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
-    listed: Option<&PixelList>,
     bounces: Option<&Bounces<'_>>,
 ) -> Result<PixelList, ReconstructionError> {
     let undecided = recording.empty_list();
     let Some(cube) = recording.set.cube.clone() else { return Ok(undecided) };
     let mut next = bounces.map(|bounces| bounces.next(recording.device, None));
-    let rays = if listed.is_some() { WalkRays::Listed } else { WalkRays::All };
-    let variant = Walk::of(recording, &cube, rays, next.is_some());
+    let variant = Walk::of(recording, &cube, false, next.is_some());
     let pass = recording.device.passes.get(&variant)?;
     let batch = &recording.batch;
     let mut bindings = recording.view_bindings();
@@ -150,10 +124,9 @@ pub(crate) fn record(
         Binding::buffer("undecided", &undecided.lists),
     ]);
     bindings.extend(batch.fetches.as_ref().map(|fetches| Binding::buffer("out_fetches", fetches)));
-    bindings.extend(listed.map(PixelList::bindings).into_iter().flatten());
     bindings.extend(bounces.zip(next.as_ref()).into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&variant, &pass, &bound, listed);
+    recording.dispatch_pixels(&variant, &pass, &bound, None);
     let Some(bounces) = bounces else { return Ok(undecided) };
     for reflection in 1..=bounces.reflections() {
         let Some(lists) = next else { break };
@@ -171,7 +144,7 @@ fn follow(
     (lists, next): (&RayLists, Option<&RayLists>),
     reflection: u32,
 ) -> Result<(), ReconstructionError> {
-    let variant = Walk::of(recording, cube, WalkRays::Bounced, next.is_some());
+    let variant = Walk::of(recording, cube, true, next.is_some());
     let pass = recording.device.passes.get(&variant)?;
     let mut bindings = shared_bindings(recording, cube, &variant);
     bindings.extend([

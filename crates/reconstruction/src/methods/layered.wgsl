@@ -21,7 +21,7 @@
 {%- if reflects %}
 {% include "gathered.wgsl" %}
 {%- endif %}
-{%- if listed or bounced %}
+{%- if bounced %}
 {% include "pixel_list.wgsl" %}
 {%- endif %}
 {%- if mirrors or bounced %}
@@ -60,34 +60,31 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let ray = rays[listed_pixels[first_listed() + id.x]];
     let throughput = linear_from_rgb9e5(ray.throughput_rgb9e5);
     let hit = walk(cube_ray(ray.origin_in_world, ray.direction), ray.near_m);
-    // Where nothing is met the environment is seen.
-    var shown = environment_mirrored(ray.direction, max(unpack4x8unorm(ray.guess).y, LEAST_ROUGHNESS)) * throughput;
+    let guess = unpack4x8unorm(ray.guess);
+    let is_unknown = !hit.met{{ "" if truncated else " && !hit.is_empty" }};
+    // Where nothing is met the environment is seen; where the cube does not know, what the mirror shows without rays.
+    var shown = environment_mirrored(ray.direction, max(guess.y, LEAST_ROUGHNESS)) * throughput * select(1.0, guess.x, is_unknown);
     for (var met = hit.met; met; met = false) {
         shown = light_from(hit, ray.origin_in_world + ray.direction * hit.t, -ray.direction, ray.pixel, throughput);
     }
     out_color[ray.pixel] = rgb9e5_from_linear(linear_from_rgb9e5(out_color[ray.pixel]) + shown);
-{%- if truncated %}
-    if !hit.met { out_provenance[ray.pixel] = (out_provenance[ray.pixel] & 0xffffff00u) | PROVENANCE_GUESSED; }
-{%- endif %}
+    for (var guessed = is_unknown; guessed; guessed = false) {
+        out_provenance[ray.pixel] = (out_provenance[ray.pixel] & 0xffffff00u) | PROVENANCE_GUESSED;
+    }
 }
 {%- else %}
 
-@compute @workgroup_size({{ "LIST_WORKGROUP" if listed else "TILE_PX, TILE_PX" }})
+@compute @workgroup_size(TILE_PX, TILE_PX)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-{%- if listed %}
-    if id.x >= lists[work.view.number].count { return; }
-    let pixel = pixel_of(place_of(listed_pixels[first_listed() + id.x]));
-{%- else %}
     let at = pixel_at(id);
     if any(at >= work.view.size_px) { return; }
     let pixel = pixel_of(at);
-{%- endif %}
     let hit = walk(cube_ray(work.view.eye_in_world, pixel.direction), work.view.near_m);
     var shown = vec3f(0.0);
     for (var met = hit.met; met; met = false) {
         let point_in_world = work.view.eye_in_world + pixel.direction * hit.t;
         shown = light_from(hit, point_in_world, -normalize(pixel.direction), pixel.index, vec3f(1.0));
     }
-    write_found(pixel.index, hit.met, hit.t, shown, origin_of(1u << hit.axis, 0u), {{ "false" if truncated else "true" }});
+    write_found(pixel.index, hit.met, hit.t, shown, origin_of(1u << hit.axis, 0u), {{ "false" if truncated else "hit.is_empty" }});
 }
 {%- endif %}

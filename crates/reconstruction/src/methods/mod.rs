@@ -192,7 +192,7 @@ impl ReconstructionMethod {
             LightFieldSearch { steps } => light_field_search::record(recording, steps),
             JointCarve { stop_level } => joint_carve::record(recording, stop_level, listed),
             Mesh | HybridMesh { .. } => quads::record(drawing, recording, mesh),
-            Layered => layered::record(recording, listed, bounces),
+            Layered => layered::record(recording, bounces),
         }
     }
 

@@ -4,7 +4,7 @@ use depth_image::{CubeGrid, LayeredDepthImage, PinholeCamera, ProvenanceKind, Ra
 use glam::{IVec2, Vec2, Vec3};
 
 use super::{pixel::Pixel, view};
-use crate::cube::{CubeSamples, LEAST_SHARE, Links, SQUARE_REACH, links};
+use crate::cube::{CubeSamples, LEAST_NORMAL_ALONG_LINE, Links, SQUARE_REACH, links};
 use crate::set_description::SetDescription;
 
 /// A layered depth cube without any order in space.
@@ -55,7 +55,7 @@ impl CubeTwin {
         let t = normal.dot(point - origin) / facing;
         let off = origin + direction * t - point;
         let place = Vec2::new(off[next], off[last]);
-        let is_within = place.abs().max_element() <= SQUARE_REACH && normal[along].abs() >= LEAST_SHARE;
+        let is_within = place.abs().max_element() <= SQUARE_REACH && normal[along].abs() >= LEAST_NORMAL_ALONG_LINE;
         (facing < 0.0 && is_within).then_some(CubeHit { t, sample, place })
     }
 

@@ -7,7 +7,7 @@ use gpu::{Binding, BufferPool, DrawPass, Frame, Gpu, GpuError, PooledBuffer};
 use rayon::prelude::*;
 use wgpu::{BufferUsages, TextureUsages};
 
-use super::kept::Kept;
+use super::selection::LayerSelection;
 use crate::{RenderError, stages::Stages, work::DrawWork};
 
 /// Crossings of a line for which there is room at first.
@@ -15,7 +15,11 @@ const EXPECTED_LAYERS: u64 = 4;
 /// Crossings that are drawn together take no more bytes than this.
 const MOST_BYTES: u64 = 128 << 20;
 
-/// Crossings that are written at once.
+/// Lines that are drawn together: their crossings are counted in 32 bits.
+const MOST_LINES: u32 = 1 << 20;
+/// Crossings of an image; a set has bits for as many.
+const MOST_CROSSINGS: u64 = 1 << 28;
+/// A double-sided surface writes two at once.
 const SIDES: u64 = 2;
 
 /// `Crossing` of the shader.
@@ -47,10 +51,14 @@ pub(super) fn met(
     stages: &Stages,
     work: &DrawWork<'_>,
     camera: &ParallelCamera,
-    kept: Kept,
+    kept: LayerSelection,
 ) -> Result<(Vec<u32>, Vec<Crossing>, bool), RenderError> {
     let mut crossings = Vec::new();
-    draw_rows(stages, work, (camera, kept), 0..camera.size_px.y, &mut crossings)?;
+    let rows = camera.size_px.y;
+    let a_band = (MOST_LINES / camera.size_px.x).max(1);
+    for first in (0..rows).step_by(a_band as usize) {
+        draw_rows(stages, work, (camera, kept), first..(first + a_band).min(rows), &mut crossings)?;
+    }
     Ok(by_line(camera.pixel_count(), &crossings))
 }
 
@@ -58,7 +66,7 @@ pub(super) fn met(
 fn draw_rows(
     stages: &Stages,
     work: &DrawWork<'_>,
-    (camera, kept): (&ParallelCamera, Kept),
+    (camera, kept): (&ParallelCamera, LayerSelection),
     rows: std::ops::Range<u32>,
     crossings: &mut Vec<Crossing>,
 ) -> Result<(), RenderError> {
@@ -78,10 +86,7 @@ fn draw_rows(
         return Drawn::draw(stages, work, (&part, kept), count)?.read(stages, work, first_line, crossings);
     }
     if rows.len() == 1 {
-        return Err(GpuError::check_limit("the surfaces on one row of lines", count, most).err().map_or_else(
-            || GpuError::OutOfMemory("the surfaces on one row of lines".to_owned()).into(),
-            RenderError::from,
-        ));
+        GpuError::check_limit("the surfaces on one row of lines", count, most)?;
     }
     let middle = rows.start + rows.len() as u32 / 2;
     draw_rows(stages, work, (camera, kept), rows.start..middle, crossings)?;
@@ -99,7 +104,7 @@ impl Drawn {
     fn draw(
         stages: &Stages,
         work: &DrawWork<'_>,
-        (camera, kept): (&ParallelCamera, Kept),
+        (camera, kept): (&ParallelCamera, LayerSelection),
         capacity: u64,
     ) -> Result<Self, RenderError> {
         let Stages { gpu, pool, raster, .. } = stages;
@@ -134,6 +139,8 @@ impl Drawn {
         first_line: u32,
         crossings: &mut Vec<Crossing>,
     ) -> Result<(), RenderError> {
+        let all = crossings.len() as u64 + u64::from(self.count);
+        GpuError::check_limit("the surfaces of a layered image", all, MOST_CROSSINGS)?;
         let bytes = u64::from(self.count) * size_of::<Crossing>() as u64;
         if bytes == 0 {
             return Ok(());

@@ -17,9 +17,11 @@ use crate::{RenderError, illuminate, stages::Stages, sums::SumPlanes, work::Draw
 
 /// Surfaces that are lit together: bounds their memory.
 const POINTS_A_LIST: usize = 1 << 18;
-/// Rays begin above a surface by this share of the spacing of lines, and by this share of coordinates: the numbers of `rise.wgsl`.
-const BIAS_SPACINGS: f32 = 0.015_625;
-const BIAS_ROUNDINGS: f32 = 4e-7;
+/// Rays begin above a surface by this share of the pixel's footprint on it: less than can be seen, more than the rounding of the
+/// point.
+pub(crate) const BIAS_FOOTPRINTS: f32 = 0.015_625;
+/// Rays also begin higher by the rounding of coordinates, relative to the greatest.
+pub(crate) const BIAS_ROUNDINGS: f32 = 4e-7;
 
 #[derive(Debug)]
 pub(crate) struct Lit {
@@ -69,13 +71,22 @@ pub(super) fn light(
     };
     let points = Points::of(camera, first);
     let mut light = Light { visibility8: vec![Vec::new(); output.sums.visibility_words()], ..Light::default() };
-    for (number, listed) in crossings.chunks(POINTS_A_LIST).enumerate() {
-        let first_point = number * POINTS_A_LIST;
+    let a_list = points_a_list(stages, output);
+    for (number, listed) in crossings.chunks(a_list).enumerate() {
+        let first_point = number * a_list;
         let bounces: Vec<GpuBounce> =
             (first_point..).zip(listed).map(|(place, crossing)| points.bounce(place, crossing)).collect();
         light_list(stages, &batch, &bounces, &mut light)?;
     }
     Ok(light)
+}
+
+/// Surfaces for which no buffer is larger than the device binds.
+fn points_a_list(stages: &Stages, output: Output) -> usize {
+    let limits = stages.gpu.device.limits();
+    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) as usize;
+    let planes = output.sums.count().max(1 + output.sums.visibility_words()).max(size_of::<GpuBounce>() / 4);
+    POINTS_A_LIST.min(bytes / (4 * planes)).max(1)
 }
 
 /// Lights one list of surfaces.
@@ -149,7 +160,7 @@ impl<'a> Points<'a> {
         let [right, down, forward] = camera.axes_in_world();
         let corner = Vec2::new(camera.corner_in_world.dot(right), camera.corner_in_world.dot(down)) / camera.spacing_m;
         let seed = forward.to_array().iter().fold(1, |seed, c| mixed(seed ^ (c * 1024.0).round() as i32 as u32));
-        Self { camera, first, first_line: corner.round().as_ivec2().as_uvec2(), seed }
+        Self { camera, first, first_line: (corner + 0.25).floor().as_ivec2().as_uvec2(), seed }
     }
 
     fn bounce(&self, place: usize, crossing: &Crossing) -> GpuBounce {
@@ -162,11 +173,10 @@ impl<'a> Points<'a> {
         let line = UVec2::new(first_line.x.wrapping_add(pixel.x), first_line.y.wrapping_add(pixel.y));
         GpuBounce {
             point_in_world: point.to_array(),
-            place: place as u32,
             seed: mixed(mixed(seed ^ line.x) ^ line.y.rotate_left(16) ^ (layer << 8)),
             side_m: camera.spacing_m,
             surface: crossing.surface,
-            bias_m: BIAS_SPACINGS * camera.spacing_m + BIAS_ROUNDINGS * point.abs().max_element(),
+            bias_m: BIAS_FOOTPRINTS * camera.spacing_m + BIAS_ROUNDINGS * point.abs().max_element(),
             met: 1,
             ..GpuBounce::zeroed()
         }

@@ -1,17 +1,16 @@
 //! Layered depth images: all surfaces that the lines of a parallel camera meet, by drawing without a test of depth, and their light.
 
 mod crossings;
-mod kept;
 mod lit;
+mod selection;
 
-use depth_image::{LayeredDepthImage, ParallelCamera, SpecularPlanes, oct8_from_unit};
-use glam::Vec3;
+use depth_image::{LayeredDepthImage, ParallelCamera, SpecularPlanes, oct8_from_oct16};
 use rayon::prelude::*;
 
 #[cfg(test)]
 pub(crate) use crossings::{Crossing, GpuLines};
-pub use kept::Kept;
-pub(crate) use lit::Lit;
+pub(crate) use lit::{BIAS_FOOTPRINTS, BIAS_ROUNDINGS, Lit};
+pub use selection::LayerSelection;
 
 use crate::{RenderError, stages::Stages, work::DrawWork};
 
@@ -20,7 +19,7 @@ pub(crate) fn draw(
     stages: &Stages,
     work: DrawWork<'_>,
     camera: &ParallelCamera,
-    kept: Kept,
+    kept: LayerSelection,
 ) -> Result<LayeredDepthImage, RenderError> {
     let (first, crossings, truncated) = crossings::met(stages, &work, camera, kept)?;
     let lit = lit::light(stages, work, camera, (&first, &crossings))?;
@@ -29,7 +28,7 @@ pub(crate) fn draw(
     Ok(LayeredDepthImage {
         camera: *camera,
         planar_depth_m: crossings.par_iter().map(|crossing| crossing.planar_depth_m).collect(),
-        plane_normal_oct8: crossings.par_iter().map(|crossing| coarser(crossing.plane_normal_oct16)).collect(),
+        plane_normal_oct8: crossings.par_iter().map(|crossing| oct8_from_oct16(crossing.plane_normal_oct16)).collect(),
         color_rgb9e5: lit.color_rgb9e5,
         normal_oct16: reflects.then(|| word(2)),
         specular: reflects
@@ -37,13 +36,4 @@ pub(crate) fn draw(
         first,
         truncated,
     })
-}
-
-/// An octahedral normal in two bytes.
-fn coarser(oct16: u32) -> u16 {
-    let [x, y] = [oct16, oct16 >> 16].map(|bits| f32::from(bits as u16 as i16) / 32767.0);
-    let z = 1.0 - x.abs() - y.abs();
-    let wrapped = |a: f32, b: f32| (1.0 - b.abs()) * if a >= 0.0 { 1.0 } else { -1.0 };
-    let unfolded = if z < 0.0 { Vec3::new(wrapped(x, y), wrapped(y, x), z) } else { Vec3::new(x, y, z) };
-    oct8_from_unit(unfolded)
 }

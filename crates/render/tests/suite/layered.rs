@@ -2,13 +2,13 @@
 
 use depth_image::{Aabb, CubeGrid, Environment, LayeredDepthImage, Light, PinholeCamera, Ray, linear_from_rgb9e5};
 use glam::{UVec2, Vec3};
-use render::{Kept, RenderError, scalar};
+use render::{LayerSelection, RenderError, scalar};
 use scene::Scene;
 use scene::procedural::{teapot_mirror, uv_sphere};
 
 use crate::stage::{device, floor_under, image, lamps, upload, work};
 
-fn layers(scene: &Scene, side: u32, kept: Kept, lighting: &str) -> [LayeredDepthImage; 3] {
+fn layers(scene: &Scene, side: u32, kept: LayerSelection, lighting: &str) -> [LayeredDepthImage; 3] {
     let scene_on_device = upload(scene);
     let grid = CubeGrid::around(&scene.bounds(), side).expect("a grid");
     [0, 1, 2].map(|axis| {
@@ -35,7 +35,7 @@ fn lines_hold_what_their_twins_rays_meet() {
     let scene = teapot_mirror();
     let on_device = upload(&scene);
     let twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
-    for (axis, image) in layers(&scene, 64, Kept::All, "unlit").into_iter().enumerate() {
+    for (axis, image) in layers(&scene, 64, LayerSelection::All, "unlit").into_iter().enumerate() {
         let (camera, mut same, mut lines, mut samples) = (image.camera, 0, 0, 0);
         for line in 0..camera.pixel_count() {
             let pixel = UVec2::new(line as u32 % camera.size_px.x, line as u32 / camera.size_px.x).as_vec2() + 0.5;
@@ -60,7 +60,7 @@ fn a_sphere_has_two_sides_and_each_axis_its_own_part_of_them() {
     let scene = uv_sphere(1.0, 96);
     let bounds = Aabb::around(scene.bounds().corners());
     let (center, radius) = (bounds.center(), 0.5 * bounds.size().max_element());
-    let [all, dominant] = [Kept::All, Kept::Dominant].map(|kept| layers(&scene, 64, kept, "unlit"));
+    let [all, dominant] = [LayerSelection::All, LayerSelection::Dominant].map(|kept| layers(&scene, 64, kept, "unlit"));
     let counts =
         |images: &[LayeredDepthImage; 3]| images.iter().map(LayeredDepthImage::sample_count).sum::<usize>() as f32;
     for image in &dominant {
@@ -78,10 +78,10 @@ fn a_sphere_has_two_sides_and_each_axis_its_own_part_of_them() {
             }
         }
     }
-    // The mean of the sum and of the greatest of a unit vector's components: 1.5 and 0.832, with the overlap 0.57.
+    // The greatest of a unit vector's components over their sum, in the mean: 0.555; with the overlap 0.605.
     let share = counts(&dominant) / counts(&all);
     println!("dominant over all: {share}");
-    assert!((0.5..0.65).contains(&share), "{share}");
+    assert!((0.58..0.63).contains(&share), "{share}");
 }
 
 /// A floor is seen from both sides; its lower side is dark.
@@ -93,7 +93,7 @@ fn sides_are_lit_by_themselves() {
     scene.materials[0].double_sided = true;
     scene.illumination.environment =
         Environment { zenith_linear: Vec3::ZERO, nadir_linear: Vec3::ZERO, is_mapped: false };
-    let image = layers(&scene, 16, Kept::Dominant, "shadows")[1].clone();
+    let image = layers(&scene, 16, LayerSelection::Dominant, "shadows")[1].clone();
     assert_eq!(image.layer_count(), 2);
     let mut bright = 0;
     for (sample, &color) in image.color_rgb9e5.iter().enumerate() {
@@ -112,7 +112,7 @@ fn light_is_that_of_depth_images() {
     let scene = teapot_mirror();
     let on_device = upload(&scene);
     for lighting in ["unlit", "phong", "shadows", "soft 64, occlusion 64"] {
-        let above = layers(&scene, 128, Kept::Dominant, lighting)[1].clone();
+        let above = layers(&scene, 128, LayerSelection::Dominant, lighting)[1].clone();
         let bounds = scene.bounds();
         let eye = bounds.center() + Vec3::Y * 200.0;
         let camera = PinholeCamera::looking_at(eye, bounds.center(), Vec3::NEG_Z, 0.05, UVec2::splat(256));
@@ -144,8 +144,9 @@ fn light_does_not_depend_on_how_often_it_is_made_and_a_part_has_the_light_of_the
     let scene = teapot_mirror();
     let on_device = upload(&scene);
     let camera = CubeGrid::around(&scene.bounds(), 48).expect("a grid").camera(2);
-    let draw =
-        |camera| device().1.draw_layers(work(&on_device, "soft 4, occlusion 4"), &camera, Kept::All).expect("layers");
+    let draw = |camera| {
+        device().1.draw_layers(work(&on_device, "soft 4, occlusion 4"), &camera, LayerSelection::All).expect("layers")
+    };
     let (once, again) = (draw(camera), draw(camera));
     assert_eq!(once, again);
     let part = depth_image::ViewPart { first_px: UVec2::new(0, 4), size_px: UVec2::new(camera.size_px.x, 8) };
@@ -167,7 +168,7 @@ fn a_camera_that_cannot_be_used_is_refused() {
         depth_image::ParallelCamera { range_m: 0.0, ..good },
         depth_image::ParallelCamera { size_px: UVec2::new(4, 0), ..good },
     ] {
-        let drawn = device().1.draw_layers(work(&on_device, "unlit"), &camera, Kept::All);
+        let drawn = device().1.draw_layers(work(&on_device, "unlit"), &camera, LayerSelection::All);
         assert!(matches!(drawn, Err(RenderError::Camera { index: 0, .. })), "{camera:?}");
     }
 }

@@ -2,7 +2,7 @@
 
 /// The surfaces that a layered image holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Kept {
+pub enum LayerSelection {
     /// All that its lines meet (Lischinski §3.1).
     All,
     /// Those whose normal is largest along the lines, of the camera's three axes, or nearly so: images along all three axes hold
@@ -14,7 +14,7 @@ pub enum Kept {
 /// overlap.
 const LEAST_DOMINANT_SHARE: f32 = 0.9;
 
-impl Kept {
+impl LayerSelection {
     pub(super) fn least_share(self) -> f32 {
         match self {
             Self::All => 0.0,
