@@ -33,7 +33,7 @@ impl Reflectors {
         Self::of_planes(tables, &planes, (illumination, highlight), |_, words| words, turn)
     }
 
-    /// `sorted` brings the words of samples, so many each, into the set's order.
+    /// `sorted` receives the number of words of a sample and the words of all samples; it gives them in the set's order.
     fn of_planes(
         tables: &TablePool,
         planes: &[Planes<'_>],

@@ -67,16 +67,24 @@ pub(crate) fn record(
 
 /// The resources of `surface.wgsl`.
 pub(crate) fn bindings<'b>(recording: &'b Recording<'_>, undecided: &'b PixelList) -> Vec<Binding<'b>> {
-    let batch = &recording.batch;
     let mut bindings = recording.cell_bindings();
-    bindings.extend([
-        Binding::texture("cell_colors", &recording.set.cell_colors),
+    bindings.push(Binding::texture("cell_colors", &recording.set.cell_colors));
+    bindings.extend(found_bindings(recording, undecided));
+    bindings
+}
+
+/// The resources of `found.wgsl`.
+pub(crate) fn found_bindings<'b>(
+    recording: &'b Recording<'_>,
+    undecided: &'b PixelList,
+) -> impl Iterator<Item = Binding<'b>> {
+    let batch = &recording.batch;
+    let found = [
         Binding::buffer("out_color", &batch.color),
         Binding::buffer("out_inverse_depth", &batch.inverse_depth_per_m),
         Binding::buffer("out_provenance", &batch.provenance),
         Binding::buffer("undecided_pixels", &undecided.pixels),
         Binding::buffer("undecided", &undecided.lists),
-    ]);
-    bindings.extend(batch.fetches.as_ref().map(|fetches| Binding::buffer("out_fetches", fetches)));
-    bindings
+    ];
+    found.into_iter().chain(batch.fetches.as_ref().map(|fetches| Binding::buffer("out_fetches", fetches)))
 }

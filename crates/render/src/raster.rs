@@ -79,6 +79,19 @@ impl RasterVariant {
         RedundancyVariant::all(&tests).into_iter().flat_map(each)
     }
 
+    /// Of a plain material, without any plane beside the surface.
+    fn of(work: &DrawWork<'_>) -> Self {
+        Self {
+            material: MaterialTraits::default(),
+            shading: work.lighting.highlight(),
+            surface_id: false,
+            depth_only: false,
+            wind: work.scene.wind,
+            redundancy: None,
+            appended: false,
+        }
+    }
+
     /// That of parallel cameras, of a plain material.
     #[cfg(test)]
     pub fn appended() -> Self {
@@ -167,13 +180,9 @@ impl Raster {
         let Recording { batch, frame, .. } = recording;
         let scene = batch.work.scene;
         let shown = RasterVariant {
-            material: MaterialTraits::default(),
-            shading: batch.work.lighting.highlight(),
             surface_id: surfaces.iter().any(|target| target.surface_ids.is_some()),
-            depth_only: false,
-            wind: scene.wind,
             redundancy: predecessors.map(|images| images.variant),
-            appended: false,
+            ..RasterVariant::of(&batch.work)
         };
         let front = RasterVariant { depth_only: true, redundancy: None, ..shown };
         let cameras = &batch.cameras[first..][..surfaces.len()];
@@ -208,15 +217,7 @@ impl Raster {
         depth: &wgpu::TextureView,
     ) -> Result<(), RenderError> {
         let scene = work.scene;
-        let variant = RasterVariant {
-            material: MaterialTraits::default(),
-            shading: work.lighting.highlight(),
-            surface_id: false,
-            depth_only: false,
-            wind: scene.wind,
-            redundancy: None,
-            appended: true,
-        };
+        let variant = RasterVariant { appended: true, ..RasterVariant::of(work) };
         let groups = scene.draws.first().map(|draw| {
             let pass = self.passes.get(&RasterVariant { material: draw.material, ..variant })?;
             let own = pass.bind(OWN_GROUP, memory.iter().cloned())?;

@@ -262,8 +262,8 @@ fn halved(view: &View) -> Vec<u8> {
     (0..size_px.element_product()).flat_map(|index| mean(index).to_array().map(srgb8_from_linear)).collect()
 }
 
-/// Pixels that differ.
-fn changed(before: &View, after: &View) -> Vec<bool> {
+/// Pixels that differ by more than [`SEEN_CODES`].
+pub fn changed(before: &View, after: &View) -> Vec<bool> {
     let pixels = before.srgb8.chunks_exact(3).zip(after.srgb8.chunks_exact(3));
     pixels.map(|(a, b)| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > SEEN_CODES)).collect()
 }

@@ -9,4 +9,4 @@ mod orders;
 mod reflectance;
 mod single_rays;
 
-pub use measure::around;
+pub use measure::{around, changed, reflecting};

@@ -8,12 +8,13 @@ use depth_image::{PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use metrics::{Rgb8Image, flip_map, psnr_db};
 use reconstruction::{Mirrors, SampleSet};
-use render::{LayerSelection, Lighting};
+use render::LayerSelection;
 use study::{Bar, Cell, Check, Table};
 
 use super::subject::Subject;
 use super::views::LAYERED;
 use crate::failures::stand::Stand;
+use crate::impostors::{changed, reflecting};
 use crate::statistics::median;
 
 const SCENE: &str = "mirror-box";
@@ -25,8 +26,6 @@ const REPEATS: usize = 3;
 /// Mirrors on a ray's way.
 const GENERATIONS: [u32; 4] = [0, 1, 2, 7];
 const MOST: u32 = 7;
-/// A mirror shows the scene where it differs from the environment by more than this, in codes.
-const SEEN_CODES: u8 = 8;
 const LEAST_PSNR_DB: f64 = 27.0;
 /// A light, and the bound of the time of a view with all mirrors over that of direct drawing.
 const LIGHTS: [(&str, f64); 2] = [("shadows", 0.3), ("soft 16, occlusion 16", 0.05)];
@@ -98,7 +97,7 @@ fn cameras() -> Vec<PinholeCamera> {
     (0..VIEWS).map(view).collect()
 }
 
-/// Views with so many mirrors, and the seconds of one.
+/// Views by rays that meet up to `reflections` mirrors, and the seconds of one view.
 fn walked(subject: &Subject<'_>, set: &SampleSet, reflections: u32) -> anyhow::Result<(Vec<View>, f64)> {
     let mirrors = Mirrors { cells: &[], reflections };
     let (reconstructor, turn) = (subject.stand.reconstructor(), Default::default());
@@ -107,11 +106,7 @@ fn walked(subject: &Subject<'_>, set: &SampleSet, reflections: u32) -> anyhow::R
 
 /// The same views, drawn directly.
 fn direct(subject: &Subject<'_>, reflections: u32) -> anyhow::Result<(Vec<View>, f64)> {
-    let plain = subject.lighting.to_string();
-    let lighting: Lighting = match reflections {
-        0 => subject.lighting,
-        _ => format!("{plain}, reflections {reflections}").parse()?,
-    };
+    let lighting = reflecting(subject.lighting, reflections)?;
     timed(|| subject.stand.views(&subject.on_device, lighting, &subject.views, ViewPlanes::COLOR))
 }
 
@@ -125,11 +120,6 @@ fn timed(make: impl Fn() -> anyhow::Result<Vec<View>>) -> anyhow::Result<(Vec<Vi
     };
     let seconds = median((0..REPEATS).map(run).collect::<anyhow::Result<_>>()?);
     Ok((views, seconds))
-}
-
-fn changed(before: &View, after: &View) -> Vec<bool> {
-    let pixels = before.srgb8.chunks_exact(3).zip(after.srgb8.chunks_exact(3));
-    pixels.map(|(a, b)| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > SEEN_CODES)).collect()
 }
 
 /// Mean PSNR and FLIP over the marked pixels.

@@ -1,7 +1,7 @@
 // What a layered depth cube shows at a place: between the four lines around it, of the samples that lie on one surface.
 
-// Colour; how many samples before and after its own those on the same surface in the neighbouring lines along the next axis are, in
-// two halves; their numbers in the lines before and after along the axis after that.
+// A sample's colour, and the samples on its surface in the four neighbouring lines. Along the next axis: how far before and after its
+// own number theirs are, in two halves of a word. Along the axis after that: their numbers, a word each.
 @group(0) var cube_samples: texture_2d<u32>;
 
 struct CubeSample { color_linear: vec3f, number: u32, links: vec3u }

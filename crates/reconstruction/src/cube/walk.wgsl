@@ -17,15 +17,15 @@ struct Cube {
 }
 
 @group(0) var<uniform> cube: Cube;
-// The distance to the nearest cell with samples, in cells; with the highest bit, the number of a brick.
 const IS_BRICK: u32 = 0x80000000u;
+// The distance to the nearest cell with samples, in cells; with the highest bit, the number of a brick.
 @group(0) var cube_cells: texture_2d<u32>;
 // The mask of a brick's voxels in two words, and its first leaf.
 @group(0) var cube_bricks: texture_2d<u32>;
 // The first pair of entries of a leaf, and the one after its last.
 @group(0) var cube_leaves: texture_2d<u32>;
-// Two entries a texel. Each is a sample's number; a bit for each coordinate of its line among the voxel's four lines along an axis; its normal, its depth along
-// the axis, and the axis in the highest two bits.
+// Two entries a texel, of two words each: a sample's number, with a bit for each coordinate of its line among the voxel's four lines
+// along an axis; and its normal, its depth along the axis, and the axis in the highest two bits.
 @group(0) var cube_entries: texture_2d<u32>;
 
 struct CubeRay { origin: vec3f, direction: vec3f }

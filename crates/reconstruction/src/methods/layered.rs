@@ -9,6 +9,7 @@ use minijinja::{Value, context};
 use crate::bounce::{Bounces, RayLists};
 use crate::cube::Cube;
 use crate::reflectors::sample_texels;
+use crate::surface::found_bindings;
 use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
@@ -113,17 +114,9 @@ pub(crate) fn record(
     let mut next = bounces.map(|bounces| bounces.next(recording.device, None));
     let variant = Walk::of(recording, &cube, false, next.is_some());
     let pass = recording.device.passes.get(&variant)?;
-    let batch = &recording.batch;
     let mut bindings = recording.view_bindings();
     bindings.extend(shared_bindings(recording, &cube, &variant));
-    bindings.extend([
-        Binding::buffer("out_color", &batch.color),
-        Binding::buffer("out_inverse_depth", &batch.inverse_depth_per_m),
-        Binding::buffer("out_provenance", &batch.provenance),
-        Binding::buffer("undecided_pixels", &undecided.pixels),
-        Binding::buffer("undecided", &undecided.lists),
-    ]);
-    bindings.extend(batch.fetches.as_ref().map(|fetches| Binding::buffer("out_fetches", fetches)));
+    bindings.extend(found_bindings(recording, &undecided));
     bindings.extend(bounces.zip(next.as_ref()).into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
     let bound = pass.bind(0, bindings)?;
     recording.dispatch_pixels(&variant, &pass, &bound, None);
