@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use cluster::limits::MAX_WORKLOADS;
 use cluster::{Assignment, SamplerShare, SetContent};
-use depth_image::{Camera, DepthImage};
+use depth_image::{SampleCamera, SampleImage};
 use node::{CellPlan, Connections, Deadlines, PlansInForce, SampleSet, beyond_timeline, blocking, has_set};
 use parking_lot::Mutex;
 use tokio::task::JoinSet;
@@ -30,7 +30,7 @@ pub(crate) struct Fetcher {
 
 /// The images of a set that have been fetched so far.
 struct Gathered {
-    images: Vec<Option<DepthImage>>,
+    images: Vec<Option<SampleImage>>,
     times: FetchTimes,
 }
 
@@ -46,11 +46,13 @@ impl Fetcher {
             relay.end(gathered.as_ref().map(drop).map_err(|failed| failed.status.clone()));
         }
         let (images, times) = gathered?;
-        Ok((SampleSet::of(&set.plan.workload, join_tiles(&set.plan, images).await?, set.plan.is_mirror), times))
+        let images = join_tiles(&set.plan, images).await?;
+        let whole = SampleSet::of(&set.plan.workload, images, set.plan.is_mirror);
+        Ok((whole.map_err(|error| Status::data_loss(error.to_string()))?, times))
     }
 
     /// All images of a set, or their tiles, in their order.
-    async fn gather(self: &Arc<Self>, set: &SetRequest) -> Result<(Vec<DepthImage>, FetchTimes), NotFetched> {
+    async fn gather(self: &Arc<Self>, set: &SetRequest) -> Result<(Vec<SampleImage>, FetchTimes), NotFetched> {
         let plan = &set.plan;
         let mut gathered = Gathered { images: vec![None; plan.image_count()], times: FetchTimes::default() };
         if let Some(request) = self.request_to_relay(plan)
@@ -91,7 +93,7 @@ impl Fetcher {
     }
 
     /// The missing images, from their samplers.
-    fn requests_to_samplers(&self, set: &SetRequest, images: &[Option<DepthImage>]) -> Vec<ShareRequest> {
+    fn requests_to_samplers(&self, set: &SetRequest, images: &[Option<SampleImage>]) -> Vec<ShareRequest> {
         let Deadlines { work, chunk, .. } = self.deadlines;
         let request = |share: &SamplerShare| {
             let is_missing = |index: &u32| images.get(*index as usize).is_some_and(Option::is_none);
@@ -152,16 +154,16 @@ fn has_place(plan: &Assignment, node_name: &str) -> bool {
 }
 
 /// The images of a set from those that were sampled: the same, or joined from tiles.
-async fn join_tiles(plan: &CellPlan, sampled: Vec<DepthImage>) -> Result<Vec<DepthImage>, Status> {
+async fn join_tiles(plan: &CellPlan, sampled: Vec<SampleImage>) -> Result<Vec<SampleImage>, Status> {
     if plan.tile_count == 1 {
         return Ok(sampled);
     }
     let plan = plan.clone();
     blocking(move || {
         let mut sampled = sampled.into_iter();
-        let mut joined = |camera: &Camera| {
+        let mut joined = |camera: &SampleCamera| {
             let tiles = sampled.by_ref().take(plan.tile_count as usize).collect();
-            DepthImage::from_tiles(*camera, tiles).map_err(|error| Status::data_loss(error.to_string()))
+            SampleImage::from_tiles(camera, tiles).map_err(|error| Status::data_loss(error.to_string()))
         };
         plan.workload.sample_cameras.iter().map(&mut joined).collect()
     })

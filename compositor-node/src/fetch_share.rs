@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use cluster::{Assignment, FetchImages, SamplerShare};
-use codec::{Chunk, DecodeLimits, Reassembled, Reassembler, SampleSetId, decode_depth_image};
-use depth_image::{Camera, DepthImage, SpecularPlanes};
+use codec::{Chunk, DecodeLimits, Reassembled, Reassembler, SampleSetId, decode_sample_image};
+use depth_image::{SampleCamera, SampleImage, SpecularPlanes};
 use node::{CellPlan, Connections, blocking, next_within};
 use tonic::{Code, Status};
 use wire::rpc::{Backoff, Messages, SamplerClient};
@@ -60,7 +60,7 @@ impl FetchTimes {
 /// The decoded images of a share, with their indices.
 #[derive(Debug)]
 pub(crate) struct FetchedShare {
-    pub(crate) images: Vec<(u32, DepthImage)>,
+    pub(crate) images: Vec<(u32, SampleImage)>,
     pub(crate) times: FetchTimes,
 }
 
@@ -163,7 +163,7 @@ fn check_image(
     whole: &Reassembled,
     id: SampleSetId,
     share: &SamplerShare,
-    have: &[(u32, DepthImage)],
+    have: &[(u32, SampleImage)],
 ) -> Result<(), Status> {
     let index = whole.image_index;
     if whole.sample_set_id != id {
@@ -177,19 +177,19 @@ fn check_image(
 
 /// Checks the planes of visibility. Highlights find a light's visibility by its place: there is a byte for every light, or
 /// none at all.
-fn check_visibility(plan: &Assignment, index: u32, image: &DepthImage) -> Result<(), Status> {
+fn check_visibility(plan: &Assignment, index: u32, image: &SampleImage) -> Result<(), Status> {
     let lights = plan.workload.illumination.lights.len();
-    let planes = image.specular.as_ref().map_or(0, |specular| specular.visibility8.len());
+    let planes = image.specular().map_or(0, |specular| specular.visibility8.len());
     if planes == 0 || planes == SpecularPlanes::visibility_planes(lights) {
         return Ok(());
     }
     Err(Status::data_loss(format!("image {index} has {planes} planes of visibility for {lights} lights")))
 }
 
-async fn decode(cameras: &[Camera], whole: Reassembled) -> Result<DepthImage, Status> {
+async fn decode(cameras: &[SampleCamera], whole: Reassembled) -> Result<SampleImage, Status> {
     let camera = cameras.get(whole.image_index as usize).copied();
     let camera = camera.ok_or_else(|| Status::data_loss(format!("image {} has no camera", whole.image_index)))?;
     let decode =
-        move || decode_depth_image(&whole.image.header, camera, &whole.image.payload, &DecodeLimits::default());
+        move || decode_sample_image(&whole.image.header, &camera, &whole.image.payload, &DecodeLimits::default());
     blocking(move || decode().map_err(|error| Status::data_loss(error.to_string()))).await
 }

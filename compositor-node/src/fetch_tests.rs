@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cluster::{Assignment, FetchImages, Workload};
 use codec::{Chunk, ChunkBody, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
-use depth_image::{Environment, Illumination, Light, PinholeCamera, SpecularPlanes};
+use depth_image::{Camera, DepthImage, Environment, Illumination, Light, PinholeCamera, SpecularPlanes};
 use glam::{UVec2, Vec3};
 use tokio::net::TcpListener;
 use tokio_stream::StreamExt as _;
@@ -83,7 +83,7 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
     let routes = Routes::new(sampler_server(Script { chunks, stays_open }));
     let _server = tokio::spawn(node::serve(listener, routes, false, shutdown.clone()));
     let share = SamplerShare { node_name: "n7".to_owned(), address, image_indices: vec![0, 1] };
-    let workload = Workload { sample_cameras: vec![camera(); 2], illumination: illumination(), ..workload() };
+    let workload = Workload { sample_cameras: vec![camera().into(); 2], illumination: illumination(), ..workload() };
     let plan = Arc::new(Assignment { plan_epoch: 5, workload, samplers: vec![share], ..assignment() });
     let deadlines = Deadlines { chunk: Duration::from_millis(200), ..Deadlines::default() };
     let request = SetRequest { plan: CellPlan::of(&plan, 0).unwrap(), set_index: 0, relay: None };
@@ -100,7 +100,7 @@ async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Stat
 
 #[tokio::test]
 async fn a_whole_set_is_fetched() {
-    assert_eq!(fetched(good_chunks(), false).await.unwrap().images.len(), 2);
+    assert_eq!(fetched(good_chunks(), false).await.unwrap().images.depth().len(), 2);
 }
 
 #[tokio::test]
@@ -108,7 +108,7 @@ async fn planes_of_highlights_are_fetched() {
     for visibilities in [0, 2] {
         let set = fetched(chunks_of(&shiny(visibilities)), false).await.unwrap();
         assert_eq!(set.illumination, illumination());
-        assert_eq!(set.images, [shiny(visibilities), shiny(visibilities)]);
+        assert_eq!(set.images.depth(), [shiny(visibilities), shiny(visibilities)]);
     }
 }
 

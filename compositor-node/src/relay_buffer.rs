@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Weak};
 
 use cluster::SetContent;
-use codec::EncodedDepthImage;
+use codec::EncodedImage;
 use parking_lot::Mutex;
 use tokio::sync::watch;
 use tokio_stream::StreamExt as _;
@@ -14,7 +14,7 @@ use wire::rpc::Messages;
 /// The images that have arrived so far.
 #[derive(Debug, Clone, Default)]
 struct RelayState {
-    images: Vec<(u32, EncodedDepthImage)>,
+    images: Vec<(u32, EncodedImage)>,
     ended: Option<Result<(), Status>>,
 }
 
@@ -42,7 +42,7 @@ impl RelayBuffers {
 
 impl RelayBuffer {
     /// Adds an image that has arrived; one that was fetched again after a fault counts once.
-    pub(crate) fn add(&self, index: u32, image: EncodedDepthImage) {
+    pub(crate) fn add(&self, index: u32, image: EncodedImage) {
         self.0.send_if_modified(|state| {
             let is_new = state.images.iter().all(|(other, _)| *other != index);
             if is_new {
@@ -73,14 +73,14 @@ impl RelayBuffer {
     }
 
     /// The images that have arrived, then those that arrive.
-    pub(crate) fn images(&self) -> Messages<(u32, EncodedDepthImage)> {
+    pub(crate) fn images(&self) -> Messages<(u32, EncodedImage)> {
         let state = self.0.subscribe();
         Box::pin(tokio_stream::iter(0..).then(move |place| at(state.clone(), place)).map_while(|image| image))
     }
 }
 
 /// The image at a place, or, at the place after the last one, the error that the images end with. Waits for it.
-async fn at(mut state: watch::Receiver<RelayState>, place: usize) -> Option<Result<(u32, EncodedDepthImage), Status>> {
+async fn at(mut state: watch::Receiver<RelayState>, place: usize) -> Option<Result<(u32, EncodedImage), Status>> {
     let is_known = |state: &RelayState| state.images.len() > place || state.ended.is_some();
     let is_evicted = state.wait_for(is_known).await.is_err();
     let state = state.borrow();
@@ -94,14 +94,14 @@ async fn at(mut state: watch::Receiver<RelayState>, place: usize) -> Option<Resu
 
 #[cfg(test)]
 mod tests {
-    use codec::{EncodedDepthImage, ImageHeader, InverseDepthRange};
+    use codec::{EncodedImage, ImageHeader, InverseDepthRange};
 
     use super::*;
 
-    fn image(byte: u8) -> EncodedDepthImage {
+    fn image(byte: u8) -> EncodedImage {
         let inverse_depth_range = InverseDepthRange { least_per_m: 0.0, greatest_per_m: 1.0 };
-        let header = ImageHeader { width: 1, height: 1, inverse_depth_range, planes: Vec::new() };
-        EncodedDepthImage { header, payload: vec![byte].into() }
+        let header = ImageHeader { width: 1, height: 1, inverse_depth_range, layered: None, planes: Vec::new() };
+        EncodedImage { header, payload: vec![byte].into() }
     }
 
     #[tokio::test]

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use cluster::{Assignment, Policy, SetContent, Timeline, Workload};
-use codec::EncodedDepthImage;
-use depth_image::{Aabb, DepthImage, PinholeCamera, nearest_set};
+use codec::EncodedImage;
+use depth_image::{Aabb, DepthImage, PinholeCamera, SampleCamera, nearest_set};
 use node::{
     ByteCache, CellPlan, Engine, MirrorSet, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet,
     Scenes, SetMemory, SharedSet, Turn,
 };
-use node::{WorkClass, beyond_timeline, most_image_bytes, most_set_bytes, own_time, set_bytes};
+use node::{WorkClass, beyond_timeline, depth_images_bytes, most_image_bytes, most_set_bytes, own_time, set_bytes};
 use tonic::{Code, Status};
 use wire::rpc::Messages;
 
@@ -137,7 +137,7 @@ impl Sets {
         self: &Arc<Self>,
         plan: &CellPlan,
         set_index: u32,
-    ) -> Result<Messages<(u32, EncodedDepthImage)>, Status> {
+    ) -> Result<Messages<(u32, EncodedImage)>, Status> {
         let content = content_of(plan, set_index)?;
         let relay = match self.cached.loaded(&content) {
             Some(set) => set.relay.clone(),
@@ -352,9 +352,10 @@ impl Sets {
         let subject = subject(plan).ok_or_else(|| beyond_timeline(set_index))?;
         let latest = SETS_IN_USE + sets_ahead(plan) as usize + EARLIER_SETS;
         self.cached.keep_latest(latest - 1, |set| set.subject == subject);
-        let sample_images: Arc<[DepthImage]> =
-            if compares_images(plan) { set.images.clone().into() } else { Arc::default() };
-        let bytes = set_bytes(&set.images) + set_bytes(&sample_images) + relay.as_ref().map_or(0, RelayBuffer::bytes);
+        let compared = if compares_images(plan) { set.images.depth() } else { &[] };
+        let sample_images: Arc<[DepthImage]> = compared.into();
+        let bytes =
+            set_bytes(&set.images) + depth_images_bytes(compared) + relay.as_ref().map_or(0, RelayBuffer::bytes);
         let fetched_s = start.elapsed().as_secs_f64();
         let set = Arc::new(set);
         let upload = move |engine: &dyn Engine| {
@@ -369,7 +370,7 @@ impl Sets {
         self.metrics.set_s.observe(start.elapsed().as_secs_f64());
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
         let moment = moment(plan, set_index).filter(|_| !plan.is_mirror);
-        let cameras = plan.workload.sample_cameras.iter().map(|camera| *camera.reference()).collect();
+        let cameras = SampleCamera::references(&plan.workload.sample_cameras);
         let (since, cell) = (Instant::now(), plan.cell);
         Ok((ReadySet { set, since, content, cell, moment, subject, cameras, sample_images, relay }, bytes))
     }

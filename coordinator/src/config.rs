@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use cluster::limits::MAX_SCENES;
 use cluster::{MirrorCell, OfferSettings, OfferStatus, SceneHash, SceneRef};
-use depth_image::{Aabb, Camera, Environment, Illumination};
+use depth_image::{Aabb, Camera, CubeGrid, Environment, Illumination};
 use glam::DVec3;
 use planner::{Budget, Row};
 use tonic::Status;
@@ -59,6 +59,8 @@ pub struct SceneOffer {
     pub package: Bytes,
     /// Sample cameras for sessions that bring none.
     pub rig: Vec<Camera>,
+    /// A layered depth cube of it, for sessions that are sampled so.
+    pub cube: Option<OfferedCube>,
     /// Its mirrors, and sample cameras for what they show, of sizes in proportion, for sessions that follow mirrors.
     pub mirrors: Vec<(MirrorCell, Vec<Camera>)>,
     /// The rig's images get the size that suits the views of a session that names none.
@@ -79,6 +81,15 @@ pub struct SceneOffer {
     pub keeps_cameras: bool,
     /// Seconds after which a scene that moves is as at its start; `None` for one that never moves.
     pub period_s: Option<f64>,
+}
+
+/// A way to sample a scene whose cameras depend on no viewer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OfferedCube {
+    /// The sampling method.
+    pub sampling: String,
+    /// The lines along which it samples.
+    pub grid: CubeGrid,
 }
 
 /// The scenes that a coordinator offers, at least one; sessions that name none get the first.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use cluster::FetchImages;
-use codec::{DecodeLimits, Reassembler, SampleSetId, decode_depth_image};
+use codec::{DecodeLimits, Reassembler, SampleSetId, decode_sample_image};
 use node::blocking;
 use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
@@ -70,7 +70,7 @@ async fn check_image(shared: &Shared, address: &str, image: &ProbedImage) -> Res
                 return Err(Status::data_loss(format!("image {got} of sample set {set} came for {id}")));
             }
             let (camera, limits) = (image.camera, DecodeLimits::default());
-            let decode = move || decode_depth_image(&whole.image.header, camera, &whole.image.payload, &limits);
+            let decode = move || decode_sample_image(&whole.image.header, &camera, &whole.image.payload, &limits);
             return blocking(move || decode().map(drop).map_err(data_loss)).await;
         }
     }

@@ -28,6 +28,12 @@ pub(crate) fn budgeted(
             Some(_) => Err(Status::invalid_argument("budget: none can be kept for mirrors that show the scene")),
         };
     }
+    if workload.samples_cube() {
+        return match own {
+            None => Ok(None),
+            Some(_) => Err(Status::invalid_argument("budget: none can be kept for a layered cube")),
+        };
+    }
     let has_own = offer.keeps_cameras || !request.sample_cameras.is_empty();
     let keeps_cameras = has_own && request.viewpoints.is_empty();
     let rows = rows(request, offer, keeps_cameras.then_some(workload.sample_cameras.len() as u32));

@@ -54,12 +54,14 @@ async fn measured_opening(
         in_background: false,
     };
     let admits = || {
-        let follows_viewers = !request.viewpoints.is_empty();
+        let follows_viewers = !request.viewpoints.is_empty() && !workload.samples_cube();
         let admitted =
             shared.with_scheduler(|scheduler| scheduler.admits_workload(&workload, budgeted.as_ref(), follows_viewers));
         admitted.map_err(|error| refusal(&error))
     };
     let Measured { costs, planes, auto_exposure } = costs_of(shared, measurement, events, admits).await?;
+    // A cube serves views from anywhere: there are no cells to follow viewers.
+    let viewpoints = if workload.samples_cube() { Vec::new() } else { request.viewpoints };
     Ok(Opening {
         session,
         workload: Workload { planes, ..workload },
@@ -75,7 +77,7 @@ async fn measured_opening(
         fallbacks: if budgeted.is_some() { Vec::new() } else { request.fallbacks },
         costs,
         auto_exposure,
-        viewpoints: request.viewpoints,
+        viewpoints,
         budgeted,
     })
 }

@@ -2,7 +2,7 @@
 
 use cluster::limits::{MAX_CELLS, MAX_TILES};
 use cluster::{DIRECT, MirrorCell, SamplePlanes, SessionRequest, Workload};
-use depth_image::{Aabb, Camera, PinholeCamera, ViewGroup};
+use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera, SampleCamera, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
 
@@ -27,19 +27,12 @@ const LEAST_STEPS: f32 = -2.0;
 /// For invalid cameras.
 pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Result<Workload, Status> {
     let volume = request.volume.unwrap_or(offer.volume);
-    let cells = cells_of(request, offer, &volume)?;
-    let cameras = match (cells.is_empty(), request.sample_cameras.is_empty()) {
-        (false, false) => return Err(Status::invalid_argument("viewpoints: sample_cameras are given, too")),
-        (false, true) => Vec::new(),
-        (true, false) => request.sample_cameras.clone(),
-        (true, true) => offer.rig.clone(),
+    let cube = cube_of(request, offer)?;
+    let cells = if cube.is_some() { Vec::new() } else { cells_of(request, offer, &volume)? };
+    let sample_cameras = match cube {
+        Some(grid) => [0, 1, 2].map(|axis| grid.camera(axis).into()).to_vec(),
+        None => sample_cameras_of(request, offer, !cells.is_empty())?,
     };
-    let size_px = session_size_px(request, offer);
-    let sized = |camera: &Camera| size_px.map_or(Ok(*camera), |size_px| resized(camera, size_px));
-    let sample_cameras = cameras.iter().map(sized).collect::<Result<Vec<_>, _>>()?;
-    if sample_cameras.is_empty() && cells.is_empty() {
-        return Err(Status::invalid_argument("sample_cameras is missing, and the scene came without a rig"));
-    }
     let workload = Workload {
         scene: offer.scene(),
         sample_cameras,
@@ -59,21 +52,54 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
     Ok(workload.with_mirrors(mirrors))
 }
 
+/// The offered cube, where the session is sampled so. It depends on no viewer.
+fn cube_of(request: &SessionRequest, offer: &SceneOffer) -> Result<Option<CubeGrid>, Status> {
+    let cube = offer.cube.as_ref().filter(|cube| cube.sampling == request.sampling);
+    let field = match cube {
+        Some(_) if request.timeline.moves() => "timeline: scenes that move",
+        Some(_) if !request.sample_cameras.is_empty() => "sample_cameras: sessions with cameras of their own",
+        Some(_) if request.sample_size_px.is_some() => "sample_image_size: images of a chosen size",
+        _ => return Ok(cube.map(|cube| cube.grid)),
+    };
+    Err(Status::invalid_argument(format!("{field} are not sampled by {}", request.sampling)))
+}
+
+/// The sample cameras of a session without a cube; none with view cells, whose cameras follow from viewpoints.
+fn sample_cameras_of(
+    request: &SessionRequest,
+    offer: &SceneOffer,
+    has_cells: bool,
+) -> Result<Vec<SampleCamera>, Status> {
+    let cameras = match (has_cells, request.sample_cameras.is_empty()) {
+        (true, false) => return Err(Status::invalid_argument("viewpoints: sample_cameras are given, too")),
+        (true, true) => return Ok(Vec::new()),
+        (false, false) => &request.sample_cameras,
+        (false, true) => &offer.rig,
+    };
+    if cameras.is_empty() {
+        return Err(Status::invalid_argument("sample_cameras is missing, and the scene came without a rig"));
+    }
+    let size_px = session_size_px(request, offer);
+    let sized = |camera: &Camera| size_px.map_or(Ok(*camera), |size_px| resized(camera, size_px));
+    cameras.iter().map(|camera| sized(camera).map(SampleCamera::Depth)).collect()
+}
+
 /// The scene's mirrors, where the session follows them, with images of about [`MIRROR_DENSITY`].
 fn mirrors_of(
     request: &SessionRequest,
     offer: &SceneOffer,
     workload: &Workload,
-) -> Result<Vec<(MirrorCell, Vec<Camera>)>, Status> {
-    if !request.follows_mirrors || request.method == DIRECT {
+) -> Result<Vec<(MirrorCell, Vec<SampleCamera>)>, Status> {
+    // In a cube mirrors show its own samples.
+    if !request.follows_mirrors || request.method == DIRECT || workload.samples_cube() {
         return Ok(Vec::new());
     }
-    let image_texels = workload.sample_cameras.first().map_or(1, Camera::pixel_count);
+    let image_texels = workload.sample_cameras.first().map_or(1, SampleCamera::pixel_count);
     let density = MIRROR_DENSITY.min(MIRRORS_DENSITY / offer.mirrors.len().max(1) as f32);
     let sized = |(cell, cameras): &(MirrorCell, Vec<Camera>)| {
         let cameras = Camera::resized_together(cameras, image_texels as f32 * density, MAX_TILES);
         let checked = |camera: Camera| {
-            let usable = camera.validate().map(|()| camera);
+            let usable = camera.validate().map(|()| SampleCamera::Depth(camera));
             usable.map_err(|error| Status::internal(format!("mirrors of scene {}: {error}", offer.name)))
         };
         Ok((cell.clone(), cameras.into_iter().map(checked).collect::<Result<_, Status>>()?))
@@ -82,7 +108,7 @@ fn mirrors_of(
 }
 
 /// The sample cameras of each view cell of the session's viewpoints, as if it were alone, in the size of the offered ones.
-fn cells_of(request: &SessionRequest, offer: &SceneOffer, volume: &Aabb) -> Result<Vec<Vec<Camera>>, Status> {
+fn cells_of(request: &SessionRequest, offer: &SceneOffer, volume: &Aabb) -> Result<Vec<Vec<SampleCamera>>, Status> {
     let offered = offer.rig.first().map(Camera::size_px);
     let size_px = session_size_px(request, offer).or(offered).unwrap_or(request.typical_view.size_px);
     let mut groups = Vec::new();
@@ -91,7 +117,7 @@ fn cells_of(request: &SessionRequest, offer: &SceneOffer, volume: &Aabb) -> Resu
         return Err(refusal(&ChoiceError::Cells { cells: groups.len() }));
     }
     let checked = |camera: PinholeCamera| {
-        let usable = camera.validate().map(|()| Camera::Pinhole(camera));
+        let usable = camera.validate().map(|()| SampleCamera::from(camera));
         usable.map_err(|error| Status::invalid_argument(format!("viewpoints: {error}")))
     };
     let cameras = |group: &ViewGroup| group.sample_cameras(size_px).into_iter().map(checked).collect();

@@ -12,7 +12,7 @@ use cluster::{
     Timeline, Workload,
 };
 use coordinator::schedule::{Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
-use depth_image::{Aabb, Camera, Environment, ExposureEv, Illumination, PinholeCamera};
+use depth_image::{Aabb, Environment, ExposureEv, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
 /// Images that are not tileable.
@@ -42,7 +42,7 @@ fn workload(images: usize, timeline: Timeline) -> Workload {
     let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(8));
     Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
-        sample_cameras: vec![Camera::Pinhole(camera); images],
+        sample_cameras: vec![camera.into(); images],
         cell_first_indices: Vec::new(),
         mirror_cells: Vec::new(),
         sampling: "conventional".to_owned(),

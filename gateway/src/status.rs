@@ -5,6 +5,7 @@ use std::sync::Arc;
 use axum::extract::{Query, State};
 use axum::response::Response;
 use cluster::{AchievedTime, ClusterStatus, Costs, NodeStatus, Policy, SessionPlan, WorkloadStatus};
+use depth_image::SampleCamera;
 use pictures::camera_frame;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -32,9 +33,12 @@ pub(crate) async fn cameras(
     let workload = shown.opened().await?.plan().assignment.workload;
     let cells = (0..workload.view_cell_count()).filter_map(|cell| Some((cell, workload.cameras_of_cell(cell)?)));
     let frames: Vec<Value> = cells
-        .flat_map(|(cell, cameras)| workload.sample_cameras[cameras].iter().map(move |camera| (cell, camera)))
+        .flat_map(|(cell, cameras)| {
+            let cameras = SampleCamera::references(&workload.sample_cameras[cameras]);
+            cameras.into_iter().map(move |camera| (cell, camera))
+        })
         .map(|(cell, camera)| {
-            let mut frame = camera_frame(camera.reference(), scene.offer.origin_in_source);
+            let mut frame = camera_frame(&camera, scene.offer.origin_in_source);
             frame.insert("cell".to_owned(), json!(cell));
             Value::Object(frame)
         })

@@ -10,7 +10,7 @@ use axum::extract::ws::WebSocket;
 use client::{ClientError, ClientId, EncodedFrame, PictureQuality, Session};
 use cluster::{Assignment, Policy, Promise, SessionPlan};
 use codec::FrameCodec;
-use depth_image::{Antialias, Camera};
+use depth_image::{Antialias, SampleCamera};
 use glam::UVec2;
 use tokio::sync::watch;
 
@@ -93,7 +93,7 @@ struct Visitor {
     /// The latest step of light that a still has shown: from 0.
     light_step: u32,
     /// The sample cameras of the finished still; `None` where there is none, or its plan is over.
-    finished_with: Option<Vec<Camera>>,
+    finished_with: Option<Vec<SampleCamera>>,
     /// Samples a pixel of a finished still: fewer where the cluster has refused more.
     most_samples: Antialias,
     max_still_px: UVec2,
@@ -397,7 +397,7 @@ fn is_near(plan: &Assignment, frame: &EncodedFrame) -> bool {
 }
 
 /// The sample cameras of a frame, if it was made under this plan.
-fn cameras_of(plan: &Assignment, frame: &EncodedFrame) -> Option<Vec<Camera>> {
+fn cameras_of(plan: &Assignment, frame: &EncodedFrame) -> Option<Vec<SampleCamera>> {
     let is_current = plan.plan_epoch == frame.header.sample_set_id.plan_epoch;
     let cameras = plan.workload.cameras_of_cell(frame.header.cell as usize).filter(|_| is_current)?;
     Some(plan.workload.sample_cameras[cameras].to_vec())

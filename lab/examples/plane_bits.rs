@@ -8,7 +8,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use codec::{DecodeLimits, EncodedDepthImage, PlaneKind, PlaneSet, decode_depth_image, encode_depth_image};
+use codec::{DecodeLimits, EncodedImage, PlaneKind, PlaneSet, decode_depth_image, encode_depth_image};
 use depth_image::DepthImage;
 use engine::GpuEngine;
 use glam::UVec2;
@@ -78,15 +78,15 @@ fn sample_runs(image: &DepthImage) -> usize {
     image.inverse_depth_per_m.chunk_by(|a, b| is_sample(a) == is_sample(b)).filter(|run| is_sample(&run[0])).count()
 }
 
-fn plane_bytes(image: &EncodedDepthImage, kind: PlaneKind) -> usize {
+fn plane_bytes(image: &EncodedImage, kind: PlaneKind) -> usize {
     let planes = image.header.planes.iter().filter(|plane| plane.kind == kind);
     planes.map(|plane| plane.packed_bytes as usize).sum()
 }
 
 /// Milliseconds to encode and to decode an image.
-fn times_ms(images: &[DepthImage], encoded: &[EncodedDepthImage]) -> anyhow::Result<[f64; 2]> {
+fn times_ms(images: &[DepthImage], encoded: &[EncodedImage]) -> anyhow::Result<[f64; 2]> {
     let limits = DecodeLimits::default();
-    let decode = |(image, encoded): (&DepthImage, &EncodedDepthImage)| {
+    let decode = |(image, encoded): (&DepthImage, &EncodedImage)| {
         decode_depth_image(&encoded.header, image.camera, &encoded.payload, &limits)
     };
     images.iter().zip(encoded).try_for_each(|pair| decode(pair).map(drop))?;

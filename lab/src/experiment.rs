@@ -11,7 +11,7 @@ use app_core::setup::{SceneArgs, Setup};
 use client::{Client, Frame, Session};
 use cluster::{PolicyChoice, SessionPlan, SessionRequest, Timeline};
 use coordinator::CoordinatorConfig;
-use depth_image::{Camera, PinholeCamera, ViewCell};
+use depth_image::{PinholeCamera, SampleCamera, ViewCell};
 use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
@@ -70,7 +70,7 @@ const SETS_IN_MEMORY: usize = 1;
 /// Half of a node's memory is for sets on the device, with the images that are relayed.
 fn set_memory_bytes(setup: &Setup) -> usize {
     let illumination = &setup.scene.illumination;
-    let cameras: Vec<_> = setup.samples.iter().copied().map(Camera::Pinhole).collect();
+    let cameras: Vec<_> = setup.samples.iter().copied().map(SampleCamera::from).collect();
     2 * SETS_IN_MEMORY * (most_set_bytes(illumination, &cameras) + most_image_bytes(illumination, &cameras))
 }
 

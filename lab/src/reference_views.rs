@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::Context as _;
 use app_core::setup::{SceneArgs, Setup};
 use codec::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
-use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
+use depth_image::{DepthImage, PinholeCamera, SampleImage, View, ViewPlanes};
 use engine::GpuEngine;
 use metrics::{PixelClass, classify, unheld_rate};
 use node::{DirectWork, Engine as _, SampleWork, Turn, WorkClass};
@@ -166,7 +166,7 @@ pub(crate) fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> any
     let work = SampleWork {
         scene_hash: setup.offer.hash.to_string(),
         wanted: (0..setup.samples.len() as u32).collect(),
-        cameras: setup.samples.iter().copied().map(Camera::Pinhole).collect(),
+        cameras: setup.samples.iter().copied().map(Into::into).collect(),
         sampling: args.sampling().to_string(),
         planes: engine.sample_planes(&args.method().to_string())?,
         lighting: args.lighting.to_string(),
@@ -174,7 +174,7 @@ pub(crate) fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> any
         temporal_reference_s: None,
         refinement: cluster::Refinement::default(),
     };
-    engine.sample(&work, TURN)?.iter().map(encoded_and_decoded).collect()
+    SampleImage::depth_images(engine.sample(&work, TURN)?)?.iter().map(encoded_and_decoded).collect()
 }
 
 fn encoded_and_decoded(image: &DepthImage) -> anyhow::Result<DepthImage> {

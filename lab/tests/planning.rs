@@ -9,7 +9,7 @@ use app_core::setup::{SceneArgs, Setup};
 use cluster::SamplePlanes;
 use codec::FrameCodec;
 use coordinator::schedule::EqualNodes;
-use depth_image::{DepthImage, View, ViewPart, ViewPlanes};
+use depth_image::{SampleImage, View, ViewPart, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
@@ -121,7 +121,7 @@ struct SlowInOtherLight(Arc<GpuEngine>);
 const SLOW: Duration = Duration::from_millis(300);
 
 impl Engine for SlowInOtherLight {
-    fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError> {
+    fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<SampleImage>, EngineError> {
         if request.lighting != "phong" {
             std::thread::sleep(SLOW);
         }
@@ -234,6 +234,7 @@ fn an_audited_part_has_the_errors_of_its_pixels_in_the_whole_view() {
     let of =
         planning.representations.iter().find(|of| of.method == "joint_carve" && of.sample_cameras.len() == 4).unwrap();
     let images = engine.sample(&subject.sample_work(engine.as_ref(), of, Light::Session).unwrap(), turn).unwrap();
+    let images = SampleImage::depth_images(images).unwrap();
     let set = engine.upload(&subject.sample_set(&images, Light::Session), turn).unwrap();
     let camera = planning.viewpoints.first(3)[2].resized(UVec2::new(400, 300));
     let view = ViewWork { cameras: vec![camera], method: of.method.clone(), planes: ViewPlanes::COLOR };

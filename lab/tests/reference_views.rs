@@ -10,7 +10,7 @@ use app_core::setup::{SceneArgs, Setup};
 use app_core::sizes::SampleSize;
 use cluster::{PolicyChoice, SessionRequest};
 use coordinator::CoordinatorConfig;
-use depth_image::{Camera, Environment, PinholeCamera, ViewCell, ViewPlanes};
+use depth_image::{Environment, PinholeCamera, SampleCamera, SampleImages, ViewCell, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
@@ -67,7 +67,7 @@ fn is_invalid(error: &EngineError, named: &str) -> bool {
 fn unknown_names_are_refused_with_their_field() {
     let (engine, args, setup, reference) = reference("uv-sphere", 1);
     let hash = setup.offer.hash.to_string();
-    let samples: Vec<_> = setup.samples.iter().copied().map(Camera::Pinhole).collect();
+    let samples: Vec<SampleCamera> = setup.samples.iter().copied().map(Into::into).collect();
     let sample = |scene_hash: &str, sampling: &str, lighting: &str| {
         engine
             .sample(
@@ -89,9 +89,10 @@ fn unknown_names_are_refused_with_their_field() {
     assert_eq!(sample("none", "conventional", "unlit"), EngineError::UnknownScene { hash: "none".to_owned() });
     assert!(is_invalid(&sample(&hash, "random", "unlit"), "sampling_method"));
     assert!(is_invalid(&sample(&hash, "conventional", "candles"), "lighting"));
+    assert!(is_invalid(&sample(&hash, "layered_cube:64", "unlit"), "sample_cameras"));
     let set = node::SampleSet {
         scene_hash: hash.clone(),
-        images: reference.images.clone(),
+        images: SampleImages::Depth(reference.images.clone()),
         volume: setup.offer.volume,
         background: Environment::default(),
         illumination: setup.offer.illumination.clone(),
@@ -108,7 +109,7 @@ fn unknown_names_are_refused_with_their_field() {
     assert!(is_invalid(&refused(&work("guess", 0.01)), "reconstruction_method"));
     assert!(is_invalid(&refused(&work("joint_carve", -1.0)), "camera"));
     assert!(is_invalid(
-        &engine.upload(&node::SampleSet { images: Vec::new(), ..set }, TURN).err().unwrap(),
+        &engine.upload(&node::SampleSet { images: SampleImages::Depth(Vec::new()), ..set }, TURN).err().unwrap(),
         "sample_images"
     ));
     assert!(is_invalid(&engine.load_scene("x", b"no package").unwrap_err(), "package"));

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use cluster::{Assignment, FetchImages, SetContent};
-use codec::{Chunk, EncodedDepthImage, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
-use depth_image::DepthImage;
+use codec::{Chunk, EncodedImage, SampleSetId, encode_sample_image, split_into_chunks};
+use depth_image::SampleImage;
 use node::{
     ByteCache, CellPlan, Engine, EngineError, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Relay,
     SampleWork, Scenes, SetMemory, Turn,
@@ -28,7 +28,7 @@ const CHUNKS_AHEAD: usize = 4;
 type Key = (SetContent, u32, Vec<u32>);
 
 /// Packed images with their indices.
-type PackedImages = Vec<(u32, EncodedDepthImage)>;
+type PackedImages = Vec<(u32, EncodedImage)>;
 
 /// Sets of one workload are sampled in the order of their requests: the one that is needed next comes first. Workloads do
 /// not wait for each other; the device shares itself among them.
@@ -142,7 +142,7 @@ impl Sampler for SamplerService {
 }
 
 /// Images with their indices, of this node or of others as they arrive.
-type Images = Messages<(u32, EncodedDepthImage)>;
+type Images = Messages<(u32, EncodedImage)>;
 
 /// Sends the wanted images as chunks, until all are sent, one fails, or the receiver takes none for too long.
 async fn send_chunks(
@@ -186,7 +186,7 @@ fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Sam
 }
 
 /// Images with the seconds that they took.
-fn sample(engine: &dyn Engine, work: &SampleWork) -> Result<(Vec<DepthImage>, f64), EngineError> {
+fn sample(engine: &dyn Engine, work: &SampleWork) -> Result<(Vec<SampleImage>, f64), EngineError> {
     let (images, sampled_s) = own_time(engine, || engine.sample(work, Turn::of(WorkClass::Batch)));
     let (scene_time_s, refinement_step) = (work.scene_time_s, work.refinement.step);
     tracing::debug!(images = work.wanted.len(), scene_time_s, refinement_step, sampled_s, "sampled");
@@ -194,7 +194,7 @@ fn sample(engine: &dyn Engine, work: &SampleWork) -> Result<(Vec<DepthImage>, f6
 }
 
 fn pack(
-    (images, sampled_s): (Vec<DepthImage>, f64),
+    (images, sampled_s): (Vec<SampleImage>, f64),
     (indices, tiles): (&[u32], f64),
     (workload_number, metrics): (u64, &NodeMetrics),
 ) -> Result<PackedImages, Status> {
@@ -203,7 +203,7 @@ fn pack(
         return Err(Status::internal(format!("{} images were sampled for {} cameras", images.len(), indices.len())));
     }
     let encode = |(index, image): (&u32, &_)| {
-        let encoded = encode_depth_image(image, PlaneSet::ALL).map_err(|error| Status::internal(error.to_string()))?;
+        let encoded = encode_sample_image(image).map_err(|error| Status::internal(error.to_string()))?;
         Ok((*index, encoded))
     };
     let encoded = indices.iter().zip(&images).map(encode).collect::<Result<Vec<_>, Status>>()?;

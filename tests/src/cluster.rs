@@ -7,8 +7,8 @@ use bytes::Bytes;
 use client::{Client, ClientError, Session, ViewRequest};
 use cluster::{BudgetRequest, MirrorCell, OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline};
 use codec::{FrameAssembly, FramePart, WholeFrame};
-use coordinator::{CoordinatorConfig, Observers, SceneOffer, SceneOffers};
-use depth_image::{Aabb, Camera, Environment, PinholeCamera, ViewPlanes};
+use coordinator::{CoordinatorConfig, Observers, OfferedCube, SceneOffer, SceneOffers};
+use depth_image::{Aabb, Camera, CubeGrid, Environment, PinholeCamera, ViewPlanes};
 use glam::{DVec3, UVec2, Vec3};
 use node::{NodeConfig, NodeMetrics};
 use planner::Row;
@@ -137,6 +137,17 @@ pub fn rows() -> Vec<Row> {
     [1, 2, 4].map(row).to_vec()
 }
 
+/// The sampling method of the scalar device that takes all surfaces on lines.
+pub const CUBE: &str = "cube";
+
+fn volume() -> Aabb {
+    Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) }
+}
+
+fn cube_grid() -> CubeGrid {
+    CubeGrid::around(&volume(), 96).expect("a volume")
+}
+
 /// The offer of a coordinator of the scalar device.
 #[must_use]
 pub fn offer() -> SceneOffer {
@@ -146,10 +157,11 @@ pub fn offer() -> SceneOffer {
         package: package(),
         fits_views: false,
         rig: rig(),
+        cube: Some(OfferedCube { sampling: CUBE.to_owned(), grid: cube_grid() }),
         mirrors: mirrors(),
         rows: rows(),
         keeps_cameras: false,
-        volume: Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) },
+        volume: volume(),
         background: Environment::uniform(SKY_LINEAR),
         illumination: illumination(),
         origin_in_source: DVec3::ZERO,

@@ -22,7 +22,7 @@ fn workload() -> Workload {
     let offer = offer();
     Workload {
         scene: SceneRef { hash: offer.hash, package_bytes: 1 },
-        sample_cameras: rig(),
+        sample_cameras: rig().into_iter().map(Into::into).collect(),
         cell_first_indices: Vec::new(),
         mirror_cells: Vec::new(),
         sampling: "conventional".to_owned(),

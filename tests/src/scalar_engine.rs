@@ -10,8 +10,9 @@ use std::time::Duration;
 
 use cluster::{DIRECT, Refinement, SamplePlanes};
 use depth_image::{
-    Antialias, BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, Environment, Illumination, Light, PinholeCamera,
-    Provenance, ProvenanceKind, Ray, Texel, ToneMapping, View, ViewPlanes, linear_from_rgb9e5, linear_from_srgb8,
+    Antialias, BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, Environment, Illumination, LayeredDepthImage, Light,
+    ParallelCamera, PinholeCamera, PixelDepth, Provenance, ProvenanceKind, Ray, SampleCamera, SampleImage,
+    SampleImages, Texel, ToneMapping, View, ViewPlanes, linear_from_rgb9e5, linear_from_srgb8, oct8_from_unit,
     rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
@@ -100,10 +101,16 @@ struct Meets {
 }
 
 fn ball(ray: &Ray, scene_time_s: f32, refinement: Refinement) -> Option<Meets> {
+    let nearest = ball_sides(ray, scene_time_s).next()?;
+    (nearest > 0.0).then_some(Meets { planar_depth_m: nearest, color_linear: ball_linear(scene_time_s, refinement) })
+}
+
+/// Where a ray's line enters the ball and leaves it.
+fn ball_sides(ray: &Ray, scene_time_s: f32) -> impl Iterator<Item = f32> {
     let (to_eye, d) = (ray.origin_in_world - ball_center(scene_time_s), ray.direction_in_world);
     let (a, b, c) = (d.dot(d), to_eye.dot(d), to_eye.dot(to_eye) - BALL_RADIUS_M * BALL_RADIUS_M);
-    let t = (-b - (b * b - a * c).sqrt()) / a;
-    (t > 0.0).then_some(Meets { planar_depth_m: t, color_linear: ball_linear(scene_time_s, refinement) })
+    let root = (b * b - a * c).sqrt();
+    [(-b - root) / a, (-b + root) / a].into_iter().filter(|t| t.is_finite())
 }
 
 fn floor(ray: &Ray) -> Option<Meets> {
@@ -138,6 +145,32 @@ fn depth_image(camera: &Camera, scene_time_s: f32, refinement: Refinement) -> De
         specular: None,
         passed: None,
         corner_inverse_depth_per_m: None,
+    }
+}
+
+/// The surfaces of the ball and of the floor's upper side on each line.
+fn layered_image(camera: &ParallelCamera, scene_time_s: f32, refinement: Refinement) -> LayeredDepthImage {
+    let (mut first, mut met) = (vec![0], Vec::new());
+    for pixel in pixels(camera.size_px) {
+        let ray = camera.ray(pixel);
+        let mut line: Vec<(f32, Vec3, Vec3)> = ball_sides(&ray, scene_time_s)
+            .map(|t| (t, ray.at(t) - ball_center(scene_time_s), ball_linear(scene_time_s, refinement)))
+            .chain(floor(&ray).map(|met| (met.planar_depth_m, Vec3::Y, met.color_linear)))
+            .filter(|(t, ..)| (0.0..=camera.range_m).contains(t))
+            .collect();
+        line.sort_by(|a, b| a.0.total_cmp(&b.0));
+        met.extend(line);
+        first.push(met.len() as u32);
+    }
+    LayeredDepthImage {
+        camera: *camera,
+        first,
+        planar_depth_m: met.iter().map(|met| met.0).collect(),
+        plane_normal_oct8: met.iter().map(|met| oct8_from_unit(met.1.normalize_or(Vec3::Y))).collect(),
+        color_rgb9e5: met.iter().map(|met| rgb9e5_from_linear(met.2)).collect(),
+        normal_oct16: None,
+        specular: None,
+        truncated: false,
     }
 }
 
@@ -182,7 +215,7 @@ impl Canvas {
 
 fn splat(set: &SampleSet, camera: &PinholeCamera, planes: ViewPlanes) -> View {
     let mut canvas = Canvas::new(camera, &set.background);
-    for (index, image) in set.images.iter().enumerate() {
+    for (index, image) in set.images.depth().iter().enumerate() {
         let size_px = image.size_px();
         for (x, y) in (0..size_px.y).flat_map(|y| (0..size_px.x).map(move |x| (x, y))) {
             let (Texel::Sample { color_linear, .. }, Some(point)) = (image.texel(x, y), image.sample_in_world(x, y))
@@ -194,7 +227,21 @@ fn splat(set: &SampleSet, camera: &PinholeCamera, planes: ViewPlanes) -> View {
             }
         }
     }
+    if let SampleImages::Cube(_, images) = &set.images {
+        images.iter().enumerate().for_each(|(index, image)| splat_layers(&mut canvas, camera, image, index));
+    }
     canvas.view(planes)
+}
+
+fn splat_layers(canvas: &mut Canvas, camera: &PinholeCamera, image: &LayeredDepthImage, index: usize) {
+    for (line, pixel) in pixels(image.camera.size_px).enumerate() {
+        for sample in image.line(line) {
+            let at = PixelDepth { pixel, planar_depth_m: image.planar_depth_m[sample] };
+            if let Some(at) = camera.project(image.camera.unproject(at)).filter(|at| camera.contains(at.pixel)) {
+                canvas.put(at.pixel, at.planar_depth_m, linear_from_rgb9e5(image.color_rgb9e5[sample]), index);
+            }
+        }
+    }
 }
 
 fn draw(camera: &PinholeCamera, scene_time_s: f32, planes: ViewPlanes) -> View {
@@ -372,32 +419,39 @@ impl Engine for ScalarEngine {
     fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {
         match sampling {
             "in_order" => Ok(true),
+            "cube" => Ok(false),
             _ => known("sampling", sampling, "conventional").map(|()| false),
         }
     }
 
     fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError> {
-        Ok(sampling == "conventional")
+        Ok(sampling == "conventional" || sampling == "cube")
     }
 
     fn sample_planes(&self, method: &str) -> Result<SamplePlanes, EngineError> {
         if method == DIRECT { Ok(()) } else { known("method", method, "splat") }.map(|()| SamplePlanes::default())
     }
 
-    fn sample(&self, request: &SampleWork, _: Turn) -> Result<Vec<DepthImage>, EngineError> {
+    fn sample(&self, request: &SampleWork, _: Turn) -> Result<Vec<SampleImage>, EngineError> {
         self.loaded(&request.scene_hash)?;
         self.images_are_sequential(&request.sampling)?;
         known("lighting", &request.lighting, "unlit")?;
-        let cameras: Vec<&Camera> = request.wanted.iter().map(|&index| &request.cameras[index as usize]).collect();
+        let cameras: Vec<&SampleCamera> =
+            request.wanted.iter().map(|&index| &request.cameras[index as usize]).collect();
+        let eye = |camera: &SampleCamera| match camera {
+            SampleCamera::Depth(camera) => camera.reference().eye_in_world.extend(camera.reference().principal_px.y),
+            SampleCamera::Layered(camera) => camera.corner_in_world.extend(camera.world_from_camera.w),
+        };
         for camera in &cameras {
-            let camera = camera.reference();
-            let eye = camera.eye_in_world.extend(camera.principal_px.y).to_array().map(f32::to_bits);
-            let image = (eye, request.scene_time_s.to_bits(), request.refinement);
+            let image = (eye(camera).to_array().map(f32::to_bits), request.scene_time_s.to_bits(), request.refinement);
             *self.counts.lock().entry(image).or_default() += 1;
         }
-        let is_held = |camera: &&Camera, holds: &Holds| holds.eyes.contains(&camera.reference().eye_in_world);
+        let is_held = |camera: &&SampleCamera, holds: &Holds| holds.eyes.contains(&eye(camera).truncate());
         self.wait_while(|holds| cameras.iter().any(|camera| is_held(camera, holds)));
-        let image = |camera| depth_image(camera, request.scene_time_s, request.refinement);
+        let image = |camera: &SampleCamera| match camera {
+            SampleCamera::Depth(camera) => depth_image(camera, request.scene_time_s, request.refinement).into(),
+            SampleCamera::Layered(camera) => layered_image(camera, request.scene_time_s, request.refinement).into(),
+        };
         sleep(self.pace().image * cameras.len() as u32);
         Ok(cameras.into_iter().map(image).collect())
     }
@@ -417,7 +471,7 @@ impl Engine for ScalarEngine {
     fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError> {
         self.works()?;
         let shown = |(_, mirror): &MirrorSet| {
-            let image = &uploaded(mirror.as_ref())?.set.images[0];
+            let image = &uploaded(mirror.as_ref())?.set.images.depth()[0];
             let middle = image.size_px() / 2;
             Ok(srgb8(linear_from_rgb9e5(image.color_rgb9e5[(middle.y * image.size_px().x + middle.x) as usize])))
         };

@@ -98,8 +98,9 @@ async fn cells_follow_a_viewer_that_walks_around() {
         session.set_viewpoints(vec![view(azimuth)]).await.unwrap();
         // The cell of the live viewer's last pose stays until it has moved.
         let cells = || session.plan().assignment.workload.sample_cameras;
-        let near = |camera: &depth_image::Camera| {
-            (camera.reference().eye_in_world - view(azimuth).eye_in_world).length() < 1e-3
+        let near = |camera: &depth_image::SampleCamera| {
+            let reference = camera.depth().expect("a camera of a view").reference();
+            (reference.eye_in_world - view(azimuth).eye_in_world).length() < 1e-3
         };
         cluster_tests::watcher::eventually("a cell here", Duration::from_secs(5), || cells().iter().any(near)).await;
         let number = live.set_pose(view(azimuth), 0).unwrap();

@@ -56,7 +56,7 @@ pub(super) fn budgeted(budget: &str) -> Budgeted {
 /// A viewer with a budget; the pipeline is forced, so that views are not drawn directly.
 pub(super) fn viewer(session: u64, budget: &str) -> Opening {
     let mut opening = opening(session, PolicyChoice::Pipeline, 1);
-    opening.workload.sample_cameras = rig();
+    opening.workload.sample_cameras = rig().into_iter().map(Into::into).collect();
     opening.frames_per_s = Some(10.0);
     opening.budgeted = Some(budgeted(budget));
     opening

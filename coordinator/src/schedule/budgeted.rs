@@ -1,7 +1,7 @@
 //! Budgets of sessions, and what the schedule needs to plan for one.
 
 use cluster::{InvalidField, MOST_PLANNED_PIXELS, Workload, nonempty};
-use depth_image::{Antialias, Camera, PinholeCamera, ViewCell};
+use depth_image::{Antialias, PinholeCamera, SampleCamera, ViewCell};
 use glam::UVec2;
 use planner::{Budget, Ladder, Row};
 use serde::{Deserialize, Serialize};
@@ -52,9 +52,9 @@ impl Budgeted {
 
     /// The workload as a row samples it, in these view cells.
     pub(super) fn sampled_as(&self, row: &Row, workload: &Workload, cells: &[ViewCell]) -> Workload {
-        let resized = |camera: &Camera| camera.resized(row.size_px(camera.size_px()));
-        let of_cell = |cell| row.cameras(cell, self.whole_px).into_iter().map(Camera::Pinhole).collect();
-        let cameras: Vec<Vec<Camera>> = match self.keeps_cameras {
+        let resized = |camera: &SampleCamera| camera.resized(row.size_px(camera.size_px()));
+        let of_cell = |cell| row.cameras(cell, self.whole_px).into_iter().map(SampleCamera::from).collect();
+        let cameras: Vec<Vec<SampleCamera>> = match self.keeps_cameras {
             true => vec![workload.sample_cameras.iter().map(resized).collect()],
             false => cells.iter().map(of_cell).collect(),
         };

@@ -2,7 +2,7 @@
 
 use cluster::Workload;
 use cluster::limits::MAX_CELLS;
-use depth_image::{Aabb, Camera, PinholeCamera, ViewCell, ViewGroup};
+use depth_image::{Aabb, PinholeCamera, SampleCamera, ViewCell, ViewGroup};
 use glam::UVec2;
 
 /// The cells of one workload. A cell that still has viewpoints stays as it is, whatever changes elsewhere: its samples stay
@@ -49,7 +49,7 @@ impl Cells {
         let cameras = |group: &ViewGroup| group.sample_cameras(self.size_px);
         let usable = |cameras: &Vec<PinholeCamera>| cameras.iter().all(|camera| camera.validate().is_ok());
         let cells: Vec<_> = self.groups.iter().map(cameras).filter(usable).take(MAX_CELLS).collect();
-        let cameras = |cell: Vec<PinholeCamera>| cell.into_iter().map(Camera::Pinhole).collect();
+        let cameras = |cell: Vec<PinholeCamera>| cell.into_iter().map(SampleCamera::from).collect();
         *workload = workload.clone().with_view_cells(cells.into_iter().map(cameras).collect());
     }
 
@@ -65,5 +65,5 @@ impl Cells {
 }
 
 fn sample_size_px(workload: &Workload) -> UVec2 {
-    workload.sample_cameras.first().map_or(UVec2::ONE, Camera::size_px)
+    workload.sample_cameras.first().map_or(UVec2::ONE, SampleCamera::size_px)
 }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::time::Duration;
 
 use cluster::{FetchImages, MeasureCosts, NodeStatus, Promise, SessionPlan};
-use depth_image::Camera;
+use depth_image::SampleCamera;
 
 use planner::{Kept, KeptKey};
 
@@ -60,7 +60,7 @@ pub struct ProbedImage {
     /// A request for one image.
     pub request: FetchImages,
     /// The image's camera.
-    pub camera: Camera,
+    pub camera: SampleCamera,
 }
 
 impl Probe {

@@ -378,8 +378,7 @@ fn overload_steps_down_the_fallbacks_and_plans_name_them() {
     assert_eq!(seen, [1, 2].map(NonZeroU32::new), "1.125 of their time at 180, 0.9 at 144");
     let plan = cluster.plan();
     assert_eq!(cluster.workload().plan.unwrap().method, "joint_carve:2");
-    let camera = plan.workload.sample_cameras[0].reference();
-    assert_eq!(camera.size_px.x, 4, "half of 8");
+    assert_eq!(plan.workload.sample_cameras[0].size_px().x, 4, "half of 8");
     cluster.step(Event::DemandChanged { session: 1, views_per_set: 1, frames_per_s: Some(20.0) });
     let plans: Vec<_> = (0..2).map(|_| applied(&cluster.wait(60)).1.fallback).collect();
     assert_eq!(plans, [1, 0].map(NonZeroU32::new), "with less to do they get all again");

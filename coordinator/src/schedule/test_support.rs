@@ -6,7 +6,7 @@ use cluster::{
     Costs, JoinCluster, NodeStatus, PolicyChoice, SamplePlanes, SceneHash, SceneRef, TileCosts, Timeline, Workload,
     WorkloadStatus,
 };
-use depth_image::{Aabb, Camera, Environment, ExposureEv, Illumination, PinholeCamera};
+use depth_image::{Aabb, Environment, ExposureEv, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
 use super::command::Command;
@@ -108,7 +108,7 @@ pub(crate) fn workload(images: usize) -> Workload {
     let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(8));
     Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
-        sample_cameras: vec![Camera::Pinhole(camera); images],
+        sample_cameras: vec![camera.into(); images],
         cell_first_indices: Vec::new(),
         mirror_cells: Vec::new(),
         sampling: "conventional".to_owned(),

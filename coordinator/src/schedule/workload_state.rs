@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use cluster::{AchievedTime, AuditOrder, Costs, Policy, PolicyChoice, Promise, Quality, Workload, is_one_place};
-use depth_image::{Camera, ExposureEv, PinholeCamera, ViewCell};
+use depth_image::{ExposureEv, PinholeCamera, SampleCamera, ViewCell};
 use glam::UVec2;
 
 use super::active_plan::ActivePlan;
@@ -65,7 +65,7 @@ pub(super) struct WorkloadState {
 #[derive(Debug, PartialEq)]
 pub(super) struct PlanTrigger {
     pub(super) policy_override: PolicyOverride,
-    pub(super) sample_cameras: Vec<Camera>,
+    pub(super) sample_cameras: Vec<SampleCamera>,
     fallback: usize,
 }
 
@@ -139,8 +139,7 @@ impl WorkloadState {
     /// The view cells that budgets are planned for: those that viewpoints may grow to, or the one between the sessions' own
     /// sample cameras.
     pub(super) fn planned_cells(&self) -> Vec<ViewCell> {
-        let pinhole = |camera: &Camera| *camera.reference();
-        let own = || ViewCell::between(&self.requested.sample_cameras.iter().map(pinhole).collect::<Vec<_>>());
+        let own = || ViewCell::between(&SampleCamera::references(&self.requested.sample_cameras));
         self.cells.as_ref().map_or_else(|| own().into_iter().collect(), Cells::grown)
     }
 
@@ -391,7 +390,7 @@ impl WorkloadState {
     pub(super) fn degraded(&self) -> Workload {
         let workload = self.in_representation();
         let Some(quality) = self.quality() else { return workload };
-        let sized = |camera: &Camera| {
+        let sized = |camera: &SampleCamera| {
             let size_px = (camera.size_px().as_dvec2() * quality.sample_side_ratio).round().as_uvec2().max(UVec2::ONE);
             camera.resized(size_px)
         };

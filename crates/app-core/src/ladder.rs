@@ -22,9 +22,12 @@ pub struct Named {
     pub cameras: Option<u32>,
 }
 
-/// The rows that a user's choices leave: a named choice is the same in all of them.
+/// The rows that a user's choices leave: a named choice is the same in all of them. Budgets do not choose cubes.
 #[must_use]
 pub fn rows(named: &Named) -> Vec<Row> {
+    if named.sampling.is_some_and(|sampling| sampling.layer_selection().is_some()) {
+        return Vec::new();
+    }
     let samplings: Vec<(String, u32)> = match named.sampling {
         Some(sampling) => vec![(sampling.to_string(), 1)],
         None => SamplingMethod::ladder().map(|(name, images)| (name.to_owned(), images)).collect(),

@@ -56,6 +56,9 @@ impl Planning {
             let reason = "no budget can be kept for mirrors that show the scene";
             return Err(BadInput(format!("--lighting {}: {reason}", args.lighting)).into());
         }
+        if setup.offer.cube.is_some() {
+            return Err(BadInput(format!("--sampling {}: budgets choose among depth images", args.sampling())).into());
+        }
         let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
         let view = cell.camera_at(Vec2::ZERO, views.size_px);
         let rig: Vec<Camera> = setup.around.iter().copied().map(Camera::Pinhole).collect();

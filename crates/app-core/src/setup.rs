@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use clap::Args;
 use cluster::{MirrorCell, OfferSettings, SceneHash};
-use coordinator::SceneOffer;
-use depth_image::{Camera, PinholeCamera};
+use coordinator::{OfferedCube, SceneOffer};
+use depth_image::{Camera, CubeGrid, PinholeCamera};
 use glam::UVec2;
 use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
@@ -15,6 +15,7 @@ use sampling::{Impostors, Mirror, Rig, SamplingMethod};
 use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec, UpAxis};
 
 use crate::camera_file::{self, Placement};
+use crate::exit::BadInput;
 use crate::ladder::{Named, rows};
 use crate::sizes::SampleSize;
 
@@ -137,10 +138,13 @@ fn offer_name(scene: &SceneSpec) -> String {
 }
 
 impl SceneArgs {
-    /// The reconstruction method.
+    /// The reconstruction method; without one, the first that the samples suit.
     #[must_use]
     pub fn method(&self) -> ReconstructionMethod {
-        self.method.unwrap_or_default()
+        let suits_cube =
+            || reconstruction::METHODS.into_iter().map(|row| row.method).find(|method| method.walks_cube());
+        let suited = self.sampling().layer_selection().and_then(|_| suits_cube());
+        self.method.or(suited).unwrap_or_default()
     }
 
     /// The sampling method.
@@ -176,12 +180,14 @@ impl SceneArgs {
         change(&mut scene);
         let around = self.sample_cameras(&scene)?;
         let samples = self.sampling().cameras(around.clone());
+        let cube = self.cube(&scene)?;
         let package = scene::pack(&scene);
         let offer = SceneOffer {
             name: offer_name(&self.scene),
             hash: SceneHash::of(&package),
             package: package.into(),
-            mirrors: mirrors_of(&scene, self.impostors),
+            mirrors: if cube.is_some() { Vec::new() } else { mirrors_of(&scene, self.impostors) },
+            cube: cube.map(|grid| OfferedCube { sampling: self.sampling().to_string(), grid }),
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
             fits_views: self.sample_size == SampleSize::Auto && self.samples.is_none(),
             rows: rows(&self.named(around.len() as u32)),
@@ -198,6 +204,23 @@ impl SceneArgs {
             period_s: scene.period_s().map(f64::from),
         };
         Ok(Setup { scene, around, samples, offer })
+    }
+
+    /// The grid of the scene's cube, where that is how it is sampled.
+    fn cube(&self, scene: &Scene) -> anyhow::Result<Option<CubeGrid>> {
+        let sampling = self.sampling();
+        let cube = sampling.cube(&scene.bounds()).with_context(|| format!("{}: --sampling {sampling}", self.scene))?;
+        if cube.is_some() && scene.period_s().is_some() {
+            return Err(BadInput(format!("--sampling {sampling}: {} moves, and a cube holds still", self.scene)).into());
+        }
+        if let Some(method) = self.method.filter(|method| method.walks_cube() != cube.is_some()) {
+            let reason = match cube {
+                Some(_) => "makes views of depth images, and not of a layered cube",
+                None => "needs a layered cube: --sampling layered_cube",
+            };
+            return Err(BadInput(format!("--method {method} {reason}")).into());
+        }
+        Ok(cube)
     }
 
     fn load_scene(&self) -> anyhow::Result<Scene> {

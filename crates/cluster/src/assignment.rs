@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 
 use codec::SampleSetId;
-use depth_image::{Camera, PinholeCamera};
+use depth_image::{PinholeCamera, SampleCamera};
 
 use crate::audit::AuditOrder;
 use crate::check::{InvalidField, text, tile_count};
@@ -92,9 +92,10 @@ impl From<Assignment> for ApplyPlan {
 impl Assignment {
     /// The cameras of all images that are sampled: of the set's images, or of their tiles.
     #[must_use]
-    pub fn sampled_cameras(&self) -> Vec<Camera> {
-        let tiles = |camera: &Camera| (0..self.tile_count).map(|tile| camera.tile(tile, self.tile_count)).collect();
-        self.workload.sample_cameras.iter().flat_map(|camera| -> Vec<Camera> { tiles(camera) }).collect()
+    pub fn sampled_cameras(&self) -> Vec<SampleCamera> {
+        let tiles =
+            |camera: &SampleCamera| (0..self.tile_count).map(|tile| camera.tile(tile, self.tile_count)).collect();
+        self.workload.sample_cameras.iter().flat_map(|camera| -> Vec<SampleCamera> { tiles(camera) }).collect()
     }
 
     /// The compositor that relays images to this one; `None` where it asks the samplers.

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU32;
 
-use depth_image::{Aabb, Camera, Environment, PinholeCamera, SinglePoleCamera};
+use depth_image::{Aabb, Camera, CubeGrid, Environment, PinholeCamera, SampleCamera, SinglePoleCamera};
 use glam::{UVec2, Vec3};
 
 use crate::test_support::{assignment, camera, workload};
@@ -102,7 +102,7 @@ fn a_view_belongs_to_the_nearest_cell_and_content_is_of_one_cell() {
 fn of_cells() -> Assignment {
     let looking = |x: f32| {
         let eye = Vec3::new(x, 0.0, 9.0);
-        Camera::Pinhole(PinholeCamera { eye_in_world: eye, ..camera() })
+        PinholeCamera { eye_in_world: eye, ..camera() }.into()
     };
     let workload = Workload {
         sample_cameras: [0.0, 10.0, 11.0, 30.0].map(looking).to_vec(),
@@ -201,8 +201,8 @@ fn mirror(x: f32) -> MirrorCell {
 /// As [`of_cells`], with two mirror cells of two cameras and of one.
 fn with_mirrors() -> Assignment {
     let mirrors = vec![
-        (mirror(0.0), vec![Camera::Pinhole(camera()); 2]),
-        (mirror(5.0), vec![Camera::Pinhole(PinholeCamera { eye_in_world: Vec3::Z * 7.0, ..camera() })]),
+        (mirror(0.0), vec![camera().into(); 2]),
+        (mirror(5.0), vec![PinholeCamera { eye_in_world: Vec3::Z * 7.0, ..camera() }.into()]),
     ];
     let mut plan = of_cells();
     plan.workload = plan.workload.with_mirrors(mirrors);
@@ -234,7 +234,7 @@ fn mirror_cells_come_last_and_are_no_views() {
 #[test]
 fn mirror_cells_stay_when_view_cells_change() {
     let plan = with_mirrors();
-    let moved = plan.workload.clone().with_view_cells(vec![vec![Camera::Pinhole(camera())]]);
+    let moved = plan.workload.clone().with_view_cells(vec![vec![camera().into()]]);
     assert_eq!((moved.cell_first_indices.clone(), moved.sample_cameras.len()), (vec![0, 1, 3], 4));
     assert_eq!(moved.validate(), Ok(()));
     let content = |workload: &Workload, cell: usize| {
@@ -247,12 +247,37 @@ fn mirror_cells_stay_when_view_cells_change() {
 }
 
 #[test]
+fn a_cube_is_one_cell_of_its_three_cameras_for_views_from_anywhere() {
+    let cube = |timeline, change: &dyn Fn(&mut Vec<SampleCamera>)| {
+        let grid = CubeGrid::around(&workload().volume, 64).unwrap();
+        let mut sample_cameras = [0, 1, 2].map(|axis| grid.camera(axis).into()).to_vec();
+        change(&mut sample_cameras);
+        Workload { sample_cameras, timeline, ..workload() }
+    };
+    let still = Timeline::still(0.0);
+    let good = cube(still, &|_| ());
+    assert_eq!(good.validate(), Ok(()));
+    assert!(good.samples_cube() && !workload().samples_cube());
+    let views =
+        [Vec3::X * 90.0, Vec3::splat(0.1), -Vec3::Z].map(|eye_in_world| PinholeCamera { eye_in_world, ..camera() });
+    assert!(views.iter().all(|view| good.cell_of(view) == 0 && good.has_cell_near(view)));
+    let refused = |workload: Workload| workload.validate().expect_err("refused").to_string();
+    assert!(refused(cube(still, &|cameras| cameras.swap(0, 1))).contains("three cameras of one layered cube"));
+    assert!(refused(cube(still, &|cameras| cameras[2] = camera().into())).contains("2 parallel of 3"));
+    assert!(refused(cube(still, &|cameras| cameras.truncate(2))).contains("2 parallel of 2"));
+    let cells = Workload { cell_first_indices: vec![0, 1], ..good };
+    assert!(refused(cells).contains("in 2 cells"));
+    let moving = Timeline { start_s: 0.0, step_s: 0.1, set_count: 5 };
+    assert!(refused(cube(moving, &|_| ())).contains("still for a layered cube"));
+}
+
+#[test]
 fn only_mirror_cells_have_single_poles_and_each_has_one_model() {
     let bounds = Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE };
     let bent = Camera::SinglePole(SinglePoleCamera::around(&bounds, Vec3::Z * 5.0, 20.0, UVec2::splat(64)));
     let with = |places: &[usize]| {
         let mut plan = with_mirrors();
-        places.iter().for_each(|&place| plan.workload.sample_cameras[place] = bent);
+        places.iter().for_each(|&place| plan.workload.sample_cameras[place] = bent.into());
         plan.validate().err().map(|error| error.to_string())
     };
     // Cameras 0 to 3 are those of view cells, 4 and 5 of one mirror, 6 of another.

@@ -140,8 +140,8 @@ pub fn viewpoints(viewpoints: &[PinholeCamera]) -> Result<(), InvalidField> {
 }
 
 /// Views are made from pinholes.
-pub(crate) fn pinholes(cameras: &[Camera]) -> Result<(), InvalidField> {
-    let bent = cameras.iter().find(|camera| camera.pinhole().is_none());
+pub(crate) fn pinholes<'a>(mut cameras: impl Iterator<Item = &'a Camera>) -> Result<(), InvalidField> {
+    let bent = cameras.find(|camera| camera.pinhole().is_none());
     bent.map_or(Ok(()), |camera| {
         Err(InvalidField::out_of_range("sample_cameras.model", camera.model_name(), "pinhole in view cells"))
     })

@@ -81,7 +81,7 @@ impl SessionRequest {
         nonempty(&self.lighting, "lighting")?;
         nonempty(&self.codec, "frame_codec")?;
         at_most(self.sample_cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras")?;
-        pinholes(&self.sample_cameras)?;
+        pinholes(self.sample_cameras.iter())?;
         check_view_size(self.typical_view.size_px, "typical_view.size_px")?;
         self.timeline.validate()?;
         frame_rate(self.frames_per_s)?;

@@ -1,6 +1,6 @@
 //! A workload and a plan for tests.
 
-use depth_image::{Aabb, Camera, Environment, Illumination, Light, PinholeCamera};
+use depth_image::{Aabb, Environment, Illumination, Light, PinholeCamera};
 use glam::{UVec2, Vec3};
 
 use crate::{Assignment, CompositorShare, Policy, SamplePlanes, SamplerShare, SceneHash, SceneRef, Timeline, Workload};
@@ -18,7 +18,7 @@ fn illumination() -> Illumination {
 pub(crate) fn workload() -> Workload {
     Workload {
         scene: SceneRef { hash: SceneHash::of(b"scene"), package_bytes: 5 },
-        sample_cameras: vec![Camera::Pinhole(camera()); 2],
+        sample_cameras: vec![camera().into(); 2],
         cell_first_indices: Vec::new(),
         mirror_cells: Vec::new(),
         sampling: "conventional".to_owned(),

@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use depth_image::{
-    Aabb, Camera, Environment, Illumination, MAX_LIGHTS, MAX_MIRROR_CELLS, PinholeCamera, ViewGroup, nearest_set,
+    Aabb, CubeGrid, Environment, Illumination, MAX_LIGHTS, MAX_MIRROR_CELLS, PinholeCamera, SampleCamera, ViewGroup,
+    nearest_set,
 };
 use serde::{Deserialize, Serialize};
 
@@ -18,8 +19,9 @@ use crate::timeline::{Refinement, Timeline};
 pub struct Workload {
     /// The scene.
     pub scene: SceneRef,
-    /// Every set has one image for each; cameras of a view cell stand next to each other.
-    pub sample_cameras: Vec<Camera>,
+    /// Every set has one image for each; cameras of a view cell stand next to each other. Those of a layered depth cube are the three
+    /// of its grid, and serve views from anywhere.
+    pub sample_cameras: Vec<SampleCamera>,
     /// Where each cell's cameras begin, the first's at 0; empty: one view cell has all.
     pub cell_first_indices: Vec<u32>,
     /// The last cells are mirror cells: they depend on no viewer, and every view is made from all of them and from one view
@@ -141,7 +143,7 @@ impl Workload {
 
     /// The workload with other view cells, the cameras of each, and its own mirror cells.
     #[must_use]
-    pub fn with_view_cells(self, cells: Vec<Vec<Camera>>) -> Self {
+    pub fn with_view_cells(self, cells: Vec<Vec<SampleCamera>>) -> Self {
         let mirrors = self.view_cell_count()..self.cell_count();
         let cameras_of = |cell| Some((self.mirror_cell(cell)?.clone(), self.of_cell(cell)?.sample_cameras));
         let mirrors: Vec<_> = mirrors.filter_map(cameras_of).collect();
@@ -152,7 +154,7 @@ impl Workload {
 
     /// The workload with further mirror cells, and the cameras of each.
     #[must_use]
-    pub fn with_mirrors(mut self, mirrors: Vec<(MirrorCell, Vec<Camera>)>) -> Self {
+    pub fn with_mirrors(mut self, mirrors: Vec<(MirrorCell, Vec<SampleCamera>)>) -> Self {
         if self.cell_first_indices.is_empty() && !mirrors.is_empty() {
             self.cell_first_indices.push(0);
         }
@@ -194,9 +196,18 @@ impl Workload {
         nearest_set(view, cells, &self.volume).unwrap_or(0) as u32
     }
 
+    /// Whether samples are those of a layered depth cube, which serves views from anywhere.
+    #[must_use]
+    pub fn samples_cube(&self) -> bool {
+        self.sample_cameras.iter().any(|camera| camera.layered().is_some())
+    }
+
     /// Whether the view cell nearest to a view serves it, or would with a small step.
     #[must_use]
     pub fn has_cell_near(&self, view: &PinholeCamera) -> bool {
+        if self.samples_cube() {
+            return true;
+        }
         let cameras = self.pinholes_of_cell(self.cell_of(view) as usize);
         let mut groups = Vec::new();
         ViewGroup::add(&mut groups, &cameras, &self.volume);
@@ -207,7 +218,7 @@ impl Workload {
 
     fn pinholes_of_cell(&self, cell: usize) -> Vec<PinholeCamera> {
         let range = self.cameras_of_cell(cell).unwrap_or_default();
-        self.sample_cameras[range].iter().map(|camera| *camera.reference()).collect()
+        SampleCamera::references(&self.sample_cameras[range])
     }
 
     /// # Errors
@@ -253,19 +264,36 @@ impl Workload {
         Ok(())
     }
 
-    /// Views are made from pinholes. The images of a mirror are of one model.
+    /// Views are made from pinholes, or from the three cameras of one cube. The images of a mirror are of one model.
     fn check_models(&self) -> Result<(), InvalidField> {
+        if self.samples_cube() {
+            return self.check_cube();
+        }
         let (of_views, _) = self.sample_cameras.split_at_checked(self.view_camera_count()).unwrap_or_default();
-        pinholes(of_views)?;
+        pinholes(of_views.iter().filter_map(SampleCamera::depth))?;
         for cell in self.view_cell_count()..self.cell_count() {
             let cameras = self.cameras_of_cell(cell).and_then(|range| self.sample_cameras.get(range)).unwrap_or(&[]);
-            let is_other = |camera: &&Camera| !camera.is_of_model(&cameras[0]);
+            let is_other = |camera: &&SampleCamera| !camera.is_of_model(&cameras[0]);
             if let Some(other) = cameras.iter().find(is_other) {
                 let expected = "the model of the mirror cell's first camera";
                 return Err(InvalidField::out_of_range("sample_cameras.model", other.model_name(), expected));
             }
         }
         Ok(())
+    }
+
+    fn check_cube(&self) -> Result<(), InvalidField> {
+        let parallel: Vec<_> = self.sample_cameras.iter().filter_map(SampleCamera::layered).copied().collect();
+        let cells = self.cell_count();
+        if cells != 1 || parallel.len() != self.sample_cameras.len() || CubeGrid::of_cameras(&parallel).is_none() {
+            let given = format!("{} parallel of {} in {cells} cells", parallel.len(), self.sample_cameras.len());
+            let allowed = "the three cameras of one layered cube, in one cell";
+            return Err(InvalidField::out_of_range("sample_cameras.model", given, allowed));
+        }
+        match self.timeline.moves() {
+            true => Err(InvalidField::out_of_range("timeline", "of a scene that moves", "still for a layered cube")),
+            false => Ok(()),
+        }
     }
 
     fn check_mirrors(&self) -> Result<(), InvalidField> {
@@ -288,8 +316,9 @@ impl Workload {
 }
 
 /// The index of each cell's first camera.
-fn first_indices(cells: &[Vec<Camera>]) -> Vec<u32> {
-    let first = |next: &mut u32, cameras: &Vec<Camera>| Some(std::mem::replace(next, *next + cameras.len() as u32));
+fn first_indices(cells: &[Vec<SampleCamera>]) -> Vec<u32> {
+    let first =
+        |next: &mut u32, cameras: &Vec<SampleCamera>| Some(std::mem::replace(next, *next + cameras.len() as u32));
     cells.iter().scan(0, first).collect()
 }
 
@@ -320,7 +349,7 @@ struct Shown<'a> {
     background: Environment,
     refinement: [u32; 2],
     illumination: &'a Illumination,
-    sample_cameras: &'a [Camera],
+    sample_cameras: &'a [SampleCamera],
 }
 
 impl SetContent {

@@ -4,7 +4,7 @@ use std::fmt;
 
 use bytes::Bytes;
 
-use crate::{EncodedDepthImage, ImageHeader};
+use crate::{EncodedImage, ImageHeader};
 
 /// Data of one chunk; the last of an image may have less.
 pub const MAX_CHUNK_BYTES: usize = 512 << 10;
@@ -81,9 +81,9 @@ pub(crate) fn chunk_count(payload_bytes: u64) -> u64 {
 pub fn split_into_chunks(
     sample_set_id: SampleSetId,
     image_index: u32,
-    image: EncodedDepthImage,
+    image: EncodedImage,
 ) -> impl Iterator<Item = Chunk> {
-    let EncodedDepthImage { header, payload } = image;
+    let EncodedImage { header, payload } = image;
     let chunk_count = chunk_count(payload.len() as u64) as u32;
     let piece = move |start: usize| payload.slice(start..payload.len().min(start + MAX_CHUNK_BYTES));
     let starts = (1..chunk_count).map(|sequence| (sequence as usize - 1) * MAX_CHUNK_BYTES);

@@ -101,7 +101,7 @@ pub(crate) fn decode_depth(
 }
 
 /// The residual of each code of a block.
-fn predict(codes: &[u16], residuals: &mut [u16]) {
+pub(crate) fn predict(codes: &[u16], residuals: &mut [u16]) {
     let before = |index: usize, back: usize| index.checked_sub(back).map_or(0, |index| codes[index]);
     for index in 0..codes.len().min(2) {
         residuals[index] = residual(codes[index], before(index, 1), before(index, 2));
@@ -121,7 +121,7 @@ fn residual(code: u16, last: u16, second_last: u16) -> u16 {
 }
 
 /// The inverse of [`predict`], in place.
-fn restore(numbers: &mut [u16]) {
+pub(crate) fn restore(numbers: &mut [u16]) {
     // In the upper halves of 32-bit registers sums wrap as 16-bit ones do, without being cut each time.
     const EDGE: u32 = (EDGE_CODES as u32) << 16;
     let (mut code, mut slope) = (0u32, 0u32);

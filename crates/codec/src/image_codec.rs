@@ -2,6 +2,7 @@
 
 use bytes::Bytes;
 use depth_image::{Camera, DepthImage, DepthImageError, SurfaceId};
+use glam::UVec2;
 
 use crate::color_codec::{pack_colors, unpack_colors};
 use crate::depth_codec::{decode_depth, encode_depth};
@@ -12,9 +13,9 @@ use crate::tagged::take;
 use crate::words_codec::{WordLayout, pack_words, unpack_words};
 use crate::{DecodeError, DecodeLimits, ImageHeader, InverseDepthRange, PlaneHeader, PlaneKind, PlaneSet};
 
-/// An encoded depth image, without its camera.
+/// An encoded sample image, without its camera.
 #[derive(Debug, Clone, PartialEq)]
-pub struct EncodedDepthImage {
+pub struct EncodedImage {
     /// The description of the payload.
     pub header: ImageHeader,
     /// The planes, one after the other.
@@ -26,7 +27,7 @@ pub struct EncodedDepthImage {
 ///
 /// # Errors
 /// Planes that are not of the camera's size; planes of highlights without normals.
-pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<EncodedDepthImage, DepthImageError> {
+pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<EncodedImage, DepthImageError> {
     image.validate()?;
     let specular = image.specular.as_ref().filter(|_| planes.specular);
     if specular.is_some() && image.normal_oct16.is_none() {
@@ -57,11 +58,12 @@ pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<Encode
         packer.push(PlaneKind::CornerInverseDepth, &pack_corners(corners));
     }
     let size_px = image.size_px();
-    Ok(EncodedDepthImage {
+    Ok(EncodedImage {
         header: ImageHeader {
             width: size_px.x,
             height: size_px.y,
             inverse_depth_range: depth.range,
+            layered: None,
             planes: packer.planes,
         },
         payload: packer.payload.into(),
@@ -80,10 +82,7 @@ pub fn decode_depth_image(
     limits: &DecodeLimits,
 ) -> Result<DepthImage, DecodeError> {
     let texels = header.validate(limits)?;
-    check_camera(header, &camera)?;
-    if payload.len() as u64 != header.payload_bytes() {
-        return Err(DecodeError::Corrupt { field: "payload", reason: "not as long as the header says" });
-    }
+    check_payload(header, camera.size_px(), payload)?;
     let [first, others @ ..] = &header.planes[..] else {
         return Err(DecodeError::Header { field: "planes", reason: "none" });
     };
@@ -106,14 +105,15 @@ pub fn decode_depth_image(
     Ok(image)
 }
 
+/// Planes that are packed one after another.
 #[derive(Default)]
-struct Packer {
-    planes: Vec<PlaneHeader>,
-    payload: Vec<u8>,
+pub(crate) struct Packer {
+    pub planes: Vec<PlaneHeader>,
+    pub payload: Vec<u8>,
 }
 
 impl Packer {
-    fn push(&mut self, kind: PlaneKind, raw: &[u8]) {
+    pub fn push(&mut self, kind: PlaneKind, raw: &[u8]) {
         let packed = lz4_flex::block::compress(raw);
         self.payload.extend_from_slice(&packed);
         self.planes.push(PlaneHeader {
@@ -124,23 +124,27 @@ impl Packer {
         });
     }
 
-    fn write(&mut self, kind: PlaneKind, write: impl FnOnce(&mut Vec<u8>)) {
+    pub fn write(&mut self, kind: PlaneKind, write: impl FnOnce(&mut Vec<u8>)) {
         let mut raw = Vec::new();
         write(&mut raw);
         self.push(kind, &raw);
     }
 }
 
-fn check_camera(header: &ImageHeader, camera: &Camera) -> Result<(), DecodeError> {
+/// Checks that an image is of its camera's size, and its payload as long as its header says.
+pub(crate) fn check_payload(header: &ImageHeader, camera_px: UVec2, payload: &[u8]) -> Result<(), DecodeError> {
     let (width, height) = (header.width, header.height);
-    let [camera_width, camera_height] = camera.size_px().to_array();
-    if (width, height) == (camera_width, camera_height) {
-        return Ok(());
+    let [camera_width, camera_height] = camera_px.to_array();
+    if (width, height) != (camera_width, camera_height) {
+        return Err(DecodeError::CameraSize { width, height, camera_width, camera_height });
     }
-    Err(DecodeError::CameraSize { width, height, camera_width, camera_height })
+    if payload.len() as u64 != header.payload_bytes() {
+        return Err(DecodeError::Corrupt { field: "payload", reason: "not as long as the header says" });
+    }
+    Ok(())
 }
 
-fn expand_plane(plane: &PlaneHeader, packed: &mut &[u8]) -> Result<Vec<u8>, DecodeError> {
+pub(crate) fn expand_plane(plane: &PlaneHeader, packed: &mut &[u8]) -> Result<Vec<u8>, DecodeError> {
     let field = plane.kind.name();
     let (own, rest) = packed
         .split_at_checked(plane.packed_bytes as usize)
@@ -186,11 +190,19 @@ fn decode_plane(
         PlaneKind::CornerInverseDepth => {
             image.corner_inverse_depth_per_m = Some(unpack_corners(std::mem::take(&mut input), corners)?);
         }
+        PlaneKind::LayerCount8 | PlaneKind::LayerDepth | PlaneKind::PlaneNormalOct8 => {
+            return Err(DecodeError::Header { field: "planes.kind", reason: "of layered images alone" });
+        }
     }
-    if input.is_empty() {
-        return Ok(());
+    check_end(plane.kind, input)
+}
+
+/// Nothing may be left of a plane.
+pub(crate) fn check_end(kind: PlaneKind, input: &[u8]) -> Result<(), DecodeError> {
+    match input.is_empty() {
+        true => Ok(()),
+        false => Err(DecodeError::Corrupt { field: kind.name(), reason: "bytes left over" }),
     }
-    Err(DecodeError::Corrupt { field: plane.kind.name(), reason: "bytes left over" })
 }
 
 fn pack_bits(bits: &[bool]) -> Vec<u8> {

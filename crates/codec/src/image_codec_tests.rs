@@ -50,7 +50,7 @@ fn shiny(width: u32, height: u32, visibilities: usize) -> DepthImage {
     DepthImage { specular: Some(SpecularPlanes { reflectance_srgb8_roughness8, visibility8 }), ..image }
 }
 
-fn decode(image: &EncodedDepthImage) -> Result<DepthImage, DecodeError> {
+fn decode(image: &EncodedImage) -> Result<DepthImage, DecodeError> {
     let limits = DecodeLimits { max_texels: 1 << 16, ..DecodeLimits::default() };
     decode_depth_image(&image.header, camera(image.header.width, image.header.height), &image.payload, &limits)
 }
@@ -118,7 +118,7 @@ fn damaged_planes_of_images_apart_are_refused() {
         let place = random.next_u32() as usize % payload.len();
         payload[place] ^= 1 << (random.next_u32() % 8);
         // Every result is of the right size, or an error.
-        if let Ok(image) = decode(&EncodedDepthImage { payload: payload.into(), ..good.clone() }) {
+        if let Ok(image) = decode(&EncodedImage { payload: payload.into(), ..good.clone() }) {
             image.validate().expect("planes of one size");
         }
     }
@@ -241,12 +241,12 @@ fn damaged_words_behind_a_sound_lz4_never_panic() {
 fn cut_and_random_payloads_are_refused() {
     let good = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
     for length in 0..good.payload.len() {
-        assert!(decode(&EncodedDepthImage { payload: good.payload.slice(..length), ..good.clone() }).is_err());
+        assert!(decode(&EncodedImage { payload: good.payload.slice(..length), ..good.clone() }).is_err());
     }
     let mut random = Random::new(12);
     for _ in 0..2000 {
         let payload: Vec<u8> = (0..good.payload.len()).map(|_| random.next_u32() as u8).collect();
-        assert_sound(decode(&EncodedDepthImage { payload: payload.into(), ..good.clone() }));
+        assert_sound(decode(&EncodedImage { payload: payload.into(), ..good.clone() }));
     }
 }
 

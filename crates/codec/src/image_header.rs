@@ -2,11 +2,12 @@
 
 use std::hash::Hasher;
 
-use depth_image::{MAX_LIGHTS, SpecularPlanes};
+use depth_image::{MAX_LAYERS, MAX_LIGHTS, SpecularPlanes};
 
 use crate::color_codec::max_colors_bytes;
 use crate::depth_codec::max_unpacked_bytes;
 use crate::error::check_limit;
+use crate::layered_codec::max_numbers_bytes;
 use crate::words_codec::{WordLayout, max_words_bytes};
 use crate::{DecodeError, DecodeLimits, InverseDepthRange};
 
@@ -32,6 +33,12 @@ pub enum PlaneKind {
     Passed1,
     /// Inverse depth at texels' corners, with a range of its own.
     CornerInverseDepth,
+    /// The number of samples of each line. Always the first plane of a layered image, and of no other.
+    LayerCount8,
+    /// 16-bit codes of planar depth, layer by layer. Always the second plane of a layered image.
+    LayerDepth,
+    /// Octahedral normals of triangles. Always the third plane of a layered image.
+    PlaneNormalOct8,
 }
 
 /// How a plane is packed.
@@ -52,12 +59,15 @@ impl PlaneKind {
     #[must_use]
     pub const fn encoding(self) -> PlaneEncoding {
         match self {
-            Self::InverseDepth | Self::CornerInverseDepth => PlaneEncoding::SlopeTaggedLz4,
+            Self::InverseDepth | Self::CornerInverseDepth | Self::LayerDepth => PlaneEncoding::SlopeTaggedLz4,
             Self::Passed1 => PlaneEncoding::BitsLz4,
             Self::ColorRgb9e5 => PlaneEncoding::ChangeTaggedLz4,
-            Self::NormalOct16 | Self::SurfaceId | Self::ReflectanceRoughness8 | Self::Visibility8 => {
-                PlaneEncoding::DifferenceTaggedLz4
-            }
+            Self::NormalOct16
+            | Self::SurfaceId
+            | Self::ReflectanceRoughness8
+            | Self::Visibility8
+            | Self::LayerCount8
+            | Self::PlaneNormalOct8 => PlaneEncoding::DifferenceTaggedLz4,
         }
     }
 
@@ -72,31 +82,65 @@ impl PlaneKind {
             Self::Visibility8 => "visibility8",
             Self::Passed1 => "passed1",
             Self::CornerInverseDepth => "corner_inverse_depth",
+            Self::LayerCount8 => "layer_count8",
+            Self::LayerDepth => "layer_depth",
+            Self::PlaneNormalOct8 => "plane_normal_oct8",
         }
     }
 
-    /// Bytes of one texel before any packing.
+    /// Bytes of one texel or sample before any packing; of a line for its number of samples.
     const fn texel_bytes(self) -> usize {
         match self {
-            Self::InverseDepth | Self::CornerInverseDepth => 2,
+            Self::InverseDepth | Self::CornerInverseDepth | Self::PlaneNormalOct8 => 2,
             Self::Passed1 => 1,
             Self::ColorRgb9e5 | Self::NormalOct16 | Self::ReflectanceRoughness8 | Self::Visibility8 => 4,
             Self::SurfaceId => 8,
+            // The first sample's number and the depth, unpacked.
+            Self::LayerCount8 | Self::LayerDepth => 4,
         }
     }
 
-    /// Most bytes that a plane of `texels` with `corners` has before LZ4.
-    const fn max_raw_bytes(self, texels: usize, corners: usize) -> usize {
+    /// The number of values of a plane.
+    const fn values(self, counts: Counts) -> usize {
         match self {
-            Self::InverseDepth => max_unpacked_bytes(texels),
-            Self::ColorRgb9e5 => max_colors_bytes(texels),
-            Self::NormalOct16 => max_words_bytes(texels, WordLayout::Halves),
-            Self::SurfaceId => 2 * max_words_bytes(texels, WordLayout::Whole),
-            Self::ReflectanceRoughness8 | Self::Visibility8 => max_words_bytes(texels, WordLayout::Bytes),
-            Self::Passed1 => texels.div_ceil(8),
-            Self::CornerInverseDepth => CORNER_RANGE_BYTES + max_unpacked_bytes(corners),
+            Self::CornerInverseDepth => counts.corners,
+            Self::LayerCount8 => counts.lines,
+            _ => counts.samples,
         }
     }
+
+    /// Most bytes that a plane of so many values has before LZ4.
+    const fn max_raw_bytes(self, values: usize) -> usize {
+        match self {
+            Self::InverseDepth => max_unpacked_bytes(values),
+            Self::ColorRgb9e5 => max_colors_bytes(values),
+            Self::NormalOct16 => max_words_bytes(values, WordLayout::Halves),
+            Self::SurfaceId => 2 * max_words_bytes(values, WordLayout::Whole),
+            Self::ReflectanceRoughness8 | Self::Visibility8 => max_words_bytes(values, WordLayout::Bytes),
+            Self::Passed1 => values.div_ceil(8),
+            Self::CornerInverseDepth => CORNER_RANGE_BYTES + max_unpacked_bytes(values),
+            Self::LayerCount8 | Self::LayerDepth => max_numbers_bytes(values),
+            Self::PlaneNormalOct8 => max_words_bytes(values, WordLayout::TwoBytes),
+        }
+    }
+}
+
+/// Values of an image's planes, by what they belong to.
+#[derive(Clone, Copy)]
+struct Counts {
+    /// Texels of a depth image; samples of a layered one.
+    samples: usize,
+    corners: usize,
+    lines: usize,
+}
+
+/// The samples of a layered image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LayeredCounts {
+    /// All samples of all lines.
+    pub sample_count: u32,
+    /// Some line met more surfaces than it has samples.
+    pub truncated: bool,
 }
 
 /// One plane of an image's payload.
@@ -135,21 +179,23 @@ impl PlaneSet {
     pub const ALL: Self = Self { normal: true, surface_id: true, specular: true, corners: true };
 }
 
-/// Size, planes and range of an encoded depth image. The camera is sent apart.
+/// Size, planes and range of an encoded sample image. The camera is sent apart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImageHeader {
     /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// The range that the 16-bit codes span.
+    /// The range that the 16-bit codes of inverse depth span; both 0 in a layered image, whose codes span its camera's range.
     pub inverse_depth_range: InverseDepthRange,
+    /// The samples of a layered image; `None` for a depth image.
+    pub layered: Option<LayeredCounts>,
     /// The planes, in the order of the payload.
     pub planes: Vec<PlaneHeader>,
 }
 
 impl ImageHeader {
-    /// Checks everything that can be checked without the payload; gives the number of texels.
+    /// Checks everything that can be checked without the payload; gives the number of texels, or of lines.
     ///
     /// # Errors
     /// Names the field that is wrong or over a limit.
@@ -157,29 +203,36 @@ impl ImageHeader {
         let texels = limits.texels(self.width, self.height)?;
         self.inverse_depth_range.validate()?;
         self.validate_kinds()?;
+        let samples = self.layered.map_or(texels, |layered| layered.sample_count as usize);
+        check_limit("sample_count", samples as u64, texels as u64 * u64::from(MAX_LAYERS))?;
+        let counts = Counts { samples, corners: self.corners(), lines: texels };
         for plane in &self.planes {
             if plane.encoding != plane.kind.encoding() {
                 return Err(DecodeError::Header { field: "planes.encoding", reason: "not the encoding of this kind" });
             }
-            check_limit(
-                "planes.raw_bytes",
-                u64::from(plane.raw_bytes),
-                plane.kind.max_raw_bytes(texels, self.corners()) as u64,
-            )?;
+            let most_bytes = plane.kind.max_raw_bytes(plane.kind.values(counts));
+            check_limit("planes.raw_bytes", u64::from(plane.raw_bytes), most_bytes as u64)?;
         }
-        let texel_bytes: usize = self.planes.iter().map(|plane| plane.kind.texel_bytes()).sum();
-        check_limit("image_bytes", texels as u64 * texel_bytes as u64, limits.max_image_bytes as u64)?;
+        let plane_bytes = |plane: &PlaneHeader| plane.kind.values(counts) as u64 * plane.kind.texel_bytes() as u64;
+        check_limit("image_bytes", self.planes.iter().map(plane_bytes).sum(), limits.max_image_bytes as u64)?;
         check_limit("payload_bytes", self.payload_bytes(), limits.max_payload_bytes as u64)?;
         Ok(texels)
     }
 
-    /// Depth, colour, \[normal\], \[surface id\], \[reflectance, visibility*\], \[passed\], \[corners\]; reflectance
-    /// only with normals.
+    /// Depth and colour, or counts, depths, normals of triangles and colour; then \[normal\], \[surface id\],
+    /// \[reflectance, visibility*\], \[passed\], \[corners\]; reflectance only with normals.
     fn validate_kinds(&self) -> Result<(), DecodeError> {
+        use PlaneKind::{ColorRgb9e5, InverseDepth, LayerCount8, LayerDepth, PlaneNormalOct8};
         let error = |reason| Err(DecodeError::Header { field: "planes.kind", reason });
         let kinds: Vec<_> = self.planes.iter().map(|plane| plane.kind).collect();
-        let Some(rest) = kinds.strip_prefix(&[PlaneKind::InverseDepth, PlaneKind::ColorRgb9e5]) else {
-            return error("must begin with inverse depth and colour");
+        let (first, reason): (&[PlaneKind], _) = match self.layered {
+            None => (&[InverseDepth, ColorRgb9e5], "must begin with inverse depth and colour"),
+            Some(_) => {
+                (&[LayerCount8, LayerDepth, PlaneNormalOct8, ColorRgb9e5], "must begin with those of a layered image")
+            }
+        };
+        let Some(rest) = kinds.strip_prefix(first) else {
+            return error(reason);
         };
         let (normals, rest) = leading(rest, PlaneKind::NormalOct16);
         let (surface_ids, rest) = leading(rest, PlaneKind::SurfaceId);
@@ -189,6 +242,9 @@ impl ImageHeader {
         let (corners, rest) = leading(rest, PlaneKind::CornerInverseDepth);
         if !rest.is_empty() || [normals, surface_ids, reflectances, passed, corners].iter().any(|&count| count > 1) {
             return error("repeated or out of order");
+        }
+        if self.layered.is_some() && [surface_ids, passed, corners] != [0; 3] {
+            return error("of depth images alone");
         }
         if reflectances > normals || (visibilities > 0 && reflectances == 0) {
             return error("reflectance without normals, or visibility without reflectance");
@@ -214,6 +270,10 @@ impl ImageHeader {
         let range = self.inverse_depth_range;
         for word in [self.width, self.height, range.least_per_m.to_bits(), range.greatest_per_m.to_bits()] {
             hasher.update(&word.to_le_bytes());
+        }
+        if let Some(LayeredCounts { sample_count, truncated }) = self.layered {
+            hasher.update(&sample_count.to_le_bytes());
+            hasher.update(&[u8::from(truncated)]);
         }
         for plane in &self.planes {
             hasher.write(&[plane.kind as u8, plane.encoding as u8]);

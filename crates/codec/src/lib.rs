@@ -18,12 +18,15 @@ mod frame_parts;
 mod image_codec;
 mod image_header;
 mod jpeg;
+mod layered_codec;
+mod layered_image_codec;
 mod lz4;
 mod picture;
 mod png;
 mod quantise;
 mod reassembler;
 mod runs;
+mod sample_image_codec;
 mod tagged;
 #[cfg(test)]
 mod test_planes;
@@ -36,8 +39,12 @@ pub use error::{DecodeError, DecodeLimits, FrameError};
 pub use frame_codec::{FrameCodec, ParseFrameCodecError, decode_frame, encode_frame};
 pub use frame_header::{FrameHeader, MAX_FRAME_BYTES, StageTimes};
 pub use frame_parts::{FrameAssembly, FrameAssemblyError, FramePart, WholeFrame};
-pub use image_codec::{EncodedDepthImage, decode_depth_image, encode_depth_image};
-pub use image_header::{ImageHeader, MAX_VISIBILITY_PLANES, PlaneEncoding, PlaneHeader, PlaneKind, PlaneSet};
+pub use image_codec::{EncodedImage, decode_depth_image, encode_depth_image};
+pub use image_header::{
+    ImageHeader, LayeredCounts, MAX_VISIBILITY_PLANES, PlaneEncoding, PlaneHeader, PlaneKind, PlaneSet,
+};
+pub use layered_image_codec::{decode_layered_image, encode_layered_image};
 pub use quantise::InverseDepthRange;
 pub use reassembler::{ChunkError, Reassembled, Reassembler};
+pub use sample_image_codec::{EncodeError, decode_sample_image, encode_sample_image};
 pub use view_codec::{EncodedView, decode_view, encode_view};

@@ -3,9 +3,7 @@
 use bytes::Bytes;
 
 use crate::chunk::chunk_count;
-use crate::{
-    Chunk, ChunkBody, DecodeError, DecodeLimits, EncodedDepthImage, ImageHeader, MAX_CHUNK_BYTES, SampleSetId,
-};
+use crate::{Chunk, ChunkBody, DecodeError, DecodeLimits, EncodedImage, ImageHeader, MAX_CHUNK_BYTES, SampleSetId};
 
 /// An image whose chunks have all arrived.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,7 +13,7 @@ pub struct Reassembled {
     /// Index of the image in the set.
     pub image_index: u32,
     /// The image; its header has passed [`ImageHeader::validate`].
-    pub image: EncodedDepthImage,
+    pub image: EncodedImage,
 }
 
 /// Why a chunk is refused. An incomplete image is dropped, unless the chunk was stale or a duplicate.
@@ -155,7 +153,7 @@ impl UnderWay {
     fn finish(self) -> Reassembled {
         // A payload in one chunk is kept as it is.
         let payload = <[Bytes; 1]>::try_from(self.pieces).map_or_else(|pieces| pieces.concat().into(), |[whole]| whole);
-        let image = EncodedDepthImage { header: self.header, payload };
+        let image = EncodedImage { header: self.header, payload };
         Reassembled { sample_set_id: self.sample_set_id, image_index: self.image_index, image }
     }
 }

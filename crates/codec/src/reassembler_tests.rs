@@ -7,7 +7,7 @@ const SET: SampleSetId = SampleSetId { plan_epoch: 3, index: 14 };
 const LATER: SampleSetId = SampleSetId { plan_epoch: 4, index: 0 };
 
 /// The payload is not an image: the reassembler does not look into it.
-fn image(payload_bytes: usize) -> EncodedDepthImage {
+fn image(payload_bytes: usize) -> EncodedImage {
     let depth_bytes = payload_bytes / 3;
     let plane = |kind: PlaneKind, packed_bytes: usize| PlaneHeader {
         kind,
@@ -19,13 +19,14 @@ fn image(payload_bytes: usize) -> EncodedDepthImage {
         width: 2048,
         height: 2048,
         inverse_depth_range: InverseDepthRange { least_per_m: 0.1, greatest_per_m: 1.0 },
+        layered: None,
         planes: vec![
             plane(PlaneKind::InverseDepth, depth_bytes),
             plane(PlaneKind::ColorRgb9e5, payload_bytes - depth_bytes),
         ],
     };
     let mut random = Random::new(payload_bytes as u64);
-    EncodedDepthImage { header, payload: (0..payload_bytes).map(|_| random.next_u32() as u8).collect() }
+    EncodedImage { header, payload: (0..payload_bytes).map(|_| random.next_u32() as u8).collect() }
 }
 
 fn chunks(payload_bytes: usize) -> Vec<Chunk> {

@@ -25,6 +25,8 @@ pub(crate) enum WordLayout {
     Whole,
     /// Two numbers of 16 bits, as in octahedral normals.
     Halves,
+    /// Two numbers of 8 bits in the lower half, as in octahedral normals of triangles.
+    TwoBytes,
     /// Four numbers of 8 bits, as in reflectance and visibility.
     Bytes,
 }
@@ -33,14 +35,17 @@ impl WordLayout {
     /// Streams of a plane.
     const fn parts(self) -> usize {
         match self {
-            Self::Whole | Self::Halves => 2,
+            Self::Whole | Self::Halves | Self::TwoBytes => 2,
             Self::Bytes => 4,
         }
     }
 
     /// The bit at which a part begins in its word.
     const fn shift(self, part: usize) -> usize {
-        part * 32 / self.parts()
+        match self {
+            Self::Whole | Self::Halves => 16 * part,
+            Self::TwoBytes | Self::Bytes => 8 * part,
+        }
     }
 }
 
@@ -68,7 +73,7 @@ fn differences(words: &[u32], layout: WordLayout, shift: usize, out: &mut [u16])
         WordLayout::Halves => for_neighbours(words, out, |word, last| {
             zigzag(((word >> shift) as u16).wrapping_sub((last >> shift) as u16))
         }),
-        WordLayout::Bytes => for_neighbours(words, out, |word, last| {
+        WordLayout::TwoBytes | WordLayout::Bytes => for_neighbours(words, out, |word, last| {
             let difference = ((word >> shift) as u8).wrapping_sub((last >> shift) as u8);
             zigzag(difference as i8 as u16)
         }),
@@ -117,6 +122,10 @@ fn extend_by_changes(words: &mut Vec<u32>, numbers: &[u16], block: usize, layout
             let half = |number| u32::from(unzigzag(number));
             words.extend(low.iter().zip(high).map(|(&low, &high)| half(low) | half(high) << 16));
         }
+        WordLayout::TwoBytes => {
+            let byte = |number| u32::from(unzigzag(number) as u8);
+            words.extend(low.iter().zip(high).map(|(&low, &high)| byte(low) | byte(high) << 8));
+        }
         WordLayout::Bytes => {
             let byte = |number| u32::from(unzigzag(number) as u8);
             let two = |(&low, &high)| byte(low) | byte(high) << 8;
@@ -132,7 +141,7 @@ fn sum_up(changes: &mut [u32], layout: WordLayout) {
     match layout {
         WordLayout::Whole => scan(changes, u32::wrapping_add),
         WordLayout::Halves => scan(changes, |word, change| add_parts(word, change, 0x8000_8000)),
-        WordLayout::Bytes => scan(changes, |word, change| add_parts(word, change, 0x8080_8080)),
+        WordLayout::TwoBytes | WordLayout::Bytes => scan(changes, |word, change| add_parts(word, change, 0x8080_8080)),
     }
 }
 
@@ -166,8 +175,10 @@ mod tests {
     fn words_survive() {
         let mut random = Random::new(5);
         for count in [0, 1, 2, 7, 1000, BLOCK + 3] {
-            for layout in [WordLayout::Whole, WordLayout::Halves, WordLayout::Bytes] {
-                let words: Vec<u32> = (0..count).map(|_| random.next_u32() >> random.below(32)).collect();
+            for layout in [WordLayout::Whole, WordLayout::Halves, WordLayout::TwoBytes, WordLayout::Bytes] {
+                let least_shift = if layout == WordLayout::TwoBytes { 16 } else { 0 };
+                let shift = least_shift + random.below(32 - least_shift);
+                let words: Vec<u32> = (0..count).map(|_| random.next_u32() >> shift).collect();
                 let mut bytes = Vec::new();
                 pack_words(&words, layout, &mut bytes);
                 assert!(bytes.len() <= max_words_bytes(words.len(), layout));

@@ -1,8 +1,8 @@
 //! The grid of a layered depth cube: lines along three orthogonal axes, all of one spacing.
 
-use glam::{Mat3A, Quat, UVec2, UVec3, Vec3};
+use glam::{Mat3A, Quat, UVec2, UVec3, Vec2, Vec3};
 
-use crate::{Aabb, CameraError, ParallelCamera};
+use crate::{Aabb, CameraError, ParallelCamera, PixelDepth};
 
 /// A box of cubic cells. Through the middle of each row of cells, along each of the three axes, runs a line on which a scene is
 /// sampled (Lischinski §3.1).
@@ -20,6 +20,9 @@ pub struct CubeGrid {
 
 /// The sides that a cube may have, in cells.
 pub const CUBE_SIDES: std::ops::RangeInclusive<u32> = 16..=4096;
+
+/// How far the lines of a grid's camera may be from the grid's, in spacings: coordinates are rounded.
+const CAMERA_ROUNDING: f32 = 0.05;
 
 impl CubeGrid {
     /// The grid around a box with `side` cells along its longest edge. Surfaces on the faces of the box lie within it.
@@ -62,6 +65,41 @@ impl CubeGrid {
         (0..3).try_for_each(|axis| self.camera(axis).validate())
     }
 
+    /// The grid whose cameras these are, one along each axis in their order; `None` of others.
+    #[must_use]
+    pub fn of_cameras(cameras: &[ParallelCamera]) -> Option<Self> {
+        let &[first, second, _] = cameras else { return None };
+        let frame = Mat3A::from_quat(first.world_from_camera);
+        let axes = Mat3A::from_cols(frame.z_axis, frame.x_axis, frame.y_axis);
+        let [own, rows] = [second.size_px.y, first.size_px.y];
+        let edge_m = |cells: u32| cells as f32 * first.spacing_m;
+        let grid = Self {
+            corner_in_world: first.corner_in_world
+                - Vec3::from(frame.y_axis) * edge_m(rows)
+                - Vec3::from(frame.z_axis) * edge_m(own),
+            world_from_cube: Quat::from_mat3a(&axes).normalize(),
+            spacing_m: first.spacing_m,
+            size: UVec3::new(own, first.size_px.x, rows),
+        };
+        let is_own = |(axis, camera)| grid.has_camera(axis, camera);
+        (grid.validate().is_ok() && cameras.iter().enumerate().all(is_own)).then_some(grid)
+    }
+
+    /// Whether a camera has the lines along an axis, but for rounding.
+    #[must_use]
+    pub fn has_camera(&self, axis: usize, camera: &ParallelCamera) -> bool {
+        let own = self.camera(axis);
+        let [right, end] = [Vec2::new(own.size_px.x as f32, 0.0), own.size_px.as_vec2()];
+        let is_near = |pixel, planar_depth_m| {
+            let at = PixelDepth { pixel, planar_depth_m };
+            own.unproject(at).distance(camera.unproject(at)) < CAMERA_ROUNDING * self.spacing_m
+        };
+        let places = [(Vec2::ZERO, 0.0), (right, 0.0), (end, 0.0), (Vec2::ZERO, own.range_m)];
+        let is_alike =
+            own.size_px == camera.size_px && (own.range_m - camera.range_m).abs() < CAMERA_ROUNDING * own.spacing_m;
+        is_alike && places.into_iter().all(|(pixel, planar_depth_m)| is_near(pixel, planar_depth_m))
+    }
+
     /// The camera of the lines along an axis, 0 to 2, which looks against the axis. Its columns rise along the next axis, and
     /// its rows fall along the one after that.
     #[must_use]
@@ -84,10 +122,7 @@ impl CubeGrid {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec2;
-
     use super::*;
-    use crate::PixelDepth;
 
     #[test]
     fn cameras_see_each_other_s_points_in_one_grid() {
@@ -102,6 +137,27 @@ mod tests {
             assert!((depth - place[axis]).abs() < 1e-3, "{axis}: {depth}");
             assert!((pixel.x - place[columns]).abs() < 1e-3, "{axis}: {pixel}");
             assert!((grid.size[rows] as f32 - pixel.y - place[rows]).abs() < 1e-3, "{axis}: {pixel}");
+        }
+    }
+
+    #[test]
+    fn a_grid_is_known_by_its_three_cameras_alone() {
+        let turned = Quat::from_rotation_y(0.4) * Quat::from_rotation_x(0.2);
+        for world_from_cube in [Quat::IDENTITY, turned] {
+            let grid = CubeGrid { world_from_cube, ..CubeGrid::around(&bounds(), 512).unwrap() };
+            let cameras = [0, 1, 2].map(|axis| grid.camera(axis));
+            let known = CubeGrid::of_cameras(&cameras).unwrap();
+            assert_eq!((known.size, known.spacing_m), (grid.size, grid.spacing_m));
+            assert!((0..3).all(|axis| known.has_camera(axis, &cameras[axis])));
+            let [x, y, z] = cameras;
+            assert_eq!(CubeGrid::of_cameras(&[x, z, y]), None);
+            assert_eq!(CubeGrid::of_cameras(&[x, y]), None);
+            let moved = ParallelCamera { corner_in_world: z.corner_in_world + Vec3::X * (0.1 * z.spacing_m), ..z };
+            let shorter = ParallelCamera { range_m: 0.9 * z.range_m, ..z };
+            let twisted = ParallelCamera { world_from_camera: z.world_from_camera * Quat::from_rotation_z(1e-3), ..z };
+            for other in [moved, shorter, twisted, ParallelCamera { corner_in_world: Vec3::NAN, ..z }] {
+                assert_eq!(CubeGrid::of_cameras(&[x, y, other]), None);
+            }
         }
     }
 

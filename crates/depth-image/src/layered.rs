@@ -1,6 +1,6 @@
 //! Layered depth images: all surfaces on each line of a parallel camera, not only the first.
 
-use glam::Vec3;
+use glam::{UVec2, Vec3};
 
 use crate::{CameraError, ParallelCamera, SpecularPlanes};
 
@@ -47,6 +47,10 @@ pub enum LayeredError {
         "sample {layer} of line {line} of a layered image has depth {depth_m} m, must not be nearer than the one before, nor beyond {range_m} m"
     )]
     Depth { line: usize, layer: usize, depth_m: f32, range_m: f32 },
+    #[error("tile {tile} of a layered image has {given} lines, the image's has {expected}")]
+    Tile { tile: usize, given: UVec2, expected: UVec2 },
+    #[error("tiles of a layered image have visibility of different lamps")]
+    MixedTiles,
 }
 
 impl LayeredDepthImage {
@@ -126,7 +130,7 @@ impl LayeredDepthImage {
 
 #[cfg(test)]
 mod tests {
-    use glam::{Quat, UVec2};
+    use glam::Quat;
 
     use super::*;
 

@@ -1,12 +1,13 @@
 //! The parallel camera: its rays are lines of one direction, a spacing apart.
 
 use glam::{Mat3A, Quat, UVec2, Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 
 use crate::{CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray, ViewPart};
 
 /// A camera of parallel lines. Planar depth is the distance from its reference plane; planes are linear in depth, not in inverse
 /// depth.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ParallelCamera {
     /// The corner of the first pixel, on the reference plane.
     pub corner_in_world: Vec3,

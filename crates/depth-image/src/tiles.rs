@@ -2,7 +2,10 @@
 
 use glam::UVec2;
 
-use crate::{Camera, DepthImage, DepthImageError, SpecularPlanes, ViewPart};
+use crate::{
+    Camera, DepthImage, DepthImageError, LayeredDepthImage, LayeredError, ParallelCamera, SampleCamera, SpecularPlanes,
+    ViewPart,
+};
 
 /// Tiles that do not form an image; `tile` counts from the top.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -21,11 +24,64 @@ impl Camera {
     /// The camera of tile number `tile`, from the top, of `count`. With fewer rows than tiles, some tiles are empty.
     #[must_use]
     pub fn tile(&self, tile: u32, count: u32) -> Self {
-        let size_px = self.size_px();
-        let row = |i: u32| (u64::from(i) * u64::from(size_px.y) / u64::from(count.max(1))) as u32;
-        let (first, end) = (row(tile), row(tile + 1));
-        self.part(&ViewPart { first_px: UVec2::new(0, first), size_px: UVec2::new(size_px.x, end - first) })
+        self.part(&part(self.size_px(), tile, count))
     }
+}
+
+impl SampleCamera {
+    /// The camera of tile number `tile`, from the top, of `count`. With fewer rows than tiles, some tiles are empty.
+    #[must_use]
+    pub fn tile(&self, tile: u32, count: u32) -> Self {
+        match self {
+            Self::Depth(camera) => Self::Depth(camera.tile(tile, count)),
+            Self::Layered(camera) => Self::Layered(camera.part(&part(camera.size_px, tile, count))),
+        }
+    }
+}
+
+/// The rows of a tile.
+fn part(size_px: UVec2, tile: u32, count: u32) -> ViewPart {
+    let row = |i: u32| (u64::from(i) * u64::from(size_px.y) / u64::from(count.max(1))) as u32;
+    let (first, end) = (row(tile), row(tile + 1));
+    ViewPart { first_px: UVec2::new(0, first), size_px: UVec2::new(size_px.x, end - first) }
+}
+
+impl LayeredDepthImage {
+    /// Joins tiles, from the top, to one image.
+    ///
+    /// # Errors
+    /// Tiles of other sizes, and planes that are not those of their lines.
+    pub fn from_tiles(camera: ParallelCamera, tiles: &[Self]) -> Result<Self, LayeredError> {
+        for (number, tile) in tiles.iter().enumerate() {
+            let expected = part(camera.size_px, number as u32, tiles.len() as u32).size_px;
+            if tile.camera.size_px != expected {
+                return Err(LayeredError::Tile { tile: number, given: tile.camera.size_px, expected });
+            }
+            tile.validate()?;
+        }
+        let concat = |plane: fn(&Self) -> &[u32]| tiles.iter().flat_map(|tile| plane(tile).iter().copied()).collect();
+        let firsts = tiles.iter().scan(0, |before, tile| {
+            let first = *before;
+            *before += tile.sample_count() as u32;
+            Some(tile.first[..tile.first.len() - 1].iter().map(move |line| first + line))
+        });
+        let samples = tiles.iter().map(|tile| tile.sample_count() as u32).sum();
+        Ok(Self {
+            camera,
+            first: firsts.flatten().chain([samples]).collect(),
+            planar_depth_m: tiles.iter().flat_map(|tile| tile.planar_depth_m.iter().copied()).collect(),
+            plane_normal_oct8: tiles.iter().flat_map(|tile| tile.plane_normal_oct8.iter().copied()).collect(),
+            color_rgb9e5: concat(|tile| &tile.color_rgb9e5),
+            normal_oct16: filled(tiles, Self::sample_count, |tile| tile.normal_oct16.as_deref()),
+            specular: layered_specular(tiles)?,
+            truncated: tiles.iter().any(|tile| tile.truncated),
+        })
+    }
+}
+
+fn layered_specular(tiles: &[LayeredDepthImage]) -> Result<Option<SpecularPlanes>, LayeredError> {
+    let specular = tiles.iter().map(|tile| (tile.sample_count(), tile.specular.as_ref()));
+    specular_of(specular.collect()).ok_or(LayeredError::MixedTiles)
 }
 
 impl DepthImage {
@@ -48,8 +104,8 @@ impl DepthImage {
             inverse_depth_per_m: concat(&tiles, |tile| &tile.inverse_depth_per_m),
             color_rgb9e5: concat(&tiles, |tile| &tile.color_rgb9e5),
             surface_id: joined(&tiles, "surface_id", |tile| tile.surface_id.as_deref())?,
-            normal_oct16: filled(&tiles, |tile| tile.normal_oct16.as_deref()),
-            passed: filled(&tiles, |tile| tile.passed.as_deref()),
+            normal_oct16: filled(&tiles, texel_count, |tile| tile.normal_oct16.as_deref()),
+            passed: filled(&tiles, texel_count, |tile| tile.passed.as_deref()),
             specular: specular(&tiles)?,
             corner_inverse_depth_per_m: corners.map(|_| shared_corners(&tiles)),
         })
@@ -75,24 +131,40 @@ fn joined<T: Copy>(
 }
 
 /// Joins a plane that a tile lacks where all of it would be zero.
-fn filled<T: Copy + Default>(tiles: &[DepthImage], plane: impl Fn(&DepthImage) -> Option<&[T]>) -> Option<Vec<T>> {
+fn filled<I, T: Copy + Default>(
+    tiles: &[I],
+    len: impl Fn(&I) -> usize,
+    plane: impl Fn(&I) -> Option<&[T]>,
+) -> Option<Vec<T>> {
     tiles.iter().any(|tile| plane(tile).is_some()).then(|| {
-        let zeros = |tile: &DepthImage| vec![T::default(); tile.size_px().element_product() as usize];
-        let of = |tile: &DepthImage| plane(tile).map_or_else(|| zeros(tile), <[T]>::to_vec);
+        let zeros = |tile: &I| vec![T::default(); len(tile)];
+        let of = |tile: &I| plane(tile).map_or_else(|| zeros(tile), <[T]>::to_vec);
         tiles.iter().flat_map(of).collect()
     })
 }
 
-/// Joins the inputs of highlights. A tile without highlights has no visibility either.
+fn texel_count(tile: &DepthImage) -> usize {
+    tile.size_px().element_product() as usize
+}
+
+/// Joins the inputs of highlights.
 fn specular(tiles: &[DepthImage]) -> Result<Option<SpecularPlanes>, TileError> {
-    let mut counts = tiles.iter().filter_map(|tile| tile.specular.as_ref()).map(|s| s.visibility8.len());
-    let Some(count) = counts.next() else { return Ok(None) };
+    let specular = tiles.iter().map(|tile| (texel_count(tile), tile.specular.as_ref()));
+    specular_of(specular.collect()).ok_or(TileError::Mixed { plane: "visibility" })
+}
+
+/// Joins the inputs of highlights of tiles, whose lengths are known. A tile without highlights has no visibility either. `None` for
+/// tiles of different lamps.
+fn specular_of(tiles: Vec<(usize, Option<&SpecularPlanes>)>) -> Option<Option<SpecularPlanes>> {
+    let mut counts = tiles.iter().filter_map(|(_, specular)| Some(specular.as_ref()?.visibility8.len()));
+    let Some(count) = counts.next() else { return Some(None) };
     if counts.any(|other| other != count) {
-        return Err(TileError::Mixed { plane: "visibility" });
+        return None;
     }
-    let reflectance = filled(tiles, |tile| Some(tile.specular.as_ref()?.reflectance_srgb8_roughness8.as_slice()));
-    let visibility = |number: usize| filled(tiles, |tile| Some(tile.specular.as_ref()?.visibility8[number].as_slice()));
-    Ok(Some(SpecularPlanes {
+    let len = |tile: &(usize, Option<&SpecularPlanes>)| tile.0;
+    let reflectance = filled(&tiles, len, |tile| Some(tile.1?.reflectance_srgb8_roughness8.as_slice()));
+    let visibility = |number: usize| filled(&tiles, len, |tile| Some(tile.1?.visibility8[number].as_slice()));
+    Some(Some(SpecularPlanes {
         reflectance_srgb8_roughness8: reflectance.unwrap_or_default(),
         visibility8: (0..count).filter_map(visibility).collect(),
     }))

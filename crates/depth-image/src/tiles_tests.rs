@@ -67,3 +67,70 @@ fn tiles_that_do_not_fit_are_refused_by_number() {
     mixed[2].corner_inverse_depth_per_m = None;
     assert!(matches!(DepthImage::from_tiles(camera(), mixed), Err(TileError::Mixed { .. })));
 }
+
+/// Lines of one to three samples, each of which encodes its line.
+fn layered(camera: ParallelCamera) -> LayeredDepthImage {
+    let line = |row: u32, column: u32| {
+        let ray = camera.ray(UVec2::new(column, row).as_vec2() + 0.5);
+        (ray.origin_in_world.dot(Vec3::new(3.0, 5.0, 7.0)) * 1000.0).round() as u32
+    };
+    let lines: Vec<u32> =
+        (0..camera.size_px.y).flat_map(|row| (0..camera.size_px.x).map(move |column| line(row, column))).collect();
+    let count = |line: &u32| line % 3 + 1;
+    let samples: Vec<u32> = lines.iter().flat_map(|line| (0..count(line)).map(move |layer| 8 * line + layer)).collect();
+    let first = lines.iter().scan(0, |next, line| Some(std::mem::replace(next, *next + count(line))));
+    LayeredDepthImage {
+        camera,
+        first: first.chain([samples.len() as u32]).collect(),
+        planar_depth_m: samples.iter().map(|sample| (sample % 8) as f32).collect(),
+        plane_normal_oct8: samples.iter().map(|&sample| sample as u16).collect(),
+        color_rgb9e5: samples.clone(),
+        normal_oct16: Some(samples.iter().map(|sample| sample ^ 1).collect()),
+        specular: Some(SpecularPlanes {
+            reflectance_srgb8_roughness8: samples.iter().map(|sample| sample ^ 2).collect(),
+            visibility8: vec![samples; 2],
+        }),
+        truncated: false,
+    }
+}
+
+fn parallel_camera() -> ParallelCamera {
+    ParallelCamera {
+        corner_in_world: Vec3::splat(20.0),
+        world_from_camera: glam::Quat::IDENTITY,
+        spacing_m: 0.25,
+        size_px: UVec2::new(5, 9),
+        range_m: 4.0,
+    }
+}
+
+fn layered_tiles(count: u32) -> Vec<LayeredDepthImage> {
+    let tile = |tile| *SampleCamera::Layered(parallel_camera()).tile(tile, count).layered().unwrap();
+    (0..count).map(|number| layered(tile(number))).collect()
+}
+
+#[test]
+fn joined_tiles_equal_the_layered_image() {
+    let whole = layered(parallel_camera());
+    for count in 1..=9 {
+        let joined = LayeredDepthImage::from_tiles(parallel_camera(), &layered_tiles(count)).unwrap();
+        assert_eq!((joined.validate(), joined), (Ok(()), whole.clone()), "{count} tiles");
+    }
+}
+
+#[test]
+fn layered_tiles_that_do_not_fit_are_refused_and_missing_highlights_are_zeros() {
+    let mut swapped = layered_tiles(4);
+    swapped.swap(0, 3);
+    let joined = LayeredDepthImage::from_tiles(parallel_camera(), &swapped);
+    assert!(matches!(joined, Err(LayeredError::Tile { tile: 0, .. })));
+    let mut tiles = layered_tiles(3);
+    (tiles[0].specular, tiles[0].normal_oct16, tiles[0].truncated) = (None, None, true);
+    let joined = LayeredDepthImage::from_tiles(parallel_camera(), &tiles).unwrap();
+    assert_eq!((joined.validate(), joined.truncated), (Ok(()), true));
+    let specular = joined.specular.unwrap();
+    let of_first = tiles[0].sample_count();
+    assert!(specular.visibility8[1][..of_first].iter().all(|&visibility| visibility == 0));
+    tiles[1].specular.as_mut().unwrap().visibility8.pop();
+    assert_eq!(LayeredDepthImage::from_tiles(parallel_camera(), &tiles), Err(LayeredError::MixedTiles));
+}

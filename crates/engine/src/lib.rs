@@ -7,7 +7,7 @@ use std::sync::{Arc, Weak};
 
 use bands::{BAND_PIXELS, views_in_bands};
 use cluster::{DIRECT, SamplePlanes};
-use depth_image::{Aabb, DepthImage, View};
+use depth_image::{Aabb, Camera, SampleCamera, SampleImage, SampleImages, View};
 use gpu::{DevicePreference, Gpu, GpuError};
 use node::{
     DirectWork, Engine, EngineError, MirrorSet, OpenEngine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
@@ -193,12 +193,6 @@ impl Engine for GpuEngine {
             return Ok(SamplePlanes::default());
         }
         let method: ReconstructionMethod = parsed("reconstruction_method", method)?;
-        if method.walks_cube() {
-            return Err(invalid(
-                "reconstruction_method",
-                format!("{method} needs a layered cube, which clusters do not sample yet"),
-            ));
-        }
         let RequiredPlanes { normal, corner_inverse_depth } = method.required_planes();
         Ok(SamplePlanes { normals: normal, corner_inverse_depths: corner_inverse_depth })
     }
@@ -211,7 +205,7 @@ impl Engine for GpuEngine {
         gpu::take_waited_s()
     }
 
-    fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError> {
+    fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<SampleImage>, EngineError> {
         let scene = self.scene(&request.scene_hash)?;
         let cluster::Refinement { step, steps } = request.refinement;
         let lighting: Lighting = parsed("lighting", &request.lighting)?;
@@ -221,16 +215,24 @@ impl Engine for GpuEngine {
             refinement: Refinement { step, steps },
             ..draw_work(&scene, lighting, request.scene_time_s, turn)
         };
+        let method: SamplingMethod = parsed("sampling_method", &request.sampling)?;
+        if request.cameras.iter().any(|camera| camera.layered().is_some()) {
+            let lines = request.wanted.iter().filter_map(|&wanted| request.cameras.get(wanted as usize)?.layered());
+            let image = |camera| self.sampler.sample_layers(draw, camera, method).map(SampleImage::Layered);
+            return self.catching(|| lines.map(image).collect::<Result<_, _>>().map_err(sampling_error));
+        }
+        let cameras: Vec<Camera> = request.cameras.iter().filter_map(SampleCamera::depth).copied().collect();
         let SamplePlanes { normals: normal, corner_inverse_depths: corners } = request.planes;
         let work = sampling::SampleWork {
             draw,
-            cameras: &request.cameras,
+            cameras: &cameras,
             wanted: &request.wanted,
-            method: parsed("sampling_method", &request.sampling)?,
+            method,
             planes: render::SamplePlanes { specular: true, normal, corners, ..Default::default() },
             temporal_reference_s: request.temporal_reference_s,
         };
-        self.catching(|| self.sampler.sample(&work).map_err(sampling_error))
+        let images = self.catching(|| self.sampler.sample(&work).map_err(sampling_error))?;
+        Ok(images.into_iter().map(SampleImage::Depth).collect())
     }
 
     fn upload(&self, set: &SampleSet, turn: Turn) -> Result<SharedSet, EngineError> {
@@ -250,7 +252,13 @@ impl Engine for GpuEngine {
             environment: environment.as_ref(),
             mips: set.is_mirror,
         };
-        let upload = || self.reconstructor.upload_in_turn(&set.images, &description, device_turn(turn));
+        let turn = device_turn(turn);
+        let upload = || match &set.images {
+            SampleImages::Depth(images) => self.reconstructor.upload_in_turn(images, &description, turn),
+            SampleImages::Cube(grid, images) => {
+                self.reconstructor.upload_cube_in_turn(grid, images, &description, turn)
+            }
+        };
         let set = self.catching(|| upload().map_err(reconstruction_error))?;
         Ok(Arc::new(Uploaded { set: Arc::new(set), reflections: lighting.reflections(), mirrors: Vec::new() }))
     }
@@ -340,7 +348,8 @@ fn parsed<T: FromStr<Err: ToString>>(field: &'static str, text: &str) -> Result<
 fn sampling_error(error: SamplingError) -> EngineError {
     match error {
         SamplingError::Render(error) => render_error(error),
-        SamplingError::Layer { .. } => invalid("sample_cameras", error),
+        SamplingError::Layer { .. } | SamplingError::Lines { .. } => invalid("sample_cameras", error),
+        SamplingError::Cameras { .. } => invalid("sampling_method", error),
         SamplingError::Selection { .. } => invalid("image_indices", error),
     }
 }

@@ -1,7 +1,9 @@
 //! The exposure of sessions that leave it to the plan.
 
-use cluster::Workload;
-use depth_image::{ExposureEv, PinholeCamera, ToneCurve, ToneMapping, View, ViewCell, ViewPlanes, linear_from_srgb8};
+use cluster::{MeasureCosts, Workload};
+use depth_image::{
+    ExposureEv, PinholeCamera, SampleCamera, ToneCurve, ToneMapping, View, ViewCell, ViewPlanes, linear_from_srgb8,
+};
 use glam::{UVec2, Vec2};
 
 use crate::engine::{DirectWork, Engine, EngineError, Turn};
@@ -26,10 +28,12 @@ const STEPS_PER_EV: f32 = 100.0;
 /// Enough for each way through the limits, and a refinement.
 const MOST_PICTURES: usize = 6;
 
-/// Measures the exposure of a workload on the view in the middle of its first view cell, drawn from the scene at its start.
-/// It is 0 where that view shows no surface.
-pub(crate) fn auto_exposure(engine: &dyn Engine, workload: &Workload, turn: Turn) -> Result<ExposureEv, EngineError> {
-    let Some(camera) = default_view(workload) else { return Ok(ExposureEv::ZERO) };
+/// Measures the exposure of a workload on the view in the middle of its first view cell, drawn from the scene at its start; without
+/// view cells, on the first typical view. It is 0 where that view shows no surface.
+pub(crate) fn auto_exposure(engine: &dyn Engine, asked: &MeasureCosts, turn: Turn) -> Result<ExposureEv, EngineError> {
+    let workload = &asked.workload;
+    let typical_view = || asked.typical_views.first().map(|view| view.resized(SIZE_PX));
+    let Some(camera) = default_view(workload).or_else(typical_view) else { return Ok(ExposureEv::ZERO) };
     exposure_of(|exposure| {
         let tone = ToneMapping { exposure, curve: ToneCurve::None };
         let planes = ViewPlanes { tone, ..ViewPlanes::WITH_DEPTH };
@@ -70,8 +74,7 @@ fn limited(ev: f32) -> ExposureEv {
 /// The view in the middle of the first view cell.
 fn default_view(workload: &Workload) -> Option<PinholeCamera> {
     let cameras = workload.sample_cameras.get(workload.cameras_of_cell(0)?)?;
-    let cameras: Vec<PinholeCamera> = cameras.iter().map(|camera| *camera.reference()).collect();
-    Some(ViewCell::between(&cameras)?.camera_at(Vec2::ZERO, SIZE_PX))
+    Some(ViewCell::between(&SampleCamera::references(cameras))?.camera_at(Vec2::ZERO, SIZE_PX))
 }
 
 /// The percentile of the surfaces' brightest channels in linear light; `None` without surfaces. Light of one colour is cut

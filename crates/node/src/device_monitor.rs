@@ -5,7 +5,7 @@ use std::any::Any;
 use std::sync::Arc;
 
 use cluster::SamplePlanes;
-use depth_image::{DepthImage, PinholeCamera, View};
+use depth_image::{PinholeCamera, SampleImage, View};
 use parking_lot::Mutex;
 use tokio::sync::watch;
 
@@ -146,7 +146,7 @@ impl Engine for DeviceMonitor {
         self.engine.take_waited_s()
     }
 
-    fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError> {
+    fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<SampleImage>, EngineError> {
         let sample = || self.engine.sample(request, turn);
         self.relieved(sample, sample)
     }

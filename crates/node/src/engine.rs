@@ -6,7 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use cluster::{Refinement, SamplePlanes, Workload};
-use depth_image::{Aabb, Camera, DepthImage, Environment, Illumination, PinholeCamera, View, ViewPlanes};
+use depth_image::{
+    Aabb, Environment, Illumination, PinholeCamera, SampleCamera, SampleImage, SampleImageError, SampleImages, View,
+    ViewPlanes,
+};
 use tonic::Status;
 
 /// The urgency of work on a device, which the nodes of a process share.
@@ -76,7 +79,7 @@ pub trait Engine: Send + Sync + 'static {
         0.0
     }
     /// Samples the wanted images of a set, in their order.
-    fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<DepthImage>, EngineError>;
+    fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<SampleImage>, EngineError>;
     /// Uploads a set for reconstruction. Fails for images that the device cannot take.
     fn upload(&self, set: &SampleSet, turn: Turn) -> Result<SharedSet, EngineError>;
     /// A set whose mirrors show what the sets of mirror cells hold, each with the bounds of its mirrors. It keeps these sets on
@@ -130,7 +133,7 @@ pub type MirrorSet = (Aabb, SharedSet);
 pub struct SampleWork {
     pub scene_hash: String,
     /// The cameras of the whole set, in its order: an image may depend on the cameras before its own.
-    pub cameras: Vec<Camera>,
+    pub cameras: Vec<SampleCamera>,
     /// Indices of the cameras to sample.
     pub wanted: Vec<u32>,
     pub sampling: String,
@@ -168,7 +171,7 @@ pub struct SampleSet {
     /// The scene, whose environment map views show and highlights mirror; it must be loaded where there is one.
     pub scene_hash: String,
     /// One image for each sample camera, in their order.
-    pub images: Vec<DepthImage>,
+    pub images: SampleImages,
     /// The bounds of reconstruction.
     pub volume: Aabb,
     /// Radiance of rays that leave the scene, by their direction.
@@ -183,17 +186,19 @@ pub struct SampleSet {
 
 impl SampleSet {
     /// A set of a workload of one cell.
-    #[must_use]
-    pub fn of(workload: &Workload, images: Vec<DepthImage>, is_mirror: bool) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// Images that do not belong together.
+    pub fn of(workload: &Workload, images: Vec<SampleImage>, is_mirror: bool) -> Result<Self, SampleImageError> {
+        Ok(Self {
             scene_hash: workload.scene.hash.to_string(),
-            images,
+            images: images.try_into()?,
             volume: workload.volume,
             background: workload.background,
             illumination: workload.illumination.clone(),
             lighting: workload.lighting.clone(),
             is_mirror,
-        }
+        })
     }
 }
 

@@ -39,7 +39,7 @@ pub use port::Port;
 pub use scenes::Scenes;
 pub use server::{DRAIN, MAX_STREAMS, ServeError, health, serve, with_reflection};
 pub use service::NodeService;
-pub use set_bytes::{most_image_bytes, most_set_bytes, set_bytes};
+pub use set_bytes::{depth_images_bytes, most_image_bytes, most_set_bytes, set_bytes};
 pub use set_memory::SetMemory;
 pub use streams::{next_within, until_drained, with_guard};
 pub use telemetry::{NodeMetrics, Reason, Telemetry, init_logging};

@@ -4,9 +4,9 @@
 use std::fmt::Display;
 
 use cluster::{Costs, DIRECT, MeasureCosts, Measured, ROW_PARTS, TileCosts, Workload};
-use codec::{DecodeLimits, EncodedDepthImage, FrameCodec, PlaneSet};
-use codec::{decode_depth_image, encode_depth_image, encode_view};
-use depth_image::{Camera, DepthImage, PinholeCamera, View};
+use codec::{DecodeLimits, EncodedImage, FrameCodec};
+use codec::{decode_sample_image, encode_sample_image, encode_view};
+use depth_image::{PinholeCamera, SampleCamera, SampleImage, View};
 use glam::UVec2;
 use tonic::Status;
 
@@ -74,7 +74,8 @@ impl Measurement<'_> {
         let sampled = cells.iter().enumerate().map(|cell| self.timed(|| self.sampled(&sample(cell))));
         let (encoded, cells_s): (Vec<_>, Vec<f64>) = sampled.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let upload = |(number, (cell, images)): (usize, (&Workload, &Vec<_>))| {
-            let set = SampleSet::of(cell, decoded(cell, images)?, workload.mirror_cell(number).is_some());
+            let is_mirror = workload.mirror_cell(number).is_some();
+            let set = SampleSet::of(cell, decoded(cell, images)?, is_mirror).map_err(codec)?;
             Ok(engine.upload(&set, self.turn)?)
         };
         let upload_all = || cells.iter().zip(&encoded).enumerate().map(upload).collect::<Result<Vec<_>, Status>>();
@@ -97,13 +98,13 @@ impl Measurement<'_> {
         let in_order = engine.images_are_sequential(&workload.sampling)?;
         let costs =
             Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles };
-        Ok(Measured { costs, planes, auto_exposure: auto_exposure(engine, workload, self.turn)? })
+        Ok(Measured { costs, planes, auto_exposure: auto_exposure(engine, request, self.turn)? })
     }
 
     /// Images as they leave a sampler, which encodes one set before it samples the next.
-    fn sampled(&self, work: &SampleWork) -> Result<Vec<EncodedDepthImage>, Status> {
+    fn sampled(&self, work: &SampleWork) -> Result<Vec<EncodedImage>, Status> {
         let images = self.engine.sample(work, self.turn)?;
-        images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL).map_err(codec)).collect()
+        images.iter().map(|image| encode_sample_image(image).map_err(codec)).collect()
     }
 
     /// The overhead of a tile, measured on a tile of one row, and the shares of rows, measured on quarters of the height.
@@ -113,7 +114,7 @@ impl Measurement<'_> {
         if whole.cameras.iter().any(|camera| (camera.size_px().y as usize) < ROW_PARTS) {
             return Ok(None);
         }
-        let tile_s = |camera: Camera| {
+        let tile_s = |camera: SampleCamera| {
             let work = SampleWork { cameras: vec![camera], wanted: vec![0], ..whole.clone() };
             Ok::<f64, Status>(self.timed(|| self.sampled(&work))?.1)
         };
@@ -195,10 +196,10 @@ fn direct_views(alone_s: f64, most: u32) -> u32 {
     ((DIRECT_CALL_S / alone_s) as u32).clamp(1, most.max(1))
 }
 
-fn decoded(workload: &Workload, encoded: &[EncodedDepthImage]) -> Result<Vec<DepthImage>, Status> {
+fn decoded(workload: &Workload, encoded: &[EncodedImage]) -> Result<Vec<SampleImage>, Status> {
     let limits = DecodeLimits::default();
-    let decode = |(image, camera): (&EncodedDepthImage, &Camera)| {
-        decode_depth_image(&image.header, *camera, &image.payload, &limits).map_err(codec)
+    let decode = |(image, camera): (&EncodedImage, &SampleCamera)| {
+        decode_sample_image(&image.header, camera, &image.payload, &limits).map_err(codec)
     };
     encoded.iter().zip(&workload.sample_cameras).map(decode).collect()
 }

@@ -38,11 +38,11 @@ fn camera() -> PinholeCamera {
     PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::splat(4))
 }
 
-fn image(camera: &Camera) -> DepthImage {
+fn image(camera: &SampleCamera) -> SampleImage {
     let size_px = camera.size_px();
     let texels = size_px.element_product() as usize;
     DepthImage {
-        camera: *camera,
+        camera: *camera.depth().expect("a camera of a view"),
         inverse_depth_per_m: vec![0.5; texels],
         color_rgb9e5: vec![0; texels],
         normal_oct16: Some(vec![0; texels]),
@@ -51,6 +51,7 @@ fn image(camera: &Camera) -> DepthImage {
         passed: None,
         corner_inverse_depth_per_m: None,
     }
+    .into()
 }
 
 fn views(cameras: &[PinholeCamera]) -> Vec<View> {
@@ -64,9 +65,10 @@ fn views(cameras: &[PinholeCamera]) -> Vec<View> {
 }
 
 impl Sleeper {
-    fn sample_parts_s(&self, part: &Camera) -> f64 {
+    fn sample_parts_s(&self, part: &SampleCamera) -> f64 {
         let Some((image_s, rows_s)) = self.parts_s else { return 0.0 };
-        let first = (camera().principal_px.y - part.reference().principal_px.y) as usize;
+        let first =
+            (camera().principal_px.y - part.depth().expect("a camera of a view").reference().principal_px.y) as usize;
         image_s + rows_s[first..first + part.size_px().y as usize].iter().sum::<f64>()
     }
 }
@@ -100,7 +102,7 @@ impl Engine for Sleeper {
         Ok(SamplePlanes { normals: true, ..SamplePlanes::default() })
     }
 
-    fn sample(&self, request: &SampleWork, _: Turn) -> Result<Vec<DepthImage>, EngineError> {
+    fn sample(&self, request: &SampleWork, _: Turn) -> Result<Vec<SampleImage>, EngineError> {
         self.calls.lock().unwrap().refinements.push(request.refinement);
         let parts_s: f64 = request.cameras.iter().map(|camera| self.sample_parts_s(camera)).sum();
         std::thread::sleep(Duration::from_secs_f64(self.sample_s + parts_s));
@@ -108,7 +110,7 @@ impl Engine for Sleeper {
     }
 
     fn upload(&self, set: &SampleSet, _: Turn) -> Result<SharedSet, EngineError> {
-        let shiny = set.images.iter().all(|image| image.specular.is_some());
+        let shiny = set.images.depth().iter().all(|image| image.specular.is_some());
         self.calls.lock().unwrap().uploads.push((set.illumination.clone(), shiny));
         Ok(Arc::new(Nothing))
     }
@@ -137,7 +139,7 @@ pub(crate) fn request(batch_count: u32) -> MeasureCosts {
     let lamp = depth_image::Light::Point { position_in_world: Vec3::Y, intensity_linear: Vec3::ONE, radius_m: 0.1 };
     let workload = Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
-        sample_cameras: vec![Camera::Pinhole(camera()); 2],
+        sample_cameras: vec![camera().into(); 2],
         cell_first_indices: Vec::new(),
         mirror_cells: Vec::new(),
         sampling: "conventional".to_owned(),
@@ -181,7 +183,7 @@ fn costs_of_views_with_mirrors_are_those_of_all_their_images() {
     let bounds = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
     let mirror = cluster::MirrorCell { bounds, sampling: "conventional".to_owned() };
     let plain = request(32);
-    let workload = plain.workload.clone().with_mirrors(vec![(mirror, vec![Camera::Pinhole(camera()); 6])]);
+    let workload = plain.workload.clone().with_mirrors(vec![(mirror, vec![camera().into(); 6])]);
     let engine = Sleeper { sample_s: 0.04, ..Sleeper::default() };
     let costs = measure_costs(&engine, &MeasureCosts { workload, ..plain }).unwrap().costs;
     let calls = engine.calls.into_inner().unwrap();

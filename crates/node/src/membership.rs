@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use cluster::{Assignment, JoinCluster, NodeStatus, Policy, Welcome, Workload};
-use depth_image::{Camera, ViewPlanes};
-use glam::UVec2;
+use depth_image::{CubeGrid, PinholeCamera, SampleCamera, ViewPlanes};
+use glam::{UVec2, Vec3};
 use tokio_stream::StreamExt as _;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
@@ -136,13 +136,14 @@ async fn do_a_little(client: &CoordinatorClient, scenes: &Scenes, plans: &PlansI
 fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), EngineError> {
     let turn = Turn::of(WorkClass::Batch);
     let workload = small(&plan.workload.of_one_view());
-    let Some(view) = workload.sample_cameras.first().map(|camera| *camera.reference()) else { return Ok(()) };
+    let view = any_view(&workload);
     if plan.policy == Policy::Direct {
         return engine.draw_direct(&DirectWork::of(&workload, vec![view], ViewPlanes::default()), turn).map(drop);
     }
     let upload = |(number, cell): (usize, &Workload)| {
         let (images, is_mirror) = (engine.sample(&SampleWork::of(cell), turn)?, workload.mirror_cell(number).is_some());
-        engine.upload(&SampleSet::of(cell, images, is_mirror), turn)
+        let set = SampleSet::of(cell, images, is_mirror);
+        engine.upload(&set.map_err(|error| EngineError::Device(error.to_string()))?, turn)
     };
     let sets = workload.cells().iter().enumerate().map(upload).collect::<Result<Vec<_>, _>>()?;
     let set = mirroring(engine, &workload, sets)?;
@@ -151,8 +152,21 @@ fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), En
 }
 
 fn small(workload: &Workload) -> Workload {
-    let camera = |camera: &Camera| camera.resized(SIZE_PX);
-    Workload { sample_cameras: workload.sample_cameras.iter().map(camera).collect(), ..workload.clone() }
+    let camera = |camera: &SampleCamera| camera.resized(SIZE_PX);
+    let sample_cameras = match CubeGrid::around(&workload.volume, SIZE_PX.x) {
+        Ok(grid) if workload.samples_cube() => [0, 1, 2].map(|axis| grid.camera(axis).into()).to_vec(),
+        _ => workload.sample_cameras.iter().map(camera).collect(),
+    };
+    Workload { sample_cameras, ..workload.clone() }
+}
+
+/// The view of the first sample camera, or one from outside.
+fn any_view(workload: &Workload) -> PinholeCamera {
+    let outside = || {
+        let (middle, size) = (workload.volume.center(), workload.volume.size());
+        PinholeCamera::looking_at(middle + size.max_element() * Vec3::new(1.0, 0.5, 1.0), middle, Vec3::Y, 0.8, SIZE_PX)
+    };
+    SampleCamera::references(&workload.sample_cameras).first().copied().unwrap_or_else(outside)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use cluster::limits::MAX_WORKLOADS;
 use cluster::{ApplyPlan, Assignment, SetContent, Workload};
-use codec::EncodedDepthImage;
+use codec::EncodedImage;
 use depth_image::Aabb;
 use parking_lot::Mutex;
 use tokio::sync::watch;
@@ -304,7 +304,7 @@ impl Deref for CellPlan {
 
 /// Relays a cell's set as a compositor fetches it: all its images with their indices, in the order they arrive. An error where
 /// they are no longer buffered, and in the stream where their fetch fails.
-pub type Relay = Arc<dyn Fn(&CellPlan, u32) -> Result<Messages<(u32, EncodedDepthImage)>, Status> + Send + Sync>;
+pub type Relay = Arc<dyn Fn(&CellPlan, u32) -> Result<Messages<(u32, EncodedImage)>, Status> + Send + Sync>;
 
 /// The refusal of a set that a plan's timeline does not have.
 pub fn beyond_timeline(set_index: u32) -> Status {
@@ -314,7 +314,7 @@ pub fn beyond_timeline(set_index: u32) -> Status {
 #[cfg(test)]
 pub(crate) mod tests {
     use cluster::{CompositorShare, Policy};
-    use depth_image::Camera;
+    use depth_image::SampleCamera;
     use tonic::Code;
 
     use super::*;
@@ -337,7 +337,7 @@ pub(crate) mod tests {
 
     /// The same workload with other cameras, in another role and policy.
     fn moved(plan: Assignment) -> Assignment {
-        let sample_cameras: Vec<Camera> = plan.workload.sample_cameras.iter().rev().copied().collect();
+        let sample_cameras: Vec<SampleCamera> = plan.workload.sample_cameras.iter().rev().copied().collect();
         let workload = Workload { sample_cameras, cell_first_indices: vec![0], ..plan.workload };
         let share = CompositorShare { node_name: "n".to_owned(), address: "http://n".to_owned(), view_weight: 1 };
         Assignment { workload, policy: Policy::Direct, compositors: vec![share], ..plan }

@@ -1,6 +1,6 @@
 //! The sizes of sample sets in memory, before they are allocated and afterwards.
 
-use depth_image::{Camera, DepthImage, Illumination, SpecularPlanes};
+use depth_image::{DepthImage, Illumination, LayeredDepthImage, SampleCamera, SampleImages, SpecularPlanes};
 
 /// Inverse depth, colour, a normal, a surface, reflectance and a mark, for one texel.
 const MOST_TEXEL_BYTES: usize = 4 + 4 + 4 + 8 + 4 + 1;
@@ -8,40 +8,74 @@ const MOST_TEXEL_BYTES: usize = 4 + 4 + 4 + 8 + 4 + 1;
 const CORNER_BYTES: usize = 4;
 /// The least and the greatest depth of all levels of a pyramid, for one texel: 8 · 4/3.
 const PYRAMID_TEXEL_BYTES: usize = 11;
+/// Depth, a normal of a triangle, colour, a normal and reflectance, for one sample of a layered image.
+const MOST_SAMPLE_BYTES: usize = 4 + 2 + 4 + 4 + 4;
+/// A sample's words, and its entry among those of its voxel, on a device.
+const CUBE_SAMPLE_BYTES: usize = 16 + 16;
+/// The number of a line's first sample.
+const LINE_BYTES: usize = 4;
+/// Samples of a line that are reserved for before they are known, on average over a cube: few scenes have more, and what a set
+/// takes is counted when it is there.
+const EXPECTED_LAYERS: usize = 2;
 
-/// The most bytes of sample images, unpacked, if an image has every plane.
+/// The most bytes of sample images, unpacked, if an image has every plane. Those of layered images are expected.
 #[must_use]
-pub fn most_image_bytes(illumination: &Illumination, cameras: &[Camera]) -> usize {
+pub fn most_image_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -> usize {
     let visibility_bytes = 4 * SpecularPlanes::visibility_planes(illumination.lights.len());
-    let bytes = |camera: &Camera| {
-        let corners = (camera.size_px().x as usize + 1) * (camera.size_px().y as usize + 1);
-        camera.pixel_count() * (MOST_TEXEL_BYTES + visibility_bytes) + corners * CORNER_BYTES
+    let bytes = |camera: &SampleCamera| match camera {
+        SampleCamera::Depth(camera) => {
+            let corners = (camera.size_px().x as usize + 1) * (camera.size_px().y as usize + 1);
+            camera.pixel_count() * (MOST_TEXEL_BYTES + visibility_bytes) + corners * CORNER_BYTES
+        }
+        SampleCamera::Layered(camera) => {
+            camera.pixel_count() * (LINE_BYTES + EXPECTED_LAYERS * (MOST_SAMPLE_BYTES + visibility_bytes))
+        }
     };
     cameras.iter().map(bytes).sum()
 }
 
 /// The most bytes of a set on a device.
 #[must_use]
-pub fn most_set_bytes(illumination: &Illumination, cameras: &[Camera]) -> usize {
-    let texels: usize = cameras.iter().map(Camera::pixel_count).sum();
-    most_image_bytes(illumination, cameras) + texels * PYRAMID_TEXEL_BYTES
+pub fn most_set_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -> usize {
+    let search_bytes = |camera: &SampleCamera| match camera {
+        SampleCamera::Depth(camera) => camera.pixel_count() * PYRAMID_TEXEL_BYTES,
+        SampleCamera::Layered(camera) => camera.pixel_count() * EXPECTED_LAYERS * CUBE_SAMPLE_BYTES,
+    };
+    most_image_bytes(illumination, cameras) + cameras.iter().map(search_bytes).sum::<usize>()
 }
 
 /// Bytes of images on a device, by the planes that they have.
 #[must_use]
-pub fn set_bytes(images: &[DepthImage]) -> usize {
+pub fn set_bytes(images: &SampleImages) -> usize {
+    match images {
+        SampleImages::Depth(images) => depth_images_bytes(images),
+        SampleImages::Cube(_, images) => images.iter().map(layered_bytes).sum(),
+    }
+}
+
+/// Bytes of depth images on a device, by the planes that they have.
+#[must_use]
+pub fn depth_images_bytes(images: &[DepthImage]) -> usize {
     images.iter().map(image_bytes).sum()
 }
 
+fn specular_words(specular: &SpecularPlanes) -> usize {
+    specular.reflectance_srgb8_roughness8.len() * (1 + specular.visibility8.len())
+}
+
+fn layered_bytes(image: &LayeredDepthImage) -> usize {
+    let samples = image.sample_count();
+    let words = image.normal_oct16.as_ref().map_or(0, Vec::len) + image.specular.as_ref().map_or(0, specular_words);
+    samples * CUBE_SAMPLE_BYTES + 4 * words
+}
+
 fn image_bytes(image: &DepthImage) -> usize {
-    let specular =
-        |specular: &SpecularPlanes| specular.reflectance_srgb8_roughness8.len() * (1 + specular.visibility8.len());
     let texels = image.inverse_depth_per_m.len();
     let words = texels
         + image.color_rgb9e5.len()
         + image.normal_oct16.as_ref().map_or(0, Vec::len)
         + image.surface_id.as_ref().map_or(0, |ids| 2 * ids.len())
-        + image.specular.as_ref().map_or(0, specular)
+        + image.specular.as_ref().map_or(0, specular_words)
         + image.corner_inverse_depth_per_m.as_ref().map_or(0, Vec::len);
     4 * words + image.passed.as_ref().map_or(0, Vec::len) + PYRAMID_TEXEL_BYTES * texels
 }
@@ -60,7 +94,7 @@ mod tests {
         let illumination = request(1).workload.illumination;
         let lights = illumination.lights.len();
         let plain = DepthImage {
-            camera: Camera::Pinhole(camera),
+            camera: camera.into(),
             inverse_depth_per_m: vec![0.5; 256],
             color_rgb9e5: vec![0; 256],
             normal_oct16: None,
@@ -69,7 +103,7 @@ mod tests {
             passed: None,
             corner_inverse_depth_per_m: None,
         };
-        assert_eq!(set_bytes(std::slice::from_ref(&plain)), 256 * (4 + 4 + 11));
+        assert_eq!(set_bytes(&SampleImages::Depth(vec![plain.clone()])), 256 * (4 + 4 + 11));
         let specular = SpecularPlanes {
             reflectance_srgb8_roughness8: vec![0; 256],
             visibility8: vec![vec![0; 256]; SpecularPlanes::visibility_planes(lights)],
@@ -83,6 +117,7 @@ mod tests {
             ..plain
         };
         full.validate().unwrap();
-        assert_eq!(set_bytes(&[full.clone(), full]), most_set_bytes(&illumination, &[Camera::Pinhole(camera); 2]));
+        let images = SampleImages::Depth(vec![full.clone(), full]);
+        assert_eq!(set_bytes(&images), most_set_bytes(&illumination, &[camera.into(); 2]));
     }
 }

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use codec::{
-    DecodeError, DecodeLimits, EncodedDepthImage, FrameCodec, FrameError, PlaneSet, decode_depth_image,
-    encode_depth_image, encode_view,
+    DecodeError, DecodeLimits, EncodeError, EncodedImage, FrameCodec, FrameError, decode_depth_image,
+    encode_sample_image, encode_view,
 };
-use depth_image::{DepthImage, DepthImageError, PinholeCamera, View, ViewPlanes};
+use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes};
 use metrics::MetricsError;
 use node::{Engine, EngineError, SampleWork, SharedSet, Turn, ViewWork, own_time};
 use planner::{RowCosts, ViewErrors, median};
@@ -43,7 +43,7 @@ pub enum ProbeError {
     #[error(transparent)]
     Engine(#[from] EngineError),
     #[error("a sample image cannot be encoded: {0}")]
-    Encode(#[from] DepthImageError),
+    Encode(#[from] EncodeError),
     #[error("a sample image cannot be decoded: {0}")]
     Decode(#[from] DecodeError),
     #[error("codec: {0}")]
@@ -237,10 +237,10 @@ impl Prober {
     }
 
     /// Images as they leave a sampler, and g_s.
-    fn encoded(&self, work: &SampleWork) -> Result<(Vec<EncodedDepthImage>, f64), ProbeError> {
+    fn encoded(&self, work: &SampleWork) -> Result<(Vec<EncodedImage>, f64), ProbeError> {
         let (encoded, seconds) = self.own_time(|| {
             let images = self.engine.sample(work, self.turn)?;
-            let encoded = images.iter().map(|image| encode_depth_image(image, PlaneSet::ALL));
+            let encoded = images.iter().map(|image| encode_sample_image(image));
             Ok::<_, ProbeError>(encoded.collect::<Result<Vec<_>, _>>()?)
         });
         let encoded = encoded?;

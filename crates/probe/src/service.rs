@@ -115,10 +115,12 @@ fn add(costs: &mut Costs, own: &RowCosts, share: f64) {
 fn representation(request: &ProbeViews, cell: u32) -> Result<Representation, Status> {
     let workload = request.workload.of_cell(cell as usize);
     let workload = workload.ok_or_else(|| Status::invalid_argument(format!("views: there is no view cell {cell}")))?;
+    let of_views = || Status::invalid_argument("sample_cameras: budgets choose among depth images alone");
+    let sample_cameras = workload.sample_cameras.iter().map(|camera| camera.depth().copied());
     Ok(Representation {
         sampling: workload.sampling,
         method: request.method.clone(),
-        sample_cameras: workload.sample_cameras,
+        sample_cameras: sample_cameras.collect::<Option<_>>().ok_or_else(of_views)?,
     })
 }
 

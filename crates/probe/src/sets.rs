@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use cluster::SamplePlanes;
 use depth_image::{Camera, DepthImage};
-use node::set_bytes;
+use node::depth_images_bytes;
 
 use crate::subject::Light;
 
@@ -50,8 +50,9 @@ impl Sets {
 
     pub(crate) fn keep(&mut self, key: SetKey, set: Arc<SampledSet>) {
         self.newest_last.push((key, set));
-        let bytes =
-            |sets: &[(SetKey, Arc<SampledSet>)]| sets.iter().map(|(_, set)| set_bytes(&set.images)).sum::<usize>();
+        let bytes = |sets: &[(SetKey, Arc<SampledSet>)]| {
+            sets.iter().map(|(_, set)| depth_images_bytes(&set.images)).sum::<usize>()
+        };
         while self.newest_last.len() > 1 && bytes(&self.newest_last) > MAX_BYTES {
             self.newest_last.remove(0);
         }

@@ -1,7 +1,9 @@
 //! The scene, and the viewpoints for which representations are measured.
 
 use cluster::Refinement;
-use depth_image::{Aabb, DepthImage, Environment, Illumination, PinholeCamera, ViewCell, ViewPlanes};
+use depth_image::{
+    Aabb, DepthImage, Environment, Illumination, PinholeCamera, SampleCamera, SampleImages, ViewCell, ViewPlanes,
+};
 use glam::{UVec2, Vec2};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork};
 use planner::ProbeView;
@@ -83,7 +85,7 @@ impl Subject {
     ) -> Result<SampleWork, EngineError> {
         Ok(SampleWork {
             scene_hash: self.scene_hash.clone(),
-            cameras: of.sample_cameras.clone(),
+            cameras: of.sample_cameras.iter().copied().map(SampleCamera::Depth).collect(),
             wanted: (0..of.sample_cameras.len() as u32).collect(),
             sampling: of.sampling.clone(),
             planes: engine.sample_planes(&of.method)?,
@@ -99,7 +101,7 @@ impl Subject {
     pub fn sample_set(&self, images: &[DepthImage], light: Light) -> SampleSet {
         SampleSet {
             scene_hash: self.scene_hash.clone(),
-            images: images.to_vec(),
+            images: SampleImages::Depth(images.to_vec()),
             volume: self.volume,
             background: self.background,
             illumination: self.illumination.clone(),

@@ -102,7 +102,21 @@ impl Reconstructor {
         images: &[LayeredDepthImage; 3],
         set: &SetDescription<'_>,
     ) -> Result<SampleSet, ReconstructionError> {
-        SampleSet::upload_cube(&self.tables, grid, images, set, Turn::default())
+        self.upload_cube_in_turn(grid, images, set, Turn::default())
+    }
+
+    /// As [`Reconstructor::upload_cube`], at its place in the device's order.
+    ///
+    /// # Errors
+    /// As [`Reconstructor::upload_cube`].
+    pub fn upload_cube_in_turn(
+        &self,
+        grid: &CubeGrid,
+        images: &[LayeredDepthImage; 3],
+        set: &SetDescription<'_>,
+        turn: Turn,
+    ) -> Result<SampleSet, ReconstructionError> {
+        SampleSet::upload_cube(&self.tables, grid, images, set, turn)
     }
 
     /// One view a camera, in their order.

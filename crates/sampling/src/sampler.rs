@@ -2,11 +2,16 @@
 
 use std::sync::Arc;
 
-use depth_image::{Camera, DepthImage};
+use depth_image::{Camera, DepthImage, LayeredDepthImage, ParallelCamera};
 use gpu::Gpu;
-use render::{RenderError, Renderer, SamplePlanes};
+use render::{DrawWork, RenderError, Renderer, SamplePlanes};
 
-use crate::{error::SamplingError, methods::templates, temporal_hysteresis::TemporalHysteresis, work::SampleWork};
+use crate::{
+    error::SamplingError,
+    methods::{SamplingMethod, templates},
+    temporal_hysteresis::TemporalHysteresis,
+    work::SampleWork,
+};
 
 /// Takes samples; shares its pipelines with direct rendering.
 pub struct Sampler {
@@ -36,6 +41,20 @@ impl Sampler {
         let reference = self.hysteresis.reference(&self.renderer, work, test)?;
         let SampleWork { draw, cameras, wanted, planes, .. } = *work;
         Ok(self.renderer.draw_image_sequence(draw, cameras, wanted, planes, test, reference.as_ref())?)
+    }
+
+    /// The layered image of a cube's lines.
+    ///
+    /// # Errors
+    /// A method that has none, a camera that is not valid, or the device.
+    pub fn sample_layers(
+        &self,
+        draw: DrawWork<'_>,
+        camera: &ParallelCamera,
+        method: SamplingMethod,
+    ) -> Result<LayeredDepthImage, SamplingError> {
+        let other = || SamplingError::Cameras { method: method.to_string() };
+        Ok(self.renderer.draw_layers(draw, camera, method.layer_selection().ok_or_else(other)?)?)
     }
 }
 

@@ -13,8 +13,8 @@ use cluster::{
 };
 use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
 use depth_image::{
-    Aabb, Antialias, Camera, Environment, ExposureEv, Illumination, Light, MAX_LIGHTS, PinholeCamera, ToneCurve,
-    ToneMapping, ViewPlanes,
+    Aabb, Antialias, Camera, CubeGrid, Environment, ExposureEv, Illumination, Light, MAX_LIGHTS, PinholeCamera,
+    ToneCurve, ToneMapping, ViewPlanes,
 };
 use glam::{DVec3, UVec2, Vec3};
 
@@ -62,7 +62,7 @@ fn illumination() -> Illumination {
 pub(super) fn workload() -> Workload {
     Workload {
         scene: SceneRef { hash: SceneHash::of(b"scene"), package_bytes: 5 },
-        sample_cameras: vec![Camera::Pinhole(camera()); 2],
+        sample_cameras: vec![camera().into(); 2],
         cell_first_indices: Vec::new(),
         mirror_cells: Vec::new(),
         sampling: "conventional".to_owned(),
@@ -185,9 +185,15 @@ fn messages_survive_the_round_trip() {
     assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(cells.clone())), Ok(cells));
     let mut mirrors = assignment();
     let cell = MirrorCell { bounds: mirrors.workload.volume, sampling: "all".to_owned() };
-    mirrors.workload = mirrors.workload.with_mirrors(vec![(cell, vec![Camera::Pinhole(camera())])]);
+    mirrors.workload = mirrors.workload.with_mirrors(vec![(cell, vec![camera().into()])]);
     mirrors.samplers[0].image_indices = vec![0, 1, 2];
     assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(mirrors.clone())), Ok(mirrors));
+    let mut cube = assignment();
+    let grid = CubeGrid::around(&cube.workload.volume, 64).unwrap();
+    cube.workload.sample_cameras = [0, 1, 2].map(|axis| grid.camera(axis).into()).to_vec();
+    cube.workload.timeline = Timeline::still(0.0);
+    cube.samplers[0].image_indices = vec![0, 1, 2];
+    assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(cube.clone())), Ok(cube));
     let apply = ApplyPlan { assignment: assignment(), open_workloads: vec![3, 1] };
     assert_eq!(read::<ApplyPlan, _>(to_message::<proto::ApplyAssignmentRequest, _>(apply.clone())), Ok(apply));
     assert_eq!(read::<SessionRequest, _>(to_message::<proto::OpenSessionRequest, _>(request())), Ok(request()));
@@ -323,7 +329,7 @@ fn a_refusal_names_the_plan_in_force() {
     let refusal = refuse_plan(&assignment(), "plan_epoch 3 is not in force".to_owned());
     assert_eq!((refusal.code(), plan_in_force(&refusal)), (tonic::Code::FailedPrecondition, Some(assignment())));
     let mut large = assignment();
-    large.workload.sample_cameras = vec![Camera::Pinhole(camera()); 16];
+    large.workload.sample_cameras = vec![camera().into(); 16];
     large.workload.illumination.lights = vec![illumination().lights[1]; 255];
     let refusal = refuse_plan(&large, String::new());
     assert!(plan_in_force(&refusal).is_none_or(|named| named == large), "whole or not at all");
@@ -566,7 +572,8 @@ fn zeros_and_empty_texts_of_the_wire_become_none() {
     assert_eq!((message.frames_per_s, message.forced_tile_count), (0.0, 0));
     assert_eq!(read::<SessionRequest, _>(message), Ok(asked));
     let settings = OfferSettings { lighting: Some("unlit".to_owned()), ..OfferSettings::default() };
-    let Workload { scene, sample_cameras, volume, .. } = workload();
+    let Workload { scene, volume, .. } = workload();
+    let sample_cameras = vec![Camera::Pinhole(camera()); 2];
     let name = "scene".to_owned();
     let (origin_in_source, period_s) = (DVec3::X, Some(2.5));
     let offer = OfferStatus { name, scene, sample_cameras, volume, origin_in_source, settings, period_s };

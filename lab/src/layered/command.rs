@@ -12,7 +12,7 @@ use study::{Bar, Check, Report, Table};
 
 use super::subject::Subject;
 use super::views::{self, Figures};
-use super::{cubes, mirrors};
+use super::{cubes, mirrors, viewpoints};
 use crate::failures::stand::Stand;
 use crate::progress::bar;
 
@@ -23,6 +23,10 @@ const SCENES: [&str; 6] = ["courtyard", "tree", "tree-terrain-500k", "grass", "u
 const QUICK: usize = 3;
 const VIEWS: [usize; 2] = [24, 6];
 const LIGHTING: Lighting = Lighting { direct: Direct::Phong, occlusion: None, reflections: None, rate: Rate::Full };
+/// Scenes in which a cube is compared with view cells, by the number of viewpoints.
+const AMONG_VIEWPOINTS: [&str; 2] = ["courtyard", "tree-terrain-500k"];
+/// The bound of bytes sent a sample, in the mean of the scenes.
+const MOST_SENT_B: f64 = 5.5;
 /// The bounds of loads a ray.
 const MOST_LOADS: [(&str, f64); 2] = [("tree", 40.0), ("bird-nest", 30.0)];
 /// PSNR of the views around `courtyard` from a cube of 1024², and of the worst of them.
@@ -30,7 +34,8 @@ const LEAST_PSNR_DB: [f64; 2] = [33.0, 31.5];
 
 /// Samples scenes on the lines along three axes, all surfaces behind one another, and walks through these samples for views from
 /// all around. Compares the views with direct drawing, and with those of joint_carve from depth images near each view. Then follows
-/// rays off mirrors through a cube, up to seven mirrors on a ray's way, and says after how many views the cube is repaid.
+/// rays off mirrors through a cube, up to seven mirrors on a ray's way, and says after how many views the cube is repaid. Last it compares
+/// what a compositor pulls for viewers in many places: one cube, or the images of their view cells.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   myriorama study layered
@@ -60,23 +65,32 @@ pub fn run(args: &LayeredArgs) -> anyhow::Result<Outcome> {
     report.version("myriorama", env!("CARGO_PKG_VERSION"));
     report.parameter("lighting", LIGHTING.to_string());
     let scenes = &SCENES[..if args.quick { QUICK } else { SCENES.len() }];
-    let progress = bar("scenes", scenes.len() * (SIDES.len() + 1));
-    let (mut held, mut seen) = (cubes::table(), views::table());
+    let progress = bar("scenes", scenes.len() * (SIDES.len() + 1) + AMONG_VIEWPOINTS.len());
+    let (mut held, mut seen, mut pulled) = (cubes::table(), views::table(), viewpoints::table());
+    let mut sent_b = Vec::new();
     for &name in scenes {
         let subject = Subject::new(&stand, name, LIGHTING, VIEWS[usize::from(args.quick)])?;
         let images = views::of_images(&subject)?;
         seen.push(images.row(name, "joint_carve"))?;
         progress.inc(1);
         for side in SIDES {
-            let checks = of_side(&subject, side, &images, (&mut held, &mut seen))?;
+            let checks = of_side(&subject, side, &images, (&mut held, &mut seen, &mut sent_b))?;
             report.checks.extend(checks);
             progress.inc(1);
         }
+        if AMONG_VIEWPOINTS.contains(&name) {
+            let (chart, check) = viewpoints::measure(&subject, &mut pulled)?;
+            report.charts.push(chart.into());
+            report.checks.extend(check);
+            progress.inc(1);
+        }
     }
+    let mean_b = sent_b.iter().sum::<f64>() / sent_b.len() as f64;
+    report.checks.push(Check::new("bytes sent a sample, mean of the scenes", mean_b, "B", Bar::AtMost(MOST_SENT_B)));
     progress.finish_and_clear();
     let (mirrors, checks) = mirrors::measure(&stand)?;
     report.checks.extend(checks);
-    report.tables.extend([held, seen, mirrors]);
+    report.tables.extend([held, seen, pulled, mirrors]);
     report.tables.iter().for_each(|table| println!("{}", table.to_text()));
     let holds = report.finish(&args.out)?;
     Ok(Outcome::of(holds || !args.strict))
@@ -87,12 +101,15 @@ fn of_side(
     subject: &Subject<'_>,
     side: u32,
     images: &Figures,
-    (held, seen): (&mut Table, &mut Table),
+    (held, seen, sent_b): (&mut Table, &mut Table, &mut Vec<f64>),
 ) -> anyhow::Result<Vec<Check>> {
     let (cube, mut checks) = match side == SIDES[1] {
         true => cubes::measure(subject, side, held)?,
         false => (subject.cube((side, render::LayerSelection::Dominant), subject.lighting, 1)?, Vec::new()),
     };
+    if side == SIDES[1] {
+        sent_b.push(cube.encoded_bytes()? as f64 / cube.samples() as f64);
+    }
     let walk = views::of_cube(subject, &subject.upload(&cube)?.0)?;
     seen.push(walk.row(subject.name, &format!("layered, {side}²")))?;
     checks.extend(views::cost_check(subject.name, side, &walk, images));

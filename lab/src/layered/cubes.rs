@@ -27,6 +27,7 @@ pub fn table() -> Table {
         ("layers", "s"),
         ("with light", "s"),
         ("load", "s"),
+        ("sent a sample", "B"),
     ];
     Table::new("Cubes: samples on the lines along three axes, and seconds", &columns)
 }
@@ -56,6 +57,7 @@ pub fn measure(subject: &Subject<'_>, side: u32, table: &mut Table) -> anyhow::R
         Cell::from(layers.sample_s),
         Cell::from(cube.sample_s),
         Cell::from(load_s),
+        Cell::from(cube.encoded_bytes()? as f64 / cube.samples() as f64),
     ])?;
     let bar = MOST_SHARE.iter().find(|(name, _)| *name == subject.name).map_or(MOST_SHARE_ELSEWHERE, |(_, bar)| *bar);
     let mut checks =

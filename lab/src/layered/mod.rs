@@ -4,4 +4,5 @@ pub mod command;
 mod cubes;
 mod mirrors;
 mod subject;
+mod viewpoints;
 mod views;

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use anyhow::Context as _;
+use codec::encode_layered_image;
 use depth_image::{Aabb, CubeGrid, LayeredDepthImage, PinholeCamera, View, ViewPlanes};
 use reconstruction::{SampleSet, SetDescription};
 use render::{GpuScene, LayerSelection, Lighting};
@@ -100,5 +101,13 @@ impl Cube {
     /// Samples of all three images.
     pub fn samples(&self) -> usize {
         self.images.iter().map(LayeredDepthImage::sample_count).sum()
+    }
+
+    /// Bytes of all three images as samplers send them.
+    ///
+    /// # Errors
+    /// Planes that do not belong together.
+    pub fn encoded_bytes(&self) -> anyhow::Result<usize> {
+        self.images.iter().map(|image| Ok(encode_layered_image(image)?.payload.len())).sum()
     }
 }

@@ -8,7 +8,7 @@ use app_core::exit::Outcome;
 use app_core::planning::Planning;
 use app_core::setup::DeviceArgs;
 use clap::Args;
-use depth_image::{Antialias, Camera, ViewPlanes, nested_places};
+use depth_image::{Antialias, Camera, SampleImage, ViewPlanes, nested_places};
 use engine::GpuEngine;
 use metrics::holding_images;
 use node::{Engine as _, Turn, WorkClass};
@@ -97,7 +97,7 @@ fn coverage(engine: &Arc<GpuEngine>, conditions: &Conditions) -> anyhow::Result<
     let turn = Turn::of(WorkClass::Batch);
     let of = all_places(&planning)?;
     let work = planning.subject.sample_work(engine.as_ref(), &of, Light::Screening)?;
-    let images = engine.sample(&work, turn)?;
+    let images = SampleImage::depth_images(engine.sample(&work, turn)?)?;
     let mut coverage = Coverage::new(PLACES);
     for cameras in planning.viewpoints.first(VIEWS).chunks(VIEWS_A_CALL) {
         let work = planning.subject.direct_work(cameras.to_vec(), Light::Screening, ViewPlanes::WITH_DEPTH);

@@ -77,7 +77,7 @@ impl Subject {
         let offer = &self.setup.offer;
         let workload = Workload {
             scene: offer.scene(),
-            sample_cameras: offer.rig.clone(),
+            sample_cameras: offer.rig.iter().copied().map(Into::into).collect(),
             cell_first_indices: Vec::new(),
             mirror_cells: Vec::new(),
             sampling: self.args.sampling().to_string(),

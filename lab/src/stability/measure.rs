@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes};
+use depth_image::{DepthImage, PinholeCamera, SampleImage, View, ViewPlanes};
 use node::{DirectWork, Engine, SampleWork, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
 use probe::{Light, Representation, Subject};
 use rayon::prelude::*;
@@ -59,7 +59,7 @@ impl Stand<'_> {
     pub fn sample(&self, set: &SetOfPath) -> anyhow::Result<Vec<DepthImage>> {
         let finished = self.subject.sample_work(self.engine, &set.representation, Light::Session)?;
         let work = SampleWork { scene_time_s: set.time_s, refinement: set.refinement, ..finished };
-        Ok(self.engine.sample(&work, Self::TURN)?)
+        Ok(SampleImage::depth_images(self.engine.sample(&work, Self::TURN)?)?)
     }
 
     pub fn upload(&self, images: &[DepthImage]) -> anyhow::Result<SharedSet> {

@@ -9,7 +9,7 @@ use cluster::{
 use cluster_tests::cluster::{Cluster, camera, rig, views, whole_frame};
 use cluster_tests::watcher::eventually;
 use codec::{FrameHeader, WholeFrame};
-use depth_image::{Camera, PinholeCamera};
+use depth_image::{Camera, PinholeCamera, SampleCamera};
 use glam::{UVec2, Vec3};
 use node::{Deadlines, NodeConfig};
 use tokio::time::timeout;
@@ -41,7 +41,8 @@ fn with_two_cells(plan: &Assignment) -> Assignment {
 
 /// The next plan: with cells side by side, whose images all samplers share.
 fn with_cells(plan: &Assignment, count: u32) -> Assignment {
-    let sample_cameras: Vec<_> = (0..count).flat_map(|cell| shifted_rig(AWAY_M * cell as f32)).collect();
+    let sample_cameras: Vec<_> =
+        (0..count).flat_map(|cell| shifted_rig(AWAY_M * cell as f32)).map(Into::into).collect();
     let cell_first_indices = (0..count).map(|cell| cell * rig().len() as u32).collect();
     let nodes = plan.samplers.len() as u32;
     let own = |at: u32| (0..sample_cameras.len() as u32).filter(|image| image % nodes == at).collect();
@@ -49,6 +50,10 @@ fn with_cells(plan: &Assignment, count: u32) -> Assignment {
     let samplers = shares.map(|(share, at)| SamplerShare { image_indices: own(at), ..share.clone() }).collect();
     let workload = Workload { sample_cameras, cell_first_indices, ..plan.workload.clone() };
     Assignment { plan_epoch: plan.plan_epoch + 1, workload, samplers, ..plan.clone() }
+}
+
+fn sampled(rig: Vec<Camera>) -> Vec<SampleCamera> {
+    rig.into_iter().map(Into::into).collect()
 }
 
 async fn apply(cluster: &Cluster, plan: &Assignment) {
@@ -208,7 +213,7 @@ async fn a_workload_that_has_ended_and_is_opened_again_is_not_sampled_again() {
     shown(&mut opened(&address, &plan).await, 1, 0.0).await;
     assert_eq!(cluster.take_counts(), [1; 3]);
     for is_open in [true, false] {
-        let workload = Workload { sample_cameras: shifted_rig(AWAY_M), ..plan.workload.clone() };
+        let workload = Workload { sample_cameras: sampled(shifted_rig(AWAY_M)), ..plan.workload.clone() };
         let between = Assignment { workload, ..plan.clone() };
         let mut between = alone(&between, number + 10, number + 10);
         between.open_workloads.extend(is_open.then_some(number));
@@ -232,7 +237,7 @@ async fn a_workload_whose_sampling_takes_long_delays_no_other() {
     let mut held = opened(&address, &plan).await;
     held.say_at(Some((1, camera(0.0, SIZE_PX))), 0).await;
     eventually("sampling has begun", HEALED, || engine.held_calls() == 1).await;
-    let workload = Workload { sample_cameras: shifted_rig(AWAY_M), ..plan.workload.clone() };
+    let workload = Workload { sample_cameras: sampled(shifted_rig(AWAY_M)), ..plan.workload.clone() };
     // Epochs of different workloads may be equal.
     let other = Assignment { workload_number: plan.workload_number + 1, workload, ..plan.clone() };
     apply(&cluster, &other).await;

@@ -14,7 +14,7 @@ pub fn sample_set(
 ) -> SampleSet {
     let work = SampleWork {
         scene_hash: hash.to_owned(),
-        cameras: cameras.iter().copied().map(Into::into).collect(),
+        cameras: cameras.iter().copied().map(|camera| camera.into().into()).collect(),
         wanted: (0..cameras.len() as u32).collect(),
         sampling: "conventional".to_owned(),
         planes: SamplePlanes::default(),
@@ -25,7 +25,7 @@ pub fn sample_set(
     };
     SampleSet {
         scene_hash: hash.to_owned(),
-        images: engine.sample(&work, Turn::of(WorkClass::Batch)).expect("images"),
+        images: engine.sample(&work, Turn::of(WorkClass::Batch)).expect("images").try_into().expect("of one kind"),
         volume: scene.bounds(),
         background: scene.background,
         illumination: scene.illumination.clone(),

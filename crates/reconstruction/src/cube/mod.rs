@@ -116,7 +116,7 @@ fn check(grid: &CubeGrid, images: &[LayeredDepthImage; 3]) -> Result<(), Reconst
     for (index, image) in images.iter().enumerate() {
         let wrong = |reason: String| ReconstructionError::Sample { index, reason };
         image.validate().map_err(|error| wrong(error.to_string()))?;
-        if image.camera != grid.camera(index) {
+        if !grid.has_camera(index, &image.camera) {
             return Err(wrong(format!("its lines are not those of the cube's grid along axis {index}")));
         }
     }

@@ -1,7 +1,7 @@
 //! Which of the surfaces on a line a layered image holds.
 
 /// The surfaces that a layered image holds.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum LayerSelection {
     /// All that its lines meet (Lischinski §3.1).
     All,

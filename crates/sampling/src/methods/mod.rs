@@ -4,14 +4,16 @@
 //! product code outside this folder names a method.
 
 pub(crate) mod depth_peeling;
+pub(crate) mod layered_cube;
 pub(crate) mod non_redundant;
 pub(crate) mod useful;
 
-use depth_image::{Antialias, Camera, NamedMethod, PinholeCamera, Setting, named_methods};
+use depth_image::{Aabb, Antialias, Camera, CameraError, CubeGrid, NamedMethod, PinholeCamera, Setting, named_methods};
 use gpu::{ShaderError, Templates};
-use render::RedundancyTest;
+use render::{LayerSelection, RedundancyTest};
 
 use crate::error::SamplingError;
+pub use layered_cube::LayeredCube;
 pub use non_redundant::Redundancy;
 
 /// The choice of samples of a scene.
@@ -29,12 +31,14 @@ pub enum SamplingMethod {
         /// Images, each of the surfaces behind the one before.
         layers: u32,
     },
+    /// All surfaces on the lines of a cube around the scene, for viewers anywhere (Lischinski §3.1).
+    LayeredCube(LayeredCube),
 }
 
-use SamplingMethod::{Conventional, DepthPeeling, NonRedundant, Useful};
+use SamplingMethod::{Conventional, DepthPeeling, LayeredCube as Cube, NonRedundant, Useful};
 
 /// All methods by name; the first is the default.
-pub const METHODS: [NamedMethod<SamplingMethod>; 4] = [
+pub const METHODS: [NamedMethod<SamplingMethod>; 5] = [
     NamedMethod {
         name: "conventional",
         method: SamplingMethod::CONVENTIONAL,
@@ -68,6 +72,12 @@ pub const METHODS: [NamedMethod<SamplingMethod>; 4] = [
         }),
         help: "takes layer behind layer from the middle of the cameras, 4 by default",
     },
+    NamedMethod {
+        name: "layered_cube",
+        method: Cube(LayeredCube::DEFAULT),
+        setting: Some(Setting { form: layered_cube::FORM, parse: |text| layered_cube::parse(text).map(Cube) }),
+        help: "takes all surfaces on the lines of a cube, for viewers anywhere; 512 lines along its longest side by default",
+    },
 ];
 
 /// The templates of `render`, with the redundancy tests of all methods.
@@ -91,12 +101,13 @@ impl SamplingMethod {
         METHODS.into_iter().flat_map(|row| match row.method {
             NonRedundant(_) => Redundancy::ALL.map(NonRedundant).to_vec(),
             Useful(_) => Redundancy::ALL.map(Useful).to_vec(),
-            method @ (Conventional(_) | DepthPeeling { .. }) => vec![method],
+            method @ (Conventional(_) | DepthPeeling { .. } | Cube(_)) => vec![method],
         })
     }
 
     /// The names of the methods among which budgets choose, each with the least number of images of a set. With fewer the
-    /// first method has the same samples. Samples that depend on the planned views serve no others, and are not among them.
+    /// first method has the same samples. Samples that depend on the planned views serve no others, and are not among them, nor are
+    /// cubes, which have no sample cameras near the views.
     pub fn ladder() -> impl Iterator<Item = (&'static str, u32)> {
         METHODS.into_iter().filter_map(|row| row.method.least_images().map(|images| (row.name, images)))
     }
@@ -105,7 +116,7 @@ impl SamplingMethod {
         match self {
             Conventional(_) => Some(1),
             NonRedundant(_) | DepthPeeling { .. } => Some(2),
-            Useful(_) => None,
+            Useful(_) | Cube(_) => None,
         }
     }
 
@@ -114,7 +125,7 @@ impl SamplingMethod {
     pub fn own_image_count(self) -> Option<u32> {
         match self {
             DepthPeeling { layers } => Some(layers),
-            Conventional(_) | NonRedundant(_) | Useful(_) => None,
+            Conventional(_) | NonRedundant(_) | Useful(_) | Cube(_) => None,
         }
     }
 
@@ -123,16 +134,36 @@ impl SamplingMethod {
     pub fn with_images(self, count: u32) -> Self {
         match self {
             DepthPeeling { .. } => DepthPeeling { layers: count },
-            Conventional(_) | NonRedundant(_) | Useful(_) => self,
+            Conventional(_) | NonRedundant(_) | Useful(_) | Cube(_) => self,
         }
     }
 
-    /// The cameras that images are taken with, for a rig of these cameras.
+    /// The cube of a scene within these bounds; `None` where images are those of cameras.
+    ///
+    /// # Errors
+    /// Bounds that are empty or not finite.
+    pub fn cube(self, bounds: &Aabb) -> Result<Option<CubeGrid>, CameraError> {
+        match self {
+            Cube(cube) => CubeGrid::around(bounds, cube.side).map(Some),
+            Conventional(_) | NonRedundant(_) | Useful(_) | DepthPeeling { .. } => Ok(None),
+        }
+    }
+
+    /// The surfaces that images of all surfaces keep; `None` where images have the first ones alone.
+    #[must_use]
+    pub fn layer_selection(self) -> Option<LayerSelection> {
+        match self {
+            Cube(cube) => Some(cube.kept),
+            Conventional(_) | NonRedundant(_) | Useful(_) | DepthPeeling { .. } => None,
+        }
+    }
+
+    /// The cameras that images are taken with, for a rig of these cameras. Those of a cube follow from the scene.
     #[must_use]
     pub fn cameras(self, rig: Vec<PinholeCamera>) -> Vec<PinholeCamera> {
         match self {
             DepthPeeling { layers } => depth_peeling::cameras(&rig, layers as usize),
-            Conventional(_) | NonRedundant(_) | Useful(_) => rig,
+            Conventional(_) | NonRedundant(_) | Useful(_) | Cube(_) => rig,
         }
     }
 
@@ -143,6 +174,7 @@ impl SamplingMethod {
     pub fn check(self, cameras: &[Camera]) -> Result<(), SamplingError> {
         match self {
             DepthPeeling { .. } => depth_peeling::check(cameras),
+            Cube(_) => Err(SamplingError::Lines { method: self.to_string() }),
             Conventional(_) | NonRedundant(_) | Useful(_) => Ok(()),
         }
     }
@@ -152,7 +184,7 @@ impl SamplingMethod {
     pub fn antialias(self) -> Antialias {
         match self {
             Conventional(antialias) => antialias,
-            NonRedundant(_) | Useful(_) | DepthPeeling { .. } => Antialias::NONE,
+            NonRedundant(_) | Useful(_) | DepthPeeling { .. } | Cube(_) => Antialias::NONE,
         }
     }
 
@@ -160,7 +192,7 @@ impl SamplingMethod {
     #[must_use]
     pub fn redundancy_test(self) -> Option<RedundancyTest> {
         match self {
-            Conventional(_) => None,
+            Conventional(_) | Cube(_) => None,
             NonRedundant(redundancy) => Some(redundancy.test()),
             Useful(redundancy) => Some(useful::test(redundancy)),
             DepthPeeling { .. } => Some(depth_peeling::TEST),
@@ -183,7 +215,7 @@ impl SamplingMethod {
     #[must_use]
     pub fn has_hysteresis(self) -> bool {
         match self {
-            Conventional(_) | DepthPeeling { .. } => false,
+            Conventional(_) | DepthPeeling { .. } | Cube(_) => false,
             NonRedundant(redundancy) | Useful(redundancy) => redundancy == Redundancy::Tolerance,
         }
     }
@@ -194,6 +226,7 @@ impl SamplingMethod {
             Conventional(antialias) => (antialias > Antialias::NONE).then(|| antialias.to_string()),
             NonRedundant(redundancy) | Useful(redundancy) => Some(redundancy.to_string()),
             DepthPeeling { layers } => Some(layers.to_string()),
+            Cube(cube) => Some(cube.to_string()),
         }
     }
 }
@@ -207,7 +240,7 @@ mod tests {
         for method in SamplingMethod::all() {
             assert_eq!(method.to_string().parse(), Ok(method));
         }
-        assert_eq!(SamplingMethod::all().count(), 8);
+        assert_eq!(SamplingMethod::all().count(), 9);
         assert_eq!("non-redundant".parse(), Ok(NonRedundant(Redundancy::Pixel)));
         let filtered = Conventional(Antialias::of(4).expect("offered"));
         assert_eq!(("conventional:4".parse(), filtered.to_string().as_str()), (Ok(filtered), "conventional:4"));
@@ -220,6 +253,10 @@ mod tests {
             "depth_peeling:0",
             "depth_peeling:17",
             "depth_peeling:-1",
+            "layered_cube:15",
+            "layered_cube:4097",
+            "layered_cube:512:none",
+            "layered_cube:512:all:all",
         ] {
             assert!(name.parse::<SamplingMethod>().is_err(), "{name}");
         }

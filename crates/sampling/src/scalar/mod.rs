@@ -114,7 +114,7 @@ fn image(camera: &PinholeCamera, texels: &[Texel]) -> DepthImage {
 
 fn is_redundant(query: &Query<'_>, candidate: &Candidate, was_kept: bool, image: &DepthImage) -> bool {
     match query.method {
-        SamplingMethod::Conventional(_) => false,
+        SamplingMethod::Conventional(_) | SamplingMethod::LayeredCube(_) => false,
         SamplingMethod::NonRedundant(Redundancy::Pixel) | SamplingMethod::Useful(Redundancy::Pixel) => {
             is_pixel_redundant(candidate, image)
         }

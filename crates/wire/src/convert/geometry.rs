@@ -1,7 +1,7 @@
 //! Cameras and bounds.
 
 use cluster::InvalidField;
-use depth_image::{Aabb, Camera, PinholeCamera, SinglePoleCamera};
+use depth_image::{Aabb, Camera, ParallelCamera, PinholeCamera, SampleCamera, SinglePoleCamera};
 use glam::{Quat, UVec2, Vec2, Vec3};
 
 use super::{Convert, required};
@@ -49,10 +49,9 @@ impl Convert<proto::PinholeCamera> for PinholeCamera {
     }
 
     fn write(self) -> proto::PinholeCamera {
-        let q = self.world_from_camera;
         proto::PinholeCamera {
             eye_in_world_m: self.eye_in_world.write(),
-            world_from_camera_unit: Some(proto::Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }),
+            world_from_camera_unit: Some(quaternion(self.world_from_camera)),
             focal_px: self.focal_px.write(),
             principal_px: self.principal_px.write(),
             width_px: self.size_px.x,
@@ -91,23 +90,75 @@ impl Convert<proto::SinglePoleCamera> for SinglePoleCamera {
 
 impl Convert<proto::Camera> for Camera {
     fn read(camera: proto::Camera, _: &'static str) -> Result<Self, WireError> {
-        match required(camera.model, "camera.model")? {
-            Model::Pinhole(pinhole) => PinholeCamera::read(pinhole, "camera.pinhole").map(Self::Pinhole),
-            Model::SinglePole(camera) => SinglePoleCamera::read(camera, "camera.single_pole").map(Self::SinglePole),
+        match SampleCamera::read(camera, "camera")? {
+            SampleCamera::Depth(camera) => Ok(camera),
+            SampleCamera::Layered(_) => {
+                Err(InvalidField::out_of_range("camera.model", "parallel", "pinhole or single_pole").into())
+            }
         }
     }
 
     fn write(self) -> proto::Camera {
+        SampleCamera::Depth(self).write()
+    }
+}
+
+impl Convert<proto::Camera> for SampleCamera {
+    fn read(camera: proto::Camera, _: &'static str) -> Result<Self, WireError> {
+        Ok(match required(camera.model, "camera.model")? {
+            Model::Pinhole(camera) => Camera::Pinhole(PinholeCamera::read(camera, "camera.pinhole")?).into(),
+            Model::SinglePole(camera) => {
+                Camera::SinglePole(SinglePoleCamera::read(camera, "camera.single_pole")?).into()
+            }
+            Model::Parallel(camera) => ParallelCamera::read(camera, "camera.parallel")?.into(),
+        })
+    }
+
+    fn write(self) -> proto::Camera {
         let model = match self {
-            Self::Pinhole(camera) => Model::Pinhole(camera.write()),
-            Self::SinglePole(camera) => Model::SinglePole(camera.write()),
+            Self::Depth(Camera::Pinhole(camera)) => Model::Pinhole(camera.write()),
+            Self::Depth(Camera::SinglePole(camera)) => Model::SinglePole(camera.write()),
+            Self::Layered(camera) => Model::Parallel(camera.write()),
         };
         proto::Camera { model: Some(model) }
     }
 }
 
+impl Convert<proto::ParallelCamera> for ParallelCamera {
+    fn read(camera: proto::ParallelCamera, field: &'static str) -> Result<Self, WireError> {
+        let corner = required(camera.corner_in_world_m, "camera.parallel.corner_in_world_m")?;
+        let turn = required(camera.world_from_camera_unit, "camera.parallel.world_from_camera_unit")?;
+        let camera = Self {
+            corner_in_world: Vec3::new(corner.x, corner.y, corner.z),
+            world_from_camera: Quat::from_xyzw(turn.x, turn.y, turn.z, turn.w),
+            spacing_m: camera.spacing_m,
+            size_px: UVec2::new(camera.width_px, camera.height_px),
+            range_m: camera.range_m,
+        };
+        camera.validate().map_err(|source| InvalidField::Camera { field, source })?;
+        Ok(camera)
+    }
+
+    fn write(self) -> proto::ParallelCamera {
+        proto::ParallelCamera {
+            corner_in_world_m: self.corner_in_world.write(),
+            world_from_camera_unit: Some(quaternion(self.world_from_camera)),
+            spacing_m: self.spacing_m,
+            width_px: self.size_px.x,
+            height_px: self.size_px.y,
+            range_m: self.range_m,
+        }
+    }
+}
+
+fn quaternion(q: Quat) -> proto::Quaternion {
+    proto::Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }
+}
+
 #[cfg(test)]
 mod tests {
+    use depth_image::CubeGrid;
+
     use super::*;
 
     fn camera() -> SinglePoleCamera {
@@ -120,6 +171,26 @@ mod tests {
         for camera in [Camera::Pinhole(camera().reference), Camera::SinglePole(camera())] {
             assert_eq!(Camera::read(camera.write(), "camera"), Ok(camera));
         }
+    }
+
+    #[test]
+    fn parallel_cameras_travel_as_sample_cameras_alone() {
+        let bounds = Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE };
+        let camera = SampleCamera::from(CubeGrid::around(&bounds, 64).expect("a grid").camera(1));
+        assert_eq!(SampleCamera::read(camera.write(), "camera"), Ok(camera));
+        let refused = Camera::read(camera.write(), "camera").expect_err("no camera of a depth image").to_string();
+        assert!(refused.contains("camera.model is parallel"), "{refused}");
+        let spoilt = |spoil: &dyn Fn(&mut proto::ParallelCamera)| {
+            let Some(Model::Parallel(mut message)) = camera.write().model else { panic!("a parallel camera") };
+            spoil(&mut message);
+            let refused = SampleCamera::read(proto::Camera { model: Some(Model::Parallel(message)) }, "camera");
+            refused.expect_err("a spoilt camera").to_string()
+        };
+        assert!(spoilt(&|m| m.corner_in_world_m = None).contains("parallel.corner_in_world_m"));
+        assert!(spoilt(&|m| m.world_from_camera_unit = None).contains("parallel.world_from_camera_unit"));
+        assert!(spoilt(&|m| m.spacing_m = 0.0).contains("spacing_m"));
+        assert!(spoilt(&|m| m.range_m = f32::NAN).contains("range_m"));
+        assert!(spoilt(&|m| m.width_px = 0).contains("size_px"));
     }
 
     #[test]

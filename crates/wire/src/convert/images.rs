@@ -2,7 +2,8 @@
 
 use cluster::{FetchImages, at_most};
 use codec::{
-    Chunk, ChunkBody, ImageHeader, MAX_CHUNK_BYTES, MAX_VISIBILITY_PLANES, PlaneEncoding, PlaneHeader, PlaneKind,
+    Chunk, ChunkBody, ImageHeader, LayeredCounts, MAX_CHUNK_BYTES, MAX_VISIBILITY_PLANES, PlaneEncoding, PlaneHeader,
+    PlaneKind,
 };
 
 use super::{Convert, required};
@@ -10,7 +11,7 @@ use crate::error::WireError;
 use crate::proto::chunk::Body;
 
 /// One plane of each kind; visibility may have more.
-const MAX_PLANES: usize = 5 + MAX_VISIBILITY_PLANES;
+const MAX_PLANES: usize = 6 + MAX_VISIBILITY_PLANES;
 
 messages! {
     FetchSampleImagesRequest = FetchImages { plan_epoch, workload_number, set_index, image_indices; cell: cell_index },
@@ -20,16 +21,17 @@ messages! {
         sample_set_id: plan_epoch | set_index, sequence: sequence_number, crc32: body_crc32
     };
     ImageHeader = ImageHeader {
-        planes; width: width_px, height: height_px,
+        planes, layered; width: width_px, height: height_px,
         inverse_depth_range: least_inverse_depth_per_m | greatest_inverse_depth_per_m
     }, first |h| at_most(h.planes.len(), MAX_PLANES, "header.planes");
+    LayeredCounts = LayeredCounts { sample_count; truncated: is_truncated };
     PlaneHeader = PlaneHeader { kind as "planes.kind", encoding as "planes.encoding", raw_bytes, packed_bytes };
 }
 
 enums! {
     PlaneKind {
         InverseDepth, ColorRgb9e5, NormalOct16, SurfaceId, ReflectanceRoughness8, Visibility8, Passed1,
-        CornerInverseDepth
+        CornerInverseDepth, LayerCount8, LayerDepth, PlaneNormalOct8
     }
     PlaneEncoding { SlopeTaggedLz4, DifferenceTaggedLz4, ChangeTaggedLz4, BitsLz4 }
 }

@@ -1,0 +1,129 @@
+//! A layered image to header and payload, and back.
+
+use depth_image::{LayeredDepthImage, LayeredError, ParallelCamera};
+
+use crate::color_codec::{pack_colors, unpack_colors};
+use crate::image_codec::{Packer, check_end, check_payload, expand_plane};
+use crate::layered_codec::{
+    gather, layer_by_layer, pack_depths, pack_layer_counts, scatter, unpack_depths, unpack_layer_counts,
+};
+use crate::words_codec::{WordLayout, pack_words, unpack_words};
+use crate::{
+    DecodeError, DecodeLimits, EncodedImage, ImageHeader, InverseDepthRange, LayeredCounts, PlaneHeader, PlaneKind,
+};
+
+/// Packs a layered image. Depth is quantised to 16 bits over the camera's range, and all else is kept to the bit.
+///
+/// # Errors
+/// Samples that are not those of the camera's lines; planes of highlights without normals.
+pub fn encode_layered_image(image: &LayeredDepthImage) -> Result<EncodedImage, LayeredError> {
+    image.validate()?;
+    if image.specular.is_some() && image.normal_oct16.is_none() {
+        return Err(LayeredError::Plane { plane: "normal", len: 0, expected: image.sample_count() });
+    }
+    let places = layer_by_layer(&image.first);
+    let mut packer = Packer::default();
+    packer.write(PlaneKind::LayerCount8, |out| pack_layer_counts(&image.first, out));
+    packer.write(PlaneKind::LayerDepth, |out| {
+        pack_depths(&gather(&image.planar_depth_m, &places), image.camera.range_m, out);
+    });
+    let normals: Vec<u32> = places.iter().map(|&at| image.plane_normal_oct8[at as usize].into()).collect();
+    packer.write(PlaneKind::PlaneNormalOct8, |out| pack_words(&normals, WordLayout::TwoBytes, out));
+    packer.write(PlaneKind::ColorRgb9e5, |out| pack_colors(&gather(&image.color_rgb9e5, &places), out));
+    let mut write = |kind, plane: &[u32], layout| {
+        packer.write(kind, |out| pack_words(&gather(plane, &places), layout, out));
+    };
+    if let Some(normals) = &image.normal_oct16 {
+        write(PlaneKind::NormalOct16, normals, WordLayout::Halves);
+    }
+    if let Some(specular) = &image.specular {
+        write(PlaneKind::ReflectanceRoughness8, &specular.reflectance_srgb8_roughness8, WordLayout::Bytes);
+        specular.visibility8.iter().for_each(|plane| write(PlaneKind::Visibility8, plane, WordLayout::Bytes));
+    }
+    let [width, height] = image.camera.size_px.to_array();
+    let layered = Some(LayeredCounts { sample_count: places.len() as u32, truncated: image.truncated });
+    let inverse_depth_range = InverseDepthRange { least_per_m: 0.0, greatest_per_m: 0.0 };
+    let header = ImageHeader { width, height, inverse_depth_range, layered, planes: packer.planes };
+    Ok(EncodedImage { header, payload: packer.payload.into() })
+}
+
+/// Unpacks a layered image. The camera must have passed its own validation.
+///
+/// # Errors
+/// A header that is inconsistent, over the limits or not of the camera's size. A payload that does not decode to exactly
+/// the planes of the header.
+pub fn decode_layered_image(
+    header: &ImageHeader,
+    camera: ParallelCamera,
+    payload: &[u8],
+    limits: &DecodeLimits,
+) -> Result<LayeredDepthImage, DecodeError> {
+    let lines = header.validate(limits)?;
+    check_payload(header, camera.size_px, payload)?;
+    let Some(LayeredCounts { sample_count, truncated }) = header.layered else {
+        return Err(DecodeError::Header { field: "planes.kind", reason: "not those of a layered image" });
+    };
+    let [counts, others @ ..] = &header.planes[..] else {
+        return Err(DecodeError::Header { field: "planes", reason: "none" });
+    };
+    let mut packed = payload;
+    let raw = expand_plane(counts, &mut packed)?;
+    let mut input = &raw[..];
+    let first = unpack_layer_counts(&mut input, lines, sample_count as usize)?;
+    check_end(counts.kind, input)?;
+    let places = layer_by_layer(&first);
+    let mut image = LayeredDepthImage {
+        camera,
+        first,
+        planar_depth_m: Vec::new(),
+        plane_normal_oct8: Vec::new(),
+        color_rgb9e5: Vec::new(),
+        normal_oct16: None,
+        specular: None,
+        truncated,
+    };
+    for plane in others {
+        let raw = expand_plane(plane, &mut packed)?;
+        decode_plane(plane, &raw, &places, &mut image)?;
+    }
+    image.validate().map_err(|_| DecodeError::Corrupt { field: "layer_depth", reason: "falls along a line" })?;
+    Ok(image)
+}
+
+fn decode_plane(
+    plane: &PlaneHeader,
+    raw: &[u8],
+    places: &[u32],
+    image: &mut LayeredDepthImage,
+) -> Result<(), DecodeError> {
+    let mut input = raw;
+    let samples = places.len();
+    let words = |input: &mut &[u8], layout| -> Result<Vec<u32>, DecodeError> {
+        Ok(scatter(&unpack_words(input, samples, layout)?, places))
+    };
+    match plane.kind {
+        PlaneKind::LayerDepth => {
+            image.planar_depth_m = scatter(&unpack_depths(&mut input, samples, image.camera.range_m)?, places);
+        }
+        PlaneKind::PlaneNormalOct8 => {
+            let normals = words(&mut input, WordLayout::TwoBytes)?;
+            image.plane_normal_oct8 = normals.into_iter().map(|normal| normal as u16).collect();
+        }
+        PlaneKind::ColorRgb9e5 => image.color_rgb9e5 = scatter(&unpack_colors(&mut input, samples)?, places),
+        PlaneKind::NormalOct16 => image.normal_oct16 = Some(words(&mut input, WordLayout::Halves)?),
+        PlaneKind::ReflectanceRoughness8 => {
+            let reflectances = words(&mut input, WordLayout::Bytes)?;
+            image.specular.get_or_insert_default().reflectance_srgb8_roughness8 = reflectances;
+        }
+        PlaneKind::Visibility8 => {
+            let visibilities = words(&mut input, WordLayout::Bytes)?;
+            image.specular.get_or_insert_default().visibility8.push(visibilities);
+        }
+        _ => return Err(DecodeError::Header { field: "planes.kind", reason: "of depth images alone" }),
+    }
+    check_end(plane.kind, input)
+}
+
+#[cfg(test)]
+#[path = "layered_image_codec_tests.rs"]
+mod tests;

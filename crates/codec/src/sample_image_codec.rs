@@ -1,0 +1,45 @@
+//! A sample image of either kind to header and payload, and back.
+
+use depth_image::{DepthImageError, LayeredError, SampleCamera, SampleImage};
+
+use crate::image_codec::{decode_depth_image, encode_depth_image};
+use crate::layered_image_codec::{decode_layered_image, encode_layered_image};
+use crate::{DecodeError, DecodeLimits, EncodedImage, ImageHeader, PlaneSet};
+
+/// Planes that do not belong together.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming variants")]
+pub enum EncodeError {
+    #[error(transparent)]
+    Depth(#[from] DepthImageError),
+    #[error(transparent)]
+    Layered(#[from] LayeredError),
+}
+
+/// Packs an image with all of its planes.
+///
+/// # Errors
+/// Planes that are not of the camera's size; planes of highlights without normals.
+pub fn encode_sample_image(image: &SampleImage) -> Result<EncodedImage, EncodeError> {
+    Ok(match image {
+        SampleImage::Depth(image) => encode_depth_image(image, PlaneSet::ALL)?,
+        SampleImage::Layered(image) => encode_layered_image(image)?,
+    })
+}
+
+/// Unpacks the image of a camera, which must have passed its own validation.
+///
+/// # Errors
+/// A header that is inconsistent, over the limits, or not of the camera. A payload that does not decode to exactly the
+/// planes of the header.
+pub fn decode_sample_image(
+    header: &ImageHeader,
+    camera: &SampleCamera,
+    payload: &[u8],
+    limits: &DecodeLimits,
+) -> Result<SampleImage, DecodeError> {
+    Ok(match camera {
+        SampleCamera::Depth(camera) => decode_depth_image(header, *camera, payload, limits)?.into(),
+        SampleCamera::Layered(camera) => decode_layered_image(header, *camera, payload, limits)?.into(),
+    })
+}

@@ -1,0 +1,138 @@
+//! A layered depth cube by the engine alone, as a sampler sends it and a compositor gets it.
+
+use codec::{DecodeLimits, decode_sample_image, encode_sample_image};
+use depth_image::{CubeGrid, PinholeCamera, SampleCamera, SampleImage, View, ViewPlanes};
+use engine::GpuEngine;
+use glam::{UVec2, Vec3};
+use gpu::DevicePreference;
+use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, SharedSet, Turn, ViewWork, WorkClass};
+use scene::{Limits, MissingTextures, Scene, SceneSpec};
+
+mod common;
+
+const HASH: &str = "a box with mirrors";
+const LIGHTING: &str = "shadows, reflections 3";
+const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
+
+struct Stand {
+    engine: GpuEngine,
+    scene: Scene,
+}
+
+impl Stand {
+    fn new() -> Self {
+        let spec: SceneSpec = "mirror-box".parse().expect("a name");
+        let scene = spec.load(&Limits::default(), MissingTextures::Refuse).expect("a scene");
+        let engine = GpuEngine::open(DevicePreference::Software).expect("an engine");
+        engine.put_scene(HASH, &scene).expect("a scene");
+        Self { engine, scene }
+    }
+
+    fn cameras(&self) -> [SampleCamera; 3] {
+        let grid = CubeGrid::around(&self.scene.bounds(), 160).expect("a grid");
+        [0, 1, 2].map(|axis| grid.camera(axis).into())
+    }
+
+    fn work(&self, cameras: &[SampleCamera], sampling: &str) -> SampleWork {
+        SampleWork {
+            scene_hash: HASH.to_owned(),
+            cameras: cameras.to_vec(),
+            wanted: (0..cameras.len() as u32).collect(),
+            sampling: sampling.to_owned(),
+            planes: self.engine.sample_planes("layered").expect("a method"),
+            lighting: LIGHTING.to_owned(),
+            scene_time_s: 0.0,
+            temporal_reference_s: None,
+            refinement: cluster::Refinement::default(),
+        }
+    }
+
+    /// The image of a camera, sampled in tiles, each of which is sent.
+    fn sent(&self, camera: &SampleCamera, tiles: u32) -> (SampleImage, usize) {
+        let mut bytes = 0;
+        let tile = |number: u32| {
+            let camera = camera.tile(number, tiles);
+            let images = self.engine.sample(&self.work(&[camera], "layered_cube:160"), TURN).expect("an image");
+            let encoded = encode_sample_image(&images[0]).expect("planes of one size");
+            bytes += encoded.payload.len();
+            decode_sample_image(&encoded.header, &camera, &encoded.payload, &DecodeLimits::default()).expect("an image")
+        };
+        let tiles = (0..tiles).map(tile).collect();
+        (SampleImage::from_tiles(camera, tiles).expect("tiles of the image"), bytes)
+    }
+
+    fn set(&self, images: Vec<SampleImage>) -> SharedSet {
+        let like = common::sample_set(&self.engine, (HASH, &self.scene), &[camera()], LIGHTING);
+        let set = SampleSet { images: images.try_into().expect("a cube"), ..like };
+        self.engine.upload(&set, TURN).expect("a set")
+    }
+
+    fn view(&self, set: &SharedSet, method: &str) -> Result<View, EngineError> {
+        let work = ViewWork { cameras: vec![camera()], method: method.to_owned(), planes: ViewPlanes::ALL };
+        Ok(self.engine.reconstruct(set.as_ref(), &work, TURN)?.remove(0))
+    }
+
+    fn direct(&self) -> View {
+        let (scene_hash, lighting, cameras) = (HASH.to_owned(), LIGHTING.to_owned(), vec![camera()]);
+        let work = DirectWork { scene_hash, cameras, lighting, scene_time_s: 0.0, planes: ViewPlanes::COLOR };
+        self.engine.draw_direct(&work, TURN).expect("a view").remove(0)
+    }
+}
+
+fn camera() -> PinholeCamera {
+    PinholeCamera::looking_at(Vec3::new(0.6, 1.6, 5.5), Vec3::new(0.0, 1.0, 0.0), Vec3::Y, 0.7, UVec2::new(120, 90))
+}
+
+fn samples(image: &SampleImage) -> usize {
+    let SampleImage::Layered(image) = image else { panic!("a layered image") };
+    image.sample_count()
+}
+
+fn rms(a: &View, b: &View) -> f64 {
+    let squares: f64 = a.srgb8.iter().zip(&b.srgb8).map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2)).sum();
+    (squares / a.srgb8.len() as f64).sqrt()
+}
+
+#[test]
+fn a_cube_that_was_sent_in_tiles_shows_the_scene_and_what_mirrors_show() {
+    let stand = Stand::new();
+    let cameras = stand.cameras();
+    let (whole, bytes): (Vec<_>, Vec<_>) = cameras.iter().map(|camera| stand.sent(camera, 1)).unzip();
+    let (tiled, _): (Vec<_>, Vec<_>) = cameras.iter().map(|camera| stand.sent(camera, 3)).unzip();
+    let count: usize = whole.iter().map(samples).sum();
+    println!("{:.1} bytes a sample of {count}", bytes.iter().sum::<usize>() as f64 / count as f64);
+    for (whole, tiled) in whole.iter().zip(&tiled) {
+        let (whole, tiled) = (samples(whole), samples(tiled));
+        assert!(whole.abs_diff(tiled) * 1000 <= whole, "{whole} and {tiled} samples");
+    }
+    let direct = stand.direct();
+    let [whole, tiled] = [whole, tiled].map(|images| stand.view(&stand.set(images), "layered").expect("a view"));
+    let errors = [rms(&whole, &direct), rms(&tiled, &direct), rms(&whole, &tiled)];
+    println!("errors of 255: whole {:.2}, tiled {:.2}, of each other {:.2}", errors[0], errors[1], errors[2]);
+    assert!(errors[0] < 12.0 && errors[1] < 12.0, "22 dB and more: {errors:?}");
+    assert!(errors[2] < 3.0, "{errors:?}");
+}
+
+#[test]
+fn methods_and_cameras_that_do_not_suit_are_refused_by_name() {
+    let stand = Stand::new();
+    let cube: Vec<_> = stand.cameras().iter().map(|camera| stand.sent(camera, 1).0).collect();
+    let field = |error: EngineError| match error {
+        EngineError::InvalidArgument { field, reason } => (field, reason),
+        other => panic!("{other}"),
+    };
+    let refused = field(stand.view(&stand.set(cube.clone()), "joint_carve").expect_err("no depth images"));
+    assert_eq!(refused.0, "reconstruction_method", "{}", refused.1);
+    let depth = stand.engine.sample(&stand.work(&[camera().into()], "conventional"), TURN).expect("an image");
+    let refused = field(stand.view(&stand.set(depth.clone()), "layered").expect_err("no cube"));
+    assert_eq!(refused.0, "reconstruction_method", "{}", refused.1);
+    let lines = stand.work(&stand.cameras(), "conventional");
+    let refused = field(stand.engine.sample(&lines, TURN).expect_err("lines"));
+    assert_eq!(refused.0, "sampling_method", "{}", refused.1);
+    let views = stand.work(&[camera().into()], "layered_cube:64");
+    let refused = field(stand.engine.sample(&views, TURN).expect_err("a camera of a view"));
+    assert_eq!(refused.0, "sample_cameras", "{}", refused.1);
+    let mixed = [&cube[..2], &depth].concat();
+    assert!(depth_image::SampleImages::try_from(mixed).is_err());
+    assert!(depth_image::SampleImages::try_from(cube[..2].to_vec()).is_err());
+}

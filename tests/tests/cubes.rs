@@ -1,0 +1,103 @@
+//! A layered depth cube in a cluster: one sample set for viewers anywhere.
+#![allow(clippy::unwrap_used)]
+
+use std::f32::consts::TAU;
+use std::time::Duration;
+
+use client::{Frame, Session, ViewRequest};
+use cluster::{PolicyChoice, SessionRequest, Timeline};
+use cluster_tests::cluster::{CUBE, Cluster, request, rig};
+use cluster_tests::watcher::eventually;
+use depth_image::{PinholeCamera, ProvenanceKind};
+use glam::{UVec2, Vec3};
+
+const STILL: Timeline = Timeline { start_s: 1.0, step_s: 0.0, set_count: 1 };
+const SOON: Duration = Duration::from_secs(20);
+
+fn view(azimuth_rad: f32) -> PinholeCamera {
+    let target = Vec3::new(0.0, 0.5, 0.0);
+    let eye = target + Vec3::new(2.4 * azimuth_rad.sin(), 0.7, 2.4 * azimuth_rad.cos());
+    PinholeCamera::looking_at(eye, target, Vec3::Y, 0.9, UVec2::new(36, 27))
+}
+
+fn around(count: usize) -> impl Iterator<Item = f32> {
+    (0..count).map(move |i| TAU * i as f32 / count as f32)
+}
+
+fn sampled_as_cube(viewpoints: Vec<PinholeCamera>) -> SessionRequest {
+    let asked = request(PolicyChoice::Pipeline, STILL);
+    SessionRequest { sampling: CUBE.to_owned(), forced_sampler_count: Some(1), viewpoints, ..asked }
+}
+
+async fn frames(session: &Session, azimuths: impl IntoIterator<Item = f32>) -> Vec<Frame> {
+    let request = |(frame, azimuth)| ViewRequest { frame, set_index: 0, camera: view(azimuth) };
+    let requests: Vec<ViewRequest> = (0..).zip(azimuths).map(request).collect();
+    session.render_views(requests).unwrap().all().await.unwrap()
+}
+
+/// The share of pixels in the picture's middle, which shows the ball, that samples show.
+fn known_in_the_middle(frame: &Frame) -> f64 {
+    let provenance = frame.view.provenance.as_ref().unwrap();
+    let middle = (11..17).flat_map(|row| (15..21).map(move |column| row * 36 + column));
+    let hits = middle.filter(|&pixel| provenance[pixel].kind() == ProvenanceKind::Hit).count();
+    hits as f64 / 36.0
+}
+
+/// One set serves viewers from everywhere: nothing is sampled again, and no plan is made, when they walk.
+#[tokio::test(flavor = "multi_thread")]
+async fn viewers_that_walk_around_cause_no_sampling_and_no_plan() {
+    let cluster = Cluster::start(3).await;
+    let session = cluster.session(sampled_as_cube(vec![view(0.0)])).await.unwrap();
+    let plan = session.plan().assignment;
+    assert_eq!((plan.workload.sample_cameras.len(), plan.workload.cell_count()), (3, 1));
+    assert!(plan.workload.samples_cube());
+    assert!(frames(&session, around(24)).await.iter().all(|frame| known_in_the_middle(frame) > 0.9));
+    assert_eq!(cluster.take_counts(), vec![1; plan.image_count()], "each image once, for all compositors");
+    for azimuth in around(6) {
+        session.set_viewpoints(vec![view(azimuth), view(azimuth + 0.5)]).await.unwrap();
+        assert!(known_in_the_middle(&frames(&session, [azimuth]).await[0]) > 0.9);
+    }
+    let second = cluster.session(sampled_as_cube(around(8).map(view).collect())).await.unwrap();
+    frames(&second, around(8)).await;
+    assert_eq!(second.plan().assignment.workload_number, plan.workload_number, "of one workload");
+    assert_eq!(session.plan().assignment.plan_epoch, second.plan().assignment.plan_epoch);
+    assert_eq!(session.plan().assignment.workload, plan.workload);
+    assert_eq!(cluster.take_counts(), [0; 0]);
+}
+
+/// A killed compositor's successor loads the images that are sampled already, once.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_successor_of_a_killed_compositor_pulls_the_set_once() {
+    let mut cluster = Cluster::start(3).await;
+    let session = cluster.session(sampled_as_cube(vec![view(0.0)])).await.unwrap();
+    frames(&session, around(12)).await;
+    cluster.take_counts();
+    let plan = session.plan().assignment;
+    let is_sampler = |name: &str| plan.samplers.iter().any(|share| share.node_name == name);
+    let killed = plan.compositors.iter().find(|share| !is_sampler(&share.node_name)).unwrap();
+    let number: usize = killed.node_name[1..].parse().unwrap();
+    cluster.nodes[number].kill();
+    let all = frames(&session, around(12)).await;
+    assert!(all.len() == 12 && all.iter().all(|frame| known_in_the_middle(frame) > 0.9));
+    cluster.add_node(|config| config);
+    let has_successor = || session.plan().assignment.composites("n3");
+    eventually("a successor", SOON, has_successor).await;
+    frames(&session, around(36)).await;
+    eventually("its set", SOON, || cluster.metrics[3].sets_loaded.get() > 0).await;
+    frames(&session, around(36)).await;
+    assert_eq!(cluster.metrics[3].sets_loaded.get(), 1);
+    assert_eq!(cluster.take_counts(), [0; 0], "nothing is sampled again");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_a_cube_does_not_serve_is_refused_by_name() {
+    let cluster = Cluster::start(1).await;
+    let refused = async |asked: SessionRequest| cluster.session(asked).await.err().unwrap().to_string();
+    let moving = Timeline { start_s: 0.0, step_s: 0.05, set_count: 4 };
+    let asked = SessionRequest { timeline: moving, ..sampled_as_cube(Vec::new()) };
+    assert!(refused(asked).await.contains("timeline: scenes that move are not sampled by cube"));
+    let asked = SessionRequest { sample_cameras: rig(), ..sampled_as_cube(Vec::new()) };
+    assert!(refused(asked).await.contains("sample_cameras: "));
+    let asked = SessionRequest { sample_size_px: Some(UVec2::splat(64)), ..sampled_as_cube(Vec::new()) };
+    assert!(refused(asked).await.contains("sample_image_size: "));
+}
