@@ -79,9 +79,12 @@ async fn a_successor_of_a_killed_compositor_pulls_the_set_once() {
     cluster.nodes[number].kill();
     let all = frames(&session, around(12)).await;
     assert!(all.len() == 12 && all.iter().all(|frame| known_in_the_middle(frame) > 0.9));
+    assert_eq!(cluster.take_counts(), [0; 0], "the others have the set");
     cluster.add_node(|config| config);
     let has_successor = || session.plan().assignment.composites("n3");
     eventually("a successor", SOON, has_successor).await;
+    // A node warms up by a small cube before it joins.
+    assert_eq!(cluster.engines[3].take_counts().len(), 3);
     frames(&session, around(36)).await;
     eventually("its set", SOON, || cluster.metrics[3].sets_loaded.get() > 0).await;
     frames(&session, around(36)).await;

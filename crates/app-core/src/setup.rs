@@ -215,8 +215,8 @@ impl SceneArgs {
         }
         if let Some(method) = self.method.filter(|method| method.walks_cube() != cube.is_some()) {
             let reason = match cube {
-                Some(_) => "makes views of depth images, and not of a layered cube",
-                None => "needs a layered cube: --sampling layered_cube",
+                Some(_) => "makes views of depth images, and not of a cube of layered ones",
+                None => "needs a cube of layered images: see --sampling",
             };
             return Err(BadInput(format!("--method {method} {reason}")).into());
         }

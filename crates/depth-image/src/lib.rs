@@ -21,6 +21,7 @@ mod method_table;
 mod parallel;
 mod pinhole;
 mod projection;
+mod sample_camera;
 mod sample_image;
 #[cfg(any(test, feature = "scalar"))]
 mod scalar;
@@ -50,7 +51,8 @@ pub use method_table::{NamedMethod, Setting, method_forms, method_help, method_n
 pub use parallel::ParallelCamera;
 pub use pinhole::PinholeCamera;
 pub use projection::{CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray};
-pub use sample_image::{SampleCamera, SampleImage, SampleImageError, SampleImages};
+pub use sample_camera::SampleCamera;
+pub use sample_image::{SampleImage, SampleImageError, SampleImages};
 #[cfg(any(test, feature = "scalar"))]
 pub use scalar::{
     Incident, Texel, disc_from_square, environment_highlight_linear, environment_reflectance_linear, highlight_linear,

@@ -177,6 +177,16 @@ fn views() -> RenderViews {
 }
 
 #[test]
+fn a_plan_of_a_cube_survives_the_round_trip() {
+    let mut cube = assignment();
+    let grid = CubeGrid::around(&cube.workload.volume, 64).unwrap();
+    cube.workload.sample_cameras = [0, 1, 2].map(|axis| grid.camera(axis).into()).to_vec();
+    cube.workload.timeline = Timeline::still(0.0);
+    cube.samplers[0].image_indices = vec![0, 1, 2];
+    assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(cube.clone())), Ok(cube));
+}
+
+#[test]
 fn messages_survive_the_round_trip() {
     assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(assignment())), Ok(assignment()));
     let mut cells = Assignment { tile_count: 2, relay_fanout: NonZeroU32::new(3), ..assignment() };
@@ -188,12 +198,6 @@ fn messages_survive_the_round_trip() {
     mirrors.workload = mirrors.workload.with_mirrors(vec![(cell, vec![camera().into()])]);
     mirrors.samplers[0].image_indices = vec![0, 1, 2];
     assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(mirrors.clone())), Ok(mirrors));
-    let mut cube = assignment();
-    let grid = CubeGrid::around(&cube.workload.volume, 64).unwrap();
-    cube.workload.sample_cameras = [0, 1, 2].map(|axis| grid.camera(axis).into()).to_vec();
-    cube.workload.timeline = Timeline::still(0.0);
-    cube.samplers[0].image_indices = vec![0, 1, 2];
-    assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(cube.clone())), Ok(cube));
     let apply = ApplyPlan { assignment: assignment(), open_workloads: vec![3, 1] };
     assert_eq!(read::<ApplyPlan, _>(to_message::<proto::ApplyAssignmentRequest, _>(apply.clone())), Ok(apply));
     assert_eq!(read::<SessionRequest, _>(to_message::<proto::OpenSessionRequest, _>(request())), Ok(request()));

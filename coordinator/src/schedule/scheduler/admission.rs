@@ -43,7 +43,8 @@ impl Scheduler {
     ) -> Result<(), ChoiceError> {
         let Some(number) = self.workload_of_session(session) else { return Ok(()) };
         let before = &self.workloads[&number];
-        if viewpoints.is_some() && before.cell_count().is_none() {
+        // A cube serves views from anywhere.
+        if viewpoints.is_some() && before.cell_count().is_none() && !before.requested.samples_cube() {
             return Err(ChoiceError::NoCells { session });
         }
         // Together: rate and cells multiply.
