@@ -90,6 +90,9 @@ pub struct OfferedCube {
     pub sampling: String,
     /// The lines along which it samples.
     pub grid: CubeGrid,
+    /// The sampling method with the rig's cameras, for sessions whose views are drawn directly: they share no workload with those of
+    /// the cube.
+    pub beside: String,
 }
 
 /// The scenes that a coordinator offers, at least one; sessions that name none get the first.

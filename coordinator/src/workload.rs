@@ -6,7 +6,7 @@ use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera, SampleCamera, ViewGroup
 use glam::UVec2;
 use tonic::Status;
 
-use crate::config::SceneOffer;
+use crate::config::{OfferedCube, SceneOffer};
 use crate::grpc_status::refusal;
 use crate::schedule::ChoiceError;
 
@@ -27,7 +27,9 @@ const LEAST_STEPS: f32 = -2.0;
 /// For invalid cameras.
 pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Result<Workload, Status> {
     let volume = request.volume.unwrap_or(offer.volume);
-    let cube = cube_of(request, offer)?;
+    let offered = offer.cube.as_ref().filter(|cube| cube.sampling == request.sampling);
+    let drawn = offered.filter(|_| request.method == DIRECT);
+    let cube = offered.filter(|_| drawn.is_none()).map(|cube| checked_cube(request, cube)).transpose()?;
     let cells = if cube.is_some() { Vec::new() } else { cells_of(request, offer, &volume)? };
     let sample_cameras = match cube {
         Some(grid) => [0, 1, 2].map(|axis| grid.camera(axis).into()).to_vec(),
@@ -38,7 +40,7 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
         sample_cameras,
         cell_first_indices: Vec::new(),
         mirror_cells: Vec::new(),
-        sampling: request.sampling.clone(),
+        sampling: drawn.map_or(&request.sampling, |cube| &cube.beside).clone(),
         lighting: request.lighting.clone(),
         planes: SamplePlanes::default(),
         volume,
@@ -52,16 +54,18 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
     Ok(workload.with_mirrors(mirrors))
 }
 
-/// The offered cube, where the session is sampled so. It depends on no viewer.
-fn cube_of(request: &SessionRequest, offer: &SceneOffer) -> Result<Option<CubeGrid>, Status> {
-    let cube = offer.cube.as_ref().filter(|cube| cube.sampling == request.sampling);
-    let field = match cube {
-        Some(_) if request.timeline.moves() => "timeline: scenes that move",
-        Some(_) if !request.sample_cameras.is_empty() => "sample_cameras: sessions with cameras of their own",
-        Some(_) if request.sample_size_px.is_some() => "sample_image_size: images of a chosen size",
-        _ => return Ok(cube.map(|cube| cube.grid)),
-    };
-    Err(Status::invalid_argument(format!("{field} are not sampled by {}", request.sampling)))
+/// The grid of an offered cube, which depends on no viewer.
+fn checked_cube(request: &SessionRequest, cube: &OfferedCube) -> Result<CubeGrid, Status> {
+    let refused = [
+        (request.timeline.moves(), "timeline: scenes that move"),
+        (!request.sample_cameras.is_empty(), "sample_cameras: sessions with cameras of their own"),
+        (request.sample_size_px.is_some(), "sample_image_size: images of a chosen size"),
+        (request.volume.is_some(), "volume: parts of the scene"),
+    ];
+    match refused.into_iter().find(|(is_asked, _)| *is_asked) {
+        Some((_, what)) => Err(Status::invalid_argument(format!("{what} are not sampled by {}", cube.sampling))),
+        None => Ok(cube.grid),
+    }
 }
 
 /// The sample cameras of a session without a cube; none with view cells, whose cameras follow from viewpoints.

@@ -98,6 +98,7 @@ impl Experiment {
         nodes: usize,
     ) -> anyhow::Result<Self> {
         let setup = args.load()?;
+        setup.check_depth_images()?;
         let engine = GpuEngine::shared(device)?;
         engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
         let runtime = runtime()?;

@@ -41,6 +41,7 @@ impl ReferenceViews {
         args: &SceneArgs,
         cameras: Vec<PinholeCamera>,
     ) -> anyhow::Result<Self> {
+        setup.check_depth_images()?;
         engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
         let images = sample(engine, setup, args)?;
         let environment = engine.scene(setup.offer.hash.as_str())?.environment.clone();

@@ -83,6 +83,23 @@ fn input_of_the_lab_that_cannot_be_used_is_named_with_status_2() {
 }
 
 #[test]
+fn what_cannot_be_sampled_as_a_cube_is_named_with_status_2() {
+    let cases: [(&[&str], &str); 6] = [
+        (&["up", "--scene", "snake", "--sampling", "layered_cube:64"], "snake moves"),
+        (&["up", "--scene", "quad", "--sampling", "layered_cube:15"], "layered_cube:15"),
+        (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--method", "mesh"], "--method mesh"),
+        (&["up", "--scene", "quad", "--method", "layered"], "see --sampling"),
+        (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--sample-size", "40x30"], "--sample-size"),
+        (&["plan", "--scene", "quad", "--sampling", "layered_cube:64", "--budget", "flip 0.1"], "needs depth images"),
+    ];
+    for (arguments, named) in cases {
+        let (status, message) = status_and_message(&myriorama(arguments));
+        assert_eq!(status, Some(2), "{arguments:?}: {message}");
+        assert!(message.contains(named), "{arguments:?}: {message}");
+    }
+}
+
+#[test]
 fn an_absent_cluster_is_a_failure_at_run_time() {
     let (status, message) =
         status_and_message(&myriorama(&["view", "--coordinator", "http://127.0.0.1:9", "--orbit", "2"]));

@@ -157,7 +157,7 @@ pub fn offer() -> SceneOffer {
         package: package(),
         fits_views: false,
         rig: rig(),
-        cube: Some(OfferedCube { sampling: CUBE.to_owned(), grid: cube_grid() }),
+        cube: Some(OfferedCube { sampling: CUBE.to_owned(), grid: cube_grid(), beside: "conventional".to_owned() }),
         mirrors: mirrors(),
         rows: rows(),
         keeps_cameras: false,

@@ -5,10 +5,10 @@ use std::f32::consts::TAU;
 use std::time::Duration;
 
 use client::{Frame, Session, ViewRequest};
-use cluster::{PolicyChoice, SessionRequest, Timeline};
+use cluster::{BudgetRequest, DIRECT, PolicyChoice, SessionRequest, Timeline};
 use cluster_tests::cluster::{CUBE, Cluster, request, rig};
 use cluster_tests::watcher::eventually;
-use depth_image::{PinholeCamera, ProvenanceKind};
+use depth_image::{Aabb, PinholeCamera, ProvenanceKind};
 use glam::{UVec2, Vec3};
 
 const STILL: Timeline = Timeline { start_s: 1.0, step_s: 0.0, set_count: 1 };
@@ -103,4 +103,29 @@ async fn what_a_cube_does_not_serve_is_refused_by_name() {
     assert!(refused(asked).await.contains("sample_cameras: "));
     let asked = SessionRequest { sample_size_px: Some(UVec2::splat(64)), ..sampled_as_cube(Vec::new()) };
     assert!(refused(asked).await.contains("sample_image_size: "));
+    let volume = Some(Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE });
+    let asked = SessionRequest { volume, ..sampled_as_cube(Vec::new()) };
+    assert!(refused(asked).await.contains("volume: "));
+    let budget = BudgetRequest { budget: Some("flip 0.1".to_owned()), ..BudgetRequest::default() };
+    let asked = SessionRequest { budget, forced_sampler_count: None, ..sampled_as_cube(Vec::new()) };
+    assert!(refused(asked).await.contains("budget: none can be kept for a layered cube"));
+}
+
+/// Whoever has views drawn directly changes nothing for viewers of the cube.
+#[tokio::test(flavor = "multi_thread")]
+async fn directly_drawn_views_are_of_another_workload() {
+    let cluster = Cluster::start(2).await;
+    let session = cluster.session(sampled_as_cube(vec![view(0.0)])).await.unwrap();
+    let plan = session.plan().assignment;
+    let asked = SessionRequest {
+        method: DIRECT.to_owned(),
+        policy: PolicyChoice::Direct,
+        forced_sampler_count: None,
+        ..sampled_as_cube(Vec::new())
+    };
+    let drawn = cluster.session(asked).await.unwrap();
+    assert_ne!(drawn.plan().assignment.workload_number, plan.workload_number);
+    assert!(!drawn.plan().assignment.workload.samples_cube());
+    frames(&drawn, [0.3]).await;
+    assert_eq!(session.plan().assignment.policy, plan.policy);
 }

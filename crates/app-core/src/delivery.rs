@@ -75,14 +75,17 @@ fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
     let (lighting, method) = (lighting.to_owned(), method.to_owned());
     let all = Quality { lighting, method, sample_side_ratio: 1.0, frame_rate_ratio: 1.0 };
     let plain = unmirrored.map(|lighting| Quality { lighting: lighting.to_string(), ..all.clone() });
-    let above = plain.clone().unwrap_or(all);
+    let above = plain.clone().unwrap_or_else(|| all.clone());
     let dim = fewer_rays.map(|lighting| Quality { lighting: lighting.to_string(), ..above.clone() });
     let above = dim.clone().unwrap_or(above);
     let coarse = fewer_steps.map(|method| Quality { method: method.to_string(), ..above.clone() });
     let above = coarse.clone().unwrap_or(above);
-    let small = Quality { sample_side_ratio: SAMPLE_SIDE_RATIO, ..above };
-    let slow = Quality { frame_rate_ratio: FRAME_RATE_RATIO, ..small.clone() };
-    plain.into_iter().chain(dim).chain(coarse).chain([small, slow]).collect()
+    // The images of a cube have one size.
+    let is_sized = !all.method.parse().is_ok_and(ReconstructionMethod::walks_cube);
+    let small = is_sized.then(|| Quality { sample_side_ratio: SAMPLE_SIDE_RATIO, ..above.clone() });
+    let above = small.clone().unwrap_or(above);
+    let slow = Quality { frame_rate_ratio: FRAME_RATE_RATIO, ..above };
+    plain.into_iter().chain(dim).chain(coarse).chain(small).chain([slow]).collect()
 }
 
 /// Opens a session.

@@ -56,9 +56,7 @@ impl Planning {
             let reason = "no budget can be kept for mirrors that show the scene";
             return Err(BadInput(format!("--lighting {}: {reason}", args.lighting)).into());
         }
-        if setup.offer.cube.is_some() {
-            return Err(BadInput(format!("--sampling {}: budgets choose among depth images", args.sampling())).into());
-        }
+        setup.check_depth_images()?;
         let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
         let view = cell.camera_at(Vec2::ZERO, views.size_px);
         let rig: Vec<Camera> = setup.around.iter().copied().map(Camera::Pinhole).collect();
@@ -254,7 +252,7 @@ mod tests {
         let camera = sized.representations[0].sample_cameras[0].reference();
         assert_eq!((camera.size_px, sized.ladder.rows().len()), (UVec2::new(320, 240), 60));
         assert_eq!(args(&["--sample-size", "320x240"]).sample_size, SampleSize::Fixed(UVec2::new(320, 240)));
-        for sampling in SamplingMethod::all() {
+        for sampling in SamplingMethod::all().filter(|sampling| sampling.layer_selection().is_none()) {
             let fixed = planning(&["--sampling", &sampling.to_string()]);
             let counts = distinct(&fixed, |row| row.camera_count);
             let expected =

@@ -102,6 +102,19 @@ pub struct Setup {
     pub offer: SceneOffer,
 }
 
+impl Setup {
+    /// Checks that samples are depth images, which not all commands can do without.
+    ///
+    /// # Errors
+    /// They are a cube.
+    pub fn check_depth_images(&self) -> Result<(), BadInput> {
+        let cube = self.offer.cube.as_ref();
+        cube.map_or(Ok(()), |cube| {
+            Err(BadInput(format!("--sampling {}: this command needs depth images", cube.sampling)))
+        })
+    }
+}
+
 /// The scene's mirrors, as sessions follow them.
 fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<(MirrorCell, Vec<Camera>)> {
     let (mirrors, beyond) = sampling::mirrors(scene, impostors);
@@ -187,7 +200,11 @@ impl SceneArgs {
             hash: SceneHash::of(&package),
             package: package.into(),
             mirrors: if cube.is_some() { Vec::new() } else { mirrors_of(&scene, self.impostors) },
-            cube: cube.map(|grid| OfferedCube { sampling: self.sampling().to_string(), grid }),
+            cube: cube.map(|grid| OfferedCube {
+                sampling: self.sampling().to_string(),
+                grid,
+                beside: SamplingMethod::default().to_string(),
+            }),
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
             fits_views: self.sample_size == SampleSize::Auto && self.samples.is_none(),
             rows: rows(&self.named(around.len() as u32)),
@@ -212,6 +229,10 @@ impl SceneArgs {
         let cube = sampling.cube(&scene.bounds()).with_context(|| format!("{}: --sampling {sampling}", self.scene))?;
         if cube.is_some() && scene.period_s().is_some() {
             return Err(BadInput(format!("--sampling {sampling}: {} moves, and a cube holds still", self.scene)).into());
+        }
+        if cube.is_some() && self.sample_size.fixed_px().is_some() {
+            let reason = "the size of its images follows from SIDE";
+            return Err(BadInput(format!("--sample-size: {sampling} has none, {reason}")).into());
         }
         if let Some(method) = self.method.filter(|method| method.walks_cube() != cube.is_some()) {
             let reason = match cube {

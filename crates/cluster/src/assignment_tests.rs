@@ -265,6 +265,10 @@ fn a_cube_is_one_cell_of_its_three_cameras_for_views_from_anywhere() {
     assert!(refused(cube(still, &|cameras| cameras.swap(0, 1))).contains("three cameras of one layered cube"));
     assert!(refused(cube(still, &|cameras| cameras[2] = camera().into())).contains("2 parallel of 3"));
     assert!(refused(cube(still, &|cameras| cameras.truncate(2))).contains("2 parallel of 2"));
+    let grid = CubeGrid::around(&good.volume, 64).unwrap();
+    let flat = CubeGrid { size: grid.size.with_y(15), ..grid };
+    let flat = cube(still, &|cameras| *cameras = [0, 1, 2].map(|axis| flat.camera(axis).into()).to_vec());
+    assert!(refused(flat).contains("16 rows and more"));
     let cells = Workload { cell_first_indices: vec![0, 1], ..good };
     assert!(refused(cells).contains("in 2 cells"));
     let moving = Timeline { start_s: 0.0, step_s: 0.1, set_count: 5 };

@@ -9,7 +9,7 @@ use depth_image::{
 use serde::{Deserialize, Serialize};
 
 use crate::check::{InvalidField, at_most, nonempty, pinholes, within};
-use crate::limits::{MAX_CELLS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS};
+use crate::limits::{MAX_CELLS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS, MAX_TILES};
 use crate::scene::SceneRef;
 use crate::timeline::{Refinement, Timeline};
 
@@ -289,6 +289,9 @@ impl Workload {
             let given = format!("{} parallel of {} in {cells} cells", parallel.len(), self.sample_cameras.len());
             let allowed = "the three cameras of one layered cube, in one cell";
             return Err(InvalidField::out_of_range("sample_cameras.model", given, allowed));
+        }
+        if let Some(short) = parallel.iter().find(|camera| camera.size_px.y < MAX_TILES) {
+            return Err(InvalidField::out_of_range("sample_cameras.size", short.size_px, "16 rows and more in a cube"));
         }
         match self.timeline.moves() {
             true => Err(InvalidField::out_of_range("timeline", "of a scene that moves", "still for a layered cube")),

@@ -223,7 +223,7 @@ fn damaged_planes_behind_a_sound_lz4_never_panic() {
 fn damaged_words_behind_a_sound_lz4_never_panic() {
     let mut random = Random::new(14);
     let words: Vec<u32> = (0..500).map(|_| random.next_u32() >> random.below(32)).collect();
-    for layout in [WordLayout::Whole, WordLayout::Halves, WordLayout::Bytes] {
+    for layout in [WordLayout::Whole, WordLayout::Halves, WordLayout::TwoBytes, WordLayout::Bytes] {
         let mut good = Vec::new();
         pack_words(&words, layout, &mut good);
         for _ in 0..2000 {

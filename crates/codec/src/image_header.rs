@@ -203,6 +203,9 @@ impl ImageHeader {
         let texels = limits.texels(self.width, self.height)?;
         self.inverse_depth_range.validate()?;
         self.validate_kinds()?;
+        if self.layered.is_some() && !self.inverse_depth_range.is_empty() {
+            return Err(DecodeError::Header { field: "inverse_depth_range", reason: "not 0 in a layered image" });
+        }
         let samples = self.layered.map_or(texels, |layered| layered.sample_count as usize);
         check_limit("sample_count", samples as u64, texels as u64 * u64::from(MAX_LAYERS))?;
         let counts = Counts { samples, corners: self.corners(), lines: texels };

@@ -149,4 +149,29 @@ mod tests {
         let most_m = 0.51 * range_m / f32::from(u16::MAX);
         assert!(depths.iter().zip(&back).all(|(a, b)| (a - b).abs() <= most_m && *b <= range_m));
     }
+
+    #[test]
+    fn damaged_planes_behind_a_sound_lz4_never_panic() {
+        let mut random = Random::new(23);
+        let mut first = vec![0];
+        (0..600).for_each(|line| first.push(first[line] + random.below(6) as u32));
+        let samples = first[600] as usize;
+        let depths: Vec<f32> = (0..samples).map(|_| random.unit() * 5.0).collect();
+        let [mut counts, mut codes] = [Vec::new(), Vec::new()];
+        pack_layer_counts(&first, &mut counts);
+        pack_depths(&depths, 5.0, &mut codes);
+        let mut damaged = |good: &[u8]| {
+            let mut bytes = good.to_vec();
+            let at = random.below(bytes.len());
+            bytes[at] = random.next_u32() as u8;
+            bytes.truncate(if random.below(4) == 0 { random.below(bytes.len()) } else { bytes.len() });
+            bytes
+        };
+        for _ in 0..3000 {
+            let first = unpack_layer_counts(&mut &damaged(&counts)[..], 600, samples);
+            assert!(first.is_err() || first.is_ok_and(|first| first.is_sorted() && first[600] as usize == samples));
+            let depths = unpack_depths(&mut &damaged(&codes)[..], samples, 5.0);
+            assert!(depths.is_err() || depths.is_ok_and(|depths| depths.iter().all(|d| (0.0..=5.0).contains(d))));
+        }
+    }
 }

@@ -104,7 +104,10 @@ fn damaged_payloads_never_panic() {
 fn damaged_headers_are_refused_by_field() {
     let good = encode_layered_image(&image(40, 20, true)).unwrap();
     type Damage = fn(&mut ImageHeader);
-    let cases: [(&str, Damage); 12] = [
+    let cases: [(&str, Damage); 13] = [
+        ("inverse_depth_range", |h| {
+            h.inverse_depth_range = InverseDepthRange { least_per_m: 0.1, greatest_per_m: 1.0 }
+        }),
         ("size", |h| h.width = 0),
         ("texels", |h| (h.width, h.height) = (16_384, 16_384)),
         ("must begin with inverse depth", |h| h.layered = None),

@@ -177,8 +177,8 @@ mod tests {
         for count in [0, 1, 2, 7, 1000, BLOCK + 3] {
             for layout in [WordLayout::Whole, WordLayout::Halves, WordLayout::TwoBytes, WordLayout::Bytes] {
                 let least_shift = if layout == WordLayout::TwoBytes { 16 } else { 0 };
-                let shift = least_shift + random.below(32 - least_shift);
-                let words: Vec<u32> = (0..count).map(|_| random.next_u32() >> shift).collect();
+                let mut word = || random.next_u32() >> (least_shift + random.below(32 - least_shift));
+                let words: Vec<u32> = (0..count).map(|_| word()).collect();
                 let mut bytes = Vec::new();
                 pack_words(&words, layout, &mut bytes);
                 assert!(bytes.len() <= max_words_bytes(words.len(), layout));

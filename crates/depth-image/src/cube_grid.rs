@@ -25,7 +25,8 @@ pub const CUBE_SIDES: std::ops::RangeInclusive<u32> = 16..=4096;
 const CAMERA_ROUNDING: f32 = 0.05;
 
 impl CubeGrid {
-    /// The grid around a box with `side` cells along its longest edge. Surfaces on the faces of the box lie within it.
+    /// The grid around a box with `side` cells along its longest edge, and 16 at least along the others. Surfaces on the faces of the
+    /// box lie within it.
     ///
     /// # Errors
     /// A side beyond [`CUBE_SIDES`], and a box that is empty or not finite.
@@ -40,8 +41,8 @@ impl CubeGrid {
         }
         let spacing_m = extent_m / (side - 1) as f32;
         // Half a cell of room on each side, and for the rounding of coordinates.
-        let size =
-            ((bounds.size() / spacing_m + 1.0 - 1e-3).ceil().as_uvec3()).clamp(UVec3::splat(2), UVec3::splat(side));
+        let size = (bounds.size() / spacing_m + 1.0 - 1e-3).ceil().as_uvec3();
+        let size = size.clamp(UVec3::splat(*CUBE_SIDES.start()), UVec3::splat(side));
         let corner_in_world = bounds.center() - size.as_vec3() * (0.5 * spacing_m);
         Ok(Self { corner_in_world, world_from_cube: Quat::IDENTITY, spacing_m, size })
     }

@@ -1,12 +1,13 @@
 //! The exposure of sessions that leave it to the plan.
 
-use cluster::{MeasureCosts, Workload};
+use cluster::Workload;
 use depth_image::{
     ExposureEv, PinholeCamera, SampleCamera, ToneCurve, ToneMapping, View, ViewCell, ViewPlanes, linear_from_srgb8,
 };
 use glam::{UVec2, Vec2};
 
 use crate::engine::{DirectWork, Engine, EngineError, Turn};
+use crate::outside::view_from_outside;
 
 /// The picture that is measured.
 const SIZE_PX: UVec2 = UVec2::splat(64);
@@ -28,12 +29,10 @@ const STEPS_PER_EV: f32 = 100.0;
 /// Enough for each way through the limits, and a refinement.
 const MOST_PICTURES: usize = 6;
 
-/// Measures the exposure of a workload on the view in the middle of its first view cell, drawn from the scene at its start; without
-/// view cells, on the first typical view. It is 0 where that view shows no surface.
-pub(crate) fn auto_exposure(engine: &dyn Engine, asked: &MeasureCosts, turn: Turn) -> Result<ExposureEv, EngineError> {
-    let workload = &asked.workload;
-    let typical_view = || asked.typical_views.first().map(|view| view.resized(SIZE_PX));
-    let Some(camera) = default_view(workload).or_else(typical_view) else { return Ok(ExposureEv::ZERO) };
+/// Measures the exposure of a workload on the view in the middle of its first view cell, or else from outside, drawn from the scene at
+/// its start. It is 0 where that view shows no surface.
+pub(crate) fn auto_exposure(engine: &dyn Engine, workload: &Workload, turn: Turn) -> Result<ExposureEv, EngineError> {
+    let camera = default_view(workload).unwrap_or_else(|| view_from_outside(&workload.volume, SIZE_PX));
     exposure_of(|exposure| {
         let tone = ToneMapping { exposure, curve: ToneCurve::None };
         let planes = ViewPlanes { tone, ..ViewPlanes::WITH_DEPTH };

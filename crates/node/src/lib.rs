@@ -11,6 +11,7 @@ mod device_monitor;
 mod engine;
 mod measure;
 mod membership;
+mod outside;
 mod plan;
 mod port;
 mod scenes;

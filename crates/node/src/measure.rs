@@ -98,7 +98,7 @@ impl Measurement<'_> {
         let in_order = engine.images_are_sequential(&workload.sampling)?;
         let costs =
             Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles };
-        Ok(Measured { costs, planes, auto_exposure: auto_exposure(engine, request, self.turn)? })
+        Ok(Measured { costs, planes, auto_exposure: auto_exposure(engine, workload, self.turn)? })
     }
 
     /// Images as they leave a sampler, which encodes one set before it samples the next.

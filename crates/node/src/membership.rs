@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use cluster::{Assignment, JoinCluster, NodeStatus, Policy, Welcome, Workload};
 use depth_image::{CubeGrid, PinholeCamera, SampleCamera, ViewPlanes};
-use glam::{UVec2, Vec3};
+use glam::UVec2;
 use tokio_stream::StreamExt as _;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
@@ -14,6 +14,7 @@ use wire::rpc::{Backoff, CoordinatorClient, connect};
 
 use crate::blocking::blocking;
 use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, ViewWork, WorkClass, mirroring};
+use crate::outside::view_from_outside;
 use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
 use crate::work_done::WorkDone;
@@ -162,10 +163,7 @@ fn small(workload: &Workload) -> Workload {
 
 /// The view of the first sample camera, or one from outside.
 fn any_view(workload: &Workload) -> PinholeCamera {
-    let outside = || {
-        let (middle, size) = (workload.volume.center(), workload.volume.size());
-        PinholeCamera::looking_at(middle + size.max_element() * Vec3::new(1.0, 0.5, 1.0), middle, Vec3::Y, 0.8, SIZE_PX)
-    };
+    let outside = || view_from_outside(&workload.volume, SIZE_PX);
     SampleCamera::references(&workload.sample_cameras).first().copied().unwrap_or_else(outside)
 }
 
@@ -202,6 +200,11 @@ mod tests {
                 (sampled, sampled, drawn)
             );
         }
+        let grid = CubeGrid::around(&request(1).workload.volume, 64).unwrap();
+        let sample_cameras = [0, 1, 2].map(|axis| grid.camera(axis).into()).to_vec();
+        let cube = small(&Workload { sample_cameras, ..request(1).workload });
+        assert_eq!((cube.validate(), cube.sample_cameras[0].size_px()), (Ok(()), SIZE_PX));
+        assert_eq!(any_view(&cube), view_from_outside(&cube.volume, SIZE_PX));
         assert!(small(&request(1).workload).sample_cameras.iter().all(|camera| camera.size_px() == SIZE_PX));
     }
 }

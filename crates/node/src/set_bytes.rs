@@ -1,6 +1,7 @@
 //! The sizes of sample sets in memory, before they are allocated and afterwards.
 
-use depth_image::{DepthImage, Illumination, LayeredDepthImage, SampleCamera, SampleImages, SpecularPlanes};
+use depth_image::{CubeGrid, DepthImage, Illumination, LayeredDepthImage, SampleCamera, SampleImages, SpecularPlanes};
+use glam::UVec3;
 
 /// Inverse depth, colour, a normal, a surface, reflectance and a mark, for one texel.
 const MOST_TEXEL_BYTES: usize = 4 + 4 + 4 + 8 + 4 + 1;
@@ -12,6 +13,8 @@ const PYRAMID_TEXEL_BYTES: usize = 11;
 const MOST_SAMPLE_BYTES: usize = 4 + 2 + 4 + 4 + 4;
 /// A sample's words, and its entry among those of its voxel, on a device.
 const CUBE_SAMPLE_BYTES: usize = 16 + 16;
+/// A cell has so many spacings a side, and a word in a table.
+const CELL_SIDE: u32 = 8;
 /// The number of a line's first sample.
 const LINE_BYTES: usize = 4;
 /// Samples of a line that are reserved for before they are known, on average over a cube: few scenes have more, and what a set
@@ -34,14 +37,16 @@ pub fn most_image_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -
     cameras.iter().map(bytes).sum()
 }
 
-/// The most bytes of a set on a device.
+/// The most bytes of a set on a device; of a cube, as [`most_image_bytes`] expects them.
 #[must_use]
 pub fn most_set_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -> usize {
     let search_bytes = |camera: &SampleCamera| match camera {
         SampleCamera::Depth(camera) => camera.pixel_count() * PYRAMID_TEXEL_BYTES,
         SampleCamera::Layered(camera) => camera.pixel_count() * EXPECTED_LAYERS * CUBE_SAMPLE_BYTES,
     };
-    most_image_bytes(illumination, cameras) + cameras.iter().map(search_bytes).sum::<usize>()
+    let parallel: Vec<_> = cameras.iter().filter_map(SampleCamera::layered).copied().collect();
+    let cells = CubeGrid::of_cameras(&parallel).map_or(0, |grid| cell_bytes(grid.size));
+    most_image_bytes(illumination, cameras) + cameras.iter().map(search_bytes).sum::<usize>() + cells
 }
 
 /// Bytes of images on a device, by the planes that they have.
@@ -49,8 +54,14 @@ pub fn most_set_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -> 
 pub fn set_bytes(images: &SampleImages) -> usize {
     match images {
         SampleImages::Depth(images) => depth_images_bytes(images),
-        SampleImages::Cube(_, images) => images.iter().map(layered_bytes).sum(),
+        SampleImages::Cube(grid, images) => cell_bytes(grid.size) + images.iter().map(layered_bytes).sum::<usize>(),
     }
+}
+
+/// Bytes of the table of a cube's cells.
+fn cell_bytes(size: UVec3) -> usize {
+    let [x, y, z] = size.to_array().map(|side| side.div_ceil(CELL_SIDE) as usize);
+    4 * x * y * z
 }
 
 /// Bytes of depth images on a device, by the planes that they have.
@@ -82,11 +93,35 @@ fn image_bytes(image: &DepthImage) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use depth_image::PinholeCamera;
+    use depth_image::{Aabb, PinholeCamera};
     use glam::{UVec2, Vec3};
 
     use super::*;
     use crate::measure::tests::request;
+
+    #[test]
+    fn a_cube_of_two_samples_a_line_has_the_expected_bytes() {
+        let grid = CubeGrid::around(&Aabb { min: Vec3::ZERO, max: Vec3::ONE }, 32).unwrap();
+        let image = |axis| {
+            let camera = grid.camera(axis);
+            let samples = 2 * camera.pixel_count();
+            LayeredDepthImage {
+                first: (0..=camera.pixel_count() as u32).map(|line| 2 * line).collect(),
+                planar_depth_m: vec![0.5; samples],
+                plane_normal_oct8: vec![0; samples],
+                color_rgb9e5: vec![0; samples],
+                normal_oct16: None,
+                specular: None,
+                truncated: false,
+                camera,
+            }
+        };
+        let cameras = [0, 1, 2].map(|axis| grid.camera(axis).into());
+        let bytes = set_bytes(&SampleImages::Cube(grid, Box::new([image(0), image(1), image(2)])));
+        assert_eq!(bytes, 3 * 2 * 32 * 32 * 32 + 4 * 4 * 4 * 4);
+        let most = most_set_bytes(&request(1).workload.illumination, &cameras);
+        assert!(most > bytes && most < 3 * bytes, "{bytes} of {most}");
+    }
 
     #[test]
     fn a_set_is_never_larger_than_its_cameras_told() {

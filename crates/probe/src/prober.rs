@@ -240,7 +240,7 @@ impl Prober {
     fn encoded(&self, work: &SampleWork) -> Result<(Vec<EncodedImage>, f64), ProbeError> {
         let (encoded, seconds) = self.own_time(|| {
             let images = self.engine.sample(work, self.turn)?;
-            let encoded = images.iter().map(|image| encode_sample_image(image));
+            let encoded = images.iter().map(encode_sample_image);
             Ok::<_, ProbeError>(encoded.collect::<Result<Vec<_>, _>>()?)
         });
         let encoded = encoded?;

@@ -21,7 +21,9 @@ fn a_set_in_slices_is_the_whole_set_with_every_method() {
     for visibility in [Visibility::Triangles, Visibility::Rays] {
         // Tests that trace rays find surfaces by rays.
         let is_possible = |method: &SamplingMethod| {
-            visibility == Visibility::Rays || method.images_are_sequential() || method.images_are_independent()
+            let takes_images = method.layer_selection().is_none();
+            let is_drawn = method.images_are_sequential() || method.images_are_independent();
+            takes_images && (visibility == Visibility::Rays || is_drawn)
         };
         for method in SamplingMethod::all().filter(is_possible) {
             let cameras = pinholes(&method.cameras(rig.to_vec()));

@@ -10,8 +10,8 @@ use super::{Convert, required};
 use crate::error::WireError;
 use crate::proto::chunk::Body;
 
-/// One plane of each kind; visibility may have more.
-const MAX_PLANES: usize = 6 + MAX_VISIBILITY_PLANES;
+/// One plane of each kind that a depth image may have, which has the most; visibility may have more.
+const MAX_PLANES: usize = 7 + MAX_VISIBILITY_PLANES;
 
 messages! {
     FetchSampleImagesRequest = FetchImages { plan_epoch, workload_number, set_index, image_indices; cell: cell_index },
