@@ -17,6 +17,8 @@ const ALL_BUSY_KNOWN: &str = "[...document.querySelectorAll('#nodes tbody td:las
 const FIGURES: &str = "Object.fromEntries([...document.querySelectorAll('#workloads dl div')].map((figure) =>
     [figure.firstChild.textContent, figure.lastChild.textContent]))";
 const IS_NOW: &str = "document.getElementById('updated').textContent === 'Now, every second.'";
+/// Times that the page is compared with the cluster, a fifth of a second apart.
+const ATTEMPTS: usize = 50;
 
 /// The page of the status, after a visit to the scene: its workload stays for a while.
 async fn status_of(url: &str) -> Visit {
@@ -35,18 +37,25 @@ async fn the_status_names_the_nodes_the_policy_and_the_samplers() {
     let names: Vec<&str> = nodes.iter().map(|[name, ..]| name.as_str()).collect();
     assert_eq!(names, ["n0", "n1", "n2"]);
     assert!(nodes.iter().all(|[_, device, ..]| device == "scalar loops"), "{nodes:?}");
-    let status = bench.cluster.client.status().await.unwrap();
-    let plan = &status.workloads[0].plan.as_ref().unwrap().assignment;
-    let shown: BTreeMap<String, String> = visit.browser.value(FIGURES).await.unwrap();
-    assert_eq!(
-        (&*shown["Policy"], &*shown["K, samplers"]),
-        (&*plan.policy.to_string(), &*plan.samplers.len().to_string())
-    );
     visit.until(ALL_BUSY_KNOWN).await;
-    for sampler in &plan.samplers {
-        let row = nodes.iter().find(|[name, ..]| *name == sampler.node_name).unwrap();
-        assert!(row[2].contains("sampler"), "{row:?}");
+    // The page shows the status of a moment ago, and a new plan may have come since.
+    let mut differing = String::new();
+    for _ in 0..ATTEMPTS {
+        let status = bench.cluster.client.status().await.unwrap();
+        let plan = &status.workloads[0].plan.as_ref().unwrap().assignment;
+        let shown: BTreeMap<String, String> = visit.browser.value(FIGURES).await.unwrap();
+        let nodes: Vec<[String; 4]> = visit.browser.value(NODES).await.unwrap();
+        let policy = (plan.policy.to_string(), plan.samplers.len().to_string());
+        let is_shown = |name: &str| nodes.iter().any(|[node, _, roles, _]| node == name && roles.contains("sampler"));
+        let all_shown = plan.samplers.iter().all(|share| is_shown(&share.node_name));
+        if all_shown && (&shown["Policy"], &shown["K, samplers"]) == (&policy.0, &policy.1) {
+            differing.clear();
+            break;
+        }
+        differing = format!("{nodes:?} {shown:?}, but {policy:?} {:?}", plan.samplers);
+        tokio::time::sleep(std::time::Duration::from_millis(200)).await;
     }
+    assert_eq!(differing, "");
     visit.end(Expected::NoError).await;
 }
 
