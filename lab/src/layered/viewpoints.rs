@@ -15,8 +15,8 @@ use super::subject::{Cube, Subject};
 use super::views::LAYERED;
 use crate::failures::stage::CARVE;
 
-/// Numbers of viewpoints.
-const COUNTS: [usize; 5] = [1, 4, 16, 64, 256];
+/// Numbers of viewpoints. A quick run has no more than the first four.
+pub const COUNTS: [usize; 5] = [1, 4, 16, 64, 256];
 /// The number, over a hemisphere, at which the bytes of a cube have a bound, as a share of those of cells.
 const BOUNDED: (usize, f64) = (64, 0.5);
 /// The views that are made at most, evenly among the viewpoints.
@@ -106,7 +106,7 @@ pub fn table() -> Table {
 ///
 /// # Errors
 /// The device fails.
-pub fn measure(subject: &Subject<'_>, table: &mut Table) -> anyhow::Result<(XyChart, Vec<Check>)> {
+pub fn measure(subject: &Subject<'_>, counts: &[usize], table: &mut Table) -> anyhow::Result<(XyChart, Vec<Check>)> {
     let cubes = SIDES.iter().map(|&side| {
         let cube = subject.cube((side, LayerSelection::Dominant), subject.lighting, 1)?;
         Ok((side, cube.encoded_bytes()?, cube))
@@ -117,7 +117,7 @@ pub fn measure(subject: &Subject<'_>, table: &mut Table) -> anyhow::Result<(XyCh
     let mut checks = Vec::new();
     for places in Places::ALL {
         let (mut of_cells, mut of_cube) = (Vec::new(), Vec::new());
-        for count in COUNTS {
+        for &count in counts {
             let [bytes, ratio, worse_db] = row(subject, (places, count), &cubes, table)?;
             of_cells.push((count as f64, bytes / 1e6));
             of_cube.push((count as f64, ratio * bytes / 1e6));
