@@ -32,7 +32,7 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
     let cube = offered.filter(|_| drawn.is_none()).map(|cube| checked_cube(request, cube)).transpose()?;
     let cells = if cube.is_some() { Vec::new() } else { cells_of(request, offer, &volume)? };
     let sample_cameras = match cube {
-        Some(grid) => [0, 1, 2].map(|axis| grid.camera(axis).into()).to_vec(),
+        Some(grid) => grid.cameras().map(SampleCamera::from).to_vec(),
         None => sample_cameras_of(request, offer, !cells.is_empty())?,
     };
     let workload = Workload {

@@ -1,7 +1,7 @@
 //! A depth image to header and payload, and back.
 
 use bytes::Bytes;
-use depth_image::{Camera, DepthImage, DepthImageError, SurfaceId};
+use depth_image::{Camera, DepthImage, DepthImageError, SpecularPlanes, SurfaceId};
 use glam::UVec2;
 
 use crate::color_codec::{pack_colors, unpack_colors};
@@ -174,13 +174,8 @@ fn decode_plane(
             let nothing = SurfaceId { instance: 0, primitive: 0 };
             image.surface_id = Some(runs.scatter(&unpack_surface_ids(&mut input, samples)?, nothing));
         }
-        PlaneKind::ReflectanceRoughness8 => {
-            let reflectances = words(&mut input, WordLayout::Bytes)?;
-            image.specular.get_or_insert_default().reflectance_srgb8_roughness8 = reflectances;
-        }
-        PlaneKind::Visibility8 => {
-            let visibilities = words(&mut input, WordLayout::Bytes)?;
-            image.specular.get_or_insert_default().visibility8.push(visibilities);
+        PlaneKind::ReflectanceRoughness8 | PlaneKind::Visibility8 => {
+            put_specular(&mut image.specular, plane.kind, words(&mut input, WordLayout::Bytes)?);
         }
         PlaneKind::Passed1 => {
             let texels = image.inverse_depth_per_m.len();
@@ -195,6 +190,15 @@ fn decode_plane(
         }
     }
     check_end(plane.kind, input)
+}
+
+/// Adds a plane of inputs of highlights.
+pub(crate) fn put_specular(specular: &mut Option<SpecularPlanes>, kind: PlaneKind, words: Vec<u32>) {
+    let specular = specular.get_or_insert_default();
+    match kind {
+        PlaneKind::ReflectanceRoughness8 => specular.reflectance_srgb8_roughness8 = words,
+        _ => specular.visibility8.push(words),
+    }
 }
 
 /// Nothing may be left of a plane.

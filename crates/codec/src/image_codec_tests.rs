@@ -1,6 +1,6 @@
 //! Round trips, and thousands of damaged headers and payloads.
 
-use depth_image::{PinholeCamera, SpecularPlanes};
+use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
 
 use super::*;

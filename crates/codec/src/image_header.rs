@@ -109,7 +109,7 @@ impl PlaneKind {
         }
     }
 
-    /// Most bytes that a plane of so many values has before LZ4.
+    /// The most bytes of a plane before LZ4, by its number of values.
     const fn max_raw_bytes(self, values: usize) -> usize {
         match self {
             Self::InverseDepth => max_unpacked_bytes(values),

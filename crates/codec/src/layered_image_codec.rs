@@ -3,7 +3,7 @@
 use depth_image::{LayeredDepthImage, LayeredError, ParallelCamera};
 
 use crate::color_codec::{pack_colors, unpack_colors};
-use crate::image_codec::{Packer, check_end, check_payload, expand_plane};
+use crate::image_codec::{Packer, check_end, check_payload, expand_plane, put_specular};
 use crate::layered_codec::{
     gather, layer_by_layer, pack_depths, pack_layer_counts, scatter, unpack_depths, unpack_layer_counts,
 };
@@ -111,13 +111,8 @@ fn decode_plane(
         }
         PlaneKind::ColorRgb9e5 => image.color_rgb9e5 = scatter(&unpack_colors(&mut input, samples)?, places),
         PlaneKind::NormalOct16 => image.normal_oct16 = Some(words(&mut input, WordLayout::Halves)?),
-        PlaneKind::ReflectanceRoughness8 => {
-            let reflectances = words(&mut input, WordLayout::Bytes)?;
-            image.specular.get_or_insert_default().reflectance_srgb8_roughness8 = reflectances;
-        }
-        PlaneKind::Visibility8 => {
-            let visibilities = words(&mut input, WordLayout::Bytes)?;
-            image.specular.get_or_insert_default().visibility8.push(visibilities);
+        PlaneKind::ReflectanceRoughness8 | PlaneKind::Visibility8 => {
+            put_specular(&mut image.specular, plane.kind, words(&mut input, WordLayout::Bytes)?);
         }
         _ => return Err(DecodeError::Header { field: "planes.kind", reason: "of depth images alone" }),
     }

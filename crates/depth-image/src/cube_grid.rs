@@ -101,6 +101,12 @@ impl CubeGrid {
         is_alike && places.into_iter().all(|(pixel, planar_depth_m)| is_near(pixel, planar_depth_m))
     }
 
+    /// The cameras along the three axes.
+    #[must_use]
+    pub fn cameras(&self) -> [ParallelCamera; 3] {
+        [0, 1, 2].map(|axis| self.camera(axis))
+    }
+
     /// The camera of the lines along an axis, 0 to 2, which looks against the axis. Its columns rise along the next axis, and
     /// its rows fall along the one after that.
     #[must_use]

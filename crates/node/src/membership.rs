@@ -155,7 +155,7 @@ fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), En
 fn small(workload: &Workload) -> Workload {
     let camera = |camera: &SampleCamera| camera.resized(SIZE_PX);
     let sample_cameras = match CubeGrid::around(&workload.volume, SIZE_PX.x) {
-        Ok(grid) if workload.samples_cube() => [0, 1, 2].map(|axis| grid.camera(axis).into()).to_vec(),
+        Ok(grid) if workload.samples_cube() => grid.cameras().map(SampleCamera::from).to_vec(),
         _ => workload.sample_cameras.iter().map(camera).collect(),
     };
     Workload { sample_cameras, ..workload.clone() }

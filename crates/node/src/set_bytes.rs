@@ -13,7 +13,7 @@ const PYRAMID_TEXEL_BYTES: usize = 11;
 const MOST_SAMPLE_BYTES: usize = 4 + 2 + 4 + 4 + 4;
 /// A sample's words, and its entry among those of its voxel, on a device.
 const CUBE_SAMPLE_BYTES: usize = 16 + 16;
-/// A cell has so many spacings a side, and a word in a table.
+/// The side of a cell of a cube, in spacings. A table has one word for each cell.
 const CELL_SIDE: u32 = 8;
 /// The number of a line's first sample.
 const LINE_BYTES: usize = 4;

@@ -4,15 +4,15 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use codec::{PlaneSet, encode_depth_image};
-use depth_image::{Aabb, Antialias, Camera, DepthImage, PinholeCamera, View, ViewGroup, ViewPlanes, nearest_set};
+use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, View, ViewGroup, ViewPlanes, nearest_set};
 use glam::{UVec2, Vec3};
 use metrics::{PictureErrors, Rgb8Image};
 use reconstruction::{ReconstructionMethod, SampleSet};
-use render::{LayerSelection, SamplePlanes};
+use render::LayerSelection;
 use study::{Axis, Bar, Cell, Check, Series, Table, XyChart};
 
 use super::subject::{Cube, Subject};
-use super::views::LAYERED;
+use super::views::{LAYERED, PLAIN};
 use crate::failures::stage::CARVE;
 
 /// Numbers of viewpoints. A quick run has no more than the first four.
@@ -27,8 +27,6 @@ const SIDES: [u32; 4] = [128, 256, 512, 1024];
 const WORSE_DB: f64 = 1.0;
 /// The size of views; sample images have twice as many columns and rows.
 const VIEW_PX: UVec2 = UVec2::new(200, 150);
-const PLAIN: SamplePlanes =
-    SamplePlanes { antialias: Antialias::NONE, normal: false, surface_id: false, specular: true, corners: false };
 
 /// Where viewers are.
 #[derive(Debug, Clone, Copy, PartialEq)]
