@@ -47,7 +47,7 @@ impl Fetcher {
         }
         let (images, times) = gathered?;
         let images = join_tiles(&set.plan, images).await?;
-        let whole = SampleSet::of(&set.plan.workload, images, set.plan.is_mirror);
+        let whole = SampleSet::of(&set.plan.workload, images, set.plan.is_common);
         Ok((whole.map_err(|error| Status::data_loss(error.to_string()))?, times))
     }
 

@@ -4,11 +4,11 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use cluster::{Assignment, Policy, SetContent, Timeline, Workload};
+use cluster::{Assignment, CommonCell, Policy, SetContent, Timeline, Workload};
 use codec::EncodedImage;
-use depth_image::{Aabb, DepthImage, PinholeCamera, SampleCamera, nearest_set};
+use depth_image::{DepthImage, PinholeCamera, SampleCamera, nearest_set};
 use node::{
-    ByteCache, CellPlan, Engine, MirrorSet, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet,
+    ByteCache, CellPlan, CommonSet, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet,
     Scenes, SetMemory, SharedSet, Turn,
 };
 use node::{WorkClass, beyond_timeline, depth_images_bytes, most_image_bytes, most_set_bytes, own_time, set_bytes};
@@ -51,7 +51,7 @@ pub(crate) struct ReadySet {
     pub(crate) content: SetContent,
     /// The cell that it was loaded for, in the plan of that time.
     pub(crate) cell: u32,
-    /// What its images show, wherever their cameras are; `None` for a mirror cell's, from which alone no view is made.
+    /// What its images show, wherever their cameras are; `None` for a common cell's, from which alone no view is made.
     moment: Option<SetContent>,
     /// What its images show, whenever it is.
     subject: SetContent,
@@ -67,9 +67,9 @@ pub(crate) struct ReadySet {
 pub(crate) struct ViewSets {
     /// The set of their view cell.
     pub(crate) of_cell: Pinned<ReadySet>,
-    /// The same on the device, with those of the mirror cells.
+    /// The same on the device, with those of the common cells.
     pub(crate) on_device: SharedSet,
-    _mirrors: Vec<Pinned<ReadySet>>,
+    _common: Vec<Pinned<ReadySet>>,
 }
 
 /// The content of a set without its cameras: equal for the sets of all view cells at one moment.
@@ -162,7 +162,7 @@ impl Sets {
         Ok(images)
     }
 
-    /// Waits for the complete sets of a view cell and of all mirror cells; the sets after them are then fetched ahead, so that
+    /// Waits for the complete sets of a view cell and of all common cells; the sets after them are then fetched ahead, so that
     /// samplers work on them while these are shown. While it waits for one it keeps no other in memory: two that wait never
     /// wait for each other.
     pub(crate) async fn of_views(
@@ -172,12 +172,12 @@ impl Sets {
         cell: u32,
     ) -> Result<ViewSets, Status> {
         let of_cell = CellPlan::of(plan, cell)?;
-        let mirrors = CellPlan::of_mirrors(plan);
-        self.check_room(&of_cell, &mirrors)?;
+        let common = CellPlan::of_common(plan);
+        self.check_room(&of_cell, &common)?;
         // Where samplers take turns, those of later sets need not wait for this one's.
         let in_turn = of_cell.sets_at_once() > 1;
         if in_turn {
-            self.fetch_ahead(&of_cell, &mirrors, set_index);
+            self.fetch_ahead(&of_cell, &common, set_index);
         }
         let mut _turn = None;
         for attempt in 0..ATTEMPTS {
@@ -185,53 +185,54 @@ impl Sets {
             if attempt == CALM_ATTEMPTS {
                 _turn = Some(self.assembling.lock().await);
             }
-            let set = self.load(&of_cell, set_index, &mirrors).await?;
-            if let Some(sets) = self.with_mirrors(set, &mirrors, set_index)? {
+            let set = self.load(&of_cell, set_index, &common).await?;
+            if let Some(sets) = self.with_common(set, &common, set_index)? {
                 if !in_turn {
-                    self.fetch_ahead(&of_cell, &mirrors, set_index);
+                    self.fetch_ahead(&of_cell, &common, set_index);
                 }
                 return Ok(sets);
             }
-            for (_, mirror) in &mirrors {
-                self.load(mirror, set_index, &[]).await?;
+            for (_, cell) in &common {
+                self.load(cell, set_index, &[]).await?;
             }
         }
         Err(Status::resource_exhausted(format!("set-memory: other views need the room of sample set {set_index}")))
     }
 
     /// A view's sets fit into memory together, or never will.
-    fn check_room(&self, of_cell: &CellPlan, mirrors: &[(Aabb, CellPlan)]) -> Result<(), Status> {
-        let bytes = self.most_bytes(of_cell) + self.most_bytes_of(mirrors);
+    fn check_room(&self, of_cell: &CellPlan, common: &[(CommonCell, CellPlan)]) -> Result<(), Status> {
+        let bytes = self.most_bytes(of_cell) + self.most_bytes_of(common);
         let max_bytes = self.cached.max_bytes();
-        if mirrors.is_empty() || bytes <= max_bytes {
+        if common.is_empty() || bytes <= max_bytes {
             return Ok(());
         }
         let reason = format!("set-memory: {bytes} bytes of a view's sample sets exceed the {max_bytes} of this node");
         Err(Status::resource_exhausted(reason))
     }
 
-    fn most_bytes_of(&self, mirrors: &[(Aabb, CellPlan)]) -> usize {
-        mirrors.iter().map(|(_, mirror)| self.most_bytes(mirror)).sum()
+    fn most_bytes_of(&self, common: &[(CommonCell, CellPlan)]) -> usize {
+        common.iter().map(|(_, cell)| self.most_bytes(cell)).sum()
     }
 
-    /// A view cell's set with those of the mirror cells of its moment; `None` where one of these is not loaded.
-    pub(crate) fn with_mirrors(
+    /// A view cell's set with those of the common cells of its moment; `None` where one of these is not loaded.
+    pub(crate) fn with_common(
         &self,
         of_cell: Pinned<ReadySet>,
-        mirrors: &[(Aabb, CellPlan)],
+        common: &[(CommonCell, CellPlan)],
         set_index: u32,
     ) -> Result<Option<ViewSets>, Status> {
-        let loaded =
-            |(bounds, mirror): &(Aabb, CellPlan)| Some((*bounds, self.cached.loaded(&mirror.set_content(set_index)?)?));
-        let mirrors: Option<Vec<_>> = mirrors.iter().map(loaded).collect();
-        let Some(mirrors) = mirrors else { return Ok(None) };
-        let sets: Vec<MirrorSet> = mirrors.iter().map(|(bounds, ready)| (*bounds, ready.set.clone())).collect();
+        let loaded = |(cell, plan): &(CommonCell, CellPlan)| {
+            Some((cell.clone(), self.cached.loaded(&plan.set_content(set_index)?)?))
+        };
+        let common: Option<Vec<_>> = common.iter().map(loaded).collect();
+        let Some(common) = common else { return Ok(None) };
+        let sets: Vec<CommonSet> = common.iter().map(|(cell, ready)| (cell.clone(), ready.set.clone())).collect();
         let on_device = match sets.is_empty() {
             true => of_cell.set.clone(),
-            false => self.scenes.engine().mirroring(of_cell.set.clone(), sets)?,
+            false => self.scenes.engine().with_common(of_cell.set.clone(), sets)?,
         };
-        let mirrors = mirrors.into_iter().map(|(_, ready)| ready).collect();
-        Ok(Some(ViewSets { of_cell, on_device, _mirrors: mirrors }))
+        let common = common.into_iter().map(|(_, ready)| ready).collect();
+        Ok(Some(ViewSets { of_cell, on_device, _common: common }))
     }
 
     /// A set that is loaded already.
@@ -248,14 +249,14 @@ impl Sets {
     }
 
     /// Begins to load the sets after one, moment by moment, as far as memory has room.
-    fn fetch_ahead(self: &Arc<Self>, of_cell: &CellPlan, mirrors: &[(Aabb, CellPlan)], set_index: u32) {
+    fn fetch_ahead(self: &Arc<Self>, of_cell: &CellPlan, common: &[(CommonCell, CellPlan)], set_index: u32) {
         let last = of_cell.workload.timeline.set_count.saturating_sub(1);
-        let bytes = self.most_bytes(of_cell) + self.most_bytes_of(mirrors);
+        let bytes = self.most_bytes(of_cell) + self.most_bytes_of(common);
         let room = self.cached.max_bytes() / bytes.max(1);
         let ahead = sets_ahead(of_cell).min(u32::try_from(room.saturating_sub(SETS_IN_USE)).unwrap_or(u32::MAX));
         for next in set_index.saturating_add(1)..=last.min(set_index.saturating_add(ahead)) {
             if of_cell.set_content(next) != of_cell.set_content(set_index) {
-                for cell in [of_cell].into_iter().chain(mirrors.iter().map(|(_, mirror)| mirror)) {
+                for cell in [of_cell].into_iter().chain(common.iter().map(|(_, cell)| cell)) {
                     self.begin_to_load(cell, next, Duration::ZERO);
                 }
             }
@@ -263,8 +264,8 @@ impl Sets {
     }
 
     /// The number of further view cells of a moment for which memory has room: more would evict the sets in use.
-    pub(crate) fn room_ahead(&self, of_cell: &CellPlan, mirrors: &[(Aabb, CellPlan)]) -> usize {
-        let free_bytes = self.cached.max_bytes().saturating_sub(self.most_bytes_of(mirrors));
+    pub(crate) fn room_ahead(&self, of_cell: &CellPlan, common: &[(CommonCell, CellPlan)]) -> usize {
+        let free_bytes = self.cached.max_bytes().saturating_sub(self.most_bytes_of(common));
         let room = free_bytes / self.most_bytes(of_cell).max(1);
         room.saturating_sub(SETS_IN_USE)
     }
@@ -292,7 +293,7 @@ impl Sets {
         self: &Arc<Self>,
         plan: &CellPlan,
         set_index: u32,
-        beside: &[(Aabb, CellPlan)],
+        beside: &[(CommonCell, CellPlan)],
     ) -> Result<Pinned<ReadySet>, Status> {
         let content = content_of(plan, set_index)?;
         // It is about to be used: what is loaded beside it must not evict it.
@@ -369,7 +370,7 @@ impl Sets {
         self.metrics.sets_loaded.inc();
         self.metrics.set_s.observe(start.elapsed().as_secs_f64());
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
-        let moment = moment(plan, set_index).filter(|_| !plan.is_mirror);
+        let moment = moment(plan, set_index).filter(|_| !plan.is_common);
         let cameras = SampleCamera::references(&plan.workload.sample_cameras);
         let (since, cell) = (Instant::now(), plan.cell);
         Ok((ReadySet { set, since, content, cell, moment, subject, cameras, sample_images, relay }, bytes))

@@ -140,8 +140,8 @@ impl Shared {
     pub(crate) fn begin_to_load(&self, plan: &Arc<Assignment>, set_index: u32, cells: impl Iterator<Item = u32>) {
         if plan.policy != Policy::Direct {
             let plans = cells.map_while(|cell| CellPlan::of(plan, cell).ok());
-            let mirrors = CellPlan::of_mirrors(plan);
-            let has_room = |(ahead, plan): &(usize, CellPlan)| *ahead <= self.sets.room_ahead(plan, &mirrors);
+            let common = CellPlan::of_common(plan);
+            let has_room = |(ahead, plan): &(usize, CellPlan)| *ahead <= self.sets.room_ahead(plan, &common);
             let plans = plans.enumerate().take_while(has_room);
             plans.map_while(|(_, plan)| self.sets.load_ahead(&plan, set_index)).for_each(drop);
         }
@@ -150,7 +150,7 @@ impl Shared {
     /// The source of a place, if it is still there; it is not waited for.
     pub(crate) fn source_at(&self, plan: &Arc<Assignment>, set_index: u32, place: Place) -> Option<Source> {
         match place.content {
-            Some(content) => self.with_mirrors(self.sets.loaded(&content)?, plan, set_index).map(Source::Sets),
+            Some(content) => self.with_common(self.sets.loaded(&content)?, plan, set_index).map(Source::Sets),
             None => scene(plan, set_index).ok(),
         }
     }
@@ -160,12 +160,12 @@ impl Shared {
         let id = plan.sample_set_id(set_index)?;
         let set = self.sets.loaded(&CellPlan::of(plan, cell).ok()?.set_content(set_index)?)?;
         let place = Place { id, cell, is_neighbour: false, content: Some(set.content) };
-        Some(Loaded { source: Source::Sets(self.with_mirrors(set, plan, set_index)?), place, wait_s: 0.0 })
+        Some(Loaded { source: Source::Sets(self.with_common(set, plan, set_index)?), place, wait_s: 0.0 })
     }
 
-    /// A set with those of mirror cells; `None` where one is not loaded.
-    fn with_mirrors(&self, set: Pinned<ReadySet>, plan: &Arc<Assignment>, set_index: u32) -> Option<ViewSets> {
-        self.sets.with_mirrors(set, &CellPlan::of_mirrors(plan), set_index).ok().flatten()
+    /// A set with those of common cells; `None` where one is not loaded.
+    fn with_common(&self, set: Pinned<ReadySet>, plan: &Arc<Assignment>, set_index: u32) -> Option<ViewSets> {
+        self.sets.with_common(set, &CellPlan::of_common(plan), set_index).ok().flatten()
     }
 
     /// The nearest loaded set of a view's moment.
@@ -173,7 +173,7 @@ impl Shared {
         let id = plan.sample_set_id(set_index).filter(|_| plan.policy != Policy::Direct)?;
         let set = self.sets.nearest(plan, set_index, view)?;
         let place = Place { id, cell: set.cell, is_neighbour: true, content: Some(set.content) };
-        Some(Loaded { source: Source::Sets(self.with_mirrors(set, plan, set_index)?), place, wait_s: 0.0 })
+        Some(Loaded { source: Source::Sets(self.with_common(set, plan, set_index)?), place, wait_s: 0.0 })
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use cluster::limits::MAX_SCENES;
-use cluster::{MirrorCell, OfferSettings, OfferStatus, SceneHash, SceneRef};
+use cluster::{CommonCell, OfferSettings, OfferStatus, SceneHash, SceneRef};
 use depth_image::{Aabb, Camera, CubeGrid, Environment, Illumination};
 use glam::DVec3;
 use planner::{Budget, Row};
@@ -62,7 +62,9 @@ pub struct SceneOffer {
     /// A layered depth cube of it, for sessions that are sampled so.
     pub cube: Option<OfferedCube>,
     /// Its mirrors, and sample cameras for what they show, of sizes in proportion, for sessions that follow mirrors.
-    pub mirrors: Vec<(MirrorCell, Vec<Camera>)>,
+    pub mirrors: Vec<(CommonCell, Vec<Camera>)>,
+    /// A layered depth cube of it, for what the images of a still scene leave unknown.
+    pub base: Option<(CommonCell, CubeGrid)>,
     /// The rig's images get the size that suits the views of a session that names none.
     pub fits_views: bool,
     /// The volume that is reconstructed, unless a session brings its own.

@@ -22,10 +22,12 @@ pub(crate) fn budgeted(
     let own = request.budget.budget.as_deref().map(str::parse::<Budget>).transpose();
     let own = own.map_err(|error| Status::invalid_argument(format!("budget: {error}")))?;
     let Some(budget) = own.or(config.budget) else { return Ok(None) };
-    if !workload.mirror_cells.is_empty() {
+    if !workload.common_cells.is_empty() {
         return match own {
             None => Ok(None),
-            Some(_) => Err(Status::invalid_argument("budget: none can be kept for mirrors that show the scene")),
+            Some(_) => Err(Status::invalid_argument(
+                "budget: none can be kept for mirrors that show the scene, and beside a base",
+            )),
         };
     }
     if workload.samples_cube() {

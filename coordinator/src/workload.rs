@@ -1,7 +1,7 @@
 //! The workload of a session: its own settings, completed with those of its scene.
 
 use cluster::limits::{MAX_CELLS, MAX_TILES};
-use cluster::{DIRECT, MirrorCell, SamplePlanes, SessionRequest, Workload};
+use cluster::{CommonCell, DIRECT, SamplePlanes, SessionRequest, Workload};
 use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera, SampleCamera, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
@@ -39,7 +39,7 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
         scene: offer.scene(),
         sample_cameras,
         cell_first_indices: Vec::new(),
-        mirror_cells: Vec::new(),
+        common_cells: Vec::new(),
         sampling: drawn.map_or(&request.sampling, |cube| &cube.beside).clone(),
         lighting: request.lighting.clone(),
         planes: SamplePlanes::default(),
@@ -51,7 +51,8 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
     };
     let workload = if cells.is_empty() { workload } else { workload.with_view_cells(cells) };
     let mirrors = mirrors_of(request, offer, &workload)?;
-    Ok(workload.with_mirrors(mirrors))
+    let base = base_of(request, offer, &workload);
+    Ok(workload.with_common_cells(mirrors.into_iter().chain(base).collect()))
 }
 
 /// The grid of an offered cube, which depends on no viewer.
@@ -93,14 +94,14 @@ fn mirrors_of(
     request: &SessionRequest,
     offer: &SceneOffer,
     workload: &Workload,
-) -> Result<Vec<(MirrorCell, Vec<SampleCamera>)>, Status> {
+) -> Result<Vec<(CommonCell, Vec<SampleCamera>)>, Status> {
     // In a cube mirrors show its own samples.
     if !request.follows_mirrors || request.method == DIRECT || workload.samples_cube() {
         return Ok(Vec::new());
     }
     let image_texels = workload.sample_cameras.first().map_or(1, SampleCamera::pixel_count);
     let density = MIRROR_DENSITY.min(MIRRORS_DENSITY / offer.mirrors.len().max(1) as f32);
-    let sized = |(cell, cameras): &(MirrorCell, Vec<Camera>)| {
+    let sized = |(cell, cameras): &(CommonCell, Vec<Camera>)| {
         let cameras = Camera::resized_together(cameras, image_texels as f32 * density, MAX_TILES);
         let checked = |camera: Camera| {
             let usable = camera.validate().map(|()| SampleCamera::Depth(camera));
@@ -109,6 +110,18 @@ fn mirrors_of(
         Ok((cell.clone(), cameras.into_iter().map(checked).collect::<Result<_, Status>>()?))
     };
     offer.mirrors.iter().map(sized).collect()
+}
+
+/// The scene's base, where the session is made from depth images of the whole scene that hold still.
+fn base_of(
+    request: &SessionRequest,
+    offer: &SceneOffer,
+    workload: &Workload,
+) -> Option<(CommonCell, Vec<SampleCamera>)> {
+    let is_suited = request.method != DIRECT && request.volume.is_none();
+    let is_suited = is_suited && !workload.samples_cube() && !workload.timeline.moves();
+    let (cell, grid) = offer.base.as_ref().filter(|_| is_suited)?;
+    Some((cell.clone(), grid.cameras().map(SampleCamera::from).to_vec()))
 }
 
 /// The sample cameras of each view cell of the session's viewpoints, as if it were alone, in the size of the offered ones.

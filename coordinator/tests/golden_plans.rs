@@ -44,7 +44,7 @@ fn workload(images: usize, timeline: Timeline) -> Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
         sample_cameras: vec![camera.into(); images],
         cell_first_indices: Vec::new(),
-        mirror_cells: Vec::new(),
+        common_cells: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
         planes: SamplePlanes::default(),

@@ -103,7 +103,7 @@ function planFigures(plan) {
   const nodes = new Set([...(plan.samplers ?? []), ...(plan.compositors ?? [])]);
   return [
     ["Plan", whole(plan.epoch)], ["Policy", plan.policy ?? UNKNOWN], ["P, nodes of the plan", whole(nodes.size || NaN)],
-    ["K, samplers", whole(plan.samplers?.length)], ["View cells", whole(plan.cells)], ["Mirror cells", whole(plan.mirror_cells)],
+    ["K, samplers", whole(plan.samplers?.length)], ["View cells", whole(plan.cells)], ["Common cells", whole(plan.common_cells)],
   ];
 }
 

@@ -106,7 +106,7 @@ fn described_plan(plan: &SessionPlan, achieved: &[AchievedTime]) -> Value {
     json!({
         "epoch": assignment.plan_epoch, "policy": assignment.policy.to_string(), "reason": plan.reason,
         "samplers": samplers, "compositors": compositors, "cells": assignment.workload.view_cell_count(),
-        "mirror_cells": assignment.workload.mirror_cells.len(),
+        "common_cells": assignment.workload.common_cells.len(),
         "costs": described_costs(&plan.costs), "policies": policies,
     })
 }

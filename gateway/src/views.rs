@@ -236,6 +236,7 @@ fn surface(visited: &Visited, view: &View, at: UVec2, first_camera: usize) -> Op
         ProvenanceKind::Hit => "cameras",
         ProvenanceKind::Filled => "filled",
         ProvenanceKind::Guessed => "guessed",
+        ProvenanceKind::Base => "base",
     };
     Some(json!({
         "at": at.to_array(), "source": source, "cameras": cameras,

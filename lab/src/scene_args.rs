@@ -19,6 +19,7 @@ pub fn scene_args(scene: SceneSpec) -> SceneArgs {
         method: None,
         sampling: None,
         sample_size: SampleSize::default(),
+        base: None,
         impostors: Default::default(),
         samples: None,
     }

@@ -15,7 +15,7 @@ use glam::UVec2;
 use gpu::DevicePreference;
 use lab::scene_args;
 use node::{
-    DirectWork, Engine, EngineError, MirrorSet, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewAudit,
+    CommonSet, DirectWork, Engine, EngineError, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewAudit,
     ViewProbes as _, ViewWork, WorkClass,
 };
 use planner::{
@@ -160,8 +160,8 @@ impl Engine for SlowInOtherLight {
         self.0.upload(set, turn)
     }
 
-    fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError> {
-        self.0.mirroring(set, mirrors)
+    fn with_common(&self, set: SharedSet, mirrors: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
+        self.0.with_common(set, mirrors)
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {

@@ -97,7 +97,7 @@ fn unknown_names_are_refused_with_their_field() {
         background: Environment::default(),
         illumination: setup.offer.illumination.clone(),
         lighting: args.lighting.to_string(),
-        is_mirror: false,
+        is_common: false,
     };
     let uploaded = engine.upload(&set, TURN).unwrap();
     let work = |method: &str, near_m: f32| ViewWork {

@@ -84,7 +84,11 @@ fn input_of_the_lab_that_cannot_be_used_is_named_with_status_2() {
 
 #[test]
 fn what_cannot_be_sampled_as_a_cube_is_named_with_status_2() {
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 10] = [
+        (&["up", "--scene", "snake", "--base", "layered_cube:64"], "--base layered_cube:64: snake moves"),
+        (&["up", "--scene", "quad", "--base", "conventional"], "--base conventional: a base is a layered cube"),
+        (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--base", "layered_cube:64"], "a cube already"),
+        (&["demo", "--scene", "quad", "--base", "layered_cube:64"], "--base layered_cube:64: clusters alone"),
         (&["up", "--scene", "snake", "--sampling", "layered_cube:64"], "snake moves"),
         (&["up", "--scene", "quad", "--sampling", "layered_cube:15"], "layered_cube:15"),
         (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--method", "mesh"], "--method mesh"),

@@ -199,7 +199,7 @@ fn workload(images: usize, sets: u32) -> Workload {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
         sample_cameras: vec![camera.into(); images],
         cell_first_indices: Vec::new(),
-        mirror_cells: Vec::new(),
+        common_cells: Vec::new(),
         sampling: String::new(),
         lighting: String::new(),
         planes: SamplePlanes::default(),

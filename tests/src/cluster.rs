@@ -5,7 +5,9 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use client::{Client, ClientError, Session, ViewRequest};
-use cluster::{BudgetRequest, MirrorCell, OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline};
+use cluster::{
+    BudgetRequest, CommonCell, CommonKind, OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline,
+};
 use codec::{FrameAssembly, FramePart, WholeFrame};
 use coordinator::{CoordinatorConfig, Observers, OfferedCube, SceneOffer, SceneOffers};
 use depth_image::{Aabb, Camera, CubeGrid, Environment, PinholeCamera, ViewPlanes};
@@ -144,7 +146,12 @@ fn volume() -> Aabb {
     Aabb { min: Vec3::splat(-3.0), max: Vec3::splat(3.0) }
 }
 
-fn cube_grid() -> CubeGrid {
+/// The grid of the cube on offer.
+///
+/// # Panics
+/// The volume has no grid.
+#[must_use]
+pub fn cube_grid() -> CubeGrid {
     CubeGrid::around(&volume(), 96).expect("a volume")
 }
 
@@ -159,6 +166,7 @@ pub fn offer() -> SceneOffer {
         rig: rig(),
         cube: Some(OfferedCube { sampling: CUBE.to_owned(), grid: cube_grid(), beside: "conventional".to_owned() }),
         mirrors: mirrors(),
+        base: None,
         rows: rows(),
         keeps_cameras: false,
         volume: volume(),
@@ -172,13 +180,13 @@ pub fn offer() -> SceneOffer {
 }
 
 /// Two mirrors, whose images show the ball in their middle.
-fn mirrors() -> Vec<(MirrorCell, Vec<Camera>)> {
+fn mirrors() -> Vec<(CommonCell, Vec<Camera>)> {
     let mirror = |x_m: f32| {
         let place = Vec3::new(x_m, 0.5, 2.0);
         let towards = Vec3::new(0.0, 0.6, 0.0);
         let camera = PinholeCamera::looking_at(place, towards, Vec3::Y, 0.6, UVec2::splat(16));
         let bounds = Aabb { min: place - 0.1, max: place + 0.1 };
-        (MirrorCell { bounds, sampling: "conventional".to_owned() }, vec![camera.into()])
+        (CommonCell { kind: CommonKind::Mirrors, bounds, sampling: "conventional".to_owned() }, vec![camera.into()])
     };
     vec![mirror(-1.0), mirror(1.0)]
 }
@@ -270,9 +278,18 @@ impl Cluster {
         nodes: usize,
         change: impl Fn(NodeConfig) -> NodeConfig,
     ) -> Self {
-        let coordinator = Server::start(move |listener, shutdown| {
-            coordinator::serve(listener, config, offer().into(), observers, shutdown)
-        });
+        let start = move |listener, shutdown| coordinator::serve(listener, config, offer().into(), observers, shutdown);
+        Self::start_after(Server::start(start), nodes, change).await
+    }
+
+    /// As [`Cluster::start`], with another scene on offer.
+    pub async fn start_offering(offer: SceneOffer, nodes: usize) -> Self {
+        let (config, observers) = (CoordinatorConfig::default(), Observers::default());
+        let start = move |listener, shutdown| coordinator::serve(listener, config, offer.into(), observers, shutdown);
+        Self::start_after(Server::start(start), nodes, |config| config).await
+    }
+
+    async fn start_after(coordinator: Server, nodes: usize, change: impl Fn(NodeConfig) -> NodeConfig) -> Self {
         let client = connected(&coordinator.address).await;
         let mut cluster = Self { coordinator, nodes: Vec::new(), engines: Vec::new(), metrics: Vec::new(), client };
         for _ in 0..nodes {

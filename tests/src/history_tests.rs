@@ -24,7 +24,7 @@ fn workload() -> Workload {
         scene: SceneRef { hash: offer.hash, package_bytes: 1 },
         sample_cameras: rig().into_iter().map(Into::into).collect(),
         cell_first_indices: Vec::new(),
-        mirror_cells: Vec::new(),
+        common_cells: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
         planes: SamplePlanes::default(),

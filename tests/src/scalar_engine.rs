@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::sleep;
 use std::time::Duration;
 
-use cluster::{DIRECT, Refinement, SamplePlanes};
+use cluster::{CommonKind, DIRECT, Refinement, SamplePlanes};
 use depth_image::{
     Antialias, BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, Environment, Illumination, LayeredDepthImage, Light,
     ParallelCamera, PinholeCamera, PixelDepth, Provenance, ProvenanceKind, Ray, SampleCamera, SampleImage,
@@ -16,7 +16,7 @@ use depth_image::{
     rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
-use node::{DirectWork, Engine, EngineError, MirrorSet, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork};
+use node::{CommonSet, DirectWork, Engine, EngineError, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork};
 use parking_lot::{Condvar, Mutex};
 
 /// The floor's colour.
@@ -467,10 +467,18 @@ impl Engine for ScalarEngine {
         Ok(Arc::new(Uploaded { set: set.clone(), mirrored: Vec::new() }))
     }
 
-    /// The first pixels of its views show what the mirrors' images show in their middle, one pixel a mirror cell.
-    fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError> {
+    /// The first pixels of its views show what the mirrors' images show in their middle, one pixel a mirror cell. A base must be
+    /// a cube.
+    fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
         self.works()?;
-        let shown = |(_, mirror): &MirrorSet| {
+        let (bases, mirrors): (Vec<_>, Vec<_>) =
+            common.into_iter().partition(|(cell, _)| cell.kind == CommonKind::Base);
+        for (_, base) in &bases {
+            if !matches!(uploaded(base.as_ref())?.set.images, SampleImages::Cube(..)) {
+                return Err(EngineError::Device("a base without a cube".to_owned()));
+            }
+        }
+        let shown = |(_, mirror): &CommonSet| {
             let image = &uploaded(mirror.as_ref())?.set.images.depth()[0];
             let middle = image.size_px() / 2;
             Ok(srgb8(linear_from_rgb9e5(image.color_rgb9e5[(middle.y * image.size_px().x + middle.x) as usize])))

@@ -48,7 +48,7 @@ async fn mirrors_show_the_moment_of_their_view() {
     let session = cluster.session(following(MOVING)).await.unwrap();
     let plan = session.plan().assignment;
     let own = plan.workload.view_cell_count();
-    assert_eq!((own, plan.workload.mirror_cells.len(), plan.image_count()), (1, 2, 3 + 2));
+    assert_eq!((own, plan.workload.common_cells.len(), plan.image_count()), (1, 2, 3 + 2));
     for frame in frames(&session, views(MOVING.set_count, 6)).await {
         let time_s = MOVING.time_s(frame.request.set_index).unwrap();
         assert_eq!(mirrored(&frame), [ball_at(time_s); 2], "set {}", frame.request.set_index);
@@ -67,7 +67,7 @@ async fn sessions_that_follow_no_mirrors_have_no_mirror_cells() {
         SessionRequest { method: DIRECT.to_owned(), policy: PolicyChoice::Auto, ..following(STILL) },
     ] {
         let session = cluster.session(asked).await.unwrap();
-        assert_eq!(session.plan().assignment.workload.mirror_cells, []);
+        assert_eq!(session.plan().assignment.workload.common_cells, []);
         cluster.close(session).await;
     }
     let budget = cluster::BudgetRequest { budget: Some("flip 0.1".to_owned()), names_method: false };
@@ -91,7 +91,7 @@ async fn no_mirror_image_is_sampled_again_when_viewers_move() {
     let second = frames(&session, view(PI)).await;
     assert_eq!(cluster.take_counts(), [1], "the new cell's alone");
     assert_eq!(mirrored(&first[0]), mirrored(&second[0]));
-    assert_eq!(session.plan().assignment.workload.mirror_cells.len(), 2);
+    assert_eq!(session.plan().assignment.workload.common_cells.len(), 2);
 }
 
 /// The images of a mirror are being made when their sampler is killed.

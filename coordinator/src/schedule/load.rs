@@ -14,8 +14,8 @@ pub struct Load {
     pub tiles: usize,
     /// View cells that the images belong to: at least 1.
     pub cells: usize,
-    /// Mirror cells, which every compositor loads.
-    pub mirror_cells: usize,
+    /// Common cells, which every compositor loads.
+    pub common_cells: usize,
     /// Sample sets that differ, of the whole session.
     pub sets: usize,
     /// V: views of a sample set.
@@ -32,7 +32,7 @@ impl Default for Load {
             images: 0,
             tiles: 1,
             cells: 1,
-            mirror_cells: 0,
+            common_cells: 0,
             sets: 1,
             views: 0,
             images_are_sequential: false,
@@ -99,9 +99,9 @@ impl Load {
         if self.is_already_sampled { 0.0 } else { self.cells_each(compositors) as f64 * node.costs.load_set_s }
     }
 
-    /// Views are shared cell by cell: a node has an even share of the view cells, and part of another; and all mirror cells.
+    /// Views are shared cell by cell: a node has an even share of the view cells, and part of another; and all common cells.
     fn cells_each(&self, compositors: usize) -> usize {
-        (self.cells.div_ceil(compositors.max(1)) + 1).min(self.cells) + self.mirror_cells
+        (self.cells.div_ceil(compositors.max(1)) + 1).min(self.cells) + self.common_cells
     }
 
     /// Nodes that can sample at the same time.

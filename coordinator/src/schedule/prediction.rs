@@ -94,7 +94,7 @@ mod tests {
         images: 4,
         tiles: 1,
         cells: 1,
-        mirror_cells: 0,
+        common_cells: 0,
         sets: 1,
         views: 1000,
         images_are_sequential: false,

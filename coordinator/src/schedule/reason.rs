@@ -36,11 +36,11 @@ fn ms(seconds: f64) -> String {
 /// The cells that images belong to, where there are several.
 fn near(load: &Load) -> String {
     let counted = |count: usize, of: &str| format!("{count} {of}{}", if count == 1 { "" } else { "s" });
-    match (load.cells, load.mirror_cells) {
+    match (load.cells, load.common_cells) {
         (1, 0) => String::new(),
         (cells, 0) => format!(" for {}", counted(cells, "view cell")),
-        (cells, mirrors) => {
-            format!(" for {} and {}", counted(cells, "view cell"), counted(mirrors, "mirror cell"))
+        (cells, common) => {
+            format!(" for {} and {}", counted(cells, "view cell"), counted(common, "common cell"))
         }
     }
 }

@@ -1,6 +1,8 @@
 use std::num::NonZeroU32;
 
-use cluster::{Assignment, Costs, MirrorCell, Policy, PolicyChoice, Quality, SessionPlan, TileCosts, WorkloadStatus};
+use cluster::{
+    Assignment, CommonCell, CommonKind, Costs, Policy, PolicyChoice, Quality, SessionPlan, TileCosts, WorkloadStatus,
+};
 
 use super::*;
 use crate::schedule::demand::{ChoiceError, PolicyOverride};
@@ -317,15 +319,16 @@ fn sessions_beyond_the_nodes_time_are_refused() {
 fn mirror_cells_leave_with_the_first_fallback_and_plans_stay_whole() {
     let mut cluster = Cluster::of(3);
     let asked = opening(1, PolicyChoice::Pipeline, 1);
-    let mirror = MirrorCell { bounds: asked.workload.volume, sampling: "conventional".to_owned() };
+    let mirror =
+        CommonCell { kind: CommonKind::Mirrors, bounds: asked.workload.volume, sampling: "conventional".to_owned() };
     let cameras = asked.workload.sample_cameras.clone();
-    let workload = asked.workload.clone().with_mirrors(vec![(mirror.clone(), cameras.clone()), (mirror, cameras)]);
+    let workload = asked.workload.clone().with_common_cells(vec![(mirror.clone(), cameras.clone()), (mirror, cameras)]);
     let whole = Quality { sample_side_ratio: 1.0, ..quality("joint_carve", 1.0) };
     let fallbacks = vec![whole, quality("joint_carve:1", 0.8)];
     let opening = Opening { workload, frames_per_s: Some(150.0), fallbacks, ..asked };
     let commands = cluster.step(Event::Opened(Box::new(opening)));
     let first = assignment_of(&commands);
-    assert_eq!((first.image_count(), first.workload.mirror_cells.len(), first.validate()), (12, 2, Ok(())));
+    assert_eq!((first.image_count(), first.workload.common_cells.len(), first.validate()), (12, 2, Ok(())));
     let slow =
         MeasuredCosts { reconstruct_view_s: Some(0.0145), encode_view_s: Some(0.001), ..MeasuredCosts::default() };
     let mut plans = Vec::new();
@@ -343,7 +346,7 @@ fn mirror_cells_leave_with_the_first_fallback_and_plans_stay_whole() {
         }));
     }
     assert!(plans.iter().all(|plan| plan.validate().is_ok()), "{plans:?}");
-    let without = plans.iter().find(|plan| plan.workload.mirror_cells.is_empty()).expect("a fallback");
+    let without = plans.iter().find(|plan| plan.workload.common_cells.is_empty()).expect("a fallback");
     assert_eq!((without.image_count(), without.workload.cell_count()), (4, 1));
 }
 

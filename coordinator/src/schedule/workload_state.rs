@@ -303,7 +303,7 @@ impl WorkloadState {
             images: self.image_count(),
             tiles: 1,
             cells: self.requested.view_cell_count(),
-            mirror_cells: if self.quality().is_none() { self.requested.mirror_cells.len() } else { 0 },
+            common_cells: if self.quality().is_none() { self.requested.common_cells.len() } else { 0 },
             // A static scene is one set, though it be refined: the sampler keeps its sums.
             sets: if timeline.moves() { timeline.set_count as usize } else { 1 },
             views: views_at_once.saturating_add(rated),
@@ -394,7 +394,7 @@ impl WorkloadState {
             let size_px = (camera.size_px().as_dvec2() * quality.sample_side_ratio).round().as_uvec2().max(UVec2::ONE);
             camera.resized(size_px)
         };
-        let workload = workload.without_mirrors();
+        let workload = workload.without_common_cells();
         Workload {
             lighting: quality.lighting.clone(),
             sample_cameras: workload.sample_cameras.iter().map(sized).collect(),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::Args;
-use cluster::{MirrorCell, OfferSettings, SceneHash};
+use cluster::{CommonCell, CommonKind, OfferSettings, SceneHash};
 use coordinator::{OfferedCube, SceneOffer};
 use depth_image::{Camera, CubeGrid, PinholeCamera};
 use glam::UVec2;
@@ -79,6 +79,9 @@ pub struct SceneArgs {
     /// are about twice as dense as each session's views
     #[arg(long, default_value_t, value_name = "WxH|auto")]
     pub sample_size: SampleSize,
+    /// A layered depth cube of the whole scene, layered_cube:SIDE, beside the sample images: what these leave unknown is found in it
+    #[arg(long, value_name = "NAME")]
+    pub base: Option<SamplingMethod>,
     /// Images of what mirrors show, for lighting with reflections: auto[:UNSEEN], as few as see all but UNSEEN percent
     /// of mirrored rays all the way; pinhole[:N], N in the same order; single_pole[:N], 1 or 2 around the object that
     /// most rays meet; or none
@@ -103,20 +106,21 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Checks that samples are depth images, which not all commands can do without.
+    /// Checks that samples are depth images alone, which not all commands can do without.
     ///
     /// # Errors
-    /// They are a cube.
+    /// They are a cube, or have one beside them.
     pub fn check_depth_images(&self) -> Result<(), BadInput> {
-        let cube = self.offer.cube.as_ref();
-        cube.map_or(Ok(()), |cube| {
-            Err(BadInput(format!("--sampling {}: this command needs depth images", cube.sampling)))
-        })
+        match (&self.offer.cube, &self.offer.base) {
+            (Some(cube), _) => Err(BadInput(format!("--sampling {}: this command needs depth images", cube.sampling))),
+            (_, Some((base, _))) => Err(BadInput(format!("--base {}: clusters alone have one: see up", base.sampling))),
+            (None, None) => Ok(()),
+        }
     }
 }
 
 /// The scene's mirrors, as sessions follow them.
-fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<(MirrorCell, Vec<Camera>)> {
+fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<(CommonCell, Vec<Camera>)> {
     let (mirrors, beyond) = sampling::mirrors(scene, impostors);
     if beyond > 0 {
         tracing::info!(beyond, followed = mirrors.len(), "the smallest mirrors show the environment alone");
@@ -138,8 +142,8 @@ fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<(MirrorCell, Vec<Camer
         }
     }
     let sampling = SamplingMethod::default().to_string();
-    let cell = |mirror: Mirror| (MirrorCell { bounds: mirror.bounds, sampling: sampling.clone() }, mirror.cameras);
-    mirrors.into_iter().map(cell).collect()
+    let cell = |bounds| CommonCell { kind: CommonKind::Mirrors, bounds, sampling: sampling.clone() };
+    mirrors.into_iter().map(|mirror: Mirror| (cell(mirror.bounds), mirror.cameras)).collect()
 }
 
 /// The name by which sessions ask for a scene: a built-in scene's own, or a file's without folder and ending.
@@ -193,7 +197,7 @@ impl SceneArgs {
         change(&mut scene);
         let around = self.sample_cameras(&scene)?;
         let samples = self.sampling().cameras(around.clone());
-        let cube = self.cube(&scene)?;
+        let (cube, base) = (self.cube(&scene)?, self.base(&scene)?);
         let package = scene::pack(&scene);
         let offer = SceneOffer {
             name: offer_name(&self.scene),
@@ -205,6 +209,7 @@ impl SceneArgs {
                 grid,
                 beside: SamplingMethod::default().to_string(),
             }),
+            base,
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
             fits_views: self.sample_size == SampleSize::Auto && self.samples.is_none(),
             rows: rows(&self.named(around.len() as u32)),
@@ -223,13 +228,33 @@ impl SceneArgs {
         Ok(Setup { scene, around, samples, offer })
     }
 
+    /// The grid of a cube of a still scene; `None` for a method that samples none.
+    fn grid(&self, scene: &Scene, option: &str, sampling: SamplingMethod) -> anyhow::Result<Option<CubeGrid>> {
+        let cube = sampling.cube(&scene.bounds()).with_context(|| format!("{}: {option} {sampling}", self.scene))?;
+        if cube.is_some() && scene.period_s().is_some() {
+            return Err(BadInput(format!("{option} {sampling}: {} moves, and a cube holds still", self.scene)).into());
+        }
+        Ok(cube)
+    }
+
+    /// The scene's base, where there is to be one.
+    fn base(&self, scene: &Scene) -> anyhow::Result<Option<(CommonCell, CubeGrid)>> {
+        let Some(base) = self.base else { return Ok(None) };
+        let refused = |reason: &str| Err(BadInput(format!("--base {base}: {reason}")).into());
+        if self.sampling().layer_selection().is_some() {
+            return refused("the samples are a cube already");
+        }
+        let Some(grid) = self.grid(scene, "--base", base)? else {
+            return refused("a base is a layered cube: see --sampling");
+        };
+        let cell = CommonCell { kind: CommonKind::Base, bounds: scene.bounds(), sampling: base.to_string() };
+        Ok(Some((cell, grid)))
+    }
+
     /// The grid of the scene's cube, where that is how it is sampled.
     fn cube(&self, scene: &Scene) -> anyhow::Result<Option<CubeGrid>> {
         let sampling = self.sampling();
-        let cube = sampling.cube(&scene.bounds()).with_context(|| format!("{}: --sampling {sampling}", self.scene))?;
-        if cube.is_some() && scene.period_s().is_some() {
-            return Err(BadInput(format!("--sampling {sampling}: {} moves, and a cube holds still", self.scene)).into());
-        }
+        let cube = self.grid(scene, "--sampling", sampling)?;
         if cube.is_some() && self.sample_size.fixed_px().is_some() {
             let reason = "the size of its images follows from SIDE";
             return Err(BadInput(format!("--sample-size: {sampling} has none, {reason}")).into());

@@ -7,8 +7,8 @@ use glam::{UVec2, Vec3};
 
 use crate::test_support::{assignment, camera, workload};
 use crate::{
-    ApplyPlan, Assignment, CompositorShare, MirrorCell, Policy, Refinement, SamplePlanes, SamplerShare, Timeline,
-    Workload,
+    ApplyPlan, Assignment, CommonCell, CommonKind, CompositorShare, Policy, Refinement, SamplePlanes, SamplerShare,
+    Timeline, Workload,
 };
 
 fn refusal(plan: &Assignment) -> String {
@@ -193,9 +193,9 @@ fn cells_that_are_empty_or_out_of_order_are_refused() {
 }
 
 /// A box around the mirrors of a mirror cell.
-fn mirror(x: f32) -> MirrorCell {
+fn mirror(x: f32) -> CommonCell {
     let bounds = Aabb { min: Vec3::new(x, 0.0, 0.0), max: Vec3::new(x + 1.0, 1.0, 0.0) };
-    MirrorCell { bounds, sampling: "all".to_owned() }
+    CommonCell { kind: CommonKind::Mirrors, bounds, sampling: "all".to_owned() }
 }
 
 /// As [`of_cells`], with two mirror cells of two cameras and of one.
@@ -205,7 +205,7 @@ fn with_mirrors() -> Assignment {
         (mirror(5.0), vec![PinholeCamera { eye_in_world: Vec3::Z * 7.0, ..camera() }.into()]),
     ];
     let mut plan = of_cells();
-    plan.workload = plan.workload.with_mirrors(mirrors);
+    plan.workload = plan.workload.with_common_cells(mirrors);
     plan.samplers[1].image_indices.extend(8..14);
     plan
 }
@@ -218,17 +218,17 @@ fn mirror_cells_come_last_and_are_no_views() {
     assert_eq!(plan.workload.cell_first_indices, [0, 1, 3, 4, 6]);
     let near_mirror = PinholeCamera { eye_in_world: Vec3::Z * 7.0, ..camera() };
     assert_eq!(plan.cell_of(&near_mirror), view_cells.cell_of(&near_mirror));
-    assert_eq!((plan.workload.mirror_cell(2), plan.workload.mirror_cell(4)), (None, Some(&mirror(5.0))));
+    assert_eq!((plan.workload.common_cell(2), plan.workload.common_cell(4)), (None, Some(&mirror(5.0))));
     let of_mirror = plan.of_cell(3).unwrap();
-    assert_eq!((of_mirror.workload.sampling.as_str(), of_mirror.workload.mirror_cells.len()), ("all", 0));
+    assert_eq!((of_mirror.workload.sampling.as_str(), of_mirror.workload.common_cells.len()), ("all", 0));
     assert_eq!(of_mirror.samplers[0].image_indices, [0, 1, 2, 3], "its own, tile by tile");
     for cell in 0..3 {
         let content = |plan: &Assignment| plan.of_cell(cell).unwrap().set_content(0);
         assert_eq!(content(&plan), content(&view_cells), "views' images do not depend on mirrors");
     }
-    assert_eq!(plan.workload.clone().without_mirrors(), view_cells.workload);
-    assert_eq!(view_cells.workload.clone().without_mirrors(), view_cells.workload);
-    assert_eq!(workload().with_mirrors(Vec::new()), workload());
+    assert_eq!(plan.workload.clone().without_common_cells(), view_cells.workload);
+    assert_eq!(view_cells.workload.clone().without_common_cells(), view_cells.workload);
+    assert_eq!(workload().with_common_cells(Vec::new()), workload());
 }
 
 #[test]
@@ -242,7 +242,7 @@ fn mirror_cells_stay_when_view_cells_change() {
     };
     assert_eq!([content(&moved, 1), content(&moved, 2)], [content(&plan.workload, 3), content(&plan.workload, 4)]);
     let one = plan.workload.of_one_view();
-    assert_eq!((one.cell_first_indices.clone(), one.mirror_cells.len()), (vec![0, 1, 3], 2));
+    assert_eq!((one.cell_first_indices.clone(), one.common_cells.len()), (vec![0, 1, 3], 2));
     assert_eq!(of_cells().workload.of_one_view(), of_cells().workload.of_cell(0).unwrap());
 }
 
@@ -270,9 +270,28 @@ fn a_cube_is_one_cell_of_its_three_cameras_for_views_from_anywhere() {
     let flat = cube(still, &|cameras| *cameras = [0, 1, 2].map(|axis| flat.camera(axis).into()).to_vec());
     assert!(refused(flat).contains("16 rows and more"));
     let cells = Workload { cell_first_indices: vec![0, 1], ..good };
-    assert!(refused(cells).contains("in 2 cells"));
+    assert!(refused(cells).contains("cells of a layered cube is 2, must be 1"));
     let moving = Timeline { start_s: 0.0, step_s: 0.1, set_count: 5 };
     assert!(refused(cube(moving, &|_| ())).contains("still for a layered cube"));
+}
+
+#[test]
+fn a_base_is_one_cube_beside_the_cells_of_a_still_scene() {
+    let grid = CubeGrid::around(&workload().volume, 64).unwrap();
+    let cell = CommonCell { kind: CommonKind::Base, ..mirror(0.0) };
+    let base = (cell.clone(), grid.cameras().map(SampleCamera::from).to_vec());
+    let still = Workload { timeline: Timeline::still(0.0), ..with_mirrors().workload };
+    let good = still.clone().with_common_cells(vec![base.clone()]);
+    assert_eq!(good.validate(), Ok(()));
+    assert!(!good.samples_cube() && good.common_cell(5) == Some(&cell));
+    assert!(good.of_cell(5).unwrap().samples_cube());
+    let refused = |workload: Workload| workload.validate().expect_err("refused").to_string();
+    let with = |common| refused(still.clone().with_common_cells(common));
+    assert!(with(vec![base.clone(), base.clone()]).contains("common_cells of a base has 2, at most 1"));
+    let pinholes = vec![camera().into(); 3];
+    assert!(with(vec![(cell, pinholes)]).contains("three cameras of one layered cube"));
+    assert!(with(vec![(mirror(0.0), base.1.clone())]).contains("the model of the mirror cell's first camera"));
+    assert!(refused(with_mirrors().workload.with_common_cells(vec![base])).contains("still for a layered cube"));
 }
 
 #[test]
@@ -308,13 +327,13 @@ fn mirror_cells_that_no_peer_may_send_are_refused() {
         spoil(&mut plan.workload);
         refusal(&plan)
     };
-    let many = |w: &mut Workload| w.mirror_cells = vec![mirror(0.0); 9];
-    assert!(spoilt(&many).contains("mirror_cells has 9, at most 8"));
-    let no_views = |w: &mut Workload| w.mirror_cells = vec![mirror(0.0); 5];
-    assert!(spoilt(&no_views).contains("mirror_cells is 5, must be fewer than cells"));
+    let many = |w: &mut Workload| w.common_cells = vec![mirror(0.0); 9];
+    assert!(spoilt(&many).contains("common_cells of mirrors has 9, at most 8"));
+    let no_views = |w: &mut Workload| w.common_cells = vec![mirror(0.0); 5];
+    assert!(spoilt(&no_views).contains("common_cells is 5, must be fewer than cells"));
     for bounds in [Aabb::EMPTY, Aabb { min: Vec3::ZERO, max: Vec3::INFINITY }, Aabb { min: Vec3::NAN, max: Vec3::ONE }]
     {
-        assert!(spoilt(&|w| w.mirror_cells[0].bounds = bounds).contains("mirror_cells.bounds"), "{bounds:?}");
+        assert!(spoilt(&|w| w.common_cells[0].bounds = bounds).contains("common_cells.bounds"), "{bounds:?}");
     }
-    assert!(spoilt(&|w| w.mirror_cells[1].sampling.clear()).contains("mirror_cells.sampling_method is missing"));
+    assert!(spoilt(&|w| w.common_cells[1].sampling.clear()).contains("common_cells.sampling_method is missing"));
 }

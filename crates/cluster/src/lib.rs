@@ -8,6 +8,7 @@
 mod assignment;
 mod audit;
 mod check;
+mod common_cell;
 mod costs;
 pub mod limits;
 mod node;
@@ -34,6 +35,7 @@ pub use audit::{
 pub use check::{
     InvalidField, at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints,
 };
+pub use common_cell::{CommonCell, CommonKind};
 pub use costs::{Costs, MeasuredCosts, ROW_PARTS, TileCosts};
 pub use node::{JoinCluster, MeasureCosts, Measured, NodeStatus, Ready, SamplerReport, Welcome, WorkReport};
 pub use policy::{Policy, PolicyChoice, UnknownPolicy};
@@ -44,4 +46,4 @@ pub use session::{ChangeSession, Quality, SessionEvent, SessionPlan, SessionRequ
 pub use status::{AchievedTime, ClusterStatus, NodeCondition, OfferSettings, OfferStatus, WorkloadStatus};
 pub use timeline::{Refinement, Timeline};
 pub use views::{DIRECT, FetchImages, LiveRequest, RenderViews, RequestedView, check_view_count, check_view_size};
-pub use workload::{MirrorCell, SamplePlanes, SetContent, Workload};
+pub use workload::{SamplePlanes, SetContent, Workload};

@@ -20,7 +20,7 @@ pub(crate) fn workload() -> Workload {
         scene: SceneRef { hash: SceneHash::of(b"scene"), package_bytes: 5 },
         sample_cameras: vec![camera().into(); 2],
         cell_first_indices: Vec::new(),
-        mirror_cells: Vec::new(),
+        common_cells: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "phong".to_owned(),
         planes: SamplePlanes::default(),

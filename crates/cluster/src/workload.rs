@@ -2,14 +2,12 @@
 
 use std::ops::Range;
 
-use depth_image::{
-    Aabb, CubeGrid, Environment, Illumination, MAX_LIGHTS, MAX_MIRROR_CELLS, PinholeCamera, SampleCamera, ViewGroup,
-    nearest_set,
-};
+use depth_image::{Aabb, Environment, Illumination, MAX_LIGHTS, PinholeCamera, SampleCamera, ViewGroup, nearest_set};
 use serde::{Deserialize, Serialize};
 
 use crate::check::{InvalidField, at_most, nonempty, pinholes, within};
-use crate::limits::{MAX_CELLS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS, MAX_TILES};
+use crate::common_cell::{CommonCell, CommonKind, check_cube};
+use crate::limits::{MAX_CELLS, MAX_COMMON_CELLS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS};
 use crate::scene::SceneRef;
 use crate::timeline::{Refinement, Timeline};
 
@@ -26,7 +24,7 @@ pub struct Workload {
     pub cell_first_indices: Vec<u32>,
     /// The last cells are mirror cells: they depend on no viewer, and every view is made from all of them and from one view
     /// cell.
-    pub mirror_cells: Vec<MirrorCell>,
+    pub common_cells: Vec<CommonCell>,
     /// How images are sampled.
     pub sampling: String,
     /// How samples are lit.
@@ -43,15 +41,6 @@ pub struct Workload {
     pub illumination: Illumination,
     /// Steps in which a still picture is refined: from 1, finished at once, to [`MAX_REFINEMENT_STEPS`].
     pub refinement_steps: u32,
-}
-
-/// Mirrors within a box. The images of its cell show what they mirror.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct MirrorCell {
-    /// Holds the mirrors' surfaces at all moments.
-    pub bounds: Aabb,
-    /// How its images are sampled.
-    pub sampling: String,
 }
 
 /// Planes of sample images that not every reconstruction method needs.
@@ -81,7 +70,7 @@ impl Workload {
         if self.timeline.moves() { last } else { Refinement { step: set_index.min(last.step), ..last } }
     }
 
-    /// All cells: view cells, and after them mirror cells.
+    /// All cells: view cells, and after them common cells.
     #[must_use]
     pub fn cell_count(&self) -> usize {
         self.cell_first_indices.len().max(1)
@@ -90,20 +79,20 @@ impl Workload {
     /// View cells: each view is made from the images of one of them.
     #[must_use]
     pub fn view_cell_count(&self) -> usize {
-        self.cell_count().saturating_sub(self.mirror_cells.len()).max(1)
+        self.cell_count().saturating_sub(self.common_cells.len()).max(1)
     }
 
-    /// Sample cameras of view cells; those of mirror cells come after them.
+    /// Sample cameras of view cells; those of common cells come after them.
     #[must_use]
     pub fn view_camera_count(&self) -> usize {
-        let first_of_mirrors = self.cell_first_indices.get(self.view_cell_count());
-        first_of_mirrors.map_or(self.sample_cameras.len(), |&first| first as usize)
+        let first_of_common = self.cell_first_indices.get(self.view_cell_count());
+        first_of_common.map_or(self.sample_cameras.len(), |&first| first as usize)
     }
 
-    /// The mirror cell of a cell's number; `None` for a view cell, and beyond the last.
+    /// The common cell of a cell's number; `None` for a view cell, and beyond the last.
     #[must_use]
-    pub fn mirror_cell(&self, cell: usize) -> Option<&MirrorCell> {
-        self.mirror_cells.get(cell.checked_sub(self.view_cell_count())?)
+    pub fn common_cell(&self, cell: usize) -> Option<&CommonCell> {
+        self.common_cells.get(cell.checked_sub(self.view_cell_count())?)
     }
 
     /// The range of sample cameras of a cell; `None` beyond the last cell.
@@ -114,7 +103,7 @@ impl Workload {
         Some(first(cell)?..first(cell + 1).unwrap_or(self.sample_cameras.len()))
     }
 
-    /// The workload of one cell alone, without mirror cells; `None` beyond the last.
+    /// The workload of one cell alone, without common cells; `None` beyond the last.
     #[must_use]
     pub fn of_cell(&self, cell: usize) -> Option<Self> {
         Some(Self {
@@ -122,11 +111,11 @@ impl Workload {
             scene: self.scene.clone(),
             sample_cameras: self.sample_cameras.get(self.cameras_of_cell(cell)?)?.to_vec(),
             cell_first_indices: Vec::new(),
-            mirror_cells: Vec::new(),
-            sampling: self.mirror_cell(cell).map_or(&self.sampling, |mirror| &mirror.sampling).clone(),
+            common_cells: Vec::new(),
+            sampling: self.common_cell(cell).map_or(&self.sampling, |common| &common.sampling).clone(),
             lighting: self.lighting.clone(),
-            // Rays off mirrors need no planes of their own.
-            planes: self.mirror_cell(cell).map_or(self.planes, |_| SamplePlanes::default()),
+            // What is found in them needs no planes of its own.
+            planes: self.common_cell(cell).map_or(self.planes, |_| SamplePlanes::default()),
             volume: self.volume,
             background: self.background,
             timeline: self.timeline,
@@ -135,53 +124,53 @@ impl Workload {
         })
     }
 
-    /// The workloads of all cells: view cells first, then mirror cells.
+    /// The workloads of all cells: view cells first, then common cells.
     #[must_use]
     pub fn cells(&self) -> Vec<Self> {
         (0..self.cell_count()).filter_map(|cell| self.of_cell(cell)).collect()
     }
 
-    /// The workload with other view cells, the cameras of each, and its own mirror cells.
+    /// The workload with other view cells, the cameras of each, and its own common cells.
     #[must_use]
     pub fn with_view_cells(self, cells: Vec<Vec<SampleCamera>>) -> Self {
-        let mirrors = self.view_cell_count()..self.cell_count();
-        let cameras_of = |cell| Some((self.mirror_cell(cell)?.clone(), self.of_cell(cell)?.sample_cameras));
-        let mirrors: Vec<_> = mirrors.filter_map(cameras_of).collect();
+        let common = self.view_cell_count()..self.cell_count();
+        let cameras_of = |cell| Some((self.common_cell(cell)?.clone(), self.of_cell(cell)?.sample_cameras));
+        let common: Vec<_> = common.filter_map(cameras_of).collect();
         let cell_first_indices = first_indices(&cells);
         let sample_cameras = cells.concat();
-        Self { sample_cameras, cell_first_indices, mirror_cells: Vec::new(), ..self }.with_mirrors(mirrors)
+        Self { sample_cameras, cell_first_indices, common_cells: Vec::new(), ..self }.with_common_cells(common)
     }
 
-    /// The workload with further mirror cells, and the cameras of each.
+    /// The workload with further common cells, and the cameras of each.
     #[must_use]
-    pub fn with_mirrors(mut self, mirrors: Vec<(MirrorCell, Vec<SampleCamera>)>) -> Self {
-        if self.cell_first_indices.is_empty() && !mirrors.is_empty() {
+    pub fn with_common_cells(mut self, common: Vec<(CommonCell, Vec<SampleCamera>)>) -> Self {
+        if self.cell_first_indices.is_empty() && !common.is_empty() {
             self.cell_first_indices.push(0);
         }
-        for (cell, cameras) in mirrors {
+        for (cell, cameras) in common {
             self.cell_first_indices.push(self.sample_cameras.len() as u32);
             self.sample_cameras.extend(cameras);
-            self.mirror_cells.push(cell);
+            self.common_cells.push(cell);
         }
         self
     }
 
-    /// The workload without mirror cells.
+    /// The workload without common cells.
     #[must_use]
-    pub fn without_mirrors(mut self) -> Self {
+    pub fn without_common_cells(mut self) -> Self {
         let (cells, cameras) = (self.view_cell_count(), self.view_camera_count());
         self.sample_cameras.truncate(cameras);
         self.cell_first_indices.truncate(cells);
-        self.mirror_cells.clear();
+        self.common_cells.clear();
         self
     }
 
-    /// The workload of one view, which stands for others: the first view cell and the mirror cells.
+    /// The workload of one view, which stands for others: the first view cell and the common cells.
     #[must_use]
     pub fn of_one_view(&self) -> Self {
         match self.of_cell(0) {
             None => self.clone(),
-            Some(first) if self.mirror_cells.is_empty() => first,
+            Some(first) if self.common_cells.is_empty() => first,
             Some(first) => self.clone().with_view_cells(vec![first.sample_cameras]),
         }
     }
@@ -196,10 +185,10 @@ impl Workload {
         nearest_set(view, cells, &self.volume).unwrap_or(0) as u32
     }
 
-    /// Whether samples are those of a layered depth cube, which serves views from anywhere.
+    /// Whether views are made from a layered depth cube, which serves views from anywhere.
     #[must_use]
     pub fn samples_cube(&self) -> bool {
-        self.sample_cameras.iter().any(|camera| camera.layered().is_some())
+        self.sample_cameras.iter().take(self.view_camera_count()).any(|camera| camera.layered().is_some())
     }
 
     /// Whether the view cell nearest to a view serves it, or would with a small step.
@@ -226,7 +215,7 @@ impl Workload {
     pub fn validate(&self) -> Result<(), InvalidField> {
         self.scene.validate()?;
         self.check_cells()?;
-        self.check_mirrors()?;
+        self.check_common()?;
         self.check_models()?;
         for camera in &self.sample_cameras {
             camera.validate().map_err(|source| InvalidField::Camera { field: "sample_cameras", source })?;
@@ -248,8 +237,8 @@ impl Workload {
 
     fn check_cells(&self) -> Result<(), InvalidField> {
         let firsts = &self.cell_first_indices;
-        at_most(self.mirror_cells.len(), MAX_MIRROR_CELLS, "mirror_cells")?;
-        at_most(firsts.len(), MAX_CELLS + self.mirror_cells.len(), "cell_first_indices")?;
+        at_most(self.common_cells.len(), MAX_COMMON_CELLS, "common_cells")?;
+        at_most(firsts.len(), MAX_CELLS + self.common_cells.len(), "cell_first_indices")?;
         at_most(self.sample_cameras.len(), MAX_SAMPLE_CAMERAS * self.cell_count(), "sample_cameras")?;
         let ends = firsts.iter().skip(1).copied().chain([self.sample_cameras.len() as u32]);
         let is_cell = |(&first, end): (&u32, u32)| first < end && end - first <= MAX_SAMPLE_CAMERAS as u32;
@@ -264,57 +253,42 @@ impl Workload {
         Ok(())
     }
 
-    /// Views are made from pinholes, or from the three cameras of one cube. The images of a mirror are of one model.
+    /// Views are made from pinholes, or from the three cameras of one cube.
     fn check_models(&self) -> Result<(), InvalidField> {
         if self.samples_cube() {
-            return self.check_cube();
+            if self.cell_count() > 1 {
+                return Err(InvalidField::out_of_range("cells of a layered cube", self.cell_count(), "1"));
+            }
+            return check_cube(&self.sample_cameras).and_then(|()| self.check_still());
         }
         let (of_views, _) = self.sample_cameras.split_at_checked(self.view_camera_count()).unwrap_or_default();
         pinholes(of_views.iter().filter_map(SampleCamera::depth))?;
-        for cell in self.view_cell_count()..self.cell_count() {
-            let cameras = self.cameras_of_cell(cell).and_then(|range| self.sample_cameras.get(range)).unwrap_or(&[]);
-            let is_other = |camera: &&SampleCamera| !camera.is_of_model(&cameras[0]);
-            if let Some(other) = cameras.iter().find(is_other) {
-                let expected = "the model of the mirror cell's first camera";
-                return Err(InvalidField::out_of_range("sample_cameras.model", other.model_name(), expected));
-            }
+        for (number, cell) in (self.view_cell_count()..).zip(&self.common_cells) {
+            let range = self.cameras_of_cell(number).unwrap_or_default();
+            cell.check_cameras(self.sample_cameras.get(range).unwrap_or(&[]))?;
         }
-        Ok(())
+        let has_base = self.common_cells.iter().any(|cell| cell.kind == CommonKind::Base);
+        if has_base { self.check_still() } else { Ok(()) }
     }
 
-    fn check_cube(&self) -> Result<(), InvalidField> {
-        let parallel: Vec<_> = self.sample_cameras.iter().filter_map(SampleCamera::layered).copied().collect();
-        let cells = self.cell_count();
-        if cells != 1 || parallel.len() != self.sample_cameras.len() || CubeGrid::of_cameras(&parallel).is_none() {
-            let given = format!("{} parallel of {} in {cells} cells", parallel.len(), self.sample_cameras.len());
-            let allowed = "the three cameras of one layered cube, in one cell";
-            return Err(InvalidField::out_of_range("sample_cameras.model", given, allowed));
-        }
-        if let Some(short) = parallel.iter().find(|camera| camera.size_px.y < MAX_TILES) {
-            return Err(InvalidField::out_of_range("sample_cameras.size", short.size_px, "16 rows and more in a cube"));
-        }
+    /// A cube is of one moment.
+    fn check_still(&self) -> Result<(), InvalidField> {
         match self.timeline.moves() {
             true => Err(InvalidField::out_of_range("timeline", "of a scene that moves", "still for a layered cube")),
             false => Ok(()),
         }
     }
 
-    fn check_mirrors(&self) -> Result<(), InvalidField> {
-        let mirrors = self.mirror_cells.len();
-        if mirrors > 0 && mirrors >= self.cell_first_indices.len() {
-            return Err(InvalidField::out_of_range(
-                "mirror_cells",
-                mirrors,
-                "fewer than cells: views have one at least",
-            ));
-        }
-        for MirrorCell { bounds, sampling } in &self.mirror_cells {
-            nonempty(sampling, "mirror_cells.sampling_method")?;
-            if bounds.is_empty() || !bounds.min.is_finite() || !bounds.max.is_finite() {
-                return Err(InvalidField::out_of_range("mirror_cells.bounds", "empty or not finite", "a finite box"));
+    fn check_common(&self) -> Result<(), InvalidField> {
+        CommonCell::check_all(&self.common_cells)?;
+        let common = self.common_cells.len();
+        match common > 0 && common >= self.cell_first_indices.len() {
+            true => {
+                let allowed = "fewer than cells: views have one at least";
+                Err(InvalidField::out_of_range("common_cells", common, allowed))
             }
+            false => Ok(()),
         }
-        Ok(())
     }
 }
 

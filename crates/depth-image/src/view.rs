@@ -21,6 +21,9 @@ pub enum ProvenanceKind {
     Filled,
     /// A mirror of which some ray ends where no sample camera sees; there it shows lamps and the environment.
     Guessed,
+    /// A surface that no sample camera saw, from the base: a layered depth cube of the whole scene. Or a mirror of which some ray ends
+    /// there.
+    Base,
 }
 
 impl Provenance {
@@ -40,6 +43,7 @@ impl Provenance {
             0 => ProvenanceKind::Empty,
             1 => ProvenanceKind::Hit,
             3 => ProvenanceKind::Guessed,
+            4 => ProvenanceKind::Base,
             _ => ProvenanceKind::Filled,
         }
     }

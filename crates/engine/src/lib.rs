@@ -6,16 +6,17 @@ use std::str::FromStr;
 use std::sync::{Arc, Weak};
 
 use bands::{BAND_PIXELS, views_in_bands};
-use cluster::{DIRECT, SamplePlanes};
+use cluster::{CommonKind, DIRECT, SamplePlanes};
 use depth_image::{Aabb, Camera, SampleCamera, SampleImage, SampleImages, View};
 use gpu::{DevicePreference, Gpu, GpuError};
 use node::{
-    DirectWork, Engine, EngineError, MirrorSet, OpenEngine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
+    CommonSet, DirectWork, Engine, EngineError, OpenEngine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
     ViewWork, WorkClass,
 };
 use parking_lot::Mutex;
 use reconstruction::{
-    MirrorCell, Mirrors, ReconstructionError, ReconstructionMethod, Reconstructor, RequiredPlanes, SetDescription,
+    CommonSets, MirrorCell, Mirrors, ReconstructionError, ReconstructionMethod, Reconstructor, RequiredPlanes,
+    SetDescription,
 };
 use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, Visibility};
 use sampling::{Sampler, SamplingError, SamplingMethod};
@@ -49,6 +50,8 @@ struct Uploaded {
     reflections: u32,
     /// What mirrors show.
     mirrors: Vec<(Aabb, Arc<reconstruction::SampleSet>)>,
+    /// What tells where its images leave anything unknown.
+    base: Option<Arc<reconstruction::SampleSet>>,
 }
 impl UploadedSet for Uploaded {}
 
@@ -250,7 +253,7 @@ impl Engine for GpuEngine {
             illumination: &set.illumination,
             highlight: lighting.highlight(),
             environment: environment.as_ref(),
-            mips: set.is_mirror,
+            mips: set.is_common,
         };
         let turn = device_turn(turn);
         let upload = || match &set.images {
@@ -260,25 +263,38 @@ impl Engine for GpuEngine {
             }
         };
         let set = self.catching(|| upload().map_err(reconstruction_error))?;
-        Ok(Arc::new(Uploaded { set: Arc::new(set), reflections: lighting.reflections(), mirrors: Vec::new() }))
+        Ok(Arc::new(Uploaded {
+            set: Arc::new(set),
+            reflections: lighting.reflections(),
+            mirrors: Vec::new(),
+            base: None,
+        }))
     }
 
-    fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError> {
+    fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
         let set = Uploaded::of(set)?;
-        let shown = |(bounds, mirror)| Ok((bounds, Uploaded::of(mirror)?.set.clone()));
-        let mirrors = mirrors.into_iter().map(shown).collect::<Result<_, EngineError>>()?;
-        Ok(Arc::new(Uploaded { set: set.set.clone(), reflections: set.reflections, mirrors }))
+        let (mut mirrors, mut base) = (Vec::new(), None);
+        for (cell, common) in common {
+            let common = Uploaded::of(common)?.set.clone();
+            match cell.kind {
+                CommonKind::Mirrors => mirrors.push((cell.bounds, common)),
+                CommonKind::Base => base = Some(common),
+            }
+        }
+        Ok(Arc::new(Uploaded { set: set.set.clone(), reflections: set.reflections, mirrors, base }))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {
-        let Uploaded { set, reflections, mirrors } = (set as &dyn Any).downcast_ref().ok_or_else(of_another_device)?;
+        let Uploaded { set, reflections, mirrors, base } =
+            (set as &dyn Any).downcast_ref().ok_or_else(of_another_device)?;
         let cells = mirrors.iter().map(|(bounds, shown)| MirrorCell { bounds: *bounds, surroundings: shown });
         let cells: Vec<MirrorCell<'_>> = cells.collect();
         let mirrors = Mirrors { cells: &cells, reflections: *reflections };
+        let common = CommonSets { mirrors, base: base.as_deref() };
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
         let turn = device_turn(turn);
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
-            let make = || self.reconstructor.reconstruct_mirrored(set, mirrors, cameras, method, work.planes, turn);
+            let make = || self.reconstructor.reconstruct_with(set, common, cameras, method, work.planes, turn);
             self.catching(|| make().map_err(reconstruction_error))
         })
     }
@@ -334,7 +350,7 @@ fn reconstruction_error(error: ReconstructionError) -> EngineError {
         ReconstructionError::NoSamples { .. } => invalid("reconstruction_method", error),
         ReconstructionError::Gpu(error) => gpu_error(error),
         ReconstructionError::Shader(_) | ReconstructionError::MissingPlane { .. } => device(error),
-        ReconstructionError::MirrorCells(_) => invalid("mirror_cells", error),
+        ReconstructionError::MirrorCells(_) => invalid("common_cells", error),
         ReconstructionError::Reflections(_) => invalid("reflections", error),
         ReconstructionError::Model { .. } | ReconstructionError::CurvedSearch { .. } => invalid("sample_images", error),
     }

@@ -4,11 +4,12 @@ mod common;
 
 use std::sync::Arc;
 
-use depth_image::{Camera, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use cluster::{CommonCell, CommonKind, Refinement, SamplePlanes};
+use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera, ProvenanceKind, SampleCamera, View, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use gpu::DevicePreference;
-use node::{DirectWork, Engine, MirrorSet, SampleSet, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
+use node::{CommonSet, DirectWork, Engine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
 use sampling::Impostors;
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 
@@ -31,15 +32,35 @@ impl Stand {
         Self { engine, scene }
     }
 
-    fn set(&self, cameras: &[impl Copy + Into<Camera>], is_mirror: bool) -> SharedSet {
+    fn set(&self, cameras: &[impl Copy + Into<Camera>], is_common: bool) -> SharedSet {
         let set = common::sample_set(&self.engine, (HASH, &self.scene), cameras, LIGHTING);
-        self.engine.upload(&SampleSet { is_mirror, ..set }, TURN).expect("a set")
+        self.engine.upload(&SampleSet { is_common, ..set }, TURN).expect("a set")
     }
 
-    fn mirrors(&self, impostors: Impostors) -> Vec<MirrorSet> {
+    fn mirrors(&self, impostors: Impostors) -> Vec<CommonSet> {
         let (mirrors, beyond) = sampling::mirrors(&self.scene, impostors);
         assert_eq!((mirrors.len(), beyond), (1, 0));
-        mirrors.into_iter().map(|mirror| (mirror.bounds, self.set(&mirror.cameras, true))).collect()
+        mirrors.into_iter().map(|mirror| (cell(mirror.bounds), self.set(&mirror.cameras, true))).collect()
+    }
+
+    /// A layered depth cube of the whole scene.
+    fn base(&self, side: u32) -> CommonSet {
+        let grid = CubeGrid::around(&self.scene.bounds(), side).expect("a grid");
+        let like = common::sample_set(&self.engine, (HASH, &self.scene), &[camera()], LIGHTING);
+        let work = SampleWork {
+            scene_hash: HASH.to_owned(),
+            cameras: grid.cameras().map(SampleCamera::from).to_vec(),
+            wanted: vec![0, 1, 2],
+            sampling: format!("layered_cube:{side}"),
+            planes: SamplePlanes::default(),
+            lighting: LIGHTING.to_owned(),
+            scene_time_s: 0.0,
+            temporal_reference_s: None,
+            refinement: Refinement::default(),
+        };
+        let images = self.engine.sample(&work, TURN).expect("layers").try_into().expect("a cube");
+        let set = self.engine.upload(&SampleSet { images, is_common: true, ..like }, TURN).expect("a set");
+        (CommonCell { kind: CommonKind::Base, ..cell(self.scene.bounds()) }, set)
     }
 
     fn view(&self, set: &dyn UploadedSet) -> View {
@@ -58,6 +79,14 @@ impl Stand {
         };
         self.engine.draw_direct(&work, TURN).expect("a view").remove(0)
     }
+}
+
+fn cell(bounds: Aabb) -> CommonCell {
+    CommonCell { kind: CommonKind::Mirrors, bounds, sampling: "conventional".to_owned() }
+}
+
+fn marked(view: &View, kind: ProvenanceKind) -> Vec<bool> {
+    view.provenance.as_ref().expect("provenance").iter().map(|provenance| provenance.kind() == kind).collect()
 }
 
 /// From behind the teapot, onto the mirror.
@@ -88,7 +117,7 @@ fn views_of_sets_with_mirror_cells_show_the_scene_in_mirrors() {
     let set = stand.set(&[camera()], false);
     let without = stand.view(set.as_ref());
     let with =
-        stand.view(stand.engine.mirroring(set.clone(), stand.mirrors(Impostors::default())).expect("a set").as_ref());
+        stand.view(stand.engine.with_common(set.clone(), stand.mirrors(Impostors::default())).expect("a set").as_ref());
     let [before, after] = [&without, &with].map(|view| difference(view, &truth, &mirrored));
     println!("mean difference in mirrors: {before:.1} codes without mirror cells, {after:.1} with");
     assert!(after < 0.6 * before, "{before} {after}");
@@ -97,7 +126,7 @@ fn views_of_sets_with_mirror_cells_show_the_scene_in_mirrors() {
     let kinds = with.provenance.as_ref().expect("provenance").iter().map(|provenance| provenance.kind());
     let guessed = kinds.zip(&mirrored).filter(|(kind, is)| **is && *kind == ProvenanceKind::Guessed).count();
     assert!(guessed * 50 < mirrored.iter().filter(|is| **is).count(), "{guessed} guessed");
-    let again = stand.view(stand.engine.mirroring(set, stand.mirrors(Impostors::default())).expect("a set").as_ref());
+    let again = stand.view(stand.engine.with_common(set, stand.mirrors(Impostors::default())).expect("a set").as_ref());
     assert_eq!(with.srgb8, again.srgb8);
 }
 
@@ -109,7 +138,7 @@ fn single_pole_images_show_the_object_in_mirrors() {
     let set = stand.set(&[camera()], false);
     let without = stand.view(set.as_ref());
     let mirrors = stand.mirrors(Impostors::SinglePoles { images: 2 });
-    let with = stand.view(stand.engine.mirroring(set.clone(), mirrors).expect("a set").as_ref());
+    let with = stand.view(stand.engine.with_common(set.clone(), mirrors).expect("a set").as_ref());
     let differs = |(a, b): (&[u8], &[u8])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 8);
     let found: Vec<bool> = with.srgb8.chunks_exact(3).zip(without.srgb8.chunks_exact(3)).map(differs).collect();
     let [before, after] = [&without, &with].map(|view| difference(view, &truth, &found));
@@ -124,6 +153,31 @@ fn single_pole_images_show_the_object_in_mirrors() {
     assert!(refused.is_err_and(|error| error.to_string().contains("single_pole")), "views are made from pinholes");
 }
 
+/// Of one image, or of the teapot alone, mirrors do not know all that they show.
+#[test]
+fn a_base_tells_what_the_images_of_mirrors_leave_unknown() {
+    let stand = Stand::new();
+    let (truth, set, base) = (stand.direct(LIGHTING), stand.set(&[camera()], false), stand.base(256));
+    for impostors in [Impostors::Pinholes { images: 1 }, Impostors::SinglePoles { images: 1 }] {
+        let mirrors = stand.mirrors(impostors);
+        let both = mirrors.iter().cloned().chain([base.clone()]).collect();
+        let [without, with] = [mirrors.clone(), both]
+            .map(|common| stand.view(stand.engine.with_common(set.clone(), common).expect("a set").as_ref()));
+        let guessed = marked(&without, ProvenanceKind::Guessed);
+        let [before, after] = [&without, &with].map(|view| difference(view, &truth, &guessed));
+        let count = |view: &View, kind| marked(view, kind).into_iter().filter(|is| *is).count();
+        let [left, told] = [ProvenanceKind::Guessed, ProvenanceKind::Base].map(|kind| count(&with, kind));
+        println!(
+            "{impostors}: {} guessed, mean difference {before:.1} codes; {after:.1} of a base",
+            count(&without, ProvenanceKind::Guessed)
+        );
+        assert!(count(&without, ProvenanceKind::Guessed) > 40 && left == 0, "{impostors}: {left} left");
+        assert!(told > 40 && after < 0.6 * before, "{impostors}: {told}, {before} and {after}");
+        let known: Vec<bool> = marked(&with, ProvenanceKind::Base).iter().map(|is| !is).collect();
+        assert!(difference(&with, &without, &known) < 1e-9, "{impostors}: all else stays");
+    }
+}
+
 #[test]
 fn sets_of_other_devices_are_refused_as_mirrors() {
     let stand = Stand::new();
@@ -131,11 +185,12 @@ fn sets_of_other_devices_are_refused_as_mirrors() {
     struct Foreign;
     impl UploadedSet for Foreign {}
     let bounds = stand.scene.bounds();
-    let refused = stand.engine.mirroring(set.clone(), vec![(bounds, Arc::new(Foreign))]).err().map(|e| e.to_string());
+    let refused =
+        stand.engine.with_common(set.clone(), vec![(cell(bounds), Arc::new(Foreign))]).err().map(|e| e.to_string());
     assert_eq!(refused.as_deref(), Some("device: a sample set of another device"));
-    assert!(stand.engine.mirroring(Arc::new(Foreign), Vec::new()).is_err());
-    let too_many = stand.engine.mirroring(set.clone(), vec![(bounds, set); 9]).expect("a set");
+    assert!(stand.engine.with_common(Arc::new(Foreign), Vec::new()).is_err());
+    let too_many = stand.engine.with_common(set.clone(), vec![(cell(bounds), set); 9]).expect("a set");
     let work = ViewWork { cameras: vec![camera()], method: "joint_carve".to_owned(), planes: ViewPlanes::COLOR };
     let refused = stand.engine.reconstruct(too_many.as_ref(), &work, TURN).err().map(|error| error.to_string());
-    assert_eq!(refused.as_deref(), Some("mirror_cells: views have at most 8 mirror cells, not 9"));
+    assert_eq!(refused.as_deref(), Some("common_cells: views have at most 8 mirror cells, not 9"));
 }

@@ -10,7 +10,7 @@ use parking_lot::Mutex;
 use tokio::sync::watch;
 
 use crate::engine::{
-    DirectWork, Engine, EngineError, MirrorSet, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork,
+    CommonSet, DirectWork, Engine, EngineError, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork,
 };
 use crate::set_memory::SetMemory;
 
@@ -156,8 +156,8 @@ impl Engine for DeviceMonitor {
         self.relieved(upload, upload)
     }
 
-    fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError> {
-        self.monitored(self.engine.mirroring(set, mirrors))
+    fn with_common(&self, set: SharedSet, mirrors: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
+        self.monitored(self.engine.with_common(set, mirrors))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {

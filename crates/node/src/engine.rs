@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use cluster::{Refinement, SamplePlanes, Workload};
+use cluster::{CommonCell, Refinement, SamplePlanes, Workload};
 use depth_image::{
     Aabb, Environment, Illumination, PinholeCamera, SampleCamera, SampleImage, SampleImageError, SampleImages, View,
     ViewPlanes,
@@ -82,9 +82,9 @@ pub trait Engine: Send + Sync + 'static {
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<SampleImage>, EngineError>;
     /// Uploads a set for reconstruction. Fails for images that the device cannot take.
     fn upload(&self, set: &SampleSet, turn: Turn) -> Result<SharedSet, EngineError>;
-    /// A set whose mirrors show what the sets of mirror cells hold, each with the bounds of its mirrors. It keeps these sets on
-    /// the device. Mirrors of other sets show lamps and the environment.
-    fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError>;
+    /// A set with those of common cells, which it keeps on the device: its mirrors show what the sets of mirrors hold, and a base tells
+    /// what its own images leave unknown. Mirrors of other sets show lamps and the environment.
+    fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError>;
     /// Reconstructs one view for each camera.
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError>;
     /// Draws one view for each camera from the scene itself.
@@ -94,9 +94,9 @@ pub trait Engine: Send + Sync + 'static {
 /// Opens the engine of a device, for a node's start and again after the device was lost. It blocks.
 pub type OpenEngine = Arc<dyn Fn() -> Result<Arc<dyn Engine>, EngineError> + Send + Sync>;
 
-/// The set of a view cell with those of mirror cells, from the sets of all cells of a workload [of one
+/// The set of a view cell with those of common cells, from the sets of all cells of a workload [of one
 /// view](Workload::of_one_view).
-pub(crate) fn mirroring(
+pub(crate) fn set_of_view(
     engine: &dyn Engine,
     workload: &Workload,
     sets: Vec<SharedSet>,
@@ -104,9 +104,8 @@ pub(crate) fn mirroring(
     let mut sets = sets.into_iter();
     let reason = || EngineError::InvalidArgument { field: "sample_cameras", reason: "a view has none".to_owned() };
     let set = sets.next().ok_or_else(reason)?;
-    let bounds = workload.mirror_cells.iter().map(|mirror| mirror.bounds);
-    let mirrors: Vec<MirrorSet> = bounds.zip(sets).collect();
-    if mirrors.is_empty() { Ok(set) } else { engine.mirroring(set, mirrors) }
+    let common: Vec<CommonSet> = workload.common_cells.iter().cloned().zip(sets).collect();
+    if common.is_empty() { Ok(set) } else { engine.with_common(set, common) }
 }
 
 /// The result of work on this thread, and the seconds that it took, without those for which it waited for others.
@@ -124,8 +123,8 @@ pub trait UploadedSet: Any + Send + Sync {}
 /// A sample set on the device, which the views of it share.
 pub type SharedSet = Arc<dyn UploadedSet>;
 
-/// The bounds of a mirror cell's mirrors, and its set.
-pub type MirrorSet = (Aabb, SharedSet);
+/// A common cell and its set.
+pub type CommonSet = (CommonCell, SharedSet);
 
 /// Images to sample.
 #[derive(Debug, Clone, PartialEq)]
@@ -180,8 +179,8 @@ pub struct SampleSet {
     pub illumination: Illumination,
     /// The lighting that the images were sampled with; highlights follow its formula.
     pub lighting: String,
-    /// Rays off a mirror are followed in it, and may cover several texels.
-    pub is_mirror: bool,
+    /// It is of a common cell: rays off mirrors are followed in it, and may cover several texels.
+    pub is_common: bool,
 }
 
 impl SampleSet {
@@ -189,7 +188,7 @@ impl SampleSet {
     ///
     /// # Errors
     /// Images that do not belong together.
-    pub fn of(workload: &Workload, images: Vec<SampleImage>, is_mirror: bool) -> Result<Self, SampleImageError> {
+    pub fn of(workload: &Workload, images: Vec<SampleImage>, is_common: bool) -> Result<Self, SampleImageError> {
         Ok(Self {
             scene_hash: workload.scene.hash.to_string(),
             images: images.try_into()?,
@@ -197,7 +196,7 @@ impl SampleSet {
             background: workload.background,
             illumination: workload.illumination.clone(),
             lighting: workload.lighting.clone(),
-            is_mirror,
+            is_common,
         })
     }
 }

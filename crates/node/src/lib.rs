@@ -31,7 +31,7 @@ pub use config::{Deadlines, NodeConfig, Quotas, view_bytes};
 pub use connections::Connections;
 pub use device_monitor::DeviceMonitor;
 pub use engine::{
-    DirectWork, Engine, EngineError, MirrorSet, OpenEngine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
+    CommonSet, DirectWork, Engine, EngineError, OpenEngine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
     ViewWork, WorkClass, own_time,
 };
 pub use membership::keep_membership;

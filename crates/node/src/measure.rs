@@ -12,7 +12,7 @@ use tonic::Status;
 
 use crate::auto_exposure::auto_exposure;
 use crate::engine::{
-    DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass, mirroring, own_time,
+    DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass, own_time, set_of_view,
 };
 
 /// Runs of one operation after a warm-up, in which shaders are built.
@@ -67,20 +67,20 @@ impl Measurement<'_> {
         let planes = engine.sample_planes(&request.method)?;
         // Views are made from all of them: their own cell, and what mirrors show.
         let cells = workload.cells();
-        let sample = |(number, cell): (usize, &Workload)| match workload.mirror_cell(number) {
+        let sample = |(number, cell): (usize, &Workload)| match workload.common_cell(number) {
             Some(_) => SampleWork::of(cell),
             None => SampleWork { planes, ..SampleWork::of(cell) },
         };
         let sampled = cells.iter().enumerate().map(|cell| self.timed(|| self.sampled(&sample(cell))));
         let (encoded, cells_s): (Vec<_>, Vec<f64>) = sampled.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let upload = |(number, (cell, images)): (usize, (&Workload, &Vec<_>))| {
-            let is_mirror = workload.mirror_cell(number).is_some();
-            let set = SampleSet::of(cell, decoded(cell, images)?, is_mirror).map_err(codec)?;
+            let is_common = workload.common_cell(number).is_some();
+            let set = SampleSet::of(cell, decoded(cell, images)?, is_common).map_err(codec)?;
             Ok(engine.upload(&set, self.turn)?)
         };
         let upload_all = || cells.iter().zip(&encoded).enumerate().map(upload).collect::<Result<Vec<_>, Status>>();
         let (sets, load_s) = self.timed(upload_all)?;
-        let set = mirroring(engine, workload, sets)?;
+        let set = set_of_view(engine, workload, sets)?;
         let load_set_s = load_s / cells.len().max(1) as f64;
         let sample_image_s = cells_s.iter().sum::<f64>() / workload.sample_cameras.len().max(1) as f64;
         let is_tileable = engine.images_are_independent(&workload.sampling)?;

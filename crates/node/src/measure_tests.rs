@@ -9,7 +9,7 @@ use depth_image::{Aabb, DepthImage, Environment, Illumination, SpecularPlanes, V
 use glam::Vec3;
 
 use super::*;
-use crate::engine::{EngineError, MirrorSet, SharedSet};
+use crate::engine::{CommonSet, EngineError, SharedSet};
 
 /// A device that sleeps and notes its calls.
 #[derive(Default)]
@@ -115,8 +115,8 @@ impl Engine for Sleeper {
         Ok(Arc::new(Nothing))
     }
 
-    fn mirroring(&self, set: SharedSet, mirrors: Vec<MirrorSet>) -> Result<SharedSet, EngineError> {
-        self.calls.lock().unwrap().mirrors.push(mirrors.into_iter().map(|(bounds, _)| bounds).collect());
+    fn with_common(&self, set: SharedSet, mirrors: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
+        self.calls.lock().unwrap().mirrors.push(mirrors.into_iter().map(|(cell, _)| cell.bounds).collect());
         Ok(set)
     }
 
@@ -141,7 +141,7 @@ pub(crate) fn request(batch_count: u32) -> MeasureCosts {
         scene: SceneRef { hash: SceneHash::of(b""), package_bytes: 0 },
         sample_cameras: vec![camera().into(); 2],
         cell_first_indices: Vec::new(),
-        mirror_cells: Vec::new(),
+        common_cells: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "traced".to_owned(),
         planes: SamplePlanes::default(),
@@ -181,9 +181,10 @@ fn quick_operations_run_three_times_after_a_warm_up() {
 #[test]
 fn costs_of_views_with_mirrors_are_those_of_all_their_images() {
     let bounds = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
-    let mirror = cluster::MirrorCell { bounds, sampling: "conventional".to_owned() };
+    let mirror =
+        cluster::CommonCell { kind: cluster::CommonKind::Mirrors, bounds, sampling: "conventional".to_owned() };
     let plain = request(32);
-    let workload = plain.workload.clone().with_mirrors(vec![(mirror, vec![camera().into(); 6])]);
+    let workload = plain.workload.clone().with_common_cells(vec![(mirror, vec![camera().into(); 6])]);
     let engine = Sleeper { sample_s: 0.04, ..Sleeper::default() };
     let costs = measure_costs(&engine, &MeasureCosts { workload, ..plain }).unwrap().costs;
     let calls = engine.calls.into_inner().unwrap();

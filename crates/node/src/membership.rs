@@ -13,7 +13,7 @@ use tonic::Status;
 use wire::rpc::{Backoff, CoordinatorClient, connect};
 
 use crate::blocking::blocking;
-use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, ViewWork, WorkClass, mirroring};
+use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, ViewWork, WorkClass, set_of_view};
 use crate::outside::view_from_outside;
 use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
@@ -142,22 +142,23 @@ fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), En
         return engine.draw_direct(&DirectWork::of(&workload, vec![view], ViewPlanes::default()), turn).map(drop);
     }
     let upload = |(number, cell): (usize, &Workload)| {
-        let (images, is_mirror) = (engine.sample(&SampleWork::of(cell), turn)?, workload.mirror_cell(number).is_some());
-        let set = SampleSet::of(cell, images, is_mirror);
+        let (images, is_common) = (engine.sample(&SampleWork::of(cell), turn)?, workload.common_cell(number).is_some());
+        let set = SampleSet::of(cell, images, is_common);
         engine.upload(&set.map_err(|error| EngineError::Device(error.to_string()))?, turn)
     };
     let sets = workload.cells().iter().enumerate().map(upload).collect::<Result<Vec<_>, _>>()?;
-    let set = mirroring(engine, &workload, sets)?;
+    let set = set_of_view(engine, &workload, sets)?;
     let work = ViewWork { cameras: vec![view], method, planes: ViewPlanes::default() };
     engine.reconstruct(set.as_ref(), &work, turn).map(drop)
 }
 
 fn small(workload: &Workload) -> Workload {
-    let camera = |camera: &SampleCamera| camera.resized(SIZE_PX);
-    let sample_cameras = match CubeGrid::around(&workload.volume, SIZE_PX.x) {
-        Ok(grid) if workload.samples_cube() => grid.cameras().map(SampleCamera::from).to_vec(),
-        _ => workload.sample_cameras.iter().map(camera).collect(),
+    let mut cube = CubeGrid::around(&workload.volume, SIZE_PX.x).into_iter().flat_map(|grid| grid.cameras());
+    let camera = |camera: &SampleCamera| match camera.layered() {
+        Some(_) => cube.next().map_or(*camera, SampleCamera::from),
+        None => camera.resized(SIZE_PX),
     };
+    let sample_cameras = workload.sample_cameras.iter().map(camera).collect();
     Workload { sample_cameras, ..workload.clone() }
 }
 

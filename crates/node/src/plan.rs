@@ -5,9 +5,8 @@ use std::ops::Deref;
 use std::sync::Arc;
 
 use cluster::limits::MAX_WORKLOADS;
-use cluster::{ApplyPlan, Assignment, SetContent, Workload};
+use cluster::{ApplyPlan, Assignment, CommonCell, SetContent, Workload};
 use codec::EncodedImage;
-use depth_image::Aabb;
 use parking_lot::Mutex;
 use tokio::sync::watch;
 use tonic::Status;
@@ -267,8 +266,8 @@ pub struct CellPlan {
     plan: Arc<Assignment>,
     /// Index into the plan's cells.
     pub cell: u32,
-    /// It is a mirror cell: views are not made from it alone.
-    pub is_mirror: bool,
+    /// It is a common cell: views are not made from it alone.
+    pub is_common: bool,
 }
 
 impl CellPlan {
@@ -278,19 +277,19 @@ impl CellPlan {
     /// For a cell beyond the plan's last.
     pub fn of(plan: &Arc<Assignment>, cell: u32) -> Result<Self, Status> {
         let cell_count = plan.workload.cell_count();
-        let is_mirror = plan.workload.mirror_cell(cell as usize).is_some();
+        let is_common = plan.workload.common_cell(cell as usize).is_some();
         if (cell, cell_count) == (0, 1) {
-            return Ok(Self { plan: plan.clone(), cell, is_mirror });
+            return Ok(Self { plan: plan.clone(), cell, is_common });
         }
         let beyond = || Status::invalid_argument(format!("cell_index {cell} is beyond {cell_count} cells"));
-        Ok(Self { plan: Arc::new(plan.of_cell(cell).ok_or_else(beyond)?), cell, is_mirror })
+        Ok(Self { plan: Arc::new(plan.of_cell(cell).ok_or_else(beyond)?), cell, is_common })
     }
 
-    /// The parts of `plan` for all mirror cells, with the bounds of their mirrors.
-    pub fn of_mirrors(plan: &Arc<Assignment>) -> Vec<(Aabb, Self)> {
+    /// The parts of `plan` for all common cells.
+    pub fn of_common(plan: &Arc<Assignment>) -> Vec<(CommonCell, Self)> {
         let first = plan.workload.view_cell_count();
-        let mirrors = plan.workload.mirror_cells.iter().enumerate();
-        mirrors.filter_map(|(at, mirror)| Some((mirror.bounds, Self::of(plan, (first + at) as u32).ok()?))).collect()
+        let common = plan.workload.common_cells.iter().enumerate();
+        common.filter_map(|(at, cell)| Some((cell.clone(), Self::of(plan, (first + at) as u32).ok()?))).collect()
     }
 }
 

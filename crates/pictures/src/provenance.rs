@@ -28,6 +28,8 @@ enum Source {
     Blend,
     /// The scene.
     Direct,
+    /// A layered depth cube of the whole scene.
+    Base,
     /// The surroundings of a hole.
     Fill,
     /// A mirror of which some ray ends where no camera sees.
@@ -41,6 +43,7 @@ impl Source {
             (ProvenanceKind::Empty, _) => Self::Background,
             (ProvenanceKind::Filled, _) => Self::Fill,
             (ProvenanceKind::Guessed, _) => Self::Guess,
+            (ProvenanceKind::Base, _) => Self::Base,
             (ProvenanceKind::Hit, 0) => Self::Direct,
             (ProvenanceKind::Hit, mask) if mask.is_power_of_two() => Self::Sample(mask.trailing_zeros() as u8),
             (ProvenanceKind::Hit, _) => Self::Blend,
@@ -53,6 +56,7 @@ impl Source {
             Self::Sample(camera) => ("camera", CAMERAS[usize::from(camera) % CAMERAS.len()]),
             Self::Blend => ("blended", [255, 255, 255]),
             Self::Direct => ("drawn directly", [150, 150, 160]),
+            Self::Base => ("from the base", [120, 90, 220]),
             Self::Fill => ("filled", [255, 60, 60]),
             Self::Guess => ("mirror, guessed", [255, 60, 220]),
             Self::Background => ("background", [40, 44, 52]),

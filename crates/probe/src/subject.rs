@@ -106,7 +106,7 @@ impl Subject {
             background: self.background,
             illumination: self.illumination.clone(),
             lighting: self.lighting(light).to_owned(),
-            is_mirror: false,
+            is_common: false,
         }
     }
 

@@ -2,7 +2,8 @@
 //!
 //! [`Reconstructor::upload`] puts one complete sample set on the device with a min-max pyramid a camera.
 //! [`Reconstructor::reconstruct`] draws views from it, many in one submission: tile starts, then the method, the fill and
-//! highlights for each position within the pixels, and their mean. [`Mirrors`] follow rays off mirrors in further sets. Each method is one enum variant, one `.rs` and `.wgsl` pair in `methods`, and has a scalar twin.
+//! highlights for each position within the pixels, and their mean. [`CommonSets`] are further sets, in which rays off mirrors are followed,
+//! and pixels that images leave unknown. Each method is one enum variant, one `.rs` and `.wgsl` pair in `methods`, and has a scalar twin.
 
 mod antialias;
 mod bounce;
@@ -39,7 +40,7 @@ pub use methods::{METHODS, ReconstructionMethod, UnknownMethod};
 pub use pyramid::CodedDepth;
 pub use quads::{ErrorBound, MeshStatistics, Quad, RequiredPlanes};
 pub use ray_ends::{RayEnd, RayWork};
-pub use reconstructor::Reconstructor;
+pub use reconstructor::{CommonSets, Reconstructor};
 pub use sample_set::SampleSet;
 pub use set_description::SetDescription;
 pub use shaders::{shader_sources, shaders, templates};

@@ -9,6 +9,7 @@ use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
 use crate::bounce::{self, Bounces, CurvedSearch, MirrorCell, Mirrors};
+use crate::cube::Cube;
 use crate::in_flight::{InFlight, Statistics};
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
@@ -16,7 +17,7 @@ use crate::ray_ends::{RayEnd, RayWork, follow_rays};
 use crate::recording::{MIRRORED_PIXELS_A_BATCH, MIRRORED_PIXELS_A_SLICE, PIXELS_A_BATCH, Recording, batches};
 use crate::sample_set::SampleSet;
 use crate::set_description::SetDescription;
-use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
+use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod, methods::layered};
 use crate::{fill, shaders::templates, specular, tile_start};
 
 /// Calls of one class that are under way at once: each holds the memory of two batches.
@@ -30,12 +31,28 @@ pub struct Reconstructor {
     calls: JobLimit,
 }
 
+/// Sets that views are made from beside their own.
+#[derive(Clone, Copy, Default)]
+pub struct CommonSets<'s> {
+    /// What mirrors show.
+    pub mirrors: Mirrors<'s>,
+    /// A layered cube of the whole scene, in which is walked what the view's images, or those of a mirror cell, leave unknown.
+    pub base: Option<&'s SampleSet>,
+}
+
+impl<'s> From<Mirrors<'s>> for CommonSets<'s> {
+    fn from(mirrors: Mirrors<'s>) -> Self {
+        Self { mirrors, base: None }
+    }
+}
+
 /// Views to reconstruct.
 #[derive(Clone, Copy)]
 struct Request<'r> {
     set: &'r SampleSet,
     method: ReconstructionMethod,
     mirrors: Mirrors<'r>,
+    base: Option<&'r Cube>,
     /// The memory for rays off mirrors, while a batch is recorded.
     bounces: Option<&'r Bounces<'r>>,
     /// Of the set, where the method draws it.
@@ -145,25 +162,25 @@ impl Reconstructor {
         planes: ViewPlanes,
         turn: Turn,
     ) -> Result<Vec<View>, ReconstructionError> {
-        self.reconstruct_mirrored(set, Mirrors::default(), cameras, method, planes, turn)
+        self.reconstruct_with(set, CommonSets::default(), cameras, method, planes, turn)
     }
 
-    /// As [`Reconstructor::reconstruct_in_turn`], with mirrors that show the scene. Those of a layered cube need no cells: they show the
-    /// cube.
+    /// As [`Reconstructor::reconstruct_in_turn`], with further sets: those that mirrors show, and a base. A layered cube needs none: its
+    /// mirrors show the cube.
     ///
     /// # Errors
-    /// As [`Reconstructor::reconstruct`], too many mirror cells, and a cell without depth images.
-    pub fn reconstruct_mirrored(
+    /// As [`Reconstructor::reconstruct`], too many mirror cells, a cell without depth images, and a base without a cube.
+    pub fn reconstruct_with<'s>(
         &self,
         set: &SampleSet,
-        mirrors: Mirrors<'_>,
+        shared: impl Into<CommonSets<'s>>,
         cameras: &[PinholeCamera],
         method: ReconstructionMethod,
         planes: ViewPlanes,
         turn: Turn,
     ) -> Result<Vec<View>, ReconstructionError> {
         let output = (planes, Positions::Shared, false);
-        self.reconstruct_counted((set, mirrors), cameras, method, output, turn).map(|(views, _)| views)
+        self.reconstruct_counted((set, shared.into()), cameras, method, output, turn).map(|(views, _)| views)
     }
 
     /// As [`Reconstructor::reconstruct`], but each position within a pixel is reconstructed by itself: what views whose positions
@@ -179,7 +196,7 @@ impl Reconstructor {
         planes: ViewPlanes,
     ) -> Result<Vec<View>, ReconstructionError> {
         let output = (planes, Positions::Whole, false);
-        let set = (set, Mirrors::default());
+        let set = (set, CommonSets::default());
         self.reconstruct_counted(set, cameras, method, output, Turn::default()).map(|(views, _)| views)
     }
 
@@ -195,13 +212,13 @@ impl Reconstructor {
         planes: ViewPlanes,
         count_fetches: bool,
     ) -> Result<(Vec<View>, Statistics), ReconstructionError> {
-        let set = (set, Mirrors::default());
+        let set = (set, CommonSets::default());
         self.reconstruct_counted(set, cameras, method, (planes, Positions::Shared, count_fetches), Turn::default())
     }
 
     fn reconstruct_counted(
         &self,
-        (set, mirrors): (&SampleSet, Mirrors<'_>),
+        (set, CommonSets { mirrors, base }): (&SampleSet, CommonSets<'_>),
         cameras: &[PinholeCamera],
         method: ReconstructionMethod,
         (planes, positions, count_fetches): (ViewPlanes, Positions, bool),
@@ -216,12 +233,23 @@ impl Reconstructor {
         let own = [MirrorCell { bounds: everywhere, surroundings: set }];
         let mirrors = if method.walks_cube() { Mirrors { cells: &own, ..mirrors } } else { mirrors };
         let mirrors = mirrors.checked_for(set)?;
+        let base = base.filter(|_| !method.walks_cube()).map(cube_of_base).transpose()?;
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;
         let bounces = None;
-        let request =
-            Request { set, mirrors, bounces, method, mesh: mesh.as_deref(), planes, positions, turn, count_fetches };
+        let request = Request {
+            set,
+            mirrors,
+            base,
+            bounces,
+            method,
+            mesh: mesh.as_deref(),
+            planes,
+            positions,
+            turn,
+            count_fetches,
+        };
         let mut views = Vec::with_capacity(cameras.len());
         let mut statistics = Statistics::default();
         let mut in_flight: Option<InFlight<'_>> = None;
@@ -316,15 +344,20 @@ impl Reconstructor {
         recording: &mut Recording<'_>,
         listed: Option<&PixelList>,
     ) -> Result<(), ReconstructionError> {
-        let unknown = request.method.record(&self.drawing, request.mesh, recording, listed, request.bounces)?;
-        fill::record(recording, &unknown)?;
-        if request.method.walks_cube() {
-            return Ok(());
+        let Request { method, base, bounces, .. } = request;
+        let unknown = method.record(&self.drawing, request.mesh, recording, listed, bounces)?;
+        if method.walks_cube() {
+            return fill::record(recording, &unknown);
         }
-        let Some(bounces) = request.bounces else { return specular::record(recording, listed, None) };
-        let first = bounces.next(&self.device, None);
-        specular::record(recording, listed, Some((bounces, &first)))?;
-        bounce::record(recording, bounces, first)
+        let mirrored = bounces.map(|bounces| (bounces, bounces.next(&self.device, None)));
+        let first = mirrored.as_ref().map(|(bounces, first)| (*bounces, first));
+        let unknown = match base {
+            Some(base) => layered::record_left(recording, base, &unknown, first)?,
+            None => unknown,
+        };
+        fill::record(recording, &unknown)?;
+        specular::record(recording, listed, first)?;
+        mirrored.map_or(Ok(()), |(bounces, first)| bounce::record(recording, bounces, base, first))
     }
 
     /// Where single rays end in images of a mirror's surroundings, followed as rays off mirrors are; also the seconds on the
@@ -358,6 +391,11 @@ impl Reconstructor {
         let mesh = method.mesh(&self.device, set, Turn::default())?;
         mesh.map_or(Ok(Vec::new()), |mesh| quads::read(&self.device, &mesh, set))
     }
+}
+
+fn cube_of_base(base: &SampleSet) -> Result<&Cube, ReconstructionError> {
+    let none = || ReconstructionError::NoSamples { what: "a base".to_owned(), needed: "a layered cube" };
+    base.cube.as_deref().ok_or_else(none)
 }
 
 /// Views come from pinholes or from a cube, as the method needs.

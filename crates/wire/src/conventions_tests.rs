@@ -97,5 +97,5 @@ fn enums_are_prefixed_and_begin_unspecified() {
         assert!(kind.value.iter().all(|value| value.name().starts_with(prefix)));
         enums += 1;
     }
-    assert_eq!(enums, 7);
+    assert_eq!(enums, 8);
 }

@@ -5,11 +5,11 @@ use std::num::NonZeroU32;
 use cluster::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
 use cluster::{
     AchievedTime, ApplyPlan, Assignment, AuditOrder, AuditReport, AuditSummary, AuditedView, BudgetRequest,
-    ChangeSession, ClusterStatus, CompositorShare, Costs, ErrorInterval, InvalidField, JoinCluster, LiveRequest,
-    MeasureCosts, Measured, MeasuredCosts, MirrorCell, NodeCondition, NodeStatus, OfferSettings, OfferStatus, Policy,
-    PolicyChoice, ProbedView, Promise, PromiseState, Quality, RenderViews, RequestedView, SamplePlanes, SamplerReport,
-    SamplerShare, SceneHash, SceneRef, SessionEvent, SessionPlan, SessionRequest, TileCosts, Timeline, WorkReport,
-    Workload, WorkloadStatus,
+    ChangeSession, ClusterStatus, CommonCell, CommonKind, CompositorShare, Costs, ErrorInterval, InvalidField,
+    JoinCluster, LiveRequest, MeasureCosts, Measured, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings,
+    OfferStatus, Policy, PolicyChoice, ProbedView, Promise, PromiseState, Quality, RenderViews, RequestedView,
+    SamplePlanes, SamplerReport, SamplerShare, SceneHash, SceneRef, SessionEvent, SessionPlan, SessionRequest,
+    TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
 };
 use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
 use depth_image::{
@@ -64,7 +64,7 @@ pub(super) fn workload() -> Workload {
         scene: SceneRef { hash: SceneHash::of(b"scene"), package_bytes: 5 },
         sample_cameras: vec![camera().into(); 2],
         cell_first_indices: Vec::new(),
-        mirror_cells: Vec::new(),
+        common_cells: Vec::new(),
         sampling: "conventional".to_owned(),
         lighting: "phong".to_owned(),
         planes: SamplePlanes::default(),
@@ -194,8 +194,8 @@ fn messages_survive_the_round_trip() {
     cells.samplers[0].image_indices = vec![3, 1, 2, 0];
     assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(cells.clone())), Ok(cells));
     let mut mirrors = assignment();
-    let cell = MirrorCell { bounds: mirrors.workload.volume, sampling: "all".to_owned() };
-    mirrors.workload = mirrors.workload.with_mirrors(vec![(cell, vec![camera().into()])]);
+    let cell = CommonCell { kind: CommonKind::Mirrors, bounds: mirrors.workload.volume, sampling: "all".to_owned() };
+    mirrors.workload = mirrors.workload.with_common_cells(vec![(cell, vec![camera().into()])]);
     mirrors.samplers[0].image_indices = vec![0, 1, 2];
     assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(mirrors.clone())), Ok(mirrors));
     let apply = ApplyPlan { assignment: assignment(), open_workloads: vec![3, 1] };
@@ -484,14 +484,15 @@ fn the_largest_number_of_lights_survives_the_round_trip() {
 
 #[test]
 fn bad_mirror_cells_are_refused_by_field() {
-    let spoilt = |cells: Vec<proto::MirrorCell>| {
+    let spoilt = |cells: Vec<proto::CommonCell>| {
         let message = to_message::<proto::Assignment, _>(assignment());
-        let workload = message.workload.map(|workload| proto::Workload { mirror_cells: cells, ..workload });
+        let workload = message.workload.map(|workload| proto::Workload { common_cells: cells, ..workload });
         refusal::<_, Assignment>(proto::Assignment { workload, ..message })
     };
-    let cell = proto::MirrorCell { bounds: None, sampling_method: "all".to_owned() };
-    assert!(spoilt(vec![cell.clone()]).contains("mirror_cells.bounds is missing"));
-    assert!(spoilt(vec![cell; 9]).contains("mirror_cells has 9"));
+    let cell = proto::CommonCell { bounds: None, sampling_method: "all".to_owned(), kind: 1 };
+    assert!(spoilt(vec![cell.clone()]).contains("common_cells.bounds is missing"));
+    assert!(spoilt(vec![proto::CommonCell { kind: 0, ..cell.clone() }]).contains("common_cells.kind"));
+    assert!(spoilt(vec![cell; 10]).contains("common_cells has 10"));
 }
 
 #[test]

@@ -76,7 +76,7 @@ pub fn measure(hall: &Hall<'_>, mirrors: &[Mirror]) -> anyhow::Result<Costs> {
         let mirrors = Mirrors { cells: &cells, reflections };
         let reconstructor = hall.stand.reconstructor();
         let turn = Default::default();
-        let make = || Ok(reconstructor.reconstruct_mirrored(&set, mirrors, &views, CARVE, ViewPlanes::COLOR, turn)?);
+        let make = || Ok(reconstructor.reconstruct_with(&set, mirrors, &views, CARVE, ViewPlanes::COLOR, turn)?);
         make()?;
         let times = (0..REPEATS).map(|_| Ok(timed(make)?.1 / BATCH as f64)).collect::<anyhow::Result<Vec<f64>>>()?;
         Ok(median(times))

@@ -196,7 +196,7 @@ impl<'s> Hall<'s> {
         let view = |subject: &Subject| {
             let (set, cameras, turn) = (&subject.set, [subject.camera], Default::default());
             let reconstructor = self.stand.reconstructor();
-            let views = reconstructor.reconstruct_mirrored(set, mirrors, &cameras, CARVE, ViewPlanes::ALL, turn)?;
+            let views = reconstructor.reconstruct_with(set, mirrors, &cameras, CARVE, ViewPlanes::ALL, turn)?;
             views.into_iter().next().context("a view")
         };
         self.subjects.iter().map(view).collect()

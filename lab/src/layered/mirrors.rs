@@ -101,7 +101,7 @@ fn cameras() -> Vec<PinholeCamera> {
 fn walked(subject: &Subject<'_>, set: &SampleSet, reflections: u32) -> anyhow::Result<(Vec<View>, f64)> {
     let mirrors = Mirrors { cells: &[], reflections };
     let (reconstructor, turn) = (subject.stand.reconstructor(), Default::default());
-    timed(|| Ok(reconstructor.reconstruct_mirrored(set, mirrors, &subject.views, LAYERED, ViewPlanes::COLOR, turn)?))
+    timed(|| Ok(reconstructor.reconstruct_with(set, mirrors, &subject.views, LAYERED, ViewPlanes::COLOR, turn)?))
 }
 
 /// The same views, drawn directly.

@@ -79,7 +79,7 @@ impl Subject {
             scene: offer.scene(),
             sample_cameras: offer.rig.iter().copied().map(Into::into).collect(),
             cell_first_indices: Vec::new(),
-            mirror_cells: Vec::new(),
+            common_cells: Vec::new(),
             sampling: self.args.sampling().to_string(),
             lighting: lighting.to_string(),
             planes: SamplePlanes::default(),

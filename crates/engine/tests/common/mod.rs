@@ -30,6 +30,6 @@ pub fn sample_set(
         background: scene.background,
         illumination: scene.illumination.clone(),
         lighting: lighting.to_owned(),
-        is_mirror: false,
+        is_common: false,
     }
 }

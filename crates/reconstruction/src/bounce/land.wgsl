@@ -68,6 +68,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let ray = rays[index];
     let origin = provenance[index];
     let kind = origin & 0xffu;
+    // The base has told what the mirror shows.
+    if kind == PROVENANCE_BASE { return; }
     let guess = unpack4x8unorm(ray.guess);
     let is_unknown = kind == PROVENANCE_FILLED;
     // Where nothing is met the environment is seen; where no image knew, what the mirror shows without rays.

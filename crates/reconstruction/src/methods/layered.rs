@@ -1,8 +1,6 @@
 //! A walk along each ray through the samples of a layered depth cube.
 
-use std::sync::Arc;
-
-use depth_image::Highlight;
+use depth_image::{Highlight, MAX_MIRROR_CELLS};
 use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots, switches};
 use minijinja::{Value, context};
 
@@ -13,18 +11,40 @@ use crate::surface::found_bindings;
 use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
+/// The rays that are walked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Walked {
+    /// Those of all pixels.
+    Pixels,
+    /// Those of pixels that another method leaves: the cube is the base beside its images.
+    LeftPixels,
+    /// Those off mirrors.
+    Bounced,
+    /// Those off mirrors whose end the images of a mirror cell leave unknown: the cube is the base.
+    LeftBounced,
+}
+
+impl Walked {
+    fn is_bounced(self) -> bool {
+        matches!(self, Self::Bounced | Self::LeftBounced)
+    }
+
+    fn is_left(self) -> bool {
+        matches!(self, Self::LeftPixels | Self::LeftBounced)
+    }
+}
+
 /// The switches of `layered.wgsl`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Walk {
     set: SetVariant,
-    /// Rays are those off mirrors, not those of the view.
-    bounced: bool,
+    rays: Walked,
     /// What a ray does not meet may be a surface that the cube does not hold.
     truncated: bool,
     /// The formula of highlights, where samples have any.
     highlight: Option<Highlight>,
-    /// Mirrors list the rays off them.
-    mirrors: bool,
+    /// Mirrors list the rays off them; the number of lists.
+    mirror_cells: Option<usize>,
     lights: usize,
     environment_map: bool,
     visibility_words: usize,
@@ -33,30 +53,45 @@ pub(crate) struct Walk {
 impl Walk {
     const PLAIN: Self = Self {
         set: SetVariant::CUBE,
-        bounced: false,
+        rays: Walked::Pixels,
         truncated: false,
         highlight: None,
-        mirrors: false,
+        mirror_cells: None,
         lights: 0,
         environment_map: false,
         visibility_words: 0,
     };
 
-    fn of(recording: &Recording<'_>, cube: &Cube, bounced: bool, mirrors: bool) -> Self {
+    fn of(recording: &Recording<'_>, cube: &Cube, rays: Walked, spawning: Option<&Bounces<'_>>) -> Self {
         let reflectors = cube.reflectors.as_ref();
         let highlight = reflectors.map(|reflectors| reflectors.highlight);
         // Blinn-Phong surfaces mirror lamps only.
         let is_mapped = highlight == Some(Highlight::Ggx) && recording.set.environment.is_some();
-        let count_fetches = !bounced && recording.batch.fetches.is_some();
+        // Rays off mirrors see no image of the view's set.
+        let set = if rays.is_bounced() { SetVariant::CUBE } else { recording.variant() };
         Self {
-            set: SetVariant { count_fetches, ..recording.set.variant() },
-            bounced,
+            set,
+            rays,
             truncated: cube.truncated,
             highlight,
-            mirrors,
+            // Mirrors of a matt base are not in it.
+            mirror_cells: spawning.filter(|_| highlight == Some(Highlight::Ggx)).map(Bounces::cell_count),
             lights: reflectors.map_or(0, |reflectors| reflectors.lights),
             environment_map: is_mapped,
             visibility_words: reflectors.map_or(0, |reflectors| reflectors.visibility_words),
+        }
+    }
+}
+
+impl Walk {
+    /// The same in a base, beside four images.
+    fn of_base(self) -> Self {
+        let mirror_cells = self.mirror_cells.map(|_| MAX_MIRROR_CELLS);
+        match self.rays {
+            Walked::Pixels | Walked::LeftPixels => {
+                Self { rays: Walked::LeftPixels, set: SetVariant { cameras: 4, ..self.set }, mirror_cells, ..self }
+            }
+            Walked::Bounced | Walked::LeftBounced => Self { rays: Walked::LeftBounced, mirror_cells, ..self },
         }
     }
 }
@@ -67,12 +102,13 @@ impl ShaderVariant for Walk {
 
     fn context(&self) -> Value {
         context! {
-            bounced => self.bounced,
+            bounced => self.rays.is_bounced(),
+            left => self.rays.is_left(),
             truncated => self.truncated,
             reflects => self.highlight.is_some(),
             highlight => highlight_name(self.highlight.unwrap_or(Highlight::Ggx)),
-            mirrors => self.mirrors,
-            mirror_cells => usize::from(self.mirrors),
+            mirrors => self.mirror_cells.is_some(),
+            mirror_cells => self.mirror_cells.unwrap_or(0),
             light_slots => light_slots(self.lights),
             environment_map => self.environment_map,
             visibility_words => self.visibility_words,
@@ -94,13 +130,15 @@ impl ShaderVariant for Walk {
                 let set = SetVariant { count_fetches, ..SetVariant::CUBE };
                 let with = Self { set, truncated, lights, visibility_words, ..Self::PLAIN };
                 let ggx = Self { highlight: Some(Highlight::Ggx), environment_map, ..with };
-                let bounced = (!count_fetches).then_some(Self { bounced: true, ..ggx });
+                let bounced = (!count_fetches).then_some(Self { rays: Walked::Bounced, ..ggx });
                 let blinn_phong = (!environment_map).then_some(Self { highlight: Some(Highlight::BlinnPhong), ..with });
                 let mirrored = [Some(ggx), bounced].into_iter().flatten();
-                mirrored.flat_map(|walk| [walk, Self { mirrors: true, ..walk }]).chain(blinn_phong)
+                mirrored.flat_map(|walk| [walk, Self { mirror_cells: Some(1), ..walk }]).chain(blinn_phong)
             })
         });
-        matt.chain(glossy).collect()
+        let own: Vec<Self> = matt.chain(glossy).collect();
+        let left = own.iter().filter(|walk| walk.lights <= 3 && !walk.environment_map).map(|walk| walk.of_base());
+        own.iter().copied().chain(left).collect()
     }
 }
 
@@ -112,43 +150,82 @@ pub(crate) fn record(
     let undecided = recording.empty_list();
     let Some(cube) = recording.set.cube.clone() else { return Ok(undecided) };
     let mut next = bounces.map(|bounces| bounces.next(recording.device, None));
-    let variant = Walk::of(recording, &cube, false, next.is_some());
-    let pass = recording.device.passes.get(&variant)?;
-    let mut bindings = recording.view_bindings();
-    bindings.extend(shared_bindings(recording, &cube, &variant));
-    bindings.extend(found_bindings(recording, &undecided));
-    bindings.extend(bounces.zip(next.as_ref()).into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
-    let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&variant, &pass, &bound, None);
+    walk_pixels(recording, &cube, (None, &undecided), bounces.zip(next.as_ref()))?;
     let Some(bounces) = bounces else { return Ok(undecided) };
     for reflection in 1..=bounces.reflections() {
         let Some(lists) = next else { break };
         next = (reflection < bounces.reflections()).then(|| bounces.next(recording.device, Some(&lists)));
-        follow(recording, &cube, bounces, (&lists, next.as_ref()), reflection)?;
+        follow(recording, (&cube, Walked::Bounced), bounces, (&lists, next.as_ref()), (0, reflection))?;
     }
     Ok(undecided)
 }
 
-/// Records the walk of rays off one mirror, whose light is added to their pixels.
+/// Records the walk of pixels that another method leaves, in the cube beside its images. Gives those that stay unknown.
+pub(crate) fn record_left(
+    recording: &mut Recording<'_>,
+    base: &Cube,
+    left: &PixelList,
+    mirrored: Option<(&Bounces<'_>, &RayLists)>,
+) -> Result<PixelList, ReconstructionError> {
+    let undecided = recording.empty_list();
+    walk_pixels(recording, base, (Some(left), &undecided), mirrored)?;
+    Ok(undecided)
+}
+
+/// Records the walk of rays off mirrors whose end the images of a mirror cell leave unknown, in the cube beside them.
+pub(crate) fn follow_left(
+    recording: &mut Recording<'_>,
+    base: &Cube,
+    bounces: &Bounces<'_>,
+    lists: (&RayLists, Option<&RayLists>),
+    place: (usize, u32),
+) -> Result<(), ReconstructionError> {
+    follow(recording, (base, Walked::LeftBounced), bounces, lists, place)
+}
+
+fn walk_pixels(
+    recording: &mut Recording<'_>,
+    cube: &Cube,
+    (listed, undecided): (Option<&PixelList>, &PixelList),
+    mirrored: Option<(&Bounces<'_>, &RayLists)>,
+) -> Result<(), ReconstructionError> {
+    let rays = if listed.is_some() { Walked::LeftPixels } else { Walked::Pixels };
+    let variant = Walk::of(recording, cube, rays, mirrored.map(|(bounces, _)| bounces));
+    let pass = recording.device.passes.get(&variant)?;
+    let mut bindings = recording.view_bindings();
+    bindings.extend(shared_bindings(recording, cube, &variant));
+    bindings.extend(found_bindings(recording, undecided));
+    bindings.extend(listed.into_iter().flat_map(PixelList::bindings));
+    let spawning = mirrored.filter(|_| variant.mirror_cells.is_some());
+    bindings.extend(spawning.into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_pixels(&variant, &pass, &bound, listed);
+    Ok(())
+}
+
+/// Records the walk of rays off one mirror of a mirror cell, whose light is added to their pixels.
 fn follow(
     recording: &mut Recording<'_>,
-    cube: &Arc<Cube>,
+    (cube, rays): (&Cube, Walked),
     bounces: &Bounces<'_>,
     (lists, next): (&RayLists, Option<&RayLists>),
-    reflection: u32,
+    (cell, reflection): (usize, u32),
 ) -> Result<(), ReconstructionError> {
-    let variant = Walk::of(recording, cube, true, next.is_some());
+    let variant = Walk::of(recording, cube, rays, next.map(|_| bounces));
     let pass = recording.device.passes.get(&variant)?;
     let mut bindings = shared_bindings(recording, cube, &variant);
+    let [_, _, ray_provenance] = bounces.planes();
     bindings.extend([
-        bounces.work_binding(0),
+        bounces.work_binding(cell),
         Binding::buffer("out_color", &recording.batch.color),
         Binding::buffer("out_provenance", &recording.batch.provenance),
     ]);
+    bindings.extend(rays.is_left().then(|| Binding::buffer("ray_provenance", ray_provenance)));
     bindings.extend(bounces.list_bindings(lists));
+    let next = next.filter(|_| variant.mirror_cells.is_some());
     bindings.extend(next.into_iter().flat_map(|next| bounces.spawn_bindings(next)));
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&variant, &pass, &bound, (bounces.lists_of(lists), 0), reflection);
+    recording.dispatch_listed(&variant, &pass, &bound, (bounces.lists_of(lists), cell), (cell, reflection));
     Ok(())
 }
 

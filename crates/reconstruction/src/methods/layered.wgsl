@@ -1,5 +1,5 @@
 // Rays through a layered depth cube: the nearest surface that its samples describe, and the light that it sends to the ray. Rays are
-// those of a view, or those off the mirrors that a view shows.
+// those of a view, or those off the mirrors that a view shows; where the cube is a base, those alone that images leave unknown.
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
 {%- if reflects or bounced %}
@@ -21,7 +21,7 @@
 {%- if reflects %}
 {% include "gathered.wgsl" %}
 {%- endif %}
-{%- if bounced %}
+{%- if bounced or left %}
 {% include "pixel_list.wgsl" %}
 {%- endif %}
 {%- if mirrors or bounced %}
@@ -32,6 +32,10 @@
 {%- endif %}
 {%- if bounced %}
 @group(0) var<storage, read> rays: array<MirroredRay>;
+{%- if left %}
+// Of the rays, as the images around their mirrors tell it.
+@group(0) var<storage, read_write> ray_provenance: array<u32>;
+{%- endif %}
 {%- endif %}
 
 // The light that a surface sends towards `towards_eye`, of which a pixel shows the share `throughput`. Mirrors list the rays off them.
@@ -57,9 +61,16 @@ fn light_from(hit: CubeHit, point_in_world: vec3f, towards_eye: vec3f, pixel: u3
 @compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= lists[work.view.number].count { return; }
-    let ray = rays[listed_pixels[first_listed() + id.x]];
+    let index = listed_pixels[first_listed() + id.x];
+    let ray = rays[index];
     let throughput = linear_from_rgb9e5(ray.throughput_rgb9e5);
-    let hit = walk(cube_ray(ray.origin_in_world, ray.direction), ray.near_m);
+{%- if left %}
+    if (ray_provenance[index] & 0xffu) != PROVENANCE_FILLED { return; }
+    let near_m = max(ray.near_m, cube.start_m);
+{%- else %}
+    let near_m = ray.near_m;
+{%- endif %}
+    let hit = walk(cube_ray(ray.origin_in_world, ray.direction), near_m);
     let guess = unpack4x8unorm(ray.guess);
     let is_unknown = !hit.met{{ "" if truncated else " && !hit.is_empty" }};
     // Where nothing is met the environment is seen; where the cube does not know, what the mirror shows without rays.
@@ -68,10 +79,21 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         shown = light_from(hit, ray.origin_in_world + ray.direction * hit.t, -ray.direction, ray.pixel, throughput);
     }
     out_color[ray.pixel] = rgb9e5_from_linear(linear_from_rgb9e5(out_color[ray.pixel]) + shown);
-    for (var guessed = is_unknown; guessed; guessed = false) {
-        out_provenance[ray.pixel] = (out_provenance[ray.pixel] & 0xffffff00u) | PROVENANCE_GUESSED;
-    }
+    let origin = out_provenance[ray.pixel] & 0xffffff00u;
+{%- if left %}
+    ray_provenance[index] = PROVENANCE_BASE;
+    out_provenance[ray.pixel] = origin | select(PROVENANCE_BASE, PROVENANCE_GUESSED, is_unknown);
+{%- else %}
+    for (var guessed = is_unknown; guessed; guessed = false) { out_provenance[ray.pixel] = origin | PROVENANCE_GUESSED; }
+{%- endif %}
 }
+{%- else %}
+{%- if left %}
+
+@compute @workgroup_size(LIST_WORKGROUP)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= lists[work.view.number].count { return; }
+    let pixel = pixel_of(place_of(listed_pixels[first_listed() + id.x]));
 {%- else %}
 
 @compute @workgroup_size(TILE_PX, TILE_PX)
@@ -79,12 +101,16 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let at = pixel_at(id);
     if any(at >= work.view.size_px) { return; }
     let pixel = pixel_of(at);
+{%- endif %}
     let hit = walk(cube_ray(work.view.eye_in_world, pixel.direction), work.view.near_m);
     var shown = vec3f(0.0);
     for (var met = hit.met; met; met = false) {
         let point_in_world = work.view.eye_in_world + pixel.direction * hit.t;
         shown = light_from(hit, point_in_world, -normalize(pixel.direction), pixel.index, vec3f(1.0));
     }
-    write_found(pixel.index, hit.met, hit.t, shown, origin_of(1u << hit.axis, 0u), {{ "false" if truncated else "hit.is_empty" }});
+    write_found(pixel.index, hit.met, hit.t, shown, origin_of({{ "0u" if left else "1u << hit.axis" }}, 0u), {{ "false" if truncated else "hit.is_empty" }});
+{%- if left %}
+    for (var met = hit.met; met; met = false) { out_provenance[pixel.index] = PROVENANCE_BASE; }
+{%- endif %}
 }
 {%- endif %}

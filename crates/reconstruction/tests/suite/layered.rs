@@ -16,14 +16,14 @@ use crate::stage::{
 
 const LAYERED: ReconstructionMethod = ReconstructionMethod::Layered;
 
-struct CubeStage {
-    scene: Scene,
-    grid: CubeGrid,
-    images: [LayeredDepthImage; 3],
+pub struct CubeStage {
+    pub scene: Scene,
+    pub grid: CubeGrid,
+    pub images: [LayeredDepthImage; 3],
 }
 
 impl CubeStage {
-    fn new(scene: Scene, side: u32, kept: LayerSelection) -> Self {
+    pub fn new(scene: Scene, side: u32, kept: LayerSelection) -> Self {
         let on_device = GpuScene::upload(gpu(), &scene).expect("a scene");
         let grid = CubeGrid::around(&scene.bounds(), side).expect("a grid");
         let images = [0, 1, 2]
@@ -31,17 +31,17 @@ impl CubeStage {
         Self { scene, grid, images }
     }
 
-    fn upload(&self) -> SampleSet {
+    pub fn upload(&self) -> SampleSet {
         let set = matt(self.scene.bounds(), self.scene.background);
         reconstructor().upload_cube(&self.grid, &self.images, &set).expect("a cube")
     }
 
-    fn view(&self, camera: &PinholeCamera) -> View {
+    pub fn view(&self, camera: &PinholeCamera) -> View {
         let views = reconstructor().reconstruct(&self.upload(), &[*camera], LAYERED, ViewPlanes::ALL);
         views.expect("a view").remove(0)
     }
 
-    fn twin(&self, camera: &PinholeCamera) -> View {
+    pub fn twin(&self, camera: &PinholeCamera) -> View {
         let set = matt(self.scene.bounds(), self.scene.background);
         CubeTwin::new(&self.grid, &self.images).reconstruct(&set, camera)
     }
@@ -97,7 +97,7 @@ fn mirrors_show_what_direct_drawing_shows() {
     let view = |reflections| {
         let mirrors = Mirrors { cells: &[], reflections };
         let views =
-            reconstructor().reconstruct_mirrored(&set, mirrors, &[camera], LAYERED, ViewPlanes::ALL, Turn::default());
+            reconstructor().reconstruct_with(&set, mirrors, &[camera], LAYERED, ViewPlanes::ALL, Turn::default());
         views.expect("a view").remove(0)
     };
     let psnr = |a: &View, b: &View| {

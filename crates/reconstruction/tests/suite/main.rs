@@ -2,6 +2,7 @@
 
 mod antialias;
 mod background;
+mod base;
 mod batches;
 mod closed_form;
 mod holes_and_limits;

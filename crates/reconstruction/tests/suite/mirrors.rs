@@ -62,7 +62,7 @@ fn reconstruct(
     cameras: &[PinholeCamera],
     planes: ViewPlanes,
 ) -> Result<Vec<View>, ReconstructionError> {
-    reconstructor().reconstruct_mirrored(set, mirrors, cameras, CARVE, planes, Default::default())
+    reconstructor().reconstruct_with(set, mirrors, cameras, CARVE, planes, Default::default())
 }
 
 fn images(scene: &GpuScene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {

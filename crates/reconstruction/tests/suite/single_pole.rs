@@ -276,14 +276,8 @@ fn a_view_shows_the_teapot_in_its_mirror() {
     let cells = [MirrorCell { bounds: Aabb { min: MIRROR - 3.6, max: MIRROR + 3.6 }, surroundings: &set }];
     let shown = |reflections| {
         let mirrors = Mirrors { cells: &cells, reflections };
-        let views = reconstructor().reconstruct_mirrored(
-            &samples,
-            mirrors,
-            &[view],
-            CARVE,
-            ViewPlanes::ALL,
-            Default::default(),
-        );
+        let views =
+            reconstructor().reconstruct_with(&samples, mirrors, &[view], CARVE, ViewPlanes::ALL, Default::default());
         views.expect("a view").remove(0)
     };
     let lit: DrawWork<'_> = DrawWork { lighting: "shadows, reflections 1".parse().expect("a lighting"), ..work };

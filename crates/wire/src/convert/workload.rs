@@ -1,17 +1,16 @@
 //! Scenes, workloads, costs and plans.
 
-use cluster::limits::{MAX_CELLS, MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_TILES, MAX_WORKLOADS};
+use cluster::limits::{MAX_CELLS, MAX_COMMON_CELLS, MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_TILES, MAX_WORKLOADS};
 use cluster::{
-    ApplyPlan, Assignment, AuditOrder, CompositorShare, Costs, FetchScene, InvalidField, MirrorCell, Policy,
-    SamplerShare, ScenePart, SceneRef, TileCosts, Timeline, Workload, at_most, finite_seconds, nonempty,
+    ApplyPlan, Assignment, AuditOrder, CommonCell, CommonKind, CompositorShare, Costs, FetchScene, InvalidField,
+    Policy, SamplerShare, ScenePart, SceneRef, TileCosts, Timeline, Workload, at_most, finite_seconds, nonempty,
 };
-use depth_image::MAX_MIRROR_CELLS;
 
 use super::Convert;
 use crate::error::WireError;
 use crate::proto;
 
-enums! { Policy { Pipeline, Direct, TimeShare } }
+enums! { Policy { Pipeline, Direct, TimeShare } CommonKind { Mirrors, Base } }
 
 messages! {
     SceneRef = SceneRef { package_bytes; hash: scene_hash }, then SceneRef::validate;
@@ -19,16 +18,16 @@ messages! {
     FetchSceneResponse = ScenePart { offset_bytes, data };
     Timeline = Timeline { start_s, step_s, set_count };
     Workload = Workload {
-        scene as "workload.scene", sample_cameras, cell_first_indices, mirror_cells, lighting, volume as "workload.volume",
+        scene as "workload.scene", sample_cameras, cell_first_indices, common_cells, lighting, volume as "workload.volume",
         timeline as "workload.timeline", illumination as "workload.illumination", background as "workload.background";
         sampling: sampling_method, planes: with_normals | with_corner_inverse_depths,
         refinement_steps: refinement_step_count
     }, first |w| {
-        at_most(w.mirror_cells.len(), MAX_MIRROR_CELLS, "mirror_cells")?;
-        let cells = w.cell_first_indices.len().clamp(1, MAX_CELLS + MAX_MIRROR_CELLS);
+        at_most(w.common_cells.len(), MAX_COMMON_CELLS, "common_cells")?;
+        let cells = w.cell_first_indices.len().clamp(1, MAX_CELLS + MAX_COMMON_CELLS);
         at_most(w.sample_cameras.len(), MAX_SAMPLE_CAMERAS * cells, "sample_cameras")
     }, then Workload::validate;
-    MirrorCell = MirrorCell { bounds as "mirror_cells.bounds"; sampling: sampling_method };
+    CommonCell = CommonCell { kind as "common_cells.kind", bounds as "common_cells.bounds"; sampling: sampling_method };
     Assignment = Assignment {
         plan_epoch, workload_number, policy, workload as "assignment.workload", samplers, compositors, tile_count, audit;
         relay_fanout: relay_fanout_count, method: reconstruction_method
@@ -44,7 +43,7 @@ messages! {
         first |r| at_most(r.open_workload_numbers.len(), MAX_WORKLOADS, "open_workload_numbers");
     SamplerShare = SamplerShare { node_name, image_indices; address: node_address },
         first |s| {
-            let most = (MAX_CELLS + MAX_MIRROR_CELLS) * MAX_SAMPLE_CAMERAS * MAX_TILES as usize;
+            let most = (MAX_CELLS + MAX_COMMON_CELLS) * MAX_SAMPLE_CAMERAS * MAX_TILES as usize;
             at_most(s.image_indices.len(), most, "image_indices")?;
             check_node(&s.node_name, &s.node_address)
         };

@@ -1,0 +1,70 @@
+//! Cells that depend on no viewer.
+
+use depth_image::{Aabb, CubeGrid, MAX_MIRROR_CELLS, SampleCamera};
+use serde::{Deserialize, Serialize};
+
+use crate::check::{InvalidField, at_most, nonempty};
+use crate::limits::MAX_TILES;
+
+/// A cell that depends on no viewer: every view is made from all of these, and from one view cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CommonCell {
+    /// What its images are for.
+    pub kind: CommonKind,
+    /// Holds the surfaces of mirrors at all moments; of a base, the scene.
+    pub bounds: Aabb,
+    /// How its images are sampled.
+    pub sampling: String,
+}
+
+/// What the images of a common cell are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CommonKind {
+    /// They show what mirrors within the bounds show.
+    Mirrors,
+    /// They are those of a layered depth cube, in which is walked what other images leave unknown.
+    Base,
+}
+
+impl CommonCell {
+    /// # Errors
+    /// For too many mirrors or bases, and values that no peer may send.
+    pub(crate) fn check_all(cells: &[Self]) -> Result<(), InvalidField> {
+        let count = |kind| cells.iter().filter(|cell| cell.kind == kind).count();
+        at_most(count(CommonKind::Mirrors), MAX_MIRROR_CELLS, "common_cells of mirrors")?;
+        at_most(count(CommonKind::Base), 1, "common_cells of a base")?;
+        for Self { bounds, sampling, .. } in cells {
+            nonempty(sampling, "common_cells.sampling_method")?;
+            if bounds.is_empty() || !bounds.min.is_finite() || !bounds.max.is_finite() {
+                return Err(InvalidField::out_of_range("common_cells.bounds", "empty or not finite", "a finite box"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The images of mirrors are of one model; those of a base are a cube's.
+    pub(crate) fn check_cameras(&self, cameras: &[SampleCamera]) -> Result<(), InvalidField> {
+        if self.kind == CommonKind::Base {
+            return check_cube(cameras);
+        }
+        let is_other = |camera: &&SampleCamera| camera.layered().is_some() || !camera.is_of_model(&cameras[0]);
+        cameras.iter().find(is_other).map_or(Ok(()), |other| {
+            let expected = "the model of the mirror cell's first camera";
+            Err(InvalidField::out_of_range("sample_cameras.model", other.model_name(), expected))
+        })
+    }
+}
+
+/// Checks that cameras are the three of one layered cube, each with a row for every tile.
+pub(crate) fn check_cube(cameras: &[SampleCamera]) -> Result<(), InvalidField> {
+    let parallel: Vec<_> = cameras.iter().filter_map(SampleCamera::layered).copied().collect();
+    if parallel.len() != cameras.len() || CubeGrid::of_cameras(&parallel).is_none() {
+        let given = format!("{} parallel of {}", parallel.len(), cameras.len());
+        let allowed = "the three cameras of one layered cube, in one cell";
+        return Err(InvalidField::out_of_range("sample_cameras.model", given, allowed));
+    }
+    let short = parallel.iter().find(|camera| camera.size_px.y < MAX_TILES);
+    short.map_or(Ok(()), |short| {
+        Err(InvalidField::out_of_range("sample_cameras.size", short.size_px, "16 rows and more in a cube"))
+    })
+}
