@@ -12,7 +12,7 @@ use study::{Bar, Check, Report, Table};
 
 use super::subject::Subject;
 use super::views::{self, Figures};
-use super::{cubes, mirrors, viewpoints};
+use super::{baselines, cubes, mirrors, viewpoints};
 use crate::failures::stand::Stand;
 use crate::progress::bar;
 
@@ -34,8 +34,9 @@ const LEAST_PSNR_DB: [f64; 2] = [33.0, 31.5];
 
 /// Samples scenes on the lines along three axes, all surfaces behind one another, and walks through these samples for views from
 /// all around. Compares the views with direct drawing, and with those of joint_carve from depth images near each view. Then follows
-/// rays off mirrors through a cube, up to seven mirrors on a ray's way, and says after how many views the cube is repaid. Last it compares
-/// what a compositor pulls for viewers in many places: one cube, or the images of their view cells.
+/// rays off mirrors through a cube, up to seven mirrors on a ray's way, and says after how many views the cube is repaid. Also compares
+/// what a compositor pulls for viewers in many places: one cube, or the images of their view cells. Last come the paper's own ways to
+/// primary rays: projecting all samples, and quadtrees of depths.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   myriorama study layered
@@ -94,7 +95,9 @@ pub fn run(args: &LayeredArgs) -> anyhow::Result<Outcome> {
     progress.finish_and_clear();
     let (mirrors, checks) = mirrors::measure(&stand)?;
     report.checks.extend(checks);
-    report.tables.extend([held, seen, pulled, mirrors]);
+    let (ways, checks) = baselines::measure(&stand, LIGHTING, args.quick)?;
+    report.checks.extend(checks);
+    report.tables.extend([held, seen, pulled, mirrors, ways]);
     report.tables.iter().for_each(|table| println!("{}", table.to_text()));
     let holds = report.finish(&args.out)?;
     Ok(Outcome::of(holds || !args.strict))

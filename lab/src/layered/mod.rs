@@ -1,8 +1,11 @@
 //! `myriorama study layered`: views from layered depth cubes.
 
+mod baselines;
 pub mod command;
 mod cubes;
 mod mirrors;
+pub mod pyramid;
 mod subject;
 mod viewpoints;
 mod views;
+mod warp;

@@ -36,19 +36,21 @@ pub struct Figures {
     pub view_s: f64,
 }
 
+/// Of rows by [`Figures::row`].
+pub const COLUMNS: [(&str, &str); 9] = [
+    ("scene", ""),
+    ("views by", ""),
+    ("PSNR", "dB"),
+    ("worst PSNR", "dB"),
+    ("FLIP", ""),
+    ("wrong hits", "%"),
+    ("missed", "%"),
+    ("loads a ray", ""),
+    ("a view", "ms"),
+];
+
 pub fn table() -> Table {
-    let columns = [
-        ("scene", ""),
-        ("views by", ""),
-        ("PSNR", "dB"),
-        ("worst PSNR", "dB"),
-        ("FLIP", ""),
-        ("wrong hits", "%"),
-        ("missed", "%"),
-        ("loads a ray", ""),
-        ("a view", "ms"),
-    ];
-    Table::new("Views: errors over the pixels that show a surface", &columns)
+    Table::new("Views: errors over the pixels that show a surface", &COLUMNS)
 }
 
 impl Figures {
@@ -134,7 +136,11 @@ fn view_s(subject: &Subject<'_>, set: &SampleSet, method: ReconstructionMethod) 
     Ok(median((0..REPEATS).map(|_| timed()).collect::<anyhow::Result<_>>()?))
 }
 
-fn figures(truths: &[View], views: &[View], (loads, view_s): (f64, f64)) -> anyhow::Result<Figures> {
+/// Of views beside the truth.
+///
+/// # Errors
+/// Views of other sizes.
+pub fn figures(truths: &[View], views: &[View], (loads, view_s): (f64, f64)) -> anyhow::Result<Figures> {
     let mut all =
         Figures { psnr_db: 0.0, worst_psnr_db: f64::INFINITY, flip: 0.0, wrong_hits: 0.0, missed: 0.0, loads, view_s };
     for (truth, view) in truths.iter().zip(views) {

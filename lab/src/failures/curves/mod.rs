@@ -2,6 +2,7 @@
 
 mod courtyard;
 mod depth_range;
+mod epsilon;
 mod frames;
 mod k_fd;
 mod layers;
@@ -17,10 +18,11 @@ mod view_cell;
 use super::curve::Curve;
 
 /// Families of curves that share their scene or their parts.
-pub const CURVES: [&[Curve]; 13] = [
+pub const CURVES: [&[Curve]; 14] = [
     &poles::CURVES,
     &sphere::CURVES,
     &[thickness::CURVE],
+    &[epsilon::CURVE],
     &odd_eyes::CURVES,
     &view_cell::CURVES,
     &[courtyard::CURVE],

@@ -1,0 +1,184 @@
+//! The paper's own ways to the primary rays of a view, beside the walk through planes: its warp, and its quadtrees.
+//!
+//! The host does both, with the samples of all surfaces as in the paper. A pixel shows the colour of one sample: no scene here has
+//! highlights under the study's light, so that a sample's colour is all that it sends.
+
+use std::time::Instant;
+
+use anyhow::ensure;
+use depth_image::{PinholeCamera, ToneMapping, View, linear_from_rgb9e5};
+use glam::Vec2;
+use rayon::prelude::*;
+use render::{LayerSelection, Lighting};
+use study::{Bar, Cell, Check, Table};
+
+use super::pyramid::{EPSILON_FACTOR, Hit, Pyramids};
+use super::subject::{Cube, Subject};
+use super::views::{self, Figures};
+use super::warp::warp;
+use crate::failures::stand::Stand;
+
+/// A quick run has the first alone.
+const SCENES: [&str; 3] = ["bird-nest", "mirror-box", "tree"];
+const VIEWS: usize = 3;
+const SIDE: u32 = 512;
+/// Where the texels of the first side are too large for the bound beside the warp.
+const FINER_SIDE: u32 = 1024;
+const MOST_TEXEL_PX: f64 = 0.54;
+/// Bounds beside the quadtrees: wrong hits and loads as shares of theirs. PSNR above both of the paper's ways.
+const MOST_WRONG_HITS: f64 = 0.4;
+const MOST_LOADS: f64 = 0.35;
+const LEAST_GAIN_DB: f64 = 3.0;
+
+/// The table of all scenes, and its checks.
+///
+/// # Errors
+/// The device fails.
+pub fn measure(stand: &Stand, lighting: Lighting, is_quick: bool) -> anyhow::Result<(Table, Vec<Check>)> {
+    let columns = [&views::COLUMNS[..], &[("texel", "px"), ("holes", "%")]].concat();
+    let mut table = Table::new("The paper's ways beside the walk", &columns);
+    let mut checks = Vec::new();
+    for &name in &SCENES[..if is_quick { 1 } else { SCENES.len() }] {
+        let subject = Subject::new(stand, name, lighting, VIEWS)?;
+        checks.extend(of_scene(&subject, &mut table)?);
+    }
+    Ok((table, checks))
+}
+
+fn of_scene(subject: &Subject<'_>, table: &mut Table) -> anyhow::Result<Vec<Check>> {
+    let name = subject.name;
+    let cubes = Cubes::new(subject, SIDE)?;
+    let quadtrees = cubes.traced(&cubes.all)?;
+    cubes.push("pyramid", &quadtrees, None, table)?;
+    cubes.push("pyramid, dominant axis", &cubes.traced(&cubes.dominant)?, None, table)?;
+    let walk = cubes.compared_with_warp(table)?;
+    let over = |what: &str| format!("{name}: {what} of a walk over quadtrees, {SIDE}²");
+    let mut checks = vec![
+        Check::new(
+            over("wrong hits"),
+            walk.figures.wrong_hits / quadtrees.wrong_hits,
+            "",
+            Bar::AtMost(MOST_WRONG_HITS),
+        ),
+        Check::new(over("loads"), walk.figures.loads / quadtrees.loads, "", Bar::AtMost(MOST_LOADS)),
+        Check::new(over("PSNR"), walk.figures.psnr_db - quadtrees.psnr_db, "dB", Bar::AtLeast(LEAST_GAIN_DB)),
+    ];
+    let (side, walk) = match cubes.texel_px() > MOST_TEXEL_PX {
+        true => (FINER_SIDE, Cubes::new(subject, FINER_SIDE)?.compared_with_warp(table)?),
+        false => (SIDE, walk),
+    };
+    let gain = format!("{name}: PSNR of a walk over the warp, {side}²");
+    checks.push(Check::new(gain, walk.over_warp_db, "dB", Bar::AtLeast(LEAST_GAIN_DB)));
+    Ok(checks)
+}
+
+/// The figures of a walk, and its gain over the warp.
+struct Walk {
+    figures: Figures,
+    over_warp_db: f64,
+}
+
+/// Cubes of one scene and side: all surfaces for the paper's ways, those of the dominant axis for the walk.
+struct Cubes<'s> {
+    subject: &'s Subject<'s>,
+    side: u32,
+    all: Cube,
+    dominant: Cube,
+}
+
+impl<'s> Cubes<'s> {
+    fn new(subject: &'s Subject<'s>, side: u32) -> anyhow::Result<Self> {
+        let [all, dominant] =
+            [LayerSelection::All, LayerSelection::Dominant].map(|kept| subject.cube((side, kept), subject.lighting, 1));
+        let (all, dominant) = (all?, dominant?);
+        ensure!(all.images.iter().all(|image| image.specular.is_none()), "{} has highlights", subject.name);
+        Ok(Self { subject, side, all, dominant })
+    }
+
+    /// A texel in the middle of the scene, in pixels of the first view.
+    fn texel_px(&self) -> f64 {
+        let at_m = |view: &PinholeCamera| view.eye_in_world.distance(self.subject.scene.bounds().center());
+        let view = self.subject.views.first();
+        view.map_or(f64::NAN, |view| f64::from(self.all.grid.spacing_m * view.focal_px.y / at_m(view)))
+    }
+
+    fn push(&self, by: &str, figures: &Figures, holes: Option<f64>, table: &mut Table) -> anyhow::Result<()> {
+        let row = figures.row(self.subject.name, &format!("{by}, {}²", self.side));
+        let more = [Cell::from(self.texel_px()), Cell::from(holes.map(|share| share * 100.0))];
+        Ok(table.push([row, more.to_vec()].concat())?)
+    }
+
+    fn compared_with_warp(&self, table: &mut Table) -> anyhow::Result<Walk> {
+        let (warped, holes) = self.warped()?;
+        self.push("warp", &warped, Some(holes), table)?;
+        let figures = views::of_cube(self.subject, &self.subject.upload(&self.dominant)?.0)?;
+        self.push("layered", &figures, None, table)?;
+        Ok(Walk { figures, over_warp_db: figures.psnr_db - warped.psnr_db })
+    }
+
+    /// By quadtrees; rays are shared among the cores.
+    fn traced(&self, cube: &Cube) -> anyhow::Result<Figures> {
+        let pyramids = Pyramids::new(&cube.images, EPSILON_FACTOR);
+        self.figures(cube, |camera| {
+            let found = (0..camera.pixel_count())
+                .into_par_iter()
+                .map(|pixel| pyramids.trace(camera.ray(center(camera, pixel)), camera.near_m));
+            let found: Vec<(Option<Hit>, usize)> = found.collect();
+            let loads = found.iter().map(|(_, loads)| loads).sum();
+            (found.into_iter().map(|(hit, _)| hit).collect(), loads)
+        })
+    }
+
+    /// By the warp, on one core but for its holes. Gives also their share of the pixels that show a surface: the others of the
+    /// background are followed in vain.
+    fn warped(&self) -> anyhow::Result<(Figures, f64)> {
+        let pyramids = Pyramids::new(&self.all.images, EPSILON_FACTOR);
+        let mut are_holes = Vec::new();
+        let figures = self.figures(&self.all, |camera| {
+            let warped = warp(&self.all.images, &pyramids, camera);
+            are_holes.extend(warped.is_hole);
+            (warped.hits, warped.loads)
+        })?;
+        let surfaces = self.subject.truths.iter().flat_map(|truth| truth.inverse_depth_per_m.iter().flatten());
+        let shown: Vec<bool> =
+            are_holes.iter().zip(surfaces).filter(|(_, depth)| **depth > 0.0).map(|(hole, _)| *hole).collect();
+        Ok((figures, shown.iter().filter(|hole| **hole).count() as f64 / shown.len() as f64))
+    }
+
+    /// Of views by hits and the loads of all their rays.
+    fn figures(
+        &self,
+        cube: &Cube,
+        mut hits: impl FnMut(&PinholeCamera) -> (Vec<Option<Hit>>, usize),
+    ) -> anyhow::Result<Figures> {
+        let start = Instant::now();
+        let found: Vec<_> = self.subject.views.iter().map(|camera| (camera, hits(camera))).collect();
+        let view_s = start.elapsed().as_secs_f64() / VIEWS as f64;
+        let rays: usize = found.iter().map(|(camera, _)| camera.pixel_count()).sum();
+        let loads: usize = found.iter().map(|(_, (_, loads))| loads).sum();
+        let views: Vec<View> = found.iter().map(|(camera, (hits, _))| self.view(cube, camera, hits)).collect();
+        views::figures(&self.subject.truths, &views, (loads as f64 / rays as f64, view_s))
+    }
+
+    fn view(&self, cube: &Cube, camera: &PinholeCamera, hits: &[Option<Hit>]) -> View {
+        let background = |pixel| {
+            let towards = camera.ray(center(camera, pixel)).direction_in_world.normalize_or_zero();
+            self.subject.scene.background.radiance_linear(towards)
+        };
+        let shown = hits.iter().enumerate().map(|(pixel, hit)| match hit {
+            Some(hit) => linear_from_rgb9e5(cube.images[hit.image].color_rgb9e5[hit.sample]),
+            None => background(pixel),
+        });
+        View {
+            size_px: camera.size_px,
+            srgb8: shown.flat_map(|shown| ToneMapping::NONE.srgb8(shown)).collect(),
+            inverse_depth_per_m: Some(hits.iter().map(|hit| hit.map_or(0.0, |hit| hit.t.recip())).collect()),
+            provenance: None,
+        }
+    }
+}
+
+fn center(camera: &PinholeCamera, pixel: usize) -> Vec2 {
+    let columns = camera.size_px.x as usize;
+    Vec2::new((pixel % columns) as f32, (pixel / columns) as f32) + 0.5
+}
