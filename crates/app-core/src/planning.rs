@@ -52,7 +52,7 @@ impl Planning {
     /// # Errors
     /// The scene has no sample cameras, or the user's choices leave no row.
     pub fn new(setup: &Setup, args: &SceneArgs, views: &PlannedViews) -> anyhow::Result<Self> {
-        if args.lighting.reflections() > 0 {
+        if args.lighting.without_reflections().is_some() {
             let reason = "no budget can be kept for mirrors that show the scene";
             return Err(BadInput(format!("--lighting {}: {reason}", args.lighting)).into());
         }

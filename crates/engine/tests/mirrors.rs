@@ -194,3 +194,12 @@ fn sets_of_other_devices_are_refused_as_mirrors() {
     let refused = stand.engine.reconstruct(too_many.as_ref(), &work, TURN).err().map(|error| error.to_string());
     assert_eq!(refused.as_deref(), Some("common_cells: views have at most 8 mirror cells, not 9"));
 }
+
+/// Light that depends on the viewer is no part of samples.
+#[test]
+fn samples_are_those_of_lighting_without_glossy_reflections() {
+    let stand = Stand::new();
+    let [glossy, plain] = ["shadows, glossy 4", "shadows"]
+        .map(|lighting| common::sample_set(&stand.engine, (HASH, &stand.scene), &[camera()], lighting).images);
+    assert!(glossy == plain);
+}

@@ -95,6 +95,7 @@ impl ShaderVariant for Finish {
             environment_map => self.environment_map,
             highlight => highlight.map(highlight_name),
             mirrors => self.output.mirrors,
+            glossy => self.output.glossy,
             surface_id => surface_id.is_some(),
             normal_plane => normal, reflector_plane => reflector, id_plane => surface_id, passed_plane => passed,
             averaged => antialias > Antialias::NONE, plane_count => count,
@@ -110,7 +111,8 @@ impl ShaderVariant for Finish {
         });
         let mirrored = |output: Output| {
             let is_mirror = output.highlight == Some(Highlight::Ggx);
-            [Some(output), is_mirror.then_some(Output { mirrors: true, ..output })].into_iter().flatten()
+            let mirrored = [false, true].map(|glossy| Output { mirrors: true, glossy, ..output });
+            std::iter::once(output).chain(mirrored.into_iter().filter(move |_| is_mirror))
         };
         let views = colors.flat_map(mirrored).flat_map(Self::of_output);
         let plain = Output::default();

@@ -104,8 +104,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var glossy = met && surface.w != 0u; glossy; glossy = false) {
         let direction = direction_of(pixel);
         let point = {{ "origin_of(pixel)" if single_pole else "camera.eye_in_world" }} + direction * (camera.near_m / depth);
+        // Where rays go into lobes, they bring the environment.
         var visibility: VisibilityWords;
-{% for word in range(visibility_words) %}        visibility[{{ word }}] = visibility_word({{ word }}u, place, open);
+{% for word in range(visibility_words) %}        visibility[{{ word }}] = visibility_word({{ word }}u, place, {{ "0.0" if glossy else "open" }});
 {% endfor %}
         linear += highlight(point, unit_from_oct16(surface.z), -normalize(direction), surface.w, visibility);
 {%- if mirrors %}

@@ -15,7 +15,7 @@ use crate::known_samples::KnownCamera;
 use crate::layered::{Crossing, GpuLines};
 use crate::pixel_camera::PixelCamera;
 use crate::raster::{RasterCamera, RasterVariant};
-use crate::reflections::{Spawn, bounces::GpuBounce};
+use crate::reflections::{Lobe, Spawn, bounces::GpuBounce, lobe::GpuLobe};
 use crate::test_support::{TEST, test_templates};
 
 /// Fields with their offsets, and the size of the whole.
@@ -164,6 +164,11 @@ fn a_bounce_has_the_wgsl_layout() {
         padding
     });
     assert_eq!(shader(&parsed(&Spawn::all().remove(0)), "Bounce"), host);
+}
+
+#[test]
+fn a_lobe_has_the_wgsl_layout() {
+    assert_eq!(shader(&parsed(&Lobe::all().remove(0)), "Lobe"), host!(GpuLobe { ray, ray_count, whole }));
 }
 
 #[test]

@@ -7,6 +7,9 @@ use depth_image::{Highlight, MAX_REFLECTIONS};
 /// Most rays a light, or of occlusion, a pixel.
 pub const MAX_RAYS: u32 = 4096;
 
+/// Most rays of a lobe, a pixel.
+pub const MAX_GLOSSY_RAYS: u32 = 256;
+
 /// A lighting, written as terms with commas between them: `soft 16, occlusion 16`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Lighting {
@@ -16,6 +19,9 @@ pub struct Lighting {
     pub occlusion: Option<Occlusion>,
     /// The mirrors that a ray meets, one after the other; without any, mirrors show lamps and the environment.
     pub reflections: Option<NonZeroU32>,
+    /// Rays a pixel into the lobe of what it shows, as far as `reflections` does not follow its mirrored ray; without them rough
+    /// reflectors mirror the environment alone.
+    pub glossy: Option<NonZeroU32>,
     /// The pixels that get rays of their own.
     pub rate: Rate,
 }
@@ -64,13 +70,15 @@ const DEFAULT_TOLERANCE: f32 = 0.04;
 #[allow(missing_docs, reason = "self-naming variants")]
 pub enum UnknownLighting {
     #[error(
-        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, occlusion N, occlusion N RADIUSm, reflections N, adaptive, adaptive TOLERANCE with commas between them"
+        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, occlusion N, occlusion N RADIUSm, reflections N, glossy N, adaptive, adaptive TOLERANCE with commas between them"
     )]
     Term(String),
     #[error("lighting {0:?}: rays must be from 1 to {MAX_RAYS}")]
     Rays(String),
     #[error("lighting {0:?}: reflections must be from 1 to {MAX_REFLECTIONS}")]
     Reflections(String),
+    #[error("lighting {0:?}: rays of glossy must be from 1 to {MAX_GLOSSY_RAYS}")]
+    Glossy(String),
     #[error("lighting {0:?}: {1} must be a positive number")]
     Number(String, &'static str),
     #[error("lighting {0:?}: {1}")]
@@ -79,7 +87,8 @@ pub enum UnknownLighting {
 
 impl Lighting {
     /// Base colours as they are.
-    pub const UNLIT: Self = Self { direct: Direct::Unlit, occlusion: None, reflections: None, rate: Rate::Full };
+    pub const UNLIT: Self =
+        Self { direct: Direct::Unlit, occlusion: None, reflections: None, glossy: None, rate: Rate::Full };
 
     /// Whether anything arrives at surfaces.
     #[must_use]
@@ -115,10 +124,17 @@ impl Lighting {
         self.reflections.map_or(0, NonZeroU32::get)
     }
 
-    /// Without mirror images of the scene; `None` where there are none.
+    /// Rays of a lobe a pixel.
+    #[must_use]
+    pub fn glossy_rays(&self) -> u32 {
+        self.glossy.map_or(0, NonZeroU32::get)
+    }
+
+    /// Without mirror images of the scene, sharp or glossy; `None` where there are none.
     #[must_use]
     pub fn without_reflections(&self) -> Option<Self> {
-        self.reflections.is_some().then_some(Self { reflections: None, ..*self })
+        let is_reflected = self.reflections.or(self.glossy).is_some();
+        is_reflected.then_some(Self { reflections: None, glossy: None, ..*self })
     }
 
     /// A quarter of the rays, at least one each; `None` where there are no fewer.
@@ -158,7 +174,7 @@ impl Lighting {
 impl FromStr for Lighting {
     type Err = UnknownLighting;
     fn from_str(text: &str) -> Result<Self, UnknownLighting> {
-        let (mut direct, mut occlusion, mut reflections, mut rate) = (None, None, None, None);
+        let (mut direct, mut occlusion, mut reflections, mut glossy, mut rate) = (None, None, None, None, None);
         for term in text.split(',').map(str::trim) {
             let words: Vec<&str> = term.split_whitespace().collect();
             let again = match words[..] {
@@ -172,6 +188,7 @@ impl FromStr for Lighting {
                     occlusion.replace(Occlusion { rays: rays(text, n)?, radius_m }).is_some()
                 }
                 ["reflections", n] => reflections.replace(mirrors(text, n)?).is_some(),
+                ["glossy", n] => glossy.replace(lobe_rays(text, n)?).is_some(),
                 ["adaptive"] => rate.replace(Rate::Adaptive { tolerance: DEFAULT_TOLERANCE }).is_some(),
                 ["adaptive", n] => {
                     rate.replace(Rate::Adaptive { tolerance: positive(text, n, "the tolerance")? }).is_some()
@@ -183,11 +200,11 @@ impl FromStr for Lighting {
             }
         }
         let lighting =
-            Self { direct: direct.unwrap_or_default(), occlusion, reflections, rate: rate.unwrap_or_default() };
+            Self { direct: direct.unwrap_or_default(), occlusion, reflections, glossy, rate: rate.unwrap_or_default() };
         if !lighting.is_lit() && occlusion.is_some() {
             return Err(UnknownLighting::Conflict(text.to_owned(), "unlit surfaces have no occlusion"));
         }
-        if lighting.shadow_rays() == 0 && reflections.is_some() {
+        if lighting.shadow_rays() == 0 && lighting.without_reflections().is_some() {
             return Err(UnknownLighting::Conflict(
                 text.to_owned(),
                 "mirrors show the scene under shadows and soft N only",
@@ -210,6 +227,11 @@ fn mirrors(text: &str, number: &str) -> Result<NonZeroU32, UnknownLighting> {
     mirrors.ok_or_else(|| UnknownLighting::Reflections(text.to_owned()))
 }
 
+fn lobe_rays(text: &str, number: &str) -> Result<NonZeroU32, UnknownLighting> {
+    let rays = number.parse().ok().filter(|rays: &NonZeroU32| rays.get() <= MAX_GLOSSY_RAYS);
+    rays.ok_or_else(|| UnknownLighting::Glossy(text.to_owned()))
+}
+
 fn positive(text: &str, number: &str, what: &'static str) -> Result<f32, UnknownLighting> {
     let value = number.parse().ok().filter(|v: &f32| v.is_finite() && *v > 0.0);
     value.ok_or_else(|| UnknownLighting::Number(text.to_owned(), what))
@@ -230,6 +252,9 @@ impl fmt::Display for Lighting {
         }
         if let Some(reflections) = self.reflections {
             write!(f, ", reflections {reflections}")?;
+        }
+        if let Some(rays) = self.glossy {
+            write!(f, ", glossy {rays}")?;
         }
         match self.rate {
             Rate::Full => Ok(()),
@@ -256,6 +281,8 @@ mod tests {
             "soft 4, adaptive 0.1",
             "shadows, reflections 8",
             "soft 16, occlusion 16, reflections 2, adaptive",
+            "shadows, glossy 256",
+            "soft 16, occlusion 16, reflections 2, glossy 16, adaptive",
         ] {
             assert_eq!(name.parse::<Lighting>().expect(name).to_string(), name);
         }
@@ -264,7 +291,7 @@ mod tests {
 
     #[test]
     fn invalid_lightings_are_refused_with_the_reason() {
-        use UnknownLighting::{Conflict, Number, Rays, Reflections, Term};
+        use UnknownLighting::{Conflict, Glossy, Number, Rays, Reflections, Term};
         let parsed = |text: &str| text.parse::<Lighting>().expect_err(text);
         for text in ["soft 0", "soft -1", "soft 4097", "soft many", "occlusion 0", "soft 99999999999"] {
             assert!(matches!(parsed(text), Rays(_)), "{text}");
@@ -272,17 +299,30 @@ mod tests {
         for text in ["shadows, reflections 0", "shadows, reflections 9", "shadows, reflections -1"] {
             assert!(matches!(parsed(text), Reflections(_)), "{text}");
         }
-        for text in ["", "soft", "reflections", "bright", "unlit;phong", "occlusion", "occlusion 1 2 3"] {
+        for text in ["shadows, glossy 0", "shadows, glossy 257", "shadows, glossy -1"] {
+            assert!(matches!(parsed(text), Glossy(_)), "{text}");
+        }
+        for text in ["", "soft", "reflections", "glossy", "bright", "unlit;phong", "occlusion", "occlusion 1 2 3"] {
             assert!(matches!(parsed(text), Term(_)), "{text}");
         }
         for text in ["occlusion 4 -1m", "occlusion 4 NaN", "soft 4, adaptive inf", "soft 4, adaptive 0"] {
             assert!(matches!(parsed(text), Number(..)), "{text}");
         }
-        let unmirrored = ["phong, reflections 1", "unlit, reflections 1", "reflections 2"];
+        let unmirrored = ["phong, reflections 1", "unlit, reflections 1", "reflections 2", "glossy 4"];
         let twice = ["unlit, phong", "occlusion 4, occlusion 8", "shadows, reflections 1, reflections 1"];
         for text in [&unmirrored[..], &twice, &["unlit, occlusion 4", "phong, adaptive"]].concat() {
             assert!(matches!(parsed(text), Conflict(..)), "{text}");
         }
+    }
+
+    #[test]
+    fn lighting_without_reflections_has_no_glossy_ones_either() {
+        let plain =
+            |text: &str| text.parse::<Lighting>().expect(text).without_reflections().map(|plain| plain.to_string());
+        for text in ["soft 4, reflections 2", "soft 4, glossy 8", "soft 4, reflections 2, glossy 8"] {
+            assert_eq!(plain(text).as_deref(), Some("soft 4"), "{text}");
+        }
+        assert_eq!(plain("soft 4"), None);
     }
 
     #[test]

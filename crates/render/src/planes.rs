@@ -21,6 +21,8 @@ pub(crate) struct Output {
     pub highlight: Option<Highlight>,
     /// Mirrors of a view show the scene.
     pub mirrors: bool,
+    /// Rays of lobes bring what mirrors do not show.
+    pub glossy: bool,
     pub normal: bool,
     pub reflector: bool,
     pub surface_id: bool,

@@ -364,8 +364,9 @@ fn corner_cameras(cameras: &[PinholeCamera]) -> Vec<PinholeCamera> {
 
 fn views_output(work: DrawWork<'_>) -> Output {
     let highlight = work.highlight();
-    let mirrors = highlight.is_some() && work.lighting.reflections() > 0;
-    Output { highlight, mirrors, ..Output::of(work, highlight.is_some()) }
+    let glossy = highlight.is_some() && work.lighting.glossy_rays() > 0;
+    let mirrors = highlight.is_some() && work.lighting.without_reflections().is_some();
+    Output { highlight, mirrors, glossy, ..Output::of(work, highlight.is_some()) }
 }
 
 fn images_output(work: DrawWork<'_>, planes: SamplePlanes, test: Option<RedundancyTest>) -> Output {

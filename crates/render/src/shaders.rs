@@ -16,7 +16,7 @@ use crate::{
     pixel_list::LIST_WORKGROUP,
     raster::RasterVariant,
     redundancy_test::RedundancyTest,
-    reflections::{Follow, Land, Spawn},
+    reflections::{Follow, Land, Lobe, Spawn},
     sums::COLOR_SUMS,
     surfaces::NOTHING,
 };
@@ -30,7 +30,7 @@ pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
     "raster.wgsl", "append.wgsl", "layered/lit.wgsl", "packed_surface.wgsl", "surfaces.wgsl", "albedo.wgsl", "camera.wgsl", "single_pole.wgsl", "sequence.wgsl", "sums.wgsl",
     "illuminate.wgsl", "interpolate.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl", "hashed_alpha.wgsl",
     "rise.wgsl", "spot.wgsl", "shaded.wgsl", "visibility.wgsl", "reflections/bounce.wgsl", "reflections/bounce_off.wgsl", "reflections/curvature.wgsl",
-    "reflections/spawn.wgsl", "reflections/follow.wgsl", "reflections/land.wgsl",
+    "reflections/spawn.wgsl", "reflections/follow.wgsl", "reflections/land.wgsl", "reflections/lobe.wgsl",
     "rays/traverse.wgsl", "rays/material.wgsl", "rays/primary.wgsl"
 };
 
@@ -58,6 +58,7 @@ pub fn shader_sources<'t>(
         Illuminate,
         Interpolate,
         Spawn,
+        Lobe,
         Follow,
         Land,
         Lit,

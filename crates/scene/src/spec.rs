@@ -10,7 +10,7 @@ use crate::{Limits, MissingTextures, Scene, SceneError, load_file};
 
 /// Names of the built-in scenes. A `tree-terrain-…` may have the suffix `-wind`, and `grass` a `:` with a
 /// [density](GrassDensity). A file of such a name is reached as `./name`.
-pub const BUILT_IN_NAMES: [&str; 20] = [
+pub const BUILT_IN_NAMES: [&str; 22] = [
     "tree-terrain-30k",
     "tree-terrain-125k",
     "tree-terrain-500k",
@@ -31,6 +31,8 @@ pub const BUILT_IN_NAMES: [&str; 20] = [
     "mirror-pair",
     "mirror-hall",
     "mirror-box",
+    "teapot-floor",
+    "teapot-spheres",
 ];
 
 /// The name before the density of a meadow.

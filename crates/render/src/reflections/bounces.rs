@@ -57,7 +57,7 @@ pub(crate) struct Rays<'r> {
     pub list: &'r BounceList,
     /// Pixels of the piece.
     pub units: u64,
-    /// Mirrors on the way so far.
+    /// Mirrors on the way so far; counted from [`depth_image::MAX_REFLECTIONS`] on where the first is a glossy surface.
     pub generation: u32,
 }
 

@@ -1,17 +1,20 @@
-//! Mirror images of the scene in views: rays off the mirrors of a picture are followed, the points where they end are lit,
-//! and their light is added to the pixels. Mirrors among those points send rays on.
+//! Mirror images of the scene in views: rays off the mirrors of a picture, and into the lobes of glossy surfaces, are followed, the
+//! points where they end are lit, and their light is added to the pixels. Mirrors among those points send rays on.
 
 pub(crate) mod bounces;
 mod follow;
 mod land;
+pub(crate) mod lobe;
 mod spawn;
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
+use depth_image::MAX_REFLECTIONS;
 use gpu::{BufferPool, Gpu, PooledBuffer};
 
 pub(crate) use follow::Follow;
 pub(crate) use land::Land;
+pub(crate) use lobe::Lobe;
 pub(crate) use spawn::Spawn;
 
 use self::bounces::{BounceList, GpuBounce, Rays};
@@ -29,6 +32,8 @@ pub(crate) struct Reflections {
     pub reflected: PooledBuffer,
     /// Rays and the points where they end: of one mirror, and of the next.
     bounces: [PooledBuffer; 2],
+    /// The weights of all rays into the lobe of each pixel together.
+    lobe_weights: PooledBuffer,
     /// The light at the ends, as `sums.wgsl` has it.
     sums: PooledBuffer,
     /// Rays that there is room for.
@@ -55,10 +60,12 @@ impl Reflections {
             gpu.check_storage_bytes(label, bytes)?;
             Ok::<_, RenderError>(pool.lend_storage(label, bytes))
         };
+        let lobe_bytes = batch.bytes(usize::from(batch.output.glossy)).max(4);
         let rays_bytes = size_of::<GpuBounce>() as u64 * u64::from(capacity);
         Ok(Some(Self {
             reflected: lend("mirrored light", batch.bytes(3))?,
             bounces: [lend("mirrored rays", rays_bytes)?, lend("mirrored rays", rays_bytes)?],
+            lobe_weights: lend("weights of lobes", lobe_bytes)?,
             sums: lend("light of mirrored points", 4 * u64::from(capacity) * batch.output.sums.count() as u64)?,
             capacity,
         }))
@@ -70,6 +77,7 @@ impl Reflections {
     /// A pass cannot be made.
     pub fn record(&self, recording: &mut Recording<'_>, surfaces: &[Surfaces]) -> Result<(), RenderError> {
         let batch = recording.batch;
+        recording.frame.encoder.clear_buffer(&self.reflected, 0, None);
         // Light that is refined is summed up for pixels alone: mirrored points have the same rays anew.
         let rays = recording.sums.rays.clone().map(|rays| Range { start: 0, ..rays });
         let parts = batch.parts_of_points(recording.gpu, &rays, self.capacity);
@@ -81,7 +89,7 @@ impl Reflections {
         Ok(())
     }
 
-    /// Mirror after mirror: rays are followed, their ends are lit, and what is seen there is added to the pixels.
+    /// Rays off mirrors, then of each pixel's lobe one after another: the memory is that of one ray a pixel.
     fn record_piece(
         &self,
         recording: &mut Recording<'_>,
@@ -89,22 +97,42 @@ impl Reflections {
         (element, piece): (u32, Piece),
         target: &Surfaces,
     ) -> Result<(), RenderError> {
-        let generations = recording.batch.work.lighting.reflections();
-        let units = units(recording, piece);
-        let first = BounceList::new(recording.gpu);
-        let next = (&*self.bounces[0], &first);
-        spawn::record(recording, &self.reflected, (element, piece, units), target, next)?;
-        let mut listed = Some(first);
-        for generation in 1..=generations {
-            let Some(list) = listed else { break };
-            let [from, to] = if generation % 2 == 1 { [0, 1] } else { [1, 0] };
-            let rays = Rays { bounces: &self.bounces[from], list: &list, units, generation };
+        let lighting = recording.batch.work.lighting;
+        let piece = (element, piece, units(recording, piece));
+        let mirrors = lighting.reflections();
+        if mirrors > 0 {
+            let first = BounceList::new(recording.gpu);
+            spawn::record(recording, piece, target, (&self.bounces[0], &first))?;
+            self.record_rays(recording, parts, (first, piece.2), 1..=mirrors)?;
+        }
+        // Costs are learned by generation, and are others than those of rays off mirrors.
+        let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + mirrors.max(1);
+        for ray in 0..lighting.glossy_rays() {
+            let first = BounceList::new(recording.gpu);
+            lobe::record(recording, (ray, &self.lobe_weights), piece, target, (&self.bounces[0], &first))?;
+            self.record_rays(recording, parts, (first, piece.2), generations.clone())?;
+        }
+        Ok(())
+    }
+
+    /// Mirror after mirror: the rays of a list are followed, their ends are lit, and what is seen there is added to the pixels.
+    fn record_rays(
+        &self,
+        recording: &mut Recording<'_>,
+        parts: &[Part],
+        (mut list, units): (BounceList, u64),
+        generations: RangeInclusive<u32>,
+    ) -> Result<(), RenderError> {
+        let [mut from, mut to] = [&self.bounces[0], &self.bounces[1]];
+        for generation in generations.clone() {
+            let rays = Rays { bounces: from, list: &list, units, generation };
             follow::record(recording, rays)?;
             illuminate::record_points(recording, parts, rays, &self.sums)?;
-            let next = (generation < generations).then(|| BounceList::new(recording.gpu));
-            let onward = next.as_ref().map(|next| (&*self.bounces[to], next));
+            let next = BounceList::new(recording.gpu);
+            let onward = (generation < *generations.end()).then_some((&**to, &next));
             land::record(recording, [&parts[0].cameras, &self.sums, &self.reflected], rays, onward)?;
-            listed = next;
+            list = next;
+            std::mem::swap(&mut from, &mut to);
         }
         Ok(())
     }

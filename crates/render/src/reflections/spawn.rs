@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Planes of a view: colour and depth.
-const VIEW_PLANES: usize = 2;
+pub(super) const VIEW_PLANES: usize = 2;
 
 #[derive(Debug)]
 pub(crate) struct Spawn {
@@ -49,7 +49,6 @@ impl ShaderVariant for Spawn {
 /// Records the pass over a piece of a picture.
 pub(super) fn record(
     recording: &mut Recording<'_>,
-    reflected: &Buffer,
     (element, piece, units): (u32, Piece, u64),
     target: &Surfaces,
     (next_bounces, next): (&Buffer, &BounceList),
@@ -61,7 +60,7 @@ pub(super) fn record(
     debug_assert_eq!(batch.output.layout().count, VIEW_PLANES);
     let pass = recording.passes.get(&variant)?;
     let illumination = &batch.work.scene.illumination;
-    let buffers = [&recording.cameras, illumination, reflected, next_bounces];
+    let buffers = [&recording.cameras, illumination, next_bounces];
     let own = pass.bind(0, bindings(buffers, next, target))?;
     let tree = pass.bind(1, traced.bindings())?;
     let size = [batch.cameras[piece.camera].size_px().x, piece.end_row - piece.first_row, 1];
@@ -72,14 +71,13 @@ pub(super) fn record(
 }
 
 fn bindings<'r>(
-    [camera, illumination, reflected, next_bounces]: [&'r Buffer; 4],
+    [camera, illumination, next_bounces]: [&'r Buffer; 3],
     next: &'r BounceList,
     target: &'r Surfaces,
 ) -> Vec<Binding<'r>> {
     let mut bindings = vec![
         Binding::buffer("camera", camera),
         Binding::buffer("illumination", illumination),
-        Binding::buffer("reflected", reflected),
         Binding::buffer("next_bounces", next_bounces),
         next.binding("next"),
     ];
@@ -98,7 +96,7 @@ mod tests {
         let (list, traced) = (BounceList::new(&stage.gpu), stage.scene.rays.at(0.0).expect("a tree"));
         for variant in Spawn::all() {
             let target = stage.surfaces(variant.by_rays, false);
-            stage.check(&variant, 0, &bindings([&stage.buffer; 4], &list, &target));
+            stage.check(&variant, 0, &bindings([&stage.buffer; 3], &list, &target));
             stage.check(&variant, 1, &traced.bindings());
         }
     }

@@ -10,9 +10,6 @@
 {% include "reflections/bounce_off.wgsl" %}
 
 @group(0) var<uniform> illumination: Illumination;
-// Red, green and blue of each pixel: linear light that mirrored rays bring.
-@group(0) var<storage, read_write> reflected: array<f32>;
-
 {% include "rise.wgsl" %}
 {% include "spot.wgsl" %}
 {% include "reflections/curvature.wgsl" %}
@@ -40,7 +37,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let pixel = pixel_at(id, 1u);
     if is_beyond(pixel) { return; }
     let place = camera.first_word / {{ plane_count }}u + place_of(pixel);
-    for (var channel = 0u; channel < 3u; channel++) { reflected[3u * place + channel] = 0.0; }
     let depth = reversed_depth_at(pixel);
     let surface = surface_at(pixel);
     let reflector = unpack_reflector(surface.w);

@@ -81,6 +81,6 @@ impl Scene {
     }
 }
 
-fn bias_m(origin: Vec3, offset: Vec3, side_m: f32) -> f32 {
+pub(super) fn bias_m(origin: Vec3, offset: Vec3, side_m: f32) -> f32 {
     BIAS_FOOTPRINTS * side_m + BIAS_ROUNDINGS * (origin.abs() + offset.abs()).max_element()
 }

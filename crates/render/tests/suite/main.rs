@@ -4,6 +4,7 @@ mod animation;
 mod antialias;
 mod closed_forms;
 mod environment_map;
+mod glossy;
 mod layered;
 mod light_failures;
 mod materials;

@@ -13,15 +13,15 @@ use scene::{Instance, Material, Scene};
 use crate::stage::{SIZE_PX, device, lamps, upload, work};
 
 /// Codes of 8-bit sRGB that two roundings and the tables of a device make.
-const ROUNDING: i32 = 3;
+pub const ROUNDING: i32 = 3;
 
-fn mirror(reflectance: f32) -> Material {
+pub fn mirror(reflectance: f32) -> Material {
     let base_color_linear = [reflectance, reflectance, reflectance, 1.0];
     Material { name: "mirror".into(), base_color_linear, metallic: 1.0, roughness: 0.0, ..Material::default() }
 }
 
 /// A scene of several, in the dark.
-fn of_parts(parts: Vec<(Scene, Material, Affine3A)>) -> Scene {
+pub fn of_parts(parts: Vec<(Scene, Material, Affine3A)>) -> Scene {
     let mut whole = Scene { name: "parts".into(), ..Scene::default() };
     for (number, (mut part, material, world_from_mesh)) in (0..).zip(parts) {
         let mut mesh = part.meshes.remove(0);
@@ -34,11 +34,11 @@ fn of_parts(parts: Vec<(Scene, Material, Affine3A)>) -> Scene {
     whole
 }
 
-fn dark() -> Illumination {
+pub fn dark() -> Illumination {
     Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) }
 }
 
-fn glowing() -> Material {
+pub fn glowing() -> Material {
     Material { name: "as it is".into(), unlit: true, ..Material::default() }
 }
 
@@ -46,25 +46,25 @@ fn at(x: f32, y: f32, z: f32) -> Affine3A {
     Affine3A::from_translation(Vec3::new(x, y, z))
 }
 
-fn floor_mirror(reflectance: f32) -> (Scene, Material, Affine3A) {
+pub fn floor_mirror(reflectance: f32) -> (Scene, Material, Affine3A) {
     (quad(Vec3::ZERO, 3.0, Vec3::Y, [255; 3]), mirror(reflectance), Affine3A::IDENTITY)
 }
 
-fn view_of(scene: &GpuScene, lighting: &str, camera: &PinholeCamera) -> View {
+pub fn view_of(scene: &GpuScene, lighting: &str, camera: &PinholeCamera) -> View {
     let work = DrawWork { visibility: Visibility::Rays, ..work(scene, lighting) };
     device().1.draw_views(work, &[*camera], ViewPlanes::WITH_DEPTH).expect("a view").remove(0)
 }
 
-fn linear_at(view: &View, pixel: UVec2) -> Vec3 {
+pub fn linear_at(view: &View, pixel: UVec2) -> Vec3 {
     let first = 3 * (pixel.y * view.size_px.x + pixel.x) as usize;
     Vec3::from_slice(&[0, 1, 2].map(|channel| linear_from_srgb8(view.srgb8[first + channel])))
 }
 
-fn pixels(size_px: UVec2) -> impl Iterator<Item = UVec2> {
+pub fn pixels(size_px: UVec2) -> impl Iterator<Item = UVec2> {
     (0..size_px.y).flat_map(move |y| (0..size_px.x).map(move |x| UVec2::new(x, y)))
 }
 
-fn code_of(linear: Vec3) -> Vec3 {
+pub fn code_of(linear: Vec3) -> Vec3 {
     linear.map(|c| if c <= 0.003_130_8 { c * 12.92 } else { 1.055 * c.min(1.0).powf(1.0 / 2.4) - 0.055 } * 255.0)
 }
 
@@ -203,7 +203,7 @@ fn a_ball_mirrors_a_point_where_alhazen_says() {
     }
 }
 
-fn between_the_pair() -> PinholeCamera {
+pub fn between_the_pair() -> PinholeCamera {
     PinholeCamera::looking_at(Vec3::new(-1.7, 1.7, 0.9), Vec3::new(2.0, 1.1, 0.4), Vec3::Y, 0.9, SIZE_PX)
 }
 

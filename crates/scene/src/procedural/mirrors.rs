@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::geometry::{MeshBuilder, matt, vertex};
 use super::random::Noise;
-use super::teapot::teapot;
+use super::teapot::{Teapot, teapot};
 use crate::{Material, Scene};
 
 const LIGHT_CHECK: Vec3 = Vec3::splat(214.0);
@@ -38,13 +38,13 @@ const POST_SIDES: u32 = 64;
 const HALL_HALF_SIDE_M: u32 = 4;
 const HALL_HEIGHT_M: u32 = 4;
 
-/// [Newell's teapot](teapot) on a floor of 24 m with checks of 1 m, before a mirror of 39,600 triangles that is convex
+/// [Newell's teapot](Teapot) on a floor of 24 m with checks of 1 m, before a mirror of 39,600 triangles that is convex
 /// with dents.
 #[must_use]
 pub fn teapot_mirror() -> Scene {
     let mut builder = MeshBuilder::default();
     checks(&mut builder, 12);
-    teapot(&mut builder, TEAPOT_FOOT, 1.0);
+    teapot(&mut builder, Teapot { foot: TEAPOT_FOOT, scale: 1.0, squares: 16 });
     builder.finish_part(0);
     pebble(&mut builder);
     builder.finish_part(1);
@@ -84,7 +84,7 @@ pub fn mirror_hall() -> Scene {
         let corner = -half_side_m * (inwards + right);
         checked(&mut builder, corner, [right, Vec3::Y], [2 * HALL_HALF_SIDE_M, HALL_HEIGHT_M]);
     }
-    teapot(&mut builder, Vec3::new(0.0, 0.0, 0.8), 0.5);
+    teapot(&mut builder, Teapot { foot: Vec3::new(0.0, 0.0, 0.8), scale: 0.5, squares: 16 });
     builder.finish_part(0);
     for side in [-1.0, 1.0] {
         ball(&mut builder, Vec3::new(2.0 * side, 1.5, -1.8), 1.5, Vec3::splat(255.0));
@@ -140,7 +140,7 @@ fn post(builder: &mut MeshBuilder, foot: Vec3, radius_m: f32, height_m: f32) {
 }
 
 /// A metal without roughness.
-fn mirror(reflectance: f32) -> Material {
+pub(super) fn mirror(reflectance: f32) -> Material {
     let base_color_linear = [reflectance, reflectance, reflectance, 1.0];
     Material { name: "mirror".into(), base_color_linear, metallic: 1.0, roughness: 0.0, ..Material::default() }
 }
@@ -152,7 +152,7 @@ fn checks(builder: &mut MeshBuilder, half_side_m: u32) {
 }
 
 /// Checks of 1 m from a corner on, to the right and up.
-fn checked(builder: &mut MeshBuilder, corner: Vec3, [right, up]: [Vec3; 2], [columns, rows]: [u32; 2]) {
+pub(super) fn checked(builder: &mut MeshBuilder, corner: Vec3, [right, up]: [Vec3; 2], [columns, rows]: [u32; 2]) {
     for row in 0..rows {
         for column in 0..columns {
             let middle = corner + right * (column as f32 + 0.5) + up * (row as f32 + 0.5);
@@ -162,7 +162,7 @@ fn checked(builder: &mut MeshBuilder, corner: Vec3, [right, up]: [Vec3; 2], [col
     }
 }
 
-fn ball(builder: &mut MeshBuilder, middle: Vec3, radius_m: f32, color_srgb: Vec3) {
+pub(super) fn ball(builder: &mut MeshBuilder, middle: Vec3, radius_m: f32, color_srgb: Vec3) {
     star(builder, [64, 32], color_srgb, |out| middle + out * radius_m);
 }
 

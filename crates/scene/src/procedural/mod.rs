@@ -6,6 +6,7 @@
 mod bird_nest;
 mod blocks;
 mod geometry;
+mod glossy_floor;
 mod grass;
 mod lone_tree;
 mod mirrors;
@@ -20,6 +21,7 @@ mod urban;
 
 pub use bird_nest::bird_nest;
 pub use blocks::{BlocksViewpoints, blocks, blocks_viewpoints};
+pub use glossy_floor::{teapot_floor, teapot_spheres};
 pub use grass::{GrassDensity, grass};
 pub use lone_tree::lone_tree;
 pub use mirrors::{mirror_box, mirror_hall, mirror_pair, teapot_mirror};
@@ -49,6 +51,8 @@ pub(crate) fn by_name(name: &str) -> Scene {
         "mirror-pair" => mirror_pair(),
         "mirror-hall" => mirror_hall(),
         "mirror-box" => mirror_box(),
+        "teapot-floor" => teapot_floor(),
+        "teapot-spheres" => teapot_spheres(),
         _ => unit_cube(),
     }
 }

@@ -7,8 +7,6 @@ use glam::{Vec2, Vec3};
 
 use super::geometry::{MeshBuilder, vertex};
 
-/// Squares along each side of a patch.
-const SQUARES: u32 = 16;
 /// The side of the pattern's cubes, metres.
 const PATTERN_M: f32 = 0.5;
 const LIGHT: Vec3 = Vec3::new(226.0, 196.0, 120.0);
@@ -63,12 +61,22 @@ const TUBES: [[Section; 4]; 4] = [
     ],
 ];
 
-/// The teapot with its bottom's middle at `foot` and its spout towards +x, in a pattern of cubes: 16,384 triangles. It is `scale`
-/// times as large as Newell's.
-pub(super) fn teapot(builder: &mut MeshBuilder, foot: Vec3, scale: f32) {
+/// A teapot in a pattern of cubes, with its spout towards +x: 64 · `squares`² triangles.
+#[derive(Clone, Copy)]
+pub(super) struct Teapot {
+    /// The middle of its bottom.
+    pub foot: Vec3,
+    /// Its size, over that of Newell's.
+    pub scale: f32,
+    /// Squares along each side of a patch.
+    pub squares: u32,
+}
+
+pub(super) fn teapot(builder: &mut MeshBuilder, teapot: Teapot) {
+    let squares = teapot.squares;
     for patch in patches() {
-        for square in 0..SQUARES * SQUARES {
-            add_square(builder, &patch, [square / SQUARES, square % SQUARES], (foot, scale));
+        for square in 0..squares * squares {
+            add_square(builder, &patch, [square / squares, square % squares], teapot);
         }
     }
 }
@@ -104,8 +112,9 @@ fn mirrored(patch: Patch) -> Patch {
 }
 
 /// Two triangles of one colour.
-fn add_square(builder: &mut MeshBuilder, patch: &Patch, [row, column]: [u32; 2], (foot, scale): (Vec3, f32)) {
-    let at = |r: u32, c: u32| Vec2::new((row + r) as f32, (column + c) as f32) / SQUARES as f32;
+fn add_square(builder: &mut MeshBuilder, patch: &Patch, [row, column]: [u32; 2], teapot: Teapot) {
+    let Teapot { foot, scale, squares } = teapot;
+    let at = |r: u32, c: u32| Vec2::new((row + r) as f32, (column + c) as f32) / squares as f32;
     let color_srgb = pattern(point(patch, (at(0, 0) + at(1, 1)) * 0.5));
     let corners = [at(0, 0), at(0, 1), at(1, 1), at(1, 0)]
         .map(|place| builder.push(vertex(point(patch, place) * scale + foot, normal(patch, place), color_srgb)));
@@ -150,7 +159,7 @@ mod tests {
 
     fn triangles() -> Vec<([Vec3; 3], Vec3)> {
         let mut builder = MeshBuilder::default();
-        teapot(&mut builder, Vec3::ZERO, 1.0);
+        teapot(&mut builder, Teapot { foot: Vec3::ZERO, scale: 1.0, squares: 16 });
         let mesh = builder.into_scene("teapot", Material::default()).meshes.remove(0);
         let of = |corners: &[u32]| {
             let at = |i: usize| mesh.vertices[corners[i] as usize];

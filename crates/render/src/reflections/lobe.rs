@@ -1,0 +1,105 @@
+//! Rays into the lobes of what a picture shows, pass by pass one of each pixel.
+
+use bytemuck::{Pod, Zeroable};
+use depth_image::Highlight;
+use gpu::{Binding, DispatchSize, ResourceTraits, ShaderVariant, WorkKind, highlight_name, light_slots, switches};
+use minijinja::{Value, context};
+use wgpu::{Buffer, BufferUsages};
+
+use super::bounces::BounceList;
+use super::spawn::VIEW_PLANES;
+use crate::{RenderError, batch::Recording, pieces::Piece, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
+
+/// `Lobe` of the shader.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuLobe {
+    pub ray: u32,
+    pub ray_count: u32,
+    pub whole: u32,
+}
+
+#[derive(Debug)]
+pub(crate) struct Lobe {
+    by_rays: bool,
+    /// The first ray of a pixel sums up the weights of all.
+    first: bool,
+}
+
+impl ShaderVariant for Lobe {
+    const TEMPLATE: &'static str = "reflections/lobe.wgsl";
+    const TRAITS: ResourceTraits = CAMERA_TRAITS;
+
+    fn context(&self) -> Value {
+        context! {
+            single_pole => false,
+            by_rays => self.by_rays,
+            first => self.first,
+            plane_count => VIEW_PLANES,
+            highlight => highlight_name(Highlight::Ggx),
+            mirrors => true,
+            environment_map => false,
+            light_count => 0, light_slots => light_slots(0), visibility_words => 0,
+        }
+    }
+
+    fn all() -> Vec<Self> {
+        switches().map(|[by_rays, first]| Self { by_rays, first }).collect()
+    }
+}
+
+/// Records the pass over a piece of a picture.
+pub(super) fn record(
+    recording: &mut Recording<'_>,
+    (ray, weights): (u32, &Buffer),
+    (element, piece, units): (u32, Piece, u64),
+    target: &Surfaces,
+    (next_bounces, next): (&Buffer, &BounceList),
+) -> Result<(), RenderError> {
+    let batch = recording.batch;
+    let variant = Lobe { by_rays: batch.by_rays, first: ray == 0 };
+    let pass = recording.passes.get(&variant)?;
+    let lighting = batch.work.lighting;
+    let whole = u32::from(lighting.reflections.is_none());
+    let lobe = GpuLobe { ray, ray_count: lighting.glossy_rays(), whole };
+    let lobe = recording.gpu.buffer_with("lobe", &[lobe], BufferUsages::UNIFORM);
+    let buffers = [&recording.cameras, &batch.work.scene.illumination, &lobe, weights, next_bounces];
+    let own = pass.bind(0, bindings(buffers, next, target))?;
+    let size = [batch.cameras[piece.camera].size_px().x, piece.end_row - piece.first_row, 1];
+    pass.dispatch_each(&mut recording.frame, &[&own], element..element + 1, DispatchSize::Invocations(size));
+    recording.frame.cut(WorkKind::new(batch.family(), &variant.name()), units);
+    Ok(())
+}
+
+fn bindings<'r>(
+    [camera, illumination, lobe, weights, next_bounces]: [&'r Buffer; 5],
+    next: &'r BounceList,
+    target: &'r Surfaces,
+) -> Vec<Binding<'r>> {
+    let mut bindings = vec![
+        Binding::buffer("camera", camera),
+        Binding::buffer("illumination", illumination),
+        Binding::buffer("lobe", lobe),
+        Binding::buffer("weights", weights),
+        Binding::buffer("next_bounces", next_bounces),
+        next.binding("next"),
+    ];
+    bindings.extend(target.bindings());
+    bindings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_support::TestStage;
+
+    #[test]
+    fn every_variant_is_bound_by_its_names() {
+        let stage = TestStage::new();
+        let list = BounceList::new(&stage.gpu);
+        for variant in Lobe::all() {
+            let target = stage.surfaces(variant.by_rays, false);
+            stage.check(&variant, 0, &bindings([&stage.buffer; 5], &list, &target));
+        }
+    }
+}
