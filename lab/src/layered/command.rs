@@ -12,7 +12,7 @@ use study::{Bar, Check, Report, Table};
 
 use super::subject::Subject;
 use super::views::{self, Figures};
-use super::{baselines, cubes, mirrors, viewpoints};
+use super::{base, baselines, cubes, mirrors, viewpoints};
 use crate::failures::stand::Stand;
 use crate::progress::bar;
 
@@ -98,7 +98,9 @@ pub fn run(args: &LayeredArgs) -> anyhow::Result<Outcome> {
     report.checks.extend(checks);
     let (ways, checks) = baselines::measure(&stand, LIGHTING, args.quick)?;
     report.checks.extend(checks);
-    report.tables.extend([held, seen, pulled, mirrors, ways]);
+    let (base, checks) = base::measure(&stand, LIGHTING)?;
+    report.checks.extend(checks);
+    report.tables.extend([held, seen, pulled, mirrors, ways, base]);
     report.tables.iter().for_each(|table| println!("{}", table.to_text()));
     let holds = report.finish(&args.out)?;
     Ok(Outcome::of(holds || !args.strict))

@@ -1,5 +1,6 @@
 //! `myriorama study layered`: views from layered depth cubes.
 
+mod base;
 mod baselines;
 pub mod command;
 mod cubes;
