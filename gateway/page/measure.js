@@ -24,7 +24,7 @@ function sourceOf({ point, source, cameras }) {
   if (!point || source === "nothing") return "nothing there";
   if (source === "direct") return "drawn directly";
   if (source === "filled") return "filled: no camera saw this";
-  if (source === "base") return "no camera saw this: from the base";
+  if (source === "base") return cameras?.length ? "mirror: shows what the base holds" : "no camera saw this: from the base";
   if (source === "guessed") return "mirror: no camera saw all that it shows";
   if (!cameras?.length) return "seen by the cameras";
   return `seen by camera${cameras.length > 1 ? "s" : ""} ${cameras.join(", ")}`;

@@ -160,8 +160,8 @@ impl Engine for SlowInOtherLight {
         self.0.upload(set, turn)
     }
 
-    fn with_common(&self, set: SharedSet, mirrors: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
-        self.0.with_common(set, mirrors)
+    fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
+        self.0.with_common(set, common)
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {

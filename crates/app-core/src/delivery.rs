@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use client::{Client, Frame, Session, ViewRequest};
 use cluster::limits::{MAX_VIEWPOINTS, MAX_VIEWS_PER_SET};
-use cluster::{BudgetRequest, OfferSettings, PolicyChoice, Quality, SessionRequest, Timeline};
+use cluster::{BudgetRequest, DIRECT, OfferSettings, PolicyChoice, Quality, SessionRequest, Timeline};
 use depth_image::{PinholeCamera, ViewPlanes};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -69,7 +69,9 @@ pub fn at_rate(request: SessionRequest, frames_per_s: f64) -> SessionRequest {
 /// images, fewer pictures a second. Each includes those before it. Steps that the lighting and the method do not have are skipped.
 fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
     let whole: Option<Lighting> = lighting.parse().ok();
-    let unmirrored = whole.and_then(|lighting| lighting.without_reflections());
+    // Reconstructed views have no glossy reflections to lose.
+    let loses = |lighting: &Lighting| lighting.reflections() > 0 || method == DIRECT;
+    let unmirrored = whole.filter(loses).and_then(|lighting| lighting.without_reflections());
     let fewer_rays = unmirrored.or(whole).and_then(|lighting| lighting.with_fewer_rays());
     let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.coarser());
     let (lighting, method) = (lighting.to_owned(), method.to_owned());

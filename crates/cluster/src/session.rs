@@ -93,7 +93,7 @@ impl SessionRequest {
     }
 }
 
-/// A quality below the one that a session asked for. It has no mirror cells.
+/// A quality below the one that a session asked for. It has no common cells.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// How samples are lit.

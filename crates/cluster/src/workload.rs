@@ -22,7 +22,7 @@ pub struct Workload {
     pub sample_cameras: Vec<SampleCamera>,
     /// Where each cell's cameras begin, the first's at 0; empty: one view cell has all.
     pub cell_first_indices: Vec<u32>,
-    /// The last cells are mirror cells: they depend on no viewer, and every view is made from all of them and from one view
+    /// The last cells are these: they depend on no viewer, and every view is made from all of them and from one view
     /// cell.
     pub common_cells: Vec<CommonCell>,
     /// How images are sampled.

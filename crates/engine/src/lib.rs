@@ -350,7 +350,7 @@ fn reconstruction_error(error: ReconstructionError) -> EngineError {
         ReconstructionError::NoSamples { .. } => invalid("reconstruction_method", error),
         ReconstructionError::Gpu(error) => gpu_error(error),
         ReconstructionError::Shader(_) | ReconstructionError::MissingPlane { .. } => device(error),
-        ReconstructionError::MirrorCells(_) => invalid("common_cells", error),
+        ReconstructionError::MirrorCells(_) => invalid("common_cells of mirrors", error),
         ReconstructionError::Reflections(_) => invalid("reflections", error),
         ReconstructionError::Model { .. } | ReconstructionError::CurvedSearch { .. } => invalid("sample_images", error),
     }

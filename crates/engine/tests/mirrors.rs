@@ -192,7 +192,7 @@ fn sets_of_other_devices_are_refused_as_mirrors() {
     let too_many = stand.engine.with_common(set.clone(), vec![(cell(bounds), set); 9]).expect("a set");
     let work = ViewWork { cameras: vec![camera()], method: "joint_carve".to_owned(), planes: ViewPlanes::COLOR };
     let refused = stand.engine.reconstruct(too_many.as_ref(), &work, TURN).err().map(|error| error.to_string());
-    assert_eq!(refused.as_deref(), Some("common_cells: views have at most 8 mirror cells, not 9"));
+    assert_eq!(refused.as_deref(), Some("common_cells of mirrors: views have at most 8 mirror cells, not 9"));
 }
 
 /// Light that depends on the viewer is no part of samples.

@@ -156,8 +156,8 @@ impl Engine for DeviceMonitor {
         self.relieved(upload, upload)
     }
 
-    fn with_common(&self, set: SharedSet, mirrors: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
-        self.monitored(self.engine.with_common(set, mirrors))
+    fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
+        self.monitored(self.engine.with_common(set, common))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {

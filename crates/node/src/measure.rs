@@ -65,7 +65,7 @@ impl Measurement<'_> {
     fn costs(&self, request: &MeasureCosts) -> Result<Measured, Status> {
         let (engine, workload) = (self.engine, &request.workload);
         let planes = engine.sample_planes(&request.method)?;
-        // Views are made from all of them: their own cell, and what mirrors show.
+        // Views are made from all of them: their own cell, and common cells.
         let cells = workload.cells();
         let sample = |(number, cell): (usize, &Workload)| match workload.common_cell(number) {
             Some(_) => SampleWork::of(cell),

@@ -357,7 +357,11 @@ impl Reconstructor {
         };
         fill::record(recording, &unknown)?;
         specular::record(recording, listed, first)?;
-        mirrored.map_or(Ok(()), |(bounces, first)| bounce::record(recording, bounces, base, first))
+        let Some((bounces, first)) = mirrored else { return Ok(()) };
+        bounce::record(recording, bounces, first, |recording, lists, place| match base {
+            Some(base) => layered::follow_left(recording, base, bounces, lists, place),
+            None => Ok(()),
+        })
     }
 
     /// Where single rays end in images of a mirror's surroundings, followed as rays off mirrors are; also the seconds on the

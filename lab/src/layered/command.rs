@@ -36,7 +36,7 @@ const LEAST_PSNR_DB: [f64; 2] = [33.0, 31.5];
 /// Samples scenes on the lines along three axes, all surfaces behind one another, and walks through these samples for views from
 /// all around. Compares the views with direct drawing, and with those of joint_carve from depth images near each view. Then follows
 /// rays off mirrors through a cube, up to seven mirrors on a ray's way, and says after how many views the cube is repaid. Also compares
-/// what a compositor pulls for viewers in many places: one cube, or the images of their view cells. Last come the paper's own ways to
+/// what a compositor pulls for viewers in many places: one cube, or the images of their view cells. Then come the paper's own ways to
 /// primary rays: projecting all samples, and quadtrees of depths.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
@@ -98,7 +98,7 @@ pub fn run(args: &LayeredArgs) -> anyhow::Result<Outcome> {
     report.checks.extend(checks);
     let (ways, checks) = baselines::measure(&stand, LIGHTING, args.quick)?;
     report.checks.extend(checks);
-    let (base, checks) = base::measure(&stand, LIGHTING)?;
+    let (base, checks) = base::measure(&stand, LIGHTING, args.quick)?;
     report.checks.extend(checks);
     report.tables.extend([held, seen, pulled, mirrors, ways, base]);
     report.tables.iter().for_each(|table| println!("{}", table.to_text()));

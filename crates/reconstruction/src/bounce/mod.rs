@@ -16,9 +16,7 @@ use wgpu::{Buffer, BufferUsages};
 pub use curved_search::CurvedSearch;
 pub(crate) use curved_search::{CurvedWalk, LONGEST_STEP, MAX_WALK_STEPS};
 
-use crate::cube::Cube;
 use crate::methods::joint_carve::Carve;
-use crate::methods::layered;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList};
 use crate::recording::nearest_first;
 use crate::reflectors::{Reflectors, sample_texels};
@@ -365,13 +363,17 @@ impl ShaderVariant for Land {
     }
 }
 
-/// Records the passes over the rays that the view's mirrors have listed, mirror after mirror. What images leave unknown is walked in
-/// the base.
+/// Records the passes over the rays that the view's mirrors have listed, mirror after mirror. `follow_left` may tell the
+/// ends of rays that the images of a cell leave unknown.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     bounces: &Bounces<'_>,
-    base: Option<&Cube>,
     first: RayLists,
+    follow_left: impl Fn(
+        &mut Recording<'_>,
+        (&RayLists, Option<&RayLists>),
+        (usize, u32),
+    ) -> Result<(), ReconstructionError>,
 ) -> Result<(), ReconstructionError> {
     let mut listed = Some(first);
     for reflection in 1..=bounces.reflections {
@@ -379,9 +381,7 @@ pub(crate) fn record(
         let next = (reflection < bounces.reflections).then(|| bounces.next(recording.device, Some(&lists)));
         for cell in 0..bounces.cells.len() {
             follow(recording, bounces, &lists, (cell, reflection))?;
-            if let Some(base) = base {
-                layered::follow_left(recording, base, bounces, (&lists, next.as_ref()), (cell, reflection))?;
-            }
+            follow_left(recording, (&lists, next.as_ref()), (cell, reflection))?;
             land(recording, bounces, (&lists, next.as_ref()), (cell, reflection))?;
         }
         listed = next;

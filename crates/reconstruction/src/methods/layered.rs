@@ -66,7 +66,8 @@ impl Walk {
         let reflectors = cube.reflectors.as_ref();
         let highlight = reflectors.map(|reflectors| reflectors.highlight);
         // Blinn-Phong surfaces mirror lamps only.
-        let is_mapped = highlight == Some(Highlight::Ggx) && recording.set.environment.is_some();
+        let is_mapped =
+            (highlight == Some(Highlight::Ggx) || rays == Walked::LeftBounced) && recording.set.environment.is_some();
         // Rays off mirrors see no image of the view's set.
         let set = if rays.is_bounced() { SetVariant::CUBE } else { recording.variant() };
         Self {
@@ -137,8 +138,14 @@ impl ShaderVariant for Walk {
             })
         });
         let own: Vec<Self> = matt.chain(glossy).collect();
-        let left = own.iter().filter(|walk| walk.lights <= 3 && !walk.environment_map).map(|walk| walk.of_base());
-        own.iter().copied().chain(left).collect()
+        let left = own.iter().filter(|walk| walk.lights <= 3).map(|walk| walk.of_base());
+        let without_reflectors = switches().map(|[truncated, environment_map]| Self {
+            rays: Walked::LeftBounced,
+            truncated,
+            environment_map,
+            ..Self::PLAIN
+        });
+        own.iter().copied().chain(left).chain(without_reflectors).collect()
     }
 }
 
@@ -231,10 +238,10 @@ fn follow(
 
 fn shared_bindings<'b>(recording: &'b Recording<'_>, cube: &'b Cube, variant: &Walk) -> Vec<Binding<'b>> {
     let mut bindings: Vec<Binding<'b>> = cube.bindings().into_iter().collect();
-    if let Some(reflectors) = &cube.reflectors {
-        bindings.push(Binding::buffer("illumination", &reflectors.illumination));
-        bindings.push(Binding::texture("samples", &reflectors.samples));
-    }
+    // A base may be too coarse to hold the mirrors of the view's images, or anything that reflects.
+    let lit = cube.reflectors.as_ref().or(recording.set.reflectors.as_ref().filter(|_| variant.rays.is_bounced()));
+    bindings.extend(lit.map(|reflectors| Binding::buffer("illumination", &reflectors.illumination)));
+    bindings.extend(cube.reflectors.as_ref().map(|reflectors| Binding::texture("samples", &reflectors.samples)));
     let map = recording.set.environment.as_deref().filter(|_| variant.environment_map);
     bindings.extend(map.into_iter().flat_map(GpuEnvironment::bindings));
     bindings

@@ -2,11 +2,12 @@
 
 use depth_image::{Aabb, Antialias, Camera, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use glam::{UVec2, Vec3};
-use reconstruction::{MirrorCell, Mirrors, ReconstructionError, SampleSet, SetDescription};
-use render::{GpuScene, SamplePlanes};
+use reconstruction::{CommonSets, MirrorCell, Mirrors, ReconstructionError, SampleSet, SetDescription};
+use render::{GpuScene, LayerSelection, SamplePlanes};
 use scene::Scene;
 use scene::procedural::{mirror_pair, teapot_mirror};
 
+use crate::layered::CubeStage;
 use crate::stage::{CARVE, description, gpu, kinds, looking, reconstructor, renderer, work};
 
 const VIEW_PX: UVec2 = UVec2::new(128, 96);
@@ -224,6 +225,28 @@ fn what_no_image_knows_is_guessed_and_said_to_be() {
     assert!(guessed.count() > 800);
     // The guess is the environment, as without rays: all but roundings of shared exponents.
     assert!(greatest <= Some(6), "{greatest:?}");
+}
+
+/// A base without anything that reflects, as one is whose lines miss all mirrors.
+#[test]
+fn a_matt_base_tells_what_no_image_knows() {
+    let mut hall = before_the_teapot();
+    let away = looking(Vec3::new(0.0, 60.0, 0.0), Vec3::new(0.0, 61.0, 0.1), 50.0, UVec2::new(32, 32));
+    hall.cells[0].1 = Hall::new(teapot_mirror(), &[away], &[]).samples;
+    let matt_base = CubeStage::new(teapot_mirror(), 128, LayerSelection::Dominant).upload();
+    let camera = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, VIEW_PX);
+    let guessed = hall.view(&camera, 2);
+    let cells = [MirrorCell { bounds: hall.cells[0].0, surroundings: &hall.cells[0].1 }];
+    let common = CommonSets { mirrors: Mirrors { cells: &cells, reflections: 2 }, base: Some(&matt_base) };
+    let turn = Default::default();
+    let views = reconstructor().reconstruct_with(&hall.samples, common, &[camera], CARVE, ViewPlanes::ALL, turn);
+    let told = views.expect("a view").remove(0);
+    let count = |view: &View, kind| kinds(view).into_iter().filter(|&of| of == kind).count();
+    let truth = hall.drawn(&camera, 1);
+    let [before, after] = [&guessed, &told].map(|view| mean_difference(view, &truth));
+    println!("mean difference {before} guessed, {after} by a base");
+    assert!(count(&guessed, ProvenanceKind::Guessed) > 800 && count(&told, ProvenanceKind::Guessed) == 0);
+    assert!(count(&told, ProvenanceKind::Base) > 800 && after < before, "{before}, {after}");
 }
 
 fn facing_a_mirror() -> PinholeCamera {

@@ -20,7 +20,7 @@ const SINKING: f32 = 0.02;
 /// Samples of a cube are those of the dominant axis.
 const DOMINANT: f32 = 0.9;
 
-const NONE: &[Shape] = &[Shape::EqualAt { x: 1.0, y: 0.0, tolerance: 0.0 }, Shape::Plateau { tolerance: 0.0 }];
+const NONE: &[Shape] = &[Shape::EqualAt { x: 1.0, y: 0.0, tolerance: 0.0 }];
 
 pub const CURVE: Curve = Curve {
     name: "Rays missed and false hits against the multiplier of ε",
@@ -48,7 +48,8 @@ fn measure(_: &Stand, factors: &[f64]) -> anyhow::Result<Rows> {
         let twin = CubeTwin::new(&grid, &[0, 1, 2].map(|axis| sheet(&grid, axis, normal, DOMINANT)));
         rates(&bounds, normal, |ray| twin.walk(ray, 0.0).is_some())
     });
-    let [planes_missed, planes_false] = [0, 1].map(|kind| of_planes.iter().map(|rates| rates[kind]).sum::<f64>());
+    let [planes_missed, planes_false] =
+        [0, 1].map(|kind| of_planes.iter().map(|rates| rates[kind]).fold(0.0, f64::max));
     rows(factors, |factor| {
         let [low, middle, steep] = normals.map(|normal| {
             let image = sheet(&grid, 2, normal, 0.0);
