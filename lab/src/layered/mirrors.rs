@@ -110,8 +110,11 @@ fn direct(subject: &Subject<'_>, reflections: u32) -> anyhow::Result<(Vec<View>,
     timed(|| subject.stand.views(&subject.on_device, lighting, &subject.views, ViewPlanes::COLOR))
 }
 
-/// The first makes shaders; of the others the median counts.
-fn timed(make: impl Fn() -> anyhow::Result<Vec<View>>) -> anyhow::Result<(Vec<View>, f64)> {
+/// Views, and the seconds of one: the first run makes shaders, and of the others the median counts.
+///
+/// # Errors
+/// Those of the views.
+pub fn timed(make: impl Fn() -> anyhow::Result<Vec<View>>) -> anyhow::Result<(Vec<View>, f64)> {
     let views = make()?;
     let run = |_| -> anyhow::Result<f64> {
         let start = Instant::now();
@@ -123,7 +126,10 @@ fn timed(make: impl Fn() -> anyhow::Result<Vec<View>>) -> anyhow::Result<(Vec<Vi
 }
 
 /// Mean PSNR and FLIP over the marked pixels.
-fn errors(truths: &[View], views: &[View], pixels: &[Vec<bool>]) -> anyhow::Result<[f64; 2]> {
+///
+/// # Errors
+/// Views differ in size, or no pixel is marked.
+pub fn errors(truths: &[View], views: &[View], pixels: &[Vec<bool>]) -> anyhow::Result<[f64; 2]> {
     let mut sums = [0.0; 2];
     for ((truth, view), pixels) in truths.iter().zip(views).zip(pixels) {
         let [reference, picture] = [Rgb8Image::of_view(truth)?, Rgb8Image::of_view(view)?];

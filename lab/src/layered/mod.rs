@@ -4,6 +4,7 @@ mod base;
 mod baselines;
 pub mod command;
 mod cubes;
+mod glossy;
 mod mirrors;
 pub mod pyramid;
 mod subject;
