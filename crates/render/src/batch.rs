@@ -86,6 +86,11 @@ impl Batch<'_> {
         matches!(self.cameras.first(), Some(Camera::SinglePole(_)))
     }
 
+    /// Rays into the lobe of a pixel at this position: the positions within a pixel share its rays.
+    pub fn glossy_rays(&self) -> u32 {
+        self.work.lighting.glossy_rays().div_ceil(self.output.antialias.samples())
+    }
+
     /// Whether colour is wanted of this position.
     pub fn has_color(&self) -> bool {
         self.output.samples || self.position < self.output.antialias.samples()

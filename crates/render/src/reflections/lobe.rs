@@ -61,7 +61,7 @@ pub(super) fn record(
     let pass = recording.passes.get(&variant)?;
     let lighting = batch.work.lighting;
     let whole = u32::from(lighting.reflections.is_none());
-    let lobe = GpuLobe { ray, ray_count: lighting.glossy_rays(), whole };
+    let lobe = GpuLobe { ray, ray_count: batch.glossy_rays(), whole };
     let lobe = recording.gpu.buffer_with("lobe", &[lobe], BufferUsages::UNIFORM);
     let buffers = [&recording.cameras, &batch.work.scene.illumination, &lobe, weights, next_bounces];
     let own = pass.bind(0, bindings(buffers, next, target))?;

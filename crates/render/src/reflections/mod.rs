@@ -107,7 +107,7 @@ impl Reflections {
         }
         // Costs are learned by generation, and are others than those of rays off mirrors.
         let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + mirrors.max(1);
-        for ray in 0..lighting.glossy_rays() {
+        for ray in 0..recording.batch.glossy_rays() {
             let first = BounceList::new(recording.gpu);
             lobe::record(recording, (ray, &self.lobe_weights), piece, target, (&self.bounces[0], &first))?;
             self.record_rays(recording, parts, (first, piece.2), generations.clone())?;

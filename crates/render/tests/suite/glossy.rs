@@ -1,15 +1,16 @@
 //! Rays into the lobes of glossy surfaces against closed forms, the scalar reference, and many rays.
 
-use depth_image::{Environment, PinholeCamera, View, environment_reflectance_linear};
+use depth_image::{Antialias, Environment, PinholeCamera, View, ViewPlanes, environment_reflectance_linear};
 use glam::{Affine3A, UVec2, Vec2, Vec3};
 use render::scalar::{self, lobe::lobe_ray, sequence::point_of};
+use render::{DrawWork, Visibility};
 use scene::Material;
 use scene::procedural::{mirror_pair, quad, teapot_floor};
 
 use crate::reflections::{
     ROUNDING, between_the_pair, code_of, dark, floor_mirror, glowing, linear_at, of_parts, pixels, view_of,
 };
-use crate::stage::{SIZE_PX, upload};
+use crate::stage::{SIZE_PX, device, upload, work};
 
 fn before_the_floor() -> PinholeCamera {
     PinholeCamera::looking_at(Vec3::new(4.0, 3.0, 6.5), Vec3::new(0.0, 0.6, 0.5), Vec3::Y, 0.8, SIZE_PX)
@@ -187,4 +188,16 @@ fn only_pixels_with_reflectors_change_and_repeats_are_equal() {
         changed += u32::from(differs);
     }
     assert!(changed > 1500, "{changed}");
+}
+
+#[test]
+fn samples_of_a_pixel_share_its_rays() {
+    let scene = upload(&teapot_floor());
+    let planes = ViewPlanes { antialias: Antialias::of(4).expect("four samples"), ..ViewPlanes::COLOR };
+    let drawn = |rays: u32| {
+        let work = DrawWork { visibility: Visibility::Rays, ..work(&scene, &format!("shadows, glossy {rays}")) };
+        device().1.draw_views(work, &[before_the_floor()], planes).expect("a view").remove(0)
+    };
+    let [one, four, five] = [1, 4, 5].map(drawn);
+    assert!(one == four && five != four, "one ray for each sample, and two");
 }
