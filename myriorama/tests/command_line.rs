@@ -88,7 +88,7 @@ fn what_cannot_be_sampled_as_a_cube_is_named_with_status_2() {
         (&["up", "--scene", "snake", "--base", "layered_cube:64"], "--base layered_cube:64: snake moves"),
         (&["up", "--scene", "quad", "--base", "conventional"], "--base conventional: a base is a layered cube"),
         (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--base", "layered_cube:64"], "a cube already"),
-        (&["demo", "--scene", "quad", "--base", "layered_cube:64"], "--base layered_cube:64: clusters alone"),
+        (&["demo", "--scene", "quad", "--base", "layered_cube:64"], "--base layered_cube:64: this command takes none"),
         (&["up", "--scene", "snake", "--sampling", "layered_cube:64"], "snake moves"),
         (&["up", "--scene", "quad", "--sampling", "layered_cube:15"], "layered_cube:15"),
         (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--method", "mesh"], "--method mesh"),

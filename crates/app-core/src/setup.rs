@@ -114,7 +114,9 @@ impl Setup {
     pub fn check_depth_images(&self) -> Result<(), BadInput> {
         match (&self.offer.cube, &self.offer.base) {
             (Some(cube), _) => Err(BadInput(format!("--sampling {}: this command needs depth images", cube.sampling))),
-            (_, Some((base, _))) => Err(BadInput(format!("--base {}: clusters alone have one: see up", base.sampling))),
+            (_, Some((base, _))) => {
+                Err(BadInput(format!("--base {}: this command takes none, up does", base.sampling)))
+            }
             (None, None) => Ok(()),
         }
     }

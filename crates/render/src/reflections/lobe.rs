@@ -7,7 +7,7 @@ use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
 use super::bounces::BounceList;
-use super::spawn::VIEW_PLANES;
+use super::spawn::{self, VIEW_PLANES};
 use crate::{RenderError, batch::Recording, pieces::Piece, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
 
 /// `Lobe` of the shader.
@@ -76,15 +76,8 @@ fn bindings<'r>(
     next: &'r BounceList,
     target: &'r Surfaces,
 ) -> Vec<Binding<'r>> {
-    let mut bindings = vec![
-        Binding::buffer("camera", camera),
-        Binding::buffer("illumination", illumination),
-        Binding::buffer("lobe", lobe),
-        Binding::buffer("weights", weights),
-        Binding::buffer("next_bounces", next_bounces),
-        next.binding("next"),
-    ];
-    bindings.extend(target.bindings());
+    let mut bindings = spawn::bindings([camera, illumination, next_bounces], next, target);
+    bindings.extend([Binding::buffer("lobe", lobe), Binding::buffer("weights", weights)]);
     bindings
 }
 

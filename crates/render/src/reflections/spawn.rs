@@ -70,7 +70,8 @@ pub(super) fn record(
     Ok(())
 }
 
-fn bindings<'r>(
+/// The resources of passes that list rays of a picture's pixels.
+pub(super) fn bindings<'r>(
     [camera, illumination, next_bounces]: [&'r Buffer; 3],
     next: &'r BounceList,
     target: &'r Surfaces,
