@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use cluster::limits::MAX_SCENES;
 use cluster::{CommonCell, OfferSettings, OfferStatus, SceneHash, SceneRef};
-use depth_image::{Aabb, Camera, CubeGrid, Environment, Illumination};
+use depth_image::{Aabb, Camera, CubeGrid, Environment, Illumination, LightFieldCamera};
 use glam::DVec3;
 use planner::{Budget, Row};
 use tonic::Status;
@@ -92,6 +92,8 @@ pub struct OfferedCube {
     pub sampling: String,
     /// The lines along which it samples.
     pub grid: CubeGrid,
+    /// The lines of its light field, if it has one.
+    pub light_field: Option<LightFieldCamera>,
     /// The sampling method with the rig's cameras, for sessions whose views are drawn directly: they share no workload with those of
     /// the cube.
     pub beside: String,

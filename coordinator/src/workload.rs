@@ -2,7 +2,7 @@
 
 use cluster::limits::{MAX_CELLS, MAX_TILES};
 use cluster::{CommonCell, DIRECT, SamplePlanes, SessionRequest, Workload};
-use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera, SampleCamera, ViewGroup};
+use depth_image::{Aabb, Camera, PinholeCamera, SampleCamera, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
 
@@ -32,7 +32,10 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
     let cube = offered.filter(|_| drawn.is_none()).map(|cube| checked_cube(request, cube)).transpose()?;
     let cells = if cube.is_some() { Vec::new() } else { cells_of(request, offer, &volume)? };
     let sample_cameras = match cube {
-        Some(grid) => grid.cameras().map(SampleCamera::from).to_vec(),
+        Some(cube) => {
+            let parallel = cube.grid.cameras().map(SampleCamera::from).into_iter();
+            parallel.chain(cube.light_field.map(SampleCamera::from)).collect()
+        }
         None => sample_cameras_of(request, offer, !cells.is_empty())?,
     };
     let workload = Workload {
@@ -55,8 +58,8 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
     Ok(workload.with_common_cells(mirrors.into_iter().chain(base).collect()))
 }
 
-/// The grid of an offered cube, which depends on no viewer.
-fn checked_cube(request: &SessionRequest, cube: &OfferedCube) -> Result<CubeGrid, Status> {
+/// An offered cube, which depends on no viewer.
+fn checked_cube<'o>(request: &SessionRequest, cube: &'o OfferedCube) -> Result<&'o OfferedCube, Status> {
     let refused = [
         (request.timeline.moves(), "timeline: scenes that move"),
         (!request.sample_cameras.is_empty(), "sample_cameras: sessions with cameras of their own"),
@@ -65,7 +68,7 @@ fn checked_cube(request: &SessionRequest, cube: &OfferedCube) -> Result<CubeGrid
     ];
     match refused.into_iter().find(|(is_asked, _)| *is_asked) {
         Some((_, what)) => Err(Status::invalid_argument(format!("{what} are not sampled by {}", cube.sampling))),
-        None => Ok(cube.grid),
+        None => Ok(cube),
     }
 }
 

@@ -164,7 +164,12 @@ pub fn offer() -> SceneOffer {
         package: package(),
         fits_views: false,
         rig: rig(),
-        cube: Some(OfferedCube { sampling: CUBE.to_owned(), grid: cube_grid(), beside: "conventional".to_owned() }),
+        cube: Some(OfferedCube {
+            sampling: CUBE.to_owned(),
+            grid: cube_grid(),
+            light_field: None,
+            beside: "conventional".to_owned(),
+        }),
         mirrors: mirrors(),
         base: None,
         rows: rows(),

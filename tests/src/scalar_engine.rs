@@ -10,10 +10,10 @@ use std::time::Duration;
 
 use cluster::{CommonKind, DIRECT, Refinement, SamplePlanes};
 use depth_image::{
-    Antialias, BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, Environment, Illumination, LayeredDepthImage, Light,
-    ParallelCamera, PinholeCamera, PixelDepth, Provenance, ProvenanceKind, Ray, SampleCamera, SampleImage,
-    SampleImages, Texel, ToneMapping, View, ViewPlanes, linear_from_rgb9e5, linear_from_srgb8, oct8_from_unit,
-    rgb9e5_from_linear, srgb8_from_linear,
+    Antialias, BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, Environment, Illumination, LayeredDepthImage,
+    LayeredLightField, Light, LightFieldCamera, ParallelCamera, PinholeCamera, PixelDepth, Provenance, ProvenanceKind,
+    Ray, SampleCamera, SampleImage, SampleImages, Texel, ToneMapping, View, ViewPlanes, linear_from_rgb9e5,
+    linear_from_srgb8, oct8_from_unit, rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
 use node::{CommonSet, DirectWork, Engine, EngineError, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork};
@@ -227,10 +227,21 @@ fn splat(set: &SampleSet, camera: &PinholeCamera, planes: ViewPlanes) -> View {
             }
         }
     }
-    if let SampleImages::Cube(_, images) = &set.images {
-        images.iter().enumerate().for_each(|(index, image)| splat_layers(&mut canvas, camera, image, index));
+    if let SampleImages::Cube(cube) = &set.images {
+        cube.images.iter().enumerate().for_each(|(index, image)| splat_layers(&mut canvas, camera, image, index));
     }
     canvas.view(planes)
+}
+
+/// Nothing mirrors.
+fn no_light(camera: &LightFieldCamera) -> LayeredLightField {
+    LayeredLightField {
+        camera: *camera,
+        first: vec![0; camera.line_count() + 1],
+        planar_depth_m: Vec::new(),
+        radiance_rgb9e5: Vec::new(),
+        truncated: false,
+    }
 }
 
 fn splat_layers(canvas: &mut Canvas, camera: &PinholeCamera, image: &LayeredDepthImage, index: usize) {
@@ -441,6 +452,7 @@ impl Engine for ScalarEngine {
         let eye = |camera: &SampleCamera| match camera {
             SampleCamera::Depth(camera) => camera.reference().eye_in_world.extend(camera.reference().principal_px.y),
             SampleCamera::Layered(camera) => camera.corner_in_world.extend(camera.world_from_camera.w),
+            SampleCamera::LightField(camera) => camera.bounds.center().extend(camera.first_pair as f32),
         };
         for camera in &cameras {
             let image = (eye(camera).to_array().map(f32::to_bits), request.scene_time_s.to_bits(), request.refinement);
@@ -451,6 +463,7 @@ impl Engine for ScalarEngine {
         let image = |camera: &SampleCamera| match camera {
             SampleCamera::Depth(camera) => depth_image(camera, request.scene_time_s, request.refinement).into(),
             SampleCamera::Layered(camera) => layered_image(camera, request.scene_time_s, request.refinement).into(),
+            SampleCamera::LightField(camera) => no_light(camera).into(),
         };
         sleep(self.pace().image * cameras.len() as u32);
         Ok(cameras.into_iter().map(image).collect())

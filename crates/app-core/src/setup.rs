@@ -210,6 +210,7 @@ impl SceneArgs {
             cube: cube.map(|grid| OfferedCube {
                 sampling: self.sampling().to_string(),
                 grid,
+                light_field: self.sampling().light_field(&scene.bounds()),
                 beside: SamplingMethod::default().to_string(),
             }),
             base,
@@ -247,6 +248,9 @@ impl SceneArgs {
         if self.sampling().layer_selection().is_some() {
             return refused("the samples are a cube already");
         }
+        if base.light_field(&scene.bounds()).is_some() {
+            return refused("a light field shows the mirrors of a cube that is the sampling itself");
+        }
         let Some(grid) = self.grid(scene, "--base", base)? else {
             return refused("a base is a layered cube: see --sampling");
         };
@@ -262,6 +266,7 @@ impl SceneArgs {
             let reason = "the size of its images follows from SIDE";
             return Err(BadInput(format!("--sample-size: {sampling} has none, {reason}")).into());
         }
+        self.check_light_field(scene, sampling)?;
         if let Some(method) = self.method.filter(|method| method.walks_cube() != cube.is_some()) {
             let reason = match cube {
                 Some(_) => "makes views of depth images, and not of a cube of layered ones",
@@ -270,6 +275,19 @@ impl SceneArgs {
             return Err(BadInput(format!("--method {method} {reason}")).into());
         }
         Ok(cube)
+    }
+
+    /// Checks that a light field is there for what shows it, and only then.
+    fn check_light_field(&self, scene: &Scene, sampling: SamplingMethod) -> Result<(), BadInput> {
+        let is_there = sampling.light_field(&scene.bounds()).is_some();
+        if is_there && self.lighting.without_reflections().is_none() {
+            let reason = "a light field shows mirrors: it needs --lighting with reflections N or glossy N";
+            return Err(BadInput(format!("--sampling {sampling}: {reason}")));
+        }
+        match self.method.filter(|method| method.gathers() && !is_there) {
+            Some(method) => Err(BadInput(format!("--method {method} gathers in a light field: see --sampling"))),
+            None => Ok(()),
+        }
     }
 
     fn load_scene(&self) -> anyhow::Result<Scene> {

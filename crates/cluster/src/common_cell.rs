@@ -45,9 +45,9 @@ impl CommonCell {
     /// The images of mirrors are of one model; those of a base are a cube's.
     pub(crate) fn check_cameras(&self, cameras: &[SampleCamera]) -> Result<(), InvalidField> {
         if self.kind == CommonKind::Base {
-            return check_cube(cameras);
+            return check_cube(cameras, 0);
         }
-        let is_other = |camera: &&SampleCamera| camera.layered().is_some() || !camera.is_of_model(&cameras[0]);
+        let is_other = |camera: &&SampleCamera| camera.depth().is_none() || !camera.is_of_model(&cameras[0]);
         cameras.iter().find(is_other).map_or(Ok(()), |other| {
             let expected = "the model of the mirror cell's first camera";
             Err(InvalidField::out_of_range("sample_cameras.model", other.model_name(), expected))
@@ -55,12 +55,15 @@ impl CommonCell {
     }
 }
 
-/// Checks that cameras are the three of one layered cube, each with a row for every tile.
-pub(crate) fn check_cube(cameras: &[SampleCamera]) -> Result<(), InvalidField> {
-    let parallel: Vec<_> = cameras.iter().filter_map(SampleCamera::layered).copied().collect();
-    if parallel.len() != cameras.len() || CubeGrid::of_cameras(&parallel).is_none() {
-        let given = format!("{} parallel of {}", parallel.len(), cameras.len());
-        let allowed = "the three cameras of one layered cube, in one cell";
+/// Checks that cameras are the three of one layered cube, each with a row for every tile; after them may come some of light fields.
+pub(crate) fn check_cube(cameras: &[SampleCamera], most_light_fields: usize) -> Result<(), InvalidField> {
+    let parallel: Vec<_> = cameras.iter().map_while(SampleCamera::layered).copied().collect();
+    let light_fields = cameras.iter().skip(parallel.len()).map_while(SampleCamera::light_field).count();
+    let is_whole = parallel.len() + light_fields == cameras.len() && light_fields <= most_light_fields;
+    if !is_whole || CubeGrid::of_cameras(&parallel).is_none() {
+        let given = format!("{} parallel and {light_fields} light_field of {}", parallel.len(), cameras.len());
+        let allowed =
+            "the three cameras of one layered cube, in one cell, and at most one of a light field of its samples";
         return Err(InvalidField::out_of_range("sample_cameras.model", given, allowed));
     }
     let short = parallel.iter().find(|camera| camera.size_px.y < MAX_TILES);

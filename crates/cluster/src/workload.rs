@@ -188,7 +188,7 @@ impl Workload {
     /// Whether views are made from a layered depth cube, which serves views from anywhere.
     #[must_use]
     pub fn samples_cube(&self) -> bool {
-        self.sample_cameras.iter().take(self.view_camera_count()).any(|camera| camera.layered().is_some())
+        self.sample_cameras.iter().take(self.view_camera_count()).any(|camera| camera.depth().is_none())
     }
 
     /// Whether the view cell nearest to a view serves it, or would with a small step.
@@ -253,13 +253,13 @@ impl Workload {
         Ok(())
     }
 
-    /// Views are made from pinholes, or from the three cameras of one cube.
+    /// Views are made from pinholes, or from the cameras of one cube.
     fn check_models(&self) -> Result<(), InvalidField> {
         if self.samples_cube() {
             if self.cell_count() > 1 {
                 return Err(InvalidField::out_of_range("cells of a layered cube", self.cell_count(), "1"));
             }
-            return check_cube(&self.sample_cameras).and_then(|()| self.check_still());
+            return check_cube(&self.sample_cameras, 1).and_then(|()| self.check_still());
         }
         let (of_views, _) = self.sample_cameras.split_at_checked(self.view_camera_count()).unwrap_or_default();
         pinholes(of_views.iter().filter_map(SampleCamera::depth))?;

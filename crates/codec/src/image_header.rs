@@ -222,7 +222,7 @@ impl ImageHeader {
         Ok(texels)
     }
 
-    /// Depth and colour, or counts, depths, normals of triangles and colour; then \[normal\], \[surface id\],
+    /// Depth and colour, or counts, depths, normals of triangles (but of a light field) and colour; then \[normal\], \[surface id\],
     /// \[reflectance, visibility*\], \[passed\], \[corners\]; reflectance only with normals.
     fn validate_kinds(&self) -> Result<(), DecodeError> {
         use PlaneKind::{ColorRgb9e5, InverseDepth, LayerCount8, LayerDepth, PlaneNormalOct8};
@@ -230,6 +230,8 @@ impl ImageHeader {
         let kinds: Vec<_> = self.planes.iter().map(|plane| plane.kind).collect();
         let (first, reason): (&[PlaneKind], _) = match self.layered {
             None => (&[InverseDepth, ColorRgb9e5], "must begin with inverse depth and colour"),
+            // A light field has its own direction for a normal.
+            Some(_) if kinds.len() == 3 => (&[LayerCount8, LayerDepth, ColorRgb9e5], "must be those of a light field"),
             Some(_) => {
                 (&[LayerCount8, LayerDepth, PlaneNormalOct8, ColorRgb9e5], "must begin with those of a layered image")
             }

@@ -1,6 +1,7 @@
 //! A layered image to header and payload, and back.
 
 use depth_image::{LayeredDepthImage, LayeredError, ParallelCamera};
+use glam::UVec2;
 
 use crate::color_codec::{pack_colors, unpack_colors};
 use crate::image_codec::{Packer, check_end, check_payload, expand_plane, put_specular};
@@ -40,11 +41,53 @@ pub fn encode_layered_image(image: &LayeredDepthImage) -> Result<EncodedImage, L
         write(PlaneKind::ReflectanceRoughness8, &specular.reflectance_srgb8_roughness8, WordLayout::Bytes);
         specular.visibility8.iter().for_each(|plane| write(PlaneKind::Visibility8, plane, WordLayout::Bytes));
     }
-    let [width, height] = image.camera.size_px.to_array();
-    let layered = Some(LayeredCounts { sample_count: places.len() as u32, truncated: image.truncated });
+    Ok(encoded(
+        packer,
+        image.camera.size_px,
+        LayeredCounts { sample_count: places.len() as u32, truncated: image.truncated },
+    ))
+}
+
+/// The image of packed planes.
+pub(crate) fn encoded(packer: Packer, size_px: UVec2, layered: LayeredCounts) -> EncodedImage {
+    let [width, height] = size_px.to_array();
     let inverse_depth_range = InverseDepthRange { least_per_m: 0.0, greatest_per_m: 0.0 };
-    let header = ImageHeader { width, height, inverse_depth_range, layered, planes: packer.planes };
-    Ok(EncodedImage { header, payload: packer.payload.into() })
+    let header = ImageHeader { width, height, inverse_depth_range, layered: Some(layered), planes: packer.planes };
+    EncodedImage { header, payload: packer.payload.into() }
+}
+
+/// The lines of a packed image, and its planes after theirs.
+pub(crate) struct PackedLines<'p> {
+    pub first: Vec<u32>,
+    /// Of samples, in the order in which they are packed.
+    pub places: Vec<u32>,
+    pub truncated: bool,
+    pub planes: &'p [PlaneHeader],
+    /// Of those planes.
+    pub payload: &'p [u8],
+}
+
+/// Unpacks the lines of an image of this size.
+pub(crate) fn unpack_lines<'p>(
+    header: &'p ImageHeader,
+    size_px: UVec2,
+    payload: &'p [u8],
+    limits: &DecodeLimits,
+) -> Result<PackedLines<'p>, DecodeError> {
+    let lines = header.validate(limits)?;
+    check_payload(header, size_px, payload)?;
+    let Some(LayeredCounts { sample_count, truncated }) = header.layered else {
+        return Err(DecodeError::Header { field: "planes.kind", reason: "not those of a layered image" });
+    };
+    let [counts, planes @ ..] = &header.planes[..] else {
+        return Err(DecodeError::Header { field: "planes", reason: "none" });
+    };
+    let mut packed = payload;
+    let raw = expand_plane(counts, &mut packed)?;
+    let mut input = &raw[..];
+    let first = unpack_layer_counts(&mut input, lines, sample_count as usize)?;
+    check_end(counts.kind, input)?;
+    Ok(PackedLines { places: layer_by_layer(&first), first, truncated, planes, payload: packed })
 }
 
 /// Unpacks a layered image. The camera must have passed its own validation.
@@ -58,20 +101,11 @@ pub fn decode_layered_image(
     payload: &[u8],
     limits: &DecodeLimits,
 ) -> Result<LayeredDepthImage, DecodeError> {
-    let lines = header.validate(limits)?;
-    check_payload(header, camera.size_px, payload)?;
-    let Some(LayeredCounts { sample_count, truncated }) = header.layered else {
-        return Err(DecodeError::Header { field: "planes.kind", reason: "not those of a layered image" });
-    };
-    let [counts, others @ ..] = &header.planes[..] else {
-        return Err(DecodeError::Header { field: "planes", reason: "none" });
-    };
-    let mut packed = payload;
-    let raw = expand_plane(counts, &mut packed)?;
-    let mut input = &raw[..];
-    let first = unpack_layer_counts(&mut input, lines, sample_count as usize)?;
-    check_end(counts.kind, input)?;
-    let places = layer_by_layer(&first);
+    let PackedLines { first, places, truncated, planes, payload: mut packed } =
+        unpack_lines(header, camera.size_px, payload, limits)?;
+    if planes.get(1).is_none_or(|plane| plane.kind != PlaneKind::PlaneNormalOct8) {
+        return Err(DecodeError::Header { field: "planes.kind", reason: "those of a light field" });
+    }
     let mut image = LayeredDepthImage {
         camera,
         first,
@@ -82,7 +116,7 @@ pub fn decode_layered_image(
         specular: None,
         truncated,
     };
-    for plane in others {
+    for plane in planes {
         let raw = expand_plane(plane, &mut packed)?;
         decode_plane(plane, &raw, &places, &mut image)?;
     }

@@ -20,6 +20,7 @@ mod image_header;
 mod jpeg;
 mod layered_codec;
 mod layered_image_codec;
+mod light_field_codec;
 mod lz4;
 mod picture;
 mod png;
@@ -44,6 +45,7 @@ pub use image_header::{
     ImageHeader, LayeredCounts, MAX_VISIBILITY_PLANES, PlaneEncoding, PlaneHeader, PlaneKind, PlaneSet,
 };
 pub use layered_image_codec::{decode_layered_image, encode_layered_image};
+pub use light_field_codec::{decode_light_field, encode_light_field};
 pub use quantise::InverseDepthRange;
 pub use reassembler::{ChunkError, Reassembled, Reassembler};
 pub use sample_image_codec::{EncodeError, decode_sample_image, encode_sample_image};

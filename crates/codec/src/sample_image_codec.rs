@@ -1,9 +1,10 @@
-//! A sample image of either kind to header and payload, and back.
+//! A sample image of any kind to header and payload, and back.
 
 use depth_image::{DepthImageError, LayeredError, SampleCamera, SampleImage};
 
 use crate::image_codec::{decode_depth_image, encode_depth_image};
 use crate::layered_image_codec::{decode_layered_image, encode_layered_image};
+use crate::light_field_codec::{decode_light_field, encode_light_field};
 use crate::{DecodeError, DecodeLimits, EncodedImage, ImageHeader, PlaneSet};
 
 /// Planes that do not belong together.
@@ -24,6 +25,7 @@ pub fn encode_sample_image(image: &SampleImage) -> Result<EncodedImage, EncodeEr
     Ok(match image {
         SampleImage::Depth(image) => encode_depth_image(image, PlaneSet::ALL)?,
         SampleImage::Layered(image) => encode_layered_image(image)?,
+        SampleImage::LightField(image) => encode_light_field(image)?,
     })
 }
 
@@ -41,5 +43,6 @@ pub fn decode_sample_image(
     Ok(match camera {
         SampleCamera::Depth(camera) => decode_depth_image(header, *camera, payload, limits)?.into(),
         SampleCamera::Layered(camera) => decode_layered_image(header, *camera, payload, limits)?.into(),
+        SampleCamera::LightField(camera) => decode_light_field(header, *camera, payload, limits)?.into(),
     })
 }

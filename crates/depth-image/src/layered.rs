@@ -75,32 +75,7 @@ impl LayeredDepthImage {
         if let Some((plane, len, expected)) = planes.find(|(_, len, expected)| len != expected) {
             return Err(LayeredError::Plane { plane, len, expected });
         }
-        let (ends, mut least) = (&self.first[1..], 0);
-        for (line, &first) in self.first.iter().enumerate() {
-            if first < least || first as usize > samples || (line == 0 && first != 0) {
-                return Err(LayeredError::First { line, first, least, samples });
-            }
-            least = first;
-        }
-        if ends.last().is_some_and(|&end| end as usize != samples) {
-            return Err(LayeredError::First { line: ends.len(), first: least, least: samples as u32, samples });
-        }
-        (0..ends.len()).try_for_each(|line| self.validate_line(line))
-    }
-
-    fn validate_line(&self, line: usize) -> Result<(), LayeredError> {
-        let [first, end] = [self.first[line], self.first[line + 1]];
-        if end - first > MAX_LAYERS {
-            return Err(LayeredError::Layers { line, layers: end - first });
-        }
-        let (mut nearest_m, range_m) = (0.0, self.camera.range_m);
-        for (layer, &depth_m) in self.planar_depth_m[first as usize..end as usize].iter().enumerate() {
-            if !(nearest_m..=range_m).contains(&depth_m) {
-                return Err(LayeredError::Depth { line, layer, depth_m, range_m });
-            }
-            nearest_m = depth_m;
-        }
-        Ok(())
+        check_lines(&self.first, &self.planar_depth_m, self.camera.range_m)
     }
 
     /// Number of samples.
@@ -126,6 +101,36 @@ impl LayeredDepthImage {
     pub fn plane_normal_in_world(&self, sample: usize) -> Vec3 {
         crate::unit_from_oct8(self.plane_normal_oct8[sample])
     }
+}
+
+/// Checks the prefix sums of lines, and that depths rise along each.
+pub(crate) fn check_lines(first: &[u32], planar_depth_m: &[f32], range_m: f32) -> Result<(), LayeredError> {
+    let samples = planar_depth_m.len();
+    let (ends, mut least) = (&first[1..], 0);
+    for (line, &first) in first.iter().enumerate() {
+        if first < least || first as usize > samples || (line == 0 && first != 0) {
+            return Err(LayeredError::First { line, first, least, samples });
+        }
+        least = first;
+    }
+    if ends.last().is_some_and(|&end| end as usize != samples) {
+        return Err(LayeredError::First { line: ends.len(), first: least, least: samples as u32, samples });
+    }
+    (0..ends.len()).try_for_each(|line| check_line(line, [first[line], first[line + 1]], planar_depth_m, range_m))
+}
+
+fn check_line(line: usize, [first, end]: [u32; 2], planar_depth_m: &[f32], range_m: f32) -> Result<(), LayeredError> {
+    if end - first > MAX_LAYERS {
+        return Err(LayeredError::Layers { line, layers: end - first });
+    }
+    let mut nearest_m = 0.0;
+    for (layer, &depth_m) in planar_depth_m[first as usize..end as usize].iter().enumerate() {
+        if !(nearest_m..=range_m).contains(&depth_m) {
+            return Err(LayeredError::Depth { line, layer, depth_m, range_m });
+        }
+        nearest_m = depth_m;
+    }
+    Ok(())
 }
 
 #[cfg(test)]

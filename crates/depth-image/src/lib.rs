@@ -17,6 +17,8 @@ mod highlight;
 mod image;
 mod layered;
 mod light;
+mod light_directions;
+mod light_field;
 mod method_table;
 mod parallel;
 mod pinhole;
@@ -47,12 +49,14 @@ pub use highlight::{Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS, ROUGHEST_MIRRO
 pub use image::{BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId};
 pub use layered::{LayeredDepthImage, LayeredError, MAX_LAYERS};
 pub use light::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
+pub use light_directions::{LightDirection, LightDirections};
+pub use light_field::{LIGHT_FIELD_SIDES, LayeredLightField, LightFieldCamera};
 pub use method_table::{NamedMethod, Setting, method_forms, method_help, method_named};
 pub use parallel::ParallelCamera;
 pub use pinhole::PinholeCamera;
 pub use projection::{CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray};
 pub use sample_camera::SampleCamera;
-pub use sample_image::{SampleImage, SampleImageError, SampleImages};
+pub use sample_image::{CubeImages, SampleImage, SampleImageError, SampleImages};
 #[cfg(any(test, feature = "scalar"))]
 pub use scalar::{
     Incident, Texel, disc_from_square, environment_highlight_linear, environment_reflectance_linear, highlight_linear,

@@ -1,9 +1,9 @@
-//! The cameras of a sample set: those of views, or the lines of a cube.
+//! The cameras of a sample set: those of views, or the lines of a cube and of a light field.
 
 use glam::UVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::{Camera, CameraError, ParallelCamera, PinholeCamera};
+use crate::{Camera, CameraError, LightFieldCamera, ParallelCamera, PinholeCamera};
 
 /// The camera of a sample image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -12,6 +12,8 @@ pub enum SampleCamera {
     Depth(Camera),
     /// Meets all surfaces on each of its lines.
     Layered(ParallelCamera),
+    /// Meets all light on the lines of many directions.
+    LightField(LightFieldCamera),
 }
 
 impl From<Camera> for SampleCamera {
@@ -32,22 +34,37 @@ impl From<ParallelCamera> for SampleCamera {
     }
 }
 
+impl From<LightFieldCamera> for SampleCamera {
+    fn from(camera: LightFieldCamera) -> Self {
+        Self::LightField(camera)
+    }
+}
+
 impl SampleCamera {
-    /// The camera of a depth image; `None` of a layered one.
+    /// The camera of a depth image; `None` of others.
     #[must_use]
     pub fn depth(&self) -> Option<&Camera> {
         match self {
             Self::Depth(camera) => Some(camera),
-            Self::Layered(_) => None,
+            Self::Layered(_) | Self::LightField(_) => None,
         }
     }
 
-    /// The camera of a layered image; `None` of a depth image.
+    /// The camera of a layered image; `None` of others.
     #[must_use]
     pub fn layered(&self) -> Option<&ParallelCamera> {
         match self {
-            Self::Depth(_) => None,
             Self::Layered(camera) => Some(camera),
+            Self::Depth(_) | Self::LightField(_) => None,
+        }
+    }
+
+    /// The camera of a light field; `None` of others.
+    #[must_use]
+    pub fn light_field(&self) -> Option<&LightFieldCamera> {
+        match self {
+            Self::LightField(camera) => Some(camera),
+            Self::Depth(_) | Self::Layered(_) => None,
         }
     }
 
@@ -63,6 +80,7 @@ impl SampleCamera {
         match self {
             Self::Depth(camera) => camera.model_name(),
             Self::Layered(_) => "parallel",
+            Self::LightField(_) => "light_field",
         }
     }
 
@@ -78,6 +96,7 @@ impl SampleCamera {
         match self {
             Self::Depth(camera) => camera.size_px(),
             Self::Layered(camera) => camera.size_px,
+            Self::LightField(camera) => camera.size_px(),
         }
     }
 
@@ -96,15 +115,16 @@ impl SampleCamera {
         match self {
             Self::Depth(camera) => camera.validate(),
             Self::Layered(camera) => camera.validate(),
+            Self::LightField(camera) => camera.validate(),
         }
     }
 
-    /// The same field of view in another size. The lines of a layered image belong to a cube, and stay.
+    /// The same field of view in another size. Lines of a cube or of a light field stay.
     #[must_use]
     pub fn resized(&self, size_px: UVec2) -> Self {
         match self {
             Self::Depth(camera) => Self::Depth(camera.resized(size_px)),
-            Self::Layered(_) => *self,
+            Self::Layered(_) | Self::LightField(_) => *self,
         }
     }
 }

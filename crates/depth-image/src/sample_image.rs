@@ -1,7 +1,8 @@
 //! The images of a sample set: depth images of views, or layered images of a cube.
 
 use crate::{
-    CubeGrid, DepthImage, LayeredDepthImage, LayeredError, ParallelCamera, SampleCamera, SpecularPlanes, TileError,
+    CubeGrid, DepthImage, LayeredDepthImage, LayeredError, LayeredLightField, ParallelCamera, SampleCamera,
+    SpecularPlanes, TileError,
 };
 
 /// An image of a sample set.
@@ -12,6 +13,8 @@ pub enum SampleImage {
     Depth(DepthImage),
     /// All surfaces on each line.
     Layered(LayeredDepthImage),
+    /// All light on the lines of many directions.
+    LightField(LayeredLightField),
 }
 
 /// Why images do not form what they are for.
@@ -22,7 +25,7 @@ pub enum SampleImageError {
     Depth(#[from] TileError),
     #[error(transparent)]
     Layered(#[from] LayeredError),
-    #[error("depth images and layered images do not go together")]
+    #[error("depth images and layered images do not go together, nor two light fields")]
     Mixed,
     #[error("{images} layered images are not the three of one cube")]
     NoCube { images: usize },
@@ -33,8 +36,19 @@ pub enum SampleImageError {
 pub enum SampleImages {
     /// Those of cameras of views, in their order.
     Depth(Vec<DepthImage>),
-    /// Those along the axes of a cube.
-    Cube(CubeGrid, Box<[LayeredDepthImage; 3]>),
+    /// Those along the axes of a cube, and a light field where mirrors are gathered in one.
+    Cube(Box<CubeImages>),
+}
+
+/// The images of a cube.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CubeImages {
+    /// The lines of all three.
+    pub grid: CubeGrid,
+    /// Along the first axis, the second, and the third.
+    pub images: [LayeredDepthImage; 3],
+    /// The light of the same scene.
+    pub light_field: Option<LayeredLightField>,
 }
 
 impl TryFrom<Vec<SampleImage>> for SampleImages {
@@ -44,11 +58,18 @@ impl TryFrom<Vec<SampleImage>> for SampleImages {
         if matches!(images.first(), None | Some(SampleImage::Depth(_))) {
             return SampleImage::depth_images(images).map(Self::Depth);
         }
-        let images = SampleImage::layered_images(images)?;
-        let no_cube = SampleImageError::NoCube { images: images.len() };
-        let cameras: Vec<ParallelCamera> = images.iter().map(|image| image.camera).collect();
-        let cube = CubeGrid::of_cameras(&cameras).zip(images.try_into().ok());
-        cube.map(|(grid, images)| Self::Cube(grid, Box::new(images))).ok_or(no_cube)
+        let (mut layered, mut light_field) = (Vec::new(), None);
+        for image in images {
+            match image {
+                SampleImage::Layered(image) => layered.push(image),
+                SampleImage::LightField(image) if light_field.is_none() => light_field = Some(image),
+                SampleImage::LightField(_) | SampleImage::Depth(_) => return Err(SampleImageError::Mixed),
+            }
+        }
+        let no_cube = SampleImageError::NoCube { images: layered.len() };
+        let cameras: Vec<ParallelCamera> = layered.iter().map(|image| image.camera).collect();
+        let cube = CubeGrid::of_cameras(&cameras).zip(layered.try_into().ok());
+        cube.map(|(grid, images)| Self::Cube(Box::new(CubeImages { grid, images, light_field }))).ok_or(no_cube)
     }
 }
 
@@ -58,7 +79,7 @@ impl SampleImages {
     pub fn depth(&self) -> &[DepthImage] {
         match self {
             Self::Depth(images) => images,
-            Self::Cube(..) => &[],
+            Self::Cube(_) => &[],
         }
     }
 }
@@ -75,6 +96,12 @@ impl From<LayeredDepthImage> for SampleImage {
     }
 }
 
+impl From<LayeredLightField> for SampleImage {
+    fn from(image: LayeredLightField) -> Self {
+        Self::LightField(image)
+    }
+}
+
 impl SampleImage {
     /// Joins the tiles of a camera, from the top, to one image.
     ///
@@ -86,6 +113,9 @@ impl SampleImage {
             SampleCamera::Layered(camera) => {
                 Self::Layered(LayeredDepthImage::from_tiles(*camera, &Self::layered_images(tiles)?)?)
             }
+            SampleCamera::LightField(camera) => {
+                Self::LightField(LayeredLightField::from_tiles(*camera, &Self::light_fields(tiles)?)?)
+            }
         })
     }
 
@@ -96,7 +126,7 @@ impl SampleImage {
     pub fn depth_images(images: Vec<Self>) -> Result<Vec<DepthImage>, SampleImageError> {
         let depth = |image| match image {
             Self::Depth(image) => Ok(image),
-            Self::Layered(_) => Err(SampleImageError::Mixed),
+            Self::Layered(_) | Self::LightField(_) => Err(SampleImageError::Mixed),
         };
         images.into_iter().map(depth).collect()
     }
@@ -104,9 +134,17 @@ impl SampleImage {
     fn layered_images(images: Vec<Self>) -> Result<Vec<LayeredDepthImage>, SampleImageError> {
         let layered = |image| match image {
             Self::Layered(image) => Ok(image),
-            Self::Depth(_) => Err(SampleImageError::Mixed),
+            Self::Depth(_) | Self::LightField(_) => Err(SampleImageError::Mixed),
         };
         images.into_iter().map(layered).collect()
+    }
+
+    fn light_fields(images: Vec<Self>) -> Result<Vec<LayeredLightField>, SampleImageError> {
+        let light_field = |image| match image {
+            Self::LightField(image) => Ok(image),
+            Self::Depth(_) | Self::Layered(_) => Err(SampleImageError::Mixed),
+        };
+        images.into_iter().map(light_field).collect()
     }
 
     /// Inputs of highlights, where the image has them.
@@ -115,6 +153,7 @@ impl SampleImage {
         match self {
             Self::Depth(image) => image.specular.as_ref(),
             Self::Layered(image) => image.specular.as_ref(),
+            Self::LightField(_) => None,
         }
     }
 }

@@ -3,8 +3,8 @@
 use glam::UVec2;
 
 use crate::{
-    Camera, DepthImage, DepthImageError, LayeredDepthImage, LayeredError, ParallelCamera, SampleCamera, SpecularPlanes,
-    ViewPart,
+    Camera, DepthImage, DepthImageError, LayeredDepthImage, LayeredError, LayeredLightField, LightFieldCamera,
+    ParallelCamera, SampleCamera, SpecularPlanes, ViewPart,
 };
 
 /// Tiles that do not form an image; `tile` counts from the top.
@@ -35,6 +35,7 @@ impl SampleCamera {
         match self {
             Self::Depth(camera) => Self::Depth(camera.tile(tile, count)),
             Self::Layered(camera) => Self::Layered(camera.part(&part(camera.size_px, tile, count))),
+            Self::LightField(camera) => Self::LightField(camera.part(&part(camera.size_px(), tile, count))),
         }
     }
 }
@@ -60,15 +61,9 @@ impl LayeredDepthImage {
             tile.validate()?;
         }
         let concat = |plane: fn(&Self) -> &[u32]| tiles.iter().flat_map(|tile| plane(tile).iter().copied()).collect();
-        let firsts = tiles.iter().scan(0, |before, tile| {
-            let first = *before;
-            *before += tile.sample_count() as u32;
-            Some(tile.first[..tile.first.len() - 1].iter().map(move |line| first + line))
-        });
-        let samples = tiles.iter().map(|tile| tile.sample_count() as u32).sum();
         Ok(Self {
             camera,
-            first: firsts.flatten().chain([samples]).collect(),
+            first: joined_lines(tiles.iter().map(|tile| &tile.first[..])),
             planar_depth_m: tiles.iter().flat_map(|tile| tile.planar_depth_m.iter().copied()).collect(),
             plane_normal_oct8: tiles.iter().flat_map(|tile| tile.plane_normal_oct8.iter().copied()).collect(),
             color_rgb9e5: concat(|tile| &tile.color_rgb9e5),
@@ -77,6 +72,41 @@ impl LayeredDepthImage {
             truncated: tiles.iter().any(|tile| tile.truncated),
         })
     }
+}
+
+impl LayeredLightField {
+    /// Joins tiles, from the first pair of directions, to one light field.
+    ///
+    /// # Errors
+    /// Tiles of other directions, and planes that are not those of their lines.
+    pub fn from_tiles(camera: LightFieldCamera, tiles: &[Self]) -> Result<Self, LayeredError> {
+        let size_px = camera.size_px();
+        for (number, tile) in tiles.iter().enumerate() {
+            let expected = part(size_px, number as u32, tiles.len() as u32).size_px;
+            let given = tile.camera.size_px();
+            if given != expected {
+                return Err(LayeredError::Tile { tile: number, given, expected });
+            }
+            tile.validate()?;
+        }
+        Ok(Self {
+            camera,
+            first: joined_lines(tiles.iter().map(|tile| &tile.first[..])),
+            planar_depth_m: tiles.iter().flat_map(|tile| tile.planar_depth_m.iter().copied()).collect(),
+            radiance_rgb9e5: tiles.iter().flat_map(|tile| tile.radiance_rgb9e5.iter().copied()).collect(),
+            truncated: tiles.iter().any(|tile| tile.truncated),
+        })
+    }
+}
+
+/// The prefix sums of the lines of all tiles.
+fn joined_lines<'a>(tiles: impl Iterator<Item = &'a [u32]>) -> Vec<u32> {
+    let mut joined = vec![0];
+    for first in tiles {
+        let before = joined[joined.len() - 1];
+        joined.extend(first.iter().skip(1).map(|line| before + line));
+    }
+    joined
 }
 
 fn layered_specular(tiles: &[LayeredDepthImage]) -> Result<Option<SpecularPlanes>, LayeredError> {

@@ -48,6 +48,8 @@ struct Uploaded {
     set: Arc<reconstruction::SampleSet>,
     /// Mirrors that a ray meets one after the other in this light.
     reflections: u32,
+    /// Rough surfaces show what is around them.
+    glossy: bool,
     /// What mirrors show.
     mirrors: Vec<(Aabb, Arc<reconstruction::SampleSet>)>,
     /// What tells where its images leave anything unknown.
@@ -149,6 +151,29 @@ impl GpuEngine {
     pub fn scene(&self, hash: &str) -> Result<Arc<GpuScene>, EngineError> {
         self.scenes.get(hash).ok_or_else(|| EngineError::UnknownScene { hash: hash.to_owned() })
     }
+
+    /// Images of a cube, and its light field: that shows mirrors, and is lit with what they show.
+    fn sample_cube(
+        &self,
+        request: &SampleWork,
+        (draw, mirrored): (DrawWork<'_>, Lighting),
+        method: SamplingMethod,
+    ) -> Result<Vec<SampleImage>, EngineError> {
+        let wanted = request.wanted.iter().filter_map(|&wanted| request.cameras.get(wanted as usize));
+        let wanted: Vec<&SampleCamera> = wanted.collect();
+        if wanted.iter().any(|camera| camera.light_field().is_some()) && mirrored.without_reflections().is_none() {
+            return Err(invalid("lighting", "a light field needs reflections N or glossy N, which it shows"));
+        }
+        let image = |camera: &SampleCamera| match camera {
+            SampleCamera::Layered(camera) => self.sampler.sample_layers(draw, camera, method).map(SampleImage::Layered),
+            SampleCamera::LightField(camera) => {
+                let draw = DrawWork { lighting: mirrored, ..draw };
+                self.sampler.sample_light_field(draw, camera).map(SampleImage::LightField)
+            }
+            SampleCamera::Depth(_) => Err(SamplingError::Lines { method: method.to_string() }),
+        };
+        self.catching(|| wanted.into_iter().map(image).collect::<Result<_, _>>().map_err(sampling_error))
+    }
 }
 
 fn device_turn(Turn { class, flow }: Turn) -> gpu::Turn {
@@ -211,18 +236,16 @@ impl Engine for GpuEngine {
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<SampleImage>, EngineError> {
         let scene = self.scene(&request.scene_hash)?;
         let cluster::Refinement { step, steps } = request.refinement;
-        let lighting: Lighting = parsed("lighting", &request.lighting)?;
+        let mirrored: Lighting = parsed("lighting", &request.lighting)?;
         // What mirrors show is each view's own.
-        let lighting = lighting.without_reflections().unwrap_or(lighting);
+        let lighting = mirrored.without_reflections().unwrap_or(mirrored);
         let draw = DrawWork {
             refinement: Refinement { step, steps },
             ..draw_work(&scene, lighting, request.scene_time_s, turn)
         };
         let method: SamplingMethod = parsed("sampling_method", &request.sampling)?;
-        if request.cameras.iter().any(|camera| camera.layered().is_some()) {
-            let lines = request.wanted.iter().filter_map(|&wanted| request.cameras.get(wanted as usize)?.layered());
-            let image = |camera| self.sampler.sample_layers(draw, camera, method).map(SampleImage::Layered);
-            return self.catching(|| lines.map(image).collect::<Result<_, _>>().map_err(sampling_error));
+        if request.cameras.iter().any(|camera| camera.depth().is_none()) {
+            return self.sample_cube(request, (draw, mirrored), method);
         }
         let cameras: Vec<Camera> = request.cameras.iter().filter_map(SampleCamera::depth).copied().collect();
         let SamplePlanes { normals: normal, corner_inverse_depths: corners } = request.planes;
@@ -258,14 +281,13 @@ impl Engine for GpuEngine {
         let turn = device_turn(turn);
         let upload = || match &set.images {
             SampleImages::Depth(images) => self.reconstructor.upload_in_turn(images, &description, turn),
-            SampleImages::Cube(grid, images) => {
-                self.reconstructor.upload_cube_in_turn(grid, images, &description, turn)
-            }
+            SampleImages::Cube(cube) => self.reconstructor.upload_cube_in_turn(cube, &description, turn),
         };
         let set = self.catching(|| upload().map_err(reconstruction_error))?;
         Ok(Arc::new(Uploaded {
             set: Arc::new(set),
             reflections: lighting.reflections(),
+            glossy: lighting.glossy_rays() > 0,
             mirrors: Vec::new(),
             base: None,
         }))
@@ -281,15 +303,16 @@ impl Engine for GpuEngine {
                 CommonKind::Base => base = Some(common),
             }
         }
-        Ok(Arc::new(Uploaded { set: set.set.clone(), reflections: set.reflections, mirrors, base }))
+        let Uploaded { ref set, reflections, glossy, .. } = *set;
+        Ok(Arc::new(Uploaded { set: set.clone(), reflections, glossy, mirrors, base }))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {
-        let Uploaded { set, reflections, mirrors, base } =
+        let Uploaded { set, reflections, glossy, mirrors, base } =
             (set as &dyn Any).downcast_ref().ok_or_else(of_another_device)?;
         let cells = mirrors.iter().map(|(bounds, shown)| MirrorCell { bounds: *bounds, surroundings: shown });
         let cells: Vec<MirrorCell<'_>> = cells.collect();
-        let mirrors = Mirrors { cells: &cells, reflections: *reflections };
+        let mirrors = Mirrors { cells: &cells, reflections: *reflections, glossy: *glossy };
         let common = CommonSets { mirrors, base: base.as_deref() };
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
         let turn = device_turn(turn);
@@ -352,7 +375,9 @@ fn reconstruction_error(error: ReconstructionError) -> EngineError {
         ReconstructionError::Shader(_) | ReconstructionError::MissingPlane { .. } => device(error),
         ReconstructionError::MirrorCells(_) => invalid("common_cells of mirrors", error),
         ReconstructionError::Reflections(_) => invalid("reflections", error),
-        ReconstructionError::Model { .. } | ReconstructionError::CurvedSearch { .. } => invalid("sample_images", error),
+        ReconstructionError::Model { .. }
+        | ReconstructionError::CurvedSearch { .. }
+        | ReconstructionError::LightField { .. } => invalid("sample_images", error),
     }
 }
 

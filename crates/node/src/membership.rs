@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use cluster::{Assignment, JoinCluster, NodeStatus, Policy, Welcome, Workload};
-use depth_image::{CubeGrid, PinholeCamera, SampleCamera, ViewPlanes};
+use depth_image::{
+    CubeGrid, LIGHT_FIELD_SIDES, LightDirections, LightFieldCamera, PinholeCamera, SampleCamera, ViewPlanes,
+};
 use glam::UVec2;
 use tokio_stream::StreamExt as _;
 use tokio_util::sync::CancellationToken;
@@ -152,11 +154,16 @@ fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), En
     engine.reconstruct(set.as_ref(), &work, turn).map(drop)
 }
 
+/// The smallest light field.
+const WARM_DIRECTIONS: LightDirections = LightDirections::D66;
+const WARM_SIDE_PX: u32 = *LIGHT_FIELD_SIDES.start();
+
 fn small(workload: &Workload) -> Workload {
     let mut cube = CubeGrid::around(&workload.volume, SIZE_PX.x).into_iter().flat_map(|grid| grid.cameras());
-    let camera = |camera: &SampleCamera| match camera.layered() {
-        Some(_) => cube.next().map_or(*camera, SampleCamera::from),
-        None => camera.resized(SIZE_PX),
+    let camera = |camera: &SampleCamera| match camera {
+        SampleCamera::Layered(_) => cube.next().map_or(*camera, SampleCamera::from),
+        SampleCamera::LightField(field) => LightFieldCamera::around(field.bounds, WARM_DIRECTIONS, WARM_SIDE_PX).into(),
+        SampleCamera::Depth(_) => camera.resized(SIZE_PX),
     };
     let sample_cameras = workload.sample_cameras.iter().map(camera).collect();
     Workload { sample_cameras, ..workload.clone() }

@@ -1,6 +1,9 @@
 //! The sizes of sample sets in memory, before they are allocated and afterwards.
 
-use depth_image::{CubeGrid, DepthImage, Illumination, LayeredDepthImage, SampleCamera, SampleImages, SpecularPlanes};
+use depth_image::{
+    CubeGrid, DepthImage, Illumination, LayeredDepthImage, LayeredLightField, SampleCamera, SampleImages,
+    SpecularPlanes,
+};
 use glam::UVec3;
 
 /// Inverse depth, colour, a normal, a surface, reflectance and a mark, for one texel.
@@ -15,6 +18,8 @@ const MOST_SAMPLE_BYTES: usize = 4 + 2 + 4 + 4 + 4;
 const CUBE_SAMPLE_BYTES: usize = 16 + 16;
 /// The side of a cell of a cube, in spacings. A table has one word for each cell.
 const CELL_SIDE: u32 = 8;
+/// Depth and radiance of a sample of a light field.
+const LIGHT_SAMPLE_BYTES: usize = 4 + 4;
 /// The number of a line's first sample.
 const LINE_BYTES: usize = 4;
 /// Samples of a line that are reserved for before they are known, on average over a cube: few scenes have more, and what a set
@@ -33,6 +38,7 @@ pub fn most_image_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -
         SampleCamera::Layered(camera) => {
             camera.pixel_count() * (LINE_BYTES + EXPECTED_LAYERS * (MOST_SAMPLE_BYTES + visibility_bytes))
         }
+        SampleCamera::LightField(camera) => camera.line_count() * (LINE_BYTES + EXPECTED_LAYERS * LIGHT_SAMPLE_BYTES),
     };
     cameras.iter().map(bytes).sum()
 }
@@ -43,6 +49,7 @@ pub fn most_set_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -> 
     let search_bytes = |camera: &SampleCamera| match camera {
         SampleCamera::Depth(camera) => camera.pixel_count() * PYRAMID_TEXEL_BYTES,
         SampleCamera::Layered(camera) => camera.pixel_count() * EXPECTED_LAYERS * CUBE_SAMPLE_BYTES,
+        SampleCamera::LightField(_) => 0,
     };
     let parallel: Vec<_> = cameras.iter().filter_map(SampleCamera::layered).copied().collect();
     let cells = CubeGrid::of_cameras(&parallel).map_or(0, |grid| cell_bytes(grid.size));
@@ -54,7 +61,10 @@ pub fn most_set_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -> 
 pub fn set_bytes(images: &SampleImages) -> usize {
     match images {
         SampleImages::Depth(images) => depth_images_bytes(images),
-        SampleImages::Cube(grid, images) => cell_bytes(grid.size) + images.iter().map(layered_bytes).sum::<usize>(),
+        SampleImages::Cube(cube) => {
+            let images = cube.images.iter().map(layered_bytes).sum::<usize>();
+            cell_bytes(cube.grid.size) + images + cube.light_field.as_ref().map_or(0, light_field_bytes)
+        }
     }
 }
 
@@ -80,6 +90,10 @@ fn layered_bytes(image: &LayeredDepthImage) -> usize {
     samples * CUBE_SAMPLE_BYTES + 4 * words
 }
 
+fn light_field_bytes(field: &LayeredLightField) -> usize {
+    field.first.len() * LINE_BYTES + field.sample_count() * LIGHT_SAMPLE_BYTES
+}
+
 fn image_bytes(image: &DepthImage) -> usize {
     let texels = image.inverse_depth_per_m.len();
     let words = texels
@@ -93,7 +107,7 @@ fn image_bytes(image: &DepthImage) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use depth_image::{Aabb, PinholeCamera};
+    use depth_image::{Aabb, CubeImages, PinholeCamera};
     use glam::{UVec2, Vec3};
 
     use super::*;
@@ -117,7 +131,8 @@ mod tests {
             }
         };
         let cameras = [0, 1, 2].map(|axis| grid.camera(axis).into());
-        let bytes = set_bytes(&SampleImages::Cube(grid, Box::new([image(0), image(1), image(2)])));
+        let images = [image(0), image(1), image(2)];
+        let bytes = set_bytes(&SampleImages::Cube(Box::new(CubeImages { grid, images, light_field: None })));
         assert_eq!(bytes, 3 * 2 * 32 * 32 * 32 + 4 * 4 * 4 * 4);
         let most = most_set_bytes(&request(1).workload.illumination, &cameras);
         assert!(most > bytes && most < 3 * bytes, "{bytes} of {most}");

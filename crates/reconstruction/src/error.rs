@@ -18,6 +18,8 @@ pub enum ReconstructionError {
     /// A sample image is invalid; `index` is its place in the set.
     #[error("sample image {index}: {reason}")]
     Sample { index: usize, reason: String },
+    #[error("the light field: {reason}")]
+    LightField { reason: String },
     /// A sample image lacks a plane, named as in [`depth_image::DepthImageError`].
     #[error("sample image {index} has no plane {plane}, which the reconstruction method needs")]
     MissingPlane { index: usize, plane: &'static str },

@@ -6,7 +6,7 @@ use bytemuck::Zeroable as _;
 use gpu::{GpuTone, ShaderSource};
 use naga::{Module, TypeInner};
 
-use crate::cube::GpuCube;
+use crate::cube::{GpuCube, GpuLightField};
 use crate::{
     bounce::{GpuMirrorBox, GpuMirroredRay},
     pixel_list::GpuPixelList,
@@ -193,6 +193,12 @@ fn mirrored_rays_and_mirror_boxes_agree_where_they_are_written_and_read() {
 fn cubes_agree() {
     let cube = host!(GpuCube { cube_from_world, size, columns, rows, start_m, padding });
     assert_eq!(templates_that_agree("Cube", &cube), BTreeSet::from(["layered.wgsl"]));
+}
+
+#[test]
+fn light_fields_agree() {
+    let field = host!(GpuLightField { directions, side_px, exponent, least_alpha });
+    assert_eq!(templates_that_agree("LightField", &field), BTreeSet::from(["layered.wgsl"]));
 }
 
 #[test]

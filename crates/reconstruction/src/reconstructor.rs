@@ -3,7 +3,9 @@
 
 use std::sync::Arc;
 
-use depth_image::{Aabb, Antialias, CubeGrid, DepthImage, LayeredDepthImage, PinholeCamera, Ray, View, ViewPlanes};
+use depth_image::{
+    Aabb, Antialias, CubeGrid, CubeImages, DepthImage, LayeredDepthImage, PinholeCamera, Ray, View, ViewPlanes,
+};
 use glam::{Vec2, Vec3};
 use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
@@ -119,21 +121,20 @@ impl Reconstructor {
         images: &[LayeredDepthImage; 3],
         set: &SetDescription<'_>,
     ) -> Result<SampleSet, ReconstructionError> {
-        self.upload_cube_in_turn(grid, images, set, Turn::default())
+        SampleSet::upload_cube(&self.tables, grid, (images, None), set, Turn::default())
     }
 
-    /// As [`Reconstructor::upload_cube`], at its place in the device's order.
+    /// As [`Reconstructor::upload_cube`], with a light field where there is one, at its place in the device's order.
     ///
     /// # Errors
-    /// As [`Reconstructor::upload_cube`].
+    /// As [`Reconstructor::upload_cube`], and a light field that cannot be used.
     pub fn upload_cube_in_turn(
         &self,
-        grid: &CubeGrid,
-        images: &[LayeredDepthImage; 3],
+        cube: &CubeImages,
         set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<SampleSet, ReconstructionError> {
-        SampleSet::upload_cube(&self.tables, grid, images, set, turn)
+        SampleSet::upload_cube(&self.tables, &cube.grid, (&cube.images, cube.light_field.as_ref()), set, turn)
     }
 
     /// One view a camera, in their order.
@@ -406,6 +407,10 @@ fn cube_of_base(base: &SampleSet) -> Result<&Cube, ReconstructionError> {
 fn check_samples(set: &SampleSet, method: ReconstructionMethod) -> Result<(), ReconstructionError> {
     if set.is_single_pole() {
         return Err(ReconstructionError::Model { model: "single_pole" });
+    }
+    let has_light_field = || set.cube.as_ref().is_some_and(|cube| cube.light_field.is_some());
+    if method.gathers() && !has_light_field() {
+        return Err(ReconstructionError::NoSamples { what: method.to_string(), needed: "a light field" });
     }
     let (is_there, needed) = match method.walks_cube() {
         true => (set.cube.is_some(), "a layered cube"),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
-use depth_image::{Aabb, CubeGrid, DepthImage, Environment, LayeredDepthImage, PinholeCamera};
+use depth_image::{Aabb, CubeGrid, DepthImage, Environment, LayeredDepthImage, LayeredLightField, PinholeCamera};
 use glam::{UVec2, Vec2, Vec3};
 use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
@@ -123,7 +123,7 @@ impl SampleSet {
     pub(crate) fn upload_cube(
         tables: &TablePool,
         grid: &CubeGrid,
-        images: &[LayeredDepthImage; 3],
+        images: (&[LayeredDepthImage; 3], Option<&LayeredLightField>),
         set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {

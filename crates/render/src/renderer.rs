@@ -3,7 +3,8 @@
 use std::{collections::VecDeque, sync::Arc};
 
 use depth_image::{
-    Antialias, Camera, DepthImage, LayeredDepthImage, ParallelCamera, PinholeCamera, ToneMapping, View, ViewPlanes,
+    Antialias, Camera, DepthImage, LayeredDepthImage, LayeredLightField, LightFieldCamera, ParallelCamera,
+    PinholeCamera, ToneMapping, View, ViewPlanes,
 };
 use glam::UVec2;
 use gpu::{Frame, Gpu, GpuError, Templates, Turn, WorkClass};
@@ -96,6 +97,20 @@ impl Renderer {
         let limit = u64::from(self.gpu.device.limits().max_texture_dimension_2d);
         GpuError::check_limit("a layered image's side", camera.size_px.max_element().into(), limit)?;
         layered::draw(&self.stages, work, camera, kept)
+    }
+
+    /// The light of all surfaces on the lines of many directions, with highlights and what mirrors show, towards each. The lighting has
+    /// mirror images of the scene; without any, and where nothing reflects, there are no samples.
+    ///
+    /// # Errors
+    /// A camera that is not valid, or the device.
+    pub fn draw_light_field(
+        &self,
+        work: DrawWork<'_>,
+        camera: &LightFieldCamera,
+    ) -> Result<LayeredLightField, RenderError> {
+        camera.validate().map_err(|source| RenderError::Camera { index: 0, source })?;
+        layered::light_field::draw(&self.stages, work, camera)
     }
 
     /// As [`Renderer::draw_depth_images`] for the `wanted` of `cameras`, but each image omits the samples that are

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use depth_image::{Camera, DepthImage, LayeredDepthImage, ParallelCamera};
+use depth_image::{Camera, DepthImage, LayeredDepthImage, LayeredLightField, LightFieldCamera, ParallelCamera};
 use gpu::Gpu;
 use render::{DrawWork, RenderError, Renderer, SamplePlanes};
 
@@ -55,6 +55,18 @@ impl Sampler {
     ) -> Result<LayeredDepthImage, SamplingError> {
         let other = || SamplingError::Cameras { method: method.to_string() };
         Ok(self.renderer.draw_layers(draw, camera, method.layer_selection().ok_or_else(other)?)?)
+    }
+
+    /// The light field of a scene, under a lighting that follows mirrors.
+    ///
+    /// # Errors
+    /// A camera that is not valid, or the device.
+    pub fn sample_light_field(
+        &self,
+        draw: DrawWork<'_>,
+        camera: &LightFieldCamera,
+    ) -> Result<LayeredLightField, SamplingError> {
+        Ok(self.renderer.draw_light_field(draw, camera)?)
     }
 }
 

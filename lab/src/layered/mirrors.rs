@@ -99,7 +99,7 @@ fn cameras() -> Vec<PinholeCamera> {
 
 /// Views by rays that meet up to `reflections` mirrors, and the seconds of one view.
 fn walked(subject: &Subject<'_>, set: &SampleSet, reflections: u32) -> anyhow::Result<(Vec<View>, f64)> {
-    let mirrors = Mirrors { cells: &[], reflections };
+    let mirrors = Mirrors { cells: &[], reflections, glossy: false };
     let (reconstructor, turn) = (subject.stand.reconstructor(), Default::default());
     timed(|| Ok(reconstructor.reconstruct_with(set, mirrors, &subject.views, LAYERED, ViewPlanes::COLOR, turn)?))
 }

@@ -14,7 +14,7 @@ use super::subject::Subject;
 use crate::failures::stage::CARVE;
 use crate::statistics::median;
 
-pub const LAYERED: ReconstructionMethod = ReconstructionMethod::Layered;
+pub const LAYERED: ReconstructionMethod = ReconstructionMethod::LAYERED;
 /// Views of a batch that is timed, and the times; the median counts.
 const BATCH: usize = 8;
 const REPEATS: usize = 5;

@@ -91,9 +91,13 @@ fn mirror_share(roughness: f32) -> f32 {
 
 // The highlight of the environment, unoccluded, as far as no ray brings it.
 fn highlight_from_environment(mirror: Mirror) -> vec3f {
+{%- if glossy is defined and glossy %}
+    return vec3f(0.0);
+{%- else %}
     let roughness = max(mirror.reflector.roughness, LEAST_ROUGHNESS);
     let arriving = environment_mirrored(reflect(-mirror.towards_eye, mirror.normal), roughness);
     return arriving * environment_reflectance(mirror) * (1.0 - mirror_share(mirror.reflector.roughness));
+{%- endif %}
 }
 {%- else %}
     return environment_mirrored(reflect(-mirror.towards_eye, mirror.normal), roughness) * brdf;

@@ -55,6 +55,8 @@ pub struct Mirrors<'s> {
     pub cells: &'s [MirrorCell<'s>],
     /// Without any, mirrors show lamps and the environment.
     pub reflections: u32,
+    /// Rough surfaces show what is around them, too, where there is a light field.
+    pub glossy: bool,
 }
 
 impl Mirrors<'_> {
@@ -72,7 +74,7 @@ impl Mirrors<'_> {
         }
         let reflectors = set.cube.as_ref().map_or(&set.reflectors, |cube| &cube.reflectors);
         let has_mirrors = reflectors.as_ref().is_some_and(|of| of.highlight == Highlight::Ggx);
-        Ok(if self.reflections > 0 && has_mirrors { self } else { Self::default() })
+        Ok(if (self.reflections > 0 || self.glossy) && has_mirrors { self } else { Self::default() })
     }
 }
 
@@ -105,6 +107,7 @@ pub(crate) struct Bounces<'s> {
     /// Smallest first.
     cells: Vec<MirrorCell<'s>>,
     reflections: u32,
+    glossy: bool,
     /// A `MirrorBox` for each cell.
     boxes: Buffer,
     /// A `ViewWork` for each cell.
@@ -171,6 +174,7 @@ impl<'s> Bounces<'s> {
         let plane = |label| lend(label, 4 * pixels);
         Ok(Some(Self {
             reflections: mirrors.reflections,
+            glossy: mirrors.glossy,
             boxes: device.gpu.buffer_with("mirror boxes", &boxes, BufferUsages::UNIFORM),
             works: cells.iter().enumerate().map(work).collect(),
             poles: cells.iter().map(|cell| poles(device, cell, curved_search)).collect(),
@@ -237,6 +241,11 @@ impl<'s> Bounces<'s> {
     /// Mirrors that a ray meets.
     pub fn reflections(&self) -> u32 {
         self.reflections
+    }
+
+    /// Rough surfaces show what is around them.
+    pub fn are_glossy(&self) -> bool {
+        self.glossy
     }
 
     /// The work of a cell.

@@ -2,11 +2,12 @@
 
 mod bricks;
 mod distances;
+mod light_field;
 mod links;
 mod samples;
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{CubeGrid, LayeredDepthImage};
+use depth_image::{CubeGrid, LayeredDepthImage, LayeredLightField};
 use glam::Vec3;
 use gpu::{Binding, GpuError, Table, TablePool, Turn};
 use wgpu::{BufferUsages, TextureFormat};
@@ -14,6 +15,9 @@ use wgpu::{BufferUsages, TextureFormat};
 #[cfg(feature = "scalar")]
 pub(crate) use bricks::LEAST_NORMAL_ALONG_LINE;
 pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, SQUARE_REACH};
+#[cfg(test)]
+pub(crate) use light_field::GpuLightField;
+pub(crate) use light_field::LightField;
 pub(crate) use links::links;
 pub(crate) use samples::CubeSamples;
 #[cfg(feature = "scalar")]
@@ -57,6 +61,8 @@ pub(crate) struct Cube {
     /// Some line has met more surfaces than it holds.
     pub truncated: bool,
     pub reflectors: Option<Reflectors>,
+    /// The light around the cube's mirrors.
+    pub light_field: Option<LightField>,
 }
 
 impl Cube {
@@ -64,7 +70,7 @@ impl Cube {
     pub fn upload(
         tables: &TablePool,
         grid: &CubeGrid,
-        images: &[LayeredDepthImage; 3],
+        (images, light_field): (&[LayeredDepthImage; 3], Option<&LayeredLightField>),
         set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
@@ -93,6 +99,7 @@ impl Cube {
             entries: tables.upload("entries of a cube", TextureFormat::Rgba32Uint, &bricks.entries, turn)?,
             samples: tables.upload("samples of a cube", TextureFormat::Rgba32Uint, &words, turn)?,
             reflectors: Reflectors::of_cube(tables, (images, &samples.place), set, turn)?,
+            light_field: light_field.map(|field| LightField::upload(tables, field, turn)).transpose()?,
             truncated: images.iter().any(|image| image.truncated),
         })
     }

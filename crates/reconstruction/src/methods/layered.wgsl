@@ -21,13 +21,16 @@
 {%- if reflects %}
 {% include "gathered.wgsl" %}
 {%- endif %}
+{%- if gathers %}
+{% include "cube/gather.wgsl" %}
+{%- endif %}
 {%- if bounced or left %}
 {% include "pixel_list.wgsl" %}
 {%- endif %}
-{%- if mirrors or bounced %}
+{%- if spawns or bounced %}
 {% include "bounce/ray.wgsl" %}
 {%- endif %}
-{%- if mirrors %}
+{%- if spawns %}
 {% include "bounce/spawn.wgsl" %}
 {%- endif %}
 {%- if bounced %}
@@ -48,8 +51,16 @@ fn light_from(hit: CubeHit, point_in_world: vec3f, towards_eye: vec3f, pixel: u3
         let own = throughput * glossy.reflecting;
         shown += own * highlight(point_in_world, glossy.normal, towards_eye, glossy.reflector, glossy.visibility);
 {%- if mirrors %}
-        let open = {{ "unpack4x8unorm(glossy.visibility[0]).x" if visibility_words > 0 else "1.0" }};
         let mirror = Mirror(point_in_world, glossy.normal, towards_eye, unpack_reflector(glossy.reflector));
+{%- endif %}
+{%- if gathers %}
+        let share = {{ gathered_share }};
+        for (var gathers = share > 0.0; gathers; gathers = false) {
+            shown += own * environment_reflectance(mirror) * share * gathered_light(mirror);
+        }
+{%- endif %}
+{%- if spawns %}
+        let open = {{ "unpack4x8unorm(glossy.visibility[0]).x" if visibility_words > 0 else "1.0" }};
         shown += bounce_off(mirror, pixel, own, open, cube.start_m / START_FOOTPRINTS, Cone(0.0, 0.0));
 {%- endif %}
     }

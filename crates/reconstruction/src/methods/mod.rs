@@ -11,7 +11,7 @@ mod mesh;
 
 use std::sync::Arc;
 
-use depth_image::{NamedMethod, Setting, named_methods};
+use depth_image::{MAX_REFLECTIONS, NamedMethod, Setting, named_methods};
 use gpu::{ShaderError, ShaderSource, Templates, Turn, shader_sources, wgsl_constants, wgsl_files};
 
 use self::hybrid_mesh::GREATEST_SLOPE;
@@ -45,7 +45,10 @@ pub enum ReconstructionMethod {
         merged: Option<ErrorBound>,
     },
     /// Rays walk through a layered depth cube and meet the planes of its samples.
-    Layered,
+    Layered {
+        /// Mirrors on a ray's way that are followed; what the next one shows is gathered in a light field. All, where none is given.
+        followed: Option<u32>,
+    },
 }
 
 use ReconstructionMethod::{HybridMesh, JointCarve, Layered, LightFieldSearch, Mesh};
@@ -91,9 +94,16 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 5] = [
     },
     NamedMethod {
         name: "layered",
-        method: Layered,
-        setting: None,
-        help: "walks through a layered cube, and meets the planes of its samples",
+        method: ReconstructionMethod::LAYERED,
+        setting: Some(Setting {
+            form: "MIRRORS (0 to 8)",
+            parse: |text| {
+                let followed = text.parse().ok().filter(|&mirrors| mirrors <= MAX_REFLECTIONS)?;
+                Some(Layered { followed: Some(followed) })
+            },
+        }),
+        help: "walks through a layered cube, and meets the planes of its samples; follows rays off so many mirrors, and gathers in a \
+               light field what further ones show",
     },
 ];
 
@@ -130,11 +140,14 @@ pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<Shad
 named_methods!(ReconstructionMethod, UnknownMethod, "reconstruction method");
 
 impl ReconstructionMethod {
+    /// Walks through a layered cube, and follows all mirrors.
+    pub const LAYERED: Self = Layered { followed: None };
+
     /// Planes that sample images need beside colour and depth.
     #[must_use]
     pub fn required_planes(self) -> RequiredPlanes {
         match self {
-            LightFieldSearch { .. } | JointCarve { .. } | Mesh | Layered => RequiredPlanes::default(),
+            LightFieldSearch { .. } | JointCarve { .. } | Mesh | Layered { .. } => RequiredPlanes::default(),
             HybridMesh { .. } => CornerPlanes::REQUIRED,
         }
     }
@@ -150,7 +163,7 @@ impl ReconstructionMethod {
             LightFieldSearch { .. } => vec![LightFieldSearch { steps: LADDER_STEPS }],
             Mesh => vec![Mesh],
             // Budgets choose among sets of images.
-            Layered => Vec::new(),
+            Layered { .. } => Vec::new(),
             HybridMesh { .. } => {
                 vec![HybridMesh { merged: ErrorBound::from_px(LADDER_BOUND_PX) }, HybridMesh { merged: None }]
             }
@@ -163,14 +176,20 @@ impl ReconstructionMethod {
         match self {
             LightFieldSearch { steps } => (steps > 1).then_some(LightFieldSearch { steps: steps / 2 }),
             JointCarve { stop_level } if stop_level < MAX_STOP_LEVEL => Some(JointCarve { stop_level: stop_level + 1 }),
-            JointCarve { .. } | Mesh | HybridMesh { .. } | Layered => None,
+            JointCarve { .. } | Mesh | HybridMesh { .. } | Layered { .. } => None,
         }
     }
 
     /// Views come from a layered cube; those of other methods from depth images.
     #[must_use]
     pub fn walks_cube(self) -> bool {
-        matches!(self, Layered)
+        matches!(self, Layered { .. })
+    }
+
+    /// What mirrors show is gathered in a light field, which the set must have.
+    #[must_use]
+    pub fn gathers(self) -> bool {
+        matches!(self, Layered { followed: Some(_) })
     }
 
     /// Rays are followed from where their tiles start; other methods draw.
@@ -192,7 +211,7 @@ impl ReconstructionMethod {
             LightFieldSearch { steps } => light_field_search::record(recording, steps),
             JointCarve { stop_level } => joint_carve::record(recording, stop_level, listed),
             Mesh | HybridMesh { .. } => quads::record(drawing, recording, mesh),
-            Layered => layered::record(recording, bounces),
+            Layered { followed } => layered::record(recording, bounces, followed),
         }
     }
 
@@ -204,7 +223,7 @@ impl ReconstructionMethod {
     ) -> Result<Option<PixelList>, ReconstructionError> {
         match self {
             JointCarve { .. } => joint_carve::smooth::record(recording).map(Some),
-            LightFieldSearch { .. } | Mesh | HybridMesh { .. } | Layered => Ok(None),
+            LightFieldSearch { .. } | Mesh | HybridMesh { .. } | Layered { .. } => Ok(None),
         }
     }
 
@@ -216,7 +235,7 @@ impl ReconstructionMethod {
         turn: Turn,
     ) -> Result<Option<Arc<QuadMesh>>, ReconstructionError> {
         match self {
-            LightFieldSearch { .. } | JointCarve { .. } | Layered => Ok(None),
+            LightFieldSearch { .. } | JointCarve { .. } | Layered { .. } => Ok(None),
             Mesh => mesh::mesh(device, set, turn).map(Some),
             HybridMesh { merged } => hybrid_mesh::mesh(device, set, merged, turn).map(Some),
         }
@@ -227,7 +246,8 @@ impl ReconstructionMethod {
         match self {
             LightFieldSearch { steps } => Some(steps.to_string()),
             JointCarve { stop_level } => (stop_level > 0).then(|| stop_level.to_string()),
-            Mesh | Layered => None,
+            Mesh => None,
+            Layered { followed } => followed.map(|mirrors| mirrors.to_string()),
             HybridMesh { merged } => merged.map(|bound| bound.to_string()),
         }
     }
@@ -289,7 +309,7 @@ mod tests {
             assert_eq!((setting.parse)(&beyond.to_string()), None, "{}:{beyond}", row.name);
             checked += 1;
         }
-        assert_eq!(checked, 3);
+        assert_eq!(checked, 4);
     }
 
     #[test]

@@ -211,7 +211,7 @@ pub fn quads(images: &[DepthImage], method: ReconstructionMethod) -> Option<Vec<
         }
         ReconstructionMethod::LightFieldSearch { .. }
         | ReconstructionMethod::JointCarve { .. }
-        | ReconstructionMethod::Layered => None,
+        | ReconstructionMethod::Layered { .. } => None,
     }
 }
 
@@ -242,7 +242,7 @@ fn pixels_from(cameras: &[SampleCamera], rays: &ViewRays, starts: &[f32], method
                 ReconstructionMethod::Mesh | ReconstructionMethod::HybridMesh { .. } => {
                     unreachable!("meshes are drawn, not searched")
                 }
-                ReconstructionMethod::Layered => unreachable!("it walks through a cube, not through images"),
+                ReconstructionMethod::Layered { .. } => unreachable!("it walks through a cube, not through images"),
             }
         })
         .collect()

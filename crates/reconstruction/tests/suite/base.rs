@@ -97,6 +97,6 @@ fn a_base_without_a_cube_is_refused_and_views_of_a_cube_need_none() {
     let (set, base) = (stage.upload(), cube.upload());
     let refused = view(&set, Some(&set), &camera, (CARVE, ViewPlanes::COLOR)).expect_err("no cube");
     assert_eq!(refused.to_string(), "a base needs a layered cube, which the sample set lacks");
-    let walked = |beside| view(&base, beside, &camera, (ReconstructionMethod::Layered, ViewPlanes::ALL));
+    let walked = |beside| view(&base, beside, &camera, (ReconstructionMethod::LAYERED, ViewPlanes::ALL));
     assert!(walked(None).expect("a view") == walked(Some(&base)).expect("a view"));
 }

@@ -14,7 +14,7 @@ use crate::stage::{
     Agreement, CARVE, Stage, corpus, count, depths, gpu, looking, matt, plainly_lit, reconstructor, renderer,
 };
 
-const LAYERED: ReconstructionMethod = ReconstructionMethod::Layered;
+const LAYERED: ReconstructionMethod = ReconstructionMethod::LAYERED;
 
 pub struct CubeStage {
     pub scene: Scene,
@@ -95,7 +95,7 @@ fn mirrors_show_what_direct_drawing_shows() {
     let set = reconstructor().upload_cube(&grid, &images, &description).expect("a cube");
     let camera = looking(Vec3::new(0.4, 2.0, 6.5), Vec3::Y * 1.2, 40.0, UVec2::new(120, 90));
     let view = |reflections| {
-        let mirrors = Mirrors { cells: &[], reflections };
+        let mirrors = Mirrors { cells: &[], reflections, glossy: false };
         let views =
             reconstructor().reconstruct_with(&set, mirrors, &[camera], LAYERED, ViewPlanes::ALL, Turn::default());
         views.expect("a view").remove(0)

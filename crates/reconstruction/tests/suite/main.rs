@@ -7,6 +7,7 @@ mod batches;
 mod closed_form;
 mod holes_and_limits;
 mod layered;
+mod light_field;
 mod merging;
 mod mesh_limits;
 mod meshes;

@@ -184,7 +184,7 @@ impl<'a> Points<'a> {
 }
 
 /// A permutation of all words (Wellons' `lowbias32`).
-fn mixed(word: u32) -> u32 {
+pub(super) fn mixed(word: u32) -> u32 {
     let a = (word ^ word >> 16).wrapping_mul(0x7feb_352d);
     let b = (a ^ a >> 15).wrapping_mul(0x846c_a68b);
     b ^ b >> 16

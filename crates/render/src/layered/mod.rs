@@ -1,6 +1,7 @@
 //! Layered depth images: all surfaces that the lines of a parallel camera meet, by drawing without a test of depth, and their light.
 
 mod crossings;
+pub(crate) mod light_field;
 mod lit;
 mod selection;
 

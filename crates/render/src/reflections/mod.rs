@@ -5,6 +5,7 @@ pub(crate) mod bounces;
 mod follow;
 mod land;
 pub(crate) mod lobe;
+pub(crate) mod radiance;
 mod spawn;
 
 use std::ops::{Range, RangeInclusive};
@@ -56,19 +57,34 @@ impl Reflections {
         }
         let pixels = |piece: &Piece| (piece.end_row - piece.first_row) * batch.cameras[piece.camera].size_px().x;
         let capacity = pieces.iter().map(pixels).max().unwrap_or(0).max(1);
+        Self::lend_for(gpu, pool, batch, (capacity, batch.bytes(1))).map(Some)
+    }
+
+    /// Memory for so many rays, and for planes of so many bytes.
+    fn lend_for(
+        gpu: &Gpu,
+        pool: &BufferPool,
+        batch: &Batch<'_>,
+        (capacity, plane_bytes): (u32, u64),
+    ) -> Result<Self, RenderError> {
         let lend = |label, bytes| {
             gpu.check_storage_bytes(label, bytes)?;
             Ok::<_, RenderError>(pool.lend_storage(label, bytes))
         };
-        let lobe_bytes = batch.bytes(usize::from(batch.output.glossy)).max(4);
+        let lobe_bytes = if batch.output.glossy { plane_bytes } else { 4 };
         let rays_bytes = size_of::<GpuBounce>() as u64 * u64::from(capacity);
-        Ok(Some(Self {
-            reflected: lend("mirrored light", batch.bytes(3))?,
+        Ok(Self {
+            reflected: lend("mirrored light", 3 * plane_bytes)?,
             bounces: [lend("mirrored rays", rays_bytes)?, lend("mirrored rays", rays_bytes)?],
             lobe_weights: lend("weights of lobes", lobe_bytes)?,
             sums: lend("light of mirrored points", 4 * u64::from(capacity) * batch.output.sums.count() as u64)?,
             capacity,
-        }))
+        })
+    }
+
+    fn memories(&self) -> [&PooledBuffer; 2] {
+        let [first, second] = &self.bounces;
+        [first, second]
     }
 
     /// Records the mirror images of all pictures at one position within their pixels.
@@ -103,38 +119,49 @@ impl Reflections {
         if mirrors > 0 {
             let first = BounceList::new(recording.gpu);
             spawn::record(recording, piece, target, (&self.bounces[0], &first))?;
-            self.record_rays(recording, parts, (first, piece.2), 1..=mirrors)?;
+            self.record_rays(recording, parts, (self.memories(), first, piece.2), 1..=mirrors)?;
         }
         // Costs are learned by generation, and are others than those of rays off mirrors.
         let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + mirrors.max(1);
         for ray in 0..recording.batch.glossy_rays() {
             let first = BounceList::new(recording.gpu);
             lobe::record(recording, (ray, &self.lobe_weights), piece, target, (&self.bounces[0], &first))?;
-            self.record_rays(recording, parts, (first, piece.2), generations.clone())?;
+            self.record_rays(recording, parts, (self.memories(), first, piece.2), generations.clone())?;
         }
         Ok(())
     }
 
-    /// Mirror after mirror: the rays of a list are followed, their ends are lit, and what is seen there is added to the pixels.
+    /// Mirror after mirror: the rays of a list, in the first of two memories, are followed, their ends are lit, and what is seen there
+    /// is added to the pixels.
     fn record_rays(
         &self,
         recording: &mut Recording<'_>,
         parts: &[Part],
-        (mut list, units): (BounceList, u64),
+        ([mut from, mut to], mut list, units): ([&PooledBuffer; 2], BounceList, u64),
         generations: RangeInclusive<u32>,
     ) -> Result<(), RenderError> {
-        let [mut from, mut to] = [&self.bounces[0], &self.bounces[1]];
         for generation in generations.clone() {
             let rays = Rays { bounces: from, list: &list, units, generation };
             follow::record(recording, rays)?;
-            illuminate::record_points(recording, parts, rays, &self.sums)?;
-            let next = BounceList::new(recording.gpu);
-            let onward = (generation < *generations.end()).then_some((&**to, &next));
-            land::record(recording, [&parts[0].cameras, &self.sums, &self.reflected], rays, onward)?;
-            list = next;
+            list = self.record_ends(recording, parts, rays, (generation < *generations.end()).then_some(to))?;
             std::mem::swap(&mut from, &mut to);
         }
         Ok(())
+    }
+
+    /// Lights the ends of rays, and adds what they send to the pixels. Gives the rays off mirrors among them, if they are to be followed.
+    fn record_ends(
+        &self,
+        recording: &mut Recording<'_>,
+        parts: &[Part],
+        ends: Rays<'_>,
+        onward: Option<&PooledBuffer>,
+    ) -> Result<BounceList, RenderError> {
+        illuminate::record_points(recording, parts, ends, &self.sums)?;
+        let next = BounceList::new(recording.gpu);
+        let onward = onward.map(|memory| (&**memory, &next));
+        land::record(recording, [&parts[0].cameras, &self.sums, &self.reflected], ends, onward)?;
+        Ok(next)
     }
 }
 

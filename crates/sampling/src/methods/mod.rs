@@ -8,12 +8,15 @@ pub(crate) mod layered_cube;
 pub(crate) mod non_redundant;
 pub(crate) mod useful;
 
-use depth_image::{Aabb, Antialias, Camera, CameraError, CubeGrid, NamedMethod, PinholeCamera, Setting, named_methods};
+use depth_image::{
+    Aabb, Antialias, Camera, CameraError, CubeGrid, LightFieldCamera, NamedMethod, PinholeCamera, Setting,
+    named_methods,
+};
 use gpu::{ShaderError, Templates};
 use render::{LayerSelection, RedundancyTest};
 
 use crate::error::SamplingError;
-pub use layered_cube::LayeredCube;
+pub use layered_cube::{LayeredCube, LightFieldSize};
 pub use non_redundant::Redundancy;
 
 /// The choice of samples of a scene.
@@ -76,7 +79,8 @@ pub const METHODS: [NamedMethod<SamplingMethod>; 5] = [
         name: "layered_cube",
         method: Cube(LayeredCube::DEFAULT),
         setting: Some(Setting { form: layered_cube::FORM, parse: |text| layered_cube::parse(text).map(Cube) }),
-        help: "takes all surfaces on the lines of a cube, for viewers anywhere; 512 lines along its longest side by default",
+        help: "takes all surfaces on the lines of a cube, for viewers anywhere; 512 lines along its longest side by default; a light \
+               field of N directions (66, 258 or 1026), of PX by PX lines each (64 by default), shows glossy surfaces what is around",
     },
 ];
 
@@ -146,6 +150,17 @@ impl SamplingMethod {
         match self {
             Cube(cube) => CubeGrid::around(bounds, cube.side).map(Some),
             Conventional(_) | NonRedundant(_) | Useful(_) | DepthPeeling { .. } => Ok(None),
+        }
+    }
+
+    /// The lines of a light field of a scene within these bounds; `None` without one.
+    #[must_use]
+    pub fn light_field(self, bounds: &Aabb) -> Option<LightFieldCamera> {
+        match self {
+            Cube(LayeredCube { light_field: Some(LightFieldSize { directions, side_px }), .. }) => {
+                Some(LightFieldCamera::around(*bounds, directions, side_px))
+            }
+            Cube(_) | Conventional(_) | NonRedundant(_) | Useful(_) | DepthPeeling { .. } => None,
         }
     }
 

@@ -1,7 +1,9 @@
 //! Cameras and bounds.
 
 use cluster::InvalidField;
-use depth_image::{Aabb, Camera, ParallelCamera, PinholeCamera, SampleCamera, SinglePoleCamera};
+use depth_image::{
+    Aabb, Camera, LightDirections, LightFieldCamera, ParallelCamera, PinholeCamera, SampleCamera, SinglePoleCamera,
+};
 use glam::{Quat, UVec2, Vec2, Vec3};
 
 use super::{Convert, required};
@@ -92,8 +94,8 @@ impl Convert<proto::Camera> for Camera {
     fn read(camera: proto::Camera, _: &'static str) -> Result<Self, WireError> {
         match SampleCamera::read(camera, "camera")? {
             SampleCamera::Depth(camera) => Ok(camera),
-            SampleCamera::Layered(_) => {
-                Err(InvalidField::out_of_range("camera.model", "parallel", "pinhole or single_pole").into())
+            other @ (SampleCamera::Layered(_) | SampleCamera::LightField(_)) => {
+                Err(InvalidField::out_of_range("camera.model", other.model_name(), "pinhole or single_pole").into())
             }
         }
     }
@@ -111,6 +113,7 @@ impl Convert<proto::Camera> for SampleCamera {
                 Camera::SinglePole(SinglePoleCamera::read(camera, "camera.single_pole")?).into()
             }
             Model::Parallel(camera) => ParallelCamera::read(camera, "camera.parallel")?.into(),
+            Model::LightField(camera) => LightFieldCamera::read(camera, "camera.light_field")?.into(),
         })
     }
 
@@ -119,6 +122,7 @@ impl Convert<proto::Camera> for SampleCamera {
             Self::Depth(Camera::Pinhole(camera)) => Model::Pinhole(camera.write()),
             Self::Depth(Camera::SinglePole(camera)) => Model::SinglePole(camera.write()),
             Self::Layered(camera) => Model::Parallel(camera.write()),
+            Self::LightField(camera) => Model::LightField(camera.write()),
         };
         proto::Camera { model: Some(model) }
     }
@@ -151,6 +155,31 @@ impl Convert<proto::ParallelCamera> for ParallelCamera {
     }
 }
 
+impl Convert<proto::LightFieldCamera> for LightFieldCamera {
+    fn read(camera: proto::LightFieldCamera, field: &'static str) -> Result<Self, WireError> {
+        let refused = |source| InvalidField::Camera { field, source };
+        let camera = Self {
+            bounds: Aabb::read(camera.bounds, "camera.light_field.bounds")?,
+            directions: LightDirections::of(camera.direction_count).map_err(refused)?,
+            side_px: camera.side_px,
+            first_pair: camera.first_pair,
+            pairs: camera.pair_count,
+        };
+        camera.validate().map_err(refused)?;
+        Ok(camera)
+    }
+
+    fn write(self) -> proto::LightFieldCamera {
+        proto::LightFieldCamera {
+            bounds: self.bounds.write(),
+            direction_count: self.directions.count(),
+            side_px: self.side_px,
+            first_pair: self.first_pair,
+            pair_count: self.pairs,
+        }
+    }
+}
+
 fn quaternion(q: Quat) -> proto::Quaternion {
     proto::Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }
 }
@@ -160,6 +189,23 @@ mod tests {
     use depth_image::CubeGrid;
 
     use super::*;
+
+    #[test]
+    fn cameras_of_light_fields_survive_and_others_are_refused() {
+        let bounds = Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE };
+        let camera = SampleCamera::from(LightFieldCamera::around(bounds, LightDirections::D258, 64));
+        for camera in [camera, camera.tile(1, 4)] {
+            assert_eq!(SampleCamera::read(camera.write(), "camera"), Ok(camera));
+        }
+        let own = camera.light_field().copied().expect("a light field").write();
+        let refused = |camera: proto::LightFieldCamera| {
+            LightFieldCamera::read(camera, "camera.light_field").expect_err("a fault").to_string()
+        };
+        assert!(refused(proto::LightFieldCamera { direction_count: 100, ..own }).contains("directions"));
+        assert!(refused(proto::LightFieldCamera { side_px: 91, ..own }).contains("side_px"));
+        assert!(refused(proto::LightFieldCamera { pair_count: u32::MAX, ..own }).contains("pairs"));
+        assert!(refused(proto::LightFieldCamera { bounds: None, ..own }).contains("camera.light_field"));
+    }
 
     fn camera() -> SinglePoleCamera {
         let bounds = Aabb { min: Vec3::splat(-1.0), max: Vec3::ONE };

@@ -1,0 +1,96 @@
+// Light that comes to a surface from around the way of a mirrored ray, gathered from the directions of a layered light field
+// (Lischinski §4.2).
+
+struct LightField {
+    directions: u32,
+    // Lines along each side of a direction's square.
+    side_px: u32,
+    // Of the lobe at mirrors, around the mirrored ray.
+    exponent: f32,
+    // Narrower lobes are as wide as this one: they hold three directions.
+    least_alpha: f32,
+}
+
+@group(0) var<uniform> light_field: LightField;
+// Four texels a direction: where light goes and its solid angle; rows that take (point_in_world, 1) to the column and the row among the
+// lines, and to the depth behind which samples send light to the point.
+@group(0) var light_directions: texture_2d<u32>;
+// The first sample of a line, and the one after its last.
+@group(0) var light_lines: texture_2d<u32>;
+// Depth and radiance.
+@group(0) var light_samples: texture_2d<u32>;
+
+// Directions that a lobe takes less of than this, beside the mirrored one, do not count.
+const LEAST_LOBE_SHARE: f32 = 0.01;
+
+fn light_texel(direction: u32, texel: u32) -> vec4f {
+    return bitcast<vec4f>(textureLoad(light_directions, texel_at(4u * direction + texel), 0));
+}
+
+// How much a surface reflects of the light from a direction, beside that from the mirrored one.
+fn lobe_share(mirror: Mirror, mirrored: vec3f, towards_light: vec3f) -> f32 {
+    let n_l = dot(mirror.normal, towards_light);
+    if n_l <= 0.0 { return 0.0; }
+    if mirror.reflector.roughness < ROUGHEST_MIXED { return pow(max(dot(mirrored, towards_light), 0.0), light_field.exponent); }
+    let alpha = max(ggx_alpha(mirror.reflector.roughness), light_field.least_alpha);
+    let half_way = unit_or_zero(towards_light + mirror.towards_eye);
+    let n_v = max(dot(mirror.normal, mirror.towards_eye), LEAST_COSINE);
+    let lobe = ggx_distribution(mirror.normal, half_way, alpha) * ggx_visibility(n_l, n_v, alpha) * n_l;
+    return lobe * alpha * alpha / max(ggx_visibility(n_v, n_v, alpha) * n_v, 1e-12);
+}
+
+// The light of the first surface on a line behind a depth, or of what is around the scene.
+fn light_on_line(line: u32, depth_m: f32, around: vec3f) -> vec3f {
+{% if count_fetches %}    fetches += 1u;
+{% endif %}
+    let ends = textureLoad(light_lines, texel_at(line), 0).xy;
+    var found = false;
+    var light = around;
+    for (var sample = ends.x; sample < ends.y && !found; sample++) {
+{% if count_fetches %}        fetches += 1u;
+{% endif %}
+        let words = textureLoad(light_samples, texel_at(sample), 0);
+        found = bitcast<f32>(words.x) >= depth_m;
+        light = select(light, linear_from_rgb9e5(words.y), found);
+    }
+    return light;
+}
+
+// The light that goes in a direction through a point: between the four lines around it.
+fn light_through(direction: u32, towards: vec3f, point_in_world: vec3f) -> vec3f {
+{% if count_fetches %}    fetches += 3u;
+{% endif %}
+    let p = vec4f(point_in_world, 1.0);
+    let place = vec2f(dot(light_texel(direction, 1u), p), dot(light_texel(direction, 2u), p)) - 0.5;
+    let depth_m = dot(light_texel(direction, 3u), p);
+    let last = f32(light_field.side_px - 1u);
+    let first = clamp(floor(place), vec2f(0.0), vec2f(last - 1.0));
+    let share = clamp(place - first, vec2f(0.0), vec2f(1.0));
+    let around = environment_mirrored(-towards, LEAST_ROUGHNESS);
+    let line = (direction * light_field.side_px + u32(first.y)) * light_field.side_px + u32(first.x);
+    var light = vec3f(0.0);
+    for (var corner = 0u; corner < 4u; corner++) {
+        let step = vec2u(corner & 1u, corner >> 1u);
+        let weights = select(1.0 - share, share, step == vec2u(1u));
+        light += light_on_line(line + step.x + step.y * light_field.side_px, depth_m, around) * (weights.x * weights.y);
+    }
+    return light;
+}
+
+// The mean light of a lobe.
+fn gathered_light(mirror: Mirror) -> vec3f {
+    let mirrored = reflect(-mirror.towards_eye, mirror.normal);
+    var light = vec3f(0.0);
+    var sum = 0.0;
+    for (var direction = 0u; direction < light_field.directions; direction++) {
+{% if count_fetches %}        fetches += 1u;
+{% endif %}
+        let own = light_texel(direction, 0u);
+        let share = lobe_share(mirror, mirrored, -own.xyz);
+        for (var counts = share > LEAST_LOBE_SHARE; counts; counts = false) {
+            light += light_through(direction, own.xyz, mirror.point_in_world) * (share * own.w);
+            sum += share * own.w;
+        }
+    }
+    return light / max(sum, 1e-12);
+}

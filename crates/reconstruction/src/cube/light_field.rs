@@ -1,0 +1,112 @@
+//! A layered light field on the device, in which the light that comes to a surface is gathered.
+
+use bytemuck::{Pod, Zeroable};
+use depth_image::{LayeredLightField, LightDirection, LightDirections, LightFieldCamera};
+use glam::Vec4;
+use gpu::{Binding, Table, TablePool, Turn};
+use wgpu::{BufferUsages, TextureFormat};
+
+use crate::error::ReconstructionError;
+
+/// Light comes from samples that are at least so many spacings of the lines away: nearer ones may be of the surface itself.
+const NEAREST_SPACINGS: f32 = 0.5;
+
+/// The lobe with which mirrors are gathered: the exponent of the cosine to the mirrored ray. With 258 directions it is that of
+/// Lischinski's figure 3; a narrower lobe than each of these may hold fewer than three directions.
+fn mirror_exponent(directions: LightDirections) -> f32 {
+    match directions {
+        LightDirections::D66 => 12.0,
+        LightDirections::D258 => 40.0,
+        LightDirections::D1026 => 160.0,
+    }
+}
+
+/// The width of a microfacet lobe that is as wide as one of an exponent around the mirrored ray: a half-way vector turns by half as much.
+fn alpha_of(exponent: f32) -> f32 {
+    (2.0 / (4.0 * exponent + 2.0)).sqrt()
+}
+
+/// `LightField` of `cube/gather.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuLightField {
+    pub directions: u32,
+    pub side_px: u32,
+    pub exponent: f32,
+    pub least_alpha: f32,
+}
+
+impl GpuLightField {
+    pub fn of(camera: &LightFieldCamera) -> Self {
+        let exponent = mirror_exponent(camera.directions);
+        Self {
+            directions: camera.directions.count(),
+            side_px: camera.side_px,
+            exponent,
+            least_alpha: alpha_of(exponent),
+        }
+    }
+}
+
+/// A light field, ready to be gathered in.
+pub(crate) struct LightField {
+    own: wgpu::Buffer,
+    directions: Table,
+    lines: Table,
+    samples: Table,
+}
+
+impl LightField {
+    /// Fails for a part of a light field, damaged samples, and beyond the device's limits.
+    pub fn upload(tables: &TablePool, field: &LayeredLightField, turn: Turn) -> Result<Self, ReconstructionError> {
+        let wrong = |reason: String| ReconstructionError::LightField { reason };
+        field.validate().map_err(|error| wrong(error.to_string()))?;
+        if field.camera.pairs != field.camera.directions.pairs() {
+            return Err(wrong(format!("{} of {} pairs", field.camera.pairs, field.camera.directions.pairs())));
+        }
+        tables.gpu.check_table("lines of a light field", field.first.len())?;
+        tables.gpu.check_table("samples of a light field", field.sample_count())?;
+        let directions: Vec<[u32; 4]> = field
+            .camera
+            .directions
+            .all()
+            .iter()
+            .flat_map(|direction| direction_rows(&field.camera, direction))
+            .collect();
+        let lines: Vec<[u32; 2]> = field.first.windows(2).map(|ends| [ends[0], ends[1]]).collect();
+        let samples = field.planar_depth_m.iter().zip(&field.radiance_rgb9e5);
+        let mut samples: Vec<[u32; 2]> = samples.map(|(depth_m, &radiance)| [depth_m.to_bits(), radiance]).collect();
+        // A table has one texel at least.
+        samples.resize(samples.len().max(1), [0; 2]);
+        Ok(Self {
+            own: tables.gpu.buffer_with("light field", &[GpuLightField::of(&field.camera)], BufferUsages::UNIFORM),
+            directions: tables.upload("directions of a light field", TextureFormat::Rgba32Uint, &directions, turn)?,
+            lines: tables.upload("lines of a light field", TextureFormat::Rg32Uint, &lines, turn)?,
+            samples: tables.upload("samples of a light field", TextureFormat::Rg32Uint, &samples, turn)?,
+        })
+    }
+
+    /// The resources of `cube/gather.wgsl`.
+    pub fn bindings(&self) -> [Binding<'_>; 4] {
+        [
+            Binding::buffer("light_field", &self.own),
+            Binding::texture("light_directions", &self.directions),
+            Binding::texture("light_lines", &self.lines),
+            Binding::texture("light_samples", &self.samples),
+        ]
+    }
+}
+
+/// Texels of `light_directions`.
+fn direction_rows(camera: &LightFieldCamera, direction: &LightDirection) -> [[u32; 4]; 4] {
+    let lines = camera.lines(direction.towards);
+    let [right, down, forward] = lines.axes_in_world();
+    let row = |axis: glam::Vec3, offset: f32| axis.extend(offset - axis.dot(lines.corner_in_world));
+    let rows: [Vec4; 4] = [
+        direction.towards.extend(direction.solid_angle_sr),
+        row(right / lines.spacing_m, 0.0),
+        row(down / lines.spacing_m, 0.0),
+        row(forward, NEAREST_SPACINGS * lines.spacing_m),
+    ];
+    rows.map(|row| row.to_array().map(f32::to_bits))
+}

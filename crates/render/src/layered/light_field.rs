@@ -1,0 +1,107 @@
+//! Layered light fields: the light of all surfaces on the lines of many directions, towards each.
+
+use bytemuck::Zeroable;
+use depth_image::{
+    Highlight, LayeredLightField, LightFieldCamera, ParallelCamera, PixelDepth, oct8_from_oct16, rgb9e5_from_linear,
+    unit_from_oct8,
+};
+use glam::{UVec2, Vec3};
+
+use super::crossings::{self, Crossing};
+use super::lit::{BIAS_FOOTPRINTS, BIAS_ROUNDINGS, mixed};
+use super::selection::LayerSelection;
+use crate::reflections::{bounces::GpuBounce, radiance::RadianceWork};
+use crate::{RenderError, stages::Stages, work::DrawWork};
+
+/// A ray off a mirror meets nothing nearer than this share of the lines' spacing.
+const NEAR_SPACINGS: f32 = 0.1;
+
+/// The light field of a scene whose lighting follows mirrors. One draw finds the surfaces of two opposite directions: each is a sample of
+/// the one that it faces. There are none where no mirrors are followed.
+pub(crate) fn draw(
+    stages: &Stages,
+    work: DrawWork<'_>,
+    camera: &LightFieldCamera,
+) -> Result<LayeredLightField, RenderError> {
+    let mut first = vec![0];
+    let (mut planar_depth_m, mut truncated) = (Vec::new(), false);
+    if work.highlight() != Some(Highlight::Ggx) || work.lighting.without_reflections().is_none() {
+        first.resize(camera.line_count() + 1, 0);
+        return Ok(LayeredLightField {
+            camera: *camera,
+            first,
+            planar_depth_m,
+            radiance_rgb9e5: Vec::new(),
+            truncated,
+        });
+    }
+    let mut light = RadianceWork::of(stages, work)?;
+    let directions = camera.directions.all();
+    for pair in directions.chunks(2).skip(camera.first_pair as usize).take(camera.pairs as usize) {
+        let lines = camera.lines(pair[0].towards);
+        let (first_of_line, crossings, more) = crossings::met(stages, &work, &lines, LayerSelection::All)?;
+        truncated |= more;
+        for (is_opposite, direction) in [false, true].into_iter().zip(pair) {
+            let pair = Pair { lines: &lines, first: &first_of_line, crossings: &crossings, is_opposite };
+            for line in 0..lines.pixel_count() {
+                let facing = pair.facing(line, direction.towards);
+                planar_depth_m.extend(facing.iter().map(|crossing| pair.depth_m(crossing)));
+                first.push(planar_depth_m.len() as u32);
+                light.add(facing.into_iter().map(|crossing| point(&lines, crossing, direction.towards)))?;
+            }
+        }
+    }
+    let radiance_rgb9e5 = light.finish()?.into_iter().map(rgb9e5_from_linear).collect();
+    Ok(LayeredLightField { camera: *camera, first, planar_depth_m, radiance_rgb9e5, truncated })
+}
+
+/// The surfaces on the lines of two opposite directions, as one of the two counts them.
+struct Pair<'a> {
+    /// Of the first direction.
+    lines: &'a ParallelCamera,
+    first: &'a [u32],
+    crossings: &'a [Crossing],
+    /// Counts columns and depths from their other ends.
+    is_opposite: bool,
+}
+
+impl<'a> Pair<'a> {
+    /// The surfaces on a line that face a direction, by rising depth.
+    fn facing(&self, line: usize, towards: Vec3) -> Vec<&'a Crossing> {
+        let columns = self.lines.size_px.x as usize;
+        let (row, column) = (line / columns, line % columns);
+        let line = if self.is_opposite { row * columns + (columns - 1 - column) } else { line };
+        let on_line = &self.crossings[self.first[line] as usize..self.first[line + 1] as usize];
+        let normal = |crossing: &Crossing| unit_from_oct8(oct8_from_oct16(crossing.plane_normal_oct16));
+        let faces = |crossing: &&Crossing| normal(crossing).dot(towards) > 0.0;
+        let mut facing: Vec<&Crossing> = on_line.iter().filter(faces).collect();
+        if self.is_opposite {
+            facing.reverse();
+        }
+        facing
+    }
+
+    fn depth_m(&self, crossing: &Crossing) -> f32 {
+        let depth_m = crossing.planar_depth_m;
+        if self.is_opposite { self.lines.range_m - depth_m } else { depth_m }
+    }
+}
+
+/// A surface as a point that is seen from where its light goes.
+fn point(lines: &ParallelCamera, crossing: &Crossing, towards: Vec3) -> GpuBounce {
+    let columns = lines.size_px.x;
+    let pixel = UVec2::new(crossing.line % columns, crossing.line / columns).as_vec2() + 0.5;
+    let point = lines.unproject(PixelDepth { pixel, planar_depth_m: crossing.planar_depth_m });
+    let place = (point / lines.spacing_m * 16.0).round().as_ivec3().to_array();
+    GpuBounce {
+        point_in_world: point.to_array(),
+        direction: (-towards).to_array(),
+        // Of the point's place: tiles have the noise of the whole.
+        seed: place.into_iter().fold(1, |seed, along| mixed(seed ^ along as u32)),
+        side_m: lines.spacing_m,
+        near_m: NEAR_SPACINGS * lines.spacing_m,
+        surface: crossing.surface,
+        bias_m: BIAS_FOOTPRINTS * lines.spacing_m + BIAS_ROUNDINGS * point.abs().max_element(),
+        ..GpuBounce::zeroed()
+    }
+}

@@ -1,0 +1,93 @@
+//! The light that listed surfaces send towards one direction each, with what their mirrors show.
+
+use depth_image::ToneMapping;
+use glam::Vec3;
+use gpu::Frame;
+
+use super::Reflections;
+use super::bounces::{BounceList, GpuBounce, Rays};
+use crate::accumulation::Sums;
+use crate::batch::{Batch, Recording};
+use crate::pieces::Pieces;
+use crate::planes::Output;
+use crate::{RenderError, stages::Stages, work::DrawWork};
+
+/// Surfaces that are lit together: bounds their memory.
+const POINTS_A_LIST: usize = 1 << 17;
+
+/// Surfaces to be lit, as the ends of rays that come from where their light goes.
+pub(crate) struct RadianceWork<'a> {
+    stages: &'a Stages,
+    batch: Batch<'a>,
+    points: Vec<GpuBounce>,
+    /// Linear radiance of the points before.
+    lit: Vec<Vec3>,
+}
+
+impl<'a> RadianceWork<'a> {
+    /// No surfaces as yet. The lighting has shadows.
+    pub fn of(stages: &'a Stages, work: DrawWork<'a>) -> Result<Self, RenderError> {
+        let batch = Batch {
+            work,
+            cameras: &[],
+            by_rays: false,
+            traced: Some(work.scene.rays.at(work.scene_time_s)?),
+            output: Output { mirrors: true, ..Output::of(work, true) },
+            tone: ToneMapping::NONE,
+            sequence: None,
+            position: 0,
+        };
+        Ok(Self { stages, batch, points: Vec::new(), lit: Vec::new() })
+    }
+
+    /// Adds surfaces; lights those that are listed once there are enough of them.
+    pub fn add(&mut self, points: impl Iterator<Item = GpuBounce>) -> Result<(), RenderError> {
+        for point in points {
+            let place = self.points.len() as u32;
+            self.points.push(GpuBounce { place, throughput_linear: [1.0; 3], met: 1, ..point });
+            if self.points.len() == POINTS_A_LIST {
+                self.light()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The radiance of all surfaces, in the order in which they were added.
+    pub fn finish(mut self) -> Result<Vec<Vec3>, RenderError> {
+        if !self.points.is_empty() {
+            self.light()?;
+        }
+        Ok(self.lit)
+    }
+
+    fn light(&mut self) -> Result<(), RenderError> {
+        let Self { stages: Stages { gpu, pool, passes, batches, .. }, batch, points, lit } = self;
+        let count = points.len() as u32;
+        let plane_bytes = 4 * u64::from(count);
+        let work = batch.work;
+        let _one = batches.begin(work.turn.class);
+        let memory = Reflections::lend_for(gpu, pool, batch, (count, plane_bytes))?;
+        gpu.queue.write_buffer(&memory.bounces[0], 0, bytemuck::cast_slice(points));
+        let rays = [work.lighting.shadow_rays(), work.lighting.occlusion_rays()];
+        let rays = rays.map(|rays| 0..work.refinement.share_of(rays));
+        let parts = batch.parts_of_points(gpu, &rays, count);
+        let (pieces, cameras) = (Pieces { all: Vec::new() }, parts[0].cameras.clone());
+        let sums = Sums { buffer: pool.lend_storage("no sums", 4), rays };
+        let frame = Frame::begin(gpu, "light of a light field", work.turn);
+        let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, visit_counts: None, frame };
+        recording.frame.encoder.clear_buffer(&memory.reflected, 0, None);
+        let (list, units, mirrors) = (BounceList::of(gpu, count), u64::from(count), work.lighting.reflections());
+        let ends = Rays { bounces: &memory.bounces[0], list: &list, units, generation: 0 };
+        let [first, second] = memory.memories();
+        let next = memory.record_ends(&mut recording, &parts, ends, (mirrors > 0).then_some(second))?;
+        memory.record_rays(&mut recording, &parts, ([second, first], next, units), 1..=mirrors)?;
+        let mut frame = recording.frame;
+        let read = frame.read_back(&memory.reflected, 0..3 * plane_bytes, pool.lend_host("radiance", 3 * plane_bytes));
+        let result = frame.submit()?.wait()?;
+        result.with(read, |linear: &[f32]| {
+            lit.extend(linear.chunks_exact(3).take(points.len()).map(Vec3::from_slice));
+        })?;
+        points.clear();
+        Ok(())
+    }
+}
