@@ -22,6 +22,8 @@ struct LightField {
 
 // Directions that a lobe takes less of than this, beside the mirrored one, do not count.
 const LEAST_LOBE_SHARE: f32 = 0.01;
+// How much of a direction's own width its lines are taken from.
+const FOOTPRINT_SHARE: f32 = 0.8;
 
 fn light_texel(direction: u32, texel: u32) -> vec4f {
     return bitcast<vec4f>(textureLoad(light_directions, texel_at(4u * direction + texel), 0));
@@ -39,47 +41,72 @@ fn lobe_share(mirror: Mirror, mirrored: vec3f, towards_light: vec3f) -> f32 {
     return lobe * alpha * alpha / max(ggx_visibility(n_v, n_v, alpha) * n_v, 1e-12);
 }
 
-// The light of the first surface on a line behind a depth, or of what is around the scene.
-fn light_on_line(line: u32, depth_m: f32, around: vec3f) -> vec3f {
+// The light of the first surface on a line behind a depth, and how far behind; or what is around the scene, at no distance.
+fn light_on_line(line: u32, depth_m: f32, around: vec3f) -> vec4f {
 {% if count_fetches %}    fetches += 1u;
 {% endif %}
     let ends = textureLoad(light_lines, texel_at(line), 0).xy;
     var found = false;
-    var light = around;
+    var light = vec4f(around, 0.0);
     for (var sample = ends.x; sample < ends.y && !found; sample++) {
 {% if count_fetches %}        fetches += 1u;
 {% endif %}
         let words = textureLoad(light_samples, texel_at(sample), 0);
-        found = bitcast<f32>(words.x) >= depth_m;
-        light = select(light, linear_from_rgb9e5(words.y), found);
+        let behind_m = bitcast<f32>(words.x) - depth_m;
+        found = behind_m >= 0.0;
+        light = select(light, vec4f(linear_from_rgb9e5(words.y), behind_m), found);
     }
     return light;
 }
 
-// The light that goes in a direction through a point: between the four lines around it.
-fn light_through(direction: u32, towards: vec3f, point_in_world: vec3f) -> vec3f {
+// The line of a direction whose square holds a place, or the nearest to it.
+fn line_at(direction: u32, place: vec2f) -> u32 {
+    let at = vec2u(clamp(place, vec2f(0.0), vec2f(f32(light_field.side_px - 1u))));
+    return (direction * light_field.side_px + at.y) * light_field.side_px + at.x;
+}
+
+// The same light between the four lines around a place.
+fn light_between_lines(direction: u32, place: vec2f, depth_m: f32, around: vec3f) -> vec3f {
+    let first = floor(place - 0.5);
+    let share = place - 0.5 - first;
+    var light = vec3f(0.0);
+    for (var corner = 0u; corner < 4u; corner++) {
+        let step = vec2f(vec2u(corner & 1u, corner >> 1u));
+        let weights = select(1.0 - share, share, step == vec2f(1.0));
+        light += light_on_line(line_at(direction, first + step), depth_m, around).rgb * (weights.x * weights.y);
+    }
+    return light;
+}
+
+// The light that comes to a point from around a direction; `towards` has the direction and its solid angle.
+fn light_through(direction: u32, towards: vec4f, point_in_world: vec3f, is_rough: bool) -> vec3f {
 {% if count_fetches %}    fetches += 3u;
 {% endif %}
     let p = vec4f(point_in_world, 1.0);
-    let place = vec2f(dot(light_texel(direction, 1u), p), dot(light_texel(direction, 2u), p)) - 0.5;
+    let column = light_texel(direction, 1u);
+    let place = vec2f(dot(column, p), dot(light_texel(direction, 2u), p));
     let depth_m = dot(light_texel(direction, 3u), p);
-    let last = f32(light_field.side_px - 1u);
-    let first = clamp(floor(place), vec2f(0.0), vec2f(last - 1.0));
-    let share = clamp(place - first, vec2f(0.0), vec2f(1.0));
-    let around = environment_mirrored(-towards, LEAST_ROUGHNESS);
-    let line = (direction * light_field.side_px + u32(first.y)) * light_field.side_px + u32(first.x);
-    var light = vec3f(0.0);
-    for (var corner = 0u; corner < 4u; corner++) {
-        let step = vec2u(corner & 1u, corner >> 1u);
-        let weights = select(1.0 - share, share, step == vec2u(1u));
-        light += light_on_line(line + step.x + step.y * light_field.side_px, depth_m, around) * (weights.x * weights.y);
+    let around = environment_mirrored(-towards.xyz, LEAST_ROUGHNESS);
+    // A direction stands for all within its solid angle: they see more of a surface the farther it is. Without that a wide lobe shows
+    // as many separate images of it as it holds directions.
+    var width_px = 0.0;
+    for (var wide = is_rough; wide; wide = false) {
+        let behind_m = light_on_line(line_at(direction, place), depth_m, around).w;
+        width_px = FOOTPRINT_SHARE * behind_m * sqrt(towards.w) * length(column.xyz);
     }
-    return light;
+    let places = select(1u, 4u, is_rough);
+    var light = vec3f(0.0);
+    for (var i = 0u; i < places; i++) {
+        let offset = vec2f(vec2u(i & 1u, i >> 1u)) - 0.5;
+        light += light_between_lines(direction, place + offset * width_px, depth_m, around);
+    }
+    return light / f32(places);
 }
 
 // The mean light of a lobe.
 fn gathered_light(mirror: Mirror) -> vec3f {
     let mirrored = reflect(-mirror.towards_eye, mirror.normal);
+    let is_rough = mirror.reflector.roughness >= ROUGHEST_MIXED;
     var light = vec3f(0.0);
     var sum = 0.0;
     for (var direction = 0u; direction < light_field.directions; direction++) {
@@ -88,7 +115,7 @@ fn gathered_light(mirror: Mirror) -> vec3f {
         let own = light_texel(direction, 0u);
         let share = lobe_share(mirror, mirrored, -own.xyz);
         for (var counts = share > LEAST_LOBE_SHARE; counts; counts = false) {
-            light += light_through(direction, own.xyz, mirror.point_in_world) * (share * own.w);
+            light += light_through(direction, own, mirror.point_in_world, is_rough) * (share * own.w);
             sum += share * own.w;
         }
     }

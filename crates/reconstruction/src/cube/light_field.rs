@@ -15,9 +15,9 @@ const NEAREST_SPACINGS: f32 = 0.5;
 /// Lischinski's figure 3; a narrower lobe than each of these may hold fewer than three directions.
 fn mirror_exponent(directions: LightDirections) -> f32 {
     match directions {
-        LightDirections::D66 => 12.0,
-        LightDirections::D258 => 40.0,
-        LightDirections::D1026 => 160.0,
+        LightDirections::D66 => 30.0,
+        LightDirections::D258 => 120.0,
+        LightDirections::D1026 => 480.0,
     }
 }
 

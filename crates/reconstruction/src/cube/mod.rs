@@ -15,7 +15,7 @@ use wgpu::{BufferUsages, TextureFormat};
 #[cfg(feature = "scalar")]
 pub(crate) use bricks::LEAST_NORMAL_ALONG_LINE;
 pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, SQUARE_REACH};
-#[cfg(test)]
+#[cfg(any(test, feature = "scalar"))]
 pub(crate) use light_field::GpuLightField;
 pub(crate) use light_field::LightField;
 pub(crate) use links::links;

@@ -7,6 +7,7 @@ mod curved_search;
 mod draw;
 mod fill;
 mod follow;
+mod gather;
 mod hybrid_mesh;
 mod joint_carve;
 mod layered;
@@ -24,6 +25,7 @@ mod view_ray;
 
 pub use self::curved_search::SinglePoleImages;
 pub use self::follow::PinholeImages;
+pub use self::gather::{Reflecting, gathered_light};
 pub use self::layered::CubeTwin;
 pub use self::mips::ColorMips;
 use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};

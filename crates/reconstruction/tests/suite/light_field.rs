@@ -1,20 +1,18 @@
 //! What mirrors and rough surfaces show, gathered in layered light fields.
 
-use std::time::Instant;
-
 use depth_image::{
-    CubeGrid, CubeImages, Highlight, LayeredLightField, LightDirections, LightFieldCamera, PinholeCamera, View,
-    ViewPlanes,
+    CubeGrid, CubeImages, Environment, LayeredLightField, LightDirections, LightFieldCamera, PinholeCamera, Reflector,
+    View, ViewPlanes, environment_reflectance_linear, linear_from_srgb8, srgb8_from_linear,
 };
 use glam::{UVec2, Vec3};
 use gpu::Turn;
-use metrics::{Rgb8Image, psnr_db};
-use reconstruction::{Mirrors, ReconstructionError, ReconstructionMethod, SampleSet, SetDescription};
+use reconstruction::scalar::{Reflecting, gathered_light};
+use reconstruction::{Mirrors, ReconstructionError, ReconstructionMethod, SampleSet};
 use render::{DrawWork, GpuScene, LayerSelection};
-use scene::Scene;
-use scene::procedural::mirror_box;
+use scene::procedural::{mirror_box, teapot_floor};
+use scene::{Material, Scene};
 
-use crate::stage::{gpu, looking, matt, plainly_lit, reconstructor, renderer};
+use crate::stage::{depths, description, gpu, looking, plainly_lit, psnr_db, reconstructor, renderer};
 
 const SIDE: u32 = 192;
 
@@ -53,25 +51,14 @@ impl Gathering {
             let camera = self.grid.camera(axis);
             renderer().draw_layers(self.lit("shadows"), &camera, LayerSelection::Dominant).expect("layers")
         };
-        let description = SetDescription {
-            illumination: &self.scene.illumination,
-            highlight: Some(Highlight::Ggx),
-            ..matt(self.scene.bounds(), self.scene.background)
-        };
         let cube = CubeImages { grid: self.grid, images: [image(0), image(1), image(2)], light_field };
-        reconstructor().upload_cube_in_turn(&cube, &description, Turn::default()).expect("a cube")
+        reconstructor().upload_cube_in_turn(&cube, &description(&self.scene), Turn::default()).expect("a cube")
     }
 
     fn view(&self, set: &SampleSet, method: &str, mirrors: Mirrors<'_>) -> View {
         let method: ReconstructionMethod = method.parse().expect(method);
-        let views = reconstructor().reconstruct_with(
-            set,
-            mirrors,
-            &[self.camera],
-            method,
-            ViewPlanes::ALL,
-            Turn::default(),
-        );
+        let views =
+            reconstructor().reconstruct_with(set, mirrors, &[self.camera], method, ViewPlanes::ALL, Turn::default());
         views.expect("a view").remove(0)
     }
 
@@ -80,35 +67,103 @@ impl Gathering {
     }
 }
 
-fn psnr(a: &View, b: &View, pixels: &[bool]) -> f64 {
-    let [a, b] = [a, b].map(|view| Rgb8Image::of_view(view).expect("a picture"));
-    psnr_db(&a, &b, Some(pixels)).expect("of one size").expect("pixels")
-}
-
 /// Pixels that two views show differently.
 fn changed(a: &View, b: &View) -> Vec<bool> {
     let is_other = |(a, b): (&[u8], &[u8])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 2);
     a.srgb8.chunks(3).zip(b.srgb8.chunks(3)).map(is_other).collect()
 }
 
+const MIRRORS: Mirrors<'_> = Mirrors { cells: &[], reflections: 7, glossy: false };
+const GLOSSY: Mirrors<'_> = Mirrors { cells: &[], reflections: 0, glossy: true };
+
 #[test]
-fn gathered_mirrors_are_blurred_and_more_directions_are_sharper() {
+fn gathered_mirrors_are_blurred_and_rays_before_the_gathering_sharpen_them() {
     let stage = Gathering::mirror_box();
-    let lighting = "shadows, reflections 7";
-    let [none, truth] = ["shadows", lighting].map(|lighting| stage.direct(lighting));
+    let [none, truth] = ["shadows", "shadows, reflections 7"].map(|lighting| stage.direct(lighting));
     let pixels = changed(&none, &truth);
-    let mirrors = Mirrors { cells: &[], reflections: 7, glossy: false };
-    for directions in LightDirections::ALL {
-        let start = Instant::now();
-        let field = stage.light_field(directions, lighting);
-        let samples = field.sample_count();
-        println!("{directions:?}: {samples} samples in {:?}", start.elapsed());
-        let set = stage.set(Some(field));
-        for method in ["layered:0", "layered:1", "layered"] {
-            let view = stage.view(&set, method, mirrors);
-            let start = Instant::now();
-            stage.view(&set, method, mirrors);
-            println!("{method}: {:.2} dB in {:?}", psnr(&truth, &view, &pixels), start.elapsed());
+    let psnr_db = |view: &View| psnr_db(&truth, view, &pixels);
+    let of = |directions| {
+        let set = stage.set(Some(stage.light_field(directions, "shadows, reflections 7")));
+        ["layered:0", "layered:1", "layered"].map(|method| psnr_db(&stage.view(&set, method, MIRRORS)))
+    };
+    let [coarse, fine] = [of(LightDirections::D66), of(LightDirections::D258)];
+    println!("{} pixels: 66 directions {coarse:.2?} dB, 258 {fine:.2?} dB", pixels.iter().filter(|&&is| is).count());
+    assert!(fine[0] > coarse[0] + 1.0 && fine[1] > fine[0] + 5.0, "{coarse:?} {fine:?}");
+    assert!(fine[2] > 30.0 && fine[2] > fine[1] + 1.0 && coarse[2] == fine[2], "{coarse:?} {fine:?}");
+    assert!(fine[0] > psnr_db(&none) + 3.0, "{fine:?}");
+}
+
+#[test]
+fn rough_surfaces_show_what_is_around_them() {
+    let camera = looking(Vec3::new(8.0, 4.5, 8.0), Vec3::Y, 40.0, UVec2::new(120, 90));
+    let stage = Gathering::new(teapot_floor(), camera);
+    let drawn = |glossy: &str| stage.direct(&format!("shadows{glossy}"));
+    let [none, truth, few] = ["", ", glossy 256", ", glossy 4"].map(drawn);
+    let pixels = changed(&none, &truth);
+    let set = stage.set(Some(stage.light_field(LightDirections::D258, "shadows, glossy 1")));
+    let [gathered, few, none] =
+        [stage.view(&set, "layered", GLOSSY), few, none].map(|view| psnr_db(&truth, &view, &pixels));
+    println!("gathered {gathered:.2} dB, four rays {few:.2} dB, none {none:.2} dB");
+    assert!(gathered > few + 3.0 && few > none + 1.0, "{gathered} {few} {none}");
+}
+
+/// The floor lies at height 0, and all else above it.
+#[test]
+fn gathering_is_its_twin() {
+    let camera = looking(Vec3::new(8.0, 4.5, 8.0), Vec3::Y, 40.0, UVec2::new(60, 45));
+    let sky = Environment::uniform(Vec3::ZERO);
+    for roughness in [0.0, 0.33, 0.6] {
+        let mut scene = teapot_floor().lit_by(None, Some(sky));
+        let floor = Material { roughness, ..scene.materials[1].clone() };
+        scene.materials[1] = floor.clone();
+        let stage = Gathering::new(scene, camera);
+        let field = stage.light_field(LightDirections::D66, "shadows, reflections 1, glossy 1");
+        let set = stage.set(Some(field.clone()));
+        let plain = stage.view(&set, "layered", Mirrors::default());
+        let gathered = stage.view(&set, "layered:0", Mirrors { reflections: 1, ..GLOSSY });
+        let base = Vec3::from_slice(&floor.base_color_linear[..3]);
+        let reflectance_linear = base * floor.metallic + Vec3::splat(0.04 * (1.0 - floor.metallic));
+        let (mut close, mut pixels) = (0, 0);
+        for (index, &inverse_depth) in depths(&plain).iter().enumerate() {
+            let pixel = UVec2::new(index as u32 % camera.size_px.x, index as u32 / camera.size_px.x);
+            let ray = camera.ray(pixel.as_vec2() + 0.5);
+            let point_in_world = ray.at(1.0 / inverse_depth);
+            if inverse_depth <= 0.0 || point_in_world.y.abs() > 1e-3 {
+                continue;
+            }
+            let (normal_in_world, towards_eye_in_world) = (Vec3::Y, -ray.direction_in_world.normalize_or_zero());
+            let reflector = Reflector { reflectance_linear, roughness };
+            let surface = Reflecting { point_in_world, normal_in_world, towards_eye_in_world, reflector };
+            let light = gathered_light(&field, &surface, |_| Vec3::ZERO);
+            let added = light * environment_reflectance_linear(normal_in_world, towards_eye_in_world, &reflector);
+            let expected = [0, 1, 2]
+                .map(|channel| srgb8_from_linear(linear_from_srgb8(plain.srgb8[3 * index + channel]) + added[channel]));
+            let own = &gathered.srgb8[3 * index..][..3];
+            pixels += 1;
+            close += usize::from(own.iter().zip(expected).all(|(own, twin)| own.abs_diff(twin) <= 2));
         }
+        println!("roughness {roughness}: {close} of {pixels} pixels");
+        assert!(pixels > 500 && close as f64 > 0.97 * f64::from(pixels), "{roughness}: {close} of {pixels}");
+    }
+}
+
+#[test]
+fn a_method_that_gathers_needs_a_light_field_and_damaged_ones_are_refused() {
+    let stage = Gathering::mirror_box();
+    let gather: ReconstructionMethod = "layered:0".parse().expect("a method");
+    let refused = reconstructor().reconstruct(&stage.set(None), &[stage.camera], gather, ViewPlanes::ALL);
+    assert!(matches!(refused, Err(ReconstructionError::NoSamples { needed: "a light field", .. })));
+    let field = stage.light_field(LightDirections::D66, "shadows, reflections 1");
+    let camera = LightFieldCamera { pairs: 1, ..field.camera };
+    let part = LayeredLightField { camera, first: field.first[..=camera.line_count()].to_vec(), ..field.clone() };
+    let short = LayeredLightField { radiance_rgb9e5: Vec::new(), ..field };
+    for field in [part, short] {
+        let images = [0, 1, 2].map(|axis| {
+            let camera = stage.grid.camera(axis);
+            renderer().draw_layers(stage.lit("unlit"), &camera, LayerSelection::Dominant).expect("layers")
+        });
+        let cube = CubeImages { grid: stage.grid, images, light_field: Some(field) };
+        let refused = reconstructor().upload_cube_in_turn(&cube, &description(&stage.scene), Turn::default());
+        assert!(matches!(refused, Err(ReconstructionError::LightField { .. })));
     }
 }
