@@ -3,7 +3,7 @@
 pub mod command;
 mod curve;
 mod curves;
-mod measures;
+pub mod measures;
 mod report;
 mod shape;
 pub mod stage;

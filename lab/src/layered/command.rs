@@ -12,7 +12,7 @@ use study::{Bar, Check, Report, Table};
 
 use super::subject::Subject;
 use super::views::{self, Figures};
-use super::{base, baselines, cubes, glossy, mirrors, viewpoints};
+use super::{base, baselines, cubes, glossy, mirrors, triangles, viewpoints};
 use crate::failures::stand::Stand;
 use crate::progress::bar;
 
@@ -95,6 +95,9 @@ pub fn run(args: &LayeredArgs) -> anyhow::Result<Outcome> {
     let mean_b = sent_b.iter().sum::<f64>() / sent_b.len() as f64;
     report.checks.push(Check::new("bytes sent a sample, mean of the scenes", mean_b, "B", Bar::AtMost(MOST_SENT_B)));
     progress.finish_and_clear();
+    if !args.quick {
+        report.checks.push(triangles::measure(&stand, LIGHTING, &mut seen)?);
+    }
     let (mirrors, checks) = mirrors::measure(&stand)?;
     report.checks.extend(checks);
     let (ways, checks) = baselines::measure(&stand, LIGHTING, args.quick)?;

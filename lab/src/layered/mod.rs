@@ -8,6 +8,7 @@ mod glossy;
 mod mirrors;
 pub mod pyramid;
 mod subject;
+mod triangles;
 mod viewpoints;
 mod views;
 mod warp;
