@@ -86,17 +86,17 @@ struct Walk {
 }
 
 /// Cubes of one scene and side: all surfaces for the paper's ways, those of the dominant axis for the walk.
-struct Cubes<'s> {
+pub struct Cubes<'s> {
     subject: &'s Subject<'s>,
     side: u32,
-    all: Cube,
-    dominant: Cube,
+    pub all: Cube,
+    pub dominant: Cube,
 }
 
 impl<'s> Cubes<'s> {
     /// # Errors
     /// The device fails, or the subject's light has highlights.
-    fn new(subject: &'s Subject<'s>, side: u32) -> anyhow::Result<Self> {
+    pub fn new(subject: &'s Subject<'s>, side: u32) -> anyhow::Result<Self> {
         let [all, dominant] =
             [LayerSelection::All, LayerSelection::Dominant].map(|kept| subject.cube((side, kept), subject.lighting, 1));
         let (all, dominant) = (all?, dominant?);
@@ -143,7 +143,7 @@ impl<'s> Cubes<'s> {
     ///
     /// # Errors
     /// Views of other sizes.
-    fn warped(&self) -> anyhow::Result<(Figures, f64)> {
+    pub fn warped(&self) -> anyhow::Result<(Figures, f64)> {
         let pyramids = Pyramids::new(&self.all.images, EPSILON_FACTOR);
         let mut are_holes = Vec::new();
         let figures = self.figures(&self.all, |camera| {

@@ -12,7 +12,7 @@ use study::{Bar, Check, Report, Table};
 
 use super::subject::Subject;
 use super::views::{self, Figures};
-use super::{base, baselines, cubes, glossy, mirrors, triangles, viewpoints};
+use super::{base, baselines, cubes, glossy, mirrors, table_one, triangles, viewpoints};
 use crate::failures::stand::Stand;
 use crate::progress::bar;
 
@@ -106,6 +106,7 @@ pub fn run(args: &LayeredArgs) -> anyhow::Result<Outcome> {
     report.checks.extend(checks);
     let glossy = glossy::measure(&stand, args.quick)?;
     report.tables.extend([held, seen, pulled, mirrors, ways, base, glossy]);
+    report.tables.extend(table_one::measure(&stand, LIGHTING)?);
     report.tables.iter().for_each(|table| println!("{}", table.to_text()));
     let holds = report.finish(&args.out)?;
     Ok(Outcome::of(holds || !args.strict))

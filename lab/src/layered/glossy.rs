@@ -9,7 +9,7 @@ use super::subject::Subject;
 use crate::failures::stand::Stand;
 use crate::impostors::changed;
 
-const SCENE: &str = "teapot-floor";
+pub const SCENE: &str = "teapot-floor";
 /// As in the paper.
 const VIEW_PX: UVec2 = UVec2::new(256, 256);
 const VIEWS: usize = 3;
@@ -42,7 +42,7 @@ pub fn measure(stand: &Stand, is_quick: bool) -> anyhow::Result<Table> {
 }
 
 /// Towards the corner of the room, from left to right.
-fn cameras() -> Vec<PinholeCamera> {
+pub fn cameras() -> Vec<PinholeCamera> {
     let view = |number: usize| {
         let aside = number as f32 - 0.5 * (VIEWS - 1) as f32;
         PinholeCamera::looking_at(Vec3::new(8.0 + aside, 4.5, 8.0 - aside), Vec3::Y, Vec3::Y, 0.7, VIEW_PX)
