@@ -1,6 +1,7 @@
 //! Where methods fail, as data: curves with the shapes that they must have, in one list for tests and for the study.
 
 pub mod command;
+mod cubes;
 mod curve;
 mod curves;
 pub mod measures;
