@@ -62,7 +62,7 @@ const OF_PAPER: Column = Column {
 
 pub const TABLE_1: [Column; 3] = [
     Column {
-        name: "sphere & cylinder",
+        name: "paper: sphere & cylinder",
         primitives: 8,
         cube_mb: 42.5,
         layers: Layers { mean: 0.97, most: 3 },
@@ -74,7 +74,7 @@ pub const TABLE_1: [Column; 3] = [
         ..OF_PAPER
     },
     Column {
-        name: "teapot",
+        name: "paper: teapot",
         primitives: 9121,
         cube_mb: 28.8,
         layers: Layers { mean: 0.53, most: 4 },
@@ -86,7 +86,7 @@ pub const TABLE_1: [Column; 3] = [
         ..OF_PAPER
     },
     Column {
-        name: "teapot & spheres",
+        name: "paper: teapot & spheres",
         primitives: 9179,
         cube_mb: 50.6,
         layers: Layers { mean: 1.23, most: 10 },

@@ -7,7 +7,7 @@ use study::{Cell, Table};
 use super::baselines::Cubes;
 use super::paper::{Column, MB, TABLE_1};
 use super::subject::Subject;
-use super::{glossy, mirrors, storage, views};
+use super::{glossy, mirrors, storage};
 use crate::failures::stand::Stand;
 
 const SIDE: u32 = 512;
@@ -51,7 +51,7 @@ fn of_scene(stand: &Stand, views: &Views, lighting: Lighting, storage: &mut Tabl
     let plain = Subject::of_views(stand, views.scene, lighting, |_| (views.cameras)())?;
     let cubes = Cubes::new(&plain, SIDE)?;
     let (warped, holes) = cubes.warped()?;
-    let walk_s = views::of_cube(&plain, &plain.upload(&cubes.dominant)?.0)?.view_s;
+    let (_, walk_s) = mirrors::walked(&plain, &plain.upload(&cubes.dominant)?.0, 0)?;
     let subject = Subject::of_views(stand, views.scene, LIGHT.parse()?, |_| (views.cameras)())?;
     // The first use of a light builds shaders.
     let cube = subject.cube((SIDE, LayerSelection::Dominant), subject.lighting, 2)?;
