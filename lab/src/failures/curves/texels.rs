@@ -25,10 +25,10 @@ pub const CURVE: Curve = Curve {
     name: "Errors against texels in the picture",
     subject: "a town, a layered depth cube, the viewer walks in",
     x: X::log("side of a texel", "px", &[0.14, 0.25, 0.5, 0.71, 1.0, 1.41, 2.0]),
-    y: ["SSIM of the foreground; hits off by 1 % of the distance; surfaces not held", ""],
+    y: ["1 − SSIM of the foreground; hits off by 1 % of the distance; surfaces not held", ""],
     series: &[
-        Series::new("SSIM", &[Shape::falls(0.1, 0.02)]),
-        Series::new("wrong hits", &[Shape::rises(0.05, 0.005)]),
+        Series::new("1 − SSIM", &[Shape::rises(0.05, 0.025)]),
+        Series::new("wrong hits", &[Shape::rises(0.02, 0.005)]),
         Series::new("not held", &[Shape::Bounded { least: 0.0, most: 0.06 }, Shape::Plateau { tolerance: 0.03 }]),
     ],
     why: "Silhouettes are those of squares, and colours are a texel apart: both grow in the picture. As many surfaces are lost from afar.",
@@ -49,7 +49,11 @@ fn measure(stand: &Stand, sides_px: &[f64]) -> anyhow::Result<Rows> {
     let places = subject.truths.chunks(TURNS_DEG.len()).zip(views.chunks(TURNS_DEG.len()));
     let row = |(truths, views): (&[View], &[View])| {
         let wrong_hits = figures(truths, views, (f64::NAN, f64::NAN))?.wrong_hits;
-        Ok(vec![foreground(truths, views)?.ssim, wrong_hits, not_held(truths, views, BEHIND * cube.grid.spacing_m)])
+        Ok(vec![
+            1.0 - foreground(truths, views)?.ssim,
+            wrong_hits,
+            not_held(truths, views, BEHIND * cube.grid.spacing_m),
+        ])
     };
     places.map(row).collect()
 }
