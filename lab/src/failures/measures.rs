@@ -44,6 +44,14 @@ pub fn found(truths: &[View], views: &[View]) -> f64 {
     }))
 }
 
+/// The share of the truth's surfaces that views do not hold: they show nothing there, or something more than `behind_m` farther away.
+pub fn not_held(truths: &[View], views: &[View], behind_m: f32) -> f64 {
+    let pairs = truths.iter().zip(views).flat_map(|(truth, view)| depths(truth).iter().zip(depths(view)));
+    // No surface is as far away as it can be: its inverse depth is 0.
+    let is_farther = |(truth, view): (&f32, &f32)| 1.0 / view.max(0.0) > 1.0 / truth + behind_m;
+    share(pairs.filter(|(truth, _)| **truth > 0.0).map(is_farther))
+}
+
 /// The mean relative error of depth, where the truth and the view have a surface.
 ///
 /// # Errors
@@ -113,6 +121,8 @@ mod tests {
         let (truth, test) = ([view([1.0, 1.0, 1.0, 0.0])], [view([1.01, 1.0, 0.0, 0.0])]);
         assert!((found(&truth, &test) - 2.0 / 3.0).abs() < 1e-9);
         assert!((depth_error(&truth, &test).unwrap() - 0.005).abs() < 1e-6);
+        assert!((not_held(&truth, &test, 0.1) - 1.0 / 3.0).abs() < 1e-9);
+        assert_eq!(not_held(&test, &truth, 0.005), 0.5);
         assert_eq!(share_of_kind(&test, ProvenanceKind::Hit), 0.5);
         assert!(share([]).is_nan() && mean([]).is_none());
         assert!(depth_error(&truth, &[view([0.0; 4])]).is_err());

@@ -1,9 +1,10 @@
 //! Where methods fail, as data: curves with the shapes that they must have, in one list for tests and for the study.
 
 pub mod command;
+mod cubes;
 mod curve;
 mod curves;
-mod measures;
+pub mod measures;
 mod report;
 mod shape;
 pub mod stage;

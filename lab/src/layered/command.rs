@@ -12,7 +12,7 @@ use study::{Bar, Check, Report, Table};
 
 use super::subject::Subject;
 use super::views::{self, Figures};
-use super::{base, baselines, cubes, glossy, mirrors, viewpoints};
+use super::{base, baselines, cubes, glossy, light_fields, mirrors, table_one, triangles, viewpoints};
 use crate::failures::stand::Stand;
 use crate::progress::bar;
 
@@ -37,8 +37,8 @@ const LEAST_PSNR_DB: [f64; 2] = [33.0, 31.5];
 /// all around. Compares the views with direct drawing, and with those of joint_carve from depth images near each view. Then follows
 /// rays off mirrors through a cube, up to seven mirrors on a ray's way, and says after how many views the cube is repaid. Also compares
 /// what a compositor pulls for viewers in many places: one cube, or the images of their view cells. Then come the paper's own ways to
-/// primary rays: projecting all samples, and quadtrees of depths. Last come a cube as a base beside depth images, and rays into the
-/// lobes of glossy pixels.
+/// primary rays: projecting all samples, and quadtrees of depths. Last come a cube as a base beside depth images, and glossy pixels and
+/// mirrors that are gathered in layered light fields, beside rays.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   myriorama study layered
@@ -95,14 +95,21 @@ pub fn run(args: &LayeredArgs) -> anyhow::Result<Outcome> {
     let mean_b = sent_b.iter().sum::<f64>() / sent_b.len() as f64;
     report.checks.push(Check::new("bytes sent a sample, mean of the scenes", mean_b, "B", Bar::AtMost(MOST_SENT_B)));
     progress.finish_and_clear();
+    if !args.quick {
+        report.checks.push(triangles::measure(&stand, LIGHTING, &mut seen)?);
+    }
     let (mirrors, checks) = mirrors::measure(&stand)?;
     report.checks.extend(checks);
     let (ways, checks) = baselines::measure(&stand, LIGHTING, args.quick)?;
     report.checks.extend(checks);
     let (base, checks) = base::measure(&stand, LIGHTING, args.quick)?;
     report.checks.extend(checks);
-    let glossy = glossy::measure(&stand, args.quick)?;
-    report.tables.extend([held, seen, pulled, mirrors, ways, base, glossy]);
+    let (glossy, checks) = glossy::measure(&stand, args.quick)?;
+    report.checks.extend(checks);
+    let (gathered, checks) = light_fields::measure(&stand, args.quick)?;
+    report.checks.extend(checks);
+    report.tables.extend([held, seen, pulled, mirrors, ways, base, glossy, gathered]);
+    report.tables.extend(table_one::measure(&stand, LIGHTING)?);
     report.tables.iter().for_each(|table| println!("{}", table.to_text()));
     let holds = report.finish(&args.out)?;
     Ok(Outcome::of(holds || !args.strict))

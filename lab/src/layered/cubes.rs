@@ -5,6 +5,8 @@ use render::{LayerSelection, Lighting};
 use study::{Bar, Cell, Check, Table};
 
 use super::subject::{Cube, Subject};
+use super::views;
+use crate::failures::measures::not_held;
 
 /// The greatest share of the samples of all surfaces that those of the dominant axis may be.
 const MOST_SHARE: [(&str, f64); 4] = [("tree", 0.75), ("grass", 0.75), ("tree-terrain-500k", 0.75), ("bird-nest", 0.8)];
@@ -12,6 +14,10 @@ const MOST_SHARE: [(&str, f64); 4] = [("tree", 0.75), ("grass", 0.75), ("tree-te
 const MOST_SHARE_ELSEWHERE: f64 = 1.0;
 /// The scene whose layers are timed, and the bound of their seconds without light.
 const TIMED: (&str, f64) = ("tree-terrain-500k", 1.0);
+/// What a ray meets farther than this behind a surface is another one, in spacings.
+const BEHIND: f32 = 4.0;
+/// Percent points by which the pixels that samples of the dominant axis do not hold may exceed those of all surfaces.
+const MORE_NOT_HELD: f64 = 0.05;
 /// Times that a cube is sampled; the fastest counts.
 const TIMES: usize = 3;
 
@@ -24,6 +30,8 @@ pub fn table() -> Table {
         ("share", ""),
         ("mean layers", ""),
         ("most layers", ""),
+        ("not held by all surfaces", "%"),
+        ("not held", "%"),
         ("layers", "s"),
         ("with light", "s"),
         ("load", "s"),
@@ -43,6 +51,7 @@ pub fn measure(subject: &Subject<'_>, side: u32, table: &mut Table) -> anyhow::R
     let cube = subject.cube((side, LayerSelection::Dominant), subject.lighting, 2)?;
     drop(subject.upload(&cube)?);
     let load_s = subject.upload(&cube)?.1;
+    let [not_held_by_all, not_held] = [not_held_percent(subject, &all)?, not_held_percent(subject, &cube)?];
     let share = cube.samples() as f64 / all.samples() as f64;
     let lines: usize = cube.images.iter().map(|image| image.camera.pixel_count()).sum();
     let most_layers = all.images.iter().map(LayeredDepthImage::layer_count).max().unwrap_or(0);
@@ -54,17 +63,28 @@ pub fn measure(subject: &Subject<'_>, side: u32, table: &mut Table) -> anyhow::R
         Cell::from(share),
         Cell::from(all.samples() as f64 / lines as f64),
         Cell::from(most_layers),
+        Cell::from(not_held_by_all),
+        Cell::from(not_held),
         Cell::from(layers.sample_s),
         Cell::from(cube.sample_s),
         Cell::from(load_s),
         Cell::from(cube.encoded_bytes()? as f64 / cube.samples() as f64),
     ])?;
     let bar = MOST_SHARE.iter().find(|(name, _)| *name == subject.name).map_or(MOST_SHARE_ELSEWHERE, |(_, bar)| *bar);
-    let mut checks =
-        vec![Check::new(format!("{}: samples over those of all surfaces", subject.name), share, "", Bar::AtMost(bar))];
+    let of = |what: &str| format!("{}: {what} those of all surfaces", subject.name);
+    let mut checks = vec![
+        Check::new(of("samples over"), share, "", Bar::AtMost(bar)),
+        Check::new(of("pixels not held beyond"), not_held - not_held_by_all, "%", Bar::AtMost(MORE_NOT_HELD)),
+    ];
     if subject.name == TIMED.0 {
         let name = format!("{}: layers of a cube of {side}², without light", subject.name);
         checks.push(Check::new(name, layers.sample_s, "s", Bar::AtMost(TIMED.1)));
     }
     Ok((cube, checks))
+}
+
+/// Percent of the pixels with a surface in which the walk meets nothing, or something clearly behind it.
+fn not_held_percent(subject: &Subject<'_>, cube: &Cube) -> anyhow::Result<f64> {
+    let (views, _) = views::made(subject, &subject.upload(cube)?.0, &subject.views, views::LAYERED)?;
+    Ok(100.0 * not_held(&subject.truths, &views, BEHIND * cube.grid.spacing_m))
 }

@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use metrics::{Rgb8Image, flip_map, psnr_db};
-use reconstruction::{Mirrors, SampleSet};
+use reconstruction::{Mirrors, ReconstructionMethod, SampleSet};
 use render::LayerSelection;
 use study::{Bar, Cell, Check, Table};
 
@@ -17,7 +17,7 @@ use crate::failures::stand::Stand;
 use crate::impostors::{changed, reflecting};
 use crate::statistics::median;
 
-const SCENE: &str = "mirror-box";
+pub const SCENE: &str = "mirror-box";
 const SIDE: u32 = 512;
 /// As in the paper.
 const VIEW_PX: UVec2 = UVec2::new(256, 256);
@@ -88,7 +88,7 @@ fn of_light(stand: &Stand, light: &str, most: f64, table: &mut Table) -> anyhow:
 }
 
 /// From before the box, from left to right.
-fn cameras() -> Vec<PinholeCamera> {
+pub fn cameras() -> Vec<PinholeCamera> {
     let view = |number: usize| {
         let right = number as f32 / (VIEWS - 1) as f32 * 2.0 - 1.0;
         let eye = Vec3::new(2.2 * right, 1.9, 6.0);
@@ -98,14 +98,32 @@ fn cameras() -> Vec<PinholeCamera> {
 }
 
 /// Views by rays that meet up to `reflections` mirrors, and the seconds of one view.
-fn walked(subject: &Subject<'_>, set: &SampleSet, reflections: u32) -> anyhow::Result<(Vec<View>, f64)> {
-    let mirrors = Mirrors { cells: &[], reflections, glossy: false };
+///
+/// # Errors
+/// The device fails.
+pub fn walked(subject: &Subject<'_>, set: &SampleSet, reflections: u32) -> anyhow::Result<(Vec<View>, f64)> {
+    shown(subject, set, LAYERED, Mirrors { reflections, ..Mirrors::default() })
+}
+
+/// Views by a method that shows mirrors, and the seconds of one view.
+///
+/// # Errors
+/// The device fails.
+pub fn shown(
+    subject: &Subject<'_>,
+    set: &SampleSet,
+    method: ReconstructionMethod,
+    mirrors: Mirrors<'_>,
+) -> anyhow::Result<(Vec<View>, f64)> {
     let (reconstructor, turn) = (subject.stand.reconstructor(), Default::default());
-    timed(|| Ok(reconstructor.reconstruct_with(set, mirrors, &subject.views, LAYERED, ViewPlanes::COLOR, turn)?))
+    timed(|| Ok(reconstructor.reconstruct_with(set, mirrors, &subject.views, method, ViewPlanes::COLOR, turn)?))
 }
 
 /// The same views, drawn directly.
-fn direct(subject: &Subject<'_>, reflections: u32) -> anyhow::Result<(Vec<View>, f64)> {
+///
+/// # Errors
+/// The device fails.
+pub fn direct(subject: &Subject<'_>, reflections: u32) -> anyhow::Result<(Vec<View>, f64)> {
     let lighting = reflecting(subject.lighting, reflections)?;
     timed(|| subject.stand.views(&subject.on_device, lighting, &subject.views, ViewPlanes::COLOR))
 }

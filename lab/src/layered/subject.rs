@@ -4,13 +4,19 @@ use std::time::Instant;
 
 use anyhow::Context as _;
 use codec::encode_layered_image;
-use depth_image::{Aabb, CubeGrid, LayeredDepthImage, PinholeCamera, View, ViewPlanes};
+use depth_image::{
+    Aabb, CubeGrid, CubeImages, LayeredDepthImage, LayeredLightField, LightDirections, LightFieldCamera, PinholeCamera,
+    View, ViewPlanes,
+};
 use reconstruction::{SampleSet, SetDescription};
 use render::{GpuScene, LayerSelection, Lighting};
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 
 use crate::failures::stand::{Stand, work};
 use crate::impostors::around;
+
+/// Lines along each side of a light field's squares, as in the paper.
+const LINES: u32 = 64;
 
 /// A scene on the device, and views around it, drawn directly.
 pub struct Subject<'s> {
@@ -82,6 +88,30 @@ impl<'s> Subject<'s> {
         let start = Instant::now();
         let set = self.stand.reconstructor().upload_cube(&cube.grid, &cube.images, &self.description())?;
         Ok((set, start.elapsed().as_secs_f64()))
+    }
+
+    /// A light field of the scene, and the seconds that it takes.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn light_field(
+        &self,
+        directions: LightDirections,
+        lighting: Lighting,
+    ) -> anyhow::Result<(LayeredLightField, f64)> {
+        let camera = LightFieldCamera::around(self.scene.bounds(), directions, LINES);
+        let start = Instant::now();
+        let field = self.stand.engine().renderer.draw_light_field(work(&self.on_device, lighting), &camera)?;
+        Ok((field, start.elapsed().as_secs_f64()))
+    }
+
+    /// Puts a cube with a light field on the device.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn upload_with(&self, cube: &Cube, light_field: LayeredLightField) -> anyhow::Result<SampleSet> {
+        let images = CubeImages { grid: cube.grid, images: cube.images.clone(), light_field: Some(light_field) };
+        Ok(self.stand.reconstructor().upload_cube_in_turn(&images, &self.description(), Default::default())?)
     }
 
     /// What all images of the scene share.

@@ -110,7 +110,11 @@ fn beside(subject: &Subject<'_>, camera: &PinholeCamera, right: f32, up: f32) ->
     PinholeCamera { near_m: camera.near_m, ..aimed }
 }
 
-fn made(
+/// Views, and the loads of a ray.
+///
+/// # Errors
+/// The device fails.
+pub fn made(
     subject: &Subject<'_>,
     set: &SampleSet,
     cameras: &[PinholeCamera],

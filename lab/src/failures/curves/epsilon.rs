@@ -1,9 +1,9 @@
 //! The ε of quadtrees of depths against planes: a sheet through a layered depth cube, by the host alone.
 
-use depth_image::{Aabb, CubeGrid, LayeredDepthImage, Ray, oct8_from_unit, unit_from_oct8};
+use depth_image::{Ray, oct8_from_unit, unit_from_oct8};
 use glam::{Vec2, Vec3};
-use reconstruction::scalar::CubeTwin;
 
+use crate::failures::cubes::{self, Crossing};
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::share;
 use crate::failures::shape::Shape;
@@ -17,8 +17,6 @@ const SIDE: u32 = 24;
 const RAYS: usize = 400;
 /// Rays along the sheet sink by this share of their way, so that its front faces them.
 const SINKING: f32 = 0.02;
-/// Samples of a cube are those of the dominant axis.
-const DOMINANT: f32 = 0.9;
 
 const NONE: &[Shape] = &[Shape::EqualAt { x: 1.0, y: 0.0, tolerance: 0.0 }];
 
@@ -42,19 +40,18 @@ pub const CURVE: Curve = Curve {
 };
 
 fn measure(_: &Stand, factors: &[f64]) -> anyhow::Result<Rows> {
-    let bounds = Aabb { min: Vec3::ZERO, max: Vec3::splat((SIDE - 1) as f32) };
-    let (grid, normals) = (CubeGrid::around(&bounds, SIDE)?, TILTS_DEG.map(normal));
+    let (grid, normals) = (cubes::grid(SIDE)?, TILTS_DEG.map(normal));
     let of_planes = normals.map(|normal| {
-        let twin = CubeTwin::new(&grid, &[0, 1, 2].map(|axis| sheet(&grid, axis, normal, DOMINANT)));
-        rates(&bounds, normal, |ray| twin.walk(ray, 0.0).is_some())
+        let twin = cubes::cube(&grid, sheet(normal));
+        rates(normal, |ray| twin.walk(ray, 0.0).is_some())
     });
     let [planes_missed, planes_false] =
         [0, 1].map(|kind| of_planes.iter().map(|rates| rates[kind]).fold(0.0, f64::max));
     rows(factors, |factor| {
         let [low, middle, steep] = normals.map(|normal| {
-            let image = sheet(&grid, 2, normal, 0.0);
+            let image = cubes::image(&grid, 2, 0.0, sheet(normal));
             let pyramids = Pyramids::new(std::slice::from_ref(&image), factor as f32);
-            rates(&bounds, normal, |ray| pyramids.trace(ray, 0.0).0.is_some())
+            rates(normal, |ray| pyramids.trace(ray, 0.0).0.is_some())
         });
         Ok([low[0], middle[0], steep[0], low[1], middle[1], steep[1], planes_missed, planes_false])
     })
@@ -66,31 +63,17 @@ fn normal(tilt_deg: f32) -> Vec3 {
     unit_from_oct8(oct8_from_unit((Vec2::from_angle(0.4) * sin).extend(cos)))
 }
 
-/// A sheet through the middle of the grid, on the lines of one axis; empty where the normal leans from the axis too far.
-fn sheet(grid: &CubeGrid, axis: usize, normal: Vec3, least_of_greatest: f32) -> LayeredDepthImage {
-    let (camera, middle) = (grid.camera(axis), Vec3::splat(0.5 * (SIDE - 1) as f32));
-    let is_held = normal[axis].abs() >= least_of_greatest * normal.abs().max_element();
-    let (mut first, mut planar_depth_m) = (vec![0], Vec::new());
-    for place in (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| Vec2::new(x as f32, y as f32))) {
-        let line = camera.ray(place + 0.5);
-        let depth_m = normal.dot(middle - line.origin_in_world) / normal.dot(line.direction_in_world);
-        planar_depth_m.extend(Some(depth_m).filter(|depth_m| is_held && (0.0..=camera.range_m).contains(depth_m)));
-        first.push(planar_depth_m.len() as u32);
-    }
-    LayeredDepthImage {
-        camera,
-        first,
-        plane_normal_oct8: vec![oct8_from_unit(normal); planar_depth_m.len()],
-        color_rgb9e5: vec![0; planar_depth_m.len()],
-        planar_depth_m,
-        normal_oct16: None,
-        specular: None,
-        truncated: false,
+/// Where a ray crosses a sheet through the middle of the grid.
+fn sheet(normal: Vec3) -> impl Fn(Ray) -> Vec<Crossing> {
+    let middle = Vec3::splat(0.5 * (SIDE - 1) as f32);
+    move |ray| {
+        let t = normal.dot(middle - ray.origin_in_world) / normal.dot(ray.direction_in_world);
+        vec![Crossing { t, normal_in_world: normal }]
     }
 }
 
 /// The shares of rays through the sheet that meet nothing, and of rays along it, in front of it, that meet something.
-fn rates(bounds: &Aabb, normal: Vec3, is_met: impl Fn(Ray) -> bool) -> [f64; 2] {
+fn rates(normal: Vec3, is_met: impl Fn(Ray) -> bool) -> [f64; 2] {
     let (right, up) = normal.any_orthonormal_pair();
     let along = |turns: f32| {
         let at = Vec2::from_angle(turns * std::f32::consts::TAU);
@@ -98,7 +81,7 @@ fn rates(bounds: &Aabb, normal: Vec3, is_met: impl Fn(Ray) -> bool) -> [f64; 2] 
     };
     let ray = |number: usize, is_through: bool| {
         let [a, b, c, d] = [0.618_034, 0.754_878, 0.569_84, 0.819_173].map(|step| (step * number as f32).fract());
-        let on_sheet = bounds.center() + along(a) * (6.0 * b.sqrt());
+        let on_sheet = Vec3::splat(0.5 * (SIDE - 1) as f32) + along(a) * (6.0 * b.sqrt());
         let (back, height_m) = match is_through {
             true => ((along(c) + normal * (0.2 + 4.0 * d)).normalize_or_zero(), 0.0),
             // At most 42 m within the cube: a ray never reaches the sheet.

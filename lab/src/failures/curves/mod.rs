@@ -1,28 +1,36 @@
 //! All curves: tests measure them at a small size, the study at its full size.
 
 mod courtyard;
+mod cube_edges;
+mod cube_mirrors;
 mod depth_range;
 mod epsilon;
 mod frames;
 mod k_fd;
 mod layers;
+mod leaves;
 mod light;
 mod odd_eyes;
 mod poles;
 mod quads;
 mod redundancy;
 mod sphere;
+mod texels;
 mod thickness;
 mod view_cell;
 
 use super::curve::Curve;
 
 /// Families of curves that share their scene or their parts.
-pub const CURVES: [&[Curve]; 14] = [
+pub const CURVES: [&[Curve]; 18] = [
     &poles::CURVES,
     &sphere::CURVES,
     &[thickness::CURVE],
     &[epsilon::CURVE],
+    &[texels::CURVE],
+    &cube_edges::CURVES,
+    &leaves::CURVES,
+    &cube_mirrors::CURVES,
     &odd_eyes::CURVES,
     &view_cell::CURVES,
     &[courtyard::CURVE],

@@ -1,0 +1,138 @@
+//! The figures of Lischinski and Rappoport's Table 1, and the arithmetic of their §3.4.
+
+use super::storage::Layers;
+
+/// Megabytes of the paper: its slab of 192 MB has 32 × 32 × 256² texels of three bytes.
+pub const MB: f64 = (1 << 20) as f64;
+/// A light field slab of 32 × 32 × 256² texels of three bytes.
+pub const SLAB_BYTES: f64 = (32 * 32 * 256 * 256 * 3) as f64;
+/// A volume of 512³ voxels of one byte.
+pub const VOLUME_BYTES: f64 = (512 * 512 * 512) as f64;
+/// Bytes a texel and a sample of the paper's layout: six images of 512² give all three sizes of Table 1 (computed, not printed there).
+const TEXEL_BYTES: f64 = 8.2;
+const SAMPLE_BYTES: f64 = 20.8;
+
+/// Samples of three images are as many as voxels of a volume from this mean number of layers on (§3.4).
+pub fn layers_of_a_volume(side: u32) -> f64 {
+    f64::from(side) / 3.0
+}
+
+/// Bytes of layered images in the paper's layout.
+pub fn layered_bytes(texels: usize, samples: usize) -> f64 {
+    texels as f64 * TEXEL_BYTES + samples as f64 * SAMPLE_BYTES
+}
+
+/// A column of Table 1: of the paper, in seconds of a 200 MHz Pentium Pro, or of a scene here.
+#[derive(Debug, Clone)]
+pub struct Column {
+    pub name: &'static str,
+    pub primitives: usize,
+    pub cube_mb: f64,
+    pub sent_mb: Option<f64>,
+    /// Of six images, each with the surfaces that face it.
+    pub layers: Layers,
+    /// The paper's has the light field, too.
+    pub construction_s: f64,
+    pub warp_s: f64,
+    /// The paper says that there are fewer.
+    pub holes_percent: f64,
+    pub walk_s: Option<f64>,
+    /// The view-dependent pass and the whole view, with 0, 1 and 7 reflections.
+    pub pass_s: [Option<f64>; 3],
+    pub view_s: [Option<f64>; 3],
+    /// Ray tracing or direct drawing, with as many reflections as the last view.
+    pub direct_s: f64,
+}
+
+/// What the paper's columns share.
+const OF_PAPER: Column = Column {
+    name: "",
+    primitives: 0,
+    cube_mb: f64::NAN,
+    sent_mb: None,
+    layers: Layers { mean: f64::NAN, most: 0 },
+    construction_s: f64::NAN,
+    warp_s: f64::NAN,
+    holes_percent: 2.0,
+    walk_s: None,
+    pass_s: [None; 3],
+    view_s: [None; 3],
+    direct_s: f64::NAN,
+};
+
+pub const TABLE_1: [Column; 3] = [
+    Column {
+        name: "paper: sphere & cylinder",
+        primitives: 8,
+        cube_mb: 42.5,
+        layers: Layers { mean: 0.97, most: 3 },
+        construction_s: 582.0,
+        warp_s: 2.9,
+        pass_s: [Some(2.7), Some(4.3), Some(4.5)],
+        view_s: [Some(5.6), Some(7.2), Some(7.5)],
+        direct_s: 8.2,
+        ..OF_PAPER
+    },
+    Column {
+        name: "paper: teapot",
+        primitives: 9121,
+        cube_mb: 28.8,
+        layers: Layers { mean: 0.53, most: 4 },
+        construction_s: 726.0,
+        warp_s: 1.3,
+        pass_s: [Some(3.2), None, None],
+        view_s: [Some(4.5), None, None],
+        direct_s: 126.1,
+        ..OF_PAPER
+    },
+    Column {
+        name: "paper: teapot & spheres",
+        primitives: 9179,
+        cube_mb: 50.6,
+        layers: Layers { mean: 1.23, most: 10 },
+        construction_s: 2420.0,
+        warp_s: 3.5,
+        pass_s: [Some(2.7), Some(11.1), None],
+        view_s: [Some(6.2), Some(14.6), None],
+        direct_s: 22.2,
+        ..OF_PAPER
+    },
+];
+
+impl Column {
+    /// With the most reflections.
+    fn last_view_s(&self) -> Option<f64> {
+        self.view_s.iter().copied().flatten().last()
+    }
+
+    pub fn over_direct(&self) -> Option<f64> {
+        Some(self.last_view_s()? / self.direct_s)
+    }
+
+    /// Views after which the construction is repaid; `None` if never.
+    pub fn repaid(&self) -> Option<f64> {
+        let saved_s = self.direct_s - self.last_view_s()?;
+        (saved_s > 0.0).then_some(self.construction_s / saved_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn six_images_of_the_assumed_layout_have_the_sizes_of_table_1() {
+        for column in &TABLE_1 {
+            let texels = 6 * 512 * 512;
+            let mb = layered_bytes(texels, (texels as f64 * column.layers.mean) as usize) / MB;
+            assert!((mb / column.cube_mb - 1.0).abs() < 0.01, "{}: {mb}", column.name);
+        }
+    }
+
+    #[test]
+    fn the_paper_s_slab_and_volume_have_its_sizes_and_its_scenes_are_repaid_after_831_6_and_318_views() {
+        assert_eq!([SLAB_BYTES, VOLUME_BYTES].map(|bytes| bytes / MB), [192.0, 128.0]);
+        let repaid = TABLE_1.each_ref().map(|column| column.repaid().map(f64::round));
+        assert_eq!(repaid, [Some(831.0), Some(6.0), Some(318.0)]);
+    }
+}
