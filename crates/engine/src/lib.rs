@@ -48,8 +48,8 @@ struct Uploaded {
     set: Arc<reconstruction::SampleSet>,
     /// Mirrors that a ray meets one after the other in this light.
     reflections: u32,
-    /// Rough surfaces show what is around them.
-    glossy: bool,
+    /// Rays of what rough surfaces show.
+    glossy_rays: u32,
     /// What mirrors show.
     mirrors: Vec<(Aabb, Arc<reconstruction::SampleSet>)>,
     /// What tells where its images leave anything unknown.
@@ -287,7 +287,7 @@ impl Engine for GpuEngine {
         Ok(Arc::new(Uploaded {
             set: Arc::new(set),
             reflections: lighting.reflections(),
-            glossy: lighting.glossy_rays() > 0,
+            glossy_rays: lighting.glossy_rays(),
             mirrors: Vec::new(),
             base: None,
         }))
@@ -303,16 +303,16 @@ impl Engine for GpuEngine {
                 CommonKind::Base => base = Some(common),
             }
         }
-        let Uploaded { ref set, reflections, glossy, .. } = *set;
-        Ok(Arc::new(Uploaded { set: set.clone(), reflections, glossy, mirrors, base }))
+        let Uploaded { ref set, reflections, glossy_rays, .. } = *set;
+        Ok(Arc::new(Uploaded { set: set.clone(), reflections, glossy_rays, mirrors, base }))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {
-        let Uploaded { set, reflections, glossy, mirrors, base } =
+        let Uploaded { set, reflections, glossy_rays, mirrors, base } =
             (set as &dyn Any).downcast_ref().ok_or_else(of_another_device)?;
         let cells = mirrors.iter().map(|(bounds, shown)| MirrorCell { bounds: *bounds, surroundings: shown });
         let cells: Vec<MirrorCell<'_>> = cells.collect();
-        let mirrors = Mirrors { cells: &cells, reflections: *reflections, glossy: *glossy };
+        let mirrors = Mirrors { cells: &cells, reflections: *reflections, glossy_rays: *glossy_rays };
         let common = CommonSets { mirrors, base: base.as_deref() };
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
         let turn = device_turn(turn);

@@ -8,7 +8,7 @@ use naga::{Module, TypeInner};
 
 use crate::cube::{GpuCube, GpuLightField};
 use crate::{
-    bounce::{GpuMirrorBox, GpuMirroredRay},
+    bounce::{GpuGlossySurface, GpuMirrorBox, GpuMirroredRay, lobe::GpuLobeRays},
     pixel_list::GpuPixelList,
     quads::{GpuCutWork, GpuQuadWork},
     shaders::{shader_sources, templates},
@@ -178,14 +178,20 @@ fn lists_of_pixels_agree_where_they_are_written_and_read() {
 fn mirrored_rays_and_mirror_boxes_agree_where_they_are_written_and_read() {
     let ray =
         host!(GpuMirroredRay { origin_in_world, pixel, direction, guess, throughput_rgb9e5, near_m, width_m, spread });
-    let in_images =
-        ["bounce/curved_search.wgsl", "bounce/land.wgsl", "bounce/march.wgsl", "joint_carve.wgsl", "specular.wgsl"];
+    let in_images = [
+        "bounce/curved_search.wgsl",
+        "bounce/land.wgsl",
+        "bounce/lobe.wgsl",
+        "bounce/march.wgsl",
+        "joint_carve.wgsl",
+        "specular.wgsl",
+    ];
     let passes = [&in_images[..], &["layered.wgsl"]].concat();
     assert_eq!(templates_that_agree("MirroredRay", &ray), BTreeSet::from_iter(passes));
     let boxes = host!(GpuMirrorBox { min_in_world, first_listed, max_in_world, padding });
     assert_eq!(
         templates_that_agree("MirrorBox", &boxes),
-        BTreeSet::from(["bounce/land.wgsl", "layered.wgsl", "specular.wgsl"])
+        BTreeSet::from(["bounce/land.wgsl", "bounce/lobe.wgsl", "layered.wgsl", "specular.wgsl"])
     );
 }
 
@@ -193,6 +199,25 @@ fn mirrored_rays_and_mirror_boxes_agree_where_they_are_written_and_read() {
 fn cubes_agree() {
     let cube = host!(GpuCube { cube_from_world, size, columns, rows, start_m, padding });
     assert_eq!(templates_that_agree("Cube", &cube), BTreeSet::from(["layered.wgsl"]));
+}
+
+#[test]
+fn glossy_surfaces_agree_where_they_are_listed_and_send_rays() {
+    let surface = host!(GpuGlossySurface {
+        point_in_world,
+        pixel,
+        towards_eye,
+        normal_oct16,
+        throughput_linear,
+        roughness,
+        start_m,
+        open,
+        padding
+    });
+    let rays = host!(GpuLobeRays { count, number });
+    let passes = BTreeSet::from(["bounce/lobe.wgsl", "layered.wgsl"]);
+    assert_eq!(templates_that_agree("GlossySurface", &surface), passes);
+    assert_eq!(templates_that_agree("LobeRays", &rays), passes);
 }
 
 #[test]

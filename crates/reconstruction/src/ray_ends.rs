@@ -64,7 +64,7 @@ pub(crate) fn follow_rays(
         return Err(ReconstructionError::NoSamples { what: "a ray off a mirror".to_owned(), needed: "depth images" });
     }
     let cells = [MirrorCell { bounds: Aabb::around([surroundings.eye_in_world()]), surroundings }];
-    let mirrors = Mirrors { cells: &cells, reflections: 1, glossy: false };
+    let mirrors = Mirrors { cells: &cells, reflections: 1, glossy_rays: 0 };
     let size_px = UVec2::new(COLUMNS, (rays.len() as u32).div_ceil(COLUMNS).max(1));
     let camera = PinholeCamera::looking_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 1.0, size_px);
     let planes = (ViewPlanes::ALL, false);

@@ -6,7 +6,7 @@ use minijinja::Value;
 
 use crate::antialias::Shown;
 use crate::bounce::{
-    BOUNCE_LEVEL, BounceMarch, CurvedWalk, EDGE_COSINE, LEAST_RISE, LEAST_WAY, LONGEST_STEP, Land, MARCH_ROUNDS,
+    BOUNCE_LEVEL, BounceMarch, CurvedWalk, EDGE_COSINE, LEAST_RISE, LEAST_WAY, LONGEST_STEP, Land, Lobe, MARCH_ROUNDS,
     MAX_BOUNCE_MOVES, MAX_WALK_STEPS, START_FOOTPRINTS,
 };
 use crate::cube::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, HIT_SLACK, MAX_CUBE_STEPS, SQUARE_REACH, WALK_NUDGE};
@@ -21,9 +21,9 @@ use crate::view_work::{CELL_MARGIN_PX, FAR_AWAY, TILE_PX};
 use crate::{methods, pixel_list::LIST_WORKGROUP, quads, specular::Specular};
 
 /// Passes over whole views, and templates that several shaders include.
-const SHADERS: [(&str, &str); 23] = wgsl_files! {
+const SHADERS: [(&str, &str); 26] = wgsl_files! {
     "antialias.wgsl", "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "found.wgsl", "cube/walk.wgsl", "cube/colors.wgsl", "cube/gather.wgsl", "pixel_list.wgsl",
-    "gathered.wgsl", "gather_at.wgsl", "nearest_at.wgsl", "colors.wgsl", "bounce/ray.wgsl", "bounce/spawn.wgsl", "bounce/march.wgsl", "bounce/curved_search.wgsl", "single_pole.wgsl", "bounce/mips.wgsl", "bounce/land.wgsl"
+    "gathered.wgsl", "gather_at.wgsl", "nearest_at.wgsl", "colors.wgsl", "bounce/ray.wgsl", "bounce/list.wgsl", "bounce/glossy.wgsl", "bounce/lobe.wgsl", "bounce/spawn.wgsl", "bounce/march.wgsl", "bounce/curved_search.wgsl", "single_pole.wgsl", "bounce/mips.wgsl", "bounce/land.wgsl"
 };
 
 const PROVENANCE_EMPTY: u32 = ProvenanceKind::Empty as u32;
@@ -57,7 +57,7 @@ pub fn templates() -> Result<Templates, ShaderError> {
 
 /// The texts of all variants of all passes.
 pub fn shader_sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    gpu::shader_sources!(templates, TileStart, Fill, Specular, BounceMarch, CurvedWalk, Land, Shown)
+    gpu::shader_sources!(templates, TileStart, Fill, Specular, BounceMarch, CurvedWalk, Land, Lobe, Shown)
         .chain(quads::sources(templates))
         .chain(methods::sources(templates))
 }

@@ -27,7 +27,7 @@ const CLAMP: u32 = scene::Wrap::Clamp as u32;
 
 /// The shader templates of this crate.
 pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
-    "raster.wgsl", "append.wgsl", "layered/lit.wgsl", "packed_surface.wgsl", "surfaces.wgsl", "albedo.wgsl", "camera.wgsl", "single_pole.wgsl", "sequence.wgsl", "sums.wgsl",
+    "raster.wgsl", "append.wgsl", "layered/lit.wgsl", "packed_surface.wgsl", "surfaces.wgsl", "albedo.wgsl", "camera.wgsl", "single_pole.wgsl", "sums.wgsl",
     "illuminate.wgsl", "interpolate.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl", "hashed_alpha.wgsl",
     "rise.wgsl", "spot.wgsl", "shaded.wgsl", "visibility.wgsl", "reflections/bounce.wgsl", "reflections/bounce_off.wgsl", "reflections/curvature.wgsl",
     "reflections/spawn.wgsl", "reflections/follow.wgsl", "reflections/land.wgsl", "reflections/lobe.wgsl",

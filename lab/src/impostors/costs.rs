@@ -73,7 +73,7 @@ pub fn measure(hall: &Hall<'_>, mirrors: &[Mirror]) -> anyhow::Result<Costs> {
     let ((set, load_s), (sets, load_mirrors_s)) = (timed(load)?, timed(load_mirrors)?);
     let cells = cells(&bounds, &sets);
     let view_s = |reflections| -> anyhow::Result<f64> {
-        let mirrors = Mirrors { cells: &cells, reflections, glossy: false };
+        let mirrors = Mirrors { cells: &cells, reflections, glossy_rays: 0 };
         let reconstructor = hall.stand.reconstructor();
         let turn = Default::default();
         let make = || Ok(reconstructor.reconstruct_with(&set, mirrors, &views, CARVE, ViewPlanes::COLOR, turn)?);

@@ -192,7 +192,7 @@ impl<'s> Hall<'s> {
     /// # Errors
     /// The device fails.
     pub fn views(&self, cells: &[MirrorCell<'_>], reflections: u32) -> anyhow::Result<Vec<View>> {
-        let mirrors = Mirrors { cells, reflections, glossy: false };
+        let mirrors = Mirrors { cells, reflections, glossy_rays: 0 };
         let view = |subject: &Subject| {
             let (set, cameras, turn) = (&subject.set, [subject.camera], Default::default());
             let reconstructor = self.stand.reconstructor();

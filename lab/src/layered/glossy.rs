@@ -58,7 +58,7 @@ pub fn measure(stand: &Stand, is_quick: bool) -> anyhow::Result<(Table, Vec<Chec
     for directions in LightDirections::ALL {
         let field = subject.light_field(directions, lighting(Some(1))?)?.0;
         let set = subject.upload_with(&cube, field)?;
-        let views = shown(&subject, &set, LAYERED, Mirrors { glossy: true, ..Mirrors::default() })?;
+        let views = shown(&subject, &set, LAYERED, Mirrors { glossy_rays: 1, ..Mirrors::default() })?;
         let gathered = row(format!("gathered, {} directions", directions.count()), views, walk_s)?;
         checks.gathered = if directions == LightDirections::D258 { Some(gathered) } else { checks.gathered };
     }

@@ -69,6 +69,8 @@ impl Templates {
             ("light.wgsl", include_str!("../wgsl/light.wgsl")),
             ("environment.wgsl", include_str!("../wgsl/environment.wgsl")),
             ("highlight.wgsl", include_str!("../wgsl/highlight.wgsl")),
+            ("sequence.wgsl", include_str!("../wgsl/sequence.wgsl")),
+            ("lobe.wgsl", include_str!("../wgsl/lobe.wgsl")),
             ("table.wgsl", include_str!("../wgsl/table.wgsl")),
             ("tone.wgsl", include_str!("../wgsl/tone.wgsl")),
         ];

@@ -2,6 +2,7 @@
 //! mirror after mirror, and what they find is added to the pixels.
 
 mod curved_search;
+pub(crate) mod lobe;
 pub(crate) mod mips;
 
 use bytemuck::{Pod, Zeroable};
@@ -15,6 +16,7 @@ use wgpu::{Buffer, BufferUsages};
 
 pub use curved_search::CurvedSearch;
 pub(crate) use curved_search::{CurvedWalk, LONGEST_STEP, MAX_WALK_STEPS};
+pub(crate) use lobe::{GpuGlossySurface, Lobe};
 
 use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList};
@@ -55,8 +57,9 @@ pub struct Mirrors<'s> {
     pub cells: &'s [MirrorCell<'s>],
     /// Without any, mirrors show lamps and the environment.
     pub reflections: u32,
-    /// Rough surfaces show what is around them, too, where there is a light field.
-    pub glossy: bool,
+    /// Rays into the lobe of a rough surface that a view from a cube shows; in a light field it is gathered instead, whatever their
+    /// number. Without any, rough surfaces show lamps and the environment.
+    pub glossy_rays: u32,
 }
 
 impl Mirrors<'_> {
@@ -74,7 +77,7 @@ impl Mirrors<'_> {
         }
         let reflectors = set.cube.as_ref().map_or(&set.reflectors, |cube| &cube.reflectors);
         let has_mirrors = reflectors.as_ref().is_some_and(|of| of.highlight == Highlight::Ggx);
-        Ok(if (self.reflections > 0 || self.glossy) && has_mirrors { self } else { Self::default() })
+        Ok(if (self.reflections > 0 || self.glossy_rays > 0) && has_mirrors { self } else { Self::default() })
     }
 }
 
@@ -107,7 +110,9 @@ pub(crate) struct Bounces<'s> {
     /// Smallest first.
     cells: Vec<MirrorCell<'s>>,
     reflections: u32,
-    glossy: bool,
+    glossy_rays: u32,
+    /// Rough surfaces, which are to send rays.
+    glossy_surfaces: Option<PooledBuffer>,
     /// A `MirrorBox` for each cell.
     boxes: Buffer,
     /// A `ViewWork` for each cell.
@@ -174,7 +179,10 @@ impl<'s> Bounces<'s> {
         let plane = |label| lend(label, 4 * pixels);
         Ok(Some(Self {
             reflections: mirrors.reflections,
-            glossy: mirrors.glossy,
+            glossy_rays: mirrors.glossy_rays,
+            glossy_surfaces: (mirrors.glossy_rays > 0)
+                .then(|| lend("glossy surfaces", size_of::<GpuGlossySurface>() * pixels))
+                .transpose()?,
             boxes: device.gpu.buffer_with("mirror boxes", &boxes, BufferUsages::UNIFORM),
             works: cells.iter().enumerate().map(work).collect(),
             poles: cells.iter().map(|cell| poles(device, cell, curved_search)).collect(),
@@ -234,7 +242,8 @@ impl<'s> Bounces<'s> {
 
     /// What must live until the device is done.
     pub fn into_memory(self) -> Vec<PooledBuffer> {
-        let planes = [self.color, self.inverse_depth_per_m, self.provenance].into_iter().chain(self.steps);
+        let planes = [self.color, self.inverse_depth_per_m, self.provenance].into_iter();
+        let planes = planes.chain(self.steps).chain(self.glossy_surfaces);
         self.rays.into_iter().chain(self.listed).chain(planes).collect()
     }
 
@@ -243,9 +252,9 @@ impl<'s> Bounces<'s> {
         self.reflections
     }
 
-    /// Rough surfaces show what is around them.
-    pub fn are_glossy(&self) -> bool {
-        self.glossy
+    /// Rays into the lobe of a rough surface, and the memory for such surfaces; `None` without rays.
+    pub fn glossy(&self) -> Option<(u32, &Buffer)> {
+        self.glossy_surfaces.as_deref().map(|surfaces| (self.glossy_rays, surfaces))
     }
 
     /// The work of a cell.

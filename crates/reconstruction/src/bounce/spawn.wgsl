@@ -1,22 +1,5 @@
-// Lists of rays off mirrors, one for each mirror cell.
-
-// Where the surfaces of a mirror cell lie. Smaller boxes come first.
-struct MirrorBox {
-    min_in_world: vec3f,
-    // Where its list begins.
-    first_listed: u32,
-    max_in_world: vec3f,
-    padding: u32,
-}
-
-const MIRROR_CELLS: u32 = {{ mirror_cells }}u;
-
-@group(0) var<uniform> mirror_boxes: array<MirrorBox, MIRROR_CELLS>;
-@group(0) var<storage, read_write> next_rays: array<MirroredRay>;
-@group(0) var<storage, read_write> next_listed: array<u32>;
-struct NextList { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
-// One for each mirror cell, and one that counts all rays.
-@group(0) var<storage, read_write> next_lists: array<NextList, {{ mirror_cells + 1 }}>;
+// Rays off mirrors.
+{% include "bounce/list.wgsl" %}
 
 // The smallest mirror cell that holds a point, or the number after the last.
 fn mirror_cell_at(point_in_world: vec3f) -> u32 {
@@ -71,13 +54,9 @@ fn bounce_off(mirror: Mirror, pixel: u32, throughput_linear: vec3f, open: f32, s
         return environment_mirrored(towards, max(mirror.reflector.roughness, LEAST_ROUGHNESS)) * passed * open;
     }
     for (var listed = max(max(passed.r, passed.g), passed.b) > 0.0; listed; listed = false) {
-        let number = atomicAdd(&next_lists[MIRROR_CELLS].count, 1u);
-        let entry = atomicAdd(&next_lists[cell].count, 1u);
-        if entry % LIST_WORKGROUP == 0u { atomicAdd(&next_lists[cell].workgroups, 1u); }
-        next_listed[mirror_boxes[cell].first_listed + entry] = number;
         let near_m = START_FOOTPRINTS * side_m / max(dot(mirror.normal, towards), LEAST_RISE);
         let guess = pack4x8unorm(vec4f(open, mirror.reflector.roughness, 0.0, 0.0));
-        next_rays[number] = MirroredRay(mirror.point_in_world, pixel, towards, guess, rgb9e5_from_linear(passed), near_m, cone.width_m, cone.spread);
+        list_ray(cell, MirroredRay(mirror.point_in_world, pixel, towards, guess, rgb9e5_from_linear(passed), near_m, cone.width_m, cone.spread));
     }
     return vec3f(0.0);
 }

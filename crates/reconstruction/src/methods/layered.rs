@@ -1,9 +1,12 @@
 //! A walk along each ray through the samples of a layered depth cube.
 
-use depth_image::{Highlight, MAX_MIRROR_CELLS};
+use std::ops::RangeInclusive;
+
+use depth_image::{Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS};
 use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots, switches};
 use minijinja::{Value, context};
 
+use crate::bounce::lobe::{self, GlossyList};
 use crate::bounce::{Bounces, RayLists};
 use crate::cube::{Cube, LightField};
 use crate::reflectors::sample_texels;
@@ -34,36 +37,45 @@ impl Walked {
     }
 }
 
-/// What is gathered in a light field of what surfaces mirror.
+/// How a surface's lobe is lit, beside the rays off mirrors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Gather {
-    /// What smooth ones mirror.
-    Mirrors,
-    /// What no ray off a mirror brings.
-    Rest,
-    /// All.
-    All,
+enum LobeLight {
+    /// What smooth surfaces mirror is gathered in a light field.
+    GatheredMirrors,
+    /// What no ray off a mirror brings is gathered.
+    GatheredRest,
+    /// All is gathered.
+    Gathered,
+    /// Rays are sent for what no ray off a mirror brings.
+    SentRest,
+    /// Rays are sent for all.
+    Sent,
 }
 
-impl Gather {
-    const ALL: [Self; 3] = [Self::Mirrors, Self::Rest, Self::All];
+impl LobeLight {
+    const ALL: [Self; 5] = [Self::GatheredMirrors, Self::GatheredRest, Self::Gathered, Self::SentRest, Self::Sent];
 
     /// For the surfaces that pixels show. `followed` of `mirrors` are followed; rough surfaces may be glossy.
-    fn of_pixels(followed: u32, mirrors: u32, glossy: bool) -> Option<Self> {
-        match (followed == 0 && mirrors > 0, glossy) {
-            (true, true) => Some(Self::All),
-            (true, false) => Some(Self::Mirrors),
-            (false, true) => Some(if mirrors > 0 { Self::Rest } else { Self::All }),
-            (false, false) => None,
+    fn of_pixels((followed, mirrors): (u32, u32), glossy: bool, has_light_field: bool) -> Option<Self> {
+        match (followed < mirrors && followed == 0, glossy, has_light_field) {
+            (true, true, _) => Some(Self::Gathered),
+            (true, false, _) => Some(Self::GatheredMirrors),
+            (false, true, true) => Some(if mirrors > 0 { Self::GatheredRest } else { Self::Gathered }),
+            (false, true, false) => Some(if mirrors > 0 { Self::SentRest } else { Self::Sent }),
+            (false, false, _) => None,
         }
+    }
+
+    fn is_sent(self) -> bool {
+        matches!(self, Self::SentRest | Self::Sent)
     }
 
     /// In a shader, of a mirror.
     fn share(self) -> &'static str {
         match self {
-            Self::Mirrors => "mirror_share(mirror.reflector.roughness)",
-            Self::Rest => "1.0 - mirror_share(mirror.reflector.roughness)",
-            Self::All => "1.0",
+            Self::GatheredMirrors => "mirror_share(mirror.reflector.roughness)",
+            Self::GatheredRest | Self::SentRest => "1.0 - mirror_share(mirror.reflector.roughness)",
+            Self::Gathered | Self::Sent => "1.0",
         }
     }
 }
@@ -79,7 +91,7 @@ pub(crate) struct Walk {
     highlight: Option<Highlight>,
     /// Mirrors list the rays off them; the number of lists.
     mirror_cells: Option<usize>,
-    gather: Option<Gather>,
+    lobe: Option<LobeLight>,
     lights: usize,
     environment_map: bool,
     visibility_words: usize,
@@ -92,7 +104,7 @@ impl Walk {
         truncated: false,
         highlight: None,
         mirror_cells: None,
-        gather: None,
+        lobe: None,
         lights: 0,
         environment_map: false,
         visibility_words: 0,
@@ -102,7 +114,7 @@ impl Walk {
         recording: &Recording<'_>,
         cube: &Cube,
         rays: Walked,
-        (spawning, gather): (Option<&Bounces<'_>>, Option<Gather>),
+        (spawning, lobe): (Option<&Bounces<'_>>, Option<LobeLight>),
     ) -> Self {
         let reflectors = cube.reflectors.as_ref();
         let highlight = reflectors.map(|reflectors| reflectors.highlight);
@@ -118,7 +130,7 @@ impl Walk {
             highlight,
             // Mirrors of a matt base are not in it.
             mirror_cells: spawning.filter(|_| highlight == Some(Highlight::Ggx)).map(Bounces::cell_count),
-            gather: gather.filter(|_| highlight == Some(Highlight::Ggx)),
+            lobe: lobe.filter(|_| highlight == Some(Highlight::Ggx)),
             lights: reflectors.map_or(0, |reflectors| reflectors.lights),
             environment_map: is_mapped,
             visibility_words: reflectors.map_or(0, |reflectors| reflectors.visibility_words),
@@ -140,10 +152,14 @@ impl Walk {
 }
 
 impl Walk {
-    /// The same with all that may be gathered.
-    fn gathering(self) -> impl Iterator<Item = Self> {
-        let kinds = Gather::ALL.into_iter().filter(move |&kind| kind == Gather::Mirrors || !self.rays.is_bounced());
-        kinds.map(move |kind| Self { mirror_cells: (kind == Gather::Rest).then_some(1), gather: Some(kind), ..self })
+    /// The same with all ways to light lobes.
+    fn with_lobes(self) -> impl Iterator<Item = Self> {
+        let is_of_ends = |lobe: &LobeLight| *lobe == LobeLight::GatheredMirrors;
+        let lobes = LobeLight::ALL.into_iter().filter(move |lobe| is_of_ends(lobe) || !self.rays.is_bounced());
+        lobes.map(move |lobe| {
+            let follows = matches!(lobe, LobeLight::GatheredRest | LobeLight::SentRest);
+            Self { mirror_cells: follows.then_some(1), lobe: Some(lobe), ..self }
+        })
     }
 }
 
@@ -158,11 +174,12 @@ impl ShaderVariant for Walk {
             truncated => self.truncated,
             reflects => self.highlight.is_some(),
             highlight => highlight_name(self.highlight.unwrap_or(Highlight::Ggx)),
-            mirrors => self.mirror_cells.or(self.gather.map(|_| 0)).is_some(),
+            mirrors => self.mirror_cells.is_some() || self.lobe.is_some(),
             spawns => self.mirror_cells.is_some(),
-            gathers => self.gather.is_some(),
-            gathered_share => self.gather.map_or("0.0", Gather::share),
-            glossy => matches!(self.gather, Some(Gather::Rest | Gather::All)),
+            gathers => self.lobe.is_some_and(|lobe| !lobe.is_sent()),
+            lists_glossy => self.lobe.is_some_and(LobeLight::is_sent),
+            lobe_share => self.lobe.map_or("0.0", LobeLight::share),
+            glossy => self.lobe.is_some_and(|lobe| lobe != LobeLight::GatheredMirrors),
             mirror_cells => self.mirror_cells.unwrap_or(0),
             light_slots => light_slots(self.lights),
             environment_map => self.environment_map,
@@ -189,12 +206,12 @@ impl ShaderVariant for Walk {
                 let blinn_phong = (!environment_map).then_some(Self { highlight: Some(Highlight::BlinnPhong), ..with });
                 let mirrored = [Some(ggx), bounced].into_iter().flatten();
                 let each =
-                    |walk: Self| [walk, Self { mirror_cells: Some(1), ..walk }].into_iter().chain(walk.gathering());
+                    |walk: Self| [walk, Self { mirror_cells: Some(1), ..walk }].into_iter().chain(walk.with_lobes());
                 mirrored.flat_map(each).chain(blinn_phong)
             })
         });
         let own: Vec<Self> = matt.chain(glossy).collect();
-        let left = own.iter().filter(|walk| walk.lights <= 3 && walk.gather.is_none()).map(|walk| walk.of_base());
+        let left = own.iter().filter(|walk| walk.lights <= 3 && walk.lobe.is_none()).map(|walk| walk.of_base());
         let without_reflectors = switches().map(|[truncated, environment_map]| Self {
             rays: Walked::LeftBounced,
             truncated,
@@ -206,7 +223,7 @@ impl ShaderVariant for Walk {
 }
 
 /// Records the walk of all pixels, and of the rays off the mirrors that they show, of which `followed` are followed before what the next
-/// one shows is gathered. Gives the pixels that stay unknown.
+/// one shows is gathered; then of rays into lobes. Gives the pixels that stay unknown.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     bounces: Option<&Bounces<'_>>,
@@ -216,22 +233,49 @@ pub(crate) fn record(
     let Some(cube) = recording.set.cube.clone() else { return Ok(undecided) };
     let mirrors = bounces.map_or(0, Bounces::reflections);
     let followed = followed.map_or(mirrors, |followed| followed.min(mirrors));
-    let glossy = bounces.is_some_and(Bounces::are_glossy) && cube.light_field.is_some();
-    let next_of = |recording: &Recording<'_>, before: Option<&RayLists>, reflection: u32| {
-        bounces.filter(|_| reflection < followed).map(|bounces| bounces.next(recording.device, before))
-    };
-    let mut next = next_of(recording, None, 0);
-    let gather = Gather::of_pixels(followed, mirrors, glossy);
-    walk_pixels(recording, &cube, (None, &undecided), (bounces.zip(next.as_ref()), gather))?;
+    let glossy = bounces.and_then(Bounces::glossy);
+    let lobe = LobeLight::of_pixels((followed, mirrors), glossy.is_some(), cube.light_field.is_some());
+    let sent = glossy.filter(|_| lobe.is_some_and(LobeLight::is_sent)).map(|(rays, surfaces)| {
+        // The positions within a pixel share its rays.
+        let rays = rays.div_ceil(recording.batch.planes.antialias.samples());
+        GlossyList::empty(recording.device, surfaces, rays)
+    });
+    let first = bounces.filter(|_| followed > 0).map(|bounces| bounces.next(recording.device, None));
+    walk_pixels(recording, &cube, (None, &undecided), (bounces.zip(first.as_ref()), lobe, sent.as_ref()))?;
     let Some(bounces) = bounces else { return Ok(undecided) };
-    for reflection in 1..=followed {
-        let Some(lists) = next else { break };
-        next = next_of(recording, Some(&lists), reflection);
-        let gather = (reflection == followed && followed < mirrors).then_some(Gather::Mirrors);
-        let rays = (Walked::Bounced, gather);
-        follow(recording, (&cube, rays), bounces, (&lists, next.as_ref()), (0, reflection))?;
+    if let Some(first) = first {
+        let last = (followed < mirrors).then_some(LobeLight::GatheredMirrors);
+        follow_mirrors(recording, &cube, bounces, (first, last), 1..=followed)?;
+    }
+    let reflectors = cube.reflectors.as_ref();
+    for (glossy, reflectors) in sent.iter().zip(reflectors) {
+        for number in 0..glossy.rays {
+            let first = lobe::record(recording, bounces, (glossy, number), &reflectors.illumination)?;
+            // Costs are learned by generation, and are others than those of rays off mirrors.
+            let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + mirrors.max(1);
+            follow_mirrors(recording, &cube, bounces, (first, None), generations)?;
+        }
     }
     Ok(undecided)
+}
+
+/// Records the walk of listed rays, and of those off the mirrors that they meet; what the `last` ones show may be gathered.
+fn follow_mirrors(
+    recording: &mut Recording<'_>,
+    cube: &Cube,
+    bounces: &Bounces<'_>,
+    (mut lists, last): (RayLists, Option<LobeLight>),
+    generations: RangeInclusive<u32>,
+) -> Result<(), ReconstructionError> {
+    for generation in generations.clone() {
+        let goes_on = generation < *generations.end();
+        let next = goes_on.then(|| bounces.next(recording.device, Some(&lists)));
+        let lobe = last.filter(|_| !goes_on);
+        follow(recording, (cube, (Walked::Bounced, lobe)), bounces, (&lists, next.as_ref()), (0, generation))?;
+        let Some(next) = next else { break };
+        lists = next;
+    }
+    Ok(())
 }
 
 /// Records the walk of pixels that another method leaves, in the cube beside its images. Gives those that stay unknown.
@@ -242,7 +286,7 @@ pub(crate) fn record_left(
     mirrored: Option<(&Bounces<'_>, &RayLists)>,
 ) -> Result<PixelList, ReconstructionError> {
     let undecided = recording.empty_list();
-    walk_pixels(recording, base, (Some(left), &undecided), (mirrored, None))?;
+    walk_pixels(recording, base, (Some(left), &undecided), (mirrored, None, None))?;
     Ok(undecided)
 }
 
@@ -261,10 +305,10 @@ fn walk_pixels(
     recording: &mut Recording<'_>,
     cube: &Cube,
     (listed, undecided): (Option<&PixelList>, &PixelList),
-    (mirrored, gather): (Option<(&Bounces<'_>, &RayLists)>, Option<Gather>),
+    (mirrored, lobe, sent): (Option<(&Bounces<'_>, &RayLists)>, Option<LobeLight>, Option<&GlossyList<'_>>),
 ) -> Result<(), ReconstructionError> {
     let rays = if listed.is_some() { Walked::LeftPixels } else { Walked::Pixels };
-    let variant = Walk::of(recording, cube, rays, (mirrored.map(|(bounces, _)| bounces), gather));
+    let variant = Walk::of(recording, cube, rays, (mirrored.map(|(bounces, _)| bounces), lobe));
     let pass = recording.device.passes.get(&variant)?;
     let mut bindings = recording.view_bindings();
     bindings.extend(shared_bindings(recording, cube, &variant));
@@ -272,6 +316,7 @@ fn walk_pixels(
     bindings.extend(listed.into_iter().flat_map(PixelList::bindings));
     let spawning = mirrored.filter(|_| variant.mirror_cells.is_some());
     bindings.extend(spawning.into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
+    bindings.extend(sent.filter(|_| variant.lobe.is_some()).into_iter().flat_map(GlossyList::bindings));
     let bound = pass.bind(0, bindings)?;
     recording.dispatch_pixels(&variant, &pass, &bound, listed);
     Ok(())
@@ -280,12 +325,12 @@ fn walk_pixels(
 /// Records the walk of rays off one mirror of a mirror cell, whose light is added to their pixels.
 fn follow(
     recording: &mut Recording<'_>,
-    (cube, (rays, gather)): (&Cube, (Walked, Option<Gather>)),
+    (cube, (rays, lobe)): (&Cube, (Walked, Option<LobeLight>)),
     bounces: &Bounces<'_>,
     (lists, next): (&RayLists, Option<&RayLists>),
     (cell, reflection): (usize, u32),
 ) -> Result<(), ReconstructionError> {
-    let variant = Walk::of(recording, cube, rays, (next.map(|_| bounces), gather));
+    let variant = Walk::of(recording, cube, rays, (next.map(|_| bounces), lobe));
     let pass = recording.device.passes.get(&variant)?;
     let mut bindings = shared_bindings(recording, cube, &variant);
     let [_, _, ray_provenance] = bounces.planes();
@@ -305,7 +350,7 @@ fn follow(
 
 fn shared_bindings<'b>(recording: &'b Recording<'_>, cube: &'b Cube, variant: &Walk) -> Vec<Binding<'b>> {
     let mut bindings: Vec<Binding<'b>> = cube.bindings().into_iter().collect();
-    let light_field = cube.light_field.as_ref().filter(|_| variant.gather.is_some());
+    let light_field = cube.light_field.as_ref().filter(|_| variant.lobe.is_some_and(|lobe| !lobe.is_sent()));
     bindings.extend(light_field.into_iter().flat_map(LightField::bindings));
     // A base may be too coarse to hold the mirrors of the view's images, or anything that reflects.
     let lit = cube.reflectors.as_ref().or(recording.set.reflectors.as_ref().filter(|_| variant.rays.is_bounced()));

@@ -33,6 +33,26 @@
 {%- if spawns %}
 {% include "bounce/spawn.wgsl" %}
 {%- endif %}
+{%- if lists_glossy %}
+{% include "sequence.wgsl" %}
+{% include "lobe.wgsl" %}
+{% include "bounce/glossy.wgsl" %}
+
+@group(0) var<storage, read_write> glossy_surfaces: array<GlossySurface>;
+struct GlossyList { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
+@group(0) var<storage, read_write> glossy_list: GlossyList;
+
+// Lists a surface from whose lobe a pixel shows the share `shown`. All of its rays together weigh 1.
+fn list_glossy(mirror: Mirror, pixel: u32, shown: vec3f, open: f32) {
+    let seed = seed_of(mirror.point_in_world);
+    var sum = 0.0;
+    for (var i = 0u; i < lobe_rays.count; i++) { sum += lobe_ray(mirror, point_of(i, seed)).weight; }
+    let entry = atomicAdd(&glossy_list.count, 1u);
+    if entry % LIST_WORKGROUP == 0u { atomicAdd(&glossy_list.workgroups, 1u); }
+    let throughput = shown * environment_reflectance(mirror) / max(sum, 1e-12);
+    glossy_surfaces[entry] = GlossySurface(mirror.point_in_world, pixel, mirror.towards_eye, oct16_from_unit(mirror.normal), throughput, mirror.reflector.roughness, cube.start_m, open, vec2u(0u));
+}
+{%- endif %}
 {%- if bounced %}
 @group(0) var<storage, read> rays: array<MirroredRay>;
 {%- if left %}
@@ -54,13 +74,19 @@ fn light_from(hit: CubeHit, point_in_world: vec3f, towards_eye: vec3f, pixel: u3
         let mirror = Mirror(point_in_world, glossy.normal, towards_eye, unpack_reflector(glossy.reflector));
 {%- endif %}
 {%- if gathers %}
-        let share = {{ gathered_share }};
+        let share = {{ lobe_share }};
         for (var gathers = share > 0.0; gathers; gathers = false) {
             shown += own * environment_reflectance(mirror) * share * gathered_light(mirror);
         }
 {%- endif %}
-{%- if spawns %}
+{%- if spawns or lists_glossy %}
         let open = {{ "unpack4x8unorm(glossy.visibility[0]).x" if visibility_words > 0 else "1.0" }};
+{%- endif %}
+{%- if lists_glossy %}
+        let rest = {{ lobe_share }};
+        for (var lists = rest > 0.0; lists; lists = false) { list_glossy(mirror, pixel, own * rest, open); }
+{%- endif %}
+{%- if spawns %}
         shown += bounce_off(mirror, pixel, own, open, cube.start_m / START_FOOTPRINTS, Cone(0.0, 0.0));
 {%- endif %}
     }

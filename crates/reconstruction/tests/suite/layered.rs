@@ -95,7 +95,7 @@ fn mirrors_show_what_direct_drawing_shows() {
     let set = reconstructor().upload_cube(&grid, &images, &description).expect("a cube");
     let camera = looking(Vec3::new(0.4, 2.0, 6.5), Vec3::Y * 1.2, 40.0, UVec2::new(120, 90));
     let view = |reflections| {
-        let mirrors = Mirrors { cells: &[], reflections, glossy: false };
+        let mirrors = Mirrors { cells: &[], reflections, glossy_rays: 0 };
         let views =
             reconstructor().reconstruct_with(&set, mirrors, &[camera], LAYERED, ViewPlanes::ALL, Turn::default());
         views.expect("a view").remove(0)

@@ -45,7 +45,7 @@ impl Hall {
     fn view(&self, camera: &PinholeCamera, reflections: u32) -> View {
         let cells: Vec<MirrorCell<'_>> =
             self.cells.iter().map(|(bounds, surroundings)| MirrorCell { bounds: *bounds, surroundings }).collect();
-        let mirrors = Mirrors { cells: &cells, reflections, glossy: false };
+        let mirrors = Mirrors { cells: &cells, reflections, glossy_rays: 0 };
         reconstruct(&self.samples, mirrors, &[*camera], ViewPlanes::ALL).expect("a view").remove(0)
     }
 
@@ -184,7 +184,7 @@ fn sets_without_mirrors_are_what_they_are_without_cells() {
         let [without, with] = [0, 2].map(|reflections| {
             let (bounds, surroundings) = (hall.cells[0].0, &hall.cells[0].1);
             let cells = [MirrorCell { bounds, surroundings }];
-            reconstruct(&set, Mirrors { cells: &cells, reflections, glossy: false }, &[camera], ViewPlanes::ALL)
+            reconstruct(&set, Mirrors { cells: &cells, reflections, glossy_rays: 0 }, &[camera], ViewPlanes::ALL)
                 .expect("a view")
         });
         assert!(with == without, "{highlight:?}");
@@ -202,7 +202,7 @@ fn views_with_several_samples_a_pixel_are_the_same_together_and_alone() {
     let cells = [MirrorCell { bounds: around, surroundings: &hall.samples }, MirrorCell { bounds, surroundings }];
     let planes = ViewPlanes { antialias: Antialias::of(4).expect("four samples"), ..ViewPlanes::ALL };
     let views = |cells: &[MirrorCell<'_>], cameras: &[PinholeCamera]| {
-        reconstruct(&hall.samples, Mirrors { cells, reflections: 2, glossy: false }, cameras, planes).expect("views")
+        reconstruct(&hall.samples, Mirrors { cells, reflections: 2, glossy_rays: 0 }, cameras, planes).expect("views")
     };
     let together = views(&cells, &cameras);
     let alone: Vec<View> = cameras.iter().map(|camera| views(&cells[1..], &[*camera]).remove(0)).collect();
@@ -239,7 +239,7 @@ fn a_matt_base_tells_what_no_image_knows() {
     let guessed = hall.view(&camera, 2);
     let cells = [MirrorCell { bounds: hall.cells[0].0, surroundings: &hall.cells[0].1 }];
     let common =
-        CommonSets { mirrors: Mirrors { cells: &cells, reflections: 2, glossy: false }, base: Some(&matt_base) };
+        CommonSets { mirrors: Mirrors { cells: &cells, reflections: 2, glossy_rays: 0 }, base: Some(&matt_base) };
     let turn = Default::default();
     let views = reconstructor().reconstruct_with(&hall.samples, common, &[camera], CARVE, ViewPlanes::ALL, turn);
     let told = views.expect("a view").remove(0);
@@ -294,7 +294,7 @@ fn more_than_the_limits_is_refused() {
     let (bounds, surroundings) = (hall.cells[0].0, &hall.cells[0].1);
     let cells = [MirrorCell { bounds, surroundings }; 9];
     let refused = |cells: &[MirrorCell<'_>], reflections| {
-        reconstruct(&hall.samples, Mirrors { cells, reflections, glossy: false }, &[], ViewPlanes::ALL)
+        reconstruct(&hall.samples, Mirrors { cells, reflections, glossy_rays: 0 }, &[], ViewPlanes::ALL)
             .expect_err("beyond the limits")
     };
     assert!(matches!(refused(&cells, 1), ReconstructionError::MirrorCells(9)));

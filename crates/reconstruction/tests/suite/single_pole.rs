@@ -275,7 +275,7 @@ fn a_view_shows_the_teapot_in_its_mirror() {
     let samples = reconstructor().upload(&samples, &description(scene)).expect("a set");
     let cells = [MirrorCell { bounds: Aabb { min: MIRROR - 3.6, max: MIRROR + 3.6 }, surroundings: &set }];
     let shown = |reflections| {
-        let mirrors = Mirrors { cells: &cells, reflections, glossy: false };
+        let mirrors = Mirrors { cells: &cells, reflections, glossy_rays: 0 };
         let views =
             reconstructor().reconstruct_with(&samples, mirrors, &[view], CARVE, ViewPlanes::ALL, Default::default());
         views.expect("a view").remove(0)

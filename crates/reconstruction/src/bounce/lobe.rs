@@ -1,0 +1,112 @@
+//! Rays into the lobes of the rough surfaces that a view shows: each surface is listed once, and sends one ray after another.
+
+use bytemuck::{Pod, Zeroable};
+use depth_image::Highlight;
+use gpu::{Binding, ResourceTraits, ShaderVariant, highlight_name, light_slots};
+use minijinja::{Value, context};
+use wgpu::{Buffer, BufferUsages};
+
+use super::{Bounces, RayLists};
+use crate::pixel_list::GpuPixelList;
+use crate::{device::Device, error::ReconstructionError, recording::Recording};
+
+/// `GlossySurface` of `bounce/glossy.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuGlossySurface {
+    pub point_in_world: [f32; 3],
+    pub pixel: u32,
+    pub towards_eye: [f32; 3],
+    pub normal_oct16: u32,
+    pub throughput_linear: [f32; 3],
+    pub roughness: f32,
+    pub start_m: f32,
+    pub open: f32,
+    pub padding: [u32; 2],
+}
+
+/// `LobeRays` of `bounce/glossy.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuLobeRays {
+    pub count: u32,
+    pub number: u32,
+}
+
+/// The rough surfaces of one position within the pixels.
+pub(crate) struct GlossyList<'b> {
+    surfaces: &'b Buffer,
+    list: Buffer,
+    /// Rays of each.
+    pub rays: u32,
+    count: Buffer,
+}
+
+impl<'b> GlossyList<'b> {
+    /// None as yet.
+    pub fn empty(device: &Device, surfaces: &'b Buffer, rays: u32) -> Self {
+        let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT;
+        let list = GpuPixelList { workgroups: [0, 1, 1], count: 0 };
+        let list = device.gpu.buffer_with("glossy surfaces", &[list], usage);
+        Self { surfaces, list, rays, count: uniform(device, rays, 0) }
+    }
+
+    /// The resources of passes that list surfaces.
+    pub fn bindings(&self) -> [Binding<'_>; 3] {
+        [
+            Binding::buffer("lobe_rays", &self.count),
+            Binding::buffer("glossy_surfaces", self.surfaces),
+            Binding::buffer("glossy_list", &self.list),
+        ]
+    }
+}
+
+fn uniform(device: &Device, count: u32, number: u32) -> Buffer {
+    device.gpu.buffer_with("rays of lobes", &[GpuLobeRays { count, number }], BufferUsages::UNIFORM)
+}
+
+/// One ray of each listed surface.
+#[derive(Debug)]
+pub(crate) struct Lobe;
+
+impl ShaderVariant for Lobe {
+    const TEMPLATE: &'static str = "bounce/lobe.wgsl";
+    const TRAITS: ResourceTraits = &[];
+
+    fn context(&self) -> Value {
+        context! {
+            highlight => highlight_name(Highlight::Ggx),
+            mirrors => true,
+            mirror_cells => 1,
+            environment_map => false,
+            light_slots => light_slots(0),
+            visibility_words => 0,
+        }
+    }
+
+    fn all() -> Vec<Self> {
+        vec![Self]
+    }
+}
+
+/// Records the pass that sends one of the rays of all listed surfaces; gives their lists.
+pub(crate) fn record(
+    recording: &mut Recording<'_>,
+    bounces: &Bounces<'_>,
+    (glossy, number): (&GlossyList<'_>, u32),
+    illumination: &Buffer,
+) -> Result<RayLists, ReconstructionError> {
+    let pass = recording.device.passes.get(&Lobe)?;
+    let lists = bounces.next(recording.device, None);
+    let own = uniform(recording.device, glossy.rays, number);
+    let mut bindings = vec![
+        Binding::buffer("illumination", illumination),
+        Binding::buffer("lobe_rays", &own),
+        Binding::buffer("glossy", glossy.surfaces),
+        Binding::buffer("glossy_list", &glossy.list),
+    ];
+    bindings.extend(bounces.spawn_bindings(&lists));
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_listed(&Lobe, &pass, &bound, (&glossy.list, 0), ());
+    Ok(lists)
+}
