@@ -37,8 +37,8 @@ const LEAST_PSNR_DB: [f64; 2] = [33.0, 31.5];
 /// all around. Compares the views with direct drawing, and with those of joint_carve from depth images near each view. Then follows
 /// rays off mirrors through a cube, up to seven mirrors on a ray's way, and says after how many views the cube is repaid. Also compares
 /// what a compositor pulls for viewers in many places: one cube, or the images of their view cells. Then come the paper's own ways to
-/// primary rays: projecting all samples, and quadtrees of depths. Last come a cube as a base beside depth images, and glossy pixels and
-/// mirrors that are gathered in layered light fields, beside rays.
+/// primary rays: projecting all samples, and quadtrees of depths. Then come a cube as a base beside depth images, and glossy pixels and
+/// mirrors that are gathered in layered light fields, beside rays. Last comes the paper's Table 1, its figures beside ours.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   myriorama study layered

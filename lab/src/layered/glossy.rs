@@ -1,4 +1,4 @@
-//! Glossy pixels by rays into their lobes, drawn directly, and gathered in light fields: error against time.
+//! Glossy pixels by rays into their lobes, drawn directly and in a cube, and gathered in light fields: error against time.
 
 use depth_image::{LightDirections, PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
@@ -35,7 +35,7 @@ const SIDE: u32 = 512;
 /// The device fails.
 pub fn measure(stand: &Stand, is_quick: bool) -> anyhow::Result<(Table, Vec<Check>)> {
     let columns = [("way", ""), ("PSNR", "dB"), ("FLIP", ""), ("a view", "ms"), ("a view without", "ms")];
-    let title = format!("Glossy pixels of {SCENE}, against {MOST_RAYS} rays into their lobes, drawn directly");
+    let title = format!("Glossy pixels of {SCENE}, against {MOST_RAYS} rays drawn directly");
     let mut table = Table::new(title, &columns);
     let subject = Subject::of_views(stand, SCENE, LIGHT.parse()?, |_| cameras())?;
     let without_s = drawn(&subject, None)?.1;
@@ -49,12 +49,17 @@ pub fn measure(stand: &Stand, is_quick: bool) -> anyhow::Result<(Table, Vec<Chec
     };
     let mut checks = Checks::default();
     for &rays in &RAYS[..if is_quick { QUICK } else { RAYS.len() }] {
-        let drawn = row(format!("{rays} rays"), drawn(&subject, Some(rays))?, without_s)?;
+        let drawn = row(format!("{rays} rays, drawn directly"), drawn(&subject, Some(rays))?, without_s)?;
         checks.few = if rays == FEW_RAYS { Some(drawn) } else { checks.few };
         checks.many = if rays == MANY_RAYS { Some(drawn) } else { checks.many };
     }
     let cube = subject.cube((SIDE, LayerSelection::Dominant), subject.lighting, 1)?;
-    let walk_s = shown(&subject, &subject.upload(&cube)?.0, LAYERED, Mirrors::default())?.1;
+    let (set, _) = subject.upload(&cube)?;
+    let walk_s = shown(&subject, &set, LAYERED, Mirrors::default())?.1;
+    for &rays in &RAYS[..if is_quick { QUICK } else { RAYS.len() }] {
+        let views = shown(&subject, &set, LAYERED, Mirrors { glossy_rays: rays, ..Mirrors::default() })?;
+        row(format!("{rays} rays in a cube"), views, walk_s)?;
+    }
     for directions in LightDirections::ALL {
         let field = subject.light_field(directions, lighting(Some(1))?)?.0;
         let set = subject.upload_with(&cube, field)?;

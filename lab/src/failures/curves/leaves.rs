@@ -16,10 +16,12 @@ const LEAVES: u32 = 80;
 /// Half sides of leaves that are not narrow.
 const HALF_M: f32 = 3.0;
 const HALF_LENGTH_M: f32 = 8.0;
+const SMALL_LEAVES: u32 = 300;
+const SMALL_HALF_M: f32 = 0.7;
 const BLADES: u32 = 40;
 const RAYS_A_BLADE: u32 = 60;
 
-pub const CURVES: [Curve; 2] = [
+pub const CURVES: [Curve; 3] = [
     Curve {
         name: "Narrow leaves in a cube",
         subject: "blades of all directions, the twin",
@@ -37,6 +39,18 @@ pub const CURVES: [Curve; 2] = [
         series: &[Series::new("layered", &[Shape::FallsThenFlat { least_fall: 0.3, tolerance: 0.01 }])],
         why: "Lines begin at one side of the scene: a viewer on the other side sees their last layers.",
         measure: by_layers,
+    },
+    Curve {
+        name: "Small leaves against the axes that hold them",
+        subject: "300 leaves of 1.4 spacings, kept where their normal has a share of its greatest component, the twin",
+        x: X::linear("least share of the greatest component", "", &[0.0, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]),
+        y: ["rays to a leaf that miss it, samples over all", ""],
+        series: &[
+            Series::new("missed", &[Shape::rises(0.01, 0.005)]),
+            Series::new("samples", &[Shape::falls(0.3, 0.0), Shape::EqualAt { x: 0.0, y: 1.0, tolerance: 0.0 }]),
+        ],
+        why: "A leaf smaller than √3 spacings is met by chance: each further axis that holds it is one more chance.",
+        measure: by_share,
     },
 ];
 
@@ -112,6 +126,22 @@ fn by_layers(_: &Stand, counts: &[f64]) -> anyhow::Result<Rows> {
         let twin = CubeTwin::new(&grid, &images.each_ref().map(|image| cut(image, layers as usize)));
         let rays = cubes::rays_around(Vec3::splat(0.5 * (SIDE - 1) as f32), 9.0, RAYS);
         Ok([missed(rays.map(|ray| cubes::both(&twin, crossings, ray)))])
+    })
+}
+
+fn by_share(_: &Stand, shares: &[f64]) -> anyhow::Result<Rows> {
+    let grid = cubes::grid(SIDE)?;
+    let leaves: Vec<Leaf> = (0..SMALL_LEAVES).map(|seed| Leaf::new(seed, 16.0, Vec2::splat(SMALL_HALF_M))).collect();
+    let crossings = |ray| leaves.iter().flat_map(|leaf| leaf.crossings(ray)).collect::<Vec<_>>();
+    let kept = |share: f32| [0, 1, 2].map(|axis| cubes::image(&grid, axis, share, crossings));
+    let samples = |images: &[LayeredDepthImage; 3]| images.iter().map(LayeredDepthImage::sample_count).sum::<usize>();
+    let all = samples(&kept(0.0));
+    rows(shares, |share| {
+        let images = kept(share as f32);
+        let twin = CubeTwin::new(&grid, &images);
+        let rays = cubes::rays_around(Vec3::splat(0.5 * (SIDE - 1) as f32), 9.0, RAYS);
+        let met = rays.map(|ray| cubes::both(&twin, crossings, ray));
+        Ok([missed(met), samples(&images) as f64 / all as f64])
     })
 }
 
