@@ -69,8 +69,9 @@ pub fn at_rate(request: SessionRequest, frames_per_s: f64) -> SessionRequest {
 /// images, fewer pictures a second. Each includes those before it. Steps that the lighting and the method do not have are skipped.
 fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
     let whole: Option<Lighting> = lighting.parse().ok();
-    // Reconstructed views have no glossy reflections to lose.
-    let loses = |lighting: &Lighting| lighting.reflections() > 0 || method == DIRECT;
+    // Views from depth images have no glossy reflections to lose.
+    let walks_cube = method.parse().is_ok_and(ReconstructionMethod::walks_cube);
+    let loses = |lighting: &Lighting| lighting.reflections() > 0 || method == DIRECT || walks_cube;
     let unmirrored = whole.filter(loses).and_then(|lighting| lighting.without_reflections());
     let fewer_rays = unmirrored.or(whole).and_then(|lighting| lighting.with_fewer_rays());
     let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.coarser());
@@ -83,8 +84,7 @@ fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
     let coarse = fewer_steps.map(|method| Quality { method: method.to_string(), ..above.clone() });
     let above = coarse.clone().unwrap_or(above);
     // The images of a cube have one size.
-    let is_sized = !all.method.parse().is_ok_and(ReconstructionMethod::walks_cube);
-    let small = is_sized.then(|| Quality { sample_side_ratio: SAMPLE_SIDE_RATIO, ..above.clone() });
+    let small = (!walks_cube).then(|| Quality { sample_side_ratio: SAMPLE_SIDE_RATIO, ..above.clone() });
     let above = small.clone().unwrap_or(above);
     let slow = Quality { frame_rate_ratio: FRAME_RATE_RATIO, ..above };
     plain.into_iter().chain(dim).chain(coarse).chain(small).chain([slow]).collect()

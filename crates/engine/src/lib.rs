@@ -160,10 +160,6 @@ impl GpuEngine {
         method: SamplingMethod,
     ) -> Result<Vec<SampleImage>, EngineError> {
         let wanted = request.wanted.iter().filter_map(|&wanted| request.cameras.get(wanted as usize));
-        let wanted: Vec<&SampleCamera> = wanted.collect();
-        if wanted.iter().any(|camera| camera.light_field().is_some()) && mirrored.without_reflections().is_none() {
-            return Err(invalid("lighting", "a light field needs reflections N or glossy N, which it shows"));
-        }
         let image = |camera: &SampleCamera| match camera {
             SampleCamera::Layered(camera) => self.sampler.sample_layers(draw, camera, method).map(SampleImage::Layered),
             SampleCamera::LightField(camera) => {
@@ -172,7 +168,7 @@ impl GpuEngine {
             }
             SampleCamera::Depth(_) => Err(SamplingError::Lines { method: method.to_string() }),
         };
-        self.catching(|| wanted.into_iter().map(image).collect::<Result<_, _>>().map_err(sampling_error))
+        self.catching(|| wanted.map(image).collect::<Result<_, _>>().map_err(sampling_error))
     }
 }
 
