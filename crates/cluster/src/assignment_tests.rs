@@ -2,7 +2,10 @@
 
 use std::num::NonZeroU32;
 
-use depth_image::{Aabb, Camera, CubeGrid, Environment, PinholeCamera, SampleCamera, SinglePoleCamera};
+use depth_image::{
+    Aabb, Camera, CubeGrid, Environment, LightDirections, LightFieldCamera, PinholeCamera, SampleCamera,
+    SinglePoleCamera,
+};
 use glam::{UVec2, Vec3};
 
 use crate::test_support::{assignment, camera, workload};
@@ -263,8 +266,10 @@ fn a_cube_is_one_cell_of_its_three_cameras_for_views_from_anywhere() {
     assert!(views.iter().all(|view| good.cell_of(view) == 0 && good.has_cell_near(view)));
     let refused = |workload: Workload| workload.validate().expect_err("refused").to_string();
     assert!(refused(cube(still, &|cameras| cameras.swap(0, 1))).contains("three cameras of one layered cube"));
-    assert!(refused(cube(still, &|cameras| cameras[2] = camera().into())).contains("2 parallel of 3"));
-    assert!(refused(cube(still, &|cameras| cameras.truncate(2))).contains("2 parallel of 2"));
+    assert!(
+        refused(cube(still, &|cameras| cameras[2] = camera().into())).contains("2 parallel and 0 light_field of 3")
+    );
+    assert!(refused(cube(still, &|cameras| cameras.truncate(2))).contains("2 parallel and 0 light_field of 2"));
     let grid = CubeGrid::around(&good.volume, 64).unwrap();
     let flat = CubeGrid { size: grid.size.with_y(15), ..grid };
     let flat = cube(still, &|cameras| *cameras = [0, 1, 2].map(|axis| flat.camera(axis).into()).to_vec());
@@ -273,6 +278,39 @@ fn a_cube_is_one_cell_of_its_three_cameras_for_views_from_anywhere() {
     assert!(refused(cells).contains("cells of a layered cube is 2, must be 1"));
     let moving = Timeline { start_s: 0.0, step_s: 0.1, set_count: 5 };
     assert!(refused(cube(moving, &|_| ())).contains("still for a layered cube"));
+}
+
+#[test]
+fn one_light_field_may_follow_the_cameras_of_a_cube() {
+    let still = Workload { timeline: Timeline::still(0.0), ..workload() };
+    let cube = CubeGrid::around(&still.volume, 64).unwrap().cameras().map(SampleCamera::from);
+    let around = LightFieldCamera::around(still.volume, LightDirections::D66, 16);
+    let field = [SampleCamera::from(around)];
+    let of = |cameras: &[&[SampleCamera]]| Workload { sample_cameras: cameras.concat(), ..still.clone() };
+    let good = of(&[&cube, &field]);
+    assert_eq!(good.validate(), Ok(()));
+    assert!(good.samples_cube() && good.has_cell_near(&camera()));
+    let content = |workload: Workload| Assignment { workload, ..assignment() }.set_content(0);
+    assert_ne!(content(good.clone()), content(of(&[&cube])));
+    let refused = |workload: Workload| workload.validate().expect_err("refused").to_string();
+    for (cameras, given) in [
+        (of(&[&cube, &field, &field]), "3 parallel and 2 light_field of 5"),
+        (of(&[&field, &cube]), "0 parallel and 1 light_field of 4"),
+        (of(&[&cube[..2], &field, &cube[2..]]), "2 parallel and 1 light_field of 4"),
+        (of(&[&field]), "0 parallel and 1 light_field of 1"),
+        (of(&[&[camera().into()], &field]), "0 parallel and 0 light_field of 2"),
+    ] {
+        let text = refused(cameras);
+        assert!(text.contains("sample_cameras.model") && text.contains(given), "{text}");
+    }
+    let cell = CommonCell { kind: CommonKind::Base, ..mirror(0.0) };
+    let base = still.clone().with_common_cells(vec![(cell, good.sample_cameras.clone())]);
+    let text = refused(base);
+    assert!(text.contains("sample_cameras.model") && text.contains("3 parallel and 1 light_field of 4"), "{text}");
+    let dense = SampleCamera::from(LightFieldCamera { side_px: 91, ..around });
+    assert!(refused(of(&[&cube, &[dense]])).contains("side_px"));
+    let part = SampleCamera::from(LightFieldCamera { first_pair: 1, pairs: 32, ..around });
+    assert!(refused(of(&[&cube, &[part]])).contains("sample_cameras.pairs is 32 of 33"));
 }
 
 #[test]

@@ -66,6 +66,11 @@ pub(crate) fn check_cube(cameras: &[SampleCamera], most_light_fields: usize) -> 
             "the three cameras of one layered cube, in one cell, and at most one of a light field of its samples";
         return Err(InvalidField::out_of_range("sample_cameras.model", given, allowed));
     }
+    let mut fields = cameras.iter().filter_map(SampleCamera::light_field);
+    if let Some(part) = fields.find(|field| field.pairs != field.directions.pairs()) {
+        let given = format!("{} of {}", part.pairs, part.directions.pairs());
+        return Err(InvalidField::out_of_range("sample_cameras.pairs", given, "all of a light field"));
+    }
     let short = parallel.iter().find(|camera| camera.size_px.y < MAX_TILES);
     short.map_or(Ok(()), |short| {
         Err(InvalidField::out_of_range("sample_cameras.size", short.size_px, "16 rows and more in a cube"))

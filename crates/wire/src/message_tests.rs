@@ -13,8 +13,8 @@ use cluster::{
 };
 use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
 use depth_image::{
-    Aabb, Antialias, Camera, CubeGrid, Environment, ExposureEv, Illumination, Light, MAX_LIGHTS, PinholeCamera,
-    ToneCurve, ToneMapping, ViewPlanes,
+    Aabb, Antialias, Camera, CubeGrid, Environment, ExposureEv, Illumination, Light, LightDirections, LightFieldCamera,
+    MAX_LIGHTS, PinholeCamera, ToneCurve, ToneMapping, ViewPlanes,
 };
 use glam::{DVec3, UVec2, Vec3};
 
@@ -183,7 +183,13 @@ fn a_plan_of_a_cube_survives_the_round_trip() {
     cube.workload.sample_cameras = [0, 1, 2].map(|axis| grid.camera(axis).into()).to_vec();
     cube.workload.timeline = Timeline::still(0.0);
     cube.samplers[0].image_indices = vec![0, 1, 2];
-    assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(cube.clone())), Ok(cube));
+    let mut with_light_field = cube.clone();
+    let field = LightFieldCamera::around(cube.workload.volume, LightDirections::D66, 16);
+    with_light_field.workload.sample_cameras.push(field.into());
+    with_light_field.samplers[0].image_indices.push(3);
+    for plan in [cube, with_light_field] {
+        assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(plan.clone())), Ok(plan));
+    }
 }
 
 #[test]

@@ -19,7 +19,7 @@ fn layers(scene: &Scene, side: u32, kept: LayerSelection, lighting: &str) -> [La
 }
 
 /// Front after front along a line, towards the camera's far side: depths and normals.
-fn fronts(twin: &scalar::rays::Scene, ray: Ray, range_m: f32) -> Vec<f32> {
+pub fn fronts(twin: &scalar::rays::Scene, ray: Ray, range_m: f32) -> Vec<f32> {
     let mut from_m = 0.0;
     let next = || {
         let hit = twin.closest_between(&ray, from_m, range_m).0?;

@@ -7,6 +7,7 @@ mod environment_map;
 mod glossy;
 mod layered;
 mod light_failures;
+mod light_field;
 mod materials;
 mod raster;
 mod reflections;

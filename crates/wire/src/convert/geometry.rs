@@ -162,7 +162,7 @@ impl Convert<proto::LightFieldCamera> for LightFieldCamera {
             bounds: Aabb::read(camera.bounds, "camera.light_field.bounds")?,
             directions: LightDirections::of(camera.direction_count).map_err(refused)?,
             side_px: camera.side_px,
-            first_pair: camera.first_pair,
+            first_pair: camera.first_pair_index,
             pairs: camera.pair_count,
         };
         camera.validate().map_err(refused)?;
@@ -174,7 +174,7 @@ impl Convert<proto::LightFieldCamera> for LightFieldCamera {
             bounds: self.bounds.write(),
             direction_count: self.directions.count(),
             side_px: self.side_px,
-            first_pair: self.first_pair,
+            first_pair_index: self.first_pair,
             pair_count: self.pairs,
         }
     }
