@@ -62,8 +62,7 @@ pub(crate) fn check_cube(cameras: &[SampleCamera], most_light_fields: usize) -> 
     let is_whole = parallel.len() + light_fields == cameras.len() && light_fields <= most_light_fields;
     if !is_whole || CubeGrid::of_cameras(&parallel).is_none() {
         let given = format!("{} parallel and {light_fields} light_field of {}", parallel.len(), cameras.len());
-        let allowed =
-            "the three cameras of one layered cube, in one cell, and at most one of a light field of its samples";
+        let allowed = "the three cameras of one layered cube, in one cell, and at most one of a light field";
         return Err(InvalidField::out_of_range("sample_cameras.model", given, allowed));
     }
     let mut fields = cameras.iter().filter_map(SampleCamera::light_field);

@@ -1,4 +1,4 @@
-//! The images of a sample set: depth images of views, or layered images of a cube.
+//! The images of a sample set: depth images of views, or layered images of a cube and a light field.
 
 use crate::{
     CubeGrid, DepthImage, LayeredDepthImage, LayeredError, LayeredLightField, ParallelCamera, SampleCamera,

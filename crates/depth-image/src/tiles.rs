@@ -82,10 +82,9 @@ impl LayeredLightField {
     pub fn from_tiles(camera: LightFieldCamera, tiles: &[Self]) -> Result<Self, LayeredError> {
         let size_px = camera.size_px();
         for (number, tile) in tiles.iter().enumerate() {
-            let expected = part(size_px, number as u32, tiles.len() as u32).size_px;
-            let given = tile.camera.size_px();
-            if given != expected {
-                return Err(LayeredError::Tile { tile: number, given, expected });
+            let expected = camera.part(&part(size_px, number as u32, tiles.len() as u32));
+            if tile.camera != expected {
+                return Err(LayeredError::LightFieldTile { tile: number, given: tile.camera, expected });
             }
             tile.validate()?;
         }

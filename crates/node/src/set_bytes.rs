@@ -49,7 +49,7 @@ pub fn most_set_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -> 
     let search_bytes = |camera: &SampleCamera| match camera {
         SampleCamera::Depth(camera) => camera.pixel_count() * PYRAMID_TEXEL_BYTES,
         SampleCamera::Layered(camera) => camera.pixel_count() * EXPECTED_LAYERS * CUBE_SAMPLE_BYTES,
-        SampleCamera::LightField(_) => 0,
+        SampleCamera::LightField(camera) => camera.line_count() * LINE_BYTES,
     };
     let parallel: Vec<_> = cameras.iter().filter_map(SampleCamera::layered).copied().collect();
     let cells = CubeGrid::of_cameras(&parallel).map_or(0, |grid| cell_bytes(grid.size));
@@ -91,7 +91,8 @@ fn layered_bytes(image: &LayeredDepthImage) -> usize {
 }
 
 fn light_field_bytes(field: &LayeredLightField) -> usize {
-    field.first.len() * LINE_BYTES + field.sample_count() * LIGHT_SAMPLE_BYTES
+    // The first sample of a line, and its end.
+    2 * field.first.len() * LINE_BYTES + field.sample_count() * LIGHT_SAMPLE_BYTES
 }
 
 fn image_bytes(image: &DepthImage) -> usize {

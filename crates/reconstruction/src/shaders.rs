@@ -6,10 +6,13 @@ use minijinja::Value;
 
 use crate::antialias::Shown;
 use crate::bounce::{
-    BOUNCE_LEVEL, BounceMarch, CurvedWalk, EDGE_COSINE, LEAST_RISE, LEAST_WAY, LONGEST_STEP, Land, Lobe, MARCH_ROUNDS,
-    MAX_BOUNCE_MOVES, MAX_WALK_STEPS, START_FOOTPRINTS,
+    BOUNCE_LEVEL, BounceMarch, CurvedWalk, EDGE_COSINE, LEAST_RISE, LEAST_WAY, LONGEST_STEP, Land, Lobe, LobeSum,
+    MARCH_ROUNDS, MAX_BOUNCE_MOVES, MAX_WALK_STEPS, START_FOOTPRINTS,
 };
-use crate::cube::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, HIT_SLACK, MAX_CUBE_STEPS, SQUARE_REACH, WALK_NUDGE};
+use crate::cube::{
+    ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, FOOTPRINT_SHARE, HIT_SLACK, LEAST_LOBE_SHARE, MAX_CUBE_STEPS, SQUARE_REACH,
+    WALK_NUDGE,
+};
 use crate::fill::{DIRECTIONS, Fill, REACH_PX, SAME_SIDE};
 use crate::pyramid::{BACKGROUND_CODE, FLAT_FOOTPRINTS, HOLE_CODE, SLOPE_SHARE};
 use crate::surface::{
@@ -21,9 +24,9 @@ use crate::view_work::{CELL_MARGIN_PX, FAR_AWAY, TILE_PX};
 use crate::{methods, pixel_list::LIST_WORKGROUP, quads, specular::Specular};
 
 /// Passes over whole views, and templates that several shaders include.
-const SHADERS: [(&str, &str); 26] = wgsl_files! {
+const SHADERS: [(&str, &str); 28] = wgsl_files! {
     "antialias.wgsl", "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "found.wgsl", "cube/walk.wgsl", "cube/colors.wgsl", "cube/gather.wgsl", "pixel_list.wgsl",
-    "gathered.wgsl", "gather_at.wgsl", "nearest_at.wgsl", "colors.wgsl", "bounce/ray.wgsl", "bounce/list.wgsl", "bounce/glossy.wgsl", "bounce/lobe.wgsl", "bounce/spawn.wgsl", "bounce/march.wgsl", "bounce/curved_search.wgsl", "single_pole.wgsl", "bounce/mips.wgsl", "bounce/land.wgsl"
+    "gathered.wgsl", "gather_at.wgsl", "nearest_at.wgsl", "colors.wgsl", "bounce/ray.wgsl", "bounce/list.wgsl", "bounce/glossy.wgsl", "bounce/lobe.wgsl", "bounce/lobe_rays.wgsl", "bounce/lobe_sum.wgsl", "bounce/spawn.wgsl", "bounce/march.wgsl", "bounce/curved_search.wgsl", "single_pole.wgsl", "bounce/mips.wgsl", "bounce/land.wgsl"
 };
 
 const PROVENANCE_EMPTY: u32 = ProvenanceKind::Empty as u32;
@@ -46,7 +49,7 @@ pub fn templates() -> Result<Templates, ShaderError> {
     let constants = wgsl_constants! {
         ANGLE_FLOOR, BACKGROUND_CODE, BORDER_PX, BOUNCE_LEVEL, CARVING_SHARE, CELL_MARGIN_PX, FAR_AWAY, FLAT_FOOTPRINTS,
         GREATEST_TILE_MOVE, HALF_CODE, HALF_DIAGONAL, HIDDEN_WEIGHT, HOLE_CODE, LEAST_SHARE, LEAST_TILE_MOVE,
-        ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, HIT_SLACK, MAX_CUBE_STEPS, SQUARE_REACH, WALK_NUDGE,
+        ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, FOOTPRINT_SHARE, HIT_SLACK, LEAST_LOBE_SHARE, MAX_CUBE_STEPS, SQUARE_REACH, WALK_NUDGE,
         LIST_WORKGROUP, MAX_TILE_MOVES, PROVENANCE_BASE, PROVENANCE_EMPTY, PROVENANCE_FILLED, PROVENANCE_GUESSED, PROVENANCE_HIT, REACH_PX, SAME_SIDE,
         EDGE_COSINE, LEAST_RISE, LEAST_WAY, LONGEST_STEP, MARCH_ROUNDS, MAX_BOUNCE_MOVES, MAX_WALK_STEPS, SLOPE_SHARE, SPLIT_SHIFT, START_FOOTPRINTS, THICKNESS_FOOTPRINTS, TILE_PX, WHOLE
     };
@@ -57,7 +60,7 @@ pub fn templates() -> Result<Templates, ShaderError> {
 
 /// The texts of all variants of all passes.
 pub fn shader_sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    gpu::shader_sources!(templates, TileStart, Fill, Specular, BounceMarch, CurvedWalk, Land, Lobe, Shown)
+    gpu::shader_sources!(templates, TileStart, Fill, Specular, BounceMarch, CurvedWalk, Land, Lobe, LobeSum, Shown)
         .chain(quads::sources(templates))
         .chain(methods::sources(templates))
 }

@@ -14,16 +14,7 @@ struct GlossySurface {
     start_m: f32,
     // The open share of the environment.
     open: f32,
-    padding: vec2u,
-}
-
-// Rays of a pixel; the number of one of them.
-struct LobeRays { count: u32, number: u32 }
-
-@group(0) var<uniform> lobe_rays: LobeRays;
-
-// Of noise: that of a place does not depend on the picture around it.
-fn seed_of(point_in_world: vec3f) -> u32 {
-    let bits = bitcast<vec3u>(point_in_world);
-    return hashed(bits.x ^ hashed(bits.y ^ hashed(bits.z)));
+    // 1 where all rays go below the surface: the mirrored one takes their place.
+    is_mirrored: u32,
+    padding: u32,
 }

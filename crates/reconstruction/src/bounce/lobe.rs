@@ -22,10 +22,11 @@ pub(crate) struct GpuGlossySurface {
     pub roughness: f32,
     pub start_m: f32,
     pub open: f32,
-    pub padding: [u32; 2],
+    pub is_mirrored: u32,
+    pub padding: u32,
 }
 
-/// `LobeRays` of `bounce/glossy.wgsl`.
+/// `LobeRays` of `bounce/lobe_rays.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct GpuLobeRays {
@@ -36,6 +37,8 @@ pub(crate) struct GpuLobeRays {
 /// The rough surfaces of one position within the pixels.
 pub(crate) struct GlossyList<'b> {
     surfaces: &'b Buffer,
+    /// Of their pixels, from all of their rays.
+    light: &'b Buffer,
     list: Buffer,
     /// Rays of each.
     pub rays: u32,
@@ -44,20 +47,26 @@ pub(crate) struct GlossyList<'b> {
 
 impl<'b> GlossyList<'b> {
     /// None as yet.
-    pub fn empty(device: &Device, surfaces: &'b Buffer, rays: u32) -> Self {
+    pub fn empty(device: &Device, [surfaces, light]: [&'b Buffer; 2], rays: u32) -> Self {
         let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT;
         let list = GpuPixelList { workgroups: [0, 1, 1], count: 0 };
         let list = device.gpu.buffer_with("glossy surfaces", &[list], usage);
-        Self { surfaces, list, rays, count: uniform(device, rays, 0) }
+        Self { surfaces, light, list, rays, count: uniform(device, rays, 0) }
     }
 
     /// The resources of passes that list surfaces.
-    pub fn bindings(&self) -> [Binding<'_>; 3] {
+    pub fn bindings(&self) -> [Binding<'_>; 4] {
         [
             Binding::buffer("lobe_rays", &self.count),
             Binding::buffer("glossy_surfaces", self.surfaces),
             Binding::buffer("glossy_list", &self.list),
+            self.light_binding(),
         ]
+    }
+
+    /// The light of passes that add to it.
+    pub fn light_binding(&self) -> Binding<'_> {
+        Binding::buffer("lobe_light", self.light)
     }
 }
 
@@ -109,4 +118,35 @@ pub(crate) fn record(
     let bound = pass.bind(0, bindings)?;
     recording.dispatch_listed(&Lobe, &pass, &bound, (&glossy.list, 0), ());
     Ok(lists)
+}
+
+/// The sum of all rays.
+#[derive(Debug)]
+pub(crate) struct LobeSum;
+
+impl ShaderVariant for LobeSum {
+    const TEMPLATE: &'static str = "bounce/lobe_sum.wgsl";
+    const TRAITS: ResourceTraits = &[];
+
+    fn context(&self) -> Value {
+        context! {}
+    }
+
+    fn all() -> Vec<Self> {
+        vec![Self]
+    }
+}
+
+/// Records the pass that adds the light of all rays to the pixels.
+pub(crate) fn record_sum(recording: &mut Recording<'_>, glossy: &GlossyList<'_>) -> Result<(), ReconstructionError> {
+    let pass = recording.device.passes.get(&LobeSum)?;
+    let bindings = vec![
+        Binding::buffer("glossy", glossy.surfaces),
+        Binding::buffer("glossy_list", &glossy.list),
+        glossy.light_binding(),
+        Binding::buffer("out_color", &recording.batch.color),
+    ];
+    let bound = pass.bind(0, bindings)?;
+    recording.dispatch_listed(&LobeSum, &pass, &bound, (&glossy.list, 0), ());
+    Ok(())
 }

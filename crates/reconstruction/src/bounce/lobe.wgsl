@@ -8,6 +8,7 @@
 {% include "bounce/ray.wgsl" %}
 {% include "bounce/list.wgsl" %}
 {% include "bounce/glossy.wgsl" %}
+{% include "bounce/lobe_rays.wgsl" %}
 
 @group(0) var<uniform> illumination: Illumination;
 @group(0) var<storage, read> glossy: array<GlossySurface>;
@@ -20,7 +21,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let surface = glossy[id.x];
     let normal = unit_from_oct16(surface.normal_oct16);
     let mirror = Mirror(surface.point_in_world, normal, surface.towards_eye, Reflector(vec3f(1.0), surface.roughness));
-    let ray = lobe_ray(mirror, point_of(lobe_rays.number, seed_of(surface.point_in_world)));
+    var ray = lobe_ray(mirror, point_of(lobe_rays.number, seed_of(surface.point_in_world)));
+    if surface.is_mirrored != 0u { ray = LobeRay(reflect(-surface.towards_eye, normal), select(0.0, 1.0, lobe_rays.number == 0u)); }
     for (var brings = ray.weight > 0.0; brings; brings = false) {
         let near_m = surface.start_m / max(dot(normal, ray.direction), LEAST_RISE);
         let guess = pack4x8unorm(vec4f(surface.open, LEAST_ROUGHNESS, 0.0, 0.0));

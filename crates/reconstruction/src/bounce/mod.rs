@@ -16,7 +16,7 @@ use wgpu::{Buffer, BufferUsages};
 
 pub use curved_search::CurvedSearch;
 pub(crate) use curved_search::{CurvedWalk, LONGEST_STEP, MAX_WALK_STEPS};
-pub(crate) use lobe::{GpuGlossySurface, Lobe};
+pub(crate) use lobe::{GpuGlossySurface, Lobe, LobeSum};
 
 use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList};
@@ -77,11 +77,13 @@ impl Mirrors<'_> {
         }
         let reflectors = set.cube.as_ref().map_or(&set.reflectors, |cube| &cube.reflectors);
         let has_mirrors = reflectors.as_ref().is_some_and(|of| of.highlight == Highlight::Ggx);
-        Ok(if (self.reflections > 0 || self.glossy_rays > 0) && has_mirrors { self } else { Self::default() })
+        // Without a cube rough surfaces show no scene.
+        let is_followed = self.reflections > 0 || (self.glossy_rays > 0 && set.cube.is_some());
+        Ok(if is_followed && has_mirrors { self } else { Self::default() })
     }
 }
 
-/// `MirrorBox` of `bounce/spawn.wgsl`.
+/// `MirrorBox` of `bounce/list.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct GpuMirrorBox {
@@ -111,8 +113,8 @@ pub(crate) struct Bounces<'s> {
     cells: Vec<MirrorCell<'s>>,
     reflections: u32,
     glossy_rays: u32,
-    /// Rough surfaces, which are to send rays.
-    glossy_surfaces: Option<PooledBuffer>,
+    /// Rough surfaces, which are to send rays, and the light that these bring, 12 bytes a pixel.
+    lobes: Option<[PooledBuffer; 2]>,
     /// A `MirrorBox` for each cell.
     boxes: Buffer,
     /// A `ViewWork` for each cell.
@@ -177,11 +179,16 @@ impl<'s> Bounces<'s> {
         let rays = || lend("mirrored rays", size_of::<GpuMirroredRay>() * pixels);
         let listed = || lend("lists of mirrored rays", 4 * pixels * cells.len());
         let plane = |label| lend(label, 4 * pixels);
+        let surfaces = || lend("glossy surfaces", size_of::<GpuGlossySurface>() * pixels);
+        // In a light field lobes are gathered.
+        let is_plain_cube =
+            |cell: &MirrorCell<'_>| cell.surroundings.cube.as_ref().is_some_and(|cube| cube.light_field.is_none());
+        let sends = mirrors.glossy_rays > 0 && cells.iter().any(is_plain_cube);
         Ok(Some(Self {
             reflections: mirrors.reflections,
             glossy_rays: mirrors.glossy_rays,
-            glossy_surfaces: (mirrors.glossy_rays > 0)
-                .then(|| lend("glossy surfaces", size_of::<GpuGlossySurface>() * pixels))
+            lobes: sends
+                .then(|| Ok::<_, ReconstructionError>([surfaces()?, lend("light of lobes", 12 * pixels)?]))
                 .transpose()?,
             boxes: device.gpu.buffer_with("mirror boxes", &boxes, BufferUsages::UNIFORM),
             works: cells.iter().enumerate().map(work).collect(),
@@ -204,7 +211,7 @@ impl<'s> Bounces<'s> {
         RayLists { lists, memory: before.map_or(0, |before| 1 - before.memory) }
     }
 
-    /// The resources of `bounce/spawn.wgsl`.
+    /// The resources of `bounce/list.wgsl`.
     pub fn spawn_bindings<'b>(&'b self, next: &'b RayLists) -> [Binding<'b>; 4] {
         [
             Binding::buffer("mirror_boxes", &self.boxes),
@@ -243,7 +250,7 @@ impl<'s> Bounces<'s> {
     /// What must live until the device is done.
     pub fn into_memory(self) -> Vec<PooledBuffer> {
         let planes = [self.color, self.inverse_depth_per_m, self.provenance].into_iter();
-        let planes = planes.chain(self.steps).chain(self.glossy_surfaces);
+        let planes = planes.chain(self.steps).chain(self.lobes.into_iter().flatten());
         self.rays.into_iter().chain(self.listed).chain(planes).collect()
     }
 
@@ -252,9 +259,14 @@ impl<'s> Bounces<'s> {
         self.reflections
     }
 
-    /// Rays into the lobe of a rough surface, and the memory for such surfaces; `None` without rays.
-    pub fn glossy(&self) -> Option<(u32, &Buffer)> {
-        self.glossy_surfaces.as_deref().map(|surfaces| (self.glossy_rays, surfaces))
+    /// Rays into the lobe of a rough surface, sent or gathered.
+    pub fn glossy_rays(&self) -> u32 {
+        self.glossy_rays
+    }
+
+    /// The memory for rough surfaces and for the light of their rays, where these are sent.
+    pub fn lobes(&self) -> Option<[&Buffer; 2]> {
+        self.lobes.as_ref().map(|[surfaces, light]| [&**surfaces, &**light])
     }
 
     /// The work of a cell.

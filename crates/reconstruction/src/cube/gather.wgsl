@@ -20,11 +20,6 @@ struct LightField {
 // Depth and radiance.
 @group(0) var light_samples: texture_2d<u32>;
 
-// Directions that a lobe takes less of than this, beside the mirrored one, do not count.
-const LEAST_LOBE_SHARE: f32 = 0.01;
-// How much of a direction's own width its lines are taken from.
-const FOOTPRINT_SHARE: f32 = 0.8;
-
 fn light_texel(direction: u32, texel: u32) -> vec4f {
     return bitcast<vec4f>(textureLoad(light_directions, texel_at(4u * direction + texel), 0));
 }
@@ -73,7 +68,11 @@ fn light_between_lines(direction: u32, place: vec2f, depth_m: f32, around: vec3f
     for (var corner = 0u; corner < 4u; corner++) {
         let step = vec2f(vec2u(corner & 1u, corner >> 1u));
         let weights = select(1.0 - share, share, step == vec2f(1.0));
-        light += light_on_line(line_at(direction, first + step), depth_m, around).rgb * (weights.x * weights.y);
+        let at = first + step;
+        // Beside the square the scene has nothing.
+        let is_beside = any(at < vec2f(-1.0)) || any(at > vec2f(f32(light_field.side_px)));
+        let own = select(light_on_line(line_at(direction, at), depth_m, around).rgb, around, is_beside);
+        light += own * (weights.x * weights.y);
     }
     return light;
 }
@@ -119,5 +118,6 @@ fn gathered_light(mirror: Mirror) -> vec3f {
             sum += share * own.w;
         }
     }
-    return light / max(sum, 1e-12);
+    // A narrow lobe along a surface may hold no direction.
+    return select(environment_mirrored(mirrored, LEAST_ROUGHNESS), light / max(sum, 1e-12), sum > 0.0);
 }

@@ -9,10 +9,15 @@ use wgpu::{BufferUsages, TextureFormat};
 use crate::error::ReconstructionError;
 
 /// Light comes from samples that are at least so many spacings of the lines away: nearer ones may be of the surface itself.
-const NEAREST_SPACINGS: f32 = 0.5;
+pub(crate) const NEAREST_SPACINGS: f32 = 0.5;
 
-/// The lobe with which mirrors are gathered: the exponent of the cosine to the mirrored ray. With 258 directions it is that of
-/// Lischinski's figure 3; a narrower lobe than each of these may hold fewer than three directions.
+/// Directions that a lobe takes less of than this, beside the mirrored one, do not count.
+pub(crate) const LEAST_LOBE_SHARE: f32 = 0.01;
+/// How much of a direction's own width its lines are taken from.
+pub(crate) const FOOTPRINT_SHARE: f32 = 0.8;
+
+/// The lobe with which mirrors are gathered: the exponent of the cosine to the mirrored ray. Narrower lobes hold fewer than three
+/// directions too often. Lischinski's figure 3 has 40.
 fn mirror_exponent(directions: LightDirections) -> f32 {
     match directions {
         LightDirections::D66 => 30.0,

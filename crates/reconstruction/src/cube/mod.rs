@@ -17,7 +17,9 @@ pub(crate) use bricks::LEAST_NORMAL_ALONG_LINE;
 pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, SQUARE_REACH};
 #[cfg(any(test, feature = "scalar"))]
 pub(crate) use light_field::GpuLightField;
-pub(crate) use light_field::LightField;
+#[cfg(feature = "scalar")]
+pub(crate) use light_field::NEAREST_SPACINGS;
+pub(crate) use light_field::{FOOTPRINT_SHARE, LEAST_LOBE_SHARE, LightField};
 pub(crate) use links::links;
 pub(crate) use samples::CubeSamples;
 #[cfg(feature = "scalar")]

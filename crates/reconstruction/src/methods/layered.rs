@@ -23,13 +23,15 @@ enum Walked {
     LeftPixels,
     /// Those off mirrors.
     Bounced,
+    /// Those into lobes, and off the mirrors that they meet.
+    IntoLobes,
     /// Those off mirrors whose end the images of a mirror cell leave unknown: the cube is the base.
     LeftBounced,
 }
 
 impl Walked {
     fn is_bounced(self) -> bool {
-        matches!(self, Self::Bounced | Self::LeftBounced)
+        matches!(self, Self::Bounced | Self::IntoLobes | Self::LeftBounced)
     }
 
     fn is_left(self) -> bool {
@@ -146,7 +148,9 @@ impl Walk {
             Walked::Pixels | Walked::LeftPixels => {
                 Self { rays: Walked::LeftPixels, set: SetVariant { cameras: 4, ..self.set }, mirror_cells, ..self }
             }
-            Walked::Bounced | Walked::LeftBounced => Self { rays: Walked::LeftBounced, mirror_cells, ..self },
+            Walked::Bounced | Walked::IntoLobes | Walked::LeftBounced => {
+                Self { rays: Walked::LeftBounced, mirror_cells, ..self }
+            }
         }
     }
 }
@@ -155,7 +159,10 @@ impl Walk {
     /// The same with all ways to light lobes.
     fn with_lobes(self) -> impl Iterator<Item = Self> {
         let is_of_ends = |lobe: &LobeLight| *lobe == LobeLight::GatheredMirrors;
-        let lobes = LobeLight::ALL.into_iter().filter(move |lobe| is_of_ends(lobe) || !self.rays.is_bounced());
+        let lobes = LobeLight::ALL.into_iter().filter(move |lobe| match self.rays {
+            Walked::IntoLobes => false,
+            rays => is_of_ends(lobe) || !rays.is_bounced(),
+        });
         lobes.map(move |lobe| {
             let follows = matches!(lobe, LobeLight::GatheredRest | LobeLight::SentRest);
             Self { mirror_cells: follows.then_some(1), lobe: Some(lobe), ..self }
@@ -171,6 +178,7 @@ impl ShaderVariant for Walk {
         context! {
             bounced => self.rays.is_bounced(),
             left => self.rays.is_left(),
+            into_lobes => self.rays == Walked::IntoLobes,
             truncated => self.truncated,
             reflects => self.highlight.is_some(),
             highlight => highlight_name(self.highlight.unwrap_or(Highlight::Ggx)),
@@ -202,16 +210,20 @@ impl ShaderVariant for Walk {
                 let set = SetVariant { count_fetches, ..SetVariant::CUBE };
                 let with = Self { set, truncated, lights, visibility_words, ..Self::PLAIN };
                 let ggx = Self { highlight: Some(Highlight::Ggx), environment_map, ..with };
-                let bounced = (!count_fetches).then_some(Self { rays: Walked::Bounced, ..ggx });
+                let bounced =
+                    (!count_fetches).then(|| [Walked::Bounced, Walked::IntoLobes].map(|rays| Self { rays, ..ggx }));
                 let blinn_phong = (!environment_map).then_some(Self { highlight: Some(Highlight::BlinnPhong), ..with });
-                let mirrored = [Some(ggx), bounced].into_iter().flatten();
+                let mirrored = [ggx].into_iter().chain(bounced.into_iter().flatten());
                 let each =
                     |walk: Self| [walk, Self { mirror_cells: Some(1), ..walk }].into_iter().chain(walk.with_lobes());
                 mirrored.flat_map(each).chain(blinn_phong)
             })
         });
         let own: Vec<Self> = matt.chain(glossy).collect();
-        let left = own.iter().filter(|walk| walk.lights <= 3 && walk.lobe.is_none()).map(|walk| walk.of_base());
+        let left = own
+            .iter()
+            .filter(|walk| walk.lights <= 3 && walk.lobe.is_none() && walk.rays != Walked::IntoLobes)
+            .map(|walk| walk.of_base());
         let without_reflectors = switches().map(|[truncated, environment_map]| Self {
             rays: Walked::LeftBounced,
             truncated,
@@ -233,19 +245,17 @@ pub(crate) fn record(
     let Some(cube) = recording.set.cube.clone() else { return Ok(undecided) };
     let mirrors = bounces.map_or(0, Bounces::reflections);
     let followed = followed.map_or(mirrors, |followed| followed.min(mirrors));
-    let glossy = bounces.and_then(Bounces::glossy);
-    let lobe = LobeLight::of_pixels((followed, mirrors), glossy.is_some(), cube.light_field.is_some());
-    let sent = glossy.filter(|_| lobe.is_some_and(LobeLight::is_sent)).map(|(rays, surfaces)| {
-        // The positions within a pixel share its rays.
-        let rays = rays.div_ceil(recording.batch.planes.antialias.samples());
-        GlossyList::empty(recording.device, surfaces, rays)
-    });
+    // The positions within a pixel share its rays.
+    let rays = bounces.map_or(0, Bounces::glossy_rays).div_ceil(recording.batch.planes.antialias.samples());
+    let lobe = LobeLight::of_pixels((followed, mirrors), rays > 0, cube.light_field.is_some());
+    let memory = bounces.and_then(Bounces::lobes).filter(|_| lobe.is_some_and(LobeLight::is_sent));
+    let sent = memory.map(|memory| GlossyList::empty(recording.device, memory, rays));
     let first = bounces.filter(|_| followed > 0).map(|bounces| bounces.next(recording.device, None));
     walk_pixels(recording, &cube, (None, &undecided), (bounces.zip(first.as_ref()), lobe, sent.as_ref()))?;
     let Some(bounces) = bounces else { return Ok(undecided) };
     if let Some(first) = first {
         let last = (followed < mirrors).then_some(LobeLight::GatheredMirrors);
-        follow_mirrors(recording, &cube, bounces, (first, last), 1..=followed)?;
+        follow_mirrors(recording, &cube, bounces, (first, last, None), 1..=followed)?;
     }
     let reflectors = cube.reflectors.as_ref();
     for (glossy, reflectors) in sent.iter().zip(reflectors) {
@@ -253,25 +263,28 @@ pub(crate) fn record(
             let first = lobe::record(recording, bounces, (glossy, number), &reflectors.illumination)?;
             // Costs are learned by generation, and are others than those of rays off mirrors.
             let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + mirrors.max(1);
-            follow_mirrors(recording, &cube, bounces, (first, None), generations)?;
+            follow_mirrors(recording, &cube, bounces, (first, None, Some(glossy)), generations)?;
         }
+        lobe::record_sum(recording, glossy)?;
     }
     Ok(undecided)
 }
 
-/// Records the walk of listed rays, and of those off the mirrors that they meet; what the `last` ones show may be gathered.
+/// Records the walk of listed rays, and of those off the mirrors that they meet; what the `last` ones show may be gathered. The light of
+/// rays into lobes is summed up.
 fn follow_mirrors(
     recording: &mut Recording<'_>,
     cube: &Cube,
     bounces: &Bounces<'_>,
-    (mut lists, last): (RayLists, Option<LobeLight>),
+    (mut lists, last, lobes): (RayLists, Option<LobeLight>, Option<&GlossyList<'_>>),
     generations: RangeInclusive<u32>,
 ) -> Result<(), ReconstructionError> {
     for generation in generations.clone() {
         let goes_on = generation < *generations.end();
         let next = goes_on.then(|| bounces.next(recording.device, Some(&lists)));
-        let lobe = last.filter(|_| !goes_on);
-        follow(recording, (cube, (Walked::Bounced, lobe)), bounces, (&lists, next.as_ref()), (0, generation))?;
+        let ends = Ends { gathered: last.filter(|_| !goes_on), lobes };
+        let rays = if lobes.is_some() { Walked::IntoLobes } else { Walked::Bounced };
+        follow(recording, (cube, rays, ends), bounces, (&lists, next.as_ref()), (0, generation))?;
         let Some(next) = next else { break };
         lists = next;
     }
@@ -298,7 +311,7 @@ pub(crate) fn follow_left(
     lists: (&RayLists, Option<&RayLists>),
     place: (usize, u32),
 ) -> Result<(), ReconstructionError> {
-    follow(recording, (base, (Walked::LeftBounced, None)), bounces, lists, place)
+    follow(recording, (base, Walked::LeftBounced, Ends::default()), bounces, lists, place)
 }
 
 fn walk_pixels(
@@ -322,21 +335,30 @@ fn walk_pixels(
     Ok(())
 }
 
+/// What becomes of the light at the ends of rays.
+#[derive(Clone, Copy, Default)]
+struct Ends<'g> {
+    /// What mirrors show there.
+    gathered: Option<LobeLight>,
+    /// It is summed up, where rays go into lobes.
+    lobes: Option<&'g GlossyList<'g>>,
+}
+
 /// Records the walk of rays off one mirror of a mirror cell, whose light is added to their pixels.
 fn follow(
     recording: &mut Recording<'_>,
-    (cube, (rays, lobe)): (&Cube, (Walked, Option<LobeLight>)),
+    (cube, rays, ends): (&Cube, Walked, Ends<'_>),
     bounces: &Bounces<'_>,
     (lists, next): (&RayLists, Option<&RayLists>),
     (cell, reflection): (usize, u32),
 ) -> Result<(), ReconstructionError> {
-    let variant = Walk::of(recording, cube, rays, (next.map(|_| bounces), lobe));
+    let variant = Walk::of(recording, cube, rays, (next.map(|_| bounces), ends.gathered));
     let pass = recording.device.passes.get(&variant)?;
     let mut bindings = shared_bindings(recording, cube, &variant);
     let [_, _, ray_provenance] = bounces.planes();
     bindings.extend([
         bounces.work_binding(cell),
-        Binding::buffer("out_color", &recording.batch.color),
+        ends.lobes.map_or(Binding::buffer("out_color", &recording.batch.color), GlossyList::light_binding),
         Binding::buffer("out_provenance", &recording.batch.provenance),
     ]);
     bindings.extend(rays.is_left().then(|| Binding::buffer("ray_provenance", ray_provenance)));

@@ -1,18 +1,9 @@
 //! The twin of `cube/gather.wgsl`.
 
-use depth_image::{LayeredLightField, LightDirection, PixelDepth, Reflector, linear_from_rgb9e5};
+use depth_image::{LayeredLightField, LightDirection, PixelDepth, ROUGHEST_MIRROR, Reflector, linear_from_rgb9e5};
 use glam::{Vec2, Vec3};
 
-use crate::cube::GpuLightField;
-
-/// Light comes from samples at least so far away, in spacings of the lines.
-const NEAREST_SPACINGS: f32 = 0.5;
-/// Directions of which a lobe takes less do not count.
-const LEAST_LOBE_SHARE: f32 = 0.01;
-/// How much of a direction's own width its lines are taken from.
-const FOOTPRINT_SHARE: f32 = 0.8;
-/// Smoother surfaces have the lobe of mirrors.
-const ROUGHEST_MIRROR: f32 = 0.2;
+use crate::cube::{FOOTPRINT_SHARE, GpuLightField, LEAST_LOBE_SHARE, NEAREST_SPACINGS};
 
 /// A surface that reflects towards an eye.
 #[derive(Debug, Clone, Copy)]
@@ -38,7 +29,7 @@ pub fn gathered_light(field: &LayeredLightField, surface: &Reflecting, around: i
             sum += weight;
         }
     }
-    light / sum.max(1e-12)
+    if sum > 0.0 { light / sum } else { around(lobe.mirrored) }
 }
 
 struct Lobe {
@@ -108,8 +99,8 @@ fn light_through(
     }
     let behind_m = own.met(pixel).map_or(0.0, |sample| field.planar_depth_m[sample] - own.least_depth_m);
     let width_px = FOOTPRINT_SHARE * behind_m * direction.solid_angle_sr.sqrt() / lines.spacing_m;
-    let quarters = [Vec2::new(-0.5, -0.5), Vec2::new(0.5, -0.5), Vec2::new(-0.5, 0.5), Vec2::splat(0.5)];
-    quarters.into_iter().map(|offset| own.light_between(pixel + offset * width_px)).sum::<Vec3>() / 4.0
+    let halves = [Vec2::new(-0.5, -0.5), Vec2::new(0.5, -0.5), Vec2::new(-0.5, 0.5), Vec2::splat(0.5)];
+    halves.into_iter().map(|offset| own.light_between(pixel + offset * width_px)).sum::<Vec3>() / 4.0
 }
 
 /// The lines of a direction behind a depth.
@@ -138,7 +129,12 @@ impl DirectionLines<'_> {
     fn light_between(&self, place: Vec2) -> Vec3 {
         let first = (place - 0.5).floor();
         let share = place - 0.5 - first;
-        let row = |y: f32| self.light(first + Vec2::new(0.0, y)).lerp(self.light(first + Vec2::new(1.0, y)), share.x);
+        let side = self.field.camera.side_px as f32;
+        let light = |at: Vec2| match at.min_element() < -1.0 || at.max_element() > side {
+            true => self.around,
+            false => self.light(at),
+        };
+        let row = |y: f32| light(first + Vec2::new(0.0, y)).lerp(light(first + Vec2::new(1.0, y)), share.x);
         row(0.0).lerp(row(1.0), share.y)
     }
 }

@@ -6,6 +6,7 @@ use depth_image::{
     unit_from_oct8,
 };
 use glam::{UVec2, Vec3};
+use gpu::GpuError;
 
 use super::crossings::{self, Crossing};
 use super::lit::{BIAS_FOOTPRINTS, BIAS_ROUNDINGS, mixed};
@@ -15,9 +16,11 @@ use crate::{RenderError, stages::Stages, work::DrawWork};
 
 /// A ray off a mirror meets nothing nearer than this share of the lines' spacing.
 const NEAR_SPACINGS: f32 = 0.1;
+/// Samples of a light field: as many fit a device's textures.
+const MOST_SAMPLES: u64 = 1 << 26;
 
 /// The light field of a scene whose lighting follows mirrors. One draw finds the surfaces of two opposite directions: each is a sample of
-/// the one that it faces. There are none where no mirrors are followed.
+/// the one that it faces. There are none where nothing shows the scene.
 pub(crate) fn draw(
     stages: &Stages,
     work: DrawWork<'_>,
@@ -41,6 +44,7 @@ pub(crate) fn draw(
         let lines = camera.lines(pair[0].towards);
         let (first_of_line, crossings, more) = crossings::met(stages, &work, &lines, LayerSelection::All)?;
         truncated |= more;
+        GpuError::check_limit("the samples of a light field", planar_depth_m.len() as u64, MOST_SAMPLES)?;
         for (is_opposite, direction) in [false, true].into_iter().zip(pair) {
             let pair = Pair { lines: &lines, first: &first_of_line, crossings: &crossings, is_opposite };
             for line in 0..lines.pixel_count() {

@@ -76,7 +76,9 @@ impl<'a> RadianceWork<'a> {
         let frame = Frame::begin(gpu, "light of a light field", work.turn);
         let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, visit_counts: None, frame };
         recording.frame.encoder.clear_buffer(&memory.reflected, 0, None);
-        let (list, units, mirrors) = (BounceList::of(gpu, count), u64::from(count), work.lighting.reflections());
+        // Whoever gathers them has met one mirror before.
+        let mirrors = work.lighting.reflections().saturating_sub(1);
+        let (list, units) = (BounceList::of(gpu, count), u64::from(count));
         let ends = Rays { bounces: &memory.bounces[0], list: &list, units, generation: 0 };
         let [first, second] = memory.memories();
         let next = memory.record_ends(&mut recording, &parts, ends, (mirrors > 0).then_some(second))?;
