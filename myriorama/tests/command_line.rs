@@ -84,7 +84,8 @@ fn input_of_the_lab_that_cannot_be_used_is_named_with_status_2() {
 
 #[test]
 fn what_cannot_be_sampled_as_a_cube_is_named_with_status_2() {
-    let cases: [(&[&str], &str); 10] = [
+    let fields = "layered_cube:64+light_field:66";
+    let cases: [(&[&str], &str); 14] = [
         (&["up", "--scene", "snake", "--base", "layered_cube:64"], "--base layered_cube:64: snake moves"),
         (&["up", "--scene", "quad", "--base", "conventional"], "--base conventional: a base is a layered cube"),
         (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--base", "layered_cube:64"], "a cube already"),
@@ -95,6 +96,13 @@ fn what_cannot_be_sampled_as_a_cube_is_named_with_status_2() {
         (&["up", "--scene", "quad", "--method", "layered"], "see --sampling"),
         (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--sample-size", "40x30"], "--sample-size"),
         (&["plan", "--scene", "quad", "--sampling", "layered_cube:64", "--budget", "flip 0.1"], "needs depth images"),
+        (
+            &["up", "--scene", "quad", "--sampling", "layered_cube:64+light_field:100"],
+            "layered_cube:64+light_field:100",
+        ),
+        (&["up", "--scene", "quad", "--sampling", fields, "--lighting", "shadows"], "--lighting with reflections N"),
+        (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--method", "layered:0"], "in a light field"),
+        (&["up", "--scene", "quad", "--base", fields], "--base layered_cube:64+light_field:66: a light field"),
     ];
     for (arguments, named) in cases {
         let (status, message) = status_and_message(&myriorama(arguments));

@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use client::{Client, ClientError, Session, ViewRequest};
 use cluster::{
-    BudgetRequest, CommonCell, CommonKind, OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline,
+    Assignment, BudgetRequest, CommonCell, CommonKind, OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline,
 };
 use codec::{FrameAssembly, FramePart, WholeFrame};
 use coordinator::{CoordinatorConfig, Observers, OfferedCube, SceneOffer, SceneOffers};
-use depth_image::{Aabb, Camera, CubeGrid, Environment, PinholeCamera, ViewPlanes};
+use depth_image::{Aabb, Camera, CubeGrid, Environment, LightDirections, LightFieldCamera, PinholeCamera, ViewPlanes};
 use glam::{DVec3, UVec2, Vec3};
 use node::{NodeConfig, NodeMetrics};
 use planner::Row;
@@ -184,6 +184,15 @@ pub fn offer() -> SceneOffer {
     }
 }
 
+/// As [`offer`], with a light field beside the cube.
+#[must_use]
+pub fn offer_with_light_field() -> SceneOffer {
+    let offer = offer();
+    let light_field = Some(LightFieldCamera::around(offer.volume, LightDirections::D66, 16));
+    let cube = offer.cube.map(|cube| OfferedCube { light_field, ..cube });
+    SceneOffer { cube, ..offer }
+}
+
 /// Two mirrors, whose images show the ball in their middle.
 fn mirrors() -> Vec<(CommonCell, Vec<Camera>)> {
     let mirror = |x_m: f32| {
@@ -315,6 +324,16 @@ impl Cluster {
             let open = std::sync::Arc::new(move || Ok(std::sync::Arc::new(engine.opened()) as _));
             node_host::serve(listener, config, open, metrics, shutdown)
         }));
+    }
+
+    /// Kills a compositor that samples nothing, abruptly.
+    ///
+    /// # Panics
+    /// The plan has none.
+    pub fn kill_compositor(&mut self, plan: &Assignment) {
+        let is_sampler = |name: &str| plan.samplers.iter().any(|share| share.node_name == name);
+        let killed = plan.compositors.iter().find(|share| !is_sampler(&share.node_name)).expect("a compositor");
+        self.nodes[killed.node_name[1..].parse::<usize>().expect("a number")].kill();
     }
 
     /// Kills the coordinator abruptly.

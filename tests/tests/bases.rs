@@ -68,10 +68,7 @@ async fn a_successor_of_a_killed_compositor_pulls_the_base_once() {
     let views = || (0..12).map(|view| 0.002 * view as f32);
     assert_eq!(frames(&session, views()).await, 12);
     cluster.take_counts();
-    let plan = session.plan().assignment;
-    let is_sampler = |name: &str| plan.samplers.iter().any(|share| share.node_name == name);
-    let killed = plan.compositors.iter().find(|share| !is_sampler(&share.node_name)).unwrap();
-    cluster.nodes[killed.node_name[1..].parse::<usize>().unwrap()].kill();
+    cluster.kill_compositor(&session.plan().assignment);
     assert_eq!(frames(&session, views()).await, 12);
     cluster.add_node(|config| config);
     eventually("a successor", SOON, || session.plan().assignment.composites("n3")).await;

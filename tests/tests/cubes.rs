@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use client::{Frame, Session, ViewRequest};
 use cluster::{BudgetRequest, DIRECT, PolicyChoice, SessionRequest, Timeline};
-use cluster_tests::cluster::{CUBE, Cluster, request, rig};
+use cluster_tests::cluster::{CUBE, Cluster, offer_with_light_field, request, rig};
 use cluster_tests::watcher::eventually;
 use depth_image::{Aabb, PinholeCamera, ProvenanceKind};
 use glam::{UVec2, Vec3};
@@ -72,22 +72,42 @@ async fn a_successor_of_a_killed_compositor_pulls_the_set_once() {
     let session = cluster.session(sampled_as_cube(vec![view(0.0)])).await.unwrap();
     frames(&session, around(12)).await;
     cluster.take_counts();
+    check_successor(&mut cluster, &session).await;
+}
+
+/// The fourth image of the set. Viewers that walk cause no more of it, and a successor loads it with the cube.
+#[tokio::test(flavor = "multi_thread")]
+async fn tiles_of_a_light_field_are_sampled_once_and_a_successor_pulls_them_once() {
+    let mut cluster = Cluster::start_offering(offer_with_light_field(), 3).await;
+    let asked = SessionRequest { forced_tile_count: Some(2), ..sampled_as_cube(vec![view(0.0)]) };
+    let session = cluster.session(asked).await.unwrap();
     let plan = session.plan().assignment;
-    let is_sampler = |name: &str| plan.samplers.iter().any(|share| share.node_name == name);
-    let killed = plan.compositors.iter().find(|share| !is_sampler(&share.node_name)).unwrap();
-    let number: usize = killed.node_name[1..].parse().unwrap();
-    cluster.nodes[number].kill();
-    let all = frames(&session, around(12)).await;
+    assert_eq!((plan.workload.sample_cameras.len(), plan.image_count()), (4, 8), "two tiles each");
+    assert!(plan.workload.sample_cameras[3].light_field().is_some());
+    for azimuth in around(6) {
+        session.set_viewpoints(vec![view(azimuth)]).await.unwrap();
+        assert!(known_in_the_middle(&frames(&session, [azimuth]).await[0]) > 0.9);
+    }
+    assert_eq!(cluster.take_counts(), [1; 8]);
+    assert_eq!(session.plan().assignment.plan_epoch, plan.plan_epoch);
+    check_successor(&mut cluster, &session).await;
+}
+
+/// Kills a compositor, and checks what the node in its place loads.
+async fn check_successor(cluster: &mut Cluster, session: &Session) {
+    let plan = session.plan().assignment;
+    cluster.kill_compositor(&plan);
+    let all = frames(session, around(12)).await;
     assert!(all.len() == 12 && all.iter().all(|frame| known_in_the_middle(frame) > 0.9));
     assert_eq!(cluster.take_counts(), [0; 0], "the others have the set");
     cluster.add_node(|config| config);
     let has_successor = || session.plan().assignment.composites("n3");
     eventually("a successor", SOON, has_successor).await;
-    // A node warms up by a small cube before it joins.
-    assert_eq!(cluster.engines[3].take_counts().len(), 3);
-    frames(&session, around(36)).await;
+    // A node warms up by a small set before it joins.
+    assert_eq!(cluster.engines[3].take_counts().len(), plan.workload.sample_cameras.len());
+    frames(session, around(36)).await;
     eventually("its set", SOON, || cluster.metrics[3].sets_loaded.get() > 0).await;
-    frames(&session, around(36)).await;
+    frames(session, around(36)).await;
     assert_eq!(cluster.metrics[3].sets_loaded.get(), 1);
     assert_eq!(cluster.take_counts(), [0; 0], "nothing is sampled again");
 }

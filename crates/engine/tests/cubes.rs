@@ -1,7 +1,9 @@
 //! A layered depth cube by the engine alone, as a sampler sends it and a compositor gets it.
 
 use codec::{DecodeLimits, decode_sample_image, encode_sample_image};
-use depth_image::{CubeGrid, PinholeCamera, SampleCamera, SampleImage, View, ViewPlanes};
+use depth_image::{
+    CubeGrid, LightDirections, LightFieldCamera, PinholeCamera, SampleCamera, SampleImage, View, ViewPlanes,
+};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use gpu::DevicePreference;
@@ -88,6 +90,19 @@ fn samples(image: &SampleImage) -> usize {
     image.sample_count()
 }
 
+fn light_samples(images: &[SampleImage]) -> usize {
+    let [SampleImage::LightField(field)] = images else { panic!("a light field") };
+    field.sample_count()
+}
+
+/// The name of the setting that an error is about, and the reason.
+fn field(error: EngineError) -> (&'static str, String) {
+    match error {
+        EngineError::InvalidArgument { field, reason } => (field, reason),
+        other => panic!("{other}"),
+    }
+}
+
 fn rms(a: &View, b: &View) -> f64 {
     let squares: f64 = a.srgb8.iter().zip(&b.srgb8).map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2)).sum();
     (squares / a.srgb8.len() as f64).sqrt()
@@ -117,10 +132,6 @@ fn a_cube_that_was_sent_in_tiles_shows_the_scene_and_what_mirrors_show() {
 fn methods_and_cameras_that_do_not_suit_are_refused_by_name() {
     let stand = Stand::new();
     let cube: Vec<_> = stand.cameras().iter().map(|camera| stand.sent(camera, 1).0).collect();
-    let field = |error: EngineError| match error {
-        EngineError::InvalidArgument { field, reason } => (field, reason),
-        other => panic!("{other}"),
-    };
     let refused = field(stand.view(&stand.set(cube.clone()), "joint_carve").expect_err("no depth images"));
     assert_eq!(refused.0, "reconstruction_method", "{}", refused.1);
     let depth = stand.engine.sample(&stand.work(&[camera().into()], "conventional"), TURN).expect("an image");
@@ -135,4 +146,28 @@ fn methods_and_cameras_that_do_not_suit_are_refused_by_name() {
     let mixed = [&cube[..2], &depth].concat();
     assert!(depth_image::SampleImages::try_from(mixed).is_err());
     assert!(depth_image::SampleImages::try_from(cube[..2].to_vec()).is_err());
+}
+
+#[test]
+fn a_light_field_is_sampled_where_mirrors_are_followed_and_views_gather_in_it() {
+    let stand = Stand::new();
+    let around = LightFieldCamera::around(stand.scene.bounds(), LightDirections::D66, 32);
+    let sampled = |lighting: &str| {
+        let work = stand.work(&[around.into()], "layered_cube:160+light_field:66x32");
+        stand.engine.sample(&SampleWork { lighting: lighting.to_owned(), ..work }, TURN)
+    };
+    let count = light_samples(&sampled("shadows, reflections 1").expect("a light field"));
+    let refused = field(sampled("shadows").expect_err("no mirrors are followed"));
+    assert_eq!(refused.0, "lighting", "{}", refused.1);
+    let cube: Vec<_> = stand.cameras().iter().map(|camera| stand.sent(camera, 1).0).collect();
+    let (light, bytes) = stand.sent(&around.into(), 3);
+    let set = stand.set([&cube[..], &[light]].concat());
+    let [followed, gathered] = ["layered", "layered:0"].map(|method| stand.view(&set, method).expect("a view"));
+    let direct = stand.direct();
+    let errors = [rms(&followed, &direct), rms(&gathered, &direct), rms(&followed, &gathered)];
+    println!("{count} samples, {:.1} bytes each", bytes as f64 / count as f64);
+    println!("errors of 255: followed {:.2}, gathered {:.2}, of each other {:.2}", errors[0], errors[1], errors[2]);
+    assert!(count > 10_000 && errors[2] > 2.0 && errors[1] > errors[0] && errors[1] < 30.0, "{count} {errors:?}");
+    let refused = field(stand.view(&stand.set(cube), "layered:0").expect_err("no light field"));
+    assert_eq!(refused.0, "reconstruction_method", "{}", refused.1);
 }
