@@ -157,8 +157,8 @@ fn a_light_field_is_sampled_where_mirrors_are_followed_and_views_gather_in_it() 
         stand.engine.sample(&SampleWork { lighting: lighting.to_owned(), ..work }, TURN)
     };
     let count = light_samples(&sampled("shadows, reflections 1").expect("a light field"));
-    let refused = field(sampled("shadows").expect_err("no mirrors are followed"));
-    assert_eq!(refused.0, "lighting", "{}", refused.1);
+    // As for a session that has lost its reflections under overload.
+    assert_eq!(light_samples(&sampled("shadows").expect("no mirrors are followed")), 0);
     let cube: Vec<_> = stand.cameras().iter().map(|camera| stand.sent(camera, 1).0).collect();
     let (light, bytes) = stand.sent(&around.into(), 3);
     let set = stand.set([&cube[..], &[light]].concat());

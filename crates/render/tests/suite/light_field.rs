@@ -96,7 +96,7 @@ fn a_mirror_sends_what_its_mirrored_rays_meet() {
     let mut scene = of_parts(vec![floor_mirror(0.9), (plate, bright, Affine3A::IDENTITY)]);
     scene.illumination.environment = Environment::uniform(Vec3::splat(sky));
     let reflector = Reflector { reflectance_linear: Vec3::splat(0.9), roughness: 0.0 };
-    let field = directions(&drawn(&upload(&scene), &around(&scene, 32), "shadows, reflections 1"));
+    let field = directions(&drawn(&upload(&scene), &around(&scene, 32), "shadows, reflections 2"));
     let (mut by_end, mut farthest_off) = ([0; 2], 0.0_f32);
     for (towards, sample) in all_samples(&field) {
         let LightSample { point_in_world: point, radiance_linear: radiance } = sample;
