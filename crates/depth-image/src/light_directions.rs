@@ -45,7 +45,8 @@ impl LightDirections {
     }
 
     /// The parts of an edge.
-    fn divisions(self) -> i32 {
+    #[must_use]
+    pub fn divisions(self) -> u32 {
         match self {
             Self::D66 => 4,
             Self::D258 => 8,
@@ -56,7 +57,7 @@ impl LightDirections {
     /// The number of directions.
     #[must_use]
     pub fn count(self) -> u32 {
-        (4 * self.divisions() * self.divisions() + 2) as u32
+        4 * self.divisions() * self.divisions() + 2
     }
 
     /// Pairs of opposite directions.
@@ -78,7 +79,7 @@ impl LightDirections {
 
     /// One vertex of each opposite two.
     fn first_vertices(self) -> impl Iterator<Item = IVec3> {
-        let n = self.divisions();
+        let n = self.divisions() as i32;
         let square = move |k: i32| (-n..=n).flat_map(move |j| (-n..=n).map(move |i| IVec3::new(i, j, k)));
         let is_vertex = move |v: &IVec3| v.abs().element_sum() == n;
         let is_first = |v: &IVec3| [v.z, v.y, v.x].into_iter().find(|&c| c != 0).is_some_and(|c| c > 0);
@@ -103,7 +104,7 @@ impl LightDirections {
 
     /// The triangles of the face whose coordinates are not negative.
     fn face_triangles(self) -> impl Iterator<Item = [IVec3; 3]> {
-        let n = self.divisions();
+        let n = self.divisions() as i32;
         let at = move |i: i32, j: i32| IVec3::new(i, j, n - i - j);
         let up = move |(i, j): (i32, i32)| [at(i, j), at(i + 1, j), at(i, j + 1)];
         let down = move |(i, j): (i32, i32)| (i + j + 2 <= n).then(|| [at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);

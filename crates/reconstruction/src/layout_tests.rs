@@ -224,7 +224,7 @@ fn glossy_surfaces_agree_where_they_are_listed_and_send_rays() {
 
 #[test]
 fn light_fields_agree() {
-    let field = host!(GpuLightField { directions, side_px, exponent, least_alpha });
+    let field = host!(GpuLightField { directions, divisions, side_px, exponent, least_alpha });
     assert_eq!(templates_that_agree("LightField", &field), BTreeSet::from(["layered.wgsl"]));
 }
 

@@ -3,6 +3,8 @@
 
 struct LightField {
     directions: u32,
+    // Parts of an edge of the octahedron whose vertices they are.
+    divisions: u32,
     // Lines along each side of a direction's square.
     side_px: u32,
     // Of the lobe at mirrors, around the mirrored ray.
@@ -15,6 +17,9 @@ struct LightField {
 // Four texels a direction: where light goes and its solid angle; rows that take (point_in_world, 1) to the column and the row among the
 // lines, and to the depth behind which samples send light to the point.
 @group(0) var light_directions: texture_2d<u32>;
+// For each cell of both halves of the octahedron, seen from above: the nearest direction. After them for each direction all, by rising
+// angle to it.
+@group(0) var light_orders: texture_2d<u32>;
 // The first sample of a line, and the one after its last.
 @group(0) var light_lines: texture_2d<u32>;
 // Depth and radiance.
@@ -34,6 +39,28 @@ fn lobe_share(mirror: Mirror, mirrored: vec3f, towards_light: vec3f) -> f32 {
     let n_v = max(dot(mirror.normal, mirror.towards_eye), LEAST_COSINE);
     let lobe = ggx_distribution(mirror.normal, half_way, alpha) * ggx_visibility(n_l, n_v, alpha) * n_l;
     return lobe * alpha * alpha / max(ggx_visibility(n_v, n_v, alpha) * n_v, 1e-12);
+}
+
+// The direction that is nearest to a unit vector, or nearly so.
+fn nearest_direction(towards: vec3f) -> u32 {
+    let scale = f32(light_field.divisions) / (abs(towards.x) + abs(towards.y) + abs(towards.z));
+    let side = 2 * i32(light_field.divisions) + 1;
+    let at = vec2i(round(towards.xy * scale)) + i32(light_field.divisions);
+    let cell = (select(0, side, towards.z < 0.0) + at.y) * side + at.x;
+    return textureLoad(light_orders, texel_at(u32(cell)), 0).x;
+}
+
+fn direction_in_order(nearest: u32, place: u32) -> u32 {
+    let side = 2u * light_field.divisions + 1u;
+    return textureLoad(light_orders, texel_at(2u * side * side + nearest * light_field.directions + place), 0).x;
+}
+
+// The angle from the mirrored ray beyond which directions do not count.
+fn lobe_angle(mirror: Mirror, is_rough: bool) -> f32 {
+    // Masking and the cosine weigh some directions more than the mirrored one.
+    let alpha = max(ggx_alpha(mirror.reflector.roughness), light_field.least_alpha);
+    let rough = 2.0 * atan(alpha * sqrt(sqrt(MOST_MASKING / LEAST_LOBE_SHARE) - 1.0));
+    return select(acos(pow(LEAST_LOBE_SHARE, 1.0 / light_field.exponent)), rough, is_rough);
 }
 
 // The light of the first surface on a line behind a depth, and how far behind; or what is around the scene, at no distance.
@@ -108,12 +135,19 @@ fn gathered_light(mirror: Mirror) -> vec3f {
     let is_rough = mirror.reflector.roughness >= ROUGHEST_MIXED;
     var light = vec3f(0.0);
     var sum = 0.0;
-    for (var direction = 0u; direction < light_field.directions; direction++) {
-{% if count_fetches %}        fetches += 1u;
+    let nearest = nearest_direction(-mirrored);
+    let middle = light_texel(nearest, 0u).xyz;
+    let farthest = lobe_angle(mirror, is_rough) + acos(clamp(dot(middle, -mirrored), -1.0, 1.0));
+    let least_cosine = cos(min(farthest, LIGHT_PI));
+    var is_within = true;
+    for (var place = 0u; place < light_field.directions && is_within; place++) {
+{% if count_fetches %}        fetches += 2u;
 {% endif %}
+        let direction = direction_in_order(nearest, place);
         let own = light_texel(direction, 0u);
+        is_within = dot(middle, own.xyz) >= least_cosine;
         let share = lobe_share(mirror, mirrored, -own.xyz);
-        for (var counts = share > LEAST_LOBE_SHARE; counts; counts = false) {
+        for (var counts = is_within && share > LEAST_LOBE_SHARE; counts; counts = false) {
             light += light_through(direction, own, mirror.point_in_world, is_rough) * (share * own.w);
             sum += share * own.w;
         }

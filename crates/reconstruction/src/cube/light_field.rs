@@ -2,8 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{LayeredLightField, LightDirection, LightDirections, LightFieldCamera};
-use glam::Vec4;
+use glam::{IVec3, Vec3, Vec4};
 use gpu::{Binding, Table, TablePool, Turn};
+use rayon::prelude::*;
 use wgpu::{BufferUsages, TextureFormat};
 
 use crate::error::ReconstructionError;
@@ -13,6 +14,8 @@ pub(crate) const NEAREST_SPACINGS: f32 = 0.5;
 
 /// Directions that a lobe takes less of than this, beside the mirrored one, do not count.
 pub(crate) const LEAST_LOBE_SHARE: f32 = 0.01;
+/// Masking and the cosine may weigh a direction so many times as much as the mirrored one.
+pub(crate) const MOST_MASKING: f32 = 4.0;
 /// How much of a direction's own width its lines are taken from.
 pub(crate) const FOOTPRINT_SHARE: f32 = 0.8;
 
@@ -36,6 +39,7 @@ fn alpha_of(exponent: f32) -> f32 {
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct GpuLightField {
     pub directions: u32,
+    pub divisions: u32,
     pub side_px: u32,
     pub exponent: f32,
     pub least_alpha: f32,
@@ -46,6 +50,7 @@ impl GpuLightField {
         let exponent = mirror_exponent(camera.directions);
         Self {
             directions: camera.directions.count(),
+            divisions: camera.directions.divisions(),
             side_px: camera.side_px,
             exponent,
             least_alpha: alpha_of(exponent),
@@ -57,6 +62,7 @@ impl GpuLightField {
 pub(crate) struct LightField {
     own: wgpu::Buffer,
     directions: Table,
+    orders: Table,
     lines: Table,
     samples: Table,
 }
@@ -86,27 +92,58 @@ impl LightField {
         Ok(Self {
             own: tables.gpu.buffer_with("light field", &[GpuLightField::of(&field.camera)], BufferUsages::UNIFORM),
             directions: tables.upload("directions of a light field", TextureFormat::Rgba32Uint, &directions, turn)?,
+            orders: tables.upload(
+                "orders of directions",
+                TextureFormat::R32Uint,
+                &orders(field.camera.directions),
+                turn,
+            )?,
             lines: tables.upload("lines of a light field", TextureFormat::Rg32Uint, &lines, turn)?,
             samples: tables.upload("samples of a light field", TextureFormat::Rg32Uint, &samples, turn)?,
         })
     }
 
     /// The resources of `cube/gather.wgsl`.
-    pub fn bindings(&self) -> [Binding<'_>; 4] {
+    pub fn bindings(&self) -> [Binding<'_>; 5] {
         [
             Binding::buffer("light_field", &self.own),
             Binding::texture("light_directions", &self.directions),
+            Binding::texture("light_orders", &self.orders),
             Binding::texture("light_lines", &self.lines),
             Binding::texture("light_samples", &self.samples),
         ]
     }
 }
 
+/// Texels of `light_orders`.
+fn orders(directions: LightDirections) -> Vec<u32> {
+    let all: Vec<Vec3> = directions.all().iter().map(|direction| direction.towards).collect();
+    let n = directions.divisions() as i32;
+    let cell = |half: i32, j: i32, i: i32| {
+        let height = (n - i.abs() - j.abs()).max(0) * half;
+        let towards = IVec3::new(i, j, height).as_vec3().normalize_or_zero();
+        all.iter()
+            .map(|own| own.dot(towards))
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map_or(0, |(at, _)| at as u32)
+    };
+    let rows = [1, -1].into_iter().flat_map(|half| (-n..=n).map(move |j| (half, j)));
+    let mut orders: Vec<u32> = rows.flat_map(|(half, j)| (-n..=n).map(move |i| cell(half, j, i))).collect();
+    let order = |middle: &Vec3| {
+        let mut order: Vec<u32> = (0..all.len() as u32).collect();
+        order.sort_by(|&a, &b| all[b as usize].dot(*middle).total_cmp(&all[a as usize].dot(*middle)));
+        order
+    };
+    orders.extend(all.par_iter().map(order).flatten_iter().collect::<Vec<u32>>());
+    orders
+}
+
 /// Texels of `light_directions`.
 fn direction_rows(camera: &LightFieldCamera, direction: &LightDirection) -> [[u32; 4]; 4] {
     let lines = camera.lines(direction.towards);
     let [right, down, forward] = lines.axes_in_world();
-    let row = |axis: glam::Vec3, offset: f32| axis.extend(offset - axis.dot(lines.corner_in_world));
+    let row = |axis: Vec3, offset: f32| axis.extend(offset - axis.dot(lines.corner_in_world));
     let rows: [Vec4; 4] = [
         direction.towards.extend(direction.solid_angle_sr),
         row(right / lines.spacing_m, 0.0),

@@ -19,7 +19,7 @@ pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, SQUARE_REACH};
 pub(crate) use light_field::GpuLightField;
 #[cfg(feature = "scalar")]
 pub(crate) use light_field::NEAREST_SPACINGS;
-pub(crate) use light_field::{FOOTPRINT_SHARE, LEAST_LOBE_SHARE, LightField};
+pub(crate) use light_field::{FOOTPRINT_SHARE, LEAST_LOBE_SHARE, LightField, MOST_MASKING};
 pub(crate) use links::links;
 pub(crate) use samples::CubeSamples;
 #[cfg(feature = "scalar")]
