@@ -2,7 +2,7 @@
 
 use glam::{UVec2, Vec3};
 
-use crate::{CameraError, LightFieldCamera, ParallelCamera, SpecularPlanes};
+use crate::{CameraError, ParallelCamera, SpecularPlanes};
 
 /// The most samples of one line; what lies behind them is not held.
 pub const MAX_LAYERS: u32 = 255;
@@ -49,8 +49,8 @@ pub enum LayeredError {
     Depth { line: usize, layer: usize, depth_m: f32, range_m: f32 },
     #[error("tile {tile} of a layered image has {given} lines, the image's has {expected}")]
     Tile { tile: usize, given: UVec2, expected: UVec2 },
-    #[error("tile {tile} of a light field has the lines of {given:?}, must have those of {expected:?}")]
-    LightFieldTile { tile: usize, given: LightFieldCamera, expected: LightFieldCamera },
+    #[error("tile {tile} of a light field has other lines than that part of the whole")]
+    LightFieldTile { tile: usize },
     #[error("tiles of a layered image have visibility of different lamps")]
     MixedTiles,
 }

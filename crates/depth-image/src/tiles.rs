@@ -84,7 +84,7 @@ impl LayeredLightField {
         for (number, tile) in tiles.iter().enumerate() {
             let expected = camera.part(&part(size_px, number as u32, tiles.len() as u32));
             if tile.camera != expected {
-                return Err(LayeredError::LightFieldTile { tile: number, given: tile.camera, expected });
+                return Err(LayeredError::LightFieldTile { tile: number });
             }
             tile.validate()?;
         }

@@ -8,7 +8,10 @@ use naga::{Module, TypeInner};
 
 use crate::cube::{GpuCube, GpuLightField};
 use crate::{
-    bounce::{GpuGlossySurface, GpuMirrorBox, GpuMirroredRay, lobe::GpuLobeRays},
+    bounce::{
+        GpuMirrorBox, GpuMirroredRay,
+        lobe::{GpuGlossySurface, GpuLobeRays},
+    },
     pixel_list::GpuPixelList,
     quads::{GpuCutWork, GpuQuadWork},
     shaders::{shader_sources, templates},

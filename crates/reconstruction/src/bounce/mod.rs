@@ -16,7 +16,7 @@ use wgpu::{Buffer, BufferUsages};
 
 pub use curved_search::CurvedSearch;
 pub(crate) use curved_search::{CurvedWalk, LONGEST_STEP, MAX_WALK_STEPS};
-pub(crate) use lobe::{GpuGlossySurface, Lobe, LobeSum};
+pub(crate) use lobe::{Lobe, LobeSum};
 
 use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList};
@@ -172,24 +172,14 @@ impl<'s> Bounces<'s> {
             let bytes = [bytemuck::bytes_of(&work), bytemuck::cast_slice(&cameras)].concat();
             device.gpu.buffer_with("mirror cell", &uniform_elements([bytes]), BufferUsages::UNIFORM)
         };
-        let lend = |label: &'static str, bytes: usize| {
-            device.gpu.check_storage_bytes(label, bytes as u64)?;
-            Ok::<_, ReconstructionError>(device.buffers.lend_storage(label, bytes as u64))
-        };
+        let lend = |label, bytes| lend(device, label, bytes);
         let rays = || lend("mirrored rays", size_of::<GpuMirroredRay>() * pixels);
         let listed = || lend("lists of mirrored rays", 4 * pixels * cells.len());
         let plane = |label| lend(label, 4 * pixels);
-        let surfaces = || lend("glossy surfaces", size_of::<GpuGlossySurface>() * pixels);
-        // In a light field lobes are gathered.
-        let is_plain_cube =
-            |cell: &MirrorCell<'_>| cell.surroundings.cube.as_ref().is_some_and(|cube| cube.light_field.is_none());
-        let sends = mirrors.glossy_rays > 0 && cells.iter().any(is_plain_cube);
         Ok(Some(Self {
             reflections: mirrors.reflections,
             glossy_rays: mirrors.glossy_rays,
-            lobes: sends
-                .then(|| Ok::<_, ReconstructionError>([surfaces()?, lend("light of lobes", 12 * pixels)?]))
-                .transpose()?,
+            lobes: lobe::lend(device, mirrors, pixels)?,
             boxes: device.gpu.buffer_with("mirror boxes", &boxes, BufferUsages::UNIFORM),
             works: cells.iter().enumerate().map(work).collect(),
             poles: cells.iter().map(|cell| poles(device, cell, curved_search)).collect(),
@@ -311,6 +301,12 @@ impl<'s> Bounces<'s> {
         ]);
         bindings
     }
+}
+
+/// Memory for the rays of a batch.
+fn lend(device: &Device, label: &'static str, bytes: usize) -> Result<PooledBuffer, ReconstructionError> {
+    device.gpu.check_storage_bytes(label, bytes as u64)?;
+    Ok(device.buffers.lend_storage(label, bytes as u64))
 }
 
 /// The switches of `bounce/march.wgsl`.

@@ -1,15 +1,15 @@
 //! What mirrors and rough surfaces show, gathered in layered light fields.
 
 use depth_image::{
-    CubeGrid, CubeImages, Environment, LayeredLightField, LightDirections, LightFieldCamera, PinholeCamera, Reflector,
-    View, ViewPlanes, environment_reflectance_linear, linear_from_srgb8, srgb8_from_linear,
+    Antialias, CubeGrid, CubeImages, Environment, LayeredLightField, LightDirections, LightFieldCamera, PinholeCamera,
+    Reflector, View, ViewPlanes, environment_reflectance_linear, linear_from_srgb8, srgb8_from_linear,
 };
 use glam::{UVec2, Vec3};
 use gpu::Turn;
 use reconstruction::scalar::{Reflecting, gathered_light};
 use reconstruction::{Mirrors, ReconstructionError, ReconstructionMethod, SampleSet};
 use render::{DrawWork, GpuScene, LayerSelection};
-use scene::procedural::{mirror_box, teapot_floor};
+use scene::procedural::{mirror_box, teapot_floor, teapot_spheres};
 use scene::{Material, Scene};
 
 use crate::stage::{depths, description, gpu, looking, plainly_lit, psnr_db, reconstructor, renderer};
@@ -140,6 +140,47 @@ fn rays_into_lobes_err_as_those_of_direct_drawing_do() {
         // With many rays what remains is that of the cube's samples.
         assert!(walked > drawn.min(33.5) - 1.5, "{rays}: {walked} {drawn}");
     }
+}
+
+/// Many weak rays are as much light as few strong ones.
+#[test]
+fn the_light_of_many_rays_is_that_of_few() {
+    let camera = looking(Vec3::new(8.0, 4.5, 8.0), Vec3::Y, 40.0, UVec2::new(60, 45));
+    let mut scene = teapot_floor();
+    let floor = Material { metallic: 0.0, base_color_linear: [0.5, 0.5, 0.5, 1.0], ..scene.materials[1].clone() };
+    scene.materials[1] = floor;
+    let stage = Gathering::new(scene.lit_by(None, Some(Environment::uniform(Vec3::ZERO))), camera);
+    let set = stage.set(None);
+    let light = |mirrors| {
+        let view = stage.view(&set, "layered", mirrors);
+        view.srgb8.iter().map(|&code| f64::from(linear_from_srgb8(code))).sum::<f64>()
+    };
+    let plain = light(Mirrors::default());
+    let [few, many] = [8, 256].map(|glossy_rays| light(Mirrors { glossy_rays, ..GLOSSY }) - plain);
+    println!("light of 8 rays {few:.2}, of 256 {many:.2}, beside {plain:.0}");
+    assert!(few > 0.01 * plain && (many / few - 1.0).abs() < 0.06, "{few} {many}");
+}
+
+#[test]
+fn mirrors_and_lobes_of_several_samples_in_several_views_are_those_of_direct_drawing() {
+    let camera = looking(Vec3::new(8.0, 4.5, 8.0), Vec3::Y, 40.0, UVec2::new(80, 60));
+    let stage = Gathering::new(teapot_spheres(), camera);
+    let set = stage.set(None);
+    let other = looking(Vec3::new(6.0, 5.0, 9.0), Vec3::Y, 40.0, UVec2::new(80, 60));
+    let planes = ViewPlanes { antialias: Antialias::of(4).expect("offered"), ..ViewPlanes::COLOR };
+    let mirrors = Mirrors { cells: &[], reflections: 2, glossy_rays: 16 };
+    let method = ReconstructionMethod::LAYERED;
+    let made = |cameras: &[PinholeCamera]| {
+        reconstructor().reconstruct_with(&set, mirrors, cameras, method, planes, Turn::default()).expect("views")
+    };
+    let views = made(&[camera, other]);
+    assert_eq!(views[1], made(&[other])[0], "views of a batch are those of each");
+    let drawn = |lighting| renderer().draw_views(stage.lit(lighting), &[camera], planes).expect("a view").remove(0);
+    let [none, truth] = ["shadows", "shadows, reflections 2, glossy 64"].map(drawn);
+    let pixels = changed(&none, &truth);
+    let [own, without] = [psnr_db(&truth, &views[0], &pixels), psnr_db(&truth, &none, &pixels)];
+    println!("{own:.2} dB, without mirrors and lobes {without:.2} dB");
+    assert!(own > 24.0 && own > without + 5.0, "{own} {without}");
 }
 
 /// The floor lies at height 0, and all else above it.
