@@ -14,6 +14,7 @@ mod fill;
 mod in_flight;
 #[cfg(test)]
 mod layout_tests;
+mod lobes;
 mod methods;
 mod pixel_list;
 mod pyramid;

@@ -1,7 +1,5 @@
 //! The figures of Lischinski and Rappoport's Table 1, and the arithmetic of their §3.4.
 
-use super::storage::Layers;
-
 /// Megabytes of the paper: its slab of 192 MB has 32 × 32 × 256² texels of three bytes.
 pub const MB: f64 = (1 << 20) as f64;
 /// A light field slab of 32 × 32 × 256² texels of three bytes.
@@ -20,6 +18,13 @@ pub fn layers_of_a_volume(side: u32) -> f64 {
 /// Bytes of layered images in the paper's layout.
 pub fn layered_bytes(texels: usize, samples: usize) -> f64 {
     texels as f64 * TEXEL_BYTES + samples as f64 * SAMPLE_BYTES
+}
+
+/// Layers of the lines of images.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Layers {
+    pub mean: f64,
+    pub most: usize,
 }
 
 /// A column of Table 1: of the paper, in seconds of a 200 MHz Pentium Pro, or of a scene here.

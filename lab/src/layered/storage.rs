@@ -4,16 +4,9 @@ use depth_image::LayeredDepthImage;
 use reconstruction::SampleSet;
 use study::{Cell, Table};
 
-use super::paper::{self, MB};
+use super::paper::{self, Layers, MB};
 use super::subject::{Cube, Subject};
 use super::views;
-
-/// Layers of the lines of images.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Layers {
-    pub mean: f64,
-    pub most: usize,
-}
 
 pub fn table() -> Table {
     let columns = [

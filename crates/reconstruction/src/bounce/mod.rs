@@ -2,7 +2,7 @@
 //! mirror after mirror, and what they find is added to the pixels.
 
 mod curved_search;
-pub(crate) mod lobe;
+mod glossy;
 pub(crate) mod mips;
 
 use bytemuck::{Pod, Zeroable};
@@ -16,7 +16,8 @@ use wgpu::{Buffer, BufferUsages};
 
 pub use curved_search::CurvedSearch;
 pub(crate) use curved_search::{CurvedWalk, LONGEST_STEP, MAX_WALK_STEPS};
-pub(crate) use lobe::{Lobe, LobeSum};
+#[cfg(test)]
+pub(crate) use glossy::GpuGlossySurface;
 
 use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList};
@@ -48,6 +49,13 @@ pub struct MirrorCell<'s> {
     pub bounds: Aabb,
     /// The surroundings, as seen from within the box or from its corners, lit like the images of the views.
     pub surroundings: &'s SampleSet,
+}
+
+impl MirrorCell<'_> {
+    /// A cube without a light field, in which lobes would be gathered.
+    fn is_plain_cube(&self) -> bool {
+        self.surroundings.cube.as_ref().is_some_and(|cube| cube.light_field.is_none())
+    }
 }
 
 /// The mirrors of a scene, and how many of them a ray meets one after the other.
@@ -172,14 +180,15 @@ impl<'s> Bounces<'s> {
             let bytes = [bytemuck::bytes_of(&work), bytemuck::cast_slice(&cameras)].concat();
             device.gpu.buffer_with("mirror cell", &uniform_elements([bytes]), BufferUsages::UNIFORM)
         };
-        let lend = |label, bytes| lend(device, label, bytes);
+        let lend = |label, bytes| device.lend(label, bytes);
         let rays = || lend("mirrored rays", size_of::<GpuMirroredRay>() * pixels);
         let listed = || lend("lists of mirrored rays", 4 * pixels * cells.len());
         let plane = |label| lend(label, 4 * pixels);
+        let sends = mirrors.glossy_rays > 0 && cells.iter().any(MirrorCell::is_plain_cube);
         Ok(Some(Self {
             reflections: mirrors.reflections,
             glossy_rays: mirrors.glossy_rays,
-            lobes: lobe::lend(device, mirrors, pixels)?,
+            lobes: sends.then(|| glossy::lend(device, pixels)).transpose()?,
             boxes: device.gpu.buffer_with("mirror boxes", &boxes, BufferUsages::UNIFORM),
             works: cells.iter().enumerate().map(work).collect(),
             poles: cells.iter().map(|cell| poles(device, cell, curved_search)).collect(),
@@ -301,12 +310,6 @@ impl<'s> Bounces<'s> {
         ]);
         bindings
     }
-}
-
-/// Memory for the rays of a batch.
-fn lend(device: &Device, label: &'static str, bytes: usize) -> Result<PooledBuffer, ReconstructionError> {
-    device.gpu.check_storage_bytes(label, bytes as u64)?;
-    Ok(device.buffers.lend_storage(label, bytes as u64))
 }
 
 /// The switches of `bounce/march.wgsl`.

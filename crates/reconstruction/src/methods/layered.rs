@@ -6,9 +6,9 @@ use depth_image::{Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS};
 use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots, switches};
 use minijinja::{Value, context};
 
-use crate::bounce::lobe::{self, GlossyList};
 use crate::bounce::{Bounces, RayLists};
 use crate::cube::{Cube, LightField};
+use crate::lobes::{self, GlossyList};
 use crate::reflectors::sample_texels;
 use crate::surface::found_bindings;
 use crate::view_work::{ONE_VIEW, SetVariant};
@@ -260,12 +260,12 @@ pub(crate) fn record(
     let reflectors = cube.reflectors.as_ref();
     for (glossy, reflectors) in sent.iter().zip(reflectors) {
         for number in 0..glossy.rays {
-            let first = lobe::record(recording, bounces, (glossy, number), &reflectors.illumination)?;
+            let first = lobes::record(recording, bounces, (glossy, number), &reflectors.illumination)?;
             // Costs are learned by generation, and are others than those of rays off mirrors.
             let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + mirrors.max(1);
             follow_mirrors(recording, &cube, bounces, (first, None, Some(glossy)), generations)?;
         }
-        lobe::record_sum(recording, glossy)?;
+        lobes::record_sum(recording, glossy)?;
     }
     Ok(undecided)
 }

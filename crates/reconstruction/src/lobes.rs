@@ -2,29 +2,13 @@
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::Highlight;
-use gpu::{Binding, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, light_slots};
+use gpu::{Binding, ResourceTraits, ShaderVariant, highlight_name, light_slots};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
-use super::{Bounces, MirrorCell, Mirrors, RayLists};
+use crate::bounce::{Bounces, RayLists};
 use crate::pixel_list::GpuPixelList;
 use crate::{device::Device, error::ReconstructionError, recording::Recording};
-
-/// `GlossySurface` of `bounce/glossy.wgsl`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(crate) struct GpuGlossySurface {
-    pub point_in_world: [f32; 3],
-    pub pixel: u32,
-    pub towards_eye: [f32; 3],
-    pub normal_oct16: u32,
-    pub throughput_linear: [f32; 3],
-    pub roughness: f32,
-    pub start_m: f32,
-    pub open: f32,
-    pub is_mirrored: u32,
-    pub padding: u32,
-}
 
 /// `LobeRays` of `bounce/lobe_rays.wgsl`.
 #[repr(C)]
@@ -32,22 +16,6 @@ pub(crate) struct GpuGlossySurface {
 pub(crate) struct GpuLobeRays {
     pub count: u32,
     pub number: u32,
-}
-
-/// Memory for rough surfaces and for the light of their rays, for as many pixels; none where no rays are sent.
-pub(super) fn lend(
-    device: &Device,
-    mirrors: Mirrors<'_>,
-    pixels: usize,
-) -> Result<Option<[PooledBuffer; 2]>, ReconstructionError> {
-    // In a light field lobes are gathered.
-    let is_plain =
-        |cell: &MirrorCell<'_>| cell.surroundings.cube.as_ref().is_some_and(|cube| cube.light_field.is_none());
-    if mirrors.glossy_rays == 0 || !mirrors.cells.iter().any(is_plain) {
-        return Ok(None);
-    }
-    let surfaces = super::lend(device, "glossy surfaces", size_of::<GpuGlossySurface>() * pixels)?;
-    Ok(Some([surfaces, super::lend(device, "light of lobes", 12 * pixels)?]))
 }
 
 /// The rough surfaces of one position within the pixels.
