@@ -52,7 +52,7 @@ fn over_the_best(_: &Stand, loads: &[f64]) -> anyhow::Result<Rows> {
     rows(loads, |load| {
         Ok(NODES.map(|p| {
             let time = |k: usize| (load / k as f64).max(1.0 / (p - k) as f64);
-            let least = (1..p).map(time).fold(f64::INFINITY, f64::min);
+            let least = (1..p).map(time).min_by(f64::total_cmp).unwrap_or(f64::INFINITY);
             time(k_fd(1, load, 1, 1.0, p)) / least
         }))
     })
