@@ -12,7 +12,7 @@ pub(crate) struct Device {
 }
 
 impl Device {
-    /// Memory of so many bytes.
+    /// Lends a storage buffer of this size.
     ///
     /// # Errors
     /// More than the device binds.

@@ -22,9 +22,9 @@ const RAYS: [u32; 5] = [1, 4, 16, 64, 128];
 const MOST_RAYS: u32 = 256;
 /// Rays of a quick run.
 const QUICK: usize = 3;
-/// Gathering in 258 directions is no worse than so many rays.
+/// The number of rays a pixel to which gathering in 258 directions is to be equal or better.
 const FEW_RAYS: u32 = 4;
-/// The bound of the time of a view by gathering over that of direct drawing with so many rays: 1/28, as in the paper.
+/// The number of rays a pixel against which the time of gathering is measured. The bound of the ratio is the paper's, 1/28.
 const MANY_RAYS: u32 = 64;
 const MOST_OF_DIRECT: f64 = 0.036;
 const SIDE: u32 = 512;

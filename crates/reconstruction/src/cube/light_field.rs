@@ -9,12 +9,12 @@ use wgpu::{BufferUsages, TextureFormat};
 
 use crate::error::ReconstructionError;
 
-/// Light comes from samples that are at least so many spacings of the lines away: nearer ones may be of the surface itself.
+/// The least distance from a surface to a sample that lights it, in spacings of the lines. Nearer samples may be of the surface itself.
 pub(crate) const NEAREST_SPACINGS: f32 = 0.5;
 
 /// Directions that a lobe takes less of than this, beside the mirrored one, do not count.
 pub(crate) const LEAST_LOBE_SHARE: f32 = 0.01;
-/// Masking and the cosine may weigh a direction so many times as much as the mirrored one.
+/// An upper bound of what masking and the cosine weigh for one direction, over what they weigh for the mirrored one.
 pub(crate) const MOST_MASKING: f32 = 4.0;
 /// How much of a direction's own width its lines are taken from.
 pub(crate) const FOOTPRINT_SHARE: f32 = 0.8;

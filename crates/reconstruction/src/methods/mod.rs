@@ -102,8 +102,8 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 5] = [
                 Some(Layered { followed: Some(followed) })
             },
         }),
-        help: "walks through a layered cube, and meets the planes of its samples; follows rays off so many mirrors, and gathers in a \
-               light field what further ones show",
+        help: "walks through a layered cube, and meets the planes of its samples; with MIRRORS, rays are followed off at most that \
+               many mirrors, and what the next one shows is gathered in a light field",
     },
 ];
 

@@ -1,8 +1,9 @@
 //! What mirrors and rough surfaces show, gathered in layered light fields.
 
 use depth_image::{
-    Antialias, CubeGrid, CubeImages, Environment, LayeredLightField, LightDirections, LightFieldCamera, PinholeCamera,
-    Reflector, View, ViewPlanes, environment_reflectance_linear, linear_from_srgb8, srgb8_from_linear,
+    Antialias, CubeGrid, CubeImages, Environment, Highlight, Illumination, LayeredLightField, LightDirections,
+    LightFieldCamera, PinholeCamera, Reflector, View, ViewPlanes, environment_reflectance_linear, highlight_linear,
+    linear_from_srgb8, srgb8_from_linear,
 };
 use glam::{UVec2, Vec3};
 use gpu::Turn;
@@ -187,8 +188,14 @@ fn mirrors_and_lobes_of_several_samples_in_several_views_are_those_of_direct_dra
 #[test]
 fn gathering_is_its_twin() {
     let camera = looking(Vec3::new(8.0, 4.5, 8.0), Vec3::Y, 40.0, UVec2::new(60, 45));
-    let sky = Environment::uniform(Vec3::ZERO);
-    for roughness in [0.0, 0.33, 0.6] {
+    // Above, and nearly level, the floor sees it.
+    let sky = Environment {
+        zenith_linear: Vec3::new(0.3, 0.1, 0.0),
+        nadir_linear: Vec3::new(0.0, 0.1, 0.3),
+        is_mapped: false,
+    };
+    let illumination = Illumination { lights: Vec::new(), environment: sky };
+    for roughness in [0.0, 0.15, 0.33, 0.6] {
         let mut scene = teapot_floor().lit_by(None, Some(sky));
         let floor = Material { roughness, ..scene.materials[1].clone() };
         scene.materials[1] = floor.clone();
@@ -210,8 +217,20 @@ fn gathering_is_its_twin() {
             let (normal_in_world, towards_eye_in_world) = (Vec3::Y, -ray.direction_in_world.normalize_or_zero());
             let reflector = Reflector { reflectance_linear, roughness };
             let surface = Reflecting { point_in_world, normal_in_world, towards_eye_in_world, reflector };
-            let light = gathered_light(&field, &surface, |_| Vec3::ZERO);
-            let added = light * environment_reflectance_linear(normal_in_world, towards_eye_in_world, &reflector);
+            let light = gathered_light(&field, &surface, |towards| sky.radiance_linear(towards));
+            let gathered_linear =
+                light * environment_reflectance_linear(normal_in_world, towards_eye_in_world, &reflector);
+            // What is gathered takes the place of the environment.
+            let mirrored_sky_linear = highlight_linear(
+                Highlight::Ggx,
+                &illumination,
+                &|_| 1.0,
+                point_in_world,
+                normal_in_world,
+                towards_eye_in_world,
+                &reflector,
+            );
+            let added = gathered_linear - mirrored_sky_linear;
             let expected = [0, 1, 2]
                 .map(|channel| srgb8_from_linear(linear_from_srgb8(plain.srgb8[3 * index + channel]) + added[channel]));
             let own = &gathered.srgb8[3 * index..][..3];

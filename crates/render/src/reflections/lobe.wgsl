@@ -18,7 +18,7 @@
 {% include "rise.wgsl" %}
 {% include "spot.wgsl" %}
 
-// The number of this ray, of so many of a pixel. `whole` is 1 where rays off mirrors do not show a part of the light.
+// The number of this ray, and the number of rays of a pixel. `whole` is 1 where rays off mirrors do not show a part of the light.
 struct Lobe { ray: u32, ray_count: u32, whole: u32 }
 
 @compute @workgroup_size(8, 8)

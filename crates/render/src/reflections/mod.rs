@@ -60,7 +60,7 @@ impl Reflections {
         Self::lend_for(gpu, pool, batch, (capacity, batch.bytes(1))).map(Some)
     }
 
-    /// Memory for so many rays, and for planes of so many bytes.
+    /// Memory for `capacity` rays, and for planes of `plane_bytes` each.
     fn lend_for(
         gpu: &Gpu,
         pool: &BufferPool,

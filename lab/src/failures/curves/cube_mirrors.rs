@@ -15,7 +15,7 @@ const BALL_IN_WORLD: Vec3 = Vec3::new(11.3, 9.6, 11.7);
 const RADIUS_M: f32 = 8.0;
 const FLOOR_M: f32 = BALL_IN_WORLD.y - RADIUS_M;
 const RAYS: u32 = 2000;
-/// As the walk starts them: so many spacings above the mirror, at most four times as far along the ray.
+/// The height above the mirror at which the walk starts rays, in spacings. Along a slanting ray it starts at most four times as far.
 const START_SPACINGS: f32 = 0.75;
 const LEAST_RISE: f32 = 0.25;
 /// A view of 200 pixels in 23°.
