@@ -2,7 +2,7 @@
 
 use glam::UVec3;
 
-use super::distances::distances;
+use super::reaches::reaches;
 use super::samples::CubeSamples;
 
 /// Steeper planes are no entries: another axis holds them. A sample is met where its normal has this share along the line at least.
@@ -16,8 +16,8 @@ pub(crate) const ENTRY_DEPTH_STEP: f32 = (2.0 * MOST_REACH + VOXEL) / 16383.0;
 const VOXEL: f32 = 2.0;
 /// Samples reach a little over the middle between two lines, in spacings: no ray passes between two squares.
 pub(crate) const SQUARE_REACH: f32 = 0.55;
-/// A cell that is a brick.
-const BRICK: u32 = 1 << 31;
+/// Of an entry that is the first of its leaf: more than one other follows.
+const MORE: u32 = 1 << 31;
 
 /// The tables of `cube/walk.wgsl`.
 pub(super) struct Bricks {
@@ -26,12 +26,13 @@ pub(super) struct Bricks {
     pub rows: u32,
     pub cells: Vec<u32>,
     pub bricks: Vec<[u32; 4]>,
-    pub leaves: Vec<[u32; 2]>,
-    /// Two a texel.
+    /// Two entries; or the first entry of more, and the places of the first pair of the others and of the one after their last.
+    pub leaves: Vec<[u32; 4]>,
+    /// Two a texel, of the leaves with more than two.
     pub entries: Vec<[u32; 4]>,
 }
 
-/// A sample whose plane passes through a voxel.
+/// A sample, or the two of a surface that is seen from both sides, whose plane passes through a voxel.
 #[derive(Clone, Copy, Default)]
 struct Passage {
     /// Within its brick.
@@ -47,13 +48,13 @@ impl Bricks {
         let mut all = Self {
             columns: size.x,
             rows: size.y,
-            cells: distances(size, &occupied),
+            cells: reaches(size, &occupied),
             bricks: Vec::new(),
             leaves: Vec::new(),
-            entries: Vec::with_capacity(passages.len() / 2 + 1),
+            entries: Vec::new(),
         };
         for (cell, ends) in first.windows(2).enumerate().filter(|(_, ends)| ends[1] > ends[0]) {
-            all.cells[cell] = BRICK | all.bricks.len() as u32;
+            all.cells[cell] = all.bricks.len() as u32;
             all.add_brick(&passages[ends[0] as usize..ends[1] as usize]);
         }
         all
@@ -65,13 +66,22 @@ impl Bricks {
         let first_leaf = self.leaves.len() as u32;
         for leaf in passages.chunk_by(|a, b| a.voxel == b.voxel) {
             mask[leaf[0].voxel as usize / 32] |= 1 << (leaf[0].voxel % 32);
-            let first = self.entries.len() as u32;
-            // The last of an odd number is there twice, which changes nothing.
-            let pair = |two: &[Passage]| [two[0].words, two[two.len() - 1].words];
-            self.entries.extend(leaf.chunks(2).map(|two| bytemuck::cast::<[[u32; 2]; 2], [u32; 4]>(pair(two))));
-            self.leaves.push([first, self.entries.len() as u32]);
+            let leaf = self.leaf(leaf);
+            self.leaves.push(leaf);
         }
         self.bricks.push([mask[0], mask[1], first_leaf, 0]);
+    }
+
+    fn leaf(&mut self, passages: &[Passage]) -> [u32; 4] {
+        // The last of an odd number is there twice, which changes nothing.
+        let pair = |two: &[Passage]| bytemuck::cast([two[0].words, two[two.len() - 1].words]);
+        if passages.len() <= 2 {
+            return pair(passages);
+        }
+        let [sample, place] = passages[0].words;
+        let first = self.entries.len() as u32;
+        self.entries.extend(passages[1..].chunks(2).map(pair));
+        [sample | MORE, place, first, self.entries.len() as u32]
     }
 }
 
@@ -92,9 +102,9 @@ fn by_cell(samples: &CubeSamples, size: UVec3) -> (Vec<u32>, Vec<Passage>) {
     (first, passages)
 }
 
-/// Calls `take` for each voxel that a sample's plane passes through, with the voxel's cell.
+/// Calls `take` for each voxel that a surface's plane passes through, with the voxel's cell.
 fn each_passage(samples: &CubeSamples, size: UVec3, mut take: impl FnMut(usize, Passage)) {
-    for sample in 0..samples.len() {
+    for (sample, is_two_sided) in surfaces(samples) {
         let line = samples.line[sample];
         let axis = samples.axis_of(line);
         if samples.normal[sample][axis].abs() < LEAST_NORMAL_ALONG_LINE {
@@ -107,15 +117,22 @@ fn each_passage(samples: &CubeSamples, size: UVec3, mut take: impl FnMut(usize, 
         let [from, to] = [depth - reach, depth + reach].map(|end| ((end / VOXEL).floor().max(0.0) as u32).min(last));
         let mut voxel = UVec3::ZERO;
         (voxel[(axis + 1) % 3], voxel[(axis + 2) % 3]) = (place.x / 2, place.y / 2);
-        let of_line = (place.x & 1) << (28 + (axis + 1) % 3) | (place.y & 1) << (28 + (axis + 2) % 3);
+        let bit = |offset: usize, is_set: u32| is_set << (28 + (axis + offset) % 3);
+        let bits = bit(0, is_two_sided.into()) | bit(1, place.x & 1) | bit(2, place.y & 1);
         let normal = u32::from(samples.normal_oct8(sample)) | (axis as u32) << 30;
         for along in from..=to {
             voxel[axis] = along;
             let below = (depth - along as f32 * VOXEL + ENTRY_DEPTH_BELOW) / ENTRY_DEPTH_STEP;
-            let words = [sample as u32 | of_line, normal | (below.round().clamp(0.0, 16383.0) as u32) << 16];
+            let words = [sample as u32 | bits, normal | (below.round().clamp(0.0, 16383.0) as u32) << 16];
             let (cell, within) = (voxel / 4, voxel % 4);
             let number = within.x + 4 * within.y + 16 * within.z;
             take((cell.x + size.x * (cell.y + size.y * cell.z)) as usize, Passage { voxel: number, words });
         }
     }
+}
+
+/// The sample of each surface, and whether the next sample is the same surface's other side.
+fn surfaces(samples: &CubeSamples) -> impl Iterator<Item = (usize, bool)> {
+    let of = |sample: usize| (sample < samples.len()).then(|| (sample, samples.has_other_side(sample)));
+    std::iter::successors(of(0), move |&(sample, is_two_sided)| of(sample + 1 + usize::from(is_two_sided)))
 }

@@ -1,9 +1,9 @@
 //! A layered depth cube on the device: its samples as bricks for rays to walk through, and as lines for their colours.
 
 mod bricks;
-mod distances;
 mod light_field;
 mod links;
+mod reaches;
 mod samples;
 
 use bytemuck::{Pod, Zeroable};
@@ -97,7 +97,7 @@ impl Cube {
             own: tables.gpu.buffer_with("cube", &[cube], BufferUsages::UNIFORM),
             cells: tables.upload("cells of a cube", TextureFormat::R32Uint, &bricks.cells, turn)?,
             bricks: tables.upload("bricks of a cube", TextureFormat::Rgba32Uint, &bricks.bricks, turn)?,
-            leaves: tables.upload("leaves of a cube", TextureFormat::Rg32Uint, &bricks.leaves, turn)?,
+            leaves: tables.upload("leaves of a cube", TextureFormat::Rgba32Uint, &bricks.leaves, turn)?,
             entries: tables.upload("entries of a cube", TextureFormat::Rgba32Uint, &bricks.entries, turn)?,
             samples: tables.upload("samples of a cube", TextureFormat::Rgba32Uint, &words, turn)?,
             reflectors: Reflectors::of_cube(tables, (images, &samples.place), set, turn)?,

@@ -90,6 +90,15 @@ impl CubeSamples {
         self.first[line as usize] as usize..self.first[line as usize + 1] as usize
     }
 
+    /// Whether the next sample is the other side of the same surface.
+    pub(super) fn has_other_side(&self, sample: usize) -> bool {
+        let next = sample + 1;
+        next < self.len()
+            && self.line[next] == self.line[sample]
+            && self.depth[next] == self.depth[sample]
+            && self.normal[next].dot(self.normal[sample]) < OPPOSITE
+    }
+
     /// The texels of `cube_samples` in `cube/colors.wgsl`.
     pub(super) fn words(&self, links: &[Links]) -> Vec<[u32; 4]> {
         let words = |sample: usize| {
@@ -118,5 +127,7 @@ impl CubeSamples {
     }
 }
 
+/// The cosine between opposite normals, but for the rounding of both.
+const OPPOSITE: f32 = -0.9999;
 /// Steeper planes count as being as steep as this.
 const LEAST_SLOPE_DIVISOR: f32 = 1e-3;
