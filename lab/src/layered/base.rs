@@ -7,7 +7,7 @@ use depth_image::{PinholeCamera, ProvenanceKind, View, ViewCell, ViewPlanes};
 use glam::UVec2;
 use reconstruction::{CommonSets, SampleSet};
 use render::{LayerSelection, Lighting};
-use study::{Bar, Cell, Check, Table};
+use study::{Bar, Cell, Check, Report, Table};
 
 use super::subject::Subject;
 use super::views;
@@ -28,19 +28,19 @@ const MOST_UNKNOWN: f64 = 0.2;
 const MOST_OVER: f64 = 1.25;
 const MOST_LOAD_S: f64 = 0.5;
 
-/// The table of all scenes, and its checks.
+/// Adds the table of all scenes, and its checks.
 ///
 /// # Errors
 /// The device fails.
-pub fn measure(stand: &Stand, lighting: Lighting, is_quick: bool) -> anyhow::Result<(Table, Vec<Check>)> {
+pub fn measure(stand: &Stand, lighting: Lighting, is_quick: bool, report: &mut Report) -> anyhow::Result<()> {
     let more = [("unknown", "%"), ("from the base", "%"), ("loaded, a million samples", "s")];
     let title = format!("A base of {SIDE}² beside the four images of each scene's sample cameras");
     let mut table = Table::new(title, &[&views::COLUMNS[..], &more].concat());
-    let mut checks = Vec::new();
     for &(name, gain_db) in &SCENES[..if is_quick { 1 } else { SCENES.len() }] {
-        checks.extend(of_scene(stand, (name, gain_db), lighting, &mut table)?);
+        report.checks.extend(of_scene(stand, (name, gain_db), lighting, &mut table)?);
     }
-    Ok((table, checks))
+    report.tables.push(table);
+    Ok(())
 }
 
 /// Views, and the seconds of one.

@@ -10,8 +10,9 @@ use depth_image::{PinholeCamera, ToneMapping, View, linear_from_rgb9e5};
 use glam::Vec2;
 use rayon::prelude::*;
 use render::{LayerSelection, Lighting};
-use study::{Bar, Cell, Check, Table};
+use study::{Axis, Bar, Better, Cell, Check, Report, Table, XyChart};
 
+use super::accuracy::{Reached, over_time};
 use super::pyramid::{EPSILON_FACTOR, Hit, Pyramids};
 use super::subject::{Cube, Subject};
 use super::views::{self, Figures};
@@ -32,57 +33,99 @@ const LEAST_GAIN_DB: f64 = 3.0;
 /// The bound of loads a ray of a walk, in scenes whose loads no other table has.
 const MOST_LOADS_A_RAY: f64 = 30.0;
 const LOADS_COUNTED: [&str; 2] = ["mirror-box", "teapot-spheres"];
+const WARP: &str = "warp";
+const WAYS: [&str; 4] = ["pyramid", "pyramid, dominant axis", WARP, "layered"];
+const IMAGES: &str = "joint_carve";
+const NOTE: &str = "Sides of cubes stand beside the points. The device makes views by layered and joint_carve, the host those of the paper's ways.";
 
-/// The table of all scenes, and its checks.
+/// Adds the table of all scenes, its checks, and charts of each scene.
 ///
 /// # Errors
 /// The device fails.
-pub fn measure(stand: &Stand, lighting: Lighting, is_quick: bool) -> anyhow::Result<(Table, Vec<Check>)> {
+pub fn measure(stand: &Stand, lighting: Lighting, is_quick: bool, report: &mut Report) -> anyhow::Result<()> {
     let columns = [&views::COLUMNS[..], &[("texel", "px"), ("holes", "%")]].concat();
     let mut table = Table::new("The paper's ways beside the walk", &columns);
-    let mut checks = Vec::new();
     for &name in &SCENES[..if is_quick { 1 } else { SCENES.len() }] {
         let subject = Subject::new(stand, name, lighting, VIEWS)?;
-        checks.extend(of_scene(&subject, &mut table)?);
+        let coarse = Ways::new(&Cubes::new(&subject, SIDE)?)?;
+        let is_coarse = coarse.texel_px > MOST_TEXEL_PX;
+        let finer = is_coarse.then(|| Ways::new(&Cubes::new(&subject, FINER_SIDE)?)).transpose()?;
+        let all: Vec<&Ways> = [&coarse].into_iter().chain(&finer).collect();
+        let images = views::of_images(&subject)?;
+        for ways in &all {
+            ways.push(name, &mut table)?;
+        }
+        table.push([images.row(name, IMAGES), vec![Cell::from(None::<f64>); 2]].concat())?;
+        report.checks.extend(checks(name, &coarse, finer.as_ref().unwrap_or(&coarse)));
+        report.charts.extend(charts(name, &all, &images).map(Into::into));
     }
-    Ok((table, checks))
+    report.tables.push(table);
+    Ok(())
 }
 
-fn of_scene(subject: &Subject<'_>, table: &mut Table) -> anyhow::Result<Vec<Check>> {
-    let name = subject.name;
-    let cubes = Cubes::new(subject, SIDE)?;
-    let quadtrees = cubes.traced(&cubes.all)?;
-    cubes.push("pyramid", &quadtrees, None, table)?;
-    cubes.push("pyramid, dominant axis", &cubes.traced(&cubes.dominant)?, None, table)?;
-    let walk = cubes.compared_with_warp(table)?;
-    let over = |what: &str| format!("{name}: {what} of a walk over quadtrees, {SIDE}²");
+fn checks(name: &str, ways: &Ways, beside_warp: &Ways) -> Vec<Check> {
+    let [quadtrees, _, _, walk] = ways.figures;
+    let over = |what: &str| format!("{name}: {what} of a walk over quadtrees, {}²", ways.side);
     let mut checks = vec![
-        Check::new(
-            over("wrong hits"),
-            walk.figures.wrong_hits / quadtrees.wrong_hits,
-            "",
-            Bar::AtMost(MOST_WRONG_HITS),
-        ),
-        Check::new(over("loads"), walk.figures.loads / quadtrees.loads, "", Bar::AtMost(MOST_LOADS)),
-        Check::new(over("PSNR"), walk.figures.psnr_db - quadtrees.psnr_db, "dB", Bar::AtLeast(LEAST_GAIN_DB)),
+        Check::new(over("wrong hits"), walk.wrong_hits / quadtrees.wrong_hits, "", Bar::AtMost(MOST_WRONG_HITS)),
+        Check::new(over("loads"), walk.loads / quadtrees.loads, "", Bar::AtMost(MOST_LOADS)),
+        Check::new(over("PSNR"), walk.psnr_db - quadtrees.psnr_db, "dB", Bar::AtLeast(LEAST_GAIN_DB)),
     ];
     if LOADS_COUNTED.contains(&name) {
-        let loads = format!("{name}: loads a ray, {SIDE}²");
-        checks.push(Check::new(loads, walk.figures.loads, "", Bar::AtMost(MOST_LOADS_A_RAY)));
+        let loads = format!("{name}: loads a ray, {}²", ways.side);
+        checks.push(Check::new(loads, walk.loads, "", Bar::AtMost(MOST_LOADS_A_RAY)));
     }
-    let (side, walk) = match cubes.texel_px() > MOST_TEXEL_PX {
-        true => (FINER_SIDE, Cubes::new(subject, FINER_SIDE)?.compared_with_warp(table)?),
-        false => (SIDE, walk),
-    };
-    let gain = format!("{name}: PSNR of a walk over the warp, {side}²");
-    checks.push(Check::new(gain, walk.over_warp_db, "dB", Bar::AtLeast(LEAST_GAIN_DB)));
-    Ok(checks)
+    let [_, _, warped, walk] = beside_warp.figures;
+    let gain = format!("{name}: PSNR of a walk over the warp, {}²", beside_warp.side);
+    checks.push(Check::new(gain, walk.psnr_db - warped.psnr_db, "dB", Bar::AtLeast(LEAST_GAIN_DB)));
+    checks
 }
 
-/// The figures of a walk, and its gain over the warp.
-struct Walk {
-    figures: Figures,
-    over_warp_db: f64,
+/// PSNR and wrong hits of all ways over the time of a view.
+fn charts(name: &str, all: &[&Ways], images: &Figures) -> [XyChart; 2] {
+    type Accuracy = (&'static str, Axis, Better, fn(&Figures) -> f64);
+    let accuracies: [Accuracy; 2] = [
+        ("PSNR", Axis::linear("PSNR", "dB"), Better::High, |figures| figures.psnr_db),
+        ("wrong hits", Axis::log("wrong hits", "%"), Better::Low, |figures| figures.wrong_hits * 100.0),
+    ];
+    accuracies.map(|(quantity, axis, better, of)| {
+        let reached =
+            |setting: String, figures: &Figures| Reached { setting, view_s: figures.view_s, accuracy: of(figures) };
+        let ways = WAYS.into_iter().enumerate().map(|(way, by)| {
+            (by, all.iter().map(|ways| reached(format!("{}²", ways.side), &ways.figures[way])).collect())
+        });
+        let images = (IMAGES, vec![reached(String::new(), images)]);
+        over_time((format!("{name}: {quantity} over time"), NOTE), (axis, better), ways.chain([images]))
+    })
+}
+
+/// All ways to views, in cubes of one side.
+struct Ways {
+    side: u32,
+    /// Of each of [`WAYS`].
+    figures: [Figures; 4],
+    texel_px: f64,
+    /// The share of holes of the warp.
+    holes: f64,
+}
+
+impl Ways {
+    fn new(cubes: &Cubes<'_>) -> anyhow::Result<Self> {
+        let [quadtrees, of_dominant] = [cubes.traced(&cubes.all)?, cubes.traced(&cubes.dominant)?];
+        let (warped, holes) = cubes.warped()?;
+        let walk = views::of_cube(cubes.subject, &cubes.subject.upload(&cubes.dominant)?.0)?;
+        let figures = [quadtrees, of_dominant, warped, walk];
+        Ok(Self { side: cubes.side, figures, texel_px: cubes.texel_px(), holes })
+    }
+
+    fn push(&self, name: &str, table: &mut Table) -> anyhow::Result<()> {
+        for (by, figures) in WAYS.into_iter().zip(&self.figures) {
+            let holes = (by == WARP).then_some(self.holes * 100.0);
+            let more = [Cell::from(self.texel_px), Cell::from(holes)];
+            table.push([figures.row(name, &format!("{by}, {}²", self.side)), more.to_vec()].concat())?;
+        }
+        Ok(())
+    }
 }
 
 /// Cubes of one scene and side: all surfaces for the paper's ways, those of the dominant axis for the walk.
@@ -109,20 +152,6 @@ impl<'s> Cubes<'s> {
         let at_m = |view: &PinholeCamera| view.eye_in_world.distance(self.subject.scene.bounds().center());
         let view = self.subject.views.first();
         view.map_or(f64::NAN, |view| f64::from(self.all.grid.spacing_m * view.focal_px.y / at_m(view)))
-    }
-
-    fn push(&self, by: &str, figures: &Figures, holes: Option<f64>, table: &mut Table) -> anyhow::Result<()> {
-        let row = figures.row(self.subject.name, &format!("{by}, {}²", self.side));
-        let more = [Cell::from(self.texel_px()), Cell::from(holes.map(|share| share * 100.0))];
-        Ok(table.push([row, more.to_vec()].concat())?)
-    }
-
-    fn compared_with_warp(&self, table: &mut Table) -> anyhow::Result<Walk> {
-        let (warped, holes) = self.warped()?;
-        self.push("warp", &warped, Some(holes), table)?;
-        let figures = views::of_cube(self.subject, &self.subject.upload(&self.dominant)?.0)?;
-        self.push("layered", &figures, None, table)?;
-        Ok(Walk { figures, over_warp_db: figures.psnr_db - warped.psnr_db })
     }
 
     /// By quadtrees; rays are shared among the cores.

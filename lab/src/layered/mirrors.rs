@@ -8,8 +8,8 @@ use depth_image::{PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use metrics::{Rgb8Image, flip_map, psnr_db};
 use reconstruction::{Mirrors, ReconstructionMethod, SampleSet};
-use render::LayerSelection;
-use study::{Bar, Cell, Check, Table};
+use render::{LayerSelection, Lighting};
+use study::{Bar, Cell, Check, Report, Table};
 
 use super::subject::Subject;
 use super::views::LAYERED;
@@ -32,11 +32,11 @@ const LIGHTS: [(&str, f64); 2] = [("shadows", 0.3), ("soft 16, occlusion 16", 0.
 /// The light by which a cube is to be repaid, and the most views after which it is; the paper's first scene takes 831.
 const REPAID: (&str, f64) = ("shadows", 290.0);
 
-/// The table of all lights, and its checks.
+/// Adds the table of all lights, and its checks.
 ///
 /// # Errors
 /// The device fails.
-pub fn measure(stand: &Stand) -> anyhow::Result<(Table, Vec<Check>)> {
+pub fn measure(stand: &Stand, report: &mut Report) -> anyhow::Result<()> {
     let columns = [
         ("light", ""),
         ("mirrors", ""),
@@ -50,11 +50,11 @@ pub fn measure(stand: &Stand) -> anyhow::Result<(Table, Vec<Check>)> {
         ("repaid after", "views"),
     ];
     let mut table = Table::new(format!("Mirrors of {SCENE} in views of 256×256 from a cube of {SIDE}²"), &columns);
-    let mut checks = Vec::new();
     for (light, most) in LIGHTS {
-        checks.extend(of_light(stand, light, most, &mut table)?);
+        report.checks.extend(of_light(stand, light, most, &mut table)?);
     }
-    Ok((table, checks))
+    report.tables.push(table);
+    Ok(())
 }
 
 fn of_light(stand: &Stand, light: &str, most: f64, table: &mut Table) -> anyhow::Result<Vec<Check>> {
@@ -124,15 +124,19 @@ pub fn shown(
 /// # Errors
 /// The device fails.
 pub fn direct(subject: &Subject<'_>, reflections: u32) -> anyhow::Result<(Vec<View>, f64)> {
-    let lighting = reflecting(subject.lighting, reflections)?;
+    drawn(subject, reflecting(subject.lighting, reflections)?)
+}
+
+/// Views that are drawn directly in a light, and the seconds of one view.
+///
+/// # Errors
+/// The device fails.
+pub fn drawn(subject: &Subject<'_>, lighting: Lighting) -> anyhow::Result<(Vec<View>, f64)> {
     timed(|| subject.stand.views(&subject.on_device, lighting, &subject.views, ViewPlanes::COLOR))
 }
 
 /// Views, and the seconds of one: the first run makes shaders, and of the others the median counts.
-///
-/// # Errors
-/// Those of the views.
-pub fn timed(make: impl Fn() -> anyhow::Result<Vec<View>>) -> anyhow::Result<(Vec<View>, f64)> {
+fn timed(make: impl Fn() -> anyhow::Result<Vec<View>>) -> anyhow::Result<(Vec<View>, f64)> {
     let views = make()?;
     let run = |_| -> anyhow::Result<f64> {
         let start = Instant::now();

@@ -1,9 +1,12 @@
 //! `myriorama study layered`: views from layered depth cubes.
 
+mod accuracy;
+mod baked;
 mod base;
 mod baselines;
 pub mod command;
 mod cubes;
+mod figures;
 mod glossy;
 mod light_fields;
 mod mirrors;

@@ -1,7 +1,6 @@
 //! Storage of a cube beside that of a light field and of a volume, and six images beside three.
 
-use depth_image::LayeredDepthImage;
-use reconstruction::SampleSet;
+use depth_image::{LayeredDepthImage, LayeredLightField};
 use study::{Cell, Table};
 
 use super::paper::{self, Layers, MB};
@@ -35,11 +34,11 @@ pub fn table() -> Table {
 ///
 /// # Errors
 /// Planes that do not belong together.
-pub fn row(name: &str, all: &Cube, cube: &Cube, device_mb: Option<f64>) -> anyhow::Result<Vec<Cell>> {
+pub fn row(name: &str, all: &Cube, cube: &Cube, device_mb: f64) -> anyhow::Result<Vec<Cell>> {
     let (six, three) = (six_images(&all.images), three_images(&all.images));
     let lines = lines(&all.images);
     let side = cube.grid.size.max_element();
-    let voxels_a_sample = device_mb.map(|mb| mb * MB / cube.samples() as f64);
+    let voxels_a_sample = device_mb * MB / cube.samples() as f64;
     Ok(vec![
         Cell::from(name),
         Cell::from(cube.samples()),
@@ -49,7 +48,7 @@ pub fn row(name: &str, all: &Cube, cube: &Cube, device_mb: Option<f64>) -> anyho
         Cell::from(paper::VOLUME_BYTES / MB),
         Cell::from(three.mean),
         Cell::from(paper::layers_of_a_volume(side)),
-        Cell::from(voxels_a_sample.map(|voxels| paper::layers_of_a_volume(side) / voxels)),
+        Cell::from(paper::layers_of_a_volume(side) / voxels_a_sample),
         Cell::from(six.mean),
         Cell::from(six.most),
         Cell::from(paper::layered_bytes(2 * lines, all.samples()) / MB),
@@ -58,28 +57,30 @@ pub fn row(name: &str, all: &Cube, cube: &Cube, device_mb: Option<f64>) -> anyho
     ])
 }
 
-/// Megabytes that a cube takes on the device; `None` where the device does not tell.
+/// Megabytes on the device of a cube, and of a light field beside it; not numbers where the device does not tell.
 ///
 /// # Errors
 /// The device fails.
-pub fn device_mb(subject: &Subject<'_>, cube: &Cube) -> anyhow::Result<Option<f64>> {
-    // The memory of an earlier set may serve the first one; the second takes its own.
-    let _first = used(subject, cube)?;
-    let before = allocated_bytes(subject);
-    let _second = used(subject, cube)?;
-    Ok(before.zip(allocated_bytes(subject)).map(|(before, after)| (after - before) / MB))
+pub fn device_mb(subject: &Subject<'_>, cube: &Cube, field: &LayeredLightField) -> anyhow::Result<[f64; 2]> {
+    // After a view has been made from a set no copy is under way.
+    let used = |with_field: bool| {
+        let set = if with_field { subject.upload_with(cube, field.clone())?.0 } else { subject.upload(cube)?.0 };
+        views::made(subject, &set, &subject.views, views::LAYERED)?;
+        anyhow::Ok(set)
+    };
+    // The memory of earlier sets may serve the first ones. All are kept, so that the others take their own.
+    let _first = [used(false)?, used(true)?];
+    let none = allocated_bytes(subject);
+    let _second = used(false)?;
+    let one = allocated_bytes(subject);
+    let _third = used(true)?;
+    let both = allocated_bytes(subject);
+    Ok([one - none, both - one - (one - none)].map(|bytes| bytes / MB))
 }
 
-/// A cube on the device, from which a view has been made: no copy is under way.
-fn used(subject: &Subject<'_>, cube: &Cube) -> anyhow::Result<SampleSet> {
-    let (set, _) = subject.upload(cube)?;
-    views::made(subject, &set, &subject.views, views::LAYERED)?;
-    Ok(set)
-}
-
-fn allocated_bytes(subject: &Subject<'_>) -> Option<f64> {
-    let report = subject.stand.engine().renderer.gpu().device.generate_allocator_report()?;
-    Some(report.total_allocated_bytes as f64)
+fn allocated_bytes(subject: &Subject<'_>) -> f64 {
+    let report = subject.stand.engine().renderer.gpu().device.generate_allocator_report();
+    report.map_or(f64::NAN, |report| report.total_allocated_bytes as f64)
 }
 
 fn lines(images: &[LayeredDepthImage]) -> usize {

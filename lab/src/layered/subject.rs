@@ -12,11 +12,9 @@ use reconstruction::{SampleSet, SetDescription};
 use render::{GpuScene, LayerSelection, Lighting};
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 
+use super::paper::LightField;
 use crate::failures::stand::{Stand, work};
 use crate::impostors::around;
-
-/// Lines along each side of a light field's squares, as in the paper.
-const LINES: u32 = 64;
 
 /// A scene on the device, and views around it, drawn directly.
 pub struct Subject<'s> {
@@ -90,7 +88,7 @@ impl<'s> Subject<'s> {
         Ok((set, start.elapsed().as_secs_f64()))
     }
 
-    /// A light field of the scene, and the seconds that it takes.
+    /// A light field of the scene with as many lines as the paper's, and the seconds that it takes.
     ///
     /// # Errors
     /// The device fails.
@@ -99,19 +97,21 @@ impl<'s> Subject<'s> {
         directions: LightDirections,
         lighting: Lighting,
     ) -> anyhow::Result<(LayeredLightField, f64)> {
-        let camera = LightFieldCamera::around(self.scene.bounds(), directions, LINES);
+        let camera = LightFieldCamera::around(self.scene.bounds(), directions, LightField::LINES);
         let start = Instant::now();
         let field = self.stand.engine().renderer.draw_light_field(work(&self.on_device, lighting), &camera)?;
         Ok((field, start.elapsed().as_secs_f64()))
     }
 
-    /// Puts a cube with a light field on the device.
+    /// Puts a cube with a light field on the device. Gives also the seconds.
     ///
     /// # Errors
     /// The device fails.
-    pub fn upload_with(&self, cube: &Cube, light_field: LayeredLightField) -> anyhow::Result<SampleSet> {
+    pub fn upload_with(&self, cube: &Cube, light_field: LayeredLightField) -> anyhow::Result<(SampleSet, f64)> {
         let images = CubeImages { grid: cube.grid, images: cube.images.clone(), light_field: Some(light_field) };
-        Ok(self.stand.reconstructor().upload_cube_in_turn(&images, &self.description(), Default::default())?)
+        let start = Instant::now();
+        let set = self.stand.reconstructor().upload_cube_in_turn(&images, &self.description(), Default::default())?;
+        Ok((set, start.elapsed().as_secs_f64()))
     }
 
     /// What all images of the scene share.
