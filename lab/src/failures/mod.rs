@@ -4,6 +4,7 @@ pub mod command;
 mod cubes;
 mod curve;
 mod curves;
+mod light_fields;
 pub mod measures;
 mod report;
 mod shape;

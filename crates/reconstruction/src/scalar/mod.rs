@@ -25,7 +25,7 @@ mod view_ray;
 
 pub use self::curved_search::SinglePoleImages;
 pub use self::follow::PinholeImages;
-pub use self::gather::{Reflecting, gathered_light};
+pub use self::gather::{Reflecting, gathered_light, gathered_light_with_exponent};
 pub use self::layered::CubeTwin;
 pub use self::mips::ColorMips;
 use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};

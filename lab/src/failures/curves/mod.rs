@@ -6,6 +6,7 @@ mod cube_mirrors;
 mod depth_range;
 mod epsilon;
 mod frames;
+mod gather;
 mod k_fd;
 mod layers;
 mod leaves;
@@ -22,7 +23,7 @@ mod view_cell;
 use super::curve::Curve;
 
 /// Families of curves that share their scene or their parts.
-pub const CURVES: [&[Curve]; 18] = [
+pub const CURVES: [&[Curve]; 19] = [
     &poles::CURVES,
     &sphere::CURVES,
     &[thickness::CURVE],
@@ -31,6 +32,7 @@ pub const CURVES: [&[Curve]; 18] = [
     &cube_edges::CURVES,
     &leaves::CURVES,
     &cube_mirrors::CURVES,
+    &gather::CURVES,
     &odd_eyes::CURVES,
     &view_cell::CURVES,
     &[courtyard::CURVE],
