@@ -85,7 +85,7 @@ pub struct SceneArgs {
     pub base: Option<SamplingMethod>,
     /// Images of what mirrors show, for lighting with reflections: auto[:UNSEEN], as few as see all but UNSEEN percent
     /// of mirrored rays all the way; pinhole[:N], N in the same order; single_pole[:N], 1 or 2 around the object that
-    /// most rays meet; or none
+    /// most rays meet; or none. Mirrors without images show what --base holds, or else the environment
     #[arg(long, default_value_t, value_name = "NAME")]
     pub impostors: Impostors,
     /// Sample cameras from a transforms.json, in the scene file's coordinates [default: four, placed from the scene's
@@ -126,7 +126,7 @@ impl Setup {
 fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<(CommonCell, Vec<Camera>)> {
     let (mirrors, beyond) = sampling::mirrors(scene, impostors);
     if beyond > 0 {
-        tracing::info!(beyond, followed = mirrors.len(), "the smallest mirrors show the environment alone");
+        tracing::info!(beyond, followed = mirrors.len(), "the smallest mirrors have no images of what they show");
     }
     for mirror in &mirrors {
         for candidate in &mirror.candidates {

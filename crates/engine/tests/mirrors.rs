@@ -179,6 +179,22 @@ fn a_base_tells_what_the_images_of_mirrors_leave_unknown() {
 }
 
 #[test]
+fn a_base_shows_what_mirrors_without_images_show() {
+    let stand = Stand::new();
+    let (truth, plain) = (stand.direct(LIGHTING), stand.direct("shadows"));
+    let set = stand.set(&[camera()], false);
+    let with = stand.view(stand.engine.with_common(set.clone(), vec![stand.base(256)]).expect("a set").as_ref());
+    let without = stand.view(set.as_ref());
+    let differs = |(a, b): (&[u8], &[u8])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 8);
+    let mirrored: Vec<bool> = truth.srgb8.chunks_exact(3).zip(plain.srgb8.chunks_exact(3)).map(differs).collect();
+    let [before, after] = [&without, &with].map(|view| difference(view, &truth, &mirrored));
+    println!("mean difference {before:.1} codes, {after:.1} with a base");
+    assert!(after < 0.5 * before, "{before} and {after}");
+    let of_base = marked(&with, ProvenanceKind::Base);
+    assert!(of_base.iter().zip(&mirrored).filter(|(base, mirrored)| **base && **mirrored).count() > 500);
+}
+
+#[test]
 fn sets_of_other_devices_are_refused_as_mirrors() {
     let stand = Stand::new();
     let set = stand.set(&[camera()], false);

@@ -4,13 +4,13 @@
 use std::sync::Arc;
 
 use depth_image::{
-    Aabb, Antialias, CubeGrid, CubeImages, DepthImage, LayeredDepthImage, PinholeCamera, Ray, View, ViewPlanes,
+    Antialias, CubeGrid, CubeImages, DepthImage, LayeredDepthImage, PinholeCamera, Ray, View, ViewPlanes,
 };
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
-use crate::bounce::{self, Bounces, CurvedSearch, MirrorCell, Mirrors};
+use crate::bounce::{self, Bounces, CurvedSearch, Mirrors};
 use crate::cube::Cube;
 use crate::in_flight::{InFlight, Statistics};
 use crate::pixel_list::PixelList;
@@ -230,11 +230,14 @@ impl Reconstructor {
         }
         check_samples(set, method)?;
         // All mirrors of a cube show the cube, whatever cells there are.
-        let everywhere = Aabb { min: Vec3::splat(f32::MIN), max: Vec3::splat(f32::MAX) };
-        let own = [MirrorCell { bounds: everywhere, surroundings: set }];
-        let mirrors = if method.walks_cube() { Mirrors { cells: &own, ..mirrors } } else { mirrors };
-        let mirrors = mirrors.checked_for(set)?;
+        let (mirrors, cube) = match method.walks_cube() {
+            true => (Mirrors { cells: &[], ..mirrors }, Some(set)),
+            false => (mirrors, base),
+        };
         let base = base.filter(|_| !method.walks_cube()).map(cube_of_base).transpose()?;
+        let mirrors = mirrors.checked_for(set, cube)?;
+        let cells = mirrors.cells_with(cube);
+        let mirrors = Mirrors { cells: &cells, ..mirrors };
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;
@@ -359,8 +362,8 @@ impl Reconstructor {
         fill::record(recording, &unknown)?;
         specular::record(recording, listed, first)?;
         let Some((bounces, first)) = mirrored else { return Ok(()) };
-        bounce::record(recording, bounces, first, |recording, lists, place| match base {
-            Some(base) => layered::follow_left(recording, base, bounces, lists, place),
+        bounce::record(recording, bounces, first, |recording, which, lists, place| match base {
+            Some(base) => layered::follow_in_base(recording, base, (bounces, which), lists, place),
             None => Ok(()),
         })
     }

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use depth_image::{Highlight, MAX_MIRROR_CELLS};
+use depth_image::Highlight;
 use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots};
 use minijinja::{Value, context};
 
-use crate::bounce::{Bounces, RayLists};
+use crate::bounce::{Bounces, MAX_RAY_LISTS, RayLists};
 use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, reflectors::sample_texels};
 
@@ -51,8 +51,7 @@ impl ShaderVariant for Specular {
         let lit = kinds.flat_map(|kind| lights.map(|(lights, words)| (kind, lights, words)));
         lit.flat_map(|((highlight, environment_map), lights, visibility_words)| {
             SetVariant::all().into_iter().filter(|set| !set.count_fetches).flat_map(move |set| {
-                let mirrored =
-                    [Some(1), Some(MAX_MIRROR_CELLS)].into_iter().filter(move |_| highlight == Highlight::Ggx);
+                let mirrored = [Some(1), Some(MAX_RAY_LISTS)].into_iter().filter(move |_| highlight == Highlight::Ggx);
                 std::iter::once(None).chain(mirrored).flat_map(move |mirror_cells| {
                     let with =
                         Self { set, highlight, lights, environment_map, listed: false, visibility_words, mirror_cells };

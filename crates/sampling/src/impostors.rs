@@ -14,7 +14,7 @@ const UNSEEN_PERCENT: f32 = 0.3;
 /// The images of what mirrors show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Impostors {
-    /// None: mirrors show the environment alone.
+    /// None: mirrors show what a base holds, or else the environment alone.
     None,
     /// As few as see mirrored rays all the way, at most eight.
     Auto {

@@ -1,4 +1,4 @@
-// Lists of rays off mirrors, one for each mirror cell.
+// Lists of rays off mirrors, one for each mirror cell, of which a base is the last.
 
 // Where the surfaces of a mirror cell lie. Smaller boxes come first.
 struct MirrorBox {

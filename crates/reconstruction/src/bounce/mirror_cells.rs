@@ -1,7 +1,9 @@
 //! What views are given to show in mirrors and in rough surfaces.
 
 use depth_image::{Aabb, Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS};
+use glam::Vec3;
 
+use crate::reflectors::Reflectors;
 use crate::{error::ReconstructionError, sample_set::SampleSet};
 
 /// Mirrors within a box, and images of what they show.
@@ -13,7 +15,18 @@ pub struct MirrorCell<'s> {
     pub surroundings: &'s SampleSet,
 }
 
-impl MirrorCell<'_> {
+impl<'s> MirrorCell<'s> {
+    /// A cube in which all mirrors are followed that are in no other cell.
+    fn everywhere(cube: &'s SampleSet) -> Self {
+        let bounds = Aabb { min: Vec3::splat(f32::MIN), max: Vec3::splat(f32::MAX) };
+        Self { bounds, surroundings: cube }
+    }
+
+    /// Its surroundings are a cube: the base, or the set of a view from a cube.
+    pub(super) fn is_cube(&self) -> bool {
+        self.surroundings.cube.is_some()
+    }
+
     /// A cube without a light field, in which lobes would be gathered.
     pub(super) fn is_plain_cube(&self) -> bool {
         self.surroundings.cube.as_ref().is_some_and(|cube| cube.light_field.is_none())
@@ -23,7 +36,7 @@ impl MirrorCell<'_> {
 /// The mirrors of a scene, and how many of them a ray meets one after the other.
 #[derive(Clone, Copy, Default)]
 pub struct Mirrors<'s> {
-    /// At most [`MAX_MIRROR_CELLS`]. Mirrors in none of them show lamps and the environment.
+    /// At most [`MAX_MIRROR_CELLS`]. Mirrors in none of them show what the base holds; without a base, lamps and the environment.
     pub cells: &'s [MirrorCell<'s>],
     /// Without any, mirrors show lamps and the environment.
     pub reflections: u32,
@@ -32,23 +45,35 @@ pub struct Mirrors<'s> {
     pub glossy_rays: u32,
 }
 
-impl Mirrors<'_> {
-    /// Without cells where nothing is to be followed: no reflections, or a set without mirrors.
-    pub(crate) fn checked_for(self, set: &SampleSet) -> Result<Self, ReconstructionError> {
+impl<'s> Mirrors<'s> {
+    /// Without anything to follow in a set without mirrors. `cube` is the base, or the set itself where it is a cube.
+    pub(crate) fn checked_for(self, set: &SampleSet, cube: Option<&SampleSet>) -> Result<Self, ReconstructionError> {
         if self.cells.len() > MAX_MIRROR_CELLS {
             return Err(ReconstructionError::MirrorCells(self.cells.len()));
         }
         if self.reflections > MAX_REFLECTIONS {
             return Err(ReconstructionError::Reflections(self.reflections));
         }
-        let is_own = |cell: &MirrorCell<'_>| std::ptr::eq(cell.surroundings, set);
-        if self.cells.iter().any(|cell| !is_own(cell) && cell.surroundings.cameras.is_empty()) {
+        if self.cells.iter().any(|cell| cell.surroundings.cameras.is_empty()) {
             return Err(ReconstructionError::NoSamples { what: "a mirror cell".to_owned(), needed: "depth images" });
         }
-        let reflectors = set.cube.as_ref().map_or(&set.reflectors, |cube| &cube.reflectors);
-        let has_mirrors = reflectors.as_ref().is_some_and(|of| of.highlight == Highlight::Ggx);
+        let reflectors = set.reflectors.as_ref().or(cube.and_then(reflectors_of_cube));
+        let has_mirrors = reflectors.is_some_and(|of| of.highlight == Highlight::Ggx);
         // Without a cube rough surfaces show no scene.
-        let is_followed = self.reflections > 0 || (self.glossy_rays > 0 && set.cube.is_some());
-        Ok(if is_followed && has_mirrors { self } else { Self::default() })
+        let glossy_rays = if set.cube.is_some() { self.glossy_rays } else { 0 };
+        Ok(if has_mirrors { Self { glossy_rays, ..self } } else { Self::default() })
     }
+
+    /// The cells in which rays are followed, if any are: the cube comes last, since it holds the mirrors that are in no other.
+    pub(crate) fn cells_with(&self, cube: Option<&'s SampleSet>) -> Vec<MirrorCell<'s>> {
+        if self.reflections == 0 && self.glossy_rays == 0 {
+            return Vec::new();
+        }
+        self.cells.iter().copied().chain(cube.map(MirrorCell::everywhere)).collect()
+    }
+}
+
+/// What the samples of a cube reflect, where any does.
+pub(super) fn reflectors_of_cube(set: &SampleSet) -> Option<&Reflectors> {
+    set.cube.as_ref()?.reflectors.as_ref()
 }

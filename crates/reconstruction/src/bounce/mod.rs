@@ -19,6 +19,7 @@ pub use curved_search::CurvedSearch;
 pub(crate) use curved_search::{CurvedWalk, LONGEST_STEP, MAX_WALK_STEPS};
 #[cfg(test)]
 pub(crate) use glossy::GpuGlossySurface;
+use mirror_cells::reflectors_of_cube;
 pub use mirror_cells::{MirrorCell, Mirrors};
 
 use crate::methods::joint_carve::Carve;
@@ -43,6 +44,8 @@ pub(crate) const LEAST_WAY: f32 = 1e-5;
 pub(crate) const EDGE_COSINE: f32 = 0.7;
 /// Moves of a mirrored ray after its marches.
 pub(crate) const MAX_BOUNCE_MOVES: u32 = 96;
+/// Lists of rays: one for each mirror cell, and one for a base.
+pub(crate) const MAX_RAY_LISTS: usize = MAX_MIRROR_CELLS + 1;
 
 /// `MirrorBox` of `bounce/list.wgsl`.
 #[repr(C)]
@@ -236,6 +239,11 @@ impl<'s> Bounces<'s> {
         self.cells.len()
     }
 
+    /// What the base reflects, if there is one in which anything does.
+    fn base_reflectors(&self) -> Option<&'s Reflectors> {
+        self.cells.last().and_then(|cell| reflectors_of_cube(cell.surroundings))
+    }
+
     /// The rays of a list.
     pub fn list_bindings<'b>(&'b self, lists: &'b RayLists) -> [Binding<'b>; 3] {
         [
@@ -321,7 +329,7 @@ impl ShaderVariant for Land {
 
     fn all() -> Vec<Self> {
         let lights = [(0, 0), (3, 1), (255, 64)];
-        let cells = [(None, false), (None, true), (Some(1), true), (Some(MAX_MIRROR_CELLS), true)];
+        let cells = [(None, false), (None, true), (Some(1), true), (Some(MAX_RAY_LISTS), true)];
         let sets = || SetVariant::all().into_iter().filter(|set| !set.count_fetches);
         let each = move |(lights, visibility_words)| {
             cells.into_iter().flat_map(move |(next_cells, reflects)| {
@@ -345,14 +353,24 @@ impl ShaderVariant for Land {
     }
 }
 
-/// Records the passes over the rays that the view's mirrors have listed, mirror after mirror. `follow_left` may tell the
-/// ends of rays that the images of a cell leave unknown.
+/// The rays of a list that are walked in a base.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum InBase {
+    /// Those of mirrors in no mirror cell.
+    All,
+    /// Those whose ends the images of their mirror cell leave unknown.
+    Left,
+}
+
+/// Records the passes over the rays that the view's mirrors have listed, mirror after mirror. `walk` follows rays in the base, where
+/// there is one.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     bounces: &Bounces<'_>,
     first: RayLists,
-    follow_left: impl Fn(
+    walk: impl Fn(
         &mut Recording<'_>,
+        InBase,
         (&RayLists, Option<&RayLists>),
         (usize, u32),
     ) -> Result<(), ReconstructionError>,
@@ -361,10 +379,15 @@ pub(crate) fn record(
     for reflection in 1..=bounces.reflections {
         let Some(lists) = listed else { break };
         let next = (reflection < bounces.reflections).then(|| bounces.next(recording.device, Some(&lists)));
-        for cell in 0..bounces.cells.len() {
-            follow(recording, bounces, &lists, (cell, reflection))?;
-            follow_left(recording, (&lists, next.as_ref()), (cell, reflection))?;
-            land(recording, bounces, (&lists, next.as_ref()), (cell, reflection))?;
+        for (number, cell) in bounces.cells.iter().enumerate() {
+            let (rays, place) = ((&lists, next.as_ref()), (number, reflection));
+            if cell.is_cube() {
+                walk(recording, InBase::All, rays, place)?;
+                continue;
+            }
+            follow(recording, bounces, &lists, place)?;
+            walk(recording, InBase::Left, rays, place)?;
+            land(recording, bounces, rays, place)?;
         }
         listed = next;
     }
@@ -428,8 +451,9 @@ pub(crate) fn land(
     (cell, reflection): (usize, u32),
 ) -> Result<(), ReconstructionError> {
     let set = bounces.cells[cell].surroundings;
-    // Rays come from reflectors.
-    let Some(view_reflectors) = &recording.set.reflectors else { return Ok(()) };
+    // Rays come from reflectors: of the view's images, or of the base alone.
+    let view_reflectors = recording.set.reflectors.as_ref().or(bounces.base_reflectors());
+    let Some(view_reflectors) = view_reflectors else { return Ok(()) };
     let is_lit_alike =
         |of: &&Reflectors| of.highlight == view_reflectors.highlight && of.lights == view_reflectors.lights;
     let reflectors = set.reflectors.as_ref().filter(is_lit_alike);

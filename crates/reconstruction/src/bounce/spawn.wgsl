@@ -42,7 +42,8 @@ fn cone_off(before: Cone, curvature: f32) -> Cone {
     return Cone(before.width_m, before.spread + 2.0 * curvature * before.width_m);
 }
 
-// Lists the ray off a mirror. Gives what the mirror shows of the environment where no cell knows its surroundings.
+// Lists the ray off a mirror. Gives what the mirror shows of the environment where no cell knows its surroundings. A base is a cell
+// that holds all mirrors.
 // `open` is the share of the environment that reaches the mirror; `side_m` is a pixel's of the picture that shows the mirror,
 // above which the ray begins.
 fn bounce_off(mirror: Mirror, pixel: u32, throughput_linear: vec3f, open: f32, side_m: f32, cone: Cone) -> vec3f {

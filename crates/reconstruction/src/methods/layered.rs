@@ -2,11 +2,11 @@
 
 use std::ops::RangeInclusive;
 
-use depth_image::{Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS};
+use depth_image::{Highlight, MAX_REFLECTIONS};
 use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots, switches};
 use minijinja::{Value, context};
 
-use crate::bounce::{Bounces, RayLists};
+use crate::bounce::{Bounces, InBase, MAX_RAY_LISTS, RayLists};
 use crate::cube::{Cube, LightField};
 use crate::lobes::{self, GlossyList};
 use crate::reflectors::sample_texels;
@@ -21,7 +21,7 @@ enum Walked {
     Pixels,
     /// Those of pixels that another method leaves: the cube is the base beside its images.
     LeftPixels,
-    /// Those off mirrors.
+    /// Those off mirrors. Where the cube is a base, those of mirrors in no mirror cell.
     Bounced,
     /// Those into lobes, and off the mirrors that they meet.
     IntoLobes,
@@ -87,6 +87,8 @@ impl LobeLight {
 pub(crate) struct Walk {
     set: SetVariant,
     rays: Walked,
+    /// The cube is the base beside a view's images.
+    in_base: bool,
     /// What a ray does not meet may be a surface that the cube does not hold.
     truncated: bool,
     /// The formula of highlights, where samples have any.
@@ -103,6 +105,7 @@ impl Walk {
     const PLAIN: Self = Self {
         set: SetVariant::CUBE,
         rays: Walked::Pixels,
+        in_base: false,
         truncated: false,
         highlight: None,
         mirror_cells: None,
@@ -120,14 +123,16 @@ impl Walk {
     ) -> Self {
         let reflectors = cube.reflectors.as_ref();
         let highlight = reflectors.map(|reflectors| reflectors.highlight);
+        let in_base = recording.set.cube.is_none();
         // Blinn-Phong surfaces mirror lamps only.
         let is_mapped =
-            (highlight == Some(Highlight::Ggx) || rays == Walked::LeftBounced) && recording.set.environment.is_some();
+            (highlight == Some(Highlight::Ggx) || in_base && rays.is_bounced()) && recording.set.environment.is_some();
         // Rays off mirrors see no image of the view's set.
         let set = if rays.is_bounced() { SetVariant::CUBE } else { recording.variant() };
         Self {
             set,
             rays,
+            in_base,
             truncated: cube.truncated,
             highlight,
             // Mirrors of a matt base are not in it.
@@ -142,15 +147,17 @@ impl Walk {
 
 impl Walk {
     /// The same in a base, beside four images.
-    fn of_base(self) -> Self {
-        let mirror_cells = self.mirror_cells.map(|_| MAX_MIRROR_CELLS);
+    fn of_base(self) -> Vec<Self> {
+        let mirror_cells = self.mirror_cells.map(|_| MAX_RAY_LISTS);
+        let base = Self { in_base: true, mirror_cells, ..self };
         match self.rays {
             Walked::Pixels | Walked::LeftPixels => {
-                Self { rays: Walked::LeftPixels, set: SetVariant { cameras: 4, ..self.set }, mirror_cells, ..self }
+                vec![Self { rays: Walked::LeftPixels, set: SetVariant { cameras: 4, ..self.set }, ..base }]
             }
-            Walked::Bounced | Walked::IntoLobes | Walked::LeftBounced => {
-                Self { rays: Walked::LeftBounced, mirror_cells, ..self }
+            Walked::Bounced | Walked::LeftBounced => {
+                [Walked::Bounced, Walked::LeftBounced].map(|rays| Self { rays, ..base }).to_vec()
             }
+            Walked::IntoLobes => Vec::new(),
         }
     }
 }
@@ -178,6 +185,7 @@ impl ShaderVariant for Walk {
         context! {
             bounced => self.rays.is_bounced(),
             left => self.rays.is_left(),
+            in_base => self.in_base,
             into_lobes => self.rays == Walked::IntoLobes,
             truncated => self.truncated,
             reflects => self.highlight.is_some(),
@@ -220,15 +228,10 @@ impl ShaderVariant for Walk {
             })
         });
         let own: Vec<Self> = matt.chain(glossy).collect();
-        let left = own
-            .iter()
-            .filter(|walk| walk.lights <= 3 && walk.lobe.is_none() && walk.rays != Walked::IntoLobes)
-            .map(|walk| walk.of_base());
-        let without_reflectors = switches().map(|[truncated, environment_map]| Self {
-            rays: Walked::LeftBounced,
-            truncated,
-            environment_map,
-            ..Self::PLAIN
+        let left = own.iter().filter(|walk| walk.lights <= 3 && walk.lobe.is_none()).flat_map(|walk| walk.of_base());
+        let without_reflectors = switches().flat_map(|[truncated, environment_map]| {
+            let in_base = Self { in_base: true, truncated, environment_map, ..Self::PLAIN };
+            [Walked::Bounced, Walked::LeftBounced].map(|rays| Self { rays, ..in_base })
         });
         own.iter().copied().chain(left).chain(without_reflectors).collect()
     }
@@ -303,15 +306,20 @@ pub(crate) fn record_left(
     Ok(undecided)
 }
 
-/// Records the walk of rays off mirrors whose end the images of a mirror cell leave unknown, in the cube beside them.
-pub(crate) fn follow_left(
+/// Records the walk of rays off mirrors in the cube beside a view's images: of a list's, or of those whose end the images of a mirror
+/// cell leave unknown.
+pub(crate) fn follow_in_base(
     recording: &mut Recording<'_>,
     base: &Cube,
-    bounces: &Bounces<'_>,
+    (bounces, which): (&Bounces<'_>, InBase),
     lists: (&RayLists, Option<&RayLists>),
     place: (usize, u32),
 ) -> Result<(), ReconstructionError> {
-    follow(recording, (base, Walked::LeftBounced, Ends::default()), bounces, lists, place)
+    let rays = match which {
+        InBase::All => Walked::Bounced,
+        InBase::Left => Walked::LeftBounced,
+    };
+    follow(recording, (base, rays, Ends::default()), bounces, lists, place)
 }
 
 fn walk_pixels(
@@ -344,7 +352,7 @@ struct Ends<'g> {
     lobes: Option<&'g GlossyList<'g>>,
 }
 
-/// Records the walk of rays off one mirror of a mirror cell, whose light is added to their pixels.
+/// Records the walk of rays off the mirrors of a mirror cell, whose light is added to their pixels.
 fn follow(
     recording: &mut Recording<'_>,
     (cube, rays, ends): (&Cube, Walked, Ends<'_>),

@@ -114,11 +114,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let throughput = linear_from_rgb9e5(ray.throughput_rgb9e5);
 {%- if left %}
     if (ray_provenance[index] & 0xffu) != PROVENANCE_FILLED { return; }
-    let near_m = max(ray.near_m, cube.start_m);
-{%- else %}
-    let near_m = ray.near_m;
 {%- endif %}
-    let hit = walk(cube_ray(ray.origin_in_world, ray.direction), near_m);
+    let hit = walk(cube_ray(ray.origin_in_world, ray.direction), {{ "max(ray.near_m, cube.start_m)" if in_base else "ray.near_m" }});
     let guess = unpack4x8unorm(ray.guess);
     let is_unknown = !hit.met{{ "" if truncated else " && !hit.is_empty" }};
     // Where nothing is met the environment is seen; where the cube does not know, what the mirror shows without rays.
@@ -134,6 +131,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let origin = out_provenance[ray.pixel] & 0xffffff00u;
 {%- if left %}
     ray_provenance[index] = PROVENANCE_BASE;
+{%- endif %}
+{%- if in_base %}
     out_provenance[ray.pixel] = origin | select(PROVENANCE_BASE, PROVENANCE_GUESSED, is_unknown);
 {%- else %}
     for (var guessed = is_unknown; guessed; guessed = false) { out_provenance[ray.pixel] = origin | PROVENANCE_GUESSED; }

@@ -1,9 +1,9 @@
 //! What mirrors and rough surfaces show, gathered in layered light fields.
 
 use depth_image::{
-    Antialias, CubeGrid, CubeImages, Environment, Highlight, Illumination, LayeredLightField, LightDirections,
-    LightFieldCamera, PinholeCamera, Reflector, View, ViewPlanes, environment_reflectance_linear, highlight_linear,
-    linear_from_srgb8, srgb8_from_linear,
+    Antialias, CubeGrid, CubeImages, Environment, Highlight, Illumination, LayeredDepthImage, LayeredLightField,
+    LightDirections, LightFieldCamera, PinholeCamera, Reflector, View, ViewPlanes, environment_reflectance_linear,
+    highlight_linear, linear_from_srgb8, srgb8_from_linear,
 };
 use glam::{UVec2, Vec3};
 use gpu::Turn;
@@ -18,15 +18,15 @@ use crate::stage::{depths, description, gpu, looking, plainly_lit, psnr_db, reco
 const SIDE: u32 = 192;
 
 /// A scene and its cube, with a camera.
-struct Gathering {
-    scene: Scene,
-    on_device: GpuScene,
-    grid: CubeGrid,
-    camera: PinholeCamera,
+pub struct Gathering {
+    pub scene: Scene,
+    pub on_device: GpuScene,
+    pub grid: CubeGrid,
+    pub camera: PinholeCamera,
 }
 
 impl Gathering {
-    fn new(scene: Scene, camera: PinholeCamera) -> Self {
+    pub fn new(scene: Scene, camera: PinholeCamera) -> Self {
         let on_device = GpuScene::upload(gpu(), &scene).expect("a scene");
         let grid = CubeGrid::around(&scene.bounds(), SIDE).expect("a grid");
         Self { scene, on_device, grid, camera }
@@ -36,7 +36,7 @@ impl Gathering {
         Self::new(mirror_box(), looking(Vec3::new(0.4, 2.0, 6.5), Vec3::Y * 1.2, 40.0, UVec2::new(120, 90)))
     }
 
-    fn lit(&self, lighting: &str) -> DrawWork<'_> {
+    pub fn lit(&self, lighting: &str) -> DrawWork<'_> {
         DrawWork { lighting: lighting.parse().expect(lighting), ..plainly_lit(&self.on_device) }
     }
 
@@ -47,13 +47,20 @@ impl Gathering {
         field
     }
 
-    fn set(&self, light_field: Option<LayeredLightField>) -> SampleSet {
-        let image = |axis| {
+    pub fn images(&self) -> [LayeredDepthImage; 3] {
+        [0, 1, 2].map(|axis| {
             let camera = self.grid.camera(axis);
             renderer().draw_layers(self.lit("shadows"), &camera, LayerSelection::Dominant).expect("layers")
-        };
-        let cube = CubeImages { grid: self.grid, images: [image(0), image(1), image(2)], light_field };
-        reconstructor().upload_cube_in_turn(&cube, &description(&self.scene), Turn::default()).expect("a cube")
+        })
+    }
+
+    pub fn set(&self, light_field: Option<LayeredLightField>) -> SampleSet {
+        let cube = CubeImages { grid: self.grid, images: self.images(), light_field };
+        self.upload(&cube)
+    }
+
+    pub fn upload(&self, cube: &CubeImages) -> SampleSet {
+        reconstructor().upload_cube_in_turn(cube, &description(&self.scene), Turn::default()).expect("a cube")
     }
 
     fn view(&self, set: &SampleSet, method: &str, mirrors: Mirrors<'_>) -> View {
@@ -63,13 +70,13 @@ impl Gathering {
         views.expect("a view").remove(0)
     }
 
-    fn direct(&self, lighting: &str) -> View {
+    pub fn direct(&self, lighting: &str) -> View {
         renderer().draw_views(self.lit(lighting), &[self.camera], ViewPlanes::ALL).expect("a view").remove(0)
     }
 }
 
 /// Pixels that two views show differently.
-fn changed(a: &View, b: &View) -> Vec<bool> {
+pub fn changed(a: &View, b: &View) -> Vec<bool> {
     let is_other = |(a, b): (&[u8], &[u8])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 2);
     a.srgb8.chunks(3).zip(b.srgb8.chunks(3)).map(is_other).collect()
 }

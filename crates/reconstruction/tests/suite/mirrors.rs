@@ -1,6 +1,8 @@
 //! Mirrors that show the scene: rays off them are followed in images of their surroundings, against direct drawing.
 
-use depth_image::{Aabb, Antialias, Camera, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use depth_image::{
+    Aabb, Antialias, Camera, CubeImages, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes,
+};
 use glam::{UVec2, Vec3};
 use reconstruction::{CommonSets, MirrorCell, Mirrors, ReconstructionError, SampleSet, SetDescription};
 use render::{GpuScene, LayerSelection, SamplePlanes};
@@ -8,7 +10,8 @@ use scene::Scene;
 use scene::procedural::{mirror_pair, teapot_mirror};
 
 use crate::layered::CubeStage;
-use crate::stage::{CARVE, description, gpu, kinds, looking, reconstructor, renderer, work};
+use crate::light_field::Gathering;
+use crate::stage::{CARVE, count, description, gpu, kinds, looking, reconstructor, renderer, work};
 
 const VIEW_PX: UVec2 = UVec2::new(128, 96);
 
@@ -43,10 +46,14 @@ impl Hall {
     }
 
     fn view(&self, camera: &PinholeCamera, reflections: u32) -> View {
+        self.view_beside(None, camera, reflections)
+    }
+
+    fn view_beside(&self, base: Option<&SampleSet>, camera: &PinholeCamera, reflections: u32) -> View {
         let cells: Vec<MirrorCell<'_>> =
             self.cells.iter().map(|(bounds, surroundings)| MirrorCell { bounds: *bounds, surroundings }).collect();
-        let mirrors = Mirrors { cells: &cells, reflections, glossy_rays: 0 };
-        reconstruct(&self.samples, mirrors, &[*camera], ViewPlanes::ALL).expect("a view").remove(0)
+        let common = CommonSets { mirrors: Mirrors { cells: &cells, reflections, glossy_rays: 0 }, base };
+        reconstruct(&self.samples, common, &[*camera], ViewPlanes::ALL).expect("a view").remove(0)
     }
 
     fn drawn(&self, camera: &PinholeCamera, reflections: u32) -> View {
@@ -57,13 +64,13 @@ impl Hall {
     }
 }
 
-fn reconstruct(
+fn reconstruct<'s>(
     set: &SampleSet,
-    mirrors: Mirrors<'_>,
+    common: impl Into<CommonSets<'s>>,
     cameras: &[PinholeCamera],
     planes: ViewPlanes,
 ) -> Result<Vec<View>, ReconstructionError> {
-    reconstructor().reconstruct_with(set, mirrors, cameras, CARVE, planes, Default::default())
+    reconstructor().reconstruct_with(set, common, cameras, CARVE, planes, Default::default())
 }
 
 fn images(scene: &GpuScene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
@@ -237,18 +244,124 @@ fn a_matt_base_tells_what_no_image_knows() {
     let matt_base = CubeStage::new(teapot_mirror(), 128, LayerSelection::Dominant).upload();
     let camera = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, VIEW_PX);
     let guessed = hall.view(&camera, 2);
-    let cells = [MirrorCell { bounds: hall.cells[0].0, surroundings: &hall.cells[0].1 }];
-    let common =
-        CommonSets { mirrors: Mirrors { cells: &cells, reflections: 2, glossy_rays: 0 }, base: Some(&matt_base) };
-    let turn = Default::default();
-    let views = reconstructor().reconstruct_with(&hall.samples, common, &[camera], CARVE, ViewPlanes::ALL, turn);
-    let told = views.expect("a view").remove(0);
-    let count = |view: &View, kind| kinds(view).into_iter().filter(|&of| of == kind).count();
+    let told = hall.view_beside(Some(&matt_base), &camera, 2);
     let truth = hall.drawn(&camera, 1);
     let [before, after] = [&guessed, &told].map(|view| mean_difference(view, &truth));
     println!("mean difference {before} guessed, {after} by a base");
     assert!(count(&guessed, ProvenanceKind::Guessed) > 800 && count(&told, ProvenanceKind::Guessed) == 0);
     assert!(count(&told, ProvenanceKind::Base) > 800 && after < before, "{before}, {after}");
+}
+
+/// Pixels in which mirrors show the scene, and of how many views are near the truth there.
+struct Mirrored {
+    truth: View,
+    pixels: Vec<usize>,
+}
+
+impl Mirrored {
+    fn of(hall: &Hall, camera: &PinholeCamera, reflections: u32) -> Self {
+        let (plain, truth) = (hall.drawn(camera, 0), hall.drawn(camera, reflections));
+        let differs = differences(&plain, &truth).into_iter().enumerate().filter(|(_, difference)| *difference > 8);
+        Self { pixels: differs.map(|(pixel, _)| pixel).collect(), truth }
+    }
+
+    fn near(&self, view: &View) -> f32 {
+        let near = self.pixels.iter().filter(|&&pixel| is_near(view, &self.truth, pixel)).count();
+        near as f32 / self.pixels.len() as f32
+    }
+
+    fn of_kind(&self, view: &View, kind: ProvenanceKind) -> usize {
+        let kinds = kinds(view);
+        self.pixels.iter().filter(|&&pixel| kinds[pixel] == kind).count()
+    }
+}
+
+fn onto_the_dented_mirror() -> PinholeCamera {
+    looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, VIEW_PX)
+}
+
+#[test]
+fn mirrors_in_no_cell_show_what_a_base_holds() {
+    let (mut hall, camera) = (before_the_teapot(), onto_the_dented_mirror());
+    let base = Gathering::new(teapot_mirror(), camera).set(None);
+    let mirrored = Mirrored::of(&hall, &camera, 2);
+    let elsewhere = Aabb { min: Vec3::splat(50.0), max: Vec3::splat(51.0) };
+    hall.cells[0].0 = elsewhere;
+    let [without, beside_a_cell] = [None, Some(&base)].map(|base| hall.view_beside(base, &camera, 2));
+    hall.cells.clear();
+    let view = hall.view_beside(Some(&base), &camera, 2);
+    assert!(view == beside_a_cell, "a cell of no mirror changes nothing");
+    let [before, after] = [&without, &view].map(|view| mirrored.near(view));
+    let from_base = mirrored.of_kind(&view, ProvenanceKind::Base);
+    println!("{} pixels: {before} near without a base, {after} with one, {from_base} from it", mirrored.pixels.len());
+    assert!(mirrored.pixels.len() > 800 && from_base * 20 > mirrored.pixels.len() * 19, "{from_base}");
+    assert!(after > 0.7 && before < 0.3, "{after}, without {before}");
+    assert_eq!(count(&view, ProvenanceKind::Guessed), 0);
+}
+
+#[test]
+fn what_a_truncated_base_does_not_hold_is_guessed() {
+    let (mut hall, camera) = (before_the_teapot(), onto_the_dented_mirror());
+    hall.cells.clear();
+    let stage = Gathering::new(teapot_mirror(), camera);
+    let view = |is_truncated| {
+        let mut images = stage.images();
+        images[0].truncated = is_truncated;
+        let base = stage.upload(&CubeImages { grid: stage.grid, images, light_field: None });
+        hall.view_beside(Some(&base), &camera, 1)
+    };
+    let [whole, truncated] = [false, true].map(view);
+    let (whole, truncated) = (kinds(&whole), kinds(&truncated));
+    let of_base =
+        whole.iter().zip(&truncated).filter(|(kind, _)| **kind == ProvenanceKind::Base).map(|(_, kind)| *kind);
+    let (known, guessed) = (ProvenanceKind::Base, ProvenanceKind::Guessed);
+    let counts = [known, guessed].map(|kind| of_base.clone().filter(|of| *of == kind).count());
+    println!("{counts:?} known and guessed of {}", of_base.clone().count());
+    assert!(counts[0] > 500 && counts[1] > 200 && counts[0] + counts[1] == of_base.count(), "{counts:?}");
+    assert!(!whole.contains(&guessed));
+}
+
+/// The view's only image shows the mirror from behind, and its set reflects nothing.
+#[test]
+fn mirrors_that_only_the_base_shows_show_the_scene() {
+    let (mut hall, camera) = (before_the_teapot(), onto_the_dented_mirror());
+    let behind = looking(Vec3::new(0.0, 4.0, -16.0), Vec3::new(0.0, 2.0, 5.0), 60.0, UVec2::new(160, 120));
+    let scene = teapot_mirror();
+    let matt = SetDescription { highlight: None, ..description(&scene) };
+    hall.samples = reconstructor().upload(&images(&hall.on_device, &[behind]), &matt).expect("a sample set");
+    let base = Gathering::new(teapot_mirror(), camera).set(None);
+    let mut mirrored = Mirrored::of(&hall, &camera, 1);
+    let found = kinds(&hall.view_beside(Some(&base), &camera, 0));
+    mirrored.pixels.retain(|&pixel| found[pixel] == ProvenanceKind::Base);
+    let shares =
+        |hall: &Hall| [0, 1].map(|reflections| mirrored.near(&hall.view_beside(Some(&base), &camera, reflections)));
+    let in_images = shares(&hall);
+    hall.cells.clear();
+    let in_base = shares(&hall);
+    println!("{} pixels, near without rays and with them:", mirrored.pixels.len());
+    println!("{in_images:?} in images of the mirror's cell, {in_base:?} in the base");
+    assert!(mirrored.pixels.len() > 400, "{}", mirrored.pixels.len());
+    for [without, with] in [in_images, in_base] {
+        assert!(with > 0.6 && without < 0.3, "{with}, without {without}");
+    }
+}
+
+#[test]
+fn rays_go_on_between_a_mirror_with_a_cell_and_one_in_the_base() {
+    let (mut hall, camera) = (between_two_mirrors(true), facing_a_mirror());
+    hall.cells.truncate(1);
+    let base = Gathering::new(mirror_pair(), camera).set(None);
+    for reflections in [1, 2, 4] {
+        let truth = hall.drawn(&camera, reflections);
+        let [without, with] =
+            [None, Some(&base)].map(|base| mean_difference(&hall.view_beside(base, &camera, reflections), &truth));
+        println!("{reflections} reflections: mean difference {without} without a base, {with} with one");
+        assert!(with < without, "{reflections}: {with}, {without}");
+    }
+    let twice = hall.drawn(&camera, 2);
+    let [one, two] =
+        [1, 2].map(|reflections| mean_difference(&hall.view_beside(Some(&base), &camera, reflections), &twice));
+    assert!(two < 0.97 * one, "{two} by two mirrors, {one} by one");
 }
 
 fn facing_a_mirror() -> PinholeCamera {
