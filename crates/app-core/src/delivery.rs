@@ -69,7 +69,7 @@ pub fn at_rate(request: SessionRequest, frames_per_s: f64) -> SessionRequest {
 /// images, fewer pictures a second. Each includes those before it. Steps that the lighting and the method do not have are skipped.
 fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
     let whole: Option<Lighting> = lighting.parse().ok();
-    // Views from depth images have no glossy reflections to lose.
+    // Views from depth images have glossy reflections beside a base alone, and no fallback has a base.
     let walks_cube = method.parse().is_ok_and(ReconstructionMethod::walks_cube);
     let loses = |lighting: &Lighting| lighting.reflections() > 0 || method == DIRECT || walks_cube;
     let unmirrored = whole.filter(loses).and_then(|lighting| lighting.without_reflections());

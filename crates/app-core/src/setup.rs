@@ -54,8 +54,8 @@ pub struct SceneArgs {
     pub up: UpAxis,
     /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, or soft N (N rays
     /// a light). Ambient occlusion: occlusion N [RADIUSm]. Mirrors that show the scene: reflections N (mirrors that a
-    /// ray meets, 1 to 8). Glossy surfaces that show it, in views drawn directly or from a cube: glossy N (rays a pixel, 1 to
-    /// 256). Rate: adaptive [TOLERANCE] traces rays only where light changes
+    /// ray meets, 1 to 8). Glossy surfaces that show it, in views drawn directly, from a cube or beside a base: glossy N
+    /// (rays a pixel, 1 to 256). Rate: adaptive [TOLERANCE] traces rays only where light changes
     #[arg(long, default_value_t, value_name = "TERMS")]
     pub lighting: Lighting,
     /// A lamp in place of the scene's lamps, in the scene file's coordinates; may be repeated. Forms: "sun

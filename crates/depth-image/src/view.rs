@@ -19,10 +19,10 @@ pub enum ProvenanceKind {
     Hit,
     /// A surface that no sample camera saw; its colour comes from the farther side of the gap.
     Filled,
-    /// A mirror of which some ray ends where no sample camera sees; there it shows lamps and the environment.
+    /// A surface that reflects what no sample camera sees and no base holds; there it shows lamps and the environment.
     Guessed,
-    /// A surface that no sample camera saw, from the base: a layered depth cube of the whole scene. Or a mirror of which some ray ends
-    /// there.
+    /// A surface that no sample camera saw, from the base: a layered depth cube of the whole scene. Or a surface that reflects what is
+    /// found there.
     Base,
 }
 

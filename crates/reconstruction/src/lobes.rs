@@ -10,6 +10,54 @@ use crate::bounce::{Bounces, RayLists};
 use crate::pixel_list::GpuPixelList;
 use crate::{device::Device, error::ReconstructionError, recording::Recording};
 
+/// How a surface's lobe is lit, beside the rays off mirrors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LobeLight {
+    /// What smooth surfaces mirror is gathered in a light field.
+    GatheredMirrors,
+    /// What no ray off a mirror brings is gathered.
+    GatheredRest,
+    /// All is gathered.
+    Gathered,
+    /// Rays are sent for what no ray off a mirror brings.
+    SentRest,
+    /// Rays are sent for all.
+    Sent,
+}
+
+impl LobeLight {
+    pub const ALL: [Self; 5] = [Self::GatheredMirrors, Self::GatheredRest, Self::Gathered, Self::SentRest, Self::Sent];
+
+    /// For the surfaces that pixels show. `followed` of `mirrors` are followed; rough surfaces may be glossy.
+    pub fn of_pixels((followed, mirrors): (u32, u32), glossy: bool, has_light_field: bool) -> Option<Self> {
+        match (followed < mirrors && followed == 0, glossy, has_light_field) {
+            (true, true, _) => Some(Self::Gathered),
+            (true, false, _) => Some(Self::GatheredMirrors),
+            (false, true, true) => Some(if mirrors > 0 { Self::GatheredRest } else { Self::Gathered }),
+            (false, true, false) => Some(Self::sent(mirrors > 0)),
+            (false, false, _) => None,
+        }
+    }
+
+    /// By rays, beside those off mirrors where these are followed.
+    pub fn sent(beside_mirrors: bool) -> Self {
+        if beside_mirrors { Self::SentRest } else { Self::Sent }
+    }
+
+    pub fn is_sent(self) -> bool {
+        matches!(self, Self::SentRest | Self::Sent)
+    }
+
+    /// In a shader, of a mirror.
+    pub fn share(self) -> &'static str {
+        match self {
+            Self::GatheredMirrors => "mirror_share(mirror.reflector.roughness)",
+            Self::GatheredRest | Self::SentRest => "1.0 - mirror_share(mirror.reflector.roughness)",
+            Self::Gathered | Self::Sent => "1.0",
+        }
+    }
+}
+
 /// `LobeRays` of `bounce/lobe_rays.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -30,8 +78,15 @@ pub(crate) struct GlossyList<'b> {
 }
 
 impl<'b> GlossyList<'b> {
+    /// None as yet. `None` where no rays are sent.
+    pub fn of(recording: &Recording<'_>, bounces: &'b Bounces<'_>) -> Option<Self> {
+        // The positions within a pixel share its rays.
+        let rays = bounces.glossy_rays().div_ceil(recording.batch.planes.antialias.samples());
+        Some(Self::empty(recording.device, bounces.lobes()?, rays))
+    }
+
     /// None as yet.
-    pub fn empty(device: &Device, [surfaces, light]: [&'b Buffer; 2], rays: u32) -> Self {
+    fn empty(device: &Device, [surfaces, light]: [&'b Buffer; 2], rays: u32) -> Self {
         let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT;
         let list = GpuPixelList { workgroups: [0, 1, 1], count: 0 };
         let list = device.gpu.buffer_with("glossy surfaces", &[list], usage);

@@ -13,6 +13,7 @@ use crate::antialias::{self, Sums};
 use crate::bounce::{self, Bounces, CurvedSearch, Mirrors};
 use crate::cube::Cube;
 use crate::in_flight::{InFlight, Statistics};
+use crate::lobes::GlossyList;
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
 use crate::ray_ends::{RayEnd, RayWork, follow_rays};
@@ -38,7 +39,8 @@ pub struct Reconstructor {
 pub struct CommonSets<'s> {
     /// What mirrors show.
     pub mirrors: Mirrors<'s>,
-    /// A layered cube of the whole scene, in which is walked what the view's images, or those of a mirror cell, leave unknown.
+    /// A layered cube of the whole scene, in which is walked what the view's images, or those of a mirror cell, leave unknown, and what
+    /// rough surfaces and mirrors in no mirror cell show.
     pub base: Option<&'s SampleSet>,
 }
 
@@ -54,9 +56,11 @@ struct Request<'r> {
     set: &'r SampleSet,
     method: ReconstructionMethod,
     mirrors: Mirrors<'r>,
+    /// Rays into lobes that are walked in the base, with those off the mirrors that they meet.
+    lobes: Mirrors<'r>,
     base: Option<&'r Cube>,
-    /// The memory for rays off mirrors, while a batch is recorded.
-    bounces: Option<&'r Bounces<'r>>,
+    /// The memory for rays off mirrors, and for those into lobes, while a batch is recorded.
+    bounces: [Option<&'r Bounces<'r>>; 2],
     /// Of the set, where the method draws it.
     mesh: Option<&'r Mesh>,
     planes: ViewPlanes,
@@ -235,18 +239,18 @@ impl Reconstructor {
             false => (mirrors, base),
         };
         let base = base.filter(|_| !method.walks_cube()).map(cube_of_base).transpose()?;
-        let mirrors = mirrors.checked_for(set, cube)?;
-        let cells = mirrors.cells_with(cube);
-        let mirrors = Mirrors { cells: &cells, ..mirrors };
+        let [mirrors, lobes] = mirrors.checked_for(set, cube)?.split(base.is_some());
+        let cells = [mirrors, lobes].map(|of| of.cells_with(cube));
+        let (mirrors, lobes) = (Mirrors { cells: &cells[0], ..mirrors }, Mirrors { cells: &cells[1], ..lobes });
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;
-        let bounces = None;
         let request = Request {
             set,
             mirrors,
+            lobes,
             base,
-            bounces,
+            bounces: [None; 2],
             method,
             mesh: mesh.as_deref(),
             planes,
@@ -258,7 +262,7 @@ impl Reconstructor {
         let mut statistics = Statistics::default();
         let mut in_flight: Option<InFlight<'_>> = None;
         // The device works on one batch while the host takes the one before apart.
-        for batch in batches(cameras, self.most_pixels(mirrors)) {
+        for batch in batches(cameras, self.most_pixels(cells.iter().any(|cells| !cells.is_empty()))) {
             let recording = self.record(request, batch)?;
             // Whoever holds the device asks for no other turn.
             let done = in_flight.take().map(InFlight::wait).transpose()?;
@@ -273,11 +277,11 @@ impl Reconstructor {
     }
 
     /// The pixels of a batch. Rays off mirrors take memory, and are followed at once beside live streams.
-    fn most_pixels(&self, mirrors: Mirrors<'_>) -> usize {
-        match (mirrors.cells.is_empty(), self.device.gpu.device_queue.cuts()) {
-            (true, _) => PIXELS_A_BATCH,
-            (false, false) => MIRRORED_PIXELS_A_BATCH,
-            (false, true) => MIRRORED_PIXELS_A_SLICE,
+    fn most_pixels(&self, follows_rays: bool) -> usize {
+        match (follows_rays, self.device.gpu.device_queue.cuts()) {
+            (false, _) => PIXELS_A_BATCH,
+            (true, false) => MIRRORED_PIXELS_A_BATCH,
+            (true, true) => MIRRORED_PIXELS_A_SLICE,
         }
     }
 
@@ -287,14 +291,15 @@ impl Reconstructor {
         request: Request<'r>,
         cameras: &[PinholeCamera],
     ) -> Result<Recording<'r>, ReconstructionError> {
-        let Request { set, mirrors, method, planes, turn, count_fetches, .. } = request;
+        let Request { set, mirrors, lobes, method, planes, turn, count_fetches, .. } = request;
         let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), mirrors.cells.len()));
         let output = (planes, count_fetches);
         let mut recording = Recording::begin(&self.device, set, cameras, output, (family, turn))?;
         let rays = recording.batch.plane_bytes as usize / 4;
-        let bounces = Bounces::lend(&self.device, mirrors, rays, CurvedSearch::default())?;
-        self.record_positions(Request { bounces: bounces.as_ref(), ..request }, &mut recording)?;
-        recording.batch.bounces = bounces.map_or(Vec::new(), Bounces::into_memory);
+        let lend = |of| Bounces::lend(&self.device, of, rays, CurvedSearch::default());
+        let bounces = [lend(mirrors)?, lend(lobes)?];
+        self.record_positions(Request { bounces: bounces.each_ref().map(Option::as_ref), ..request }, &mut recording)?;
+        recording.batch.bounces = bounces.into_iter().flatten().flat_map(Bounces::into_memory).collect();
         Ok(recording)
     }
 
@@ -314,7 +319,7 @@ impl Reconstructor {
         if planes.inverse_depth || planes.provenance {
             recording.go_to(Vec2::ZERO);
             // Mirrors count here for provenance alone: colour is the mean of the positions before.
-            let bounces = request.bounces.filter(|_| planes.provenance);
+            let bounces = if planes.provenance { request.bounces } else { [None; 2] };
             self.record_position(Request { bounces, ..request }, recording, None)?;
         }
         antialias::record(recording, Sums::Read, None)
@@ -326,7 +331,9 @@ impl Reconstructor {
         recording.go_to(offsets_px.next().unwrap_or_default());
         self.record_position(request, recording, None)?;
         let rough = match request.positions {
-            Positions::Shared if request.bounces.is_none() => request.method.share_positions(recording)?,
+            Positions::Shared if request.bounces.iter().all(Option::is_none) => {
+                request.method.share_positions(recording)?
+            }
             // What a mirror shows is not shared.
             Positions::Shared | Positions::Whole => None,
         };
@@ -348,24 +355,30 @@ impl Reconstructor {
         recording: &mut Recording<'_>,
         listed: Option<&PixelList>,
     ) -> Result<(), ReconstructionError> {
-        let Request { method, base, bounces, .. } = request;
+        let Request { method, base, bounces: [bounces, lobes], .. } = request;
         let unknown = method.record(&self.drawing, request.mesh, recording, listed, bounces)?;
         if method.walks_cube() {
             return fill::record(recording, &unknown);
         }
         let mirrored = bounces.map(|bounces| (bounces, bounces.next(&self.device, None)));
         let first = mirrored.as_ref().map(|(bounces, first)| (*bounces, first));
+        let glossy = lobes.and_then(|lobes| GlossyList::of(recording, lobes));
         let unknown = match base {
-            Some(base) => layered::record_left(recording, base, &unknown, first)?,
+            Some(base) => layered::record_left(recording, base, &unknown, (first, glossy.as_ref()))?,
             None => unknown,
         };
         fill::record(recording, &unknown)?;
-        specular::record(recording, listed, first)?;
-        let Some((bounces, first)) = mirrored else { return Ok(()) };
-        bounce::record(recording, bounces, first, |recording, which, lists, place| match base {
-            Some(base) => layered::follow_in_base(recording, base, (bounces, which), lists, place),
-            None => Ok(()),
-        })
+        specular::record(recording, listed, (first, glossy.as_ref()))?;
+        if let Some((bounces, first)) = mirrored {
+            bounce::record(recording, bounces, first, |recording, which, lists, place| match base {
+                Some(base) => layered::follow_in_base(recording, base, (bounces, which), lists, place),
+                None => Ok(()),
+            })?;
+        }
+        match (base, lobes, &glossy) {
+            (Some(base), Some(lobes), Some(glossy)) => layered::follow_lobes(recording, base, lobes, glossy),
+            _ => Ok(()),
+        }
     }
 
     /// Where single rays end in images of a mirror's surroundings, followed as rays off mirrors are; also the seconds on the

@@ -18,8 +18,8 @@ use crate::{quads::QuadTargets, sample_set::SampleSet};
 
 /// Bounds the memory of a batch: 20 bytes a pixel on the device, 32 with several positions a pixel, up to 12 on the host.
 pub(crate) const PIXELS_A_BATCH: usize = 1 << 20;
-/// The same where mirrors are followed: their rays take 108 bytes a pixel, and 16 more for each
-/// mirror cell and for a base.
+/// The same where rays off mirrors are followed: they take 108 bytes a pixel, and 16 more for each mirror cell and for a base. Rays into
+/// lobes that are walked in a base take as much again, and 76 more for their surfaces.
 pub(crate) const MIRRORED_PIXELS_A_BATCH: usize = 1 << 18;
 /// The same beside live streams: the rays of a batch are followed in one slice.
 pub(crate) const MIRRORED_PIXELS_A_SLICE: usize = 1 << 14;

@@ -25,9 +25,9 @@ use crate::view_work::{CELL_MARGIN_PX, FAR_AWAY, TILE_PX};
 use crate::{methods, pixel_list::LIST_WORKGROUP, quads, specular::Specular};
 
 /// Passes over whole views, and templates that several shaders include.
-const SHADERS: [(&str, &str); 28] = wgsl_files! {
+const SHADERS: [(&str, &str); 29] = wgsl_files! {
     "antialias.wgsl", "tile_start.wgsl", "fill.wgsl", "specular.wgsl", "view_work.wgsl", "cell.wgsl", "surface.wgsl", "found.wgsl", "cube/walk.wgsl", "cube/colors.wgsl", "cube/gather.wgsl", "pixel_list.wgsl",
-    "gathered.wgsl", "gather_at.wgsl", "nearest_at.wgsl", "colors.wgsl", "bounce/ray.wgsl", "bounce/list.wgsl", "bounce/glossy.wgsl", "bounce/lobe.wgsl", "bounce/lobe_rays.wgsl", "bounce/lobe_sum.wgsl", "bounce/spawn.wgsl", "bounce/march.wgsl", "bounce/curved_search.wgsl", "single_pole.wgsl", "bounce/mips.wgsl", "bounce/land.wgsl"
+    "gathered.wgsl", "gather_at.wgsl", "nearest_at.wgsl", "colors.wgsl", "bounce/ray.wgsl", "bounce/list.wgsl", "bounce/glossy.wgsl", "bounce/list_glossy.wgsl", "bounce/lobe.wgsl", "bounce/lobe_rays.wgsl", "bounce/lobe_sum.wgsl", "bounce/spawn.wgsl", "bounce/march.wgsl", "bounce/curved_search.wgsl", "single_pole.wgsl", "bounce/mips.wgsl", "bounce/land.wgsl"
 };
 
 const PROVENANCE_EMPTY: u32 = ProvenanceKind::Empty as u32;

@@ -7,6 +7,7 @@ use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name
 use minijinja::{Value, context};
 
 use crate::bounce::{Bounces, MAX_RAY_LISTS, RayLists};
+use crate::lobes::{GlossyList, LobeLight};
 use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, reflectors::sample_texels};
 
@@ -24,6 +25,8 @@ pub(crate) struct Specular {
     visibility_words: usize,
     /// Mirrors list their rays; the number of mirror cells.
     mirror_cells: Option<usize>,
+    /// Rough surfaces are listed, which are to send rays.
+    lists_glossy: bool,
 }
 
 impl ShaderVariant for Specular {
@@ -39,8 +42,12 @@ impl ShaderVariant for Specular {
             visibility_words => self.visibility_words,
             listed => self.listed,
             sample_texels => sample_texels(self.visibility_words),
-            mirrors => self.mirror_cells.is_some(),
+            mirrors => self.mirror_cells.is_some() || self.lists_glossy,
+            spawns => self.mirror_cells.is_some(),
             mirror_cells => self.mirror_cells.unwrap_or(0),
+            lists_glossy => self.lists_glossy,
+            glossy => self.lists_glossy,
+            lobe_share => LobeLight::sent(self.mirror_cells.is_some()).share(),
             ..self.set.context()
         }
     }
@@ -51,13 +58,23 @@ impl ShaderVariant for Specular {
         let lit = kinds.flat_map(|kind| lights.map(|(lights, words)| (kind, lights, words)));
         lit.flat_map(|((highlight, environment_map), lights, visibility_words)| {
             SetVariant::all().into_iter().filter(|set| !set.count_fetches).flat_map(move |set| {
-                let mirrored = [Some(1), Some(MAX_RAY_LISTS)].into_iter().filter(move |_| highlight == Highlight::Ggx);
+                let is_ggx = highlight == Highlight::Ggx;
+                let mirrored = [Some(1), Some(MAX_RAY_LISTS)].into_iter().filter(move |_| is_ggx);
                 std::iter::once(None).chain(mirrored).flat_map(move |mirror_cells| {
-                    let with =
-                        Self { set, highlight, lights, environment_map, listed: false, visibility_words, mirror_cells };
+                    let with = Self {
+                        set,
+                        highlight,
+                        lights,
+                        environment_map,
+                        listed: false,
+                        visibility_words,
+                        mirror_cells,
+                        lists_glossy: false,
+                    };
+                    let glossy = (is_ggx && lights <= 3).then_some(Self { lists_glossy: true, ..with });
                     // Pixels that show mirrors are found anew at each position, not listed.
-                    let listed = if mirror_cells.is_some() { &[false][..] } else { &[false, true] };
-                    listed.iter().map(move |&listed| Self { listed, ..with })
+                    let listed = mirror_cells.is_none().then_some(Self { listed: true, ..with });
+                    std::iter::once(with).chain(listed).chain(glossy)
                 })
             })
         })
@@ -65,11 +82,12 @@ impl ShaderVariant for Specular {
     }
 }
 
-/// Highlights are added after the fill, which would spread them. Mirrors list their rays, where they are to be followed.
+/// Highlights are added after the fill, which would spread them. Mirrors list their rays, where they are to be followed, and rough
+/// surfaces are listed, where their lobes are sent rays.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     listed: Option<&PixelList>,
-    mirrored: Option<(&Bounces<'_>, &RayLists)>,
+    (mirrored, glossy): (Option<(&Bounces<'_>, &RayLists)>, Option<&GlossyList<'_>>),
 ) -> Result<(), ReconstructionError> {
     let Some(reflectors) = &recording.set.reflectors else { return Ok(()) };
     let mirrors = |_: &&Arc<GpuEnvironment>| reflectors.highlight == Highlight::Ggx;
@@ -83,6 +101,7 @@ pub(crate) fn record(
         listed: listed.is_some(),
         visibility_words: reflectors.visibility_words,
         mirror_cells: mirrored.map(|(bounces, _)| bounces.cell_count()),
+        lists_glossy: glossy.is_some(),
     };
     let pass = recording.device.passes.get(&variant)?;
     let mut bindings = recording.cell_bindings();
@@ -96,6 +115,7 @@ pub(crate) fn record(
     bindings.extend(environment.into_iter().flat_map(|map| map.bindings()));
     bindings.extend(listed.map(PixelList::bindings).into_iter().flatten());
     bindings.extend(mirrored.into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
+    bindings.extend(glossy.into_iter().flat_map(GlossyList::bindings));
     let bound = pass.bind(0, bindings)?;
     recording.dispatch_pixels(&variant, &pass, &bound, listed);
     Ok(())

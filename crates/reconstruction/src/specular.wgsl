@@ -20,9 +20,12 @@
 {% if listed %}
 {% include "pixel_list.wgsl" %}
 {% endif %}
-{%- if mirrors %}
+{%- if spawns %}
 {% include "bounce/ray.wgsl" %}
 {% include "bounce/spawn.wgsl" %}
+{%- endif %}
+{%- if lists_glossy %}
+{% include "bounce/list_glossy.wgsl" %}
 {%- endif %}
 
 @compute @workgroup_size({{ "LIST_WORKGROUP" if listed else "TILE_PX, TILE_PX" }})
@@ -49,11 +52,17 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let mirror = Mirror(point_in_world, around.normal, towards_eye, unpack_reflector(around.reflector));
     let open = {{ "unpack4x8unorm(around.visibility[0]).x" if visibility_words > 0 else "1.0" }};
     let side_m = 1.0 / (inverse_depth[index] * work.view.focal_px);
+{%- if spawns %}
     let curvature = select(0.0, curvature_at(camera, cell_index, point_in_world, 1.0 / (inverse_w * camera.focal_px)), corners.connected);
     // Each of several positions within a pixel has a part of its footprint.
     let width_m = side_m * sqrt(work.position_share);
     let cone = cone_off(Cone(width_m, width_m / distance(point_in_world, work.view.eye_in_world)), curvature);
     added += bounce_off(mirror, index, vec3f(around.reflecting), open, side_m, cone);
+{%- endif %}
+{%- if lists_glossy %}
+    let rest = around.reflecting * ({{ lobe_share }});
+    for (var lists = rest > 0.0; lists; lists = false) { list_glossy(mirror, index, vec3f(rest), open); }
+{%- endif %}
     out_color[index] = rgb9e5_from_linear(linear_from_rgb9e5(out_color[index]) + added);
 {%- else %}
     let added = highlight(point_in_world, around.normal, towards_eye, around.reflector, around.visibility);

@@ -15,10 +15,9 @@ pub(crate) struct GpuGlossySurface {
     pub normal_oct16: u32,
     pub throughput_linear: [f32; 3],
     pub roughness: f32,
-    pub start_m: f32,
     pub open: f32,
     pub is_mirrored: u32,
-    pub padding: u32,
+    pub padding: [u32; 2],
 }
 
 /// For as many pixels: surfaces, and the light that their rays bring.

@@ -10,11 +10,9 @@ struct GlossySurface {
     // The share that the pixel shows of the light of a ray with weight 1.
     throughput_linear: vec3f,
     roughness: f32,
-    // A ray straight up meets nothing nearer.
-    start_m: f32,
     // The open share of the environment.
     open: f32,
     // 1 where all rays go below the surface: the mirrored one takes their place.
     is_mirrored: u32,
-    padding: u32,
+    padding: vec2u,
 }

@@ -6,7 +6,8 @@ struct MirrorBox {
     // Where its list begins.
     first_listed: u32,
     max_in_world: vec3f,
-    padding: u32,
+    // In a cube a ray straight off a surface meets nothing nearer; in images, where this is 0, footprints tell.
+    start_m: f32,
 }
 
 const MIRROR_CELLS: u32 = {{ mirror_cells }}u;

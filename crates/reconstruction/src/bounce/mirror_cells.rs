@@ -40,8 +40,8 @@ pub struct Mirrors<'s> {
     pub cells: &'s [MirrorCell<'s>],
     /// Without any, mirrors show lamps and the environment.
     pub reflections: u32,
-    /// Rays into the lobe of a rough surface that a view from a cube shows; in a light field it is gathered instead, whatever their
-    /// number. Without any, rough surfaces show lamps and the environment.
+    /// Rays into the lobe of a rough surface, which are walked in the cube of the view or in a base; in a light field it is gathered
+    /// instead, whatever their number. Without any, and without a cube, rough surfaces show lamps and the environment.
     pub glossy_rays: u32,
 }
 
@@ -60,8 +60,16 @@ impl<'s> Mirrors<'s> {
         let reflectors = set.reflectors.as_ref().or(cube.and_then(reflectors_of_cube));
         let has_mirrors = reflectors.is_some_and(|of| of.highlight == Highlight::Ggx);
         // Without a cube rough surfaces show no scene.
-        let glossy_rays = if set.cube.is_some() { self.glossy_rays } else { 0 };
+        let glossy_rays = if cube.is_some() { self.glossy_rays } else { 0 };
         Ok(if has_mirrors { Self { glossy_rays, ..self } } else { Self::default() })
+    }
+
+    /// The rays off mirrors, and those into lobes where they are followed apart: beside images, and in the base alone.
+    pub(crate) fn split(self, has_base: bool) -> [Self; 2] {
+        match has_base && self.glossy_rays > 0 {
+            true => [Self { glossy_rays: 0, ..self }, Self { cells: &[], ..self }],
+            false => [self, Self::default()],
+        }
     }
 
     /// The cells in which rays are followed, if any are: the cube comes last, since it holds the mirrors that are in no other.

@@ -54,7 +54,7 @@ pub(crate) struct GpuMirrorBox {
     pub min_in_world: [f32; 3],
     pub first_listed: u32,
     pub max_in_world: [f32; 3],
-    pub padding: u32,
+    pub start_m: f32,
 }
 
 /// `MirroredRay` of `bounce/ray.wgsl`.
@@ -125,7 +125,7 @@ impl<'s> Bounces<'s> {
             min_in_world: cell.bounds.min.to_array(),
             first_listed: first_listed(number),
             max_in_world: cell.bounds.max.to_array(),
-            padding: 0,
+            start_m: cell.surroundings.cube.as_ref().map_or(0.0, |cube| cube.start_m),
         };
         let boxes: Vec<GpuMirrorBox> = cells.iter().enumerate().map(mirror_box).collect();
         let work = |(number, cell): (usize, &MirrorCell<'_>)| {

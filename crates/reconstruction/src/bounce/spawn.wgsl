@@ -45,7 +45,7 @@ fn cone_off(before: Cone, curvature: f32) -> Cone {
 // Lists the ray off a mirror. Gives what the mirror shows of the environment where no cell knows its surroundings. A base is a cell
 // that holds all mirrors.
 // `open` is the share of the environment that reaches the mirror; `side_m` is a pixel's of the picture that shows the mirror,
-// above which the ray begins.
+// above which a ray in images begins.
 fn bounce_off(mirror: Mirror, pixel: u32, throughput_linear: vec3f, open: f32, side_m: f32, cone: Cone) -> vec3f {
     let share = mirror_share(mirror.reflector.roughness);
     let towards = reflect(-mirror.towards_eye, mirror.normal);
@@ -55,7 +55,8 @@ fn bounce_off(mirror: Mirror, pixel: u32, throughput_linear: vec3f, open: f32, s
         return environment_mirrored(towards, max(mirror.reflector.roughness, LEAST_ROUGHNESS)) * passed * open;
     }
     for (var listed = max(max(passed.r, passed.g), passed.b) > 0.0; listed; listed = false) {
-        let near_m = START_FOOTPRINTS * side_m / max(dot(mirror.normal, towards), LEAST_RISE);
+        let in_cube_m = mirror_boxes[cell].start_m;
+        let near_m = select(START_FOOTPRINTS * side_m, in_cube_m, in_cube_m > 0.0) / max(dot(mirror.normal, towards), LEAST_RISE);
         let guess = pack4x8unorm(vec4f(open, mirror.reflector.roughness, 0.0, 0.0));
         list_ray(cell, MirroredRay(mirror.point_in_world, pixel, towards, guess, rgb9e5_from_linear(passed), near_m, cone.width_m, cone.spread));
     }

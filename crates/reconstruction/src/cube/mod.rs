@@ -60,6 +60,8 @@ pub(crate) struct Cube {
     leaves: Table,
     entries: Table,
     samples: Table,
+    /// A ray straight off a surface meets nothing nearer.
+    pub start_m: f32,
     /// Some line has met more surfaces than it holds.
     pub truncated: bool,
     pub reflectors: Option<Reflectors>,
@@ -85,12 +87,13 @@ impl Cube {
         let samples = CubeSamples::of(grid, images);
         let bricks = Bricks::of(&samples);
         let words = samples.words(&links(&samples));
+        let start_m = START_SPACINGS * grid.spacing_m;
         let cube = GpuCube {
             cube_from_world: cube_from_world(grid),
             size: grid.size.to_array(),
             columns: bricks.columns,
             rows: bricks.rows,
-            start_m: START_SPACINGS * grid.spacing_m,
+            start_m,
             padding: [0; 2],
         };
         Ok(Self {
@@ -101,6 +104,7 @@ impl Cube {
             entries: tables.upload("entries of a cube", TextureFormat::Rgba32Uint, &bricks.entries, turn)?,
             samples: tables.upload("samples of a cube", TextureFormat::Rgba32Uint, &words, turn)?,
             reflectors: Reflectors::of_cube(tables, (images, &samples.place), set, turn)?,
+            start_m,
             light_field: light_field.map(|field| LightField::upload(tables, field, turn)).transpose()?,
             truncated: images.iter().any(|image| image.truncated),
         })

@@ -8,7 +8,7 @@ use minijinja::{Value, context};
 
 use crate::bounce::{Bounces, InBase, MAX_RAY_LISTS, RayLists};
 use crate::cube::{Cube, LightField};
-use crate::lobes::{self, GlossyList};
+use crate::lobes::{self, GlossyList, LobeLight};
 use crate::reflectors::sample_texels;
 use crate::surface::found_bindings;
 use crate::view_work::{ONE_VIEW, SetVariant};
@@ -36,49 +36,6 @@ impl Walked {
 
     fn is_left(self) -> bool {
         matches!(self, Self::LeftPixels | Self::LeftBounced)
-    }
-}
-
-/// How a surface's lobe is lit, beside the rays off mirrors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum LobeLight {
-    /// What smooth surfaces mirror is gathered in a light field.
-    GatheredMirrors,
-    /// What no ray off a mirror brings is gathered.
-    GatheredRest,
-    /// All is gathered.
-    Gathered,
-    /// Rays are sent for what no ray off a mirror brings.
-    SentRest,
-    /// Rays are sent for all.
-    Sent,
-}
-
-impl LobeLight {
-    const ALL: [Self; 5] = [Self::GatheredMirrors, Self::GatheredRest, Self::Gathered, Self::SentRest, Self::Sent];
-
-    /// For the surfaces that pixels show. `followed` of `mirrors` are followed; rough surfaces may be glossy.
-    fn of_pixels((followed, mirrors): (u32, u32), glossy: bool, has_light_field: bool) -> Option<Self> {
-        match (followed < mirrors && followed == 0, glossy, has_light_field) {
-            (true, true, _) => Some(Self::Gathered),
-            (true, false, _) => Some(Self::GatheredMirrors),
-            (false, true, true) => Some(if mirrors > 0 { Self::GatheredRest } else { Self::Gathered }),
-            (false, true, false) => Some(if mirrors > 0 { Self::SentRest } else { Self::Sent }),
-            (false, false, _) => None,
-        }
-    }
-
-    fn is_sent(self) -> bool {
-        matches!(self, Self::SentRest | Self::Sent)
-    }
-
-    /// In a shader, of a mirror.
-    fn share(self) -> &'static str {
-        match self {
-            Self::GatheredMirrors => "mirror_share(mirror.reflector.roughness)",
-            Self::GatheredRest | Self::SentRest => "1.0 - mirror_share(mirror.reflector.roughness)",
-            Self::Gathered | Self::Sent => "1.0",
-        }
     }
 }
 
@@ -157,7 +114,7 @@ impl Walk {
             Walked::Bounced | Walked::LeftBounced => {
                 [Walked::Bounced, Walked::LeftBounced].map(|rays| Self { rays, ..base }).to_vec()
             }
-            Walked::IntoLobes => Vec::new(),
+            Walked::IntoLobes => vec![Self { in_base: true, ..self }],
         }
     }
 }
@@ -231,7 +188,7 @@ impl ShaderVariant for Walk {
         let left = own.iter().filter(|walk| walk.lights <= 3 && walk.lobe.is_none()).flat_map(|walk| walk.of_base());
         let without_reflectors = switches().flat_map(|[truncated, environment_map]| {
             let in_base = Self { in_base: true, truncated, environment_map, ..Self::PLAIN };
-            [Walked::Bounced, Walked::LeftBounced].map(|rays| Self { rays, ..in_base })
+            [Walked::Bounced, Walked::IntoLobes, Walked::LeftBounced].map(|rays| Self { rays, ..in_base })
         });
         own.iter().copied().chain(left).chain(without_reflectors).collect()
     }
@@ -248,11 +205,10 @@ pub(crate) fn record(
     let Some(cube) = recording.set.cube.clone() else { return Ok(undecided) };
     let mirrors = bounces.map_or(0, Bounces::reflections);
     let followed = followed.map_or(mirrors, |followed| followed.min(mirrors));
-    // The positions within a pixel share its rays.
-    let rays = bounces.map_or(0, Bounces::glossy_rays).div_ceil(recording.batch.planes.antialias.samples());
-    let lobe = LobeLight::of_pixels((followed, mirrors), rays > 0, cube.light_field.is_some());
-    let memory = bounces.and_then(Bounces::lobes).filter(|_| lobe.is_some_and(LobeLight::is_sent));
-    let sent = memory.map(|memory| GlossyList::empty(recording.device, memory, rays));
+    let is_glossy = bounces.is_some_and(|bounces| bounces.glossy_rays() > 0);
+    let lobe = LobeLight::of_pixels((followed, mirrors), is_glossy, cube.light_field.is_some());
+    let sent = bounces.filter(|_| lobe.is_some_and(LobeLight::is_sent));
+    let sent = sent.and_then(|bounces| GlossyList::of(recording, bounces));
     let first = bounces.filter(|_| followed > 0).map(|bounces| bounces.next(recording.device, None));
     walk_pixels(recording, &cube, (None, &undecided), (bounces.zip(first.as_ref()), lobe, sent.as_ref()))?;
     let Some(bounces) = bounces else { return Ok(undecided) };
@@ -260,17 +216,27 @@ pub(crate) fn record(
         let last = (followed < mirrors).then_some(LobeLight::GatheredMirrors);
         follow_mirrors(recording, &cube, bounces, (first, last, None), 1..=followed)?;
     }
-    let reflectors = cube.reflectors.as_ref();
-    for (glossy, reflectors) in sent.iter().zip(reflectors) {
-        for number in 0..glossy.rays {
-            let first = lobes::record(recording, bounces, (glossy, number), &reflectors.illumination)?;
-            // Costs are learned by generation, and are others than those of rays off mirrors.
-            let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + mirrors.max(1);
-            follow_mirrors(recording, &cube, bounces, (first, None, Some(glossy)), generations)?;
-        }
-        lobes::record_sum(recording, glossy)?;
+    if let Some(glossy) = &sent {
+        follow_lobes(recording, &cube, bounces, glossy)?;
     }
     Ok(undecided)
+}
+
+/// Records the walks of rays into the lobes of listed surfaces, one ray of each after another, and adds their light to the pixels.
+pub(crate) fn follow_lobes(
+    recording: &mut Recording<'_>,
+    cube: &Cube,
+    bounces: &Bounces<'_>,
+    glossy: &GlossyList<'_>,
+) -> Result<(), ReconstructionError> {
+    let Some(reflectors) = cube.reflectors.as_ref().or(recording.set.reflectors.as_ref()) else { return Ok(()) };
+    for number in 0..glossy.rays {
+        let first = lobes::record(recording, bounces, (glossy, number), &reflectors.illumination)?;
+        // Costs are learned by generation, and are others than those of rays off mirrors.
+        let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + bounces.reflections().max(1);
+        follow_mirrors(recording, cube, bounces, (first, None, Some(glossy)), generations)?;
+    }
+    lobes::record_sum(recording, glossy)
 }
 
 /// Records the walk of listed rays, and of those off the mirrors that they meet; what the `last` ones show may be gathered. The light of
@@ -294,15 +260,17 @@ fn follow_mirrors(
     Ok(())
 }
 
-/// Records the walk of pixels that another method leaves, in the cube beside its images. Gives those that stay unknown.
+/// Records the walk of pixels that another method leaves, in the cube beside its images. Mirrors list the rays off them, and rough
+/// surfaces are listed where their lobes are sent rays. Gives those that stay unknown.
 pub(crate) fn record_left(
     recording: &mut Recording<'_>,
     base: &Cube,
     left: &PixelList,
-    mirrored: Option<(&Bounces<'_>, &RayLists)>,
+    (mirrored, glossy): (Option<(&Bounces<'_>, &RayLists)>, Option<&GlossyList<'_>>),
 ) -> Result<PixelList, ReconstructionError> {
     let undecided = recording.empty_list();
-    walk_pixels(recording, base, (Some(left), &undecided), (mirrored, None, None))?;
+    let lobe = glossy.map(|_| LobeLight::sent(mirrored.is_some()));
+    walk_pixels(recording, base, (Some(left), &undecided), (mirrored, lobe, glossy))?;
     Ok(undecided)
 }
 

@@ -38,31 +38,7 @@
 {% include "bounce/spawn.wgsl" %}
 {%- endif %}
 {%- if lists_glossy %}
-{% include "sequence.wgsl" %}
-{% include "lobe.wgsl" %}
-{% include "bounce/glossy.wgsl" %}
-{% include "bounce/lobe_rays.wgsl" %}
-
-@group(0) var<storage, read_write> glossy_surfaces: array<GlossySurface>;
-struct GlossyList { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
-@group(0) var<storage, read_write> glossy_list: GlossyList;
-@group(0) var<storage, read_write> lobe_light: array<f32>;
-
-// Lists a surface from whose lobe a pixel shows the share `shown`. All of its rays together weigh 1.
-fn list_glossy(mirror: Mirror, pixel: u32, shown: vec3f, open: f32) {
-    let seed = seed_of(mirror.point_in_world);
-    // As the rays see it.
-    let normal_oct16 = oct16_from_unit(mirror.normal);
-    let listed = Mirror(mirror.point_in_world, unit_from_oct16(normal_oct16), mirror.towards_eye, mirror.reflector);
-    var sum = 0.0;
-    for (var i = 0u; i < lobe_rays.count; i++) { sum += lobe_ray(listed, point_of(i, seed)).weight; }
-    let all_below = sum <= 0.0;
-    let entry = atomicAdd(&glossy_list.count, 1u);
-    if entry % LIST_WORKGROUP == 0u { atomicAdd(&glossy_list.workgroups, 1u); }
-    let throughput = shown * environment_reflectance(mirror) / select(sum, 1.0, all_below);
-    for (var channel = 0u; channel < 3u; channel++) { lobe_light[3u * pixel + channel] = 0.0; }
-    glossy_surfaces[entry] = GlossySurface(mirror.point_in_world, pixel, mirror.towards_eye, normal_oct16, throughput, mirror.reflector.roughness, cube.start_m, open, select(0u, 1u, all_below), 0u);
-}
+{% include "bounce/list_glossy.wgsl" %}
 {%- endif %}
 {%- if bounced %}
 @group(0) var<storage, read> rays: array<MirroredRay>;
@@ -115,7 +91,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {%- if left %}
     if (ray_provenance[index] & 0xffu) != PROVENANCE_FILLED { return; }
 {%- endif %}
-    let hit = walk(cube_ray(ray.origin_in_world, ray.direction), {{ "max(ray.near_m, cube.start_m)" if in_base else "ray.near_m" }});
+    let hit = walk(cube_ray(ray.origin_in_world, ray.direction), {{ "max(ray.near_m, cube.start_m)" if left else "ray.near_m" }});
     let guess = unpack4x8unorm(ray.guess);
     let is_unknown = !hit.met{{ "" if truncated else " && !hit.is_empty" }};
     // Where nothing is met the environment is seen; where the cube does not know, what the mirror shows without rays.
@@ -133,7 +109,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     ray_provenance[index] = PROVENANCE_BASE;
 {%- endif %}
 {%- if in_base %}
-    out_provenance[ray.pixel] = origin | select(PROVENANCE_BASE, PROVENANCE_GUESSED, is_unknown);
+    // Of several rays one that is guessed counts.
+    let is_guessed = is_unknown || (out_provenance[ray.pixel] & 0xffu) == PROVENANCE_GUESSED;
+    out_provenance[ray.pixel] = origin | select(PROVENANCE_BASE, PROVENANCE_GUESSED, is_guessed);
 {%- else %}
     for (var guessed = is_unknown; guessed; guessed = false) { out_provenance[ray.pixel] = origin | PROVENANCE_GUESSED; }
 {%- endif %}

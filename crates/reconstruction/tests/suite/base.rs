@@ -1,14 +1,20 @@
 //! A layered depth cube beside depth images: what these leave unknown is walked in it.
 
-use depth_image::{Antialias, PinholeCamera, ProvenanceKind, View, ViewPlanes};
-use glam::UVec2;
+use depth_image::{Antialias, CubeImages, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use glam::{UVec2, Vec3};
 use gpu::Turn;
 use reconstruction::{CommonSets, Mirrors, ReconstructionError, ReconstructionMethod, SampleSet};
 use render::LayerSelection;
+use scene::procedural::teapot_spheres;
 
 use crate::layered::CubeStage;
+use crate::light_field::{Gathering, GlossyFloor, changed};
 use crate::meshes::all_meshes;
-use crate::stage::{CARVE, Stage, colors_differ_by, corpus, count, depths, kinds, psnr_db, reconstructor};
+use crate::mirrors::images;
+use crate::stage::{
+    CARVE, Stage, colors_differ_by, corpus, count, depths, description, kinds, looking, psnr_db, reconstructor,
+    renderer,
+};
 
 fn view(
     set: &SampleSet,
@@ -99,4 +105,81 @@ fn a_base_without_a_cube_is_refused_and_views_of_a_cube_need_none() {
     assert_eq!(refused.to_string(), "a base needs a layered cube, which the sample set lacks");
     let walked = |beside| view(&base, beside, &camera, (ReconstructionMethod::LAYERED, ViewPlanes::ALL));
     assert!(walked(None).expect("a view") == walked(Some(&base)).expect("a view"));
+}
+
+/// Depth images of a lit scene, from around its view.
+fn set_of(stage: &Gathering) -> SampleSet {
+    let eye = stage.camera.eye_in_world;
+    let sample = |(x, y): (f32, f32)| {
+        let aside = Vec3::new(x, y, -x);
+        looking(eye + aside, Vec3::Y + aside, 44.0, UVec2::new(240, 180))
+    };
+    let cameras = [(-0.2, -0.2), (0.2, 0.2), (0.2, -0.2), (-0.2, 0.2)].map(sample);
+    reconstructor().upload(&images(&stage.on_device, &cameras), &description(&stage.scene)).expect("a sample set")
+}
+
+fn lit_view(set: &SampleSet, base: Option<&SampleSet>, stage: &Gathering, rays: (u32, u32)) -> View {
+    let mirrors = Mirrors { cells: &[], reflections: rays.0, glossy_rays: rays.1 };
+    let shared = CommonSets { mirrors, base };
+    let views = reconstructor().reconstruct_with(set, shared, &[stage.camera], CARVE, ViewPlanes::ALL, Turn::default());
+    views.expect("a view").remove(0)
+}
+
+#[test]
+fn rough_surfaces_of_images_show_what_a_base_holds() {
+    let floor = GlossyFloor::new();
+    // The view's own image: errors are those of what the floor shows.
+    let own_image = images(&floor.stage.on_device, &[floor.stage.camera]);
+    let set = reconstructor().upload(&own_image, &description(&floor.stage.scene)).expect("a sample set");
+    let base = floor.stage.set(None);
+    let plain = lit_view(&set, None, &floor.stage, (0, 0));
+    assert!(lit_view(&set, None, &floor.stage, (0, 16)) == plain, "without a base all is as without the term");
+    let none = floor.psnr_db(&plain);
+    let of_rays = [1, 4, 16].map(|rays| {
+        let view = lit_view(&set, Some(&base), &floor.stage, (0, rays));
+        let from_base = kinds(&view).into_iter().zip(&floor.pixels).filter(|(k, is)| **is && *k == ProvenanceKind::Base);
+        let share = from_base.count() as f64 / floor.pixels.iter().filter(|&&is| is).count() as f64;
+        let [own, drawn] = [floor.psnr_db(&view), floor.direct_db(rays)];
+        println!("{rays} rays: {own:.2} dB in a base, {drawn:.2} dB drawn directly, {none:.2} dB without; {share:.3} of the base");
+        assert!(own > drawn.min(33.5) - 1.5 && share > 0.95, "{rays}: {own} {drawn} {share}");
+        own
+    });
+    assert!(of_rays[2] > none + 3.0 && of_rays.is_sorted(), "{of_rays:?}, {none}");
+}
+
+#[test]
+fn rays_into_lobes_that_a_truncated_base_does_not_hold_are_guessed() {
+    let floor = GlossyFloor::new();
+    let mut images = floor.stage.images();
+    images[0].truncated = true;
+    let base = floor.stage.upload(&CubeImages { grid: floor.stage.grid, images, light_field: None });
+    let view = lit_view(&set_of(&floor.stage), Some(&base), &floor.stage, (0, 8));
+    let [guessed, known] = [ProvenanceKind::Guessed, ProvenanceKind::Base].map(|kind| count(&view, kind));
+    println!("{guessed} guessed, {known} known");
+    assert!(guessed > 1000 && known > 20, "{guessed} {known}");
+}
+
+/// Of the images, of pixels that only the base shows, and of several samples a pixel.
+#[test]
+fn lobes_and_mirrors_beside_images_are_those_of_direct_drawing() {
+    let camera = looking(Vec3::new(8.0, 4.5, 8.0), Vec3::Y, 40.0, UVec2::new(80, 60));
+    let stage = Gathering::new(teapot_spheres(), camera);
+    let other = looking(Vec3::new(8.2, 4.6, 8.0), Vec3::Y, 40.0, UVec2::new(80, 60));
+    let (set, base) = (set_of(&stage), stage.set(None));
+    let planes = ViewPlanes { antialias: Antialias::of(4).expect("offered"), ..ViewPlanes::ALL };
+    let made = |cameras: &[PinholeCamera], reflections, glossy_rays| {
+        let shared = CommonSets { mirrors: Mirrors { cells: &[], reflections, glossy_rays }, base: Some(&base) };
+        reconstructor().reconstruct_with(&set, shared, cameras, CARVE, planes, Turn::default()).expect("views")
+    };
+    let views = made(&[camera, other], 2, 16);
+    assert!(views[1] == made(&[other], 2, 16)[0], "views of a batch are those of each");
+    let drawn = |lighting| renderer().draw_views(stage.lit(lighting), &[camera], planes).expect("a view").remove(0);
+    let [none, truth] = ["shadows", "shadows, reflections 2, glossy 64"].map(drawn);
+    let pixels = changed(&none, &truth);
+    let [own, mirrors, without] =
+        [&views[0], &made(&[camera], 2, 0)[0], &made(&[camera], 0, 0)[0]].map(|view| psnr_db(&truth, view, &pixels));
+    println!("{own:.2} dB, with mirrors alone {mirrors:.2}, without mirrors and lobes {without:.2} dB");
+    assert!(own > 24.0 && own > mirrors + 1.5 && mirrors > without + 1.5, "{own} {mirrors} {without}");
+    let walked = views[0].provenance.as_ref().expect("provenance");
+    assert!(walked.iter().any(|of| of.kind() == ProvenanceKind::Base));
 }

@@ -102,15 +102,15 @@ fn gathered_mirrors_are_blurred_and_rays_before_the_gathering_sharpen_them() {
 }
 
 /// A teapot on a rough floor, its views without and with many rays into lobes, and the pixels that these change.
-struct GlossyFloor {
-    stage: Gathering,
-    none: View,
-    truth: View,
-    pixels: Vec<bool>,
+pub struct GlossyFloor {
+    pub stage: Gathering,
+    pub none: View,
+    pub truth: View,
+    pub pixels: Vec<bool>,
 }
 
 impl GlossyFloor {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let camera = looking(Vec3::new(8.0, 4.5, 8.0), Vec3::Y, 40.0, UVec2::new(120, 90));
         let stage = Gathering::new(teapot_floor(), camera);
         let [none, truth] = ["shadows", "shadows, glossy 256"].map(|lighting| stage.direct(lighting));
@@ -118,11 +118,11 @@ impl GlossyFloor {
         Self { stage, none, truth, pixels }
     }
 
-    fn psnr_db(&self, view: &View) -> f64 {
+    pub fn psnr_db(&self, view: &View) -> f64 {
         psnr_db(&self.truth, view, &self.pixels)
     }
 
-    fn direct_db(&self, rays: u32) -> f64 {
+    pub fn direct_db(&self, rays: u32) -> f64 {
         self.psnr_db(&self.stage.direct(&format!("shadows, glossy {rays}")))
     }
 }

@@ -73,7 +73,7 @@ fn reconstruct<'s>(
     reconstructor().reconstruct_with(set, common, cameras, CARVE, planes, Default::default())
 }
 
-fn images(scene: &GpuScene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
+pub fn images(scene: &GpuScene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
     let cameras: Vec<Camera> = cameras.iter().map(|camera| Camera::Pinhole(*camera)).collect();
     let planes = SamplePlanes { specular: true, ..SamplePlanes::default() };
     renderer().draw_depth_images(work(scene, "shadows"), &cameras, planes).expect("depth images")
