@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use app_core::exit::BadInput;
 use app_core::plan_files::PlanFiles;
 use app_core::planning::screening_light;
 use clap::Args;
 use cluster::MAX_AUDIT_TIME_RATIO;
-use coordinator::{CoordinatorConfig, PlanStore};
+use coordinator::{CoordinatorConfig, PlanStore, SceneOffer, SceneOffers};
 use planner::Budget;
 
 /// Arguments of commands with a coordinator.
@@ -15,7 +16,7 @@ use planner::Budget;
 pub struct BudgetArgs {
     /// The budget of sessions that state none: the most error, and the most time of a view, as in "flip 0.05" or "flip p95
     /// 0.06, time 8ms" (see `myriorama plan --help`). The cluster chooses what is sampled, and how views are reconstructed,
-    /// as far as a session does not name it [default: none]
+    /// as far as a session does not name it. None is kept with a layered cube as --sampling or --base [default: none]
     #[arg(long, value_name = "BUDGET")]
     budget: Option<Budget>,
     /// The share of a compositor's time that audits of promises may take, from 0 to 0.5: they draw some views directly as well,
@@ -44,6 +45,21 @@ pub struct PlansArgs {
 }
 
 impl BudgetArgs {
+    /// # Errors
+    /// None can be kept for an offered scene: it is sampled as a layered cube, or has one beside its samples.
+    pub fn check(&self, offers: &SceneOffers) -> Result<(), BadInput> {
+        let Some(budget) = self.budget else { return Ok(()) };
+        let cube = |offer: &SceneOffer| match (&offer.cube, &offer.base) {
+            (Some(cube), _) => Some(format!("--sampling {}", cube.sampling)),
+            (None, Some((base, _))) => Some(format!("--base {}", base.sampling)),
+            (None, None) => None,
+        };
+        match offers.iter().find_map(cube) {
+            Some(cube) => Err(BadInput(format!("--budget {budget}: none can be kept with {cube}"))),
+            None => Ok(()),
+        }
+    }
+
     /// A coordinator's configuration with this budget.
     pub fn configure(&self, config: CoordinatorConfig) -> CoordinatorConfig {
         let plans = self.plans.files().map(|files| Arc::new(files) as Arc<dyn PlanStore>);

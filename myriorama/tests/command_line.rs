@@ -85,7 +85,7 @@ fn input_of_the_lab_that_cannot_be_used_is_named_with_status_2() {
 #[test]
 fn what_cannot_be_sampled_as_a_cube_is_named_with_status_2() {
     let fields = "layered_cube:64+light_field:66";
-    let cases: [(&[&str], &str); 14] = [
+    let cases: [(&[&str], &str); 17] = [
         (&["up", "--scene", "snake", "--base", "layered_cube:64"], "--base layered_cube:64: snake moves"),
         (&["up", "--scene", "quad", "--base", "conventional"], "--base conventional: a base is a layered cube"),
         (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--base", "layered_cube:64"], "a cube already"),
@@ -102,6 +102,18 @@ fn what_cannot_be_sampled_as_a_cube_is_named_with_status_2() {
         ),
         (&["up", "--scene", "quad", "--sampling", fields, "--lighting", "shadows"], "--lighting with reflections N"),
         (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--method", "layered:0"], "in a light field"),
+        (
+            &["up", "--scene", "quad", "--base", "layered_cube:64", "--budget", "flip 0.1"],
+            "--budget flip 0.1: none can be kept with --base layered_cube:64",
+        ),
+        (
+            &["coordinator", "--scene", "quad", "--base", "layered_cube:64", "--budget", "flip 0.1"],
+            "--budget flip 0.1: none can be kept with --base layered_cube:64",
+        ),
+        (
+            &["up", "--scene", "quad", "--sampling", "layered_cube:64", "--budget", "flip 0.1"],
+            "--budget flip 0.1: none can be kept with --sampling layered_cube:64",
+        ),
         (&["up", "--scene", "quad", "--base", fields], "--base layered_cube:64+light_field:66: a light field"),
     ];
     for (arguments, named) in cases {

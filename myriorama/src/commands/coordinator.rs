@@ -57,6 +57,7 @@ pub struct CoordinatorArgs {
 /// The scene cannot be used, or the port is taken.
 pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
     let (scenes, offers) = args.scenes.load()?;
+    args.budget.check(&offers)?;
     let listener = listen(args.listen, args.insecure_bind).await?;
     let address = listener.local_addr()?;
     for (scene, offer) in scenes.iter().zip(offers.iter()) {

@@ -53,6 +53,7 @@ pub struct UpArgs {
 /// The scene cannot be used, there is no device, or the port is taken.
 pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     let (scenes, offers) = args.scenes.load()?;
+    args.budget.check(&offers)?;
     let listener = listen(args.listen, args.insecure_bind).await?;
     let engine = GpuEngine::shared(args.device.device)?;
     let (memory, nodes) = (args.memory.set_memory_bytes(engine.is_software()), usize::from(args.nodes));
