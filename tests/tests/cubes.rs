@@ -5,8 +5,9 @@ use std::f32::consts::TAU;
 use std::time::Duration;
 
 use client::{Frame, Session, ViewRequest};
-use cluster::{BudgetRequest, DIRECT, PolicyChoice, SessionRequest, Timeline};
+use cluster::{BudgetRequest, DIRECT, PolicyChoice, Refinement, SessionRequest, Timeline};
 use cluster_tests::cluster::{CUBE, Cluster, offer_with_light_field, request, rig};
+use cluster_tests::picture::fault_of;
 use cluster_tests::watcher::eventually;
 use depth_image::{Aabb, PinholeCamera, ProvenanceKind};
 use glam::{UVec2, Vec3};
@@ -91,6 +92,37 @@ async fn tiles_of_a_light_field_are_sampled_once_and_a_successor_pulls_them_once
     assert_eq!(cluster.take_counts(), [1; 8]);
     assert_eq!(session.plan().assignment.plan_epoch, plan.plan_epoch);
     check_successor(&mut cluster, &session).await;
+}
+
+/// Three steps over six moments. Each step has images of the cube and a light field of its own, as the cells' images have.
+#[tokio::test(flavor = "multi_thread")]
+async fn each_step_of_light_samples_the_cube_and_its_light_field_once() {
+    let cluster = Cluster::start_offering(offer_with_light_field(), 3).await;
+    let timeline = Timeline { set_count: 6, ..STILL };
+    let asked = SessionRequest { timeline, refinement_steps: 3, ..sampled_as_cube(vec![view(0.0)]) };
+    let session = cluster.session(asked.clone()).await.unwrap();
+    let plan = session.plan().assignment;
+    assert_eq!(plan.workload.sample_cameras.len(), 4);
+    assert_ne!(plan.set_content(0), plan.set_content(1));
+    assert!((2..6).all(|set_index| plan.set_content(set_index) == plan.set_content(2)));
+    let of_set = |set_index: u32| {
+        let request = move |(number, azimuth)| ViewRequest {
+            frame: u64::from(4 * set_index + number),
+            set_index,
+            camera: view(azimuth),
+        };
+        (0..).zip(around(4)).map(request)
+    };
+    let frames = session.render_views((0..6).flat_map(of_set).collect::<Vec<_>>()).unwrap().all().await.unwrap();
+    assert_eq!(frames.len(), 24);
+    for frame in &frames {
+        let refinement = Refinement { step: frame.request.set_index.min(2), steps: 3 };
+        assert_eq!(fault_of(frame, STILL.start_s as f32, refinement), None);
+    }
+    assert_eq!(cluster.take_counts(), [1; 12], "four images of three steps, none twice, none ahead of the last");
+    let again = cluster.session(asked).await.unwrap();
+    again.render_views(of_set(5).collect::<Vec<_>>()).unwrap().all().await.unwrap();
+    assert!(cluster.take_counts().is_empty(), "a new session shows what is there");
 }
 
 /// Kills a compositor, and checks what the node in its place loads.

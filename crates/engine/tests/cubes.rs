@@ -1,8 +1,10 @@
 //! A layered depth cube by the engine alone, as a sampler sends it and a compositor gets it.
 
+use cluster::Refinement;
 use codec::{DecodeLimits, decode_sample_image, encode_sample_image};
 use depth_image::{
     CubeGrid, LightDirections, LightFieldCamera, PinholeCamera, SampleCamera, SampleImage, View, ViewPlanes,
+    linear_from_rgb9e5,
 };
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
@@ -45,7 +47,7 @@ impl Stand {
             lighting: LIGHTING.to_owned(),
             scene_time_s: 0.0,
             temporal_reference_s: None,
-            refinement: cluster::Refinement::default(),
+            refinement: Refinement::default(),
         }
     }
 
@@ -170,4 +172,40 @@ fn a_light_field_is_sampled_where_mirrors_are_followed_and_views_gather_in_it() 
     assert!(count > 10_000 && errors[2] > 2.0 && errors[1] > errors[0] && errors[1] < 30.0, "{count} {errors:?}");
     let refused = field(stand.view(&stand.set(cube), "layered:0").expect_err("no light field"));
     assert_eq!(refused.0, "reconstruction_method", "{}", refused.1);
+}
+
+/// A ray a lamp, then two, four and eight: the places stay, and the light comes nearer to that of all rays.
+#[test]
+fn light_in_steps_refines_a_light_field_as_it_does_the_cube() {
+    let stand = Stand::new();
+    let around = LightFieldCamera::around(stand.scene.bounds(), LightDirections::D66, 16);
+    let sampled = |camera: SampleCamera, refinement| {
+        let work = stand.work(&[camera], "layered_cube:160+light_field:66x16");
+        let work = SampleWork { lighting: "soft 8, reflections 2".to_owned(), refinement, ..work };
+        stand.engine.sample(&work, TURN).expect("an image").remove(0)
+    };
+    let steps = (0..4).map(|step| Refinement { step, steps: 4 });
+    let light = |image: &SampleImage| match image {
+        SampleImage::LightField(field) => (field.first.clone(), field.radiance_rgb9e5.clone()),
+        SampleImage::Layered(image) => (image.first.clone(), image.color_rgb9e5.clone()),
+        SampleImage::Depth(_) => panic!("an image of a cube"),
+    };
+    for camera in [around.into(), stand.cameras()[0]] {
+        let whole = light(&sampled(camera, Refinement::default()));
+        let errors: Vec<f32> = steps
+            .clone()
+            .map(|refinement| {
+                let (first, colors) = light(&sampled(camera, refinement));
+                assert_eq!(first, whole.0, "the same samples");
+                let squares = colors
+                    .iter()
+                    .zip(&whole.1)
+                    .map(|(&a, &b)| linear_from_rgb9e5(a).distance_squared(linear_from_rgb9e5(b)));
+                (squares.sum::<f32>() / colors.len() as f32).sqrt()
+            })
+            .collect();
+        println!("{} samples, errors by steps {errors:?}", whole.1.len());
+        assert!(whole.1.len() > 2_000 && errors[0] > 0.0 && errors[3] == 0.0, "{errors:?}");
+        assert!(errors.is_sorted_by(|a, b| a > b), "{errors:?}");
+    }
 }
