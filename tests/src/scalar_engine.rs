@@ -240,7 +240,6 @@ fn no_light(camera: &LightFieldCamera) -> LayeredLightField {
         first: vec![0; camera.line_count() + 1],
         planar_depth_m: Vec::new(),
         radiance_rgb9e5: Vec::new(),
-        truncated: false,
     }
 }
 

@@ -139,7 +139,7 @@ struct Counts {
 pub struct LayeredCounts {
     /// All samples of all lines.
     pub sample_count: u32,
-    /// Some line met more surfaces than it has samples.
+    /// Some line of a layered depth image met more surfaces than it has samples. Light fields do not say.
     pub truncated: bool,
 }
 

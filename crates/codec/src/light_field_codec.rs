@@ -21,7 +21,7 @@ pub fn encode_light_field(field: &LayeredLightField) -> Result<EncodedImage, Lay
         pack_depths(&gather(&field.planar_depth_m, &places), field.camera.range_m(), out);
     });
     packer.write(PlaneKind::ColorRgb9e5, |out| pack_colors(&gather(&field.radiance_rgb9e5, &places), out));
-    let counts = LayeredCounts { sample_count: places.len() as u32, truncated: field.truncated };
+    let counts = LayeredCounts { sample_count: places.len() as u32, truncated: false };
     Ok(encoded(packer, field.camera.size_px(), counts))
 }
 
@@ -38,6 +38,9 @@ pub fn decode_light_field(
 ) -> Result<LayeredLightField, DecodeError> {
     let PackedLines { first, places, truncated, planes, payload: mut packed } =
         unpack_lines(header, camera.size_px(), payload, limits)?;
+    if truncated {
+        return Err(DecodeError::Header { field: "layered.truncated", reason: "of layered depth images alone" });
+    }
     let [depths, colors] = planes else {
         return Err(DecodeError::Header { field: "planes.kind", reason: "not those of a light field" });
     };
@@ -49,7 +52,7 @@ pub fn decode_light_field(
     let mut input = &raw[..];
     let radiance_rgb9e5 = scatter(&unpack_colors(&mut input, places.len())?, &places);
     check_end(colors.kind, input)?;
-    let field = LayeredLightField { camera, first, planar_depth_m, radiance_rgb9e5, truncated };
+    let field = LayeredLightField { camera, first, planar_depth_m, radiance_rgb9e5 };
     field.validate().map_err(|_| DecodeError::Corrupt { field: "layer_depth", reason: "falls along a line" })?;
     Ok(field)
 }
@@ -75,7 +78,7 @@ mod tests {
             first.push(planar_depth_m.len() as u32);
         }
         let radiance_rgb9e5 = planar_depth_m.iter().map(|_| random.next_u32()).collect();
-        LayeredLightField { camera, first, planar_depth_m, radiance_rgb9e5, truncated: true }
+        LayeredLightField { camera, first, planar_depth_m, radiance_rgb9e5 }
     }
 
     #[test]
@@ -101,6 +104,7 @@ mod tests {
             decode(&other, &payload)
         };
         assert!(with(|header| header.layered = None).is_err());
+        assert!(with(|header| header.layered.as_mut().unwrap().truncated = true).is_err());
         assert!(with(|header| header.height += 1).is_err());
         assert!(with(|header| header.planes.swap(0, 1)).is_err());
         assert!(with(|header| header.planes.truncate(2)).is_err());

@@ -126,8 +126,6 @@ pub struct LayeredLightField {
     pub planar_depth_m: Vec<f32>,
     /// Radiance towards the direction, linear RGB9E5.
     pub radiance_rgb9e5: Vec<u32>,
-    /// Some line met more surfaces than [`crate::MAX_LAYERS`].
-    pub truncated: bool,
 }
 
 impl LayeredLightField {
@@ -218,7 +216,6 @@ mod tests {
             first: vec![0; lines + 1],
             planar_depth_m: Vec::new(),
             radiance_rgb9e5: Vec::new(),
-            truncated: false,
         };
         assert_eq!((image.validate(), lines), (Ok(()), 66 * 16 * 16));
         let short = LayeredLightField { radiance_rgb9e5: vec![0], ..image.clone() };

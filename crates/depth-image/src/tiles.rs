@@ -93,7 +93,6 @@ impl LayeredLightField {
             first: joined_lines(tiles.iter().map(|tile| &tile.first[..])),
             planar_depth_m: tiles.iter().flat_map(|tile| tile.planar_depth_m.iter().copied()).collect(),
             radiance_rgb9e5: tiles.iter().flat_map(|tile| tile.radiance_rgb9e5.iter().copied()).collect(),
-            truncated: tiles.iter().any(|tile| tile.truncated),
         })
     }
 }

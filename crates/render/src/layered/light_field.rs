@@ -27,23 +27,17 @@ pub(crate) fn draw(
     camera: &LightFieldCamera,
 ) -> Result<LayeredLightField, RenderError> {
     let mut first = vec![0];
-    let (mut planar_depth_m, mut truncated) = (Vec::new(), false);
+    let mut planar_depth_m = Vec::new();
     if work.highlight() != Some(Highlight::Ggx) || work.lighting.without_reflections().is_none() {
         first.resize(camera.line_count() + 1, 0);
-        return Ok(LayeredLightField {
-            camera: *camera,
-            first,
-            planar_depth_m,
-            radiance_rgb9e5: Vec::new(),
-            truncated,
-        });
+        return Ok(LayeredLightField { camera: *camera, first, planar_depth_m, radiance_rgb9e5: Vec::new() });
     }
     let mut light = RadianceWork::of(stages, work)?;
     let directions = camera.directions.all();
     for pair in directions.chunks(2).skip(camera.first_pair as usize).take(camera.pairs as usize) {
         let lines = camera.lines(pair[0].towards);
-        let (first_of_line, crossings, more) = crossings::met(stages, &work, &lines, LayerSelection::All)?;
-        truncated |= more;
+        // Of a line with more surfaces than an image holds the first ones count.
+        let (first_of_line, crossings, _) = crossings::met(stages, &work, &lines, LayerSelection::All)?;
         GpuError::check_limit("the samples of a light field", planar_depth_m.len() as u64, MOST_SAMPLES)?;
         for (is_opposite, direction) in [false, true].into_iter().zip(pair) {
             let pair = Pair { lines: &lines, first: &first_of_line, crossings: &crossings, is_opposite };
@@ -56,7 +50,7 @@ pub(crate) fn draw(
         }
     }
     let radiance_rgb9e5 = light.finish()?.into_iter().map(rgb9e5_from_linear).collect();
-    Ok(LayeredLightField { camera: *camera, first, planar_depth_m, radiance_rgb9e5, truncated })
+    Ok(LayeredLightField { camera: *camera, first, planar_depth_m, radiance_rgb9e5 })
 }
 
 /// The surfaces on the lines of two opposite directions, as one of the two counts them.
