@@ -61,8 +61,8 @@ pub struct SceneOffer {
     pub rig: Vec<Camera>,
     /// A layered depth cube of it, for sessions that are sampled so.
     pub cube: Option<OfferedCube>,
-    /// Its mirrors, and sample cameras for what they show, of sizes in proportion, for sessions that follow mirrors.
-    pub mirrors: Vec<(CommonCell, Vec<Camera>)>,
+    /// Its mirrors, for sessions that follow mirrors.
+    pub mirrors: Vec<OfferedMirror>,
     /// A layered depth cube of it, for what the images of a still scene leave unknown.
     pub base: Option<(CommonCell, CubeGrid)>,
     /// The rig's images get the size that suits the views of a session that names none.
@@ -83,6 +83,25 @@ pub struct SceneOffer {
     pub keeps_cameras: bool,
     /// Seconds after which a scene that moves is as at its start; `None` for one that never moves.
     pub period_s: Option<f64>,
+}
+
+/// A mirror of a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OfferedMirror {
+    /// Its box, and how its images are sampled.
+    pub cell: CommonCell,
+    /// Sample cameras for what it shows, of sizes in proportion.
+    pub cameras: Vec<Camera>,
+    /// The mean side of the images' texels where mirrored rays end, if a base may take the images' place.
+    pub texel_side_m: Option<f32>,
+}
+
+impl OfferedMirror {
+    /// Whether a base shows what rays end at as finely as images of so many texels together: it tells all ends, and costs no images.
+    pub(crate) fn gains_nothing_over(&self, spacing_m: f32, texels: f32) -> bool {
+        let own_texels: usize = self.cameras.iter().map(Camera::pixel_count).sum();
+        self.texel_side_m.is_some_and(|side_m| spacing_m <= side_m * (own_texels as f32 / texels).sqrt())
+    }
 }
 
 /// A way to sample a scene whose cameras depend on no viewer.

@@ -2,11 +2,11 @@
 
 use cluster::limits::{MAX_CELLS, MAX_TILES};
 use cluster::{CommonCell, DIRECT, SamplePlanes, SessionRequest, Workload};
-use depth_image::{Aabb, Camera, PinholeCamera, SampleCamera, ViewGroup};
+use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera, SampleCamera, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
 
-use crate::config::{OfferedCube, SceneOffer};
+use crate::config::{OfferedCube, OfferedMirror, SceneOffer};
 use crate::grpc_status::refusal;
 use crate::schedule::ChoiceError;
 
@@ -53,8 +53,10 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
         refinement_steps: request.refinement_steps,
     };
     let workload = if cells.is_empty() { workload } else { workload.with_view_cells(cells) };
-    let mirrors = mirrors_of(request, offer, &workload)?;
     let base = base_of(request, offer, &workload);
+    let spacing_m = base.as_ref().map(|(_, grid)| grid.spacing_m);
+    let mirrors = mirrors_of(request, offer, &workload, spacing_m)?;
+    let base = base.map(|(cell, grid)| (cell.clone(), grid.cameras().map(SampleCamera::from).to_vec()));
     Ok(workload.with_common_cells(mirrors.into_iter().chain(base).collect()))
 }
 
@@ -92,39 +94,44 @@ fn sample_cameras_of(
     cameras.iter().map(|camera| sized(camera).map(SampleCamera::Depth)).collect()
 }
 
-/// The scene's mirrors, where the session follows them, with images of about [`MIRROR_DENSITY`].
+/// The scene's mirrors, where the session follows them, with images of about [`MIRROR_DENSITY`]. Those whose images gain nothing over a
+/// base of this spacing have none.
 fn mirrors_of(
     request: &SessionRequest,
     offer: &SceneOffer,
     workload: &Workload,
+    base_spacing_m: Option<f32>,
 ) -> Result<Vec<(CommonCell, Vec<SampleCamera>)>, Status> {
     // In a cube mirrors show its own samples.
     if !request.follows_mirrors || request.method == DIRECT || workload.samples_cube() {
         return Ok(Vec::new());
     }
     let image_texels = workload.sample_cameras.first().map_or(1, SampleCamera::pixel_count);
-    let density = MIRROR_DENSITY.min(MIRRORS_DENSITY / offer.mirrors.len().max(1) as f32);
-    let sized = |(cell, cameras): &(CommonCell, Vec<Camera>)| {
-        let cameras = Camera::resized_together(cameras, image_texels as f32 * density, MAX_TILES);
+    let texels_of = |mirrors: usize| image_texels as f32 * MIRROR_DENSITY.min(MIRRORS_DENSITY / mirrors.max(1) as f32);
+    let texels = texels_of(offer.mirrors.len());
+    let gains =
+        |mirror: &&OfferedMirror| !base_spacing_m.is_some_and(|base_m| mirror.gains_nothing_over(base_m, texels));
+    let mirrors: Vec<&OfferedMirror> = offer.mirrors.iter().filter(gains).collect();
+    let sized = |mirror: &&OfferedMirror| {
+        let cameras = Camera::resized_together(&mirror.cameras, texels_of(mirrors.len()), MAX_TILES);
         let checked = |camera: Camera| {
             let usable = camera.validate().map(|()| SampleCamera::Depth(camera));
             usable.map_err(|error| Status::internal(format!("mirrors of scene {}: {error}", offer.name)))
         };
-        Ok((cell.clone(), cameras.into_iter().map(checked).collect::<Result<_, Status>>()?))
+        Ok((mirror.cell.clone(), cameras.into_iter().map(checked).collect::<Result<_, Status>>()?))
     };
-    offer.mirrors.iter().map(sized).collect()
+    mirrors.iter().map(sized).collect()
 }
 
 /// The scene's base, where the session is made from depth images of the whole scene that hold still.
-fn base_of(
+fn base_of<'o>(
     request: &SessionRequest,
-    offer: &SceneOffer,
+    offer: &'o SceneOffer,
     workload: &Workload,
-) -> Option<(CommonCell, Vec<SampleCamera>)> {
+) -> Option<&'o (CommonCell, CubeGrid)> {
     let is_suited = request.method != DIRECT && request.volume.is_none();
     let is_suited = is_suited && !workload.samples_cube() && !workload.timeline.moves();
-    let (cell, grid) = offer.base.as_ref().filter(|_| is_suited)?;
-    Some((cell.clone(), grid.cameras().map(SampleCamera::from).to_vec()))
+    offer.base.as_ref().filter(|_| is_suited)
 }
 
 /// The sample cameras of each view cell of the session's viewpoints, as if it were alone, in the size of the offered ones.
@@ -176,6 +183,21 @@ mod tests {
     fn camera(width: u32, height: u32) -> PinholeCamera {
         let size_px = UVec2::new(width, height);
         PinholeCamera::looking_at(glam::Vec3::Z, glam::Vec3::ZERO, glam::Vec3::Y, 0.8, size_px)
+    }
+
+    #[test]
+    fn a_base_takes_the_place_of_images_that_are_no_finer() {
+        let bounds = Aabb { min: glam::Vec3::NEG_ONE, max: glam::Vec3::ONE };
+        let cell = CommonCell { kind: cluster::CommonKind::Mirrors, bounds, sampling: "conventional".to_owned() };
+        let cameras = vec![Camera::Pinhole(camera(100, 100)); 4];
+        let mirror = OfferedMirror { cell, cameras, texel_side_m: Some(0.1) };
+        assert!(mirror.gains_nothing_over(0.1, 40_000.0) && !mirror.gains_nothing_over(0.101, 40_000.0));
+        assert!(mirror.gains_nothing_over(0.2, 10_000.0), "coarser images");
+        assert!(!mirror.gains_nothing_over(0.1, 160_000.0), "finer ones");
+        assert!(
+            !OfferedMirror { texel_side_m: None, ..mirror }.gains_nothing_over(0.0, 1.0),
+            "images that are asked for"
+        );
     }
 
     #[test]

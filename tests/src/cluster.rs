@@ -9,7 +9,7 @@ use cluster::{
     Assignment, BudgetRequest, CommonCell, CommonKind, OfferSettings, PolicyChoice, SceneHash, SessionRequest, Timeline,
 };
 use codec::{FrameAssembly, FramePart, WholeFrame};
-use coordinator::{CoordinatorConfig, Observers, OfferedCube, SceneOffer, SceneOffers};
+use coordinator::{CoordinatorConfig, Observers, OfferedCube, OfferedMirror, SceneOffer, SceneOffers};
 use depth_image::{Aabb, Camera, CubeGrid, Environment, LightDirections, LightFieldCamera, PinholeCamera, ViewPlanes};
 use glam::{DVec3, UVec2, Vec3};
 use node::{NodeConfig, NodeMetrics};
@@ -194,13 +194,14 @@ pub fn offer_with_light_field() -> SceneOffer {
 }
 
 /// Two mirrors, whose images show the ball in their middle.
-fn mirrors() -> Vec<(CommonCell, Vec<Camera>)> {
+fn mirrors() -> Vec<OfferedMirror> {
     let mirror = |x_m: f32| {
         let place = Vec3::new(x_m, 0.5, 2.0);
         let towards = Vec3::new(0.0, 0.6, 0.0);
         let camera = PinholeCamera::looking_at(place, towards, Vec3::Y, 0.6, UVec2::splat(16));
         let bounds = Aabb { min: place - 0.1, max: place + 0.1 };
-        (CommonCell { kind: CommonKind::Mirrors, bounds, sampling: "conventional".to_owned() }, vec![camera.into()])
+        let cell = CommonCell { kind: CommonKind::Mirrors, bounds, sampling: "conventional".to_owned() };
+        OfferedMirror { cell, cameras: vec![camera.into()], texel_side_m: None }
     };
     vec![mirror(-1.0), mirror(1.0)]
 }

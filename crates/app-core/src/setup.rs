@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use clap::Args;
 use cluster::{CommonCell, CommonKind, OfferSettings, SceneHash};
-use coordinator::{OfferedCube, SceneOffer};
+use coordinator::{OfferedCube, OfferedMirror, SceneOffer};
 use depth_image::{Camera, CubeGrid, PinholeCamera};
 use glam::UVec2;
 use gpu::DevicePreference;
@@ -84,7 +84,7 @@ pub struct SceneArgs {
     #[arg(long, value_name = "NAME")]
     pub base: Option<SamplingMethod>,
     /// Images of what mirrors show, for lighting with reflections: auto[:UNSEEN], as few as see all but UNSEEN percent
-    /// of mirrored rays all the way; pinhole[:N], N in the same order; single_pole[:N], 1 or 2 around the object that
+    /// of mirrored rays all the way, and none where --base shows as fine; pinhole[:N], N in the same order; single_pole[:N], 1 or 2 around the object that
     /// most rays meet; or none. Mirrors without images show what --base holds, or else the environment
     #[arg(long, default_value_t, value_name = "NAME")]
     pub impostors: Impostors,
@@ -123,7 +123,7 @@ impl Setup {
 }
 
 /// The scene's mirrors, as sessions follow them.
-fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<(CommonCell, Vec<Camera>)> {
+fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<OfferedMirror> {
     let (mirrors, beyond) = sampling::mirrors(scene, impostors);
     if beyond > 0 {
         tracing::info!(beyond, followed = mirrors.len(), "the smallest mirrors have no images of what they show");
@@ -137,6 +137,10 @@ fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<(CommonCell, Vec<Camer
                 candidate.unseen_ratio * 100.0
             );
         }
+        if let Some(side_m) = mirror.texel_side_m {
+            let texels: usize = mirror.cameras.iter().map(Camera::pixel_count).sum();
+            tracing::info!("of {texels} texels together, images resolve {side_m:.3} m where mirrored rays end");
+        }
         let images = mirror.cameras.len();
         let of = |ratio: f32| format!("{:.1} %", ratio * 100.0);
         match mirror.unseen_ratio.map(|ratios| ratios.map(of)) {
@@ -145,8 +149,12 @@ fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<(CommonCell, Vec<Camer
         }
     }
     let sampling = SamplingMethod::default().to_string();
-    let cell = |bounds| CommonCell { kind: CommonKind::Mirrors, bounds, sampling: sampling.clone() };
-    mirrors.into_iter().map(|mirror: Mirror| (cell(mirror.bounds), mirror.cameras)).collect()
+    let offered = |Mirror { bounds, cameras, texel_side_m, .. }| OfferedMirror {
+        cell: CommonCell { kind: CommonKind::Mirrors, bounds, sampling: sampling.clone() },
+        cameras,
+        texel_side_m,
+    };
+    mirrors.into_iter().map(offered).collect()
 }
 
 /// The name by which sessions ask for a scene: a built-in scene's own, or a file's without folder and ending.

@@ -194,6 +194,31 @@ fn a_base_shows_what_mirrors_without_images_show() {
     assert!(of_base.iter().zip(&mirrored).filter(|(base, mirrored)| **base && **mirrored).count() > 500);
 }
 
+/// Where its lines are as near to one another as texels of images are large, a base shows mirrors as well as they do, and far better
+/// than a coarser one.
+#[test]
+fn a_base_that_may_take_the_place_of_images_shows_mirrors_as_well() {
+    let stand = Stand::new();
+    let (truth, plain, set) = (stand.direct(LIGHTING), stand.direct("shadows"), stand.set(&[camera()], false));
+    let differs = |(a, b): (&[u8], &[u8])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 8);
+    let mirrored: Vec<bool> = truth.srgb8.chunks_exact(3).zip(plain.srgb8.chunks_exact(3)).map(differs).collect();
+    let error = |common| {
+        let view = stand.view(stand.engine.with_common(set.clone(), common).expect("a set").as_ref());
+        difference(&view, &truth, &mirrored)
+    };
+    let mirror = sampling::mirrors(&stand.scene, Impostors::default()).0.remove(0);
+    let texels = |cameras: &[Camera]| cameras.iter().map(Camera::pixel_count).sum::<usize>() as f32;
+    let cameras = Camera::resized_together(&mirror.cameras, 65_536.0, 16);
+    let side_m = mirror.texel_side_m.expect("rays choose") * (texels(&mirror.cameras) / texels(&cameras)).sqrt();
+    let images = error(vec![(cell(mirror.bounds), stand.set(&cameras, true))]);
+    let lines = stand.scene.bounds().size().max_element() / side_m;
+    let [fine, coarse] = [1.0, 0.25].map(|share| error(vec![stand.base((lines * share) as u32 + 2)]));
+    println!(
+        "{side_m:.3} m, {lines:.0} lines: {images:.2} codes by images, {fine:.2} by a base, {coarse:.2} by a coarser one"
+    );
+    assert!(fine < 1.1 * images && coarse > 2.0 * fine, "{images} {fine} {coarse}");
+}
+
 #[test]
 fn sets_of_other_devices_are_refused_as_mirrors() {
     let stand = Stand::new();

@@ -11,6 +11,7 @@ use crate::impostors::{ImageLimits, Models};
 use super::directions::{ASIDE, FACE_DEG, SIDE_PX, WIDE_DEG, looking};
 use super::groups::Group;
 use super::rays::{PLACES, Triangles, Way};
+use super::resolution::mean_side_m;
 use super::seen::{Images, Ways, seen_by, share_of_ways, strike};
 use super::single_pole;
 
@@ -34,6 +35,8 @@ pub(super) struct Choice {
     pub candidates: Vec<Candidate>,
     /// Of the rays by which they were chosen, and of as many others. `None` where rays did not choose.
     pub unseen_ratio: Option<[f32; 2]>,
+    /// Where rays end, of images that are not asked for by number.
+    pub texel_side_m: Option<f32>,
 }
 
 /// Images from which a choice is made, of equal texels together.
@@ -92,7 +95,9 @@ pub(super) fn choose(
     let mut of_fresh = vec![true; ways.fresh.len() * PLACES];
     chosen.cameras.iter().for_each(|camera| strike(&mut of_fresh, &seen_by(camera, &ways.fresh, triangles)));
     let unseen_ratio = Some([&chosen.unseen, &of_fresh].map(|unseen| share_of_ways(unseen)));
-    Choice { cameras: chosen.cameras.clone(), candidates, unseen_ratio }
+    let is_free = limits.models == Models::All;
+    let texel_side_m = is_free.then(|| mean_side_m(&chosen.cameras, &ways)).flatten();
+    Choice { cameras: chosen.cameras.clone(), candidates, unseen_ratio, texel_side_m }
 }
 
 fn mark(candidates: &mut [Candidate], chosen: &Images) {
@@ -142,7 +147,7 @@ struct Pool {
 impl Pool {
     fn usual(&self, most: usize) -> Choice {
         let cameras = self.usual.iter().take(most).map(|&camera| self.cameras[camera].into()).collect();
-        Choice { cameras, candidates: Vec::new(), unseen_ratio: None }
+        Choice { cameras, candidates: Vec::new(), unseen_ratio: None, texel_side_m: None }
     }
 
     /// As few images as the limits allow.

@@ -4,6 +4,7 @@ mod choice;
 mod directions;
 mod groups;
 mod rays;
+mod resolution;
 mod seen;
 mod single_pole;
 
@@ -35,6 +36,9 @@ pub struct Mirror {
     /// The shares of mirrored rays that images do not see all the way: of those by which the images were chosen, and of as many
     /// others. `None` where rays did not choose: the mirror moves, few eyes see it, or the scene has too many triangles.
     pub unseen_ratio: Option<[f32; 2]>,
+    /// The mean side of the images' texels where mirrored rays end at surfaces: a layered cube whose lines are nearer to one another than
+    /// that shows these as finely. `None` where images are asked for by number, and where rays did not choose.
+    pub texel_side_m: Option<f32>,
 }
 
 /// The mirrors of a scene with the images that are asked for, the largest first, at most [`MAX_MIRROR_CELLS`]; and the number of
@@ -53,10 +57,10 @@ pub fn mirrors(scene: &Scene, impostors: Impostors) -> (Vec<Mirror>, usize) {
     let triangles = stands.then(|| Triangles::of(scene, volume)).flatten();
     let mirror = |group: &Group| {
         let triangles = triangles.as_ref().filter(|_| !group.moves);
-        let Choice { cameras, candidates, unseen_ratio } =
+        let Choice { cameras, candidates, unseen_ratio, texel_side_m } =
             choose(group, triangles, limits, (volume.center(), volume.near_m()));
         let bounds = group.bounds.padded(group.bounds.size().length() * MARGIN);
-        Mirror { bounds, cameras, candidates, unseen_ratio }
+        Mirror { bounds, cameras, candidates, unseen_ratio, texel_side_m }
     };
     (groups.iter().map(mirror).collect(), beyond)
 }
@@ -218,6 +222,25 @@ mod tests {
             assert_eq!(mirror.cameras.len(), images);
             assert!(mirror.unseen_ratio.is_none_or(|[chosen, _]| chosen > 0.9), "{:?}", mirror.unseen_ratio);
         }
+    }
+
+    /// A flat mirror before a wall that is parallel to it: rays end where texels are as large as at the wall's distance, and larger aside.
+    #[test]
+    fn texels_are_as_large_as_where_rays_end() {
+        for name in ["teapot-mirror", "mirror-pair"] {
+            for mirror in mirrors(&scene(name)).0 {
+                let side_m = mirror.texel_side_m.expect("rays choose");
+                let texel_m = |camera: &Camera, way_m: f32| way_m / camera.reference().focal_px.x;
+                let size_m = scene(name).bounds().size().length();
+                let finest =
+                    mirror.cameras.iter().map(|camera| texel_m(camera, 0.02 * size_m)).fold(f32::MAX, f32::min);
+                let coarsest = mirror.cameras.iter().map(|camera| texel_m(camera, size_m)).fold(0.0, f32::max);
+                println!("{name}: texels of {side_m} m, from {finest} to {coarsest} m");
+                assert!(side_m > finest && side_m < coarsest, "{name}: {side_m}");
+            }
+        }
+        let asked_for = super::mirrors(&scene("teapot-mirror"), Impostors::Pinholes { images: 4 }).0.remove(0);
+        assert_eq!(asked_for.texel_side_m, None);
     }
 
     #[test]
