@@ -224,7 +224,7 @@ mod tests {
         }
     }
 
-    /// A flat mirror before a wall that is parallel to it: rays end where texels are as large as at the wall's distance, and larger aside.
+    /// Between those of what is close to a mirror and those of the far end of the scene.
     #[test]
     fn texels_are_as_large_as_where_rays_end() {
         for name in ["teapot-mirror", "mirror-pair"] {
