@@ -35,6 +35,5 @@ pub fn light_field(
         first,
         planar_depth_m: samples.iter().map(|lit| lit.t).collect(),
         radiance_rgb9e5: samples.iter().map(|lit| rgb9e5_from_linear(Vec3::splat(lit.light))).collect(),
-        truncated: false,
     }
 }

@@ -119,7 +119,7 @@ fn of_side(
     (held, seen, sent_b): (&mut Table, &mut Table, &mut Vec<f64>),
 ) -> anyhow::Result<Vec<Check>> {
     let (cube, mut checks) = match side == SIDES[1] {
-        true => cubes::measure(subject, side, held)?,
+        true => cubes::measure(subject, side, (held, &mut *seen))?,
         false => (subject.cube((side, render::LayerSelection::Dominant), subject.lighting, 1)?, Vec::new()),
     };
     if side == SIDES[1] {

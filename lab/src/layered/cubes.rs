@@ -40,12 +40,18 @@ pub fn table() -> Table {
     Table::new("Cubes: samples on the lines along three axes, and seconds", &columns)
 }
 
-/// A row of the table, and its checks. Gives the cube with the light of the study.
+/// A row of the table, one of views with all surfaces, and the checks. Gives the cube with the light of the study.
 ///
 /// # Errors
 /// The device fails.
-pub fn measure(subject: &Subject<'_>, side: u32, table: &mut Table) -> anyhow::Result<(Cube, Vec<Check>)> {
-    let all = subject.cube((side, LayerSelection::All), Lighting::UNLIT, 1)?;
+pub fn measure(
+    subject: &Subject<'_>,
+    side: u32,
+    (table, seen): (&mut Table, &mut Table),
+) -> anyhow::Result<(Cube, Vec<Check>)> {
+    let all = subject.cube((side, LayerSelection::All), subject.lighting, 1)?;
+    let by_all = views::of_cube(subject, &subject.upload(&all)?.0)?;
+    seen.push(by_all.row(subject.name, &format!("layered, {side}², all surfaces")))?;
     let layers = subject.cube((side, LayerSelection::Dominant), Lighting::UNLIT, TIMES)?;
     // The first use of a light builds shaders.
     let cube = subject.cube((side, LayerSelection::Dominant), subject.lighting, 2)?;
