@@ -107,20 +107,18 @@ fn mirrors_of(
         return Ok(Vec::new());
     }
     let image_texels = workload.sample_cameras.first().map_or(1, SampleCamera::pixel_count);
-    let texels_of = |mirrors: usize| image_texels as f32 * MIRROR_DENSITY.min(MIRRORS_DENSITY / mirrors.max(1) as f32);
-    let texels = texels_of(offer.mirrors.len());
+    let texels = image_texels as f32 * MIRROR_DENSITY.min(MIRRORS_DENSITY / offer.mirrors.len().max(1) as f32);
     let gains =
         |mirror: &&OfferedMirror| !base_spacing_m.is_some_and(|base_m| mirror.gains_nothing_over(base_m, texels));
-    let mirrors: Vec<&OfferedMirror> = offer.mirrors.iter().filter(gains).collect();
-    let sized = |mirror: &&OfferedMirror| {
-        let cameras = Camera::resized_together(&mirror.cameras, texels_of(mirrors.len()), MAX_TILES);
+    let sized = |mirror: &OfferedMirror| {
+        let cameras = Camera::resized_together(&mirror.cameras, texels, MAX_TILES);
         let checked = |camera: Camera| {
             let usable = camera.validate().map(|()| SampleCamera::Depth(camera));
             usable.map_err(|error| Status::internal(format!("mirrors of scene {}: {error}", offer.name)))
         };
         Ok((mirror.cell.clone(), cameras.into_iter().map(checked).collect::<Result<_, Status>>()?))
     };
-    mirrors.iter().map(sized).collect()
+    offer.mirrors.iter().filter(gains).map(sized).collect()
 }
 
 /// The scene's base, where the session is made from depth images of the whole scene that hold still.

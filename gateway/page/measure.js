@@ -24,8 +24,8 @@ function sourceOf({ point, source, cameras }) {
   if (!point || source === "nothing") return "nothing there";
   if (source === "direct") return "drawn directly";
   if (source === "filled") return "filled: no camera saw this";
-  if (source === "base") return cameras?.length ? "mirror: shows what the base holds" : "no camera saw this: from the base";
-  if (source === "guessed") return "mirror: no camera saw all that it shows";
+  if (source === "base") return cameras?.length ? "reflection: shows what the base holds" : "no camera saw this: from the base";
+  if (source === "guessed") return "reflection: no camera saw all that it shows";
   if (!cameras?.length) return "seen by the cameras";
   return `seen by camera${cameras.length > 1 ? "s" : ""} ${cameras.join(", ")}`;
 }

@@ -84,7 +84,7 @@ pub struct SceneArgs {
     #[arg(long, value_name = "NAME")]
     pub base: Option<SamplingMethod>,
     /// Images of what mirrors show, for lighting with reflections: auto[:UNSEEN], as few as see all but UNSEEN percent
-    /// of mirrored rays all the way, and none where --base shows as fine; pinhole[:N], N in the same order; single_pole[:N], 1 or 2 around the object that
+    /// of mirrored rays all the way, and none where --base shows their ends as finely as images would; pinhole[:N], N in the same order; single_pole[:N], 1 or 2 around the object that
     /// most rays meet; or none. Mirrors without images show what --base holds, or else the environment
     #[arg(long, default_value_t, value_name = "NAME")]
     pub impostors: Impostors,

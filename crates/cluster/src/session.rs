@@ -29,7 +29,8 @@ pub struct SessionRequest {
     pub sampling: String,
     /// How samples are lit.
     pub lighting: String,
-    /// Mirrors in reconstructed views show the scene, as the lighting says: samples have mirror cells.
+    /// Mirrors in reconstructed views show the scene, as the lighting says: samples have mirror cells, but for mirrors that a base shows as
+    /// finely. A base shows mirrors in any case.
     pub follows_mirrors: bool,
     /// How frames are encoded.
     pub codec: String,

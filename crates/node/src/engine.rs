@@ -82,8 +82,9 @@ pub trait Engine: Send + Sync + 'static {
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<SampleImage>, EngineError>;
     /// Uploads a set for reconstruction. Fails for images that the device cannot take.
     fn upload(&self, set: &SampleSet, turn: Turn) -> Result<SharedSet, EngineError>;
-    /// A set with those of common cells, which it keeps on the device: its mirrors show what the sets of mirrors hold, and a base tells
-    /// what its own images leave unknown. Mirrors of other sets show lamps and the environment.
+    /// A set with those of common cells, which it keeps on the device: its mirrors show what the sets of mirrors hold. A base tells
+    /// what its own images leave unknown, and what mirrors without such a set and rough surfaces show. Without both, mirrors show lamps and the
+    /// environment.
     fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError>;
     /// Reconstructs one view for each camera.
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError>;

@@ -58,7 +58,7 @@ impl Source {
             Self::Direct => ("drawn directly", [150, 150, 160]),
             Self::Base => ("from the base", [120, 90, 220]),
             Self::Fill => ("filled", [255, 60, 60]),
-            Self::Guess => ("mirror, guessed", [255, 60, 220]),
+            Self::Guess => ("reflection, guessed", [255, 60, 220]),
             Self::Background => ("background", [40, 44, 52]),
         }
     }

@@ -1,6 +1,6 @@
 //! The light that the samples of a set reflect towards a viewer, on the device.
 
-use depth_image::{DepthImage, Highlight, Illumination, LayeredDepthImage, SpecularPlanes};
+use depth_image::{DepthImage, Highlight, Illumination, LayeredDepthImage, ROUGHEST_MIRROR, SpecularPlanes};
 use gpu::{GpuError, Table, TablePool, Turn, illumination_bytes};
 use wgpu::{BufferUsages, TextureFormat};
 
@@ -15,6 +15,8 @@ pub(crate) struct Reflectors {
     pub highlight: Highlight,
     pub lights: usize,
     pub visibility_words: usize,
+    /// Some sample is smooth enough to mirror the scene.
+    pub has_mirrors: bool,
     pub samples: Table,
     pub illumination: wgpu::Buffer,
 }
@@ -51,6 +53,7 @@ impl Reflectors {
             highlight,
             lights: illumination.lights.len(),
             visibility_words,
+            has_mirrors: planes.iter().any(Planes::has_mirrors),
             samples: tables.upload("reflectors", TextureFormat::Rgba32Uint, &words, turn)?,
             illumination: gpu.buffer_with("illumination", &bytes, BufferUsages::UNIFORM),
         }))
@@ -99,7 +102,15 @@ impl<'i> Planes<'i> {
     }
 
     fn reflects(&self) -> bool {
-        self.specular.is_some_and(|planes| planes.reflectance_srgb8_roughness8.iter().any(|&word| word != 0))
+        self.has_sample(|word| word != 0)
+    }
+
+    fn has_mirrors(&self) -> bool {
+        self.has_sample(|word| word != 0 && ((word >> 24) as f32) < ROUGHEST_MIRROR * 255.0)
+    }
+
+    fn has_sample(&self, is_meant: impl Fn(u32) -> bool) -> bool {
+        self.specular.is_some_and(|planes| planes.reflectance_srgb8_roughness8.iter().any(|&word| is_meant(word)))
     }
 }
 

@@ -23,7 +23,7 @@ pub(crate) struct Specular {
     listed: bool,
     /// The words that say which lights a sample sees; 0 where all samples see all.
     visibility_words: usize,
-    /// Mirrors list their rays; the number of mirror cells.
+    /// Mirrors list their rays; the number of lists.
     mirror_cells: Option<usize>,
     /// Rough surfaces are listed, which are to send rays.
     lists_glossy: bool,

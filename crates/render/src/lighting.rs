@@ -20,7 +20,7 @@ pub struct Lighting {
     /// The mirrors that a ray meets, one after the other; without any, mirrors show lamps and the environment.
     pub reflections: Option<NonZeroU32>,
     /// Rays a pixel into the lobe of what it shows, as far as `reflections` does not follow its mirrored ray; without them rough
-    /// reflectors mirror the environment alone.
+    /// reflectors mirror the environment alone, but where a light field is gathered.
     pub glossy: Option<NonZeroU32>,
     /// The pixels that get rays of their own.
     pub rate: Rate,

@@ -33,7 +33,7 @@ struct Views {
 
 const ALL_MIRRORS: Mirrors<'_> = Mirrors { cells: &[], reflections: 7, glossy_rays: 0 };
 
-/// The floor of `teapot-floor` is gathered at once. By rays it has as small an error with 16 of them.
+/// The floor of `teapot-floor` is gathered at once.
 const SCENES: [Views; 3] = [
     Views {
         scene: mirrors::SCENE,

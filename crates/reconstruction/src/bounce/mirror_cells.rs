@@ -46,7 +46,8 @@ pub struct Mirrors<'s> {
 }
 
 impl<'s> Mirrors<'s> {
-    /// Without anything to follow in a set without mirrors. `cube` is the base, or the set itself where it is a cube.
+    /// Without rays off mirrors where nothing mirrors the scene, and without rays into lobes where nothing reflects. `cube` is the base, or
+    /// the set itself where it is a cube.
     pub(crate) fn checked_for(self, set: &SampleSet, cube: Option<&SampleSet>) -> Result<Self, ReconstructionError> {
         if self.cells.len() > MAX_MIRROR_CELLS {
             return Err(ReconstructionError::MirrorCells(self.cells.len()));
@@ -57,11 +58,13 @@ impl<'s> Mirrors<'s> {
         if self.cells.iter().any(|cell| cell.surroundings.cameras.is_empty()) {
             return Err(ReconstructionError::NoSamples { what: "a mirror cell".to_owned(), needed: "depth images" });
         }
-        let reflectors = set.reflectors.as_ref().or(cube.and_then(reflectors_of_cube));
-        let has_mirrors = reflectors.is_some_and(|of| of.highlight == Highlight::Ggx);
+        let all = [set.reflectors.as_ref(), cube.and_then(reflectors_of_cube)];
+        let reflecting: Vec<&Reflectors> =
+            all.into_iter().flatten().filter(|of| of.highlight == Highlight::Ggx).collect();
+        let off_mirrors = if reflecting.iter().any(|of| of.has_mirrors) { self } else { Self::default() };
         // Without a cube rough surfaces show no scene.
-        let glossy_rays = if cube.is_some() { self.glossy_rays } else { 0 };
-        Ok(if has_mirrors { Self { glossy_rays, ..self } } else { Self::default() })
+        let glossy_rays = if cube.is_some() && !reflecting.is_empty() { self.glossy_rays } else { 0 };
+        Ok(Self { glossy_rays, ..off_mirrors })
     }
 
     /// The rays off mirrors, and those into lobes where they are followed apart: beside images, and in the base alone.

@@ -1,4 +1,4 @@
-//! Mirror images of the scene: rays off the mirrors that a view shows are followed in images of the mirrors' surroundings,
+//! Mirror images of the scene: rays off the mirrors that a view shows are followed in images of the mirrors' surroundings or in a cube,
 //! mirror after mirror, and what they find is added to the pixels.
 
 mod curved_search;
@@ -104,7 +104,7 @@ pub(crate) struct RayLists {
 }
 
 impl<'s> Bounces<'s> {
-    /// Lends the memory for one ray a pixel. `None` without mirror cells.
+    /// Lends the memory for one ray a pixel. `None` where there is nothing to follow rays in.
     pub fn lend(
         device: &Device,
         mirrors: Mirrors<'s>,
@@ -119,7 +119,7 @@ impl<'s> Bounces<'s> {
         let most_rays = u64::from(limits.max_compute_workgroups_per_dimension) * u64::from(LIST_WORKGROUP);
         GpuError::check_limit("the mirrored rays of a batch", pixels as u64, most_rays)?;
         let volume_m3 = |cell: &MirrorCell<'_>| cell.bounds.size().element_product();
-        cells.sort_by(|a, b| volume_m3(a).total_cmp(&volume_m3(b)));
+        cells.sort_by(|a, b| a.is_cube().cmp(&b.is_cube()).then(volume_m3(a).total_cmp(&volume_m3(b))));
         let first_listed = |cell: usize| (cell * pixels) as u32;
         let mirror_box = |(number, cell): (usize, &MirrorCell<'_>)| GpuMirrorBox {
             min_in_world: cell.bounds.min.to_array(),
@@ -297,7 +297,7 @@ impl ShaderVariant for BounceMarch {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Land {
     set: SetVariant,
-    /// Mirrors among the ends of rays list the next rays; the number of mirror cells.
+    /// Mirrors among the ends of rays list the next rays; the number of lists.
     next_cells: Option<usize>,
     /// The cell's images have reflectors.
     reflects: bool,
@@ -356,10 +356,10 @@ impl ShaderVariant for Land {
 /// The rays of a list that are walked in a base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum InBase {
-    /// Those of mirrors in no mirror cell.
-    All,
+    /// All: those of mirrors in no mirror cell.
+    WholeList,
     /// Those whose ends the images of their mirror cell leave unknown.
-    Left,
+    LeftByImages,
 }
 
 /// Records the passes over the rays that the view's mirrors have listed, mirror after mirror. `walk` follows rays in the base, where
@@ -382,11 +382,11 @@ pub(crate) fn record(
         for (number, cell) in bounces.cells.iter().enumerate() {
             let (rays, place) = ((&lists, next.as_ref()), (number, reflection));
             if cell.is_cube() {
-                walk(recording, InBase::All, rays, place)?;
+                walk(recording, InBase::WholeList, rays, place)?;
                 continue;
             }
             follow(recording, bounces, &lists, place)?;
-            walk(recording, InBase::Left, rays, place)?;
+            walk(recording, InBase::LeftByImages, rays, place)?;
             land(recording, bounces, rays, place)?;
         }
         listed = next;

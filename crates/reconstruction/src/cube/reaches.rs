@@ -1,7 +1,6 @@
 //! How far rays skip through empty cells, by the octant of their direction.
 
 use glam::UVec3;
-use rayon::prelude::*;
 
 /// Octants of directions. A bit for each axis says whether a ray rises along it.
 const OCTANTS: usize = 8;
@@ -13,9 +12,15 @@ const FARTHEST: u8 = (1 << BITS) - 1;
 /// A word for each cell that is not `occupied`. For each octant it has the side of the largest cube of empty cells that begins with this cell
 /// and lies ahead of a ray, at least 1 and at most [`FARTHEST`]; what is outside of the grid is empty. The words of occupied cells are 0.
 pub(super) fn reaches(size: UVec3, occupied: &[bool]) -> Vec<u32> {
-    let octants: Vec<Vec<u8>> = (0..OCTANTS).into_par_iter().map(|octant| in_octant(size, occupied, octant)).collect();
-    let word = |cell: usize| (0..OCTANTS).map(|octant| u32::from(octants[octant][cell]) << (BITS * octant)).sum();
-    (0..occupied.len()).into_par_iter().map(word).collect()
+    let mut words = vec![0; occupied.len()];
+    for octant in 0..OCTANTS {
+        let own = in_octant(size, occupied, octant);
+        words
+            .iter_mut()
+            .zip(own)
+            .for_each(|(word, reach): (&mut u32, u8)| *word |= u32::from(reach) << (BITS * octant));
+    }
+    words
 }
 
 /// A cube reaches one cell farther than the least of those that begin at the seven cells ahead.

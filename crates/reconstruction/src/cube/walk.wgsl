@@ -89,7 +89,8 @@ fn mask_ahead(within: vec3u, rises: vec3<bool>) -> vec2u {
     let rows = select(0x1111u >> (12u - 4u * within.y), (0x1111u << (4u * within.y)) & 0xffffu, rises.y);
     let layers = select(15u >> (3u - within.z), (15u << within.z) & 15u, rises.z);
     let layer = columns * rows;
-    return vec2u(layer * (layers & 1u) | (layer * (layers >> 1u & 1u)) << 16u, layer * (layers >> 2u & 1u) | (layer * (layers >> 3u)) << 16u);
+    let in_layers = vec4u(layer) * ((vec4u(layers) >> vec4u(0u, 1u, 2u, 3u)) & vec4u(1u));
+    return in_layers.xz | (in_layers.yw << vec2u(16u));
 }
 
 // The nearest surface on a ray, from `near` on.

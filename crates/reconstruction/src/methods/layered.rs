@@ -284,8 +284,8 @@ pub(crate) fn follow_in_base(
     place: (usize, u32),
 ) -> Result<(), ReconstructionError> {
     let rays = match which {
-        InBase::All => Walked::Bounced,
-        InBase::Left => Walked::LeftBounced,
+        InBase::WholeList => Walked::Bounced,
+        InBase::LeftByImages => Walked::LeftBounced,
     };
     follow(recording, (base, rays, Ends::default()), bounces, lists, place)
 }

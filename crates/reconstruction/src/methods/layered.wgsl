@@ -1,5 +1,6 @@
 // Rays through a layered depth cube: the nearest surface that its samples describe, and the light that it sends to the ray. Rays are
-// those of a view, or those off the mirrors that a view shows; where the cube is a base, those alone that images leave unknown.
+// those of a view, or those off the mirrors and into the lobes that a view shows. Where the cube is a base they are those of pixels and mirrored
+// rays that images leave unknown, of mirrors that have no images, and of lobes.
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
 {%- if reflects or bounced %}

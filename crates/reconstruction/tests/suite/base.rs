@@ -148,6 +148,19 @@ fn rough_surfaces_of_images_show_what_a_base_holds() {
 }
 
 #[test]
+fn a_scene_without_mirrors_looks_the_same_whether_reflections_are_followed_or_not() {
+    let floor = GlossyFloor::new();
+    let (set, base) = (set_of(&floor.stage), floor.stage.set(None));
+    let planes = ViewPlanes { antialias: Antialias::of(4).expect("offered"), ..ViewPlanes::ALL };
+    let [followed, plain] = [3, 0].map(|reflections| {
+        let shared = CommonSets { mirrors: Mirrors { reflections, ..Mirrors::default() }, base: Some(&base) };
+        let cameras = [floor.stage.camera];
+        reconstructor().reconstruct_with(&set, shared, &cameras, CARVE, planes, Turn::default()).expect("a view")
+    });
+    assert!(followed == plain);
+}
+
+#[test]
 fn rays_into_lobes_that_a_truncated_base_does_not_hold_are_guessed() {
     let floor = GlossyFloor::new();
     let mut images = floor.stage.images();
