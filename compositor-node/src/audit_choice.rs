@@ -108,6 +108,10 @@ impl AuditChoice {
     pub(crate) fn end(&mut self, now: Instant, ended: Ended, share: f64) {
         let Ended { kind, busy_s, wall_s, random } = ended;
         self.is_auditing = false;
+        // A viewer who stays where an audit has failed is audited there once more.
+        if busy_s.is_none() {
+            self.audited.pop_back();
+        }
         let is_first = !self.kinds.contains(&kind);
         let pause = match busy_s {
             None => random_pause(wall_s, share, random).max(FAILED_PAUSE),
@@ -193,6 +197,18 @@ mod tests {
         choice.end(at, ended(None, 0), 0.01);
         let other_method = (1, "splat".to_owned());
         assert_eq!(choice.choose(at + FAILED_PAUSE, &other_method, &other_set, 1e-3), Some(0), "other views");
+    }
+
+    #[test]
+    fn a_place_is_audited_again_if_its_audit_has_failed() {
+        let (mut choice, mut now) = (AuditChoice::default(), Instant::now());
+        let views = [view(1, 0.0, 1)];
+        for busy_s in [None, None, Some(0.01)] {
+            assert_eq!(choice.choose(now, &kind(), &views, 1e-3), Some(0), "{busy_s:?}");
+            choice.end(now, ended(busy_s, 0), 0.5);
+            now += FAILED_PAUSE + FIRST_PAUSE;
+        }
+        assert_eq!(choice.choose(now, &kind(), &views, 1e-3), None, "it has been audited");
     }
 
     #[test]
