@@ -97,7 +97,8 @@ pub struct OfferedMirror {
 }
 
 impl OfferedMirror {
-    /// Whether a base shows what rays end at as finely as images of so many texels together: it tells all ends, and costs no images.
+    /// Whether the images, with `texels` in all, resolve the ends of rays no finer than a base of this spacing. The base knows every end and
+    /// needs no images.
     pub(crate) fn gains_nothing_over(&self, spacing_m: f32, texels: f32) -> bool {
         let own_texels: usize = self.cameras.iter().map(Camera::pixel_count).sum();
         self.texel_side_m.is_some_and(|side_m| spacing_m <= side_m * (own_texels as f32 / texels).sqrt())

@@ -17,7 +17,7 @@ const VOXEL: f32 = 2.0;
 /// Samples reach a little over the middle between two lines, in spacings: no ray passes between two squares.
 pub(crate) const SQUARE_REACH: f32 = 0.55;
 /// Of an entry that is the first of its leaf: more than one other follows.
-const MORE: u32 = 1 << 31;
+pub(crate) const MORE_ENTRIES: u32 = 1 << 31;
 
 /// The tables of `cube/walk.wgsl`.
 pub(super) struct Bricks {
@@ -81,7 +81,7 @@ impl Bricks {
         let [sample, place] = passages[0].words;
         let first = self.entries.len() as u32;
         self.entries.extend(passages[1..].chunks(2).map(pair));
-        [sample | MORE, place, first, self.entries.len() as u32]
+        [sample | MORE_ENTRIES, place, first, self.entries.len() as u32]
     }
 }
 

@@ -14,7 +14,7 @@ use wgpu::{BufferUsages, TextureFormat};
 
 #[cfg(feature = "scalar")]
 pub(crate) use bricks::LEAST_NORMAL_ALONG_LINE;
-pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, SQUARE_REACH};
+pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, MORE_ENTRIES, SQUARE_REACH};
 #[cfg(any(test, feature = "scalar"))]
 pub(crate) use light_field::GpuLightField;
 #[cfg(feature = "scalar")]

@@ -24,11 +24,10 @@ struct Cube {
 @group(0) var cube_bricks: texture_2d<u32>;
 // A leaf's two entries of two words each: a sample's number, with a bit for each coordinate of its line among the voxel's four lines
 // along an axis, and for the axis itself whether the next sample is the surface's other side; and its normal, its depth along the axis, and the
-// axis in the highest two bits. With the highest bit of the first word, a first entry, and the places of the first pair of others and of the
+// axis in the highest two bits. With `MORE_ENTRIES` in the first word, a first entry, and the places of the first pair of others and of the
 // one after their last.
 @group(0) var cube_leaves: texture_2d<u32>;
 const NO_ENTRY: u32 = 0xffffffffu;
-const MORE_ENTRIES: u32 = 0x80000000u;
 // Two entries a texel.
 @group(0) var cube_entries: texture_2d<u32>;
 
