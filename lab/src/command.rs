@@ -5,10 +5,10 @@ use clap::Subcommand;
 
 use crate::bench::{self, BenchArgs};
 use crate::compare::command::{self as compare, CompareArgs};
-use crate::demo::{self, DemoArgs};
 use crate::failures::command::{self as failures, FailuresArgs};
 use crate::fronts::command::{self as fronts, FrontsArgs};
 use crate::impostors::command::{self as impostors, ImpostorsArgs};
+use crate::lages::{self, LagesArgs};
 use crate::layered::command::{self as layered, LayeredArgs};
 use crate::placement::command::{self as placement, PlacementArgs};
 use crate::planner_study::command::{self as planner_study, PlannerArgs};
@@ -19,8 +19,6 @@ use crate::view_errors::{self, ErrorsArgs};
 /// A subcommand that measures.
 #[derive(Debug, Subcommand)]
 pub enum LabCommand {
-    /// Runs the paper's experiment on this machine and writes a report
-    Demo(DemoArgs),
     /// Measures speed and accuracy against bars and writes a report
     Bench(BenchArgs),
     /// Repeats the experiments of a paper, or draws how methods fail, and writes a report
@@ -31,6 +29,8 @@ pub enum LabCommand {
 /// A study.
 #[derive(Debug, Subcommand)]
 pub enum StudyCommand {
+    /// Repeats the experiment of Lages et al.: total time against the number of views, the time of each stage, and K
+    Lages(LagesArgs),
     /// Measures how well methods sample four kinds of scene: Tables 1 and 2, Fig. 6 and 7 of Xie et al., and more
     Sampling(SamplingArgs),
     /// Draws how methods fail, as curves, and checks their shapes
@@ -70,8 +70,8 @@ impl LabCommand {
     /// Input that cannot be used, or a failure of the device, the cluster or the report's folder.
     pub fn run(&self) -> anyhow::Result<Outcome> {
         match self {
-            Self::Demo(args) => demo::run(args),
             Self::Bench(args) => bench::run(args),
+            Self::Study(StudyCommand::Lages(args)) => lages::run(args),
             Self::Study(StudyCommand::Sampling(args)) => sampling::run(args),
             Self::Study(StudyCommand::Failures(args)) => failures::run(args),
             Self::Study(StudyCommand::Fronts(args)) => fronts::run(args),

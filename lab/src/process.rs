@@ -1,11 +1,13 @@
-//! Processes of this program: a coordinator or a node of its own, for benches.
+//! Processes of the program `myriorama`: a coordinator or a node of its own, for benches.
 
 use std::io::{BufRead as _, BufReader};
+use std::path::PathBuf;
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use app_core::exit::BadInput;
 use gpu::DevicePreference;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
@@ -13,7 +15,20 @@ use tokio::net::TcpStream;
 /// The longest time until a process serves: a scene is made, or a device found.
 const START: Duration = Duration::from_secs(300);
 
-/// A process of this program, which is killed when dropped.
+/// The program `myriorama`, which lies beside this one.
+///
+/// # Errors
+/// It has not been built.
+pub fn product() -> anyhow::Result<PathBuf> {
+    let own = std::env::current_exe().context("this program's file is not known")?;
+    let product = own.with_file_name("myriorama");
+    if !product.is_file() {
+        return Err(BadInput(format!("{} is missing: `make lab` builds it", product.display())).into());
+    }
+    Ok(product)
+}
+
+/// A process of the product, which is killed when dropped.
 #[derive(Debug)]
 pub struct Process {
     name: String,
@@ -30,8 +45,7 @@ impl Drop for Process {
 impl Process {
     /// Starts a process with arguments as on the command line.
     fn start(name: &str, arguments: &[String]) -> anyhow::Result<Self> {
-        let program = std::env::current_exe().context("this program's file is not known")?;
-        let mut command = Command::new(program);
+        let mut command = Command::new(product()?);
         command.args(arguments).stdin(Stdio::null()).stdout(Stdio::piped());
         let mut child = command.spawn().with_context(|| format!("cannot start {name}"))?;
         let output = child.stdout.take().context("a process without output")?;

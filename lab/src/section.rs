@@ -3,10 +3,9 @@
 use std::path::Path;
 
 use app_core::exit::Outcome;
+use app_core::progress::bar;
 use clap::ValueEnum;
-use study::{Bar, Check, Report, Table};
-
-use crate::progress::bar;
+use report::{Bar, Check, Report, Table};
 
 /// The result of a part.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -1,7 +1,7 @@
 //! Time against error: settings of light field search and joint carve on one scene.
 
 use reconstruction::ReconstructionMethod;
-use study::{Axis, Better, Cell, Point, ReportError, Series, Table, XyChart};
+use report::{Axis, Better, Cell, Point, ReportError, Series, Table, XyChart};
 
 use crate::evaluation::Evaluation;
 use crate::reference_views::ReferenceViews;

@@ -1,21 +1,21 @@
-//! `myriorama study errors`: errors of many random views, the data on which bounds and audits are tested.
+//! `myriorama-lab study errors`: errors of many random views, the data on which bounds and audits are tested.
 
 use std::path::PathBuf;
 
 use anyhow::Context as _;
 use app_core::exit::Outcome;
+use app_core::progress::bar;
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use depth_image::Antialias;
 use engine::GpuEngine;
 use planner::{ProbeView, ViewErrors};
 use probe::Light;
-use study::{Cell, Table};
+use report::{Cell, Table};
 
 use crate::fronts::conditions::{self, Conditions};
 use crate::fronts::row::default_place;
 use crate::fronts::subject::Subject;
-use crate::progress::bar;
 use crate::statistics::mean_and_variation;
 
 /// Sample cameras of the rows that are measured: in the middle, and at the corners.
@@ -28,15 +28,15 @@ const PLACES: i32 = 4;
 /// Measures FLIP of random views by the default methods, with one and with four sample cameras, and writes them as CSV.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  myriorama study errors --subject poles --views 100
-  myriorama study errors --conditions crates/planner/tests/data/subjects.toml   the data of the planner's tests")]
+  myriorama-lab study errors --subject poles --views 100
+  myriorama-lab study errors --conditions crates/planner/tests/data/subjects.toml   the data of the planner's tests")]
 pub struct ErrorsArgs {
     #[command(flatten)]
     device: DeviceArgs,
     /// The CSV file
     #[arg(long, default_value = "out/study/view_errors.csv", value_name = "FILE")]
     out: PathBuf,
-    /// Subjects from a file in the form of study/conditions.toml, in place of its own
+    /// Subjects from a file in the form of lab/conditions.toml, in place of its own
     #[arg(long, value_name = "FILE")]
     conditions: Option<PathBuf>,
     /// Only subjects whose names contain this text, in any case

@@ -6,7 +6,7 @@ use app_core::exit::Outcome;
 use app_core::process::runtime;
 use clap::{Parser, Subcommand};
 
-use crate::commands::{coordinator, gateway, health, node, plan, replay, status, up, view};
+use crate::commands::{coordinator, demo, gateway, health, node, plan, replay, status, up, view};
 
 /// Many views of one scene from a few depth images.
 ///
@@ -26,7 +26,7 @@ const MEASURED_TO_END: Duration = Duration::from_secs(5);
 
 const EXAMPLES: &str = "\
 Examples:
-  myriorama demo                                      the paper's experiment on this machine: out/demo/index.html
+  myriorama demo                                      a cluster beside direct drawing: out/demo/index.html
   myriorama demo --scene helmet.gltf                  the same for your own model
   myriorama up --scene helmet.gltf                    a whole cluster in this process, on 127.0.0.1:7420
   myriorama view --orbit 24 --out out/orbit           24 views from it, as PNG
@@ -61,10 +61,8 @@ pub enum Command {
     Replay(replay::ReplayArgs),
     /// Asks a coordinator or a node whether it serves
     Health(health::HealthArgs),
-    /// Subcommands that measure
-    #[cfg(feature = "lab")]
-    #[command(flatten)]
-    Lab(lab::LabCommand),
+    /// Shows what a cluster gains on one scene, and writes a page with pictures
+    Demo(demo::DemoArgs),
 }
 
 impl Command {
@@ -84,8 +82,7 @@ impl Command {
             Self::Status(args) => runtime()?.block_on(status::run(&args)),
             Self::Replay(args) => replay::run(&args),
             Self::Health(args) => runtime()?.block_on(health::run(&args)),
-            #[cfg(feature = "lab")]
-            Self::Lab(command) => command.run(),
+            Self::Demo(args) => demo::run(&args),
         }
     }
 }

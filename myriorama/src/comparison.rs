@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use depth_image::View;
 use image::ImageReader;
 use metrics::{PictureErrors, Rgb8Image};
-use table::{Cell, Table};
+use report::{Cell, Table};
 
 /// Errors over the foreground, then over the whole picture.
 pub type Row = [f64; 6];

@@ -1,5 +1,4 @@
-//! The program `myriorama`: a whole cluster, a part of one, or its client. With the feature `lab` it also measures
-//! itself.
+//! The program `myriorama`: a whole cluster, a part of one, or its client.
 //!
 //! Each of [`commands`] is one subcommand of [`cli`].
 #![cfg_attr(test, allow(clippy::unwrap_used))]

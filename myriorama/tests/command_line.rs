@@ -17,8 +17,7 @@ fn help_teaches_every_command() {
     let help = myriorama(&["--help"]);
     let text = String::from_utf8_lossy(&help.stdout).into_owned();
     assert!(help.status.success());
-    let lab: &[&str] = if cfg!(feature = "lab") { &["demo", "bench", "study"] } else { &[] };
-    for command in ["up", "coordinator", "node", "view", "plan", "status", "health", "replay"].iter().chain(lab) {
+    for command in ["demo", "up", "coordinator", "node", "view", "plan", "status", "health", "replay"] {
         assert!(text.contains(&format!("\n  {command} ")), "{command} in {text}");
         assert!(myriorama(&[command, "--help"]).status.success(), "{command} --help");
     }
@@ -36,7 +35,7 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
     let (broken, cameras) = (broken.to_str().unwrap(), cameras.to_str().unwrap());
     let folder = folder.path().to_str().unwrap();
     let many = vec!["flip 0.1"; 200].join(", ");
-    let cases: [(&[&str], &str); 20] = [
+    let cases: [(&[&str], &str); 21] = [
         (&["plan", "--scene", "quad"], "--budget"),
         (&["plan", "--scene", "quad", "--budget", "blur 3"], "blur"),
         (&["plan", "--scene", "quad", "--budget", "flip NaN"], "flip NaN"),
@@ -45,6 +44,7 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
         (&["plan", "--scene", "quad", "--budget", "flip 0.1", "--rate", "0"], "0.01 to 1000"),
         (&["plan", "--scene", broken, "--budget", "flip 0.1"], "broken.glb"),
         (&["up", "--scene", broken], "broken.glb"),
+        (&["demo", "--scene", "/nowhere/absent.glb"], "absent.glb"),
         (&["coordinator", "--scene", broken], "broken.glb"),
         (&["coordinator", "--scene", "quad", "--scene", "quad"], "scene quad is given twice"),
         (&["view", "--cameras", cameras, "--out", folder], "would be written over it"),
@@ -65,20 +65,23 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
     }
 }
 
-#[cfg(feature = "lab")]
 #[test]
-fn input_of_the_lab_that_cannot_be_used_is_named_with_status_2() {
-    assert!(myriorama(&["bench", "scaling", "--help"]).status.success(), "bench scaling --help");
-    let cases: [(&[&str], &str); 4] = [
-        (&["study", "fronts", "--subject", "nowhere"], "nowhere"),
-        (&["study", "fronts", "--conditions", "/nowhere/absent.toml"], "absent.toml"),
-        (&["bench", "scaling", "--quota", "0"], "0.01 to 64"),
-        (&["demo", "--scene", "/nowhere/absent.glb"], "absent.glb"),
-    ];
-    for (arguments, named) in cases {
-        let (status, message) = status_and_message(&myriorama(arguments));
-        assert_eq!(status, Some(2), "{arguments:?}: {message}");
-        assert!(message.contains(named), "{arguments:?}: {message}");
+fn the_demo_writes_a_page_whose_checks_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let demo = myriorama(&["demo", "--scene", "blocks", "--quick", "--nodes", "2", "--strict", "--out", out]);
+    let (status, message) = status_and_message(&demo);
+    assert_eq!(status, Some(0), "{message}");
+    for file in ["first-page.png", "index.html", "report.json", "what-sharing-gains.csv", "pictures/first-page.png"] {
+        assert!(folder.path().join(file).is_file(), "{file} is missing");
+    }
+    let gains = std::fs::read_to_string(folder.path().join("what-sharing-gains.csv")).unwrap();
+    let rows: Vec<_> = gains.lines().skip(1).map(|row| row.split(',').collect::<Vec<_>>()).collect();
+    assert_eq!(rows.len(), 2, "expensive and plain light: {gains}");
+    for row in rows {
+        // The light, "soft 16, occlusion 16", has a comma.
+        let foreground_psnr_db: f64 = row[row.len() - 3].parse().unwrap();
+        assert!(foreground_psnr_db > 20.0, "{gains}");
     }
 }
 

@@ -36,8 +36,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("browser", &[]),
     ("network-proxy", &[]),
     ("simulation", &["client", "coordinator", "cluster", "depth-image"]),
-    ("table", &[]),
-    ("study", &["metrics", "pictures", "table"]),
+    ("report", &["metrics", "pictures"]),
     ("probe", &["planner", "metrics", "node", "cluster", "codec", "depth-image"]),
     ("engine", &["node", "reconstruction", "sampling", "render", "gpu", "scene", "cluster", "depth-image"]),
     (
@@ -48,6 +47,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "codec",
             "coordinator",
             "depth-image",
+            "engine",
             "gpu",
             "node",
             "node-host",
@@ -56,9 +56,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "probe",
             "reconstruction",
             "render",
+            "report",
             "sampling",
             "scene",
-            "table",
         ],
     ),
     (
@@ -81,10 +81,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "probe",
             "reconstruction",
             "render",
+            "report",
             "sampling",
             "scene",
             "simulation",
-            "study",
             "wire",
         ],
     ),
@@ -99,7 +99,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "depth-image",
             "engine",
             "gateway",
-            "lab",
             "metrics",
             "node",
             "node-host",
@@ -108,7 +107,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "probe",
             "reconstruction",
             "render",
-            "table",
+            "report",
+            "sampling",
+            "scene",
             "wire",
         ],
     ),
@@ -140,8 +141,8 @@ const MESSAGES: [&str; 5] = ["prost", "prost-types", "prost-build", "tonic-prost
 /// Crates that a thin client must not link.
 const DEVICE: [&str; 5] = ["wgpu", "wgpu-core", "wgpu-hal", "naga", "ash"];
 
-/// Crates that a program without its lab must not link: measurements, and the charts of their reports.
-const LAB: [&str; 6] = ["browser", "lab", "plotters", "simulation", "study", "thirtyfour"];
+/// Crates of the laboratory, which the program must not link.
+const LAB: [&str; 5] = ["browser", "lab", "network-proxy", "simulation", "thirtyfour"];
 
 /// Text of code that a decision may not depend on.
 const IMPURE: [&str; 8] =
@@ -342,20 +343,39 @@ fn services_see_the_device_through_the_engine_only() {
     }
 }
 
-/// The packages of a program without its optional ones.
-fn thin_closure(of: &str, uses: &BTreeMap<String, BTreeSet<String>>) -> BTreeSet<String> {
-    let packages = graph().workspace_packages();
-    let program = packages.iter().find(|package| package.name.as_str() == of).expect("the program");
-    let kept = program.dependencies.iter().filter(|used| used.kind == DependencyKind::Normal && !used.optional);
-    kept.flat_map(|used| closure(&used.name, uses)).collect()
+#[test]
+fn the_program_links_no_laboratory() {
+    let uses = resolved();
+    let lab_crates = |of: &str| {
+        let linked = closure(of, &uses);
+        LAB.into_iter().filter(|name| linked.contains(*name)).collect::<Vec<_>>()
+    };
+    assert_eq!(lab_crates("myriorama"), Vec::<&str>::new());
+    assert_eq!(lab_crates("lab"), LAB, "the check sees the laboratory where it is");
+}
+
+/// The packages of a selection with their versions and features.
+fn features(selection: &[&str]) -> BTreeSet<String> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut tree = Command::new(cargo);
+    tree.current_dir(root()).args(["tree", "--offline", "--prefix", "none", "--no-dedupe", "--format", "{p} {f}"]);
+    let output = tree.args(selection).output().expect("cargo tree runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text").lines().map(str::to_owned).collect()
 }
 
 #[test]
-fn a_thin_program_measures_nothing() {
-    let uses = resolved();
-    let lab = |of: &BTreeSet<String>| LAB.into_iter().filter(|name| of.contains(*name)).collect::<Vec<_>>();
-    assert_eq!(lab(&thin_closure("myriorama", &uses)), Vec::<&str>::new());
-    assert_eq!(lab(&closure("myriorama", &uses)), LAB, "the check sees the lab where it is");
+fn programs_and_tests_share_one_build_of_every_crate() {
+    let all = features(&["--workspace", "--edges", "normal,build,dev"]);
+    let of_programs = features(&["--package", "myriorama", "--package", "lab", "--edges", "normal,build"]);
+    for package in ["myriorama", "lab"] {
+        let program = features(&["--package", package, "--edges", "normal,build"]);
+        assert!(program.iter().any(|line| line.starts_with("wgpu v")), "the tree was read");
+        assert_eq!(program.difference(&all).collect::<Vec<_>>(), Vec::<&String>::new(), "{package}");
+        assert_eq!(program.difference(&of_programs).collect::<Vec<_>>(), Vec::<&String>::new(), "{package}");
+    }
+    let client = features(&["--package", "client", "--edges", "normal,build"]);
+    assert!(client.difference(&all).count() > 0, "a client alone has fewer features");
 }
 
 #[test]

@@ -40,13 +40,19 @@ fn is_bad_input(error: &(dyn std::error::Error + 'static)) -> bool {
         || error.is::<CameraFileError>()
 }
 
-/// Prints the error on standard error, and returns the exit status: 0 done, 1 a check fell short, 2 input that cannot be
+/// Prints the error of `program` on standard error, and returns the exit status: 0 done, 1 a check fell short, 2 input that cannot be
 /// used, 3 a failure at run time, 130 ended by a signal.
 #[must_use]
-pub fn report(result: &anyhow::Result<Outcome>) -> ExitCode {
+pub fn report(program: &str, result: &anyhow::Result<Outcome>) -> ExitCode {
     if let Err(error) = result {
-        eprintln!("myriorama: {error:#}");
+        eprintln!("{program}: {error:#}");
     }
+    status(result).into()
+}
+
+/// The exit status of a result.
+#[must_use]
+pub fn status(result: &anyhow::Result<Outcome>) -> u8 {
     match result {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::FellShort) => 1,
@@ -54,5 +60,4 @@ pub fn report(result: &anyhow::Result<Outcome>) -> ExitCode {
         Err(error) if error.chain().any(is_bad_input) => 2,
         Err(_) => 3,
     }
-    .into()
 }

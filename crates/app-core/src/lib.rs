@@ -1,6 +1,7 @@
 //! Common parts of the program's commands and the lab's.
 //!
-//! [`setup`] makes a scene on offer out of arguments, and [`scenes`] several. [`cluster`] runs coordinator and nodes in one process.
+//! [`setup`] makes a scene on offer out of arguments, and [`scenes`] several. [`cluster`] runs coordinator and nodes in one process, and
+//! [`experiment`] a client beside them.
 //! [`delivery`] opens sessions and receives views, and [`live`] follows a path with a moving camera. [`camera_file`]
 //! reads camera files, and [`camera_record`] writes those of views. [`ladder`] has the representations among which budgets
 //! choose, [`planning`] the terms of a plan, and [`plan_files`] the measurements of plans. [`exit`] defines the exit status.
@@ -11,12 +12,14 @@ pub mod camera_record;
 pub mod cluster;
 pub mod delivery;
 pub mod exit;
+pub mod experiment;
 pub mod ladder;
 pub mod live;
 pub mod memory;
 pub mod plan_files;
 pub mod planning;
 pub mod process;
+pub mod progress;
 pub mod scenes;
 pub mod setup;
 pub mod sizes;

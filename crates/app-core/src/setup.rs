@@ -95,6 +95,7 @@ pub struct SceneArgs {
 }
 
 /// A scene with its sample cameras.
+#[derive(Clone)]
 pub struct Setup {
     /// The scene.
     pub scene: Scene,
@@ -166,6 +167,26 @@ fn offer_name(scene: &SceneSpec) -> String {
 }
 
 impl SceneArgs {
+    /// A scene with all other arguments by default.
+    #[must_use]
+    pub fn new(scene: SceneSpec) -> Self {
+        Self {
+            scene,
+            missing_textures: MissingTextures::default(),
+            clip: None,
+            up: UpAxis::default(),
+            lighting: Lighting::default(),
+            lights: Vec::new(),
+            environment: None,
+            method: None,
+            sampling: None,
+            sample_size: SampleSize::default(),
+            base: None,
+            impostors: Impostors::default(),
+            samples: None,
+        }
+    }
+
     /// The reconstruction method; without one, the first that the samples suit.
     #[must_use]
     pub fn method(&self) -> ReconstructionMethod {

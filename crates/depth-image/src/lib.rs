@@ -25,7 +25,6 @@ mod pinhole;
 mod projection;
 mod sample_camera;
 mod sample_image;
-#[cfg(any(test, feature = "scalar"))]
 mod scalar;
 mod single_pole;
 mod tiles;
@@ -57,7 +56,6 @@ pub use pinhole::PinholeCamera;
 pub use projection::{CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray};
 pub use sample_camera::SampleCamera;
 pub use sample_image::{CubeImages, SampleImage, SampleImageError, SampleImages};
-#[cfg(any(test, feature = "scalar"))]
 pub use scalar::{
     Incident, Texel, disc_from_square, environment_highlight_linear, environment_reflectance_linear, highlight_linear,
     tangents_of, unit_from_oct16,

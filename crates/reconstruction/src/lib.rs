@@ -24,7 +24,6 @@ mod reconstructor;
 mod recording;
 mod reflectors;
 mod sample_set;
-#[cfg(feature = "scalar")]
 pub mod scalar;
 mod set_description;
 mod shaders;

@@ -33,7 +33,6 @@ mod rays;
 mod redundancy_test;
 mod reflections;
 mod renderer;
-#[cfg(feature = "scalar")]
 pub mod scalar;
 mod shaders;
 mod stages;

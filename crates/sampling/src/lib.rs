@@ -6,7 +6,6 @@ mod methods;
 mod mirrors;
 mod rig;
 mod sampler;
-#[cfg(feature = "scalar")]
 pub mod scalar;
 mod temporal_hysteresis;
 mod work;

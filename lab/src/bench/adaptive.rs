@@ -3,20 +3,19 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use app_core::progress::bar;
 use app_core::setup::{SceneArgs, Setup};
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use engine::GpuEngine;
 use metrics::PictureErrors;
 use render::{DrawWork, GpuScene, Lighting, Rate, Refinement, Visibility};
+use report::{Axis, Bar, Check, Point, Report, Series, Table, XyChart};
 use scene::SceneSpec;
-use study::{Axis, Bar, Check, Point, Report, Series, Table, XyChart};
 
 use super::args::BenchArgs;
 use super::timing::in_turn;
 use crate::evaluation::mean_errors;
 use crate::lighting_study::FINE;
-use crate::progress::bar;
-use crate::scene_args::scene_args;
 
 /// The lighting whose picture counts as converged.
 const CONVERGED: &str = "soft 256, occlusion 256";
@@ -54,7 +53,7 @@ const COLUMNS: [(&str, &str); 12] = [
 /// Adds a table, charts and checks.
 pub fn compare(args: &BenchArgs, engine: &Arc<GpuEngine>, setup: &Setup, report: &mut Report) -> anyhow::Result<()> {
     let spec: SceneSpec = SMOOTH.parse()?;
-    let smooth = SceneArgs { sample_size: args.scene.sample_size, ..scene_args(spec) }.load()?;
+    let smooth = SceneArgs { sample_size: args.scene.sample_size, ..SceneArgs::new(spec) }.load()?;
     engine.put_scene(smooth.offer.hash.as_str(), &smooth.scene)?;
     let mut table = Table::new(format!("Adaptive rate, {FINE}"), &COLUMNS);
     let own = args.scene.scene.to_string();

@@ -3,17 +3,16 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use app_core::setup::Setup;
+use app_core::progress::bar;
+use app_core::setup::{SceneArgs, Setup};
 use depth_image::Camera;
 use engine::GpuEngine;
 use render::{AccelerationReport, DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
+use report::{Axis, Bar, Check, Report, Series, Table, XyChart};
 use scene::SceneSpec;
-use study::{Axis, Bar, Check, Report, Series, Table, XyChart};
 
 use super::args::BenchArgs;
 use super::timing::in_turn;
-use crate::progress::bar;
-use crate::scene_args::scene_args;
 use crate::statistics::median;
 
 const WINDY: &str = "tree-terrain-500k-wind";
@@ -74,7 +73,7 @@ fn show(
     report: &mut Report,
 ) -> anyhow::Result<Vec<Moment>> {
     let spec: SceneSpec = name.parse()?;
-    let setup = scene_args(spec).load()?;
+    let setup = SceneArgs::new(spec).load()?;
     engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
     let scene = engine.scene(setup.offer.hash.as_str())?;
     let moments = moments(args, engine, &scene, (&setup, times_s))?;

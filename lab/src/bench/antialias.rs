@@ -3,6 +3,8 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use app_core::experiment::VIEW_SIZE_PX;
+use app_core::progress::bar;
 use app_core::setup::{SceneArgs, Setup};
 use coordinator::fitting_size_px;
 use depth_image::{Antialias, PinholeCamera, View, ViewCell, ViewPlanes, linear_from_srgb8, srgb8_from_linear};
@@ -10,18 +12,15 @@ use engine::GpuEngine;
 use glam::{UVec2, Vec2};
 use metrics::{PictureErrors, Rgb8Image};
 use reconstruction::ReconstructionMethod;
+use report::{Axis, Bar, Better, Check, Point, Report, Series, Table, XyChart};
 use sampling::SamplingMethod;
 use scene::SceneSpec;
-use study::{Axis, Bar, Better, Check, Point, Report, Series, Table, XyChart};
 
 use super::args::BenchArgs;
 use super::fronts::models_of;
 use super::peer;
 use super::timing::in_turn;
-use crate::experiment::VIEW_SIZE_PX;
-use crate::progress::bar;
 use crate::reference_views::{ReferenceViews, sample};
-use crate::scene_args::scene_args;
 
 /// A method that draws, beside the one that is asked for.
 const HYBRID: &str = "hybrid_mesh";
@@ -104,7 +103,7 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
     let named = named.collect::<anyhow::Result<Vec<(String, SceneSpec)>>>()?;
     let models = models.into_iter().map(|path| (path.display().to_string(), SceneSpec::File(path)));
     for (number, (name, spec)) in named.into_iter().chain(models).enumerate() {
-        let subject = Subject::new(args, engine, scene_args(spec))?;
+        let subject = Subject::new(args, engine, SceneArgs::new(spec))?;
         let rows = subject.rows(args)?;
         push(&mut table, &name, &rows)?;
         report.charts.extend(charts(&name, &rows).map(Into::into));
@@ -148,7 +147,7 @@ fn defaults(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> a
     let mut gains_db = Vec::with_capacity(paths.len());
     for path in paths {
         let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        let subject = Subject::new(args, engine, scene_args(SceneSpec::File(path)))?;
+        let subject = Subject::new(args, engine, SceneArgs::new(SceneSpec::File(path)))?;
         let four = Antialias::of(4).context("four samples are offered")?;
         let row =
             |subject: &Subject, antialias| subject.row(Maker::Reconstructed(args.scene.method()), antialias, f64::NAN);

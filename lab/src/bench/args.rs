@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use app_core::setup::{DeviceArgs, SceneArgs};
 use clap::{Args, Subcommand};
 
+use super::plane_bits::PlaneBitsArgs;
+use super::view_cost::ViewCostArgs;
 use crate::load::command::LoadArgs;
 use crate::promise::command::PromiseArgs;
 use crate::scaling::command::ScalingArgs;
@@ -16,7 +18,7 @@ use crate::viewer::command::ViewerBenchArgs;
 #[derive(Debug, Args)]
 #[command(
     args_conflicts_with_subcommands = true,
-    after_help = "Example: myriorama bench --models models/ --peer peer-bench/ --strict"
+    after_help = "Example: myriorama-lab bench --models models/ --peer peer-bench/ --strict"
 )]
 pub struct BenchArgs {
     #[command(subcommand)]
@@ -65,6 +67,10 @@ pub(super) enum Part {
     Sharing(SharingArgs),
     /// Measure the viewer in a browser
     Viewer(ViewerBenchArgs),
+    /// Print the time of a reconstructed view (c) and its errors, to compare two commits
+    ViewCost(ViewCostArgs),
+    /// Print the bits of each plane of depth images, and the time of packing them
+    PlaneBits(PlaneBitsArgs),
 }
 
 impl BenchArgs {

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use codec::{DecodeLimits, decode_depth_plane, encode_depth_plane, inverse_depth_codes};
 use depth_image::DepthImage;
-use study::{Bar, Check, Report, Table};
+use report::{Bar, Check, Report, Table};
 
 use crate::statistics::median;
 

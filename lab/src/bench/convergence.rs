@@ -3,15 +3,15 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use app_core::progress::bar;
 use app_core::setup::Setup;
 use depth_image::{Camera, DepthImage, PinholeCamera, linear_from_rgb9e5};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
-use study::{Axis, Bar, Check, Report, Series, Table, XyChart};
+use report::{Axis, Bar, Check, Report, Series, Table, XyChart};
 
 use super::args::BenchArgs;
-use crate::progress::bar;
 
 /// Rays of the reference.
 const REFERENCE: u32 = 1024;

@@ -4,19 +4,18 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context as _;
+use app_core::experiment::VIEW_SIZE_PX;
+use app_core::progress::bar;
 use app_core::setup::SceneArgs;
 use depth_image::ViewCell;
 use engine::GpuEngine;
 use reconstruction::ReconstructionMethod;
+use report::{Bar, Check, Report};
 use scene::SceneSpec;
-use study::{Bar, Check, Report};
 
 use super::args::BenchArgs;
 use crate::evaluation::Evaluation;
-use crate::experiment::VIEW_SIZE_PX;
-use crate::progress::bar;
 use crate::reference_views::ReferenceViews;
-use crate::scene_args::scene_args;
 use crate::sweep;
 
 /// The number of models of a folder that are compared, the largest files.
@@ -90,7 +89,7 @@ fn sweep_scene(
     engine: &Arc<GpuEngine>,
     report: &mut Report,
 ) -> anyhow::Result<()> {
-    let scene = SceneArgs { lighting: args.scene.lighting, ..scene_args(spec) };
+    let scene = SceneArgs { lighting: args.scene.lighting, ..SceneArgs::new(spec) };
     let setup = scene.load()?;
     let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
     let reference = ReferenceViews::draw(engine, &setup, &scene, cell.spread(args.compared_views(), VIEW_SIZE_PX))?;

@@ -2,18 +2,18 @@
 
 use std::sync::Arc;
 
+use app_core::experiment::{DeliverySettings, Experiment, PAPER_VIEWS, VIEW_SIZE_PX};
+use app_core::progress::bar;
 use app_core::setup::{SceneArgs, Setup};
 use cluster::PolicyChoice;
 use depth_image::ViewCell;
 use engine::GpuEngine;
 use render::Lighting;
-use study::{Bar, Check, Report, Table};
+use report::{Bar, Check, Report, Table};
 
 use super::args::BenchArgs;
 use crate::evaluation::mean_errors;
-use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS, VIEW_SIZE_PX};
 use crate::lighting_study::{self, Extent, FINE};
-use crate::progress::bar;
 use crate::reference_views::ReferenceViews;
 use crate::statistics::median;
 
@@ -28,7 +28,7 @@ const GLOSSY: f32 = 0.3;
 
 /// Measures every lighting on the scene.
 pub fn qualities(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
-    let rows = lighting_study::measure(experiment, Extent::bench(args.quick), drop)?;
+    let rows = lighting_study::measure(experiment, Extent::bench(args.quick))?;
     lighting_study::report(&rows, experiment.setup.scene.illumination.lights.len(), report)?;
     report.checks.extend(lighting_study::checks(&rows));
     still(args, experiment, report)

@@ -6,18 +6,17 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Context as _;
-use app_core::setup::Setup;
+use app_core::progress::bar;
+use app_core::setup::{SceneArgs, Setup};
 use depth_image::{View, ViewCell, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec2};
 use render::{DrawWork, Lighting, Refinement, Visibility};
+use report::{Bar, Cell, Check, Report, Table};
 use scene::SceneSpec;
-use study::{Bar, Cell, Check, Report, Table};
 
 use super::args::BenchArgs;
 use super::fronts::models_of;
-use crate::progress::bar;
-use crate::scene_args::scene_args;
 
 /// The size of the pictures whose covered share counts.
 const PICTURE_PX: UVec2 = UVec2::new(480, 360);
@@ -81,7 +80,7 @@ fn name_of(folder: &Path, path: &Path) -> String {
 
 fn load(engine: &Arc<GpuEngine>, path: PathBuf) -> anyhow::Result<Loaded> {
     let start = Instant::now();
-    let setup = scene_args(SceneSpec::File(path)).load()?;
+    let setup = SceneArgs::new(SceneSpec::File(path)).load()?;
     let seconds = start.elapsed().as_secs_f64();
     Ok(Loaded {
         triangles: setup.scene.triangle_count(),
@@ -163,9 +162,9 @@ mod tests {
         assert_eq!([text(0, 0), text(0, 1), text(0, 2), text(0, 7)], ["folder/a.GLB", "glb", "1", "50"]);
         assert_eq!([text(2, 1), text(2, 8)], ["ply", "no faces"]);
         let [refused, share] = checks(&models);
-        assert_eq!((refused.outcome(), refused.value()), (study::Outcome::FallsShort, Some(1.0)));
-        assert_eq!((share.outcome(), share.value()), (study::Outcome::Holds, Some(0.4)));
-        assert_eq!(checks(&models[1..2])[1].outcome(), study::Outcome::FallsShort);
+        assert_eq!((refused.outcome(), refused.value()), (report::Outcome::FallsShort, Some(1.0)));
+        assert_eq!((share.outcome(), share.value()), (report::Outcome::Holds, Some(0.4)));
+        assert_eq!(checks(&models[1..2])[1].outcome(), report::Outcome::FallsShort);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! `myriorama bench`: measured values against bars, as ratios of one run.
+//! `myriorama-lab bench`: measured values against bars, as ratios of one run.
 
 mod adaptive;
 mod animation;
@@ -10,11 +10,13 @@ mod fronts;
 mod light;
 mod loaded;
 mod peer;
+mod plane_bits;
 mod rays;
 mod run;
 mod sampling;
 mod throughput;
 mod timing;
+mod view_cost;
 
 pub use args::BenchArgs;
 pub use run::run;

@@ -8,13 +8,12 @@ use app_core::setup::{SceneArgs, Setup};
 use depth_image::PinholeCamera;
 use engine::GpuEngine;
 use render::Lighting;
+use report::{Bar, Check, Report};
 use scene::{Environment, SceneSpec};
-use study::{Bar, Check, Report};
 
 use super::args::BenchArgs;
 use crate::evaluation::Evaluation;
 use crate::reference_views::ReferenceViews;
-use crate::scene_args::scene_args;
 use crate::sweep;
 
 /// A fiftieth of the 280 ms a view that RVS takes on two cores.
@@ -64,7 +63,7 @@ pub(super) fn scene(folder: &Path) -> anyhow::Result<(SceneArgs, Setup)> {
     let args = SceneArgs {
         lighting: Lighting::UNLIT,
         samples: Some(folder.join("samples.json")),
-        ..scene_args(SceneSpec::File(folder.join("bench.ply")))
+        ..SceneArgs::new(SceneSpec::File(folder.join("bench.ply")))
     };
     let setup = args.load_changed(|scene| scene.background = Environment::default())?;
     Ok((args, setup))

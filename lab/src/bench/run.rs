@@ -3,15 +3,16 @@
 use std::sync::Arc;
 
 use app_core::exit::Outcome;
+use app_core::experiment::Experiment;
 use engine::GpuEngine;
 use node::Engine as _;
-use study::{Bar, Check, Report};
+use report::{Bar, Check, Report};
 
 use super::args::{BenchArgs, Part};
 use super::{
-    adaptive, animation, antialias, codec, convergence, fronts, light, loaded, peer, rays, sampling, throughput,
+    adaptive, animation, antialias, codec, convergence, fronts, light, loaded, peer, plane_bits, rays, sampling,
+    throughput, view_cost,
 };
-use crate::experiment::Experiment;
 use crate::memory::peak_memory_mb;
 use crate::reference_views::ReferenceViews;
 use crate::{load, promise, scaling, sharing, viewer};
@@ -27,11 +28,14 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
         Some(Part::Promise(args)) => return promise::command::run(args),
         Some(Part::Sharing(args)) => return sharing::command::run(args),
         Some(Part::Viewer(args)) => return viewer::command::run(args),
+        Some(Part::ViewCost(args)) => return view_cost::run(args),
+        Some(Part::PlaneBits(args)) => return plane_bits::run(args),
         None if args.antialias => return alone(args, antialias::measure),
         None if args.loading => return alone(args, loaded::measure),
         None => (),
     }
-    let experiment = Experiment::start(args.scene.clone(), Vec::new(), args.device.device, usize::from(args.nodes))?;
+    let experiment =
+        Experiment::start(args.scene.clone(), args.scene.load()?, args.device.device, usize::from(args.nodes))?;
     let mut report = new_report(args, &experiment.engine.device_name());
     println!("{} on {}", args.scene.scene, experiment.engine.device_name());
     throughput::delivered(args, &experiment, &mut report)?;

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
+use app_core::progress::bar;
 use depth_image::{DepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
 use reconstruction::{MeshStatistics, SampleSet, SetDescription};
 use render::SamplePlanes;
+use report::{Bar, Check, Report, Table};
 use sampling::SamplingMethod;
-use study::{Bar, Check, Report, Table};
 
 use super::args::BenchArgs;
-use crate::progress::bar;
 use crate::sampling_study::{Extent, SCENES, Subject, times, times_report};
 
 const SIZE_PX: UVec2 = UVec2::new(400, 300);

@@ -3,14 +3,14 @@
 use std::time::Instant;
 
 use anyhow::Context as _;
+use app_core::experiment::{Experiment, PAPER_VIEWS};
+use app_core::progress::bar;
 use cluster::PolicyChoice;
 use depth_image::{PinholeCamera, ViewPlanes};
 use node::{DirectWork, Engine as _, Turn, WorkClass};
-use study::{Bar, Check, Report, Table};
+use report::{Bar, Check, Report, Table};
 
 use super::args::BenchArgs;
-use crate::experiment::{Experiment, PAPER_VIEWS};
-use crate::progress::bar;
 use crate::reference_views::ReferenceViews;
 use crate::statistics::median;
 

@@ -1,7 +1,7 @@
 //! BD-time: the mean ratio of the times of two fronts, over the errors that both reach (Bjøntegaard 2001, "Calculation of
 //! Average PSNR Differences between RD-curves", VCEG-M33; interpolation as in the JCT-VC's sheets).
 
-use study::{Better, Point, pareto_front};
+use report::{Better, Point, pareto_front};
 
 use super::pchip::Pchip;
 

@@ -1,11 +1,11 @@
-//! `myriorama study compare`.
+//! `myriorama-lab study compare`.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use app_core::exit::{BadInput, Outcome};
 use clap::Args;
-use study::{Cell, Table};
+use report::{Cell, Table};
 
 use super::bd_time::bd_time;
 use super::fronts::{ALL, Methods, read};
@@ -14,8 +14,8 @@ use crate::statistics::geometric_mean;
 /// Compares the fronts of two reports by BD-time: the mean ratio of costs at equal FLIP of the foreground.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
-  myriorama study fronts --quick --out old       of one version of the program, and likewise `new` of another
-  myriorama study compare old/report.json new/report.json")]
+  myriorama-lab study fronts --quick --out old       of one version of the program, and likewise `new` of another
+  myriorama-lab study compare old/report.json new/report.json")]
 pub struct CompareArgs {
     /// The report of `study fronts` to compare with
     #[arg(value_name = "OLD")]

@@ -1,11 +1,11 @@
-//! The rows of a report of `myriorama study fronts`.
+//! The rows of a report of `myriorama-lab study fronts`.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
 use app_core::exit::BadInput;
-use study::{Cell, Point, Report, Table};
+use report::{Cell, Point, Report, Table};
 
 use crate::fronts::report::{COST, FOREGROUND_FLIP, RECONSTRUCTION, ROWS};
 

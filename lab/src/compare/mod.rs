@@ -1,4 +1,4 @@
-//! `myriorama study compare`: by how much the fronts of one release cost more or less than those of another.
+//! `myriorama-lab study compare`: by how much the fronts of one release cost more or less than those of another.
 
 mod bd_time;
 pub mod command;

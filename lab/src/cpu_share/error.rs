@@ -15,7 +15,7 @@ pub enum CpuShareError {
     /// A cgroup file system without the controller where it is needed.
     #[error(
         "{} has no cpu.max: the cpu controller is not handed down to it. Run as root, or in a delegated group: \
-         systemd-run --user --scope -p Delegate=yes myriorama bench scaling", path.display()
+         systemd-run --user --scope -p Delegate=yes myriorama-lab bench scaling", path.display()
     )]
     NoController { path: PathBuf },
     /// Most often there is no permission.

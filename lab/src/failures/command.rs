@@ -1,25 +1,25 @@
-//! `myriorama study failures`.
+//! `myriorama-lab study failures`.
 
 use std::path::PathBuf;
 
 use app_core::exit::{BadInput, Outcome};
+use app_core::progress::bar;
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use engine::GpuEngine;
 use node::Engine as _;
-use study::Report;
+use report::Report;
 
 use super::curves;
 use super::report::{Result as CurveResult, add_to};
 use super::stand::Stand;
-use crate::progress::bar;
 
 /// Measures the curves of docs/failures.md; `cargo test -p lab failures` measures the same at a small size.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  myriorama study failures                    all curves
-  myriorama study failures --quick --strict   in small pictures; exit status 1 if a shape is lost
-  myriorama study failures --curve steps      only the curves whose names contain \"steps\"")]
+  myriorama-lab study failures                    all curves
+  myriorama-lab study failures --quick --strict   in small pictures; exit status 1 if a shape is lost
+  myriorama-lab study failures --curve steps      only the curves whose names contain \"steps\"")]
 pub struct FailuresArgs {
     #[command(flatten)]
     device: DeviceArgs,

@@ -1,6 +1,6 @@
 //! Curves as a table, charts and checks.
 
-use study::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
+use report::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 
 use super::curve::{Curve, Measured};
 use super::stand::Stand;

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use planner::{Metric, Row};
 use reconstruction::ReconstructionMethod;
+use report::{Bar, Check};
 use sampling::SamplingMethod;
-use study::{Bar, Check};
 
 use super::measure::Front;
 use super::row::MeasuredRow;

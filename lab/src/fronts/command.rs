@@ -1,4 +1,4 @@
-//! `myriorama study fronts`.
+//! `myriorama-lab study fronts`.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -6,13 +6,14 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use app_core::exit::{BadInput, Outcome};
+use app_core::progress::bar;
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use depth_image::Antialias;
 use engine::GpuEngine;
 use node::Engine as _;
 use planner::ProbeView;
-use study::{Bar, Check, Report};
+use report::{Bar, Check, Report};
 
 use super::checks::checks;
 use super::conditions::{self, Conditions};
@@ -20,7 +21,6 @@ use super::measure::{Front, Limits};
 use super::report::add_to;
 use super::row::REPEATS;
 use super::subject::Subject;
-use crate::progress::bar;
 
 /// Views that rows are measured on, in the quick form and in the full one.
 const VIEWS: [u32; 2] = [8, 32];
@@ -29,12 +29,12 @@ const GRACE_S: f64 = 15.0;
 /// The longest quick run.
 const QUICK_S: f64 = 600.0;
 
-/// Measures cost and error of all rows of the ladder on the subjects of study/conditions.toml, and charts the fronts.
+/// Measures cost and error of all rows of the ladder on the subjects of lab/conditions.toml, and charts the fronts.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  myriorama study fronts --quick --strict   four subjects, every second number of cameras and size
-  myriorama study fronts --time 60          what a minute allows, spread over all rows; the report says what is missing
-  myriorama study fronts --subject urban    one subject, all rows")]
+  myriorama-lab study fronts --quick --strict   four subjects, every second number of cameras and size
+  myriorama-lab study fronts --time 60          what a minute allows, spread over all rows; the report says what is missing
+  myriorama-lab study fronts --subject urban    one subject, all rows")]
 pub struct FrontsArgs {
     #[command(flatten)]
     device: DeviceArgs,
@@ -50,7 +50,7 @@ pub struct FrontsArgs {
     /// Only subjects whose names contain this text, in any case
     #[arg(long = "subject", value_name = "TEXT")]
     subjects: Vec<String>,
-    /// Subjects from a file in the form of study/conditions.toml, in place of its own
+    /// Subjects from a file in the form of lab/conditions.toml, in place of its own
     #[arg(long, value_name = "FILE")]
     conditions: Option<PathBuf>,
     /// Exit status 1 when a check falls short

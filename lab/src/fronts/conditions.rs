@@ -1,4 +1,4 @@
-//! Named subjects, from `study/conditions.toml` or a file of the same form.
+//! Named subjects, from `lab/conditions.toml` or a file of the same form.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use glam::UVec2;
 use serde::Deserialize;
 
 /// The subjects that come with the program.
-const OWN: &str = include_str!("../../../study/conditions.toml");
+const OWN: &str = include_str!("../../conditions.toml");
 /// The most bytes of a file, and subjects in it.
 const MAX_BYTES: u64 = 1 << 20;
 const MAX_SUBJECTS: usize = 256;
@@ -47,7 +47,7 @@ fn one() -> f32 {
 }
 
 fn paper_size_px() -> UVec2 {
-    crate::experiment::VIEW_SIZE_PX
+    app_core::experiment::VIEW_SIZE_PX
 }
 
 fn plain() -> String {
@@ -55,7 +55,7 @@ fn plain() -> String {
 }
 
 fn paper_views() -> usize {
-    crate::experiment::PAPER_VIEWS
+    app_core::experiment::PAPER_VIEWS
 }
 
 #[derive(Deserialize)]

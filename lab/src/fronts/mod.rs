@@ -1,4 +1,4 @@
-//! `myriorama study fronts`: cost against error of every representation among which a budget chooses.
+//! `myriorama-lab study fronts`: cost against error of every representation among which a budget chooses.
 
 mod checks;
 pub mod command;

@@ -1,7 +1,7 @@
 //! Tables and charts of fronts.
 
 use planner::{Choice, Metric, Price};
-use study::{Axis, Better, Cell, Point, Report, Series, Table, XyChart};
+use report::{Axis, Better, Cell, Point, Report, Series, Table, XyChart};
 
 use super::measure::{Front, Planned};
 use super::row::{CLASSES, MeasuredRow};

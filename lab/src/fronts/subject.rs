@@ -14,7 +14,6 @@ use node::{Turn, WorkClass};
 use probe::Prober;
 
 use super::conditions::Conditions;
-use crate::scene_args::scene_args;
 
 /// A loaded subject.
 pub struct Subject {
@@ -33,7 +32,7 @@ impl Subject {
         let of = || format!("subject {:?}", conditions.name);
         let args = SceneArgs {
             lighting: conditions.lighting.parse().with_context(of)?,
-            ..scene_args(conditions.scene.parse().with_context(of)?)
+            ..SceneArgs::new(conditions.scene.parse().with_context(of)?)
         };
         let setup = args.load().with_context(of)?;
         engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;

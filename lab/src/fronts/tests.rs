@@ -7,7 +7,7 @@ use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
 use planner::{Choice, Metric, ProbeView};
-use study::{Outcome, Report};
+use report::{Outcome, Report};
 
 use super::checks::checks;
 use super::conditions::{Conditions, read};

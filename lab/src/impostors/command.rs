@@ -3,22 +3,22 @@
 use std::path::PathBuf;
 
 use app_core::exit::Outcome;
+use app_core::progress::bar;
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use depth_image::Aabb;
 use engine::GpuEngine;
 use node::Engine as _;
 use render::Lighting;
+use report::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 use sampling::{Impostors, Mirror};
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
-use study::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 
 use super::candidates::{UNFILTERED, candidates};
 use super::costs::{self, Costs};
 use super::measure::{Answer, Figures, Hall, VIEW_PX, around};
 use super::{orders, reflectance, single_rays};
 use crate::failures::stand::Stand;
-use crate::progress::bar;
 
 /// Views around a scene.
 const VIEWS: [usize; 2] = [24, 6];
@@ -33,8 +33,8 @@ const LIGHTING: [&str; 2] = ["soft 16, occlusion 16, reflections 1", "shadows, r
 /// number of views, and the change of colours by the number of mirrors on a ray's way.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  myriorama study impostors
-  myriorama study impostors --quick --strict   in hard shadows; exit status 1 if a bar is missed")]
+  myriorama-lab study impostors
+  myriorama-lab study impostors --quick --strict   in hard shadows; exit status 1 if a bar is missed")]
 pub struct ImpostorsArgs {
     #[command(flatten)]
     device: DeviceArgs,

@@ -1,4 +1,4 @@
-//! `myriorama study impostors`: how well images of a mirror's surroundings answer its rays.
+//! `myriorama-lab study impostors`: how well images of a mirror's surroundings answer its rays.
 
 mod candidates;
 pub mod command;

@@ -3,9 +3,9 @@
 use depth_image::PinholeCamera;
 use glam::Vec3;
 use render::Lighting;
+use report::{Bar, Cell, Check, Table};
 use sampling::Impostors;
 use scene::{Limits, MissingTextures, SceneSpec};
-use study::{Bar, Cell, Check, Table};
 
 use super::measure::{Hall, VIEW_PX};
 use crate::failures::stand::Stand;

@@ -1,17 +1,17 @@
 //! How views change with each further mirror on a ray's way, by the mirrors' reflectance: views by images, and directly drawn ones.
 
 use anyhow::Context as _;
+use app_core::progress::bar;
 use depth_image::{PinholeCamera, View, linear_from_srgb8};
 use glam::Vec3;
 use render::Lighting;
+use report::{Axis, Bar, Check, Series, XyChart};
 use sampling::Impostors;
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
-use study::{Axis, Bar, Check, Series, XyChart};
 
 use super::measure::{Hall, VIEW_PX, cells};
 use super::orders;
 use crate::failures::stand::Stand;
-use crate::progress::bar;
 
 /// Two mirror balls, and the reflectances that they are given.
 const SCENE: &str = "mirror-hall";

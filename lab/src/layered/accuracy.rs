@@ -1,6 +1,6 @@
 //! Charts of accuracy over time.
 
-use study::{Axis, Better, Point, Series, XyChart};
+use report::{Axis, Better, Point, Series, XyChart};
 
 /// What one setting of a way to make views reaches, and the seconds of a view.
 pub struct Reached {

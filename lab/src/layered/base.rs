@@ -3,17 +3,17 @@
 use std::time::Instant;
 
 use anyhow::Context as _;
+use app_core::setup::SceneArgs;
 use depth_image::{PinholeCamera, ProvenanceKind, View, ViewCell, ViewPlanes};
 use glam::UVec2;
 use reconstruction::{CommonSets, SampleSet};
 use render::{LayerSelection, Lighting};
-use study::{Bar, Cell, Check, Report, Table};
+use report::{Bar, Cell, Check, Report, Table};
 
 use super::subject::Subject;
 use super::views;
 use crate::failures::stage::CARVE;
 use crate::failures::stand::{Stand, pinholes};
-use crate::scene_args::scene_args;
 use crate::statistics::median;
 
 /// Scenes, and by how many dB views gain at least. A quick run has the first alone.
@@ -63,7 +63,7 @@ fn of_scene(
     lighting: Lighting,
     table: &mut Table,
 ) -> anyhow::Result<Vec<Check>> {
-    let around = scene_args(name.parse()?).load()?.around;
+    let around = SceneArgs::new(name.parse()?).load()?.around;
     let cell = ViewCell::between(&around).context("sample cameras")?;
     let subject = Subject::of_views(stand, name, lighting, |_| cell.spread(VIEWS, VIEW_PX))?;
     let images = stand.images(&subject.on_device, lighting, &pinholes(&around), views::PLAIN)?;

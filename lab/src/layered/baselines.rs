@@ -10,7 +10,7 @@ use depth_image::{PinholeCamera, ToneMapping, View, linear_from_rgb9e5};
 use glam::Vec2;
 use rayon::prelude::*;
 use render::{LayerSelection, Lighting};
-use study::{Axis, Bar, Better, Cell, Check, Report, Table, XyChart};
+use report::{Axis, Bar, Better, Cell, Check, Report, Table, XyChart};
 
 use super::accuracy::{Reached, over_time};
 use super::pyramid::{EPSILON_FACTOR, Hit, Pyramids};

@@ -3,18 +3,18 @@
 use std::path::PathBuf;
 
 use app_core::exit::Outcome;
+use app_core::progress::bar;
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use engine::GpuEngine;
 use node::Engine as _;
 use render::{Direct, Lighting, Rate};
-use study::{Bar, Check, Report, Table};
+use report::{Bar, Check, Report, Table};
 
 use super::subject::Subject;
 use super::views::{self, Figures};
 use super::{base, baselines, cubes, glossy, light_fields, mirrors, table_one, triangles, viewpoints};
 use crate::failures::stand::Stand;
-use crate::progress::bar;
 
 /// Sides of cubes, in texels of the longest edge. The one that holds and costs are measured of is the second.
 const SIDES: [u32; 3] = [256, 512, 1024];
@@ -42,8 +42,8 @@ const LEAST_PSNR_DB: [f64; 2] = [33.0, 31.5];
 /// show accuracy over time, and pictures what the paper's figures show.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  myriorama study layered
-  myriorama study layered --quick --strict   fewer scenes and views; exit status 1 if a bar is missed")]
+  myriorama-lab study layered
+  myriorama-lab study layered --quick --strict   fewer scenes and views; exit status 1 if a bar is missed")]
 pub struct LayeredArgs {
     #[command(flatten)]
     device: DeviceArgs,

@@ -2,7 +2,7 @@
 
 use depth_image::LayeredDepthImage;
 use render::{LayerSelection, Lighting};
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use super::subject::{Cube, Subject};
 use super::views;

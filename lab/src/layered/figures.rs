@@ -2,7 +2,7 @@
 
 use anyhow::Context as _;
 use depth_image::View;
-use study::{Picture, PictureRow};
+use report::{Picture, PictureRow};
 
 /// Views side by side, each with its caption: what a figure of the paper shows.
 ///

@@ -4,7 +4,7 @@ use depth_image::{LightDirections, PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use reconstruction::Mirrors;
 use render::{LayerSelection, Lighting};
-use study::{Axis, Bar, Better, Cell, Check, PictureRow, Report, Table, XyChart};
+use report::{Axis, Bar, Better, Cell, Check, PictureRow, Report, Table, XyChart};
 
 use super::accuracy::{Reached, over_time};
 use super::figures;

@@ -4,7 +4,7 @@ use codec::encode_light_field;
 use depth_image::{LightDirections, View};
 use reconstruction::{Mirrors, ReconstructionMethod};
 use render::LayerSelection;
-use study::{Bar, Cell, Check, PictureRow, Report, Table};
+use report::{Bar, Cell, Check, PictureRow, Report, Table};
 
 use super::mirrors::{self, SCENE, cameras, errors, shown};
 use super::subject::{Cube, Subject};

@@ -9,7 +9,7 @@ use glam::{UVec2, Vec3};
 use metrics::{Rgb8Image, flip_map, psnr_db};
 use reconstruction::{Mirrors, ReconstructionMethod, SampleSet};
 use render::{LayerSelection, Lighting};
-use study::{Bar, Cell, Check, Report, Table};
+use report::{Bar, Cell, Check, Report, Table};
 
 use super::subject::Subject;
 use super::views::LAYERED;

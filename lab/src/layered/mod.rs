@@ -1,4 +1,4 @@
-//! `myriorama study layered`: views from layered depth cubes.
+//! `myriorama-lab study layered`: views from layered depth cubes.
 
 mod accuracy;
 mod baked;

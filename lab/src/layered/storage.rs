@@ -1,7 +1,7 @@
 //! Storage of a cube beside that of a light field and of a volume, and six images beside three.
 
 use depth_image::{LayeredDepthImage, LayeredLightField};
-use study::{Cell, Table};
+use report::{Cell, Table};
 
 use super::paper::{self, Layers, MB};
 use super::subject::{Cube, Subject};

@@ -4,7 +4,7 @@ use codec::encode_light_field;
 use depth_image::{LightDirections, PinholeCamera, View};
 use reconstruction::{Mirrors, ReconstructionMethod};
 use render::{LayerSelection, Lighting};
-use study::{Cell, PictureRow, Report, Table};
+use report::{Cell, PictureRow, Report, Table};
 
 use super::baselines::Cubes;
 use super::paper::{Column, LightField, MB, TABLE_1};

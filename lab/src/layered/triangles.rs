@@ -1,7 +1,7 @@
 //! Views of small and of large scenes: a walk depends on samples, not on triangles.
 
 use render::{LayerSelection, Lighting};
-use study::{Bar, Check, Table};
+use report::{Bar, Check, Table};
 
 use super::subject::Subject;
 use super::views::{self, Figures};

@@ -9,7 +9,7 @@ use glam::{UVec2, Vec3};
 use metrics::{PictureErrors, Rgb8Image};
 use reconstruction::{ReconstructionMethod, SampleSet};
 use render::LayerSelection;
-use study::{Axis, Bar, Cell, Check, Series, Table, XyChart};
+use report::{Axis, Bar, Cell, Check, Series, Table, XyChart};
 
 use super::subject::{Cube, Subject};
 use super::views::{LAYERED, PLAIN};

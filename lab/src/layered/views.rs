@@ -8,7 +8,7 @@ use glam::Vec3;
 use metrics::{PictureErrors, Rgb8Image, depth_errors};
 use reconstruction::{ReconstructionMethod, SampleSet};
 use render::SamplePlanes;
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use super::subject::Subject;
 use crate::failures::stage::CARVE;

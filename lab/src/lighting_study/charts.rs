@@ -1,7 +1,7 @@
 //! Charts of lightings.
 
 use render::Lighting;
-use study::{Axis, Point, Series, XyChart};
+use report::{Axis, Point, Series, XyChart};
 
 use super::measure::Row;
 

@@ -1,13 +1,11 @@
 //! Measurements of lightings: parts alone, and views delivered.
 
-use client::Frame;
+use app_core::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
+use app_core::progress::bar;
 use cluster::{Costs, PolicyChoice};
 use render::Lighting;
 
-use crate::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
-use crate::progress::bar;
-
-/// The finest lighting of the demo, which the checks are about.
+/// The lighting which the checks are about.
 pub const FINE: &str = "soft 16, occlusion 16";
 /// Lightings, from the cheapest to the most expensive.
 const QUALITIES: [&str; 6] = ["unlit", "phong", "shadows", "soft 4, occlusion 4", FINE, "soft 64, occlusion 64"];
@@ -39,12 +37,6 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// The size in the demo.
-    #[must_use]
-    pub fn demo(quick: bool) -> Self {
-        if quick { Self { qualities: 4, views: &[64] } } else { Self { qualities: 5, views: &[PAPER_VIEWS] } }
-    }
-
     /// The size in the bench.
     #[must_use]
     pub fn bench(quick: bool) -> Self {
@@ -52,36 +44,28 @@ impl Extent {
     }
 }
 
-/// Measures every lighting, and passes the frames of the last one to `finest`, in the order in which they come.
-pub fn measure(experiment: &Experiment, extent: Extent, mut finest: impl FnMut(Frame)) -> anyhow::Result<Vec<Row>> {
+/// Measures every lighting.
+///
+/// # Errors
+/// The cluster fails.
+pub fn measure(experiment: &Experiment, extent: Extent) -> anyhow::Result<Vec<Row>> {
     let progress = bar("light", extent.qualities);
     let mut rows = Vec::with_capacity(extent.qualities);
     for name in &QUALITIES[..extent.qualities] {
         let views = if *name == FINE { extent.views } else { &extent.views[..1] };
-        let is_last = rows.len() + 1 == extent.qualities;
-        let arrived = |frame| {
-            if is_last {
-                finest(frame)
-            }
-        };
-        rows.push(row(experiment, name.parse()?, views, arrived)?);
+        rows.push(row(experiment, name.parse()?, views)?);
         progress.inc(1);
     }
     progress.finish_and_clear();
     Ok(rows)
 }
 
-fn row(
-    experiment: &Experiment,
-    lighting: Lighting,
-    views: &[usize],
-    mut arrived: impl FnMut(Frame),
-) -> anyhow::Result<Row> {
+fn row(experiment: &Experiment, lighting: Lighting, views: &[usize]) -> anyhow::Result<Row> {
     let settings = |policy, count| DeliverySettings { lighting, ..experiment.delivery(policy, count) };
     let mut pipelines = Vec::with_capacity(views.len());
     let mut plan = None;
     for &count in views {
-        let delivered = experiment.deliver(settings(PolicyChoice::Pipeline, count), &mut arrived)?;
+        let delivered = experiment.deliver(settings(PolicyChoice::Pipeline, count), drop)?;
         pipelines.push((count, delivered.seconds));
         plan = Some(delivered.plan);
     }

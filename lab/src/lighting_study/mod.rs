@@ -5,5 +5,5 @@ mod measure;
 mod report;
 mod tables;
 
-pub use measure::{Extent, FINE, Row, measure};
-pub use report::{checks, report, summary};
+pub use measure::{Extent, FINE, measure};
+pub use report::{checks, report};

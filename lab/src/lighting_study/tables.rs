@@ -2,7 +2,7 @@
 
 use cluster::Costs;
 use coordinator::schedule::k_fd;
-use study::Table;
+use report::Table;
 
 use super::measure::Row;
 

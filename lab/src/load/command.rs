@@ -1,25 +1,25 @@
-//! `myriorama bench load`: many clients on real processes.
+//! `myriorama-lab bench load`: many clients on real processes.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
+use ::report::Report;
 use app_core::exit::Outcome;
 use app_core::process::runtime;
+use app_core::progress::bar;
 use clap::Args;
 use gpu::DevicePreference;
 use render::Lighting;
 use scene::SceneSpec;
-use study::Report;
 
 use super::processes::Setting;
 use super::{phases, report};
 use crate::cpu_share::Hierarchy;
-use crate::progress::bar;
 
 /// Measures four loads, each on a coordinator and node processes of its own. The clients ask for views of 320×180: 8
 /// clients for 10 frames a second, 16 for 15, 80 for 10, and 200 for none.
 #[derive(Debug, Args)]
-#[command(after_help = "Example: myriorama bench load --minutes 10 --strict")]
+#[command(after_help = "Example: myriorama-lab bench load --minutes 10 --strict")]
 pub struct LoadArgs {
     /// The scene
     #[arg(long, value_name = "SPEC", default_value = "courtyard")]

@@ -1,6 +1,6 @@
 //! Memory of processes under load.
 
-use study::{Axis, Cell, Series, Table, XyChart};
+use report::{Axis, Cell, Series, Table, XyChart};
 
 use super::phases::{Idle, Load};
 use super::statistics::WARM_UP;

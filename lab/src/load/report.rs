@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use app_core::live::{STAGES, latencies, quantile};
-use study::{Axis, Bar, BarChart, Cell, Check, Report, Series, Table, XyChart};
+use report::{Axis, Bar, BarChart, Cell, Check, Report, Series, Table, XyChart};
 
 use super::memory::{growth, idle, memory, memory_chart};
 use super::phases::{Load, Phases};

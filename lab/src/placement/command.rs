@@ -6,6 +6,7 @@ use std::sync::Arc;
 use anyhow::Context as _;
 use app_core::exit::Outcome;
 use app_core::planning::Planning;
+use app_core::progress::bar;
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use depth_image::{Antialias, Camera, SampleImage, ViewPlanes, nested_places};
@@ -13,13 +14,12 @@ use engine::GpuEngine;
 use metrics::holding_images;
 use node::{Engine as _, Turn, WorkClass};
 use probe::{Light, Representation};
-use study::{Cell, Report, Table};
+use report::{Cell, Report, Table};
 
 use super::coverage::Coverage;
 use crate::fronts::conditions::{self, Conditions};
 use crate::fronts::row::default_place;
 use crate::fronts::subject::Subject;
-use crate::progress::bar;
 use crate::statistics::geometric_mean;
 
 /// Views of a subject, and those that are drawn at once.
@@ -36,8 +36,8 @@ const DEFAULT_CAMERAS: u32 = 4;
 /// for the scene one after another, and at the best of all.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  myriorama study placement
-  myriorama study placement --subject urban")]
+  myriorama-lab study placement
+  myriorama-lab study placement --subject urban")]
 pub struct PlacementArgs {
     #[command(flatten)]
     device: DeviceArgs,

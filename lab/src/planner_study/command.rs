@@ -1,4 +1,4 @@
-//! `myriorama study planner`.
+//! `myriorama-lab study planner`.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use depth_image::Antialias;
 use engine::GpuEngine;
 use node::Engine as _;
 use planner::{Kept, Pricing as _};
-use study::{Bar, Check, Report, Table};
+use report::{Bar, Check, Report, Table};
 
 use super::case::{Case, Cases, budgets};
 use super::evidence::Evidence;
@@ -34,8 +34,8 @@ const TABLE_SEED: u64 = 0x0000_0074_6162_6c65;
 /// plan sees.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  myriorama study planner --seed 7 --quick --strict   four subjects; exit status 1 when a check falls short
-  myriorama study planner --seed 123                  eight subjects")]
+  myriorama-lab study planner --seed 7 --quick --strict   four subjects; exit status 1 when a check falls short
+  myriorama-lab study planner --seed 123                  eight subjects")]
 pub struct PlannerArgs {
     #[command(flatten)]
     device: DeviceArgs,

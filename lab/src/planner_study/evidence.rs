@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use anyhow::Context as _;
 use app_core::planning::Planning;
+use app_core::progress::bar;
 use planner::{ErrorTerm, ProbeView, Statistic, ViewErrors};
 use probe::{Light, Prober};
 
 use super::pricing::Priced;
 use crate::fronts::row::{MeasuredRow, REPEATS, TIMED_VIEWS, mean_error, time_again};
 use crate::fronts::subject::Subject;
-use crate::progress::bar;
 
 /// Views of the table, and of confirmations.
 const TABLE_VIEWS: u64 = 32;

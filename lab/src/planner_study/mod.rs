@@ -1,4 +1,4 @@
-//! `myriorama study planner`: plans on subjects that nothing was tuned on, against tables of all rows.
+//! `myriorama-lab study planner`: plans on subjects that nothing was tuned on, against tables of all rows.
 
 mod case;
 pub mod command;

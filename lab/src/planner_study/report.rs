@@ -1,7 +1,7 @@
 //! The table of cases, and checks of regret, promises and planning time.
 
 use planner::{ERROR_RATE, Statistic, is_over};
-use study::{Bar, Cell, Check, Report, Table};
+use report::{Bar, Cell, Check, Report, Table};
 
 use super::case::Case;
 use crate::statistics::{geometric_mean, median, quantile};
@@ -151,7 +151,7 @@ mod tests {
         // With a share of 0.95, 4 or more of 24 fail in 2.9 % of cases, and 3 or more in 11.6 %.
         assert!(greatest_share(24, 3) > 0.95 && greatest_share(24, 4) < 0.95);
         let of = |over: usize| share("share", &[vec![2.0; over], vec![1.0; 24 - over]].concat(), 1.0, 0.95);
-        assert_eq!([3, 4].map(|over| of(over).outcome()), [study::Outcome::Holds, study::Outcome::FallsShort]);
-        assert_eq!(share("share", &[], 1.0, 0.95).outcome(), study::Outcome::NotRun);
+        assert_eq!([3, 4].map(|over| of(over).outcome()), [report::Outcome::Holds, report::Outcome::FallsShort]);
+        assert_eq!(share("share", &[], 1.0, 0.95).outcome(), report::Outcome::NotRun);
     }
 }

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use cluster::{PolicyChoice, PromiseState};
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use super::forged::forge;
 use super::live_viewer::{Asked, Cluster, Viewer};

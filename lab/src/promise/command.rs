@@ -13,7 +13,7 @@ use crate::section::{finish, measure_parts, report};
 /// Measures what audits and planning cost a live viewer of 200×150, whose views are made by the policy `pipeline`, and how
 /// soon a promise is broken and replaced that wrong measurements, or a viewer outside its view cell, have made untrue.
 #[derive(Debug, Args)]
-#[command(after_help = "Example: myriorama bench promise --quick --strict")]
+#[command(after_help = "Example: myriorama-lab bench promise --quick --strict")]
 pub struct PromiseArgs {
     /// Scenes of the part `price`
     #[arg(long, value_name = "SPEC", default_values = ["tree-terrain-500k", "courtyard"])]

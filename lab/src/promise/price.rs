@@ -5,8 +5,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use cluster::PolicyChoice;
+use report::{Bar, Cell, Check, Table};
 use scene::SceneSpec;
-use study::{Bar, Cell, Check, Table};
 
 use super::live_viewer::{Asked, Cluster, Viewer};
 use crate::section::Section;

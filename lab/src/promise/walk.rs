@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use cluster::{PolicyChoice, Promise, PromiseState};
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use super::broken::replaced_by_audits;
 use super::live_viewer::{Asked, Cluster, Viewer};

@@ -1,7 +1,7 @@
 //! Checks of the relations that the paper finds.
 
+use report::{Bar, Check};
 use sampling::{Redundancy, SamplingMethod};
-use study::{Bar, Check};
 
 use super::availability::Availability;
 use super::counts::percent;

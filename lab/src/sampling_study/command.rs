@@ -1,4 +1,4 @@
-//! `myriorama study sampling`.
+//! `myriorama-lab study sampling`.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use app_core::setup::DeviceArgs;
 use clap::Args;
 use engine::GpuEngine;
 use node::Engine as _;
-use study::Report;
+use report::Report;
 
 use super::detection::{detection, detection_report};
 use super::extent::Extent;

@@ -2,15 +2,14 @@
 
 use std::sync::Arc;
 
+use app_core::progress::bar;
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use render::{DrawWork, Lighting, Refinement, SamplePlanes, Visibility};
+use report::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 use sampling::{Redundancy, SampleWork, Sampler, SamplingMethod};
 use scene::{Mesh, MeshPart, Scene, Vertex, procedural};
-use study::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
-
-use crate::progress::bar;
 
 const SIDE_PX: u32 = 64;
 const DISTANCE_M: f32 = 4.0;

@@ -1,7 +1,7 @@
 //! Figures of the paper, Tables 1 and 2.
 
+use report::Cell;
 use sampling::SamplingMethod;
-use study::Cell;
 
 /// Xie, Table 1, in the order of [`super::SCENES`].
 const PAPER: [PaperRow; 4] = [

@@ -2,7 +2,7 @@
 
 use depth_image::DepthImage;
 use image::{Rgb, RgbImage};
-use study::{Picture, PictureRow};
+use report::{Picture, PictureRow};
 
 use super::counts::ImageCount;
 use super::methods::METHODS;

@@ -1,15 +1,15 @@
 //! Views from each sampling by each reconstruction: from as many images, and from as many samples.
 
+use app_core::progress::bar;
 use app_core::setup::{SceneArgs, Setup};
 use glam::UVec2;
 use reconstruction::ReconstructionMethod;
+use report::{Axis, Bar, Cell, Check, Point, Report, Series, Table, XyChart};
 use sampling::SamplingMethod;
-use study::{Axis, Bar, Cell, Check, Point, Report, Series, Table, XyChart};
 
 use super::methods::METHODS;
 use super::subject::Subject;
 use crate::evaluation::Evaluation;
-use crate::progress::bar;
 use crate::reference_views::ReferenceViews;
 
 const SAMPLE_PX: UVec2 = UVec2::new(400, 300);

@@ -1,8 +1,9 @@
 //! Measurements of one scene.
 
+use app_core::progress::bar;
 use glam::UVec2;
+use report::Report;
 use sampling::SamplingMethod;
-use study::Report;
 
 use super::availability::Availability;
 use super::counts::{ImageCount, image_counts, mark_useful};
@@ -12,7 +13,6 @@ use super::methods::METHODS;
 use super::pictures;
 use super::subject::{Subject, WITH_IDS};
 use super::visibility::{Seen, seen};
-use crate::progress::bar;
 
 /// The side of output frames, as in the paper.
 const FRAME_PX: UVec2 = UVec2::splat(512);

@@ -1,8 +1,9 @@
 //! Fig. 7: redundancy by pixel approaches redundancy by visibility as images grow.
 
+use app_core::progress::bar;
 use glam::UVec2;
+use report::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 use sampling::{Redundancy, SamplingMethod};
-use study::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 
 use super::counts::{ImageCount, image_counts, mark_useful, percent};
 use super::extent::Extent;
@@ -10,7 +11,6 @@ use super::held::Held;
 use super::methods::{IMAGES, METHODS};
 use super::subject::{Subject, WITH_IDS};
 use super::visibility::seen;
-use crate::progress::bar;
 
 const SIDES_PX: [u32; 4] = [256, 512, 1024, 2048];
 /// The scenes of the paper's figure.

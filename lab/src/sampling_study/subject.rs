@@ -11,7 +11,6 @@ use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility}
 use sampling::{Rig, SampleWork, Sampler, SamplingMethod};
 
 use super::methods::IMAGES;
-use crate::scene_args::scene_args;
 
 /// The paper's scenes, as this project makes them.
 pub const SCENES: [&str; 4] = ["bird-nest", "grass", "urban", "tree"];
@@ -61,7 +60,7 @@ impl Subject {
     /// # Errors
     /// The scene cannot be used, or the device fails.
     pub fn load(engine: &Arc<GpuEngine>, name: &str) -> anyhow::Result<Self> {
-        let args = scene_args(name.parse().with_context(|| name.to_owned())?);
+        let args = SceneArgs::new(name.parse().with_context(|| name.to_owned())?);
         let setup = args.load()?;
         let hash = setup.offer.hash.to_string();
         engine.put_scene(&hash, &setup.scene)?;

@@ -1,7 +1,7 @@
 //! Table 1 and Table 2 of the paper, its figures beside ours.
 
+use report::{Cell, Report, Table};
 use sampling::SamplingMethod;
-use study::{Cell, Report, Table};
 
 use super::checks::{checks, missing_ratio};
 use super::counts::percent;

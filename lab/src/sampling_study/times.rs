@@ -6,8 +6,8 @@ use codec::{PlaneSet, encode_depth_image};
 use depth_image::DepthImage;
 use glam::UVec2;
 use render::SamplePlanes;
+use report::{Bar, Cell, Check, Report, Table};
 use sampling::{SamplingMethod, scalar};
-use study::{Bar, Cell, Check, Report, Table};
 
 use super::extent::Extent;
 use super::methods::{IMAGES, METHODS};

@@ -1,7 +1,7 @@
 //! Figures 5 to 8 of the paper, from measured points.
 
 use cluster::PolicyChoice;
-use study::{Axis, BarChart, Chart, Series, XyChart};
+use report::{Axis, BarChart, Chart, Series, XyChart};
 
 use super::matrix::{FEW_NODES, PAPER_VIEWS};
 use super::paper::{PaperRow, TABLE_1};

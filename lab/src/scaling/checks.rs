@@ -1,7 +1,7 @@
 //! Checks of the measured points.
 
 use cluster::PolicyChoice;
-use study::{Bar, Check};
+use report::{Bar, Check};
 
 use super::matrix::{Extent, PAPER_NODES, PAPER_VIEWS, TILED_VIEWS};
 use super::measured::Measured;

@@ -1,4 +1,4 @@
-//! `myriorama bench scaling`.
+//! `myriorama-lab bench scaling`.
 
 use std::fs::create_dir_all;
 use std::path::PathBuf;
@@ -16,14 +16,15 @@ use super::matrix::Extent;
 use super::measure::{Request, take};
 use super::report::{report, show};
 use super::subject::Subject;
-use crate::scene_args::scene_args;
 
 /// Measures the time between two sample sets on a coordinator and P node processes, for P = 2…11 nodes, V = 10…1000
 /// views and every policy. Each node has an equal share of this machine's processors by control groups of Linux, so
 /// that eleven nodes fit two cores. The paper's figures and the predictions stand beside the results. A simulation
 /// around the same schedule is compared with them and goes on to 1,000 nodes.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  myriorama bench scaling --quick\n  myriorama bench scaling --out out/scaling")]
+#[command(
+    after_help = "Examples:\n  myriorama-lab bench scaling --quick\n  myriorama-lab bench scaling --out out/scaling"
+)]
 pub struct ScalingArgs {
     /// A scene by name, or a file
     #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
@@ -94,7 +95,7 @@ impl ScalingArgs {
 pub fn run(args: &ScalingArgs) -> anyhow::Result<Outcome> {
     let request = args.request()?;
     create_dir_all(&args.out).with_context(|| format!("cannot write to {}", args.out.display()))?;
-    let scene = SceneArgs { method: Some(args.method), ..scene_args(args.scene.clone()) };
+    let scene = SceneArgs { method: Some(args.method), ..SceneArgs::new(args.scene.clone()) };
     let subject = Subject::load(&scene)?;
     let measured = runtime()?.block_on(take(&request, &subject))?;
     println!("simulating up to {} nodes", args.simulate_to);

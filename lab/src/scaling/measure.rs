@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use app_core::process::stop_signal;
+use app_core::progress::bar;
 use cluster::Costs;
 use gpu::DevicePreference;
 use indicatif::ProgressBar;
@@ -16,7 +17,6 @@ use super::measured::{Measured, MeasuredLighting, Timed};
 use super::point::{Point, PointSettings};
 use super::processes::NodeProcesses;
 use super::subject::{MEASURED_BATCH, Subject};
-use crate::progress::bar;
 
 /// Attempts at a point whose plan changes while it is measured; the last one counts.
 const ATTEMPTS: u32 = 2;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Context as _;
-use study::{Report, Table};
+use report::{Report, Table};
 
 use super::checks::checks;
 use super::matrix::{Extent, FEW_NODES, PAPER_NODES, PAPER_VIEWS};

@@ -4,12 +4,11 @@ use std::cell::Cell;
 
 use anyhow::Context as _;
 use app_core::delivery::request;
+use app_core::experiment::VIEW_SIZE_PX;
 use app_core::setup::{SceneArgs, Setup};
 use cluster::{MeasureCosts, PolicyChoice, SamplePlanes, SessionRequest, Timeline, Workload};
 use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
 use render::Lighting;
-
-use crate::experiment::VIEW_SIZE_PX;
 
 /// Scene time between sets: far less than any motion, but a new set, which is sampled as the paper's sets are.
 const SET_STEP_S: f64 = 1e-3;

@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use cluster::Costs;
 use coordinator::schedule::{Demand, Load, NodeCosts, PolicyOverride, choose};
+use report::{Axis, Chart, Series, Table, XyChart};
 use simulation::spread_speeds;
-use study::{Axis, Chart, Series, Table, XyChart};
 
 use super::sweep::{Basis, Scenario, Simulated, VIEWS, reach};
 

@@ -1,7 +1,7 @@
 //! Tables of measured points.
 
 use cluster::{Costs, Policy, PolicyChoice};
-use study::{Cell, Table};
+use report::{Cell, Table};
 
 use super::costs::mean;
 use super::matrix::{FEW_NODES, HEADLINE_VIEWS, PAPER_VIEWS, predicted_s};

@@ -1,7 +1,7 @@
 //! Whole sample images beside tiles: with whole images, no more than S nodes can sample.
 
 use cluster::{Costs, PolicyChoice};
-use study::Table;
+use report::Table;
 
 use super::costs::efficiency;
 use super::point::Point;

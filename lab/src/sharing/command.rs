@@ -1,4 +1,4 @@
-//! `myriorama bench sharing`: whether clients of one cluster leave each other alone.
+//! `myriorama-lab bench sharing`: whether clients of one cluster leave each other alone.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use crate::section::{self, Section, finish, measure_parts};
 /// codecs, scenes, moments, and views drawn directly. Each batch is measured alone, too. Further rows are what the sharing
 /// of a cluster must not change: costs, the other scene when a node is killed, a client's memory, plans of walkers.
 #[derive(Debug, Args)]
-#[command(after_help = "Example: myriorama bench sharing --strict")]
+#[command(after_help = "Example: myriorama-lab bench sharing --strict")]
 pub struct SharingArgs {
     /// The scene of the viewer
     #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]

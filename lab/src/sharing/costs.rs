@@ -7,7 +7,7 @@ use app_core::delivery::{open, receive, request};
 use client::Client;
 use cluster::{Costs, PolicyChoice, SessionRequest, Timeline};
 use depth_image::PinholeCamera;
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use super::guests::{GUESTS, SMALL_PX};
 use super::up::{Up, policies};

@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use client::Client;
 use cluster::PolicyChoice;
 use gpu::DevicePreference;
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use super::up::policies;
 use super::viewer::{Viewer, Watched};

@@ -5,10 +5,11 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use super::up::{Up, policies};
 use crate::memory::peak_memory_mb_of;
+use crate::process::product;
 use crate::section::Section;
 
 /// The most memory of the client.
@@ -70,7 +71,7 @@ async fn view(coordinator: &str, views: usize, folder: &Path) -> anyhow::Result<
 }
 
 fn started(coordinator: &str, views: usize, folder: &Path) -> anyhow::Result<Child> {
-    let mut command = Command::new(std::env::current_exe().context("this program's file is not known")?);
+    let mut command = Command::new(product()?);
     command.args(["view", "--coordinator", coordinator, "--views", &views.to_string(), "--size", "1920x1080"]);
     command
         .args(["--antialias", "1", "--exposure", "0", "--tone-map", "none"])

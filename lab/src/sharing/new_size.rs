@@ -6,7 +6,7 @@ use app_core::delivery::{open, receive, request};
 use client::Client;
 use cluster::{PolicyChoice, SessionRequest};
 use glam::UVec2;
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use super::guests::SMALL_PX;
 use super::up::{Up, policies};

@@ -1,6 +1,6 @@
 //! The table of the guests and its checks.
 
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use super::beside::Row;
 use super::guests::Guest;

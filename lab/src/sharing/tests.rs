@@ -50,5 +50,5 @@ fn a_guest_that_could_not_be_measured_falls_short_of_every_bar() {
     let rows: Vec<_> = super::guests::GUESTS.iter().map(|guest| (guest, None)).collect();
     let section = super::report::section(&rows, String::new()).unwrap();
     assert!(section.checks.len() > 12);
-    assert!(section.checks.iter().all(|check| check.outcome() == study::Outcome::FallsShort));
+    assert!(section.checks.iter().all(|check| check.outcome() == report::Outcome::FallsShort));
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use anyhow::Context as _;
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use crate::section::Section;
 
@@ -62,7 +62,7 @@ mod tests {
         let section =
             section("policy: pipeline\nplans a second: 1.5\nwanted fetches ended: 0\nlongest gap: 0.2\n").unwrap();
         let holds: Vec<_> = section.checks.iter().map(Check::outcome).collect();
-        assert_eq!(holds, [study::Outcome::FallsShort, study::Outcome::Holds, study::Outcome::Holds]);
+        assert_eq!(holds, [report::Outcome::FallsShort, report::Outcome::Holds, report::Outcome::Holds]);
         assert!(super::section("plans a second: 1.5\n").is_err());
     }
 }

@@ -1,16 +1,17 @@
-//! `myriorama study stability`.
+//! `myriorama-lab study stability`.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::Context as _;
 use app_core::exit::{BadInput, Outcome};
+use app_core::progress::bar;
 use app_core::setup::DeviceArgs;
 use clap::Args;
 use depth_image::Antialias;
 use engine::GpuEngine;
 use node::Engine as _;
-use study::{Bar, Check, Report};
+use report::{Bar, Check, Report};
 
 use super::measure::{Measured, Stand};
 use super::paths::{PATHS, Path, PathKind};
@@ -18,7 +19,6 @@ use super::report::add_to;
 use super::still::differing_rows;
 use crate::fronts::conditions::Conditions;
 use crate::fronts::subject::Subject;
-use crate::progress::bar;
 
 /// Frames of a path, in the quick form and in the full one.
 const FRAMES: [usize; 2] = [16, 48];
@@ -28,8 +28,8 @@ const STILL_SCENE: &str = "tree-terrain-30k";
 /// Measures how errors change from frame to frame along paths, and the jump where a view's samples change.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
-  myriorama study stability --strict        exit status 1 when a check falls short
-  myriorama study stability --quick --path cells")]
+  myriorama-lab study stability --strict        exit status 1 when a check falls short
+  myriorama-lab study stability --quick --path cells")]
 pub struct StabilityArgs {
     #[command(flatten)]
     device: DeviceArgs,

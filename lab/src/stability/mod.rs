@@ -1,4 +1,4 @@
-//! `myriorama study stability`: errors from frame to frame along paths, and the jump where a view's samples change.
+//! `myriorama-lab study stability`: errors from frame to frame along paths, and the jump where a view's samples change.
 
 pub mod command;
 mod figures;

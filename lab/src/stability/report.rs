@@ -1,6 +1,6 @@
 //! Charts, tables, pictures and checks of paths.
 
-use study::{Axis, Bar, Cell, Check, Picture, PictureRow, Report, Series, Table, XyChart};
+use report::{Axis, Bar, Cell, Check, Picture, PictureRow, Report, Series, Table, XyChart};
 
 use super::figures::{CLASSES, Figures};
 use super::measure::Measured;

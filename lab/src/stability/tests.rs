@@ -9,7 +9,7 @@ use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
 use metrics::ScoreMap;
-use study::{Outcome, Report};
+use report::{Outcome, Report};
 
 use super::figures::Figures;
 use super::measure::{Measured, Stand};

@@ -1,4 +1,4 @@
-//! `myriorama bench viewer`: the viewer in a real browser.
+//! `myriorama-lab bench viewer`: the viewer in a real browser.
 
 use std::path::PathBuf;
 
@@ -17,7 +17,7 @@ use crate::section::{Section, finish, measure_parts, report};
 /// drags, stills, first pictures, a slow link, faults, a walk around the scene, and memory. Needs chromium and
 /// chromium-driver.
 #[derive(Debug, Args)]
-#[command(after_help = "Example: myriorama bench viewer --quick --only dragging --only rest")]
+#[command(after_help = "Example: myriorama-lab bench viewer --quick --only dragging --only rest")]
 pub struct ViewerBenchArgs {
     /// The scene
     #[arg(long, value_name = "SPEC", default_value = "courtyard")]

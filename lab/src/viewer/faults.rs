@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use cluster::PolicyChoice;
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use super::page::{Page, longest_gap_s};
 use super::stand::{Ground, Stand};

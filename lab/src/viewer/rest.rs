@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cluster::PolicyChoice;
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use super::page::Page;
 use super::stand::{Ground, Stand};

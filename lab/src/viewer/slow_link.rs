@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use cluster::PolicyChoice;
 use network_proxy::{Proxy, Way};
-use study::{Bar, Cell, Check, Table};
+use report::{Bar, Cell, Check, Table};
 
 use super::page::{Page, Picture};
 use super::stand::{Ground, Stand, authority};

@@ -5,8 +5,8 @@ use std::time::Duration;
 use anyhow::Context as _;
 use browser::input::Drag;
 use cluster::PolicyChoice;
+use report::{Bar, Cell, Check, Table};
 use serde_json::Value;
-use study::{Bar, Cell, Check, Table};
 
 use super::page::{Page, longest_gap_s};
 use super::stand::{Ground, Stand};

@@ -1,6 +1,7 @@
 //! Subcommands: one module each, with its arguments.
 
 pub mod coordinator;
+pub mod demo;
 pub mod gateway;
 pub mod health;
 pub mod node;

@@ -8,7 +8,7 @@ use app_core::exit::Outcome;
 use clap::Args;
 use client::Client;
 use cluster::{ClusterStatus, Costs, NodeCondition, NodeStatus, WorkloadStatus};
-use table::{Cell, Table};
+use report::{Cell, Table};
 
 use crate::terminal_picture;
 

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use client::{ClientError, LiveFrame};
-use table::{Cell, Table};
+use report::{Cell, Table};
 
 /// Stages of a frame's age, in order and complete.
 pub const STAGES: [&str; 9] = [

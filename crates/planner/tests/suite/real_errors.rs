@@ -1,5 +1,5 @@
 //! Bounds and audits on errors of real views: FLIP of 1,000 random views of each row in `tests/data/view_errors.csv`, which
-//! `myriorama study errors` measures.
+//! `myriorama-lab study errors` measures.
 
 use planner::{Audit, Budget, ERROR_RATE, Metric, Moments, ViewErrors, most_over};
 

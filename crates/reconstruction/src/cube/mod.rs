@@ -12,17 +12,13 @@ use glam::Vec3;
 use gpu::{Binding, GpuError, Table, TablePool, Turn};
 use wgpu::{BufferUsages, TextureFormat};
 
-#[cfg(feature = "scalar")]
 pub(crate) use bricks::LEAST_NORMAL_ALONG_LINE;
 pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, MORE_ENTRIES, SQUARE_REACH};
-#[cfg(any(test, feature = "scalar"))]
 pub(crate) use light_field::GpuLightField;
-#[cfg(feature = "scalar")]
 pub(crate) use light_field::NEAREST_SPACINGS;
 pub(crate) use light_field::{FOOTPRINT_SHARE, LEAST_LOBE_SHARE, LightField, MOST_MASKING};
 pub(crate) use links::links;
 pub(crate) use samples::CubeSamples;
-#[cfg(feature = "scalar")]
 pub(crate) use samples::Links;
 
 use self::bricks::Bricks;

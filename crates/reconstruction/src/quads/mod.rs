@@ -20,7 +20,6 @@ pub(crate) use cut::GpuCutWork;
 #[cfg(test)]
 pub(crate) use draw::GpuQuadWork;
 pub(crate) use draw::QuadDrawing;
-#[cfg(feature = "scalar")]
 pub(crate) use merge::GREATEST_EXTENT;
 pub(crate) use merge::record as merge;
 pub(crate) use mesh::{Cut, Mesh, QuadVertices, SetMeshes};

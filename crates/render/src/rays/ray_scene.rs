@@ -84,7 +84,6 @@ struct Fixed {
 }
 
 /// The same on the host.
-#[cfg(feature = "scalar")]
 pub(crate) struct HostTables<'t> {
     pub nodes: &'t [obvhs::cwbvh::node::CwBvhNode],
     pub corners: Vec<[[u32; 4]; 3]>,
@@ -247,7 +246,6 @@ impl RayScene {
     }
 
     /// The tables of a scene time, before they are put on the device.
-    #[cfg(feature = "scalar")]
     pub(crate) fn host_tables<R>(
         &self,
         scene_time_s: f32,

@@ -3,7 +3,7 @@
 use depth_image::{PinholeCamera, ViewPlanes};
 use glam::UVec2;
 use render::{Choice, Lighting, Visibility};
-use study::{Bar, Cell, Check, Report, Table};
+use report::{Bar, Cell, Check, Report, Table};
 
 use super::subject::{RUNS, Subject};
 use crate::bench::timing::in_turn;

@@ -2,7 +2,7 @@
 
 use gpu::BufferPool;
 use render::{Lighting, Visibility};
-use study::{Bar, Check, Report, Table};
+use report::{Bar, Check, Report, Table};
 
 use super::{
     memory_pass,

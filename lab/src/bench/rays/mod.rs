@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use app_core::setup::Setup;
 use engine::GpuEngine;
-use study::{Report, Table};
+use report::{Report, Table};
 
 use self::subject::Subject;
 use super::args::BenchArgs;

@@ -3,7 +3,7 @@
 use depth_image::{DepthImage, Light, unit_from_oct16};
 use glam::{UVec2, Vec3};
 use render::{Lighting, SamplePlanes};
-use study::{Cell, Report, Table};
+use report::{Cell, Report, Table};
 
 use super::subject::{RUNS, Subject};
 use crate::bench::timing::in_turn;

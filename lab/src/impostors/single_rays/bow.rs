@@ -3,7 +3,7 @@
 
 use depth_image::SinglePoleCamera;
 use glam::Vec2;
-use study::{Axis, Series, XyChart};
+use report::{Axis, Series, XyChart};
 
 /// Lengths of edges across the radius, and their distances from the pole.
 const EDGES_PX: [f32; 6] = [4.0, 8.0, 16.0, 32.0, 64.0, 128.0];

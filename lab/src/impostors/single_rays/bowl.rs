@@ -4,9 +4,9 @@ use depth_image::{PinholeCamera, ProvenanceKind};
 use glam::{UVec2, Vec3};
 use reconstruction::RayWork;
 use render::scalar;
+use report::{Bar, Check};
 use scene::procedural::uv_sphere;
 use scene::{Material, Scene};
-use study::{Bar, Check};
 
 use super::teapot::{mirrored, unlit_set};
 use crate::failures::stand::Stand;

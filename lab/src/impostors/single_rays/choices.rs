@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use glam::{Affine3A, Quat, UVec2, Vec3};
 use reconstruction::RayWork;
 use render::scalar;
+use report::{Bar, Cell, Check, Table};
 use sampling::{Impostors, Mirror};
 use scene::procedural::{quad, teapot_mirror, uv_sphere};
 use scene::{Instance, Mesh, Scene};
-use study::{Bar, Cell, Check, Table};
 
 use super::bowl::bowl;
 use super::teapot::{NEAR_M, mirrored, unlit_set};

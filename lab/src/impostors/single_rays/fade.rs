@@ -4,7 +4,7 @@
 use depth_image::{Camera, ProvenanceKind};
 use glam::Vec3;
 use reconstruction::{RayEnd, RayWork};
-use study::{Cell, Table};
+use report::{Cell, Table};
 
 use super::found::{LEAST_ERROR, SIDE_PX, squared_error};
 use super::teapot::{NEAR_M, Rays, Teapot};

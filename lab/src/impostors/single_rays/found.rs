@@ -3,7 +3,7 @@
 use depth_image::{Camera, ProvenanceKind, srgb8_from_linear};
 use glam::Vec3;
 use reconstruction::{RayEnd, RayWork};
-use study::{Axis, Bar, Cell, Check, Series, Table, XyChart};
+use report::{Axis, Bar, Cell, Check, Series, Table, XyChart};
 
 use super::teapot::{ASIDE, NEAR_M, Rays, Teapot};
 

@@ -9,10 +9,10 @@ mod found;
 mod steps;
 mod teapot;
 
-use study::Report;
+use app_core::progress::bar;
+use report::Report;
 
 use crate::failures::stand::Stand;
-use crate::progress::bar;
 use teapot::{Teapot, off_mirror, off_patch, views};
 
 /// Rays off a flat patch, in full and in quick runs.

@@ -5,7 +5,7 @@ use std::slice;
 use depth_image::Camera;
 use glam::UVec2;
 use reconstruction::{CurvedSearch, RayWork, SampleSet};
-use study::{Bar, Cell, Check, Report, Table};
+use report::{Bar, Cell, Check, Report, Table};
 
 use super::found::SIDE_PX;
 use super::teapot::{NEAR_M, Rays, Teapot, off_mirror, views};

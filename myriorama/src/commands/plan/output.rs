@@ -9,8 +9,8 @@ use app_core::setup::Setup;
 use depth_image::Camera;
 use planner::{Budget, Choice, Metric, Outcome, Price, RowSummary};
 use probe::Representation;
+use report::{Cell, Table};
 use serde_json::Map;
-use table::{Cell, Table};
 
 /// A plan that is made.
 pub(super) struct Output<'a> {

@@ -1,0 +1,184 @@
+//! A scene, a cluster in this process, and a client of it.
+
+use std::cell::Cell;
+use std::sync::Arc;
+
+use anyhow::Context as _;
+use client::{Client, Frame, Session};
+use cluster::{PolicyChoice, SessionPlan, SessionRequest, Timeline};
+use coordinator::CoordinatorConfig;
+use depth_image::{PinholeCamera, SampleCamera, ViewCell};
+use engine::GpuEngine;
+use glam::UVec2;
+use gpu::DevicePreference;
+use node::{NodeConfig, most_image_bytes, most_set_bytes};
+use reconstruction::ReconstructionMethod;
+use render::{Choice, Lighting};
+use tokio::runtime::Runtime;
+
+use crate::cluster::Cluster;
+use crate::delivery::{open, receive, request};
+use crate::process::{listen, runtime};
+use crate::setup::{SceneArgs, Setup};
+
+/// The number of views V of the paper's headline: 290 views of 200×150.
+pub const PAPER_VIEWS: usize = 290;
+/// The size of every view, unless cameras are given.
+pub const VIEW_SIZE_PX: UVec2 = UVec2::new(200, 150);
+/// Scene time between runs: far less than any motion, but a new sample set, which no node has kept.
+const RUN_STEP_S: f64 = 1e-4;
+
+/// Settings of one delivery.
+#[derive(Debug, Clone, Copy)]
+pub struct DeliverySettings {
+    /// How surfaces are lit.
+    pub lighting: Lighting,
+    /// Whether views are reconstructed or drawn directly.
+    pub policy: PolicyChoice,
+    /// How views are reconstructed.
+    pub method: ReconstructionMethod,
+    /// The number of views a set.
+    pub views: usize,
+    /// Sample sets of one moment, each with all views.
+    pub sets: u32,
+}
+
+/// Delivered views.
+#[derive(Debug)]
+pub struct Delivered {
+    /// The coordinator's plan, and the costs that it measured.
+    pub plan: SessionPlan,
+    /// Seconds from the request to the last frame, decoded and checksummed.
+    pub seconds: f64,
+}
+
+/// Receives all views of all sets, in the order in which they come; `arrived` is called for each.
+///
+/// # Errors
+/// As [`receive`].
+pub async fn receive_all(
+    session: &Session,
+    views: &[PinholeCamera],
+    mut arrived: impl FnMut(Frame),
+) -> anyhow::Result<Delivered> {
+    let received = async |frame| {
+        arrived(frame);
+        Ok(())
+    };
+    let seconds = receive(session, views, received).await?;
+    Ok(Delivered { plan: session.plan(), seconds })
+}
+
+/// Sample sets for which a node has room: one in use and one to come. Every run has sets of its own, and none needs them again.
+const SETS_IN_MEMORY: usize = 1;
+
+/// Half of a node's memory is for sets on the device, with the images that are relayed.
+fn set_memory_bytes(setup: &Setup) -> usize {
+    let illumination = &setup.scene.illumination;
+    let cameras: Vec<_> = setup.samples.iter().copied().map(SampleCamera::from).collect();
+    2 * SETS_IN_MEMORY * (most_set_bytes(illumination, &cameras) + most_image_bytes(illumination, &cameras))
+}
+
+/// A cluster that runs until it is stopped.
+pub struct Experiment {
+    /// The device of all nodes.
+    pub engine: Arc<GpuEngine>,
+    /// The scene and its sample cameras.
+    pub setup: Setup,
+    /// The arguments that `setup` was loaded from.
+    pub args: SceneArgs,
+    runtime: Runtime,
+    cluster: Cluster,
+    client: Client,
+    runs: Cell<u32>,
+}
+
+impl Experiment {
+    /// Starts `nodes` nodes, which share a device.
+    ///
+    /// # Errors
+    /// The scene is not sampled by depth images, or a device or port is not to be had.
+    pub fn start(args: SceneArgs, setup: Setup, device: DevicePreference, nodes: usize) -> anyhow::Result<Self> {
+        setup.check_depth_images()?;
+        let engine = GpuEngine::shared(device)?;
+        engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
+        let runtime = runtime()?;
+        let (cluster, client) = runtime.block_on(async {
+            let listener = listen(([127, 0, 0, 1], 0).into(), false).await?;
+            let configure = |config| NodeConfig { set_memory_bytes: set_memory_bytes(&setup), ..config };
+            let open = engine.clone().opener();
+            let config = CoordinatorConfig::default();
+            let cluster = Cluster::start(configure, listener, config, setup.offer.clone().into(), open, nodes).await?;
+            let client = cluster.client().await?;
+            anyhow::Ok((cluster, client))
+        })?;
+        Ok(Self { engine, setup, args, runtime, cluster, client, runs: Cell::new(0) })
+    }
+
+    /// `count` views, spread between the sample cameras.
+    ///
+    /// # Errors
+    /// There are no sample cameras.
+    pub fn views(&self, count: usize) -> anyhow::Result<Vec<PinholeCamera>> {
+        let cell = ViewCell::between(&self.setup.around).context("no sample cameras")?;
+        Ok(cell.spread(count, VIEW_SIZE_PX))
+    }
+
+    /// Settings for `views` of one set, with everything else from the scene's arguments.
+    #[must_use]
+    pub fn delivery(&self, policy: PolicyChoice, views: usize) -> DeliverySettings {
+        DeliverySettings { lighting: self.args.lighting, policy, method: self.args.method(), views, sets: 1 }
+    }
+
+    /// Delivers views of a new sample set. The time excludes the coordinator's measurements.
+    ///
+    /// # Errors
+    /// The cluster fails.
+    pub fn deliver(&self, settings: DeliverySettings, arrived: impl FnMut(Frame)) -> anyhow::Result<Delivered> {
+        let run = self.runs.replace(self.runs.get() + 1);
+        let views = self.views(settings.views)?;
+        let request = SessionRequest {
+            method: settings.method.to_string(),
+            lighting: settings.lighting.to_string(),
+            policy: settings.policy,
+            timeline: Timeline { set_count: settings.sets, ..Timeline::still(f64::from(run) * RUN_STEP_S) },
+            ..request(self.setup.offer.settings.clone(), &views)?
+        };
+        self.receive(request, &views, arrived)
+    }
+
+    /// Delivers views as a request says. The time excludes the coordinator's measurements.
+    ///
+    /// # Errors
+    /// The coordinator refuses the request, or the cluster fails.
+    pub fn receive(
+        &self,
+        request: SessionRequest,
+        views: &[PinholeCamera],
+        arrived: impl FnMut(Frame),
+    ) -> anyhow::Result<Delivered> {
+        self.runtime.block_on(async {
+            let session = open(&self.client, request).await?;
+            receive_all(&session, views, arrived).await
+        })
+    }
+
+    /// The renderer's choice between triangles and rays for views of this size.
+    ///
+    /// # Errors
+    /// The scene has left the device.
+    pub fn visibility(&self) -> anyhow::Result<Choice> {
+        let view = self.views(1)?;
+        let scene = self.engine.scene(self.setup.offer.hash.as_str())?;
+        Ok(self.engine.renderer.choice(&scene, &view[0], 0.0)?)
+    }
+
+    /// Drains the cluster.
+    ///
+    /// # Errors
+    /// A server failed.
+    pub fn stop(self) -> anyhow::Result<()> {
+        drop(self.client);
+        self.runtime.block_on(self.cluster.drain())
+    }
+}

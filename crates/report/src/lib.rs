@@ -1,0 +1,33 @@
+//! Reports of measurements, as `demo`, `bench` and `study` write them.
+//!
+//! A caller gathers numbers into a [`Report`]: tables, [`Check`]s against a bar, [`Chart`]s, pictures.
+//! [`Report::write`] makes files of them, and [`Report::finish`] also prints the checks. Nothing here measures, and
+//! nothing draws on a GPU: data in, files out. The format is described in `docs/report-format.md`.
+//!
+//! Charts share one look: a name has the same colour in all of them ([`Palette`]), axes carry units, and extrapolated
+//! parts are dashed.
+
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod chart;
+mod check;
+mod check_text;
+mod error;
+mod html;
+mod paths;
+mod picture;
+mod report;
+mod slug;
+mod table;
+mod write;
+
+pub use chart::{
+    Axis, BarChart, Better, Chart, Limit, Mark, Palette, Point, Scale, Series, Stage, XyChart, pareto_front,
+};
+pub use check::{Bar, Check, Outcome};
+pub use check_text::checks_text;
+pub use error::ReportError;
+pub use picture::{Legend, Picture, PictureRow, comparison_row, contact_sheet};
+pub use report::{Report, SCHEMA_VERSION};
+pub use slug::slug;
+pub use table::{Cell, Column, Table, TableError};

@@ -1,0 +1,157 @@
+//! Tables: columns with units, rows of cells.
+
+use serde::{Deserialize, Serialize};
+
+use super::cell::Cell;
+
+/// A table that cannot be made or written.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub enum TableError {
+    /// A row and the columns differ in number.
+    #[error("row {row} of table {table:?} has {cells} cells, its columns are {columns}")]
+    RowLength { table: String, row: usize, cells: usize, columns: usize },
+    /// The CSV writer failed.
+    #[error("cannot write a table: {0}")]
+    Csv(#[from] csv::Error),
+}
+
+/// A column.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Column {
+    /// The heading.
+    pub name: String,
+    /// The unit, such as `ms`, `dB` or `px`; empty for none.
+    pub unit: String,
+}
+
+impl Column {
+    /// `name (unit)`.
+    #[must_use]
+    pub fn heading(&self) -> String {
+        match self.unit.is_empty() {
+            true => self.name.clone(),
+            false => format!("{} ({})", self.name, self.unit),
+        }
+    }
+}
+
+/// A table, written as `{slug(name)}.csv`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    /// The title.
+    pub name: String,
+    /// Columns, left to right.
+    pub columns: Vec<Column>,
+    /// Rows, top to bottom, each with one cell a column.
+    pub rows: Vec<Vec<Cell>>,
+}
+
+impl Table {
+    /// An empty table of `(heading, unit)` columns.
+    #[must_use]
+    pub fn new(name: impl Into<String>, columns: &[(&str, &str)]) -> Self {
+        let column = |&(name, unit): &(&str, &str)| Column { name: name.into(), unit: unit.into() };
+        Self { name: name.into(), columns: columns.iter().map(column).collect(), rows: Vec::new() }
+    }
+
+    /// Adds a row.
+    ///
+    /// # Errors
+    /// Cells and columns differ in number.
+    pub fn push(&mut self, row: impl IntoIterator<Item = Cell>) -> Result<(), TableError> {
+        self.rows.push(row.into_iter().collect());
+        self.validate()
+    }
+
+    /// Checks that every row has one cell a column.
+    pub fn validate(&self) -> Result<(), TableError> {
+        let columns = self.columns.len();
+        match self.rows.iter().enumerate().find(|(_, row)| row.len() != columns) {
+            Some((row, cells)) => {
+                Err(TableError::RowLength { table: self.name.clone(), row, cells: cells.len(), columns })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The table as CSV with a heading line, quoted by RFC 4180.
+    ///
+    /// # Errors
+    /// Cells and columns differ in number.
+    pub fn to_csv(&self) -> Result<Vec<u8>, TableError> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(self.columns.iter().map(Column::heading))?;
+        for row in &self.rows {
+            writer.write_record(row.iter().map(Cell::full))?;
+        }
+        writer.into_inner().map_err(|error| csv::Error::from(error.into_error()).into())
+    }
+
+    /// The name, then aligned columns: words to the left, numbers to the right.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        let heads: Vec<String> = self.columns.iter().map(Column::heading).collect();
+        let rows: Vec<Vec<String>> = self.rows.iter().map(|row| row.iter().map(Cell::display).collect()).collect();
+        let width =
+            |column: usize| rows.iter().chain([&heads]).map(|row| row[column].chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..heads.len()).map(width).collect();
+        let is_number = |cell: &Cell| cell.is_numeric() || *cell == Cell::Missing;
+        let line = |row: &Vec<String>| {
+            let cell = |(column, text): (usize, &String)| match self.rows.iter().all(|row| is_number(&row[column])) {
+                true => format!("{text:>0$}", widths[column]),
+                false => format!("{text:<0$}", widths[column]),
+            };
+            row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()
+        };
+        let lines = [&heads].into_iter().chain(&rows).map(line);
+        format!("{}\n{}", self.name, lines.collect::<Vec<_>>().join("\n"))
+    }
+
+    /// The table as Markdown, with numbers as in [`Cell::display`].
+    #[must_use]
+    pub fn to_markdown(&self) -> String {
+        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+        let heads = line(self.columns.iter().map(Column::heading).collect());
+        let rule = format!("|{}\n", "---|".repeat(self.columns.len()));
+        let rows: String = self.rows.iter().map(|row| line(row.iter().map(Cell::display).collect())).collect();
+        format!("**{}**\n\n{heads}{rule}{rows}", self.name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn csv_is_quoted_and_in_full() {
+        let mut table = Table::new("costs", &[("what", ""), ("time", "ms")]);
+        table.push(["a, \"b\"".into(), 1.234_567_8.into()]).unwrap();
+        table.push(["none".into(), f64::NAN.into()]).unwrap();
+        let text = String::from_utf8(table.to_csv().unwrap()).unwrap();
+        assert_eq!(text, "what,time (ms)\n\"a, \"\"b\"\"\",1.2345678\nnone,\n");
+    }
+
+    #[test]
+    fn tables_read_as_markdown() {
+        let mut table = Table::new("Times", &[("P", ""), ("T", "s")]);
+        table.push([2_u32.into(), 1.5.into()]).unwrap();
+        assert_eq!(table.to_markdown(), "**Times**\n\n| P | T (s) |\n|---|---|\n| 2 | 1.5 |\n");
+    }
+
+    #[test]
+    fn a_row_with_too_few_cells_is_refused() {
+        let mut table = Table::new("costs", &[("what", ""), ("time", "ms")]);
+        assert!(matches!(table.push([1_u32.into()]), Err(TableError::RowLength { cells: 1, columns: 2, .. })));
+    }
+
+    #[test]
+    fn columns_of_text_are_aligned() {
+        let mut table = Table::new("Times", &[("method", ""), ("time", "ms")]);
+        table.push(["direct".into(), 60.0.into()]).unwrap();
+        table.push(["joint_carve".into(), 3.25.into()]).unwrap();
+        let lines: Vec<String> = table.to_text().lines().map(str::to_owned).collect();
+        assert_eq!(lines.len(), 4);
+        assert!(lines[1..].iter().all(|line| line.chars().count() == lines[1].chars().count()), "{lines:?}");
+    }
+}

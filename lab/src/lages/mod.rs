@@ -1,0 +1,71 @@
+//! `myriorama-lab study lages`: the experiment of Lages et al., with their Figures 5 and 6.
+
+mod charts;
+mod timing;
+
+use std::path::PathBuf;
+
+use app_core::exit::Outcome;
+use app_core::experiment::Experiment;
+use app_core::setup::{DeviceArgs, SceneArgs};
+use clap::Args;
+use node::Engine as _;
+use report::{Bar, Check, Report};
+
+use timing::Times;
+
+/// The number of nodes P of the paper.
+const NODES: usize = 5;
+
+/// Delivers 1 to 1000 views of 200×150 from S samples of 400×300 by five nodes in one process, and as many drawn directly.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: myriorama-lab study lages --lighting \"soft 16, occlusion 16\"")]
+pub struct LagesArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// Where the report goes
+    #[arg(long, default_value = "out/study/lages", value_name = "DIR")]
+    out: PathBuf,
+    /// Delivers at most 64 views
+    #[arg(long)]
+    quick: bool,
+    /// Exit status 1 when a check falls short
+    #[arg(long)]
+    strict: bool,
+}
+
+/// Measures deliveries and writes the report.
+///
+/// # Errors
+/// Input cannot be used, or the device or the cluster fails.
+pub fn run(args: &LagesArgs) -> anyhow::Result<Outcome> {
+    let experiment = Experiment::start(args.scene.clone(), args.scene.load()?, args.device.device, NODES)?;
+    let times = timing::measure(&experiment, args.quick)?;
+    let mut report = report(args, &experiment, &times)?;
+    report.parameter("direct finds surfaces by", experiment.visibility()?.to_string());
+    experiment.stop()?;
+    report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
+    println!("\n{}", report.summary);
+    let ok = report.finish(&args.out)?;
+    Ok(Outcome::of(ok || !args.strict))
+}
+
+fn report(args: &LagesArgs, experiment: &Experiment, times: &Times) -> anyhow::Result<Report> {
+    let mut report =
+        Report::new(format!("Myriorama study: Lages, {}", args.scene.scene), experiment.engine.device_name());
+    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    report.parameter("scene", args.scene.scene.to_string());
+    report.parameter("triangles", experiment.setup.scene.triangle_count() as usize);
+    report.parameter("sample images S", experiment.setup.samples.len());
+    report.parameter("nodes P", NODES);
+    report.parameter("lighting", args.scene.lighting.to_string());
+    report.parameter("method", args.scene.method().to_string());
+    report.parameter("quick", args.quick);
+    timing::tables(times, &mut report)?;
+    report.charts.extend([charts::total_time(times).into(), charts::stages(times).into()]);
+    report.summary = timing::summary(times);
+    report.checks.push(Check::new("chosen K off the formula's", times.headline_k_off_formula(), "", Bar::Equal(0.0)));
+    Ok(report)
+}

@@ -1,0 +1,102 @@
+//! `myriorama-lab`: measurements of the product, each as a report. Its commands are `bench` and `study`.
+//!
+//! [`bench`] compares measured values with bars. [`lages`] and [`sampling_study`] repeat the experiments of papers.
+//! [`load`] and [`scaling`] start clusters of processes. [`failures`] holds the shapes of curves of errors.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod balance;
+mod bench;
+mod command;
+mod compare;
+mod cpu_share;
+mod evaluation;
+mod failures;
+mod fronts;
+mod impostors;
+mod lages;
+mod layered;
+mod lighting_study;
+mod load;
+mod memory;
+mod placement;
+mod planner_study;
+mod process;
+mod promise;
+mod reference_views;
+mod sampling_study;
+mod scaling;
+mod section;
+mod sharing;
+mod stability;
+mod statistics;
+mod sweep;
+#[cfg(test)]
+mod tests;
+mod view_errors;
+mod viewer;
+
+use std::process::ExitCode;
+
+use app_core::exit;
+use clap::Parser;
+use command::LabCommand;
+
+/// Measures how fast and how accurate Myriorama is, and how its methods fail.
+#[derive(Debug, Parser)]
+#[command(name = "myriorama-lab", version, propagate_version = true, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    command: LabCommand,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  myriorama-lab bench --quick                       speed and accuracy against bars: out/bench/index.html
+  myriorama-lab bench viewer                        the viewer in a real browser
+  myriorama-lab study failures --quick --strict     how methods fail, as curves with the shapes that they must have
+
+Parts that start coordinators and nodes as processes need the program myriorama in the same folder: `make lab` builds both.
+
+Exit status: 0 done; 1 a check fell short and --strict was given; 2 arguments or input that cannot be used; 3 a failure at
+run time. RUST_LOG=info (or debug) says what is going on.";
+
+fn main() -> ExitCode {
+    app_core::process::restart_with_library_settings();
+    node::init_logging("warn");
+    exit::report("myriorama-lab", &Cli::parse().command.run())
+}
+
+#[cfg(test)]
+mod command_line_tests {
+    use super::*;
+
+    fn parsed(arguments: &[&str]) -> Result<Cli, clap::Error> {
+        Cli::try_parse_from([&["myriorama-lab"], arguments].concat())
+    }
+
+    #[test]
+    fn input_that_cannot_be_used_is_named_with_status_2() {
+        let cases: [(&[&str], &str); 2] = [
+            (&["study", "fronts", "--subject", "nowhere"], "nowhere"),
+            (&["study", "fronts", "--conditions", "/nowhere/absent.toml"], "absent.toml"),
+        ];
+        for (arguments, named) in cases {
+            let result = parsed(arguments).unwrap().command.run();
+            assert_eq!(exit::status(&result), 2, "{arguments:?}");
+            let message = format!("{:#}", result.unwrap_err());
+            assert!(message.contains(named), "{arguments:?}: {message}");
+        }
+        let refused = parsed(&["bench", "scaling", "--quota", "0"]).unwrap_err();
+        assert!(refused.exit_code() == 2 && refused.to_string().contains("0.01 to 64"), "{refused}");
+    }
+
+    #[test]
+    fn every_command_has_help() {
+        use clap::CommandFactory as _;
+        Cli::command().debug_assert();
+        for command in [&["bench", "--help"][..], &["bench", "scaling", "--help"], &["study", "lages", "--help"]] {
+            let help = parsed(command).unwrap_err();
+            assert_eq!(help.exit_code(), 0, "{command:?}");
+        }
+    }
+}

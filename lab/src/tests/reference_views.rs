@@ -1,0 +1,170 @@
+//! The device behind a node, alone and in a cluster, against views drawn from the scene.
+
+use std::sync::Arc;
+
+use crate::reference_views::ReferenceViews;
+use app_core::cluster::Cluster;
+use app_core::delivery::{open, receive, request};
+use app_core::process::{listen, runtime};
+use app_core::setup::{SceneArgs, Setup};
+use app_core::sizes::SampleSize;
+use cluster::{PolicyChoice, SessionRequest};
+use coordinator::CoordinatorConfig;
+use depth_image::{Environment, PinholeCamera, SampleCamera, SampleImages, ViewCell, ViewPlanes};
+use engine::GpuEngine;
+use glam::UVec2;
+use gpu::DevicePreference;
+use node::{DirectWork, Engine as _, EngineError, SampleWork, Turn, ViewWork, WorkClass};
+use reconstruction::ReconstructionMethod;
+
+const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
+
+const VIEW_SIZE: UVec2 = UVec2::new(64, 48);
+
+fn args(scene: &str) -> SceneArgs {
+    SceneArgs { sample_size: SampleSize::Fixed(UVec2::new(160, 120)), ..SceneArgs::new(scene.parse().unwrap()) }
+}
+
+fn views(setup: &Setup, count: usize) -> Vec<PinholeCamera> {
+    ViewCell::between(&setup.samples).unwrap().spread(count, VIEW_SIZE)
+}
+
+fn reference(scene: &str, count: usize) -> (Arc<GpuEngine>, SceneArgs, Setup, ReferenceViews) {
+    let (engine, args) = (GpuEngine::shared(DevicePreference::Any).unwrap(), args(scene));
+    let setup = args.load().unwrap();
+    let reference = ReferenceViews::draw(&engine, &setup, &args, views(&setup, count)).unwrap();
+    (engine, args, setup, reference)
+}
+
+#[test]
+fn views_from_samples_are_as_those_from_the_scene() {
+    for scene in ["uv-sphere", "courtyard"] {
+        let (_, _, _, reference) = reference(scene, 4);
+        let row = reference.evaluate(ReconstructionMethod::default(), 1).unwrap();
+        assert!(row.psnr_db > 30.0, "{scene}: {row:?}");
+        assert!(row.wrong_hits < 0.05 && row.unknown < 0.1, "{scene}: {row:?}");
+        assert!(row.fetches_a_ray > 0.0 && row.ms_a_view > 0.0, "{scene}: {row:?}");
+    }
+}
+
+#[test]
+fn the_comparison_sees_views_of_another_place() {
+    let (engine, args, setup, reference) = reference("courtyard", 2);
+    let own = reference.evaluate(ReconstructionMethod::default(), 1).unwrap();
+    let mut moved = ReferenceViews::draw(&engine, &setup, &args, views(&setup, 6).split_off(4)).unwrap();
+    moved.views.clone_from(&reference.views);
+    let row = moved.evaluate(ReconstructionMethod::default(), 1).unwrap();
+    assert!(row.psnr_db < own.psnr_db - 3.0 && row.flip > 2.0 * own.flip, "{row:?} {own:?}");
+}
+
+fn is_invalid(error: &EngineError, named: &str) -> bool {
+    matches!(error, EngineError::InvalidArgument { field, .. } if *field == named)
+}
+
+#[test]
+fn unknown_names_are_refused_with_their_field() {
+    let (engine, args, setup, reference) = reference("uv-sphere", 1);
+    let hash = setup.offer.hash.to_string();
+    let samples: Vec<SampleCamera> = setup.samples.iter().copied().map(Into::into).collect();
+    let sample = |scene_hash: &str, sampling: &str, lighting: &str| {
+        engine
+            .sample(
+                &SampleWork {
+                    scene_hash: scene_hash.to_owned(),
+                    cameras: samples.clone(),
+                    wanted: vec![0, 1],
+                    sampling: sampling.to_owned(),
+                    planes: cluster::SamplePlanes::default(),
+                    lighting: lighting.to_owned(),
+                    scene_time_s: 0.0,
+                    temporal_reference_s: None,
+                    refinement: cluster::Refinement::default(),
+                },
+                TURN,
+            )
+            .unwrap_err()
+    };
+    assert_eq!(sample("none", "conventional", "unlit"), EngineError::UnknownScene { hash: "none".to_owned() });
+    assert!(is_invalid(&sample(&hash, "random", "unlit"), "sampling_method"));
+    assert!(is_invalid(&sample(&hash, "conventional", "candles"), "lighting"));
+    assert!(is_invalid(&sample(&hash, "layered_cube:64", "unlit"), "sample_cameras"));
+    let set = node::SampleSet {
+        scene_hash: hash.clone(),
+        images: SampleImages::Depth(reference.images.clone()),
+        volume: setup.offer.volume,
+        background: Environment::default(),
+        illumination: setup.offer.illumination.clone(),
+        lighting: args.lighting.to_string(),
+        is_common: false,
+    };
+    let uploaded = engine.upload(&set, TURN).unwrap();
+    let work = |method: &str, near_m: f32| ViewWork {
+        cameras: vec![PinholeCamera { near_m, ..reference.cameras[0] }],
+        method: method.to_owned(),
+        planes: ViewPlanes::default(),
+    };
+    let refused = |work: &ViewWork| engine.reconstruct(uploaded.as_ref(), work, TURN).unwrap_err();
+    assert!(is_invalid(&refused(&work("guess", 0.01)), "reconstruction_method"));
+    assert!(is_invalid(&refused(&work("joint_carve", -1.0)), "camera"));
+    assert!(is_invalid(
+        &engine.upload(&node::SampleSet { images: SampleImages::Depth(Vec::new()), ..set }, TURN).err().unwrap(),
+        "sample_images"
+    ));
+    assert!(is_invalid(&engine.load_scene("x", b"no package").unwrap_err(), "package"));
+}
+
+#[test]
+fn a_package_loads_as_the_scene_does() {
+    let (engine, _, setup, reference) = reference("unit-cube", 2);
+    let package = scene::pack(&setup.scene);
+    engine.load_scene("by package", &package).unwrap();
+    assert!(engine.has_scene("by package"));
+    let work = DirectWork {
+        scene_hash: "by package".to_owned(),
+        cameras: reference.cameras.clone(),
+        lighting: "phong".to_owned(),
+        scene_time_s: 0.0,
+        planes: ViewPlanes::ALL,
+    };
+    let views = engine.draw_direct(&work, TURN).unwrap();
+    assert_eq!(views.len(), reference.views.len());
+    for (view, expected) in views.iter().zip(&reference.views) {
+        // The faster of rays and triangles is chosen by timing for each package; they may differ at edges.
+        let same = view.srgb8.iter().zip(&expected.srgb8).filter(|(a, b)| a == b).count();
+        let share = same as f64 / expected.srgb8.len() as f64;
+        assert!(view.size_px == expected.size_px && share > 0.98, "{share}");
+    }
+}
+
+#[test]
+fn a_cluster_gives_what_one_engine_gives() {
+    let (engine, args, setup, reference) = reference("uv-sphere", 16);
+    let alone = reference.reconstruct(args.method(), ViewPlanes::ALL).unwrap();
+    let mut delivered = runtime().unwrap().block_on(async {
+        let listener = listen(([127, 0, 0, 1], 0).into(), false).await.unwrap();
+        let config = CoordinatorConfig::default();
+        let cluster =
+            Cluster::start(|it| it, listener, config, setup.offer.clone().into(), engine.opener(), 3).await.unwrap();
+        let client = cluster.client().await.unwrap();
+        let offer = client.status().await.unwrap().offers.remove(0);
+        assert_eq!((&offer.sample_cameras, &offer.settings), (&setup.offer.rig, &setup.offer.settings));
+        let request = request(offer.settings, &reference.cameras).unwrap();
+        let request = SessionRequest { policy: PolicyChoice::Pipeline, planes: ViewPlanes::ALL, ..request };
+        let session = open(&client, request).await.unwrap();
+        let plan = session.plan();
+        assert!(plan.sampler_count() >= 1 && plan.assignment.compositors.len() + plan.sampler_count() == 3);
+        let mut frames = Vec::new();
+        let received = async |frame| {
+            frames.push(frame);
+            Ok(())
+        };
+        receive(&session, &reference.cameras, received).await.unwrap();
+        drop((session, client));
+        cluster.drain().await.unwrap();
+        frames
+    });
+    delivered.sort_by_key(|frame| frame.request.frame);
+    let views: Vec<_> = delivered.into_iter().map(|frame| frame.view).collect();
+    assert_eq!(views.len(), 16);
+    assert!(views == alone, "views of the cluster differ from the engine's");
+}

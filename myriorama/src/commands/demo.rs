@@ -1,0 +1,119 @@
+//! `myriorama demo`: one scene in expensive and in plain light, by a whole cluster in this process.
+
+mod first_page;
+mod page_layout;
+mod shared_light;
+mod viewpoint;
+
+use std::path::PathBuf;
+
+use app_core::exit::Outcome;
+use app_core::experiment::Experiment;
+use app_core::progress::bar;
+use app_core::setup::{DeviceArgs, SceneArgs, Setup};
+use clap::Args;
+use node::Engine as _;
+use render::Lighting;
+use report::{Bar, Check, Report};
+
+use shared_light::LightResult;
+
+/// Shows what sharing samples gains: 290 views of 200×150 of one scene, from four samples of 400×300 by P nodes in one
+/// process, beside views that are drawn directly. Once in expensive light, once in plain light. Writes a page with
+/// pictures, tables and a chart to --out. Takes two minutes at most on two slow cores, and half a minute with --quick.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  myriorama demo\n  myriorama demo --showcase\n  myriorama demo --scene helmet.gltf --out out/helmet\n  myriorama demo --scene tree-terrain-30k --quick"
+)]
+pub struct DemoArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// Nodes P that share the device
+    #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=256))]
+    nodes: u16,
+    /// Where the report goes
+    #[arg(long, default_value = "out/demo", value_name = "DIR")]
+    out: PathBuf,
+    /// Makes only the first page, first-page.png in --out
+    #[arg(long)]
+    showcase: bool,
+    /// Makes 64 views in place of 290
+    #[arg(long)]
+    quick: bool,
+    /// Exit status 1 when a check falls short
+    #[arg(long)]
+    strict: bool,
+}
+
+/// The light in which sharing pays, unless the user names one.
+const EXPENSIVE_LIGHT: &str = "soft 16, occlusion 16";
+/// The number of views V of Lages et al., and of the quick form.
+const VIEWS: usize = app_core::experiment::PAPER_VIEWS;
+const QUICK_VIEWS: usize = 64;
+
+/// Runs the demo and writes the report.
+///
+/// # Errors
+/// Input cannot be used, or the device or the cluster fails.
+pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
+    let setup = args.scene.load()?;
+    let cover = first_page::write(args, setup.clone())?;
+    if args.showcase {
+        return Ok(Outcome::Done);
+    }
+    let experiment = start(args, setup)?;
+    let results = measure(args, &experiment)?;
+    let mut report = new_report(args, &experiment);
+    report.cover = Some(cover);
+    shared_light::report(&results, &mut report)?;
+    report.checks.extend(results.iter().map(check_of_k));
+    experiment.stop()?;
+    report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
+    println!("\n{}", report.summary);
+    let ok = report.finish(&args.out)?;
+    Ok(Outcome::of(ok || !args.strict))
+}
+
+/// A cluster of `args.nodes` nodes in this process.
+fn start(args: &DemoArgs, setup: Setup) -> anyhow::Result<Experiment> {
+    Experiment::start(args.scene.clone(), setup, args.device.device, usize::from(args.nodes))
+}
+
+/// The results of each light, the most expensive first.
+fn measure(args: &DemoArgs, experiment: &Experiment) -> anyhow::Result<Vec<LightResult>> {
+    let (scene, triangles) = (&args.scene.scene, experiment.setup.scene.triangle_count());
+    println!("{scene}: {triangles} triangles on {}", experiment.engine.device_name());
+    let plain = Lighting::default();
+    let is_named = args.scene.lighting != plain;
+    let expensive = if is_named { args.scene.lighting } else { EXPENSIVE_LIGHT.parse()? };
+    let lights = [expensive, plain];
+    let views = if args.quick { QUICK_VIEWS } else { VIEWS };
+    let progress = bar("light", lights.len());
+    let mut results = Vec::with_capacity(lights.len());
+    for lighting in lights {
+        results.push(LightResult::measure(experiment, lighting, views)?);
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    Ok(results)
+}
+
+fn new_report(args: &DemoArgs, experiment: &Experiment) -> Report {
+    let mut report = Report::new(format!("Myriorama demo: {}", args.scene.scene), experiment.engine.device_name());
+    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    report.parameter("scene", args.scene.scene.to_string());
+    report.parameter("triangles", experiment.setup.scene.triangle_count() as usize);
+    report.parameter("sample images S", experiment.setup.samples.len());
+    report.parameter("nodes P", u32::from(args.nodes));
+    report.parameter("method", args.scene.method().to_string());
+    report.parameter("sampling", args.scene.sampling().to_string());
+    report.parameter("quick", args.quick);
+    report
+}
+
+fn check_of_k(result: &LightResult) -> Check {
+    let name = format!("{}: samplers K, off the formula's", result.lighting);
+    Check::new(name, result.samplers_off_formula() as f64, "", Bar::Equal(0.0))
+}

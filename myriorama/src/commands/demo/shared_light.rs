@@ -1,0 +1,262 @@
+//! Views in one light: delivered from shared samples, beside direct drawing.
+
+use anyhow::Context as _;
+use app_core::delivery::request;
+use app_core::experiment::{DeliverySettings, Experiment};
+use client::Frame;
+use cluster::{Costs, PolicyChoice, SessionPlan, SessionRequest};
+use coordinator::schedule::k_fd;
+use depth_image::{PinholeCamera, View, ViewPlanes};
+use image::imageops;
+use metrics::{PictureErrors, Rgb8Image, flip_map};
+use render::Lighting;
+use report::{Axis, Picture, PictureRow, Point, Report, Series, Table, XyChart, comparison_row, contact_sheet};
+
+/// The time for which direct drawing is timed; the time of more views is extended linearly.
+const DIRECT_S: f64 = 2.0;
+const DIRECT_VIEWS: std::ops::RangeInclusive<usize> = 4..=48;
+/// Views of each light that are compared with direct drawing.
+const COMPARED_VIEWS: usize = 6;
+/// Rows of pictures in every light but the first, which has all compared views.
+const FURTHER_ROWS: usize = 2;
+const SHEET_COLUMNS: u32 = 20;
+/// The numbers of views along the chart's axis.
+const CHART_VIEWS: [usize; 7] = [1, 3, 10, 32, 100, 290, 1000];
+
+/// A view beside the same view drawn directly.
+struct ComparedView {
+    direct: View,
+    reconstructed: View,
+    /// Over the pixels that show a surface.
+    errors: PictureErrors,
+}
+
+/// Measurements and pictures of one light.
+pub(super) struct LightResult {
+    pub(super) lighting: Lighting,
+    plan: SessionPlan,
+    /// The number of sample images S.
+    images: usize,
+    nodes: usize,
+    /// All views, in their order.
+    views: Vec<View>,
+    /// Seconds from the request for all views until the last is decoded, the samples included.
+    shared_s: f64,
+    /// The number of views for which direct drawing was timed.
+    direct_views: usize,
+    direct_view_s: f64,
+    compared: Vec<ComparedView>,
+}
+
+impl LightResult {
+    /// Delivers `count` views from samples, and some of them drawn directly.
+    ///
+    /// # Errors
+    /// The cluster fails.
+    pub(super) fn measure(experiment: &Experiment, lighting: Lighting, count: usize) -> anyhow::Result<Self> {
+        let settings = |policy, views| DeliverySettings { lighting, ..experiment.delivery(policy, views) };
+        let mut frames = Vec::with_capacity(count);
+        let shared = experiment.deliver(settings(PolicyChoice::Pipeline, count), |frame| frames.push(frame))?;
+        let affordable = (DIRECT_S / shared.plan.costs.direct_view_s) as usize;
+        let direct_views = affordable.clamp(*DIRECT_VIEWS.start(), *DIRECT_VIEWS.end());
+        let direct = experiment.deliver(settings(PolicyChoice::Direct, direct_views), drop)?;
+        Ok(Self {
+            lighting,
+            images: experiment.setup.samples.len(),
+            nodes: direct.plan.assignment.compositors.len(),
+            plan: shared.plan,
+            views: in_order(frames),
+            shared_s: shared.seconds,
+            direct_views,
+            direct_view_s: direct.seconds / direct_views as f64,
+            compared: compare(experiment, lighting, count)?,
+        })
+    }
+
+    /// The difference between the coordinator's K and the formula's.
+    pub(super) fn samplers_off_formula(&self) -> usize {
+        self.plan.sampler_count().abs_diff(self.formula_samplers())
+    }
+
+    fn formula_samplers(&self) -> usize {
+        let Costs { sample_image_s, reconstruct_view_s, encode_view_s, .. } = self.plan.costs;
+        let k = k_fd(self.images, sample_image_s, self.views.len(), reconstruct_view_s + encode_view_s, self.nodes);
+        k.clamp(1, self.images.max(1))
+    }
+
+    /// The time of drawing all views directly over that of making them from samples.
+    fn gain(&self) -> f64 {
+        self.direct_view_s * self.views.len() as f64 / self.shared_s
+    }
+
+    /// Seconds for `views` views from samples, by the costs: S·g_s + d + V·(c + e).
+    fn predicted_s(&self, views: usize) -> f64 {
+        let Costs { sample_image_s, reconstruct_view_s, load_set_s, encode_view_s, .. } = self.plan.costs;
+        self.images as f64 * sample_image_s + load_set_s + views as f64 * (reconstruct_view_s + encode_view_s)
+    }
+
+    fn mean_error(&self, value: fn(&PictureErrors) -> f64) -> f64 {
+        self.compared.iter().map(|compared| value(&compared.errors)).sum::<f64>() / self.compared.len() as f64
+    }
+
+    fn sentence(&self) -> String {
+        let (lighting, views, shared_s) = (self.lighting, self.views.len(), self.shared_s);
+        let direct_s = self.direct_view_s * views as f64;
+        format!(
+            "{lighting}: {views} views from {} shared samples in {shared_s:.1} s; drawn directly, {direct_s:.1} s ({:.1} times as long).",
+            self.images,
+            self.gain()
+        )
+    }
+}
+
+fn in_order(mut frames: Vec<Frame>) -> Vec<View> {
+    frames.sort_by_key(|frame| frame.request.frame);
+    frames.into_iter().map(|frame| frame.view).collect()
+}
+
+/// Some of the `count` views, by both policies.
+fn compare(experiment: &Experiment, lighting: Lighting, count: usize) -> anyhow::Result<Vec<ComparedView>> {
+    let all = experiment.views(count)?;
+    let cameras: Vec<PinholeCamera> =
+        all.into_iter().step_by((count / COMPARED_VIEWS).max(1)).take(COMPARED_VIEWS).collect();
+    let views = |policy, planes| -> anyhow::Result<Vec<View>> {
+        let request = SessionRequest {
+            lighting: lighting.to_string(),
+            policy,
+            planes,
+            ..request(experiment.setup.offer.settings.clone(), &cameras)?
+        };
+        let mut frames = Vec::with_capacity(cameras.len());
+        experiment.receive(request, &cameras, |frame| frames.push(frame))?;
+        Ok(in_order(frames))
+    };
+    let reconstructed = views(PolicyChoice::Pipeline, ViewPlanes::ALL)?;
+    let direct = views(PolicyChoice::Direct, ViewPlanes::WITH_DEPTH)?;
+    let pairs = direct.into_iter().zip(reconstructed);
+    pairs
+        .map(|(direct, reconstructed)| {
+            let [errors, _] = PictureErrors::of(&direct, &Rgb8Image::of_view(&reconstructed)?)?;
+            Ok(ComparedView { direct, reconstructed, errors })
+        })
+        .collect()
+}
+
+/// Adds the summary, tables, the chart and the pictures.
+///
+/// # Errors
+/// A view is not of its size.
+pub(super) fn report(results: &[LightResult], report: &mut Report) -> anyhow::Result<()> {
+    report.summary = results.iter().map(LightResult::sentence).collect::<Vec<_>>().join(" ");
+    report.tables.push(gains(results)?);
+    report.tables.push(costs(results)?);
+    report.charts.push(total_time(results).into());
+    for (index, result) in results.iter().enumerate() {
+        report.pictures.push(all_views(result));
+        let rows = if index == 0 { COMPARED_VIEWS } else { FURTHER_ROWS };
+        for (number, compared) in result.compared.iter().take(rows).enumerate() {
+            let title = format!("{}, view {number}", result.lighting);
+            report.pictures.push(compared_row(&title, compared)?);
+        }
+    }
+    Ok(())
+}
+
+fn gains(results: &[LightResult]) -> anyhow::Result<Table> {
+    let columns = [
+        ("light", ""),
+        ("views V", ""),
+        ("from samples", "s"),
+        ("drawn directly, extended", "s"),
+        ("timed on views", ""),
+        ("gain", "×"),
+        ("foreground PSNR", "dB"),
+        ("foreground SSIM", ""),
+        ("foreground FLIP", ""),
+    ];
+    let mut table = Table::new("What sharing gains", &columns);
+    for result in results {
+        table.push([
+            result.lighting.to_string().into(),
+            result.views.len().into(),
+            result.shared_s.into(),
+            (result.direct_view_s * result.views.len() as f64).into(),
+            result.direct_views.into(),
+            result.gain().into(),
+            result.mean_error(|errors| errors.psnr_db).into(),
+            result.mean_error(|errors| errors.ssim).into(),
+            result.mean_error(|errors| errors.flip).into(),
+        ])?;
+    }
+    Ok(table)
+}
+
+fn costs(results: &[LightResult]) -> anyhow::Result<Table> {
+    let columns = [
+        ("light", ""),
+        ("g_s a sample", "ms"),
+        ("g_v a view", "ms"),
+        ("d a set", "ms"),
+        ("c a view", "ms"),
+        ("e a view", "ms"),
+        ("c / g_v", ""),
+        ("samplers K", ""),
+        ("K of the formula", ""),
+    ];
+    let mut table = Table::new("Costs of one operation, alone and warm", &columns);
+    for result in results {
+        let costs = result.plan.costs;
+        table.push([
+            result.lighting.to_string().into(),
+            (costs.sample_image_s * 1e3).into(),
+            (costs.direct_view_s * 1e3).into(),
+            (costs.load_set_s * 1e3).into(),
+            (costs.reconstruct_view_s * 1e3).into(),
+            (costs.encode_view_s * 1e3).into(),
+            (costs.reconstruct_view_s / costs.direct_view_s).into(),
+            result.plan.sampler_count().into(),
+            result.formula_samplers().into(),
+        ])?;
+    }
+    Ok(table)
+}
+
+/// Figure 5 of Lages et al.
+fn total_time(results: &[LightResult]) -> XyChart {
+    const PREDICTED: [Point; 0] = [];
+    let mut chart = XyChart::new("Total time against views", Axis::log("views V", ""), Axis::log("total time", "s"));
+    for result in results {
+        let lighting = result.lighting;
+        let direct = CHART_VIEWS.map(|views| (views as f64, result.direct_view_s * views as f64));
+        let shared = CHART_VIEWS.map(|views| (views as f64, result.predicted_s(views)));
+        let delivered = [(result.views.len() as f64, result.shared_s)];
+        chart = chart
+            .with(Series::line(format!("direct, {lighting}"), PREDICTED).then_extrapolated(direct))
+            .with(Series::line(format!("from samples, {lighting}"), PREDICTED).then_extrapolated(shared))
+            .with(Series::points(format!("from samples, {lighting}, delivered"), delivered));
+    }
+    chart.note = "Dashed: from the costs, S·g_s + d + V·(c + e), and from the timed views of direct drawing. Points: delivered to a client.".to_owned();
+    chart
+}
+
+fn all_views(result: &LightResult) -> PictureRow {
+    let halved = |view: &View| {
+        let image = pictures::rgb(view)?;
+        Some(imageops::thumbnail(&image, (image.width() / 2).max(1), (image.height() / 2).max(1)))
+    };
+    let images: Vec<_> = result.views.iter().filter_map(halved).collect();
+    let name = format!("contact sheet, {}", result.lighting);
+    let caption = format!("{} delivered views, {}, at half their size", images.len(), result.lighting);
+    let sheet = contact_sheet(&images, SHEET_COLUMNS, 2);
+    PictureRow { title: format!("All views, {}", result.lighting), pictures: vec![Picture::new(name, caption, sheet)] }
+}
+
+/// The row *direct | reconstructed | error map | provenance*.
+fn compared_row(title: &str, compared: &ComparedView) -> anyhow::Result<PictureRow> {
+    let ComparedView { direct, reconstructed, .. } = compared;
+    let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(reconstructed)?)?;
+    let [direct_image, reconstructed_image] =
+        [direct, reconstructed].map(|view| pictures::rgb(view).context("a view is not of its size"));
+    let provenance = pictures::provenance(reconstructed, 0);
+    Ok(comparison_row(title, direct_image?, reconstructed_image?, &flip, provenance))
+}
