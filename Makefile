@@ -1,5 +1,5 @@
 # The release profile builds everything: the software device and the scalar references need it, and no second
-# profile is then compiled.
+# profile is then compiled. `ARGS` go to the program or to `cargo test`.
 #
 # Requirements are Rust (its version is in Cargo.toml), a linker (`cc`) and a Vulkan device; tests need a browser, too. The
 # targets install all but Rust where they are missing and no question is needed; see scripts/.
@@ -13,16 +13,20 @@ export NODEVICE_SELECT = 1
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help build demo cluster cluster-test test fmt-check lint unit bench doc audit vulkan browser toolchain lint-toolchain clean bench-scaling
+.PHONY: help build announce demo lab cluster cluster-test test fmt-check lint unit bench doc audit vulkan browser toolchain lint-toolchain clean bench-scaling
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 	@echo '  ARGS="…" goes to the program, as in: make demo ARGS="--scene model.glb"'
 
-demo: build ## the paper's experiment on this machine; pictures and report in out/demo
+demo: build ## a cluster on this machine beside direct drawing; pictures and report in out/demo
 	$(CARGO) run --release --locked --package myriorama -- demo $(ARGS)
 
-test: fmt-check lint unit ## format, lints and all tests
+test: ## format, lints and all tests, with the time of each phase and the slowest tests
+	@scripts/test.sh
+
+lab: build ## the measuring program, target/release/myriorama-lab
+	$(CARGO) build --release --locked --package myriorama --package lab
 
 cluster: build ## a coordinator and four nodes in containers; leaves them running
 	deploy/cluster.sh
@@ -30,11 +34,11 @@ cluster: build ## a coordinator and four nodes in containers; leaves them runnin
 cluster-test: build ## the same, kills nodes while it serves a client, and stops the cluster
 	deploy/cluster.sh --test
 
-bench: build ## speed and accuracy against the bars; report in out/bench
-	$(CARGO) run --release --locked --package myriorama -- bench $(ARGS)
+bench: lab ## speed and accuracy against the bars; report in out/bench
+	$(CARGO) run --release --locked --package lab -- bench $(ARGS)
 
-bench-scaling: build ## scaling to eleven nodes, simulated to 1,000 (root; an hour and a half, ARGS=--quick ten minutes)
-	$(CARGO) run --release --locked --package myriorama -- bench scaling $(ARGS)
+bench-scaling: lab ## scaling to eleven nodes, simulated to 1,000 (root; an hour and a half, ARGS=--quick ten minutes)
+	$(CARGO) run --release --locked --package lab -- bench scaling $(ARGS)
 
 doc: toolchain ## the crates' documentation, in target/doc
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --workspace --no-deps
@@ -47,8 +51,11 @@ clean: ## remove all build output and reports
 	$(CARGO) clean
 	rm -rf out
 
-build: toolchain vulkan
+build: toolchain vulkan announce
 	$(CARGO) build --release --locked --package myriorama
+
+announce:
+	@scripts/announce-build.sh
 
 fmt-check: lint-toolchain
 	$(CARGO) fmt --all --check
@@ -56,8 +63,9 @@ fmt-check: lint-toolchain
 lint: lint-toolchain
 	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
 
+# RUN is a program that runs each test program.
 unit: toolchain vulkan browser
-	$(CARGO) test --release --locked --workspace
+	$(CARGO) test --release --locked --workspace $(if $(RUN),--config 'target."cfg(unix)".runner="$(RUN)"') $(ARGS)
 
 vulkan:
 	@scripts/ensure-vulkan.sh

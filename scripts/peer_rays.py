@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Measures Embree on one core in million rays a second, for comparison with `myriorama bench`.
+"""Measures Embree on one core in million rays a second, for comparison with `myriorama-lab bench`.
 
     pip install embreex numpy
     scripts/peer_rays.py SCENE.ply SAMPLES.json
-    myriorama bench --scene SCENE.ply --samples SAMPLES.json
+    myriorama-lab bench --scene SCENE.ply --samples SAMPLES.json
 
 Primary rays come from the first camera. From each hit start 16 shadow rays towards a sun of two degrees and 16
 cosine-weighted occlusion rays within a twentieth of the scene's diagonal, as in `soft 16, occlusion 16`. Embree traces
