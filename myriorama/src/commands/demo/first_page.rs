@@ -2,21 +2,23 @@
 
 use std::fmt;
 use std::path::Path;
+use std::time::Instant;
 
 use anyhow::Context as _;
-use app_core::delivery::request;
-use app_core::experiment::Experiment;
 use app_core::setup::Setup;
-use cluster::{Costs, PolicyChoice, SessionRequest};
-use depth_image::{Antialias, Camera, PinholeCamera, View, ViewPlanes};
+use cluster::{Refinement, SamplePlanes};
+use depth_image::{Antialias, PinholeCamera, View, ViewPlanes};
+use engine::GpuEngine;
+use glam::UVec2;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use metrics::{PictureErrors, Rgb8Image, flip_map};
+use node::{DirectWork, Engine as _, SampleSet, SampleWork, Turn, ViewWork, WorkClass};
 use render::Lighting;
 use report::Picture;
 
+use super::DemoArgs;
 use super::page_layout::{PageParts, VIEW_PX};
 use super::viewpoint::Viewpoint;
-use super::{DemoArgs, start};
 
 /// The light of the page, unless the user names one. Few rays a sample are enough: a pixel has the mean of four samples,
 /// or of four images.
@@ -24,21 +26,21 @@ const LIGHTING: &str = "soft 1, occlusion 2";
 /// The side of sample images over that of the view, unless the user names a size.
 const DENSITY: f32 = 1.25;
 const SAMPLES_A_PIXEL: u32 = 4;
+/// The size of the view that is drawn before the timed one.
+const WARM_UP_PX: UVec2 = UVec2::new(32, 20);
 
 /// Makes the page and writes it as `first-page.png` to `args.out`.
 ///
 /// # Errors
-/// The device or the cluster fails, or the folder cannot be written.
+/// The samples are no depth images, the device fails, or the folder cannot be written.
 pub(super) fn write(args: &DemoArgs, setup: Setup) -> anyhow::Result<Picture> {
+    setup.check_depth_images()?;
     let viewpoint = Viewpoint::of(&args.scene.scene, &setup)?;
     let camera = viewpoint.camera(VIEW_PX.into());
     let denser_px = (camera.size_px.as_vec2() * DENSITY).as_uvec2();
     let around = viewpoint.samples(args.scene.sample_size.fixed_px().unwrap_or(denser_px));
     let samples = args.scene.sampling().cameras(around.clone());
-    // A cluster of its own: the page's views are far larger than the others, and so are their buffers.
-    let experiment = start(args, Setup { around, samples, ..setup })?;
-    let picture = page(args, &experiment, camera)?;
-    experiment.stop()?;
+    let picture = page(args, &Setup { around, samples, ..setup }, camera)?;
     let path = args.out.join("first-page.png");
     save(&picture, &path).with_context(|| path.display().to_string())?;
     println!("first page: {}", path.display());
@@ -54,49 +56,86 @@ fn save(picture: &Picture, path: &Path) -> anyhow::Result<()> {
     Ok(picture.image.write_with_encoder(encoder)?)
 }
 
-/// The view by both policies, and the costs that the coordinator has measured on it.
+/// The view of the page, drawn directly and reconstructed, and the times of both on an idle device.
 struct PageViews {
     direct: View,
+    direct_s: f64,
     reconstructed: View,
-    costs: Costs,
+    reconstruct_s: f64,
+    /// The time of all sample images.
+    samples_s: f64,
 }
 
 impl PageViews {
-    fn receive(experiment: &Experiment, camera: PinholeCamera, lighting: Lighting) -> anyhow::Result<Self> {
+    fn make(args: &DemoArgs, setup: &Setup, camera: PinholeCamera, lighting: Lighting) -> anyhow::Result<Self> {
+        // A device of its own: the page's views are far larger than the others, and so are their buffers.
+        let engine = GpuEngine::shared(args.device.device)?;
+        engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
+        let turn = Turn::of(WorkClass::Batch);
         let antialias = Antialias::of(SAMPLES_A_PIXEL).context("four samples are offered")?;
-        let shared = SessionRequest {
+        let planes = ViewPlanes { antialias, ..ViewPlanes::ALL };
+        let method = args.scene.method().to_string();
+        let set_work = sample_work(args, setup, lighting, engine.sample_planes(&method)?);
+        let (images, samples_s) = timed(|| Ok(engine.sample(&set_work, turn)?))?;
+        let set = SampleSet {
+            scene_hash: setup.offer.hash.to_string(),
+            images: images.try_into()?,
+            volume: setup.offer.volume,
+            background: setup.offer.background,
+            illumination: setup.offer.illumination.clone(),
             lighting: lighting.to_string(),
-            sample_cameras: experiment.setup.samples.iter().copied().map(Camera::Pinhole).collect(),
-            planes: ViewPlanes { antialias, ..ViewPlanes::ALL },
-            ..request(experiment.setup.offer.settings.clone(), &[camera])?
+            is_common: false,
         };
-        let mut views = Vec::with_capacity(2);
-        let mut costs = Costs::default();
-        for policy in [PolicyChoice::Pipeline, PolicyChoice::Direct] {
-            let request = SessionRequest { policy, ..shared.clone() };
-            let delivered = experiment.receive(request, &[camera], |frame| views.push(frame.view))?;
-            if policy == PolicyChoice::Pipeline {
-                costs = delivered.plan.costs;
-            }
-        }
-        let direct = views.pop().context("no view was drawn")?;
-        let reconstructed = views.pop().context("no view was reconstructed")?;
-        Ok(Self { direct, reconstructed, costs })
+        let set = engine.upload(&set, turn)?;
+        let view_work = ViewWork { cameras: vec![camera], method, planes };
+        let reconstruct = || one(engine.reconstruct(set.as_ref(), &view_work, turn)?);
+        // The first view of a size also makes its buffers and shaders.
+        reconstruct()?;
+        let (reconstructed, reconstruct_s) = timed(reconstruct)?;
+        let draw = |camera| {
+            let (scene_hash, lighting) = (setup.offer.hash.to_string(), lighting.to_string());
+            let work = DirectWork { scene_hash, cameras: vec![camera], lighting, scene_time_s: 0.0, planes };
+            one(engine.draw_direct(&work, turn)?)
+        };
+        draw(camera.resized(WARM_UP_PX))?;
+        let (direct, direct_s) = timed(|| draw(camera))?;
+        Ok(Self { direct, direct_s, reconstructed, reconstruct_s, samples_s })
     }
 }
 
-fn page(args: &DemoArgs, experiment: &Experiment, camera: PinholeCamera) -> anyhow::Result<Picture> {
+fn sample_work(args: &DemoArgs, setup: &Setup, lighting: Lighting, planes: SamplePlanes) -> SampleWork {
+    SampleWork {
+        scene_hash: setup.offer.hash.to_string(),
+        cameras: setup.samples.iter().copied().map(Into::into).collect(),
+        wanted: (0..setup.samples.len() as u32).collect(),
+        sampling: args.scene.sampling().to_string(),
+        planes,
+        lighting: lighting.to_string(),
+        scene_time_s: 0.0,
+        temporal_reference_s: None,
+        refinement: Refinement::default(),
+    }
+}
+
+fn one(mut views: Vec<View>) -> anyhow::Result<View> {
+    views.pop().context("no view")
+}
+
+fn timed<T>(make: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<(T, f64)> {
+    let start = Instant::now();
+    let made = make()?;
+    Ok((made, start.elapsed().as_secs_f64()))
+}
+
+fn page(args: &DemoArgs, setup: &Setup, camera: PinholeCamera) -> anyhow::Result<Picture> {
     let is_named = args.scene.lighting != Lighting::default();
     let lighting = if is_named { args.scene.lighting } else { LIGHTING.parse()? };
-    let PageViews { direct, reconstructed, costs } = PageViews::receive(experiment, camera, lighting)?;
+    let PageViews { direct, direct_s, reconstructed, reconstruct_s, samples_s } =
+        PageViews::make(args, setup, camera, lighting)?;
     let reconstructed_picture = Rgb8Image::of_view(&reconstructed)?;
     let [foreground, whole] = PictureErrors::of(&direct, &reconstructed_picture)?;
-    let figures =
-        PageFigures { direct_s: costs.direct_view_s, reconstruct_s: costs.reconstruct_view_s, foreground, whole }
-            .to_string();
-    let setup = &experiment.setup;
+    let figures = PageFigures { direct_s, reconstruct_s, foreground, whole }.to_string();
     let sample_px = setup.samples.first().context("no sample cameras")?.size_px;
-    let samples_s = costs.sample_image_s * setup.samples.len() as f64;
     let (provenance, legend) = pictures::provenance(&reconstructed, 0).context("a view without provenance")?;
     let parts = PageParts {
         direct: pictures::rgb(&direct).context("a view is not of its size")?,

@@ -2,8 +2,7 @@
 
 use anyhow::Context as _;
 use app_core::delivery::request;
-use app_core::experiment::{DeliverySettings, Experiment};
-use client::Frame;
+use app_core::experiment::{Delivered, Experiment};
 use cluster::{Costs, PolicyChoice, SessionPlan, SessionRequest};
 use coordinator::schedule::k_fd;
 use depth_image::{PinholeCamera, View, ViewPlanes};
@@ -15,10 +14,8 @@ use report::{Axis, Picture, PictureRow, Point, Report, Series, Table, XyChart, c
 /// The time for which direct drawing is timed; the time of more views is extended linearly.
 const DIRECT_S: f64 = 2.0;
 const DIRECT_VIEWS: std::ops::RangeInclusive<usize> = 4..=48;
-/// Views of each light that are compared with direct drawing.
-const COMPARED_VIEWS: usize = 6;
-/// Rows of pictures in every light but the first, which has all compared views.
-const FURTHER_ROWS: usize = 2;
+/// Rows of pictures in the first light, and in every other one.
+const ROWS: [usize; 2] = [6, 2];
 const SHEET_COLUMNS: u32 = 20;
 /// The numbers of views along the chart's axis.
 const CHART_VIEWS: [usize; 7] = [1, 3, 10, 32, 100, 290, 1000];
@@ -29,6 +26,13 @@ struct ComparedView {
     reconstructed: View,
     /// Over the pixels that show a surface.
     errors: PictureErrors,
+}
+
+impl ComparedView {
+    fn new(direct: View, reconstructed: View) -> anyhow::Result<Self> {
+        let [errors, _] = PictureErrors::of(&direct, &Rgb8Image::of_view(&reconstructed)?)?;
+        Ok(Self { direct, reconstructed, errors })
+    }
 }
 
 /// Measurements and pictures of one light.
@@ -42,9 +46,8 @@ pub(super) struct LightResult {
     views: Vec<View>,
     /// Seconds from the request for all views until the last is decoded, the samples included.
     shared_s: f64,
-    /// The number of views for which direct drawing was timed.
-    direct_views: usize,
     direct_view_s: f64,
+    /// The views for which direct drawing was timed.
     compared: Vec<ComparedView>,
 }
 
@@ -54,22 +57,27 @@ impl LightResult {
     /// # Errors
     /// The cluster fails.
     pub(super) fn measure(experiment: &Experiment, lighting: Lighting, count: usize) -> anyhow::Result<Self> {
-        let settings = |policy, views| DeliverySettings { lighting, ..experiment.delivery(policy, views) };
-        let mut frames = Vec::with_capacity(count);
-        let shared = experiment.deliver(settings(PolicyChoice::Pipeline, count), |frame| frames.push(frame))?;
+        let cameras = experiment.views(count)?;
+        let (shared, views) = deliver(experiment, PolicyChoice::Pipeline, lighting, &cameras)?;
         let affordable = (DIRECT_S / shared.plan.costs.direct_view_s) as usize;
-        let direct_views = affordable.clamp(*DIRECT_VIEWS.start(), *DIRECT_VIEWS.end());
-        let direct = experiment.deliver(settings(PolicyChoice::Direct, direct_views), drop)?;
+        let direct_views = affordable.clamp(*DIRECT_VIEWS.start(), *DIRECT_VIEWS.end()).min(count);
+        let step = count / direct_views;
+        let timed_cameras: Vec<PinholeCamera> = cameras.iter().copied().step_by(step).take(direct_views).collect();
+        // Direct drawing is timed warm, as the costs of reconstruction were measured.
+        let warm_up = &timed_cameras[..direct_views.min(*DIRECT_VIEWS.start())];
+        deliver(experiment, PolicyChoice::Direct, lighting, warm_up)?;
+        let (direct, direct_pictures) = deliver(experiment, PolicyChoice::Direct, lighting, &timed_cameras)?;
+        let pairs = direct_pictures.into_iter().zip(views.iter().step_by(step));
+        let compared = pairs.map(|(direct, reconstructed)| ComparedView::new(direct, reconstructed.clone()));
         Ok(Self {
             lighting,
             images: experiment.setup.samples.len(),
             nodes: direct.plan.assignment.compositors.len(),
             plan: shared.plan,
-            views: in_order(frames),
             shared_s: shared.seconds,
-            direct_views,
             direct_view_s: direct.seconds / direct_views as f64,
-            compared: compare(experiment, lighting, count)?,
+            compared: compared.collect::<anyhow::Result<_>>()?,
+            views,
         })
     }
 
@@ -110,36 +118,24 @@ impl LightResult {
     }
 }
 
-fn in_order(mut frames: Vec<Frame>) -> Vec<View> {
-    frames.sort_by_key(|frame| frame.request.frame);
-    frames.into_iter().map(|frame| frame.view).collect()
-}
-
-/// Some of the `count` views, by both policies.
-fn compare(experiment: &Experiment, lighting: Lighting, count: usize) -> anyhow::Result<Vec<ComparedView>> {
-    let all = experiment.views(count)?;
-    let cameras: Vec<PinholeCamera> =
-        all.into_iter().step_by((count / COMPARED_VIEWS).max(1)).take(COMPARED_VIEWS).collect();
-    let views = |policy, planes| -> anyhow::Result<Vec<View>> {
-        let request = SessionRequest {
-            lighting: lighting.to_string(),
-            policy,
-            planes,
-            ..request(experiment.setup.offer.settings.clone(), &cameras)?
-        };
-        let mut frames = Vec::with_capacity(cameras.len());
-        experiment.receive(request, &cameras, |frame| frames.push(frame))?;
-        Ok(in_order(frames))
+/// Views with depth and provenance, in the order of their cameras. All sessions of a light ask for equal views, so that the
+/// coordinator measures costs once.
+fn deliver(
+    experiment: &Experiment,
+    policy: PolicyChoice,
+    lighting: Lighting,
+    cameras: &[PinholeCamera],
+) -> anyhow::Result<(Delivered, Vec<View>)> {
+    let request = SessionRequest {
+        lighting: lighting.to_string(),
+        policy,
+        planes: ViewPlanes::ALL,
+        ..request(experiment.setup.offer.settings.clone(), cameras)?
     };
-    let reconstructed = views(PolicyChoice::Pipeline, ViewPlanes::ALL)?;
-    let direct = views(PolicyChoice::Direct, ViewPlanes::WITH_DEPTH)?;
-    let pairs = direct.into_iter().zip(reconstructed);
-    pairs
-        .map(|(direct, reconstructed)| {
-            let [errors, _] = PictureErrors::of(&direct, &Rgb8Image::of_view(&reconstructed)?)?;
-            Ok(ComparedView { direct, reconstructed, errors })
-        })
-        .collect()
+    let mut frames = Vec::with_capacity(cameras.len());
+    let delivered = experiment.receive(request, cameras, |frame| frames.push(frame))?;
+    frames.sort_by_key(|frame| frame.request.frame);
+    Ok((delivered, frames.into_iter().map(|frame| frame.view).collect()))
 }
 
 /// Adds the summary, tables, the chart and the pictures.
@@ -153,7 +149,7 @@ pub(super) fn report(results: &[LightResult], report: &mut Report) -> anyhow::Re
     report.charts.push(total_time(results).into());
     for (index, result) in results.iter().enumerate() {
         report.pictures.push(all_views(result));
-        let rows = if index == 0 { COMPARED_VIEWS } else { FURTHER_ROWS };
+        let rows = ROWS[index.min(1)];
         for (number, compared) in result.compared.iter().take(rows).enumerate() {
             let title = format!("{}, view {number}", result.lighting);
             report.pictures.push(compared_row(&title, compared)?);
@@ -181,7 +177,7 @@ fn gains(results: &[LightResult]) -> anyhow::Result<Table> {
             result.views.len().into(),
             result.shared_s.into(),
             (result.direct_view_s * result.views.len() as f64).into(),
-            result.direct_views.into(),
+            result.compared.len().into(),
             result.gain().into(),
             result.mean_error(|errors| errors.psnr_db).into(),
             result.mean_error(|errors| errors.ssim).into(),
