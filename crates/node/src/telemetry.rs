@@ -17,19 +17,27 @@ use prometheus_client::metrics::{
 use prometheus_client::registry::{Metric, Registry, Unit};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::fmt;
+use tracing_subscriber::layer::SubscriberExt as _;
+use tracing_subscriber::util::SubscriberInitExt as _;
 
 use crate::work_done::WorkDone;
 
 const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
-/// Starts logging; `default_filter` applies where `RUST_LOG` is not set. A second call does nothing.
-pub fn init_logging(default_filter: &str) {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default_filter));
-    let logging = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
-    let logging = logging.with_ansi(std::io::stderr().is_terminal());
+/// Starts logging. `RUST_LOG` names levels, such as `info` or `warn,coordinator=debug`; where it is not set, `default_levels`
+/// apply. A second call does nothing.
+pub fn init_logging(default_levels: &str) {
+    let named = std::env::var("RUST_LOG").ok().and_then(|named| {
+        let levels = named.parse::<Targets>();
+        levels.inspect_err(|error| eprintln!("RUST_LOG={named} is ignored: {error}")).ok()
+    });
+    let levels = named.or_else(|| default_levels.parse().ok()).unwrap_or_default();
+    let lines = fmt::layer().with_writer(std::io::stderr).with_ansi(std::io::stderr().is_terminal());
     let is_json = std::env::var("MYRIORAMA_LOG_FORMAT").is_ok_and(|format| format == "json");
-    let started = if is_json { logging.json().try_init() } else { logging.try_init() };
+    let logging = tracing_subscriber::registry().with(levels);
+    let started = if is_json { logging.with(lines.json()).try_init() } else { logging.with(lines).try_init() };
     if started.is_err() {
         tracing::debug!("logging was already started");
     }
