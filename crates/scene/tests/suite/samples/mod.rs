@@ -1,5 +1,4 @@
 //! Small files of every format for tests.
-#![allow(dead_code, clippy::unwrap_used)]
 
 pub mod compressed;
 pub mod skinned;

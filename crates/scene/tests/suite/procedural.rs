@@ -1,8 +1,6 @@
 //! The stand-ins for the scenes of Xie, Wang and Popescu's *Non-redundant rendering*: equally large, valid and
 //! deterministic.
 
-#![allow(clippy::unwrap_used)]
-
 use glam::Vec3;
 use scene::{Limits, Mesh, MissingTextures, Scene, SceneSpec};
 

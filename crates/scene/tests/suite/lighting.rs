@@ -1,5 +1,4 @@
 //! Lights as text, the default lights, and scenes without light.
-#![allow(clippy::unwrap_used)]
 
 use depth_image::linear_from_srgb8;
 use glam::{DVec3, Vec3};

@@ -1,15 +1,13 @@
 //! Import of glTF: valid content is kept and invalid content is refused.
-#![allow(clippy::unwrap_used)]
-
-mod samples;
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
 
 use glam::Vec3;
-use samples::{
+use scene::{Light, LightSpec, Limits, MissingTextures, Scene, SceneErrorKind, load_file};
+
+use crate::samples::{
     CUBE_CORNERS, GltfCube, Sample, cube, cube_buffer, cube_triangles, load, refusal, signed_volume, world_triangles,
 };
-use scene::{Light, LightSpec, Limits, MissingTextures, Scene, SceneErrorKind, load_file};
 
 fn refused(change: impl FnOnce(&mut GltfCube)) -> String {
     refusal("bad.glb", &cube(change).glb())

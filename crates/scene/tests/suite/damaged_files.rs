@@ -1,16 +1,14 @@
 //! Files that are truncated at every length, or have bytes changed at random, give a scene or an error, and no panic.
-#![allow(clippy::unwrap_used)]
-
-mod samples;
 
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use samples::compressed::{compressed_cube, diagonals, plain_streams, positions};
-use samples::skinned::Tube;
-use samples::{GltfCube, cube_obj, cube_ply_ascii, cube_ply_binary};
 use scene::procedural::{checker_sphere, unit_cube};
 use scene::{Limits, MissingTextures, load_file, pack, unpack};
+
+use crate::samples::compressed::{compressed_cube, diagonals, plain_streams, positions};
+use crate::samples::skinned::Tube;
+use crate::samples::{self, GltfCube, cube_obj, cube_ply_ascii, cube_ply_binary};
 
 /// Tight limits keep a changed size from making the test slow.
 fn limits() -> Limits {

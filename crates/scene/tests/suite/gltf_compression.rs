@@ -1,12 +1,10 @@
 //! `EXT_meshopt_compression`: compressed views are those of their plain form, and invalid ones are refused.
-#![allow(clippy::unwrap_used)]
-
-mod samples;
 
 use glam::Vec3;
-use samples::compressed::{Stream, compressed_cube, diagonals, plain_streams, positions, quaternions};
-use samples::{CUBE_CORNERS, GltfCube, Sample, cube_triangles, load, refusal, world_triangles};
 use scene::{Limits, MissingTextures, SceneErrorKind, load_file};
+
+use crate::samples::compressed::{Stream, compressed_cube, diagonals, plain_streams, positions, quaternions};
+use crate::samples::{CUBE_CORNERS, GltfCube, Sample, cube_triangles, load, refusal, world_triangles};
 
 const EXT: &str = "EXT_meshopt_compression";
 

@@ -1,10 +1,8 @@
 //! Textures of glTF: their formats and uses, and those that are missing.
-#![allow(clippy::unwrap_used)]
 
-mod samples;
-
-use samples::{Sample, cube, load, refusal};
 use scene::{Limits, MissingTextures, SceneErrorKind, TextureUse, load_file};
+
+use crate::samples::{Sample, cube, load, refusal};
 
 /// An image of `texels`, as a data URI.
 fn png_of(texels: &[[u8; 4]]) -> String {

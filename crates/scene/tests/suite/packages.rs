@@ -1,15 +1,13 @@
 //! Packages, and procedural scenes.
-#![allow(clippy::unwrap_used)]
-
-mod samples;
 
 use glam::{UVec2, Vec3};
-use samples::signed_volume;
 use scene::procedural::{checker_sphere, courtyard, poles, quad, tree_terrain, unit_cube, uv_sphere};
 use scene::{
     Environment, EnvironmentMap, Illumination, Light, LightSpec, Limits, Scene, SceneErrorKind, Texture, TextureUse,
     VertexDetail, Wrap, pack, unpack,
 };
+
+use crate::samples::{signed_volume, world_triangles};
 
 #[test]
 fn packing_is_deterministic_and_loses_nothing() {
@@ -206,7 +204,7 @@ fn a_quad_faces_along_its_normal() {
     for normal in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z, Vec3::new(1.0, 2.0, -3.0)] {
         let scene = quad(Vec3::new(0.0, 0.0, -4.0), 2.0, normal, [1, 2, 3]);
         scene.validate(&Limits::default()).unwrap();
-        for [a, b, c] in samples::world_triangles(&scene) {
+        for [a, b, c] in world_triangles(&scene) {
             assert!((b - a).cross(c - a).normalize_or_zero().distance(normal.normalize_or_zero()) < 1e-5);
             assert!((a - Vec3::new(0.0, 0.0, -4.0)).dot(normal).abs() < 1e-4);
         }

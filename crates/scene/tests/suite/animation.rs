@@ -1,15 +1,13 @@
 //! Animated scenes: import of glTF clips and skins, poses, bounds and packages.
-#![allow(clippy::unwrap_used)]
-
-mod samples;
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use glam::Vec3;
-use samples::skinned::{ChannelOf, Tube};
-use samples::{GltfCube, cube, load, refusal, signed_volume};
 use scene::procedural::{snake, unit_cube};
 use scene::{Limits, MissingTextures, NodeTransform, Scene, Vertex, load_file, pack, unpack};
+
+use crate::samples::skinned::{ChannelOf, Tube};
+use crate::samples::{GltfCube, Sample, cube, load, refusal, signed_volume};
 
 /// The vertices of the first instance at a moment, in the world.
 fn posed(scene: &Scene, scene_time_s: f32) -> Vec<Vertex> {
@@ -340,14 +338,14 @@ fn damaged_animations_are_refused_by_their_field() {
 
 #[test]
 fn keys_and_joints_over_the_limits_are_refused_before_they_are_read() {
-    let sample = samples::Sample::new("tube.glb", &Tube::bending().glb());
+    let sample = Sample::new("tube.glb", &Tube::bending().glb());
     let refused = |limits: Limits| load_file(&sample.path, &limits, MissingTextures::Refuse).unwrap_err().to_string();
     let keys = refused(Limits { keys: 2, ..Limits::default() });
     assert!(keys.contains("animation 0, channel 0, input, keys: 3 is over the limit of 2"), "{keys}");
     let mut twice = Tube::bending();
     twice.nodes += r#",{"mesh":0,"skin":0}"#;
     twice.roots += ",3";
-    let sample = samples::Sample::new("tube.glb", &twice.glb());
+    let sample = Sample::new("tube.glb", &twice.glb());
     let of = |limits: Limits| load_file(&sample.path, &limits, MissingTextures::Refuse);
     assert_eq!(of(Limits { vertices: 108, ..Limits::default() }).unwrap().animation.unwrap().moving.len(), 2);
     let vertices = of(Limits { vertices: 107, ..Limits::default() }).unwrap_err().to_string();

@@ -1,11 +1,9 @@
 //! Import of OBJ and PLY: valid content is kept and invalid content is refused.
-#![allow(clippy::unwrap_used)]
-
-mod samples;
 
 use glam::{DVec3, Vec3};
-use samples::{Sample, cube_obj, cube_ply_ascii, cube_ply_binary, load, ply_header, refusal, signed_volume};
 use scene::{Limits, MissingTextures, Scene, SceneErrorKind, SceneSpec, load_file};
+
+use crate::samples::{Sample, cube_obj, cube_ply_ascii, cube_ply_binary, load, ply_header, refusal, signed_volume};
 
 fn assert_is_cube(scene: &Scene) {
     assert_eq!(scene.triangle_count(), 12);

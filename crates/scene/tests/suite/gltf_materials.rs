@@ -1,11 +1,9 @@
 //! Materials of glTF: textures with coordinates and wrap modes of their own, tangents, reflectance and blending.
-#![allow(clippy::unwrap_used)]
-
-mod samples;
 
 use glam::{Vec2, Vec3};
-use samples::{GltfCube, cube, load, refusal};
 use scene::{Material, Mesh, Scene, TextureUse, Wrap};
+
+use crate::samples::{GltfCube, cube, load, refusal};
 
 /// A square that faces +Z, whose u runs along X and v along -Y; the second coordinates are twice the first.
 fn square(material: &str, more: &str) -> GltfCube {
