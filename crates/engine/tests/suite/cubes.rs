@@ -12,7 +12,7 @@ use gpu::DevicePreference;
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, SharedSet, Turn, ViewWork, WorkClass};
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
 
-mod common;
+use crate::stage::sample_set;
 
 const HASH: &str = "a box with mirrors";
 const LIGHTING: &str = "shadows, reflections 3";
@@ -66,7 +66,7 @@ impl Stand {
     }
 
     fn set(&self, images: Vec<SampleImage>) -> SharedSet {
-        let like = common::sample_set(&self.engine, (HASH, &self.scene), &[camera()], LIGHTING);
+        let like = sample_set(&self.engine, (HASH, &self.scene), &[camera()], LIGHTING);
         let set = SampleSet { images: images.try_into().expect("a cube"), ..like };
         self.engine.upload(&set, TURN).expect("a set")
     }

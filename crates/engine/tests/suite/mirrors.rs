@@ -1,7 +1,5 @@
 //! Views of sets with mirror cells show the scene in mirrors, about as views that are drawn directly do.
 
-mod common;
-
 use std::sync::Arc;
 
 use cluster::{CommonCell, CommonKind, Refinement, SamplePlanes};
@@ -12,6 +10,8 @@ use gpu::DevicePreference;
 use node::{CommonSet, DirectWork, Engine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
 use sampling::Impostors;
 use scene::{Limits, MissingTextures, Scene, SceneSpec};
+
+use crate::stage::sample_set;
 
 const LIGHTING: &str = "shadows, reflections 1";
 const HASH: &str = "a teapot before a mirror";
@@ -33,7 +33,7 @@ impl Stand {
     }
 
     fn set(&self, cameras: &[impl Copy + Into<Camera>], is_common: bool) -> SharedSet {
-        let set = common::sample_set(&self.engine, (HASH, &self.scene), cameras, LIGHTING);
+        let set = sample_set(&self.engine, (HASH, &self.scene), cameras, LIGHTING);
         self.engine.upload(&SampleSet { is_common, ..set }, TURN).expect("a set")
     }
 
@@ -46,7 +46,7 @@ impl Stand {
     /// A layered depth cube of the whole scene.
     fn base(&self, side: u32) -> CommonSet {
         let grid = CubeGrid::around(&self.scene.bounds(), side).expect("a grid");
-        let like = common::sample_set(&self.engine, (HASH, &self.scene), &[camera()], LIGHTING);
+        let like = sample_set(&self.engine, (HASH, &self.scene), &[camera()], LIGHTING);
         let work = SampleWork {
             scene_hash: HASH.to_owned(),
             cameras: grid.cameras().map(SampleCamera::from).to_vec(),
@@ -241,6 +241,6 @@ fn sets_of_other_devices_are_refused_as_mirrors() {
 fn samples_are_those_of_lighting_without_glossy_reflections() {
     let stand = Stand::new();
     let [glossy, plain] = ["shadows, glossy 4", "shadows"]
-        .map(|lighting| common::sample_set(&stand.engine, (HASH, &stand.scene), &[camera()], lighting).images);
+        .map(|lighting| sample_set(&stand.engine, (HASH, &stand.scene), &[camera()], lighting).images);
     assert!(glossy == plain);
 }

@@ -1,8 +1,6 @@
 //! An environment map goes with the scene's package to every engine: views from samples show and mirror it as direct ones
 //! do.
 
-mod common;
-
 use std::f32::consts::PI;
 
 use depth_image::{EnvironmentMap, PinholeCamera, View, ViewPlanes};
@@ -12,6 +10,8 @@ use gpu::DevicePreference;
 use node::{DirectWork, Engine, EngineError, Turn, ViewWork, WorkClass};
 use scene::procedural::uv_sphere;
 use scene::{Material, Scene, pack};
+
+use crate::stage::sample_set;
 
 const LIGHTING: &str = "soft 4";
 const HASH: &str = "a ball under a map";
@@ -36,7 +36,7 @@ fn camera(x: f32) -> PinholeCamera {
 fn from_samples(engine: &GpuEngine, scene: &Scene) -> View {
     let turn = Turn::of(WorkClass::Batch);
     let cameras = [-0.4, -0.1, 0.2, 0.5].map(camera);
-    let set = common::sample_set(engine, (HASH, scene), &cameras, LIGHTING);
+    let set = sample_set(engine, (HASH, scene), &cameras, LIGHTING);
     let without_scene = GpuEngine::open(DevicePreference::Software).expect("an engine").upload(&set, turn).err();
     assert_eq!(without_scene, Some(EngineError::UnknownScene { hash: HASH.to_owned() }));
     let set = engine.upload(&set, turn).expect("a set");

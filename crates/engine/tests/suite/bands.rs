@@ -1,7 +1,5 @@
 //! Views with more pixels than a device's buffers hold are made in bands, and are what they would be in one piece.
 
-mod common;
-
 use depth_image::{Antialias, PinholeCamera, VIEW_REACH_PX, View, ViewPart, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec2, Vec3};
@@ -9,6 +7,8 @@ use gpu::DevicePreference;
 use node::{DirectWork, Engine, SampleSet, Turn, ViewWork, WorkClass};
 use scene::Scene;
 use scene::procedural::uv_sphere;
+
+use crate::stage::sample_set;
 
 const LIGHTING: &str = "soft 2";
 const HASH: &str = "a ball";
@@ -36,7 +36,7 @@ fn crop_camera() -> PinholeCamera {
 
 fn samples(engine: &GpuEngine, scene: &Scene) -> SampleSet {
     let cameras = [-0.5, 0.5].map(|x| camera(x, UVec2::new(320, 240)));
-    common::sample_set(engine, (HASH, scene), &cameras, LIGHTING)
+    sample_set(engine, (HASH, scene), &cameras, LIGHTING)
 }
 
 /// The share of the crop's bytes that differ by more than rounding, and how many pixels show the ball. What is beyond the
