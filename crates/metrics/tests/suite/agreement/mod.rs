@@ -1,8 +1,6 @@
 //! PSNR, SSIM and FLIP against independent implementations: scikit-image 0.26.0 and flip-evaluator 1.7.
 //! `reference_values.py` beside this file printed the table.
 
-#![allow(clippy::unwrap_used)]
-
 mod pairs;
 
 use metrics::{Rgb8Image, flip_map, psnr_db, ssim_map};

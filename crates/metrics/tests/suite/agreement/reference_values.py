@@ -1,4 +1,4 @@
-"""Prints the table of main.rs from the pairs that the example `compare_pairs` wrote.
+"""Prints the table of mod.rs from the pairs that the example `compare_pairs` wrote.
 
     pip install scikit-image flip-evaluator pillow
     cargo run --release -p metrics --example compare_pairs -- FOLDER

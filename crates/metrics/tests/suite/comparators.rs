@@ -1,7 +1,5 @@
 //! All image metrics on one pair of patterns.
 
-#![allow(clippy::unwrap_used)]
-
 use metrics::{MetricsError, PdiffSettings, PixelClass, Rgb8Image, class_mask, flip_map, pdiff_map, psnr_db, ssim_map};
 
 fn pattern(shift: usize) -> Rgb8Image<'static> {
