@@ -1,5 +1,4 @@
 //! Camera files survive a round trip, and faults are named.
-#![allow(clippy::unwrap_used)]
 
 use app_core::camera_file::{CameraFault, MAX_FILE_BYTES, Placement, read};
 use app_core::camera_record::{self, NamedCamera, write};

@@ -1,5 +1,4 @@
 //! A model from a file fills the default picture.
-#![allow(clippy::unwrap_used)]
 
 use std::f32::consts::{PI, TAU};
 use std::fmt::Write as _;
