@@ -1,43 +1,33 @@
 //! Sampling on the software device: the planes that were asked for, and batches.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use depth_image::{Camera, CameraError, DepthImage, PinholeCamera, ViewCell};
 use glam::{UVec2, Vec3};
-use gpu::{DevicePreference, Gpu};
-use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, SamplePlanes, Visibility};
-use sampling::{Rig, SampleWork, Sampler, SamplingError, SamplingMethod, renderer};
+use render::{DrawWork, GpuScene, Lighting, RenderError, SamplePlanes, Visibility};
+use sampling::{Rig, SampleWork, SamplingError, SamplingMethod};
 use scene::procedural::courtyard;
 
-struct Device {
-    sampler: Sampler,
-    scene: GpuScene,
+use crate::stage::{device, pinholes, unlit, upload};
+
+struct Yard {
+    on_device: GpuScene,
     rig: Rig,
 }
 
-/// The software device of this program; a test without one fails.
-fn device() -> &'static Device {
-    static DEVICE: OnceLock<Device> = OnceLock::new();
-    DEVICE.get_or_init(|| {
-        let gpu: Arc<Gpu> = Gpu::open(DevicePreference::Software).expect("a software device");
-        let yard = courtyard();
-        Device {
-            sampler: Sampler::sharing(Arc::new(renderer(&gpu).expect("a renderer"))),
-            scene: GpuScene::upload(&gpu, &yard).expect("a scene"),
-            rig: Rig::two_plane(&yard.bounds(), 2.5).expect("a rig"),
-        }
+/// The courtyard, uploaded once for all tests of this file.
+fn yard() -> &'static Yard {
+    static YARD: OnceLock<Yard> = OnceLock::new();
+    YARD.get_or_init(|| {
+        let scene = courtyard();
+        let rig = Rig::two_plane(&scene.bounds(), 2.5).expect("a rig");
+        Yard { on_device: upload(&scene), rig }
     })
 }
 
 fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, SamplingError> {
-    let draw = DrawWork {
-        scene: &device().scene,
-        lighting: Lighting::default(),
-        scene_time_s: 0.0,
-        visibility: Visibility::Triangles,
-        refinement: Refinement::default(),
-        turn: Default::default(),
-    };
+    let lighting = Lighting::default();
+    let draw = DrawWork { lighting, visibility: Visibility::Triangles, ..unlit(&yard().on_device) };
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
     let method = SamplingMethod::CONVENTIONAL;
     device().sampler.sample(&SampleWork { draw, cameras, wanted: &wanted, method, planes, temporal_reference_s: None })
@@ -46,13 +36,13 @@ fn sample(cameras: &[Camera], planes: SamplePlanes) -> Result<Vec<DepthImage>, S
 /// More than one submission holds, of two sizes.
 fn cameras() -> Vec<Camera> {
     let sizes = [UVec2::new(40, 30), UVec2::new(33, 17)];
-    let cell = ViewCell::between(&device().rig.samples(sizes[0])).expect("four cameras");
+    let cell = ViewCell::between(&yard().rig.samples(sizes[0])).expect("four cameras");
     sizes.into_iter().flat_map(|size_px| cell.spread(20, size_px)).map(Camera::Pinhole).collect()
 }
 
 #[test]
 fn requested_planes_are_present() {
-    let cameras: Vec<Camera> = device().rig.samples(UVec2::new(40, 30)).into_iter().map(Camera::Pinhole).collect();
+    let cameras = pinholes(&yard().rig.samples(UVec2::new(40, 30)));
     let mut depth = None;
     for (normal, surface_id) in [(false, false), (true, false), (false, true), (true, true)] {
         let images = sample(&cameras, SamplePlanes { normal, surface_id, ..SamplePlanes::default() }).expect("images");
