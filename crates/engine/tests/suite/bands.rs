@@ -1,14 +1,12 @@
 //! Views with more pixels than a device's buffers hold are made in bands, and are what they would be in one piece.
 
 use depth_image::{Antialias, PinholeCamera, VIEW_REACH_PX, View, ViewPart, ViewPlanes};
-use engine::GpuEngine;
 use glam::{UVec2, Vec2, Vec3};
-use gpu::DevicePreference;
 use node::{DirectWork, Engine, SampleSet, Turn, ViewWork, WorkClass};
 use scene::Scene;
 use scene::procedural::uv_sphere;
 
-use crate::stage::sample_set;
+use crate::stage::{engine, sample_set};
 
 const LIGHTING: &str = "soft 2";
 const HASH: &str = "a ball";
@@ -34,9 +32,9 @@ fn crop_camera() -> PinholeCamera {
     view_camera().part(&ViewPart { first_px: UVec2::new(0, CROP[0]), size_px })
 }
 
-fn samples(engine: &GpuEngine, scene: &Scene) -> SampleSet {
+fn samples(scene: &Scene) -> SampleSet {
     let cameras = [-0.5, 0.5].map(|x| camera(x, UVec2::new(320, 240)));
-    sample_set(engine, (HASH, scene), &cameras, LIGHTING)
+    sample_set((HASH, scene), &cameras, LIGHTING)
 }
 
 /// The share of the crop's bytes that differ by more than rounding, and how many pixels show the ball. What is beyond the
@@ -54,20 +52,19 @@ fn differences(whole: &View, crop: &View) -> (f64, usize) {
 
 #[test]
 fn a_view_in_bands_is_its_crops() {
-    let engine = GpuEngine::open(DevicePreference::Software).expect("an engine");
     let scene = uv_sphere(1.0, 96);
-    engine.put_scene(HASH, &scene).expect("a scene");
-    let set = engine.upload(&samples(&engine, &scene), TURN).expect("a set");
+    engine().put_scene(HASH, &scene).expect("a scene");
+    let set = engine().upload(&samples(&scene), TURN).expect("a set");
     let planes = ViewPlanes { antialias: Antialias::of(2).expect("offered"), ..ViewPlanes::ALL };
     for direct in [false, true] {
         let views = [view_camera(), crop_camera()].map(|camera| {
             let cameras = vec![camera];
             let views = if direct {
                 let (scene_hash, lighting) = (HASH.to_owned(), LIGHTING.to_owned());
-                engine.draw_direct(&DirectWork { scene_hash, cameras, lighting, scene_time_s: 0.0, planes }, TURN)
+                engine().draw_direct(&DirectWork { scene_hash, cameras, lighting, scene_time_s: 0.0, planes }, TURN)
             } else {
                 let work = ViewWork { cameras, method: "joint_carve".to_owned(), planes };
-                engine.reconstruct(set.as_ref(), &work, TURN)
+                engine().reconstruct(set.as_ref(), &work, TURN)
             };
             views.expect("a view").remove(0)
         });

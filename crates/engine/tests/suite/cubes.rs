@@ -1,37 +1,34 @@
 //! A layered depth cube by the engine alone, as a sampler sends it and a compositor gets it.
 
+use std::sync::OnceLock;
+
 use cluster::Refinement;
 use codec::{DecodeLimits, decode_sample_image, encode_sample_image};
 use depth_image::{
     CubeGrid, LightDirections, LightFieldCamera, PinholeCamera, SampleCamera, SampleImage, View, ViewPlanes,
     linear_from_rgb9e5,
 };
-use engine::GpuEngine;
 use glam::{UVec2, Vec3};
-use gpu::DevicePreference;
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork, SharedSet, Turn, ViewWork, WorkClass};
-use scene::{Limits, MissingTextures, Scene, SceneSpec};
+use scene::Scene;
 
-use crate::stage::sample_set;
+use crate::stage::{engine, loaded, sample_set};
 
 const HASH: &str = "a box with mirrors";
 const LIGHTING: &str = "shadows, reflections 3";
 const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
 
 struct Stand {
-    engine: GpuEngine,
     scene: Scene,
 }
 
-impl Stand {
-    fn new() -> Self {
-        let spec: SceneSpec = "mirror-box".parse().expect("a name");
-        let scene = spec.load(&Limits::default(), MissingTextures::Refuse).expect("a scene");
-        let engine = GpuEngine::open(DevicePreference::Software).expect("an engine");
-        engine.put_scene(HASH, &scene).expect("a scene");
-        Self { engine, scene }
-    }
+/// The stand of all tests of this file: its scene is loaded once.
+fn stand() -> &'static Stand {
+    static STAND: OnceLock<Stand> = OnceLock::new();
+    STAND.get_or_init(|| Stand { scene: loaded(HASH, "mirror-box") })
+}
 
+impl Stand {
     fn cameras(&self) -> [SampleCamera; 3] {
         let grid = CubeGrid::around(&self.scene.bounds(), 160).expect("a grid");
         [0, 1, 2].map(|axis| grid.camera(axis).into())
@@ -43,7 +40,7 @@ impl Stand {
             cameras: cameras.to_vec(),
             wanted: (0..cameras.len() as u32).collect(),
             sampling: sampling.to_owned(),
-            planes: self.engine.sample_planes("layered").expect("a method"),
+            planes: engine().sample_planes("layered").expect("a method"),
             lighting: LIGHTING.to_owned(),
             scene_time_s: 0.0,
             temporal_reference_s: None,
@@ -56,7 +53,7 @@ impl Stand {
         let mut bytes = 0;
         let tile = |number: u32| {
             let camera = camera.tile(number, tiles);
-            let images = self.engine.sample(&self.work(&[camera], "layered_cube:160"), TURN).expect("an image");
+            let images = engine().sample(&self.work(&[camera], "layered_cube:160"), TURN).expect("an image");
             let encoded = encode_sample_image(&images[0]).expect("planes of one size");
             bytes += encoded.payload.len();
             decode_sample_image(&encoded.header, &camera, &encoded.payload, &DecodeLimits::default()).expect("an image")
@@ -66,20 +63,20 @@ impl Stand {
     }
 
     fn set(&self, images: Vec<SampleImage>) -> SharedSet {
-        let like = sample_set(&self.engine, (HASH, &self.scene), &[camera()], LIGHTING);
+        let like = sample_set((HASH, &self.scene), &[camera()], LIGHTING);
         let set = SampleSet { images: images.try_into().expect("a cube"), ..like };
-        self.engine.upload(&set, TURN).expect("a set")
+        engine().upload(&set, TURN).expect("a set")
     }
 
     fn view(&self, set: &SharedSet, method: &str) -> Result<View, EngineError> {
         let work = ViewWork { cameras: vec![camera()], method: method.to_owned(), planes: ViewPlanes::ALL };
-        Ok(self.engine.reconstruct(set.as_ref(), &work, TURN)?.remove(0))
+        Ok(engine().reconstruct(set.as_ref(), &work, TURN)?.remove(0))
     }
 
     fn direct(&self) -> View {
         let (scene_hash, lighting, cameras) = (HASH.to_owned(), LIGHTING.to_owned(), vec![camera()]);
         let work = DirectWork { scene_hash, cameras, lighting, scene_time_s: 0.0, planes: ViewPlanes::COLOR };
-        self.engine.draw_direct(&work, TURN).expect("a view").remove(0)
+        engine().draw_direct(&work, TURN).expect("a view").remove(0)
     }
 }
 
@@ -112,7 +109,7 @@ fn rms(a: &View, b: &View) -> f64 {
 
 #[test]
 fn a_cube_that_was_sent_in_tiles_shows_the_scene_and_what_mirrors_show() {
-    let stand = Stand::new();
+    let stand = stand();
     let cameras = stand.cameras();
     let (whole, bytes): (Vec<_>, Vec<_>) = cameras.iter().map(|camera| stand.sent(camera, 1)).unzip();
     let (tiled, _): (Vec<_>, Vec<_>) = cameras.iter().map(|camera| stand.sent(camera, 3)).unzip();
@@ -132,18 +129,18 @@ fn a_cube_that_was_sent_in_tiles_shows_the_scene_and_what_mirrors_show() {
 
 #[test]
 fn methods_and_cameras_that_do_not_suit_are_refused_by_name() {
-    let stand = Stand::new();
+    let stand = stand();
     let cube: Vec<_> = stand.cameras().iter().map(|camera| stand.sent(camera, 1).0).collect();
     let refused = field(stand.view(&stand.set(cube.clone()), "joint_carve").expect_err("no depth images"));
     assert_eq!(refused.0, "reconstruction_method", "{}", refused.1);
-    let depth = stand.engine.sample(&stand.work(&[camera().into()], "conventional"), TURN).expect("an image");
+    let depth = engine().sample(&stand.work(&[camera().into()], "conventional"), TURN).expect("an image");
     let refused = field(stand.view(&stand.set(depth.clone()), "layered").expect_err("no cube"));
     assert_eq!(refused.0, "reconstruction_method", "{}", refused.1);
     let lines = stand.work(&stand.cameras(), "conventional");
-    let refused = field(stand.engine.sample(&lines, TURN).expect_err("lines"));
+    let refused = field(engine().sample(&lines, TURN).expect_err("lines"));
     assert_eq!(refused.0, "sampling_method", "{}", refused.1);
     let views = stand.work(&[camera().into()], "layered_cube:64");
-    let refused = field(stand.engine.sample(&views, TURN).expect_err("a camera of a view"));
+    let refused = field(engine().sample(&views, TURN).expect_err("a camera of a view"));
     assert_eq!(refused.0, "sample_cameras", "{}", refused.1);
     let mixed = [&cube[..2], &depth].concat();
     assert!(depth_image::SampleImages::try_from(mixed).is_err());
@@ -152,11 +149,11 @@ fn methods_and_cameras_that_do_not_suit_are_refused_by_name() {
 
 #[test]
 fn a_light_field_is_sampled_where_mirrors_are_followed_and_views_gather_in_it() {
-    let stand = Stand::new();
+    let stand = stand();
     let around = LightFieldCamera::around(stand.scene.bounds(), LightDirections::D66, 32);
     let sampled = |lighting: &str| {
         let work = stand.work(&[around.into()], "layered_cube:160+light_field:66x32");
-        stand.engine.sample(&SampleWork { lighting: lighting.to_owned(), ..work }, TURN)
+        engine().sample(&SampleWork { lighting: lighting.to_owned(), ..work }, TURN)
     };
     let count = light_samples(&sampled("shadows, reflections 1").expect("a light field"));
     // As for a session that has lost its reflections under overload.
@@ -177,12 +174,12 @@ fn a_light_field_is_sampled_where_mirrors_are_followed_and_views_gather_in_it() 
 /// A ray a lamp, then two, four and eight: the places stay, and the light comes nearer to that of all rays.
 #[test]
 fn light_in_steps_refines_a_light_field_as_it_does_the_cube() {
-    let stand = Stand::new();
+    let stand = stand();
     let around = LightFieldCamera::around(stand.scene.bounds(), LightDirections::D66, 16);
     let sampled = |camera: SampleCamera, refinement| {
         let work = stand.work(&[camera], "layered_cube:160+light_field:66x16");
         let work = SampleWork { lighting: "soft 8, reflections 2".to_owned(), refinement, ..work };
-        stand.engine.sample(&work, TURN).expect("an image").remove(0)
+        engine().sample(&work, TURN).expect("an image").remove(0)
     };
     let steps = (0..4).map(|step| Refinement { step, steps: 4 });
     let light = |image: &SampleImage| match image {

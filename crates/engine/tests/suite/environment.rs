@@ -4,14 +4,12 @@
 use std::f32::consts::PI;
 
 use depth_image::{EnvironmentMap, PinholeCamera, View, ViewPlanes};
-use engine::GpuEngine;
 use glam::{UVec2, Vec3};
-use gpu::DevicePreference;
-use node::{DirectWork, Engine, EngineError, Turn, ViewWork, WorkClass};
+use node::{DirectWork, Engine, EngineError, SampleSet, Turn, ViewWork, WorkClass};
 use scene::procedural::uv_sphere;
 use scene::{Material, Scene, pack};
 
-use crate::stage::sample_set;
+use crate::stage::{engine, sample_set};
 
 const LIGHTING: &str = "soft 4";
 const HASH: &str = "a ball under a map";
@@ -33,24 +31,24 @@ fn camera(x: f32) -> PinholeCamera {
     PinholeCamera::looking_at(Vec3::new(x, 0.5, 3.0), Vec3::ZERO, Vec3::Y, 0.9, UVec2::new(96, 72))
 }
 
-fn from_samples(engine: &GpuEngine, scene: &Scene) -> View {
+fn from_samples(scene: &Scene) -> View {
     let turn = Turn::of(WorkClass::Batch);
     let cameras = [-0.4, -0.1, 0.2, 0.5].map(camera);
-    let set = sample_set(engine, (HASH, scene), &cameras, LIGHTING);
-    let without_scene = GpuEngine::open(DevicePreference::Software).expect("an engine").upload(&set, turn).err();
-    assert_eq!(without_scene, Some(EngineError::UnknownScene { hash: HASH.to_owned() }));
-    let set = engine.upload(&set, turn).expect("a set");
+    let set = sample_set((HASH, scene), &cameras, LIGHTING);
+    let elsewhere = SampleSet { scene_hash: "a scene elsewhere".to_owned(), ..set.clone() };
+    let refused = engine().upload(&elsewhere, turn).err();
+    assert_eq!(refused, Some(EngineError::UnknownScene { hash: elsewhere.scene_hash }));
+    let set = engine().upload(&set, turn).expect("a set");
     let work =
         ViewWork { cameras: vec![camera(0.05)], method: "joint_carve".to_owned(), planes: ViewPlanes::WITH_DEPTH };
-    engine.reconstruct(set.as_ref(), &work, turn).expect("a view").remove(0)
+    engine().reconstruct(set.as_ref(), &work, turn).expect("a view").remove(0)
 }
 
 #[test]
 fn a_view_from_samples_shows_and_mirrors_the_map_of_the_package() {
     let scene = scene();
-    let engine = GpuEngine::open(DevicePreference::Software).expect("an engine");
-    engine.load_scene(HASH, &pack(&scene)).expect("a scene");
-    let view = from_samples(&engine, &scene);
+    engine().load_scene(HASH, &pack(&scene)).expect("a scene");
+    let view = from_samples(&scene);
     let direct = DirectWork {
         scene_hash: HASH.to_owned(),
         cameras: vec![camera(0.05)],
@@ -58,7 +56,7 @@ fn a_view_from_samples_shows_and_mirrors_the_map_of_the_package() {
         scene_time_s: 0.0,
         planes: ViewPlanes::WITH_DEPTH,
     };
-    let direct = engine.draw_direct(&direct, Turn::of(WorkClass::Batch)).expect("a view").remove(0);
+    let direct = engine().draw_direct(&direct, Turn::of(WorkClass::Batch)).expect("a view").remove(0);
     let depths = view
         .inverse_depth_per_m
         .as_ref()

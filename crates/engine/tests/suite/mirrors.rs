@@ -1,17 +1,15 @@
 //! Views of sets with mirror cells show the scene in mirrors, about as views that are drawn directly do.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use cluster::{CommonCell, CommonKind, Refinement, SamplePlanes};
 use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera, ProvenanceKind, SampleCamera, View, ViewPlanes};
-use engine::GpuEngine;
 use glam::{UVec2, Vec3};
-use gpu::DevicePreference;
 use node::{CommonSet, DirectWork, Engine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
 use sampling::Impostors;
-use scene::{Limits, MissingTextures, Scene, SceneSpec};
+use scene::Scene;
 
-use crate::stage::sample_set;
+use crate::stage::{engine, loaded, sample_set};
 
 const LIGHTING: &str = "shadows, reflections 1";
 const HASH: &str = "a teapot before a mirror";
@@ -19,22 +17,19 @@ const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
 
 /// A scene on the software device, and what its views are made from.
 struct Stand {
-    engine: GpuEngine,
     scene: Scene,
 }
 
-impl Stand {
-    fn new() -> Self {
-        let spec: SceneSpec = "teapot-mirror".parse().expect("a name");
-        let scene = spec.load(&Limits::default(), MissingTextures::Refuse).expect("a scene");
-        let engine = GpuEngine::open(DevicePreference::Software).expect("an engine");
-        engine.put_scene(HASH, &scene).expect("a scene");
-        Self { engine, scene }
-    }
+/// The stand of all tests of this file: its scene is loaded once.
+fn stand() -> &'static Stand {
+    static STAND: OnceLock<Stand> = OnceLock::new();
+    STAND.get_or_init(|| Stand { scene: loaded(HASH, "teapot-mirror") })
+}
 
+impl Stand {
     fn set(&self, cameras: &[impl Copy + Into<Camera>], is_common: bool) -> SharedSet {
-        let set = sample_set(&self.engine, (HASH, &self.scene), cameras, LIGHTING);
-        self.engine.upload(&SampleSet { is_common, ..set }, TURN).expect("a set")
+        let set = sample_set((HASH, &self.scene), cameras, LIGHTING);
+        engine().upload(&SampleSet { is_common, ..set }, TURN).expect("a set")
     }
 
     fn mirrors(&self, impostors: Impostors) -> Vec<CommonSet> {
@@ -46,7 +41,7 @@ impl Stand {
     /// A layered depth cube of the whole scene.
     fn base(&self, side: u32) -> CommonSet {
         let grid = CubeGrid::around(&self.scene.bounds(), side).expect("a grid");
-        let like = sample_set(&self.engine, (HASH, &self.scene), &[camera()], LIGHTING);
+        let like = sample_set((HASH, &self.scene), &[camera()], LIGHTING);
         let work = SampleWork {
             scene_hash: HASH.to_owned(),
             cameras: grid.cameras().map(SampleCamera::from).to_vec(),
@@ -58,15 +53,15 @@ impl Stand {
             temporal_reference_s: None,
             refinement: Refinement::default(),
         };
-        let images = self.engine.sample(&work, TURN).expect("layers").try_into().expect("a cube");
-        let set = self.engine.upload(&SampleSet { images, is_common: true, ..like }, TURN).expect("a set");
+        let images = engine().sample(&work, TURN).expect("layers").try_into().expect("a cube");
+        let set = engine().upload(&SampleSet { images, is_common: true, ..like }, TURN).expect("a set");
         (CommonCell { kind: CommonKind::Base, ..cell(self.scene.bounds()) }, set)
     }
 
     fn view(&self, set: &dyn UploadedSet) -> View {
         let method = "joint_carve".to_owned();
         let work = ViewWork { cameras: vec![camera()], method, planes: ViewPlanes::ALL };
-        self.engine.reconstruct(set, &work, TURN).expect("a view").remove(0)
+        engine().reconstruct(set, &work, TURN).expect("a view").remove(0)
     }
 
     fn direct(&self, lighting: &str) -> View {
@@ -77,7 +72,7 @@ impl Stand {
             scene_time_s: 0.0,
             planes: ViewPlanes::COLOR,
         };
-        self.engine.draw_direct(&work, TURN).expect("a view").remove(0)
+        engine().draw_direct(&work, TURN).expect("a view").remove(0)
     }
 }
 
@@ -107,7 +102,7 @@ fn difference(a: &View, b: &View, of: &[bool]) -> f64 {
 
 #[test]
 fn views_of_sets_with_mirror_cells_show_the_scene_in_mirrors() {
-    let stand = Stand::new();
+    let stand = stand();
     let truth = stand.direct(LIGHTING);
     let plain = stand.direct("shadows");
     let differs = |(a, b): (&[u8], &[u8])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 8);
@@ -117,7 +112,7 @@ fn views_of_sets_with_mirror_cells_show_the_scene_in_mirrors() {
     let set = stand.set(&[camera()], false);
     let without = stand.view(set.as_ref());
     let with =
-        stand.view(stand.engine.with_common(set.clone(), stand.mirrors(Impostors::default())).expect("a set").as_ref());
+        stand.view(engine().with_common(set.clone(), stand.mirrors(Impostors::default())).expect("a set").as_ref());
     let [before, after] = [&without, &with].map(|view| difference(view, &truth, &mirrored));
     println!("mean difference in mirrors: {before:.1} codes without mirror cells, {after:.1} with");
     assert!(after < 0.6 * before, "{before} {after}");
@@ -126,26 +121,26 @@ fn views_of_sets_with_mirror_cells_show_the_scene_in_mirrors() {
     let kinds = with.provenance.as_ref().expect("provenance").iter().map(|provenance| provenance.kind());
     let guessed = kinds.zip(&mirrored).filter(|(kind, is)| **is && *kind == ProvenanceKind::Guessed).count();
     assert!(guessed * 50 < mirrored.iter().filter(|is| **is).count(), "{guessed} guessed");
-    let again = stand.view(stand.engine.with_common(set, stand.mirrors(Impostors::default())).expect("a set").as_ref());
+    let again = stand.view(engine().with_common(set, stand.mirrors(Impostors::default())).expect("a set").as_ref());
     assert_eq!(with.srgb8, again.srgb8);
 }
 
 /// Single-pole images show the teapot; the rest of the mirror stays.
 #[test]
 fn single_pole_images_show_the_object_in_mirrors() {
-    let stand = Stand::new();
+    let stand = stand();
     let truth = stand.direct(LIGHTING);
     let set = stand.set(&[camera()], false);
     let without = stand.view(set.as_ref());
     let mirrors = stand.mirrors(Impostors::SinglePoles { images: 2 });
-    let with = stand.view(stand.engine.with_common(set.clone(), mirrors).expect("a set").as_ref());
+    let with = stand.view(engine().with_common(set.clone(), mirrors).expect("a set").as_ref());
     let differs = |(a, b): (&[u8], &[u8])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 8);
     let found: Vec<bool> = with.srgb8.chunks_exact(3).zip(without.srgb8.chunks_exact(3)).map(differs).collect();
     let [before, after] = [&without, &with].map(|view| difference(view, &truth, &found));
     let count = found.iter().filter(|is| **is).count();
     println!("{count} pixels: mean difference {before:.1} codes without mirror cells, {after:.1} with");
     assert!(count > 40 && after < 0.7 * before, "{count}: {before} {after}");
-    let refused = stand.engine.reconstruct(
+    let refused = engine().reconstruct(
         stand.mirrors(Impostors::SinglePoles { images: 1 })[0].1.as_ref(),
         &ViewWork { cameras: vec![camera()], method: "joint_carve".to_owned(), planes: ViewPlanes::COLOR },
         TURN,
@@ -156,13 +151,13 @@ fn single_pole_images_show_the_object_in_mirrors() {
 /// Of one image, or of the teapot alone, mirrors do not know all that they show.
 #[test]
 fn a_base_tells_what_the_images_of_mirrors_leave_unknown() {
-    let stand = Stand::new();
+    let stand = stand();
     let (truth, set, base) = (stand.direct(LIGHTING), stand.set(&[camera()], false), stand.base(256));
     for impostors in [Impostors::Pinholes { images: 1 }, Impostors::SinglePoles { images: 1 }] {
         let mirrors = stand.mirrors(impostors);
         let both = mirrors.iter().cloned().chain([base.clone()]).collect();
         let [without, with] = [mirrors.clone(), both]
-            .map(|common| stand.view(stand.engine.with_common(set.clone(), common).expect("a set").as_ref()));
+            .map(|common| stand.view(engine().with_common(set.clone(), common).expect("a set").as_ref()));
         let guessed = marked(&without, ProvenanceKind::Guessed);
         let [before, after] = [&without, &with].map(|view| difference(view, &truth, &guessed));
         let count = |view: &View, kind| marked(view, kind).into_iter().filter(|is| *is).count();
@@ -180,10 +175,10 @@ fn a_base_tells_what_the_images_of_mirrors_leave_unknown() {
 
 #[test]
 fn a_base_shows_what_mirrors_without_images_show() {
-    let stand = Stand::new();
+    let stand = stand();
     let (truth, plain) = (stand.direct(LIGHTING), stand.direct("shadows"));
     let set = stand.set(&[camera()], false);
-    let with = stand.view(stand.engine.with_common(set.clone(), vec![stand.base(256)]).expect("a set").as_ref());
+    let with = stand.view(engine().with_common(set.clone(), vec![stand.base(256)]).expect("a set").as_ref());
     let without = stand.view(set.as_ref());
     let differs = |(a, b): (&[u8], &[u8])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 8);
     let mirrored: Vec<bool> = truth.srgb8.chunks_exact(3).zip(plain.srgb8.chunks_exact(3)).map(differs).collect();
@@ -198,12 +193,12 @@ fn a_base_shows_what_mirrors_without_images_show() {
 /// than a coarser one.
 #[test]
 fn a_base_that_may_take_the_place_of_images_shows_mirrors_as_well() {
-    let stand = Stand::new();
+    let stand = stand();
     let (truth, plain, set) = (stand.direct(LIGHTING), stand.direct("shadows"), stand.set(&[camera()], false));
     let differs = |(a, b): (&[u8], &[u8])| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 8);
     let mirrored: Vec<bool> = truth.srgb8.chunks_exact(3).zip(plain.srgb8.chunks_exact(3)).map(differs).collect();
     let error = |common| {
-        let view = stand.view(stand.engine.with_common(set.clone(), common).expect("a set").as_ref());
+        let view = stand.view(engine().with_common(set.clone(), common).expect("a set").as_ref());
         difference(&view, &truth, &mirrored)
     };
     let mirror = sampling::mirrors(&stand.scene, Impostors::default()).0.remove(0);
@@ -221,26 +216,26 @@ fn a_base_that_may_take_the_place_of_images_shows_mirrors_as_well() {
 
 #[test]
 fn sets_of_other_devices_are_refused_as_mirrors() {
-    let stand = Stand::new();
+    let stand = stand();
     let set = stand.set(&[camera()], false);
     struct Foreign;
     impl UploadedSet for Foreign {}
     let bounds = stand.scene.bounds();
     let refused =
-        stand.engine.with_common(set.clone(), vec![(cell(bounds), Arc::new(Foreign))]).err().map(|e| e.to_string());
+        engine().with_common(set.clone(), vec![(cell(bounds), Arc::new(Foreign))]).err().map(|e| e.to_string());
     assert_eq!(refused.as_deref(), Some("device: a sample set of another device"));
-    assert!(stand.engine.with_common(Arc::new(Foreign), Vec::new()).is_err());
-    let too_many = stand.engine.with_common(set.clone(), vec![(cell(bounds), set); 9]).expect("a set");
+    assert!(engine().with_common(Arc::new(Foreign), Vec::new()).is_err());
+    let too_many = engine().with_common(set.clone(), vec![(cell(bounds), set); 9]).expect("a set");
     let work = ViewWork { cameras: vec![camera()], method: "joint_carve".to_owned(), planes: ViewPlanes::COLOR };
-    let refused = stand.engine.reconstruct(too_many.as_ref(), &work, TURN).err().map(|error| error.to_string());
+    let refused = engine().reconstruct(too_many.as_ref(), &work, TURN).err().map(|error| error.to_string());
     assert_eq!(refused.as_deref(), Some("common_cells of mirrors: views have at most 8 mirror cells, not 9"));
 }
 
 /// Light that depends on the viewer is no part of samples.
 #[test]
 fn samples_are_those_of_lighting_without_glossy_reflections() {
-    let stand = Stand::new();
-    let [glossy, plain] = ["shadows, glossy 4", "shadows"]
-        .map(|lighting| sample_set(&stand.engine, (HASH, &stand.scene), &[camera()], lighting).images);
+    let stand = stand();
+    let [glossy, plain] =
+        ["shadows, glossy 4", "shadows"].map(|lighting| sample_set((HASH, &stand.scene), &[camera()], lighting).images);
     assert!(glossy == plain);
 }
