@@ -10,7 +10,7 @@ use tokio::time::timeout;
 use tonic::Code;
 use wire::rpc::{CompositorClient, connect};
 
-use crate::raw::{HEALED, Raw, STILL, compositor_of, greedy, pipeline, seen};
+use super::raw::{HEALED, Raw, STILL, compositor_of, greedy, pipeline, seen};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 2 };
 

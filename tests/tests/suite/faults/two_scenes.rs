@@ -8,7 +8,7 @@ use cluster_tests::cluster::OTHER_SCENE;
 use cluster_tests::processes::{Processes, number_of};
 use cluster_tests::watcher::{Watcher, watched_request};
 
-use crate::{CLOSED, PROGRAM, compositor_of, finish, has_role, sampler_of};
+use super::{CLOSED, PROGRAM, compositor_of, finish, has_role, sampler_of};
 
 /// The longest time without frames of the other scene: less than a fault takes to heal.
 const UNDISTURBED: Duration = Duration::from_secs(2);

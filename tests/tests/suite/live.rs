@@ -1,5 +1,4 @@
 //! Clients receive all requested pictures, whole and each of one set, while nodes come and go.
-#![allow(clippy::unwrap_used)]
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;

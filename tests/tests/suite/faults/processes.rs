@@ -8,7 +8,7 @@ use cluster_tests::processes::{Processes, number_of};
 use cluster_tests::watcher::Watcher;
 use rustix::process::Signal;
 
-use crate::{CLOSED, ONE_WITNESS, PROGRAM, SILENT, compositor_of, finish, has_role, sampler_of};
+use super::{CLOSED, ONE_WITNESS, PROGRAM, SILENT, compositor_of, finish, has_role, sampler_of};
 
 async fn killed(what: &str, victim: fn(&Session) -> String) {
     let mut cluster = Processes::start(PROGRAM, 3).await;

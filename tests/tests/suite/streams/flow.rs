@@ -16,7 +16,7 @@ use tokio::time::timeout;
 use tonic::Code;
 use wire::rpc::{NodeClient, connect};
 
-use crate::raw::{HEALED, Raw, SIZE_PX, STILL, compositor_of, greedy, pipeline, seen};
+use super::raw::{HEALED, Raw, SIZE_PX, STILL, compositor_of, greedy, pipeline, seen};
 
 /// The shift to the cameras of the second cell.
 const AWAY_M: f32 = 3.0;

@@ -17,7 +17,7 @@ use network_proxy::Random;
 use tonic::{Code, Status};
 use wire::rpc::{CoordinatorClient, connect};
 
-use crate::{CLOSED, PROGRAM, finish};
+use super::{CLOSED, PROGRAM, finish};
 
 /// Greatest time of a refusal.
 const AT_ONCE: Duration = Duration::from_secs(1);

@@ -1,5 +1,4 @@
 //! Visitors of a gateway, over its real port: pictures are those of the Rust client, and nobody can break it.
-#![allow(clippy::unwrap_used)]
 
 use std::time::Duration;
 

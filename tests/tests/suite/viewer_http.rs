@@ -1,5 +1,4 @@
 //! Requests of HTTP to a gateway, over its real port: numbers are those of the Rust client, tokens count, places are limited.
-#![allow(clippy::unwrap_used)]
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

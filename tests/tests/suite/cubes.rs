@@ -1,5 +1,4 @@
 //! A layered depth cube in a cluster: one sample set for viewers anywhere.
-#![allow(clippy::unwrap_used)]
 
 use std::f32::consts::TAU;
 use std::time::Duration;

@@ -11,8 +11,8 @@ use tokio_stream::StreamExt as _;
 use tonic::Code;
 use wire::rpc::{CoordinatorClient, connect};
 
-use crate::CLOSED;
-use crate::bad_input::Beside;
+use super::CLOSED;
+use super::bad_input::Beside;
 
 /// Sessions that are opened and dropped, and the time for them.
 const SESSIONS: usize = 10_000;

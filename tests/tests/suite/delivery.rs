@@ -1,5 +1,4 @@
 //! Clusters in one process over real ports: every view arrives once, and from one set.
-#![allow(clippy::unwrap_used)]
 
 use std::collections::HashSet;
 

@@ -1,5 +1,4 @@
 //! A base in a cluster: a layered depth cube beside the images of view cells, which every view is made from.
-#![allow(clippy::unwrap_used)]
 
 use std::f32::consts::{PI, TAU};
 use std::time::Duration;

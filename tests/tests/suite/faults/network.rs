@@ -14,7 +14,7 @@ use network_proxy::{Proxy, Way};
 use tokio_stream::StreamExt as _;
 use wire::rpc::{CompositorClient, connect};
 
-use crate::{CLOSED, PROGRAM, SILENT, compositor_of, finish, has_role, sampler_of};
+use super::{CLOSED, PROGRAM, SILENT, compositor_of, finish, has_role, sampler_of};
 
 /// A cluster whose links can fail.
 struct Network {

@@ -1,5 +1,4 @@
 //! Budgets of sessions on real nodes of the scalar device: promises that are kept, or cannot be.
-#![allow(clippy::unwrap_used)]
 
 use std::io::Write;
 use std::sync::Arc;

@@ -14,7 +14,7 @@ use codec::{ChunkBody, SampleSetId};
 use node::NodeConfig;
 use wire::rpc::{CoordinatorClient, connect};
 
-use crate::{CLOSED, ONE_WITNESS, compositor_of, has_role, sampler_of};
+use super::{CLOSED, ONE_WITNESS, compositor_of, has_role, sampler_of};
 
 const SPOILT: [(&str, Spoil); 8] = [
     ("corrupt", |c| c[1].body = ChunkBody::Data(vec![0; 30].into())),

@@ -1,7 +1,6 @@
 //! Faults, injected into real processes, real sockets and the data between them. Each test checks the client's frames
 //! and the coordinator's records against the invariants, and prints the longest time without frames. `docs/faults.md`
 //! has the table.
-#![allow(clippy::unwrap_used)]
 
 mod bad_input;
 mod chunks;

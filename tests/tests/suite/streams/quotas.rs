@@ -16,7 +16,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::Code;
 use wire::rpc::{CompositorClient, connect};
 
-use crate::raw::{HEALED, Raw, STILL, compositor_of, greedy, narrow, pipeline, seen};
+use super::raw::{HEALED, Raw, STILL, compositor_of, greedy, narrow, pipeline, seen};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_client_that_takes_no_frames_delays_no_other_and_is_cut_off() {

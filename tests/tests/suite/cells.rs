@@ -1,5 +1,4 @@
 //! View cells: views from all around, each made from images of near sample cameras.
-#![allow(clippy::unwrap_used)]
 
 use std::f32::consts::{PI, TAU};
 use std::time::Duration;

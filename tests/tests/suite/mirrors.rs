@@ -1,5 +1,4 @@
 //! Mirror cells: images of what mirrors show, which every view is made from.
-#![allow(clippy::unwrap_used)]
 
 use std::f32::consts::PI;
 use std::time::Duration;

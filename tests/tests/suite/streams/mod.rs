@@ -1,5 +1,4 @@
 //! Live streams: the newest pose counts, and no stream delays another.
-#![allow(clippy::unwrap_used)]
 
 mod flow;
 mod quotas;

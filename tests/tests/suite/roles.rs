@@ -1,5 +1,4 @@
 //! Tiles, relays, changing demand, and nodes' reports of their work.
-#![allow(clippy::unwrap_used)]
 
 use std::num::NonZeroU32;
 use std::time::{Duration, Instant};

@@ -1,5 +1,4 @@
 //! Several workloads are served side by side, and no session ends another.
-#![allow(clippy::unwrap_used)]
 
 use std::time::Duration;
 

@@ -1,5 +1,4 @@
 //! Nodes of a stated speed: views of a slow node are stolen, and K follows V.
-#![allow(clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};

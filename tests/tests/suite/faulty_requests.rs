@@ -1,5 +1,4 @@
 //! Faulty requests are refused by name, and the cluster survives them.
-#![allow(clippy::unwrap_used)]
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
