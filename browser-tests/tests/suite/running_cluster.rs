@@ -1,5 +1,4 @@
 //! The viewer of a cluster that runs already: `deploy/cluster.sh --test` gives its link.
-#![allow(clippy::unwrap_used)]
 
 use browser::input::Drag;
 use browser_tests::visit::{Expected, Visit};
