@@ -6,12 +6,14 @@ use std::time::Duration;
 use client::{Frame, Session, ViewRequest};
 use cluster::{DIRECT, PolicyChoice, SessionRequest, Timeline};
 use cluster_tests::cluster::{Cluster, camera, offer, request, views};
-use cluster_tests::scalar_engine::{Pace, ball_linear, srgb8};
+use cluster_tests::scalar_engine::{ball_linear, srgb8};
+use cluster_tests::watcher::eventually;
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 0.5, set_count: 4 };
 const STILL: Timeline = Timeline { start_s: 1.0, step_s: 0.0, set_count: 1 };
+const SOON: Duration = Duration::from_secs(5);
 
 fn following(timeline: Timeline) -> SessionRequest {
     SessionRequest { follows_mirrors: true, ..request(PolicyChoice::Pipeline, timeline) }
@@ -86,7 +88,7 @@ async fn no_mirror_image_is_sampled_again_when_viewers_move() {
     let epoch = session.plan().assignment.plan_epoch;
     session.set_viewpoints(vec![around(PI)]).await.unwrap();
     let has_moved = || session.plan().assignment.plan_epoch > epoch;
-    cluster_tests::watcher::eventually("a cell there", Duration::from_secs(5), has_moved).await;
+    eventually("a cell there", SOON, has_moved).await;
     let second = frames(&session, view(PI)).await;
     assert_eq!(cluster.take_counts(), [1], "the new cell's alone");
     assert_eq!(mirrored(&first[0]), mirrored(&second[0]));
@@ -104,10 +106,13 @@ async fn a_node_that_is_killed_amid_mirror_images_changes_no_frame() {
     let plan = session.plan().assignment;
     let cell = plan.of_cell(plan.workload.view_cell_count() as u32).unwrap();
     let node: usize = cell.samplers[0].node_name.trim_start_matches('n').parse().unwrap();
-    cluster.engines[node].keep_pace(Pace { image: Duration::from_millis(300), ..Pace::default() });
+    let engine = cluster.engines[node].clone();
+    let mirror_cameras = offer().mirrors.into_iter().flat_map(|mirror| mirror.cameras);
+    mirror_cameras.for_each(|camera| engine.hold_samples_from(camera.reference().eye_in_world));
     let stream = session.render_views(views(MOVING.set_count, 6)).unwrap();
-    tokio::time::sleep(Duration::from_millis(200)).await;
+    eventually("sampling has begun", SOON, || engine.held_calls() > 0).await;
     cluster.nodes[node].kill();
+    engine.release();
     let mut received = stream.all().await.unwrap();
     received.sort_by_key(|frame| frame.request.frame);
     assert_eq!(received.len(), expected.len());
