@@ -1,6 +1,7 @@
 //! A cluster in one process over real loopback ports. Every node has its own runtime, so that a test can kill it
 //! abruptly.
 
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -111,11 +112,17 @@ pub struct Cluster {
 }
 
 /// The package is longer than a message, so that it travels in parts.
-#[must_use]
-pub fn package() -> Bytes {
+static PACKAGE: LazyLock<Bytes> = LazyLock::new(|| {
     let mut package = b"ball over floor".to_vec();
     package.extend((0..1_500_000u32).map(|i| (i * 7 % 251) as u8));
     package.into()
+});
+static PACKAGE_HASH: LazyLock<SceneHash> = LazyLock::new(|| SceneHash::of(&PACKAGE));
+
+/// The package of the scene on offer.
+#[must_use]
+pub fn package() -> Bytes {
+    PACKAGE.clone()
 }
 
 /// Three sample cameras on an arc in front of the ball.
@@ -160,7 +167,7 @@ pub fn cube_grid() -> CubeGrid {
 pub fn offer() -> SceneOffer {
     SceneOffer {
         name: "ball".to_owned(),
-        hash: SceneHash::of(&package()),
+        hash: PACKAGE_HASH.clone(),
         package: package(),
         fits_views: false,
         rig: rig(),
