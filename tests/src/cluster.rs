@@ -233,6 +233,14 @@ pub fn camera(x_m: f32, size_px: UVec2) -> PinholeCamera {
     PinholeCamera::looking_at(Vec3::new(x_m, 1.2, 3.0), Vec3::new(0.0, 0.5, 0.0), Vec3::Y, 0.9, size_px)
 }
 
+/// A camera on a circle around the ball.
+#[must_use]
+pub fn camera_around(azimuth_rad: f32, distance_m: f32, size_px: UVec2) -> PinholeCamera {
+    let target = Vec3::new(0.0, 0.5, 0.0);
+    let eye = target + Vec3::new(distance_m * azimuth_rad.sin(), 0.7, distance_m * azimuth_rad.cos());
+    PinholeCamera::looking_at(eye, target, Vec3::Y, 0.9, size_px)
+}
+
 /// A session of the scalar device.
 #[must_use]
 pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use client::{Session, ViewRequest};
 use cluster::{BudgetRequest, CommonCell, CommonKind, DIRECT, PolicyChoice, SessionRequest, Timeline};
-use cluster_tests::cluster::{CUBE, Cluster, cube_grid, offer, request};
+use cluster_tests::cluster::{CUBE, Cluster, camera_around, cube_grid, offer, request};
 use cluster_tests::watcher::eventually;
 use coordinator::SceneOffer;
 use depth_image::{Aabb, PinholeCamera};
@@ -21,11 +21,8 @@ fn with_base() -> SceneOffer {
     SceneOffer { base: Some((cell, cube_grid())), ..offer }
 }
 
-/// A camera on a circle around the ball.
 fn around(azimuth_rad: f32) -> PinholeCamera {
-    let target = Vec3::new(0.0, 0.5, 0.0);
-    let eye = target + Vec3::new(3.0 * azimuth_rad.sin(), 0.7, 3.0 * azimuth_rad.cos());
-    PinholeCamera::looking_at(eye, target, Vec3::Y, 0.9, UVec2::new(36, 27))
+    camera_around(azimuth_rad, 3.0, UVec2::new(36, 27))
 }
 
 fn asked(viewpoints: Vec<PinholeCamera>) -> SessionRequest {

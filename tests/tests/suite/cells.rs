@@ -5,18 +5,15 @@ use std::time::Duration;
 
 use client::{Frame, ViewRequest};
 use cluster::{PolicyChoice, SessionRequest, Timeline};
-use cluster_tests::cluster::{Cluster, request};
+use cluster_tests::cluster::{Cluster, camera_around, request};
 use cluster_tests::walkers::walk;
 use depth_image::{PinholeCamera, ProvenanceKind};
-use glam::{UVec2, Vec3};
+use glam::UVec2;
 
 const STILL: Timeline = Timeline { start_s: 1.0, step_s: 0.0, set_count: 1 };
 
-/// A camera on a circle around the ball.
 fn view(azimuth_rad: f32) -> PinholeCamera {
-    let target = Vec3::new(0.0, 0.5, 0.0);
-    let eye = target + Vec3::new(3.0 * azimuth_rad.sin(), 0.7, 3.0 * azimuth_rad.cos());
-    PinholeCamera::looking_at(eye, target, Vec3::Y, 0.9, UVec2::new(48, 36))
+    camera_around(azimuth_rad, 3.0, UVec2::new(48, 36))
 }
 
 fn looking_from(azimuths: impl IntoIterator<Item = f32>) -> SessionRequest {

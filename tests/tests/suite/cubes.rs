@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use client::{Frame, Session, ViewRequest};
 use cluster::{BudgetRequest, DIRECT, PolicyChoice, Refinement, SessionRequest, Timeline};
-use cluster_tests::cluster::{CUBE, Cluster, offer_with_light_field, request, rig};
+use cluster_tests::cluster::{CUBE, Cluster, camera_around, offer_with_light_field, request, rig};
 use cluster_tests::picture::fault_of;
 use cluster_tests::watcher::eventually;
 use depth_image::{Aabb, PinholeCamera, ProvenanceKind};
@@ -15,9 +15,7 @@ const STILL: Timeline = Timeline { start_s: 1.0, step_s: 0.0, set_count: 1 };
 const SOON: Duration = Duration::from_secs(20);
 
 fn view(azimuth_rad: f32) -> PinholeCamera {
-    let target = Vec3::new(0.0, 0.5, 0.0);
-    let eye = target + Vec3::new(2.4 * azimuth_rad.sin(), 0.7, 2.4 * azimuth_rad.cos());
-    PinholeCamera::looking_at(eye, target, Vec3::Y, 0.9, UVec2::new(36, 27))
+    camera_around(azimuth_rad, 2.4, UVec2::new(36, 27))
 }
 
 fn around(count: usize) -> impl Iterator<Item = f32> {

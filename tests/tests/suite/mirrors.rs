@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use client::{Frame, Session, ViewRequest};
 use cluster::{DIRECT, PolicyChoice, SessionRequest, Timeline};
-use cluster_tests::cluster::{Cluster, camera, offer, request, views};
+use cluster_tests::cluster::{Cluster, camera, camera_around, offer, request, views};
 use cluster_tests::scalar_engine::{ball_linear, srgb8};
 use cluster_tests::watcher::eventually;
 use depth_image::PinholeCamera;
-use glam::{UVec2, Vec3};
+use glam::UVec2;
 
 const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 0.5, set_count: 4 };
 const STILL: Timeline = Timeline { start_s: 1.0, step_s: 0.0, set_count: 1 };
@@ -35,11 +35,8 @@ async fn frames(session: &Session, views: Vec<ViewRequest>) -> Vec<Frame> {
     frames
 }
 
-/// A camera on a circle around the ball.
 fn around(azimuth_rad: f32) -> PinholeCamera {
-    let target = Vec3::new(0.0, 0.5, 0.0);
-    let eye = target + Vec3::new(3.0 * azimuth_rad.sin(), 0.7, 3.0 * azimuth_rad.cos());
-    PinholeCamera::looking_at(eye, target, Vec3::Y, 0.9, UVec2::new(48, 36))
+    camera_around(azimuth_rad, 3.0, UVec2::new(48, 36))
 }
 
 /// Views and mirrors of a frame show one moment: the ball has another colour in each.
