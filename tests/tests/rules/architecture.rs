@@ -11,6 +11,8 @@ use std::sync::OnceLock;
 
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
 
+use crate::root;
+
 /// Which crates of the workspace each one may use, in programs and build scripts. Other uses are not
 /// allowed.
 const ALLOWED: &[(&str, &[&str])] = &[
@@ -148,10 +150,6 @@ const IMPURE: [&str; 8] =
     [".await", "async fn", "Instant::now", "SystemTime", "tokio::", "std::thread", "std::env", "std::fs"];
 
 type Arrow = (String, String);
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace around this crate").to_owned()
-}
 
 /// The crate graph as Cargo resolves it for this machine. Offline: what a test run needs is there already.
 fn graph() -> &'static Metadata {

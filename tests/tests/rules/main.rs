@@ -5,3 +5,10 @@ mod architecture;
 mod methods;
 mod shaders;
 mod structure;
+
+use std::path::{Path, PathBuf};
+
+/// The folder of the workspace.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace around this crate").to_owned()
+}

@@ -9,6 +9,8 @@ use std::str::FromStr as _;
 use cluster_tests::imports::is_for_tests;
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
+use crate::root;
+
 /// Folders that name methods: the methods, their twins, and all that measures and tests them.
 const MAY_NAME: [&str; 6] = [
     "crates/reconstruction/src/methods",
@@ -112,10 +114,6 @@ fn text_of(set: &Methods, literal: &str) -> Option<String> {
         text.split(':').next() == Some(**name) || (name.contains('_') && words.any(|word| word == **name))
     };
     set.names.iter().find(is_named).map(|name| (*name).to_owned())
-}
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace around this crate").to_owned()
 }
 
 /// The files that the product is built from, by their paths in the workspace.

@@ -2,16 +2,14 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use cluster_tests::imports::{ModulePath, circles, imports, imports_of_crate};
 
+use crate::root;
+
 /// Lines from a function's first to its last.
 const MAX_FUNCTION_LINES: usize = 60;
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace around this crate").to_owned()
-}
 
 /// All files below the workspace with one of these endings.
 fn sources(endings: &[&str]) -> Vec<PathBuf> {
