@@ -110,7 +110,7 @@ viewer_link() {
 visit() {
     scripts/ensure-browser.sh
     MYRIORAMA_VIEWER="$(viewer_link)" "${CARGO:-cargo}" test --quiet --release --locked --package browser-tests \
-        --test cluster -- --ignored --nocapture
+        --test suite running_cluster:: -- --ignored --nocapture
 }
 
 build

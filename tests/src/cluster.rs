@@ -1,6 +1,7 @@
 //! A cluster in one process over real loopback ports. Every node has its own runtime, so that a test can kill it
 //! abruptly.
 
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -111,11 +112,17 @@ pub struct Cluster {
 }
 
 /// The package is longer than a message, so that it travels in parts.
-#[must_use]
-pub fn package() -> Bytes {
+static PACKAGE: LazyLock<Bytes> = LazyLock::new(|| {
     let mut package = b"ball over floor".to_vec();
     package.extend((0..1_500_000u32).map(|i| (i * 7 % 251) as u8));
     package.into()
+});
+static PACKAGE_HASH: LazyLock<SceneHash> = LazyLock::new(|| SceneHash::of(&PACKAGE));
+
+/// The package of the scene on offer.
+#[must_use]
+pub fn package() -> Bytes {
+    PACKAGE.clone()
 }
 
 /// Three sample cameras on an arc in front of the ball.
@@ -160,7 +167,7 @@ pub fn cube_grid() -> CubeGrid {
 pub fn offer() -> SceneOffer {
     SceneOffer {
         name: "ball".to_owned(),
-        hash: SceneHash::of(&package()),
+        hash: PACKAGE_HASH.clone(),
         package: package(),
         fits_views: false,
         rig: rig(),
@@ -224,6 +231,14 @@ pub fn two_offers() -> SceneOffers {
 #[must_use]
 pub fn camera(x_m: f32, size_px: UVec2) -> PinholeCamera {
     PinholeCamera::looking_at(Vec3::new(x_m, 1.2, 3.0), Vec3::new(0.0, 0.5, 0.0), Vec3::Y, 0.9, size_px)
+}
+
+/// A camera on a circle around the ball.
+#[must_use]
+pub fn camera_around(azimuth_rad: f32, distance_m: f32, size_px: UVec2) -> PinholeCamera {
+    let target = Vec3::new(0.0, 0.5, 0.0);
+    let eye = target + Vec3::new(distance_m * azimuth_rad.sin(), 0.7, distance_m * azimuth_rad.cos());
+    PinholeCamera::looking_at(eye, target, Vec3::Y, 0.9, size_px)
 }
 
 /// A session of the scalar device.

@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 use client::{LiveView, Session};
 use cluster::{PolicyChoice, SessionRequest, Timeline};
 use depth_image::PinholeCamera;
-use glam::{UVec2, Vec3};
+use glam::UVec2;
 use tokio::task::JoinSet;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
-use crate::cluster::{Cluster, request};
+use crate::cluster::{Cluster, camera_around, request};
 
 const STILL: Timeline = Timeline { start_s: 1.0, step_s: 0.0, set_count: 1 };
 /// Poses a second of each walker.
@@ -38,11 +38,8 @@ pub struct Walked {
     pub longest_gap_s: f64,
 }
 
-/// A camera on a circle around the ball.
 fn view(azimuth_rad: f32) -> PinholeCamera {
-    let target = Vec3::new(0.0, 0.5, 0.0);
-    let eye = target + Vec3::new(3.0 * azimuth_rad.sin(), 0.7, 3.0 * azimuth_rad.cos());
-    PinholeCamera::looking_at(eye, target, Vec3::Y, 0.9, UVec2::new(48, 36))
+    camera_around(azimuth_rad, 3.0, UVec2::new(48, 36))
 }
 
 /// Lets `count` walkers walk for `lasting`, once all see the scene.

@@ -14,6 +14,7 @@ mod pictures;
 mod pivot;
 mod playback;
 mod refining;
+mod running_cluster;
 mod scene;
 mod status;
 mod surface;

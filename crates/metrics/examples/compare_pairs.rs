@@ -1,9 +1,9 @@
-//! Writes the pairs of `tests/agreement` as binary PPM files into a folder, and prints what this crate
-//! makes of them. `tests/agreement/reference_values.py` prints what others make of the files.
+//! Writes the pairs of `tests/suite/agreement` as binary PPM files into a folder, and prints what this crate
+//! makes of them. `tests/suite/agreement/reference_values.py` prints what others make of the files.
 //!
 //! With a second argument, compares two PPM files instead.
 
-#[path = "../tests/agreement/pairs.rs"]
+#[path = "../tests/suite/agreement/pairs.rs"]
 mod pairs;
 
 use std::path::Path;

@@ -1,6 +1,7 @@
-//! Sampling without redundance on the software device.
+//! Sampling on the software device: planes and batches, and images that omit what others hold.
 
 mod failures;
 mod non_redundant;
+mod sampler;
 mod slices;
 mod stage;

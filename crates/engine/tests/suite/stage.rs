@@ -1,0 +1,48 @@
+//! The engine of all tests here, and sample sets of whole scenes.
+
+use std::sync::OnceLock;
+
+use cluster::{Refinement, SamplePlanes};
+use depth_image::Camera;
+use engine::GpuEngine;
+use gpu::DevicePreference;
+use node::{Engine, SampleSet, SampleWork, Turn, WorkClass};
+use scene::{Limits, MissingTextures, Scene, SceneSpec};
+
+/// The engine of this program, on the software device; a test without one fails.
+pub fn engine() -> &'static GpuEngine {
+    static ENGINE: OnceLock<GpuEngine> = OnceLock::new();
+    ENGINE.get_or_init(|| GpuEngine::open(DevicePreference::Software).expect("an engine"))
+}
+
+/// A procedural scene, which the engine has under `hash` from now on.
+pub fn loaded(hash: &str, name: &str) -> Scene {
+    let spec: SceneSpec = name.parse().expect("a name");
+    let scene = spec.load(&Limits::default(), MissingTextures::Refuse).expect("a scene");
+    engine().put_scene(hash, &scene).expect("a scene");
+    scene
+}
+
+/// The images of these cameras, as views are made from them.
+pub fn sample_set((hash, scene): (&str, &Scene), cameras: &[impl Copy + Into<Camera>], lighting: &str) -> SampleSet {
+    let work = SampleWork {
+        scene_hash: hash.to_owned(),
+        cameras: cameras.iter().copied().map(|camera| camera.into().into()).collect(),
+        wanted: (0..cameras.len() as u32).collect(),
+        sampling: "conventional".to_owned(),
+        planes: SamplePlanes::default(),
+        lighting: lighting.to_owned(),
+        scene_time_s: 0.0,
+        temporal_reference_s: None,
+        refinement: Refinement::default(),
+    };
+    SampleSet {
+        scene_hash: hash.to_owned(),
+        images: engine().sample(&work, Turn::of(WorkClass::Batch)).expect("images").try_into().expect("of one kind"),
+        volume: scene.bounds(),
+        background: scene.background,
+        illumination: scene.illumination.clone(),
+        lighting: lighting.to_owned(),
+        is_common: false,
+    }
+}

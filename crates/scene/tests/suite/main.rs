@@ -1,0 +1,14 @@
+//! Scenes through the public interface: imports, damaged files, lights, procedural scenes and packages.
+#![allow(clippy::unwrap_used)]
+
+mod animation;
+mod damaged_files;
+mod gltf_compression;
+mod gltf_import;
+mod gltf_materials;
+mod gltf_textures;
+mod lighting;
+mod obj_and_ply_import;
+mod packages;
+mod procedural;
+mod samples;
