@@ -77,6 +77,10 @@ fn cut(record: &Path, views: usize) {
     fs::write(record, format!("{}\n]}}\n", kept.join("\n").trim_end_matches(','))).unwrap();
 }
 
+/// Enough views that a command still makes them when it is interrupted.
+const VIEWS: usize = 1200;
+const MANY: &[&str] = &["--views", "1200"];
+
 /// Waits until there is a picture.
 fn wait_for_first_picture(folder: &Path) {
     while !folder.join("view_0000.png").exists() {
@@ -102,24 +106,24 @@ fn interrupt_twice(mut view: Child) {
 fn a_second_signal_ends_a_command_that_writes_a_picture() {
     let (up, folder) = (Up::start(), tempfile::tempdir().unwrap());
     let folder = folder.path();
-    let mut view = up.view(folder, &["--views", "4000"]).spawn().unwrap();
+    let mut view = up.view(folder, MANY).spawn().unwrap();
     wait_for_first_picture(folder);
-    let part = folder.join("view_3999.part");
+    let part = folder.join("view_1199.part");
     block(&part);
     let pictures = || files_of(folder).filter(|name| name.ends_with(".png")).count();
-    while pictures() < 3999 {
+    while pictures() < VIEWS - 1 {
         assert!(view.try_wait().unwrap().is_none(), "{} pictures", pictures());
         std::thread::sleep(Duration::from_millis(20));
     }
     interrupt_twice(view);
-    assert_eq!((pictures(), part.exists()), (3999, false));
+    assert_eq!((pictures(), part.exists()), (VIEWS - 1, false));
 }
 
 #[test]
 fn a_second_signal_ends_a_command_that_writes_its_record() {
     let (up, folder) = (Up::start(), tempfile::tempdir().unwrap());
     let folder = folder.path();
-    let view = up.view(folder, &["--views", "4000"]).spawn().unwrap();
+    let view = up.view(folder, MANY).spawn().unwrap();
     wait_for_first_picture(folder);
     let before = fs::read(folder.join("cameras.json")).unwrap();
     let part = folder.join("cameras.part");
@@ -131,7 +135,6 @@ fn a_second_signal_ends_a_command_that_writes_its_record() {
 
 #[test]
 fn a_resumed_request_leaves_the_files_of_one_that_was_not_interrupted() {
-    const MANY: &[&str] = &["--views", "4000"];
     const COMPARED: &[&str] = &["--views", "6", "--frames", "2", "--depth", "--provenance", "--compare"];
     let up = Up::start();
     let folders = [(); 4].map(|()| tempfile::tempdir().unwrap());
@@ -160,9 +163,9 @@ fn a_resumed_request_leaves_the_files_of_one_that_was_not_interrupted() {
     let left = files(interrupted);
     let pictures = left.keys().filter(|name| name.ends_with(".png")).count();
     assert_eq!(left.len(), pictures + 1, "whole pictures and the record: {:?}", left.keys());
-    assert!(text.contains(&format!("{pictures} of 4000 views are written to {}", interrupted.display())), "{text}");
-    assert!(text.contains("--views 4000 --resume` asks for the rest"), "{text}");
-    assert!((1..4000).contains(&pictures), "{pictures}");
+    assert!(text.contains(&format!("{pictures} of {VIEWS} views are written to {}", interrupted.display())), "{text}");
+    assert!(text.contains(&format!("--views {VIEWS} --resume` asks for the rest")), "{text}");
+    assert!((1..VIEWS).contains(&pictures), "{pictures}");
     let record = String::from_utf8(left["cameras.json"].clone()).unwrap();
     assert_eq!(record.lines().count(), pictures + 2);
     up.viewed(interrupted, &[MANY, &["--resume"]].concat(), 0);

@@ -1,10 +1,11 @@
 //! Every variant of every pass is a valid shader.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-use gpu::{ShaderInterface, ShaderSource};
+use gpu::{ShaderError, ShaderInterface, ShaderSource};
 use naga::front::wgsl::{Frontend, Options};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
+use rayon::prelude::*;
 use sampling::SamplingMethod;
 
 /// The module, and what is wrong with it otherwise.
@@ -28,19 +29,37 @@ fn entries(name: &str, wgsl: &str) -> Vec<String> {
     module.entry_points.into_iter().map(|entry| entry.name).collect()
 }
 
+/// Checks each text once, on all cores: many variants have the same. `expected` are the names of the entry points of a
+/// template's variants. Returns how many variants each template has.
+fn check_all(
+    sources: impl Iterator<Item = Result<ShaderSource, ShaderError>>,
+    expected: impl Fn(&str, usize) -> &'static [&'static str] + Sync,
+) -> BTreeMap<&'static str, usize> {
+    let sources: Vec<ShaderSource> = sources.map(|source| source.expect("a text")).collect();
+    let mut variants = BTreeMap::new();
+    for source in &sources {
+        *variants.entry(source.template).or_default() += 1;
+    }
+    let mut seen = HashSet::new();
+    let different: Vec<&ShaderSource> =
+        sources.iter().filter(|source| seen.insert((source.template, source.wgsl.as_str()))).collect();
+    different.par_iter().for_each(|ShaderSource { name, template, wgsl, traits }| {
+        let entries = entries(name, wgsl);
+        assert_eq!(entries, expected(template, entries.len()), "{name}");
+        ShaderInterface::of(template, wgsl, traits).unwrap_or_else(|error| panic!("{name}: {error}"));
+    });
+    variants
+}
+
 #[test]
 fn every_variant_of_reconstruction_is_a_valid_shader() {
     let templates = reconstruction::templates().expect("templates");
-    let mut found = BTreeSet::new();
-    for source in reconstruction::shader_sources(&templates) {
-        let ShaderSource { name, template, wgsl, traits } = source.expect("a text");
-        let expected: &[&str] = if template == "draw.wgsl" { &["vertex", "fragment"] } else { &["main"] };
-        assert_eq!(entries(&name, &wgsl), expected, "{name}");
-        ShaderInterface::of(template, &wgsl, traits).unwrap_or_else(|error| panic!("{name}: {error}"));
-        found.insert(template);
-    }
+    let found = check_all(reconstruction::shader_sources(&templates), |template, _| match template {
+        "draw.wgsl" => &["vertex", "fragment"],
+        _ => &["main"],
+    });
     let shaders = reconstruction::shaders().into_iter().filter(|(_, text)| has_entry(text));
-    assert_eq!(found, shaders.map(|(name, _)| name).collect());
+    assert_eq!(found.into_keys().collect::<BTreeSet<_>>(), shaders.map(|(name, _)| name).collect());
 }
 
 /// All variants of pipelines of [`render::Renderer`], with the redundancy tests of all sampling methods.
@@ -48,22 +67,14 @@ fn every_variant_of_reconstruction_is_a_valid_shader() {
 fn every_variant_of_drawing_is_a_valid_shader() {
     let templates = sampling::templates().expect("templates");
     let tests: Vec<_> = SamplingMethod::all().filter_map(SamplingMethod::redundancy_test).collect();
-    let mut texts = BTreeMap::<&str, usize>::new();
-    for source in render::shader_sources(&templates, &tests) {
-        let ShaderSource { name, template, wgsl, traits } = source.expect("a text");
-        let entries = entries(&name, &wgsl);
-        let expected: &[&str] = match template {
-            "raster.wgsl" if entries.len() == 1 => &["vertex"],
-            "raster.wgsl" => &["vertex", "fragment"],
-            _ => &["main"],
-        };
-        assert_eq!(entries, expected, "{name}");
-        ShaderInterface::of(template, &wgsl, traits).unwrap_or_else(|error| panic!("{name}: {error}"));
-        *texts.entry(template).or_default() += 1;
-    }
+    let found = check_all(render::shader_sources(&templates, &tests), |template, entries| match template {
+        "raster.wgsl" if entries == 1 => &["vertex"],
+        "raster.wgsl" => &["vertex", "fragment"],
+        _ => &["main"],
+    });
     let shaders = render::SHADERS.iter().filter(|(_, text)| has_entry(text)).map(|(name, _)| *name);
     for shader in shaders {
-        assert!(texts.get(shader).is_some_and(|&count| count >= 2), "{shader}: {texts:?}");
+        assert!(found.get(shader).is_some_and(|&count| count >= 2), "{shader}: {found:?}");
     }
 }
 
