@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use browser::input::Place;
 use browser::inspect::Pixels;
-use browser::{Browser, BrowserOptions, View};
+use browser::{Browser, BrowserOptions, Key, View};
 use cluster_tests::gateway_bench::PageCamera;
 use serde::Deserialize;
 use tokio::sync::{Semaphore, SemaphorePermit};
@@ -233,7 +233,7 @@ impl Visit {
     ///
     /// # Panics
     /// The page has no picture.
-    pub async fn press(&self, key: impl Into<char>) {
+    pub async fn press(&self, key: impl Into<Key>) {
         self.browser.run::<()>("document.getElementById('picture').focus()", Vec::new()).await.expect("a picture");
         self.browser.press(key).await.expect("a key");
     }

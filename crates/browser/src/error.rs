@@ -2,30 +2,39 @@
 
 use std::time::Duration;
 
-use thirtyfour::error::WebDriverError;
-
 /// Why a browser does not do what it was told.
 #[derive(Debug, thiserror::Error)]
 pub enum BrowserError {
     /// The program is not on this machine.
     #[error("{0} is missing: scripts/ensure-browser.sh installs it, or says how")]
     Missing(&'static str),
-    /// The driver has not said its port.
-    #[error("chromedriver does not start: {0}")]
-    Driver(String),
-    /// The driver has ended before it said its port.
-    #[error("chromedriver does not start: it has ended")]
-    Ended,
+    /// The browser opens no port for the DevTools protocol.
+    #[error("chromium does not start: {0}")]
+    Start(String),
     /// A folder or a process cannot be made.
     #[error("{0}")]
     Io(#[from] std::io::Error),
-    /// The driver or the page refuses a command.
-    #[error("{command}: {source}")]
-    Command {
+    /// The browser has ended, its page has crashed, or the connection is lost.
+    #[error("{command}: chromium or its page has ended")]
+    Ended {
         /// What the browser was told.
         command: String,
-        /// Its answer.
-        source: Box<WebDriverError>,
+    },
+    /// The browser refuses a command.
+    #[error("{command}: {reason}")]
+    Refused {
+        /// What the browser was told.
+        command: String,
+        /// Its reason.
+        reason: String,
+    },
+    /// A script throws an exception.
+    #[error("{script}: {exception}")]
+    Thrown {
+        /// The script.
+        script: String,
+        /// The text of the exception.
+        exception: String,
     },
     /// A page answers something else than what is expected.
     #[error("{command}: {answer}: {reason}")]
@@ -36,6 +45,14 @@ pub enum BrowserError {
         answer: String,
         /// Why the answer cannot be read.
         reason: String,
+    },
+    /// The browser does not answer in time.
+    #[error("{command}: no answer within {within:?}")]
+    NoAnswer {
+        /// What the browser was told.
+        command: String,
+        /// The time that was allowed.
+        within: Duration,
     },
     /// A condition has not come true.
     #[error("{condition} has not come true within {within:?}")]
@@ -48,11 +65,19 @@ pub enum BrowserError {
 }
 
 impl BrowserError {
-    pub(crate) fn command(command: &str, source: WebDriverError) -> Self {
-        Self::Command { command: command.to_owned(), source: Box::new(source) }
+    pub(crate) fn ended(command: &str) -> Self {
+        Self::Ended { command: command.to_owned() }
+    }
+
+    pub(crate) fn refused(command: &str, reason: &str) -> Self {
+        Self::Refused { command: command.to_owned(), reason: reason.to_owned() }
     }
 
     pub(crate) fn answer(command: &str, answer: impl ToString, reason: impl ToString) -> Self {
         Self::Answer { command: command.to_owned(), answer: answer.to_string(), reason: reason.to_string() }
+    }
+
+    pub(crate) fn no_answer(command: &str, within: Duration) -> Self {
+        Self::NoAnswer { command: command.to_owned(), within }
     }
 }

@@ -4,11 +4,11 @@
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use thirtyfour::action_chain::ActionChain;
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::browser::Browser;
 use crate::error::BrowserError;
+use crate::key::{Key, SHIFT};
 
 /// A place in the view: columns and rows.
 pub type Place = [f64; 2];
@@ -71,9 +71,6 @@ pub enum TouchPhase {
     /// A finger is gone.
     End,
 }
-
-/// The bit of Shift among the keys of a mouse event.
-const SHIFT: u32 = 8;
 
 impl Browser {
     /// Drags the mouse.
@@ -151,33 +148,29 @@ impl Browser {
         self.devtools("Input.dispatchTouchEvent", parameters).await.map(drop)
     }
 
-    /// Presses and releases a key: a letter, or a [`thirtyfour::Key`].
+    /// Presses and releases a key.
     ///
     /// # Errors
-    /// The browser refuses the event.
-    pub async fn press(&self, key: impl Into<char>) -> Result<(), BrowserError> {
+    /// The browser refuses an event.
+    pub async fn press(&self, key: impl Into<Key>) -> Result<(), BrowserError> {
         let key = key.into();
-        self.keys(|chain| chain.key_down(key).key_up(key)).await
+        self.key_down(key).await?;
+        self.key_up(key).await
     }
 
     /// Presses a key, which stays down.
     ///
     /// # Errors
     /// The browser refuses the event.
-    pub async fn key_down(&self, key: impl Into<char>) -> Result<(), BrowserError> {
-        self.keys(|chain| chain.key_down(key)).await
+    pub async fn key_down(&self, key: impl Into<Key>) -> Result<(), BrowserError> {
+        self.devtools("Input.dispatchKeyEvent", key.into().event(true)).await.map(drop)
     }
 
     /// Releases a key.
     ///
     /// # Errors
     /// The browser refuses the event.
-    pub async fn key_up(&self, key: impl Into<char>) -> Result<(), BrowserError> {
-        self.keys(|chain| chain.key_up(key)).await
-    }
-
-    async fn keys(&self, add: impl FnOnce(ActionChain) -> ActionChain) -> Result<(), BrowserError> {
-        let chain = self.driver().action_chain_with_delay(Some(Duration::ZERO), Some(Duration::ZERO));
-        add(chain).perform().await.map_err(|error| BrowserError::command("a key", error))
+    pub async fn key_up(&self, key: impl Into<Key>) -> Result<(), BrowserError> {
+        self.devtools("Input.dispatchKeyEvent", key.into().event(false)).await.map(drop)
     }
 }

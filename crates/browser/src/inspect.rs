@@ -78,7 +78,10 @@ impl Browser {
     /// # Errors
     /// The browser refuses it.
     pub async fn screenshot_png(&self) -> Result<Vec<u8>, BrowserError> {
-        self.driver().screenshot_as_png().await.map_err(|error| BrowserError::command("a screenshot", error))
+        const METHOD: &str = "Page.captureScreenshot";
+        let answer = self.devtools(METHOD, json!({ "format": "png" })).await?;
+        let png = BASE64_STANDARD.decode(answer["data"].as_str().unwrap_or_default());
+        png.map_err(|error| BrowserError::answer(METHOD, answer, error))
     }
 
     /// The memory of the page's live objects and of their buffers, after a collection of garbage.

@@ -1,6 +1,6 @@
-//! The driver as a process, which ends with all of its browser.
+//! The browser as a group of processes, which ends with its owner.
 
-use std::io::{BufRead as _, BufReader};
+use std::io::{BufRead as _, BufReader, Read as _};
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
@@ -8,60 +8,49 @@ use std::time::Duration;
 
 use rustix::process::{Pid, Signal, kill_process_group};
 use tokio::sync::oneshot;
+use tokio::time::timeout;
 
 use crate::error::BrowserError;
 
-/// The time that the driver may take to open its port.
+/// The time that the browser may take to open its port.
 const STARTS_WITHIN: Duration = Duration::from_secs(20);
-/// The shell waits for the end of its input, which comes even when this program is killed. It then kills its group: itself, the
-/// driver, and the browser.
-const SCRIPT: &str = r#""$@" </dev/null & exec >&-; read -r _; kill -KILL 0"#;
+/// The shell waits for the end of its input, which comes even when this program is killed. It then kills its group: itself
+/// and all processes of the browser. It passes on the browser's standard error, and holds no end of that pipe itself.
+const SCRIPT: &str = r#""$@" </dev/null 2>&1 >/dev/null & exec >&-; read -r _; kill -KILL 0"#;
 
-/// A driver takes a free port of IPv4 and the same of IPv6, and ends if another program has just taken that.
-const TRIES: u32 = 3;
-
-/// A `chromedriver` at a port of the system's choice. All processes of its group are killed when it is dropped.
+/// A `chromium` with the DevTools protocol at a port of the system's choice. All processes of its group are killed when it is
+/// dropped.
 #[derive(Debug)]
-pub struct DriverProcess {
+pub(crate) struct BrowserProcess {
     shell: Child,
     _input: Option<ChildStdin>,
-    /// Its address, as `http://host:port`.
-    pub address: String,
+    /// Where the browser speaks the DevTools protocol, as `ws://host:port/path`.
+    pub(crate) address: String,
 }
 
-impl DriverProcess {
-    /// Starts a driver.
+impl BrowserProcess {
+    /// Starts a browser, with its temporary files in a folder.
     ///
     /// # Errors
     /// There is none on this machine, or it does not start.
-    pub async fn start() -> Result<Self, BrowserError> {
-        let driver = program("chromedriver")?;
-        let mut tries = 1;
-        loop {
-            match Self::start_once(&driver).await {
-                Err(BrowserError::Ended) if tries < TRIES => tries += 1,
-                started => return started,
-            }
-        }
-    }
-
-    async fn start_once(driver: &Path) -> Result<Self, BrowserError> {
+    pub(crate) async fn start(arguments: &[String], temporary: &Path) -> Result<Self, BrowserError> {
         let mut command = Command::new("sh");
-        command.args(["-c", SCRIPT, "sh"]).arg(driver).arg("--port=0").process_group(0);
+        command.args(["-c", SCRIPT, "sh"]).arg(program("chromium")?).args(arguments);
+        command.env("TMPDIR", temporary).process_group(0);
         let mut shell = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn()?;
-        let (input, output) = (shell.stdin.take(), shell.stdout.take());
+        let input = shell.stdin.take();
+        let output = shell.stdout.take();
         let mut process = Self { shell, _input: input, address: String::new() };
-        let (send, port) = oneshot::channel();
-        std::thread::spawn(move || output.map(|output| read(output, send)));
-        let port = tokio::time::timeout(STARTS_WITHIN, port).await;
-        let port = port.map_err(|_| BrowserError::Driver(format!("no port within {STARTS_WITHIN:?}")))?;
-        let port = port.map_err(|_| BrowserError::Ended)?;
-        process.address = format!("http://127.0.0.1:{port}");
+        let (sender, address) = oneshot::channel();
+        std::thread::spawn(move || output.map(|output| read(output, sender)));
+        let address = timeout(STARTS_WITHIN, address).await;
+        let address = address.map_err(|_| BrowserError::Start(format!("no address within {STARTS_WITHIN:?}")))?;
+        process.address = address.unwrap_or_else(|_| Err(String::new())).map_err(BrowserError::Start)?;
         Ok(process)
     }
 }
 
-impl Drop for DriverProcess {
+impl Drop for BrowserProcess {
     fn drop(&mut self) {
         let _ = kill_process_group(Pid::from_child(&self.shell), Signal::KILL);
         let _ = self.shell.wait();
@@ -69,26 +58,28 @@ impl Drop for DriverProcess {
 }
 
 /// A program on the path.
-///
-/// # Errors
-/// There is none.
-pub fn program(name: &'static str) -> Result<PathBuf, BrowserError> {
+fn program(name: &'static str) -> Result<PathBuf, BrowserError> {
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let mut found = std::env::split_paths(&path).map(|folder| folder.join(name));
-    found.find(|file| file.is_file()).ok_or(BrowserError::Missing(name))
+    let mut files = std::env::split_paths(&path).map(|folder| folder.join(name));
+    files.find(|file| file.is_file()).ok_or(BrowserError::Missing(name))
 }
 
-/// Sends the port; reads further lines to their end, so that the driver never waits for a reader.
-fn read(output: ChildStdout, send: oneshot::Sender<u16>) {
-    let mut lines = BufReader::new(output).lines().map_while(Result::ok);
-    if let Some(port) = lines.by_ref().find_map(|line| port_in(&line)) {
-        let _ = send.send(port);
-    }
-    lines.for_each(drop);
+/// Sends the address, or the last line of a browser that ends without one. Reads to the end, so that the browser never waits
+/// for a reader.
+fn read(output: ChildStdout, sender: oneshot::Sender<Result<String, String>>) {
+    let mut output = BufReader::new(output);
+    let mut last_line = "it has ended".to_owned();
+    let address = output.by_ref().lines().map_while(Result::ok).find_map(|line| {
+        let address = address_in(&line);
+        last_line = line;
+        address
+    });
+    let _ = sender.send(address.ok_or(last_line));
+    let _ = std::io::copy(&mut output, &mut std::io::sink());
 }
 
-fn port_in(line: &str) -> Option<u16> {
-    line.split_once("started successfully on port ")?.1.trim_end_matches('.').parse().ok()
+fn address_in(line: &str) -> Option<String> {
+    line.strip_prefix("DevTools listening on ").map(|address| address.trim_end().to_owned())
 }
 
 #[cfg(test)]
@@ -96,9 +87,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_port_is_in_one_line_of_the_driver() {
-        assert_eq!(port_in("ChromeDriver was started successfully on port 37117."), Some(37117));
-        assert_eq!(port_in("Starting ChromeDriver 156.0 on port 0"), None);
+    fn the_address_is_in_one_line_of_the_browser() {
+        let address = "ws://127.0.0.1:37117/devtools/browser/5a";
+        assert_eq!(address_in(&format!("DevTools listening on {address}")).as_deref(), Some(address));
+        assert_eq!(address_in("[1:1:ERROR:bus.cc(408)] Failed to connect to the bus"), None);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use browser::input::{Drag, TouchPhase};
 use browser::{Browser, BrowserError, BrowserOptions, Key, View};
+use serde_json::json;
 
 const SOON: Duration = Duration::from_secs(10);
 
@@ -54,6 +55,59 @@ async fn a_page_hears_mouse_fingers_wheel_and_keys() {
     assert_eq!(events(&browser).await, ["keydown:a", "keyup:a", "keydown:Tab", "keyup:Tab"]);
     browser.click("button").await.unwrap();
     browser.wait_until("window.isPressed", SOON).await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn keys_have_the_names_of_a_us_keyboard_and_type_their_text() {
+    const PAGE: &str = "data:text/html,<!doctype html><textarea></textarea><script>
+        window.keys = [];
+        const keep = (event) => window.keys.push([event.key, event.code, event.keyCode, event.shiftKey]);
+        addEventListener('keydown', keep);
+        document.querySelector('textarea').focus();
+        </script>";
+    let browser = Browser::start(&BrowserOptions::default()).await.unwrap();
+    browser.open(PAGE).await.unwrap();
+    for key in ['w', 'W', '7', ' ', '+', '-'].map(Key::from).into_iter().chain([Key::Enter, Key::Home]) {
+        browser.press(key).await.unwrap();
+    }
+    let keys: Vec<(String, String, u32, bool)> = browser.value("window.keys").await.unwrap();
+    let expected = [
+        ("w", "KeyW", 87, false),
+        ("W", "KeyW", 87, true),
+        ("7", "Digit7", 55, false),
+        (" ", "Space", 32, false),
+        ("+", "Equal", 187, true),
+        ("-", "Minus", 189, false),
+        ("Enter", "Enter", 13, false),
+        ("Home", "Home", 36, false),
+    ];
+    assert_eq!(keys, expected.map(|(key, code, number, shift)| (key.to_owned(), code.to_owned(), number, shift)));
+    let text: String = browser.value("document.querySelector('textarea').value").await.unwrap();
+    assert_eq!(text, "wW7 +-\n");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_page_that_replaces_itself_while_it_loads_is_waited_for() {
+    const PAGE: &str = "data:text/html,<script>location.replace('about:blank')</script><p>never seen";
+    let browser = Browser::start(&BrowserOptions::default()).await.unwrap();
+    for url in ["about:blank", "about:blank", "about:blank#part", PAGE, "about:blank"] {
+        browser.open(url).await.unwrap();
+    }
+    let error = browser.open("http://127.0.0.1:1/").await.unwrap_err();
+    assert!(error.to_string().contains("net::ERR_"), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn commands_are_in_flight_at_once_and_end_with_their_page() {
+    let browser = opened(View::default()).await;
+    let waiting = browser.run::<u32>("return await new Promise((resolve) => { window.resolve = resolve })", Vec::new());
+    let (answer, ()) = tokio::join!(waiting, async { browser.run("resolve(7)", Vec::new()).await.unwrap() });
+    assert_eq!(answer.unwrap(), 7);
+    let waiting = browser.run::<()>("await new Promise(() => {})", Vec::new());
+    let (answer, crash) = tokio::join!(waiting, browser.devtools("Page.crash", json!({})));
+    assert!(matches!(answer, Err(BrowserError::Ended { .. })), "{answer:?}");
+    assert!(matches!(crash, Err(BrowserError::Ended { .. })), "{crash:?}");
+    assert!(matches!(browser.open(PAGE).await, Err(BrowserError::Ended { .. })));
 }
 
 #[tokio::test(flavor = "multi_thread")]

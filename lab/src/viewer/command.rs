@@ -14,8 +14,7 @@ use super::{dragging, faults, first_picture, memory, rest, slow_link, walk};
 use crate::section::{Section, finish, measure_parts, report};
 
 /// Measures the viewer's page in Chromium, before a gateway, a coordinator and two nodes on the same machine: pictures of
-/// drags, stills, first pictures, a slow link, faults, a walk around the scene, and memory. Needs chromium and
-/// chromium-driver.
+/// drags, stills, first pictures, a slow link, faults, a walk around the scene, and memory. Needs chromium.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: myriorama-lab bench viewer --quick --only dragging --only rest")]
 pub struct ViewerBenchArgs {

@@ -61,7 +61,7 @@ impl Page {
     pub(super) async fn start(size_px: [u32; 2]) -> anyhow::Result<Self> {
         let view = View { size_px, ..View::default() };
         let browser = Browser::start(&BrowserOptions { view, ..BrowserOptions::default() }).await;
-        let browser = browser.context("no browser: scripts/ensure-browser.sh installs chromium and chromium-driver")?;
+        let browser = browser.context("no browser: scripts/ensure-browser.sh installs chromium")?;
         Ok(Self { browser, size_px })
     }
 

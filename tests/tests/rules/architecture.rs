@@ -144,7 +144,7 @@ const MESSAGES: [&str; 5] = ["prost", "prost-types", "prost-build", "tonic-prost
 const DEVICE: [&str; 5] = ["wgpu", "wgpu-core", "wgpu-hal", "naga", "ash"];
 
 /// Crates of the laboratory, which the program must not link.
-const LAB: [&str; 5] = ["browser", "lab", "network-proxy", "simulation", "thirtyfour"];
+const LAB: [&str; 4] = ["browser", "lab", "network-proxy", "simulation"];
 
 /// Text of code that a decision may not depend on.
 const IMPURE: [&str; 8] =
