@@ -26,6 +26,8 @@ use super::subject::Subject;
 const VIEWS: [u32; 2] = [8, 32];
 /// The time of a run beyond `--time`, for loading and the report.
 const GRACE_S: f64 = 15.0;
+/// Numbers of cameras and sides of images of the rows of a quick run: every second one.
+const QUICK_ROWS: (&[u32], &[f64]) = (&[1, 4], &[0.5, 1.0]);
 /// The longest quick run.
 const QUICK_S: f64 = 600.0;
 
@@ -75,7 +77,7 @@ impl FrontsArgs {
             Instant::now() + left / subjects.max(1) as u32
         });
         let views = (0..VIEWS[usize::from(!self.quick)]).map(ProbeView::Screening).collect();
-        Limits { end, views, every_second: self.quick }
+        Limits { end, views, only: self.quick.then_some(QUICK_ROWS) }
     }
 }
 

@@ -16,9 +16,6 @@ use super::subject::Subject;
 const BUDGET_LEVELS: [f64; 3] = [0.2, 0.5, 0.8];
 /// Seconds of measuring that a plan may take.
 const ALLOWANCE_S: f64 = 120.0;
-/// Every second number of cameras, and side of images.
-const QUICK_CAMERAS: [u32; 2] = [1, 4];
-const QUICK_SIDES: [f64; 2] = [0.5, 1.0];
 /// Samples a pixel of the rows of the front that are measured again.
 const SAMPLES: u32 = 4;
 
@@ -27,8 +24,8 @@ pub struct Limits {
     /// When measuring ends.
     pub end: Option<Instant>,
     pub views: Vec<ProbeView>,
-    /// Every second number of cameras and size.
-    pub every_second: bool,
+    /// Numbers of sample cameras and sides of their images of the rows that are measured; `None`: all.
+    pub only: Option<(&'static [u32], &'static [f64])>,
 }
 
 impl Limits {
@@ -38,7 +35,7 @@ impl Limits {
 
     /// Whether a row is to be measured.
     pub fn include(&self, row: &Row) -> bool {
-        !self.every_second || (QUICK_CAMERAS.contains(&row.camera_count) && QUICK_SIDES.contains(&row.side_ratio))
+        self.only.is_none_or(|(cameras, sides)| cameras.contains(&row.camera_count) && sides.contains(&row.side_ratio))
     }
 }
 

@@ -26,8 +26,8 @@ fn front(limits: &Limits) -> Front {
 #[test]
 fn a_front_has_all_methods_and_plans_are_near_it() {
     let views = (0..2).map(ProbeView::Screening).collect();
-    let front = front(&Limits { end: None, views, every_second: true });
-    assert_eq!((front.rows.len(), front.left_out), (48, 0));
+    let front = front(&Limits { end: None, views, only: Some((&[4], &[1.0])) });
+    assert_eq!((front.rows.len(), front.left_out), (12, 0));
     let best = front.best(Metric::Flip);
     let falls = |pair: &[&super::row::MeasuredRow]| {
         pair[0].price.node_s <= pair[1].price.node_s
@@ -50,7 +50,7 @@ fn a_front_has_all_methods_and_plans_are_near_it() {
 #[test]
 fn a_front_ends_in_time_and_counts_what_is_missing() {
     let views = vec![ProbeView::Screening(0)];
-    let front = front(&Limits { end: Some(Instant::now()), views, every_second: false });
+    let front = front(&Limits { end: Some(Instant::now()), views, only: None });
     assert_eq!((front.rows.len(), front.left_out, front.planned.len()), (0, 180, 0));
     assert!(checks(&[front]).iter().any(|check| check.outcome() == Outcome::FallsShort));
 }

@@ -1,51 +1,20 @@
 //! `myriorama demo`: one scene in expensive and in plain light, by a whole cluster in this process.
 
+mod args;
 mod first_page;
 mod page_layout;
 mod shared_light;
 mod viewpoint;
 
-use std::path::PathBuf;
-
 use app_core::exit::Outcome;
 use app_core::experiment::Experiment;
 use app_core::progress::bar;
-use app_core::setup::{DeviceArgs, SceneArgs, Setup};
-use clap::Args;
 use node::Engine as _;
 use render::Lighting;
 use report::{Bar, Check, Report};
 
+pub use args::DemoArgs;
 use shared_light::LightResult;
-
-/// Shows what sharing samples gains: 290 views of 200×150 of one scene, from four samples of 400×300 by P nodes in one
-/// process, beside views that are drawn directly. Once in expensive light, once in plain light. Writes a page with
-/// pictures, tables and a chart to --out. Takes two minutes at most on two slow cores, and half a minute with --quick.
-#[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:\n  myriorama demo\n  myriorama demo --showcase\n  myriorama demo --scene helmet.gltf --out out/helmet\n  myriorama demo --scene tree-terrain-30k --quick"
-)]
-pub struct DemoArgs {
-    #[command(flatten)]
-    scene: SceneArgs,
-    #[command(flatten)]
-    device: DeviceArgs,
-    /// Nodes P that share the device
-    #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=256))]
-    nodes: u16,
-    /// Where the report goes
-    #[arg(long, default_value = "out/demo", value_name = "DIR")]
-    out: PathBuf,
-    /// Makes only the first page, first-page.png in --out
-    #[arg(long)]
-    showcase: bool,
-    /// Makes 64 views in place of 290
-    #[arg(long)]
-    quick: bool,
-    /// Exit status 1 when a check falls short
-    #[arg(long)]
-    strict: bool,
-}
 
 /// The light in which sharing pays, unless the user names one.
 const EXPENSIVE_LIGHT: &str = "soft 16, occlusion 16";
@@ -63,7 +32,8 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     if args.showcase {
         return Ok(Outcome::Done);
     }
-    let experiment = start(args, setup)?;
+    let nodes = usize::from(args.nodes);
+    let experiment = Experiment::start(args.scene.clone(), setup, args.device.device, nodes)?;
     let results = measure(args, &experiment)?;
     let mut report = new_report(args, &experiment);
     report.cover = Some(cover);
@@ -74,11 +44,6 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     println!("\n{}", report.summary);
     let ok = report.finish(&args.out)?;
     Ok(Outcome::of(ok || !args.strict))
-}
-
-/// A cluster of `args.nodes` nodes in this process.
-fn start(args: &DemoArgs, setup: Setup) -> anyhow::Result<Experiment> {
-    Experiment::start(args.scene.clone(), setup, args.device.device, usize::from(args.nodes))
 }
 
 /// The results of each light, the most expensive first.

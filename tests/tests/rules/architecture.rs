@@ -356,24 +356,23 @@ fn the_program_links_no_laboratory() {
 fn features(selection: &[&str]) -> BTreeSet<String> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut tree = Command::new(cargo);
-    tree.current_dir(root()).args(["tree", "--offline", "--prefix", "none", "--no-dedupe", "--format", "{p} {f}"]);
+    tree.current_dir(root()).args(["tree", "--offline", "--prefix", "none", "--format", "{p} {f}"]);
     let output = tree.args(selection).output().expect("cargo tree runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).expect("text").lines().map(str::to_owned).collect()
+    let text = String::from_utf8(output.stdout).expect("text");
+    // A package that is named again has a mark.
+    text.lines().map(|line| line.trim_end_matches(" (*)").to_owned()).collect()
 }
 
 #[test]
 fn programs_and_tests_share_one_build_of_every_crate() {
     let all = features(&["--workspace", "--edges", "normal,build,dev"]);
-    let of_programs = features(&["--package", "myriorama", "--package", "lab", "--edges", "normal,build"]);
     for package in ["myriorama", "lab"] {
         let program = features(&["--package", package, "--edges", "normal,build"]);
         assert!(program.iter().any(|line| line.starts_with("wgpu v")), "the tree was read");
         assert_eq!(program.difference(&all).collect::<Vec<_>>(), Vec::<&String>::new(), "{package}");
-        assert_eq!(program.difference(&of_programs).collect::<Vec<_>>(), Vec::<&String>::new(), "{package}");
+        assert!(all.difference(&program).count() > 0, "a crate of tests alone is seen as different");
     }
-    let client = features(&["--package", "client", "--edges", "normal,build"]);
-    assert!(client.difference(&all).count() > 0, "a client alone has fewer features");
 }
 
 #[test]

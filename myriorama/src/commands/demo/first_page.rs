@@ -16,7 +16,7 @@ use node::{DirectWork, Engine as _, SampleSet, SampleWork, Turn, ViewWork, WorkC
 use render::Lighting;
 use report::Picture;
 
-use super::DemoArgs;
+use super::args::DemoArgs;
 use super::page_layout::{PageParts, VIEW_PX};
 use super::viewpoint::Viewpoint;
 
