@@ -27,7 +27,7 @@ fn front(limits: &Limits) -> Front {
 fn a_front_has_all_methods_and_plans_are_near_it() {
     let views = (0..2).map(ProbeView::Screening).collect();
     let front = front(&Limits { end: None, views, only: Some((&[4], &[1.0])) });
-    assert_eq!((front.rows.len(), front.left_out), (12, 0));
+    assert_eq!((front.rows.len(), front.left_out), (18, 0));
     let best = front.best(Metric::Flip);
     let falls = |pair: &[&super::row::MeasuredRow]| {
         pair[0].price.node_s <= pair[1].price.node_s
