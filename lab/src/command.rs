@@ -20,10 +20,10 @@ use crate::view_errors::{self, ErrorsArgs};
 #[derive(Debug, Subcommand)]
 pub enum LabCommand {
     /// Measures speed and accuracy against bars and writes a report
-    Bench(BenchArgs),
+    Bench(Box<BenchArgs>),
     /// Repeats the experiments of a paper, or draws how methods fail, and writes a report
     #[command(subcommand)]
-    Study(StudyCommand),
+    Study(Box<StudyCommand>),
 }
 
 /// A study.
@@ -71,17 +71,25 @@ impl LabCommand {
     pub fn run(&self) -> anyhow::Result<Outcome> {
         match self {
             Self::Bench(args) => bench::run(args),
-            Self::Study(StudyCommand::Lages(args)) => lages::run(args),
-            Self::Study(StudyCommand::Sampling(args)) => sampling::run(args),
-            Self::Study(StudyCommand::Failures(args)) => failures::run(args),
-            Self::Study(StudyCommand::Fronts(args)) => fronts::run(args),
-            Self::Study(StudyCommand::Planner(args)) => planner_study::run(args),
-            Self::Study(StudyCommand::Placement(args)) => placement::run(args),
-            Self::Study(StudyCommand::Impostors(args)) => impostors::run(args),
-            Self::Study(StudyCommand::Layered(args)) => layered::run(args),
-            Self::Study(StudyCommand::Stability(args)) => stability::run(args),
-            Self::Study(StudyCommand::Compare(args)) => compare::run(args),
-            Self::Study(StudyCommand::Errors(args)) => view_errors::run(args),
+            Self::Study(study) => study.run(),
+        }
+    }
+}
+
+impl StudyCommand {
+    fn run(&self) -> anyhow::Result<Outcome> {
+        match self {
+            Self::Lages(args) => lages::run(args),
+            Self::Sampling(args) => sampling::run(args),
+            Self::Failures(args) => failures::run(args),
+            Self::Fronts(args) => fronts::run(args),
+            Self::Planner(args) => planner_study::run(args),
+            Self::Placement(args) => placement::run(args),
+            Self::Impostors(args) => impostors::run(args),
+            Self::Layered(args) => layered::run(args),
+            Self::Stability(args) => stability::run(args),
+            Self::Compare(args) => compare::run(args),
+            Self::Errors(args) => view_errors::run(args),
         }
     }
 }

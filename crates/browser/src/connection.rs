@@ -18,6 +18,8 @@ type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
 
 /// The time within which a browser answers, even on a busy machine.
 const ANSWERS_WITHIN: Duration = Duration::from_secs(60);
+/// Commands that wait for the socket.
+const COMMANDS_IN_FLIGHT: usize = 16;
 /// The pause between two looks for the first page.
 const POLL: Duration = Duration::from_millis(5);
 
@@ -26,7 +28,7 @@ const POLL: Duration = Duration::from_millis(5);
 /// A task owns the socket. It ends when the connection is dropped or lost, and then every command that waits is told so.
 #[derive(Debug)]
 pub(crate) struct Connection {
-    commands: mpsc::UnboundedSender<Command>,
+    commands: mpsc::Sender<Command>,
     record: watch::Receiver<PageRecord>,
     /// The session of the page; absent while there is none, when commands are for the browser.
     session: Option<String>,
@@ -47,7 +49,7 @@ impl Connection {
     pub(crate) async fn open(address: &str) -> Result<Self, BrowserError> {
         let socket = connect_async_with_config(address, None, true).await;
         let (socket, _) = socket.map_err(|error| BrowserError::refused(address, &error.to_string()))?;
-        let (commands, received) = mpsc::unbounded_channel();
+        let (commands, received) = mpsc::channel(COMMANDS_IN_FLIGHT);
         let (sender, record) = watch::channel(PageRecord::default());
         tokio::spawn(serve(socket, received, sender));
         let mut connection = Self { commands, record, session: None };
@@ -88,7 +90,7 @@ impl Connection {
         }
         let (sender, answer) = oneshot::channel();
         let command = Command { message, answer: sender };
-        self.commands.send(command).map_err(|_| BrowserError::ended(method))?;
+        self.commands.send(command).await.map_err(|_| BrowserError::ended(method))?;
         let answer = timeout(ANSWERS_WITHIN, answer).await;
         let answer = answer.map_err(|_| BrowserError::no_answer(method, ANSWERS_WITHIN))?;
         let mut answer = answer.map_err(|_| BrowserError::ended(method))?;
@@ -116,7 +118,7 @@ impl Connection {
 }
 
 /// Sends commands, passes on their answers, and records events, until the connection is dropped or lost or the page ends.
-async fn serve(mut socket: Socket, mut commands: mpsc::UnboundedReceiver<Command>, record: watch::Sender<PageRecord>) {
+async fn serve(mut socket: Socket, mut commands: mpsc::Receiver<Command>, record: watch::Sender<PageRecord>) {
     let mut answers: HashMap<u64, oneshot::Sender<Value>> = HashMap::new();
     let mut last_number = 0;
     loop {
