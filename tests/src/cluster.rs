@@ -21,7 +21,7 @@ use tokio_stream::StreamExt as _;
 use tokio_util::sync::CancellationToken;
 use wire::rpc::Messages;
 
-use crate::scalar_engine::{SKY_LINEAR, ScalarEngine, illumination};
+use crate::scalar_engine::{Pace, SKY_LINEAR, ScalarEngine, illumination};
 
 /// A server with its own runtime.
 pub struct Server {
@@ -109,6 +109,8 @@ pub struct Cluster {
     pub metrics: Vec<NodeMetrics>,
     /// A connected client.
     pub client: Client,
+    /// The speed of nodes that are added.
+    pace: Pace,
 }
 
 /// The package is longer than a message, so that it travels in parts.
@@ -321,7 +323,14 @@ impl Cluster {
 
     async fn start_after(coordinator: Server, nodes: usize, change: impl Fn(NodeConfig) -> NodeConfig) -> Self {
         let client = connected(&coordinator.address).await;
-        let mut cluster = Self { coordinator, nodes: Vec::new(), engines: Vec::new(), metrics: Vec::new(), client };
+        let mut cluster = Self {
+            coordinator,
+            nodes: Vec::new(),
+            engines: Vec::new(),
+            metrics: Vec::new(),
+            client,
+            pace: Pace::default(),
+        };
         for _ in 0..nodes {
             cluster.add_node(&change);
         }
@@ -329,9 +338,17 @@ impl Cluster {
         cluster
     }
 
+    /// Gives all nodes a stated speed, also those that are added. Timings of a busy machine then look alike, so that
+    /// plans do not change with them.
+    pub fn keep_pace(&mut self, pace: Pace) {
+        self.pace = pace;
+        self.engines.iter().for_each(|engine| engine.keep_pace(pace));
+    }
+
     /// Adds a node, which joins soon.
     pub fn add_node(&mut self, change: impl Fn(NodeConfig) -> NodeConfig) {
         let engine = ScalarEngine::default();
+        engine.keep_pace(self.pace);
         let config = change(NodeConfig::new(format!("n{}", self.nodes.len()), &self.coordinator.address));
         let metrics = NodeMetrics::default();
         self.engines.push(engine.clone());

@@ -71,6 +71,14 @@ pub struct Pace {
     pub view: Duration,
 }
 
+impl Pace {
+    /// Times in milliseconds.
+    #[must_use]
+    pub fn from_ms(image_ms: u64, view_ms: u64) -> Self {
+        Self { image: Duration::from_millis(image_ms), view: Duration::from_millis(view_ms) }
+    }
+}
+
 /// Work that waits until a test releases it.
 #[derive(Debug, Default)]
 struct Holds {

@@ -6,6 +6,7 @@ use std::time::Duration;
 use client::{Session, ViewRequest};
 use cluster::{BudgetRequest, CommonCell, CommonKind, DIRECT, PolicyChoice, SessionRequest, Timeline};
 use cluster_tests::cluster::{CUBE, Cluster, camera_around, cube_grid, offer, request};
+use cluster_tests::scalar_engine::Pace;
 use cluster_tests::watcher::eventually;
 use coordinator::SceneOffer;
 use depth_image::{Aabb, PinholeCamera};
@@ -60,6 +61,7 @@ async fn a_base_is_sampled_once_wherever_viewers_walk() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_successor_of_a_killed_compositor_pulls_the_base_once() {
     let mut cluster = Cluster::start_offering(with_base(), 3).await;
+    cluster.keep_pace(Pace::from_ms(10, 20));
     let session = cluster.session(asked(vec![around(0.0)])).await.unwrap();
     let views = || (0..12).map(|view| 0.002 * view as f32);
     assert_eq!(frames(&session, views()).await, 12);

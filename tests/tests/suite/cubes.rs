@@ -7,6 +7,7 @@ use client::{Frame, Session, ViewRequest};
 use cluster::{BudgetRequest, DIRECT, PolicyChoice, Refinement, SessionRequest, Timeline};
 use cluster_tests::cluster::{CUBE, Cluster, camera_around, offer_with_light_field, request, rig};
 use cluster_tests::picture::fault_of;
+use cluster_tests::scalar_engine::Pace;
 use cluster_tests::watcher::eventually;
 use depth_image::{Aabb, PinholeCamera, ProvenanceKind};
 use glam::{UVec2, Vec3};
@@ -67,6 +68,7 @@ async fn viewers_that_walk_around_cause_no_sampling_and_no_plan() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_successor_of_a_killed_compositor_pulls_the_set_once() {
     let mut cluster = Cluster::start(3).await;
+    cluster.keep_pace(Pace::from_ms(10, 20));
     let session = cluster.session(sampled_as_cube(vec![view(0.0)])).await.unwrap();
     frames(&session, around(12)).await;
     cluster.take_counts();
@@ -77,6 +79,7 @@ async fn a_successor_of_a_killed_compositor_pulls_the_set_once() {
 #[tokio::test(flavor = "multi_thread")]
 async fn tiles_of_a_light_field_are_sampled_once_and_a_successor_pulls_them_once() {
     let mut cluster = Cluster::start_offering(offer_with_light_field(), 3).await;
+    cluster.keep_pace(Pace::from_ms(10, 20));
     let asked = SessionRequest { forced_tile_count: Some(2), ..sampled_as_cube(vec![view(0.0)]) };
     let session = cluster.session(asked).await.unwrap();
     let plan = session.plan().assignment;

@@ -12,13 +12,9 @@ const MOVING: Timeline = Timeline { start_s: 0.0, step_s: 1.0, set_count: 3 };
 /// Time until a better plan is in force: three reevaluations, and a dwell of 5 s of the plan before it.
 const SETTLED: Duration = Duration::from_secs(20);
 
-fn of_ms(image_ms: u64, view_ms: u64) -> Pace {
-    Pace { image: Duration::from_millis(image_ms), view: Duration::from_millis(view_ms) }
-}
-
 async fn cluster_of(nodes: usize, pace: Pace) -> Cluster {
-    let cluster = Cluster::start(nodes).await;
-    cluster.engines.iter().for_each(|engine| engine.keep_pace(pace));
+    let mut cluster = Cluster::start(nodes).await;
+    cluster.keep_pace(pace);
     cluster
 }
 
@@ -30,14 +26,14 @@ fn number_of(node_name: &str) -> usize {
 #[tokio::test(flavor = "multi_thread")]
 async fn views_of_a_compositor_that_became_slow_are_stolen() {
     const VIEWS: u32 = 600;
-    let cluster = cluster_of(4, of_ms(1, 10)).await;
+    let cluster = cluster_of(4, Pace::from_ms(1, 10)).await;
     let asked = request(PolicyChoice::Pipeline, Timeline { set_count: 1, ..MOVING });
     let asked = SessionRequest { forced_sampler_count: Some(1), views_per_set: VIEWS, ..asked };
     let session = cluster.session(asked).await.unwrap();
     let compositors: Vec<usize> =
         session.plan().assignment.compositors.iter().map(|share| number_of(&share.node_name)).collect();
     let slow = compositors[1];
-    cluster.engines[slow].keep_pace(of_ms(1, 50));
+    cluster.engines[slow].keep_pace(Pace::from_ms(1, 50));
     // The views of the measurement.
     compositors.iter().for_each(|&node| _ = cluster.engines[node].take_reconstructed());
     let frames = session.render_views(views(1, VIEWS)).unwrap().all().await.unwrap();
@@ -86,7 +82,7 @@ async fn follow(session: &Session, views_per_set: u32, k: usize) -> SessionPlan 
 
 #[tokio::test(flavor = "multi_thread")]
 async fn k_follows_v_from_one_to_five_hundred_and_back() {
-    let cluster = cluster_of(6, of_ms(60, 2)).await;
+    let cluster = cluster_of(6, Pace::from_ms(60, 2)).await;
     let asked = SessionRequest { views_per_set: 1, ..request(PolicyChoice::Pipeline, MOVING) };
     let session = cluster.session(asked).await.unwrap();
     assert_eq!(session.plan().sampler_count(), 3, "{}", session.plan().reason);
