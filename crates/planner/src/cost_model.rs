@@ -37,7 +37,7 @@ pub struct TimedRow {
 /// Predictions from the measured rows.
 #[derive(Debug, Clone)]
 pub struct CostModel {
-    rows: Vec<Row>,
+    points: Vec<Point>,
     process: GaussianProcess,
     /// The weights of the measured rows in predictions of g_s, d and c.
     weights: [Vec<f64>; 3],
@@ -50,7 +50,8 @@ impl CostModel {
     /// 10⁻⁹ s, count as that.
     #[must_use]
     pub fn fit(timed: &[TimedRow]) -> Self {
-        let process = GaussianProcess::new(timed.len(), |i, j| covariance(&timed[i].row, &timed[j].row), NOISE);
+        let points: Vec<Point> = timed.iter().map(|timed| Point::new(&timed.row)).collect();
+        let process = GaussianProcess::new(timed.len(), |i, j| points[i].covariance(&points[j]), NOISE);
         let residuals = [0, 1, 2].map(|cost| -> Vec<f64> {
             timed.iter().map(|timed| log_costs(&timed.costs)[cost] - prior(&timed.row)[cost]).collect()
         });
@@ -58,14 +59,15 @@ impl CostModel {
         // The most likely scale, with the prior's as one more measurement.
         let scale = |cost: usize| (1.0 + dot(&residuals[cost], &weights[cost])) / (1.0 + timed.len() as f64);
         let scales = [0, 1, 2].map(scale);
-        Self { rows: timed.iter().map(|timed| timed.row.clone()).collect(), process, weights, scales }
+        Self { points, process, weights, scales }
     }
 
     /// The predicted costs of a valid row, always finite and from e⁻²⁰ to e²⁰ s, less some standard deviations.
     #[must_use]
     pub fn predict(&self, row: &Row, deviations: f64) -> RowCosts {
-        let covariances: Vec<f64> = self.rows.iter().map(|other| covariance(row, other)).collect();
-        let variance = self.process.variance(covariance(row, row), &covariances) + NOISE;
+        let point = Point::new(row);
+        let covariances = self.covariances(&point);
+        let variance = self.process.variance(point.covariance(&point), &covariances) + NOISE;
         let prior = prior(row);
         let [sample_image_s, load_set_s, reconstruct_view_s] = [0, 1, 2].map(|cost| {
             let log = prior[cost] + dot(&covariances, &self.weights[cost]);
@@ -78,8 +80,13 @@ impl CostModel {
     /// How little the measured rows say about a row: the variance of its predicted logarithm, at the prior's scale.
     #[must_use]
     pub fn uncertainty(&self, row: &Row) -> f64 {
-        let covariances: Vec<f64> = self.rows.iter().map(|other| covariance(row, other)).collect();
-        self.process.variance(covariance(row, row), &covariances)
+        let point = Point::new(row);
+        self.process.variance(point.covariance(&point), &self.covariances(&point))
+    }
+
+    /// With the measured rows.
+    fn covariances(&self, point: &Point) -> Vec<f64> {
+        self.points.iter().map(|other| point.covariance(other)).collect()
     }
 }
 
@@ -88,14 +95,27 @@ fn logs(row: &Row) -> [f64; 2] {
     [f64::from(row.camera_count).ln(), row.side_ratio.ln()]
 }
 
-fn covariance(a: &Row, b: &Row) -> f64 {
-    let (logs_a, logs_b) = (logs(a), logs(b));
-    let squares = [0, 1].map(|axis| ((logs_a[axis] - logs_b[axis]) / NEAR[axis]).powi(2));
-    let nearness = (-0.5 * (squares[0] + squares[1])).exp();
-    let (is_method, is_sampling) = (a.method == b.method, a.sampling == b.sampling);
-    let is_shared = [true, is_method, is_sampling, is_method && is_sampling];
-    let shared: f64 = SHARED.iter().zip(is_shared).map(|(variance, is)| if is { *variance } else { 0.0 }).sum();
-    CONSTANT + EXPONENT * dot(&logs_a, &logs_b) + nearness * shared
+/// A row, and its logarithms, which every covariance needs.
+#[derive(Debug, Clone)]
+struct Point {
+    row: Row,
+    logs: [f64; 2],
+}
+
+impl Point {
+    fn new(row: &Row) -> Self {
+        Self { row: row.clone(), logs: logs(row) }
+    }
+
+    fn covariance(&self, other: &Self) -> f64 {
+        let squares = [0, 1].map(|axis| ((self.logs[axis] - other.logs[axis]) / NEAR[axis]).powi(2));
+        let nearness = (-0.5 * (squares[0] + squares[1])).exp();
+        let is_method = self.row.method == other.row.method;
+        let is_sampling = self.row.sampling == other.row.sampling;
+        let is_shared = [true, is_method, is_sampling, is_method && is_sampling];
+        let shared: f64 = SHARED.iter().zip(is_shared).map(|(variance, is)| if is { *variance } else { 0.0 }).sum();
+        CONSTANT + EXPONENT * dot(&self.logs, &other.logs) + nearness * shared
+    }
 }
 
 /// The prior means of the logarithms of g_s, d and c.
