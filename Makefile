@@ -63,9 +63,8 @@ fmt-check: lint-toolchain
 lint: lint-toolchain
 	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
 
-# RUN is a program that runs each test program.
 unit: toolchain vulkan browser
-	$(CARGO) test --release --locked --workspace $(if $(RUN),--config 'target."cfg(unix)".runner="$(RUN)"') $(ARGS)
+	$(CARGO) test --release --locked --workspace $(ARGS)
 
 vulkan:
 	@scripts/ensure-vulkan.sh
