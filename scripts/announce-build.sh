@@ -6,6 +6,6 @@ cd "$(dirname "$0")/.."
 if [ ! -e "${CARGO_TARGET_DIR:-target}/release/myriorama" ]; then
     cat <<'TEXT'
 The first build compiles Myriorama and the libraries that it uses, with optimisation, since the software device and the
-codecs need it. It takes four to six minutes on two cores and about two on eight. Later builds take seconds.
+codecs need it. It takes four to five minutes on two cores and less than two on eight. Later builds take seconds.
 TEXT
 fi
