@@ -155,7 +155,7 @@ fn session_size_px(request: &SessionRequest, offer: &SceneOffer) -> Option<UVec2
     request.sample_size_px.or_else(|| fitting_size_px(&offer.rig, &request.typical_view).filter(|_| is_fitted))
 }
 
-/// The size of offered images that makes them about [`SAMPLE_DENSITY`] times as dense as a view. Sizes are whole steps of √2
+/// The size of offered images that makes them about `SAMPLE_DENSITY` times as dense as a view. Sizes are whole steps of √2
 /// apart, so that sessions of similar views share their samples. `None` without images or with a degenerate view.
 #[must_use]
 pub fn fitting_size_px(rig: &[Camera], view: &PinholeCamera) -> Option<UVec2> {

@@ -1,6 +1,6 @@
 //! `myriorama-lab`: measurements of the product, each as a report. Its commands are `bench` and `study`.
 //!
-//! [`bench`] compares measured values with bars. [`lages`] and [`sampling_study`] repeat the experiments of papers.
+//! [`mod@bench`] compares measured values with bars. [`lages`] and [`sampling_study`] repeat the experiments of papers.
 //! [`load`] and [`scaling`] start clusters of processes. [`failures`] holds the shapes of curves of errors.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 

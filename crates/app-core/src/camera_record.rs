@@ -77,7 +77,7 @@ fn write_lines(
 /// file.
 ///
 /// # Errors
-/// The file cannot be read, or was not written by [`write`].
+/// The file cannot be read, or was not written by [`write()`].
 pub fn read(path: &Path, frame: impl FnMut(&str)) -> Result<Option<Map<String, Value>>, CameraFileError> {
     let named = |error: CameraFileError| CameraFileError { file: path.display().to_string(), ..error };
     match File::open(path) {

@@ -36,6 +36,7 @@ pub struct DeviceArgs {
 
 /// The scene, its sampling and its lighting.
 #[derive(Debug, Clone, Args)]
+#[allow(rustdoc::broken_intra_doc_links, reason = "help has optional parts in brackets")]
 pub struct SceneArgs {
     /// A scene by name or a file (.gltf, .glb, .obj, .ply). Names: tree-terrain-30k, -125k, -500k, -2m (each also with
     /// -wind), snake (animated), bird-nest, urban, tree, grass, grass:DENSITY, blocks, courtyard, teapot-mirror, and

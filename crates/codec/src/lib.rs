@@ -1,6 +1,6 @@
 //! Depth images, views and frames as bytes, and those bytes in chunks.
 //!
-//! Planes: [`quantise`], [`runs`] and [`tagged`] are the pieces; `depth_codec`, `color_codec` and `words_codec` make planes
+//! Planes: `quantise`, `runs` and `tagged` are the pieces; `depth_codec`, `color_codec` and `words_codec` make planes
 //! of them. Depth images: `image_codec` puts planes together and `chunk` cuts the result. Views: `frame_codec` packs the
 //! colour, `view_codec` adds the other planes, and `frame_parts` cuts the result.
 //!

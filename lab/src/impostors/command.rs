@@ -35,6 +35,7 @@ const LIGHTING: [&str; 2] = ["soft 16, occlusion 16, reflections 1", "shadows, r
 #[command(after_help = "Examples:
   myriorama-lab study impostors
   myriorama-lab study impostors --quick --strict   in hard shadows; exit status 1 if a bar is missed")]
+#[allow(rustdoc::broken_intra_doc_links, reason = "help has optional parts in brackets")]
 pub struct ImpostorsArgs {
     #[command(flatten)]
     device: DeviceArgs,

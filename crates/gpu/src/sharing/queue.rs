@@ -78,7 +78,7 @@ impl DeviceQueue {
     }
 
     /// The units of one slice of a family's work; all where work is not cut, `unknown` where a rate is not known. Known
-    /// rates bring no more than [`MOST_RESIZING`] times as many or as few.
+    /// rates bring no more than `MOST_RESIZING` times as many or as few.
     #[must_use]
     pub fn slice_units(&self, family: u64, unknown: u64) -> u64 {
         if !self.cuts() {

@@ -21,7 +21,7 @@ const BALL_DISTANCE_M: f32 = 0.9;
 const ROWS: [(u32, f32); 3] = [(10, 2.6), (9, 3.4), (10, 4.2)];
 const MATT_BALLS: [Vec3; 2] = [Vec3::new(204.0, 92.0, 48.0), Vec3::new(64.0, 130.0, 190.0)];
 
-/// [Newell's teapot](Teapot) of 9,216 triangles on a floor of 10 m whose glossy reflection shows it and two walls of checks,
+/// Newell's teapot of 9,216 triangles on a floor of 10 m whose glossy reflection shows it and two walls of checks,
 /// under two lamps.
 #[must_use]
 pub fn teapot_floor() -> Scene {

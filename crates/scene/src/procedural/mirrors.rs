@@ -38,7 +38,7 @@ const POST_SIDES: u32 = 64;
 const HALL_HALF_SIDE_M: u32 = 4;
 const HALL_HEIGHT_M: u32 = 4;
 
-/// [Newell's teapot](Teapot) on a floor of 24 m with checks of 1 m, before a mirror of 39,600 triangles that is convex
+/// Newell's teapot on a floor of 24 m with checks of 1 m, before a mirror of 39,600 triangles that is convex
 /// with dents.
 #[must_use]
 pub fn teapot_mirror() -> Scene {
