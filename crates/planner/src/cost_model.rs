@@ -37,7 +37,9 @@ pub struct TimedRow {
 /// Predictions from the measured rows.
 #[derive(Debug, Clone)]
 pub struct CostModel {
-    points: Vec<Point>,
+    rows: Vec<Row>,
+    /// The logarithms of each row's S and side.
+    logs: Vec<[f64; 2]>,
     process: GaussianProcess,
     /// The weights of the measured rows in predictions of g_s, d and c.
     weights: [Vec<f64>; 3],
@@ -50,8 +52,8 @@ impl CostModel {
     /// 10⁻⁹ s, count as that.
     #[must_use]
     pub fn fit(timed: &[TimedRow]) -> Self {
-        let points: Vec<Point> = timed.iter().map(|timed| Point::new(&timed.row)).collect();
-        let process = GaussianProcess::new(timed.len(), |i, j| points[i].covariance(&points[j]), NOISE);
+        let points: Vec<Point<'_>> = timed.iter().map(|timed| Point::new(&timed.row)).collect();
+        let process = GaussianProcess::new(timed.len(), |i, j| points[i].covariance(points[j]), NOISE);
         let residuals = [0, 1, 2].map(|cost| -> Vec<f64> {
             timed.iter().map(|timed| log_costs(&timed.costs)[cost] - prior(&timed.row)[cost]).collect()
         });
@@ -59,15 +61,17 @@ impl CostModel {
         // The most likely scale, with the prior's as one more measurement.
         let scale = |cost: usize| (1.0 + dot(&residuals[cost], &weights[cost])) / (1.0 + timed.len() as f64);
         let scales = [0, 1, 2].map(scale);
-        Self { points, process, weights, scales }
+        let rows = points.iter().map(|point| point.row.clone()).collect();
+        let logs = points.iter().map(|point| point.logs).collect();
+        Self { rows, logs, process, weights, scales }
     }
 
     /// The predicted costs of a valid row, always finite and from e⁻²⁰ to e²⁰ s, less some standard deviations.
     #[must_use]
     pub fn predict(&self, row: &Row, deviations: f64) -> RowCosts {
         let point = Point::new(row);
-        let covariances = self.covariances(&point);
-        let variance = self.process.variance(point.covariance(&point), &covariances) + NOISE;
+        let covariances = self.covariances(point);
+        let variance = self.process.variance(point.covariance(point), &covariances) + NOISE;
         let prior = prior(row);
         let [sample_image_s, load_set_s, reconstruct_view_s] = [0, 1, 2].map(|cost| {
             let log = prior[cost] + dot(&covariances, &self.weights[cost]);
@@ -81,12 +85,13 @@ impl CostModel {
     #[must_use]
     pub fn uncertainty(&self, row: &Row) -> f64 {
         let point = Point::new(row);
-        self.process.variance(point.covariance(&point), &self.covariances(&point))
+        self.process.variance(point.covariance(point), &self.covariances(point))
     }
 
-    /// With the measured rows.
-    fn covariances(&self, point: &Point) -> Vec<f64> {
-        self.points.iter().map(|other| point.covariance(other)).collect()
+    /// The covariance of a point with each measured row.
+    fn covariances(&self, point: Point<'_>) -> Vec<f64> {
+        let measured = self.rows.iter().zip(&self.logs).map(|(row, &logs)| Point { row, logs });
+        measured.map(|other| point.covariance(other)).collect()
     }
 }
 
@@ -95,19 +100,19 @@ fn logs(row: &Row) -> [f64; 2] {
     [f64::from(row.camera_count).ln(), row.side_ratio.ln()]
 }
 
-/// A row, and its logarithms, which every covariance needs.
-#[derive(Debug, Clone)]
-struct Point {
-    row: Row,
+/// A row with the logarithms of its S and side, which every covariance needs.
+#[derive(Debug, Clone, Copy)]
+struct Point<'a> {
+    row: &'a Row,
     logs: [f64; 2],
 }
 
-impl Point {
-    fn new(row: &Row) -> Self {
-        Self { row: row.clone(), logs: logs(row) }
+impl<'a> Point<'a> {
+    fn new(row: &'a Row) -> Self {
+        Self { row, logs: logs(row) }
     }
 
-    fn covariance(&self, other: &Self) -> f64 {
+    fn covariance(self, other: Self) -> f64 {
         let squares = [0, 1].map(|axis| ((self.logs[axis] - other.logs[axis]) / NEAR[axis]).powi(2));
         let nearness = (-0.5 * (squares[0] + squares[1])).exp();
         let is_method = self.row.method == other.row.method;
