@@ -56,11 +56,11 @@ pub(crate) enum Source {
 }
 
 impl Source {
-    /// The scene that views are drawn from.
-    pub(crate) fn scene(&self) -> Option<&SceneRef> {
+    /// The scene that surfaces, or all of the views, are drawn from.
+    pub(crate) fn scene(&self) -> &SceneRef {
         match self {
-            Self::Sets(_) => None,
-            Self::Scene { plan, .. } => Some(&plan.workload.scene),
+            Self::Sets(sets) => &sets.scene,
+            Self::Scene { plan, .. } => &plan.workload.scene,
         }
     }
 

@@ -47,8 +47,11 @@ impl Fetcher {
         }
         let (images, times) = gathered?;
         let images = join_tiles(&set.plan, images).await?;
-        let whole = SampleSet::of(&set.plan.workload, images, set.plan.is_common);
-        Ok((whole.map_err(|error| Status::data_loss(error.to_string()))?, times))
+        let first = SampleSet::of(&set.plan.workload, images, set.plan.is_common);
+        let first = first.map_err(|error| Status::data_loss(error.to_string()))?;
+        let scene_time_s = set.plan.workload.timeline.time_s(set.set_index);
+        let scene_time_s = scene_time_s.ok_or_else(|| beyond_timeline(set.set_index))?;
+        Ok((SampleSet { scene_time_s, ..first }, times))
     }
 
     /// All images of a set, or their tiles, in their order.

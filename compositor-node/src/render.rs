@@ -101,7 +101,7 @@ impl Rendering {
         let (source, key) = (batch[0].source.clone(), batch[0].key.clone());
         let cameras: Vec<_> = batch.iter().map(|waiting| waiting.view.camera).collect();
         let count = cameras.len();
-        let scene = source.scene().cloned();
+        let scene = source.scene().clone();
         let make = move |engine: &dyn Engine| match &source {
             Source::Sets(sets) => {
                 let work = ViewWork { cameras: cameras.clone(), method: key.method.clone(), planes: key.planes };
@@ -119,7 +119,7 @@ impl Rendering {
             let (made, busy_s) = own_time(engine, || make(engine));
             made.map(|made| (made, busy_s))
         };
-        let ((operation, views), busy_s) = self.scenes.on_device(scene.as_ref(), timed).await?;
+        let ((operation, views), busy_s) = self.scenes.on_device(&scene, timed).await?;
         if views.len() == count {
             Ok((operation, views, busy_s))
         } else {

@@ -69,6 +69,7 @@ pub(crate) struct ViewSets {
     pub(crate) of_cell: Pinned<ReadySet>,
     /// The same on the device, with those of the common cells.
     pub(crate) on_device: SharedSet,
+    pub(crate) scene: SceneRef,
     _common: Vec<Pinned<ReadySet>>,
 }
 
@@ -363,8 +364,7 @@ impl Sets {
             let (set, upload_s) = own_time(engine, || engine.upload(&set, Turn::of(WorkClass::Batch)));
             set.map(|set| (set, upload_s))
         };
-        // Only a scene with an environment map has a part in this.
-        let (set, upload_s) = self.scenes.on_device(Some(&plan.workload.scene), upload).await?;
+        let (set, upload_s) = self.scenes.on_device(&plan.workload.scene, upload).await?;
         self.metrics.done.add(plan.workload_number, Operation::LoadSet, 1.0, times.decode_s + upload_s);
         self.metrics.done.transferred(plan.workload_number, times.bytes, times.transfer_s);
         self.metrics.sets_loaded.inc();

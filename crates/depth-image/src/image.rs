@@ -41,6 +41,33 @@ pub struct DepthImage {
     /// Inverse depths at the corners of texels, with one column and one row more than the other planes. This is the
     /// image H of Xie's Algorithm 4, taken half a pixel up and to the left.
     pub corner_inverse_depth_per_m: Option<Vec<f32>>,
+    /// The light that arrives at samples, in place of colour, which is then empty.
+    pub light: Option<LightPlanes>,
+}
+
+/// Lamps with a share of their own in [`LightPlanes`].
+pub const MAX_LAMP_SHARES: usize = 15;
+
+/// The light that arrives at samples, in place of colour: for views that take surfaces from the scene.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct LightPlanes {
+    /// Octahedral normals of triangles in world space; [`DepthImage::normal_oct16`] has those of shading.
+    pub triangle_normal_oct16: Vec<u32>,
+    /// What a white surface reflects of lamps, linear RGB9E5.
+    pub lamps_rgb9e5: Vec<u32>,
+    /// What a white surface reflects of the environment, linear RGB9E5, without the material's occlusion texture.
+    pub environment_rgb9e5: Vec<u32>,
+    /// The arriving shares, 255 for all.
+    pub share8: Vec<Vec<u32>>,
+}
+
+impl LightPlanes {
+    /// Number of planes of [`LightPlanes::share8`] for `light_count` lights.
+    #[must_use]
+    pub const fn share_planes(light_count: usize) -> usize {
+        let named = if light_count > MAX_LAMP_SHARES { MAX_LAMP_SHARES + 1 } else { light_count };
+        (1 + named).div_ceil(4)
+    }
 }
 
 /// Inputs from which a compositor computes view-dependent light.

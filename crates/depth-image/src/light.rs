@@ -3,10 +3,12 @@
 //! The unit of intensity includes the reflectance's 1/π: a surface of albedo 1 that faces a light of irradiance 1 has
 //! radiance 1.
 
-use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
+
+use crate::MAX_LAMP_SHARES;
 
 /// Lights of one scene: with the environment they fill 64 planes of visibility.
 pub const MAX_LIGHTS: usize = 255;
@@ -86,6 +88,20 @@ pub struct LightError {
     pub reason: &'static str,
 }
 
+impl Illumination {
+    /// The lamps with a share of their own in [`LightPlanes`](crate::LightPlanes), by rising number: those of most power
+    /// where there are more than [`MAX_LAMP_SHARES`]. All nodes choose the same.
+    #[must_use]
+    pub fn lamps_with_shares(&self) -> Vec<u32> {
+        let mut lamps: Vec<u32> = (0..self.lights.len() as u32).collect();
+        let power = |lamp: &u32| self.lights[*lamp as usize].power();
+        lamps.sort_by(|a, b| power(b).total_cmp(&power(a)).then(a.cmp(b)));
+        lamps.truncate(MAX_LAMP_SHARES);
+        lamps.sort_unstable();
+        lamps
+    }
+}
+
 impl Environment {
     /// The same radiance from all directions.
     #[must_use]
@@ -117,6 +133,20 @@ impl Environment {
 }
 
 impl Light {
+    /// The sum of the light's channels in all directions; without bound for parallel light, which reaches the whole scene.
+    fn power(&self) -> f32 {
+        match *self {
+            Self::Directional { irradiance_linear, .. } => irradiance_linear.element_sum() * 1e9,
+            Self::Point { intensity_linear, .. } => 4.0 * PI * intensity_linear.element_sum(),
+            Self::Spot { intensity_linear, outer_cone_rad, .. } => {
+                2.0 * PI * (1.0 - outer_cone_rad.cos()) * intensity_linear.element_sum()
+            }
+            Self::Rectangle { half_edges_in_world: [u, v], radiance_linear, .. } => {
+                4.0 * u.cross(v).length() * radiance_linear.element_sum()
+            }
+        }
+    }
+
     /// Checks every field.
     ///
     /// # Errors
@@ -185,6 +215,25 @@ fn within(field: &'static str, v: f32, most: f32, reason: &'static str) -> Resul
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_strongest_lamps_have_shares_of_their_own() {
+        let lamp = |strength: f32| Light::Point {
+            position_in_world: Vec3::ZERO,
+            intensity_linear: Vec3::splat(strength),
+            radius_m: 0.1,
+        };
+        let lit = |strengths: &[f32]| Illumination {
+            lights: strengths.iter().map(|&strength| lamp(strength)).collect(),
+            environment: Environment::default(),
+        };
+        assert_eq!(lit(&[3.0, 1.0, 2.0]).lamps_with_shares(), [0, 1, 2]);
+        let mut strengths = vec![1.0; 20];
+        strengths[19] = 2.0;
+        strengths[3] = 0.5;
+        let expected: Vec<u32> = (0..15).filter(|&lamp| lamp != 3).chain([19]).collect();
+        assert_eq!(lit(&strengths).lamps_with_shares(), expected, "of equal lamps the first ones");
+    }
 
     #[test]
     fn an_invalid_light_is_refused_with_its_field() {

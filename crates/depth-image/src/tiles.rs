@@ -135,6 +135,7 @@ impl DepthImage {
             normal_oct16: filled(&tiles, texel_count, |tile| tile.normal_oct16.as_deref()),
             passed: filled(&tiles, texel_count, |tile| tile.passed.as_deref()),
             specular: specular(&tiles)?,
+            light: None,
             corner_inverse_depth_per_m: corners.map(|_| shared_corners(&tiles)),
         })
     }

@@ -24,6 +24,8 @@ pub enum ProvenanceKind {
     /// A surface that no sample camera saw, from the base: a layered depth cube of the whole scene. Or a surface that reflects what is
     /// found there.
     Base,
+    /// A surface of the scene whose light no sample knows: it was lit in this view.
+    LitHere,
 }
 
 impl Provenance {
@@ -44,6 +46,7 @@ impl Provenance {
             1 => ProvenanceKind::Hit,
             3 => ProvenanceKind::Guessed,
             4 => ProvenanceKind::Base,
+            5 => ProvenanceKind::LitHere,
             _ => ProvenanceKind::Filled,
         }
     }

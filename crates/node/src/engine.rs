@@ -86,7 +86,7 @@ pub trait Engine: Send + Sync + 'static {
     /// what its own images leave unknown, and what mirrors without such a set and rough surfaces show. Without both, mirrors show lamps and the
     /// environment.
     fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError>;
-    /// Reconstructs one view for each camera.
+    /// Reconstructs one view for each camera. A set of light needs its scene, which must be loaded.
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError>;
     /// Draws one view for each camera from the scene itself.
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError>;
@@ -168,7 +168,8 @@ impl SampleWork {
 /// The images of one set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleSet {
-    /// The scene, whose environment map views show and highlights mirror; it must be loaded where there is one.
+    /// The scene. It must be loaded where it has an environment map, which views show and highlights mirror, and where the images
+    /// have light in place of colour: surfaces of such views come from the scene.
     pub scene_hash: String,
     /// One image for each sample camera, in their order.
     pub images: SampleImages,
@@ -180,12 +181,14 @@ pub struct SampleSet {
     pub illumination: Illumination,
     /// The lighting that the images were sampled with; highlights follow its formula.
     pub lighting: String,
+    /// The moment of the scene that the images show.
+    pub scene_time_s: f32,
     /// It is of a common cell: rays off mirrors are followed in it, and may cover several texels.
     pub is_common: bool,
 }
 
 impl SampleSet {
-    /// A set of a workload of one cell.
+    /// The first set of a workload of one cell.
     ///
     /// # Errors
     /// Images that do not belong together.
@@ -197,6 +200,7 @@ impl SampleSet {
             background: workload.background,
             illumination: workload.illumination.clone(),
             lighting: workload.lighting.clone(),
+            scene_time_s: workload.timeline.start_s as f32,
             is_common,
         })
     }

@@ -106,6 +106,7 @@ impl Subject {
             background: self.background,
             illumination: self.illumination.clone(),
             lighting: self.lighting(light).to_owned(),
+            scene_time_s: self.scene_time_s,
             is_common: false,
         }
     }

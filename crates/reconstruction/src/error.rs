@@ -39,6 +39,9 @@ pub enum ReconstructionError {
     /// The set has other samples than a method, or rays off mirrors, need.
     #[error("{what} needs {needed}, which the sample set lacks")]
     NoSamples { what: String, needed: &'static str },
+    /// The method takes surfaces from the scene, which this crate does not have.
+    #[error("{method} takes surfaces from the scene, and cannot be reconstructed from samples alone")]
+    NoScene { method: String },
     #[error("the volume of the sample set is empty or not finite")]
     Volume,
 }

@@ -424,6 +424,9 @@ fn check_samples(set: &SampleSet, method: ReconstructionMethod) -> Result<(), Re
     if set.is_single_pole() {
         return Err(ReconstructionError::Model { model: "single_pole" });
     }
+    if method.light_cache_quality().is_some() {
+        return Err(ReconstructionError::NoScene { method: method.to_string() });
+    }
     let has_light_field = || set.cube.as_ref().is_some_and(|cube| cube.light_field.is_some());
     if method.gathers() && !has_light_field() {
         return Err(ReconstructionError::NoSamples { what: method.to_string(), needed: "a light field" });

@@ -10,7 +10,7 @@ use gpu::{BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVa
 use crate::accumulation::{Key, Sums};
 use crate::pieces::{Piece, Pieces};
 use crate::pixel_camera::{PixelCamera, uniform};
-use crate::{Rate, known_samples::ImageSequence, planes::Output, rays::Traced, work::DrawWork};
+use crate::{Rate, known_samples::ImageSequence, light_cache::CachedLight, planes::Output, rays::Traced, work::DrawWork};
 
 /// The share of the scene's diagonal within which occlusion is looked for, where a lighting names no radius.
 const OCCLUSION_OF_DIAGONAL: f32 = 0.05;
@@ -35,8 +35,10 @@ pub(crate) struct Batch<'a> {
     /// of the output.
     pub tone: ToneMapping,
     pub sequence: Option<ImageSequence<'a>>,
-    /// The number of the position within the pixels.
-    pub position: u32,
+    /// Light that is looked up before rays are traced.
+    pub cached: Option<CachedLight<'a>>,
+    /// The position within the pixels.
+    pub position: Position,
 }
 
 /// Some rays of each pixel.
@@ -62,23 +64,37 @@ pub(crate) struct Recording<'a> {
     pub frame: Frame<'a>,
 }
 
-/// The number of a position, and the cameras whose pixels' centres are there.
-pub(crate) type Position = (u32, Vec<Camera>);
+/// A position within the pixels.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Position {
+    pub number: u32,
+    /// From the pixels' centres.
+    pub offset_px: Vec2,
+}
+
+/// A position, and the cameras whose pixels' centres are there.
+pub(crate) struct ShiftedCameras {
+    position: Position,
+    cameras: Vec<Camera>,
+}
 
 impl Batch<'_> {
     /// All positions within the pixels. The centre of a depth image comes first; that of a view last, for depth alone.
-    pub fn positions(&self) -> Vec<Position> {
+    pub fn positions(&self) -> Vec<ShiftedCameras> {
         let Output { antialias, depth, samples, .. } = self.output;
         let center = |is: bool| (is && antialias > Antialias::NONE).then_some(Vec2::ZERO);
-        let shifted = |offset_px: Vec2| self.cameras.iter().map(|camera| camera.with_offset(offset_px)).collect();
         let all = center(samples).into_iter().chain(antialias.offsets_px()).chain(center(depth && !samples));
-        (0..).zip(all.map(shifted)).collect()
+        let shifted = |(number, offset_px)| ShiftedCameras {
+            position: Position { number, offset_px },
+            cameras: self.cameras.iter().map(|camera| camera.with_offset(offset_px)).collect(),
+        };
+        (0..).zip(all).map(shifted).collect()
     }
 
     /// The batch at one position.
-    pub fn at<'b>(&'b self, (position, cameras): &'b Position) -> Batch<'b> {
-        let Self { work, by_rays, ref traced, output, tone, sequence, .. } = *self;
-        Batch { work, cameras, by_rays, traced: traced.clone(), output, tone, sequence, position: *position }
+    pub fn at<'b>(&'b self, shifted: &'b ShiftedCameras) -> Batch<'b> {
+        let ShiftedCameras { position, ref cameras } = *shifted;
+        Batch { cameras, traced: self.traced.clone(), position, ..*self }
     }
 
     /// Whether its cameras are single-pole cameras.
@@ -86,14 +102,26 @@ impl Batch<'_> {
         matches!(self.cameras.first(), Some(Camera::SinglePole(_)))
     }
 
-    /// Rays into the lobe of a pixel at this position: the positions within a pixel share its rays.
+    /// Rays into the lobe of a pixel at this position.
     pub fn glossy_rays(&self) -> u32 {
-        self.work.lighting.glossy_rays().div_ceil(self.output.antialias.samples())
+        self.at_each_position(self.work.lighting.glossy_rays())
+    }
+
+    /// Rays to each lamp, and of occlusion, at this position.
+    pub fn light_rays(&self) -> [u32; 2] {
+        let lighting = self.work.lighting;
+        [lighting.shadow_rays(), lighting.occlusion_rays()].map(|rays| self.at_each_position(rays))
+    }
+
+    /// The positions within a pixel of a view share the pixel's rays. A sample has all rays at each of its positions.
+    fn at_each_position(&self, rays_a_pixel: u32) -> u32 {
+        let positions = if self.output.samples { 1 } else { self.output.antialias.samples() };
+        rays_a_pixel.div_ceil(positions)
     }
 
     /// Whether colour is wanted of this position.
     pub fn has_color(&self) -> bool {
-        self.output.samples || self.position < self.output.antialias.samples()
+        self.output.samples || self.position.number < self.output.antialias.samples()
     }
 
     /// The bytes of planes of all pixels.
@@ -122,8 +150,9 @@ impl Batch<'_> {
     /// The pixels of a slice of pictures whose cost is unknown.
     pub fn unknown_slice_px(&self) -> u64 {
         let DrawWork { scene, lighting, .. } = self.work;
-        let (to_lamps, around) =
-            (lighting.shadow_rays() * scene.traced_lamps(lighting), lighting.occlusion_rays() * self.rays_around());
+        let [shadow_rays, occlusion_rays] = self.light_rays();
+        let to_lamps = shadow_rays * scene.traced_lamps(lighting);
+        let around = occlusion_rays * self.rays_around();
         let [shadow, occlusion] = [to_lamps, around].map(|rays| u64::from(rays.min(RAYS_A_DISPATCH)));
         UNKNOWN_SLICE_RAYS / (1 + shadow + occlusion)
     }
@@ -166,12 +195,14 @@ impl Batch<'_> {
         let DrawWork { scene, lighting, .. } = self.work;
         let radius_m = lighting.occlusion.and_then(|occlusion| occlusion.radius_m);
         let diagonal_m = scene.bounds_in_world.size().length();
+        // Each position has rays of its own among those of the pixel's sequence.
+        let [first_shadow_ray, first_occlusion_ray] = self.light_rays().map(|rays| rays * self.position.number);
         PixelCamera {
-            first_shadow_ray: rays.shadow.start,
+            first_shadow_ray: first_shadow_ray + rays.shadow.start,
             shadow_rays: rays.shadow.end - rays.shadow.start,
             first_light: rays.lamps.start,
             end_light: rays.lamps.end,
-            first_occlusion_ray: rays.occlusion.start,
+            first_occlusion_ray: first_occlusion_ray + rays.occlusion.start,
             occlusion_rays: rays.occlusion.end - rays.occlusion.start,
             // Without rays, all light is known at once.
             shadow_rays_in_sum: shadow.end.max(1),
@@ -187,7 +218,7 @@ impl Batch<'_> {
         let [planes, sum_planes] = [self.output.layout().count, self.output.sums.count()].map(|count| count as u32);
         let (mut first_word, mut first_sum) = (0, 0);
         let place = |camera: &Camera| {
-            let camera = PixelCamera { first_word, first_sum, ..PixelCamera::of(camera, self.position) };
+            let camera = PixelCamera { first_word, first_sum, ..PixelCamera::of(camera, self.position.offset_px) };
             first_word += camera.pixel_count * planes;
             first_sum += camera.pixel_count * sum_planes;
             self.with_rays(camera, &rays, &sums.rays)

@@ -14,4 +14,7 @@ pub enum RenderError {
     /// Some pictures are taken by pinholes alone.
     #[error("camera {index} is a {model}, must be a pinhole for {what}")]
     Model { index: usize, model: &'static str, what: &'static str },
+    /// A sample image cannot be used as light.
+    #[error("sample image {index}: {reason}")]
+    Samples { index: usize, reason: String },
 }

@@ -14,7 +14,7 @@ use wgpu::{Buffer, BufferUsages};
 use crate::batch::{Batch, Recording};
 use crate::planes::{Output, PlaneLayout};
 use crate::{
-    RenderError, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest, sums::SumPlanes, surfaces::Surfaces,
+    RenderError, light_cache::GpuLampShares, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest, sums::SumPlanes, surfaces::Surfaces,
 };
 
 /// Inverse depths within a texel differ by this share at most where they are of one surface.
@@ -29,6 +29,7 @@ pub(crate) struct GpuFinish {
     pub position_count: u32,
     pub padding: u32,
     pub tone: GpuTone,
+    pub shares: GpuLampShares,
 }
 
 #[derive(Debug)]
@@ -87,7 +88,7 @@ impl ShaderVariant for Finish {
 
     fn context(&self) -> Value {
         let Output { sums, samples, antialias, highlight, passed: redundancy, usefulness_test, .. } = self.output;
-        let PlaneLayout { normal, reflector, surface_id, passed, count } = self.output.layout();
+        let PlaneLayout { normal, reflector, surface_id, passed, light, count, .. } = self.output.layout();
         context! {
             by_rays => self.by_rays,
             single_pole => self.single_pole,
@@ -99,6 +100,7 @@ impl ShaderVariant for Finish {
             surface_id => surface_id.is_some(),
             normal_plane => normal, reflector_plane => reflector, id_plane => surface_id, passed_plane => passed,
             averaged => antialias > Antialias::NONE, plane_count => count,
+            light => light.is_some(), light_plane => light, share_words => self.output.share_words(),
             samples, redundancy, usefulness_test,
             ..sums.context()
         }
@@ -116,11 +118,13 @@ impl ShaderVariant for Finish {
         };
         let views = colors.flat_map(mirrored).flat_map(Self::of_output);
         let plain = Output::default();
-        let images = [plain, Output { antialias: Antialias::MOST, ..plain }, Output { passed: true, ..plain }];
+        let light = Output { light: true, ..plain };
+        let passed = [Output { passed: true, ..plain }, Output { passed: true, ..light }];
+        let images = [plain, Output { antialias: Antialias::MOST, ..plain }, light].into_iter().chain(passed);
         // Views have one eye.
         let bent = Self::of_images(plain).filter(|variant| variant.by_rays);
         let bent = bent.map(|variant| Self { single_pole: true, ..variant });
-        views.chain(images.into_iter().flat_map(Self::of_images)).chain(bent).collect()
+        views.chain(images.flat_map(Self::of_images)).chain(bent).collect()
     }
 }
 
@@ -155,10 +159,11 @@ pub(crate) fn record(
     let pass = passes.get(&variant)?;
     let finish = GpuFinish {
         view_cell_m: batch.sequence.map_or(0.0, |sequence| sequence.known.view_cell_m),
-        position: batch.position,
+        position: batch.position.number,
         position_count: batch.output.antialias.samples(),
         padding: 0,
         tone: batch.tone.into(),
+        shares: batch.work.scene.lamp_shares,
     };
     let finish = gpu.buffer_with("finish", &[finish], BufferUsages::UNIFORM);
     for (camera, target) in surfaces.iter().enumerate() {
@@ -203,6 +208,7 @@ fn bindings<'r>(
     bindings.extend(is_averaged.then(|| Binding::buffer("position_sums", position_sums)));
     let ids = target.surface_ids.as_ref().filter(|_| variant.output.surface_id);
     bindings.extend(ids.map(|ids| Binding::texture("surface_ids", ids)));
+    bindings.extend(target.views.triangle_normal_binding().filter(|_| variant.output.light));
     bindings.extend(variant.output.passed.then(|| Binding::texture("front_depth", &target.views.front_depth)));
     bindings
 }

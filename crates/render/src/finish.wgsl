@@ -39,9 +39,10 @@
 @group(0) var front_depth: {{ "texture_2d<f32>" if by_rays else "texture_depth_2d" }};
 {% endif %}
 {% include "sums.wgsl" %}
+{% include "lamp_shares.wgsl" %}
 
 // The position within the pixels, of so many. One beyond them is the centre: it gives depth, and no colour.
-struct Finish { view_cell_m: f32, position: u32, position_count: u32, tone: Tone }
+struct Finish { view_cell_m: f32, position: u32, position_count: u32, tone: Tone, shares: LampShares }
 {% if redundancy %}
 
 fn front_at(texel: vec2u) -> f32 { return textureLoad(front_depth, texel, 0){{ ".x" if by_rays else "" }}; }
@@ -56,6 +57,33 @@ fn put(plane: u32, place: u32, word: u32) { words[camera.first_word + plane * ca
 {% include "visibility.wgsl" %}
 {% endif %}
 
+{% if light %}
+
+@group(0) var triangle_normals: texture_2d<u32>;
+
+// Bytes of shares: the environment's, then those of lamps that have one, then that of all other lamps.
+fn share_word(word: u32, place: u32) -> u32 {
+    var shares = vec4f(0.0);
+    for (var i = 0u; i < 4u; i++) {
+        let number = word * 4u + i;
+        if number > finish.shares.lamp_count { break; }
+        shares[i] = share_of(number, place);
+    }
+    return pack4x8unorm(shares);
+}
+
+fn share_of(number: u32, place: u32) -> f32 {
+    if number == 0u { return sum_at(OPEN_TO_ENVIRONMENT, place) / f32(camera.occlusion_rays_in_sum); }
+    let rays = f32(camera.shadow_rays_in_sum);
+    if number <= MAX_LAMP_SHARES { return sum_at(OPEN_TO_LAMPS + lamp_of(number - 1u), place) / rays; }
+    var open = 0.0;
+    for (var lamp = 0u; lamp < {{ light_count }}u; lamp++) { open += sum_at(OPEN_TO_LAMPS + lamp, place); }
+    for (var named = 0u; named < MAX_LAMP_SHARES; named++) { open -= sum_at(OPEN_TO_LAMPS + lamp_of(named), place); }
+    return open / (rays * {{ light_count }}.0 - rays * f32(MAX_LAMP_SHARES));
+}
+
+fn lamp_of(number: u32) -> u32 { return finish.shares.lamps[number / 4u][number % 4u]; }
+{% endif %}
 {% if averaged and samples %}
 
 // Adds the colour of one position, if it shows the surface of the centre, the first position; gives the mean so far.
@@ -99,7 +127,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var hidden = met && front > depth; hidden; hidden = false) { met = is_useful(pixel, depth, front); }
 {% endif %}
 {% endif %}
+{% if light %}
+    put(0u, place, rgb9e5_from_linear({{ "select(vec3f(0.0), lamps_at(place), met)" if lit else "vec3f(0.0)" }}));
+    put({{ light_plane }}u, place, textureLoad(triangle_normals, pixel, 0).x);
+    put({{ light_plane + 1 }}u, place, rgb9e5_from_linear({{ "select(vec3f(0.0), environment_at(place, 1.0), met)" if lit else "vec3f(0.0)" }}));
+{% for word in range(share_words) %}    put({{ light_plane + 2 + word }}u, place, share_word({{ word }}u, place));
+{% endfor %}
+{% else %}
 {% include "shaded.wgsl" %}
+{% endif %}
 {% if highlight %}
     for (var glossy = met && surface.w != 0u; glossy; glossy = false) {
         let direction = direction_of(pixel);
@@ -115,8 +151,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {%- endif %}
     }
 {% endif %}
+{% if not light %}
     for (var open = !met; open; open = false) { linear = background_linear(direction_of(pixel)); }
-{% if samples and averaged %}
+{% endif %}
+{% if light %}
+    // Light is in its planes already.
+{% elif samples and averaged %}
     put(0u, place, rgb9e5_from_linear(mean_with(linear, depth / camera.near_m, place)));
     // All other planes are the centre's.
     if finish.position > 0u { return; }

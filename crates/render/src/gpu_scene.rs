@@ -12,6 +12,7 @@ use indexmap::IndexSet;
 use scene::{Material, Scene, TextureUse, VertexDetail, Wind};
 use wgpu::BufferUsages;
 
+use crate::light_cache::GpuLampShares;
 use crate::material::{normal_scale, phong_reflector};
 use crate::motion::Motion;
 use crate::rays::{AccelerationReport, OrderedMesh, RayScene, flat::world_metres};
@@ -102,6 +103,7 @@ pub struct GpuScene {
     pub(crate) background: wgpu::Buffer,
     pub(crate) illumination: wgpu::Buffer,
     pub(crate) light_count: usize,
+    pub(crate) lamp_shares: GpuLampShares,
     /// Light and background, where a map gives them.
     pub environment: Option<Arc<GpuEnvironment>>,
     pub(crate) rays: RayScene,
@@ -150,6 +152,7 @@ impl GpuScene {
             background: gpu.buffer_with("background", &gpu::background_bytes(&scene.background), BufferUsages::UNIFORM),
             illumination: gpu.buffer_with("illumination", &illumination, BufferUsages::UNIFORM),
             light_count: scene.illumination.lights.len(),
+            lamp_shares: GpuLampShares::new(&scene.illumination.lamps_with_shares(), scene.illumination.lights.len()),
             environment: environment.map(Arc::new),
             rays: RayScene::of(gpu, scene, &textures, &ordered, motion.clone()),
             highlights: [

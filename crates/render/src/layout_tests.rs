@@ -13,6 +13,7 @@ use crate::interpolate::Interpolate;
 use crate::keep::Keep;
 use crate::known_samples::KnownCamera;
 use crate::layered::{Crossing, GpuLines};
+use crate::light_cache::{GpuCache, GpuCacheCamera, GpuLampShares, LookUp};
 use crate::pixel_camera::PixelCamera;
 use crate::raster::{RasterCamera, RasterVariant};
 use crate::reflections::{Lobe, Spawn, bounces::GpuBounce, lobe::GpuLobe};
@@ -168,12 +169,12 @@ fn a_bounce_has_the_wgsl_layout() {
 
 #[test]
 fn a_lobe_has_the_wgsl_layout() {
-    assert_eq!(shader(&parsed(&Lobe::all().remove(0)), "Lobe"), host!(GpuLobe { ray, ray_count, whole }));
+    assert_eq!(shader(&parsed(&Lobe::all().remove(0)), "Lobe"), host!(GpuLobe { first_ray, ray, ray_count, whole }));
 }
 
 #[test]
 fn the_finish_and_its_tone_have_the_wgsl_layout() {
-    let finish = host!(GpuFinish { view_cell_m, position, position_count, padding, tone });
+    let finish = host!(GpuFinish { view_cell_m, position, position_count, padding, tone, shares });
     let GpuTone { exposure_factor: _, curve: _, padding: _ } = GpuTone::zeroed();
     let offsets = [offset_of!(GpuTone, exposure_factor), offset_of!(GpuTone, curve), offset_of!(GpuTone, padding)];
     for variant in Finish::all() {
@@ -183,6 +184,37 @@ fn the_finish_and_its_tone_have_the_wgsl_layout() {
         assert_eq!(tone.bytes, size_of::<GpuTone>());
         assert_eq!(tone.fields.iter().map(|(_, offset)| *offset).collect::<Vec<_>>(), offsets);
     }
+}
+
+#[test]
+fn the_light_cache_has_the_wgsl_layout() {
+    let module = parsed(&LookUp::all().remove(0));
+    assert_eq!(shader(&module, "LampShares"), host!(GpuLampShares { lamps, lamp_count, padding }));
+    let camera = host!(GpuCacheCamera {
+        homogeneous_texel_from_offset,
+        eye_offset,
+        footprint,
+        column_in_world,
+        first_sample,
+        row_in_world,
+        half_step_per_m,
+        corner_in_world,
+        near_m,
+        size_px,
+        padding
+    });
+    assert_eq!(shader(&module, "CacheCamera"), camera);
+    let cache = host!(GpuCache {
+        shares,
+        least_coverage,
+        plane_footprints,
+        least_cosine,
+        most_difference,
+        camera_count,
+        padding,
+        cameras
+    });
+    assert_eq!(shader(&module, "Cache"), cache);
 }
 
 #[test]

@@ -21,6 +21,7 @@ mod layered;
 mod layers;
 #[cfg(test)]
 mod layout_tests;
+mod light_cache;
 mod lighting;
 mod material;
 mod motion;
@@ -48,6 +49,7 @@ pub use error::RenderError;
 pub use gpu_scene::GpuScene;
 pub use known_samples::{TemporalReference, view_cell_m};
 pub use layered::LayerSelection;
+pub use light_cache::LightCache;
 pub use lighting::{Direct, Lighting, MAX_RAYS, Occlusion, Rate, UnknownLighting};
 pub use rays::{AccelerationReport, host_tree};
 pub use redundancy_test::{Evidence, RedundancyTest};

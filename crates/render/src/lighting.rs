@@ -2,10 +2,13 @@
 
 use std::{fmt, num::NonZeroU32, str::FromStr};
 
-use depth_image::{Highlight, MAX_REFLECTIONS};
+use depth_image::{Highlight, LightCacheQuality, MAX_REFLECTIONS};
 
 /// Most rays a light, or of occlusion, a pixel.
 pub const MAX_RAYS: u32 = 4096;
+
+/// Rays a pixel of points that no sample knows, where the lighting has as many.
+const LEAST_RAYS_HERE: NonZeroU32 = NonZeroU32::new(16).unwrap();
 
 /// Most rays of a lobe, a pixel.
 pub const MAX_GLOSSY_RAYS: u32 = 256;
@@ -148,6 +151,22 @@ impl Lighting {
         let occlusion = self.occlusion.map(|occlusion| Occlusion { rays: fewer(occlusion.rays), ..occlusion });
         let lighting = Self { direct, occlusion, ..*self };
         (lighting != *self).then_some(lighting)
+    }
+
+    /// The light of points that no sample knows: a quarter of the rays but at least [`LEAST_RAYS_HERE`], and all of them at the
+    /// finest quality. Such points are few, and they lie where light changes, so that noise is hard to see there.
+    #[must_use]
+    pub(crate) fn for_unknown_points(&self, quality: LightCacheQuality) -> Self {
+        if quality >= LightCacheQuality::Fine {
+            return *self;
+        }
+        let fewer = |rays: NonZeroU32| rays.min(NonZeroU32::new(rays.get() / 4).unwrap_or(rays).max(LEAST_RAYS_HERE));
+        let direct = match self.direct {
+            Direct::Soft(rays) => Direct::Soft(fewer(rays)),
+            other => other,
+        };
+        let occlusion = self.occlusion.map(|occlusion| Occlusion { rays: fewer(occlusion.rays), ..occlusion });
+        Self { direct, occlusion, ..*self }
     }
 
     /// The formula of highlights; none for unlit surfaces.
@@ -323,6 +342,18 @@ mod tests {
             assert_eq!(plain(text).as_deref(), Some("soft 4"), "{text}");
         }
         assert_eq!(plain("soft 4"), None);
+    }
+
+    #[test]
+    fn unknown_points_have_a_quarter_of_the_rays_but_no_fewer_than_16() {
+        let here = |text: &str, quality| {
+            text.parse::<Lighting>().expect(text).for_unknown_points(quality).to_string()
+        };
+        let balanced = LightCacheQuality::Balanced;
+        assert_eq!(here("soft 128, occlusion 256 2m, adaptive", balanced), "soft 32, occlusion 64 2m, adaptive");
+        assert_eq!(here("soft 32, occlusion 8", balanced), "soft 16, occlusion 8");
+        assert_eq!(here("shadows, occlusion 64, reflections 2", balanced), "shadows, occlusion 16, reflections 2");
+        assert_eq!(here("soft 128, occlusion 64", LightCacheQuality::Fine), "soft 128, occlusion 64");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::Camera;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use gpu::{Gpu, ResourceTrait, ResourceTraits, uniform_elements};
 use wgpu::BufferUsages;
 
@@ -48,10 +48,12 @@ pub(crate) struct PixelCamera {
 pub(crate) const CAMERA_TRAITS: ResourceTraits = &[("camera", ResourceTrait::DynamicOffset)];
 
 impl PixelCamera {
+    /// `camera` looks through a position within its pixels, this far from their centres.
+    ///
     /// Rays' seeds are the camera's place, and the pixel's from the forward axis: noise does not swim while nothing moves,
-    /// images that are blended do not share it, and a tile of an image has the image's. Positions within a pixel do not share it
-    /// either.
-    pub fn of(camera: &Camera, position: u32) -> Self {
+    /// images that are blended do not share it, and a tile of an image has the image's. All positions within a pixel have its
+    /// seed: they take different rays of one sequence.
+    pub fn of(camera: &Camera, offset_px: Vec2) -> Self {
         let (pole_px, bend_px_m, farthest_m) = match camera {
             Camera::Pinhole(_) => Default::default(),
             Camera::SinglePole(camera) => (camera.pole_px.to_array(), camera.bend_px_m(), camera.farthest_m),
@@ -64,7 +66,7 @@ impl PixelCamera {
             .eye_in_world
             .to_array()
             .iter()
-            .fold(position, |seed, c| (seed ^ c.to_bits()).wrapping_mul(0x9e37_79b1).rotate_left(13));
+            .fold(0_u32, |seed, c| (seed ^ c.to_bits()).wrapping_mul(0x9e37_79b1).rotate_left(13));
         Self {
             eye_in_world: camera.eye_in_world.to_array(),
             near_m: camera.near_m,
@@ -75,7 +77,7 @@ impl PixelCamera {
             size_px: camera.size_px.to_array(),
             pixel_count: camera.pixel_count() as u32,
             seed,
-            first_from_axis: (-camera.principal_px).floor().as_ivec2().as_uvec2().to_array(),
+            first_from_axis: (-camera.principal_px - offset_px).floor().as_ivec2().as_uvec2().to_array(),
             shadow_rays_in_sum: 1,
             occlusion_rays_in_sum: 1,
             end_row: camera.size_px.y,

@@ -2,7 +2,7 @@
 //! and depth images.
 
 use depth_image::{
-    Antialias, Camera, DepthImage, Highlight, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId, View, ViewPlanes,
+    Antialias, Camera, DepthImage, Highlight, LightPlanes, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId, View, ViewPlanes,
 };
 
 use crate::{sums::SumPlanes, work::DrawWork};
@@ -26,6 +26,12 @@ pub(crate) struct Output {
     pub normal: bool,
     pub reflector: bool,
     pub surface_id: bool,
+    /// Normals of triangles are found beside surfaces.
+    pub triangle_normal: bool,
+    /// Samples have light in place of colour.
+    pub light: bool,
+    /// Views say where the light of each pixel is from.
+    pub provenance: bool,
     /// Whether redundant surfaces lie before the sample.
     pub passed: bool,
     /// The template of the test that samples behind redundant ones must pass.
@@ -40,6 +46,9 @@ pub(crate) struct PlaneLayout {
     /// Instance and primitive.
     pub surface_id: Option<usize>,
     pub passed: Option<usize>,
+    /// Light of the environment, and shares, beside light of lamps in place of colour.
+    pub light: Option<usize>,
+    pub provenance: Option<usize>,
     pub count: usize,
 }
 
@@ -48,6 +57,11 @@ impl Output {
     pub fn of(work: DrawWork<'_>, reflects: bool) -> Self {
         let visibility = reflects && work.lighting.is_traced();
         Self { sums: SumPlanes { light_count: work.scene.light_count, visibility }, ..Self::default() }
+    }
+
+    /// Words of packed shares of light.
+    pub fn share_words(&self) -> usize {
+        if self.sums.visibility { LightPlanes::share_planes(self.sums.light_count) } else { 0 }
     }
 
     /// The places of planes among those of a camera.
@@ -62,7 +76,9 @@ impl Output {
         let reflector = place(self.reflector, 1 + self.sums.visibility_words());
         let surface_id = place(self.surface_id, 2);
         let passed = place(self.passed, 1);
-        PlaneLayout { normal, reflector, surface_id, passed, count }
+        let light = place(self.light, 2 + self.share_words());
+        let provenance = place(self.provenance, 1);
+        PlaneLayout { normal, reflector, surface_id, passed, light, provenance, count }
     }
 }
 
@@ -77,20 +93,31 @@ fn split<'a>(mut words: &'a [u32], planes: usize, cameras: &'a [Camera]) -> impl
     })
 }
 
-pub(crate) fn views(words: &[u32], output: Output, cameras: &[Camera], planes: ViewPlanes) -> Vec<View> {
+/// `lit` is the provenance of surfaces where no plane says it.
+pub(crate) fn views(
+    words: &[u32],
+    output: Output,
+    cameras: &[Camera],
+    planes: ViewPlanes,
+    lit: ProvenanceKind,
+) -> Vec<View> {
+    let layout = output.layout();
     let view = |(camera, own): Picture<'_>| {
         let inverse_depth: &[f32] = bytemuck::cast_slice(own[1]);
         let hit =
-            |&inverse: &f32| if inverse > 0.0 { Provenance::new(ProvenanceKind::Hit, 0) } else { Provenance::EMPTY };
+            |&inverse: &f32| if inverse > 0.0 { Provenance::new(lit, 0) } else { Provenance::EMPTY };
         let rgb = |word: &u32| word.to_le_bytes().into_iter().take(3);
         View {
             size_px: camera.size_px(),
             srgb8: own[0].iter().flat_map(rgb).collect(),
             inverse_depth_per_m: planes.inverse_depth.then(|| inverse_depth.to_vec()),
-            provenance: planes.provenance.then(|| inverse_depth.iter().map(hit).collect()),
+            provenance: planes.provenance.then(|| match layout.provenance {
+                Some(plane) => own[plane].iter().map(|&word| Provenance(word)).collect(),
+                None => inverse_depth.iter().map(hit).collect(),
+            }),
         }
     };
-    split(words, output.layout().count, cameras).map(view).collect()
+    split(words, layout.count, cameras).map(view).collect()
 }
 
 pub(crate) fn depth_images(words: &[u32], output: Output, cameras: &[Camera]) -> Vec<DepthImage> {
@@ -101,16 +128,23 @@ pub(crate) fn depth_images(words: &[u32], output: Output, cameras: &[Camera]) ->
             reflectance_srgb8_roughness8: own[reflector].to_vec(),
             visibility8: visibility(reflector).iter().map(|plane| plane.to_vec()).collect(),
         };
+        let light = |first: usize| LightPlanes {
+            triangle_normal_oct16: own[first].to_vec(),
+            lamps_rgb9e5: own[0].to_vec(),
+            environment_rgb9e5: own[first + 1].to_vec(),
+            share8: own[first + 2..][..output.share_words()].iter().map(|plane| plane.to_vec()).collect(),
+        };
         let id = |(&instance, &primitive): (&u32, &u32)| SurfaceId { instance, primitive };
         DepthImage {
             camera: *camera,
             inverse_depth_per_m: bytemuck::cast_slice(own[1]).to_vec(),
-            color_rgb9e5: own[0].to_vec(),
+            color_rgb9e5: if output.light { Vec::new() } else { own[0].to_vec() },
             normal_oct16: layout.normal.map(|normal| own[normal].to_vec()),
             surface_id: layout.surface_id.map(|ids| own[ids].iter().zip(own[ids + 1]).map(id).collect()),
             specular: layout.reflector.map(specular),
             passed: layout.passed.and_then(|passed| passed_plane(own[passed])),
             corner_inverse_depth_per_m: None,
+            light: layout.light.map(light),
         }
     };
     split(words, layout.count, cameras).map(image).collect()

@@ -13,7 +13,7 @@ use minijinja::{Value, context};
 
 use crate::gpu_scene::{Draw, GpuObject, MaterialTraits};
 use crate::known_samples::{Predecessors, RedundancyVariant};
-use crate::surfaces::{NOTHING, SURFACE_FORMAT, SURFACE_ID_FORMAT, Surfaces};
+use crate::surfaces::{NOTHING, SURFACE_FORMAT, SURFACE_ID_FORMAT, Surfaces, TRIANGLE_NORMAL_FORMAT};
 use crate::{
     GpuScene, RenderError, batch::Recording, cluster::Frustum, pixel_camera::uniform, redundancy_test::RedundancyTest,
     work::DrawWork,
@@ -38,6 +38,7 @@ pub(crate) struct RasterVariant {
     /// `None` shows colours as they are.
     shading: Option<Highlight>,
     surface_id: bool,
+    triangle_normal: bool,
     depth_only: bool,
     wind: bool,
     redundancy: Option<RedundancyVariant>,
@@ -85,6 +86,7 @@ impl RasterVariant {
             material: MaterialTraits::default(),
             shading: work.lighting.highlight(),
             surface_id: false,
+            triangle_normal: false,
             depth_only: false,
             wind: work.scene.wind,
             redundancy: None,
@@ -121,6 +123,7 @@ impl ShaderVariant for RasterVariant {
         context! {
             shading => self.shading.map_or("unlit", highlight_name),
             surface_id => self.surface_id,
+            triangle_normal => self.triangle_normal,
             depth_only => self.depth_only,
             wind => self.wind,
             appended => self.appended,
@@ -138,6 +141,7 @@ impl ShaderVariant for RasterVariant {
                     material,
                     shading,
                     surface_id,
+                    triangle_normal: false,
                     depth_only,
                     wind,
                     redundancy: None,
@@ -148,7 +152,10 @@ impl ShaderVariant for RasterVariant {
         let nearest: Vec<Self> = shadings.into_iter().flat_map(each).collect();
         let appended = nearest.iter().filter(|variant| !variant.surface_id && !variant.depth_only);
         let appended: Vec<Self> = appended.map(|variant| Self { appended: true, ..*variant }).collect();
-        [nearest, appended].concat()
+        let with_normals = nearest.iter().filter(|variant| !variant.depth_only);
+        let with_normals: Vec<Self> =
+            with_normals.map(|variant| Self { triangle_normal: true, ..*variant }).collect();
+        [nearest, appended, with_normals].concat()
     }
 }
 
@@ -157,6 +164,7 @@ impl DrawVariant for RasterVariant {
         let mut color_formats = Vec::new();
         color_formats.extend((!self.depth_only && !self.appended).then_some(SURFACE_FORMAT));
         color_formats.extend((!self.depth_only && self.surface_id).then_some(SURFACE_ID_FORMAT));
+        color_formats.extend((!self.depth_only && self.triangle_normal).then_some(TRIANGLE_NORMAL_FORMAT));
         let cull_mode = (!self.material.double_sided && !self.appended).then_some(wgpu::Face::Back);
         let vertices = [vertex_layout()].into_iter().chain(self.material.mapped.then(detail_layout)).collect();
         DrawState { vertices, cull_mode, color_formats, nearest_only: !self.appended }
@@ -181,6 +189,7 @@ impl Raster {
         let scene = batch.work.scene;
         let shown = RasterVariant {
             surface_id: surfaces.iter().any(|target| target.surface_ids.is_some()),
+            triangle_normal: batch.output.triangle_normal,
             redundancy: predecessors.map(|images| images.variant),
             ..RasterVariant::of(&batch.work)
         };
@@ -201,7 +210,8 @@ impl Raster {
             if predecessors.is_some() {
                 self.draw_in_slices(frame, &view, front, &[], &target.views.front_depth)?;
             }
-            let colors: Vec<_> = std::iter::once(&target.views.surfaces).chain(&target.surface_ids).collect();
+            let planes = target.surface_ids.iter().chain(&target.views.triangle_normals);
+            let colors: Vec<_> = std::iter::once(&target.views.surfaces).chain(planes).collect();
             self.draw_in_slices(frame, &view, shown, &colors, &target.views.reversed_depth)?;
         }
         Ok(())

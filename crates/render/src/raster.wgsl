@@ -2,6 +2,9 @@
 {% endif %}
 // Draws triangles: which surface each pixel shows. Light comes later.
 {% include "packed_surface.wgsl" %}
+{% if triangle_normal %}
+{% include "triangle_normal.wgsl" %}
+{% endif %}
 {% if mapped and alpha_tested %}
 {% include "hashed_alpha.wgsl" %}
 {% endif %}
@@ -69,6 +72,8 @@ struct Varyings {
     // In the mesh's space, in metres of the world.
     @location(7) place_m: vec3f,
 {% endif %}
+{% if triangle_normal %}    @location(8) from_eye_in_world: vec3f,
+{% endif %}
 }
 
 fn rows_times(rows: array<vec4f, 3>, v: vec4f) -> vec3f {
@@ -101,6 +106,8 @@ fn vertex(
     out.color_linear = vec4f(linear_from_srgb(color_srgb.rgb), color_srgb.a);
     out.first_primitive = first_primitive;
 {% if redundancy_test or appended %}    out.position_in_world = position_in_world;
+{% endif %}
+{% if triangle_normal %}    out.from_eye_in_world = position_in_world - camera.eye_in_world;
 {% endif %}
 {% if mapped %}
     // Corners have unit vectors, as those of rays do.
@@ -163,11 +170,16 @@ struct Planes {
     @location(0) surface: vec4u,
 {% if surface_id %}    @location(1) surface_id: vec2u,
 {% endif %}
+{% if triangle_normal %}    @location({{ 2 if surface_id else 1 }}) triangle_normal: u32,
+{% endif %}
 }
 {%- endif %}
 
 @fragment
 fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface_id or redundancy_test %}, @builtin(primitive_index) primitive: u32{% endif %}) {{ "" if appended else "-> Planes " }}{
+{%- if triangle_normal %}
+    let across = cross(dpdx(in.from_eye_in_world), dpdy(in.from_eye_in_world));
+{%- endif %}
 {%- if appended %}
     let slope = slope_of(dpdx(in.position_in_world), dpdy(in.position_in_world));
 {%- endif %}
@@ -208,6 +220,8 @@ fn fragment(in: Varyings, @builtin(front_facing) front_facing: bool{% if surface
     var out: Planes;
     out.surface = packed_surface(base.rgb, emissive_linear, shown_normal * facing, coat);
 {% if surface_id %}    out.surface_id = vec2u(object.instance, in.first_primitive + primitive);
+{% endif %}
+{% if triangle_normal %}    out.triangle_normal = triangle_normal_oct16(across, in.from_eye_in_world);
 {% endif %}
     return out;
 {%- endif %}

@@ -4,15 +4,16 @@ use std::{collections::VecDeque, sync::Arc};
 
 use depth_image::{
     Antialias, Camera, DepthImage, LayeredDepthImage, LayeredLightField, LightFieldCamera, ParallelCamera,
-    PinholeCamera, ToneMapping, View, ViewPlanes,
+    LightCacheQuality, PinholeCamera, ProvenanceKind, ToneMapping, View, ViewPlanes,
 };
 use glam::UVec2;
-use gpu::{Frame, Gpu, GpuError, Templates, Turn, WorkClass};
+use gpu::{Frame, Gpu, GpuError, TablePool, Templates, Turn, WorkClass};
 use parking_lot::Mutex;
 
-use crate::batch::{Batch, batches};
+use crate::batch::{Batch, Position, batches};
 use crate::known_samples::{ImageSequence, KnownSamples, TemporalReference};
 use crate::layered::{self, LayerSelection};
+use crate::light_cache::{CachedLight, LightCache, LookUpTests};
 use crate::planes::{self, Output};
 use crate::visibility::{Choice, Costs, Visibility};
 use crate::work::{DrawWork, SamplePlanes};
@@ -27,10 +28,21 @@ const LEAST_TIMED_PX: usize = 256 * 256;
 /// Scenes whose costs are remembered.
 const MOST_SCENES: usize = 64;
 
+/// Pictures of one kind, in one light.
+#[derive(Clone, Copy)]
+struct DrawRequest<'a> {
+    work: DrawWork<'a>,
+    output: Output,
+    tone: ToneMapping,
+    sequence: Option<ImageSequence<'a>>,
+    cached: Option<CachedLight<'a>>,
+}
+
 /// Draws on one device.
 pub struct Renderer {
     gpu: Arc<Gpu>,
     stages: Stages,
+    tables: TablePool,
     layer_cache: LayerCache,
     /// By scene; the one that was measured first is at the front.
     costs: Mutex<VecDeque<(u64, Costs)>>,
@@ -41,7 +53,8 @@ impl Renderer {
     #[must_use]
     pub fn new(gpu: &Arc<Gpu>, templates: Templates) -> Self {
         let stages = Stages::new(gpu, &Arc::new(templates));
-        Self { gpu: gpu.clone(), stages, layer_cache: LayerCache::default(), costs: Mutex::default() }
+        let tables = TablePool::new(gpu);
+        Self { gpu: gpu.clone(), stages, tables, layer_cache: LayerCache::default(), costs: Mutex::default() }
     }
 
     /// The device.
@@ -60,12 +73,63 @@ impl Renderer {
         cameras: &[PinholeCamera],
         planes: ViewPlanes,
     ) -> Result<Vec<View>, RenderError> {
+        self.views(work, None, cameras, planes, ProvenanceKind::Hit)
+    }
+
+    /// Puts samples of light on the device, for views of a scene that is lit by rays.
+    ///
+    /// # Errors
+    /// Samples that are not of light, not of this scene's lamps, or beyond the device's limits.
+    pub fn upload_light(
+        &self,
+        scene: &GpuScene,
+        images: &[DepthImage],
+        turn: Turn,
+    ) -> Result<LightCache, RenderError> {
+        LightCache::upload(&self.tables, images, scene.light_count, turn)
+    }
+
+    /// Finished views: surfaces from the scene, their light from samples where these know it. `work` has the light of the
+    /// samples; other points are lit by its rays, or fewer. With `exact`, and under light that traces no rays, no sample is asked:
+    /// such views are those of [`Renderer::draw_views`] to the bit.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw_views`].
+    pub fn draw_cached_views(
+        &self,
+        work: DrawWork<'_>,
+        cache: &LightCache,
+        quality: LightCacheQuality,
+        cameras: &[PinholeCamera],
+        planes: ViewPlanes,
+    ) -> Result<Vec<View>, RenderError> {
+        let tests = LookUpTests::new(quality).filter(|_| work.lighting.is_traced());
+        let cached = tests.map(|tests| CachedLight { cache, tests });
+        let lighting = if cached.is_some() { work.lighting.for_unknown_points(quality) } else { work.lighting };
+        self.views(DrawWork { lighting, ..work }, cached, cameras, planes, ProvenanceKind::LitHere)
+    }
+
+    /// Views, with light that is looked up first where there is any. `lit` is the provenance of surfaces without it.
+    fn views(
+        &self,
+        work: DrawWork<'_>,
+        cached: Option<CachedLight<'_>>,
+        cameras: &[PinholeCamera],
+        planes: ViewPlanes,
+        lit: ProvenanceKind,
+    ) -> Result<Vec<View>, RenderError> {
         let cameras = as_cameras(cameras);
         self.check(&cameras)?;
-        let (antialias, depth) = (planes.antialias, planes.inverse_depth || planes.provenance);
-        let output = Output { antialias, depth, ..views_output(work) };
-        let read = |words: &[u32], output, cameras: &[Camera]| planes::views(words, output, cameras, planes);
-        self.draw(work, &cameras, (output, planes.tone), None, read)
+        let output = Output {
+            antialias: planes.antialias,
+            depth: planes.inverse_depth || planes.provenance,
+            triangle_normal: cached.is_some(),
+            provenance: cached.is_some() && planes.provenance,
+            ..views_output(work)
+        };
+        let read = |words: &[u32], cameras: &[Camera]| planes::views(words, output, cameras, planes, lit);
+        let request = DrawRequest { work, output, tone: planes.tone, sequence: None, cached };
+        self.draw(request, &cameras, read)
     }
 
     /// Depth images, in as few submissions as memory allows.
@@ -179,13 +243,16 @@ impl Renderer {
     ) -> Result<Vec<DepthImage>, RenderError> {
         let corners = planes.corners.then(|| pinholes(cameras, "depths at corners")).transpose()?;
         let output = images_output(work, planes, test);
-        let untoned = |output: Output| (output, ToneMapping::NONE);
-        let mut images = self.draw(work, cameras, untoned(output), sequence, planes::depth_images)?;
+        let request = DrawRequest { work, output, tone: ToneMapping::NONE, sequence, cached: None };
+        let mut images =
+            self.draw(request, cameras, |words, cameras| planes::depth_images(words, output, cameras))?;
         if let Some(pinholes) = corners {
             let (work, cameras) = (work.unlit(), as_cameras(&corner_cameras(&pinholes)));
             self.check(&cameras)?;
             let output = images_output(work, SamplePlanes::default(), test);
-            let corners = self.draw(work, &cameras, untoned(output), of_corners, planes::depth_images)?;
+            let request = DrawRequest { work, output, sequence: of_corners, ..request };
+            let corners =
+                self.draw(request, &cameras, |words, cameras| planes::depth_images(words, output, cameras))?;
             for (image, corners) in images.iter_mut().zip(corners) {
                 image.corner_inverse_depth_per_m = Some(corners.inverse_depth_per_m);
             }
@@ -196,18 +263,17 @@ impl Renderer {
     /// Batch after batch; `read` makes pictures of the words of one.
     fn draw<T>(
         &self,
-        work: DrawWork<'_>,
+        request: DrawRequest<'_>,
         cameras: &[Camera],
-        (output, tone): (Output, ToneMapping),
-        sequence: Option<ImageSequence<'_>>,
-        read: impl Fn(&[u32], Output, &[Camera]) -> Vec<T>,
+        read: impl Fn(&[u32], &[Camera]) -> Vec<T>,
     ) -> Result<Vec<T>, RenderError> {
+        let DrawRequest { work, output, tone, sequence, cached } = request;
         let mut pictures = Vec::with_capacity(cameras.len());
         for cameras in batches(cameras, self.most_pixels(output)) {
             let sequence = sequence.map(|sequence| ImageSequence { first: pictures.len(), ..sequence });
-            let batch = Batch { tone, ..self.batch(work, cameras, output, sequence)? };
+            let batch = Batch { tone, cached, ..self.batch(work, cameras, output, sequence)? };
             let (result, words) = self.stages.draw(&batch, None)?;
-            result.with(words, |words: &[u32]| pictures.extend(read(words, output, cameras)))?;
+            result.with(words, |words: &[u32]| pictures.extend(read(words, cameras)))?;
         }
         Ok(pictures)
     }
@@ -345,7 +411,8 @@ impl Renderer {
         };
         let needs_tree = by_rays || work.lighting.is_traced();
         let traced = needs_tree.then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
-        Ok(Batch { work, cameras, by_rays, traced, output, tone: ToneMapping::NONE, sequence, position: 0 })
+        let (tone, cached, position) = (ToneMapping::NONE, None, Position::default());
+        Ok(Batch { work, cameras, by_rays, traced, output, tone, sequence, cached, position })
     }
 
     /// The pixels for which no buffer of a batch is larger than the device binds.
@@ -385,16 +452,18 @@ fn views_output(work: DrawWork<'_>) -> Output {
 }
 
 fn images_output(work: DrawWork<'_>, planes: SamplePlanes, test: Option<RedundancyTest>) -> Output {
-    let reflector = planes.specular && work.highlight().is_some();
-    let antialias = if work.refinement.steps > 1 { Antialias::NONE } else { planes.antialias };
+    let reflector = planes.specular && work.highlight().is_some() && !planes.light;
+    let is_centre_alone = work.refinement.steps > 1 || planes.light;
     Output {
         samples: true,
-        antialias,
-        normal: planes.normal || reflector,
+        antialias: if is_centre_alone { Antialias::NONE } else { planes.antialias },
+        normal: planes.normal || reflector || planes.light,
         reflector,
         surface_id: planes.surface_id,
+        triangle_normal: planes.light,
+        light: planes.light,
         passed: test.is_some(),
         usefulness_test: test.and_then(|test| test.usefulness),
-        ..Output::of(work, reflector)
+        ..Output::of(work, reflector || planes.light)
     }
 }

@@ -12,6 +12,7 @@ use crate::{
     illuminate::Illuminate,
     interpolate::Interpolate,
     keep::Keep,
+    light_cache::{LookUp, MAX_CACHE_CAMERAS, PROVENANCE_EMPTY, PROVENANCE_HIT, PROVENANCE_LIT_HERE},
     layered::{BIAS_FOOTPRINTS, BIAS_ROUNDINGS, Lit},
     pixel_list::LIST_WORKGROUP,
     raster::RasterVariant,
@@ -24,11 +25,12 @@ use crate::{
 /// Numbers of a texture's wrap modes.
 const MIRROR: u32 = scene::Wrap::Mirror as u32;
 const CLAMP: u32 = scene::Wrap::Clamp as u32;
+const MAX_LAMP_SHARES: u32 = depth_image::MAX_LAMP_SHARES as u32;
 
 /// The shader templates of this crate.
 pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
     "raster.wgsl", "append.wgsl", "layered/lit.wgsl", "packed_surface.wgsl", "surfaces.wgsl", "albedo.wgsl", "camera.wgsl", "single_pole.wgsl", "sums.wgsl",
-    "illuminate.wgsl", "interpolate.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl", "hashed_alpha.wgsl",
+    "illuminate.wgsl", "interpolate.wgsl", "light_cache.wgsl", "lamp_shares.wgsl", "triangle_normal.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl", "hashed_alpha.wgsl",
     "rise.wgsl", "spot.wgsl", "shaded.wgsl", "visibility.wgsl", "reflections/bounce.wgsl", "reflections/bounce_off.wgsl", "reflections/curvature.wgsl",
     "reflections/spawn.wgsl", "reflections/follow.wgsl", "reflections/land.wgsl", "reflections/lobe.wgsl",
     "rays/traverse.wgsl", "rays/material.wgsl", "rays/primary.wgsl"
@@ -40,8 +42,8 @@ pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
 /// When a text is not a template.
 pub fn templates(tests: &[(&'static str, &'static str)]) -> Result<Templates, ShaderError> {
     Ok(Templates::new(&[SHADERS, tests].concat())?.declaring(wgsl_constants! {
-        ALPHA_HASHED, ALPHA_TESTED, BIAS_FOOTPRINTS, BIAS_ROUNDINGS, BOX_SLACK, CLAMP, COLOR_SUMS, DOUBLE_SIDED, EDGE_ROUNDINGS, LEAST_FACING, LIST_WORKGROUP, MATERIAL_TEXELS, MIRROR, MOST_LAYERS,
-        NOTHING, REFERENCE_FOOTPRINTS, SAME_SURFACE, SPECULAR, UNLIT, VERTEX
+        ALPHA_HASHED, ALPHA_TESTED, BIAS_FOOTPRINTS, BIAS_ROUNDINGS, BOX_SLACK, CLAMP, COLOR_SUMS, DOUBLE_SIDED, EDGE_ROUNDINGS, LEAST_FACING, LIST_WORKGROUP, MATERIAL_TEXELS, MAX_CACHE_CAMERAS, MAX_LAMP_SHARES, MIRROR, MOST_LAYERS,
+        NOTHING, PROVENANCE_EMPTY, PROVENANCE_HIT, PROVENANCE_LIT_HERE, REFERENCE_FOOTPRINTS, SAME_SURFACE, SPECULAR, UNLIT, VERTEX
     }))
 }
 
@@ -57,6 +59,7 @@ pub fn shader_sources<'t>(
         Keep,
         Illuminate,
         Interpolate,
+        LookUp,
         Spawn,
         Lobe,
         Follow,

@@ -8,6 +8,7 @@ use crate::accumulation::{Accumulations, Sums};
 use crate::batch::{Batch, Recording};
 use crate::finish::Planes;
 use crate::known_samples::{ImageSequence, Predecessors};
+use crate::light_cache::{self, CachedLight, Picture};
 use crate::pieces::{Piece, Pieces};
 use crate::reflections::{self, Reflections};
 use crate::surfaces::{SurfaceKind, SurfacePool, Surfaces};
@@ -84,7 +85,7 @@ impl Stages {
         let (lighting, refinement) = (batch.work.lighting, batch.work.refinement);
         let bytes = batch.bytes(if lighting.is_lit() { batch.output.sums.count() } else { 0 });
         self.gpu.check_storage_bytes("the light of a batch (bytes)", bytes)?;
-        let wanted = [lighting.shadow_rays(), lighting.occlusion_rays()].map(|rays| refinement.share_of(rays));
+        let wanted = batch.light_rays().map(|rays| refinement.share_of(rays));
         let kept = (refinement.steps > 1).then(|| self.accumulations.take(&batch.key(), wanted)).flatten();
         let buffer = || self.pool.lend_storage("light", bytes.max(4));
         Ok(kept.unwrap_or_else(|| Sums { buffer: buffer(), rays: wanted.map(|rays| 0..rays) }))
@@ -102,7 +103,7 @@ impl Stages {
             Some(sequence) => self.find_in_sequence(recording, sequence, surfaces)?,
             None => self.find(recording, (0, surfaces), None)?,
         }
-        let lists = if recording.batch.has_color() { self.light(recording, surfaces)? } else { Vec::new() };
+        let lists = self.light(recording, surfaces, planes)?;
         if let Some(mirrored) = mirrored.filter(|_| recording.batch.has_color()) {
             mirrored.record(recording, surfaces)?;
         }
@@ -148,6 +149,7 @@ impl Stages {
             size_px: batch.cameras[place].size_px(),
             by_rays: batch.by_rays,
             surface_id: batch.output.surface_id,
+            triangle_normal: batch.output.triangle_normal,
             front: batch.sequence.is_some_and(|sequence| sequence.number(place) > 0),
         };
         match batch.sequence.and_then(|sequence| sequence.layer(place, Evidence::SurfaceIds)) {
@@ -158,9 +160,17 @@ impl Stages {
 
     /// Records the light that arrives at surfaces: rays for all pixels, or for a grid of pixels and those where light between
     /// them would be wrong. The lists of those must live until the frame is done.
-    fn light(&self, recording: &mut Recording<'_>, surfaces: &[Surfaces]) -> Result<Vec<PixelList>, RenderError> {
+    fn light(
+        &self,
+        recording: &mut Recording<'_>,
+        surfaces: &[Surfaces],
+        planes: &Planes,
+    ) -> Result<Vec<PixelList>, RenderError> {
         let (batch, mut lists) = (recording.batch, Vec::new());
-        if !batch.work.lighting.is_lit() {
+        if let Some(cached) = batch.cached {
+            return self.look_up(recording, cached, surfaces, planes);
+        }
+        if !batch.work.lighting.is_lit() || !batch.has_color() {
             return Ok(lists);
         }
         let parts = batch.parts(&self.gpu, &recording.pieces, &recording.sums);
@@ -178,6 +188,32 @@ impl Stages {
             }
         }
         Ok(lists)
+    }
+
+    /// Records the look-up of light in samples, and the light of the pixels that no sample knows. The lists of those must live
+    /// until the frame is done. A position without colour is looked up for its provenance alone.
+    fn look_up(
+        &self,
+        recording: &mut Recording<'_>,
+        cached: CachedLight<'_>,
+        surfaces: &[Surfaces],
+        planes: &Planes,
+    ) -> Result<Vec<PixelList>, RenderError> {
+        let batch = recording.batch;
+        let mut all = Vec::new();
+        if !batch.has_color() && !batch.output.provenance {
+            return Ok(all);
+        }
+        let parts = batch.parts(&self.gpu, &recording.pieces, &recording.sums);
+        for (camera, target) in surfaces.iter().enumerate() {
+            let lists = self.lists(recording, camera);
+            light_cache::record(recording, cached, Picture { camera, target, words: &planes.words, lists: &lists })?;
+            if batch.has_color() {
+                illuminate::record(recording, &parts, (camera, slice::from_ref(target)), (1, Some(&lists)))?;
+            }
+            all.extend(lists);
+        }
+        Ok(all)
     }
 
     /// An empty list for each piece of a picture.

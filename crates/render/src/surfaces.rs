@@ -11,6 +11,9 @@ pub(crate) const SURFACE_FORMAT: TextureFormat = TextureFormat::Rgba32Uint;
 /// Instance and primitive.
 pub(crate) const SURFACE_ID_FORMAT: TextureFormat = TextureFormat::Rg32Uint;
 
+/// Octahedral.
+pub(crate) const TRIANGLE_NORMAL_FORMAT: TextureFormat = TextureFormat::R32Uint;
+
 /// All bits of a word: no instance has this number, and no triangle.
 pub(crate) const NOTHING: u32 = u32::MAX;
 
@@ -23,13 +26,15 @@ pub(crate) struct SurfaceKind {
     pub size_px: UVec2,
     pub by_rays: bool,
     pub surface_id: bool,
+    pub triangle_normal: bool,
     /// The nearest surface is wanted besides the one that is shown.
     pub front: bool,
 }
 
 impl SurfaceKind {
     fn bytes(&self) -> u64 {
-        let pixel = 16 + 4 * (1 + u64::from(self.front)) + 8 * u64::from(self.surface_id);
+        let floats = 1 + u64::from(self.front) + u64::from(self.triangle_normal);
+        let pixel = 16 + 4 * floats + 8 * u64::from(self.surface_id);
         pixel * u64::from(self.size_px.x) * u64::from(self.size_px.y)
     }
 }
@@ -41,6 +46,14 @@ pub(crate) struct SurfaceViews {
     /// The reversed depth of the nearest surface on each pixel's ray, redundant or not.
     pub front_depth: wgpu::TextureView,
     surface_ids: Option<wgpu::TextureView>,
+    /// On the side that is seen.
+    pub triangle_normals: Option<wgpu::TextureView>,
+}
+
+impl SurfaceViews {
+    pub fn triangle_normal_binding(&self) -> Option<Binding<'_>> {
+        self.triangle_normals.as_ref().map(|normals| Binding::texture("triangle_normals", normals))
+    }
 }
 
 /// Lends textures; they come back when dropped.
@@ -81,6 +94,7 @@ impl SurfacePool {
             front_depth: if kind.front { view(depth) } else { reversed_depth.clone() },
             reversed_depth,
             surface_ids: kind.surface_id.then(|| view(SURFACE_ID_FORMAT)),
+            triangle_normals: kind.triangle_normal.then(|| view(TRIANGLE_NORMAL_FORMAT)),
         }
     }
 }

@@ -47,7 +47,8 @@ impl TestStage {
     }
 
     pub fn surfaces(&self, by_rays: bool, surface_id: bool) -> Surfaces {
-        self.surfaces.lend(SurfaceKind { size_px: UVec2::ONE, by_rays, surface_id, front: true }, None)
+        let kind = SurfaceKind { size_px: UVec2::ONE, by_rays, surface_id, triangle_normal: true, front: true };
+        self.surfaces.lend(kind, None)
     }
 
     /// Fails unless the bindings name all variables of a group, each once.

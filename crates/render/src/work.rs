@@ -76,6 +76,8 @@ pub struct SamplePlanes {
     pub specular: bool,
     /// [`DepthImage::corner_inverse_depth_per_m`](depth_image::DepthImage::corner_inverse_depth_per_m): a second picture.
     pub corners: bool,
+    /// [`DepthImage::light`](depth_image::DepthImage::light) in place of colour, with normals; a texel then has one position.
+    pub light: bool,
 }
 
 #[cfg(test)]

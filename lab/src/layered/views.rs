@@ -22,7 +22,7 @@ const REPEATS: usize = 5;
 const SPREAD_RAD: f32 = 0.06;
 const DENSITY: u32 = 2;
 pub const PLAIN: SamplePlanes =
-    SamplePlanes { antialias: Antialias::NONE, normal: false, surface_id: false, specular: true, corners: false };
+    SamplePlanes { antialias: Antialias::NONE, normal: false, surface_id: false, specular: true, corners: false, light: false };
 
 /// Means over views of a scene, and the seconds of a view.
 #[derive(Debug, Clone, Copy)]

@@ -142,4 +142,4 @@ impl Subject {
 
 /// The planes that all metrics by pixel need.
 pub(super) const WITH_IDS: SamplePlanes =
-    SamplePlanes { antialias: Antialias::NONE, normal: false, surface_id: true, specular: false, corners: false };
+    SamplePlanes { antialias: Antialias::NONE, normal: false, surface_id: true, specular: false, corners: false, light: false };

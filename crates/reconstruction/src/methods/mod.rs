@@ -11,7 +11,7 @@ mod mesh;
 
 use std::sync::Arc;
 
-use depth_image::{MAX_REFLECTIONS, NamedMethod, Setting, named_methods};
+use depth_image::{LightCacheQuality, MAX_REFLECTIONS, NamedMethod, Setting, named_methods};
 use gpu::{ShaderError, ShaderSource, Templates, Turn, shader_sources, wgsl_constants, wgsl_files};
 
 use self::hybrid_mesh::GREATEST_SLOPE;
@@ -49,12 +49,17 @@ pub enum ReconstructionMethod {
         /// Mirrors on a ray's way that are followed; what the next one shows is gathered in a light field. All, where none is given.
         followed: Option<u32>,
     },
+    /// Surfaces come from the scene, their light from the samples. `render` makes such views, not this crate.
+    LightCache {
+        /// The certainty that light of samples must have.
+        quality: LightCacheQuality,
+    },
 }
 
-use ReconstructionMethod::{HybridMesh, JointCarve, Layered, LightFieldSearch, Mesh};
+use ReconstructionMethod::{HybridMesh, JointCarve, Layered, LightCache, LightFieldSearch, Mesh};
 
 /// All methods by name; the first is the default.
-pub const METHODS: [NamedMethod<ReconstructionMethod>; 5] = [
+pub const METHODS: [NamedMethod<ReconstructionMethod>; 6] = [
     NamedMethod {
         name: "joint_carve",
         method: JointCarve { stop_level: 0 },
@@ -105,6 +110,15 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 5] = [
         help: "walks through a layered cube, and meets the planes of its samples; with MIRRORS, rays are followed off at most that \
                many mirrors, and what the next one shows is gathered in a light field",
     },
+    NamedMethod {
+        name: "light_cache",
+        method: LightCache { quality: LightCacheQuality::Balanced },
+        setting: Some(Setting {
+            form: "QUALITY (draft, fast, balanced, fine or exact)",
+            parse: |text| text.parse().ok().map(|quality| LightCache { quality }),
+        }),
+        help: "takes surfaces from the scene and light from the samples; lights points that no sample knows in the view, balanced by default",
+    },
 ];
 
 /// The steps of the search, and the bound of merged quads in pixels, among which budgets choose.
@@ -147,7 +161,9 @@ impl ReconstructionMethod {
     #[must_use]
     pub fn required_planes(self) -> RequiredPlanes {
         match self {
-            LightFieldSearch { .. } | JointCarve { .. } | Mesh | Layered { .. } => RequiredPlanes::default(),
+            LightFieldSearch { .. } | JointCarve { .. } | Mesh | Layered { .. } | LightCache { .. } => {
+                RequiredPlanes::default()
+            }
             HybridMesh { .. } => CornerPlanes::REQUIRED,
         }
     }
@@ -163,7 +179,7 @@ impl ReconstructionMethod {
             LightFieldSearch { .. } => vec![LightFieldSearch { steps: LADDER_STEPS }],
             Mesh => vec![Mesh],
             // Budgets choose among sets of images.
-            Layered { .. } => Vec::new(),
+            Layered { .. } | LightCache { .. } => Vec::new(),
             HybridMesh { .. } => {
                 vec![HybridMesh { merged: ErrorBound::from_px(LADDER_BOUND_PX) }, HybridMesh { merged: None }]
             }
@@ -176,8 +192,16 @@ impl ReconstructionMethod {
         match self {
             LightFieldSearch { steps } => (steps > 1).then_some(LightFieldSearch { steps: steps / 2 }),
             JointCarve { stop_level } if stop_level < MAX_STOP_LEVEL => Some(JointCarve { stop_level: stop_level + 1 }),
+            LightCache { quality } => quality.lower().map(|quality| LightCache { quality }),
             JointCarve { .. } | Mesh | HybridMesh { .. } | Layered { .. } => None,
         }
+    }
+
+    /// The quality of views whose surfaces come from the scene; their samples have light in place of colour. `None` for methods
+    /// that find surfaces in samples.
+    #[must_use]
+    pub fn light_cache_quality(self) -> Option<LightCacheQuality> {
+        if let LightCache { quality } = self { Some(quality) } else { None }
     }
 
     /// Views come from a layered cube; those of other methods from depth images.
@@ -212,6 +236,7 @@ impl ReconstructionMethod {
             JointCarve { stop_level } => joint_carve::record(recording, stop_level, listed),
             Mesh | HybridMesh { .. } => quads::record(drawing, recording, mesh),
             Layered { followed } => layered::record(recording, bounces, followed),
+            LightCache { .. } => Err(ReconstructionError::NoScene { method: self.to_string() }),
         }
     }
 
@@ -223,7 +248,7 @@ impl ReconstructionMethod {
     ) -> Result<Option<PixelList>, ReconstructionError> {
         match self {
             JointCarve { .. } => joint_carve::smooth::record(recording).map(Some),
-            LightFieldSearch { .. } | Mesh | HybridMesh { .. } | Layered { .. } => Ok(None),
+            LightFieldSearch { .. } | Mesh | HybridMesh { .. } | Layered { .. } | LightCache { .. } => Ok(None),
         }
     }
 
@@ -235,7 +260,7 @@ impl ReconstructionMethod {
         turn: Turn,
     ) -> Result<Option<Arc<QuadMesh>>, ReconstructionError> {
         match self {
-            LightFieldSearch { .. } | JointCarve { .. } | Layered { .. } => Ok(None),
+            LightFieldSearch { .. } | JointCarve { .. } | Layered { .. } | LightCache { .. } => Ok(None),
             Mesh => mesh::mesh(device, set, turn).map(Some),
             HybridMesh { merged } => hybrid_mesh::mesh(device, set, merged, turn).map(Some),
         }
@@ -249,6 +274,7 @@ impl ReconstructionMethod {
             Mesh => None,
             Layered { followed } => followed.map(|mirrors| mirrors.to_string()),
             HybridMesh { merged } => merged.map(|bound| bound.to_string()),
+            LightCache { quality } => (quality != LightCacheQuality::default()).then(|| quality.to_string()),
         }
     }
 }
@@ -264,8 +290,15 @@ mod tests {
             assert_eq!(name.parse::<ReconstructionMethod>().expect(name).to_string(), name);
             assert_eq!(name.replace('_', "-").parse::<ReconstructionMethod>().expect(name).to_string(), name);
         }
+        for name in ["light_cache", "light_cache:draft", "light_cache:fast", "light_cache:fine", "light_cache:exact"] {
+            assert_eq!(name.parse::<ReconstructionMethod>().expect(name).to_string(), name);
+        }
+        assert_eq!("light_cache:balanced".parse(), "light_cache".parse::<ReconstructionMethod>());
         for name in [
             "",
+            "light_cache:",
+            "light_cache:best",
+            "light_cache:Fine",
             "carve",
             "joint_carve:9",
             "light_field_search:0",
@@ -298,7 +331,8 @@ mod tests {
     #[test]
     fn settings_have_the_bounds_that_their_form_says() {
         let mut checked = 0;
-        for (row, setting) in METHODS.iter().filter_map(|row| Some((row, row.setting?))) {
+        let numbered = METHODS.iter().filter(|row| row.method.light_cache_quality().is_none());
+        for (row, setting) in numbered.filter_map(|row| Some((row, row.setting?))) {
             let range = setting.form.split(['(', ')']).nth(1).expect("a range");
             let (least, greatest) = range.split_once(" to ").expect("two bounds");
             for text in [least, greatest] {
@@ -319,13 +353,14 @@ mod tests {
             std::iter::successors(Some(name.parse::<ReconstructionMethod>().expect(name)), next).count()
         };
         assert_eq!((settings("light_field_search:100"), settings("joint_carve"), settings("mesh")), (7, 9, 1));
+        assert_eq!(settings("light_cache:exact"), 5);
     }
 
     #[test]
     fn the_error_names_every_method() {
         let error = "carve".parse::<ReconstructionMethod>().expect_err("no method").to_string();
         for name in
-            ["joint_carve:LEVEL", "light_field_search:STEPS", " mesh,", " hybrid_mesh,", "hybrid_mesh:PX", " layered"]
+            ["joint_carve:LEVEL", "light_field_search:STEPS", " mesh,", "hybrid_mesh:PX", " layered", "light_cache:QUALITY"]
         {
             assert!(error.contains(name), "{name} is not in {error}");
         }

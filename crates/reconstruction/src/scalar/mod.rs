@@ -213,7 +213,8 @@ pub fn quads(images: &[DepthImage], method: ReconstructionMethod) -> Option<Vec<
         }
         ReconstructionMethod::LightFieldSearch { .. }
         | ReconstructionMethod::JointCarve { .. }
-        | ReconstructionMethod::Layered { .. } => None,
+        | ReconstructionMethod::Layered { .. }
+        | ReconstructionMethod::LightCache { .. } => None,
     }
 }
 
@@ -245,6 +246,7 @@ fn pixels_from(cameras: &[SampleCamera], rays: &ViewRays, starts: &[f32], method
                     unreachable!("meshes are drawn, not searched")
                 }
                 ReconstructionMethod::Layered { .. } => unreachable!("it walks through a cube, not through images"),
+                ReconstructionMethod::LightCache { .. } => unreachable!("its surfaces come from the scene"),
             }
         })
         .collect()

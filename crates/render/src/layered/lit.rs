@@ -8,7 +8,7 @@ use minijinja::{Value, context, value::merge_maps};
 
 use super::crossings::Crossing;
 use crate::accumulation::Sums;
-use crate::batch::{Batch, Part, Recording};
+use crate::batch::{Batch, Part, Position, Recording};
 use crate::pieces::Pieces;
 use crate::pixel_camera::CAMERA_TRAITS;
 use crate::planes::Output;
@@ -67,7 +67,8 @@ pub(super) fn light(
         output,
         tone: ToneMapping::NONE,
         sequence: None,
-        position: 0,
+        cached: None,
+        position: Position::default(),
     };
     let points = Points::of(camera, first);
     let mut light = Light { visibility8: vec![Vec::new(); output.sums.visibility_words()], ..Light::default() };
@@ -96,7 +97,7 @@ fn light_list(stages: &Stages, batch: &Batch<'_>, bounces: &[GpuBounce], light: 
     let plane_bytes = 4 * u64::from(count);
     let _one = stages.batches.begin(batch.work.turn.class);
     let lighting = batch.work.lighting;
-    let rays = [lighting.shadow_rays(), lighting.occlusion_rays()].map(|rays| 0..batch.work.refinement.share_of(rays));
+    let rays = batch.light_rays().map(|rays| 0..batch.work.refinement.share_of(rays));
     let sums = pool.lend_storage("light of layers", plane_bytes * sum_planes as u64);
     let memory = pool.lend_storage("surfaces of layers", size_of_val(bounces) as u64);
     gpu.queue.write_buffer(&memory, 0, bytemuck::cast_slice(bounces));

@@ -22,6 +22,7 @@ pub(crate) struct Primary {
     /// `None` shows colours as they are.
     shading: Option<Highlight>,
     surface_id: bool,
+    triangle_normal: bool,
     count_visits: bool,
     /// Rays around a pole, in place of those through one eye.
     single_pole: bool,
@@ -50,6 +51,7 @@ impl ShaderVariant for Primary {
             primary => true,
             shading => self.shading.map_or("unlit", highlight_name),
             surface_id => self.surface_id,
+            triangle_normal => self.triangle_normal,
             count_visits => self.count_visits,
             single_pole => self.single_pole,
             ..merge_maps([self.traversal.context(), RedundancyVariant::context(self.redundancy, KNOWN_GROUP)])
@@ -59,9 +61,16 @@ impl ShaderVariant for Primary {
     fn all() -> Vec<Self> {
         let shadings = [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)];
         let each = |shading| {
-            switches().flat_map(move |[surface_id, count_visits, single_pole]| {
-                let plain =
-                    |traversal| Self { traversal, shading, surface_id, count_visits, single_pole, redundancy: None };
+            switches().flat_map(move |[surface_id, triangle_normal, count_visits, single_pole]| {
+                let plain = |traversal| Self {
+                    traversal,
+                    shading,
+                    surface_id,
+                    triangle_normal,
+                    count_visits,
+                    single_pole,
+                    redundancy: None,
+                };
                 Traversal::ALL.map(plain)
             })
         };
@@ -82,6 +91,7 @@ pub(crate) fn record(
         traversal: Traversal::of(traced),
         shading: batch.work.lighting.highlight(),
         surface_id: surfaces.iter().any(|target| target.surface_ids.is_some()),
+        triangle_normal: batch.output.triangle_normal,
         count_visits: visit_counts.is_some(),
         single_pole: batch.is_single_pole(),
         redundancy: predecessors.map(|images| images.variant),
@@ -107,6 +117,7 @@ fn bindings<'r>(
     bindings.extend(target.bindings());
     let ids = target.surface_ids.as_ref().filter(|_| variant.surface_id);
     bindings.extend(ids.map(|ids| Binding::texture("surface_ids", ids)));
+    bindings.extend(target.views.triangle_normal_binding().filter(|_| variant.triangle_normal));
     bindings.extend(variant.redundancy.map(|_| Binding::texture("front_depth", &target.views.front_depth)));
     bindings.extend(visit_counts.map(|counts| Binding::buffer("visit_counts", counts)));
     bindings

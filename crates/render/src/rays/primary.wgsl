@@ -1,6 +1,9 @@
 // The surface that each pixel shows, by one ray each: the same that raster.wgsl draws.
 {% include "camera.wgsl" %}
 {% include "packed_surface.wgsl" %}
+{% if triangle_normal %}
+{% include "triangle_normal.wgsl" %}
+{% endif %}
 {% include "rays/traverse.wgsl" %}
 
 @group(0) var surfaces: texture_storage_2d<rgba32uint, write>;
@@ -8,6 +11,9 @@
 @group(0) var reversed_depth: texture_storage_2d<r32float, write>;
 {% if surface_id %}
 @group(0) var surface_ids: texture_storage_2d<rg32uint, write>;
+{% endif %}
+{% if triangle_normal %}
+@group(0) var triangle_normals: texture_storage_2d<r32uint, write>;
 {% endif %}
 {% if redundancy_test %}
 // The reversed depth of the nearest surface, redundant or not.
@@ -62,6 +68,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let met = hit.slot != NOTHING;
     var surface = vec4u(0u);
     var ids = vec2u(NOTHING);
+{% if triangle_normal %}    var triangle_normal = 0u;
+{% endif %}
     for (var found = met; found; found = false) {
         let triangle = textureLoad(flat_triangles, texel_at(hit.slot), 0);
         let at = attributes_at(hit.crossing);
@@ -72,10 +80,18 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             normal_at(triangle.z, at, footprints) * facing, coat(triangle.z, triangle.w, at, footprints),
         );
         ids = triangle.xy;
+{% if triangle_normal %}
+        let corner = bitcast<vec3f>(corner_texel(hit.slot * 3u).xyz);
+        let first_edge = bitcast<vec3f>(corner_texel(hit.slot * 3u + 1u).xyz) - corner;
+        let second_edge = bitcast<vec3f>(corner_texel(hit.slot * 3u + 2u).xyz) - corner;
+        triangle_normal = triangle_normal_oct16(cross(first_edge, second_edge), direction);
+{% endif %}
     }
     textureStore(surfaces, pixel, surface);
     textureStore(reversed_depth, pixel, vec4f(select(0.0, camera.near_m / hit.t, met)));
 {% if surface_id %}    textureStore(surface_ids, pixel, vec4u(ids, 0u, 0u));
+{% endif %}
+{% if triangle_normal %}    textureStore(triangle_normals, pixel, vec4u(triangle_normal));
 {% endif %}
 {% if count_visits %}
     let place = place_of(pixel) * 2u;

@@ -14,6 +14,7 @@ use crate::{RenderError, batch::Recording, pieces::Piece, pixel_camera::CAMERA_T
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct GpuLobe {
+    pub first_ray: u32,
     pub ray: u32,
     pub ray_count: u32,
     pub whole: u32,
@@ -22,6 +23,8 @@ pub(crate) struct GpuLobe {
 #[derive(Debug)]
 pub(crate) struct Lobe {
     by_rays: bool,
+    /// Planes of the picture, by which a pixel's place is found.
+    plane_count: usize,
     /// The first ray of a pixel sums up the weights of all.
     first: bool,
 }
@@ -35,7 +38,7 @@ impl ShaderVariant for Lobe {
             single_pole => false,
             by_rays => self.by_rays,
             first => self.first,
-            plane_count => VIEW_PLANES,
+            plane_count => self.plane_count,
             highlight => highlight_name(Highlight::Ggx),
             mirrors => true,
             environment_map => false,
@@ -44,7 +47,7 @@ impl ShaderVariant for Lobe {
     }
 
     fn all() -> Vec<Self> {
-        switches().map(|[by_rays, first]| Self { by_rays, first }).collect()
+        switches().map(|[by_rays, first]| Self { by_rays, plane_count: VIEW_PLANES, first }).collect()
     }
 }
 
@@ -57,11 +60,13 @@ pub(super) fn record(
     (next_bounces, next): (&Buffer, &BounceList),
 ) -> Result<(), RenderError> {
     let batch = recording.batch;
-    let variant = Lobe { by_rays: batch.by_rays, first: ray == 0 };
+    let variant = Lobe { by_rays: batch.by_rays, plane_count: batch.output.layout().count, first: ray == 0 };
     let pass = recording.passes.get(&variant)?;
     let lighting = batch.work.lighting;
     let whole = u32::from(lighting.reflections.is_none());
-    let lobe = GpuLobe { ray, ray_count: batch.glossy_rays(), whole };
+    let ray_count = batch.glossy_rays();
+    let first_ray = batch.position.number * ray_count;
+    let lobe = GpuLobe { first_ray, ray: first_ray + ray, ray_count, whole };
     let lobe = recording.gpu.buffer_with("lobe", &[lobe], BufferUsages::UNIFORM);
     let buffers = [&recording.cameras, &batch.work.scene.illumination, &lobe, weights, next_bounces];
     let own = pass.bind(0, bindings(buffers, next, target))?;

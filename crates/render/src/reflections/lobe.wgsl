@@ -18,8 +18,9 @@
 {% include "rise.wgsl" %}
 {% include "spot.wgsl" %}
 
-// The number of this ray, and the number of rays of a pixel. `whole` is 1 where rays off mirrors do not show a part of the light.
-struct Lobe { ray: u32, ray_count: u32, whole: u32 }
+// Of the rays of a pixel's sequence: the first at this position, this one, and how many the position has. `whole` is 1 where
+// rays off mirrors do not show a part of the light.
+struct Lobe { first_ray: u32, ray: u32, ray_count: u32, whole: u32 }
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -38,7 +39,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         var ray = lobe_ray(mirror, point_of(lobe.ray, seed));
 {% if first %}
         var sum = 0.0;
-        for (var i = 0u; i < lobe.ray_count; i++) { sum += lobe_ray(mirror, point_of(i, seed)).weight; }
+        for (var i = 0u; i < lobe.ray_count; i++) { sum += lobe_ray(mirror, point_of(lobe.first_ray + i, seed)).weight; }
         weights[place] = sum;
         // All rays go below the surface: the mirrored one takes their place.
         let mirrored = LobeRay(reflect(direction, spot.normal) / length(direction), 1.0);

@@ -7,7 +7,7 @@ use gpu::Frame;
 use super::Reflections;
 use super::bounces::{BounceList, GpuBounce, Rays};
 use crate::accumulation::Sums;
-use crate::batch::{Batch, Recording};
+use crate::batch::{Batch, Position, Recording};
 use crate::pieces::Pieces;
 use crate::planes::Output;
 use crate::{RenderError, stages::Stages, work::DrawWork};
@@ -35,7 +35,8 @@ impl<'a> RadianceWork<'a> {
             output: Output { mirrors: true, ..Output::of(work, true) },
             tone: ToneMapping::NONE,
             sequence: None,
-            position: 0,
+            cached: None,
+        position: Position::default(),
         };
         Ok(Self { stages, batch, points: Vec::new(), lit: Vec::new() })
     }
@@ -68,8 +69,7 @@ impl<'a> RadianceWork<'a> {
         let _one = batches.begin(work.turn.class);
         let memory = Reflections::lend_for(gpu, pool, batch, (count, plane_bytes))?;
         gpu.queue.write_buffer(&memory.bounces[0], 0, bytemuck::cast_slice(points));
-        let rays = [work.lighting.shadow_rays(), work.lighting.occlusion_rays()];
-        let rays = rays.map(|rays| 0..work.refinement.share_of(rays));
+        let rays = batch.light_rays().map(|rays| 0..work.refinement.share_of(rays));
         let parts = batch.parts_of_points(gpu, &rays, count);
         let (pieces, cameras) = (Pieces { all: Vec::new() }, parts[0].cameras.clone());
         let sums = Sums { buffer: pool.lend_storage("no sums", 4), rays };

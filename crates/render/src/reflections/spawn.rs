@@ -16,6 +16,8 @@ pub(super) const VIEW_PLANES: usize = 2;
 #[derive(Debug)]
 pub(crate) struct Spawn {
     by_rays: bool,
+    /// Planes of the picture, by which a pixel's place is found.
+    plane_count: usize,
     traversal: Traversal,
 }
 
@@ -31,7 +33,7 @@ impl ShaderVariant for Spawn {
             cone => true,
             shading => highlight_name(Highlight::Ggx),
             count_visits => false,
-            plane_count => VIEW_PLANES,
+            plane_count => self.plane_count,
             highlight => highlight_name(Highlight::Ggx),
             mirrors => true,
             environment_map => false,
@@ -41,7 +43,7 @@ impl ShaderVariant for Spawn {
     }
 
     fn all() -> Vec<Self> {
-        let each = |by_rays| Traversal::ALL.map(|traversal| Self { by_rays, traversal });
+        let each = |by_rays| Traversal::ALL.map(|traversal| Self { by_rays, plane_count: VIEW_PLANES, traversal });
         [false, true].into_iter().flat_map(each).collect()
     }
 }
@@ -56,8 +58,8 @@ pub(super) fn record(
     let batch = recording.batch;
     // Lighting with mirrors has rays.
     let Some(traced) = batch.traced.as_deref() else { return Ok(()) };
-    let variant = Spawn { by_rays: batch.by_rays, traversal: Traversal::of(traced) };
-    debug_assert_eq!(batch.output.layout().count, VIEW_PLANES);
+    let (traversal, plane_count) = (Traversal::of(traced), batch.output.layout().count);
+    let variant = Spawn { by_rays: batch.by_rays, plane_count, traversal };
     let pass = recording.passes.get(&variant)?;
     let illumination = &batch.work.scene.illumination;
     let buffers = [&recording.cameras, illumination, next_bounces];

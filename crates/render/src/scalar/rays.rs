@@ -64,7 +64,7 @@ pub struct Visits {
 /// The ray through the middle of a pixel, as on a device; its parameter is planar depth.
 #[must_use]
 pub fn pixel_ray(camera: &PinholeCamera, pixel: UVec2) -> Ray {
-    let rays = PixelCamera::of(&(*camera).into(), 0);
+    let rays = PixelCamera::of(&(*camera).into(), Vec2::ZERO);
     let [column, row, corner] = [rays.column_in_world, rays.row_in_world, rays.corner_in_world].map(Vec3::from);
     let center = pixel.as_vec2() + 0.5;
     let direction_in_world = column * center.x + row * center.y + corner;

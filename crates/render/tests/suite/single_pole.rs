@@ -21,6 +21,7 @@ const ALL: SamplePlanes = SamplePlanes {
     surface_id: true,
     specular: true,
     corners: false,
+    light: false,
 };
 
 fn images(work: DrawWork<'_>, cameras: &[Camera]) -> Vec<DepthImage> {

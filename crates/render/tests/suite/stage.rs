@@ -11,7 +11,7 @@ use scene::{Instance, Scene};
 
 pub const SIZE_PX: UVec2 = UVec2::new(96, 72);
 const ALL: SamplePlanes =
-    SamplePlanes { antialias: Antialias::NONE, normal: true, surface_id: true, specular: true, corners: false };
+    SamplePlanes { antialias: Antialias::NONE, normal: true, surface_id: true, specular: true, corners: false, light: false };
 
 /// The software device of this program; a test without one fails.
 pub fn device() -> &'static (Arc<Gpu>, Renderer) {
