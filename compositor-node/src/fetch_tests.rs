@@ -38,6 +38,7 @@ fn dull() -> DepthImage {
         specular: None,
         passed: None,
         corner_inverse_depth_per_m: None,
+        light: None,
     }
 }
 

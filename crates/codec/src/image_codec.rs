@@ -31,7 +31,7 @@ pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<Encode
     image.validate()?;
     let specular = image.specular.as_ref().filter(|_| planes.specular);
     if specular.is_some() && image.normal_oct16.is_none() {
-        return Err(DepthImageError { plane: "normal", len: 0, expected: image.inverse_depth_per_m.len() });
+        return Err(DepthImageError::Size { plane: "normal", len: 0, expected: image.inverse_depth_per_m.len() });
     }
     let depth = encode_depth(&image.inverse_depth_per_m);
     let runs = &depth.runs;
@@ -98,6 +98,7 @@ pub fn decode_depth_image(
         specular: None,
         passed: None,
         corner_inverse_depth_per_m: None,
+        light: None,
     };
     for plane in others {
         decode_plane(plane, &mut packed, &runs, header.corners(), &mut image)?;

@@ -34,6 +34,7 @@ fn image(width: u32, height: u32) -> DepthImage {
         specular: None,
         passed: None,
         corner_inverse_depth_per_m: None,
+        light: None,
     }
 }
 

@@ -153,6 +153,7 @@ mod tests {
             specular: None,
             passed: None,
             corner_inverse_depth_per_m: None,
+            light: None,
         };
         assert_eq!(set_bytes(&SampleImages::Depth(vec![plain.clone()])), 256 * (4 + 4 + 11));
         let specular = SpecularPlanes {

@@ -111,6 +111,7 @@ pub(crate) fn depth_images(words: &[u32], output: Output, cameras: &[Camera]) ->
             specular: layout.reflector.map(specular),
             passed: layout.passed.and_then(|passed| passed_plane(own[passed])),
             corner_inverse_depth_per_m: None,
+            light: None,
         }
     };
     split(words, layout.count, cameras).map(image).collect()
