@@ -218,7 +218,7 @@ impl Engine for GpuEngine {
         }
         let method: ReconstructionMethod = parsed("reconstruction_method", method)?;
         let RequiredPlanes { normal, corner_inverse_depth } = method.required_planes();
-        Ok(SamplePlanes { normals: normal, corner_inverse_depths: corner_inverse_depth })
+        Ok(SamplePlanes { normals: normal, corner_inverse_depths: corner_inverse_depth, light: false })
     }
 
     fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
@@ -244,7 +244,7 @@ impl Engine for GpuEngine {
             return self.sample_cube(request, (draw, mirrored), method);
         }
         let cameras: Vec<Camera> = request.cameras.iter().filter_map(SampleCamera::depth).copied().collect();
-        let SamplePlanes { normals: normal, corner_inverse_depths: corners } = request.planes;
+        let SamplePlanes { normals: normal, corner_inverse_depths: corners, light: _ } = request.planes;
         let work = sampling::SampleWork {
             draw,
             cameras: &cameras,
@@ -372,6 +372,7 @@ fn reconstruction_error(error: ReconstructionError) -> EngineError {
         ReconstructionError::MirrorCells(_) => invalid("common_cells of mirrors", error),
         ReconstructionError::Reflections(_) => invalid("reflections", error),
         ReconstructionError::Model { .. }
+        | ReconstructionError::LightForColor { .. }
         | ReconstructionError::CurvedSearch { .. }
         | ReconstructionError::LightField { .. } => invalid("sample_images", error),
     }
