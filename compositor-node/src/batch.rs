@@ -59,7 +59,7 @@ impl Source {
     /// The scene that surfaces, or all of the views, are drawn from.
     pub(crate) fn scene(&self) -> &SceneRef {
         match self {
-            Self::Sets(sets) => &sets.scene,
+            Self::Sets(sets) => &sets.of_cell.scene,
             Self::Scene { plan, .. } => &plan.workload.scene,
         }
     }

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use cluster::{Assignment, FetchImages, SamplerShare};
 use codec::{Chunk, DecodeLimits, Reassembled, Reassembler, SampleSetId, decode_sample_image};
-use depth_image::{SampleCamera, SampleImage, SpecularPlanes};
+use depth_image::{LightPlanes, SampleCamera, SampleImage, SpecularPlanes};
 use node::{CellPlan, Connections, blocking, next_within};
 use tonic::{Code, Status};
 use wire::rpc::{Backoff, Messages, SamplerClient};
@@ -110,6 +110,7 @@ async fn fetch_once(
         let image = decode(&cameras, whole).await?;
         chunks.times.decode_s += start.elapsed().as_secs_f64();
         check_visibility(plan, index, &image)?;
+        check_light(plan, index, &image)?;
         set.relay.iter().for_each(|relay| relay.add(index, encoded.clone()));
         images.push((index, image));
     }
@@ -184,6 +185,33 @@ fn check_visibility(plan: &Assignment, index: u32, image: &SampleImage) -> Resul
         return Ok(());
     }
     Err(Status::data_loss(format!("image {index} has {planes} planes of visibility for {lights} lights")))
+}
+
+/// Checks that images have light in place of colour where the plan says so, and nowhere else. A lamp's share is found by its
+/// place: there are shares of all lamps, or none at all.
+fn check_light(plan: &Assignment, index: u32, image: &SampleImage) -> Result<(), Status> {
+    let light = match image {
+        SampleImage::Depth(image) => image.light.as_ref(),
+        SampleImage::Layered(_) | SampleImage::LightField(_) => None,
+    };
+    match light {
+        Some(_) if !plan.workload.planes.light => {
+            Err(Status::data_loss(format!("image {index} has light where colour is needed")))
+        }
+        None if plan.workload.planes.light => {
+            Err(Status::data_loss(format!("image {index} has colour where light is needed")))
+        }
+        Some(light) => check_shares(plan, index, light.share8.len()),
+        None => Ok(()),
+    }
+}
+
+fn check_shares(plan: &Assignment, index: u32, planes: usize) -> Result<(), Status> {
+    let lights = plan.workload.illumination.lights.len();
+    if planes == 0 || planes == LightPlanes::share_planes(lights) {
+        return Ok(());
+    }
+    Err(Status::data_loss(format!("image {index} has {planes} planes of shares for {lights} lamps")))
 }
 
 async fn decode(cameras: &[SampleCamera], whole: Reassembled) -> Result<SampleImage, Status> {

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use cluster::{Assignment, FetchImages, Workload};
+use cluster::{Assignment, FetchImages, SamplePlanes, Workload};
 use codec::{Chunk, ChunkBody, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
-use depth_image::{Camera, DepthImage, Environment, Illumination, Light, PinholeCamera, SpecularPlanes};
+use depth_image::{Camera, DepthImage, Environment, Illumination, Light, LightPlanes, PinholeCamera, SpecularPlanes};
 use glam::{UVec2, Vec3};
 use tokio::net::TcpListener;
 use tokio_stream::StreamExt as _;
@@ -38,6 +38,7 @@ fn dull() -> DepthImage {
         specular: None,
         passed: None,
         corner_inverse_depth_per_m: None,
+        light: None,
     }
 }
 
@@ -48,6 +49,17 @@ fn shiny(visibilities: usize) -> DepthImage {
         visibility8: vec![vec![u32::MAX; 256]; visibilities],
     };
     DepthImage { normal_oct16: Some(vec![7; 256]), specular: Some(specular), ..dull() }
+}
+
+/// An image with light in place of colour, and with `shares` planes of shares.
+fn lit(shares: usize) -> DepthImage {
+    let light = LightPlanes {
+        triangle_normal_oct16: vec![3; 256],
+        lamps_rgb9e5: (0..256).collect(),
+        environment_rgb9e5: (0..256).rev().collect(),
+        share8: vec![vec![u32::MAX; 256]; shares],
+    };
+    DepthImage { color_rgb9e5: Vec::new(), normal_oct16: Some(vec![7; 256]), light: Some(light), ..dull() }
 }
 
 /// Chunks of two images of set 0 of plan 5.
@@ -77,13 +89,18 @@ impl Sampler for Script {
 }
 
 async fn fetched(chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Status> {
+    fetched_with_planes(SamplePlanes::default(), chunks, stays_open).await
+}
+
+async fn fetched_with_planes(planes: SamplePlanes, chunks: Vec<Chunk>, stays_open: bool) -> Result<SampleSet, Status> {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = format!("http://{}", listener.local_addr().unwrap());
     let shutdown = CancellationToken::new();
     let routes = Routes::new(sampler_server(Script { chunks, stays_open }));
     let _server = tokio::spawn(node::serve(listener, routes, false, shutdown.clone()));
     let share = SamplerShare { node_name: "n7".to_owned(), address, image_indices: vec![0, 1] };
-    let workload = Workload { sample_cameras: vec![camera().into(); 2], illumination: illumination(), ..workload() };
+    let sample_cameras = vec![camera().into(); 2];
+    let workload = Workload { sample_cameras, planes, illumination: illumination(), ..workload() };
     let plan = Arc::new(Assignment { plan_epoch: 5, workload, samplers: vec![share], ..assignment() });
     let deadlines = Deadlines { chunk: Duration::from_millis(200), ..Deadlines::default() };
     let request = SetRequest { plan: CellPlan::of(&plan, 0).unwrap(), set_index: 0, relay: None };
@@ -109,6 +126,25 @@ async fn planes_of_highlights_are_fetched() {
         let set = fetched(chunks_of(&shiny(visibilities)), false).await.unwrap();
         assert_eq!(set.illumination, illumination());
         assert_eq!(set.images.depth(), [shiny(visibilities), shiny(visibilities)]);
+    }
+}
+
+#[tokio::test]
+async fn light_and_colour_are_fetched_where_the_plan_says_so() {
+    let planes = SamplePlanes { normals: true, light: true, ..SamplePlanes::default() };
+    for shares in [0, 2] {
+        let set = fetched_with_planes(planes, chunks_of(&lit(shares)), false).await.unwrap();
+        assert_eq!(set.images.depth(), [lit(shares), lit(shares)]);
+    }
+    let refused = [
+        ("has light where colour is needed", fetched(chunks_of(&lit(2)), false).await),
+        ("has colour where light is needed", fetched_with_planes(planes, good_chunks(), false).await),
+        ("3 planes of shares for 4 lamps", fetched_with_planes(planes, chunks_of(&lit(3)), false).await),
+    ];
+    for (reason, refused) in refused {
+        let refused = refused.expect_err(reason);
+        assert_eq!(refused.code(), Code::DataLoss, "{refused}");
+        assert!(refused.message().contains(reason), "{refused}");
     }
 }
 

@@ -4,7 +4,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use cluster::{Assignment, CommonCell, Policy, SetContent, Timeline, Workload};
+use cluster::{Assignment, CommonCell, Policy, SceneRef, SetContent, Timeline, Workload};
 use codec::EncodedImage;
 use depth_image::{DepthImage, PinholeCamera, SampleCamera, nearest_set};
 use node::{
@@ -45,6 +45,8 @@ fn sets_ahead(plan: &Assignment) -> u32 {
 
 /// A complete set of one cell on the device.
 pub(crate) struct ReadySet {
+    /// The scene, which surfaces come from where the set has light in place of colour.
+    pub(crate) scene: SceneRef,
     pub(crate) set: SharedSet,
     /// The time at which it was ready.
     pub(crate) since: Instant,
@@ -69,7 +71,6 @@ pub(crate) struct ViewSets {
     pub(crate) of_cell: Pinned<ReadySet>,
     /// The same on the device, with those of the common cells.
     pub(crate) on_device: SharedSet,
-    pub(crate) scene: SceneRef,
     _common: Vec<Pinned<ReadySet>>,
 }
 
@@ -373,7 +374,8 @@ impl Sets {
         let moment = moment(plan, set_index).filter(|_| !plan.is_common);
         let cameras = SampleCamera::references(&plan.workload.sample_cameras);
         let (since, cell) = (Instant::now(), plan.cell);
-        Ok((ReadySet { set, since, content, cell, moment, subject, cameras, sample_images, relay }, bytes))
+        let scene = plan.workload.scene.clone();
+        Ok((ReadySet { set, scene, since, content, cell, moment, subject, cameras, sample_images, relay }, bytes))
     }
 
     async fn fetch(&self, request: &SetRequest) -> Result<(SampleSet, FetchTimes), Status> {

@@ -237,6 +237,7 @@ fn surface(visited: &Visited, view: &View, at: UVec2, first_camera: usize) -> Op
         ProvenanceKind::Filled => "filled",
         ProvenanceKind::Guessed => "guessed",
         ProvenanceKind::Base => "base",
+        ProvenanceKind::LitHere => "lit_here",
     };
     Some(json!({
         "at": at.to_array(), "source": source, "cameras": cameras,

@@ -98,7 +98,7 @@ impl SamplerService {
             if !plans.have_set(&content, set_index) {
                 return Err(Status::failed_precondition(format!("no plan in force has this set {set_index}")));
             }
-            let sampled = scenes.on_device(Some(&scene), move |engine| sample(engine, &work)).await?;
+            let sampled = scenes.on_device(&scene, move |engine| sample(engine, &work)).await?;
             let images = blocking(move || pack(sampled, (&indices, tiles), (number, &metrics))).await?;
             let bytes = images.iter().map(|(_, image)| image.payload.len()).sum();
             Ok((images, bytes))

@@ -153,6 +153,7 @@ fn depth_image(camera: &Camera, scene_time_s: f32, refinement: Refinement) -> De
         specular: None,
         passed: None,
         corner_inverse_depth_per_m: None,
+        light: None,
     }
 }
 
@@ -226,7 +227,8 @@ fn splat(set: &SampleSet, camera: &PinholeCamera, planes: ViewPlanes) -> View {
     for (index, image) in set.images.depth().iter().enumerate() {
         let size_px = image.size_px();
         for (x, y) in (0..size_px.y).flat_map(|y| (0..size_px.x).map(move |x| (x, y))) {
-            let (Texel::Sample { color_linear, .. }, Some(point)) = (image.texel(x, y), image.sample_in_world(x, y))
+            let (Texel::Sample { color_linear: Some(color_linear), .. }, Some(point)) =
+                (image.texel(x, y), image.sample_in_world(x, y))
             else {
                 continue;
             };

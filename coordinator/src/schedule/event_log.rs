@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::{Command, Event, Scheduler};
 
 /// Logs of other versions are refused.
-const VERSION: u32 = 10;
+const VERSION: u32 = 11;
 const VERSION_KEY: &str = "version";
 /// A line that is longer is no event.
 const MAX_LINE_BYTES: u64 = 16 << 20;

@@ -115,7 +115,7 @@ fn a_log_has_one_line_an_event_after_its_version() {
     let text = String::from_utf8(recorded()).unwrap();
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines.len(), history().len() + 1);
-    assert_eq!(lines[0], r#"{"version":10}"#);
+    assert_eq!(lines[0], r#"{"version":11}"#);
     assert_eq!(
         lines[5],
         "(now_ns:4123456789,event:demand_changed(session:7,views_per_set:500,frames_per_s:Some(0.1)))"
@@ -149,7 +149,7 @@ fn floats_of_a_log_keep_every_bit() {
 
 #[test]
 fn an_invalid_line_is_refused_with_its_number_and_field() {
-    let after_header = |line: &str| refusal(format!("{{\"version\":10}}\n{line}\n").as_bytes());
+    let after_header = |line: &str| refusal(format!("{{\"version\":11}}\n{line}\n").as_bytes());
     let cases = [
         (
             "(now_ns:0,event:demand_changed(session:1,views_per_set:9999999,frames_per_s:None))",
@@ -183,8 +183,8 @@ fn an_invalid_line_is_refused_with_its_number_and_field() {
 #[test]
 fn a_log_of_another_version_is_refused_by_its_version() {
     let old = b"{\"version\":2}\n{\"now_ns\":0,\"event\":\"tick\"}\n";
-    assert_eq!(refusal(old), "line 1: version is 2, must be 10");
-    assert_eq!(refusal(b"{\"version\":3}\n"), "line 1: version is 3, must be 10");
+    assert_eq!(refusal(old), "line 1: version is 2, must be 11");
+    assert_eq!(refusal(b"{\"version\":3}\n"), "line 1: version is 3, must be 11");
 }
 
 #[test]

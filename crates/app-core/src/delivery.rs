@@ -26,11 +26,13 @@ const FRAME_RATE_RATIO: f64 = 0.8;
 pub fn request(offered: OfferSettings, views: &[PinholeCamera]) -> anyhow::Result<SessionRequest> {
     let OfferSettings { method, sampling, lighting } = offered;
     let lighting = lighting.unwrap_or_else(|| Lighting::default().to_string());
+    let method = method.unwrap_or_else(|| ReconstructionMethod::default().to_string());
     Ok(SessionRequest {
         scene: None,
-        method: method.unwrap_or_else(|| ReconstructionMethod::default().to_string()),
         sampling: sampling.unwrap_or_else(|| SamplingMethod::default().to_string()),
-        follows_mirrors: has_reflections(&lighting),
+        // Where surfaces come from the scene, so does what mirrors show.
+        follows_mirrors: has_reflections(&lighting) && !takes_light_from_samples(&method),
+        method,
         lighting,
         codec: "lz4".to_owned(),
         sample_cameras: Vec::new(),
@@ -51,6 +53,10 @@ pub fn request(offered: OfferSettings, views: &[PinholeCamera]) -> anyhow::Resul
         viewpoints: Vec::new(),
         budget: BudgetRequest::default(),
     })
+}
+
+fn takes_light_from_samples(method: &str) -> bool {
+    method.parse().is_ok_and(|method: ReconstructionMethod| method.light_cache_quality().is_some())
 }
 
 /// Whether mirrors show the scene in a lighting.

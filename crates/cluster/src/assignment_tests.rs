@@ -68,6 +68,7 @@ fn set_content_differs_where_and_only_where_a_set_shows_something_else() {
     assert_ne!(id(&|a| a.workload.lighting = "unlit".to_owned()), same);
     assert_ne!(id(&|a| a.workload.sample_cameras.truncate(1)), same);
     assert_ne!(id(&|a| a.workload.refinement_steps = 2), same);
+    assert_ne!(id(&|a| a.workload.planes.light = true), same);
     assert_ne!(id(&|a| a.workload.illumination.lights.truncate(3)), same);
     assert_ne!(id(&|a| a.workload.illumination.environment = Environment::default()), same);
     assert_eq!((assignment().set_content(3), assignment().sample_set_id(3)), (None, None));
@@ -84,6 +85,15 @@ fn set_content_differs_where_and_only_where_a_set_shows_something_else() {
     let contents: Vec<_> = (0..8).map(|set_index| refined.set_content(set_index).unwrap()).collect();
     assert!((0..3).all(|i| !contents[i + 1..].contains(&contents[i])), "each step is another");
     assert!(contents[3..].iter().all(|content| *content == contents[3]), "the last stays");
+}
+
+#[test]
+fn images_with_light_serve_only_methods_that_need_light() {
+    let color = SamplePlanes { normals: true, ..SamplePlanes::default() };
+    let light = SamplePlanes { light: true, ..color };
+    assert!(color.contain(SamplePlanes::default()) && color.contain(color) && light.contain(light));
+    assert!(light.contain(SamplePlanes { normals: false, ..light }));
+    assert!(!light.contain(color) && !light.contain(SamplePlanes::default()) && !color.contain(light));
 }
 
 #[test]
@@ -346,7 +356,7 @@ fn only_mirror_cells_have_single_poles_and_each_has_one_model() {
     assert_eq!(with(&[6]), None);
     // Planes of quads are those of view cells: no ray off a mirror reads them.
     let mut plan = with_mirrors();
-    plan.workload.planes = SamplePlanes { normals: true, corner_inverse_depths: true };
+    plan.workload.planes = SamplePlanes { normals: true, corner_inverse_depths: true, light: true };
     let planes = |cell: usize| plan.workload.of_cell(cell).map(|workload| workload.planes);
     assert_eq!([planes(0), planes(3)], [Some(plan.workload.planes), Some(SamplePlanes::default())]);
     for mixed in [4, 5] {

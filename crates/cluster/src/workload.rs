@@ -29,7 +29,7 @@ pub struct Workload {
     pub sampling: String,
     /// How samples are lit.
     pub lighting: String,
-    /// The planes of images beside colour and inverse depth. Views may be made by every method that needs no others.
+    /// The planes of images beside inverse depth and colour, or light in place of colour. Views may be made by every method that needs no others.
     pub planes: SamplePlanes,
     /// The bounds of reconstruction.
     pub volume: Aabb,
@@ -50,13 +50,18 @@ pub struct SamplePlanes {
     pub normals: bool,
     /// Inverse depth at the corners of texels.
     pub corner_inverse_depths: bool,
+    /// Light in place of colour, for views that take surfaces from the scene.
+    pub light: bool,
 }
 
 impl SamplePlanes {
-    /// Whether images with these planes have all of `needed`.
+    /// Whether images with these planes have all of `needed`. Images with light have no colour, and serve only methods that
+    /// need light.
     #[must_use]
     pub fn contain(self, needed: Self) -> bool {
-        (self.normals || !needed.normals) && (self.corner_inverse_depths || !needed.corner_inverse_depths)
+        self.light == needed.light
+            && (self.normals || !needed.normals)
+            && (self.corner_inverse_depths || !needed.corner_inverse_depths)
     }
 }
 

@@ -99,6 +99,7 @@ fn black(plane: &[f32], width: u32, height: u32) -> DepthImage {
         specular: None,
         passed: None,
         corner_inverse_depth_per_m: None,
+        light: None,
     }
 }
 

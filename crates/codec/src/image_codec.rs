@@ -1,7 +1,7 @@
 //! A depth image to header and payload, and back.
 
 use bytes::Bytes;
-use depth_image::{Camera, DepthImage, DepthImageError, SpecularPlanes, SurfaceId};
+use depth_image::{Camera, DepthImage, DepthImageError, LightPlanes, SpecularPlanes, SurfaceId};
 use glam::UVec2;
 
 use crate::color_codec::{pack_colors, unpack_colors};
@@ -23,33 +23,19 @@ pub struct EncodedImage {
 }
 
 /// Packs an image. Inverse depth is quantised to 16 bits over the image's range. Other planes are kept to the bit at
-/// samples, and decode to zeros at texels without one.
+/// samples, and decode to zeros at texels without one. An image with light is encoded with all of its planes but surface
+/// keys.
 ///
 /// # Errors
-/// Planes that are not of the camera's size; planes of highlights without normals.
+/// Planes that do not form an image; planes of highlights without normals.
 pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<EncodedImage, DepthImageError> {
     image.validate()?;
-    let specular = image.specular.as_ref().filter(|_| planes.specular);
-    if specular.is_some() && image.normal_oct16.is_none() {
-        return Err(DepthImageError { plane: "normal", len: 0, expected: image.inverse_depth_per_m.len() });
-    }
     let depth = encode_depth(&image.inverse_depth_per_m);
-    let runs = &depth.runs;
     let mut packer = Packer::default();
     packer.push(PlaneKind::InverseDepth, &depth.bytes);
-    packer.write(PlaneKind::ColorRgb9e5, |out| pack_colors(&runs.gather(&image.color_rgb9e5), out));
-    if let Some(normals) = image.normal_oct16.as_ref().filter(|_| planes.normal || specular.is_some()) {
-        packer.write(PlaneKind::NormalOct16, |out| pack_words(&runs.gather(normals), WordLayout::Halves, out));
-    }
-    if let Some(ids) = image.surface_id.as_ref().filter(|_| planes.surface_id) {
-        packer.write(PlaneKind::SurfaceId, |out| pack_surface_ids(&runs.gather(ids), out));
-    }
-    if let Some(specular) = specular {
-        let mut write = |kind, plane: &[u32]| {
-            packer.write(kind, |out| pack_words(&runs.gather(plane), WordLayout::Bytes, out));
-        };
-        write(PlaneKind::ReflectanceRoughness8, &specular.reflectance_srgb8_roughness8);
-        specular.visibility8.iter().for_each(|visibility| write(PlaneKind::Visibility8, visibility));
+    match &image.light {
+        Some(light) => pack_light(image, light, &depth.runs, &mut packer),
+        None => pack_color(image, planes, &depth.runs, &mut packer)?,
     }
     if let Some(passed) = &image.passed {
         packer.push(PlaneKind::Passed1, &pack_bits(passed));
@@ -68,6 +54,45 @@ pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<Encode
         },
         payload: packer.payload.into(),
     })
+}
+
+/// Packs colour, and what a method or highlights need beside it.
+fn pack_color(image: &DepthImage, planes: PlaneSet, runs: &Runs, packer: &mut Packer) -> Result<(), DepthImageError> {
+    let specular = image.specular.as_ref().filter(|_| planes.specular);
+    if specular.is_some() && image.normal_oct16.is_none() {
+        return Err(DepthImageError::Size { plane: "normal", len: 0, expected: image.inverse_depth_per_m.len() });
+    }
+    packer.write(PlaneKind::ColorRgb9e5, |out| pack_colors(&runs.gather(&image.color_rgb9e5), out));
+    if let Some(normals) = image.normal_oct16.as_ref().filter(|_| planes.normal || specular.is_some()) {
+        packer.write(PlaneKind::NormalOct16, |out| pack_words(&runs.gather(normals), WordLayout::Halves, out));
+    }
+    if let Some(ids) = image.surface_id.as_ref().filter(|_| planes.surface_id) {
+        packer.write(PlaneKind::SurfaceId, |out| pack_surface_ids(&runs.gather(ids), out));
+    }
+    if let Some(specular) = specular {
+        let mut write = |kind, plane: &[u32]| {
+            packer.write(kind, |out| pack_words(&runs.gather(plane), WordLayout::Bytes, out));
+        };
+        write(PlaneKind::ReflectanceRoughness8, &specular.reflectance_srgb8_roughness8);
+        specular.visibility8.iter().for_each(|visibility| write(PlaneKind::Visibility8, visibility));
+    }
+    Ok(())
+}
+
+/// Packs light and both normals, of an image that has passed its validation.
+fn pack_light(image: &DepthImage, light: &LightPlanes, runs: &Runs, packer: &mut Packer) {
+    let write_changes = |packer: &mut Packer, kind, plane: &[u32]| {
+        packer.write(kind, |out| pack_colors(&runs.gather(plane), out));
+    };
+    write_changes(packer, PlaneKind::TriangleNormalOct16, &light.triangle_normal_oct16);
+    if let Some(normals) = &image.normal_oct16 {
+        packer.write(PlaneKind::NormalOct16, |out| pack_words(&runs.gather(normals), WordLayout::Halves, out));
+    }
+    write_changes(packer, PlaneKind::LampsRgb9e5, &light.lamps_rgb9e5);
+    write_changes(packer, PlaneKind::EnvironmentRgb9e5, &light.environment_rgb9e5);
+    for share in &light.share8 {
+        packer.write(PlaneKind::LightShare8, |out| pack_words(&runs.gather(share), WordLayout::Bytes, out));
+    }
 }
 
 /// Unpacks an image. The camera must have passed its own validation.
@@ -98,6 +123,7 @@ pub fn decode_depth_image(
         specular: None,
         passed: None,
         corner_inverse_depth_per_m: None,
+        light: None,
     };
     for plane in others {
         decode_plane(plane, &mut packed, &runs, header.corners(), &mut image)?;
@@ -177,6 +203,10 @@ fn decode_plane(
         PlaneKind::ReflectanceRoughness8 | PlaneKind::Visibility8 => {
             put_specular(&mut image.specular, plane.kind, words(&mut input, WordLayout::Bytes)?);
         }
+        PlaneKind::TriangleNormalOct16 | PlaneKind::LampsRgb9e5 | PlaneKind::EnvironmentRgb9e5 => {
+            put_light(&mut image.light, plane.kind, runs.scatter(&unpack_colors(&mut input, samples)?, 0));
+        }
+        PlaneKind::LightShare8 => put_light(&mut image.light, plane.kind, words(&mut input, WordLayout::Bytes)?),
         PlaneKind::Passed1 => {
             let texels = image.inverse_depth_per_m.len();
             let bits = take(&mut input, texels.div_ceil(8))?;
@@ -198,6 +228,17 @@ pub(crate) fn put_specular(specular: &mut Option<SpecularPlanes>, kind: PlaneKin
     match kind {
         PlaneKind::ReflectanceRoughness8 => specular.reflectance_srgb8_roughness8 = words,
         _ => specular.visibility8.push(words),
+    }
+}
+
+/// Adds a plane of light.
+fn put_light(light: &mut Option<LightPlanes>, kind: PlaneKind, words: Vec<u32>) {
+    let light = light.get_or_insert_default();
+    match kind {
+        PlaneKind::TriangleNormalOct16 => light.triangle_normal_oct16 = words,
+        PlaneKind::LampsRgb9e5 => light.lamps_rgb9e5 = words,
+        PlaneKind::EnvironmentRgb9e5 => light.environment_rgb9e5 = words,
+        _ => light.share8.push(words),
     }
 }
 

@@ -5,7 +5,7 @@ use glam::{UVec2, Vec3};
 
 use super::*;
 use crate::{
-    InverseDepthRange, PlaneEncoding,
+    InverseDepthRange, MAX_LIGHT_SHARE_PLANES, PlaneEncoding,
     test_planes::{Random, tree_over_terrain},
 };
 
@@ -34,6 +34,7 @@ fn image(width: u32, height: u32) -> DepthImage {
         specular: None,
         passed: None,
         corner_inverse_depth_per_m: None,
+        light: None,
     }
 }
 
@@ -48,6 +49,23 @@ fn shiny(width: u32, height: u32, visibilities: usize) -> DepthImage {
     let reflectance_srgb8_roughness8 = plane();
     let visibility8 = (0..visibilities).map(|_| plane()).collect();
     DepthImage { specular: Some(SpecularPlanes { reflectance_srgb8_roughness8, visibility8 }), ..image }
+}
+
+/// An image with light in place of colour, and a number of planes of shares.
+fn lit(width: u32, height: u32, shares: usize) -> DepthImage {
+    let mut random = Random::new(30);
+    let image = image(width, height);
+    let mut plane = || {
+        let word = |&inverse: &f32| if inverse > 0.0 { random.next_u32() } else { 0 };
+        image.inverse_depth_per_m.iter().map(word).collect::<Vec<_>>()
+    };
+    let light = LightPlanes {
+        triangle_normal_oct16: plane(),
+        lamps_rgb9e5: plane(),
+        environment_rgb9e5: plane(),
+        share8: (0..shares).map(|_| plane()).collect(),
+    };
+    DepthImage { color_rgb9e5: Vec::new(), surface_id: None, light: Some(light), ..image }
 }
 
 fn decode(image: &EncodedImage) -> Result<DepthImage, DecodeError> {
@@ -125,6 +143,27 @@ fn damaged_planes_of_images_apart_are_refused() {
 }
 
 #[test]
+fn images_with_light_survive_with_all_of_their_planes() {
+    for (width, height, shares) in [(1, 1, 1), (7, 3, 0), (160, 120, 2), (20, 20, MAX_LIGHT_SHARE_PLANES)] {
+        let passed = apart(width, height).passed;
+        for image in [lit(width, height, shares), DepthImage { passed, ..lit(width, height, shares) }] {
+            let encoded = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+            let back = decode(&encoded).expect("own encoding");
+            let half_step = encoded.header.inverse_depth_range.step_per_m() as f32 * 0.505;
+            for (&was, &is) in image.inverse_depth_per_m.iter().zip(&back.inverse_depth_per_m) {
+                assert!((was - is).abs() <= half_step && (was > 0.0 || was == is));
+            }
+            let inverse_depth_per_m = back.inverse_depth_per_m.clone();
+            assert_eq!(back, DepthImage { inverse_depth_per_m, ..image.clone() });
+            // All of their planes are needed, but for surface keys, which stay with the sampler.
+            let id = SurfaceId { instance: 1, primitive: 2 };
+            let with_keys = DepthImage { surface_id: Some(vec![id; image.inverse_depth_per_m.len()]), ..image };
+            assert_eq!(encode_depth_image(&with_keys, PlaneSet::DEPTH_COLOR), Ok(encoded));
+        }
+    }
+}
+
+#[test]
 fn planes_are_encoded_only_on_request() {
     let encoded = encode_depth_image(&image(20, 20), PlaneSet::DEPTH_COLOR).expect("consistent planes");
     let back = decode(&encoded).expect("own encoding");
@@ -173,6 +212,9 @@ fn inconsistent_planes_are_refused() {
     let mut bad = shiny(20, 20, 2);
     bad.specular.as_mut().expect("made so").visibility8[1].pop();
     assert!(encode_depth_image(&bad, PlaneSet::ALL).is_err());
+    let bad = DepthImage { color_rgb9e5: vec![0; 400], ..lit(20, 20, 2) };
+    let error = encode_depth_image(&bad, PlaneSet::ALL).expect_err("colour and light").to_string();
+    assert!(error.contains("has the plane color"), "{error}");
     let bad = DepthImage { normal_oct16: None, ..shiny(20, 20, 2) };
     let error = encode_depth_image(&bad, PlaneSet::ALL).expect_err("no normals").to_string();
     assert!(error.contains("plane normal has 0"), "{error}");
@@ -189,17 +231,19 @@ fn assert_sound(result: Result<DepthImage, DecodeError>) {
 
 #[test]
 fn damaged_payloads_never_panic() {
-    let good = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
     let mut random = Random::new(10);
-    for _ in 0..6000 {
-        let mut bad = good.clone();
-        let mut payload = good.payload.to_vec();
-        for _ in 0..1 + random.below(4) {
-            let at = random.below(payload.len());
-            payload[at] ^= 1 << random.below(8);
+    for image in [shiny(48, 32, 2), lit(48, 32, 2)] {
+        let good = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+        for _ in 0..6000 {
+            let mut bad = good.clone();
+            let mut payload = good.payload.to_vec();
+            for _ in 0..1 + random.below(4) {
+                let at = random.below(payload.len());
+                payload[at] ^= 1 << random.below(8);
+            }
+            bad.payload = payload.into();
+            assert_sound(decode(&bad));
         }
-        bad.payload = payload.into();
-        assert_sound(decode(&bad));
     }
 }
 
@@ -239,14 +283,16 @@ fn damaged_words_behind_a_sound_lz4_never_panic() {
 
 #[test]
 fn cut_and_random_payloads_are_refused() {
-    let good = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
-    for length in 0..good.payload.len() {
-        assert!(decode(&EncodedImage { payload: good.payload.slice(..length), ..good.clone() }).is_err());
-    }
     let mut random = Random::new(12);
-    for _ in 0..2000 {
-        let payload: Vec<u8> = (0..good.payload.len()).map(|_| random.next_u32() as u8).collect();
-        assert_sound(decode(&EncodedImage { payload: payload.into(), ..good.clone() }));
+    for image in [shiny(48, 32, 2), lit(48, 32, 2)] {
+        let good = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+        for length in 0..good.payload.len() {
+            assert!(decode(&EncodedImage { payload: good.payload.slice(..length), ..good.clone() }).is_err());
+        }
+        for _ in 0..2000 {
+            let payload: Vec<u8> = (0..good.payload.len()).map(|_| random.next_u32() as u8).collect();
+            assert_sound(decode(&EncodedImage { payload: payload.into(), ..good.clone() }));
+        }
     }
 }
 
@@ -309,6 +355,63 @@ fn planes_of_highlights_out_of_order_are_refused() {
         let error = decode(&bad).expect_err(name).to_string();
         assert!(error.contains(name), "{name}: {error}");
     }
+}
+
+#[test]
+fn planes_of_light_out_of_order_are_refused() {
+    let good = encode_depth_image(&lit(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
+    let kinds: Vec<_> = good.header.planes.iter().map(|plane| plane.kind).collect();
+    assert_eq!(
+        kinds,
+        [
+            PlaneKind::InverseDepth,
+            PlaneKind::TriangleNormalOct16,
+            PlaneKind::NormalOct16,
+            PlaneKind::LampsRgb9e5,
+            PlaneKind::EnvironmentRgb9e5,
+            PlaneKind::LightShare8,
+            PlaneKind::LightShare8
+        ]
+    );
+    let other = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
+    let color_and_highlights = [1, 4, 5].map(|place: usize| other.header.planes[place]);
+    type Damage = fn(&mut Vec<PlaneHeader>, &[PlaneHeader; 3]);
+    let cases: [(&str, Damage); 15] = [
+        ("must begin with inverse depth", |p, _| drop(p.remove(0))),
+        ("must begin with inverse depth, normals of triangles", |p, _| drop(p.remove(1))),
+        ("must begin with inverse depth", |p, _| drop(p.remove(2))),
+        ("must begin with inverse depth", |p, _| drop(p.remove(3))),
+        ("must begin with inverse depth", |p, _| p.truncate(4)),
+        ("must begin with inverse depth", |p, _| p.swap(1, 2)),
+        ("must begin with inverse depth", |p, _| p.swap(3, 4)),
+        ("must begin with inverse depth", |p, color| p.insert(1, color[0])),
+        ("repeated or out of order", |p, _| p.push(p[4])),
+        ("not of an image with light", |p, color| p.push(color[0])),
+        ("not of an image with light", |p, color| p.extend(&color[1..])),
+        ("planes.light_share8 is 6", |p, _| p.extend([p[6]; 4])),
+        ("planes.encoding", |p, _| p[1].encoding = PlaneEncoding::DifferenceTaggedLz4),
+        ("planes.raw_bytes", |p, _| p[3].raw_bytes = u32::MAX),
+        ("planes.raw_bytes", |p, _| p[6].raw_bytes = u32::MAX),
+    ];
+    for (number, (name, damage)) in cases.into_iter().enumerate() {
+        let mut bad = good.clone();
+        damage(&mut bad.header.planes, &color_and_highlights);
+        let error = decode(&bad).expect_err(name).to_string();
+        assert!(error.contains(name), "case {number}, {name}: {error}");
+    }
+    let mut beside_color = other;
+    beside_color.header.planes.push(good.header.planes[5]);
+    let error = decode(&beside_color).expect_err("a plane of light beside colour").to_string();
+    assert!(error.contains("must begin with inverse depth, normals of triangles"), "{error}");
+}
+
+#[test]
+fn planes_of_light_claim_bounded_memory() {
+    let mut bad = encode_depth_image(&lit(48, 32, MAX_LIGHT_SHARE_PLANES), PlaneSet::ALL).expect("consistent planes");
+    (bad.header.width, bad.header.height) = (4096, 4096);
+    let limits = DecodeLimits { max_image_bytes: 37 << 24, ..DecodeLimits::default() };
+    let result = decode_depth_image(&bad.header, camera(4096, 4096), &bad.payload, &limits);
+    assert!(matches!(result, Err(DecodeError::Limit { field: "image_bytes", .. })), "{result:?}");
 }
 
 #[test]

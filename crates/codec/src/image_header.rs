@@ -2,7 +2,7 @@
 
 use std::hash::Hasher;
 
-use depth_image::{MAX_LAYERS, MAX_LIGHTS, SpecularPlanes};
+use depth_image::{LightPlanes, MAX_LAYERS, MAX_LIGHTS, SpecularPlanes};
 
 use crate::color_codec::max_colors_bytes;
 use crate::depth_codec::max_unpacked_bytes;
@@ -14,12 +14,15 @@ use crate::{DecodeError, DecodeLimits, InverseDepthRange};
 /// Planes of visibility of one sample image: one byte for the environment and each light.
 pub const MAX_VISIBILITY_PLANES: usize = SpecularPlanes::visibility_planes(MAX_LIGHTS);
 
+/// Planes of arriving shares of one sample image with light.
+pub const MAX_LIGHT_SHARE_PLANES: usize = LightPlanes::share_planes(MAX_LIGHTS);
+
 /// The content of a plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PlaneKind {
     /// 16-bit codes of inverse depth, with background and holes. Always the first plane.
     InverseDepth,
-    /// RGB9E5, linear. Always the second plane.
+    /// RGB9E5, linear. Always the second plane of an image without light.
     ColorRgb9e5,
     /// Octahedral normals.
     NormalOct16,
@@ -39,7 +42,24 @@ pub enum PlaneKind {
     LayerDepth,
     /// Octahedral normals of triangles. Always the third plane of a layered image.
     PlaneNormalOct8,
+    /// Octahedral normals of triangles. Always the second plane of an image with light; normals follow.
+    TriangleNormalOct16,
+    /// What a white surface reflects of lamps, RGB9E5, linear. Always the fourth plane of an image with light.
+    LampsRgb9e5,
+    /// What a white surface reflects of the environment, RGB9E5, linear. Always the fifth plane of an image with light.
+    EnvironmentRgb9e5,
+    /// The arriving shares of four lights. Only images with light have such planes, up to [`MAX_LIGHT_SHARE_PLANES`].
+    LightShare8,
 }
+
+/// The planes with which an image with light begins.
+const FIRST_LIGHT_PLANES: [PlaneKind; 5] = [
+    PlaneKind::InverseDepth,
+    PlaneKind::TriangleNormalOct16,
+    PlaneKind::NormalOct16,
+    PlaneKind::LampsRgb9e5,
+    PlaneKind::EnvironmentRgb9e5,
+];
 
 /// How a plane is packed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -61,13 +81,17 @@ impl PlaneKind {
         match self {
             Self::InverseDepth | Self::CornerInverseDepth | Self::LayerDepth => PlaneEncoding::SlopeTaggedLz4,
             Self::Passed1 => PlaneEncoding::BitsLz4,
-            Self::ColorRgb9e5 => PlaneEncoding::ChangeTaggedLz4,
+            // Normals of triangles change as seldom as unlit colours do.
+            Self::ColorRgb9e5 | Self::TriangleNormalOct16 | Self::LampsRgb9e5 | Self::EnvironmentRgb9e5 => {
+                PlaneEncoding::ChangeTaggedLz4
+            }
             Self::NormalOct16
             | Self::SurfaceId
             | Self::ReflectanceRoughness8
             | Self::Visibility8
             | Self::LayerCount8
-            | Self::PlaneNormalOct8 => PlaneEncoding::DifferenceTaggedLz4,
+            | Self::PlaneNormalOct8
+            | Self::LightShare8 => PlaneEncoding::DifferenceTaggedLz4,
         }
     }
 
@@ -85,7 +109,16 @@ impl PlaneKind {
             Self::LayerCount8 => "layer_count8",
             Self::LayerDepth => "layer_depth",
             Self::PlaneNormalOct8 => "plane_normal_oct8",
+            Self::TriangleNormalOct16 => "triangle_normal_oct16",
+            Self::LampsRgb9e5 => "lamps_rgb9e5",
+            Self::EnvironmentRgb9e5 => "environment_rgb9e5",
+            Self::LightShare8 => "light_share8",
         }
+    }
+
+    /// Whether only images with light have planes of this kind.
+    const fn belongs_to_light(self) -> bool {
+        matches!(self, Self::TriangleNormalOct16 | Self::LampsRgb9e5 | Self::EnvironmentRgb9e5 | Self::LightShare8)
     }
 
     /// Bytes of one texel or sample before any packing; of a line for its number of samples.
@@ -94,6 +127,7 @@ impl PlaneKind {
             Self::InverseDepth | Self::CornerInverseDepth | Self::PlaneNormalOct8 => 2,
             Self::Passed1 => 1,
             Self::ColorRgb9e5 | Self::NormalOct16 | Self::ReflectanceRoughness8 | Self::Visibility8 => 4,
+            Self::TriangleNormalOct16 | Self::LampsRgb9e5 | Self::EnvironmentRgb9e5 | Self::LightShare8 => 4,
             Self::SurfaceId => 8,
             // The first sample's number and the depth, unpacked.
             Self::LayerCount8 | Self::LayerDepth => 4,
@@ -113,10 +147,14 @@ impl PlaneKind {
     const fn max_raw_bytes(self, values: usize) -> usize {
         match self {
             Self::InverseDepth => max_unpacked_bytes(values),
-            Self::ColorRgb9e5 => max_colors_bytes(values),
+            Self::ColorRgb9e5 | Self::TriangleNormalOct16 | Self::LampsRgb9e5 | Self::EnvironmentRgb9e5 => {
+                max_colors_bytes(values)
+            }
             Self::NormalOct16 => max_words_bytes(values, WordLayout::Halves),
             Self::SurfaceId => 2 * max_words_bytes(values, WordLayout::Whole),
-            Self::ReflectanceRoughness8 | Self::Visibility8 => max_words_bytes(values, WordLayout::Bytes),
+            Self::ReflectanceRoughness8 | Self::Visibility8 | Self::LightShare8 => {
+                max_words_bytes(values, WordLayout::Bytes)
+            }
             Self::Passed1 => values.div_ceil(8),
             Self::CornerInverseDepth => CORNER_RANGE_BYTES + max_unpacked_bytes(values),
             Self::LayerCount8 | Self::LayerDepth => max_numbers_bytes(values),
@@ -156,7 +194,8 @@ pub struct PlaneHeader {
     pub packed_bytes: u32,
 }
 
-/// The planes that are encoded besides inverse depth and colour.
+/// The planes that are encoded besides inverse depth and colour. Images with light are encoded with all of their planes but
+/// surface keys, whatever the set says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct PlaneSet {
     /// Octahedral normals, where the image has them.
@@ -222,12 +261,17 @@ impl ImageHeader {
         Ok(texels)
     }
 
-    /// Depth and colour, or counts, depths, normals of triangles (but of a light field) and colour; then \[normal\], \[surface id\],
+    /// Depth and light, or depth and colour, or counts, depths, normals of triangles (but of a light field) and colour; then \[normal\], \[surface id\],
     /// \[reflectance, visibility*\], \[passed\], \[corners\]; reflectance only with normals.
     fn validate_kinds(&self) -> Result<(), DecodeError> {
         use PlaneKind::{ColorRgb9e5, InverseDepth, LayerCount8, LayerDepth, PlaneNormalOct8};
         let error = |reason| Err(DecodeError::Header { field: "planes.kind", reason });
         let kinds: Vec<_> = self.planes.iter().map(|plane| plane.kind).collect();
+        match kinds.iter().any(|kind| kind.belongs_to_light()) {
+            true if self.layered.is_some() => return error("of depth images alone"),
+            true => return validate_light_kinds(&kinds),
+            false => {}
+        }
         let (first, reason): (&[PlaneKind], _) = match self.layered {
             None => (&[InverseDepth, ColorRgb9e5], "must begin with inverse depth and colour"),
             // A light field has its own direction for a normal.
@@ -287,6 +331,20 @@ impl ImageHeader {
         }
         hasher.finalize()
     }
+}
+
+/// The planes of [`FIRST_LIGHT_PLANES`], then \[share*\], \[passed\].
+fn validate_light_kinds(kinds: &[PlaneKind]) -> Result<(), DecodeError> {
+    let error = |reason| Err(DecodeError::Header { field: "planes.kind", reason });
+    let Some(rest) = kinds.strip_prefix(&FIRST_LIGHT_PLANES) else {
+        return error("must begin with inverse depth, normals of triangles, normals, lamps and environment");
+    };
+    let (shares, rest) = leading(rest, PlaneKind::LightShare8);
+    let (passed, rest) = leading(rest, PlaneKind::Passed1);
+    if !rest.is_empty() || passed > 1 {
+        return error("repeated or out of order, or not of an image with light");
+    }
+    check_limit("planes.light_share8", shares as u64, MAX_LIGHT_SHARE_PLANES as u64)
 }
 
 /// The count of planes of a kind at the front, and the planes that follow.

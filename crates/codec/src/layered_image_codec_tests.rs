@@ -104,7 +104,7 @@ fn damaged_payloads_never_panic() {
 fn damaged_headers_are_refused_by_field() {
     let good = encode_layered_image(&image(40, 20, true)).unwrap();
     type Damage = fn(&mut ImageHeader);
-    let cases: [(&str, Damage); 13] = [
+    let cases: [(&str, Damage); 14] = [
         ("inverse_depth_range", |h| {
             h.inverse_depth_range = InverseDepthRange { least_per_m: 0.1, greatest_per_m: 1.0 }
         }),
@@ -116,6 +116,7 @@ fn damaged_headers_are_refused_by_field() {
         ("must begin with those of a layered", |h| h.planes.swap(0, 1)),
         ("must begin with those of a layered", |h| h.planes.clear()),
         ("of depth images alone", |h| h.planes.push(PlaneHeader { kind: PlaneKind::Passed1, ..h.planes[0] })),
+        ("of depth images alone", |h| h.planes.push(PlaneHeader { kind: PlaneKind::LightShare8, ..h.planes[0] })),
         ("out of order", |h| h.planes.push(h.planes[4])),
         ("planes.encoding", |h| h.planes[1].encoding = PlaneEncoding::DifferenceTaggedLz4),
         ("planes.raw_bytes", |h| h.planes[2].raw_bytes = u32::MAX),

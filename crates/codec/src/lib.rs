@@ -42,7 +42,8 @@ pub use frame_header::{FrameHeader, MAX_FRAME_BYTES, StageTimes};
 pub use frame_parts::{FrameAssembly, FrameAssemblyError, FramePart, WholeFrame};
 pub use image_codec::{EncodedImage, decode_depth_image, encode_depth_image};
 pub use image_header::{
-    ImageHeader, LayeredCounts, MAX_VISIBILITY_PLANES, PlaneEncoding, PlaneHeader, PlaneKind, PlaneSet,
+    ImageHeader, LayeredCounts, MAX_LIGHT_SHARE_PLANES, MAX_VISIBILITY_PLANES, PlaneEncoding, PlaneHeader, PlaneKind,
+    PlaneSet,
 };
 pub use layered_image_codec::{decode_layered_image, encode_layered_image};
 pub use light_field_codec::{decode_light_field, encode_light_field};

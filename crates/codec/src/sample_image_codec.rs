@@ -20,7 +20,7 @@ pub enum EncodeError {
 /// Packs an image with all of its planes.
 ///
 /// # Errors
-/// Planes that are not of the camera's size; planes of highlights without normals.
+/// Planes that do not form an image; planes of highlights without normals.
 pub fn encode_sample_image(image: &SampleImage) -> Result<EncodedImage, EncodeError> {
     Ok(match image {
         SampleImage::Depth(image) => encode_depth_image(image, PlaneSet::ALL)?,

@@ -46,7 +46,10 @@ pub use encoding::{
 pub use environment_light::{BrightTexel, EnvironmentLight, LOBE_ROUGHNESS, LOBE_SIZE_PX, Lobe};
 pub use environment_map::{EnvironmentMap, EnvironmentMapError, MAX_ENVIRONMENT_SIZE_PX};
 pub use highlight::{Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS, ROUGHEST_MIRROR, Reflector};
-pub use image::{BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, LightPlanes, MAX_LAMP_SHARES, HOLE_INVERSE_DEPTH, SpecularPlanes, SurfaceId};
+pub use image::{
+    BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, LightPlanes, MAX_LAMP_SHARES,
+    SpecularPlanes, SurfaceId,
+};
 pub use layered::{LayeredDepthImage, LayeredError, MAX_LAYERS};
 pub use light::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
 pub use light_cache::{LightCacheQuality, UnknownQuality};

@@ -4,7 +4,7 @@ use glam::UVec2;
 
 use crate::{
     Camera, DepthImage, DepthImageError, LayeredDepthImage, LayeredError, LayeredLightField, LightFieldCamera,
-    ParallelCamera, SampleCamera, SpecularPlanes, ViewPart,
+    LightPlanes, ParallelCamera, SampleCamera, SpecularPlanes, ViewPart,
 };
 
 /// Tiles that do not form an image; `tile` counts from the top.
@@ -135,8 +135,8 @@ impl DepthImage {
             normal_oct16: filled(&tiles, texel_count, |tile| tile.normal_oct16.as_deref()),
             passed: filled(&tiles, texel_count, |tile| tile.passed.as_deref()),
             specular: specular(&tiles)?,
-            light: None,
             corner_inverse_depth_per_m: corners.map(|_| shared_corners(&tiles)),
+            light: light(&tiles)?,
         })
     }
 }
@@ -180,6 +180,28 @@ fn texel_count(tile: &DepthImage) -> usize {
 fn specular(tiles: &[DepthImage]) -> Result<Option<SpecularPlanes>, TileError> {
     let specular = tiles.iter().map(|tile| (texel_count(tile), tile.specular.as_ref()));
     specular_of(specular.collect()).ok_or(TileError::Mixed { plane: "visibility" })
+}
+
+/// Joins the planes of light. No tile has colour beside another's light, and all have shares of the same lamps.
+fn light(tiles: &[DepthImage]) -> Result<Option<LightPlanes>, TileError> {
+    let lights: Vec<&LightPlanes> = tiles.iter().filter_map(|tile| tile.light.as_ref()).collect();
+    let Some(first) = lights.first() else { return Ok(None) };
+    if lights.len() < tiles.len() {
+        return Err(TileError::Mixed { plane: "light" });
+    }
+    let share_count = first.share8.len();
+    if lights.iter().any(|light| light.share8.len() != share_count) {
+        return Err(TileError::Mixed { plane: "share" });
+    }
+    let concat = |plane: &dyn Fn(&LightPlanes) -> &[u32]| -> Vec<u32> {
+        lights.iter().flat_map(|light| plane(light).iter().copied()).collect()
+    };
+    Ok(Some(LightPlanes {
+        triangle_normal_oct16: concat(&|light| &light.triangle_normal_oct16),
+        lamps_rgb9e5: concat(&|light| &light.lamps_rgb9e5),
+        environment_rgb9e5: concat(&|light| &light.environment_rgb9e5),
+        share8: (0..share_count).map(|number| concat(&|light| &light.share8[number])).collect(),
+    }))
 }
 
 /// Joins the inputs of highlights of tiles, whose lengths are known. A tile without highlights has no visibility either. `None` for

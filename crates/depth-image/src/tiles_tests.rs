@@ -29,7 +29,51 @@ fn image(camera: Camera) -> DepthImage {
         }),
         passed: Some(plane.iter().map(|v| v.to_bits() & 1 == 1).collect()),
         corner_inverse_depth_per_m: Some(texels(camera.size_px() + 1).map(corner).collect()),
+        light: None,
     }
+}
+
+/// An image with light in place of colour, whose texels encode their rays, too.
+fn lit_image(camera: Camera) -> DepthImage {
+    let image = image(camera);
+    let plane = |mask: u32| image.color_rgb9e5.iter().map(|word| word ^ mask).collect::<Vec<_>>();
+    let light = LightPlanes {
+        triangle_normal_oct16: plane(4),
+        lamps_rgb9e5: plane(5),
+        environment_rgb9e5: plane(6),
+        share8: vec![plane(7), plane(8)],
+    };
+    DepthImage {
+        color_rgb9e5: Vec::new(),
+        specular: None,
+        corner_inverse_depth_per_m: None,
+        light: Some(light),
+        ..image
+    }
+}
+
+#[test]
+fn joined_tiles_with_light_equal_the_image() {
+    let whole = lit_image(camera());
+    for count in 1..=11 {
+        let tiles: Vec<_> = (0..count).map(|tile| lit_image(camera().tile(tile, count))).collect();
+        assert_eq!(DepthImage::from_tiles(camera(), tiles).expect("they fit"), whole, "{count} tiles");
+    }
+}
+
+#[test]
+fn tiles_that_mix_light_and_colour_or_numbers_of_lamps_are_refused() {
+    let tiles = || (0..3).map(|tile| lit_image(camera().tile(tile, 3))).collect::<Vec<_>>();
+    let mut mixed = tiles();
+    mixed[1] = image(camera().tile(1, 3));
+    mixed[1].corner_inverse_depth_per_m = None;
+    assert_eq!(DepthImage::from_tiles(camera(), mixed), Err(TileError::Mixed { plane: "light" }));
+    let mut of_fewer_lamps = tiles();
+    of_fewer_lamps[2].light.as_mut().unwrap().share8.pop();
+    assert_eq!(DepthImage::from_tiles(camera(), of_fewer_lamps), Err(TileError::Mixed { plane: "share" }));
+    let mut broken = tiles();
+    broken[1].light.as_mut().unwrap().lamps_rgb9e5.pop();
+    assert!(matches!(DepthImage::from_tiles(camera(), broken), Err(TileError::Planes { tile: 1, .. })));
 }
 
 #[test]

@@ -15,7 +15,8 @@ pub struct Provenance(pub u32);
 pub enum ProvenanceKind {
     /// The ray meets nothing: background.
     Empty,
-    /// A surface visible to at least one sample camera.
+    /// A surface visible to at least one sample camera. In views whose surfaces come from the scene, the surface's light is
+    /// known from these cameras.
     Hit,
     /// A surface that no sample camera saw; its colour comes from the farther side of the gap.
     Filled,
@@ -99,5 +100,27 @@ impl ViewPlanes {
     #[must_use]
     pub fn bytes_per_pixel(self) -> usize {
         3 + 4 * usize::from(self.inverse_depth) + 4 * usize::from(self.provenance)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_survive_packing_and_unknown_codes_count_as_filled() {
+        let kinds = [
+            ProvenanceKind::Empty,
+            ProvenanceKind::Hit,
+            ProvenanceKind::Filled,
+            ProvenanceKind::Guessed,
+            ProvenanceKind::Base,
+            ProvenanceKind::LitHere,
+        ];
+        for (code, kind) in kinds.into_iter().enumerate() {
+            let packed = Provenance::new(kind, 5);
+            assert_eq!((packed.0 & 0xff, packed.kind(), packed.camera_mask()), (code as u32, kind, 5));
+        }
+        assert_eq!(Provenance(6).kind(), ProvenanceKind::Filled);
     }
 }

@@ -7,7 +7,7 @@ use std::sync::{Arc, Weak};
 
 use bands::{BAND_PIXELS, views_in_bands};
 use cluster::{CommonKind, DIRECT, SamplePlanes};
-use depth_image::{Aabb, Camera, SampleCamera, SampleImage, SampleImages, View};
+use depth_image::{Aabb, Camera, DepthImage, SampleCamera, SampleImage, SampleImages, View};
 use gpu::{DevicePreference, Gpu, GpuError};
 use node::{
     CommonSet, DirectWork, Engine, EngineError, OpenEngine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
@@ -18,7 +18,7 @@ use reconstruction::{
     CommonSets, MirrorCell, Mirrors, ReconstructionError, ReconstructionMethod, Reconstructor, RequiredPlanes,
     SetDescription,
 };
-use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, Renderer, Visibility};
+use render::{DrawWork, GpuScene, LightCache, Lighting, Refinement, RenderError, Renderer, Visibility};
 use sampling::{Sampler, SamplingError, SamplingMethod};
 use scene::{Limits, Scene};
 use scene_cache::SceneCache;
@@ -44,7 +44,23 @@ pub struct GpuEngine {
 }
 
 /// A sample set on this engine's device.
-struct Uploaded {
+enum Uploaded {
+    /// Surfaces and colours.
+    Images(UploadedImages),
+    /// Light of surfaces of the scene.
+    Light(UploadedLight),
+}
+
+/// Samples of light, with the scene that they are of.
+struct UploadedLight {
+    cache: LightCache,
+    scene_hash: String,
+    lighting: Lighting,
+    scene_time_s: f32,
+}
+
+/// A set of images, with those of common cells.
+struct UploadedImages {
     set: Arc<reconstruction::SampleSet>,
     /// Mirrors that a ray meets one after the other in this light.
     reflections: u32,
@@ -58,9 +74,15 @@ struct Uploaded {
 impl UploadedSet for Uploaded {}
 
 impl Uploaded {
-    fn of(set: SharedSet) -> Result<Arc<Self>, EngineError> {
-        let any: Arc<dyn Any + Send + Sync> = set;
-        any.downcast().map_err(|_| of_another_device())
+    /// The images of a set of images.
+    fn images(set: &dyn UploadedSet) -> Result<&UploadedImages, EngineError> {
+        match (set as &dyn Any).downcast_ref().ok_or_else(of_another_device)? {
+            Self::Images(images) => Ok(images),
+            Self::Light(_) => Err(invalid(
+                "common_cells",
+                "views that take light from samples have neither mirror cells nor a base; leave out --base",
+            )),
+        }
     }
 }
 
@@ -172,6 +194,42 @@ impl GpuEngine {
     }
 }
 
+impl GpuEngine {
+    fn upload_light(
+        &self,
+        set: &SampleSet,
+        lighting: Lighting,
+        images: &[DepthImage],
+        turn: gpu::Turn,
+    ) -> Result<SharedSet, EngineError> {
+        let scene = self.scene(&set.scene_hash)?;
+        let upload = || self.renderer.upload_light(&scene, lighting, images, turn).map_err(render_error);
+        let cache = self.catching(upload)?;
+        let (scene_hash, scene_time_s) = (set.scene_hash.clone(), set.scene_time_s);
+        Ok(Arc::new(Uploaded::Light(UploadedLight { cache, scene_hash, lighting, scene_time_s })))
+    }
+
+    /// Views whose surfaces come from the scene and whose light comes from samples.
+    fn draw_cached(
+        &self,
+        light: &UploadedLight,
+        method: ReconstructionMethod,
+        work: &ViewWork,
+        turn: Turn,
+    ) -> Result<Vec<View>, EngineError> {
+        let quality = method.light_cache_quality().ok_or_else(|| {
+            invalid("reconstruction_method", format!("the samples have light where {method} needs colour"))
+        })?;
+        let UploadedLight { cache, scene_hash, lighting, scene_time_s } = light;
+        let scene = self.scene(scene_hash)?;
+        let draw = draw_work(&scene, *lighting, *scene_time_s, turn);
+        views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
+            let make = || self.renderer.draw_cached_views(draw, cache, quality, cameras, work.planes);
+            self.catching(|| make().map_err(render_error))
+        })
+    }
+}
+
 fn device_turn(Turn { class, flow }: Turn) -> gpu::Turn {
     let class = match class {
         WorkClass::Live => gpu::WorkClass::Live,
@@ -218,7 +276,8 @@ impl Engine for GpuEngine {
         }
         let method: ReconstructionMethod = parsed("reconstruction_method", method)?;
         let RequiredPlanes { normal, corner_inverse_depth } = method.required_planes();
-        Ok(SamplePlanes { normals: normal, corner_inverse_depths: corner_inverse_depth })
+        let light = method.light_cache_quality().is_some();
+        Ok(SamplePlanes { normals: normal, corner_inverse_depths: corner_inverse_depth, light })
     }
 
     fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
@@ -241,16 +300,20 @@ impl Engine for GpuEngine {
         };
         let method: SamplingMethod = parsed("sampling_method", &request.sampling)?;
         if request.cameras.iter().any(|camera| camera.depth().is_none()) {
+            if request.planes.light {
+                let reason = "light is taken from the images of view cells, not from a layered cube";
+                return Err(invalid("reconstruction_method", reason));
+            }
             return self.sample_cube(request, (draw, mirrored), method);
         }
         let cameras: Vec<Camera> = request.cameras.iter().filter_map(SampleCamera::depth).copied().collect();
-        let SamplePlanes { normals: normal, corner_inverse_depths: corners } = request.planes;
+        let SamplePlanes { normals: normal, corner_inverse_depths: corners, light } = request.planes;
         let work = sampling::SampleWork {
             draw,
             cameras: &cameras,
             wanted: &request.wanted,
             method,
-            planes: render::SamplePlanes { specular: true, normal, corners, ..Default::default() },
+            planes: render::SamplePlanes { specular: true, normal, corners, light, ..Default::default() },
             temporal_reference_s: request.temporal_reference_s,
         };
         let images = self.catching(|| self.sampler.sample(&work).map_err(sampling_error))?;
@@ -259,6 +322,10 @@ impl Engine for GpuEngine {
 
     fn upload(&self, set: &SampleSet, turn: Turn) -> Result<SharedSet, EngineError> {
         let lighting: Lighting = parsed("lighting", &set.lighting)?;
+        let images = set.images.depth();
+        if images.iter().any(|image| image.light.is_some()) {
+            return self.upload_light(set, lighting, images, device_turn(turn));
+        }
         let environment = match set.illumination.environment.is_mapped {
             true => {
                 let map = self.scene(&set.scene_hash)?.environment.clone();
@@ -280,37 +347,40 @@ impl Engine for GpuEngine {
             SampleImages::Cube(cube) => self.reconstructor.upload_cube_in_turn(cube, &description, turn),
         };
         let set = self.catching(|| upload().map_err(reconstruction_error))?;
-        Ok(Arc::new(Uploaded {
+        Ok(Arc::new(Uploaded::Images(UploadedImages {
             set: Arc::new(set),
             reflections: lighting.reflections(),
             glossy_rays: lighting.glossy_rays(),
             mirrors: Vec::new(),
             base: None,
-        }))
+        })))
     }
 
     fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
-        let set = Uploaded::of(set)?;
+        let &UploadedImages { ref set, reflections, glossy_rays, .. } = Uploaded::images(set.as_ref())?;
         let (mut mirrors, mut base) = (Vec::new(), None);
         for (cell, common) in common {
-            let common = Uploaded::of(common)?.set.clone();
+            let common = Uploaded::images(common.as_ref())?.set.clone();
             match cell.kind {
                 CommonKind::Mirrors => mirrors.push((cell.bounds, common)),
                 CommonKind::Base => base = Some(common),
             }
         }
-        let Uploaded { ref set, reflections, glossy_rays, .. } = *set;
-        Ok(Arc::new(Uploaded { set: set.clone(), reflections, glossy_rays, mirrors, base }))
+        let images = UploadedImages { set: set.clone(), reflections, glossy_rays, mirrors, base };
+        Ok(Arc::new(Uploaded::Images(images)))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {
-        let Uploaded { set, reflections, glossy_rays, mirrors, base } =
-            (set as &dyn Any).downcast_ref().ok_or_else(of_another_device)?;
+        let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
+        let images = match (set as &dyn Any).downcast_ref().ok_or_else(of_another_device)? {
+            Uploaded::Images(images) => images,
+            Uploaded::Light(light) => return self.draw_cached(light, method, work, turn),
+        };
+        let UploadedImages { set, reflections, glossy_rays, mirrors, base } = images;
         let cells = mirrors.iter().map(|(bounds, shown)| MirrorCell { bounds: *bounds, surroundings: shown });
         let cells: Vec<MirrorCell<'_>> = cells.collect();
         let mirrors = Mirrors { cells: &cells, reflections: *reflections, glossy_rays: *glossy_rays };
         let common = CommonSets { mirrors, base: base.as_deref() };
-        let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
         let turn = device_turn(turn);
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
             let make = || self.reconstructor.reconstruct_with(set, common, cameras, method, work.planes, turn);
@@ -356,6 +426,7 @@ fn gpu_error(error: GpuError) -> EngineError {
 fn render_error(error: RenderError) -> EngineError {
     match error {
         RenderError::Camera { .. } | RenderError::Model { .. } => invalid("camera", error),
+        RenderError::Samples { .. } => invalid("sample_images", error),
         RenderError::Gpu(error) => gpu_error(error),
         RenderError::Shader(_) => device(error),
     }
@@ -366,12 +437,15 @@ fn reconstruction_error(error: ReconstructionError) -> EngineError {
         ReconstructionError::Camera { .. } => invalid("camera", error),
         ReconstructionError::Sample { .. } | ReconstructionError::SampleCount(_) => invalid("sample_images", error),
         ReconstructionError::Volume => invalid("volume", error),
-        ReconstructionError::NoSamples { .. } => invalid("reconstruction_method", error),
+        ReconstructionError::NoSamples { .. } | ReconstructionError::NoScene { .. } => {
+            invalid("reconstruction_method", error)
+        }
         ReconstructionError::Gpu(error) => gpu_error(error),
         ReconstructionError::Shader(_) | ReconstructionError::MissingPlane { .. } => device(error),
         ReconstructionError::MirrorCells(_) => invalid("common_cells of mirrors", error),
         ReconstructionError::Reflections(_) => invalid("reflections", error),
         ReconstructionError::Model { .. }
+        | ReconstructionError::LightForColor { .. }
         | ReconstructionError::CurvedSearch { .. }
         | ReconstructionError::LightField { .. } => invalid("sample_images", error),
     }

@@ -50,6 +50,7 @@ fn image(camera: &SampleCamera) -> SampleImage {
         specular: Some(SpecularPlanes { reflectance_srgb8_roughness8: vec![9; texels], ..SpecularPlanes::default() }),
         passed: None,
         corner_inverse_depth_per_m: None,
+        light: None,
     }
     .into()
 }

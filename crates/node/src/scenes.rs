@@ -68,19 +68,19 @@ impl Scenes {
     /// The work's own, and those of [`Scenes::ensure`].
     pub async fn on_device<T: Send + 'static>(
         &self,
-        scene: Option<&SceneRef>,
+        scene: &SceneRef,
         work: impl Fn(&dyn Engine) -> Result<T, EngineError> + Clone + Send + 'static,
     ) -> Result<T, Status> {
         let attempt = || {
             let (engine, work) = (self.engine(), work.clone());
             blocking(move || Ok::<_, Status>(work(engine.as_ref())))
         };
-        match (attempt().await?, scene) {
-            (Err(EngineError::UnknownScene { .. }), Some(scene)) => {
+        match attempt().await? {
+            Err(EngineError::UnknownScene { .. }) => {
                 self.ensure(scene).await?;
                 Ok(attempt().await??)
             }
-            (done, _) => Ok(done?),
+            done => Ok(done?),
         }
     }
 

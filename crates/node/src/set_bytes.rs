@@ -1,13 +1,16 @@
 //! The sizes of sample sets in memory, before they are allocated and afterwards.
 
 use depth_image::{
-    CubeGrid, DepthImage, Illumination, LayeredDepthImage, LayeredLightField, SampleCamera, SampleImages,
+    CubeGrid, DepthImage, Illumination, LayeredDepthImage, LayeredLightField, LightPlanes, SampleCamera, SampleImages,
     SpecularPlanes,
 };
 use glam::UVec3;
 
 /// Inverse depth, colour, a normal, a surface, reflectance and a mark, for one texel.
 const MOST_TEXEL_BYTES: usize = 4 + 4 + 4 + 8 + 4 + 1;
+/// Inverse depth, a normal of a triangle, a normal, a surface, lamps, environment and a mark, for one texel of an image with
+/// light in place of colour.
+const MOST_LIGHT_TEXEL_BYTES: usize = 4 + 4 + 4 + 8 + 4 + 4 + 1;
 /// The inverse depth of a texel's corner; an image has a column and a row of them more than of texels.
 const CORNER_BYTES: usize = 4;
 /// The least and the greatest depth of all levels of a pyramid, for one texel: 8 · 4/3.
@@ -30,10 +33,13 @@ const EXPECTED_LAYERS: usize = 2;
 #[must_use]
 pub fn most_image_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -> usize {
     let visibility_bytes = 4 * SpecularPlanes::visibility_planes(illumination.lights.len());
+    let share_bytes = 4 * LightPlanes::share_planes(illumination.lights.len());
     let bytes = |camera: &SampleCamera| match camera {
         SampleCamera::Depth(camera) => {
             let corners = (camera.size_px().x as usize + 1) * (camera.size_px().y as usize + 1);
-            camera.pixel_count() * (MOST_TEXEL_BYTES + visibility_bytes) + corners * CORNER_BYTES
+            let with_color = camera.pixel_count() * (MOST_TEXEL_BYTES + visibility_bytes) + corners * CORNER_BYTES;
+            let with_light = camera.pixel_count() * (MOST_LIGHT_TEXEL_BYTES + share_bytes);
+            with_color.max(with_light)
         }
         SampleCamera::Layered(camera) => {
             camera.pixel_count() * (LINE_BYTES + EXPECTED_LAYERS * (MOST_SAMPLE_BYTES + visibility_bytes))
@@ -84,6 +90,11 @@ fn specular_words(specular: &SpecularPlanes) -> usize {
     specular.reflectance_srgb8_roughness8.len() * (1 + specular.visibility8.len())
 }
 
+fn light_words(light: &LightPlanes) -> usize {
+    let shares: usize = light.share8.iter().map(Vec::len).sum();
+    light.triangle_normal_oct16.len() + light.lamps_rgb9e5.len() + light.environment_rgb9e5.len() + shares
+}
+
 fn layered_bytes(image: &LayeredDepthImage) -> usize {
     let samples = image.sample_count();
     let words = image.normal_oct16.as_ref().map_or(0, Vec::len) + image.specular.as_ref().map_or(0, specular_words);
@@ -102,7 +113,8 @@ fn image_bytes(image: &DepthImage) -> usize {
         + image.normal_oct16.as_ref().map_or(0, Vec::len)
         + image.surface_id.as_ref().map_or(0, |ids| 2 * ids.len())
         + image.specular.as_ref().map_or(0, specular_words)
-        + image.corner_inverse_depth_per_m.as_ref().map_or(0, Vec::len);
+        + image.corner_inverse_depth_per_m.as_ref().map_or(0, Vec::len)
+        + image.light.as_ref().map_or(0, light_words);
     4 * words + image.passed.as_ref().map_or(0, Vec::len) + PYRAMID_TEXEL_BYTES * texels
 }
 
@@ -153,6 +165,7 @@ mod tests {
             specular: None,
             passed: None,
             corner_inverse_depth_per_m: None,
+            light: None,
         };
         assert_eq!(set_bytes(&SampleImages::Depth(vec![plain.clone()])), 256 * (4 + 4 + 11));
         let specular = SpecularPlanes {
@@ -165,10 +178,28 @@ mod tests {
             specular: Some(specular),
             passed: Some(vec![false; 256]),
             corner_inverse_depth_per_m: Some(vec![0.0; 17 * 17]),
-            ..plain
+            ..plain.clone()
         };
         full.validate().unwrap();
         let images = SampleImages::Depth(vec![full.clone(), full]);
         assert_eq!(set_bytes(&images), most_set_bytes(&illumination, &[camera.into(); 2]));
+        let shares = LightPlanes::share_planes(lights);
+        let lit = DepthImage {
+            color_rgb9e5: Vec::new(),
+            normal_oct16: Some(vec![0; 256]),
+            surface_id: Some(vec![depth_image::SurfaceId { instance: 0, primitive: 0 }; 256]),
+            passed: Some(vec![false; 256]),
+            light: Some(LightPlanes {
+                triangle_normal_oct16: vec![0; 256],
+                lamps_rgb9e5: vec![0; 256],
+                environment_rgb9e5: vec![0; 256],
+                share8: vec![vec![0; 256]; shares],
+            }),
+            ..plain
+        };
+        lit.validate().unwrap();
+        let lit_bytes = set_bytes(&SampleImages::Depth(vec![lit]));
+        assert_eq!(lit_bytes, 256 * (MOST_LIGHT_TEXEL_BYTES + 4 * shares + PYRAMID_TEXEL_BYTES));
+        assert!(lit_bytes <= most_set_bytes(&illumination, &[camera.into()]));
     }
 }

@@ -30,6 +30,8 @@ enum Source {
     Direct,
     /// A layered depth cube of the whole scene.
     Base,
+    /// A surface of the scene that was lit in this view.
+    LitHere,
     /// The surroundings of a hole.
     Fill,
     /// A mirror of which some ray ends where no camera sees.
@@ -44,6 +46,7 @@ impl Source {
             (ProvenanceKind::Filled, _) => Self::Fill,
             (ProvenanceKind::Guessed, _) => Self::Guess,
             (ProvenanceKind::Base, _) => Self::Base,
+            (ProvenanceKind::LitHere, _) => Self::LitHere,
             (ProvenanceKind::Hit, 0) => Self::Direct,
             (ProvenanceKind::Hit, mask) if mask.is_power_of_two() => Self::Sample(mask.trailing_zeros() as u8),
             (ProvenanceKind::Hit, _) => Self::Blend,
@@ -57,6 +60,7 @@ impl Source {
             Self::Blend => ("blended", [255, 255, 255]),
             Self::Direct => ("drawn directly", [150, 150, 160]),
             Self::Base => ("from the base", [120, 90, 220]),
+            Self::LitHere => ("lit here", [150, 90, 40]),
             Self::Fill => ("filled", [255, 60, 60]),
             Self::Guess => ("reflection, guessed", [255, 60, 220]),
             Self::Background => ("background", [40, 44, 52]),
@@ -95,6 +99,17 @@ mod tests {
         let (image, legend) = provenance(&view(vec![fill, sample, fill]), 4).unwrap();
         assert_eq!(legend, [("camera 5".to_owned(), CAMERAS[1]), ("filled".to_owned(), [255, 60, 60])]);
         assert_eq!([0, 1, 2].map(|x| image[(x, 0)].0), [legend[1].1, legend[0].1, legend[1].1]);
+    }
+
+    #[test]
+    fn surfaces_that_were_lit_in_the_view_have_a_colour_of_their_own() {
+        let [lit, sample] = [Provenance::new(ProvenanceKind::LitHere, 0), Provenance::new(ProvenanceKind::Hit, 1)];
+        let (_, legend) = provenance(&view(vec![lit, sample, lit]), 0).unwrap();
+        let names: Vec<&str> = legend.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["camera 0", "lit here"]);
+        let others = [Source::Blend, Source::Direct, Source::Base, Source::Fill, Source::Guess, Source::Background];
+        let colors = others.map(|source| source.name_and_color().1);
+        assert!(!CAMERAS.iter().chain(&colors).any(|color| *color == legend[1].1));
     }
 
     #[test]

@@ -80,6 +80,7 @@ mod tests {
             specular: None,
             passed: None,
             corner_inverse_depth_per_m: None,
+            light: None,
         }
     }
 

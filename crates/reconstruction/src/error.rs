@@ -23,6 +23,9 @@ pub enum ReconstructionError {
     /// A sample image lacks a plane, named as in [`depth_image::DepthImageError`].
     #[error("sample image {index} has no plane {plane}, which the reconstruction method needs")]
     MissingPlane { index: usize, plane: &'static str },
+    /// The method, or rays off mirrors, show the colour of samples; `index` is the image's place in the set.
+    #[error("sample image {index} has light where colour is needed")]
+    LightForColor { index: usize },
     #[error("a sample set holds 1 to {MAX_SAMPLE_CAMERAS} images, not {0}")]
     SampleCount(usize),
     #[error("views have at most {MAX_MIRROR_CELLS} mirror cells, not {0}")]

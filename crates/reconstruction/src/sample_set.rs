@@ -67,8 +67,8 @@ impl SampleSet {
         }
     }
 
-    /// Builds pyramids and uploads everything. Fails for too many images, planes or cameras that do not fit, or a set
-    /// beyond the device's limits.
+    /// Builds pyramids and uploads everything. Fails for too many images, planes or cameras that do not fit, images with
+    /// light in place of colour, or a set beyond the device's limits.
     pub(crate) fn upload(
         tables: &TablePool,
         images: &[DepthImage],
@@ -194,6 +194,9 @@ fn check(tables: &TablePool, images: &[DepthImage], set: &SetDescription<'_>) ->
         let wrong = |reason: String| ReconstructionError::Sample { index, reason };
         camera.validate().map_err(|error| wrong(error.to_string()))?;
         image.validate().map_err(|error| wrong(error.to_string()))?;
+        if image.light.is_some() {
+            return Err(ReconstructionError::LightForColor { index });
+        }
         if camera.size_px().min_element() < 2 {
             return Err(wrong("an image of one row or column has no surface between samples".to_owned()));
         }

@@ -156,14 +156,14 @@ fn sample_texels(share_words: usize) -> usize {
 }
 
 impl LightCache {
-    /// Puts samples on a device, whose light has the shares of `light_count` lamps.
+    /// Puts samples on a device, which have this many planes of shares.
     ///
     /// # Errors
     /// Names the image that has no light, or whose planes do not fit, or is no pinhole's; too many images for the device.
     pub(crate) fn upload(
         tables: &TablePool,
         images: &[DepthImage],
-        light_count: usize,
+        share_words: usize,
         turn: Turn,
     ) -> Result<Self, RenderError> {
         let refused = |index: usize, reason: String| RenderError::Samples { index, reason };
@@ -173,12 +173,11 @@ impl LightCache {
         let mut cached = Vec::new();
         let mut first_sample = 0;
         for (index, image) in images.iter().enumerate() {
-            let camera = checked(image, light_count).map_err(|reason| refused(index, reason))?;
+            let camera = checked(image, share_words).map_err(|reason| refused(index, reason))?;
             let range = image.inverse_depth_range().map_or(0.0, |(least, greatest)| greatest - least);
             cached.push(CachedImage { camera, first_sample, half_step_per_m: 0.5 * range / DEPTH_CODES });
             first_sample += camera.pixel_count() as u32;
         }
-        let share_words = images[0].light.as_ref().map_or(0, |light| light.share8.len());
         let texels = sample_texels(share_words);
         tables.gpu.check_table("samples of light", first_sample as usize * texels)?;
         let words: Vec<[u32; 4]> = images.iter().flat_map(|image| packed(image, texels)).collect();
@@ -208,13 +207,12 @@ impl LightCache {
 }
 
 /// The camera of an image that can be used, or the reason against it.
-fn checked(image: &DepthImage, light_count: usize) -> Result<PinholeCamera, String> {
+fn checked(image: &DepthImage, share_words: usize) -> Result<PinholeCamera, String> {
     image.validate().map_err(|error| error.to_string())?;
     let light = image.light.as_ref().ok_or("colour where light is needed")?;
-    let expected = LightPlanes::share_planes(light_count);
     let given = light.share8.len();
-    if given != expected {
-        return Err(format!("{given} planes of shares, the {light_count} lamps of the scene have {expected}"));
+    if given != share_words {
+        return Err(format!("{given} planes of shares of light, the scene's lamps and lighting need {share_words}"));
     }
     let camera = image.camera.pinhole().ok_or_else(|| format!("a {}, must be a pinhole", image.camera.model_name()))?;
     Ok(*camera)

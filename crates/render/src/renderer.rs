@@ -4,7 +4,7 @@ use std::{collections::VecDeque, sync::Arc};
 
 use depth_image::{
     Antialias, Camera, DepthImage, LayeredDepthImage, LayeredLightField, LightFieldCamera, ParallelCamera,
-    LightCacheQuality, PinholeCamera, ProvenanceKind, ToneMapping, View, ViewPlanes,
+    LightCacheQuality, LightPlanes, PinholeCamera, ProvenanceKind, ToneMapping, View, ViewPlanes,
 };
 use glam::UVec2;
 use gpu::{Frame, Gpu, GpuError, TablePool, Templates, Turn, WorkClass};
@@ -76,17 +76,19 @@ impl Renderer {
         self.views(work, None, cameras, planes, ProvenanceKind::Hit)
     }
 
-    /// Puts samples of light on the device, for views of a scene that is lit by rays.
+    /// Puts samples of the light of this scene on the device, and checks them.
     ///
     /// # Errors
     /// Samples that are not of light, not of this scene's lamps, or beyond the device's limits.
     pub fn upload_light(
         &self,
         scene: &GpuScene,
+        lighting: Lighting,
         images: &[DepthImage],
         turn: Turn,
     ) -> Result<LightCache, RenderError> {
-        LightCache::upload(&self.tables, images, scene.light_count, turn)
+        let share_words = if lighting.is_traced() { LightPlanes::share_planes(scene.light_count) } else { 0 };
+        LightCache::upload(&self.tables, images, share_words, turn)
     }
 
     /// Finished views: surfaces from the scene, their light from samples where these know it. `work` has the light of the

@@ -11,7 +11,10 @@ use cluster::{
     SamplePlanes, SamplerReport, SamplerShare, SceneHash, SceneRef, SessionEvent, SessionPlan, SessionRequest,
     TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
 };
-use codec::{FrameCodec, FrameHeader, MAX_VISIBILITY_PLANES, SampleSetId, StageTimes};
+use codec::{
+    FrameCodec, FrameHeader, ImageHeader, InverseDepthRange, MAX_LIGHT_SHARE_PLANES, MAX_VISIBILITY_PLANES,
+    PlaneHeader, PlaneKind, SampleSetId, StageTimes,
+};
 use depth_image::{
     Aabb, Antialias, Camera, CubeGrid, Environment, ExposureEv, Illumination, Light, LightDirections, LightFieldCamera,
     MAX_LIGHTS, PinholeCamera, ToneCurve, ToneMapping, ViewPlanes,
@@ -195,6 +198,11 @@ fn a_plan_of_a_cube_survives_the_round_trip() {
 #[test]
 fn messages_survive_the_round_trip() {
     assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(assignment())), Ok(assignment()));
+    for [normals, corner_inverse_depths, light] in [[true, false, false], [false, true, false], [true, false, true]] {
+        let mut with_planes = assignment();
+        with_planes.workload.planes = SamplePlanes { normals, corner_inverse_depths, light };
+        assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(with_planes.clone())), Ok(with_planes));
+    }
     let mut cells = Assignment { tile_count: 2, relay_fanout: NonZeroU32::new(3), ..assignment() };
     cells.workload.cell_first_indices = vec![0, 1];
     cells.samplers[0].image_indices = vec![3, 1, 2, 0];
@@ -523,6 +531,30 @@ fn errors_become_statuses() {
     assert_eq!((refused.code(), refused.message()), (tonic::Code::InvalidArgument, "views is missing"));
 }
 
+#[test]
+fn image_headers_with_light_survive_and_their_kinds_keep_their_numbers() {
+    let first = [
+        PlaneKind::InverseDepth,
+        PlaneKind::TriangleNormalOct16,
+        PlaneKind::NormalOct16,
+        PlaneKind::LampsRgb9e5,
+        PlaneKind::EnvironmentRgb9e5,
+    ];
+    let kinds = first.into_iter().chain([PlaneKind::LightShare8; MAX_LIGHT_SHARE_PLANES]).chain([PlaneKind::Passed1]);
+    let plane = |kind: PlaneKind| PlaneHeader { kind, encoding: kind.encoding(), raw_bytes: 7, packed_bytes: 5 };
+    let header = ImageHeader {
+        width: 4,
+        height: 3,
+        inverse_depth_range: InverseDepthRange { least_per_m: 0.1, greatest_per_m: 2.0 },
+        layered: None,
+        planes: kinds.map(plane).collect(),
+    };
+    let message = to_message::<proto::ImageHeader, _>(header.clone());
+    let numbers: Vec<i32> = message.planes.iter().map(|plane| plane.kind).collect();
+    assert_eq!(numbers, [1, 12, 3, 13, 14, 15, 15, 15, 15, 15, 7]);
+    assert_eq!(read::<ImageHeader, _>(message), Ok(header));
+}
+
 fn header() -> FrameHeader {
     FrameHeader {
         sample_set_id: SampleSetId { plan_epoch: 1, index: 0 },
@@ -640,7 +672,8 @@ fn typical_views_of_several_sizes_or_none_are_refused() {
 #[test]
 fn a_measured_exposure_survives_within_its_limits() {
     let auto_exposure = ExposureEv::new(-3.25).unwrap();
-    let measured = Measured { costs: session_plan().costs, planes: SamplePlanes::default(), auto_exposure };
+    let planes = SamplePlanes { light: true, ..SamplePlanes::default() };
+    let measured = Measured { costs: session_plan().costs, planes, auto_exposure };
     let message = to_message::<proto::MeasureCostsResponse, _>(measured);
     assert_eq!(read::<Measured, _>(message), Ok(measured));
     let spoilt = proto::MeasureCostsResponse { auto_exposure_ev: f32::NAN, ..message };

@@ -23,6 +23,7 @@ pub fn seen_from(subject: &Subject<'_>, number: usize, view: &View, camera: Pinh
         specular: None,
         passed: None,
         corner_inverse_depth_per_m: None,
+        light: None,
     };
     let reconstructor = subject.stand.reconstructor();
     let set = reconstructor.upload(&[image], &subject.description())?;

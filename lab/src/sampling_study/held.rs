@@ -87,6 +87,7 @@ mod tests {
             specular: None,
             passed: None,
             corner_inverse_depth_per_m: None,
+            light: None,
         };
         let samples = held_samples(&image);
         assert_eq!(samples.len(), 192);

@@ -95,6 +95,7 @@ fn unknown_names_are_refused_with_their_field() {
         background: Environment::default(),
         illumination: setup.offer.illumination.clone(),
         lighting: args.lighting.to_string(),
+        scene_time_s: 0.0,
         is_common: false,
     };
     let uploaded = engine.upload(&set, TURN).unwrap();

@@ -15,8 +15,8 @@ pub enum Texel {
     Sample {
         /// Depth along the forward axis.
         planar_depth_m: f32,
-        /// Outgoing radiance, linear RGB.
-        color_linear: Vec3,
+        /// Outgoing radiance, linear RGB; `None` in an image with light.
+        color_linear: Option<Vec3>,
     },
 }
 
@@ -28,7 +28,7 @@ impl DepthImage {
         match self.inverse_depth_per_m[index] {
             inverse if inverse > 0.0 => Texel::Sample {
                 planar_depth_m: inverse.recip(),
-                color_linear: linear_from_rgb9e5(self.color_rgb9e5[index]),
+                color_linear: self.color_rgb9e5.get(index).copied().map(linear_from_rgb9e5),
             },
             BACKGROUND_INVERSE_DEPTH => Texel::Background,
             _ => Texel::Hole,

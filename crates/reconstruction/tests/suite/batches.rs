@@ -1,6 +1,6 @@
 //! Many views in one call, and requests that are refused.
 
-use depth_image::{Aabb, CameraError, PinholeCamera, ViewPlanes};
+use depth_image::{Aabb, CameraError, LightPlanes, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
 use reconstruction::ReconstructionError;
 use scene::procedural::uv_sphere;
@@ -85,6 +85,26 @@ fn refused(stage: &Stage) -> ReconstructionError {
     done.err().expect("an error")
 }
 
+/// An image with light in place of colour serves no method that shows the colour of samples.
+fn assert_light_is_refused(good: &Stage) {
+    let mut lit = good.clone();
+    let image = &mut lit.images[1];
+    let texels = std::mem::take(&mut image.color_rgb9e5).len();
+    image.specular = None;
+    image.corner_inverse_depth_per_m = None;
+    image.normal_oct16 = Some(vec![0; texels]);
+    image.light = Some(LightPlanes {
+        triangle_normal_oct16: vec![0; texels],
+        lamps_rgb9e5: vec![0; texels],
+        environment_rgb9e5: vec![0; texels],
+        share8: Vec::new(),
+    });
+    assert_eq!(image.validate(), Ok(()));
+    let error = refused(&lit);
+    assert!(matches!(error, ReconstructionError::LightForColor { index: 1 }), "{error}");
+    assert!(error.to_string().contains("image 1 has light where colour is needed"), "{error}");
+}
+
 #[test]
 fn sets_that_cannot_be_used_are_refused() {
     let good = stage();
@@ -95,6 +115,7 @@ fn sets_that_cannot_be_used_are_refused() {
     let mut short = good.clone();
     short.images[1].inverse_depth_per_m.pop();
     assert!(matches!(refused(&short), ReconstructionError::Sample { index: 1, .. }));
+    assert_light_is_refused(&good);
     let mut nowhere = good.clone();
     let eye_in_world = Vec3::NAN;
     nowhere.images[0].camera = PinholeCamera { eye_in_world, ..*good.images[0].camera.reference() }.into();

@@ -158,6 +158,7 @@ fn pole(columns: u32) -> (DepthImage, SinglePoleCamera) {
         specular: None,
         passed: None,
         corner_inverse_depth_per_m: None,
+        light: None,
     };
     (image, camera)
 }

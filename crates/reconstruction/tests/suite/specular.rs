@@ -96,6 +96,7 @@ impl Room {
             }),
             passed: None,
             corner_inverse_depth_per_m: None,
+            light: None,
         }
     }
 

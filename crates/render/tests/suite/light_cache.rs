@@ -46,7 +46,7 @@ fn samples(work: DrawWork<'_>) -> Vec<DepthImage> {
 
 fn cached(work: DrawWork<'_>, images: &[DepthImage], quality: LightCacheQuality, planes: ViewPlanes) -> View {
     let renderer = &device().1;
-    let cache = renderer.upload_light(work.scene, images, work.turn).expect("a cache");
+    let cache = renderer.upload_light(work.scene, work.lighting, images, work.turn).expect("a cache");
     renderer.draw_cached_views(work, &cache, quality, &[view_camera()], planes).expect("a view").remove(0)
 }
 

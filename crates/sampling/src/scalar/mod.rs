@@ -109,6 +109,7 @@ fn image(camera: &PinholeCamera, texels: &[Texel]) -> DepthImage {
             .any(|texel| texel.passed_m.is_some())
             .then(|| texels.iter().map(|texel| texel.passed_m.is_some()).collect()),
         corner_inverse_depth_per_m: None,
+        light: None,
     }
 }
 

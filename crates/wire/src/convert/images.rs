@@ -2,16 +2,19 @@
 
 use cluster::{FetchImages, at_most};
 use codec::{
-    Chunk, ChunkBody, ImageHeader, LayeredCounts, MAX_CHUNK_BYTES, MAX_VISIBILITY_PLANES, PlaneEncoding, PlaneHeader,
-    PlaneKind,
+    Chunk, ChunkBody, ImageHeader, LayeredCounts, MAX_CHUNK_BYTES, MAX_LIGHT_SHARE_PLANES, MAX_VISIBILITY_PLANES,
+    PlaneEncoding, PlaneHeader, PlaneKind,
 };
 
 use super::{Convert, required};
 use crate::error::WireError;
 use crate::proto::chunk::Body;
 
-/// One plane of each kind that a depth image may have, which has the most; visibility may have more.
+/// One plane of each kind that a depth image with colour may have, which has the most; visibility may have more.
 const MAX_PLANES: usize = 7 + MAX_VISIBILITY_PLANES;
+
+// Six planes of an image with light, and its shares.
+const _: () = assert!(6 + MAX_LIGHT_SHARE_PLANES <= MAX_PLANES);
 
 messages! {
     FetchSampleImagesRequest = FetchImages { plan_epoch, workload_number, set_index, image_indices; cell: cell_index },
@@ -31,7 +34,8 @@ messages! {
 enums! {
     PlaneKind {
         InverseDepth, ColorRgb9e5, NormalOct16, SurfaceId, ReflectanceRoughness8, Visibility8, Passed1,
-        CornerInverseDepth, LayerCount8, LayerDepth, PlaneNormalOct8
+        CornerInverseDepth, LayerCount8, LayerDepth, PlaneNormalOct8, TriangleNormalOct16, LampsRgb9e5,
+        EnvironmentRgb9e5, LightShare8
     }
     PlaneEncoding { SlopeTaggedLz4, DifferenceTaggedLz4, ChangeTaggedLz4, BitsLz4 }
 }

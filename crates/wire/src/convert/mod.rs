@@ -203,7 +203,7 @@ macro_rules! flat {
 flat! {
     UVec2 { x: u32, y: u32 }
     DVec3 { x: f64, y: f64, z: f64 }
-    SamplePlanes { normals: bool, corner_inverse_depths: bool }
+    SamplePlanes { normals: bool, corner_inverse_depths: bool, light: bool }
     InverseDepthRange { least_per_m: f32, greatest_per_m: f32 }
     SampleSetId { plan_epoch: u64, index: u32 }
     SampleSetId { plan_epoch: u64, index: u64 }

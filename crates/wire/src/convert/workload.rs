@@ -20,7 +20,7 @@ messages! {
     Workload = Workload {
         scene as "workload.scene", sample_cameras, cell_first_indices, common_cells, lighting, volume as "workload.volume",
         timeline as "workload.timeline", illumination as "workload.illumination", background as "workload.background";
-        sampling: sampling_method, planes: with_normals | with_corner_inverse_depths,
+        sampling: sampling_method, planes: with_normals | with_corner_inverse_depths | with_light,
         refinement_steps: refinement_step_count
     }, first |w| {
         at_most(w.common_cells.len(), MAX_COMMON_CELLS, "common_cells")?;

@@ -84,6 +84,7 @@ impl PageViews {
             background: setup.offer.background,
             illumination: setup.offer.illumination.clone(),
             lighting: lighting.to_string(),
+            scene_time_s: 0.0,
             is_common: false,
         };
         let set = engine.upload(&set, turn)?;
