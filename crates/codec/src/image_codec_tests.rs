@@ -377,10 +377,10 @@ fn planes_of_light_out_of_order_are_refused() {
     let color_and_highlights = [1, 4, 5].map(|place: usize| other.header.planes[place]);
     type Damage = fn(&mut Vec<PlaneHeader>, &[PlaneHeader; 3]);
     let cases: [(&str, Damage); 15] = [
-        ("must begin with inverse depth", |p, _| drop(p.remove(0))),
-        ("must begin with inverse depth, normals of triangles", |p, _| drop(p.remove(1))),
-        ("must begin with inverse depth", |p, _| drop(p.remove(2))),
-        ("must begin with inverse depth", |p, _| drop(p.remove(3))),
+        ("must begin with inverse depth", |p, _| drop(p.drain(0..=0))),
+        ("must begin with inverse depth, normals of triangles", |p, _| drop(p.drain(1..=1))),
+        ("must begin with inverse depth", |p, _| drop(p.drain(2..=2))),
+        ("must begin with inverse depth", |p, _| drop(p.drain(3..=3))),
         ("must begin with inverse depth", |p, _| p.truncate(4)),
         ("must begin with inverse depth", |p, _| p.swap(1, 2)),
         ("must begin with inverse depth", |p, _| p.swap(3, 4)),

@@ -180,6 +180,15 @@ fn views() -> RenderViews {
 }
 
 #[test]
+fn planes_of_samples_survive_the_round_trip() {
+    for [normals, corner_inverse_depths, light] in [[true, false, false], [false, true, false], [true, false, true]] {
+        let mut with_planes = assignment();
+        with_planes.workload.planes = SamplePlanes { normals, corner_inverse_depths, light };
+        assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(with_planes.clone())), Ok(with_planes));
+    }
+}
+
+#[test]
 fn a_plan_of_a_cube_survives_the_round_trip() {
     let mut cube = assignment();
     let grid = CubeGrid::around(&cube.workload.volume, 64).unwrap();
@@ -198,11 +207,6 @@ fn a_plan_of_a_cube_survives_the_round_trip() {
 #[test]
 fn messages_survive_the_round_trip() {
     assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(assignment())), Ok(assignment()));
-    for [normals, corner_inverse_depths, light] in [[true, false, false], [false, true, false], [true, false, true]] {
-        let mut with_planes = assignment();
-        with_planes.workload.planes = SamplePlanes { normals, corner_inverse_depths, light };
-        assert_eq!(read::<Assignment, _>(to_message::<proto::Assignment, _>(with_planes.clone())), Ok(with_planes));
-    }
     let mut cells = Assignment { tile_count: 2, relay_fanout: NonZeroU32::new(3), ..assignment() };
     cells.workload.cell_first_indices = vec![0, 1];
     cells.samplers[0].image_indices = vec![3, 1, 2, 0];
