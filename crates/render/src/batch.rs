@@ -10,7 +10,9 @@ use gpu::{BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVa
 use crate::accumulation::{Key, Sums};
 use crate::pieces::{Piece, Pieces};
 use crate::pixel_camera::{PixelCamera, uniform};
-use crate::{Rate, known_samples::ImageSequence, light_cache::CachedLight, planes::Output, rays::Traced, work::DrawWork};
+use crate::{
+    Rate, known_samples::ImageSequence, light_cache::CachedLight, planes::Output, rays::Traced, work::DrawWork,
+};
 
 /// The share of the scene's diagonal within which occlusion is looked for, where a lighting names no radius.
 const OCCLUSION_OF_DIAGONAL: f32 = 0.05;

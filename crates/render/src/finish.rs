@@ -14,7 +14,8 @@ use wgpu::{Buffer, BufferUsages};
 use crate::batch::{Batch, Recording};
 use crate::planes::{Output, PlaneLayout};
 use crate::{
-    RenderError, light_cache::GpuLampShares, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest, sums::SumPlanes, surfaces::Surfaces,
+    RenderError, light_cache::GpuLampShares, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest,
+    sums::SumPlanes, surfaces::Surfaces,
 };
 
 /// Inverse depths within a texel differ by this share at most where they are of one surface.
@@ -62,7 +63,9 @@ impl Finish {
     }
 
     fn of_images(output: Output) -> impl Iterator<Item = Self> {
-        switches().flat_map(move |[normal, reflector, surface_id]| {
+        // Samples of light have no highlights.
+        let all = switches().filter(move |[_, reflector, _]| !(output.light && *reflector));
+        all.flat_map(move |[normal, reflector, surface_id]| {
             Self::of_output(Output { samples: true, normal, reflector, surface_id, ..output })
         })
     }

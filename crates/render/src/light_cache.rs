@@ -18,7 +18,7 @@ use crate::{GpuScene, RenderError, sums::SumPlanes, surfaces::Surfaces};
 /// Sample images of a set of light.
 pub(crate) const MAX_CACHE_CAMERAS: u32 = 16;
 /// Values of stored inverse depth; a step between two of them is the range over one fewer.
-const DEPTH_CODES: f32 = 65_534.0;
+pub(crate) const DEPTH_CODES: f32 = 65_534.0;
 
 /// Codes of [`ProvenanceKind`].
 pub(crate) const PROVENANCE_EMPTY: u32 = ProvenanceKind::Empty as u32;

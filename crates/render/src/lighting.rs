@@ -346,9 +346,7 @@ mod tests {
 
     #[test]
     fn unknown_points_have_a_quarter_of_the_rays_but_no_fewer_than_16() {
-        let here = |text: &str, quality| {
-            text.parse::<Lighting>().expect(text).for_unknown_points(quality).to_string()
-        };
+        let here = |text: &str, quality| text.parse::<Lighting>().expect(text).for_unknown_points(quality).to_string();
         let balanced = LightCacheQuality::Balanced;
         assert_eq!(here("soft 128, occlusion 256 2m, adaptive", balanced), "soft 32, occlusion 64 2m, adaptive");
         assert_eq!(here("soft 32, occlusion 8", balanced), "soft 16, occlusion 8");

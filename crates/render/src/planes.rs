@@ -2,7 +2,8 @@
 //! and depth images.
 
 use depth_image::{
-    Antialias, Camera, DepthImage, Highlight, LightPlanes, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId, View, ViewPlanes,
+    Antialias, Camera, DepthImage, Highlight, LightPlanes, Provenance, ProvenanceKind, SpecularPlanes, SurfaceId, View,
+    ViewPlanes,
 };
 
 use crate::{sums::SumPlanes, work::DrawWork};
@@ -104,8 +105,7 @@ pub(crate) fn views(
     let layout = output.layout();
     let view = |(camera, own): Picture<'_>| {
         let inverse_depth: &[f32] = bytemuck::cast_slice(own[1]);
-        let hit =
-            |&inverse: &f32| if inverse > 0.0 { Provenance::new(lit, 0) } else { Provenance::EMPTY };
+        let hit = |&inverse: &f32| if inverse > 0.0 { Provenance::new(lit, 0) } else { Provenance::EMPTY };
         let rgb = |word: &u32| word.to_le_bytes().into_iter().take(3);
         View {
             size_px: camera.size_px(),

@@ -153,8 +153,7 @@ impl ShaderVariant for RasterVariant {
         let appended = nearest.iter().filter(|variant| !variant.surface_id && !variant.depth_only);
         let appended: Vec<Self> = appended.map(|variant| Self { appended: true, ..*variant }).collect();
         let with_normals = nearest.iter().filter(|variant| !variant.depth_only);
-        let with_normals: Vec<Self> =
-            with_normals.map(|variant| Self { triangle_normal: true, ..*variant }).collect();
+        let with_normals: Vec<Self> = with_normals.map(|variant| Self { triangle_normal: true, ..*variant }).collect();
         [nearest, appended, with_normals].concat()
     }
 }

@@ -3,8 +3,8 @@
 use std::{collections::VecDeque, sync::Arc};
 
 use depth_image::{
-    Antialias, Camera, DepthImage, LayeredDepthImage, LayeredLightField, LightFieldCamera, ParallelCamera,
-    LightCacheQuality, LightPlanes, PinholeCamera, ProvenanceKind, ToneMapping, View, ViewPlanes,
+    Antialias, Camera, DepthImage, LayeredDepthImage, LayeredLightField, LightCacheQuality, LightFieldCamera,
+    LightPlanes, ParallelCamera, PinholeCamera, ProvenanceKind, ToneMapping, View, ViewPlanes,
 };
 use glam::UVec2;
 use gpu::{Frame, Gpu, GpuError, TablePool, Templates, Turn, WorkClass};
@@ -246,8 +246,7 @@ impl Renderer {
         let corners = planes.corners.then(|| pinholes(cameras, "depths at corners")).transpose()?;
         let output = images_output(work, planes, test);
         let request = DrawRequest { work, output, tone: ToneMapping::NONE, sequence, cached: None };
-        let mut images =
-            self.draw(request, cameras, |words, cameras| planes::depth_images(words, output, cameras))?;
+        let mut images = self.draw(request, cameras, |words, cameras| planes::depth_images(words, output, cameras))?;
         if let Some(pinholes) = corners {
             let (work, cameras) = (work.unlit(), as_cameras(&corner_cameras(&pinholes)));
             self.check(&cameras)?;

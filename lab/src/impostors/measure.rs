@@ -22,8 +22,14 @@ pub const VIEW_PX: UVec2 = UVec2::new(200, 150);
 const SEEN_CODES: u8 = 8;
 /// Rays a pixel of the smooth truth.
 const RAYS: u32 = 64;
-const PLANES: SamplePlanes =
-    SamplePlanes { antialias: Antialias::NONE, normal: false, surface_id: false, specular: true, corners: false, light: false };
+const PLANES: SamplePlanes = SamplePlanes {
+    antialias: Antialias::NONE,
+    normal: false,
+    surface_id: false,
+    specular: true,
+    corners: false,
+    light: false,
+};
 
 /// A view, its own sample set, and the truth. The set's one image is the view's, so that errors are those of the mirror.
 struct Subject {

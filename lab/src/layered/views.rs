@@ -21,8 +21,14 @@ const REPEATS: usize = 5;
 /// Between neighbouring sample cameras of the carve, as seen from the scene's middle, and their density over that of the view.
 const SPREAD_RAD: f32 = 0.06;
 const DENSITY: u32 = 2;
-pub const PLAIN: SamplePlanes =
-    SamplePlanes { antialias: Antialias::NONE, normal: false, surface_id: false, specular: true, corners: false, light: false };
+pub const PLAIN: SamplePlanes = SamplePlanes {
+    antialias: Antialias::NONE,
+    normal: false,
+    surface_id: false,
+    specular: true,
+    corners: false,
+    light: false,
+};
 
 /// Means over views of a scene, and the seconds of a view.
 #[derive(Debug, Clone, Copy)]

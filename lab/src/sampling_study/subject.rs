@@ -141,5 +141,11 @@ impl Subject {
 }
 
 /// The planes that all metrics by pixel need.
-pub(super) const WITH_IDS: SamplePlanes =
-    SamplePlanes { antialias: Antialias::NONE, normal: false, surface_id: true, specular: false, corners: false, light: false };
+pub(super) const WITH_IDS: SamplePlanes = SamplePlanes {
+    antialias: Antialias::NONE,
+    normal: false,
+    surface_id: true,
+    specular: false,
+    corners: false,
+    light: false,
+};

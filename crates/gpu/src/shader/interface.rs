@@ -233,6 +233,7 @@ fn texture_format(format: StorageFormat) -> Option<TextureFormat> {
     match format {
         StorageFormat::R32Float => Some(TextureFormat::R32Float),
         StorageFormat::Rg32Uint => Some(TextureFormat::Rg32Uint),
+        StorageFormat::R32Uint => Some(TextureFormat::R32Uint),
         StorageFormat::Rgba32Uint => Some(TextureFormat::Rgba32Uint),
         _ => None,
     }

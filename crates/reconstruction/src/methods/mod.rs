@@ -359,9 +359,14 @@ mod tests {
     #[test]
     fn the_error_names_every_method() {
         let error = "carve".parse::<ReconstructionMethod>().expect_err("no method").to_string();
-        for name in
-            ["joint_carve:LEVEL", "light_field_search:STEPS", " mesh,", "hybrid_mesh:PX", " layered", "light_cache:QUALITY"]
-        {
+        for name in [
+            "joint_carve:LEVEL",
+            "light_field_search:STEPS",
+            " mesh,",
+            "hybrid_mesh:PX",
+            " layered",
+            "light_cache:QUALITY",
+        ] {
             assert!(error.contains(name), "{name} is not in {error}");
         }
     }

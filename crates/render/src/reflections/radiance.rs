@@ -36,7 +36,7 @@ impl<'a> RadianceWork<'a> {
             tone: ToneMapping::NONE,
             sequence: None,
             cached: None,
-        position: Position::default(),
+            position: Position::default(),
         };
         Ok(Self { stages, batch, points: Vec::new(), lit: Vec::new() })
     }

@@ -1,12 +1,15 @@
 //! Views whose surfaces come from the scene and whose light comes from samples.
 
 use depth_image::{
-    Camera, DepthImage, Environment, Illumination, Light, LightCacheQuality, PinholeCamera, ProvenanceKind, View,
-    ViewPlanes,
+    Aabb, Camera, DepthImage, Environment, Illumination, Light, LightCacheQuality, PinholeCamera, Provenance,
+    ProvenanceKind, SinglePoleCamera, View, ViewPlanes, rgb9e5_from_linear, srgb8_from_linear,
 };
-use glam::{UVec2, Vec3};
-use render::{DrawWork, GpuScene, SamplePlanes, Visibility};
-use scene::Scene;
+use glam::{Affine3A, UVec2, Vec3};
+use render::scalar::light_cache::{LightSamples, SurfacePoint};
+use render::scalar::rays;
+use render::{DrawWork, SamplePlanes, Visibility};
+use scene::procedural::uv_sphere;
+use scene::{Instance, Scene};
 
 use crate::stage::{device, floor_under, mean, upload, work};
 
@@ -23,7 +26,8 @@ const LIGHTING: &str = "soft 16, occlusion 16 1m";
 
 /// A floor under a lamp, half of it under a smaller quad.
 fn shadowed_floor() -> Scene {
-    let lamp = Light::Point { position_in_world: Vec3::new(0.3, 2.0, 0.2), intensity_linear: Vec3::splat(2.0), radius_m: 0.1 };
+    let lamp =
+        Light::Point { position_in_world: Vec3::new(0.3, 2.0, 0.2), intensity_linear: Vec3::splat(2.0), radius_m: 0.1 };
     let environment = Environment::uniform(Vec3::splat(0.3));
     floor_under(&[(Vec3::new(-0.2, 0.4, 0.0), 0.3, Vec3::Y)], Illumination { lights: vec![lamp], environment })
 }
@@ -76,7 +80,6 @@ fn most_light_of_a_floor_is_known_and_as_if_it_were_traced() {
         for quality in [LightCacheQuality::Fast, LightCacheQuality::Balanced, LightCacheQuality::Fine] {
             let view = cached(work, &images, quality, ViewPlanes::ALL);
             let (error, unknown) = (difference(&view, &traced), share_of(&view, ProvenanceKind::LitHere));
-            println!("{visibility} {quality}: {error} {unknown}, hits {}", share_of(&view, ProvenanceKind::Hit));
             assert_eq!(view.inverse_depth_per_m, traced.inverse_depth_per_m, "{quality}");
             assert!(error < 4.0 && error <= 1.1 * last, "{visibility} {quality}: {error}, before {last}");
             assert!(unknown < 0.35, "{quality}: {unknown}");
@@ -98,5 +101,130 @@ fn exact_views_and_views_in_plain_light_are_direct_views() {
     same("unlit", LightCacheQuality::Draft);
 }
 
-#[allow(dead_code)]
-fn unused(_: &GpuScene) {}
+/// A floor with a sphere on it, whose normals of shading are not those of its triangles.
+fn sphere_on_a_floor(lights: Vec<Light>) -> Scene {
+    let environment = Environment::gradient(Vec3::splat(0.5), Vec3::splat(0.1));
+    let mut scene = floor_under(&[], Illumination { lights, environment });
+    let mesh = scene.meshes.len() as u32;
+    scene.meshes.push(uv_sphere(0.3, 24).meshes.remove(0));
+    let world_from_mesh = Affine3A::from_translation(Vec3::new(0.1, 0.3, 0.0));
+    scene.instances.push(Instance { mesh, world_from_mesh });
+    scene
+}
+
+fn lamp(x: f32, strength: f32) -> Light {
+    let (position_in_world, intensity_linear) = (Vec3::new(x, 2.0, 0.7), Vec3::splat(strength));
+    Light::Point { position_in_world, intensity_linear, radius_m: 0.1 }
+}
+
+/// The surface that a pixel shows, and its colour.
+fn surface(scene: &rays::Scene, camera: &PinholeCamera, pixel: UVec2) -> Option<(SurfacePoint, Vec3)> {
+    let ray = rays::pixel_ray(camera, pixel);
+    let hit = scene.closest(&ray, camera.near_m).0?;
+    let [a, b, c] = scene.triangles_in_world().nth(hit.slot as usize).expect("a triangle");
+    let across = (b - a).cross(c - a).normalize();
+    let point = SurfacePoint {
+        point_in_world: ray.at(hit.t),
+        normal_in_world: scene.normal_in_world(&hit),
+        triangle_normal_in_world: if across.dot(ray.direction_in_world) > 0.0 { -across } else { across },
+        footprint_m: hit.t / camera.focal_px.min_element(),
+    };
+    Some((point, scene.look(&hit).base_linear))
+}
+
+/// The share of pixels whose colour and provenance the scalar twin gives within 1 of 255. Pixels that no sample knows have
+/// the light of direct drawing.
+fn share_like_the_twin(scene: &Scene, quality: LightCacheQuality) -> f32 {
+    let gpu_scene = upload(scene);
+    let work = DrawWork { visibility: Visibility::Rays, ..work(&gpu_scene, LIGHTING) };
+    let images = samples(work);
+    let view = cached(work, &images, quality, ViewPlanes::ALL);
+    let traced = direct(work);
+    let (twin, camera) = (rays::Scene::of(&gpu_scene, 0.0).expect("tables"), view_camera());
+    let light = LightSamples { images: &images, illumination: &scene.illumination };
+    let provenance = view.provenance.as_ref().expect("provenance");
+    let color = |view: &View, place: usize| <[u8; 3]>::try_from(&view.srgb8[3 * place..][..3]).expect("a pixel");
+    let (mut like, mut known) = (0, 0);
+    for place in 0..view.srgb8.len() / 3 {
+        let pixel = UVec2::new(place as u32 % VIEW_PX.x, place as u32 / VIEW_PX.x);
+        let surface = surface(&twin, &camera, pixel);
+        let found = surface.and_then(|(point, base)| Some((light.look_up(&point, quality)?, base)));
+        let (expected, origin) = match (surface, found) {
+            (None, _) => (color(&traced, place), Provenance::EMPTY),
+            (Some(_), None) => (color(&traced, place), Provenance::new(ProvenanceKind::LitHere, 0)),
+            (Some(_), Some((light, base_linear))) => {
+                known += 1;
+                let linear = base_linear * (light.lamps_linear + light.environment_linear);
+                let origin = Provenance::new(ProvenanceKind::Hit, light.camera_mask);
+                (linear.to_array().map(srgb8_from_linear), origin)
+            }
+        };
+        let is_near = color(&view, place).iter().zip(expected).all(|(&a, b)| a.abs_diff(b) <= 1);
+        like += usize::from(is_near && provenance[place] == origin);
+    }
+    assert!(known > 2000, "{known} known pixels");
+    like as f32 / provenance.len() as f32
+}
+
+#[test]
+fn views_are_those_of_the_scalar_twin() {
+    let few = sphere_on_a_floor(vec![lamp(0.3, 1.0), lamp(-0.6, 0.5)]);
+    let many = sphere_on_a_floor((0..20).map(|number| lamp(0.1 * number as f32 - 1.0, 0.1)).collect());
+    for quality in [LightCacheQuality::Draft, LightCacheQuality::Balanced, LightCacheQuality::Fine] {
+        let share = share_like_the_twin(&few, quality);
+        assert!(share >= 0.999, "{quality}: {share}");
+    }
+    let share = share_like_the_twin(&many, LightCacheQuality::Balanced);
+    assert!(share >= 0.999, "20 lamps: {share}");
+}
+
+#[test]
+fn samples_that_are_not_of_this_light_are_refused_by_name() {
+    let renderer = &device().1;
+    let scene = upload(&shadowed_floor());
+    let work = work(&scene, LIGHTING);
+    let refused = |images: &[DepthImage]| {
+        let error = renderer.upload_light(&scene, work.lighting, images, work.turn).err();
+        error.expect("refused").to_string()
+    };
+    let good = samples(work);
+    let with = |change: fn(&mut DepthImage)| {
+        let mut images = good.clone();
+        change(&mut images[1]);
+        refused(&images)
+    };
+    let colored = renderer.draw_depth_images(work, &sample_cameras(), SamplePlanes::default()).expect("images");
+    assert_eq!(refused(&colored), "sample image 0: colour where light is needed");
+    assert!(refused(&[]).contains("1 to 16 images") && refused(&vec![good[0].clone(); 17]).contains("1 to 16 images"));
+    let unshared = with(|image| image.light.as_mut().expect("light").share8.clear());
+    assert_eq!(unshared, "sample image 1: 0 planes of shares of light, the scene's lamps and lighting need 1");
+    assert!(with(|image| image.normal_oct16 = None).contains("normal"));
+    let single_pole =
+        SinglePoleCamera::around(&Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE }, Vec3::Z * 3.0, 8.0, VIEW_PX);
+    let bent = renderer.draw_depth_images(work, &[Camera::SinglePole(single_pole)], LIGHT).expect("an image");
+    assert!(refused(&bent).contains("must be a pinhole"), "{}", refused(&bent));
+}
+
+#[test]
+fn light_that_is_no_number_or_without_bound_makes_no_nan() {
+    let scene = upload(&shadowed_floor());
+    let work = work(&scene, LIGHTING);
+    let mut images = samples(work);
+    let light = images[0].light.as_mut().expect("light");
+    light.lamps_rgb9e5.fill(rgb9e5_from_linear(Vec3::INFINITY));
+    light.environment_rgb9e5.fill(rgb9e5_from_linear(Vec3::NAN));
+    let view = cached(work, &images, LightCacheQuality::Draft, ViewPlanes::ALL);
+    let known = view.provenance.as_ref().expect("provenance").iter().position(|origin| origin.camera_mask() != 0);
+    let place = 3 * known.expect("a known pixel");
+    assert!(view.srgb8[place..place + 3].iter().all(|&channel| channel > 0), "bright, not black");
+}
+
+#[test]
+fn one_camera_is_enough_for_a_set() {
+    let scene = upload(&shadowed_floor());
+    let work = work(&scene, LIGHTING);
+    let images = &samples(work)[..1];
+    let view = cached(work, images, LightCacheQuality::Balanced, ViewPlanes::ALL);
+    let traced = direct(DrawWork { lighting: "soft 64, occlusion 64 1m".parse().expect("a lighting"), ..work });
+    assert!(difference(&view, &traced) < 4.0);
+}

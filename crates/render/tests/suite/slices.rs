@@ -9,8 +9,14 @@ use render::{DrawWork, GpuScene, Refinement, Renderer, SamplePlanes, Visibility}
 use scene::Scene;
 use scene::procedural::{courtyard, mirror_pair};
 
-const PLANES: SamplePlanes =
-    SamplePlanes { antialias: Antialias::NONE, normal: true, surface_id: true, specular: true, corners: true, light: false };
+const PLANES: SamplePlanes = SamplePlanes {
+    antialias: Antialias::NONE,
+    normal: true,
+    surface_id: true,
+    specular: true,
+    corners: true,
+    light: false,
+};
 /// Rows of a piece are eight, and a draw has one triangle.
 const FEW_UNITS: u64 = 1;
 

@@ -10,8 +10,14 @@ use scene::procedural::quad;
 use scene::{Instance, Scene};
 
 pub const SIZE_PX: UVec2 = UVec2::new(96, 72);
-const ALL: SamplePlanes =
-    SamplePlanes { antialias: Antialias::NONE, normal: true, surface_id: true, specular: true, corners: false, light: false };
+const ALL: SamplePlanes = SamplePlanes {
+    antialias: Antialias::NONE,
+    normal: true,
+    surface_id: true,
+    specular: true,
+    corners: false,
+    light: false,
+};
 
 /// The software device of this program; a test without one fails.
 pub fn device() -> &'static (Arc<Gpu>, Renderer) {
