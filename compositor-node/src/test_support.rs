@@ -19,6 +19,7 @@ pub(crate) fn workload() -> Workload {
         timeline: Timeline::still(0.0),
         illumination: Illumination::default(),
         refinement_steps: 1,
+        traced_pixel_count: None,
     }
 }
 

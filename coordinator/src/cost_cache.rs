@@ -140,7 +140,12 @@ pub(crate) mod tests {
     fn measured(reconstruct_view_s: f64) -> Known {
         let costs = Costs { sample_image_s: 3.0, reconstruct_view_s, encode_view_s: 0.001, ..Costs::default() };
         Known {
-            measured: Measured { costs, planes: SamplePlanes::default(), auto_exposure: ExposureEv::ZERO },
+            measured: Measured {
+                costs,
+                planes: SamplePlanes::default(),
+                auto_exposure: ExposureEv::ZERO,
+                traced_pixel_count: None,
+            },
             is_settled: true,
         }
     }

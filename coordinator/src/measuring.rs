@@ -132,7 +132,7 @@ fn was_idle(idle_for: Duration, elapsed: Duration) -> bool {
     idle_for > elapsed + REPORTED_WITHIN
 }
 
-/// Which planes a method needs is the same on every node, and the exposure nearly.
+/// Which planes a method needs is the same on every node, and the exposure nearly. All nodes find surfaces as the first one would.
 fn slowest(one: Measured, other: Measured) -> Measured {
     Measured { costs: one.costs.max(other.costs), ..one }
 }

@@ -59,12 +59,13 @@ async fn measured_opening(
             shared.with_scheduler(|scheduler| scheduler.admits_workload(&workload, budgeted.as_ref(), follows_viewers));
         admitted.map_err(|error| refusal(&error))
     };
-    let Measured { costs, planes, auto_exposure } = costs_of(shared, measurement, events, admits).await?;
+    let Measured { costs, planes, auto_exposure, traced_pixel_count } =
+        costs_of(shared, measurement, events, admits).await?;
     // A cube serves views from anywhere: there are no cells to follow viewers.
     let viewpoints = if workload.samples_cube() { Vec::new() } else { request.viewpoints };
     Ok(Opening {
         session,
-        workload: Workload { planes, ..workload },
+        workload: Workload { planes, traced_pixel_count, ..workload },
         method: request.method,
         views_per_set: request.views_per_set as usize,
         frames_per_s: request.frames_per_s,

@@ -51,6 +51,7 @@ pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Resul
         timeline: request.timeline,
         illumination: offer.illumination.clone(),
         refinement_steps: request.refinement_steps,
+        traced_pixel_count: None,
     };
     let workload = if cells.is_empty() { workload } else { workload.with_view_cells(cells) };
     let base = base_of(request, offer, &workload);

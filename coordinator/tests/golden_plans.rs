@@ -53,6 +53,7 @@ fn workload(images: usize, timeline: Timeline) -> Workload {
         timeline,
         illumination: Illumination::default(),
         refinement_steps: 1,
+        traced_pixel_count: None,
     }
 }
 

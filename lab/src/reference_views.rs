@@ -174,6 +174,7 @@ pub(crate) fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> any
         scene_time_s: 0.0,
         temporal_reference_s: None,
         refinement: cluster::Refinement::default(),
+        surfaces_by_rays: None,
     };
     SampleImage::depth_images(engine.sample(&work, TURN)?)?.iter().map(encoded_and_decoded).collect()
 }
@@ -190,6 +191,7 @@ fn direct_work(setup: &Setup, lighting: Lighting, cameras: &[PinholeCamera], pla
         lighting: lighting.to_string(),
         scene_time_s: 0.0,
         planes,
+        surfaces_by_rays: None,
     }
 }
 

@@ -208,5 +208,6 @@ fn workload(images: usize, sets: u32) -> Workload {
         timeline: Timeline { start_s: 0.0, step_s: 1.0, set_count: sets },
         illumination: Illumination::default(),
         refinement_steps: 1,
+        traced_pixel_count: None,
     }
 }

@@ -33,6 +33,7 @@ fn workload() -> Workload {
         timeline: Timeline::still(0.0),
         illumination: illumination(),
         refinement_steps: 1,
+        traced_pixel_count: None,
     }
 }
 

@@ -185,10 +185,11 @@ impl WorkloadState {
         }
     }
 
-    /// A workload whose images need no more planes than these is as good with these.
+    /// A workload whose images need no more planes than these is as good with these, however its surfaces are found.
     fn with_planes(&self, other: &Workload) -> Workload {
         let own = self.requested.planes;
-        Workload { planes: if own.contain(other.planes) { own } else { other.planes }, ..other.clone() }
+        let planes = if own.contain(other.planes) { own } else { other.planes };
+        Workload { planes, traced_pixel_count: self.requested.traced_pixel_count, ..other.clone() }
     }
 
     /// Where a compositor's live viewers are, in place of where they were.

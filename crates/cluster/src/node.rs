@@ -106,6 +106,8 @@ pub struct Measured {
     pub planes: SamplePlanes,
     /// The exposure at which the view in the middle of the workload's first view cell is bright, and little of it white.
     pub auto_exposure: ExposureEv,
+    /// The pixels up to which pictures find surfaces faster by rays; `None` where nobody measured it.
+    pub traced_pixel_count: Option<u32>,
 }
 
 /// A node is ready for a plan.

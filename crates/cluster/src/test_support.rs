@@ -29,6 +29,7 @@ pub(crate) fn workload() -> Workload {
         timeline: Timeline { start_s: 1.0, step_s: 0.5, set_count: 3 },
         illumination: illumination(),
         refinement_steps: 1,
+        traced_pixel_count: None,
     }
 }
 

@@ -41,6 +41,9 @@ pub struct Workload {
     pub illumination: Illumination,
     /// Steps in which a still picture is refined: from 1, finished at once, to [`MAX_REFINEMENT_STEPS`].
     pub refinement_steps: u32,
+    /// Pictures of at most so many pixels find surfaces by rays, larger ones by drawing triangles: which is faster was measured
+    /// when the workload was opened, and is the same on every node, so that two nodes make equal pictures. `None`: not measured.
+    pub traced_pixel_count: Option<u32>,
 }
 
 /// Planes of sample images that not every reconstruction method needs.
@@ -73,6 +76,12 @@ impl Workload {
     pub fn refinement(&self, set_index: u32) -> Refinement {
         let last = Refinement::last_of(self.refinement_steps);
         if self.timeline.moves() { last } else { Refinement { step: set_index.min(last.step), ..last } }
+    }
+
+    /// Whether pictures of so many pixels find surfaces by rays; `None` where that was not measured.
+    #[must_use]
+    pub fn finds_surfaces_by_rays(&self, pixels: usize) -> Option<bool> {
+        self.traced_pixel_count.map(|most| pixels <= most as usize)
     }
 
     /// All cells: view cells, and after them common cells.
@@ -126,6 +135,7 @@ impl Workload {
             timeline: self.timeline,
             illumination: self.illumination.clone(),
             refinement_steps: self.refinement_steps,
+            traced_pixel_count: self.traced_pixel_count,
         })
     }
 
@@ -330,6 +340,7 @@ struct Shown<'a> {
     volume: Aabb,
     background: Environment,
     refinement: [u32; 2],
+    traced_pixel_count: Option<u32>,
     illumination: &'a Illumination,
     sample_cameras: &'a [SampleCamera],
 }
@@ -349,6 +360,7 @@ impl SetContent {
             volume: workload.volume,
             background: workload.background,
             refinement: [refinement.step, refinement.steps],
+            traced_pixel_count: workload.traced_pixel_count,
             illumination: &workload.illumination,
             sample_cameras: &workload.sample_cameras,
         };

@@ -7,7 +7,7 @@ use std::sync::{Arc, Weak};
 
 use bands::{BAND_PIXELS, views_in_bands};
 use cluster::{CommonKind, DIRECT, SamplePlanes};
-use depth_image::{Aabb, Camera, DepthImage, SampleCamera, SampleImage, SampleImages, View};
+use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, SampleCamera, SampleImage, SampleImages, View};
 use gpu::{DevicePreference, Gpu, GpuError};
 use node::{
     CommonSet, DirectWork, Engine, EngineError, OpenEngine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
@@ -57,6 +57,8 @@ struct UploadedLight {
     scene_hash: String,
     lighting: Lighting,
     scene_time_s: f32,
+    /// Views of at most so many pixels find surfaces by rays.
+    traced_pixel_count: Option<u32>,
 }
 
 /// A set of images, with those of common cells.
@@ -205,8 +207,13 @@ impl GpuEngine {
         let scene = self.scene(&set.scene_hash)?;
         let upload = || self.renderer.upload_light(&scene, lighting, images, turn).map_err(render_error);
         let cache = self.catching(upload)?;
-        let (scene_hash, scene_time_s) = (set.scene_hash.clone(), set.scene_time_s);
-        Ok(Arc::new(Uploaded::Light(UploadedLight { cache, scene_hash, lighting, scene_time_s })))
+        Ok(Arc::new(Uploaded::Light(UploadedLight {
+            cache,
+            scene_hash: set.scene_hash.clone(),
+            lighting,
+            scene_time_s: set.scene_time_s,
+            traced_pixel_count: set.traced_pixel_count,
+        })))
     }
 
     /// Views whose surfaces come from the scene and whose light comes from samples.
@@ -215,14 +222,17 @@ impl GpuEngine {
         light: &UploadedLight,
         method: ReconstructionMethod,
         work: &ViewWork,
-        turn: Turn,
+        turn: gpu::Turn,
     ) -> Result<Vec<View>, EngineError> {
         let quality = method.light_cache_quality().ok_or_else(|| {
             invalid("reconstruction_method", format!("the samples have light where {method} needs colour"))
         })?;
-        let UploadedLight { cache, scene_hash, lighting, scene_time_s } = light;
+        let UploadedLight { cache, scene_hash, lighting, scene_time_s, traced_pixel_count } = light;
         let scene = self.scene(scene_hash)?;
+        let pixels = work.cameras.first().map_or(0, PinholeCamera::pixel_count);
+        let by_rays = traced_pixel_count.map(|most| pixels <= most as usize);
         let draw = draw_work(&scene, *lighting, *scene_time_s, turn);
+        let draw = DrawWork { visibility: visibility(by_rays), ..draw };
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
             let make = || self.renderer.draw_cached_views(draw, cache, quality, cameras, work.planes);
             self.catching(|| make().map_err(render_error))
@@ -239,9 +249,17 @@ fn device_turn(Turn { class, flow }: Turn) -> gpu::Turn {
     gpu::Turn { class, flow }
 }
 
-fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32, turn: Turn) -> DrawWork<'_> {
+fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32, turn: gpu::Turn) -> DrawWork<'_> {
     let (visibility, refinement) = (Visibility::Measured, Refinement::default());
-    DrawWork { scene, lighting, scene_time_s, visibility, refinement, turn: device_turn(turn) }
+    DrawWork { scene, lighting, scene_time_s, visibility, refinement, turn }
+}
+
+fn visibility(surfaces_by_rays: Option<bool>) -> Visibility {
+    match surfaces_by_rays {
+        Some(true) => Visibility::Rays,
+        Some(false) => Visibility::Triangles,
+        None => Visibility::Measured,
+    }
 }
 
 impl Engine for GpuEngine {
@@ -296,7 +314,8 @@ impl Engine for GpuEngine {
         let lighting = mirrored.without_reflections().unwrap_or(mirrored);
         let draw = DrawWork {
             refinement: Refinement { step, steps },
-            ..draw_work(&scene, lighting, request.scene_time_s, turn)
+            visibility: visibility(request.surfaces_by_rays),
+            ..draw_work(&scene, lighting, request.scene_time_s, device_turn(turn))
         };
         let method: SamplingMethod = parsed("sampling_method", &request.sampling)?;
         if request.cameras.iter().any(|camera| camera.depth().is_none()) {
@@ -374,7 +393,7 @@ impl Engine for GpuEngine {
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
         let images = match (set as &dyn Any).downcast_ref().ok_or_else(of_another_device)? {
             Uploaded::Images(images) => images,
-            Uploaded::Light(light) => return self.draw_cached(light, method, work, turn),
+            Uploaded::Light(light) => return self.draw_cached(light, method, work, device_turn(turn)),
         };
         let UploadedImages { set, reflections, glossy_rays, mirrors, base } = images;
         let cells = mirrors.iter().map(|(bounds, shown)| MirrorCell { bounds: *bounds, surroundings: shown });
@@ -388,11 +407,20 @@ impl Engine for GpuEngine {
         })
     }
 
+    fn traced_pixel_count(&self, work: &DirectWork, turn: Turn) -> Result<Option<u32>, EngineError> {
+        let scene = self.scene(&work.scene_hash)?;
+        let Some(camera) = work.cameras.first() else { return Ok(None) };
+        let draw = draw_work(&scene, parsed("lighting", &work.lighting)?, work.scene_time_s, device_turn(turn));
+        let count = || self.renderer.traced_pixel_count(draw, camera).map_err(render_error);
+        self.catching(count).map(Some)
+    }
+
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError> {
         let scene = self.scene(&work.scene_hash)?;
         let lighting = parsed("lighting", &work.lighting)?;
+        let draw = draw_work(&scene, lighting, work.scene_time_s, device_turn(turn));
+        let draw = DrawWork { visibility: visibility(work.surfaces_by_rays), ..draw };
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
-            let draw = draw_work(&scene, lighting, work.scene_time_s, turn);
             self.catching(|| self.renderer.draw_views(draw, cameras, work.planes).map_err(render_error))
         })
     }

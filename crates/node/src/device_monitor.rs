@@ -166,6 +166,10 @@ impl Engine for DeviceMonitor {
         })
     }
 
+    fn traced_pixel_count(&self, work: &DirectWork, turn: Turn) -> Result<Option<u32>, EngineError> {
+        self.monitored(self.engine.traced_pixel_count(work, turn))
+    }
+
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError> {
         self.in_halves(&work.cameras, |cameras| {
             self.engine.draw_direct(&DirectWork { cameras: cameras.to_vec(), ..work.clone() }, turn)

@@ -90,6 +90,12 @@ pub trait Engine: Send + Sync + 'static {
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError>;
     /// Draws one view for each camera from the scene itself.
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError>;
+    /// The pixels up to which pictures of a scene find surfaces faster by rays than by drawing triangles, measured for views like
+    /// the first of `work`. `None` for an engine that knows one way only.
+    fn traced_pixel_count(&self, work: &DirectWork, turn: Turn) -> Result<Option<u32>, EngineError> {
+        let (_, _) = (work, turn);
+        Ok(None)
+    }
 }
 
 /// Opens the engine of a device, for a node's start and again after the device was lost. It blocks.
@@ -145,6 +151,8 @@ pub struct SampleWork {
     pub temporal_reference_s: Option<f32>,
     /// How far the light is refined. Any step may be asked for first, or alone.
     pub refinement: Refinement,
+    /// Whether surfaces are found by rays or drawn; `None`: whichever this node measured to be faster.
+    pub surfaces_by_rays: Option<bool>,
 }
 
 impl SampleWork {
@@ -161,8 +169,17 @@ impl SampleWork {
             scene_time_s: workload.timeline.start_s as f32,
             temporal_reference_s: None,
             refinement: Refinement::default(),
+            surfaces_by_rays: surfaces_by_rays(
+                workload,
+                workload.sample_cameras.first().map(SampleCamera::pixel_count),
+            ),
         }
     }
+}
+
+/// How all nodes find the surfaces of pictures of a size.
+fn surfaces_by_rays(workload: &Workload, pixels: Option<usize>) -> Option<bool> {
+    workload.finds_surfaces_by_rays(pixels?)
 }
 
 /// The images of one set.
@@ -183,6 +200,8 @@ pub struct SampleSet {
     pub lighting: String,
     /// The moment of the scene that the images show.
     pub scene_time_s: f32,
+    /// As in the workload, for views of this set whose surfaces come from the scene.
+    pub traced_pixel_count: Option<u32>,
     /// It is of a common cell: rays off mirrors are followed in it, and may cover several texels.
     pub is_common: bool,
 }
@@ -201,6 +220,7 @@ impl SampleSet {
             illumination: workload.illumination.clone(),
             lighting: workload.lighting.clone(),
             scene_time_s: workload.timeline.start_s as f32,
+            traced_pixel_count: workload.traced_pixel_count,
             is_common,
         })
     }
@@ -228,6 +248,8 @@ pub struct DirectWork {
     pub scene_time_s: f32,
     /// Planes beside colour.
     pub planes: ViewPlanes,
+    /// Whether surfaces are found by rays or drawn; `None`: whichever this node measured to be faster.
+    pub surfaces_by_rays: Option<bool>,
 }
 
 impl DirectWork {
@@ -235,6 +257,7 @@ impl DirectWork {
     #[must_use]
     pub fn of(workload: &Workload, cameras: Vec<PinholeCamera>, planes: ViewPlanes) -> Self {
         Self {
+            surfaces_by_rays: surfaces_by_rays(workload, cameras.first().map(PinholeCamera::pixel_count)),
             scene_hash: workload.scene.hash.to_string(),
             cameras,
             lighting: workload.lighting.clone(),

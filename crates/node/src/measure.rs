@@ -31,14 +31,15 @@ pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Resu
     let class = if request.in_background { WorkClass::Background } else { WorkClass::Batch };
     let (measured_request, of_pixels) = of_most_pixels(request);
     let measurement = Measurement { engine, turn: Turn { class, flow: Turn::next_flow() } };
-    let Measured { costs, planes, auto_exposure } = measurement.costs(&measured_request)?;
+    let measured = measurement.costs(&measured_request)?;
+    let costs = measured.costs;
     let costs = Costs {
         direct_view_s: costs.direct_view_s * of_pixels,
         reconstruct_view_s: costs.reconstruct_view_s * of_pixels,
         encode_view_s: costs.encode_view_s * of_pixels,
         ..costs
     };
-    Ok(Measured { costs, planes, auto_exposure })
+    Ok(Measured { costs, ..measured })
 }
 
 /// The request with views of [`MOST_PIXELS`] at most, and the pixels of a requested view for each of theirs.
@@ -98,7 +99,13 @@ impl Measurement<'_> {
         let in_order = engine.images_are_sequential(&workload.sampling)?;
         let costs =
             Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles };
-        Ok(Measured { costs, planes, auto_exposure: auto_exposure(engine, workload, self.turn)? })
+        let first_view = DirectWork::of(workload, request.views(1), request.planes);
+        Ok(Measured {
+            costs,
+            planes,
+            auto_exposure: auto_exposure(engine, workload, self.turn)?,
+            traced_pixel_count: engine.traced_pixel_count(&first_view, self.turn)?,
+        })
     }
 
     /// Images as they leave a sampler, which encodes one set before it samples the next.

@@ -151,6 +151,7 @@ pub(crate) fn request(batch_count: u32) -> MeasureCosts {
         timeline: Timeline { start_s: 0.0, step_s: 0.0, set_count: 8 },
         illumination: Illumination { lights: vec![lamp], ..Illumination::default() },
         refinement_steps: 4,
+        traced_pixel_count: None,
     };
     MeasureCosts {
         workload,

@@ -93,6 +93,7 @@ impl Subject {
             scene_time_s: self.scene_time_s,
             temporal_reference_s: None,
             refinement: Refinement::default(),
+            surfaces_by_rays: None,
         })
     }
 
@@ -107,6 +108,7 @@ impl Subject {
             illumination: self.illumination.clone(),
             lighting: self.lighting(light).to_owned(),
             scene_time_s: self.scene_time_s,
+            traced_pixel_count: None,
             is_common: false,
         }
     }
@@ -120,6 +122,7 @@ impl Subject {
             lighting: self.lighting(light).to_owned(),
             scene_time_s: self.scene_time_s,
             planes,
+            surfaces_by_rays: None,
         }
     }
 

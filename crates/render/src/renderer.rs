@@ -288,6 +288,18 @@ impl Renderer {
         Ok(self.costs_in_turn(scene, camera, scene_time_s, Turn::default())?.at(camera.pixel_count()))
     }
 
+    /// The pixels up to which pictures of a scene find surfaces faster by rays: measured with the scene's first pictures.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn traced_pixel_count(&self, work: DrawWork<'_>, camera: &PinholeCamera) -> Result<u32, RenderError> {
+        if is_drawn_at_each_moment(work) {
+            return Ok(0);
+        }
+        let costs = self.costs_in_turn(work.scene, camera, work.scene_time_s, work.turn)?;
+        Ok(costs.most_traced_pixels(camera.pixel_count()))
+    }
+
     /// Whether surfaces are found by rays. A live stream does not wait for the measurement: where there is none, it traces rays
     /// if the scene has more triangles than the picture pixels.
     fn is_by_rays(
@@ -401,11 +413,10 @@ impl Renderer {
         let by_rays = match work.visibility {
             // Triangles are drawn through one eye.
             _ if cameras[0].pinhole().is_none() => true,
+            _ if sequence.is_some_and(|sequence| sequence.known.test.traces_rays()) => true,
             Visibility::Triangles => false,
             Visibility::Rays => true,
-            Visibility::Measured if sequence.is_some_and(|sequence| sequence.known.test.traces_rays()) => true,
-            // Each moment of a moving scene would need a tree that nothing else needs.
-            Visibility::Measured if work.scene.animated && !work.lighting.is_traced() => false,
+            Visibility::Measured if is_drawn_at_each_moment(work) => false,
             Visibility::Measured => {
                 self.is_by_rays(work.scene, cameras[0].reference(), work.scene_time_s, work.turn)?
             }
@@ -422,6 +433,11 @@ impl Renderer {
         let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) as usize;
         PIXELS_A_SUBMISSION.min(bytes / (4 * output.layout().count.max(output.sums.count())))
     }
+}
+
+/// Each moment of a moving scene would need a tree that nothing else needs.
+fn is_drawn_at_each_moment(work: DrawWork<'_>) -> bool {
+    work.scene.animated && !work.lighting.is_traced()
 }
 
 /// The camera with the same field of view and no fewer than `pixels` pixels.

@@ -58,6 +58,17 @@ impl Costs {
         Self { triangles: line(|choice| choice.triangles_s), rays: line(|choice| choice.rays_s) }
     }
 
+    /// The pixels up to which rays are faster. Lines that do not cross where pictures are have one answer for all sizes, that of
+    /// a view of `pixels`.
+    pub fn most_traced_pixels(&self, pixels: usize) -> u32 {
+        let gain_s = self.triangles.fixed_s - self.rays.fixed_s;
+        let loss_a_pixel_s = self.rays.pixel_s - self.triangles.pixel_s;
+        if gain_s > 0.0 && loss_a_pixel_s > 0.0 {
+            return (gain_s / loss_a_pixel_s) as u32;
+        }
+        if self.at(pixels).rays_are_faster() { u32::MAX } else { 0 }
+    }
+
     /// The predicted costs of a view with this number of pixels.
     pub fn at(&self, pixels: usize) -> Choice {
         Choice { triangles_s: self.triangles.at(pixels), rays_s: self.rays.at(pixels) }
@@ -114,6 +125,17 @@ mod tests {
         let (same, large) = (costs.at(4000), costs.at(10_000));
         assert!(near(same.triangles_s, 4.3) && near(same.rays_s, 4.0) && same.rays_are_faster());
         assert!(near(large.triangles_s, 4.9) && near(large.rays_s, 10.0) && !large.rays_are_faster());
+    }
+
+    #[test]
+    fn rays_are_faster_up_to_where_the_lines_cross() {
+        let choice = |triangles_s, rays_s| Choice { triangles_s, rays_s };
+        let crossing = Costs::through([(1000, choice(4.0, 1.0)), (4000, choice(4.0, 4.0))]);
+        assert!((3998..=4000).contains(&crossing.most_traced_pixels(1)), "{}", crossing.most_traced_pixels(1));
+        let rays = Costs::through([(1000, choice(4.0, 1.0)), (4000, choice(16.0, 4.0))]);
+        assert_eq!(rays.most_traced_pixels(4000), u32::MAX);
+        let triangles = Costs::through([(1000, choice(1.0, 4.0)), (4000, choice(4.0, 16.0))]);
+        assert_eq!(triangles.most_traced_pixels(4000), 0);
     }
 
     #[test]

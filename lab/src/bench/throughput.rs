@@ -73,6 +73,7 @@ fn direct_s_a_view(reference: &ReferenceViews, experiment: &Experiment, runs: us
         lighting: experiment.args.lighting.to_string(),
         scene_time_s: 0.0,
         planes: ViewPlanes::default(),
+        surfaces_by_rays: None,
     };
     let run = || {
         let start = Instant::now();

@@ -87,6 +87,7 @@ impl Subject {
             timeline: self.fresh_timeline(1),
             illumination: offer.illumination.clone(),
             refinement_steps: 1,
+            traced_pixel_count: None,
         };
         MeasureCosts {
             workload,

@@ -79,6 +79,7 @@ fn unknown_names_are_refused_with_their_field() {
                     scene_time_s: 0.0,
                     temporal_reference_s: None,
                     refinement: cluster::Refinement::default(),
+                    surfaces_by_rays: None,
                 },
                 TURN,
             )
@@ -96,6 +97,7 @@ fn unknown_names_are_refused_with_their_field() {
         illumination: setup.offer.illumination.clone(),
         lighting: args.lighting.to_string(),
         scene_time_s: 0.0,
+        traced_pixel_count: None,
         is_common: false,
     };
     let uploaded = engine.upload(&set, TURN).unwrap();
@@ -126,6 +128,7 @@ fn a_package_loads_as_the_scene_does() {
         lighting: "phong".to_owned(),
         scene_time_s: 0.0,
         planes: ViewPlanes::ALL,
+        surfaces_by_rays: None,
     };
     let views = engine.draw_direct(&work, TURN).unwrap();
     assert_eq!(views.len(), reference.views.len());

@@ -1,12 +1,13 @@
 //! Views with more pixels than a device's buffers hold are made in bands, and are what they would be in one piece.
 
+use cluster::DIRECT;
 use depth_image::{Antialias, PinholeCamera, VIEW_REACH_PX, View, ViewPart, ViewPlanes};
 use glam::{UVec2, Vec2, Vec3};
 use node::{DirectWork, Engine, SampleSet, Turn, ViewWork, WorkClass};
 use scene::Scene;
 use scene::procedural::uv_sphere;
 
-use crate::stage::{engine, sample_set};
+use crate::stage::{engine, light_set, sample_set};
 
 const LIGHTING: &str = "soft 2";
 const HASH: &str = "a ball";
@@ -55,16 +56,20 @@ fn a_view_in_bands_is_its_crops() {
     let scene = uv_sphere(1.0, 96);
     engine().put_scene(HASH, &scene).expect("a scene");
     let set = engine().upload(&samples(&scene), TURN).expect("a set");
+    let cameras = [-0.5, 0.5].map(|x| camera(x, UVec2::new(320, 240)));
+    let light = engine().upload(&light_set((HASH, &scene), &cameras, LIGHTING), TURN).expect("a set");
     let planes = ViewPlanes { antialias: Antialias::of(2).expect("offered"), ..ViewPlanes::ALL };
-    for direct in [false, true] {
+    for method in ["joint_carve", "light_cache", DIRECT] {
         let views = [view_camera(), crop_camera()].map(|camera| {
             let cameras = vec![camera];
-            let views = if direct {
-                let (scene_hash, lighting) = (HASH.to_owned(), LIGHTING.to_owned());
-                engine().draw_direct(&DirectWork { scene_hash, cameras, lighting, scene_time_s: 0.0, planes }, TURN)
+            let (scene_hash, lighting, method) = (HASH.to_owned(), LIGHTING.to_owned(), method.to_owned());
+            let views = if method == DIRECT {
+                let work =
+                    DirectWork { scene_hash, cameras, lighting, scene_time_s: 0.0, planes, surfaces_by_rays: None };
+                engine().draw_direct(&work, TURN)
             } else {
-                let work = ViewWork { cameras, method: "joint_carve".to_owned(), planes };
-                engine().reconstruct(set.as_ref(), &work, TURN)
+                let set = if method == "light_cache" { &light } else { &set };
+                engine().reconstruct(set.as_ref(), &ViewWork { cameras, method, planes }, TURN)
             };
             views.expect("a view").remove(0)
         });
@@ -72,7 +77,7 @@ fn a_view_in_bands_is_its_crops() {
         assert_eq!(whole.size_px, SIZE_PX);
         assert_eq!(whole.srgb8.len(), 3 * view_camera().pixel_count());
         let (differ, shown) = differences(whole, crop);
-        println!("direct {direct}: {differ} of the bytes differ, {shown} pixels show the ball");
-        assert!(shown > 10_000 && differ < 1e-3, "direct {direct}: {differ}, {shown}");
+        println!("{method}: {differ} of the bytes differ, {shown} pixels show the ball");
+        assert!(shown > 10_000 && differ < 1e-3, "{method}: {differ}, {shown}");
     }
 }

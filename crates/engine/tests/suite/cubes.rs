@@ -45,6 +45,7 @@ impl Stand {
             scene_time_s: 0.0,
             temporal_reference_s: None,
             refinement: Refinement::default(),
+            surfaces_by_rays: None,
         }
     }
 
@@ -75,7 +76,14 @@ impl Stand {
 
     fn direct(&self) -> View {
         let (scene_hash, lighting, cameras) = (HASH.to_owned(), LIGHTING.to_owned(), vec![camera()]);
-        let work = DirectWork { scene_hash, cameras, lighting, scene_time_s: 0.0, planes: ViewPlanes::COLOR };
+        let work = DirectWork {
+            scene_hash,
+            cameras,
+            lighting,
+            scene_time_s: 0.0,
+            planes: ViewPlanes::COLOR,
+            surfaces_by_rays: None,
+        };
         engine().draw_direct(&work, TURN).expect("a view").remove(0)
     }
 }

@@ -55,6 +55,7 @@ fn a_view_from_samples_shows_and_mirrors_the_map_of_the_package() {
         lighting: LIGHTING.to_owned(),
         scene_time_s: 0.0,
         planes: ViewPlanes::WITH_DEPTH,
+        surfaces_by_rays: None,
     };
     let direct = engine().draw_direct(&direct, Turn::of(WorkClass::Batch)).expect("a view").remove(0);
     let depths = view

@@ -1,7 +1,8 @@
-//! The engine on the software device: cubes, mirrors, environment maps, and views in bands.
+//! The engine on the software device: cubes, mirrors, environment maps, light of samples, and views in bands.
 
 mod bands;
 mod cubes;
 mod environment;
+mod light_cache;
 mod mirrors;
 mod stage;

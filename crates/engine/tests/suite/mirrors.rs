@@ -52,6 +52,7 @@ impl Stand {
             scene_time_s: 0.0,
             temporal_reference_s: None,
             refinement: Refinement::default(),
+            surfaces_by_rays: None,
         };
         let images = engine().sample(&work, TURN).expect("layers").try_into().expect("a cube");
         let set = engine().upload(&SampleSet { images, is_common: true, ..like }, TURN).expect("a set");
@@ -71,6 +72,7 @@ impl Stand {
             lighting: lighting.to_owned(),
             scene_time_s: 0.0,
             planes: ViewPlanes::COLOR,
+            surfaces_by_rays: None,
         };
         engine().draw_direct(&work, TURN).expect("a view").remove(0)
     }

@@ -25,16 +25,31 @@ pub fn loaded(hash: &str, name: &str) -> Scene {
 
 /// The images of these cameras, as views are made from them.
 pub fn sample_set((hash, scene): (&str, &Scene), cameras: &[impl Copy + Into<Camera>], lighting: &str) -> SampleSet {
+    planned_set((hash, scene), cameras, lighting, SamplePlanes::default())
+}
+
+/// Images of light in place of colour.
+pub fn light_set((hash, scene): (&str, &Scene), cameras: &[impl Copy + Into<Camera>], lighting: &str) -> SampleSet {
+    planned_set((hash, scene), cameras, lighting, SamplePlanes { light: true, ..SamplePlanes::default() })
+}
+
+fn planned_set(
+    (hash, scene): (&str, &Scene),
+    cameras: &[impl Copy + Into<Camera>],
+    lighting: &str,
+    planes: SamplePlanes,
+) -> SampleSet {
     let work = SampleWork {
         scene_hash: hash.to_owned(),
         cameras: cameras.iter().copied().map(|camera| camera.into().into()).collect(),
         wanted: (0..cameras.len() as u32).collect(),
         sampling: "conventional".to_owned(),
-        planes: SamplePlanes::default(),
+        planes,
         lighting: lighting.to_owned(),
         scene_time_s: 0.0,
         temporal_reference_s: None,
         refinement: Refinement::default(),
+        surfaces_by_rays: None,
     };
     SampleSet {
         scene_hash: hash.to_owned(),
@@ -43,6 +58,8 @@ pub fn sample_set((hash, scene): (&str, &Scene), cameras: &[impl Copy + Into<Cam
         background: scene.background,
         illumination: scene.illumination.clone(),
         lighting: lighting.to_owned(),
+        scene_time_s: 0.0,
+        traced_pixel_count: None,
         is_common: false,
     }
 }

@@ -21,7 +21,8 @@ messages! {
         planes: antialias_sample_count | exposure_ev | tone_curve | with_inverse_depth | with_provenance
     }, first |r| at_most(r.typical_views.len(), MAX_BATCH as usize, "typical_views"), then MeasureCosts::validate;
     MeasureCostsResponse = Measured {
-        costs; planes: with_normals | with_corner_inverse_depths | with_light, auto_exposure: auto_exposure_ev
+        costs, traced_pixel_count;
+        planes: with_normals | with_corner_inverse_depths | with_light, auto_exposure: auto_exposure_ev
     };
     ProbeViewsRequest = ProbeViews {
         workload, compared_lighting, views, with_errors; method: reconstruction_method, antialias: antialias_sample_count

@@ -19,7 +19,7 @@ messages! {
     Timeline = Timeline { start_s, step_s, set_count };
     Workload = Workload {
         scene as "workload.scene", sample_cameras, cell_first_indices, common_cells, lighting, volume as "workload.volume",
-        timeline as "workload.timeline", illumination as "workload.illumination", background as "workload.background";
+        timeline as "workload.timeline", illumination as "workload.illumination", background as "workload.background", traced_pixel_count;
         sampling: sampling_method, planes: with_normals | with_corner_inverse_depths | with_light,
         refinement_steps: refinement_step_count
     }, first |w| {

@@ -85,6 +85,7 @@ impl PageViews {
             illumination: setup.offer.illumination.clone(),
             lighting: lighting.to_string(),
             scene_time_s: 0.0,
+            traced_pixel_count: None,
             is_common: false,
         };
         let set = engine.upload(&set, turn)?;
@@ -95,7 +96,14 @@ impl PageViews {
         let (reconstructed, reconstruct_s) = timed(reconstruct)?;
         let draw = |camera| {
             let (scene_hash, lighting) = (setup.offer.hash.to_string(), lighting.to_string());
-            let work = DirectWork { scene_hash, cameras: vec![camera], lighting, scene_time_s: 0.0, planes };
+            let work = DirectWork {
+                scene_hash,
+                cameras: vec![camera],
+                lighting,
+                scene_time_s: 0.0,
+                planes,
+                surfaces_by_rays: None,
+            };
             one(engine.draw_direct(&work, turn)?)
         };
         draw(camera.resized(WARM_UP_PX))?;
@@ -115,6 +123,7 @@ fn sample_work(args: &DemoArgs, setup: &Setup, lighting: Lighting, planes: Sampl
         scene_time_s: 0.0,
         temporal_reference_s: None,
         refinement: Refinement::default(),
+        surfaces_by_rays: None,
     }
 }
 
