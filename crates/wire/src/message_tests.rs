@@ -76,6 +76,7 @@ pub(super) fn workload() -> Workload {
         timeline: Timeline { start_s: 1.0, step_s: 0.5, set_count: 3 },
         illumination: illumination(),
         refinement_steps: 1,
+        traced_pixel_count: Some(640 * 360),
     }
 }
 
@@ -677,7 +678,8 @@ fn typical_views_of_several_sizes_or_none_are_refused() {
 fn a_measured_exposure_survives_within_its_limits() {
     let auto_exposure = ExposureEv::new(-3.25).unwrap();
     let planes = SamplePlanes { light: true, ..SamplePlanes::default() };
-    let measured = Measured { costs: session_plan().costs, planes, auto_exposure };
+    let traced_pixel_count = Some(1 << 20);
+    let measured = Measured { costs: session_plan().costs, planes, auto_exposure, traced_pixel_count };
     let message = to_message::<proto::MeasureCostsResponse, _>(measured);
     assert_eq!(read::<Measured, _>(message), Ok(measured));
     let spoilt = proto::MeasureCostsResponse { auto_exposure_ev: f32::NAN, ..message };

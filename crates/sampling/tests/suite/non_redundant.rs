@@ -10,8 +10,14 @@ use scene::{Instance, Scene};
 use crate::stage::{device, upload};
 
 const SIZE_PX: UVec2 = UVec2::new(80, 60);
-const ALL: SamplePlanes =
-    SamplePlanes { antialias: Antialias::NONE, normal: true, surface_id: true, specular: false, corners: true };
+const ALL: SamplePlanes = SamplePlanes {
+    antialias: Antialias::NONE,
+    normal: true,
+    surface_id: true,
+    specular: false,
+    corners: true,
+    light: false,
+};
 const APART: [SamplingMethod; 3] = [
     SamplingMethod::NonRedundant(Redundancy::Pixel),
     SamplingMethod::NonRedundant(Redundancy::Visibility),
