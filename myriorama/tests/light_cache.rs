@@ -1,0 +1,103 @@
+//! `light_cache` in a cluster of several processes: its pictures, and those of a compositor's successor.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::io::{BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+const NODES: usize = 3;
+const VIEWS: usize = 160;
+
+/// A coordinator and its nodes, which are killed at the end.
+struct Cluster {
+    processes: Vec<Child>,
+    address: String,
+}
+
+fn program(arguments: &[&str]) -> Command {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_myriorama"));
+    program.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+    program
+}
+
+impl Cluster {
+    fn start() -> Self {
+        let scene = ["--scene", "courtyard", "--lighting", "soft 4, occlusion 4"];
+        let arguments = [&["coordinator", "--listen", "127.0.0.1:0"], &scene[..]].concat();
+        let mut coordinator = program(&arguments).spawn().unwrap();
+        let mut lines = BufReader::new(coordinator.stdout.take().unwrap()).lines().map(Result::unwrap);
+        let line = lines.find(|line| line.contains("http://127.0.0.1:")).unwrap();
+        let address = line[line.find("http://").unwrap()..].split_whitespace().next().unwrap().to_owned();
+        let node = |_| {
+            let arguments = ["node", "--coordinator", &address, "--device", "software"];
+            program(&arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+        };
+        let nodes = (0..NODES).map(node);
+        let processes = std::iter::once(coordinator).chain(nodes).collect();
+        let cluster = Self { processes, address };
+        while !cluster.has_all_nodes() {
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        cluster
+    }
+
+    fn has_all_nodes(&self) -> bool {
+        let status = program(&["status", "--coordinator", &self.address]).output().unwrap();
+        String::from_utf8_lossy(&status.stdout).matches("node-").count() >= NODES
+    }
+
+    fn view(&self, folder: &Path, arguments: &[&str]) -> Command {
+        let mut view = program(&["view", "--coordinator", &self.address, "--policy", "pipeline", "--size", "96x72"]);
+        view.args(["--method", "light_cache", "--provenance", "--out"]).arg(folder).args(arguments);
+        view
+    }
+}
+
+impl Drop for Cluster {
+    fn drop(&mut self) {
+        for process in &mut self.processes {
+            let _ = process.kill();
+            let _ = process.wait();
+        }
+    }
+}
+
+fn succeeded(output: &Output) -> String {
+    let [out, error] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
+    assert!(output.status.success(), "{out}{error}");
+    out
+}
+
+fn pictures(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut pictures: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|end| end == "png")).collect();
+    pictures.sort();
+    pictures
+}
+
+#[test]
+fn pictures_look_like_direct_ones_and_outlive_a_killed_node() {
+    let mut cluster = Cluster::start();
+    let folders = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    let [compared, whole, disturbed] = folders.each_ref().map(tempfile::TempDir::path);
+    let against_direct = ["--orbit", "4", "--compare", "--least-psnr", "36"];
+    let text = succeeded(&cluster.view(compared, &against_direct).output().unwrap());
+    assert!(text.contains("foreground PSNR"), "{text}");
+
+    let count = VIEWS.to_string();
+    let many = ["--views", &count];
+    succeeded(&cluster.view(whole, &many).output().unwrap());
+    let view = cluster.view(disturbed, &many).spawn().unwrap();
+    while pictures(disturbed).is_empty() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    cluster.processes[NODES].kill().unwrap();
+    succeeded(&view.wait_with_output().unwrap());
+    let [whole, disturbed] = [whole, disturbed].map(pictures);
+    assert_eq!((whole.len(), disturbed.len()), (2 * VIEWS, 2 * VIEWS), "colour and provenance");
+    for (one, other) in whole.iter().zip(&disturbed) {
+        assert!(fs::read(one).unwrap() == fs::read(other).unwrap(), "{} differs", other.display());
+    }
+}
