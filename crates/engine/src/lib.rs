@@ -488,7 +488,7 @@ fn sampling_error(error: SamplingError) -> EngineError {
     match error {
         SamplingError::Render(error) => render_error(error),
         SamplingError::Layer { .. } | SamplingError::Lines { .. } => invalid("sample_cameras", error),
-        SamplingError::Cameras { .. } => invalid("sampling_method", error),
+        SamplingError::Cameras { .. } | SamplingError::Positions { .. } => invalid("sampling_method", error),
         SamplingError::Selection { .. } => invalid("image_indices", error),
     }
 }

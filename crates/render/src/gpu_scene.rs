@@ -152,7 +152,7 @@ impl GpuScene {
             background: gpu.buffer_with("background", &gpu::background_bytes(&scene.background), BufferUsages::UNIFORM),
             illumination: gpu.buffer_with("illumination", &illumination, BufferUsages::UNIFORM),
             light_count: scene.illumination.lights.len(),
-            lamp_shares: GpuLampShares::new(&scene.illumination.lamps_with_shares(), scene.illumination.lights.len()),
+            lamp_shares: GpuLampShares::new(&scene.illumination),
             environment: environment.map(Arc::new),
             rays: RayScene::of(gpu, scene, &textures, &ordered, motion.clone()),
             highlights: [

@@ -1,7 +1,9 @@
 //! Light of samples on a device, and its look-up at the surfaces of views.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Camera, DepthImage, LightCacheQuality, LightPlanes, MAX_LAMP_SHARES, PinholeCamera, ProvenanceKind};
+use depth_image::{
+    Camera, DepthImage, Illumination, LightCacheQuality, LightPlanes, MAX_LAMP_SHARES, PinholeCamera, ProvenanceKind,
+};
 use glam::{DVec3, Vec3};
 use gpu::{
     Binding, DispatchSize, Gpu, GpuEnvironment, ResourceTraits, ShaderVariant, Table, TablePool, Turn, WorkKind,
@@ -135,13 +137,13 @@ impl LookUpTests {
 }
 
 impl GpuLampShares {
-    /// The numbers of the lamps that have a share, of `light_count`.
-    pub fn new(named: &[u32], light_count: usize) -> Self {
+    /// The lamps of a scene that have a share.
+    pub fn new(illumination: &Illumination) -> Self {
         let mut lamps = [[0; 4]; 4];
-        for (place, &lamp) in named.iter().enumerate() {
+        for (place, lamp) in illumination.lamps_with_shares().into_iter().enumerate() {
             lamps[place / 4][place % 4] = lamp;
         }
-        Self { lamps, lamp_count: shares_of_lamps(light_count) as u32, padding: [0; 3] }
+        Self { lamps, lamp_count: shares_of_lamps(illumination.lights.len()) as u32, padding: [0; 3] }
     }
 }
 

@@ -16,6 +16,9 @@ pub enum SamplingError {
     /// The lines of a cube are sampled by another method.
     #[error("{method} samples with the cameras of views, and not along the lines of a cube")]
     Cameras { method: String },
+    /// A texel has several positions, whose colours count, but one light.
+    #[error("{method} samples several positions a texel, and samples of light have one")]
+    Positions { method: String },
     /// A selected image is not in the set, or images in sequence are not all selected.
     #[error("image {index} is not among the {cameras} of the set, or not wanted with all others by {method}")]
     Selection { index: u32, cameras: usize, method: String },

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use depth_image::{Camera, DepthImage, LayeredDepthImage, LayeredLightField, LightFieldCamera, ParallelCamera};
+use depth_image::{
+    Antialias, Camera, DepthImage, LayeredDepthImage, LayeredLightField, LightFieldCamera, ParallelCamera,
+};
 use gpu::Gpu;
 use render::{DrawWork, RenderError, Renderer, SamplePlanes};
 
@@ -32,6 +34,9 @@ impl Sampler {
     /// A camera that is not valid or does not go with the method, or the device.
     pub fn sample(&self, work: &SampleWork<'_>) -> Result<Vec<DepthImage>, SamplingError> {
         check_wanted(work)?;
+        if work.planes.light && work.method.antialias() > Antialias::NONE {
+            return Err(SamplingError::Positions { method: work.method.to_string() });
+        }
         work.method.check(work.cameras)?;
         let Some(test) = work.method.redundancy_test() else {
             let cameras: Vec<Camera> = work.wanted.iter().map(|&index| work.cameras[index as usize]).collect();

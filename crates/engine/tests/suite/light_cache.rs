@@ -79,9 +79,8 @@ fn views_are_equal_again_and_beside_a_live_stream() {
     assert!(view(set.as_ref(), METHOD) == whole, "in slices");
 }
 
-/// An image of light, whose surfaces are found by rays.
-fn sampled(camera: SampleCamera) -> DepthImage {
-    let work = SampleWork {
+fn sample_work(camera: SampleCamera) -> SampleWork {
+    SampleWork {
         scene_hash: HASH.to_owned(),
         cameras: vec![camera],
         wanted: vec![0],
@@ -92,8 +91,13 @@ fn sampled(camera: SampleCamera) -> DepthImage {
         temporal_reference_s: None,
         refinement: cluster::Refinement::default(),
         surfaces_by_rays: Some(true),
-    };
-    let images: SampleImages = engine().sample(&work, TURN).expect("an image").try_into().expect("an image");
+    }
+}
+
+/// An image of light, whose surfaces are found by rays.
+fn sampled(camera: SampleCamera) -> DepthImage {
+    let images: SampleImages =
+        engine().sample(&sample_work(camera), TURN).expect("an image").try_into().expect("an image");
     images.depth()[0].clone()
 }
 
@@ -153,19 +157,22 @@ fn what_does_not_fit_is_refused_by_name() {
 }
 
 #[test]
+fn samples_of_light_have_one_position() {
+    scene();
+    let work = SampleWork { sampling: "conventional:4".to_owned(), ..sample_work(sample_cameras()[0].into()) };
+    let error = engine().sample(&work, TURN).expect_err("refused").to_string();
+    assert!(error.contains("sampling_method") && error.contains("samples of light have one"), "{error}");
+}
+
+#[test]
 fn a_layered_cube_is_no_cache_of_light_yet() {
     let grid = CubeGrid::around(&scene().bounds(), 16).expect("a grid");
     let work = SampleWork {
-        scene_hash: HASH.to_owned(),
         cameras: grid.cameras().map(SampleCamera::from).to_vec(),
         wanted: vec![0, 1, 2],
         sampling: "layered_cube:16".to_owned(),
         planes: engine().sample_planes(METHOD).expect("planes"),
-        lighting: LIGHTING.to_owned(),
-        scene_time_s: 0.0,
-        temporal_reference_s: None,
-        refinement: cluster::Refinement::default(),
-        surfaces_by_rays: None,
+        ..sample_work(sample_cameras()[0].into())
     };
     let error = engine().sample(&work, TURN).expect_err("refused").to_string();
     assert!(error.contains("not from a layered cube"), "{error}");
