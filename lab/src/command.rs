@@ -10,6 +10,7 @@ use crate::fronts::command::{self as fronts, FrontsArgs};
 use crate::impostors::command::{self as impostors, ImpostorsArgs};
 use crate::lages::{self, LagesArgs};
 use crate::layered::command::{self as layered, LayeredArgs};
+use crate::light_cache_study::command::{self as light_cache, LightCacheArgs};
 use crate::placement::command::{self as placement, PlacementArgs};
 use crate::planner_study::command::{self as planner_study, PlannerArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
@@ -55,6 +56,13 @@ pub enum StudyCommand {
     Impostors(ImpostorsArgs),
     /// Measures views from layered depth cubes, which hold every surface once
     Layered(LayeredArgs),
+    /// Measures views with light from samples against direct drawing with few rays, at equal error
+    ///
+    /// For each scene the report has the time and the errors of direct drawing with 1 to 16 rays a position and of each
+    /// quality of light_cache, and the gain: the time of direct drawing with the fewest rays that reaches a quality's FLIP,
+    /// over the quality's time. docs/benchmarks.md says how they are measured.
+    #[command(name = "light_cache")]
+    LightCache(LightCacheArgs),
     /// Measures how errors change from frame to frame, and the jump where samples change
     Stability(StabilityArgs),
     /// Compares two reports of `study fronts`
@@ -87,6 +95,7 @@ impl StudyCommand {
             Self::Placement(args) => placement::run(args),
             Self::Impostors(args) => impostors::run(args),
             Self::Layered(args) => layered::run(args),
+            Self::LightCache(args) => light_cache::run(args),
             Self::Stability(args) => stability::run(args),
             Self::Compare(args) => compare::run(args),
             Self::Errors(args) => view_errors::run(args),

@@ -15,6 +15,7 @@ mod fronts;
 mod impostors;
 mod lages;
 mod layered;
+mod light_cache_study;
 mod lighting_study;
 mod load;
 mod memory;

@@ -179,7 +179,7 @@ pub(crate) fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> any
     SampleImage::depth_images(engine.sample(&work, TURN)?)?.iter().map(encoded_and_decoded).collect()
 }
 
-fn encoded_and_decoded(image: &DepthImage) -> anyhow::Result<DepthImage> {
+pub(crate) fn encoded_and_decoded(image: &DepthImage) -> anyhow::Result<DepthImage> {
     let encoded = encode_depth_image(image, PlaneSet::ALL)?;
     Ok(decode_depth_image(&encoded.header, image.camera, &encoded.payload, &DecodeLimits::default())?)
 }

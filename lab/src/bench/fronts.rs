@@ -113,7 +113,7 @@ pub fn models(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) ->
 }
 
 /// The largest model files of a folder and of its subfolders.
-pub(super) fn models_of(folder: &Path, most: usize) -> anyhow::Result<Vec<PathBuf>> {
+pub(crate) fn models_of(folder: &Path, most: usize) -> anyhow::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for path in entries(folder)? {
         let inside = if path.is_dir() { entries(&path)? } else { vec![path] };

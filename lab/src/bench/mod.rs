@@ -6,7 +6,7 @@ mod antialias;
 mod args;
 mod codec;
 mod convergence;
-mod fronts;
+pub(crate) mod fronts;
 mod light;
 mod loaded;
 mod peer;

@@ -1,0 +1,192 @@
+//! Times and errors of direct drawing with few rays, and of each quality of light from samples.
+
+use std::sync::Arc;
+
+use anyhow::Context as _;
+use depth_image::{Antialias, LightCacheQuality, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use engine::GpuEngine;
+use metrics::{PSNR_CAP_DB, Rgb8Image, flip_map, foreground, psnr_db};
+use rayon::prelude::*;
+use render::Lighting;
+
+use super::stage::{LIGHTING, SAMPLES_A_PIXEL, Stage, ViewLight, antialias};
+use super::subjects::Subject;
+
+/// Rays to a lamp and of occlusion at each position, in direct drawing.
+pub const DIRECT_RAYS: [u32; 5] = [1, 2, 4, 8, 16];
+/// The place in [`DIRECT_RAYS`] of direct drawing under [`LIGHTING`], whose rays the positions of a pixel share.
+pub const SHARED: usize = 2;
+/// The place of direct drawing with all rays of [`LIGHTING`] at each position: the reference.
+pub const REFERENCE: usize = DIRECT_RAYS.len() - 1;
+/// Twice the rays of the reference.
+const TRUTH_LIGHTING: &str = "soft 128, occlusion 128";
+pub const QUALITIES: [LightCacheQuality; 4] =
+    [LightCacheQuality::Draft, LightCacheQuality::Fast, LightCacheQuality::Balanced, LightCacheQuality::Fine];
+/// One ray to a lamp and one of occlusion: little light beside the surfaces.
+const PLAIN_LIGHTING: &str = "shadows, occlusion 1";
+/// A look-up costs at least this share of the surfaces; less is noise of the clock.
+const LEAST_LOOK_UP: f64 = 0.01;
+
+/// Measurements of a scene.
+pub struct SceneResult {
+    pub name: String,
+    pub is_outside: bool,
+    /// Direct drawing with each of [`DIRECT_RAYS`].
+    pub direct: Vec<Row>,
+    /// Each of [`QUALITIES`].
+    pub qualities: Vec<Row>,
+    /// Time of looking light up over the time of surfaces, one position a pixel, `draft`.
+    pub look_up_ratio: f64,
+}
+
+/// One way of making the views.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    pub name: String,
+    pub ms: f64,
+    pub errors: Errors,
+    /// The share of surface pixels that no sample knows; 0 in direct drawing, which asks none.
+    pub unknown: f64,
+}
+
+/// Errors over the foreground, means over views.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Errors {
+    /// Against the reference.
+    pub psnr_db: f64,
+    pub flip: f64,
+    /// Against the truth.
+    pub truth_flip: f64,
+}
+
+/// A gain at equal FLIP over direct drawing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gain {
+    pub ratio: f64,
+    /// No direct row reaches the FLIP: the gain is more than the ratio.
+    pub is_lower_bound: bool,
+}
+
+/// Measures a scene with `count` views.
+///
+/// # Errors
+/// The scene cannot be loaded, or the device fails.
+pub fn measure(engine: &Arc<GpuEngine>, subject: &Subject, count: usize) -> anyhow::Result<SceneResult> {
+    let setup = subject.load()?;
+    let stage = Stage::new(engine, &setup.scene, subject.viewpoints(&setup, count)?)?;
+    let lighting: Lighting = LIGHTING.parse()?;
+    let cache = stage.cache(lighting)?;
+    let mut names = Vec::new();
+    let mut lights = Vec::new();
+    for rays in DIRECT_RAYS {
+        let pixel_rays = rays * SAMPLES_A_PIXEL;
+        names.push(format!("direct, {rays} rays"));
+        lights.push(ViewLight::Direct(format!("soft {pixel_rays}, occlusion {pixel_rays}").parse()?));
+    }
+    for quality in QUALITIES {
+        names.push(quality.to_string());
+        lights.push(ViewLight::Cached { cache: &cache, lighting, quality });
+    }
+    let pictures =
+        lights.iter().map(|&light| stage.views(light, antialias())).collect::<anyhow::Result<Vec<Vec<View>>>>()?;
+    let reference = &pictures[REFERENCE];
+    let truth = truth(&stage)?;
+    let times = stage.ms_a_view(&lights, antialias())?;
+    let mut direct = Vec::new();
+    for ((name, views), ms) in names.into_iter().zip(&pictures).zip(times) {
+        let [psnr_db, flip] = mean_errors(reference, views)?;
+        let [_, truth_flip] = mean_errors(&truth, views)?;
+        let errors = Errors { psnr_db, flip, truth_flip };
+        direct.push(Row { name, ms, errors, unknown: unknown_share(views) });
+    }
+    let qualities = direct.split_off(DIRECT_RAYS.len());
+    let look_up_ratio = look_up_ratio(&stage)?;
+    Ok(SceneResult { name: subject.name.clone(), is_outside: subject.pose.is_none(), direct, qualities, look_up_ratio })
+}
+
+/// Seeds are made from the bits of the camera's eye: from the next place in x the picture is the same, and its noise another.
+fn truth(stage: &Stage) -> anyhow::Result<Vec<View>> {
+    let next = |camera: &PinholeCamera| PinholeCamera {
+        eye_in_world: camera.eye_in_world.with_x(camera.eye_in_world.x.next_up()),
+        ..*camera
+    };
+    let cameras: Vec<PinholeCamera> = stage.viewpoints.views.iter().map(next).collect();
+    let planes = ViewPlanes { antialias: antialias(), ..ViewPlanes::WITH_DEPTH };
+    stage.draw(ViewLight::Direct(TRUTH_LIGHTING.parse()?), &cameras, planes)
+}
+
+fn look_up_ratio(stage: &Stage) -> anyhow::Result<f64> {
+    let lighting = PLAIN_LIGHTING.parse()?;
+    let cache = stage.cache(lighting)?;
+    let draft = ViewLight::Cached { cache: &cache, lighting, quality: LightCacheQuality::Draft };
+    let ms = stage.ms_a_view(&[ViewLight::Direct(Lighting::UNLIT), draft], Antialias::NONE)?;
+    Ok(((ms[1] - ms[0]) / ms[0]).max(LEAST_LOOK_UP))
+}
+
+fn unknown_share(views: &[View]) -> f64 {
+    let kinds = || views.iter().flat_map(|view| view.provenance.iter().flatten()).map(|origin| origin.kind());
+    let surfaces = kinds().filter(|&kind| kind != ProvenanceKind::Empty).count();
+    let unknown = kinds().filter(|&kind| kind == ProvenanceKind::LitHere).count();
+    unknown as f64 / surfaces.max(1) as f64
+}
+
+/// PSNR and FLIP over the foreground, means over views.
+///
+/// # Errors
+/// Views differ in size, or show no surface.
+pub fn mean_errors(references: &[View], views: &[View]) -> anyhow::Result<[f64; 2]> {
+    let errors = |(reference, view): (&View, &View)| {
+        let (expected, actual) = (Rgb8Image::of_view(reference)?, Rgb8Image::of_view(view)?);
+        let mask = foreground(reference, &actual)?;
+        let psnr_db = psnr_db(&expected, &actual, Some(&mask))?.context("a view of no surface")?;
+        let flip = flip_map(&expected, &actual)?.mean(Some(&mask))?.context("a view of no surface")?;
+        anyhow::Ok([psnr_db.min(PSNR_CAP_DB), flip])
+    };
+    let pairs = references.par_iter().zip(views);
+    let errors = pairs.map(errors).collect::<anyhow::Result<Vec<_>>>()?;
+    Ok([0, 1].map(|which| errors.iter().map(|errors| errors[which]).sum::<f64>() / errors.len() as f64))
+}
+
+impl SceneResult {
+    /// The time of direct drawing with the fewest rays that reach the row's FLIP, over the row's time.
+    pub fn gain(&self, row: &Row) -> Gain {
+        let flip = row.errors.truth_flip;
+        let Some(place) = self.direct.iter().position(|direct| direct.errors.truth_flip <= flip) else {
+            let last_ms = self.direct.last().map_or(f64::NAN, |last| last.ms);
+            return Gain { ratio: last_ms / row.ms, is_lower_bound: true };
+        };
+        let after = &self.direct[place];
+        let before = &self.direct[place.saturating_sub(1)];
+        let change = (before.errors.truth_flip / after.errors.truth_flip).ln();
+        let share = if change > 0.0 { (before.errors.truth_flip / flip).ln() / change } else { 1.0 };
+        let direct_ms = before.ms * (after.ms / before.ms).powf(share);
+        Gain { ratio: direct_ms / row.ms, is_lower_bound: false }
+    }
+
+    /// The quality with the greatest gain, and the gain.
+    pub fn best_quality(&self) -> Option<(&Row, Gain)> {
+        let gains = self.qualities.iter().map(|row| (row, self.gain(row)));
+        gains.max_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(ms: f64, truth_flip: f64) -> Row {
+        let errors = Errors { psnr_db: 40.0, flip: truth_flip, truth_flip };
+        Row { name: String::new(), ms, errors, unknown: 0.0 }
+    }
+
+    #[test]
+    fn gains_compare_with_the_fewest_rays_that_reach_the_flip() {
+        let direct = vec![row(100.0, 0.04), row(200.0, 0.02), row(400.0, 0.01)];
+        let result =
+            SceneResult { name: String::new(), is_outside: true, direct, qualities: Vec::new(), look_up_ratio: 0.0 };
+        let gain = |flip| result.gain(&row(50.0, flip));
+        assert_eq!(gain(0.05), Gain { ratio: 2.0, is_lower_bound: false }, "one ray is better already");
+        assert!((gain(0.02_f64.sqrt() * 0.01_f64.sqrt()).ratio - 4.0 * 2.0_f64.sqrt()).abs() < 1e-9);
+        assert_eq!(gain(0.005), Gain { ratio: 8.0, is_lower_bound: true });
+    }
+}
