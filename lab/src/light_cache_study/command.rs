@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context as _;
 use app_core::exit::{BadInput, Outcome};
 use app_core::progress::bar;
 use app_core::setup::DeviceArgs;
@@ -10,11 +11,11 @@ use engine::GpuEngine;
 use node::Engine as _;
 use report::Report;
 
-use super::conditions::{CONDITIONS, Condition};
+use super::conditions::CONDITIONS;
 use super::measure::measure;
-use super::report::{add_to, failed};
-use super::stage::{LIGHTING, SAMPLES_A_PIXEL, VIEW_PX};
-use super::subjects::{Subject, subjects};
+use super::report::add_to;
+use super::stage::{LIGHTING, SAMPLES_A_PIXEL};
+use super::subjects::{VIEW_PX, subjects};
 
 /// Views of a scene, in the quick form and in the full one.
 const VIEWS: [usize; 2] = [2, 8];
@@ -48,26 +49,17 @@ impl LightCacheArgs {
     fn wants(&self, name: &str) -> bool {
         name.to_lowercase().contains(&self.subject.to_lowercase())
     }
-
-    fn subjects(&self) -> anyhow::Result<Vec<Subject>> {
-        let mut subjects = subjects(self.models.as_deref(), self.quick)?;
-        subjects.retain(|subject| self.wants(&subject.name));
-        Ok(subjects)
-    }
-
-    /// The quick form has none.
-    fn conditions(&self) -> Vec<Condition> {
-        CONDITIONS.into_iter().filter(|condition| !self.quick && self.wants(condition.name)).collect()
-    }
 }
 
-/// Measures all subjects and writes the report. A subject that fails is a check that falls short.
+/// Measures all subjects and writes the report.
 ///
 /// # Errors
-/// There is no device or no such subject, the folder of models lacks one, or the report cannot be written.
+/// There is no such subject, the folder of models lacks one, the device fails, or the report cannot be written.
 pub fn run(args: &LightCacheArgs) -> anyhow::Result<Outcome> {
-    let subjects = args.subjects()?;
-    let conditions = args.conditions();
+    let mut subjects = subjects(args.models.as_deref(), args.quick)?;
+    subjects.retain(|subject| args.wants(&subject.name));
+    let mut conditions = if args.quick { Vec::new() } else { CONDITIONS.to_vec() };
+    conditions.retain(|condition| args.wants(condition.name));
     if subjects.is_empty() && conditions.is_empty() {
         return Err(BadInput(format!("no subject's name contains {:?}", args.subject)).into());
     }
@@ -81,17 +73,13 @@ pub fn run(args: &LightCacheArgs) -> anyhow::Result<Outcome> {
     let mut results = Vec::new();
     for subject in &subjects {
         progress.set_message(subject.name.clone());
-        match measure(&engine, subject, views) {
-            Ok(result) => results.push(result),
-            Err(error) => report.checks.push(failed(&subject.name, &error)),
-        }
+        results.push(measure(&engine, subject, views).with_context(|| subject.name.clone())?);
         progress.inc(1);
     }
     add_to(&mut report, &results)?;
     for condition in conditions {
         progress.set_message(condition.name);
-        let check = condition.check(&engine, args.models.as_deref());
-        report.checks.push(check.unwrap_or_else(|error| failed(condition.name, &error)));
+        condition.add_to(&mut report, &engine, args.models.as_deref()).context(condition.name)?;
         progress.inc(1);
     }
     progress.finish_and_clear();

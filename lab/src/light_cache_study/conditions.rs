@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use depth_image::{Antialias, EnvironmentMap, Light, LightCacheQuality};
+use depth_image::{Antialias, EnvironmentMap, Light, LightCacheQuality, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
-use report::{Bar, Check};
+use report::{Bar, Check, PictureRow, Report};
 use scene::Scene;
 
-use super::measure::mean_errors;
+use super::measure::{mean_errors, picture_row};
 use super::stage::{LIGHTING, REFERENCE_LIGHTING, Stage, ViewLight, antialias};
 use super::subjects::{Subject, model};
 
@@ -37,6 +37,12 @@ enum Kind {
     ManyLamps,
 }
 
+/// The views of all moments against direct drawing.
+struct Compared {
+    least_psnr_db: f64,
+    pictures: Option<PictureRow>,
+}
+
 pub const CONDITIONS: [Condition; 5] = [
     Condition { name: "snake, moving", scene: "snake", kind: Kind::Moving },
     Condition { name: "tree-terrain-125k-wind, moving", scene: "tree-terrain-125k-wind", kind: Kind::Moving },
@@ -46,30 +52,35 @@ pub const CONDITIONS: [Condition; 5] = [
 ];
 
 impl Condition {
-    /// Compares the PSNR of the worst moment with its bar.
+    /// Adds a check of the worst moment's PSNR, and the last moment's picture.
     ///
     /// # Errors
     /// The folder lacks the model, or the device fails.
-    pub fn check(&self, engine: &Arc<GpuEngine>, models: Option<&Path>) -> anyhow::Result<Check> {
+    pub fn add_to(&self, report: &mut Report, engine: &Arc<GpuEngine>, models: Option<&Path>) -> anyhow::Result<()> {
         let is_moving = self.kind == Kind::Moving;
         let quality = if is_moving { LightCacheQuality::Fast } else { LightCacheQuality::Balanced };
         let bar = Bar::AtLeast(if is_moving { 34.0 } else { 36.0 });
-        let name = format!("`{quality}`, {}: PSNR", self.name);
+        let name = format!("`{quality}`, {}: least PSNR", self.name);
         let scene = match (self.kind, models) {
-            (Kind::MappedModel, None) => return Ok(Check::not_run(name, "dB", bar, "--models is not given")),
             (Kind::MappedModel, Some(folder)) => model(folder, self.scene)?,
+            (Kind::MappedModel, None) => {
+                report.checks.push(Check::not_run(name, "dB", bar, "--models is not given"));
+                return Ok(());
+            }
             _ => self.scene.parse()?,
         };
-        let psnr_db = self.least_psnr_db(engine, &Subject::outside(self.name, scene), quality)?;
-        Ok(Check::new(name, psnr_db, "dB", bar))
+        let compared = self.compare(engine, &Subject::outside(self.name, scene), quality)?;
+        report.pictures.extend(compared.pictures);
+        report.checks.push(Check::new(name, compared.least_psnr_db, "dB", bar));
+        Ok(())
     }
 
-    fn least_psnr_db(
+    fn compare(
         &self,
         engine: &Arc<GpuEngine>,
         subject: &Subject,
         quality: LightCacheQuality,
-    ) -> anyhow::Result<f64> {
+    ) -> anyhow::Result<Compared> {
         let setup = subject.load()?;
         let mut scene = setup.scene.clone();
         match self.kind {
@@ -83,17 +94,20 @@ impl Condition {
         let antialias = if self.kind == Kind::Moving { Antialias::NONE } else { antialias() };
         let moments = if self.kind == Kind::Moving { MOMENTS } else { 1 };
         let mut stage = Stage::new(engine, &scene, subject.viewpoints(&setup, VIEWS)?)?;
-        let mut least_psnr_db = f64::INFINITY;
+        let mut compared = Compared { least_psnr_db: f64::INFINITY, pictures: None };
         for moment in 0..moments {
             stage.scene_time_s = scene.period_s().unwrap_or(0.0) * moment as f32 / moments as f32;
             let cache = stage.cache(lighting)?;
-            let expected = stage.views(reference, antialias)?;
-            let views = stage.views(ViewLight::Cached { cache: &cache, lighting, quality }, antialias)?;
+            let planes = ViewPlanes { antialias, ..ViewPlanes::WITH_DEPTH };
+            let cached = ViewLight::Cached { cache: &cache, lighting, quality };
+            let expected = stage.draw(reference, &stage.viewpoints.views, planes)?;
+            let views = stage.draw(cached, &stage.viewpoints.views, planes)?;
             let [psnr_db, _] = mean_errors(&expected, &views)?;
             tracing::info!(condition = self.name, moment, psnr_db, "compared");
-            least_psnr_db = least_psnr_db.min(psnr_db);
+            compared.least_psnr_db = compared.least_psnr_db.min(psnr_db);
+            compared.pictures = Some(picture_row(self.name, &expected[0], &views[0])?);
         }
-        Ok(least_psnr_db)
+        Ok(compared)
     }
 }
 

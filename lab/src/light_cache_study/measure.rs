@@ -7,9 +7,10 @@ use depth_image::{Antialias, LightCacheQuality, PinholeCamera, ProvenanceKind, V
 use engine::GpuEngine;
 use metrics::{PSNR_CAP_DB, Rgb8Image, flip_map, foreground, psnr_db};
 use rayon::prelude::*;
-use render::Lighting;
+use render::{LightCache, Lighting};
+use report::{PictureRow, comparison_row};
 
-use super::stage::{LIGHTING, SAMPLES_A_PIXEL, Stage, ViewLight, antialias};
+use super::stage::{LIGHTING, SAMPLES_A_PIXEL, Stage, TimedViews, ViewLight, antialias};
 use super::subjects::Subject;
 
 /// Rays to a lamp and of occlusion at each position, in direct drawing.
@@ -22,6 +23,8 @@ pub const REFERENCE: usize = DIRECT_RAYS.len() - 1;
 const TRUTH_LIGHTING: &str = "soft 128, occlusion 128";
 pub const QUALITIES: [LightCacheQuality; 4] =
     [LightCacheQuality::Draft, LightCacheQuality::Fast, LightCacheQuality::Balanced, LightCacheQuality::Fine];
+/// The place in [`QUALITIES`] of the quality that the report shows.
+const SHOWN: usize = 2;
 /// One ray to a lamp and one of occlusion: little light beside the surfaces.
 const PLAIN_LIGHTING: &str = "shadows, occlusion 1";
 /// A look-up costs at least this share of the surfaces; less is noise of the clock.
@@ -35,6 +38,8 @@ pub struct SceneResult {
     pub direct: Vec<Row>,
     /// Each of [`QUALITIES`].
     pub qualities: Vec<Row>,
+    /// The first view, `balanced`, beside the reference.
+    pub pictures: PictureRow,
     /// Time of looking light up over the time of surfaces, one position a pixel, `draft`.
     pub look_up_ratio: f64,
 }
@@ -44,19 +49,12 @@ pub struct SceneResult {
 pub struct Row {
     pub name: String,
     pub ms: f64,
-    pub errors: Errors,
-    /// The share of surface pixels that no sample knows; 0 in direct drawing, which asks none.
-    pub unknown: f64,
-}
-
-/// Errors over the foreground, means over views.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Errors {
-    /// Against the reference.
+    /// Against the reference, as `flip`. Errors are over the foreground, means over views.
     pub psnr_db: f64,
     pub flip: f64,
-    /// Against the truth.
     pub truth_flip: f64,
+    /// The share of surface pixels that no sample knows; 0 in direct drawing, which asks none.
+    pub unknown: f64,
 }
 
 /// A gain at equal FLIP over direct drawing.
@@ -76,32 +74,53 @@ pub fn measure(engine: &Arc<GpuEngine>, subject: &Subject, count: usize) -> anyh
     let stage = Stage::new(engine, &setup.scene, subject.viewpoints(&setup, count)?)?;
     let lighting: Lighting = LIGHTING.parse()?;
     let cache = stage.cache(lighting)?;
-    let mut names = Vec::new();
+    let timed = stage.timed(&lights(&cache, lighting)?, antialias())?;
+    let truth = truth(&stage)?;
+    let mut reference = timed[REFERENCE].views.clone();
+    for (reference, truth) in reference.iter_mut().zip(&truth) {
+        reference.inverse_depth_per_m.clone_from(&truth.inverse_depth_per_m);
+    }
+    let row = |name: String, timed: &TimedViews, unknown: f64| {
+        let [psnr_db, flip] = mean_errors(&reference, &timed.views)?;
+        let [_, truth_flip] = mean_errors(&truth, &timed.views)?;
+        anyhow::Ok(Row { name, ms: timed.ms, psnr_db, flip, truth_flip, unknown })
+    };
+    let (timed_direct, timed_cached) = timed.split_at(DIRECT_RAYS.len());
+    let mut direct = Vec::new();
+    for (rays, timed) in DIRECT_RAYS.iter().zip(timed_direct) {
+        direct.push(row(format!("direct, {rays} rays"), timed, 0.0)?);
+    }
+    let mut qualities = Vec::new();
+    for (quality, timed) in QUALITIES.into_iter().zip(timed_cached) {
+        qualities.push(row(quality.to_string(), timed, unknown_share(&stage, &cache, quality)?)?);
+    }
+    Ok(SceneResult {
+        name: subject.name.clone(),
+        is_outside: subject.pose.is_none(),
+        pictures: picture_row(&subject.name, &reference[0], &timed_cached[SHOWN].views[0])?,
+        direct,
+        qualities,
+        look_up_ratio: look_up_ratio(&stage)?,
+    })
+}
+
+/// All rows: each of [`DIRECT_RAYS`], then each of [`QUALITIES`].
+fn lights(cache: &LightCache, lighting: Lighting) -> anyhow::Result<Vec<ViewLight<'_>>> {
     let mut lights = Vec::new();
     for rays in DIRECT_RAYS {
         let pixel_rays = rays * SAMPLES_A_PIXEL;
-        names.push(format!("direct, {rays} rays"));
         lights.push(ViewLight::Direct(format!("soft {pixel_rays}, occlusion {pixel_rays}").parse()?));
     }
-    for quality in QUALITIES {
-        names.push(quality.to_string());
-        lights.push(ViewLight::Cached { cache: &cache, lighting, quality });
-    }
-    let pictures =
-        lights.iter().map(|&light| stage.views(light, antialias())).collect::<anyhow::Result<Vec<Vec<View>>>>()?;
-    let reference = &pictures[REFERENCE];
-    let truth = truth(&stage)?;
-    let times = stage.ms_a_view(&lights, antialias())?;
-    let mut direct = Vec::new();
-    for ((name, views), ms) in names.into_iter().zip(&pictures).zip(times) {
-        let [psnr_db, flip] = mean_errors(reference, views)?;
-        let [_, truth_flip] = mean_errors(&truth, views)?;
-        let errors = Errors { psnr_db, flip, truth_flip };
-        direct.push(Row { name, ms, errors, unknown: unknown_share(views) });
-    }
-    let qualities = direct.split_off(DIRECT_RAYS.len());
-    let look_up_ratio = look_up_ratio(&stage)?;
-    Ok(SceneResult { name: subject.name.clone(), is_outside: subject.pose.is_none(), direct, qualities, look_up_ratio })
+    lights.extend(QUALITIES.map(|quality| ViewLight::Cached { cache, lighting, quality }));
+    Ok(lights)
+}
+
+/// A view beside the reference, with the map of its error.
+pub fn picture_row(title: &str, reference: &View, view: &View) -> anyhow::Result<PictureRow> {
+    let flip = flip_map(&Rgb8Image::of_view(reference)?, &Rgb8Image::of_view(view)?)?;
+    let [reference, view] = [reference, view].map(pictures::rgb);
+    let sizes = "a view's colours do not fit its size";
+    Ok(comparison_row(title, reference.context(sizes)?, view.context(sizes)?, &flip, None))
 }
 
 /// Seeds are made from the bits of the camera's eye: from the next place in x the picture is the same, and its noise another.
@@ -119,15 +138,18 @@ fn look_up_ratio(stage: &Stage) -> anyhow::Result<f64> {
     let lighting = PLAIN_LIGHTING.parse()?;
     let cache = stage.cache(lighting)?;
     let draft = ViewLight::Cached { cache: &cache, lighting, quality: LightCacheQuality::Draft };
-    let ms = stage.ms_a_view(&[ViewLight::Direct(Lighting::UNLIT), draft], Antialias::NONE)?;
-    Ok(((ms[1] - ms[0]) / ms[0]).max(LEAST_LOOK_UP))
+    let timed = stage.timed(&[ViewLight::Direct(Lighting::UNLIT), draft], Antialias::NONE)?;
+    Ok((timed[1].ms / timed[0].ms - 1.0).max(LEAST_LOOK_UP))
 }
 
-fn unknown_share(views: &[View]) -> f64 {
+/// The share of surface pixels whose light no sample knows. It does not depend on the rays of the view.
+fn unknown_share(stage: &Stage, cache: &LightCache, quality: LightCacheQuality) -> anyhow::Result<f64> {
+    let light = ViewLight::Cached { cache, lighting: PLAIN_LIGHTING.parse()?, quality };
+    let views = stage.draw(light, &stage.viewpoints.views, ViewPlanes::WITH_PROVENANCE)?;
     let kinds = || views.iter().flat_map(|view| view.provenance.iter().flatten()).map(|origin| origin.kind());
     let surfaces = kinds().filter(|&kind| kind != ProvenanceKind::Empty).count();
     let unknown = kinds().filter(|&kind| kind == ProvenanceKind::LitHere).count();
-    unknown as f64 / surfaces.max(1) as f64
+    Ok(unknown as f64 / surfaces.max(1) as f64)
 }
 
 /// PSNR and FLIP over the foreground, means over views.
@@ -150,15 +172,15 @@ pub fn mean_errors(references: &[View], views: &[View]) -> anyhow::Result<[f64; 
 impl SceneResult {
     /// The time of direct drawing with the fewest rays that reach the row's FLIP, over the row's time.
     pub fn gain(&self, row: &Row) -> Gain {
-        let flip = row.errors.truth_flip;
-        let Some(place) = self.direct.iter().position(|direct| direct.errors.truth_flip <= flip) else {
+        let flip = row.truth_flip;
+        let Some(place) = self.direct.iter().position(|direct| direct.truth_flip <= flip) else {
             let last_ms = self.direct.last().map_or(f64::NAN, |last| last.ms);
             return Gain { ratio: last_ms / row.ms, is_lower_bound: true };
         };
         let after = &self.direct[place];
         let before = &self.direct[place.saturating_sub(1)];
-        let change = (before.errors.truth_flip / after.errors.truth_flip).ln();
-        let share = if change > 0.0 { (before.errors.truth_flip / flip).ln() / change } else { 1.0 };
+        let change = (before.truth_flip / after.truth_flip).ln();
+        let share = if change > 0.0 { (before.truth_flip / flip).ln() / change } else { 1.0 };
         let direct_ms = before.ms * (after.ms / before.ms).powf(share);
         Gain { ratio: direct_ms / row.ms, is_lower_bound: false }
     }
@@ -175,15 +197,16 @@ mod tests {
     use super::*;
 
     fn row(ms: f64, truth_flip: f64) -> Row {
-        let errors = Errors { psnr_db: 40.0, flip: truth_flip, truth_flip };
-        Row { name: String::new(), ms, errors, unknown: 0.0 }
+        Row { name: String::new(), ms, psnr_db: 40.0, flip: truth_flip, truth_flip, unknown: 0.0 }
     }
 
     #[test]
     fn gains_compare_with_the_fewest_rays_that_reach_the_flip() {
         let direct = vec![row(100.0, 0.04), row(200.0, 0.02), row(400.0, 0.01)];
+        let pictures = PictureRow { title: String::new(), pictures: Vec::new() };
+        let name = String::new();
         let result =
-            SceneResult { name: String::new(), is_outside: true, direct, qualities: Vec::new(), look_up_ratio: 0.0 };
+            SceneResult { name, is_outside: true, direct, qualities: Vec::new(), pictures, look_up_ratio: 0.0 };
         let gain = |flip| result.gain(&row(50.0, flip));
         assert_eq!(gain(0.05), Gain { ratio: 2.0, is_lower_bound: false }, "one ray is better already");
         assert!((gain(0.02_f64.sqrt() * 0.01_f64.sqrt()).ratio - 4.0 * 2.0_f64.sqrt()).abs() < 1e-9);

@@ -29,20 +29,16 @@ const QUALITY_BARS: [QualityBars; 2] = [
 /// # Errors
 /// A row that does not fit its table.
 pub fn add_to(report: &mut Report, results: &[SceneResult]) -> anyhow::Result<()> {
+    if results.is_empty() {
+        return Ok(());
+    }
     report.tables.push(table(results)?);
     report.charts.extend(results.iter().map(|result| chart(result).into()));
-    if !results.is_empty() {
-        add_quality_checks(report, results);
-        add_gain_checks(report, results);
-        add_time_checks(report, results);
-    }
+    report.pictures.extend(results.iter().map(|result| result.pictures.clone()));
+    add_quality_checks(report, results);
+    add_gain_checks(report, results);
+    add_time_checks(report, results);
     Ok(())
-}
-
-/// The check of a subject that failed.
-pub fn failed(name: &str, error: &anyhow::Error) -> Check {
-    tracing::warn!(name, error = format!("{error:#}"), "not measured");
-    Check::new(format!("{name}: measured to the end"), f64::NAN, "", Bar::AtLeast(1.0))
 }
 
 fn table(results: &[SceneResult]) -> anyhow::Result<Table> {
@@ -66,9 +62,9 @@ fn table(results: &[SceneResult]) -> anyhow::Result<Table> {
                 result.name.clone().into(),
                 row.name.clone().into(),
                 row.ms.into(),
-                row.errors.psnr_db.into(),
-                row.errors.flip.into(),
-                row.errors.truth_flip.into(),
+                row.psnr_db.into(),
+                row.flip.into(),
+                row.truth_flip.into(),
                 if is_cached { (row.unknown * 100.0).into() } else { Cell::Missing },
                 if is_cached { gain_cell } else { Cell::Missing },
             ])?;
@@ -78,7 +74,7 @@ fn table(results: &[SceneResult]) -> anyhow::Result<Table> {
 }
 
 fn chart(result: &SceneResult) -> XyChart {
-    let point = |row: &Row| (row.ms, row.errors.truth_flip);
+    let point = |row: &Row| (row.ms, row.truth_flip);
     let time = Axis::log("a view", "ms");
     let mut chart = XyChart::new(format!("FLIP over time, {}", result.name), time, Axis::log("FLIP", ""))
         .with(Series::line("direct", result.direct.iter().map(point)));
@@ -93,9 +89,9 @@ fn add_quality_checks(report: &mut Report, results: &[SceneResult]) {
     for bars in QUALITY_BARS {
         let named = |result: &SceneResult| result.qualities.iter().find(|row| row.name == bars.quality).cloned();
         let rows: Vec<Row> = results.iter().filter_map(named).collect();
-        let mean_db = rows.iter().map(|row| row.errors.psnr_db).sum::<f64>() / rows.len() as f64;
-        let least_db = rows.iter().map(|row| row.errors.psnr_db).fold(f64::INFINITY, f64::min);
-        let flip = rows.iter().map(|row| row.errors.flip).fold(0.0, f64::max);
+        let mean_db = rows.iter().map(|row| row.psnr_db).sum::<f64>() / rows.len() as f64;
+        let least_db = rows.iter().map(|row| row.psnr_db).fold(f64::INFINITY, f64::min);
+        let flip = rows.iter().map(|row| row.flip).fold(0.0, f64::max);
         let name = |what: &str| format!("`{}`, {} scenes: {what}", bars.quality, rows.len());
         report.checks.extend([
             Check::new(name("mean PSNR"), mean_db, "dB", Bar::AtLeast(bars.mean_psnr_db)),
@@ -133,7 +129,7 @@ fn add_time_checks(report: &mut Report, results: &[SceneResult]) {
     let missing = format!("{} of {} are measured", look_ups.len(), LOOK_UP_SCENES.join(", "));
     let ratio = |result: &SceneResult| result.direct[SHARED].ms / result.direct[REFERENCE].ms;
     let shared = geometric_mean(&results.iter().map(ratio).collect::<Vec<_>>());
-    let psnr = |result: &SceneResult| result.direct[SHARED].errors.psnr_db;
+    let psnr = |result: &SceneResult| result.direct[SHARED].psnr_db;
     let least_db = results.iter().map(psnr).fold(f64::INFINITY, f64::min);
     report.checks.extend([
         Check::maybe("`draft`, 1 sample a pixel: time of look-up over surfaces", all, "×", Bar::AtMost(0.9), missing),

@@ -13,7 +13,6 @@ use super::subjects::Viewpoints;
 use crate::reference_views::encoded_and_decoded;
 use crate::statistics::median;
 
-pub const VIEW_PX: UVec2 = UVec2::new(640, 360);
 /// Positions within a pixel.
 pub const SAMPLES_A_PIXEL: u32 = 4;
 /// The lighting of samples and of views that use them.
@@ -40,6 +39,12 @@ pub struct Stage {
 pub enum ViewLight<'a> {
     Direct(Lighting),
     Cached { cache: &'a LightCache, lighting: Lighting, quality: LightCacheQuality },
+}
+
+/// Views without depth, and the milliseconds that each takes.
+pub struct TimedViews {
+    pub views: Vec<View>,
+    pub ms: f64,
 }
 
 impl Stage {
@@ -92,29 +97,26 @@ impl Stage {
         Ok(views?)
     }
 
-    /// All views with depth and provenance.
-    pub fn views(&self, light: ViewLight<'_>, antialias: Antialias) -> anyhow::Result<Vec<View>> {
-        self.draw(light, &self.viewpoints.views, ViewPlanes { antialias, ..ViewPlanes::ALL })
-    }
-
-    /// Milliseconds a view under each light: the median of runs that draw all views at once. The lights take turns.
-    pub fn ms_a_view(&self, lights: &[ViewLight<'_>], antialias: Antialias) -> anyhow::Result<Vec<f64>> {
-        let views = &self.viewpoints.views;
+    /// All views under each light, and the time of a view: the median of runs that draw all at once. The lights take turns.
+    pub fn timed(&self, lights: &[ViewLight<'_>], antialias: Antialias) -> anyhow::Result<Vec<TimedViews>> {
+        let cameras = &self.viewpoints.views;
         let planes = ViewPlanes { antialias, ..ViewPlanes::COLOR };
         for &light in lights {
-            self.draw(light, &[views[0].resized(WARM_UP_PX)], planes)?;
+            self.draw(light, &[cameras[0].resized(WARM_UP_PX)], planes)?;
         }
-        let mut runs: Vec<Vec<f64>> = vec![Vec::new(); lights.len()];
+        let mut runs = vec![Vec::new(); lights.len()];
+        let mut views = vec![Vec::new(); lights.len()];
         for _ in 0..RUNS {
-            for (&light, seconds) in lights.iter().zip(&mut runs) {
-                if seconds.iter().sum::<f64>() < MOST_TIMED_S {
+            for (place, &light) in lights.iter().enumerate() {
+                if runs[place].iter().sum::<f64>() < MOST_TIMED_S {
                     let start = Instant::now();
-                    self.draw(light, views, planes)?;
-                    seconds.push(start.elapsed().as_secs_f64());
+                    views[place] = self.draw(light, cameras, planes)?;
+                    runs[place].push(start.elapsed().as_secs_f64());
                 }
             }
         }
-        Ok(runs.into_iter().map(|seconds| median(seconds) * 1e3 / views.len() as f64).collect())
+        let ms = |seconds: Vec<f64>| median(seconds) * 1e3 / cameras.len() as f64;
+        Ok(runs.into_iter().zip(views).map(|(seconds, views)| TimedViews { views, ms: ms(seconds) }).collect())
     }
 }
 

@@ -6,13 +6,14 @@ use anyhow::Context as _;
 use app_core::exit::BadInput;
 use app_core::setup::{SceneArgs, Setup};
 use depth_image::{PinholeCamera, ViewCell};
-use glam::{Vec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 use sampling::Impostors;
 use scene::SceneSpec;
 
-use super::stage::VIEW_PX;
 use crate::bench::fronts::models_of;
 
+/// Columns and rows of a view.
+pub const VIEW_PX: UVec2 = UVec2::new(640, 360);
 const MODELS: [&str; 4] = ["FlightHelmet", "lamborghini", "ingenuity", "threejs-shaderball"];
 const BUILT_IN: [&str; 4] = ["urban", "courtyard", "bird-nest", "tree-terrain-500k"];
 /// The models and built-in scenes of the quick form.
