@@ -12,13 +12,13 @@ use node::Engine as _;
 use report::Report;
 
 use super::conditions::CONDITIONS;
-use super::measure::measure;
+use super::measure::{Extent, measure};
 use super::report::add_to;
 use super::stage::{LIGHTING, SAMPLES_A_PIXEL};
 use super::subjects::{VIEW_PX, subjects};
 
-/// Views of a scene, in the quick form and in the full one.
-const VIEWS: [usize; 2] = [2, 8];
+/// The quick form and the full one.
+const EXTENTS: [Extent; 2] = [Extent { views: 2, truth_views: 1 }, Extent { views: 8, truth_views: 8 }];
 
 /// Measures views with light from samples against direct drawing with few rays, at equal error.
 #[derive(Debug, Args)]
@@ -68,12 +68,12 @@ pub fn run(args: &LightCacheArgs) -> anyhow::Result<Outcome> {
     report.version("myriorama", env!("CARGO_PKG_VERSION"));
     report.parameter("views", format!("{VIEW_PX}, {SAMPLES_A_PIXEL} samples a pixel"));
     report.parameter("lighting", LIGHTING);
-    let views = VIEWS[usize::from(!args.quick)];
+    let extent = EXTENTS[usize::from(!args.quick)];
     let progress = bar("scenes", subjects.len() + conditions.len());
     let mut results = Vec::new();
     for subject in &subjects {
         progress.set_message(subject.name.clone());
-        results.push(measure(&engine, subject, views).with_context(|| subject.name.clone())?);
+        results.push(measure(&engine, subject, extent).with_context(|| subject.name.clone())?);
         progress.inc(1);
     }
     add_to(&mut report, &results)?;

@@ -65,21 +65,26 @@ pub struct Gain {
     pub is_lower_bound: bool,
 }
 
-/// Measures a scene with `count` views.
+/// The size of a measurement.
+#[derive(Debug, Clone, Copy)]
+pub struct Extent {
+    pub views: usize,
+    /// The first of the views, which are compared with the truth.
+    pub truth_views: usize,
+}
+
+/// Measures a scene.
 ///
 /// # Errors
 /// The scene cannot be loaded, or the device fails.
-pub fn measure(engine: &Arc<GpuEngine>, subject: &Subject, count: usize) -> anyhow::Result<SceneResult> {
+pub fn measure(engine: &Arc<GpuEngine>, subject: &Subject, extent: Extent) -> anyhow::Result<SceneResult> {
     let setup = subject.load()?;
-    let stage = Stage::new(engine, &setup.scene, subject.viewpoints(&setup, count)?)?;
+    let stage = Stage::new(engine, &setup.scene, subject.viewpoints(&setup, extent.views)?)?;
     let lighting: Lighting = LIGHTING.parse()?;
     let cache = stage.cache(lighting)?;
     let timed = stage.timed(&lights(&cache, lighting)?, antialias())?;
-    let truth = truth(&stage)?;
-    let mut reference = timed[REFERENCE].views.clone();
-    for (reference, truth) in reference.iter_mut().zip(&truth) {
-        reference.inverse_depth_per_m.clone_from(&truth.inverse_depth_per_m);
-    }
+    let reference = with_depth(&stage, timed[REFERENCE].views.clone())?;
+    let truth = truth(&stage, extent.truth_views)?;
     let row = |name: String, timed: &TimedViews, unknown: f64| {
         let [psnr_db, flip] = mean_errors(&reference, &timed.views)?;
         let [_, truth_flip] = mean_errors(&truth, &timed.views)?;
@@ -123,13 +128,22 @@ pub fn picture_row(title: &str, reference: &View, view: &View) -> anyhow::Result
     Ok(comparison_row(title, reference.context(sizes)?, view.context(sizes)?, &flip, None))
 }
 
+/// The views with the depth of their surfaces, which tells the foreground.
+fn with_depth(stage: &Stage, mut views: Vec<View>) -> anyhow::Result<Vec<View>> {
+    let unlit = stage.draw(ViewLight::Direct(Lighting::UNLIT), &stage.viewpoints.views, ViewPlanes::WITH_DEPTH)?;
+    for (view, unlit) in views.iter_mut().zip(unlit) {
+        view.inverse_depth_per_m = unlit.inverse_depth_per_m;
+    }
+    Ok(views)
+}
+
 /// Seeds are made from the bits of the camera's eye: from the next place in x the picture is the same, and its noise another.
-fn truth(stage: &Stage) -> anyhow::Result<Vec<View>> {
+fn truth(stage: &Stage, count: usize) -> anyhow::Result<Vec<View>> {
     let next = |camera: &PinholeCamera| PinholeCamera {
         eye_in_world: camera.eye_in_world.with_x(camera.eye_in_world.x.next_up()),
         ..*camera
     };
-    let cameras: Vec<PinholeCamera> = stage.viewpoints.views.iter().map(next).collect();
+    let cameras: Vec<PinholeCamera> = stage.viewpoints.views.iter().take(count).map(next).collect();
     let planes = ViewPlanes { antialias: antialias(), ..ViewPlanes::WITH_DEPTH };
     stage.draw(ViewLight::Direct(TRUTH_LIGHTING.parse()?), &cameras, planes)
 }
@@ -152,7 +166,7 @@ fn unknown_share(stage: &Stage, cache: &LightCache, quality: LightCacheQuality) 
     Ok(unknown as f64 / surfaces.max(1) as f64)
 }
 
-/// PSNR and FLIP over the foreground, means over views.
+/// PSNR and FLIP over the foreground, means over the views that have a reference.
 ///
 /// # Errors
 /// Views differ in size, or show no surface.

@@ -11,7 +11,6 @@ const EXPENSIVE_SCENE: &str = "tree-terrain-500k";
 /// Scenes whose look-ups are compared with their surfaces.
 const LOOK_UP_SCENES: [&str; 4] = ["FlightHelmet", EXPENSIVE_SCENE, "courtyard", "urban"];
 
-/// The bars of a quality.
 struct QualityBars {
     quality: &'static str,
     mean_psnr_db: f64,
@@ -24,7 +23,7 @@ const QUALITY_BARS: [QualityBars; 2] = [
     QualityBars { quality: "fast", mean_psnr_db: 39.0, least_psnr_db: 34.0, greatest_flip: 0.033 },
 ];
 
-/// Adds the table of all scenes, a chart of each, and the checks.
+/// Adds the tables of all scenes, a chart and pictures of each, and the checks.
 ///
 /// # Errors
 /// A row that does not fit its table.
@@ -33,6 +32,11 @@ pub fn add_to(report: &mut Report, results: &[SceneResult]) -> anyhow::Result<()
         return Ok(());
     }
     report.tables.push(table(results)?);
+    let mut look_ups = Table::new("`draft`, 1 sample a pixel", &[("scene", ""), ("look-up over surfaces", "×")]);
+    for result in results {
+        look_ups.push([result.name.clone().into(), result.look_up_ratio.into()])?;
+    }
+    report.tables.push(look_ups);
     report.charts.extend(results.iter().map(|result| chart(result).into()));
     report.pictures.extend(results.iter().map(|result| result.pictures.clone()));
     add_quality_checks(report, results);

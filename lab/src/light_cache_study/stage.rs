@@ -21,7 +21,7 @@ pub const LIGHTING: &str = "soft 16, occlusion 16";
 pub const REFERENCE_LIGHTING: &str = "soft 64, occlusion 64";
 /// Timed runs of every row; no more are made once they have taken this long.
 const RUNS: usize = 3;
-const MOST_TIMED_S: f64 = 6.0;
+const MOST_TIMED_S: f64 = 4.0;
 /// Columns and rows of the view that builds pipelines before runs are timed.
 const WARM_UP_PX: UVec2 = UVec2::new(64, 36);
 
