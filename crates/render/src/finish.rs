@@ -135,6 +135,8 @@ impl ShaderVariant for Finish {
 pub(crate) struct Planes {
     pub words: PooledBuffer,
     position_sums: Option<PooledBuffer>,
+    /// The pixels whose light is that of their first position, where light is looked up.
+    pub kept: Option<PooledBuffer>,
 }
 
 impl Planes {
@@ -146,7 +148,9 @@ impl Planes {
         let sum_bytes = if is_averaged { batch.bytes(3 + usize::from(batch.output.samples)) } else { 0 };
         gpu.check_storage_bytes("the sums of several samples a pixel (bytes)", sum_bytes)?;
         let sums = is_averaged.then(|| pool.lend_storage("sums of positions", sum_bytes.max(4)));
-        Ok(Self { words: pool.lend_storage("planes", bytes.max(4)), position_sums: sums })
+        let shares_light = is_averaged && batch.cached.is_some();
+        let kept = shares_light.then(|| pool.lend_storage("kept light", batch.bytes(1).max(4)));
+        Ok(Self { words: pool.lend_storage("planes", bytes.max(4)), position_sums: sums, kept })
     }
 }
 

@@ -204,16 +204,7 @@ fn the_light_cache_has_the_wgsl_layout() {
         padding
     });
     assert_eq!(shader(&module, "CacheCamera"), camera);
-    let cache = host!(GpuCache {
-        shares,
-        least_coverage,
-        plane_footprints,
-        least_cosine,
-        most_difference,
-        camera_count,
-        padding,
-        cameras
-    });
+    let cache = host!(GpuCache { shares, least_coverage, plane_footprints, least_cosine, most_difference, cameras });
     assert_eq!(shader(&module, "Cache"), cache);
 }
 

@@ -2,7 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{
-    Camera, DepthImage, Illumination, LightCacheQuality, LightPlanes, MAX_LAMP_SHARES, PinholeCamera, ProvenanceKind,
+    Antialias, Camera, DepthImage, Illumination, LightCacheQuality, LightPlanes, MAX_LAMP_SHARES, PinholeCamera,
+    ProvenanceKind,
 };
 use glam::{DVec3, Vec3};
 use gpu::{
@@ -13,6 +14,7 @@ use minijinja::{Value, context, value::merge_maps};
 use wgpu::{Buffer, BufferUsages, TextureFormat};
 
 use crate::batch::{Batch, Recording};
+use crate::finish::Planes;
 use crate::pixel_camera::CAMERA_TRAITS;
 use crate::pixel_list::PixelList;
 use crate::{GpuScene, RenderError, sums::SumPlanes, surfaces::Surfaces};
@@ -93,8 +95,6 @@ pub(crate) struct GpuCache {
     pub plane_footprints: f32,
     pub least_cosine: f32,
     pub most_difference: f32,
-    pub camera_count: u32,
-    pub padding: [u32; 3],
     pub cameras: [GpuCacheCamera; MAX_CACHE_CAMERAS as usize],
 }
 
@@ -106,7 +106,22 @@ pub(crate) struct LookUp {
     bright_traced: bool,
     sums: SumPlanes,
     share_words: usize,
+    /// Sample images: their numbers are constants, whose values the software device reads once for all lanes.
+    camera_count: usize,
+    positions: Positions,
+    /// Planes of the picture, by which a pixel's place is found.
+    plane_count: usize,
     provenance_plane: Option<usize>,
+}
+
+/// The position within the pixels whose light is looked up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Positions {
+    /// There is one.
+    Only,
+    /// The light of later ones may be that of this one.
+    First,
+    Later,
 }
 
 impl LookUpTests {
@@ -200,8 +215,6 @@ impl LightCache {
             plane_footprints,
             least_cosine,
             most_difference: most_difference.min(f32::MAX),
-            camera_count: self.images.len() as u32,
-            padding: [0; 3],
             cameras,
         };
         gpu.buffer_with("light cache", &[cache], BufferUsages::UNIFORM)
@@ -274,6 +287,13 @@ impl LookUp {
             bright_traced: environment_map && work.lighting.shadow_rays() > 0,
             sums: output.sums,
             share_words: cache.share_words,
+            camera_count: cache.images.len(),
+            positions: match batch.position.number {
+                _ if output.antialias == Antialias::NONE => Positions::Only,
+                0 => Positions::First,
+                _ => Positions::Later,
+            },
+            plane_count: output.layout().count,
             provenance_plane: output.layout().provenance,
         }
     }
@@ -297,6 +317,13 @@ impl ShaderVariant for LookUp {
             sample_texels => sample_texels(self.share_words),
             light_slots => light_slots(light_count),
             share_words => self.share_words,
+            camera_count => self.camera_count,
+            positions => match self.positions {
+                Positions::Only => "only",
+                Positions::First => "first",
+                Positions::Later => "later",
+            },
+            plane_count => self.plane_count,
             lamps_with_shares,
         };
         merge_maps([own, self.sums.context()])
@@ -312,6 +339,9 @@ impl ShaderVariant for LookUp {
                     bright_traced: environment_map && traced,
                     sums: SumPlanes { light_count, visibility },
                     share_words: LightPlanes::share_planes(light_count),
+                    camera_count: 1 + light_count % 4,
+                    positions: [Positions::Only, Positions::First, Positions::Later][variants.len() % 3],
+                    plane_count: 2 + usize::from(provenance),
                     provenance_plane: provenance.then_some(2),
                 });
             }
@@ -330,13 +360,20 @@ pub(crate) fn record(
     let variant = LookUp::new(batch, cache);
     let pass = recording.passes.get(&variant)?;
     let scene = batch.work.scene;
-    let Picture { camera, target, words, lists } = picture;
+    let Picture { camera, target, planes, lists } = picture;
     let uniform = cache.uniform(recording.gpu, scene, tests, &batch.cameras[camera]);
-    let buffers = Buffers { cameras: &recording.cameras, cache: &uniform, sums: &recording.sums.buffer, words };
+    let buffers = Buffers {
+        cameras: &recording.cameras,
+        cache: &uniform,
+        sums: &recording.sums.buffer,
+        words: &planes.words,
+        kept: planes.kept.as_deref().unwrap_or(&planes.words),
+    };
     let bound = lists.iter().map(|list| {
         let own = bindings(&variant, &buffers, scene, &cache.samples);
         let normals = target.views.triangle_normal_binding();
-        pass.bind(0, own.into_iter().chain(target.bindings()).chain(normals).chain(list.bindings()))
+        let first = target.views.first_surface_binding().filter(|_| variant.positions != Positions::Only);
+        pass.bind(0, own.into_iter().chain(target.bindings()).chain(normals).chain(first).chain(list.bindings()))
     });
     let bound = bound.collect::<Result<Vec<_>, _>>()?;
     let kind = WorkKind::new(batch.family(), &variant.name());
@@ -351,8 +388,7 @@ pub(crate) struct Picture<'p> {
     /// Its number in the batch.
     pub camera: usize,
     pub target: &'p Surfaces,
-    /// The planes of the batch.
-    pub words: &'p Buffer,
+    pub planes: &'p Planes,
     /// A list for each piece.
     pub lists: &'p [PixelList],
 }
@@ -362,6 +398,7 @@ struct Buffers<'r> {
     cache: &'r Buffer,
     sums: &'r Buffer,
     words: &'r Buffer,
+    kept: &'r Buffer,
 }
 
 /// Those that are not the picture's own.
@@ -379,6 +416,8 @@ fn bindings<'r>(
         Binding::texture("samples", samples),
     ];
     bindings.extend(variant.provenance_plane.map(|_| Binding::buffer("words", buffers.words)));
+    let shares_light = variant.positions != Positions::Only;
+    bindings.extend(shares_light.then(|| Binding::buffer("kept", buffers.kept)));
     let map = scene.environment.as_deref().filter(|_| variant.environment_map);
     bindings.extend(map.into_iter().flat_map(GpuEnvironment::bindings));
     bindings
@@ -397,13 +436,14 @@ mod tests {
         let table = Table::new(&stage.gpu, "samples", TextureFormat::Rgba32Uint, &[[0_u32; 4]; 2]).expect("a table");
         let list = PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), 1);
         let buffer = &stage.buffer;
-        let buffers = Buffers { cameras: buffer, cache: buffer, sums: buffer, words: buffer };
+        let buffers = Buffers { cameras: buffer, cache: buffer, sums: buffer, words: buffer, kept: buffer };
         for variant in LookUp::all() {
             let target = stage.surfaces(variant.by_rays, false);
             let mut own = bindings(&variant, &buffers, &stage.scene, &table);
             own.extend(variant.environment_map.then(|| stage.environment.bindings()).into_iter().flatten());
             own.extend(target.bindings());
             own.extend(target.views.triangle_normal_binding());
+            own.extend(target.views.first_surface_binding().filter(|_| variant.positions != Positions::Only));
             own.extend(list.bindings());
             stage.check(&variant, 0, &own);
         }

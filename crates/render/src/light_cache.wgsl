@@ -40,7 +40,6 @@ struct Cache {
     least_cosine: f32,
     // Between the luminances of texels, at most, relative to the greatest.
     most_difference: f32,
-    camera_count: u32,
     cameras: array<CacheCamera, MAX_CACHE_CAMERAS>,
 }
 
@@ -58,6 +57,13 @@ struct List { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
 {%- if provenance_plane %}
 @group(0) var<storage, read_write> words: array<u32>;
 {%- endif %}
+{%- if positions != "only" %}
+// The surface of a pixel at its first position, if its light is known: its plane's distance from the eye, the normals of its
+// triangle and of shading, and its provenance.
+@group(0) var first_surfaces: {{ "texture_storage_2d<rgba32uint, write>" if positions == "first" else "texture_2d<u32>" }};
+// 1 for pixels whose sums are still those of the first position.
+@group(0) var<storage, read_write> kept: array<u32>;
+{%- endif %}
 {% include "sums.wgsl" %}
 
 // Texels of a sample in the table.
@@ -70,6 +76,12 @@ const LEAST_WEIGHT: f32 = 0.02;
 // Differences are relative to no less light than this.
 const LEAST_LUMINANCE: f32 = 0.05;
 const MOST_RATIO: f32 = 4.0;
+{%- if positions == "later" %}
+// Surfaces at two positions within a pixel have one light: cosines between their normals, and the distance from one plane.
+const ALIKE_TRIANGLES: f32 = 0.98;
+const ALIKE_NORMALS: f32 = 0.9995;
+const ALIKE_FOOTPRINTS: f32 = 0.1;
+{%- endif %}
 // Cosine between normals of shading up to which the light is the same.
 const SAME_NORMAL: f32 = 0.99999;
 
@@ -81,7 +93,7 @@ struct Point {
     footprint_m: f32,
 }
 
-// Light of one image, or of all of them: sums over texels by their weights.
+// Sums over texels by their weights.
 struct CachedLight {
     lamps_linear: vec3f,
     environment_linear: vec3f,
@@ -106,23 +118,36 @@ fn luminance(linear: vec3f) -> f32 { return dot(linear, vec3f(0.2126, 0.7152, 0.
 // The luminance of each lamp that has a share times the direction towards it, then of all other lamps together, then of the
 // bright texels of an environment map.
 var<private> lamp_vectors: array<vec3f, {{ lamp_vectors }}>;
+{%- if light_count %}
+
+// As incident_from of the lamp's middle, by fewer operations.
+fn lamp_vector(light: Light, point_in_world: vec3f) -> vec3f {
+    let parallel = light.kind == LIGHT_PARALLEL;
+    let middle = light.middle_in_world - select(point_in_world, vec3f(0.0), parallel);
+    let distance_m = max(length(middle), LEAST_DISTANCE_M);
+    let towards = middle / distance_m;
+    let area_normal = cross(light.axis_in_world, light.next_edge_in_world);
+    let seen_area = max(-dot(area_normal, towards), 0.0) * (4.0 / LIGHT_PI);
+    let cone = clamp((-dot(light.axis_in_world, towards) - light.outer_cosine) * light.cone_scale, 0.0, 1.0);
+    let share = select(cone * cone, seen_area, light.kind == LIGHT_RECTANGLE) / (distance_m * distance_m);
+    return towards * (luminance(light.color_linear) * select(share, 1.0, parallel));
+}
+{%- endif %}
 
 fn find_lamps(point_in_world: vec3f) {
-    for (var i = 0u; i < {{ lamp_vectors }}u; i++) { lamp_vectors[i] = vec3f(0.0); }
-{%- if light_count %}
-    for (var number = 0u; number < illumination.light_count; number++) {
-        let incident = incident_from(illumination.lights[number], point_in_world, vec2f(0.5));
-        var place = number;
+{%- for number in range([light_count, max_lamp_shares] | min) %}
+    lamp_vectors[{{ number }}u] = lamp_vector(illumination.lights[{{ ("cache.shares.lamps[" ~ (number // 4) ~ "u][" ~ (number % 4) ~ "u]") if light_count > max_lamp_shares else (number ~ "u") }}], point_in_world);
+{%- endfor %}
 {%- if light_count > max_lamp_shares %}
-        place = MAX_LAMP_SHARES;
-        for (var named = 0u; named < MAX_LAMP_SHARES; named++) {
-            place = select(place, named, cache.shares.lamps[named / 4u][named % 4u] == number);
-        }
-{%- endif %}
-        lamp_vectors[place] += incident.towards * luminance(incident.irradiance_linear);
+    var others = vec3f(0.0);
+    for (var number = 0u; number < illumination.light_count; number++) {
+        others += lamp_vector(illumination.lights[number], point_in_world);
     }
+    for (var named = 0u; named < MAX_LAMP_SHARES; named++) { others -= lamp_vectors[named]; }
+    lamp_vectors[MAX_LAMP_SHARES] = others;
 {%- endif %}
 {%- if bright_traced %}
+    lamp_vectors[{{ lamp_vectors - 1 }}u] = vec3f(0.0);
     for (var bright = has_bright_texels(); bright; bright = false) {
         let incident = incident_from_bright(vec2f(0.5));
         lamp_vectors[{{ lamp_vectors - 1 }}u] = incident.towards * luminance(incident.irradiance_linear);
@@ -147,7 +172,48 @@ fn expected_of_environment(normal: vec3f) -> f32 {
 
 fn ratio_of(here: f32, there: f32) -> f32 { return clamp(here / max(there, 1e-6), 0.0, MOST_RATIO); }
 
-// What the four texels around a point's place in an image say of it.
+// A texel of an image: where its sample is in the table, and its bilinear weight, 0 where it does not count.
+struct Texel { first: u32, weight: f32, words: vec4u }
+
+// A point as seen from an image's eye, and the first of the texels around its place with its direction. `along_normal` is the
+// offset's share along the point's normal.
+struct Sight { offset: vec3f, along_normal: f32, texel: vec2i, direction: vec3f }
+
+// A vector along an octahedral unit vector, of another length: a root less.
+fn along_oct16(packed: u32) -> vec3f {
+    let flat = unpack2x16snorm(packed);
+    let z = 1.0 - abs(flat.x) - abs(flat.y);
+    return vec3f(select(flat, oct_wrapped(flat), z < 0.0), z);
+}
+
+// `half_step` is half a step of the stored inverse depth times the depth of the point: times the depth of the texel it is what the
+// step moves the texel along its direction.
+fn texel_beside(image: CacheCamera, sight: Sight, step: vec2i, weight: f32, point: Point, plane_m: f32, half_step: f32) -> Texel {
+    let place = sight.texel + step;
+    let clamped = vec2u(clamp(place, vec2i(0), vec2i(image.size_px) - 1));
+    let first = (image.first_sample + clamped.y * image.size_px.x + clamped.x) * SAMPLE_TEXELS;
+    let words = textureLoad(samples, texel_at(first), 0);
+    let inverse_depth_per_m = bitcast<f32>(words.x);
+    let depth_m = 1.0 / max(inverse_depth_per_m, 1e-30);
+    let normal = along_oct16(words.y);
+    let squared = dot(normal, normal);
+    let ways = vec2f(step);
+    let direction = sight.direction + image.column_in_world * ways.x + image.row_in_world * ways.y;
+    let cosine = dot(normal, point.triangle_normal);
+    let along_texel = dot(normal, direction);
+    let along_point = dot(point.triangle_normal, direction);
+    let from_texel_m = dot(normal, sight.offset) - depth_m * along_texel;
+    let from_point_m = sight.along_normal - depth_m * along_point;
+    let step_m = half_step * depth_m;
+    let is_turned_alike = cosine > 0.0 && cosine * cosine >= cache.least_cosine * cache.least_cosine * squared;
+    let is_in_plane = abs(from_texel_m) <= plane_m * sqrt(squared) + step_m * abs(along_texel)
+        && abs(from_point_m) <= plane_m + step_m * abs(along_point);
+    let counts = all(vec2i(clamped) == place) && inverse_depth_per_m > 0.0 && is_turned_alike && is_in_plane;
+    return Texel(first, select(0.0, weight, counts), words);
+}
+
+// What the four texels around a point's place in an image say of it. Loops, not branches: the software device skips only loops
+// that no lane needs.
 fn consult(image: CacheCamera, number: u32, point: Point, known: ptr<function, Known>) {
     let at = vec4f(point.offset, 1.0);
     let rows = image.homogeneous_texel_from_offset;
@@ -156,41 +222,31 @@ fn consult(image: CacheCamera, number: u32, point: Point, known: ptr<function, K
     let size = vec2f(image.size_px);
     let from_border = min(place, size - place);
     let border = clamp(min(from_border.x, from_border.y) / BORDER_PX, 0.0, 1.0);
-    let towards_camera = image.eye_offset - point.offset;
-    // Loops, not branches: the software device skips only loops that no lane needs.
     for (var inside = depth_m > image.near_m && border > 0.0; inside; inside = false) {
-        let low = vec2i(floor(place - 0.5));
-        let share = place - 0.5 - vec2f(low);
-        let facing = max(dot(point.triangle_normal, towards_camera), 0.0) * inverseSqrt(max(dot(towards_camera, towards_camera), 1e-30));
+        let low = floor(place - 0.5);
+        let share = place - 0.5 - low;
+        let center = low + 0.5;
+        let offset = point.offset - image.eye_offset;
+        let sight = Sight(
+            offset, dot(point.triangle_normal, offset), vec2i(low),
+            image.column_in_world * center.x + image.row_in_world * center.y + image.corner_in_world,
+        );
         let texel_m = depth_m * image.footprint;
-        let closeness = border * (facing + GRAZING_SHARE) / (texel_m * texel_m);
-        let most_m = cache.plane_footprints * max(texel_m, point.footprint_m) + image.half_step_per_m * depth_m * depth_m;
-        var own: CachedLight;
-        var coverage = 0.0;
-        for (var corner = 0u; corner < 4u; corner++) {
-            let step = vec2i(i32(corner & 1u), i32(corner >> 1u));
-            let texel = low + step;
-            let weights = select(1.0 - share, share, step == vec2i(1));
-            let weight = weights.x * weights.y;
-            let is_inside = all(texel >= vec2i(0)) && all(texel < vec2i(image.size_px));
-            for (var near = is_inside && weight > 0.0; near; near = false) {
-                let first = (image.first_sample + u32(texel.y) * image.size_px.x + u32(texel.x)) * SAMPLE_TEXELS;
-                let words = textureLoad(samples, texel_at(first), 0);
-                let inverse_depth_per_m = bitcast<f32>(words.x);
-                let normal = unit_from_oct16(words.y);
-                let center = vec2f(texel) + 0.5;
-                let direction = image.column_in_world * center.x + image.row_in_world * center.y + image.corner_in_world;
-                let between = point.offset - image.eye_offset - direction / max(inverse_depth_per_m, 1e-30);
-                let planes_m = max(abs(dot(between, normal)), abs(dot(between, point.triangle_normal)));
-                let is_same = dot(normal, point.triangle_normal) >= cache.least_cosine && planes_m <= most_m;
-                for (var counts = inverse_depth_per_m > 0.0 && is_same; counts; counts = false) {
-                    coverage += weight;
-                    add_texel(words, first, weight, closeness, point, &own, known);
-                }
-            }
-        }
+        let plane_m = cache.plane_footprints * max(texel_m, point.footprint_m);
+        let half_step = image.half_step_per_m * depth_m;
+{%- for corner in range(4) %}
+        let texel{{ corner }} = texel_beside(
+            image, sight, vec2i({{ corner % 2 }}, {{ corner // 2 }}),
+            {{ "share.x" if corner % 2 else "(1.0 - share.x)" }} * {{ "share.y" if corner // 2 else "(1.0 - share.y)" }}, point, plane_m, half_step,
+        );
+{%- endfor %}
+        let coverage = texel0.weight + texel1.weight + texel2.weight + texel3.weight;
         for (var counts = coverage > 0.0; counts; counts = false) {
-            add_image(own, coverage * coverage, known);
+            let facing = max(-sight.along_normal, 0.0) * inverseSqrt(max(dot(offset, offset), 1e-30));
+            let certainty = coverage * coverage * border * (facing + GRAZING_SHARE) / (texel_m * texel_m);
+{%- for corner in range(4) %}
+            add_texel(texel{{ corner }}, certainty, point, known);
+{%- endfor %}
             (*known).coverage = max((*known).coverage, coverage);
             (*known).camera_mask |= 1u << number;
         }
@@ -198,18 +254,18 @@ fn consult(image: CacheCamera, number: u32, point: Point, known: ptr<function, K
 }
 
 // Adds the light of a texel, as it would be with the point's own normal.
-fn add_texel(words: vec4u, first: u32, weight: f32, closeness: f32, point: Point, own: ptr<function, CachedLight>, known: ptr<function, Known>) {
-    let more = textureLoad(samples, texel_at(first + 1u), 0);
-    var lamps = linear_from_rgb9e5(words.w);
+fn add_texel(texel: Texel, certainty: f32, point: Point, known: ptr<function, Known>) {
+    let more = textureLoad(samples, texel_at(texel.first + 1u), 0);
+    var lamps = linear_from_rgb9e5(texel.words.w);
     var environment = linear_from_rgb9e5(more.x);
 {%- if share_words > 3 %}
-    let rest = textureLoad(samples, texel_at(first + 2u), 0);
+    let rest = textureLoad(samples, texel_at(texel.first + 2u), 0);
 {%- endif %}
 {%- for word in range(share_words) %}
     let shares{{ word }} = unpack4x8unorm({% if word < 3 %}more[{{ word + 1 }}u]{% else %}rest[{{ word - 3 }}u]{% endif %});
 {%- endfor %}
-    let normal = unit_from_oct16(words.z);
-    for (var differs = dot(normal, point.normal) < SAME_NORMAL; differs; differs = false) {
+    let normal = unit_from_oct16(texel.words.z);
+    for (var differs = texel.weight > 0.0 && dot(normal, point.normal) < SAME_NORMAL; differs; differs = false) {
         lamps *= ratio_of(
             expected_of_lamps(point.normal{% for word in range(share_words) %}, shares{{ word }}{% endfor %}),
             expected_of_lamps(normal{% for word in range(share_words) %}, shares{{ word }}{% endfor %}),
@@ -217,24 +273,15 @@ fn add_texel(words: vec4u, first: u32, weight: f32, closeness: f32, point: Point
         environment *= ratio_of(expected_of_environment(point.normal), expected_of_environment(normal));
     }
     let total = luminance(lamps + environment);
-    let agrees = weight > LEAST_WEIGHT;
+    let agrees = texel.weight > LEAST_WEIGHT;
     (*known).least_luminance = select((*known).least_luminance, min((*known).least_luminance, total), agrees);
     (*known).greatest_luminance = select((*known).greatest_luminance, max((*known).greatest_luminance, total), agrees);
-    let share = weight * closeness;
-    (*own).lamps_linear += lamps * share;
-    (*own).environment_linear += environment * share;
-    (*own).weight += share;
+    let share = texel.weight * certainty;
+    (*known).light.lamps_linear += lamps * share;
+    (*known).light.environment_linear += environment * share;
+    (*known).light.weight += share;
 {%- for word in range(share_words) %}
-    (*own).shares{{ word }} += shares{{ word }} * share;
-{%- endfor %}
-}
-
-fn add_image(own: CachedLight, share: f32, known: ptr<function, Known>) {
-    (*known).light.lamps_linear += own.lamps_linear * share;
-    (*known).light.environment_linear += own.environment_linear * share;
-    (*known).light.weight += own.weight * share;
-{%- for word in range(share_words) %}
-    (*known).light.shares{{ word }} += own.shares{{ word }} * share;
+    (*known).light.shares{{ word }} += shares{{ word }} * share;
 {%- endfor %}
 }
 
@@ -272,6 +319,18 @@ fn put_other_lamps(light: CachedLight, place: u32) {
 }
 {%- endif %}
 
+{%- if positions == "later" %}
+
+// Whether a point of a later position is on the plane of the first position's surface and turned alike: then it has its light.
+fn is_like_first(point: Point, first: vec4u) -> bool {
+    let triangle_normal = unit_from_oct16(first.y);
+    let from_plane_m = abs(dot(triangle_normal, point.offset) - bitcast<f32>(first.x));
+    let is_turned_alike = dot(triangle_normal, point.triangle_normal) >= ALIKE_TRIANGLES
+        && dot(unit_from_oct16(first.z), point.normal) >= ALIKE_NORMALS;
+    return is_turned_alike && from_plane_m <= ALIKE_FOOTPRINTS * point.footprint_m;
+}
+{%- endif %}
+
 fn list_pixel(place: u32) {
     let entry = atomicAdd(&list.count, 1u);
     listed_pixels[entry] = place;
@@ -287,32 +346,51 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let surface = surface_at(pixel);
     let met = depth > 0.0;
     let needs_light = met && (surface.x & SHOWN_AS_IT_IS) == 0u;
+    let planar_depth_m = camera.near_m / max(depth, 1e-30);
+    let point = Point(
+        direction_of(pixel) * planar_depth_m, unit_from_oct16(surface.z),
+        unit_from_oct16(textureLoad(triangle_normals, pixel, 0).x), planar_depth_m * camera.footprint,
+    );
+{%- if positions == "later" %}
+    let kept_place = camera.first_word / {{ plane_count }}u + place;
+    let first = textureLoad(first_surfaces, pixel, 0);
+    let is_kept = needs_light && kept[kept_place] == 1u && is_like_first(point, first);
+    let is_asked = needs_light && !is_kept;
+{%- else %}
+    let is_asked = needs_light;
+{%- endif %}
     var known: Known;
     known.least_luminance = 3.0e38;
-    for (var lit = needs_light; lit; lit = false) {
-        let planar_depth_m = camera.near_m / depth;
-        let point = Point(
-            direction_of(pixel) * planar_depth_m, unit_from_oct16(surface.z),
-            unit_from_oct16(textureLoad(triangle_normals, pixel, 0).x), planar_depth_m * camera.footprint,
-        );
+    for (var asked = is_asked; asked; asked = false) {
 {%- if lamp_vectors %}
         find_lamps(camera.eye_in_world + point.offset);
 {%- endif %}
-        for (var number = 0u; number < cache.camera_count; number++) { consult(cache.cameras[number], number, point, &known); }
+{%- for number in range(camera_count) %}
+        consult(cache.cameras[{{ number }}u], {{ number }}u, point, &known);
+{%- endfor %}
     }
-    let is_answered = needs_light && is_known(known);
+    let is_answered = is_asked && is_known(known);
     for (var answered = is_answered; answered; answered = false) {
 {%- if visibility and light_count > max_lamp_shares %}
         put_other_lamps(known.light, place);
 {%- endif %}
         put_light(known.light, place);
     }
-    let is_unknown = needs_light && !is_answered;
+    let is_unknown = is_asked && !is_answered;
     if is_unknown { list_pixel(place); }
-{%- if provenance_plane %}
     var origin = select(PROVENANCE_EMPTY, PROVENANCE_HIT, met);
     origin = select(origin, PROVENANCE_HIT | known.camera_mask << 8u, is_answered);
     origin = select(origin, PROVENANCE_LIT_HERE, is_unknown);
+{%- if positions == "first" %}
+    kept[camera.first_word / {{ plane_count }}u + place] = select(0u, 1u, is_answered);
+    let from_eye_m = dot(point.triangle_normal, point.offset);
+    let triangle_normal = textureLoad(triangle_normals, pixel, 0).x;
+    textureStore(first_surfaces, pixel, vec4u(bitcast<u32>(from_eye_m), triangle_normal, surface.z, origin));
+{%- elif positions == "later" %}
+    origin = select(origin, first.w, is_kept);
+    if is_asked { kept[kept_place] = 0u; }
+{%- endif %}
+{%- if provenance_plane %}
     words[camera.first_word + {{ provenance_plane }}u * camera.pixel_count + place] = origin;
 {%- endif %}
 }

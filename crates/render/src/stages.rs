@@ -2,6 +2,7 @@
 
 use std::{slice, sync::Arc};
 
+use depth_image::Antialias;
 use gpu::{BufferPool, Frame, FrameResult, Gpu, JobLimit, PassCache, Readback, Templates};
 
 use crate::accumulation::{Accumulations, Sums};
@@ -150,6 +151,7 @@ impl Stages {
             by_rays: batch.by_rays,
             surface_id: batch.output.surface_id,
             triangle_normal: batch.output.triangle_normal,
+            first_surface: batch.cached.is_some() && batch.output.antialias > Antialias::NONE,
             front: batch.sequence.is_some_and(|sequence| sequence.number(place) > 0),
         };
         match batch.sequence.and_then(|sequence| sequence.layer(place, Evidence::SurfaceIds)) {
@@ -207,7 +209,7 @@ impl Stages {
         let parts = batch.parts(&self.gpu, &recording.pieces, &recording.sums);
         for (camera, target) in surfaces.iter().enumerate() {
             let lists = self.lists(recording, camera);
-            light_cache::record(recording, cached, Picture { camera, target, words: &planes.words, lists: &lists })?;
+            light_cache::record(recording, cached, Picture { camera, target, planes, lists: &lists })?;
             if batch.has_color() {
                 illuminate::record(recording, &parts, (camera, slice::from_ref(target)), (1, Some(&lists)))?;
             }

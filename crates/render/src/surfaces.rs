@@ -27,6 +27,8 @@ pub(crate) struct SurfaceKind {
     pub by_rays: bool,
     pub surface_id: bool,
     pub triangle_normal: bool,
+    /// Positions within the pixels share light, by the surface of the first.
+    pub first_surface: bool,
     /// The nearest surface is wanted besides the one that is shown.
     pub front: bool,
 }
@@ -34,7 +36,7 @@ pub(crate) struct SurfaceKind {
 impl SurfaceKind {
     fn bytes(&self) -> u64 {
         let floats = 1 + u64::from(self.front) + u64::from(self.triangle_normal);
-        let pixel = 16 + 4 * floats + 8 * u64::from(self.surface_id);
+        let pixel = 16 * (1 + u64::from(self.first_surface)) + 4 * floats + 8 * u64::from(self.surface_id);
         pixel * u64::from(self.size_px.x) * u64::from(self.size_px.y)
     }
 }
@@ -48,9 +50,15 @@ pub(crate) struct SurfaceViews {
     surface_ids: Option<wgpu::TextureView>,
     /// On the side that is seen.
     pub triangle_normals: Option<wgpu::TextureView>,
+    /// What `light_cache.wgsl` keeps of the surfaces at the first position.
+    first_surfaces: Option<wgpu::TextureView>,
 }
 
 impl SurfaceViews {
+    pub fn first_surface_binding(&self) -> Option<Binding<'_>> {
+        self.first_surfaces.as_ref().map(|surfaces| Binding::texture("first_surfaces", surfaces))
+    }
+
     pub fn triangle_normal_binding(&self) -> Option<Binding<'_>> {
         self.triangle_normals.as_ref().map(|normals| Binding::texture("triangle_normals", normals))
     }
@@ -83,10 +91,11 @@ impl SurfacePool {
     fn make(&self, kind: SurfaceKind) -> SurfaceViews {
         let written = if kind.by_rays { TextureUsages::STORAGE_BINDING } else { TextureUsages::RENDER_ATTACHMENT };
         let [width, height] = kind.size_px.to_array();
-        let view = |format| {
+        let view_for = |format, written| {
             let usage = written | TextureUsages::TEXTURE_BINDING;
             self.gpu.texture("surfaces", [width, height, 1], format, usage).create_view(&Default::default())
         };
+        let view = |format| view_for(format, written);
         let depth = if kind.by_rays { TextureFormat::R32Float } else { DrawPass::DEPTH_FORMAT };
         let reversed_depth = view(depth);
         SurfaceViews {
@@ -95,6 +104,7 @@ impl SurfacePool {
             reversed_depth,
             surface_ids: kind.surface_id.then(|| view(SURFACE_ID_FORMAT)),
             triangle_normals: kind.triangle_normal.then(|| view(TRIANGLE_NORMAL_FORMAT)),
+            first_surfaces: kind.first_surface.then(|| view_for(SURFACE_FORMAT, TextureUsages::STORAGE_BINDING)),
         }
     }
 }

@@ -47,7 +47,14 @@ impl TestStage {
     }
 
     pub fn surfaces(&self, by_rays: bool, surface_id: bool) -> Surfaces {
-        let kind = SurfaceKind { size_px: UVec2::ONE, by_rays, surface_id, triangle_normal: true, front: true };
+        let kind = SurfaceKind {
+            size_px: UVec2::ONE,
+            by_rays,
+            surface_id,
+            triangle_normal: true,
+            first_surface: true,
+            front: true,
+        };
         self.surfaces.lend(kind, None)
     }
 

@@ -1,8 +1,8 @@
 //! The twin of `light_cache.wgsl`: light of samples at one surface, under a gradient from all around.
 
 use depth_image::{
-    DepthImage, Illumination, LightCacheQuality, LightPlanes, MAX_LAMP_SHARES, PinholeCamera, PixelDepth,
-    linear_from_rgb9e5, unit_from_oct16,
+    DepthImage, Illumination, LightCacheQuality, LightPlanes, MAX_LAMP_SHARES, PixelDepth, linear_from_rgb9e5,
+    unit_from_oct16,
 };
 use glam::{UVec2, Vec2, Vec3};
 
@@ -127,14 +127,18 @@ impl LightSamples<'_> {
         let towards_camera = (camera.eye_in_world - point.point_in_world).normalize_or_zero();
         let facing = point.triangle_normal_in_world.dot(towards_camera).max(0.0);
         let closeness = border * (facing + GRAZING_SHARE) / (texel_m * texel_m);
-        let most_m = tests.plane_footprints * texel_m.max(point.footprint_m) + half_step_m(image, &place);
+        let tolerance = Tolerance {
+            plane_m: tests.plane_footprints * texel_m.max(point.footprint_m),
+            half_step: half_step_per_m(image) * place.planar_depth_m,
+            least_cosine: tests.least_cosine,
+        };
         let (mut own, mut coverage) = (WeightedLight::default(), 0.0);
         for step in [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE] {
             let weight = ((1.0 - step) * (1.0 - share) + step * share).to_array();
             let weight = weight[0] * weight[1];
             let texel = low + step;
             let inside = texel.min_element() >= 0.0 && texel.cmplt(camera.size_px.as_vec2()).all();
-            if inside && weight > 0.0 && is_same_surface(image, camera, texel.as_uvec2(), point, tests, most_m) {
+            if inside && weight > 0.0 && is_same_surface(image, texel.as_uvec2(), point, &tolerance) {
                 coverage += weight;
                 let light = self.light_of_texel(image, texel.as_uvec2(), point);
                 own.add(light, weight * closeness);
@@ -191,31 +195,36 @@ impl LightSamples<'_> {
     }
 }
 
+/// How near a texel of an image must be.
+struct Tolerance {
+    plane_m: f32,
+    /// Half a step of the stored inverse depth times the depth of the point.
+    half_step: f32,
+    least_cosine: f32,
+}
+
 /// Whether a texel lies on the surface of a point.
-fn is_same_surface(
-    image: &DepthImage,
-    camera: &PinholeCamera,
-    texel: UVec2,
-    point: &SurfacePoint,
-    tests: &LookUpTests,
-    most_m: f32,
-) -> bool {
-    let place = (texel.y * camera.size_px.x + texel.x) as usize;
+fn is_same_surface(image: &DepthImage, texel: UVec2, point: &SurfacePoint, tolerance: &Tolerance) -> bool {
+    let place = (texel.y * image.size_px().x + texel.x) as usize;
     let inverse_depth_per_m = image.inverse_depth_per_m[place];
     if inverse_depth_per_m <= 0.0 {
         return false;
     }
     let normal = unit_from_oct16(image.light.as_ref().expect("light").triangle_normal_oct16[place]);
     let center = PixelDepth { pixel: texel.as_vec2() + 0.5, planar_depth_m: inverse_depth_per_m.recip() };
-    let between = point.point_in_world - camera.unproject(center);
-    let planes_m = between.dot(normal).abs().max(between.dot(point.triangle_normal_in_world).abs());
-    normal.dot(point.triangle_normal_in_world) >= tests.least_cosine && planes_m <= most_m
+    let texel_in_world = image.camera.unproject(center);
+    let between = point.point_in_world - texel_in_world;
+    // What half a step of the depth moves the texel by.
+    let step = (texel_in_world - image.camera.reference().eye_in_world) * tolerance.half_step;
+    let is_near = |normal: Vec3| between.dot(normal).abs() <= tolerance.plane_m + step.dot(normal).abs();
+    let is_turned_alike = normal.dot(point.triangle_normal_in_world) >= tolerance.least_cosine;
+    is_turned_alike && is_near(normal) && is_near(point.triangle_normal_in_world)
 }
 
-/// Half a step of the stored depth, in metres where a point is.
-fn half_step_m(image: &DepthImage, place: &PixelDepth) -> f32 {
+/// Half a step of the stored inverse depth.
+fn half_step_per_m(image: &DepthImage) -> f32 {
     let range = image.inverse_depth_range().map_or(0.0, |(least, greatest)| greatest - least);
-    0.5 * range / DEPTH_CODES * place.planar_depth_m * place.planar_depth_m
+    0.5 * range / DEPTH_CODES
 }
 
 fn luminance(linear: Vec3) -> f32 {

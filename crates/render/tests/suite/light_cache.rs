@@ -1,8 +1,8 @@
 //! Views whose surfaces come from the scene and whose light comes from samples.
 
 use depth_image::{
-    Aabb, Camera, DepthImage, Environment, Illumination, Light, LightCacheQuality, PinholeCamera, Provenance,
-    ProvenanceKind, SinglePoleCamera, View, ViewPlanes, rgb9e5_from_linear, srgb8_from_linear,
+    Aabb, Antialias, Camera, DepthImage, Environment, Illumination, Light, LightCacheQuality, PinholeCamera,
+    Provenance, ProvenanceKind, SinglePoleCamera, View, ViewPlanes, rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{Affine3A, UVec2, Vec3};
 use render::scalar::light_cache::{LightSamples, SurfacePoint};
@@ -227,4 +227,22 @@ fn one_camera_is_enough_for_a_set() {
     let view = cached(work, images, LightCacheQuality::Balanced, ViewPlanes::ALL);
     let traced = direct(DrawWork { lighting: "soft 64, occlusion 64 1m".parse().expect("a lighting"), ..work });
     assert!(difference(&view, &traced) < 4.0);
+}
+
+#[test]
+fn positions_within_a_pixel_share_light_and_provenance_is_that_of_the_centre() {
+    let scene = upload(&sphere_on_a_floor(vec![lamp(0.3, 1.0)]));
+    let work = work(&scene, LIGHTING);
+    let images = samples(work);
+    let four = ViewPlanes { antialias: Antialias::of(4).expect("offered"), ..ViewPlanes::ALL };
+    let view = cached(work, &images, LightCacheQuality::Balanced, four);
+    let many = DrawWork { lighting: "soft 64, occlusion 64 1m".parse().expect("a lighting"), ..work };
+    let traced = device().1.draw_views(many, &[view_camera()], four).expect("a view").remove(0);
+    let error = difference(&view, &traced);
+    assert!(error < 2.5, "{error}");
+    let center = cached(work, &images, LightCacheQuality::Balanced, ViewPlanes::ALL);
+    assert_eq!(view.inverse_depth_per_m, center.inverse_depth_per_m);
+    let [of_positions, of_center] = [&view, &center].map(|view| view.provenance.as_ref().expect("provenance"));
+    let same = of_positions.iter().zip(of_center).filter(|(a, b)| a.kind() == b.kind()).count();
+    assert!(same * 50 > 48 * of_center.len(), "{same} of {}", of_center.len());
 }
