@@ -1,14 +1,19 @@
 //! Views whose light comes from samples, beside views that are drawn directly.
 
-use depth_image::{DepthImage, Environment, Illumination, Light, LightCacheQuality, PinholeCamera, View, ViewPlanes};
-use depth_image::{ProvenanceKind, linear_from_srgb8};
+use depth_image::{
+    DepthImage, Environment, Illumination, Light, LightCacheQuality, PinholeCamera, ProvenanceKind, View, ViewPlanes,
+    linear_from_srgb8,
+};
 use glam::{Affine3A, UVec2, Vec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, SamplePlanes};
 use scene::procedural::{quad, unit_cube};
 use scene::{Instance, Scene};
 
-use super::measures::{depths, is_kind, mean};
+use super::measures::{depths, is_kind, mean, share};
 use super::stand::{Stand, pinholes, work};
+
+/// Of 8-bit colours.
+const CLEAR_DIFFERENCE: f64 = 16.0;
 
 /// A box with sides along the axes.
 #[derive(Debug, Clone, Copy)]
@@ -23,6 +28,13 @@ pub struct LitScene<'s> {
     scene: GpuScene,
     lighting: Lighting,
     pub scene_time_s: f32,
+}
+
+/// Some pixels of a view, and their true colours.
+pub struct ComparedPixels {
+    pub camera: PinholeCamera,
+    pub truth: View,
+    pub pixels: Vec<usize>,
 }
 
 /// A white floor through the origin, with boxes.
@@ -81,6 +93,13 @@ impl<'s> LitScene<'s> {
     }
 }
 
+impl ComparedPixels {
+    /// The mean absolute difference of 8-bit colours where light comes from samples.
+    pub fn error(&self, lit: &LitScene<'_>, images: &[DepthImage], quality: LightCacheQuality) -> anyhow::Result<f64> {
+        Ok(color_error(&self.truth, &lit.cached(images, quality, self.camera)?, &self.pixels))
+    }
+}
+
 /// The share of a view's surfaces whose light no sample knew.
 pub fn unknown_share(view: &View) -> f64 {
     let count = |kind| is_kind(view, kind).filter(|is| *is).count() as f64;
@@ -99,9 +118,15 @@ pub fn pixels_where(camera: &PinholeCamera, view: &View, is_wanted: impl Fn(Vec3
 }
 
 /// The mean absolute difference of 8-bit colours over some pixels.
-pub fn color_error(truth: &View, view: &View, pixels: &[usize]) -> f64 {
+fn color_error(truth: &View, view: &View, pixels: &[usize]) -> f64 {
     let channels = pixels.iter().flat_map(|&pixel| 3 * pixel..3 * pixel + 3);
     mean(channels.map(|channel| f64::from(truth.srgb8[channel].abs_diff(view.srgb8[channel])))).unwrap_or(f64::NAN)
+}
+
+/// The share of a view's surfaces whose colour is clearly not the true one.
+pub fn share_of_other_colors(truth: &View, view: &View) -> f64 {
+    let differs = |pixel: usize| color_error(truth, view, &[pixel]) > CLEAR_DIFFERENCE;
+    share(depths(truth).iter().enumerate().filter(|(_, depth)| **depth > 0.0).map(|(pixel, _)| differs(pixel)))
 }
 
 /// The mean linear green light of some pixels.
