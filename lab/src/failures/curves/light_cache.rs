@@ -1,9 +1,8 @@
 //! Light of samples at surfaces of the scene: edges of light within a texel, steps of depth, other moments, and the points
 //! that no sample knows.
 
-use codec::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
 use depth_image::LightCacheQuality::{Balanced, Fast, Fine};
-use depth_image::{DepthImage, Environment, Illumination, PinholeCamera, View, nested_places};
+use depth_image::{Environment, Illumination, PinholeCamera, View, nested_places};
 use glam::{UVec2, Vec2, Vec3};
 use scene::procedural::{courtyard, quad, snake};
 use scene::{Instance, Scene};
@@ -15,6 +14,7 @@ use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::shape::Shape;
 use crate::failures::stage::{Cell, looking};
 use crate::failures::stand::Stand;
+use crate::reference_views::encoded_and_decoded;
 
 const FLOOR_HALF_M: f32 = 2.5;
 const EYE_HEIGHT_M: f32 = 4.0;
@@ -250,11 +250,6 @@ fn by_range(stand: &Stand, ratios: &[f64]) -> anyhow::Result<Rows> {
             share_of_other_colors(&truth, &balanced),
         ])
     })
-}
-
-fn encoded_and_decoded(image: &DepthImage) -> anyhow::Result<DepthImage> {
-    let encoded = encode_depth_image(image, PlaneSet::default())?;
-    Ok(decode_depth_image(&encoded.header, image.camera, &encoded.payload, &DecodeLimits::default())?)
 }
 
 fn by_moment(stand: &Stand, times_s: &[f64]) -> anyhow::Result<Rows> {
