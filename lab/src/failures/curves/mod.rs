@@ -11,6 +11,7 @@ mod k_fd;
 mod layers;
 mod leaves;
 mod light;
+mod light_cache;
 mod odd_eyes;
 mod poles;
 mod quads;
@@ -23,7 +24,7 @@ mod view_cell;
 use super::curve::Curve;
 
 /// Families of curves that share their scene or their parts.
-pub const CURVES: [&[Curve]; 19] = [
+pub const CURVES: [&[Curve]; 20] = [
     &poles::CURVES,
     &sphere::CURVES,
     &[thickness::CURVE],
@@ -38,6 +39,7 @@ pub const CURVES: [&[Curve]; 19] = [
     &[courtyard::CURVE],
     &depth_range::CURVES,
     &light::CURVES,
+    &light_cache::CURVES,
     &frames::CURVES,
     &quads::CURVES,
     &redundancy::CURVES,

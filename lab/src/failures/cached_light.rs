@@ -1,0 +1,135 @@
+//! Views whose light comes from samples, beside views that are drawn directly.
+
+use depth_image::{
+    DepthImage, Environment, Illumination, Light, LightCacheQuality, PinholeCamera, ProvenanceKind, View, ViewPlanes,
+    linear_from_srgb8,
+};
+use glam::{Affine3A, UVec2, Vec2, Vec3};
+use render::{DrawWork, GpuScene, Lighting, SamplePlanes};
+use scene::procedural::{quad, unit_cube};
+use scene::{Instance, Scene};
+
+use super::measures::{depths, is_kind, mean, share};
+use super::stand::{Stand, pinholes, work};
+
+/// Of 8-bit colours.
+const CLEAR_DIFFERENCE: f64 = 16.0;
+
+/// A box with sides along the axes.
+#[derive(Debug, Clone, Copy)]
+pub struct Cuboid {
+    pub center: Vec3,
+    pub size_m: Vec3,
+}
+
+/// A scene under one lighting at one moment.
+pub struct LitScene<'s> {
+    stand: &'s Stand,
+    scene: GpuScene,
+    lighting: Lighting,
+    pub scene_time_s: f32,
+}
+
+/// Some pixels of a view, and their true colours.
+pub struct ComparedPixels {
+    pub camera: PinholeCamera,
+    pub truth: View,
+    pub pixels: Vec<usize>,
+}
+
+/// A white floor through the origin, with boxes.
+pub fn floor_with(cuboids: &[Cuboid], half_size_m: f32, illumination: Illumination) -> Scene {
+    let mut scene = quad(Vec3::ZERO, half_size_m, Vec3::Y, [255; 3]);
+    scene.materials[0].unlit = false;
+    scene.meshes.extend(unit_cube().meshes);
+    scene.instances.extend(cuboids.iter().map(|cuboid| {
+        let world_from_mesh = Affine3A::from_translation(cuboid.center) * Affine3A::from_scale(cuboid.size_m);
+        Instance { mesh: 1, world_from_mesh }
+    }));
+    Scene { illumination, ..scene }
+}
+
+/// Light from one direction, with sharp shadows, and none from the environment.
+pub fn sun(towards: Vec3) -> Illumination {
+    let sun = Light::Directional {
+        towards_light_in_world: towards.normalize_or(Vec3::Y),
+        irradiance_linear: Vec3::splat(0.8),
+        angular_radius_rad: 0.0,
+    };
+    Illumination { lights: vec![sun], environment: Environment::uniform(Vec3::ZERO) }
+}
+
+impl<'s> LitScene<'s> {
+    pub fn new(stand: &'s Stand, scene: &Scene, lighting: &str) -> anyhow::Result<Self> {
+        Ok(Self { stand, scene: stand.upload(scene)?, lighting: lighting.parse()?, scene_time_s: 0.0 })
+    }
+
+    fn work(&self) -> DrawWork<'_> {
+        DrawWork { scene_time_s: self.scene_time_s, ..work(&self.scene, self.lighting) }
+    }
+
+    /// Samples of light.
+    pub fn samples(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
+        let planes = SamplePlanes { light: true, ..SamplePlanes::default() };
+        Ok(self.stand.engine().renderer.draw_depth_images(self.work(), &pinholes(cameras), planes)?)
+    }
+
+    /// A view with the light of samples where they know it.
+    pub fn cached(
+        &self,
+        images: &[DepthImage],
+        quality: LightCacheQuality,
+        camera: PinholeCamera,
+    ) -> anyhow::Result<View> {
+        let renderer = &self.stand.engine().renderer;
+        let work = self.work();
+        let cache = renderer.upload_light(work.scene, work.lighting, images, work.turn)?;
+        Ok(renderer.draw_cached_views(work, &cache, quality, &[camera], ViewPlanes::ALL)?.remove(0))
+    }
+
+    /// A view that is lit by its own rays.
+    pub fn direct(&self, camera: PinholeCamera) -> anyhow::Result<View> {
+        Ok(self.stand.engine().renderer.draw_views(self.work(), &[camera], ViewPlanes::ALL)?.remove(0))
+    }
+}
+
+impl ComparedPixels {
+    /// The mean absolute difference of 8-bit colours where light comes from samples.
+    pub fn error(&self, lit: &LitScene<'_>, images: &[DepthImage], quality: LightCacheQuality) -> anyhow::Result<f64> {
+        Ok(color_error(&self.truth, &lit.cached(images, quality, self.camera)?, &self.pixels))
+    }
+}
+
+/// The share of a view's surfaces whose light no sample knew.
+pub fn unknown_share(view: &View) -> f64 {
+    let count = |kind| is_kind(view, kind).filter(|is| *is).count() as f64;
+    let unknown = count(ProvenanceKind::LitHere);
+    unknown / (unknown + count(ProvenanceKind::Hit))
+}
+
+/// The pixels of a view whose surfaces are at some places in the world.
+pub fn pixels_where(camera: &PinholeCamera, view: &View, is_wanted: impl Fn(Vec3) -> bool) -> Vec<usize> {
+    let shows = |&(index, depth): &(usize, &f32)| {
+        let place = UVec2::new(index as u32 % camera.size_px.x, index as u32 / camera.size_px.x);
+        let ray = camera.ray(place.as_vec2() + Vec2::splat(0.5));
+        *depth > 0.0 && is_wanted(ray.at(depth.recip()))
+    };
+    depths(view).iter().enumerate().filter(shows).map(|(index, _)| index).collect()
+}
+
+/// The mean absolute difference of 8-bit colours over some pixels.
+fn color_error(truth: &View, view: &View, pixels: &[usize]) -> f64 {
+    let channels = pixels.iter().flat_map(|&pixel| 3 * pixel..3 * pixel + 3);
+    mean(channels.map(|channel| f64::from(truth.srgb8[channel].abs_diff(view.srgb8[channel])))).unwrap_or(f64::NAN)
+}
+
+/// The share of a view's surfaces whose colour is clearly not the true one.
+pub fn share_of_other_colors(truth: &View, view: &View) -> f64 {
+    let differs = |pixel: usize| color_error(truth, view, &[pixel]) > CLEAR_DIFFERENCE;
+    share(depths(truth).iter().enumerate().filter(|(_, depth)| **depth > 0.0).map(|(pixel, _)| differs(pixel)))
+}
+
+/// The mean linear green light of some pixels.
+pub fn mean_light(view: &View, pixels: &[usize]) -> f64 {
+    mean(pixels.iter().map(|&pixel| f64::from(linear_from_srgb8(view.srgb8[3 * pixel + 1])))).unwrap_or(f64::NAN)
+}
