@@ -79,12 +79,12 @@ pub const CURVES: [Curve; 7] = [
         x: X::log("distance of the wall over the card's", "", &[1e1, 1e2, 1e3, 3e3, 1e4, 3e4, 1e5]),
         y: ["share of surfaces", ""],
         series: &[
-            Series::new("unknown, fast", &[Shape::rises(0.1, 0.01)]),
-            Series::new("unknown, balanced", &[Shape::rises(0.1, 0.01)]),
+            Series::new("unknown, fast", &[Shape::Plateau { tolerance: 0.015 }]),
+            Series::new("unknown, balanced", &[Shape::Plateau { tolerance: 0.015 }]),
             Series::new("another colour, fast", &[Shape::Bounded { least: 0.0, most: 0.05 }]),
             Series::new("another colour, balanced", &[Shape::Bounded { least: 0.0, most: 0.005 }]),
         ],
-        why: "A step of the stored depth moves far samples off their surface. The tolerance has half a step at the depth of the point, too little where a step is a tenth of the inverse depth.",
+        why: "A step of the stored depth moves far samples along their rays. The tolerance has what half a step moves them by, so that they stay known.",
         measure: by_range,
     },
     Curve {
