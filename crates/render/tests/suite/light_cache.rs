@@ -15,7 +15,7 @@ use crate::stage::{device, floor_under, mean, upload, work};
 
 const VIEW_PX: UVec2 = UVec2::new(160, 120);
 const LIGHT: SamplePlanes = SamplePlanes {
-    antialias: depth_image::Antialias::NONE,
+    antialias: Antialias::NONE,
     normal: false,
     surface_id: false,
     specular: false,
@@ -227,6 +227,16 @@ fn one_camera_is_enough_for_a_set() {
     let view = cached(work, images, LightCacheQuality::Balanced, ViewPlanes::ALL);
     let traced = direct(DrawWork { lighting: "soft 64, occlusion 64 1m".parse().expect("a lighting"), ..work });
     assert!(difference(&view, &traced) < 4.0);
+}
+
+#[test]
+fn all_lamps_of_a_scene_count() {
+    let scene = upload(&sphere_on_a_floor((0..255).map(|number| lamp(0.01 * number as f32 - 1.2, 0.008)).collect()));
+    let work = work(&scene, "soft 1, occlusion 4 1m");
+    let view = cached(work, &samples(work), LightCacheQuality::Balanced, ViewPlanes::ALL);
+    assert!(share_of(&view, ProvenanceKind::LitHere) < 0.2);
+    let error = difference(&view, &direct(work));
+    assert!(error < 4.0, "{error}");
 }
 
 #[test]
