@@ -11,7 +11,7 @@ use crate::accumulation::{Key, Sums};
 use crate::pieces::{Piece, Pieces};
 use crate::pixel_camera::{PixelCamera, uniform};
 use crate::{
-    Rate, known_samples::ImageSequence, light_cache::CachedLight, planes::Output, rays::Traced, work::DrawWork,
+    Rate, known_samples::ImageSequence, light_samples::CachedLight, planes::Output, rays::Traced, work::DrawWork,
 };
 
 /// The share of the scene's diagonal within which occlusion is looked for, where a lighting names no radius.

@@ -14,7 +14,7 @@ use wgpu::{Buffer, BufferUsages};
 use crate::batch::{Batch, Recording};
 use crate::planes::{Output, PlaneLayout};
 use crate::{
-    RenderError, light_cache::GpuLampShares, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest,
+    RenderError, lamp_shares::GpuLampShares, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest,
     sums::SumPlanes, surfaces::Surfaces,
 };
 

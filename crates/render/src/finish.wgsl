@@ -52,6 +52,14 @@ fn front_at(texel: vec2u) -> f32 { return textureLoad(front_depth, texel, 0){{ "
 {% endif %}
 
 fn put(plane: u32, place: u32, word: u32) { words[camera.first_word + plane * camera.pixel_count + place] = word; }
+{%- if redundancy %}
+
+// A hole lies behind redundant surfaces where nothing else is met: nothing is known of it.
+fn put_depth_behind(place: u32, depth: f32, front: f32, met: bool) {
+    put(1u, place, bitcast<u32>(select(depth / camera.near_m, -1.0, !met && front > 0.0)));
+    put({{ passed_plane }}u, place, select(0u, 1u, front > depth));
+}
+{%- endif %}
 {% if visibility %}
 
 {% include "visibility.wgsl" %}
@@ -83,6 +91,15 @@ fn share_of(number: u32, place: u32) -> f32 {
 }
 
 fn lamp_of(number: u32) -> u32 { return finish.shares.lamps[number / 4u][number % 4u]; }
+
+fn put_light(pixel: vec2u, place: u32, met: bool) {
+    put(0u, place, rgb9e5_from_linear({{ "select(vec3f(0.0), lamps_at(place), met)" if lit else "vec3f(0.0)" }}));
+    put({{ light_plane }}u, place, textureLoad(triangle_normals, pixel, 0).x);
+    put({{ light_plane + 1 }}u, place, rgb9e5_from_linear({{ "select(vec3f(0.0), environment_at(place, 1.0), met)" if lit else "vec3f(0.0)" }}));
+{%- for word in range(share_words) %}
+    put({{ light_plane + 2 + word }}u, place, share_word({{ word }}u, place));
+{%- endfor %}
+}
 {% endif %}
 {% if averaged and samples %}
 
@@ -127,14 +144,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var hidden = met && front > depth; hidden; hidden = false) { met = is_useful(pixel, depth, front); }
 {% endif %}
 {% endif %}
-{% if light %}
-    put(0u, place, rgb9e5_from_linear({{ "select(vec3f(0.0), lamps_at(place), met)" if lit else "vec3f(0.0)" }}));
-    put({{ light_plane }}u, place, textureLoad(triangle_normals, pixel, 0).x);
-    put({{ light_plane + 1 }}u, place, rgb9e5_from_linear({{ "select(vec3f(0.0), environment_at(place, 1.0), met)" if lit else "vec3f(0.0)" }}));
-{% for word in range(share_words) %}    put({{ light_plane + 2 + word }}u, place, share_word({{ word }}u, place));
-{% endfor %}
-{% else %}
-{% include "shaded.wgsl" %}
+{% if light %}    put_light(pixel, place, met);
+{% else %}{% include "shaded.wgsl" %}
 {% endif %}
 {% if highlight %}
     for (var glossy = met && surface.w != 0u; glossy; glossy = false) {
@@ -151,12 +162,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {%- endif %}
     }
 {% endif %}
-{% if not light %}
-    for (var open = !met; open; open = false) { linear = background_linear(direction_of(pixel)); }
-{% endif %}
-{% if light %}
-    // Light is in its planes already.
-{% elif samples and averaged %}
+{% if not light %}    for (var open = !met; open; open = false) { linear = background_linear(direction_of(pixel)); }
+{% endif %}{% if light %}{% elif samples and averaged %}
     put(0u, place, rgb9e5_from_linear(mean_with(linear, depth / camera.near_m, place)));
     // All other planes are the centre's.
     if finish.position > 0u { return; }
@@ -167,9 +174,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     put(0u, place, pack4x8unorm(vec4f(srgb_from_linear(shown), 1.0)));
 {% endif %}
 {% if redundancy %}
-    // A hole lies behind redundant surfaces where nothing else is met: nothing is known of it.
-    put(1u, place, bitcast<u32>(select(depth / camera.near_m, -1.0, !met && front > 0.0)));
-    put({{ passed_plane }}u, place, select(0u, 1u, front > depth));
+    put_depth_behind(place, depth, front, met);
 {% else %}
     put(1u, place, bitcast<u32>(depth / camera.near_m));
 {% endif %}

@@ -12,7 +12,7 @@ use indexmap::IndexSet;
 use scene::{Material, Scene, TextureUse, VertexDetail, Wind};
 use wgpu::BufferUsages;
 
-use crate::light_cache::GpuLampShares;
+use crate::lamp_shares::GpuLampShares;
 use crate::material::{normal_scale, phong_reflector};
 use crate::motion::Motion;
 use crate::rays::{AccelerationReport, OrderedMesh, RayScene, flat::world_metres};

@@ -1,102 +1,22 @@
-//! Light of samples on a device, and its look-up at the surfaces of views.
+//! The look-up of light in samples, at the surfaces of views.
 
-use bytemuck::{Pod, Zeroable};
-use depth_image::{
-    Antialias, Camera, DepthImage, Illumination, LightCacheQuality, LightPlanes, MAX_LAMP_SHARES, PinholeCamera,
-    ProvenanceKind,
-};
-use glam::{DVec3, Vec3};
-use gpu::{
-    Binding, DispatchSize, Gpu, GpuEnvironment, ResourceTraits, ShaderVariant, Table, TablePool, Turn, WorkKind,
-    light_slots, switches,
-};
+use depth_image::{Antialias, MAX_LAMP_SHARES, ProvenanceKind};
+use gpu::{Binding, DispatchSize, GpuEnvironment, ResourceTraits, ShaderVariant, WorkKind, light_slots, switches};
 use minijinja::{Value, context, value::merge_maps};
-use wgpu::{Buffer, BufferUsages, TextureFormat};
+use wgpu::Buffer;
 
 use crate::batch::{Batch, Recording};
 use crate::finish::Planes;
+use crate::lamp_shares::shares_of_lamps;
+use crate::light_samples::{CachedLight, LightCache, sample_texels};
 use crate::pixel_camera::CAMERA_TRAITS;
 use crate::pixel_list::PixelList;
 use crate::{GpuScene, RenderError, sums::SumPlanes, surfaces::Surfaces};
-
-/// Sample images of a set of light.
-pub(crate) const MAX_CACHE_CAMERAS: u32 = 16;
-/// Values of stored inverse depth; a step between two of them is the range over one fewer.
-pub(crate) const DEPTH_CODES: f32 = 65_534.0;
 
 /// Codes of [`ProvenanceKind`].
 pub(crate) const PROVENANCE_EMPTY: u32 = ProvenanceKind::Empty as u32;
 pub(crate) const PROVENANCE_HIT: u32 = ProvenanceKind::Hit as u32;
 pub(crate) const PROVENANCE_LIT_HERE: u32 = ProvenanceKind::LitHere as u32;
-
-/// Samples of light on a device.
-pub struct LightCache {
-    samples: Table,
-    images: Vec<CachedImage>,
-    /// Words of packed shares of each sample.
-    share_words: usize,
-}
-
-/// A sample image of a [`LightCache`].
-struct CachedImage {
-    camera: PinholeCamera,
-    first_sample: u32,
-    half_step_per_m: f32,
-}
-
-/// Samples of light for the views of a batch, and when they know the light of a point.
-#[derive(Clone, Copy)]
-pub(crate) struct CachedLight<'a> {
-    pub cache: &'a LightCache,
-    pub tests: LookUpTests,
-}
-
-/// The tests of one quality: when samples know the light of a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LookUpTests {
-    pub least_coverage: f32,
-    pub plane_footprints: f32,
-    pub least_cosine: f32,
-    pub most_difference: f32,
-}
-
-/// `LampShares` of `lamp_shares.wgsl`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(crate) struct GpuLampShares {
-    pub lamps: [[u32; 4]; 4],
-    pub lamp_count: u32,
-    pub padding: [u32; 3],
-}
-
-/// `CacheCamera` of the shader.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(crate) struct GpuCacheCamera {
-    pub homogeneous_texel_from_offset: [[f32; 4]; 3],
-    pub eye_offset: [f32; 3],
-    pub footprint: f32,
-    pub column_in_world: [f32; 3],
-    pub first_sample: u32,
-    pub row_in_world: [f32; 3],
-    pub half_step_per_m: f32,
-    pub corner_in_world: [f32; 3],
-    pub near_m: f32,
-    pub size_px: [u32; 2],
-    pub padding: [u32; 2],
-}
-
-/// `Cache` of the shader.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(crate) struct GpuCache {
-    pub shares: GpuLampShares,
-    pub least_coverage: f32,
-    pub plane_footprints: f32,
-    pub least_cosine: f32,
-    pub most_difference: f32,
-    pub cameras: [GpuCacheCamera; MAX_CACHE_CAMERAS as usize],
-}
 
 #[derive(Debug)]
 pub(crate) struct LookUp {
@@ -124,159 +44,6 @@ enum Positions {
     Later,
 }
 
-impl LookUpTests {
-    /// `None` where no sample is asked.
-    pub fn new(quality: LightCacheQuality) -> Option<Self> {
-        let any = Self {
-            least_coverage: f32::MIN_POSITIVE,
-            plane_footprints: 1.0,
-            least_cosine: 30_f32.to_radians().cos(),
-            most_difference: f32::INFINITY,
-        };
-        let surrounded =
-            Self { least_coverage: 0.75, plane_footprints: 0.25, least_cosine: 23_f32.to_radians().cos(), ..any };
-        match quality {
-            LightCacheQuality::Draft => Some(any),
-            LightCacheQuality::Fast => Some(surrounded),
-            LightCacheQuality::Balanced => Some(Self { most_difference: 0.5, ..surrounded }),
-            LightCacheQuality::Fine => Some(Self {
-                // Four weights do not sum up to 1 to the bit.
-                least_coverage: 0.999,
-                plane_footprints: 0.1,
-                most_difference: 0.35,
-                ..surrounded
-            }),
-            LightCacheQuality::Exact => None,
-        }
-    }
-}
-
-impl GpuLampShares {
-    /// The lamps of a scene that have a share.
-    pub fn new(illumination: &Illumination) -> Self {
-        let mut lamps = [[0; 4]; 4];
-        for (place, lamp) in illumination.lamps_with_shares().into_iter().enumerate() {
-            lamps[place / 4][place % 4] = lamp;
-        }
-        Self { lamps, lamp_count: shares_of_lamps(illumination.lights.len()) as u32, padding: [0; 3] }
-    }
-}
-
-/// Shares of lamps: one for each, or else one for each of the strongest and one for all others.
-fn shares_of_lamps(light_count: usize) -> usize {
-    light_count.min(MAX_LAMP_SHARES + 1)
-}
-
-/// Texels of the table that a sample takes.
-fn sample_texels(share_words: usize) -> usize {
-    (5 + share_words).div_ceil(4)
-}
-
-impl LightCache {
-    /// Puts samples on a device, which have this many planes of shares.
-    ///
-    /// # Errors
-    /// Names the image that has no light, or whose planes do not fit, or is no pinhole's; too many images for the device.
-    pub(crate) fn upload(
-        tables: &TablePool,
-        images: &[DepthImage],
-        share_words: usize,
-        turn: Turn,
-    ) -> Result<Self, RenderError> {
-        let refused = |index: usize, reason: String| RenderError::Samples { index, reason };
-        if images.is_empty() || images.len() > MAX_CACHE_CAMERAS as usize {
-            return Err(refused(images.len(), format!("a set of light has 1 to {MAX_CACHE_CAMERAS} images")));
-        }
-        let mut cached = Vec::new();
-        let mut first_sample = 0;
-        for (index, image) in images.iter().enumerate() {
-            let camera = checked(image, share_words).map_err(|reason| refused(index, reason))?;
-            let range = image.inverse_depth_range().map_or(0.0, |(least, greatest)| greatest - least);
-            cached.push(CachedImage { camera, first_sample, half_step_per_m: 0.5 * range / DEPTH_CODES });
-            first_sample += camera.pixel_count() as u32;
-        }
-        let texels = sample_texels(share_words);
-        tables.gpu.check_table("samples of light", first_sample as usize * texels)?;
-        let words: Vec<[u32; 4]> = images.iter().flat_map(|image| packed(image, texels)).collect();
-        let samples = tables.upload("samples of light", TextureFormat::Rgba32Uint, &words, turn)?;
-        Ok(Self { samples, images: cached, share_words })
-    }
-
-    /// The uniform of a view.
-    fn uniform(&self, gpu: &Gpu, scene: &GpuScene, tests: LookUpTests, view: &Camera) -> Buffer {
-        let mut cameras = [GpuCacheCamera::zeroed(); MAX_CACHE_CAMERAS as usize];
-        for (camera, image) in cameras.iter_mut().zip(&self.images) {
-            *camera = image.seen_from(view.reference().eye_in_world);
-        }
-        let LookUpTests { least_coverage, plane_footprints, least_cosine, most_difference } = tests;
-        let cache = GpuCache {
-            shares: scene.lamp_shares,
-            least_coverage,
-            plane_footprints,
-            least_cosine,
-            most_difference: most_difference.min(f32::MAX),
-            cameras,
-        };
-        gpu.buffer_with("light cache", &[cache], BufferUsages::UNIFORM)
-    }
-}
-
-/// The camera of an image that can be used, or the reason against it.
-fn checked(image: &DepthImage, share_words: usize) -> Result<PinholeCamera, String> {
-    image.validate().map_err(|error| error.to_string())?;
-    let light = image.light.as_ref().ok_or("colour where light is needed")?;
-    let given = light.share8.len();
-    if given != share_words {
-        return Err(format!("{given} planes of shares of light, the scene's lamps and lighting need {share_words}"));
-    }
-    let camera = image.camera.pinhole().ok_or_else(|| format!("a {}, must be a pinhole", image.camera.model_name()))?;
-    Ok(*camera)
-}
-
-/// The words of all samples of an image, in whole texels.
-fn packed(image: &DepthImage, texels: usize) -> Vec<[u32; 4]> {
-    let (Some(light), Some(normals)) = (&image.light, &image.normal_oct16) else { return Vec::new() };
-    let mut words = Vec::with_capacity(texels * normals.len());
-    for (place, &normal) in normals.iter().enumerate() {
-        let inverse_depth = image.inverse_depth_per_m[place].to_bits();
-        words.push([inverse_depth, light.triangle_normal_oct16[place], normal, light.lamps_rgb9e5[place]]);
-        let share = |word: usize| light.share8.get(word).map_or(0, |plane| plane[place]);
-        words.push([light.environment_rgb9e5[place], share(0), share(1), share(2)]);
-        if texels > 2 {
-            words.push([share(3), share(4), 0, 0]);
-        }
-    }
-    words
-}
-
-impl CachedImage {
-    /// The numbers of the image's camera for a view from `eye_in_world`. In double precision: both may be far from the origin.
-    fn seen_from(&self, eye_in_world: Vec3) -> GpuCacheCamera {
-        let camera = &self.camera;
-        let eye_offset: DVec3 = camera.eye_in_world.as_dvec3() - eye_in_world.as_dvec3();
-        let rows = camera.homogeneous_pixel_from_world().map(|row| {
-            let axis = row.truncate();
-            axis.extend(-axis.as_dvec3().dot(eye_offset) as f32).to_array()
-        });
-        let column = camera.world_from_camera * Vec3::X / camera.focal_px.x;
-        let row = camera.world_from_camera * Vec3::NEG_Y / camera.focal_px.y;
-        let corner = camera.forward_in_world() - column * camera.principal_px.x - row * camera.principal_px.y;
-        GpuCacheCamera {
-            homogeneous_texel_from_offset: rows,
-            eye_offset: eye_offset.as_vec3().to_array(),
-            footprint: camera.focal_px.min_element().recip(),
-            column_in_world: column.to_array(),
-            first_sample: self.first_sample,
-            row_in_world: row.to_array(),
-            half_step_per_m: self.half_step_per_m,
-            corner_in_world: corner.to_array(),
-            near_m: camera.near_m,
-            size_px: camera.size_px.to_array(),
-            padding: [0; 2],
-        }
-    }
-}
-
 impl LookUp {
     fn new(batch: &Batch<'_>, cache: &LightCache) -> Self {
         let Batch { work, output, .. } = batch;
@@ -287,7 +54,7 @@ impl LookUp {
             bright_traced: environment_map && work.lighting.shadow_rays() > 0,
             sums: output.sums,
             share_words: cache.share_words,
-            camera_count: cache.images.len(),
+            camera_count: cache.image_count(),
             positions: match batch.position.number {
                 _ if output.antialias == Antialias::NONE => Positions::Only,
                 0 => Positions::First,
@@ -338,7 +105,7 @@ impl ShaderVariant for LookUp {
                     environment_map,
                     bright_traced: environment_map && traced,
                     sums: SumPlanes { light_count, visibility },
-                    share_words: LightPlanes::share_planes(light_count),
+                    share_words: (1 + shares_of_lamps(light_count)).div_ceil(4),
                     camera_count: 1 + light_count % 4,
                     positions: [Positions::Only, Positions::First, Positions::Later][variants.len() % 3],
                     plane_count: 2 + usize::from(provenance),
@@ -425,7 +192,8 @@ fn bindings<'r>(
 
 #[cfg(test)]
 mod tests {
-    use gpu::BufferPool;
+    use gpu::{BufferPool, Table};
+    use wgpu::TextureFormat;
 
     use super::*;
     use crate::test_support::TestStage;

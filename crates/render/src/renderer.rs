@@ -13,7 +13,7 @@ use parking_lot::Mutex;
 use crate::batch::{Batch, Position, batches};
 use crate::known_samples::{ImageSequence, KnownSamples, TemporalReference};
 use crate::layered::{self, LayerSelection};
-use crate::light_cache::{CachedLight, LightCache, LookUpTests};
+use crate::light_samples::{CachedLight, LightCache, LookUpTests};
 use crate::planes::{self, Output};
 use crate::visibility::{Choice, Costs, Visibility};
 use crate::work::{DrawWork, SamplePlanes};

@@ -21,8 +21,9 @@ const MAY_NAME: [&str; 6] = [
     "tests",
 ];
 
-/// Words that mean something else in a folder: a scene's meshes are no method.
-const OTHER_MEANINGS: [(&str, &str); 1] = [("crates/scene", "mesh")];
+/// Words that mean something else in a folder: a scene's meshes are no method, and a method that takes surfaces from the scene has
+/// its passes where surfaces are found.
+const OTHER_MEANINGS: [(&str, &str); 2] = [("crates/scene", "mesh"), ("crates/render", "light_cache")];
 
 /// A closed set of methods.
 struct Methods {

@@ -6,7 +6,7 @@ use depth_image::{
 };
 use glam::{UVec2, Vec2, Vec3};
 
-use crate::light_cache::{DEPTH_CODES, LookUpTests};
+use crate::light_samples::{DEPTH_CODES, LookUpTests};
 
 /// A surface of a view.
 #[derive(Debug, Clone, Copy)]

@@ -232,7 +232,7 @@ fn one_camera_is_enough_for_a_set() {
 #[test]
 fn all_lamps_of_a_scene_count() {
     let scene = upload(&sphere_on_a_floor((0..255).map(|number| lamp(0.01 * number as f32 - 1.2, 0.008)).collect()));
-    let work = work(&scene, "soft 1, occlusion 4 1m");
+    let work = work(&scene, "soft 1, occlusion 16 1m");
     let view = cached(work, &samples(work), LightCacheQuality::Balanced, ViewPlanes::ALL);
     assert!(share_of(&view, ProvenanceKind::LitHere) < 0.2);
     let error = difference(&view, &direct(work));
