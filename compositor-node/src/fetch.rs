@@ -102,7 +102,7 @@ impl Fetcher {
             let is_missing = |index: &u32| images.get(*index as usize).is_some_and(Option::is_none);
             let image_indices = share.image_indices.iter().copied().filter(is_missing).collect();
             let share = SamplerShare { image_indices, ..share.clone() };
-            ShareRequest { share, answer_within: work, first_within: chunk, chunk_within: chunk }
+            ShareRequest { share, answer_within: chunk, first_within: work, chunk_within: chunk }
         };
         let requests = set.plan.samplers_of(set.set_index).iter().map(request);
         requests.filter(|request| !request.share.image_indices.is_empty()).collect()

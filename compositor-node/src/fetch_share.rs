@@ -30,9 +30,9 @@ pub(crate) struct SetRequest {
 #[derive(Debug, Clone)]
 pub(crate) struct ShareRequest {
     pub(crate) share: SamplerShare,
-    /// The time until the answer: a sampler answers when it has sampled.
+    /// The time until the answer.
     pub(crate) answer_within: Duration,
-    /// The time from the answer to the first chunk.
+    /// The time from the answer to the first chunk: a sampler samples in between.
     pub(crate) first_within: Duration,
     /// The time between chunks.
     pub(crate) chunk_within: Duration,

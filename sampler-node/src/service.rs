@@ -81,7 +81,11 @@ impl SamplerService {
     }
 
     /// All of this node's images of a set, made for the first request in one submission.
-    async fn images(&self, plan: &Assignment, set_index: u32) -> Result<Pinned<PackedImages>, Status> {
+    fn images(
+        &self,
+        plan: &Assignment,
+        set_index: u32,
+    ) -> Result<impl Future<Output = Result<Pinned<PackedImages>, Status>> + Send + 'static, Status> {
         let content = plan.set_content(set_index).ok_or_else(|| beyond_timeline(set_index))?;
         let indices = plan.images_of(&self.plans.node_name, set_index).to_vec();
         let work = sample_work(plan, &indices, set_index)?;
@@ -103,17 +107,28 @@ impl SamplerService {
             let bytes = images.iter().map(|(_, image)| image.payload.len()).sum();
             Ok((images, bytes))
         };
-        self.cache.get(key, most_bytes, make).await
+        let cache = self.cache.clone();
+        Ok(async move { cache.get(key, most_bytes, make).await })
     }
 
-    /// The wanted ones of `images` as chunks.
-    fn send(&self, plan: &CellPlan, request: FetchImages, images: Images) -> Messages<Chunk> {
+    /// The wanted ones of `images` as chunks. The stream begins before there are images: expensive light takes longer than a
+    /// receiver waits for a stream that is silent.
+    fn send(
+        &self,
+        plan: &CellPlan,
+        request: FetchImages,
+        images: impl Future<Output = Result<Images, Status>> + Send + 'static,
+    ) -> Messages<Chunk> {
         let id = SampleSetId { plan_epoch: plan.plan_epoch, index: request.set_index.into() };
         let (send, chunks) = mpsc::channel(CHUNKS_AHEAD);
         let (wanted, stall) = (request.image_indices, self.stall);
+        let send_all = async move |send: &mpsc::Sender<Result<Chunk, Status>>| match images.await {
+            Ok(images) => send_chunks(images, id, &wanted, send, stall).await,
+            Err(status) => drop(send.send_timeout(Err(status), stall).await),
+        };
         tokio::spawn(async move {
             tokio::select! {
-                () = send_chunks(images, id, &wanted, &send, stall) => (),
+                () = send_all(&send) => (),
                 () = send.closed() => (),
             }
         });
@@ -130,14 +145,18 @@ impl Sampler for SamplerService {
         if let Some(index) = request.image_indices.iter().find(|index| !own.contains(index)) {
             if plan.relays(name) {
                 let images = (self.relay)(&plan, request.set_index)?;
-                return Ok(self.send(&plan, request, images));
+                return Ok(self.send(&plan, request, std::future::ready(Ok(images))));
             }
             return Err(Status::invalid_argument(format!("image_indices: {index} is not sampled by {name}")));
         }
-        let images = self.images(&plan, request.set_index).await?;
-        // Payloads are shared, and stay in the cache until all have been sent.
-        let shared = Box::pin(tokio_stream::iter((*images).clone()).map(Ok));
-        Ok(self.send(&plan, request, with_guard(shared, images)))
+        let images = self.images(&plan, request.set_index)?;
+        let shared = async move {
+            let images = images.await?;
+            // Payloads are shared, and stay in the cache until all have been sent.
+            let shared: Images = Box::pin(tokio_stream::iter((*images).clone()).map(Ok));
+            Ok(with_guard(shared, images))
+        };
+        Ok(self.send(&plan, request, shared))
     }
 }
 

@@ -150,7 +150,8 @@ async fn next_set_under(change: impl Fn(Assignment) -> Assignment) -> (Result<()
         };
         tokio::spawn(async move {
             let sampler = SamplerClient::new(connect(&address).await.unwrap());
-            sampler.fetch_sample_images(fetch).await.map(drop)
+            // The stream begins at once; its first message comes with the images.
+            sampler.fetch_sample_images(fetch).await?.next().await.unwrap().map(drop)
         })
     };
     let begun = fetch(0);
