@@ -8,7 +8,8 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 const NODES: usize = 3;
-const VIEWS: usize = 160;
+/// Enough that a node still makes views when it is killed.
+const VIEWS: usize = 400;
 
 /// A coordinator and its nodes, which are killed at the end.
 struct Cluster {
@@ -48,8 +49,9 @@ impl Cluster {
         String::from_utf8_lossy(&status.stdout).matches("node-").count() >= NODES
     }
 
+    /// A request in which every node samples and makes views.
     fn view(&self, folder: &Path, arguments: &[&str]) -> Command {
-        let mut view = program(&["view", "--coordinator", &self.address, "--policy", "pipeline", "--size", "96x72"]);
+        let mut view = program(&["view", "--coordinator", &self.address, "--policy", "time-share", "--size", "96x72"]);
         view.args(["--method", "light_cache", "--provenance", "--out"]).arg(folder).args(arguments);
         view
     }
@@ -89,11 +91,12 @@ fn pictures_look_like_direct_ones_and_outlive_a_killed_node() {
     let count = VIEWS.to_string();
     let many = ["--views", &count];
     succeeded(&cluster.view(whole, &many).output().unwrap());
-    let view = cluster.view(disturbed, &many).spawn().unwrap();
+    let mut view = cluster.view(disturbed, &many).spawn().unwrap();
     while pictures(disturbed).is_empty() {
         std::thread::sleep(Duration::from_millis(2));
     }
     cluster.processes[NODES].kill().unwrap();
+    assert!(view.try_wait().unwrap().is_none(), "all views were made before");
     succeeded(&view.wait_with_output().unwrap());
     let [whole, disturbed] = [whole, disturbed].map(pictures);
     assert_eq!((whole.len(), disturbed.len()), (2 * VIEWS, 2 * VIEWS), "colour and provenance");

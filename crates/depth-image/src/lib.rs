@@ -52,7 +52,7 @@ pub use image::{
 };
 pub use layered::{LayeredDepthImage, LayeredError, MAX_LAYERS};
 pub use light::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
-pub use light_cache::{LightCacheQuality, UnknownQuality};
+pub use light_cache::LightCacheQuality;
 pub use light_directions::{LightDirection, LightDirections};
 pub use light_field::{LIGHT_FIELD_SIDES, LayeredLightField, LightFieldCamera};
 pub use method_table::{NamedMethod, Setting, method_forms, method_help, method_named};

@@ -1,7 +1,6 @@
 //! The qualities of views whose surfaces come from the scene and whose light comes from samples.
 
 use std::fmt;
-use std::str::FromStr;
 
 /// The certainty that light of samples must have to be used at a point; other points are lit in the view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
@@ -19,11 +18,6 @@ pub enum LightCacheQuality {
     Exact,
 }
 
-/// A text that names no quality.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the quality must be draft, fast, balanced, fine or exact")]
-pub struct UnknownQuality;
-
 impl LightCacheQuality {
     /// All, by rising quality.
     pub const ALL: [Self; 5] = [Self::Draft, Self::Fast, Self::Balanced, Self::Fine, Self::Exact];
@@ -40,19 +34,17 @@ impl LightCacheQuality {
         }
     }
 
+    /// The quality of a text; `None` for another text.
+    #[must_use]
+    pub fn named(text: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|quality| quality.name() == text)
+    }
+
     /// The next lower quality; `None` for the lowest.
     #[must_use]
     pub fn lower(self) -> Option<Self> {
         let place = Self::ALL.iter().position(|&quality| quality == self)?;
         place.checked_sub(1).map(|lower| Self::ALL[lower])
-    }
-}
-
-impl FromStr for LightCacheQuality {
-    type Err = UnknownQuality;
-
-    fn from_str(text: &str) -> Result<Self, UnknownQuality> {
-        Self::ALL.into_iter().find(|quality| quality.name() == text).ok_or(UnknownQuality)
     }
 }
 

@@ -194,9 +194,7 @@ impl GpuEngine {
         };
         self.catching(|| wanted.map(image).collect::<Result<_, _>>().map_err(sampling_error))
     }
-}
 
-impl GpuEngine {
     fn upload_light(
         &self,
         set: &SampleSet,
@@ -222,7 +220,7 @@ impl GpuEngine {
         light: &UploadedLight,
         method: ReconstructionMethod,
         work: &ViewWork,
-        turn: gpu::Turn,
+        turn: Turn,
     ) -> Result<Vec<View>, EngineError> {
         let quality = method.light_cache_quality().ok_or_else(|| {
             invalid("reconstruction_method", format!("the samples have light where {method} needs colour"))
@@ -231,8 +229,7 @@ impl GpuEngine {
         let scene = self.scene(scene_hash)?;
         let pixels = work.cameras.first().map_or(0, PinholeCamera::pixel_count);
         let by_rays = traced_pixel_count.map(|most| pixels <= most as usize);
-        let draw = draw_work(&scene, *lighting, *scene_time_s, turn);
-        let draw = DrawWork { visibility: visibility(by_rays), ..draw };
+        let draw = draw_work(&scene, *lighting, *scene_time_s, by_rays, turn);
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
             let make = || self.renderer.draw_cached_views(draw, cache, quality, cameras, work.planes);
             self.catching(|| make().map_err(render_error))
@@ -249,17 +246,20 @@ fn device_turn(Turn { class, flow }: Turn) -> gpu::Turn {
     gpu::Turn { class, flow }
 }
 
-fn draw_work(scene: &GpuScene, lighting: Lighting, scene_time_s: f32, turn: gpu::Turn) -> DrawWork<'_> {
-    let (visibility, refinement) = (Visibility::Measured, Refinement::default());
-    DrawWork { scene, lighting, scene_time_s, visibility, refinement, turn }
-}
-
-fn visibility(surfaces_by_rays: Option<bool>) -> Visibility {
-    match surfaces_by_rays {
+/// Work of a scene at a moment, with finished light. Surfaces are found as asked, or else by whichever way is faster here.
+fn draw_work(
+    scene: &GpuScene,
+    lighting: Lighting,
+    scene_time_s: f32,
+    surfaces_by_rays: Option<bool>,
+    turn: Turn,
+) -> DrawWork<'_> {
+    let visibility = match surfaces_by_rays {
         Some(true) => Visibility::Rays,
         Some(false) => Visibility::Triangles,
         None => Visibility::Measured,
-    }
+    };
+    DrawWork { scene, lighting, scene_time_s, visibility, refinement: Refinement::default(), turn: device_turn(turn) }
 }
 
 impl Engine for GpuEngine {
@@ -314,8 +314,7 @@ impl Engine for GpuEngine {
         let lighting = mirrored.without_reflections().unwrap_or(mirrored);
         let draw = DrawWork {
             refinement: Refinement { step, steps },
-            visibility: visibility(request.surfaces_by_rays),
-            ..draw_work(&scene, lighting, request.scene_time_s, device_turn(turn))
+            ..draw_work(&scene, lighting, request.scene_time_s, request.surfaces_by_rays, turn)
         };
         let method: SamplingMethod = parsed("sampling_method", &request.sampling)?;
         if request.cameras.iter().any(|camera| camera.depth().is_none()) {
@@ -393,7 +392,7 @@ impl Engine for GpuEngine {
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
         let images = match (set as &dyn Any).downcast_ref().ok_or_else(of_another_device)? {
             Uploaded::Images(images) => images,
-            Uploaded::Light(light) => return self.draw_cached(light, method, work, device_turn(turn)),
+            Uploaded::Light(light) => return self.draw_cached(light, method, work, turn),
         };
         let UploadedImages { set, reflections, glossy_rays, mirrors, base } = images;
         let cells = mirrors.iter().map(|(bounds, shown)| MirrorCell { bounds: *bounds, surroundings: shown });
@@ -410,7 +409,7 @@ impl Engine for GpuEngine {
     fn traced_pixel_count(&self, work: &DirectWork, turn: Turn) -> Result<Option<u32>, EngineError> {
         let scene = self.scene(&work.scene_hash)?;
         let Some(camera) = work.cameras.first() else { return Ok(None) };
-        let draw = draw_work(&scene, parsed("lighting", &work.lighting)?, work.scene_time_s, device_turn(turn));
+        let draw = draw_work(&scene, parsed("lighting", &work.lighting)?, work.scene_time_s, None, turn);
         let count = || self.renderer.traced_pixel_count(draw, camera).map_err(render_error);
         self.catching(count).map(Some)
     }
@@ -418,8 +417,7 @@ impl Engine for GpuEngine {
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError> {
         let scene = self.scene(&work.scene_hash)?;
         let lighting = parsed("lighting", &work.lighting)?;
-        let draw = draw_work(&scene, lighting, work.scene_time_s, device_turn(turn));
-        let draw = DrawWork { visibility: visibility(work.surfaces_by_rays), ..draw };
+        let draw = draw_work(&scene, lighting, work.scene_time_s, work.surfaces_by_rays, turn);
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
             self.catching(|| self.renderer.draw_views(draw, cameras, work.planes).map_err(render_error))
         })

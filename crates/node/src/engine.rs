@@ -92,8 +92,7 @@ pub trait Engine: Send + Sync + 'static {
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError>;
     /// The pixels up to which pictures of a scene find surfaces faster by rays than by drawing triangles, measured for views like
     /// the first of `work`. `None` for an engine that knows one way only.
-    fn traced_pixel_count(&self, work: &DirectWork, turn: Turn) -> Result<Option<u32>, EngineError> {
-        let (_, _) = (work, turn);
+    fn traced_pixel_count(&self, _work: &DirectWork, _turn: Turn) -> Result<Option<u32>, EngineError> {
         Ok(None)
     }
 }

@@ -11,6 +11,9 @@ const MOST_TEXEL_BYTES: usize = 4 + 4 + 4 + 8 + 4 + 1;
 /// Inverse depth, a normal of a triangle, a normal, a surface, lamps, environment and a mark, for one texel of an image with
 /// light in place of colour.
 const MOST_LIGHT_TEXEL_BYTES: usize = 4 + 4 + 4 + 8 + 4 + 4 + 1;
+/// Words of a sample of light on a device beside its shares, in texels of a table.
+const LIGHT_WORDS: usize = 5;
+const TABLE_TEXEL_BYTES: usize = 16;
 /// The inverse depth of a texel's corner; an image has a column and a row of them more than of texels.
 const CORNER_BYTES: usize = 4;
 /// The least and the greatest depth of all levels of a pyramid, for one texel: 8 · 4/3.
@@ -90,11 +93,6 @@ fn specular_words(specular: &SpecularPlanes) -> usize {
     specular.reflectance_srgb8_roughness8.len() * (1 + specular.visibility8.len())
 }
 
-fn light_words(light: &LightPlanes) -> usize {
-    let shares: usize = light.share8.iter().map(Vec::len).sum();
-    light.triangle_normal_oct16.len() + light.lamps_rgb9e5.len() + light.environment_rgb9e5.len() + shares
-}
-
 fn layered_bytes(image: &LayeredDepthImage) -> usize {
     let samples = image.sample_count();
     let words = image.normal_oct16.as_ref().map_or(0, Vec::len) + image.specular.as_ref().map_or(0, specular_words);
@@ -108,13 +106,16 @@ fn light_field_bytes(field: &LayeredLightField) -> usize {
 
 fn image_bytes(image: &DepthImage) -> usize {
     let texels = image.inverse_depth_per_m.len();
+    if let Some(light) = &image.light {
+        // Whole texels of a table, and no pyramids.
+        return texels * TABLE_TEXEL_BYTES * (LIGHT_WORDS + light.share8.len()).div_ceil(4);
+    }
     let words = texels
         + image.color_rgb9e5.len()
         + image.normal_oct16.as_ref().map_or(0, Vec::len)
         + image.surface_id.as_ref().map_or(0, |ids| 2 * ids.len())
         + image.specular.as_ref().map_or(0, specular_words)
-        + image.corner_inverse_depth_per_m.as_ref().map_or(0, Vec::len)
-        + image.light.as_ref().map_or(0, light_words);
+        + image.corner_inverse_depth_per_m.as_ref().map_or(0, Vec::len);
     4 * words + image.passed.as_ref().map_or(0, Vec::len) + PYRAMID_TEXEL_BYTES * texels
 }
 
@@ -199,7 +200,7 @@ mod tests {
         };
         lit.validate().unwrap();
         let lit_bytes = set_bytes(&SampleImages::Depth(vec![lit]));
-        assert_eq!(lit_bytes, 256 * (MOST_LIGHT_TEXEL_BYTES + 4 * shares + PYRAMID_TEXEL_BYTES));
+        assert_eq!(lit_bytes, 256 * TABLE_TEXEL_BYTES * (LIGHT_WORDS + shares).div_ceil(4));
         assert!(lit_bytes <= most_set_bytes(&illumination, &[camera.into()]));
     }
 }

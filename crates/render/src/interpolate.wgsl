@@ -5,9 +5,7 @@
 {% include "surfaces.wgsl" %}
 
 @group(0) var<storage, read_write> sums: array<f32>;
-struct List { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
-@group(0) var<storage, read_write> listed_pixels: array<u32>;
-@group(0) var<storage, read_write> list: List;
+{% include "pixel_list.wgsl" %}
 {% include "sums.wgsl" %}
 
 const STEP: u32 = {{ step_px }}u;
@@ -53,9 +51,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% endfor %}
     agree = agree && all(greatest - least <= camera.tolerance * max(greatest, vec3f(LEAST_LIGHT)));
     if !agree {
-        let entry = atomicAdd(&list.count, 1u);
-        listed_pixels[entry] = place;
-        if entry % LIST_WORKGROUP == 0u { atomicAdd(&list.workgroups, 1u); }
+        list_pixel(place);
         return;
     }
     let share = vec2f(pixel - low) / f32(2u * STEP);

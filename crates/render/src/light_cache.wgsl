@@ -51,15 +51,13 @@ struct Cache {
 // Of the view.
 @group(0) var triangle_normals: texture_2d<u32>;
 @group(0) var<storage, read_write> sums: array<f32>;
-struct List { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
-@group(0) var<storage, read_write> listed_pixels: array<u32>;
-@group(0) var<storage, read_write> list: List;
+{% include "pixel_list.wgsl" %}
 {%- if provenance_plane %}
 @group(0) var<storage, read_write> words: array<u32>;
 {%- endif %}
 {%- if positions != "only" %}
-// The surface of a pixel at its first position, if its light is known: its plane's distance from the eye, the normals of its
-// triangle and of shading, and its provenance.
+// The surface of a pixel at its first position: its plane's distance from the eye, the normals of its triangle and of shading, and
+// its provenance.
 @group(0) var first_surfaces: {{ "texture_storage_2d<rgba32uint, write>" if positions == "first" else "texture_2d<u32>" }};
 // 1 for pixels whose sums are still those of the first position.
 @group(0) var<storage, read_write> kept: array<u32>;
@@ -161,7 +159,7 @@ fn expected_of_lamps(normal: vec3f{% for word in range(share_words) %}, shares{{
     var expected = 0.0;
 {%- for place in range(lamp_vectors) %}
 {%- set byte = place + 1 %}
-    expected += max(dot(lamp_vectors[{{ place }}u], normal), 0.0){% if share_words and place < lamps_with_shares %} * shares{{ byte // 4 }}[{{ byte % 4 }}u]{% endif %};
+    expected += max(dot(lamp_vectors[{{ place }}u], normal), 0.0){% if place < lamps_with_shares %} * shares{{ byte // 4 }}[{{ byte % 4 }}u]{% endif %};
 {%- endfor %}
     return expected;
 }
@@ -330,12 +328,6 @@ fn is_like_first(point: Point, first: vec4u) -> bool {
     return is_turned_alike && from_plane_m <= ALIKE_FOOTPRINTS * point.footprint_m;
 }
 {%- endif %}
-
-fn list_pixel(place: u32) {
-    let entry = atomicAdd(&list.count, 1u);
-    listed_pixels[entry] = place;
-    if entry % LIST_WORKGROUP == 0u { atomicAdd(&list.workgroups, 1u); }
-}
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {

@@ -2,12 +2,12 @@
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Camera, DepthImage, LightCacheQuality, PinholeCamera};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use gpu::{Gpu, Table, TablePool, Turn};
 use wgpu::{Buffer, BufferUsages, TextureFormat};
 
 use crate::lamp_shares::GpuLampShares;
-use crate::{GpuScene, RenderError};
+use crate::{GpuScene, RenderError, pixel_camera::PixelCamera};
 
 /// Sample images of a set of light.
 pub(crate) const MAX_CACHE_CAMERAS: u32 = 16;
@@ -122,15 +122,16 @@ impl LightCache {
             return Err(refused(images.len(), format!("a set of light has 1 to {MAX_CACHE_CAMERAS} images")));
         }
         let mut cached = Vec::new();
-        let mut first_sample = 0;
+        let mut first_sample = 0_usize;
         for (index, image) in images.iter().enumerate() {
             let camera = checked(image, share_words).map_err(|reason| refused(index, reason))?;
             let range = image.inverse_depth_range().map_or(0.0, |(least, greatest)| greatest - least);
-            cached.push(CachedImage { camera, first_sample, half_step_per_m: 0.5 * range / DEPTH_CODES });
-            first_sample += camera.pixel_count() as u32;
+            let half_step_per_m = 0.5 * range / DEPTH_CODES;
+            cached.push(CachedImage { camera, first_sample: first_sample as u32, half_step_per_m });
+            first_sample += camera.pixel_count();
         }
         let texels = sample_texels(share_words);
-        tables.gpu.check_table("samples of light", first_sample as usize * texels)?;
+        tables.gpu.check_table("samples of light", first_sample * texels)?;
         let words: Vec<[u32; 4]> = images.iter().flat_map(|image| packed(image, texels)).collect();
         let samples = tables.upload("samples of light", TextureFormat::Rgba32Uint, &words, turn)?;
         Ok(Self { samples, images: cached, share_words })
@@ -197,20 +198,18 @@ impl CachedImage {
             let axis = row.truncate();
             axis.extend(-axis.as_dvec3().dot(eye_offset) as f32).to_array()
         });
-        let column = camera.world_from_camera * Vec3::X / camera.focal_px.x;
-        let row = camera.world_from_camera * Vec3::NEG_Y / camera.focal_px.y;
-        let corner = camera.forward_in_world() - column * camera.principal_px.x - row * camera.principal_px.y;
+        let rays = PixelCamera::of(&(*camera).into(), Vec2::ZERO);
         GpuCacheCamera {
             homogeneous_texel_from_offset: rows,
             eye_offset: eye_offset.as_vec3().to_array(),
-            footprint: camera.focal_px.min_element().recip(),
-            column_in_world: column.to_array(),
+            footprint: rays.footprint,
+            column_in_world: rays.column_in_world,
             first_sample: self.first_sample,
-            row_in_world: row.to_array(),
+            row_in_world: rays.row_in_world,
             half_step_per_m: self.half_step_per_m,
-            corner_in_world: corner.to_array(),
-            near_m: camera.near_m,
-            size_px: camera.size_px.to_array(),
+            corner_in_world: rays.corner_in_world,
+            near_m: rays.near_m,
+            size_px: rays.size_px,
             padding: [0; 2],
         }
     }

@@ -143,14 +143,18 @@ impl Lighting {
     /// A quarter of the rays, at least one each; `None` where there are no fewer.
     #[must_use]
     pub fn with_fewer_rays(&self) -> Option<Self> {
-        let fewer = |rays: NonZeroU32| NonZeroU32::new(rays.get() / 4).unwrap_or(NonZeroU32::MIN);
+        let lighting = self.with_rays(|rays| NonZeroU32::new(rays.get() / 4).unwrap_or(NonZeroU32::MIN));
+        (lighting != *self).then_some(lighting)
+    }
+
+    /// With other numbers of rays to lamps and of occlusion.
+    fn with_rays(&self, rays: impl Fn(NonZeroU32) -> NonZeroU32) -> Self {
         let direct = match self.direct {
-            Direct::Soft(rays) => Direct::Soft(fewer(rays)),
+            Direct::Soft(to_lamps) => Direct::Soft(rays(to_lamps)),
             other => other,
         };
-        let occlusion = self.occlusion.map(|occlusion| Occlusion { rays: fewer(occlusion.rays), ..occlusion });
-        let lighting = Self { direct, occlusion, ..*self };
-        (lighting != *self).then_some(lighting)
+        let occlusion = self.occlusion.map(|occlusion| Occlusion { rays: rays(occlusion.rays), ..occlusion });
+        Self { direct, occlusion, ..*self }
     }
 
     /// The light of points that no sample knows: a quarter of the rays but at least [`LEAST_RAYS_HERE`], and all of them at the
@@ -160,13 +164,8 @@ impl Lighting {
         if quality >= LightCacheQuality::Fine {
             return *self;
         }
-        let fewer = |rays: NonZeroU32| rays.min(NonZeroU32::new(rays.get() / 4).unwrap_or(rays).max(LEAST_RAYS_HERE));
-        let direct = match self.direct {
-            Direct::Soft(rays) => Direct::Soft(fewer(rays)),
-            other => other,
-        };
-        let occlusion = self.occlusion.map(|occlusion| Occlusion { rays: fewer(occlusion.rays), ..occlusion });
-        Self { direct, occlusion, ..*self }
+        let quarter = |rays: NonZeroU32| NonZeroU32::new(rays.get() / 4).unwrap_or(NonZeroU32::MIN);
+        self.with_rays(|rays| rays.min(quarter(rays).max(LEAST_RAYS_HERE)))
     }
 
     /// The formula of highlights; none for unlit surfaces.

@@ -115,7 +115,7 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 6] = [
         method: LightCache { quality: LightCacheQuality::Balanced },
         setting: Some(Setting {
             form: "QUALITY (draft, fast, balanced, fine or exact)",
-            parse: |text| text.parse().ok().map(|quality| LightCache { quality }),
+            parse: |text| LightCacheQuality::named(text).map(|quality| LightCache { quality }),
         }),
         help: "takes surfaces from the scene and light from the samples; lights points that no sample knows in the view, balanced by default",
     },

@@ -1,0 +1,10 @@
+// Pixels that this pass leaves to the next (pixel_list.rs).
+struct List { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
+@group(0) var<storage, read_write> listed_pixels: array<u32>;
+@group(0) var<storage, read_write> list: List;
+
+fn list_pixel(place: u32) {
+    let entry = atomicAdd(&list.count, 1u);
+    listed_pixels[entry] = place;
+    if entry % LIST_WORKGROUP == 0u { atomicAdd(&list.workgroups, 1u); }
+}
