@@ -80,13 +80,12 @@ const ALIKE_TRIANGLES: f32 = 0.98;
 const ALIKE_NORMALS: f32 = 0.9995;
 const ALIKE_FOOTPRINTS: f32 = 0.1;
 {%- endif %}
-// Cosine between normals of shading up to which the light is the same.
-const SAME_NORMAL: f32 = 0.99999;
 
 struct Point {
     // From the view's eye.
     offset: vec3f,
     normal: vec3f,
+    normal_oct16: u32,
     triangle_normal: vec3f,
     footprint_m: f32,
 }
@@ -175,7 +174,7 @@ struct Texel { first: u32, weight: f32, words: vec4u }
 
 // A point as seen from an image's eye, and the first of the texels around its place with its direction. `along_normal` is the
 // offset's share along the point's normal.
-struct Sight { offset: vec3f, along_normal: f32, texel: vec2i, direction: vec3f }
+struct Sight { offset: vec3f, along_normal: f32, direction: vec3f }
 
 // A vector along an octahedral unit vector, of another length: a root less.
 fn along_oct16(packed: u32) -> vec3f {
@@ -186,17 +185,12 @@ fn along_oct16(packed: u32) -> vec3f {
 
 // `half_step` is half a step of the stored inverse depth times the depth of the point: times the depth of the texel it is what the
 // step moves the texel along its direction.
-fn texel_beside(image: CacheCamera, sight: Sight, step: vec2i, weight: f32, point: Point, plane_m: f32, half_step: f32) -> Texel {
-    let place = sight.texel + step;
-    let clamped = vec2u(clamp(place, vec2i(0), vec2i(image.size_px) - 1));
-    let first = (image.first_sample + clamped.y * image.size_px.x + clamped.x) * SAMPLE_TEXELS;
+fn texel_beside(sight: Sight, first: u32, direction: vec3f, weight: f32, point: Point, plane_m: f32, half_step: f32) -> Texel {
     let words = textureLoad(samples, texel_at(first), 0);
     let inverse_depth_per_m = bitcast<f32>(words.x);
     let depth_m = 1.0 / max(inverse_depth_per_m, 1e-30);
     let normal = along_oct16(words.y);
     let squared = dot(normal, normal);
-    let ways = vec2f(step);
-    let direction = sight.direction + image.column_in_world * ways.x + image.row_in_world * ways.y;
     let cosine = dot(normal, point.triangle_normal);
     let along_texel = dot(normal, direction);
     let along_point = dot(point.triangle_normal, direction);
@@ -206,12 +200,12 @@ fn texel_beside(image: CacheCamera, sight: Sight, step: vec2i, weight: f32, poin
     let is_turned_alike = cosine > 0.0 && cosine * cosine >= cache.least_cosine * cache.least_cosine * squared;
     let is_in_plane = abs(from_texel_m) <= plane_m * sqrt(squared) + step_m * abs(along_texel)
         && abs(from_point_m) <= plane_m + step_m * abs(along_point);
-    let counts = all(vec2i(clamped) == place) && inverse_depth_per_m > 0.0 && is_turned_alike && is_in_plane;
+    let counts = inverse_depth_per_m > 0.0 && is_turned_alike && is_in_plane;
     return Texel(first, select(0.0, weight, counts), words);
 }
 
-// What the four texels around a point's place in an image say of it. Loops, not branches: the software device skips only loops
-// that no lane needs.
+// What the four texels around a point's place in an image say of it. Branches, and no loops that pass once as elsewhere: most points
+// are seen by most images, and the software device keeps in memory what a loop changes.
 fn consult(image: CacheCamera, number: u32, point: Point, known: ptr<function, Known>) {
     let at = vec4f(point.offset, 1.0);
     let rows = image.homogeneous_texel_from_offset;
@@ -220,39 +214,55 @@ fn consult(image: CacheCamera, number: u32, point: Point, known: ptr<function, K
     let size = vec2f(image.size_px);
     let from_border = min(place, size - place);
     let border = clamp(min(from_border.x, from_border.y) / BORDER_PX, 0.0, 1.0);
-    for (var inside = depth_m > image.near_m && border > 0.0; inside; inside = false) {
+    if depth_m > image.near_m && border > 0.0 {
         let low = floor(place - 0.5);
         let share = place - 0.5 - low;
         let center = low + 0.5;
         let offset = point.offset - image.eye_offset;
+        let last = size - 1.0;
+        // Texels beyond the border have no weight.
+        let first_weight = select(vec2f(0.0), 1.0 - share, low >= vec2f(0.0));
+        let second_weight = select(vec2f(0.0), share, low < last);
+        let first = vec2u(max(low, vec2f(0.0)));
+        let second = vec2u(min(low + 1.0, last));
+        let upper = (image.first_sample + first.y * image.size_px.x) * SAMPLE_TEXELS;
+        let lower = (image.first_sample + second.y * image.size_px.x) * SAMPLE_TEXELS;
+        let left = first.x * SAMPLE_TEXELS;
+        let right = second.x * SAMPLE_TEXELS;
         let sight = Sight(
-            offset, dot(point.triangle_normal, offset), vec2i(low),
+            offset, dot(point.triangle_normal, offset),
             image.column_in_world * center.x + image.row_in_world * center.y + image.corner_in_world,
         );
         let texel_m = depth_m * image.footprint;
         let plane_m = cache.plane_footprints * max(texel_m, point.footprint_m);
         let half_step = image.half_step_per_m * depth_m;
+        let facing = max(-sight.along_normal, 0.0) * inverseSqrt(max(dot(offset, offset), 1e-30));
+        let closeness = border * (facing + GRAZING_SHARE) / (texel_m * texel_m);
+        var own: CachedLight;
+        var coverage = 0.0;
 {%- for corner in range(4) %}
         let texel{{ corner }} = texel_beside(
-            image, sight, vec2i({{ corner % 2 }}, {{ corner // 2 }}),
-            {{ "share.x" if corner % 2 else "(1.0 - share.x)" }} * {{ "share.y" if corner // 2 else "(1.0 - share.y)" }}, point, plane_m, half_step,
+            sight, {{ "lower" if corner // 2 else "upper" }} + {{ "right" if corner % 2 else "left" }},
+            sight.direction{{ " + image.column_in_world" if corner % 2 }}{{ " + image.row_in_world" if corner // 2 }},
+            {{ "second" if corner % 2 else "first" }}_weight.x * {{ "second" if corner // 2 else "first" }}_weight.y, point, plane_m, half_step,
         );
+        coverage += texel{{ corner }}.weight;
+        add_texel(texel{{ corner }}, closeness, point, &own, known);
 {%- endfor %}
-        let coverage = texel0.weight + texel1.weight + texel2.weight + texel3.weight;
-        for (var counts = coverage > 0.0; counts; counts = false) {
-            let facing = max(-sight.along_normal, 0.0) * inverseSqrt(max(dot(offset, offset), 1e-30));
-            let certainty = coverage * coverage * border * (facing + GRAZING_SHARE) / (texel_m * texel_m);
-{%- for corner in range(4) %}
-            add_texel(texel{{ corner }}, certainty, point, known);
+        let certainty = coverage * coverage;
+        (*known).light.lamps_linear += own.lamps_linear * certainty;
+        (*known).light.environment_linear += own.environment_linear * certainty;
+        (*known).light.weight += own.weight * certainty;
+{%- for word in range(share_words) %}
+        (*known).light.shares{{ word }} += own.shares{{ word }} * certainty;
 {%- endfor %}
-            (*known).coverage = max((*known).coverage, coverage);
-            (*known).camera_mask |= 1u << number;
-        }
+        (*known).coverage = max((*known).coverage, coverage);
+        (*known).camera_mask |= select(0u, 1u << number, coverage > 0.0);
     }
 }
 
 // Adds the light of a texel, as it would be with the point's own normal.
-fn add_texel(texel: Texel, certainty: f32, point: Point, known: ptr<function, Known>) {
+fn add_texel(texel: Texel, certainty: f32, point: Point, own: ptr<function, CachedLight>, known: ptr<function, Known>) {
     let more = textureLoad(samples, texel_at(texel.first + 1u), 0);
     var lamps = linear_from_rgb9e5(texel.words.w);
     var environment = linear_from_rgb9e5(more.x);
@@ -262,8 +272,8 @@ fn add_texel(texel: Texel, certainty: f32, point: Point, known: ptr<function, Kn
 {%- for word in range(share_words) %}
     let shares{{ word }} = unpack4x8unorm({% if word < 3 %}more[{{ word + 1 }}u]{% else %}rest[{{ word - 3 }}u]{% endif %});
 {%- endfor %}
-    let normal = unit_from_oct16(texel.words.z);
-    for (var differs = texel.weight > 0.0 && dot(normal, point.normal) < SAME_NORMAL; differs; differs = false) {
+    if texel.weight > 0.0 && texel.words.z != point.normal_oct16 {
+        let normal = unit_from_oct16(texel.words.z);
         lamps *= ratio_of(
             expected_of_lamps(point.normal{% for word in range(share_words) %}, shares{{ word }}{% endfor %}),
             expected_of_lamps(normal{% for word in range(share_words) %}, shares{{ word }}{% endfor %}),
@@ -275,11 +285,11 @@ fn add_texel(texel: Texel, certainty: f32, point: Point, known: ptr<function, Kn
     (*known).least_luminance = select((*known).least_luminance, min((*known).least_luminance, total), agrees);
     (*known).greatest_luminance = select((*known).greatest_luminance, max((*known).greatest_luminance, total), agrees);
     let share = texel.weight * certainty;
-    (*known).light.lamps_linear += lamps * share;
-    (*known).light.environment_linear += environment * share;
-    (*known).light.weight += share;
+    (*own).lamps_linear += lamps * share;
+    (*own).environment_linear += environment * share;
+    (*own).weight += share;
 {%- for word in range(share_words) %}
-    (*known).light.shares{{ word }} += shares{{ word }} * share;
+    (*own).shares{{ word }} += shares{{ word }} * share;
 {%- endfor %}
 }
 
@@ -340,7 +350,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let needs_light = met && (surface.x & SHOWN_AS_IT_IS) == 0u;
     let planar_depth_m = camera.near_m / max(depth, 1e-30);
     let point = Point(
-        direction_of(pixel) * planar_depth_m, unit_from_oct16(surface.z),
+        direction_of(pixel) * planar_depth_m, unit_from_oct16(surface.z), surface.z,
         unit_from_oct16(textureLoad(triangle_normals, pixel, 0).x), planar_depth_m * camera.footprint,
     );
 {%- if positions == "later" %}
@@ -353,7 +363,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {%- endif %}
     var known: Known;
     known.least_luminance = 3.0e38;
-    for (var asked = is_asked; asked; asked = false) {
+    if is_asked {
 {%- if lamp_vectors %}
         find_lamps(camera.eye_in_world + point.offset);
 {%- endif %}
@@ -362,7 +372,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {%- endfor %}
     }
     let is_answered = is_asked && is_known(known);
-    for (var answered = is_answered; answered; answered = false) {
+    if is_answered {
 {%- if visibility and light_count > max_lamp_shares %}
         put_other_lamps(known.light, place);
 {%- endif %}
