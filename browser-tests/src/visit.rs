@@ -187,6 +187,20 @@ impl Visit {
         self.browser.value("myriorama.statistics.pictures.at(-1)").await.expect("a picture")
     }
 
+    /// As [`Visit::settled`]; with the pixels of that picture, and of none that came after it.
+    ///
+    /// # Panics
+    /// As [`Visit::settled`].
+    pub async fn settled_canvas(&self) -> (Picture, Pixels) {
+        loop {
+            let still = self.settled().await;
+            let canvas = self.canvas().await;
+            if self.settled().await == still {
+                return (still, canvas);
+            }
+        }
+    }
+
     /// The pictures so far.
     ///
     /// # Panics

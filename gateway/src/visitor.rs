@@ -287,12 +287,13 @@ impl Visitor {
             let number = asked.pose.number;
             if asked.pose.still { number == newest } else { number >= self.sent }
         };
-        let Some(asked) = asked.filter(is_wanted) else {
+        let plan = session.plan().assignment;
+        let Some(asked) = asked.filter(is_wanted).filter(|asked| !self.is_finished(asked, &cameras_of(&plan, &frame)))
+        else {
             stream.discard(&frame);
             return Ok(());
         };
         self.sent = asked.pose.number;
-        let plan = session.plan().assignment;
         let (shown, last) = (self.light_step_of(&plan, &frame), self.scene.shown.light_steps - 1);
         let is_own_cell = !frame.header.is_neighbour_cell;
         let is_near = !asked.pose.still || is_near(&plan, &frame);
@@ -331,6 +332,12 @@ impl Visitor {
         let quality = PictureQuality { codec: frame.header.codec, antialias };
         let again = stream.ask(asked.pose, frame.request.camera, next_set, quality);
         again.map_err(|error| End::Refused(error.to_string()))
+    }
+
+    /// Whether the finished still of a pose has been sent: a plan that came while it was made has asked for it again, from the
+    /// first step of light and with one sample a pixel.
+    fn is_finished(&self, asked: &Asked, cameras: &Option<Vec<SampleCamera>>) -> bool {
+        asked.pose.still && asked.pose.number == self.sent && cameras.is_some() && *cameras == self.finished_with
     }
 
     /// A new plan may have a view cell that is nearer to a visitor who rests: the still is then asked for again.

@@ -58,9 +58,9 @@ async fn the_ball_stays_round_in_windows_of_all_shapes() {
     for size_px in [[640, 480], [900, 400], [420, 560]] {
         visit.browser.set_view(View { size_px, ..View::default() }).await.unwrap();
         visit.until(&format!("myriorama.screen.size.join() === '{},{}'", size_px[0], size_px[1])).await;
-        let still = visit.settled().await;
+        let (still, canvas) = visit.settled_canvas().await;
         assert_eq!(still.header.camera, camera, "the camera stays");
-        assert_round(&still, &visit.canvas().await);
+        assert_round(&still, &canvas);
     }
     visit.end(Expected::NoError).await;
 }
@@ -70,8 +70,7 @@ async fn a_screen_with_finer_pixels_has_a_finer_picture() {
     let (bench, url) = gateway().await;
     let view = View { size_px: [320, 240], scale: 2.0, ..View::default() };
     let visit = Visit::in_view(&url, view).await;
-    let still = visit.settled().await;
-    let canvas = visit.canvas().await;
+    let (still, canvas) = visit.settled_canvas().await;
     assert_eq!(canvas.size_px, [640, 480]);
     assert_round(&still, &canvas);
     assert!(canvas.srgb8 == bench.reference(&still.header.camera.into(), canvas.size_px).await);
