@@ -12,6 +12,8 @@ use crate::schedule::ChoiceError;
 
 /// Texels of a sample image a pixel of a view, each way: what brings most for its cost (docs/benchmarks.md).
 const SAMPLE_DENSITY: f32 = 2.0;
+/// The same of samples that views take only light from: surfaces need no finer ones.
+const LIGHT_DENSITY: f32 = 1.0;
 /// The most texels of a set of images whose size follows the views: a software device samples them in about a second.
 const MAX_FITTING_TEXELS: usize = 1 << 20;
 /// Texels of all images of a mirror cell, over those of one sample image: a mirror shows all directions.
@@ -153,15 +155,20 @@ fn cells_of(request: &SessionRequest, offer: &SceneOffer, volume: &Aabb) -> Resu
 /// The size of a session's images; `None` where the offer's is fixed, or the session brings its own cameras.
 fn session_size_px(request: &SessionRequest, offer: &SceneOffer) -> Option<UVec2> {
     let is_fitted = offer.fits_views && request.sample_cameras.is_empty();
-    request.sample_size_px.or_else(|| fitting_size_px(&offer.rig, &request.typical_view).filter(|_| is_fitted))
+    let density = if request.takes_light { LIGHT_DENSITY } else { SAMPLE_DENSITY };
+    request.sample_size_px.or_else(|| size_of_density(&offer.rig, &request.typical_view, density).filter(|_| is_fitted))
 }
 
 /// The size of offered images that makes them about `SAMPLE_DENSITY` times as dense as a view. Sizes are whole steps of √2
 /// apart, so that sessions of similar views share their samples. `None` without images or with a degenerate view.
 #[must_use]
 pub fn fitting_size_px(rig: &[Camera], view: &PinholeCamera) -> Option<UVec2> {
+    size_of_density(rig, view, SAMPLE_DENSITY)
+}
+
+fn size_of_density(rig: &[Camera], view: &PinholeCamera, density: f32) -> Option<UVec2> {
     let offered = rig.first()?.reference();
-    let wanted = SAMPLE_DENSITY * view.focal_px.min_element() / offered.focal_px.min_element();
+    let wanted = density * view.focal_px.min_element() / offered.focal_px.min_element();
     let most = (MAX_FITTING_TEXELS as f32 / (offered.pixel_count() * rig.len()) as f32).log2().floor();
     let steps = (2.0 * wanted.log2()).round().max(LEAST_STEPS).min(most);
     let size_px = (offered.size_px.as_vec2() * (0.5 * steps).exp2()).round();
@@ -216,5 +223,6 @@ mod tests {
         };
         assert!((1..=40).all(|cameras| texels(cameras).is_some_and(|texels| texels < MAX_FITTING_TEXELS + 4096)));
         assert_eq!(fitting_size_px(&[], &camera(4, 3)), None);
+        assert_eq!(size_of_density(&rig, &camera(400, 300), LIGHT_DENSITY), Some(UVec2::new(400, 300)));
     }
 }

@@ -33,7 +33,7 @@ export class Notices {
     const light = header.light_step;
     if (light < lightSteps) this.badge("still", `still (light ${light} of ${lightSteps})`);
     else if (header.samples < stillSamples) this.badge("still", `still (${header.samples} of ${stillSamples} samples)`);
-    else this.badge(isSharp && !header.neighbour ? "exact" : "still");
+    else this.badge(isSharp && header.direct ? "exact" : "still");
   }
 
   badge(state, text = state) {
@@ -41,7 +41,7 @@ export class Notices {
     if (badge.textContent === text) return;
     badge.dataset.state = state;
     badge.textContent = text;
-    if (state === "exact") say("The picture is sharp.");
+    if (state === "exact") say("The picture is that of direct drawing.");
   }
 
   /** Says why there are no pictures, unless there soon are; the last one stays, greyed. */

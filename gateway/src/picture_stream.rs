@@ -40,6 +40,7 @@ pub(crate) struct About {
     pub(crate) light_step: u32,
     /// Whether its view cell is made for its place.
     pub(crate) is_own_cell: bool,
+    pub(crate) is_direct: bool,
     /// The least round trip to the page so far.
     pub(crate) rtt_s: Option<f64>,
 }
@@ -132,6 +133,7 @@ impl PictureStream {
             light_step: about.light_step,
             samples: header.antialias.samples(),
             neighbour: !about.is_own_cell,
+            direct: about.is_direct,
             compositor: frame.node_name.clone(),
             replaced: asked.replaced,
             times_ms: times(frame, asked.arrived, Instant::now()),

@@ -130,6 +130,8 @@ pub(crate) struct PictureHeader {
     pub(crate) samples: u32,
     /// Whether the cell is a neighbour of the view's own, which is not loaded yet.
     pub(crate) neighbour: bool,
+    /// Whether it was drawn from the scene, without samples.
+    pub(crate) direct: bool,
     /// The compositor that made it.
     pub(crate) compositor: String,
     /// Poses that were replaced by newer ones since the picture before.
@@ -227,6 +229,7 @@ mod tests {
             light_step: 1,
             samples: 1,
             neighbour: false,
+            direct: false,
             compositor: "n0".to_owned(),
             replaced: 2,
             times_ms: PictureTimes { gateway: 12.5, ..PictureTimes::default() },

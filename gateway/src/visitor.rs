@@ -297,7 +297,8 @@ impl Visitor {
         let (shown, last) = (self.light_step_of(&plan, &frame), self.scene.shown.light_steps - 1);
         let is_own_cell = !frame.header.is_neighbour_cell;
         let is_near = !asked.pose.still || is_near(&plan, &frame);
-        let about = About { light_step: shown + 1, is_own_cell: is_own_cell && is_near, rtt_s: page.rtt_s };
+        let is_direct = plan.policy == Policy::Direct && plan.plan_epoch == frame.header.sample_set_id.plan_epoch;
+        let about = About { light_step: shown + 1, is_own_cell: is_own_cell && is_near, is_direct, rtt_s: page.rtt_s };
         let message = stream.message(&frame, &asked, about);
         if asked.pose.still {
             page.send_still(message)?

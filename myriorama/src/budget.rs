@@ -45,6 +45,11 @@ pub struct PlansArgs {
 }
 
 impl BudgetArgs {
+    /// Whether there is a budget.
+    pub fn is_given(&self) -> bool {
+        self.budget.is_some()
+    }
+
     /// # Errors
     /// None can be kept for an offered scene: it is sampled as a layered cube, or has one beside its samples.
     pub fn check(&self, offers: &SceneOffers) -> Result<(), BadInput> {

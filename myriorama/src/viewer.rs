@@ -80,12 +80,11 @@ impl Viewer {
 /// follow them.
 pub fn request_of(policy: PolicyChoice, tone: ToneArgs) -> RequestOf {
     Arc::new(move |offer: &OfferStatus, typical: PinholeCamera| {
-        let request = request(offer.settings.clone(), &[typical]).expect("one view");
+        let request = request(offer.settings.clone(), policy, &[typical]).expect("one view");
         let request = tone.for_people(at_rate(request, PICTURES_PER_S));
         let steps = request.lighting.parse().map_or(1, |lighting: Lighting| lighting.refinement_steps());
         SessionRequest {
             scene: Some(offer.name.clone()),
-            policy,
             viewpoints: vec![typical],
             refinement_steps: steps,
             timeline: Timeline { set_count: steps, ..Timeline::still(0.0) },

@@ -35,7 +35,7 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
     let (broken, cameras) = (broken.to_str().unwrap(), cameras.to_str().unwrap());
     let folder = folder.path().to_str().unwrap();
     let many = vec!["flip 0.1"; 200].join(", ");
-    let cases: [(&[&str], &str); 21] = [
+    let cases: [(&[&str], &str); 24] = [
         (&["plan", "--scene", "quad"], "--budget"),
         (&["plan", "--scene", "quad", "--budget", "blur 3"], "blur"),
         (&["plan", "--scene", "quad", "--budget", "flip NaN"], "flip NaN"),
@@ -57,6 +57,12 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
         (&["view", "--tone-map", "foo"], "tone map must be none or khronos-neutral"),
         (&["up", "--scene", "quad", "--exposure", "-17"], "--exposure"),
         (&["view", "--orbit", "3", "--grid", "2x2"], "--grid"),
+        (&["view", "--quality", "good"], "draft, fast, balanced, fine, exact"),
+        (
+            &["view", "--quality", "fine", "--method", "mesh"],
+            "'--quality <NAME>' cannot be used with '--method <NAME>'",
+        ),
+        (&["up", "--scene", "quad", "--quality", "fine", "--method", "mesh"], "'--quality <NAME>' cannot be used"),
     ];
     for (arguments, named) in cases {
         let (status, message) = status_and_message(&myriorama(arguments));

@@ -49,10 +49,10 @@ impl Cluster {
         String::from_utf8_lossy(&status.stdout).matches("node-").count() >= NODES
     }
 
-    /// A request in which every node samples and makes views.
+    /// A request in which every node samples and makes views. Its method is that of traced light.
     fn view(&self, folder: &Path, arguments: &[&str]) -> Command {
         let mut view = program(&["view", "--coordinator", &self.address, "--policy", "time-share", "--size", "96x72"]);
-        view.args(["--method", "light_cache", "--provenance", "--out"]).arg(folder).args(arguments);
+        view.args(["--provenance", "--out"]).arg(folder).args(arguments);
         view
     }
 }
@@ -84,7 +84,7 @@ fn pictures_look_like_direct_ones_and_outlive_a_killed_node() {
     let mut cluster = Cluster::start();
     let folders = [(); 3].map(|()| tempfile::tempdir().unwrap());
     let [compared, whole, disturbed] = folders.each_ref().map(tempfile::TempDir::path);
-    let against_direct = ["--orbit", "4", "--compare", "--least-psnr", "36"];
+    let against_direct = ["--orbit", "4", "--compare", "--least-psnr", "36", "--quality", "fine"];
     let text = succeeded(&cluster.view(compared, &against_direct).output().unwrap());
     assert!(text.contains("foreground PSNR"), "{text}");
 

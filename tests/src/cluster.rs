@@ -252,6 +252,7 @@ pub fn request(policy: PolicyChoice, timeline: Timeline) -> SessionRequest {
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
         follows_mirrors: false,
+        takes_light: false,
         codec: "lz4".to_owned(),
         sample_cameras: Vec::new(),
         sample_size_px: None,

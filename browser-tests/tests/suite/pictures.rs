@@ -33,7 +33,7 @@ async fn a_rested_page_shows_the_picture_of_the_rust_client_to_the_bit() {
     let reference = bench.reference(&still.header.camera.into(), canvas.size_px).await;
     assert!(canvas.srgb8 == reference, "the canvas differs from the client's picture");
     assert!(canvas.srgb8 != shifted(&reference, 640), "a shifted picture is seen");
-    visit.until("document.getElementById('badge').textContent === 'exact'").await;
+    visit.until("document.getElementById('badge').textContent === 'still'").await;
     visit.end(Expected::NoError).await;
 }
 

@@ -1,7 +1,7 @@
 //! Stills whose light is refined in steps, and then their samples a pixel.
 
 use browser_tests::visit::{Expected, Visit};
-use cluster::{Refinement, SessionRequest, Timeline};
+use cluster::{PolicyChoice, Refinement, SessionRequest, Timeline};
 use cluster_tests::scalar_engine::{ball_linear, srgb8};
 use serde_json::json;
 
@@ -17,13 +17,14 @@ const WATCH_BADGE: &str = "addEventListener('DOMContentLoaded', () => {
 })";
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_still_is_exact_only_in_its_last_light_with_all_samples() {
+async fn a_still_from_samples_names_its_light_and_samples_and_is_never_exact() {
     let timeline = Timeline { start_s: 0.0, step_s: 0.0, set_count: STEPS };
     let (_bench, url) = gateway_of(SessionRequest { refinement_steps: STEPS, timeline, ..slow_request() }).await;
     let visit = Visit::to("about:blank").await;
     visit.browser.devtools("Page.addScriptToEvaluateOnNewDocument", json!({ "source": WATCH_BADGE })).await.unwrap();
     visit.browser.open(&url).await.unwrap();
-    visit.until("document.getElementById('badge').textContent === 'exact'").await;
+    visit.settled().await;
+    visit.until("document.getElementById('badge').textContent === 'still'").await;
     let pictures = visit.pictures().await;
     let mut steps: Vec<u32> = pictures.iter().filter(|p| p.header.still).map(|p| p.header.light_step).collect();
     steps.dedup();
@@ -36,10 +37,18 @@ async fn a_still_is_exact_only_in_its_last_light_with_all_samples() {
         ("still (light 2 of 3)", 2),
         ("still (1 of 16 samples)", 3),
         ("still (4 of 16 samples)", 3),
-        ("exact", 3),
     ];
     assert_eq!(badges, expected.map(|(text, step)| (text.to_owned(), step)));
     let last = ball_linear(0.0, Refinement { step: STEPS - 1, steps: STEPS });
     assert!(visit.canvas().await.srgb8.as_chunks::<3>().0.contains(&srgb8(last)), "the ball in its last light");
+    visit.end(Expected::NoError).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_still_that_is_drawn_directly_is_exact() {
+    let (_bench, url) = gateway_of(SessionRequest { policy: PolicyChoice::Direct, ..slow_request() }).await;
+    let visit = Visit::to(&url).await;
+    visit.settled().await;
+    visit.until("document.getElementById('badge').textContent === 'exact'").await;
     visit.end(Expected::NoError).await;
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use client::{Client, Frame, Session, ViewRequest};
 use cluster::limits::{MAX_VIEWPOINTS, MAX_VIEWS_PER_SET};
 use cluster::{BudgetRequest, DIRECT, OfferSettings, PolicyChoice, Quality, SessionRequest, Timeline};
-use depth_image::{PinholeCamera, ViewPlanes};
+use depth_image::{LightCacheQuality, PinholeCamera, ViewPlanes};
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::SamplingMethod;
@@ -18,20 +18,42 @@ const SAMPLE_SIDE_RATIO: f64 = 0.7;
 /// Pictures a second at a fallback, over those asked for.
 const FRAME_RATE_RATIO: f64 = 0.8;
 
-/// A request for `views` a set: finished pictures of a still scene, without other planes, by the policy that is predicted
-/// to be fastest, with the settings that the coordinator offers.
+/// What a session asks for beside settings and views.
+#[derive(Debug, Clone, Default)]
+pub struct Terms {
+    /// The policy; without one, that which is predicted to be fastest.
+    pub policy: PolicyChoice,
+    /// The budget, which chooses the method unless that is named.
+    pub budget: BudgetRequest,
+}
+
+impl From<PolicyChoice> for Terms {
+    fn from(policy: PolicyChoice) -> Self {
+        Self { policy, ..Self::default() }
+    }
+}
+
+/// A request for `views` a set: finished pictures of a still scene, without other planes, with the settings that the coordinator
+/// offers.
 ///
 /// # Errors
 /// There are no views.
-pub fn request(offered: OfferSettings, views: &[PinholeCamera]) -> anyhow::Result<SessionRequest> {
+pub fn request(
+    offered: OfferSettings,
+    terms: impl Into<Terms>,
+    views: &[PinholeCamera],
+) -> anyhow::Result<SessionRequest> {
     let OfferSettings { method, sampling, lighting } = offered;
+    let terms = terms.into();
     let lighting = lighting.unwrap_or_else(|| Lighting::default().to_string());
-    let method = method.unwrap_or_else(|| ReconstructionMethod::default().to_string());
+    let method = method.unwrap_or_else(|| default_method(&lighting, &terms));
+    let takes_light = takes_light_from_samples(&method);
     Ok(SessionRequest {
         scene: None,
         sampling: sampling.unwrap_or_else(|| SamplingMethod::default().to_string()),
         // Where surfaces come from the scene, so does what mirrors show.
-        follows_mirrors: has_reflections(&lighting) && !takes_light_from_samples(&method),
+        follows_mirrors: has_reflections(&lighting) && !takes_light,
+        takes_light,
         method,
         lighting,
         codec: "lz4".to_owned(),
@@ -44,15 +66,27 @@ pub fn request(offered: OfferSettings, views: &[PinholeCamera]) -> anyhow::Resul
         planes: ViewPlanes::default(),
         auto_exposure: false,
         timeline: Timeline::still(0.0),
-        policy: PolicyChoice::Auto,
+        policy: terms.policy,
         forced_sampler_count: None,
         refinement_steps: 1,
         frames_per_s: None,
         fallbacks: Vec::new(),
         forced_tile_count: None,
         viewpoints: Vec::new(),
-        budget: BudgetRequest::default(),
+        budget: terms.budget,
     })
+}
+
+/// How views are made where nobody names a method: with shared light where light is traced, and directly in plain light, which costs
+/// less than sharing it. Budgets and plain light whose policy asks for samples take views from samples alone.
+pub(crate) fn default_method(lighting: &str, Terms { policy, budget }: &Terms) -> String {
+    let is_traced = lighting.parse().is_ok_and(|lighting: Lighting| lighting.is_traced());
+    match policy {
+        _ if budget.budget.is_some() => ReconstructionMethod::default().to_string(),
+        _ if is_traced => ReconstructionMethod::from(LightCacheQuality::default()).to_string(),
+        PolicyChoice::Pipeline | PolicyChoice::TimeShare => ReconstructionMethod::default().to_string(),
+        PolicyChoice::Auto | PolicyChoice::Direct => DIRECT.to_owned(),
+    }
 }
 
 fn takes_light_from_samples(method: &str) -> bool {
@@ -73,7 +107,11 @@ pub fn at_rate(request: SessionRequest, frames_per_s: f64) -> SessionRequest {
 
 /// Fallbacks under overload, in order: no mirror images of the scene, fewer rays of light, a coarser method, smaller sample
 /// images, fewer pictures a second. Each includes those before it. Steps that the lighting and the method do not have are skipped.
+/// Shared light stays as it is, and the views' quality goes down step by step: other samples would have to be lit first.
 fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
+    if takes_light_from_samples(method) {
+        return fallbacks_of_quality(lighting, method);
+    }
     let whole: Option<Lighting> = lighting.parse().ok();
     // Views from depth images have glossy reflections beside a base alone, and no fallback has a base.
     let walks_cube = method.parse().is_ok_and(ReconstructionMethod::walks_cube);
@@ -81,6 +119,7 @@ fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
     let unmirrored = whole.filter(loses).and_then(|lighting| lighting.without_reflections());
     let fewer_rays = unmirrored.or(whole).and_then(|lighting| lighting.with_fewer_rays());
     let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.coarser());
+    let method_is_sampled = method != DIRECT;
     let (lighting, method) = (lighting.to_owned(), method.to_owned());
     let all = Quality { lighting, method, sample_side_ratio: 1.0, frame_rate_ratio: 1.0 };
     let plain = unmirrored.map(|lighting| Quality { lighting: lighting.to_string(), ..all.clone() });
@@ -89,11 +128,27 @@ fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
     let above = dim.clone().unwrap_or(above);
     let coarse = fewer_steps.map(|method| Quality { method: method.to_string(), ..above.clone() });
     let above = coarse.clone().unwrap_or(above);
-    // The images of a cube have one size.
-    let small = (!walks_cube).then(|| Quality { sample_side_ratio: SAMPLE_SIDE_RATIO, ..above.clone() });
+    // The images of a cube have one size, and direct views have none.
+    let small =
+        (!walks_cube && method_is_sampled).then(|| Quality { sample_side_ratio: SAMPLE_SIDE_RATIO, ..above.clone() });
     let above = small.clone().unwrap_or(above);
     let slow = Quality { frame_rate_ratio: FRAME_RATE_RATIO, ..above };
     plain.into_iter().chain(dim).chain(coarse).chain(small).chain([slow]).collect()
+}
+
+fn fallbacks_of_quality(lighting: &str, method: &str) -> Vec<Quality> {
+    let of = |method: String| Quality {
+        lighting: lighting.to_owned(),
+        method,
+        sample_side_ratio: 1.0,
+        frame_rate_ratio: 1.0,
+    };
+    let lower = |method: &ReconstructionMethod| method.coarser();
+    let lower = std::iter::successors(method.parse().ok(), lower).skip(1);
+    let mut fallbacks: Vec<Quality> = lower.map(|method| of(method.to_string())).collect();
+    let lowest = fallbacks.last().cloned().unwrap_or_else(|| of(method.to_owned()));
+    fallbacks.push(Quality { frame_rate_ratio: FRAME_RATE_RATIO, ..lowest });
+    fallbacks
 }
 
 /// Opens a session.
@@ -159,13 +214,46 @@ mod tests {
     fn views_with_mirror_images_lose_them_first() {
         let offered = OfferSettings { lighting: Some("shadows, reflections 2".to_owned()), ..OfferSettings::default() };
         let view = PinholeCamera::looking_at(glam::Vec3::Z, glam::Vec3::ZERO, glam::Vec3::Y, 0.8, glam::UVec2::ONE);
-        let request = request(offered, &[view]).expect("a request");
-        assert_eq!((request.method.as_str(), request.follows_mirrors), ("joint_carve", true));
-        let lightings: Vec<String> = fallbacks(&request.lighting, "direct").into_iter().map(|q| q.lighting).collect();
-        assert_eq!(lightings, ["shadows"; 3]);
-        let lightings: Vec<String> =
-            fallbacks("soft 8, reflections 1", "direct").into_iter().map(|q| q.lighting).collect();
-        assert_eq!(lightings, ["soft 8", "soft 2", "soft 2", "soft 2"]);
+        let of_images = OfferSettings { method: Some("joint_carve".to_owned()), ..offered.clone() };
+        assert!(request(of_images, PolicyChoice::Auto, &[view]).expect("a request").follows_mirrors);
+        assert!(
+            !request(offered, PolicyChoice::Auto, &[view]).expect("a request").follows_mirrors,
+            "the scene has them"
+        );
+        let lightings =
+            |lighting| -> Vec<String> { fallbacks(lighting, DIRECT).into_iter().map(|q| q.lighting).collect() };
+        assert_eq!(lightings("shadows, reflections 2"), ["shadows"; 2]);
+        assert_eq!(lightings("soft 8, reflections 1"), ["soft 8", "soft 2", "soft 2"]);
+    }
+
+    #[test]
+    fn the_default_method_follows_from_the_light_the_policy_and_the_budget() {
+        let budget = BudgetRequest { budget: Some("flip 0.05".to_owned()), names_method: false };
+        let method = |lighting: &str, terms: &Terms| default_method(lighting, terms);
+        for policy in [PolicyChoice::Auto, PolicyChoice::Direct, PolicyChoice::Pipeline, PolicyChoice::TimeShare] {
+            for lighting in ["shadows", "soft 4", "phong, occlusion 8"] {
+                assert_eq!(method(lighting, &policy.into()), "light_cache");
+                assert_eq!(method(lighting, &Terms { policy, budget: budget.clone() }), "joint_carve");
+            }
+        }
+        for lighting in ["unlit", "phong", "phong, reflections 2"] {
+            assert_eq!(method(lighting, &PolicyChoice::Auto.into()), DIRECT);
+            assert_eq!(method(lighting, &PolicyChoice::Direct.into()), DIRECT);
+            assert_eq!(method(lighting, &PolicyChoice::Pipeline.into()), "joint_carve");
+            assert_eq!(method(lighting, &PolicyChoice::TimeShare.into()), "joint_carve");
+            assert_eq!(method(lighting, &Terms { budget: budget.clone(), ..Terms::default() }), "joint_carve");
+        }
+    }
+
+    #[test]
+    fn shared_light_loses_quality_step_by_step_and_then_pictures() {
+        let ladder = fallbacks("soft 16, occlusion 8", "light_cache:fine");
+        let steps: Vec<_> = ladder.iter().map(|q| (q.method.as_str(), q.frame_rate_ratio)).collect();
+        assert_eq!(
+            steps,
+            [("light_cache", 1.0), ("light_cache:fast", 1.0), ("light_cache:draft", 1.0), ("light_cache:draft", 0.8)]
+        );
+        assert!(ladder.iter().all(|q| q.lighting == "soft 16, occlusion 8" && q.sample_side_ratio == 1.0));
     }
 
     #[test]

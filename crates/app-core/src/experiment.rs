@@ -140,9 +140,8 @@ impl Experiment {
         let request = SessionRequest {
             method: settings.method.to_string(),
             lighting: settings.lighting.to_string(),
-            policy: settings.policy,
             timeline: Timeline { set_count: settings.sets, ..Timeline::still(f64::from(run) * RUN_STEP_S) },
-            ..request(self.setup.offer.settings.clone(), &views)?
+            ..request(self.setup.offer.settings.clone(), settings.policy, &views)?
         };
         self.receive(request, &views, arrived)
     }

@@ -2,7 +2,7 @@
 //!
 //! [`setup`] makes a scene on offer out of arguments, and [`scenes`] several. [`cluster`] runs coordinator and nodes in one process, and
 //! [`experiment`] a client beside them.
-//! [`delivery`] opens sessions and receives views, and [`live`] follows a path with a moving camera. [`camera_file`]
+//! [`quality`] is the quality of shared light. [`delivery`] opens sessions and receives views, and [`live`] follows a path with a moving camera. [`camera_file`]
 //! reads camera files, and [`camera_record`] writes those of views. [`ladder`] has the representations among which budgets
 //! choose, [`planning`] the terms of a plan, and [`plan_files`] the measurements of plans. [`exit`] defines the exit status.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -20,6 +20,7 @@ pub mod plan_files;
 pub mod planning;
 pub mod process;
 pub mod progress;
+pub mod quality;
 pub mod scenes;
 pub mod setup;
 pub mod sizes;

@@ -5,6 +5,7 @@ use coordinator::{SceneOffer, SceneOffers};
 use scene::{Scene, SceneSpec};
 
 use crate::exit::BadInput;
+use crate::quality::QualityArgs;
 use crate::setup::{SceneArgs, Setup};
 
 /// The arguments of [`SceneArgs`], for one scene or several.
@@ -17,12 +18,20 @@ pub struct ScenesArgs {
 }
 
 impl ScenesArgs {
-    /// Loads all scenes, and places sample cameras in each.
+    /// Loads all scenes, and places sample cameras in each. With a budget for all sessions, whose budget chooses among methods, views
+    /// are made from samples alone.
     ///
     /// # Errors
     /// A scene cannot be used, or is given twice.
-    pub fn load(&self) -> anyhow::Result<(Vec<Scene>, SceneOffers)> {
-        let setup = |scene: &SceneSpec| SceneArgs { scene: scene.clone(), ..self.first.clone() }.load();
+    pub fn load(&self, has_budget: bool) -> anyhow::Result<(Vec<Scene>, SceneOffers)> {
+        let setup = |scene: &SceneSpec| {
+            let args = SceneArgs { scene: scene.clone(), ..self.first.clone() };
+            let mut setup = args.load()?;
+            if !has_budget {
+                setup.offer.settings.method = args.offered_method().map(|method| method.to_string());
+            }
+            anyhow::Ok(setup)
+        };
         let setups = self.scenes.iter().map(setup).collect::<anyhow::Result<Vec<Setup>>>()?;
         let (scenes, offers): (_, Vec<SceneOffer>) = setups.into_iter().map(|setup| (setup.scene, setup.offer)).unzip();
         Ok((scenes, SceneOffers::new(offers).map_err(|error| BadInput(error.to_string()))?))
@@ -31,7 +40,8 @@ impl ScenesArgs {
 
 impl Args for ScenesArgs {
     fn augment_args(command: Command) -> Command {
-        SceneArgs::augment_args(command).mut_arg("scene", |scene| scene.action(ArgAction::Append))
+        let command = SceneArgs::augment_args(command).mut_arg("scene", |scene| scene.action(ArgAction::Append));
+        QualityArgs::augment_args(command)
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -43,7 +53,9 @@ impl FromArgMatches for ScenesArgs {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let scenes = matches.get_many("scene").into_iter().flatten().cloned().collect();
         // One value is taken here: the first.
-        Ok(Self { scenes, first: SceneArgs::from_arg_matches(matches)? })
+        let first = SceneArgs::from_arg_matches(matches)?;
+        let of_quality = QualityArgs::from_arg_matches(matches)?.method();
+        Ok(Self { scenes, first: SceneArgs { method: first.method.or(of_quality), ..first } })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::Args;
-use cluster::{CommonCell, CommonKind, OfferSettings, SceneHash};
+use cluster::{CommonCell, CommonKind, OfferSettings, PolicyChoice, SceneHash};
 use coordinator::{OfferedCube, OfferedMirror, SceneOffer};
 use depth_image::{Camera, CubeGrid, PinholeCamera};
 use glam::UVec2;
@@ -15,6 +15,7 @@ use sampling::{Impostors, Mirror, Rig, SamplingMethod};
 use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec, UpAxis};
 
 use crate::camera_file::{self, Placement};
+use crate::delivery::default_method;
 use crate::exit::BadInput;
 use crate::ladder::{Named, rows};
 use crate::sizes::SampleSize;
@@ -71,7 +72,8 @@ pub struct SceneArgs {
     pub environment: Option<EnvironmentSpec>,
     /// The reconstruction method; `None` where the user names none
     #[arg(long, visible_alias = "reconstruction", value_name = "NAME",
-        help = format!("How views are reconstructed. {} [default: {}]", ReconstructionMethod::help(), ReconstructionMethod::default()))]
+        help = format!("How views are made. {} [default: shared light where light is traced, direct drawing in plain light; from samples alone, {}, \
+            with a cube, a base or a budget, and in experiments]", ReconstructionMethod::help(), ReconstructionMethod::default()))]
     pub method: Option<ReconstructionMethod>,
     /// The sampling method; `None` where the user names none
     #[arg(long, value_name = "NAME",
@@ -195,6 +197,20 @@ impl SceneArgs {
             || reconstruction::METHODS.into_iter().map(|row| row.method).find(|method| method.walks_cube());
         let suited = self.sampling().layer_selection().and_then(|_| suits_cube());
         self.method.or(suited).unwrap_or_default()
+    }
+
+    /// The method that a coordinator offers: a named one, or one that the samples need. Without one it follows from the light of
+    /// views.
+    pub(crate) fn offered_method(&self) -> Option<ReconstructionMethod> {
+        let needs_images = self.base.is_some() || !self.sampling().may_hold_light();
+        self.method.or_else(|| needs_images.then(|| self.method()))
+    }
+
+    /// The method of views from samples in a light, as a client that names none would ask for.
+    #[must_use]
+    pub fn method_in(&self, lighting: Lighting) -> String {
+        let of_light = || default_method(&lighting.to_string(), &PolicyChoice::Pipeline.into());
+        self.offered_method().map_or_else(of_light, |method| method.to_string())
     }
 
     /// The sampling method.

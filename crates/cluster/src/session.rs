@@ -32,6 +32,9 @@ pub struct SessionRequest {
     /// Mirrors in reconstructed views show the scene, as the lighting says: samples have mirror cells, but for mirrors that a base shows as
     /// finely. A base shows mirrors in any case.
     pub follows_mirrors: bool,
+    /// Views take only light from samples, which are then as dense as views. Others take surfaces, too, from samples that are twice as
+    /// dense.
+    pub takes_light: bool,
     /// How frames are encoded.
     pub codec: String,
     /// Empty: the rig that the coordinator was given with the scene.

@@ -21,8 +21,8 @@ const RUNS: usize = 3;
 const LONG_RUN_S: f64 = 0.5;
 /// Larger views are measured in this size: their time is in proportion to their pixels.
 const MOST_PIXELS: usize = 1 << 20;
-/// The longest time of views that are drawn in one call, unless one alone takes longer.
-const DIRECT_CALL_S: f64 = 1.0;
+/// The longest time of views that are made in one call, unless one alone takes longer.
+const CALL_S: f64 = 1.0;
 
 /// Measures g_s, g_v, c, d and e one after the other. Time that other work has the device does not count.
 pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Result<Measured, Status> {
@@ -133,10 +133,27 @@ impl Measurement<'_> {
         Ok(split_into_overhead_and_shares(sample_image_s, row_s, quarters_s))
     }
 
-    /// The cost of one view over all typical views, in calls of the batch's size; with some of the views.
+    /// The cost of one view over all typical views, in calls of the batch's size; with some of the views. Of one typical view as many
+    /// are made as time allows, as of views that are drawn directly.
     fn reconstruct_view_s(&self, set: &dyn UploadedSet, request: &MeasureCosts) -> Result<(Vec<View>, f64), Status> {
+        if request.typical_views.len() > 1 {
+            return self.reconstructed(set, request, request.batch_count.max(request.typical_views.len() as u32));
+        }
+        let (made, alone_s) = self.reconstructed(set, request, 1)?;
+        match views_in_time(alone_s, request.batch_count) {
+            1 => Ok((made, alone_s)),
+            views => self.reconstructed(set, request, views),
+        }
+    }
+
+    fn reconstructed(
+        &self,
+        set: &dyn UploadedSet,
+        request: &MeasureCosts,
+        views: u32,
+    ) -> Result<(Vec<View>, f64), Status> {
         let batch = request.batch_count as usize;
-        let views = request.views(request.batch_count.max(request.typical_views.len() as u32));
+        let views = request.views(views);
         let work = |cameras: &[PinholeCamera]| ViewWork {
             cameras: cameras.to_vec(),
             method: request.method.clone(),
@@ -154,7 +171,7 @@ impl Measurement<'_> {
         let work = |views: u32| DirectWork::of(&request.workload, request.views(views), request.planes);
         let draw = |views: u32| Ok(self.engine.draw_direct(&work(views), self.turn)?);
         let (drawn, alone_s) = self.timed(|| draw(1))?;
-        let views = direct_views(alone_s, request.batch_count);
+        let views = views_in_time(alone_s, request.batch_count);
         if views == 1 {
             return Ok((drawn, alone_s));
         }
@@ -197,10 +214,10 @@ fn codec(error: impl Display) -> Status {
     Status::internal(format!("codec: {error}"))
 }
 
-/// The number of views to draw in one call, where one alone takes `alone_s`.
-fn direct_views(alone_s: f64, most: u32) -> u32 {
+/// The number of views to make in one call, where one alone takes `alone_s`.
+fn views_in_time(alone_s: f64, most: u32) -> u32 {
     // A cast saturates: views that take no time give the largest batch.
-    ((DIRECT_CALL_S / alone_s) as u32).clamp(1, most.max(1))
+    ((CALL_S / alone_s) as u32).clamp(1, most.max(1))
 }
 
 fn decoded(workload: &Workload, encoded: &[EncodedImage]) -> Result<Vec<SampleImage>, Status> {

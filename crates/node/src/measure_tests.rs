@@ -16,6 +16,7 @@ use crate::engine::{CommonSet, EngineError, SharedSet};
 pub(crate) struct Sleeper {
     sample_s: f64,
     direct_view_s: f64,
+    reconstruct_view_s: f64,
     build_s: f64,
     /// Seconds of an image, and of each of its rows; images are then tileable.
     parts_s: Option<(f64, [f64; 4])>,
@@ -26,6 +27,7 @@ pub(crate) struct Sleeper {
 pub(crate) struct Calls {
     pub(crate) refinements: Vec<Refinement>,
     pub(crate) drawn_views: Vec<usize>,
+    pub(crate) reconstructed_views: Vec<usize>,
     pub(crate) uploads: Vec<(Illumination, bool)>,
     /// The bounds of the mirrors of each set that has some.
     pub(crate) mirrors: Vec<Vec<Aabb>>,
@@ -124,6 +126,8 @@ impl Engine for Sleeper {
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, _: Turn) -> Result<Vec<View>, EngineError> {
         let any: &dyn Any = set;
         assert!(any.is::<Nothing>());
+        self.calls.lock().unwrap().reconstructed_views.push(work.cameras.len());
+        std::thread::sleep(Duration::from_secs_f64(self.reconstruct_view_s * work.cameras.len() as f64));
         Ok(views(&work.cameras))
     }
 
@@ -176,6 +180,7 @@ fn quick_operations_run_three_times_after_a_warm_up() {
     let (costs, calls) = measured(engine, 32);
     assert_eq!(calls.refinements, [Refinement::default(); 4], "finished, for any number of steps");
     assert_eq!(calls.drawn_views, [1, 1, 1, 1, 32, 32, 32, 32, 1], "the last is for the exposure");
+    assert_eq!(calls.reconstructed_views, [1, 1, 1, 1, 32, 32, 32, 32]);
     assert!((1e-3..0.01).contains(&costs.direct_view_s), "{costs:?}");
     assert_eq!(calls.uploads, vec![(request(1).workload.illumination, true); 4], "with what highlights need");
 }
@@ -197,8 +202,11 @@ fn costs_of_views_with_mirrors_are_those_of_all_their_images() {
 
 #[test]
 fn slow_operations_run_once_after_a_warm_up() {
-    let (costs, calls) = measured(Sleeper { sample_s: 0.51, direct_view_s: 0.51, ..Sleeper::default() }, 32);
+    let slow = Sleeper { sample_s: 0.51, direct_view_s: 0.51, reconstruct_view_s: 0.51, ..Sleeper::default() };
+    let (costs, calls) = measured(slow, 32);
     assert_eq!((calls.refinements.len(), calls.drawn_views), (2, vec![1, 1, 1]));
+    assert_eq!(calls.reconstructed_views, [1, 1]);
+    assert!((0.51..2.0).contains(&costs.reconstruct_view_s), "{costs:?}");
     assert!((0.51..2.0).contains(&costs.direct_view_s), "{costs:?}");
     assert!((0.255..1.0).contains(&costs.sample_image_s), "two images a run: {costs:?}");
 }
@@ -218,9 +226,9 @@ fn large_views_are_measured_in_a_smaller_size() {
 
 #[test]
 fn as_many_views_are_drawn_as_time_allows() {
-    let views = [1e-9, 0.01, 0.09, 0.3, 0.6, 40.0].map(|alone_s| direct_views(alone_s, 32));
+    let views = [1e-9, 0.01, 0.09, 0.3, 0.6, 40.0].map(|alone_s| views_in_time(alone_s, 32));
     assert_eq!(views, [32, 32, 11, 3, 1, 1]);
-    assert_eq!((direct_views(0.0, 32), direct_views(f64::NAN, 32), direct_views(0.1, 1)), (32, 1, 1));
+    assert_eq!((views_in_time(0.0, 32), views_in_time(f64::NAN, 32), views_in_time(0.1, 1)), (32, 1, 1));
 }
 
 #[test]

@@ -121,6 +121,7 @@ fn request() -> SessionRequest {
         sampling: "conventional".to_owned(),
         lighting: "unlit".to_owned(),
         follows_mirrors: true,
+        takes_light: true,
         codec: "raw".to_owned(),
         sample_cameras: vec![Camera::Pinhole(camera())],
         sample_size_px: Some(UVec2::new(8, 8)),

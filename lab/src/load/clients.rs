@@ -53,8 +53,7 @@ impl Tour {
         let offer = status.offers.into_iter().next().context("the coordinator does not say what it shows")?;
         let samples: Vec<_> = offer.sample_cameras.iter().map(|camera| *camera.reference()).collect();
         let path = ViewCell::between(&samples).context("no sample cameras")?.orbit(PATH_POSES, size_px);
-        let request = at_rate(request(offer.settings, &path[..1])?, rate_hz);
-        let request = SessionRequest { policy: PolicyChoice::Pipeline, ..request };
+        let request = at_rate(request(offer.settings, PolicyChoice::Pipeline, &path[..1])?, rate_hz);
         Ok(Self { coordinator: coordinator.to_owned(), request, path })
     }
 

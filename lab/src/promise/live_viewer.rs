@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use app_core::delivery::{open, request, viewpoints};
+use app_core::delivery::{Terms, open, request, viewpoints};
 use app_core::live::{Drive, Record, drive};
 use client::{Client, Session};
 use cluster::{BudgetRequest, OfferStatus, PolicyChoice, Promise, PromiseState, SessionRequest};
@@ -114,8 +114,8 @@ impl Cluster {
         let Asked { budget, policy, rate_hz, path, has_cells } = asked;
         let budget = BudgetRequest { budget: budget.map(str::to_owned), names_method: false };
         let viewpoints = if has_cells { viewpoints(&path) } else { Vec::new() };
-        let plain = request(self.offer.settings.clone(), &path[..1])?;
-        let request = SessionRequest { policy, budget, frames_per_s: Some(rate_hz), viewpoints, ..plain };
+        let request = request(self.offer.settings.clone(), Terms { policy, budget }, &path[..1])?;
+        let request = SessionRequest { frames_per_s: Some(rate_hz), viewpoints, ..request };
         Ok(Viewer { session: open(&self.client, request).await?, path })
     }
 }

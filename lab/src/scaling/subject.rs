@@ -67,7 +67,7 @@ impl Subject {
         set_count: u32,
     ) -> anyhow::Result<SessionRequest> {
         let (lighting, timeline) = (lighting.to_string(), self.fresh_timeline(set_count));
-        Ok(SessionRequest { lighting, policy, timeline, ..request(self.setup.offer.settings.clone(), views)? })
+        Ok(SessionRequest { lighting, timeline, ..request(self.setup.offer.settings.clone(), policy, views)? })
     }
 
     /// A measurement for a node: a new set of this lighting, and views in calls of `batch_count`.

@@ -71,9 +71,8 @@ async fn taken(up: &Up, number: usize) -> anyhow::Result<Taken> {
     let near = |view: PinholeCamera| PinholeCamera { near_m: view.near_m * (1.0 + NEAR_STEP * number as f32), ..view };
     let views: Vec<PinholeCamera> = path(offer, VIEWS, SMALL_PX)?.into_iter().map(near).collect();
     let request = SessionRequest {
-        policy: PolicyChoice::Pipeline,
         timeline: Timeline::still(1e-3 * (number + 1) as f64),
-        ..request(offer.settings.clone(), &views)?
+        ..request(offer.settings.clone(), PolicyChoice::Pipeline, &views)?
     };
     let session = open(&client, request).await?;
     for _ in 0..BATCHES {

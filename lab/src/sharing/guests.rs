@@ -62,14 +62,15 @@ impl Guest {
         let offer = offers[usize::from(self.difference == Difference::Scene)];
         let views = path(offer, self.views, self.size_px)?;
         let client = Client::connect(coordinator).await?;
-        let session = open(&client, self.request(offer, request(offer.settings.clone(), &views)?)).await?;
+        let request = request(offer.settings.clone(), PolicyChoice::Pipeline, &views)?;
+        let session = open(&client, self.request(offer, request)).await?;
         receive(&session, &views, async |_| Ok(())).await?;
         Ok(start.elapsed().as_secs_f64())
     }
 
     /// A guest that shares the viewer's workload forces the same policy.
     fn request(&self, offer: &OfferStatus, request: SessionRequest) -> SessionRequest {
-        let request = SessionRequest { policy: PolicyChoice::Pipeline, scene: Some(offer.name.clone()), ..request };
+        let request = SessionRequest { scene: Some(offer.name.clone()), ..request };
         match self.difference {
             Difference::Size | Difference::Scene => request,
             Difference::Lighting => SessionRequest { lighting: "soft 2, occlusion 2".to_owned(), ..request },

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use app_core::delivery::{open, receive, request};
 use client::Client;
-use cluster::{PolicyChoice, SessionRequest};
+use cluster::PolicyChoice;
 use glam::UVec2;
 use report::{Bar, Cell, Check, Table};
 
@@ -49,8 +49,8 @@ async fn first_view(up: &Up, size_px: UVec2) -> anyhow::Result<(f64, String)> {
     let client = Client::connect(&up.coordinator).await?;
     let views = path(offer, 1, size_px)?;
     let start = Instant::now();
-    let request = request(offer.settings.clone(), &views)?;
-    let session = open(&client, SessionRequest { policy: PolicyChoice::Pipeline, ..request }).await?;
+    let request = request(offer.settings.clone(), PolicyChoice::Pipeline, &views)?;
+    let session = open(&client, request).await?;
     receive(&session, &views, async |_| Ok(())).await?;
     let seconds = start.elapsed().as_secs_f64();
     Ok((seconds, policies(&up.coordinator).await?))

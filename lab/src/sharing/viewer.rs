@@ -65,8 +65,8 @@ impl Viewer {
     /// The coordinator refuses.
     pub(super) async fn start(coordinator: &str, offer: &OfferStatus, policy: PolicyChoice) -> anyhow::Result<Self> {
         let path = path(offer, PATH_POSES, SIZE_PX)?;
-        let request = at_rate(request(offer.settings.clone(), &path[..1])?, RATE_HZ);
-        let request = SessionRequest { policy, scene: Some(offer.name.clone()), ..request };
+        let request = at_rate(request(offer.settings.clone(), policy, &path[..1])?, RATE_HZ);
+        let request = SessionRequest { scene: Some(offer.name.clone()), ..request };
         let client = Client::connect(coordinator).await?;
         let session = open(&client, request).await?;
         // Once with a frame in hand: shaders are built by then.

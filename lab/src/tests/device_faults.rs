@@ -8,7 +8,7 @@ use app_core::process::{listen, runtime};
 use app_core::setup::{SceneArgs, Setup};
 use app_core::sizes::SampleSize;
 use client::Session;
-use cluster::{PolicyChoice, SessionRequest};
+use cluster::PolicyChoice;
 use coordinator::CoordinatorConfig;
 use depth_image::{PinholeCamera, View, ViewCell};
 use engine::GpuEngine;
@@ -42,8 +42,7 @@ impl Bench {
             .await
             .unwrap();
         let client = cluster.client().await.unwrap();
-        let request = request(self.setup.offer.settings.clone(), &self.views).unwrap();
-        let request = SessionRequest { policy: PolicyChoice::Pipeline, ..request };
+        let request = request(self.setup.offer.settings.clone(), PolicyChoice::Pipeline, &self.views).unwrap();
         (cluster, open(&client, request).await.unwrap())
     }
 

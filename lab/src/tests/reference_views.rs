@@ -152,8 +152,8 @@ fn a_cluster_gives_what_one_engine_gives() {
         let client = cluster.client().await.unwrap();
         let offer = client.status().await.unwrap().offers.remove(0);
         assert_eq!((&offer.sample_cameras, &offer.settings), (&setup.offer.rig, &setup.offer.settings));
-        let request = request(offer.settings, &reference.cameras).unwrap();
-        let request = SessionRequest { policy: PolicyChoice::Pipeline, planes: ViewPlanes::ALL, ..request };
+        let request = request(offer.settings, PolicyChoice::Pipeline, &reference.cameras).unwrap();
+        let request = SessionRequest { planes: ViewPlanes::ALL, ..request };
         let session = open(&client, request).await.unwrap();
         let plan = session.plan();
         assert!(plan.sampler_count() >= 1 && plan.assignment.compositors.len() + plan.sampler_count() == 3);

@@ -56,7 +56,7 @@ pub struct CoordinatorArgs {
 /// # Errors
 /// The scene cannot be used, or the port is taken.
 pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
-    let (scenes, offers) = args.scenes.load()?;
+    let (scenes, offers) = args.scenes.load(args.budget.is_given())?;
     args.budget.check(&offers)?;
     let listener = listen(args.listen, args.insecure_bind).await?;
     let address = listener.local_addr()?;

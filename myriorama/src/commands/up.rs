@@ -52,7 +52,7 @@ pub struct UpArgs {
 /// # Errors
 /// The scene cannot be used, there is no device, or the port is taken.
 pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
-    let (scenes, offers) = args.scenes.load()?;
+    let (scenes, offers) = args.scenes.load(args.budget.is_given())?;
     args.budget.check(&offers)?;
     let listener = listen(args.listen, args.insecure_bind).await?;
     let engine = GpuEngine::shared(args.device.device)?;

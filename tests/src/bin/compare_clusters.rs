@@ -145,6 +145,7 @@ fn request(row: Row, typical_view: PinholeCamera) -> SessionRequest {
         sampling: row.sampling.to_owned(),
         lighting: row.lighting.to_owned(),
         follows_mirrors: false,
+        takes_light: false,
         codec: row.codec.to_owned(),
         sample_cameras: sample_cameras(row.sampling, typical_view),
         sample_size_px: None,

@@ -153,6 +153,12 @@ pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<Shad
 
 named_methods!(ReconstructionMethod, UnknownMethod, "reconstruction method");
 
+impl From<LightCacheQuality> for ReconstructionMethod {
+    fn from(quality: LightCacheQuality) -> Self {
+        LightCache { quality }
+    }
+}
+
 impl ReconstructionMethod {
     /// Walks through a layered cube, and follows all mirrors.
     pub const LAYERED: Self = Layered { followed: None };

@@ -203,6 +203,16 @@ impl SamplingMethod {
         }
     }
 
+    /// Whether samples may hold light in place of colour: those of one position a texel, in depth images of several places.
+    #[must_use]
+    pub fn may_hold_light(self) -> bool {
+        match self {
+            Conventional(antialias) => antialias == Antialias::NONE,
+            NonRedundant(_) | Useful(_) => true,
+            DepthPeeling { .. } | Cube(_) => false,
+        }
+    }
+
     /// The test by which an image omits samples that others hold.
     #[must_use]
     pub fn redundancy_test(self) -> Option<RedundancyTest> {

@@ -23,7 +23,7 @@ messages! {
         settings: reconstruction_method | sampling_method | lighting
     }, first |o| at_most(o.sample_cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras"), then OfferStatus::validate;
     OpenSessionRequest = SessionRequest {
-        scene, lighting, follows_mirrors, sample_cameras, volume, typical_view, timeline, forced_sampler_count, frames_per_s, fallbacks,
+        scene, lighting, follows_mirrors, takes_light, sample_cameras, volume, typical_view, timeline, forced_sampler_count, frames_per_s, fallbacks,
         forced_tile_count, viewpoints;
         method: reconstruction_method, sampling: sampling_method, codec: frame_codec,
         sample_size_px: sample_image_size, views_per_set: views_per_set_count,

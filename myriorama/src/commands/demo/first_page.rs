@@ -16,15 +16,13 @@ use node::{DirectWork, Engine as _, SampleSet, SampleWork, Turn, ViewWork, WorkC
 use render::Lighting;
 use report::Picture;
 
+use super::EXPENSIVE_LIGHT;
 use super::args::DemoArgs;
 use super::page_layout::{PageParts, VIEW_PX};
 use super::viewpoint::Viewpoint;
 
-/// The light of the page, unless the user names one. Few rays a sample are enough: a pixel has the mean of four samples,
-/// or of four images.
-const LIGHTING: &str = "soft 1, occlusion 2";
-/// The side of sample images over that of the view, unless the user names a size.
-const DENSITY: f32 = 1.25;
+/// The side of sample images over that of the view, unless the user names a size: light needs no more.
+const DENSITY: f32 = 1.0;
 const SAMPLES_A_PIXEL: u32 = 4;
 /// The size of the view that is drawn before the timed one.
 const WARM_UP_PX: UVec2 = UVec2::new(32, 20);
@@ -74,7 +72,7 @@ impl PageViews {
         let turn = Turn::of(WorkClass::Batch);
         let antialias = Antialias::of(SAMPLES_A_PIXEL).context("four samples are offered")?;
         let planes = ViewPlanes { antialias, ..ViewPlanes::ALL };
-        let method = args.scene.method().to_string();
+        let method = args.scene.method_in(lighting);
         let set_work = sample_work(args, setup, lighting, engine.sample_planes(&method)?);
         let (images, samples_s) = timed(|| Ok(engine.sample(&set_work, turn)?))?;
         let set = SampleSet {
@@ -139,7 +137,7 @@ fn timed<T>(make: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<(T, f64)
 
 fn page(args: &DemoArgs, setup: &Setup, camera: PinholeCamera) -> anyhow::Result<Picture> {
     let is_named = args.scene.lighting != Lighting::default();
-    let lighting = if is_named { args.scene.lighting } else { LIGHTING.parse()? };
+    let lighting = if is_named { args.scene.lighting } else { EXPENSIVE_LIGHT.parse()? };
     let PageViews { direct, direct_s, reconstructed, reconstruct_s, samples_s } =
         PageViews::make(args, setup, camera, lighting)?;
     let reconstructed_picture = Rgb8Image::of_view(&reconstructed)?;
@@ -156,11 +154,11 @@ fn page(args: &DemoArgs, setup: &Setup, camera: PinholeCamera) -> anyhow::Result
         facts: vec![
             format!("{}, {} triangles", setup.offer.name, setup.scene.triangle_count()),
             format!("{lighting}; {SAMPLES_A_PIXEL} samples a pixel"),
-            format!("{} depth images {}x{}: {}", setup.samples.len(), sample_px.x, sample_px.y, duration(samples_s)),
+            format!("{} sample images {}x{}: {}", setup.samples.len(), sample_px.x, sample_px.y, duration(samples_s)),
         ],
         figures: format!("a view: {figures}"),
     };
-    let caption = format!("A view drawn directly, and reconstructed: {figures}");
+    let caption = format!("A view drawn directly, and made with samples: {figures}");
     Ok(Picture::new("first page", caption, parts.page()))
 }
 

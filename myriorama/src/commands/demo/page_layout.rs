@@ -43,7 +43,7 @@ impl PageParts {
         let small = |image, filter| imageops::resize(image, SMALL_PX.0, SMALL_PX.1, filter);
         let second = MARGIN_PX * 2 + VIEW_PX.0;
         place(&mut page, (MARGIN_PX, ROWS_PX[0]), "drawn directly from the scene", &self.direct);
-        place(&mut page, (second, ROWS_PX[0]), "reconstructed from four depth images", &self.reconstructed);
+        place(&mut page, (second, ROWS_PX[0]), "made with four sample images", &self.reconstructed);
         // Between two sources there is no third.
         let provenance = small(&self.provenance, FilterType::Nearest);
         place(&mut page, (MARGIN_PX, ROWS_PX[1]), "where each pixel comes from", &provenance);

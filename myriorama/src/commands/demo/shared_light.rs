@@ -3,7 +3,7 @@
 use anyhow::Context as _;
 use app_core::delivery::request;
 use app_core::experiment::{Delivered, Experiment};
-use cluster::{Costs, PolicyChoice, SessionPlan, SessionRequest};
+use cluster::{Costs, OfferSettings, PolicyChoice, SessionPlan, SessionRequest};
 use coordinator::schedule::k_fd;
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use image::imageops;
@@ -131,12 +131,12 @@ fn deliver(
     lighting: Lighting,
     cameras: &[PinholeCamera],
 ) -> anyhow::Result<(Delivered, Vec<View>)> {
-    let request = SessionRequest {
-        lighting: lighting.to_string(),
-        policy,
-        planes: ViewPlanes::ALL,
-        ..request(experiment.setup.offer.settings.clone(), cameras)?
+    let settings = OfferSettings {
+        method: Some(experiment.args.method_in(lighting)),
+        lighting: Some(lighting.to_string()),
+        ..experiment.setup.offer.settings.clone()
     };
+    let request = SessionRequest { planes: ViewPlanes::ALL, ..request(settings, policy, cameras)? };
     let mut frames = Vec::with_capacity(cameras.len());
     let delivered = experiment.receive(request, cameras, |frame| frames.push(frame))?;
     frames.sort_by_key(|frame| frame.request.frame);

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use app_core::camera_file::{self, Placement};
 use app_core::exit::BadInput;
+use app_core::quality::QualityArgs;
 use app_core::sizes::{SizePx, grid};
 use clap::Args;
 use cluster::{OfferStatus, PolicyChoice};
@@ -56,9 +57,12 @@ pub struct ViewArgs {
     /// Writes the provenance of every pixel as well
     #[arg(long)]
     pub(super) provenance: bool,
-    /// How views are reconstructed [default: the coordinator's]
+    /// How views are made [default: the coordinator's, or else shared light where light is traced and direct drawing in plain light;
+    /// from samples alone with --budget, and in plain light with --policy pipeline or time-share]
     #[arg(long, value_name = "NAME")]
-    pub(super) method: Option<ReconstructionMethod>,
+    method: Option<ReconstructionMethod>,
+    #[command(flatten)]
+    quality: QualityArgs,
     /// How surfaces are lit, as in "soft 16, occlusion 16" (see `myriorama up --help`) [default: the coordinator's]
     #[arg(long, value_name = "TERMS")]
     pub(super) lighting: Option<Lighting>,
@@ -112,6 +116,11 @@ pub struct ViewArgs {
 }
 
 impl ViewArgs {
+    /// The method that the user names.
+    pub(super) fn method(&self) -> Option<ReconstructionMethod> {
+        self.method.or(self.quality.method())
+    }
+
     /// The planes of the views, without their tone, which may be the plan's.
     pub(super) fn planes(&self) -> ViewPlanes {
         let (inverse_depth, provenance) = (self.depth, self.provenance);

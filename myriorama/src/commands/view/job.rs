@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use app_core::delivery::{at_rate, open, request, viewpoints};
+use app_core::delivery::{Terms, at_rate, open, request, viewpoints};
 use app_core::exit::BadInput;
 use client::{Client, Session};
 use cluster::{BudgetRequest, OfferSettings, OfferStatus, Promise, PromiseState, SessionRequest, Timeline};
@@ -103,24 +103,23 @@ fn offered(offers: Vec<OfferStatus>, scene: Option<&str>) -> anyhow::Result<Offe
 
 fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamera]) -> anyhow::Result<SessionRequest> {
     let views = if args.live { &cameras[..1] } else { cameras };
-    let lighting = args.lighting.map(|lighting| lighting.to_string()).or(offer.settings.lighting.clone());
-    let mut request = request(OfferSettings { lighting, ..offer.settings.clone() }, views)?;
-    request.scene = Some(offer.name.clone());
-    if let Some(method) = args.method {
-        request.method = method.to_string();
-    }
+    let OfferSettings { method, sampling, lighting } = offer.settings.clone();
+    let settings = OfferSettings {
+        method: args.method().map(|method| method.to_string()).or(method),
+        sampling,
+        lighting: args.lighting.map(|lighting| lighting.to_string()).or(lighting),
+    };
+    let budget = args.budget.map(|budget| budget.to_string());
+    let budget = BudgetRequest { budget, names_method: args.method().is_some() };
+    let request = request(settings, Terms { policy: args.policy, budget }, views)?;
     let request = if args.live { at_rate(request, args.rate) } else { request };
     let request = SessionRequest {
         forced_tile_count: args.tiles,
         refinement_steps: if args.refine { refinement_steps(&request.lighting) } else { 1 },
+        scene: Some(offer.name.clone()),
         codec: args.codec.to_string(),
-        policy: args.policy,
         planes: args.planes(),
         timeline: timeline(args.frames, args.frame_step, args.refine),
-        budget: BudgetRequest {
-            budget: args.budget.map(|budget| budget.to_string()),
-            names_method: args.method.is_some(),
-        },
         viewpoints: if args.cells || args.viewpoints.around.is_some() { viewpoints(cameras) } else { Vec::new() },
         ..request
     };
