@@ -16,8 +16,6 @@ use report::{Bar, Check, Report};
 pub use args::DemoArgs;
 use shared_light::LightResult;
 
-/// The light in which sharing pays, unless the user names one.
-const EXPENSIVE_LIGHT: &str = "soft 16, occlusion 16";
 /// The number of views V of Lages et al., and of the quick form.
 const VIEWS: usize = app_core::experiment::PAPER_VIEWS;
 const QUICK_VIEWS: usize = 64;
@@ -50,10 +48,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
 fn measure(args: &DemoArgs, experiment: &Experiment) -> anyhow::Result<Vec<LightResult>> {
     let (scene, triangles) = (&args.scene.scene, experiment.setup.scene.triangle_count());
     println!("{scene}: {triangles} triangles on {}", experiment.engine.device_name());
-    let plain = Lighting::default();
-    let is_named = args.scene.lighting != plain;
-    let expensive = if is_named { args.scene.lighting } else { EXPENSIVE_LIGHT.parse()? };
-    let lights = [expensive, plain];
+    let lights = [args.expensive_light()?, Lighting::default()];
     let views = if args.quick { QUICK_VIEWS } else { VIEWS };
     let progress = bar("light", lights.len());
     let mut results = Vec::with_capacity(lights.len());

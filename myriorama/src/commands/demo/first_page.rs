@@ -16,13 +16,12 @@ use node::{DirectWork, Engine as _, SampleSet, SampleWork, Turn, ViewWork, WorkC
 use render::Lighting;
 use report::Picture;
 
-use super::EXPENSIVE_LIGHT;
 use super::args::DemoArgs;
 use super::page_layout::{PageParts, VIEW_PX};
 use super::viewpoint::Viewpoint;
 
 /// The side of sample images over that of the view, unless the user names a size: light needs no more.
-const DENSITY: f32 = 1.0;
+const DENSITY: f32 = 0.5;
 const SAMPLES_A_PIXEL: u32 = 4;
 /// The size of the view that is drawn before the timed one.
 const WARM_UP_PX: UVec2 = UVec2::new(32, 20);
@@ -136,8 +135,7 @@ fn timed<T>(make: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<(T, f64)
 }
 
 fn page(args: &DemoArgs, setup: &Setup, camera: PinholeCamera) -> anyhow::Result<Picture> {
-    let is_named = args.scene.lighting != Lighting::default();
-    let lighting = if is_named { args.scene.lighting } else { EXPENSIVE_LIGHT.parse()? };
+    let lighting = args.expensive_light()?;
     let PageViews { direct, direct_s, reconstructed, reconstruct_s, samples_s } =
         PageViews::make(args, setup, camera, lighting)?;
     let reconstructed_picture = Rgb8Image::of_view(&reconstructed)?;
