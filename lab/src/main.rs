@@ -77,8 +77,10 @@ mod command_line_tests {
 
     #[test]
     fn input_that_cannot_be_used_is_named_with_status_2() {
-        let cases: [(&[&str], &str); 2] = [
+        let cases: [(&[&str], &str); 4] = [
             (&["study", "fronts", "--subject", "nowhere"], "nowhere"),
+            (&["study", "light_cache", "--subject", "nowhere"], "nowhere"),
+            (&["study", "light_cache", "--subject", "helmet", "--models", "/nowhere/models"], "/nowhere/models"),
             (&["study", "fronts", "--conditions", "/nowhere/absent.toml"], "absent.toml"),
         ];
         for (arguments, named) in cases {
