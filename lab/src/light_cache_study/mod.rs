@@ -29,6 +29,7 @@ const LOOK_UP_SCENES: [&str; 4] = ["FlightHelmet", EXPENSIVE_SCENE, "courtyard",
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   myriorama-lab study light_cache --models models/ --strict   exit status 1 when a check falls short
+  myriorama-lab study light_cache --models models/ --views 1  the figures of docs/benchmarks.md
   myriorama-lab study light_cache --quick --subject courtyard")]
 pub struct LightCacheArgs {
     #[command(flatten)]
@@ -39,9 +40,13 @@ pub struct LightCacheArgs {
     /// A folder with the models FlightHelmet, lamborghini, ingenuity and threejs-shaderball, or with subfolders that have them
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
-    /// Measures a few scenes, in two views
+    /// Measures a few scenes, in two views unless --views is given
     #[arg(long)]
     quick: bool,
+    /// Views of a scene, from the first of eight places on an orbit
+    #[arg(long, default_value_t = 8, default_value_if("quick", "true", "2"), value_name = "N",
+        value_parser = clap::value_parser!(u8).range(1..=8))]
+    pub views: u8,
     /// Only subjects whose names contain this text, in any case
     #[arg(long = "subject", value_name = "TEXT", default_value = "")]
     subject: String,
@@ -66,18 +71,17 @@ pub fn run(args: &LightCacheArgs) -> anyhow::Result<Outcome> {
     if subjects.is_empty() && conditions.is_empty() {
         return Err(BadInput(format!("no subject's name contains {:?}", args.subject)).into());
     }
-    let view_count = if args.quick { 2 } else { 8 };
     let engine = GpuEngine::shared(args.device.device)?;
     let stand = Stand::new(&engine, false);
     let progress = bar("scenes", subjects.len() + conditions.len());
     let mut report = Report::new("Myriorama study: light_cache", engine.device_name());
     report.version("myriorama", env!("CARGO_PKG_VERSION"));
-    report.parameter("views", format!("{view_count} of {VIEW_PX}, {SAMPLES_A_PIXEL} samples a pixel"));
+    report.parameter("views", format!("{} of {VIEW_PX}, {SAMPLES_A_PIXEL} samples a pixel", args.views));
     report.parameter("lighting", LIGHTING);
     let mut results = Vec::new();
     for subject in subjects {
         progress.set_message(subject.name);
-        results.push(measure(&stand, &subject, view_count).context(subject.name)?);
+        results.push(measure(&stand, &subject, args.views.into()).context(subject.name)?);
         progress.inc(1);
     }
     if !results.is_empty() {
