@@ -10,7 +10,7 @@ use crate::fronts::command::{self as fronts, FrontsArgs};
 use crate::impostors::command::{self as impostors, ImpostorsArgs};
 use crate::lages::{self, LagesArgs};
 use crate::layered::command::{self as layered, LayeredArgs};
-use crate::light_cache_study::command::{self as light_cache, LightCacheArgs};
+use crate::light_cache_study::{self as light_cache, LightCacheArgs};
 use crate::placement::command::{self as placement, PlacementArgs};
 use crate::planner_study::command::{self as planner_study, PlannerArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};

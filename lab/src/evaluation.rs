@@ -165,7 +165,7 @@ fn evaluation(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, 
 /// Views differ in size, or a reference has no depth.
 pub fn mean_errors(references: &[View], tests: &[View]) -> anyhow::Result<[PictureErrors; 2]> {
     let errors = |(reference, test): (&View, &View)| PictureErrors::of(reference, &Rgb8Image::of_view(test)?);
-    let errors = references.iter().zip(tests).map(errors).collect::<Result<Vec<_>, _>>()?;
+    let errors = references.par_iter().zip(tests).map(errors).collect::<Result<Vec<_>, _>>()?;
     let mean = |part: usize| {
         let mean = |value: fn(&PictureErrors) -> f64| {
             errors.iter().map(|e| value(&e[part])).sum::<f64>() / errors.len() as f64

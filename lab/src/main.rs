@@ -70,6 +70,7 @@ fn main() -> ExitCode {
 #[cfg(test)]
 mod command_line_tests {
     use super::*;
+    use crate::command::StudyCommand;
 
     fn parsed(arguments: &[&str]) -> Result<Cli, clap::Error> {
         Cli::try_parse_from([&["myriorama-lab"], arguments].concat())
@@ -77,8 +78,10 @@ mod command_line_tests {
 
     #[test]
     fn input_that_cannot_be_used_is_named_with_status_2() {
-        let cases: [(&[&str], &str); 2] = [
+        let cases: [(&[&str], &str); 4] = [
             (&["study", "fronts", "--subject", "nowhere"], "nowhere"),
+            (&["study", "light_cache", "--subject", "nowhere"], "nowhere"),
+            (&["study", "light_cache", "--subject", "helmet", "--models", "/nowhere/models"], "/nowhere/models"),
             (&["study", "fronts", "--conditions", "/nowhere/absent.toml"], "absent.toml"),
         ];
         for (arguments, named) in cases {
@@ -89,6 +92,21 @@ mod command_line_tests {
         }
         let refused = parsed(&["bench", "scaling", "--quota", "0"]).unwrap_err();
         assert!(refused.exit_code() == 2 && refused.to_string().contains("0.01 to 64"), "{refused}");
+        let refused = parsed(&["study", "light_cache", "--views", "9"]).unwrap_err();
+        assert!(refused.exit_code() == 2 && refused.to_string().contains("1..=8"), "{refused}");
+    }
+
+    #[test]
+    fn a_quick_study_of_light_cache_has_fewer_views_unless_their_number_is_given() {
+        let views = |options: &[&str]| {
+            let LabCommand::Study(study) = parsed(&[&["study", "light_cache"], options].concat()).unwrap().command
+            else {
+                panic!("a study");
+            };
+            let StudyCommand::LightCache(args) = *study else { panic!("light_cache") };
+            args.views
+        };
+        assert_eq!([views(&[]), views(&["--quick"]), views(&["--quick", "--views", "1"])], [8, 2, 1]);
     }
 
     #[test]

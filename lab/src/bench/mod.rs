@@ -15,7 +15,7 @@ mod rays;
 mod run;
 mod sampling;
 mod throughput;
-mod timing;
+pub(crate) mod timing;
 mod view_cost;
 
 pub use args::BenchArgs;

@@ -15,6 +15,14 @@ pub fn bd_time(old: &[Point], new: &[Point]) -> Option<f64> {
     (from < to).then(|| (new.mean(from, to) - old.mean(from, to)).exp() - 1.0)
 }
 
+/// The least time at which an error is reached, between points with the same interpolation as [`bd_time`]; `None` where the
+/// front has fewer than two points, or none that reaches the error.
+pub fn time_at(points: &[Point], error: f64) -> Option<f64> {
+    let curve = curve(points)?;
+    let [least, greatest] = curve.range();
+    (error >= least).then(|| curve.at(error.min(greatest)).exp())
+}
+
 /// The logarithm of the time over the error.
 fn curve(points: &[Point]) -> Option<Pchip> {
     let front = pareto_front(points, [Better::Low, Better::Low]);
@@ -73,6 +81,16 @@ mod tests {
         assert!((bd_time(&slower, &old).unwrap() + 0.5).abs() < 1e-12);
         let beaten = [old.clone(), points(&[9.0], &[0.25])].concat();
         assert_eq!(bd_time(&beaten, &old), Some(0.0), "a point that another beats does not count");
+    }
+
+    #[test]
+    fn an_error_is_reached_between_the_times_of_its_neighbours() {
+        let front = points(&[1.0, 2.0, 4.0], &[0.4, 0.2, 0.1]);
+        let between = time_at(&front, 0.15).unwrap();
+        assert!((2.3..3.3).contains(&between), "{between}");
+        assert!((time_at(&front, 0.2).unwrap() - 2.0).abs() < 1e-12);
+        assert!((time_at(&front, 0.5).unwrap() - 1.0).abs() < 1e-12, "the first point is better already");
+        assert_eq!(time_at(&front, 0.05), None);
     }
 
     #[test]

@@ -4,3 +4,5 @@ mod bd_time;
 pub mod command;
 mod fronts;
 mod pchip;
+
+pub use bd_time::time_at;

@@ -25,6 +25,11 @@ impl Pchip {
         [self.x[0], self.x[self.x.len() - 1]]
     }
 
+    /// y at an x within the range.
+    pub fn at(&self, x: f64) -> f64 {
+        self.value(x, x, x)
+    }
+
     /// The mean of y from one x to a greater one, both within the range.
     pub fn mean(&self, from: f64, to: f64) -> f64 {
         let inner = self.x.iter().copied().filter(|x| (from..to).contains(x) && *x > from);

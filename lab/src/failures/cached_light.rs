@@ -1,16 +1,19 @@
 //! Views whose light comes from samples, beside views that are drawn directly.
 
+use std::sync::Arc;
+
 use depth_image::{
     DepthImage, Environment, Illumination, Light, LightCacheQuality, PinholeCamera, ProvenanceKind, View, ViewPlanes,
     linear_from_srgb8,
 };
 use glam::{Affine3A, UVec2, Vec2, Vec3};
-use render::{DrawWork, GpuScene, Lighting, SamplePlanes};
+use render::{DrawWork, GpuScene, LightCache, Lighting, SamplePlanes, Visibility};
 use scene::procedural::{quad, unit_cube};
 use scene::{Instance, Scene};
 
 use super::measures::{depths, is_kind, mean, share};
 use super::stand::{Stand, pinholes, work};
+use crate::reference_views::encoded_and_decoded;
 
 /// Of 8-bit colours.
 const CLEAR_DIFFERENCE: f64 = 16.0;
@@ -22,11 +25,14 @@ pub struct Cuboid {
     pub size_m: Vec3,
 }
 
-/// A scene under one lighting at one moment.
+/// A scene under one lighting at one moment. Views look light up in samples where there are any.
+#[derive(Clone)]
 pub struct LitScene<'s> {
     stand: &'s Stand,
-    scene: GpuScene,
+    scene: Arc<GpuScene>,
     lighting: Lighting,
+    samples: Option<(Arc<LightCache>, LightCacheQuality)>,
+    visibility: Visibility,
     pub scene_time_s: f32,
 }
 
@@ -60,18 +66,63 @@ pub fn sun(towards: Vec3) -> Illumination {
 }
 
 impl<'s> LitScene<'s> {
+    /// Surfaces are found by triangles.
     pub fn new(stand: &'s Stand, scene: &Scene, lighting: &str) -> anyhow::Result<Self> {
-        Ok(Self { stand, scene: stand.upload(scene)?, lighting: lighting.parse()?, scene_time_s: 0.0 })
+        Ok(Self {
+            stand,
+            scene: Arc::new(stand.upload(scene)?),
+            lighting: lighting.parse()?,
+            samples: None,
+            visibility: Visibility::Triangles,
+            scene_time_s: 0.0,
+        })
+    }
+
+    /// Surfaces are found by rays if that is faster in this view.
+    pub fn by_faster_way(mut self, camera: &PinholeCamera) -> anyhow::Result<Self> {
+        let choice = self.stand.engine().renderer.choice(&self.scene, camera, self.scene_time_s)?;
+        if choice.rays_are_faster() {
+            self.visibility = Visibility::Rays;
+        }
+        Ok(self)
+    }
+
+    /// The scene in another light, without samples.
+    pub fn in_light(&self, lighting: &str) -> anyhow::Result<Self> {
+        Ok(Self { lighting: lighting.parse()?, samples: None, ..self.clone() })
+    }
+
+    /// The scene with light from samples.
+    pub fn with_samples(&self, images: &[DepthImage], quality: LightCacheQuality) -> anyhow::Result<Self> {
+        let work = self.work();
+        let cache = self.stand.engine().renderer.upload_light(work.scene, work.lighting, images, work.turn)?;
+        Ok(Self { samples: Some((Arc::new(cache), quality)), ..self.clone() })
     }
 
     fn work(&self) -> DrawWork<'_> {
-        DrawWork { scene_time_s: self.scene_time_s, ..work(&self.scene, self.lighting) }
+        DrawWork { scene_time_s: self.scene_time_s, visibility: self.visibility, ..work(&self.scene, self.lighting) }
     }
 
-    /// Samples of light.
+    /// Samples of light. They hold no reflections: what mirrors show is each view's own.
     pub fn samples(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
         let planes = SamplePlanes { light: true, ..SamplePlanes::default() };
-        Ok(self.stand.engine().renderer.draw_depth_images(self.work(), &pinholes(cameras), planes)?)
+        let lighting = self.lighting.without_reflections().unwrap_or(self.lighting);
+        let work = DrawWork { lighting, ..self.work() };
+        Ok(self.stand.engine().renderer.draw_depth_images(work, &pinholes(cameras), planes)?)
+    }
+
+    /// Samples of light as compositors decode them.
+    pub fn decoded_samples(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
+        self.samples(cameras)?.iter().map(encoded_and_decoded).collect()
+    }
+
+    pub fn views(&self, cameras: &[PinholeCamera], planes: ViewPlanes) -> anyhow::Result<Vec<View>> {
+        let renderer = &self.stand.engine().renderer;
+        let views = match &self.samples {
+            Some((cache, quality)) => renderer.draw_cached_views(self.work(), cache, *quality, cameras, planes),
+            None => renderer.draw_views(self.work(), cameras, planes),
+        };
+        Ok(views?)
     }
 
     /// A view with the light of samples where they know it.
@@ -81,15 +132,12 @@ impl<'s> LitScene<'s> {
         quality: LightCacheQuality,
         camera: PinholeCamera,
     ) -> anyhow::Result<View> {
-        let renderer = &self.stand.engine().renderer;
-        let work = self.work();
-        let cache = renderer.upload_light(work.scene, work.lighting, images, work.turn)?;
-        Ok(renderer.draw_cached_views(work, &cache, quality, &[camera], ViewPlanes::ALL)?.remove(0))
+        Ok(self.with_samples(images, quality)?.views(&[camera], ViewPlanes::ALL)?.remove(0))
     }
 
     /// A view that is lit by its own rays.
     pub fn direct(&self, camera: PinholeCamera) -> anyhow::Result<View> {
-        Ok(self.stand.engine().renderer.draw_views(self.work(), &[camera], ViewPlanes::ALL)?.remove(0))
+        Ok(self.views(&[camera], ViewPlanes::ALL)?.remove(0))
     }
 }
 

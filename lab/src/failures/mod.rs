@@ -1,6 +1,6 @@
 //! Where methods fail, as data: curves with the shapes that they must have, in one list for tests and for the study.
 
-mod cached_light;
+pub mod cached_light;
 pub mod command;
 mod cubes;
 mod curve;

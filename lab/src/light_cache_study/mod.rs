@@ -1,8 +1,191 @@
 //! `myriorama-lab study light_cache`: views whose light comes from samples, against direct drawing at equal error.
 
-pub mod command;
-mod conditions;
 mod measure;
-mod report;
-mod stage;
 mod subjects;
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use app_core::exit::{BadInput, Outcome};
+use app_core::progress::bar;
+use app_core::setup::DeviceArgs;
+use clap::Args;
+use engine::GpuEngine;
+use node::Engine as _;
+use report::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
+
+use crate::failures::stand::Stand;
+use crate::section;
+use crate::statistics::{geometric_mean, mean_and_variation, quantile};
+use measure::{REFERENCE, Row, SAMPLES_A_PIXEL, SHARED, SceneResult, check, measure};
+use subjects::{CONDITIONS, Condition, LIGHTING, OUTSIDE_SCENES, Subject, VIEW_PX, scene_names};
+
+/// The scene that gains most.
+const EXPENSIVE_SCENE: &str = "tree-terrain-500k";
+/// Scenes whose look-ups are compared with their surfaces.
+const LOOK_UP_SCENES: [&str; 4] = ["FlightHelmet", EXPENSIVE_SCENE, "courtyard", "urban"];
+
+/// Measures views with light from samples against direct drawing with few rays, at equal error.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  myriorama-lab study light_cache --models models/ --strict   exit status 1 when a check falls short
+  myriorama-lab study light_cache --models models/ --views 1  the figures of docs/benchmarks.md
+  myriorama-lab study light_cache --quick --subject courtyard")]
+pub struct LightCacheArgs {
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// Where the report goes
+    #[arg(long, default_value = "out/study/light_cache", value_name = "DIR")]
+    out: PathBuf,
+    /// A folder with the models FlightHelmet, lamborghini, ingenuity and threejs-shaderball, or with subfolders that have them
+    #[arg(long, value_name = "DIR")]
+    models: Option<PathBuf>,
+    /// Measures a few scenes, in two views unless --views is given
+    #[arg(long)]
+    quick: bool,
+    /// Views of a scene, from the first of eight places on an orbit
+    #[arg(long, default_value_t = 8, default_value_if("quick", "true", "2"), value_name = "N",
+        value_parser = clap::value_parser!(u8).range(1..=8))]
+    pub views: u8,
+    /// Only subjects whose names contain this text, in any case
+    #[arg(long = "subject", value_name = "TEXT", default_value = "")]
+    subject: String,
+    /// Exit status 1 when a check falls short
+    #[arg(long)]
+    strict: bool,
+}
+
+/// Measures all subjects and writes the report.
+///
+/// # Errors
+/// There is no such subject, the folder of models lacks one, the device fails, or the report cannot be written.
+pub fn run(args: &LightCacheArgs) -> anyhow::Result<Outcome> {
+    let is_wanted = |name: &str| name.to_lowercase().contains(&args.subject.to_lowercase());
+    let models = args.models.as_deref();
+    let mut subjects = Vec::new();
+    for name in scene_names(args.quick).into_iter().filter(|name| is_wanted(name)) {
+        subjects.extend(Subject::new(name, models)?);
+    }
+    let conditions = CONDITIONS.iter().filter(|condition| !args.quick && is_wanted(condition.name));
+    let conditions: Vec<&Condition> = conditions.collect();
+    if subjects.is_empty() && conditions.is_empty() {
+        return Err(BadInput(format!("no subject's name contains {:?}", args.subject)).into());
+    }
+    let engine = GpuEngine::shared(args.device.device)?;
+    let stand = Stand::new(&engine, false);
+    let progress = bar("scenes", subjects.len() + conditions.len());
+    let mut report = Report::new("Myriorama study: light_cache", engine.device_name());
+    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    report.parameter("views", format!("{} of {VIEW_PX}, {SAMPLES_A_PIXEL} samples a pixel", args.views));
+    report.parameter("lighting", LIGHTING);
+    let mut results = Vec::new();
+    for subject in subjects {
+        progress.set_message(subject.name);
+        results.push(measure(&stand, &subject, args.views.into()).context(subject.name)?);
+        progress.inc(1);
+    }
+    if !results.is_empty() {
+        add_to(&mut report, results)?;
+    }
+    for condition in conditions {
+        progress.set_message(condition.name);
+        check(&stand, condition, models, &mut report).context(condition.name)?;
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    section::finish(report, Vec::new(), &args.out, args.strict)
+}
+
+fn add_to(report: &mut Report, results: Vec<SceneResult>) -> anyhow::Result<()> {
+    let columns = [
+        ("scene", ""),
+        ("light", ""),
+        ("a view", "ms"),
+        ("PSNR", "dB"),
+        ("FLIP", ""),
+        ("FLIP against the truth", ""),
+        ("unknown", "%"),
+        ("gain at equal FLIP", "×"),
+    ];
+    let mut rows = Table::new("Views of each scene", &columns);
+    let mut look_ups = Table::new("`draft`, 1 sample a pixel", &[("scene", ""), ("look-up over surfaces", "×")]);
+    for result in &results {
+        for row in result.direct.iter().chain(&result.qualities) {
+            let gain = match result.direct_ms(row) {
+                _ if row.unknown.is_none() => Cell::Missing,
+                Some(direct_ms) => Cell::from(direct_ms / row.ms),
+                None => format!("> {:.2}", result.direct[REFERENCE].ms / row.ms).into(),
+            };
+            let unknown_percent = row.unknown.map(|share| share * 100.0);
+            let numbers = [row.ms, row.psnr_db, row.flip, row.truth_flip].map(Cell::from);
+            let names = [result.name.into(), row.name.as_str().into()];
+            rows.push(names.into_iter().chain(numbers).chain([unknown_percent.into(), gain]))?;
+        }
+        look_ups.push([result.name.into(), result.look_up_ratio.into()])?;
+    }
+    report.tables = vec![rows, look_ups];
+    report.charts = results.iter().map(|result| chart(result).into()).collect();
+    report.checks = [quality_checks(&results), gain_checks(&results), time_checks(&results)].concat();
+    report.pictures = results.into_iter().map(|result| result.pictures).collect();
+    Ok(())
+}
+
+fn chart(result: &SceneResult) -> XyChart {
+    let point = |row: &Row| (row.ms, row.truth_flip);
+    let name = format!("FLIP over time, {}", result.name);
+    let mut chart = XyChart::new(name, Axis::log("a view", "ms"), Axis::log("FLIP", ""));
+    chart = chart.with(Series::line("direct", result.direct.iter().map(point)));
+    for row in &result.qualities {
+        chart = chart.with(Series::points(row.name.clone(), [point(row)]));
+    }
+    chart.note = "Errors over the foreground against a truth with other noise.".to_owned();
+    chart
+}
+
+fn quality_checks(results: &[SceneResult]) -> Vec<Check> {
+    let mut checks = Vec::new();
+    for (quality, mean_db, least_db, most_flip) in [("balanced", 43.0, 38.0, 0.022), ("fast", 39.0, 34.0, 0.033)] {
+        let rows = results.iter().flat_map(|result| &result.qualities).filter(|row| row.name == quality);
+        let (psnr_db, flip): (Vec<f64>, Vec<f64>) = rows.map(|row| (row.psnr_db, row.flip)).unzip();
+        let name = |what: &str| format!("`{quality}`, {} scenes: {what}", results.len());
+        let (mean, _) = mean_and_variation(&psnr_db);
+        checks.push(Check::new(name("mean PSNR"), mean, "dB", Bar::AtLeast(mean_db)));
+        checks.push(Check::new(name("least PSNR"), quantile(psnr_db, 0.0), "dB", Bar::AtLeast(least_db)));
+        checks.push(Check::new(name("greatest FLIP"), quantile(flip, 1.0), "", Bar::AtMost(most_flip)));
+    }
+    checks
+}
+
+fn gain_checks(results: &[SceneResult]) -> Vec<Check> {
+    let best = |result: &SceneResult| {
+        let gain = |row: &Row| result.direct_ms(row).unwrap_or(result.direct[REFERENCE].ms) / row.ms;
+        result.qualities.iter().map(gain).fold(0.0, f64::max)
+    };
+    let outside = || results.iter().filter(|result| !result.name.contains(", inside"));
+    let gains: Vec<f64> = outside().map(best).collect();
+    let expensive = outside().find(|result| result.name == EXPENSIVE_SCENE).map(best);
+    let all = (gains.len() == OUTSIDE_SCENES).then(|| geometric_mean(&gains)).flatten();
+    let not_all = format!("{} of {OUTSIDE_SCENES} outside scenes are measured", gains.len());
+    let least = gains.into_iter().reduce(f64::min);
+    let name = |what: &str| format!("gain of the best quality at equal FLIP, {what}");
+    vec![
+        Check::maybe(name(EXPENSIVE_SCENE), expensive, "×", Bar::AtLeast(2.5), "the scene is not measured"),
+        Check::maybe(name("geometric mean"), all, "×", Bar::AtLeast(1.3), not_all),
+        Check::maybe(name("least"), least, "×", Bar::AtLeast(0.8), "no outside scene is measured"),
+    ]
+}
+
+fn time_checks(results: &[SceneResult]) -> Vec<Check> {
+    let compared = results.iter().filter(|result| LOOK_UP_SCENES.contains(&result.name));
+    let look_ups: Vec<f64> = compared.map(|result| result.look_up_ratio).collect();
+    let all = (look_ups.len() == LOOK_UP_SCENES.len()).then(|| geometric_mean(&look_ups)).flatten();
+    let missing = format!("{} of {} are measured", look_ups.len(), LOOK_UP_SCENES.join(", "));
+    let shared = results.iter().map(|result| result.direct[SHARED].ms / result.direct[REFERENCE].ms);
+    let shared = geometric_mean(&shared.collect::<Vec<_>>());
+    let least_db = quantile(results.iter().map(|result| result.direct[SHARED].psnr_db).collect(), 0.0);
+    vec![
+        Check::maybe("`draft`, 1 sample a pixel: time of look-up over surfaces", all, "×", Bar::AtMost(0.9), missing),
+        Check::maybe("direct: time with rays a pixel over rays a position", shared, "×", Bar::AtMost(0.45), "no scene"),
+        Check::new("direct with rays a pixel: least PSNR", least_db, "dB", Bar::AtLeast(40.0)),
+    ]
+}

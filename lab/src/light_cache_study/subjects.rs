@@ -1,141 +1,144 @@
-//! The scenes of the study, and where their views and sample cameras stand.
+//! The subjects of the study: scenes, and where their views and sample cameras stand.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Context as _;
 use app_core::exit::BadInput;
 use app_core::setup::{SceneArgs, Setup};
-use depth_image::{PinholeCamera, ViewCell};
-use glam::{UVec2, Vec2, Vec3};
+use depth_image::{EnvironmentMap, Light, PinholeCamera, ViewCell};
+use glam::{UVec2, Vec3};
 use sampling::Impostors;
-use scene::SceneSpec;
+use scene::{Scene, SceneSpec};
 
 use crate::bench::fronts::models_of;
+use crate::failures::cached_light::LitScene;
+use crate::failures::stand::Stand;
 
-/// Columns and rows of a view.
+/// The lighting of samples and of views that use them.
+pub const LIGHTING: &str = "soft 16, occlusion 16";
 pub const VIEW_PX: UVec2 = UVec2::new(640, 360);
+/// Views are the first places of an orbit of so many.
+const PLACES: usize = 8;
+/// Scenes that are seen from outside: models of a folder, and built-in ones.
 const MODELS: [&str; 4] = ["FlightHelmet", "lamborghini", "ingenuity", "threejs-shaderball"];
 const BUILT_IN: [&str; 4] = ["urban", "courtyard", "bird-nest", "tree-terrain-500k"];
-/// The models and built-in scenes of the quick form.
-const QUICK_MODELS: [&str; 1] = ["lamborghini"];
-const QUICK_BUILT_IN: [&str; 2] = ["courtyard", "tree-terrain-125k"];
-/// Scenes that are seen from outside, in the full form.
 pub const OUTSIDE_SCENES: usize = MODELS.len() + BUILT_IN.len();
-/// Eye heights inside scenes: in the middle of a street, and in a corner of the yard.
-const INSIDE: [(&str, Pose); 2] = [
-    (
-        "urban",
-        Pose {
-            eye_in_world: Vec3::new(-61.0, 1.7, 30.0),
-            target_in_world: Vec3::new(-56.0, 6.0, -30.0),
-            half_edges_m: Vec2::new(1.5, 0.5),
-        },
-    ),
-    (
-        "courtyard",
-        Pose {
-            eye_in_world: Vec3::new(-1.2, 1.2, 1.3),
-            target_in_world: Vec3::new(0.4, 0.6, -0.4),
-            half_edges_m: Vec2::new(0.3, 0.2),
-        },
-    ),
+const QUICK: [&str; 3] = ["lamborghini", "courtyard", "tree-terrain-125k"];
+/// View cells inside scenes: in the middle of a street, and in a corner of the yard.
+const INSIDE: [Inside; 2] = [
+    Inside { name: "urban, inside", eyes: [[-62.5, 1.2, 29.88], [-59.5, 2.2, 30.12]], towards: [5.0, 4.3, -60.0] },
+    Inside { name: "courtyard, inside", eyes: [[-1.42, 1.0, 1.09], [-0.98, 1.4, 1.51]], towards: [1.6, -0.6, -1.7] },
 ];
-const POSE_FOV_Y_RAD: f32 = 1.0;
+const INSIDE_FOV_Y_RAD: f32 = 1.0;
+/// Subjects of a single check.
+pub const CONDITIONS: [Condition; 5] = [
+    Condition { name: "snake, moving", is_moving: true, terms: "", change: Ok },
+    Condition { name: "tree-terrain-125k-wind, moving", is_moving: true, terms: "", change: Ok },
+    Condition { name: "mirror-hall, 2 reflections", is_moving: false, terms: ", reflections 2", change: Ok },
+    Condition { name: "lamborghini, environment map", is_moving: false, terms: "", change: under_sky },
+    Condition { name: "courtyard, 40 lamps", is_moving: false, terms: "", change: with_lamps },
+];
 
-/// A scene and how it is seen.
-#[derive(Debug, Clone)]
+/// A scene. The name says after a comma what is special about the subject, if anything is.
 pub struct Subject {
-    pub name: String,
-    pub scene: SceneSpec,
-    /// The place of an eye inside the scene; without one the scene is seen from outside.
-    pub pose: Option<Pose>,
+    pub name: &'static str,
+    scene: SceneSpec,
 }
 
-/// A place inside a scene.
-#[derive(Debug, Clone, Copy)]
-pub struct Pose {
-    eye_in_world: Vec3,
-    target_in_world: Vec3,
-    /// Half the width and height of the view cell about the eye.
-    half_edges_m: Vec2,
+/// A view cell inside a scene: eyes at opposite corners, and their common direction, in world space.
+struct Inside {
+    name: &'static str,
+    eyes: [[f32; 3]; 2],
+    towards: [f32; 3],
 }
 
-/// Cameras of views, and of the samples that serve the views.
-pub struct Viewpoints {
+type Change = fn(Scene) -> anyhow::Result<Scene>;
+
+pub struct Condition {
+    pub name: &'static str,
+    pub is_moving: bool,
+    /// Terms of the lighting beside those of all subjects.
+    pub terms: &'static str,
+    pub change: Change,
+}
+
+/// A scene on the device, and the cameras of its views and of the samples that serve them.
+pub struct Stage<'s> {
+    pub lit: LitScene<'s>,
+    pub period_s: f32,
     pub views: Vec<PinholeCamera>,
     pub samples: Vec<PinholeCamera>,
 }
 
-impl Subject {
-    /// A scene that is seen from outside.
-    pub fn outside(name: &str, scene: SceneSpec) -> Self {
-        Self { name: name.to_owned(), scene, pose: None }
-    }
-
-    /// Loads the scene.
-    pub fn load(&self) -> anyhow::Result<Setup> {
-        let args = SceneArgs { impostors: Impostors::None, ..SceneArgs::new(self.scene.clone()) };
-        args.load().with_context(|| self.name.clone())
-    }
-
-    /// `count` views on an orbit within the view cell, and its four sample cameras. A texel has a view pixel's focal length.
-    pub fn viewpoints(&self, setup: &Setup, count: usize) -> anyhow::Result<Viewpoints> {
-        let corners = self.pose.map_or_else(|| setup.around.clone(), |pose| pose.corners(setup));
-        let views = ViewCell::between(&corners).context("no sample cameras")?.orbit(count, VIEW_PX);
-        let view = views.first().context("no views")?;
-        let fitted = |camera: PinholeCamera| {
-            let size_px = camera.size_px.as_vec2() * (view.focal_px.y / camera.focal_px.y);
-            camera.resized(size_px.round().as_uvec2())
-        };
-        Ok(Viewpoints { samples: corners.into_iter().map(fitted).collect(), views })
-    }
-}
-
-impl Pose {
-    /// Cameras at the corners of the cell, in rows from the bottom left.
-    fn corners(self, setup: &Setup) -> Vec<PinholeCamera> {
-        let middle =
-            PinholeCamera::looking_at(self.eye_in_world, self.target_in_world, Vec3::Y, POSE_FOV_Y_RAD, VIEW_PX);
-        let right = middle.world_from_camera * Vec3::X * self.half_edges_m.x;
-        let corner = |[x, y]: [f32; 2]| PinholeCamera {
-            eye_in_world: middle.eye_in_world + right * x + Vec3::Y * (self.half_edges_m.y * y),
-            near_m: setup.scene.bounds().near_m(),
-            ..middle
-        };
-        [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]].map(corner).to_vec()
-    }
-}
-
 /// The scenes that are compared with direct drawing.
-///
-/// # Errors
-/// The folder lacks a model.
-pub fn subjects(models: Option<&Path>, is_quick: bool) -> anyhow::Result<Vec<Subject>> {
-    let model_names: &[&str] = if is_quick { &QUICK_MODELS } else { &MODELS };
-    let built_in: &[&str] = if is_quick { &QUICK_BUILT_IN } else { &BUILT_IN };
-    let mut subjects = Vec::new();
-    if let Some(folder) = models {
-        for name in model_names {
-            subjects.push(Subject::outside(name, model(folder, name)?));
-        }
-    }
-    for name in built_in {
-        subjects.push(Subject::outside(name, name.parse()?));
-    }
-    let inside: &[(&str, Pose)] = if is_quick { &[] } else { &INSIDE };
-    for (name, pose) in inside {
-        subjects.push(Subject { name: format!("{name}, inside"), scene: name.parse()?, pose: Some(*pose) });
-    }
-    Ok(subjects)
+pub fn scene_names(is_quick: bool) -> Vec<&'static str> {
+    let inside = INSIDE.map(|cell| cell.name);
+    if is_quick { QUICK.to_vec() } else { [&MODELS[..], &BUILT_IN, &inside].concat() }
 }
 
-/// The model of this name in a folder.
-///
-/// # Errors
-/// The folder lacks it.
-pub fn model(folder: &Path, name: &str) -> anyhow::Result<SceneSpec> {
-    let is_named = |path: &PathBuf| path.file_stem().is_some_and(|stem| stem == name);
-    let found = models_of(folder, usize::MAX)?.into_iter().find(is_named);
-    let missing = || BadInput(format!("{}: no model {name}", folder.display()));
-    Ok(SceneSpec::File(found.ok_or_else(missing)?))
+impl Subject {
+    /// The subject of a name; `None` for a model without a folder of models.
+    pub fn new(name: &'static str, models: Option<&Path>) -> anyhow::Result<Option<Self>> {
+        let scene_name = name.split(',').next().unwrap_or(name);
+        let mut scene = scene_name.parse()?;
+        if let SceneSpec::File(file) = &mut scene {
+            let Some(folder) = models else { return Ok(None) };
+            let mut models = models_of(folder, usize::MAX)?.into_iter();
+            let model = models.find(|model| model.file_stem().is_some_and(|stem| stem == scene_name));
+            *file = model.ok_or_else(|| BadInput(format!("{}: no model {scene_name}", folder.display())))?;
+        }
+        Ok(Some(Self { name, scene }))
+    }
+
+    /// Puts the scene on the device. A texel of its four sample images has a view pixel's focal length.
+    pub fn stage<'s>(&self, stand: &'s Stand, view_count: usize, change: Change) -> anyhow::Result<Stage<'s>> {
+        let args = SceneArgs { impostors: Impostors::None, ..SceneArgs::new(self.scene.clone()) };
+        let Setup { scene, mut around, .. } = args.load()?;
+        if let Some(cell) = INSIDE.iter().find(|cell| cell.name == self.name) {
+            around = cell.corners(scene.bounds().near_m())?;
+        }
+        let mut views = ViewCell::between(&around).context("no sample cameras")?.orbit(PLACES, VIEW_PX);
+        views.truncate(view_count);
+        for camera in &mut around {
+            let size_px = camera.size_px.as_vec2() * (views[0].focal_px.y / camera.focal_px.y);
+            *camera = camera.resized(size_px.round().as_uvec2());
+        }
+        let period_s = scene.period_s().unwrap_or(0.0);
+        let lit = LitScene::new(stand, &change(scene)?, LIGHTING)?.by_faster_way(&views[0])?;
+        Ok(Stage { lit, period_s, views, samples: around })
+    }
+}
+
+impl Inside {
+    fn corners(&self, near_m: f32) -> anyhow::Result<Vec<PinholeCamera>> {
+        let camera = |eye: [f32; 3]| {
+            let target = Vec3::from(eye) + Vec3::from(self.towards);
+            let aimed = PinholeCamera::looking_at(eye.into(), target, Vec3::Y, INSIDE_FOV_Y_RAD, VIEW_PX);
+            PinholeCamera { near_m, ..aimed }
+        };
+        Ok(ViewCell::between(&self.eyes.map(camera)).context("a view cell")?.grid(2, 2, VIEW_PX))
+    }
+}
+
+/// A blue sky over brown ground, with a sun of nine texels.
+fn under_sky(scene: Scene) -> anyhow::Result<Scene> {
+    let mut texels = [[Vec3::new(0.3, 0.5, 0.9); 1024], [Vec3::new(0.15, 0.12, 0.08); 1024]].concat();
+    for row in 7..=9 {
+        texels[64 * row + 39..][..3].fill(Vec3::splat(60.0));
+    }
+    Ok(scene.surrounded_by(EnvironmentMap::new(UVec2::new(64, 32), &texels)?))
+}
+
+/// Lamps of three colours in a grid over the scene.
+fn with_lamps(mut scene: Scene) -> anyhow::Result<Scene> {
+    let bounds = scene.bounds();
+    scene.illumination.lights.clear();
+    for number in 0..40 {
+        let place = Vec3::new((number % 8) as f32 / 7.0, 1.0, (number / 8) as f32 / 4.0);
+        let position_in_world = bounds.min + bounds.size() * (0.3 + 0.4 * place) + Vec3::Y;
+        let mut intensity_linear = Vec3::splat(0.15);
+        intensity_linear[number % 3] = 0.3;
+        scene.illumination.lights.push(Light::Point { position_in_world, intensity_linear, radius_m: 0.1 });
+    }
+    Ok(scene)
 }

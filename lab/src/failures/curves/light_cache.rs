@@ -14,7 +14,6 @@ use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::shape::Shape;
 use crate::failures::stage::{Cell, looking};
 use crate::failures::stand::Stand;
-use crate::reference_views::encoded_and_decoded;
 
 const FLOOR_HALF_M: f32 = 2.5;
 const EYE_HEIGHT_M: f32 = 4.0;
@@ -238,8 +237,7 @@ fn by_range(stand: &Stand, ratios: &[f64]) -> anyhow::Result<Rows> {
     let sample_px = at_density(view_camera.size_px, 0.5);
     rows(ratios, |far_m| {
         let lit = LitScene::new(stand, &card_before_a_wall(far_m as f32), "shadows")?;
-        let images = lit.samples(&[-0.1, 0.1].map(|x| camera(x, sample_px)))?;
-        let decoded = images.iter().map(encoded_and_decoded).collect::<anyhow::Result<Vec<_>>>()?;
+        let decoded = lit.decoded_samples(&[-0.1, 0.1].map(|x| camera(x, sample_px)))?;
         let truth = lit.direct(view_camera)?;
         let balanced = lit.cached(&decoded, Balanced, view_camera)?;
         let fast = lit.cached(&decoded, Fast, view_camera)?;
