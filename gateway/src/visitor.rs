@@ -4,13 +4,14 @@
 //! it on its screen: at most two of each stream are on their way. A picture is never older than one that was sent, and a still
 //! is always of the newest pose.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use axum::extract::ws::WebSocket;
 use client::{ClientError, ClientId, EncodedFrame, PictureQuality, Session};
 use cluster::{Assignment, Policy, Promise, SessionPlan};
 use codec::FrameCodec;
-use depth_image::{Antialias, SampleCamera};
+use depth_image::{Antialias, PinholeCamera, SampleCamera};
 use glam::UVec2;
 use tokio::sync::watch;
 
@@ -25,6 +26,8 @@ use crate::scenes::{SceneError, SceneSessions};
 
 /// The longest age that says something of the link: a page may have been hidden.
 const MAX_AGE_MS: f64 = 10_000.0;
+/// Plans that are remembered.
+const PLANS: usize = 2;
 
 /// Serves a page until it leaves.
 pub(crate) async fn visit(socket: WebSocket, gateway: Arc<Gateway>) {
@@ -51,13 +54,14 @@ async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
         number: gateway.next_visitor(),
         is_moving: false,
         light_step: 0,
-        finished_with: None,
+        made_with: None,
+        is_finished: false,
         most_samples: Antialias::MOST,
         scene,
         max_still_px: gateway.config.max_still_px,
         newest: None,
         sent: 0,
-        plan_epoch: 0,
+        plans: VecDeque::new(),
         promise: None,
         rate: Rate::default(),
     };
@@ -92,16 +96,19 @@ struct Visitor {
     is_moving: bool,
     /// The latest step of light that a still has shown: from 0.
     light_step: u32,
-    /// The sample cameras of the finished still; `None` where there is none, or its plan is over.
-    finished_with: Option<Vec<SampleCamera>>,
+    /// The sample cameras of the last picture; `None` before one, or where its plan is long over.
+    made_with: Option<Vec<SampleCamera>>,
+    /// Whether the last picture has finished light and all samples a pixel, if it is a still.
+    is_finished: bool,
     /// Samples a pixel of a finished still: fewer where the cluster has refused more.
     most_samples: Antialias,
     max_still_px: UVec2,
     newest: Option<Pose>,
     /// The number of the last picture.
     sent: u64,
-    /// The last plan and promise that the page was told of.
-    plan_epoch: u64,
+    /// The last plans that the page was told of, the newest first: pictures may still come under the one before.
+    plans: VecDeque<Assignment>,
+    /// The last promise that it was told of.
     promise: Option<Promise>,
     rate: Rate,
 }
@@ -175,6 +182,9 @@ impl Visitor {
         session: &Session,
         states: &mut watch::Receiver<SessionState>,
     ) -> Result<Option<ClientError>, End> {
+        // Nothing of this session has been sent yet.
+        self.plans.clear();
+        self.is_finished = false;
         self.promise = session.promise();
         self.tell_plan(page, &session.plan())?;
         let client = ClientId::new();
@@ -201,7 +211,7 @@ impl Visitor {
                     }
                 },
                 changed = states.changed() => return changed.map(|()| None).map_err(|_| End::Gone),
-                plan = session.another_plan(self.plan_epoch) => {
+                plan = session.another_plan(self.plan_epoch()) => {
                     self.tell_plan(page, &plan)?;
                     self.renew_still(&plan, &mut motion, &mut still)?;
                 }
@@ -287,12 +297,17 @@ impl Visitor {
             let number = asked.pose.number;
             if asked.pose.still { number == newest } else { number >= self.sent }
         };
-        let plan = session.plan().assignment;
-        let Some(asked) = asked.filter(is_wanted).filter(|asked| !self.is_finished(asked, &cameras_of(&plan, &frame)))
-        else {
+        let cameras = self.cameras_of(&frame);
+        // A plan that came while the finished still was made has asked for it again, from the first step of light.
+        let is_again = |asked: &Asked| {
+            let is_last = asked.pose.still && asked.pose.number == self.sent;
+            is_last && self.is_finished && cameras.is_some() && cameras == self.made_with
+        };
+        let Some(asked) = asked.filter(|asked| is_wanted(asked) && !is_again(asked)) else {
             stream.discard(&frame);
             return Ok(());
         };
+        let plan = session.plan().assignment;
         self.sent = asked.pose.number;
         let (shown, last) = (self.light_step_of(&plan, &frame), self.scene.shown.light_steps - 1);
         let is_own_cell = !frame.header.is_neighbour_cell;
@@ -314,8 +329,9 @@ impl Visitor {
         }
         let samples = frame.header.antialias;
         let is_finished = is_own_cell && (shown == last && samples >= self.most_samples || !asked.pose.still);
-        self.finished_with = cameras_of(&plan, &frame).filter(|_| is_finished);
-        if is_finished && (self.finished_with.is_some() || !asked.pose.still) {
+        let is_of_plan = cameras.is_some() && cameras == cell_cameras(&plan, &frame.request.camera);
+        (self.made_with, self.is_finished) = (cameras, is_finished);
+        if is_finished && (is_of_plan || !asked.pose.still) {
             return Ok(());
         }
         // A visitor that rests would see a neighbouring cell's picture, an earlier plan's, unfinished light or few samples a
@@ -335,10 +351,16 @@ impl Visitor {
         again.map_err(|error| End::Refused(error.to_string()))
     }
 
-    /// Whether the finished still of a pose has been sent: a plan that came while it was made has asked for it again, from the
-    /// first step of light and with one sample a pixel.
-    fn is_finished(&self, asked: &Asked, cameras: &Option<Vec<SampleCamera>>) -> bool {
-        asked.pose.still && asked.pose.number == self.sent && cameras.is_some() && *cameras == self.finished_with
+    /// The epoch of the last plan that the page was told of.
+    fn plan_epoch(&self) -> u64 {
+        self.plans.front().map_or(0, |plan| plan.plan_epoch)
+    }
+
+    /// The sample cameras of a picture, by the plan that it was made under.
+    fn cameras_of(&self, frame: &EncodedFrame) -> Option<Vec<SampleCamera>> {
+        let plan_epoch = frame.header.sample_set_id.plan_epoch;
+        let workload = &self.plans.iter().find(|plan| plan.plan_epoch == plan_epoch)?.workload;
+        Some(workload.sample_cameras[workload.cameras_of_cell(frame.header.cell as usize)?].to_vec())
     }
 
     /// A new plan may have a view cell that is nearer to a visitor who rests: the still is then asked for again.
@@ -351,12 +373,11 @@ impl Visitor {
         let Some(pose) = self.newest.filter(|pose| pose.still && pose.number == self.sent) else { return Ok(()) };
         let camera = self.scene.space.camera(&pose.camera, UVec2::from_array(pose.canvas_px));
         let camera = camera.map_err(|error| End::Refused(error.to_string()))?;
-        let workload = &plan.assignment.workload;
-        let cameras = workload.cameras_of_cell(workload.cell_of(&camera) as usize);
-        if cameras.map(|cameras| workload.sample_cameras[cameras].to_vec()) == self.finished_with {
+        // What is on its way goes on under the new plan.
+        if cell_cameras(&plan.assignment, &camera) == self.made_with {
             return Ok(());
         }
-        if self.finished_with.is_some() {
+        if self.is_finished {
             self.light_step = 0;
         }
         self.ask(pose, motion, still)
@@ -373,10 +394,13 @@ impl Visitor {
     }
 
     fn tell_plan(&mut self, page: &Page, plan: &SessionPlan) -> Result<(), End> {
-        self.plan_epoch = plan.assignment.plan_epoch;
+        if self.plan_epoch() != plan.assignment.plan_epoch {
+            self.plans.push_front(plan.assignment.clone());
+            self.plans.truncate(PLANS);
+        }
         let (policy, reason) = (plan.assignment.policy.to_string(), plan.reason.clone());
         let promise = self.promise.as_ref().map(ToString::to_string);
-        page.tell(&ToPage::Plan { epoch: self.plan_epoch, policy, reason, promise })
+        page.tell(&ToPage::Plan { epoch: self.plan_epoch(), policy, reason, promise })
     }
 
     /// Learns from a picture on the screen.
@@ -404,9 +428,8 @@ fn is_near(plan: &Assignment, frame: &EncodedFrame) -> bool {
     plan.policy == Policy::Direct || plan.workload.has_cell_near(&frame.request.camera)
 }
 
-/// The sample cameras of a frame, if it was made under this plan.
-fn cameras_of(plan: &Assignment, frame: &EncodedFrame) -> Option<Vec<SampleCamera>> {
-    let is_current = plan.plan_epoch == frame.header.sample_set_id.plan_epoch;
-    let cameras = plan.workload.cameras_of_cell(frame.header.cell as usize).filter(|_| is_current)?;
+/// The sample cameras of the cell that a plan has for a view.
+fn cell_cameras(plan: &Assignment, camera: &PinholeCamera) -> Option<Vec<SampleCamera>> {
+    let cameras = plan.workload.cameras_of_cell(plan.workload.cell_of(camera) as usize)?;
     Some(plan.workload.sample_cameras[cameras].to_vec())
 }
