@@ -182,11 +182,7 @@ impl Visitor {
         session: &Session,
         states: &mut watch::Receiver<SessionState>,
     ) -> Result<Option<ClientError>, End> {
-        // Nothing of this session has been sent yet.
-        self.plans.clear();
-        self.is_finished = false;
-        self.promise = session.promise();
-        self.tell_plan(page, &session.plan())?;
+        self.begin(page, session)?;
         let client = ClientId::new();
         let (mut motion, mut still) = (PictureStream::new(session, client), PictureStream::new(session, client));
         if let Some(pose) = self.newest {
@@ -236,6 +232,14 @@ impl Visitor {
                 },
             }
         }
+    }
+
+    /// Nothing of a session has been sent yet.
+    fn begin(&mut self, page: &Page, session: &Session) -> Result<(), End> {
+        self.plans.clear();
+        self.is_finished = false;
+        self.promise = session.promise();
+        self.tell_plan(page, &session.plan())
     }
 
     /// Takes a pose.
