@@ -248,7 +248,7 @@ impl Visitor {
             FromPage::Open { .. } => Err(End::Refused("type: open comes once".to_owned())),
             FromPage::Shown { .. } | FromPage::Received {} => Ok(()),
             FromPage::Pose(pose) => {
-                let last = self.newest.map_or(0, |newest| newest.number);
+                let last = self.newest_number();
                 if pose.number <= last {
                     return Err(End::Refused(format!("number: {} comes after {last}", pose.number)));
                 }
@@ -296,18 +296,8 @@ impl Visitor {
         frame: EncodedFrame,
         asked: Option<Asked>,
     ) -> Result<(), End> {
-        let newest = self.newest.map_or(0, |newest| newest.number);
-        let is_wanted = |asked: &Asked| {
-            let number = asked.pose.number;
-            if asked.pose.still { number == newest } else { number >= self.sent }
-        };
         let cameras = self.cameras_of(&frame);
-        // A plan that came while the finished still was made has asked for it again, from the first step of light.
-        let is_again = |asked: &Asked| {
-            let is_last = asked.pose.still && asked.pose.number == self.sent;
-            is_last && self.is_finished && cameras.is_some() && cameras == self.made_with
-        };
-        let Some(asked) = asked.filter(|asked| is_wanted(asked) && !is_again(asked)) else {
+        let Some(asked) = asked.filter(|asked| self.is_wanted(asked, cameras.as_deref())) else {
             stream.discard(&frame);
             return Ok(());
         };
@@ -328,7 +318,7 @@ impl Visitor {
             // Another cell's light begins anew.
             self.light_step = if is_own_cell { self.light_step.max(shown) } else { 0 };
         }
-        if asked.pose.number != newest {
+        if asked.pose.number != self.newest_number() {
             return Ok(());
         }
         let samples = frame.header.antialias;
@@ -353,6 +343,22 @@ impl Visitor {
         let quality = PictureQuality { codec: frame.header.codec, antialias };
         let again = stream.ask(asked.pose, frame.request.camera, next_set, quality);
         again.map_err(|error| End::Refused(error.to_string()))
+    }
+
+    fn newest_number(&self) -> u64 {
+        self.newest.map_or(0, |newest| newest.number)
+    }
+
+    /// Whether a picture that was made with these cameras is to be sent.
+    fn is_wanted(&self, asked: &Asked, cameras: Option<&[SampleCamera]>) -> bool {
+        let number = asked.pose.number;
+        if !asked.pose.still {
+            return number >= self.sent;
+        }
+        // A plan that came while the finished still was made has asked for it again, from the first step of light.
+        let is_finished = number == self.sent && self.is_finished;
+        let is_again = is_finished && cameras.is_some() && cameras == self.made_with.as_deref();
+        number == self.newest_number() && !is_again
     }
 
     /// The epoch of the last plan that the page was told of.
