@@ -34,6 +34,9 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     let experiment = Experiment::start(args.scene.clone(), setup, args.device.device, nodes)?;
     let results = measure(args, &experiment)?;
     let mut report = new_report(args, &experiment);
+    for result in &results {
+        report.parameter(format!("method, {}", result.lighting), args.scene.method_in(result.lighting));
+    }
     report.cover = Some(cover);
     shared_light::report(&results, &mut report)?;
     report.checks.extend(results.iter().map(check_of_k));
@@ -67,7 +70,6 @@ fn new_report(args: &DemoArgs, experiment: &Experiment) -> Report {
     report.parameter("triangles", experiment.setup.scene.triangle_count() as usize);
     report.parameter("sample images S", experiment.setup.samples.len());
     report.parameter("nodes P", u32::from(args.nodes));
-    report.parameter("method", args.scene.method().to_string());
     report.parameter("sampling", args.scene.sampling().to_string());
     report.parameter("quick", args.quick);
     report
