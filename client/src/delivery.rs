@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use cluster::{Assignment, RenderViews};
+use cluster::Assignment;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 use wire::rpc::Backoff;
@@ -75,7 +75,14 @@ async fn call_all(
     let plan = active.clone();
     let arrange = move |views: &mut [ViewRequest]| cell_by_cell(&plan.plan.assignment, views);
     let views = Unrequested::new(sink.window().clone(), &weights, Box::new(arrange));
-    let request = RenderViews { planes: sink.window().lock().planes(), ..active.request() };
+    let mut request = active.request();
+    {
+        let window = sink.window().lock();
+        request.planes = window.planes();
+        if let Some(method) = &window.method {
+            request.method.clone_from(method);
+        }
+    }
     let pumps = start_pumps(request, views, peers.len(), Some(active.plan.view_s()));
     let mut calls = JoinSet::new();
     for (peer, pump) in peers.iter().zip(pumps) {

@@ -15,7 +15,7 @@ use crate::error::ClientError;
 use crate::peer::{Failure, FrameStream, Peer, decode};
 use crate::placement::{ClientId, Tried};
 use crate::poses::{Newest, Poses, SentPose};
-use crate::view_request::{EncodedFrame, Frame, LiveFrame, LiveTimes, PictureQuality, ViewRequest};
+use crate::view_request::{EncodedFrame, Frame, LiveFrame, LiveTimes, ViewRequest};
 use crate::window::check_frame;
 
 /// The longest silence of a client: its compositor cuts off one that is silent for longer.
@@ -169,18 +169,24 @@ impl LiveStream {
 
     /// A request for the newest pose, if it was not sent, which acknowledges the frames that were taken.
     fn request(&mut self) -> RenderViews {
-        let Newest { pose, taken } = *self.newest.borrow_and_update();
+        let Newest { pose, taken } = self.newest.borrow_and_update().clone();
         self.poses.taken(taken);
-        let live = LiveRequest { acknowledged_frame: taken, client_id: self.client_id };
-        let mut request = RenderViews { live: Some(live), ..self.state.borrow().active.request() };
+        let mut live = LiveRequest { acknowledged_frame: taken, client_id: self.client_id, waits_for_set: false };
+        let mut request = self.state.borrow().active.request();
         if let Some(pose) = pose.filter(|pose| self.poses.wants(pose)) {
             let ViewRequest { frame, set_index, camera } = pose.request;
             (request.set_index, request.views) = (set_index, vec![RequestedView { frame, camera }]);
-            if let Some(PictureQuality { codec, antialias }) = pose.quality {
-                (request.codec, request.planes.antialias) = (codec, antialias);
+            if let Some(quality) = &pose.quality {
+                request.codec = quality.codec;
+                request.planes.antialias = quality.antialias;
+                live.waits_for_set = quality.waits_for_set;
+                if let Some(method) = &quality.method {
+                    request.method = method.to_string();
+                }
             }
             self.poses.sent(pose);
         }
+        request.live = Some(live);
         request
     }
 
@@ -190,7 +196,7 @@ impl LiveStream {
             |reason: &str| Failure::of_peer(peer, ClientError::Unexpected { frame: number, reason: reason.to_owned() });
         let answers = self.poses.answer(number).ok_or_else(|| unexpected("was not requested, or is late"))?;
         let mut planes = self.state.borrow().active.settings.planes;
-        let quality = answers.pose.quality;
+        let quality = answers.pose.quality.as_ref();
         planes.antialias = quality.map_or(planes.antialias, |quality| quality.antialias);
         check_frame(&answers.pose.request, planes, &frame.header).map_err(|reason| unexpected(&reason))?;
         if quality.is_some_and(|quality| quality.codec != frame.header.codec) {

@@ -11,7 +11,7 @@ pub(crate) const CREDITS: usize = 2;
 const MAX_SENT: usize = 64;
 
 /// A pose that was given.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Pose {
     pub(crate) request: ViewRequest,
     /// `None`: the session's.
@@ -20,14 +20,14 @@ pub(crate) struct Pose {
 }
 
 /// A pose that was sent.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SentPose {
     pub(crate) pose: Pose,
     pub(crate) sent: Instant,
 }
 
 /// The viewer's last word.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Newest {
     pub(crate) pose: Option<Pose>,
     /// The last frame that the viewer has taken.

@@ -201,19 +201,26 @@ impl Session {
         R: IntoIterator<Item = ViewRequest, IntoIter: Send + 'static>,
     {
         let planes = self.state.borrow().active.settings.planes;
-        self.render_views_with(planes, requests)
+        self.render_views_with(planes, None, requests)
     }
 
-    /// As [`Session::render_views`], with these planes in place of the session's.
+    /// As [`Session::render_views`], with these planes in place of the session's, and with another reconstruction method where one
+    /// is named: its samples must be those of the session's.
     ///
     /// # Errors
     /// As [`Session::render_views`].
-    pub fn render_views_with<R>(&self, planes: ViewPlanes, requests: R) -> Result<Frames, ClientError>
+    pub fn render_views_with<R>(
+        &self,
+        planes: ViewPlanes,
+        method: Option<String>,
+        requests: R,
+    ) -> Result<Frames, ClientError>
     where
         R: IntoIterator<Item = ViewRequest, IntoIter: Send + 'static>,
     {
         let sets = self.state.borrow().active.plan.assignment.workload.timeline.set_count;
-        let window = Window::open(requests.into_iter(), sets, planes)?;
+        let mut window = Window::open(requests.into_iter(), sets, planes)?;
+        window.method = method;
         Ok(Frames::start(window, |sink| deliver(self.state.clone(), sink)))
     }
 

@@ -1,5 +1,6 @@
 //! Views that a caller asks for, and the frames that answer them.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use bytes::Bytes;
@@ -21,12 +22,16 @@ pub(crate) struct ViewSettings {
 }
 
 /// How one picture is made and sent, in place of the session's way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PictureQuality {
     /// The encoding.
     pub codec: FrameCodec,
     /// Samples a pixel.
     pub antialias: Antialias,
+    /// The reconstruction method, whose samples must be those of the session's; `None`: the session's.
+    pub method: Option<Arc<str>>,
+    /// Whether the picture waits for its sample set, as a still does.
+    pub waits_for_set: bool,
 }
 
 /// One view.

@@ -30,6 +30,8 @@ pub(crate) struct Window {
     /// Sets of the timeline.
     set_count: u32,
     planes: ViewPlanes,
+    /// The reconstruction method of all views; `None`: the session's.
+    pub(crate) method: Option<String>,
 }
 
 impl fmt::Debug for Window {
@@ -50,7 +52,7 @@ impl Window {
     ) -> Result<Self, ClientError> {
         let requests: Box<dyn Iterator<Item = ViewRequest> + Send> = Box::new(requests);
         let (source, due) = (Some(requests.peekable()), BTreeMap::new());
-        let mut window = Self { source, last: None, due, received: 0, fault: None, set_count, planes };
+        let mut window = Self { source, last: None, due, received: 0, fault: None, set_count, planes, method: None };
         while window.due.len() < LEAST_AHEAD_VIEWS && !window.draw().is_empty() {}
         match window.fault.take() {
             Some(error) => Err(error),

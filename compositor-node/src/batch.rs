@@ -18,6 +18,9 @@ pub(crate) const MAX_BATCH: usize = 64;
 /// Pixels of one call, times their samples: 64 views of full HD would hold half a gigabyte.
 const MAX_BATCH_PIXELS: usize = 64 << 20;
 
+/// The kind of views that are drawn with few rays until their set is there.
+const PREVIEW: &str = "preview";
+
 /// Views with equal keys can be made in one call.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct BatchKey {
@@ -29,12 +32,17 @@ pub(crate) struct BatchKey {
     pub(crate) method: String,
     pub(crate) planes: ViewPlanes,
     pub(crate) size_px: UVec2,
+    pub(crate) is_preview: bool,
 }
 
 impl BatchKey {
     /// The kind of these views.
     pub(crate) fn kind(&self) -> ViewKind {
-        let method = if self.content.is_some() { &self.method } else { DIRECT };
+        let method = match self.content {
+            Some(_) => &self.method,
+            None if self.is_preview => PREVIEW,
+            None => DIRECT,
+        };
         let antialias = self.planes.antialias;
         ViewKind { workload_number: self.workload_number, method: method.to_owned(), antialias }
     }
@@ -52,7 +60,7 @@ pub(crate) enum Source {
     /// Complete sample sets.
     Sets(ViewSets),
     /// The scene itself.
-    Scene { plan: Arc<Assignment>, scene_time_s: f32 },
+    Scene { plan: Arc<Assignment>, scene_time_s: f32, is_preview: bool },
 }
 
 impl Source {
@@ -79,10 +87,17 @@ pub(crate) struct Place {
     pub(crate) id: SampleSetId,
     /// The view cell whose set it is.
     pub(crate) cell: u32,
-    /// Whether the view is in another cell.
+    /// Whether the view is in another cell, or drawn from the scene until its set is there.
     pub(crate) is_neighbour: bool,
     /// The set; `None` for the scene itself.
     pub(crate) content: Option<SetContent>,
+}
+
+impl Place {
+    /// Whether views are drawn from the scene with few rays, because no set is there yet.
+    pub(crate) fn is_preview(&self) -> bool {
+        self.is_neighbour && self.content.is_none()
+    }
 }
 
 /// The source of the views of a set that are in one view cell.
@@ -124,6 +139,7 @@ impl Waiting {
             method: request.method.clone(),
             planes: request.planes,
             size_px: view.camera.size_px,
+            is_preview: set.place.is_preview(),
         };
         let (source, codec, set_wait_s, queued) = (set.source.clone(), request.codec, set.wait_s, Instant::now());
         Self { key, place: set.place, source, view, codec, arrived, set_wait_s, queued, reply, credit }

@@ -5,13 +5,15 @@
 //! arrive more slowly than poses, every set is shown, with its newest pose.
 //!
 //! A viewer that moves to another view cell waits only for a moment: until the set of that cell is there, the nearest loaded
-//! set of the same scene time serves.
+//! set of the same scene time serves. Where samples hold light, no viewer in motion waits for the first set either: views are
+//! drawn from the scene with few rays until it is there.
 
 use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Instant;
 
 use cluster::{Assignment, DIRECT, Policy, RenderViews, RequestedView, SetContent};
+use depth_image::PinholeCamera;
 use node::{CellPlan, next_within, view_bytes};
 use tokio::sync::Semaphore;
 use tonic::Status;
@@ -89,6 +91,8 @@ pub(crate) struct LiveStream<'a> {
     without_set: Option<Instant>,
     /// Whether neighbours have been tried since something changed.
     has_tried: bool,
+    /// The last view that was drawn from the scene until its set is there: it is not drawn again.
+    previewed: Option<PinholeCamera>,
     course: Course,
     /// The last set that was fetched without being waited for.
     aside: Option<SetContent>,
@@ -111,6 +115,7 @@ impl<'a> LiveStream<'a> {
             own: None,
             without_set: None,
             has_tried: false,
+            previewed: None,
             course: Course::default(),
             aside: None,
             _viewer: client.shared.arrivals.viewer(),
@@ -317,8 +322,12 @@ impl<'a> LiveStream<'a> {
     /// The time at which a pose has waited long enough for another cell; `None` where none waits, or no other set can serve.
     /// A viewer that stays in its cell waits for the next set there: another cell's would look worse.
     fn patience_ends(&self) -> Option<Instant> {
-        let has_moved = |pose: &&Pose| self.own.is_some_and(|own| own != pose.plan_and_cell());
-        let waits = self.waiting().filter(has_moved).is_some() && !self.has_tried;
+        let may_show_other = |pose: &&Pose| match self.own {
+            Some(own) => own != pose.plan_and_cell(),
+            None => pose.plan.workload.planes.light,
+        };
+        let in_motion = |pose: &&Pose| pose.request.live.is_some_and(|live| !live.waits_for_set);
+        let waits = self.waiting().filter(in_motion).filter(may_show_other).is_some() && !self.has_tried;
         Some(self.without_set.filter(|_| waits)? + self.client.shared.deadlines.neighbour)
     }
 
@@ -341,7 +350,11 @@ impl<'a> LiveStream<'a> {
         }
         let Some(pose) = self.waiting() else { return };
         let (plan, set_index, cell) = (pose.plan.clone(), pose.request.set_index, pose.cell);
-        let Some(set) = self.client.shared.nearest(&plan, set_index, &pose.view.camera) else { return };
+        let camera = pose.view.camera;
+        let Some(set) = self.client.shared.meanwhile(&plan, set_index, &camera) else { return };
+        if set.place.is_preview() && self.previewed.replace(camera) == Some(camera) {
+            return;
+        }
         if self.newest.is_some() {
             self.fetch_aside(&plan, set_index, cell);
         }

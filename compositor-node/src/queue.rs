@@ -215,6 +215,7 @@ mod tests {
             method: String::new(),
             planes: ViewPlanes::default(),
             size_px: camera.size_px,
+            is_preview: false,
         };
         let permit = Arc::new(Semaphore::new(1)).try_acquire_owned().unwrap();
         let node = NodeQuota::new(Quotas::default()).try_view(1).unwrap();
@@ -223,7 +224,7 @@ mod tests {
         Waiting {
             key,
             place,
-            source: Source::Scene { plan: Arc::new(assignment()), scene_time_s: 0.0 },
+            source: Source::Scene { plan: Arc::new(assignment()), scene_time_s: 0.0, is_preview: false },
             view: RequestedView { frame: number.into(), camera },
             codec: FrameCodec::Lz4,
             arrived: now,

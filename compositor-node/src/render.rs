@@ -76,7 +76,9 @@ impl Rendering {
                 let batch_s = start.elapsed().as_secs_f64();
                 let pixels = batch.iter().map(|view| view.view.camera.pixel_count()).sum();
                 self.times.learn(Instant::now(), &batch[0].key.kind(), pixels, busy_s);
-                metrics.done.add(batch[0].key.workload_number, operation, batch.len() as f64, busy_s);
+                if !batch[0].key.is_preview {
+                    metrics.done.add(batch[0].key.workload_number, operation, batch.len() as f64, busy_s);
+                }
                 metrics.views.inc_by(batch.len() as u64);
                 for view in &batch {
                     metrics.view_s.observe(batch_s / batch.len() as f64);
@@ -109,9 +111,12 @@ impl Rendering {
                     .reconstruct(sets.on_device.as_ref(), &work, turn)
                     .map(|views| (Operation::ReconstructView, views))
             }
-            Source::Scene { plan, scene_time_s } => {
-                let work = DirectWork::of(&plan.workload, cameras.clone(), key.planes);
-                let work = DirectWork { scene_time_s: *scene_time_s, ..work };
+            Source::Scene { plan, scene_time_s, is_preview } => {
+                let mut work = DirectWork::of(&plan.workload, cameras.clone(), key.planes);
+                work.scene_time_s = *scene_time_s;
+                if *is_preview {
+                    work.lighting = engine.preview_lighting(&work.lighting)?;
+                }
                 engine.draw_direct(&work, turn).map(|views| (Operation::DirectView, views))
             }
         };

@@ -4,7 +4,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use cluster::{Assignment, CommonCell, Policy, SceneRef, SetContent, Timeline, Workload};
+use cluster::{Assignment, CommonCell, DIRECT, Policy, SceneRef, SetContent, Timeline, Workload};
 use codec::EncodedImage;
 use depth_image::{DepthImage, PinholeCamera, SampleCamera, nearest_set};
 use node::{
@@ -108,7 +108,8 @@ impl Sets {
     /// Checks that a plan's samples have the planes that a method needs, where there are samples.
     pub(crate) fn check_method(&self, plan: &Assignment, method: &str) -> Result<(), Status> {
         let needed = self.scenes.engine().sample_planes(method)?;
-        if plan.policy == Policy::Direct || plan.workload.planes.contain(needed) {
+        let is_drawn = plan.policy == Policy::Direct || method == DIRECT;
+        if is_drawn || plan.workload.planes.contain(needed) {
             return Ok(());
         }
         let text = "needs planes that this workload does not sample; a session of this method does";

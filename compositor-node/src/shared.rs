@@ -80,6 +80,8 @@ impl Shared {
         if key.method == DIRECT && plan().is_some_and(|plan| plan.policy != Policy::Direct) {
             return Lane::Direct;
         }
+        // A preview takes no time from the samples that it waits for.
+        let is_live = is_live && !key.is_preview;
         let is_long = |limit_s: f64| match self.times.predicted_s(&key.kind(), key.size_px) {
             Some(seconds) => seconds > limit_s,
             None => key.size_px.element_product().saturating_mul(key.planes.antialias.samples()) > LONG_PIXELS,
@@ -130,7 +132,7 @@ impl Shared {
                 let content = sets.of_cell.content;
                 (Source::Sets(sets), Some(content))
             }
-            Policy::Direct => (scene(plan, set_index)?, None),
+            Policy::Direct => (scene(plan, set_index, false)?, None),
         };
         let place = Place { id, cell, is_neighbour: false, content };
         Ok(Loaded { source, place, wait_s: start.elapsed().as_secs_f64() })
@@ -151,7 +153,7 @@ impl Shared {
     pub(crate) fn source_at(&self, plan: &Arc<Assignment>, set_index: u32, place: Place) -> Option<Source> {
         match place.content {
             Some(content) => self.with_common(self.sets.loaded(&content)?, plan, set_index).map(Source::Sets),
-            None => scene(plan, set_index).ok(),
+            None => scene(plan, set_index, place.is_preview()).ok(),
         }
     }
 
@@ -168,16 +170,21 @@ impl Shared {
         self.sets.with_common(set, &CellPlan::of_common(plan), set_index).ok().flatten()
     }
 
-    /// The nearest loaded set of a view's moment.
-    pub(crate) fn nearest(&self, plan: &Arc<Assignment>, set_index: u32, view: &PinholeCamera) -> Option<Loaded> {
+    /// What shows a view until its own set is there: the nearest loaded set of its moment, or the scene itself where views take
+    /// their surfaces from it.
+    pub(crate) fn meanwhile(&self, plan: &Arc<Assignment>, set_index: u32, view: &PinholeCamera) -> Option<Loaded> {
         let id = plan.sample_set_id(set_index).filter(|_| plan.policy != Policy::Direct)?;
-        let set = self.sets.nearest(plan, set_index, view)?;
+        let Some(set) = self.sets.nearest(plan, set_index, view) else {
+            let source = plan.workload.planes.light.then(|| scene(plan, set_index, true).ok()).flatten()?;
+            let place = Place { id, cell: plan.cell_of(view), is_neighbour: true, content: None };
+            return Some(Loaded { source, place, wait_s: 0.0 });
+        };
         let place = Place { id, cell: set.cell, is_neighbour: true, content: Some(set.content) };
         Some(Loaded { source: Source::Sets(self.with_common(set, plan, set_index)?), place, wait_s: 0.0 })
     }
 }
 
-fn scene(plan: &Arc<Assignment>, set_index: u32) -> Result<Source, Status> {
+fn scene(plan: &Arc<Assignment>, set_index: u32, is_preview: bool) -> Result<Source, Status> {
     let scene_time_s = plan.workload.timeline.time_s(set_index).ok_or_else(|| beyond_timeline(set_index))?;
-    Ok(Source::Scene { plan: plan.clone(), scene_time_s })
+    Ok(Source::Scene { plan: plan.clone(), scene_time_s, is_preview })
 }

@@ -11,9 +11,9 @@ use std::time::Duration;
 use cluster::{CommonKind, DIRECT, Refinement, SamplePlanes};
 use depth_image::{
     Antialias, BACKGROUND_INVERSE_DEPTH, Camera, DepthImage, Environment, Illumination, LayeredDepthImage,
-    LayeredLightField, Light, LightFieldCamera, ParallelCamera, PinholeCamera, PixelDepth, Provenance, ProvenanceKind,
-    Ray, SampleCamera, SampleImage, SampleImages, Texel, ToneMapping, View, ViewPlanes, linear_from_rgb9e5,
-    linear_from_srgb8, oct8_from_unit, rgb9e5_from_linear, srgb8_from_linear,
+    LayeredLightField, Light, LightFieldCamera, LightPlanes, ParallelCamera, PinholeCamera, PixelDepth, Provenance,
+    ProvenanceKind, Ray, SampleCamera, SampleImage, SampleImages, Texel, ToneMapping, View, ViewPlanes,
+    linear_from_rgb9e5, linear_from_srgb8, oct8_from_unit, oct16_from_unit, rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
 use node::{CommonSet, DirectWork, Engine, EngineError, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork};
@@ -157,6 +157,19 @@ fn depth_image(camera: &Camera, scene_time_s: f32, refinement: Refinement) -> De
     }
 }
 
+/// The same image with its colours as the light of lamps.
+fn with_light(image: DepthImage) -> DepthImage {
+    let texels = image.color_rgb9e5.len();
+    let normals = vec![oct16_from_unit(Vec3::Y); texels];
+    let light = LightPlanes {
+        triangle_normal_oct16: normals.clone(),
+        lamps_rgb9e5: image.color_rgb9e5,
+        environment_rgb9e5: vec![rgb9e5_from_linear(Vec3::ZERO); texels],
+        share8: Vec::new(),
+    };
+    DepthImage { color_rgb9e5: Vec::new(), normal_oct16: Some(normals), light: Some(light), ..image }
+}
+
 /// The surfaces of the ball and of the floor's upper side on each line.
 fn layered_image(camera: &ParallelCamera, scene_time_s: f32, refinement: Refinement) -> LayeredDepthImage {
     let (mut first, mut met) = (vec![0], Vec::new());
@@ -227,11 +240,12 @@ fn splat(set: &SampleSet, camera: &PinholeCamera, planes: ViewPlanes) -> View {
     for (index, image) in set.images.depth().iter().enumerate() {
         let size_px = image.size_px();
         for (x, y) in (0..size_px.y).flat_map(|y| (0..size_px.x).map(move |x| (x, y))) {
-            let (Texel::Sample { color_linear: Some(color_linear), .. }, Some(point)) =
-                (image.texel(x, y), image.sample_in_world(x, y))
+            let (Texel::Sample { color_linear, .. }, Some(point)) = (image.texel(x, y), image.sample_in_world(x, y))
             else {
                 continue;
             };
+            let light = || Some(image.light.as_ref()?.lamps_rgb9e5[(y * size_px.x + x) as usize]);
+            let Some(color_linear) = color_linear.or_else(|| light().map(linear_from_rgb9e5)) else { continue };
             if let Some(at) = camera.project(point).filter(|at| camera.contains(at.pixel)) {
                 canvas.put(at.pixel, at.planar_depth_m, color_linear, index);
             }
@@ -300,6 +314,9 @@ fn uploaded(set: &dyn UploadedSet) -> Result<&Uploaded, EngineError> {
     let any: &dyn Any = set;
     any.downcast_ref().ok_or_else(|| EngineError::Device("a set of another device".to_owned()))
 }
+
+/// The method of shared light, with a quality behind a colon. Its views show the samples' colours, as those of `splat` do.
+pub const LIGHT_CACHE: &str = "light_cache";
 
 fn known(field: &'static str, value: &str, known: &str) -> Result<(), EngineError> {
     if value == known {
@@ -449,7 +466,11 @@ impl Engine for ScalarEngine {
     }
 
     fn sample_planes(&self, method: &str) -> Result<SamplePlanes, EngineError> {
-        if method == DIRECT { Ok(()) } else { known("method", method, "splat") }.map(|()| SamplePlanes::default())
+        match method.strip_prefix(LIGHT_CACHE) {
+            Some(_) => Ok(SamplePlanes { light: true, ..SamplePlanes::default() }),
+            None if method == DIRECT => Ok(SamplePlanes::default()),
+            None => known("method", method, "splat").map(|()| SamplePlanes::default()),
+        }
     }
 
     fn sample(&self, request: &SampleWork, _: Turn) -> Result<Vec<SampleImage>, EngineError> {
@@ -470,7 +491,10 @@ impl Engine for ScalarEngine {
         let is_held = |camera: &&SampleCamera, holds: &Holds| holds.eyes.contains(&eye(camera).truncate());
         self.wait_while(|holds| cameras.iter().any(|camera| is_held(camera, holds)));
         let image = |camera: &SampleCamera| match camera {
-            SampleCamera::Depth(camera) => depth_image(camera, request.scene_time_s, request.refinement).into(),
+            SampleCamera::Depth(camera) => {
+                let image = depth_image(camera, request.scene_time_s, request.refinement);
+                if request.planes.light { with_light(image) } else { image }.into()
+            }
             SampleCamera::Layered(camera) => layered_image(camera, request.scene_time_s, request.refinement).into(),
             SampleCamera::LightField(camera) => no_light(camera).into(),
         };
@@ -512,7 +536,7 @@ impl Engine for ScalarEngine {
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, _: Turn) -> Result<Vec<View>, EngineError> {
         self.works()?;
         self.has_room_for(work.cameras.len())?;
-        known("method", &work.method, "splat")?;
+        self.sample_planes(&work.method)?;
         let Uploaded { set, mirrored } = uploaded(set)?;
         self.wait_while(|holds| work.cameras.iter().any(|camera| holds.sizes_px.contains(&camera.size_px)));
         sleep(self.pace().view * work.cameras.len() as u32);

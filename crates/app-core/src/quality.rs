@@ -20,7 +20,11 @@ impl QualityArgs {
     }
 }
 
-fn quality(text: &str) -> Result<LightCacheQuality, String> {
+/// A quality by its name.
+///
+/// # Errors
+/// For another text.
+pub fn quality(text: &str) -> Result<LightCacheQuality, String> {
     let names = || LightCacheQuality::ALL.map(LightCacheQuality::name).join(", ");
     LightCacheQuality::named(text).ok_or_else(|| format!("expected one of {}", names()))
 }

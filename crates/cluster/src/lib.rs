@@ -37,7 +37,9 @@ pub use check::{
 };
 pub use common_cell::{CommonCell, CommonKind};
 pub use costs::{Costs, MeasuredCosts, ROW_PARTS, TileCosts};
-pub use node::{JoinCluster, MeasureCosts, Measured, NodeStatus, Ready, SamplerReport, Welcome, WorkReport};
+pub use node::{
+    JoinCluster, MeasureCosts, Measured, NodeStatus, Ready, SamplerReport, SharedLightCosts, Welcome, WorkReport,
+};
 pub use policy::{Policy, PolicyChoice, UnknownPolicy};
 pub use probing::{ProbeViews, ProbedView, ProbedViews};
 pub use promise::{BudgetRequest, Promise, PromiseState};

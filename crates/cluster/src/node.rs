@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::audit::AuditReport;
 use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text, viewpoints, within};
+use crate::check_seconds;
 use crate::costs::{Costs, MeasuredCosts};
 use crate::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
 use crate::scene::SceneRef;
@@ -108,6 +109,31 @@ pub struct Measured {
     pub auto_exposure: ExposureEv,
     /// The pixels up to which pictures find surfaces faster by rays; `None` where nobody measured it.
     pub traced_pixel_count: Option<u32>,
+    /// The parts of a view whose light comes from samples; `None` by another method.
+    pub shared_light: Option<SharedLightCosts>,
+}
+
+/// Where the time of a view goes whose light comes from samples.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SharedLightCosts {
+    /// The share of the view's surface points whose light samples know, from 0 to 1.
+    pub known_ratio: f64,
+    /// Seconds of finding surfaces.
+    pub surfaces_s: f64,
+    /// Seconds of looking up their light, and of lighting the points that no sample is near.
+    pub look_up_s: f64,
+    /// Seconds of lighting the other points that no sample knows.
+    pub unknown_s: f64,
+}
+
+impl SharedLightCosts {
+    /// # Errors
+    /// For a share that is not from 0 to 1, and for times that are negative or not finite.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        check_seconds!(self; surfaces_s, look_up_s, unknown_s);
+        let is_ratio = (0.0..=1.0).contains(&self.known_ratio);
+        is_ratio.then_some(()).ok_or_else(|| InvalidField::out_of_range("known_ratio", self.known_ratio, "from 0 to 1"))
+    }
 }
 
 /// A node is ready for a plan.

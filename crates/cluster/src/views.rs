@@ -47,6 +47,8 @@ pub struct LiveRequest {
     pub acknowledged_frame: u64,
     /// The client's own choice: names it in logs.
     pub client_id: u64,
+    /// Whether the view waits for its set, as a still does. Views in motion take what is there meanwhile.
+    pub waits_for_set: bool,
 }
 
 impl RenderViews {

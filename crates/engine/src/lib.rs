@@ -7,11 +7,14 @@ use std::sync::{Arc, Weak};
 
 use bands::{BAND_PIXELS, views_in_bands};
 use cluster::{CommonKind, DIRECT, SamplePlanes};
-use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, SampleCamera, SampleImage, SampleImages, View};
+use depth_image::{
+    Aabb, Camera, DepthImage, LightCacheQuality, PinholeCamera, ProvenanceKind, SampleCamera, SampleImage,
+    SampleImages, View, ViewPlanes,
+};
 use gpu::{DevicePreference, Gpu, GpuError};
 use node::{
-    CommonSet, DirectWork, Engine, EngineError, OpenEngine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
-    ViewWork, WorkClass,
+    CommonSet, DirectWork, Engine, EngineError, LightParts, OpenEngine, SampleSet, SampleWork, SharedSet, Turn,
+    UploadedSet, ViewWork, WorkClass, own_time,
 };
 use parking_lot::Mutex;
 use reconstruction::{
@@ -59,6 +62,13 @@ struct UploadedLight {
     scene_time_s: f32,
     /// Views of at most so many pixels find surfaces by rays.
     traced_pixel_count: Option<u32>,
+}
+
+impl UploadedLight {
+    /// How surfaces of views of so many pixels are found; `None` where nobody measured it.
+    fn by_rays(&self, pixels: usize) -> Option<bool> {
+        self.traced_pixel_count.map(|most| pixels <= most as usize)
+    }
 }
 
 /// A set of images, with those of common cells.
@@ -214,6 +224,13 @@ impl GpuEngine {
         })))
     }
 
+    /// The seconds of work on this thread that has been done once before.
+    fn warm_time<T>(&self, work: impl Fn() -> Result<T, EngineError>) -> Result<f64, EngineError> {
+        work()?;
+        let (done, seconds) = own_time(self, work);
+        done.map(|_| seconds)
+    }
+
     /// Views whose surfaces come from the scene and whose light comes from samples.
     fn draw_cached(
         &self,
@@ -225,11 +242,10 @@ impl GpuEngine {
         let quality = method.light_cache_quality().ok_or_else(|| {
             invalid("reconstruction_method", format!("the samples have light where {method} needs colour"))
         })?;
-        let UploadedLight { cache, scene_hash, lighting, scene_time_s, traced_pixel_count } = light;
+        let UploadedLight { cache, scene_hash, lighting, scene_time_s, .. } = light;
         let scene = self.scene(scene_hash)?;
         let pixels = work.cameras.first().map_or(0, PinholeCamera::pixel_count);
-        let by_rays = traced_pixel_count.map(|most| pixels <= most as usize);
-        let draw = draw_work(&scene, *lighting, *scene_time_s, by_rays, turn);
+        let draw = draw_work(&scene, *lighting, *scene_time_s, light.by_rays(pixels), turn);
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
             let make = || self.renderer.draw_cached_views(draw, cache, quality, cameras, work.planes);
             self.catching(|| make().map_err(render_error))
@@ -296,6 +312,10 @@ impl Engine for GpuEngine {
         let RequiredPlanes { normal, corner_inverse_depth } = method.required_planes();
         let light = method.light_cache_quality().is_some();
         Ok(SamplePlanes { normals: normal, corner_inverse_depths: corner_inverse_depth, light })
+    }
+
+    fn preview_lighting(&self, lighting: &str) -> Result<String, EngineError> {
+        Ok(parsed::<Lighting>("lighting", lighting)?.with_single_rays().to_string())
     }
 
     fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
@@ -406,6 +426,29 @@ impl Engine for GpuEngine {
         })
     }
 
+    fn light_parts(
+        &self,
+        set: &dyn UploadedSet,
+        work: &ViewWork,
+        turn: Turn,
+    ) -> Result<Option<LightParts>, EngineError> {
+        let Some(Uploaded::Light(light)) = (set as &dyn Any).downcast_ref() else { return Ok(None) };
+        let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
+        let with_provenance = ViewWork { planes: ViewPlanes { provenance: true, ..work.planes }, ..work.clone() };
+        let views = self.draw_cached(light, method, &with_provenance, turn)?;
+        let scene = self.scene(&light.scene_hash)?;
+        let pixels = work.cameras.first().map_or(0, PinholeCamera::pixel_count);
+        let by_rays = light.by_rays(pixels);
+        let unlit = draw_work(&scene, Lighting::UNLIT, light.scene_time_s, by_rays, turn);
+        let surfaces = || self.renderer.draw_views(unlit, &work.cameras, work.planes).map_err(render_error);
+        let draft = ReconstructionMethod::from(LightCacheQuality::Draft);
+        Ok(Some(LightParts {
+            known_ratio: known_ratio(&views),
+            surfaces_s: self.warm_time(|| self.catching(surfaces))?,
+            draft_s: self.warm_time(|| self.draw_cached(light, draft, work, turn))?,
+        }))
+    }
+
     fn traced_pixel_count(&self, work: &DirectWork, turn: Turn) -> Result<Option<u32>, EngineError> {
         let scene = self.scene(&work.scene_hash)?;
         let Some(camera) = work.cameras.first() else { return Ok(None) };
@@ -422,6 +465,14 @@ impl Engine for GpuEngine {
             self.catching(|| self.renderer.draw_views(draw, cameras, work.planes).map_err(render_error))
         })
     }
+}
+
+/// The share of the points with a surface whose light samples know; 1 where no pixel shows a surface.
+fn known_ratio(views: &[View]) -> f64 {
+    let kinds = views.iter().filter_map(|view| view.provenance.as_ref()).flatten().map(|provenance| provenance.kind());
+    let surfaces: Vec<ProvenanceKind> = kinds.filter(|kind| *kind != ProvenanceKind::Empty).collect();
+    let unknown = surfaces.iter().filter(|kind| **kind == ProvenanceKind::LitHere).count();
+    1.0 - unknown as f64 / surfaces.len().max(1) as f64
 }
 
 fn device(error: impl ToString) -> EngineError {

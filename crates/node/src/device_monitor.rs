@@ -10,7 +10,8 @@ use parking_lot::Mutex;
 use tokio::sync::watch;
 
 use crate::engine::{
-    CommonSet, DirectWork, Engine, EngineError, SampleSet, SampleWork, SharedSet, Turn, UploadedSet, ViewWork,
+    CommonSet, DirectWork, Engine, EngineError, LightParts, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
+    ViewWork,
 };
 use crate::set_memory::SetMemory;
 
@@ -138,6 +139,10 @@ impl Engine for DeviceMonitor {
         self.monitored(self.engine.sample_planes(method))
     }
 
+    fn preview_lighting(&self, lighting: &str) -> Result<String, EngineError> {
+        self.monitored(self.engine.preview_lighting(lighting))
+    }
+
     fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
         self.engine.live_stream()
     }
@@ -164,6 +169,15 @@ impl Engine for DeviceMonitor {
         self.in_halves(&work.cameras, |cameras| {
             self.engine.reconstruct(set, &ViewWork { cameras: cameras.to_vec(), ..work.clone() }, turn)
         })
+    }
+
+    fn light_parts(
+        &self,
+        set: &dyn UploadedSet,
+        work: &ViewWork,
+        turn: Turn,
+    ) -> Result<Option<LightParts>, EngineError> {
+        self.monitored(self.engine.light_parts(set, work, turn))
     }
 
     fn traced_pixel_count(&self, work: &DirectWork, turn: Turn) -> Result<Option<u32>, EngineError> {

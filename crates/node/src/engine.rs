@@ -69,6 +69,10 @@ pub trait Engine: Send + Sync + 'static {
     fn images_are_independent(&self, sampling: &str) -> Result<bool, EngineError>;
     /// The planes of sample images that a reconstruction method needs.
     fn sample_planes(&self, method: &str) -> Result<SamplePlanes, EngineError>;
+    /// The lighting of views that are drawn quickly until their set is there: a single ray of each kind.
+    fn preview_lighting(&self, lighting: &str) -> Result<String, EngineError> {
+        Ok(lighting.to_owned())
+    }
     /// Counts a live stream as open until the guard is dropped. Meanwhile long work is cut into slices, so that live work
     /// goes between them.
     fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
@@ -88,6 +92,15 @@ pub trait Engine: Send + Sync + 'static {
     fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError>;
     /// Reconstructs one view for each camera. A set of light needs its scene, which must be loaded.
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError>;
+    /// The parts of making views whose light comes from samples; `None` for a set of another kind.
+    fn light_parts(
+        &self,
+        _set: &dyn UploadedSet,
+        _work: &ViewWork,
+        _turn: Turn,
+    ) -> Result<Option<LightParts>, EngineError> {
+        Ok(None)
+    }
     /// Draws one view for each camera from the scene itself.
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError>;
     /// The pixels up to which pictures of a scene find surfaces faster by rays than by drawing triangles, measured for views like
@@ -234,6 +247,17 @@ pub struct ViewWork {
     pub method: String,
     /// Planes beside colour.
     pub planes: ViewPlanes,
+}
+
+/// The parts of making views whose light comes from samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightParts {
+    /// The share of surface points whose light samples know, from 0 to 1.
+    pub known_ratio: f64,
+    /// Seconds of finding surfaces.
+    pub surfaces_s: f64,
+    /// Seconds of surfaces and the look-up, where the light of every sample that is near counts.
+    pub draft_s: f64,
 }
 
 /// Views to draw from the scene.

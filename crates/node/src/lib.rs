@@ -31,8 +31,8 @@ pub use config::{Deadlines, NodeConfig, Quotas, view_bytes};
 pub use connections::Connections;
 pub use device_monitor::DeviceMonitor;
 pub use engine::{
-    CommonSet, DirectWork, Engine, EngineError, OpenEngine, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
-    ViewWork, WorkClass, own_time,
+    CommonSet, DirectWork, Engine, EngineError, LightParts, OpenEngine, SampleSet, SampleWork, SharedSet, Turn,
+    UploadedSet, ViewWork, WorkClass, own_time,
 };
 pub use membership::keep_membership;
 pub use plan::{CellPlan, PlansInForce, Relay, beyond_timeline, has_set};

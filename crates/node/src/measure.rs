@@ -3,7 +3,7 @@
 
 use std::fmt::Display;
 
-use cluster::{Costs, DIRECT, MeasureCosts, Measured, ROW_PARTS, TileCosts, Workload};
+use cluster::{Costs, DIRECT, MeasureCosts, Measured, ROW_PARTS, SharedLightCosts, TileCosts, Workload};
 use codec::{DecodeLimits, EncodedImage, FrameCodec};
 use codec::{decode_sample_image, encode_sample_image, encode_view};
 use depth_image::{PinholeCamera, SampleCamera, SampleImage, View};
@@ -12,7 +12,8 @@ use tonic::Status;
 
 use crate::auto_exposure::auto_exposure;
 use crate::engine::{
-    DirectWork, Engine, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass, own_time, set_of_view,
+    DirectWork, Engine, LightParts, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass, own_time,
+    set_of_view,
 };
 
 /// Runs of one operation after a warm-up, in which shaders are built.
@@ -72,7 +73,8 @@ impl Measurement<'_> {
             Some(_) => SampleWork::of(cell),
             None => SampleWork { planes, ..SampleWork::of(cell) },
         };
-        let sampled = cells.iter().enumerate().map(|cell| self.timed(|| self.sampled(&sample(cell))));
+        let is_tileable = engine.images_are_independent(&workload.sampling)?;
+        let sampled = cells.iter().enumerate().map(|cell| self.sampled_timed(&sample(cell), is_tileable));
         let (encoded, cells_s): (Vec<_>, Vec<f64>) = sampled.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let upload = |(number, (cell, images)): (usize, (&Workload, &Vec<_>))| {
             let is_common = workload.common_cell(number).is_some();
@@ -84,7 +86,6 @@ impl Measurement<'_> {
         let set = set_of_view(engine, workload, sets)?;
         let load_set_s = load_s / cells.len().max(1) as f64;
         let sample_image_s = cells_s.iter().sum::<f64>() / workload.sample_cameras.len().max(1) as f64;
-        let is_tileable = engine.images_are_independent(&workload.sampling)?;
         let first = cells.first().zip(cells_s.first()).filter(|_| is_tileable);
         let tile_costs = |(cell, cell_s): (&Workload, &f64)| {
             self.tile_costs(&sample((0, cell)), cell_s / cell.sample_cameras.len().max(1) as f64)
@@ -96,6 +97,7 @@ impl Measurement<'_> {
             _ => self.reconstruct_view_s(set.as_ref(), request)?,
         };
         let encode_view_s = self.encode_s(&made, &request.codec)?;
+        let shared_light = self.shared_light(set.as_ref(), request, reconstruct_view_s)?;
         let in_order = engine.images_are_sequential(&workload.sampling)?;
         let costs =
             Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles };
@@ -105,13 +107,42 @@ impl Measurement<'_> {
             planes,
             auto_exposure: auto_exposure(engine, workload, self.turn)?,
             traced_pixel_count: engine.traced_pixel_count(&first_view, self.turn)?,
+            shared_light,
         })
+    }
+
+    /// Where the time of one view goes whose light comes from samples.
+    fn shared_light(
+        &self,
+        set: &dyn UploadedSet,
+        request: &MeasureCosts,
+        reconstruct_view_s: f64,
+    ) -> Result<Option<SharedLightCosts>, Status> {
+        let work = ViewWork { cameras: request.views(1), method: request.method.clone(), planes: request.planes };
+        let parts = self.engine.light_parts(set, &work, self.turn)?;
+        Ok(parts.map(|LightParts { known_ratio, surfaces_s, draft_s }| SharedLightCosts {
+            known_ratio,
+            surfaces_s,
+            look_up_s: (draft_s - surfaces_s).max(0.0),
+            unknown_s: (reconstruct_view_s - draft_s).max(0.0),
+        }))
     }
 
     /// Images as they leave a sampler, which encodes one set before it samples the next.
     fn sampled(&self, work: &SampleWork) -> Result<Vec<EncodedImage>, Status> {
         let images = self.engine.sample(work, self.turn)?;
         images.iter().map(|image| encode_sample_image(image).map_err(codec)).collect()
+    }
+
+    /// Images, and their time. Where images are tileable, one row of the first builds all shaders: a set whose light is expensive is
+    /// then sampled once.
+    fn sampled_timed(&self, work: &SampleWork, is_tileable: bool) -> Result<(Vec<EncodedImage>, f64), Status> {
+        let Some(first) = work.cameras.first().copied().filter(|_| is_tileable) else {
+            return self.timed(|| self.sampled(work));
+        };
+        let row = first.tile(0, first.size_px().y);
+        self.sampled(&SampleWork { cameras: vec![row], wanted: vec![0], ..work.clone() })?;
+        self.timed_warm(|| self.sampled(work))
     }
 
     /// The overhead of a tile, measured on a tile of one row, and the shares of rows, measured on quarters of the height.
@@ -188,12 +219,17 @@ impl Measurement<'_> {
         Ok(seconds / made.len().max(1) as f64)
     }
 
-    /// The result of a warm-up, and the median time of the runs after it: one long run, or [`RUNS`]. The first run after the
-    /// warm-up decides how many, since the warm-up may have built shaders.
+    /// As [`Measurement::timed_warm`], after a warm-up, which may build shaders.
     fn timed<T>(&self, mut run: impl FnMut() -> Result<T, Status>) -> Result<(T, f64), Status> {
-        let result = run()?;
-        let mut seconds = Vec::with_capacity(RUNS);
-        while seconds.len() < runs_after(seconds.first().copied()) {
+        run()?;
+        self.timed_warm(run)
+    }
+
+    /// The result of the first run, and the median time of the runs: one long run, or [`RUNS`].
+    fn timed_warm<T>(&self, mut run: impl FnMut() -> Result<T, Status>) -> Result<(T, f64), Status> {
+        let (result, first_s) = own_time(self.engine, &mut run);
+        let (result, mut seconds) = (result?, vec![first_s]);
+        while seconds.len() < runs_after(first_s) {
             let (done, own_s) = own_time(self.engine, &mut run);
             done?;
             seconds.push(own_s);
@@ -229,8 +265,8 @@ fn decoded(workload: &Workload, encoded: &[EncodedImage]) -> Result<Vec<SampleIm
 }
 
 /// The number of runs, by the time of the first.
-fn runs_after(first_s: Option<f64>) -> usize {
-    if first_s.is_some_and(|first_s| first_s > LONG_RUN_S) { 1 } else { RUNS }
+fn runs_after(first_s: f64) -> usize {
+    if first_s > LONG_RUN_S { 1 } else { RUNS }
 }
 
 #[cfg(test)]

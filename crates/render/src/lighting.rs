@@ -7,8 +7,10 @@ use depth_image::{Highlight, LightCacheQuality, MAX_REFLECTIONS};
 /// Most rays a light, or of occlusion, a pixel.
 pub const MAX_RAYS: u32 = 4096;
 
-/// Rays a pixel of points that no sample knows, where the lighting has as many.
+/// Rays a pixel of points that no sample knows, where the lighting has as many: in pictures that people look at for long, and in
+/// those that pass.
 const LEAST_RAYS_HERE: NonZeroU32 = NonZeroU32::new(16).unwrap();
+const LEAST_RAYS_IN_MOTION: NonZeroU32 = NonZeroU32::new(4).unwrap();
 
 /// Most rays of a lobe, a pixel.
 pub const MAX_GLOSSY_RAYS: u32 = 256;
@@ -147,6 +149,12 @@ impl Lighting {
         (lighting != *self).then_some(lighting)
     }
 
+    /// One ray to each lamp and one of occlusion: the first step of refinement.
+    #[must_use]
+    pub fn with_single_rays(&self) -> Self {
+        self.with_rays(|_| NonZeroU32::MIN)
+    }
+
     /// With other numbers of rays to lamps and of occlusion.
     fn with_rays(&self, rays: impl Fn(NonZeroU32) -> NonZeroU32) -> Self {
         let direct = match self.direct {
@@ -157,15 +165,17 @@ impl Lighting {
         Self { direct, occlusion, ..*self }
     }
 
-    /// The light of points that no sample knows: a quarter of the rays but at least [`LEAST_RAYS_HERE`], and all of them at the
-    /// finest quality. Such points are few, and they lie where light changes, so that noise is hard to see there.
+    /// The light of points that no sample knows: a quarter of the rays but at least [`LEAST_RAYS_HERE`], or [`LEAST_RAYS_IN_MOTION`]
+    /// below `balanced`, and all of them at the finest quality. Such points are few, and they lie where light changes, so that noise
+    /// is hard to see there.
     #[must_use]
     pub(crate) fn for_unknown_points(&self, quality: LightCacheQuality) -> Self {
         if quality >= LightCacheQuality::Fine {
             return *self;
         }
+        let least = if quality < LightCacheQuality::Balanced { LEAST_RAYS_IN_MOTION } else { LEAST_RAYS_HERE };
         let quarter = |rays: NonZeroU32| NonZeroU32::new(rays.get() / 4).unwrap_or(NonZeroU32::MIN);
-        self.with_rays(|rays| rays.min(quarter(rays).max(LEAST_RAYS_HERE)))
+        self.with_rays(|rays| rays.min(quarter(rays).max(least)))
     }
 
     /// The formula of highlights; none for unlit surfaces.
@@ -351,6 +361,7 @@ mod tests {
         assert_eq!(here("soft 32, occlusion 8", balanced), "soft 16, occlusion 8");
         assert_eq!(here("shadows, occlusion 64, reflections 2", balanced), "shadows, occlusion 16, reflections 2");
         assert_eq!(here("soft 128, occlusion 64", LightCacheQuality::Fine), "soft 128, occlusion 64");
+        assert_eq!(here("soft 128, occlusion 8", LightCacheQuality::Fast), "soft 32, occlusion 4");
     }
 
     #[test]

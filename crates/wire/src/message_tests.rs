@@ -9,7 +9,7 @@ use cluster::{
     JoinCluster, LiveRequest, MeasureCosts, Measured, MeasuredCosts, NodeCondition, NodeStatus, OfferSettings,
     OfferStatus, Policy, PolicyChoice, ProbedView, Promise, PromiseState, Quality, RenderViews, RequestedView,
     SamplePlanes, SamplerReport, SamplerShare, SceneHash, SceneRef, SessionEvent, SessionPlan, SessionRequest,
-    TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
+    SharedLightCosts, TileCosts, Timeline, WorkReport, Workload, WorkloadStatus,
 };
 use codec::{
     FrameCodec, FrameHeader, ImageHeader, InverseDepthRange, MAX_LIGHT_SHARE_PLANES, MAX_VISIBILITY_PLANES,
@@ -222,8 +222,8 @@ fn messages_survive_the_round_trip() {
     assert_eq!(read::<ApplyPlan, _>(to_message::<proto::ApplyAssignmentRequest, _>(apply.clone())), Ok(apply));
     assert_eq!(read::<SessionRequest, _>(to_message::<proto::OpenSessionRequest, _>(request())), Ok(request()));
     assert_eq!(read::<RenderViews, _>(to_message::<proto::RenderViewsRequest, _>(views())), Ok(views()));
-    let live =
-        RenderViews { live: Some(LiveRequest { acknowledged_frame: 8, client_id: 5 }), views: Vec::new(), ..views() };
+    let live = LiveRequest { acknowledged_frame: 8, client_id: 5, waits_for_set: true };
+    let live = RenderViews { live: Some(live), views: Vec::new(), ..views() };
     assert_eq!(read::<RenderViews, _>(to_message::<proto::RenderViewsRequest, _>(live.clone())), Ok(live));
     let plan = SessionEvent::Plan(Box::new(session_plan()));
     assert_eq!(read::<SessionEvent, _>(to_message::<proto::OpenSessionResponse, _>(plan.clone())), Ok(plan));
@@ -680,7 +680,8 @@ fn a_measured_exposure_survives_within_its_limits() {
     let auto_exposure = ExposureEv::new(-3.25).unwrap();
     let planes = SamplePlanes { light: true, ..SamplePlanes::default() };
     let traced_pixel_count = Some(1 << 20);
-    let measured = Measured { costs: session_plan().costs, planes, auto_exposure, traced_pixel_count };
+    let shared_light = Some(SharedLightCosts { known_ratio: 0.9, surfaces_s: 0.1, look_up_s: 0.02, unknown_s: 0.3 });
+    let measured = Measured { costs: session_plan().costs, planes, auto_exposure, traced_pixel_count, shared_light };
     let message = to_message::<proto::MeasureCostsResponse, _>(measured);
     assert_eq!(read::<Measured, _>(message), Ok(measured));
     let spoilt = proto::MeasureCostsResponse { auto_exposure_ev: f32::NAN, ..message };

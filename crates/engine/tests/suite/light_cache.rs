@@ -136,6 +136,24 @@ fn surfaces_are_found_as_the_plan_says_and_exact_views_are_direct_ones() {
 }
 
 #[test]
+fn the_parts_of_a_view_are_told_and_a_preview_has_single_rays() {
+    let set = engine().upload(&decoded_set(), TURN).expect("a set");
+    let known = |method: &str| {
+        let parts = engine().light_parts(set.as_ref(), &work(method), TURN).expect("measured").expect("light");
+        assert!(parts.surfaces_s > 0.0 && parts.draft_s > 0.0, "{parts:?}");
+        parts.known_ratio
+    };
+    let [draft, fine] = ["light_cache:draft", "light_cache:fine"].map(known);
+    assert!(0.2 < fine && fine < draft && draft <= 1.0, "{fine} {draft}");
+    assert!((known("light_cache:exact")).abs() < 1e-9, "every point is lit in the view");
+    let colored = engine().upload(&sample_set((HASH, scene()), &sample_cameras(), LIGHTING), TURN).expect("a set");
+    assert_eq!(engine().light_parts(colored.as_ref(), &work("joint_carve"), TURN), Ok(None));
+    let preview = |lighting: &str| engine().preview_lighting(lighting).expect("a lighting");
+    assert_eq!(preview("soft 16, occlusion 64 0.5m, reflections 2"), "soft 1, occlusion 1 0.5m, reflections 2");
+    assert_eq!(preview("phong"), "phong");
+}
+
+#[test]
 fn what_does_not_fit_is_refused_by_name() {
     let light = engine().upload(&decoded_set(), TURN).expect("a set");
     assert!(refused(light.as_ref(), "joint_carve").contains("light where joint_carve needs colour"));

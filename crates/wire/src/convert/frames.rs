@@ -15,7 +15,7 @@ messages! {
         planes: antialias_sample_count | exposure_ev | tone_curve | with_inverse_depth | with_provenance
     }, first |r| check_view_count(r.views.len(), r.live.is_some()), then RenderViews::validate;
     RequestedView = RequestedView { camera as "views.camera"; frame: frame_number };
-    LiveRequest = LiveRequest { client_id; acknowledged_frame: acknowledged_frame_number };
+    LiveRequest = LiveRequest { client_id, waits_for_set; acknowledged_frame: acknowledged_frame_number };
     RenderViewsResponse = FramePart { header, offset_bytes, data; frame: frame_number };
     FrameHeader = FrameHeader {
         camera as "header.camera", color_bytes, inverse_depth_bytes, provenance_bytes,

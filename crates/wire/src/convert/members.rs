@@ -3,8 +3,8 @@
 use cluster::limits::{MAX_BATCH, MAX_PROBE_VIEWS, MAX_SCENES, MAX_VIEWPOINTS, MAX_WORKLOADS};
 use cluster::{
     AchievedTime, AuditReport, AuditedView, ClusterStatus, JoinCluster, MeasureCosts, Measured, NodeCondition,
-    NodeStatus, ProbeViews, ProbedView, ProbedViews, Ready, SamplerReport, Welcome, WorkReport, WorkloadStatus,
-    at_most,
+    NodeStatus, ProbeViews, ProbedView, ProbedViews, Ready, SamplerReport, SharedLightCosts, Welcome, WorkReport,
+    WorkloadStatus, at_most,
 };
 
 use crate::error::{PROTOCOL_VERSION, check_version};
@@ -21,9 +21,11 @@ messages! {
         planes: antialias_sample_count | exposure_ev | tone_curve | with_inverse_depth | with_provenance
     }, first |r| at_most(r.typical_views.len(), MAX_BATCH as usize, "typical_views"), then MeasureCosts::validate;
     MeasureCostsResponse = Measured {
-        costs, traced_pixel_count;
+        costs, traced_pixel_count, shared_light;
         planes: with_normals | with_corner_inverse_depths | with_light, auto_exposure: auto_exposure_ev
     };
+    SharedLightCosts = SharedLightCosts { known_ratio, surfaces_s, look_up_s, unknown_s },
+        then SharedLightCosts::validate;
     ProbeViewsRequest = ProbeViews {
         workload, compared_lighting, views, with_errors; method: reconstruction_method, antialias: antialias_sample_count
     }, first |r| at_most(r.views.len(), MAX_PROBE_VIEWS, "views"), then ProbeViews::validate;

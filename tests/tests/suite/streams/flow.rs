@@ -4,9 +4,11 @@ use std::num::NonZeroU32;
 use std::time::Duration;
 
 use cluster::{
-    ApplyPlan, Assignment, Policy, RenderViews, RequestedView, SamplerShare, SessionRequest, Timeline, Workload,
+    ApplyPlan, Assignment, LiveRequest, Policy, RenderViews, RequestedView, SamplerShare, SessionRequest, Timeline,
+    Workload,
 };
 use cluster_tests::cluster::{Cluster, camera, rig, views, whole_frame};
+use cluster_tests::scalar_engine::LIGHT_CACHE;
 use cluster_tests::watcher::eventually;
 use codec::{FrameHeader, WholeFrame};
 use depth_image::{Camera, PinholeCamera, SampleCamera};
@@ -149,6 +151,43 @@ async fn the_first_set_of_a_stream_is_waited_for() {
     cluster.engines[0].release();
     let header = timeout(HEALED, whole_frame(&mut raw.parts)).await.expect("its own").header;
     assert_eq!((header.cell, header.is_neighbour_cell), (1, false));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_viewer_in_motion_sees_the_scene_until_its_first_set_of_light_is_there_and_a_still_waits() {
+    let quick = |config: NodeConfig| NodeConfig {
+        deadlines: Deadlines { neighbour: Duration::from_millis(1), ..config.deadlines },
+        ..config
+    };
+    let cluster = Cluster::start_with(1, quick).await;
+    let method = format!("{LIGHT_CACHE}:fine");
+    let request = SessionRequest { method: method.clone(), takes_light: true, ..pipeline(STILL) };
+    let session = cluster.session(request).await.unwrap();
+    let plan = session.plan().assignment;
+    assert!(plan.workload.planes.light);
+    let engine = &cluster.engines[0];
+    let _of_measuring = engine.take_reconstructed();
+    engine.hold_samples_from(eye(&rig()[0]));
+    let address = compositor_of(&session).0;
+    let [mut moving, mut still] = [opened(&address, &plan).await, opened(&address, &plan).await];
+    for stream in [&mut moving, &mut still] {
+        stream.template.method.clone_from(&method);
+    }
+    still.template.live = Some(LiveRequest { client_id: 1, waits_for_set: true, ..LiveRequest::default() });
+    still.say_at(Some((1, camera(0.0, SIZE_PX))), 0).await;
+    for frame in 1..4 {
+        assert!(shown(&mut moving, frame, 0.01 * frame as f32).await.is_neighbour_cell, "no set is there");
+    }
+    moving.say_at(Some((4, camera(0.03, SIZE_PX))), 3).await;
+    assert_eq!(moving.frame().await, None, "the same view is not drawn again");
+    assert_eq!(still.frame().await, None, "it waits");
+    assert_eq!(engine.take_reconstructed(), 0);
+    engine.release();
+    for stream in [&mut moving, &mut still] {
+        let header = timeout(HEALED, whole_frame(&mut stream.parts)).await.expect("from the set").header;
+        assert!(!header.is_neighbour_cell);
+    }
+    assert_eq!(engine.take_reconstructed(), 2);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -71,7 +71,7 @@ impl Raw {
             codec: FrameCodec::Lz4,
             planes: ViewPlanes::default(),
             views: Vec::new(),
-            live: Some(LiveRequest { acknowledged_frame: 0, client_id: 1 }),
+            live: Some(LiveRequest { client_id: 1, ..LiveRequest::default() }),
         };
         Ok(Self { send, parts, template })
     }
