@@ -145,6 +145,7 @@ pub(crate) mod tests {
                 planes: SamplePlanes::default(),
                 auto_exposure: ExposureEv::ZERO,
                 traced_pixel_count: None,
+                shared_light: None,
             },
             is_settled: true,
         }

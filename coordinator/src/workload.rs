@@ -12,10 +12,12 @@ use crate::schedule::ChoiceError;
 
 /// Texels of a sample image a pixel of a view, each way: what brings most for its cost (docs/benchmarks.md).
 const SAMPLE_DENSITY: f32 = 2.0;
-/// The same of samples that views take only light from: surfaces need no finer ones.
-const LIGHT_DENSITY: f32 = 1.0;
+/// The same of samples that views take only light from, the finest first: surfaces need no finer ones.
+pub(crate) const LIGHT_DENSITIES: [f32; 3] = [1.0, 0.5, 0.25];
 /// The most texels of a set of images whose size follows the views: a software device samples them in about a second.
 const MAX_FITTING_TEXELS: usize = 1 << 20;
+/// The same of samples of light, whose time is measured.
+const MAX_LIGHT_TEXELS: usize = 1 << 24;
 /// Texels of all images of a mirror cell, over those of one sample image: a mirror shows all directions.
 const MIRROR_DENSITY: f32 = 2.2;
 /// The same of all mirror cells together, which every view needs.
@@ -23,22 +25,28 @@ const MIRRORS_DENSITY: f32 = 4.4;
 /// Steps of √2 by which images are smaller than the offered ones at most.
 const LEAST_STEPS: f32 = -2.0;
 
-/// Completes a request with the scene's defaults. A node tells which planes its method needs.
+/// Completes a request with the scene's defaults. A node tells which planes its method needs. Samples of light have a density of
+/// `light_density` where their size follows the views.
 ///
 /// # Errors
 /// For invalid cameras.
-pub(crate) fn workload_of(request: &SessionRequest, offer: &SceneOffer) -> Result<Workload, Status> {
+pub(crate) fn workload_of(
+    request: &SessionRequest,
+    offer: &SceneOffer,
+    light_density: f32,
+) -> Result<Workload, Status> {
     let volume = request.volume.unwrap_or(offer.volume);
     let offered = offer.cube.as_ref().filter(|cube| cube.sampling == request.sampling);
     let drawn = offered.filter(|_| request.method == DIRECT);
     let cube = offered.filter(|_| drawn.is_none()).map(|cube| checked_cube(request, cube)).transpose()?;
-    let cells = if cube.is_some() { Vec::new() } else { cells_of(request, offer, &volume)? };
+    let size_px = session_size_px(request, offer, light_density);
+    let cells = if cube.is_some() { Vec::new() } else { cells_of(request, offer, size_px, &volume)? };
     let sample_cameras = match cube {
         Some(cube) => {
             let parallel = cube.grid.cameras().map(SampleCamera::from).into_iter();
             parallel.chain(cube.light_field.map(SampleCamera::from)).collect()
         }
-        None => sample_cameras_of(request, offer, !cells.is_empty())?,
+        None => sample_cameras_of(request, offer, size_px, !cells.is_empty())?,
     };
     let workload = Workload {
         scene: offer.scene(),
@@ -81,6 +89,7 @@ fn checked_cube<'o>(request: &SessionRequest, cube: &'o OfferedCube) -> Result<&
 fn sample_cameras_of(
     request: &SessionRequest,
     offer: &SceneOffer,
+    size_px: Option<UVec2>,
     has_cells: bool,
 ) -> Result<Vec<SampleCamera>, Status> {
     let cameras = match (has_cells, request.sample_cameras.is_empty()) {
@@ -92,7 +101,6 @@ fn sample_cameras_of(
     if cameras.is_empty() {
         return Err(Status::invalid_argument("sample_cameras is missing, and the scene came without a rig"));
     }
-    let size_px = session_size_px(request, offer);
     let sized = |camera: &Camera| size_px.map_or(Ok(*camera), |size_px| resized(camera, size_px));
     cameras.iter().map(|camera| sized(camera).map(SampleCamera::Depth)).collect()
 }
@@ -136,9 +144,14 @@ fn base_of<'o>(
 }
 
 /// The sample cameras of each view cell of the session's viewpoints, as if it were alone, in the size of the offered ones.
-fn cells_of(request: &SessionRequest, offer: &SceneOffer, volume: &Aabb) -> Result<Vec<Vec<SampleCamera>>, Status> {
+fn cells_of(
+    request: &SessionRequest,
+    offer: &SceneOffer,
+    size_px: Option<UVec2>,
+    volume: &Aabb,
+) -> Result<Vec<Vec<SampleCamera>>, Status> {
     let offered = offer.rig.first().map(Camera::size_px);
-    let size_px = session_size_px(request, offer).or(offered).unwrap_or(request.typical_view.size_px);
+    let size_px = size_px.or(offered).unwrap_or(request.typical_view.size_px);
     let mut groups = Vec::new();
     ViewGroup::add(&mut groups, &request.viewpoints, volume);
     if groups.len() > MAX_CELLS {
@@ -153,23 +166,33 @@ fn cells_of(request: &SessionRequest, offer: &SceneOffer, volume: &Aabb) -> Resu
 }
 
 /// The size of a session's images; `None` where the offer's is fixed, or the session brings its own cameras.
-fn session_size_px(request: &SessionRequest, offer: &SceneOffer) -> Option<UVec2> {
+fn session_size_px(request: &SessionRequest, offer: &SceneOffer, light_density: f32) -> Option<UVec2> {
     let is_fitted = offer.fits_views && request.sample_cameras.is_empty();
-    let density = if request.takes_light { LIGHT_DENSITY } else { SAMPLE_DENSITY };
-    request.sample_size_px.or_else(|| size_of_density(&offer.rig, &request.typical_view, density).filter(|_| is_fitted))
+    let (density, most_texels) = match request.takes_light {
+        true => (light_density, MAX_LIGHT_TEXELS),
+        false => (SAMPLE_DENSITY, MAX_FITTING_TEXELS),
+    };
+    let fitting = || size_of_density(&offer.rig, &request.typical_view, density, most_texels).filter(|_| is_fitted);
+    request.sample_size_px.or_else(fitting)
+}
+
+/// Whether the density of a session's samples of light may be chosen.
+pub(crate) fn chooses_light_density(request: &SessionRequest, offer: &SceneOffer) -> bool {
+    let is_fitted = offer.fits_views && request.sample_cameras.is_empty() && request.sample_size_px.is_none();
+    request.takes_light && is_fitted
 }
 
 /// The size of offered images that makes them about `SAMPLE_DENSITY` times as dense as a view. Sizes are whole steps of √2
 /// apart, so that sessions of similar views share their samples. `None` without images or with a degenerate view.
 #[must_use]
 pub fn fitting_size_px(rig: &[Camera], view: &PinholeCamera) -> Option<UVec2> {
-    size_of_density(rig, view, SAMPLE_DENSITY)
+    size_of_density(rig, view, SAMPLE_DENSITY, MAX_FITTING_TEXELS)
 }
 
-fn size_of_density(rig: &[Camera], view: &PinholeCamera, density: f32) -> Option<UVec2> {
+fn size_of_density(rig: &[Camera], view: &PinholeCamera, density: f32, most_texels: usize) -> Option<UVec2> {
     let offered = rig.first()?.reference();
     let wanted = density * view.focal_px.min_element() / offered.focal_px.min_element();
-    let most = (MAX_FITTING_TEXELS as f32 / (offered.pixel_count() * rig.len()) as f32).log2().floor();
+    let most = (most_texels as f32 / (offered.pixel_count() * rig.len()) as f32).log2().floor();
     let steps = (2.0 * wanted.log2()).round().max(LEAST_STEPS).min(most);
     let size_px = (offered.size_px.as_vec2() * (0.5 * steps).exp2()).round();
     steps.is_finite().then(|| size_px.as_uvec2().max(UVec2::ONE))
@@ -223,6 +246,7 @@ mod tests {
         };
         assert!((1..=40).all(|cameras| texels(cameras).is_some_and(|texels| texels < MAX_FITTING_TEXELS + 4096)));
         assert_eq!(fitting_size_px(&[], &camera(4, 3)), None);
-        assert_eq!(size_of_density(&rig, &camera(400, 300), LIGHT_DENSITY), Some(UVec2::new(400, 300)));
+        assert_eq!(size_of_density(&rig, &camera(400, 300), 1.0, MAX_LIGHT_TEXELS), Some(UVec2::new(400, 300)));
+        assert_eq!(size_of_density(&rig, &camera(800, 600), 0.5, MAX_LIGHT_TEXELS), Some(UVec2::new(400, 300)));
     }
 }

@@ -75,6 +75,8 @@ fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) -> Opening 
         viewpoints: Vec::new(),
         costs: WHOLE,
         auto_exposure: ExposureEv::ZERO,
+        last_view_time_ratio: 1.0,
+        note: String::new(),
         budgeted: None,
     }
 }

@@ -175,6 +175,8 @@ fn open(cluster: &Cluster, demand: &Demand) -> Event {
         viewpoints: Vec::new(),
         costs: slowest,
         auto_exposure: ExposureEv::ZERO,
+        last_view_time_ratio: 1.0,
+        note: String::new(),
         budgeted: None,
     }))
 }

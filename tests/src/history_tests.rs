@@ -69,6 +69,8 @@ fn log(plan_epoch: u64) -> Vec<u8> {
         policy_override: PolicyOverride { policy: PolicyChoice::Pipeline, ..PolicyOverride::default() },
         costs,
         auto_exposure: ExposureEv::ZERO,
+        last_view_time_ratio: 1.0,
+        note: String::new(),
         budgeted: None,
     };
     let left = Event::Left { incarnation: plan_epoch + 1, node_name: "b".to_owned() };

@@ -3,7 +3,7 @@
 use cluster::limits::{MAX_VIEWS_PER_SET, MAX_WORKLOADS};
 use cluster::{
     AuditReport, Costs, InvalidField, JoinCluster, MAX_AUDIT_TIME_RATIO, MeasuredCosts, Quality, SamplePlanes,
-    SamplerReport, Workload, finite_seconds, frame_rate, nonempty, reason, viewpoints,
+    SamplerReport, Workload, finite_seconds, frame_rate, nonempty, ratio, reason, viewpoints,
 };
 use depth_image::{ExposureEv, PinholeCamera};
 use planner::ProbeId;
@@ -98,6 +98,12 @@ pub struct Opening {
     pub viewpoints: Vec<PinholeCamera>,
     /// Its budget; `None`: it is shown what it asks for.
     pub budgeted: Option<Budgeted>,
+    /// The time of a view at its last fallback over that of one as it asks for, as measured; 1 where nobody knows it.
+    #[serde(default = "unknown_ratio")]
+    pub last_view_time_ratio: f64,
+    /// What the reasons of its workload's plans say beside their figures.
+    #[serde(default)]
+    pub note: String,
 }
 
 impl Event {
@@ -142,6 +148,10 @@ impl Event {
     }
 }
 
+fn unknown_ratio() -> f64 {
+    1.0
+}
+
 impl Opening {
     fn validate(&self) -> Result<(), InvalidField> {
         self.workload.validate()?;
@@ -151,6 +161,8 @@ impl Opening {
         self.fallbacks.iter().try_for_each(Quality::validate)?;
         self.costs.validate()?;
         self.budgeted.as_ref().map_or(Ok(()), Budgeted::validate)?;
+        ratio(self.last_view_time_ratio, "last_view_time_ratio")?;
+        reason(&self.note, "note")?;
         viewpoints(&self.viewpoints)
     }
 }

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 /// Frames begin to wait above this utilisation.
-const FULL: f64 = 0.95;
+pub(super) const FULL: f64 = 0.95;
 /// A step up is taken where its predicted utilisation is below this.
 const ROOMY: f64 = 0.75;
 /// Samples in a row that must agree before a step down, and before a step up.
@@ -78,6 +78,12 @@ impl Overload {
             return true;
         }
         false
+    }
+
+    /// Begins at a step, with the utilisation by one view a second that is predicted for each step above.
+    pub(super) fn begin_at(&mut self, now: Duration, step: usize, view_utilisation_when_left: Vec<f64>) {
+        self.view_utilisation_when_left = view_utilisation_when_left;
+        self.change(now, step);
     }
 
     /// Sessions have come or gone, and accept no more than `fallbacks` any more.

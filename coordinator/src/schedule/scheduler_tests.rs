@@ -290,6 +290,44 @@ fn a_static_scene_with_a_rate_is_sampled_once_and_all_nodes_make_views() {
 }
 
 #[test]
+fn views_that_take_longer_than_a_second_are_admitted_at_a_rate_that_leaves_them_time() {
+    let costs = Costs { reconstruct_view_s: 3.0, direct_view_s: 9.0, ..COSTS };
+    let rated = |session, frames_per_s| {
+        let asked = opening(session, PIPELINE, 1);
+        Event::Opened(Box::new(Opening { frames_per_s: Some(frames_per_s), costs, ..asked }))
+    };
+    let mut cluster = Cluster::of(2);
+    let refused = cluster.step(rated(1, 0.5));
+    assert!(matches!(refused[..], [Command::Refuse { session: 1, .. }]), "a view in two seconds: {refused:?}");
+    cluster.step(rated(2, 0.1));
+    let utilisation = cluster.workload().utilisation.unwrap();
+    assert!((utilisation - 0.3).abs() < 0.01, "a view of three seconds in ten: {utilisation}");
+}
+
+#[test]
+fn a_session_begins_at_the_fallback_that_has_room_where_its_time_is_known() {
+    let fallbacks = vec![quality("fast", 1.0), quality("draft", 1.0), quality("draft", 0.8)];
+    let rated = |session, frames_per_s, last_view_time_ratio| {
+        let asked = opening(session, PIPELINE, 1);
+        let frames_per_s = Some(frames_per_s);
+        let fallbacks = fallbacks.clone();
+        Event::Opened(Box::new(Opening { frames_per_s, fallbacks, last_view_time_ratio, ..asked }))
+    };
+    let step_at = |frames_per_s, ratio| {
+        let mut cluster = Cluster::of(2);
+        let commands = cluster.step(rated(1, frames_per_s, ratio));
+        let [Command::Apply { plan, .. }] = &commands[..] else { panic!("{commands:?}") };
+        plan.fallback.map_or(0, |step| step.get())
+    };
+    // A view takes 10 ms of one of two nodes, the other of which samples: a quarter of it at the last fallback.
+    assert_eq!([80.0, 150.0, 300.0, 400.0].map(|rate| step_at(rate, 0.25)), [0, 1, 2, 3]);
+    assert_eq!(step_at(80.0, 1.0), 0);
+    let refused = |rate, ratio| matches!(Cluster::of(2).step(rated(1, rate, ratio))[..], [Command::Refuse { .. }]);
+    assert!(refused(150.0, 1.0) && !refused(150.0, 0.25), "its times are not known");
+    assert!(refused(500.0, 0.25));
+}
+
+#[test]
 fn sessions_beyond_the_nodes_time_are_refused() {
     let mut cluster = Cluster::of(2);
     let fallbacks = vec![quality("joint_carve:1", 0.8)];

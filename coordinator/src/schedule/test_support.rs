@@ -141,6 +141,8 @@ pub(super) fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) 
         viewpoints: Vec::new(),
         costs: COSTS,
         auto_exposure: ExposureEv::ZERO,
+        last_view_time_ratio: 1.0,
+        note: String::new(),
         budgeted: None,
     }
 }

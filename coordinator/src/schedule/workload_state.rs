@@ -11,7 +11,7 @@ use super::active_plan::ActivePlan;
 use super::budgeted::Budgeted;
 use super::cells::Cells;
 use super::node_costs::view_s;
-use super::overload::Overload;
+use super::overload::{FULL, Overload};
 use super::representation::Representation;
 use super::session_mix::SessionMix;
 use super::{Load, Opening, PolicyOverride};
@@ -30,6 +30,10 @@ pub(super) struct WorkloadState {
     pub(super) costs: Costs,
     /// As measured when it was opened: views of all cells, moments and plans have one exposure.
     pub(super) auto_exposure: ExposureEv,
+    /// The time of a view at the last fallback over that of one as it was asked for.
+    last_view_time_ratio: f64,
+    /// What the reasons of its plans say beside their figures.
+    pub(super) note: String,
     pub(super) sessions: SessionMix,
     /// The representations among which budgets of its sessions choose; `None`: its sessions have no budget.
     pub(super) budgeted: Option<Budgeted>,
@@ -77,6 +81,8 @@ impl WorkloadState {
             cells: (!opening.viewpoints.is_empty()).then(|| Cells::of(&opening.workload)),
             costs: opening.costs,
             auto_exposure: opening.auto_exposure,
+            last_view_time_ratio: opening.last_view_time_ratio,
+            note: opening.note.clone(),
             sessions: SessionMix::default(),
             budgeted: opening.budgeted.clone(),
             representation: None,
@@ -267,10 +273,19 @@ impl WorkloadState {
         self.active_plan.as_ref().map(ActivePlan::policy)
     }
 
-    /// Scene time from set to set; a second for a static scene.
+    /// Views a second of sessions with a rate.
+    fn rated_views_per_s(&self) -> f64 {
+        self.sessions.views_per_s() * self.frame_rate_ratio()
+    }
+
+    /// Scene time from set to set. That of a static scene is about a second, or longer where views are rare: its views are whole.
     fn set_s(&self) -> f64 {
-        let timeline = &self.requested.timeline;
-        if timeline.moves() { timeline.step_s.abs() } else { 1.0 }
+        let (timeline, views_per_s) = (&self.requested.timeline, self.rated_views_per_s());
+        match timeline.moves() {
+            true => timeline.step_s.abs(),
+            false if views_per_s > 0.0 => views_per_s.ceil() / views_per_s,
+            false => 1.0,
+        }
     }
 
     /// Views of a set: those of sessions with a rate while the set is shown, and those of the others at once.
@@ -299,7 +314,8 @@ impl WorkloadState {
 
     fn load_with(&self, views_at_once: usize) -> Load {
         let timeline = &self.requested.timeline;
-        let rated = (self.sessions.views_per_s() * self.frame_rate_ratio() * self.set_s()).ceil() as usize;
+        let views_per_s = self.rated_views_per_s();
+        let rated = if timeline.moves() { views_per_s * self.set_s() } else { views_per_s }.ceil() as usize;
         Load {
             images: self.image_count(),
             tiles: 1,
@@ -321,8 +337,37 @@ impl WorkloadState {
     /// The share of the nodes' time that sessions with a rate take at their last fallback, where a set of their views
     /// takes `time_s` now.
     pub(super) fn utilisation_at_last(&self, time_s: f64) -> f64 {
-        let least_ratio = self.sessions.fallbacks().last().map_or(1.0, |quality| quality.frame_rate_ratio);
-        time_s / self.set_s() * least_ratio / self.frame_rate_ratio()
+        let last = self.sessions.fallbacks().len();
+        time_s / self.set_s() * self.load_ratio(last) / self.load_ratio(self.overload.step)
+    }
+
+    /// The share of the nodes' time at a fallback over that of views as they were asked for. Where the time of the last one is known,
+    /// those between are taken to differ by equal ratios.
+    fn load_ratio(&self, step: usize) -> f64 {
+        let fallbacks = self.sessions.fallbacks();
+        let rate_ratio = step.checked_sub(1).and_then(|at| fallbacks.get(at)).map_or(1.0, |q| q.frame_rate_ratio);
+        rate_ratio * self.view_time_ratio(step)
+    }
+
+    /// The time of a view at a fallback over that of one as it was asked for.
+    pub(super) fn view_time_ratio(&self, step: usize) -> f64 {
+        let steps = self.sessions.fallbacks().iter().take_while(|quality| quality.frame_rate_ratio >= 1.0).count();
+        self.last_view_time_ratio.powf(step.min(steps) as f64 / steps.max(1) as f64)
+    }
+
+    /// Begins at the first fallback that has room, where views as asked for would take this share of the nodes' time, and the time of
+    /// others is known.
+    pub(super) fn begin_with_room(&mut self, now: Duration, utilisation: f64) {
+        if self.last_view_time_ratio >= 1.0 || self.sessions.viewers() == 0 {
+            return;
+        }
+        let last = self.sessions.fallbacks().len();
+        let at = |step: usize| utilisation * self.load_ratio(step);
+        let step = (0..last).find(|&step| at(step) <= FULL).unwrap_or(last);
+        let views_per_s = self.sessions.views_per_s();
+        let view_utilisation = |step: usize| utilisation * self.view_time_ratio(step) / views_per_s;
+        let when_left = (0..step).map(view_utilisation).collect();
+        self.overload.begin_at(now, step, when_left);
     }
 
     /// A node's costs of the views of sessions with a rate, from those of the mean view: batches may ask for larger ones.
@@ -353,7 +398,7 @@ impl WorkloadState {
         let is_direct = self.policy_override().policy == PolicyChoice::Direct;
         let direct_s = mean.direct_view_s + mean.encode_view_s;
         let each_s = if is_direct { direct_s } else { direct_s.min(view_s(mean)) };
-        let views_s = self.sessions.views_per_s() * self.frame_rate_ratio() * each_s;
+        let views_s = self.rated_views_per_s() * each_s;
         let samples = !is_direct && self.requested.timeline.moves() && views_s > 0.0;
         let set_s = self.image_count() as f64 * mean.sample_image_s + mean.load_set_s;
         views_s + if samples { set_s / self.set_s() } else { 0.0 }

@@ -146,14 +146,18 @@ impl Scheduler {
 
 /// The share of all nodes' time that a workload's sessions with a rate take at their last fallback.
 fn promised(workload: &WorkloadState, nodes: &[NodeCosts]) -> f64 {
+    rated_set_s(workload, nodes).map_or(0.0, |time_s| workload.utilisation_at_last(time_s))
+}
+
+/// Seconds of a set's views of sessions with a rate; `None` without such sessions.
+pub(super) fn rated_set_s(workload: &WorkloadState, nodes: &[NodeCosts]) -> Option<f64> {
     if workload.sessions.viewers() == 0 {
-        return 0.0;
+        return None;
     }
     let load = workload.rated_load();
     let policy_override = workload.policy_override().possible(&load, nodes.len());
     let of_viewers = |node: &NodeCosts| NodeCosts { costs: workload.of_viewers(&node.costs), ..*node };
     let nodes: Vec<NodeCosts> = nodes.iter().map(of_viewers).collect();
-    let choice = choose(&Demand { load, nodes: &nodes, policy_override, current: None });
     // Nodes that can do none of it do not work for it.
-    choice.map_or(0.0, |choice| workload.utilisation_at_last(choice.time_s()))
+    choose(&Demand { load, nodes: &nodes, policy_override, current: None }).ok().map(|choice| choice.time_s())
 }

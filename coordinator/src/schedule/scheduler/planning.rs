@@ -223,7 +223,7 @@ impl Scheduler {
         let old = workload.active_plan.as_ref();
         let slowest = candidates.iter().fold(Costs::default(), |slowest, node| slowest.max(node.costs.costs));
         let again = if old.is_some() { format!(" Planned again: {why}.") } else { String::new() };
-        let mut plan = session_plan(assignment, slowest, choice, format!("{}{again}", choice.reason));
+        let mut plan = session_plan(assignment, slowest, choice, format!("{}{}{again}", choice.reason, workload.note));
         plan.fallback = NonZeroU32::new(workload.overload.step as u32);
         plan.frame_rate_ratio = workload.frame_rate_ratio();
         plan.method = workload.method();

@@ -1,9 +1,12 @@
 //! Sessions: opening, closing, and changes of their demand.
 
+use cluster::Costs;
+
+use super::admission::rated_set_s;
 use super::{RESUMED_WITHIN, Scheduler};
 use crate::schedule::session_mix::SessionMix;
 use crate::schedule::workload_state::{PlanTrigger, WorkloadState};
-use crate::schedule::{Command, Opening};
+use crate::schedule::{Command, NodeCosts, Opening};
 
 impl Scheduler {
     /// Numbers of all open workloads. None for a while after a restart: streams under plans of the coordinator before go on
@@ -36,8 +39,15 @@ impl Scheduler {
     fn begin(&mut self, opening: &Opening) -> Vec<Command> {
         let number = self.last_workload.max(self.plan_epoch) + 1;
         self.last_workload = number;
-        let workload = WorkloadState::new(self.now, opening);
-        self.members.values_mut().for_each(|member| member.expect(number, &workload.costs));
+        let mut workload = WorkloadState::new(self.now, opening);
+        let alone = vec![NodeCosts { costs: opening.costs, ..NodeCosts::default() }; self.usable().count()];
+        if let Some(time_s) = rated_set_s(&workload, &alone) {
+            workload.begin_with_room(self.now, workload.utilisation(time_s));
+        }
+        let view_time_ratio = workload.view_time_ratio(workload.overload.step);
+        let reconstruct_view_s = workload.costs.reconstruct_view_s * view_time_ratio;
+        let expected = Costs { reconstruct_view_s, ..workload.costs };
+        self.members.values_mut().for_each(|member| member.expect(number, &expected));
         self.workloads.insert(number, workload);
         self.nodes_changed(&format!("workload {number} began"))
     }
