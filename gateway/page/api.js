@@ -1,11 +1,12 @@
 // Requests of HTTP to the gateway. A refusal is an error whose message is the gateway's sentence.
 
-/** The query of a view: { scene, camera, size, moment }; a null moment is left out. */
-export function queryOf({ scene, camera, size, moment }, more = {}) {
+/** The query of a view: { scene, camera, size, moment, quality }; a null moment or quality is left out. */
+export function queryOf({ scene, camera, size, moment, quality }, more = {}) {
   const query = new URLSearchParams({
     scene, eye: camera.eye.join(","), target: camera.target.join(","), fov: camera.fov_y_deg, size: size.join("x"), ...more,
   });
   if (moment !== null) query.set("moment", moment);
+  if (quality) query.set("quality", quality);
   return query;
 }
 

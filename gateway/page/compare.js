@@ -1,9 +1,8 @@
-// The view as it was reconstructed beside the view drawn directly, with the measures of their difference.
+// The view from samples beside the view drawn directly, with the measures of their difference.
 
 import { $, element, on, press, say } from "./dom.js";
-import { queryOf, requestJson, within } from "./api.js";
+import { queryOf, requestJson } from "./api.js";
 
-const LARGEST_PX = [640, 360];
 const PICTURES = { "compare-view": "view", "compare-direct": "direct", "compare-flip": "flip_map" };
 
 export class Compare {
@@ -61,7 +60,7 @@ export class Compare {
     const { signal } = (this.asked = new AbortController());
     this.tell("Both pictures are being made…");
     try {
-      const result = await requestJson("compare.json", queryOf({ ...view, size: within(view.size, LARGEST_PX) }), signal);
+      const result = await requestJson("compare.json", queryOf(view), signal);
       if (!signal.aborted) this.show(result);
     } catch (error) {
       if (!signal.aborted) this.tell(error.message);
@@ -80,14 +79,13 @@ export class Compare {
       ["Foreground PSNR", psnr(result.foreground_psnr_db)], ["Foreground SSIM", number(result.foreground_ssim, 4)],
       ["Foreground FLIP", number(result.foreground_flip, 4)],
       ["PSNR", psnr(result.psnr_db)], ["SSIM", number(result.ssim, 4)], ["FLIP", number(result.flip, 4)],
-      ["Reconstructed in", ms(result.view_ms)], ["Drawn directly in", ms(result.direct_ms)],
+      ["From samples in", ms(result.view_ms)], ["Drawn directly in", ms(result.direct_ms)],
     ];
     $("measures").replaceChildren(...rows.map(([name, value]) => element("div", element("dt", name), element("dd", value))));
     this.showsFlip(false);
     this.split();
     $("compared").hidden = false;
-    this.tell("");
-    say(`Compared: foreground PSNR ${psnr(result.foreground_psnr_db)}, FLIP ${number(result.foreground_flip, 4)}.`);
+    this.tell(`${psnr(result.foreground_psnr_db)} and FLIP ${number(result.foreground_flip, 4)} from the picture drawn directly, where there is a surface.`);
     if ($("comparison").contains(document.activeElement)) $("split").focus();
   }
 
@@ -103,6 +101,6 @@ export class Compare {
     const percent = Number($("split").value);
     $("compare-view").style.clipPath = `inset(0 ${100 - percent}% 0 0)`;
     $("divider").style.left = `${percent}%`;
-    $("split").setAttribute("aria-valuetext", `${percent} % reconstructed, ${100 - percent} % drawn directly`);
+    $("split").setAttribute("aria-valuetext", `${percent} % from samples, ${100 - percent} % drawn directly`);
   }
 }

@@ -46,6 +46,7 @@ const poses = new Poses(link, screen, {
   asked: (still) => notices.asked(still),
   rested: settle,
   isLossless: () => $("lossless").checked,
+  quality,
   isPlaying: () => playback.isPlaying,
 });
 const pictures = new Pictures(link, screen, poses, statistics, showsPicture);
@@ -124,6 +125,7 @@ function enter({ home, bounds }) {
   const linked = poses.state ? null : camera.fromFragment(location.hash);
   poses.state = camera.fromCamera(linked ?? home, sizeOf(bounds), isFlying());
   [shown, plan] = [null, null];
+  $("quality").value = welcome.quality;
   measure.restart();
   moved();
   marks.redraw();
@@ -136,7 +138,13 @@ function sizeOf([low, high]) {
 function planned(message) {
   const isNew = message.epoch !== plan?.epoch;
   plan = message;
+  $("light").hidden = !plan.shares_light;
   if (isNew) frusta.planned();
+}
+
+/** The quality of shared light that was chosen; null for the scene's own, and where no light is shared. */
+function quality() {
+  return plan?.shares_light ? $("quality").value : null;
 }
 
 /** The visitor moves the camera. */
@@ -185,7 +193,7 @@ function view() {
   if (!shown) return null;
   const { header, moment } = shown;
   const size = header.still ? header.size_px : within(screen.size, welcome.max_still_px);
-  return { scene: welcome.scene, camera: header.camera, size, moment };
+  return { scene: welcome.scene, camera: header.camera, size, moment, quality: quality() };
 }
 
 function restView() {
@@ -222,6 +230,10 @@ on("copy-camera", (button) => poses.state && copied(button, JSON.stringify(camer
 on("save", async () => shown && download(await screen.png(), `${welcome.scene}.png`));
 $("scene").addEventListener("change", (event) => link.open(event.target.value));
 $("lossless").addEventListener("change", () => poses.again());
+$("quality").addEventListener("change", () => {
+  compare.close();
+  poses.again();
+});
 document.addEventListener("visibilitychange", () => !document.hidden && !(poses.number && isAtRest()) && poses.again());
 addEventListener("keydown", (event) => event.key === "Escape" && escape());
 addEventListener("hashchange", () => {

@@ -25,7 +25,7 @@ function sourceOf({ point, source, cameras }) {
   if (source === "direct") return "drawn directly";
   if (source === "filled") return "filled: no camera saw this";
   if (source === "base") return cameras?.length ? "reflection: shows what the base holds" : "no camera saw this: from the base";
-  if (source === "lit_here") return "no camera saw this: lit in this view";
+  if (source === "lit_here") return "no camera knows its light: lit in this view";
   if (source === "guessed") return "reflection: no camera saw all that it shows";
   if (!cameras?.length) return "seen by the cameras";
   return `seen by camera${cameras.length > 1 ? "s" : ""} ${cameras.join(", ")}`;

@@ -33,6 +33,7 @@ export class Notices {
     const light = header.light_step;
     if (light < lightSteps) this.badge("still", `still (light ${light} of ${lightSteps})`);
     else if (header.samples < stillSamples) this.badge("still", `still (${header.samples} of ${stillSamples} samples)`);
+    else if (header.more) this.badge("still", "still (exact follows)");
     else this.badge(isSharp && header.direct ? "exact" : "still");
   }
 

@@ -9,7 +9,7 @@ const POSE_MS = 8;
 export class Poses {
   /**
    * `hooks`: moved() after another camera or moment, asked(still) after a pose has left, rested() once no pose has followed,
-   * isLossless(), isPlaying().
+   * isLossless(), isPlaying(), quality().
    */
   constructor(link, screen, hooks) {
     this.link = link;
@@ -99,7 +99,8 @@ export class Poses {
 
   message(still) {
     const pose = { type: "pose", number: this.number, camera: camera.toCamera(this.state), canvas_px: this.screen.size, still };
-    return this.moment === null ? pose : { ...pose, moment: this.moment };
+    const quality = this.hooks.quality();
+    return { ...pose, ...(this.moment !== null && { moment: this.moment }), ...(quality && { quality }) };
   }
 
   rest() {

@@ -51,6 +51,7 @@ function agesOf(recent) {
 /** Where the last picture comes from. */
 function originOf(header, lightSteps) {
   return [
+    ["light", header.direct ? "drawn directly" : header.quality ? `shared, ${header.quality}` : "from samples"],
     ["light step", `${header.light_step} of ${lightSteps}`],
     ["samples a pixel", `${header.samples}`],
     ["sample set", header.set],

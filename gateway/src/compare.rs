@@ -9,8 +9,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use client::Frame;
 use codec::{FrameCodec, encode_frame};
-use depth_image::{View, ViewPlanes};
-use glam::UVec2;
+use depth_image::{Antialias, View, ViewPlanes};
 use metrics::{PictureErrors, Rgb8Image, flip_map};
 use serde_json::{Value, json};
 
@@ -19,24 +18,24 @@ use crate::responses::{Refusal, held};
 use crate::single_views::SingleView;
 use crate::views::{ViewQuery, Visited};
 
-/// The largest view that is compared: it takes a thread a fraction of a second.
-const MAX_PX: UVec2 = UVec2::new(640, 360);
-
 /// `compare.json`: one at a time.
 pub(crate) async fn compare(
     State(gateway): State<Arc<Gateway>>,
     Query(query): Query<ViewQuery>,
 ) -> Result<Response, Refusal> {
-    let visited = Visited::of(&gateway, &query, MAX_PX).await?;
+    let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
     let (shown, direct) = (visited.shown(), &visited.scene.direct);
     let _visit = direct.visits.begin();
     // Those that wait for a session hold up no other comparison.
-    tokio::try_join!(shown.opened(), direct.opened())?;
+    let (session, _) = tokio::try_join!(shown.opened(), direct.opened())?;
     let busy = |_| Refusal(StatusCode::TOO_MANY_REQUESTS, "another view is being compared: try again later".to_owned());
     let _place = gateway.comparison.try_acquire().map_err(busy)?;
-    let draw = |kept, planes| gateway.single_views.draw(kept, visited.camera, planes, visited.moment);
-    let SingleView { frame: view, place, .. } = draw(shown, ViewPlanes::COLOR).await?;
-    let SingleView { frame: direct, .. } = draw(direct, ViewPlanes::WITH_DEPTH).await?;
+    // As finished stills are.
+    let planes = ViewPlanes { antialias: Antialias::MOST, tone: session.tone(), ..ViewPlanes::COLOR };
+    let with_depth = ViewPlanes { inverse_depth: true, ..planes };
+    let draw = |kept, planes, method| gateway.single_views.draw(kept, visited.camera, planes, method, visited.moment);
+    let SingleView { frame: view, place, .. } = draw(shown, planes, visited.method(&gateway, &session)).await?;
+    let SingleView { frame: direct, .. } = draw(direct, with_depth, None).await?;
     let compared = tokio::task::spawn_blocking(move || compared(&view, &direct));
     let compared = compared.await.map_err(Refusal::internal)?;
     let compared = compared.ok_or_else(|| Refusal::internal("the views cannot be compared"))?;

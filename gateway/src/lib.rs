@@ -1,7 +1,7 @@
 //! The way of browsers into a cluster: a page, a WebSocket for each visitor, and views over plain HTTP.
 //!
 //! `server` answers connections and `http` their requests. A `visitor` has two live streams, one of pictures in
-//! motion and one of stills; `rate` chooses the size of the pictures in motion. `scenes` keeps one session for all visitors of
+//! motion and one of stills; `rate` chooses the size and the light of the pictures in motion, `still` the steps of stills. `scenes` keeps one session for all visitors of
 //! a scene. Messages are in `protocol`, and on a page of the documentation: `docs/viewer-protocol.md`.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
@@ -23,13 +23,14 @@ mod scenes;
 mod server;
 mod single_views;
 mod status;
+mod still;
 mod tls;
 mod token;
 mod views;
 mod visitor;
 mod visits;
 
-pub use config::{GatewayConfig, RequestOf};
+pub use config::{GatewayConfig, RequestOf, SharedLightMethods};
 pub use server::{Connections, accept, serve};
 pub use tls::{TlsError, tls_config};
 pub use token::Token;

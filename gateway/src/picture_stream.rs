@@ -9,6 +9,8 @@ use codec::FrameCodec;
 use depth_image::PinholeCamera;
 
 use crate::protocol::{self, PictureHeader, PictureTimes, Pose};
+use crate::rate::Chosen;
+use crate::still::PictureLight;
 
 /// Poses that are remembered: a client replaces those that were not sent.
 const MAX_ASKED: usize = 512;
@@ -17,6 +19,9 @@ const MAX_ASKED: usize = 512;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Asked {
     pub(crate) pose: Pose,
+    pub(crate) light: PictureLight,
+    /// The choice that it was asked for by; `None` for a still.
+    chosen: Option<Chosen>,
     /// The live stream's own number.
     frame: u64,
     arrived: Instant,
@@ -24,13 +29,23 @@ pub(crate) struct Asked {
     replaced: u64,
 }
 
+/// A picture to ask for, beside its pose.
+#[derive(Debug)]
+pub(crate) struct Wanted {
+    pub(crate) set_index: u32,
+    pub(crate) quality: PictureQuality,
+    pub(crate) light: PictureLight,
+    /// The choice in motion; `None` for a still.
+    pub(crate) chosen: Option<Chosen>,
+}
+
 /// A picture that was sent and not shown yet.
 #[derive(Debug, Clone, Copy)]
 struct Sent {
     number: u64,
     frame: u64,
-    /// `None` for a picture whose age says nothing of the link: one that was discarded, or repeats a pose.
-    height_px: Option<u32>,
+    /// `None` for a picture whose age says nothing of the link: a still, one that was discarded, or one that repeats a pose.
+    chosen: Option<Chosen>,
 }
 
 /// What the page is told of a picture, beside its frame's own header.
@@ -41,6 +56,8 @@ pub(crate) struct About {
     /// Whether its view cell is made for its place.
     pub(crate) is_own_cell: bool,
     pub(crate) is_direct: bool,
+    /// Whether a better picture of the pose follows.
+    pub(crate) more: bool,
     /// The least round trip to the page so far.
     pub(crate) rtt_s: Option<f64>,
 }
@@ -59,20 +76,20 @@ impl PictureStream {
         Self { view: session.live_encoded(client), last: 0, asked: VecDeque::new(), sent: VecDeque::new() }
     }
 
-    /// Asks for a picture of a pose from a sample set.
-    pub(crate) fn ask(
-        &mut self,
-        pose: Pose,
-        camera: PinholeCamera,
-        set_index: u32,
-        quality: PictureQuality,
-    ) -> Result<(), ClientError> {
+    /// Asks for a picture of a pose.
+    pub(crate) fn ask(&mut self, pose: Pose, camera: PinholeCamera, wanted: Wanted) -> Result<(), ClientError> {
+        let Wanted { set_index, quality, light, chosen } = wanted;
         let frame = self.view.set_pose(camera, set_index, quality)?;
         if self.asked.len() >= MAX_ASKED {
             self.asked.pop_front();
         }
-        self.asked.push_back(Asked { pose, frame, arrived: Instant::now(), replaced: 0 });
+        self.asked.push_back(Asked { pose, light, chosen, frame, arrived: Instant::now(), replaced: 0 });
         Ok(())
+    }
+
+    /// Whether the last picture that was asked for is to be drawn directly.
+    pub(crate) fn draws(&self) -> bool {
+        self.asked.back().is_some_and(|asked| asked.light == PictureLight::Drawn)
     }
 
     /// The next picture, and the pose that it answers. Cancellation loses none.
@@ -89,14 +106,14 @@ impl PictureStream {
     /// A picture is not sent. Its credit is given back, after those of pictures that were sent before it.
     pub(crate) fn discard(&mut self, frame: &EncodedFrame) {
         match self.sent.back().copied() {
-            Some(last) => self.sent.push_back(Sent { frame: frame.request.frame, height_px: None, ..last }),
+            Some(last) => self.sent.push_back(Sent { frame: frame.request.frame, chosen: None, ..last }),
             None => self.view.confirm(frame.request.frame),
         }
     }
 
-    /// The height of a picture that was sent and not shown yet.
-    pub(crate) fn height_of(&self, number: u64) -> Option<u32> {
-        self.sent.iter().find(|sent| sent.number == number)?.height_px
+    /// The choice that a picture was made by that was sent and not shown yet.
+    pub(crate) fn chosen_for(&self, number: u64) -> Option<Chosen> {
+        self.sent.iter().find(|sent| sent.number == number)?.chosen
     }
 
     /// All pictures up to this number have been shown, or never will be.
@@ -110,9 +127,9 @@ impl PictureStream {
     /// The message of a picture, which is sent now.
     pub(crate) fn message(&mut self, frame: &EncodedFrame, asked: &Asked, about: About) -> Bytes {
         let (number, size_px) = (asked.pose.number, frame.header.size_px);
-        let height_px = (number > self.last).then_some(size_px.y);
+        let chosen = asked.chosen.filter(|_| number > self.last);
         self.last = number;
-        self.sent.push_back(Sent { number, frame: frame.request.frame, height_px });
+        self.sent.push_back(Sent { number, frame: frame.request.frame, chosen });
         let header = &frame.header;
         let (media_type, jpeg_quality) = match header.codec {
             FrameCodec::Png => ("image/png", None),
@@ -133,7 +150,9 @@ impl PictureStream {
             light_step: about.light_step,
             samples: header.antialias.samples(),
             neighbour: !about.is_own_cell,
+            quality: asked.light.quality().filter(|_| !about.is_direct),
             direct: about.is_direct,
+            more: about.more,
             compositor: frame.node_name.clone(),
             replaced: asked.replaced,
             times_ms: times(frame, asked.arrived, Instant::now()),

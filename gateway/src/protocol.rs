@@ -2,6 +2,8 @@
 //! them for clients in other languages.
 
 use bytes::{BufMut as _, Bytes, BytesMut};
+use depth_image::LightCacheQuality;
+use serde::de::{Deserializer, Error as _};
 use serde::{Deserialize, Serialize};
 
 use crate::camera::PageCamera;
@@ -45,6 +47,17 @@ pub(crate) struct Pose {
     pub(crate) moment: u32,
     /// Whether the camera rests: the picture is then lossless and of the canvas's size.
     pub(crate) still: bool,
+    /// The quality of shared light in stills, and at most in motion; the welcome's where none is named.
+    #[serde(default, deserialize_with = "quality")]
+    pub(crate) quality: Option<LightCacheQuality>,
+}
+
+/// A quality by its name.
+pub(crate) fn quality<'de, D: Deserializer<'de>>(text: D) -> Result<Option<LightCacheQuality>, D::Error> {
+    let Some(text) = Option::<String>::deserialize(text)? else { return Ok(None) };
+    let names = || LightCacheQuality::ALL.map(LightCacheQuality::name).join(", ");
+    let unknown = || D::Error::custom(format!("quality: {text:?}, must be one of {}", names()));
+    LightCacheQuality::named(&text).map(Some).ok_or_else(unknown)
 }
 
 /// The gateway's messages.
@@ -67,6 +80,8 @@ pub(crate) enum ToPage {
         light_steps: u32,
         /// Samples a pixel of a finished still.
         still_samples: u32,
+        /// The quality of shared light in stills for which no other is asked.
+        quality: &'static str,
         /// Moments of a scene that moves; 1 for one that never moves.
         moments: u32,
         /// The time between two moments.
@@ -91,6 +106,8 @@ pub(crate) enum ToPage {
         policy: String,
         /// Why it is in force.
         reason: String,
+        /// Whether views share light, so that they have a quality.
+        shares_light: bool,
         /// The promise to the sessions of the scene; `None` without a budget.
         promise: Option<String>,
     },
@@ -130,8 +147,12 @@ pub(crate) struct PictureHeader {
     pub(crate) samples: u32,
     /// Whether the cell is a neighbour of the view's own, which is not loaded yet.
     pub(crate) neighbour: bool,
+    /// The quality of its shared light; `None` where the light is not shared.
+    pub(crate) quality: Option<&'static str>,
     /// Whether it was drawn from the scene, without samples.
     pub(crate) direct: bool,
+    /// Whether a better picture of the pose follows.
+    pub(crate) more: bool,
     /// The compositor that made it.
     pub(crate) compositor: String,
     /// Poses that were replaced by newer ones since the picture before.
@@ -195,7 +216,7 @@ mod tests {
 
     #[test]
     fn a_pose_is_read() {
-        let pose = Pose { number: 7, camera: CAMERA, canvas_px: [640, 360], moment: 0, still: true };
+        let pose = Pose { number: 7, camera: CAMERA, canvas_px: [640, 360], moment: 0, still: true, quality: None };
         assert_eq!(serde_json::from_str::<FromPage>(POSE).unwrap(), FromPage::Pose(pose));
         assert_eq!(serde_json::from_str::<FromPage>(r#"{"type":"open"}"#).unwrap(), FromPage::Open { scene: None });
     }
@@ -229,7 +250,9 @@ mod tests {
             light_step: 1,
             samples: 1,
             neighbour: false,
+            quality: None,
             direct: false,
+            more: false,
             compositor: "n0".to_owned(),
             replaced: 2,
             times_ms: PictureTimes { gateway: 12.5, ..PictureTimes::default() },

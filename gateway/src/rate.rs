@@ -1,6 +1,7 @@
 //! The size and the quality of pictures in motion, from the age of the pictures that were shown: down at once, up slowly.
 //! It reads no clock.
 
+use depth_image::LightCacheQuality;
 use glam::UVec2;
 
 /// Heights of pictures in motion: a closed set, so that the views of several visitors can be made together.
@@ -8,19 +9,30 @@ pub(crate) const HEIGHTS_PX: [u32; 8] = [90, 120, 180, 240, 360, 480, 720, 1080]
 /// Widths are multiples of this.
 const WIDTH_STEP_PX: u32 = 32;
 /// JPEG qualities of the heights.
-const QUALITIES: [u8; 8] = [60, 65, 70, 75, 75, 80, 80, 80];
-/// The first height.
-const FIRST: usize = 2;
+const JPEG_QUALITIES: [u8; 8] = [60, 65, 70, 75, 75, 80, 80, 80];
+/// Qualities of shared light below the largest height: a larger picture says more than finer light.
+const QUALITIES_PER_HEIGHT: usize = 2;
+/// The first rung.
+const FIRST: Rung = Rung { height: 2, quality: 0 };
 /// The age that a picture may have beyond the round trip.
 const BUDGET_S: f64 = 0.15;
-/// The share of the budget that the next larger size may be predicted to take.
+/// The share of the budget that the next rung may be predicted to take.
 const ROOM: f64 = 0.7;
+/// The time of a picture over that of the next lower quality, at most.
+const QUALITY_GROWTH: f64 = 1.5;
 /// Ages that decide together, by their median.
 const AGES: usize = 5;
-/// The time at one size before a larger one is tried.
+/// The time on one rung before a higher one is tried.
 const PAUSE_S: f64 = 1.0;
-/// The longest time before a size that was too large is tried again.
+/// The longest time before a rung that was too high is tried again.
 const LONGEST_PAUSE_S: f64 = 64.0;
+
+/// A height, and the quality of shared light at that height, both by their places. A greater rung costs more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Rung {
+    height: usize,
+    quality: usize,
+}
 
 /// A picture that was shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,24 +41,28 @@ pub(crate) struct Shown {
     pub(crate) age_s: f64,
     /// The least round trip so far.
     pub(crate) rtt_s: f64,
-    /// The height that the picture had.
-    pub(crate) height_px: u32,
+    /// The choice that the picture was made by.
+    pub(crate) chosen: Chosen,
 }
 
 /// The choice for the next pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Chosen {
-    rung: usize,
+    rung: Rung,
 }
 
 impl Chosen {
     pub(crate) fn height_px(self) -> u32 {
-        HEIGHTS_PX[self.rung]
+        HEIGHTS_PX[self.rung.height]
     }
 
-    /// The JPEG quality.
-    pub(crate) fn quality(self) -> u8 {
-        QUALITIES[self.rung]
+    pub(crate) fn jpeg_quality(self) -> u8 {
+        JPEG_QUALITIES[self.rung.height]
+    }
+
+    /// The quality of shared light, where light is shared.
+    pub(crate) fn light(self) -> LightCacheQuality {
+        LightCacheQuality::ALL[self.rung.quality]
     }
 
     /// The size of a picture for a canvas. Its pixels need not be square.
@@ -58,29 +74,39 @@ impl Chosen {
     }
 }
 
-/// The controller of one visitor.
+/// The controller of one visitor. At each height, light is a draft first and then fast; the largest height has all qualities.
 #[derive(Debug)]
 pub(crate) struct Rate {
-    rung: usize,
-    /// The highest rung that the canvas has a use for.
+    rung: Rung,
+    /// The largest height that the canvas has a use for.
     highest: usize,
+    /// Qualities of light, from the lowest: one where light is not shared.
+    quality_count: usize,
     ages_s: Vec<f64>,
     /// The time since which the rung is what it is.
     since_s: f64,
     /// For each rung, the time before which it is not tried again, and the pause after its next failure.
-    failed: [(f64, f64); HEIGHTS_PX.len()],
+    failed: [[(f64, f64); LightCacheQuality::ALL.len()]; HEIGHTS_PX.len()],
 }
 
 impl Default for Rate {
     fn default() -> Self {
-        let failed = [(f64::NEG_INFINITY, 2.0 * PAUSE_S); HEIGHTS_PX.len()];
-        Self { rung: FIRST, highest: HEIGHTS_PX.len() - 1, ages_s: Vec::new(), since_s: f64::NEG_INFINITY, failed }
+        Self {
+            rung: FIRST,
+            highest: HEIGHTS_PX.len() - 1,
+            quality_count: 1,
+            ages_s: Vec::new(),
+            since_s: f64::NEG_INFINITY,
+            failed: [[(f64::NEG_INFINITY, 2.0 * PAUSE_S); LightCacheQuality::ALL.len()]; HEIGHTS_PX.len()],
+        }
     }
 }
 
 impl Rate {
     pub(crate) fn chosen(&self) -> Chosen {
-        Chosen { rung: self.rung.min(self.highest) }
+        let height = self.rung.height.min(self.highest);
+        let quality = if height < self.rung.height { QUALITIES_PER_HEIGHT - 1 } else { self.rung.quality };
+        Chosen { rung: Rung { height, quality: quality.min(self.qualities_at(height) - 1) } }
     }
 
     /// Pictures are not larger than the canvas.
@@ -89,52 +115,77 @@ impl Rate {
         self.highest = larger.unwrap_or(HEIGHTS_PX.len() - 1);
     }
 
+    /// Light has this quality at most; `None` where it is not shared.
+    pub(crate) fn limit(&mut self, best: Option<LightCacheQuality>) {
+        self.quality_count = best.map_or(1, |best| LightCacheQuality::ALL.iter().filter(|&&q| q <= best).count());
+    }
+
+    fn qualities_at(&self, height: usize) -> usize {
+        if height == self.highest { self.quality_count } else { self.quality_count.min(QUALITIES_PER_HEIGHT) }
+    }
+
+    fn above(&self, Rung { height, quality }: Rung) -> Option<Rung> {
+        match quality + 1 {
+            quality if quality < self.qualities_at(height) => Some(Rung { height, quality }),
+            _ => (height < self.highest).then_some(Rung { height: height + 1, quality: 0 }),
+        }
+    }
+
+    fn below(&self, Rung { height, quality }: Rung) -> Option<Rung> {
+        match (quality.checked_sub(1), height.checked_sub(1)) {
+            (Some(quality), _) => Some(Rung { height, quality }),
+            (None, Some(height)) => Some(Rung { height, quality: self.qualities_at(height) - 1 }),
+            (None, None) => None,
+        }
+    }
+
     /// Learns from a picture that was shown at `now_s`.
     pub(crate) fn step(&mut self, now_s: f64, shown: Shown) {
-        let rung = self.chosen().rung;
-        if shown.height_px != HEIGHTS_PX[rung] {
+        if shown.chosen != self.chosen() {
             return;
         }
+        let rung = shown.chosen.rung;
         self.ages_s.push(shown.age_s);
         let is_far_beyond = |age_s: &f64| age_s - shown.rtt_s > 2.0 * BUDGET_S;
-        if rung > 0 && self.ages_s.len() >= 2 && self.ages_s.iter().rev().take(2).all(is_far_beyond) {
-            return self.fail(now_s, rung);
+        let below = self.below(rung);
+        if let Some(below) = below.filter(|_| self.ages_s.len() >= 2)
+            && self.ages_s.iter().rev().take(2).all(is_far_beyond)
+        {
+            return self.fail(now_s, rung, below);
         }
         if self.ages_s.len() < AGES {
             return;
         }
-        let age_s = median(&mut self.ages_s);
-        let beyond_s = (age_s - shown.rtt_s).max(0.0);
-        if beyond_s > BUDGET_S && rung > 0 {
-            self.fail(now_s, rung);
-        } else if rung < self.highest && self.may_rise(now_s, beyond_s, rung) {
-            self.go(now_s, rung + 1);
-        } else {
-            self.ages_s.remove(0);
+        let beyond_s = (median(&self.ages_s) - shown.rtt_s).max(0.0);
+        match (below, self.above(rung)) {
+            (Some(below), _) if beyond_s > BUDGET_S => self.fail(now_s, rung, below),
+            (_, Some(above)) if self.may_rise(now_s, beyond_s, (rung, above)) => self.go(now_s, above),
+            _ => drop(self.ages_s.remove(0)),
         }
     }
 
-    fn fail(&mut self, now_s: f64, rung: usize) {
-        let (until_s, pause_s) = &mut self.failed[rung];
+    fn fail(&mut self, now_s: f64, rung: Rung, below: Rung) {
+        let (until_s, pause_s) = &mut self.failed[rung.height][rung.quality];
         *until_s = now_s + *pause_s;
         *pause_s = (*pause_s * 2.0).min(LONGEST_PAUSE_S);
-        self.go(now_s, rung - 1);
+        self.go(now_s, below);
     }
 
-    /// Whether the next rung is predicted to have room, by the number of its pixels.
-    fn may_rise(&self, now_s: f64, beyond_s: f64, rung: usize) -> bool {
-        let side = f64::from(HEIGHTS_PX[rung + 1]) / f64::from(HEIGHTS_PX[rung]);
-        let is_due = now_s - self.since_s >= PAUSE_S && now_s >= self.failed[rung + 1].0;
-        is_due && beyond_s * side * side <= ROOM * BUDGET_S
+    /// Whether the next rung is predicted to have room, by the number of its pixels or the quality of its light.
+    fn may_rise(&self, now_s: f64, beyond_s: f64, (rung, above): (Rung, Rung)) -> bool {
+        let side = f64::from(HEIGHTS_PX[above.height]) / f64::from(HEIGHTS_PX[rung.height]);
+        let growth = if above.height == rung.height { QUALITY_GROWTH } else { side * side };
+        let is_due = now_s - self.since_s >= PAUSE_S && now_s >= self.failed[above.height][above.quality].0;
+        is_due && beyond_s * growth <= ROOM * BUDGET_S
     }
 
-    fn go(&mut self, now_s: f64, rung: usize) {
+    fn go(&mut self, now_s: f64, rung: Rung) {
         (self.rung, self.since_s) = (rung, now_s);
         self.ages_s.clear();
     }
 }
 
-fn median(values: &mut [f64]) -> f64 {
+fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted[sorted.len() / 2]
@@ -166,10 +217,11 @@ mod tests {
             (self.seed >> 11) as f64 / (1u64 << 53) as f64
         }
 
-        /// The age of a picture of this height, beside 16:9, with noise of a tenth.
-        fn age_s(&mut self, height_px: u32) -> f64 {
-            let pixels = f64::from(height_px).powi(2) * 16.0 / 9.0;
-            let work_s = 0.008 + pixels * self.pixel_s + pixels * 0.2 / self.bytes_s;
+        /// The age of a picture of this height, beside 16:9, with noise of a tenth. Each quality takes a third more time.
+        fn age_s(&mut self, chosen: Chosen) -> f64 {
+            let pixels = f64::from(chosen.height_px()).powi(2) * 16.0 / 9.0;
+            let pixel_s = self.pixel_s * 1.33_f64.powi(chosen.rung.quality as i32);
+            let work_s = 0.008 + pixels * pixel_s + pixels * 0.2 / self.bytes_s;
             self.rtt_s + work_s * (0.95 + 0.1 * self.uniform())
         }
 
@@ -177,11 +229,11 @@ mod tests {
         fn run(&mut self, rate: &mut Rate, from_s: f64, to_s: f64) -> Vec<(f64, u32)> {
             let (mut now_s, mut heights) = (from_s, Vec::new());
             while now_s < to_s {
-                let height_px = rate.chosen().height_px();
-                let age_s = self.age_s(height_px);
+                let chosen = rate.chosen();
+                let age_s = self.age_s(chosen);
                 now_s += (age_s / 2.0).max(0.033);
-                rate.step(now_s, Shown { age_s, rtt_s: self.rtt_s, height_px });
-                heights.push((now_s, height_px));
+                rate.step(now_s, Shown { age_s, rtt_s: self.rtt_s, chosen });
+                heights.push((now_s, chosen.height_px()));
             }
             heights
         }
@@ -195,6 +247,7 @@ mod tests {
     fn no_link_makes_the_size_swing_by_more_than_a_rung() {
         for seed in 0..200 {
             let (mut link, mut rate) = (Link::random(seed), Rate::default());
+            rate.limit(LightCacheQuality::ALL.get(seed as usize % 6).copied());
             let heights = link.run(&mut rate, 0.0, 120.0);
             let late = heights.iter().filter(|(s, _)| *s > 30.0).map(|(_, height)| rung(*height));
             let (low, high) = late.clone().fold((9, 0), |(low, high), rung| (low.min(rung), high.max(rung)));
@@ -211,9 +264,10 @@ mod tests {
         for seed in 0..200 {
             let (mut link, mut rate) = (Link::random(seed), Rate::default());
             link.run(&mut rate, 0.0, 30.0);
-            let mut ages: Vec<f64> = (0..99).map(|_| link.age_s(rate.chosen().height_px())).collect();
-            let fits = link.age_s(HEIGHTS_PX[0]) - link.rtt_s < 0.9 * BUDGET_S;
-            assert!(!fits || median(&mut ages) <= link.rtt_s + 1.1 * BUDGET_S, "seed {seed}: {:?}", rate.chosen());
+            let ages: Vec<f64> = (0..99).map(|_| link.age_s(rate.chosen())).collect();
+            let lowest = Chosen { rung: Rung { height: 0, quality: 0 } };
+            let fits = link.age_s(lowest) - link.rtt_s < 0.9 * BUDGET_S;
+            assert!(!fits || median(&ages) <= link.rtt_s + 1.1 * BUDGET_S, "seed {seed}: {:?}", rate.chosen());
         }
     }
 
@@ -230,17 +284,48 @@ mod tests {
     }
 
     #[test]
+    fn light_is_a_draft_then_fast_at_each_height_and_as_fine_as_allowed_at_the_largest() {
+        let mut rate = Rate::default();
+        rate.fit(UVec2::new(640, 360));
+        rate.limit(Some(LightCacheQuality::Fine));
+        let mut chosen = Vec::new();
+        for number in 0..2000 {
+            let now = rate.chosen();
+            rate.step(number as f64 * 0.05, Shown { age_s: 0.01, rtt_s: 0.005, chosen: now });
+            chosen.push((now.height_px(), now.light().name()));
+        }
+        chosen.dedup();
+        let expected = [
+            (180, "draft"),
+            (180, "fast"),
+            (240, "draft"),
+            (240, "fast"),
+            (360, "draft"),
+            (360, "fast"),
+            (360, "balanced"),
+            (360, "fine"),
+        ];
+        assert_eq!(chosen, expected);
+        rate.limit(Some(LightCacheQuality::Fast));
+        assert_eq!(rate.chosen().light(), LightCacheQuality::Fast, "the visitor wants no more");
+        rate.fit(UVec2::new(320, 180));
+        assert_eq!((rate.chosen().height_px(), rate.chosen().light()), (180, LightCacheQuality::Fast));
+        rate.limit(None);
+        assert_eq!(rate.chosen().light(), LightCacheQuality::Draft, "light is not shared");
+    }
+
+    #[test]
     fn a_picture_that_is_far_too_old_makes_the_next_ones_smaller_at_once() {
         let mut rate = Rate::default();
         for number in 0..2 {
-            rate.step(number as f64 * 0.05, Shown { age_s: 1.0, rtt_s: 0.01, height_px: HEIGHTS_PX[FIRST] });
+            rate.step(number as f64 * 0.05, Shown { age_s: 1.0, rtt_s: 0.01, chosen: Chosen { rung: FIRST } });
         }
-        assert_eq!(rate.chosen().height_px(), HEIGHTS_PX[FIRST - 1]);
+        assert_eq!(rate.chosen().height_px(), HEIGHTS_PX[FIRST.height - 1]);
     }
 
     #[test]
     fn sizes_keep_the_canvas_shape_to_half_a_step() {
-        let chosen = |rung| Chosen { rung };
+        let chosen = |height| Chosen { rung: Rung { height, quality: 0 } };
         assert_eq!(chosen(2).size_px(UVec2::new(640, 360)), UVec2::new(320, 180));
         assert_eq!(chosen(4).size_px(UVec2::new(640, 360)), UVec2::new(640, 360));
         assert_eq!(chosen(0).size_px(UVec2::new(1, 10_000)), UVec2::new(32, 90));

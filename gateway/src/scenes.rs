@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use client::{Client, ClientError};
 use cluster::{ClusterStatus, DIRECT, OfferStatus, PolicyChoice, SessionRequest, Timeline};
+use depth_image::LightCacheQuality;
 use glam::UVec2;
 use parking_lot::Mutex;
 
@@ -14,7 +15,7 @@ use crate::config::GatewayConfig;
 use crate::kept_session::{FIRST_DELAY, FirstOpened, KeptSession, LONGEST_DELAY, Lingers};
 
 /// The size of pictures in motion that costs are measured on.
-const TYPICAL_PX: UVec2 = UVec2::new(640, 360);
+pub(crate) const TYPICAL_PX: UVec2 = UVec2::new(640, 360);
 
 /// Moments of a scene that moves.
 const MOMENTS_PER_S: f64 = 12.0;
@@ -75,6 +76,8 @@ pub(crate) struct SceneSessions {
     pub(crate) moving: Option<KeptSession>,
     /// The same views drawn directly, for comparison.
     pub(crate) direct: KeptSession,
+    /// The quality of shared light in stills for which no other is asked.
+    pub(crate) quality: LightCacheQuality,
 }
 
 impl Scenes {
@@ -148,6 +151,8 @@ impl SceneSessions {
         let shown = (config.request_of)(&offer, space.camera(&home, TYPICAL_PX)?);
         let moving = offer.period_s.map(|period_s| moving(shown.clone(), period_s));
         let direct = drawn_directly(shown.clone(), moving.as_ref().map(|request| request.timeline));
+        let offered = offer.settings.method.as_deref().and_then(config.methods.quality_of);
+        let quality = config.quality.or(offered).unwrap_or(LightCacheQuality::Fine);
         let start = |request, first, lingers| KeptSession::start(&config.coordinator, request, first, lingers);
         Ok(Self {
             shown: start(shown, first, VISITORS),
@@ -156,6 +161,7 @@ impl SceneSessions {
             offer,
             space,
             home,
+            quality,
         })
     }
 

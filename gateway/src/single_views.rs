@@ -48,19 +48,21 @@ impl Default for SingleViews {
 }
 
 impl SingleViews {
-    /// One view: of a moment of a scene that moves, else in its finished light.
+    /// One view: of a moment of a scene that moves, else in its finished light. By a method of the session's samples where one is
+    /// named.
     pub(crate) async fn draw(
         &self,
         kept: &KeptSession,
         camera: PinholeCamera,
         planes: ViewPlanes,
+        method: Option<String>,
         moment: u32,
     ) -> Result<SingleView, SingleViewError> {
         // A session that does not open takes no place from others.
         let session = kept.opened().await?;
         let place = self.0.clone().try_acquire_owned().map_err(|_| SingleViewError::Full)?;
         let _made = kept.single_views.acquire().await.map_err(|_| SingleViewError::Full)?;
-        match made(&session, camera, planes, moment).await {
+        match made(&session, camera, planes, method, moment).await {
             Ok((frame, plan)) => Ok(SingleView { frame, plan, place }),
             Err(error) => {
                 // Pages judge a session that they watch: one request ends it for nobody.
@@ -77,13 +79,14 @@ async fn made(
     session: &Session,
     camera: PinholeCamera,
     planes: ViewPlanes,
+    method: Option<String>,
     moment: u32,
 ) -> Result<(Frame, Option<SessionPlan>), ClientError> {
     let plan = session.plan();
     let timeline = plan.assignment.workload.timeline;
     let set_index = if timeline.moves() { moment } else { timeline.set_count - 1 };
     let request = ViewRequest { frame: 1, set_index, camera };
-    let frames = session.render_views_with(planes, [request])?.all().await?;
+    let frames = session.render_views_with(planes, method, [request])?.all().await?;
     let none = || ClientError::Ended { reason: "no frame was received".to_owned() };
     let frame = frames.into_iter().next().ok_or_else(none)?;
     let plan_epoch = frame.header.sample_set_id.plan_epoch;

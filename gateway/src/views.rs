@@ -5,9 +5,9 @@ use std::sync::Arc;
 use axum::extract::{Path, Query, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode};
 use axum::response::Response;
-use client::Frame;
+use client::{Frame, Session};
 use codec::{FrameCodec, encode_frame};
-use depth_image::{Antialias, PinholeCamera, PixelDepth, ProvenanceKind, View, ViewPlanes};
+use depth_image::{Antialias, LightCacheQuality, PinholeCamera, PixelDepth, ProvenanceKind, View, ViewPlanes};
 use glam::{UVec2, Vec2};
 use pictures::Legend;
 use serde::Deserialize;
@@ -16,9 +16,11 @@ use serde_json::{Value, json};
 use crate::camera::PageCamera;
 use crate::gateway::Gateway;
 use crate::kept_session::KeptSession;
+use crate::protocol;
 use crate::responses::{Refusal, as_json, held};
 use crate::scenes::SceneSessions;
 use crate::single_views::SingleView;
+use crate::still::PlannedLight;
 use crate::visits::Visit;
 
 /// The size of a view that names none.
@@ -42,6 +44,8 @@ pub(crate) struct ViewQuery {
     at: Option<String>,
     #[serde(default)]
     moment: u32,
+    #[serde(default, deserialize_with = "protocol::quality")]
+    quality: Option<LightCacheQuality>,
 }
 
 /// The plane of a view that a picture shows.
@@ -98,6 +102,7 @@ pub(crate) struct Visited {
     pub(crate) scene: Arc<SceneSessions>,
     pub(crate) camera: PinholeCamera,
     pub(crate) moment: u32,
+    quality: LightCacheQuality,
     _visit: Visit,
 }
 
@@ -111,12 +116,19 @@ impl Visited {
         }
         let visit = scene.session_of(moment).visits.begin();
         let camera = query.camera(&scene, max_px)?;
-        Ok(Self { scene, camera, moment, _visit: visit })
+        let quality = query.quality.unwrap_or(scene.quality);
+        Ok(Self { scene, camera, moment, quality, _visit: visit })
     }
 
     /// The session that shows the scene.
     pub(crate) fn shown(&self) -> &KeptSession {
         self.scene.session_of(self.moment)
+    }
+
+    /// The method of the view in a session that shares light; `None`: the session's own.
+    pub(crate) fn method(&self, gateway: &Gateway, session: &Session) -> Option<String> {
+        let is_shared = PlannedLight::from(&session.plan()).is_shared;
+        is_shared.then(|| (gateway.config.methods.of_quality)(self.quality))
     }
 
     /// The view, drawn directly where no view cell is near: cells follow visitors, not single requests.
@@ -126,8 +138,8 @@ impl Visited {
         let is_near = session.plan().assignment.workload.has_cell_near(&self.camera);
         let planes = ViewPlanes { tone: session.tone(), ..planes };
         let _visit = (!is_near).then(|| direct.visits.begin());
-        let kept = if is_near { shown } else { direct };
-        Ok(gateway.single_views.draw(kept, self.camera, planes, self.moment).await?)
+        let (kept, method) = if is_near { (shown, self.method(gateway, &session)) } else { (direct, None) };
+        Ok(gateway.single_views.draw(kept, self.camera, planes, method, self.moment).await?)
     }
 }
 

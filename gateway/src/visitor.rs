@@ -9,25 +9,42 @@ use std::sync::Arc;
 
 use axum::extract::ws::WebSocket;
 use client::{ClientError, ClientId, EncodedFrame, PictureQuality, Session};
-use cluster::{Assignment, Policy, Promise, SessionPlan};
+use cluster::{Assignment, DIRECT, Policy, Promise, SessionPlan};
 use codec::FrameCodec;
-use depth_image::{Antialias, PinholeCamera, SampleCamera};
+use depth_image::{Antialias, LightCacheQuality, PinholeCamera, SampleCamera};
 use glam::UVec2;
 use tokio::sync::watch;
 
 use crate::camera::still_size;
+use crate::config::SharedLightMethods;
 use crate::gateway::Gateway;
 use crate::kept_session::{KeptSession, SessionState};
 use crate::page::{End, Page, with_page};
-use crate::picture_stream::{About, Asked, PictureStream};
+use crate::picture_stream::{About, Asked, PictureStream, Wanted};
 use crate::protocol::{FromPage, Pose, ToPage};
 use crate::rate::{Rate, Shown};
 use crate::scenes::{SceneError, SceneSessions};
+use crate::still::{PictureLight, PlannedLight, Still, Stills, fewer};
 
 /// The longest age that says something of the link: a page may have been hidden.
 const MAX_AGE_MS: f64 = 10_000.0;
 /// Plans that are remembered.
 const PLANS: usize = 2;
+
+/// The picture of a pose after another of the same pose.
+#[derive(Debug, Clone, Copy)]
+struct Next {
+    set_index: u32,
+    samples: Antialias,
+    light: PictureLight,
+}
+
+impl Next {
+    /// The same picture once more.
+    fn again(asked: &Asked, frame: &EncodedFrame) -> Self {
+        Self { set_index: frame.request.set_index, samples: frame.header.antialias, light: asked.light }
+    }
+}
 
 /// Serves a page until it leaves.
 pub(crate) async fn visit(socket: WebSocket, gateway: Arc<Gateway>) {
@@ -45,6 +62,7 @@ async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
         home: scene.home,
         light_steps: scene.shown.light_steps,
         still_samples: Antialias::MOST.samples(),
+        quality: scene.quality.name(),
         moments: scene.timeline().set_count,
         moment_step_s: scene.timeline().step_s,
         max_still_px: gateway.config.max_still_px.to_array(),
@@ -56,12 +74,17 @@ async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
         light_step: 0,
         made_with: None,
         is_finished: false,
+        is_drawn: false,
         most_samples: Antialias::MOST,
+        may_draw: true,
         scene,
         max_still_px: gateway.config.max_still_px,
+        methods: gateway.config.methods,
         newest: None,
         sent: 0,
         plans: VecDeque::new(),
+        planned: None,
+        fallback: None,
         promise: None,
         rate: Rate::default(),
     };
@@ -98,16 +121,25 @@ struct Visitor {
     light_step: u32,
     /// The sample cameras of the last picture; `None` before one, or where its plan is long over.
     made_with: Option<Vec<SampleCamera>>,
-    /// Whether the last picture has finished light and all samples a pixel, if it is a still.
+    /// Whether no better picture follows the last under its plan.
     is_finished: bool,
+    /// Whether the last picture was drawn from the scene.
+    is_drawn: bool,
     /// Samples a pixel of a finished still: fewer where the cluster has refused more.
     most_samples: Antialias,
+    /// Whether stills may be drawn directly: not where the cluster has refused one.
+    may_draw: bool,
     max_still_px: UVec2,
+    methods: SharedLightMethods,
     newest: Option<Pose>,
     /// The number of the last picture.
     sent: u64,
     /// The last plans that the page was told of, the newest first: pictures may still come under the one before.
     plans: VecDeque<Assignment>,
+    /// The light of the last plan's views.
+    planned: Option<PlannedLight>,
+    /// The quality of shared light that an overload leaves in motion.
+    fallback: Option<LightCacheQuality>,
     /// The last promise that it was told of.
     promise: Option<Promise>,
     rate: Rate,
@@ -221,11 +253,11 @@ impl Visitor {
                 },
                 frame = still.next() => match frame {
                     Ok((frame, asked)) => self.forward(page, session, &mut still, frame, asked)?,
-                    Err(ClientError::Exhausted { .. }) if self.most_samples > Antialias::NONE => {
-                        self.most_samples = fewer(self.most_samples);
+                    Err(ClientError::Exhausted { .. }) if still.draws() || self.most_samples > Antialias::NONE => {
+                        let samples = self.with_less(&still);
                         still = PictureStream::new(session, client);
                         if let Some(pose) = self.newest {
-                            self.ask(pose, &mut motion, &mut still)?;
+                            self.ask_with(pose, samples, &mut motion, &mut still)?;
                         }
                     }
                     Err(error) => return Ok(Some(error)),
@@ -234,10 +266,20 @@ impl Visitor {
         }
     }
 
+    /// The cluster has refused the last still: gives the samples a pixel to go on with.
+    fn with_less(&mut self, still: &PictureStream) -> Antialias {
+        if still.draws() {
+            self.may_draw = false;
+            return self.most_samples;
+        }
+        self.most_samples = fewer(self.most_samples);
+        Antialias::NONE
+    }
+
     /// Nothing of a session has been sent yet.
     fn begin(&mut self, page: &Page, session: &Session) -> Result<(), End> {
         self.plans.clear();
-        self.is_finished = false;
+        (self.is_finished, self.is_drawn) = (false, false);
         self.promise = session.promise();
         self.tell_plan(page, &session.plan())
     }
@@ -261,6 +303,7 @@ impl Visitor {
                 checked.map_err(|error| End::Refused(error.to_string()))?;
                 self.rate.fit(canvas_px);
                 self.newest = Some(pose);
+                self.limit_rate();
                 page.end_still();
                 // A scene that moves passes its first moment, too.
                 self.is_moving = pose.moment > 0 || self.is_moving && !pose.still;
@@ -270,24 +313,59 @@ impl Visitor {
         }
     }
 
-    /// Asks for the picture of a pose.
+    /// Asks for the picture of a pose. The first still comes soon: more samples follow once its light is finished.
     fn ask(&self, pose: Pose, motion: &mut PictureStream, still: &mut PictureStream) -> Result<(), End> {
+        self.ask_with(pose, Antialias::NONE, motion, still)
+    }
+
+    /// The same, with so many samples a pixel in a still.
+    fn ask_with(
+        &self,
+        pose: Pose,
+        still_samples: Antialias,
+        motion: &mut PictureStream,
+        still: &mut PictureStream,
+    ) -> Result<(), End> {
         let canvas_px = UVec2::from_array(pose.canvas_px);
         let chosen = self.rate.chosen();
         let (stream, size_px, codec) = if pose.still {
             (still, still_size(canvas_px, self.max_still_px), FrameCodec::Png)
         } else {
-            (motion, chosen.size_px(canvas_px), FrameCodec::Jpeg { quality: chosen.quality() })
+            (motion, chosen.size_px(canvas_px), FrameCodec::Jpeg { quality: chosen.jpeg_quality() })
         };
-        // The first still comes soon: more samples follow once its light is finished.
-        let quality = PictureQuality { codec, antialias: Antialias::NONE };
         let camera = self.scene.space.camera(&pose.camera, canvas_px).map(|camera| camera.resized(size_px));
         let camera = camera.map_err(|error| End::Refused(error.to_string()))?;
+        let samples = if pose.still { still_samples } else { Antialias::NONE };
+        let light = match self.planned {
+            Some(planned) if pose.still => self.stills().light(planned, samples),
+            Some(planned) if planned.is_shared => PictureLight::Shared(chosen.light()),
+            _ => PictureLight::Session,
+        };
         let set_index = if self.is_moving { pose.moment } else { self.light_step };
-        stream.ask(pose, camera, set_index, quality).map_err(|error| End::Refused(error.to_string()))
+        let next = Next { set_index, samples, light };
+        self.ask_next(pose, camera, codec, next, stream)
     }
 
-    /// Passes a picture on, unless a later one was sent, or it is a still of an earlier pose.
+    fn ask_next(
+        &self,
+        pose: Pose,
+        camera: PinholeCamera,
+        codec: FrameCodec,
+        next: Next,
+        stream: &mut PictureStream,
+    ) -> Result<(), End> {
+        let method = match next.light {
+            PictureLight::Session => None,
+            PictureLight::Shared(quality) => Some((self.methods.of_quality)(quality).into()),
+            PictureLight::Drawn => Some(DIRECT.into()),
+        };
+        let quality = PictureQuality { codec, antialias: next.samples, method, waits_for_set: pose.still };
+        let chosen = (!pose.still).then(|| self.rate.chosen());
+        let wanted = Wanted { set_index: next.set_index, quality, light: next.light, chosen };
+        stream.ask(pose, camera, wanted).map_err(|error| End::Refused(error.to_string()))
+    }
+
+    /// Passes a picture on, unless a later one was sent, or it is a still of an earlier pose. What follows it is asked for.
     fn forward(
         &mut self,
         page: &mut Page,
@@ -301,48 +379,86 @@ impl Visitor {
             stream.discard(&frame);
             return Ok(());
         };
-        let plan = session.plan().assignment;
-        self.sent = asked.pose.number;
-        let (shown, last) = (self.light_step_of(&plan, &frame), self.scene.shown.light_steps - 1);
-        let is_own_cell = !frame.header.is_neighbour_cell;
-        let is_near = !asked.pose.still || is_near(&plan, &frame);
-        let is_direct = plan.policy == Policy::Direct && plan.plan_epoch == frame.header.sample_set_id.plan_epoch;
-        let about = About { light_step: shown + 1, is_own_cell: is_own_cell && is_near, is_direct, rtt_s: page.rtt_s };
+        let (pose, plan) = (asked.pose, session.plan().assignment);
+        self.sent = pose.number;
+        let is_drawn = asked.light == PictureLight::Drawn;
+        let is_planned_direct =
+            plan.policy == Policy::Direct && plan.plan_epoch == frame.header.sample_set_id.plan_epoch;
+        let is_own_cell = is_drawn || !frame.header.is_neighbour_cell;
+        let is_near = is_drawn || !pose.still || is_near(&plan, &frame);
+        let shown = self.light_step_of(&plan, &frame);
+        if pose.still && plan.policy != Policy::Direct && !self.is_moving {
+            // Another cell's light begins anew.
+            self.light_step = if is_own_cell { self.light_step.max(shown) } else { 0 };
+        }
+        let is_of_plan = is_drawn || cameras.is_some() && cameras == cell_cameras(&plan, &frame.request.camera);
+        let is_newest = pose.number == self.newest_number();
+        let next = self.next(&asked, &frame, shown, is_own_cell);
+        // A visitor that rests would see a neighbouring cell's picture, an earlier plan's, unfinished light or few samples a
+        // pixel for ever.
+        let follows = next.or_else(|| (pose.still && !is_of_plan).then(|| Next::again(&asked, &frame)));
+        let follows = follows.filter(|_| is_newest);
+        let about = About {
+            light_step: shown + 1,
+            is_own_cell: is_own_cell && is_near,
+            is_direct: is_drawn || is_planned_direct,
+            more: follows.is_some(),
+            rtt_s: page.rtt_s,
+        };
         let message = stream.message(&frame, &asked, about);
-        if asked.pose.still {
+        if pose.still {
             page.send_still(message)?
         } else {
             page.send_moving(message)?
         }
-        if asked.pose.still && plan.policy != Policy::Direct && !self.is_moving {
-            // Another cell's light begins anew.
-            self.light_step = if is_own_cell { self.light_step.max(shown) } else { 0 };
+        if is_newest {
+            (self.made_with, self.is_finished) = (cameras, next.is_none());
+            self.is_drawn = is_drawn;
         }
-        if asked.pose.number != self.newest_number() {
-            return Ok(());
+        match follows {
+            Some(next) => self.ask_next(pose, frame.request.camera, frame.header.codec, next, stream),
+            None => Ok(()),
         }
-        let samples = frame.header.antialias;
-        let is_finished = is_own_cell && (shown == last && samples >= self.most_samples || !asked.pose.still);
-        let is_of_plan = cameras.is_some() && cameras == cell_cameras(&plan, &frame.request.camera);
-        (self.made_with, self.is_finished) = (cameras, is_finished);
-        if is_finished && (is_of_plan || !asked.pose.still) {
-            return Ok(());
+    }
+
+    /// The picture of the same pose that follows one, under the same plan; `None` after the last.
+    fn next(&self, asked: &Asked, frame: &EncodedFrame, shown: u32, is_own_cell: bool) -> Option<Next> {
+        let last = self.scene.shown.light_steps - 1;
+        let samples = Antialias::NONE;
+        if !is_own_cell {
+            let set_index = if self.is_moving { frame.request.set_index } else { self.light_step };
+            return Some(Next { set_index, samples, light: asked.light });
         }
-        // A visitor that rests would see a neighbouring cell's picture, an earlier plan's, unfinished light or few samples a
-        // pixel for ever.
-        let next_set = match (self.is_moving, is_own_cell) {
-            (true, _) => frame.request.set_index,
-            (false, true) => (shown + 1).min(last),
-            (false, false) => self.light_step,
+        if !asked.pose.still {
+            return None;
+        }
+        if shown < last && asked.light != PictureLight::Drawn {
+            return Some(Next { set_index: shown + 1, samples, light: asked.light });
+        }
+        let still = Still {
+            samples: frame.header.antialias,
+            light: asked.light,
+            pixel_count: frame.request.camera.pixel_count(),
+            made_s: frame.header.stage_times.batch_s,
         };
-        let antialias = if is_own_cell && shown == last && asked.pose.still {
-            more(samples).min(self.most_samples)
-        } else {
-            Antialias::NONE
-        };
-        let quality = PictureQuality { codec: frame.header.codec, antialias };
-        let again = stream.ask(asked.pose, frame.request.camera, next_set, quality);
-        again.map_err(|error| End::Refused(error.to_string()))
+        let (samples, light) = self.stills().after(self.planned?, still)?;
+        let set_index = if self.is_moving { frame.request.set_index } else { last };
+        Some(Next { set_index, samples, light })
+    }
+
+    /// The stills of the newest pose.
+    fn stills(&self) -> Stills {
+        Stills {
+            quality: self.quality(),
+            most_samples: self.most_samples,
+            may_draw: self.may_draw,
+            light_steps: self.scene.shown.light_steps,
+        }
+    }
+
+    /// The quality of shared light that the visitor wants.
+    fn quality(&self) -> LightCacheQuality {
+        self.newest.and_then(|pose| pose.quality).unwrap_or(self.scene.quality)
     }
 
     fn newest_number(&self) -> u64 {
@@ -383,8 +499,8 @@ impl Visitor {
         let Some(pose) = self.newest.filter(|pose| pose.still && pose.number == self.sent) else { return Ok(()) };
         let camera = self.scene.space.camera(&pose.camera, UVec2::from_array(pose.canvas_px));
         let camera = camera.map_err(|error| End::Refused(error.to_string()))?;
-        // What is on its way goes on under the new plan.
-        if cell_cameras(&plan.assignment, &camera) == self.made_with {
+        // What is on its way goes on under the new plan, and what was drawn from the scene is the same under any.
+        if self.is_drawn || cell_cameras(&plan.assignment, &camera) == self.made_with {
             return Ok(());
         }
         if self.is_finished {
@@ -408,29 +524,34 @@ impl Visitor {
             self.plans.push_front(plan.assignment.clone());
             self.plans.truncate(PLANS);
         }
-        let (policy, reason) = (plan.assignment.policy.to_string(), plan.reason.clone());
-        let promise = self.promise.as_ref().map(ToString::to_string);
-        page.tell(&ToPage::Plan { epoch: self.plan_epoch(), policy, reason, promise })
+        let planned = PlannedLight::from(plan);
+        self.planned = Some(planned);
+        self.fallback = plan.fallback.and_then(|_| (self.methods.quality_of)(&plan.method));
+        self.limit_rate();
+        page.tell(&ToPage::Plan {
+            epoch: self.plan_epoch(),
+            policy: plan.assignment.policy.to_string(),
+            reason: plan.reason.clone(),
+            shares_light: planned.is_shared,
+            promise: self.promise.as_ref().map(ToString::to_string),
+        })
+    }
+
+    /// Bounds the light of pictures in motion by what the visitor wants, and by the fallback of all.
+    fn limit_rate(&mut self) {
+        let wanted = self.quality();
+        let best = self.fallback.map_or(wanted, |fallback| fallback.min(wanted));
+        self.rate.limit(self.planned.filter(|planned| planned.is_shared).map(|_| best));
     }
 
     /// Learns from a picture on the screen.
     fn shown(&mut self, page: &Page, number: u64, age_ms: f64, motion: &PictureStream) {
-        let (Some(height_px), Some(rtt_s)) = (motion.height_of(number), page.rtt_s) else { return };
+        let (Some(chosen), Some(rtt_s)) = (motion.chosen_for(number), page.rtt_s) else { return };
         if (0.0..=MAX_AGE_MS).contains(&age_ms) {
             let now_s = page.heard.duration_since(page.started).as_secs_f64();
-            self.rate.step(now_s, Shown { age_s: age_ms / 1000.0, rtt_s, height_px });
+            self.rate.step(now_s, Shown { age_s: age_ms / 1000.0, rtt_s, chosen });
         }
     }
-}
-
-/// The samples a pixel of the still after one with so many. Each step costs more than all before it, and positions of one
-/// view share their work, which views of one position each would not.
-fn more(samples: Antialias) -> Antialias {
-    Antialias::of(4 * samples.samples()).unwrap_or(Antialias::MOST)
-}
-
-fn fewer(samples: Antialias) -> Antialias {
-    Antialias::of(samples.samples() / 4).unwrap_or(Antialias::NONE)
 }
 
 /// Whether a plan has a view cell near a frame's camera. Where it has none, the next plan will.

@@ -7,8 +7,9 @@ use app_core::delivery::{at_rate, request};
 use clap::Args;
 use cluster::{OfferStatus, PolicyChoice, SessionRequest, Timeline};
 use depth_image::PinholeCamera;
-use gateway::{Connections, GatewayConfig, RequestOf};
+use gateway::{Connections, GatewayConfig, RequestOf, SharedLightMethods};
 use node::Port;
+use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
@@ -59,7 +60,10 @@ impl ViewerArgs {
         shutdown: CancellationToken,
     ) -> Option<Viewer> {
         let request_of = request_of(PolicyChoice::Auto, self.tone);
-        let config = GatewayConfig { hosts: self.hosts.clone(), ..GatewayConfig::new(coordinator, request_of) };
+        let config = GatewayConfig {
+            hosts: self.hosts.clone(),
+            ..GatewayConfig::new(coordinator, request_of, shared_light_methods())
+        };
         let served = tokio::spawn(gateway::serve(browsers?, config, shutdown.clone()));
         // Whoever started this may read no more than the address.
         let _ = writeln!(std::io::stdout(), "Open {coordinator}/");
@@ -73,6 +77,14 @@ impl Viewer {
         self.shutdown.cancel();
         // A viewer that has failed has ended, too.
         let _ = self.served.await;
+    }
+}
+
+/// The methods between which the pictures of a visitor change.
+pub fn shared_light_methods() -> SharedLightMethods {
+    SharedLightMethods {
+        of_quality: |quality| ReconstructionMethod::from(quality).to_string(),
+        quality_of: |method| method.parse().ok().and_then(|method: ReconstructionMethod| method.light_cache_quality()),
     }
 }
 

@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use client::ViewRequest;
 use cluster::{PolicyChoice, SessionRequest, Timeline};
-use depth_image::{Antialias, PinholeCamera, View, ViewPlanes};
-use gateway::GatewayConfig;
+use depth_image::{Antialias, LightCacheQuality, PinholeCamera, View, ViewPlanes};
+use gateway::{GatewayConfig, SharedLightMethods};
 use glam::{DVec3, UVec2, Vec3};
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
 
 use crate::cluster::{Cluster, Server, offer, request};
+use crate::scalar_engine::LIGHT_CACHE;
 
 /// A camera as pages state it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,7 +61,7 @@ impl GatewayBench {
     pub async fn start_with(request: SessionRequest, change: impl FnOnce(GatewayConfig) -> GatewayConfig) -> Self {
         let cluster = Cluster::start(3).await;
         let of_scene = request.clone();
-        let config = GatewayConfig::new(&cluster.coordinator.address, Arc::new(move |_, _| of_scene.clone()));
+        let config = config(&cluster.coordinator.address, of_scene);
         let config = change(config);
         let gateway = serve("127.0.0.1:0", config.clone());
         Self { cluster, gateway, config, request }
@@ -101,7 +102,7 @@ impl GatewayBench {
         let session = self.cluster.client.open_session(request, |_| ()).await.expect("a session");
         let camera = camera.of_size(UVec2::from_array(size_px));
         let view = ViewRequest { frame: 1, set_index: 0, camera };
-        let frames = session.render_views_with(planes, [view]).expect("a view").all().await;
+        let frames = session.render_views_with(planes, None, [view]).expect("a view").all().await;
         frames.expect("a frame").remove(0).view
     }
 
@@ -123,7 +124,15 @@ impl GatewayBench {
 /// A gateway of another cluster, for sessions of this kind.
 #[must_use]
 pub fn gateway_of(coordinator: &str, request: SessionRequest) -> Server {
-    serve("127.0.0.1:0", GatewayConfig::new(coordinator, Arc::new(move |_, _| request.clone())))
+    serve("127.0.0.1:0", config(coordinator, request))
+}
+
+fn config(coordinator: &str, request: SessionRequest) -> GatewayConfig {
+    let methods = SharedLightMethods {
+        of_quality: |quality| format!("{LIGHT_CACHE}:{quality}"),
+        quality_of: |method| LightCacheQuality::named(method.strip_prefix(LIGHT_CACHE)?.strip_prefix(':')?),
+    };
+    GatewayConfig::new(coordinator, Arc::new(move |_, _| request.clone()), methods)
 }
 
 fn serve(address: &str, config: GatewayConfig) -> Server {

@@ -5,15 +5,17 @@ use std::path::PathBuf;
 
 use app_core::exit::{BadInput, Outcome};
 use app_core::process::{cancel_at_signal, listen};
+use app_core::quality::quality;
 use app_core::sizes::SizePx;
 use clap::Args;
 use cluster::PolicyChoice;
+use depth_image::LightCacheQuality;
 use gateway::{GatewayConfig, Token, tls_config};
 use glam::UVec2;
 use tokio_util::sync::CancellationToken;
 
 use crate::tone::ToneArgs;
-use crate::viewer::request_of;
+use crate::viewer::{request_of, shared_light_methods};
 
 /// Serves the viewer to browsers. Pictures go on while the coordinator is away. There may be any number of gateways.
 #[derive(Debug, Args)]
@@ -34,6 +36,10 @@ pub struct GatewayArgs {
     /// The policy of the visitors' sessions: pipeline, direct, time-share, or auto (the fastest by prediction)
     #[arg(long, default_value_t, value_name = "NAME")]
     policy: PolicyChoice,
+    /// The quality of shared light in stills, and at most in motion, unless a visitor chooses another: draft, fast, balanced,
+    /// fine or exact [default: that of the scene, or fine]
+    #[arg(long, value_name = "NAME", value_parser = quality)]
+    quality: Option<LightCacheQuality>,
     #[command(flatten)]
     tone: ToneArgs,
     /// A name of this server in links, beside localhost and addresses; may be repeated
@@ -78,7 +84,8 @@ pub async fn run(args: GatewayArgs) -> anyhow::Result<Outcome> {
         origins: args.origins,
         tls,
         token,
-        ..GatewayConfig::new(&args.coordinator, request_of(args.policy, args.tone))
+        quality: args.quality,
+        ..GatewayConfig::new(&args.coordinator, request_of(args.policy, args.tone), shared_light_methods())
     };
     let shutdown = CancellationToken::new();
     cancel_at_signal(shutdown.clone());

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use cluster_tests::gateway_bench::{GatewayBench, PageCamera};
+use cluster::SessionRequest;
+use cluster_tests::gateway_bench::{GatewayBench, PageCamera, session_request};
+use cluster_tests::scalar_engine::LIGHT_CACHE;
 use codec::{DecodeLimits, FrameCodec, decode_frame};
 use futures_util::{SinkExt as _, StreamExt as _};
 use gateway::GatewayConfig;
@@ -99,6 +101,27 @@ impl Visitor {
         number
     }
 
+    /// The stills of a pose up to the last, as samples a pixel, quality and whether they are drawn directly.
+    async fn stills(&mut self, pose: Value) -> Vec<(u64, Value, bool)> {
+        self.number += 1;
+        let camera = json!({ "eye": EYE, "target": TARGET, "fov_y_deg": FOV_Y_DEG });
+        let mut message =
+            json!({ "type": "pose", "number": self.number, "camera": camera, "canvas_px": SIZE, "still": true });
+        message.as_object_mut().unwrap().extend(pose.as_object().unwrap().clone());
+        self.tell(&message).await;
+        let mut stills = Vec::new();
+        loop {
+            let picture = self.picture().await;
+            self.shown(&picture).await;
+            let Value::Object(header) = &picture.header else { panic!("{}", picture.header) };
+            let samples = header["samples"].as_u64().unwrap();
+            stills.push((samples, header["quality"].clone(), header["direct"].as_bool().unwrap()));
+            if !header["more"].as_bool().unwrap() {
+                return stills;
+            }
+        }
+    }
+
     async fn shown(&mut self, picture: &Picture) {
         self.tell(&json!({ "type": "shown", "number": picture.number(), "age_ms": 20.0 })).await;
     }
@@ -183,6 +206,35 @@ impl Visitor {
         }
         reason.expect("a refusal")
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_still_of_shared_light_becomes_finer_and_is_drawn_at_last() {
+    let request = SessionRequest { method: format!("{LIGHT_CACHE}:balanced"), takes_light: true, ..session_request() };
+    let bench = Bench(GatewayBench::start_with(request, |config| config).await);
+    let mut visitor = bench.visitor().await;
+    visitor.tell(&json!({ "type": "open" })).await;
+    assert_eq!(visitor.heard().await["quality"], "fine");
+    let plan = loop {
+        let heard = visitor.heard().await;
+        if heard["type"] == "plan" {
+            break heard;
+        }
+    };
+    assert_eq!(plan["shares_light"], true);
+    let shared = |samples: u64, quality: &str| (samples, Value::from(quality), false);
+    let drawn = (16, Value::Null, true);
+    let early = [shared(1, "balanced"), shared(4, "balanced")];
+    let fine = [&early[..], &[shared(16, "fine"), drawn.clone()]].concat();
+    assert_eq!(visitor.stills(json!({})).await, fine);
+    let balanced = [&early[..], &[shared(16, "balanced")]].concat();
+    assert_eq!(visitor.stills(json!({ "quality": "balanced" })).await, balanced);
+    assert_eq!(visitor.stills(json!({ "quality": "exact" })).await, [&early[..], &[drawn]].concat());
+    let draft = [1, 4, 16].map(|samples| shared(samples, "draft"));
+    assert_eq!(visitor.stills(json!({ "quality": "draft" })).await, draft);
+    visitor.tell(&json!({ "type": "pose", "number": 99, "quality": "best" })).await;
+    let refused = visitor.heard().await;
+    assert!(refused["reason"].as_str().unwrap().contains("draft, fast, balanced, fine, exact"), "{refused}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -124,7 +124,7 @@ async fn queries_out_of_range_are_refused_by_name() {
         ("view.png?show=x", "show"),
         ("view.png?size=1921x1080", "size"),
         ("view.png?fov=0", "fov"),
-        ("compare.json?size=641x360", "size"),
+        ("compare.json?size=1921x360", "size"),
         ("point.json?size=64x48&at=64,0", "at"),
         ("point.json?size=64x48&at=-1,0", "at"),
         ("depth.npy?eye=1,nan", "eye"),
