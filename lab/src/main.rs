@@ -19,6 +19,7 @@ mod light_cache_study;
 mod lighting_study;
 mod load;
 mod memory;
+mod models;
 mod placement;
 mod planner_study;
 mod process;

@@ -17,9 +17,9 @@ use sampling::SamplingMethod;
 use scene::SceneSpec;
 
 use super::args::BenchArgs;
-use super::fronts::models_of;
 use super::peer;
 use super::timing::in_turn;
+use crate::models::models_of;
 use crate::reference_views::{ReferenceViews, sample};
 
 /// A method that draws, beside the one that is asked for.

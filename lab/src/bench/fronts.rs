@@ -1,6 +1,5 @@
 //! The fronts of time against error of joint carve and light field search.
 
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Context as _;
@@ -15,6 +14,7 @@ use scene::SceneSpec;
 
 use super::args::BenchArgs;
 use crate::evaluation::Evaluation;
+use crate::models::models_of;
 use crate::reference_views::ReferenceViews;
 use crate::sweep;
 
@@ -110,33 +110,4 @@ pub fn models(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) ->
         sweep_scene(&name, SceneSpec::File(path), args, engine, report)?;
     }
     Ok(())
-}
-
-/// The largest model files of a folder and of its subfolders.
-pub(crate) fn models_of(folder: &Path, most: usize) -> anyhow::Result<Vec<PathBuf>> {
-    let mut found = Vec::new();
-    for path in entries(folder)? {
-        let inside = if path.is_dir() { entries(&path)? } else { vec![path] };
-        found.extend(inside.into_iter().filter(|path| is_model(path)));
-    }
-    anyhow::ensure!(
-        !found.is_empty(),
-        app_core::exit::BadInput(format!("{}: no .gltf, .glb, .obj or .ply file", folder.display()))
-    );
-    found.sort_by_key(|path| std::cmp::Reverse(std::fs::metadata(path).map_or(0, |file| file.len())));
-    found.truncate(most);
-    Ok(found)
-}
-
-fn entries(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let listed = std::fs::read_dir(folder)
-        .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<Vec<_>>>());
-    let mut paths = listed.map_err(|error| app_core::exit::BadInput(format!("{}: {error}", folder.display())))?;
-    paths.sort();
-    Ok(paths)
-}
-
-fn is_model(path: &Path) -> bool {
-    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_ascii_lowercase();
-    ["gltf", "glb", "obj", "ply"].contains(&extension.as_str())
 }

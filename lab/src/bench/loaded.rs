@@ -16,7 +16,7 @@ use report::{Bar, Cell, Check, Report, Table};
 use scene::SceneSpec;
 
 use super::args::BenchArgs;
-use super::fronts::models_of;
+use crate::models::models_of;
 
 /// The size of the pictures whose covered share counts.
 const PICTURE_PX: UVec2 = UVec2::new(480, 360);

@@ -10,9 +10,9 @@ use glam::{UVec2, Vec3};
 use sampling::Impostors;
 use scene::{Scene, SceneSpec};
 
-use crate::bench::fronts::models_of;
 use crate::failures::cached_light::LitScene;
 use crate::failures::stand::Stand;
+use crate::models::models_of;
 
 /// The lighting of samples and of views that use them.
 pub const LIGHTING: &str = "soft 16, occlusion 16";

@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use app_core::delivery::{at_rate, open, request};
 use app_core::live::{Drive, Record, drive};
 use client::{Client, ClientError, LiveView, Session};
-use cluster::{PolicyChoice, SessionRequest};
+use cluster::{DIRECT, PolicyChoice, SessionRequest};
 use depth_image::{PinholeCamera, ViewCell};
 use glam::UVec2;
 use tokio::task::JoinSet;
@@ -16,12 +16,21 @@ const PATH_POSES: usize = 240;
 /// The time between the starts of two clients.
 const START_INTERVAL: Duration = Duration::from_millis(50);
 
+/// What the clients of all loads ask for.
+#[derive(Debug, Clone)]
+pub struct Wanted {
+    pub size_px: UVec2,
+    /// Frames a second of each client, in place of each load's own.
+    pub rate_hz: Option<f64>,
+    /// How views are made; `None`: as the cluster offers.
+    pub method: Option<String>,
+}
+
 /// A number of equal clients.
 #[derive(Debug, Clone)]
 pub struct Clients {
     pub count: usize,
     pub rate_hz: f64,
-    pub size_px: UVec2,
     /// The time for which each client asks.
     pub lasting: Duration,
 }
@@ -48,12 +57,16 @@ impl Tour {
     ///
     /// # Errors
     /// The coordinator does not answer, or has no scene.
-    pub async fn of(coordinator: &str, size_px: UVec2, rate_hz: f64) -> anyhow::Result<Self> {
+    pub async fn of(coordinator: &str, wanted: &Wanted, rate_hz: f64) -> anyhow::Result<Self> {
         let status = Client::connect(coordinator).await?.status().await?;
         let offer = status.offers.into_iter().next().context("the coordinator does not say what it shows")?;
         let samples: Vec<_> = offer.sample_cameras.iter().map(|camera| *camera.reference()).collect();
-        let path = ViewCell::between(&samples).context("no sample cameras")?.orbit(PATH_POSES, size_px);
-        let request = at_rate(request(offer.settings, PolicyChoice::Pipeline, &path[..1])?, rate_hz);
+        let path = ViewCell::between(&samples).context("no sample cameras")?.orbit(PATH_POSES, wanted.size_px);
+        let mut settings = offer.settings;
+        settings.method = wanted.method.clone().or(settings.method);
+        let is_direct = settings.method.as_deref() == Some(DIRECT);
+        let policy = if is_direct { PolicyChoice::Direct } else { PolicyChoice::Pipeline };
+        let request = at_rate(request(settings, policy, &path[..1])?, rate_hz);
         Ok(Self { coordinator: coordinator.to_owned(), request, path })
     }
 

@@ -7,17 +7,20 @@ use ::report::Report;
 use app_core::exit::Outcome;
 use app_core::process::runtime;
 use app_core::progress::bar;
+use app_core::sizes::SizePx;
 use clap::Args;
+use glam::UVec2;
 use gpu::DevicePreference;
 use render::Lighting;
 use scene::SceneSpec;
 
+use super::clients::Wanted;
 use super::processes::Setting;
 use super::{phases, report};
 use crate::cpu_share::Hierarchy;
 
-/// Measures four loads, each on a coordinator and node processes of its own. The clients ask for views of 320×180: 8
-/// clients for 10 frames a second, 16 for 15, 80 for 10, and 200 for none.
+/// Measures four loads, each on a coordinator and node processes of its own. 8 clients ask for 10 frames a
+/// second, 16 for 15, 80 for 10, and 200 for none.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: myriorama-lab bench load --minutes 10 --strict")]
 pub struct LoadArgs {
@@ -27,6 +30,15 @@ pub struct LoadArgs {
     /// How surfaces are lit
     #[arg(long, value_name = "TERMS", default_value_t)]
     lighting: Lighting,
+    /// The size of views
+    #[arg(long, default_value_t = SizePx(UVec2::new(320, 180)), value_name = "WxH")]
+    size: SizePx,
+    /// Frames a second that each client asks for, in place of 10, 15 and 10
+    #[arg(long, value_name = "HZ", value_parser = hertz)]
+    rate: Option<f64>,
+    /// How views are made: a reconstruction method or direct [default: by the lighting]
+    #[arg(long, value_name = "NAME")]
+    method: Option<String>,
     /// any (a GPU if there is one) or software
     #[arg(long, default_value_t, value_name = "NAME", env = "MYRIORAMA_DEVICE")]
     device: DevicePreference,
@@ -55,6 +67,10 @@ fn cores(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|cores| (0.0..=1024.0).contains(cores)).ok_or_else(|| "expected 0 to 1024".to_owned())
 }
 
+fn hertz(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|hz| (0.01..=1000.0).contains(hz)).ok_or_else(|| "expected 0.01 to 1000".to_owned())
+}
+
 fn minutes(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
@@ -65,6 +81,10 @@ fn minutes(text: &str) -> Result<f64, String> {
 impl LoadArgs {
     fn lasting(&self) -> Duration {
         Duration::from_secs_f64(if self.quick { 30.0 } else { self.minutes * 60.0 })
+    }
+
+    fn wanted(&self) -> Wanted {
+        Wanted { size_px: self.size.0, rate_hz: self.rate, method: self.method.clone() }
     }
 
     fn setting(&self) -> Setting {
@@ -86,12 +106,14 @@ impl LoadArgs {
 /// A process does not start, or a client fails other than by refusal.
 pub fn run(args: &LoadArgs) -> anyhow::Result<Outcome> {
     let progress = bar("load", 4);
-    let phases = runtime()?.block_on(phases::run(&args.setting(), args.lasting(), &progress))?;
+    let phases = runtime()?.block_on(phases::run(&args.setting(), &args.wanted(), args.lasting(), &progress))?;
     progress.finish_and_clear();
     let mut report = Report::new("Myriorama bench load", phases.device.clone());
     report.version("myriorama", env!("CARGO_PKG_VERSION"));
     report.parameter("scene", args.scene.to_string());
     report.parameter("lighting", args.lighting.to_string());
+    report.parameter("size", args.size.to_string());
+    report.parameter("method", args.method.clone().unwrap_or_else(|| "by the lighting".to_owned()));
     report.parameter("nodes P", u32::from(args.nodes));
     let share = args.share_cores().map_or_else(|| "all".to_owned(), |cores| format!("{cores:.2}"));
     report.parameter("cores of each node", share);

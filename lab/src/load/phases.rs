@@ -3,15 +3,12 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use glam::UVec2;
 use indicatif::ProgressBar;
 
-use super::clients::{Clients, Outcome, Tour, follow};
+use super::clients::{Clients, Outcome, Tour, Wanted, follow};
 use super::processes::{Processes, Setting};
 use crate::memory::memory_mib;
 
-/// Size of every frame.
-const SIZE_PX: UVec2 = UVec2::new(320, 180);
 /// The number of idle clients.
 const IDLE: usize = 200;
 /// The wait before the memory of idle clients is read.
@@ -52,26 +49,32 @@ pub struct Phases {
 ///
 /// # Errors
 /// A process does not start, or a client fails other than by refusal.
-pub async fn run(setting: &Setting, lasting: Duration, progress: &ProgressBar) -> anyhow::Result<Phases> {
+pub async fn run(
+    setting: &Setting,
+    wanted: &Wanted,
+    lasting: Duration,
+    progress: &ProgressBar,
+) -> anyhow::Result<Phases> {
     let mut device = String::new();
     let mut loads = Vec::new();
     for (clients, rate_hz) in [(8, 10.0), (16, 15.0), (80, 10.0)] {
+        let rate_hz = wanted.rate_hz.unwrap_or(rate_hz);
         progress.set_message(format!("{clients} clients, {rate_hz} frames a second"));
-        let clients = Clients { count: clients, rate_hz, size_px: SIZE_PX, lasting };
-        let (load, named) = load(setting, clients).await?;
+        let clients = Clients { count: clients, rate_hz, lasting };
+        let (load, named) = load(setting, wanted, clients).await?;
         loads.push(load);
         device = named;
         progress.inc(1);
     }
     progress.set_message(format!("{IDLE} idle clients"));
-    let idle = idle(setting).await?;
+    let idle = idle(setting, wanted).await?;
     progress.inc(1);
     Ok(Phases { device, loads, idle })
 }
 
-async fn load(setting: &Setting, clients: Clients) -> anyhow::Result<(Load, String)> {
+async fn load(setting: &Setting, wanted: &Wanted, clients: Clients) -> anyhow::Result<(Load, String)> {
     let processes = Processes::start(setting).await?;
-    let tour = Tour::of(&processes.address, clients.size_px, clients.rate_hz).await?;
+    let tour = Tour::of(&processes.address, wanted, clients.rate_hz).await?;
     drop(tour.warm().await?);
     let (start, mut memory) = (Instant::now(), Memory::default());
     let mut following = Box::pin(follow(&tour, &clients));
@@ -88,9 +91,9 @@ async fn load(setting: &Setting, clients: Clients) -> anyhow::Result<(Load, Stri
     Ok((Load { name, clients, outcomes, dropped, memory: memory.0 }, processes.device.clone()))
 }
 
-async fn idle(setting: &Setting) -> anyhow::Result<Idle> {
+async fn idle(setting: &Setting, wanted: &Wanted) -> anyhow::Result<Idle> {
     let processes = Processes::start(setting).await?;
-    let tour = Tour::of(&processes.address, SIZE_PX, 0.0).await?;
+    let tour = Tour::of(&processes.address, wanted, 0.0).await?;
     let first = tour.warm().await?;
     tokio::time::sleep(REST).await;
     let mut before = Memory::default();

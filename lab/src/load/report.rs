@@ -41,6 +41,7 @@ fn clients(loads: &[Load]) -> anyhow::Result<Table> {
         ("refused", ""),
         ("poses", ""),
         ("frames", ""),
+        ("frames a second, all clients", ""),
         ("undegraded", "%"),
         ("degraded", "%"),
         ("rate kept, worst client", "%"),
@@ -54,6 +55,7 @@ fn clients(loads: &[Load]) -> anyhow::Result<Table> {
         let mean = shares.iter().sum::<f64>() / shares.len() as f64;
         let counts = [load.served().count(), load.refused(), load.posed() as usize, load.shown().count()];
         let numbers = [
+            load.shown().count() as f64 / load.clients.lasting.as_secs_f64(),
             load.undegraded_share() * 100.0,
             load.degraded() as f64 / load.posed() as f64 * 100.0,
             quantile(&shares, 0.0) * 100.0,

@@ -22,7 +22,7 @@ fn shown(frame: u64, posed_s: f64, fallback: u32) -> Shown {
 
 /// One frame in four is missing, the last is degraded; another client is refused.
 fn load() -> Load {
-    let clients = Clients { count: 2, rate_hz: 10.0, size_px: glam::UVec2::new(8, 8), lasting: Duration::from_secs(4) };
+    let clients = Clients { count: 2, rate_hz: 10.0, lasting: Duration::from_secs(4) };
     let kept = (1..=40u64).filter(|frame| frame % 4 != 0);
     let shown = kept.map(|frame| shown(frame, frame as f64 * 0.1 - 0.05, u32::from(frame == 39))).collect();
     let record = Record { shown, posed: 40, error: None, seconds: 4.0 };

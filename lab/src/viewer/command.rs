@@ -6,21 +6,29 @@ use app_core::exit::Outcome;
 use app_core::process::runtime;
 use clap::Args;
 use gpu::DevicePreference;
+use render::Lighting;
 use scene::SceneSpec;
 
 use super::part::Part;
 use super::stand::Ground;
-use super::{dragging, faults, first_picture, memory, rest, slow_link, walk};
+use super::{dragging, faults, first_picture, memory, rest, slow_link, stills, walk};
 use crate::section::{Section, finish, measure_parts, report};
 
 /// Measures the viewer's page in Chromium, before a gateway, a coordinator and two nodes on the same machine: pictures of
-/// drags, stills, first pictures, a slow link, faults, a walk around the scene, and memory. Needs chromium.
+/// drags, stills, first pictures, a slow link, faults, a walk around the scene, stills of shared light, and memory. Needs chromium.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: myriorama-lab bench viewer --quick --only dragging --only rest")]
 pub struct ViewerBenchArgs {
     /// The scene
     #[arg(long, value_name = "SPEC", default_value = "courtyard")]
     scene: SceneSpec,
+    /// How surfaces are lit in stills of shared light
+    #[arg(long, value_name = "TERMS", default_value = "soft 16, occlusion 16")]
+    lighting: Lighting,
+    /// A folder with the models FlightHelmet, lamborghini, ingenuity, threejs-shaderball and spot, or with subfolders that have
+    /// them, for stills of shared light
+    #[arg(long, value_name = "DIR")]
+    models: Option<PathBuf>,
     /// any (a GPU if there is one) or software
     #[arg(long, default_value_t, value_name = "NAME", env = "MYRIORAMA_DEVICE")]
     device: DevicePreference,
@@ -41,7 +49,15 @@ pub struct ViewerBenchArgs {
 impl ViewerBenchArgs {
     fn ground(&self) -> Ground {
         let (repeats, memory_s) = if self.quick { (1, 60.0) } else { (5, 600.0) };
-        Ground { scene: self.scene.to_string(), device: self.device, repeats, memory_s }
+        Ground {
+            scene: self.scene.to_string(),
+            lighting: self.lighting,
+            models: self.models.clone(),
+            out: self.out.clone(),
+            device: self.device,
+            repeats,
+            memory_s,
+        }
     }
 }
 
@@ -67,6 +83,7 @@ async fn measure_part(ground: &Ground, part: Part) -> anyhow::Result<Section> {
         Part::SlowLink => slow_link::measure(ground).await,
         Part::Faults => faults::measure(ground).await,
         Part::Walk => walk::measure(ground).await,
+        Part::Stills => stills::measure(ground).await,
         Part::Memory => memory::measure(ground).await,
     }
 }

@@ -114,11 +114,11 @@ async fn drags(ground: &Ground, stand: &Stand, size_px: [u32; 2]) -> anyhow::Res
     page.drag(DRAG_S).await?;
     let (mut all, mut moves) = (Vec::new(), Vec::new());
     for _ in 0..ground.repeats {
-        page.wait_for_exact(STILL).await?;
+        page.wait_for_finished(STILL).await?;
         tokio::time::sleep(REST).await;
         let before = page.picture_count().await?;
         page.drag(FIRST_MOVE_S).await?;
-        page.wait_for_exact(STILL).await?;
+        page.wait_for_finished(STILL).await?;
         let first = page.moving_since(before).await?.into_iter().next();
         moves.push(first.map_or(f64::INFINITY, |picture| picture.age_ms));
         all.push(one_drag(stand, &page).await?);

@@ -57,7 +57,7 @@ async fn killed_compositor(ground: &Ground) -> anyhow::Result<f64> {
 async fn killed_gateway(stand: &mut Stand) -> anyhow::Result<(f64, f64)> {
     let page = stand.page(SIZE_PX).await?;
     page.drag(1.0).await?;
-    page.wait_for_exact(WITHIN).await?;
+    page.wait_for_finished(WITHIN).await?;
     page.browser.run::<()>(WATCH_BANNER, Vec::new()).await?;
     let (index, killed_ms) = (page.picture_count().await?, page.now_ms().await?);
     stand.restart_gateway(AWAY).await?;

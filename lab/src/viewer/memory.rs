@@ -24,7 +24,7 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
     let (start, mut readings) = (Instant::now(), Vec::new());
     while start.elapsed().as_secs_f64() < ground.memory_s {
         page.drag(DRAG_S).await?;
-        page.wait_for_exact(WITHIN).await?;
+        page.wait_for_finished(WITHIN).await?;
         let heap_mib = page.browser.heap_bytes().await? / MIB;
         let gateway_mib = memory_mib(&stand.gateway.id().to_string()).unwrap_or(f64::NAN);
         readings.push([heap_mib, gateway_mib]);

@@ -13,4 +13,5 @@ mod part;
 mod rest;
 mod slow_link;
 mod stand;
+mod stills;
 mod walk;

@@ -26,8 +26,10 @@ const WATCH: &str = "window.lastMove = 0;
         if (text.includes('\"pose\"')) window.longestPose = Math.max(window.longestPose, text.length);
         send(text);
     };";
-const IS_EXACT: &str = "window.myriorama && document.getElementById('badge').dataset.state === 'exact'
-    && window.myriorama.shown() === window.myriorama.number()";
+const IS_FINISHED: &str = "(() => {
+    const last = window.myriorama?.statistics.pictures.at(-1)?.header;
+    return last && last.still && !last.more && last.number === window.myriorama.number();
+})()";
 
 /// A picture on the screen, by the page's clock.
 #[derive(Debug, Clone, Deserialize)]
@@ -69,9 +71,9 @@ impl Page {
         Ok(self.browser.open(url).await?)
     }
 
-    /// Waits until the newest pose's still is on the screen.
-    pub(super) async fn wait_for_exact(&self, within: Duration) -> anyhow::Result<()> {
-        Ok(self.browser.wait_until(IS_EXACT, within).await?)
+    /// Waits until the newest pose's finished still is on the screen.
+    pub(super) async fn wait_for_finished(&self, within: Duration) -> anyhow::Result<()> {
+        Ok(self.browser.wait_until(IS_FINISHED, within).await?)
     }
 
     /// Begins to note times and bytes.
@@ -111,6 +113,17 @@ impl Page {
             at += 25;
         }
         self.moving_since(before).await
+    }
+
+    /// Turns around the pivot by a share of a full turn: a drag over the canvas's height is half a turn.
+    pub(super) async fn turn(&self, share: f64, seconds: f64) -> anyhow::Result<()> {
+        let [width, height] = self.size_px.map(f64::from);
+        let length = 2.0 * height * share;
+        let steps = (seconds * 50.0).max(2.0) as usize;
+        let place = |step: usize| [width * 0.1 + length * step as f64 / steps as f64, height * 0.4];
+        let interval = Duration::from_secs_f64(seconds / steps as f64);
+        let path = (0..=steps).map(place).collect();
+        Ok(self.browser.drag(&Drag { interval, ..Drag::along(path) }).await?)
     }
 
     fn place(&self, step: usize) -> Place {

@@ -17,6 +17,8 @@ pub(super) enum Part {
     Faults,
     /// A walk around the scene, and its stills beside direct drawing
     Walk,
+    /// The still of shared light of five models beside direct drawing with many rays
+    Stills,
     /// Memory of the page and the gateway while a visitor drags and rests
     Memory,
 }

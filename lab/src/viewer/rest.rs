@@ -43,9 +43,9 @@ async fn stills(ground: &Ground, page: &Page) -> anyhow::Result<Vec<f64>> {
     page.drag(DRAG_S).await?;
     let mut times_ms = Vec::new();
     for _ in 0..ground.repeats * DRAGS {
-        page.wait_for_exact(WITHIN).await?;
+        page.wait_for_finished(WITHIN).await?;
         page.drag(DRAG_S).await?;
-        page.wait_for_exact(WITHIN).await?;
+        page.wait_for_finished(WITHIN).await?;
         let last = "window.myriorama.statistics.pictures.findLast((p) => p.header.still
             && p.header.number === window.myriorama.number())";
         times_ms.push(page.browser.value(&format!("({last}).paintedAt - window.lastMove")).await?);

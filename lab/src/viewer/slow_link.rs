@@ -31,7 +31,7 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
     proxy.set(LINK, LINK);
     let page = Page::start(SIZE_PX).await?;
     page.open(&proxy.address).await?;
-    page.wait_for_exact(WITHIN).await?;
+    page.wait_for_finished(WITHIN).await?;
     let start_ms = page.now_ms().await? + FOUND_S * 1000.0;
     let pictures = page.drag(DRAG_S).await?;
     let slow: Vec<Picture> = pictures.into_iter().filter(|picture| picture.painted_ms > start_ms).collect();

@@ -1,9 +1,11 @@
 //! A cluster, a gateway and a browser, each a process.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use cluster::PolicyChoice;
 use gpu::DevicePreference;
+use render::Lighting;
 
 use super::page::Page;
 use crate::load::processes::{Processes, Setting};
@@ -17,6 +19,12 @@ const FIRST_PICTURE: Duration = Duration::from_secs(120);
 #[derive(Debug, Clone)]
 pub(super) struct Ground {
     pub(super) scene: String,
+    /// The light of stills of shared light.
+    pub(super) lighting: Lighting,
+    /// The folder of their models.
+    pub(super) models: Option<PathBuf>,
+    /// The folder of the report.
+    pub(super) out: PathBuf,
     pub(super) device: DevicePreference,
     /// Repeats of a measurement.
     pub(super) repeats: usize,
@@ -65,7 +73,7 @@ impl Stand {
     pub(super) async fn page(&self, size_px: [u32; 2]) -> anyhow::Result<Page> {
         let page = Page::start(size_px).await?;
         page.open(&self.url).await?;
-        page.wait_for_exact(FIRST_PICTURE).await?;
+        page.wait_for_finished(FIRST_PICTURE).await?;
         Ok(page)
     }
 }

@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use anyhow::Context as _;
-use browser::input::Drag;
 use cluster::PolicyChoice;
 use report::{Bar, Cell, Check, Table};
 use serde_json::Value;
@@ -30,10 +29,10 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
     let stand = Stand::start(ground, PolicyChoice::Pipeline).await?;
     let page = stand.page(SIZE_PX).await?;
     page.drag(2.0).await?;
-    page.wait_for_exact(WITHIN).await?;
+    page.wait_for_finished(WITHIN).await?;
     let (index, since_ms) = (page.picture_count().await?, page.now_ms().await?);
     for _ in 0..PARTS {
-        turn(&page, 1.0 / PARTS as f64, WALK_S / PARTS as f64).await?;
+        page.turn(1.0 / PARTS as f64, WALK_S / PARTS as f64).await?;
     }
     let until_ms = page.now_ms().await?;
     let pictures = page.pictures_since(index).await?;
@@ -64,24 +63,13 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
     Ok(Section { device: stand.processes.device.clone(), tables: vec![table], checks })
 }
 
-/// Turns around the pivot by a share of a full turn: a drag over the canvas's height is half a turn.
-async fn turn(page: &Page, share: f64, seconds: f64) -> anyhow::Result<()> {
-    let [width, height] = SIZE_PX.map(f64::from);
-    let length = 2.0 * height * share;
-    let steps = (seconds * 50.0).max(2.0) as usize;
-    let place = |step: usize| [width * 0.1 + length * step as f64 / steps as f64, height * 0.4];
-    let interval = Duration::from_secs_f64(seconds / steps as f64);
-    let path = (0..=steps).map(place).collect();
-    Ok(page.browser.drag(&Drag { interval, ..Drag::along(path) }).await?)
-}
-
 /// The PSNR of the foreground and of the whole picture of the stills of a visitor who rests for two seconds after every 15°.
 async fn stills(stand: &Stand, page: &Page) -> anyhow::Result<[Vec<f64>; 2]> {
     let mut psnr_db = [Vec::new(), Vec::new()];
     for _ in 0..STILLS {
-        turn(page, 1.0 / STILLS as f64, 0.3).await?;
+        page.turn(1.0 / STILLS as f64, 0.3).await?;
         tokio::time::sleep(REST).await;
-        page.wait_for_exact(WITHIN).await?;
+        page.wait_for_finished(WITHIN).await?;
         let query = "const { eye, target, fov_y_deg } = window.myriorama.camera.toCamera(window.myriorama.state());
             return `eye=${eye}&target=${target}&fov=${fov_y_deg}`";
         let query: String = page.browser.run(query, Vec::new()).await?;
