@@ -8,6 +8,7 @@ use axum::response::Response;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use client::Frame;
+use cluster::DIRECT;
 use codec::{FrameCodec, encode_frame};
 use depth_image::{Antialias, View, ViewPlanes};
 use metrics::{PictureErrors, Rgb8Image, flip_map};
@@ -24,18 +25,17 @@ pub(crate) async fn compare(
     Query(query): Query<ViewQuery>,
 ) -> Result<Response, Refusal> {
     let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
-    let (shown, direct) = (visited.shown(), &visited.scene.direct);
-    let _visit = direct.visits.begin();
+    let shown = visited.shown();
     // Those that wait for a session hold up no other comparison.
-    let (session, _) = tokio::try_join!(shown.opened(), direct.opened())?;
+    let session = shown.opened().await?;
     let busy = |_| Refusal(StatusCode::TOO_MANY_REQUESTS, "another view is being compared: try again later".to_owned());
     let _place = gateway.comparison.try_acquire().map_err(busy)?;
     // As finished stills are.
     let planes = ViewPlanes { antialias: Antialias::MOST, tone: session.tone(), ..ViewPlanes::COLOR };
     let with_depth = ViewPlanes { inverse_depth: true, ..planes };
-    let draw = |kept, planes, method| gateway.single_views.draw(kept, visited.camera, planes, method, visited.moment);
-    let SingleView { frame: view, place, .. } = draw(shown, planes, visited.method(&gateway, &session)).await?;
-    let SingleView { frame: direct, .. } = draw(direct, with_depth, None).await?;
+    let draw = |planes, method| gateway.single_views.draw(shown, visited.camera, planes, method, visited.moment);
+    let SingleView { frame: view, place, .. } = draw(planes, visited.method(&gateway, &session)).await?;
+    let SingleView { frame: direct, .. } = draw(with_depth, Some(DIRECT.to_owned())).await?;
     let compared = tokio::task::spawn_blocking(move || compared(&view, &direct));
     let compared = compared.await.map_err(Refusal::internal)?;
     let compared = compared.ok_or_else(|| Refusal::internal("the views cannot be compared"))?;

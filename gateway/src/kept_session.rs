@@ -15,6 +15,8 @@ pub(crate) const FIRST_DELAY: Duration = Duration::from_millis(250);
 pub(crate) const LONGEST_DELAY: Duration = Duration::from_secs(4);
 /// The lowest rate that a session is opened with, in pictures a second.
 const LEAST_RATE: f64 = 0.05;
+/// A session stays open after its last visit: a visitor who comes back soon finds the samples that were there.
+const LINGERS: Duration = Duration::from_secs(60);
 /// The interval at which the session's demand follows the visitors.
 const FOLLOW: Duration = Duration::from_secs(1);
 
@@ -69,17 +71,8 @@ pub(crate) enum FirstOpened {
     AtVisit,
 }
 
-/// The time for which a session stays open after its last visit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Lingers(pub(crate) Duration);
-
 impl KeptSession {
-    pub(crate) fn start(
-        coordinator: &str,
-        request: SessionRequest,
-        first: FirstOpened,
-        Lingers(lingers): Lingers,
-    ) -> Self {
+    pub(crate) fn start(coordinator: &str, request: SessionRequest, first: FirstOpened) -> Self {
         let waiting = SessionState::Waiting { stage: "connecting", detail: "the gateway connects".to_owned() };
         let (changes, state) = watch::channel(waiting);
         let (failures, failed) = mpsc::channel(16);
@@ -87,7 +80,7 @@ impl KeptSession {
         let visits = Arc::new(Visits::default());
         let coordinator = coordinator.to_owned();
         let usual_rate = request.frames_per_s;
-        let keeper = Keeper { coordinator, request, usual_rate, lingers, visits: visits.clone(), changes, failed };
+        let keeper = Keeper { coordinator, request, usual_rate, visits: visits.clone(), changes, failed };
         let mut tasks = JoinSet::new();
         tasks.spawn(keeper.run(first));
         let single_views = Semaphore::new(SINGLE_VIEWS);
@@ -131,7 +124,6 @@ struct Keeper {
     coordinator: String,
     request: SessionRequest,
     usual_rate: Option<f64>,
-    lingers: Duration,
     visits: Arc<Visits>,
     changes: watch::Sender<SessionState>,
     failed: mpsc::Receiver<Arc<Session>>,
@@ -226,7 +218,7 @@ impl Keeper {
                     return Closed::Failed;
                 },
                 _ = ticks.tick() => {
-                    if self.visits.is_left(Instant::now(), self.lingers) {
+                    if self.visits.is_left(Instant::now(), LINGERS) {
                         return Closed::Left;
                     }
                     self.ask_for(self.visits.active(Instant::now()).max(1) as u32, &mut told, session).await;

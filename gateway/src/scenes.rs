@@ -5,14 +5,14 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use client::{Client, ClientError};
-use cluster::{ClusterStatus, DIRECT, OfferStatus, PolicyChoice, SessionRequest, Timeline};
+use cluster::{ClusterStatus, OfferStatus, SessionRequest, Timeline};
 use depth_image::LightCacheQuality;
 use glam::UVec2;
 use parking_lot::Mutex;
 
 use crate::camera::{BadView, PageCamera, ViewSpace};
 use crate::config::GatewayConfig;
-use crate::kept_session::{FIRST_DELAY, FirstOpened, KeptSession, LONGEST_DELAY, Lingers};
+use crate::kept_session::{FIRST_DELAY, FirstOpened, KeptSession, LONGEST_DELAY};
 
 /// The size of pictures in motion that costs are measured on.
 pub(crate) const TYPICAL_PX: UVec2 = UVec2::new(640, 360);
@@ -20,13 +20,6 @@ pub(crate) const TYPICAL_PX: UVec2 = UVec2::new(640, 360);
 /// Moments of a scene that moves.
 const MOMENTS_PER_S: f64 = 12.0;
 const MAX_MOMENTS: f64 = 120.0;
-
-/// A visitor who comes back soon finds the samples that were there.
-const VISITORS: Lingers = Lingers(Duration::from_secs(60));
-/// Nodes that draw single views are needed elsewhere.
-const SINGLE_VIEWS: Lingers = Lingers(Duration::from_secs(3));
-/// Views a second that are drawn directly: a low rate takes few nodes from visitors.
-const DIRECT_PER_S: f64 = 0.1;
 
 /// A status is told for this time.
 const STATUS_FOR: Duration = Duration::from_millis(500);
@@ -74,8 +67,6 @@ pub(crate) struct SceneSessions {
     pub(crate) shown: KeptSession,
     /// Views of a scene that moves, for visitors who see it move. At rest, many views share a sample set.
     pub(crate) moving: Option<KeptSession>,
-    /// The same views drawn directly, for comparison.
-    pub(crate) direct: KeptSession,
     /// The quality of shared light in stills for which no other is asked.
     pub(crate) quality: LightCacheQuality,
 }
@@ -150,14 +141,12 @@ impl SceneSessions {
         let home = space.home(&offer);
         let shown = (config.request_of)(&offer, space.camera(&home, TYPICAL_PX)?);
         let moving = offer.period_s.map(|period_s| moving(shown.clone(), period_s));
-        let direct = drawn_directly(shown.clone(), moving.as_ref().map(|request| request.timeline));
         let offered = offer.settings.method.as_deref().and_then(config.methods.quality_of);
         let quality = config.quality.or(offered).unwrap_or(LightCacheQuality::Fine);
-        let start = |request, first, lingers| KeptSession::start(&config.coordinator, request, first, lingers);
+        let start = |request, first| KeptSession::start(&config.coordinator, request, first);
         Ok(Self {
-            shown: start(shown, first, VISITORS),
-            moving: moving.map(|request| start(request, FirstOpened::AtVisit, VISITORS)),
-            direct: start(direct, FirstOpened::AtVisit, SINGLE_VIEWS),
+            shown: start(shown, first),
+            moving: moving.map(|request| start(request, FirstOpened::AtVisit)),
             offer,
             space,
             home,
@@ -181,19 +170,4 @@ fn moving(request: SessionRequest, period_s: f64) -> SessionRequest {
     let moments = (period_s * MOMENTS_PER_S).round().clamp(2.0, MAX_MOMENTS);
     let timeline = Timeline { start_s: 0.0, step_s: period_s / moments, set_count: moments as u32 };
     SessionRequest { timeline, refinement_steps: 1, ..request }
-}
-
-/// Single views of the same scene and light, drawn directly. Without viewpoints they share the visitors' workload, and force
-/// what visitors force: something else would change their plan.
-fn drawn_directly(request: SessionRequest, timeline: Option<Timeline>) -> SessionRequest {
-    SessionRequest {
-        method: DIRECT.to_owned(),
-        policy: if request.viewpoints.is_empty() { request.policy } else { PolicyChoice::Auto },
-        frames_per_s: Some(DIRECT_PER_S),
-        fallbacks: Vec::new(),
-        viewpoints: Vec::new(),
-        timeline: timeline.unwrap_or(Timeline::still(0.0)),
-        refinement_steps: 1,
-        ..request
-    }
 }

@@ -6,6 +6,7 @@ use axum::extract::{Path, Query, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode};
 use axum::response::Response;
 use client::{Frame, Session};
+use cluster::DIRECT;
 use codec::{FrameCodec, encode_frame};
 use depth_image::{Antialias, LightCacheQuality, PinholeCamera, PixelDepth, ProvenanceKind, View, ViewPlanes};
 use glam::{UVec2, Vec2};
@@ -133,13 +134,12 @@ impl Visited {
 
     /// The view, drawn directly where no view cell is near: cells follow visitors, not single requests.
     async fn draw(&self, gateway: &Gateway, planes: ViewPlanes) -> Result<SingleView, Refusal> {
-        let (shown, direct) = (self.shown(), &self.scene.direct);
+        let shown = self.shown();
         let session = shown.opened().await?;
         let is_near = session.plan().assignment.workload.has_cell_near(&self.camera);
         let planes = ViewPlanes { tone: session.tone(), ..planes };
-        let _visit = (!is_near).then(|| direct.visits.begin());
-        let (kept, method) = if is_near { (shown, self.method(gateway, &session)) } else { (direct, None) };
-        Ok(gateway.single_views.draw(kept, self.camera, planes, method, self.moment).await?)
+        let method = if is_near { self.method(gateway, &session) } else { Some(DIRECT.to_owned()) };
+        Ok(gateway.single_views.draw(shown, self.camera, planes, method, self.moment).await?)
     }
 }
 
