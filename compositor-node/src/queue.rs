@@ -29,13 +29,16 @@ pub(crate) enum Lane {
     LongBatch,
     /// Views that a request has drawn from the scene, whatever the plan: one at a time.
     Direct,
+    /// Views of live streams that are drawn from the scene until their set is there.
+    Preview,
 }
 
 impl Lane {
-    pub(crate) const ALL: [Self; 5] = [Self::Live, Self::LongLive, Self::Batch, Self::LongBatch, Self::Direct];
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Live, Self::LongLive, Self::Batch, Self::LongBatch, Self::Direct, Self::Preview];
 
     pub(crate) fn is_live(self) -> bool {
-        matches!(self, Self::Live | Self::LongLive)
+        matches!(self, Self::Live | Self::LongLive | Self::Preview)
     }
 }
 

@@ -19,6 +19,9 @@ use crate::view_times::ViewTimes;
 /// Batches that are being encoded while the device makes the next.
 const BATCHES_BEHIND: usize = 2;
 
+/// The share of the time for previews: the rest is for the samples that they wait for.
+const PREVIEW_SHARE: f64 = 0.5;
+
 /// Makes views, and encodes them. Clones share the encoders.
 #[derive(Clone)]
 pub(crate) struct Rendering {
@@ -63,6 +66,8 @@ impl Rendering {
                 let busy_s = self.render(turn, batch, place).await;
                 if lane == Lane::Direct && arrivals.served() > served {
                     tokio::time::sleep(pause(busy_s, self.direct_share)).await;
+                } else if lane == Lane::Preview {
+                    tokio::time::sleep(pause(busy_s, PREVIEW_SHARE)).await;
                 }
             }
         }

@@ -76,12 +76,13 @@ impl Drop for ClientStream {
 
 impl Shared {
     fn lane(&self, is_live: bool, key: &BatchKey) -> Lane {
+        if key.is_preview {
+            return Lane::Preview;
+        }
         let plan = || self.plans.in_force(key.workload_number);
         if key.method == DIRECT && plan().is_some_and(|plan| plan.policy != Policy::Direct) {
             return Lane::Direct;
         }
-        // A preview takes no time from the samples that it waits for.
-        let is_live = is_live && !key.is_preview;
         let is_long = |limit_s: f64| match self.times.predicted_s(&key.kind(), key.size_px) {
             Some(seconds) => seconds > limit_s,
             None => key.size_px.element_product().saturating_mul(key.planes.antialias.samples()) > LONG_PIXELS,
