@@ -181,7 +181,7 @@ impl LiveStream {
                 request.planes.antialias = quality.antialias;
                 live.waits_for_set = quality.waits_for_set;
                 if let Some(method) = &quality.method {
-                    request.method = method.to_string();
+                    request.method.clone_from(method);
                 }
             }
             self.poses.sent(pose);

@@ -1,6 +1,5 @@
 //! Views that a caller asks for, and the frames that answer them.
 
-use std::sync::Arc;
 use std::time::Instant;
 
 use bytes::Bytes;
@@ -29,7 +28,7 @@ pub struct PictureQuality {
     /// Samples a pixel.
     pub antialias: Antialias,
     /// The reconstruction method, whose samples must be those of the session's; `None`: the session's.
-    pub method: Option<Arc<str>>,
+    pub method: Option<String>,
     /// Whether the picture waits for its sample set, as a still does.
     pub waits_for_set: bool,
 }

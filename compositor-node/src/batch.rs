@@ -60,7 +60,7 @@ pub(crate) enum Source {
     /// Complete sample sets.
     Sets(ViewSets),
     /// The scene itself.
-    Scene { plan: Arc<Assignment>, scene_time_s: f32, is_preview: bool },
+    Scene { plan: Arc<Assignment>, scene_time_s: f32 },
 }
 
 impl Source {

@@ -227,7 +227,7 @@ mod tests {
         Waiting {
             key,
             place,
-            source: Source::Scene { plan: Arc::new(assignment()), scene_time_s: 0.0, is_preview: false },
+            source: Source::Scene { plan: Arc::new(assignment()), scene_time_s: 0.0 },
             view: RequestedView { frame: number.into(), camera },
             codec: FrameCodec::Lz4,
             arrived: now,

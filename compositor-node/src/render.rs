@@ -116,10 +116,10 @@ impl Rendering {
                     .reconstruct(sets.on_device.as_ref(), &work, turn)
                     .map(|views| (Operation::ReconstructView, views))
             }
-            Source::Scene { plan, scene_time_s, is_preview } => {
+            Source::Scene { plan, scene_time_s } => {
                 let mut work = DirectWork::of(&plan.workload, cameras.clone(), key.planes);
                 work.scene_time_s = *scene_time_s;
-                if *is_preview {
+                if key.is_preview {
                     work.lighting = engine.preview_lighting(&work.lighting)?;
                 }
                 engine.draw_direct(&work, turn).map(|views| (Operation::DirectView, views))

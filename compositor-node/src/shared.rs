@@ -133,7 +133,7 @@ impl Shared {
                 let content = sets.of_cell.content;
                 (Source::Sets(sets), Some(content))
             }
-            Policy::Direct => (scene(plan, set_index, false)?, None),
+            Policy::Direct => (scene(plan, set_index)?, None),
         };
         let place = Place { id, cell, is_neighbour: false, content };
         Ok(Loaded { source, place, wait_s: start.elapsed().as_secs_f64() })
@@ -154,7 +154,7 @@ impl Shared {
     pub(crate) fn source_at(&self, plan: &Arc<Assignment>, set_index: u32, place: Place) -> Option<Source> {
         match place.content {
             Some(content) => self.with_common(self.sets.loaded(&content)?, plan, set_index).map(Source::Sets),
-            None => scene(plan, set_index, place.is_preview()).ok(),
+            None => scene(plan, set_index).ok(),
         }
     }
 
@@ -176,7 +176,7 @@ impl Shared {
     pub(crate) fn meanwhile(&self, plan: &Arc<Assignment>, set_index: u32, view: &PinholeCamera) -> Option<Loaded> {
         let id = plan.sample_set_id(set_index).filter(|_| plan.policy != Policy::Direct)?;
         let Some(set) = self.sets.nearest(plan, set_index, view) else {
-            let source = plan.workload.planes.light.then(|| scene(plan, set_index, true).ok()).flatten()?;
+            let source = plan.workload.planes.light.then(|| scene(plan, set_index).ok()).flatten()?;
             let place = Place { id, cell: plan.cell_of(view), is_neighbour: true, content: None };
             return Some(Loaded { source, place, wait_s: 0.0 });
         };
@@ -185,7 +185,7 @@ impl Shared {
     }
 }
 
-fn scene(plan: &Arc<Assignment>, set_index: u32, is_preview: bool) -> Result<Source, Status> {
+fn scene(plan: &Arc<Assignment>, set_index: u32) -> Result<Source, Status> {
     let scene_time_s = plan.workload.timeline.time_s(set_index).ok_or_else(|| beyond_timeline(set_index))?;
-    Ok(Source::Scene { plan: plan.clone(), scene_time_s, is_preview })
+    Ok(Source::Scene { plan: plan.clone(), scene_time_s })
 }

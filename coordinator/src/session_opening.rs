@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use cluster::{MeasureCosts, Measured, SessionRequest, SessionStage, SharedLightCosts, Workload};
-use depth_image::{ToneMapping, ViewPlanes};
+use cluster::{Costs, MeasureCosts, Measured, SessionRequest, SessionStage, SharedLightCosts, Workload};
+use depth_image::{SampleCamera, ToneMapping, ViewPlanes};
 use tonic::Status;
 
 use crate::grpc_status::refusal;
@@ -12,7 +12,7 @@ use crate::schedule::{Budgeted, Event, MEASURED_BATCH, Opening, PolicyOverride};
 use crate::session_budget::budgeted;
 use crate::sessions::EventSender;
 use crate::shared::Shared;
-use crate::workload::{LIGHT_DENSITIES, chooses_light_density, workload_of};
+use crate::workload::{LightDensity, chooses_light_density, workload_of};
 
 /// The longest time of a device for a set of light in full density.
 const LONGEST_LIGHT_SET_S: f64 = 10.0;
@@ -43,26 +43,20 @@ async fn measured_opening(
     events: &EventSender,
 ) -> Result<Opening, Status> {
     let offer = shared.offers.find(request.scene.as_deref())?;
-    let mut densities = LIGHT_DENSITIES.into_iter();
-    let mut finest_set_s = None;
-    let (workload, budgeted, measured) = loop {
-        let density = densities.next().unwrap_or(1.0);
-        let workload = workload_of(&request, offer, density)?;
-        let budgeted = budgeted(&request, &workload, offer, &shared.config)?;
-        let measured = measured_workload(shared, &request, &workload, budgeted.as_ref(), events).await?;
-        let set_s = measured.costs.sample_image_s * workload.of_one_view().view_camera_count() as f64;
-        if set_s <= LONGEST_LIGHT_SET_S || densities.len() == 0 || !chooses_light_density(&request, offer) {
-            break (workload, budgeted, measured);
-        }
-        finest_set_s.get_or_insert(set_s);
-    };
+    let mut workload = workload_of(&request, offer, LightDensity::FULL)?;
+    let budgeted = budgeted(&request, &workload, offer, &shared.config)?;
+    let mut measured = measured_workload(shared, &request, &workload, budgeted.as_ref(), events).await?;
+    let full_set_s = measured.costs.sample_image_s * workload.of_one_view().view_camera_count() as f64;
+    let density = LightDensity::for_set(full_set_s, LONGEST_LIGHT_SET_S);
+    let is_coarser = density != LightDensity::FULL && chooses_light_density(&request, offer);
+    if is_coarser {
+        workload = workload_of(&request, offer, density)?;
+        measured = measured_workload(shared, &request, &workload, budgeted.as_ref(), events).await?;
+    }
     let Measured { costs, planes, auto_exposure, traced_pixel_count, shared_light } = measured;
-    let density = LIGHT_DENSITIES[LIGHT_DENSITIES.len() - 1 - densities.len()];
-    let note =
-        shared_light.map_or_else(String::new, |light| light_note(&request.method, &light, density, finest_set_s));
-    let has_coarser = request.fallbacks.iter().any(|fallback| fallback.method != request.method);
-    let coarsest_s = shared_light.filter(|_| has_coarser).map(|light| light.surfaces_s + light.look_up_s);
-    let last_view_time_ratio = coarsest_s.map_or(1.0, |seconds| seconds / costs.reconstruct_view_s);
+    let note = shared_light.map_or_else(String::new, |light| light_note(&request.method, &light))
+        + &if is_coarser { density_note(&workload, &request, full_set_s) } else { String::new() };
+    let last_view_time_ratio = last_view_time_ratio(&request, &costs, shared_light.as_ref());
     // A cube serves views from anywhere: there are no cells to follow viewers.
     let viewpoints = if workload.samples_cube() { Vec::new() } else { request.viewpoints };
     Ok(Opening {
@@ -82,7 +76,7 @@ async fn measured_opening(
         auto_exposure,
         viewpoints,
         budgeted,
-        last_view_time_ratio: if last_view_time_ratio > 0.0 { last_view_time_ratio.min(1.0) } else { 1.0 },
+        last_view_time_ratio,
         note,
     })
 }
@@ -115,19 +109,35 @@ async fn measured_workload(
     costs_of(shared, measurement, events, admits).await
 }
 
+/// The time of a view at the last fallback over that of one as it is asked for: light has the lowest quality there. 1 where the parts
+/// of a view are not known.
+fn last_view_time_ratio(request: &SessionRequest, costs: &Costs, light: Option<&SharedLightCosts>) -> f64 {
+    let has_coarser = request.fallbacks.iter().any(|fallback| fallback.method != request.method);
+    let Some(light) = light.filter(|_| has_coarser) else { return 1.0 };
+    let ratio = (light.surfaces_s + light.look_up_s) / costs.reconstruct_view_s;
+    if ratio > 0.0 { ratio.min(1.0) } else { 1.0 }
+}
+
 /// What the reason of a plan says of light that views share.
-fn light_note(method: &str, light: &SharedLightCosts, density: f32, finest_set_s: Option<f64>) -> String {
-    let ms = |seconds: f64| format!("{:.0} ms", seconds * 1e3);
-    let of_density = finest_set_s.map_or_else(String::new, |set_s| {
-        format!(" Samples have {density} times the density of views: in full density a set would take {set_s:.0} s.")
-    });
+fn light_note(method: &str, light: &SharedLightCosts) -> String {
+    let SharedLightCosts { known_ratio, surfaces_s, look_up_s, unknown_s } = light;
     format!(
-        " By {method}, samples know the light of {:.0} % of a view's points; surfaces take {}, the look-up {}, and the other \
-         points {}.{of_density}",
-        light.known_ratio * 100.0,
-        ms(light.surfaces_s),
-        ms(light.look_up_s),
-        ms(light.unknown_s),
+        " By {method}, samples know the light of {:.0} % of a view's points; surfaces take {:.0} ms, the look-up {:.0} ms, and \
+         the other points {:.0} ms.",
+        known_ratio * 100.0,
+        surfaces_s * 1e3,
+        look_up_s * 1e3,
+        unknown_s * 1e3,
+    )
+}
+
+/// What the reason of a plan says of samples of light that are coarser than views.
+fn density_note(workload: &Workload, request: &SessionRequest, full_set_s: f64) -> String {
+    let sample = workload.sample_cameras.first().and_then(SampleCamera::depth);
+    let sample_focal_px = sample.map_or(0.0, |camera| camera.reference().focal_px.y);
+    let density = sample_focal_px / request.typical_view.focal_px.y;
+    format!(
+        " Samples have {density:.2} times the density of views: in full density a set would take {full_set_s:.0} s."
     )
 }
 

@@ -12,8 +12,6 @@ use crate::schedule::ChoiceError;
 
 /// Texels of a sample image a pixel of a view, each way: what brings most for its cost (docs/benchmarks.md).
 const SAMPLE_DENSITY: f32 = 2.0;
-/// The same of samples that views take only light from, the finest first: surfaces need no finer ones.
-pub(crate) const LIGHT_DENSITIES: [f32; 3] = [1.0, 0.5, 0.25];
 /// The most texels of a set of images whose size follows the views: a software device samples them in about a second.
 const MAX_FITTING_TEXELS: usize = 1 << 20;
 /// The same of samples of light, whose time is measured.
@@ -25,6 +23,24 @@ const MIRRORS_DENSITY: f32 = 4.4;
 /// Steps of √2 by which images are smaller than the offered ones at most.
 const LEAST_STEPS: f32 = -2.0;
 
+/// Texels of an image of light a pixel of a view, each way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LightDensity(f32);
+
+impl LightDensity {
+    /// Surfaces come from the scene: they need no finer samples.
+    pub(crate) const FULL: Self = Self(1.0);
+
+    /// The finest of full, half and a quarter of the density in which a set takes at most so long, by its number of texels.
+    pub(crate) fn for_set(full_set_s: f64, longest_s: f64) -> Self {
+        match full_set_s / longest_s {
+            ratio if ratio <= 1.0 => Self::FULL,
+            ratio if ratio <= 4.0 => Self(0.5),
+            _ => Self(0.25),
+        }
+    }
+}
+
 /// Completes a request with the scene's defaults. A node tells which planes its method needs. Samples of light have a density of
 /// `light_density` where their size follows the views.
 ///
@@ -33,7 +49,7 @@ const LEAST_STEPS: f32 = -2.0;
 pub(crate) fn workload_of(
     request: &SessionRequest,
     offer: &SceneOffer,
-    light_density: f32,
+    light_density: LightDensity,
 ) -> Result<Workload, Status> {
     let volume = request.volume.unwrap_or(offer.volume);
     let offered = offer.cube.as_ref().filter(|cube| cube.sampling == request.sampling);
@@ -166,10 +182,10 @@ fn cells_of(
 }
 
 /// The size of a session's images; `None` where the offer's is fixed, or the session brings its own cameras.
-fn session_size_px(request: &SessionRequest, offer: &SceneOffer, light_density: f32) -> Option<UVec2> {
+fn session_size_px(request: &SessionRequest, offer: &SceneOffer, light_density: LightDensity) -> Option<UVec2> {
     let is_fitted = offer.fits_views && request.sample_cameras.is_empty();
     let (density, most_texels) = match request.takes_light {
-        true => (light_density, MAX_LIGHT_TEXELS),
+        true => (light_density.0, MAX_LIGHT_TEXELS),
         false => (SAMPLE_DENSITY, MAX_FITTING_TEXELS),
     };
     let fitting = || size_of_density(&offer.rig, &request.typical_view, density, most_texels).filter(|_| is_fitted);
@@ -247,6 +263,8 @@ mod tests {
         assert!((1..=40).all(|cameras| texels(cameras).is_some_and(|texels| texels < MAX_FITTING_TEXELS + 4096)));
         assert_eq!(fitting_size_px(&[], &camera(4, 3)), None);
         assert_eq!(size_of_density(&rig, &camera(400, 300), 1.0, MAX_LIGHT_TEXELS), Some(UVec2::new(400, 300)));
+        let density = |set_s| LightDensity::for_set(set_s, 10.0).0;
+        assert_eq!([0.0, 10.0, 10.1, 40.0, 40.1, 900.0].map(density), [1.0, 1.0, 0.5, 0.5, 0.25, 0.25]);
         assert_eq!(size_of_density(&rig, &camera(800, 600), 0.5, MAX_LIGHT_TEXELS), Some(UVec2::new(400, 300)));
     }
 }

@@ -159,8 +159,10 @@ impl Rate {
         let beyond_s = (median(&self.ages_s) - shown.rtt_s).max(0.0);
         match (below, self.above(rung)) {
             (Some(below), _) if beyond_s > BUDGET_S => self.fail(now_s, rung, below),
-            (_, Some(above)) if self.may_rise(now_s, beyond_s, (rung, above)) => self.go(now_s, above),
-            _ => drop(self.ages_s.remove(0)),
+            (_, Some(above)) if self.may_rise(now_s, beyond_s, rung, above) => self.go(now_s, above),
+            _ => {
+                self.ages_s.remove(0);
+            }
         }
     }
 
@@ -172,7 +174,7 @@ impl Rate {
     }
 
     /// Whether the next rung is predicted to have room, by the number of its pixels or the quality of its light.
-    fn may_rise(&self, now_s: f64, beyond_s: f64, (rung, above): (Rung, Rung)) -> bool {
+    fn may_rise(&self, now_s: f64, beyond_s: f64, rung: Rung, above: Rung) -> bool {
         let side = f64::from(HEIGHTS_PX[above.height]) / f64::from(HEIGHTS_PX[rung.height]);
         let growth = if above.height == rung.height { QUALITY_GROWTH } else { side * side };
         let is_due = now_s - self.since_s >= PAUSE_S && now_s >= self.failed[above.height][above.quality].0;

@@ -356,8 +356,8 @@ impl Visitor {
     ) -> Result<(), End> {
         let method = match next.light {
             PictureLight::Session => None,
-            PictureLight::Shared(quality) => Some((self.methods.of_quality)(quality).into()),
-            PictureLight::Drawn => Some(DIRECT.into()),
+            PictureLight::Shared(quality) => Some((self.methods.of_quality)(quality)),
+            PictureLight::Drawn => Some(DIRECT.to_owned()),
         };
         let quality = PictureQuality { codec, antialias: next.samples, method, waits_for_set: pose.still };
         let chosen = (!pose.still).then(|| self.rate.chosen());

@@ -362,11 +362,9 @@ impl WorkloadState {
             return;
         }
         let last = self.sessions.fallbacks().len();
-        let at = |step: usize| utilisation * self.load_ratio(step);
-        let step = (0..last).find(|&step| at(step) <= FULL).unwrap_or(last);
-        let views_per_s = self.sessions.views_per_s();
-        let view_utilisation = |step: usize| utilisation * self.view_time_ratio(step) / views_per_s;
-        let when_left = (0..step).map(view_utilisation).collect();
+        let step = (0..last).find(|&step| utilisation * self.load_ratio(step) <= FULL).unwrap_or(last);
+        let view_utilisation = utilisation / self.sessions.views_per_s();
+        let when_left = (0..step).map(|step| view_utilisation * self.view_time_ratio(step)).collect();
         self.overload.begin_at(now, step, when_left);
     }
 

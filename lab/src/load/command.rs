@@ -19,8 +19,8 @@ use super::processes::Setting;
 use super::{phases, report};
 use crate::cpu_share::Hierarchy;
 
-/// Measures four loads, each on a coordinator and node processes of its own. 8 clients ask for 10 frames a
-/// second, 16 for 15, 80 for 10, and 200 for none.
+/// Measures four loads, each on a coordinator and node processes of its own. Of views of 320×180, 8 clients
+/// ask for 10 frames a second, 16 for 15, 80 for 10, and 200 for none, unless options say otherwise.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: myriorama-lab bench load --minutes 10 --strict")]
 pub struct LoadArgs {
