@@ -27,6 +27,10 @@ mod student;
 mod view;
 mod view_errors;
 
+/// What budgets choose among, for those who expect more.
+pub const CHOICE_OF_BUDGETS: &str =
+    "Budgets choose among views from samples alone and direct drawing: they do not know shared light yet.";
+
 pub use audit::{Audit, Interval};
 pub use binomial::{at_most_over, is_over, most_over, views_needed};
 pub use bounds::{ERROR_RATE, MAX_ROUNDS, Moments, round_error_rate};

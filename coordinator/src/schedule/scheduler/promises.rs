@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cluster::{AuditSummary, Costs, Policy, PolicyChoice, Promise, PromiseState};
-use planner::{Budget, Outcome};
+use planner::{Budget, CHOICE_OF_BUDGETS, Outcome};
 
 use super::Scheduler;
 use crate::schedule::budget_state::{BudgetState, InForce};
@@ -113,7 +113,7 @@ impl Scheduler {
                 (None, Some(outcome)) => {
                     let audits = audit.map(|audit| audit.in_words(self.now, other)).unwrap_or_default();
                     let here = if other.is_none() { state.findings.broken_here(self.now) } else { String::new() };
-                    format!("{}{audits}{here}", outcome.reason)
+                    format!("{} {CHOICE_OF_BUDGETS}{audits}{here}", outcome.reason)
                 }
                 (None, None) if state.plan.budget.implies(budget) => state.plan.reason(),
                 (None, None) => "A plan for it follows.".to_owned(),

@@ -7,7 +7,7 @@ use app_core::camera_record::{self, NamedCamera};
 use app_core::planning::Planning;
 use app_core::setup::Setup;
 use depth_image::Camera;
-use planner::{Budget, Choice, Metric, Outcome, Price, RowSummary};
+use planner::{Budget, CHOICE_OF_BUDGETS, Choice, Metric, Outcome, Price, RowSummary};
 use probe::Representation;
 use report::{Cell, Table};
 use serde_json::Map;
@@ -41,7 +41,7 @@ impl Output<'_> {
         let csv = out.join("rows.csv");
         let all = self.table("all rows", lines.iter())?.to_csv()?;
         std::fs::write(&csv, all).with_context(|| format!("cannot write {}", csv.display()))?;
-        println!("{}\n", self.outcome.reason);
+        println!("{}\n{CHOICE_OF_BUDGETS}\n", self.outcome.reason);
         println!("{}", self.table("Front of cost against error", front(&lines).into_iter())?.to_text());
         if let Choice::Row(row) = self.outcome.choice {
             let chosen = &self.planning.representations[row];
