@@ -12,7 +12,7 @@ use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::{Impostors, Mirror, Rig, SamplingMethod};
-use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec, UpAxis};
+use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec, SourceCamera, UpAxis};
 
 use crate::camera_file::{self, Placement};
 use crate::delivery::default_method;
@@ -26,6 +26,8 @@ const SAMPLE_SIZE_PX: UVec2 = UVec2::new(400, 300);
 const TWO_PLANE_HEIGHT: f32 = 3.0;
 /// Half the angle between neighbouring cameras in front of a model.
 const MODEL_SPREAD_RAD: f32 = 0.12;
+/// What the sample cameras of an interior look at is this far away, in diagonals of the scene.
+const INTERIOR_SHARE: f32 = 0.3;
 
 /// The device.
 #[derive(Debug, Clone, Copy, Args)]
@@ -55,9 +57,10 @@ pub struct SceneArgs {
     #[arg(long, default_value_t, value_name = "x|y|z")]
     pub up: UpAxis,
     /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, or soft N (N rays
-    /// a light). Ambient occlusion: occlusion N [RADIUSm]. Mirrors that show the scene: reflections N (mirrors that a
-    /// ray meets, 1 to 8). Glossy surfaces that show it, in views drawn directly, from a cube or beside a base: glossy N
-    /// (rays a pixel, 1 to 256). Rate: adaptive [TOLERANCE] traces rays only where light changes
+    /// a light). Light from all around: occlusion N [RADIUSm], or indirect N, with what surfaces send back. Mirrors that
+    /// show the scene: reflections N (mirrors that a ray meets, 1 to 8). Glossy surfaces that show it, in views drawn
+    /// directly, from a cube or beside a base: glossy N (rays a pixel, 1 to 256). Rate: adaptive [TOLERANCE] traces rays
+    /// only where light changes
     #[arg(long, default_value_t, value_name = "TERMS")]
     pub lighting: Lighting,
     /// A lamp in place of the scene's lamps, in the scene file's coordinates; may be repeated. Forms: "sun
@@ -376,6 +379,12 @@ impl SceneArgs {
     fn rig_cameras(&self, scene: &Scene, size_px: UVec2) -> anyhow::Result<Vec<PinholeCamera>> {
         let bounds = scene.bounds();
         let rig = match self.scene {
+            // An interior, seen from within.
+            SceneSpec::BuiltIn(_) if !scene.cameras.is_empty() => {
+                let SourceCamera { world_from_camera, fov_y_rad, .. } = &scene.cameras[0];
+                let distance_m = bounds.size().length() * INTERIOR_SHARE;
+                Ok(Rig::around(world_from_camera, *fov_y_rad, distance_m, MODEL_SPREAD_RAD))
+            }
             SceneSpec::TreeTerrain { .. } => Rig::two_plane(&bounds, TWO_PLANE_HEIGHT),
             // As it stands first.
             SceneSpec::File(_) if scene.animation.is_some() => {

@@ -27,7 +27,7 @@ pub(crate) struct Key {
 /// Sums over the first rays of every pixel's sequences.
 pub(crate) struct Sums {
     pub buffer: PooledBuffer,
-    /// Numbers of the rays to be added now: to lamps, and of occlusion.
+    /// Numbers of the rays to be added now: to lamps, and of ambient light.
     pub rays: [Range<u32>; 2],
 }
 

@@ -16,7 +16,7 @@ use crate::{
 
 /// The share of the scene's diagonal within which occlusion is looked for, where a lighting names no radius.
 const OCCLUSION_OF_DIAGONAL: f32 = 0.05;
-/// Rays to all lamps, and rays of occlusion, that one dispatch traces for a pixel: the software device ends all loops of an
+/// Rays to all lamps, and of ambient light, that one dispatch traces for a pixel: the software device ends all loops of an
 /// invocation after 65,535 turns together, and a GPU may take a long dispatch for a hung one.
 const RAYS_A_DISPATCH: u32 = 32;
 const CAMERAS_A_SUBMISSION: usize = 32;
@@ -45,7 +45,7 @@ pub(crate) struct Batch<'a> {
 
 /// Some rays of each pixel.
 pub(crate) struct Part {
-    /// The numbers of the rays to each lamp, of these lamps, and of the rays of occlusion.
+    /// The numbers of the rays to each lamp, of these lamps, and of the rays of ambient light.
     pub counts: [u32; 3],
     /// A uniform of the pieces.
     pub cameras: wgpu::Buffer,
@@ -109,10 +109,10 @@ impl Batch<'_> {
         self.at_each_position(self.work.lighting.glossy_rays())
     }
 
-    /// Rays to each lamp, and of occlusion, at this position.
+    /// Rays to each lamp, and of ambient light, at this position.
     pub fn light_rays(&self) -> [u32; 2] {
         let lighting = self.work.lighting;
-        [lighting.shadow_rays(), lighting.occlusion_rays()].map(|rays| self.at_each_position(rays))
+        [lighting.shadow_rays(), lighting.ambient_rays()].map(|rays| self.at_each_position(rays))
     }
 
     /// The positions within a pixel of a view share the pixel's rays. A sample has all rays at each of its positions.
@@ -152,19 +152,19 @@ impl Batch<'_> {
     /// The pixels of a slice of pictures whose cost is unknown.
     pub fn unknown_slice_px(&self) -> u64 {
         let DrawWork { scene, lighting, .. } = self.work;
-        let [shadow_rays, occlusion_rays] = self.light_rays();
+        let [shadow_rays, ambient_rays] = self.light_rays();
         let to_lamps = shadow_rays * scene.traced_lamps(lighting);
-        let around = occlusion_rays * self.rays_around();
-        let [shadow, occlusion] = [to_lamps, around].map(|rays| u64::from(rays.min(RAYS_A_DISPATCH)));
-        UNKNOWN_SLICE_RAYS / (1 + shadow + occlusion)
+        let around = ambient_rays * self.rays_around();
+        let [shadow, ambient] = [to_lamps, around].map(|rays| u64::from(rays.min(RAYS_A_DISPATCH)));
+        UNKNOWN_SLICE_RAYS / (1 + shadow + ambient)
     }
 
-    /// Rays that are traced for each ray of occlusion: where lamps have no rays, bright texels of an environment map take as
-    /// many.
+    /// Rays that are traced for each ray of ambient light: where it meets a surface, one goes on to a lamp; where lamps have no
+    /// rays, bright texels of an environment map take as many.
     fn rays_around(&self) -> u32 {
         let DrawWork { scene, lighting, .. } = self.work;
         let has_bright = scene.environment.as_deref().is_some_and(|map| map.has_bright_texels);
-        if has_bright && lighting.shadow_rays() == 0 { 2 } else { 1 }
+        if lighting.is_indirect() || has_bright && lighting.shadow_rays() == 0 { 2 } else { 1 }
     }
 
     /// A uniform of the pieces with their cameras' places in the batch's planes, for each part of the rays.
@@ -177,8 +177,8 @@ impl Batch<'_> {
     /// A uniform for all rays.
     pub fn uniform_of_all(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums) -> wgpu::Buffer {
         let lamps = 0..self.work.scene.traced_lamps(self.work.lighting);
-        let [shadow, occlusion] = sums.rays.clone();
-        self.uniform(gpu, pieces, sums, Rays { shadow, lamps, occlusion })
+        let [shadow, ambient] = sums.rays.clone();
+        self.uniform(gpu, pieces, sums, Rays { shadow, lamps, ambient })
     }
 
     /// A uniform for each part of `rays`, for a list with room for `capacity` points.
@@ -193,23 +193,22 @@ impl Batch<'_> {
     }
 
     /// A camera with these rays, and those that its sums hold afterwards.
-    fn with_rays(&self, camera: PixelCamera, rays: &Rays, [shadow, occlusion]: &[Range<u32>; 2]) -> PixelCamera {
+    fn with_rays(&self, camera: PixelCamera, rays: &Rays, [shadow, ambient]: &[Range<u32>; 2]) -> PixelCamera {
         let DrawWork { scene, lighting, .. } = self.work;
-        let radius_m = lighting.occlusion.and_then(|occlusion| occlusion.radius_m);
         let diagonal_m = scene.bounds_in_world.size().length();
         // Each position has rays of its own among those of the pixel's sequence.
-        let [first_shadow_ray, first_occlusion_ray] = self.light_rays().map(|rays| rays * self.position.number);
+        let [first_shadow_ray, first_ambient_ray] = self.light_rays().map(|rays| rays * self.position.number);
         PixelCamera {
             first_shadow_ray: first_shadow_ray + rays.shadow.start,
             shadow_rays: rays.shadow.end - rays.shadow.start,
             first_light: rays.lamps.start,
             end_light: rays.lamps.end,
-            first_occlusion_ray: first_occlusion_ray + rays.occlusion.start,
-            occlusion_rays: rays.occlusion.end - rays.occlusion.start,
+            first_ambient_ray: first_ambient_ray + rays.ambient.start,
+            ambient_rays: rays.ambient.end - rays.ambient.start,
             // Without rays, all light is known at once.
             shadow_rays_in_sum: shadow.end.max(1),
-            occlusion_rays_in_sum: occlusion.end.max(1),
-            occlusion_radius_m: radius_m.unwrap_or(diagonal_m * OCCLUSION_OF_DIAGONAL),
+            ambient_rays_in_sum: ambient.end.max(1),
+            occlusion_radius_m: lighting.occlusion_radius_m().unwrap_or(diagonal_m * OCCLUSION_OF_DIAGONAL),
             tolerance: if let Rate::Adaptive { tolerance } = lighting.rate { tolerance } else { 0.0 },
             ..camera
         }
@@ -282,33 +281,33 @@ pub(crate) fn batches(cameras: &[Camera], most_pixels: usize) -> impl Iterator<I
     })
 }
 
-/// Numbers of rays to each of some lamps, and of occlusion.
+/// Numbers of rays to each of some lamps, and of ambient light.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Rays {
     shadow: Range<u32>,
     lamps: Range<u32>,
-    occlusion: Range<u32>,
+    ambient: Range<u32>,
 }
 
 impl Rays {
     fn counts(&self) -> [u32; 3] {
-        [&self.shadow, &self.lamps, &self.occlusion].map(|range| range.len() as u32)
+        [&self.shadow, &self.lamps, &self.ambient].map(|range| range.len() as u32)
     }
 }
 
-/// Rays to all lamps and of occlusion, cut into parts. A part traces at most [`RAYS_A_DISPATCH`] rays to lamps and as many
-/// of occlusion. Each ray of occlusion counts as `rays_around` traced ones.
-fn parts_of([shadow, occlusion]: &[Range<u32>; 2], lamp_count: u32, rays_around: u32) -> Vec<Rays> {
+/// Rays to all lamps and of ambient light, cut into parts. A part traces at most [`RAYS_A_DISPATCH`] rays to lamps and as many
+/// of ambient light. Each of these counts as `rays_around` traced ones.
+fn parts_of([shadow, ambient]: &[Range<u32>; 2], lamp_count: u32, rays_around: u32) -> Vec<Rays> {
     let lamps_a_part = if shadow.is_empty() { lamp_count } else { lamp_count.min(RAYS_A_DISPATCH) }.max(1);
     let lamps = ranges(&(0..lamp_count), lamps_a_part);
     let to_lamps = ranges(shadow, RAYS_A_DISPATCH / lamps_a_part.min(RAYS_A_DISPATCH));
     let to_lamps = to_lamps.iter().flat_map(|shadow| lamps.iter().map(|lamps| (shadow.clone(), lamps.clone())));
     let mut to_lamps: Vec<(Range<u32>, Range<u32>)> = to_lamps.collect();
-    let mut around = ranges(occlusion, RAYS_A_DISPATCH / rays_around);
+    let mut around = ranges(ambient, RAYS_A_DISPATCH / rays_around);
     let count = to_lamps.len().max(around.len());
     to_lamps.resize(count, (shadow.end..shadow.end, 0..0));
-    around.resize(count, occlusion.end..occlusion.end);
-    let part = |((shadow, lamps), occlusion)| Rays { shadow, lamps, occlusion };
+    around.resize(count, ambient.end..ambient.end);
+    let part = |((shadow, lamps), ambient)| Rays { shadow, lamps, ambient };
     to_lamps.into_iter().zip(around).map(part).collect()
 }
 
@@ -324,7 +323,7 @@ mod tests {
 
     #[test]
     fn rays_are_traced_in_parts_that_cover_all_of_them() {
-        let rays = |shadow, lamps, occlusion| Rays { shadow, lamps, occlusion };
+        let rays = |shadow, lamps, ambient| Rays { shadow, lamps, ambient };
         assert_eq!(parts_of(&[0..0, 0..0], 200, 1), [rays(0..0, 0..200, 0..0)]);
         assert_eq!(parts_of(&[0..0, 0..40], 2, 1), [rays(0..0, 0..2, 0..32), rays(0..0, 0..0, 32..40)]);
         assert_eq!(parts_of(&[0..0, 0..20], 0, 2), [rays(0..0, 0..0, 0..16), rays(0..0, 0..0, 16..20)]);

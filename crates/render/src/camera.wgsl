@@ -17,10 +17,10 @@ struct PixelCamera {
     // Numbers of the rays that are traced now, and of all that the sums hold afterwards.
     first_shadow_ray: u32,
     shadow_rays: u32,
-    first_occlusion_ray: u32,
-    occlusion_rays: u32,
+    first_ambient_ray: u32,
+    ambient_rays: u32,
     shadow_rays_in_sum: u32,
-    occlusion_rays_in_sum: u32,
+    ambient_rays_in_sum: u32,
     occlusion_radius_m: f32,
     tolerance: f32,
     // The first pixel, from where the forward axis meets the image; wraps.

@@ -81,7 +81,7 @@ fn share_word(word: u32, place: u32) -> u32 {
 }
 
 fn share_of(number: u32, place: u32) -> f32 {
-    if number == 0u { return sum_at(OPEN_TO_ENVIRONMENT, place) / f32(camera.occlusion_rays_in_sum); }
+    if number == 0u { return sum_at(OPEN_TO_ENVIRONMENT, place) / f32(camera.ambient_rays_in_sum); }
     let rays = f32(camera.shadow_rays_in_sum);
     if number <= MAX_LAMP_SHARES { return sum_at(OPEN_TO_LAMPS + lamp_of(number - 1u), place) / rays; }
     var open = 0.0;

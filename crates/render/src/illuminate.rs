@@ -1,12 +1,16 @@
 //! Light of lamps and the environment, summed over rays.
 
-use gpu::{Binding, BoundGroup, DispatchSize, GpuEnvironment, ResourceTraits, ShaderVariant, WorkKind, switches};
+use depth_image::Highlight;
+use gpu::{
+    Binding, BoundGroup, DispatchSize, GpuEnvironment, ResourceTraits, ShaderVariant, WorkKind, highlight_name,
+    switches,
+};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
 use crate::rays::Traversal;
 use crate::{
-    Direct, RenderError,
+    Ambient, Direct, RenderError,
     batch::{Batch, Part, Recording},
     pixel_camera::CAMERA_TRAITS,
     pixel_list::PixelList,
@@ -28,6 +32,16 @@ enum ShadowRays {
     Many,
 }
 
+/// The rays of ambient light that a shader is written for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum AmbientRays {
+    None,
+    /// They look for surfaces that occlude the environment.
+    Occlusion,
+    /// They bring what surfaces send back.
+    Indirect,
+}
+
 #[derive(Debug)]
 pub(crate) struct Illuminate {
     by_rays: bool,
@@ -39,8 +53,7 @@ pub(crate) struct Illuminate {
     /// Lit are listed points, such as those where mirrored rays end, not pixels.
     bounces: bool,
     shadow_rays: ShadowRays,
-    /// Rays look for surfaces that occlude the environment.
-    occluded: bool,
+    ambient: AmbientRays,
     /// Light is added to sums of earlier rays.
     continued: bool,
     sums: SumPlanes,
@@ -59,7 +72,7 @@ impl Illuminate {
         listed: false,
         bounces: false,
         shadow_rays: ShadowRays::None,
-        occluded: false,
+        ambient: AmbientRays::None,
         continued: false,
         sums: SumPlanes { light_count: 0, visibility: false },
         environment_map: false,
@@ -83,11 +96,17 @@ impl ShaderVariant for Illuminate {
                 ShadowRays::One => "one",
                 ShadowRays::Many => "many",
             },
-            occluded => self.occluded,
+            ambient => match self.ambient {
+                AmbientRays::None => "none",
+                AmbientRays::Occlusion => "occlusion",
+                AmbientRays::Indirect => "indirect",
+            },
             continued => self.continued,
             environment_map => self.environment_map,
             traced => self.traversal.is_some(),
-            primary => false,
+            primary => self.ambient == AmbientRays::Indirect,
+            from_eye => false,
+            shading => highlight_name(Highlight::Ggx),
             count_visits => false,
             ..merge_maps([self.sums.context(), self.traversal.map(Traversal::context).unwrap_or_default()])
         }
@@ -95,22 +114,22 @@ impl ShaderVariant for Illuminate {
 
     fn all() -> Vec<Self> {
         let mut variants = Vec::new();
-        for [by_rays, occluded, continued, environment_map] in switches() {
+        for [by_rays, continued, environment_map] in switches() {
             for (step_px, listed) in [(1, false), (GRID_PX, false), (1, true)] {
-                for shadow_rays in [ShadowRays::None, ShadowRays::One, ShadowRays::Many] {
-                    let lit = Self { by_rays, step_px, listed, shadow_rays, occluded, continued, ..Self::UNLIT };
+                for (shadow_rays, ambient) in Self::RAYS {
+                    let lit = Self { by_rays, step_px, listed, shadow_rays, ambient, continued, ..Self::UNLIT };
                     variants.extend(Self { environment_map, ..lit }.with_all_sums());
                 }
             }
         }
         for (step_px, listed) in [(1, false), (GRID_PX, false), (1, true)] {
             let bent = Self { by_rays: true, single_pole: true, step_px, listed, ..Self::UNLIT };
-            let lit = Self { shadow_rays: ShadowRays::Many, occluded: true, ..bent };
+            let lit = Self { shadow_rays: ShadowRays::Many, ambient: AmbientRays::Occlusion, ..bent };
             variants.extend([bent, lit].iter().flat_map(Self::with_all_sums));
         }
-        for [occluded, continued, environment_map] in switches() {
-            for shadow_rays in [ShadowRays::None, ShadowRays::One, ShadowRays::Many] {
-                let lit = Self { bounces: true, shadow_rays, occluded, continued, ..Self::UNLIT };
+        for [continued, environment_map] in switches() {
+            for (shadow_rays, ambient) in Self::RAYS {
+                let lit = Self { bounces: true, shadow_rays, ambient, continued, ..Self::UNLIT };
                 variants.extend(Self { environment_map, ..lit }.with_all_sums());
             }
         }
@@ -119,9 +138,21 @@ impl ShaderVariant for Illuminate {
 }
 
 impl Illuminate {
+    /// The kinds of rays that go together.
+    const RAYS: [(ShadowRays, AmbientRays); 8] = [
+        (ShadowRays::None, AmbientRays::None),
+        (ShadowRays::None, AmbientRays::Occlusion),
+        (ShadowRays::One, AmbientRays::None),
+        (ShadowRays::One, AmbientRays::Occlusion),
+        (ShadowRays::One, AmbientRays::Indirect),
+        (ShadowRays::Many, AmbientRays::None),
+        (ShadowRays::Many, AmbientRays::Occlusion),
+        (ShadowRays::Many, AmbientRays::Indirect),
+    ];
+
     /// With each kind of sums, and with each traversal where rays are traced.
     fn with_all_sums(&self) -> Vec<Self> {
-        let is_traced = self.occluded || self.shadow_rays != ShadowRays::None;
+        let is_traced = self.ambient != AmbientRays::None || self.shadow_rays != ShadowRays::None;
         let each =
             |sums| Traversal::ALL.map(|traversal| Self { sums, traversal: is_traced.then_some(traversal), ..*self });
         SumPlanes::all().flat_map(each).collect()
@@ -139,7 +170,11 @@ impl Illuminate {
                 Direct::Shadows => ShadowRays::One,
                 Direct::Soft(_) => ShadowRays::Many,
             },
-            occluded: lighting.occlusion.is_some(),
+            ambient: match lighting.ambient {
+                None => AmbientRays::None,
+                Some(Ambient::Occlusion(..)) => AmbientRays::Occlusion,
+                Some(Ambient::Indirect(_)) => AmbientRays::Indirect,
+            },
             sums: batch.output.sums,
             environment_map: batch.work.scene.environment.is_some(),
             traversal: traced.map(Traversal::of),

@@ -1,8 +1,12 @@
 // Light that arrives at each pixel's surface from every lamp and from the environment, with rays where they are asked for.
 // The sums are such that later rays can be added.
 {% include "camera.wgsl" %}
+{% if ambient == "indirect" %}
+{% include "packed_surface.wgsl" %}
+{% else %}
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
+{% endif %}
 {% include "light.wgsl" %}
 {% if environment_map and not traced %}
 {% include "table.wgsl" %}
@@ -98,22 +102,36 @@ fn from_lamp(number: u32, spot: Spot) -> Arrival {
 {% endif %}
 }
 
+{% if ambient == "indirect" %}
+
+{% include "indirect.wgsl" %}
+{% endif %}
+
+// With indirect light, what surfaces send back is part of it.
 fn from_environment(spot: Spot) -> Arrival {
-{% if occluded %}
+{% if ambient != "none" %}
     let around = tangents_of(spot.normal);
     var arrival = Arrival(vec3f(0.0), 0.0);
-    for (var i = 0u; i < camera.occlusion_rays; i++) {
-        let disc = disc_from_square(point_of(camera.first_occlusion_ray + i, hashed(spot.seed + 0x5bd1e995u)));
+    for (var i = 0u; i < camera.ambient_rays; i++) {
+        let number = camera.first_ambient_ray + i;
+        let disc = disc_from_square(point_of(number, hashed(spot.seed + 0x5bd1e995u)));
         let up = sqrt(max(1.0 - dot(disc, disc), 0.0));
         let towards = around.tangent * disc.x + around.bitangent * disc.y + spot.normal * up;
+{% if ambient == "indirect" %}
+        let ray = indirect_ray(spot, towards, number);
+        arrival.linear += ray.linear;
+        arrival.open += ray.open;
+    }
+{% else %}
         let open = select(1.0, 0.0, is_blocked(ray_from(spot.origin, towards), camera.occlusion_radius_m));
         arrival.linear += {{ "environment_base" if environment_map else "environment_radiance" }}(towards) * open;
         arrival.open += open;
     }
+{% endif %}
 {% if environment_map and shadow_rays == "none" %}
     // Lamps have no rays: bright texels take as many as there are of occlusion.
-    for (var i = 0u; i < camera.occlusion_rays && has_bright_texels(); i++) {
-        let place = point_of(camera.first_occlusion_ray + i, hashed(spot.seed + illumination.light_count));
+    for (var i = 0u; i < camera.ambient_rays && has_bright_texels(); i++) {
+        let place = point_of(camera.first_ambient_ray + i, hashed(spot.seed + illumination.light_count));
         arrival.linear += arrival_of(incident_from_bright(place), spot).linear;
     }
 {% endif %}
@@ -151,7 +169,7 @@ fn light_bounce(place: u32) {
     var environment = Arrival(vec3f(0.0), 0.0);
     for (var found = bounce.met != 0u; found; found = false) {
         let spot = spot_of(bounce);
-{% if traced and alpha_tested and mapped %}        ray_side_m = bounce.side_m;
+{% if traced and alpha_tested and mapped %}        cone_side_m = bounce.side_m;
 {% endif %}
 {%- else %}
 
@@ -162,7 +180,7 @@ fn light_pixel(pixel: vec2u) {
     var environment = Arrival(vec3f(0.0), 0.0);
     for (var found = depth > 0.0; found; found = false) {
         let spot = spot_of(pixel, depth, surface_at(pixel));
-{% if traced and alpha_tested and mapped %}        ray_side_m = camera.near_m / depth * camera.footprint;
+{% if traced and alpha_tested and mapped %}        cone_side_m = camera.near_m / depth * camera.footprint;
 {% endif %}
 {%- endif %}
         environment = from_environment(spot);

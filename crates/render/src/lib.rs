@@ -52,7 +52,7 @@ pub use gpu_scene::GpuScene;
 pub use known_samples::{TemporalReference, view_cell_m};
 pub use layered::LayerSelection;
 pub use light_samples::LightCache;
-pub use lighting::{Direct, Lighting, MAX_RAYS, Occlusion, Rate, UnknownLighting};
+pub use lighting::{Ambient, Direct, Lighting, MAX_RAYS, Rate, UnknownLighting};
 pub use rays::{AccelerationReport, host_tree};
 pub use redundancy_test::{Evidence, RedundancyTest};
 pub use renderer::Renderer;

@@ -278,7 +278,9 @@ fn add_texel(texel: Texel, certainty: f32, point: Point, own: ptr<function, Cach
             expected_of_lamps(point.normal{% for word in range(share_words) %}, shares{{ word }}{% endfor %}),
             expected_of_lamps(normal{% for word in range(share_words) %}, shares{{ word }}{% endfor %}),
         );
-        environment *= ratio_of(expected_of_environment(point.normal), expected_of_environment(normal));
+        // Light that surfaces send back is there without an environment, too.
+        let expected = expected_of_environment(normal);
+        environment *= select(1.0, ratio_of(expected_of_environment(point.normal), expected), expected > 0.0);
     }
     let total = luminance(lamps + environment);
     let agrees = texel.weight > LEAST_WEIGHT;
@@ -303,7 +305,7 @@ fn put(plane: u32, place: u32, value: f32) { sums[camera.first_sum + plane * cam
 
 // Writes light as the sums of rays.
 fn put_light(light: CachedLight, place: u32) {
-    let scale = vec2f(f32(camera.shadow_rays_in_sum), f32(camera.occlusion_rays_in_sum)) / light.weight;
+    let scale = vec2f(f32(camera.shadow_rays_in_sum), f32(camera.ambient_rays_in_sum)) / light.weight;
     for (var channel = 0u; channel < 3u; channel++) {
         put(LAMPS + channel, place, light.lamps_linear[channel] * scale.x);
         put(ENVIRONMENT + channel, place, light.environment_linear[channel] * scale.y);

@@ -20,8 +20,8 @@ pub const MAX_GLOSSY_RAYS: u32 = 256;
 pub struct Lighting {
     /// Light of lamps.
     pub direct: Direct,
-    /// Rays that look for near surfaces in the way of the environment's light; without them all of it arrives.
-    pub occlusion: Option<Occlusion>,
+    /// Light from all around by rays; without them all of the environment's light arrives.
+    pub ambient: Option<Ambient>,
     /// The mirrors that a ray meets, one after the other; without any, mirrors show lamps and the environment.
     pub reflections: Option<NonZeroU32>,
     /// Rays a pixel into the lobe of what it shows, as far as `reflections` does not follow its mirrored ray; without them rough
@@ -45,13 +45,29 @@ pub enum Direct {
     Soft(NonZeroU32),
 }
 
-/// Cosine-weighted ambient occlusion.
+/// Light from all around, by cosine-weighted rays a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Occlusion {
-    /// A pixel.
-    pub rays: NonZeroU32,
-    /// Surfaces farther away occlude nothing; a share of the scene's diagonal where not given.
-    pub radius_m: Option<f32>,
+pub enum Ambient {
+    /// The environment's, as far as no near surface is in the way. Surfaces beyond the radius, in metres, occlude nothing; it is a
+    /// share of the scene's diagonal where not given.
+    Occlusion(NonZeroU32, Option<f32>),
+    /// The environment's, and what the surfaces that rays meet send back: their emission, and one diffuse bounce of lamps.
+    Indirect(NonZeroU32),
+}
+
+impl Ambient {
+    fn with_rays(self, change: impl Fn(NonZeroU32) -> NonZeroU32) -> Self {
+        match self {
+            Self::Occlusion(rays, radius_m) => Self::Occlusion(change(rays), radius_m),
+            Self::Indirect(rays) => Self::Indirect(change(rays)),
+        }
+    }
+
+    fn rays(self) -> NonZeroU32 {
+        match self {
+            Self::Occlusion(rays, _) | Self::Indirect(rays) => rays,
+        }
+    }
 }
 
 /// The pixels that get rays of their own.
@@ -75,7 +91,7 @@ const DEFAULT_TOLERANCE: f32 = 0.04;
 #[allow(missing_docs, reason = "self-naming variants")]
 pub enum UnknownLighting {
     #[error(
-        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, occlusion N, occlusion N RADIUSm, reflections N, glossy N, adaptive, adaptive TOLERANCE with commas between them"
+        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, occlusion N, occlusion N RADIUSm, indirect N, reflections N, glossy N, adaptive, adaptive TOLERANCE with commas between them"
     )]
     Term(String),
     #[error("lighting {0:?}: rays must be from 1 to {MAX_RAYS}")]
@@ -93,7 +109,7 @@ pub enum UnknownLighting {
 impl Lighting {
     /// Base colours as they are.
     pub const UNLIT: Self =
-        Self { direct: Direct::Unlit, occlusion: None, reflections: None, glossy: None, rate: Rate::Full };
+        Self { direct: Direct::Unlit, ambient: None, reflections: None, glossy: None, rate: Rate::Full };
 
     /// Whether anything arrives at surfaces.
     #[must_use]
@@ -104,7 +120,7 @@ impl Lighting {
     /// Whether rays are traced.
     #[must_use]
     pub fn is_traced(&self) -> bool {
-        self.shadow_rays() > 0 || self.occlusion.is_some()
+        self.shadow_rays() > 0 || self.ambient.is_some()
     }
 
     /// Rays a light and pixel.
@@ -117,10 +133,22 @@ impl Lighting {
         }
     }
 
-    /// Rays of occlusion a pixel.
+    /// Rays a pixel of the light from all around.
     #[must_use]
-    pub fn occlusion_rays(&self) -> u32 {
-        self.occlusion.map_or(0, |occlusion| occlusion.rays.get())
+    pub fn ambient_rays(&self) -> u32 {
+        self.ambient.map_or(0, |ambient| ambient.rays().get())
+    }
+
+    /// Whether light that surfaces send back is traced.
+    #[must_use]
+    pub fn is_indirect(&self) -> bool {
+        matches!(self.ambient, Some(Ambient::Indirect(_)))
+    }
+
+    /// The radius of occlusion, where one is given.
+    #[must_use]
+    pub fn occlusion_radius_m(&self) -> Option<f32> {
+        if let Some(Ambient::Occlusion(_, radius_m)) = self.ambient { radius_m } else { None }
     }
 
     /// The mirrors that a ray meets.
@@ -149,20 +177,19 @@ impl Lighting {
         (lighting != *self).then_some(lighting)
     }
 
-    /// One ray to each lamp and one of occlusion: the first step of refinement.
+    /// One ray to each lamp and one of the light from all around: the first step of refinement.
     #[must_use]
     pub fn with_single_rays(&self) -> Self {
         self.with_rays(|_| NonZeroU32::MIN)
     }
 
-    /// With other numbers of rays to lamps and of occlusion.
+    /// With other numbers of rays.
     fn with_rays(&self, rays: impl Fn(NonZeroU32) -> NonZeroU32) -> Self {
         let direct = match self.direct {
             Direct::Soft(to_lamps) => Direct::Soft(rays(to_lamps)),
             other => other,
         };
-        let occlusion = self.occlusion.map(|occlusion| Occlusion { rays: rays(occlusion.rays), ..occlusion });
-        Self { direct, occlusion, ..*self }
+        Self { direct, ambient: self.ambient.map(|ambient| ambient.with_rays(&rays)), ..*self }
     }
 
     /// The light of points that no sample knows: a quarter of the rays but at least [`LEAST_RAYS_HERE`], or [`LEAST_RAYS_IN_MOTION`]
@@ -192,8 +219,8 @@ impl Lighting {
     #[must_use]
     pub fn refinement_steps(&self) -> u32 {
         let most = match self.direct {
-            Direct::Soft(rays) => rays.get().max(self.occlusion_rays()),
-            _ => self.occlusion_rays(),
+            Direct::Soft(rays) => rays.get().max(self.ambient_rays()),
+            _ => self.ambient_rays(),
         };
         most.max(1).next_power_of_two().ilog2() + 1
     }
@@ -202,7 +229,7 @@ impl Lighting {
 impl FromStr for Lighting {
     type Err = UnknownLighting;
     fn from_str(text: &str) -> Result<Self, UnknownLighting> {
-        let (mut direct, mut occlusion, mut reflections, mut glossy, mut rate) = (None, None, None, None, None);
+        let (mut direct, mut ambient, mut reflections, mut glossy, mut rate) = (None, None, None, None, None);
         for term in text.split(',').map(str::trim) {
             let words: Vec<&str> = term.split_whitespace().collect();
             let again = match words[..] {
@@ -210,11 +237,12 @@ impl FromStr for Lighting {
                 ["phong"] => direct.replace(Direct::Phong).is_some(),
                 ["shadows"] => direct.replace(Direct::Shadows).is_some(),
                 ["soft", n] => direct.replace(Direct::Soft(rays(text, n)?)).is_some(),
-                ["occlusion", n] => occlusion.replace(Occlusion { rays: rays(text, n)?, radius_m: None }).is_some(),
+                ["occlusion", n] => ambient.replace(Ambient::Occlusion(rays(text, n)?, None)).is_some(),
                 ["occlusion", n, radius] => {
                     let radius_m = Some(positive(text, radius.strip_suffix('m').unwrap_or(radius), "the radius")?);
-                    occlusion.replace(Occlusion { rays: rays(text, n)?, radius_m }).is_some()
+                    ambient.replace(Ambient::Occlusion(rays(text, n)?, radius_m)).is_some()
                 }
+                ["indirect", n] => ambient.replace(Ambient::Indirect(rays(text, n)?)).is_some(),
                 ["reflections", n] => reflections.replace(mirrors(text, n)?).is_some(),
                 ["glossy", n] => glossy.replace(lobe_rays(text, n)?).is_some(),
                 ["adaptive"] => rate.replace(Rate::Adaptive { tolerance: DEFAULT_TOLERANCE }).is_some(),
@@ -224,12 +252,22 @@ impl FromStr for Lighting {
                 _ => return Err(UnknownLighting::Term(term.to_owned())),
             };
             if again {
-                return Err(UnknownLighting::Conflict(text.to_owned(), "says one thing twice"));
+                let is_ambient = ["occlusion", "indirect"].contains(&words[0]);
+                let reason = if is_ambient {
+                    "occlusion and indirect are one light, which is said once"
+                } else {
+                    "says one thing twice"
+                };
+                return Err(UnknownLighting::Conflict(text.to_owned(), reason));
             }
         }
         let lighting =
-            Self { direct: direct.unwrap_or_default(), occlusion, reflections, glossy, rate: rate.unwrap_or_default() };
-        if !lighting.is_lit() && occlusion.is_some() {
+            Self { direct: direct.unwrap_or_default(), ambient, reflections, glossy, rate: rate.unwrap_or_default() };
+        if lighting.is_indirect() && lighting.shadow_rays() == 0 {
+            let reason = "indirect light needs shadows or soft N: phong and unlit have none of lamps";
+            return Err(UnknownLighting::Conflict(text.to_owned(), reason));
+        }
+        if !lighting.is_lit() && ambient.is_some() {
             return Err(UnknownLighting::Conflict(text.to_owned(), "unlit surfaces have no occlusion"));
         }
         if lighting.shadow_rays() == 0 && lighting.without_reflections().is_some() {
@@ -273,9 +311,10 @@ impl fmt::Display for Lighting {
             Direct::Shadows => write!(f, "shadows")?,
             Direct::Soft(rays) => write!(f, "soft {rays}")?,
         }
-        match self.occlusion {
-            Some(Occlusion { rays, radius_m: Some(radius_m) }) => write!(f, ", occlusion {rays} {radius_m}m")?,
-            Some(Occlusion { rays, radius_m: None }) => write!(f, ", occlusion {rays}")?,
+        match self.ambient {
+            Some(Ambient::Occlusion(rays, Some(radius_m))) => write!(f, ", occlusion {rays} {radius_m}m")?,
+            Some(Ambient::Occlusion(rays, None)) => write!(f, ", occlusion {rays}")?,
+            Some(Ambient::Indirect(rays)) => write!(f, ", indirect {rays}")?,
             None => {}
         }
         if let Some(reflections) = self.reflections {
@@ -306,6 +345,8 @@ mod tests {
             "soft 16, occlusion 16",
             "phong, occlusion 4 0.5m",
             "shadows, occlusion 8, adaptive",
+            "soft 16, indirect 64",
+            "shadows, indirect 1, reflections 2",
             "soft 4, adaptive 0.1",
             "shadows, reflections 8",
             "soft 16, occlusion 16, reflections 2, adaptive",
@@ -321,7 +362,9 @@ mod tests {
     fn invalid_lightings_are_refused_with_the_reason() {
         use UnknownLighting::{Conflict, Glossy, Number, Rays, Reflections, Term};
         let parsed = |text: &str| text.parse::<Lighting>().expect_err(text);
-        for text in ["soft 0", "soft -1", "soft 4097", "soft many", "occlusion 0", "soft 99999999999"] {
+        for text in
+            ["soft 0", "soft -1", "soft 4097", "soft many", "occlusion 0", "soft 99999999999", "soft 4, indirect 0"]
+        {
             assert!(matches!(parsed(text), Rays(_)), "{text}");
         }
         for text in ["shadows, reflections 0", "shadows, reflections 9", "shadows, reflections -1"] {
@@ -340,6 +383,9 @@ mod tests {
         let twice = ["unlit, phong", "occlusion 4, occlusion 8", "shadows, reflections 1, reflections 1"];
         for text in [&unmirrored[..], &twice, &["unlit, occlusion 4", "phong, adaptive"]].concat() {
             assert!(matches!(parsed(text), Conflict(..)), "{text}");
+        }
+        for text in ["unlit, indirect 4", "phong, indirect 4", "indirect 4", "soft 4, occlusion 4, indirect 4"] {
+            assert!(parsed(text).to_string().contains("indirect"), "{text}");
         }
     }
 

@@ -1,7 +1,7 @@
 //! Places of sample cameras.
 
 use depth_image::{Aabb, PinholeCamera};
-use glam::{UVec2, Vec2, Vec3};
+use glam::{Affine3A, UVec2, Vec2, Vec3};
 
 /// Four cameras at the corners of a rectangle, all looking at one point: the two-plane rig of Lages
 /// §4.1. The rectangle is the view cell; views lie within it.
@@ -55,6 +55,22 @@ impl Rig {
             fov_y_rad: FOV_Y_RAD,
             near_m: half.max_element() * 0.05,
         })
+    }
+
+    /// Around a camera that a scene names, which may stand within it: neighbouring cameras see what is `distance_m` before it
+    /// 2 · `spread_rad` apart.
+    #[must_use]
+    pub fn around(world_from_camera: &Affine3A, fov_y_rad: f32, distance_m: f32, spread_rad: f32) -> Self {
+        let [right, up, backwards] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| world_from_camera.transform_vector3(axis));
+        let center_in_world = world_from_camera.transform_point3(Vec3::ZERO);
+        let half = distance_m * spread_rad.tan();
+        Self {
+            center_in_world,
+            half_edges_in_world: [right * half, up * half],
+            target_in_world: center_in_world - backwards * distance_m,
+            fov_y_rad,
+            near_m: distance_m * 0.02,
+        }
     }
 
     /// Before a model's front, at a distance from which all of it is seen, slightly raised. Neighbouring

@@ -10,7 +10,7 @@ use crate::{Limits, MissingTextures, Scene, SceneError, load_file};
 
 /// Names of the built-in scenes. A `tree-terrain-…` may have the suffix `-wind`, and `grass` a `:` with a
 /// [density](GrassDensity). A file of such a name is reached as `./name`.
-pub const BUILT_IN_NAMES: [&str; 22] = [
+pub const BUILT_IN_NAMES: [&str; 23] = [
     "tree-terrain-30k",
     "tree-terrain-125k",
     "tree-terrain-500k",
@@ -21,6 +21,7 @@ pub const BUILT_IN_NAMES: [&str; 22] = [
     "checker-sphere",
     "poles",
     "courtyard",
+    "gallery",
     "blocks",
     "bird-nest",
     "grass",

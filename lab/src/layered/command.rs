@@ -23,7 +23,7 @@ const SCENES: [&str; 6] = ["courtyard", "tree", "tree-terrain-500k", "grass", "u
 const QUICK: usize = 3;
 const VIEWS: [usize; 2] = [24, 6];
 const LIGHTING: Lighting =
-    Lighting { direct: Direct::Phong, occlusion: None, reflections: None, glossy: None, rate: Rate::Full };
+    Lighting { direct: Direct::Phong, ambient: None, reflections: None, glossy: None, rate: Rate::Full };
 /// Scenes in which a cube is compared with view cells, by the number of viewpoints.
 const AMONG_VIEWPOINTS: [&str; 2] = ["courtyard", "tree-terrain-500k"];
 /// The bound of bytes sent a sample, in the mean of the scenes.

@@ -6,6 +6,7 @@ use anyhow::Context as _;
 use depth_image::LightCacheQuality::{self, Balanced, Draft, Fast, Fine};
 use depth_image::{Antialias, View, ViewPlanes};
 use metrics::{PictureErrors, Rgb8Image, flip_map};
+use render::Lighting;
 use report::{Bar, Check, PictureRow, Point, Report, comparison_row};
 
 use super::subjects::{Condition, LIGHTING, Stage, Subject};
@@ -17,34 +18,59 @@ use crate::failures::measures::mean;
 use crate::failures::stand::Stand;
 
 pub const SAMPLES_A_PIXEL: u32 = 4;
-const REFERENCE_LIGHTING: &str = "soft 64, occlusion 64";
-const TRUTH_LIGHTING: &str = "soft 128, occlusion 128";
 /// Little light beside the surfaces.
 const PLAIN_LIGHTING: &str = "shadows, occlusion 1";
-/// Rays to a lamp and of occlusion at each position, in direct drawing.
-const DIRECT_RAYS: [u32; 5] = [1, 2, 4, 8, 16];
-/// The place of direct drawing under [`LIGHTING`], whose rays the positions of a pixel share.
+/// The place of direct drawing whose positions share the rays of 16 rays a pixel.
 pub const SHARED: usize = 2;
-/// The place of direct drawing with all rays of [`LIGHTING`] at each position: the reference.
-pub const REFERENCE: usize = 4;
 const QUALITIES: [LightCacheQuality; 4] = [Draft, Fast, Balanced, Fine];
-/// The place of `balanced` among all rows.
-const SHOWN: usize = 7;
-const RUNS: usize = 3;
 /// A look-up costs at least this share of the surfaces; less is noise of the clock.
 const LEAST_LOOK_UP: f64 = 0.01;
 const CONDITION_VIEWS: usize = 2;
 
+/// The kind of light that is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Light {
+    Occlusion,
+    Indirect,
+}
+
+impl Light {
+    pub fn of(lighting: &Lighting) -> Self {
+        if lighting.is_indirect() { Self::Indirect } else { Self::Occlusion }
+    }
+
+    /// Rays to a lamp and of ambient light at each position, in direct drawing. The last is the reference. Lamps need few.
+    fn direct_rays(self) -> &'static [[u32; 2]] {
+        match self {
+            Self::Occlusion => &[[1, 1], [2, 2], [4, 4], [8, 8], [16, 16]],
+            Self::Indirect => &[[1, 1], [2, 2], [4, 4], [4, 8], [4, 16], [4, 32], [16, 64]],
+        }
+    }
+
+    fn lighting(self, [to_lamps, ambient]: [u32; 2]) -> String {
+        let term = if self == Self::Indirect { "indirect" } else { "occlusion" };
+        format!("soft {to_lamps}, {term} {ambient}")
+    }
+
+    /// Of all positions, with as many rays again.
+    fn truth(self) -> String {
+        let reference = self.direct_rays().last().copied().unwrap_or([16, 16]);
+        self.lighting(reference.map(|rays| 2 * SAMPLES_A_PIXEL * rays))
+    }
+}
+
 /// Measurements of a scene.
 pub struct SceneResult {
     pub name: &'static str,
-    /// Direct drawing with each of [`DIRECT_RAYS`].
+    /// Direct drawing, from the fewest rays to the reference.
     pub direct: Vec<Row>,
     pub qualities: Vec<Row>,
     /// The first view, `balanced`, beside the reference.
     pub pictures: PictureRow,
     /// Time of looking light up over the time of surfaces, one position a pixel, `draft`.
     pub look_up_ratio: f64,
+    /// Of the views without light.
+    pub unlit_ms: f64,
 }
 
 /// A way of drawing the views. Errors are over the foreground, means over views.
@@ -58,46 +84,62 @@ pub struct Row {
     pub unknown: Option<f64>,
 }
 
-pub fn measure(stand: &Stand, subject: &Subject, view_count: usize) -> anyhow::Result<SceneResult> {
-    let stage = subject.stage(stand, view_count, Ok)?;
-    let ways = ways(&stage)?;
+pub fn measure(stand: &Stand, subject: &Subject, plan: Measuring) -> anyhow::Result<SceneResult> {
+    let Measuring { lighting, view_count, runs } = plan;
+    let (stage, light) = (subject.stage(stand, lighting, view_count, Ok)?, Light::of(&lighting));
+    let ways = ways(&stage, light)?;
+    let reference = light.direct_rays().len() - 1;
     let planes = planes(SAMPLES_A_PIXEL);
     let mut views = vec![Vec::new(); ways.len()];
     let places: Vec<usize> = (0..ways.len()).collect();
-    let seconds = in_turn(&places, RUNS, |place| {
+    let seconds = in_turn(&places, runs, |place| {
         views[place] = ways[place].1.views(&stage.views, ViewPlanes { inverse_depth: false, ..planes })?;
         Ok(())
     })?;
     // Seeds are made from the bits of a camera's eye: from the next place in x the picture is the same, and its noise another.
     let mut truth_cameras = stage.views.clone();
     truth_cameras.iter_mut().for_each(|camera| camera.eye_in_world.x = camera.eye_in_world.x.next_up());
-    let truth = stage.lit.in_light(TRUTH_LIGHTING)?.views(&truth_cameras, planes)?;
-    for (reference, truth) in views[REFERENCE].iter_mut().zip(&truth) {
+    let truth = stage.lit.in_light(&light.truth())?.views(&truth_cameras, planes)?;
+    for (reference, truth) in views[reference].iter_mut().zip(&truth) {
         reference.inverse_depth_per_m.clone_from(&truth.inverse_depth_per_m);
     }
     let mut rows: Vec<Row> = Vec::new();
     for (place, (name, lit)) in ways.into_iter().enumerate() {
-        let [PictureErrors { psnr_db, flip, .. }, _] = mean_errors(&views[REFERENCE], &views[place])?;
+        let [PictureErrors { psnr_db, flip, .. }, _] = mean_errors(&views[reference], &views[place])?;
         let truth_flip = mean_errors(&truth, &views[place])?[0].flip;
         let ms = seconds[place] * 1e3 / view_count as f64;
         let mut unknown = None;
-        if place > REFERENCE {
+        if place > reference {
             unknown = mean(lit.views(&stage.views, ViewPlanes::WITH_PROVENANCE)?.iter().map(unknown_share));
         }
         rows.push(Row { name, ms, psnr_db, flip, truth_flip, unknown });
     }
-    let pictures = picture_row(subject.name, &views[REFERENCE][0], &views[SHOWN][0])?;
-    let qualities = rows.split_off(DIRECT_RAYS.len());
-    Ok(SceneResult { name: subject.name, direct: rows, qualities, pictures, look_up_ratio: look_up_ratio(&stage)? })
+    let balanced = rows.iter().position(|row| row.name == Balanced.to_string()).context("a quality")?;
+    let pictures = picture_row(subject.name, &views[reference][0], &views[balanced][0])?;
+    let qualities = rows.split_off(reference + 1);
+    let [unlit_s, look_up_s] = plain_seconds(&stage, runs)?;
+    let look_up_ratio = (look_up_s / unlit_s - 1.0).max(LEAST_LOOK_UP);
+    let unlit = stage.lit.in_light("unlit")?;
+    let all_positions = in_turn(&[&unlit], runs, |way| way.views(&stage.views, planes).map(drop))?;
+    let unlit_ms = all_positions[0] * 1e3 / view_count as f64;
+    Ok(SceneResult { name: subject.name, direct: rows, qualities, pictures, look_up_ratio, unlit_ms })
+}
+
+/// How a scene is measured.
+#[derive(Debug, Clone, Copy)]
+pub struct Measuring {
+    pub lighting: Lighting,
+    pub view_count: usize,
+    /// Each way is timed this often.
+    pub runs: usize,
 }
 
 /// Direct drawing with each number of rays, then light from samples of each quality.
-fn ways<'s>(stage: &Stage<'s>) -> anyhow::Result<Vec<(String, LitScene<'s>)>> {
+fn ways<'s>(stage: &Stage<'s>, light: Light) -> anyhow::Result<Vec<(String, LitScene<'s>)>> {
     let mut ways = Vec::new();
-    for rays in DIRECT_RAYS {
-        let pixel_rays = rays * SAMPLES_A_PIXEL;
-        let lighting = format!("soft {pixel_rays}, occlusion {pixel_rays}");
-        ways.push((format!("direct, {rays} rays"), stage.lit.in_light(&lighting)?));
+    for rays in light.direct_rays() {
+        let lighting = light.lighting(rays.map(|rays| rays * SAMPLES_A_PIXEL));
+        ways.push((format!("direct, {} and {} rays", rays[0], rays[1]), stage.lit.in_light(&lighting)?));
     }
     let images = stage.lit.decoded_samples(&stage.samples)?;
     for quality in QUALITIES {
@@ -107,6 +149,11 @@ fn ways<'s>(stage: &Stage<'s>) -> anyhow::Result<Vec<(String, LitScene<'s>)>> {
 }
 
 impl SceneResult {
+    /// Direct drawing with the most rays.
+    pub fn reference(&self) -> &Row {
+        &self.direct[self.direct.len() - 1]
+    }
+
     /// The time of direct drawing with the fewest rays that reach a row's FLIP; `None` where no direct row reaches it.
     pub fn direct_ms(&self, row: &Row) -> Option<f64> {
         let points: Vec<Point> = self.direct.iter().map(|direct| (direct.ms, direct.truth_flip.ln()).into()).collect();
@@ -114,12 +161,13 @@ impl SceneResult {
     }
 }
 
-fn look_up_ratio(stage: &Stage<'_>) -> anyhow::Result<f64> {
+/// One position a pixel: without light, and with light that is looked up.
+fn plain_seconds(stage: &Stage<'_>, runs: usize) -> anyhow::Result<[f64; 2]> {
     let plain = stage.lit.in_light(PLAIN_LIGHTING)?;
     let draft = plain.with_samples(&plain.decoded_samples(&stage.samples)?, Draft)?;
     let unlit = plain.in_light("unlit")?;
-    let seconds = in_turn(&[&unlit, &draft], RUNS, |way| way.views(&stage.views, ViewPlanes::COLOR).map(drop))?;
-    Ok((seconds[1] / seconds[0] - 1.0).max(LEAST_LOOK_UP))
+    let seconds = in_turn(&[&unlit, &draft], runs, |way| way.views(&stage.views, ViewPlanes::COLOR).map(drop))?;
+    Ok([seconds[0], seconds[1]])
 }
 
 /// A view beside the reference, with the map of its error.
@@ -138,7 +186,7 @@ pub fn check(stand: &Stand, condition: &Condition, models: Option<&Path>, report
         report.checks.push(Check::not_run(name, "dB", bar, "--models is not given"));
         return Ok(());
     };
-    let mut stage = subject.stage(stand, CONDITION_VIEWS, condition.change)?;
+    let mut stage = subject.stage(stand, LIGHTING.parse()?, CONDITION_VIEWS, condition.change)?;
     let moments = if condition.is_moving { 8 } else { 1 };
     let planes = planes(if condition.is_moving { 1 } else { SAMPLES_A_PIXEL });
     let mut least_db = f64::INFINITY;
@@ -146,7 +194,7 @@ pub fn check(stand: &Stand, condition: &Condition, models: Option<&Path>, report
     for moment in 0..moments {
         stage.lit.scene_time_s = stage.period_s * moment as f32 / moments as f32;
         let lit = stage.lit.in_light(&format!("{LIGHTING}{}", condition.terms))?;
-        let reference = stage.lit.in_light(&format!("{REFERENCE_LIGHTING}{}", condition.terms))?;
+        let reference = stage.lit.in_light(&format!("soft 64, occlusion 64{}", condition.terms))?;
         let cached = lit.with_samples(&lit.decoded_samples(&stage.samples)?, quality)?;
         let views = cached.views(&stage.views, planes)?;
         let expected = reference.views(&stage.views, planes)?;

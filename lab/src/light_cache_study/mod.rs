@@ -12,14 +12,16 @@ use app_core::setup::DeviceArgs;
 use clap::Args;
 use engine::GpuEngine;
 use node::Engine as _;
+use render::Lighting;
 use report::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 
 use crate::failures::stand::Stand;
 use crate::section;
 use crate::statistics::{geometric_mean, mean_and_variation, quantile};
-use measure::{REFERENCE, Row, SAMPLES_A_PIXEL, SHARED, SceneResult, check, measure};
+use measure::{Light, Measuring, Row, SAMPLES_A_PIXEL, SHARED, SceneResult, check, measure};
 use subjects::{CONDITIONS, Condition, LIGHTING, OUTSIDE_SCENES, Subject, VIEW_PX, scene_names};
 
+const RUNS: usize = 3;
 /// The scene that gains most.
 const EXPENSIVE_SCENE: &str = "tree-terrain-500k";
 /// Scenes whose look-ups are compared with their surfaces.
@@ -30,7 +32,8 @@ const LOOK_UP_SCENES: [&str; 4] = ["FlightHelmet", EXPENSIVE_SCENE, "courtyard",
 #[command(after_help = "Examples:
   myriorama-lab study light_cache --models models/ --strict   exit status 1 when a check falls short
   myriorama-lab study light_cache --models models/ --views 1  the figures of docs/benchmarks.md
-  myriorama-lab study light_cache --quick --subject courtyard")]
+  myriorama-lab study light_cache --quick --subject courtyard
+  myriorama-lab study light_cache --lighting \"soft 16, indirect 64\" --views 1   the gain of sharing indirect light")]
 pub struct LightCacheArgs {
     #[command(flatten)]
     device: DeviceArgs,
@@ -40,7 +43,10 @@ pub struct LightCacheArgs {
     /// A folder with the models FlightHelmet, lamborghini, ingenuity and threejs-shaderball, or with subfolders that have them
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
-    /// Measures a few scenes, in two views unless --views is given
+    /// The lighting, with occlusion or with indirect light; its rays are those of samples
+    #[arg(long, default_value = LIGHTING, value_name = "TERMS")]
+    lighting: Lighting,
+    /// Measures a few scenes once, in two views unless --views is given
     #[arg(long)]
     quick: bool,
     /// Views of a scene, from the first of eight places on an orbit
@@ -63,10 +69,12 @@ pub fn run(args: &LightCacheArgs) -> anyhow::Result<Outcome> {
     let is_wanted = |name: &str| name.to_lowercase().contains(&args.subject.to_lowercase());
     let models = args.models.as_deref();
     let mut subjects = Vec::new();
-    for name in scene_names(args.quick).into_iter().filter(|name| is_wanted(name)) {
+    let light = Light::of(&args.lighting);
+    for name in scene_names(light, args.quick).into_iter().filter(|name| is_wanted(name)) {
         subjects.extend(Subject::new(name, models)?);
     }
-    let conditions = CONDITIONS.iter().filter(|condition| !args.quick && is_wanted(condition.name));
+    let has_conditions = !args.quick && light == Light::Occlusion;
+    let conditions = CONDITIONS.iter().filter(|condition| has_conditions && is_wanted(condition.name));
     let conditions: Vec<&Condition> = conditions.collect();
     if subjects.is_empty() && conditions.is_empty() {
         return Err(BadInput(format!("no subject's name contains {:?}", args.subject)).into());
@@ -77,15 +85,17 @@ pub fn run(args: &LightCacheArgs) -> anyhow::Result<Outcome> {
     let mut report = Report::new("Myriorama study: light_cache", engine.device_name());
     report.version("myriorama", env!("CARGO_PKG_VERSION"));
     report.parameter("views", format!("{} of {VIEW_PX}, {SAMPLES_A_PIXEL} samples a pixel", args.views));
-    report.parameter("lighting", LIGHTING);
+    report.parameter("lighting", args.lighting.to_string());
+    let runs = if args.quick { 1 } else { RUNS };
+    let plan = Measuring { lighting: args.lighting, view_count: args.views.into(), runs };
     let mut results = Vec::new();
     for subject in subjects {
         progress.set_message(subject.name);
-        results.push(measure(&stand, &subject, args.views.into()).context(subject.name)?);
+        results.push(measure(&stand, &subject, plan).context(subject.name)?);
         progress.inc(1);
     }
     if !results.is_empty() {
-        add_to(&mut report, results)?;
+        add_to(&mut report, light, results)?;
     }
     for condition in conditions {
         progress.set_message(condition.name);
@@ -96,7 +106,7 @@ pub fn run(args: &LightCacheArgs) -> anyhow::Result<Outcome> {
     section::finish(report, Vec::new(), &args.out, args.strict)
 }
 
-fn add_to(report: &mut Report, results: Vec<SceneResult>) -> anyhow::Result<()> {
+fn add_to(report: &mut Report, light: Light, results: Vec<SceneResult>) -> anyhow::Result<()> {
     let columns = [
         ("scene", ""),
         ("light", ""),
@@ -114,7 +124,7 @@ fn add_to(report: &mut Report, results: Vec<SceneResult>) -> anyhow::Result<()> 
             let gain = match result.direct_ms(row) {
                 _ if row.unknown.is_none() => Cell::Missing,
                 Some(direct_ms) => Cell::from(direct_ms / row.ms),
-                None => format!("> {:.2}", result.direct[REFERENCE].ms / row.ms).into(),
+                None => format!("> {:.2}", result.reference().ms / row.ms).into(),
             };
             let unknown_percent = row.unknown.map(|share| share * 100.0);
             let numbers = [row.ms, row.psnr_db, row.flip, row.truth_flip].map(Cell::from);
@@ -125,7 +135,10 @@ fn add_to(report: &mut Report, results: Vec<SceneResult>) -> anyhow::Result<()> 
     }
     report.tables = vec![rows, look_ups];
     report.charts = results.iter().map(|result| chart(result).into()).collect();
-    report.checks = [quality_checks(&results), gain_checks(&results), time_checks(&results)].concat();
+    report.checks = match light {
+        Light::Occlusion => [quality_checks(&results), gain_checks(&results), time_checks(&results)].concat(),
+        Light::Indirect => results.iter().flat_map(indirect_checks).collect(),
+    };
     report.pictures = results.into_iter().map(|result| result.pictures).collect();
     Ok(())
 }
@@ -156,9 +169,31 @@ fn quality_checks(results: &[SceneResult]) -> Vec<Check> {
     checks
 }
 
+/// Those of `balanced` in a scene with indirect light: error, gain, and the time over that of surfaces without light.
+fn indirect_checks(result: &SceneResult) -> Vec<Check> {
+    let name = |what: &str| format!("`balanced`, indirect light, {}: {what}", result.name);
+    let Some(row) = result.qualities.iter().find(|row| row.name == "balanced") else { return Vec::new() };
+    let gain = result.direct_ms(row).unwrap_or(result.reference().ms) / row.ms;
+    let over_unlit = row.ms / result.unlit_ms;
+    let (least_gain, most_over_unlit) = match result.name {
+        "courtyard, inside" => (20.0, Some(4.0)),
+        "gallery" => (10.0, None),
+        "urban, inside" => (4.0, Some(3.0)),
+        _ => (5.0, None),
+    };
+    let mut checks = vec![Check::new(name("gain at equal FLIP"), gain, "×", Bar::AtLeast(least_gain))];
+    if result.name != EXPENSIVE_SCENE {
+        checks.push(Check::new(name("FLIP"), row.flip, "", Bar::AtMost(0.017)));
+    }
+    if let Some(most) = most_over_unlit {
+        checks.push(Check::new(name("time over unlit"), over_unlit, "×", Bar::AtMost(most)));
+    }
+    checks
+}
+
 fn gain_checks(results: &[SceneResult]) -> Vec<Check> {
     let best = |result: &SceneResult| {
-        let gain = |row: &Row| result.direct_ms(row).unwrap_or(result.direct[REFERENCE].ms) / row.ms;
+        let gain = |row: &Row| result.direct_ms(row).unwrap_or(result.reference().ms) / row.ms;
         result.qualities.iter().map(gain).fold(0.0, f64::max)
     };
     let outside = || results.iter().filter(|result| !result.name.contains(", inside"));
@@ -180,7 +215,7 @@ fn time_checks(results: &[SceneResult]) -> Vec<Check> {
     let look_ups: Vec<f64> = compared.map(|result| result.look_up_ratio).collect();
     let all = (look_ups.len() == LOOK_UP_SCENES.len()).then(|| geometric_mean(&look_ups)).flatten();
     let missing = format!("{} of {} are measured", look_ups.len(), LOOK_UP_SCENES.join(", "));
-    let shared = results.iter().map(|result| result.direct[SHARED].ms / result.direct[REFERENCE].ms);
+    let shared = results.iter().map(|result| result.direct[SHARED].ms / result.reference().ms);
     let shared = geometric_mean(&shared.collect::<Vec<_>>());
     let least_db = quantile(results.iter().map(|result| result.direct[SHARED].psnr_db).collect(), 0.0);
     vec![

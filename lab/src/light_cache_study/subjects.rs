@@ -5,16 +5,18 @@ use std::path::Path;
 use anyhow::Context as _;
 use app_core::exit::BadInput;
 use app_core::setup::{SceneArgs, Setup};
-use depth_image::{EnvironmentMap, Light, PinholeCamera, ViewCell};
+use depth_image::{EnvironmentMap, PinholeCamera, ViewCell};
 use glam::{UVec2, Vec3};
+use render::Lighting;
 use sampling::Impostors;
 use scene::{Scene, SceneSpec};
 
+use super::measure::Light;
 use crate::failures::cached_light::LitScene;
 use crate::failures::stand::Stand;
 use crate::models::models_of;
 
-/// The lighting of samples and of views that use them.
+/// The lighting of samples and of views that use them, unless another is given.
 pub const LIGHTING: &str = "soft 16, occlusion 16";
 pub const VIEW_PX: UVec2 = UVec2::new(640, 360);
 /// Views are the first places of an orbit of so many.
@@ -24,6 +26,9 @@ const MODELS: [&str; 4] = ["FlightHelmet", "lamborghini", "ingenuity", "threejs-
 const BUILT_IN: [&str; 4] = ["urban", "courtyard", "bird-nest", "tree-terrain-500k"];
 pub const OUTSIDE_SCENES: usize = MODELS.len() + BUILT_IN.len();
 const QUICK: [&str; 3] = ["lamborghini", "courtyard", "tree-terrain-125k"];
+/// Scenes whose indirect light is measured; the quick ones come first.
+const INDIRECT: [&str; 4] = ["courtyard, inside", "gallery", "urban, inside", "tree-terrain-500k"];
+const QUICK_INDIRECT: usize = 2;
 /// View cells inside scenes: in the middle of a street, and in a corner of the yard.
 const INSIDE: [Inside; 2] = [
     Inside { name: "urban, inside", eyes: [[-62.5, 1.2, 29.88], [-59.5, 2.2, 30.12]], towards: [5.0, 4.3, -60.0] },
@@ -71,9 +76,14 @@ pub struct Stage<'s> {
 }
 
 /// The scenes that are compared with direct drawing.
-pub fn scene_names(is_quick: bool) -> Vec<&'static str> {
+pub fn scene_names(light: Light, is_quick: bool) -> Vec<&'static str> {
     let inside = INSIDE.map(|cell| cell.name);
-    if is_quick { QUICK.to_vec() } else { [&MODELS[..], &BUILT_IN, &inside].concat() }
+    match (light, is_quick) {
+        (Light::Indirect, true) => INDIRECT[..QUICK_INDIRECT].to_vec(),
+        (Light::Indirect, false) => INDIRECT.to_vec(),
+        (Light::Occlusion, true) => QUICK.to_vec(),
+        (Light::Occlusion, false) => [&MODELS[..], &BUILT_IN, &inside].concat(),
+    }
 }
 
 impl Subject {
@@ -91,7 +101,13 @@ impl Subject {
     }
 
     /// Puts the scene on the device. A texel of its four sample images has a view pixel's focal length.
-    pub fn stage<'s>(&self, stand: &'s Stand, view_count: usize, change: Change) -> anyhow::Result<Stage<'s>> {
+    pub fn stage<'s>(
+        &self,
+        stand: &'s Stand,
+        lighting: Lighting,
+        view_count: usize,
+        change: Change,
+    ) -> anyhow::Result<Stage<'s>> {
         let args = SceneArgs { impostors: Impostors::None, ..SceneArgs::new(self.scene.clone()) };
         let Setup { scene, mut around, .. } = args.load()?;
         if let Some(cell) = INSIDE.iter().find(|cell| cell.name == self.name) {
@@ -104,7 +120,7 @@ impl Subject {
             *camera = camera.resized(size_px.round().as_uvec2());
         }
         let period_s = scene.period_s().unwrap_or(0.0);
-        let lit = LitScene::new(stand, &change(scene)?, LIGHTING)?.by_faster_way(&views[0])?;
+        let lit = LitScene::new(stand, &change(scene)?, &lighting.to_string())?.by_faster_way(&views[0])?;
         Ok(Stage { lit, period_s, views, samples: around })
     }
 }
@@ -138,7 +154,11 @@ fn with_lamps(mut scene: Scene) -> anyhow::Result<Scene> {
         let position_in_world = bounds.min + bounds.size() * (0.3 + 0.4 * place) + Vec3::Y;
         let mut intensity_linear = Vec3::splat(0.15);
         intensity_linear[number % 3] = 0.3;
-        scene.illumination.lights.push(Light::Point { position_in_world, intensity_linear, radius_m: 0.1 });
+        scene.illumination.lights.push(depth_image::Light::Point {
+            position_in_world,
+            intensity_linear,
+            radius_m: 0.1,
+        });
     }
     Ok(scene)
 }

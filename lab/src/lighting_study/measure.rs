@@ -86,7 +86,7 @@ fn row(experiment: &Experiment, lighting: Lighting, views: &[usize]) -> anyhow::
 impl Row {
     /// Rays for the finished colour of one pixel.
     pub(super) fn rays_a_pixel(&self, lamps: usize) -> f64 {
-        f64::from(1 + self.lighting.shadow_rays() * lamps as u32 + self.lighting.occlusion_rays())
+        f64::from(1 + self.lighting.shadow_rays() * lamps as u32 + self.lighting.ambient_rays())
     }
 
     /// The pipeline's throughput over direct rendering's.

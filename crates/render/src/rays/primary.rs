@@ -49,6 +49,7 @@ impl ShaderVariant for Primary {
     fn context(&self) -> Value {
         context! {
             primary => true,
+            from_eye => true,
             shading => self.shading.map_or("unlit", highlight_name),
             surface_id => self.surface_id,
             triangle_normal => self.triangle_normal,

@@ -127,15 +127,11 @@ const ROOT: Todo = Todo(0u, 0x80000000u);
 {% include "rays/material.wgsl" %}
 {% endif %}
 {% if alpha_tested %}
-{% if mapped and cone is defined %}
+{% if mapped and not from_eye %}
 
 // A pixel's side across the ray where it begins, and its growth in a metre.
 var<private> cone_side_m: f32 = 1.0;
 var<private> cone_spread: f32 = 0.0;
-{% elif mapped and not primary %}
-
-// A pixel's side on the surface from which rays are sent.
-var<private> ray_side_m: f32 = 1.0;
 {% endif %}
 
 fn is_there(slot: u32, crossing: Crossing) -> bool {
@@ -143,7 +139,7 @@ fn is_there(slot: u32, crossing: Crossing) -> bool {
     let at = attributes_at(crossing);
     var cutoff = bitcast<f32>(material_texel(triangle.z, 1u).w);
 {% if mapped %}
-    let side_m = {% if cone is defined %}abs(cone_side_m + crossing.t * cone_spread){% elif primary %}crossing.t * camera.footprint{% else %}ray_side_m{% endif %};
+    let side_m = {{ "crossing.t * camera.footprint" if from_eye else "abs(cone_side_m + crossing.t * cone_spread)" }};
     cutoff = select(cutoff, hashed_cutoff(at.place_m, side_m), (triangle.w & ALPHA_HASHED) != 0u);
 {% endif %}
     return base_color(triangle.z, at, vec2f(0.0)).a >= cutoff;

@@ -19,7 +19,7 @@ impl ShaderVariant for Follow {
     fn context(&self) -> Value {
         let own = context! {
             primary => true,
-            cone => true,
+            from_eye => false,
             shading => highlight_name(Highlight::Ggx),
             count_visits => false,
         };

@@ -30,7 +30,7 @@ impl ShaderVariant for Spawn {
             single_pole => false,
             by_rays => self.by_rays,
             primary => true,
-            cone => true,
+            from_eye => false,
             shading => highlight_name(Highlight::Ggx),
             count_visits => false,
             plane_count => self.plane_count,

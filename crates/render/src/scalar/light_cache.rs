@@ -170,7 +170,10 @@ impl LightSamples<'_> {
             let of_lamps = |normal| self.expected_of_lamps(light, place, point.point_in_world, normal);
             let of_environment = |normal| luminance(self.illumination.environment.diffuse_linear(normal));
             lamps_linear *= ratio(of_lamps(point.normal_in_world), of_lamps(normal));
-            environment_linear *= ratio(of_environment(point.normal_in_world), of_environment(normal));
+            let expected = of_environment(normal);
+            if expected > 0.0 {
+                environment_linear *= ratio(of_environment(point.normal_in_world), expected);
+            }
         }
         TexelLight { lamps_linear, environment_linear }
     }

@@ -81,7 +81,7 @@ impl Scene {
 }
 
 /// Of `spot.wgsl`.
-fn pixel_seed(camera: &PinholeCamera, pixel: UVec2) -> u32 {
+pub(super) fn pixel_seed(camera: &PinholeCamera, pixel: UVec2) -> u32 {
     let PixelCamera { seed, first_from_axis: [x, y], .. } = PixelCamera::of(&(*camera).into(), Vec2::ZERO);
     let (x, y) = (pixel.x.wrapping_add(x), pixel.y.wrapping_add(y));
     hashed(seed ^ hashed((x & 0xffff) | (y << 16)))

@@ -2,6 +2,7 @@
 //! trace rays and gather light, which do the same on the same data, one ray after another.
 
 pub mod hashed_alpha;
+mod indirect;
 pub mod light_cache;
 pub mod lobe;
 mod nearest;

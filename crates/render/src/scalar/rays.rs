@@ -48,6 +48,10 @@ pub struct Hit {
 pub struct Look {
     /// The material's colour and the vertices', linear.
     pub base_linear: Vec3,
+    /// The share of light that it scatters.
+    pub albedo_linear: Vec3,
+    /// What it sends without light.
+    pub emission_linear: Vec3,
     /// `None` where there are no highlights.
     pub reflector: Option<Reflector>,
 }
@@ -193,6 +197,7 @@ impl Scene {
         let FlatTriangle { material, flags, .. } = self.triangles[hit.slot as usize];
         let texel = |part: u32| self.materials[(material * MATERIAL_TEXELS + part) as usize].map(f32::from_bits);
         let ([r, g, b, _], [metallic, roughness, ..], [dr, dg, db, _]) = (texel(0), texel(2), texel(3));
+        let [er, eg, eb, _] = texel(1);
         let (numbers, shares) = (self.numbers_of(hit), hit.shares());
         let vertex_linear = |i: usize| {
             let [r, g, b, _] = self.vertices[numbers[i]].color_srgba8;
@@ -200,9 +205,12 @@ impl Scene {
         };
         let base_linear = Vec3::new(r, g, b) * (0..3).map(vertex_linear).sum::<Vec3>();
         let reflectance_linear = Vec3::new(dr, dg, db).lerp(base_linear, metallic);
-        let is_glossy = flags & SPECULAR != 0 && flags & UNLIT == 0;
+        let is_unlit = flags & UNLIT != 0;
+        let is_glossy = flags & SPECULAR != 0 && !is_unlit;
         Look {
             base_linear,
+            albedo_linear: if is_unlit { Vec3::ZERO } else { base_linear * (1.0 - metallic) },
+            emission_linear: Vec3::new(er, eg, eb) + if is_unlit { base_linear } else { Vec3::ZERO },
             // In the bits that a device has of it.
             reflector: Reflector::unpack(Reflector { reflectance_linear, roughness }.pack()).filter(|_| is_glossy),
         }

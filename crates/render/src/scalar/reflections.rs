@@ -7,7 +7,7 @@ use super::rays::{Hit, Scene};
 
 /// Of `rise.wgsl`.
 const BIAS_FOOTPRINTS: f32 = 0.015_625;
-const BIAS_ROUNDINGS: f32 = 4e-7;
+pub(super) const BIAS_ROUNDINGS: f32 = 4e-7;
 
 /// A ray off a mirror.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -279,7 +279,7 @@ fn still_scenes_do_not_flicker_and_refinement_steps_add_up() {
 fn each_kind_of_light_alone_refines_to_the_whole() {
     let scene = courtyard();
     let (on_device, camera) = (upload(&scene), before(&scene));
-    for lighting in ["soft 8", "phong, occlusion 8", "shadows, occlusion 4", "soft 100"] {
+    for lighting in ["soft 8", "phong, occlusion 8", "shadows, occlusion 4", "soft 4, indirect 8", "soft 100"] {
         let lit = work(&on_device, lighting);
         let steps = lit.lighting.refinement_steps();
         let refined = |step| image(DrawWork { refinement: Refinement { step, steps }, ..lit }, &camera);

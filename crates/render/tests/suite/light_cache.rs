@@ -134,9 +134,9 @@ fn surface(scene: &rays::Scene, camera: &PinholeCamera, pixel: UVec2) -> Option<
 
 /// The share of pixels whose colour and provenance the scalar twin gives within 1 of 255. Pixels that no sample knows have
 /// the light of direct drawing.
-fn share_like_the_twin(scene: &Scene, quality: LightCacheQuality) -> f32 {
+fn share_like_the_twin(scene: &Scene, lighting: &str, quality: LightCacheQuality) -> f32 {
     let gpu_scene = upload(scene);
-    let work = DrawWork { visibility: Visibility::Rays, ..work(&gpu_scene, LIGHTING) };
+    let work = DrawWork { visibility: Visibility::Rays, ..work(&gpu_scene, lighting) };
     let images = samples(work);
     let view = cached(work, &images, quality, ViewPlanes::ALL);
     let traced = direct(work);
@@ -171,11 +171,16 @@ fn views_are_those_of_the_scalar_twin() {
     let few = sphere_on_a_floor(vec![lamp(0.3, 1.0), lamp(-0.6, 0.5)]);
     let many = sphere_on_a_floor((0..20).map(|number| lamp(0.1 * number as f32 - 1.0, 0.1)).collect());
     for quality in [LightCacheQuality::Draft, LightCacheQuality::Balanced, LightCacheQuality::Fine] {
-        let share = share_like_the_twin(&few, quality);
+        let share = share_like_the_twin(&few, LIGHTING, quality);
         assert!(share >= 0.999, "{quality}: {share}");
     }
-    let share = share_like_the_twin(&many, LightCacheQuality::Balanced);
+    let share = share_like_the_twin(&many, LIGHTING, LightCacheQuality::Balanced);
     assert!(share >= 0.999, "20 lamps: {share}");
+    // What surfaces send back is all that there is of the second word of light.
+    let mut enclosed = few;
+    enclosed.illumination.environment = Environment::default();
+    let share = share_like_the_twin(&enclosed, "soft 16, indirect 16", LightCacheQuality::Balanced);
+    assert!(share >= 0.999, "indirect light: {share}");
 }
 
 #[test]

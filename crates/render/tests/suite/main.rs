@@ -5,6 +5,7 @@ mod antialias;
 mod closed_forms;
 mod environment_map;
 mod glossy;
+mod indirect;
 mod layered;
 mod light_cache;
 mod light_failures;

@@ -173,7 +173,7 @@ fn pebble(builder: &mut MeshBuilder) {
 }
 
 /// A closed surface with a point for each direction from its middle, and the normals of the smooth surface.
-fn star(builder: &mut MeshBuilder, segments: [u32; 2], color_srgb: Vec3, point: impl Fn(Vec3) -> Vec3) {
+pub(super) fn star(builder: &mut MeshBuilder, segments: [u32; 2], color_srgb: Vec3, point: impl Fn(Vec3) -> Vec3) {
     builder.closed(segments, |out| vertex(point(out), normal_of(&point, out), color_srgb));
 }
 

@@ -5,6 +5,7 @@
 
 mod bird_nest;
 mod blocks;
+mod gallery;
 mod geometry;
 mod glossy_floor;
 mod grass;
@@ -21,6 +22,7 @@ mod urban;
 
 pub use bird_nest::bird_nest;
 pub use blocks::{BlocksViewpoints, blocks, blocks_viewpoints};
+pub use gallery::gallery;
 pub use glossy_floor::{teapot_floor, teapot_spheres};
 pub use grass::{GrassDensity, grass};
 pub use lone_tree::lone_tree;
@@ -45,6 +47,7 @@ pub(crate) fn by_name(name: &str) -> Scene {
         "blocks" => blocks(),
         "bird-nest" => bird_nest(),
         "urban" => urban(),
+        "gallery" => gallery(),
         "tree" => lone_tree(),
         "snake" => snake(),
         "teapot-mirror" => teapot_mirror(),

@@ -1,0 +1,86 @@
+//! A furnished room with pictures and sculptures, lit by the sun and the sky through its windows and by glowing lamps: most of its
+//! light is indirect.
+
+mod art;
+mod furniture;
+mod room;
+
+use depth_image::{Environment, Illumination, Light};
+use glam::{Affine3A, Mat3, Vec3};
+
+use super::geometry::{MeshBuilder, matt};
+use super::mirrors::star;
+use crate::{Material, Scene, SourceCamera};
+
+/// From the middle of the floor to the walls, and the height, in metres.
+const HALF_LENGTH_M: f32 = 6.0;
+const HALF_WIDTH_M: f32 = 4.0;
+const HEIGHT_M: f32 = 4.2;
+
+const EYE: Vec3 = Vec3::new(4.3, 1.65, 2.9);
+const TARGET: Vec3 = Vec3::new(-2.2, 1.35, -1.0);
+const FOV_Y_RAD: f32 = 1.0;
+
+/// About 80,000 triangles.
+#[must_use]
+pub fn gallery() -> Scene {
+    let mut builder = MeshBuilder::default();
+    room::add(&mut builder);
+    furniture::add(&mut builder);
+    art::add(&mut builder);
+    builder.finish_part(0);
+    furniture::add_leaves(&mut builder);
+    builder.finish_part(1);
+    furniture::add_lanterns(&mut builder);
+    builder.finish_part(2);
+    art::add_ring(&mut builder);
+    builder.finish_part(3);
+    let leaves = Material { double_sided: true, ..matt("leaves") };
+    let materials = vec![matt("matt"), leaves, glowing("lantern", [2.6, 1.9, 1.1]), glowing("ring", [3.2, 0.5, 1.4])];
+    let mut scene = builder.into_scene_of("gallery", materials);
+    let sun = Light::Directional {
+        towards_light_in_world: Vec3::new(0.42, 0.68, -0.6).normalize_or(Vec3::Y),
+        irradiance_linear: Vec3::new(5.0, 4.5, 3.8),
+        angular_radius_rad: 0.01,
+    };
+    let environment = Environment::gradient(Vec3::new(0.75, 1.0, 1.5), Vec3::new(0.45, 0.42, 0.36));
+    scene.illumination = Illumination { lights: vec![sun], environment };
+    scene.background = environment;
+    let back = (EYE - TARGET).normalize_or(Vec3::Z);
+    let right = Vec3::Y.cross(back).normalize_or(Vec3::X);
+    let turned = Mat3::from_cols(right, back.cross(right), back);
+    let world_from_camera = Affine3A::from_mat3_translation(turned, EYE);
+    scene.cameras = vec![SourceCamera { name: "entrance".into(), world_from_camera, fov_y_rad: FOV_Y_RAD }];
+    scene
+}
+
+fn glowing(name: &str, radiance: [f32; 3]) -> Material {
+    Material { base_color_linear: [0.0, 0.0, 0.0, 1.0], emissive_linear: Vec3::from(radiance), ..matt(name) }
+}
+
+/// A box with rounded edges, as of cloth.
+fn cushion(builder: &mut MeshBuilder, middle: Vec3, half: Vec3, color_srgb: Vec3) {
+    let rounded = |at: f32| at.signum() * at.abs().powf(0.35);
+    star(builder, [48, 24], color_srgb, |out| {
+        middle + Vec3::new(rounded(out.x), rounded(out.y), rounded(out.z)) * half
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gallery_is_a_closed_room_but_for_its_windows() {
+        let scene = gallery();
+        let triangles = scene.triangle_count();
+        assert!((50_000..150_000).contains(&triangles), "{triangles} triangles");
+        let volume = scene.bounds();
+        assert!(volume.min.cmple(-Vec3::new(HALF_LENGTH_M, 0.0, HALF_WIDTH_M)).all(), "{volume:?}");
+        assert!(scene.vertices_in_world().all(Vec3::is_finite));
+        let eye = scene.cameras[0].world_from_camera.translation;
+        assert!(Vec3::from(eye).distance(EYE) < 1e-6);
+        let glowing = scene.materials.iter().filter(|material| material.emissive_linear != Vec3::ZERO);
+        assert_eq!(glowing.count(), 2);
+    }
+}
