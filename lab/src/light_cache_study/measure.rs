@@ -9,6 +9,7 @@ use metrics::{PictureErrors, Rgb8Image, flip_map};
 use render::Lighting;
 use report::{Bar, Check, PictureRow, Point, Report, comparison_row};
 
+use super::light::{Light, SAMPLES_A_PIXEL};
 use super::subjects::{Condition, LIGHTING, Stage, Subject};
 use crate::bench::timing::in_turn;
 use crate::compare::time_at;
@@ -17,7 +18,6 @@ use crate::failures::cached_light::{LitScene, unknown_share};
 use crate::failures::measures::mean;
 use crate::failures::stand::Stand;
 
-pub const SAMPLES_A_PIXEL: u32 = 4;
 /// Little light beside the surfaces.
 const PLAIN_LIGHTING: &str = "shadows, occlusion 1";
 /// The place of direct drawing whose positions share the rays of 16 rays a pixel.
@@ -26,38 +26,6 @@ const QUALITIES: [LightCacheQuality; 4] = [Draft, Fast, Balanced, Fine];
 /// A look-up costs at least this share of the surfaces; less is noise of the clock.
 const LEAST_LOOK_UP: f64 = 0.01;
 const CONDITION_VIEWS: usize = 2;
-
-/// The kind of light that is compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Light {
-    Occlusion,
-    Indirect,
-}
-
-impl Light {
-    pub fn of(lighting: &Lighting) -> Self {
-        if lighting.is_indirect() { Self::Indirect } else { Self::Occlusion }
-    }
-
-    /// Rays to a lamp and of ambient light at each position, in direct drawing. The last is the reference. Lamps need few.
-    fn direct_rays(self) -> &'static [[u32; 2]] {
-        match self {
-            Self::Occlusion => &[[1, 1], [2, 2], [4, 4], [8, 8], [16, 16]],
-            Self::Indirect => &[[1, 1], [2, 2], [4, 4], [4, 8], [4, 16], [4, 32], [16, 64]],
-        }
-    }
-
-    fn lighting(self, [to_lamps, ambient]: [u32; 2]) -> String {
-        let term = if self == Self::Indirect { "indirect" } else { "occlusion" };
-        format!("soft {to_lamps}, {term} {ambient}")
-    }
-
-    /// Of all positions, with as many rays again.
-    fn truth(self) -> String {
-        let reference = self.direct_rays().last().copied().unwrap_or([16, 16]);
-        self.lighting(reference.map(|rays| 2 * SAMPLES_A_PIXEL * rays))
-    }
-}
 
 /// Measurements of a scene.
 pub struct SceneResult {

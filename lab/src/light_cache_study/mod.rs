@@ -1,5 +1,6 @@
 //! `myriorama-lab study light_cache`: views whose light comes from samples, against direct drawing at equal error.
 
+mod light;
 mod measure;
 mod subjects;
 
@@ -18,7 +19,8 @@ use report::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 use crate::failures::stand::Stand;
 use crate::section;
 use crate::statistics::{geometric_mean, mean_and_variation, quantile};
-use measure::{Light, Measuring, Row, SAMPLES_A_PIXEL, SHARED, SceneResult, check, measure};
+use light::{Light, SAMPLES_A_PIXEL};
+use measure::{Measuring, Row, SHARED, SceneResult, check, measure};
 use subjects::{CONDITIONS, Condition, LIGHTING, OUTSIDE_SCENES, Subject, VIEW_PX, scene_names};
 
 const RUNS: usize = 3;

@@ -11,7 +11,7 @@ use render::Lighting;
 use sampling::Impostors;
 use scene::{Scene, SceneSpec};
 
-use super::measure::Light;
+use super::light::Light;
 use crate::failures::cached_light::LitScene;
 use crate::failures::stand::Stand;
 use crate::models::models_of;

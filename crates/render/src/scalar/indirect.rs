@@ -76,11 +76,11 @@ impl Scene {
         };
         let point_of = |salt| point_of(number, hashed(from.seed.wrapping_add(salt)));
         let (place, at) = (point_of(0x68bc_21eb), point_of(0x02e5_be93).x);
-        look.emission_linear + look.albedo_linear * self.from_one_lamp(&spot, place, at, illumination)
+        look.emission_linear + look.albedo_linear * self.light_of_one_lamp(&spot, place, at, illumination)
     }
 
     /// The light of one lamp as if it were that of all.
-    fn from_one_lamp(&self, spot: &Spot, place: Vec2, at: f32, illumination: &Illumination) -> Vec3 {
+    fn light_of_one_lamp(&self, spot: &Spot, place: Vec2, at: f32, illumination: &Illumination) -> Vec3 {
         let brings = |incident: &Incident| {
             incident.irradiance_linear * spot.normal.dot(incident.towards_light_in_world).max(0.0)
         };

@@ -87,8 +87,8 @@ fn from_wall(wall: (Vec3, f32, Vec3), lamp: Vec3, floor_point: Vec3) -> f32 {
     let patch = |(i, j): (i32, i32)| {
         let at = center + along * place(i) + Vec3::Y * place(j);
         let (to_lamp, from_floor) = (lamp - at, at - floor_point);
-        let arriving = to_lamp.normalize().dot(normal).max(0.0) / to_lamp.length_squared();
-        let towards = from_floor.normalize();
+        let arriving = to_lamp.normalize_or_zero().dot(normal).max(0.0) / to_lamp.length_squared();
+        let towards = from_floor.normalize_or_zero();
         arriving * towards.y.max(0.0) * -towards.dot(normal) / (PI * from_floor.length_squared()) * step_m * step_m
     };
     (0..STEPS).flat_map(|i| (0..STEPS).map(move |j| (i, j))).map(patch).sum()

@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 use super::super::geometry::{MeshBuilder, Station, vertex};
 use super::super::mirrors::star;
 use super::super::random::{Noise, mix};
-use super::{HALF_LENGTH_M, HALF_WIDTH_M};
+use super::room::{HALF_LENGTH_M, HALF_WIDTH_M};
 
 const PLINTH: Vec3 = Vec3::new(214.0, 210.0, 202.0);
 

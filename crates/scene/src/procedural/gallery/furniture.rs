@@ -8,7 +8,7 @@ use super::super::geometry::{MeshBuilder, vertex};
 use super::super::mirrors::star;
 use super::super::random::Rng;
 use super::super::teapot::{Teapot, teapot};
-use super::{HALF_LENGTH_M, HEIGHT_M, cushion};
+use super::room::{HALF_LENGTH_M, HEIGHT_M};
 
 const OAK: Vec3 = Vec3::new(168.0, 124.0, 82.0);
 const DARK: Vec3 = Vec3::new(64.0, 56.0, 52.0);
@@ -146,4 +146,12 @@ pub(super) fn add_lanterns(builder: &mut MeshBuilder) {
     for (middle, radius_m) in LANTERNS {
         star(builder, [48, 24], Vec3::splat(255.0), |out| middle + out * Vec3::new(1.0, 0.85, 1.0) * radius_m);
     }
+}
+
+/// A box with rounded edges, as of cloth.
+fn cushion(builder: &mut MeshBuilder, middle: Vec3, half: Vec3, color_srgb: Vec3) {
+    let rounded = |at: f32| at.signum() * at.abs().powf(0.35);
+    star(builder, [48, 24], color_srgb, |out| {
+        middle + Vec3::new(rounded(out.x), rounded(out.y), rounded(out.z)) * half
+    });
 }

@@ -9,13 +9,7 @@ use depth_image::{Environment, Illumination, Light};
 use glam::{Affine3A, Mat3, Vec3};
 
 use super::geometry::{MeshBuilder, matt};
-use super::mirrors::star;
 use crate::{Material, Scene, SourceCamera};
-
-/// From the middle of the floor to the walls, and the height, in metres.
-const HALF_LENGTH_M: f32 = 6.0;
-const HALF_WIDTH_M: f32 = 4.0;
-const HEIGHT_M: f32 = 4.2;
 
 const EYE: Vec3 = Vec3::new(4.3, 1.65, 2.9);
 const TARGET: Vec3 = Vec3::new(-2.2, 1.35, -1.0);
@@ -58,16 +52,9 @@ fn glowing(name: &str, radiance: [f32; 3]) -> Material {
     Material { base_color_linear: [0.0, 0.0, 0.0, 1.0], emissive_linear: Vec3::from(radiance), ..matt(name) }
 }
 
-/// A box with rounded edges, as of cloth.
-fn cushion(builder: &mut MeshBuilder, middle: Vec3, half: Vec3, color_srgb: Vec3) {
-    let rounded = |at: f32| at.signum() * at.abs().powf(0.35);
-    star(builder, [48, 24], color_srgb, |out| {
-        middle + Vec3::new(rounded(out.x), rounded(out.y), rounded(out.z)) * half
-    });
-}
-
 #[cfg(test)]
 mod tests {
+    use super::room::{HALF_LENGTH_M, HALF_WIDTH_M};
     use super::*;
 
     #[test]

@@ -4,7 +4,11 @@ use glam::Vec3;
 
 use super::super::geometry::MeshBuilder;
 use super::super::random::Rng;
-use super::{HALF_LENGTH_M, HALF_WIDTH_M, HEIGHT_M};
+
+/// From the middle of the floor to the walls, and the height, in metres.
+pub(super) const HALF_LENGTH_M: f32 = 6.0;
+pub(super) const HALF_WIDTH_M: f32 = 4.0;
+pub(super) const HEIGHT_M: f32 = 4.2;
 
 const PLANK_M: [f32; 2] = [1.5, 0.2];
 const WINDOW_MIDDLES_M: [f32; 4] = [-4.3, -1.45, 1.4, 4.25];
