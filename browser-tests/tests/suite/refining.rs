@@ -28,7 +28,8 @@ async fn a_still_from_samples_names_its_light_and_samples_and_is_never_exact() {
     let pictures = visit.pictures().await;
     let mut steps: Vec<u32> = pictures.iter().filter(|p| p.header.still).map(|p| p.header.light_step).collect();
     steps.dedup();
-    assert_eq!(steps, [1, 2, 3]);
+    // A machine that is busy may have the second set before the visitor rests.
+    assert!(steps == [1, 2, 3] || steps == [2, 3], "{steps:?}");
     let mut badges: Vec<(String, u32)> = visit.browser.value("badges").await.unwrap();
     // Without a number, it is the last picture in motion, which rests.
     badges.retain(|(text, _)| !["moving", "waiting", "still"].contains(&text.as_str()));
@@ -38,7 +39,8 @@ async fn a_still_from_samples_names_its_light_and_samples_and_is_never_exact() {
         ("still (1 of 16 samples)", 3),
         ("still (4 of 16 samples)", 3),
     ];
-    assert_eq!(badges, expected.map(|(text, step)| (text.to_owned(), step)));
+    let expected = expected.iter().filter(|(_, step)| steps.contains(step));
+    assert_eq!(badges, expected.map(|&(text, step)| (text.to_owned(), step)).collect::<Vec<_>>());
     let last = ball_linear(0.0, Refinement { step: STEPS - 1, steps: STEPS });
     assert!(visit.canvas().await.srgb8.as_chunks::<3>().0.contains(&srgb8(last)), "the ball in its last light");
     visit.end(Expected::NoError).await;
