@@ -28,6 +28,8 @@ const TWO_PLANE_HEIGHT: f32 = 3.0;
 const MODEL_SPREAD_RAD: f32 = 0.12;
 /// What the sample cameras of an interior look at is this far away, in diagonals of the scene.
 const INTERIOR_SHARE: f32 = 0.3;
+/// Walls reach beyond a picture's borders on all sides: samples of an interior are as wide as wide views.
+const INTERIOR_ASPECT: UVec2 = UVec2::new(16, 9);
 
 /// The device.
 #[derive(Debug, Clone, Copy, Args)]
@@ -383,7 +385,8 @@ impl SceneArgs {
             SceneSpec::BuiltIn(_) if !scene.cameras.is_empty() => {
                 let SourceCamera { world_from_camera, fov_y_rad, .. } = &scene.cameras[0];
                 let distance_m = bounds.size().length() * INTERIOR_SHARE;
-                Ok(Rig::around(world_from_camera, *fov_y_rad, distance_m, MODEL_SPREAD_RAD))
+                let rig = Rig::around(world_from_camera, *fov_y_rad, distance_m, MODEL_SPREAD_RAD);
+                return Ok(rig.samples(UVec2::new(size_px.y * INTERIOR_ASPECT.x / INTERIOR_ASPECT.y, size_px.y)));
             }
             SceneSpec::TreeTerrain { .. } => Rig::two_plane(&bounds, TWO_PLANE_HEIGHT),
             // As it stands first.

@@ -38,6 +38,7 @@ mod reflections;
 mod renderer;
 pub mod scalar;
 mod shaders;
+mod smooth_light;
 mod stages;
 mod sums;
 mod surfaces;

@@ -15,6 +15,7 @@ use crate::known_samples::{ImageSequence, KnownSamples, TemporalReference};
 use crate::layered::{self, LayerSelection};
 use crate::light_samples::{CachedLight, LightCache, LookUpTests};
 use crate::planes::{self, Output};
+use crate::smooth_light::smoothed;
 use crate::visibility::{Choice, Costs, Visibility};
 use crate::work::{DrawWork, SamplePlanes};
 use crate::{GpuScene, Lighting, RenderError, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages};
@@ -88,7 +89,11 @@ impl Renderer {
         turn: Turn,
     ) -> Result<LightCache, RenderError> {
         let share_words = if lighting.is_traced() { LightPlanes::share_planes(scene.light_count) } else { 0 };
-        LightCache::upload(&self.tables, images, share_words, turn)
+        if !lighting.is_indirect() {
+            return LightCache::upload(&self.tables, images, share_words, turn);
+        }
+        let smooth: Vec<DepthImage> = images.iter().map(smoothed).collect();
+        LightCache::upload(&self.tables, &smooth, share_words, turn)
     }
 
     /// Finished views: surfaces from the scene, their light from samples where these know it. `work` has the light of the

@@ -10,6 +10,7 @@ pub mod rays;
 pub mod reflections;
 pub mod sequence;
 
+pub use crate::smooth_light::smoothed;
 pub use crate::{
     known_samples::{LEAST_FACING, REFERENCE_FOOTPRINTS},
     rays::primary::MOST_LAYERS,

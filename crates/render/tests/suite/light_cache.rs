@@ -141,7 +141,9 @@ fn share_like_the_twin(scene: &Scene, lighting: &str, quality: LightCacheQuality
     let view = cached(work, &images, quality, ViewPlanes::ALL);
     let traced = direct(work);
     let (twin, camera) = (rays::Scene::of(&gpu_scene, 0.0).expect("tables"), view_camera());
-    let light = LightSamples { images: &images, illumination: &scene.illumination };
+    let smooth: Vec<DepthImage> = images.iter().map(render::scalar::smoothed).collect();
+    let images = if work.lighting.is_indirect() { &smooth } else { &images };
+    let light = LightSamples { images, illumination: &scene.illumination };
     let provenance = view.provenance.as_ref().expect("provenance");
     let color = |view: &View, place: usize| <[u8; 3]>::try_from(&view.srgb8[3 * place..][..3]).expect("a pixel");
     let (mut like, mut known) = (0, 0);
