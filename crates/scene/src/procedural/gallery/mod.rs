@@ -30,16 +30,17 @@ pub fn gallery() -> Scene {
     art::add_ring(&mut builder);
     builder.finish_part(3);
     let leaves = Material { double_sided: true, ..matt("leaves") };
-    let materials = vec![matt("matt"), leaves, glowing("lantern", [2.6, 1.9, 1.1]), glowing("ring", [3.2, 0.5, 1.4])];
+    let materials = vec![matt("matt"), leaves, glowing("lantern", [4.0, 2.9, 1.7]), glowing("ring", [4.5, 0.7, 2.0])];
     let mut scene = builder.into_scene_of("gallery", materials);
     let sun = Light::Directional {
         towards_light_in_world: Vec3::new(0.42, 0.68, -0.6).normalize_or(Vec3::Y),
-        irradiance_linear: Vec3::new(5.0, 4.5, 3.8),
+        irradiance_linear: Vec3::new(9.0, 8.2, 7.0),
         angular_radius_rad: 0.01,
     };
-    let environment = Environment::gradient(Vec3::new(0.75, 1.0, 1.5), Vec3::new(0.45, 0.42, 0.36));
+    let environment = Environment::gradient(Vec3::new(1.7, 2.2, 3.2), Vec3::new(1.0, 0.94, 0.82));
     scene.illumination = Illumination { lights: vec![sun], environment };
-    scene.background = environment;
+    // As bright as a picture shows it beside the room.
+    scene.background = Environment::gradient(Vec3::new(0.62, 0.82, 1.2), Vec3::new(0.42, 0.4, 0.34));
     let back = (EYE - TARGET).normalize_or(Vec3::Z);
     let right = Vec3::Y.cross(back).normalize_or(Vec3::X);
     let turned = Mat3::from_cols(right, back.cross(right), back);
