@@ -30,7 +30,7 @@ LEAST = 0.03
 SAMPLES = 1024
 # Sides of the squares of pixels whose means are compared.
 SQUARE = 8
-BRIGHTER = 4
+BRIGHTER = 2
 SIZE = (160, 120)
 
 
