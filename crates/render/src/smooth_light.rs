@@ -45,14 +45,14 @@ fn smoothed_ambient(image: &DepthImage, words: &[u32]) -> Vec<u32> {
     let surfaces: Vec<Option<Surface>> = (0..words.len()).into_par_iter().map(|place| surface(image, place)).collect();
     let mut linear: Vec<Vec3> = words.iter().map(|&word| linear_from_rgb9e5(word)).collect();
     for step_px in STEPS_PX {
-        let mean = |place| mean_around(&surfaces, &linear, size_px, (place, step_px));
+        let mean = |place| mean_around(&surfaces, &linear, size_px, place, step_px);
         linear = (0..words.len()).into_par_iter().map(mean).collect();
     }
     linear.into_iter().map(rgb9e5_from_linear).collect()
 }
 
 /// The mean over a texel and the eight around it that are on its surface, by a binomial kernel.
-fn mean_around(surfaces: &[Option<Surface>], linear: &[Vec3], size_px: UVec2, (place, step_px): (usize, i32)) -> Vec3 {
+fn mean_around(surfaces: &[Option<Surface>], linear: &[Vec3], size_px: UVec2, place: usize, step_px: i32) -> Vec3 {
     let Some(own) = &surfaces[place] else { return linear[place] };
     let at = IVec2::new(place as i32 % size_px.x as i32, place as i32 / size_px.x as i32);
     let (mut sum, mut weight) = (Vec3::ZERO, 0.0);

@@ -71,6 +71,10 @@ pub fn run(args: &LightCacheArgs) -> anyhow::Result<Outcome> {
     let is_wanted = |name: &str| name.to_lowercase().contains(&args.subject.to_lowercase());
     let models = args.models.as_deref();
     let mut subjects = Vec::new();
+    if args.lighting.ambient.is_none() || args.lighting.shadow_rays() == 0 {
+        let reason = "the study needs rays to lamps, and occlusion or indirect light";
+        return Err(BadInput(format!("--lighting \"{}\": {reason}", args.lighting)).into());
+    }
     let light = Light::of(&args.lighting);
     for name in scene_names(light, args.quick).into_iter().filter(|name| is_wanted(name)) {
         subjects.extend(Subject::new(name, models)?);

@@ -60,12 +60,12 @@ impl Scene {
         let towards = tangent * disc.x + bitangent * disc.y + spot.normal * up;
         let ray = Ray { origin_in_world: spot.origin(), direction_in_world: towards };
         match self.closest(&ray, 0.0) {
-            (Some(hit), _) => self.sent_back(&ray, &hit, (spot, number), illumination),
+            (Some(hit), _) => self.sent_back(&ray, &hit, spot, number, illumination),
             (None, _) => illumination.environment.radiance_linear(towards),
         }
     }
 
-    fn sent_back(&self, ray: &Ray, hit: &Hit, (from, number): (&Spot, u32), illumination: &Illumination) -> Vec3 {
+    fn sent_back(&self, ray: &Ray, hit: &Hit, from: &Spot, number: u32, illumination: &Illumination) -> Vec3 {
         let look = self.look(hit);
         let offset = ray.direction_in_world * hit.t;
         let spot = Spot {

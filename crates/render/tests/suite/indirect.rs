@@ -3,25 +3,17 @@
 use std::f32::consts::PI;
 
 use depth_image::{
-    Antialias, DepthImage, Environment, Illumination, Light, PinholeCamera, linear_from_rgb9e5, rgb9e5_from_linear,
+    DepthImage, Environment, Illumination, Light, PinholeCamera, linear_from_rgb9e5, rgb9e5_from_linear,
 };
 use glam::{Affine3A, UVec2, Vec3};
 use render::scalar::{rays, smoothed};
-use render::{DrawWork, SamplePlanes, Visibility};
+use render::{DrawWork, Visibility};
 use scene::procedural::{courtyard, quad, uv_sphere};
 use scene::{Instance, Material, Scene};
 
-use crate::stage::{device, floor_under, lamps, mean, upload, work};
+use crate::stage::{LIGHT, device, floor_under, lamps, mean, upload, work};
 
 const SIZE_PX: UVec2 = UVec2::new(24, 18);
-const LIGHT: SamplePlanes = SamplePlanes {
-    antialias: Antialias::NONE,
-    normal: false,
-    surface_id: false,
-    specular: false,
-    corners: false,
-    light: true,
-};
 
 /// Adds a square with a material of its own.
 fn add_quad(scene: &mut Scene, (center, half_m, normal): (Vec3, f32, Vec3), material: Material) {
@@ -162,7 +154,7 @@ fn light_is_that_of_the_scalar_twin() {
 }
 
 #[test]
-fn smoothed_samples_have_a_third_of_the_noise_and_keep_their_borders() {
+fn smoothed_samples_have_a_third_of_the_noise() {
     let lamp = point_lamp(Vec3::new(0.3, 2.0, 0.7), 1.0);
     let camera = PinholeCamera::looking_at(Vec3::new(0.8, 1.4, 2.2), Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(160, 120));
     let scene = corner(vec![lamp]);
@@ -181,7 +173,7 @@ fn smoothed_samples_have_a_third_of_the_noise_and_keep_their_borders() {
 }
 
 #[test]
-fn rays_in_steps_and_parts_are_those_of_one_picture() {
+fn more_rays_than_a_dispatch_traces_keep_the_mean_brightness() {
     let scene = courtyard();
     let camera = PinholeCamera::looking_at(Vec3::new(3.0, 4.0, 6.0), Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(96, 72));
     let uploaded = upload(&scene);

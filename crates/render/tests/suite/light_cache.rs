@@ -11,17 +11,9 @@ use render::{DrawWork, SamplePlanes, Visibility};
 use scene::procedural::uv_sphere;
 use scene::{Instance, Scene};
 
-use crate::stage::{device, floor_under, mean, upload, work};
+use crate::stage::{LIGHT, device, floor_under, mean, upload, work};
 
 const VIEW_PX: UVec2 = UVec2::new(160, 120);
-const LIGHT: SamplePlanes = SamplePlanes {
-    antialias: Antialias::NONE,
-    normal: false,
-    surface_id: false,
-    specular: false,
-    corners: false,
-    light: true,
-};
 const LIGHTING: &str = "soft 16, occlusion 16 1m";
 
 /// A floor under a lamp, half of it under a smaller quad.

@@ -19,6 +19,16 @@ const ALL: SamplePlanes = SamplePlanes {
     light: false,
 };
 
+/// Light in place of colour.
+pub const LIGHT: SamplePlanes = SamplePlanes {
+    antialias: Antialias::NONE,
+    normal: false,
+    surface_id: false,
+    specular: false,
+    corners: false,
+    light: true,
+};
+
 /// The software device of this program; a test without one fails.
 pub fn device() -> &'static (Arc<Gpu>, Renderer) {
     static DEVICE: OnceLock<(Arc<Gpu>, Renderer)> = OnceLock::new();
