@@ -22,6 +22,10 @@ const RUNS: usize = 3;
 const LONG_RUN_S: f64 = 0.5;
 /// Larger views are measured in this size: their time is in proportion to their pixels.
 const MOST_PIXELS: usize = 1 << 20;
+/// Images of light and views are first measured with this part of their sides.
+const QUICK_SIDE_RATIO: f32 = 0.25;
+/// A measurement of light that would take longer is not repeated in full size: a client may wait for it.
+const LONG_MEASUREMENT_S: f64 = 1.0;
 /// The longest time of views that are made in one call, unless one alone takes longer.
 const CALL_S: f64 = 1.0;
 
@@ -30,31 +34,87 @@ pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Resu
     // Work that arrives meanwhile goes between slices of a measurement that nobody waits for.
     let _cut = request.in_background.then(|| engine.live_stream());
     let class = if request.in_background { WorkClass::Background } else { WorkClass::Batch };
-    let (measured_request, of_pixels) = of_most_pixels(request);
     let measurement = Measurement { engine, turn: Turn { class, flow: Turn::next_flow() } };
-    let measured = measurement.costs(&measured_request)?;
-    let costs = measured.costs;
-    let costs = Costs {
-        direct_view_s: costs.direct_view_s * of_pixels,
-        reconstruct_view_s: costs.reconstruct_view_s * of_pixels,
-        encode_view_s: costs.encode_view_s * of_pixels,
-        ..costs
-    };
-    Ok(Measured { costs, ..measured })
-}
-
-/// The request with views of [`MOST_PIXELS`] at most, and the pixels of a requested view for each of theirs.
-fn of_most_pixels(request: &MeasureCosts) -> (MeasureCosts, f64) {
-    let pixels = |request: &MeasureCosts| request.typical_views.first().map_or(1, PinholeCamera::pixel_count);
-    let mut measured = request.clone();
-    if pixels(request) > MOST_PIXELS {
-        let scale = (MOST_PIXELS as f32 / pixels(request) as f32).sqrt();
-        for view in &mut measured.typical_views {
-            *view = view.resized((view.size_px.as_vec2() * scale).as_uvec2().max(UVec2::ONE));
+    if engine.sample_planes(&request.method)?.light {
+        let quick = Resized::new(request, QUICK_SIDE_RATIO, QUICK_SIDE_RATIO);
+        let measured = quick.in_full_size(measurement.costs(&quick.request)?);
+        if measurement_s(&measured.costs, &request.workload) > LONG_MEASUREMENT_S {
+            return Ok(measured);
         }
     }
-    let of_pixels = pixels(request) as f64 / pixels(&measured) as f64;
-    (measured, of_pixels)
+    let resized = Resized::with_most_pixels(request);
+    Ok(resized.in_full_size(measurement.costs(&resized.request)?))
+}
+
+/// About the time that it takes to measure these costs.
+fn measurement_s(costs: &Costs, workload: &Workload) -> f64 {
+    let set_s = costs.sample_image_s * workload.sample_cameras.len() as f64;
+    let warmed_s = costs.direct_view_s + costs.reconstruct_view_s + costs.encode_view_s;
+    set_s + 2.0 * warmed_s
+}
+
+/// A measurement with smaller images and views, whose times are in proportion to their pixels.
+struct Resized {
+    request: MeasureCosts,
+    texels_ratio: f64,
+    pixels_ratio: f64,
+}
+
+impl Resized {
+    /// Images of full size, and views of [`MOST_PIXELS`] at most.
+    fn with_most_pixels(request: &MeasureCosts) -> Self {
+        let view_pixels = request.typical_views.first().map_or(1, PinholeCamera::pixel_count);
+        Self::new(request, 1.0, (MOST_PIXELS as f32 / view_pixels as f32).sqrt().min(1.0))
+    }
+
+    fn new(request: &MeasureCosts, image_side_ratio: f32, view_side_ratio: f32) -> Self {
+        let mut resized = request.clone();
+        if image_side_ratio < 1.0 {
+            for image in &mut resized.workload.sample_cameras {
+                *image = image.resized(scaled_size(image.size_px(), image_side_ratio));
+            }
+        }
+        for view in &mut resized.typical_views {
+            *view = view.resized(scaled_size(view.size_px, view_side_ratio));
+        }
+        let ratio = |full: usize, small: usize| full as f64 / small.max(1) as f64;
+        let texels = |request: &MeasureCosts| -> usize {
+            request.workload.sample_cameras.iter().map(SampleCamera::pixel_count).sum()
+        };
+        let pixels =
+            |request: &MeasureCosts| -> usize { request.typical_views.iter().map(PinholeCamera::pixel_count).sum() };
+        Self {
+            texels_ratio: ratio(texels(request), texels(&resized)),
+            pixels_ratio: ratio(pixels(request), pixels(&resized)),
+            request: resized,
+        }
+    }
+
+    fn in_full_size(&self, measured: Measured) -> Measured {
+        let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles } =
+            measured.costs;
+        let sample_image_s = sample_image_s * self.texels_ratio;
+        let costs = Costs {
+            sample_image_s,
+            direct_view_s: direct_view_s * self.pixels_ratio,
+            reconstruct_view_s: reconstruct_view_s * self.pixels_ratio,
+            load_set_s: load_set_s * self.texels_ratio,
+            encode_view_s: encode_view_s * self.pixels_ratio,
+            in_order,
+            tiles: tiles.and_then(|tiles| TileCosts::of_image(sample_image_s, tiles.overhead_s, tiles.row_shares)),
+        };
+        let shared_light = measured.shared_light.map(|light| SharedLightCosts {
+            known_ratio: light.known_ratio,
+            surfaces_s: light.surfaces_s * self.pixels_ratio,
+            look_up_s: light.look_up_s * self.pixels_ratio,
+            unknown_s: light.unknown_s * self.pixels_ratio,
+        });
+        Measured { costs, shared_light, ..measured }
+    }
+}
+
+fn scaled_size(size_px: UVec2, side_ratio: f32) -> UVec2 {
+    (size_px.as_vec2() * side_ratio).as_uvec2().max(UVec2::ONE)
 }
 
 /// A measurement's device, and its place among other work.

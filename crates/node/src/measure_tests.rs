@@ -18,6 +18,9 @@ pub(crate) struct Sleeper {
     direct_view_s: f64,
     reconstruct_view_s: f64,
     build_s: f64,
+    /// Seconds of a texel of an image.
+    texel_s: f64,
+    takes_light: bool,
     /// Seconds of an image, and of each of its rows; images are then tileable.
     parts_s: Option<(f64, [f64; 4])>,
     pub(crate) calls: Mutex<Calls>,
@@ -26,6 +29,7 @@ pub(crate) struct Sleeper {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Calls {
     pub(crate) refinements: Vec<Refinement>,
+    sampled_px: Vec<UVec2>,
     pub(crate) drawn_views: Vec<usize>,
     pub(crate) reconstructed_views: Vec<usize>,
     pub(crate) uploads: Vec<(Illumination, bool)>,
@@ -102,13 +106,16 @@ impl Engine for Sleeper {
     }
 
     fn sample_planes(&self, _: &str) -> Result<SamplePlanes, EngineError> {
-        Ok(SamplePlanes { normals: true, ..SamplePlanes::default() })
+        Ok(SamplePlanes { normals: true, light: self.takes_light, ..SamplePlanes::default() })
     }
 
     fn sample(&self, request: &SampleWork, _: Turn) -> Result<Vec<SampleImage>, EngineError> {
-        self.calls.lock().unwrap().refinements.push(request.refinement);
+        let mut calls = self.calls.lock().unwrap();
+        calls.refinements.push(request.refinement);
+        calls.sampled_px.extend(request.cameras.iter().map(SampleCamera::size_px));
         let parts_s: f64 = request.cameras.iter().map(|camera| self.sample_parts_s(camera)).sum();
-        std::thread::sleep(Duration::from_secs_f64(self.sample_s + parts_s));
+        let texels: usize = request.cameras.iter().map(SampleCamera::pixel_count).sum();
+        std::thread::sleep(Duration::from_secs_f64(self.sample_s + parts_s + self.texel_s * texels as f64));
         Ok(request.cameras.iter().map(image).collect())
     }
 
@@ -214,14 +221,33 @@ fn slow_operations_run_once_after_a_warm_up() {
 #[test]
 fn large_views_are_measured_in_a_smaller_size() {
     let large = camera().resized(UVec2::new(8192, 4096));
-    let (smaller, of_pixels) = of_most_pixels(&MeasureCosts { typical_views: vec![large; 2], ..request(1) });
-    let [first, second] = smaller.typical_views[..] else { panic!() };
+    let smaller = Resized::with_most_pixels(&MeasureCosts { typical_views: vec![large; 2], ..request(1) });
+    let [first, second] = smaller.request.typical_views[..] else { panic!() };
     assert_eq!((first, first.size_px), (second, UVec2::new(1448, 724)));
-    assert!((of_pixels - 32.0).abs() < 0.02, "{of_pixels}");
+    assert!((smaller.pixels_ratio - 32.0).abs() < 0.02, "{}", smaller.pixels_ratio);
     let engine = Sleeper { direct_view_s: 0.01, ..Sleeper::default() };
     let costs = measure_costs(&engine, &MeasureCosts { typical_views: vec![large], ..request(1) }).unwrap().costs;
     assert!((0.32..1.0).contains(&costs.direct_view_s), "{costs:?}");
-    assert_eq!(of_most_pixels(&request(1)).1, 1.0);
+    assert_eq!(Resized::with_most_pixels(&request(1)).pixels_ratio, 1.0);
+}
+
+#[test]
+fn expensive_light_is_measured_in_a_smaller_size() {
+    let large = camera().resized(UVec2::splat(64));
+    let mut wanted = MeasureCosts { typical_views: vec![large], ..request(1) };
+    wanted.workload.sample_cameras = vec![large.into(); 2];
+    let measured = |texel_s: f64| {
+        let engine = Sleeper { texel_s, takes_light: true, ..Sleeper::default() };
+        let costs = measure_costs(&engine, &wanted).unwrap().costs;
+        let sizes_px = engine.calls.into_inner().unwrap().sampled_px;
+        (costs.sample_image_s, sizes_px)
+    };
+    let (image_s, sizes_px) = measured(2e-4);
+    assert!((0.8..1.2).contains(&image_s), "{image_s}");
+    assert!(sizes_px.iter().all(|size_px| size_px.x == 16), "{sizes_px:?}");
+    let (image_s, sizes_px) = measured(2e-6);
+    assert!((0.008..0.1).contains(&image_s), "{image_s}");
+    assert!(sizes_px.iter().any(|size_px| size_px.x == 64), "cheap light is measured in full size: {sizes_px:?}");
 }
 
 #[test]
