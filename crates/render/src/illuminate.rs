@@ -50,6 +50,8 @@ pub(crate) struct Illuminate {
     /// The distance of the pixels that are lit, where they are not listed.
     step_px: u32,
     listed: bool,
+    /// Ambient light of the pixels at the list's end is in the sums already.
+    knows_ambient: bool,
     /// Lit are listed points, such as those where mirrored rays end, not pixels.
     bounces: bool,
     shadow_rays: ShadowRays,
@@ -70,6 +72,7 @@ impl Illuminate {
         single_pole: false,
         step_px: 1,
         listed: false,
+        knows_ambient: false,
         bounces: false,
         shadow_rays: ShadowRays::None,
         ambient: AmbientRays::None,
@@ -90,6 +93,7 @@ impl ShaderVariant for Illuminate {
             single_pole => self.single_pole,
             step_px => self.step_px,
             listed => self.listed,
+            knows_ambient => self.knows_ambient,
             bounces => self.bounces,
             shadow_rays => match self.shadow_rays {
                 ShadowRays::None => "none",
@@ -126,6 +130,12 @@ impl ShaderVariant for Illuminate {
             let bent = Self { by_rays: true, single_pole: true, step_px, listed, ..Self::UNLIT };
             let lit = Self { shadow_rays: ShadowRays::Many, ambient: AmbientRays::Occlusion, ..bent };
             variants.extend([bent, lit].iter().flat_map(Self::with_all_sums));
+        }
+        for [by_rays, continued, environment_map] in switches() {
+            let (shadow_rays, ambient) = (ShadowRays::Many, AmbientRays::Indirect);
+            let lit =
+                Self { by_rays, listed: true, knows_ambient: true, shadow_rays, ambient, continued, ..Self::UNLIT };
+            variants.extend(Self { environment_map, ..lit }.with_all_sums());
         }
         for [continued, environment_map] in switches() {
             for (shadow_rays, ambient) in Self::RAYS {
@@ -196,7 +206,9 @@ pub(crate) fn record(
     let traced = batch.traced.as_deref().filter(|_| lighting.is_traced());
     for (number, part) in parts.iter().enumerate() {
         let continued = number > 0 || recording.sums.rays.iter().any(|rays| rays.start > 0);
-        let variant = Illuminate { step_px, listed: lists.is_some(), continued, ..Illuminate::of(batch) };
+        let of_batch = Illuminate::of(batch);
+        let knows_ambient = batch.cached.is_some() && of_batch.ambient == AmbientRays::Indirect;
+        let variant = Illuminate { step_px, listed: lists.is_some(), knows_ambient, continued, ..of_batch };
         let pass = recording.passes.get(&variant)?;
         let rays = traced.map(|traced| pass.bind(1, traced.bindings())).transpose()?;
         let kind = WorkKind::new(batch.family(), &(variant.name(), part.counts));

@@ -29,7 +29,7 @@
 @group(0) var<storage, read> bounces: array<Bounce>;
 @group(0) var<storage, read> list: BounceList;
 {% elif listed %}
-struct List { workgroups: u32, y: u32, z: u32, count: u32 }
+struct List { workgroups: u32, y: u32, z: u32, count: u32, last_count: u32 }
 @group(0) var<storage, read> listed_pixels: array<u32>;
 @group(0) var<storage, read> list: List;
 {% endif %}
@@ -108,11 +108,11 @@ fn from_lamp(number: u32, spot: Spot) -> Arrival {
 {% endif %}
 
 // With indirect light, what surfaces send back is part of it.
-fn from_environment(spot: Spot) -> Arrival {
+fn from_environment(spot: Spot, ambient_rays: u32) -> Arrival {
 {% if ambient != "none" %}
     let around = tangents_of(spot.normal);
     var arrival = Arrival(vec3f(0.0), 0.0);
-    for (var i = 0u; i < camera.ambient_rays; i++) {
+    for (var i = 0u; i < ambient_rays; i++) {
         let number = camera.first_ambient_ray + i;
         let disc = disc_from_square(point_of(number, hashed(spot.seed + 0x5bd1e995u)));
         let up = sqrt(max(1.0 - dot(disc, disc), 0.0));
@@ -130,7 +130,7 @@ fn from_environment(spot: Spot) -> Arrival {
 {% endif %}
 {% if environment_map and shadow_rays == "none" %}
     // Lamps have no rays: bright texels take as many as there are of occlusion.
-    for (var i = 0u; i < camera.ambient_rays && has_bright_texels(); i++) {
+    for (var i = 0u; i < ambient_rays && has_bright_texels(); i++) {
         let place = point_of(camera.first_ambient_ray + i, hashed(spot.seed + illumination.light_count));
         arrival.linear += arrival_of(incident_from_bright(place), spot).linear;
     }
@@ -173,7 +173,7 @@ fn light_bounce(place: u32) {
 {% endif %}
 {%- else %}
 
-fn light_pixel(pixel: vec2u) {
+fn light_pixel(pixel: vec2u, knows_ambient: bool) {
     let place = place_of(pixel);
     let depth = reversed_depth_at(pixel);
     var lamps_linear = vec3f(0.0);
@@ -183,7 +183,7 @@ fn light_pixel(pixel: vec2u) {
 {% if traced and alpha_tested and mapped %}        cone_side_m = camera.near_m / depth * camera.footprint;
 {% endif %}
 {%- endif %}
-        environment = from_environment(spot);
+        environment = from_environment(spot, {{ "select(camera.ambient_rays, 0u, knows_ambient)" if knows_ambient else "camera.ambient_rays" }});
 {% if visibility and not continued %}
         for (var number = 0u; number < illumination.light_count; number++) { add(OPEN_TO_LAMPS + number, place, 0.0); }
 {% endif %}
@@ -197,6 +197,9 @@ fn light_pixel(pixel: vec2u) {
         }
     }
     add_color(LAMPS, place, lamps_linear);
+{%- if knows_ambient %}
+    if knows_ambient { return; }
+{%- endif %}
     add_color(ENVIRONMENT, place, environment.linear);
 {% if visibility %}    add(OPEN_TO_ENVIRONMENT, place, environment.open);
 {% endif %}
@@ -211,15 +214,19 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% elif listed %}
 @compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    if id.x >= list.count { return; }
-    let place = listed_pixels[id.x];
-    light_pixel(vec2u(place % camera.size_px.x, place / camera.size_px.x));
+    let first_count = (list.count + LIST_WORKGROUP - 1u) / LIST_WORKGROUP * LIST_WORKGROUP;
+    let is_last = id.x >= first_count;
+    let entry = select(id.x, id.x - first_count, is_last);
+    if entry >= select(list.count, list.last_count, is_last) { return; }
+    let place = listed_pixels[select(entry, arrayLength(&listed_pixels) - 1u - entry, is_last)];
+    let pixel = vec2u(place % camera.size_px.x, place / camera.size_px.x);
+    light_pixel(pixel, is_last);
 }
 {% else %}
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let pixel = pixel_at(id, {{ step_px }}u);
     if is_beyond(pixel) { return; }
-    light_pixel(pixel);
+    light_pixel(pixel, false);
 }
 {% endif %}

@@ -24,6 +24,8 @@ pub(crate) struct LookUp {
     environment_map: bool,
     /// Bright texels of the map are lamps, and no part of the environment.
     bright_traced: bool,
+    /// The ambient light of samples is indirect light.
+    indirect: bool,
     sums: SumPlanes,
     share_words: usize,
     /// Sample images: their numbers are constants, whose values the software device reads once for all lanes.
@@ -52,6 +54,7 @@ impl LookUp {
             by_rays: batch.by_rays,
             environment_map,
             bright_traced: environment_map && work.lighting.shadow_rays() > 0,
+            indirect: work.lighting.is_indirect(),
             sums: output.sums,
             share_words: cache.share_words,
             camera_count: cache.image_count(),
@@ -78,6 +81,7 @@ impl ShaderVariant for LookUp {
             single_pole => false,
             environment_map => self.environment_map,
             bright_traced => self.bright_traced,
+            indirect => self.indirect,
             provenance_plane => self.provenance_plane,
             max_lamp_shares => MAX_LAMP_SHARES,
             lamp_vectors => lamps_with_shares + usize::from(self.bright_traced),
@@ -104,6 +108,7 @@ impl ShaderVariant for LookUp {
                     by_rays,
                     environment_map,
                     bright_traced: environment_map && traced,
+                    indirect: traced,
                     sums: SumPlanes { light_count, visibility },
                     share_words: (1 + shares_of_lamps(light_count)).div_ceil(4),
                     camera_count: 1 + light_count % 4,

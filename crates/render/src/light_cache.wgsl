@@ -381,7 +381,17 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         put_light(known.light, place);
     }
     let is_unknown = is_asked && !is_answered;
+{%- if indirect %}
+    // Indirect light changes slowly: it is known wherever a texel counts, and only lamps are asked.
+    let is_unlit = is_unknown && known.light.weight > 0.0;
+    if is_unlit {
+        put_light(known.light, place);
+        list_pixel_last(place);
+    }
+    if is_unknown && !is_unlit { list_pixel(place); }
+{%- else %}
     if is_unknown { list_pixel(place); }
+{%- endif %}
     var origin = select(PROVENANCE_EMPTY, PROVENANCE_HIT, met);
     origin = select(origin, PROVENANCE_HIT | known.camera_mask << 8u, is_answered);
     origin = select(origin, PROVENANCE_LIT_HERE, is_unknown);

@@ -18,8 +18,8 @@ impl PixelList {
         let bytes = 4 * u64::from(pixels);
         Self {
             pixels: pool.lend_storage("pixels to be lit", bytes),
-            // Workgroups along x, y and z, and the list's length.
-            arguments: gpu.buffer_with("list", &[0u32, 1, 1, 0], BufferUsages::STORAGE | BufferUsages::INDIRECT),
+            // Workgroups along x, y and z, and the numbers of pixels from the list's beginning and from its end.
+            arguments: gpu.buffer_with("list", &[0u32, 1, 1, 0, 0], BufferUsages::STORAGE | BufferUsages::INDIRECT),
         }
     }
 

@@ -3,7 +3,8 @@
 use std::f32::consts::PI;
 
 use depth_image::{
-    DepthImage, Environment, Illumination, Light, PinholeCamera, linear_from_rgb9e5, rgb9e5_from_linear,
+    DepthImage, Environment, Illumination, Light, LightCacheQuality, PinholeCamera, ProvenanceKind, View, ViewPlanes,
+    linear_from_rgb9e5, rgb9e5_from_linear,
 };
 use glam::{Affine3A, UVec2, Vec3};
 use render::scalar::{rays, smoothed};
@@ -170,6 +171,35 @@ fn smoothed_samples_have_a_third_of_the_noise() {
     let light = |image: &DepthImage| image.light.clone().expect("light");
     assert!(light(&few).lamps_rgb9e5 == light(&smooth).lamps_rgb9e5, "shadows of lamps are not smoothed");
     assert!(few.inverse_depth_per_m == smooth.inverse_depth_per_m);
+}
+
+/// Texels on both sides of a shadow's edge disagree by lamps alone: the view asks lamps, and takes indirect light from samples.
+#[test]
+fn at_the_edges_of_shadows_indirect_light_is_that_of_samples() {
+    let renderer = &device().1;
+    let scene = upload(&corner(vec![point_lamp(Vec3::new(0.3, 2.0, 0.7), 2.0)]));
+    let camera =
+        |x: f32| PinholeCamera::looking_at(Vec3::new(x, 1.4, 2.2), Vec3::ZERO, Vec3::Y, 0.8, UVec2::new(160, 120));
+    let [many, few] = ["soft 1, indirect 256", "soft 1, indirect 1"].map(|lighting| work(&scene, lighting));
+    let images = renderer.draw_depth_images(many, &[camera(0.6).into(), camera(1.0).into()], LIGHT).expect("samples");
+    let cache = renderer.upload_light(&scene, few.lighting, &images, few.turn).expect("a cache");
+    let view_camera = [camera(0.8)];
+    let view = renderer.draw_cached_views(few, &cache, LightCacheQuality::Balanced, &view_camera, ViewPlanes::ALL);
+    let view = view.expect("a view").remove(0);
+    let [wanted, noisy] =
+        [many, few].map(|work| renderer.draw_views(work, &view_camera, ViewPlanes::ALL).expect("a view"));
+    let provenance = view.provenance.as_ref().expect("provenance");
+    let unknown = (0..provenance.len()).filter(|&pixel| provenance[pixel].kind() == ProvenanceKind::LitHere);
+    let unknown: Vec<usize> = unknown.collect();
+    let off = |other: &View| {
+        let channels = unknown.iter().flat_map(|&pixel| 3 * pixel..3 * pixel + 3);
+        let squares = channels.map(|at| (f32::from(other.srgb8[at]) - f32::from(wanted[0].srgb8[at])).powi(2));
+        mean(squares).sqrt()
+    };
+    let (own, traced) = (off(&view), off(&noisy[0]));
+    println!("{} unknown pixels: RMSE {own}, with rays of their own {traced}", unknown.len());
+    assert!(unknown.len() > 100, "{}", unknown.len());
+    assert!(own < 0.5 * traced, "{own} {traced}");
 }
 
 #[test]
