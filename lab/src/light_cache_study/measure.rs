@@ -4,8 +4,9 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use depth_image::LightCacheQuality::{self, Balanced, Draft, Fast, Fine};
-use depth_image::{Antialias, View, ViewPlanes};
-use metrics::{PictureErrors, Rgb8Image, flip_map};
+use depth_image::{Antialias, PinholeCamera, View, ViewPlanes};
+use glam::Quat;
+use metrics::{PictureErrors, Rgb8Image, change_error_map, flip_map, foreground};
 use render::Lighting;
 use report::{Bar, Check, PictureRow, Point, Report, comparison_row};
 
@@ -26,6 +27,11 @@ const QUALITIES: [LightCacheQuality; 4] = [Draft, Fast, Balanced, Fine];
 /// A look-up costs at least this share of the surfaces; less is noise of the clock.
 const LEAST_LOOK_UP: f64 = 0.01;
 const CONDITION_VIEWS: usize = 2;
+/// Rays to a lamp and of ambient light, at each position, of the direct drawing whose flicker is compared.
+const FLICKERING: [u32; 2] = [4, 4];
+/// Frames in which a camera turns, and the way between them.
+const FRAMES: usize = 4;
+const FRAME_TURN_RAD: f32 = 0.2_f32.to_radians();
 
 /// Measurements of a scene.
 pub struct SceneResult {
@@ -39,6 +45,9 @@ pub struct SceneResult {
     pub look_up_ratio: f64,
     /// Of the views without light.
     pub unlit_ms: f64,
+    /// Error of the change from frame to frame while the camera turns: of `balanced` over that of direct drawing with
+    /// [`FLICKERING`] rays.
+    pub flicker_ratio: Option<f64>,
 }
 
 /// A way of drawing the views. Errors are over the foreground, means over views.
@@ -71,6 +80,11 @@ pub fn measure(stand: &Stand, subject: &Subject, plan: Measuring) -> anyhow::Res
     for (reference, truth) in views[reference].iter_mut().zip(&truth) {
         reference.inverse_depth_per_m.clone_from(&truth.inverse_depth_per_m);
     }
+    let balanced = ways.iter().position(|(name, _)| *name == Balanced.to_string()).context("a quality")?;
+    let flicker_ratio = match light {
+        Light::Indirect => Some(flicker_ratio(&stage, &ways[reference].1, &ways[balanced].1)?),
+        Light::Occlusion => None,
+    };
     let mut rows: Vec<Row> = Vec::new();
     for (place, (name, lit)) in ways.into_iter().enumerate() {
         let [PictureErrors { psnr_db, flip, .. }, _] = mean_errors(&views[reference], &views[place])?;
@@ -82,7 +96,6 @@ pub fn measure(stand: &Stand, subject: &Subject, plan: Measuring) -> anyhow::Res
         }
         rows.push(Row { name, ms, psnr_db, flip, truth_flip, unknown });
     }
-    let balanced = rows.iter().position(|row| row.name == Balanced.to_string()).context("a quality")?;
     let pictures = picture_row(subject.name, &views[reference][0], &views[balanced][0])?;
     let qualities = rows.split_off(reference + 1);
     let [unlit_s, look_up_s] = plain_seconds(&stage, runs)?;
@@ -90,7 +103,36 @@ pub fn measure(stand: &Stand, subject: &Subject, plan: Measuring) -> anyhow::Res
     let unlit = stage.lit.in_light("unlit")?;
     let all_positions = in_turn(&[&unlit], runs, |way| way.views(&stage.views, planes).map(drop))?;
     let unlit_ms = all_positions[0] * 1e3 / view_count as f64;
-    Ok(SceneResult { name: subject.name, direct: rows, qualities, pictures, look_up_ratio, unlit_ms })
+    Ok(SceneResult { name: subject.name, direct: rows, qualities, pictures, look_up_ratio, unlit_ms, flicker_ratio })
+}
+
+/// The error of the change from frame to frame: that of views with light from samples over that of direct drawing.
+fn flicker_ratio(stage: &Stage<'_>, reference: &LitScene<'_>, cached: &LitScene<'_>) -> anyhow::Result<f64> {
+    let first = stage.views.first().context("a view")?;
+    let turned = |frame: usize| {
+        let turn = Quat::from_rotation_y(frame as f32 * FRAME_TURN_RAD);
+        PinholeCamera { world_from_camera: turn * first.world_from_camera, ..*first }
+    };
+    let cameras: Vec<PinholeCamera> = (0..FRAMES).map(turned).collect();
+    let rays = FLICKERING.map(|rays| rays * SAMPLES_A_PIXEL);
+    let direct = stage.lit.in_light(&Light::Indirect.lighting(rays))?;
+    let expected = reference.views(&cameras, planes(SAMPLES_A_PIXEL))?;
+    let change_error = |lit: &LitScene<'_>| {
+        let frames = lit.views(&cameras, planes(SAMPLES_A_PIXEL))?;
+        let changes = expected.windows(2).zip(frames.windows(2));
+        let errors = changes.map(|(expected, frames)| change_error(expected, frames));
+        mean(errors.collect::<anyhow::Result<Vec<f64>>>()?).context("two frames")
+    };
+    Ok(change_error(cached)? / change_error(&direct)?)
+}
+
+/// The mean over the pixels that show a surface in the second frame.
+fn change_error(expected: &[View], frames: &[View]) -> anyhow::Result<f64> {
+    let pictures = |views: &[View]| views.iter().map(Rgb8Image::of_view).collect::<Result<Vec<_>, _>>();
+    let (expected_pictures, pictures) = (pictures(expected)?, pictures(frames)?);
+    let map = change_error_map([&expected_pictures[0], &expected_pictures[1]], [&pictures[0], &pictures[1]])?;
+    let is_surface = foreground(&expected[1], &pictures[1])?;
+    map.mean(Some(&is_surface))?.context("a surface")
 }
 
 /// How a scene is measured.

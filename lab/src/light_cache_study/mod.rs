@@ -187,7 +187,11 @@ fn indirect_checks(result: &SceneResult) -> Vec<Check> {
         "urban, inside" => (4.0, Some(3.0)),
         _ => (5.0, None),
     };
-    let mut checks = vec![Check::new(name("gain at equal FLIP"), gain, "×", Bar::AtLeast(least_gain))];
+    let flicker = "change of error from frame to frame over direct drawing with 4 rays";
+    let mut checks = vec![
+        Check::new(name("gain at equal FLIP"), gain, "×", Bar::AtLeast(least_gain)),
+        Check::maybe(name(flicker), result.flicker_ratio, "×", Bar::AtMost(0.3), "not measured"),
+    ];
     if result.name != EXPENSIVE_SCENE {
         checks.push(Check::new(name("FLIP"), row.flip, "", Bar::AtMost(0.017)));
     }
