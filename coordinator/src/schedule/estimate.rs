@@ -173,6 +173,11 @@ impl Estimate {
         self.operations.as_ref().map(Operation::ratio)
     }
 
+    /// As if nothing had been timed since the session was opened.
+    pub(super) fn alone(&self) -> NodeCosts {
+        NodeCosts { costs: self.alone, transfer_image_s: self.now().transfer_image_s }
+    }
+
     pub(super) fn now(&self) -> NodeCosts {
         self.now_among(&Ratios::default())
     }

@@ -328,6 +328,24 @@ fn a_session_begins_at_the_fallback_that_has_room_where_its_time_is_known() {
 }
 
 #[test]
+fn what_a_busy_machine_took_refuses_nothing_once_it_is_idle() {
+    let mut cluster = Cluster::of(2);
+    cluster.step(rated(1, 50.0, Vec::new()));
+    cluster.wait(1);
+    let (plan_epoch, now) = (cluster.plan().plan_epoch, cluster.now);
+    let slow = MeasuredCosts { reconstruct_view_s: Some(4.0 * COSTS.reconstruct_view_s), ..MeasuredCosts::default() };
+    for second in 1..30 {
+        cluster.now = now + Duration::from_secs(second);
+        ["node-0", "node-1"].map(|name| cluster.step(timed(name, plan_epoch, slow)));
+    }
+    let admits = |cluster: &Cluster| cluster.scheduler.admits(1, 1, Some(60.0), None);
+    assert!(matches!(admits(&cluster), Err(ChoiceError::Overload { .. })), "other programs use the machine");
+    cluster.now += Duration::from_secs(11);
+    cluster.step(Event::Tick);
+    assert_eq!(admits(&cluster), Ok(()), "nothing has been timed for a while");
+}
+
+#[test]
 fn sessions_beyond_the_nodes_time_are_refused() {
     let mut cluster = Cluster::of(2);
     let fallbacks = vec![quality("joint_carve:1", 0.8)];

@@ -108,7 +108,7 @@ impl Scheduler {
     }
 
     fn change_of<'a>(&self, number: u64, before: &'a WorkloadState, after: WorkloadState) -> Change<'a> {
-        let nodes = self.rebased_costs_of_all(number, &after.costs);
+        let nodes = self.costs_to_admit(number, &after.costs);
         Change { before: Some((number, before)), after, nodes }
     }
 
@@ -120,22 +120,23 @@ impl Scheduler {
         if let Some(cells) = after.cell_count().filter(|&cells| cells > MAX_CELLS) {
             return Err(ChoiceError::Cells { cells });
         }
-        let own = before.map_or(0.0, |(number, workload)| promised(workload, &self.costs_of_all(number)));
+        let now =
+            |number: u64, workload: &WorkloadState| promised(workload, &self.costs_to_admit(number, &workload.costs));
+        let own = before.map_or(0.0, |(number, workload)| now(number, workload));
         let asked = promised(after, nodes).max(self.without_fallbacks(change));
         // Batches take what is left, and add nothing to what is promised.
         if asked <= own {
             return Ok(());
         }
         let others = self.workloads.iter().filter(|(number, _)| before.is_none_or(|(own, _)| own != **number));
-        let needed =
-            others.map(|(&number, workload)| promised(workload, &self.costs_of_all(number))).sum::<f64>() + asked;
+        let needed = others.map(|(&number, workload)| now(number, workload)).sum::<f64>() + asked;
         if needed > MOST_ADMITTED { Err(ChoiceError::Overload { needed }) } else { Ok(()) }
     }
 
     /// The share of the nodes' time at the last fallback that is left, where a session does not accept the one in force:
     /// it took as much when it was left.
     fn without_fallbacks(&self, Change { before, after, nodes }: &Change<'_>) -> f64 {
-        let Some((_, before)) = before else { return 0.0 };
+        let Some((_, before)) = before.filter(|(_, before)| !before.is_idle(self.now)) else { return 0.0 };
         let when_left = before.overload.view_utilisation_when_left(after.overload.step);
         let own_nodes = before.nodes.len() as f64 / nodes.len().max(1) as f64;
         when_left.map_or(0.0, |view_utilisation| {

@@ -86,15 +86,18 @@ impl Scheduler {
         costs_among(self.usable().filter_map(|(_, member)| member.estimates.get(&number)))
     }
 
-    /// The same with other costs alone.
-    pub(super) fn rebased_costs_of_all(&self, number: u64, costs: &Costs) -> Vec<NodeCosts> {
+    /// The same for an admission, with `alone` in place of what was measured alone. Timings of a workload that has been idle for
+    /// a while do not count: other programs may have slowed them down, and no new ones come while it is refused.
+    pub(super) fn costs_to_admit(&self, number: u64, alone: &Costs) -> Vec<NodeCosts> {
         let estimates = self.usable().filter_map(|(_, member)| member.estimates.get(&number).cloned());
-        let rebased: Vec<Estimate> = estimates
-            .map(|mut estimate| {
-                estimate.rebase(costs);
-                estimate
-            })
-            .collect();
+        let rebased = estimates.map(|mut estimate| {
+            estimate.rebase(alone);
+            estimate
+        });
+        if self.workloads.get(&number).is_some_and(|workload| workload.is_idle(self.now)) {
+            return rebased.map(|estimate| estimate.alone()).collect();
+        }
+        let rebased: Vec<Estimate> = rebased.collect();
         costs_among(rebased.iter())
     }
 
