@@ -145,8 +145,9 @@ impl SceneOffers {
             _ => (),
         }
         for (place, offer) in offers.iter().enumerate() {
-            if offers[..place].iter().any(|other| other.name == offer.name || other.hash == offer.hash) {
-                return Err(OfferError::Twice { name: offer.name.clone() });
+            let is_same = |other: &&SceneOffer| other.name == offer.name || other.hash == offer.hash;
+            if let Some(other) = offers[..place].iter().find(is_same) {
+                return Err(OfferError::Twice { name: other.name.clone() });
             }
         }
         Ok(Self(offers))

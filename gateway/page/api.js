@@ -24,9 +24,12 @@ export async function requestJson(name, query, signal) {
   return (await request(name, query, signal)).json();
 }
 
-/** The gateway's reason not to let this page in; null where it lets it in, or does not answer in time. */
+/**
+ * The gateway's reason not to let this page in; null where it lets it in, or does not answer in time. A POST, since browsers send no
+ * Origin with a GET of the page's own server, and a proxy may have changed Host: a page that is let in gets "method not allowed".
+ */
 export async function refusal(withinMs) {
-  const options = { cache: "no-store", signal: AbortSignal.timeout(withinMs) };
+  const options = { method: "POST", cache: "no-store", signal: AbortSignal.timeout(withinMs) };
   const answer = await fetch("api/v1/status.json", options).catch(() => null);
   return [401, 403].includes(answer?.status) ? (await answer.text()).trim() : null;
 }

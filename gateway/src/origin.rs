@@ -12,7 +12,7 @@ pub(crate) enum Stranger {
     #[error("Host {0:?} is not a name of this server: give it by --host")]
     Host(String),
     /// The request comes from another page.
-    #[error("Origin {0:?} is not this server: give it by --allow-origin")]
+    #[error("Origin {0:?} is not this server: give it by --allow-origin, or let the proxy pass Host with its port")]
     Origin(String),
 }
 

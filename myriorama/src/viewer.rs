@@ -32,6 +32,9 @@ pub struct ViewerArgs {
     /// A name of this server in links, beside localhost and addresses; may be repeated
     #[arg(long = "host", value_name = "NAME")]
     hosts: Vec<String>,
+    /// Another page that may use this server, as https://host; may be repeated
+    #[arg(long = "allow-origin", value_name = "ORIGIN")]
+    origins: Vec<String>,
     #[command(flatten)]
     tone: ToneArgs,
 }
@@ -62,6 +65,7 @@ impl ViewerArgs {
         let request_of = request_of(PolicyChoice::Auto, self.tone);
         let config = GatewayConfig {
             hosts: self.hosts.clone(),
+            origins: self.origins.clone(),
             ..GatewayConfig::new(coordinator, request_of, shared_light_methods())
         };
         let served = tokio::spawn(gateway::serve(browsers?, config, shutdown.clone()));

@@ -1,7 +1,7 @@
-//! Camera files: nerfstudio's `transforms.json`, so that anyone can run someone else's experiment.
+//! Camera files: nerfstudio's `transforms.json` and its camera paths, so that anyone can run someone else's experiment.
 //!
-//! `transform_matrix` is camera to world, the camera looking down −Z with +Y up. Focal lengths and principal points are
-//! in pixels, for a frame or for all. Only pinhole cameras can be used: distortion that is not zero is refused by name.
+//! `transform_matrix` is camera to world, the camera looking down −Z with +Y up, as rows or as 16 numbers. Focal lengths and
+//! principal points are in pixels, for a frame or for all; angles of view may stand in place of focal lengths. Only pinhole cameras can be used: distortion that is not zero is refused by name.
 //! Files are in the scene file's own space: the origin of a re-centred scene is subtracted in double precision.
 
 use std::fs::File;
@@ -9,7 +9,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use depth_image::{CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera};
-use glam::{DMat3, DQuat, DVec3, UVec2, Vec2};
+use glam::{DMat3, DQuat, DVec2, DVec3, DVec4, UVec2, Vec2};
 use serde_json::{Map, Value};
 
 /// The most bytes of a camera file: a thousand cameras take about 0.5 MB.
@@ -18,7 +18,8 @@ pub const MAX_FILE_BYTES: u64 = 32 << 20;
 const MAX_FRAMES: usize = 65_536;
 /// The tolerance of a matrix's axes to unit length and right angles.
 const RIGID_TOLERANCE: f64 = 1e-3;
-const MODELS: [&str; 3] = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE"];
+/// Pinholes, where their distortion is zero.
+const MODELS: [&str; 6] = ["FULL_OPENCV", "OPENCV", "PINHOLE", "RADIAL", "SIMPLE_PINHOLE", "SIMPLE_RADIAL"];
 const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
 
 /// Facts that a camera file does not state.
@@ -28,6 +29,8 @@ pub struct Placement {
     pub origin_in_source: DVec3,
     /// The distance to the near plane.
     pub near_m: f32,
+    /// The size of frames that state none.
+    pub size_px: UVec2,
 }
 
 /// A camera file that cannot be used, with the place of the fault.
@@ -38,8 +41,7 @@ pub struct CameraFileError {
     pub file: String,
     /// `frame 3, fl_x`, or the part outside frames.
     pub place: String,
-    /// The reason.
-    #[source]
+    /// The reason, which the text ends with: it is no source.
     pub kind: CameraFault,
 }
 
@@ -104,9 +106,11 @@ fn at_most(place: &str, actual: u64, limit: u64) -> Result<(), CameraFileError> 
 }
 
 fn parse(text: &str, placement: Placement) -> Result<Vec<PinholeCamera>, CameraFileError> {
+    let text = text.trim_start_matches('\u{feff}');
     let json: Value = serde_json::from_str(&without_nan(text)).map_err(|error| fault("file", error))?;
     let shared = json.as_object().ok_or_else(|| fault("file", CameraFault::Missing))?;
-    let frames = shared.get("frames").and_then(Value::as_array).filter(|frames| !frames.is_empty());
+    let frames = shared.get("frames").or_else(|| shared.get("camera_path"));
+    let frames = frames.and_then(Value::as_array).filter(|frames| !frames.is_empty());
     let frames = frames.ok_or_else(|| fault("frames", CameraFault::Missing))?;
     at_most("frames", frames.len() as u64, MAX_FRAMES as u64)?;
     let camera = |(index, frame): (usize, &Value)| {
@@ -149,8 +153,10 @@ impl Frame<'_> {
         self.optional(field)?.ok_or_else(|| self.fault(field, CameraFault::Missing))
     }
 
-    fn side(&self, field: &str) -> Result<u32, CameraFileError> {
-        let side = self.number(field)?;
+    /// The columns or rows, by their name in a `transforms.json` and in a camera path.
+    fn side(&self, [field, in_path]: [&str; 2], default_px: u32) -> Result<u32, CameraFileError> {
+        let given = self.optional(field)?.map_or_else(|| self.optional(in_path), |side| Ok(Some(side)))?;
+        let side = given.unwrap_or(f64::from(default_px));
         if side.fract() == 0.0 && (1.0..=f64::from(MAX_IMAGE_SIDE_PX)).contains(&side) {
             return Ok(side as u32);
         }
@@ -163,6 +169,14 @@ impl Frame<'_> {
         if !MODELS.contains(&model) {
             return Err(self.fault("camera_model", CameraFault::Unsupported(model.to_owned())));
         }
+        let is_fisheye = self.value("is_fisheye").and_then(Value::as_bool).unwrap_or(false);
+        if is_fisheye {
+            return Err(self.fault("is_fisheye", CameraFault::Unsupported("a fisheye".to_owned())));
+        }
+        let kind = self.value("camera_type").and_then(Value::as_str).unwrap_or("perspective");
+        if kind != "perspective" {
+            return Err(self.fault("camera_type", CameraFault::Unsupported(kind.to_owned())));
+        }
         for field in DISTORTIONS {
             if let Some(value) = self.optional(field)?.filter(|value| *value != 0.0) {
                 return Err(self.fault(field, CameraFault::Unsupported(format!("{field} = {value}"))));
@@ -173,8 +187,9 @@ impl Frame<'_> {
 
     fn camera(&self, placement: Placement) -> Result<PinholeCamera, CameraFileError> {
         self.check_model()?;
-        let size_px = UVec2::new(self.side("w")?, self.side("h")?);
-        let focal_x = self.number("fl_x")?;
+        let columns = self.side(["w", "render_width"], placement.size_px.x)?;
+        let size_px = UVec2::new(columns, self.side(["h", "render_height"], placement.size_px.y)?);
+        let focal_px = self.focal_px(size_px)?;
         let principal = [
             self.optional("cx")?.unwrap_or(f64::from(size_px.x) / 2.0),
             self.optional("cy")?.unwrap_or(f64::from(size_px.y) / 2.0),
@@ -183,7 +198,7 @@ impl Frame<'_> {
         let camera = PinholeCamera {
             eye_in_world: (eye_in_source - placement.origin_in_source).as_vec3(),
             world_from_camera: rotation.as_quat().normalize(),
-            focal_px: Vec2::new(focal_x as f32, self.optional("fl_y")?.unwrap_or(focal_x) as f32),
+            focal_px: focal_px.as_vec2(),
             principal_px: Vec2::from_array(principal.map(|v| v as f32)),
             size_px,
             near_m: placement.near_m,
@@ -192,13 +207,28 @@ impl Frame<'_> {
         Ok(camera)
     }
 
+    /// Focal lengths, or those of the angles of view: `camera_angle_x` and `_y` in radians, or a path's vertical `fov` in degrees.
+    fn focal_px(&self, size_px: UVec2) -> Result<DVec2, CameraFileError> {
+        let of_angle = |field: &str, side_px: u32| {
+            let angle_rad = self.optional(field)?.map(|angle| if field == "fov" { angle.to_radians() } else { angle });
+            Ok(angle_rad.map(|angle_rad| 0.5 * f64::from(side_px) / (0.5 * angle_rad).tan()))
+        };
+        let (mut x, mut y) = (self.optional("fl_x")?, self.optional("fl_y")?);
+        if x.is_none() {
+            x = of_angle("camera_angle_x", size_px.x)?;
+            y = y.or(of_angle("camera_angle_y", size_px.y)?).or(of_angle("fov", size_px.y)?);
+        }
+        let x = x.or(y).ok_or_else(|| self.fault("fl_x", CameraFault::Missing))?;
+        Ok(DVec2::new(x, y.unwrap_or(x)))
+    }
+
     fn pose(&self) -> Result<(DQuat, DVec3), CameraFileError> {
         let rows = self.rows()?;
         let column = |i: usize| DVec3::new(rows[0][i], rows[1][i], rows[2][i]);
         let axes = DMat3::from_cols(column(0), column(1), column(2));
         let offs = (axes.transpose() * axes - DMat3::IDENTITY).to_cols_array();
         let off = offs.into_iter().fold(0.0f64, |most, v| most.max(v.abs()));
-        if off > RIGID_TOLERANCE || axes.determinant() < 0.0 || rows[3] != [0.0, 0.0, 0.0, 1.0] {
+        if off > RIGID_TOLERANCE || axes.determinant() < 0.0 || !is_last_row(rows[3]) {
             let value = format!("no rotation (determinant {:.4}, axes off by {off:.4})", axes.determinant());
             let allowed = "rigid: a rotation, a translation and the row 0 0 0 1";
             return Err(self.fault("transform_matrix", CameraFault::OutOfRange { value, allowed }));
@@ -208,8 +238,8 @@ impl Frame<'_> {
 
     fn rows(&self) -> Result<[[f64; 4]; 4], CameraFileError> {
         let fault = |kind| self.fault("transform_matrix", kind);
-        let given = self.own.get("transform_matrix").cloned().and_then(|matrix| serde_json::from_value(matrix).ok());
-        let given: Vec<Vec<Value>> = given.ok_or_else(|| fault(CameraFault::Missing))?;
+        let given = self.own.get("transform_matrix").or_else(|| self.own.get("camera_to_world"));
+        let given = given.and_then(matrix_rows).ok_or_else(|| fault(CameraFault::Missing))?;
         let count = Some(given.len()).filter(|count| !(3..=4).contains(count));
         if let Some(wrong) = count.or_else(|| given.iter().map(Vec::len).find(|length| *length != 4)) {
             let (value, allowed) = (format!("of {wrong} rows or columns"), "4 rows of 4 numbers");
@@ -222,6 +252,19 @@ impl Frame<'_> {
         }
         Ok(rows)
     }
+}
+
+/// The rows of a matrix that is written as rows or as 16 numbers.
+fn matrix_rows(value: &Value) -> Option<Vec<Vec<Value>>> {
+    let given = value.as_array()?;
+    if given.len() == 16 {
+        return Some(given.chunks(4).map(<[Value]>::to_vec).collect());
+    }
+    given.iter().map(|row| row.as_array().cloned()).collect()
+}
+
+fn is_last_row(row: [f64; 4]) -> bool {
+    (DVec4::from_array(row) - DVec4::W).abs().max_element() <= RIGID_TOLERANCE
 }
 
 fn finite(value: &Value) -> Result<f64, CameraFault> {

@@ -25,3 +25,12 @@ pub mod scenes;
 pub mod setup;
 pub mod sizes;
 pub mod view_limits;
+
+/// Prints a line on standard output. A reader that has gone, as in `up | head -1`, ends nothing.
+#[macro_export]
+macro_rules! print_line {
+    ($($argument:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), $($argument)*);
+    }};
+}

@@ -1,7 +1,7 @@
 //! Basics of every command: a runtime, a signal, ports.
 
 use std::env;
-use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs as _};
 use std::os::unix::process::CommandExt as _;
 use std::process::Command;
 use std::thread;
@@ -14,6 +14,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 
 use crate::exit::BadInput;
+use crate::print_line;
 
 /// Starts the program anew in this process if settings are missing that libraries read from the environment. Settings of
 /// the user stay. Where the system refuses the restart, the program goes on with the libraries' own settings.
@@ -97,6 +98,28 @@ pub fn cancel_at_signal(shutdown: CancellationToken) {
     });
 }
 
+/// An address to listen on, as `HOST:PORT` with a name or a number.
+///
+/// # Errors
+/// The text has no port, or the name is unknown.
+pub fn listen_address(text: &str) -> Result<SocketAddr, String> {
+    let mut found = text.to_socket_addrs().map_err(|error| format!("{error}, must be HOST:PORT"))?;
+    found.next().ok_or_else(|| format!("{text} has no address"))
+}
+
+/// The address of a coordinator; `http://` may be left out.
+///
+/// # Errors
+/// Another scheme.
+pub fn coordinator_url(text: &str) -> Result<String, String> {
+    match text.split_once("://") {
+        None => Ok(format!("http://{text}")),
+        Some(("http", _)) => Ok(text.to_owned()),
+        Some(("https", _)) => Err("coordinators have no TLS yet: use http://, in a network that is trusted".to_owned()),
+        Some((scheme, _)) => Err(format!("the scheme is {scheme}, must be http")),
+    }
+}
+
 /// Opens a port to serve on.
 ///
 /// # Errors
@@ -133,7 +156,7 @@ pub async fn serve_metrics(
 ) -> anyhow::Result<()> {
     if let Some(address) = address {
         let listener = listen(address, insecure_bind).await?;
-        println!("metrics at http://{}/metrics", listener.local_addr()?);
+        print_line!("metrics at http://{}/metrics", listener.local_addr()?);
         tokio::spawn(telemetry.serve(listener, shutdown));
     }
     Ok(())

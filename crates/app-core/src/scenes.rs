@@ -33,8 +33,21 @@ impl ScenesArgs {
             anyhow::Ok(setup)
         };
         let setups = self.scenes.iter().map(setup).collect::<anyhow::Result<Vec<Setup>>>()?;
-        let (scenes, offers): (_, Vec<SceneOffer>) = setups.into_iter().map(|setup| (setup.scene, setup.offer)).unzip();
+        let (scenes, mut offers): (_, Vec<SceneOffer>) =
+            setups.into_iter().map(|setup| (setup.scene, setup.offer)).unzip();
+        number_equal_names(&mut offers);
         Ok((scenes, SceneOffers::new(offers).map_err(|error| BadInput(error.to_string()))?))
+    }
+}
+
+/// Files of one name in different folders are told apart: `scene`, `scene-2`.
+fn number_equal_names(offers: &mut [SceneOffer]) {
+    for place in 1..offers.len() {
+        let (before, rest) = offers.split_at_mut(place);
+        let own = rest[0].name.clone();
+        let names = std::iter::once(own.clone()).chain((2..).map(|number| format!("{own}-{number}")));
+        let mut free = names.filter(|name| before.iter().all(|other| other.name != *name));
+        rest[0].name = free.next().unwrap_or(own);
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::Args;
+use clap::builder::{OsStringValueParser, TypedValueParser as _};
 use cluster::{CommonCell, CommonKind, OfferSettings, PolicyChoice, SceneHash};
 use coordinator::{OfferedCube, OfferedMirror, SceneOffer};
 use depth_image::{Camera, CubeGrid, PinholeCamera};
@@ -46,7 +47,8 @@ pub struct SceneArgs {
     /// A scene by name or a file (.gltf, .glb, .obj, .ply). Names: tree-terrain-30k, -125k, -500k, -2m (each also with
     /// -wind), snake (animated), bird-nest, urban, tree, grass, grass:DENSITY, blocks, courtyard, teapot-mirror, and
     /// more
-    #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k")]
+    #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k",
+        value_parser = OsStringValueParser::new().try_map(SceneSpec::try_from))]
     pub scene: SceneSpec,
     /// What is done about textures that a scene's file names and that are not there: refuse the scene, or show grey
     #[arg(long, default_value_t, value_name = "refuse|grey")]
@@ -374,7 +376,9 @@ impl SceneArgs {
             return self.rig_cameras(scene, size_px.unwrap_or(SAMPLE_SIZE_PX));
         };
         let near_m = scene.bounds().near_m();
-        let cameras = camera_file::read(path, Placement { origin_in_source: scene.origin_in_source, near_m })?;
+        let size_of_views_px = size_px.unwrap_or(SAMPLE_SIZE_PX);
+        let placement = Placement { origin_in_source: scene.origin_in_source, near_m, size_px: size_of_views_px };
+        let cameras = camera_file::read(path, placement)?;
         Ok(cameras.into_iter().map(|camera| size_px.map_or(camera, |size_px| camera.resized(size_px))).collect())
     }
 

@@ -118,10 +118,11 @@ impl ViewCell {
         self.half_sides_of(camera).cmple(self.half_sides * (1.0 + ROUNDING)).all()
     }
 
-    /// The camera at a place of the rectangle halfway between front and rear, -1 to 1 in both directions.
+    /// The camera at a place of the rectangle halfway between front and rear, -1 to 1 in both directions. Its shorter side has the field of
+    /// view of the sample images' height: in portrait format a model is as whole as in landscape format.
     #[must_use]
     pub fn camera_at(&self, place: Vec2, size_px: UVec2) -> PinholeCamera {
-        self.camera(place.extend(0.0), self.focal_heights * size_px.y as f32, size_px)
+        self.camera(place.extend(0.0), self.focal_heights * size_px.min_element() as f32, size_px)
     }
 
     /// `count` views spread evenly, by a low-discrepancy sequence (R2, Roberts 2018).

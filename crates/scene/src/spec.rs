@@ -1,10 +1,11 @@
 //! Scenes by name, for the command line.
 
+use std::ffi::OsString;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::error::at_most;
+use crate::error::{Fault, at_most};
 use crate::procedural::{self, GrassDensity, grass, tree_terrain};
 use crate::{Limits, MissingTextures, Scene, SceneError, load_file};
 
@@ -38,6 +39,10 @@ pub const BUILT_IN_NAMES: [&str; 23] = [
 
 /// The name before the density of a meadow.
 const GRASS: &str = "grass";
+
+/// Built-in scenes that are named where a scene is mistyped: at most so many, and with this likeness of Jaro and Winkler.
+const MOST_NEAREST: usize = 3;
+const LEAST_LIKENESS: f64 = 0.85;
 
 /// The seed of the named trees, equal on all nodes and in all runs.
 const TREE_SEED: u64 = 2007;
@@ -85,6 +90,7 @@ impl SceneSpec {
     /// The errors of [`load_file`], and a meadow over the limits.
     pub fn load(&self, limits: &Limits, missing: MissingTextures) -> Result<Scene, SceneError> {
         let scene = match self {
+            Self::File(path) if path.extension().is_none() && !path.exists() => return Err(no_such_scene(path)),
             Self::File(path) => {
                 return Ok(load_file(path, limits, missing)?.with_default_lights().with_default_background());
             }
@@ -100,6 +106,29 @@ impl SceneSpec {
             Self::BuiltIn(name) => procedural::by_name(name),
         };
         Ok(Scene { name: self.to_string(), ..scene })
+    }
+}
+
+/// A mistyped name of a built-in scene.
+fn no_such_scene(path: &Path) -> SceneError {
+    let text = path.display().to_string();
+    let mut names = BUILT_IN_NAMES.map(|name| (strsim::jaro_winkler(&text, name), name)).to_vec();
+    names.retain(|(likeness, _)| *likeness >= LEAST_LIKENESS);
+    names.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    let nearest: Vec<&str> = names.into_iter().take(MOST_NEAREST).map(|(_, name)| name).collect();
+    let meant = if nearest.is_empty() { String::new() } else { format!("; did you mean {}?", nearest.join(" or ")) };
+    Fault::malformed("scene", format!("no built-in scene and no file has this name{meant}")).in_file(text)
+}
+
+/// Any text of the command line: a path need not be UTF-8.
+impl TryFrom<OsString> for SceneSpec {
+    type Error = SceneSpecError;
+
+    fn try_from(text: OsString) -> Result<Self, Self::Error> {
+        match text.to_str() {
+            Some(text) => text.parse(),
+            None => Ok(Self::File(text.into())),
+        }
     }
 }
 
@@ -160,6 +189,27 @@ mod tests {
 
     fn parsed(text: &str) -> SceneSpec {
         text.parse().unwrap()
+    }
+
+    #[test]
+    fn a_mistyped_scene_is_answered_with_the_nearest_names() {
+        let refused = |text: &str| {
+            parsed(text).load(&Limits::default(), MissingTextures::default()).map(|_| ()).unwrap_err().to_string()
+        };
+        let text = refused("tree-terain-30k");
+        assert!(text.contains("did you mean tree-terrain-30k"), "{text}");
+        let text = refused("galery");
+        assert!(text.ends_with("did you mean gallery?"), "{text}");
+        assert!(!refused("zzz").contains("mean"), "nothing is near");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_path_need_not_be_utf_8() {
+        use std::os::unix::ffi::OsStringExt as _;
+        let path = OsString::from_vec(b"models/\xff/a.glb".to_vec());
+        assert_eq!(SceneSpec::try_from(path.clone()), Ok(SceneSpec::File(path.into())));
+        assert_eq!(SceneSpec::try_from(OsString::from("urban")), Ok(SceneSpec::BuiltIn("urban")));
     }
 
     #[test]

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use app_core::exit::Outcome;
-use app_core::process::{cancel_at_signal, listen, loopback_of, serve_metrics};
+use app_core::print_line;
+use app_core::process::{cancel_at_signal, listen, listen_address, loopback_of, serve_metrics};
 use app_core::scenes::ScenesArgs;
 use clap::Args;
 use coordinator::schedule::Recorder;
@@ -23,10 +24,10 @@ pub struct CoordinatorArgs {
     #[command(flatten)]
     scenes: ScenesArgs,
     /// The address to listen on
-    #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT")]
+    #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT", value_parser = listen_address)]
     listen: SocketAddr,
     /// The address for Prometheus, at /metrics [default: no metrics]
-    #[arg(long, value_name = "HOST:PORT")]
+    #[arg(long, value_name = "HOST:PORT", value_parser = listen_address)]
     metrics: Option<SocketAddr>,
     /// Records the schedule's events to a file, for `myriorama replay`
     #[arg(long, value_name = "FILE")]
@@ -61,7 +62,7 @@ pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
     let listener = listen(args.listen, args.insecure_bind).await?;
     let address = listener.local_addr()?;
     for (scene, offer) in scenes.iter().zip(offers.iter()) {
-        println!("{}: {}, offered at http://{address}", offer.name, scene.contents());
+        print_line!("{}: {}, offered at http://{address}", offer.name, scene.contents());
     }
     drop(scenes);
     let shutdown = CancellationToken::new();

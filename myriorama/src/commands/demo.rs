@@ -8,6 +8,7 @@ mod viewpoint;
 
 use app_core::exit::Outcome;
 use app_core::experiment::Experiment;
+use app_core::print_line;
 use app_core::progress::bar;
 use node::Engine as _;
 use render::Lighting;
@@ -41,8 +42,8 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     shared_light::report(&results, &mut report)?;
     report.checks.extend(results.iter().map(check_of_k));
     experiment.stop()?;
-    report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
-    println!("\n{}", report.summary);
+    report.tables.iter().for_each(|table| print_line!("\n{}", table.to_text()));
+    print_line!("\n{}", report.summary);
     let ok = report.finish(&args.out)?;
     Ok(Outcome::of(ok || !args.strict))
 }
@@ -50,7 +51,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
 /// The results of each light, the most expensive first.
 fn measure(args: &DemoArgs, experiment: &Experiment) -> anyhow::Result<Vec<LightResult>> {
     let (scene, triangles) = (&args.scene.scene, experiment.setup.scene.triangle_count());
-    println!("{scene}: {triangles} triangles on {}", experiment.engine.device_name());
+    print_line!("{scene}: {triangles} triangles on {}", experiment.engine.device_name());
     let lights = [args.expensive_light()?, Lighting::default()];
     let views = if args.quick { QUICK_VIEWS } else { VIEWS };
     let progress = bar("light", lights.len());

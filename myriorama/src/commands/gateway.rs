@@ -4,7 +4,8 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::path::PathBuf;
 
 use app_core::exit::{BadInput, Outcome};
-use app_core::process::{cancel_at_signal, listen};
+use app_core::print_line;
+use app_core::process::{cancel_at_signal, coordinator_url, listen, listen_address};
 use app_core::quality::quality;
 use app_core::sizes::SizePx;
 use clap::Args;
@@ -22,10 +23,10 @@ use crate::viewer::{request_of, shared_light_methods};
 #[command(after_help = "Example: myriorama gateway --coordinator http://127.0.0.1:7420 --listen 127.0.0.1:7421")]
 pub struct GatewayArgs {
     /// The coordinator
-    #[arg(long, default_value = "http://127.0.0.1:7420", value_name = "URL")]
+    #[arg(long, default_value = "http://127.0.0.1:7420", value_name = "URL", value_parser = coordinator_url)]
     coordinator: String,
     /// The address to listen on
-    #[arg(long, default_value = "127.0.0.1:7421", value_name = "HOST:PORT")]
+    #[arg(long, default_value = "127.0.0.1:7421", value_name = "HOST:PORT", value_parser = listen_address)]
     listen: SocketAddr,
     /// The most visitors at a time; further ones wait
     #[arg(long, default_value_t = 64, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=64))]
@@ -76,7 +77,7 @@ pub async fn run(args: GatewayArgs) -> anyhow::Result<Outcome> {
     let token = if address.ip().is_loopback() { None } else { Some(Token::random()?) };
     let scheme = if tls.is_some() { "https" } else { "http" };
     let authority = reachable(address, args.hosts.first());
-    println!("Open {scheme}://{authority}/{}", token.as_ref().map_or_else(String::new, Token::query));
+    print_line!("Open {scheme}://{authority}/{}", token.as_ref().map_or_else(String::new, Token::query));
     let config = GatewayConfig {
         max_visitors: usize::from(args.max_visitors),
         max_still_px: args.max_still.0,

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use anyhow::{Context as _, bail};
 use app_core::exit::Outcome;
+use app_core::print_line;
 use clap::Args;
 
 const DEADLINE: Duration = Duration::from_secs(4);
@@ -29,6 +30,6 @@ pub async fn run(args: &HealthArgs) -> anyhow::Result<Outcome> {
     if !answer.with_context(no_answer)?.with_context(no_answer)? {
         bail!("{} does not serve", args.address);
     }
-    println!("{} serves", args.address);
+    print_line!("{} serves", args.address);
     Ok(Outcome::Done)
 }

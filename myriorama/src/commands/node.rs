@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use app_core::exit::Outcome;
 use app_core::memory::MemoryArgs;
-use app_core::process::{cancel_at_signal, listen, serve_metrics};
+use app_core::print_line;
+use app_core::process::{cancel_at_signal, coordinator_url, listen, listen_address, serve_metrics};
 use app_core::setup::DeviceArgs;
 use app_core::view_limits::ViewLimitArgs;
 use clap::Args;
@@ -17,10 +18,10 @@ use tokio_util::sync::CancellationToken;
 #[derive(Debug, Args)]
 pub struct NodeArgs {
     /// The address of the coordinator
-    #[arg(long, value_name = "URL", env = "MYRIORAMA_COORDINATOR")]
+    #[arg(long, value_name = "URL", env = "MYRIORAMA_COORDINATOR", value_parser = coordinator_url)]
     coordinator: String,
     /// The address to listen on; port 0 takes a free port
-    #[arg(long, default_value = "127.0.0.1:0", value_name = "HOST:PORT")]
+    #[arg(long, default_value = "127.0.0.1:0", value_name = "HOST:PORT", value_parser = listen_address)]
     listen: SocketAddr,
     /// A name that is unique in the cluster [default: node-PORT, or the host's name if it listens on all addresses]
     #[arg(long)]
@@ -36,7 +37,7 @@ pub struct NodeArgs {
     #[command(flatten)]
     memory: MemoryArgs,
     /// The address for Prometheus, at /metrics [default: no metrics]
-    #[arg(long, value_name = "HOST:PORT")]
+    #[arg(long, value_name = "HOST:PORT", value_parser = listen_address)]
     metrics: Option<SocketAddr>,
     /// Describes services and messages by gRPC reflection, for grpcurl and the like
     #[arg(long)]
@@ -66,7 +67,7 @@ pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
     engine.bound_scenes(memory);
     let name = args.name.unwrap_or_else(|| name_of(address));
     let advertise = args.advertise.or_else(|| own_address(&args.coordinator, address));
-    println!("{name} on {}, at http://{address}", engine.device_name());
+    print_line!("{name} on {}, at http://{address}", engine.device_name());
     let config = NodeConfig {
         scene_folder: args.scene_folder,
         advertised_address: advertise,

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use app_core::exit::Outcome;
 use app_core::planning::{PlannedViews, Planning, one_node};
+use app_core::print_line;
 use app_core::setup::{DeviceArgs, SceneArgs, Setup};
 use app_core::sizes::SizePx;
 use clap::Args;
@@ -127,6 +128,6 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
     }
     let output = Output { budget: args.budget, out: &args.out, setup: &setup, planning: &planning, outcome: &outcome };
     output.write(&planner.summaries(), pricing.direct())?;
-    println!("\n{:.1} s of measuring; all rows are in {}", planner.spent_s(), args.out.join("rows.csv").display());
+    print_line!("\n{:.1} s of measuring; all rows are in {}", planner.spent_s(), args.out.join("rows.csv").display());
     Ok(Outcome::of(outcome.state == PromiseState::Kept))
 }

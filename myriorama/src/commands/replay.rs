@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use app_core::exit::{BadInput, Outcome};
+use app_core::print_line;
 use clap::Args;
 use coordinator::schedule::{Command, LogError, ProbeKind, Step, replay};
 
@@ -31,7 +32,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<Outcome> {
         |command: &Command| matches!(command, Command::Probe(probe) if probe.kind() == ProbeKind::Liveness);
     for Step { now, commands, .. } in steps {
         for command in commands.iter().filter(|command| !is_routine(command)) {
-            println!("{:>10.3} s  {command}", now.as_secs_f64());
+            print_line!("{:>10.3} s  {command}", now.as_secs_f64());
         }
     }
     eprintln!("{events} events");

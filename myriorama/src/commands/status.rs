@@ -1,10 +1,13 @@
 //! `myriorama status`: workloads and their demand, nodes with their roles and costs, and the reasons of the plans.
 
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Context as _;
 use app_core::exit::Outcome;
+use app_core::print_line;
+use app_core::process::coordinator_url;
 use clap::Args;
 use client::Client;
 use cluster::{ClusterStatus, Costs, NodeCondition, NodeStatus, WorkloadStatus};
@@ -45,7 +48,7 @@ const COLUMNS: [(&str, &str); 12] = [
 #[derive(Debug, Args)]
 pub struct StatusArgs {
     /// The address of the coordinator
-    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7420", env = "MYRIORAMA_COORDINATOR")]
+    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7420", env = "MYRIORAMA_COORDINATOR", value_parser = coordinator_url)]
     coordinator: String,
     /// Repeats every S seconds until ctrl-c
     #[arg(long, value_name = "S", num_args = 0..=1, default_missing_value = "1")]
@@ -69,11 +72,13 @@ pub async fn run(args: &StatusArgs) -> anyhow::Result<Outcome> {
                 let written = std::fs::write(file, terminal_picture::svg(&text));
                 written.with_context(|| format!("cannot write {}", file.display()))?;
             }
-            println!("{text}");
+            print_line!("{text}");
             return Ok(Outcome::Done);
         };
-        // The terminal is cleared, so that the table stays in place.
-        println!("\x1b[2J\x1b[H{text}");
+        // The terminal is cleared, so that the table stays in place. Nobody may be reading any more.
+        if writeln!(std::io::stdout(), "\x1b[2J\x1b[H{text}").is_err() {
+            return Ok(Outcome::Done);
+        }
         tokio::time::sleep(Duration::from_secs_f64(seconds.clamp(0.1, 3600.0))).await;
     }
 }

@@ -5,7 +5,8 @@ use std::net::SocketAddr;
 use app_core::cluster::Cluster;
 use app_core::exit::Outcome;
 use app_core::memory::MemoryArgs;
-use app_core::process::{listen, stop_signal};
+use app_core::print_line;
+use app_core::process::{listen, listen_address, stop_signal};
 use app_core::scenes::ScenesArgs;
 use app_core::setup::DeviceArgs;
 use app_core::view_limits::ViewLimitArgs;
@@ -36,7 +37,7 @@ pub struct UpArgs {
     #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
     nodes: u16,
     /// The address that the coordinator listens on
-    #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT")]
+    #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT", value_parser = listen_address)]
     listen: SocketAddr,
     /// Serves without TLS on an address that others can reach
     #[arg(long)]
@@ -60,7 +61,7 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     engine.bound_scenes(memory);
     for (scene, offer) in scenes.iter().zip(offers.iter()) {
         engine.put_scene(offer.hash.as_str(), scene)?;
-        println!("{}: {}", offer.name, scene.contents());
+        print_line!("{}: {}", offer.name, scene.contents());
     }
     // The device and the packages hold the scenes now; the third copy is dropped.
     drop(scenes);
@@ -75,13 +76,13 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     let config = CoordinatorConfig { insecure_bind: args.insecure_bind, ..CoordinatorConfig::default() };
     let config = args.budget.configure(config);
     let mut cluster = Cluster::start(configure, port, config, offers, engine.opener(), nodes).await?;
-    println!("{nodes} nodes on {device_name}, at {}", cluster.address);
+    print_line!("{nodes} nodes on {device_name}, at {}", cluster.address);
     let viewer = args.viewer.serve(browsers, &cluster.address, CancellationToken::new());
     tokio::select! {
         stopped = stop_signal() => stopped?,
         failed = cluster.failed() => failed?,
     }
-    println!("draining");
+    print_line!("draining");
     if let Some(viewer) = viewer {
         viewer.end().await;
     }

@@ -16,6 +16,7 @@ use app_core::delivery::receive_requests;
 use app_core::exit::{BadInput, Outcome};
 use app_core::live;
 use app_core::live::Drive;
+use app_core::print_line;
 use app_core::process::StopSignals;
 use client::Session;
 use depth_image::PinholeCamera;
@@ -82,7 +83,7 @@ async fn pictures(args: &ViewArgs, signals: &StopSignals) -> anyhow::Result<Outc
             return Ok(Outcome::Interrupted);
         }
     } else {
-        println!("{} views are in {} already", record.total(), args.out.display());
+        print_line!("{} views are in {} already", record.total(), args.out.display());
         record.save()?;
     }
     let unkept = record.unkept_promise().filter(|_| args.budget.is_some());
@@ -113,7 +114,11 @@ async fn write_missing(
         return Ok(Ended::Stopped);
     }
     record.set_tone(session.tone());
-    // A record of other pictures does not outlive them.
+    // Neither do pictures of an earlier request stay beside those of this one, nor their record.
+    let deleted = if args.resume { 0 } else { record.delete_earlier() };
+    if deleted > 0 {
+        print_line!("{deleted} pictures of an earlier request are deleted from {}", args.out.display());
+    }
     record.save()?;
     let progress = ProgressBar::new(record.total());
     progress.set_position(record.count());
@@ -133,7 +138,7 @@ async fn write_missing(
     progress.finish_and_clear();
     let seconds = received.and_then(|received| finished.map(|()| received))?;
     let Some(seconds) = seconds else { return Ok(Ended::Stopped) };
-    println!("{} views in {seconds:.3} s, in {}", record.count() - before, args.out.display());
+    print_line!("{} views in {seconds:.3} s, in {}", record.count() - before, args.out.display());
     Ok(Ended::Done)
 }
 
@@ -164,8 +169,8 @@ async fn follow(args: &ViewArgs, session: &Session, path: Vec<PinholeCamera>) ->
     let file = args.out.join("live.csv");
     std::fs::write(&file, record.frames()?.to_csv()?).with_context(|| format!("cannot write {}", file.display()))?;
     let latencies = live::latencies("From pose to picture", record.shown.iter())?;
-    println!("{}\n\n{}", latencies.to_text(), record.summary());
-    session.promise().into_iter().for_each(|promise| println!("{promise}"));
+    print_line!("{}\n\n{}", latencies.to_text(), record.summary());
+    session.promise().into_iter().for_each(|promise| print_line!("{promise}"));
     if let Some(error) = record.error {
         return Err(error.into());
     }

@@ -6,7 +6,7 @@ use depth_image::PinholeCamera;
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use serde_json::{Map, Value, json};
 
-const PLACEMENT: Placement = Placement { origin_in_source: DVec3::ZERO, near_m: 0.01 };
+const PLACEMENT: Placement = Placement { origin_in_source: DVec3::ZERO, near_m: 0.01, size_px: UVec2::new(120, 80) };
 
 fn camera(i: u8) -> PinholeCamera {
     let eye = Vec3::new(f32::from(i), 1.0, 3.0 - f32::from(i) * 0.2);
@@ -110,6 +110,50 @@ fn shared_intrinsics_hold_for_all_frames() {
     assert_eq!((found[1].size_px, found[1].eye_in_world), (UVec2::new(200, 150), Vec3::new(0.5, 0.25, 2.0)));
 }
 
+/// What instant-ngp, COLMAP's converters and nerfstudio's viewer write.
+#[test]
+fn other_writers_cameras_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cameras.json");
+    let rows = frame()["transform_matrix"].clone();
+    let flat: Vec<Value> = rows.as_array().unwrap().iter().flat_map(|row| row.as_array().unwrap().clone()).collect();
+    let nearly = json!([rows[0], rows[1], rows[2], [0, 0, 1e-9, 0.9999999]]);
+    let right_angle = std::f64::consts::FRAC_PI_2;
+    let files = [
+        (json!({"camera_angle_x": right_angle, "frames": [{"transform_matrix": rows}]}), [120, 80], 60.0),
+        (
+            json!({"camera_angle_x": right_angle, "w": 64, "h": 48, "frames": [{"transform_matrix": nearly}]}),
+            [64, 48],
+            32.0,
+        ),
+        (json!({"w": 64, "h": 48, "fl_x": 60, "frames": [{"transform_matrix": flat}]}), [64, 48], 60.0),
+        (
+            json!({"w": 64, "h": 48, "fl_x": 60, "camera_model": "SIMPLE_RADIAL", "k1": 0, "is_fisheye": false,
+                "frames": [{"transform_matrix": rows}]}),
+            [64, 48],
+            60.0,
+        ),
+        (
+            json!({"camera_type": "perspective", "render_width": 320, "render_height": 240,
+                "camera_path": [{"camera_to_world": flat, "fov": 90, "aspect": 1.333}]}),
+            [320, 240],
+            120.0,
+        ),
+    ];
+    for (file, size_px, focal_px) in files {
+        std::fs::write(&path, format!("\u{feff}{file}")).unwrap();
+        let camera = read(&path, PLACEMENT).unwrap_or_else(|error| panic!("{error}: {file}"))[0];
+        assert_eq!((camera.size_px, camera.eye_in_world), (size_px.into(), Vec3::new(0.5, 0.25, 2.0)), "{file}");
+        assert!((camera.focal_px - Vec2::splat(focal_px)).abs().max_element() < 1e-3, "{file}: {}", camera.focal_px);
+    }
+}
+
+#[test]
+fn a_fault_is_told_once() {
+    let error = anyhow::Error::from(error_of("{\"frames\": ["));
+    assert_eq!(format!("{error:#}").matches("EOF").count(), 1, "{error:#}");
+}
+
 #[test]
 fn bad_fields_are_named_with_their_frame() {
     let scaled = json!([[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]);
@@ -123,6 +167,8 @@ fn bad_fields_are_named_with_their_frame() {
         ("k1", json!(0.1)),
         ("p2", json!(-0.01)),
         ("camera_model", json!("OPENCV_FISHEYE")),
+        ("is_fisheye", json!(true)),
+        ("camera_type", json!("equirectangular")),
         ("transform_matrix", json!(null)),
         ("transform_matrix", json!([[1, 0, 0, 0]])),
         ("transform_matrix", json!([[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 1]])),

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Context as _;
+use app_core::print_line;
 use app_core::setup::Setup;
 use cluster::{Refinement, SamplePlanes};
 use depth_image::{Antialias, PinholeCamera, View, ViewPlanes};
@@ -40,7 +41,7 @@ pub(super) fn write(args: &DemoArgs, setup: Setup) -> anyhow::Result<Picture> {
     let picture = page(args, &Setup { around, samples, ..setup }, camera)?;
     let path = args.out.join("first-page.png");
     save(&picture, &path).with_context(|| path.display().to_string())?;
-    println!("first page: {}", path.display());
+    print_line!("first page: {}", path.display());
     Ok(picture)
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::Context as _;
 use app_core::camera_record::{self, NamedCamera};
 use app_core::planning::Planning;
+use app_core::print_line;
 use app_core::setup::Setup;
 use depth_image::Camera;
 use planner::{Budget, CHOICE_OF_BUDGETS, Choice, Metric, Outcome, Price, RowSummary};
@@ -41,13 +42,13 @@ impl Output<'_> {
         let csv = out.join("rows.csv");
         let all = self.table("all rows", lines.iter())?.to_csv()?;
         std::fs::write(&csv, all).with_context(|| format!("cannot write {}", csv.display()))?;
-        println!("{}\n{CHOICE_OF_BUDGETS}\n", self.outcome.reason);
-        println!("{}", self.table("Front of cost against error", front(&lines).into_iter())?.to_text());
+        print_line!("{}\n{CHOICE_OF_BUDGETS}\n", self.outcome.reason);
+        print_line!("{}", self.table("Front of cost against error", front(&lines).into_iter())?.to_text());
         if let Choice::Row(row) = self.outcome.choice {
             let chosen = &self.planning.representations[row];
             let cameras = out.join("samples.json");
             self.write_cameras(&cameras, chosen)?;
-            println!("\nThe flags that repeat it, for up, coordinator and demo:\n  {}", flags(chosen, &cameras));
+            print_line!("\nThe flags that repeat it, for up, coordinator and demo:\n  {}", flags(chosen, &cameras));
         }
         Ok(())
     }

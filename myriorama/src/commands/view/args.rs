@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use app_core::camera_file::{self, Placement};
 use app_core::exit::BadInput;
+use app_core::process::coordinator_url;
 use app_core::quality::QualityArgs;
 use app_core::sizes::{SizePx, grid};
 use clap::Args;
@@ -27,7 +28,7 @@ use crate::tone::ToneArgs;
 #[derive(Debug, Args)]
 pub struct ViewArgs {
     /// The address of the coordinator
-    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7420", env = "MYRIORAMA_COORDINATOR")]
+    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7420", env = "MYRIORAMA_COORDINATOR", value_parser = coordinator_url)]
     pub(super) coordinator: String,
     /// The scene, by its name or hash at the coordinator [default: the first on offer]
     #[arg(long, value_name = "NAME")]
@@ -171,7 +172,7 @@ impl Viewpoints {
     /// A file or a camera cannot be used, or the coordinator has no sample cameras.
     pub(super) fn cameras(&self, offer: &OfferStatus, size: SizePx) -> anyhow::Result<Vec<PinholeCamera>> {
         let near_m = offer.volume.near_m();
-        let placement = Placement { origin_in_source: offer.origin_in_source, near_m };
+        let placement = Placement { origin_in_source: offer.origin_in_source, near_m, size_px: size.0 };
         if let Some(path) = &self.cameras {
             return Ok(camera_file::read(path, placement)?);
         }

@@ -3,6 +3,7 @@
 use anyhow::Context as _;
 use app_core::delivery::{open, receive_requests, requests};
 use app_core::exit::Outcome;
+use app_core::print_line;
 use client::Frame;
 use cluster::{BudgetRequest, DIRECT, PolicyChoice, SessionRequest};
 use depth_image::ViewPlanes;
@@ -31,7 +32,7 @@ pub(super) async fn compare(args: &ViewArgs, job: &Job, views: u64) -> anyhow::R
     };
     receive_requests(&session, requests(args.frames, job.cameras.clone()), received).await?;
     let (table, worst_psnr_db) = comparison::table(rows)?;
-    println!("\n{}", table.to_text());
+    print_line!("\n{}", table.to_text());
     let path = args.out.join("comparison.csv");
     std::fs::write(&path, table.to_csv()?).with_context(|| format!("cannot write {}", path.display()))?;
     Ok(Outcome::of(args.least_psnr.is_none_or(|least| worst_psnr_db >= least)))

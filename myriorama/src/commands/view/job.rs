@@ -6,6 +6,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use app_core::delivery::{Terms, at_rate, open, request, viewpoints};
 use app_core::exit::BadInput;
+use app_core::print_line;
 use client::{Client, Session};
 use cluster::{BudgetRequest, OfferSettings, OfferStatus, Promise, PromiseState, SessionRequest, Timeline};
 use depth_image::PinholeCamera;
@@ -47,7 +48,7 @@ impl Job {
     pub(super) async fn open(&self) -> anyhow::Result<Session> {
         let session = open(&self.client, self.request.clone()).await?;
         let plan = session.plan();
-        println!("plan {}: {}", plan.assignment.plan_epoch, plan.reason);
+        print_line!("plan {}: {}", plan.assignment.plan_epoch, plan.reason);
         Ok(session)
     }
 
@@ -64,7 +65,7 @@ impl Job {
             }
         };
         let _ = tokio::time::timeout(longest, settled).await;
-        session.promise().into_iter().for_each(|promise| println!("{promise}"));
+        session.promise().into_iter().for_each(|promise| print_line!("{promise}"));
         Ok(())
     }
 

@@ -155,6 +155,18 @@ impl Record {
         Ok(())
     }
 
+    /// Deletes the pictures that the record in the folder names, and returns their number: they are of an earlier request. Files
+    /// that no record names stay, as does everything where the record was not written by this program.
+    pub(super) fn delete_earlier(&self) -> usize {
+        let mut named = Vec::new();
+        let record = camera_record::read(&self.folder.join(FILE_NAME), |line| named.extend(number_of_line(line)));
+        if record.is_err() {
+            return 0;
+        }
+        let names = named.into_iter().flat_map(|number| FileNames::of(number, ViewPlanes::ALL).into_names());
+        names.filter(|name| std::fs::remove_file(self.folder.join(name)).is_ok()).count()
+    }
+
     /// The view of a line of the record, with the scale of its depth picture.
     fn view_of(&self, line: &str) -> Option<(u64, f32)> {
         let frame: Map<String, Value> = serde_json::from_str(line).ok()?;
@@ -221,6 +233,12 @@ impl Record {
         }
         NamedCamera { file_path: files.color, camera: self.cameras[(number % views) as usize], more }
     }
+}
+
+/// The number of the view that a line of a record names.
+fn number_of_line(line: &str) -> Option<u64> {
+    let frame: Map<String, Value> = serde_json::from_str(line).ok()?;
+    number_of(frame.get("file_path")?.as_str()?)
 }
 
 fn described(promise: &Promise) -> Value {

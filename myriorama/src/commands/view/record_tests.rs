@@ -61,6 +61,22 @@ fn a_record_resumed_and_finished_is_that_of_one_go() {
 }
 
 #[test]
+fn pictures_of_an_earlier_request_are_deleted_and_no_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut earlier = record(folder.path(), "mesh", [0.3, 0.4]);
+    (0..4).for_each(|number| write(&mut earlier, number));
+    earlier.save().unwrap();
+    let others = ["view_0009.png", "notes.txt"].map(|name| folder.path().join(name));
+    others.iter().for_each(|path| std::fs::write(path, "kept").unwrap());
+    assert_eq!(record(folder.path(), "direct", [0.1, 0.2]).delete_earlier(), 8, "colour and depth of four views");
+    let mut left: Vec<_> = folder.path().read_dir().unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    left.sort();
+    assert_eq!(left, ["cameras.json", "notes.txt", "view_0009.png"]);
+    std::fs::write(folder.path().join(FILE_NAME), "{}").unwrap();
+    assert_eq!(record(folder.path(), "direct", [0.1, 0.2]).delete_earlier(), 0, "a record of another program");
+}
+
+#[test]
 fn other_settings_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path(), "mesh", [0.3, 0.4]).save().unwrap();
