@@ -128,9 +128,9 @@ fn flicker_ratio(stage: &Stage<'_>, reference: &LitScene<'_>, cached: &LitScene<
 
 /// The mean over the pixels that show a surface in the second frame.
 fn change_error(expected: &[View], frames: &[View]) -> anyhow::Result<f64> {
-    let pictures = |views: &[View]| views.iter().map(Rgb8Image::of_view).collect::<Result<Vec<_>, _>>();
-    let (expected_pictures, pictures) = (pictures(expected)?, pictures(frames)?);
-    let map = change_error_map([&expected_pictures[0], &expected_pictures[1]], [&pictures[0], &pictures[1]])?;
+    let expected_pictures = [Rgb8Image::of_view(&expected[0])?, Rgb8Image::of_view(&expected[1])?];
+    let pictures = [Rgb8Image::of_view(&frames[0])?, Rgb8Image::of_view(&frames[1])?];
+    let map = change_error_map(expected_pictures.each_ref(), pictures.each_ref())?;
     let is_surface = foreground(&expected[1], &pictures[1])?;
     map.mean(Some(&is_surface))?.context("a surface")
 }
