@@ -48,7 +48,7 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
         (&["coordinator", "--scene", broken], "broken.glb"),
         (&["coordinator", "--scene", "quad", "--scene", "quad"], "scene quad is given twice"),
         (&["view", "--cameras", cameras, "--out", folder], "would be written over it"),
-        (&["up", "--scene", "quad", "--samples", cameras], "cameras.json: frame 0, w"),
+        (&["up", "--scene", "quad", "--samples", cameras], "cameras.json: frame 0, fl_x"),
         (&["up", "--scene", "quad", "--listen", "0.0.0.0:0"], "--insecure-bind"),
         (&["up", "--scene", "quad", "--method", "guess"], "guess"),
         (&["view", "--size", "0x0"], "0x0"),

@@ -336,7 +336,9 @@ fn what_a_busy_machine_took_refuses_nothing_once_it_is_idle() {
     let slow = MeasuredCosts { reconstruct_view_s: Some(4.0 * COSTS.reconstruct_view_s), ..MeasuredCosts::default() };
     for second in 1..30 {
         cluster.now = now + Duration::from_secs(second);
-        ["node-0", "node-1"].map(|name| cluster.step(timed(name, plan_epoch, slow)));
+        for name in ["n0", "n1"] {
+            cluster.step(timed(name, plan_epoch, slow));
+        }
     }
     let admits = |cluster: &Cluster| cluster.scheduler.admits(1, 1, Some(60.0), None);
     assert!(matches!(admits(&cluster), Err(ChoiceError::Overload { .. })), "other programs use the machine");
