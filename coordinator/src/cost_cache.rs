@@ -114,12 +114,14 @@ fn at_size((near_px, near): (f64, Measured), other: Option<(f64, Measured)>, pix
         encode_view_s: at(|costs| costs.encode_view_s),
         ..near.costs
     };
-    Measured { costs, ..near }
+    let view_ratio = costs.reconstruct_view_s / near.costs.reconstruct_view_s;
+    let shared_light = near.shared_light.filter(|_| view_ratio.is_finite()).map(|light| light.scaled(view_ratio));
+    Measured { costs, shared_light, ..near }
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use cluster::SamplePlanes;
+    use cluster::{SamplePlanes, SharedLightCosts};
     use depth_image::{ExposureEv, PinholeCamera, ViewPlanes};
 
     use super::*;
@@ -215,5 +217,23 @@ pub(crate) mod tests {
         let method = MeasureCosts { method: "mesh".to_owned(), ..wanted.clone() };
         let images = MeasureCosts { workload: workload(3), ..wanted };
         assert!(cache.predict("d", &method).is_none() && cache.predict("d", &images).is_none());
+    }
+
+    #[test]
+    fn parts_of_a_view_are_predicted_with_its_time() {
+        let (cache, size_px) = (CostCache::default(), UVec2::new(64, 48));
+        let light = SharedLightCosts { known_ratio: 0.9, surfaces_s: 0.1, look_up_s: 0.02, unknown_s: 0.28 };
+        let mut known = measured(0.4);
+        known.measured.shared_light = Some(light);
+        cache.insert("d", &measurement(size_px), known);
+        let predicted = cache.predict("d", &measurement(size_px * UVec2::new(2, 1))).unwrap();
+        let SharedLightCosts { known_ratio, surfaces_s, look_up_s, unknown_s } = predicted.shared_light.unwrap();
+        assert_eq!(known_ratio, 0.9);
+        let differences = [surfaces_s - 0.2, look_up_s - 0.04, unknown_s - 0.56];
+        assert!(differences.iter().all(|difference| difference.abs() < 1e-12), "{predicted:?}");
+        known.measured.costs.reconstruct_view_s = 0.0;
+        cache.insert("d", &measurement(size_px), known);
+        let predicted = cache.predict("d", &measurement(size_px * 2)).unwrap();
+        assert_eq!(predicted.shared_light, None, "of no time");
     }
 }

@@ -133,8 +133,11 @@ fn was_idle(idle_for: Duration, elapsed: Duration) -> bool {
 }
 
 /// Which planes a method needs is the same on every node, and the exposure nearly. All nodes find surfaces as the first one would.
+/// The parts of a view are those of the device whose views take longest.
 fn slowest(one: Measured, other: Measured) -> Measured {
-    Measured { costs: one.costs.max(other.costs), ..one }
+    let is_slower = other.costs.reconstruct_view_s > one.costs.reconstruct_view_s;
+    let shared_light = if is_slower { other.shared_light } else { one.shared_light };
+    Measured { costs: one.costs.max(other.costs), shared_light, ..one }
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use node::Telemetry;
 use parking_lot::Mutex;
 use prometheus_client::encoding::EncodeLabelSet;
 use prometheus_client::metrics::{counter::Counter, family::Family, gauge::Gauge};
+use prometheus_client::registry::Unit;
 
 use crate::schedule::{Command, Event, Recorder};
 
@@ -27,6 +28,19 @@ struct AuditedError {
     value: &'static str,
 }
 
+/// A workload whose views take their light from samples.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct LitWorkload {
+    workload: u64,
+}
+
+/// A part of the time of such a workload's view.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct ViewPart {
+    workload: u64,
+    part: &'static str,
+}
+
 /// Registered gauges of the cluster's state, and counters of plans and measurements.
 #[derive(Debug, Clone)]
 pub struct CoordinatorMetrics {
@@ -40,6 +54,8 @@ pub struct CoordinatorMetrics {
     promises: Family<State, Gauge>,
     view_probes: Counter,
     audit_errors: Family<AuditedError, Gauge<f64, AtomicU64>>,
+    known_light: Family<LitWorkload, Gauge<f64, AtomicU64>>,
+    view_parts_s: Family<ViewPart, Gauge<f64, AtomicU64>>,
     broken: Counter,
     /// Workloads whose promise is broken now.
     broken_workloads: Arc<Mutex<BTreeSet<u64>>>,
@@ -66,6 +82,8 @@ impl CoordinatorMetrics {
             promises: Family::default(),
             view_probes: Counter::default(),
             audit_errors: Family::default(),
+            known_light: Family::default(),
+            view_parts_s: Family::default(),
             broken: Counter::default(),
             broken_workloads: Arc::default(),
         };
@@ -75,16 +93,22 @@ impl CoordinatorMetrics {
         let help =
             "The error of a workload's audited views: the interval that has it with 95 % confidence, and the mean";
         registry.register("cluster_audit_error_ratio", help, metrics.audit_errors.clone());
+        let help = "The share of a view's surface points whose light samples know, as measured";
+        registry.register("cluster_known_light_ratio", help, metrics.known_light.clone());
+        let help = "Parts of a view whose light comes from samples, as measured";
+        registry.register_with_unit("cluster_view_part", help, Unit::Seconds, metrics.view_parts_s.clone());
         registry.register("cluster_promises_broken", "Promises that audits have found broken", metrics.broken.clone());
         metrics
     }
 
-    pub(crate) fn show(&self, status: &ClusterStatus, commands: &[Command]) {
+    /// Shows the cluster's state, and counts what the schedule has ordered.
+    pub fn show(&self, status: &ClusterStatus, commands: &[Command]) {
         let plans = commands.iter().filter(|command| matches!(command, Command::Apply { .. })).count();
         self.plans.inc_by(plans as u64);
         let probes = commands.iter().filter(|command| matches!(command, Command::ProbeViews(_))).count();
         self.view_probes.inc_by(probes as u64);
         self.show_audits(status);
+        self.show_shared_light(status);
         for state in [PromiseState::Measuring, PromiseState::Kept, PromiseState::Broken, PromiseState::Unreachable] {
             let promises = status.workloads.iter().filter_map(|workload| workload.promise.as_ref());
             let count = promises.filter(|promise| promise.state == state).count();
@@ -120,6 +144,23 @@ impl CoordinatorMetrics {
     }
 }
 
+impl CoordinatorMetrics {
+    fn show_shared_light(&self, status: &ClusterStatus) {
+        self.known_light.clear();
+        self.view_parts_s.clear();
+        for status in &status.workloads {
+            let Some(light) = status.shared_light else { continue };
+            let workload = status.number;
+            self.known_light.get_or_create(&LitWorkload { workload }).set(light.known_ratio);
+            let parts =
+                [("surfaces", light.surfaces_s), ("look_up", light.look_up_s), ("unknown_points", light.unknown_s)];
+            for (part, seconds) in parts {
+                self.view_parts_s.get_or_create(&ViewPart { workload, part }).set(seconds);
+            }
+        }
+    }
+}
+
 impl Default for CoordinatorMetrics {
     fn default() -> Self {
         Self::new(&Telemetry::default())
@@ -145,5 +186,34 @@ impl Observers {
             tracing::error!(%error, "events are no longer recorded");
             self.log = None;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use cluster::SharedLightCosts;
+
+    use super::*;
+
+    #[test]
+    fn parts_of_views_are_shown_while_their_workload_is_open() {
+        let telemetry = Telemetry::default();
+        let metrics = CoordinatorMetrics::new(&telemetry);
+        let costs = SharedLightCosts { known_ratio: 0.93, surfaces_s: 0.12, look_up_s: 0.04, unknown_s: 0.31 };
+        let lit = WorkloadStatus { number: 7, shared_light: Some(costs), ..WorkloadStatus::default() };
+        let plain = WorkloadStatus { number: 8, ..WorkloadStatus::default() };
+        metrics.show(&ClusterStatus { workloads: vec![lit, plain.clone()], ..ClusterStatus::default() }, &[]);
+        let page = telemetry.page();
+        for line in [
+            "myriorama_cluster_known_light_ratio{workload=\"7\"} 0.93",
+            "myriorama_cluster_view_part_seconds{workload=\"7\",part=\"surfaces\"} 0.12",
+            "myriorama_cluster_view_part_seconds{workload=\"7\",part=\"look_up\"} 0.04",
+            "myriorama_cluster_view_part_seconds{workload=\"7\",part=\"unknown_points\"} 0.31",
+        ] {
+            assert!(page.contains(line), "{line} in {page}");
+        }
+        assert!(!page.contains("workload=\"8\""), "{page}");
+        metrics.show(&ClusterStatus { workloads: vec![plain], ..ClusterStatus::default() }, &[]);
+        assert!(!telemetry.page().contains("workload=\"7\""), "{}", telemetry.page());
     }
 }

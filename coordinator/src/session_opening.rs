@@ -54,8 +54,7 @@ async fn measured_opening(
         measured = measured_workload(shared, &request, &workload, budgeted.as_ref(), events).await?;
     }
     let Measured { costs, planes, auto_exposure, traced_pixel_count, shared_light } = measured;
-    let note = shared_light.map_or_else(String::new, |light| light_note(&request.method, &light))
-        + &if is_coarser { density_note(&workload, &request, full_set_s) } else { String::new() };
+    let note = if is_coarser { density_note(&workload, &request, full_set_s) } else { String::new() };
     let last_view_time_ratio = last_view_time_ratio(&request, &costs, shared_light.as_ref());
     // A cube serves views from anywhere: there are no cells to follow viewers.
     let viewpoints = if workload.samples_cube() { Vec::new() } else { request.viewpoints };
@@ -77,6 +76,7 @@ async fn measured_opening(
         viewpoints,
         budgeted,
         last_view_time_ratio,
+        shared_light,
         note,
     })
 }
@@ -116,19 +116,6 @@ fn last_view_time_ratio(request: &SessionRequest, costs: &Costs, light: Option<&
     let Some(light) = light.filter(|_| has_coarser) else { return 1.0 };
     let ratio = (light.surfaces_s + light.look_up_s) / costs.reconstruct_view_s;
     if ratio > 0.0 { ratio.min(1.0) } else { 1.0 }
-}
-
-/// What the reason of a plan says of light that views share.
-fn light_note(method: &str, light: &SharedLightCosts) -> String {
-    let SharedLightCosts { known_ratio, surfaces_s, look_up_s, unknown_s } = light;
-    format!(
-        " By {method}, samples know the light of {:.0} % of a view's points; surfaces take {:.0} ms, the look-up {:.0} ms, and \
-         the other points {:.0} ms.",
-        known_ratio * 100.0,
-        surfaces_s * 1e3,
-        look_up_s * 1e3,
-        unknown_s * 1e3,
-    )
 }
 
 /// What the reason of a plan says of samples of light that are coarser than views.

@@ -76,6 +76,7 @@ fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) -> Opening 
         costs: WHOLE,
         auto_exposure: ExposureEv::ZERO,
         last_view_time_ratio: 1.0,
+        shared_light: None,
         note: String::new(),
         budgeted: None,
     }

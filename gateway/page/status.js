@@ -90,7 +90,7 @@ function workloadSection(workload) {
   const name = element("h2", `Workload ${workload.number ?? UNKNOWN}`);
   const numbers = element("dl", ...figures([
     ["Sessions", whole(workload.sessions)], ["Viewers", whole(workload.viewers)], ["Views a set", whole(workload.views_per_set)],
-    ["Utilisation", percent(workload.utilisation)], ...(plan ? planFigures(plan) : []),
+    ["Utilisation", percent(workload.utilisation)], ...(plan ? planFigures(plan) : []), ...lightFigures(workload.shared_light),
   ]));
   numbers.className = "figures";
   const promise = workload.promise ? [element("p", workload.promise)] : [];
@@ -104,6 +104,15 @@ function planFigures(plan) {
   return [
     ["Plan", whole(plan.epoch)], ["Policy", plan.policy ?? UNKNOWN], ["P, nodes of the plan", whole(nodes.size || NaN)],
     ["K, samplers", whole(plan.samplers?.length)], ["View cells", whole(plan.cells)], ["Common cells", whole(plan.common_cells)],
+  ];
+}
+
+/** How much of a view's light samples know, and where its time goes; nothing where views take no light from samples. */
+function lightFigures(light) {
+  if (!light) return [];
+  return [
+    ["Known light", percent(light.known_ratio)], ["Surfaces of a view", time(light.surfaces_s)],
+    ["Look-up", time(light.look_up_s)], ["Unknown points", time(light.unknown_points_s)],
   ];
 }
 

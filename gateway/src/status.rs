@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::extract::{Query, State};
 use axum::response::Response;
-use cluster::{AchievedTime, ClusterStatus, Costs, NodeStatus, Policy, SessionPlan, WorkloadStatus};
+use cluster::{AchievedTime, ClusterStatus, Costs, NodeStatus, Policy, SessionPlan, SharedLightCosts, WorkloadStatus};
 use depth_image::SampleCamera;
 use pictures::camera_frame;
 use serde::Deserialize;
@@ -83,7 +83,15 @@ fn described_workload(workload: &WorkloadStatus) -> Value {
         "number": workload.number, "sessions": workload.session_count, "viewers": workload.viewer_count,
         "views_per_set": workload.views_per_set, "utilisation": workload.utilisation,
         "promise": workload.promise.as_ref().map(ToString::to_string),
+        "shared_light": workload.shared_light.as_ref().map(described_light),
         "plan": workload.plan.as_ref().map(|plan| described_plan(plan, &workload.achieved)),
+    })
+}
+
+fn described_light(light: &SharedLightCosts) -> Value {
+    json!({
+        "known_ratio": light.known_ratio, "surfaces_s": light.surfaces_s, "look_up_s": light.look_up_s,
+        "unknown_points_s": light.unknown_s,
     })
 }
 

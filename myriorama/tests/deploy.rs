@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use clap::Parser as _;
+use cluster::{ClusterStatus, SharedLightCosts, WorkloadStatus};
 use coordinator::CoordinatorMetrics;
 use node::{NodeMetrics, Telemetry};
 
@@ -22,8 +23,11 @@ fn names_in(text: &str) -> BTreeSet<String> {
 #[test]
 fn every_metric_of_the_dashboard_is_exported() {
     let telemetry = Telemetry::default();
-    let (node, _coordinator) = (NodeMetrics::new(&telemetry), CoordinatorMetrics::new(&telemetry));
+    let (node, coordinator) = (NodeMetrics::new(&telemetry), CoordinatorMetrics::new(&telemetry));
     node.drop_view("client gone");
+    let shared_light = Some(SharedLightCosts { known_ratio: 0.9, surfaces_s: 0.1, look_up_s: 0.02, unknown_s: 0.3 });
+    let workloads = vec![WorkloadStatus { shared_light, ..WorkloadStatus::default() }];
+    coordinator.show(&ClusterStatus { workloads, ..ClusterStatus::default() }, &[]);
     let exported = names_in(&telemetry.page());
     let shown = names_in(&deployed("grafana/dashboard.json"));
     assert!(shown.len() > 10, "{shown:?}");

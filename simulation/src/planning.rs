@@ -176,6 +176,7 @@ fn open(cluster: &Cluster, demand: &Demand) -> Event {
         costs: slowest,
         auto_exposure: ExposureEv::ZERO,
         last_view_time_ratio: 1.0,
+        shared_light: None,
         note: String::new(),
         budgeted: None,
     }))

@@ -70,6 +70,7 @@ fn log(plan_epoch: u64) -> Vec<u8> {
         costs,
         auto_exposure: ExposureEv::ZERO,
         last_view_time_ratio: 1.0,
+        shared_light: None,
         note: String::new(),
         budgeted: None,
     };

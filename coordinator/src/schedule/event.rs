@@ -3,7 +3,7 @@
 use cluster::limits::{MAX_VIEWS_PER_SET, MAX_WORKLOADS};
 use cluster::{
     AuditReport, Costs, InvalidField, JoinCluster, MAX_AUDIT_TIME_RATIO, MeasuredCosts, Quality, SamplePlanes,
-    SamplerReport, Workload, finite_seconds, frame_rate, nonempty, ratio, reason, viewpoints,
+    SamplerReport, SharedLightCosts, Workload, finite_seconds, frame_rate, nonempty, ratio, reason, viewpoints,
 };
 use depth_image::{ExposureEv, PinholeCamera};
 use planner::ProbeId;
@@ -101,6 +101,9 @@ pub struct Opening {
     /// The time of a view at its last fallback over that of one as it asks for, as measured; 1 where nobody knows it.
     #[serde(default = "unknown_ratio")]
     pub last_view_time_ratio: f64,
+    /// Where the time of its views goes, as measured; `None` where they take no light from samples.
+    #[serde(default)]
+    pub shared_light: Option<SharedLightCosts>,
     /// What the reasons of its workload's plans say beside their figures.
     #[serde(default)]
     pub note: String,
@@ -162,6 +165,7 @@ impl Opening {
         self.costs.validate()?;
         self.budgeted.as_ref().map_or(Ok(()), Budgeted::validate)?;
         ratio(self.last_view_time_ratio, "last_view_time_ratio")?;
+        self.shared_light.as_ref().map_or(Ok(()), SharedLightCosts::validate)?;
         reason(&self.note, "note")?;
         viewpoints(&self.viewpoints)
     }

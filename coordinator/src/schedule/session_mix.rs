@@ -1,6 +1,6 @@
 //! The sessions of one workload, and what they ask for together.
 
-use cluster::{Costs, Quality};
+use cluster::{Costs, Quality, SharedLightCosts};
 use depth_image::PinholeCamera;
 use planner::Budget;
 
@@ -18,6 +18,7 @@ struct Session {
     method: String,
     /// As measured for its own views.
     costs: Costs,
+    shared_light: Option<SharedLightCosts>,
     budget: Option<Budget>,
 }
 
@@ -43,6 +44,7 @@ impl SessionMix {
             viewpoints: opening.viewpoints.clone(),
             method: opening.method.clone(),
             costs: opening.costs,
+            shared_light: opening.shared_light,
             budget: opening.budgeted.as_ref().map(|budgeted| budgeted.budget),
         });
     }
@@ -123,6 +125,12 @@ impl SessionMix {
     pub(super) fn usual_method(&self) -> Option<&str> {
         let count = |of: &Session| self.0.iter().filter(|session| session.method == of.method).count();
         self.0.iter().rev().max_by_key(|session| count(session)).map(|session| session.method.as_str())
+    }
+
+    /// Where the time of views goes by the method of most sessions, as measured for the first of them.
+    pub(super) fn shared_light(&self) -> Option<SharedLightCosts> {
+        let usual_method = self.usual_method()?;
+        self.0.iter().find(|session| session.method == usual_method)?.shared_light
     }
 
     /// The least strict budget that implies those of all sessions. A session is left out where its budget may not be kept
@@ -250,5 +258,23 @@ mod tests {
         assert_eq!(mix(&[live, large]).costs(1.0), Some(both), "30 views a second");
         assert_eq!(mix(&[small]).costs(1.0), Some(COSTS));
         assert_eq!(SessionMix::default().costs(1.0), None);
+    }
+
+    #[test]
+    fn the_parts_of_a_view_are_those_of_the_method_that_most_sessions_have() {
+        let light =
+            |known_ratio| Some(SharedLightCosts { known_ratio, surfaces_s: 0.1, look_up_s: 0.02, unknown_s: 0.3 });
+        let of = |session, method: &str, known_ratio| Opening {
+            method: method.to_owned(),
+            shared_light: light(known_ratio),
+            ..opening(session, PolicyChoice::Auto, 1)
+        };
+        let mut sessions = mix(&[of(1, "fine", 0.8), of(2, "draft", 0.9)]);
+        assert_eq!(sessions.shared_light(), light(0.8), "of two methods, the first");
+        sessions.add(&of(3, "draft", 0.95));
+        assert_eq!(sessions.shared_light(), light(0.9), "of three sessions, two are drafts");
+        [4, 5, 6].into_iter().for_each(|session| sessions.add(&opening(session, PolicyChoice::Auto, 1)));
+        assert_eq!(sessions.shared_light(), None, "most sessions have views from samples alone");
+        assert_eq!(SessionMix::default().shared_light(), None);
     }
 }

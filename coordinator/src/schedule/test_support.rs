@@ -142,6 +142,7 @@ pub(super) fn opening(session: u64, policy: PolicyChoice, views_per_set: usize) 
         costs: COSTS,
         auto_exposure: ExposureEv::ZERO,
         last_view_time_ratio: 1.0,
+        shared_light: None,
         note: String::new(),
         budgeted: None,
     }

@@ -149,10 +149,6 @@ impl Frame<'_> {
         self.value(field).map(|value| finite(value).map_err(|kind| self.fault(field, kind))).transpose()
     }
 
-    fn number(&self, field: &str) -> Result<f64, CameraFileError> {
-        self.optional(field)?.ok_or_else(|| self.fault(field, CameraFault::Missing))
-    }
-
     /// The columns or rows, by their name in a `transforms.json` and in a camera path.
     fn side(&self, [field, in_path]: [&str; 2], default_px: u32) -> Result<u32, CameraFileError> {
         let given = self.optional(field)?.map_or_else(|| self.optional(in_path), |side| Ok(Some(side)))?;
@@ -209,14 +205,12 @@ impl Frame<'_> {
 
     /// Focal lengths, or those of the angles of view: `camera_angle_x` and `_y` in radians, or a path's vertical `fov` in degrees.
     fn focal_px(&self, size_px: UVec2) -> Result<DVec2, CameraFileError> {
-        let of_angle = |field: &str, side_px: u32| {
-            let angle_rad = self.optional(field)?.map(|angle| if field == "fov" { angle.to_radians() } else { angle });
-            Ok(angle_rad.map(|angle_rad| 0.5 * f64::from(side_px) / (0.5 * angle_rad).tan()))
-        };
         let (mut x, mut y) = (self.optional("fl_x")?, self.optional("fl_y")?);
         if x.is_none() {
-            x = of_angle("camera_angle_x", size_px.x)?;
-            y = y.or(of_angle("camera_angle_y", size_px.y)?).or(of_angle("fov", size_px.y)?);
+            let fov_y_rad = self.optional("fov")?.map(f64::to_radians);
+            let angle_y_rad = self.optional("camera_angle_y")?.or(fov_y_rad);
+            x = self.optional("camera_angle_x")?.map(|angle_rad| focal_length_px(angle_rad, size_px.x));
+            y = y.or(angle_y_rad.map(|angle_rad| focal_length_px(angle_rad, size_px.y)));
         }
         let x = x.or(y).ok_or_else(|| self.fault("fl_x", CameraFault::Missing))?;
         Ok(DVec2::new(x, y.unwrap_or(x)))
@@ -252,6 +246,10 @@ impl Frame<'_> {
         }
         Ok(rows)
     }
+}
+
+fn focal_length_px(angle_rad: f64, side_px: u32) -> f64 {
+    0.5 * f64::from(side_px) / (0.5 * angle_rad).tan()
 }
 
 /// The rows of a matrix that is written as rows or as 16 numbers.

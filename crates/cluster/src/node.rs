@@ -127,6 +127,17 @@ pub struct SharedLightCosts {
 }
 
 impl SharedLightCosts {
+    /// The costs of a view that takes `ratio` times as long, with as many known points.
+    #[must_use]
+    pub fn scaled(self, ratio: f64) -> Self {
+        Self {
+            known_ratio: self.known_ratio,
+            surfaces_s: self.surfaces_s * ratio,
+            look_up_s: self.look_up_s * ratio,
+            unknown_s: self.unknown_s * ratio,
+        }
+    }
+
     /// # Errors
     /// For a share that is not from 0 to 1, and for times that are negative or not finite.
     pub fn validate(&self) -> Result<(), InvalidField> {

@@ -6,7 +6,7 @@ use glam::DVec3;
 use crate::check::{InvalidField, at_most, finite_seconds, nonempty, text};
 use crate::costs::Costs;
 use crate::limits::{MAX_NODES, MAX_SAMPLE_CAMERAS, MAX_SCENES, MAX_WORKLOADS};
-use crate::node::NodeStatus;
+use crate::node::{NodeStatus, SharedLightCosts};
 use crate::policy::Policy;
 use crate::promise::Promise;
 use crate::scene::SceneRef;
@@ -79,6 +79,9 @@ pub struct WorkloadStatus {
     pub utilisation: Option<f64>,
     /// The promise to its sessions; `None` without a budget.
     pub promise: Option<Promise>,
+    /// Where the time of a view goes by the usual method of its sessions, as measured when they were opened; `None` where views
+    /// take no light from samples.
+    pub shared_light: Option<SharedLightCosts>,
     /// The share of all nodes' time that one more viewer would take: one like the mean of its viewers, or one of 10 views a
     /// second.
     pub one_more_viewer: f64,
@@ -90,6 +93,7 @@ impl WorkloadStatus {
         at_most(self.achieved.len(), MAX_POLICIES, "achieved_times")?;
         self.plan.as_ref().map_or(Ok(()), SessionPlan::validate)?;
         self.promise.as_ref().map_or(Ok(()), Promise::validate)?;
+        self.shared_light.as_ref().map_or(Ok(()), SharedLightCosts::validate)?;
         self.conditions.iter().try_for_each(NodeCondition::validate)?;
         self.achieved.iter().try_for_each(|achieved| finite_seconds(achieved.busy_s, "busy_s"))?;
         finite_seconds(self.utilisation, "utilisation_ratio")?;

@@ -103,12 +103,7 @@ impl Resized {
             in_order,
             tiles: tiles.and_then(|tiles| TileCosts::of_image(sample_image_s, tiles.overhead_s, tiles.row_shares)),
         };
-        let shared_light = measured.shared_light.map(|light| SharedLightCosts {
-            known_ratio: light.known_ratio,
-            surfaces_s: light.surfaces_s * self.pixels_ratio,
-            look_up_s: light.look_up_s * self.pixels_ratio,
-            unknown_s: light.unknown_s * self.pixels_ratio,
-        });
+        let shared_light = measured.shared_light.map(|light| light.scaled(self.pixels_ratio));
         Measured { costs, shared_light, ..measured }
     }
 }

@@ -245,6 +245,7 @@ fn messages_survive_the_round_trip() {
         achieved: vec![AchievedTime { policy: Policy::TimeShare, busy_s: 0.3 }],
         utilisation: Some(0.6),
         promise: Some(promise()),
+        shared_light: Some(SharedLightCosts { known_ratio: 0.9, surfaces_s: 0.1, look_up_s: 0.02, unknown_s: 0.3 }),
         one_more_viewer: 0.02,
     };
     let waiting = WorkloadStatus { number: 4, ..WorkloadStatus::default() };

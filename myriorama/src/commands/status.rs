@@ -10,7 +10,7 @@ use app_core::print_line;
 use app_core::process::coordinator_url;
 use clap::Args;
 use client::Client;
-use cluster::{ClusterStatus, Costs, NodeCondition, NodeStatus, WorkloadStatus};
+use cluster::{ClusterStatus, Costs, NodeCondition, NodeStatus, SharedLightCosts, WorkloadStatus};
 use report::{Cell, Table};
 
 use crate::terminal_picture;
@@ -140,7 +140,7 @@ fn workload_text(workload: &WorkloadStatus, nodes: &[NodeStatus]) -> anyhow::Res
     Ok(format!("{}\n\n{why}{promise}\n{}", table.to_text(), achieved(workload)))
 }
 
-/// Times that policies achieved, and the load of the nodes.
+/// Times that policies achieved, the load of the nodes, and where the time of a view with shared light goes.
 fn achieved(workload: &WorkloadStatus) -> String {
     let achieved = workload.achieved.iter();
     let mut lines: Vec<String> =
@@ -150,8 +150,20 @@ fn achieved(workload: &WorkloadStatus) -> String {
         let quality = fallback.map_or("all that was asked for".to_owned(), |number| format!("fallback {number}"));
         lines.push(format!("Sessions take {:.0} % of its nodes' time and get {quality}.", utilisation * 100.0));
     }
+    lines.extend(workload.shared_light.as_ref().map(light_text));
     lines.push(format!("One more viewer would take {:.1} % of all nodes' time.", workload.one_more_viewer * 100.0));
     lines.join("\n")
+}
+
+/// How much of a view's light samples know, and where its time goes.
+fn light_text(light: &SharedLightCosts) -> String {
+    let [surfaces_ms, look_up_ms, unknown_ms] =
+        [light.surfaces_s, light.look_up_s, light.unknown_s].map(|seconds| seconds * 1e3);
+    format!(
+        "Samples know the light of {:.1} % of a view's points. Surfaces take {surfaces_ms:.1} ms, the look-up {look_up_ms:.1} ms, \
+         and the other points {unknown_ms:.1} ms.",
+        light.known_ratio * 100.0,
+    )
 }
 
 fn condition<'a>(workload: &'a WorkloadStatus, node: &NodeStatus) -> Option<&'a NodeCondition> {

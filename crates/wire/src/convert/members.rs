@@ -59,7 +59,7 @@ messages! {
         at_most(s.workloads.len(), MAX_WORKLOADS, "workloads")
     }, then ClusterStatus::validate;
     WorkloadStatus = WorkloadStatus {
-        plan, session_count, viewer_count, conditions, promise;
+        plan, session_count, viewer_count, conditions, promise, shared_light;
         number: workload_number, views_per_set: views_per_set_count, achieved: achieved_times,
         utilisation: utilisation_ratio, one_more_viewer: one_more_viewer_ratio
     };
