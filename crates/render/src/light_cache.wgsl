@@ -341,6 +341,19 @@ fn is_like_first(point: Point, first: vec4u) -> bool {
 }
 {%- endif %}
 
+// Lists a point that samples do not know well enough.
+fn leave_to_rays(light: CachedLight, place: u32) {
+{%- if indirect %}
+    // Indirect light changes slowly: it is known wherever a texel counts, and only lamps are asked.
+    if light.weight > 0.0 {
+        put_light(light, place);
+        list_pixel_last(place);
+        return;
+    }
+{%- endif %}
+    list_pixel(place);
+}
+
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let pixel = pixel_at(id, 1u);
@@ -381,17 +394,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         put_light(known.light, place);
     }
     let is_unknown = is_asked && !is_answered;
-{%- if indirect %}
-    // Indirect light changes slowly: it is known wherever a texel counts, and only lamps are asked.
-    let is_unlit = is_unknown && known.light.weight > 0.0;
-    if is_unlit {
-        put_light(known.light, place);
-        list_pixel_last(place);
-    }
-    if is_unknown && !is_unlit { list_pixel(place); }
-{%- else %}
-    if is_unknown { list_pixel(place); }
-{%- endif %}
+    if is_unknown { leave_to_rays(known.light, place); }
     var origin = select(PROVENANCE_EMPTY, PROVENANCE_HIT, met);
     origin = select(origin, PROVENANCE_HIT | known.camera_mask << 8u, is_answered);
     origin = select(origin, PROVENANCE_LIT_HERE, is_unknown);
