@@ -122,9 +122,7 @@ impl CoordinatorMetrics {
         self.views_per_set.set(number(status.views_per_set()));
         self.plan_epoch.set(number(status.plan_epoch));
     }
-}
 
-impl CoordinatorMetrics {
     fn show_audits(&self, status: &ClusterStatus) {
         let is_broken = |workload: &&WorkloadStatus| {
             workload.promise.as_ref().is_some_and(|promise| promise.state == PromiseState::Broken)
@@ -142,9 +140,7 @@ impl CoordinatorMetrics {
             }
         }
     }
-}
 
-impl CoordinatorMetrics {
     fn show_shared_light(&self, status: &ClusterStatus) {
         self.known_light.clear();
         self.view_parts_s.clear();

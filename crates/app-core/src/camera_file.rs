@@ -1,8 +1,9 @@
 //! Camera files: nerfstudio's `transforms.json` and its camera paths, so that anyone can run someone else's experiment.
 //!
 //! `transform_matrix` is camera to world, the camera looking down −Z with +Y up, as rows or as 16 numbers. Focal lengths and
-//! principal points are in pixels, for a frame or for all; angles of view may stand in place of focal lengths. Only pinhole cameras can be used: distortion that is not zero is refused by name.
-//! Files are in the scene file's own space: the origin of a re-centred scene is subtracted in double precision.
+//! principal points are in pixels, for a frame or for all; angles of view may stand in place of focal lengths. Only pinhole
+//! cameras can be used: distortion that is not zero is refused by name. Files are in the scene file's own space: the origin of a
+//! re-centred scene is subtracted in double precision.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -149,10 +150,16 @@ impl Frame<'_> {
         self.value(field).map(|value| finite(value).map_err(|kind| self.fault(field, kind))).transpose()
     }
 
-    /// The columns or rows, by their name in a `transforms.json` and in a camera path.
-    fn side(&self, [field, in_path]: [&str; 2], default_px: u32) -> Result<u32, CameraFileError> {
-        let given = self.optional(field)?.map_or_else(|| self.optional(in_path), |side| Ok(Some(side)))?;
-        let side = given.unwrap_or(f64::from(default_px));
+    /// The size: `w` and `h` of a `transforms.json`, `render_width` and `render_height` of a camera path.
+    fn size_px(&self, default_px: UVec2) -> Result<UVec2, CameraFileError> {
+        let columns = self.optional("w")?.or(self.optional("render_width")?);
+        let rows = self.optional("h")?.or(self.optional("render_height")?);
+        let columns = columns.unwrap_or(f64::from(default_px.x));
+        let rows = rows.unwrap_or(f64::from(default_px.y));
+        Ok(UVec2::new(self.side_px("w", columns)?, self.side_px("h", rows)?))
+    }
+
+    fn side_px(&self, field: &str, side: f64) -> Result<u32, CameraFileError> {
         if side.fract() == 0.0 && (1.0..=f64::from(MAX_IMAGE_SIDE_PX)).contains(&side) {
             return Ok(side as u32);
         }
@@ -183,8 +190,7 @@ impl Frame<'_> {
 
     fn camera(&self, placement: Placement) -> Result<PinholeCamera, CameraFileError> {
         self.check_model()?;
-        let columns = self.side(["w", "render_width"], placement.size_px.x)?;
-        let size_px = UVec2::new(columns, self.side(["h", "render_height"], placement.size_px.y)?);
+        let size_px = self.size_px(placement.size_px)?;
         let focal_px = self.focal_px(size_px)?;
         let principal = [
             self.optional("cx")?.unwrap_or(f64::from(size_px.x) / 2.0),

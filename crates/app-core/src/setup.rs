@@ -40,6 +40,9 @@ pub struct DeviceArgs {
     pub device: DevicePreference,
 }
 
+/// The scene of those who name none.
+pub const DEFAULT_SCENE: &str = "tree-terrain-500k";
+
 /// The scene, its sampling and its lighting.
 #[derive(Debug, Clone, Args)]
 #[allow(rustdoc::broken_intra_doc_links, reason = "help has optional parts in brackets")]
@@ -47,7 +50,7 @@ pub struct SceneArgs {
     /// A scene by name or a file (.gltf, .glb, .obj, .ply). Names: tree-terrain-30k, -125k, -500k, -2m (each also with
     /// -wind), snake (animated), bird-nest, urban, tree, grass, grass:DENSITY, blocks, courtyard, teapot-mirror, and
     /// more
-    #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k",
+    #[arg(long, value_name = "SPEC", default_value = DEFAULT_SCENE,
         value_parser = OsStringValueParser::new().try_map(SceneSpec::try_from))]
     pub scene: SceneSpec,
     /// What is done about textures that a scene's file names and that are not there: refuse the scene, or show grey

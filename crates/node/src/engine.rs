@@ -45,7 +45,7 @@ impl Turn {
 
     /// Work of a class in the common flow.
     #[must_use]
-    pub fn of(class: WorkClass) -> Self {
+    pub const fn of(class: WorkClass) -> Self {
         Self { class, flow: Self::COMMON_FLOW }
     }
 }

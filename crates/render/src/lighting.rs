@@ -177,10 +177,16 @@ impl Lighting {
         (lighting != *self).then_some(lighting)
     }
 
+    /// No more than so many rays of each kind a pixel.
+    #[must_use]
+    pub fn with_at_most_rays(&self, most: NonZeroU32) -> Self {
+        self.with_rays(|rays| rays.min(most))
+    }
+
     /// One ray to each lamp and one of the light from all around: the first step of refinement.
     #[must_use]
     pub fn with_single_rays(&self) -> Self {
-        self.with_rays(|_| NonZeroU32::MIN)
+        self.with_at_most_rays(NonZeroU32::MIN)
     }
 
     /// With other numbers of rays.

@@ -27,7 +27,9 @@ const QUICK_VIEWS: usize = 64;
 /// Input cannot be used, or the device or the cluster fails.
 pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     let setup = args.scene.load()?;
-    let cover = first_page::write(args, setup.clone())?;
+    let page_scene = args.first_page_scene()?;
+    let page_setup = if page_scene.scene == args.scene.scene { setup.clone() } else { page_scene.load()? };
+    let cover = first_page::write(args, &page_scene, page_setup)?;
     if args.showcase {
         return Ok(Outcome::Done);
     }

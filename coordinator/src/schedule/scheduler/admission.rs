@@ -120,17 +120,20 @@ impl Scheduler {
         if let Some(cells) = after.cell_count().filter(|&cells| cells > MAX_CELLS) {
             return Err(ChoiceError::Cells { cells });
         }
-        let now =
-            |number: u64, workload: &WorkloadState| promised(workload, &self.costs_to_admit(number, &workload.costs));
-        let own = before.map_or(0.0, |(number, workload)| now(number, workload));
+        let own = before.map_or(0.0, |(number, workload)| self.promised_to(number, workload));
         let asked = promised(after, nodes).max(self.without_fallbacks(change));
         // Batches take what is left, and add nothing to what is promised.
         if asked <= own {
             return Ok(());
         }
         let others = self.workloads.iter().filter(|(number, _)| before.is_none_or(|(own, _)| own != **number));
-        let needed = others.map(|(&number, workload)| now(number, workload)).sum::<f64>() + asked;
+        let needed = others.map(|(&number, workload)| self.promised_to(number, workload)).sum::<f64>() + asked;
         if needed > MOST_ADMITTED { Err(ChoiceError::Overload { needed }) } else { Ok(()) }
+    }
+
+    /// What is promised to the sessions of an open workload.
+    fn promised_to(&self, number: u64, workload: &WorkloadState) -> f64 {
+        promised(workload, &self.costs_to_admit(number, &workload.costs))
     }
 
     /// The share of the nodes' time at the last fallback that is left, where a session does not accept the one in force:

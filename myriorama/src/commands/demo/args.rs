@@ -2,16 +2,21 @@
 
 use std::path::PathBuf;
 
-use app_core::setup::{DeviceArgs, SceneArgs};
+use app_core::setup::{DEFAULT_SCENE, DeviceArgs, SceneArgs};
 use clap::Args;
 use render::Lighting;
 
 /// The light in which sharing pays, unless the user names one.
 const EXPENSIVE_LIGHT: &str = "soft 16, occlusion 16";
+/// The light of the first page, unless the user names one.
+const FIRST_PAGE_LIGHT: &str = "soft 16, indirect 64";
+/// The scene of the first page, unless the user names one.
+const FIRST_PAGE_SCENE: &str = "gallery";
 
-/// Shows what sharing samples gains: 290 views of 200×150 of one scene, from four sample images by P nodes in one
-/// process, beside views that are drawn directly. Once in expensive light, once in plain light. Writes a page with
-/// pictures, tables and a chart to --out. Takes three minutes at most on two slow cores, and a minute with --quick.
+/// Shows what sharing samples gains. First a page: a room in indirect light whose light comes from four sample images,
+/// beside direct drawing in the same time. Then 290 views of 200×150 of one scene, from four sample images by P nodes in
+/// one process, beside views that are drawn directly; once in expensive light, once in plain light. Writes pictures,
+/// tables and a chart to --out. Takes three minutes at most on two slow cores, and a minute with --quick.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  myriorama demo\n  myriorama demo --showcase\n  myriorama demo --scene helmet.gltf --out out/helmet\n  myriorama demo --scene tree-terrain-30k --quick"
@@ -43,5 +48,17 @@ impl DemoArgs {
     pub(super) fn expensive_light(&self) -> anyhow::Result<Lighting> {
         let is_named = self.scene.lighting != Lighting::default();
         if is_named { Ok(self.scene.lighting) } else { Ok(EXPENSIVE_LIGHT.parse()?) }
+    }
+
+    /// The scene and light of the first page.
+    pub(super) fn first_page_scene(&self) -> anyhow::Result<SceneArgs> {
+        let mut page_scene = self.scene.clone();
+        if page_scene.scene == DEFAULT_SCENE.parse()? {
+            page_scene.scene = FIRST_PAGE_SCENE.parse()?;
+        }
+        if page_scene.lighting == Lighting::default() {
+            page_scene.lighting = FIRST_PAGE_LIGHT.parse()?;
+        }
+        Ok(page_scene)
     }
 }
