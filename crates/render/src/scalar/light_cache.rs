@@ -21,15 +21,18 @@ pub struct SurfacePoint {
     pub footprint_m: f32,
 }
 
-/// Light that samples know.
+/// Light of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct KnownLight {
+pub struct SampledLight {
     /// What a white surface reflects of lamps.
     pub lamps_linear: Vec3,
     /// What a white surface reflects of the environment.
     pub environment_linear: Vec3,
     /// The images whose texels count, one bit each.
     pub camera_mask: u32,
+    /// Whether the texels are enough, and agree. Where they do not, lamps have rays of their own, as has occlusion; indirect light
+    /// is that of the texels all the same.
+    pub is_known: bool,
 }
 
 /// Sums over texels by their weights.
@@ -80,12 +83,12 @@ const MOST_RATIO: f32 = 4.0;
 const SAME_NORMAL: f32 = 0.99999;
 
 impl LightSamples<'_> {
-    /// The light of a surface; `None` where samples do not know it well enough.
+    /// The light of a surface; `None` where no texel counts.
     ///
     /// # Panics
     /// Images that are no pinholes', or without light.
     #[must_use]
-    pub fn look_up(&self, point: &SurfacePoint, quality: LightCacheQuality) -> Option<KnownLight> {
+    pub fn look_up(&self, point: &SurfacePoint, quality: LightCacheQuality) -> Option<SampledLight> {
         let tests = LookUpTests::new(quality)?;
         let mut found = Findings {
             light: WeightedLight::default(),
@@ -100,11 +103,11 @@ impl LightSamples<'_> {
         let Findings { light, coverage, least_luminance, greatest_luminance, camera_mask } = found;
         let difference = greatest_luminance - least_luminance;
         let agrees = difference <= tests.most_difference * greatest_luminance.max(LEAST_LUMINANCE);
-        let is_known = light.weight > 0.0 && coverage >= tests.least_coverage && agrees;
-        is_known.then(|| KnownLight {
+        (light.weight > 0.0).then(|| SampledLight {
             lamps_linear: light.lamps_linear / light.weight,
             environment_linear: light.environment_linear / light.weight,
             camera_mask,
+            is_known: coverage >= tests.least_coverage && agrees,
         })
     }
 

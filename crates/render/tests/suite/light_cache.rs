@@ -2,7 +2,8 @@
 
 use depth_image::{
     Aabb, Antialias, Camera, DepthImage, Environment, Illumination, Light, LightCacheQuality, PinholeCamera,
-    Provenance, ProvenanceKind, SinglePoleCamera, View, ViewPlanes, rgb9e5_from_linear, srgb8_from_linear,
+    Provenance, ProvenanceKind, SinglePoleCamera, View, ViewPlanes, linear_from_srgb8, rgb9e5_from_linear,
+    srgb8_from_linear,
 };
 use glam::{Affine3A, UVec2, Vec3};
 use render::scalar::light_cache::{LightSamples, SurfacePoint};
@@ -124,40 +125,49 @@ fn surface(scene: &rays::Scene, camera: &PinholeCamera, pixel: UVec2) -> Option<
     Some((point, scene.look(&hit).base_linear))
 }
 
-/// The share of pixels whose colour and provenance the scalar twin gives within 1 of 255. Pixels that no sample knows have
-/// the light of direct drawing.
+/// The share of pixels whose colour and provenance the scalar twin gives within 1 of 255. Points that samples do not know
+/// have the light of direct drawing; under indirect light that of lamps alone, where any texel counts.
 fn share_like_the_twin(scene: &Scene, lighting: &str, quality: LightCacheQuality) -> f32 {
     let gpu_scene = upload(scene);
     let work = DrawWork { visibility: Visibility::Rays, ..work(&gpu_scene, lighting) };
+    let is_indirect = work.lighting.is_indirect();
     let images = samples(work);
     let view = cached(work, &images, quality, ViewPlanes::ALL);
     let traced = direct(work);
+    let lamps = is_indirect.then(|| direct(DrawWork { lighting: "soft 16".parse().expect("lighting"), ..work }));
     let (twin, camera) = (rays::Scene::of(&gpu_scene, 0.0).expect("tables"), view_camera());
     let smooth: Vec<DepthImage> = images.iter().map(render::scalar::smoothed).collect();
-    let images = if work.lighting.is_indirect() { &smooth } else { &images };
+    let images = if is_indirect { &smooth } else { &images };
     let light = LightSamples { images, illumination: &scene.illumination };
     let provenance = view.provenance.as_ref().expect("provenance");
     let color = |view: &View, place: usize| <[u8; 3]>::try_from(&view.srgb8[3 * place..][..3]).expect("a pixel");
+    let lit_here = Provenance::new(ProvenanceKind::LitHere, 0);
     let (mut like, mut known) = (0, 0);
     for (place, &shown) in provenance.iter().enumerate() {
         let pixel = UVec2::new(place as u32 % VIEW_PX.x, place as u32 / VIEW_PX.x);
         let surface = surface(&twin, &camera, pixel);
         let found = surface.and_then(|(point, base)| Some((light.look_up(&point, quality)?, base)));
-        let (expected, origin) = match (surface, found) {
-            (None, _) => (color(&traced, place), Provenance::EMPTY),
-            (Some(_), None) => (color(&traced, place), Provenance::new(ProvenanceKind::LitHere, 0)),
-            (Some(_), Some((light, base_linear))) => {
+        let (expected, origin) = match (found, &lamps) {
+            (Some((light, base_linear)), _) if light.is_known => {
                 known += 1;
                 let linear = base_linear * (light.lamps_linear + light.environment_linear);
-                let origin = Provenance::new(ProvenanceKind::Hit, light.camera_mask);
-                (linear.to_array().map(srgb8_from_linear), origin)
+                (srgb8(linear), Provenance::new(ProvenanceKind::Hit, light.camera_mask))
             }
+            (Some((light, base_linear)), Some(lamps)) => {
+                let of_lamps = Vec3::from_array(color(lamps, place).map(linear_from_srgb8));
+                (srgb8(of_lamps + base_linear * light.environment_linear), lit_here)
+            }
+            _ => (color(&traced, place), if surface.is_some() { lit_here } else { Provenance::EMPTY }),
         };
         let is_near = color(&view, place).iter().zip(expected).all(|(&a, b)| a.abs_diff(b) <= 1);
         like += usize::from(is_near && shown == origin);
     }
     assert!(known > 2000, "{known} known pixels");
     like as f32 / provenance.len() as f32
+}
+
+fn srgb8(linear: Vec3) -> [u8; 3] {
+    linear.to_array().map(srgb8_from_linear)
 }
 
 #[test]
