@@ -17,6 +17,7 @@ mod lages;
 mod layered;
 mod light_cache_study;
 mod lighting_study;
+mod lit_views;
 mod load;
 mod memory;
 mod models;

@@ -99,13 +99,27 @@ impl<'s> LitScene<'s> {
         Ok(Self { samples: Some((Arc::new(cache), quality)), ..self.clone() })
     }
 
+    /// The scene with light from the same samples at another quality; without samples nothing changes.
+    pub fn at_quality(&self, quality: LightCacheQuality) -> Self {
+        let samples = self.samples.as_ref().map(|(cache, _)| (cache.clone(), quality));
+        Self { samples, ..self.clone() }
+    }
+
     fn work(&self) -> DrawWork<'_> {
         DrawWork { scene_time_s: self.scene_time_s, visibility: self.visibility, ..work(&self.scene, self.lighting) }
     }
 
     /// Samples of light. They hold no reflections: what mirrors show is each view's own.
     pub fn samples(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
-        let planes = SamplePlanes { light: true, ..SamplePlanes::default() };
+        self.draw_samples(cameras, SamplePlanes { light: true, ..SamplePlanes::default() })
+    }
+
+    /// Samples of colour, for methods that make views from images alone.
+    pub fn color_samples(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
+        self.draw_samples(cameras, SamplePlanes::default())
+    }
+
+    fn draw_samples(&self, cameras: &[PinholeCamera], planes: SamplePlanes) -> anyhow::Result<Vec<DepthImage>> {
         let lighting = self.lighting.without_reflections().unwrap_or(self.lighting);
         let work = DrawWork { lighting, ..self.work() };
         Ok(self.stand.engine().renderer.draw_depth_images(work, &pinholes(cameras), planes)?)

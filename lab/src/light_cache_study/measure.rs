@@ -4,20 +4,21 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use depth_image::LightCacheQuality::{self, Balanced, Draft, Fast, Fine};
-use depth_image::{Antialias, PinholeCamera, View, ViewPlanes};
+use depth_image::{PinholeCamera, View, ViewPlanes};
 use glam::Quat;
 use metrics::{PictureErrors, Rgb8Image, change_error_map, flip_map, foreground};
 use render::Lighting;
 use report::{Bar, Check, PictureRow, Point, Report, comparison_row};
 
-use super::light::{Light, SAMPLES_A_PIXEL};
-use super::subjects::{Condition, LIGHTING, Stage, Subject};
+use super::subjects::{Condition, LIGHTING, direct_rays};
 use crate::bench::timing::in_turn;
-use crate::compare::time_at;
 use crate::evaluation::mean_errors;
-use crate::failures::cached_light::{LitScene, unknown_share};
+use crate::failures::cached_light::LitScene;
 use crate::failures::measures::mean;
 use crate::failures::stand::Stand;
+use crate::lit_views::light::{Light, LightRays, SAMPLES_A_PIXEL};
+use crate::lit_views::measure::{DirectCurve, planes, true_views, unknown};
+use crate::lit_views::subject::{OrbitViews, SetSize, Stage, Subject, VIEW_PX};
 
 /// Little light beside the surfaces.
 const PLAIN_LIGHTING: &str = "shadows, occlusion 1";
@@ -28,7 +29,7 @@ const QUALITIES: [LightCacheQuality; 4] = [Draft, Fast, Balanced, Fine];
 const LEAST_LOOK_UP: f64 = 0.01;
 const CONDITION_VIEWS: usize = 2;
 /// Rays to a lamp and of ambient light, at each position, of the direct drawing whose flicker is compared.
-const FLICKERING: [u32; 2] = [4, 4];
+const FLICKERING: LightRays = LightRays::new(4, 4);
 /// Frames in which a camera turns, and the way between them.
 const FRAMES: usize = 4;
 const FRAME_TURN_RAD: f32 = 0.2_f32.to_radians();
@@ -63,9 +64,10 @@ pub struct Row {
 
 pub fn measure(stand: &Stand, subject: &Subject, plan: Measuring) -> anyhow::Result<SceneResult> {
     let Measuring { lighting, view_count, runs } = plan;
-    let (stage, light) = (subject.stage(stand, lighting, view_count, Ok)?, Light::of(&lighting));
+    let light = Light::of(&lighting);
+    let stage = subject.stage(stand, lighting, OrbitViews { count: view_count, size_px: VIEW_PX }, Ok)?;
     let ways = ways(&stage, light)?;
-    let reference = light.direct_rays().len() - 1;
+    let reference = direct_rays(light).len() - 1;
     let planes = planes(SAMPLES_A_PIXEL);
     let mut views = vec![Vec::new(); ways.len()];
     let places: Vec<usize> = (0..ways.len()).collect();
@@ -73,10 +75,7 @@ pub fn measure(stand: &Stand, subject: &Subject, plan: Measuring) -> anyhow::Res
         views[place] = ways[place].1.views(&stage.views, ViewPlanes { inverse_depth: false, ..planes })?;
         Ok(())
     })?;
-    // Seeds are made from the bits of a camera's eye: from the next place in x the picture is the same, and its noise another.
-    let mut truth_cameras = stage.views.clone();
-    truth_cameras.iter_mut().for_each(|camera| camera.eye_in_world.x = camera.eye_in_world.x.next_up());
-    let truth = stage.lit.in_light(&light.truth())?.views(&truth_cameras, planes)?;
+    let truth = true_views(&stage, &light.truth(direct_rays(light)[reference]))?;
     for (reference, truth) in views[reference].iter_mut().zip(&truth) {
         reference.inverse_depth_per_m.clone_from(&truth.inverse_depth_per_m);
     }
@@ -90,10 +89,7 @@ pub fn measure(stand: &Stand, subject: &Subject, plan: Measuring) -> anyhow::Res
         let [PictureErrors { psnr_db, flip, .. }, _] = mean_errors(&views[reference], &views[place])?;
         let truth_flip = mean_errors(&truth, &views[place])?[0].flip;
         let ms = seconds[place] * 1e3 / view_count as f64;
-        let mut unknown = None;
-        if place > reference {
-            unknown = mean(lit.views(&stage.views, ViewPlanes::WITH_PROVENANCE)?.iter().map(unknown_share));
-        }
+        let unknown = if place > reference { unknown(&lit, &stage.views)? } else { None };
         rows.push(Row { name, ms, psnr_db, flip, truth_flip, unknown });
     }
     let pictures = picture_row(subject.name, &views[reference][0], &views[balanced][0])?;
@@ -114,8 +110,7 @@ fn flicker_ratio(stage: &Stage<'_>, reference: &LitScene<'_>, cached: &LitScene<
         PinholeCamera { world_from_camera: turn * first.world_from_camera, ..*first }
     };
     let cameras: Vec<PinholeCamera> = (0..FRAMES).map(turned).collect();
-    let rays = FLICKERING.map(|rays| rays * SAMPLES_A_PIXEL);
-    let direct = stage.lit.in_light(&Light::Indirect.lighting(rays))?;
+    let direct = stage.lit.in_light(&Light::Indirect.lighting(FLICKERING.a_pixel()))?;
     let expected = reference.views(&cameras, planes(SAMPLES_A_PIXEL))?;
     let change_error = |lit: &LitScene<'_>| {
         let frames = lit.views(&cameras, planes(SAMPLES_A_PIXEL))?;
@@ -147,14 +142,14 @@ pub struct Measuring {
 /// Direct drawing with each number of rays, then light from samples of each quality.
 fn ways<'s>(stage: &Stage<'s>, light: Light) -> anyhow::Result<Vec<(String, LitScene<'s>)>> {
     let mut ways = Vec::new();
-    for rays in light.direct_rays() {
-        let lighting = light.lighting(rays.map(|rays| rays * SAMPLES_A_PIXEL));
-        ways.push((format!("direct, {} and {} rays", rays[0], rays[1]), stage.lit.in_light(&lighting)?));
+    for rays in direct_rays(light) {
+        let lighting = light.lighting(rays.a_pixel());
+        let name = format!("direct, {} and {} rays", rays.to_lamps, rays.ambient);
+        ways.push((name, stage.lit.in_light(&lighting)?));
     }
-    let images = stage.lit.decoded_samples(&stage.samples)?;
-    for quality in QUALITIES {
-        ways.push((quality.to_string(), stage.lit.with_samples(&images, quality)?));
-    }
+    let images = stage.lit.decoded_samples(&stage.sample_cameras(SetSize::DEFAULT))?;
+    let cached = stage.lit.with_samples(&images, QUALITIES[0])?;
+    ways.extend(QUALITIES.map(|quality| (quality.to_string(), cached.at_quality(quality))));
     Ok(ways)
 }
 
@@ -164,17 +159,27 @@ impl SceneResult {
         &self.direct[self.direct.len() - 1]
     }
 
-    /// The time of direct drawing with the fewest rays that reach a row's FLIP; `None` where no direct row reaches it.
-    pub fn direct_ms(&self, row: &Row) -> Option<f64> {
-        let points: Vec<Point> = self.direct.iter().map(|direct| (direct.ms, direct.truth_flip.ln()).into()).collect();
-        time_at(&points, row.truth_flip.ln())
+    pub fn curve(&self) -> DirectCurve {
+        DirectCurve::new(self.direct.iter().map(Row::point))
+    }
+
+    /// The time of direct drawing with a quality's FLIP over the quality's, at least.
+    pub fn gain(&self, row: &Row) -> f64 {
+        self.curve().least_ms_at(row.truth_flip) / row.ms
+    }
+}
+
+impl Row {
+    /// The time of a view, and its FLIP against the truth.
+    pub fn point(&self) -> Point {
+        (self.ms, self.truth_flip).into()
     }
 }
 
 /// One position a pixel: without light, and with light that is looked up.
 fn plain_seconds(stage: &Stage<'_>, runs: usize) -> anyhow::Result<[f64; 2]> {
     let plain = stage.lit.in_light(PLAIN_LIGHTING)?;
-    let draft = plain.with_samples(&plain.decoded_samples(&stage.samples)?, Draft)?;
+    let draft = plain.with_samples(&plain.decoded_samples(&stage.sample_cameras(SetSize::DEFAULT))?, Draft)?;
     let unlit = plain.in_light("unlit")?;
     let seconds = in_turn(&[&unlit, &draft], runs, |way| way.views(&stage.views, ViewPlanes::COLOR).map(drop))?;
     Ok([seconds[0], seconds[1]])
@@ -196,7 +201,9 @@ pub fn check(stand: &Stand, condition: &Condition, models: Option<&Path>, report
         report.checks.push(Check::not_run(name, "dB", bar, "--models is not given"));
         return Ok(());
     };
-    let mut stage = subject.stage(stand, LIGHTING.parse()?, CONDITION_VIEWS, condition.change)?;
+    let views = OrbitViews { count: CONDITION_VIEWS, size_px: VIEW_PX };
+    let mut stage = subject.stage(stand, LIGHTING.parse()?, views, condition.change)?;
+    let sample_cameras = stage.sample_cameras(SetSize::DEFAULT);
     let moments = if condition.is_moving { 8 } else { 1 };
     let planes = planes(if condition.is_moving { 1 } else { SAMPLES_A_PIXEL });
     let mut least_db = f64::INFINITY;
@@ -205,7 +212,7 @@ pub fn check(stand: &Stand, condition: &Condition, models: Option<&Path>, report
         stage.lit.scene_time_s = stage.period_s * moment as f32 / moments as f32;
         let lit = stage.lit.in_light(&format!("{LIGHTING}{}", condition.terms))?;
         let reference = stage.lit.in_light(&format!("soft 64, occlusion 64{}", condition.terms))?;
-        let cached = lit.with_samples(&lit.decoded_samples(&stage.samples)?, quality)?;
+        let cached = lit.with_samples(&lit.decoded_samples(&sample_cameras)?, quality)?;
         let views = cached.views(&stage.views, planes)?;
         let expected = reference.views(&stage.views, planes)?;
         least_db = mean_errors(&expected, &views)?[0].psnr_db.min(least_db);
@@ -214,8 +221,4 @@ pub fn check(stand: &Stand, condition: &Condition, models: Option<&Path>, report
     report.checks.push(Check::new(name, least_db, "dB", bar));
     report.pictures.extend(pictures);
     Ok(())
-}
-
-fn planes(samples_a_pixel: u32) -> ViewPlanes {
-    ViewPlanes { antialias: Antialias::of(samples_a_pixel).unwrap_or_default(), ..ViewPlanes::WITH_DEPTH }
 }

@@ -1,6 +1,5 @@
 //! `myriorama-lab study light_cache`: views whose light comes from samples, against direct drawing at equal error.
 
-mod light;
 mod measure;
 mod subjects;
 
@@ -17,11 +16,12 @@ use render::Lighting;
 use report::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 
 use crate::failures::stand::Stand;
+use crate::lit_views::light::{Light, SAMPLES_A_PIXEL};
+use crate::lit_views::subject::{Subject, VIEW_PX};
 use crate::section;
 use crate::statistics::{geometric_mean, mean_and_variation, quantile};
-use light::{Light, SAMPLES_A_PIXEL};
 use measure::{Measuring, Row, SHARED, SceneResult, check, measure};
-use subjects::{CONDITIONS, Condition, LIGHTING, OUTSIDE_SCENES, Subject, VIEW_PX, scene_names};
+use subjects::{CONDITIONS, Condition, LIGHTING, OUTSIDE_SCENES, scene_names};
 
 const RUNS: usize = 3;
 /// The scene that gains most.
@@ -126,16 +126,13 @@ fn add_to(report: &mut Report, light: Light, results: Vec<SceneResult>) -> anyho
     let mut rows = Table::new("Views of each scene", &columns);
     let mut look_ups = Table::new("`draft`, 1 sample a pixel", &[("scene", ""), ("look-up over surfaces", "×")]);
     for result in &results {
+        let curve = result.curve();
         for row in result.direct.iter().chain(&result.qualities) {
-            let gain = match result.direct_ms(row) {
-                _ if row.unknown.is_none() => Cell::Missing,
-                Some(direct_ms) => Cell::from(direct_ms / row.ms),
-                None => format!("> {:.2}", result.reference().ms / row.ms).into(),
-            };
+            let gain = row.unknown.map(|_| curve.gain(&row.point()));
             let unknown_percent = row.unknown.map(|share| share * 100.0);
             let numbers = [row.ms, row.psnr_db, row.flip, row.truth_flip].map(Cell::from);
             let names = [result.name.into(), row.name.as_str().into()];
-            rows.push(names.into_iter().chain(numbers).chain([unknown_percent.into(), gain]))?;
+            rows.push(names.into_iter().chain(numbers).chain([unknown_percent.into(), gain.into()]))?;
         }
         look_ups.push([result.name.into(), result.look_up_ratio.into()])?;
     }
@@ -150,12 +147,11 @@ fn add_to(report: &mut Report, light: Light, results: Vec<SceneResult>) -> anyho
 }
 
 fn chart(result: &SceneResult) -> XyChart {
-    let point = |row: &Row| (row.ms, row.truth_flip);
     let name = format!("FLIP over time, {}", result.name);
     let mut chart = XyChart::new(name, Axis::log("a view", "ms"), Axis::log("FLIP", ""));
-    chart = chart.with(Series::line("direct", result.direct.iter().map(point)));
+    chart = chart.with(Series::line("direct", result.direct.iter().map(Row::point)));
     for row in &result.qualities {
-        chart = chart.with(Series::points(row.name.clone(), [point(row)]));
+        chart = chart.with(Series::points(row.name.clone(), [row.point()]));
     }
     chart.note = "Errors over the foreground against a truth with other noise.".to_owned();
     chart
@@ -179,7 +175,7 @@ fn quality_checks(results: &[SceneResult]) -> Vec<Check> {
 fn indirect_checks(result: &SceneResult) -> Vec<Check> {
     let name = |what: &str| format!("`balanced`, indirect light, {}: {what}", result.name);
     let Some(row) = result.qualities.iter().find(|row| row.name == "balanced") else { return Vec::new() };
-    let gain = result.direct_ms(row).unwrap_or(result.reference().ms) / row.ms;
+    let gain = result.gain(row);
     let over_unlit = row.ms / result.unlit_ms;
     let (least_gain, most_over_unlit) = match result.name {
         "courtyard, inside" => (20.0, Some(4.0)),
@@ -203,8 +199,8 @@ fn indirect_checks(result: &SceneResult) -> Vec<Check> {
 
 fn gain_checks(results: &[SceneResult]) -> Vec<Check> {
     let best = |result: &SceneResult| {
-        let gain = |row: &Row| result.direct_ms(row).unwrap_or(result.reference().ms) / row.ms;
-        result.qualities.iter().map(gain).fold(0.0, f64::max)
+        let gains = result.qualities.iter().map(|row| result.gain(row));
+        gains.fold(0.0, f64::max)
     };
     let outside = || results.iter().filter(|result| !result.name.contains(", inside"));
     let gains: Vec<f64> = outside().map(best).collect();

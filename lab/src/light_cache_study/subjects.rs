@@ -1,26 +1,14 @@
-//! The subjects of the study: scenes, and where their views and sample cameras stand.
+//! The subjects of the study, and the numbers of rays of direct drawing.
 
-use std::path::Path;
-
-use anyhow::Context as _;
-use app_core::exit::BadInput;
-use app_core::setup::{SceneArgs, Setup};
-use depth_image::{EnvironmentMap, PinholeCamera, ViewCell};
+use depth_image::EnvironmentMap;
 use glam::{UVec2, Vec3};
-use render::Lighting;
-use sampling::Impostors;
-use scene::{Scene, SceneSpec};
+use scene::Scene;
 
-use super::light::Light;
-use crate::failures::cached_light::LitScene;
-use crate::failures::stand::Stand;
-use crate::models::models_of;
+use crate::lit_views::light::{Light, LightRays};
+use crate::lit_views::subject::{Change, INSIDE};
 
 /// The lighting of samples and of views that use them, unless another is given.
 pub const LIGHTING: &str = "soft 16, occlusion 16";
-pub const VIEW_PX: UVec2 = UVec2::new(640, 360);
-/// Views are the first places of an orbit of so many.
-const PLACES: usize = 8;
 /// Scenes that are seen from outside: models of a folder, and built-in ones.
 const MODELS: [&str; 4] = ["FlightHelmet", "lamborghini", "ingenuity", "threejs-shaderball"];
 const BUILT_IN: [&str; 4] = ["urban", "courtyard", "bird-nest", "tree-terrain-500k"];
@@ -29,12 +17,6 @@ const QUICK: [&str; 3] = ["lamborghini", "courtyard", "tree-terrain-125k"];
 /// Scenes whose indirect light is measured; the quick ones come first.
 const INDIRECT: [&str; 4] = ["courtyard, inside", "gallery", "urban, inside", "tree-terrain-500k"];
 const QUICK_INDIRECT: usize = 2;
-/// View cells inside scenes: in the middle of a street, and in a corner of the yard.
-const INSIDE: [Inside; 2] = [
-    Inside { name: "urban, inside", eyes: [[-62.5, 1.2, 29.88], [-59.5, 2.2, 30.12]], towards: [5.0, 4.3, -60.0] },
-    Inside { name: "courtyard, inside", eyes: [[-1.42, 1.0, 1.09], [-0.98, 1.4, 1.51]], towards: [1.6, -0.6, -1.7] },
-];
-const INSIDE_FOV_Y_RAD: f32 = 1.0;
 /// Subjects of a single check.
 pub const CONDITIONS: [Condition; 5] = [
     Condition { name: "snake, moving", is_moving: true, terms: "", change: Ok },
@@ -44,21 +26,6 @@ pub const CONDITIONS: [Condition; 5] = [
     Condition { name: "courtyard, 40 lamps", is_moving: false, terms: "", change: with_lamps },
 ];
 
-/// A scene. The name says after a comma what is special about the subject, if anything is.
-pub struct Subject {
-    pub name: &'static str,
-    scene: SceneSpec,
-}
-
-/// A view cell inside a scene: eyes at opposite corners, and their common direction, in world space.
-struct Inside {
-    name: &'static str,
-    eyes: [[f32; 3]; 2],
-    towards: [f32; 3],
-}
-
-type Change = fn(Scene) -> anyhow::Result<Scene>;
-
 pub struct Condition {
     pub name: &'static str,
     pub is_moving: bool,
@@ -67,12 +34,28 @@ pub struct Condition {
     pub change: Change,
 }
 
-/// A scene on the device, and the cameras of its views and of the samples that serve them.
-pub struct Stage<'s> {
-    pub lit: LitScene<'s>,
-    pub period_s: f32,
-    pub views: Vec<PinholeCamera>,
-    pub samples: Vec<PinholeCamera>,
+/// Rays of direct drawing at each position. The last is the reference. Lamps need few.
+pub fn direct_rays(light: Light) -> &'static [LightRays] {
+    const OCCLUSION: [LightRays; 5] = [
+        LightRays::new(1, 1),
+        LightRays::new(2, 2),
+        LightRays::new(4, 4),
+        LightRays::new(8, 8),
+        LightRays::new(16, 16),
+    ];
+    const INDIRECT: [LightRays; 7] = [
+        LightRays::new(1, 1),
+        LightRays::new(2, 2),
+        LightRays::new(4, 4),
+        LightRays::new(4, 8),
+        LightRays::new(4, 16),
+        LightRays::new(4, 32),
+        LightRays::new(16, 64),
+    ];
+    match light {
+        Light::Occlusion => &OCCLUSION,
+        Light::Indirect => &INDIRECT,
+    }
 }
 
 /// The scenes that are compared with direct drawing.
@@ -83,56 +66,6 @@ pub fn scene_names(light: Light, is_quick: bool) -> Vec<&'static str> {
         (Light::Indirect, false) => INDIRECT.to_vec(),
         (Light::Occlusion, true) => QUICK.to_vec(),
         (Light::Occlusion, false) => [&MODELS[..], &BUILT_IN, &inside].concat(),
-    }
-}
-
-impl Subject {
-    /// The subject of a name; `None` for a model without a folder of models.
-    pub fn new(name: &'static str, models: Option<&Path>) -> anyhow::Result<Option<Self>> {
-        let scene_name = name.split(',').next().unwrap_or(name);
-        let mut scene = scene_name.parse()?;
-        if let SceneSpec::File(file) = &mut scene {
-            let Some(folder) = models else { return Ok(None) };
-            let mut models = models_of(folder, usize::MAX)?.into_iter();
-            let model = models.find(|model| model.file_stem().is_some_and(|stem| stem == scene_name));
-            *file = model.ok_or_else(|| BadInput(format!("{}: no model {scene_name}", folder.display())))?;
-        }
-        Ok(Some(Self { name, scene }))
-    }
-
-    /// Puts the scene on the device. A texel of its four sample images has a view pixel's focal length.
-    pub fn stage<'s>(
-        &self,
-        stand: &'s Stand,
-        lighting: Lighting,
-        view_count: usize,
-        change: Change,
-    ) -> anyhow::Result<Stage<'s>> {
-        let args = SceneArgs { impostors: Impostors::None, ..SceneArgs::new(self.scene.clone()) };
-        let Setup { scene, mut around, .. } = args.load()?;
-        if let Some(cell) = INSIDE.iter().find(|cell| cell.name == self.name) {
-            around = cell.corners(scene.bounds().near_m())?;
-        }
-        let mut views = ViewCell::between(&around).context("no sample cameras")?.orbit(PLACES, VIEW_PX);
-        views.truncate(view_count);
-        for camera in &mut around {
-            let size_px = camera.size_px.as_vec2() * (views[0].focal_px.y / camera.focal_px.y);
-            *camera = camera.resized(size_px.round().as_uvec2());
-        }
-        let period_s = scene.period_s().unwrap_or(0.0);
-        let lit = LitScene::new(stand, &change(scene)?, &lighting.to_string())?.by_faster_way(&views[0])?;
-        Ok(Stage { lit, period_s, views, samples: around })
-    }
-}
-
-impl Inside {
-    fn corners(&self, near_m: f32) -> anyhow::Result<Vec<PinholeCamera>> {
-        let camera = |eye: [f32; 3]| {
-            let target = Vec3::from(eye) + Vec3::from(self.towards);
-            let aimed = PinholeCamera::looking_at(eye.into(), target, Vec3::Y, INSIDE_FOV_Y_RAD, VIEW_PX);
-            PinholeCamera { near_m, ..aimed }
-        };
-        Ok(ViewCell::between(&self.eyes.map(camera)).context("a view cell")?.grid(2, 2, VIEW_PX))
     }
 }
 
