@@ -84,12 +84,20 @@ pub fn read(path: Option<&Path>) -> Result<Vec<Conditions>, BadInput> {
 /// # Errors
 /// No subject's name contains any of the texts.
 pub fn named(all: Vec<Conditions>, texts: &[String]) -> Result<Vec<Conditions>, BadInput> {
-    let is_named = |subject: &Conditions| {
-        let name = subject.name.to_lowercase();
-        texts.iter().any(|text| name.contains(&text.to_lowercase()))
-    };
-    let named: Vec<Conditions> = all.into_iter().filter(is_named).collect();
-    if named.is_empty() { Err(BadInput(format!("no subject's name contains {texts:?}"))) } else { Ok(named) }
+    let named: Vec<Conditions> = all.into_iter().filter(|subject| is_named(&subject.name, texts)).collect();
+    if named.is_empty() { Err(none_is_named(texts)) } else { Ok(named) }
+}
+
+/// Whether a name contains one of the texts, in any case.
+#[must_use]
+pub fn is_named(name: &str, texts: &[String]) -> bool {
+    let name = name.to_lowercase();
+    texts.iter().any(|text| name.contains(&text.to_lowercase()))
+}
+
+#[must_use]
+pub fn none_is_named(texts: &[String]) -> BadInput {
+    BadInput(format!("no subject's name contains {texts:?}"))
 }
 
 fn parsed(text: &str, file: &str) -> Result<Vec<Conditions>, BadInput> {
