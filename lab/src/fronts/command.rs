@@ -224,7 +224,7 @@ fn measure_lit(
     let views = expensive::subjects::views(args.quick);
     report.parameter("expensive light: views a row", format!("{} of {}", views.count, views.size_px));
     for LitWork { subject, light } in wanted {
-        let progress = bar(format!("views, {}, {light:?}", subject.name), LightFront::steps(views));
+        let progress = bar(format!("rows, {}, {light:?}", subject.name), expensive::rows::ROWS);
         let front = LightFront::measure(&stand, subject, *light, views, || progress.inc(1));
         progress.finish_and_clear();
         let front = front.with_context(|| format!("subject {:?}", subject.name))?;

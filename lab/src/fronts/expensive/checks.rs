@@ -11,7 +11,7 @@ use crate::lit_views::subject::SetSize;
 /// FLIP of direct drawing with the most rays over that with the fewest: the reference shows what rays bring.
 const MOST_DIRECT_RATIO: f64 = 0.6;
 /// FLIP of direct drawing over that of `balanced` in the same time, in interiors.
-const LEAST_INDIRECT_RATIO: f64 = 2.0;
+const LEAST_INDIRECT_RATIO: f64 = 1.5;
 const LEAST_OCCLUSION_RATIO: f64 = 1.2;
 
 pub fn checks(front: &LightFront) -> Vec<Check> {
@@ -62,7 +62,7 @@ fn is_finite(row: &LightRow) -> bool {
 fn direct_ratio(front: &LightFront) -> Option<f64> {
     let mut direct = front.rows.iter().filter(|row| matches!(row.drawing, Drawing::Direct(_)));
     let fewest = direct.next()?;
-    Some(direct.last()?.flip / fewest.flip)
+    Some(direct.next_back()?.flip / fewest.flip)
 }
 
 /// Direct drawing that is slower than `balanced` even with the fewest rays is compared all the same.
@@ -100,7 +100,8 @@ mod tests {
             rows.extend(QUALITIES.map(|q| row(Drawing::LightCache(q), Some(set), shared_ms, shared_flip)));
         }
         rows.push(row(Drawing::JointCarve, Some(SetSize::DEFAULT), 20.0, 0.2));
-        LightFront { name: "a room".to_owned(), light: Light::Indirect, is_interior: true, rows }
+        let truth = Light::Indirect.truth(DIRECT_RAYS[6]);
+        LightFront { name: "a room".to_owned(), light: Light::Indirect, is_interior: true, truth, rows }
     }
 
     fn falls_short(front: &LightFront) -> usize {

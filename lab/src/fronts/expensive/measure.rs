@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use depth_image::{PinholeCamera, View, ViewPlanes};
+use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes};
 use metrics::PictureErrors;
 use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
 
@@ -19,6 +19,8 @@ use crate::statistics::median;
 
 /// The most rays to a lamp and of ambient light at a position; true views have twice as many.
 const MOST_RAYS: LightRays = LightRays::new(16, 64);
+/// The density of a set that is sampled before each set that is timed, since the first of a kind compiles shaders.
+const WARM_UP_DENSITY: f32 = 0.0625;
 
 /// A subject's rows under one lighting.
 pub struct LightFront {
@@ -26,13 +28,15 @@ pub struct LightFront {
     pub name: String,
     pub light: Light,
     pub is_interior: bool,
+    /// The lighting of the true views.
+    pub truth: String,
     pub rows: Vec<LightRow>,
 }
 
 /// What draws views.
 enum Drawer<'s> {
     Scene(LitScene<'s>),
-    Images(&'s Stand, SampleSet),
+    Images(&'s Stand, Box<SampleSet>),
 }
 
 /// A row before it is measured.
@@ -41,12 +45,16 @@ struct OpenRow<'s> {
     set: Option<SetSize>,
     sampling_s: f64,
     drawer: Drawer<'s>,
-    views: Vec<View>,
-    views_s: Vec<f64>,
+}
+
+/// Decoded images of a set, and the time of sampling it.
+struct TimedImages {
+    images: Vec<DepthImage>,
+    sampling_s: f64,
 }
 
 impl LightFront {
-    /// Measures all rows. Rows take turns, view by view, so that none has the quieter machine.
+    /// Measures all rows; calls `done` after each.
     ///
     /// # Errors
     /// The scene cannot be used, or the device fails.
@@ -59,27 +67,15 @@ impl LightFront {
     ) -> anyhow::Result<Self> {
         let lighting = lighting(light);
         let stage = subject.stage(stand, lighting.parse()?, views, Ok)?;
-        let mut rows = open_rows(&stage, light)?;
-        let planes = ViewPlanes { inverse_depth: false, ..planes(SAMPLES_A_PIXEL) };
-        for camera in &stage.views {
-            for row in &mut rows {
-                let start = Instant::now();
-                let view = row.drawer.view(camera, planes)?;
-                row.views_s.push(start.elapsed().as_secs_f64());
-                row.views.push(view);
-            }
+        let truth_lighting = light.truth(MOST_RAYS);
+        let truth = true_views(&stage, &truth_lighting)?;
+        let mut rows = Vec::new();
+        for row in open_rows(&stage, light)? {
+            rows.push(row.measure(&stage, &truth)?);
             done();
         }
-        let truth = true_views(&stage, &light.truth(MOST_RAYS))?;
-        done();
-        let rows = rows.into_iter().map(|row| row.close(&stage, &truth)).collect::<anyhow::Result<_>>()?;
         let name = format!("{}, {lighting}", subject.name);
-        Ok(Self { name, light, is_interior: is_interior(subject.name), rows })
-    }
-
-    /// Calls of `done` while a subject is measured.
-    pub fn steps(views: OrbitViews) -> usize {
-        views.count + 1
+        Ok(Self { name, light, is_interior: is_interior(subject.name), truth: truth_lighting, rows })
     }
 
     pub fn direct(&self) -> DirectCurve {
@@ -102,23 +98,24 @@ fn open_rows<'s>(stage: &Stage<'s>, light: Light) -> anyhow::Result<Vec<OpenRow<
     let mut rows = Vec::new();
     for rays in DIRECT_RAYS {
         let lit = stage.lit.in_light(&light.lighting(rays.a_pixel()))?;
-        rows.push(OpenRow::new(Drawing::Direct(rays), None, 0.0, Drawer::Scene(lit)));
+        rows.push(OpenRow { drawing: Drawing::Direct(rays), set: None, sampling_s: 0.0, drawer: Drawer::Scene(lit) });
     }
     for set in sets() {
-        let start = Instant::now();
-        let images = stage.lit.samples(&stage.sample_cameras(set))?;
-        let sampling_s = start.elapsed().as_secs_f64();
-        let images = images.iter().map(encoded_and_decoded).collect::<anyhow::Result<Vec<_>>>()?;
+        let TimedImages { images, sampling_s } = TimedImages::sample(stage, set, |cameras| stage.lit.samples(cameras))?;
         let cached = stage.lit.with_samples(&images, QUALITIES[0])?;
         rows.extend(QUALITIES.map(|quality| {
             let drawer = Drawer::Scene(cached.at_quality(quality));
-            OpenRow::new(Drawing::LightCache(quality), Some(set), sampling_s, drawer)
+            OpenRow { drawing: Drawing::LightCache(quality), set: Some(set), sampling_s, drawer }
         }));
     }
-    let start = Instant::now();
-    let images = stage.lit.color_samples(&stage.sample_cameras(SetSize::DEFAULT))?;
-    let sampling_s = start.elapsed().as_secs_f64();
-    let images = images.iter().map(encoded_and_decoded).collect::<anyhow::Result<Vec<_>>>()?;
+    rows.push(joint_carve(stage)?);
+    Ok(rows)
+}
+
+fn joint_carve<'s>(stage: &Stage<'s>) -> anyhow::Result<OpenRow<'s>> {
+    let set = SetSize::DEFAULT;
+    let TimedImages { images, sampling_s } =
+        TimedImages::sample(stage, set, |cameras| stage.lit.color_samples(cameras))?;
     let description = SetDescription {
         volume: stage.scene.bounds(),
         background: stage.scene.background,
@@ -128,9 +125,24 @@ fn open_rows<'s>(stage: &Stage<'s>, light: Light) -> anyhow::Result<Vec<OpenRow<
         mips: false,
     };
     let images = stage.stand.reconstructor().upload(&images, &description)?;
-    let drawer = Drawer::Images(stage.stand, images);
-    rows.push(OpenRow::new(Drawing::JointCarve, Some(SetSize::DEFAULT), sampling_s, drawer));
-    Ok(rows)
+    let drawer = Drawer::Images(stage.stand, Box::new(images));
+    Ok(OpenRow { drawing: Drawing::JointCarve, set: Some(set), sampling_s, drawer })
+}
+
+impl TimedImages {
+    fn sample(
+        stage: &Stage<'_>,
+        set: SetSize,
+        sample: impl Fn(&[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>>,
+    ) -> anyhow::Result<Self> {
+        sample(&stage.sample_cameras(SetSize { density: WARM_UP_DENSITY, ..set }))?;
+        let cameras = stage.sample_cameras(set);
+        let start = Instant::now();
+        let images = sample(&cameras)?;
+        let sampling_s = start.elapsed().as_secs_f64();
+        let images = images.iter().map(encoded_and_decoded).collect::<anyhow::Result<_>>()?;
+        Ok(Self { images, sampling_s })
+    }
 }
 
 impl Drawer<'_> {
@@ -147,13 +159,19 @@ impl Drawer<'_> {
     }
 }
 
-impl<'s> OpenRow<'s> {
-    fn new(drawing: Drawing, set: Option<SetSize>, sampling_s: f64, drawer: Drawer<'s>) -> Self {
-        Self { drawing, set, sampling_s, drawer, views: Vec::new(), views_s: Vec::new() }
-    }
-
-    fn close(self, stage: &Stage<'_>, truth: &[View]) -> anyhow::Result<LightRow> {
-        let [PictureErrors { psnr_db, flip, .. }, _] = mean_errors(truth, &self.views)?;
+impl OpenRow<'_> {
+    /// Draws the views one after the other, after one that does not count.
+    fn measure(self, stage: &Stage<'_>, truth: &[View]) -> anyhow::Result<LightRow> {
+        let planes = ViewPlanes { inverse_depth: false, ..planes(SAMPLES_A_PIXEL) };
+        self.drawer.view(&stage.views[0], planes)?;
+        let mut views = Vec::with_capacity(stage.views.len());
+        let mut views_s = Vec::with_capacity(stage.views.len());
+        for camera in &stage.views {
+            let start = Instant::now();
+            views.push(self.drawer.view(camera, planes)?);
+            views_s.push(start.elapsed().as_secs_f64());
+        }
+        let [PictureErrors { psnr_db, flip, .. }, _] = mean_errors(truth, &views)?;
         let unknown = match (&self.drawing, &self.drawer) {
             (Drawing::LightCache(_), Drawer::Scene(lit)) => unknown(lit, &stage.views)?,
             _ => None,
@@ -161,7 +179,7 @@ impl<'s> OpenRow<'s> {
         Ok(LightRow {
             drawing: self.drawing,
             set: self.set,
-            view_ms: median(self.views_s) * 1e3,
+            view_ms: median(views_s) * 1e3,
             sampling_s: self.sampling_s,
             flip,
             psnr_db,

@@ -6,7 +6,7 @@
 pub mod checks;
 mod measure;
 pub mod report;
-mod rows;
+pub mod rows;
 pub mod subjects;
 
 pub use measure::LightFront;

@@ -12,6 +12,7 @@ use super::rows::{Drawing, LightRow};
 pub fn add_to(report: &mut Report, front: &LightFront) -> anyhow::Result<()> {
     let table = table(front)?;
     println!("{}", table.to_markdown());
+    report.parameter(format!("{}: truth", front.name), front.truth.as_str());
     report.tables.push(table);
     report.charts.push(chart(front).into());
     Ok(())
@@ -58,7 +59,6 @@ fn chart(front: &LightFront) -> XyChart {
     let title = format!("FLIP against time, {}", front.name);
     let mut chart = XyChart::new(title, Axis::log("a view", "ms"), Axis::log("Foreground FLIP", ""));
     let mut series: Vec<String> = front.rows.iter().map(series_name).collect();
-    series.dedup();
     series.sort();
     series.dedup();
     for name in series {
