@@ -42,11 +42,12 @@ pub enum StudyCommand {
     ///
     /// Errors of pictures are those of the foreground: of the pixels that show a surface.
     Failures(FailuresArgs),
-    /// Charts cost against error of every representation among which a budget chooses
+    /// Charts cost against error of every representation among which a budget chooses, and of shared light
     ///
     /// A row of the ladder is a sampling method, a number of sample cameras, a size of their images and a reconstruction
     /// method. For each subject the report has a table of all rows, charts with the front of the best, direct drawing and
-    /// what `myriorama plan` chooses. docs/fronts.md explains how to read them.
+    /// what `myriorama plan` chooses. Under expensive light the rows are qualities of light_cache with sample sets of several
+    /// sizes, joint_carve, and direct drawing with 1 to 64 rays. docs/fronts.md explains how to read both.
     Fronts(FrontsArgs),
     /// Plans on subjects that nothing was tuned on, and compares the choices with tables of all rows
     Planner(PlannerArgs),

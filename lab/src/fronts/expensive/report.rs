@@ -63,14 +63,15 @@ fn chart(front: &LightFront) -> XyChart {
     series.dedup();
     for name in series {
         let rows = front.rows.iter().filter(|row| series_name(row) == name);
-        let points: Vec<Point> = rows.map(|row| point(front, row)).collect();
+        let points: Vec<Point> = rows.map(point).collect();
         let is_direct = name == "direct";
         chart = chart.with(if is_direct { Series::line(name, points) } else { Series::points(name, points) });
     }
     chart = chart.with_front(Better::Low, Better::Low);
-    chart.note = "Sampling is not part of the time of a view. Labels: direct drawing by its rays of occlusion or of \
-        indirect light a position, rows of the front by S and density."
-        .to_owned();
+    chart.note =
+        "Sampling is not part of the time of a view. Labels: rays of occlusion or of indirect light a position, in \
+        direct drawing."
+            .to_owned();
     chart
 }
 
@@ -81,12 +82,10 @@ fn series_name(row: &LightRow) -> String {
     }
 }
 
-/// Rows of direct drawing and of the front are labelled.
-fn point(front: &LightFront, row: &LightRow) -> Point {
-    let label = match (row.drawing, row.set) {
-        (Drawing::Direct(rays), _) => rays.ambient.to_string(),
-        (_, Some(set)) if front.is_on_front(row) => format!("{}, {}", set.images, set.density),
-        _ => String::new(),
+fn point(row: &LightRow) -> Point {
+    let label = match row.drawing {
+        Drawing::Direct(rays) => rays.ambient.to_string(),
+        Drawing::LightCache(_) | Drawing::JointCarve => String::new(),
     };
     Point::labelled(row.view_ms, row.flip, label)
 }
