@@ -5,8 +5,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use cluster::limits::MAX_SCENES;
 use cluster::{CommonCell, OfferSettings, OfferStatus, SceneHash, SceneRef};
-use depth_image::{Aabb, Camera, CubeGrid, Environment, Illumination, LightFieldCamera};
-use glam::DVec3;
+use depth_image::{Aabb, Camera, CubeGrid, Environment, Illumination, LightFieldCamera, SourceSpace};
 use planner::{Budget, Row};
 use tonic::Status;
 
@@ -73,8 +72,8 @@ pub struct SceneOffer {
     pub background: Environment,
     /// Lamps and environment: compositors add the highlights, which depend on the viewer.
     pub illumination: Illumination,
-    /// The point of the source file's space that is the world's origin.
-    pub origin_in_source: DVec3,
+    /// The space of the scene's file.
+    pub source_space: SourceSpace,
     /// Defaults of sessions.
     pub settings: OfferSettings,
     /// The representations among which budgets choose.
@@ -184,7 +183,7 @@ impl SceneOffer {
             scene: self.scene(),
             sample_cameras: self.rig.clone(),
             volume: self.volume,
-            origin_in_source: self.origin_in_source,
+            source_space: self.source_space,
             settings: self.settings.clone(),
             period_s: self.period_s,
         }

@@ -42,7 +42,7 @@ export function eyeOf(state) {
 /** The state of a camera of the protocol: { eye, target, fov_y_deg }. */
 export function fromCamera(camera, size, isFlying = false) {
   const back = add(camera.eye, scale(camera.target, -1));
-  const distance = Math.max(length(back), NEAREST * size, 1e-9);
+  const distance = Math.max(length(back), NEAREST * size, 1e-30);
   const pitch = clamp(Math.asin(clamp(back[1] / distance, -1, 1)), -STEEPEST, STEEPEST);
   return { target: camera.target, yaw: Math.atan2(back[0], back[2]), pitch, distance, fovY: camera.fov_y_deg, size, isFlying };
 }
@@ -138,7 +138,7 @@ export function fromFragment(fragment) {
   if (!parts) return null;
   const [eye, target] = [parts[1], parts[2]].map((text) => text.split(",").map(Number));
   const fov = Number(parts[3]);
-  const isPoint = (p) => p.length === 3 && p.every((v) => Number.isFinite(v) && Math.abs(v) <= 1e9);
+  const isPoint = (p) => p.length === 3 && p.every((v) => Number.isFinite(v) && Math.abs(v) <= 1e12);
   const isCamera = isPoint(eye) && isPoint(target) && fov >= 1 && fov <= 170;
   return isCamera ? { eye, target, fov_y_deg: fov } : null;
 }

@@ -1,14 +1,14 @@
 //! Cameras as pages and links name them, and the sizes of pictures.
 
 use cluster::OfferStatus;
-use depth_image::{PinholeCamera, ViewCell};
+use depth_image::{PinholeCamera, SourceSpace, ViewCell};
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// The field of view of a page that chooses none, in degrees.
 const FOV_Y_DEG: f64 = 45.0;
-/// The greatest coordinate of a camera, in the scene file's unit.
-const FARTHEST: f64 = 1e9;
+/// The greatest coordinate of a camera, in the scene file's unit and in metres.
+const FARTHEST: f64 = 1e12;
 /// The longest side of a page's canvas.
 const MAX_CANVAS_PX: u32 = 16_384;
 
@@ -40,13 +40,13 @@ fn bad(field: &'static str, value: impl std::fmt::Debug, allowed: &'static str) 
 /// The world of a scene on offer, as views need it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ViewSpace {
-    origin_in_source: DVec3,
+    pub(crate) source_space: SourceSpace,
     near_m: f32,
 }
 
 impl ViewSpace {
     pub(crate) fn of(offer: &OfferStatus) -> Self {
-        Self { origin_in_source: offer.origin_in_source, near_m: offer.volume.near_m() }
+        Self { source_space: offer.source_space, near_m: offer.volume.near_m() }
     }
 
     /// The camera of a view of this size.
@@ -55,9 +55,9 @@ impl ViewSpace {
     /// For numbers that are not finite or out of range.
     pub(crate) fn camera(&self, page: &PageCamera, size_px: UVec2) -> Result<PinholeCamera, BadView> {
         let point = |field, point: [f64; 3]| {
-            let is_near = point.iter().all(|v| v.abs() <= FARTHEST);
-            let in_world = (DVec3::from_array(point) - self.origin_in_source).as_vec3();
-            if is_near { Ok(in_world) } else { Err(bad(field, point, "within ±1e9")) }
+            let in_world = self.source_space.world_from_source(DVec3::from_array(point));
+            let is_near = point.iter().all(|v| v.abs() <= FARTHEST) && in_world.abs().max_element() <= FARTHEST as f32;
+            if is_near { Ok(in_world) } else { Err(bad(field, point, "within ±1e12")) }
         };
         if !(1.0..=170.0).contains(&page.fov_y_deg) {
             return Err(bad("fov_y_deg", page.fov_y_deg, "from 1 to 170"));
@@ -87,13 +87,13 @@ impl ViewSpace {
         let fov_y_deg = middle_camera.map_or(FOV_Y_DEG, |camera| {
             f64::from((camera.size_px.y as f32 * 0.5 / camera.focal_px.y).atan() * 2.0).to_degrees()
         });
-        let in_source = |point: Vec3| (point.as_dvec3() + self.origin_in_source).to_array();
+        let in_source = |point: Vec3| self.source_space.source_from_world(point).to_array();
         PageCamera { eye: in_source(eye), target: in_source(target), fov_y_deg }
     }
 
     /// A point of the world, in the coordinates of the scene's file.
     pub(crate) fn in_source(&self, point_in_world: Vec3) -> [f64; 3] {
-        (point_in_world.as_dvec3() + self.origin_in_source).to_array()
+        self.source_space.source_from_world(point_in_world).to_array()
     }
 }
 
@@ -111,7 +111,7 @@ pub(crate) mod tests {
         PageCamera { eye: [100.0, 2.0, 3.0], target: [100.0, 0.0, 0.0], fov_y_deg: 40.0 };
 
     fn space() -> ViewSpace {
-        ViewSpace { origin_in_source: DVec3::new(100.0, 0.0, 0.0), near_m: 0.01 }
+        ViewSpace { source_space: SourceSpace::moved(DVec3::new(100.0, 0.0, 0.0)), near_m: 0.01 }
     }
 
     #[test]

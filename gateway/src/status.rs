@@ -38,7 +38,7 @@ pub(crate) async fn cameras(
             cameras.into_iter().map(move |camera| (cell, camera))
         })
         .map(|(cell, camera)| {
-            let mut frame = camera_frame(&camera, scene.offer.origin_in_source);
+            let mut frame = camera_frame(&camera, scene.offer.source_space);
             frame.insert("cell".to_owned(), json!(cell));
             Value::Object(frame)
         })

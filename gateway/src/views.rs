@@ -194,7 +194,7 @@ fn header_of(legend: &Legend) -> Option<HeaderValue> {
     names.to_string().parse().ok().filter(|_| !legend.is_empty())
 }
 
-/// `depth.npy`: planar depth in 32-bit floats, infinite where there is no surface.
+/// `depth.npy`: planar depth in the unit of the scene's file, in 32-bit floats, infinite where there is no surface.
 pub(crate) async fn depth(
     State(gateway): State<Arc<Gateway>>,
     Query(query): Query<ViewQuery>,
@@ -203,8 +203,9 @@ pub(crate) async fn depth(
     let planes = ViewPlanes::WITH_DEPTH;
     let SingleView { frame: Frame { view, .. }, place, .. } = visited.draw(&gateway, planes).await?;
     let inverse = view.inverse_depth_per_m.ok_or_else(|| Refusal::internal("the view lacks depth"))?;
+    let metres_per_unit = visited.scene.space.source_space.metres_per_unit as f32;
     // One over zero is infinite, as it should be.
-    let file = npy(view.size_px, inverse.into_iter().map(f32::recip));
+    let file = npy(view.size_px, inverse.into_iter().map(|inverse| 1.0 / (inverse * metres_per_unit)));
     Ok(held("application/octet-stream", file.into(), place))
 }
 
@@ -240,6 +241,7 @@ fn surface(visited: &Visited, view: &View, at: UVec2, first_camera: usize) -> Op
     let has_surface = inverse > 0.0 && provenance.kind() != ProvenanceKind::Empty;
     let pixel = at.as_vec2() + Vec2::splat(0.5);
     let in_world = visited.camera.unproject(PixelDepth { pixel, planar_depth_m: 1.0 / inverse });
+    let metres_per_unit = visited.scene.space.source_space.metres_per_unit as f32;
     let mask = provenance.camera_mask();
     let cameras: Vec<usize> = (0..24).filter(|bit| mask >> bit & 1 == 1).map(|bit| first_camera + bit).collect();
     let source = match provenance.kind() {
@@ -254,7 +256,7 @@ fn surface(visited: &Visited, view: &View, at: UVec2, first_camera: usize) -> Op
     Some(json!({
         "at": at.to_array(), "source": source, "cameras": cameras,
         "point": has_surface.then(|| visited.scene.space.in_source(in_world)),
-        "planar_depth": has_surface.then_some(1.0 / inverse),
+        "planar_depth": has_surface.then_some(1.0 / (inverse * metres_per_unit)),
     }))
 }
 

@@ -11,8 +11,10 @@ use cluster::{
 };
 use codec::{FrameAssembly, FramePart, WholeFrame};
 use coordinator::{CoordinatorConfig, Observers, OfferedCube, OfferedMirror, SceneOffer, SceneOffers};
-use depth_image::{Aabb, Camera, CubeGrid, Environment, LightDirections, LightFieldCamera, PinholeCamera, ViewPlanes};
-use glam::{DVec3, UVec2, Vec3};
+use depth_image::{
+    Aabb, Camera, CubeGrid, Environment, LightDirections, LightFieldCamera, PinholeCamera, SourceSpace, ViewPlanes,
+};
+use glam::{UVec2, Vec3};
 use node::{NodeConfig, NodeMetrics};
 use planner::Row;
 use tokio::net::TcpListener;
@@ -186,7 +188,7 @@ pub fn offer() -> SceneOffer {
         volume: volume(),
         background: Environment::uniform(SKY_LINEAR),
         illumination: illumination(),
-        origin_in_source: DVec3::ZERO,
+        source_space: SourceSpace::default(),
         settings: OfferSettings::default(),
         // Six moments of a viewer.
         period_s: Some(0.5),

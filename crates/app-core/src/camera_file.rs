@@ -2,14 +2,14 @@
 //!
 //! `transform_matrix` is camera to world, the camera looking down −Z with +Y up, as rows or as 16 numbers. Focal lengths and
 //! principal points are in pixels, for a frame or for all; angles of view may stand in place of focal lengths. Only pinhole
-//! cameras can be used: distortion that is not zero is refused by name. Files are in the scene file's own space: the origin of a
-//! re-centred scene is subtracted in double precision.
+//! cameras can be used: distortion that is not zero is refused by name. Files are in the scene file's own space: the origin and
+//! unit of a re-centred or scaled scene apply in double precision.
 
 use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
-use depth_image::{CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera};
+use depth_image::{CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera, SourceSpace};
 use glam::{DMat3, DQuat, DVec2, DVec3, DVec4, UVec2, Vec2};
 use serde_json::{Map, Value};
 
@@ -26,8 +26,8 @@ const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
 /// Facts that a camera file does not state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
-    /// The origin of world space, in the file's space.
-    pub origin_in_source: DVec3,
+    /// The file's space, which is that of the scene's file.
+    pub source_space: SourceSpace,
     /// The distance to the near plane.
     pub near_m: f32,
     /// The size of frames that state none.
@@ -198,7 +198,7 @@ impl Frame<'_> {
         ];
         let (rotation, eye_in_source) = self.pose()?;
         let camera = PinholeCamera {
-            eye_in_world: (eye_in_source - placement.origin_in_source).as_vec3(),
+            eye_in_world: placement.source_space.world_from_source(eye_in_source),
             world_from_camera: rotation.as_quat().normalize(),
             focal_px: focal_px.as_vec2(),
             principal_px: Vec2::from_array(principal.map(|v| v as f32)),

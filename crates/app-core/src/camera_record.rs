@@ -4,8 +4,7 @@ use std::fs::File;
 use std::io::{BufRead as _, BufReader, BufWriter, ErrorKind, Read as _, Write as _};
 use std::path::Path;
 
-use depth_image::PinholeCamera;
-use glam::DVec3;
+use depth_image::{PinholeCamera, SourceSpace};
 use pictures::camera_frame;
 use serde_json::{Map, Value, json};
 
@@ -31,10 +30,10 @@ pub struct NamedCamera {
 impl NamedCamera {
     /// The line of the camera in a record, in the space of the scene file.
     #[must_use]
-    pub fn line(&self, origin_in_source: DVec3) -> String {
+    pub fn line(&self, source_space: SourceSpace) -> String {
         let mut frame = self.more.clone();
         frame.insert("file_path".to_owned(), json!(self.file_path));
-        frame.extend(camera_frame(&self.camera, origin_in_source));
+        frame.extend(camera_frame(&self.camera, source_space));
         Value::Object(frame).to_string()
     }
 }
@@ -47,11 +46,11 @@ impl NamedCamera {
 pub fn write(
     path: &Path,
     cameras: impl IntoIterator<Item = NamedCamera>,
-    origin_in_source: DVec3,
+    source_space: SourceSpace,
     about: Map<String, Value>,
 ) -> Result<(), CameraFileError> {
     let part = path.with_extension("part");
-    let lines = cameras.into_iter().map(|camera| camera.line(origin_in_source));
+    let lines = cameras.into_iter().map(|camera| camera.line(source_space));
     let written = write_lines(&part, lines, about);
     let written = written.and_then(|()| std::fs::rename(&part, path));
     written.map_err(|error| CameraFileError { file: path.display().to_string(), ..fault("file", error) })

@@ -277,7 +277,7 @@ impl SceneArgs {
             volume: scene.bounds(),
             background: scene.background,
             illumination: scene.illumination.clone(),
-            origin_in_source: scene.origin_in_source,
+            source_space: scene.source_space,
             settings: OfferSettings {
                 method: Some(self.method().to_string()),
                 sampling: Some(self.sampling().to_string()),
@@ -380,7 +380,7 @@ impl SceneArgs {
         };
         let near_m = scene.bounds().near_m();
         let size_of_views_px = size_px.unwrap_or(SAMPLE_SIZE_PX);
-        let placement = Placement { origin_in_source: scene.origin_in_source, near_m, size_px: size_of_views_px };
+        let placement = Placement { source_space: scene.source_space, near_m, size_px: size_of_views_px };
         let cameras = camera_file::read(path, placement)?;
         Ok(cameras.into_iter().map(|camera| size_px.map_or(camera, |size_px| camera.resized(size_px))).collect())
     }

@@ -1,7 +1,6 @@
 //! The cluster as the coordinator sees it, and the scene that it offers: enough for a client to place its views.
 
-use depth_image::{Aabb, Camera};
-use glam::DVec3;
+use depth_image::{Aabb, Camera, SourceSpace};
 
 use crate::check::{InvalidField, at_most, finite_seconds, nonempty, text};
 use crate::costs::Costs;
@@ -146,8 +145,8 @@ pub struct OfferStatus {
     pub sample_cameras: Vec<Camera>,
     /// The bounds of reconstruction.
     pub volume: Aabb,
-    /// The point of the source file's space that is the world's origin.
-    pub origin_in_source: DVec3,
+    /// The space of the scene's file, in which views name their cameras.
+    pub source_space: SourceSpace,
     /// Settings for sessions that choose none.
     pub settings: OfferSettings,
     /// Seconds after which a scene that moves is as at its start; `None` for one that never moves.
@@ -169,8 +168,12 @@ impl OfferStatus {
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {
-        if !self.origin_in_source.is_finite() {
-            return Err(InvalidField::out_of_range("origin_in_source", self.origin_in_source, "finite"));
+        let SourceSpace { origin_in_source, metres_per_unit } = self.source_space;
+        if !origin_in_source.is_finite() {
+            return Err(InvalidField::out_of_range("origin_in_source", origin_in_source, "finite"));
+        }
+        if !self.source_space.is_valid() {
+            return Err(InvalidField::out_of_range("metres_per_source_unit", metres_per_unit, "above 0"));
         }
         finite_seconds(self.period_s, "offer.period_s")?;
         nonempty(&self.name, "offers.name")?;

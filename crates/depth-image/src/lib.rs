@@ -28,6 +28,7 @@ mod sample_camera;
 mod sample_image;
 mod scalar;
 mod single_pole;
+mod source_space;
 mod tiles;
 mod tone;
 mod view;
@@ -66,6 +67,7 @@ pub use scalar::{
     tangents_of, unit_from_oct16,
 };
 pub use single_pole::SinglePoleCamera;
+pub use source_space::SourceSpace;
 pub use tiles::TileError;
 pub use tone::{Exposure, ExposureEv, ToneCurve, ToneError, ToneMapping};
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};

@@ -1,15 +1,15 @@
 //! Cameras in the convention of `transforms.json`.
 
-use depth_image::PinholeCamera;
-use glam::{DMat3, DVec3};
+use depth_image::{PinholeCamera, SourceSpace};
+use glam::DMat3;
 use serde_json::{Map, Value, json};
 
 /// The fields of a camera's frame in a `transforms.json`: sides, focal lengths and principal point in pixels, and the
 /// camera-to-world matrix of OpenGL's convention, in the space of the scene's file.
 #[must_use]
-pub fn camera_frame(camera: &PinholeCamera, origin_in_source: DVec3) -> Map<String, Value> {
+pub fn camera_frame(camera: &PinholeCamera, source_space: SourceSpace) -> Map<String, Value> {
     let axes = DMat3::from_quat(camera.world_from_camera.as_dquat().normalize());
-    let eye = camera.eye_in_world.as_dvec3() + origin_in_source;
+    let eye = source_space.source_from_world(camera.eye_in_world);
     let row = |i: usize| json!([axes.x_axis[i], axes.y_axis[i], axes.z_axis[i], eye[i]]);
     let (size_px, focal_px, principal_px) = (camera.size_px, camera.focal_px, camera.principal_px);
     let fields = json!({

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, SceneSpec, pack, unpack};
+use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, SceneSpec, SourceSpace, pack, unpack};
 
 fn main() {
     for name in std::env::args().skip(1) {
@@ -38,7 +38,9 @@ fn inspect(spec: &SceneSpec) {
     );
     lights.iter().for_each(|&light| println!("  {}", LightSpec(light)));
     let bounds = scene.bounds();
-    println!("  bounds {} to {}, origin in source {}", bounds.min, bounds.max, scene.origin_in_source);
+    let SourceSpace { origin_in_source, metres_per_unit } = scene.source_space;
+    println!("  bounds {} to {}, origin in source {origin_in_source}", bounds.min, bounds.max);
+    println!("  metres per unit of source {metres_per_unit}");
     let start = Instant::now();
     let package = pack(&scene);
     let packed = start.elapsed();

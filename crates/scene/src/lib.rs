@@ -2,7 +2,7 @@
 //! packages for the transfer between nodes.
 //!
 //! World space is right-handed, in metres, +Y up (glTF). Positions are `f32` around
-//! [`Scene::origin_in_source`], so that geometry in national-grid coordinates loses no precision.
+//! [`Scene::source_space`], so that geometry in national-grid coordinates loses no precision.
 //!
 //! Every scene from a file ([`load_file`]) or from a peer ([`unpack`]) has passed [`Scene::validate`]. Sizes are
 //! checked against [`Limits`] before memory is allocated for them. A refusal is a [`SceneError`] that names the file,
@@ -32,7 +32,7 @@ pub use animation::{
     Animation, Channel, Clip, Influence, Interpolation, Joint, MovingInstance, Node, NodeTransform, Property,
     TransformParts, UnknownClip,
 };
-pub use depth_image::{Environment, EnvironmentMap, Illumination, Light, LightError};
+pub use depth_image::{Environment, EnvironmentMap, Illumination, Light, LightError, SourceSpace};
 pub use error::{SceneError, SceneErrorKind};
 pub use import::{MissingTextures, MissingTexturesError, load_environment, load_file};
 pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError, LightSpecErrorKind};

@@ -50,14 +50,17 @@ impl Scene {
         self
     }
 
-    /// Replaces the scene's lamps, environment or both. Positions are in the coordinates of the source, and are moved
-    /// by [`Scene::origin_in_source`] in `f64`. A [`Light`] itself is in `f32`, a quarter of a metre at 4,000 km.
+    /// Replaces the scene's lamps, environment or both. Positions, lengths and intensities are in the coordinates of the
+    /// source, and are converted by [`Scene::source_space`] in `f64`. A [`Light`] itself is in `f32`, a quarter of a metre at 4,000 km.
     /// [`Scene::validate`] checks the lights.
     #[must_use]
     pub fn lit_by(mut self, lights: Option<Vec<Light>>, environment: Option<Environment>) -> Self {
         if let Some(mut lights) = lights {
-            for position in lights.iter_mut().filter_map(position_mut) {
-                *position = (position.as_dvec3() - self.origin_in_source).as_vec3();
+            for light in &mut lights {
+                if let Some(position) = position_mut(light) {
+                    *position = self.source_space.world_from_source(position.as_dvec3());
+                }
+                scale_to_metres(light, self.source_space.metres_per_unit);
             }
             self.illumination.lights = lights;
         }
@@ -88,6 +91,21 @@ pub(crate) fn color_mut(light: &mut Light) -> &mut Vec3 {
 /// See [`color_mut`].
 pub(crate) fn color(mut light: Light) -> Vec3 {
     *color_mut(&mut light)
+}
+
+/// Scales the lengths of a light, and its intensity, which is that at a distance of one unit.
+pub(crate) fn scale_to_metres(light: &mut Light, metres_per_unit: f64) {
+    let scaled = |v: Vec3, factor: f64| (v.as_dvec3() * factor).as_vec3();
+    match light {
+        Light::Directional { .. } => {}
+        Light::Point { intensity_linear, radius_m, .. } | Light::Spot { intensity_linear, radius_m, .. } => {
+            *intensity_linear = scaled(*intensity_linear, metres_per_unit * metres_per_unit);
+            *radius_m = (f64::from(*radius_m) * metres_per_unit) as f32;
+        }
+        Light::Rectangle { half_edges_in_world, .. } => {
+            *half_edges_in_world = half_edges_in_world.map(|edge| scaled(edge, metres_per_unit));
+        }
+    }
 }
 
 /// Position of a light; `None` for parallel light.

@@ -1,7 +1,7 @@
 //! The scene as plain data, equal on every node.
 
-use depth_image::{Environment, EnvironmentMap, Illumination};
-use glam::{Affine3A, DVec3, Vec3};
+use depth_image::{Environment, EnvironmentMap, Illumination, SourceSpace};
+use glam::{Affine3A, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::TextureUse;
@@ -32,8 +32,8 @@ pub struct Scene {
     pub wind: Option<Wind>,
     /// Motion by nodes, joints and clips; `None` for a scene without it.
     pub animation: Option<Animation>,
-    /// The point of the source file's space that became the world's origin.
-    pub origin_in_source: DVec3,
+    /// The space of the source file.
+    pub source_space: SourceSpace,
 }
 
 impl Scene {

@@ -10,8 +10,8 @@
 //! are checked against the remaining bytes before memory is allocated.
 
 use bytemuck::Pod;
-use depth_image::{Environment, EnvironmentMap, Illumination, MAX_ENVIRONMENT_SIZE_PX};
-use glam::{DVec3, UVec2};
+use depth_image::{Environment, EnvironmentMap, Illumination, MAX_ENVIRONMENT_SIZE_PX, SourceSpace};
+use glam::UVec2;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Fault, at_most};
@@ -21,7 +21,7 @@ use crate::{Animation, Instance, Limits, Material, Mesh, MeshPart, Scene, SceneE
 compile_error!("packages hold arrays as they are in memory, which must be little-endian");
 
 const MAGIC: &[u8; 8] = b"MYRSCENE";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// A scene without its large arrays.
 #[derive(Serialize, Deserialize)]
@@ -37,7 +37,7 @@ struct Header {
     cameras: Vec<SourceCamera>,
     wind: Option<Wind>,
     animation: Option<Animation>,
-    origin_in_source: DVec3,
+    source_space: SourceSpace,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -121,7 +121,7 @@ fn header_of(scene: &Scene) -> Header {
         cameras: scene.cameras.clone(),
         wind: scene.wind,
         animation: scene.animation.clone(),
-        origin_in_source: scene.origin_in_source,
+        source_space: scene.source_space,
     }
 }
 
@@ -171,7 +171,7 @@ fn scene_from_header(header: Header, reader: &mut Reader, limits: &Limits) -> Re
         cameras: header.cameras,
         wind: header.wind,
         animation: header.animation,
-        origin_in_source: header.origin_in_source,
+        source_space: header.source_space,
     })
 }
 

@@ -57,7 +57,7 @@ impl UpAxis {
 
 impl Scene {
     /// Turns the geometry and the cameras of a scene whose file has this axis upwards, so that it is +Y up. Lights stay:
-    /// OBJ and PLY files have none, and default lights are the world's. [`Scene::origin_in_source`] is turned too: the
+    /// OBJ and PLY files have none, and default lights are the world's. [`Scene::source_space`] is turned too: the
     /// source's space is that of the turned file.
     #[must_use]
     pub fn turned_upright(mut self, up: UpAxis) -> Self {
@@ -69,7 +69,7 @@ impl Scene {
         self.instances.iter_mut().for_each(|i| i.world_from_mesh = turn * i.world_from_mesh);
         self.cameras.iter_mut().for_each(|camera| camera.world_from_camera = turn * camera.world_from_camera);
         let turn = DMat3::from_cols(x.as_dvec3(), y.as_dvec3(), z.as_dvec3());
-        self.origin_in_source = turn * self.origin_in_source + DVec3::ZERO;
+        self.source_space.origin_in_source = turn * self.source_space.origin_in_source + DVec3::ZERO;
         self
     }
 }
@@ -100,21 +100,21 @@ impl fmt::Display for UpAxis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Instance;
+    use crate::{Instance, SourceSpace};
 
     #[test]
     fn the_axis_of_a_file_points_up_in_the_world() {
         for (up, axis) in [(UpAxis::X, Vec3::X), (UpAxis::Y, Vec3::Y), (UpAxis::Z, Vec3::Z)] {
             let scene = Scene {
                 instances: vec![Instance { mesh: 0, world_from_mesh: Affine3A::IDENTITY }],
-                origin_in_source: axis.as_dvec3() * 7.0,
+                source_space: SourceSpace::moved(axis.as_dvec3() * 7.0),
                 ..Scene::default()
             };
             let turned = scene.turned_upright(up);
             let world_from_mesh = turned.instances[0].world_from_mesh;
             assert_eq!(world_from_mesh.transform_point3(axis * 0.1), Vec3::Y * 0.1, "{up}");
             assert_eq!(world_from_mesh.matrix3.determinant(), 1.0, "{up} is no mirror");
-            assert_eq!(turned.origin_in_source, DVec3::Y * 7.0, "{up}");
+            assert_eq!(turned.source_space.origin_in_source, DVec3::Y * 7.0, "{up}");
             assert_eq!(up.to_string().parse(), Ok(up));
         }
     }

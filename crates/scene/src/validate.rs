@@ -34,7 +34,7 @@ impl Scene {
         require(!self.background.is_mapped, "background", "it is a map, which only the environment may be")?;
         self.wind.as_ref().map_or(Ok(()), check_wind)?;
         self.check_animation(limits)?;
-        require(self.origin_in_source.is_finite(), "origin", "not finite")
+        require(self.source_space.is_valid(), "source space", "its origin or unit is not finite or has no length")
     }
 
     fn check_sizes(&self, limits: &Limits) -> Result<(), Fault> {

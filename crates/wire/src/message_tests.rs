@@ -17,7 +17,7 @@ use codec::{
 };
 use depth_image::{
     Aabb, Antialias, Camera, CubeGrid, Environment, ExposureEv, Illumination, Light, LightDirections, LightFieldCamera,
-    MAX_LIGHTS, PinholeCamera, ToneCurve, ToneMapping, ViewPlanes,
+    MAX_LIGHTS, PinholeCamera, SourceSpace, ToneCurve, ToneMapping, ViewPlanes,
 };
 use glam::{DVec3, UVec2, Vec3};
 
@@ -625,8 +625,8 @@ fn zeros_and_empty_texts_of_the_wire_become_none() {
     let Workload { scene, volume, .. } = workload();
     let sample_cameras = vec![Camera::Pinhole(camera()); 2];
     let name = "scene".to_owned();
-    let (origin_in_source, period_s) = (DVec3::X, Some(2.5));
-    let offer = OfferStatus { name, scene, sample_cameras, volume, origin_in_source, settings, period_s };
+    let (source_space, period_s) = (SourceSpace { origin_in_source: DVec3::X, metres_per_unit: 0.5 }, Some(2.5));
+    let offer = OfferStatus { name, scene, sample_cameras, volume, source_space, settings, period_s };
     let message = to_message::<proto::SceneOffer, _>(offer.clone());
     assert_eq!((message.sampling_method.as_str(), message.lighting.as_str()), ("", "unlit"));
     assert_eq!(read::<OfferStatus, _>(message), Ok(offer));

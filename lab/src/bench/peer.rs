@@ -71,11 +71,8 @@ pub(super) fn scene(folder: &Path) -> anyhow::Result<(SceneArgs, Setup)> {
 
 pub(super) fn views(args: &BenchArgs, setup: &Setup, folder: &Path) -> anyhow::Result<Vec<PinholeCamera>> {
     let near_m = setup.offer.volume.near_m();
-    let placement = Placement {
-        origin_in_source: setup.scene.origin_in_source,
-        near_m,
-        size_px: app_core::experiment::VIEW_SIZE_PX,
-    };
+    let placement =
+        Placement { source_space: setup.scene.source_space, near_m, size_px: app_core::experiment::VIEW_SIZE_PX };
     let all = camera_file::read(&folder.join("views.json"), placement)?;
     let step = if args.quick { 8 } else { 1 };
     Ok(all.into_iter().step_by(step).collect())

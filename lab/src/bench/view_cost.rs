@@ -53,11 +53,8 @@ pub fn run(args: &ViewCostArgs) -> anyhow::Result<Outcome> {
     };
     let setup = args.load_changed(|scene| scene.background = Environment::default())?;
     let near_m = setup.offer.volume.near_m();
-    let placement = Placement {
-        origin_in_source: setup.scene.origin_in_source,
-        near_m,
-        size_px: app_core::experiment::VIEW_SIZE_PX,
-    };
+    let placement =
+        Placement { source_space: setup.scene.source_space, near_m, size_px: app_core::experiment::VIEW_SIZE_PX };
     let views: Vec<_> = camera_file::read(&folder.join("views.json"), placement)?.into_iter().step_by(16).collect();
     cost(&engine, "peer", &args, &setup, &views)?;
     Ok(Outcome::Done)

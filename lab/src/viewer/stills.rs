@@ -136,8 +136,8 @@ impl Reference {
 
     /// The same view, drawn directly.
     fn draw(&self, still: &Captured) -> anyhow::Result<View> {
-        let SceneOffer { hash, volume, origin_in_source, .. } = &self.setup.offer;
-        let in_world = |point: [f64; 3]| (DVec3::from_array(point) - origin_in_source).as_vec3();
+        let SceneOffer { hash, volume, source_space, .. } = &self.setup.offer;
+        let in_world = |point: [f64; 3]| source_space.world_from_source(DVec3::from_array(point));
         let StillCamera { eye, target, fov_y_deg } = still.camera;
         let size_px = UVec2::from_array(still.size_px);
         let fov_y_rad = fov_y_deg.to_radians() as f32;

@@ -2,11 +2,12 @@
 
 use app_core::camera_file::{CameraFault, MAX_FILE_BYTES, Placement, read};
 use app_core::camera_record::{self, NamedCamera, write};
-use depth_image::PinholeCamera;
+use depth_image::{PinholeCamera, SourceSpace};
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use serde_json::{Map, Value, json};
 
-const PLACEMENT: Placement = Placement { origin_in_source: DVec3::ZERO, near_m: 0.01, size_px: UVec2::new(120, 80) };
+const PLACEMENT: Placement =
+    Placement { source_space: SourceSpace::moved(DVec3::ZERO), near_m: 0.01, size_px: UVec2::new(120, 80) };
 
 fn camera(i: u8) -> PinholeCamera {
     let eye = Vec3::new(f32::from(i), 1.0, 3.0 - f32::from(i) * 0.2);
@@ -28,11 +29,13 @@ fn close(a: &PinholeCamera, b: &PinholeCamera) -> bool {
 fn cameras_survive_a_round_trip_far_from_the_origin() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cameras.json");
-    for origin_in_source in [DVec3::ZERO, DVec3::new(2_683_123.25, 408.5, -1_247_321.75)] {
+    let far = SourceSpace::moved(DVec3::new(2_683_123.25, 408.5, -1_247_321.75));
+    let small = SourceSpace { origin_in_source: DVec3::splat(3e-9), metres_per_unit: 2f64.powi(30) };
+    for source_space in [SourceSpace::default(), far, small] {
         let named = |i| NamedCamera { file_path: format!("{i}.png"), camera: camera(i), more: Map::new() };
         let cameras: Vec<_> = (0..5).map(named).collect();
-        write(&path, cameras.clone(), origin_in_source, Map::new()).unwrap();
-        let found = read(&path, Placement { origin_in_source, ..PLACEMENT }).unwrap();
+        write(&path, cameras.clone(), source_space, Map::new()).unwrap();
+        let found = read(&path, Placement { source_space, ..PLACEMENT }).unwrap();
         assert_eq!(found.len(), 5);
         for (named, found) in cameras.iter().zip(&found) {
             assert!(close(&named.camera, found), "{named:?} {found:?}");
@@ -48,11 +51,11 @@ fn a_record_is_read_line_by_line_as_it_was_written() {
     let about = Map::from_iter([("settings".to_owned(), json!({"method": "mesh"}))]);
     let named = |i| NamedCamera { file_path: format!("{i}.png"), camera: camera(i), more: Map::new() };
     for count in [0, 1, 3] {
-        write(&path, (0..count).map(named), DVec3::X, about.clone()).unwrap();
+        write(&path, (0..count).map(named), SourceSpace::moved(DVec3::X), about.clone()).unwrap();
         let mut lines = Vec::new();
         let found = camera_record::read(&path, |line| lines.push(line.to_owned())).unwrap().unwrap();
         assert_eq!(found["settings"], about["settings"]);
-        assert_eq!(lines, (0..count).map(|i| named(i).line(DVec3::X)).collect::<Vec<_>>());
+        assert_eq!(lines, (0..count).map(|i| named(i).line(SourceSpace::moved(DVec3::X))).collect::<Vec<_>>());
     }
     let text = std::fs::read_to_string(&path).unwrap();
     assert!(serde_json::from_str::<Value>(&text).unwrap()["frames"].as_array().unwrap().len() == 3, "it is JSON");

@@ -43,7 +43,7 @@ fn canopy_far_away(at: DVec3) -> Scene {
 fn distant_surfaces_are_lit_like_near_ones() {
     let seen = |at: DVec3| {
         let scene = canopy_far_away(at);
-        assert!((scene.origin_in_source - at).length() < 2.0, "{}", scene.origin_in_source);
+        assert!((scene.source_space.origin_in_source - at).length() < 2.0, "{}", scene.source_space.origin_in_source);
         let center = scene.bounds().center();
         let camera = PinholeCamera::looking_at(center + Vec3::new(0.3, 3.0, 0.2), center, Vec3::NEG_Z, 0.9, SIZE_PX);
         let on_device = upload(&scene);

@@ -3,6 +3,7 @@
 
 mod clamped;
 mod environment;
+mod extent;
 mod folder;
 mod gltf;
 mod missing_textures;
@@ -26,10 +27,10 @@ use source_scene::SourceScene;
 /// from its own folder and below. The scene has the lights that the file lists, which may be none: see
 /// [`Scene::with_default_lights`].
 ///
-/// Axes and units are kept as in the file (only glTF defines them). Coordinates are kept too, unless `f32` would lose
+/// Axes are kept as in the file (only glTF defines them). Coordinates are kept too, unless `f32` would lose
 /// detail far from the origin. That is the case when the centre of the bounds is more than 10 km, or more than 1000
-/// times the bounds' diagonal, from the origin. Then all parts, lights and cameras included, are moved by
-/// [`Scene::origin_in_source`].
+/// times the bounds' diagonal, from the origin. Then all parts, lights and cameras included, are moved. A scene of less than
+/// 10⁻³ or more than 10⁶ units is scaled to about a metre. [`Scene::source_space`] leads back to the file's coordinates.
 ///
 /// # Errors
 /// The file, the element at fault, and the reason.

@@ -2,19 +2,16 @@
 
 use std::collections::HashMap;
 
-use glam::{Affine3A, BVec3, DAffine3, DVec3};
+use glam::{Affine3A, DAffine3, DVec3};
 
+use super::extent::{Box3, DRAWABLE_MESH_EXTENT, recentring_offset, scale_to_drawable, source_space};
 use crate::animation::{Animation, Influence, MovingInstance};
 use crate::error::{Fault, at_most};
-use crate::light_rig::{color, color_mut, position_mut};
+use crate::light_rig::{color, color_mut, position_mut, scale_to_metres};
 use crate::{
-    Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, Texture, Vertex, VertexDetail,
+    Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, SourceSpace, Texture, Vertex,
+    VertexDetail,
 };
-
-/// Distance from the origin beyond which `f32` loses a millimetre.
-const FAR_M: f64 = 1e4;
-/// Distance in diagonals beyond which `f32` loses a hundred-thousandth of the model.
-const FAR_IN_DIAGONALS: f64 = 1e3;
 
 /// The result of an importer.
 #[derive(Default)]
@@ -71,20 +68,23 @@ impl SourceScene {
     /// Checks, re-centres, un-mirrors, converts to `f32`, and validates.
     pub(crate) fn finish(mut self, limits: &Limits) -> Result<Scene, Fault> {
         self.check_sizes(limits)?;
-        self.recentre_meshes()?;
-        let origin_in_source = self.origin_in_source()?;
+        self.normalise_meshes()?;
+        let source_space = source_space(self.bounds_in_source(), self.animation.is_some())?;
         self.unmirror();
-        let lights = self.lights.iter().map(|l| l.relative_to(origin_in_source)).collect();
-        let moved = |source_from_x: &DAffine3| moved(source_from_x, origin_in_source);
-        let instance =
-            |i: &SourceInstance| Instance { mesh: i.mesh as u32, world_from_mesh: moved(&i.source_from_mesh) };
-        let camera = |PlacedCamera { name, source_from_camera, fov_y_rad }| SourceCamera {
-            name,
-            world_from_camera: moved(&source_from_camera),
-            fov_y_rad,
+        let lights = self.lights.iter().map(|l| l.placed_in(source_space)).collect();
+        let world_from_source = world_from_source(source_space);
+        let instance = |i: &SourceInstance| Instance {
+            mesh: i.mesh as u32,
+            world_from_mesh: in_f32(&(world_from_source * i.source_from_mesh)),
+        };
+        let camera = |PlacedCamera { name, source_from_camera, fov_y_rad }| {
+            // A camera has a place and a direction, and no size.
+            let place_in_world = world_from_source.transform_point3(source_from_camera.translation);
+            let placed = DAffine3 { translation: place_in_world, ..source_from_camera };
+            SourceCamera { name, world_from_camera: in_f32(&placed), fov_y_rad }
         };
         if let Some(animation) = &mut self.animation {
-            animation.world_from_source = DAffine3::from_translation(-origin_in_source);
+            animation.world_from_source = world_from_source;
         }
         let scene = Scene {
             name: self.name,
@@ -96,7 +96,7 @@ impl SourceScene {
             environment_map: None,
             cameras: self.cameras.into_iter().map(camera).collect(),
             animation: self.animation,
-            origin_in_source,
+            source_space,
             ..Scene::default()
         };
         scene.check(limits)?;
@@ -114,32 +114,29 @@ impl SourceScene {
         Ok(())
     }
 
-    /// Moves a mesh that is far from its own origin there; its instances take over the distance.
-    fn recentre_meshes(&mut self) -> Result<(), Fault> {
+    /// Moves a mesh that is far from its own origin there, and scales one whose extent `f32` cannot draw; its instances take
+    /// over the distance and the size.
+    fn normalise_meshes(&mut self) -> Result<(), Fault> {
         for (number, mesh) in self.meshes.iter_mut().enumerate() {
             let bad = mesh.positions_in_mesh.iter().position(|p| !p.is_finite());
             if let Some(vertex) = bad {
                 return Err(Fault::malformed(format!("mesh {number}, vertex {vertex}"), "its position is not finite"));
             }
-            let offset = recentring_offset(Box3::around(mesh.positions_in_mesh.iter().copied()));
-            if offset != DVec3::ZERO {
-                mesh.positions_in_mesh.iter_mut().for_each(|p| *p -= offset);
+            let bounds = Box3::around(mesh.positions_in_mesh.iter().copied());
+            let scale = scale_to_drawable(bounds.extent(), &DRAWABLE_MESH_EXTENT);
+            let offset = recentring_offset(bounds, scale);
+            if offset != DVec3::ZERO || scale != 1.0 {
+                mesh.positions_in_mesh.iter_mut().for_each(|p| *p = (*p - offset) * scale);
+                let old_from_new =
+                    DAffine3::from_translation(offset) * DAffine3::from_scale(DVec3::splat(scale.recip()));
                 let moving = moving_instances(&mut self.animation);
                 let of_mesh = moving.filter(|moving| self.instances[moving.instance as usize].mesh == number);
-                of_mesh.for_each(|moving| moving.follow_mesh(&DAffine3::from_translation(offset)));
+                of_mesh.for_each(|moving| moving.follow_mesh(&old_from_new));
                 let of_mesh = self.instances.iter_mut().filter(|i| i.mesh == number);
-                of_mesh.for_each(|i| i.source_from_mesh *= DAffine3::from_translation(offset));
+                of_mesh.for_each(|i| i.source_from_mesh *= old_from_new);
             }
         }
         Ok(())
-    }
-
-    fn origin_in_source(&self) -> Result<DVec3, Fault> {
-        let all = self.bounds_in_source();
-        if !(all.min.is_finite() && all.max.is_finite()) {
-            return Err(Fault::malformed("scene", "its bounds are not finite"));
-        }
-        Ok(recentring_offset(all))
     }
 
     /// Bounds of all instances; not finite without instances, or where a position is not.
@@ -246,63 +243,21 @@ impl SourceLight {
         *color = (color.as_dvec3() * factor).as_vec3();
     }
 
-    fn relative_to(&self, origin_in_source: DVec3) -> Light {
+    fn placed_in(&self, source_space: SourceSpace) -> Light {
         let mut light = self.light;
         if let Some(position) = position_mut(&mut light) {
-            *position = (self.position_in_source - origin_in_source).as_vec3();
+            *position = source_space.world_from_source(self.position_in_source);
         }
+        scale_to_metres(&mut light, source_space.metres_per_unit);
         light
     }
 }
 
-fn moved(source_from_x: &DAffine3, origin_in_source: DVec3) -> Affine3A {
-    let [x, y, z] = [0, 1, 2].map(|i| source_from_x.matrix3.col(i).as_vec3());
-    let translation = (source_from_x.translation - origin_in_source).as_vec3();
-    Affine3A::from_cols(x.into(), y.into(), z.into(), translation.into())
+fn world_from_source(SourceSpace { origin_in_source, metres_per_unit }: SourceSpace) -> DAffine3 {
+    DAffine3::from_scale(DVec3::splat(metres_per_unit)) * DAffine3::from_translation(-origin_in_source)
 }
 
-/// Offset that moves `bounds` to the origin, in whole metres unless the bounds are too small.
-fn recentring_offset(bounds: Box3) -> DVec3 {
-    if bounds.is_empty() {
-        return DVec3::ZERO;
-    }
-    let (centre, diagonal) = (bounds.center(), bounds.diagonal());
-    let distance = centre.length();
-    if distance <= FAR_M && distance <= FAR_IN_DIAGONALS * diagonal {
-        DVec3::ZERO
-    } else if diagonal > 10.0 {
-        centre.round()
-    } else {
-        centre
-    }
-}
-
-#[derive(Clone, Copy)]
-pub(crate) struct Box3 {
-    min: DVec3,
-    max: DVec3,
-}
-
-impl Box3 {
-    fn around(points: impl Iterator<Item = DVec3>) -> Self {
-        let empty = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
-        points.fold(empty, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
-    }
-
-    pub(crate) fn center(&self) -> DVec3 {
-        (self.min + self.max) * 0.5
-    }
-
-    pub(crate) fn diagonal(&self) -> f64 {
-        (self.max - self.min).length()
-    }
-
-    fn is_empty(&self) -> bool {
-        self.min.cmpgt(self.max).any()
-    }
-
-    fn corners(&self) -> [DVec3; 8] {
-        let is_max = |i: usize| BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0);
-        std::array::from_fn(|i| DVec3::select(is_max(i), self.max, self.min))
-    }
+fn in_f32(transform: &DAffine3) -> Affine3A {
+    let [x, y, z] = [0, 1, 2].map(|i| transform.matrix3.col(i).as_vec3());
+    Affine3A::from_cols(x.into(), y.into(), z.into(), transform.translation.as_vec3().into())
 }

@@ -148,7 +148,7 @@ fn mirrored_joints_and_far_places_keep_triangles_outside_out() {
         assert!(expected > 0.05, "{expected}");
         assert!((volume(&mirrored, time_s) - expected).abs() < 1e-4, "{}", volume(&mirrored, time_s));
         let scene = load("far.glb", &far.glb()).unwrap();
-        assert!(scene.origin_in_source.x > 4.9e6);
+        assert!(scene.source_space.origin_in_source.x > 4.9e6);
         let vertices = posed(&scene, time_s);
         assert!(vertices.iter().all(|v| Vec3::from(v.position).length() < 4.0));
         let lengths = |vertices: &[Vertex]| Vec3::from(vertices[3].position).distance(vertices[40].position.into());

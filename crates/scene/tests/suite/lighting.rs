@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use scene::procedural::{quad, unit_cube};
 use scene::{
     Environment, EnvironmentSpec, Illumination, Light, LightSpec, LightSpecErrorKind, Limits, Material, Scene,
+    SourceSpace,
 };
 
 fn light(text: &str) -> Light {
@@ -164,7 +165,7 @@ fn given_light_replaces_the_light_of_its_kind() {
     let sky = Environment::uniform(Vec3::X);
     let relit = cube.clone().lit_by(None, Some(sky));
     assert_eq!(relit.illumination, Illumination { environment: sky, ..cube.illumination.clone() });
-    let moved = Scene { origin_in_source: DVec3::new(1e6, 0.0, -0.5), ..cube.clone() };
+    let moved = Scene { source_space: SourceSpace::moved(DVec3::new(1e6, 0.0, -0.5)), ..cube.clone() };
     let lights = ["point at=1000001,2,3", "rectangle at=1000000,0,0 u=1,0,0 v=0,1,0", "sun towards=0,1,0"];
     let relit = moved.lit_by(Some(lights.map(light).to_vec()), None);
     let expected = ["point at=1,2,3.5", "rectangle at=0,0,0.5 u=1,0,0 v=0,1,0", "sun towards=0,1,0"];

@@ -12,3 +12,4 @@ mod obj_and_ply_import;
 mod packages;
 mod procedural;
 mod samples;
+mod scale;

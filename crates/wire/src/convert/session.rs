@@ -5,6 +5,8 @@ use cluster::{
     AuditSummary, ChangeSession, ErrorInterval, OfferStatus, PolicyChoice, Promise, PromiseState, Quality,
     SessionEvent, SessionPlan, SessionRequest, SessionStage, at_most, reason,
 };
+use depth_image::SourceSpace;
+use glam::DVec3;
 
 use super::{Convert, required};
 use crate::error::{PROTOCOL_VERSION, WireError, check_version};
@@ -19,7 +21,7 @@ enums! {
 messages! {
     SceneOffer = OfferStatus {
         name, scene as "offer.scene", sample_cameras, volume as "offer.volume", period_s;
-        origin_in_source: origin_in_source_x_m | origin_in_source_y_m | origin_in_source_z_m,
+        source_space: origin_in_source_x_m | origin_in_source_y_m | origin_in_source_z_m | metres_per_source_unit,
         settings: reconstruction_method | sampling_method | lighting
     }, first |o| at_most(o.sample_cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras"), then OfferStatus::validate;
     OpenSessionRequest = SessionRequest {
@@ -49,6 +51,17 @@ messages! {
         viewers_above: viewer_above_count
     };
     ErrorInterval = ErrorInterval { ; least: least_ratio, mean: mean_ratio, greatest: greatest_ratio };
+}
+
+impl Convert<(f64, f64, f64, f64)> for SourceSpace {
+    fn read((x, y, z, metres_per_unit): (f64, f64, f64, f64), _: &'static str) -> Result<Self, WireError> {
+        Ok(Self { origin_in_source: DVec3::new(x, y, z), metres_per_unit })
+    }
+
+    fn write(self) -> (f64, f64, f64, f64) {
+        let DVec3 { x, y, z } = self.origin_in_source;
+        (x, y, z, self.metres_per_unit)
+    }
 }
 
 fn check_request(request: &mut proto::OpenSessionRequest) -> Result<(), WireError> {

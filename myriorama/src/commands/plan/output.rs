@@ -118,7 +118,7 @@ impl Output<'_> {
             more: Map::new(),
         };
         let cameras = chosen.sample_cameras.iter().enumerate().map(named);
-        Ok(camera_record::write(path, cameras, self.setup.offer.origin_in_source, Map::new())?)
+        Ok(camera_record::write(path, cameras, self.setup.offer.source_space, Map::new())?)
     }
 }
 

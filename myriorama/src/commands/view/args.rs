@@ -172,7 +172,7 @@ impl Viewpoints {
     /// A file or a camera cannot be used, or the coordinator has no sample cameras.
     pub(super) fn cameras(&self, offer: &OfferStatus, size: SizePx) -> anyhow::Result<Vec<PinholeCamera>> {
         let near_m = offer.volume.near_m();
-        let placement = Placement { origin_in_source: offer.origin_in_source, near_m, size_px: size.0 };
+        let placement = Placement { source_space: offer.source_space, near_m, size_px: size.0 };
         if let Some(path) = &self.cameras {
             return Ok(camera_file::read(path, placement)?);
         }
@@ -203,7 +203,7 @@ fn one_camera(text: &str, placement: Placement, size: SizePx) -> anyhow::Result<
         [&[x, y, z], &[u, v, w], &[fov]] if (0.1..=170.0).contains(&fov) => ([x, y, z], [u, v, w], fov),
         _ => return Err(bad().into()),
     };
-    let [eye, target] = [eye, target].map(|p| (DVec3::from_array(p) - placement.origin_in_source).as_vec3());
+    let [eye, target] = [eye, target].map(|p| placement.source_space.world_from_source(DVec3::from_array(p)));
     let camera = PinholeCamera::looking_at(eye, target, Vec3::Y, (fov_deg as f32).to_radians(), size.0);
     Ok(PinholeCamera { near_m: placement.near_m, ..camera })
 }

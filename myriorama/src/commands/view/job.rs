@@ -84,7 +84,7 @@ impl Job {
     pub(super) fn record(&self, args: &ViewArgs) -> anyhow::Result<Record> {
         let settings = settings::of(&self.request, &self.offer);
         let views = (self.cameras.clone(), args.frames);
-        let mut record = Record::new(&args.out, self.offer.origin_in_source, settings, views, self.request.planes)?;
+        let mut record = Record::new(&args.out, self.offer.source_space, settings, views, self.request.planes)?;
         if args.resume {
             record.resume()?;
         }

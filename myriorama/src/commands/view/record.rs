@@ -9,8 +9,7 @@ use app_core::delivery::requests;
 use app_core::exit::BadInput;
 use client::ViewRequest;
 use cluster::{Promise, PromiseState};
-use depth_image::{ExposureEv, PinholeCamera, ToneMapping, ViewPlanes};
-use glam::DVec3;
+use depth_image::{ExposureEv, PinholeCamera, SourceSpace, ToneMapping, ViewPlanes};
 use serde_json::{Map, Value, json};
 
 use super::file_names::{FileNames, number_of};
@@ -32,7 +31,7 @@ const PAUSE_RATIO: u32 = 20;
 /// The views of a request, and which of them are whole in a folder.
 pub(super) struct Record {
     folder: PathBuf,
-    origin_in_source: DVec3,
+    source_space: SourceSpace,
     /// Everything that the pictures depend on, by name.
     settings: Map<String, Value>,
     cameras: Arc<[PinholeCamera]>,
@@ -55,7 +54,7 @@ impl Record {
     /// There are too many views.
     pub(super) fn new(
         folder: &Path,
-        origin_in_source: DVec3,
+        source_space: SourceSpace,
         settings: Map<String, Value>,
         views: (Arc<[PinholeCamera]>, u32),
         planes: ViewPlanes,
@@ -71,7 +70,7 @@ impl Record {
         let (exposure, promise) = (None, None);
         Ok(Self {
             folder,
-            origin_in_source,
+            source_space,
             settings,
             cameras,
             set_count,
@@ -173,7 +172,7 @@ impl Record {
         let number = number_of(frame.get("file_path")?.as_str()?)?;
         let depth_scale = frame.get("inverse_depth_max_per_m").and_then(Value::as_f64).unwrap_or(0.0) as f32;
         // Text is compared: it holds every bit of a number.
-        let is_equal = number < self.total() && self.named(number, depth_scale).line(self.origin_in_source) == line;
+        let is_equal = number < self.total() && self.named(number, depth_scale).line(self.source_space) == line;
         let files = FileNames::of(number, self.planes);
         (is_equal && files.all().all(|name| self.folder.join(name).is_file())).then_some((number, depth_scale))
     }
@@ -215,7 +214,7 @@ impl Record {
         }
         let written = (0..).zip(&self.written);
         let cameras = written.filter_map(|(number, scale)| Some(self.named(number, (*scale)?)));
-        camera_record::write(&self.folder.join(FILE_NAME), cameras, self.origin_in_source, about)?;
+        camera_record::write(&self.folder.join(FILE_NAME), cameras, self.source_space, about)?;
         // Long records are written less often, so that the views go on.
         self.next_save = Instant::now() + PAUSE.max(PAUSE_RATIO * start.elapsed());
         Ok(())

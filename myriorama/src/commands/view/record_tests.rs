@@ -1,4 +1,4 @@
-use glam::{UVec2, Vec3};
+use glam::{DVec3, UVec2, Vec3};
 
 use super::*;
 
@@ -10,7 +10,7 @@ fn camera(x_m: f32) -> PinholeCamera {
 fn record(folder: &Path, method: &str, cameras: [f32; 2]) -> Record {
     let settings = Map::from_iter([("codec".to_owned(), json!("lz4")), ("method".to_owned(), json!(method))]);
     let views = (cameras.map(camera).into(), 3);
-    Record::new(folder, DVec3::new(0.1, 1e6, 0.0), settings, views, ViewPlanes::WITH_DEPTH).unwrap()
+    Record::new(folder, SourceSpace::moved(DVec3::new(0.1, 1e6, 0.0)), settings, views, ViewPlanes::WITH_DEPTH).unwrap()
 }
 
 fn write(record: &mut Record, number: u64) {
@@ -99,6 +99,7 @@ fn the_record_is_written_now_and_then() {
 #[test]
 fn more_views_than_a_record_has_room_for_are_refused() {
     let views = ([0.3, 0.4].map(camera).into(), 1 << 22);
-    let refused = Record::new(Path::new("out"), DVec3::ZERO, Map::new(), views, ViewPlanes::WITH_DEPTH).err().unwrap();
+    let refused =
+        Record::new(Path::new("out"), SourceSpace::default(), Map::new(), views, ViewPlanes::WITH_DEPTH).err().unwrap();
     assert!(refused.to_string().contains("8388608 pictures"), "{refused}");
 }
