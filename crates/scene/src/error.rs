@@ -89,7 +89,7 @@ pub(crate) fn at_most(element: impl fmt::Display, actual: u64, limit: u64) -> Re
 }
 
 /// A message quotes the file, and the file may hold megabytes without a line break.
-fn shortened(mut text: String) -> String {
+pub(crate) fn shortened(mut text: String) -> String {
     const MAX_BYTES: usize = 300;
     if text.len() > MAX_BYTES {
         text.truncate((0..=MAX_BYTES).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0));

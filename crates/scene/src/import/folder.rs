@@ -46,9 +46,20 @@ impl Folder {
         if let Some(reason) = reason_to_refuse(&relative) {
             return Err(Fault::forbidden(element, name, reason));
         }
-        let path = self.canonical_root.join(&relative).canonicalize().map_err(|e| Fault::io(element, e))?;
+        self.read_relative(element, Path::new(&relative))
+    }
+
+    /// The folder's path, without links.
+    pub(crate) fn root(&self) -> &Path {
+        &self.canonical_root
+    }
+
+    /// Reads a file by a path below this folder, as [`search`](super::file_search::search) finds it.
+    pub(crate) fn read_relative(&self, element: &str, relative: &Path) -> Result<Vec<u8>, Fault> {
+        let path = self.canonical_root.join(relative).canonicalize().map_err(|e| Fault::io(element, e))?;
         if !path.starts_with(&self.canonical_root) {
-            return Err(Fault::forbidden(element, name, "is a link that leaves the scene's folder"));
+            let name = relative.display().to_string();
+            return Err(Fault::forbidden(element, &name, "is a link that leaves the scene's folder"));
         }
         self.read_path(element, &path)
     }

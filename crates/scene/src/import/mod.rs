@@ -4,6 +4,7 @@
 mod clamped;
 mod environment;
 mod extent;
+mod file_search;
 mod folder;
 mod gltf;
 mod missing_textures;
@@ -11,8 +12,12 @@ mod normals;
 mod obj;
 mod picture;
 mod ply;
+mod polygons;
 mod source_scene;
 mod tangents;
+mod texture_files;
+mod vertex_colors;
+mod warnings;
 
 use std::path::Path;
 
@@ -35,6 +40,7 @@ use source_scene::SourceScene;
 /// # Errors
 /// The file, the element at fault, and the reason.
 pub fn load_file(path: &Path, limits: &Limits, missing: MissingTextures) -> Result<Scene, SceneError> {
+    let _importing = tracing::warn_span!("import", file = %path.display()).entered();
     let scene = read_source(path, limits, missing).and_then(|source| source.finish(limits));
     scene.map_err(|fault| fault.in_path(path))
 }

@@ -15,6 +15,34 @@ pub(crate) const FLAT: f64 = 0.999_999;
 /// Around a hub of more corners than this, all are averaged: the pairwise comparison would be quadratic.
 const MAX_CORNERS_COMPARED: usize = 256;
 
+/// Normalises the given normals, and computes those of zero length: smooth up to creases of 60°, flat on the triangles of
+/// `is_flat`. Triangles that lie with their backs to their given normals are turned round, so `mesh` must be visible from both
+/// sides. May add vertices.
+pub(crate) fn fill(mesh: &mut SourceMesh, is_flat: impl Fn(usize) -> bool) {
+    let mut is_given = Vec::with_capacity(mesh.vertices.len());
+    for vertex in &mut mesh.vertices {
+        let normal = DVec3::from(vertex.normal.map(f64::from)).try_normalize();
+        is_given.push(normal.is_some());
+        vertex.normal = normal.unwrap_or(DVec3::ZERO).as_vec3().to_array();
+    }
+    turn_to_given_normals(mesh, &is_given);
+    let crease_cosine = |triangle| if is_flat(triangle) { FLAT } else { CREASE_60_DEGREES };
+    compute(mesh, &is_given, crease_cosine);
+}
+
+fn turn_to_given_normals(mesh: &mut SourceMesh, is_given: &[bool]) {
+    for triangle in mesh.indices.chunks_exact_mut(3) {
+        let corners = [0, 1, 2].map(|i| triangle[i] as usize);
+        if corners.iter().all(|&vertex| is_given[vertex]) {
+            let [a, b, c] = corners.map(|vertex| mesh.positions_in_mesh[vertex]);
+            let given: DVec3 = corners.iter().map(|&v| DVec3::from(mesh.vertices[v].normal.map(f64::from))).sum();
+            if (b - a).cross(c - a).dot(given) < 0.0 {
+                triangle.swap(1, 2);
+            }
+        }
+    }
+}
+
 /// Makes normals for a source without normals, and fills gaps otherwise.
 pub(crate) fn complete(mesh: &mut SourceMesh, has_normals: bool, crease_cosine: f64) {
     if has_normals { repair(mesh) } else { generate(mesh, crease_cosine) }
@@ -22,14 +50,26 @@ pub(crate) fn complete(mesh: &mut SourceMesh, has_normals: bool, crease_cosine: 
 
 /// Sets every normal; may add vertices.
 fn generate(mesh: &mut SourceMesh, crease_cosine: f64) {
+    compute(mesh, &vec![false; mesh.vertices.len()], |_| crease_cosine);
+}
+
+/// Sets the normals of all vertices but those of `is_given`; may add vertices. The cosine is that of a triangle's creases.
+fn compute(mesh: &mut SourceMesh, is_given: &[bool], crease_cosine: impl Fn(usize) -> f64) {
+    if is_given.iter().all(|is_given| *is_given) {
+        return;
+    }
     let faces = Faces::of(mesh);
     let corners_at = CornersByPosition::of(mesh);
     let original_count = mesh.vertices.len();
     // The copies of each vertex form a chain through `next_copy`.
     let mut next_copy: Vec<Option<u32>> = vec![None; original_count];
-    let mut is_set = vec![false; original_count];
+    let mut is_set = is_given.to_vec();
     for corner in 0..mesh.indices.len() {
         let vertex = mesh.indices[corner];
+        if is_given[vertex as usize] {
+            continue;
+        }
+        let crease_cosine = crease_cosine(corner / 3);
         let normal = faces.smooth_normal(corner, corners_at.around(vertex), crease_cosine).as_vec3().to_array();
         mesh.indices[corner] = if is_set[vertex as usize] {
             copy_with_normal(mesh, &mut next_copy, vertex, normal)
@@ -105,6 +145,9 @@ impl Faces {
     fn smooth_normal(&self, corner: usize, around: &[u32], crease_cosine: f64) -> DVec3 {
         let own = self.normals[corner / 3];
         let compares = around.len() <= MAX_CORNERS_COMPARED;
+        if !compares && crease_cosine == FLAT {
+            return own.try_normalize().unwrap_or(DVec3::Y);
+        }
         let weighted = |&other: &u32| {
             let normal = self.normals[other as usize / 3];
             let joins = !compares || normal.dot(own) >= crease_cosine;

@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use image::ImageReader;
+use image::{ImageFormat, ImageReader};
 use rayon::prelude::*;
 
 use super::missing_textures::MissingTextures;
@@ -59,7 +59,7 @@ pub(crate) fn decode_all(
     let mut decoded_bytes = 0u64;
     for picture in pictures {
         let Some(bytes) = &picture.bytes else { continue };
-        let (width_px, height_px) = size_px(&picture.element, bytes)?;
+        let (width_px, height_px) = size_px(picture, bytes)?;
         at_most(
             format!("{}, side in pixels", picture.element),
             width_px.max(height_px).into(),
@@ -71,12 +71,19 @@ pub(crate) fn decode_all(
     pictures.par_iter().map(|picture| decode(picture, limits)).collect()
 }
 
-fn reader<'b>(element: &str, bytes: &'b [u8]) -> Result<ImageReader<Cursor<&'b [u8]>>, Fault> {
-    ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| Fault::io(element, e))
+/// A format is known by its first bytes. TGA has no such signature and is known by the name's ending.
+fn reader<'b>(picture: &EncodedPicture, bytes: &'b [u8]) -> Result<ImageReader<Cursor<&'b [u8]>>, Fault> {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let mut reader = reader.map_err(|e| Fault::io(&picture.element, e))?;
+    let is_tga = picture.file.to_ascii_lowercase().ends_with(".tga");
+    if reader.format().is_none() && is_tga {
+        reader.set_format(ImageFormat::Tga);
+    }
+    Ok(reader)
 }
 
-fn size_px(element: &str, bytes: &[u8]) -> Result<(u32, u32), Fault> {
-    reader(element, bytes)?.into_dimensions().map_err(|e| Fault::malformed(element, e.to_string()))
+fn size_px(picture: &EncodedPicture, bytes: &[u8]) -> Result<(u32, u32), Fault> {
+    reader(picture, bytes)?.into_dimensions().map_err(|e| Fault::malformed(&picture.element, e.to_string()))
 }
 
 /// The texture in place of a missing one.
@@ -86,7 +93,7 @@ fn stand_in(content: Content) -> Texture {
 
 fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
     let Some(bytes) = &picture.bytes else { return Ok(stand_in(picture.content)) };
-    let mut reader = reader(&picture.element, bytes)?;
+    let mut reader = reader(picture, bytes)?;
     let mut image_limits = image::Limits::default();
     image_limits.max_image_width = Some(limits.texture_side_px);
     image_limits.max_image_height = Some(limits.texture_side_px);
@@ -110,7 +117,7 @@ mod tests {
     fn png(width: u32, height: u32) -> EncodedPicture {
         let mut bytes = Vec::new();
         let pixels = RgbaImage::from_fn(width, height, |x, y| image::Rgba([x as u8, y as u8, 7, 255]));
-        pixels.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png).unwrap();
+        pixels.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png).unwrap();
         EncodedPicture { element: "image 0".into(), file: "a.png".into(), bytes: Some(bytes), content: Content::Colors }
     }
 

@@ -202,8 +202,7 @@ fn mtl() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.obj");
     std::fs::write(&path, format!("mtllib a.mtl\nusemtl a\n{}", cube_obj())).unwrap();
-    let library =
-        "newmtl a\nKd 1 0 0\nKs 0.5 0.5 0.5\nNs 10\nd 0.5\nTr 0.2\nmap_Kd -s 1 1 1 a.png\nnewmtl b\nKe 1 1 1\n";
+    let library = "newmtl a\nKd 1 0 0\nKs 0.5 0.5 0.5\nNs 10\nd 0.5\nTr 0.2\nmap_Kd -s 1 1 1 a.png\nmap_d -imfchan r \"a.png\" # x\nillum 2\nnewmtl b\nKe 1 1 1\n";
     damaged(library.as_bytes(), 2000, |bytes| {
         rewrite(&dir.path().join("a.mtl"), bytes);
         load(&path);
@@ -213,6 +212,11 @@ fn mtl() {
 #[test]
 fn ply_ascii() {
     load_damaged("a.ply", &cube_ply_ascii(), 3000);
+    let rich = "ply\nformat ascii 1.0\ncomment TextureFile a.png\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n\
+        property float s\nproperty float t\nelement face 2\nproperty list uchar int vertex_index\nproperty list uchar float texcoord\n\
+        property int texnumber\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0 0 0\n2 0 0 1 0\n2 2 0 1 1\n\
+        0 2 0 0 1\n1 1 0 0 0\n5 0 1 2 3 4 10 0 0 1 0 1 1 0 1 0 0 0\n3 0 1 2 0 0\n5 0 1 3 2 -1\n";
+    load_damaged("a.ply", rich.as_bytes(), 3000);
 }
 
 #[test]

@@ -1,154 +1,242 @@
-//! The numbered elements of a file, and indexed triangles from polygons of them.
+//! Faces as the file lists them, and indexed triangles of them once the whole file is known: a face may stand before its
+//! vertices.
 
 use std::collections::HashMap;
 
 use glam::DVec3;
 
 use super::super::normals;
-use super::super::source_scene::{SourceMesh, plain_vertex};
-use super::text::{Line, floats};
+use super::super::polygons::{PolygonCutter, TOO_MANY_CORNERS};
+use super::super::source_scene::SourceMesh;
+use super::super::warnings::Warnings;
+use super::attributes::{Attributes, Corner, NONE};
+use super::map::UvTransform;
+use super::text::Line;
 use crate::error::{Fault, at_most};
-use crate::{Limits, MeshPart, Vertex};
+use crate::{Limits, MeshPart};
 
-const NONE: u32 = u32::MAX;
+const TOO_SHORT: &str = "faces of fewer than three corners are left out";
+const UNREADABLE: &str = "faces with a corner that is no vertex of the file are left out";
+const NOT_FINITE: &str = "faces with a vertex that is not finite are left out";
+const WITHOUT_ATTRIBUTES: &str = "texture coordinates and normals that the file does not have are dropped";
 
-/// Positions, coordinates and normals are numbered separately; a vertex is a triple of these numbers.
-type Corner = [u32; 3];
-
+/// All faces of a file.
 #[derive(Default)]
 pub(super) struct Faces {
-    pub material_names: Vec<String>,
-    number_of_material: HashMap<String, usize>,
-    current_material: Option<usize>,
-    indices_of_material: Vec<Vec<u32>>,
-    vertex_of_corner: HashMap<Corner, u32>,
-    mesh: SourceMesh,
+    /// The names of materials, in the order of their first use.
+    pub material_names: Vec<Vec<u8>>,
+    number_of_material: HashMap<Vec<u8>, u32>,
+    current_material: Option<u32>,
+    is_flat: bool,
+    faces: Vec<Face>,
+    corners: Vec<Corner>,
     triangle_count: u64,
-    has_normals: bool,
+}
+
+struct Face {
+    line: u32,
+    material: u32,
+    is_flat: bool,
+    /// The end of its corners in `corners`, which begin where those of the face before end.
+    end: usize,
+}
+
+/// The use of a material by faces.
+#[derive(Clone, Copy)]
+pub(super) struct MaterialUse {
+    /// Number in the scene.
+    pub number: u32,
+    pub placement: UvTransform,
 }
 
 impl Faces {
-    pub(super) fn use_material(&mut self, name: &str) {
-        let next = self.material_names.len();
+    pub(super) fn use_material(&mut self, name: &[u8]) {
+        let next = self.material_names.len() as u32;
         let number = *self.number_of_material.entry(name.to_owned()).or_insert(next);
         if number == next {
             self.material_names.push(name.to_owned());
-            self.indices_of_material.push(Vec::new());
         }
         self.current_material = Some(number);
     }
 
-    pub(super) fn push(&mut self, line: &Line, attributes: &Attributes, limits: &Limits) -> Result<(), Fault> {
+    /// `s off` and `s 0` end smoothing.
+    pub(super) fn set_smoothing(&mut self, line: &Line) {
+        self.is_flat = line.words().next().is_none_or(|word| word.eq_ignore_ascii_case(b"off") || word == b"0");
+    }
+
+    pub(super) fn push(
+        &mut self,
+        line: &Line,
+        attributes: &Attributes,
+        limits: &Limits,
+        warnings: &mut Warnings,
+    ) -> Result<(), Fault> {
+        let start = self.corners.len();
+        let counts = attributes.counts();
+        let mut is_readable = true;
+        for word in line.words() {
+            let corner = corner(word, counts);
+            is_readable &= corner.is_some();
+            self.corners.extend(corner);
+        }
+        let count = self.corners.len() - start;
+        if !is_readable || count < 3 {
+            self.corners.truncate(start);
+            warnings.count(if is_readable { TOO_SHORT } else { UNREADABLE }, line);
+            return Ok(());
+        }
         if self.current_material.is_none() {
-            self.use_material("");
+            self.use_material(b"");
         }
-        let material = self.current_material.unwrap_or(0);
-        let mut words = line.rest.split_ascii_whitespace();
-        let mut next = |faces: &mut Self| words.next().map(|word| faces.vertex(word, line, attributes)).transpose();
-        let too_few = || Fault::malformed(line, "a face of fewer than three corners");
-        let (Some(hub), Some(mut last)) = (next(self)?, next(self)?) else { return Err(too_few()) };
-        let before = self.triangle_count;
-        while let Some(corner) = next(self)? {
-            self.indices_of_material[material].extend([hub, last, corner]);
-            self.triangle_count += 1;
-            last = corner;
-        }
+        self.triangle_count += count as u64 - 2;
         at_most(line, self.triangle_count, limits.triangles)?;
-        at_most(line, self.mesh.vertices.len() as u64, limits.vertices)?;
-        if self.triangle_count > before { Ok(()) } else { Err(too_few()) }
-    }
-
-    pub(super) fn into_mesh(mut self, material_numbers: &[u32]) -> Result<SourceMesh, Fault> {
-        (self.mesh.indices, self.mesh.parts) = parts_of(self.indices_of_material, material_numbers);
-        if self.mesh.indices.len() > u32::MAX as usize {
-            return Err(Fault::unsupported("faces", "more than 2^32 corners"));
-        }
-        normals::complete(&mut self.mesh, self.has_normals, normals::CREASE_60_DEGREES);
-        Ok(self.mesh)
-    }
-
-    fn vertex(&mut self, word: &str, line: &Line, attributes: &Attributes) -> Result<u32, Fault> {
-        let corner = corner(word, attributes).map_err(|why| Fault::malformed(line, format!("{word:?} {why}")))?;
-        if let Some(&vertex) = self.vertex_of_corner.get(&corner) {
-            return Ok(vertex);
-        }
-        let vertex = self.mesh.vertices.len() as u32;
-        self.vertex_of_corner.insert(corner, vertex);
-        self.has_normals |= corner[2] != NONE;
-        self.mesh.positions_in_mesh.push(attributes.positions_in_source[corner[0] as usize]);
-        self.mesh.vertices.push(attributes.vertex(corner));
-        Ok(vertex)
-    }
-}
-
-/// The numbered elements that faces refer to.
-#[derive(Default)]
-pub(super) struct Attributes {
-    pub(super) positions_in_source: Vec<DVec3>,
-    /// Colours, one for each position once any position has one.
-    pub(super) colors_srgba8: Vec<[u8; 4]>,
-    pub(super) uvs: Vec<[f32; 2]>,
-    pub(super) normals: Vec<[f32; 3]>,
-}
-
-impl Attributes {
-    /// `v x y z`, optionally followed by a weight or a colour, as several programs write it.
-    pub(super) fn push_position(&mut self, line: &Line) -> Result<(), Fault> {
-        let [x, y, z, a, g, b] = floats::<6>(line, 3)?;
-        let position = DVec3::new(x, y, z);
-        let count = line.rest.split_ascii_whitespace().count();
-        if count >= 6 {
-            self.colors_srgba8.resize(self.positions_in_source.len(), [255; 4]);
-            let [r, g, b] = [a, g, b].map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
-            self.colors_srgba8.push([r, g, b, 255]);
-        }
-        let is_weighted = count == 4 && a != 0.0;
-        self.positions_in_source.push(if is_weighted { position / a } else { position });
+        let material = self.current_material.unwrap_or(0);
+        let line = u32::try_from(line.number).unwrap_or(u32::MAX);
+        self.faces.push(Face { line, material, is_flat: self.is_flat, end: self.corners.len() });
         Ok(())
     }
 
-    fn vertex(&self, [position, uv, normal]: Corner) -> Vertex {
-        let plain = plain_vertex();
-        Vertex {
-            color_srgba8: self.colors_srgba8.get(position as usize).copied().unwrap_or(plain.color_srgba8),
-            uv: self.uvs.get(uv as usize).copied().unwrap_or(plain.uv),
-            normal: self.normals.get(normal as usize).copied().unwrap_or(plain.normal),
-            ..plain
+    pub(super) fn into_mesh(
+        self,
+        attributes: &Attributes,
+        materials: &[MaterialUse],
+        limits: &Limits,
+        warnings: &mut Warnings,
+    ) -> Result<SourceMesh, Fault> {
+        let mut builder = Builder::new(attributes, self.material_names.len());
+        let mut start = 0;
+        for face in &self.faces {
+            let corners = &self.corners[start..face.end];
+            start = face.end;
+            builder.add(face, corners, materials[face.material as usize].placement, warnings);
+            at_most(format_args!("line {} (f)", face.line), builder.mesh.vertices.len() as u64, limits.vertices)?;
         }
+        let mut mesh = builder.mesh;
+        let mut is_flat = Vec::new();
+        for (triangles, material) in builder.triangles.into_iter().zip(materials) {
+            let (first_index, index_count) = (mesh.indices.len() as u32, triangles.indices.len() as u32);
+            if index_count > 0 {
+                mesh.parts.push(MeshPart { first_index, index_count, material: material.number });
+                mesh.indices.extend(triangles.indices);
+                is_flat.extend(triangles.is_flat);
+            }
+        }
+        if mesh.indices.len() > u32::MAX as usize {
+            return Err(Fault::unsupported("faces", "more than 2^32 corners"));
+        }
+        if mesh.indices.is_empty() {
+            let reason =
+                [UNREADABLE, NOT_FINITE, TOO_SHORT].into_iter().find_map(|why| Some((why, warnings.first(why)?.0)));
+            let reason = reason.map(|(why, place)| Fault::malformed(place, format!("there are no triangles: {why}")));
+            return Err(reason.unwrap_or_else(|| Fault::malformed("scene", "it has no triangles")));
+        }
+        normals::fill(&mut mesh, |triangle| is_flat[triangle]);
+        Ok(mesh)
     }
 }
 
-/// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
-fn corner(word: &str, attributes: &Attributes) -> Result<Corner, &'static str> {
-    let counts = [attributes.positions_in_source.len(), attributes.uvs.len(), attributes.normals.len()];
+/// Makes vertices of corners and triangles of faces.
+struct Builder<'a> {
+    attributes: &'a Attributes,
+    colors_srgba8: Vec<[u8; 4]>,
+    mesh: SourceMesh,
+    /// For each material.
+    triangles: Vec<Triangles>,
+    /// By corner and by the bits of the change of its texture coordinates.
+    vertex_of_corner: HashMap<(Corner, [u64; 4]), u32>,
+    cutter: PolygonCutter,
+    polygon_in_source: Vec<DVec3>,
+    vertices: Vec<u32>,
+}
+
+#[derive(Default, Clone)]
+struct Triangles {
+    indices: Vec<u32>,
+    /// For each triangle.
+    is_flat: Vec<bool>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(attributes: &'a Attributes, material_count: usize) -> Self {
+        Self {
+            attributes,
+            colors_srgba8: attributes.colors_srgba8(),
+            mesh: SourceMesh::default(),
+            triangles: vec![Triangles::default(); material_count],
+            vertex_of_corner: HashMap::new(),
+            cutter: PolygonCutter::new(),
+            polygon_in_source: Vec::new(),
+            vertices: Vec::new(),
+        }
+    }
+
+    fn add(&mut self, face: &Face, corners: &[Corner], placement: UvTransform, warnings: &mut Warnings) {
+        let place = format_args!("line {} (f)", face.line);
+        self.polygon_in_source.clear();
+        for corner in corners {
+            let position = self.attributes.positions_in_source.get(corner[0] as usize);
+            self.polygon_in_source.extend(position);
+        }
+        if self.polygon_in_source.len() < corners.len() {
+            return warnings.count(UNREADABLE, place);
+        }
+        if !self.polygon_in_source.iter().all(|p| p.is_finite()) {
+            return warnings.count(NOT_FINITE, place);
+        }
+        self.vertices.clear();
+        let mut has_all = true;
+        for corner in corners {
+            let existing = self.attributes.existing(*corner).unwrap_or(*corner);
+            has_all &= existing == *corner;
+            let vertex = self.vertex(existing, placement);
+            self.vertices.push(vertex);
+        }
+        if !has_all {
+            warnings.count(WITHOUT_ATTRIBUTES, place);
+        }
+        if PolygonCutter::is_too_large(&self.polygon_in_source) {
+            warnings.count(TOO_MANY_CORNERS, place);
+        }
+        let triangles = self.cutter.triangles(&self.polygon_in_source);
+        let into = &mut self.triangles[face.material as usize];
+        into.indices.extend(triangles.iter().map(|&corner| self.vertices[corner as usize]));
+        into.is_flat.resize(into.indices.len() / 3, face.is_flat);
+    }
+
+    fn vertex(&mut self, corner: Corner, placement: UvTransform) -> u32 {
+        let next = self.mesh.vertices.len() as u32;
+        let UvTransform { scale, offset } = placement;
+        let key = (corner, [scale.x, scale.y, offset.x, offset.y].map(f64::to_bits));
+        let number = *self.vertex_of_corner.entry(key).or_insert(next);
+        if number == next {
+            let mut vertex = self.attributes.vertex(corner);
+            vertex.color_srgba8 = self.colors_srgba8.get(corner[0] as usize).copied().unwrap_or(vertex.color_srgba8);
+            if placement != UvTransform::IDENTITY {
+                vertex.uv = placement.apply(vertex.uv);
+            }
+            self.mesh.positions_in_mesh.push(self.attributes.positions_in_source[corner[0] as usize]);
+            self.mesh.vertices.push(vertex);
+        }
+        number
+    }
+}
+
+/// `v`, `v/vt`, `v//vn` or `v/vt/vn`. `None` for anything else; numbers may be too large.
+fn corner(word: &[u8], counts: [usize; 3]) -> Option<Corner> {
     let mut corner = [NONE; 3];
-    let mut fields = word.split('/');
+    let mut fields = word.split(|byte| *byte == b'/');
     for (number, count) in corner.iter_mut().zip(counts) {
-        if let Some(field) = fields.next().filter(|f| !f.is_empty()) {
+        if let Some(field) = fields.next().filter(|field| !field.is_empty()) {
             *number = resolved(field, count)?;
         }
     }
-    let is_complete = corner[0] != NONE && fields.next().is_none();
-    if is_complete { Ok(corner) } else { Err("is not a corner") }
+    (corner[0] != NONE && fields.next().is_none()).then_some(corner)
 }
 
-/// Resolves a number that counts from 1, or backwards from the last element so far.
-fn resolved(field: &str, count: usize) -> Result<u32, &'static str> {
-    let number: i64 = field.parse().map_err(|_| "is not a corner")?;
+/// Resolves a number that counts from 1, or backwards from the last element so far. A number of nothing becomes one that is
+/// too large.
+fn resolved(field: &[u8], count: usize) -> Option<u32> {
+    let number: i64 = std::str::from_utf8(field).ok()?.parse().ok()?;
     let from_zero = if number < 0 { number.checked_add(count as i64) } else { number.checked_sub(1) };
-    let in_range = from_zero.filter(|n| (0..count.min(NONE as usize) as i64).contains(n));
-    in_range.map(|n| n as u32).ok_or("refers to something that is not there")
-}
-
-/// Sorts triangles by material, one part each.
-fn parts_of(indices_of_material: Vec<Vec<u32>>, numbers: &[u32]) -> (Vec<u32>, Vec<MeshPart>) {
-    let (mut indices, mut parts) = (Vec::new(), Vec::new());
-    for (own, &material) in indices_of_material.into_iter().zip(numbers) {
-        if !own.is_empty() {
-            let (first_index, index_count) = (indices.len() as u32, own.len() as u32);
-            parts.push(MeshPart { first_index, index_count, material });
-            indices.extend(own);
-        }
-    }
-    (indices, parts)
+    Some(from_zero.and_then(|n| u32::try_from(n).ok()).unwrap_or(NONE).min(NONE - 1))
 }

@@ -4,10 +4,15 @@
 //! drops the texture coordinates of an object in which one face has none. It panics on indices near `i64::MAX` and on
 //! MTL colours of fewer than three numbers.
 //!
-//! Polygons become fans. Missing normals are smooth up to creases of 60°. Axes are kept. Points, lines, free-form
-//! curves and smoothing groups are skipped. A missing material library gives default materials.
+//! Files of many programs and ages are read: a row that cannot be used is left out, and a warning counts its kind. Surfaces
+//! are seen from both sides, because the format has no notion of culling. Missing normals are smooth up to creases of 60°, and
+//! flat after `s off`. Axes are kept. Points, lines and free-form curves are skipped.
 
+mod attributes;
 mod faces;
+mod map;
+mod masks;
+mod materials;
 mod mtl;
 mod text;
 
@@ -15,20 +20,28 @@ use glam::DAffine3;
 
 use super::folder::Folder;
 use super::source_scene::{SourceInstance, SourceScene};
+use super::warnings::Warnings;
 use crate::Limits;
-use crate::error::{Fault, at_most};
-use faces::{Attributes, Faces};
-use text::{Line, floats};
+use crate::error::Fault;
+use attributes::Attributes;
+use faces::Faces;
+use text::{Line, for_each_line, without_byte_order_mark};
 
 pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
-    let text = String::from_utf8_lossy(bytes);
+    let mut warnings = Warnings::default();
+    let scene = read_with(bytes, folder, limits, &mut warnings);
+    warnings.log();
+    scene
+}
+
+fn read_with(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &mut Warnings) -> Result<SourceScene, Fault> {
     let mut file = ObjFile::default();
-    for line in text::lines(&text) {
-        file.read_line(&line, limits)?;
-    }
+    for_each_line(&without_byte_order_mark(bytes), "", |line| file.read_line(line, limits, warnings))?;
     let mut scene = SourceScene::default();
-    let numbers = mtl::read_materials(&file.libraries, &file.faces.material_names, folder, limits, &mut scene)?;
-    scene.meshes.push(file.faces.into_mesh(&numbers)?);
+    let libraries = materials::read_libraries(&file.libraries, folder, limits, warnings)?;
+    let materials =
+        materials::read_materials(&libraries, &file.faces.material_names, folder, limits, warnings, &mut scene)?;
+    scene.meshes.push(file.faces.into_mesh(&file.attributes, &materials, limits, warnings)?);
     scene.instances.push(SourceInstance { mesh: 0, source_from_mesh: DAffine3::IDENTITY });
     Ok(scene)
 }
@@ -37,26 +50,28 @@ pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<Sou
 struct ObjFile {
     attributes: Attributes,
     faces: Faces,
-    libraries: Vec<String>,
+    /// What `mtllib` statements name.
+    libraries: Vec<Vec<u8>>,
 }
 
 impl ObjFile {
-    fn read_line(&mut self, line: &Line, limits: &Limits) -> Result<(), Fault> {
-        match line.keyword {
-            "v" => {
-                at_most(line, self.attributes.positions_in_source.len() as u64 + 1, limits.vertices)?;
-                self.attributes.push_position(line)?;
-            }
-            "vt" => {
-                let [u, v] = floats(line, 1)?;
-                // OBJ's v runs upwards.
-                self.attributes.uvs.push([u as f32, 1.0 - v as f32]);
-            }
-            "vn" => self.attributes.normals.push(floats::<3>(line, 3)?.map(|n| n as f32)),
-            "f" => self.faces.push(line, &self.attributes, limits)?,
-            "usemtl" => self.faces.use_material(line.rest),
-            "mtllib" => self.libraries.push(line.rest.to_owned()),
-            _ => {}
+    fn read_line(&mut self, line: &Line, limits: &Limits, warnings: &mut Warnings) -> Result<(), Fault> {
+        if line.is("v") {
+            self.attributes.push_position(line, limits, warnings)?;
+        } else if line.is("vt") {
+            self.attributes.push_uv(line, warnings);
+        } else if line.is("vn") {
+            self.attributes.push_normal(line, warnings);
+        } else if line.is("f") || line.is("fo") {
+            self.faces.push(line, &self.attributes, limits, warnings)?;
+        } else if line.is("s") {
+            self.faces.set_smoothing(line);
+        } else if line.is("usemtl") {
+            self.faces.use_material(line.rest);
+        } else if line.is("mtllib") {
+            self.libraries.push(line.rest.to_owned());
+        } else if line.is("#MRGB") {
+            self.attributes.push_mrgb(line, limits);
         }
         Ok(())
     }

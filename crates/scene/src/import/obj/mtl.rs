@@ -1,144 +1,168 @@
 //! MTL material libraries.
 
-use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::super::clamped::{all_clamped, clamped};
-use super::super::folder::{Folder, existing};
-use super::super::picture::{Content, EncodedPicture, decode_all};
-use super::super::source_scene::SourceScene;
-use super::text::{Line, floats, lines};
+use super::super::warnings::Warnings;
+use super::map::{Channel, TextureMap};
+use super::text::{Line, finite, for_each_line, without_byte_order_mark, without_comment};
 use crate::error::{Fault, at_most};
-use crate::{Limits, Material, TextureUse};
+use crate::{Limits, Material};
 
-/// Fills the scene's materials and textures, and numbers them for `names`. Missing libraries are skipped;
-/// files outside the folder are refused.
-pub(super) fn read_materials(
-    libraries: &[String],
-    names: &[String],
-    folder: &Folder,
+/// Statements that change what is seen, and that are not shown.
+const NOT_SHOWN: [&str; 15] = [
+    "bump", "map_bump", "norm", "disp", "decal", "refl", "map_Ks", "map_Ns", "map_Ke", "map_Pr", "map_Pm", "Pr", "Pm",
+    "Pc", "aniso",
+];
+
+/// A material as a library has it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Entry {
+    /// Any bytes, comment included.
+    pub name: Vec<u8>,
+    /// The library's folder, relative to the scene's folder.
+    pub folder: PathBuf,
+    pub color_map: Option<TextureMap>,
+    pub alpha_map: Option<TextureMap>,
+    material: Material,
+    /// `d`.
+    opacity: Option<f32>,
+    /// `Tr`.
+    transparency: Option<f32>,
+    /// `illum`.
+    model: Option<u32>,
+}
+
+/// Appends the materials of a library.
+pub(super) fn parse(
+    bytes: &[u8],
+    element: &str,
+    folder: &Path,
     limits: &Limits,
-    scene: &mut SourceScene,
-) -> Result<Vec<u32>, Fault> {
-    at_most("materials", names.len() as u64, limits.attributes)?;
-    let mut known = HashMap::new();
-    for library in libraries {
-        let element = format!("mtllib {library}");
-        if let Some(bytes) = existing(folder.read_name(&element, library))? {
-            parse(&String::from_utf8_lossy(&bytes), &element, limits, &mut known)?;
+    warnings: &mut Warnings,
+    entries: &mut Vec<Entry>,
+) -> Result<(), Fault> {
+    let mut is_first = true;
+    for_each_line(&without_byte_order_mark(bytes), element, |line| {
+        if line.is("newmtl") {
+            is_first = false;
+            entries.push(Entry { name: line.rest.to_owned(), folder: folder.to_owned(), ..Entry::default() });
+            return at_most(element, entries.len() as u64, limits.attributes);
         }
+        let is_usable = entries.last_mut().filter(|_| !is_first).is_none_or(|entry| entry.read_line(line, warnings));
+        if !is_usable {
+            warnings.count("statements of materials without usable numbers are left out", line);
+        }
+        Ok(())
+    })
+}
+
+impl Entry {
+    /// Returns whether the statement is usable or unknown.
+    fn read_line(&mut self, line: &Line, warnings: &mut Warnings) -> bool {
+        let material = &mut self.material;
+        if line.is("Kd") {
+            let Some(color) = color(line) else { return false };
+            let [r, g, b] = color.to_array();
+            material.base_color_linear = [r, g, b, 1.0];
+        } else if line.is("Ks") {
+            let Some(color) = color(line) else { return false };
+            material.phong_specular = color.element_sum() / 3.0;
+        } else if line.is("Ke") {
+            let Some(color) = color(line) else { return false };
+            material.emissive_linear = color;
+        } else if line.is("Ns") {
+            let Some(exponent) = non_negative(line) else { return false };
+            material.phong_exponent = exponent;
+            material.roughness = Material::roughness_from_phong_exponent(exponent);
+        } else if line.is("d") {
+            self.opacity = non_negative(line);
+            return self.opacity.is_some();
+        } else if line.is("Tr") {
+            self.transparency = non_negative(line);
+            return self.transparency.is_some();
+        } else if line.is("illum") {
+            self.model = non_negative(line).map(|model| model as u32);
+        } else if line.is("map_Kd") {
+            self.color_map = TextureMap::parse(line, warnings).or(self.color_map.take());
+        } else if line.is("map_d") || line.is("map_opacity") {
+            self.alpha_map = TextureMap::parse(line, warnings).or(self.alpha_map.take());
+        } else if let Some(keyword) = NOT_SHOWN.iter().find(|keyword| line.is(keyword)) {
+            warnings.list("statements of materials that are not shown", keyword);
+        }
+        true
     }
-    let mut textures = Textures::default();
-    let mut numbers = Vec::new();
-    for name in names {
-        let Entry { mut material, picture } = known.get(name).cloned().unwrap_or_default();
-        material.name.clone_from(name);
+
+    /// The material without its textures.
+    pub(super) fn material(&self, name: String, warnings: &mut Warnings) -> Material {
+        let mut material = Material { name, double_sided: true, ..self.material.clone() };
+        // Models 0 and 1 of illumination have no highlight, and an exponent of 0 is one as wide as the hemisphere.
+        let has_highlight = self.model.is_none_or(|model| model > 1) && material.phong_exponent >= 1.0;
+        if !has_highlight {
+            material.phong_specular = 0.0;
+        }
         if material.phong_specular == 0.0 {
             // A material without a highlight; many programs write an exponent all the same.
             material.roughness = 1.0;
         }
-        material.base_color_texture =
-            picture.map(|file| textures.number_of(&file, folder)).transpose()?.map(TextureUse::from);
-        numbers.push(scene.materials.len() as u32);
-        scene.materials.push(material);
+        let opacity = self.opacity(&material.name, warnings);
+        // Opacity acts as glTF's blending: its share of the surface remains.
+        material.base_color_linear[3] = opacity;
+        material.alpha_hashed = opacity < 1.0;
+        material
     }
-    if scene.materials.is_empty() {
-        scene.materials.push(Material::default());
-    }
-    scene.textures = decode_all(&textures.encoded, limits, folder.missing_textures)?;
-    Ok(numbers)
-}
 
-#[derive(Clone, Default)]
-struct Entry {
-    material: Material,
-    picture: Option<String>,
-}
-
-fn parse(text: &str, element: &str, limits: &Limits, known: &mut HashMap<String, Entry>) -> Result<(), Fault> {
-    let (mut name, mut entry) = (None, Entry::default());
-    for line in lines(text) {
-        if line.keyword == "newmtl" {
-            known.extend(name.replace(line.rest.to_owned()).map(|name| (name, std::mem::take(&mut entry))));
-            at_most(element, known.len() as u64, limits.attributes)?;
-        } else {
-            entry.read_line(&line)?;
-        }
-    }
-    known.extend(name.map(|name| (name, entry)));
-    Ok(())
-}
-
-impl Entry {
-    fn read_line(&mut self, line: &Line) -> Result<(), Fault> {
-        let material = &mut self.material;
-        match line.keyword {
-            "Kd" => {
-                let [r, g, b] = color(line)?.to_array();
-                material.base_color_linear = [r, g, b, material.base_color_linear[3]];
+    /// `d`, or else `Tr`. MeshLab and openMVS write `Tr 1` for an opaque material, where others write `Tr 0`: 1 alone counts as
+    /// transparent only where another statement is a sign of it.
+    fn opacity(&self, name: &str, warnings: &mut Warnings) -> f32 {
+        let opacity = match (self.opacity, self.transparency) {
+            (Some(opacity), _) => opacity,
+            (None, Some(transparency)) => {
+                let has_glass_model = matches!(self.model, Some(4 | 6 | 7 | 9));
+                if transparency >= 1.0 && self.alpha_map.is_none() && !has_glass_model {
+                    warnings.list("materials with Tr 1 alone count as opaque", name);
+                    1.0
+                } else {
+                    1.0 - transparency
+                }
             }
-            "Ks" => material.phong_specular = color(line)?.element_sum() / 3.0,
-            "Ke" => material.emissive_linear = color(line)?,
-            "Ns" => {
-                material.phong_exponent = non_negative(line)?;
-                material.roughness = Material::roughness_from_phong_exponent(material.phong_exponent);
-            }
-            "d" => material.set_opacity(non_negative(line)?),
-            "Tr" => material.set_opacity(1.0 - non_negative(line)?),
-            "map_Kd" => self.picture = Some(file_name(line.rest).to_owned()),
-            _ => {}
+            (None, None) => 1.0,
+        };
+        if opacity <= 0.0 {
+            warnings.list("materials are invisible by d or Tr", name);
         }
-        Ok(())
+        opacity.clamp(0.0, 1.0)
     }
-}
 
-impl Material {
-    /// Opacity acts as glTF's blending: its share of the surface remains.
-    fn set_opacity(&mut self, opacity: f32) {
-        self.base_color_linear[3] = opacity.clamp(0.0, 1.0);
-        self.alpha_hashed = opacity < 1.0;
+    /// The name without comment and quotes, to compare where no name is equal to the byte.
+    pub(super) fn folded_name(name: &[u8]) -> Vec<u8> {
+        let bare = without_comment(name);
+        let unquoted = bare.strip_prefix(b"\"").and_then(|inner| inner.strip_suffix(b"\"")).unwrap_or(bare);
+        unquoted.to_ascii_lowercase()
+    }
+
+    /// The channel of the alpha map that is opacity, where the file chooses one.
+    pub(super) fn alpha_channel(&self) -> Option<Channel> {
+        self.alpha_map.as_ref().and_then(|map| map.channel)
     }
 }
 
 /// A colour of one or three numbers. Exporters disagree on their encoding; they count as linear, as in the glTF
 /// converters. Negative numbers are black.
-fn color(line: &Line) -> Result<Vec3, Fault> {
-    if line.rest.starts_with("spectral") || line.rest.starts_with("xyz") {
-        return Err(Fault::unsupported(line, "colours other than RGB"));
-    }
-    let is_grey = line.rest.split_ascii_whitespace().count() == 1;
-    let [r, g, b] = floats::<3>(line, 1)?.map(|c| c as f32);
-    let color = if is_grey { [r; 3] } else { [r, g, b] };
-    all_clamped(line, color, 0.0..=f32::MAX).map(Vec3::from)
+fn color(line: &Line) -> Option<Vec3> {
+    let [r, g, b] = line.numbers();
+    let r = r?;
+    let color = match [g, b] {
+        [Some(g), Some(b)] => [r, g, b],
+        _ => [r; 3],
+    };
+    let color = Vec3::from(color.map(|c| c.max(0.0) as f32));
+    (line.numbers::<3>().iter().flatten().all(|c| c.is_finite()) && color.is_finite()).then_some(color)
 }
 
-fn non_negative(line: &Line) -> Result<f32, Fault> {
-    let [value] = floats::<1>(line, 1)?;
-    clamped(line, value as f32, 0.0..=f32::MAX)
-}
-
-/// The name follows options such as `-s 1 1 1`; without options it may contain spaces.
-fn file_name(rest: &str) -> &str {
-    if rest.starts_with('-') { rest.split_ascii_whitespace().next_back().unwrap_or(rest) } else { rest }
-}
-
-#[derive(Default)]
-struct Textures {
-    number_of_file: HashMap<String, u32>,
-    encoded: Vec<EncodedPicture>,
-}
-
-impl Textures {
-    fn number_of(&mut self, file: &str, folder: &Folder) -> Result<u32, Fault> {
-        if let Some(&number) = self.number_of_file.get(file) {
-            return Ok(number);
-        }
-        let element = format!("map_Kd {file}");
-        let bytes = existing(folder.read_name(&element, file))?;
-        let number = self.encoded.len() as u32;
-        self.encoded.push(EncodedPicture { element, file: file.to_owned(), bytes, content: Content::Colors });
-        self.number_of_file.insert(file.to_owned(), number);
-        Ok(number)
-    }
+/// The first number; `d -halo` has an option before it.
+fn non_negative(line: &Line) -> Option<f32> {
+    let number = line.words().find(|word| *word != b"-halo").and_then(finite)?;
+    Some(number.max(0.0) as f32).filter(|number| number.is_finite())
 }

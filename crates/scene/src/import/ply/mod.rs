@@ -1,81 +1,123 @@
 //! PLY, ASCII and binary, by `serde-ply`, which streams rows. Sizes are checked against the file first.
 //!
-//! The importer reads two elements. `vertex` has x y z, nx ny nz, red green blue alpha (sRGB bytes, or 0…1), and s t, u
-//! v or texture_u texture_v. `face` has vertex_indices or vertex_index; polygons become fans. Missing normals are
-//! smooth up to creases of 60°. Axes are kept. Other elements are skipped.
+//! The importer reads three elements. `vertex` has x y z, nx ny nz, red green blue alpha (sRGB), and s t. `face` has
+//! vertex_indices, and may have a colour, texcoord and texnumber. `tristrips` has vertex_indices. `header` lists other names
+//! of these properties. `comment TextureFile` names textures. Polygons of any shape are cut into triangles. Surfaces are seen
+//! from both sides. Missing normals are smooth up to creases of 60°. Axes are kept. Other elements are skipped.
 
 mod header;
+mod rows;
+mod surface;
+mod vertices;
 
 use std::io::{BufRead, Read};
+use std::path::Path;
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 use serde::{Deserialize, de::MapAccess};
 use serde_ply::{PlyReader, RowVisitor};
 
+use super::file_search::decoded;
 use super::folder::Folder;
 use super::normals;
-use super::source_scene::{SourceInstance, SourceMesh, SourceScene, plain_vertex};
+use super::picture::Content;
+use super::source_scene::{SourceInstance, SourceScene};
+use super::texture_files::{TextureFiles, TextureReference};
+use super::warnings::Warnings;
 use crate::error::{Fault, at_most};
-use crate::{Limits, Material, MeshPart, Vertex};
+use crate::{Limits, Material, TextureUse};
+use header::{PlyText, color_range};
+use rows::{FaceRow, SkippedRow, VertexRow};
+use surface::Surface;
+use vertices::Vertices;
 
-pub(super) fn read(bytes: &[u8], _folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
-    // The last number of an ASCII file may lack the white space that ends it.
-    let reader =
-        PlyReader::from_reader(bytes.chain(&b"\n"[..])).map_err(|e| Fault::malformed("header", e.to_string()))?;
-    header::check(reader.header(), bytes.len() as u64, limits)?;
-    let (mut mesh, has_normals) = read_elements(reader, limits)?;
-    let index_count = mesh.indices.len() as u32;
-    mesh.parts.push(MeshPart { first_index: 0, index_count, material: 0 });
-    normals::complete(&mut mesh, has_normals, normals::CREASE_60_DEGREES);
-    Ok(SourceScene {
-        meshes: vec![mesh],
-        instances: vec![SourceInstance { mesh: 0, source_from_mesh: DAffine3::IDENTITY }],
-        materials: vec![Material { name: "vertex colours".into(), ..Material::default() }],
-        ..SourceScene::default()
-    })
+pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
+    let mut warnings = Warnings::default();
+    let scene = read_with(bytes, folder, limits, &mut warnings);
+    warnings.log();
+    scene
 }
 
-fn read_elements(mut reader: PlyReader<impl BufRead>, limits: &Limits) -> Result<(SourceMesh, bool), Fault> {
-    let mut mesh = SourceMesh::default();
-    let mut has_normals = false;
+fn read_with(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &mut Warnings) -> Result<SourceScene, Fault> {
+    let text = PlyText::parse(bytes)?;
+    // The last number of an ASCII file may lack the white space that ends it.
+    let rows = text.header.as_bytes().chain(&*text.body).chain(&b"\n"[..]);
+    let reader = PlyReader::from_reader(rows).map_err(|e| Fault::malformed("header", e.to_string()))?;
+    header::check(reader.header(), bytes.len() as u64, limits)?;
+    let (vertices, surface) = read_elements(reader, limits, warnings)?;
+    let has_uvs = vertices.has_uvs || surface.has_uvs();
+    let mut scene = SourceScene::default();
+    if !has_uvs && !text.texture_files.is_empty() {
+        warnings.list("textures without coordinates are not shown", decoded(text.texture_files[0]));
+    } else if !text.texture_files.is_empty() {
+        read_textures(&text.texture_files, folder, limits, &mut scene)?;
+    }
+    let textured_count = scene.materials.len() as u32;
+    let white = Material { name: "vertex colours".into(), double_sided: true, ..Material::default() };
+    scene.materials.push(white);
+    let mut mesh = surface.into_mesh(&vertices, textured_count, limits, warnings)?;
+    normals::fill(&mut mesh, |_| false);
+    scene.meshes.push(mesh);
+    scene.instances.push(SourceInstance { mesh: 0, source_from_mesh: DAffine3::IDENTITY });
+    Ok(scene)
+}
+
+/// Reads the texture files, and makes a material of each.
+fn read_textures(names: &[&[u8]], folder: &Folder, limits: &Limits, scene: &mut SourceScene) -> Result<(), Fault> {
+    at_most("texture files", names.len() as u64, limits.attributes)?;
+    let mut files = TextureFiles::default();
+    for name in names {
+        let shown_name = decoded(name).into_owned();
+        let element = format!("TextureFile {shown_name}");
+        let (bases, content) = (vec![Path::new("")], Content::Colors);
+        let texture = files.number_of(TextureReference { element, names: vec![name], bases, content }, folder)?;
+        let base_color_texture = Some(TextureUse::from(texture));
+        let material = Material { name: shown_name, double_sided: true, base_color_texture, ..Material::default() };
+        scene.materials.push(material);
+    }
+    scene.textures = files.decode(limits, folder.missing_textures)?;
+    Ok(())
+}
+
+fn read_elements(
+    mut reader: PlyReader<impl BufRead>,
+    limits: &Limits,
+    warnings: &mut Warnings,
+) -> Result<(Vertices, Surface), Fault> {
+    let mut vertices = Vertices::default();
+    let mut surface = Surface::default();
     while let Some(element) = reader.current_element() {
         let name = element.name.clone();
         match name.as_str() {
             "vertex" => {
-                let color_scale = header::color_scale(element);
-                has_normals = element.has_property("nx");
-                read_vertices(&mut reader, color_scale, &mut mesh)?;
+                vertices.colors = color_range(element);
+                vertices.has_uvs = element.has_property("s");
+                let read = each_row(&mut reader, |row: VertexRow| {
+                    vertices.push(&row, warnings);
+                    Ok(())
+                });
+                read.map_err(|why| Fault::malformed(format!("vertex {}", vertices.len()), why))?;
             }
-            "face" => read_faces(&mut reader, &mut mesh, limits)?,
+            "face" | "tristrips" => {
+                let are_strips = name == "tristrips";
+                surface.set_colors(color_range(element));
+                let mut row_number = 0u64;
+                let read = each_row(&mut reader, |row: FaceRow| {
+                    if are_strips {
+                        surface.push_strips(&row.vertex_indices);
+                    } else {
+                        surface.push(&row, row_number, warnings);
+                    }
+                    row_number += 1;
+                    if surface.triangle_count() > limits.triangles { Err(TOO_MANY.to_owned()) } else { Ok(()) }
+                });
+                at_most("triangles", surface.triangle_count(), limits.triangles)?;
+                read.map_err(|why| Fault::malformed(format!("{name} {row_number}"), why))?;
+            }
             _ => each_row(&mut reader, |_: SkippedRow| Ok(())).map_err(|why| Fault::malformed(&name, why))?,
         }
     }
-    let vertex_count = mesh.vertices.len();
-    if let Some(bad) = mesh.indices.iter().find(|&&i| i as usize >= vertex_count) {
-        return Err(Fault::malformed("face", format!("index {bad} is beyond its {vertex_count} vertices")));
-    }
-    Ok((mesh, has_normals))
-}
-
-fn read_vertices(reader: &mut PlyReader<impl BufRead>, color_scale: f32, mesh: &mut SourceMesh) -> Result<(), Fault> {
-    each_row(reader, |row: VertexRow| {
-        let (position, vertex) = row.vertex(color_scale)?;
-        mesh.positions_in_mesh.push(position);
-        mesh.vertices.push(vertex);
-        Ok(())
-    })
-    .map_err(|why| Fault::malformed(format!("vertex {}", mesh.vertices.len()), why))
-}
-
-fn read_faces(reader: &mut PlyReader<impl BufRead>, mesh: &mut SourceMesh, limits: &Limits) -> Result<(), Fault> {
-    let mut face = 0u64;
-    let result = each_row(reader, |row: FaceRow| {
-        row.append_fan(&mut mesh.indices)?;
-        face += 1;
-        if mesh.indices.len() as u64 / 3 > limits.triangles { Err(TOO_MANY.to_owned()) } else { Ok(()) }
-    });
-    at_most("triangles", mesh.indices.len() as u64 / 3, limits.triangles)?;
-    result.map_err(|why| Fault::malformed(format!("face {face}"), why))
+    Ok((vertices, surface))
 }
 
 const TOO_MANY: &str = "too many triangles";
@@ -95,68 +137,5 @@ fn each_row<'de, R: BufRead, T: Deserialize<'de>>(
     match refused {
         Some(why) => Err(why),
         None => read.map_err(|e| e.0.to_string()),
-    }
-}
-
-/// A vertex of numbers of any type. Position and colour come first, and no field has an alias, so that `serde-ply`
-/// reads common rows by offset instead of by name. The header has shown that there is a position.
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct VertexRow {
-    x: f64,
-    y: f64,
-    z: f64,
-    red: Option<f32>,
-    green: Option<f32>,
-    blue: Option<f32>,
-    alpha: Option<f32>,
-    nx: f32,
-    ny: f32,
-    nz: f32,
-    s: Option<f32>,
-    t: Option<f32>,
-    u: Option<f32>,
-    v: Option<f32>,
-    texture_u: Option<f32>,
-    texture_v: Option<f32>,
-}
-
-/// A polygon.
-#[derive(Deserialize)]
-struct FaceRow {
-    #[serde(alias = "vertex_index")]
-    vertex_indices: Vec<u32>,
-}
-
-/// A row of an element that scenes do not use.
-#[derive(Deserialize)]
-struct SkippedRow {}
-
-impl VertexRow {
-    fn vertex(&self, color_scale: f32) -> Result<(DVec3, Vertex), String> {
-        let position = DVec3::new(self.x, self.y, self.z);
-        let normal = [self.nx, self.ny, self.nz];
-        let u = self.s.or(self.u).or(self.texture_u).unwrap_or(0.0);
-        let v = self.t.or(self.v).or(self.texture_v).unwrap_or(0.0);
-        if !position.is_finite() || !normal.iter().chain(&[u, v]).all(|v| v.is_finite()) {
-            return Err("a position, normal or texture coordinate is not finite".into());
-        }
-        let byte = |channel: Option<f32>| channel.map_or(255, |c| (c * color_scale + 0.5) as u8);
-        let color_srgba8 = [byte(self.red), byte(self.green), byte(self.blue), byte(self.alpha)];
-        // PLY's v runs upwards.
-        Ok((position, Vertex { normal, uv: [u, 1.0 - v], color_srgba8, ..plain_vertex() }))
-    }
-}
-
-impl FaceRow {
-    fn append_fan(&self, indices: &mut Vec<u32>) -> Result<(), String> {
-        let [hub, rim @ ..] = self.vertex_indices.as_slice() else {
-            return Err("it has no corners".into());
-        };
-        if rim.len() < 2 {
-            return Err(format!("it has {} corners", rim.len() + 1));
-        }
-        indices.extend(rim.windows(2).flat_map(|edge| [*hub, edge[0], edge[1]]));
-        Ok(())
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod compressed;
 pub mod skinned;
+pub mod warnings;
 
 use std::path::PathBuf;
 

@@ -1,0 +1,215 @@
+//! Files that OBJ, MTL and PLY name: in any encoding, in wrong case, with the folders of another computer.
+//!
+//! Names are compared as bytes before they are decoded. A file is looked for in several folders in turn; no file outside the
+//! scene's folder is found.
+
+use std::borrow::Cow;
+use std::ffi::OsString;
+use std::path::{Component, Path, PathBuf};
+
+use super::folder::Folder;
+use crate::error::shortened;
+
+/// The result of a search.
+pub(crate) enum Found {
+    /// The path below the scene's folder.
+    File(PathBuf),
+    Missing,
+    /// The name leads out of the scene's folder, and no file in it has the name's last part.
+    Outside(&'static str),
+}
+
+/// Finds the first of `names`, spellings of one file name, in the first of `bases`, folders relative to the scene's folder.
+/// A file of exactly that name comes before one whose name differs in case or encoding, and that before one that has only the
+/// last part of the name.
+pub(crate) fn search(folder: &Folder, bases: &[&Path], names: &[&[u8]]) -> Found {
+    let mut outside = None;
+    for matching in [Matching::Exact, Matching::Loose] {
+        for name in names.iter().map(|name| ReferredName::parse(name)) {
+            for base in bases.iter().filter(|_| !name.is_absolute) {
+                match resolved(folder, base, &name.parts, matching) {
+                    Found::File(path) => return Found::File(path),
+                    Found::Outside(reason) => outside = outside.or(Some(reason)),
+                    Found::Missing => {}
+                }
+            }
+        }
+    }
+    by_last_part(folder, bases, names).unwrap_or(outside.map_or(Found::Missing, Found::Outside))
+}
+
+fn by_last_part(folder: &Folder, bases: &[&Path], names: &[&[u8]]) -> Option<Found> {
+    for matching in [Matching::Exact, Matching::Loose] {
+        for name in names {
+            let parts = ReferredName::parse(name).parts;
+            let Some(last) = parts.last().filter(|last| !is_special(last)) else { continue };
+            for base in bases {
+                if let Found::File(path) = resolved(folder, base, &[last], matching) {
+                    let name = shortened(decoded(name).into_owned());
+                    tracing::warn!("{name} is not there: {} is taken", path.display());
+                    return Some(Found::File(path));
+                }
+            }
+        }
+    }
+    None
+}
+
+/// A name in parts, without the root of another computer.
+struct ReferredName<'n> {
+    parts: Vec<&'n [u8]>,
+    is_absolute: bool,
+}
+
+impl<'n> ReferredName<'n> {
+    fn parse(name: &'n [u8]) -> Self {
+        let is_separator = |byte: &u8| matches!(byte, b'/' | b'\\');
+        let has_scheme = name.split(is_separator).next().is_some_and(|first| first.contains(&b':'));
+        let is_absolute = has_scheme || name.first().is_some_and(is_separator);
+        // A drive may stand before a name without a separator: `C:t.png`.
+        let after_drive = name.iter().position(|&byte| byte == b':').filter(|_| has_scheme).map_or(0, |at| at + 1);
+        let parts = name[after_drive..].split(is_separator).filter(|part| !part.is_empty() && *part != b".");
+        Self { parts: parts.collect(), is_absolute }
+    }
+}
+
+fn is_special(part: &[u8]) -> bool {
+    part == b".." || part.contains(&0)
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Matching {
+    Exact,
+    /// In any case and encoding.
+    Loose,
+}
+
+fn resolved(folder: &Folder, base: &Path, parts: &[&[u8]], matching: Matching) -> Found {
+    let mut relative = base.to_owned();
+    for part in parts {
+        if *part == b".." {
+            if !relative.pop() {
+                return Found::Outside("climbs out of the scene's folder");
+            }
+            continue;
+        }
+        let Some(name) = entry_name(&folder.root().join(&relative), part, matching) else { return Found::Missing };
+        relative.push(name);
+    }
+    let is_normal = relative.components().all(|c| matches!(c, Component::Normal(_)));
+    match folder.root().join(&relative).canonicalize() {
+        _ if parts.is_empty() || !is_normal => Found::Missing,
+        Ok(path) if !path.starts_with(folder.root()) => Found::Outside("is a link that leaves the scene's folder"),
+        Ok(path) if path.is_file() => Found::File(relative),
+        _ => Found::Missing,
+    }
+}
+
+/// The name in `folder` that matches `part`.
+fn entry_name(folder: &Path, part: &[u8], matching: Matching) -> Option<OsString> {
+    if part.contains(&0) {
+        return None;
+    }
+    let exact = os_name(part).filter(|name| folder.join(name).symlink_metadata().is_ok());
+    if exact.is_some() || matching == Matching::Exact {
+        return exact;
+    }
+    let mut entries: Vec<OsString> = folder.read_dir().ok()?.flatten().map(|entry| entry.file_name()).collect();
+    // The order of a folder's entries is that of the file system.
+    entries.sort();
+    let wanted = decoded(part).to_lowercase();
+    let same = entries.iter().find(|entry| decoded(entry.as_encoded_bytes()).to_lowercase() == wanted);
+    let skeleton = ascii_skeleton(part);
+    let mut alike = entries.iter().filter(|entry| {
+        !part.is_ascii() && !entry.as_encoded_bytes().is_ascii() && ascii_skeleton(entry.as_encoded_bytes()) == skeleton
+    });
+    let only_one_alike = alike.next().filter(|_| alike.next().is_none());
+    same.or(only_one_alike).cloned()
+}
+
+/// A name in lower case with one mark for each run of other letters than ASCII's: equal for all encodings of the name that
+/// leave ASCII alone.
+fn ascii_skeleton(name: &[u8]) -> Vec<u8> {
+    let mut skeleton: Vec<u8> =
+        name.iter().map(|&byte| if byte.is_ascii() { byte.to_ascii_lowercase() } else { 0xff }).collect();
+    skeleton.dedup_by(|a, b| *a == 0xff && *b == 0xff);
+    skeleton
+}
+
+#[cfg(unix)]
+#[allow(clippy::unnecessary_wraps, reason = "elsewhere not all bytes are names")]
+fn os_name(part: &[u8]) -> Option<OsString> {
+    use std::os::unix::ffi::OsStringExt;
+    Some(OsString::from_vec(part.to_vec()))
+}
+
+#[cfg(not(unix))]
+fn os_name(part: &[u8]) -> Option<OsString> {
+    std::str::from_utf8(part).ok().map(OsString::from)
+}
+
+/// Text in UTF-8, or else in Latin-1.
+pub(crate) fn decoded(text: &[u8]) -> Cow<'_, str> {
+    std::str::from_utf8(text).map_or_else(|_| text.iter().map(|&byte| char::from(byte)).collect(), Cow::Borrowed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::missing_textures::MissingTextures;
+    use super::*;
+    use crate::Limits;
+
+    fn found(files: &[&str], bases: &[&str], name: &[u8]) -> String {
+        let dir = tempfile::tempdir().unwrap();
+        for file in ["scene/a.obj"].iter().chain(files) {
+            let path = dir.path().join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, b"x").unwrap();
+        }
+        let (folder, _) =
+            Folder::opened_with(&dir.path().join("scene/a.obj"), &Limits::default(), MissingTextures::Refuse).unwrap();
+        let bases: Vec<&Path> = bases.iter().map(Path::new).collect();
+        match search(&folder, &bases, &[name]) {
+            Found::File(path) => path.display().to_string(),
+            Found::Missing => "missing".into(),
+            Found::Outside(_) => "outside".into(),
+        }
+    }
+
+    #[test]
+    fn the_exact_name_comes_first_and_then_other_cases() {
+        assert_eq!(found(&["scene/T.png", "scene/t.png"], &[""], b"t.png"), "t.png");
+        assert_eq!(found(&["scene/Maps/T.png"], &[""], b"maps\\t.PNG"), "Maps/T.png");
+        assert_eq!(found(&["scene/T.png", "scene/m/t.png"], &["", "m"], b"t.png"), "m/t.png", "exact in any folder");
+    }
+
+    #[test]
+    fn names_in_other_encodings_are_found() {
+        assert_eq!(found(&["scene/Öl.png"], &[""], b"\xd6l.png"), "Öl.png", "Latin-1");
+        assert_eq!(found(&["scene/木.png"], &[""], b"\x96\xd8.png"), "木.png", "Shift JIS");
+        assert_eq!(found(&["scene/木.png", "scene/水.png"], &[""], b"\x96\xd8.png"), "missing", "two are alike");
+    }
+
+    #[test]
+    fn absolute_names_are_found_by_their_last_part() {
+        for name in
+            ["C:\\a\\t.png", "C:t.png", "/home/x/t.png", "\\\\host\\share\\t.png", "file:///x/t.png", "no/t.png"]
+        {
+            assert_eq!(found(&["scene/t.png"], &[""], name.as_bytes()), "t.png", "{name}");
+        }
+    }
+
+    #[test]
+    fn nothing_outside_the_folder_is_found() {
+        let files = ["secret.png", "scene/m/a.mtl"];
+        for name in
+            ["../secret.png", "..\\secret.png", "../../secret.png", "x/../../secret.png", "/etc/passwd", "C:\\x.png"]
+        {
+            assert!(["outside", "missing"].contains(&&*found(&files, &["m", ""], name.as_bytes())), "{name}");
+        }
+        assert_eq!(found(&files, &[""], b"../secret.png"), "outside");
+        assert_eq!(found(&["scene/maps/t.png"], &["m"], b"../maps/t.png"), "maps/t.png", "within the scene's folder");
+        assert_eq!(found(&[], &[""], b"a\0.png"), "missing");
+        assert_eq!(found(&["scene/maps/t.png"], &[""], b"maps"), "missing", "a folder is no file");
+    }
+}

@@ -1,0 +1,66 @@
+//! The texture files of OBJ and PLY models, each read once.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use super::file_search::{Found, decoded, search};
+use super::folder::Folder;
+use super::missing_textures::MissingTextures;
+use super::picture::{Content, EncodedPicture, decode_all};
+use crate::error::{Fault, shortened};
+use crate::{Limits, Texture};
+
+#[derive(Default)]
+pub(crate) struct TextureFiles {
+    pictures: Vec<EncodedPicture>,
+    number_of: HashMap<(String, Content), u32>,
+}
+
+/// A reference to a texture file.
+pub(crate) struct TextureReference<'n> {
+    /// The statement that refers to the file, in messages.
+    pub element: String,
+    /// Spellings of the file's name. The last one is that of messages.
+    pub names: Vec<&'n [u8]>,
+    /// Folders relative to the scene's folder, in which the file is looked for in turn.
+    pub bases: Vec<&'n Path>,
+    pub content: Content,
+}
+
+impl TextureFiles {
+    /// Reads the file unless it is known, and returns its number.
+    pub(crate) fn number_of(&mut self, reference: TextureReference, folder: &Folder) -> Result<u32, Fault> {
+        let TextureReference { element, names, bases, content } = reference;
+        let name = names.last().map(|name| decoded(name).into_owned()).unwrap_or_default();
+        let (file, bytes) = match search(folder, &bases, &names) {
+            Found::File(path) => {
+                let file = path.display().to_string();
+                if let Some(&number) = self.number_of.get(&(file.clone(), content)) {
+                    return Ok(number);
+                }
+                (file, Some(folder.read_relative(&element, &path)?))
+            }
+            Found::Outside(reason) if folder.missing_textures == MissingTextures::Refuse => {
+                return Err(Fault::forbidden(element, &name, reason));
+            }
+            Found::Outside(_) | Found::Missing => (name, None),
+        };
+        let next = self.pictures.len() as u32;
+        let number = *self.number_of.entry((file.clone(), content)).or_insert(next);
+        if number == next {
+            self.pictures.push(EncodedPicture { element, file, bytes, content });
+        }
+        Ok(number)
+    }
+
+    /// Decodes all files, in the order of their numbers.
+    pub(crate) fn decode(&self, limits: &Limits, missing: MissingTextures) -> Result<Vec<Texture>, Fault> {
+        let grey = self.pictures.iter().filter(|picture| picture.bytes.is_none()).map(|picture| &*picture.file);
+        let grey: Vec<&str> = grey.collect();
+        if !grey.is_empty() && missing == MissingTextures::Grey {
+            let names = shortened(grey.join(", "));
+            tracing::warn!("{} textures are missing, and grey takes their place: {names}", grey.len());
+        }
+        decode_all(&self.pictures, limits, missing)
+    }
+}
