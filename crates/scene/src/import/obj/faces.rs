@@ -104,11 +104,12 @@ impl Faces {
         warnings: &mut Warnings,
     ) -> Result<SourceMesh, Fault> {
         let mut builder = Builder::new(attributes, self.material_names.len());
+        let placements = numbered_placements(materials);
         let mut start = 0;
         for face in &self.faces {
             let corners = &self.corners[start..face.end];
             start = face.end;
-            builder.add(face, corners, materials[face.material as usize].placement, warnings);
+            builder.add(face, corners, placements[face.material as usize], warnings);
             at_most(format_args!("line {} (f)", face.line), builder.mesh.vertices.len() as u64, limits.vertices)?;
         }
         let mut mesh = builder.mesh;
@@ -135,6 +136,24 @@ impl Faces {
     }
 }
 
+/// A placement of textures with a number: corners of equal placements are one vertex.
+#[derive(Clone, Copy)]
+struct NumberedPlacement {
+    number: u32,
+    transform: UvTransform,
+}
+
+fn numbered_placements(materials: &[MaterialUse]) -> Vec<NumberedPlacement> {
+    let mut number_of = HashMap::new();
+    let numbered = materials.iter().map(|&MaterialUse { placement: transform, .. }| {
+        let UvTransform { scale, offset } = transform;
+        let next = number_of.len() as u32;
+        let bits = [scale.x, scale.y, offset.x, offset.y].map(f64::to_bits);
+        NumberedPlacement { number: *number_of.entry(bits).or_insert(next), transform }
+    });
+    numbered.collect()
+}
+
 /// Makes vertices of corners and triangles of faces.
 struct Builder<'a> {
     attributes: &'a Attributes,
@@ -142,8 +161,8 @@ struct Builder<'a> {
     mesh: SourceMesh,
     /// For each material.
     triangles: Vec<Triangles>,
-    /// By corner and by the bits of the change of its texture coordinates.
-    vertex_of_corner: HashMap<(Corner, [u64; 4]), u32>,
+    /// By corner and by the number of its placement.
+    vertex_of_corner: HashMap<(Corner, u32), u32>,
     cutter: PolygonCutter,
     polygon_in_source: Vec<DVec3>,
     vertices: Vec<u32>,
@@ -170,7 +189,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn add(&mut self, face: &Face, corners: &[Corner], placement: UvTransform, warnings: &mut Warnings) {
+    fn add(&mut self, face: &Face, corners: &[Corner], placement: NumberedPlacement, warnings: &mut Warnings) {
         let place = format_args!("line {} (f)", face.line);
         self.polygon_in_source.clear();
         for corner in corners {
@@ -203,16 +222,14 @@ impl<'a> Builder<'a> {
         into.is_flat.resize(into.indices.len() / 3, face.is_flat);
     }
 
-    fn vertex(&mut self, corner: Corner, placement: UvTransform) -> u32 {
+    fn vertex(&mut self, corner: Corner, placement: NumberedPlacement) -> u32 {
         let next = self.mesh.vertices.len() as u32;
-        let UvTransform { scale, offset } = placement;
-        let key = (corner, [scale.x, scale.y, offset.x, offset.y].map(f64::to_bits));
-        let number = *self.vertex_of_corner.entry(key).or_insert(next);
+        let number = *self.vertex_of_corner.entry((corner, placement.number)).or_insert(next);
         if number == next {
             let mut vertex = self.attributes.vertex(corner);
             vertex.color_srgba8 = self.colors_srgba8.get(corner[0] as usize).copied().unwrap_or(vertex.color_srgba8);
-            if placement != UvTransform::IDENTITY {
-                vertex.uv = placement.apply(vertex.uv);
+            if placement.transform != UvTransform::IDENTITY {
+                vertex.uv = placement.transform.apply(vertex.uv);
             }
             self.mesh.positions_in_mesh.push(self.attributes.positions_in_source[corner[0] as usize]);
             self.mesh.vertices.push(vertex);
