@@ -14,6 +14,8 @@ use crate::{Limits, SceneErrorKind};
 /// A scene's folder. No file outside it is read, and the bytes of all files together are limited.
 pub(crate) struct Folder {
     canonical_root: PathBuf,
+    /// The scene's file in messages.
+    pub(crate) scene_file: String,
     bytes_left: Cell<u64>,
     pub(crate) missing_textures: MissingTextures,
 }
@@ -27,16 +29,45 @@ impl Folder {
     ) -> Result<(Self, Vec<u8>), Fault> {
         let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let canonical_root = parent.canonicalize().map_err(|e| Fault::io("folder", e))?;
-        let folder = Self { canonical_root, bytes_left: Cell::new(limits.file_bytes), missing_textures };
+        let scene_file = path.display().to_string();
+        let folder = Self { canonical_root, scene_file, bytes_left: Cell::new(limits.file_bytes), missing_textures };
         let bytes = folder.read_path("file", path)?;
         Ok((folder, bytes))
     }
 
-    /// Reads a file named by a URI reference, as in glTF; percent-encoding is decoded first.
-    pub(crate) fn read_uri(&self, element: &str, uri: &str) -> Result<Vec<u8>, Fault> {
-        let decoded = percent_decode_str(uri).decode_utf8();
-        let name = decoded.map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
-        self.read_name(element, &name)
+    /// Reads a file named by a URI reference, as in glTF; percent-encoding is decoded first. Where there is no such file,
+    /// the name counts without its query (`?…`), and then without regard to upper and lower case. `None` for a file that
+    /// does not exist.
+    pub(crate) fn read_uri(&self, element: &str, uri: &str) -> Result<Option<Vec<u8>>, Fault> {
+        let decoded = |uri| percent_decode_str(uri).decode_utf8();
+        let name = decoded(uri).map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
+        if let Some(bytes) = existing(self.read_name(element, &name))? {
+            return Ok(Some(bytes));
+        }
+        let path = uri.split(['?', '#']).next().and_then(|path| decoded(path).ok()).filter(|path| !path.is_empty());
+        let Some(path) = path else { return Ok(None) };
+        if let Some(bytes) = existing(self.read_name(element, &path))? {
+            return Ok(Some(bytes));
+        }
+        let found = self.find_ignoring_case(&path);
+        found.map_or(Ok(None), |found| existing(self.read_name(element, &found)))
+    }
+
+    /// The name of the file that `name` would be if upper and lower case were equal: the first in the order of names.
+    fn find_ignoring_case(&self, name: &str) -> Option<String> {
+        let relative = name.replace('\\', "/");
+        if reason_to_refuse(&relative).is_some() {
+            return None;
+        }
+        let mut found = String::new();
+        for part in relative.split('/').filter(|part| !matches!(*part, "" | ".")) {
+            let entries = self.canonical_root.join(&found).read_dir().ok()?;
+            let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
+            let part = part.to_lowercase();
+            let entry = names.filter(|name| name.to_lowercase() == part).min()?;
+            found = if found.is_empty() { entry } else { format!("{found}/{entry}") };
+        }
+        Some(found)
     }
 
     /// Reads a file by its name relative to this folder.
@@ -111,8 +142,11 @@ mod tests {
     #[test]
     fn reads_inside_and_decodes_percent() {
         let (_dir, folder) = folder_with_file();
-        assert_eq!(folder.read_uri("buffer 0", "a%20b.bin").unwrap(), b"inside");
-        assert_eq!(folder.read_uri("buffer 0", "./a b.bin").unwrap(), b"inside");
+        assert_eq!(folder.read_uri("buffer 0", "a%20b.bin").unwrap().unwrap(), b"inside");
+        assert_eq!(folder.read_uri("buffer 0", "./a b.bin").unwrap().unwrap(), b"inside");
+        assert_eq!(folder.read_uri("buffer 0", "a%20b.bin?v=3#x").unwrap().unwrap(), b"inside");
+        assert_eq!(folder.read_uri("buffer 0", "./A%20b.BIN").unwrap().unwrap(), b"inside");
+        assert!(folder.read_uri("buffer 0", "c.bin").unwrap().is_none());
     }
 
     #[test]

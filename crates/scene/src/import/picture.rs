@@ -5,6 +5,7 @@ use std::io::Cursor;
 use image::ImageReader;
 use rayon::prelude::*;
 
+use super::ktx2;
 use super::missing_textures::MissingTextures;
 use crate::error::{Fault, at_most};
 use crate::{Limits, SceneErrorKind, Texture};
@@ -76,6 +77,9 @@ fn reader<'b>(element: &str, bytes: &'b [u8]) -> Result<ImageReader<Cursor<&'b [
 }
 
 fn size_px(element: &str, bytes: &[u8]) -> Result<(u32, u32), Fault> {
+    if ktx2::is_ktx2(bytes) {
+        return ktx2::size_px(bytes).map_err(|reason| Fault::malformed(element, reason));
+    }
     reader(element, bytes)?.into_dimensions().map_err(|e| Fault::malformed(element, e.to_string()))
 }
 
@@ -86,6 +90,11 @@ fn stand_in(content: Content) -> Texture {
 
 fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
     let Some(bytes) = &picture.bytes else { return Ok(stand_in(picture.content)) };
+    if ktx2::is_ktx2(bytes) {
+        let (width_px, height_px) = size_px(&picture.element, bytes)?;
+        let srgba8 = ktx2::rgba8(bytes).map_err(|reason| Fault::malformed(&picture.element, reason))?;
+        return Ok(Texture { width_px, height_px, is_srgb: picture.content.is_srgb(), srgba8 });
+    }
     let mut reader = reader(&picture.element, bytes)?;
     let mut image_limits = image::Limits::default();
     image_limits.max_image_width = Some(limits.texture_side_px);

@@ -1,7 +1,10 @@
 //! Small files of every format for tests.
 
 pub mod compressed;
+pub mod draco;
+pub mod ktx2;
 pub mod skinned;
+pub mod warnings;
 
 use std::path::PathBuf;
 
