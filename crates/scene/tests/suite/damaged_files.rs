@@ -8,7 +8,7 @@ use scene::{Limits, MissingTextures, load_file, pack, unpack};
 
 use crate::samples::compressed::{compressed_cube, diagonals, plain_streams, positions};
 use crate::samples::draco::{cube_stream, draco_cube};
-use crate::samples::ktx2::{uastc, zstandard};
+use crate::samples::ktx2::{etc1s, uastc, uastc_of_encoder, zstandard};
 use crate::samples::skinned::Tube;
 use crate::samples::{self, GltfCube, cube_obj, cube_ply_ascii, cube_ply_binary};
 
@@ -186,7 +186,7 @@ fn damage_binary(cube: &GltfCube, changed: usize) {
 #[test]
 fn ktx2_textures() {
     let blocks = [[250, 10, 20, 255], [1, 2, 240, 128]];
-    for picture in [uastc(6, 3, &blocks), zstandard(6, 3, &blocks, None)] {
+    for picture in [uastc(6, 3, &blocks), zstandard(6, 3, &blocks, None), etc1s(), uastc_of_encoder()] {
         let cube = samples::cube(|c| {
             let length = picture.len();
             c.primitive = r#"{"attributes":{"POSITION":0},"indices":1,"material":0}"#.into();
@@ -198,7 +198,7 @@ fn ktx2_textures() {
                 "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],"#
                 .into();
         });
-        damage_binary(&cube, 6000);
+        damage_binary(&cube, 3000);
     }
 }
 

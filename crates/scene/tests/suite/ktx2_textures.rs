@@ -2,7 +2,7 @@
 
 use scene::{Limits, MissingTextures, Scene, SceneError, SceneErrorKind, load_file};
 
-use crate::samples::ktx2::{uastc, zstandard};
+use crate::samples::ktx2::{etc1s, uastc, uastc_of_encoder, zstandard};
 use crate::samples::{Sample, cube};
 
 const RED: [u8; 4] = [250, 10, 20, 255];
@@ -32,6 +32,20 @@ fn uastc_is_read_plain_and_in_zstandard() {
         assert_eq!((texture.width_px, texture.height_px, texture.is_srgb), (6, 3, true));
         let row = [RED, RED, RED, RED, BLUE, BLUE].concat();
         assert_eq!(texture.srgba8, row.repeat(3));
+    }
+}
+
+#[test]
+fn pictures_of_the_reference_encoder_have_its_colours() {
+    // The reference decodes the same texels from ETC1S, which keeps fewer colours.
+    let etc1s_colors = [[249, 10, 18, 255], [10, 200, 26, 255], [21, 29, 244, 128]];
+    let uastc_colors = [[250, 10, 20, 255], [10, 200, 30, 255], [20, 30, 240, 128]];
+    for (bytes, colors) in [(etc1s(), etc1s_colors), (uastc_of_encoder(), uastc_colors)] {
+        let scene = loaded(&bytes).unwrap();
+        let texture = &scene.textures[0];
+        assert_eq!((texture.width_px, texture.height_px), (12, 8));
+        let row: Vec<u8> = colors.iter().flat_map(|color| color.repeat(4)).collect();
+        assert_eq!(texture.srgba8, row.repeat(8));
     }
 }
 
