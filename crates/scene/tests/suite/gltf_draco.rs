@@ -45,6 +45,17 @@ fn uncompressed_accessors_count_before_the_stream() {
 }
 
 #[test]
+fn compressed_points_are_left_out() {
+    let stream = cube_stream(None, 12);
+    let cube = draco_cube(&stream, |c| {
+        let points = c.primitive.replacen('{', r#"{"mode":0,"#, 1).replace(r#""bufferView":0"#, r#""bufferView":1"#);
+        c.primitive = format!("{},{points}", c.primitive);
+        c.views += r#",{"buffer":0,"byteLength":9}"#;
+    });
+    assert_eq!(load("points.glb", &cube.glb()).unwrap().triangle_count(), 12);
+}
+
+#[test]
 fn damaged_streams_and_descriptions_are_refused_by_primitive() {
     let stream = cube_stream(None, 12);
     for length in [0, 4, 11, stream.len() / 2, stream.len() - 1] {

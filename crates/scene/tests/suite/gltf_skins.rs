@@ -133,6 +133,11 @@ fn nodes_of_scale_0_are_hidden_and_flat_ones_are_flat() {
     let limits = scene::Limits { vertices: 200, ..scene::Limits::default() };
     let error = load_file(&sample.path, &limits, scene::ImportOptions::default()).unwrap_err().to_string();
     assert!(error.contains("vertices of flattened meshes"), "{error}");
+    let zeros = cube(|c| {
+        c.nodes = r#"{"mesh":0},{"mesh":0,"matrix":[0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0]}"#.into();
+        c.roots = "0,1".into();
+    });
+    assert_eq!(load("zeros.glb", &zeros.glb()).unwrap().triangle_count(), 12);
     let all_hidden = cube(|c| c.nodes = r#"{"mesh":0,"scale":[0,0,0]}"#.into());
     assert!(refusal("none.glb", &all_hidden.glb()).contains("no triangles in scene 0"));
 }
@@ -213,7 +218,8 @@ fn vertex_colours_above_1_stay_above_1() {
         let linear = [r, g, b].map(depth_image::linear_from_srgb8);
         Vec3::from(linear) * Vec3::from_slice(&material.base_color_linear[..3])
     };
-    let bright = load("a.glb", &colored(4.0).glb()).unwrap();
+    let (bright, warning) = with_one_warning(|| load("a.glb", &colored(4.0).glb()).unwrap());
+    assert!(warning.contains("a.glb: mesh 0, primitive 0: colours of vertices are above 1"), "{warning}");
     let expected = Vec3::new(0.25, 0.25, 4.0);
     assert!(shown(&bright).distance(expected) < 0.01, "{}", shown(&bright));
     assert_eq!(bright.materials[0].base_color_linear, [0.5, 0.25, 1.0, 1.0], "other meshes keep the material");
@@ -231,4 +237,18 @@ fn moving_morph_targets_are_named() {
     let (scene, warning) = with_one_warning(|| load("a.glb", &moving.glb()).unwrap());
     assert!((signed_volume(&scene) - 1.0).abs() < 1e-6);
     assert!(warning.contains("animation 0 (talk): a channel moves morph targets"), "{warning}");
+}
+
+#[test]
+fn colours_of_integers_are_shares_also_where_the_file_does_not_say_so() {
+    let colored = cube(|c| {
+        c.primitive = r#"{"attributes":{"POSITION":0,"COLOR_0":2},"indices":1}"#.into();
+        c.accessors += r#",{"bufferView":2,"componentType":5121,"count":8,"type":"VEC4"}"#;
+        c.views += r#",{"buffer":0,"byteOffset":168,"byteLength":32}"#;
+        c.buffers = r#"{"byteLength":200}"#.into();
+        c.binary.extend([55, 0, 255, 128].repeat(8));
+    });
+    let (scene, warnings) = with_warnings(|| load("a.glb", &colored.glb()).unwrap());
+    assert_eq!(scene.meshes[0].vertices[0].color_srgba8, [128, 0, 255, 128]);
+    assert!(warnings.is_empty(), "{warnings:?}");
 }

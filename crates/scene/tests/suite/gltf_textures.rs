@@ -138,6 +138,8 @@ fn a_texture_in_avif_alone_leaves_the_factor_with_one_warning() {
         );
         assert!(warning.contains("`npx @gltf-transform/cli png IN OUT`"), "{warning}");
     }
+    let (_, warning) = with_one_warning(|| load("a.glb", &textured("{}")).unwrap());
+    assert!(warning.contains("it has no picture"), "{warning}");
     let both = r#"{"source":1,"extensions":{"EXT_texture_avif":{"source":0}}}"#;
     assert_eq!(load("a.glb", &textured(both)).unwrap().textures[0].srgba8, [1, 2, 3, 255]);
 }

@@ -152,6 +152,21 @@ impl<'a> Document<'a> {
         Ok(self.layout(index, element)?.components)
     }
 
+    /// The largest value of an accessor's unsigned integers that are not normalized.
+    pub(super) fn largest_of_plain_integers(
+        &self,
+        index: Index<Accessor>,
+        element: &str,
+    ) -> Result<Option<f32>, Fault> {
+        let layout = self.layout(index, element)?;
+        let is_plain = !layout.accessor.normalized;
+        Ok(match layout.component {
+            ComponentType::U8 if is_plain => Some(255.0),
+            ComponentType::U16 if is_plain => Some(65_535.0),
+            _ => None,
+        })
+    }
+
     /// Whether the accessor's primitive is compressed in the file.
     pub(super) fn is_decoded(&self, index: Index<Accessor>) -> bool {
         self.decoded_accessors.contains_key(&index.value())

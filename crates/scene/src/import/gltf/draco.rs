@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, HashMap};
 use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder, PointAttribute, PointIndex};
 use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::buffer::View;
-use gltf::json::mesh::{Primitive, Semantic};
+use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root, deserialize};
 use serde::Deserialize;
@@ -74,13 +74,16 @@ pub(super) fn decode_all<'a>(
     Ok(decoded)
 }
 
-/// Whether a primitive has no uncompressed positions, and its accessors have not been decoded for another primitive.
+/// Whether a primitive has triangles and no uncompressed positions, and its accessors have not been decoded for another
+/// primitive.
 fn is_needed(root: &Root, primitive: &Primitive, decoded: &HashMap<usize, DecodedAccessor>) -> bool {
     let position = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
     let accessor: Option<&Accessor> = position.and_then(|&index| root.get(index));
     let is_uncompressed = accessor.is_some_and(|accessor| accessor.buffer_view.is_some());
     let mut accessors = primitive.attributes.values().chain(&primitive.indices);
-    !is_uncompressed && !accessors.all(|index| decoded.contains_key(&index.value()))
+    let has_triangles =
+        matches!(primitive.mode, Checked::Valid(Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan));
+    has_triangles && !is_uncompressed && !accessors.all(|index| decoded.contains_key(&index.value()))
 }
 
 fn decoded_mesh(bytes: &[u8], element: &str, budget: &mut Budget) -> Result<Mesh, Fault> {

@@ -74,6 +74,11 @@ fn merged(
             let Geometry { mesh, color_scale } = geometry;
             at_most("materials", scene.materials.len() as u64, document.limits.attributes.saturating_add(1))?;
             let material = materials.number(material, color_scale, scene);
+            if color_scale > 1.0 && scene.materials[material as usize].base_color_linear[..3].iter().any(|c| *c > 1.0) {
+                document
+                    .warnings
+                    .add(&element, "colours of vertices are above 1: surfaces that stay so are shown as 1");
+            }
             merged.append_part(mesh, material);
         }
     }

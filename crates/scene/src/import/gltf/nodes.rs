@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
-use glam::{DAffine3, DMat4, DVec3, Mat4, Quat, Vec3};
+use glam::{DAffine3, DMat3, DMat4, DVec3, Mat4, Quat, Vec3};
 use gltf::json::{Index, Node, Root, Scene as JsonScene};
 
 use super::super::source_scene::{PlacedCamera, SourceInstance, SourceScene};
@@ -158,7 +158,11 @@ pub(super) fn parent_from_node(node: &Node, element: &str) -> Result<DAffine3, F
     transform.ok_or_else(|| Fault::malformed(element, "its transform is not finite, not affine, or has no rotation"))
 }
 
+/// `None` for a matrix that is not affine. Exporters write zeros alone to hide something.
 pub(super) fn affine_from(matrix: DMat4) -> Option<DAffine3> {
+    if matrix == DMat4::ZERO {
+        return Some(DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO });
+    }
     let is_affine = (matrix.row(3) - glam::DVec4::W).abs().max_element() < 1e-6;
     is_affine.then(|| DAffine3::from_mat4(matrix))
 }
@@ -178,7 +182,7 @@ pub(super) fn parts_of(node: &Node) -> TransformParts {
     }
 }
 
-/// `None` for an orthographic camera, and for one whose node has no size. The pose is rigid: a node's scale does not affect a
+/// `None` for an orthographic camera, and for one whose node or field of view has no size. The pose is rigid: a node's scale does not affect a
 /// view.
 fn placed_camera(document: &Document, node: &Node, place: &Place) -> Result<Option<PlacedCamera>, Fault> {
     let camera = node.camera.and_then(|index| document.root.get(index));
@@ -188,14 +192,15 @@ fn placed_camera(document: &Document, node: &Node, place: &Place) -> Result<Opti
     };
     let fallback = || format!("camera {}", node.camera.map_or(0, |c| c.value()));
     let name = camera.name.clone().or_else(|| node.name.clone()).unwrap_or_else(fallback);
-    if !is_invertible(&place.source_from_node) {
+    let is_open = perspective.yfov > 0.0 && perspective.yfov < std::f32::consts::PI;
+    if !(is_open && is_invertible(&place.source_from_node)) {
         let element = format_args!("{}, camera {name:?}", place.element);
-        document.warnings.add(element, "its transform has no inverse: it is left out");
+        document.warnings.add(element, "its transform has no inverse, or its field of view no size: it is left out");
         return Ok(None);
     }
     let backwards = (place.source_from_node.matrix3 * DVec3::Z).normalize_or(DVec3::Z);
     let right = (place.source_from_node.matrix3 * DVec3::Y).cross(backwards).normalize_or(DVec3::X);
-    let rotation = glam::DMat3::from_cols(right, backwards.cross(right), backwards);
+    let rotation = DMat3::from_cols(right, backwards.cross(right), backwards);
     Ok(Some(PlacedCamera {
         name,
         source_from_camera: DAffine3::from_mat3_translation(rotation, place.source_from_node.translation),

@@ -34,12 +34,12 @@ pub(super) fn read(
     let Checked::Valid(mode) = primitive.mode else {
         return Err(Fault::malformed(element, "unknown mode"));
     };
-    // Compressed strips are decoded to triangles.
-    let is_decoded = primitive.indices.is_some_and(|indices| document.is_decoded(indices));
-    let mode = if is_decoded { Mode::Triangles } else { mode };
     if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
         return Ok(None);
     }
+    // Compressed strips are decoded to triangles.
+    let is_decoded = primitive.indices.is_some_and(|indices| document.is_decoded(indices));
+    let mode = if is_decoded { Mode::Triangles } else { mode };
     let attributes = Attributes { document, primitive, weights, element };
     let position = attributes.index(Semantic::Positions);
     let position = position.ok_or_else(|| Fault::malformed(element, "it has no POSITION"))?;
@@ -176,12 +176,21 @@ fn drop_unused(mesh: &mut SourceMesh) {
 }
 
 fn linear_colors(document: &Document, index: Index<Accessor>, element: &str) -> Result<Vec<[f32; 4]>, Fault> {
-    if document.component_count(index, element)? == 3 {
+    let mut colors = if document.component_count(index, element)? == 3 {
         let rgb = document.floats::<3>(index, element)?;
-        Ok(rgb.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect())
+        rgb.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
     } else {
-        document.floats::<4>(index, element)
+        document.floats::<4>(index, element)?
+    };
+    // Integers are shares of their largest value (glTF 2.0, 3.7.2.1), also where a file does not say so.
+    if let Some(largest) = document.largest_of_plain_integers(index, element)? {
+        let has_alpha = document.component_count(index, element)? == 4;
+        for color in &mut colors {
+            let channels = if has_alpha { 4 } else { 3 };
+            color[..channels].iter_mut().for_each(|channel| *channel /= largest);
+        }
     }
+    Ok(colors)
 }
 
 fn srgba8_from_linear([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {

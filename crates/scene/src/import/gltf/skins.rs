@@ -1,6 +1,6 @@
 //! Skins: joints of vertices, and where meshes are bound to them.
 
-use glam::{DAffine3, DMat3, DMat4, DVec3, Mat4};
+use glam::{DAffine3, Mat4};
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, skin::Skin};
@@ -77,9 +77,6 @@ fn influence(shares: &mut [(f32, f32)]) -> Result<Influence, String> {
     Ok(influence)
 }
 
-/// A bind matrix that leaves vertices no extent.
-const HIDDEN: DAffine3 = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
-
 /// The inverse bind matrices of a skin, one for each of its joints. Those without an inverse hide their vertices.
 pub(super) fn bind_matrices(document: &Document, skin: &Skin, element: &str) -> Result<Vec<DAffine3>, Fault> {
     at_most(format_args!("{element}, joints"), skin.joints.len() as u64, u64::from(u16::MAX))?;
@@ -95,10 +92,7 @@ pub(super) fn bind_matrices(document: &Document, skin: &Skin, element: &str) -> 
         return Err(Fault::malformed(element, why));
     }
     let bind = |(number, matrix): (usize, &[f32; 16])| {
-        let matrix = Mat4::from_cols_array(matrix).as_dmat4();
-        // A matrix of zeros hides its vertices.
-        let transform = if matrix == DMat4::ZERO { Some(HIDDEN) } else { affine_from(matrix) };
-        let transform = transform.filter(DAffine3::is_finite);
+        let transform = affine_from(Mat4::from_cols_array(matrix).as_dmat4()).filter(DAffine3::is_finite);
         let why = "it is not finite, or not affine";
         transform.ok_or_else(|| Fault::malformed(format_args!("{element}, matrix {number}"), why))
     };

@@ -49,7 +49,8 @@ pub(super) fn image_of(document: &Document, texture: &JsonTexture) -> Result<Ind
         u32::try_from(source).ok().map(Index::new)
     };
     let sources = [of_extension("EXT_texture_webp"), Some(texture.source), of_extension("KHR_texture_basisu")];
-    let existing = || sources.into_iter().flatten().filter(|image| document.root.get(*image).is_some());
+    let has_bytes = |image: &Image| image.uri.is_some() || image.buffer_view.is_some();
+    let existing = || sources.into_iter().flatten().filter(|image| document.root.get(*image).is_some_and(has_bytes));
     if let Some(image) = existing().find(|image| unread_format(document, *image).is_none()) {
         return Ok(image);
     }
