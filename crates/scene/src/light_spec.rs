@@ -72,8 +72,6 @@ const KINDS: &[&str] = &["sun", "point", "spot", "rectangle"];
 const SUN_RADIUS_DEG: f64 = 0.27;
 /// Default cones of `KHR_lights_punctual`.
 const SPOT_CONES_DEG: [f64; 2] = [0.0, 45.0];
-/// Endings of pictures that are no environment maps, or not read.
-const OTHER_PICTURES: [&str; 9] = ["exr", "pfm", "png", "jpg", "jpeg", "tif", "tiff", "webp", "ktx2"];
 /// Vectors whose squared length is this close to 1 stay unchanged, so that a normalised vector keeps its bits.
 const UNIT_TOLERANCE: f64 = 1e-6;
 
@@ -140,12 +138,13 @@ impl FromStr for EnvironmentSpec {
     fn from_str(text: &str) -> Result<Self, LightSpecError> {
         let text = text.trim();
         let path = Path::new(text);
-        let has_ending = |ending: &&str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending));
-        if has_ending(&"hdr") {
+        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+        if extension.eq_ignore_ascii_case("hdr") {
             return Ok(Self::File(path.to_owned()));
         }
-        if OTHER_PICTURES.iter().any(has_ending) {
-            return Err(malformed("environment", text, "a file that is read: only .hdr is, in Radiance's format"));
+        // The fraction of a number begins with a digit.
+        if extension.starts_with(|first: char| first.is_ascii_alphabetic()) {
+            return Err(malformed("environment", text, "a colour or a file in Radiance's format: only .hdr is read"));
         }
         let environment = match text.split_once('/') {
             Some((zenith, nadir)) => Environment::gradient(color_from("zenith", zenith)?, color_from("nadir", nadir)?),

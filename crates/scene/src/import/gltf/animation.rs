@@ -5,7 +5,8 @@ use gltf::json::{Index, Node as JsonNode, skin::Skin};
 
 use super::super::source_scene::{SourceMesh, SourceScene};
 use super::document::Document;
-use super::nodes::{NodeTree, PlacedNode, parent_from_node, parts_of};
+use super::nodes::{NodeTree, PlacedNode};
+use super::transforms::{parent_from_node, parts_of};
 use super::{channels, degenerate, skins};
 use crate::animation::{
     Animation, Clip, Influence, Joint, MovingInstance, Node, NodeTransform, TransformParts, is_invertible,

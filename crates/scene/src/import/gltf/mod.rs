@@ -36,6 +36,7 @@ mod sources;
 mod specular_glossiness;
 mod texture_coordinates;
 mod textures;
+mod transforms;
 
 use gltf::binary::Glb;
 use gltf::json::Root;

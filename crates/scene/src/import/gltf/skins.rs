@@ -6,7 +6,7 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, skin::Skin};
 
 use super::document::{Document, same_count};
-use super::nodes::affine_from;
+use super::transforms::affine_from;
 use crate::animation::Influence;
 use crate::error::{Fault, at_most};
 
