@@ -171,7 +171,8 @@ fn morphed(mesh: &str, nodes: &str, roots: &str) -> Scene {
         c.views += r#",{"buffer":0,"byteOffset":168,"byteLength":96}"#;
         c.buffers = r#"{"byteLength":264}"#.into();
         c.binary.extend([3f32, 0.0, 0.0].repeat(8).iter().flat_map(|v| v.to_le_bytes()));
-        (c.nodes, c.roots) = (nodes.into(), roots.into());
+        c.nodes = nodes.into();
+        c.roots = roots.into();
     });
     let json = cube.json().replace(r#""meshes":[{"#, &format!(r#""meshes":[{{{mesh}"#));
     cube.binary.resize(264, 0);

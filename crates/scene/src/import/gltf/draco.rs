@@ -96,7 +96,8 @@ fn decoded_mesh(bytes: &[u8], element: &str, budget: &mut Budget) -> Result<Mesh
     MeshDecoder::new()
         .decode(&mut buffer, &mut mesh)
         .map_err(|error| Fault::malformed(element, format!("its stream is cut off or damaged: {error}")))?;
-    let (points, faces) = (mesh.num_points() as u64, mesh.num_faces() as u64);
+    let points = mesh.num_points() as u64;
+    let faces = mesh.num_faces() as u64;
     at_most(format_args!("{element}: decoded vertices"), points, budget.points)?;
     at_most(format_args!("{element}: decoded triangles"), faces, budget.faces)?;
     budget.points -= points;
