@@ -13,7 +13,9 @@ use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use sampling::{Impostors, Mirror, Rig, SamplingMethod};
-use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, Scene, SceneSpec, SourceCamera, UpAxis};
+use scene::{
+    EnvironmentSpec, ImportOptions, LightSpec, Limits, MissingTextures, Scene, SceneSpec, SourceCamera, UpAxis,
+};
 
 use crate::camera_file::{self, Placement};
 use crate::delivery::default_method;
@@ -56,6 +58,9 @@ pub struct SceneArgs {
     /// What is done about textures that a scene's file names and that are not there: refuse the scene, or show grey
     #[arg(long, default_value_t, value_name = "refuse|grey")]
     pub missing_textures: MissingTextures,
+    /// Show a glTF file without an extension that it requires and that is not read; once for each
+    #[arg(long = "ignore-required", value_name = "NAME")]
+    pub ignore_required: Vec<String>,
     /// The clip of an animated scene that plays, by its name [default: the first]
     #[arg(long, value_name = "NAME")]
     pub clip: Option<String>,
@@ -186,6 +191,7 @@ impl SceneArgs {
         Self {
             scene,
             missing_textures: MissingTextures::default(),
+            ignore_required: Vec::new(),
             clip: None,
             up: UpAxis::default(),
             lighting: Lighting::default(),
@@ -351,8 +357,9 @@ impl SceneArgs {
             SceneSpec::File(file) => self.up.check(file).context("--up")?,
             built_in => self.up.check(Path::new(&built_in.to_string())).context("--up")?,
         }
-        let mut scene =
-            self.scene.load(&Limits::default(), self.missing_textures).context("the scene cannot be used")?;
+        let options =
+            ImportOptions { missing_textures: self.missing_textures, ignore_required: self.ignore_required.clone() };
+        let mut scene = self.scene.load(&Limits::default(), options).context("the scene cannot be used")?;
         if let Some(name) = &self.clip {
             scene.play(name).with_context(|| format!("{}: --clip", self.scene))?;
         }

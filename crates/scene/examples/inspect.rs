@@ -6,6 +6,7 @@ use std::time::Instant;
 use scene::{EnvironmentSpec, LightSpec, Limits, MissingTextures, SceneSpec, SourceSpace, pack, unpack};
 
 fn main() {
+    tracing_subscriber::fmt().with_writer(std::io::stderr).without_time().init();
     for name in std::env::args().skip(1) {
         match name.parse::<SceneSpec>() {
             Ok(spec) => inspect(&spec),

@@ -34,7 +34,7 @@ pub use animation::{
 };
 pub use depth_image::{Environment, EnvironmentMap, Illumination, Light, LightError, SourceSpace};
 pub use error::{SceneError, SceneErrorKind};
-pub use import::{MissingTextures, MissingTexturesError, load_environment, load_file};
+pub use import::{ImportOptions, MissingTextures, MissingTexturesError, load_environment, load_file};
 pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError, LightSpecErrorKind};
 pub use limits::{Limits, MAX_COORDINATE_M};
 pub use model::*;

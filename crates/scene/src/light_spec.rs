@@ -138,8 +138,13 @@ impl FromStr for EnvironmentSpec {
     fn from_str(text: &str) -> Result<Self, LightSpecError> {
         let text = text.trim();
         let path = Path::new(text);
-        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hdr")) {
+        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+        if extension.eq_ignore_ascii_case("hdr") {
             return Ok(Self::File(path.to_owned()));
+        }
+        // The fraction of a number begins with a digit.
+        if extension.starts_with(|first: char| first.is_ascii_alphabetic()) {
+            return Err(malformed("environment", text, "a colour or a file in Radiance's format: only .hdr is read"));
         }
         let environment = match text.split_once('/') {
             Some((zenith, nadir)) => Environment::gradient(color_from("zenith", zenith)?, color_from("nadir", nadir)?),

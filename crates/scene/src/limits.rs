@@ -42,7 +42,7 @@ impl Default for Limits {
             texture_side_px: 16_384,
             texture_bytes: 2 << 30,
             nodes: 200_000,
-            node_depth: 128,
+            node_depth: 10_000,
             instances: 200_000,
             json_objects: 2_000_000,
             attributes: 65_536,

@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use crate::error::{Fault, at_most};
 use crate::procedural::{self, GrassDensity, grass, tree_terrain};
-use crate::{Limits, MissingTextures, Scene, SceneError, load_file};
+use crate::{ImportOptions, Limits, Scene, SceneError, load_file};
 
 /// Names of the built-in scenes. A `tree-terrain-…` may have the suffix `-wind`, and `grass` a `:` with a
 /// [density](GrassDensity). A file of such a name is reached as `./name`.
@@ -88,11 +88,11 @@ impl SceneSpec {
     ///
     /// # Errors
     /// The errors of [`load_file`], and a meadow over the limits.
-    pub fn load(&self, limits: &Limits, missing: MissingTextures) -> Result<Scene, SceneError> {
+    pub fn load(&self, limits: &Limits, options: impl Into<ImportOptions>) -> Result<Scene, SceneError> {
         let scene = match self {
             Self::File(path) if path.extension().is_none() && !path.exists() => return Err(no_such_scene(path)),
             Self::File(path) => {
-                return Ok(load_file(path, limits, missing)?.with_default_lights().with_default_background());
+                return Ok(load_file(path, limits, options)?.with_default_lights().with_default_background());
             }
             Self::TreeTerrain { triangles, wind: false } => tree_terrain(*triangles, TREE_SEED),
             Self::TreeTerrain { triangles, wind: true } => tree_terrain(*triangles, TREE_SEED).with_wind(),
@@ -186,6 +186,7 @@ impl fmt::Display for SceneSpec {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::MissingTextures;
 
     fn parsed(text: &str) -> SceneSpec {
         text.parse().unwrap()

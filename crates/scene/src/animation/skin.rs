@@ -26,7 +26,7 @@ impl MovingInstance {
 pub struct Joint {
     /// Index into [`Animation::nodes`](super::Animation::nodes).
     pub node: u32,
-    /// The inverse bind matrix; invertible.
+    /// The inverse bind matrix; finite. One without an inverse hides what follows it.
     pub joint_from_mesh: DAffine3,
 }
 

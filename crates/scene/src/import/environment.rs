@@ -1,5 +1,6 @@
 //! Environment maps from Radiance files (`.hdr`), within limits that are checked before a texel is decoded.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use depth_image::{EnvironmentMap, MAX_ENVIRONMENT_SIZE_PX};
@@ -31,7 +32,7 @@ pub fn load_environment(path: &Path) -> Result<EnvironmentMap, SceneError> {
 fn read(path: &Path) -> Result<EnvironmentMap, Fault> {
     let limits = Limits { file_bytes: MAX_FILE_BYTES, ..Limits::default() };
     let (_, bytes) = Folder::opened_with(path, &limits, MissingTextures::Refuse)?;
-    let (size_px, radiance_linear) = decoded(&bytes)?;
+    let (size_px, radiance_linear) = decoded(&with_plain_line_ends(&bytes))?;
     let clamped = radiance_linear.iter().filter(|radiance| radiance.max_element() > MAX_RADIANCE).count();
     let (reduced_px, radiance_linear) = reduced(size_px, radiance_linear);
     let map = EnvironmentMap::new(reduced_px, &radiance_linear).map_err(|e| malformed(&e.to_string()))?;
@@ -47,6 +48,27 @@ fn read(path: &Path) -> Result<EnvironmentMap, Fault> {
 
 fn malformed(reason: &str) -> Fault {
     Fault::malformed("environment map", reason)
+}
+
+/// The file with line feeds alone in its header, which ends with the line after the first empty one. Programs on Windows
+/// write carriage returns as well.
+fn with_plain_line_ends(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let mut header = Vec::new();
+    let mut is_last = false;
+    for line in bytes.split_inclusive(|&byte| byte == b'\n') {
+        let Some(text) = line.strip_suffix(b"\r\n") else {
+            // Texels, or a header that has plain line ends.
+            return bytes.into();
+        };
+        header.extend_from_slice(text);
+        header.push(b'\n');
+        if is_last {
+            let header_bytes = header.len() + header.iter().filter(|&&byte| byte == b'\n').count();
+            return [&header, &bytes[header_bytes..]].concat().into();
+        }
+        is_last = text.is_empty();
+    }
+    bytes.into()
 }
 
 /// Size and radiances, row by row.

@@ -1,4 +1,4 @@
-//! Files that OBJ, MTL and PLY name: in any encoding, in wrong case, with the folders of another computer.
+//! Files that scene files name: in any encoding, in wrong case, with the folders of another computer.
 //!
 //! Names are compared as bytes before they are decoded. A file is looked for in several folders in turn; no file outside the
 //! scene's folder is found.
@@ -36,6 +36,15 @@ pub(crate) fn search(folder: &Folder, bases: &[&Path], names: &[&[u8]]) -> Found
         }
     }
     by_last_part(folder, bases, names).unwrap_or(outside.map_or(Found::Missing, Found::Outside))
+}
+
+/// The file of this name relative to the scene's folder, in any case and encoding.
+pub(crate) fn in_any_case(folder: &Folder, name: &[u8]) -> Option<PathBuf> {
+    let name = ReferredName::parse(name);
+    match resolved(folder, Path::new(""), &name.parts, Matching::Loose) {
+        Found::File(path) if !name.is_absolute => Some(path),
+        _ => None,
+    }
 }
 
 fn by_last_part(folder: &Folder, bases: &[&Path], names: &[&[u8]]) -> Option<Found> {

@@ -7,6 +7,7 @@ use std::path::{Component, Path, PathBuf};
 
 use percent_encoding::percent_decode_str;
 
+use super::file_search::in_any_case;
 use super::missing_textures::MissingTextures;
 use crate::error::{Fault, at_most};
 use crate::{Limits, SceneErrorKind};
@@ -32,11 +33,22 @@ impl Folder {
         Ok((folder, bytes))
     }
 
-    /// Reads a file named by a URI reference, as in glTF; percent-encoding is decoded first.
-    pub(crate) fn read_uri(&self, element: &str, uri: &str) -> Result<Vec<u8>, Fault> {
-        let decoded = percent_decode_str(uri).decode_utf8();
-        let name = decoded.map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
-        self.read_name(element, &name)
+    /// Reads a file named by a URI reference, as in glTF; percent-encoding is decoded first. Where there is no such file,
+    /// the name counts without its query (`?…`), and then without regard to upper and lower case. `None` for a file that
+    /// does not exist.
+    pub(crate) fn read_uri(&self, element: &str, uri: &str) -> Result<Option<Vec<u8>>, Fault> {
+        let decoded = |uri| percent_decode_str(uri).decode_utf8();
+        let name = decoded(uri).map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
+        if let Some(bytes) = existing(self.read_name(element, &name))? {
+            return Ok(Some(bytes));
+        }
+        let path = uri.split(['?', '#']).next().and_then(|path| decoded(path).ok()).filter(|path| !path.is_empty());
+        let Some(path) = path else { return Ok(None) };
+        if let Some(bytes) = existing(self.read_name(element, &path))? {
+            return Ok(Some(bytes));
+        }
+        let found = in_any_case(self, path.as_bytes());
+        found.map_or(Ok(None), |found| existing(self.read_relative(element, &found)))
     }
 
     /// Reads a file by its name relative to this folder.
@@ -122,8 +134,11 @@ mod tests {
     #[test]
     fn reads_inside_and_decodes_percent() {
         let (_dir, folder) = folder_with_file();
-        assert_eq!(folder.read_uri("buffer 0", "a%20b.bin").unwrap(), b"inside");
-        assert_eq!(folder.read_uri("buffer 0", "./a b.bin").unwrap(), b"inside");
+        assert_eq!(folder.read_uri("buffer 0", "a%20b.bin").unwrap().unwrap(), b"inside");
+        assert_eq!(folder.read_uri("buffer 0", "./a b.bin").unwrap().unwrap(), b"inside");
+        assert_eq!(folder.read_uri("buffer 0", "a%20b.bin?v=3#x").unwrap().unwrap(), b"inside");
+        assert_eq!(folder.read_uri("buffer 0", "./A%20b.BIN").unwrap().unwrap(), b"inside");
+        assert!(folder.read_uri("buffer 0", "c.bin").unwrap().is_none());
     }
 
     #[test]

@@ -7,9 +7,11 @@ mod extent;
 mod file_search;
 mod folder;
 mod gltf;
+mod ktx2;
 mod missing_textures;
 mod normals;
 mod obj;
+mod options;
 mod picture;
 mod ply;
 mod polygons;
@@ -26,6 +28,7 @@ use crate::{Limits, Scene, SceneError};
 pub use environment::load_environment;
 use folder::Folder;
 pub use missing_textures::{MissingTextures, MissingTexturesError};
+pub use options::ImportOptions;
 use source_scene::SourceScene;
 
 /// Reads a scene from a `.gltf`, `.glb`, `.obj` or `.ply` file. Files that it refers to are read only
@@ -39,24 +42,41 @@ use source_scene::SourceScene;
 ///
 /// # Errors
 /// The file, the element at fault, and the reason.
-pub fn load_file(path: &Path, limits: &Limits, missing: MissingTextures) -> Result<Scene, SceneError> {
+pub fn load_file(path: &Path, limits: &Limits, options: impl Into<ImportOptions>) -> Result<Scene, SceneError> {
     let _importing = tracing::warn_span!("import", file = %path.display()).entered();
-    let scene = read_source(path, limits, missing).and_then(|source| source.finish(limits));
+    let scene = read_source(path, limits, &options.into()).and_then(|source| source.finish(limits));
     scene.map_err(|fault| fault.in_path(path))
 }
 
-fn read_source(path: &Path, limits: &Limits, missing: MissingTextures) -> Result<SourceScene, Fault> {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    let unknown =
-        || Fault::unsupported("file name", format!("extension {extension:?}; known are gltf, glb, obj and ply"));
-    let read: fn(&[u8], &Folder, &Limits) -> Result<SourceScene, Fault> = match extension.as_str() {
-        "gltf" | "glb" => gltf::read,
-        "obj" => obj::read,
-        "ply" => ply::read,
-        _ => return Err(unknown()),
+fn read_source(path: &Path, limits: &Limits, options: &ImportOptions) -> Result<SourceScene, Fault> {
+    let format = Format::from_path(path)?;
+    let (folder, bytes) = Folder::opened_with(path, limits, options.missing_textures)?;
+    let mut source = match format {
+        Format::Gltf => gltf::read(&bytes, &folder, limits, &options.ignore_required)?,
+        Format::Obj => obj::read(&bytes, &folder, limits)?,
+        Format::Ply => ply::read(&bytes, &folder, limits)?,
     };
-    let (folder, bytes) = Folder::opened_with(path, limits, missing)?;
-    let mut source = read(&bytes, &folder, limits)?;
     source.name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     Ok(source)
+}
+
+enum Format {
+    Gltf,
+    Obj,
+    Ply,
+}
+
+impl Format {
+    fn from_path(path: &Path) -> Result<Self, Fault> {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+        match extension.as_str() {
+            "gltf" | "glb" => Ok(Self::Gltf),
+            "obj" => Ok(Self::Obj),
+            "ply" => Ok(Self::Ply),
+            _ => {
+                let known = format!("extension {extension:?}; known are gltf, glb, obj and ply");
+                Err(Fault::unsupported("file name", known))
+            }
+        }
+    }
 }

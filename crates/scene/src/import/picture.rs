@@ -5,6 +5,7 @@ use std::io::Cursor;
 use image::{ImageFormat, ImageReader};
 use rayon::prelude::*;
 
+use super::ktx2;
 use super::missing_textures::MissingTextures;
 use crate::error::{Fault, at_most};
 use crate::{Limits, SceneErrorKind, Texture};
@@ -83,6 +84,9 @@ fn reader<'b>(picture: &EncodedPicture, bytes: &'b [u8]) -> Result<ImageReader<C
 }
 
 fn size_px(picture: &EncodedPicture, bytes: &[u8]) -> Result<(u32, u32), Fault> {
+    if ktx2::is_ktx2(bytes) {
+        return ktx2::size_px(bytes).map_err(|reason| Fault::malformed(&picture.element, reason));
+    }
     reader(picture, bytes)?.into_dimensions().map_err(|e| Fault::malformed(&picture.element, e.to_string()))
 }
 
@@ -93,6 +97,11 @@ fn stand_in(content: Content) -> Texture {
 
 fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
     let Some(bytes) = &picture.bytes else { return Ok(stand_in(picture.content)) };
+    if ktx2::is_ktx2(bytes) {
+        let (width_px, height_px) = size_px(picture, bytes)?;
+        let srgba8 = ktx2::rgba8(bytes).map_err(|reason| Fault::malformed(&picture.element, reason))?;
+        return Ok(Texture { width_px, height_px, is_srgb: picture.content.is_srgb(), srgba8 });
+    }
     let mut reader = reader(picture, bytes)?;
     let mut image_limits = image::Limits::default();
     image_limits.max_image_width = Some(limits.texture_side_px);

@@ -111,7 +111,7 @@ fn what_a_clip_grows_may_have_no_size_at_rest() {
     let mut tube = Tube::new(1, 1, 3);
     tube.nodes = r#"{"mesh":0,"scale":[0,0,0],"translation":[3,0,0]}"#.into();
     (tube.roots, tube.skins) = ("0".into(), r#"{"joints":[0]}"#.into());
-    assert!(refusal("still.glb", &tube.glb()).contains("node 0: its transform is singular"));
+    assert!(refusal("still.glb", &tube.glb()).contains("no triangles in scene 0"));
     tube.animate("grow", &[(0, "scale", "LINEAR", &[0., 1.], &[0., 0., 0., 2., 2., 2.])]);
     let scene = load("grows.glb", &tube.glb()).unwrap();
     let reach_m = |t: f32| posed(&scene, t).iter().map(|v| v.position[0] - 3.0).fold(0.0, f32::max);
@@ -200,7 +200,7 @@ fn an_invalid_animation_is_not_unpacked() {
         ("moving instance 0", |a| a.moving[0].instance = 9),
         ("twice", |a| a.moving.push(a.moving[0].clone())),
         ("joint 3: node 99", |a| a.moving[0].joints[3].node = 99),
-        ("not invertible", |a| a.moving[0].joints[3].joint_from_mesh.matrix3.x_axis = glam::DVec3::ZERO),
+        ("not finite", |a| a.moving[0].joints[3].joint_from_mesh.matrix3.x_axis = glam::DVec3::NAN),
         ("no joint", |a| a.moving[0].joints.clear()),
         ("24 vertices", |a| a.moving[0].influences.truncate(24)),
         ("vertex 7", |a| a.moving[0].influences[7].joints[0] = 24),
@@ -254,10 +254,8 @@ fn weights(tube: &mut Tube, of_each: [f32; 4]) {
 
 #[test]
 fn damaged_skins_are_refused_by_their_field() {
-    let cases: [(&str, Damage); 13] = [
-        ("vertex 0: the sum of its weights is 0,", |t| weights(t, [0.0; 4])),
-        ("the sum of its weights is 0.8", |t| weights(t, [0.5, 0.3, 0.0, 0.0])),
-        ("the sum of its weights is 2", |t| weights(t, [1.0; 4].map(|w| w * 0.5))),
+    let cases: [(&str, Damage); 9] = [
+        ("the sum of its weights is not finite", |t| weights(t, [3e38; 4])),
         ("the weight NaN", |t| weights(t, [f32::NAN, 0.0, 0.0, 1.0])),
         ("the weight -1", |t| weights(t, [2.0, -1.0, 0.0, 0.0])),
         ("joint 2 is beyond the skin's 2", |t| {
@@ -268,9 +266,7 @@ fn damaged_skins_are_refused_by_their_field() {
             let joints = t.shorts(&[0; 4 * 53]);
             t.set_attribute("JOINTS_0", joints);
         }),
-        ("skin 0: its mesh has no JOINTS_0", |t| t.attributes = t.attributes.replace("JOINTS_0", "_J")),
         ("skin 0, inverseBindMatrices, matrix 1: it is not finite", |t| bind(t, f32::NAN)),
-        ("matrix 1: it is not finite, not affine, or not invertible", |t| bind(t, 0.0)),
         ("1 matrices for 2 joints", |t| {
             let one = t.floats(&glam::Mat4::IDENTITY.to_cols_array(), "MAT4");
             t.skins = format!(r#"{{"inverseBindMatrices":{one},"joints":[1,2]}}"#);

@@ -7,6 +7,8 @@ use scene::procedural::{checker_sphere, unit_cube};
 use scene::{Limits, MissingTextures, load_file, pack, unpack};
 
 use crate::samples::compressed::{compressed_cube, diagonals, plain_streams, positions};
+use crate::samples::draco::{cube_stream, draco_cube};
+use crate::samples::ktx2::{etc1s, uastc, uastc_of_encoder, zstandard};
 use crate::samples::skinned::Tube;
 use crate::samples::{self, GltfCube, cube_obj, cube_ply_ascii, cube_ply_binary};
 
@@ -155,11 +157,23 @@ fn load_with_other_numbers(json: &str, binary: &[u8], least: u32) {
 #[test]
 fn compressed_glb() {
     load_damaged("a.glb", &compressed_gltf().glb(), 2000);
-    // Damage that meets the streams alone, behind the JSON.
-    let (cube, dir) = (compressed_gltf(), tempfile::tempdir().unwrap());
+    damage_binary(&compressed_gltf(), 3000);
+}
+
+#[test]
+fn draco_glb() {
+    for level in [None, Some(0), Some(10)] {
+        let cube = draco_cube(&cube_stream(level, 12), |_| {});
+        damage_binary(&cube, 3000);
+    }
+}
+
+/// Damage that meets the binary chunk alone, behind the JSON.
+fn damage_binary(cube: &GltfCube, changed: usize) {
+    let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.glb");
     let (mut loaded, mut slowest) = (0, Duration::ZERO);
-    damaged(&cube.binary, 3000, |binary| {
+    damaged(&cube.binary, changed, |binary| {
         rewrite(&path, &samples::glb(&cube.json(), binary));
         let start = Instant::now();
         loaded += u32::from(load(&path));
@@ -167,6 +181,25 @@ fn compressed_glb() {
     });
     println!("{loaded} loaded, slowest {slowest:?}");
     assert!(loaded > 100 && slowest < Duration::from_secs(1), "{loaded} {slowest:?}");
+}
+
+#[test]
+fn ktx2_textures() {
+    let blocks = [[250, 10, 20, 255], [1, 2, 240, 128]];
+    for picture in [uastc(6, 3, &blocks), zstandard(6, 3, &blocks, None), etc1s(), uastc_of_encoder()] {
+        let cube = samples::cube(|c| {
+            let length = picture.len();
+            c.primitive = r#"{"attributes":{"POSITION":0},"indices":1,"material":0}"#.into();
+            c.views += &format!(r#",{{"buffer":0,"byteOffset":168,"byteLength":{length}}}"#);
+            c.buffers = format!(r#"{{"byteLength":{}}}"#, length + 168);
+            c.binary.extend(&picture);
+            c.more = r#""images":[{"bufferView":2,"mimeType":"image/ktx2"}],"textures":
+                [{"extensions":{"KHR_texture_basisu":{"source":0}}}],
+                "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],"#
+                .into();
+        });
+        damage_binary(&cube, 3000);
+    }
 }
 
 #[test]
@@ -358,5 +391,12 @@ fn an_environment_map_is_refused_by_field() {
     assert_eq!(map.texel_linear(0, 0), glam::Vec3::splat(0.5), "pixels are divided by the exposure");
     rewrite(&path, &with_texel("", [255, 255, 255, 255]));
     assert_eq!(scene::load_environment(&path).unwrap().texel_linear(0, 0), glam::Vec3::splat(65_408.0), "clamped");
+    let windows = [&b"#?RADIANCE\r\nFORMAT=32-bit_rle_rgbe\r\nEXPOSURE=2\r\n\r\n-Y 1 +X 1\r\n"[..], &white].concat();
+    rewrite(&path, &windows);
+    let map = scene::load_environment(&path).unwrap();
+    assert_eq!(map.texel_linear(0, 0), glam::Vec3::splat(0.5), "lines may end as on Windows");
+    // Texels may hold the bytes of line ends.
+    rewrite(&path, &with_texel("", [b'\r', b'\n', 0, 129]));
+    assert_eq!(scene::load_environment(&path).unwrap().texel_linear(0, 0).z, 0.0);
     assert!(scene::load_environment(&dir.path().join("none.hdr")).unwrap_err().to_string().contains("none.hdr"));
 }

@@ -2,7 +2,8 @@
 
 use scene::{Limits, MissingTextures, SceneErrorKind, TextureUse, load_file};
 
-use crate::samples::{Sample, cube, load, refusal};
+use crate::samples::warnings::with_one_warning;
+use crate::samples::{Sample, cube, load};
 
 /// An image of `texels`, as a data URI.
 fn png_of(texels: &[[u8; 4]]) -> String {
@@ -75,8 +76,17 @@ fn a_webp_texture_is_read_with_and_without_another_format() {
         let scene = load("webp.glb", &textured(source, "1")).unwrap();
         assert_eq!((scene.textures.len(), &scene.textures[0].srgba8), (1, &texels.concat()), "{source:?}");
     }
+    // A texture without a picture leaves the factors of its material.
     for webp in ["2", "4294967296", "-1", "\"one\"", "null"] {
-        assert!(refusal("webp.glb", &textured("", webp)).contains("material 0"), "{webp}");
+        let (scene, warning) = with_one_warning(|| load("webp.glb", &textured("", webp)).unwrap());
+        assert!(scene.textures.is_empty() && scene.materials[0].base_color_texture.is_none(), "{webp}");
+        assert!(
+            warning.contains("webp.glb")
+                && warning.contains(
+                    "textures without a picture: materials show their factors: material 0, texture 0 (no name)"
+                ),
+            "{warning}"
+        );
     }
 }
 
@@ -107,4 +117,33 @@ fn all_missing_textures_are_named_and_grey_goes_on() {
     let sample = Sample::new("out.glb", &outside.glb());
     let error = load_file(&sample.path, &Limits::default(), MissingTextures::Grey).unwrap_err();
     assert!(matches!(error.kind, SceneErrorKind::Forbidden { .. }), "{error}");
+}
+
+#[test]
+fn a_texture_in_avif_alone_leaves_the_factor_with_one_warning() {
+    let textured = |textures: &str| {
+        cube(|c| {
+            c.primitive = r#"{"attributes":{"POSITION":0},"indices":1,"material":0}"#.into();
+            c.more = format!(
+                r#""extensionsUsed":["EXT_texture_avif"],"textures":[{textures}],"images":[{{"uri":"a.avif"}},{{"uri":"{}"}}],
+                "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}},"baseColorFactor":[0.5,0,1,1]}},
+                "emissiveTexture":{{"index":0}}}}],"#,
+                png_of(&[[1, 2, 3, 255]])
+            );
+        })
+        .glb()
+    };
+    let of_extension = r#"{"name":"wood","extensions":{"EXT_texture_avif":{"source":0}}}"#;
+    for only in [of_extension, r#"{"source":0,"name":"wood"}"#] {
+        let (scene, warning) = with_one_warning(|| load("a.glb", &textured(only)).unwrap());
+        assert_eq!(scene.materials[0].base_color_linear, [0.5, 0.0, 1.0, 1.0]);
+        assert!(scene.textures.is_empty(), "{only}");
+        assert!(warning.contains("pictures in AVIF"), "{warning}");
+        assert!(warning.contains("2, the first: material 0, texture 0 (wood)"), "{warning}");
+        assert!(warning.contains("`npx @gltf-transform/cli png IN OUT`"), "{warning}");
+    }
+    let (_, warning) = with_one_warning(|| load("a.glb", &textured("{}")).unwrap());
+    assert!(warning.contains("textures without a picture"), "{warning}");
+    let both = r#"{"source":1,"extensions":{"EXT_texture_avif":{"source":0}}}"#;
+    assert_eq!(load("a.glb", &textured(both)).unwrap().textures[0].srgba8, [1, 2, 3, 255]);
 }

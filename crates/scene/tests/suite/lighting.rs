@@ -224,3 +224,14 @@ fn only_a_material_with_a_highlight_is_specular() {
     }
     assert!(!unit_cube().materials[0].is_specular());
 }
+
+#[test]
+fn pictures_in_other_formats_are_no_environment() {
+    for file in ["skies/noon.exr", "noon.EXR", "a.png", "noon.ktx2"] {
+        let error = file.parse::<EnvironmentSpec>().expect_err(file).to_string();
+        assert!(error.contains(file) && error.contains("only .hdr is read"), "{error}");
+    }
+    for color in ["0.5", ".5", "0.5/1.5", "1,0.25,0.125"] {
+        assert!(color.parse::<EnvironmentSpec>().is_ok(), "{color}");
+    }
+}

@@ -4,9 +4,14 @@
 mod animation;
 mod damaged_files;
 mod gltf_compression;
+mod gltf_draco;
+mod gltf_extensions;
 mod gltf_import;
+mod gltf_json;
 mod gltf_materials;
+mod gltf_skins;
 mod gltf_textures;
+mod ktx2_textures;
 mod lighting;
 mod mtl_materials;
 mod obj_and_ply_import;

@@ -5,8 +5,9 @@ use gltf::json::{Index, Node as JsonNode, skin::Skin};
 
 use super::super::source_scene::{SourceMesh, SourceScene};
 use super::document::Document;
-use super::nodes::{NodeTree, PlacedNode, parent_from_node, parts_of};
-use super::{channels, skins};
+use super::nodes::{NodeTree, PlacedNode};
+use super::transforms::{parent_from_node, parts_of};
+use super::{channels, degenerate, skins};
 use crate::animation::{
     Animation, Clip, Influence, Joint, MovingInstance, Node, NodeTransform, TransformParts, is_invertible,
 };
@@ -15,7 +16,9 @@ use crate::error::{Fault, at_most};
 /// Reads clips and skins. A scene in which no mesh follows them has no animation.
 pub(super) fn read(document: &Document, tree: &NodeTree, scene: &mut SourceScene) -> Result<(), Fault> {
     let clips = channels::read(document)?;
-    let moving = moving_instances(document, tree, &clips, scene)?;
+    let placements = Placements::read(document, tree, &clips, scene)?;
+    let Placements { mut moving, degenerate } = placements;
+    degenerate::settle(&degenerate, scene, &mut moving, document.limits.vertices)?;
     if moving.is_empty() {
         return Ok(());
     }
@@ -26,42 +29,51 @@ pub(super) fn read(document: &Document, tree: &NodeTree, scene: &mut SourceScene
     Ok(())
 }
 
-/// All instances that move or are skinned. `Joint::node` is the node's place in the tree.
-fn moving_instances(
-    document: &Document,
-    tree: &NodeTree,
-    clips: &[Clip],
-    scene: &mut SourceScene,
-) -> Result<Vec<MovingInstance>, Fault> {
-    let moves = moving_nodes(document, tree, clips);
-    let mut skins = Skins::of(document, tree);
-    let mut moving = Vec::new();
-    for (place, node) in (0u32..).zip(&tree.nodes) {
-        let Some(instance) = node.instance else { continue };
-        let (joints, influences) = match document.root.nodes[node.number].skin {
-            Some(skin) => {
-                let mesh = &scene.meshes[scene.instances[instance].mesh];
-                let joints = skins.joints(skin, mesh, &format!("node {}", node.number))?;
-                scene.instances[instance].source_from_mesh = at_rest(tree, &joints, &format!("skin {}", skin.value()))?;
-                (joints, mesh.influences.clone())
-            }
-            None if moves[place as usize] => {
-                // A clip may grow what has no size at rest: only the place at rest is left.
-                let at_rest = &mut scene.instances[instance].source_from_mesh;
-                if !is_invertible(at_rest) {
-                    *at_rest = DAffine3::from_translation(at_rest.translation);
+/// The placements of meshes that need more than a transform.
+#[derive(Default)]
+struct Placements {
+    /// All instances that move or are skinned. `Joint::node` is the node's place in the tree.
+    moving: Vec<MovingInstance>,
+    /// The numbers of instances that stand still and whose transform has no inverse.
+    degenerate: Vec<usize>,
+}
+
+impl Placements {
+    fn read(document: &Document, tree: &NodeTree, clips: &[Clip], scene: &mut SourceScene) -> Result<Self, Fault> {
+        let moves = moving_nodes(document, tree, clips);
+        let mut skins = Skins::of(document, tree);
+        let mut placements = Self::default();
+        for (place, node) in (0u32..).zip(&tree.nodes) {
+            for number in node.instances.clone() {
+                let instance = &mut scene.instances[number];
+                let mesh = &scene.meshes[instance.mesh];
+                // A mesh without joints is rigid.
+                let skin = document.root.nodes[node.number].skin.filter(|_| !mesh.influences.is_empty());
+                if let Some(skin) = skin {
+                    let Skinned { joints, influences } = skins.skinned(skin, mesh, node, place)?;
+                    instance.source_from_mesh = at_rest(tree, &joints, &format!("skin {}", skin.value()))?;
+                    placements.moving.push(MovingInstance { instance: number as u32, joints, influences });
+                } else if moves[place as usize] {
+                    // A clip may grow what has no size at rest: only the place at rest is left.
+                    let at_rest = &mut instance.source_from_mesh;
+                    if !is_invertible(at_rest) {
+                        *at_rest = DAffine3::from_translation(at_rest.translation);
+                    }
+                    let joints = vec![Joint { node: place, joint_from_mesh: tree.node_from_instance[number] }];
+                    placements.moving.push(MovingInstance { instance: number as u32, joints, influences: Vec::new() });
+                } else if !is_invertible(&instance.source_from_mesh) {
+                    placements.degenerate.push(number);
                 }
-                (vec![Joint { node: place, joint_from_mesh: DAffine3::IDENTITY }], Vec::new())
             }
-            None if is_invertible(&node.source_from_node) => continue,
-            None => {
-                let element = format!("node {}", node.number);
-                return Err(Fault::malformed(element, "its transform is singular or not finite"));
-            }
-        };
-        moving.push(MovingInstance { instance: instance as u32, joints, influences });
+        }
+        Ok(placements)
     }
-    Ok(moving)
+}
+
+/// What a skinned mesh follows.
+struct Skinned {
+    joints: Vec<Joint>,
+    influences: Vec<Influence>,
 }
 
 /// Reads skins. What all skinned meshes take is counted, for a small file may place one mesh often.
@@ -81,16 +93,24 @@ impl<'d> Skins<'d> {
         Self { document, place_in_tree, joints_left, influences_left }
     }
 
-    /// The joints of a skin, which the mesh of a node fits.
-    fn joints(&mut self, index: Index<Skin>, mesh: &SourceMesh, node: &str) -> Result<Vec<Joint>, Fault> {
-        let skin = skins::skin(self.document, index, node)?;
-        let (joints, vertices) = (skin.joints.len() as u64, mesh.vertices.len() as u64);
+    /// The joints of a skin and of each vertex of a mesh. Vertices without weights follow the mesh's own node, which is then
+    /// the last joint; `place` is its place in the tree.
+    fn skinned(
+        &mut self,
+        index: Index<Skin>,
+        mesh: &SourceMesh,
+        node: &PlacedNode,
+        place: u32,
+    ) -> Result<Skinned, Fault> {
+        let node = format!("node {}", node.number);
+        let skin = skins::skin(self.document, index, &node)?;
+        let (joints, vertices) = (skin.joints.len() as u64 + 1, mesh.vertices.len() as u64);
         at_most(format_args!("{node}, joints of all skinned meshes"), joints, self.joints_left)?;
         at_most(format_args!("{node}, vertices of all skinned meshes"), vertices, self.influences_left)?;
         (self.joints_left, self.influences_left) = (self.joints_left - joints, self.influences_left - vertices);
         let element = format!("skin {}", index.value());
         let matrices = skins::bind_matrices(self.document, skin, &element)?;
-        check_influences(&mesh.influences, mesh.vertices.len(), skin.joints.len(), &element)?;
+        check_influences(&mesh.influences, skin.joints.len(), &element)?;
         let joint = |(number, (joint, joint_from_mesh)): (usize, (&Index<JsonNode>, DAffine3))| {
             let place = self.place_in_tree.get(joint.value()).copied().flatten();
             let outside = || {
@@ -99,7 +119,25 @@ impl<'d> Skins<'d> {
             };
             Ok(Joint { node: place.ok_or_else(outside)?, joint_from_mesh })
         };
-        skin.joints.iter().zip(matrices).enumerate().map(joint).collect()
+        let joints = skin.joints.iter().zip(matrices).enumerate().map(joint).collect::<Result<Vec<_>, _>>()?;
+        let mut skinned = Skinned { joints, influences: mesh.influences.clone() };
+        skinned.make_rigid_without_weights(place);
+        Ok(skinned)
+    }
+}
+
+impl Skinned {
+    fn make_rigid_without_weights(&mut self, place: u32) {
+        let own_joint = self.joints.len() as u16;
+        let rigid = Influence { joints: [own_joint, 0, 0, 0], weights: [1.0, 0.0, 0.0, 0.0] };
+        let mut is_needed = false;
+        for influence in self.influences.iter_mut().filter(|influence| influence.shares().next().is_none()) {
+            *influence = rigid;
+            is_needed = true;
+        }
+        if is_needed {
+            self.joints.push(Joint { node: place, joint_from_mesh: DAffine3::IDENTITY });
+        }
     }
 }
 
@@ -121,23 +159,22 @@ fn targets(document: &Document, clips: &[Clip]) -> Vec<bool> {
 }
 
 /// The placement at rest by the first joint whose scale is not 0: most skins are bound at rest, where all joints agree.
+/// Where there is none, the place of the first joint.
 fn at_rest(tree: &NodeTree, joints: &[Joint], element: &str) -> Result<DAffine3, Fault> {
     let placed = |joint: &Joint| tree.nodes[joint.node as usize].source_from_node * joint.joint_from_mesh;
-    let usable = joints.iter().map(placed).find(is_invertible);
-    usable.ok_or_else(|| Fault::malformed(element, "the transforms of all its joints are singular or not finite"))
+    let place = || {
+        let translation = joints.first().map(|joint| tree.nodes[joint.node as usize].source_from_node.translation);
+        translation.filter(|translation| translation.is_finite()).map(DAffine3::from_translation)
+    };
+    let usable = joints.iter().map(placed).find(is_invertible).or_else(place);
+    usable.ok_or_else(|| Fault::malformed(element, "the transforms of all its joints are not finite"))
 }
 
-fn check_influences(influences: &[Influence], vertices: usize, joints: usize, skin: &str) -> Result<(), Fault> {
-    let wrong = |vertex: usize, why: String| Err(Fault::malformed(format_args!("{skin}, vertex {vertex}"), why));
-    if influences.len() != vertices {
-        return Err(Fault::malformed(skin, "its mesh has no JOINTS_0 and WEIGHTS_0"));
-    }
+fn check_influences(influences: &[Influence], joints: usize, skin: &str) -> Result<(), Fault> {
     for (vertex, influence) in influences.iter().enumerate() {
-        if influence.shares().next().is_none() {
-            return wrong(vertex, "it has no JOINTS_0 and WEIGHTS_0".into());
-        }
         if let Some((joint, _)) = influence.shares().find(|(joint, _)| *joint >= joints) {
-            return wrong(vertex, format!("joint {joint} is beyond the skin's {joints}"));
+            let why = format!("joint {joint} is beyond the skin's {joints}");
+            return Err(Fault::malformed(format_args!("{skin}, vertex {vertex}"), why));
         }
     }
     Ok(())

@@ -25,7 +25,6 @@ fn clip(document: &Document, number: usize, animation: &JsonAnimation, keys_left
     let name = animation.name.clone().unwrap_or_else(|| format!("animation {number}"));
     // A node's property has one channel.
     let mut channels = HashMap::new();
-    let mut morphs = 0;
     for (place, json) in animation.channels.iter().enumerate() {
         let element = format!("animation {number}, channel {place}");
         match property(json, &element)? {
@@ -35,11 +34,11 @@ fn clip(document: &Document, number: usize, animation: &JsonAnimation, keys_left
                     return Err(Fault::malformed(element, "an earlier channel moves the same property"));
                 }
             }
-            None => morphs += 1,
+            None => {
+                let element = format_args!("animation {number} ({name})");
+                document.warnings.count("channels that move morph targets, which keep their default weights", element);
+            }
         }
-    }
-    if morphs > 0 {
-        tracing::warn!("animation {number}: {morphs} channels move morph targets, which are shown at rest");
     }
     let mut channels: Vec<_> = channels.into_values().collect();
     channels.sort_unstable_by_key(|(place, _)| *place);

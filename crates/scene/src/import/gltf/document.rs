@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::cell::Cell;
+use std::collections::HashMap;
 
 use data_url::DataUrl;
 use gltf::json::accessor::{Accessor, ComponentType, sparse::Sparse};
@@ -10,18 +11,23 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
 use super::super::folder::Folder;
+use super::super::warnings::Warnings;
 use super::compressed;
-use crate::Limits;
+use super::draco::{self, DecodedAccessor};
 use crate::error::{Fault, at_most};
+use crate::{Limits, SceneErrorKind};
 
 /// The parsed JSON, the bytes of all buffers, and what else their reading takes.
 pub(super) struct Document<'a> {
     pub root: &'a Root,
     pub limits: &'a Limits,
     pub folder: &'a Folder,
+    pub warnings: &'a Warnings,
     buffers: Vec<Cow<'a, [u8]>>,
     /// The bytes of each buffer view that is compressed in the file.
     decoded_views: Vec<Option<Vec<u8>>>,
+    /// The accessors of primitives that are compressed in the file, by their numbers.
+    decoded_accessors: HashMap<usize, DecodedAccessor>,
     /// A budget of elements to read. Primitives may share an accessor, so that a small file could otherwise expand
     /// without bound.
     elements_left: Cell<u64>,
@@ -33,21 +39,44 @@ impl<'a> Document<'a> {
         binary_chunk: Option<&'a [u8]>,
         folder: &'a Folder,
         limits: &'a Limits,
+        warnings: &'a Warnings,
     ) -> Result<Self, Fault> {
         // Positions, normals, tangents, two pairs of coordinates, colours, joints, weights: eight elements a vertex, and four of
         // further joints; three indices a triangle.
         let of_triangles = limits.triangles.saturating_mul(3);
         let elements = limits.vertices.saturating_mul(12).saturating_add(of_triangles).saturating_add(limits.keys);
         let elements_left = Cell::new(elements);
-        let mut document = Self { root, limits, folder, buffers: Vec::new(), decoded_views: Vec::new(), elements_left };
-        for (number, buffer) in root.buffers.iter().enumerate() {
+        let mut document = Self {
+            root,
+            limits,
+            folder,
+            warnings,
+            buffers: Vec::new(),
+            decoded_views: Vec::new(),
+            decoded_accessors: HashMap::new(),
+            elements_left,
+        };
+        document.read_buffers(binary_chunk)?;
+        let of_buffer =
+            |buffer, offset, length| slice_of(document.buffers.get(usize::try_from(buffer).ok()?)?, offset, length);
+        document.decoded_views = compressed::decode_all(root, limits.file_bytes, of_buffer)?;
+        let view_bytes = |view, element: &str| document.view(view, element).map(|(_, bytes)| bytes);
+        document.decoded_accessors = draco::decode_all(root, limits, view_bytes)?;
+        Ok(document)
+    }
+
+    fn read_buffers(&mut self, binary_chunk: Option<&'a [u8]>) -> Result<(), Fault> {
+        for (number, buffer) in self.root.buffers.iter().enumerate() {
             let element = format!("buffer {number}");
             if compressed::is_fallback(buffer) {
-                document.buffers.push(Cow::default());
+                self.buffers.push(Cow::default());
                 continue;
             }
             let bytes: Cow<[u8]> = match (&buffer.uri, binary_chunk) {
-                (Some(uri), _) => document.read_uri(&element, uri)?.into(),
+                (Some(uri), _) => {
+                    let missing = || Fault::new(&element, SceneErrorKind::MissingFiles(vec![uri.clone()]));
+                    self.read_uri(&element, uri)?.ok_or_else(missing)?.into()
+                }
                 (None, Some(chunk)) if number == 0 => chunk.into(),
                 (None, _) => return Err(Fault::malformed(element, "it has neither a uri nor a binary chunk")),
             };
@@ -55,22 +84,19 @@ impl<'a> Document<'a> {
                 let claim = format!("it claims {} bytes and has {}", buffer.byte_length.0, bytes.len());
                 return Err(Fault::malformed(element, claim));
             }
-            document.buffers.push(bytes);
+            self.buffers.push(bytes);
         }
-        let of_buffer =
-            |buffer, offset, length| slice_of(document.buffers.get(usize::try_from(buffer).ok()?)?, offset, length);
-        document.decoded_views = compressed::decode_all(root, limits.file_bytes, of_buffer)?;
-        Ok(document)
+        Ok(())
     }
 
-    /// Reads a `data:` URI or a file of the scene's folder.
-    pub(super) fn read_uri(&self, element: &str, uri: &str) -> Result<Vec<u8>, Fault> {
+    /// Reads a `data:` URI or a file of the scene's folder; `None` for a file that does not exist.
+    pub(super) fn read_uri(&self, element: &str, uri: &str) -> Result<Option<Vec<u8>>, Fault> {
         if !uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
             return self.folder.read_uri(element, uri);
         }
         let url = DataUrl::process(uri).map_err(|e| Fault::malformed(element, format!("data URI: {e:?}")))?;
         let (bytes, _) = url.decode_to_vec().map_err(|e| Fault::malformed(element, format!("data URI: {e:?}")))?;
-        Ok(bytes)
+        Ok(Some(bytes))
     }
 
     /// A buffer view and its bytes.
@@ -126,6 +152,26 @@ impl<'a> Document<'a> {
         Ok(self.layout(index, element)?.components)
     }
 
+    /// The largest value of an accessor's unsigned integers that are not normalized.
+    pub(super) fn largest_of_plain_integers(
+        &self,
+        index: Index<Accessor>,
+        element: &str,
+    ) -> Result<Option<f32>, Fault> {
+        let layout = self.layout(index, element)?;
+        let is_plain = !layout.accessor.normalized;
+        Ok(match layout.component {
+            ComponentType::U8 if is_plain => Some(255.0),
+            ComponentType::U16 if is_plain => Some(65_535.0),
+            _ => None,
+        })
+    }
+
+    /// Whether the accessor's primitive is compressed in the file.
+    pub(super) fn is_decoded(&self, index: Index<Accessor>) -> bool {
+        self.decoded_accessors.contains_key(&index.value())
+    }
+
     /// Elements of an accessor, before they are read.
     pub(super) fn element_count(&self, index: Index<Accessor>, element: &str) -> Result<u64, Fault> {
         Ok(self.layout(index, element)?.count)
@@ -147,16 +193,24 @@ impl<'a> Document<'a> {
         let (Checked::Valid(component), Checked::Valid(shape)) = (accessor.component_type, accessor.type_) else {
             return Err(Fault::malformed(name, "unknown component type or type"));
         };
-        let count = accessor.count.0;
+        let decoded = self.decoded_accessors.get(&index.value());
+        let (component, components) =
+            decoded.map_or((component.0, shape.multiplicity()), |decoded| (decoded.component, decoded.components));
+        let decoded = decoded.map(|decoded| &*decoded.bytes);
+        let element_bytes = components * component.size();
+        let count = decoded.map_or(accessor.count.0, |bytes| (bytes.len() / element_bytes.max(1)) as u64);
         if count == 0 {
             return Err(Fault::malformed(name, "it has no elements"));
         }
         at_most(&name, count, self.elements_left.get())?;
-        Ok(Layout { name, accessor, component: component.0, components: shape.multiplicity(), count })
+        Ok(Layout { name, accessor, component, components, count, decoded })
     }
 
     fn elements<T: Copy>(&self, layout: &Layout, zero: T, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, Fault> {
         self.elements_left.set(self.elements_left.get().saturating_sub(layout.count));
+        if let Some(bytes) = layout.decoded {
+            return Ok(bytes.chunks_exact(layout.element_bytes()).map(read).collect());
+        }
         let mut elements = match layout.accessor.buffer_view {
             Some(view) => {
                 let offset = layout.accessor.byte_offset.map_or(0, |o| o.0);
@@ -213,6 +267,8 @@ struct Layout<'a> {
     component: ComponentType,
     components: usize,
     count: u64,
+    /// Its elements, packed, where they are compressed in the file.
+    decoded: Option<&'a [u8]>,
 }
 
 impl Layout<'_> {

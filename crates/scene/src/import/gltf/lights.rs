@@ -5,11 +5,12 @@ use std::ops::RangeInclusive;
 
 use depth_image::LightError;
 use glam::{DAffine3, DVec3, Vec3};
+use gltf::json::Index;
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Spot, Type};
 use gltf::json::validation::Checked;
-use gltf::json::{Index, Root};
 
 use super::super::source_scene::{SourceLight, SourceScene};
+use super::document::Document;
 use crate::Light;
 use crate::error::Fault;
 
@@ -26,32 +27,43 @@ const LEAST_DISTANCE_M: f64 = 1e-3;
 /// Angles over 90° by less than this, radians, are 90°.
 const ANGLE_ROUNDING_RAD: f32 = 1e-3;
 
-/// The light of a node; `element` names the node.
+/// The light of a node; `element` names the node. `None` for a light of negative strength, and for one whose node has no
+/// direction.
 pub(super) fn placed(
-    root: &Root,
+    document: &Document,
     index: Index<JsonLight>,
     source_from_node: &DAffine3,
     element: &str,
-) -> Result<SourceLight, Fault> {
-    let json = root.get(index).ok_or_else(|| Fault::malformed(element, "its light does not exist"))?;
+) -> Result<Option<SourceLight>, Fault> {
+    let json = document.root.get(index).ok_or_else(|| Fault::malformed(element, "its light does not exist"))?;
     let element = format!("light {}", index.value());
+    let left_out = |reason: &str| {
+        let name = json.name.as_deref().unwrap_or("no name");
+        document.warnings.count(format!("lights {reason} are left out"), format_args!("{element} ({name})"));
+        Ok(None)
+    };
     let Checked::Valid(kind) = json.type_ else {
         return Err(Fault::malformed(element, "unknown type"));
     };
     let wrong = |e| Fault::light(&element, &e);
+    if json.intensity < 0.0 || json.color.iter().any(|channel| *channel < 0.0) {
+        return left_out("of negative strength");
+    }
     let color = color(json).map_err(wrong)?;
     let backwards = (source_from_node.matrix3 * DVec3::Z).try_normalize().map(|v| v.as_vec3());
-    let no_direction = LightError { field: "direction", reason: "its node's transform leaves none" };
-    let backwards = backwards.ok_or_else(|| wrong(no_direction));
+    if backwards.is_none() && kind != Type::Point {
+        return left_out("whose node's transform leaves no direction");
+    }
+    let backwards = backwards.unwrap_or(Vec3::Z);
     let light = match kind {
         Type::Directional => {
-            Light::Directional { towards_light_in_world: backwards?, irradiance_linear: color, angular_radius_rad: 0.0 }
+            Light::Directional { towards_light_in_world: backwards, irradiance_linear: color, angular_radius_rad: 0.0 }
         }
         Type::Point => Light::Point { position_in_world: Vec3::ZERO, intensity_linear: color, radius_m: 0.0 },
-        Type::Spot => spot(json, color, -backwards?).map_err(wrong)?,
+        Type::Spot => spot(json, color, -backwards).map_err(wrong)?,
     };
     light.validate().map_err(wrong)?;
-    Ok(SourceLight { light, position_in_source: source_from_node.translation })
+    Ok(Some(SourceLight { light, position_in_source: source_from_node.translation }))
 }
 
 /// Conversion from lux and candela: a white surface reflects 1/π of them into each direction.

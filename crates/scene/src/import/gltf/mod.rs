@@ -5,7 +5,8 @@
 //! (`primitive_validate_hook`, `accessor::Iter`), which a malformed file turns into a panic.
 //!
 //! `docs/formats.md` lists what is read, what is not, and what happens then. Nodes that an animation moves and skins become the
-//! scene's animation, whose first clip plays. Lamps and cameras stay at rest, and so do morph targets, with a warning.
+//! scene's animation, whose first clip plays. Lamps and cameras stay at rest, and so do morph targets, with their default
+//! weights and a warning.
 //!
 //! Factors of materials are clamped to their range. A factor that is not finite is refused, as is an invalid light.
 //!
@@ -18,73 +19,63 @@
 mod animation;
 mod channels;
 mod compressed;
+mod degenerate;
 mod document;
+mod draco;
+mod extensions;
+mod instancing;
+mod json;
 mod lights;
 mod materials;
+mod meshes;
+mod morph;
 mod nodes;
 mod primitives;
 mod skins;
+mod sources;
+mod specular_glossiness;
 mod texture_coordinates;
+mod textures;
+mod transforms;
 
 use gltf::binary::Glb;
 use gltf::json::Root;
 
 use super::folder::Folder;
-use super::source_scene::{SourceMesh, SourceScene};
+use super::source_scene::SourceScene;
+use super::warnings::Warnings;
 use crate::Limits;
 use crate::error::{Fault, at_most};
 use document::Document;
-use texture_coordinates::Coordinates;
-
-/// Extensions that a file may require.
-const SUPPORTED_EXTENSIONS: [&str; 10] = [
-    compressed::NAMES[0],
-    compressed::NAMES[1],
-    "EXT_texture_webp",
-    "KHR_lights_punctual",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_specular",
-    "KHR_materials_unlit",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
-];
-
-/// Extensions that a file may be freed of, each with the command line that does it.
-const CONVERSIONS: [(&str, &str); 2] = [
-    // Writing drops the compression unless it is asked for.
-    ("KHR_draco_mesh_compression", "npx @gltf-transform/cli copy IN OUT"),
-    ("KHR_texture_basisu", "npx @gltf-transform/cli ktxdecompress IN OUT"),
-];
 
 const GLB_MAGIC: &[u8] = b"glTF";
 const GLB_HEADER_BYTES: u32 = 12;
 
-pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
-    let (root, binary_chunk) = parsed(bytes, limits)?;
-    refuse_unknown_requirements(&root)?;
+/// Reads a file. It may require extensions in `ignore_required` that are not read.
+pub(super) fn read(
+    bytes: &[u8],
+    folder: &Folder,
+    limits: &Limits,
+    ignore_required: &[String],
+) -> Result<SourceScene, Fault> {
+    let (json, binary_chunk) = if bytes.starts_with(GLB_MAGIC) { split(bytes)? } else { (bytes, None) };
+    let warnings = Warnings::default();
+    let root = json::parse(json, limits, &warnings)?;
+    extensions::check(&root, ignore_required, &warnings)?;
     check_counts(&root, limits)?;
-    let document = Document::open(&root, binary_chunk, folder, limits)?;
+    let document = Document::open(&root, binary_chunk, folder, limits, &warnings)?;
     let mut scene = SourceScene::default();
     materials::read(&document, &mut scene)?;
-    read_meshes(&document, &mut scene)?;
-    let tree = nodes::read(&root, limits, &mut scene)?;
+    let meshes = meshes::read(&document, &mut scene)?;
+    let tree = nodes::read(&document, &meshes, &mut scene)?;
     animation::read(&document, &tree, &mut scene)?;
-    lights::expose(&mut scene);
-    Ok(scene)
-}
-
-/// The JSON and the binary chunk of a file.
-fn parsed<'a>(bytes: &'a [u8], limits: &Limits) -> Result<(Root, Option<&'a [u8]>), Fault> {
-    let (json, binary_chunk) = if bytes.starts_with(GLB_MAGIC) { split(bytes)? } else { (bytes, None) };
-    // Each object of the JSON, even `{}`, becomes a struct of some hundred bytes.
-    let objects = json.iter().filter(|&&b| b == b'{').count();
-    at_most("JSON objects", objects as u64, limits.json_objects)?;
-    let root = Root::from_slice(json).map_err(|e| Fault::malformed("JSON", e.to_string()))?;
-    if !root.asset.version.starts_with("2.") {
-        return Err(Fault::unsupported("asset", format!("glTF version {}", root.asset.version)));
+    if scene.instances.is_empty() {
+        let number = nodes::chosen_scene(&root).map_or(0, |scene| scene.value());
+        return Err(Fault::malformed("scene", format!("it has no triangles in scene {number}")));
     }
-    Ok((root, binary_chunk))
+    lights::expose(&mut scene);
+    warnings.log();
+    Ok(scene)
 }
 
 fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Fault> {
@@ -103,37 +94,9 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Fault> {
     Ok((json, glb.bin.and_then(borrowed)))
 }
 
-fn refuse_unknown_requirements(root: &Root) -> Result<(), Fault> {
-    let unknown = root.extensions_required.iter().find(|name| !SUPPORTED_EXTENSIONS.contains(&name.as_str()));
-    let Some(name) = unknown else { return Ok(()) };
-    let conversion = CONVERSIONS.iter().find(|(extension, _)| extension == name);
-    let advice = conversion.map_or_else(String::new, |(_, command)| format!("; convert the file with `{command}`"));
-    Err(Fault::unsupported("extensionsRequired", format!("{name}{advice}")))
-}
-
 fn check_counts(root: &Root, limits: &Limits) -> Result<(), Fault> {
     at_most("nodes", root.nodes.len() as u64, limits.nodes)?;
     at_most("meshes", root.meshes.len() as u64, limits.nodes)?;
     at_most("materials", root.materials.len() as u64, limits.attributes)?;
     at_most("images", root.images.len() as u64, limits.attributes)
-}
-
-/// Mesh `i` of the file becomes mesh `i` of the scene; a mesh of lines alone stays empty.
-fn read_meshes(document: &Document, scene: &mut SourceScene) -> Result<(), Fault> {
-    for (number, mesh) in document.root.meshes.iter().enumerate() {
-        let mut merged = SourceMesh::default();
-        for (part, primitive) in mesh.primitives.iter().enumerate() {
-            let element = format!("mesh {number}, primitive {part}");
-            let coordinates = Coordinates::of_material(document.root, primitive.material)?;
-            let material = materials::material_number(document.root, primitive.material, &element)?;
-            if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
-                tracing::warn!("{element}: its morph targets are shown at rest");
-            }
-            if let Some(geometry) = primitives::read(document, primitive, &coordinates, &element)? {
-                merged.append_part(geometry, material);
-            }
-        }
-        scene.meshes.push(merged);
-    }
-    Ok(())
 }

@@ -4,39 +4,51 @@ use depth_image::srgb8_from_linear;
 use glam::Vec3;
 use gltf::json::Index;
 use gltf::json::accessor::Accessor;
-use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::super::normals;
 use super::super::source_scene::{SourceMesh, plain_vertex};
 use super::super::tangents;
 use super::document::{Document, same_count};
-use super::skins;
 use super::texture_coordinates::{Coordinates, UvSource};
+use super::{morph, skins};
 use crate::error::{Fault, at_most};
 use crate::{Vertex, VertexDetail};
 
-/// `None` for points and lines.
+/// A primitive's triangles.
+pub(super) struct Geometry {
+    pub mesh: SourceMesh,
+    /// Factor of the vertex colours: 1 unless some are above 1, which a vertex has no room for.
+    pub color_scale: f32,
+}
+
+/// `None` for points and lines. `weights` are those of the morph targets.
 pub(super) fn read(
     document: &Document,
     primitive: &Primitive,
     coordinates: &Coordinates,
+    weights: &[f32],
     element: &str,
-) -> Result<Option<SourceMesh>, Fault> {
+) -> Result<Option<Geometry>, Fault> {
     let Checked::Valid(mode) = primitive.mode else {
         return Err(Fault::malformed(element, "unknown mode"));
     };
     if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
         return Ok(None);
     }
-    let attributes = Attributes { document, primitive, element };
+    // Compressed strips are decoded to triangles.
+    let is_decoded = primitive.indices.is_some_and(|indices| document.is_decoded(indices));
+    let mode = if is_decoded { Mode::Triangles } else { mode };
+    let attributes = Attributes { document, primitive, weights, element };
     let position = attributes.index(Semantic::Positions);
     let position = position.ok_or_else(|| Fault::malformed(element, "it has no POSITION"))?;
     let count = document.element_count(position, element)?;
     at_most(format_args!("{element}, vertices"), count, document.limits.vertices)?;
-    let positions = document.floats::<3>(position, element)?;
+    let mut positions = document.floats::<3>(position, element)?;
+    attributes.morph(|target| target.positions, &mut positions)?;
     let indices = triangles(document, primitive.indices, mode, positions.len(), element)?;
-    let (vertices, has_normals) = attributes.vertices(positions.len(), &coordinates.first)?;
+    let Corners { vertices, has_normals, color_scale } = attributes.corners(positions.len(), &coordinates.first)?;
     let details = attributes.details(positions.len(), coordinates)?;
     let positions_in_mesh: Vec<_> = positions.iter().map(|p| Vec3::from(*p).as_dvec3()).collect();
     let influences = skins::influences(document, primitive, &indices, positions.len(), element)?;
@@ -51,13 +63,22 @@ pub(super) fn read(
             tangents::generate(&mut mesh, second_uv).map_err(wrong)?;
         }
     }
-    Ok(Some(mesh))
+    Ok(Some(Geometry { mesh, color_scale }))
+}
+
+/// The vertices of a primitive without their positions.
+struct Corners {
+    vertices: Vec<Vertex>,
+    has_normals: bool,
+    /// See [`Geometry::color_scale`].
+    color_scale: f32,
 }
 
 /// The attributes of a primitive.
 struct Attributes<'a> {
     document: &'a Document<'a>,
     primitive: &'a Primitive,
+    weights: &'a [f32],
     element: &'a str,
 }
 
@@ -73,23 +94,40 @@ impl Attributes<'_> {
         self.index(semantic).map(read).transpose()
     }
 
-    /// The vertices, and whether they have normals.
-    fn vertices(&self, count: usize, uv: &UvSource) -> Result<(Vec<Vertex>, bool), Fault> {
+    /// Adds what morph targets change.
+    fn morph<const N: usize>(
+        &self,
+        accessor_of: impl Fn(&MorphTarget) -> Option<Index<Accessor>>,
+        values: &mut [[f32; N]],
+    ) -> Result<(), Fault> {
+        morph::add(self.document, self.primitive, self.weights, accessor_of, values, self.element)
+    }
+
+    fn corners(&self, count: usize, uv: &UvSource) -> Result<Corners, Fault> {
         let mut vertices = vec![plain_vertex(); count];
+        let mut color_scale = 1.0;
         for (v, at) in vertices.iter_mut().zip(self.floats(Semantic::TexCoords(uv.set), count)?.unwrap_or_default()) {
             v.uv = uv.apply(at);
         }
         if let Some(index) = self.index(Semantic::Colors(0)) {
             let colors = linear_colors(self.document, index, self.element)?;
             let colors = same_count(colors, count, "COLOR_0", self.element)?;
-            vertices.iter_mut().zip(colors).for_each(|(v, linear)| v.color_srgba8 = srgba8_from_linear(linear));
+            let channels = colors.iter().flat_map(|color| &color[..3]).filter(|channel| channel.is_finite());
+            color_scale = channels.fold(1.0, |most: f32, &channel| most.max(channel));
+            for (vertex, [r, g, b, alpha]) in vertices.iter_mut().zip(colors) {
+                let [r, g, b] = [r, g, b].map(|channel| channel / color_scale);
+                vertex.color_srgba8 = srgba8_from_linear([r, g, b, alpha]);
+            }
         }
-        let Some(normals) = self.floats::<3>(Semantic::Normals, count)? else { return Ok((vertices, false)) };
+        let Some(mut normals) = self.floats::<3>(Semantic::Normals, count)? else {
+            return Ok(Corners { vertices, has_normals: false, color_scale });
+        };
+        self.morph(|target| target.normals, &mut normals)?;
         if normals.iter().any(|n| !Vec3::from(*n).is_finite()) {
             return Err(Fault::malformed(self.element, "a normal is not finite"));
         }
         vertices.iter_mut().zip(normals).for_each(|(v, normal)| v.normal = normal);
-        Ok((vertices, true))
+        Ok(Corners { vertices, has_normals: true, color_scale })
     }
 
     /// Second coordinates and tangents, where the material needs them.
@@ -103,7 +141,10 @@ impl Attributes<'_> {
             details.iter_mut().zip(uvs).for_each(|(detail, at)| detail.uv = uv.apply(at));
         }
         if coordinates.tangents_along_second.is_some() {
-            let tangents = self.floats::<4>(Semantic::Tangents, count)?.unwrap_or_default();
+            let mut tangents = self.floats::<4>(Semantic::Tangents, count)?.unwrap_or_default();
+            if !tangents.is_empty() {
+                self.morph(|target| target.tangents, &mut tangents)?;
+            }
             details.iter_mut().zip(tangents).for_each(|(detail, tangent)| detail.tangent = unit_tangent(tangent));
         }
         Ok(details)
@@ -135,12 +176,21 @@ fn drop_unused(mesh: &mut SourceMesh) {
 }
 
 fn linear_colors(document: &Document, index: Index<Accessor>, element: &str) -> Result<Vec<[f32; 4]>, Fault> {
-    if document.component_count(index, element)? == 3 {
+    let mut colors = if document.component_count(index, element)? == 3 {
         let rgb = document.floats::<3>(index, element)?;
-        Ok(rgb.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect())
+        rgb.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
     } else {
-        document.floats::<4>(index, element)
+        document.floats::<4>(index, element)?
+    };
+    // Integers are shares of their largest value (glTF 2.0, 3.7.2.1), also where a file does not say so.
+    if let Some(largest) = document.largest_of_plain_integers(index, element)? {
+        let has_alpha = document.component_count(index, element)? == 4;
+        for color in &mut colors {
+            let channels = if has_alpha { 4 } else { 3 };
+            color[..channels].iter_mut().for_each(|channel| *channel /= largest);
+        }
     }
+    Ok(colors)
 }
 
 fn srgba8_from_linear([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {

@@ -6,18 +6,18 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, skin::Skin};
 
 use super::document::{Document, same_count};
-use super::nodes::affine_from;
-use crate::animation::{Influence, is_invertible};
+use super::transforms::affine_from;
+use crate::animation::Influence;
 use crate::error::{Fault, at_most};
 
-/// Weights whose sum is further from 1 are refused; others are divided by it. Files whose least weights were cut off are
-/// common.
-const MOST_MISSING: f32 = 0.1;
+/// A vertex whose weights have a lesser sum has none.
+const LEAST_SUM: f32 = 1e-6;
 /// Four joints each; files with more sets are not known.
 const MOST_SETS: u32 = 4;
 
-/// Joints and weights of each vertex; empty for a primitive without. Of more than four joints the strongest four count.
-/// Vertices that no triangle uses are not checked.
+/// Joints and weights of each vertex; empty for a primitive without. Of more than four joints the strongest four count, and
+/// weights are made to sum to 1. A vertex without weights has [`Influence::NONE`]. Vertices that no triangle uses are not
+/// checked.
 pub(super) fn influences(
     document: &Document,
     primitive: &Primitive,
@@ -57,15 +57,17 @@ fn influence(shares: &mut [(f32, f32)]) -> Result<Influence, String> {
     if let Some((_, weight)) = shares.iter().find(|(_, weight)| !(weight.is_finite() && *weight >= 0.0)) {
         return Err(format!("the weight {weight} is negative or not finite"));
     }
-    let sum: f32 = shares.iter().map(|(_, weight)| weight).sum();
-    if (sum - 1.0).abs() > MOST_MISSING {
-        return Err(format!("the sum of its weights is {sum}, not 1"));
-    }
     // The sort is stable: equal weights stay in the file's order.
     shares.sort_by(|a, b| b.1.total_cmp(&a.1));
     let strongest = || shares.iter().take(4);
     let kept: f32 = strongest().map(|(_, weight)| weight).sum();
     let mut influence = Influence::NONE;
+    if kept < LEAST_SUM {
+        return Ok(influence);
+    }
+    if !kept.is_finite() {
+        return Err("the sum of its weights is not finite".into());
+    }
     for (place, &(joint, weight)) in strongest().enumerate().filter(|(_, (_, weight))| *weight > 0.0) {
         let is_number = joint.fract() == 0.0 && (0.0..=f32::from(u16::MAX)).contains(&joint);
         influence.joints[place] =
@@ -75,7 +77,7 @@ fn influence(shares: &mut [(f32, f32)]) -> Result<Influence, String> {
     Ok(influence)
 }
 
-/// The inverse bind matrices of a skin, one for each of its joints.
+/// The inverse bind matrices of a skin, one for each of its joints. Those without an inverse hide their vertices.
 pub(super) fn bind_matrices(document: &Document, skin: &Skin, element: &str) -> Result<Vec<DAffine3>, Fault> {
     at_most(format_args!("{element}, joints"), skin.joints.len() as u64, u64::from(u16::MAX))?;
     if skin.joints.is_empty() {
@@ -90,8 +92,8 @@ pub(super) fn bind_matrices(document: &Document, skin: &Skin, element: &str) -> 
         return Err(Fault::malformed(element, why));
     }
     let bind = |(number, matrix): (usize, &[f32; 16])| {
-        let transform = affine_from(Mat4::from_cols_array(matrix).as_dmat4()).filter(is_invertible);
-        let why = "it is not finite, not affine, or not invertible";
+        let transform = affine_from(Mat4::from_cols_array(matrix).as_dmat4()).filter(DAffine3::is_finite);
+        let why = "it is not finite, or not affine";
         transform.ok_or_else(|| Fault::malformed(format_args!("{element}, matrix {number}"), why))
     };
     matrices.iter().take(skin.joints.len()).enumerate().map(bind).collect()

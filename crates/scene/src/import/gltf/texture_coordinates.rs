@@ -7,6 +7,7 @@ use gltf::json::material::Material as JsonMaterial;
 use gltf::json::texture::{Info, Texture as JsonTexture};
 use gltf::json::{Index, Root, Value, deserialize};
 
+use super::specular_glossiness;
 use crate::error::Fault;
 
 /// A set of texture coordinates and their transform.
@@ -83,8 +84,13 @@ pub(super) fn maps_of(material: &JsonMaterial, element: &str) -> Result<[Option<
         let transform = t.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM));
         Map::unparsed(t.index, t.tex_coord, transform, element)
     });
+    let specular_glossiness = specular_glossiness::of(material, element)?;
+    let base_color = match &specular_glossiness {
+        Some(specular_glossiness) => specular_glossiness.diffuse_texture.as_ref(),
+        None => pbr.base_color_texture.as_ref(),
+    };
     Ok([
-        pbr.base_color_texture.as_ref().map(Map::of),
+        base_color.map(Map::of),
         pbr.metallic_roughness_texture.as_ref().map(Map::of),
         normal.transpose()?,
         material.emissive_texture.as_ref().map(Map::of),

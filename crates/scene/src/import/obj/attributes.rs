@@ -31,7 +31,7 @@ pub(super) struct Attributes {
 
 impl Attributes {
     /// `v x y z`, optionally followed by a weight or a colour, as several programs write it.
-    pub(super) fn push_position(&mut self, line: &Line, limits: &Limits, warnings: &mut Warnings) -> Result<(), Fault> {
+    pub(super) fn push_position(&mut self, line: &Line, limits: &Limits, warnings: &Warnings) -> Result<(), Fault> {
         at_most(line, self.positions_in_source.len() as u64 + 1, limits.vertices)?;
         let [x, y, z, a, g, b] = line.numbers();
         let position = DVec3::from([x, y, z].map(|c| c.unwrap_or(f64::NAN)));
@@ -47,7 +47,7 @@ impl Attributes {
         Ok(())
     }
 
-    pub(super) fn push_uv(&mut self, line: &Line, warnings: &mut Warnings) {
+    pub(super) fn push_uv(&mut self, line: &Line, warnings: &Warnings) {
         let [u, v] = line.numbers();
         // OBJ's v runs upwards.
         let uv = [u, v].map(|c| c.unwrap_or(0.0) as f32);
@@ -58,7 +58,7 @@ impl Attributes {
         self.uvs.push([u, 1.0 - v]);
     }
 
-    pub(super) fn push_normal(&mut self, line: &Line, warnings: &mut Warnings) {
+    pub(super) fn push_normal(&mut self, line: &Line, warnings: &Warnings) {
         let normal = line.numbers::<3>().map(|c| c.unwrap_or(f64::NAN));
         let direction = DVec3::from(normal).try_normalize();
         if direction.is_none() && normal != [0.0; 3] {

@@ -69,7 +69,7 @@ impl Faces {
         line: &Line,
         attributes: &Attributes,
         limits: &Limits,
-        warnings: &mut Warnings,
+        warnings: &Warnings,
     ) -> Result<(), Fault> {
         let start = self.corners.len();
         let counts = attributes.counts();
@@ -101,7 +101,7 @@ impl Faces {
         attributes: &Attributes,
         materials: &[MaterialUse],
         limits: &Limits,
-        warnings: &mut Warnings,
+        warnings: &Warnings,
     ) -> Result<SourceMesh, Fault> {
         let mut builder = Builder::new(attributes, self.material_names.len());
         let placements = numbered_placements(materials);
@@ -127,7 +127,7 @@ impl Faces {
         }
         if mesh.indices.is_empty() {
             let reason =
-                [UNREADABLE, NOT_FINITE, TOO_SHORT].into_iter().find_map(|why| Some((why, warnings.first(why)?.0)));
+                [UNREADABLE, NOT_FINITE, TOO_SHORT].into_iter().find_map(|why| Some((why, warnings.first(why)?)));
             let reason = reason.map(|(why, place)| Fault::malformed(place, format!("there are no triangles: {why}")));
             return Err(reason.unwrap_or_else(|| Fault::malformed("scene", "it has no triangles")));
         }
@@ -189,7 +189,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn add(&mut self, face: &Face, corners: &[Corner], placement: NumberedPlacement, warnings: &mut Warnings) {
+    fn add(&mut self, face: &Face, corners: &[Corner], placement: NumberedPlacement, warnings: &Warnings) {
         let place = format_args!("line {} (f)", face.line);
         self.polygon_in_source.clear();
         for corner in corners {

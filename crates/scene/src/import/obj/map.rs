@@ -63,7 +63,7 @@ const SKIPPED: [(&str, usize); 9] = [
 
 impl TextureMap {
     /// Reads `-option arguments… file name`; `None` without a name.
-    pub(super) fn parse(line: &Line, warnings: &mut Warnings) -> Option<Self> {
+    pub(super) fn parse(line: &Line, warnings: &Warnings) -> Option<Self> {
         let mut map = Self {
             place: format!("{line} {}", decoded(line.rest)),
             names: Vec::new(),
@@ -88,7 +88,7 @@ impl TextureMap {
         Some(map)
     }
 
-    fn read_option(&mut self, option: &[u8], rest: &mut Words, line: &Line, warnings: &mut Warnings) {
+    fn read_option(&mut self, option: &[u8], rest: &mut Words, line: &Line, warnings: &Warnings) {
         match option {
             b"-s" => self.placement.scale = rest.vector(1.0),
             b"-o" => self.placement.offset = rest.vector(0.0),
@@ -185,7 +185,7 @@ mod tests {
 
     fn parsed(rest: &str) -> Option<TextureMap> {
         let line = Line { file: "", number: 1, keyword: b"map_Kd", rest: rest.as_bytes() };
-        TextureMap::parse(&line, &mut Warnings::default())
+        TextureMap::parse(&line, &Warnings::default())
     }
 
     fn name(rest: &str) -> String {

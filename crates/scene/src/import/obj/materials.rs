@@ -25,7 +25,7 @@ pub(super) fn read_libraries(
     statements: &[Vec<u8>],
     folder: &Folder,
     limits: &Limits,
-    warnings: &mut Warnings,
+    warnings: &Warnings,
 ) -> Result<Vec<Entry>, Fault> {
     let mut entries = Vec::new();
     // Some programs repeat the statement before each object.
@@ -57,7 +57,7 @@ fn read_library(
     path: &Path,
     folder: &Folder,
     limits: &Limits,
-    warnings: &mut Warnings,
+    warnings: &Warnings,
     entries: &mut Vec<Entry>,
 ) -> Result<(), Fault> {
     let element = format!("mtllib {}", path.display());
@@ -92,7 +92,7 @@ pub(super) fn read_materials(
     names: &[Vec<u8>],
     folder: &Folder,
     limits: &Limits,
-    warnings: &mut Warnings,
+    warnings: &Warnings,
     scene: &mut SourceScene,
 ) -> Result<Vec<MaterialUse>, Fault> {
     at_most("materials", names.len() as u64, limits.attributes)?;

@@ -28,13 +28,13 @@ use faces::Faces;
 use text::{Line, for_each_line, without_byte_order_mark};
 
 pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
-    let mut warnings = Warnings::default();
-    let scene = read_with(bytes, folder, limits, &mut warnings);
+    let warnings = Warnings::default();
+    let scene = read_with(bytes, folder, limits, &warnings);
     warnings.log();
     scene
 }
 
-fn read_with(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &mut Warnings) -> Result<SourceScene, Fault> {
+fn read_with(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &Warnings) -> Result<SourceScene, Fault> {
     let mut file = ObjFile::default();
     for_each_line(&without_byte_order_mark(bytes), "", |line| file.read_line(line, limits, warnings))?;
     let mut scene = SourceScene::default();
@@ -55,7 +55,7 @@ struct ObjFile {
 }
 
 impl ObjFile {
-    fn read_line(&mut self, line: &Line, limits: &Limits, warnings: &mut Warnings) -> Result<(), Fault> {
+    fn read_line(&mut self, line: &Line, limits: &Limits, warnings: &Warnings) -> Result<(), Fault> {
         if line.is("v") {
             self.attributes.push_position(line, limits, warnings)?;
         } else if line.is("vt") {

@@ -40,7 +40,7 @@ pub(super) fn parse(
     element: &str,
     folder: &Path,
     limits: &Limits,
-    warnings: &mut Warnings,
+    warnings: &Warnings,
     entries: &mut Vec<Entry>,
 ) -> Result<(), Fault> {
     let mut is_first = true;
@@ -60,7 +60,7 @@ pub(super) fn parse(
 
 impl Entry {
     /// Returns whether the statement is usable or unknown.
-    fn read_line(&mut self, line: &Line, warnings: &mut Warnings) -> bool {
+    fn read_line(&mut self, line: &Line, warnings: &Warnings) -> bool {
         let material = &mut self.material;
         if line.is("Kd") {
             let Some(color) = color(line) else { return false };
@@ -95,7 +95,7 @@ impl Entry {
     }
 
     /// The material without its textures.
-    pub(super) fn material(&self, name: String, warnings: &mut Warnings) -> Material {
+    pub(super) fn material(&self, name: String, warnings: &Warnings) -> Material {
         let mut material = Material { name, double_sided: true, ..self.material.clone() };
         // Models 0 and 1 of illumination have no highlight, and an exponent of 0 is one as wide as the hemisphere.
         let has_highlight = self.model.is_none_or(|model| model > 1) && material.phong_exponent >= 1.0;
@@ -115,7 +115,7 @@ impl Entry {
 
     /// `d`, or else `Tr`. MeshLab and openMVS write `Tr 1` for an opaque material, where others write `Tr 0`: 1 alone counts as
     /// transparent only where another statement is a sign of it.
-    fn opacity(&self, name: &str, warnings: &mut Warnings) -> f32 {
+    fn opacity(&self, name: &str, warnings: &Warnings) -> f32 {
         let opacity = match (self.opacity, self.transparency) {
             (Some(opacity), _) => opacity,
             (None, Some(transparency)) => {

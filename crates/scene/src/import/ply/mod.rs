@@ -32,13 +32,13 @@ use surface::Surface;
 use vertices::Vertices;
 
 pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
-    let mut warnings = Warnings::default();
-    let scene = read_with(bytes, folder, limits, &mut warnings);
+    let warnings = Warnings::default();
+    let scene = read_with(bytes, folder, limits, &warnings);
     warnings.log();
     scene
 }
 
-fn read_with(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &mut Warnings) -> Result<SourceScene, Fault> {
+fn read_with(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &Warnings) -> Result<SourceScene, Fault> {
     let text = PlyText::parse(bytes)?;
     // The last number of an ASCII file may lack the white space that ends it.
     let rows = text.header.as_bytes().chain(&*text.body).chain(&b"\n"[..]);
@@ -82,7 +82,7 @@ fn read_textures(names: &[&[u8]], folder: &Folder, limits: &Limits, scene: &mut 
 fn read_elements(
     mut reader: PlyReader<impl BufRead>,
     limits: &Limits,
-    warnings: &mut Warnings,
+    warnings: &Warnings,
 ) -> Result<(Vertices, Surface), Fault> {
     let mut vertices = Vertices::default();
     let mut surface = Surface::default();

@@ -55,7 +55,7 @@ impl Surface {
         }
     }
 
-    pub(super) fn push(&mut self, row: &FaceRow, number: u64, warnings: &mut Warnings) {
+    pub(super) fn push(&mut self, row: &FaceRow, number: u64, warnings: &Warnings) {
         let count = row.vertex_indices.len();
         if count < 3 {
             return warnings.count(TOO_SHORT, format_args!("face {number}"));
@@ -100,7 +100,7 @@ impl Surface {
         vertices: &Vertices,
         texture_count: u32,
         limits: &Limits,
-        warnings: &mut Warnings,
+        warnings: &Warnings,
     ) -> Result<SourceMesh, Fault> {
         let has_texture = texture_count > 0;
         let has_colors = vertices.colors != ColorRange::None || !self.colors.is_empty();
@@ -124,8 +124,8 @@ impl Surface {
         }
         if mesh.indices.is_empty() {
             let reasons = [UNKNOWN_VERTEX, NOT_FINITE, TOO_SHORT].into_iter();
-            let reason = reasons.filter_map(|why| Some((why, warnings.first(why)?.0))).next();
-            let (why, place) = reason.unwrap_or(("all are empty", "file"));
+            let reason = reasons.filter_map(|why| Some((why, warnings.first(why)?))).next();
+            let (why, place) = reason.unwrap_or_else(|| ("all are empty", "file".to_owned()));
             return Err(Fault::malformed(place, format!("there are no triangles: {why}")));
         }
         Ok(mesh)
@@ -174,7 +174,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn add(&mut self, number: usize, face: &Face, corners: std::ops::Range<usize>, warnings: &mut Warnings) {
+    fn add(&mut self, number: usize, face: &Face, corners: std::ops::Range<usize>, warnings: &Warnings) {
         let place = format_args!("face {}", face.row);
         let positions = self.surface.corners[corners.clone()].iter();
         let polygon: Option<Vec<_>> =

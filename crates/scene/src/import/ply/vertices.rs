@@ -25,7 +25,7 @@ impl Vertices {
         self.vertices.len()
     }
 
-    pub(super) fn push(&mut self, row: &VertexRow, warnings: &mut Warnings) {
+    pub(super) fn push(&mut self, row: &VertexRow, warnings: &Warnings) {
         let number = self.vertices.len();
         let position = row.position();
         if !position.is_finite() {

@@ -1,6 +1,8 @@
 //! Small files of every format for tests.
 
 pub mod compressed;
+pub mod draco;
+pub mod ktx2;
 pub mod skinned;
 pub mod warnings;
 
@@ -35,6 +37,7 @@ pub struct Sample {
 
 impl Sample {
     pub fn new(name: &str, bytes: &[u8]) -> Self {
+        warnings::keep_all_callsites();
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join(name);
         std::fs::write(&path, bytes).unwrap();

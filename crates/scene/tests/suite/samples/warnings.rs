@@ -1,10 +1,10 @@
-//! The warnings of an import.
+//! The warnings that are logged while something is done.
 
 use std::io::Write;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, LazyLock, Mutex};
 
 use scene::Scene;
-use tracing_subscriber::fmt::MakeWriter;
+use tracing::Dispatch;
 
 use super::Sample;
 
@@ -22,23 +22,35 @@ impl Write for Log {
     }
 }
 
-impl<'a> MakeWriter<'a> for Log {
-    type Writer = Self;
+/// A span or a warning that is first reached while another thread makes its subscriber may stay silent for ever. While this
+/// subscriber is there, none does.
+static ALL_CALLSITES: LazyLock<Dispatch> =
+    LazyLock::new(|| Dispatch::new(tracing_subscriber::fmt().with_writer(std::io::sink).finish()));
 
-    fn make_writer(&'a self) -> Self {
-        self.clone()
-    }
+pub fn keep_all_callsites() {
+    LazyLock::force(&ALL_CALLSITES);
+}
+
+/// Does `work`, and returns its result with the lines that this thread has logged.
+pub fn with_warnings<T>(work: impl FnOnce() -> T) -> (T, Vec<String>) {
+    let log = Log::default();
+    let writer = log.clone();
+    let subscriber =
+        tracing_subscriber::fmt().with_ansi(false).without_time().with_writer(move || writer.clone()).finish();
+    let result = tracing::subscriber::with_default(subscriber, work);
+    let text = String::from_utf8(log.0.lock().unwrap().clone()).unwrap();
+    (result, text.lines().map(str::to_owned).collect())
+}
+
+/// Does `work`, and returns its result with the only line that this thread has logged.
+pub fn with_one_warning<T>(work: impl FnOnce() -> T) -> (T, String) {
+    let (result, mut lines) = with_warnings(work);
+    assert_eq!(lines.len(), 1, "{lines:?}");
+    (result, lines.remove(0))
 }
 
 /// Loads a sample that can be used; the text has a line for each warning.
 pub fn loaded_with_warnings(sample: &Sample) -> (Scene, String) {
-    let log = Log::default();
-    let subscriber = tracing_subscriber::fmt()
-        .with_writer(log.clone())
-        .with_ansi(false)
-        .with_max_level(tracing_subscriber::filter::LevelFilter::WARN)
-        .finish();
-    let scene = tracing::subscriber::with_default(subscriber, || sample.load()).unwrap();
-    let text = String::from_utf8(log.0.lock().unwrap().clone()).unwrap();
-    (scene, text)
+    let (scene, lines) = with_warnings(|| sample.load());
+    (scene.unwrap(), lines.join("\n"))
 }

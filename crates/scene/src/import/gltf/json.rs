@@ -1,0 +1,92 @@
+//! The JSON of a file. What other loaders take and the `gltf` crate refuses is rewritten before the crate parses it: byte
+//! order marks, whole numbers written as `24.0`, members that are `null`, scenes without nodes, animation channels without a
+//! target node.
+
+use std::mem::take;
+
+use gltf::json::{Root, Value, deserialize};
+
+use super::super::warnings::Warnings;
+use crate::Limits;
+use crate::error::{Fault, at_most};
+
+const BYTE_ORDER_MARK: &str = "\u{feff}";
+/// Values of the JSON for each object of it that [`Limits`] admits.
+const VALUES_AN_OBJECT: u64 = 16;
+
+/// Parses the JSON. Its size is bounded before memory is allocated for the parsed form.
+pub(super) fn parse(json: &[u8], limits: &Limits, warnings: &Warnings) -> Result<Root, Fault> {
+    // Each object of the JSON, even `{}`, becomes a struct of some hundred bytes, and each value 32 bytes.
+    let count = |wanted: u8| json.iter().filter(|&&byte| byte == wanted).count() as u64;
+    at_most("JSON objects", count(b'{'), limits.json_objects)?;
+    at_most("JSON values", count(b','), limits.json_objects.saturating_mul(VALUES_AN_OBJECT))?;
+    let wrong = |error: gltf::json::Error| Fault::malformed("JSON", error.to_string());
+    // Names in another encoding are no reason to refuse a model.
+    let text = String::from_utf8_lossy(json);
+    let text = text.trim_start_matches(BYTE_ORDER_MARK).trim_end_matches('\0');
+    // The parser admits 128 levels, so that the recursion below ends.
+    let mut value: Value = deserialize::from_str(text).map_err(wrong)?;
+    simplify(&mut value);
+    complete(&mut value, warnings);
+    let root: Root = deserialize::from_value(value).map_err(wrong)?;
+    if !root.asset.version.starts_with("2.") {
+        return Err(Fault::unsupported("asset", format!("glTF version {}", root.asset.version)));
+    }
+    Ok(root)
+}
+
+/// Writes whole numbers without a fraction, and drops members that are `null` or of applications.
+fn simplify(value: &mut Value) {
+    /// From here on, neighbouring whole numbers are one `f64`.
+    const LARGEST_WHOLE: f64 = (1u64 << 53) as f64;
+    match value {
+        Value::Number(number) if number.is_f64() => {
+            let whole = number.as_f64().filter(|float| float.fract() == 0.0 && float.abs() < LARGEST_WHOLE);
+            if let Some(whole) = whole.filter(|whole| *whole != 0.0 || whole.is_sign_positive()) {
+                *value = Value::from(whole as i64);
+            }
+        }
+        Value::Array(items) => items.iter_mut().for_each(simplify),
+        Value::Object(members) => {
+            members.retain(|name, member| !member.is_null() && name != "extras");
+            members.values_mut().for_each(simplify);
+        }
+        _ => {}
+    }
+}
+
+/// Adds lists that may be empty, and drops channels that the `gltf` crate has no form for.
+fn complete(root: &mut Value, warnings: &Warnings) {
+    for scene in items_of(root, "scenes") {
+        add_empty_list(scene, "nodes");
+    }
+    for mesh in items_of(root, "meshes") {
+        add_empty_list(mesh, "primitives");
+    }
+    for (number, animation) in items_of(root, "animations").iter_mut().enumerate() {
+        add_empty_list(animation, "channels");
+        add_empty_list(animation, "samplers");
+        let Some(Value::Array(channels)) = animation.get_mut("channels") else { continue };
+        for channel in take(channels) {
+            let target = channel.get("target");
+            let has_node = target.is_some_and(|target| target.get("node").is_some());
+            // KHR_animation_pointer moves anything.
+            let is_pointer = target.and_then(|target| target.get("path")?.as_str()) == Some("pointer");
+            if has_node && !is_pointer {
+                channels.push(channel);
+            } else {
+                warnings.count("channels without a target node are left out", format_args!("animation {number}"));
+            }
+        }
+    }
+}
+
+fn items_of<'v>(root: &'v mut Value, name: &str) -> &'v mut [Value] {
+    root.get_mut(name).and_then(Value::as_array_mut).map_or(&mut [], Vec::as_mut_slice)
+}
+
+fn add_empty_list(value: &mut Value, name: &str) {
+    if let Value::Object(members) = value {
+        members.entry(name).or_insert_with(|| Value::Array(Vec::new()));
+    }
+}
