@@ -1,6 +1,7 @@
 //! Measured costs, kept for sessions that ask for the same, and predicted for other sizes of views.
 
-use cluster::{Costs, MeasureCosts, Measured, Timeline};
+use cluster::{Costs, MeasureCosts, Measured, SharedLightCosts, TileCosts, Timeline};
+use depth_image::{Camera, SampleCamera, ViewPlanes};
 use glam::{Quat, UVec2, Vec3};
 use parking_lot::Mutex;
 
@@ -39,13 +40,25 @@ impl CostCache {
         self.0.lock().iter().find(|entry| entry.device == device && entry.key == key).map(|entry| entry.known)
     }
 
-    /// Costs from measurements that differ in the view's size alone; `None` without any of a size near it.
+    /// Costs from measurements that differ in the view's size alone, or, where light is shared, in the quality of views and the
+    /// density of samples; `None` without any of a size near it.
     fn predict(&self, device: &str, measurement: &MeasureCosts) -> Option<Measured> {
-        let (key, pixels) = (sizeless(&cache_key(measurement)), pixels_of(measurement));
+        let key = cache_key(measurement);
         let entries = self.0.lock();
-        let alike = entries.iter().filter(|entry| entry.device == device && sizeless(&entry.key) == key);
-        let mut sizes: Vec<(f64, Measured)> =
-            alike.map(|entry| (pixels_of(&entry.key), entry.known.measured)).collect();
+        let of_device: Vec<&Entry> = entries.iter().filter(|entry| entry.device == device).collect();
+        let sized = sizeless(&key);
+        let sizes = of_device.iter().filter(|entry| sizeless(&entry.key) == sized);
+        let sizes = sizes.map(|entry| (pixels_of(&entry.key), entry.known.measured)).collect();
+        Self::predict_size(sizes, pixels_of(&key)).or_else(|| {
+            let shared = qualityless(&key);
+            let others = of_device.into_iter().filter(|entry| qualityless(&entry.key) == shared);
+            let others = others.filter_map(|entry| Some((pixels_of(&entry.key), in_quality(entry, &key)?))).collect();
+            Self::predict_size(others, pixels_of(&key))
+        })
+    }
+
+    /// Costs from those of views of other sizes, each with its number of pixels.
+    fn predict_size(mut sizes: Vec<(f64, Measured)>, pixels: f64) -> Option<Measured> {
         let distance = |of_px: f64| (of_px / pixels).max(pixels / of_px);
         // The nearest first.
         sizes.sort_by(|(a, _), (b, _)| distance(*a).total_cmp(&distance(*b)));
@@ -94,6 +107,48 @@ fn sizeless(key: &MeasureCosts) -> MeasureCosts {
     key
 }
 
+/// The sizeless key without what a prediction accounts for where light is shared: quality, planes, codec, and the size of samples.
+fn qualityless(key: &MeasureCosts) -> MeasureCosts {
+    let mut key = sizeless(key);
+    key.method = key.method.split(':').next().unwrap_or_default().to_owned();
+    key.codec.clear();
+    key.planes = ViewPlanes::default();
+    for camera in &mut key.workload.sample_cameras {
+        *camera = camera.resized(UVec2::ONE);
+        if let SampleCamera::Depth(Camera::Pinhole(pinhole)) = camera {
+            (pinhole.focal_px, pinhole.principal_px) = Default::default();
+        }
+    }
+    key
+}
+
+/// Costs of a measurement in another quality: surfaces and look-ups are for each position within a pixel, rays for each pixel,
+/// and samples for each texel. `None` where no light is shared.
+fn in_quality(entry: &Entry, wanted: &MeasureCosts) -> Option<Measured> {
+    let Measured { costs, shared_light, .. } = entry.known.measured;
+    let light = shared_light?;
+    let positions = |key: &MeasureCosts| f64::from(key.planes.antialias.samples());
+    let texels = |key: &MeasureCosts| key.workload.sample_cameras.iter().map(SampleCamera::pixel_count).sum::<usize>();
+    let positions_ratio = positions(wanted) / positions(&entry.key);
+    let texels_ratio = texels(wanted) as f64 / texels(&entry.key).max(1) as f64;
+    let light = SharedLightCosts {
+        surfaces_s: light.surfaces_s * positions_ratio,
+        look_up_s: light.look_up_s * positions_ratio,
+        ..light
+    };
+    let direct_light_s = (costs.direct_view_s - light.surfaces_s / positions_ratio).max(0.0);
+    let sample_image_s = costs.sample_image_s * texels_ratio;
+    let costs = Costs {
+        sample_image_s,
+        direct_view_s: direct_light_s + light.surfaces_s,
+        reconstruct_view_s: light.surfaces_s + light.look_up_s + light.unknown_s,
+        load_set_s: costs.load_set_s * texels_ratio,
+        tiles: costs.tiles.and_then(|tiles| TileCosts::of_image(sample_image_s, tiles.overhead_s, tiles.row_shares)),
+        ..costs
+    };
+    Some(Measured { costs, shared_light: Some(light), ..entry.known.measured })
+}
+
 fn pixels_of(measurement: &MeasureCosts) -> f64 {
     measurement.typical_views.first().map_or(1.0, |view| view.pixel_count().max(1) as f64)
 }
@@ -121,8 +176,8 @@ fn at_size((near_px, near): (f64, Measured), other: Option<(f64, Measured)>, pix
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use cluster::{SamplePlanes, SharedLightCosts};
-    use depth_image::{ExposureEv, PinholeCamera, ViewPlanes};
+    use cluster::SamplePlanes;
+    use depth_image::{Antialias, ExposureEv, PinholeCamera};
 
     use super::*;
     use crate::schedule::workload_for_tests as workload;
@@ -217,6 +272,32 @@ pub(crate) mod tests {
         let method = MeasureCosts { method: "mesh".to_owned(), ..wanted.clone() };
         let images = MeasureCosts { workload: workload(3), ..wanted };
         assert!(cache.predict("d", &method).is_none() && cache.predict("d", &images).is_none());
+    }
+
+    #[test]
+    fn other_qualities_and_densities_of_shared_light_are_predicted_from_the_parts_of_a_view() {
+        let light = SharedLightCosts { known_ratio: 0.9, surfaces_s: 0.1, look_up_s: 0.02, unknown_s: 0.28 };
+        let mut known = measured(0.4);
+        known.measured.shared_light = Some(light);
+        known.measured.costs.direct_view_s = 2.1;
+        let in_motion = MeasureCosts { method: "light_cache:fast".to_owned(), ..measurement(UVec2::new(64, 48)) };
+        let mut still =
+            MeasureCosts { method: "light_cache:fine".to_owned(), codec: "png".to_owned(), ..in_motion.clone() };
+        still.planes.antialias = Antialias::of(4).unwrap();
+        for camera in &mut still.workload.sample_cameras {
+            *camera = camera.resized(camera.size_px() / 2);
+        }
+        let cache = CostCache::default();
+        cache.insert("d", &in_motion, measured(0.4));
+        assert_eq!(cache.predict("d", &still), None, "no light is shared");
+        cache.insert("d", &in_motion, known);
+        let Measured { costs, shared_light, .. } = cache.predict("d", &still).unwrap();
+        let seconds = [costs.sample_image_s, costs.direct_view_s, costs.reconstruct_view_s];
+        let expected = [3.0 / 4.0, 2.0 + 0.4, 0.4 + 0.08 + 0.28];
+        assert!(seconds.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{seconds:?}");
+        assert_eq!(shared_light.unwrap().unknown_s, 0.28);
+        let other = MeasureCosts { workload: workload(3), ..still };
+        assert_eq!(cache.predict("d", &other), None, "other cameras");
     }
 
     #[test]

@@ -54,6 +54,9 @@ pub(crate) async fn measure_when_idle(shared: Arc<Shared>) {
 /// The next measurement for which there is an idle node.
 fn next(shared: &Shared) -> Option<(Wanted, NodeStatus)> {
     let mut queue = shared.to_measure.lock();
+    if !queue.is_quiet_for(IDLE_FOR) {
+        return None;
+    }
     let devices: BTreeSet<&str> = queue.devices().collect();
     let is_idle = |name: &str| shared.with_scheduler(|scheduler| scheduler.idle_for(name)) >= IDLE_FOR;
     let mut nodes = shared.status().nodes;
@@ -118,6 +121,14 @@ async fn measured_on(shared: &Shared, measurement: &MeasureCosts, node: &NodeSta
         async { NodeClient::new(shared.connections.to(&node.address).await?).measure_costs(measurement.clone()).await };
     let fresh = within(MEASURED_WITHIN, "measuring", call).await;
     let measured = fresh.map_err(|status| of_node(&node.node_name, &status))?;
+    let MeasureCosts { method, in_background, .. } = measurement;
+    tracing::debug!(
+        node = node.node_name,
+        method,
+        in_background,
+        seconds = start.elapsed().as_secs_f64(),
+        "costs measured"
+    );
     if measurement.in_background {
         tokio::time::sleep(REPORTED_WITHIN).await;
     }

@@ -1,6 +1,7 @@
 //! Measurements that nobody waits for: of costs that were predicted, or measured beside other work.
 
 use std::collections::VecDeque;
+use std::time::{Duration, Instant};
 
 use cluster::MeasureCosts;
 
@@ -22,7 +23,10 @@ pub(crate) struct Wanted {
 
 /// Measurements in the order in which they were first wanted.
 #[derive(Debug, Default)]
-pub(crate) struct MeasuringQueue(VecDeque<Wanted>);
+pub(crate) struct MeasuringQueue {
+    waiting: VecDeque<Wanted>,
+    last_added: Option<Instant>,
+}
 
 impl MeasuringQueue {
     /// Adds a measurement, unless it waits already.
@@ -42,24 +46,30 @@ impl MeasuringQueue {
     fn push(&mut self, wanted: Wanted) {
         let key = cache_key(&wanted.measurement);
         let is_same = |other: &Wanted| other.device == wanted.device && cache_key(&other.measurement) == key;
-        if self.0.iter().any(is_same) {
+        if self.waiting.iter().any(is_same) {
             return;
         }
-        if self.0.len() >= CAPACITY {
-            self.0.pop_front();
+        if self.waiting.len() >= CAPACITY {
+            self.waiting.pop_front();
         }
-        self.0.push_back(wanted);
+        self.waiting.push_back(wanted);
+        self.last_added = Some(Instant::now());
+    }
+
+    /// Whether nothing has been added for so long. What is added is of a session that opens, and begins to ask for views.
+    pub(crate) fn is_quiet_for(&self, duration: Duration) -> bool {
+        self.last_added.is_none_or(|last| last.elapsed() >= duration)
     }
 
     /// The devices of all measurements.
     pub(crate) fn devices(&self) -> impl Iterator<Item = &str> {
-        self.0.iter().map(|wanted| wanted.device.as_str())
+        self.waiting.iter().map(|wanted| wanted.device.as_str())
     }
 
     /// Takes the first measurement on a device of which a node is idle.
     pub(crate) fn take(&mut self, is_idle: impl Fn(&str) -> bool) -> Option<Wanted> {
-        let first = self.0.iter().position(|wanted| is_idle(&wanted.device))?;
-        self.0.remove(first)
+        let first = self.waiting.iter().position(|wanted| is_idle(&wanted.device))?;
+        self.waiting.remove(first)
     }
 }
 
@@ -105,7 +115,9 @@ mod tests {
     #[test]
     fn the_oldest_measurements_leave_a_full_queue() {
         let mut queue = MeasuringQueue::default();
+        assert!(queue.is_quiet_for(Duration::MAX));
         (1..=10_000).for_each(|side| queue.add("a", &measurement(UVec2::splat(side))));
+        assert!(queue.is_quiet_for(Duration::ZERO) && !queue.is_quiet_for(Duration::MAX));
         let sides: Vec<u32> = std::iter::from_fn(|| taken(&mut queue, "a")).map(|(_, size_px)| size_px.x).collect();
         assert_eq!(sides, (9_969..=10_000).collect::<Vec<_>>());
     }

@@ -22,9 +22,9 @@ const RUNS: usize = 3;
 const LONG_RUN_S: f64 = 0.5;
 /// Larger views are measured in this size: their time is in proportion to their pixels.
 const MOST_PIXELS: usize = 1 << 20;
-/// Images of light and views are first measured with this part of their sides.
-const QUICK_SIDE_RATIO: f32 = 0.25;
-/// A measurement of light that would take longer is not repeated in full size: a client may wait for it.
+/// Images of light and views are measured with these parts of their sides, one after the other, before they are in full size.
+const QUICK_SIDE_RATIOS: [f32; 2] = [0.125, 0.25];
+/// A measurement of light that would take longer is not repeated with larger sides: a client may wait for it.
 const LONG_MEASUREMENT_S: f64 = 1.0;
 /// The longest time of views that are made in one call, unless one alone takes longer.
 const CALL_S: f64 = 1.0;
@@ -36,10 +36,14 @@ pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Resu
     let class = if request.in_background { WorkClass::Background } else { WorkClass::Batch };
     let measurement = Measurement { engine, turn: Turn { class, flow: Turn::next_flow() } };
     if engine.sample_planes(&request.method)?.light {
-        let quick = Resized::new(request, QUICK_SIDE_RATIO, QUICK_SIDE_RATIO);
-        let measured = quick.in_full_size(measurement.costs(&quick.request)?);
-        if measurement_s(&measured.costs, &request.workload) > LONG_MEASUREMENT_S {
-            return Ok(measured);
+        let next_ratios = QUICK_SIDE_RATIOS.into_iter().skip(1).chain([1.0]);
+        for (ratio, next_ratio) in QUICK_SIDE_RATIOS.into_iter().zip(next_ratios) {
+            let quick = Resized::new(request, ratio, ratio);
+            let measured = quick.in_full_size(measurement.costs(&quick.request)?);
+            let next_s = measurement_s(&measured.costs, &request.workload) * f64::from(next_ratio).powi(2);
+            if next_s > LONG_MEASUREMENT_S {
+                return Ok(measured);
+            }
         }
     }
     let resized = Resized::with_most_pixels(request);

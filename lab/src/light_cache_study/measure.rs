@@ -30,7 +30,7 @@ const LEAST_LOOK_UP: f64 = 0.01;
 const CONDITION_VIEWS: usize = 2;
 /// Rays to a lamp and of ambient light, at each position, of the direct drawing whose flicker is compared.
 const FLICKERING: LightRays = LightRays::new(4, 4);
-/// Frames in which a camera turns, and the way between them.
+/// Frames in which a camera turns around the middle of the scene, and the angle between them.
 const FRAMES: usize = 4;
 const FRAME_TURN_RAD: f32 = 0.2_f32.to_radians();
 
@@ -105,9 +105,15 @@ pub fn measure(stand: &Stand, subject: &Subject, plan: Measuring) -> anyhow::Res
 /// The error of the change from frame to frame: that of views with light from samples over that of direct drawing.
 fn flicker_ratio(stage: &Stage<'_>, reference: &LitScene<'_>, cached: &LitScene<'_>) -> anyhow::Result<f64> {
     let first = stage.views.first().context("a view")?;
+    let middle = stage.scene.bounds().center();
+    // The eye has to move: seen from one place, a pixel has one noise, whatever the direction.
     let turned = |frame: usize| {
         let turn = Quat::from_rotation_y(frame as f32 * FRAME_TURN_RAD);
-        PinholeCamera { world_from_camera: turn * first.world_from_camera, ..*first }
+        PinholeCamera {
+            eye_in_world: middle + turn * (first.eye_in_world - middle),
+            world_from_camera: turn * first.world_from_camera,
+            ..*first
+        }
     };
     let cameras: Vec<PinholeCamera> = (0..FRAMES).map(turned).collect();
     let direct = stage.lit.in_light(&Light::Indirect.lighting(FLICKERING.a_pixel()))?;
