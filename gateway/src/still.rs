@@ -2,7 +2,7 @@
 //!
 //! A still begins with one sample a pixel, step by step of light, and goes on with more samples. Where light is shared, early
 //! stills are balanced, and that of all samples has the visitor's quality. The finest is at last drawn directly, where that does
-//! not take long.
+//! not take long, and has less error: rays of indirect light are noisier than its smoothed samples.
 
 use cluster::{Assignment, Policy, SessionPlan};
 use depth_image::{Antialias, LightCacheQuality};
@@ -38,6 +38,8 @@ impl PictureLight {
 pub(crate) struct PlannedLight {
     /// Whether it comes from samples.
     pub(crate) is_shared: bool,
+    /// Whether direct drawing has more noise.
+    is_smoother: bool,
     /// The time of a typical view that is drawn directly.
     direct_view_s: f64,
 }
@@ -46,7 +48,7 @@ impl From<&SessionPlan> for PlannedLight {
     fn from(plan: &SessionPlan) -> Self {
         let Assignment { policy, workload, .. } = &plan.assignment;
         let is_shared = *policy != Policy::Direct && workload.planes.light;
-        Self { is_shared, direct_view_s: plan.costs.direct_view_s }
+        Self { is_shared, is_smoother: workload.has_indirect_light(), direct_view_s: plan.costs.direct_view_s }
     }
 }
 
@@ -91,7 +93,7 @@ impl Stills {
             let samples = more(still.samples).min(self.most_samples);
             return Some((samples, self.light(planned, samples)));
         }
-        let is_wanted = self.quality >= LightCacheQuality::Fine && self.may_draw;
+        let is_wanted = self.quality >= LightCacheQuality::Fine && self.may_draw && !planned.is_smoother;
         let is_shared = matches!(still.light, PictureLight::Shared(_));
         let is_quick = self.drawing_s(planned, still) <= LONGEST_DRAWING_S;
         (is_wanted && is_shared && is_quick).then_some((still.samples, PictureLight::Drawn))
@@ -141,12 +143,15 @@ mod tests {
     fn shared_light_becomes_finer_and_is_drawn_where_that_is_quick() {
         use LightCacheQuality::{Balanced, Draft, Exact, Fine};
         use PictureLight::{Drawn, Session, Shared};
-        let quick = PlannedLight { is_shared: true, direct_view_s: 4.0 };
+        let quick = PlannedLight { is_shared: true, is_smoother: false, direct_view_s: 4.0 };
         let slow = PlannedLight { direct_view_s: 4.1, ..quick };
         let early = [(1, Shared(Balanced)), (4, Shared(Balanced))];
         let with = |last: &[(u32, PictureLight)]| [&early, last].concat();
         assert_eq!(all(stills(Fine), quick), with(&[(16, Shared(Fine)), (16, Drawn)]));
         assert_eq!(all(stills(Fine), slow), with(&[(16, Shared(Fine))]));
+        let indirect = PlannedLight { is_smoother: true, ..quick };
+        assert_eq!(all(stills(Fine), indirect), with(&[(16, Shared(Fine))]));
+        assert_eq!(all(stills(Exact), indirect), with(&[(16, Drawn)]), "asked for");
         assert_eq!(all(stills(Exact), slow), with(&[(16, Drawn)]), "asked for");
         assert_eq!(all(stills(Balanced), quick), with(&[(16, Shared(Balanced))]));
         assert_eq!(all(stills(Draft), quick), [1, 4, 16].map(|samples| (samples, Shared(Draft))));

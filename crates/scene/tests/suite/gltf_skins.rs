@@ -79,11 +79,14 @@ fn a_primitive_without_joints_is_rigid_beside_one_with_joints() {
 #[test]
 fn a_bind_matrix_without_an_inverse_hides_its_vertices() {
     for second in [glam::Mat4::ZERO, glam::Mat4::from_scale(Vec3::new(1.0, 0.0, 0.0))] {
-        let scene = loaded(|tube| {
-            let matrices = [glam::Mat4::IDENTITY, second].map(|matrix| matrix.to_cols_array()).concat();
-            let accessor = tube.floats(&matrices, "MAT4");
-            tube.skins = format!(r#"{{"inverseBindMatrices":{accessor},"joints":[1,2]}}"#);
+        let (scene, warning) = with_one_warning(|| {
+            loaded(|tube| {
+                let matrices = [glam::Mat4::IDENTITY, second].map(|matrix| matrix.to_cols_array()).concat();
+                let accessor = tube.floats(&matrices, "MAT4");
+                tube.skins = format!(r#"{{"inverseBindMatrices":{accessor},"joints":[1,2]}}"#);
+            })
         });
+        assert!(warning.contains("bind matrices without an inverse hide their vertices"), "{warning}");
         let points = positions(&scene, 0.0);
         // The first rings follow the first joint alone, and the last ones the second.
         let radius = |vertex: usize| points[vertex].with_x(0.0).length();

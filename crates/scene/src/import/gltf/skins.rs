@@ -94,6 +94,12 @@ pub(super) fn bind_matrices(document: &Document, skin: &Skin, element: &str) -> 
     let bind = |(number, matrix): (usize, &[f32; 16])| {
         let transform = affine_from(Mat4::from_cols_array(matrix).as_dmat4()).filter(DAffine3::is_finite);
         let why = "it is not finite, or not affine";
+        if transform.is_some_and(|transform| transform.matrix3.determinant() == 0.0) {
+            document.warnings.count(
+                "bind matrices without an inverse hide their vertices",
+                format_args!("{element}, matrix {number}"),
+            );
+        }
         transform.ok_or_else(|| Fault::malformed(format_args!("{element}, matrix {number}"), why))
     };
     matrices.iter().take(skin.joints.len()).enumerate().map(bind).collect()
