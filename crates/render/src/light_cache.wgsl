@@ -378,7 +378,12 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {%- endif %}
     var known: Known;
     known.least_luminance = 3.0e38;
+{%- if positions == "later" %}
+    // Few points are asked here. Where no lane of the software device asks, it leaves a loop, and runs a branch all the same.
+    for (var asks = is_asked; asks; asks = false) {
+{%- else %}
     if is_asked {
+{%- endif %}
 {%- if lamp_vectors %}
         find_lamps(camera.eye_in_world + point.offset);
 {%- endif %}

@@ -21,6 +21,8 @@ use crate::statistics::median;
 const MOST_RAYS: LightRays = LightRays::new(16, 64);
 /// The density of a set that is sampled before each set that is timed, since the first of a kind compiles shaders.
 const WARM_UP_DENSITY: f32 = 0.0625;
+/// The side of a view that does not count, over that of the others.
+const WARM_UP_SIDE_RATIO: f32 = 0.25;
 
 /// A subject's rows under one lighting.
 pub struct LightFront {
@@ -160,10 +162,11 @@ impl Drawer<'_> {
 }
 
 impl OpenRow<'_> {
-    /// Draws the views one after the other, after one that does not count.
+    /// Draws the views one after the other, after a small one that does not count.
     fn measure(self, stage: &Stage<'_>, truth: &[View]) -> anyhow::Result<LightRow> {
         let planes = ViewPlanes { inverse_depth: false, ..planes(SAMPLES_A_PIXEL) };
-        self.drawer.view(&stage.views[0], planes)?;
+        let first = &stage.views[0];
+        self.drawer.view(&first.resized((first.size_px.as_vec2() * WARM_UP_SIDE_RATIO).as_uvec2()), planes)?;
         let mut views = Vec::with_capacity(stage.views.len());
         let mut views_s = Vec::with_capacity(stage.views.len());
         for camera in &stage.views {
