@@ -51,9 +51,15 @@ impl CostCache {
         let sizes = sizes.map(|entry| (pixels_of(&entry.key), entry.known.measured)).collect();
         Self::predict_size(sizes, pixels_of(&key)).or_else(|| {
             let shared = qualityless(&key);
-            let others = of_device.into_iter().filter(|entry| qualityless(&entry.key) == shared);
-            let others = others.filter_map(|entry| Some((pixels_of(&entry.key), in_quality(entry, &key)?))).collect();
-            Self::predict_size(others, pixels_of(&key))
+            let others: Vec<&Entry> = of_device.into_iter().filter(|entry| qualityless(&entry.key) == shared).collect();
+            // Sizes are compared in one quality.
+            let latest = &others.last()?.key;
+            let is_alike = |entry: &&&Entry| {
+                entry.key.method == latest.method && entry.key.planes.antialias == latest.planes.antialias
+            };
+            let alike = others.iter().filter(is_alike);
+            let sizes = alike.filter_map(|entry| Some((pixels_of(&entry.key), in_quality(entry, &key)?))).collect();
+            Self::predict_size(sizes, pixels_of(&key))
         })
     }
 
@@ -107,7 +113,8 @@ fn sizeless(key: &MeasureCosts) -> MeasureCosts {
     key
 }
 
-/// The sizeless key without what a prediction accounts for where light is shared: quality, planes, codec, and the size of samples.
+/// The sizeless key without what changes costs little, or as predicted, where light is shared: quality, planes, codec, and the size
+/// of samples.
 fn qualityless(key: &MeasureCosts) -> MeasureCosts {
     let mut key = sizeless(key);
     key.method = key.method.split(':').next().unwrap_or_default().to_owned();
@@ -123,7 +130,8 @@ fn qualityless(key: &MeasureCosts) -> MeasureCosts {
 }
 
 /// Costs of a measurement in another quality: surfaces and look-ups are for each position within a pixel, rays for each pixel,
-/// and samples for each texel. `None` where no light is shared.
+/// and samples for each texel. Points that no sample knows, and encoding, take as long as in the quality that was measured. `None`
+/// where no light is shared.
 fn in_quality(entry: &Entry, wanted: &MeasureCosts) -> Option<Measured> {
     let Measured { costs, shared_light, .. } = entry.known.measured;
     let light = shared_light?;

@@ -57,7 +57,11 @@ impl ViewSpace {
         let point = |field, point: [f64; 3]| {
             let in_world = self.source_space.world_from_source(DVec3::from_array(point));
             let is_near = point.iter().all(|v| v.abs() <= FARTHEST) && in_world.abs().max_element() <= FARTHEST as f32;
-            if is_near { Ok(in_world) } else { Err(bad(field, point, "within ±1e12")) }
+            if is_near {
+                Ok(in_world)
+            } else {
+                Err(bad(field, point, "within ±1e12, and not further from the model for its size"))
+            }
         };
         if !(1.0..=170.0).contains(&page.fov_y_deg) {
             return Err(bad("fov_y_deg", page.fov_y_deg, "from 1 to 170"));

@@ -4,7 +4,7 @@
 //! stills are balanced, and that of all samples has the visitor's quality. The finest is at last drawn directly, where that does
 //! not take long, and has less error: rays of indirect light are noisier than its smoothed samples.
 
-use cluster::{Assignment, Policy, SessionPlan};
+use cluster::{Assignment, Policy, SessionPlan, has_indirect_light};
 use depth_image::{Antialias, LightCacheQuality};
 
 use crate::scenes::TYPICAL_PX;
@@ -48,7 +48,7 @@ impl From<&SessionPlan> for PlannedLight {
     fn from(plan: &SessionPlan) -> Self {
         let Assignment { policy, workload, .. } = &plan.assignment;
         let is_shared = *policy != Policy::Direct && workload.planes.light;
-        Self { is_shared, is_smoother: workload.has_indirect_light(), direct_view_s: plan.costs.direct_view_s }
+        Self { is_shared, is_smoother: has_indirect_light(&workload.lighting), direct_view_s: plan.costs.direct_view_s }
     }
 }
 

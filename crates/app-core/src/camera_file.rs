@@ -152,14 +152,14 @@ impl Frame<'_> {
 
     /// The size: `w` and `h` of a `transforms.json`, `render_width` and `render_height` of a camera path.
     fn size_px(&self, default_px: UVec2) -> Result<UVec2, CameraFileError> {
-        let columns = self.optional("w")?.or(self.optional("render_width")?);
-        let rows = self.optional("h")?.or(self.optional("render_height")?);
-        let columns = columns.unwrap_or(f64::from(default_px.x));
-        let rows = rows.unwrap_or(f64::from(default_px.y));
-        Ok(UVec2::new(self.side_px("w", columns)?, self.side_px("h", rows)?))
+        let width_field = if self.value("w").is_some() { "w" } else { "render_width" };
+        let height_field = if self.value("h").is_some() { "h" } else { "render_height" };
+        let width_px = self.side_px(width_field, default_px.x)?;
+        Ok(UVec2::new(width_px, self.side_px(height_field, default_px.y)?))
     }
 
-    fn side_px(&self, field: &str, side: f64) -> Result<u32, CameraFileError> {
+    fn side_px(&self, field: &str, default_px: u32) -> Result<u32, CameraFileError> {
+        let side = self.optional(field)?.unwrap_or(f64::from(default_px));
         if side.fract() == 0.0 && (1.0..=f64::from(MAX_IMAGE_SIDE_PX)).contains(&side) {
             return Ok(side as u32);
         }
@@ -239,7 +239,10 @@ impl Frame<'_> {
     fn rows(&self) -> Result<[[f64; 4]; 4], CameraFileError> {
         let fault = |kind| self.fault("transform_matrix", kind);
         let given = self.own.get("transform_matrix").or_else(|| self.own.get("camera_to_world"));
-        let given = given.and_then(matrix_rows).ok_or_else(|| fault(CameraFault::Missing))?;
+        let given = given.ok_or_else(|| fault(CameraFault::Missing))?;
+        let other_form =
+            || CameraFault::OutOfRange { value: "of another form".to_owned(), allowed: "4 rows of 4 numbers" };
+        let given = matrix_rows(given).ok_or_else(|| fault(other_form()))?;
         let count = Some(given.len()).filter(|count| !(3..=4).contains(count));
         if let Some(wrong) = count.or_else(|| given.iter().map(Vec::len).find(|length| *length != 4)) {
             let (value, allowed) = (format!("of {wrong} rows or columns"), "4 rows of 4 numbers");

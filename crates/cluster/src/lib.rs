@@ -48,4 +48,4 @@ pub use session::{ChangeSession, Quality, SessionEvent, SessionPlan, SessionRequ
 pub use status::{AchievedTime, ClusterStatus, NodeCondition, OfferSettings, OfferStatus, WorkloadStatus};
 pub use timeline::{Refinement, Timeline};
 pub use views::{DIRECT, FetchImages, LiveRequest, RenderViews, RequestedView, check_view_count, check_view_size};
-pub use workload::{SamplePlanes, SetContent, Workload};
+pub use workload::{SamplePlanes, SetContent, Workload, has_indirect_light};

@@ -68,14 +68,14 @@ impl SamplePlanes {
     }
 }
 
-impl Workload {
-    /// Whether the lighting has indirect light. Its rays are noisy, and samples of it are smoothed: a view that is drawn directly has
-    /// more noise than one with light from samples.
-    #[must_use]
-    pub fn has_indirect_light(&self) -> bool {
-        self.lighting.split(',').any(|term| term.trim_start().starts_with("indirect "))
-    }
+/// Whether a lighting has indirect light. Its rays are noisy, and samples of it are smoothed: a view that is drawn directly has more
+/// noise than one with light from samples.
+#[must_use]
+pub fn has_indirect_light(lighting: &str) -> bool {
+    lighting.split(',').any(|term| term.split_whitespace().next() == Some("indirect"))
+}
 
+impl Workload {
     /// The step of refinement that a set shows. In a static scene every set is one step further, up to the last; sets beyond
     /// it are equal and are not sampled again. A timeline that ends before shows no finished set. A scene that moves has no
     /// time for steps: each set shows the last. So do views drawn directly.

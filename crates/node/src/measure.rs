@@ -35,19 +35,11 @@ pub(crate) fn measure_costs(engine: &dyn Engine, request: &MeasureCosts) -> Resu
     let _cut = request.in_background.then(|| engine.live_stream());
     let class = if request.in_background { WorkClass::Background } else { WorkClass::Batch };
     let measurement = Measurement { engine, turn: Turn { class, flow: Turn::next_flow() } };
-    if engine.sample_planes(&request.method)?.light {
-        let next_ratios = QUICK_SIDE_RATIOS.into_iter().skip(1).chain([1.0]);
-        for (ratio, next_ratio) in QUICK_SIDE_RATIOS.into_iter().zip(next_ratios) {
-            let quick = Resized::new(request, ratio, ratio);
-            let measured = quick.in_full_size(measurement.costs(&quick.request)?);
-            let next_s = measurement_s(&measured.costs, &request.workload) * f64::from(next_ratio).powi(2);
-            if next_s > LONG_MEASUREMENT_S {
-                return Ok(measured);
-            }
-        }
-    }
     let resized = Resized::with_most_pixels(request);
-    Ok(resized.in_full_size(measurement.costs(&resized.request)?))
+    let first_view = DirectWork::of(&request.workload, resized.request.views(1), request.planes);
+    let measured = measurement.costs_in_steps(request, &resized)?;
+    // How rays and triangles compare depends on the size of pictures.
+    Ok(Measured { traced_pixel_count: engine.traced_pixel_count(&first_view, measurement.turn)?, ..measured })
 }
 
 /// About the time that it takes to measure these costs.
@@ -123,6 +115,22 @@ struct Measurement<'a> {
 }
 
 impl Measurement<'_> {
+    /// Costs in full size, or, of light that takes long, from smaller images and views.
+    fn costs_in_steps(&self, request: &MeasureCosts, full: &Resized) -> Result<Measured, Status> {
+        if self.engine.sample_planes(&request.method)?.light {
+            let next_ratios = QUICK_SIDE_RATIOS.into_iter().skip(1).chain([1.0]);
+            for (ratio, next_ratio) in QUICK_SIDE_RATIOS.into_iter().zip(next_ratios) {
+                let quick = Resized::new(request, ratio, ratio);
+                let measured = quick.in_full_size(self.costs(&quick.request)?);
+                let next_s = measurement_s(&measured.costs, &request.workload) * f64::from(next_ratio).powi(2);
+                if next_s > LONG_MEASUREMENT_S {
+                    return Ok(measured);
+                }
+            }
+        }
+        Ok(full.in_full_size(self.costs(&full.request)?))
+    }
+
     fn costs(&self, request: &MeasureCosts) -> Result<Measured, Status> {
         let (engine, workload) = (self.engine, &request.workload);
         let planes = engine.sample_planes(&request.method)?;
@@ -160,14 +168,8 @@ impl Measurement<'_> {
         let in_order = engine.images_are_sequential(&workload.sampling)?;
         let costs =
             Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles };
-        let first_view = DirectWork::of(workload, request.views(1), request.planes);
-        Ok(Measured {
-            costs,
-            planes,
-            auto_exposure: auto_exposure(engine, workload, self.turn)?,
-            traced_pixel_count: engine.traced_pixel_count(&first_view, self.turn)?,
-            shared_light,
-        })
+        let auto_exposure = auto_exposure(engine, workload, self.turn)?;
+        Ok(Measured { costs, planes, auto_exposure, traced_pixel_count: None, shared_light })
     }
 
     /// Where the time of one view goes whose light comes from samples.

@@ -18,6 +18,17 @@ const LIGHTING: &str = "soft 4, occlusion 4";
 const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
 const METHOD: &str = "light_cache";
 
+#[test]
+fn clusters_know_indirect_light_by_the_texts_that_are_parsed() {
+    for text in
+        ["soft 16, indirect 64", "soft 4,indirect\t1", "shadows,  indirect  8", "soft 16, occlusion 16", "unlit"]
+    {
+        let lighting: render::Lighting = text.parse().expect("lighting");
+        assert_eq!(cluster::has_indirect_light(text), lighting.is_indirect(), "{text}");
+        assert_eq!(cluster::has_indirect_light(&lighting.to_string()), lighting.is_indirect(), "{text}");
+    }
+}
+
 fn scene() -> &'static Scene {
     static SCENE: OnceLock<Scene> = OnceLock::new();
     SCENE.get_or_init(|| loaded(HASH, "courtyard"))

@@ -21,10 +21,6 @@ impl FileNames {
         }
     }
 
-    pub(super) fn into_names(self) -> impl Iterator<Item = String> {
-        [self.color].into_iter().chain(self.depth).chain(self.provenance)
-    }
-
     /// All names.
     pub(super) fn all(&self) -> impl Iterator<Item = &String> {
         [&self.color].into_iter().chain(&self.depth).chain(&self.provenance)

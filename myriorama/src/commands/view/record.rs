@@ -23,7 +23,8 @@ const TONE: &str = "tone_mapping";
 const EXPOSURE_EV: &str = "exposure_ev";
 /// The field of the promise.
 const PROMISE: &str = "promise";
-const DEPTH: &str = "16-bit: value / 65535 * inverse_depth_max_per_m, per metre; 0 is background";
+const DEPTH: &str =
+    "16-bit: value / 65535 * inverse_depth_max_per_m, per metre or unit of the scene's file; 0 is background";
 /// The time between two writings of the record, and its least multiple of the time that writing takes.
 const PAUSE: Duration = Duration::from_secs(5);
 const PAUSE_RATIO: u32 = 20;
@@ -154,16 +155,19 @@ impl Record {
         Ok(())
     }
 
-    /// Deletes the pictures that the record in the folder names, and returns their number: they are of an earlier request. Files
-    /// that no record names stay, as does everything where the record was not written by this program.
+    /// Deletes the pictures of the views that the record in the folder names, and returns the number of these views: they are of an
+    /// earlier request. Files that no record names stay, as does everything where the record was not written by this program.
     pub(super) fn delete_earlier(&self) -> usize {
         let mut named = Vec::new();
-        let record = camera_record::read(&self.folder.join(FILE_NAME), |line| named.extend(number_of_line(line)));
+        let record = camera_record::read(&self.folder.join(FILE_NAME), |line| named.extend(files_of_line(line)));
         if record.is_err() {
             return 0;
         }
-        let names = named.into_iter().flat_map(|number| FileNames::of(number, ViewPlanes::ALL).into_names());
-        names.filter(|name| std::fs::remove_file(self.folder.join(name)).is_ok()).count()
+        let is_deleted = |files: &FileNames| {
+            let deleted = files.all().filter(|name| std::fs::remove_file(self.folder.join(name)).is_ok());
+            deleted.count() > 0
+        };
+        named.iter().filter(|files| is_deleted(files)).count()
     }
 
     /// The view of a line of the record, with the scale of its depth picture.
@@ -171,6 +175,7 @@ impl Record {
         let frame: Map<String, Value> = serde_json::from_str(line).ok()?;
         let number = number_of(frame.get("file_path")?.as_str()?)?;
         let depth_scale = frame.get("inverse_depth_max_per_m").and_then(Value::as_f64).unwrap_or(0.0) as f32;
+        let depth_scale = depth_scale / self.metres_per_unit();
         // Text is compared: it holds every bit of a number.
         let is_equal = number < self.total() && self.named(number, depth_scale).line(self.source_space) == line;
         let files = FileNames::of(number, self.planes);
@@ -220,12 +225,17 @@ impl Record {
         Ok(())
     }
 
+    /// A power of two: scales of depth stay exact.
+    fn metres_per_unit(&self) -> f32 {
+        self.source_space.metres_per_unit as f32
+    }
+
     fn named(&self, number: u64, depth_scale: f32) -> NamedCamera {
         let (views, files) = (self.cameras.len() as u64, FileNames::of(number, self.planes));
         let mut more = Map::from_iter([("set_index".to_owned(), json!(number / views))]);
         if let Some(name) = files.depth {
             more.insert("depth_file_path".to_owned(), json!(name));
-            more.insert("inverse_depth_max_per_m".to_owned(), json!(depth_scale));
+            more.insert("inverse_depth_max_per_m".to_owned(), json!(depth_scale * self.metres_per_unit()));
         }
         if let Some(name) = files.provenance {
             more.insert("provenance_file_path".to_owned(), json!(name));
@@ -234,10 +244,15 @@ impl Record {
     }
 }
 
-/// The number of the view that a line of a record names.
-fn number_of_line(line: &str) -> Option<u64> {
+/// The files of the view that a line of a record names.
+fn files_of_line(line: &str) -> Option<FileNames> {
     let frame: Map<String, Value> = serde_json::from_str(line).ok()?;
-    number_of(frame.get("file_path")?.as_str()?)
+    let planes = ViewPlanes {
+        inverse_depth: frame.contains_key("depth_file_path"),
+        provenance: frame.contains_key("provenance_file_path"),
+        ..ViewPlanes::COLOR
+    };
+    Some(FileNames::of(number_of(frame.get("file_path")?.as_str()?)?, planes))
 }
 
 fn described(promise: &Promise) -> Value {
