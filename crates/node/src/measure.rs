@@ -26,6 +26,8 @@ const MOST_PIXELS: usize = 1 << 20;
 const QUICK_SIDE_RATIOS: [f32; 2] = [0.125, 0.25];
 /// A measurement of light that would take longer is not repeated with larger sides: a client may wait for it.
 const LONG_MEASUREMENT_S: f64 = 1.0;
+/// Views that are smaller than full ones are timed with larger sides, too.
+const LARGER_SIDE_RATIO: f32 = 2.0;
 /// The longest time of views that are made in one call, unless one alone takes longer.
 const CALL_S: f64 = 1.0;
 
@@ -47,6 +49,30 @@ fn measurement_s(costs: &Costs, workload: &Workload) -> f64 {
     let set_s = costs.sample_image_s * workload.sample_cameras.len() as f64;
     let warmed_s = costs.direct_view_s + costs.reconstruct_view_s + costs.encode_view_s;
     set_s + 2.0 * warmed_s
+}
+
+/// Some views that were reconstructed, and the cost of one.
+struct Reconstruction {
+    made: Vec<View>,
+    view_s: f64,
+    shared_light: Option<SharedLightCosts>,
+}
+
+/// The time of a view of so many pixels.
+#[derive(Debug, Clone, Copy)]
+struct TimedSize {
+    pixels: f64,
+    seconds: f64,
+}
+
+impl TimedSize {
+    /// The time of a view of `pixels_ratio` times the pixels: a part is the same for all sizes, and a part for each pixel.
+    fn extended(self, larger: Self, pixels_ratio: f64) -> f64 {
+        let a_pixel_s = (larger.seconds - self.seconds) / (larger.pixels - self.pixels);
+        // Timings vary: neither part is negative.
+        let a_pixel_s = a_pixel_s.clamp(0.0, self.seconds / self.pixels);
+        self.seconds + a_pixel_s * self.pixels * (pixels_ratio - 1.0)
+    }
 }
 
 /// A measurement with smaller images and views, whose times are in proportion to their pixels.
@@ -86,6 +112,17 @@ impl Resized {
         }
     }
 
+    fn view_pixels(&self) -> f64 {
+        self.request.typical_views.iter().map(PinholeCamera::pixel_count).sum::<usize>() as f64
+    }
+
+    /// Views of [`LARGER_SIDE_RATIO`], unless they are larger than full ones or than [`MOST_PIXELS`].
+    fn with_larger_views(&self) -> Option<Self> {
+        let larger = Self::new(&self.request, 1.0, LARGER_SIDE_RATIO);
+        let most_pixels = (self.view_pixels() * self.pixels_ratio).min(MOST_PIXELS as f64);
+        (self.view_pixels() < larger.view_pixels() && larger.view_pixels() <= most_pixels).then_some(larger)
+    }
+
     fn in_full_size(&self, measured: Measured) -> Measured {
         let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles } =
             measured.costs;
@@ -121,17 +158,18 @@ impl Measurement<'_> {
             let next_ratios = QUICK_SIDE_RATIOS.into_iter().skip(1).chain([1.0]);
             for (ratio, next_ratio) in QUICK_SIDE_RATIOS.into_iter().zip(next_ratios) {
                 let quick = Resized::new(request, ratio, ratio);
-                let measured = quick.in_full_size(self.costs(&quick.request)?);
+                let measured = quick.in_full_size(self.costs(&quick)?);
                 let next_s = measurement_s(&measured.costs, &request.workload) * f64::from(next_ratio).powi(2);
                 if next_s > LONG_MEASUREMENT_S {
                     return Ok(measured);
                 }
             }
         }
-        Ok(full.in_full_size(self.costs(&full.request)?))
+        Ok(full.in_full_size(self.costs(full)?))
     }
 
-    fn costs(&self, request: &MeasureCosts) -> Result<Measured, Status> {
+    fn costs(&self, resized: &Resized) -> Result<Measured, Status> {
+        let request = &resized.request;
         let (engine, workload) = (self.engine, &request.workload);
         let planes = engine.sample_planes(&request.method)?;
         // Views are made from all of them: their own cell, and common cells.
@@ -159,17 +197,35 @@ impl Measurement<'_> {
         };
         let tiles = first.map(tile_costs).transpose()?.flatten();
         let (drawn, direct_view_s) = self.direct_view_s(request)?;
-        let (made, reconstruct_view_s) = match request.method.as_str() {
-            DIRECT => (drawn, direct_view_s),
-            _ => self.reconstruct_view_s(set.as_ref(), request)?,
+        let reconstruction = match request.method.as_str() {
+            DIRECT => Reconstruction { made: drawn, view_s: direct_view_s, shared_light: None },
+            _ => self.reconstruction(set.as_ref(), resized)?,
         };
+        let Reconstruction { made, view_s: reconstruct_view_s, shared_light } = reconstruction;
         let encode_view_s = self.encode_s(&made, &request.codec)?;
-        let shared_light = self.shared_light(set.as_ref(), request, reconstruct_view_s)?;
         let in_order = engine.images_are_sequential(&workload.sampling)?;
         let costs =
             Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles };
         let auto_exposure = auto_exposure(engine, workload, self.turn)?;
         Ok(Measured { costs, planes, auto_exposure, traced_pixel_count: None, shared_light })
+    }
+
+    /// The cost of one view, and where it goes. Small views take longer than their share of the pixels: from views of two sizes follows
+    /// what a full one takes, and that in proportion to the pixels of a small one.
+    fn reconstruction(&self, set: &dyn UploadedSet, resized: &Resized) -> Result<Reconstruction, Status> {
+        let (made, small_s) = self.reconstruct_view_s(set, &resized.request)?;
+        let Some(larger) = resized.with_larger_views() else {
+            let shared_light = self.shared_light(set, &resized.request, small_s)?;
+            return Ok(Reconstruction { made, view_s: small_s, shared_light });
+        };
+        let (_, larger_s) = self.reconstruct_view_s(set, &larger.request)?;
+        let small = TimedSize { pixels: resized.view_pixels(), seconds: small_s };
+        let full_s =
+            small.extended(TimedSize { pixels: larger.view_pixels(), seconds: larger_s }, resized.pixels_ratio);
+        let view_s = full_s / resized.pixels_ratio;
+        let parts = self.shared_light(set, &larger.request, larger_s)?;
+        let shared_light = parts.filter(|_| larger_s > 0.0).map(|parts| parts.scaled(view_s / larger_s));
+        Ok(Reconstruction { made, view_s, shared_light })
     }
 
     /// Where the time of one view goes whose light comes from samples.
