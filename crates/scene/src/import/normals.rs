@@ -12,8 +12,10 @@ pub(crate) const CREASE_60_DEGREES: f64 = 0.5;
 /// Flat except for coplanar faces, as glTF 2.0 (3.7.2.1) requires.
 pub(crate) const FLAT: f64 = 0.999_999;
 
-/// Around a hub of more corners than this, all are averaged: the pairwise comparison would be quadratic.
+/// Around a hub of more corners than this, all are averaged or each is flat: the pairwise comparison would be quadratic.
 const MAX_CORNERS_COMPARED: usize = 256;
+/// Distance of unit normals up to which two corners share a vertex.
+const SAME_DIRECTION: f32 = 1e-4;
 
 /// Normalises the given normals, and computes those of zero length: smooth up to creases of 60°, flat on the triangles of
 /// `is_flat`. Triangles that lie with their backs to their given normals are turned round, so `mesh` must be visible from both
@@ -61,8 +63,7 @@ fn compute(mesh: &mut SourceMesh, is_given: &[bool], crease_cosine: impl Fn(usiz
     let faces = Faces::of(mesh);
     let corners_at = CornersByPosition::of(mesh);
     let original_count = mesh.vertices.len();
-    // The copies of each vertex form a chain through `next_copy`.
-    let mut next_copy: Vec<Option<u32>> = vec![None; original_count];
+    let mut copies = Copies { next: vec![None; original_count], at_hub: HashMap::new() };
     let mut is_set = is_given.to_vec();
     for corner in 0..mesh.indices.len() {
         let vertex = mesh.indices[corner];
@@ -70,13 +71,13 @@ fn compute(mesh: &mut SourceMesh, is_given: &[bool], crease_cosine: impl Fn(usiz
             continue;
         }
         let crease_cosine = crease_cosine(corner / 3);
-        let normal = faces.smooth_normal(corner, corners_at.around(vertex), crease_cosine).as_vec3().to_array();
-        mesh.indices[corner] = if is_set[vertex as usize] {
-            copy_with_normal(mesh, &mut next_copy, vertex, normal)
+        let around = corners_at.around(vertex);
+        let normal = faces.smooth_normal(corner, around, crease_cosine).as_vec3().to_array();
+        let is_first = !std::mem::replace(&mut is_set[vertex as usize], true);
+        mesh.indices[corner] = if is_hub(around) {
+            copies.with_normal_at_hub(mesh, vertex, normal, is_first)
         } else {
-            is_set[vertex as usize] = true;
-            mesh.vertices[vertex as usize].normal = normal;
-            vertex
+            copies.with_normal(mesh, vertex, normal, is_first)
         };
     }
     // Vertices without a triangle are never drawn, but must be valid.
@@ -103,26 +104,67 @@ fn repair(mesh: &mut SourceMesh) {
     }
 }
 
-fn copy_with_normal(mesh: &mut SourceMesh, next_copy: &mut Vec<Option<u32>>, vertex: u32, normal: [f32; 3]) -> u32 {
-    let mut at = vertex as usize;
-    loop {
-        if is_same_direction(mesh.vertices[at].normal, normal) {
-            return at as u32;
+/// The copies of vertices whose corners disagree.
+struct Copies {
+    /// The copies of a vertex form a chain, which is at most as long as the number of corners around the vertex.
+    next: Vec<Option<u32>>,
+    /// The copies of a hub, of which there may be as many as triangles, by the original vertex and the rounded normal.
+    at_hub: HashMap<(u32, [i32; 3]), u32>,
+}
+
+impl Copies {
+    /// The vertex itself for its first corner, or else its copy with this normal, which may be a new one.
+    fn with_normal(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3], is_first: bool) -> u32 {
+        if is_first {
+            mesh.vertices[vertex as usize].normal = normal;
+            return vertex;
         }
-        match next_copy[at] {
-            Some(next) => at = next as usize,
-            None => break,
+        let mut at = vertex as usize;
+        loop {
+            if is_same_direction(mesh.vertices[at].normal, normal) {
+                return at as u32;
+            }
+            match self.next[at] {
+                Some(next) => at = next as usize,
+                None => break,
+            }
         }
+        let copy = self.add(mesh, vertex, normal);
+        self.next[at] = Some(copy);
+        copy
     }
-    let copy = mesh.copy_of(vertex);
-    mesh.vertices[copy as usize].normal = normal;
-    next_copy[at] = Some(copy);
-    next_copy.push(None);
-    copy
+
+    /// Does what [`Self::with_normal`] does, in constant time.
+    fn with_normal_at_hub(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3], is_first: bool) -> u32 {
+        let key = (vertex, normal.map(|c| (c / SAME_DIRECTION).round() as i32));
+        if let Some(&copy) = self.at_hub.get(&key) {
+            return copy;
+        }
+        let number = if is_first {
+            mesh.vertices[vertex as usize].normal = normal;
+            vertex
+        } else {
+            self.add(mesh, vertex, normal)
+        };
+        self.at_hub.insert(key, number);
+        number
+    }
+
+    fn add(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3]) -> u32 {
+        let copy = mesh.copy_of(vertex);
+        mesh.vertices[copy as usize].normal = normal;
+        self.next.push(None);
+        copy
+    }
+}
+
+/// Whether so many corners meet at a point that they are not compared with each other.
+fn is_hub(around: &[u32]) -> bool {
+    around.len() > MAX_CORNERS_COMPARED
 }
 
 fn is_same_direction(a: [f32; 3], b: [f32; 3]) -> bool {
-    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f32>() < 1e-8
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f32>() < SAME_DIRECTION * SAME_DIRECTION
 }
 
 /// Unit normal of each triangle, and the angle at each corner.
@@ -144,7 +186,7 @@ impl Faces {
 
     fn smooth_normal(&self, corner: usize, around: &[u32], crease_cosine: f64) -> DVec3 {
         let own = self.normals[corner / 3];
-        let compares = around.len() <= MAX_CORNERS_COMPARED;
+        let compares = !is_hub(around);
         if !compares && crease_cosine == FLAT {
             return own.try_normalize().unwrap_or(DVec3::Y);
         }
@@ -250,6 +292,37 @@ mod tests {
         let start = std::time::Instant::now();
         generate(&mut mesh(&points, &indices), CREASE_60_DEGREES);
         assert!(start.elapsed().as_secs() < 5);
+    }
+
+    #[test]
+    fn a_flat_cone_of_many_triangles_takes_linear_time() {
+        let rim = 200_000u32;
+        let angle_rad = |i: u32| f64::from(i) / f64::from(rim) * std::f64::consts::TAU;
+        let on_rim = |i: u32| [angle_rad(i).cos() * 1e3, -1e3, angle_rad(i).sin() * 1e3];
+        let points: Vec<_> = std::iter::once([0.0; 3]).chain((0..=rim).map(on_rim)).collect();
+        let indices: Vec<_> = (1..=rim).flat_map(|i| [0, i + 1, i]).collect();
+        let mut cone = mesh(&points, &indices);
+        let start = std::time::Instant::now();
+        generate(&mut cone, FLAT);
+        assert!(start.elapsed().as_secs() < 5);
+        let hub_count = cone.positions_in_mesh.iter().filter(|p| **p == DVec3::ZERO).count();
+        assert!(hub_count > 10_000, "the cone's tip is flat: {hub_count}");
+        for triangle in cone.indices.chunks_exact(3) {
+            let [a, b, c] = [0, 1, 2].map(|i| cone.positions_in_mesh[triangle[i] as usize]);
+            let tip = DVec3::from(cone.vertices[triangle[0] as usize].normal.map(f64::from));
+            assert!((b - a).cross(c - a).normalize().distance(tip) < 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_flat_fan_in_a_plane_shares_its_hub() {
+        let rim = 1000u32;
+        let angle_rad = |i: u32| f64::from(i) / f64::from(rim) * std::f64::consts::TAU;
+        let on_rim = |i: u32| [angle_rad(i).cos(), 0.0, angle_rad(i).sin()];
+        let points: Vec<_> = std::iter::once([0.0; 3]).chain((0..=rim).map(on_rim)).collect();
+        let mut fan = mesh(&points, &(1..=rim).flat_map(|i| [0, i + 1, i]).collect::<Vec<_>>());
+        generate(&mut fan, FLAT);
+        assert_eq!(fan.vertices.len(), points.len());
     }
 
     #[test]
