@@ -117,6 +117,7 @@ impl SourceScene {
     /// Moves a mesh that is far from its own origin there, and scales one whose extent `f32` cannot draw; its instances take
     /// over the distance and the size.
     fn normalise_meshes(&mut self) -> Result<(), Fault> {
+        let mut old_from_new = Vec::with_capacity(self.meshes.len());
         for (number, mesh) in self.meshes.iter_mut().enumerate() {
             let bad = mesh.positions_in_mesh.iter().position(|p| !p.is_finite());
             if let Some(vertex) = bad {
@@ -125,15 +126,21 @@ impl SourceScene {
             let bounds = Box3::around(mesh.positions_in_mesh.iter().copied());
             let scale = scale_to_drawable(bounds.extent(), &DRAWABLE_MESH_EXTENT);
             let offset = recentring_offset(bounds, scale);
-            if offset != DVec3::ZERO || scale != 1.0 {
+            let is_changed = offset != DVec3::ZERO || scale != 1.0;
+            if is_changed {
                 mesh.positions_in_mesh.iter_mut().for_each(|p| *p = (*p - offset) * scale);
-                let old_from_new =
-                    DAffine3::from_translation(offset) * DAffine3::from_scale(DVec3::splat(scale.recip()));
-                let moving = moving_instances(&mut self.animation);
-                let of_mesh = moving.filter(|moving| self.instances[moving.instance as usize].mesh == number);
-                of_mesh.for_each(|moving| moving.follow_mesh(&old_from_new));
-                let of_mesh = self.instances.iter_mut().filter(|i| i.mesh == number);
-                of_mesh.for_each(|i| i.source_from_mesh *= old_from_new);
+            }
+            let inverse = DAffine3::from_translation(offset) * DAffine3::from_scale(DVec3::splat(scale.recip()));
+            old_from_new.push(is_changed.then_some(inverse));
+        }
+        for moving in moving_instances(&mut self.animation) {
+            if let Some(old_from_new) = &old_from_new[self.instances[moving.instance as usize].mesh] {
+                moving.follow_mesh(old_from_new);
+            }
+        }
+        for instance in &mut self.instances {
+            if let Some(old_from_new) = old_from_new[instance.mesh] {
+                instance.source_from_mesh *= old_from_new;
             }
         }
         Ok(())
@@ -230,11 +237,12 @@ impl SourceMesh {
 }
 
 impl SourceLight {
-    /// Unoccluded irradiance at a point, with spots aimed at it; distances count as at least `least_m`.
-    pub(crate) fn arriving_at(&self, point_in_source: DVec3, least_m: f64) -> DVec3 {
+    /// Unoccluded irradiance at a point, with spots aimed at it; distances count as at least `least_distance`, in the file's
+    /// unit.
+    pub(crate) fn arriving_at(&self, point_in_source: DVec3, least_distance: f64) -> DVec3 {
         let color = color(self.light).as_dvec3();
-        let distance_m = self.position_in_source.distance(point_in_source).max(least_m);
-        if matches!(self.light, Light::Directional { .. }) { color } else { color / (distance_m * distance_m) }
+        let distance = self.position_in_source.distance(point_in_source).max(least_distance);
+        if matches!(self.light, Light::Directional { .. }) { color } else { color / (distance * distance) }
     }
 
     /// Scales in double precision: a factor may be too small for `f32` where the result is not.

@@ -59,8 +59,17 @@ fn lamps_and_cameras_are_scaled_with_their_scene() {
         });
         load("lit.glb", &cube.glb()).unwrap()
     };
-    for scale in [2f64.powi(-30), 2f64.powi(25)] {
+    // The irradiance at the middle, in any unit: the lamp's intensity by the square of its distance.
+    let exposed = |scene: &Scene| {
+        let scene::Light::Point { position_in_world, intensity_linear, .. } = scene.illumination.lights[0] else {
+            panic!()
+        };
+        intensity_linear / (position_in_world - scene.bounds().center()).length_squared()
+    };
+    let unscaled = exposed(&scene(1.0));
+    for scale in [2f64.powi(-30), 2f64.powi(-12), 2f64.powi(25)] {
         let scene = scene(scale);
+        assert!(exposed(&scene).distance(unscaled) < 1e-4, "{scale:e}: {} for {unscaled}", exposed(&scene));
         let unit = scene.source_space.metres_per_unit;
         let size = scale * unit;
         assert!(unit != 1.0 && scene.bounds().size().distance(Vec3::splat(size as f32)) < 1e-5);

@@ -21,8 +21,8 @@ const UNEXPOSED: RangeInclusive<f64> = 0.25..=4.0;
 /// Least distance of a light from the middle, as a share of the bounds' diagonal: a lamp in the middle of a room lights
 /// its walls.
 const LEAST_DISTANCE_IN_DIAGONALS: f64 = 0.25;
-/// Least distance of a light from the middle, in metres, for a scene in one point.
-const LEAST_DISTANCE_M: f64 = 1e-3;
+/// Least distance of a light from the middle of a scene in one point, in the file's unit.
+const LEAST_DISTANCE_FROM_POINT: f64 = 1e-3;
 
 /// Angles over 90° by less than this, radians, are 90°.
 const ANGLE_ROUNDING_RAD: f32 = 1e-3;
@@ -97,8 +97,9 @@ fn require(holds: bool, field: &'static str, reason: &'static str) -> Result<(),
 /// Applies an exposure, which a file lacks; see [`super`].
 pub(super) fn expose(scene: &mut SourceScene) {
     let bounds = scene.bounds_in_source();
-    let least_m = (bounds.diagonal() * LEAST_DISTANCE_IN_DIAGONALS).max(LEAST_DISTANCE_M);
-    let arriving: DVec3 = scene.lights.iter().map(|light| light.arriving_at(bounds.center(), least_m)).sum();
+    let diagonal = bounds.diagonal();
+    let least = if diagonal > 0.0 { diagonal * LEAST_DISTANCE_IN_DIAGONALS } else { LEAST_DISTANCE_FROM_POINT };
+    let arriving: DVec3 = scene.lights.iter().map(|light| light.arriving_at(bounds.center(), least)).sum();
     let most = arriving.max_element();
     if most > 0.0 && most.is_finite() && !UNEXPOSED.contains(&most) {
         scene.lights.iter_mut().for_each(|light| light.scale(most.recip()));
