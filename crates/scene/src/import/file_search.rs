@@ -4,10 +4,12 @@
 //! scene's folder is found.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::ffi::OsString;
 use std::path::{Component, Path, PathBuf};
 
 use super::folder::Folder;
+use super::warnings::Warnings;
 use crate::error::shortened;
 
 /// The result of a search.
@@ -22,7 +24,9 @@ pub(crate) enum Found {
 /// Finds the first of `names`, spellings of one file name, in the first of `bases`, folders relative to the scene's folder.
 /// A file of exactly that name comes before one whose name differs in case or encoding, and that before one that has only the
 /// last part of the name.
-pub(crate) fn search(folder: &Folder, bases: &[&Path], names: &[&[u8]]) -> Found {
+pub(crate) fn search(folder: &Folder, bases: &[&Path], names: &[&[u8]], warnings: &Warnings) -> Found {
+    let bases = &distinct(bases);
+    let names = &distinct(names);
     let mut outside = None;
     for matching in [Matching::Exact, Matching::Loose] {
         for name in names.iter().map(|name| ReferredName::parse(name)) {
@@ -35,7 +39,17 @@ pub(crate) fn search(folder: &Folder, bases: &[&Path], names: &[&[u8]]) -> Found
             }
         }
     }
-    by_last_part(folder, bases, names).unwrap_or(outside.map_or(Found::Missing, Found::Outside))
+    by_last_part(folder, bases, names, warnings).unwrap_or(outside.map_or(Found::Missing, Found::Outside))
+}
+
+fn distinct<T: PartialEq + Copy>(items: &[T]) -> Vec<T> {
+    let mut distinct = Vec::with_capacity(items.len());
+    for item in items {
+        if !distinct.contains(item) {
+            distinct.push(*item);
+        }
+    }
+    distinct
 }
 
 /// The file of this name relative to the scene's folder, in any case and encoding.
@@ -47,7 +61,7 @@ pub(crate) fn in_any_case(folder: &Folder, name: &[u8]) -> Option<PathBuf> {
     }
 }
 
-fn by_last_part(folder: &Folder, bases: &[&Path], names: &[&[u8]]) -> Option<Found> {
+fn by_last_part(folder: &Folder, bases: &[&Path], names: &[&[u8]], warnings: &Warnings) -> Option<Found> {
     for matching in [Matching::Exact, Matching::Loose] {
         for name in names {
             let parts = ReferredName::parse(name).parts;
@@ -55,7 +69,10 @@ fn by_last_part(folder: &Folder, bases: &[&Path], names: &[&[u8]]) -> Option<Fou
             for base in bases {
                 if let Found::File(path) = resolved(folder, base, &[last], matching) {
                     let name = shortened(decoded(name).into_owned());
-                    tracing::warn!("{name} is not there: {} is taken", path.display());
+                    warnings.list(
+                        "missing files are replaced by files of the same name in other folders",
+                        format_args!("{name} by {}", path.display()),
+                    );
                     return Some(Found::File(path));
                 }
             }
@@ -89,7 +106,7 @@ fn is_special(part: &[u8]) -> bool {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Matching {
     Exact,
-    /// In any case and encoding.
+    /// The name may differ in case and encoding.
     Loose,
 }
 
@@ -102,7 +119,7 @@ fn resolved(folder: &Folder, base: &Path, parts: &[&[u8]], matching: Matching) -
             }
             continue;
         }
-        let Some(name) = entry_name(&folder.root().join(&relative), part, matching) else { return Found::Missing };
+        let Some(name) = entry_name(folder, &relative, part, matching) else { return Found::Missing };
         relative.push(name);
     }
     let is_normal = relative.components().all(|c| matches!(c, Component::Normal(_)));
@@ -114,26 +131,51 @@ fn resolved(folder: &Folder, base: &Path, parts: &[&[u8]], matching: Matching) -
     }
 }
 
-/// The name in `folder` that matches `part`.
-fn entry_name(folder: &Path, part: &[u8], matching: Matching) -> Option<OsString> {
+/// The name in a folder below the scene's that matches `part`.
+fn entry_name(folder: &Folder, relative: &Path, part: &[u8], matching: Matching) -> Option<OsString> {
     if part.contains(&0) {
         return None;
     }
-    let exact = os_name(part).filter(|name| folder.join(name).symlink_metadata().is_ok());
+    let path = folder.root().join(relative);
+    let exact = os_name(part).filter(|name| path.join(name).symlink_metadata().is_ok());
     if exact.is_some() || matching == Matching::Exact {
         return exact;
     }
-    let mut entries: Vec<OsString> = folder.read_dir().ok()?.flatten().map(|entry| entry.file_name()).collect();
-    // The order of a folder's entries is that of the file system.
-    entries.sort();
-    let wanted = decoded(part).to_lowercase();
-    let same = entries.iter().find(|entry| decoded(entry.as_encoded_bytes()).to_lowercase() == wanted);
-    let skeleton = ascii_skeleton(part);
-    let mut alike = entries.iter().filter(|entry| {
-        !part.is_ascii() && !entry.as_encoded_bytes().is_ascii() && ascii_skeleton(entry.as_encoded_bytes()) == skeleton
-    });
-    let only_one_alike = alike.next().filter(|_| alike.next().is_none());
-    same.or(only_one_alike).cloned()
+    folder.listing(relative).loosely_named(part).cloned()
+}
+
+/// The names in a folder, to be found in any case and encoding.
+#[derive(Default)]
+pub(crate) struct Listing {
+    by_lower_case: HashMap<String, OsString>,
+    /// Names that have other letters than ASCII's; `None` for several names that are alike.
+    by_skeleton: HashMap<Vec<u8>, Option<OsString>>,
+}
+
+impl Listing {
+    /// Reads a folder; one that cannot be read has no names.
+    pub(crate) fn read(folder: &Path) -> Self {
+        let entries = folder.read_dir().into_iter().flatten().flatten();
+        let mut names: Vec<OsString> = entries.map(|entry| entry.file_name()).collect();
+        // The order of a folder's entries is that of the file system.
+        names.sort();
+        let mut listing = Self::default();
+        for name in names {
+            let bytes = name.as_encoded_bytes();
+            if !bytes.is_ascii() {
+                let alike = listing.by_skeleton.entry(ascii_skeleton(bytes));
+                alike.and_modify(|alike| *alike = None).or_insert_with(|| Some(name.clone()));
+            }
+            listing.by_lower_case.entry(decoded(bytes).to_lowercase()).or_insert(name);
+        }
+        listing
+    }
+
+    fn loosely_named(&self, part: &[u8]) -> Option<&OsString> {
+        let same = self.by_lower_case.get(&decoded(part).to_lowercase());
+        let is_ascii = part.is_ascii();
+        same.or_else(|| self.by_skeleton.get(&ascii_skeleton(part)).filter(|_| !is_ascii)?.as_ref())
+    }
 }
 
 /// A name in lower case with one mark for each run of other letters than ASCII's: equal for all encodings of the name that
@@ -178,7 +220,7 @@ mod tests {
         let (folder, _) =
             Folder::opened_with(&dir.path().join("scene/a.obj"), &Limits::default(), MissingTextures::Refuse).unwrap();
         let bases: Vec<&Path> = bases.iter().map(Path::new).collect();
-        match search(&folder, &bases, &[name]) {
+        match search(&folder, &bases, &[name], &Warnings::default()) {
             Found::File(path) => path.display().to_string(),
             Found::Missing => "missing".into(),
             Found::Outside(_) => "outside".into(),
@@ -197,6 +239,26 @@ mod tests {
         assert_eq!(found(&["scene/Öl.png"], &[""], b"\xd6l.png"), "Öl.png", "Latin-1");
         assert_eq!(found(&["scene/木.png"], &[""], b"\x96\xd8.png"), "木.png", "Shift JIS");
         assert_eq!(found(&["scene/木.png", "scene/水.png"], &[""], b"\x96\xd8.png"), "missing", "two are alike");
+    }
+
+    #[test]
+    fn a_folder_is_read_once_for_many_names() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("a.obj"), b"x").unwrap();
+        for number in 0..100 {
+            std::fs::write(dir.path().join(format!("T{number}.PNG")), b"x").unwrap();
+        }
+        let limits = Limits::default();
+        let (folder, _) = Folder::opened_with(&dir.path().join("a.obj"), &limits, MissingTextures::Refuse).unwrap();
+        let warnings = Warnings::default();
+        let bases = [Path::new(""), Path::new("")];
+        for number in 0..100 {
+            let name = format!("t{number}.png");
+            let found = search(&folder, &bases, &[name.as_bytes(), name.as_bytes()], &warnings);
+            assert!(matches!(found, Found::File(path) if path == Path::new(&format!("T{number}.PNG"))));
+        }
+        let listing = folder.listing(Path::new(""));
+        assert!(std::rc::Rc::ptr_eq(&listing, &folder.listing(Path::new(""))));
     }
 
     #[test]

@@ -1,13 +1,15 @@
 //! The only access to files that a scene refers to.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
+use std::rc::Rc;
 
 use percent_encoding::percent_decode_str;
 
-use super::file_search::in_any_case;
+use super::file_search::{Listing, in_any_case};
 use super::missing_textures::MissingTextures;
 use crate::error::{Fault, at_most};
 use crate::{Limits, SceneErrorKind};
@@ -16,6 +18,8 @@ use crate::{Limits, SceneErrorKind};
 pub(crate) struct Folder {
     canonical_root: PathBuf,
     bytes_left: Cell<u64>,
+    /// The names in folders that were searched, by the folder's path below this one.
+    listings: RefCell<HashMap<PathBuf, Rc<Listing>>>,
     pub(crate) missing_textures: MissingTextures,
 }
 
@@ -28,7 +32,12 @@ impl Folder {
     ) -> Result<(Self, Vec<u8>), Fault> {
         let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let canonical_root = parent.canonicalize().map_err(|e| Fault::io("folder", e))?;
-        let folder = Self { canonical_root, bytes_left: Cell::new(limits.file_bytes), missing_textures };
+        let folder = Self {
+            canonical_root,
+            bytes_left: Cell::new(limits.file_bytes),
+            listings: RefCell::default(),
+            missing_textures,
+        };
         let bytes = folder.read_path("file", path)?;
         Ok((folder, bytes))
     }
@@ -64,6 +73,17 @@ impl Folder {
     /// The folder's path, without links.
     pub(crate) fn root(&self) -> &Path {
         &self.canonical_root
+    }
+
+    /// The names in a folder below this one, which is read once.
+    pub(super) fn listing(&self, relative: &Path) -> Rc<Listing> {
+        let mut listings = self.listings.borrow_mut();
+        if let Some(listing) = listings.get(relative) {
+            return Rc::clone(listing);
+        }
+        let listing = Rc::new(Listing::read(&self.canonical_root.join(relative)));
+        listings.insert(relative.to_owned(), Rc::clone(&listing));
+        listing
     }
 
     /// Reads a file by a path below this folder, as [`search`](super::file_search::search) finds it.

@@ -6,13 +6,18 @@
 use earcut::Earcut;
 use glam::{DVec2, DVec3};
 
-/// The most corners that are cut: cutting may take quadratic time.
-const MAX_CORNERS_CUT: usize = 16_384;
+/// The most corners of a polygon that is cut. An outline that crosses itself may take cubic time: `earcut` then tries all
+/// diagonals against all edges.
+const MAX_CORNERS_CUT: usize = 1024;
+/// The most that a file's polygons may cost together, which takes some seconds. A polygon costs the cube of its number of corners, and
+/// nothing if it is convex.
+const MAX_COST: u64 = 1 << 36;
 /// The warning of polygons that are not cut.
-pub(crate) const TOO_MANY_CORNERS: &str = "faces of more than 16384 corners are shown as if they were convex";
+pub(crate) const TOO_COSTLY: &str = "faces of too many corners to be cut are shown as if they were convex";
 
-/// Cuts polygons into triangles; keeps its memory from one to the next.
+/// Cuts the polygons of a file into triangles; keeps its memory from one to the next.
 pub(crate) struct PolygonCutter {
+    cost_left: u64,
     earcut: Earcut<f64>,
     outline: Vec<DVec2>,
     corners: Vec<u32>,
@@ -20,17 +25,12 @@ pub(crate) struct PolygonCutter {
 
 impl PolygonCutter {
     pub(crate) fn new() -> Self {
-        Self { earcut: Earcut::new(), outline: Vec::new(), corners: Vec::new() }
-    }
-
-    /// Returns whether a polygon has too many corners to be cut: it is shown as a fan.
-    pub(crate) fn is_too_large(polygon: &[DVec3]) -> bool {
-        polygon.len() > MAX_CORNERS_CUT
+        Self { cost_left: MAX_COST, earcut: Earcut::new(), outline: Vec::new(), corners: Vec::new() }
     }
 
     /// The triangles of a polygon as numbers of its corners, three a triangle, in the polygon's own direction. Fewer than three
-    /// corners have none.
-    pub(crate) fn triangles(&mut self, polygon: &[DVec3]) -> &[u32] {
+    /// corners have none. Calls `warn_of_cost` where the polygon is too costly to be cut: its triangles are then a fan.
+    pub(crate) fn triangles(&mut self, polygon: &[DVec3], warn_of_cost: impl FnOnce()) -> &[u32] {
         self.corners.clear();
         self.outline.clear();
         let normal = if polygon.len() > 3 { newell_normal(polygon).try_normalize() } else { None };
@@ -39,7 +39,9 @@ impl PolygonCutter {
             self.outline.extend(polygon.iter().map(|p| DVec2::new((p - polygon[0]).dot(u), (p - polygon[0]).dot(v))));
         }
         let is_fan = self.outline.is_empty() || sees_all_from_first(&self.outline);
-        if !is_fan && !Self::is_too_large(polygon) {
+        if !is_fan && !self.pays_for(polygon.len()) {
+            warn_of_cost();
+        } else if !is_fan {
             self.earcut.earcut(self.outline.iter().map(|p| p.to_array()), &[], &mut self.corners);
             turn_round_with(&mut self.corners, &self.outline);
         }
@@ -48,6 +50,12 @@ impl PolygonCutter {
             self.corners.extend(fan);
         }
         &self.corners
+    }
+
+    /// Returns whether a polygon of so many corners may be cut, and counts its cost if so.
+    fn pays_for(&mut self, corners: usize) -> bool {
+        let left = (corners <= MAX_CORNERS_CUT).then(|| self.cost_left.checked_sub((corners as u64).pow(3))).flatten();
+        left.inspect(|&left| self.cost_left = left).is_some()
     }
 }
 
@@ -81,7 +89,7 @@ mod tests {
     /// The areas of a polygon's triangles along `normal`.
     fn areas(polygon: &[[f64; 3]], normal: DVec3) -> Vec<f64> {
         let polygon: Vec<DVec3> = polygon.iter().map(|&p| p.into()).collect();
-        let triangles = PolygonCutter::new().triangles(&polygon).to_vec();
+        let triangles = PolygonCutter::new().triangles(&polygon, || panic!("too costly")).to_vec();
         let area = |t: &[u32]| {
             let [a, b, c] = [0, 1, 2].map(|i| polygon[t[i] as usize]);
             (b - a).cross(c - a).dot(normal) * 0.5
@@ -146,8 +154,41 @@ mod tests {
 
     #[test]
     fn polygons_without_area_become_fans() {
-        assert_eq!(PolygonCutter::new().triangles(&[DVec3::ONE; 5]), [0, 1, 2, 0, 2, 3, 0, 3, 4]);
-        assert!(PolygonCutter::new().triangles(&[DVec3::ONE; 2]).is_empty());
-        assert!(PolygonCutter::new().triangles(&[]).is_empty());
+        let triangles = |polygon: &[DVec3]| PolygonCutter::new().triangles(polygon, || panic!("too costly")).to_vec();
+        assert_eq!(triangles(&[DVec3::ONE; 5]), [0, 1, 2, 0, 2, 3, 0, 3, 4]);
+        assert!(triangles(&[DVec3::ONE; 2]).is_empty());
+        assert!(triangles(&[]).is_empty());
+    }
+
+    /// A closed line that crosses itself in its middle; its lobes differ, so that it has an area.
+    fn figure_eight(corners: u32) -> Vec<DVec3> {
+        let angles = (0..corners).map(|i| f64::from(i) / f64::from(corners) * std::f64::consts::TAU + 0.1);
+        angles.map(|angle| DVec3::new(angle.cos() * (1.5 + angle.cos()), (2.0 * angle).sin(), 0.0)).collect()
+    }
+
+    #[test]
+    fn outlines_that_cross_themselves_end_in_time_and_use_up_the_cost() {
+        let start = std::time::Instant::now();
+        let mut cutter = PolygonCutter::new();
+        let mut refused = 0;
+        for _ in 0..100 {
+            let triangles = cutter.triangles(&figure_eight(MAX_CORNERS_CUT as u32), || refused += 1);
+            assert!(!triangles.is_empty());
+        }
+        assert_eq!(refused, 100 - (MAX_COST / (MAX_CORNERS_CUT as u64).pow(3)) as usize);
+        let mut is_refused = false;
+        let larger = figure_eight(MAX_CORNERS_CUT as u32 + 1);
+        assert_eq!(PolygonCutter::new().triangles(&larger, || is_refused = true).len(), 3 * (larger.len() - 2));
+        assert!(is_refused);
+        assert!(start.elapsed().as_secs() < 5, "{:?}", start.elapsed());
+    }
+
+    #[test]
+    fn convex_polygons_of_any_size_cost_nothing() {
+        let angles = (0..100_000).map(|i| f64::from(i) / 100_000.0 * std::f64::consts::TAU);
+        let circle: Vec<DVec3> = angles.map(|angle| DVec3::new(angle.cos(), angle.sin(), 0.0)).collect();
+        let mut cutter = PolygonCutter::new();
+        assert_eq!(cutter.triangles(&circle, || panic!("too costly")).len(), 3 * (circle.len() - 2));
+        assert_eq!(cutter.cost_left, MAX_COST);
     }
 }

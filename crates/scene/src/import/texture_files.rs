@@ -7,6 +7,7 @@ use super::file_search::{Found, decoded, search};
 use super::folder::Folder;
 use super::missing_textures::MissingTextures;
 use super::picture::{Content, EncodedPicture, decode_all};
+use super::warnings::Warnings;
 use crate::error::{Fault, shortened};
 use crate::{Limits, Texture};
 
@@ -29,10 +30,15 @@ pub(crate) struct TextureReference<'n> {
 
 impl TextureFiles {
     /// Reads the file unless it is known, and returns its number.
-    pub(crate) fn number_of(&mut self, reference: TextureReference, folder: &Folder) -> Result<u32, Fault> {
+    pub(crate) fn number_of(
+        &mut self,
+        reference: TextureReference,
+        folder: &Folder,
+        warnings: &Warnings,
+    ) -> Result<u32, Fault> {
         let TextureReference { element, names, bases, content } = reference;
         let name = names.last().map(|name| decoded(name).into_owned()).unwrap_or_default();
-        let (file, bytes) = match search(folder, &bases, &names) {
+        let (file, bytes) = match search(folder, &bases, &names, warnings) {
             Found::File(path) => {
                 let file = path.display().to_string();
                 if let Some(&number) = self.number_of.get(&(file.clone(), content)) {

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::cell::RefCell;
+use std::collections::HashSet;
 use std::fmt::Display;
 
 use crate::error::shortened;
@@ -18,6 +19,8 @@ struct Kind {
     /// The first places, each once.
     places: Vec<String>,
     count: u64,
+    /// All names of a kind that lists names.
+    names: HashSet<String>,
     lists_names: bool,
 }
 
@@ -36,11 +39,12 @@ impl Warnings {
     pub(crate) fn list(&self, text: impl Into<Cow<'static, str>>, name: impl Display) {
         let name = shortened(name.to_string());
         self.add(text.into(), true, |kind| {
-            if !kind.places.contains(&name) {
+            if !kind.names.contains(&name) {
                 kind.count += 1;
                 if kind.places.len() < MAX_NAMES {
-                    kind.places.push(name);
+                    kind.places.push(name.clone());
                 }
+                kind.names.insert(name);
             }
         });
     }
@@ -49,7 +53,7 @@ impl Warnings {
         let mut kinds = self.0.borrow_mut();
         let number = kinds.iter().position(|kind| kind.text == text).unwrap_or(kinds.len());
         if number == kinds.len() {
-            kinds.push(Kind { text, places: Vec::new(), count: 0, lists_names });
+            kinds.push(Kind { text, places: Vec::new(), count: 0, names: HashSet::new(), lists_names });
         }
         change(&mut kinds[number]);
     }
@@ -62,7 +66,7 @@ impl Warnings {
 
     /// Logs one warning of each kind.
     pub(crate) fn log(self) {
-        for Kind { text, places, count, lists_names } in self.0.into_inner() {
+        for Kind { text, places, count, lists_names, .. } in self.0.into_inner() {
             let further = count - (places.len() as u64).min(count);
             let names = places.join(", ");
             match (lists_names, further) {
@@ -71,5 +75,20 @@ impl Warnings {
                 (false, _) => tracing::warn!("{text}: {count}, the first: {names}"),
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_beyond_those_listed_are_counted_once() {
+        let warnings = Warnings::default();
+        for number in (0..20).chain(0..20) {
+            warnings.list("names", format_args!("name {number}"));
+        }
+        let kinds = warnings.0.borrow();
+        assert_eq!((kinds[0].count, kinds[0].places.len()), (20, MAX_NAMES));
     }
 }

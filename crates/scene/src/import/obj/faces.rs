@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::super::normals;
-use super::super::polygons::{PolygonCutter, TOO_MANY_CORNERS};
+use super::super::polygons::{PolygonCutter, TOO_COSTLY};
 use super::super::source_scene::SourceMesh;
 use super::super::warnings::Warnings;
 use super::attributes::{Attributes, Corner, NONE};
@@ -18,6 +18,7 @@ use crate::{Limits, MeshPart};
 const TOO_SHORT: &str = "faces of fewer than three corners are left out";
 const UNREADABLE: &str = "faces with a corner that is no vertex of the file are left out";
 const NOT_FINITE: &str = "faces with a vertex that is not finite are left out";
+const TEXTURE_WITHOUT_COORDINATES: &str = "textures without coordinates show one texel";
 const WITHOUT_ATTRIBUTES: &str = "texture coordinates and normals that the file does not have are dropped";
 
 /// All faces of a file.
@@ -47,6 +48,7 @@ pub(super) struct MaterialUse {
     /// Number in the scene.
     pub number: u32,
     pub placement: UvTransform,
+    pub has_texture: bool,
 }
 
 impl Faces {
@@ -115,7 +117,8 @@ impl Faces {
         let mut mesh = builder.mesh;
         let mut is_flat = Vec::new();
         for (triangles, material) in builder.triangles.into_iter().zip(materials) {
-            let (first_index, index_count) = (mesh.indices.len() as u32, triangles.indices.len() as u32);
+            let first_index = mesh.indices.len() as u32;
+            let index_count = triangles.indices.len() as u32;
             if index_count > 0 {
                 mesh.parts.push(MeshPart { first_index, index_count, material: material.number });
                 mesh.indices.extend(triangles.indices);
@@ -141,15 +144,16 @@ impl Faces {
 struct NumberedPlacement {
     number: u32,
     transform: UvTransform,
+    has_texture: bool,
 }
 
 fn numbered_placements(materials: &[MaterialUse]) -> Vec<NumberedPlacement> {
     let mut number_of = HashMap::new();
-    let numbered = materials.iter().map(|&MaterialUse { placement: transform, .. }| {
+    let numbered = materials.iter().map(|&MaterialUse { placement: transform, has_texture, .. }| {
         let UvTransform { scale, offset } = transform;
         let next = number_of.len() as u32;
         let bits = [scale.x, scale.y, offset.x, offset.y].map(f64::to_bits);
-        NumberedPlacement { number: *number_of.entry(bits).or_insert(next), transform }
+        NumberedPlacement { number: *number_of.entry(bits).or_insert(next), transform, has_texture }
     });
     numbered.collect()
 }
@@ -159,9 +163,9 @@ struct Builder<'a> {
     attributes: &'a Attributes,
     colors_srgba8: Vec<[u8; 4]>,
     mesh: SourceMesh,
-    /// For each material.
+    /// The triangles of each material.
     triangles: Vec<Triangles>,
-    /// By corner and by the number of its placement.
+    /// The key is a corner and the number of its placement.
     vertex_of_corner: HashMap<(Corner, u32), u32>,
     cutter: PolygonCutter,
     polygon_in_source: Vec<DVec3>,
@@ -171,7 +175,7 @@ struct Builder<'a> {
 #[derive(Default, Clone)]
 struct Triangles {
     indices: Vec<u32>,
-    /// For each triangle.
+    /// Whether each triangle was listed after `s off`.
     is_flat: Vec<bool>,
 }
 
@@ -213,13 +217,18 @@ impl<'a> Builder<'a> {
         if !has_all {
             warnings.count(WITHOUT_ATTRIBUTES, place);
         }
-        if PolygonCutter::is_too_large(&self.polygon_in_source) {
-            warnings.count(TOO_MANY_CORNERS, place);
+        if placement.has_texture && self.has_corner_without_uv(corners) {
+            warnings.count(TEXTURE_WITHOUT_COORDINATES, place);
         }
-        let triangles = self.cutter.triangles(&self.polygon_in_source);
+        let triangles = self.cutter.triangles(&self.polygon_in_source, || warnings.count(TOO_COSTLY, place));
         let into = &mut self.triangles[face.material as usize];
         into.indices.extend(triangles.iter().map(|&corner| self.vertices[corner as usize]));
         into.is_flat.resize(into.indices.len() / 3, face.is_flat);
+    }
+
+    fn has_corner_without_uv(&self, corners: &[Corner]) -> bool {
+        let has_uv = |corner: &Corner| self.attributes.existing(*corner).is_some_and(|[_, uv, _]| uv != NONE);
+        !corners.iter().all(has_uv)
     }
 
     fn vertex(&mut self, corner: Corner, placement: NumberedPlacement) -> u32 {

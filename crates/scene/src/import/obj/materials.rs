@@ -35,13 +35,13 @@ pub(super) fn read_libraries(
         if names.iter().filter(|name| is_library_name(name)).count() < 2 {
             let whole = spellings(statement);
             let whole: Vec<&[u8]> = whole.iter().map(Vec::as_slice).collect();
-            if let Found::File(path) = search(folder, &[Path::new("")], &whole) {
+            if let Found::File(path) = search(folder, &[Path::new("")], &whole, warnings) {
                 read_library(&path, folder, limits, warnings, &mut entries)?;
                 continue;
             }
         }
         for name in names {
-            match search(folder, &[Path::new("")], &[&name]) {
+            match search(folder, &[Path::new("")], &[&name], warnings) {
                 Found::File(path) => read_library(&path, folder, limits, warnings, &mut entries)?,
                 Found::Missing => warnings.list(MISSING_LIBRARIES, decoded(&name)),
                 Found::Outside(why) => {
@@ -110,7 +110,7 @@ pub(super) fn read_materials(
         let maps = entry.and_then(|entry| Some((entry, entry.color_map.as_ref().or(entry.alpha_map.as_ref())?)));
         let mut placement = UvTransform::IDENTITY;
         if let Some((entry, map)) = maps {
-            let texture = textures.number_of(entry, folder)?;
+            let texture = textures.number_of(entry, folder, warnings)?;
             let wrap = if map.clamps { Wrap::Clamp } else { Wrap::Repeat };
             material.base_color_texture = Some(TextureUse { wrap: [wrap; 2], ..TextureUse::from(texture) });
             material.alpha_hashed |= entry.alpha_map.is_some();
@@ -119,7 +119,8 @@ pub(super) fn read_materials(
                 warnings.list("opacity maps are placed as the colours of their materials", &material.name);
             }
         }
-        uses.push(MaterialUse { number: scene.materials.len() as u32, placement });
+        let has_texture = material.base_color_texture.is_some();
+        uses.push(MaterialUse { number: scene.materials.len() as u32, placement, has_texture });
         scene.materials.push(material);
     }
     if scene.materials.is_empty() {
@@ -159,11 +160,12 @@ struct Textures {
 
 impl Textures {
     /// The number of the texture of colours and opacity.
-    fn number_of(&mut self, entry: &Entry, folder: &Folder) -> Result<u32, Fault> {
+    fn number_of(&mut self, entry: &Entry, folder: &Folder, warnings: &Warnings) -> Result<u32, Fault> {
         let mut file = |map: &TextureMap, content| {
             let names = map.names.iter().map(Vec::as_slice).collect();
             let bases = vec![&*entry.folder, Path::new("")];
-            self.files.number_of(TextureReference { element: map.place.clone(), names, bases, content }, folder)
+            let reference = TextureReference { element: map.place.clone(), names, bases, content };
+            self.files.number_of(reference, folder, warnings)
         };
         let color = entry.color_map.as_ref().map(|map| file(map, Content::Colors)).transpose()?;
         let mask = entry.alpha_map.as_ref().map(|map| file(map, Content::Data)).transpose()?;

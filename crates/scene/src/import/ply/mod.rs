@@ -50,7 +50,7 @@ fn read_with(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &Warnings
     if !has_uvs && !text.texture_files.is_empty() {
         warnings.list("textures without coordinates are not shown", decoded(text.texture_files[0]));
     } else if !text.texture_files.is_empty() {
-        read_textures(&text.texture_files, folder, limits, &mut scene)?;
+        read_textures(&text.texture_files, folder, limits, warnings, &mut scene)?;
     }
     let textured_count = scene.materials.len() as u32;
     let white = Material { name: "vertex colours".into(), double_sided: true, ..Material::default() };
@@ -63,14 +63,21 @@ fn read_with(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &Warnings
 }
 
 /// Reads the texture files, and makes a material of each.
-fn read_textures(names: &[&[u8]], folder: &Folder, limits: &Limits, scene: &mut SourceScene) -> Result<(), Fault> {
+fn read_textures(
+    names: &[&[u8]],
+    folder: &Folder,
+    limits: &Limits,
+    warnings: &Warnings,
+    scene: &mut SourceScene,
+) -> Result<(), Fault> {
     at_most("texture files", names.len() as u64, limits.attributes)?;
     let mut files = TextureFiles::default();
     for name in names {
         let shown_name = decoded(name).into_owned();
         let element = format!("TextureFile {shown_name}");
-        let (bases, content) = (vec![Path::new("")], Content::Colors);
-        let texture = files.number_of(TextureReference { element, names: vec![name], bases, content }, folder)?;
+        let bases = vec![Path::new("")];
+        let reference = TextureReference { element, names: vec![name], bases, content: Content::Colors };
+        let texture = files.number_of(reference, folder, warnings)?;
         let base_color_texture = Some(TextureUse::from(texture));
         let material = Material { name: shown_name, double_sided: true, base_color_texture, ..Material::default() };
         scene.materials.push(material);

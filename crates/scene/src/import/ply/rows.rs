@@ -50,7 +50,7 @@ impl VertexRow {
         DVec3::new(f64::from(self.nx), f64::from(self.ny), f64::from(self.nz))
     }
 
-    /// With v upwards.
+    /// The coordinates as the file has them: v runs upwards.
     pub(super) fn uv(&self) -> [f32; 2] {
         [self.s.unwrap_or(0.0), self.t.unwrap_or(0.0)]
     }

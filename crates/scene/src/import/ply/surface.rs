@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::super::polygons::{PolygonCutter, TOO_MANY_CORNERS};
+use super::super::polygons::{PolygonCutter, TOO_COSTLY};
 use super::super::source_scene::SourceMesh;
 use super::super::vertex_colors::scale_to_bytes;
 use super::super::warnings::Warnings;
@@ -116,7 +116,8 @@ impl Surface {
         }
         let mut mesh = builder.mesh;
         for (material, indices) in builder.indices_of_material.into_iter().enumerate() {
-            let (first_index, index_count) = (mesh.indices.len() as u32, indices.len() as u32);
+            let first_index = mesh.indices.len() as u32;
+            let index_count = indices.len() as u32;
             if index_count > 0 {
                 mesh.parts.push(MeshPart { first_index, index_count, material: material as u32 });
                 mesh.indices.extend(indices);
@@ -183,9 +184,6 @@ impl<'a> Builder<'a> {
         if !polygon.iter().all(|p| p.is_finite()) {
             return warnings.count(NOT_FINITE, place);
         }
-        if PolygonCutter::is_too_large(&polygon) {
-            warnings.count(TOO_MANY_CORNERS, place);
-        }
         let color = self.face_colors_srgba8.get(number).copied();
         let in_mesh: Vec<u32> = corners.map(|corner| self.vertex(corner, color)).collect();
         let last = self.indices_of_material.len() - 1;
@@ -193,7 +191,8 @@ impl<'a> Builder<'a> {
         if self.has_texture && texture.is_none() {
             warnings.count("faces of a texture that is not there are white", format_args!("face {}", face.row));
         }
-        let triangles = self.cutter.triangles(&polygon).iter().map(|&corner| in_mesh[corner as usize]);
+        let triangles = self.cutter.triangles(&polygon, || warnings.count(TOO_COSTLY, place));
+        let triangles = triangles.iter().map(|&corner| in_mesh[corner as usize]);
         self.indices_of_material[texture.unwrap_or(last)].extend(triangles);
     }
 
