@@ -39,6 +39,8 @@ fn extensions_that_may_change_geometry_are_refused_unless_they_are_ignored() {
         let ignore_required = names.iter().map(|name| (*name).to_owned()).collect();
         load_file(&sample.path, &Limits::default(), ImportOptions { ignore_required, ..ImportOptions::default() })
     };
+    let quantized = requiring(r#""WEB3D_quantized_attributes""#);
+    assert!(refusal("q.glb", &quantized.glb()).contains("WEB3D_quantized_attributes"));
     assert!(ignoring(&["KHR_implicit_shapes"]).unwrap_err().to_string().contains("EXT_of_tomorrow"));
     let (scene, warning) = with_one_warning(|| ignoring(&["EXT_of_tomorrow", "KHR_implicit_shapes"]).unwrap());
     assert_eq!(scene.triangle_count(), 12);

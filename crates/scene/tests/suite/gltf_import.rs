@@ -5,6 +5,7 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
 use glam::Vec3;
 use scene::{Light, LightSpec, Limits, MissingTextures, Scene, SceneErrorKind, load_file};
 
+use crate::samples::warnings::with_warnings;
 use crate::samples::{
     CUBE_CORNERS, GltfCube, Sample, cube, cube_buffer, cube_triangles, load, refusal, signed_volume, world_triangles,
 };
@@ -457,6 +458,40 @@ fn limits_hold_over_instances_and_objects() {
         let error = load_file(&sample.path, &limits, MissingTextures::Refuse).unwrap_err();
         assert!(matches!(error.kind, SceneErrorKind::TooLarge { .. }), "{error}");
     }
+}
+
+#[test]
+fn a_large_mesh_in_many_flat_nodes_is_refused_before_it_is_copied() {
+    const TRIANGLES: usize = 50_000;
+    const NODES: usize = 4000;
+    let flat = cube(|c| {
+        c.primitive = r#"{"attributes":{"POSITION":0,"NORMAL":0},"indices":1}"#.into();
+        c.accessors = c.accessors.replace("5123", "5121").replace("36", &(3 * TRIANGLES).to_string());
+        c.views = c.views.replace("72", &(3 * TRIANGLES).to_string());
+        c.buffers = format!(r#"{{"byteLength":{}}}"#, 96 + 3 * TRIANGLES);
+        c.binary.truncate(96);
+        c.binary.extend([0, 1, 2].repeat(TRIANGLES));
+        c.nodes = [r#"{"mesh":0,"scale":[1,1,0]}"#; NODES].join(",");
+        c.roots = (0..NODES).map(|node| node.to_string()).collect::<Vec<_>>().join(",");
+    });
+    let message = refusal("flat.glb", &flat.glb());
+    assert!(message.contains("triangles of flattened meshes: 64050000 is over"), "{message}");
+}
+
+#[test]
+fn lines_and_orthographic_cameras_are_left_out_with_a_warning() {
+    let with_lines = cube(|c| {
+        c.primitive += r#",{"attributes":{"POSITION":0},"mode":1},{"attributes":{"POSITION":0},"mode":0}"#;
+        c.more = r#""cameras":[{"type":"orthographic","name":"plan","orthographic":{"xmag":1,"ymag":1,"zfar":2,"znear":1}}],"#
+            .into();
+        c.nodes += r#",{"camera":0}"#;
+        c.roots = "0,1".into();
+    });
+    let (scene, warnings) = with_warnings(|| load("a.glb", &with_lines.glb()).unwrap());
+    assert_eq!((scene.triangle_count(), scene.cameras.len(), warnings.len()), (12, 0, 2), "{warnings:?}");
+    let warnings = warnings.join("\n");
+    assert!(warnings.contains("points and lines are left out: 2, the first: mesh 0, primitive 1"), "{warnings}");
+    assert!(warnings.contains("orthographic cameras are left out: node 1, camera \"plan\""), "{warnings}");
 }
 
 #[test]

@@ -64,11 +64,17 @@ fn channels_without_a_target_node_are_left_out() {
         })
     };
     let moved = r#""node":0,"path":"translation""#;
-    for without in [r#""path":"translation""#, r#""path":"pointer","extensions":{"KHR_animation_pointer":{}}"#] {
+    let pointer = r#""path":"pointer","extensions":{"KHR_animation_pointer":{}}"#;
+    for (without, reason) in [
+        (r#""path":"translation""#.to_owned(), "channels without a target node"),
+        (pointer.to_owned(), "channels of KHR_animation_pointer"),
+        (format!(r#""node":0,{pointer}"#), "channels of KHR_animation_pointer"),
+    ] {
+        let without = without.as_str();
         let (scene, warning) = with_one_warning(|| load("a.glb", &animated([moved, without]).glb()).unwrap());
         assert_eq!(scene.animation.unwrap().clips[0].channels.len(), 1);
         assert!(
-            warning.contains("a.glb") && warning.contains("channels without a target node are left out: animation 0"),
+            warning.contains("a.glb") && warning.contains(&format!("{reason} are left out: animation 0")),
             "{warning}"
         );
         let (_, warning) = with_one_warning(|| load("a.glb", &animated([without; 2]).glb()).unwrap());

@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 use scene::{Material, Mesh, Scene, TextureUse, Wrap};
 
+use crate::samples::warnings::with_warnings;
 use crate::samples::{GltfCube, cube, load, refusal};
 
 /// A square that faces +Z, whose u runs along X and v along -Y; the second coordinates are twice the first.
@@ -104,6 +105,24 @@ fn a_third_kind_of_coordinates_leaves_means() {
         scaled(2)
     ));
     assert!(scene.materials[0].normal_texture.is_none() && scene.materials[0].metallic_roughness_texture.is_some());
+}
+
+#[test]
+fn textures_without_coordinates_are_warned_of() {
+    let textured =
+        r#""pbrMetallicRoughness":{"baseColorTexture":{"index":0}},"emissiveTexture":{"index":1,"texCoord":1}"#;
+    let without = |material: &str, attributes: &str| {
+        let mut square = square(material, "");
+        square.primitive = square.primitive.replace(attributes, "");
+        with_warnings(|| load("square.glb", &square.glb()).unwrap()).1
+    };
+    assert!(without(textured, "").is_empty());
+    assert!(without("", r#","TEXCOORD_0":1,"TEXCOORD_1":2"#).is_empty(), "a material without textures needs none");
+    let warnings = without(textured, r#","TEXCOORD_0":1,"TEXCOORD_1":2"#);
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    let expected = "textures without coordinates show one texel: 2, the first: mesh 0, primitive 0, TEXCOORD_0";
+    assert!(warnings[0].contains(expected), "{warnings:?}");
+    assert!(without(textured, r#","TEXCOORD_1":2"#)[0].contains("primitive 0, TEXCOORD_1"));
 }
 
 #[test]

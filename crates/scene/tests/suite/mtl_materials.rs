@@ -63,6 +63,29 @@ fn a_highlight_needs_a_model_and_an_exponent() {
 }
 
 #[test]
+fn statements_that_are_not_shown_are_named() {
+    let harmless = "Ka 1 1 1\nmap_Ka a.png\nNi 1.5\nillum 2\nsharpness 60\nmap_aat on\n";
+    assert_eq!(material(harmless).1, "");
+    let library = "map_refl r.png\nmap_Ps s.png\nPs 1\nmap_disp d.png\nanisor 0\nPcr 0\nTf 1 0 0\nglow 3\n";
+    let (_, warnings) = material(&format!("{harmless}{library}"));
+    let names = "map_refl, map_Ps, Ps, map_disp, anisor, Pcr, Tf, glow";
+    assert!(warnings.contains(&format!("not shown: {names}")) && warnings.lines().count() == 1, "{warnings}");
+}
+
+#[test]
+fn brightness_of_maps_is_warned_of() {
+    let red = gray_png(1, |_| [255, 0, 0, 255]);
+    for (option, is_warned) in
+        [("-mm 0 1", false), ("-mm 0.0 1.0", false), ("-mm 0 0.5", true), ("-mm 0.2 1", true), ("", false)]
+    {
+        let sample = sample(&format!("map_Kd {option} t.png")).with("t.png", &red);
+        let (_, warnings) = loaded_with_warnings(&sample);
+        assert_eq!(warnings.contains("brightness (-mm)"), is_warned, "{option}: {warnings}");
+        assert_eq!(warnings.is_empty(), !is_warned, "{option}: {warnings}");
+    }
+}
+
+#[test]
 fn opacity_maps_become_alpha() {
     let red = gray_png(1, |_| [255, 0, 0, 255]);
     let mask = gray_png(2, |x| [[0, 0, 0, 255], [255, 255, 255, 255]][x as usize]);

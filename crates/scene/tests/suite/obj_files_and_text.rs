@@ -186,7 +186,38 @@ fn map_options_place_the_texture() {
     assert_eq!(placed("-clamp on"), ([1.0, 0.0], [Wrap::Clamp; 2]));
     let sample = textured(b"map_Kd -wobble 3 t.png\nmap_Bump b.png\nPr 0.5").with("t.png", &png(ORANGE));
     let (_, warnings) = loaded_with_warnings(&sample);
-    assert!(warnings.contains("unknown options") && warnings.contains("not shown: map_bump, Pr"), "{warnings}");
+    assert!(warnings.contains("unknown options") && warnings.contains("not shown: map_Bump, Pr"), "{warnings}");
+}
+
+#[test]
+fn textured_faces_without_coordinates_are_warned_of() {
+    let faces = "usemtl m\nf 1/1 2/2 3/3\nf 1 3 4\nf 1 2 4\nusemtl plain\nf 1 2 3\n";
+    let sample = Sample::new("a.obj", format!("mtllib a.mtl\n{SQUARE}{faces}").as_bytes())
+        .with("a.mtl", b"newmtl m\nmap_Kd t.png\nnewmtl plain\n")
+        .with("t.png", &png(ORANGE));
+    let (_, warnings) = loaded_with_warnings(&sample);
+    assert!(warnings.contains("textures without coordinates show one texel: 2, the first: line 12"), "{warnings}");
+    assert_eq!(warnings.lines().count(), 1, "{warnings}");
+    assert!(loaded_with_warnings(&textured(b"map_Kd t.png").with("t.png", &png(ORANGE))).1.is_empty());
+}
+
+#[test]
+fn shapes_other_than_faces_are_warned_of() {
+    let others = "p 1\nl 1 2\nL 2 3\ncurv 0 1 1 2\nsurf 0 1 0 1 1 2 3 4\ncall b.obj\n";
+    let sample = Sample::new("a.obj", format!("{SQUARE}{FACE}{others}").as_bytes());
+    let (scene, warnings) = loaded_with_warnings(&sample);
+    assert_eq!((scene.triangle_count(), warnings.lines().count()), (2, 1), "{warnings}");
+    assert!(warnings.contains("are left out: p, l, curv, surf, call"), "{warnings}");
+}
+
+#[test]
+fn files_found_by_their_last_name_are_named_in_one_warning() {
+    let text = format!("mtllib x/a.mtl\n{SQUARE}usemtl m\nf 1/1 2/2 3/3\nusemtl n\n{FACE}");
+    let library = b"newmtl m\nmap_Kd C:\\x\\t.png\nnewmtl n\nmap_Kd C:\\x\\t.png\n";
+    let sample = Sample::new("a.obj", text.as_bytes()).with("a.mtl", library).with("t.png", &png(ORANGE));
+    let (_, warnings) = loaded_with_warnings(&sample);
+    assert_eq!(warnings.lines().count(), 1, "{warnings}");
+    assert!(warnings.contains("x/a.mtl by a.mtl, C:\\x\\t.png by t.png"), "{warnings}");
 }
 
 #[test]

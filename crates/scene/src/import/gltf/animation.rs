@@ -18,7 +18,7 @@ pub(super) fn read(document: &Document, tree: &NodeTree, scene: &mut SourceScene
     let clips = channels::read(document)?;
     let placements = Placements::read(document, tree, &clips, scene)?;
     let Placements { mut moving, degenerate } = placements;
-    degenerate::settle(&degenerate, scene, &mut moving, document.limits.vertices)?;
+    degenerate::settle(&degenerate, scene, &mut moving, document.limits)?;
     if moving.is_empty() {
         return Ok(());
     }
@@ -79,7 +79,7 @@ struct Skinned {
 /// Reads skins. What all skinned meshes take is counted, for a small file may place one mesh often.
 struct Skins<'d> {
     document: &'d Document<'d>,
-    /// Of each node of the file.
+    /// The place of each node of the file; `None` for a node outside of the chosen scene.
     place_in_tree: Vec<Option<u32>>,
     joints_left: u64,
     influences_left: u64,
@@ -89,8 +89,7 @@ impl<'d> Skins<'d> {
     fn of(document: &'d Document<'d>, tree: &NodeTree) -> Self {
         let mut place_in_tree = vec![None; document.root.nodes.len()];
         tree.nodes.iter().zip(0..).for_each(|(node, place)| place_in_tree[node.number] = Some(place));
-        let (joints_left, influences_left) = (document.limits.nodes, document.limits.vertices);
-        Self { document, place_in_tree, joints_left, influences_left }
+        Self { document, place_in_tree, joints_left: document.limits.nodes, influences_left: document.limits.vertices }
     }
 
     /// The joints of a skin and of each vertex of a mesh. Vertices without weights follow the mesh's own node, which is then
@@ -104,10 +103,12 @@ impl<'d> Skins<'d> {
     ) -> Result<Skinned, Fault> {
         let node = format!("node {}", node.number);
         let skin = skins::skin(self.document, index, &node)?;
-        let (joints, vertices) = (skin.joints.len() as u64 + 1, mesh.vertices.len() as u64);
+        let joints = skin.joints.len() as u64 + 1;
+        let vertices = mesh.vertices.len() as u64;
         at_most(format_args!("{node}, joints of all skinned meshes"), joints, self.joints_left)?;
         at_most(format_args!("{node}, vertices of all skinned meshes"), vertices, self.influences_left)?;
-        (self.joints_left, self.influences_left) = (self.joints_left - joints, self.influences_left - vertices);
+        self.joints_left -= joints;
+        self.influences_left -= vertices;
         let element = format!("skin {}", index.value());
         let matrices = skins::bind_matrices(self.document, skin, &element)?;
         check_influences(&mesh.influences, skin.joints.len(), &element)?;
@@ -159,7 +160,7 @@ fn targets(document: &Document, clips: &[Clip]) -> Vec<bool> {
 }
 
 /// The placement at rest by the first joint whose scale is not 0: most skins are bound at rest, where all joints agree.
-/// Where there is none, the place of the first joint.
+/// If there is none, the placement is the place of the first joint.
 fn at_rest(tree: &NodeTree, joints: &[Joint], element: &str) -> Result<DAffine3, Fault> {
     let placed = |joint: &Joint| tree.nodes[joint.node as usize].source_from_node * joint.joint_from_mesh;
     let place = || {

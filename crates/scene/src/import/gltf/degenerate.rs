@@ -3,6 +3,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::super::source_scene::{SourceMesh, SourceScene};
+use crate::Limits;
 use crate::animation::MovingInstance;
 use crate::error::{Fault, at_most};
 
@@ -10,29 +11,25 @@ use crate::error::{Fault, at_most};
 const LEAST_RELATIVE_AREA: f64 = 1e-9;
 
 /// Gives each placement that flattens its mesh a flat mesh of its own, and removes the others, whose meshes have no area.
-/// `moving` keeps to its placements. All vertices together count against `vertices_limit`.
+/// `moving` keeps to its placements. The limits are checked before the first mesh is copied.
 pub(super) fn settle(
     degenerate: &[usize],
     scene: &mut SourceScene,
     moving: &mut [MovingInstance],
-    vertices_limit: u64,
+    limits: &Limits,
 ) -> Result<(), Fault> {
-    let mut is_removed = vec![false; scene.instances.len()];
-    let mut vertices: u64 = scene.meshes.iter().map(|mesh| mesh.vertices.len() as u64).sum();
-    for &number in degenerate {
+    let is_flat = |number: &usize| has_area(&scene.instances[*number].source_from_mesh.matrix3);
+    let (flat, without_area): (Vec<usize>, Vec<usize>) = degenerate.iter().copied().partition(is_flat);
+    check_sizes(&flat, scene, limits)?;
+    for number in flat {
         let instance = scene.instances[number];
-        if !has_area(&instance.source_from_mesh.matrix3) {
-            is_removed[number] = true;
-            continue;
-        }
-        let mesh = &scene.meshes[instance.mesh];
-        vertices = vertices.saturating_add(mesh.vertices.len() as u64);
-        at_most("vertices of flattened meshes", vertices, vertices_limit)?;
-        let flat = flattened(mesh, &instance.source_from_mesh);
+        let flat = flattened(&scene.meshes[instance.mesh], &instance.source_from_mesh);
         scene.instances[number].mesh = scene.meshes.len();
         scene.instances[number].source_from_mesh = DAffine3::IDENTITY;
         scene.meshes.push(flat);
     }
+    let mut is_removed = vec![false; scene.instances.len()];
+    without_area.into_iter().for_each(|number| is_removed[number] = true);
     let kept = is_removed.iter().scan(0u32, |kept, is_removed| {
         let number = *kept;
         *kept += u32::from(!is_removed);
@@ -42,6 +39,20 @@ pub(super) fn settle(
     moving.iter_mut().for_each(|moving| moving.instance = new_number[moving.instance as usize]);
     let mut is_removed = is_removed.into_iter();
     scene.instances.retain(|_| !is_removed.next().unwrap_or(false));
+    Ok(())
+}
+
+/// Counts what the flat meshes will have: a small file may place one large mesh many times.
+fn check_sizes(flat: &[usize], scene: &SourceScene, limits: &Limits) -> Result<(), Fault> {
+    let mut vertices: u64 = scene.meshes.iter().map(|mesh| mesh.vertices.len() as u64).sum();
+    let mut triangles = 0u64;
+    for &number in flat {
+        let mesh = &scene.meshes[scene.instances[number].mesh];
+        vertices = vertices.saturating_add(mesh.vertices.len() as u64);
+        at_most("vertices of flattened meshes", vertices, limits.vertices)?;
+        triangles = triangles.saturating_add(mesh.indices.len() as u64 / 3);
+        at_most("triangles of flattened meshes", triangles, limits.triangles)?;
+    }
     Ok(())
 }
 

@@ -31,7 +31,7 @@ const READ: [&str; 17] = [
 
 /// Beginnings of the names of extensions that leave all geometry in place: materials, textures, lights, motion, sound,
 /// interaction, and data about the scene. A file may require them.
-const WITHOUT_GEOMETRY: [&str; 36] = [
+const WITHOUT_GEOMETRY: [&str; 35] = [
     "ADOBE_materials_",
     "AGI_stk_metadata",
     "CESIUM_primitive_outline",
@@ -67,7 +67,6 @@ const WITHOUT_GEOMETRY: [&str; 36] = [
     "OMI_",
     "SHAPEWAYS_materials_",
     "VRM",
-    "WEB3D_",
 ];
 
 /// Refuses a file that requires an extension that may change geometry, unless `ignore_required` names it. Those that the

@@ -70,12 +70,15 @@ fn complete(root: &mut Value, warnings: &Warnings) {
         for channel in take(channels) {
             let target = channel.get("target");
             let has_node = target.is_some_and(|target| target.get("node").is_some());
-            // KHR_animation_pointer moves anything.
+            // KHR_animation_pointer moves anything, maybe beside a node.
             let is_pointer = target.and_then(|target| target.get("path")?.as_str()) == Some("pointer");
-            if has_node && !is_pointer {
+            let place = format_args!("animation {number}");
+            if is_pointer {
+                warnings.count("channels of KHR_animation_pointer are left out", place);
+            } else if has_node {
                 channels.push(channel);
             } else {
-                warnings.count("channels without a target node are left out", format_args!("animation {number}"));
+                warnings.count("channels without a target node are left out", place);
             }
         }
     }

@@ -1,7 +1,9 @@
 //! Meshes: one for each of the file, and one more for each other set of weights of its morph targets that a node names.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
+use gltf::json::mesh::{Primitive, Semantic};
+use gltf::json::validation::Checked;
 use gltf::json::{Mesh as JsonMesh, Node};
 
 use super::super::source_scene::{SourceMesh, SourceScene};
@@ -9,9 +11,10 @@ use super::document::Document;
 use super::primitives::{self, Geometry};
 use super::texture_coordinates::Coordinates;
 use super::textures::material_number;
+use crate::Material;
 use crate::error::{Fault, at_most};
 
-/// Where the meshes of the file's nodes are.
+/// The scene's numbers of the file's meshes.
 pub(super) struct Meshes {
     count: usize,
     /// The scene's numbers of meshes whose weights are not their own, by mesh and bits of the weights.
@@ -72,6 +75,13 @@ fn merged(
         let material = material_number(document.root, primitive.material, &element)?;
         if let Some(geometry) = primitives::read(document, primitive, &coordinates, weights, &element)? {
             let Geometry { mesh, color_scale } = geometry;
+            warn_of_missing_coordinates(
+                document,
+                primitive,
+                &coordinates,
+                &scene.materials[material as usize],
+                &element,
+            );
             at_most("materials", scene.materials.len() as u64, document.limits.attributes.saturating_add(1))?;
             let material = materials.number(material, color_scale, scene);
             if color_scale > 1.0 && scene.materials[material as usize].base_color_linear[..3].iter().any(|c| *c > 1.0) {
@@ -83,6 +93,25 @@ fn merged(
         }
     }
     Ok(merged)
+}
+
+/// Warns of textures that show one texel, because the primitive lacks their coordinates.
+fn warn_of_missing_coordinates(
+    document: &Document,
+    primitive: &Primitive,
+    coordinates: &Coordinates,
+    material: &Material,
+    element: &str,
+) {
+    let needed = material.textures().into_iter().flatten();
+    let sources = needed.filter_map(|used| if used.second_uv { coordinates.second } else { Some(coordinates.first) });
+    let sets: BTreeSet<u32> = sources.map(|source| source.set).collect();
+    for set in sets {
+        if !primitive.attributes.contains_key(&Checked::Valid(Semantic::TexCoords(set))) {
+            let place = format_args!("{element}, TEXCOORD_{set}");
+            document.warnings.count("textures without coordinates show one texel", place);
+        }
+    }
 }
 
 /// Copies of materials for vertex colours above 1, which a vertex has no room for: the material takes over their scale.

@@ -56,7 +56,7 @@ pub(super) fn read(document: &Document, meshes: &Meshes, scene: &mut SourceScene
 /// A node that is still to be placed.
 struct Pending {
     index: Index<Node>,
-    /// In the tree.
+    /// The parent's place in [`NodeTree::nodes`].
     parent: Option<usize>,
     source_from_parent: DAffine3,
     depth: u32,
@@ -80,9 +80,9 @@ pub(super) struct NodeTree {
 
 /// A node of the scene at rest.
 pub(super) struct PlacedNode {
-    /// In the file.
+    /// The file's number of the node.
     pub number: usize,
-    /// In the tree.
+    /// The parent's place in [`NodeTree::nodes`].
     pub parent: Option<usize>,
     /// The placements of its mesh, if it has triangles. They need not be invertible.
     pub instances: Range<usize>,
@@ -150,16 +150,19 @@ fn add_light(document: &Document, node: &Node, place: &Place, scene: &mut Source
     Ok(())
 }
 
-/// `None` for an orthographic camera, and for one whose node or field of view has no size. The pose is rigid: a node's scale does not affect a
-/// view.
+/// `None`, with a warning, for an orthographic camera, and for one whose node or field of view has no size. The pose is
+/// rigid: a node's scale does not affect a view.
 fn placed_camera(document: &Document, node: &Node, place: &Place) -> Result<Option<PlacedCamera>, Fault> {
     let camera = node.camera.and_then(|index| document.root.get(index));
     let camera = camera.ok_or_else(|| Fault::malformed(&place.element, "its camera does not exist"))?;
-    let Some(perspective) = &camera.perspective else {
-        return Ok(None);
-    };
     let fallback = || format!("camera {}", node.camera.map_or(0, |c| c.value()));
     let name = camera.name.clone().or_else(|| node.name.clone()).unwrap_or_else(fallback);
+    let Some(perspective) = &camera.perspective else {
+        document
+            .warnings
+            .count("orthographic cameras are left out", format_args!("{}, camera {name:?}", place.element));
+        return Ok(None);
+    };
     let is_open = perspective.yfov > 0.0 && perspective.yfov < std::f32::consts::PI;
     if !(is_open && is_invertible(&place.source_from_node)) {
         let element = format_args!("{}, camera {name:?}", place.element);

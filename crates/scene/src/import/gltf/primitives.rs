@@ -35,6 +35,7 @@ pub(super) fn read(
         return Err(Fault::malformed(element, "unknown mode"));
     };
     if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+        document.warnings.count("points and lines are left out", element);
         return Ok(None);
     }
     // Compressed strips are decoded to triangles.

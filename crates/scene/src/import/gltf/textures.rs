@@ -78,7 +78,7 @@ struct Used {
 
 /// The textures of a material.
 pub(super) struct Uses {
-    /// In the order of [`Material::textures`].
+    /// The textures that vertices have coordinates for, in the order of [`Material::textures`].
     maps: [Option<Used>; 5],
     /// Places of textures that count by their mean.
     pub specular: Option<usize>,

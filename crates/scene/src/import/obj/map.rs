@@ -49,17 +49,8 @@ pub(super) enum Channel {
 }
 
 /// Options whose arguments are skipped, with the number of these. Filters and resolutions change little that is seen.
-const SKIPPED: [(&str, usize); 9] = [
-    ("-blendu", 1),
-    ("-blendv", 1),
-    ("-boost", 1),
-    ("-bm", 1),
-    ("-cc", 1),
-    ("-mm", 2),
-    ("-t", 3),
-    ("-texres", 1),
-    ("-type", 1),
-];
+const SKIPPED: [(&str, usize); 8] =
+    [("-blendu", 1), ("-blendv", 1), ("-boost", 1), ("-bm", 1), ("-cc", 1), ("-t", 3), ("-texres", 1), ("-type", 1)];
 
 impl TextureMap {
     /// Reads `-option arguments… file name`; `None` without a name.
@@ -101,6 +92,13 @@ impl TextureMap {
                     b"m" => Some(Channel::Alpha),
                     b"l" => Some(Channel::Luminance),
                     _ => None,
+                }
+            }
+            b"-mm" => {
+                let base = finite(rest.next());
+                let gain = finite(rest.next());
+                if base != Some(0.0) || gain != Some(1.0) {
+                    warnings.count("brightness (-mm) of texture maps is not shown", line);
                 }
             }
             _ => match SKIPPED.iter().find(|(name, _)| name.as_bytes() == option) {

@@ -6,7 +6,8 @@
 //!
 //! Files of many programs and ages are read: a row that cannot be used is left out, and a warning counts its kind. Surfaces
 //! are seen from both sides, because the format has no notion of culling. Missing normals are smooth up to creases of 60°, and
-//! flat after `s off`. Axes are kept. Points, lines and free-form curves are skipped.
+//! flat after `s off`. Axes are kept. Points, lines and free-form
+//! curves are left out with a warning.
 
 mod attributes;
 mod faces;
@@ -46,6 +47,9 @@ fn read_with(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &Warnings
     Ok(scene)
 }
 
+/// Statements of shapes other than faces, and `call`, which names another file.
+const LEFT_OUT: [&str; 6] = ["p", "l", "curv", "curv2", "surf", "call"];
+
 #[derive(Default)]
 struct ObjFile {
     attributes: Attributes,
@@ -72,6 +76,8 @@ impl ObjFile {
             self.libraries.push(line.rest.to_owned());
         } else if line.is("#MRGB") {
             self.attributes.push_mrgb(line, limits);
+        } else if let Some(statement) = LEFT_OUT.iter().find(|statement| line.is(statement)) {
+            warnings.list("points, lines, free-form shapes and other files are left out", statement);
         }
         Ok(())
     }

@@ -4,17 +4,16 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
+use super::super::file_search::decoded;
 use super::super::warnings::Warnings;
 use super::map::{Channel, TextureMap};
 use super::text::{Line, finite, for_each_line, without_byte_order_mark, without_comment};
 use crate::error::{Fault, at_most};
 use crate::{Limits, Material};
 
-/// Statements that change what is seen, and that are not shown.
-const NOT_SHOWN: [&str; 15] = [
-    "bump", "map_bump", "norm", "disp", "decal", "refl", "map_Ks", "map_Ns", "map_Ke", "map_Pr", "map_Pm", "Pr", "Pm",
-    "Pc", "aniso",
-];
+/// Statements that are not read and change little of what is seen: ambient light, the index of refraction, and the filters
+/// of reflections and textures.
+const HARMLESS: [&str; 5] = ["Ka", "map_Ka", "Ni", "sharpness", "map_aat"];
 
 /// A material as a library has it.
 #[derive(Debug, Clone, Default)]
@@ -88,8 +87,8 @@ impl Entry {
             self.color_map = TextureMap::parse(line, warnings).or(self.color_map.take());
         } else if line.is("map_d") || line.is("map_opacity") {
             self.alpha_map = TextureMap::parse(line, warnings).or(self.alpha_map.take());
-        } else if let Some(keyword) = NOT_SHOWN.iter().find(|keyword| line.is(keyword)) {
-            warnings.list("statements of materials that are not shown", keyword);
+        } else if !HARMLESS.iter().any(|keyword| line.is(keyword)) {
+            warnings.list("statements of materials that are not shown", decoded(line.keyword));
         }
         true
     }
