@@ -378,12 +378,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {%- endif %}
     var known: Known;
     known.least_luminance = 3.0e38;
-{%- if positions == "later" %}
-    // Few points are asked here. Where no lane of the software device asks, it leaves a loop, and runs a branch all the same.
-    for (var asks = is_asked; asks; asks = false) {
-{%- else %}
-    if is_asked {
-{%- endif %}
+    // Few points of later positions are asked. The software device leaves a loop where no lane asks, but runs a branch all the same.
+    {{ "for (var asks = is_asked; asks; asks = false)" if positions == "later" else "if is_asked" }} {
 {%- if lamp_vectors %}
         find_lamps(camera.eye_in_world + point.offset);
 {%- endif %}

@@ -3,14 +3,15 @@
 //! Names are compared as bytes before they are decoded. A file is looked for in several folders in turn; no file outside the
 //! scene's folder is found.
 
-use std::borrow::Cow;
-use std::collections::HashMap;
 use std::ffi::OsString;
 use std::path::{Component, Path, PathBuf};
 
-use super::folder::Folder;
+use percent_encoding::percent_decode_str;
+
+use super::folder::{Folder, existing};
+use super::listing::decoded;
 use super::warnings::Warnings;
-use crate::error::shortened;
+use crate::error::{Fault, shortened};
 
 /// The result of a search.
 pub(crate) enum Found {
@@ -52,8 +53,26 @@ fn distinct<T: PartialEq + Copy>(items: &[T]) -> Vec<T> {
     distinct
 }
 
+/// Reads a file named by a URI reference, as in glTF; percent-encoding is decoded first. Where there is no such file,
+/// the name counts without its query (`?…`), and then without regard to upper and lower case. `None` for a file that
+/// does not exist.
+pub(crate) fn read_uri(folder: &Folder, element: &str, uri: &str) -> Result<Option<Vec<u8>>, Fault> {
+    let decoded = |uri| percent_decode_str(uri).decode_utf8();
+    let name = decoded(uri).map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
+    if let Some(bytes) = existing(folder.read_name(element, &name))? {
+        return Ok(Some(bytes));
+    }
+    let path = uri.split(['?', '#']).next().and_then(|path| decoded(path).ok()).filter(|path| !path.is_empty());
+    let Some(path) = path else { return Ok(None) };
+    if let Some(bytes) = existing(folder.read_name(element, &path))? {
+        return Ok(Some(bytes));
+    }
+    let found = in_any_case(folder, path.as_bytes());
+    found.map_or(Ok(None), |found| existing(folder.read_relative(element, &found)))
+}
+
 /// The file of this name relative to the scene's folder, in any case and encoding.
-pub(crate) fn in_any_case(folder: &Folder, name: &[u8]) -> Option<PathBuf> {
+fn in_any_case(folder: &Folder, name: &[u8]) -> Option<PathBuf> {
     let name = ReferredName::parse(name);
     match resolved(folder, Path::new(""), &name.parts, Matching::Loose) {
         Found::File(path) if !name.is_absolute => Some(path),
@@ -144,49 +163,6 @@ fn entry_name(folder: &Folder, relative: &Path, part: &[u8], matching: Matching)
     folder.listing(relative).loosely_named(part).cloned()
 }
 
-/// The names in a folder, to be found in any case and encoding.
-#[derive(Default)]
-pub(crate) struct Listing {
-    by_lower_case: HashMap<String, OsString>,
-    /// Names that have other letters than ASCII's; `None` for several names that are alike.
-    by_skeleton: HashMap<Vec<u8>, Option<OsString>>,
-}
-
-impl Listing {
-    /// Reads a folder; one that cannot be read has no names.
-    pub(crate) fn read(folder: &Path) -> Self {
-        let entries = folder.read_dir().into_iter().flatten().flatten();
-        let mut names: Vec<OsString> = entries.map(|entry| entry.file_name()).collect();
-        // The order of a folder's entries is that of the file system.
-        names.sort();
-        let mut listing = Self::default();
-        for name in names {
-            let bytes = name.as_encoded_bytes();
-            if !bytes.is_ascii() {
-                let alike = listing.by_skeleton.entry(ascii_skeleton(bytes));
-                alike.and_modify(|alike| *alike = None).or_insert_with(|| Some(name.clone()));
-            }
-            listing.by_lower_case.entry(decoded(bytes).to_lowercase()).or_insert(name);
-        }
-        listing
-    }
-
-    fn loosely_named(&self, part: &[u8]) -> Option<&OsString> {
-        let same = self.by_lower_case.get(&decoded(part).to_lowercase());
-        let is_ascii = part.is_ascii();
-        same.or_else(|| self.by_skeleton.get(&ascii_skeleton(part)).filter(|_| !is_ascii)?.as_ref())
-    }
-}
-
-/// A name in lower case with one mark for each run of other letters than ASCII's: equal for all encodings of the name that
-/// leave ASCII alone.
-fn ascii_skeleton(name: &[u8]) -> Vec<u8> {
-    let mut skeleton: Vec<u8> =
-        name.iter().map(|&byte| if byte.is_ascii() { byte.to_ascii_lowercase() } else { 0xff }).collect();
-    skeleton.dedup_by(|a, b| *a == 0xff && *b == 0xff);
-    skeleton
-}
-
 #[cfg(unix)]
 #[allow(clippy::unnecessary_wraps, reason = "elsewhere not all bytes are names")]
 fn os_name(part: &[u8]) -> Option<OsString> {
@@ -197,11 +173,6 @@ fn os_name(part: &[u8]) -> Option<OsString> {
 #[cfg(not(unix))]
 fn os_name(part: &[u8]) -> Option<OsString> {
     std::str::from_utf8(part).ok().map(OsString::from)
-}
-
-/// Text in UTF-8, or else in Latin-1.
-pub(crate) fn decoded(text: &[u8]) -> Cow<'_, str> {
-    std::str::from_utf8(text).map_or_else(|_| text.iter().map(|&byte| char::from(byte)).collect(), Cow::Borrowed)
 }
 
 #[cfg(test)]

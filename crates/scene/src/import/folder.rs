@@ -7,9 +7,7 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 use std::rc::Rc;
 
-use percent_encoding::percent_decode_str;
-
-use super::file_search::{Listing, in_any_case};
+use super::listing::Listing;
 use super::missing_textures::MissingTextures;
 use crate::error::{Fault, at_most};
 use crate::{Limits, SceneErrorKind};
@@ -42,24 +40,6 @@ impl Folder {
         Ok((folder, bytes))
     }
 
-    /// Reads a file named by a URI reference, as in glTF; percent-encoding is decoded first. Where there is no such file,
-    /// the name counts without its query (`?…`), and then without regard to upper and lower case. `None` for a file that
-    /// does not exist.
-    pub(crate) fn read_uri(&self, element: &str, uri: &str) -> Result<Option<Vec<u8>>, Fault> {
-        let decoded = |uri| percent_decode_str(uri).decode_utf8();
-        let name = decoded(uri).map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
-        if let Some(bytes) = existing(self.read_name(element, &name))? {
-            return Ok(Some(bytes));
-        }
-        let path = uri.split(['?', '#']).next().and_then(|path| decoded(path).ok()).filter(|path| !path.is_empty());
-        let Some(path) = path else { return Ok(None) };
-        if let Some(bytes) = existing(self.read_name(element, &path))? {
-            return Ok(Some(bytes));
-        }
-        let found = in_any_case(self, path.as_bytes());
-        found.map_or(Ok(None), |found| existing(self.read_relative(element, &found)))
-    }
-
     /// Reads a file by its name relative to this folder.
     pub(crate) fn read_name(&self, element: &str, name: &str) -> Result<Vec<u8>, Fault> {
         // Exporters on Windows write backslashes; as separators they are checked like slashes.
@@ -86,7 +66,7 @@ impl Folder {
         listing
     }
 
-    /// Reads a file by a path below this folder, as [`search`](super::file_search::search) finds it.
+    /// Reads a file by a path below this folder, as a search finds it.
     pub(crate) fn read_relative(&self, element: &str, relative: &Path) -> Result<Vec<u8>, Fault> {
         let path = self.canonical_root.join(relative).canonicalize().map_err(|e| Fault::io(element, e))?;
         if !path.starts_with(&self.canonical_root) {
@@ -134,6 +114,7 @@ fn reason_to_refuse(relative: &str) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::file_search::read_uri;
     use super::*;
 
     fn opened(path: &Path, limits: &Limits) -> Result<(Folder, Vec<u8>), Fault> {
@@ -154,11 +135,11 @@ mod tests {
     #[test]
     fn reads_inside_and_decodes_percent() {
         let (_dir, folder) = folder_with_file();
-        assert_eq!(folder.read_uri("buffer 0", "a%20b.bin").unwrap().unwrap(), b"inside");
-        assert_eq!(folder.read_uri("buffer 0", "./a b.bin").unwrap().unwrap(), b"inside");
-        assert_eq!(folder.read_uri("buffer 0", "a%20b.bin?v=3#x").unwrap().unwrap(), b"inside");
-        assert_eq!(folder.read_uri("buffer 0", "./A%20b.BIN").unwrap().unwrap(), b"inside");
-        assert!(folder.read_uri("buffer 0", "c.bin").unwrap().is_none());
+        assert_eq!(read_uri(&folder, "buffer 0", "a%20b.bin").unwrap().unwrap(), b"inside");
+        assert_eq!(read_uri(&folder, "buffer 0", "./a b.bin").unwrap().unwrap(), b"inside");
+        assert_eq!(read_uri(&folder, "buffer 0", "a%20b.bin?v=3#x").unwrap().unwrap(), b"inside");
+        assert_eq!(read_uri(&folder, "buffer 0", "./A%20b.BIN").unwrap().unwrap(), b"inside");
+        assert!(read_uri(&folder, "buffer 0", "c.bin").unwrap().is_none());
     }
 
     #[test]
@@ -185,7 +166,7 @@ mod tests {
             &absolute,
         ];
         for name in names {
-            let fault = folder.read_uri("buffer 0", name).unwrap_err().in_file("a.gltf");
+            let fault = read_uri(&folder, "buffer 0", name).unwrap_err().in_file("a.gltf");
             assert!(matches!(fault.kind, SceneErrorKind::Forbidden { .. }), "{name:?}: {fault}");
         }
     }

@@ -8,6 +8,7 @@ mod file_search;
 mod folder;
 mod gltf;
 mod ktx2;
+mod listing;
 mod missing_textures;
 mod normals;
 mod obj;

@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::file_search::{Found, decoded, search};
+use super::file_search::{Found, search};
 use super::folder::Folder;
+use super::listing::decoded;
 use super::missing_textures::MissingTextures;
 use super::picture::{Content, EncodedPicture, decode_all};
 use super::warnings::Warnings;

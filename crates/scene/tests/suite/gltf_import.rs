@@ -406,7 +406,12 @@ fn dangling_references_are_refused_by_name() {
 
 #[test]
 fn other_versions_are_refused() {
-    assert!(refusal("old.gltf", br#"{"asset":{"version":"1.0"}}"#).contains("version"));
+    let first = "glTF version 1.0; `npx gltf-pipeline -i IN -o OUT` converts";
+    assert!(refusal("old.gltf", br#"{"asset":{"version":"1.0"}}"#).contains(first));
+    assert!(refusal("old.gltf", br#"{"asset":{"generator":"x"},"meshes":{"a":{}}}"#).contains(first));
+    let mut old = glb(&cube(|_| {}).json(), &[]);
+    old[4] = 1;
+    assert!(refusal("old.glb", &old).contains(first));
 }
 
 #[test]

@@ -10,6 +10,7 @@ use gltf::json::buffer::View;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
+use super::super::file_search::read_uri;
 use super::super::folder::Folder;
 use super::super::warnings::Warnings;
 use super::compressed;
@@ -92,7 +93,7 @@ impl<'a> Document<'a> {
     /// Reads a `data:` URI or a file of the scene's folder; `None` for a file that does not exist.
     pub(super) fn read_uri(&self, element: &str, uri: &str) -> Result<Option<Vec<u8>>, Fault> {
         if !uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
-            return self.folder.read_uri(element, uri);
+            return read_uri(self.folder, element, uri);
         }
         let url = DataUrl::process(uri).map_err(|e| Fault::malformed(element, format!("data URI: {e:?}")))?;
         let (bytes, _) = url.decode_to_vec().map_err(|e| Fault::malformed(element, format!("data URI: {e:?}")))?;

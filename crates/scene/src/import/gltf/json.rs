@@ -26,13 +26,29 @@ pub(super) fn parse(json: &[u8], limits: &Limits, warnings: &Warnings) -> Result
     let text = text.trim_start_matches(BYTE_ORDER_MARK).trim_end_matches('\0');
     // The parser admits 128 levels, so that the recursion below ends.
     let mut value: Value = deserialize::from_str(text).map_err(wrong)?;
+    check_version(&value)?;
     simplify(&mut value);
     complete(&mut value, warnings);
-    let root: Root = deserialize::from_value(value).map_err(wrong)?;
-    if !root.asset.version.starts_with("2.") {
-        return Err(Fault::unsupported("asset", format!("glTF version {}", root.asset.version)));
+    deserialize::from_value(value).map_err(wrong)
+}
+
+/// Refuses other versions than 2. In version 1, which some files do not state, lists are objects.
+fn check_version(root: &Value) -> Result<(), Fault> {
+    let version = root.get("asset").and_then(|asset| asset.get("version")).map(ToString::to_string);
+    let version = version.unwrap_or_default();
+    let version = version.trim_matches('"');
+    let has_objects = ["buffers", "meshes", "nodes"].iter().any(|name| root.get(name).is_some_and(Value::is_object));
+    if version.starts_with('2') || version.is_empty() && !has_objects {
+        return Ok(());
     }
-    Ok(root)
+    Err(other_version(if version.is_empty() { "1.0" } else { version }))
+}
+
+pub(super) fn other_version(version: &str) -> Fault {
+    Fault::unsupported(
+        "asset",
+        format!("glTF version {version}; `npx gltf-pipeline -i IN -o OUT` converts version 1.0"),
+    )
 }
 
 /// Writes whole numbers without a fraction, and drops members that are `null` or of applications.

@@ -84,6 +84,9 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Fault> {
         // The crate subtracts the header's size unchecked.
         return Err(Fault::malformed("GLB header", "the length is smaller than the header"));
     }
+    if bytes.get(4..8) == Some(&1_u32.to_le_bytes()[..]) {
+        return Err(json::other_version("1.0"));
+    }
     let glb = Glb::from_slice(bytes).map_err(|e| Fault::malformed("GLB header", e.to_string()))?;
     // A slice only gives the borrowed form; an owned one would not outlive this function.
     let borrowed = |chunk| match chunk {

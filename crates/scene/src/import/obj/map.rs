@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::super::file_search::decoded;
+use super::super::listing::decoded;
 use super::super::warnings::Warnings;
 use super::text::{Line, finite, without_comment};
 
@@ -49,8 +49,17 @@ pub(super) enum Channel {
 }
 
 /// Options whose arguments are skipped, with the number of these. Filters and resolutions change little that is seen.
-const SKIPPED: [(&str, usize); 8] =
-    [("-blendu", 1), ("-blendv", 1), ("-boost", 1), ("-bm", 1), ("-cc", 1), ("-t", 3), ("-texres", 1), ("-type", 1)];
+const SKIPPED: [(&str, usize); 9] = [
+    ("-colorspace", 1),
+    ("-blendu", 1),
+    ("-blendv", 1),
+    ("-boost", 1),
+    ("-bm", 1),
+    ("-cc", 1),
+    ("-t", 3),
+    ("-texres", 1),
+    ("-type", 1),
+];
 
 impl TextureMap {
     /// Reads `-option arguments… file name`; `None` without a name.
@@ -196,6 +205,7 @@ mod tests {
             ("t.png", "t.png"),
             ("a b.png", "a b.png"),
             ("-s 2 2 1 -o 0.5 0 0 a b.png", "a b.png"),
+            ("-colorspace sRGB -o 0.1 3.jpg", "3.jpg"),
             ("-bm 0.5 -mm 0 1 -texres 512 2 3.png", "2 3.png"),
             ("-clamp on \"a b.png\" # note", "a b.png"),
             ("t.png # note", "t.png"),

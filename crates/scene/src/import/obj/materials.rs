@@ -3,8 +3,9 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use super::super::file_search::{Found, decoded, search};
+use super::super::file_search::{Found, search};
 use super::super::folder::Folder;
+use super::super::listing::decoded;
 use super::super::picture::Content;
 use super::super::source_scene::SourceScene;
 use super::super::texture_files::{TextureFiles, TextureReference};

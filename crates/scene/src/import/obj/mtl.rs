@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::super::file_search::decoded;
+use super::super::listing::decoded;
 use super::super::warnings::Warnings;
 use super::map::{Channel, TextureMap};
 use super::text::{Line, finite, for_each_line, without_byte_order_mark, without_comment};

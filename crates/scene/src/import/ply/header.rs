@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use serde_ply::{ElementDef, PlyFormat, PlyHeader, PropertyType, ScalarType};
 
-use super::super::file_search::decoded;
+use super::super::listing::decoded;
 use crate::Limits;
 use crate::error::{Fault, at_most};
 

@@ -17,8 +17,8 @@ use glam::DAffine3;
 use serde::{Deserialize, de::MapAccess};
 use serde_ply::{PlyReader, RowVisitor};
 
-use super::file_search::decoded;
 use super::folder::Folder;
+use super::listing::decoded;
 use super::normals;
 use super::picture::Content;
 use super::source_scene::{SourceInstance, SourceScene};
