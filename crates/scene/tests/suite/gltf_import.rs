@@ -409,7 +409,7 @@ fn other_versions_are_refused() {
     let first = "glTF version 1.0; `npx gltf-pipeline -i IN -o OUT` converts";
     assert!(refusal("old.gltf", br#"{"asset":{"version":"1.0"}}"#).contains(first));
     assert!(refusal("old.gltf", br#"{"asset":{"generator":"x"},"meshes":{"a":{}}}"#).contains(first));
-    let mut old = glb(&cube(|_| {}).json(), &[]);
+    let mut old = cube(|_| {}).glb();
     old[4] = 1;
     assert!(refusal("old.glb", &old).contains(first));
 }
