@@ -1,8 +1,9 @@
 //! Loaded files: the contents of each, the time to load it, and how much of the first picture it covers.
 
+use std::io::Write;
 use std::iter::repeat_n;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use anyhow::Context as _;
@@ -34,7 +35,7 @@ const COLUMNS: [(&str, &str); 9] = [
     ("lamps", ""),
     ("time to load", "s"),
     ("covers of the first picture", "%"),
-    ("refused", ""),
+    ("warnings, or why it is refused", ""),
 ];
 
 /// A model as it was loaded.
@@ -48,6 +49,41 @@ struct Loaded {
     seconds: f64,
     /// Pixels that show a surface, of 1.
     share: f64,
+    /// What was left out or replaced.
+    warnings: String,
+}
+
+/// Collects what is logged.
+#[derive(Clone, Default)]
+struct Log(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Log {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Does `work`, and returns its result with the warnings that this thread has logged, without the spans around them.
+fn with_warnings<T>(work: impl FnOnce() -> T) -> (T, String) {
+    let log = Log::default();
+    let writer = log.clone();
+    let subscriber = tracing_subscriber::fmt()
+        .with_max_level(tracing::Level::WARN)
+        .with_ansi(false)
+        .with_level(false)
+        .with_target(false)
+        .without_time()
+        .with_writer(move || writer.clone());
+    let result = tracing::subscriber::with_default(subscriber.finish(), work);
+    let bytes = std::mem::take(&mut *log.0.lock().unwrap_or_else(PoisonError::into_inner));
+    let text = String::from_utf8_lossy(&bytes);
+    let warnings = text.lines().map(|line| line.rsplit_once("}: ").map_or(line, |(_, warning)| warning).trim());
+    (result, warnings.collect::<Vec<_>>().join("; "))
 }
 
 /// Loads all models of the folder, if one is given; adds a table and checks.
@@ -80,7 +116,8 @@ fn name_of(folder: &Path, path: &Path) -> String {
 
 fn load(engine: &Arc<GpuEngine>, path: PathBuf) -> anyhow::Result<Loaded> {
     let start = Instant::now();
-    let setup = SceneArgs::new(SceneSpec::File(path)).load()?;
+    let (setup, warnings) = with_warnings(|| SceneArgs::new(SceneSpec::File(path)).load());
+    let setup = setup?;
     let seconds = start.elapsed().as_secs_f64();
     Ok(Loaded {
         triangles: setup.scene.triangle_count(),
@@ -89,6 +126,7 @@ fn load(engine: &Arc<GpuEngine>, path: PathBuf) -> anyhow::Result<Loaded> {
         lamps: setup.scene.illumination.lights.len(),
         seconds,
         share: share(&first_picture(engine, &setup)?),
+        warnings,
     })
 }
 
@@ -128,7 +166,7 @@ fn table(models: &[(String, Result<Loaded, String>)]) -> anyhow::Result<Table> {
                 model.lamps.into(),
                 model.seconds.into(),
                 (100.0 * model.share).into(),
-                "".into(),
+                model.warnings.as_str().into(),
             ],
             Err(error) => repeat_n(Cell::Missing, COLUMNS.len() - 3).chain([error.as_str().into()]).collect(),
         };
@@ -150,7 +188,15 @@ mod tests {
     use gpu::DevicePreference;
 
     fn loaded(share: f64) -> (String, Result<Loaded, String>) {
-        let model = Loaded { triangles: 1, textures: 2, clips: 3, lamps: 4, seconds: 0.5, share };
+        let model = Loaded {
+            triangles: 1,
+            textures: 2,
+            clips: 3,
+            lamps: 4,
+            seconds: 0.5,
+            share,
+            warnings: "a part".to_owned(),
+        };
         ("folder/a.GLB".to_owned(), Ok(model))
     }
 
@@ -160,6 +206,7 @@ mod tests {
         let table = table(&models).unwrap();
         let text = |row: usize, column: usize| table.rows[row][column].display();
         assert_eq!([text(0, 0), text(0, 1), text(0, 2), text(0, 7)], ["folder/a.GLB", "glb", "1", "50"]);
+        assert_eq!(text(0, 8), "a part");
         assert_eq!([text(2, 1), text(2, 8)], ["ply", "no faces"]);
         let [refused, share] = checks(&models);
         assert_eq!((refused.outcome(), refused.value()), (report::Outcome::FallsShort, Some(1.0)));
@@ -171,11 +218,12 @@ mod tests {
     fn a_file_is_loaded_and_covers_some_of_its_first_picture() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("square.obj");
-        std::fs::write(&path, "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\n").unwrap();
+        std::fs::write(&path, "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\nf 1 2\n").unwrap();
         let engine = GpuEngine::shared(DevicePreference::Any).unwrap();
         let model = load(&engine, path).unwrap();
         assert_eq!((model.triangles, model.textures, model.clips), (2, 0, 0));
         assert!(model.lamps > 0 && model.share > 0.2 && model.share < 0.95, "{model:?}");
+        assert_eq!(model.warnings, "faces of fewer than three corners are left out: line 6 (f)");
         assert!(load(&engine, folder.path().join("none.obj")).is_err());
     }
 }
