@@ -24,6 +24,8 @@ const LONG_RUN_S: f64 = 0.5;
 const MOST_PIXELS: usize = 1 << 20;
 /// Images of light and views are measured with these parts of their sides, one after the other, before they are in full size.
 const QUICK_SIDE_RATIOS: [f32; 2] = [0.125, 0.25];
+/// No image and no view is measured with fewer pixels: what each takes, however small, would count for all pixels.
+const LEAST_QUICK_PIXELS: f64 = 3_000.0;
 /// A measurement of light that would take longer is not repeated with larger sides: a client may wait for it.
 const LONG_MEASUREMENT_S: f64 = 1.0;
 /// Views that are smaller than full ones are timed with larger sides, too.
@@ -141,6 +143,14 @@ impl Resized {
     }
 }
 
+/// The least part of the sides with which all images and views have [`LEAST_QUICK_PIXELS`].
+fn least_quick_ratio(request: &MeasureCosts) -> f32 {
+    let images = request.workload.sample_cameras.iter().map(SampleCamera::pixel_count);
+    let views = request.typical_views.iter().map(PinholeCamera::pixel_count);
+    let fewest = images.chain(views).min().unwrap_or(0).max(1);
+    (LEAST_QUICK_PIXELS / fewest as f64).sqrt() as f32
+}
+
 fn scaled_size(size_px: UVec2, side_ratio: f32) -> UVec2 {
     (size_px.as_vec2() * side_ratio).as_uvec2().max(UVec2::ONE)
 }
@@ -157,6 +167,10 @@ impl Measurement<'_> {
         if self.engine.sample_planes(&request.method)?.light {
             let next_ratios = QUICK_SIDE_RATIOS.into_iter().skip(1).chain([1.0]);
             for (ratio, next_ratio) in QUICK_SIDE_RATIOS.into_iter().zip(next_ratios) {
+                let ratio = ratio.max(least_quick_ratio(request));
+                if ratio >= next_ratio {
+                    continue;
+                }
                 let quick = Resized::new(request, ratio, ratio);
                 let measured = quick.in_full_size(self.costs(&quick)?);
                 let next_s = measurement_s(&measured.costs, &request.workload) * f64::from(next_ratio).powi(2);

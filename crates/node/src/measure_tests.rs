@@ -233,23 +233,26 @@ fn large_views_are_measured_in_a_smaller_size() {
 
 #[test]
 fn expensive_light_is_measured_in_a_smaller_size() {
-    let large = camera().resized(UVec2::splat(64));
+    let large = camera().resized(UVec2::splat(512));
     let mut wanted = MeasureCosts { typical_views: vec![large], ..request(1) };
     wanted.workload.sample_cameras = vec![large.into(); 2];
-    let measured = |texel_s: f64| {
+    let measured = |wanted: &MeasureCosts, texel_s: f64| {
         let engine = Sleeper { texel_s, takes_light: true, ..Sleeper::default() };
-        let costs = measure_costs(&engine, &wanted).unwrap().costs;
+        let costs = measure_costs(&engine, wanted).unwrap().costs;
         let sizes_px = engine.calls.into_inner().unwrap().sampled_px;
         (costs.sample_image_s, sizes_px)
     };
-    let (image_s, sizes_px) = measured(2e-4);
+    let (image_s, sizes_px) = measured(&wanted, 3.2e-6);
     assert!((0.8..1.2).contains(&image_s), "{image_s}");
-    assert!(sizes_px.iter().all(|size_px| [8, 16].contains(&size_px.x)), "{sizes_px:?}");
-    let (_, sizes_px) = measured(5e-3);
-    assert!(sizes_px.iter().all(|size_px| size_px.x == 8), "{sizes_px:?}");
-    let (image_s, sizes_px) = measured(2e-6);
+    assert!(sizes_px.iter().all(|size_px| [64, 128].contains(&size_px.x)), "{sizes_px:?}");
+    let (_, sizes_px) = measured(&wanted, 5e-5);
+    assert!(sizes_px.iter().all(|size_px| size_px.x == 64), "{sizes_px:?}");
+    let (image_s, sizes_px) = measured(&wanted, 3e-8);
     assert!((0.008..0.1).contains(&image_s), "{image_s}");
-    assert!(sizes_px.iter().any(|size_px| size_px.x == 64), "cheap light is measured in full size: {sizes_px:?}");
+    assert!(sizes_px.iter().any(|size_px| size_px.x == 512), "cheap light is measured in full size: {sizes_px:?}");
+    wanted.workload.sample_cameras = vec![camera().resized(UVec2::splat(60)).into(); 2];
+    let least_ratio = least_quick_ratio(&wanted);
+    assert!((least_ratio.powi(2) * 60.0 * 60.0 - 3_000.0).abs() < 1.0, "{least_ratio}");
 }
 
 #[test]
