@@ -16,7 +16,7 @@ use crate::shared::Shared;
 
 /// How long one node may measure.
 const MEASURED_WITHIN: Duration = Duration::from_secs(600);
-/// What is not waited for is measured on a node that has had little to do for so long.
+/// What is not waited for is measured on a node whose host has had little to do for so long.
 const IDLE_FOR: Duration = Duration::from_secs(5);
 /// The interval at which idle nodes are sought.
 const SEEK: Duration = Duration::from_secs(1);
@@ -60,10 +60,19 @@ fn next(shared: &Shared) -> Option<(Wanted, NodeStatus)> {
     let devices: BTreeSet<&str> = queue.devices().collect();
     let is_idle = |name: &str| shared.with_scheduler(|scheduler| scheduler.idle_for(name)) >= IDLE_FOR;
     let mut nodes = shared.status().nodes;
-    nodes.retain(|node| devices.contains(node.device_name.as_str()) && is_idle(&node.node_name));
+    // Nodes of one host share its device, or its processors.
+    let busy = nodes.iter().filter(|node| !is_idle(&node.node_name));
+    let busy_hosts: BTreeSet<String> = busy.map(|node| host_of(&node.address).to_owned()).collect();
+    let is_wanted = |node: &NodeStatus| devices.contains(node.device_name.as_str());
+    nodes.retain(|node| is_wanted(node) && !busy_hosts.contains(host_of(&node.address)));
     let wanted = queue.take(|device| nodes.iter().any(|node| node.device_name == device))?;
     let node = nodes.into_iter().find(|node| node.device_name == wanted.device)?;
     Some((wanted, node))
+}
+
+/// The part of a node's address before its port.
+fn host_of(address: &str) -> &str {
+    address.rsplit_once(':').map_or(address, |(host, _)| host)
 }
 
 /// A node may be lost while it measures: others of its kind are asked once it has left.
