@@ -34,7 +34,7 @@ pub struct Condition {
     pub change: Change,
 }
 
-/// Rays of direct drawing at each position. The last is the reference. Lamps need few.
+/// Rays of direct drawing at each position. The last is the reference.
 pub fn direct_rays(light: Light) -> &'static [LightRays] {
     const OCCLUSION: [LightRays; 5] = [
         LightRays::new(1, 1),
@@ -43,15 +43,7 @@ pub fn direct_rays(light: Light) -> &'static [LightRays] {
         LightRays::new(8, 8),
         LightRays::new(16, 16),
     ];
-    const INDIRECT: [LightRays; 7] = [
-        LightRays::new(1, 1),
-        LightRays::new(2, 2),
-        LightRays::new(4, 4),
-        LightRays::new(4, 8),
-        LightRays::new(4, 16),
-        LightRays::new(4, 32),
-        LightRays::new(16, 64),
-    ];
+    const INDIRECT: [LightRays; 7] = LightRays::up_to(LightRays::new(16, 64));
     match light {
         Light::Occlusion => &OCCLUSION,
         Light::Indirect => &INDIRECT,

@@ -25,6 +25,11 @@ impl LightRays {
         Self { to_lamps, ambient }
     }
 
+    /// Rays at a position, from the fewest up to `most`. More than four to a lamp change little.
+    pub const fn up_to(most: Self) -> [Self; 7] {
+        [Self::new(1, 1), Self::new(2, 2), Self::new(4, 4), Self::new(4, 8), Self::new(4, 16), Self::new(4, 32), most]
+    }
+
     /// The rays of a pixel, if these are the rays of each of its positions.
     pub fn a_pixel(self) -> Self {
         self.times(SAMPLES_A_PIXEL)

@@ -31,6 +31,7 @@ use folder::Folder;
 pub use missing_textures::{MissingTextures, MissingTexturesError};
 pub use options::ImportOptions;
 use source_scene::SourceScene;
+use warnings::Warnings;
 
 /// Reads a scene from a `.gltf`, `.glb`, `.obj` or `.ply` file. Files that it refers to are read only
 /// from its own folder and below. The scene has the lights that the file lists, which may be none: see
@@ -52,11 +53,14 @@ pub fn load_file(path: &Path, limits: &Limits, options: impl Into<ImportOptions>
 fn read_source(path: &Path, limits: &Limits, options: &ImportOptions) -> Result<SourceScene, Fault> {
     let format = Format::from_path(path)?;
     let (folder, bytes) = Folder::opened_with(path, limits, options.missing_textures)?;
-    let mut source = match format {
-        Format::Gltf => gltf::read(&bytes, &folder, limits, &options.ignore_required)?,
-        Format::Obj => obj::read(&bytes, &folder, limits)?,
-        Format::Ply => ply::read(&bytes, &folder, limits)?,
+    let warnings = Warnings::default();
+    let read = match format {
+        Format::Gltf => gltf::read(&bytes, &folder, limits, &options.ignore_required, &warnings),
+        Format::Obj => obj::read(&bytes, &folder, limits, &warnings),
+        Format::Ply => ply::read(&bytes, &folder, limits, &warnings),
     };
+    warnings.log();
+    let mut source = read?;
     source.name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     Ok(source)
 }

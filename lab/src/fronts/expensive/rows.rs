@@ -12,16 +12,8 @@ pub const QUALITIES: [LightCacheQuality; 3] = [Fast, Balanced, Fine];
 /// Numbers of sample images, and their densities.
 const IMAGES: [usize; 2] = [1, 4];
 const DENSITIES: [f32; 3] = [0.25, 0.5, 1.0];
-/// Rays of direct drawing at each position, from the fewest. More than four to a lamp change little.
-pub const DIRECT_RAYS: [LightRays; 7] = [
-    LightRays::new(1, 1),
-    LightRays::new(2, 2),
-    LightRays::new(4, 4),
-    LightRays::new(4, 8),
-    LightRays::new(4, 16),
-    LightRays::new(4, 32),
-    LightRays::new(4, 64),
-];
+/// Rays of direct drawing at each position.
+pub const DIRECT_RAYS: [LightRays; 7] = LightRays::up_to(LightRays::new(4, 64));
 /// Rows of a subject: all qualities with all sets, `joint_carve`, and direct drawing.
 pub const ROWS: usize = QUALITIES.len() * IMAGES.len() * DENSITIES.len() + 1 + DIRECT_RAYS.len();
 

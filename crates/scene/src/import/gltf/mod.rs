@@ -57,13 +57,13 @@ pub(super) fn read(
     folder: &Folder,
     limits: &Limits,
     ignore_required: &[String],
+    warnings: &Warnings,
 ) -> Result<SourceScene, Fault> {
     let (json, binary_chunk) = if bytes.starts_with(GLB_MAGIC) { split(bytes)? } else { (bytes, None) };
-    let warnings = Warnings::default();
-    let root = json::parse(json, limits, &warnings)?;
-    extensions::check(&root, ignore_required, &warnings)?;
+    let root = json::parse(json, limits, warnings)?;
+    extensions::check(&root, ignore_required, warnings)?;
     check_counts(&root, limits)?;
-    let document = Document::open(&root, binary_chunk, folder, limits, &warnings)?;
+    let document = Document::open(&root, binary_chunk, folder, limits, warnings)?;
     let mut scene = SourceScene::default();
     materials::read(&document, &mut scene)?;
     let meshes = meshes::read(&document, &mut scene)?;
@@ -74,7 +74,6 @@ pub(super) fn read(
         return Err(Fault::malformed("scene", format!("it has no triangles in scene {number}")));
     }
     lights::expose(&mut scene);
-    warnings.log();
     Ok(scene)
 }
 

@@ -28,14 +28,7 @@ use attributes::Attributes;
 use faces::Faces;
 use text::{Line, for_each_line, without_byte_order_mark};
 
-pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
-    let warnings = Warnings::default();
-    let scene = read_with(bytes, folder, limits, &warnings);
-    warnings.log();
-    scene
-}
-
-fn read_with(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &Warnings) -> Result<SourceScene, Fault> {
+pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &Warnings) -> Result<SourceScene, Fault> {
     let mut file = ObjFile::default();
     for_each_line(&without_byte_order_mark(bytes), "", |line| file.read_line(line, limits, warnings))?;
     let mut scene = SourceScene::default();

@@ -31,14 +31,7 @@ use rows::{FaceRow, SkippedRow, VertexRow};
 use surface::Surface;
 use vertices::Vertices;
 
-pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits) -> Result<SourceScene, Fault> {
-    let warnings = Warnings::default();
-    let scene = read_with(bytes, folder, limits, &warnings);
-    warnings.log();
-    scene
-}
-
-fn read_with(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &Warnings) -> Result<SourceScene, Fault> {
+pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &Warnings) -> Result<SourceScene, Fault> {
     let text = PlyText::parse(bytes)?;
     // The last number of an ASCII file may lack the white space that ends it.
     let rows = text.header.as_bytes().chain(&*text.body).chain(&b"\n"[..]);
