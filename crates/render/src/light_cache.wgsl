@@ -378,8 +378,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {%- endif %}
     var known: Known;
     known.least_luminance = 3.0e38;
-    // Few points of later positions are asked. The software device leaves a loop where no lane asks, but runs a branch all the same.
-    {{ "for (var asks = is_asked; asks; asks = false)" if positions == "later" else "if is_asked" }} {
+    if is_asked {
 {%- if lamp_vectors %}
         find_lamps(camera.eye_in_world + point.offset);
 {%- endif %}
