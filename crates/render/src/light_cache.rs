@@ -18,7 +18,7 @@ pub(crate) const PROVENANCE_EMPTY: u32 = ProvenanceKind::Empty as u32;
 pub(crate) const PROVENANCE_HIT: u32 = ProvenanceKind::Hit as u32;
 pub(crate) const PROVENANCE_LIT_HERE: u32 = ProvenanceKind::LitHere as u32;
 
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct LookUp {
     by_rays: bool,
     environment_map: bool,
@@ -43,7 +43,17 @@ enum Positions {
     Only,
     /// The light of later ones may be that of this one.
     First,
+    /// Points are compared with those of the first position, and listed where they differ.
     Later,
+    /// The listed points of a later position.
+    Asked,
+}
+
+impl Positions {
+    /// Whether points are compared with those of other positions.
+    fn are_compared(self) -> bool {
+        matches!(self, Self::First | Self::Later)
+    }
 }
 
 impl LookUp {
@@ -93,6 +103,7 @@ impl ShaderVariant for LookUp {
                 Positions::Only => "only",
                 Positions::First => "first",
                 Positions::Later => "later",
+                Positions::Asked => "asked",
             },
             plane_count => self.plane_count,
             lamps_with_shares,
@@ -101,6 +112,7 @@ impl ShaderVariant for LookUp {
     }
 
     fn all() -> Vec<Self> {
+        let positions = [Positions::Only, Positions::First, Positions::Later, Positions::Asked];
         let mut variants = Vec::new();
         for light_count in [0, 1, 9, 40] {
             for [by_rays, environment_map, traced, visibility, provenance] in switches() {
@@ -112,7 +124,7 @@ impl ShaderVariant for LookUp {
                     sums: SumPlanes { light_count, visibility },
                     share_words: (1 + shares_of_lamps(light_count)).div_ceil(4),
                     camera_count: 1 + light_count % 4,
-                    positions: [Positions::Only, Positions::First, Positions::Later][variants.len() % 3],
+                    positions: positions[(variants.len() + variants.len() / 4) % 4],
                     plane_count: 2 + usize::from(provenance),
                     provenance_plane: provenance.then_some(2),
                 });
@@ -125,14 +137,27 @@ impl ShaderVariant for LookUp {
 /// Records the look-up at the surfaces of one camera's picture. Pixels that are to be lit come in a list for each piece.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
-    CachedLight { cache, tests }: CachedLight<'_>,
+    cached: CachedLight<'_>,
     picture: Picture<'_>,
 ) -> Result<(), RenderError> {
+    let variant = LookUp::new(recording.batch, cached.cache);
+    if variant.positions != Positions::Later {
+        return dispatch(recording, cached, picture, variant);
+    }
+    dispatch(recording, cached, Picture { lists: picture.asked, ..picture }, variant)?;
+    dispatch(recording, cached, picture, LookUp { positions: Positions::Asked, ..variant })
+}
+
+fn dispatch(
+    recording: &mut Recording<'_>,
+    CachedLight { cache, tests }: CachedLight<'_>,
+    picture: Picture<'_>,
+    variant: LookUp,
+) -> Result<(), RenderError> {
     let batch = recording.batch;
-    let variant = LookUp::new(batch, cache);
     let pass = recording.passes.get(&variant)?;
     let scene = batch.work.scene;
-    let Picture { camera, target, planes, lists } = picture;
+    let Picture { camera, target, planes, lists, asked } = picture;
     let uniform = cache.uniform(recording.gpu, scene, tests, &batch.cameras[camera]);
     let buffers = Buffers {
         cameras: &recording.cameras,
@@ -141,28 +166,36 @@ pub(crate) fn record(
         words: &planes.words,
         kept: planes.kept.as_deref().unwrap_or(&planes.words),
     };
-    let bound = lists.iter().map(|list| {
+    let is_asked = variant.positions == Positions::Asked;
+    let bound = lists.iter().enumerate().map(|(place, list)| {
         let own = bindings(&variant, &buffers, scene, &cache.samples);
         let normals = target.views.triangle_normal_binding();
-        let first = target.views.first_surface_binding().filter(|_| variant.positions != Positions::Only);
-        pass.bind(0, own.into_iter().chain(target.bindings()).chain(normals).chain(first).chain(list.bindings()))
+        let first = target.views.first_surface_binding().filter(|_| variant.positions.are_compared());
+        let asked = asked.get(place).filter(|_| is_asked).into_iter().flat_map(PixelList::asked_bindings);
+        let bindings = own.into_iter().chain(target.bindings()).chain(normals).chain(first);
+        pass.bind(0, bindings.chain(list.bindings()).chain(asked))
     });
     let bound = bound.collect::<Result<Vec<_>, _>>()?;
     let kind = WorkKind::new(batch.family(), &variant.name());
     recording.dispatch_pieces(kind, &pass, camera, |place, piece, width_px| {
-        (vec![&bound[place]], DispatchSize::Invocations([width_px, piece.end_row - piece.first_row, 1]))
+        let all = DispatchSize::Invocations([width_px, piece.end_row - piece.first_row, 1]);
+        let size = if is_asked { asked[place].size() } else { all };
+        (vec![&bound[place]], size)
     });
     Ok(())
 }
 
 /// A picture whose light is looked up.
+#[derive(Clone, Copy)]
 pub(crate) struct Picture<'p> {
     /// Its number in the batch.
     pub camera: usize,
     pub target: &'p Surfaces,
     pub planes: &'p Planes,
-    /// A list for each piece.
+    /// Pixels to be lit: a list for each piece.
     pub lists: &'p [PixelList],
+    /// Pixels that do not have the light of their first position: a list for each piece, in later positions.
+    pub asked: &'p [PixelList],
 }
 
 struct Buffers<'r> {
@@ -188,8 +221,7 @@ fn bindings<'r>(
         Binding::texture("samples", samples),
     ];
     bindings.extend(variant.provenance_plane.map(|_| Binding::buffer("words", buffers.words)));
-    let shares_light = variant.positions != Positions::Only;
-    bindings.extend(shares_light.then(|| Binding::buffer("kept", buffers.kept)));
+    bindings.extend(variant.positions.are_compared().then(|| Binding::buffer("kept", buffers.kept)));
     let map = scene.environment.as_deref().filter(|_| variant.environment_map);
     bindings.extend(map.into_iter().flat_map(GpuEnvironment::bindings));
     bindings
@@ -207,7 +239,7 @@ mod tests {
     fn every_variant_is_bound_by_its_names() {
         let stage = TestStage::new();
         let table = Table::new(&stage.gpu, "samples", TextureFormat::Rgba32Uint, &[[0_u32; 4]; 2]).expect("a table");
-        let list = PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), 1);
+        let [list, asked] = [(); 2].map(|()| PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), 1));
         let buffer = &stage.buffer;
         let buffers = Buffers { cameras: buffer, cache: buffer, sums: buffer, words: buffer, kept: buffer };
         for variant in LookUp::all() {
@@ -216,8 +248,10 @@ mod tests {
             own.extend(variant.environment_map.then(|| stage.environment.bindings()).into_iter().flatten());
             own.extend(target.bindings());
             own.extend(target.views.triangle_normal_binding());
-            own.extend(target.views.first_surface_binding().filter(|_| variant.positions != Positions::Only));
+            own.extend(target.views.first_surface_binding().filter(|_| variant.positions.are_compared()));
             own.extend(list.bindings());
+            let asked = Some(&asked).filter(|_| variant.positions == Positions::Asked);
+            own.extend(asked.into_iter().flat_map(PixelList::asked_bindings));
             stage.check(&variant, 0, &own);
         }
     }

@@ -1,6 +1,9 @@
 // Light of samples at the surfaces of a view. Each surface is projected into each sample image; of the four texels around
 // its place those count that lie on the same surface. What they say is averaged, and written as if rays had brought it.
 // Pixels that no image knows well enough are listed, to be lit by rays of their own. The twin is scalar/light_cache.rs.
+//
+// Most points at later positions within their pixels have the light of the first one. They are compared first; the others are listed,
+// and looked up in a pass over that list: the software device runs a branch that no lane takes.
 {% include "camera.wgsl" %}
 {% include "color.wgsl" %}
 {% include "normal.wgsl" %}
@@ -55,7 +58,12 @@ struct Cache {
 {%- if provenance_plane %}
 @group(0) var<storage, read_write> words: array<u32>;
 {%- endif %}
-{%- if positions != "only" %}
+{%- if positions == "asked" %}
+// Pixels whose light is looked up.
+struct Asked { workgroups: u32, y: u32, z: u32, count: u32, last_count: u32 }
+@group(0) var<storage, read> asked_pixels: array<u32>;
+@group(0) var<storage, read> asked: Asked;
+{%- elif positions != "only" %}
 // The surface of a pixel at its first position: its plane's distance from the eye, the normals of its triangle and of shading, and
 // its provenance.
 @group(0) var first_surfaces: {{ "texture_storage_2d<rgba32uint, write>" if positions == "first" else "texture_2d<u32>" }};
@@ -354,6 +362,52 @@ fn leave_to_rays(light: CachedLight, place: u32) {
     list_pixel(place);
 }
 
+fn point_at(pixel: vec2u, planar_depth_m: f32, surface: vec4u) -> Point {
+    return Point(
+        direction_of(pixel) * planar_depth_m, unit_from_oct16(surface.z), surface.z,
+        unit_from_oct16(textureLoad(triangle_normals, pixel, 0).x), planar_depth_m * camera.footprint,
+    );
+}
+
+// Writes the light of a point, or lists its pixel; gives its provenance.
+fn look_up(point: Point, place: u32) -> u32 {
+    var known: Known;
+    known.least_luminance = 3.0e38;
+{%- if lamp_vectors %}
+    find_lamps(camera.eye_in_world + point.offset);
+{%- endif %}
+{%- for number in range(camera_count) %}
+    consult(cache.cameras[{{ number }}u], {{ number }}u, point, &known);
+{%- endfor %}
+    if !is_known(known) {
+        leave_to_rays(known.light, place);
+        return PROVENANCE_LIT_HERE;
+    }
+{%- if visibility and light_count > max_lamp_shares %}
+    put_other_lamps(known.light, place);
+{%- endif %}
+    put_light(known.light, place);
+    return PROVENANCE_HIT | known.camera_mask << 8u;
+}
+
+fn put_origin(place: u32, origin: u32) {
+{%- if provenance_plane %}
+    words[camera.first_word + {{ provenance_plane }}u * camera.pixel_count + place] = origin;
+{%- endif %}
+}
+
+{%- if positions == "asked" %}
+
+@compute @workgroup_size(LIST_WORKGROUP)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= asked.count { return; }
+    let place = asked_pixels[id.x];
+    let pixel = vec2u(place % camera.size_px.x, place / camera.size_px.x);
+    let planar_depth_m = camera.near_m / max(reversed_depth_at(pixel), 1e-30);
+    put_origin(place, look_up(point_at(pixel, planar_depth_m, surface_at(pixel)), place));
+}
+{%- else %}
+
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let pixel = pixel_at(id, 1u);
@@ -363,51 +417,27 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let surface = surface_at(pixel);
     let met = depth > 0.0;
     let needs_light = met && (surface.x & SHOWN_AS_IT_IS) == 0u;
-    let planar_depth_m = camera.near_m / max(depth, 1e-30);
-    let point = Point(
-        direction_of(pixel) * planar_depth_m, unit_from_oct16(surface.z), surface.z,
-        unit_from_oct16(textureLoad(triangle_normals, pixel, 0).x), planar_depth_m * camera.footprint,
-    );
+    let point = point_at(pixel, camera.near_m / max(depth, 1e-30), surface);
+    var origin = select(PROVENANCE_EMPTY, PROVENANCE_HIT, met);
 {%- if positions == "later" %}
     let kept_place = camera.first_word / {{ plane_count }}u + place;
     let first = textureLoad(first_surfaces, pixel, 0);
-    let is_kept = needs_light && kept[kept_place] == 1u && is_like_first(point, first);
-    let is_asked = needs_light && !is_kept;
+    let is_kept = kept[kept_place] == 1u && is_like_first(point, first);
+    if needs_light && is_kept { origin = first.w; }
+    if needs_light && !is_kept {
+        kept[kept_place] = 0u;
+        list_pixel(place);
+    }
 {%- else %}
-    let is_asked = needs_light;
+    if needs_light { origin = look_up(point, place); }
 {%- endif %}
-    var known: Known;
-    known.least_luminance = 3.0e38;
-    if is_asked {
-{%- if lamp_vectors %}
-        find_lamps(camera.eye_in_world + point.offset);
-{%- endif %}
-{%- for number in range(camera_count) %}
-        consult(cache.cameras[{{ number }}u], {{ number }}u, point, &known);
-{%- endfor %}
-    }
-    let is_answered = is_asked && is_known(known);
-    if is_answered {
-{%- if visibility and light_count > max_lamp_shares %}
-        put_other_lamps(known.light, place);
-{%- endif %}
-        put_light(known.light, place);
-    }
-    let is_unknown = is_asked && !is_answered;
-    if is_unknown { leave_to_rays(known.light, place); }
-    var origin = select(PROVENANCE_EMPTY, PROVENANCE_HIT, met);
-    origin = select(origin, PROVENANCE_HIT | known.camera_mask << 8u, is_answered);
-    origin = select(origin, PROVENANCE_LIT_HERE, is_unknown);
 {%- if positions == "first" %}
+    let is_answered = needs_light && origin != PROVENANCE_LIT_HERE;
     kept[camera.first_word / {{ plane_count }}u + place] = select(0u, 1u, is_answered);
     let from_eye_m = dot(point.triangle_normal, point.offset);
     let triangle_normal = textureLoad(triangle_normals, pixel, 0).x;
     textureStore(first_surfaces, pixel, vec4u(bitcast<u32>(from_eye_m), triangle_normal, surface.z, origin));
-{%- elif positions == "later" %}
-    origin = select(origin, first.w, is_kept);
-    if is_asked { kept[kept_place] = 0u; }
 {%- endif %}
-{%- if provenance_plane %}
-    words[camera.first_word + {{ provenance_plane }}u * camera.pixel_count + place] = origin;
-{%- endif %}
+    put_origin(place, origin);
 }
+{%- endif %}

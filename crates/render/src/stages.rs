@@ -210,11 +210,13 @@ impl Stages {
         let parts = batch.parts(&self.gpu, &recording.pieces, &recording.sums);
         for (camera, target) in surfaces.iter().enumerate() {
             let lists = self.lists(recording, camera);
-            light_cache::record(recording, cached, Picture { camera, target, planes, lists: &lists })?;
+            let asked = if batch.position.number > 0 { self.lists(recording, camera) } else { Vec::new() };
+            let picture = Picture { camera, target, planes, lists: &lists, asked: &asked };
+            light_cache::record(recording, cached, picture)?;
             if batch.has_color() {
                 illuminate::record(recording, &parts, (camera, slice::from_ref(target)), (1, Some(&lists)))?;
             }
-            all.extend(lists);
+            all.extend(lists.into_iter().chain(asked));
         }
         Ok(all)
     }
