@@ -1,6 +1,7 @@
 //! `myriorama-lab`: measurements of the product, each as a report. Its commands are `bench` and `study`.
 //!
-//! [`mod@bench`] compares measured values with bars. [`lages`] and [`sampling_study`] repeat the experiments of papers.
+//! [`mod@bench`] compares measured values with bars. [`lages`], [`sampling_study`] and [`layered`] repeat the experiments of papers.
+//! All studies are rows that are measured and reported by [`study`].
 //! [`load`] and [`scaling`] start clusters of processes. [`failures`] holds the shapes of curves of errors.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
@@ -15,14 +16,10 @@ mod fronts;
 mod impostors;
 mod lages;
 mod layered;
-mod light_cache_study;
-mod lighting_study;
-mod lit_views;
+mod lit;
 mod load;
 mod memory;
 mod models;
-mod placement;
-mod planner_study;
 mod process;
 mod promise;
 mod reference_views;
@@ -32,10 +29,10 @@ mod section;
 mod sharing;
 mod stability;
 mod statistics;
+mod study;
 mod sweep;
 #[cfg(test)]
 mod tests;
-mod view_errors;
 mod viewer;
 
 use std::process::ExitCode;
@@ -80,11 +77,10 @@ mod command_line_tests {
 
     #[test]
     fn input_that_cannot_be_used_is_named_with_status_2() {
-        let cases: [(&[&str], &str); 4] = [
+        let cases: [(&[&str], &str); 3] = [
             (&["study", "fronts", "--subject", "nowhere"], "nowhere"),
             (&["study", "light_cache", "--subject", "nowhere"], "nowhere"),
             (&["study", "light_cache", "--subject", "helmet", "--models", "/nowhere/models"], "/nowhere/models"),
-            (&["study", "fronts", "--conditions", "/nowhere/absent.toml"], "absent.toml"),
         ];
         for (arguments, named) in cases {
             let result = parsed(arguments).unwrap().command.run();

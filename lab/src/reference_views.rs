@@ -8,7 +8,7 @@ use app_core::setup::{SceneArgs, Setup};
 use codec::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
 use depth_image::{DepthImage, PinholeCamera, SampleImage, View, ViewPlanes};
 use engine::GpuEngine;
-use metrics::{PixelClass, classify, unheld_rate};
+use metrics::{PixelClass, classify};
 use node::{DirectWork, Engine as _, SampleWork, Turn, WorkClass};
 use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
 use render::Lighting;
@@ -63,18 +63,6 @@ impl ReferenceViews {
     /// The classes of the pixels of every view.
     pub(crate) fn classes(&self) -> &[Vec<PixelClass>] {
         &self.classes
-    }
-
-    /// The share of the views' pixels with a surface whose surface no sample image holds.
-    ///
-    /// # Errors
-    /// A view has no depth.
-    pub fn unheld(&self) -> anyhow::Result<f64> {
-        let rate = |(camera, view): (&PinholeCamera, &View)| {
-            Ok(unheld_rate(camera, inverse_depth(view)?, &self.images)?.unwrap_or(0.0))
-        };
-        let rates = self.cameras.iter().zip(&self.views).map(rate).collect::<anyhow::Result<Vec<_>>>()?;
-        Ok(rates.iter().sum::<f64>() / rates.len() as f64)
     }
 
     /// The same views drawn from the scene in another light, with depth.

@@ -14,7 +14,6 @@ use scene::{Limits, MissingTextures, Scene, SceneSpec};
 
 use super::paper::LightField;
 use crate::failures::stand::{Stand, work};
-use crate::impostors::around;
 
 /// A scene on the device, and views around it, drawn directly.
 pub struct Subject<'s> {
@@ -35,14 +34,6 @@ pub struct Cube {
 }
 
 impl<'s> Subject<'s> {
-    /// Loads a built-in scene and draws views on a circle around it.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub fn new(stand: &'s Stand, name: &'static str, lighting: Lighting, views: usize) -> anyhow::Result<Self> {
-        Self::of_views(stand, name, lighting, |bounds| around(bounds, views))
-    }
-
     /// Loads a built-in scene and draws views of it, which its bounds place.
     ///
     /// # Errors

@@ -25,8 +25,12 @@ pub struct SceneRow {
     pub(super) available: Vec<Availability>,
 }
 
-/// Measures a scene, and adds its false colours.
-pub fn scene_report(subject: &Subject, extent: Extent, report: &mut Report) -> anyhow::Result<SceneRow> {
+impl SceneRow {
+    /// Measures a scene, and adds its false colours.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn measure(subject: &Subject, extent: Extent, report: &mut Report) -> anyhow::Result<Self> {
     let size_px = UVec2::splat(extent.side_px);
     let sets =
         METHODS.iter().map(|&method| subject.sample(method, size_px, WITH_IDS)).collect::<Result<Vec<_>, _>>()?;
@@ -54,19 +58,6 @@ pub fn scene_report(subject: &Subject, extent: Extent, report: &mut Report) -> a
         .map(|(&method, set)| seen(&rays, method, set, &viewpoints, &views, extent.seeds))
         .collect();
     report.pictures.push(pictures::false_colors(&subject.name, &sets, &counts));
-    Ok(SceneRow { name: subject.name.clone(), counts, seen, available })
+    Ok(Self { name: subject.name.clone(), counts, seen, available })
 }
-
-impl SceneRow {
-    pub(super) fn of<'a, T>(&self, rows: &'a [T], method: SamplingMethod) -> Option<&'a T> {
-        METHODS.iter().position(|&other| other == method).and_then(|place| rows.get(place))
-    }
-
-    pub(super) fn useful(&self, method: SamplingMethod) -> usize {
-        self.of(&self.counts, method).map_or(0, |images| images.iter().map(ImageCount::useful_count).sum())
-    }
-
-    pub(super) fn availability(&self, method: SamplingMethod) -> Availability {
-        self.of(&self.available, method).copied().unwrap_or_default()
-    }
 }

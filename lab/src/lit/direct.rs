@@ -1,38 +1,8 @@
-//! True views, and direct drawing at equal error.
+//! Direct drawing at equal error.
 
-use depth_image::{Antialias, PinholeCamera, View, ViewPlanes};
 use report::{Cell, Point};
 
-use super::light::SAMPLES_A_PIXEL;
-use super::subject::Stage;
 use crate::compare::time_at;
-use crate::failures::cached_light::{LitScene, unknown_share};
-use crate::failures::measures::mean;
-
-/// Planes of views with depth, for errors over the foreground.
-pub fn planes(samples_a_pixel: u32) -> ViewPlanes {
-    ViewPlanes { antialias: Antialias::of(samples_a_pixel).unwrap_or_default(), ..ViewPlanes::WITH_DEPTH }
-}
-
-/// The stage's views in another lighting, with other noise than direct drawing from the same cameras.
-///
-/// Seeds are made from the bits of a camera's eye: from the next place in x the picture is the same, and its noise another.
-///
-/// # Errors
-/// The device fails.
-pub fn true_views(stage: &Stage<'_>, lighting: &str) -> anyhow::Result<Vec<View>> {
-    let mut cameras = stage.views.clone();
-    cameras.iter_mut().for_each(|camera| camera.eye_in_world.x = camera.eye_in_world.x.next_up());
-    stage.lit.in_light(lighting)?.views(&cameras, planes(SAMPLES_A_PIXEL))
-}
-
-/// The share of surface pixels whose light no sample knows, as the mean over views; `None` without views.
-///
-/// # Errors
-/// The device fails.
-pub fn unknown(lit: &LitScene<'_>, cameras: &[PinholeCamera]) -> anyhow::Result<Option<f64>> {
-    Ok(mean(lit.views(cameras, ViewPlanes::WITH_PROVENANCE)?.iter().map(unknown_share)))
-}
 
 /// Rows of direct drawing, as points of the time of a view in ms and of its FLIP.
 pub struct DirectCurve(Vec<Point>);

@@ -25,7 +25,7 @@ pub const INSIDE: [Inside; 2] = [
 ];
 const INSIDE_FOV_Y_RAD: f32 = 1.0;
 
-/// A scene. The name says after a comma what is special about the subject, if anything is.
+/// A scene. After a comma the name says where viewers stand, if not in front of the scene.
 pub struct Subject {
     pub name: &'static str,
     scene: SceneSpec,
@@ -37,8 +37,6 @@ pub struct Inside {
     eyes: [[f32; 3]; 2],
     towards: [f32; 3],
 }
-
-pub type Change = fn(Scene) -> anyhow::Result<Scene>;
 
 /// The views of a subject: the first `count` places of an orbit of eight.
 #[derive(Debug, Clone, Copy)]
@@ -61,7 +59,6 @@ pub struct Stage<'s> {
     pub stand: &'s Stand,
     pub scene: Scene,
     pub lit: LitScene<'s>,
-    pub period_s: f32,
     pub views: Vec<PinholeCamera>,
     corners: Vec<PinholeCamera>,
     cell: ViewCell,
@@ -81,13 +78,17 @@ impl Subject {
         Ok(Some(Self { name, scene }))
     }
 
+    /// Whether viewers stand among the surfaces that light each other.
+    pub fn is_interior(&self) -> bool {
+        INSIDE.iter().any(|cell| cell.name == self.name)
+    }
+
     /// Puts the scene on the device.
     pub fn stage<'s>(
         &self,
         stand: &'s Stand,
         lighting: Lighting,
         views: OrbitViews,
-        change: Change,
     ) -> anyhow::Result<Stage<'s>> {
         let args = SceneArgs { impostors: Impostors::None, ..SceneArgs::new(self.scene.clone()) };
         let Setup { scene, around, .. } = args.load()?;
@@ -98,10 +99,8 @@ impl Subject {
         let cell = ViewCell::between(&corners).context("no sample cameras")?;
         let mut cameras = cell.orbit(PLACES, views.size_px);
         cameras.truncate(views.count);
-        let period_s = scene.period_s().unwrap_or(0.0);
-        let scene = change(scene)?;
         let lit = LitScene::new(stand, &scene, &lighting.to_string())?.by_faster_way(&cameras[0])?;
-        Ok(Stage { stand, scene, lit, period_s, views: cameras, corners, cell })
+        Ok(Stage { stand, scene, lit, views: cameras, corners, cell })
     }
 }
 

@@ -1,21 +1,108 @@
-//! Checks of fronts under expensive light.
+//! Fronts of cost against error under expensive light, part of `study fronts`.
+//!
+//! The rows are not those of the ladder: the planner does not choose among qualities of shared light, and direct drawing
+//! has an error here, the noise of its few rays.
 
-use depth_image::LightCacheQuality::Balanced;
-use report::{Bar, Check};
+use std::path::Path;
 
-use super::measure::LightFront;
-use super::rows::{Drawing, LightRow, ROWS};
-use crate::lit_views::light::Light;
-use crate::lit_views::subject::SetSize;
+use anyhow::Context as _;
+use depth_image::LightCacheQuality::{self, Balanced, Fast, Fine};
+use glam::UVec2;
+use render::Lighting;
+use report::{Bar, Check, Report};
 
+use super::light::{DIRECT_RAYS, Light, LightRays};
+use super::measure::{Drawing, LightFront, LightRow, LitRows};
+use super::report::add_to;
+use super::subject::{OrbitViews, SetSize, Subject, VIEW_PX};
+use crate::failures::stand::Stand;
+
+/// Two interiors, and two subjects that are seen from outside; the quick ones come first.
+const SUBJECTS: [&str; 4] = ["courtyard, inside", "urban, inside", "tree-terrain-500k", "FlightHelmet"];
+const QUICK_SUBJECTS: usize = 1;
+const VIEWS: OrbitViews = OrbitViews { count: 8, size_px: VIEW_PX };
+const QUICK_VIEWS: OrbitViews = OrbitViews { count: 3, size_px: UVec2::new(160, 90) };
+const QUALITIES: [LightCacheQuality; 3] = [Fast, Balanced, Fine];
+/// Numbers of sample images, and their densities.
+const IMAGES: [usize; 2] = [1, 4];
+const DENSITIES: [f32; 3] = [0.25, 0.5, 1.0];
+/// Rows of a subject: all qualities with all sets, `joint_carve`, and direct drawing.
+const ROWS: usize = QUALITIES.len() * IMAGES.len() * DENSITIES.len() + 1 + DIRECT_RAYS.len();
 /// FLIP of direct drawing with the most rays over that with the fewest: the reference shows what rays bring.
 const MOST_DIRECT_RATIO: f64 = 0.6;
 /// FLIP of direct drawing over that of `balanced` in the same time, in interiors.
 const LEAST_INDIRECT_RATIO: f64 = 1.5;
 const LEAST_OCCLUSION_RATIO: f64 = 1.2;
 
-pub fn checks(front: &LightFront) -> Vec<Check> {
-    let name = |what: &str| format!("{}: {what}", front.name);
+pub fn subject_names(is_quick: bool) -> &'static [&'static str] {
+    if is_quick { &SUBJECTS[..QUICK_SUBJECTS] } else { &SUBJECTS }
+}
+
+/// A subject under one lighting.
+pub struct LitWork {
+    /// `None` for a model without a folder of models.
+    subject: Option<Subject>,
+    name: &'static str,
+    lighting: Lighting,
+}
+
+/// The named subjects under each light.
+///
+/// # Errors
+/// The folder of models lacks one.
+pub fn wanted(names: &[&'static str], lights: &[Light], models: Option<&Path>) -> anyhow::Result<Vec<LitWork>> {
+    let mut wanted = Vec::new();
+    for &name in names {
+        for light in lights {
+            let subject = Subject::new(name, models)?;
+            wanted.push(LitWork { subject, name, lighting: light.lighting(rays(*light)).parse()? });
+        }
+    }
+    Ok(wanted)
+}
+
+/// Rays a pixel of all rows but direct drawing.
+fn rays(light: Light) -> LightRays {
+    match light {
+        Light::Indirect => LightRays::new(16, 64),
+        Light::Occlusion => LightRays::new(16, 16),
+    }
+}
+
+fn sets() -> Vec<SetSize> {
+    IMAGES.into_iter().flat_map(|images| DENSITIES.map(|density| SetSize { images, density })).collect()
+}
+
+/// Adds tables, charts and checks of all subjects.
+///
+/// # Errors
+/// A scene cannot be used, or the device fails.
+pub fn measure(stand: &Stand, wanted: &[LitWork], is_quick: bool, report: &mut Report) -> anyhow::Result<()> {
+    let views = if is_quick { QUICK_VIEWS } else { VIEWS };
+    let rows = LitRows {
+        direct: &DIRECT_RAYS,
+        qualities: &QUALITIES,
+        sets: sets(),
+        has_joint_carve: true,
+        views,
+        runs: 1,
+    };
+    report.parameter("expensive light: views a row", format!("{} of {}", views.count, views.size_px));
+    for LitWork { subject, name, lighting } in wanted {
+        let Some(subject) = subject else {
+            let name = format!("{name}, {lighting}: measured");
+            report.checks.push(Check::not_run(name, "", Bar::Equal(1.0), "--models is not given"));
+            continue;
+        };
+        let front = rows.measure(stand, subject, *lighting).with_context(|| format!("subject {name:?}"))?;
+        add_to(report, &front)?;
+        report.checks.extend(checks(&front));
+    }
+    Ok(())
+}
+
+fn checks(front: &LightFront) -> Vec<Check> {
+    let name = |what: &str| format!("{}: {what}", front.name());
     let not_finite = front.rows.iter().filter(|row| !is_finite(row)).count();
     let mut checks = vec![
         Check::new(name("rows"), front.rows.len() as f64, "", Bar::Equal(ROWS as f64)),
@@ -48,11 +135,6 @@ pub fn checks(front: &LightFront) -> Vec<Check> {
     checks
 }
 
-/// Says that a subject is left out, since it is a file and no folder is given.
-pub fn left_out(subject: &str) -> Check {
-    Check::not_run(format!("{subject}: measured"), "", Bar::Equal(1.0), "--models is not given")
-}
-
 fn is_finite(row: &LightRow) -> bool {
     [row.view_ms, row.sampling_s, row.flip, row.psnr_db, row.unknown.unwrap_or(0.0)]
         .iter()
@@ -67,9 +149,7 @@ fn direct_ratio(front: &LightFront) -> Option<f64> {
 
 /// Direct drawing that is slower than `balanced` even with the fewest rays is compared all the same.
 fn equal_time_ratio(front: &LightFront) -> Option<f64> {
-    let is_balanced =
-        |row: &&LightRow| row.drawing == Drawing::LightCache(Balanced) && row.set == Some(SetSize::DEFAULT);
-    let balanced = front.rows.iter().find(is_balanced)?;
+    let balanced = front.at_quality(Balanced)?;
     Some(front.direct().flip_at(balanced.view_ms)? / balanced.flip)
 }
 
@@ -77,7 +157,6 @@ fn equal_time_ratio(front: &LightFront) -> Option<f64> {
 mod tests {
     use report::Outcome;
 
-    use super::super::rows::{DIRECT_RAYS, QUALITIES, sets};
     use super::*;
 
     /// Direct drawing halves its error in twice the time; shared light has one time and one error.
@@ -101,7 +180,8 @@ mod tests {
         }
         rows.push(row(Drawing::JointCarve, Some(SetSize::DEFAULT), 20.0, 0.2));
         let truth = Light::Indirect.truth(DIRECT_RAYS[6]);
-        LightFront { name: "a room".to_owned(), light: Light::Indirect, is_interior: true, truth, rows }
+        let lighting = "soft 16, indirect 64".parse().unwrap();
+        LightFront { subject: "a room", lighting, light: Light::Indirect, is_interior: true, truth, rows }
     }
 
     fn falls_short(front: &LightFront) -> usize {

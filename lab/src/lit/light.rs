@@ -3,6 +3,19 @@
 use render::Lighting;
 
 pub const SAMPLES_A_PIXEL: u32 = 4;
+/// Rays to a lamp that are as good as any.
+const MOST_TO_LAMPS: u32 = 16;
+
+/// Rays of direct drawing at each position, from the fewest on. More than four to a lamp change little.
+pub const DIRECT_RAYS: [LightRays; 7] = [
+    LightRays::new(1, 1),
+    LightRays::new(2, 2),
+    LightRays::new(4, 4),
+    LightRays::new(4, 8),
+    LightRays::new(4, 16),
+    LightRays::new(4, 32),
+    LightRays::new(4, 64),
+];
 
 /// The kind of light that is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,18 +38,9 @@ impl LightRays {
         Self { to_lamps, ambient }
     }
 
-    /// Rays at a position, from the fewest up to `most`. More than four to a lamp change little.
-    pub const fn up_to(most: Self) -> [Self; 7] {
-        [Self::new(1, 1), Self::new(2, 2), Self::new(4, 4), Self::new(4, 8), Self::new(4, 16), Self::new(4, 32), most]
-    }
-
     /// The rays of a pixel, if these are the rays of each of its positions.
     pub fn a_pixel(self) -> Self {
-        self.times(SAMPLES_A_PIXEL)
-    }
-
-    fn times(self, factor: u32) -> Self {
-        Self { to_lamps: self.to_lamps * factor, ambient: self.ambient * factor }
+        Self { to_lamps: self.to_lamps * SAMPLES_A_PIXEL, ambient: self.ambient * SAMPLES_A_PIXEL }
     }
 }
 
@@ -51,8 +55,10 @@ impl Light {
         format!("soft {to_lamps}, {term} {ambient}")
     }
 
-    /// The lighting of true views: twice the rays, at each position, of the direct drawing with the most rays.
-    pub fn truth(self, most_a_position: LightRays) -> String {
-        self.lighting(most_a_position.a_pixel().times(2))
+    /// The lighting of true views: twice as many rays at each position as direct drawing has at most.
+    pub fn truth(self, most_rays: LightRays) -> String {
+        let LightRays { to_lamps, ambient } = most_rays;
+        let rays = LightRays::new(2 * to_lamps.max(MOST_TO_LAMPS), 2 * ambient);
+        self.lighting(rays.a_pixel())
     }
 }
