@@ -132,12 +132,5 @@ fn planned(subject: &Subject, planning: &Planning, pricing: EqualNodes, budget: 
         Choice::Row(row) => planning.ladder.rows()[row].to_string(),
         Choice::Direct => "direct".to_owned(),
     };
-    Ok(Planned {
-        budget,
-        choice: outcome.choice,
-        name,
-        price: outcome.price,
-        error_ratio,
-        spent_s: planner.spent_s(),
-    })
+    Ok(Planned { budget, choice: outcome.choice, name, price: outcome.price, error_ratio, spent_s: planner.spent_s() })
 }

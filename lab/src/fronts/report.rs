@@ -103,7 +103,8 @@ pub fn add_to(report: &mut Report, front: &Front) -> anyhow::Result<()> {
     let name = front.conditions.name;
     report.parameter(format!("{name}: scene"), front.scene_hash.as_str());
     let mut rows = table(format!("{ROWS}{name}"), &ROW_COLUMNS, &front.rows)?;
-    let direct = [Cell::from("direct"), Cell::Missing, Cell::Missing, Cell::Missing, (front.direct.node_s * 1e3).into()];
+    let direct =
+        [Cell::from("direct"), Cell::Missing, Cell::Missing, Cell::Missing, (front.direct.node_s * 1e3).into()];
     rows.push(direct.into_iter().chain(vec![Cell::Missing; ROW_COLUMNS.len() - 5]))?;
     let plan = |planned| PlanRow { planned, cheapest_s: cheapest_s(front, planned) };
     let plans: Vec<PlanRow<'_>> = front.planned.iter().map(plan).collect();

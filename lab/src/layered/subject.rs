@@ -119,11 +119,6 @@ impl<'s> Subject<'s> {
 }
 
 impl Cube {
-    /// Samples of all three images.
-    pub fn samples(&self) -> usize {
-        self.images.iter().map(LayeredDepthImage::sample_count).sum()
-    }
-
     /// Bytes of all three images as samplers send them.
     ///
     /// # Errors

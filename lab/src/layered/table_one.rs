@@ -7,8 +7,8 @@ use render::{LayerSelection, Lighting};
 use report::{Cell, PictureRow, Report, Table};
 
 use super::baselines::Cubes;
-use super::paper::{Column, Layers, LightField, MB, TABLE_1};
 use super::mirrors::TimedViews;
+use super::paper::{Column, Layers, LightField, MB, TABLE_1};
 use super::subject::Subject;
 use super::views::LAYERED;
 use super::{figures, glossy, mirrors, storage};

@@ -79,14 +79,8 @@ fn sets() -> Vec<SetSize> {
 /// A scene cannot be used, or the device fails.
 pub fn measure(stand: &Stand, wanted: &[LitWork], is_quick: bool, report: &mut Report) -> anyhow::Result<()> {
     let views = if is_quick { QUICK_VIEWS } else { VIEWS };
-    let rows = LitRows {
-        direct: &DIRECT_RAYS,
-        qualities: &QUALITIES,
-        sets: sets(),
-        has_joint_carve: true,
-        views,
-        runs: 1,
-    };
+    let rows =
+        LitRows { direct: &DIRECT_RAYS, qualities: &QUALITIES, sets: sets(), has_joint_carve: true, views, runs: 1 };
     report.parameter("expensive light: views a row", format!("{} of {}", views.count, views.size_px));
     for LitWork { subject, name, lighting } in wanted {
         let Some(subject) = subject else {

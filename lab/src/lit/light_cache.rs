@@ -39,13 +39,8 @@ const QUICK_OCCLUSION: [&str; 3] = ["lamborghini", "courtyard", "tree-terrain-12
 const INDIRECT: [&str; 4] = ["courtyard, inside", "gallery", "urban, inside", EXPENSIVE_SCENE];
 const QUICK_INDIRECT: usize = 2;
 /// Rays of occlusion beyond these change little.
-const OCCLUSION_RAYS: [LightRays; 5] = [
-    LightRays::new(1, 1),
-    LightRays::new(2, 2),
-    LightRays::new(4, 4),
-    LightRays::new(8, 8),
-    LightRays::new(16, 16),
-];
+const OCCLUSION_RAYS: [LightRays; 5] =
+    [LightRays::new(1, 1), LightRays::new(2, 2), LightRays::new(4, 4), LightRays::new(8, 8), LightRays::new(16, 16)];
 /// The scene that gains most.
 const EXPENSIVE_SCENE: &str = "tree-terrain-500k";
 

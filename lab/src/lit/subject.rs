@@ -84,12 +84,7 @@ impl Subject {
     }
 
     /// Puts the scene on the device.
-    pub fn stage<'s>(
-        &self,
-        stand: &'s Stand,
-        lighting: Lighting,
-        views: OrbitViews,
-    ) -> anyhow::Result<Stage<'s>> {
+    pub fn stage<'s>(&self, stand: &'s Stand, lighting: Lighting, views: OrbitViews) -> anyhow::Result<Stage<'s>> {
         let args = SceneArgs { impostors: Impostors::None, ..SceneArgs::new(self.scene.clone()) };
         let Setup { scene, around, .. } = args.load()?;
         let corners = match INSIDE.iter().find(|cell| cell.name == self.name) {

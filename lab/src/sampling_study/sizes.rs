@@ -41,11 +41,8 @@ const COLUMNS: [Column<SizeRow>; 7] = [
 /// A metric by pixel and by visibility.
 type Metric = (&'static str, fn(&SizeRow) -> [f64; 2]);
 
-const METRICS: [Metric; 3] = [
-    ("redundant", |row| row.redundant),
-    ("disoccluded", |row| row.disoccluded),
-    ("useful", |row| row.useful),
-];
+const METRICS: [Metric; 3] =
+    [("redundant", |row| row.redundant), ("disoccluded", |row| row.disoccluded), ("useful", |row| row.useful)];
 
 /// Measures a scene if the paper shows it.
 ///

@@ -29,8 +29,6 @@ pub struct Subject {
     pub name: String,
     /// The scene on offer.
     pub setup: Setup,
-    /// Arguments of the scene, all by default.
-    pub args: SceneArgs,
     rig: Rig,
     pub(super) engine: Arc<GpuEngine>,
     pub(super) scene: Arc<GpuScene>,
@@ -67,7 +65,7 @@ impl Subject {
         let rig = raised(&Rig::in_front_of(&setup.scene.bounds(), SPREAD_RAD).with_context(|| name.to_owned())?);
         let (scene, engine) = (engine.scene(&hash)?, engine.clone());
         let sampler = Sampler::sharing(engine.renderer.clone());
-        Ok(Self { name: name.to_owned(), setup, args, rig, engine, scene, sampler })
+        Ok(Self { name: name.to_owned(), setup, rig, engine, scene, sampler })
     }
 
     /// The sample cameras of a method.
