@@ -1,7 +1,7 @@
 //! `myriorama-lab`: measurements of the product, each as a report. Its commands are `bench` and `study`.
 //!
 //! [`mod@bench`] compares measured values with bars. [`lages`] and [`sampling_study`] repeat the experiments of papers.
-//! [`load`] and [`scaling`] start clusters of processes. [`failures`] holds the shapes of curves of errors.
+//! [`load`] and [`scaling`] start clusters of [`processes`]. [`failures`] holds the shapes of curves of errors.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod balance;
@@ -16,7 +16,6 @@ mod impostors;
 mod lages;
 mod layered;
 mod light_cache_study;
-mod lighting_study;
 mod lit_views;
 mod load;
 mod memory;
@@ -24,7 +23,7 @@ mod models;
 mod placement;
 mod planner_study;
 mod process;
-mod promise;
+mod processes;
 mod reference_views;
 mod sampling_study;
 mod scaling;
@@ -32,7 +31,6 @@ mod section;
 mod sharing;
 mod stability;
 mod statistics;
-mod sweep;
 #[cfg(test)]
 mod tests;
 mod view_errors;

@@ -19,6 +19,3 @@ mod times;
 mod visibility;
 
 pub(crate) use detection::found_redundant;
-pub use extent::Extent;
-pub use subject::{SCENES, Subject};
-pub use times::{times, times_report};
