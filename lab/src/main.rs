@@ -2,7 +2,7 @@
 //!
 //! [`mod@bench`] compares measured values with bars. [`lages`], [`sampling_study`] and [`layered`] repeat the experiments of papers.
 //! All studies are rows that are measured and reported by [`study`].
-//! [`load`] and [`scaling`] start clusters of processes. [`failures`] holds the shapes of curves of errors.
+//! [`load`] and [`scaling`] start clusters of [`processes`]. [`failures`] holds the shapes of curves of errors.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod balance;
@@ -21,7 +21,7 @@ mod load;
 mod memory;
 mod models;
 mod process;
-mod promise;
+mod processes;
 mod reference_views;
 mod sampling_study;
 mod scaling;
@@ -30,7 +30,6 @@ mod sharing;
 mod stability;
 mod statistics;
 mod study;
-mod sweep;
 #[cfg(test)]
 mod tests;
 mod viewer;

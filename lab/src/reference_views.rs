@@ -65,70 +65,12 @@ impl ReferenceViews {
         &self.classes
     }
 
-    /// The same views drawn from the scene in another light, with depth.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub fn drawn(&self, setup: &Setup, lighting: Lighting) -> anyhow::Result<Vec<View>> {
-        self.drawn_from(setup, lighting, &self.cameras, ViewPlanes::WITH_DEPTH)
-    }
-
-    /// Views of other cameras drawn from the scene.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub(crate) fn drawn_from(
-        &self,
-        setup: &Setup,
-        lighting: Lighting,
-        cameras: &[PinholeCamera],
-        planes: ViewPlanes,
-    ) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.draw_direct(&direct_work(setup, lighting, cameras, planes), TURN)?)
-    }
-
     /// Reconstructs all views.
     ///
     /// # Errors
     /// The device fails.
     pub fn reconstruct(&self, method: ReconstructionMethod, planes: ViewPlanes) -> anyhow::Result<Vec<View>> {
-        self.reconstruct_at(&self.cameras, method, planes)
-    }
-
-    /// As [`ReferenceViews::reconstruct`], each position within a pixel by itself.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub(crate) fn reconstruct_whole(
-        &self,
-        method: ReconstructionMethod,
-        planes: ViewPlanes,
-    ) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.reconstructor.reconstruct_whole(&self.set, &self.cameras, method, planes)?)
-    }
-
-    /// Reconstructs the views of other cameras.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub(crate) fn reconstruct_at(
-        &self,
-        cameras: &[PinholeCamera],
-        method: ReconstructionMethod,
-        planes: ViewPlanes,
-    ) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.reconstructor.reconstruct(&self.set, cameras, method, planes)?)
-    }
-
-    /// Reconstructs all views and counts the fetches of a ray; NaN where they cannot be counted.
-    pub(crate) fn reconstruct_counted(
-        &self,
-        method: ReconstructionMethod,
-        planes: ViewPlanes,
-    ) -> anyhow::Result<(Vec<View>, f64)> {
-        let reconstructor = &self.engine.reconstructor;
-        let (views, statistics) = reconstructor.reconstruct_measured(&self.set, &self.cameras, method, planes, true)?;
-        Ok((views, statistics.fetches_per_ray.unwrap_or(f64::NAN)))
+        Ok(self.engine.reconstructor.reconstruct(&self.set, &self.cameras, method, planes)?)
     }
 
     /// Milliseconds a view in one batch of `at_least` views or more: the median of `runs` after one that does not
@@ -151,7 +93,7 @@ impl ReferenceViews {
 }
 
 /// The sample set as compositors decode it.
-pub(crate) fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result<Vec<DepthImage>> {
+fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result<Vec<DepthImage>> {
     let work = SampleWork {
         scene_hash: setup.offer.hash.to_string(),
         wanted: (0..setup.samples.len() as u32).collect(),

@@ -1,9 +1,8 @@
-//! A coordinator and nodes, each as a process.
+//! A coordinator and nodes, each as a process of its own.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use anyhow::Context as _;
 use client::Client;
 use gpu::DevicePreference;
 
@@ -11,27 +10,39 @@ use crate::cpu_share::{CpuGroup, Hierarchy};
 use crate::memory::memory_mib;
 use crate::process::{Process, http_page};
 
-/// The longest wait for nodes to join.
-const JOIN: Duration = Duration::from_secs(60);
+/// The longest wait for all nodes to open their device and join.
+const JOIN: Duration = Duration::from_secs(300);
 
 /// Arguments of a cluster.
 #[derive(Debug, Clone)]
 pub struct Setting {
-    /// The scene, as arguments of `myriorama coordinator`.
-    pub scene: Vec<String>,
+    /// Arguments of `myriorama coordinator`.
+    pub coordinator: Vec<String>,
     pub device: DevicePreference,
     pub nodes: usize,
-    /// Cores of each node; `None` sets no limit.
-    pub share_cores: Option<f64>,
+    pub share: Share,
+}
+
+/// The processors of each node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Share {
+    /// All of the machine.
+    Whole,
+    /// All of the machine, in a control group, which may be limited later.
+    Group,
+    /// A number of cores, by a control group: nodes that share a machine would otherwise each promise all of it.
+    Cores(f64),
 }
 
 /// One node.
 #[derive(Debug)]
-struct Member {
+pub struct Member {
+    /// The address at which it serves the cluster.
+    pub address: String,
     process: Process,
     metrics: String,
     /// The group is dropped last: it cannot be removed before its process has ended.
-    _group: Option<CpuGroup>,
+    pub group: Option<CpuGroup>,
 }
 
 /// A coordinator and its nodes. Nodes end first: they need not miss their coordinator.
@@ -40,7 +51,7 @@ pub struct Processes {
     /// The address of the coordinator, as `http://host:port`.
     pub address: String,
     pub device: String,
-    nodes: Vec<Member>,
+    pub nodes: Vec<Member>,
     coordinator: Process,
 }
 
@@ -48,12 +59,15 @@ impl Processes {
     /// Starts a cluster and waits until its nodes have joined.
     ///
     /// # Errors
-    /// A process does not start or serve.
+    /// A process does not start or serve, or there are no control groups.
     pub async fn start(setting: &Setting) -> anyhow::Result<Self> {
-        let mut coordinator = Process::coordinator(&setting.scene)?;
+        let mut coordinator = Process::coordinator(&setting.coordinator)?;
         let address = coordinator.address()?;
-        let member = |number| Member::start(setting, &address, number);
-        let nodes = (0..setting.nodes).map(member).collect::<anyhow::Result<Vec<_>>>()?;
+        let started = (0..setting.nodes).map(|number| Process::node(number, &address, setting.device));
+        // All start before the first is waited for.
+        let started = started.collect::<anyhow::Result<Vec<_>>>()?;
+        let members = started.into_iter().map(|process| Member::new(process, setting.share));
+        let nodes = members.collect::<anyhow::Result<Vec<_>>>()?;
         let status = Client::connect(&address).await?.wait_for_nodes(setting.nodes, JOIN).await?;
         let device = status.nodes.first().map_or_else(String::new, |node| node.device_name.clone());
         Ok(Self { address, device, nodes, coordinator })
@@ -88,20 +102,24 @@ impl Processes {
 }
 
 impl Member {
-    fn start(setting: &Setting, coordinator: &str, number: usize) -> anyhow::Result<Self> {
-        let mut process = Process::node(number, coordinator, setting.device)?;
-        let (_, metrics) = (process.address()?, process.address()?);
-        let limit = |cores| limited(&process, cores);
-        let group = setting.share_cores.map(limit).transpose()?;
-        Ok(Self { process, metrics, _group: group })
+    fn new(mut process: Process, share: Share) -> anyhow::Result<Self> {
+        let address = process.address()?;
+        let metrics = process.address()?;
+        let group = match share {
+            Share::Whole => None,
+            Share::Group | Share::Cores(_) => Some(group_of(&process)?),
+        };
+        if let (Some(group), Share::Cores(cores)) = (&group, share) {
+            group.limit(cores)?;
+        }
+        Ok(Self { address, process, metrics, group })
     }
 }
 
-/// Limits a node: nodes that share a machine would otherwise each promise all of it.
-fn limited(process: &Process, cores: f64) -> anyhow::Result<CpuGroup> {
+/// A control group with a process in it.
+fn group_of(process: &Process) -> anyhow::Result<CpuGroup> {
     let group = CpuGroup::new(&Hierarchy::find()?, &format!("myriorama-{}-{}", std::process::id(), process.name()))?;
-    group.limit(Some(cores))?;
-    group.admit(process.id()).context("a node cannot be given its share")?;
+    group.admit(process.id())?;
     Ok(group)
 }
 
