@@ -4,7 +4,7 @@ use app_core::planning::Planning;
 use coordinator::schedule::EqualNodes;
 use planner::{Budget, Choice, Kept, Ladder, Metric, Planner, Price, Pricing as _, ProbeView, Row};
 
-use super::row::{MeasuredRow, TIMED_VIEWS, time_again};
+use super::row::{MeasuredRow, time_again};
 use super::subject::{Conditions, Subject};
 
 /// Levels of the planner's budgets between the least and the greatest error of a subject's rows, in equal ratios.
@@ -89,12 +89,10 @@ impl Front {
         let cameras = planning.viewpoints.cameras(&extent.views);
         let mut rows = Vec::new();
         for place in extent.places(&planning.ladder) {
-            let row = (place, &planning.ladder.rows()[place]);
-            rows.push(MeasuredRow::measure(&mut prober, row, &planning.representations[place], &cameras, &pricing)?);
+            rows.push(MeasuredRow::measure(&mut prober, planning, place, &cameras, &pricing)?);
             done();
         }
-        let timed = (&planning.representations[..], &planning.viewpoints.first(TIMED_VIEWS)[..]);
-        time_again(&mut prober, &mut rows, timed, &pricing, &mut done)?;
+        time_again(&mut prober, &mut rows, planning, &pricing, &mut done)?;
         let mut front = Self {
             conditions: subject.conditions,
             scene_hash: planning.subject.scene_hash.clone(),

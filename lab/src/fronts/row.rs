@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
+use app_core::planning::Planning;
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use metrics::{DepthErrors, depth_errors};
 use planner::{Metric, Price, Pricing, Row, RowCosts, ViewErrors, median_costs};
-use probe::{Light, Prober, Representation, view_errors};
+use probe::{Light, Prober, view_errors};
 use rayon::prelude::*;
 
 use crate::evaluation::known_depth;
@@ -13,7 +14,7 @@ use crate::evaluation::known_depth;
 /// Times that rows are timed again.
 pub const REPEATS: usize = 2;
 /// Views with which rows are timed again.
-pub const TIMED_VIEWS: usize = 16;
+const TIMED_VIEWS: usize = 16;
 
 /// A measured row.
 #[derive(Debug, Clone)]
@@ -40,11 +41,13 @@ impl MeasuredRow {
     /// The device fails.
     pub fn measure(
         prober: &mut Prober,
-        (place, row): (usize, &Row),
-        representation: &Representation,
+        planning: &Planning,
+        place: usize,
         cameras: &[PinholeCamera],
         pricing: &impl Pricing,
     ) -> anyhow::Result<Self> {
+        let row = &planning.ladder.rows()[place];
+        let representation = &planning.representations[place];
         let truths = prober.truths(Light::Session, cameras)?;
         // Delivered views have no depth, and cost less.
         let delivered = prober.subject().planes;
@@ -92,14 +95,15 @@ impl MeasuredRow {
 pub fn time_again(
     prober: &mut Prober,
     rows: &mut [MeasuredRow],
-    (representations, cameras): (&[Representation], &[PinholeCamera]),
+    planning: &Planning,
     pricing: &impl Pricing,
     mut done: impl FnMut(),
 ) -> anyhow::Result<()> {
+    let cameras = planning.viewpoints.first(TIMED_VIEWS);
     let mut costs: Vec<Vec<RowCosts>> = rows.iter().map(|row| vec![row.costs]).collect();
     for _ in 0..REPEATS {
         for (row, costs) in rows.iter().zip(&mut costs) {
-            costs.push(prober.time(&representations[row.place], cameras)?);
+            costs.push(prober.time(&planning.representations[row.place], &cameras)?);
             done();
         }
     }

@@ -125,9 +125,8 @@ impl<'s> Cubes<'s> {
     /// # Errors
     /// The device fails, or the subject's light has highlights.
     pub fn new(subject: &'s Subject<'s>, side: u32) -> anyhow::Result<Self> {
-        let [all, dominant] =
-            [LayerSelection::All, LayerSelection::Dominant].map(|kept| subject.cube((side, kept), subject.lighting, 1));
-        let (all, dominant) = (all?, dominant?);
+        let all = subject.cube(side, LayerSelection::All, subject.lighting, 1)?;
+        let dominant = subject.cube(side, LayerSelection::Dominant, subject.lighting, 1)?;
         ensure!(all.images.iter().all(|image| image.specular.is_none()), "{} has highlights", subject.name);
         Ok(Self { subject, all, dominant })
     }
@@ -176,7 +175,7 @@ impl<'s> Cubes<'s> {
         let rays: usize = found.iter().map(|(camera, _)| camera.pixel_count()).sum();
         let loads: usize = found.iter().map(|(_, (_, loads))| loads).sum();
         let views: Vec<View> = found.iter().map(|(camera, (hits, _))| self.view(cube, camera, hits)).collect();
-        views::figures(&self.subject.truths, &views, (loads as f64 / rays as f64, view_s))
+        views::figures(&self.subject.truths, &views, loads as f64 / rays as f64, view_s)
     }
 
     fn view(&self, cube: &Cube, camera: &PinholeCamera, hits: &[Option<Hit>]) -> View {

@@ -88,7 +88,7 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
     for &rays in rays {
         rows.push(row(Way::Drawn(rays), TimedViews::drawn(&subject, lighting(rays)?)?)?);
     }
-    let cube = subject.cube((SIDE, LayerSelection::Dominant), subject.lighting, 1)?;
+    let cube = subject.cube(SIDE, LayerSelection::Dominant, subject.lighting, 1)?;
     let set = subject.upload(&cube)?.0;
     let by_rays = |glossy_rays| Mirrors { glossy_rays, ..Mirrors::default() };
     for &rays in rays {

@@ -62,7 +62,7 @@ const COLUMNS: [Column<MirrorRow>; 8] = [
 /// The device fails.
 pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Result<()> {
     let subject = Subject::of_views(stand, SCENE, LIGHT.parse()?, |_| cameras())?;
-    let cube = subject.cube((SIDE, LayerSelection::Dominant), subject.lighting, 1)?;
+    let cube = subject.cube(SIDE, LayerSelection::Dominant, subject.lighting, 1)?;
     let truths = TimedViews::drawn(&subject, reflecting(subject.lighting, MOST)?)?.views;
     let mirrored = subject.truths.iter().zip(&truths).map(|(none, all)| changed(none, all)).collect();
     let box_of_mirrors = MirrorBox { subject, cube, truths, mirrored };

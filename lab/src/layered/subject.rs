@@ -55,7 +55,7 @@ impl<'s> Subject<'s> {
     ///
     /// # Errors
     /// The device fails.
-    pub fn cube(&self, (side, kept): (u32, LayerSelection), lighting: Lighting, times: usize) -> anyhow::Result<Cube> {
+    pub fn cube(&self, side: u32, kept: LayerSelection, lighting: Lighting, times: usize) -> anyhow::Result<Cube> {
         let grid = CubeGrid::around(&self.scene.bounds(), side)?;
         let draw = || -> anyhow::Result<Cube> {
             let start = Instant::now();

@@ -108,7 +108,7 @@ impl Views {
         let plain = self.measure_plain(stand)?;
         let subject = Subject::of_views(stand, self.scene, LIGHT.parse()?, |_| (self.cameras)())?;
         // The first use of a light builds shaders.
-        let cube = subject.cube((SIDE, LayerSelection::Dominant), subject.lighting, 2)?;
+        let cube = subject.cube(SIDE, LayerSelection::Dominant, subject.lighting, 2)?;
         let (field, field_s) = subject.light_field(self.directions, self.lighting.parse()?)?;
         let [cube_mb, field_mb] = storage::device_mb(&subject, &cube, &field)?;
         let light_field = LightField {

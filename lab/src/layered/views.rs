@@ -32,7 +32,7 @@ pub fn of_cube(subject: &Subject<'_>, set: &SampleSet) -> anyhow::Result<Figures
     let (views, loads) = made(subject, set, &subject.views, LAYERED)?;
     let reconstructor = subject.stand.reconstructor();
     let view_s = seconds_a_view(|| Ok(reconstructor.reconstruct(set, &subject.views, LAYERED, ViewPlanes::COLOR)?))?;
-    figures(&subject.truths, &views, (loads, view_s))
+    figures(&subject.truths, &views, loads, view_s)
 }
 
 /// The median seconds of a view of a batch, after a run that makes shaders.
@@ -68,7 +68,7 @@ pub fn made(
 ///
 /// # Errors
 /// Views differ in size.
-pub fn figures(truths: &[View], views: &[View], (loads, view_s): (f64, f64)) -> anyhow::Result<Figures> {
+pub fn figures(truths: &[View], views: &[View], loads: f64, view_s: f64) -> anyhow::Result<Figures> {
     let mut all = Figures { psnr_db: 0.0, flip: 0.0, wrong_hits: 0.0, missed: 0.0, loads, view_s };
     for (truth, view) in truths.iter().zip(views) {
         let [foreground, _] = PictureErrors::of(truth, &Rgb8Image::of_view(view)?)?;
