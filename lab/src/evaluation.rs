@@ -48,8 +48,6 @@ pub struct Evaluation {
     pub disoccluded_unmarked: f64,
     /// Disoccluded pixels, of all.
     pub disoccluded: f64,
-    /// Loads of depth and colour words a pixel.
-    pub fetches_a_ray: f64,
 }
 
 impl ReferenceViews {
@@ -66,13 +64,13 @@ impl ReferenceViews {
         runs: usize,
     ) -> anyhow::Result<Evaluation> {
         let ms_a_view = self.ms_a_view(method, views, runs)?;
-        let (views, fetches_a_ray) = self.reconstruct_counted(method, ViewPlanes::ALL)?;
+        let views = self.reconstruct(method, ViewPlanes::ALL)?;
         let pairs: Vec<_> = self.views.iter().zip(&views).zip(self.classes()).collect();
         let errors = pairs
             .into_par_iter()
             .map(|((reference, view), classes)| Errors::of(reference, view, classes))
             .collect::<anyhow::Result<Vec<_>>>()?;
-        Ok(evaluation(method, ms_a_view, fetches_a_ray, &errors))
+        Ok(evaluation(method, ms_a_view, &errors))
     }
 }
 
@@ -134,7 +132,7 @@ impl Errors {
     }
 }
 
-fn evaluation(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, errors: &[Errors]) -> Evaluation {
+fn evaluation(method: ReconstructionMethod, ms_a_view: f64, errors: &[Errors]) -> Evaluation {
     let mean = |value: fn(&Errors) -> f64| errors.iter().map(value).sum::<f64>() / errors.len() as f64;
     let sum = |value: fn(&Errors) -> usize| errors.iter().map(value).sum::<usize>() as f64;
     let covered: Vec<f64> = errors.iter().filter_map(|e| e.flip_covered).collect();
@@ -155,7 +153,6 @@ fn evaluation(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, 
         disoccluded_wrong: sum(|e| e.disoccluded_wrong) / sum(|e| e.disoccluded),
         disoccluded_unmarked: sum(|e| e.disoccluded_unmarked) / sum(|e| e.disoccluded),
         disoccluded: sum(|e| e.disoccluded) / sum(|e| e.pixels),
-        fetches_a_ray,
     }
 }
 

@@ -10,7 +10,7 @@ use depth_image::{DepthImage, PinholeCamera, SampleImage, View, ViewPlanes};
 use engine::GpuEngine;
 use metrics::{PixelClass, classify, unheld_rate};
 use node::{DirectWork, Engine as _, SampleWork, Turn, WorkClass};
-use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
+use reconstruction::{Positions, ReconstructRequest, ReconstructionMethod, SampleSet, SetDescription};
 use render::Lighting;
 
 use crate::statistics::median;
@@ -53,7 +53,7 @@ impl ReferenceViews {
             environment: environment.as_ref(),
             mips: false,
         };
-        let set = engine.reconstructor.upload(&images, &description)?;
+        let set = engine.reconstructor.upload(&images, &description, Turn::default())?;
         let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ViewPlanes::ALL), TURN)?;
         let class = |(camera, view): (&PinholeCamera, &View)| Ok(classify(camera, inverse_depth(view)?, &images)?);
         let classes = cameras.iter().zip(&views).map(class).collect::<anyhow::Result<_>>()?;
@@ -116,7 +116,11 @@ impl ReferenceViews {
         method: ReconstructionMethod,
         planes: ViewPlanes,
     ) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.reconstructor.reconstruct_whole(&self.set, &self.cameras, method, planes)?)
+        Ok(self.engine.reconstructor.reconstruct(ReconstructRequest {
+            positions: Positions::Whole,
+            planes,
+            ..ReconstructRequest::new(&self.set, &self.cameras, method)
+        })?)
     }
 
     /// Reconstructs the views of other cameras.
@@ -129,18 +133,10 @@ impl ReferenceViews {
         method: ReconstructionMethod,
         planes: ViewPlanes,
     ) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.reconstructor.reconstruct(&self.set, cameras, method, planes)?)
-    }
-
-    /// Reconstructs all views and counts the fetches of a ray; NaN where they cannot be counted.
-    pub(crate) fn reconstruct_counted(
-        &self,
-        method: ReconstructionMethod,
-        planes: ViewPlanes,
-    ) -> anyhow::Result<(Vec<View>, f64)> {
-        let reconstructor = &self.engine.reconstructor;
-        let (views, statistics) = reconstructor.reconstruct_measured(&self.set, &self.cameras, method, planes, true)?;
-        Ok((views, statistics.fetches_per_ray.unwrap_or(f64::NAN)))
+        Ok(self
+            .engine
+            .reconstructor
+            .reconstruct(ReconstructRequest { planes, ..ReconstructRequest::new(&self.set, cameras, method) })?)
     }
 
     /// Milliseconds a view in one batch of `at_least` views or more: the median of `runs` after one that does not
@@ -153,7 +149,7 @@ impl ReferenceViews {
         let cameras = self.cameras.repeat(times);
         let run = || {
             let start = Instant::now();
-            self.engine.reconstructor.reconstruct(&self.set, &cameras, method, ViewPlanes::COLOR)?;
+            self.engine.reconstructor.reconstruct(ReconstructRequest::new(&self.set, &cameras, method))?;
             anyhow::Ok(start.elapsed().as_secs_f64())
         };
         run()?;

@@ -50,7 +50,6 @@ pub fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
         ("disoccluded coloured wrong", "%"),
         ("of these not marked", "%"),
         ("disoccluded", "%"),
-        ("fetches a ray", ""),
     ];
     let mut table = Table::new(name, &columns);
     for row in rows {
@@ -58,7 +57,7 @@ pub fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
             .map(|share| share * 100.0);
         let foreground = [row.foreground_psnr_db, row.foreground_psnr_min_db, row.foreground_ssim, row.foreground_flip];
         let whole = [row.psnr_db, row.psnr_min_db, row.ssim, row.flip];
-        let numbers = [&[row.ms_a_view], &foreground[..], &whole, &shares, &[row.fetches_a_ray]].concat();
+        let numbers = [&[row.ms_a_view], &foreground[..], &whole, &shares].concat();
         table.push([Cell::from(row.method.to_string())].into_iter().chain(numbers.into_iter().map(Cell::from)))?;
     }
     Ok(table)

@@ -1,12 +1,13 @@
 //! Sampling without redundancy: its cost, and the coverage of quads cut from its images.
 
+use gpu::Turn;
 use std::sync::Arc;
 
 use app_core::progress::bar;
 use depth_image::{DepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
-use reconstruction::{MeshStatistics, SampleSet, SetDescription};
+use reconstruction::{MeshStatistics, ReconstructRequest, SampleSet, SetDescription};
 use render::SamplePlanes;
 use report::{Bar, Check, Report, Table};
 use sampling::SamplingMethod;
@@ -125,12 +126,15 @@ fn upload(subject: &Subject, engine: &GpuEngine, images: &[DepthImage]) -> anyho
         environment: None,
         mips: false,
     };
-    Ok(engine.reconstructor.upload(images, &description)?)
+    Ok(engine.reconstructor.upload(images, &description, Turn::default())?)
 }
 
 fn view(engine: &GpuEngine, set: &SampleSet, camera: &PinholeCamera, method: &str) -> anyhow::Result<View> {
     let planes = ViewPlanes::WITH_PROVENANCE;
-    let views = engine.reconstructor.reconstruct(set, std::slice::from_ref(camera), method.parse()?, planes)?;
+    let views = engine.reconstructor.reconstruct(ReconstructRequest {
+        planes,
+        ..ReconstructRequest::new(set, std::slice::from_ref(camera), method.parse()?)
+    })?;
     views.into_iter().next().ok_or_else(|| anyhow::anyhow!("no view came"))
 }
 

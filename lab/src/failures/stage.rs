@@ -2,7 +2,8 @@
 
 use depth_image::{Aabb, DepthImage, Environment, Illumination, PinholeCamera, View, ViewPlanes, nested_places};
 use glam::{UVec2, Vec3};
-use reconstruction::{ErrorBound, ReconstructionMethod, SampleSet, SetDescription};
+use gpu::Turn;
+use reconstruction::{ErrorBound, ReconstructRequest, ReconstructionMethod, SampleSet, SetDescription};
 use render::{GpuScene, Lighting, SamplePlanes};
 use scene::Scene;
 
@@ -73,7 +74,7 @@ impl<'s> Stage<'s> {
     }
 
     pub fn set(&self) -> anyhow::Result<SampleSet> {
-        Ok(self.stand.reconstructor().upload(&self.images, &self.description())?)
+        Ok(self.stand.reconstructor().upload(&self.images, &self.description(), Turn::default())?)
     }
 
     /// Views by a method, with depth and provenance.
@@ -90,8 +91,11 @@ impl<'s> Stage<'s> {
         method: ReconstructionMethod,
     ) -> anyhow::Result<Vec<View>> {
         let description = SetDescription { volume, ..self.description() };
-        let set = self.stand.reconstructor().upload(images, &description)?;
-        Ok(self.stand.reconstructor().reconstruct(&set, cameras, method, ViewPlanes::ALL)?)
+        let set = self.stand.reconstructor().upload(images, &description, Turn::default())?;
+        Ok(self.stand.reconstructor().reconstruct(ReconstructRequest {
+            planes: ViewPlanes::ALL,
+            ..ReconstructRequest::new(&set, cameras, method)
+        })?)
     }
 
     /// Views from the triangles.

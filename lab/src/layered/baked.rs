@@ -3,6 +3,8 @@
 use anyhow::Context as _;
 use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes, linear_from_srgb8, rgb9e5_from_linear};
 use glam::Vec3;
+use gpu::Turn;
+use reconstruction::ReconstructRequest;
 
 use super::subject::Subject;
 use crate::failures::stage::CARVE;
@@ -26,6 +28,6 @@ pub fn seen_from(subject: &Subject<'_>, number: usize, view: &View, camera: Pinh
         light: None,
     };
     let reconstructor = subject.stand.reconstructor();
-    let set = reconstructor.upload(&[image], &subject.description())?;
-    reconstructor.reconstruct(&set, &[camera], CARVE, ViewPlanes::COLOR)?.pop().context("a view")
+    let set = reconstructor.upload(&[image], &subject.description(), Turn::default())?;
+    reconstructor.reconstruct(ReconstructRequest::new(&set, &[camera], CARVE))?.pop().context("a view")
 }

@@ -1,12 +1,13 @@
 //! A base beside depth images: what it tells of the pixels that these leave unknown, and what it costs.
 
+use gpu::Turn;
 use std::time::Instant;
 
 use anyhow::Context as _;
 use app_core::setup::SceneArgs;
 use depth_image::{PinholeCamera, ProvenanceKind, View, ViewCell, ViewPlanes};
 use glam::UVec2;
-use reconstruction::{CommonSets, SampleSet};
+use reconstruction::{CommonSets, ReconstructRequest, SampleSet};
 use render::{LayerSelection, Lighting};
 use report::{Bar, Cell, Check, Report, Table};
 
@@ -67,7 +68,7 @@ fn of_scene(
     let cell = ViewCell::between(&around).context("sample cameras")?;
     let subject = Subject::of_views(stand, name, lighting, |_| cell.spread(VIEWS, VIEW_PX))?;
     let images = stand.images(&subject.on_device, lighting, &pinholes(&around), views::PLAIN)?;
-    let set = stand.reconstructor().upload(&images, &subject.description())?;
+    let set = stand.reconstructor().upload(&images, &subject.description(), Turn::default())?;
     let cube = subject.cube((SIDE, LayerSelection::Dominant), lighting, 1)?;
     drop(subject.upload(&cube)?);
     let (base, load_s) = subject.upload(&cube)?;
@@ -100,7 +101,11 @@ fn of_scene(
 fn both(stand: &Stand, set: &SampleSet, base: &SampleSet, cameras: &[PinholeCamera]) -> anyhow::Result<[Made; 2]> {
     let make = |base, planes| {
         let common = CommonSets { base, ..CommonSets::default() };
-        stand.reconstructor().reconstruct_with(set, common, cameras, CARVE, planes, Default::default())
+        stand.reconstructor().reconstruct(ReconstructRequest {
+            common,
+            planes,
+            ..ReconstructRequest::new(set, cameras, CARVE)
+        })
     };
     let bases = [None, Some(base)];
     let views = [make(bases[0], ViewPlanes::ALL)?, make(bases[1], ViewPlanes::ALL)?];

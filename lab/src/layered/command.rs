@@ -28,8 +28,6 @@ const LIGHTING: Lighting =
 const AMONG_VIEWPOINTS: [&str; 2] = ["courtyard", "tree-terrain-500k"];
 /// The bound of bytes sent a sample, in the mean of the scenes.
 const MOST_SENT_B: f64 = 5.5;
-/// The bounds of loads a ray.
-const MOST_LOADS: [(&str, f64); 2] = [("tree", 40.0), ("bird-nest", 30.0)];
 /// PSNR of the views around `courtyard` from a cube of 1024², and of the worst of them.
 const LEAST_PSNR_DB: [f64; 2] = [33.0, 31.5];
 
@@ -129,9 +127,6 @@ fn of_side(
     seen.push(walk.row(subject.name, &format!("layered, {side}²")))?;
     checks.extend(views::cost_check(subject.name, side, &walk, images));
     let name = subject.name;
-    if let Some((_, most)) = MOST_LOADS.iter().find(|(scene, _)| side == SIDES[1] && *scene == name) {
-        checks.push(Check::new(format!("{name}: loads a ray, {side}²"), walk.loads, "", Bar::AtMost(*most)));
-    }
     if (name, side) == ("courtyard", SIDES[2]) {
         let [mean, worst] = LEAST_PSNR_DB;
         checks.push(Check::new(

@@ -91,6 +91,6 @@ pub fn measure(
 
 /// Percent of the pixels with a surface in which the walk meets nothing, or something clearly behind it.
 fn not_held_percent(subject: &Subject<'_>, cube: &Cube) -> anyhow::Result<f64> {
-    let (views, _) = views::made(subject, &subject.upload(cube)?.0, &subject.views, views::LAYERED)?;
+    let views = views::made(subject, &subject.upload(cube)?.0, &subject.views, views::LAYERED)?;
     Ok(100.0 * not_held(&subject.truths, &views, BEHIND * cube.grid.spacing_m))
 }

@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use metrics::{Rgb8Image, flip_map, psnr_db};
-use reconstruction::{Mirrors, ReconstructionMethod, SampleSet};
+use reconstruction::{Mirrors, ReconstructRequest, ReconstructionMethod, SampleSet};
 use render::{LayerSelection, Lighting};
 use report::{Bar, Cell, Check, Report, Table};
 
@@ -116,7 +116,13 @@ pub fn shown(
     mirrors: Mirrors<'_>,
 ) -> anyhow::Result<(Vec<View>, f64)> {
     let (reconstructor, turn) = (subject.stand.reconstructor(), Default::default());
-    timed(|| Ok(reconstructor.reconstruct_with(set, mirrors, &subject.views, method, ViewPlanes::COLOR, turn)?))
+    timed(|| {
+        Ok(reconstructor.reconstruct(ReconstructRequest {
+            common: mirrors.into(),
+            turn,
+            ..ReconstructRequest::new(set, &subject.views, method)
+        })?)
+    })
 }
 
 /// The same views, drawn directly.

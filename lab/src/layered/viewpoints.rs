@@ -1,5 +1,6 @@
 //! What a compositor pulls for viewers in many places: one cube for all, or the images of their view cells.
 
+use gpu::Turn;
 use std::time::Instant;
 
 use anyhow::Context as _;
@@ -7,7 +8,7 @@ use codec::{PlaneSet, encode_depth_image};
 use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, View, ViewGroup, ViewPlanes, nearest_set};
 use glam::{UVec2, Vec3};
 use metrics::{PictureErrors, Rgb8Image};
-use reconstruction::{ReconstructionMethod, SampleSet};
+use reconstruction::{ReconstructRequest, ReconstructionMethod, SampleSet};
 use render::LayerSelection;
 use report::{Axis, Bar, Cell, Check, Series, Table, XyChart};
 
@@ -185,7 +186,7 @@ fn of_cells(
         if own.is_empty() {
             continue;
         }
-        let set = subject.stand.reconstructor().upload(&images, &subject.description())?;
+        let set = subject.stand.reconstructor().upload(&images, &subject.description(), Turn::default())?;
         let cameras: Vec<PinholeCamera> = own.iter().map(|&view| compared[view]).collect();
         own.iter().zip(made(subject, &set, &cameras, CARVE)?).for_each(|(&at, view)| made_views[at] = Some(view));
     }
@@ -204,7 +205,7 @@ fn made(
     cameras: &[PinholeCamera],
     method: ReconstructionMethod,
 ) -> anyhow::Result<Vec<View>> {
-    Ok(subject.stand.reconstructor().reconstruct(set, cameras, method, ViewPlanes::COLOR)?)
+    Ok(subject.stand.reconstructor().reconstruct(ReconstructRequest::new(set, cameras, method))?)
 }
 
 fn mean_psnr_db(views: &[View], truths: &[View]) -> anyhow::Result<f64> {

@@ -1,12 +1,13 @@
 //! Views from cubes beside views from depth images: errors, loads and time.
 
+use gpu::Turn;
 use std::time::Instant;
 
 use anyhow::Context as _;
 use depth_image::{Antialias, Camera, PinholeCamera, View, ViewPlanes};
 use glam::Vec3;
 use metrics::{PictureErrors, Rgb8Image, depth_errors};
-use reconstruction::{ReconstructionMethod, SampleSet};
+use reconstruction::{ReconstructRequest, ReconstructionMethod, SampleSet};
 use render::SamplePlanes;
 use report::{Bar, Cell, Check, Table};
 
@@ -38,7 +39,8 @@ pub struct Figures {
     pub flip: f64,
     pub wrong_hits: f64,
     pub missed: f64,
-    pub loads: f64,
+    /// Nodes that a ray of the paper's ways loads; they are not counted for other methods.
+    pub loads: Option<f64>,
     pub view_s: f64,
 }
 
@@ -61,16 +63,17 @@ pub fn table() -> Table {
 
 impl Figures {
     pub fn row(&self, name: &str, by: &str) -> Vec<Cell> {
-        let numbers = [
-            self.psnr_db,
-            self.worst_psnr_db,
-            self.flip,
-            self.wrong_hits * 100.0,
-            self.missed * 100.0,
-            self.loads,
-            self.view_s * 1e3,
-        ];
-        [Cell::from(name), Cell::from(by)].into_iter().chain(numbers.map(Cell::from)).collect()
+        vec![
+            name.into(),
+            by.into(),
+            self.psnr_db.into(),
+            self.worst_psnr_db.into(),
+            self.flip.into(),
+            (self.wrong_hits * 100.0).into(),
+            (self.missed * 100.0).into(),
+            self.loads.into(),
+            (self.view_s * 1e3).into(),
+        ]
     }
 }
 
@@ -79,8 +82,8 @@ impl Figures {
 /// # Errors
 /// The device fails.
 pub fn of_cube(subject: &Subject<'_>, set: &SampleSet) -> anyhow::Result<Figures> {
-    let (views, loads) = made(subject, set, &subject.views, LAYERED)?;
-    figures(&subject.truths, &views, (loads, view_s(subject, set, LAYERED)?))
+    let views = made(subject, set, &subject.views, LAYERED)?;
+    figures(&subject.truths, &views, view_s(subject, set, LAYERED)?)
 }
 
 /// Views between four sample cameras from their depth images, one set for each place.
@@ -88,14 +91,12 @@ pub fn of_cube(subject: &Subject<'_>, set: &SampleSet) -> anyhow::Result<Figures
 /// # Errors
 /// The device fails.
 pub fn of_images(subject: &Subject<'_>) -> anyhow::Result<Figures> {
-    let (mut views, mut loads) = (Vec::new(), 0.0);
+    let mut views = Vec::new();
     for camera in &subject.views {
-        let (own, own_loads) = made(subject, &images_around(subject, camera)?, &[*camera], CARVE)?;
-        views.extend(own);
-        loads += own_loads / subject.views.len() as f64;
+        views.extend(made(subject, &images_around(subject, camera)?, &[*camera], CARVE)?);
     }
     let set = images_around(subject, subject.views.first().context("a view")?)?;
-    figures(&subject.truths, &views, (loads, view_s(subject, &set, CARVE)?))
+    figures(&subject.truths, &views, view_s(subject, &set, CARVE)?)
 }
 
 fn images_around(subject: &Subject<'_>, camera: &PinholeCamera) -> anyhow::Result<SampleSet> {
@@ -103,7 +104,7 @@ fn images_around(subject: &Subject<'_>, camera: &PinholeCamera) -> anyhow::Resul
     let cameras: Vec<Camera> =
         places.iter().map(|&(x, y)| beside(subject, camera, x, y).resized(camera.size_px * DENSITY).into()).collect();
     let images = subject.stand.images(&subject.on_device, subject.lighting, &cameras, PLAIN)?;
-    Ok(subject.stand.reconstructor().upload(&images, &subject.description())?)
+    Ok(subject.stand.reconstructor().upload(&images, &subject.description(), Turn::default())?)
 }
 
 /// A camera beside another, which looks at the scene's middle, too.
@@ -116,7 +117,7 @@ fn beside(subject: &Subject<'_>, camera: &PinholeCamera, right: f32, up: f32) ->
     PinholeCamera { near_m: camera.near_m, ..aimed }
 }
 
-/// Views, and the loads of a ray.
+/// Views with depth.
 ///
 /// # Errors
 /// The device fails.
@@ -125,10 +126,10 @@ pub fn made(
     set: &SampleSet,
     cameras: &[PinholeCamera],
     method: ReconstructionMethod,
-) -> anyhow::Result<(Vec<View>, f64)> {
-    let reconstructor = subject.stand.reconstructor();
-    let (views, statistics) = reconstructor.reconstruct_measured(set, cameras, method, ViewPlanes::WITH_DEPTH, true)?;
-    Ok((views, statistics.fetches_per_ray.unwrap_or(0.0)))
+) -> anyhow::Result<Vec<View>> {
+    let planes = ViewPlanes::WITH_DEPTH;
+    let request = ReconstructRequest { planes, ..ReconstructRequest::new(set, cameras, method) };
+    Ok(subject.stand.reconstructor().reconstruct(request)?)
 }
 
 /// The median seconds of a view, of views between the places of the first view's sample cameras.
@@ -136,7 +137,7 @@ fn view_s(subject: &Subject<'_>, set: &SampleSet, method: ReconstructionMethod) 
     let first = subject.views.first().context("a view")?;
     let cameras: Vec<PinholeCamera> =
         (0..BATCH).map(|at| beside(subject, first, 0.25 * at as f32 - 0.9, 0.1)).collect();
-    let make = || subject.stand.reconstructor().reconstruct(set, &cameras, method, ViewPlanes::COLOR);
+    let make = || subject.stand.reconstructor().reconstruct(ReconstructRequest::new(set, &cameras, method));
     make()?;
     let timed = || -> anyhow::Result<f64> {
         let start = Instant::now();
@@ -150,9 +151,9 @@ fn view_s(subject: &Subject<'_>, set: &SampleSet, method: ReconstructionMethod) 
 ///
 /// # Errors
 /// Views of other sizes.
-pub fn figures(truths: &[View], views: &[View], (loads, view_s): (f64, f64)) -> anyhow::Result<Figures> {
-    let mut all =
-        Figures { psnr_db: 0.0, worst_psnr_db: f64::INFINITY, flip: 0.0, wrong_hits: 0.0, missed: 0.0, loads, view_s };
+pub fn figures(truths: &[View], views: &[View], view_s: f64) -> anyhow::Result<Figures> {
+    let worst_psnr_db = f64::INFINITY;
+    let mut all = Figures { psnr_db: 0.0, worst_psnr_db, flip: 0.0, wrong_hits: 0.0, missed: 0.0, loads: None, view_s };
     for (truth, view) in truths.iter().zip(views) {
         let [foreground, _] = PictureErrors::of(truth, &Rgb8Image::of_view(view)?)?;
         let depths = [truth, view].map(|view| view.inverse_depth_per_m.as_deref().unwrap_or_default());

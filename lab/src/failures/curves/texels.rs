@@ -45,7 +45,7 @@ fn measure(stand: &Stand, sides_px: &[f64]) -> anyhow::Result<Rows> {
     };
     let subject = Subject::of_views(stand, SCENE, Lighting::default(), walk)?;
     let cube = subject.cube((side, LayerSelection::Dominant), subject.lighting, 1)?;
-    let (views, _) = made(&subject, &subject.upload(&cube)?.0, &subject.views, LAYERED)?;
+    let views = made(&subject, &subject.upload(&cube)?.0, &subject.views, LAYERED)?;
     let places = subject.truths.chunks(TURNS_DEG.len()).zip(views.chunks(TURNS_DEG.len()));
     let row = |(truths, views): (&[View], &[View])| {
         let wrong_hits = figures(truths, views, (f64::NAN, f64::NAN))?.wrong_hits;

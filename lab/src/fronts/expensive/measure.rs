@@ -1,10 +1,11 @@
 //! All rows of a subject under one lighting.
 
+use gpu::Turn;
 use std::time::Instant;
 
 use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes};
 use metrics::PictureErrors;
-use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
+use reconstruction::{ReconstructRequest, ReconstructionMethod, SampleSet, SetDescription};
 
 use super::rows::{DIRECT_RAYS, Drawing, LightRow, QUALITIES, sets};
 use super::subjects::{is_interior, lighting};
@@ -126,7 +127,7 @@ fn joint_carve<'s>(stage: &Stage<'s>) -> anyhow::Result<OpenRow<'s>> {
         environment: None,
         mips: false,
     };
-    let images = stage.stand.reconstructor().upload(&images, &description)?;
+    let images = stage.stand.reconstructor().upload(&images, &description, Turn::default())?;
     let drawer = Drawer::Images(stage.stand, Box::new(images));
     Ok(OpenRow { drawing: Drawing::JointCarve, set: Some(set), sampling_s, drawer })
 }
@@ -154,7 +155,9 @@ impl Drawer<'_> {
             Self::Scene(lit) => lit.views(cameras, planes)?,
             Self::Images(stand, set) => {
                 let method = ReconstructionMethod::JointCarve { stop_level: 0 };
-                stand.reconstructor().reconstruct(set, cameras, method, planes)?
+                stand
+                    .reconstructor()
+                    .reconstruct(ReconstructRequest { planes, ..ReconstructRequest::new(set, cameras, method) })?
             }
         };
         Ok(views.remove(0))
