@@ -1,10 +1,6 @@
 //! Basics of every command: a runtime, a signal, ports.
 
-use std::env;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs as _};
-use std::os::unix::process::CommandExt as _;
-use std::process::Command;
-use std::thread;
 
 use anyhow::Context as _;
 use node::Telemetry;
@@ -15,28 +11,6 @@ use tokio_util::sync::CancellationToken;
 
 use crate::exit::BadInput;
 use crate::print_line;
-
-/// Starts the program anew in this process if settings are missing that libraries read from the environment. Settings of
-/// the user stay. Where the system refuses the restart, the program goes on with the libraries' own settings.
-pub fn restart_with_library_settings() {
-    let missing = missing_library_settings();
-    let Some(program) = env::current_exe().ok().filter(|_| !missing.is_empty()) else { return };
-    let mut arguments = env::args_os();
-    let name = arguments.next().unwrap_or_else(|| program.clone().into());
-    let _ = Command::new(program).arg0(name).args(arguments).envs(missing).exec();
-}
-
-fn missing_library_settings() -> Vec<(&'static str, String)> {
-    // By default glibc has eight arenas a core. Each keeps freed memory that its next large buffers do not fit.
-    let arenas = thread::available_parallelism().map_or(1, usize::from).to_string();
-    let mut settings = vec![("MALLOC_ARENA_MAX", arenas)];
-    if env::var_os("XDG_RUNTIME_DIR").is_none() {
-        // Mesa's device selection looks for a Wayland display, and warns where there is none.
-        settings.push(("NODEVICE_SELECT", "1".to_owned()));
-    }
-    settings.retain(|(name, _)| env::var_os(name).is_none());
-    settings
-}
 
 /// A runtime for services and clients.
 ///

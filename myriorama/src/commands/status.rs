@@ -1,7 +1,6 @@
 //! `myriorama status`: workloads and their demand, nodes with their roles and costs, and the reasons of the plans.
 
 use std::io::Write as _;
-use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -12,8 +11,6 @@ use clap::Args;
 use client::Client;
 use cluster::{ClusterStatus, Costs, NodeCondition, NodeStatus, SharedLightCosts, WorkloadStatus};
 use report::{Cell, Table};
-
-use crate::terminal_picture;
 
 const WORKLOAD_COLUMNS: [(&str, &str); 10] = [
     ("workload", ""),
@@ -53,9 +50,6 @@ pub struct StatusArgs {
     /// Repeats every S seconds until ctrl-c
     #[arg(long, value_name = "S", num_args = 0..=1, default_missing_value = "1")]
     watch: Option<f64>,
-    /// Writes the text as a picture as well (SVG)
-    #[arg(long, value_name = "FILE", conflicts_with = "watch")]
-    picture: Option<PathBuf>,
 }
 
 /// Asks and prints.
@@ -68,10 +62,6 @@ pub async fn run(args: &StatusArgs) -> anyhow::Result<Outcome> {
     loop {
         let text = text(&client.status().await?)?;
         let Some(seconds) = args.watch else {
-            if let Some(file) = &args.picture {
-                let written = std::fs::write(file, terminal_picture::svg(&text));
-                written.with_context(|| format!("cannot write {}", file.display()))?;
-            }
             print_line!("{text}");
             return Ok(Outcome::Done);
         };
