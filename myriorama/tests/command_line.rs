@@ -74,7 +74,7 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
 fn the_demo_writes_a_page_whose_checks_hold() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
-    let demo = myriorama(&["demo", "--scene", "blocks", "--quick", "--nodes", "2", "--strict", "--out", out]);
+    let demo = myriorama(&["demo", "--scene", "blocks", "--quick", "--strict", "--out", out]);
     let (status, message) = status_and_message(&demo);
     assert_eq!(status, Some(0), "{message}");
     for file in ["first-page.png", "index.html", "report.json", "what-sharing-gains.csv", "pictures/first-page.png"] {

@@ -3,12 +3,10 @@
 use std::io::Write as _;
 use std::time::Duration;
 
-use anyhow::Context as _;
 use app_core::exit::Outcome;
 use app_core::print_line;
-use app_core::process::coordinator_url;
+use app_core::addresses::CoordinatorArgs;
 use clap::Args;
-use client::Client;
 use cluster::{ClusterStatus, Costs, NodeCondition, NodeStatus, SharedLightCosts, WorkloadStatus};
 use report::{Cell, Table};
 
@@ -44,9 +42,8 @@ const COLUMNS: [(&str, &str); 12] = [
 /// Prints the workloads of a cluster, the nodes of each with their roles and costs, and the reasons of the plans.
 #[derive(Debug, Args)]
 pub struct StatusArgs {
-    /// The address of the coordinator
-    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7420", env = "MYRIORAMA_COORDINATOR", value_parser = coordinator_url)]
-    coordinator: String,
+    #[command(flatten)]
+    coordinator: CoordinatorArgs,
     /// Repeats every S seconds until ctrl-c
     #[arg(long, value_name = "S", num_args = 0..=1, default_missing_value = "1")]
     watch: Option<f64>,
@@ -57,8 +54,7 @@ pub struct StatusArgs {
 /// # Errors
 /// The coordinator does not answer.
 pub async fn run(args: &StatusArgs) -> anyhow::Result<Outcome> {
-    let client =
-        Client::connect(&args.coordinator).await.with_context(|| format!("no coordinator at {}", args.coordinator))?;
+    let client = args.coordinator.connect().await?;
     loop {
         let text = text(&client.status().await?)?;
         let Some(seconds) = args.watch else {
