@@ -5,9 +5,9 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use app_core::addresses::{InsecureArgs, MetricsArgs, listen, listen_address, loopback_of};
 use app_core::exit::Outcome;
 use app_core::print_line;
-use app_core::addresses::{InsecureArgs, MetricsArgs, listen, listen_address, loopback_of};
 use app_core::process::cancel_at_signal;
 use app_core::scenes::ScenesArgs;
 use clap::Args;

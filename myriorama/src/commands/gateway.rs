@@ -3,9 +3,9 @@
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::path::PathBuf;
 
+use app_core::addresses::{CoordinatorArgs, InsecureArgs, listen, listen_address};
 use app_core::exit::{BadInput, Outcome};
 use app_core::print_line;
-use app_core::addresses::{CoordinatorArgs, InsecureArgs, listen, listen_address};
 use app_core::process::cancel_at_signal;
 use app_core::quality::quality;
 use app_core::sizes::SizePx;

@@ -3,10 +3,10 @@
 use std::net::{SocketAddr, UdpSocket};
 use std::path::PathBuf;
 
+use app_core::addresses::{CoordinatorArgs, InsecureArgs, MetricsArgs, listen, listen_address};
 use app_core::exit::Outcome;
 use app_core::memory::MemoryArgs;
 use app_core::print_line;
-use app_core::addresses::{CoordinatorArgs, InsecureArgs, MetricsArgs, listen, listen_address};
 use app_core::process::cancel_at_signal;
 use app_core::setup::DeviceArgs;
 use app_core::view_limits::ViewLimitArgs;

@@ -3,9 +3,9 @@
 use std::io::Write as _;
 use std::time::Duration;
 
+use app_core::addresses::CoordinatorArgs;
 use app_core::exit::Outcome;
 use app_core::print_line;
-use app_core::addresses::CoordinatorArgs;
 use clap::Args;
 use cluster::{ClusterStatus, Costs, NodeCondition, NodeStatus, SharedLightCosts, WorkloadStatus};
 use report::{Cell, Table};

@@ -2,11 +2,11 @@
 
 use std::net::SocketAddr;
 
+use app_core::addresses::{InsecureArgs, listen, listen_address};
 use app_core::cluster::Cluster;
 use app_core::exit::Outcome;
 use app_core::memory::MemoryArgs;
 use app_core::print_line;
-use app_core::addresses::{InsecureArgs, listen, listen_address};
 use app_core::process::stop_signal;
 use app_core::scenes::ScenesArgs;
 use app_core::setup::DeviceArgs;

@@ -36,9 +36,9 @@ fn is_for_tests(file: &Path) -> bool {
     let folders = file.parent().into_iter().flat_map(Path::components);
     name.ends_with("_tests.rs")
         || ["tests.rs", "test_support.rs"].contains(&name)
-        || folders.map(|folder| folder.as_os_str().to_string_lossy()).any(|folder| {
-            ["tests", "benches", "examples"].contains(&folder.as_ref()) || folder.ends_with("-tests")
-        })
+        || folders
+            .map(|folder| folder.as_os_str().to_string_lossy())
+            .any(|folder| ["tests", "benches", "examples"].contains(&folder.as_ref()) || folder.ends_with("-tests"))
 }
 
 /// A formatted text without its modules of tests.

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use anyhow::Context as _;
+use app_core::addresses::CoordinatorArgs;
 use app_core::camera_file::{self, Placement};
 use app_core::exit::BadInput;
-use app_core::addresses::CoordinatorArgs;
 use app_core::quality::QualityArgs;
 use app_core::sizes::{SizePx, grid};
 use clap::Args;
