@@ -60,7 +60,6 @@ Exit status: 0 done; 1 a check fell short and --strict was given; 2 arguments or
 run time. RUST_LOG=info (or debug) says what is going on.";
 
 fn main() -> ExitCode {
-    app_core::process::restart_with_library_settings();
     node::init_logging("warn");
     exit::report("myriorama-lab", &Cli::parse().command.run())
 }

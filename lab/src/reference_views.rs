@@ -10,7 +10,7 @@ use depth_image::{DepthImage, PinholeCamera, SampleImage, View, ViewPlanes};
 use engine::GpuEngine;
 use metrics::{PixelClass, classify};
 use node::{DirectWork, Engine as _, SampleWork, Turn, WorkClass};
-use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
+use reconstruction::{ReconstructRequest, ReconstructionMethod, SampleSet, SetDescription};
 use render::Lighting;
 
 use crate::statistics::median;
@@ -53,7 +53,7 @@ impl ReferenceViews {
             environment: environment.as_ref(),
             mips: false,
         };
-        let set = engine.reconstructor.upload(&images, &description)?;
+        let set = engine.reconstructor.upload(&images, &description, Turn::default())?;
         let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ViewPlanes::ALL), TURN)?;
         let class = |(camera, view): (&PinholeCamera, &View)| Ok(classify(camera, inverse_depth(view)?, &images)?);
         let classes = cameras.iter().zip(&views).map(class).collect::<anyhow::Result<_>>()?;
@@ -70,7 +70,8 @@ impl ReferenceViews {
     /// # Errors
     /// The device fails.
     pub fn reconstruct(&self, method: ReconstructionMethod, planes: ViewPlanes) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.reconstructor.reconstruct(&self.set, &self.cameras, method, planes)?)
+        let request = ReconstructRequest::new(&self.set, &self.cameras, method);
+        Ok(self.engine.reconstructor.reconstruct(ReconstructRequest { planes, ..request })?)
     }
 
     /// Milliseconds a view in one batch of `at_least` views or more: the median of `runs` after one that does not
@@ -83,7 +84,7 @@ impl ReferenceViews {
         let cameras = self.cameras.repeat(times);
         let run = || {
             let start = Instant::now();
-            self.engine.reconstructor.reconstruct(&self.set, &cameras, method, ViewPlanes::COLOR)?;
+            self.engine.reconstructor.reconstruct(ReconstructRequest::new(&self.set, &cameras, method))?;
             anyhow::Ok(start.elapsed().as_secs_f64())
         };
         run()?;

@@ -2,7 +2,8 @@
 
 use depth_image::{Aabb, DepthImage, Environment, Illumination, PinholeCamera, View, ViewPlanes, nested_places};
 use glam::{UVec2, Vec3};
-use reconstruction::{ErrorBound, ReconstructionMethod, SampleSet, SetDescription};
+use gpu::Turn;
+use reconstruction::{ErrorBound, ReconstructRequest, ReconstructionMethod, SampleSet, SetDescription};
 use render::{GpuScene, Lighting, SamplePlanes};
 use scene::Scene;
 
@@ -74,12 +75,14 @@ impl<'s> Stage<'s> {
     }
 
     pub fn set(&self) -> anyhow::Result<SampleSet> {
-        Ok(self.stand.reconstructor().upload(&self.images, &self.description())?)
+        Ok(self.stand.reconstructor().upload(&self.images, &self.description(), Turn::default())?)
     }
 
     /// Views by a method, with depth and provenance.
     pub fn views(&self, cameras: &[PinholeCamera], method: ReconstructionMethod) -> anyhow::Result<Vec<View>> {
-        Ok(self.stand.reconstructor().reconstruct(&self.set()?, cameras, method, ViewPlanes::ALL)?)
+        let set = self.set()?;
+        let request = ReconstructRequest::new(&set, cameras, method);
+        Ok(self.stand.reconstructor().reconstruct(ReconstructRequest { planes: ViewPlanes::ALL, ..request })?)
     }
 
     /// The foreground FLIP of views by each method.

@@ -4,7 +4,7 @@ use anyhow::Context as _;
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use metrics::{Rgb8Image, flip_map, psnr_db};
-use reconstruction::{Mirrors, ReconstructionMethod, SampleSet};
+use reconstruction::{Mirrors, ReconstructRequest, ReconstructionMethod, SampleSet};
 use render::Lighting;
 
 use super::subject::Subject;
@@ -43,9 +43,8 @@ impl TimedViews {
         mirrors: Mirrors<'_>,
     ) -> anyhow::Result<Self> {
         let reconstructor = subject.stand.reconstructor();
-        let turn = Default::default();
-        let cameras = &subject.views;
-        Self::timed(|| Ok(reconstructor.reconstruct_with(set, mirrors, cameras, method, ViewPlanes::COLOR, turn)?))
+        let request = ReconstructRequest::new(set, &subject.views, method);
+        Self::timed(|| Ok(reconstructor.reconstruct(ReconstructRequest { common: mirrors.into(), ..request })?))
     }
 
     /// Views that are drawn directly in a light.

@@ -13,8 +13,8 @@ use super::views;
 pub fn device_mb(subject: &Subject<'_>, cube: &Cube, field: &LayeredLightField) -> anyhow::Result<[f64; 2]> {
     // After a view has been made from a set no copy is under way.
     let used = |with_field: bool| {
-        let set = if with_field { subject.upload_with(cube, field.clone())?.0 } else { subject.upload(cube)?.0 };
-        views::made(subject, &set, &subject.views, views::LAYERED)?;
+        let set = subject.upload_with(cube, with_field.then(|| field.clone()))?.0;
+        views::made(subject, &set)?;
         anyhow::Ok(set)
     };
     // The memory of earlier sets may serve the first ones. All are kept, so that the others take their own.

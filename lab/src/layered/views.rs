@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use depth_image::{PinholeCamera, View, ViewPlanes};
+use depth_image::{View, ViewPlanes};
 use metrics::{PictureErrors, Rgb8Image, depth_errors};
-use reconstruction::{ReconstructionMethod, SampleSet};
+use reconstruction::{ReconstructRequest, ReconstructionMethod, SampleSet};
 
 use super::subject::Subject;
 use crate::statistics::median;
@@ -20,7 +20,8 @@ pub struct Figures {
     pub flip: f64,
     pub wrong_hits: f64,
     pub missed: f64,
-    pub loads: f64,
+    /// Nodes and samples that a ray of the paper's ways loads; the walk does not count.
+    pub loads: Option<f64>,
     pub view_s: f64,
 }
 
@@ -29,10 +30,11 @@ pub struct Figures {
 /// # Errors
 /// The device fails.
 pub fn of_cube(subject: &Subject<'_>, set: &SampleSet) -> anyhow::Result<Figures> {
-    let (views, loads) = made(subject, set, &subject.views, LAYERED)?;
+    let views = made(subject, set)?;
     let reconstructor = subject.stand.reconstructor();
-    let view_s = seconds_a_view(|| Ok(reconstructor.reconstruct(set, &subject.views, LAYERED, ViewPlanes::COLOR)?))?;
-    figures(&subject.truths, &views, loads, view_s)
+    let request = ReconstructRequest::new(set, &subject.views, LAYERED);
+    let view_s = seconds_a_view(|| Ok(reconstructor.reconstruct(request)?))?;
+    figures(&subject.truths, &views, view_s)
 }
 
 /// The median seconds of a view of a batch, after a run that makes shaders.
@@ -49,27 +51,21 @@ pub fn seconds_a_view(make: impl Fn() -> anyhow::Result<Vec<View>>) -> anyhow::R
     Ok(median((0..REPEATS).map(run).collect::<anyhow::Result<_>>()?))
 }
 
-/// Views, and the loads of a ray.
+/// Views of a subject by walking through a cube, with depth.
 ///
 /// # Errors
 /// The device fails.
-pub fn made(
-    subject: &Subject<'_>,
-    set: &SampleSet,
-    cameras: &[PinholeCamera],
-    method: ReconstructionMethod,
-) -> anyhow::Result<(Vec<View>, f64)> {
-    let reconstructor = subject.stand.reconstructor();
-    let (views, statistics) = reconstructor.reconstruct_measured(set, cameras, method, ViewPlanes::WITH_DEPTH, true)?;
-    Ok((views, statistics.fetches_per_ray.unwrap_or(0.0)))
+pub fn made(subject: &Subject<'_>, set: &SampleSet) -> anyhow::Result<Vec<View>> {
+    let request = ReconstructRequest::new(set, &subject.views, LAYERED);
+    Ok(subject.stand.reconstructor().reconstruct(ReconstructRequest { planes: ViewPlanes::WITH_DEPTH, ..request })?)
 }
 
 /// The figures of views beside the truth.
 ///
 /// # Errors
 /// Views differ in size.
-pub fn figures(truths: &[View], views: &[View], loads: f64, view_s: f64) -> anyhow::Result<Figures> {
-    let mut all = Figures { psnr_db: 0.0, flip: 0.0, wrong_hits: 0.0, missed: 0.0, loads, view_s };
+pub fn figures(truths: &[View], views: &[View], view_s: f64) -> anyhow::Result<Figures> {
+    let mut all = Figures { psnr_db: 0.0, flip: 0.0, wrong_hits: 0.0, missed: 0.0, loads: None, view_s };
     for (truth, view) in truths.iter().zip(views) {
         let [foreground, _] = PictureErrors::of(truth, &Rgb8Image::of_view(view)?)?;
         let depths = [truth, view].map(|view| view.inverse_depth_per_m.as_deref().unwrap_or_default());

@@ -4,8 +4,9 @@ use std::fmt;
 use std::time::Instant;
 
 use depth_image::{Antialias, DepthImage, LightCacheQuality, PinholeCamera, View, ViewPlanes};
+use gpu::Turn;
 use metrics::PictureErrors;
-use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
+use reconstruction::{ReconstructRequest, ReconstructionMethod, SampleSet, SetDescription};
 use render::Lighting;
 use report::Point;
 
@@ -212,7 +213,7 @@ fn joint_carve<'s>(stage: &Stage<'s>) -> anyhow::Result<OpenRow<'s>> {
         environment: None,
         mips: false,
     };
-    let images = stage.stand.reconstructor().upload(&images, &description)?;
+    let images = stage.stand.reconstructor().upload(&images, &description, Turn::default())?;
     let drawer = Drawer::Images(stage.stand, Box::new(images));
     Ok(OpenRow { drawing: Drawing::JointCarve, set: Some(set), sampling_s, drawer })
 }
@@ -240,7 +241,8 @@ impl Drawer<'_> {
             Self::Scene(lit) => lit.views(cameras, planes)?,
             Self::Images(stand, set) => {
                 let method = ReconstructionMethod::JointCarve { stop_level: 0 };
-                stand.reconstructor().reconstruct(set, cameras, method, planes)?
+                let request = ReconstructRequest::new(set, cameras, method);
+                stand.reconstructor().reconstruct(ReconstructRequest { planes, ..request })?
             }
         };
         Ok(views.remove(0))

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use crate::reference_views::ReferenceViews;
+use app_core::addresses::listen;
 use app_core::cluster::Cluster;
 use app_core::delivery::{open, receive, request};
-use app_core::process::{listen, runtime};
+use app_core::process::runtime;
 use app_core::setup::{SceneArgs, Setup};
 use app_core::sizes::SampleSize;
 use cluster::{PolicyChoice, SessionRequest};

@@ -1,10 +1,11 @@
 //! Layered depth cubes: texels that grow in the picture, leaves, and mirrors that touch what they show. All but the first by the
 //! host alone.
 
-use depth_image::{Aabb, CubeGrid, LayeredDepthImage, PinholeCamera, Ray, ViewPlanes};
+use depth_image::{Aabb, CubeGrid, CubeImages, LayeredDepthImage, PinholeCamera, Ray, ViewPlanes};
 use glam::{Vec2, Vec3};
+use gpu::Turn;
 use reconstruction::scalar::CubeTwin;
-use reconstruction::{ReconstructionMethod, SetDescription};
+use reconstruction::{ReconstructRequest, ReconstructionMethod, SetDescription};
 use render::{LayerSelection, Lighting};
 use scene::{Limits, MissingTextures, SceneSpec};
 
@@ -106,13 +107,15 @@ fn by_texel(stand: &Stand, sides_px: &[f64]) -> anyhow::Result<Rows> {
         environment: None,
         mips: false,
     };
-    let set = stand.reconstructor().upload_cube(&grid, &images, &description)?;
+    let cube = CubeImages { grid, images, light_field: None };
+    let set = stand.reconstructor().upload_cube(&cube, &description, Turn::default())?;
     rows(sides_px, |side_px| {
         let pixel_m = grid.spacing_m / side_px as f32;
         let cameras = TURNS_DEG.map(|turn_deg| towards_middle(stand, &scene.bounds(), pixel_m, turn_deg));
         let truths = stand.views(&on_device, lighting, &cameras, ViewPlanes::WITH_DEPTH)?;
-        let layered = ReconstructionMethod::LAYERED;
-        let views = stand.reconstructor().reconstruct(&set, &cameras, layered, ViewPlanes::WITH_DEPTH)?;
+        let request = ReconstructRequest::new(&set, &cameras, ReconstructionMethod::LAYERED);
+        let planes = ViewPlanes::WITH_DEPTH;
+        let views = stand.reconstructor().reconstruct(ReconstructRequest { planes, ..request })?;
         Ok([1.0 - foreground(&truths, &views)?.ssim, not_held(&truths, &views, BEHIND * grid.spacing_m)])
     })
 }
