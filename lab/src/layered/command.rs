@@ -14,9 +14,9 @@ pub fn run(args: &StudyArgs) -> anyhow::Result<Outcome> {
     let engine = args.engine()?;
     let stand = Stand::new(&engine, false);
     let mut report = args.report("layered depth cubes", &engine);
-    table_one::measure(&stand, &mut report)?;
     baselines::measure(&stand, args.quick, &mut report)?;
     light_fields::measure(&stand, args.quick, &mut report)?;
     glossy::measure(&stand, args.quick, &mut report)?;
+    table_one::measure(&stand, &mut report)?;
     args.finish("layered", &report)
 }
