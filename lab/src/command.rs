@@ -9,13 +9,11 @@ use crate::failures::command::{self as failures, FailuresArgs};
 use crate::fronts::command::{self as fronts, FrontsArgs};
 use crate::impostors::command::{self as impostors, ImpostorsArgs};
 use crate::lages::{self, LagesArgs};
-use crate::layered::command::{self as layered, LayeredArgs};
-use crate::light_cache_study::{self as light_cache, LightCacheArgs};
-use crate::placement::command::{self as placement, PlacementArgs};
-use crate::planner_study::command::{self as planner_study, PlannerArgs};
+use crate::layered::command as layered;
+use crate::lit::light_cache::{self, LightCacheArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
 use crate::stability::command::{self as stability, StabilityArgs};
-use crate::view_errors::{self, ErrorsArgs};
+use crate::study::StudyArgs;
 
 /// A subcommand that measures.
 #[derive(Debug, Subcommand)]
@@ -49,27 +47,25 @@ pub enum StudyCommand {
     /// what `myriorama plan` chooses. Under expensive light the rows are qualities of light_cache with sample sets of several
     /// sizes, joint_carve, and direct drawing with 1 to 64 rays. docs/fronts.md explains how to read both.
     Fronts(FrontsArgs),
-    /// Plans on subjects that nothing was tuned on, and compares the choices with tables of all rows
-    Planner(PlannerArgs),
-    /// Measures what places of sample cameras that are chosen for a scene would gain over the fixed ones
-    Placement(PlacementArgs),
     /// Measures how well images of a mirror's surroundings answer its rays
     Impostors(ImpostorsArgs),
-    /// Measures views from layered depth cubes, which hold every surface once
-    Layered(LayeredArgs),
+    /// Repeats Table 1 of Lischinski and Rappoport: layered depth cubes, light fields, and both baselines
+    ///
+    /// Views of the paper's kinds of scene walk through a layered depth cube. Beside them stand the paper's own ways to primary
+    /// rays, projecting all samples and quadtrees of depths, and direct drawing. Mirrors and glossy surfaces are followed by
+    /// rays, or gathered in layered light fields.
+    Layered(StudyArgs),
     /// Measures views with light from samples against direct drawing with few rays, at equal error
     ///
-    /// For each scene the report has the time and the errors of direct drawing with 1 to 16 rays a position and of each
-    /// quality of light_cache, and the gain: the time of direct drawing with the fewest rays that reaches a quality's FLIP,
-    /// over the quality's time. docs/benchmarks.md says how they are measured.
+    /// For each scene the report has the time and the errors of direct drawing with few and many rays, and of each quality of
+    /// light_cache, and the gain: the time of direct drawing with the fewest rays that reaches a quality's FLIP, over the
+    /// quality's time. docs/benchmarks.md says how they are measured.
     #[command(name = "light_cache")]
     LightCache(LightCacheArgs),
     /// Measures how errors change from frame to frame, and the jump where samples change
     Stability(StabilityArgs),
     /// Compares two reports of `study fronts`
     Compare(CompareArgs),
-    /// Measures the errors of many random views, on which the planner's bounds and audits are tested
-    Errors(ErrorsArgs),
 }
 
 impl LabCommand {
@@ -92,14 +88,11 @@ impl StudyCommand {
             Self::Sampling(args) => sampling::run(args),
             Self::Failures(args) => failures::run(args),
             Self::Fronts(args) => fronts::run(args),
-            Self::Planner(args) => planner_study::run(args),
-            Self::Placement(args) => placement::run(args),
             Self::Impostors(args) => impostors::run(args),
             Self::Layered(args) => layered::run(args),
             Self::LightCache(args) => light_cache::run(args),
             Self::Stability(args) => stability::run(args),
             Self::Compare(args) => compare::run(args),
-            Self::Errors(args) => view_errors::run(args),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use anyhow::Context as _;
 use depth_image::{Provenance, ProvenanceKind, View, ViewPlanes};
-use metrics::{PictureErrors, PixelClass, Rgb8Image, class_mask, depth_errors, flip_map};
+use metrics::{PictureErrors, PixelClass, Rgb8Image, depth_errors};
 use rayon::prelude::*;
 use reconstruction::ReconstructionMethod;
 
@@ -10,7 +10,7 @@ use crate::reference_views::ReferenceViews;
 
 /// A channel off by more than this, out of 255, is a wrong colour.
 const WRONG_COLOR: u8 = 16;
-/// Views that a method is timed on, unless said otherwise.
+/// Views that a method is timed on.
 const TIMED_VIEWS: usize = 64;
 
 /// Accuracy and speed of a method. Shares are of 1, over all views together.
@@ -36,8 +36,6 @@ pub struct Evaluation {
     pub ssim: f64,
     /// Mean over views.
     pub flip: f64,
-    /// Mean over views that have covered pixels, over these pixels.
-    pub flip_covered: f64,
     /// Hits off by more than 1 % in depth, of all hits.
     pub wrong_hits: f64,
     /// Pixels that no sample camera knows, of all.
@@ -48,31 +46,19 @@ pub struct Evaluation {
     pub disoccluded_unmarked: f64,
     /// Disoccluded pixels, of all.
     pub disoccluded: f64,
-    /// Loads of depth and colour words a pixel.
-    pub fetches_a_ray: f64,
 }
 
 impl ReferenceViews {
-    /// Evaluates a method.
+    /// Evaluates a method, timed on a batch of views.
     pub fn evaluate(&self, method: ReconstructionMethod, runs: usize) -> anyhow::Result<Evaluation> {
-        self.evaluate_timed_on(method, TIMED_VIEWS, runs)
-    }
-
-    /// Evaluates a method, timed on a batch of `views` views or more.
-    pub fn evaluate_timed_on(
-        &self,
-        method: ReconstructionMethod,
-        views: usize,
-        runs: usize,
-    ) -> anyhow::Result<Evaluation> {
-        let ms_a_view = self.ms_a_view(method, views, runs)?;
-        let (views, fetches_a_ray) = self.reconstruct_counted(method, ViewPlanes::ALL)?;
+        let ms_a_view = self.ms_a_view(method, TIMED_VIEWS, runs)?;
+        let views = self.reconstruct(method, ViewPlanes::ALL)?;
         let pairs: Vec<_> = self.views.iter().zip(&views).zip(self.classes()).collect();
         let errors = pairs
             .into_par_iter()
             .map(|((reference, view), classes)| Errors::of(reference, view, classes))
             .collect::<anyhow::Result<Vec<_>>>()?;
-        Ok(evaluation(method, ms_a_view, fetches_a_ray, &errors))
+        Ok(evaluation(method, ms_a_view, &errors))
     }
 }
 
@@ -85,7 +71,6 @@ struct Errors {
     psnr_db: f64,
     ssim: f64,
     flip: f64,
-    flip_covered: Option<f64>,
     pixels: usize,
     hits: usize,
     wrong_hits: usize,
@@ -97,8 +82,7 @@ struct Errors {
 
 impl Errors {
     fn of(reference: &View, view: &View, classes: &[PixelClass]) -> anyhow::Result<Self> {
-        let (expected, actual) = (Rgb8Image::of_view(reference)?, Rgb8Image::of_view(view)?);
-        let flip = flip_map(&expected, &actual)?;
+        let actual = Rgb8Image::of_view(view)?;
         let depth = depth_errors(&known_depth(reference)?, &known_depth(view)?, None)?;
         let [foreground, whole] = PictureErrors::of(reference, &actual)?;
         let errors = Self {
@@ -108,7 +92,6 @@ impl Errors {
             psnr_db: whole.psnr_db,
             ssim: whole.ssim,
             flip: whole.flip,
-            flip_covered: flip.mean(Some(&class_mask(classes, PixelClass::Covered)))?,
             pixels: depth.pixels,
             hits: depth.hit_px,
             wrong_hits: depth.wrong_hit_px,
@@ -134,10 +117,9 @@ impl Errors {
     }
 }
 
-fn evaluation(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, errors: &[Errors]) -> Evaluation {
+fn evaluation(method: ReconstructionMethod, ms_a_view: f64, errors: &[Errors]) -> Evaluation {
     let mean = |value: fn(&Errors) -> f64| errors.iter().map(value).sum::<f64>() / errors.len() as f64;
     let sum = |value: fn(&Errors) -> usize| errors.iter().map(value).sum::<usize>() as f64;
-    let covered: Vec<f64> = errors.iter().filter_map(|e| e.flip_covered).collect();
     Evaluation {
         method,
         ms_a_view,
@@ -149,13 +131,11 @@ fn evaluation(method: ReconstructionMethod, ms_a_view: f64, fetches_a_ray: f64, 
         psnr_min_db: errors.iter().map(|e| e.psnr_db).fold(f64::INFINITY, f64::min),
         ssim: mean(|e| e.ssim),
         flip: mean(|e| e.flip),
-        flip_covered: covered.iter().sum::<f64>() / covered.len() as f64,
         wrong_hits: sum(|e| e.wrong_hits) / sum(|e| e.hits),
         unknown: sum(|e| e.unknown) / sum(|e| e.pixels),
         disoccluded_wrong: sum(|e| e.disoccluded_wrong) / sum(|e| e.disoccluded),
         disoccluded_unmarked: sum(|e| e.disoccluded_unmarked) / sum(|e| e.disoccluded),
         disoccluded: sum(|e| e.disoccluded) / sum(|e| e.pixels),
-        fetches_a_ray,
     }
 }
 

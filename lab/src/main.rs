@@ -1,7 +1,8 @@
 //! `myriorama-lab`: measurements of the product, each as a report. Its commands are `bench` and `study`.
 //!
-//! [`mod@bench`] compares measured values with bars. [`lages`] and [`sampling_study`] repeat the experiments of papers.
-//! [`load`] and [`scaling`] start clusters of processes. [`failures`] holds the shapes of curves of errors.
+//! [`mod@bench`] compares measured values with bars. [`lages`], [`sampling_study`] and [`layered`] repeat the experiments of papers.
+//! All studies are rows that are measured and reported by [`study`].
+//! [`load`] and [`scaling`] start clusters of [`processes`]. [`failures`] holds the shapes of curves of errors.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod balance;
@@ -15,16 +16,12 @@ mod fronts;
 mod impostors;
 mod lages;
 mod layered;
-mod light_cache_study;
-mod lighting_study;
-mod lit_views;
+mod lit;
 mod load;
 mod memory;
 mod models;
-mod placement;
-mod planner_study;
 mod process;
-mod promise;
+mod processes;
 mod reference_views;
 mod sampling_study;
 mod scaling;
@@ -32,10 +29,9 @@ mod section;
 mod sharing;
 mod stability;
 mod statistics;
-mod sweep;
+mod study;
 #[cfg(test)]
 mod tests;
-mod view_errors;
 mod viewer;
 
 use std::process::ExitCode;
@@ -64,7 +60,6 @@ Exit status: 0 done; 1 a check fell short and --strict was given; 2 arguments or
 run time. RUST_LOG=info (or debug) says what is going on.";
 
 fn main() -> ExitCode {
-    app_core::process::restart_with_library_settings();
     node::init_logging("warn");
     exit::report("myriorama-lab", &Cli::parse().command.run())
 }
@@ -80,11 +75,10 @@ mod command_line_tests {
 
     #[test]
     fn input_that_cannot_be_used_is_named_with_status_2() {
-        let cases: [(&[&str], &str); 4] = [
+        let cases: [(&[&str], &str); 3] = [
             (&["study", "fronts", "--subject", "nowhere"], "nowhere"),
             (&["study", "light_cache", "--subject", "nowhere"], "nowhere"),
             (&["study", "light_cache", "--subject", "helmet", "--models", "/nowhere/models"], "/nowhere/models"),
-            (&["study", "fronts", "--conditions", "/nowhere/absent.toml"], "absent.toml"),
         ];
         for (arguments, named) in cases {
             let result = parsed(arguments).unwrap().command.run();

@@ -1,15 +1,9 @@
-//! Memory of processes, as Linux reports it.
+//! Memory and processor time of processes, as Linux reports them.
 
 /// The most memory that this process has held, in MB; `None` where the system does not tell.
 #[must_use]
 pub fn peak_memory_mb() -> Option<f64> {
-    peak_memory_mb_of("self")
-}
-
-/// The most memory that a process has held, by number or `self`, in MB; `None` where the system does not tell.
-#[must_use]
-pub fn peak_memory_mb_of(process: &str) -> Option<f64> {
-    Some(status_bytes(process, "VmHWM:")? / 1e6)
+    Some(status_bytes("self", "VmHWM:")? / 1e6)
 }
 
 /// Resident memory of a process, by number or `self`, in MiB; `None` where the system does not tell.

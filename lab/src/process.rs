@@ -19,7 +19,7 @@ const START: Duration = Duration::from_secs(300);
 ///
 /// # Errors
 /// It has not been built.
-pub fn product() -> anyhow::Result<PathBuf> {
+fn product() -> anyhow::Result<PathBuf> {
     let own = std::env::current_exe().context("this program's file is not known")?;
     let product = own.with_file_name("myriorama");
     if !product.is_file() {

@@ -8,9 +8,9 @@ use app_core::setup::{SceneArgs, Setup};
 use codec::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
 use depth_image::{DepthImage, PinholeCamera, SampleImage, View, ViewPlanes};
 use engine::GpuEngine;
-use metrics::{PixelClass, classify, unheld_rate};
+use metrics::{PixelClass, classify};
 use node::{DirectWork, Engine as _, SampleWork, Turn, WorkClass};
-use reconstruction::{ReconstructionMethod, SampleSet, SetDescription};
+use reconstruction::{ReconstructRequest, ReconstructionMethod, SampleSet, SetDescription};
 use render::Lighting;
 
 use crate::statistics::median;
@@ -53,7 +53,7 @@ impl ReferenceViews {
             environment: environment.as_ref(),
             mips: false,
         };
-        let set = engine.reconstructor.upload(&images, &description)?;
+        let set = engine.reconstructor.upload(&images, &description, Turn::default())?;
         let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ViewPlanes::ALL), TURN)?;
         let class = |(camera, view): (&PinholeCamera, &View)| Ok(classify(camera, inverse_depth(view)?, &images)?);
         let classes = cameras.iter().zip(&views).map(class).collect::<anyhow::Result<_>>()?;
@@ -65,82 +65,13 @@ impl ReferenceViews {
         &self.classes
     }
 
-    /// The share of the views' pixels with a surface whose surface no sample image holds.
-    ///
-    /// # Errors
-    /// A view has no depth.
-    pub fn unheld(&self) -> anyhow::Result<f64> {
-        let rate = |(camera, view): (&PinholeCamera, &View)| {
-            Ok(unheld_rate(camera, inverse_depth(view)?, &self.images)?.unwrap_or(0.0))
-        };
-        let rates = self.cameras.iter().zip(&self.views).map(rate).collect::<anyhow::Result<Vec<_>>>()?;
-        Ok(rates.iter().sum::<f64>() / rates.len() as f64)
-    }
-
-    /// The same views drawn from the scene in another light, with depth.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub fn drawn(&self, setup: &Setup, lighting: Lighting) -> anyhow::Result<Vec<View>> {
-        self.drawn_from(setup, lighting, &self.cameras, ViewPlanes::WITH_DEPTH)
-    }
-
-    /// Views of other cameras drawn from the scene.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub(crate) fn drawn_from(
-        &self,
-        setup: &Setup,
-        lighting: Lighting,
-        cameras: &[PinholeCamera],
-        planes: ViewPlanes,
-    ) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.draw_direct(&direct_work(setup, lighting, cameras, planes), TURN)?)
-    }
-
     /// Reconstructs all views.
     ///
     /// # Errors
     /// The device fails.
     pub fn reconstruct(&self, method: ReconstructionMethod, planes: ViewPlanes) -> anyhow::Result<Vec<View>> {
-        self.reconstruct_at(&self.cameras, method, planes)
-    }
-
-    /// As [`ReferenceViews::reconstruct`], each position within a pixel by itself.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub(crate) fn reconstruct_whole(
-        &self,
-        method: ReconstructionMethod,
-        planes: ViewPlanes,
-    ) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.reconstructor.reconstruct_whole(&self.set, &self.cameras, method, planes)?)
-    }
-
-    /// Reconstructs the views of other cameras.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub(crate) fn reconstruct_at(
-        &self,
-        cameras: &[PinholeCamera],
-        method: ReconstructionMethod,
-        planes: ViewPlanes,
-    ) -> anyhow::Result<Vec<View>> {
-        Ok(self.engine.reconstructor.reconstruct(&self.set, cameras, method, planes)?)
-    }
-
-    /// Reconstructs all views and counts the fetches of a ray; NaN where they cannot be counted.
-    pub(crate) fn reconstruct_counted(
-        &self,
-        method: ReconstructionMethod,
-        planes: ViewPlanes,
-    ) -> anyhow::Result<(Vec<View>, f64)> {
-        let reconstructor = &self.engine.reconstructor;
-        let (views, statistics) = reconstructor.reconstruct_measured(&self.set, &self.cameras, method, planes, true)?;
-        Ok((views, statistics.fetches_per_ray.unwrap_or(f64::NAN)))
+        let request = ReconstructRequest::new(&self.set, &self.cameras, method);
+        Ok(self.engine.reconstructor.reconstruct(ReconstructRequest { planes, ..request })?)
     }
 
     /// Milliseconds a view in one batch of `at_least` views or more: the median of `runs` after one that does not
@@ -153,7 +84,7 @@ impl ReferenceViews {
         let cameras = self.cameras.repeat(times);
         let run = || {
             let start = Instant::now();
-            self.engine.reconstructor.reconstruct(&self.set, &cameras, method, ViewPlanes::COLOR)?;
+            self.engine.reconstructor.reconstruct(ReconstructRequest::new(&self.set, &cameras, method))?;
             anyhow::Ok(start.elapsed().as_secs_f64())
         };
         run()?;
@@ -163,7 +94,7 @@ impl ReferenceViews {
 }
 
 /// The sample set as compositors decode it.
-pub(crate) fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result<Vec<DepthImage>> {
+fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result<Vec<DepthImage>> {
     let work = SampleWork {
         scene_hash: setup.offer.hash.to_string(),
         wanted: (0..setup.samples.len() as u32).collect(),

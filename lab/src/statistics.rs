@@ -7,15 +7,6 @@ pub fn median(mut numbers: Vec<f64>) -> f64 {
     numbers.get(numbers.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// The mean of some numbers, and their coefficient of variation: the standard deviation over the mean. 0 without any.
-#[must_use]
-pub fn mean_and_variation(numbers: &[f64]) -> (f64, f64) {
-    let count = numbers.len().max(1) as f64;
-    let mean = numbers.iter().sum::<f64>() / count;
-    let square = numbers.iter().map(|number| (number - mean).powi(2)).sum::<f64>() / count;
-    (mean, if mean > 0.0 { square.sqrt() / mean } else { 0.0 })
-}
-
 /// The geometric mean of numbers above 0; `None` without any.
 #[must_use]
 pub fn geometric_mean(numbers: &[f64]) -> Option<f64> {

@@ -7,6 +7,5 @@ pub mod budget;
 pub mod cli;
 pub mod commands;
 pub mod comparison;
-pub mod terminal_picture;
 pub mod tone;
 pub mod viewer;

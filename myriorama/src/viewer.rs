@@ -29,14 +29,21 @@ pub struct ViewerArgs {
     /// Serves no viewer on the port: only gRPC
     #[arg(long)]
     no_viewer: bool,
-    /// A name of this server in links, beside localhost and addresses; may be repeated
-    #[arg(long = "host", value_name = "NAME")]
-    hosts: Vec<String>,
-    /// Another page that may use this server, as https://host; may be repeated
-    #[arg(long = "allow-origin", value_name = "ORIGIN")]
-    origins: Vec<String>,
+    #[command(flatten)]
+    names: NameArgs,
     #[command(flatten)]
     tone: ToneArgs,
+}
+
+/// The names by which browsers reach a server.
+#[derive(Debug, Clone, Args)]
+pub struct NameArgs {
+    /// A name of this server in links, beside localhost and addresses; may be repeated
+    #[arg(long = "host", value_name = "NAME")]
+    pub hosts: Vec<String>,
+    /// Another page that may use this server, as https://host; may be repeated
+    #[arg(long = "allow-origin", value_name = "ORIGIN")]
+    pub origins: Vec<String>,
 }
 
 /// A viewer that runs.
@@ -64,8 +71,8 @@ impl ViewerArgs {
     ) -> Option<Viewer> {
         let request_of = request_of(PolicyChoice::Auto, self.tone);
         let config = GatewayConfig {
-            hosts: self.hosts.clone(),
-            origins: self.origins.clone(),
+            hosts: self.names.hosts.clone(),
+            origins: self.names.origins.clone(),
             ..GatewayConfig::new(coordinator, request_of, shared_light_methods())
         };
         let served = tokio::spawn(gateway::serve(browsers?, config, shutdown.clone()));

@@ -9,7 +9,7 @@ use crate::camera_file::CameraFileError;
 pub enum Outcome {
     /// Everything was done.
     Done,
-    /// All was done, but a check fell short: by `--strict`, `--least-psnr` or `--longest-gap`.
+    /// All was done, but a check fell short.
     FellShort,
     /// A signal ended the command, which says how to go on.
     Interrupted,

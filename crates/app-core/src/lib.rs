@@ -4,9 +4,11 @@
 //! [`experiment`] a client beside them.
 //! [`quality`] is the quality of shared light. [`delivery`] opens sessions and receives views, and [`live`] follows a path with a moving camera. [`camera_file`]
 //! reads camera files, and [`camera_record`] writes those of views. [`ladder`] has the representations among which budgets
-//! choose, [`planning`] the terms of a plan, and [`plan_files`] the measurements of plans. [`exit`] defines the exit status.
+//! choose, [`planning`] the terms of a plan, and [`plan_files`] the measurements of plans. [`addresses`] are those of the command line, and [`exit`] defines
+//! the exit status.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod addresses;
 pub mod camera_file;
 pub mod camera_record;
 pub mod cluster;

@@ -1,42 +1,9 @@
-//! Basics of every command: a runtime, a signal, ports.
-
-use std::env;
-use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs as _};
-use std::os::unix::process::CommandExt as _;
-use std::process::Command;
-use std::thread;
+//! Basics of every command: a runtime and signals.
 
 use anyhow::Context as _;
-use node::Telemetry;
-use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
-
-use crate::exit::BadInput;
-use crate::print_line;
-
-/// Starts the program anew in this process if settings are missing that libraries read from the environment. Settings of
-/// the user stay. Where the system refuses the restart, the program goes on with the libraries' own settings.
-pub fn restart_with_library_settings() {
-    let missing = missing_library_settings();
-    let Some(program) = env::current_exe().ok().filter(|_| !missing.is_empty()) else { return };
-    let mut arguments = env::args_os();
-    let name = arguments.next().unwrap_or_else(|| program.clone().into());
-    let _ = Command::new(program).arg0(name).args(arguments).envs(missing).exec();
-}
-
-fn missing_library_settings() -> Vec<(&'static str, String)> {
-    // By default glibc has eight arenas a core. Each keeps freed memory that its next large buffers do not fit.
-    let arenas = thread::available_parallelism().map_or(1, usize::from).to_string();
-    let mut settings = vec![("MALLOC_ARENA_MAX", arenas)];
-    if env::var_os("XDG_RUNTIME_DIR").is_none() {
-        // Mesa's device selection looks for a Wayland display, and warns where there is none.
-        settings.push(("NODEVICE_SELECT", "1".to_owned()));
-    }
-    settings.retain(|(name, _)| env::var_os(name).is_none());
-    settings
-}
 
 /// A runtime for services and clients.
 ///
@@ -96,68 +63,4 @@ pub fn cancel_at_signal(shutdown: CancellationToken) {
             shutdown.cancel();
         }
     });
-}
-
-/// An address to listen on, as `HOST:PORT` with a name or a number.
-///
-/// # Errors
-/// The text has no port, or the name is unknown.
-pub fn listen_address(text: &str) -> Result<SocketAddr, String> {
-    let mut found = text.to_socket_addrs().map_err(|error| format!("{error}, must be HOST:PORT"))?;
-    found.next().ok_or_else(|| format!("{text} has no address"))
-}
-
-/// The address of a coordinator; `http://` may be left out.
-///
-/// # Errors
-/// Another scheme.
-pub fn coordinator_url(text: &str) -> Result<String, String> {
-    match text.split_once("://") {
-        None => Ok(format!("http://{text}")),
-        Some(("http", _)) => Ok(text.to_owned()),
-        Some(("https", _)) => Err("coordinators have no TLS yet: use http://, in a network that is trusted".to_owned()),
-        Some((scheme, _)) => Err(format!("the scheme is {scheme}, must be http")),
-    }
-}
-
-/// Opens a port to serve on.
-///
-/// # Errors
-/// The port is taken or reserved, or the address is not loopback and `insecure_bind` is not given.
-pub async fn listen(address: SocketAddr, insecure_bind: bool) -> anyhow::Result<TcpListener> {
-    if !address.ip().is_loopback() && !insecure_bind {
-        let reason = format!("{address} is not loopback: give --insecure-bind to serve there without TLS");
-        return Err(BadInput(reason).into());
-    }
-    TcpListener::bind(address).await.with_context(|| format!("cannot listen on {address}"))
-}
-
-/// The address at which this process reaches a listener, which may be bound to all addresses.
-///
-/// # Errors
-/// The listener has no address.
-pub fn loopback_of(listener: &TcpListener) -> anyhow::Result<SocketAddr> {
-    let mut address = listener.local_addr()?;
-    if address.ip().is_unspecified() {
-        address.set_ip(if address.is_ipv4() { Ipv4Addr::LOCALHOST.into() } else { Ipv6Addr::LOCALHOST.into() });
-    }
-    Ok(address)
-}
-
-/// Serves the process's metrics until `shutdown`, where an address is given.
-///
-/// # Errors
-/// As [`listen`].
-pub async fn serve_metrics(
-    address: Option<SocketAddr>,
-    insecure_bind: bool,
-    telemetry: Telemetry,
-    shutdown: CancellationToken,
-) -> anyhow::Result<()> {
-    if let Some(address) = address {
-        let listener = listen(address, insecure_bind).await?;
-        print_line!("metrics at http://{}/metrics", listener.local_addr()?);
-        tokio::spawn(telemetry.serve(listener, shutdown));
-    }
-    Ok(())
 }

@@ -7,7 +7,7 @@ use depth_image::{Camera, PinholeCamera, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Turn};
-use reconstruction::{METHODS, SetDescription};
+use reconstruction::{METHODS, ReconstructRequest, SetDescription};
 use render::{DrawWork, GpuScene, Refinement, SamplePlanes, Visibility};
 
 const RUNS: usize = 5;
@@ -39,12 +39,12 @@ fn main() -> Outcome<()> {
     let (background, illumination) = (scene.background, &scene.illumination);
     let set =
         SetDescription { volume: bounds, background, illumination, highlight: None, environment: None, mips: false };
-    let set = reconstructor.upload(&images, &set)?;
+    let set = reconstructor.upload(&images, &set, Turn::default())?;
     let view = [camera(0.0, VIEW_PX)];
     let asked: Vec<String> = std::env::args().skip(1).collect();
     let is_asked = |name: &str| asked.is_empty() || asked.iter().any(|asked| asked == name);
     for row in METHODS.iter().filter(|row| is_asked(row.name)) {
-        let make = || reconstructor.reconstruct(&set, &view, row.method, ViewPlanes::default());
+        let make = || reconstructor.reconstruct(ReconstructRequest::new(&set, &view, row.method));
         compare(&engine, row.name, || Ok(make().map(drop)?))?;
     }
     if !is_asked("direct") {

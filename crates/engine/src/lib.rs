@@ -18,8 +18,8 @@ use node::{
 };
 use parking_lot::Mutex;
 use reconstruction::{
-    CommonSets, MirrorCell, Mirrors, ReconstructionError, ReconstructionMethod, Reconstructor, RequiredPlanes,
-    SetDescription,
+    CommonSets, MirrorCell, Mirrors, ReconstructRequest, ReconstructionError, ReconstructionMethod, Reconstructor,
+    RequiredPlanes, SetDescription,
 };
 use render::{DrawWork, GpuScene, LightCache, Lighting, Refinement, RenderError, Renderer, Visibility};
 use sampling::{Sampler, SamplingError, SamplingMethod};
@@ -381,8 +381,8 @@ impl Engine for GpuEngine {
         };
         let turn = device_turn(turn);
         let upload = || match &set.images {
-            SampleImages::Depth(images) => self.reconstructor.upload_in_turn(images, &description, turn),
-            SampleImages::Cube(cube) => self.reconstructor.upload_cube_in_turn(cube, &description, turn),
+            SampleImages::Depth(images) => self.reconstructor.upload(images, &description, turn),
+            SampleImages::Cube(cube) => self.reconstructor.upload_cube(cube, &description, turn),
         };
         let set = self.catching(|| upload().map_err(reconstruction_error))?;
         Ok(Arc::new(Uploaded::Images(UploadedImages {
@@ -421,7 +421,14 @@ impl Engine for GpuEngine {
         let common = CommonSets { mirrors, base: base.as_deref() };
         let turn = device_turn(turn);
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
-            let make = || self.reconstructor.reconstruct_with(set, common, cameras, method, work.planes, turn);
+            let make = || {
+                self.reconstructor.reconstruct(ReconstructRequest {
+                    common,
+                    turn,
+                    planes: work.planes,
+                    ..ReconstructRequest::new(set, cameras, method)
+                })
+            };
             self.catching(|| make().map_err(reconstruction_error))
         })
     }

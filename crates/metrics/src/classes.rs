@@ -69,23 +69,6 @@ pub fn unheld_rate(
     Ok((!surfaces.is_empty()).then(|| unheld.count() as f64 / surfaces.len() as f64))
 }
 
-/// The sample images that hold the surface of a pixel, one bit an image, for each pixel that shows one. At most the first 32
-/// images count.
-///
-/// # Errors
-/// Planes do not fit their cameras.
-pub fn holding_images(
-    reference_camera: &PinholeCamera,
-    reference_inverse_depth: &[f32],
-    sample_images: &[DepthImage],
-) -> Result<Vec<u32>, MetricsError> {
-    let held = |point: Vec3| {
-        let images = sample_images.iter().take(32).enumerate();
-        images.fold(0, |held, (bit, image)| held | u32::from(matches_sample(image, point)) << bit)
-    };
-    Ok(surface_points(reference_camera, reference_inverse_depth)?.into_par_iter().map(held).collect())
-}
-
 fn surface_points(camera: &PinholeCamera, inverse_depth: &[f32]) -> Result<Vec<Vec3>, MetricsError> {
     expect_len("reference depth", inverse_depth.len(), camera.pixel_count())?;
     let surfaces = inverse_depth.iter().enumerate().filter(|&(_, &inverse)| inverse > 0.0);
@@ -195,18 +178,6 @@ mod tests {
         let surfaces = depth.iter().filter(|&&depth| depth > 0.0).count() as f64;
         let unheld = unheld_rate(&camera, &depth, &[sample(0.4)]).unwrap().unwrap() * surfaces;
         assert!((unheld / f64::from(columns * rows) - 1.0).abs() < 0.1, "{unheld}: with what lies beside steps");
-    }
-
-    #[test]
-    fn images_that_hold_a_surface_are_told_apart() {
-        let (camera, depth) = card_before_wall(0.0);
-        let images = [sample(0.0), sample(0.4), sample(-0.4)];
-        let held = holding_images(&camera, &depth, &images).unwrap();
-        for (place, image) in images.iter().enumerate() {
-            let unheld = held.iter().filter(|&held| held & (1 << place) == 0).count() as f64 / held.len() as f64;
-            assert_eq!(unheld_rate(&camera, &depth, std::slice::from_ref(image)).unwrap(), Some(unheld));
-        }
-        assert!(held.iter().all(|held| held & 1 == 1) && held.contains(&0b011) && held.contains(&0b101));
     }
 
     #[test]

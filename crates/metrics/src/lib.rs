@@ -31,7 +31,7 @@ mod ssim;
 mod steps;
 
 pub use change_error::change_error_map;
-pub use classes::{PixelClass, class_mask, classify, holding_images, unheld_rate};
+pub use classes::{PixelClass, class_mask, classify, unheld_rate};
 pub use depth_error::{DepthErrors, WRONG_HIT_RELATIVE, depth_errors};
 pub use error::MetricsError;
 pub use flip::{FLIP_PIXELS_PER_DEGREE, FLIP_REACH_PX, flip_map, flip_map_at};

@@ -1,5 +1,7 @@
 //! Exact bounds for shares of views. Shares and error rates are from 0 to 1. NaN decides "not over" and gives no bound.
 
+use statrs::distribution::{Binomial, DiscreteCDF as _};
+
 /// The most views of one percentile that are asked for.
 const MAX_VIEWS: usize = 4096;
 
@@ -7,21 +9,10 @@ const MAX_VIEWS: usize = 4096;
 /// as the nearest of them; NaN gives NaN where `over` is below `count`.
 #[must_use]
 pub fn at_most_over(count: usize, over: usize, share: f64) -> f64 {
-    if over >= count || share <= 0.0 {
+    if over >= count {
         return 1.0;
     }
-    if share >= 1.0 {
-        return 0.0;
-    }
-    let mut log_term = count as f64 * (-share).ln_1p();
-    let odds = share.ln() - (-share).ln_1p();
-    let mut sum = log_term.exp();
-    for k in 0..over {
-        log_term += ((count - k) as f64 / (k + 1) as f64).ln() + odds;
-        sum += log_term.exp();
-    }
-    // `min` would make 1 of NaN.
-    if sum > 1.0 { 1.0 } else { sum }
+    Binomial::new(share.clamp(0.0, 1.0), count as u64).map_or(f64::NAN, |views| views.cdf(over as u64))
 }
 
 /// The most of `count` views that may be over where at most a share of `share` may be. The bound is wrong with a

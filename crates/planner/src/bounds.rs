@@ -1,6 +1,6 @@
 //! One-sided bounds on means, and the error rates of several rounds.
 
-use crate::student::upper_quantile;
+use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 /// The probability with which a promise may be wrong.
 pub const ERROR_RATE: f64 = 0.05;
@@ -63,4 +63,33 @@ impl Moments {
 pub fn round_error_rate(round: u32) -> f64 {
     let shares: f64 = (0..MAX_ROUNDS).map(|round| 0.5_f64.powi(round as i32)).sum();
     ERROR_RATE * 0.5_f64.powi(round as i32) / shares
+}
+
+/// The value that a variable of Student's t distribution exceeds with a probability of `error_rate`, from 0 to 1.
+fn upper_quantile(degrees: usize, error_rate: f64) -> f64 {
+    match StudentsT::new(0.0, 1.0, degrees as f64) {
+        Ok(distribution) if (0.0..=1.0).contains(&error_rate) => distribution.inverse_cdf(1.0 - error_rate),
+        _ => f64::NAN,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Percentage points of the distribution, from Abramowitz and Stegun, table 26.10, and to more digits by SciPy.
+    #[test]
+    fn quantiles_are_those_of_the_tables() {
+        for (degrees, error_rate, expected) in [
+            (1, 0.05, 6.313_751_515),
+            (2, 0.05, 2.919_985_580),
+            (7, 0.05, 1.894_578_605),
+            (63, 0.05, 1.669_402_222),
+            (30, 0.005, 2.749_995_654),
+        ] {
+            let found = upper_quantile(degrees, error_rate);
+            assert!((found - expected).abs() < 1e-6, "{degrees} {error_rate}: {found}");
+        }
+        assert!(upper_quantile(0, 0.05).is_nan() && upper_quantile(5, f64::NAN).is_nan());
+    }
 }

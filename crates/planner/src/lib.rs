@@ -23,7 +23,6 @@ mod metric;
 mod outcome;
 mod planner;
 mod random;
-mod student;
 mod view;
 mod view_errors;
 

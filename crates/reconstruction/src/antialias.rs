@@ -46,8 +46,7 @@ impl ShaderVariant for Shown {
     fn all() -> Vec<Self> {
         let whole = [Sums::None, Sums::Begun, Sums::Continued, Sums::Read].map(|sums| (sums, false));
         let sums = whole.into_iter().chain([(Sums::Continued, true)]);
-        let sets =
-            SetVariant::all().into_iter().filter(|set| !set.count_fetches && !set.holes).chain([SetVariant::CUBE]);
+        let sets = SetVariant::all().into_iter().filter(|set| !set.holes).chain([SetVariant::CUBE]);
         let each = |set| {
             sums.clone().flat_map(move |(sums, listed)| {
                 [false, true].map(|environment_map| Self { set, sums, listed, environment_map })
@@ -63,7 +62,7 @@ pub(crate) fn record(
     sums: Sums,
     listed: Option<&PixelList>,
 ) -> Result<(), ReconstructionError> {
-    // Neither holes nor fetches matter here.
+    // Holes do not matter here.
     let set = SetVariant { holes: false, ..recording.set.variant() };
     let environment_map = recording.set.environment.is_some();
     let variant = Shown { set, sums, listed: listed.is_some(), environment_map };

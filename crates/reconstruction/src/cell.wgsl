@@ -14,8 +14,6 @@ struct Corners { codes: vec4f, connected: bool }
 @group(0) var cell_codes: texture_2d<u32>;
 
 fn corners_of(cell_index: u32) -> Corners {
-{% if count_fetches %}    fetches += 1u;
-{% endif %}
     let words = textureLoad(cell_codes, texel_at(cell_index), 0).xy;
     let codes = vec4u(words.x & 0x7fffu, (words.x >> 16u) & 0x7fffu, words.y & 0x7fffu, (words.y >> 16u) & 0x7fffu);
 {% if holes %}

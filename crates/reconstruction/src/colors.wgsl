@@ -2,8 +2,6 @@
 struct Colors { corners: array<vec3f, 4> }
 
 fn colors_of(cell_index: u32) -> Colors {
-{% if count_fetches %}    fetches += 2u;
-{% endif %}
     let left = textureLoad(cell_colors, texel_at(cell_index), 0).xy;
     let right = textureLoad(cell_colors, texel_at(cell_index + 1u), 0).xy;
     return Colors(array(

@@ -8,10 +8,6 @@
 @group(0) var<storage, read_write> undecided_pixels: array<u32>;
 struct UndecidedList { workgroups: atomic<u32>, y: u32, z: u32, count: atomic<u32> }
 @group(0) var<storage, read_write> undecided: array<UndecidedList>;
-{% if count_fetches %}
-@group(0) var<storage, read_write> out_fetches: array<u32>;
-var<private> fetches: u32 = 0u;
-{% endif %}
 
 // Leaves a pixel to the next pass.
 fn leave_undecided(index: u32) {
@@ -38,8 +34,6 @@ fn write_pixel(index: u32, color_rgb9e5: u32, inverse_depth_per_m: f32, provenan
     out_color[index] = color_rgb9e5;
     out_inverse_depth[index] = inverse_depth_per_m;
     out_provenance[index] = provenance;
-{% if count_fetches %}    out_fetches[index] += fetches;
-{% endif %}
 }
 
 // Writes the surface that was found at t, or what is where none was; `empty`: nothing is there.

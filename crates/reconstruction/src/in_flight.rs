@@ -7,21 +7,12 @@ use crate::error::ReconstructionError;
 use crate::recording::{Batch, Recording};
 use crate::surface::SPLIT_SHIFT;
 
-/// Device time and fetches of a reconstruction.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Statistics {
-    /// Seconds on the device, all batches.
-    pub device_s: f64,
-    /// Mean loads of depth and colour words a pixel, where counted.
-    pub fetches_per_ray: Option<f64>,
-}
-
 /// A submitted batch.
 pub(crate) struct InFlight<'g> {
     submitted: Submitted<'g>,
     colors: Readback,
-    /// Inverse depths, provenance and fetches.
-    others: [Option<Readback>; 3],
+    inverse_depth: Option<Readback>,
+    provenance: Option<Readback>,
     /// Lent until the device is done with it.
     batch: Batch,
 }
@@ -30,7 +21,8 @@ pub(crate) struct InFlight<'g> {
 pub(crate) struct Finished {
     result: FrameResult,
     colors: Readback,
-    others: [Option<Readback>; 3],
+    inverse_depth: Option<Readback>,
+    provenance: Option<Readback>,
     batch: Batch,
 }
 
@@ -42,33 +34,26 @@ impl<'g> InFlight<'g> {
         let mut read =
             |plane: &PooledBuffer| frame.read_back(plane, 0..bytes, device.buffers.lend_host("view read-back", bytes));
         let colors = read(&batch.color);
-        let inverse_depth = planes.inverse_depth.then_some(&batch.inverse_depth_per_m);
-        let provenance = planes.provenance.then_some(&batch.provenance);
-        let others = [inverse_depth, provenance, batch.fetches.as_ref()].map(|plane| plane.map(&mut read));
-        Ok(Self { submitted: frame.submit()?, colors, others, batch })
+        let inverse_depth = planes.inverse_depth.then(|| read(&batch.inverse_depth_per_m));
+        let provenance = planes.provenance.then(|| read(&batch.provenance));
+        Ok(Self { submitted: frame.submit()?, colors, inverse_depth, provenance, batch })
     }
 
     /// Waits until the device is free of it.
     pub fn wait(self) -> Result<Finished, ReconstructionError> {
-        let Self { submitted, colors, others, batch } = self;
-        Ok(Finished { result: submitted.wait()?, colors, others, batch })
+        let Self { submitted, colors, inverse_depth, provenance, batch } = self;
+        Ok(Finished { result: submitted.wait()?, colors, inverse_depth, provenance, batch })
     }
 }
 
 impl Finished {
-    /// Appends the batch's views. Fetches are added up over views.
-    pub fn unpack(self, views: &mut Vec<View>, statistics: &mut Statistics) -> Result<(), ReconstructionError> {
-        let Self { result, colors, others: [inverse_depth, provenance, fetches], batch } = self;
-        statistics.device_s += result.device_s;
+    /// Appends the batch's views.
+    pub fn unpack(self, views: &mut Vec<View>) -> Result<(), ReconstructionError> {
+        let Self { result, colors, inverse_depth, provenance, batch } = self;
         let planes = |readback: Readback| each_view(&result, readback, &batch, <[u32]>::to_vec);
         let rgb = each_view(&result, colors, &batch, rgb_bytes)?;
         let mut depths = inverse_depth.map(planes).transpose()?.unwrap_or_default().into_iter();
         let mut provenances = provenance.map(planes).transpose()?.unwrap_or_default().into_iter();
-        if let Some(readback) = fetches {
-            let sums = each_view(&result, readback, &batch, |words| words.iter().map(|&n| f64::from(n)).sum::<f64>())?;
-            let pixels = f64::from(batch.size_px.element_product());
-            *statistics.fetches_per_ray.get_or_insert(0.0) += sums.iter().sum::<f64>() / pixels;
-        }
         views.extend(rgb.into_iter().map(|srgb8| View {
             size_px: batch.size_px,
             srgb8,

@@ -35,12 +35,11 @@ mod view_work;
 
 pub use bounce::{CurvedSearch, MirrorCell, Mirrors};
 pub use error::ReconstructionError;
-pub use in_flight::Statistics;
 pub use methods::{METHODS, ReconstructionMethod, UnknownMethod};
 pub use pyramid::CodedDepth;
 pub use quads::{ErrorBound, MeshStatistics, Quad, RequiredPlanes};
 pub use ray_ends::{RayEnd, RayWork};
-pub use reconstructor::{CommonSets, Reconstructor};
+pub use reconstructor::{CommonSets, Positions, ReconstructRequest, Reconstructor};
 pub use sample_set::SampleSet;
 pub use set_description::SetDescription;
 pub use shaders::{shader_sources, shaders, templates};

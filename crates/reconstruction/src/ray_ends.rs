@@ -67,8 +67,7 @@ pub(crate) fn follow_rays(
     let mirrors = Mirrors { cells: &cells, reflections: 1, glossy_rays: 0 };
     let size_px = UVec2::new(COLUMNS, (rays.len() as u32).div_ceil(COLUMNS).max(1));
     let camera = PinholeCamera::looking_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 1.0, size_px);
-    let planes = (ViewPlanes::ALL, false);
-    let mut recording = Recording::begin(device, surroundings, &[camera], planes, (0, Turn::default()))?;
+    let mut recording = Recording::begin(device, surroundings, &[camera], ViewPlanes::ALL, (0, Turn::default()))?;
     let Some(mut bounces) = Bounces::lend(device, mirrors, camera.pixel_count(), curved_search.checked()?)? else {
         return Ok((Vec::new(), 0.0));
     };

@@ -3,16 +3,14 @@
 
 use std::sync::Arc;
 
-use depth_image::{
-    Antialias, CubeGrid, CubeImages, DepthImage, LayeredDepthImage, PinholeCamera, Ray, View, ViewPlanes,
-};
+use depth_image::{Antialias, CubeImages, DepthImage, PinholeCamera, Ray, View, ViewPlanes};
 use glam::Vec2;
 use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
 use crate::bounce::{self, Bounces, CurvedSearch, Mirrors};
 use crate::cube::Cube;
-use crate::in_flight::{InFlight, Statistics};
+use crate::in_flight::InFlight;
 use crate::lobes::GlossyList;
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
@@ -50,32 +48,61 @@ impl<'s> From<Mirrors<'s>> for CommonSets<'s> {
     }
 }
 
-/// Views to reconstruct.
+/// Views to reconstruct from one sample set.
 #[derive(Clone, Copy)]
-struct Request<'r> {
-    set: &'r SampleSet,
-    method: ReconstructionMethod,
+pub struct ReconstructRequest<'r> {
+    /// The images or the cube.
+    pub set: &'r SampleSet,
+    /// Sets of mirror cells, and a base. A layered cube needs none: its mirrors show the cube.
+    pub common: CommonSets<'r>,
+    /// One view is made for each camera.
+    pub cameras: &'r [PinholeCamera],
+    /// Whether it draws, follows rays or walks a cube.
+    pub method: ReconstructionMethod,
+    /// The planes beside colour, and how colour is sampled.
+    pub planes: ViewPlanes,
+    /// Only with several positions a pixel.
+    pub positions: Positions,
+    /// The place in the device's order.
+    pub turn: Turn,
+}
+
+impl<'r> ReconstructRequest<'r> {
+    /// A request for colour alone, without common sets.
+    #[must_use]
+    pub fn new(set: &'r SampleSet, cameras: &'r [PinholeCamera], method: ReconstructionMethod) -> Self {
+        Self {
+            set,
+            common: CommonSets::default(),
+            cameras,
+            method,
+            planes: ViewPlanes::COLOR,
+            positions: Positions::Shared,
+            turn: Turn::default(),
+        }
+    }
+}
+
+/// A checked request with everything that its batches share.
+#[derive(Clone, Copy)]
+struct Prepared<'r> {
+    request: ReconstructRequest<'r>,
     mirrors: Mirrors<'r>,
     /// Rays into lobes that are walked in the base, with those off the mirrors that they meet.
     lobes: Mirrors<'r>,
     base: Option<&'r Cube>,
     /// The memory for rays off mirrors, and for those into lobes, while a batch is recorded.
     bounces: [Option<&'r Bounces<'r>>; 2],
-    /// Of the set, where the method draws it.
+    /// The quads of the set, where the method draws them.
     mesh: Option<&'r Mesh>,
-    planes: ViewPlanes,
-    /// How the positions within a pixel are found.
-    positions: Positions,
-    turn: Turn,
-    count_fetches: bool,
 }
 
 /// How the positions within a pixel are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Positions {
-    /// Where the method can, later positions are shared from the first.
+pub enum Positions {
+    /// Where the method can, later positions take the surface of the first.
     Shared,
-    /// Each is reconstructed by itself.
+    /// Each position is reconstructed by itself, as the reference of shared positions.
     Whole,
 }
 
@@ -98,15 +125,7 @@ impl Reconstructor {
     ///
     /// # Errors
     /// Images, cameras or a volume that cannot be used, or the device's limits.
-    pub fn upload(&self, images: &[DepthImage], set: &SetDescription<'_>) -> Result<SampleSet, ReconstructionError> {
-        self.upload_in_turn(images, set, Turn::default())
-    }
-
-    /// As [`Reconstructor::upload`], in its turn.
-    ///
-    /// # Errors
-    /// As [`Reconstructor::upload`].
-    pub fn upload_in_turn(
+    pub fn upload(
         &self,
         images: &[DepthImage],
         set: &SetDescription<'_>,
@@ -115,120 +134,27 @@ impl Reconstructor {
         SampleSet::upload(&self.tables, images, set, turn)
     }
 
-    /// Puts a layered depth cube on the device: the images of the lines along each axis of a grid.
+    /// Puts a layered depth cube on the device, with its light field if it has one.
     ///
     /// # Errors
-    /// Images that are not those of the grid's lines, a volume that cannot be used, or the device's limits.
+    /// Images that are not those of the grid's lines, a light field or a volume that cannot be used, or the device's limits.
     pub fn upload_cube(
-        &self,
-        grid: &CubeGrid,
-        images: &[LayeredDepthImage; 3],
-        set: &SetDescription<'_>,
-    ) -> Result<SampleSet, ReconstructionError> {
-        SampleSet::upload_cube(&self.tables, grid, (images, None), set, Turn::default())
-    }
-
-    /// As [`Reconstructor::upload_cube`], with a light field where there is one, at its place in the device's order.
-    ///
-    /// # Errors
-    /// As [`Reconstructor::upload_cube`], and a light field that cannot be used.
-    pub fn upload_cube_in_turn(
         &self,
         cube: &CubeImages,
         set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<SampleSet, ReconstructionError> {
-        SampleSet::upload_cube(&self.tables, &cube.grid, (&cube.images, cube.light_field.as_ref()), set, turn)
+        SampleSet::upload_cube(&self.tables, cube, set, turn)
     }
 
     /// One view a camera, in their order.
     ///
     /// # Errors
-    /// A camera that is not valid (all are checked first), a set without the samples that the method needs, or the device.
-    pub fn reconstruct(
-        &self,
-        set: &SampleSet,
-        cameras: &[PinholeCamera],
-        method: ReconstructionMethod,
-        planes: ViewPlanes,
-    ) -> Result<Vec<View>, ReconstructionError> {
-        self.reconstruct_in_turn(set, cameras, method, planes, Turn::default())
-    }
-
-    /// As [`Reconstructor::reconstruct`], in its turn.
-    ///
-    /// # Errors
-    /// As [`Reconstructor::reconstruct`].
-    pub fn reconstruct_in_turn(
-        &self,
-        set: &SampleSet,
-        cameras: &[PinholeCamera],
-        method: ReconstructionMethod,
-        planes: ViewPlanes,
-        turn: Turn,
-    ) -> Result<Vec<View>, ReconstructionError> {
-        self.reconstruct_with(set, CommonSets::default(), cameras, method, planes, turn)
-    }
-
-    /// As [`Reconstructor::reconstruct_in_turn`], with further sets: those that mirrors show, and a base. A layered cube needs none: its
-    /// mirrors show the cube.
-    ///
-    /// # Errors
-    /// As [`Reconstructor::reconstruct`], too many mirror cells, a cell without depth images, and a base without a cube.
-    pub fn reconstruct_with<'s>(
-        &self,
-        set: &SampleSet,
-        shared: impl Into<CommonSets<'s>>,
-        cameras: &[PinholeCamera],
-        method: ReconstructionMethod,
-        planes: ViewPlanes,
-        turn: Turn,
-    ) -> Result<Vec<View>, ReconstructionError> {
-        let output = (planes, Positions::Shared, false);
-        self.reconstruct_counted((set, shared.into()), cameras, method, output, turn).map(|(views, _)| views)
-    }
-
-    /// As [`Reconstructor::reconstruct`], but each position within a pixel is reconstructed by itself: what views whose positions
-    /// share a surface are compared with.
-    ///
-    /// # Errors
-    /// As [`Reconstructor::reconstruct`].
-    pub fn reconstruct_whole(
-        &self,
-        set: &SampleSet,
-        cameras: &[PinholeCamera],
-        method: ReconstructionMethod,
-        planes: ViewPlanes,
-    ) -> Result<Vec<View>, ReconstructionError> {
-        let output = (planes, Positions::Whole, false);
-        let set = (set, CommonSets::default());
-        self.reconstruct_counted(set, cameras, method, output, Turn::default()).map(|(views, _)| views)
-    }
-
-    /// As [`Reconstructor::reconstruct`], and what it cost; counting fetches slows it down.
-    ///
-    /// # Errors
-    /// As [`Reconstructor::reconstruct`].
-    pub fn reconstruct_measured(
-        &self,
-        set: &SampleSet,
-        cameras: &[PinholeCamera],
-        method: ReconstructionMethod,
-        planes: ViewPlanes,
-        count_fetches: bool,
-    ) -> Result<(Vec<View>, Statistics), ReconstructionError> {
-        let set = (set, CommonSets::default());
-        self.reconstruct_counted(set, cameras, method, (planes, Positions::Shared, count_fetches), Turn::default())
-    }
-
-    fn reconstruct_counted(
-        &self,
-        (set, CommonSets { mirrors, base }): (&SampleSet, CommonSets<'_>),
-        cameras: &[PinholeCamera],
-        method: ReconstructionMethod,
-        (planes, positions, count_fetches): (ViewPlanes, Positions, bool),
-        turn: Turn,
-    ) -> Result<(Vec<View>, Statistics), ReconstructionError> {
+    /// A camera that is not valid (all are checked first), a set without the samples that the method needs, too many mirror
+    /// cells, a cell without depth images, a base without a cube, or the device.
+    pub fn reconstruct(&self, request: ReconstructRequest<'_>) -> Result<Vec<View>, ReconstructionError> {
+        let ReconstructRequest { set, common: CommonSets { mirrors, base }, cameras, method, planes, turn, .. } =
+            request;
         for (index, camera) in cameras.iter().enumerate() {
             camera.validate().map_err(|source| ReconstructionError::Camera { index, source })?;
         }
@@ -245,35 +171,21 @@ impl Reconstructor {
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;
-        let request = Request {
-            set,
-            mirrors,
-            lobes,
-            base,
-            bounces: [None; 2],
-            method,
-            mesh: mesh.as_deref(),
-            planes,
-            positions,
-            turn,
-            count_fetches,
-        };
+        let prepared = Prepared { request, mirrors, lobes, base, bounces: [None; 2], mesh: mesh.as_deref() };
         let mut views = Vec::with_capacity(cameras.len());
-        let mut statistics = Statistics::default();
         let mut in_flight: Option<InFlight<'_>> = None;
         // The device works on one batch while the host takes the one before apart.
         for batch in batches(cameras, self.most_pixels(cells.iter().any(|cells| !cells.is_empty()))) {
-            let recording = self.record(request, batch)?;
+            let recording = self.record(prepared, batch)?;
             // Whoever holds the device asks for no other turn.
             let done = in_flight.take().map(InFlight::wait).transpose()?;
             in_flight = Some(InFlight::submit(recording, planes)?);
-            done.map_or(Ok(()), |done| done.unpack(&mut views, &mut statistics))?;
+            done.map_or(Ok(()), |done| done.unpack(&mut views))?;
         }
         if let Some(last) = in_flight {
-            last.wait()?.unpack(&mut views, &mut statistics)?;
+            last.wait()?.unpack(&mut views)?;
         }
-        statistics.fetches_per_ray = statistics.fetches_per_ray.map(|sum| sum / cameras.len().max(1) as f64);
-        Ok((views, statistics))
+        Ok(views)
     }
 
     /// The pixels of a batch. Rays off mirrors take memory, and are followed at once beside live streams.
@@ -288,50 +200,58 @@ impl Reconstructor {
     /// All passes over a batch.
     fn record<'r>(
         &'r self,
-        request: Request<'r>,
+        prepared: Prepared<'r>,
         cameras: &[PinholeCamera],
     ) -> Result<Recording<'r>, ReconstructionError> {
-        let Request { set, mirrors, lobes, method, planes, turn, count_fetches, .. } = request;
+        let Prepared { request, mirrors, lobes, .. } = prepared;
+        let ReconstructRequest { set, method, planes, turn, .. } = request;
         let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), mirrors.cells.len()));
-        let output = (planes, count_fetches);
-        let mut recording = Recording::begin(&self.device, set, cameras, output, (family, turn))?;
+        let mut recording = Recording::begin(&self.device, set, cameras, planes, (family, turn))?;
         let rays = recording.batch.plane_bytes as usize / 4;
         let lend = |of| Bounces::lend(&self.device, of, rays, CurvedSearch::default());
         let bounces = [lend(mirrors)?, lend(lobes)?];
-        self.record_positions(Request { bounces: bounces.each_ref().map(Option::as_ref), ..request }, &mut recording)?;
+        self.record_positions(
+            Prepared { bounces: bounces.each_ref().map(Option::as_ref), ..prepared },
+            &mut recording,
+        )?;
         recording.batch.bounces = bounces.into_iter().flatten().flat_map(Bounces::into_memory).collect();
         Ok(recording)
     }
 
     /// The passes over all positions within the pixels, and what they show together.
-    fn record_positions(&self, request: Request<'_>, recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
-        let Request { method, planes, .. } = request;
+    fn record_positions(
+        &self,
+        prepared: Prepared<'_>,
+        recording: &mut Recording<'_>,
+    ) -> Result<(), ReconstructionError> {
+        let ReconstructRequest { method, planes, .. } = prepared.request;
         // What a tile's start proves holds for every position within its pixels.
         if method.follows_rays() {
             tile_start::record(recording)?;
         }
         if planes.antialias == Antialias::NONE {
-            self.record_position(request, recording, None)?;
+            self.record_position(prepared, recording, None)?;
             return antialias::record(recording, Sums::None, None);
         }
-        self.record_sums(request, recording)?;
+        self.record_sums(prepared, recording)?;
         // Depth and provenance have no mean: they are the centre's.
         if planes.inverse_depth || planes.provenance {
             recording.go_to(Vec2::ZERO);
             // Mirrors count here for provenance alone: colour is the mean of the positions before.
-            let bounces = if planes.provenance { request.bounces } else { [None; 2] };
-            self.record_position(Request { bounces, ..request }, recording, None)?;
+            let bounces = if planes.provenance { prepared.bounces } else { [None; 2] };
+            self.record_position(Prepared { bounces, ..prepared }, recording, None)?;
         }
         antialias::record(recording, Sums::Read, None)
     }
 
     /// The passes over all positions within the pixels. After the first, only the pixels that it leaves are found.
-    fn record_sums(&self, request: Request<'_>, recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
+    fn record_sums(&self, prepared: Prepared<'_>, recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
+        let request = prepared.request;
         let mut offsets_px = request.planes.antialias.offsets_px();
         recording.go_to(offsets_px.next().unwrap_or_default());
-        self.record_position(request, recording, None)?;
+        self.record_position(prepared, recording, None)?;
         let rough = match request.positions {
-            Positions::Shared if request.bounces.iter().all(Option::is_none) => {
+            Positions::Shared if prepared.bounces.iter().all(Option::is_none) => {
                 request.method.share_positions(recording)?
             }
             // What a mirror shows is not shared.
@@ -342,7 +262,7 @@ impl Reconstructor {
         }
         for offset_px in offsets_px {
             recording.go_to(offset_px);
-            self.record_position(request, recording, rough.as_ref())?;
+            self.record_position(prepared, recording, rough.as_ref())?;
             antialias::record(recording, Sums::Continued, rough.as_ref())?;
         }
         Ok(())
@@ -351,12 +271,13 @@ impl Reconstructor {
     /// The passes over one position within the pixels, of listed pixels or of all.
     fn record_position(
         &self,
-        request: Request<'_>,
+        prepared: Prepared<'_>,
         recording: &mut Recording<'_>,
         listed: Option<&PixelList>,
     ) -> Result<(), ReconstructionError> {
-        let Request { method, base, bounces: [bounces, lobes], .. } = request;
-        let unknown = method.record(&self.drawing, request.mesh, recording, listed, bounces)?;
+        let Prepared { request: ReconstructRequest { method, .. }, base, mesh, bounces: [bounces, lobes], .. } =
+            prepared;
+        let unknown = method.record(&self.drawing, mesh, recording, listed, bounces)?;
         if method.walks_cube() {
             return fill::record(recording, &unknown);
         }

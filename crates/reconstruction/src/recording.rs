@@ -82,8 +82,6 @@ pub(crate) struct Batch {
     rough_pixels: Option<PooledBuffer>,
     /// For methods that draw; all positions are drawn into the same.
     pub targets: Option<QuadTargets>,
-    /// Fetches of each pixel, where they are counted.
-    pub fetches: Option<PooledBuffer>,
     /// The memory of mirrored rays, lent until the device is done with the batch.
     pub bounces: Vec<PooledBuffer>,
 }
@@ -94,7 +92,7 @@ impl<'r> Recording<'r> {
         device: &'r Device,
         set: &'r SampleSet,
         cameras: &[PinholeCamera],
-        (planes, count_fetches): (ViewPlanes, bool),
+        planes: ViewPlanes,
         (family, turn): (u64, Turn),
     ) -> Result<Self, ReconstructionError> {
         let plane_bytes = 4 * (cameras[0].pixel_count() * cameras.len()) as u64;
@@ -122,13 +120,9 @@ impl<'r> Recording<'r> {
             lists_made: 0,
             rough_pixels: (planes.antialias > Antialias::NONE).then(|| plane("pixels of further positions")),
             targets: None,
-            fetches: count_fetches.then(|| plane("fetches")),
             bounces: Vec::new(),
         };
-        let mut frame = Frame::begin(&device.gpu, "reconstruct", turn);
-        if let Some(fetches) = &batch.fetches {
-            frame.encoder.clear_buffer(fetches, 0, None);
-        }
+        let frame = Frame::begin(&device.gpu, "reconstruct", turn);
         Ok(Self { device, set, frame, batch, family })
     }
 
@@ -155,11 +149,6 @@ impl<'r> Recording<'r> {
     pub fn rough_list(&self) -> PixelList {
         let pixels = self.batch.rough_pixels.as_ref().expect("lent where a pixel has several positions");
         PixelList::empty(&self.device.gpu, (**pixels).clone(), self.batch.pieces.count())
-    }
-
-    /// The switches of passes that find surfaces.
-    pub fn variant(&self) -> SetVariant {
-        SetVariant { count_fetches: self.batch.fetches.is_some(), ..self.set.variant() }
     }
 
     /// The resources of `view_work.wgsl`.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
-use depth_image::{Aabb, CubeGrid, DepthImage, Environment, LayeredDepthImage, LayeredLightField, PinholeCamera};
+use depth_image::{Aabb, CubeImages, DepthImage, Environment, PinholeCamera};
 use glam::{UVec2, Vec2, Vec3};
 use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
@@ -44,9 +44,9 @@ pub struct SampleSet {
 }
 
 impl SampleSet {
-    /// The switches of all shaders that read the set, without fetches.
+    /// The switches of all shaders that read the set.
     pub(crate) fn variant(&self) -> SetVariant {
-        SetVariant { cameras: self.cameras.len(), holes: self.uncertain.contains(&true), count_fetches: false }
+        SetVariant { cameras: self.cameras.len(), holes: self.uncertain.contains(&true) }
     }
 
     /// The eye of its first image.
@@ -122,8 +122,7 @@ impl SampleSet {
     /// A layered depth cube, without any other image.
     pub(crate) fn upload_cube(
         tables: &TablePool,
-        grid: &CubeGrid,
-        images: (&[LayeredDepthImage; 3], Option<&LayeredLightField>),
+        cube: &CubeImages,
         set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
@@ -141,7 +140,7 @@ impl SampleSet {
             reflectors: None,
             environment: set.environment.cloned(),
             meshes: SetMeshes::upload(tables, &[], turn)?,
-            cube: Some(Arc::new(Cube::upload(tables, grid, images, set, turn)?)),
+            cube: Some(Arc::new(Cube::upload(tables, cube, set, turn)?)),
         })
     }
 }

@@ -57,7 +57,7 @@ impl ShaderVariant for Specular {
         let kinds = [(Highlight::BlinnPhong, false), (Highlight::Ggx, false), (Highlight::Ggx, true)].into_iter();
         let lit = kinds.flat_map(|kind| lights.map(|(lights, words)| (kind, lights, words)));
         lit.flat_map(|((highlight, environment_map), lights, visibility_words)| {
-            SetVariant::all().into_iter().filter(|set| !set.count_fetches).flat_map(move |set| {
+            SetVariant::all().into_iter().flat_map(move |set| {
                 let is_ggx = highlight == Highlight::Ggx;
                 let mirrored = [Some(1), Some(MAX_RAY_LISTS)].into_iter().filter(move |_| is_ggx);
                 std::iter::once(None).chain(mirrored).flat_map(move |mirror_cells| {

@@ -74,17 +74,13 @@ pub(crate) fn bindings<'b>(recording: &'b Recording<'_>, undecided: &'b PixelLis
 }
 
 /// The resources of `found.wgsl`.
-pub(crate) fn found_bindings<'b>(
-    recording: &'b Recording<'_>,
-    undecided: &'b PixelList,
-) -> impl Iterator<Item = Binding<'b>> {
+pub(crate) fn found_bindings<'b>(recording: &'b Recording<'_>, undecided: &'b PixelList) -> [Binding<'b>; 5] {
     let batch = &recording.batch;
-    let found = [
+    [
         Binding::buffer("out_color", &batch.color),
         Binding::buffer("out_inverse_depth", &batch.inverse_depth_per_m),
         Binding::buffer("out_provenance", &batch.provenance),
         Binding::buffer("undecided_pixels", &undecided.pixels),
         Binding::buffer("undecided", &undecided.lists),
-    ];
-    found.into_iter().chain(batch.fetches.as_ref().map(|fetches| Binding::buffer("out_fetches", fetches)))
+    ]
 }

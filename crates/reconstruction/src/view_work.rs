@@ -5,7 +5,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
-use gpu::{GpuTone, ResourceTrait, ResourceTraits, switches};
+use gpu::{GpuTone, ResourceTrait, ResourceTraits};
 use minijinja::{Value, context};
 
 /// Shaders name each camera; more would make them too long.
@@ -26,22 +26,19 @@ pub(crate) struct SetVariant {
     pub cameras: usize,
     /// Some texels of the set prove nothing of the space before them.
     pub holes: bool,
-    /// Fetches are counted for each pixel, by passes that find surfaces.
-    pub count_fetches: bool,
 }
 
 impl SetVariant {
     pub fn context(self) -> Value {
-        context! { cameras => self.cameras, holes => self.holes, count_fetches => self.count_fetches }
+        context! { cameras => self.cameras, holes => self.holes }
     }
 
     /// A set of a layered cube alone.
-    pub const CUBE: Self = Self { cameras: 0, holes: false, count_fetches: false };
+    pub const CUBE: Self = Self { cameras: 0, holes: false };
 
     pub fn all() -> Vec<Self> {
         let counts = [1, 2, 4, MAX_SAMPLE_CAMERAS].into_iter();
-        let each = |cameras| switches().map(move |[holes, count_fetches]| Self { cameras, holes, count_fetches });
-        counts.flat_map(each).collect()
+        counts.flat_map(|cameras| [false, true].map(|holes| Self { cameras, holes })).collect()
     }
 }
 

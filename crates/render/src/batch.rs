@@ -61,8 +61,6 @@ pub(crate) struct Recording<'a> {
     /// A uniform of the batch's cameras, with an element for each piece.
     pub cameras: wgpu::Buffer,
     pub sums: Sums,
-    /// Receives node visits and triangle tests of each pixel, of a single camera.
-    pub visit_counts: Option<&'a wgpu::Buffer>,
     pub frame: Frame<'a>,
 }
 

@@ -111,7 +111,6 @@ impl ShaderVariant for Illuminate {
             primary => self.ambient == AmbientRays::Indirect,
             from_eye => false,
             shading => highlight_name(Highlight::Ggx),
-            count_visits => false,
             ..merge_maps([self.sums.context(), self.traversal.map(Traversal::context).unwrap_or_default()])
         }
     }

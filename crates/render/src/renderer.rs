@@ -7,7 +7,7 @@ use depth_image::{
     LightPlanes, ParallelCamera, PinholeCamera, ProvenanceKind, ToneMapping, View, ViewPlanes,
 };
 use glam::UVec2;
-use gpu::{Frame, Gpu, GpuError, TablePool, Templates, Turn, WorkClass};
+use gpu::{Gpu, GpuError, TablePool, Templates, Turn, WorkClass};
 use parking_lot::Mutex;
 
 use crate::batch::{Batch, Position, batches};
@@ -278,7 +278,7 @@ impl Renderer {
         for cameras in batches(cameras, self.most_pixels(output)) {
             let sequence = sequence.map(|sequence| ImageSequence { first: pictures.len(), ..sequence });
             let batch = Batch { tone, cached, ..self.batch(work, cameras, output, sequence)? };
-            let (result, words) = self.stages.draw(&batch, None)?;
+            let (result, words) = self.stages.draw(&batch)?;
             result.with(words, |words: &[u32]| pictures.extend(read(words, cameras)))?;
         }
         Ok(pictures)
@@ -369,7 +369,7 @@ impl Renderer {
             let run = || {
                 let batch = self.batch(work, &cameras, views_output(work), None)?;
                 // Waiting for turns does not count.
-                Ok(self.stages.draw(&batch, None)?.0.device_s)
+                Ok(self.stages.draw(&batch)?.0.device_s)
             };
             self.check(&cameras)?;
             // Pipelines and trees are made by the first; of the others the quickest was disturbed least.
@@ -377,25 +377,6 @@ impl Renderer {
             (0..3).map(|_| run()).try_fold(f64::INFINITY, |least, s: Result<f64, RenderError>| s.map(|s| least.min(s)))
         };
         Ok(Choice { triangles_s: seconds(Visibility::Triangles)?, rays_s: seconds(Visibility::Rays)? })
-    }
-
-    /// Visits of nodes, then tests of triangles, of each pixel's primary ray; slower than drawing.
-    ///
-    /// # Errors
-    /// A camera that is not valid, or the device.
-    pub fn count_visits(&self, work: DrawWork<'_>, camera: &PinholeCamera) -> Result<Vec<[u32; 2]>, RenderError> {
-        let cameras = [Camera::from(*camera)];
-        self.check(&cameras)?;
-        let work = DrawWork { visibility: Visibility::Rays, ..work.unlit() };
-        let batch = self.batch(work, &cameras, views_output(work), None)?;
-        let pool = &self.stages.pool;
-        let bytes = 8 * camera.pixel_count() as u64;
-        let counts = pool.lend_storage("visits", bytes);
-        drop(self.stages.draw(&batch, Some(&counts))?);
-        let mut frame = Frame::begin(&self.gpu, "visits", work.turn);
-        let read = frame.read_back(&counts, 0..bytes, pool.lend_host("visits", bytes));
-        let result = frame.submit()?.wait()?;
-        Ok(result.with(read, |pairs: &[[u32; 2]]| pairs[..camera.pixel_count()].to_vec())?)
     }
 
     fn check(&self, cameras: &[Camera]) -> Result<(), RenderError> {

@@ -44,12 +44,8 @@ impl Stages {
         }
     }
 
-    /// Draws a batch; the words that come back are its planes. `visit_counts` receives node visits and triangle tests.
-    pub fn draw(
-        &self,
-        batch: &Batch<'_>,
-        visit_counts: Option<&wgpu::Buffer>,
-    ) -> Result<(FrameResult, Readback), RenderError> {
+    /// Draws a batch; the words that come back are its planes.
+    pub fn draw(&self, batch: &Batch<'_>) -> Result<(FrameResult, Readback), RenderError> {
         let turn = batch.work.turn;
         let _one = self.batches.begin(turn.class);
         let sums = self.sums(batch)?;
@@ -62,7 +58,7 @@ impl Stages {
         let shifted = batch.positions();
         let positions: Vec<Batch<'_>> = shifted.iter().map(|position| batch.at(position)).collect();
         let frame = Frame::begin(gpu, "draw", turn);
-        let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, visit_counts, frame };
+        let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, frame };
         let surfaces: Vec<Surfaces> = (0..batch.cameras.len()).map(|place| self.lend(batch, place)).collect();
         let planes = Planes::lend(gpu, pool, batch)?;
         let mut lists = Vec::new();

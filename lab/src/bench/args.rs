@@ -5,10 +5,7 @@ use std::path::PathBuf;
 use app_core::setup::{DeviceArgs, SceneArgs};
 use clap::{Args, Subcommand};
 
-use super::plane_bits::PlaneBitsArgs;
-use super::view_cost::ViewCostArgs;
 use crate::load::command::LoadArgs;
-use crate::promise::command::PromiseArgs;
 use crate::scaling::command::ScalingArgs;
 use crate::sharing::command::SharingArgs;
 use crate::viewer::command::ViewerBenchArgs;
@@ -18,7 +15,7 @@ use crate::viewer::command::ViewerBenchArgs;
 #[derive(Debug, Args)]
 #[command(
     args_conflicts_with_subcommands = true,
-    after_help = "Example: myriorama-lab bench --models models/ --peer peer-bench/ --strict"
+    after_help = "Example: myriorama-lab bench --models models/ --strict"
 )]
 pub struct BenchArgs {
     #[command(subcommand)]
@@ -31,15 +28,9 @@ pub struct BenchArgs {
     /// largest
     #[arg(long, value_name = "DIR")]
     pub(super) models: Option<PathBuf>,
-    /// A folder with bench.ply, samples.json and views.json; the views are compared with another synthesiser's
-    #[arg(long, value_name = "DIR")]
-    pub(super) peer: Option<PathBuf>,
     /// Nodes P that share the device
     #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub(super) nodes: u16,
-    /// Measures samples a pixel alone: time, error and cost of 1 to 16, on built-in scenes and on two of --models
-    #[arg(long)]
-    pub(super) antialias: bool,
     /// Loads the files of --models alone: contents, time to load, and the share of the first picture that each covers
     #[arg(long, requires = "models")]
     pub(super) loading: bool,
@@ -61,16 +52,10 @@ pub(super) enum Part {
     Load(LoadArgs),
     /// Measure how the cluster scales with nodes and views, on processes of equal CPU share and in simulation
     Scaling(ScalingArgs),
-    /// Measure what promises of budgets cost a viewer, and how soon a broken one is replaced
-    Promise(PromiseArgs),
     /// Measure a live viewer beside the batches of other clients
     Sharing(SharingArgs),
     /// Measure the viewer in a browser
     Viewer(ViewerBenchArgs),
-    /// Print the time of a reconstructed view (c) and its errors, to compare two commits
-    ViewCost(ViewCostArgs),
-    /// Print the bits of each plane of depth images, and the time of packing them
-    PlaneBits(PlaneBitsArgs),
 }
 
 impl BenchArgs {

@@ -1,42 +1,157 @@
-//! Light sampled once and shared: its gain, highlights, still scenes, and reference views beside converged light.
+//! The cost of light, and the gain of sharing it: every lighting with its parts alone, and delivered to a client.
 
-use std::sync::Arc;
-
-use app_core::experiment::{DeliverySettings, Experiment, PAPER_VIEWS, VIEW_SIZE_PX};
+use app_core::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
 use app_core::progress::bar;
-use app_core::setup::{SceneArgs, Setup};
-use cluster::PolicyChoice;
-use depth_image::ViewCell;
-use engine::GpuEngine;
+use cluster::{Costs, PolicyChoice};
 use render::Lighting;
 use report::{Bar, Check, Report, Table};
 
 use super::args::BenchArgs;
-use crate::evaluation::mean_errors;
-use crate::lighting_study::{self, Extent, FINE};
-use crate::reference_views::ReferenceViews;
-use crate::statistics::median;
 
-/// The lighting whose picture counts as converged.
-const CONVERGED: &str = "soft 256, occlusion 256";
-/// The number of views that are compared with converged light.
-const CONVERGED_VIEWS: usize = 4;
-/// Repeats of two nearly equal times.
-const RUNS_OF_NEAR_TIMES: usize = 5;
-/// The perceptual roughness of the glossy scene.
-const GLOSSY: f32 = 0.3;
+/// The lighting of the checks.
+const FINE: &str = "soft 16, occlusion 16";
+/// Lightings, from the cheapest to the most expensive; `--quick` leaves the last out.
+const QUALITIES: [&str; 6] = ["unlit", "phong", "shadows", "soft 4, occlusion 4", FINE, "soft 64, occlusion 64"];
+const QUICK_QUALITIES: usize = 5;
+const QUICK_VIEWS: usize = 64;
+/// Views of the second delivery in [`FINE`], beside [`PAPER_VIEWS`].
+const MANY_VIEWS: usize = 1000;
+/// The time for which direct rendering is timed; more views are extended linearly.
+const DIRECT_S: f64 = 2.0;
+/// The least share of the gain that the parts allow that must arrive at a client.
+const SHARE_OF_PARTS: f64 = 0.8;
 
-/// Measures every lighting on the scene.
-pub fn qualities(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
-    let rows = lighting_study::measure(experiment, Extent::bench(args.quick))?;
-    lighting_study::report(&rows, experiment.setup.scene.illumination.lights.len(), report)?;
-    report.checks.extend(lighting_study::checks(&rows));
+/// Measurements of one lighting.
+struct Row {
+    lighting: Lighting,
+    /// Costs of each part alone.
+    costs: Costs,
+    /// The number of sample images, S.
+    images: usize,
+    /// The number of views that direct rendering was timed on.
+    direct_views: usize,
+    direct_view_s: f64,
+    /// Numbers of views V and seconds until delivered, of new sets.
+    pipelines: Vec<(usize, f64)>,
+}
+
+/// Measures every lighting on the scene; adds tables and checks.
+pub fn measure(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
+    let qualities = if args.quick { &QUALITIES[..QUICK_QUALITIES] } else { &QUALITIES[..] };
+    let progress = bar("light", qualities.len());
+    let mut rows = Vec::with_capacity(qualities.len());
+    for &name in qualities {
+        let views: &[usize] = match (args.quick, name == FINE) {
+            (true, _) => &[QUICK_VIEWS],
+            (false, true) => &[PAPER_VIEWS, MANY_VIEWS],
+            (false, false) => &[PAPER_VIEWS],
+        };
+        rows.push(row(experiment, name.parse()?, views)?);
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    report.tables.push(gains(&rows)?);
+    report.tables.push(parts(&rows)?);
+    report.checks.extend(checks(&rows));
     still(args, experiment, report)
+}
+
+fn row(experiment: &Experiment, lighting: Lighting, views: &[usize]) -> anyhow::Result<Row> {
+    let settings = |policy, count| DeliverySettings { lighting, ..experiment.delivery(policy, count) };
+    let mut pipelines = Vec::with_capacity(views.len());
+    let mut costs = Costs::default();
+    for &count in views {
+        let delivered = experiment.deliver(settings(PolicyChoice::Pipeline, count), drop)?;
+        pipelines.push((count, delivered.seconds));
+        costs = delivered.plan.costs;
+    }
+    let direct_views = ((DIRECT_S / costs.direct_view_s) as usize).clamp(4, 48);
+    let direct = experiment.deliver(settings(PolicyChoice::Direct, direct_views), drop)?;
+    Ok(Row {
+        lighting,
+        costs,
+        images: experiment.setup.samples.len(),
+        direct_views,
+        direct_view_s: direct.seconds / direct_views as f64,
+        pipelines,
+    })
+}
+
+impl Row {
+    /// The pipeline's throughput over that of direct rendering.
+    fn gain(&self, views: usize, seconds: f64) -> f64 {
+        self.direct_view_s * views as f64 / seconds
+    }
+
+    /// The gain that the parts allow: V·g_v / (S·g_s + d + V·c).
+    fn allowed(&self, views: usize) -> f64 {
+        let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, .. } = self.costs;
+        let views = views as f64;
+        views * direct_view_s / (self.images as f64 * sample_image_s + load_set_s + views * reconstruct_view_s)
+    }
+}
+
+fn parts(rows: &[Row]) -> anyhow::Result<Table> {
+    let columns = [
+        ("lighting", ""),
+        ("g_s a sample", "ms"),
+        ("g_v a view", "ms"),
+        ("d a set", "ms"),
+        ("c a view", "ms"),
+        ("e a view", "ms"),
+        ("c / g_v", ""),
+    ];
+    let mut table = Table::new("What light costs", &columns);
+    for row in rows {
+        let c = row.costs;
+        let seconds = [c.sample_image_s, c.direct_view_s, c.load_set_s, c.reconstruct_view_s, c.encode_view_s];
+        let ratio = c.reconstruct_view_s / c.direct_view_s;
+        let numbers = seconds.map(|s| s * 1e3).into_iter().chain([ratio]);
+        table.push([row.lighting.to_string().into()].into_iter().chain(numbers.map(Into::into)))?;
+    }
+    Ok(table)
+}
+
+fn gains(rows: &[Row]) -> anyhow::Result<Table> {
+    let columns = [
+        ("lighting", ""),
+        ("views V", ""),
+        ("pipeline", "s"),
+        ("direct, extended", "s"),
+        ("timed on views", ""),
+        ("gain", "×"),
+        ("its parts allow", "×"),
+    ];
+    let mut table = Table::new("What sharing gains", &columns);
+    for row in rows {
+        for &(views, seconds) in &row.pipelines {
+            table.push([
+                row.lighting.to_string().into(),
+                views.into(),
+                seconds.into(),
+                (row.direct_view_s * views as f64).into(),
+                row.direct_views.into(),
+                row.gain(views, seconds).into(),
+                row.allowed(views).into(),
+            ])?;
+        }
+    }
+    Ok(table)
+}
+
+fn checks(rows: &[Row]) -> Vec<Check> {
+    let fine = rows.iter().filter(|row| row.lighting.to_string() == FINE);
+    let delivered = fine.flat_map(|row| row.pipelines.iter().map(move |&(views, seconds)| (row, views, seconds)));
+    let check = |(row, views, seconds): (&Row, usize, f64)| {
+        let name = format!("{FINE}, {views} views: gain over direct, share of what the parts allow");
+        Check::new(name, row.gain(views, seconds) / row.allowed(views), "", Bar::AtLeast(SHARE_OF_PARTS))
+    };
+    delivered.map(check).collect()
 }
 
 /// Measures a second set of a still scene: only c and e are spent on it.
 fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
-    let views = if args.quick { 64 } else { PAPER_VIEWS };
+    let views = if args.quick { QUICK_VIEWS } else { PAPER_VIEWS };
     let settings =
         DeliverySettings { lighting: FINE.parse()?, sets: 2, ..experiment.delivery(PolicyChoice::Pipeline, views) };
     let mut waited_s = 0.0_f64;
@@ -49,75 +164,4 @@ fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyh
     let name = "still scene: longest wait of a second frame for its samples, over sampling them";
     report.checks.push(Check::new(name, waited_s / set_s, "", Bar::AtMost(0.01)));
     Ok(())
-}
-
-/// The errors of views against converged light: from shared samples, and drawn with as many rays.
-pub fn reference(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
-    let views = experiment.views(if args.quick { 1 } else { CONVERGED_VIEWS })?;
-    let progress = bar("converged light", 3);
-    let take = |lighting: Lighting| {
-        let lit = SceneArgs { lighting, ..experiment.args.clone() };
-        let reference = ReferenceViews::draw(&experiment.engine, &experiment.setup, &lit, views.clone());
-        progress.inc(1);
-        reference
-    };
-    let (unlit, fine) = (take(Lighting::UNLIT)?, take(FINE.parse()?)?);
-    let converged = fine.drawn(&experiment.setup, CONVERGED.parse()?)?;
-    progress.finish_and_clear();
-    let reconstructed = |reference: &ReferenceViews| reference.reconstruct(args.scene.method(), Default::default());
-    let shared = mean_errors(&converged, &reconstructed(&fine)?)?;
-    let drawn = mean_errors(&converged, &fine.views)?;
-    let geometry = mean_errors(&unlit.views, &reconstructed(&unlit)?)?;
-    let mut table = Table::new("Light beside converged light", &[("views", ""), ("foreground FLIP", ""), ("FLIP", "")]);
-    let rows = [
-        (format!("pipeline, {FINE}"), shared),
-        (format!("direct, {FINE}"), drawn),
-        ("pipeline beside direct, unlit".to_owned(), geometry),
-    ];
-    for (name, [foreground, whole]) in rows {
-        table.push([name.into(), foreground.flip.into(), whole.flip.into()])?;
-    }
-    report.tables.push(table);
-    let [plain, lit] = ms_in_turn(args, [&unlit, &fine])?;
-    let name = format!("c with {FINE} over c unlit");
-    report.checks.push(Check::new(name, lit / plain, "×", Bar::AtMost(1.25)));
-    let name = "FLIP to converged light: the pipeline's over direct's plus the unlit pipeline's";
-    let [foreground, whole] = [0, 1].map(|part| shared[part].flip / (drawn[part].flip + geometry[part].flip));
-    report.checks.push(Check::new(name, whole, "×", Bar::AtMost(1.0)).with_foreground(foreground));
-    Ok(())
-}
-
-/// Milliseconds a view of both, as medians. Both take turns, so that neither has the quieter machine.
-fn ms_in_turn(args: &BenchArgs, both: [&ReferenceViews; 2]) -> anyhow::Result<[f64; 2]> {
-    let mut ms = [Vec::new(), Vec::new()];
-    for _ in 0..args.runs().max(RUNS_OF_NEAR_TIMES) {
-        for (ms, reference) in ms.iter_mut().zip(both) {
-            ms.push(reference.ms_a_view(args.scene.method(), PAPER_VIEWS, 1)?);
-        }
-    }
-    Ok(ms.map(median))
-}
-
-/// Measures c where every surface has a highlight.
-pub fn glossy(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
-    let scene = glossy_scene(args)?;
-    engine.put_scene(scene.offer.hash.as_str(), &scene.scene)?;
-    let cell = ViewCell::between(&scene.around).ok_or_else(|| anyhow::anyhow!("no sample cameras"))?;
-    let take = |lighting: Lighting| {
-        let lit = SceneArgs { lighting, ..args.scene.clone() };
-        ReferenceViews::draw(engine, &scene, &lit, cell.spread(args.compared_views(), VIEW_SIZE_PX))
-    };
-    let both = [take(Lighting::UNLIT)?, take("shadows".parse()?)?];
-    let [unlit, lit] = ms_in_turn(args, [&both[0], &both[1]])?;
-    let mut table = Table::new("Highlights everywhere", &[("lighting", ""), ("c a view", "ms")]);
-    table.push(["unlit".into(), unlit.into()])?;
-    table.push(["shadows, with highlights".into(), lit.into()])?;
-    report.tables.push(table);
-    let name = format!("{} made glossy: c with highlights over c unlit", args.scene.scene);
-    report.checks.push(Check::new(name, lit / unlit, "×", Bar::AtMost(1.25)));
-    Ok(())
-}
-
-fn glossy_scene(args: &BenchArgs) -> anyhow::Result<Setup> {
-    args.scene.load_changed(|scene| scene.materials.iter_mut().for_each(|material| material.roughness = GLOSSY))
 }

@@ -21,10 +21,7 @@ use crate::models::models_of;
 
 /// The size of the pictures whose covered share counts.
 const PICTURE_PX: UVec2 = UVec2::new(480, 360);
-/// The least mean share of pictures that models cover.
-const LEAST_SHARE: f64 = 0.35;
 const REFUSED: &str = "model files: refused";
-const SHARE: &str = "model files: mean share of the first picture that shows a surface";
 
 const COLUMNS: [(&str, &str); 9] = [
     ("file", ""),
@@ -89,8 +86,7 @@ fn with_warnings<T>(work: impl FnOnce() -> T) -> (T, String) {
 /// Loads all models of the folder, if one is given; adds a table and checks.
 pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     let Some(folder) = &args.models else {
-        let not_run = |name, bar| Check::not_run(name, "", bar, "--models is not given");
-        report.checks.extend([not_run(REFUSED, Bar::Equal(0.0)), not_run(SHARE, Bar::AtLeast(LEAST_SHARE))]);
+        report.checks.push(Check::not_run(REFUSED, "", Bar::Equal(0.0), "--models is not given"));
         return Ok(());
     };
     let mut paths = models_of(folder, usize::MAX)?;
@@ -105,7 +101,7 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
     }
     progress.finish_and_clear();
     report.tables.push(table(&models)?);
-    report.checks.extend(checks(&models));
+    report.checks.push(refused(&models));
     Ok(())
 }
 
@@ -175,11 +171,9 @@ fn table(models: &[(String, Result<Loaded, String>)]) -> anyhow::Result<Table> {
     Ok(table)
 }
 
-fn checks(models: &[(String, Result<Loaded, String>)]) -> [Check; 2] {
-    let shares: Vec<f64> = models.iter().filter_map(|(_, model)| Some(model.as_ref().ok()?.share)).collect();
-    let refused = models.len() - shares.len();
-    let mean = shares.iter().sum::<f64>() / shares.len() as f64;
-    [Check::new(REFUSED, refused as f64, "", Bar::Equal(0.0)), Check::new(SHARE, mean, "", Bar::AtLeast(LEAST_SHARE))]
+fn refused(models: &[(String, Result<Loaded, String>)]) -> Check {
+    let count = models.iter().filter(|(_, model)| model.is_err()).count();
+    Check::new(REFUSED, count as f64, "", Bar::Equal(0.0))
 }
 
 #[cfg(test)]
@@ -208,10 +202,9 @@ mod tests {
         assert_eq!([text(0, 0), text(0, 1), text(0, 2), text(0, 7)], ["folder/a.GLB", "glb", "1", "50"]);
         assert_eq!(text(0, 8), "a part");
         assert_eq!([text(2, 1), text(2, 8)], ["ply", "no faces"]);
-        let [refused, share] = checks(&models);
-        assert_eq!((refused.outcome(), refused.value()), (report::Outcome::FallsShort, Some(1.0)));
-        assert_eq!((share.outcome(), share.value()), (report::Outcome::Holds, Some(0.4)));
-        assert_eq!(checks(&models[1..2])[1].outcome(), report::Outcome::FallsShort);
+        let check = refused(&models);
+        assert_eq!((check.outcome(), check.value()), (report::Outcome::FallsShort, Some(1.0)));
+        assert_eq!(refused(&models[..2]).outcome(), report::Outcome::Holds);
     }
 
     #[test]

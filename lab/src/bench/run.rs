@@ -1,7 +1,5 @@
 //! The order of the bench.
 
-use std::sync::Arc;
-
 use app_core::exit::Outcome;
 use app_core::experiment::Experiment;
 use engine::GpuEngine;
@@ -9,15 +7,12 @@ use node::Engine as _;
 use report::{Bar, Check, Report};
 
 use super::args::{BenchArgs, Part};
-use super::{
-    adaptive, animation, antialias, codec, convergence, fronts, light, loaded, peer, plane_bits, rays, sampling,
-    throughput, view_cost,
-};
+use super::{errors, light, loaded, throughput};
 use crate::memory::peak_memory_mb;
 use crate::reference_views::ReferenceViews;
-use crate::{load, promise, scaling, sharing, viewer};
+use crate::{load, scaling, sharing, viewer};
 
-/// Measures everything and writes the report.
+/// Measures everything, or one part, and writes the report.
 ///
 /// # Errors
 /// Input that cannot be used, or a failure of the device or the cluster.
@@ -25,13 +20,9 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     match &args.part {
         Some(Part::Load(args)) => return load::command::run(args),
         Some(Part::Scaling(args)) => return scaling::command::run(args),
-        Some(Part::Promise(args)) => return promise::command::run(args),
         Some(Part::Sharing(args)) => return sharing::command::run(args),
         Some(Part::Viewer(args)) => return viewer::command::run(args),
-        Some(Part::ViewCost(args)) => return view_cost::run(args),
-        Some(Part::PlaneBits(args)) => return plane_bits::run(args),
-        None if args.antialias => return alone(args, antialias::measure),
-        None if args.loading => return alone(args, loaded::measure),
+        None if args.loading => return loading(args),
         None => (),
     }
     let experiment =
@@ -42,23 +33,14 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     let views = experiment.views(args.compared_views())?;
     let reference = ReferenceViews::draw(&experiment.engine, &experiment.setup, &experiment.args, views)?;
     throughput::nanoseconds(args, &reference, &experiment, &mut report)?;
-    codec::measure(&reference.images, &mut report)?;
-    fronts::compare(&args.scene.scene.to_string(), &reference, args, &mut report)?;
+    errors::compare(&args.scene.scene.to_string(), &reference, args, &mut report)?;
     drop(reference);
-    light::qualities(args, &experiment, &mut report)?;
-    light::reference(args, &experiment, &mut report)?;
+    light::measure(args, &experiment, &mut report)?;
     let engine = experiment.engine.clone();
-    rays::measure(args, &engine, &experiment.setup, &mut report)?;
-    convergence::measure(args, &engine, &experiment.setup, &mut report)?;
-    adaptive::compare(args, &engine, &experiment.setup, &mut report)?;
     experiment.stop()?;
-    animation::measure(args, &engine, &mut report)?;
-    light::glossy(args, &engine, &mut report)?;
-    sampling::measure(args, &engine, &mut report)?;
-    fronts::gaps(args, &engine, &mut report)?;
+    errors::gaps(args, &engine, &mut report)?;
     loaded::measure(args, &engine, &mut report)?;
-    fronts::models(args, &engine, &mut report)?;
-    peer::measure(args, &engine, &mut report)?;
+    errors::models(args, &engine, &mut report)?;
     let memory = peak_memory_mb().filter(|_| engine.is_software());
     report.checks.push(Check::maybe(
         "peak memory on the software device",
@@ -70,14 +52,11 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     print_and_write(args, &report)
 }
 
-/// A part that measures on a device, without a cluster.
-type DevicePart = fn(&BenchArgs, &Arc<GpuEngine>, &mut Report) -> anyhow::Result<()>;
-
-/// One part alone.
-fn alone(args: &BenchArgs, measure: DevicePart) -> anyhow::Result<Outcome> {
+/// Only loads the model files.
+fn loading(args: &BenchArgs) -> anyhow::Result<Outcome> {
     let engine = GpuEngine::shared(args.device.device)?;
     let mut report = new_report(args, &engine.device_name());
-    measure(args, &engine, &mut report)?;
+    loaded::measure(args, &engine, &mut report)?;
     print_and_write(args, &report)
 }
 

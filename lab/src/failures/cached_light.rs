@@ -11,12 +11,9 @@ use render::{DrawWork, GpuScene, LightCache, Lighting, SamplePlanes, Visibility}
 use scene::procedural::{quad, unit_cube};
 use scene::{Instance, Scene};
 
-use super::measures::{depths, is_kind, mean, share};
+use super::measures::{depths, is_kind, mean};
 use super::stand::{Stand, pinholes, work};
 use crate::reference_views::encoded_and_decoded;
-
-/// Of 8-bit colours.
-const CLEAR_DIFFERENCE: f64 = 16.0;
 
 /// A box with sides along the axes.
 #[derive(Debug, Clone, Copy)]
@@ -183,12 +180,6 @@ pub fn pixels_where(camera: &PinholeCamera, view: &View, is_wanted: impl Fn(Vec3
 fn color_error(truth: &View, view: &View, pixels: &[usize]) -> f64 {
     let channels = pixels.iter().flat_map(|&pixel| 3 * pixel..3 * pixel + 3);
     mean(channels.map(|channel| f64::from(truth.srgb8[channel].abs_diff(view.srgb8[channel])))).unwrap_or(f64::NAN)
-}
-
-/// The share of a view's surfaces whose colour is clearly not the true one.
-pub fn share_of_other_colors(truth: &View, view: &View) -> f64 {
-    let differs = |pixel: usize| color_error(truth, view, &[pixel]) > CLEAR_DIFFERENCE;
-    share(depths(truth).iter().enumerate().filter(|(_, depth)| **depth > 0.0).map(|(pixel, _)| differs(pixel)))
 }
 
 /// The mean linear green light of some pixels.

@@ -6,8 +6,8 @@ use reconstruction::scalar::CubeTwin;
 
 use super::measures::share;
 
-/// Samples of a cube are those of the dominant axis.
-pub const DOMINANT: f32 = 0.9;
+/// Samples of a cube are those whose normal has this share of its greatest component along the axis.
+const DOMINANT: f32 = 0.9;
 /// Rays begin so far away: outside of all cubes here.
 const DISTANCE_M: f32 = 60.0;
 /// A ray has met another surface where it ends so far from the true one, in spacings.
@@ -29,19 +29,15 @@ pub fn grid(side: u32) -> anyhow::Result<CubeGrid> {
     Ok(CubeGrid::around(&Aabb { min: Vec3::ZERO, max: Vec3::splat((side - 1) as f32) }, side)?)
 }
 
-/// The image along an axis; of surfaces whose normal has this share of its greatest component there.
-pub fn image(
-    grid: &CubeGrid,
-    axis: usize,
-    least_of_greatest: f32,
-    crossings: impl Fn(Ray) -> Vec<Crossing>,
-) -> LayeredDepthImage {
+/// The image along an axis.
+pub fn image(grid: &CubeGrid, axis: usize, crossings: impl Fn(Ray) -> Vec<Crossing>) -> LayeredDepthImage {
     let camera = grid.camera(axis);
     let is_held = |crossing: &Crossing| {
         let normal = (grid.world_from_cube.inverse() * crossing.normal_in_world).abs();
-        normal[axis] >= least_of_greatest * normal.max_element() && (0.0..=camera.range_m).contains(&crossing.t)
+        normal[axis] >= DOMINANT * normal.max_element() && (0.0..=camera.range_m).contains(&crossing.t)
     };
-    let (mut first, mut samples) = (vec![0], Vec::new());
+    let mut first = vec![0];
+    let mut samples = Vec::new();
     for place in (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| Vec2::new(x as f32, y as f32))) {
         let mut line = crossings(camera.ray(place + 0.5));
         line.retain(is_held);
@@ -63,7 +59,7 @@ pub fn image(
 
 /// The three images of a cube, ready for rays.
 pub fn cube(grid: &CubeGrid, crossings: impl Fn(Ray) -> Vec<Crossing>) -> CubeTwin {
-    CubeTwin::new(grid, &[0, 1, 2].map(|axis| image(grid, axis, DOMINANT, &crossings)))
+    CubeTwin::new(grid, &[0, 1, 2].map(|axis| image(grid, axis, &crossings)))
 }
 
 /// The first surface that faces a ray.

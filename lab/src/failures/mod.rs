@@ -5,7 +5,6 @@ pub mod command;
 mod cubes;
 mod curve;
 mod curves;
-mod light_fields;
 pub mod measures;
 mod report;
 mod shape;

@@ -1,6 +1,6 @@
 //! Shapes of curves: a closed set, and the comparison of measured values with them.
 
-use Shape::{Bounded, EqualAt, FallsThenFlat, InvertedU, Monotone, NeverNaN, Plateau};
+use Shape::{Bounded, EqualAt, FallsThenFlat, Monotone, Plateau};
 
 /// The least change of a strict shape, as a share of its first value.
 const LEAST_CHANGE_SHARE: f64 = 0.2;
@@ -23,14 +23,10 @@ pub enum Shape {
     /// Never turns by more than the tolerance. With a `least_change` it changes by as much, and by a fifth of its first
     /// value; with 0 it may stay where it is.
     Monotone { direction: Direction, least_change: f64, tolerance: f64 },
-    /// Rises to a peak at an x within bounds, and falls behind it, by `least_change` on both sides.
-    InvertedU { peak_within: [f64; 2], least_change: f64, tolerance: f64 },
     /// Every value lies within these bounds.
     Bounded { least: f64, most: f64 },
     /// All values lie within a range of this tolerance.
     Plateau { tolerance: f64 },
-    /// Every value is finite, which is all that can be said of it.
-    NeverNaN,
     /// The value at an x is known.
     EqualAt { x: f64, y: f64, tolerance: f64 },
 }
@@ -50,8 +46,6 @@ pub enum Violation {
     ChangesTooLittle { change: f64, least: f64 },
     #[error("the end is not flat: its values are {range} apart, not within {tolerance}")]
     NotFlat { range: f64, tolerance: f64 },
-    #[error("the peak is at x = {at}, not within {within:?}")]
-    Peak { at: f64, within: [f64; 2] },
     #[error("{y} at x = {x} is not within {least} to {most}")]
     Outside { x: f64, y: f64, least: f64, most: f64 },
     #[error("nothing is measured at x = {x}")]
@@ -72,9 +66,9 @@ impl Shape {
     /// Strict shapes demand a change: a flat curve has none of them.
     pub fn is_strict(self) -> bool {
         match self {
-            FallsThenFlat { .. } | InvertedU { .. } => true,
+            FallsThenFlat { .. } => true,
             Monotone { least_change, .. } => least_change > 0.0,
-            Bounded { .. } | Plateau { .. } | NeverNaN | EqualAt { .. } => false,
+            Bounded { .. } | Plateau { .. } | EqualAt { .. } => false,
         }
     }
 
@@ -85,7 +79,6 @@ impl Shape {
     pub fn check(self, x: &[f64], y: &[f64]) -> Result<(), Violation> {
         check_points(x, y)?;
         match self {
-            NeverNaN => Ok(()),
             Bounded { least, most } => check_bounds(x, y, [least, most]),
             Plateau { tolerance } => check_range(y, tolerance),
             EqualAt { x: at, y: expected, tolerance } => {
@@ -96,9 +89,6 @@ impl Shape {
                 let flat = ((y.len() as f64 * FLAT_SHARE).ceil() as usize).max(2);
                 check_monotone(x, y, Direction::Down, least_fall, tolerance)?;
                 check_range(&y[y.len() - flat..], tolerance)
-            }
-            InvertedU { peak_within, least_change, tolerance } => {
-                check_inverted_u(x, y, peak_within, least_change, tolerance)
             }
         }
     }
@@ -117,12 +107,8 @@ impl std::fmt::Display for Shape {
                     false => write!(f, "{verb} or stays, turning by {tolerance} at most"),
                 }
             }
-            InvertedU { peak_within: [from, to], least_change, .. } => {
-                write!(f, "rises to a peak within {from} to {to} and falls, by {least_change} or more on both sides")
-            }
             Bounded { least, most } => write!(f, "within {least} to {most}"),
             Plateau { tolerance } => write!(f, "flat within {tolerance}"),
-            NeverNaN => write!(f, "finite"),
             EqualAt { x, y, tolerance } => write!(f, "{y} within {tolerance} at x = {x}"),
         }
     }
@@ -177,27 +163,6 @@ fn check_monotone(
     if change >= least { Ok(()) } else { Err(Violation::ChangesTooLittle { change, least }) }
 }
 
-fn check_inverted_u(
-    x: &[f64],
-    y: &[f64],
-    within: [f64; 2],
-    least_change: f64,
-    tolerance: f64,
-) -> Result<(), Violation> {
-    let peak = (0..y.len()).fold(0, |peak, i| if y[i] > y[peak] { i } else { peak });
-    if !(within[0]..=within[1]).contains(&x[peak]) {
-        return Err(Violation::Peak { at: x[peak], within });
-    }
-    for (part, direction) in [(0..peak + 1, Direction::Up), (peak..y.len(), Direction::Down)] {
-        let change = (y[peak] - if direction == Direction::Up { y[0] } else { y[y.len() - 1] }).abs();
-        if change < least_change {
-            return Err(Violation::ChangesTooLittle { change, least: least_change });
-        }
-        check_monotone(&x[part.clone()], &y[part], direction, 0.0, tolerance)?;
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -207,20 +172,18 @@ mod tests {
     const RISING: [f64; 5] = [1.0, 1.0, 2.0, 3.0, 5.0];
     const HILL: [f64; 5] = [1.0, 3.0, 5.0, 3.0, 1.0];
     const FLAT: [f64; 5] = [2.0; 5];
-    const HILL_SHAPE: Shape = InvertedU { peak_within: [2.5, 3.5], least_change: 1.0, tolerance: 0.1 };
+    const FINITE: Shape = Bounded { least: f64::NEG_INFINITY, most: f64::INFINITY };
 
     #[test]
     fn values_of_a_shape_pass() {
         let flat_end = FallsThenFlat { least_fall: 3.0, tolerance: 0.1 };
-        let good: [(Shape, [f64; 5]); 9] = [
+        let good: [(Shape, [f64; 5]); 7] = [
             (flat_end, FALLING),
             (Shape::falls(4.0, 0.0), FALLING),
             (Shape::rises(4.0, 0.0), RISING),
             (Shape::rises(0.0, 0.0), FLAT),
-            (HILL_SHAPE, HILL),
             (Bounded { least: 1.0, most: 5.0 }, HILL),
             (Plateau { tolerance: 0.0 }, FLAT),
-            (NeverNaN, HILL),
             (EqualAt { x: 3.0, y: 5.0, tolerance: 0.0 }, HILL),
         ];
         for (shape, y) in good {
@@ -232,7 +195,7 @@ mod tests {
     fn a_violation_of_every_shape_is_seen() {
         let flat_end = FallsThenFlat { least_fall: 3.0, tolerance: 0.1 };
         type Case = (Shape, [f64; 5], fn(&Violation) -> bool);
-        let bad: [Case; 14] = [
+        let bad: [Case; 11] = [
             (flat_end, RISING, |v| matches!(v, Violation::Turns { .. })),
             (flat_end, [5.0, 4.0, 3.0, 2.0, 1.0], |v| matches!(v, Violation::NotFlat { .. })),
             (flat_end, FLAT, |v| matches!(v, Violation::ChangesTooLittle { .. })),
@@ -240,9 +203,6 @@ mod tests {
             (Shape::falls(1.0, 0.0), RISING, |v| matches!(v, Violation::Turns { x, .. } if *x == 3.0)),
             (Shape::rises(0.0, 0.5), FALLING, |v| matches!(v, Violation::Turns { .. })),
             (Shape::rises(0.1, 0.0), FLAT, |v| matches!(v, Violation::ChangesTooLittle { .. })),
-            (HILL_SHAPE, RISING, |v| matches!(v, Violation::Peak { at, .. } if *at == 5.0)),
-            (HILL_SHAPE, FLAT, |v| matches!(v, Violation::Peak { .. })),
-            (HILL_SHAPE, [4.5, 4.5, 5.0, 3.0, 1.0], |v| matches!(v, Violation::ChangesTooLittle { .. })),
             (Bounded { least: 1.0, most: 4.9 }, HILL, |v| matches!(v, Violation::Outside { x, .. } if *x == 3.0)),
             (Plateau { tolerance: 3.9 }, HILL, |v| matches!(v, Violation::NotFlat { .. })),
             (EqualAt { x: 3.0, y: 4.0, tolerance: 0.9 }, HILL, |v| matches!(v, Violation::Outside { .. })),
@@ -259,10 +219,8 @@ mod tests {
         let shapes = [
             FallsThenFlat { least_fall: 1.0, tolerance: 9.0 },
             Shape::rises(0.0, 9.0),
-            HILL_SHAPE,
             Bounded { least: f64::NEG_INFINITY, most: f64::INFINITY },
             Plateau { tolerance: f64::INFINITY },
-            NeverNaN,
             EqualAt { x: 1.0, y: 1.0, tolerance: 1.0 },
         ];
         for (shape, bad) in shapes.into_iter().flat_map(|shape| [(shape, f64::NAN), (shape, f64::INFINITY)]) {
@@ -273,10 +231,10 @@ mod tests {
 
     #[test]
     fn curves_without_order_or_length_are_refused() {
-        assert!(matches!(NeverNaN.check(&X, &FLAT[1..]), Err(Violation::Lengths { xs: 5, ys: 4 })));
-        assert!(matches!(NeverNaN.check(&[1.0], &[1.0]), Err(Violation::Lengths { .. })));
-        assert_eq!(NeverNaN.check(&[1.0, 1.0], &[1.0, 2.0]), Err(Violation::Order { x: 1.0 }));
-        assert!(matches!(NeverNaN.check(&[1.0, f64::NAN], &[1.0, 2.0]), Err(Violation::Order { .. })));
+        assert!(matches!(FINITE.check(&X, &FLAT[1..]), Err(Violation::Lengths { xs: 5, ys: 4 })));
+        assert!(matches!(FINITE.check(&[1.0], &[1.0]), Err(Violation::Lengths { .. })));
+        assert_eq!(FINITE.check(&[1.0, 1.0], &[1.0, 2.0]), Err(Violation::Order { x: 1.0 }));
+        assert!(matches!(FINITE.check(&[1.0, f64::NAN], &[1.0, 2.0]), Err(Violation::Order { .. })));
     }
 
     #[test]

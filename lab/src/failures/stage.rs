@@ -2,10 +2,12 @@
 
 use depth_image::{Aabb, DepthImage, Environment, Illumination, PinholeCamera, View, ViewPlanes, nested_places};
 use glam::{UVec2, Vec3};
-use reconstruction::{ErrorBound, ReconstructionMethod, SampleSet, SetDescription};
+use gpu::Turn;
+use reconstruction::{ErrorBound, ReconstructRequest, ReconstructionMethod, SampleSet, SetDescription};
 use render::{GpuScene, Lighting, SamplePlanes};
 use scene::Scene;
 
+use super::measures::foreground;
 use super::stand::{Stand, pinholes};
 
 /// The default method.
@@ -73,25 +75,28 @@ impl<'s> Stage<'s> {
     }
 
     pub fn set(&self) -> anyhow::Result<SampleSet> {
-        Ok(self.stand.reconstructor().upload(&self.images, &self.description())?)
+        Ok(self.stand.reconstructor().upload(&self.images, &self.description(), Turn::default())?)
     }
 
     /// Views by a method, with depth and provenance.
     pub fn views(&self, cameras: &[PinholeCamera], method: ReconstructionMethod) -> anyhow::Result<Vec<View>> {
-        self.views_of(&self.images, self.volume, cameras, method)
+        let set = self.set()?;
+        let request = ReconstructRequest::new(&set, cameras, method);
+        Ok(self.stand.reconstructor().reconstruct(ReconstructRequest { planes: ViewPlanes::ALL, ..request })?)
     }
 
-    /// Views of other images in another volume.
-    pub fn views_of(
+    /// The foreground FLIP of views by each method.
+    pub fn flips<const N: usize>(
         &self,
-        images: &[DepthImage],
-        volume: Aabb,
         cameras: &[PinholeCamera],
-        method: ReconstructionMethod,
-    ) -> anyhow::Result<Vec<View>> {
-        let description = SetDescription { volume, ..self.description() };
-        let set = self.stand.reconstructor().upload(images, &description)?;
-        Ok(self.stand.reconstructor().reconstruct(&set, cameras, method, ViewPlanes::ALL)?)
+        methods: [ReconstructionMethod; N],
+    ) -> anyhow::Result<[f64; N]> {
+        let truths = self.truth(cameras)?;
+        let mut flips = [0.0; N];
+        for (flip, method) in flips.iter_mut().zip(methods) {
+            *flip = foreground(&truths, &self.views(cameras, method)?)?.flip;
+        }
+        Ok(flips)
     }
 
     /// Views from the triangles.

@@ -1,42 +1,54 @@
 //! All rows of one subject, direct drawing, and what the planner chooses.
 
-use std::time::Instant;
-
 use app_core::planning::Planning;
 use coordinator::schedule::EqualNodes;
-use depth_image::Antialias;
-use planner::{Budget, Choice, Kept, Metric, Planner, Price, Pricing as _, ProbeView, Row};
+use planner::{Budget, Choice, Kept, Ladder, Metric, Planner, Price, Pricing as _, ProbeView, Row};
 
-use super::conditions::Conditions;
-use super::order::order;
-use super::row::{MeasuredRow, TIMED_VIEWS, time_again};
-use super::subject::Subject;
+use super::row::{MeasuredRow, time_again};
+use super::subject::{Conditions, Subject};
 
 /// Levels of the planner's budgets between the least and the greatest error of a subject's rows, in equal ratios.
 const BUDGET_LEVELS: [f64; 3] = [0.2, 0.5, 0.8];
 /// Seconds of measuring that a plan may take.
 const ALLOWANCE_S: f64 = 120.0;
-/// Samples a pixel of the rows of the front that are measured again.
-const SAMPLES: u32 = 4;
 
-/// How much is measured.
-pub struct Limits {
-    /// When measuring ends.
-    pub end: Option<Instant>,
+/// Numbers of sample cameras and sides of their images, of the rows of a quick run.
+const QUICK_CAMERAS: [u32; 2] = [1, 4];
+const QUICK_SIDES: [f64; 2] = [0.5, 1.0];
+
+/// The rows that are measured, and the views that they are measured on.
+pub struct Extent {
     pub views: Vec<ProbeView>,
-    /// Numbers of sample cameras and sides of their images of the rows that are measured; `None`: all.
-    pub only: Option<(&'static [u32], &'static [f64])>,
+    includes: fn(&Row) -> bool,
 }
 
-impl Limits {
-    fn are_reached(&self) -> bool {
-        self.end.is_some_and(|end| Instant::now() >= end)
+impl Extent {
+    /// All rows and 32 views, or every second number of cameras and size, and 8 views.
+    pub fn new(is_quick: bool) -> Self {
+        match is_quick {
+            true => Self { views: screening(8), includes: is_quick_row },
+            false => Self { views: screening(32), includes: |_| true },
+        }
     }
 
-    /// Whether a row is to be measured.
-    pub fn include(&self, row: &Row) -> bool {
-        self.only.is_none_or(|(cameras, sides)| cameras.contains(&row.camera_count) && sides.contains(&row.side_ratio))
+    /// Rows of four cameras with images of the whole side.
+    #[cfg(test)]
+    pub fn of_four_cameras(views: u32) -> Self {
+        Self { views: screening(views), includes: |row| row.camera_count == 4 && row.side_ratio == 1.0 }
     }
+
+    /// The places of the rows in the ladder.
+    pub fn places(&self, ladder: &Ladder) -> Vec<usize> {
+        (0..ladder.rows().len()).filter(|&place| (self.includes)(&ladder.rows()[place])).collect()
+    }
+}
+
+fn is_quick_row(row: &Row) -> bool {
+    QUICK_CAMERAS.contains(&row.camera_count) && QUICK_SIDES.contains(&row.side_ratio)
+}
+
+fn screening(count: u32) -> Vec<ProbeView> {
+    (0..count).map(ProbeView::Screening).collect()
 }
 
 /// A plan that was made, with its budget.
@@ -57,104 +69,46 @@ pub struct Front {
     pub scene_hash: String,
     /// In the order of the ladder.
     pub rows: Vec<MeasuredRow>,
-    /// Rows of the front with four samples a pixel, and direct drawing with as many.
-    pub antialiased: Vec<MeasuredRow>,
-    pub antialiased_direct: Option<Price>,
     pub direct: Price,
     pub planned: Vec<Planned>,
-    /// Rows that were left out for want of time.
-    pub left_out: usize,
 }
 
 impl Front {
-    /// Measures a subject, as far as the limits allow.
+    /// Measures a subject; calls `done` after each row, and after each time that it is timed again.
     ///
     /// # Errors
     /// The device fails.
     pub fn measure(
         subject: &Subject,
         planning: &Planning,
-        limits: &Limits,
+        extent: &Extent,
         mut done: impl FnMut(),
     ) -> anyhow::Result<Self> {
         let mut prober = subject.prober(planning);
         let pricing = subject.pricing(&mut prober, planning)?;
-        let taken: Vec<usize> =
-            (0..planning.ladder.rows().len()).filter(|&place| limits.include(&planning.ladder.rows()[place])).collect();
-        let candidates: Vec<Row> = taken.iter().map(|&place| planning.ladder.rows()[place].clone()).collect();
-        let cameras = planning.viewpoints.cameras(&limits.views);
-        let mut rows = Vec::with_capacity(taken.len());
-        for place in order(&candidates).into_iter().map(|place| taken[place]) {
-            if limits.are_reached() {
-                break;
-            }
-            let row = (place, &planning.ladder.rows()[place]);
-            let representation = &planning.representations[place];
-            rows.push(MeasuredRow::measure(&mut prober, row, representation, &cameras, &pricing)?);
+        let cameras = planning.viewpoints.cameras(&extent.views);
+        let mut rows = Vec::new();
+        for place in extent.places(&planning.ladder) {
+            rows.push(MeasuredRow::measure(&mut prober, planning, place, &cameras, &pricing)?);
             done();
         }
-        rows.sort_by_key(|row| row.place);
-        if limits.end.is_none() {
-            let (of, cameras) = (&planning.representations[..], &planning.viewpoints.first(TIMED_VIEWS)[..]);
-            time_again(&mut prober, &mut rows, (of, cameras), &pricing, &mut done)?;
-        }
+        time_again(&mut prober, &mut rows, planning, &pricing, &mut done)?;
         let mut front = Self {
-            conditions: subject.conditions.clone(),
+            conditions: subject.conditions,
             scene_hash: planning.subject.scene_hash.clone(),
-            left_out: taken.len() - rows.len(),
             rows,
-            antialiased: Vec::new(),
-            antialiased_direct: None,
             direct: pricing.direct(),
             planned: Vec::new(),
         };
-        if limits.end.is_none() {
-            front.antialias(subject, limits)?;
-            front.plan(subject, planning, pricing)?;
-        }
+        front.plan(subject, planning, pricing)?;
         Ok(front)
-    }
-
-    /// The rows with an error below that of every cheaper one, the cheapest first.
-    #[must_use]
-    pub fn best(&self, metric: Metric) -> Vec<&MeasuredRow> {
-        let mut by_price: Vec<&MeasuredRow> = self.rows.iter().collect();
-        by_price.sort_by(|a, b| a.price.node_s.total_cmp(&b.price.node_s));
-        let mut least = f64::INFINITY;
-        by_price.retain(|row| {
-            let is_less = row.error_ratio(metric) < least;
-            least = least.min(row.error_ratio(metric));
-            is_less
-        });
-        by_price
-    }
-
-    /// Measures the rows of the front again, with several samples a pixel.
-    fn antialias(&mut self, subject: &Subject, limits: &Limits) -> anyhow::Result<()> {
-        let antialias = Antialias::of(SAMPLES).unwrap_or_default();
-        let planning = subject.planning(antialias, subject.conditions.seed)?;
-        let mut prober = subject.prober(&planning);
-        let pricing = subject.pricing(&mut prober, &planning)?;
-        let places: Vec<usize> = self.best(Metric::Flip).iter().map(|row| row.place).collect();
-        for place in places {
-            let row = (place, &planning.ladder.rows()[place]);
-            let of = &planning.representations[place];
-            self.antialiased.push(MeasuredRow::measure(
-                &mut prober,
-                row,
-                of,
-                &planning.viewpoints.cameras(&limits.views),
-                &pricing,
-            )?);
-        }
-        self.antialiased_direct = Some(pricing.direct());
-        Ok(())
     }
 
     /// Makes plans for budgets between the least and the greatest error of the rows.
     fn plan(&mut self, subject: &Subject, planning: &Planning, pricing: EqualNodes) -> anyhow::Result<()> {
         let errors = || self.rows.iter().map(|row| row.error_ratio(Metric::Flip));
-        let (least, most) = (errors().fold(1.0, f64::min).max(1e-3), errors().fold(1e-3, f64::max));
+        let least = errors().fold(1.0, f64::min).max(1e-3);
+        let most = errors().fold(1e-3, f64::max);
         for level in BUDGET_LEVELS {
             let limit = least * (most / least).powf(level);
             let budget: Budget = format!("flip {limit:.3}").parse()?;
@@ -176,6 +130,5 @@ fn planned(subject: &Subject, planning: &Planning, pricing: EqualNodes, budget: 
         Choice::Row(row) => planning.ladder.rows()[row].to_string(),
         Choice::Direct => "direct".to_owned(),
     };
-    let (choice, price, spent_s) = (outcome.choice, outcome.price, planner.spent_s());
-    Ok(Planned { budget, choice, name, price, error_ratio, spent_s })
+    Ok(Planned { budget, choice: outcome.choice, name, price: outcome.price, error_ratio, spent_s: planner.spent_s() })
 }

@@ -3,12 +3,9 @@
 
 mod checks;
 pub mod command;
-pub(crate) mod conditions;
-mod expensive;
 mod measure;
-mod order;
 pub mod report;
-pub(crate) mod row;
-pub(crate) mod subject;
+mod row;
+pub mod subject;
 #[cfg(test)]
 mod tests;

@@ -1,10 +1,11 @@
 //! Tables and charts of fronts.
 
-use planner::{Choice, Metric, Price};
-use report::{Axis, Better, Cell, Point, Report, Series, Table, XyChart};
+use planner::{Choice, Metric};
+use report::{Axis, Better, Cell, Point, Report, Series, XyChart};
 
 use super::measure::{Front, Planned};
-use super::row::{CLASSES, MeasuredRow};
+use super::row::MeasuredRow;
+use crate::study::{Column, table};
 
 /// The beginning of the names of tables of rows, and their columns that other commands read.
 pub const ROWS: &str = "Rows, ";
@@ -59,105 +60,57 @@ const FIGURES: [Figure; 4] = [
     },
 ];
 
+const ROW_COLUMNS: [Column<MeasuredRow>; 15] = [
+    Column::new("sampling", |row| row.row.sampling.as_str().into()),
+    Column::new("S", |row| row.row.camera_count.into()),
+    Column::new("side", |row| row.row.side_ratio.into()),
+    Column::new(RECONSTRUCTION, |row| row.row.method.as_str().into()),
+    Column::with_unit(COST, "ms", |row| (row.price.node_s * 1e3).into()),
+    Column::with_unit("g_s", "ms", |row| (row.costs.sample_image_s * 1e3).into()),
+    Column::with_unit("d", "ms", |row| (row.costs.load_set_s * 1e3).into()),
+    Column::with_unit("c", "ms", |row| (row.costs.reconstruct_view_s * 1e3).into()),
+    Column::with_unit("set", "kB", |row| (row.set_bytes as f64 / 1e3).into()),
+    Column::new(FOREGROUND_FLIP, |row| row.error_ratio(Metric::Flip).into()),
+    Column::new("FLIP", |row| row.error_ratio(Metric::FlipWhole).into()),
+    Column::with_unit("foreground PSNR", "dB", |row| row.psnr_db().into()),
+    Column::with_unit("disocclusion", "%", |row| (100.0 * row.error_ratio(Metric::Disocclusion)).into()),
+    Column::with_unit("wrong hits", "%", |row| (100.0 * row.wrong_hits).into()),
+    Column::with_unit("filled", "%", |row| (100.0 * row.filled).into()),
+];
+
+/// A plan beside the front within its budget.
+struct PlanRow<'f> {
+    planned: &'f Planned,
+    cheapest_s: f64,
+}
+
+fn plan_columns<'f>() -> [Column<PlanRow<'f>>; 6] {
+    [
+        Column::new("budget", |row| row.planned.budget.to_string().into()),
+        Column::new("choice", |row| row.planned.name.as_str().into()),
+        Column::with_unit("cost of a view", "ms", |row| (row.planned.price.node_s * 1e3).into()),
+        Column::new("expected error", |row| row.planned.error_ratio.into()),
+        Column::with_unit("time of the plan", "s", |row| row.planned.spent_s.into()),
+        Column::with_unit("the front's cost within the budget", "ms", |row| (row.cheapest_s * 1e3).into()),
+    ]
+}
+
 /// Adds a subject's tables and charts.
 ///
 /// # Errors
 /// A row that does not fit its table.
 pub fn add_to(report: &mut Report, front: &Front) -> anyhow::Result<()> {
-    let name = &front.conditions.name;
+    let name = front.conditions.name;
     report.parameter(format!("{name}: scene"), front.scene_hash.as_str());
-    report.parameter(format!("{name}: rows left out"), front.left_out);
-    report.tables.push(rows_table(&format!("{ROWS}{name}"), &front.rows, front.direct)?);
-    if let Some(direct) = front.antialiased_direct {
-        let title = format!("Rows of the front with four samples a pixel, {name}");
-        report.tables.push(rows_table(&title, &front.antialiased, direct)?);
-    }
-    if !front.planned.is_empty() {
-        report.tables.push(planned_table(front)?);
-    }
+    let mut rows = table(format!("{ROWS}{name}"), &ROW_COLUMNS, &front.rows)?;
+    let direct =
+        [Cell::from("direct"), Cell::Missing, Cell::Missing, Cell::Missing, (front.direct.node_s * 1e3).into()];
+    rows.push(direct.into_iter().chain(vec![Cell::Missing; ROW_COLUMNS.len() - 5]))?;
+    let plan = |planned| PlanRow { planned, cheapest_s: cheapest_s(front, planned) };
+    let plans: Vec<PlanRow<'_>> = front.planned.iter().map(plan).collect();
+    report.tables.extend([rows, table(format!("Plans, {name}"), &plan_columns(), &plans)?]);
     report.charts.extend(FIGURES.iter().map(|figure| chart(front, figure).into()));
     Ok(())
-}
-
-/// The figures of rows, and of direct drawing.
-///
-/// # Errors
-/// A row that does not fit the table.
-pub fn rows_table(name: &str, rows: &[MeasuredRow], direct: Price) -> anyhow::Result<Table> {
-    let columns = [
-        ("sampling", ""),
-        ("S", ""),
-        ("side", ""),
-        (RECONSTRUCTION, ""),
-        (COST, "ms"),
-        ("g_s", "ms"),
-        ("d", "ms"),
-        ("c", "ms"),
-        ("set", "kB"),
-        ("samples", ""),
-        (FOREGROUND_FLIP, ""),
-        ("FLIP", ""),
-        ("foreground PSNR", "dB"),
-        ("foreground SSIM", ""),
-        (CLASSES[0].1, ""),
-        (CLASSES[1].1, ""),
-        (CLASSES[2].1, ""),
-        ("disocclusion", "%"),
-        ("wrong hits", "%"),
-        ("filled", "%"),
-    ];
-    let mut table = Table::new(name, &columns);
-    for row in rows {
-        let head = [
-            Cell::from(row.row.sampling.clone()),
-            (row.row.camera_count as usize).into(),
-            row.row.side_ratio.into(),
-            row.row.method.clone().into(),
-        ];
-        let costs = [row.costs.sample_image_s, row.costs.load_set_s, row.costs.reconstruct_view_s];
-        let numbers = [
-            row.price.node_s * 1e3,
-            costs[0] * 1e3,
-            costs[1] * 1e3,
-            costs[2] * 1e3,
-            row.set_bytes as f64 / 1e3,
-            row.samples as f64,
-            row.error_ratio(Metric::Flip),
-            row.error_ratio(Metric::FlipWhole),
-            row.psnr_db(),
-        ];
-        let pictures =
-            [row.ssim].into_iter().chain(row.class_flips).map(|figure| figure.map_or(Cell::Missing, Cell::from));
-        let shares = [row.error_ratio(Metric::Disocclusion), row.wrong_hits, row.filled];
-        let shares = shares.map(|share| Cell::from(100.0 * share));
-        table.push(head.into_iter().chain(numbers.map(Cell::from)).chain(pictures).chain(shares))?;
-    }
-    let direct = [Cell::from("direct"), Cell::Missing, Cell::Missing, Cell::Missing, (direct.node_s * 1e3).into()];
-    table.push(direct.into_iter().chain(vec![Cell::Missing; columns.len() - 5]))?;
-    Ok(table)
-}
-
-fn planned_table(front: &Front) -> anyhow::Result<Table> {
-    let columns = [
-        ("budget", ""),
-        ("choice", ""),
-        ("cost of a view", "ms"),
-        ("expected error", ""),
-        ("time of the plan", "s"),
-        ("the front's cost within the budget", "ms"),
-    ];
-    let mut table = Table::new(format!("Plans, {}", front.conditions.name), &columns);
-    for planned in &front.planned {
-        table.push([
-            Cell::from(planned.budget.to_string()),
-            planned.name.clone().into(),
-            (planned.price.node_s * 1e3).into(),
-            planned.error_ratio.into(),
-            planned.spent_s.into(),
-            (cheapest_s(front, planned) * 1e3).into(),
-        ])?;
-    }
-    Ok(table)
 }
 
 /// The cost of the cheapest row within a budget, or of direct drawing.

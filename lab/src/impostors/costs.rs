@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::Context as _;
 use depth_image::{Aabb, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
-use reconstruction::Mirrors;
+use reconstruction::{Mirrors, ReconstructRequest};
 use sampling::Mirror;
 
 use super::candidates::in_a_cluster;
@@ -76,7 +76,13 @@ pub fn measure(hall: &Hall<'_>, mirrors: &[Mirror]) -> anyhow::Result<Costs> {
         let mirrors = Mirrors { cells: &cells, reflections, glossy_rays: 0 };
         let reconstructor = hall.stand.reconstructor();
         let turn = Default::default();
-        let make = || Ok(reconstructor.reconstruct_with(&set, mirrors, &views, CARVE, ViewPlanes::COLOR, turn)?);
+        let make = || {
+            Ok(reconstructor.reconstruct(ReconstructRequest {
+                common: mirrors.into(),
+                turn,
+                ..ReconstructRequest::new(&set, &views, CARVE)
+            })?)
+        };
         make()?;
         let times = (0..REPEATS).map(|_| Ok(timed(make)?.1 / BATCH as f64)).collect::<anyhow::Result<Vec<f64>>>()?;
         Ok(median(times))

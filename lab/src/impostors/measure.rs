@@ -6,8 +6,9 @@ use depth_image::{
     srgb8_from_linear,
 };
 use glam::{UVec2, Vec3};
+use gpu::Turn;
 use metrics::{Rgb8Image, flip_map, psnr_db};
-use reconstruction::{MirrorCell, Mirrors, SampleSet, SetDescription};
+use reconstruction::{MirrorCell, Mirrors, ReconstructRequest, SampleSet, SetDescription};
 use render::{GpuScene, Lighting, SamplePlanes};
 use sampling::Impostors;
 use scene::Scene;
@@ -149,7 +150,7 @@ impl<'s> Hall<'s> {
             environment: None,
             mips,
         };
-        Ok(self.stand.reconstructor().upload(images, &description)?)
+        Ok(self.stand.reconstructor().upload(images, &description, Turn::default())?)
     }
 
     /// The scene's mirrors and the sets of what they show, as in a cluster.
@@ -202,7 +203,12 @@ impl<'s> Hall<'s> {
         let view = |subject: &Subject| {
             let (set, cameras, turn) = (&subject.set, [subject.camera], Default::default());
             let reconstructor = self.stand.reconstructor();
-            let views = reconstructor.reconstruct_with(set, mirrors, &cameras, CARVE, ViewPlanes::ALL, turn)?;
+            let views = reconstructor.reconstruct(ReconstructRequest {
+                common: mirrors.into(),
+                turn,
+                planes: ViewPlanes::ALL,
+                ..ReconstructRequest::new(set, &cameras, CARVE)
+            })?;
             views.into_iter().next().context("a view")
         };
         self.subjects.iter().map(view).collect()

@@ -8,8 +8,7 @@ use super::timing::{Run, Times};
 pub fn total_time(times: &Times) -> XyChart {
     let timed = times.direct.iter().map(|run| (run.views as f64, run.seconds));
     let most = times.direct.last().map_or(0, |run| run.views);
-    let counts: Vec<usize> =
-        times.pipelines.first().map(|(_, runs)| runs.iter().map(|run| run.views).collect()).unwrap_or_default();
+    let counts: Vec<usize> = times.first_pipeline().iter().map(|run| run.views).collect();
     let beyond =
         counts.iter().filter(|&&views| views > most).map(|&views| (views as f64, times.direct_view_s() * views as f64));
     let direct = Series::line("direct", timed).then_extrapolated(beyond);

@@ -3,15 +3,13 @@
 mod charts;
 mod timing;
 
-use std::path::PathBuf;
-
 use app_core::exit::Outcome;
 use app_core::experiment::Experiment;
-use app_core::setup::{DeviceArgs, SceneArgs};
+use app_core::setup::SceneArgs;
 use clap::Args;
-use node::Engine as _;
 use report::{Bar, Check, Report};
 
+use crate::study::StudyArgs;
 use timing::Times;
 
 /// The number of nodes P of the paper.
@@ -24,16 +22,7 @@ pub struct LagesArgs {
     #[command(flatten)]
     scene: SceneArgs,
     #[command(flatten)]
-    device: DeviceArgs,
-    /// Where the report goes
-    #[arg(long, default_value = "out/study/lages", value_name = "DIR")]
-    out: PathBuf,
-    /// Delivers at most 64 views
-    #[arg(long)]
-    quick: bool,
-    /// Exit status 1 when a check falls short
-    #[arg(long)]
-    strict: bool,
+    study: StudyArgs,
 }
 
 /// Measures deliveries and writes the report.
@@ -41,28 +30,24 @@ pub struct LagesArgs {
 /// # Errors
 /// Input cannot be used, or the device or the cluster fails.
 pub fn run(args: &LagesArgs) -> anyhow::Result<Outcome> {
-    let experiment = Experiment::start(args.scene.clone(), args.scene.load()?, args.device.device, NODES)?;
-    let times = timing::measure(&experiment, args.quick)?;
+    let device = args.study.device.device;
+    let experiment = Experiment::start(args.scene.clone(), args.scene.load()?, device, NODES)?;
+    let times = timing::measure(&experiment, args.study.quick)?;
     let mut report = report(args, &experiment, &times)?;
     report.parameter("direct finds surfaces by", experiment.visibility()?.to_string());
     experiment.stop()?;
-    report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
-    println!("\n{}", report.summary);
-    let ok = report.finish(&args.out)?;
-    Ok(Outcome::of(ok || !args.strict))
+    println!("{}", report.summary);
+    args.study.finish("lages", &report)
 }
 
 fn report(args: &LagesArgs, experiment: &Experiment, times: &Times) -> anyhow::Result<Report> {
-    let mut report =
-        Report::new(format!("Myriorama study: Lages, {}", args.scene.scene), experiment.engine.device_name());
-    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    let mut report = args.study.report(&format!("Lages, {}", args.scene.scene), &experiment.engine);
     report.parameter("scene", args.scene.scene.to_string());
     report.parameter("triangles", experiment.setup.scene.triangle_count() as usize);
     report.parameter("sample images S", experiment.setup.samples.len());
     report.parameter("nodes P", NODES);
     report.parameter("lighting", args.scene.lighting.to_string());
     report.parameter("method", args.scene.method().to_string());
-    report.parameter("quick", args.quick);
     timing::tables(times, &mut report)?;
     report.charts.extend([charts::total_time(times).into(), charts::stages(times).into()]);
     report.summary = timing::summary(times);

@@ -4,15 +4,21 @@ use app_core::experiment::{Delivered, DeliverySettings, Experiment, PAPER_VIEWS}
 use app_core::progress::bar;
 use cluster::{Costs, PolicyChoice, SessionPlan};
 use coordinator::schedule::k_fd;
+use depth_image::View;
+use metrics::{PdiffSettings, Rgb8Image, flip_map, pdiff_map, psnr_db};
 use reconstruction::ReconstructionMethod;
-use report::{Report, Table};
+use report::{Cell, Report, Table};
 
 use crate::balance::{brute_force_k, k_fd_printed};
+use crate::study::{Column, table};
 
 /// The paper's method, with its 100 steps.
 const SEARCH: ReconstructionMethod = ReconstructionMethod::LightFieldSearch { steps: 100 };
 /// Numbers of views that direct rendering is timed on; more are extended linearly.
 const DIRECT_VIEWS: [usize; 3] = [1, 10, 32];
+
+/// The number of views whose errors beside direct rendering are stated.
+const COMPARED_VIEWS: usize = 10;
 
 /// One delivery.
 pub struct Run {
@@ -22,6 +28,8 @@ pub struct Run {
     /// The longest wait of a frame for its sample set.
     pub set_wait_s: f64,
     pub plan: SessionPlan,
+    /// The views in their order, in runs of [`COMPARED_VIEWS`].
+    made: Vec<View>,
 }
 
 /// All deliveries.
@@ -81,17 +89,28 @@ fn deliver(
     let name = if policy == PolicyChoice::Direct { "direct".to_owned() } else { method.to_string() };
     let progress = bar(format!("{views} views by {name}"), views);
     let mut set_wait_s = 0.0_f64;
+    let mut frames = Vec::new();
     let settings = DeliverySettings { method, ..experiment.delivery(policy, views) };
     let delivered = experiment.deliver(settings, |frame| {
         set_wait_s = set_wait_s.max(frame.header.stage_times.set_wait_s);
         progress.inc(1);
+        if views == COMPARED_VIEWS {
+            frames.push(frame);
+        }
     });
     progress.finish_and_clear();
     let Delivered { plan, seconds } = delivered?;
-    Ok(Run { views, seconds, set_wait_s, plan })
+    frames.sort_by_key(|frame| frame.request.frame);
+    let made = frames.into_iter().map(|frame| frame.view).collect();
+    Ok(Run { views, seconds, set_wait_s, plan, made })
 }
 
 impl Times {
+    /// The runs of the first method.
+    pub fn first_pipeline(&self) -> &[Run] {
+        self.pipelines.first().map_or(&[], |(_, runs)| runs)
+    }
+
     /// Seconds a view of direct rendering, when many are asked for.
     pub fn direct_view_s(&self) -> f64 {
         self.direct.last().map_or(f64::NAN, |run| run.seconds / run.views as f64)
@@ -99,8 +118,7 @@ impl Times {
 
     /// The run of the headline.
     pub fn headline(&self) -> Option<&Run> {
-        let runs = self.pipelines.first().map(|(_, runs)| runs)?;
-        runs.iter().find(|run| run.views == self.headline_views)
+        self.first_pipeline().iter().find(|run| run.views == self.headline_views)
     }
 
     /// Throughput of the default method over that of direct rendering.
@@ -122,82 +140,118 @@ impl Times {
     }
 }
 
-/// Adds total times, costs and K.
+/// A method, and its run of the most views.
+struct CostRow<'t> {
+    method: &'t str,
+    costs: Costs,
+    errors: Errors,
+}
+
+/// Errors of views beside direct rendering, as means over whole views.
+#[derive(Debug, Clone, Copy, Default)]
+struct Errors {
+    psnr_db: f64,
+    flip: f64,
+    /// Pixels that differ perceptibly.
+    different_px: f64,
+}
+
+impl Errors {
+    fn new(direct: &[View], made: &[View]) -> anyhow::Result<Self> {
+        let mut sums = Self::default();
+        for (direct, view) in direct.iter().zip(made) {
+            let [direct, view] = [Rgb8Image::of_view(direct)?, Rgb8Image::of_view(view)?];
+            sums.psnr_db += psnr_db(&direct, &view, None)?.unwrap_or(f64::NAN);
+            sums.flip += flip_map(&direct, &view)?.mean(None)?.unwrap_or(f64::NAN);
+            sums.different_px += pdiff_map(&direct, &view, PdiffSettings::default())?.failing_px(None)? as f64;
+        }
+        let count = made.len() as f64;
+        let Self { psnr_db, flip, different_px } = sums;
+        Ok(Self { psnr_db: psnr_db / count, flip: flip / count, different_px: different_px / count })
+    }
+}
+
+impl<'t> CostRow<'t> {
+    fn new(times: &Times, method: &'t str, runs: &[Run]) -> anyhow::Result<Option<Self>> {
+        let compared = |runs: &[Run]| runs.iter().position(|run| run.views == COMPARED_VIEWS);
+        let Some((direct, own)) = compared(&times.direct).zip(compared(runs)) else { return Ok(None) };
+        let errors = Errors::new(&times.direct[direct].made, &runs[own].made)?;
+        Ok(runs.last().map(|last| Self { method, costs: last.plan.costs, errors }))
+    }
+}
+
+fn cost_columns<'t>() -> [Column<CostRow<'t>>; 10] {
+    [
+        Column::new("method", |row| row.method.into()),
+        Column::with_unit("g_s a sample", "ms", |row| (row.costs.sample_image_s * 1e3).into()),
+        Column::with_unit("g_v a view", "ms", |row| (row.costs.direct_view_s * 1e3).into()),
+        Column::with_unit("c a view", "ms", |row| (row.costs.reconstruct_view_s * 1e3).into()),
+        Column::with_unit("d a set", "ms", |row| (row.costs.load_set_s * 1e3).into()),
+        Column::with_unit("e a view", "ms", |row| (row.costs.encode_view_s * 1e3).into()),
+        Column::new("c / g_v", |row| (row.costs.reconstruct_view_s / row.costs.direct_view_s).into()),
+        Column::with_unit("PSNR", "dB", |row| row.errors.psnr_db.into()),
+        Column::new("FLIP", |row| row.errors.flip.into()),
+        Column::with_unit("pdiff", "px a view", |row| row.errors.different_px.into()),
+    ]
+}
+
+/// A run, and what rules say of its K.
+struct SamplersRow<'t> {
+    times: &'t Times,
+    run: &'t Run,
+}
+
+impl SamplersRow<'_> {
+    fn k_by(&self, rule: fn(usize, f64, usize, f64, usize) -> usize) -> usize {
+        let Costs { sample_image_s, reconstruct_view_s, encode_view_s, .. } = self.run.plan.costs;
+        rule(self.times.images, sample_image_s, self.run.views, reconstruct_view_s + encode_view_s, self.times.nodes)
+    }
+}
+
+fn samplers_columns<'t>() -> [Column<SamplersRow<'t>>; 8] {
+    [
+        Column::new("views V", |row| row.run.views.into()),
+        Column::new("chosen K", |row| row.run.plan.sampler_count().into()),
+        Column::new("formula, floor", |row| row.k_by(k_fd).into()),
+        Column::new("as printed, ceil", |row| row.k_by(k_fd_printed).into()),
+        Column::new("brute force", |row| row.k_by(brute_force_k).into()),
+        Column::with_unit("pipeline predicted", "s", |row| row.run.plan.predicted_pipeline_s.into()),
+        Column::with_unit("direct predicted", "s", |row| row.run.plan.predicted_direct_s.into()),
+        Column::new("policy by prediction", |row| {
+            let plan = &row.run.plan;
+            if plan.predicted_direct_s < plan.predicted_pipeline_s { "direct".into() } else { "pipeline".into() }
+        }),
+    ]
+}
+
+/// Adds total times, costs with errors, and K.
+///
+/// # Errors
+/// A row does not fit its table, or views differ in size.
 pub fn tables(times: &Times, report: &mut Report) -> anyhow::Result<()> {
     report.tables.push(totals(times)?);
-    report.tables.push(costs(times)?);
-    report.tables.push(samplers(times)?);
+    let mut costs = Vec::new();
+    for (method, runs) in &times.pipelines {
+        costs.extend(CostRow::new(times, method, runs)?);
+    }
+    report.tables.push(table("Costs of one operation, alone and warm, and errors of views", &cost_columns(), &costs)?);
+    let samplers: Vec<SamplersRow<'_>> = times.first_pipeline().iter().map(|run| SamplersRow { times, run }).collect();
+    report.tables.push(table(format!("K of P = {} nodes", times.nodes), &samplers_columns(), &samplers)?);
     Ok(())
 }
 
 fn totals(times: &Times) -> anyhow::Result<Table> {
-    let names: Vec<&str> = times.pipelines.iter().map(|(name, _)| name.as_str()).collect();
     let mut columns = vec![("views V", ""), ("direct", "s"), ("direct is", "")];
-    columns.extend(names.iter().map(|name| (*name, "s")));
+    columns.extend(times.pipelines.iter().map(|(name, _)| (name.as_str(), "s")));
     columns.push(("direct over the first", "×"));
     let mut table = Table::new("Total time until delivered", &columns);
-    let counts = times
-        .pipelines
-        .first()
-        .map(|(_, runs)| runs.iter().map(|run| run.views).collect::<Vec<_>>())
-        .unwrap_or_default();
-    for (index, views) in counts.into_iter().enumerate() {
-        let timed = times.direct.iter().find(|run| run.views == views).map(|run| run.seconds);
-        let direct = timed.unwrap_or(times.direct_view_s() * views as f64);
-        let seconds: Vec<f64> = times.pipelines.iter().map(|(_, runs)| runs[index].seconds).collect();
+    for (place, run) in times.first_pipeline().iter().enumerate() {
+        let timed = times.direct.iter().find(|direct| direct.views == run.views);
         let how = if timed.is_some() { "timed" } else { "extended" };
-        let ratio = direct / seconds.first().copied().unwrap_or(f64::NAN);
-        let cells = [views.into(), direct.into(), how.into()]
-            .into_iter()
-            .chain(seconds.into_iter().map(Into::into))
-            .chain([ratio.into()]);
-        table.push(cells)?;
-    }
-    Ok(table)
-}
-
-fn costs(times: &Times) -> anyhow::Result<Table> {
-    let columns = [
-        ("method", ""),
-        ("g_s a sample", "ms"),
-        ("g_v a view", "ms"),
-        ("c a view", "ms"),
-        ("d a set", "ms"),
-        ("e a view", "ms"),
-        ("c / g_v", ""),
-    ];
-    let mut table = Table::new("Costs of one operation, alone and warm", &columns);
-    for (name, runs) in &times.pipelines {
-        let Some(run) = runs.last() else { continue };
-        let c = run.plan.costs;
-        let ms =
-            [c.sample_image_s, c.direct_view_s, c.reconstruct_view_s, c.load_set_s, c.encode_view_s].map(|s| s * 1e3);
-        let ratio = c.reconstruct_view_s / c.direct_view_s;
-        table.push([name.as_str().into()].into_iter().chain(ms.map(Into::into)).chain([ratio.into()]))?;
-    }
-    Ok(table)
-}
-
-fn samplers(times: &Times) -> anyhow::Result<Table> {
-    let columns = [
-        ("views V", ""),
-        ("chosen K", ""),
-        ("formula, floor", ""),
-        ("as printed, ceil", ""),
-        ("brute force", ""),
-        ("pipeline predicted", "s"),
-        ("direct predicted", "s"),
-        ("policy by prediction", ""),
-    ];
-    let mut table = Table::new(format!("K of P = {} nodes", times.nodes), &columns);
-    for run in times.pipelines.first().map(|(_, runs)| runs.as_slice()).unwrap_or_default() {
-        let plan = &run.plan;
-        let (g, c) = (plan.costs.sample_image_s, plan.costs.reconstruct_view_s + plan.costs.encode_view_s);
-        let by = |rule: fn(usize, f64, usize, f64, usize) -> usize| rule(times.images, g, run.views, c, times.nodes);
-        let would = if plan.predicted_direct_s < plan.predicted_pipeline_s { "direct" } else { "pipeline" };
-        let ks = [run.views, plan.sampler_count(), by(k_fd), by(k_fd_printed), by(brute_force_k)];
-        let predicted = [plan.predicted_pipeline_s, plan.predicted_direct_s];
-        table.push(ks.map(Into::into).into_iter().chain(predicted.map(Into::into)).chain([would.into()]))?;
+        let direct_s = timed.map_or(times.direct_view_s() * run.views as f64, |direct| direct.seconds);
+        let seconds = times.pipelines.iter().map(|(_, runs)| Cell::from(runs[place].seconds));
+        let head = [Cell::from(run.views), direct_s.into(), how.into()];
+        table.push(head.into_iter().chain(seconds).chain([Cell::from(direct_s / run.seconds)]))?;
     }
     Ok(table)
 }

@@ -10,128 +10,111 @@ use depth_image::{PinholeCamera, ToneMapping, View, linear_from_rgb9e5};
 use glam::Vec2;
 use rayon::prelude::*;
 use render::{LayerSelection, Lighting};
-use report::{Axis, Bar, Better, Cell, Check, Report, Table, XyChart};
+use report::{Bar, Check, Report};
 
-use super::accuracy::{Reached, over_time};
 use super::pyramid::{EPSILON_FACTOR, Hit, Pyramids};
 use super::subject::{Cube, Subject};
 use super::views::{self, Figures};
 use super::warp::warp;
 use crate::failures::stand::Stand;
+use crate::impostors::around;
+use crate::study::{Column, measure_rows, table};
 
 /// A quick run has the first alone.
 const SCENES: [&str; 4] = ["bird-nest", "mirror-box", "teapot-spheres", "tree"];
 const VIEWS: usize = 3;
 const SIDE: u32 = 512;
-/// Where the texels of the first side are too large for the bound beside the warp.
-const FINER_SIDE: u32 = 1024;
-const MOST_TEXEL_PX: f64 = 0.54;
-/// Bounds beside the quadtrees: wrong hits and loads as shares of theirs. PSNR above both of the paper's ways.
+/// Bounds beside the quadtrees: wrong hits as a share of theirs. PSNR above both of the paper's ways.
 const MOST_WRONG_HITS: f64 = 0.4;
-const MOST_LOADS: f64 = 0.35;
 const LEAST_GAIN_DB: f64 = 3.0;
-/// The bound of loads a ray of a walk, in scenes whose loads no other table has.
-const MOST_LOADS_A_RAY: f64 = 30.0;
-const LOADS_COUNTED: [&str; 2] = ["mirror-box", "teapot-spheres"];
-const WARP: &str = "warp";
-const WAYS: [&str; 4] = ["pyramid", "pyramid, dominant axis", WARP, "layered"];
-const IMAGES: &str = "joint_carve";
-const NOTE: &str = "Sides of cubes stand beside the points. The device makes views by layered and joint_carve, the host those of the paper's ways.";
 
-/// Adds the table of all scenes, its checks, and charts of each scene.
+/// A way to make views of a scene.
+struct WayRow {
+    scene: &'static str,
+    way: &'static str,
+    figures: Figures,
+    /// The share of holes of the warp.
+    holes: Option<f64>,
+}
+
+const COLUMNS: [Column<WayRow>; 9] = [
+    Column::new("scene", |row| row.scene.into()),
+    Column::new("views by", |row| row.way.into()),
+    Column::with_unit("PSNR", "dB", |row| row.figures.psnr_db.into()),
+    Column::new("FLIP", |row| row.figures.flip.into()),
+    Column::with_unit("wrong hits", "%", |row| (row.figures.wrong_hits * 100.0).into()),
+    Column::with_unit("missed", "%", |row| (row.figures.missed * 100.0).into()),
+    Column::new("loads a ray", |row| row.figures.loads.into()),
+    Column::with_unit("a view", "ms", |row| (row.figures.view_s * 1e3).into()),
+    Column::with_unit("holes", "%", |row| row.holes.map(|share| share * 100.0).into()),
+];
+
+/// Adds the table of all scenes, and its checks.
 ///
 /// # Errors
 /// The device fails.
-pub fn measure(stand: &Stand, lighting: Lighting, is_quick: bool, report: &mut Report) -> anyhow::Result<()> {
-    let columns = [&views::COLUMNS[..], &[("texel", "px"), ("holes", "%")]].concat();
-    let mut table = Table::new("The paper's ways beside the walk", &columns);
-    for &name in &SCENES[..if is_quick { 1 } else { SCENES.len() }] {
-        let subject = Subject::new(stand, name, lighting, VIEWS)?;
-        let coarse = Ways::new(&Cubes::new(&subject, SIDE)?)?;
-        let is_coarse = coarse.texel_px > MOST_TEXEL_PX;
-        let finer = is_coarse.then(|| Ways::new(&Cubes::new(&subject, FINER_SIDE)?)).transpose()?;
-        let all: Vec<&Ways> = [&coarse].into_iter().chain(&finer).collect();
-        let images = views::of_images(&subject)?;
-        for ways in &all {
-            ways.push(name, &mut table)?;
-        }
-        table.push([images.row(name, IMAGES), vec![Cell::from(None::<f64>); 2]].concat())?;
-        report.checks.extend(checks(name, &coarse, finer.as_ref().unwrap_or(&coarse)));
-        report.charts.extend(charts(name, &all, &images).map(Into::into));
-    }
-    report.tables.push(table);
+pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Result<()> {
+    let scenes = &SCENES[..if is_quick { 1 } else { SCENES.len() }];
+    let ways = measure_rows("the paper's ways", scenes, |&scene| Ways::measure(stand, scene))?;
+    report.checks.extend(ways.iter().flat_map(Ways::checks));
+    let rows: Vec<WayRow> = ways.into_iter().flat_map(Ways::rows).collect();
+    report.tables.push(table(format!("The paper's ways beside the walk, cubes of {SIDE}²"), &COLUMNS, &rows)?);
     Ok(())
 }
 
-fn checks(name: &str, ways: &Ways, beside_warp: &Ways) -> Vec<Check> {
-    let [quadtrees, _, _, walk] = ways.figures;
-    let over = |what: &str| format!("{name}: {what} of a walk over quadtrees, {}²", ways.side);
-    let mut checks = vec![
-        Check::new(over("wrong hits"), walk.wrong_hits / quadtrees.wrong_hits, "", Bar::AtMost(MOST_WRONG_HITS)),
-        Check::new(over("loads"), walk.loads / quadtrees.loads, "", Bar::AtMost(MOST_LOADS)),
-        Check::new(over("PSNR"), walk.psnr_db - quadtrees.psnr_db, "dB", Bar::AtLeast(LEAST_GAIN_DB)),
-    ];
-    if LOADS_COUNTED.contains(&name) {
-        let loads = format!("{name}: loads a ray, {}²", ways.side);
-        checks.push(Check::new(loads, walk.loads, "", Bar::AtMost(MOST_LOADS_A_RAY)));
-    }
-    let [_, _, warped, walk] = beside_warp.figures;
-    let gain = format!("{name}: PSNR of a walk over the warp, {}²", beside_warp.side);
-    checks.push(Check::new(gain, walk.psnr_db - warped.psnr_db, "dB", Bar::AtLeast(LEAST_GAIN_DB)));
-    checks
-}
-
-/// PSNR and wrong hits of all ways over the time of a view.
-fn charts(name: &str, all: &[&Ways], images: &Figures) -> [XyChart; 2] {
-    type Accuracy = (&'static str, Axis, Better, fn(&Figures) -> f64);
-    let accuracies: [Accuracy; 2] = [
-        ("PSNR", Axis::linear("PSNR", "dB"), Better::High, |figures| figures.psnr_db),
-        ("wrong hits", Axis::log("wrong hits", "%"), Better::Low, |figures| figures.wrong_hits * 100.0),
-    ];
-    accuracies.map(|(quantity, axis, better, of)| {
-        let reached =
-            |setting: String, figures: &Figures| Reached { setting, view_s: figures.view_s, accuracy: of(figures) };
-        let ways = WAYS.into_iter().enumerate().map(|(way, by)| {
-            (by, all.iter().map(|ways| reached(format!("{}²", ways.side), &ways.figures[way])).collect())
-        });
-        let images = (IMAGES, vec![reached(String::new(), images)]);
-        over_time((format!("{name}: {quantity} over time"), NOTE), (axis, better), ways.chain([images]))
-    })
-}
-
-/// All ways to views, in cubes of one side.
+/// All ways to views of a scene.
 struct Ways {
-    side: u32,
-    /// Of each of [`WAYS`].
-    figures: [Figures; 4],
-    texel_px: f64,
-    /// The share of holes of the warp.
+    scene: &'static str,
+    /// Quadtrees of all surfaces.
+    pyramid: Figures,
+    /// Quadtrees of the samples that the walk has.
+    dominant_pyramid: Figures,
+    warp: Figures,
     holes: f64,
+    walk: Figures,
 }
 
 impl Ways {
-    fn new(cubes: &Cubes<'_>) -> anyhow::Result<Self> {
-        let [quadtrees, of_dominant] = [cubes.traced(&cubes.all)?, cubes.traced(&cubes.dominant)?];
-        let (warped, holes) = cubes.warped()?;
-        let walk = views::of_cube(cubes.subject, &cubes.subject.upload(&cubes.dominant)?.0)?;
-        let figures = [quadtrees, of_dominant, warped, walk];
-        Ok(Self { side: cubes.side, figures, texel_px: cubes.texel_px(), holes })
+    fn measure(stand: &Stand, scene: &'static str) -> anyhow::Result<Self> {
+        let subject = Subject::of_views(stand, scene, Lighting::default(), |bounds| around(bounds, VIEWS))?;
+        let cubes = Cubes::new(&subject, SIDE)?;
+        let (warp, holes) = cubes.warped()?;
+        Ok(Self {
+            scene,
+            pyramid: cubes.traced(&cubes.all)?,
+            dominant_pyramid: cubes.traced(&cubes.dominant)?,
+            warp,
+            holes,
+            walk: views::of_cube(&subject, &subject.upload(&cubes.dominant)?.0)?,
+        })
     }
 
-    fn push(&self, name: &str, table: &mut Table) -> anyhow::Result<()> {
-        for (by, figures) in WAYS.into_iter().zip(&self.figures) {
-            let holes = (by == WARP).then_some(self.holes * 100.0);
-            let more = [Cell::from(self.texel_px), Cell::from(holes)];
-            table.push([figures.row(name, &format!("{by}, {}²", self.side)), more.to_vec()].concat())?;
-        }
-        Ok(())
+    fn rows(self) -> [WayRow; 4] {
+        let row = |way, figures| WayRow { scene: self.scene, way, figures, holes: None };
+        [
+            row("pyramid", self.pyramid),
+            row("pyramid, dominant axis", self.dominant_pyramid),
+            WayRow { holes: Some(self.holes), ..row("warp", self.warp) },
+            row("layered", self.walk),
+        ]
+    }
+
+    fn checks(&self) -> [Check; 3] {
+        let Self { pyramid, warp, walk, .. } = self;
+        let name = |what: &str| format!("{}: {what}", self.scene);
+        let wrong_hits = walk.wrong_hits / pyramid.wrong_hits;
+        let gained_db = [pyramid, warp].map(|way| walk.psnr_db - way.psnr_db);
+        [
+            Check::new(name("wrong hits of a walk over quadtrees"), wrong_hits, "", Bar::AtMost(MOST_WRONG_HITS)),
+            Check::new(name("PSNR of a walk over quadtrees"), gained_db[0], "dB", Bar::AtLeast(LEAST_GAIN_DB)),
+            Check::new(name("PSNR of a walk over the warp"), gained_db[1], "dB", Bar::AtLeast(LEAST_GAIN_DB)),
+        ]
     }
 }
 
 /// Cubes of one scene and side: all surfaces for the paper's ways, those of the dominant axis for the walk.
 pub struct Cubes<'s> {
     subject: &'s Subject<'s>,
-    side: u32,
     pub all: Cube,
     pub dominant: Cube,
 }
@@ -140,18 +123,10 @@ impl<'s> Cubes<'s> {
     /// # Errors
     /// The device fails, or the subject's light has highlights.
     pub fn new(subject: &'s Subject<'s>, side: u32) -> anyhow::Result<Self> {
-        let [all, dominant] =
-            [LayerSelection::All, LayerSelection::Dominant].map(|kept| subject.cube((side, kept), subject.lighting, 1));
-        let (all, dominant) = (all?, dominant?);
+        let all = subject.cube(side, LayerSelection::All, subject.lighting, 1)?;
+        let dominant = subject.cube(side, LayerSelection::Dominant, subject.lighting, 1)?;
         ensure!(all.images.iter().all(|image| image.specular.is_none()), "{} has highlights", subject.name);
-        Ok(Self { subject, side, all, dominant })
-    }
-
-    /// A texel in the middle of the scene, in pixels of the first view.
-    fn texel_px(&self) -> f64 {
-        let at_m = |view: &PinholeCamera| view.eye_in_world.distance(self.subject.scene.bounds().center());
-        let view = self.subject.views.first();
-        view.map_or(f64::NAN, |view| f64::from(self.all.grid.spacing_m * view.focal_px.y / at_m(view)))
+        Ok(Self { subject, all, dominant })
     }
 
     /// By quadtrees; rays are shared among the cores.
@@ -198,7 +173,8 @@ impl<'s> Cubes<'s> {
         let rays: usize = found.iter().map(|(camera, _)| camera.pixel_count()).sum();
         let loads: usize = found.iter().map(|(_, (_, loads))| loads).sum();
         let views: Vec<View> = found.iter().map(|(camera, (hits, _))| self.view(cube, camera, hits)).collect();
-        views::figures(&self.subject.truths, &views, (loads as f64 / rays as f64, view_s))
+        let figures = views::figures(&self.subject.truths, &views, view_s)?;
+        Ok(Figures { loads: Some(loads as f64 / rays as f64), ..figures })
     }
 
     fn view(&self, cube: &Cube, camera: &PinholeCamera, hits: &[Option<Hit>]) -> View {

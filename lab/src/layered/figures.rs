@@ -1,15 +1,16 @@
-//! Pictures after the paper's figures, of views that the study makes anyway.
+//! Pictures after the paper's figures.
 
 use anyhow::Context as _;
 use depth_image::View;
 use report::{Picture, PictureRow};
 
-/// Views side by side, each with its caption: what a figure of the paper shows.
+/// Views side by side, each with its caption.
 ///
 /// # Errors
 /// A view whose colour is not of its size.
 pub fn row<'v>(
-    (figure, shows): (&str, &str),
+    figure: u32,
+    title: &str,
     views: impl IntoIterator<Item = (String, &'v View)>,
 ) -> anyhow::Result<PictureRow> {
     let picture = |(caption, view): (String, &View)| {
@@ -17,13 +18,5 @@ pub fn row<'v>(
         Ok(Picture::new(format!("figure {figure}, {caption}"), caption, image))
     };
     let pictures = views.into_iter().map(picture).collect::<anyhow::Result<_>>()?;
-    Ok(PictureRow { title: format!("{shows} (Fig. {figure})"), pictures })
-}
-
-/// The one of several views that pictures show.
-///
-/// # Errors
-/// There is none.
-pub fn middle(views: &[View]) -> anyhow::Result<&View> {
-    views.get(views.len() / 2).context("a view")
+    Ok(PictureRow { title: format!("{title} (Fig. {figure})"), pictures })
 }

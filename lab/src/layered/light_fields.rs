@@ -1,165 +1,153 @@
-//! Mirrors by what is gathered in a layered light field: after as many mirrors as are followed, and by the number of directions.
+//! Mirrors by what is gathered in a layered light field: at once or after one ray, by the number of directions.
 
 use codec::encode_light_field;
 use depth_image::{LightDirections, View};
 use reconstruction::{Mirrors, ReconstructionMethod};
 use render::LayerSelection;
-use report::{Bar, Cell, Check, PictureRow, Report, Table};
+use report::{Bar, Check, PictureRow, Report};
 
-use super::mirrors::{self, SCENE, cameras, errors, shown};
+use super::figures;
+use super::mirrors::{self, SCENE, TimedViews, cameras, errors};
 use super::subject::{Cube, Subject};
 use super::views::LAYERED;
-use super::{baked, figures};
 use crate::failures::stand::Stand;
 use crate::impostors::{changed, reflecting};
+use crate::study::{Column, table};
 
 const LIGHT: &str = "shadows";
 const SIDE: u32 = 512;
 /// Mirrors on a ray's way.
 const MOST: u32 = 7;
+const MIRRORS: Mirrors<'_> = Mirrors { cells: &[], reflections: MOST, glossy_rays: 0 };
 /// What is gained over gathering alone, by one ray before it and by all rays.
 const LEAST_GAIN_DB: f64 = 5.0;
-/// What 1026 directions gain over 66 after one ray, over what they gain without.
-const MOST_GAIN_SHARE: f64 = 0.25;
-/// Of [`LightDirections::ALL`], the number that bounds are about.
-const MIDDLE: usize = 1;
+/// The number of directions that bounds are about.
+const MIDDLE: LightDirections = LightDirections::D258;
 
-/// The errors of a way to show mirrors, and a view.
-struct Mirrored {
+/// A way to show mirrors.
+struct MirrorRow {
+    /// `None` where nothing is gathered.
+    gathered: Option<Gathered>,
+    /// Mirrors that are followed by rays.
+    rays: u32,
     psnr_db: f64,
     flip: f64,
+    view_s: f64,
     view: View,
 }
+
+/// The light field of a row.
+#[derive(Debug, Clone, Copy)]
+struct Gathered {
+    directions: LightDirections,
+    samples: usize,
+    sent_bytes: usize,
+    sample_s: f64,
+}
+
+const COLUMNS: [Column<MirrorRow>; 8] = [
+    Column::new("directions", |row| row.gathered.map(|gathered| gathered.directions.count()).into()),
+    Column::new("rays before", |row| row.rays.into()),
+    Column::with_unit("mirrored pixels: PSNR", "dB", |row| row.psnr_db.into()),
+    Column::new("mirrored pixels: FLIP", |row| row.flip.into()),
+    Column::with_unit("a view", "ms", |row| (row.view_s * 1e3).into()),
+    Column::new("samples", |row| row.gathered.map(|gathered| gathered.samples).into()),
+    Column::with_unit("sent", "MB", |row| row.gathered.map(|gathered| gathered.sent_bytes as f64 / 1e6).into()),
+    Column::with_unit("sampled", "s", |row| row.gathered.map(|gathered| gathered.sample_s).into()),
+];
 
 /// Adds the table of all numbers of directions, its checks, and pictures; quick runs leave the most directions out.
 ///
 /// # Errors
 /// The device fails.
 pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Result<()> {
-    let columns = [
-        ("directions", ""),
-        ("rays before", ""),
-        ("mirrored pixels: PSNR", "dB"),
-        ("mirrored pixels: FLIP", ""),
-        ("a view", "ms"),
-        ("samples", ""),
-        ("sent", "MB"),
-        ("sampled", "s"),
-    ];
-    let mut table =
-        Table::new(format!("Mirrors of {SCENE}, gathered in light fields beside a cube of {SIDE}²"), &columns);
     let subject = Subject::of_views(stand, SCENE, LIGHT.parse()?, |_| cameras())?;
-    let cube = subject.cube((SIDE, LayerSelection::Dominant), subject.lighting, 1)?;
-    let (truths, _) = mirrors::direct(&subject, MOST)?;
+    let cube = subject.cube(SIDE, LayerSelection::Dominant, subject.lighting, 1)?;
+    let truths = TimedViews::drawn(&subject, reflecting(subject.lighting, MOST)?)?.views;
     let mirrored = subject.truths.iter().zip(&truths).map(|(none, all)| changed(none, all)).collect();
-    let work = Work { subject, cube, truths, mirrored };
-    let all = &LightDirections::ALL[..if is_quick { 2 } else { 3 }];
-    let rows = all.iter().map(|&directions| work.rows(directions, &mut table)).collect::<anyhow::Result<Vec<_>>>()?;
-    let rays = work.rays(&mut table)?;
-    report.tables.push(table);
-    report.checks.extend(checks(&rows, &rays));
-    report.pictures.extend([work.baked()?, work.by_rays(&rows[MIDDLE], &rays)?]);
-    report.pictures.push(by_directions("4, above", "gathered", all.iter().zip(rows.iter().map(|row| &row[0])))?);
-    let after_one = all.iter().zip(rows.iter().map(|row| &row[1]));
-    report.pictures.push(by_directions("4, below", "one ray, then gathered", after_one)?);
+    let box_of_mirrors = MirrorBox { subject, cube, truths, mirrored };
+    let mut rows = Vec::new();
+    for &directions in &LightDirections::ALL[..if is_quick { 2 } else { 3 }] {
+        rows.extend(box_of_mirrors.gathered(directions)?);
+    }
+    rows.push(box_of_mirrors.by_rays()?);
+    let title = format!("Mirrors of {SCENE}, gathered in light fields beside a cube of {SIDE}²");
+    report.tables.push(table(title, &COLUMNS, &rows)?);
+    report.checks.extend(checks(&rows));
+    report.pictures.extend(pictures(&rows, mirrors::middle(&box_of_mirrors.truths)?)?);
     Ok(())
 }
 
-struct Work<'s> {
+struct MirrorBox<'s> {
     subject: Subject<'s>,
     cube: Cube,
     truths: Vec<View>,
     mirrored: Vec<Vec<bool>>,
 }
 
-impl Work<'_> {
+impl MirrorBox<'_> {
     /// Gathering alone, and after one ray.
-    fn rows(&self, directions: LightDirections, table: &mut Table) -> anyhow::Result<[Mirrored; 2]> {
+    fn gathered(&self, directions: LightDirections) -> anyhow::Result<[MirrorRow; 2]> {
         let (field, sample_s) = self.subject.light_field(directions, reflecting(self.subject.lighting, MOST)?)?;
-        let sent_mb = encode_light_field(&field)?.payload.len() as f64 / 1e6;
-        let numbers = [field.sample_count() as f64, sent_mb, sample_s].map(Cell::from);
-        let (set, _) = self.subject.upload_with(&self.cube, field)?;
-        let row = |rays: u32, table: &mut Table| {
+        let sent_bytes = encode_light_field(&field)?.payload.len();
+        let gathered = Gathered { directions, samples: field.sample_count(), sent_bytes, sample_s };
+        let set = self.subject.upload_with(&self.cube, Some(field))?.0;
+        let row = |rays: u32| {
             let method = ReconstructionMethod::Layered { followed: Some(rays) };
-            let (views, view_s) =
-                shown(&self.subject, &set, method, Mirrors { reflections: MOST, ..Mirrors::default() })?;
-            let shown = self.mirrored(&views)?;
-            let own = [shown.psnr_db, shown.flip, view_s * 1e3].map(Cell::from);
-            let first = [directions.count(), rays].map(Cell::from);
-            table.push(first.into_iter().chain(own).chain(numbers.clone()))?;
-            anyhow::Ok(shown)
+            self.row(Some(gathered), rays, &TimedViews::of_cube(&self.subject, &set, method, MIRRORS)?)
         };
-        Ok([row(0, table)?, row(1, table)?])
+        Ok([row(0)?, row(1)?])
     }
 
-    /// All rays, and nothing gathered.
-    fn rays(&self, table: &mut Table) -> anyhow::Result<Mirrored> {
-        let (set, _) = self.subject.upload(&self.cube)?;
-        let mirrors = Mirrors { reflections: MOST, ..Mirrors::default() };
-        let (views, view_s) = shown(&self.subject, &set, LAYERED, mirrors)?;
-        let shown = self.mirrored(&views)?;
-        let own = [shown.psnr_db, shown.flip, view_s * 1e3].map(Cell::from);
-        table.push(["-".into(), MOST.into()].into_iter().chain(own).chain(["-", "-", "-"].map(Cell::from)))?;
-        Ok(shown)
+    /// All mirrors are followed, and nothing is gathered.
+    fn by_rays(&self) -> anyhow::Result<MirrorRow> {
+        let set = self.subject.upload(&self.cube)?.0;
+        self.row(None, MOST, &TimedViews::of_cube(&self.subject, &set, LAYERED, MIRRORS)?)
     }
 
-    fn mirrored(&self, views: &[View]) -> anyhow::Result<Mirrored> {
-        let [psnr_db, flip] = errors(&self.truths, views, &self.mirrored)?;
-        Ok(Mirrored { psnr_db, flip, view: figures::middle(views)?.clone() })
-    }
-
-    /// What the images of two cameras show to the one between them.
-    fn baked(&self) -> anyhow::Result<PictureRow> {
-        let middle = self.truths.len() / 2;
-        let seen =
-            |number: usize| baked::seen_from(&self.subject, number, &self.truths[number], self.subject.views[middle]);
-        let (left, right) = (seen(middle - 1)?, seen(middle + 1)?);
-        let views = [
-            ("warped from the camera on the left", &left),
-            ("warped from the camera on the right", &right),
-            ("drawn directly", figures::middle(&self.truths)?),
-        ];
-        let views = views.map(|(caption, view)| (caption.to_owned(), view));
-        figures::row(("1", "Mirrors as part of samples, which show what another camera saw"), views)
-    }
-
-    fn by_rays(&self, [gathered, after_one]: &[Mirrored; 2], rays: &Mirrored) -> anyhow::Result<PictureRow> {
-        let count = LightDirections::ALL[MIDDLE].count();
-        let views = [
-            (format!("a, gathered in {count} directions"), &gathered.view),
-            (format!("b, one ray, then gathered in {count} directions"), &after_one.view),
-            ("c, seven rays".to_owned(), &rays.view),
-            ("d, drawn directly".to_owned(), figures::middle(&self.truths)?),
-        ];
-        figures::row(("3", "Mirrors gathered, and by rays"), views)
+    fn row(&self, gathered: Option<Gathered>, rays: u32, timed: &TimedViews) -> anyhow::Result<MirrorRow> {
+        let [psnr_db, flip] = errors(&self.truths, &timed.views, &self.mirrored)?;
+        Ok(MirrorRow { gathered, rays, psnr_db, flip, view_s: timed.view_s, view: timed.middle()?.clone() })
     }
 }
 
-fn by_directions<'m>(
-    figure: &str,
-    way: &str,
-    mirrored: impl Iterator<Item = (&'m LightDirections, &'m Mirrored)>,
-) -> anyhow::Result<PictureRow> {
-    let views =
-        mirrored.map(|(directions, shown)| (format!("{way} in {} directions", directions.count()), &shown.view));
-    figures::row((figure, "Mirrors by the number of directions"), views)
+impl MirrorRow {
+    fn is_gathered_in(&self, directions: LightDirections) -> bool {
+        self.gathered.is_some_and(|gathered| gathered.directions == directions)
+    }
+
+    fn caption(&self) -> String {
+        match self.gathered {
+            None => format!("{} rays", self.rays),
+            Some(Gathered { directions, .. }) => {
+                let before = if self.rays == 0 { "" } else { "one ray, then " };
+                format!("{before}gathered in {} directions", directions.count())
+            }
+        }
+    }
 }
 
-fn checks(rows: &[[Mirrored; 2]], rays: &Mirrored) -> Vec<Check> {
-    let [gathered, after_one] = &rows[MIDDLE];
-    let gain = |name: &str, of: &Mirrored| {
-        let name = format!("{SCENE}: mirrored pixels, {name} over gathering alone in 258 directions");
-        Check::new(name, of.psnr_db - gathered.psnr_db, "dB", Bar::AtLeast(LEAST_GAIN_DB))
-    };
-    let sharper = rows.windows(2).map(|pair| {
-        let name = format!("{SCENE}: FLIP of gathered mirrors over that with a quarter of the directions");
-        Check::new(name, pair[1][0].flip / pair[0][0].flip, "", Bar::AtMost(1.0))
+fn checks(rows: &[MirrorRow]) -> Vec<Check> {
+    let Some(alone) = rows.iter().find(|row| row.is_gathered_in(MIDDLE) && row.rays == 0) else { return Vec::new() };
+    let better = rows.iter().filter(|row| row.rays > 0 && (row.gathered.is_none() || row.is_gathered_in(MIDDLE)));
+    let gains = better.map(|row| {
+        let name = format!("{SCENE}: mirrored pixels, {} over gathering alone in 258 directions", row.caption());
+        Check::new(name, row.psnr_db - alone.psnr_db, "dB", Bar::AtLeast(LEAST_GAIN_DB))
     });
-    let gained = |way: usize| rows[0][way].flip - rows[2][way].flip;
-    let share = (rows.len() > 2).then(|| {
-        let name = format!("{SCENE}: FLIP that 1026 directions gain after one ray, over what they gain without");
-        Check::new(name, gained(1) / gained(0), "", Bar::AtMost(MOST_GAIN_SHARE))
+    let gathered: Vec<&MirrorRow> = rows.iter().filter(|row| row.gathered.is_some() && row.rays == 0).collect();
+    let sharper = gathered.windows(2).map(|pair| {
+        let name = format!("{SCENE}: FLIP, {} over {}", pair[1].caption(), pair[0].caption());
+        Check::new(name, pair[1].flip / pair[0].flip, "", Bar::AtMost(1.0))
     });
-    let rays = [gain("seven rays", rays), gain("one ray and gathering", after_one)];
-    rays.into_iter().chain(sharper).chain(share).collect()
+    gains.chain(sharper).collect()
+}
+
+fn pictures(rows: &[MirrorRow], truth: &View) -> anyhow::Result<[PictureRow; 2]> {
+    let is_in_middle = |row: &&MirrorRow| row.gathered.is_none() || row.is_gathered_in(MIDDLE);
+    let middle = rows.iter().filter(is_in_middle).map(|row| (row.caption(), &row.view));
+    let gathered = rows.iter().filter(|row| row.gathered.is_some()).map(|row| (row.caption(), &row.view));
+    Ok([
+        figures::row(3, "Mirrors gathered, and by rays", middle.chain([("drawn directly".to_owned(), truth)]))?,
+        figures::row(4, "Mirrors by the number of directions", gathered)?,
+    ])
 }

@@ -1,11 +1,7 @@
-//! `myriorama-lab study layered`: views from layered depth cubes.
+//! `myriorama-lab study layered`: the measurements of Lischinski and Rappoport, by layered depth cubes and light fields.
 
-mod accuracy;
-mod baked;
-mod base;
 mod baselines;
 pub mod command;
-mod cubes;
 mod figures;
 mod glossy;
 mod light_fields;
@@ -15,7 +11,5 @@ pub mod pyramid;
 mod storage;
 pub mod subject;
 mod table_one;
-mod triangles;
-mod viewpoints;
 pub mod views;
 mod warp;

@@ -45,6 +45,15 @@ struct Trees<'c> {
     levels: Vec<Level>,
 }
 
+/// A place in a quadtree, and the layer from which on it is searched.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    /// The level, from 0 for single texels.
+    height: usize,
+    place: UVec2,
+    layer: usize,
+}
+
 /// The nodes of one size.
 struct Level {
     size: UVec2,
@@ -72,10 +81,12 @@ impl<'c> Pyramids<'c> {
     /// The nearest sample that faces the ray and whose depth is within ε of the ray's over its texel, from `near` on. Images follow
     /// one another, bounded by the best hit so far. Gives also the nodes and samples that were read.
     pub fn trace(&self, ray: Ray, near: f32) -> (Option<Hit>, usize) {
-        let (mut best, mut loads) = (None, 0);
+        let mut best = None;
+        let mut loads = 0;
         for trees in &self.trees {
             let ray = ImageRay::new(&trees.image.camera, ray, near);
-            trees.traverse(&ray, (trees.levels.len() - 1, UVec2::ZERO, 0), &mut best, &mut loads);
+            let root = Node { height: trees.levels.len() - 1, place: UVec2::ZERO, layer: 0 };
+            trees.traverse(&ray, root, &mut best, &mut loads);
         }
         (best, loads)
     }
@@ -83,7 +94,8 @@ impl<'c> Pyramids<'c> {
 
 impl<'c> Trees<'c> {
     fn new(number: usize, image: &'c LayeredDepthImage, epsilon_factor: f32) -> Self {
-        let (first, size) = (image.first.clone(), image.camera.size_px);
+        let first = image.first.clone();
+        let size = image.camera.size_px;
         let forward_in_world = image.camera.axes_in_world()[2];
         let mut trees = Self { number, image, forward_in_world, epsilon_factor, levels: Vec::new() };
         let mut reach: Vec<[f32; 2]> = (0..image.sample_count()).map(|sample| trees.reach(sample)).collect();
@@ -105,7 +117,8 @@ impl<'c> Trees<'c> {
     fn reach(&self, sample: usize) -> [f32; 2] {
         let cos = self.image.plane_normal_in_world(sample).dot(self.forward_in_world).abs().min(1.0);
         let slope = ((1.0 - cos * cos).sqrt() / cos).min(MAX_SLOPE);
-        let (depth, epsilon) = (self.depth(sample), self.epsilon_factor * 0.5 * slope);
+        let depth = self.depth(sample);
+        let epsilon = self.epsilon_factor * 0.5 * slope;
         [depth - epsilon, depth + epsilon]
     }
 
@@ -114,13 +127,8 @@ impl<'c> Trees<'c> {
     }
 
     /// The paper's `Traverse`, from a layer of a place on.
-    fn traverse(
-        &self,
-        ray: &ImageRay,
-        (height, place, layer): (usize, UVec2, usize),
-        best: &mut Option<Hit>,
-        loads: &mut usize,
-    ) {
+    fn traverse(&self, ray: &ImageRay, from: Node, best: &mut Option<Hit>, loads: &mut usize) {
+        let Node { height, place, layer } = from;
         let level = &self.levels[height];
         let nodes = level.nodes(place);
         let Some(along) = ray.over(height, place).filter(|_| layer < nodes.len()) else { return };
@@ -140,15 +148,19 @@ impl<'c> Trees<'c> {
             if height == 0 {
                 self.offer(ray, node, along, best);
             } else {
-                let below = |corner| (height - 1, place * 2 + corner, node - nodes.start);
-                return ray.corners().into_iter().for_each(|corner| self.traverse(ray, below(corner), best, loads));
+                for corner in ray.corners() {
+                    let below = Node { height: height - 1, place: place * 2 + corner, layer: node - nodes.start };
+                    self.traverse(ray, below, best, loads);
+                }
+                return;
             }
         }
     }
 
     /// Takes a sample of a texel if it is a hit before the best one.
     fn offer(&self, ray: &ImageRay, sample: usize, along: [f32; 2], best: &mut Option<Hit>) {
-        let ([z_in, z_out], [least, greatest]) = (ray.depths(along), self.reach(sample));
+        let [z_in, z_out] = ray.depths(along);
+        let [least, greatest] = self.reach(sample);
         let is_met = z_in <= greatest && least <= z_out;
         if !is_met || self.image.plane_normal_in_world(sample).dot(ray.direction_in_world) >= 0.0 {
             return;
@@ -178,7 +190,8 @@ impl Level {
         if self.size.max_element() == 1 {
             return None;
         }
-        let (mut first, mut reach) = (vec![0], Vec::new());
+        let mut first = vec![0];
+        let mut reach = Vec::new();
         for place in (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y))) {
             let below = CORNERS.map(|corner| self.nodes(place * 2 + corner));
             for layer in 0..below.iter().map(Range::len).max().unwrap_or(0) {
@@ -213,7 +226,8 @@ impl ImageRay {
     fn over(&self, height: usize, place: UVec2) -> Option<[f32; 2]> {
         let edges = [place << height as u32, (place + 1) << height as u32];
         let [a, b] = edges.map(|edge| (edge.as_vec2() - self.origin.truncate()) / self.direction.truncate());
-        let (t_in, t_out) = (a.min(b).max_element().max(self.near), a.max(b).min_element());
+        let t_in = a.min(b).max_element().max(self.near);
+        let t_out = a.max(b).min_element();
         (t_in <= t_out).then_some([t_in, t_out])
     }
 

@@ -14,7 +14,6 @@ use scene::{Limits, MissingTextures, Scene, SceneSpec};
 
 use super::paper::LightField;
 use crate::failures::stand::{Stand, work};
-use crate::impostors::around;
 
 /// A scene on the device, and views around it, drawn directly.
 pub struct Subject<'s> {
@@ -35,14 +34,6 @@ pub struct Cube {
 }
 
 impl<'s> Subject<'s> {
-    /// Loads a built-in scene and draws views on a circle around it.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub fn new(stand: &'s Stand, name: &'static str, lighting: Lighting, views: usize) -> anyhow::Result<Self> {
-        Self::of_views(stand, name, lighting, |bounds| around(bounds, views))
-    }
-
     /// Loads a built-in scene and draws views of it, which its bounds place.
     ///
     /// # Errors
@@ -64,7 +55,7 @@ impl<'s> Subject<'s> {
     ///
     /// # Errors
     /// The device fails.
-    pub fn cube(&self, (side, kept): (u32, LayerSelection), lighting: Lighting, times: usize) -> anyhow::Result<Cube> {
+    pub fn cube(&self, side: u32, kept: LayerSelection, lighting: Lighting, times: usize) -> anyhow::Result<Cube> {
         let grid = CubeGrid::around(&self.scene.bounds(), side)?;
         let draw = || -> anyhow::Result<Cube> {
             let start = Instant::now();
@@ -83,9 +74,7 @@ impl<'s> Subject<'s> {
     /// # Errors
     /// The device fails.
     pub fn upload(&self, cube: &Cube) -> anyhow::Result<(SampleSet, f64)> {
-        let start = Instant::now();
-        let set = self.stand.reconstructor().upload_cube(&cube.grid, &cube.images, &self.description())?;
-        Ok((set, start.elapsed().as_secs_f64()))
+        self.upload_with(cube, None)
     }
 
     /// A light field of the scene with as many lines as the paper's, and the seconds that it takes.
@@ -103,14 +92,14 @@ impl<'s> Subject<'s> {
         Ok((field, start.elapsed().as_secs_f64()))
     }
 
-    /// Puts a cube with a light field on the device. Gives also the seconds.
+    /// Puts a cube on the device, with a light field if there is one. Gives also the seconds.
     ///
     /// # Errors
     /// The device fails.
-    pub fn upload_with(&self, cube: &Cube, light_field: LayeredLightField) -> anyhow::Result<(SampleSet, f64)> {
-        let images = CubeImages { grid: cube.grid, images: cube.images.clone(), light_field: Some(light_field) };
+    pub fn upload_with(&self, cube: &Cube, light_field: Option<LayeredLightField>) -> anyhow::Result<(SampleSet, f64)> {
+        let images = CubeImages { grid: cube.grid, images: cube.images.clone(), light_field };
         let start = Instant::now();
-        let set = self.stand.reconstructor().upload_cube_in_turn(&images, &self.description(), Default::default())?;
+        let set = self.stand.reconstructor().upload_cube(&images, &self.description(), Default::default())?;
         Ok((set, start.elapsed().as_secs_f64()))
     }
 
@@ -128,11 +117,6 @@ impl<'s> Subject<'s> {
 }
 
 impl Cube {
-    /// Samples of all three images.
-    pub fn samples(&self) -> usize {
-        self.images.iter().map(LayeredDepthImage::sample_count).sum()
-    }
-
     /// Bytes of all three images as samplers send them.
     ///
     /// # Errors

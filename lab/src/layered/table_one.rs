@@ -7,10 +7,13 @@ use render::{LayerSelection, Lighting};
 use report::{Cell, PictureRow, Report, Table};
 
 use super::baselines::Cubes;
-use super::paper::{Column, LightField, MB, TABLE_1};
+use super::mirrors::TimedViews;
+use super::paper::{Column, Layers, LightField, MB, TABLE_1};
 use super::subject::Subject;
+use super::views::LAYERED;
 use super::{figures, glossy, mirrors, storage};
 use crate::failures::stand::Stand;
+use crate::study::measure_rows;
 
 const SIDE: u32 = 512;
 /// The light of surfaces.
@@ -63,18 +66,14 @@ const SCENES: [Views; 3] = [
 /// The scene of the paper's figure 6.
 const PICTURED: &str = "teapot-spheres";
 
-/// Adds Table 1, the table of storage, and pictures.
+/// Adds Table 1, and pictures.
 ///
 /// # Errors
 /// The device fails.
-pub fn measure(stand: &Stand, lighting: Lighting, report: &mut Report) -> anyhow::Result<()> {
-    let mut storage = storage::table();
-    let mut columns = TABLE_1.to_vec();
-    for views in &SCENES {
-        columns.push(of_scene(stand, views, lighting, (&mut storage, report))?);
-    }
-    let names: Vec<String> = columns.iter().map(|column| column.name.to_owned()).collect();
-    let heads: Vec<(&str, &str)> = [("", "")].into_iter().chain(names.iter().map(|name| (name.as_str(), ""))).collect();
+pub fn measure(stand: &Stand, report: &mut Report) -> anyhow::Result<()> {
+    let measured = measure_rows("Table 1", &SCENES, |views| views.measure(stand, report))?;
+    let columns = [TABLE_1.to_vec(), measured].concat();
+    let heads: Vec<(&str, &str)> = [("", "")].into_iter().chain(columns.iter().map(|of| (of.name, ""))).collect();
     let lines = LightField::LINES;
     let title =
         format!("Table 1 of the paper, beside views of 256×256 from cubes of {SIDE}² and light fields of {lines}²");
@@ -82,67 +81,79 @@ pub fn measure(stand: &Stand, lighting: Lighting, report: &mut Report) -> anyhow
     for (name, value) in ROWS {
         table.push([Cell::from(name)].into_iter().chain(columns.iter().map(value)))?;
     }
-    report.tables.extend([table, storage]);
+    report.tables.push(table);
     Ok(())
 }
 
-fn of_scene(
-    stand: &Stand,
-    views: &Views,
-    lighting: Lighting,
-    (storage, report): (&mut Table, &mut Report),
-) -> anyhow::Result<Column> {
-    let plain = Subject::of_views(stand, views.scene, lighting, |_| (views.cameras)())?;
-    let cubes = Cubes::new(&plain, SIDE)?;
-    let (warped, holes) = cubes.warped()?;
-    let (_, walk_s) = mirrors::walked(&plain, &plain.upload(&cubes.dominant)?.0, 0)?;
-    let subject = Subject::of_views(stand, views.scene, LIGHT.parse()?, |_| (views.cameras)())?;
-    // The first use of a light builds shaders.
-    let cube = subject.cube((SIDE, LayerSelection::Dominant), subject.lighting, 2)?;
-    let (field, field_s) = subject.light_field(views.directions, views.lighting.parse()?)?;
-    let [cube_mb, field_mb] = storage::device_mb(&subject, &cube, &field)?;
-    storage.push(storage::row(views.scene, &cubes.all, &cube, cube_mb)?)?;
-    let light_field = LightField {
-        directions: views.directions.count(),
-        mb: field_mb,
-        samples: Some(field.sample_count()),
-        sent_mb: Some(encode_light_field(&field)?.payload.len() as f64 / MB),
-        construction_s: Some(field_s),
-    };
-    let (set, load_s) = subject.upload_with(&cube, field)?;
-    let (mut view_s, mut shown) = ([None; 3], Vec::new());
-    for (view_s, &followed) in view_s.iter_mut().zip(views.followed) {
-        let (made, seconds) =
-            mirrors::shown(&subject, &set, ReconstructionMethod::Layered { followed }, views.mirrors)?;
-        *view_s = Some(seconds);
-        shown.push(figures::middle(&made)?.clone());
+/// The warp and the walk of a cube in plain light.
+struct Plain {
+    layers: Layers,
+    warp_s: f64,
+    holes: f64,
+    walk_s: f64,
+}
+
+impl Views {
+    fn measure_plain(&self, stand: &Stand) -> anyhow::Result<Plain> {
+        let subject = Subject::of_views(stand, self.scene, Lighting::default(), |_| (self.cameras)())?;
+        let cubes = Cubes::new(&subject, SIDE)?;
+        let (warped, holes) = cubes.warped()?;
+        let set = subject.upload(&cubes.dominant)?.0;
+        let walk = TimedViews::of_cube(&subject, &set, LAYERED, Mirrors::default())?;
+        let layers = storage::six_images(&cubes.all.images);
+        Ok(Plain { layers, warp_s: warped.view_s, holes, walk_s: walk.view_s })
     }
-    let (drawn, direct_s) = mirrors::drawn(&subject, views.lighting.parse()?)?;
-    if views.scene == PICTURED {
-        report.pictures.push(picture_row(views, &shown, figures::middle(&drawn)?)?);
+
+    fn measure(&self, stand: &Stand, report: &mut Report) -> anyhow::Result<Column> {
+        let plain = self.measure_plain(stand)?;
+        let subject = Subject::of_views(stand, self.scene, LIGHT.parse()?, |_| (self.cameras)())?;
+        // The first use of a light builds shaders.
+        let cube = subject.cube(SIDE, LayerSelection::Dominant, subject.lighting, 2)?;
+        let (field, field_s) = subject.light_field(self.directions, self.lighting.parse()?)?;
+        let [cube_mb, field_mb] = storage::device_mb(&subject, &cube, &field)?;
+        let light_field = LightField {
+            directions: self.directions.count(),
+            mb: field_mb,
+            samples: Some(field.sample_count()),
+            sent_mb: Some(encode_light_field(&field)?.payload.len() as f64 / MB),
+            construction_s: Some(field_s),
+        };
+        let (set, load_s) = subject.upload_with(&cube, Some(field))?;
+        let mut view_s = [None; 3];
+        let mut shown = Vec::new();
+        for (view_s, &followed) in view_s.iter_mut().zip(self.followed) {
+            let method = ReconstructionMethod::Layered { followed };
+            let timed = TimedViews::of_cube(&subject, &set, method, self.mirrors)?;
+            *view_s = Some(timed.view_s);
+            shown.push(timed.middle()?.clone());
+        }
+        let direct = TimedViews::drawn(&subject, self.lighting.parse()?)?;
+        if self.scene == PICTURED {
+            report.pictures.push(picture_row(self, &shown, direct.middle()?)?);
+        }
+        Ok(Column {
+            name: self.scene,
+            primitives: subject.scene.triangle_count() as usize,
+            cube_mb,
+            sent_mb: Some(cube.encoded_bytes()? as f64 / MB),
+            layers: plain.layers,
+            light_field,
+            construction_s: cube.sample_s + field_s + load_s,
+            warp_s: plain.warp_s,
+            holes_percent: plain.holes * 100.0,
+            walk_s: Some(plain.walk_s),
+            pass_s: view_s.map(|view_s| view_s.map(|view_s| view_s - plain.walk_s)),
+            view_s,
+            direct_s: direct.view_s,
+        })
     }
-    Ok(Column {
-        name: views.scene,
-        primitives: subject.scene.triangle_count() as usize,
-        cube_mb,
-        sent_mb: Some(cube.encoded_bytes()? as f64 / MB),
-        layers: storage::six_images(&cubes.all.images),
-        light_field,
-        construction_s: cube.sample_s + field_s + load_s,
-        warp_s: warped.view_s,
-        holes_percent: holes * 100.0,
-        walk_s: Some(walk_s),
-        pass_s: view_s.map(|view_s| view_s.map(|view_s| view_s - walk_s)),
-        view_s,
-        direct_s,
-    })
 }
 
 fn picture_row(views: &Views, shown: &[View], drawn: &View) -> anyhow::Result<PictureRow> {
     let gathered = |way: &str| format!("{way} in {} directions", views.directions.count());
     let captions = [gathered("gathered"), gathered("one ray, then gathered"), "seven rays".to_owned()];
     let drawn = ("drawn directly".to_owned(), drawn);
-    figures::row(("6", "A teapot and spheres"), captions.into_iter().zip(shown).chain([drawn]))
+    figures::row(6, "A teapot and spheres", captions.into_iter().zip(shown).chain([drawn]))
 }
 
 /// A row's name and its value in a column.

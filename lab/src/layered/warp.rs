@@ -21,7 +21,9 @@ pub struct Warped {
 /// hole.
 pub fn warp(images: &[LayeredDepthImage], pyramids: &Pyramids<'_>, camera: &PinholeCamera) -> Warped {
     let mut hits = vec![None; camera.pixel_count()];
-    images.iter().enumerate().for_each(|image| project(image, camera, &mut hits));
+    for (number, image) in images.iter().enumerate() {
+        project(number, image, camera, &mut hits);
+    }
     let is_hole: Vec<bool> = (0..hits.len()).map(|pixel| is_hole(&hits, camera, pixel)).collect();
     let repair = |pixel| pyramids.trace(camera.ray(place(camera, pixel).as_vec2() + 0.5), camera.near_m);
     let holes: Vec<usize> = (0..hits.len()).filter(|&pixel| is_hole[pixel]).collect();
@@ -30,7 +32,7 @@ pub fn warp(images: &[LayeredDepthImage], pyramids: &Pyramids<'_>, camera: &Pinh
     Warped { hits, is_hole, loads: repaired.iter().map(|(_, loads)| loads).sum() }
 }
 
-fn project((number, image): (usize, &LayeredDepthImage), camera: &PinholeCamera, hits: &mut [Option<Hit>]) {
+fn project(number: usize, image: &LayeredDepthImage, camera: &PinholeCamera, hits: &mut [Option<Hit>]) {
     let [right, down, forward] = image.camera.axes_in_world();
     let rows = camera.homogeneous_pixel_from_world();
     for line in 0..image.camera.pixel_count() {

@@ -15,9 +15,9 @@ use render::Lighting;
 use scene::SceneSpec;
 
 use super::clients::Wanted;
-use super::processes::Setting;
 use super::{phases, report};
 use crate::cpu_share::Hierarchy;
+use crate::processes::{Setting, Share};
 
 /// Measures four loads, each on a coordinator and node processes of its own. Of views of 320×180, 8 clients
 /// ask for 10 frames a second, 16 for 15, 80 for 10, and 200 for none, unless options say otherwise.
@@ -88,8 +88,10 @@ impl LoadArgs {
     }
 
     fn setting(&self) -> Setting {
-        let scene = ["--scene".to_owned(), self.scene.to_string(), "--lighting".to_owned(), self.lighting.to_string()];
-        Setting { scene: scene.into(), device: self.device, nodes: self.nodes.into(), share_cores: self.share_cores() }
+        let coordinator =
+            ["--scene".to_owned(), self.scene.to_string(), "--lighting".to_owned(), self.lighting.to_string()];
+        let share = self.share_cores().map_or(Share::Whole, Share::Cores);
+        Setting { coordinator: coordinator.into(), device: self.device, nodes: self.nodes.into(), share }
     }
 
     fn share_cores(&self) -> Option<f64> {

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use indicatif::ProgressBar;
 
 use super::clients::{Clients, Outcome, Tour, Wanted, follow};
-use super::processes::{Processes, Setting};
 use crate::memory::memory_mib;
+use crate::processes::{Processes, Setting};
 
 /// The number of idle clients.
 const IDLE: usize = 200;

@@ -2,12 +2,10 @@
 
 use std::sync::Arc;
 
-use app_core::progress::bar;
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use render::{DrawWork, Lighting, Refinement, SamplePlanes, Visibility};
-use report::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 use sampling::{Redundancy, SampleWork, Sampler, SamplingMethod};
 use scene::{Mesh, MeshPart, Scene, Vertex, procedural};
 
@@ -15,26 +13,7 @@ const SIDE_PX: u32 = 64;
 const DISTANCE_M: f32 = 4.0;
 /// The distance of the two viewpoints.
 const BASELINE_M: f32 = 0.37;
-const LEGS_PX: [f32; 9] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 64.0];
 const TESTS: [Redundancy; 3] = [Redundancy::Pixel, Redundancy::Visibility, Redundancy::Tolerance];
-/// Detection by triangle ids, measured by a prototype (legs in pixels, probability).
-const EXPECTED: [(f32, f64); 5] = [(0.5, 0.13), (1.0, 0.375), (2.0, 0.63), (4.0, 0.81), (16.0, 0.95)];
-
-/// The share that each test finds, for each length of legs.
-pub type Detection = Vec<(f32, [f64; 3])>;
-
-/// Measures all lengths.
-pub fn detection(engine: &Arc<GpuEngine>, quick: bool) -> anyhow::Result<Detection> {
-    let legs = if quick { &LEGS_PX[2..] } else { &LEGS_PX[..] };
-    let progress = bar("detection against triangle size", legs.len());
-    let mut rows = Vec::with_capacity(legs.len());
-    for &leg_px in legs {
-        rows.push((leg_px, found_redundant(engine, leg_px)?));
-        progress.inc(1);
-    }
-    progress.finish_and_clear();
-    Ok(rows)
-}
 
 /// The shares of redundant samples that the tests by pixel, visibility and tolerance find on a wall of triangles with
 /// legs of this length.
@@ -112,35 +91,4 @@ fn wall(leg_px: f32) -> Scene {
     let parts = vec![MeshPart { first_index: 0, index_count: indices.len() as u32, material: 0 }];
     scene.meshes = vec![Mesh { vertices, indices, parts, ..Mesh::default() }];
     scene
-}
-
-/// Adds a table, a chart and checks.
-pub fn detection_report(rows: &Detection, report: &mut Report) -> anyhow::Result<()> {
-    let columns = [("leg", "px"), ("pixel", ""), ("visibility", ""), ("tolerance", ""), ("pixel, expected", "")];
-    let mut table = Table::new("Redundant samples that are found", &columns);
-    for (leg_px, found) in rows {
-        let expected = EXPECTED.iter().find(|(leg, _)| leg == leg_px).map_or(f64::NAN, |(_, share)| *share);
-        let cells = found.iter().copied().chain([expected]).map(Cell::from);
-        table.push([f64::from(*leg_px).into()].into_iter().chain(cells))?;
-    }
-    report.tables.push(table);
-    let axes = (Axis::log("leg of triangles", "px"), Axis::linear("found", ""));
-    let chart = TESTS.iter().enumerate().fold(
-        XyChart::new("Detection against triangle size", axes.0, axes.1),
-        |chart, (place, test)| {
-            let points = rows.iter().map(|(leg, found)| (f64::from(*leg), found[place]));
-            chart.with(Series::line(SamplingMethod::NonRedundant(*test).to_string(), points))
-        },
-    );
-    report.charts.push(chart.into());
-    let rises = rows.windows(2).all(|pair| pair[0].1[0] <= pair[1].1[0] + 0.03);
-    let least = rows.iter().map(|(_, found)| found[2]).fold(f64::INFINITY, f64::min);
-    report.checks.push(Check::new(
-        "pixel finds more the larger triangles are",
-        f64::from(rises),
-        "",
-        Bar::AtLeast(1.0),
-    ));
-    report.checks.push(Check::new("tolerance finds at every size", least, "", Bar::AtLeast(0.95)));
-    Ok(())
 }

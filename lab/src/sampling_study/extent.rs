@@ -9,6 +9,8 @@ pub struct Extent {
     pub views: usize,
     /// The number of samples an image whose visibility is traced.
     pub seeds: usize,
+    /// The number of sides of images in Fig. 7.
+    pub sides: usize,
 }
 
 impl Extent {
@@ -16,9 +18,9 @@ impl Extent {
     #[must_use]
     pub fn of(quick: bool) -> Self {
         if quick {
-            Self { side_px: 256, views: 64, seeds: 512 }
+            Self { side_px: 256, views: 64, seeds: 512, sides: 2 }
         } else {
-            Self { side_px: 1024, views: 1000, seeds: 4096 }
+            Self { side_px: 1024, views: 1000, seeds: 4096, sides: 4 }
         }
     }
 }

@@ -1,7 +1,6 @@
 //! Sampling methods compared: the metrics of Xie §6.1.2 on the kinds of scene that the paper has.
 
 mod availability;
-mod checks;
 pub mod command;
 mod counts;
 mod detection;
@@ -10,7 +9,6 @@ mod held;
 mod methods;
 mod paper;
 mod pictures;
-mod reconstructions;
 mod scene;
 mod sizes;
 mod subject;
@@ -19,6 +17,3 @@ mod times;
 mod visibility;
 
 pub(crate) use detection::found_redundant;
-pub use extent::Extent;
-pub use subject::{SCENES, Subject};
-pub use times::{times, times_report};

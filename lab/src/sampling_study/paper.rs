@@ -1,6 +1,5 @@
 //! Figures of the paper, Tables 1 and 2.
 
-use report::Cell;
 use sampling::SamplingMethod;
 
 /// Xie, Table 1, in the order of [`super::SCENES`].
@@ -42,27 +41,44 @@ struct PaperRow {
     peeled: [[f64; 2]; 3],
 }
 
-/// The paper's redundant, disoccluded and useful samples of an image, in per cent.
-pub(super) fn paper(scene: &str, method: SamplingMethod, image: usize) -> [Cell; 3] {
-    let nothing = || Cell::from(f64::NAN);
+/// The paper's figures of an image, in per cent; `None` where it has none.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PaperImage {
+    pub redundant: Option<f64>,
+    pub disoccluded: Option<f64>,
+    pub useful: Option<f64>,
+}
+
+/// The paper's redundant, disoccluded and useful samples of an image.
+pub(super) fn paper_image(scene: &str, method: SamplingMethod, image: usize) -> PaperImage {
     let Some(PaperRow { redundant, apart, peeled, .. }) = PAPER.iter().find(|row| row.scene == scene) else {
-        return [nothing(), nothing(), nothing()];
+        return PaperImage::default();
     };
-    let pair = |pair: Option<&[f64; 2]>| pair.map_or([f64::NAN; 2], |pair| *pair);
-    let [disoccluded, useful] = match method {
-        SamplingMethod::Conventional(_) => [0.0, f64::NAN],
-        SamplingMethod::DepthPeeling { .. } => pair(peeled.get(image)),
-        _ => pair(image.checked_sub(1).and_then(|i| apart.get(i))),
+    let later = image.checked_sub(1);
+    let pair = match method {
+        SamplingMethod::Conventional(_) => {
+            let redundant = later.map_or(Some(0.0), |later| redundant.get(later).copied());
+            return PaperImage { redundant, disoccluded: Some(0.0), useful: None };
+        }
+        SamplingMethod::DepthPeeling { .. } => peeled.get(image),
+        _ => later.and_then(|later| apart.get(later)),
     };
-    let redundant = match (method, image) {
-        (SamplingMethod::Conventional(_), 1..) => redundant.get(image - 1).copied().unwrap_or(f64::NAN),
-        _ => 0.0,
+    PaperImage { redundant: Some(0.0), disoccluded: pair.map(|pair| pair[0]), useful: pair.map(|pair| pair[1]) }
+}
+
+/// The paper's average and least availability of a set.
+pub(super) fn paper_available(scene: &str, method: SamplingMethod) -> [Option<f64>; 2] {
+    let kind = match method {
+        SamplingMethod::Conventional(_) => 0,
+        SamplingMethod::DepthPeeling { .. } => 2,
+        _ => 1,
     };
-    [redundant, disoccluded, useful].map(Cell::from)
+    let figures = PAPER_AVAILABLE.iter().find(|(name, _)| *name == scene).map(|(_, figures)| figures[kind]);
+    [0, 1].map(|place| figures.map(|figures| figures[place]))
 }
 
 /// Xie, Table 2: average and least of conventional, non-redundant and peeled images.
-pub(super) const PAPER_AVAILABLE: [(&str, [[f64; 2]; 3]); 4] = [
+const PAPER_AVAILABLE: [(&str, [[f64; 2]; 3]); 4] = [
     ("bird-nest", [[90.0, 89.0], [93.0, 92.0], [92.0, 89.0]]),
     ("grass", [[86.0, 81.0], [96.0, 91.0], [93.0, 88.0]]),
     ("urban", [[97.0, 96.0], [98.0, 97.0], [96.0, 91.0]]),

@@ -25,48 +25,39 @@ pub struct SceneRow {
     pub(super) available: Vec<Availability>,
 }
 
-/// Measures a scene, and adds its false colours.
-pub fn scene_report(subject: &Subject, extent: Extent, report: &mut Report) -> anyhow::Result<SceneRow> {
-    let size_px = UVec2::splat(extent.side_px);
-    let sets =
-        METHODS.iter().map(|&method| subject.sample(method, size_px, WITH_IDS)).collect::<Result<Vec<_>, _>>()?;
-    let mut counts = image_counts(&sets);
-    let held: Vec<Vec<Held<'_>>> = sets.iter().map(|set| set.iter().filter_map(Held::of).collect()).collect();
-    let mut available = vec![Availability::default(); METHODS.len()];
-    let views = subject.between(extent.views, FRAME_PX);
-    let progress = bar(format!("{}: frames", subject.name), views.len());
-    subject.each_frame(&views, |frames| {
-        for frame in frames {
-            if let Some(frame) = Held::of(frame) {
-                mark_useful(&mut counts, &frame);
-            }
-            available.iter_mut().zip(&held).for_each(|(available, set)| available.add(frame, set));
-        }
-        progress.inc(frames.len() as u64);
-        Ok(())
-    })?;
-    progress.finish_and_clear();
-    let rays = render::scalar::rays::Scene::of(&subject.scene, 0.0)?;
-    let viewpoints = subject.cameras(SamplingMethod::CONVENTIONAL, size_px);
-    let seen = METHODS
-        .iter()
-        .zip(&sets)
-        .map(|(&method, set)| seen(&rays, method, set, &viewpoints, &views, extent.seeds))
-        .collect();
-    report.pictures.push(pictures::false_colors(&subject.name, &sets, &counts));
-    Ok(SceneRow { name: subject.name.clone(), counts, seen, available })
-}
-
 impl SceneRow {
-    pub(super) fn of<'a, T>(&self, rows: &'a [T], method: SamplingMethod) -> Option<&'a T> {
-        METHODS.iter().position(|&other| other == method).and_then(|place| rows.get(place))
-    }
-
-    pub(super) fn useful(&self, method: SamplingMethod) -> usize {
-        self.of(&self.counts, method).map_or(0, |images| images.iter().map(ImageCount::useful_count).sum())
-    }
-
-    pub(super) fn availability(&self, method: SamplingMethod) -> Availability {
-        self.of(&self.available, method).copied().unwrap_or_default()
+    /// Measures a scene, and adds its false colours.
+    ///
+    /// # Errors
+    /// The device fails.
+    pub fn measure(subject: &Subject, extent: Extent, report: &mut Report) -> anyhow::Result<Self> {
+        let size_px = UVec2::splat(extent.side_px);
+        let sets =
+            METHODS.iter().map(|&method| subject.sample(method, size_px, WITH_IDS)).collect::<Result<Vec<_>, _>>()?;
+        let mut counts = image_counts(&sets);
+        let held: Vec<Vec<Held<'_>>> = sets.iter().map(|set| set.iter().filter_map(Held::of).collect()).collect();
+        let mut available = vec![Availability::default(); METHODS.len()];
+        let views = subject.between(extent.views, FRAME_PX);
+        let progress = bar(format!("{}: frames", subject.name), views.len());
+        subject.each_frame(&views, |frames| {
+            for frame in frames {
+                if let Some(frame) = Held::of(frame) {
+                    mark_useful(&mut counts, &frame);
+                }
+                available.iter_mut().zip(&held).for_each(|(available, set)| available.add(frame, set));
+            }
+            progress.inc(frames.len() as u64);
+            Ok(())
+        })?;
+        progress.finish_and_clear();
+        let rays = render::scalar::rays::Scene::of(&subject.scene, 0.0)?;
+        let viewpoints = subject.cameras(SamplingMethod::CONVENTIONAL, size_px);
+        let seen = METHODS
+            .iter()
+            .zip(&sets)
+            .map(|(&method, set)| seen(&rays, method, set, &viewpoints, &views, extent.seeds))
+            .collect();
+        report.pictures.push(pictures::false_colors(&subject.name, &sets, &counts));
+        Ok(Self { name: subject.name.clone(), counts, seen, available })
     }
 }

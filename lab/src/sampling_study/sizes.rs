@@ -1,8 +1,7 @@
 //! Fig. 7: redundancy by pixel approaches redundancy by visibility as images grow.
 
-use app_core::progress::bar;
 use glam::UVec2;
-use report::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
+use report::{Axis, Bar, Check, Report, Series, XyChart};
 use sampling::{Redundancy, SamplingMethod};
 
 use super::counts::{ImageCount, image_counts, mark_useful, percent};
@@ -10,7 +9,8 @@ use super::extent::Extent;
 use super::held::Held;
 use super::methods::{IMAGES, METHODS};
 use super::subject::{Subject, WITH_IDS};
-use super::visibility::seen;
+use super::visibility::{Seen, seen};
+use crate::study::{Column, measure_rows, table};
 
 const SIDES_PX: [u32; 4] = [256, 512, 1024, 2048];
 /// The scenes of the paper's figure.
@@ -28,87 +28,102 @@ pub struct SizeRow {
     useful: [f64; 2],
 }
 
-/// The name of a metric, and its values by pixel and by visibility.
+const COLUMNS: [Column<SizeRow>; 7] = [
+    Column::with_unit("side", "px", |row| row.side_px.into()),
+    Column::with_unit("redundant by pixel", "%", |row| row.redundant[0].into()),
+    Column::with_unit("redundant by visibility", "%", |row| row.redundant[1].into()),
+    Column::with_unit("disoccluded by pixel", "%", |row| row.disoccluded[0].into()),
+    Column::with_unit("disoccluded by visibility", "%", |row| row.disoccluded[1].into()),
+    Column::with_unit("useful, of these, by pixel", "%", |row| row.useful[0].into()),
+    Column::with_unit("by visibility", "%", |row| row.useful[1].into()),
+];
+
+/// A metric by pixel and by visibility.
 type Metric = (&'static str, fn(&SizeRow) -> [f64; 2]);
 
+const METRICS: [Metric; 3] =
+    [("redundant", |row| row.redundant), ("disoccluded", |row| row.disoccluded), ("useful", |row| row.useful)];
+
 /// Measures a scene if the paper shows it.
-pub fn sizes(subject: &Subject, extent: Extent, quick: bool) -> anyhow::Result<Vec<SizeRow>> {
+///
+/// # Errors
+/// The device fails.
+pub fn sizes(subject: &Subject, extent: Extent) -> anyhow::Result<Vec<SizeRow>> {
     if !SCENES.contains(&subject.name.as_str()) {
         return Ok(Vec::new());
     }
-    let sides = if quick { &SIDES_PX[..2] } else { &SIDES_PX[..] };
     let rays = render::scalar::rays::Scene::of(&subject.scene, 0.0)?;
-    let progress = bar(format!("{}: sizes of images", subject.name), sides.len());
-    let mut rows = Vec::with_capacity(sides.len());
-    for &side_px in sides {
+    let sides = &SIDES_PX[..extent.sides];
+    measure_rows(&format!("{}: sizes of images", subject.name), sides, |&side_px| {
+        SizeRow::measure(subject, &rays, side_px, extent.seeds)
+    })
+}
+
+impl SizeRow {
+    fn measure(
+        subject: &Subject,
+        rays: &render::scalar::rays::Scene,
+        side_px: u32,
+        seeds: usize,
+    ) -> anyhow::Result<Self> {
         let size_px = UVec2::splat(side_px);
         let viewpoints = subject.cameras(SamplingMethod::CONVENTIONAL, size_px);
-        let methods = [METHODS[0], METHODS[1], SamplingMethod::NonRedundant(Redundancy::Visibility)];
-        let take = |method| subject.sample(method, size_px, WITH_IDS);
-        let [whole, apart, by_rays] = [take(methods[0])?, take(methods[1])?, take(methods[2])?];
         let views = subject.between(VIEWS, size_px);
-        let redundant = seen(&rays, methods[0], &whole, &viewpoints, &[], extent.seeds);
-        let disoccluded = seen(&rays, methods[2], &by_rays, &viewpoints, &views, extent.seeds);
-        let mut counts = image_counts(&[whole, apart]);
+        let by_rays = SamplingMethod::NonRedundant(Redundancy::Visibility);
+        let whole = subject.sample(METHODS[0], size_px, WITH_IDS)?;
+        let redundant = seen(rays, METHODS[0], &whole, &viewpoints, &[], seeds);
+        let visible = subject.sample(by_rays, size_px, WITH_IDS)?;
+        let disoccluded = seen(rays, by_rays, &visible, &viewpoints, &views, seeds);
+        let mut counts = image_counts(&[whole, subject.sample(METHODS[1], size_px, WITH_IDS)?]);
         subject.each_frame(&views, |frames| {
             frames.iter().filter_map(Held::of).for_each(|frame| mark_useful(&mut counts, &frame));
             Ok(())
         })?;
-        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / (IMAGES - 1) as f64;
-        rows.push(SizeRow {
+        let counted = |place: usize, share: fn(&ImageCount) -> f64| mean_of_later(&counts[place], share);
+        let traced = |images: &[Seen], share: fn(&Seen) -> f64| 100.0 * mean_of_later(images, share);
+        Ok(Self {
             side_px,
             redundant: [
-                mean(&mut counts[0][1..].iter().map(|c| percent(c.redundant, c.samples))),
-                mean(&mut redundant[1..].iter().map(|seen| 100.0 * seen.redundant.share)),
+                counted(0, |image| percent(image.redundant, image.samples)),
+                traced(&redundant, |image| image.redundant.share),
             ],
             disoccluded: [
-                mean(&mut counts[1][1..].iter().map(|c| percent(c.disoccluded.len(), c.samples))),
-                mean(&mut disoccluded[1..].iter().map(|seen| 100.0 * seen.disoccluded.share)),
+                counted(1, |image| percent(image.disoccluded.len(), image.samples)),
+                traced(&disoccluded, |image| image.disoccluded.share),
             ],
             useful: [
-                mean(&mut counts[1][1..].iter().map(|c: &ImageCount| percent(c.useful_count(), c.disoccluded.len()))),
-                mean(&mut disoccluded[1..].iter().map(|seen| 100.0 * seen.useful.share)),
+                counted(1, |image| percent(image.useful_count(), image.disoccluded.len())),
+                traced(&disoccluded, |image| image.useful.share),
             ],
-        });
-        progress.inc(1);
+        })
     }
-    progress.finish_and_clear();
-    Ok(rows)
+}
+
+/// The mean over all images but the first.
+fn mean_of_later<T>(images: &[T], value: fn(&T) -> f64) -> f64 {
+    images[1..].iter().map(value).sum::<f64>() / (IMAGES - 1) as f64
 }
 
 /// Adds a table, charts and checks of one scene.
+///
+/// # Errors
+/// A row does not fit its table.
 pub fn sizes_report(scene: &str, rows: &[SizeRow], report: &mut Report) -> anyhow::Result<()> {
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(()) };
-    let columns = [
-        ("side", "px"),
-        ("redundant by pixel", "%"),
-        ("redundant by visibility", "%"),
-        ("disoccluded by pixel", "%"),
-        ("disoccluded by visibility", "%"),
-        ("useful, of these, by pixel", "%"),
-        ("by visibility", "%"),
-    ];
-    let mut table = Table::new(format!("Fig. 7, {scene}"), &columns);
-    for row in rows {
-        let cells = row.redundant.into_iter().chain(row.disoccluded).chain(row.useful).map(Cell::from);
-        table.push([row.side_px.into()].into_iter().chain(cells))?;
-    }
-    report.tables.push(table);
-    let redundant: Metric = ("redundant", |row| row.redundant);
-    let disoccluded: Metric = ("disoccluded", |row| row.disoccluded);
-    let useful: Metric = ("useful", |row| row.useful);
-    for (what, of) in [redundant, disoccluded, useful] {
-        let axes = (Axis::log("side of images", "px"), Axis::linear(what, "%"));
+    report.tables.push(table(format!("Fig. 7, {scene}"), &COLUMNS, rows)?);
+    for (what, of) in METRICS {
+        let chart = XyChart::new(
+            format!("Fig. 7, {scene}: {what} samples"),
+            Axis::log("side of images", "px"),
+            Axis::linear(what, "%"),
+        );
         let line = |name: &str, place: usize| {
             Series::line(name, rows.iter().map(move |row| (f64::from(row.side_px), of(row)[place])))
         };
-        let chart = XyChart::new(format!("Fig. 7, {scene}: {what} samples"), axes.0, axes.1);
         report.charts.push(chart.with(line("by pixel", 0)).with(line("by visibility", 1)).into());
         let gap = |row: &SizeRow| (of(row)[0] - of(row)[1]).abs();
-        let name = format!(
-            "{scene}: {what} by pixel and by visibility, gap at {} px over that at {} px",
-            last.side_px, first.side_px
-        );
+        let sides = format!("gap at {} px over that at {} px", last.side_px, first.side_px);
+        let name = format!("{scene}: {what} by pixel and by visibility, {sides}");
         report.checks.push(Check::new(name, gap(last) / gap(first), "×", Bar::AtMost(0.75)));
     }
     Ok(())

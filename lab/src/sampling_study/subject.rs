@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use app_core::setup::{SceneArgs, Setup};
+use app_core::setup::SceneArgs;
 use depth_image::{Antialias, Camera, DepthImage, PinholeCamera};
 use engine::GpuEngine;
 use glam::{UVec2, Vec2, Vec3};
@@ -27,10 +27,6 @@ const FRAMES_AT_ONCE: usize = 4;
 pub struct Subject {
     /// The name of the scene.
     pub name: String,
-    /// The scene on offer.
-    pub setup: Setup,
-    /// Arguments of the scene, all by default.
-    pub args: SceneArgs,
     rig: Rig,
     pub(super) engine: Arc<GpuEngine>,
     pub(super) scene: Arc<GpuScene>,
@@ -67,7 +63,7 @@ impl Subject {
         let rig = raised(&Rig::in_front_of(&setup.scene.bounds(), SPREAD_RAD).with_context(|| name.to_owned())?);
         let (scene, engine) = (engine.scene(&hash)?, engine.clone());
         let sampler = Sampler::sharing(engine.renderer.clone());
-        Ok(Self { name: name.to_owned(), setup, args, rig, engine, scene, sampler })
+        Ok(Self { name: name.to_owned(), rig, engine, scene, sampler })
     }
 
     /// The sample cameras of a method.

@@ -1,103 +1,127 @@
 //! Table 1 and Table 2 of the paper, its figures beside ours.
 
-use report::{Cell, Report, Table};
-use sampling::SamplingMethod;
+use report::{Bar, Cell, Check, Report};
+use sampling::{Redundancy, SamplingMethod};
 
-use super::checks::{checks, missing_ratio};
-use super::counts::percent;
-use super::methods::METHODS;
-use super::paper::{PAPER_AVAILABLE, paper};
+use super::availability::Availability;
+use super::counts::{ImageCount, percent};
+use super::methods::{IMAGES, METHODS};
+use super::paper::{PaperImage, paper_available, paper_image};
 use super::scene::SceneRow;
+use super::visibility::{Estimate, Seen};
+use crate::study::{Column, table};
 
-/// Adds tables and checks of all scenes.
-pub fn tables(rows: &[SceneRow], report: &mut Report) -> anyhow::Result<()> {
-    report.tables.push(by_pixel(rows)?);
-    report.tables.push(by_visibility(rows)?);
-    report.tables.push(availabilities(rows)?);
-    report.checks.extend(rows.iter().flat_map(checks));
-    report.checks.push(missing_ratio(rows));
+const PIXEL: SamplingMethod = SamplingMethod::NonRedundant(Redundancy::Pixel);
+const VISIBILITY: SamplingMethod = SamplingMethod::NonRedundant(Redundancy::Visibility);
+const PEELING: SamplingMethod = SamplingMethod::DepthPeeling { layers: IMAGES as u32 };
+
+/// An image of a set.
+struct ImageRow<'s> {
+    scene: &'s str,
+    method: SamplingMethod,
+    number: usize,
+    count: &'s ImageCount,
+    seen: Seen,
+    paper: PaperImage,
+}
+
+/// A set in the output frames.
+struct SetRow<'s> {
+    scene: &'s str,
+    method: SamplingMethod,
+    available: Availability,
+    /// The paper's average and least.
+    paper: [Option<f64>; 2],
+}
+
+fn image_columns<'s>() -> [Column<ImageRow<'s>>; 10] {
+    [
+        Column::new("scene", |row| row.scene.into()),
+        Column::new("sampling", |row| row.method.to_string().into()),
+        Column::new("image", |row| row.number.into()),
+        Column::new("samples", |row| row.count.samples.into()),
+        Column::with_unit("redundant", "%", |row| percent(row.count.redundant, row.count.samples).into()),
+        Column::with_unit("disoccluded", "%", |row| percent(row.count.disoccluded.len(), row.count.samples).into()),
+        Column::with_unit("useful, of these", "%", |row| {
+            percent(row.count.useful_count(), row.count.disoccluded.len()).into()
+        }),
+        Column::with_unit("paper: redundant", "%", |row| row.paper.redundant.into()),
+        Column::with_unit("paper: disoccluded", "%", |row| row.paper.disoccluded.into()),
+        Column::with_unit("paper: useful", "%", |row| row.paper.useful.into()),
+    ]
+}
+
+fn seen_columns<'s>() -> [Column<ImageRow<'s>>; 6] {
+    [
+        Column::new("scene", |row| row.scene.into()),
+        Column::new("sampling", |row| row.method.to_string().into()),
+        Column::new("image", |row| row.number.into()),
+        Column::with_unit("redundant", "%", |row| with_interval(row.seen.redundant)),
+        Column::with_unit("disoccluded", "%", |row| with_interval(row.seen.disoccluded)),
+        Column::with_unit("useful, of these", "%", |row| with_interval(row.seen.useful)),
+    ]
+}
+
+fn set_columns<'s>() -> [Column<SetRow<'s>>; 6] {
+    [
+        Column::new("scene", |row| row.scene.into()),
+        Column::new("sampling", |row| row.method.to_string().into()),
+        Column::with_unit("available, average", "%", |row| row.available.mean().into()),
+        Column::with_unit("available, least", "%", |row| row.available.least().into()),
+        Column::with_unit("paper: average", "%", |row| row.paper[0].into()),
+        Column::with_unit("paper: least", "%", |row| row.paper[1].into()),
+    ]
+}
+
+/// A share and its 95 % interval, in per cent.
+fn with_interval(estimate: Estimate) -> Cell {
+    let Estimate { share, half_width } = estimate;
+    if share.is_nan() { Cell::Missing } else { format!("{:.1} ± {:.1}", 100.0 * share, 100.0 * half_width).into() }
+}
+
+/// Adds the tables of all scenes, and checks that no sample is redundant by the test of its method.
+///
+/// # Errors
+/// A row does not fit its table.
+pub fn tables(scenes: &[SceneRow], report: &mut Report) -> anyhow::Result<()> {
+    let images: Vec<ImageRow<'_>> = scenes.iter().flat_map(image_rows).collect();
+    let sets: Vec<SetRow<'_>> = scenes.iter().flat_map(set_rows).collect();
+    report.tables.push(table("Table 1, by pixel", &image_columns(), &images)?);
+    report.tables.push(table("Table 1, by visibility (95 % intervals)", &seen_columns(), &images)?);
+    report.tables.push(table("Table 2", &set_columns(), &sets)?);
+    report.checks.extend(scenes.iter().flat_map(|scene| checks(scene.name.as_str(), &image_rows(scene))));
     Ok(())
 }
 
-fn by_pixel(rows: &[SceneRow]) -> anyhow::Result<Table> {
-    let columns = [
-        ("scene", ""),
-        ("sampling", ""),
-        ("image", ""),
-        ("samples", ""),
-        ("redundant", "%"),
-        ("disoccluded", "%"),
-        ("useful, of these", "%"),
-        ("paper: redundant", "%"),
-        ("paper: disoccluded", "%"),
-        ("paper: useful", "%"),
-    ];
-    let mut table = Table::new("Table 1, by pixel", &columns);
-    for row in rows {
-        for (method, images) in METHODS.iter().zip(&row.counts) {
-            for (number, image) in images.iter().enumerate() {
-                let ours = [
-                    percent(image.redundant, image.samples),
-                    percent(image.disoccluded.len(), image.samples),
-                    percent(image.useful_count(), image.disoccluded.len()),
-                ];
-                let head = [row.name.clone().into(), method.to_string().into(), number.into(), image.samples.into()];
-                table.push(head.into_iter().chain(ours.map(Cell::from)).chain(paper(&row.name, *method, number)))?;
-            }
-        }
-    }
-    Ok(table)
+fn image_rows(scene: &SceneRow) -> Vec<ImageRow<'_>> {
+    let of_method = |(place, &method): (usize, &SamplingMethod)| {
+        let images = scene.counts[place].iter().zip(&scene.seen[place]).enumerate();
+        images.map(move |(number, (count, &seen))| {
+            let paper = paper_image(&scene.name, method, number);
+            ImageRow { scene: scene.name.as_str(), method, number, count, seen, paper }
+        })
+    };
+    METHODS.iter().enumerate().flat_map(of_method).collect()
 }
 
-fn by_visibility(rows: &[SceneRow]) -> anyhow::Result<Table> {
-    let columns = [
-        ("scene", ""),
-        ("sampling", ""),
-        ("image", ""),
-        ("redundant", "%"),
-        ("± 95 %, redundant", "%"),
-        ("disoccluded", "%"),
-        ("± 95 %, disoccluded", "%"),
-        ("useful, of these", "%"),
-        ("± 95 %, useful", "%"),
-    ];
-    let mut table = Table::new("Table 1, by visibility", &columns);
-    for row in rows {
-        for (method, images) in METHODS.iter().zip(&row.seen) {
-            for (number, image) in images.iter().enumerate() {
-                let estimates = [image.redundant, image.disoccluded, image.useful];
-                let cells = estimates.into_iter().flat_map(|e| [100.0 * e.share, 100.0 * e.half_width].map(Cell::from));
-                let head = [row.name.clone().into(), method.to_string().into(), number.into()];
-                table.push(head.into_iter().chain(cells))?;
-            }
-        }
-    }
-    Ok(table)
+fn set_rows(scene: &SceneRow) -> Vec<SetRow<'_>> {
+    let row = |(&method, &available): (&SamplingMethod, &Availability)| {
+        let paper = paper_available(&scene.name, method);
+        SetRow { scene: scene.name.as_str(), method, available, paper }
+    };
+    METHODS.iter().zip(&scene.available).map(row).collect()
 }
 
-fn availabilities(rows: &[SceneRow]) -> anyhow::Result<Table> {
-    let columns = [
-        ("scene", ""),
-        ("sampling", ""),
-        ("available, average", "%"),
-        ("available, least", "%"),
-        ("paper: average", "%"),
-        ("paper: least", "%"),
-    ];
-    let mut table = Table::new("Table 2", &columns);
-    for row in rows {
-        let paper = PAPER_AVAILABLE.iter().find(|(name, _)| *name == row.name).map(|(_, figures)| figures);
-        for (method, available) in METHODS.iter().zip(&row.available) {
-            let kind = match method {
-                SamplingMethod::Conventional(_) => 0,
-                SamplingMethod::DepthPeeling { .. } => 2,
-                _ => 1,
-            };
-            let figures = paper.map_or([f64::NAN; 2], |figures| figures[kind]);
-            let ours = [available.mean(), available.least()];
-            let head = [row.name.clone().into(), method.to_string().into()];
-            table.push(head.into_iter().chain(ours.into_iter().chain(figures).map(Cell::from)))?;
-        }
-    }
-    Ok(table)
+fn checks(scene: &str, images: &[ImageRow<'_>]) -> [Check; 3] {
+    let of = |method| images.iter().filter(move |image| image.method == method);
+    let redundant = |method| {
+        let redundant: usize = of(method).map(|image| image.count.redundant).sum();
+        let samples: usize = of(method).map(|image| image.count.samples).sum();
+        let name = format!("{scene}: redundant samples of {method}");
+        Check::new(name, percent(redundant, samples), "%", Bar::AtMost(0.01))
+    };
+    let least = |seen: Estimate| 100.0 * (seen.share - seen.half_width);
+    let by_rays = of(VISIBILITY).map(|image| least(image.seen.redundant)).fold(0.0, f64::max);
+    let name = format!("{scene}: redundant samples of {VISIBILITY}, by visibility, lower bound");
+    [redundant(PIXEL), redundant(PEELING), Check::new(name, by_rays, "%", Bar::AtMost(0.1))]
 }

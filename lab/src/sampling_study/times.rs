@@ -6,38 +6,57 @@ use codec::{PlaneSet, encode_depth_image};
 use depth_image::DepthImage;
 use glam::UVec2;
 use render::SamplePlanes;
-use report::{Bar, Cell, Check, Report, Table};
-use sampling::{SamplingMethod, scalar};
+use report::Report;
+use sampling::SamplingMethod;
 
 use super::extent::Extent;
 use super::methods::{IMAGES, METHODS};
 use super::subject::Subject;
 use crate::statistics::median;
+use crate::study::{Column, table};
 
 const RUNS: usize = 3;
 /// Milliseconds after which a measurement is not repeated.
 const ENOUGH_MS: f64 = 2000.0;
-/// The side of the images whose rays are counted.
-const COUNTED_PX: u32 = 96;
 
 /// Costs of one method on one scene.
 #[derive(Debug, Clone, Copy)]
 pub struct Times {
     /// Milliseconds of a set.
-    pub set_ms: f64,
-    /// Milliseconds of the depths at texel corners, of a set.
-    pub corners_ms: f64,
+    set_ms: f64,
     /// Bytes of depth and colour of a set, packed.
-    pub bytes: usize,
-    /// Bytes of depths at corners and of normals, packed.
-    pub corner_bytes: usize,
+    bytes: usize,
     /// The number of samples; holes do not count.
-    pub samples: usize,
-    /// Rays a pixel of later images, where a test traces rays.
-    pub rays_a_pixel: f64,
+    samples: usize,
 }
 
-/// Measures all methods.
+/// Costs beside those of conventional sampling.
+struct TimesRow {
+    scene: String,
+    method: SamplingMethod,
+    times: Times,
+    conventional: Times,
+}
+
+const COLUMNS: [Column<TimesRow>; 7] = [
+    Column::new("scene", |row| row.scene.as_str().into()),
+    Column::new("sampling", |row| row.method.to_string().into()),
+    Column::with_unit("a set", "ms", |row| row.times.set_ms.into()),
+    Column::with_unit("a later image over a conventional one", "×", |row| row.later_image_ratio().into()),
+    Column::with_unit("depth and colour", "kB", |row| (row.times.bytes as f64 / 1e3).into()),
+    Column::new("samples", |row| row.times.samples.into()),
+    Column::new("bits a sample", |row| (8.0 * row.times.bytes as f64 / row.times.samples as f64).into()),
+];
+
+impl TimesRow {
+    /// The first image of each set is conventional.
+    fn later_image_ratio(&self) -> f64 {
+        let image_ms = self.conventional.set_ms / IMAGES as f64;
+        (self.times.set_ms - image_ms) / (IMAGES - 1) as f64 / image_ms
+    }
+}
+
+/// Measures all methods, in the order of [`METHODS`].
 ///
 /// # Errors
 /// The device fails.
@@ -46,114 +65,39 @@ pub fn times(subject: &Subject, extent: Extent) -> anyhow::Result<Vec<Times>> {
 }
 
 fn of_method(subject: &Subject, method: SamplingMethod, size_px: UVec2) -> anyhow::Result<Times> {
-    let hybrid = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
-    let mut ms = [Vec::new(), Vec::new()];
-    for (ms, planes) in ms.iter_mut().zip([SamplePlanes::default(), hybrid]) {
-        // The first run builds pipelines, and chooses between rays and triangles.
+    let planes = SamplePlanes::default();
+    // The first run builds pipelines, and chooses between rays and triangles.
+    let images = subject.sample(method, size_px, planes)?;
+    let mut ms = Vec::new();
+    while ms.len() < RUNS && ms.iter().sum::<f64>() < ENOUGH_MS {
+        let start = Instant::now();
         subject.sample(method, size_px, planes)?;
-        while ms.len() < RUNS && ms.iter().sum::<f64>() < ENOUGH_MS {
-            let start = Instant::now();
-            subject.sample(method, size_px, planes)?;
-            ms.push(start.elapsed().as_secs_f64() * 1e3);
-        }
+        ms.push(start.elapsed().as_secs_f64() * 1e3);
     }
-    let images = subject.sample(method, size_px, hybrid)?;
-    let bytes = |planes: PlaneSet| -> anyhow::Result<usize> {
-        let packed = images.iter().map(|image| Ok(encode_depth_image(image, planes)?.payload.len()));
-        packed.sum()
-    };
-    let [set_ms, with_corners_ms] = ms.map(median);
-    let plain = bytes(PlaneSet::DEPTH_COLOR)?;
-    let samples = |image: &DepthImage| image.inverse_depth_per_m.iter().filter(|&&d| d > 0.0).count();
+    let bytes = |image: &DepthImage| anyhow::Ok(encode_depth_image(image, PlaneSet::DEPTH_COLOR)?.payload.len());
+    let samples = |image: &DepthImage| image.inverse_depth_per_m.iter().filter(|&&depth| depth > 0.0).count();
     Ok(Times {
-        set_ms,
-        corners_ms: with_corners_ms - set_ms,
-        bytes: plain,
-        corner_bytes: bytes(PlaneSet::ALL)? - plain,
+        set_ms: median(ms),
+        bytes: images.iter().map(bytes).sum::<anyhow::Result<usize>>()?,
         samples: images.iter().map(samples).sum(),
-        rays_a_pixel: rays_a_pixel(subject, method)?,
     })
 }
 
-fn rays_a_pixel(subject: &Subject, method: SamplingMethod) -> anyhow::Result<f64> {
-    if method.redundancy_test().is_none_or(|test| !test.traces_rays()) {
-        return Ok(f64::NAN);
-    }
-    let cameras = subject.cameras(method, UVec2::splat(COUNTED_PX));
-    let rays = scalar::rays_of_visibility(&render::scalar::rays::Scene::of(&subject.scene, 0.0)?, &cameras);
-    Ok(rays as f64 / f64::from((IMAGES as u32 - 1) * COUNTED_PX * COUNTED_PX))
-}
-
-impl Times {
-    /// Milliseconds of an image after the first, which is conventional.
-    fn later_image_ms(&self, conventional: &Self) -> f64 {
-        (self.set_ms - conventional.image_ms()) / (IMAGES - 1) as f64
-    }
-
-    fn image_ms(&self) -> f64 {
-        self.set_ms / IMAGES as f64
-    }
-
-    fn bits_a_sample(&self) -> f64 {
-        8.0 * self.bytes as f64 / self.samples as f64
-    }
-}
-
-/// Adds a table and checks of all scenes.
+/// Adds a table of all scenes, each with the costs of all methods.
 ///
 /// # Errors
 /// A row does not fit its table.
-pub fn times_report(rows: &[(String, Vec<Times>)], extent: Extent, report: &mut Report) -> anyhow::Result<()> {
-    let columns = [
-        ("scene", ""),
-        ("sampling", ""),
-        ("a set", "ms"),
-        ("a later image over a conventional one", "×"),
-        ("corner depths and normals, a set", "ms"),
-        ("depth and colour", "kB"),
-        ("corner depths and normals", "kB"),
-        ("samples", ""),
-        ("bits a sample", ""),
-        ("rays a pixel", ""),
-        ("million rays a second", ""),
-    ];
-    let mut table = Table::new(format!("Sampling, {0}×{0}", extent.side_px), &columns);
-    for (scene, times) in rows {
-        for (method, t) in METHODS.iter().zip(times) {
-            let later_ms = t.later_image_ms(&times[0]);
-            let rays_m_s = t.rays_a_pixel * f64::from(extent.side_px).powi(2) / later_ms * 1e-3;
-            let numbers = [t.set_ms, later_ms / times[0].image_ms(), t.corners_ms, t.bytes as f64 / 1e3];
-            let rest = [t.corner_bytes as f64 / 1e3, t.samples as f64, t.bits_a_sample(), t.rays_a_pixel, rays_m_s];
-            let head = [scene.clone().into(), method.to_string().into()];
-            table.push(head.into_iter().chain(numbers.into_iter().chain(rest).map(Cell::from)))?;
-        }
-    }
-    report.tables.push(table);
-    for (place, most) in [(1, 1.5), (3, 2.5)] {
-        let ratios = rows.iter().map(|(_, times)| times[place].later_image_ms(&times[0]) / times[0].image_ms());
-        let name = format!("a later image of {} over a conventional one, mean of the scenes", METHODS[place]);
-        report.checks.push(Check::new(name, ratios.sum::<f64>() / rows.len() as f64, "×", Bar::AtMost(most)));
-    }
-    for (scene, times) in rows {
-        for place in [1, 3, 5] {
-            let method = METHODS[place];
-            let more = times[place].bits_a_sample() - times[0].bits_a_sample();
-            report.checks.push(Check::new(
-                format!("{scene}: bits a sample, {method} less conventional"),
-                more,
-                "bits",
-                Bar::AtMost(3.0),
-            ));
-            if ["bird-nest", "urban"].contains(&scene.as_str()) {
-                let ratio = times[place].bytes as f64 / times[0].bytes as f64;
-                report.checks.push(Check::new(
-                    format!("{scene}: bytes, {method} over conventional"),
-                    ratio,
-                    "×",
-                    Bar::AtMost(1.0),
-                ));
-            }
-        }
-    }
+pub fn times_report(scenes: &[(String, Vec<Times>)], extent: Extent, report: &mut Report) -> anyhow::Result<()> {
+    let rows = scenes.iter().flat_map(|(scene, times)| {
+        let row = |(&method, &own): (&SamplingMethod, &Times)| TimesRow {
+            scene: scene.clone(),
+            method,
+            times: own,
+            conventional: times[0],
+        };
+        METHODS.iter().zip(times).map(row)
+    });
+    let rows: Vec<TimesRow> = rows.collect();
+    report.tables.push(table(format!("Sampling, {0}×{0}", extent.side_px), &COLUMNS, &rows)?);
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::fs::create_dir_all;
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use app_core::exit::{BadInput, Outcome};
+use app_core::exit::Outcome;
 use app_core::process::runtime;
 use app_core::setup::{DeviceArgs, SceneArgs};
 use clap::Args;
@@ -32,9 +32,6 @@ pub struct ScalingArgs {
     /// How surfaces are lit; the default is the paper's lighting
     #[arg(long, default_value_t, value_name = "TERMS")]
     lighting: Lighting,
-    /// An expensive lighting for a second table [default: none with --quick, else "soft 4, occlusion 4"]
-    #[arg(long, value_name = "TERMS")]
-    expensive_lighting: Option<Lighting>,
     /// How views are reconstructed
     #[arg(long, default_value_t, value_name = "NAME")]
     method: ReconstructionMethod,
@@ -63,28 +60,18 @@ pub struct ScalingArgs {
     strict: bool,
 }
 
-/// The default lighting of the second table.
-const EXPENSIVE_LIGHTING: &str = "soft 4, occlusion 4";
-
 fn cores(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|cores| (0.01..=64.0).contains(cores)).ok_or_else(|| "expected 0.01 to 64".to_owned())
 }
 
 impl ScalingArgs {
-    fn request(&self) -> anyhow::Result<Request> {
-        let expensive = || EXPENSIVE_LIGHTING.parse::<Lighting>().map_err(|error| BadInput(error.to_string()));
-        let expensive_lighting = match self.expensive_lighting {
-            None if !self.quick => Some(expensive()?),
-            given => given,
-        };
-        Ok(Request {
+    fn request(&self) -> Request {
+        Request {
             device: self.device.device,
             extent: Extent { quick: self.quick, nodes: usize::from(self.nodes), views: self.views as usize },
             quota_cores: self.quota,
-            lighting: self.lighting,
-            expensive_lighting,
             event_log: self.out.join("schedule.log"),
-        })
+        }
     }
 }
 
@@ -93,13 +80,13 @@ impl ScalingArgs {
 /// # Errors
 /// Input that cannot be used, no control groups, or a failure of the cluster.
 pub fn run(args: &ScalingArgs) -> anyhow::Result<Outcome> {
-    let request = args.request()?;
+    let request = args.request();
     create_dir_all(&args.out).with_context(|| format!("cannot write to {}", args.out.display()))?;
-    let scene = SceneArgs { method: Some(args.method), ..SceneArgs::new(args.scene.clone()) };
+    let scene = SceneArgs { method: Some(args.method), lighting: args.lighting, ..SceneArgs::new(args.scene.clone()) };
     let subject = Subject::load(&scene)?;
-    let measured = runtime()?.block_on(take(&request, &subject))?;
+    let results = runtime()?.block_on(take(&request, &subject))?;
     println!("simulating up to {} nodes", args.simulate_to);
-    let report = report(&measured, request.extent, &args.scene.to_string(), usize::from(args.simulate_to))?;
+    let report = report(&results, request.extent, &args.scene.to_string(), usize::from(args.simulate_to))?;
     show(&report, &args.out)?;
     let ok = report.finish(&args.out)?;
     Ok(Outcome::of(ok || !args.strict))

@@ -1,10 +1,43 @@
 //! Costs of operations on a node with its share of the machine, while the other nodes do the same.
 
 use cluster::{Costs, ROW_PARTS, TileCosts};
-use render::Lighting;
+use simulation::Calls;
 
-use super::processes::NodeProcesses;
+use super::nodes::Nodes;
 use super::subject::{MEASURED_BATCH, Subject};
+
+/// Costs that P nodes timed at the same time, each with its quota, before and after the points.
+#[derive(Debug, Clone, Default)]
+pub struct Timed {
+    pub nodes: usize,
+    /// Costs of every node, once for each request.
+    pub costs: Vec<Costs>,
+    /// Costs with one view a call.
+    pub alone: Vec<Costs>,
+}
+
+impl Timed {
+    /// The mean over all nodes and times.
+    #[must_use]
+    pub fn mean(&self) -> Costs {
+        mean(&self.costs)
+    }
+
+    /// Costs of a view, and of a call to the device: both follow from calls of one view and of many.
+    #[must_use]
+    pub fn by_view_and_call(&self) -> (Costs, Calls) {
+        let costs = self.mean();
+        let alone = mean(&self.alone);
+        let split = |alone_s: f64, of_many_s: f64| {
+            let many = f64::from(MEASURED_BATCH);
+            let view_s = ((many * of_many_s - alone_s) / (many - 1.0)).clamp(0.0, of_many_s);
+            (view_s, ((of_many_s - view_s) * many).max(0.0))
+        };
+        let (reconstruct_view_s, reconstruct_s) = split(alone.reconstruct_view_s, costs.reconstruct_view_s);
+        let (direct_view_s, direct_s) = split(alone.direct_view_s, costs.direct_view_s);
+        (Costs { reconstruct_view_s, direct_view_s, ..costs }, Calls { reconstruct_s, direct_s })
+    }
+}
 
 /// The mean of several measurements; zeros without any.
 #[must_use]
@@ -27,16 +60,11 @@ pub fn mean(all: &[Costs]) -> Costs {
 
 /// Costs of all nodes at the same time: a node that is alone on the machine has its caches and memory to itself. The
 /// cost of a view depends on its place, so each node has views of its own.
-pub async fn measure(
-    processes: &NodeProcesses,
-    subject: &Subject,
-    lighting: Lighting,
-    batch: u32,
-) -> anyhow::Result<Vec<Costs>> {
-    let nodes = processes.nodes();
-    let views = subject.views(nodes * MEASURED_BATCH as usize)?;
-    let of_node = |node| views.iter().skip(node).step_by(nodes).copied().collect();
-    processes.measure((0..nodes).map(|node| subject.measurement(lighting, of_node(node), batch))).await
+pub async fn measure(nodes: &Nodes, subject: &Subject, batch: u32) -> anyhow::Result<Vec<Costs>> {
+    let count = nodes.count();
+    let views = subject.views(count * MEASURED_BATCH as usize)?;
+    let of_node = |node| views.iter().skip(node).step_by(count).copied().collect();
+    nodes.measure((0..count).map(|node| subject.measurement(of_node(node), batch))).await
 }
 
 /// (S·g_s + V·(c+e)) / (P·T): the work of one node over the time of P nodes.
@@ -66,5 +94,17 @@ mod tests {
         // Eq. 4 over P: naive.
         assert!((efficiency(&costs, 4, 1000, 11, 1000.0 / 11.0) - 0.107).abs() < 1e-12);
         assert_eq!(mean(&[costs, Costs { sample_image_s: 3.0, ..costs }]).sample_image_s, 2.0);
+    }
+
+    #[test]
+    fn costs_of_calls_and_views_are_separated() {
+        // 10 ms a call and 2 ms a view, drawn directly at 5 ms a view and nothing a call.
+        let many = f64::from(MEASURED_BATCH);
+        let of_many = Costs { reconstruct_view_s: 0.01 / many + 0.002, direct_view_s: 0.005, ..Costs::default() };
+        let alone = Costs { reconstruct_view_s: 0.012, direct_view_s: 0.005, ..Costs::default() };
+        let timed = Timed { nodes: 1, costs: vec![of_many], alone: vec![alone] };
+        let (costs, calls) = timed.by_view_and_call();
+        assert!((costs.reconstruct_view_s - 0.002).abs() < 1e-12 && (calls.reconstruct_s - 0.01).abs() < 1e-12);
+        assert!((costs.direct_view_s - 0.005).abs() < 1e-12 && calls.direct_s.abs() < 1e-12);
     }
 }

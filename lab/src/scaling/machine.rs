@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use crate::memory::processor_s;
+
 /// Ticks of the kernel's counters in a second: fixed for programs since Linux 2.6.
 const TICKS_PER_S: f64 = 100.0;
 
@@ -21,9 +23,8 @@ impl MachineTime {
     #[must_use]
     pub fn now() -> Self {
         let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
-        let own = fs::read_to_string("/proc/self/stat").unwrap_or_default();
         let (busy_s, stolen_s) = all(&stat).unwrap_or_default();
-        Self { busy_s, stolen_s, client_s: of_process(&own).unwrap_or_default() }
+        Self { busy_s, stolen_s, client_s: processor_s(std::process::id()).unwrap_or_default() }
     }
 
     /// The difference of two readings.
@@ -45,13 +46,6 @@ fn all(stat: &str) -> Option<(f64, f64)> {
     Some((sum(&[0, 1, 2, 5, 6]), sum(&[7])))
 }
 
-/// utime and stime are the 14th and 15th field; the 2nd is a name that may hold blanks.
-fn of_process(stat: &str) -> Option<f64> {
-    let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
-    let ticks = |field: usize| fields.get(field - 3)?.parse::<f64>().ok();
-    Some((ticks(14)? + ticks(15)?) / TICKS_PER_S)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -60,9 +54,7 @@ mod tests {
     fn counters_are_read_by_their_place() {
         let stat = "cpu  100 10 50 900 5 4 6 30 0 0\ncpu0 1 1 1 1\n";
         assert_eq!(all(stat), Some((1.7, 0.3)));
-        let own = "42 (a ) name) S 1 2 3 4 5 6 7 8 9 10 250 50 0 0 20 0 1 0";
-        assert_eq!(of_process(own), Some(3.0));
-        assert_eq!(of_process("nothing"), None);
+        assert_eq!(all("nothing"), None);
     }
 
     #[test]

@@ -2,7 +2,6 @@
 
 use cluster::{Costs, PolicyChoice};
 use coordinator::schedule::{Demand, Load, NodeCosts, PolicyOverride, choose};
-use render::Lighting;
 
 use super::point::PointSettings;
 
@@ -14,23 +13,12 @@ pub const PAPER_VIEWS: usize = 1000;
 pub const FEW_NODES: usize = 5;
 /// V of the paper's headline.
 pub const HEADLINE_VIEWS: usize = 290;
-/// V at which sampling under expensive lighting takes about as long as all views: whole images then bound T most.
-pub const TILED_VIEWS: usize = 100;
 /// The fewest sets that count: more of a single set may have been made ahead than of the next one.
 const LEAST_SETS: f64 = 2.0;
 /// Seconds of opening a session, beside the work.
 const SESSION_S: f64 = 1.0;
 
 use PolicyChoice::{Auto, Direct, Pipeline, TimeShare};
-
-/// A point to measure.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PointSpec {
-    pub policy: PolicyChoice,
-    pub views: usize,
-    /// True where sample images stay whole.
-    pub whole_images: bool,
-}
 
 /// The size of the measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,18 +43,11 @@ impl Extent {
         [self.nodes].into_iter().chain(smaller).collect()
     }
 
-    /// Points at a number of nodes, under the paper's lighting or an expensive one.
+    /// Policies and numbers of views at a number of nodes.
     #[must_use]
-    pub fn points(self, nodes: usize, is_expensive: bool) -> Vec<PointSpec> {
-        let shared = match (is_expensive, self.quick) {
-            (true, _) => self.expensive_points(nodes),
-            (false, true) => self.quick_points(nodes),
-            (false, false) => full_points(nodes),
-        };
-        let cut = shared.into_iter().map(|(policy, views)| PointSpec { policy, views, whole_images: false });
-        let whole = PointSpec { policy: Pipeline, views: TILED_VIEWS, whole_images: true };
-        let whole = (is_expensive && nodes == self.nodes).then_some(whole);
-        cut.chain(whole).filter(|wanted| wanted.views <= self.views).collect()
+    pub fn points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
+        let all = if self.quick { self.quick_points(nodes) } else { full_points(nodes) };
+        all.into_iter().filter(|(_, views)| *views <= self.views).collect()
     }
 
     fn quick_points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
@@ -81,13 +62,6 @@ impl Extent {
             FEW_NODES => vec![(Pipeline, 10), (Pipeline, 100), (Pipeline, HEADLINE_VIEWS), (Direct, 10), (Direct, 100)],
             _ => vec![(Pipeline, 10), (Pipeline, 100), (Direct, 10)],
         }
-    }
-
-    /// Points under expensive lighting: `direct` on few views only.
-    fn expensive_points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
-        let shared = [TILED_VIEWS, PAPER_VIEWS].into_iter().flat_map(|views| [(Pipeline, views), (Auto, views)]);
-        let wanted = nodes == self.nodes || (!self.quick && [FEW_NODES, 8].contains(&nodes));
-        if wanted { shared.chain([(Direct, nodes)]).collect() } else { Vec::new() }
     }
 }
 
@@ -123,16 +97,16 @@ pub fn planned(
     costs: &Costs,
     images: usize,
     nodes: usize,
-    lighting: Lighting,
-    PointSpec { policy, views, whole_images }: PointSpec,
+    policy: PolicyChoice,
+    views: usize,
 ) -> Planned {
     let period_s = predicted_s(costs, images, nodes, policy, views);
     let most = if extent.quick { 5.0 } else { 8.0 };
     let counted_sets = (extent.counted_s() / period_s).ceil().clamp(LEAST_SETS, most) as u32;
-    let settings = PointSettings { lighting, policy, views, whole_images, counted_sets };
     let sampled_s = if policy == Direct { 0.0 } else { costs.sample_image_s * images as f64 };
     // Set 0, the sets that count, and the rest of the next one.
-    Planned { settings, nodes, about_s: (f64::from(counted_sets) + 1.5) * period_s + sampled_s + SESSION_S }
+    let about_s = (f64::from(counted_sets) + 1.5) * period_s + sampled_s + SESSION_S;
+    Planned { settings: PointSettings { policy, views, counted_sets }, nodes, about_s }
 }
 
 #[cfg(test)]
@@ -150,10 +124,9 @@ mod tests {
     };
 
     fn all(extent: Extent) -> Vec<Planned> {
-        let lighting = Lighting::default();
-        let of = |nodes: usize| extent.points(nodes, false).into_iter().map(move |point| (nodes, point));
+        let of = |nodes: usize| extent.points(nodes).into_iter().map(move |point| (nodes, point));
         let points = extent.node_counts().into_iter().flat_map(of);
-        points.map(|(nodes, point)| planned(extent, &COSTS, 4, nodes, lighting, point)).collect()
+        points.map(|(nodes, (policy, views))| planned(extent, &COSTS, 4, nodes, policy, views)).collect()
     }
 
     #[test]
@@ -165,19 +138,6 @@ mod tests {
         assert!(has(Pipeline, 11, 1000) && has(Auto, 11, 1000) && has(Direct, 11, 100) && has(Pipeline, 5, 290));
         let about_s: f64 = quick.iter().map(|planned| planned.about_s).sum();
         assert!((100.0..400.0).contains(&about_s), "{about_s}");
-    }
-
-    #[test]
-    fn whole_images_are_measured_beside_tiles_under_expensive_lighting() {
-        let extent = Extent { quick: true, nodes: 11, views: 100 };
-        let of = |whole_images| PointSpec { policy: Pipeline, views: TILED_VIEWS, whole_images };
-        let expensive = extent.points(11, true);
-        assert!(
-            expensive.contains(&of(false))
-                && expensive.contains(&of(true))
-                && expensive.iter().all(|wanted| wanted.views <= 100)
-        );
-        assert!(extent.points(5, true).is_empty() && !extent.points(11, false).contains(&of(true)));
     }
 
     #[test]

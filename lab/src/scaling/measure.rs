@@ -8,14 +8,14 @@ use app_core::progress::bar;
 use cluster::Costs;
 use gpu::DevicePreference;
 use indicatif::ProgressBar;
-use render::Lighting;
 
-use super::costs;
+use super::costs::{self, Timed};
 use super::matrix::{Extent, Planned, planned};
 use super::measure_point::measure;
-use super::measured::{Measured, MeasuredLighting, Timed};
+use super::nodes::Nodes;
 use super::point::{Point, PointSettings};
-use super::processes::NodeProcesses;
+use super::prediction::Traffic;
+use super::results::Results;
 use super::subject::{MEASURED_BATCH, Subject};
 
 /// Attempts at a point whose plan changes while it is measured; the last one counts.
@@ -31,8 +31,6 @@ pub struct Request {
     pub extent: Extent,
     /// Cores of a node; by default as many as fit this machine.
     pub quota_cores: Option<f64>,
-    pub lighting: Lighting,
-    pub expensive_lighting: Option<Lighting>,
     pub event_log: PathBuf,
 }
 
@@ -48,9 +46,9 @@ pub fn default_quota(nodes: usize) -> f64 {
 ///
 /// # Errors
 /// Processes or groups are not to be had, a point cannot be measured, or a signal came.
-pub async fn take(request: &Request, subject: &Subject) -> anyhow::Result<Measured> {
+pub async fn take(request: &Request, subject: &Subject) -> anyhow::Result<Results> {
     tokio::select! {
-        measured = take_undisturbed(request, subject) => measured,
+        results = take_undisturbed(request, subject) => results,
         signal = stop_signal() => {
             signal?;
             anyhow::bail!("stopped by a signal")
@@ -58,118 +56,115 @@ pub async fn take(request: &Request, subject: &Subject) -> anyhow::Result<Measur
     }
 }
 
-async fn take_undisturbed(request: &Request, subject: &Subject) -> anyhow::Result<Measured> {
+async fn take_undisturbed(request: &Request, subject: &Subject) -> anyhow::Result<Results> {
     let start = Instant::now();
-    let nodes = request.extent.nodes;
-    let quota_cores = request.quota_cores.unwrap_or_else(|| default_quota(nodes));
-    let mut processes = NodeProcesses::start(&subject.args, request.device, nodes, &request.event_log).await?;
-    let device =
-        processes.client.status().await?.nodes.first().map_or_else(String::new, |node| node.device_name.clone());
-    println!("{nodes} nodes of {quota_cores:.3} cores each on {device}");
-    let unlimited = warm(&processes, subject, request.lighting).await?;
+    let count = request.extent.nodes;
+    let quota_cores = request.quota_cores.unwrap_or_else(|| default_quota(count));
+    let mut nodes = Nodes::start(&subject.args, request.device, count, &request.event_log).await?;
+    let device = nodes.device().to_owned();
+    println!("{count} nodes of {quota_cores:.3} cores each on {device}");
+    let unlimited = warm(&nodes, subject).await?;
     println!("all are ready after {:.0} s", start.elapsed().as_secs_f64());
-    processes.limit(Some(quota_cores))?;
-    processes.rest().await?;
-    let lightings = [request.lighting].into_iter().chain(request.expensive_lighting);
-    let mut lit: Vec<MeasuredLighting> =
-        lightings.map(|lighting| MeasuredLighting { lighting, timed: Vec::new(), points: Vec::new() }).collect();
-    points(&mut processes, subject, request.extent, &mut lit).await?;
-    let cores = std::thread::available_parallelism().map_or(1, usize::from) as f64;
-    let (images, seconds) = (subject.images(), start.elapsed().as_secs_f64());
-    Ok(Measured { device, cores, quota_cores, images, unlimited, lit, seconds })
+    nodes.limit(quota_cores)?;
+    nodes.rest().await?;
+    let mut timed = Vec::new();
+    let points = points(&mut nodes, subject, request.extent, &mut timed).await?;
+    let results = Results {
+        device,
+        lighting: subject.args.lighting,
+        cores: std::thread::available_parallelism().map_or(1, usize::from) as f64,
+        quota_cores,
+        images: subject.images(),
+        unlimited,
+        timed,
+        points: Vec::new(),
+        traffic: Traffic::default(),
+        seconds: start.elapsed().as_secs_f64(),
+    };
+    Ok(results.with_points(points))
 }
 
 /// Lets every node do all kinds of work once, alone and without a limit. Shaders are then built, the scene is loaded,
 /// and rays and triangles are timed undisturbed.
-async fn warm(processes: &NodeProcesses, subject: &Subject, lighting: Lighting) -> anyhow::Result<Vec<Costs>> {
-    let progress = bar("nodes load the scene and build shaders", processes.nodes());
-    let request = subject.measurement(lighting, subject.views(MEASURED_BATCH as usize)?, MEASURED_BATCH);
-    let unlimited = processes.measure_in_turn(&request, || progress.inc(1)).await;
+async fn warm(nodes: &Nodes, subject: &Subject) -> anyhow::Result<Vec<Costs>> {
+    let progress = bar("nodes load the scene and build shaders", nodes.count());
+    let request = subject.measurement(subject.views(MEASURED_BATCH as usize)?, MEASURED_BATCH);
+    let unlimited = nodes.measure_in_turn(&request, || progress.inc(1)).await;
     progress.finish_and_clear();
     unlimited
 }
 
-/// Times the costs of all lightings that have points at this number of nodes.
-async fn time(
-    processes: &NodeProcesses,
-    subject: &Subject,
-    extent: Extent,
-    lit: &mut [MeasuredLighting],
-) -> anyhow::Result<()> {
-    let (nodes, start) = (processes.nodes(), Instant::now());
-    let with_points =
-        lit.iter_mut().enumerate().filter(|(which, _)| !extent.points(nodes, is_expensive(*which)).is_empty());
-    for (_, lit) in with_points {
-        if lit.timed.last().is_none_or(|timed| timed.nodes != nodes) {
-            let alone = costs::measure(processes, subject, lit.lighting, 1).await?;
-            lit.timed.push(Timed { nodes, alone, ..Timed::default() });
-        }
-        let costs = costs::measure(processes, subject, lit.lighting, MEASURED_BATCH).await?;
-        lit.timed.iter_mut().last().into_iter().for_each(|timed| timed.costs.extend(&costs));
+/// Times the costs at this number of nodes.
+async fn time(nodes: &Nodes, subject: &Subject, timed: &mut Vec<Timed>) -> anyhow::Result<()> {
+    let start = Instant::now();
+    if timed.last().is_none_or(|timed| timed.nodes != nodes.count()) {
+        let alone = costs::measure(nodes, subject, 1).await?;
+        timed.push(Timed { nodes: nodes.count(), alone, ..Timed::default() });
     }
-    println!("{nodes} nodes have timed their work in {:.0} s", start.elapsed().as_secs_f64());
-    processes.rest().await
+    let costs = costs::measure(nodes, subject, MEASURED_BATCH).await?;
+    timed.iter_mut().last().into_iter().for_each(|timed| timed.costs.extend(&costs));
+    println!("{} nodes have timed their work in {:.0} s", nodes.count(), start.elapsed().as_secs_f64());
+    nodes.rest().await
 }
 
 async fn points(
-    processes: &mut NodeProcesses,
+    nodes: &mut Nodes,
     subject: &Subject,
     extent: Extent,
-    lit: &mut [MeasuredLighting],
-) -> anyhow::Result<()> {
-    time(processes, subject, extent, lit).await?;
-    let all = all_points(subject, extent, lit);
-    let about_s: f64 = all.iter().map(|(_, point)| point.about_s).sum();
+    timed: &mut Vec<Timed>,
+) -> anyhow::Result<Vec<Point>> {
+    time(nodes, subject, timed).await?;
+    let costs = timed.first().map_or_else(Costs::default, Timed::mean);
+    let all = all_points(extent, &costs, subject.images());
+    let about_s: f64 = all.iter().map(|point| point.about_s).sum();
     println!("{} points, about {:.0} minutes", all.len(), (about_s / 60.0).ceil());
     let progress = bar("", about_s.ceil() as usize);
+    let mut points = Vec::with_capacity(all.len());
     let mut done_s = 0.0;
-    for (which, Planned { settings, nodes, about_s }) in all {
-        if nodes < processes.nodes() {
-            time(processes, subject, extent, lit).await?;
-            processes.shrink_to(nodes).await?;
-            time(processes, subject, extent, lit).await?;
+    for Planned { settings, nodes: count, about_s } in all {
+        if count < nodes.count() {
+            time(nodes, subject, timed).await?;
+            nodes.shrink_to(count).await?;
+            time(nodes, subject, timed).await?;
         }
-        progress.set_message(format!("P = {nodes}, V = {}, {}", settings.views, settings.policy));
-        let point = point(processes, subject, settings, done_s, about_s, &progress).await?;
+        progress.set_message(format!("P = {count}, V = {}, {}", settings.views, settings.policy));
+        let point = point(nodes, subject, settings, done_s, about_s, &progress).await?;
         progress.suspend(|| println!("{}", in_words(&point)));
-        lit[which].points.push(point);
+        points.push(point);
         done_s += about_s;
         progress.set_position(done_s as u64);
-        processes.rest().await?;
+        nodes.rest().await?;
     }
     progress.finish_and_clear();
-    time(processes, subject, extent, lit).await
+    time(nodes, subject, timed).await?;
+    Ok(points)
 }
 
 fn in_words(point: &Point) -> String {
-    let (Point { settings, nodes, period_s, fill_s, later_plans, .. }, policy) = (point, point.policy());
-    let (counted, others) = (settings.counted_sets, point.window.others_cores());
+    let PointSettings { policy: asked_for, views, counted_sets } = point.settings;
     format!(
-        "P = {nodes}, V = {}, {}: {policy}, T = {period_s:.3} s by {counted} sets after {fill_s:.2} s; changes of plan: \
-         {later_plans}; {others:.2} cores for other programs",
-        settings.views, settings.policy
+        "P = {}, V = {views}, {asked_for}: {}, T = {:.3} s by {counted_sets} sets after {:.2} s; changes of plan: {}; \
+         {:.2} cores for other programs",
+        point.nodes,
+        point.policy(),
+        point.period_s,
+        point.fill_s,
+        point.later_plans,
+        point.window.others_cores()
     )
 }
 
-/// All lightings but the first, the paper's, are expensive.
-fn is_expensive(which: usize) -> bool {
-    which > 0
-}
-
-/// All lightings at one number of nodes come before the next: nodes are only ever ended.
-fn all_points(subject: &Subject, extent: Extent, lit: &[MeasuredLighting]) -> Vec<(usize, Planned)> {
+/// By falling numbers of nodes, as nodes are only ever ended.
+fn all_points(extent: Extent, costs: &Costs, images: usize) -> Vec<Planned> {
     let of = |nodes: usize| {
-        lit.iter().enumerate().flat_map(move |(which, lit)| {
-            let points = extent.points(nodes, is_expensive(which));
-            let (costs, images) = (lit.timed.first().map_or_else(Costs::default, Timed::mean), subject.images());
-            points.into_iter().map(move |point| (which, planned(extent, &costs, images, nodes, lit.lighting, point)))
-        })
+        let points = extent.points(nodes).into_iter();
+        points.map(move |(policy, views)| planned(extent, costs, images, nodes, policy, views))
     };
     extent.node_counts().into_iter().flat_map(of).collect()
 }
 
 async fn point(
-    processes: &NodeProcesses,
+    nodes: &Nodes,
     subject: &Subject,
     settings: PointSettings,
     done_s: f64,
@@ -179,7 +174,7 @@ async fn point(
     let frames = settings.awaited_views().max(1) as f64;
     for attempt in 1.. {
         let mut arrived = 0.0;
-        let point = measure(processes, subject, settings, || {
+        let point = measure(nodes, subject, settings, || {
             arrived += 1.0;
             progress.set_position((done_s + about_s * (arrived / frames).min(1.0)) as u64);
         });

@@ -3,8 +3,8 @@
 use cluster::{Costs, Policy};
 use simulation::{Cluster, Demand, Habits, Machine, plan, run};
 
-use super::measured::{MeasuredLighting, Timed};
-use super::point::{Point, PointSettings};
+use super::costs::Timed;
+use super::point::Point;
 use crate::balance::pipeline_time;
 
 /// Simulated sets beyond those that count: the first, and those sampled ahead at the end.
@@ -24,12 +24,12 @@ pub struct Prediction {
     pub same_plan: bool,
 }
 
-/// Bytes on the network and their rate, as means over all points of a lighting.
+/// Bytes on the network and their rate, as means over all points.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Traffic {
     pub image_bytes: f64,
     pub frame_bytes: f64,
-    /// The rate between two processes of this machine.
+    /// The rate between two processes of this machine; infinite where no point shows it.
     pub bytes_per_s: f64,
 }
 
@@ -42,8 +42,9 @@ impl Traffic {
         let image_bytes = of_fetched(fetched.iter().map(|image| image.image_bytes).sum());
         let image_s = of_fetched(fetched.iter().map(|image| image.image_s).sum());
         let views: f64 = points.iter().map(|point| point.settings.views as f64).sum();
-        let frames: f64 = points.iter().map(|point| point.steps.frame_bytes).sum();
-        Self { image_bytes, frame_bytes: frames / views.max(1.0), bytes_per_s: image_bytes / image_s }
+        let frames: f64 = points.iter().map(|point| point.frame_bytes * point.settings.views as f64).sum();
+        let bytes_per_s = if image_s > 0.0 { image_bytes / image_s } else { f64::INFINITY };
+        Self { image_bytes, frame_bytes: frames / views.max(1.0), bytes_per_s }
     }
 
     /// A cluster of `nodes` equal nodes.
@@ -55,14 +56,11 @@ impl Traffic {
 
 /// Predicts a point from the costs that as many nodes timed.
 #[must_use]
-pub fn predict(lit: &MeasuredLighting, images: usize, point: &Point) -> Prediction {
-    let traffic = Traffic::of(&lit.points);
-    let bytes_per_s = if traffic.bytes_per_s > 0.0 { traffic.bytes_per_s } else { f64::INFINITY };
-    let timed = lit.timed.iter().find(|timed| timed.nodes == point.nodes);
-    let (costs, calls) = timed.map_or_else(Default::default, Timed::by_view_and_call);
-    let simulated = simulate(Machine { costs, calls, bytes_per_s }, &traffic, images, point);
+pub fn predict(timed: &Timed, traffic: Traffic, images: usize, point: &Point) -> Prediction {
+    let (costs, calls) = timed.by_view_and_call();
+    let simulated = simulate(Machine { costs, calls, bytes_per_s: traffic.bytes_per_s }, &traffic, images, point);
     Prediction {
-        equation_s: equation_s(&lit.mean(point.nodes), images, point),
+        equation_s: equation_s(&timed.mean(), images, point),
         schedule_s: point.plan.predicted_s(),
         simulated_s: simulated.map_or(f64::NAN, |(period_s, _)| period_s),
         same_plan: simulated.is_some_and(|(_, same)| same),
@@ -70,21 +68,21 @@ pub fn predict(lit: &MeasuredLighting, images: usize, point: &Point) -> Predicti
 }
 
 fn equation_s(costs: &Costs, images: usize, point: &Point) -> f64 {
-    let (nodes, views) = (point.nodes, point.settings.views);
-    let (g_s, view_s) = (costs.sample_image_s, costs.reconstruct_view_s + costs.encode_view_s);
+    let nodes = point.nodes;
+    let views = point.settings.views;
+    let view_s = costs.reconstruct_view_s + costs.encode_view_s;
     match point.policy() {
-        Policy::Pipeline => pipeline_time(images, g_s, views, view_s, nodes, point.samplers()),
+        Policy::Pipeline => pipeline_time(images, costs.sample_image_s, views, view_s, nodes, point.samplers()),
         Policy::Direct => views as f64 * costs.direct_view_s / nodes as f64,
-        Policy::TimeShare => (images as f64 * g_s + views as f64 * view_s) / nodes as f64,
+        Policy::TimeShare => (images as f64 * costs.sample_image_s + views as f64 * view_s) / nodes as f64,
     }
 }
 
 /// T, and true for an equal plan: planned with the coordinator's costs and executed at the mean ones.
 fn simulate(machine: Machine, traffic: &Traffic, images: usize, point: &Point) -> Option<(f64, bool)> {
-    let sets = point.settings.counted_sets + MORE_SETS;
-    let PointSettings { views, policy, .. } = point.settings;
-    let tiles = point.settings.forced_tiles().map(|tiles| tiles as usize);
-    let demand = Demand { views, sets, policy, tiles, nodes_report: false };
+    let settings = point.settings;
+    let sets = settings.counted_sets + MORE_SETS;
+    let demand = Demand { views: settings.views, sets, policy: settings.policy, tiles: None, nodes_report: false };
     let planned = plan(&traffic.cluster(point.nodes, Machine::of(point.plan.costs), images), &demand).ok()?;
     let roles = |plan: &cluster::Assignment| {
         let images = plan.samplers.iter().map(|share| share.image_indices.len()).collect::<Vec<_>>();
@@ -92,6 +90,6 @@ fn simulate(machine: Machine, traffic: &Traffic, images: usize, point: &Point) -
     };
     let same = roles(&planned.assignment) == roles(&point.plan.assignment);
     let cluster = traffic.cluster(point.nodes, machine, images);
-    let run = run(&cluster, &planned, point.settings.views, sets, Habits::default());
-    Some((run.period_s(point.settings.counted_sets as usize), same))
+    let run = run(&cluster, &planned, settings.views, sets, Habits::default());
+    Some((run.period_s(settings.counted_sets as usize), same))
 }

@@ -1,40 +1,79 @@
-//! Measured points of a lighting beside their predictions.
+//! All measured values: costs, and points beside their predictions.
 
-use cluster::PolicyChoice;
+use cluster::{Costs, PolicyChoice};
+use render::Lighting;
 
-use super::costs::efficiency;
+use super::costs::{Timed, efficiency};
 use super::matrix::PAPER_VIEWS;
-use super::measured::MeasuredLighting;
 use super::point::Point;
-use super::prediction::Prediction;
+use super::prediction::{Prediction, Traffic, predict};
 
-/// A measured lighting with a prediction for each of its points.
-pub struct Results<'a> {
-    /// Measured costs and points.
-    pub lit: &'a MeasuredLighting,
-    pub predictions: Vec<Prediction>,
-    pub images: usize,
+/// A measured point with its predictions.
+#[derive(Debug, Clone)]
+pub struct PredictedPoint {
+    pub point: Point,
+    pub prediction: Prediction,
 }
 
-impl<'a> Results<'a> {
+/// All measured values.
+#[derive(Debug, Clone)]
+pub struct Results {
+    pub device: String,
+    pub lighting: Lighting,
+    pub cores: f64,
+    pub quota_cores: f64,
+    /// The number of sample images, S.
+    pub images: usize,
+    /// Costs of single nodes without a limit, on all cores, while the others rest.
+    pub unlimited: Vec<Costs>,
+    /// Costs, by falling P.
+    pub timed: Vec<Timed>,
+    /// Points, in the order of measurement.
+    pub points: Vec<PredictedPoint>,
+    pub traffic: Traffic,
+    pub seconds: f64,
+}
+
+impl Results {
+    /// Adds points with their predictions from the costs that as many nodes timed.
+    #[must_use]
+    pub fn with_points(self, points: Vec<Point>) -> Self {
+        let traffic = Traffic::of(&points);
+        let predicted = |point: Point| {
+            let timed = self.timed.iter().find(|timed| timed.nodes == point.nodes);
+            let prediction = predict(timed.unwrap_or(&Timed::default()), traffic, self.images, &point);
+            PredictedPoint { point, prediction }
+        };
+        Self { points: points.into_iter().map(predicted).collect(), traffic, ..self }
+    }
+
+    /// The mean of the costs at a number of nodes; zeros where there are none.
+    #[must_use]
+    pub fn mean(&self, nodes: usize) -> Costs {
+        self.timed.iter().find(|timed| timed.nodes == nodes).map_or_else(Costs::default, Timed::mean)
+    }
+
     /// The efficiency (S·g_s + V·(c+e)) / (P·T) of a measured point.
     #[must_use]
     pub fn efficiency(&self, point: &Point) -> f64 {
-        efficiency(&self.lit.mean(point.nodes), self.images, point.settings.views, point.nodes, point.period_s)
+        efficiency(&self.mean(point.nodes), self.images, point.settings.views, point.nodes, point.period_s)
     }
 
-    /// The point of some settings, tiled as the schedule decides.
+    fn measured(&self) -> impl Iterator<Item = &Point> {
+        self.points.iter().map(|predicted| &predicted.point)
+    }
+
+    /// The point of some settings.
     #[must_use]
     pub fn find(&self, policy: PolicyChoice, nodes: usize, views: usize) -> Option<&Point> {
-        let asked =
-            |point: &&Point| (point.settings.policy, point.nodes, point.settings.views) == (policy, nodes, views);
-        self.lit.points.iter().filter(|point| !point.settings.whole_images).find(asked)
+        self.measured()
+            .find(|point| point.settings.policy == policy && point.nodes == nodes && point.settings.views == views)
     }
 
     /// The numbers of nodes P of all points, rising.
     #[must_use]
     pub fn node_counts(&self) -> Vec<usize> {
-        let mut counts: Vec<usize> = self.lit.points.iter().map(|point| point.nodes).collect();
+        let mut counts: Vec<usize> = self.measured().map(|point| point.nodes).collect();
         counts.sort_unstable();
         counts.dedup();
         counts
@@ -42,32 +81,10 @@ impl<'a> Results<'a> {
 
     /// Efficiency of `direct` at V = 1000, from the point with most views: T grows as V does.
     #[must_use]
-    pub fn naive(&self, nodes: usize) -> Option<(f64, &'a Point)> {
+    pub fn naive(&self, nodes: usize) -> Option<(f64, &Point)> {
         let is_direct = |point: &&Point| point.settings.policy == PolicyChoice::Direct && point.nodes == nodes;
-        let point = self.lit.points.iter().filter(is_direct).max_by_key(|point| point.settings.views)?;
+        let point = self.measured().filter(is_direct).max_by_key(|point| point.settings.views)?;
         let period_s = point.period_s * PAPER_VIEWS as f64 / point.settings.views as f64;
-        Some((efficiency(&self.lit.mean(nodes), self.images, PAPER_VIEWS, nodes, period_s), point))
-    }
-
-    /// Seconds of each of [`STEPS`] for one set, added up over nodes: of the pipeline at a number of nodes, by V.
-    #[must_use]
-    pub fn steps(&self, nodes: usize) -> Vec<(usize, [f64; 6])> {
-        let is_pipeline = |point: &&Point| point.nodes == nodes && point.settings.policy == PolicyChoice::Pipeline;
-        let mut points: Vec<&Point> = self.lit.points.iter().filter(is_pipeline).collect();
-        points.sort_by_key(|point| point.settings.views);
-        points.into_iter().map(|point| (point.settings.views, self.steps_of(point))).collect()
-    }
-
-    fn steps_of(&self, point: &Point) -> [f64; 6] {
-        let steps = point.steps;
-        // A compositor without a view of a set does not load it.
-        let receivers = point.compositors().min(point.settings.views) as f64;
-        let image_s = point.fetched.map_or(0.0, |image| image.image_s);
-        let transfer_s = self.images as f64 * image_s * receivers;
-        let load_s = receivers * self.lit.mean(point.nodes).load_set_s;
-        [steps.sample_s, transfer_s, load_s, steps.reconstruct_s, steps.encode_s, steps.client_s]
+        Some((efficiency(&self.mean(nodes), self.images, PAPER_VIEWS, nodes, period_s), point))
     }
 }
-
-/// The main steps of Fig. 6.
-pub const STEPS: [&str; 6] = ["sampling", "transfer", "loading d", "reconstruction", "encoding", "client"];

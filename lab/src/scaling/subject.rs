@@ -8,7 +8,6 @@ use app_core::experiment::VIEW_SIZE_PX;
 use app_core::setup::{SceneArgs, Setup};
 use cluster::{MeasureCosts, PolicyChoice, SamplePlanes, SessionRequest, Timeline, Workload};
 use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
-use render::Lighting;
 
 /// Scene time between sets: far less than any motion, but a new set, which is sampled as the paper's sets are.
 const SET_STEP_S: f64 = 1e-3;
@@ -62,17 +61,17 @@ impl Subject {
     pub fn request(
         &self,
         views: &[PinholeCamera],
-        lighting: Lighting,
         policy: PolicyChoice,
         set_count: u32,
     ) -> anyhow::Result<SessionRequest> {
-        let (lighting, timeline) = (lighting.to_string(), self.fresh_timeline(set_count));
-        Ok(SessionRequest { lighting, timeline, ..request(self.setup.offer.settings.clone(), policy, views)? })
+        let request = request(self.setup.offer.settings.clone(), policy, views)?;
+        let timeline = self.fresh_timeline(set_count);
+        Ok(SessionRequest { lighting: self.args.lighting.to_string(), timeline, ..request })
     }
 
-    /// A measurement for a node: a new set of this lighting, and views in calls of `batch_count`.
+    /// A measurement for a node: a new set, and views in calls of `batch_count`.
     #[must_use]
-    pub fn measurement(&self, lighting: Lighting, typical_views: Vec<PinholeCamera>, batch_count: u32) -> MeasureCosts {
+    pub fn measurement(&self, typical_views: Vec<PinholeCamera>, batch_count: u32) -> MeasureCosts {
         let offer = &self.setup.offer;
         let workload = Workload {
             scene: offer.scene(),
@@ -80,7 +79,7 @@ impl Subject {
             cell_first_indices: Vec::new(),
             common_cells: Vec::new(),
             sampling: self.args.sampling().to_string(),
-            lighting: lighting.to_string(),
+            lighting: self.args.lighting.to_string(),
             planes: SamplePlanes::default(),
             volume: offer.volume,
             background: offer.background,

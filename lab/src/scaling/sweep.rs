@@ -2,16 +2,22 @@
 
 use cluster::{Costs, Policy, PolicyChoice};
 use rayon::prelude::*;
-use simulation::{Cluster, Demand, Habits, Limit, Machine, Transfer, plan, run, spread_speeds};
+use report::{Axis, Series, Table, XyChart};
+use simulation::{Cluster, Demand, Habits, Limit, Machine, plan, run, spread_speeds};
 
-use super::prediction::Traffic;
+use super::costs::{efficiency, mean};
+use super::results::Results;
 
 /// Numbers of nodes, P.
 const NODES: [usize; 9] = [2, 5, 11, 20, 50, 100, 200, 500, 1000];
 /// Numbers of views, V.
-pub const VIEWS: [usize; 3] = [1_000, 10_000, 100_000];
+const VIEWS: [usize; 3] = [1_000, 10_000, 100_000];
+/// The number of views V of the chart.
+const CHARTED_VIEWS: usize = 100_000;
+/// The least efficiency that counts as scaling.
+const LEAST_EFFICIENCY: f64 = 0.8;
 /// Speeds of links, each way.
-pub const GBITS: [f64; 3] = [1.0, 10.0, 100.0];
+const GBITS: [f64; 3] = [1.0, 10.0, 100.0];
 /// Bytes a second of a link of 1 Gbit/s.
 const BYTES_PER_S_A_GBIT: f64 = 1.25e8;
 /// Sets of one run: enough for a steady state between filling and draining.
@@ -21,151 +27,162 @@ const UNEQUAL_RATIO: f64 = 4.0;
 const SEED: u64 = 11;
 /// The speed of a device that stands for a graphics processor, over this machine's.
 const FAST: f64 = 30.0;
-/// Parts of a sample image, where images are tiled.
-const PARTS: usize = 16;
 
 /// A cluster to simulate, beside P and V.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
-    pub name: String,
-    /// The device that the costs belong to, and its speed.
-    pub device: String,
-    pub costs: Costs,
+    name: String,
+    costs: Costs,
     /// The speed of every link.
-    pub gbit_per_s: f64,
-    pub habits: Habits,
-    pub parts: usize,
+    gbit_per_s: f64,
     /// True where the speeds of nodes differ.
-    pub unequal: bool,
+    is_unequal: bool,
 }
 
 /// One simulated point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
-    pub scenario: usize,
-    pub nodes: usize,
-    pub views: usize,
+    scenario: String,
+    nodes: usize,
+    views: usize,
     /// The policy that `auto` chose.
-    pub policy: Policy,
-    pub samplers: usize,
+    policy: Policy,
+    samplers: usize,
     /// The time between two sets, T.
-    pub period_s: f64,
+    period_s: f64,
     /// Efficiency as at measured points; for unequal nodes over the sum of their speeds.
-    pub efficiency: f64,
-    pub limit: Limit,
+    efficiency: f64,
+    limit: Limit,
 }
 
-/// Costs of this machine without a limit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Basis {
-    /// Costs under the paper's lighting.
-    pub plain: Costs,
-    /// Costs under expensive lighting, where it was measured.
-    pub expensive: Option<Costs>,
-    pub images: usize,
-    /// Bytes on the network.
-    pub traffic: Traffic,
-}
-
-fn times_as_fast(costs: Costs, speed: f64) -> Costs {
-    Machine::of(costs).faster(speed).costs
-}
-
-/// All scenarios: the cluster as it is, then one improvement after the other.
+/// All scenarios, by this machine's costs without a limit.
 #[must_use]
-pub fn scenarios(basis: &Basis) -> Vec<Scenario> {
-    let devices = [("this machine".to_owned(), 1.0), (format!("{FAST:.0} times as fast"), FAST)];
+pub fn scenarios(results: &Results) -> Vec<Scenario> {
+    let costs = mean(&results.unlimited);
     let mut all = Vec::new();
-    for (device, speed) in &devices {
-        for gbit_per_s in GBITS {
-            let as_is = Scenario {
-                name: format!("{gbit_per_s:.0} Gbit/s"),
-                device: device.clone(),
-                costs: times_as_fast(basis.plain, *speed),
-                gbit_per_s,
-                habits: Habits::default(),
-                parts: 1,
-                unequal: false,
-            };
-            all.push(as_is.clone());
-            let habits = Habits { transfer: Transfer::Relay(2), sets_ahead: 3, ..Habits::default() };
-            all.push(Scenario { name: format!("{gbit_per_s:.0} Gbit/s, relay"), habits, ..as_is });
-        }
+    for (device, speed) in [("this machine".to_owned(), 1.0), (format!("{FAST:.0} times as fast"), FAST)] {
+        let costs = Machine::of(costs).faster(speed).costs;
+        all.extend(GBITS.map(|gbit_per_s| Scenario {
+            name: format!("{device}, {gbit_per_s:.0} Gbit/s"),
+            costs,
+            gbit_per_s,
+            is_unequal: false,
+        }));
     }
-    all.extend(of_ten_gbit(basis));
+    let name = "this machine, unequal nodes, 10 Gbit/s".to_owned();
+    all.push(Scenario { name, costs, gbit_per_s: 10.0, is_unequal: true });
     all
-}
-
-/// Unequal nodes, and expensive lighting with and without tiles.
-fn of_ten_gbit(basis: &Basis) -> Vec<Scenario> {
-    let relay = Habits { transfer: Transfer::Relay(2), sets_ahead: 3, ..Habits::default() };
-    let plain = Scenario {
-        name: "unequal nodes".to_owned(),
-        device: "this machine".to_owned(),
-        costs: basis.plain,
-        gbit_per_s: 10.0,
-        habits: Habits::default(),
-        parts: 1,
-        unequal: true,
-    };
-    let expensive = basis.expensive.into_iter().flat_map(|costs| {
-        let whole =
-            Scenario { name: "expensive lighting, whole images".to_owned(), costs, unequal: false, ..plain.clone() };
-        let relayed = Scenario { name: "expensive lighting, relay".to_owned(), habits: relay, ..whole.clone() };
-        let cut =
-            Scenario { name: format!("expensive lighting, relay, images in {PARTS}"), parts: PARTS, ..relayed.clone() };
-        [whole, relayed, cut]
-    });
-    let expensive: Vec<_> = expensive.collect();
-    [plain].into_iter().chain(expensive).collect()
 }
 
 /// Simulates all scenarios at all P and V, many at the same time.
 #[must_use]
-pub fn sweep(basis: &Basis, scenarios: &[Scenario], most_nodes: usize) -> Vec<Simulated> {
-    let points = scenarios.iter().enumerate().flat_map(|(number, scenario)| {
+pub fn sweep(results: &Results, scenarios: &[Scenario], most_nodes: usize) -> Vec<Simulated> {
+    let points = scenarios.iter().flat_map(|scenario| {
         let nodes = NODES.into_iter().filter(move |&nodes| nodes <= most_nodes);
-        nodes.flat_map(move |nodes| VIEWS.map(|views| (number, scenario, nodes, views)))
+        nodes.flat_map(move |nodes| VIEWS.map(|views| (scenario, nodes, views)))
     });
     let points: Vec<_> = points.collect();
-    points
-        .into_par_iter()
-        .filter_map(|(number, scenario, nodes, views)| simulated(basis, scenario, number, nodes, views))
-        .collect()
+    points.into_par_iter().filter_map(|(scenario, nodes, views)| simulated(results, scenario, nodes, views)).collect()
 }
 
-fn cluster(basis: &Basis, scenario: &Scenario, nodes: usize) -> (Cluster, f64) {
+fn simulated(results: &Results, scenario: &Scenario, nodes: usize, views: usize) -> Option<Simulated> {
     let bytes_per_s = scenario.gbit_per_s * BYTES_PER_S_A_GBIT;
-    let equal = basis.traffic.cluster(nodes, Machine { bytes_per_s, ..Machine::of(scenario.costs) }, basis.images);
-    let speeds = if scenario.unequal { spread_speeds(nodes, UNEQUAL_RATIO, SEED) } else { vec![1.0; nodes] };
+    let machine = Machine { bytes_per_s, ..Machine::of(scenario.costs) };
+    let equal = results.traffic.cluster(nodes, machine, results.images);
+    let speeds = if scenario.is_unequal { spread_speeds(nodes, UNEQUAL_RATIO, SEED) } else { vec![1.0; nodes] };
     let machines = equal.machines.iter().zip(&speeds).map(|(machine, &speed)| machine.faster(speed)).collect();
-    (Cluster { machines, ..equal }.cut(scenario.parts), speeds.iter().sum())
-}
-
-fn simulated(basis: &Basis, scenario: &Scenario, number: usize, nodes: usize, views: usize) -> Option<Simulated> {
-    let (cluster, speed) = cluster(basis, scenario, nodes);
+    let cluster = Cluster { machines, ..equal };
     let demand = Demand { views, sets: SETS, policy: PolicyChoice::Auto, tiles: None, nodes_report: true };
     let planned = plan(&cluster, &demand).ok()?;
-    let run = run(&cluster, &planned, views, SETS, scenario.habits);
+    let run = run(&cluster, &planned, views, SETS, Habits::default());
     let period_s = run.steady_period_s();
+    let speed: f64 = speeds.iter().sum();
     Some(Simulated {
-        scenario: number,
+        scenario: scenario.name.clone(),
         nodes,
         views,
         policy: planned.assignment.policy,
         samplers: planned.sampler_count(),
         period_s,
-        efficiency: super::costs::efficiency(&scenario.costs, basis.images, views, 1, speed * period_s),
+        efficiency: efficiency(&scenario.costs, results.images, views, 1, speed * period_s),
         limit: run.limit(),
     })
 }
 
-/// The most nodes up to which efficiency stays above a bar, and the first point beyond.
+/// The name of the table of all points, which is too long for a terminal.
+pub const SWEEP_TABLE: &str = "Simulated points";
+
+/// A table of all simulated points.
+pub fn table(points: &[Simulated]) -> anyhow::Result<Table> {
+    let columns = [
+        ("scenario", ""),
+        ("V", ""),
+        ("P", ""),
+        ("policy", ""),
+        ("K", ""),
+        ("T", "s"),
+        ("efficiency", ""),
+        ("limit", ""),
+    ];
+    let mut table = Table::new(SWEEP_TABLE, &columns);
+    for point in points {
+        table.push([
+            point.scenario.as_str().into(),
+            point.views.into(),
+            point.nodes.into(),
+            point.policy.to_string().into(),
+            point.samplers.into(),
+            point.period_s.into(),
+            point.efficiency.into(),
+            point.limit.to_string().into(),
+        ])?;
+    }
+    Ok(table)
+}
+
+/// The number of nodes up to which each scenario scales, and the first point beyond with its limit.
+pub fn reach_table(scenarios: &[Scenario], points: &[Simulated]) -> anyhow::Result<Table> {
+    let columns = [
+        ("scenario", ""),
+        ("V", ""),
+        ("P up to which efficiency is 0.8", ""),
+        ("P beyond", ""),
+        ("efficiency there", ""),
+        ("policy there", ""),
+        ("limit there", ""),
+    ];
+    let mut table = Table::new("How far it scales, simulated", &columns);
+    for (scenario, views) in scenarios.iter().flat_map(|scenario| VIEWS.map(|views| (scenario, views))) {
+        // Points are in the order of P.
+        let all = points.iter().filter(|point| point.scenario == scenario.name && point.views == views);
+        let last = all.clone().take_while(|point| point.efficiency >= LEAST_EFFICIENCY).last();
+        let beyond = all.clone().find(|point| point.efficiency < LEAST_EFFICIENCY);
+        table.push([
+            scenario.name.as_str().into(),
+            views.into(),
+            last.map(|point| point.nodes).into(),
+            beyond.map(|point| point.nodes).into(),
+            beyond.map(|point| point.efficiency).into(),
+            beyond.map(|point| point.policy.to_string()).into(),
+            beyond.map(|point| point.limit.to_string()).into(),
+        ])?;
+    }
+    Ok(table)
+}
+
+/// Efficiency by P of all scenarios.
 #[must_use]
-pub fn reach(points: &[Simulated], scenario: usize, views: usize, bar: f64) -> (Option<usize>, Option<Simulated>) {
-    let mut of: Vec<&Simulated> = points.iter().filter(|p| p.scenario == scenario && p.views == views).collect();
-    of.sort_by_key(|point| point.nodes);
-    let short = of.iter().position(|point| point.efficiency < bar);
-    let last = short.map_or(of.len(), |short| short).checked_sub(1).map(|at| of[at].nodes);
-    (last, short.map(|short| of[short].clone()))
+pub fn chart(scenarios: &[Scenario], points: &[Simulated]) -> XyChart {
+    let name = format!("Simulated efficiency, V = {CHARTED_VIEWS}");
+    let chart = XyChart::new(name, Axis::log("nodes P", ""), Axis::linear("efficiency", ""));
+    let series = |scenario: &Scenario| {
+        let own = points.iter().filter(|point| point.scenario == scenario.name && point.views == CHARTED_VIEWS);
+        Series::line(scenario.name.as_str(), own.map(|point| (point.nodes as f64, point.efficiency)))
+    };
+    let mut chart = scenarios.iter().map(series).fold(chart.with_limit("0.8", LEAST_EFFICIENCY), XyChart::with);
+    chart.note =
+        "Simulated, not measured: plans of the real schedule, carried out by the simulation that stands beside the \
+                  measured points."
+            .to_owned();
+    chart
 }

@@ -4,19 +4,18 @@ use std::path::PathBuf;
 
 use app_core::exit::Outcome;
 use app_core::process::runtime;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use gpu::DevicePreference;
 use render::Lighting;
 use scene::SceneSpec;
 
-use super::part::Part;
 use super::up::Up;
-use super::{beside, costs, guests, killed_compositor, many_views, new_size, report, walkers};
+use super::{beside, guests, killed_compositor, report};
 use crate::section::{self, Section, finish, measure_parts};
 
 /// Measures a live viewer of 320×180 at 10 poses a second beside batches of other clients: other sizes, lightings,
-/// codecs, scenes, moments, and views drawn directly. Each batch is measured alone, too. Further rows are what the sharing
-/// of a cluster must not change: costs, the other scene when a node is killed, a client's memory, plans of walkers.
+/// codecs, scenes, moments, and views drawn directly. Each batch is measured alone, too. Then a node of one scene is killed
+/// while viewers of another scene look on.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: myriorama-lab bench sharing --strict")]
 pub struct SharingArgs {
@@ -49,17 +48,34 @@ pub struct SharingArgs {
     strict: bool,
 }
 
+/// A part of the report, which is measured by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Part {
+    /// A viewer beside six kinds of batch
+    Guests,
+    /// Two scenes on processes; a compositor of one is killed
+    KilledCompositor,
+}
+
 impl SharingArgs {
     fn repeats(&self) -> usize {
         if self.quick { 1 } else { 3 }
     }
 
     /// Arguments of `myriorama up`.
-    fn cluster(&self, scenes: &[&SceneSpec]) -> Vec<String> {
-        let scenes = scenes.iter().flat_map(|scene| ["--scene".to_owned(), scene.to_string()]);
-        let [lighting, device, nodes] = [self.lighting.to_string(), self.device.to_string(), self.nodes.to_string()];
-        let rest = ["--lighting", &lighting, "--device", &device, "--nodes", &nodes].map(str::to_owned);
-        scenes.chain(rest).collect()
+    fn cluster(&self) -> [String; 10] {
+        [
+            "--scene".to_owned(),
+            self.scene.to_string(),
+            "--scene".to_owned(),
+            self.other_scene.to_string(),
+            "--lighting".to_owned(),
+            self.lighting.to_string(),
+            "--device".to_owned(),
+            self.device.to_string(),
+            "--nodes".to_owned(),
+            self.nodes.to_string(),
+        ]
     }
 }
 
@@ -83,14 +99,9 @@ pub fn run(args: &SharingArgs) -> anyhow::Result<Outcome> {
 }
 
 async fn measure_part(args: &SharingArgs, part: Part) -> anyhow::Result<Section> {
-    let both = || args.cluster(&[&args.scene, &args.other_scene]);
     match part {
-        Part::Guests => guests(&both(), args.repeats()).await,
-        Part::NewSize => new_size::measure(&both(), args.repeats()).await,
-        Part::Costs => costs::measure(&both(), args.repeats()).await,
+        Part::Guests => guests(&args.cluster(), args.repeats()).await,
         Part::KilledCompositor => killed_compositor::measure(args.device).await,
-        Part::ManyViews => many_views::measure(&args.cluster(&[&args.other_scene]), &args.out).await,
-        Part::Walkers => walkers::measure().await,
     }
 }
 

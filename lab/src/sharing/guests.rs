@@ -31,7 +31,7 @@ enum Difference {
     Direct,
 }
 
-pub(super) const SMALL_PX: UVec2 = UVec2::new(320, 180);
+const SMALL_PX: UVec2 = UVec2::new(320, 180);
 
 /// All guests, in the order of the report.
 pub(super) static GUESTS: [Guest; 6] = [

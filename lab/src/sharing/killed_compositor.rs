@@ -10,7 +10,7 @@ use report::{Bar, Cell, Check, Table};
 
 use super::up::policies;
 use super::viewer::{Viewer, Watched};
-use crate::load::processes::{Processes, Setting};
+use crate::processes::{Processes, Setting, Share};
 use crate::section::Section;
 
 /// The longest time without a new frame of the other scene.
@@ -29,8 +29,8 @@ const AFTER: Duration = Duration::from_secs(45);
 /// # Errors
 /// A process does not start, or the frames of a viewer end.
 pub(super) async fn measure(device: DevicePreference) -> anyhow::Result<Section> {
-    let scene = SCENES.iter().flat_map(|scene| ["--scene", scene].map(str::to_owned)).collect();
-    let mut processes = Processes::start(&Setting { scene, device, nodes: NODES, share_cores: None }).await?;
+    let coordinator = SCENES.iter().flat_map(|scene| ["--scene", scene].map(str::to_owned)).collect();
+    let mut processes = Processes::start(&Setting { coordinator, device, nodes: NODES, share: Share::Whole }).await?;
     let offers = Client::connect(&processes.address).await?.status().await?.offers;
     let mut viewers = Vec::new();
     for offer in offers.iter().cycle().take(SCENES.len() * VIEWERS) {

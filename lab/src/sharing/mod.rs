@@ -6,17 +6,11 @@
 pub mod command;
 
 mod beside;
-mod costs;
 mod guests;
 mod killed_compositor;
-mod many_views;
-mod new_size;
-mod part;
 mod report;
-
 mod up;
 mod viewer;
-mod walkers;
 
 #[cfg(test)]
 mod tests;

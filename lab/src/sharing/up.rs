@@ -1,6 +1,5 @@
 //! The cluster in one process, beside which most figures are taken.
 
-use anyhow::Context as _;
 use app_core::exit::BadInput;
 use client::Client;
 use cluster::OfferStatus;
@@ -29,14 +28,6 @@ impl Up {
         let status = Client::connect(&coordinator).await?.status().await?;
         let device = status.nodes.first().map_or_else(String::new, |node| node.device_name.clone());
         Ok(Self { coordinator, offers: status.offers, device, _process: process })
-    }
-
-    /// The scene of the viewer.
-    ///
-    /// # Errors
-    /// None is on offer.
-    pub(super) fn offer(&self) -> anyhow::Result<&OfferStatus> {
-        self.offers.first().context("no scene is on offer")
     }
 
     /// The scene of the viewer and the other one.

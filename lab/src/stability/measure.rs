@@ -1,7 +1,5 @@
 //! The frames of a path on a device.
 
-use std::sync::Arc;
-
 use depth_image::{DepthImage, PinholeCamera, SampleImage, View, ViewPlanes};
 use node::{DirectWork, Engine, SampleWork, SharedSet, Turn, UploadedSet, ViewWork, WorkClass};
 use probe::{Light, Representation, Subject};
@@ -16,11 +14,9 @@ pub struct Stand<'a> {
     pub subject: &'a Subject,
 }
 
-/// A path with its frames: delivered views, the truth, and the figures of each frame from the second on.
+/// A path, and how its frames compare with the truth.
 pub struct Measured {
     pub path: Path,
-    pub views: Vec<View>,
-    pub truths: Vec<View>,
     /// The figures of the frames from the second on.
     pub figures: Vec<Figures>,
 }
@@ -33,26 +29,20 @@ impl Stand<'_> {
     /// # Errors
     /// The device fails.
     pub fn measure(&self, path: Path) -> anyhow::Result<Measured> {
-        let (mut views, mut truths, mut images) = (Vec::new(), Vec::new(), Vec::new());
+        let mut views = Vec::new();
+        let mut truths = Vec::new();
         for (place, set) in path.sets.iter().enumerate() {
             // Frames of a set follow one another.
             let frames = path.frames.iter().filter(|frame| frame.set == place);
             let cameras: Vec<PinholeCamera> = frames.map(|frame| frame.camera).collect();
-            let sampled = Arc::new(self.sample(set)?);
-            let uploaded = self.upload(&sampled)?;
+            let uploaded = self.upload(&self.sample(set)?)?;
             views.extend(self.views(uploaded.as_ref(), &set.representation, cameras.clone())?);
-            images.extend(std::iter::repeat_n(sampled, cameras.len()));
             truths.extend(self.truths(cameras, set.time_s)?);
         }
-        let compared = |frame: usize| Compared {
-            camera: path.frames[frame].camera,
-            truth: &truths[frame],
-            view: &views[frame],
-            sample_images: &images[frame],
-        };
-        let figures = (1..views.len()).into_par_iter().map(|frame| Figures::of(&compared(frame - 1), &compared(frame)));
-        let figures = figures.collect::<Result<_, _>>()?;
-        Ok(Measured { path, views, truths, figures })
+        let compared: Vec<Compared<'_>> =
+            truths.iter().zip(&views).map(|(truth, view)| Compared { truth, view }).collect();
+        let figures = compared.par_windows(2).map(|pair| Figures::new(pair[0], pair[1])).collect::<Result<_, _>>()?;
+        Ok(Measured { path, figures })
     }
 
     /// The images of a set.

@@ -8,7 +8,7 @@ use glam::{UVec2, Vec2};
 use probe::Representation;
 use render::Lighting;
 
-use crate::fronts::row::default_place;
+use crate::fronts::subject::default_place;
 
 /// The orbits' radius, as a share of the view cell.
 const RADIUS: f32 = 0.8;
@@ -61,22 +61,22 @@ pub struct PathKind {
     step_px: f32,
 }
 
+impl PathKind {
+    const fn new(name: &'static str, scene: &'static str, switch: Switch, step_px: f32) -> Self {
+        Self { name, scene, lighting: "phong", switch, step_px }
+    }
+}
+
 /// All paths.
 pub const PATHS: [PathKind; 8] = [
-    PathKind { name: "slow orbit", scene: "tree-terrain-30k", lighting: "phong", switch: Switch::None, step_px: 0.25 },
-    PathKind { name: "fast orbit", scene: "tree-terrain-30k", lighting: "phong", switch: Switch::None, step_px: 8.0 },
-    PathKind { name: "fast orbit in a city", scene: "urban", lighting: "phong", switch: Switch::None, step_px: 8.0 },
-    PathKind { name: "across cells of a tree", scene: "tree", lighting: "phong", switch: Switch::Cell, step_px: 0.0 },
-    PathKind { name: "across cells", scene: "blocks", lighting: "phong", switch: Switch::Cell, step_px: 0.0 },
-    PathKind {
-        name: "another representation",
-        scene: "tree-terrain-30k",
-        lighting: "phong",
-        switch: Switch::Representation,
-        step_px: 0.25,
-    },
-    PathKind { name: "wind", scene: "tree-terrain-30k-wind", lighting: "phong", switch: Switch::Moment, step_px: 0.0 },
-    PathKind { name: "light refined", scene: "courtyard", lighting: "soft 64", switch: Switch::Light, step_px: 0.0 },
+    PathKind::new("slow orbit", "tree-terrain-30k", Switch::None, 0.25),
+    PathKind::new("fast orbit", "tree-terrain-30k", Switch::None, 8.0),
+    PathKind::new("fast orbit in a city", "urban", Switch::None, 8.0),
+    PathKind::new("across cells of a tree", "tree", Switch::Cell, 0.0),
+    PathKind::new("across cells", "blocks", Switch::Cell, 0.0),
+    PathKind::new("another representation", "tree-terrain-30k", Switch::Representation, 0.25),
+    PathKind::new("wind", "tree-terrain-30k-wind", Switch::Moment, 0.0),
+    PathKind { lighting: "soft 64", ..PathKind::new("light refined", "courtyard", Switch::Light, 0.0) },
 ];
 
 /// The frames of a path, and its sets.
@@ -122,6 +122,11 @@ impl Path {
             }
         };
         Ok(Self { kind, sets, frames })
+    }
+
+    /// The number of frames that are made of another set than the one before.
+    pub fn switches(&self) -> usize {
+        (0..self.frames.len()).filter(|&frame| self.is_switch(frame)).count()
     }
 
     /// Whether a frame is made of another set than the one before.

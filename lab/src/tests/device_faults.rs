@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use app_core::addresses::listen;
 use app_core::cluster::Cluster;
 use app_core::delivery::{open, receive, request};
-use app_core::process::{listen, runtime};
+use app_core::process::runtime;
 use app_core::setup::{SceneArgs, Setup};
 use app_core::sizes::SampleSize;
 use client::Session;

@@ -4,31 +4,22 @@ use std::path::PathBuf;
 
 use app_core::exit::Outcome;
 use app_core::process::runtime;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use gpu::DevicePreference;
-use render::Lighting;
 use scene::SceneSpec;
 
-use super::part::Part;
 use super::stand::Ground;
-use super::{dragging, faults, first_picture, memory, rest, slow_link, stills, walk};
+use super::{dragging, faults, first_picture, memory, rest, slow_link, walk};
 use crate::section::{Section, finish, measure_parts, report};
 
 /// Measures the viewer's page in Chromium, before a gateway, a coordinator and two nodes on the same machine: pictures of
-/// drags, stills, first pictures, a slow link, faults, a walk around the scene, stills of shared light, and memory. Needs chromium.
+/// drags, stills, first pictures, a slow link, faults, a walk around the scene, and memory. Needs chromium.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: myriorama-lab bench viewer --quick --only dragging --only rest")]
 pub struct ViewerBenchArgs {
     /// The scene
     #[arg(long, value_name = "SPEC", default_value = "courtyard")]
     scene: SceneSpec,
-    /// How surfaces are lit in stills of shared light
-    #[arg(long, value_name = "TERMS", default_value = "soft 16, occlusion 16")]
-    lighting: Lighting,
-    /// A folder with the models FlightHelmet, lamborghini, ingenuity, threejs-shaderball and spot, or with subfolders that have
-    /// them, for stills of shared light
-    #[arg(long, value_name = "DIR")]
-    models: Option<PathBuf>,
     /// any (a GPU if there is one) or software
     #[arg(long, default_value_t, value_name = "NAME", env = "MYRIORAMA_DEVICE")]
     device: DevicePreference,
@@ -46,18 +37,30 @@ pub struct ViewerBenchArgs {
     strict: bool,
 }
 
+/// A part of the report, which is measured by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Part {
+    /// Pictures of a drag: their rate, age, bytes, and the gateway's share
+    Dragging,
+    /// The lossless still after a drag
+    Rest,
+    /// The first picture of a page, and of a cluster
+    FirstPicture,
+    /// A link of 1 Mbit/s with a round trip of 80 ms, which is then freed
+    SlowLink,
+    /// A compositor is killed, then the gateway
+    Faults,
+    /// A walk around the scene, and its stills beside direct drawing
+    Walk,
+    /// Memory of the page and the gateway while a visitor drags and rests
+    Memory,
+}
+
 impl ViewerBenchArgs {
     fn ground(&self) -> Ground {
-        let (repeats, memory_s) = if self.quick { (1, 60.0) } else { (5, 600.0) };
-        Ground {
-            scene: self.scene.to_string(),
-            lighting: self.lighting,
-            models: self.models.clone(),
-            out: self.out.clone(),
-            device: self.device,
-            repeats,
-            memory_s,
-        }
+        let repeats = if self.quick { 1 } else { 5 };
+        let memory_s = if self.quick { 60.0 } else { 600.0 };
+        Ground { scene: self.scene.to_string(), device: self.device, repeats, memory_s }
     }
 }
 
@@ -83,7 +86,6 @@ async fn measure_part(ground: &Ground, part: Part) -> anyhow::Result<Section> {
         Part::SlowLink => slow_link::measure(ground).await,
         Part::Faults => faults::measure(ground).await,
         Part::Walk => walk::measure(ground).await,
-        Part::Stills => stills::measure(ground).await,
         Part::Memory => memory::measure(ground).await,
     }
 }

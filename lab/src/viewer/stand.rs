@@ -1,15 +1,13 @@
 //! A cluster, a gateway and a browser, each a process.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
 use cluster::PolicyChoice;
 use gpu::DevicePreference;
-use render::Lighting;
 
 use super::page::Page;
-use crate::load::processes::{Processes, Setting};
 use crate::process::Process;
+use crate::processes::{Processes, Setting, Share};
 
 const NODES: usize = 2;
 /// The longest wait for the first picture: shaders are compiled.
@@ -19,12 +17,6 @@ const FIRST_PICTURE: Duration = Duration::from_secs(120);
 #[derive(Debug, Clone)]
 pub(super) struct Ground {
     pub(super) scene: String,
-    /// The light of stills of shared light.
-    pub(super) lighting: Lighting,
-    /// The folder of their models.
-    pub(super) models: Option<PathBuf>,
-    /// The folder of the report.
-    pub(super) out: PathBuf,
     pub(super) device: DevicePreference,
     /// Repeats of a measurement.
     pub(super) repeats: usize,
@@ -47,8 +39,8 @@ impl Stand {
     /// # Errors
     /// A process does not start.
     pub(super) async fn start(ground: &Ground, policy: PolicyChoice) -> anyhow::Result<Self> {
-        let scene = ["--scene", &ground.scene].map(str::to_owned).to_vec();
-        let setting = Setting { scene, device: ground.device, nodes: NODES, share_cores: None };
+        let coordinator = ["--scene", &ground.scene].map(str::to_owned).to_vec();
+        let setting = Setting { coordinator, device: ground.device, nodes: NODES, share: Share::Whole };
         let processes = Processes::start(&setting).await?;
         let (gateway, url) = gateway(&processes.address, policy, "127.0.0.1:0")?;
         Ok(Self { processes, gateway, url, policy })

@@ -5,9 +5,10 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use app_core::addresses::{InsecureArgs, MetricsArgs, listen, listen_address, loopback_of};
 use app_core::exit::Outcome;
 use app_core::print_line;
-use app_core::process::{cancel_at_signal, listen, listen_address, loopback_of, serve_metrics};
+use app_core::process::cancel_at_signal;
 use app_core::scenes::ScenesArgs;
 use clap::Args;
 use coordinator::schedule::Recorder;
@@ -26,26 +27,18 @@ pub struct CoordinatorArgs {
     /// The address to listen on
     #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT", value_parser = listen_address)]
     listen: SocketAddr,
-    /// The address for Prometheus, at /metrics [default: no metrics]
-    #[arg(long, value_name = "HOST:PORT", value_parser = listen_address)]
-    metrics: Option<SocketAddr>,
+    #[command(flatten)]
+    metrics: MetricsArgs,
     /// Records the schedule's events to a file, for `myriorama replay`
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Describes services and messages by gRPC reflection, for grpcurl and the like
-    #[arg(long)]
-    reflection: bool,
-    /// The most open sessions; more are refused
-    #[arg(long, value_name = "N", default_value_t = CoordinatorConfig::default().max_sessions)]
-    max_sessions: usize,
     /// The most open workloads; sessions of further ones are refused. Sessions of one scene, lighting, sampling and
     /// timeline share a workload
     #[arg(long, value_name = "N", default_value_t = CoordinatorConfig::default().max_workloads,
         value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=64))]
     max_workloads: usize,
-    /// Serves without TLS on an address that others can reach
-    #[arg(long)]
-    insecure_bind: bool,
+    #[command(flatten)]
+    insecure: InsecureArgs,
     #[command(flatten)]
     budget: BudgetArgs,
     #[command(flatten)]
@@ -59,7 +52,7 @@ pub struct CoordinatorArgs {
 pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
     let (scenes, offers) = args.scenes.load(args.budget.is_given())?;
     args.budget.check(&offers)?;
-    let listener = listen(args.listen, args.insecure_bind).await?;
+    let listener = listen(args.listen, args.insecure.insecure_bind).await?;
     let address = listener.local_addr()?;
     for (scene, offer) in scenes.iter().zip(offers.iter()) {
         print_line!("{}: {}, offered at http://{address}", offer.name, scene.contents());
@@ -67,16 +60,14 @@ pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
     drop(scenes);
     let shutdown = CancellationToken::new();
     let config = args.budget.configure(CoordinatorConfig {
-        insecure_bind: args.insecure_bind,
-        reflection: args.reflection,
-        max_sessions: args.max_sessions,
+        insecure_bind: args.insecure.insecure_bind,
         max_workloads: args.max_workloads,
         ..CoordinatorConfig::default()
     });
     let log = args.record.as_deref().map(event_log).transpose()?;
     let telemetry = Telemetry::default();
     let metrics = CoordinatorMetrics::new(&telemetry);
-    serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
+    args.metrics.serve(args.insecure, telemetry, shutdown.clone()).await?;
     cancel_at_signal(shutdown.clone());
     let own_address = format!("http://{}", loopback_of(&listener)?);
     let (port, browsers) = args.viewer.share(listener);

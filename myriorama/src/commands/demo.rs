@@ -20,6 +20,8 @@ use shared_light::LightResult;
 /// The number of views V of Lages et al., and of the quick form.
 const VIEWS: usize = app_core::experiment::PAPER_VIEWS;
 const QUICK_VIEWS: usize = 64;
+/// Nodes that share the device.
+const NODES: usize = 5;
 
 /// Runs the demo and writes the report.
 ///
@@ -33,8 +35,7 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     if args.showcase {
         return Ok(Outcome::Done);
     }
-    let nodes = usize::from(args.nodes);
-    let experiment = Experiment::start(args.scene.clone(), setup, args.device.device, nodes)?;
+    let experiment = Experiment::start(args.scene.clone(), setup, args.device.device, NODES)?;
     let results = measure(args, &experiment)?;
     let mut report = new_report(args, &experiment);
     for result in &results {
@@ -72,7 +73,7 @@ fn new_report(args: &DemoArgs, experiment: &Experiment) -> Report {
     report.parameter("scene", args.scene.scene.to_string());
     report.parameter("triangles", experiment.setup.scene.triangle_count() as usize);
     report.parameter("sample images S", experiment.setup.samples.len());
-    report.parameter("nodes P", u32::from(args.nodes));
+    report.parameter("nodes P", NODES);
     report.parameter("sampling", args.scene.sampling().to_string());
     report.parameter("quick", args.quick);
     report

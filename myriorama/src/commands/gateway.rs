@@ -3,9 +3,10 @@
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::path::PathBuf;
 
+use app_core::addresses::{CoordinatorArgs, InsecureArgs, listen, listen_address};
 use app_core::exit::{BadInput, Outcome};
 use app_core::print_line;
-use app_core::process::{cancel_at_signal, coordinator_url, listen, listen_address};
+use app_core::process::cancel_at_signal;
 use app_core::quality::quality;
 use app_core::sizes::SizePx;
 use clap::Args;
@@ -16,21 +17,17 @@ use glam::UVec2;
 use tokio_util::sync::CancellationToken;
 
 use crate::tone::ToneArgs;
-use crate::viewer::{request_of, shared_light_methods};
+use crate::viewer::{NameArgs, request_of, shared_light_methods};
 
 /// Serves the viewer to browsers. Pictures go on while the coordinator is away. There may be any number of gateways.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: myriorama gateway --coordinator http://127.0.0.1:7420 --listen 127.0.0.1:7421")]
 pub struct GatewayArgs {
-    /// The coordinator
-    #[arg(long, default_value = "http://127.0.0.1:7420", value_name = "URL", value_parser = coordinator_url)]
-    coordinator: String,
+    #[command(flatten)]
+    coordinator: CoordinatorArgs,
     /// The address to listen on
     #[arg(long, default_value = "127.0.0.1:7421", value_name = "HOST:PORT", value_parser = listen_address)]
     listen: SocketAddr,
-    /// The most visitors at a time; further ones wait
-    #[arg(long, default_value_t = 64, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=64))]
-    max_visitors: u16,
     /// The largest still picture
     #[arg(long, default_value_t = SizePx(UVec2::new(1920, 1080)), value_name = "WxH")]
     max_still: SizePx,
@@ -43,21 +40,16 @@ pub struct GatewayArgs {
     quality: Option<LightCacheQuality>,
     #[command(flatten)]
     tone: ToneArgs,
-    /// A name of this server in links, beside localhost and addresses; may be repeated
-    #[arg(long = "host", value_name = "NAME")]
-    hosts: Vec<String>,
-    /// Another page that may use this server, as https://host; may be repeated
-    #[arg(long = "allow-origin", value_name = "ORIGIN")]
-    origins: Vec<String>,
+    #[command(flatten)]
+    names: NameArgs,
     /// The certificate chain of TLS, as PEM
     #[arg(long, value_name = "FILE", requires = "tls_key")]
     tls_cert: Option<PathBuf>,
     /// The private key of the certificate, as PEM
     #[arg(long, value_name = "FILE", requires = "tls_cert")]
     tls_key: Option<PathBuf>,
-    /// Serves without TLS on an address that others can reach
-    #[arg(long)]
-    insecure_bind: bool,
+    #[command(flatten)]
+    insecure: InsecureArgs,
 }
 
 /// Runs until a signal.
@@ -71,22 +63,21 @@ pub async fn run(args: GatewayArgs) -> anyhow::Result<Outcome> {
         }
         None => None,
     };
-    let listener = listen(args.listen, args.insecure_bind || tls.is_some()).await?;
+    let listener = listen(args.listen, args.insecure.insecure_bind || tls.is_some()).await?;
     let address = listener.local_addr()?;
     // Whoever can reach the port needs the link.
     let token = if address.ip().is_loopback() { None } else { Some(Token::random()?) };
     let scheme = if tls.is_some() { "https" } else { "http" };
-    let authority = reachable(address, args.hosts.first());
+    let authority = reachable(address, args.names.hosts.first());
     print_line!("Open {scheme}://{authority}/{}", token.as_ref().map_or_else(String::new, Token::query));
     let config = GatewayConfig {
-        max_visitors: usize::from(args.max_visitors),
         max_still_px: args.max_still.0,
-        hosts: args.hosts,
-        origins: args.origins,
+        hosts: args.names.hosts,
+        origins: args.names.origins,
         tls,
         token,
         quality: args.quality,
-        ..GatewayConfig::new(&args.coordinator, request_of(args.policy, args.tone), shared_light_methods())
+        ..GatewayConfig::new(&args.coordinator.coordinator, request_of(args.policy, args.tone), shared_light_methods())
     };
     let shutdown = CancellationToken::new();
     cancel_at_signal(shutdown.clone());

@@ -15,9 +15,6 @@ pub struct HealthArgs {
     /// The address of a coordinator or a node
     #[arg(value_name = "URL")]
     address: String,
-    /// The role to ask about: coordinator, node, sampler or compositor [default: the whole process]
-    #[arg(long, default_value = "", value_name = "NAME")]
-    role: String,
 }
 
 /// Asks once.
@@ -25,7 +22,7 @@ pub struct HealthArgs {
 /// # Errors
 /// The process does not serve, or does not answer within seconds.
 pub async fn run(args: &HealthArgs) -> anyhow::Result<Outcome> {
-    let answer = tokio::time::timeout(DEADLINE, wire::rpc::is_serving(&args.address, &args.role)).await;
+    let answer = tokio::time::timeout(DEADLINE, wire::rpc::is_serving(&args.address, "")).await;
     let no_answer = || format!("{} does not answer", args.address);
     if !answer.with_context(no_answer)?.with_context(no_answer)? {
         bail!("{} does not serve", args.address);

@@ -3,10 +3,11 @@
 use std::net::{SocketAddr, UdpSocket};
 use std::path::PathBuf;
 
+use app_core::addresses::{CoordinatorArgs, InsecureArgs, MetricsArgs, listen, listen_address};
 use app_core::exit::Outcome;
 use app_core::memory::MemoryArgs;
 use app_core::print_line;
-use app_core::process::{cancel_at_signal, coordinator_url, listen, listen_address, serve_metrics};
+use app_core::process::cancel_at_signal;
 use app_core::setup::DeviceArgs;
 use app_core::view_limits::ViewLimitArgs;
 use clap::Args;
@@ -17,9 +18,8 @@ use tokio_util::sync::CancellationToken;
 /// Joins a coordinator, and samples and composites by its plan. Joins again when the coordinator comes back.
 #[derive(Debug, Args)]
 pub struct NodeArgs {
-    /// The address of the coordinator
-    #[arg(long, value_name = "URL", env = "MYRIORAMA_COORDINATOR", value_parser = coordinator_url)]
-    coordinator: String,
+    #[command(flatten)]
+    coordinator: CoordinatorArgs,
     /// The address to listen on; port 0 takes a free port
     #[arg(long, default_value = "127.0.0.1:0", value_name = "HOST:PORT", value_parser = listen_address)]
     listen: SocketAddr,
@@ -36,23 +36,12 @@ pub struct NodeArgs {
     device: DeviceArgs,
     #[command(flatten)]
     memory: MemoryArgs,
-    /// The address for Prometheus, at /metrics [default: no metrics]
-    #[arg(long, value_name = "HOST:PORT", value_parser = listen_address)]
-    metrics: Option<SocketAddr>,
-    /// Describes services and messages by gRPC reflection, for grpcurl and the like
-    #[arg(long)]
-    reflection: bool,
-    /// The most open streams of clients
-    #[arg(long, value_name = "N", default_value_t = Quotas::default().streams)]
-    max_streams: usize,
-    /// The most views of batches that are queued or not sent yet
-    #[arg(long, value_name = "N", default_value_t = Quotas::default().views)]
-    max_views: usize,
+    #[command(flatten)]
+    metrics: MetricsArgs,
     #[command(flatten)]
     limits: ViewLimitArgs,
-    /// Serves without TLS on an address that others can reach
-    #[arg(long)]
-    insecure_bind: bool,
+    #[command(flatten)]
+    insecure: InsecureArgs,
 }
 
 /// Runs until a signal.
@@ -60,27 +49,27 @@ pub struct NodeArgs {
 /// # Errors
 /// There is no device, or the port is taken.
 pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
-    let listener = listen(args.listen, args.insecure_bind).await?;
+    let coordinator = args.coordinator.coordinator;
+    let listener = listen(args.listen, args.insecure.insecure_bind).await?;
     let address = listener.local_addr()?;
     let engine = GpuEngine::shared(args.device.device)?;
     let memory = args.memory.set_memory_bytes(engine.is_software());
     engine.bound_scenes(memory);
     let name = args.name.unwrap_or_else(|| name_of(address));
-    let advertise = args.advertise.or_else(|| own_address(&args.coordinator, address));
+    let advertise = args.advertise.or_else(|| own_address(&coordinator, address));
     print_line!("{name} on {}, at http://{address}", engine.device_name());
     let config = NodeConfig {
         scene_folder: args.scene_folder,
         advertised_address: advertise,
-        insecure_bind: args.insecure_bind,
-        reflection: args.reflection,
+        insecure_bind: args.insecure.insecure_bind,
         set_memory_bytes: memory,
-        quotas: Quotas { streams: args.max_streams, views: args.max_views, view_bytes: args.memory.view_memory },
-        ..args.limits.within(NodeConfig::new(name, args.coordinator))
+        quotas: Quotas { view_bytes: args.memory.view_memory, ..Quotas::default() },
+        ..args.limits.within(NodeConfig::new(name, coordinator))
     };
     let shutdown = CancellationToken::new();
     let telemetry = Telemetry::default();
     let metrics = NodeMetrics::new(&telemetry);
-    serve_metrics(args.metrics, args.insecure_bind, telemetry, shutdown.clone()).await?;
+    args.metrics.serve(args.insecure, telemetry, shutdown.clone()).await?;
     cancel_at_signal(shutdown.clone());
     node_host::serve(listener, config, engine.opener(), metrics, shutdown).await?;
     Ok(Outcome::Done)

@@ -58,9 +58,6 @@ pub struct PlanArgs {
     /// The most time of measuring
     #[arg(long, default_value_t = 300.0, value_name = "S", value_parser = allowance)]
     allowance: f64,
-    /// The seed of the random views
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    seed: u64,
     #[command(flatten)]
     plans: PlansArgs,
     /// The folder of samples.json and rows.csv
@@ -105,7 +102,7 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
         planes: ViewPlanes { antialias: args.antialias, ..ViewPlanes::COLOR },
         codec: args.codec,
         scene_time_s: 0.0,
-        seed: args.seed,
+        seed: 0,
     };
     let planning = Planning::new(&setup, &args.scene, &views)?;
     let mut prober = Prober::new(engine.clone(), planning.subject.clone(), Turn::of(WorkClass::Batch));

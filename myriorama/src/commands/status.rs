@@ -1,19 +1,14 @@
 //! `myriorama status`: workloads and their demand, nodes with their roles and costs, and the reasons of the plans.
 
 use std::io::Write as _;
-use std::path::PathBuf;
 use std::time::Duration;
 
-use anyhow::Context as _;
+use app_core::addresses::CoordinatorArgs;
 use app_core::exit::Outcome;
 use app_core::print_line;
-use app_core::process::coordinator_url;
 use clap::Args;
-use client::Client;
 use cluster::{ClusterStatus, Costs, NodeCondition, NodeStatus, SharedLightCosts, WorkloadStatus};
 use report::{Cell, Table};
-
-use crate::terminal_picture;
 
 const WORKLOAD_COLUMNS: [(&str, &str); 10] = [
     ("workload", ""),
@@ -47,15 +42,11 @@ const COLUMNS: [(&str, &str); 12] = [
 /// Prints the workloads of a cluster, the nodes of each with their roles and costs, and the reasons of the plans.
 #[derive(Debug, Args)]
 pub struct StatusArgs {
-    /// The address of the coordinator
-    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7420", env = "MYRIORAMA_COORDINATOR", value_parser = coordinator_url)]
-    coordinator: String,
+    #[command(flatten)]
+    coordinator: CoordinatorArgs,
     /// Repeats every S seconds until ctrl-c
     #[arg(long, value_name = "S", num_args = 0..=1, default_missing_value = "1")]
     watch: Option<f64>,
-    /// Writes the text as a picture as well (SVG)
-    #[arg(long, value_name = "FILE", conflicts_with = "watch")]
-    picture: Option<PathBuf>,
 }
 
 /// Asks and prints.
@@ -63,15 +54,10 @@ pub struct StatusArgs {
 /// # Errors
 /// The coordinator does not answer.
 pub async fn run(args: &StatusArgs) -> anyhow::Result<Outcome> {
-    let client =
-        Client::connect(&args.coordinator).await.with_context(|| format!("no coordinator at {}", args.coordinator))?;
+    let client = args.coordinator.connect().await?;
     loop {
         let text = text(&client.status().await?)?;
         let Some(seconds) = args.watch else {
-            if let Some(file) = &args.picture {
-                let written = std::fs::write(file, terminal_picture::svg(&text));
-                written.with_context(|| format!("cannot write {}", file.display()))?;
-            }
             print_line!("{text}");
             return Ok(Outcome::Done);
         };

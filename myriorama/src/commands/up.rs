@@ -2,11 +2,12 @@
 
 use std::net::SocketAddr;
 
+use app_core::addresses::{InsecureArgs, listen, listen_address};
 use app_core::cluster::Cluster;
 use app_core::exit::Outcome;
 use app_core::memory::MemoryArgs;
 use app_core::print_line;
-use app_core::process::{listen, listen_address, stop_signal};
+use app_core::process::stop_signal;
 use app_core::scenes::ScenesArgs;
 use app_core::setup::DeviceArgs;
 use app_core::view_limits::ViewLimitArgs;
@@ -39,9 +40,8 @@ pub struct UpArgs {
     /// The address that the coordinator listens on
     #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT", value_parser = listen_address)]
     listen: SocketAddr,
-    /// Serves without TLS on an address that others can reach
-    #[arg(long)]
-    insecure_bind: bool,
+    #[command(flatten)]
+    insecure: InsecureArgs,
     #[command(flatten)]
     budget: BudgetArgs,
     #[command(flatten)]
@@ -55,7 +55,7 @@ pub struct UpArgs {
 pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     let (scenes, offers) = args.scenes.load(args.budget.is_given())?;
     args.budget.check(&offers)?;
-    let listener = listen(args.listen, args.insecure_bind).await?;
+    let listener = listen(args.listen, args.insecure.insecure_bind).await?;
     let engine = GpuEngine::shared(args.device.device)?;
     let (memory, nodes) = (args.memory.set_memory_bytes(engine.is_software()), usize::from(args.nodes));
     engine.bound_scenes(memory);
@@ -73,7 +73,7 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     };
     let device_name = engine.device_name();
     let (port, browsers) = args.viewer.share(listener);
-    let config = CoordinatorConfig { insecure_bind: args.insecure_bind, ..CoordinatorConfig::default() };
+    let config = CoordinatorConfig { insecure_bind: args.insecure.insecure_bind, ..CoordinatorConfig::default() };
     let config = args.budget.configure(config);
     let mut cluster = Cluster::start(configure, port, config, offers, engine.opener(), nodes).await?;
     print_line!("{nodes} nodes on {device_name}, at {}", cluster.address);

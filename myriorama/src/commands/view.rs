@@ -32,6 +32,9 @@ use record::Record;
 use stopping::{Ended, how_to_resume, until};
 use writer::PictureWriter;
 
+/// The longest wait for the choice of a budget.
+const LONGEST_WAIT: Duration = Duration::from_secs(60);
+
 /// Asks for views, receives them, and writes them.
 ///
 /// # Errors
@@ -93,7 +96,7 @@ async fn pictures(args: &ViewArgs, signals: &StopSignals) -> anyhow::Result<Outc
     }
     job.expose(&record);
     match until(&signals.first, compare(args, &job, record.total())).await? {
-        Some(outcome) => is_kept.map(|()| outcome),
+        Some(()) => is_kept.map(|()| Outcome::Done),
         None => {
             eprintln!("{}", how_to_resume(&record, &args.out));
             Ok(Outcome::Interrupted)
@@ -109,8 +112,7 @@ async fn write_missing(
     signals: &StopSignals,
 ) -> anyhow::Result<Ended> {
     let Some(session) = until(&signals.first, job.open()).await? else { return Ok(Ended::Stopped) };
-    let wait = job.wait_for_promise(&session, Duration::from_secs_f64(args.promise_wait));
-    if until(&signals.first, wait).await?.is_none() {
+    if until(&signals.first, job.wait_for_promise(&session, LONGEST_WAIT)).await?.is_none() {
         return Ok(Ended::Stopped);
     }
     record.set_tone(session.tone());
@@ -174,7 +176,5 @@ async fn follow(args: &ViewArgs, session: &Session, path: Vec<PinholeCamera>) ->
     if let Some(error) = record.error {
         return Err(error.into());
     }
-    let (gap_s, _) = record.longest_gap_s(0.0);
-    let is_fluent = |longest: f64| gap_s <= longest && !record.shown.is_empty();
-    Ok(Outcome::of(args.longest_gap.is_none_or(is_fluent)))
+    Ok(Outcome::Done)
 }

@@ -2,6 +2,7 @@
 
 // Apart from the clusters of `suite`, whose deadlines need the cores that these checks keep busy.
 mod architecture;
+mod habits;
 mod methods;
 mod shaders;
 mod structure;

@@ -9,10 +9,10 @@ use cluster_tests::imports::{ModulePath, circles, imports, imports_of_crate};
 use crate::root;
 
 /// Lines from a function's first to its last.
-const MAX_FUNCTION_LINES: usize = 60;
+const MAX_FUNCTION_LINES: usize = 100;
 
 /// All files below the workspace with one of these endings.
-fn sources(endings: &[&str]) -> Vec<PathBuf> {
+pub(crate) fn sources(endings: &[&str]) -> Vec<PathBuf> {
     let mut open = vec![root()];
     let mut files = Vec::new();
     while let Some(folder) = open.pop() {

@@ -1,5 +1,4 @@
-//! Bounds and audits on errors of real views: FLIP of 1,000 random views of each row in `tests/data/view_errors.csv`, which
-//! `myriorama-lab study errors` measures.
+//! Bounds and audits on errors of real views: FLIP of 1,000 random views of each row in `tests/data/view_errors.csv`.
 
 use planner::{Audit, Budget, ERROR_RATE, Metric, Moments, ViewErrors, most_over};
 

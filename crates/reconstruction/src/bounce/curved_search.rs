@@ -1,7 +1,7 @@
 //! The walk along curved rays in images of single-pole cameras: `curved_search.wgsl`.
 
 use gpu::{ResourceTraits, ShaderVariant};
-use minijinja::Value;
+use minijinja::{Value, context};
 
 use crate::error::ReconstructionError;
 use crate::view_work::{ONE_VIEW, SetVariant};
@@ -42,6 +42,8 @@ impl Default for CurvedSearch {
 #[derive(Debug)]
 pub(crate) struct CurvedWalk {
     pub set: SetVariant,
+    /// Counts the steps of each ray, for a study.
+    pub count_steps: bool,
 }
 
 impl ShaderVariant for CurvedWalk {
@@ -49,10 +51,13 @@ impl ShaderVariant for CurvedWalk {
     const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
-        self.set.context()
+        context! { count_steps => self.count_steps, ..self.set.context() }
     }
 
     fn all() -> Vec<Self> {
-        SetVariant::all().into_iter().map(|set| Self { set }).collect()
+        SetVariant::all()
+            .into_iter()
+            .flat_map(|set| [false, true].map(|count_steps| Self { set, count_steps }))
+            .collect()
     }
 }

@@ -288,7 +288,7 @@ impl ShaderVariant for BounceMarch {
     }
 
     fn all() -> Vec<Self> {
-        let sets = SetVariant::all().into_iter().filter(|set| !set.count_fetches);
+        let sets = SetVariant::all().into_iter();
         sets.map(|set| Self { set }).collect()
     }
 }
@@ -330,7 +330,7 @@ impl ShaderVariant for Land {
     fn all() -> Vec<Self> {
         let lights = [(0, 0), (3, 1), (255, 64)];
         let cells = [(None, false), (None, true), (Some(1), true), (Some(MAX_RAY_LISTS), true)];
-        let sets = || SetVariant::all().into_iter().filter(|set| !set.count_fetches);
+        let sets = || SetVariant::all().into_iter();
         let each = move |(lights, visibility_words)| {
             cells.into_iter().flat_map(move |(next_cells, reflects)| {
                 sets().flat_map(move |set| {
@@ -430,13 +430,13 @@ fn follow_curved(
     lists: &RayLists,
     (cell, reflection): (usize, u32),
 ) -> Result<(), ReconstructionError> {
-    let count_fetches = bounces.steps.is_some();
-    let walk = CurvedWalk { set: SetVariant { count_fetches, ..bounces.cells[cell].surroundings.variant() } };
+    let set = bounces.cells[cell].surroundings.variant();
+    let walk = CurvedWalk { set, count_steps: bounces.steps.is_some() };
     let unknown = PixelList::empty(&recording.device.gpu, (*bounces.listed[3]).clone(), bounces.cells.len());
     let pass = recording.device.passes.get(&walk)?;
     let mut bindings = bounces.search_bindings(cell, &unknown);
     bindings.extend(bounces.pole_binding(cell));
-    bindings.extend(bounces.steps.as_ref().map(|steps| Binding::buffer("out_fetches", steps)));
+    bindings.extend(bounces.steps.as_ref().map(|steps| Binding::buffer("out_steps", steps)));
     bindings.extend(bounces.list_bindings(lists));
     let bound = pass.bind(0, bindings)?;
     recording.dispatch_listed(&walk, &pass, &bound, (&lists.lists, cell), (cell, reflection));

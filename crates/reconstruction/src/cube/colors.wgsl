@@ -7,8 +7,6 @@
 struct CubeSample { color_linear: vec3f, number: u32, links: vec3u }
 
 fn cube_sample(number: u32) -> CubeSample {
-{% if count_fetches %}    fetches += 1u;
-{% endif %}
     let words = textureLoad(cube_samples, texel_at(number), 0);
     return CubeSample(linear_from_rgb9e5(words.x), number, words.yzw);
 }

@@ -65,14 +65,10 @@ fn lobe_angle(mirror: Mirror, is_rough: bool) -> f32 {
 
 // The light of the first surface on a line behind a depth, and how far behind; or what is around the scene, at no distance.
 fn light_on_line(line: u32, depth_m: f32, around: vec3f) -> vec4f {
-{% if count_fetches %}    fetches += 1u;
-{% endif %}
     let ends = textureLoad(light_lines, texel_at(line), 0).xy;
     var found = false;
     var light = vec4f(around, 0.0);
     for (var sample = ends.x; sample < ends.y && !found; sample++) {
-{% if count_fetches %}        fetches += 1u;
-{% endif %}
         let words = textureLoad(light_samples, texel_at(sample), 0);
         let behind_m = bitcast<f32>(words.x) - depth_m;
         found = behind_m >= 0.0;
@@ -106,8 +102,6 @@ fn light_between_lines(direction: u32, place: vec2f, depth_m: f32, around: vec3f
 
 // The light that comes to a point from around a direction; `towards` has the direction and its solid angle.
 fn light_through(direction: u32, towards: vec4f, point_in_world: vec3f, is_rough: bool) -> vec3f {
-{% if count_fetches %}    fetches += 3u;
-{% endif %}
     let p = vec4f(point_in_world, 1.0);
     let column = light_texel(direction, 1u);
     let place = vec2f(dot(column, p), dot(light_texel(direction, 2u), p));
@@ -141,8 +135,6 @@ fn gathered_light(mirror: Mirror) -> vec3f {
     let least_cosine = cos(min(farthest, LIGHT_PI));
     var is_within = true;
     for (var place = 0u; place < light_field.directions && is_within; place++) {
-{% if count_fetches %}        fetches += 2u;
-{% endif %}
         let direction = direction_in_order(nearest, place);
         let own = light_texel(direction, 0u);
         is_within = dot(middle, own.xyz) >= least_cosine;

@@ -7,7 +7,7 @@ mod reaches;
 mod samples;
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{CubeGrid, LayeredDepthImage, LayeredLightField};
+use depth_image::{CubeGrid, CubeImages, LayeredDepthImage};
 use glam::Vec3;
 use gpu::{Binding, GpuError, Table, TablePool, Turn};
 use wgpu::{BufferUsages, TextureFormat};
@@ -69,8 +69,7 @@ impl Cube {
     /// Fails for images that are not those of the grid's lines, and beyond the device's limits.
     pub fn upload(
         tables: &TablePool,
-        grid: &CubeGrid,
-        (images, light_field): (&[LayeredDepthImage; 3], Option<&LayeredLightField>),
+        CubeImages { grid, images, light_field }: &CubeImages,
         set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
@@ -101,7 +100,7 @@ impl Cube {
             samples: tables.upload("samples of a cube", TextureFormat::Rgba32Uint, &words, turn)?,
             reflectors: Reflectors::of_cube(tables, (images, &samples.place), set, turn)?,
             start_m,
-            light_field: light_field.map(|field| LightField::upload(tables, field, turn)).transpose()?,
+            light_field: light_field.as_ref().map(|field| LightField::upload(tables, field, turn)).transpose()?,
             truncated: images.iter().any(|image| image.truncated),
         })
     }

@@ -51,14 +51,10 @@ fn along(axis: u32, v: vec3f) -> vec3f { return select(select(v.zxy, v.yzx, axis
 struct Cell { place: vec3i, reach: i32, mask: vec2u, first_leaf: u32 }
 
 fn cell_at(place: vec3i, octant: u32) -> Cell {
-{% if count_fetches %}    fetches += 1u;
-{% endif %}
     let index = u32(place.x) + cube.columns * (u32(place.y) + cube.rows * u32(place.z));
     let word = textureLoad(cube_cells, texel_at(index), 0).x;
     var cell = Cell(place, i32((word >> (4u * octant)) & 15u), vec2u(0u), 0u);
     if (word >> 28u) == 0u {
-{% if count_fetches %}        fetches += 1u;
-{% endif %}
         let words = textureLoad(cube_bricks, texel_at(word), 0);
         cell = Cell(place, 0, words.xy, words.z);
     }
@@ -147,16 +143,12 @@ fn met_in_leaf(ray: CubeRay, voxel: vec3i, cell: Cell, span: vec2f) -> CubeHit {
     let bit = 1u << (within.x + 4u * within.y + 16u * (within.z & 1u));
     let before = countOneBits(select(cell.mask.x, cell.mask.y, within.z >= 2u) & (bit - 1u))
         + select(0u, countOneBits(cell.mask.x), within.z >= 2u);
-{% if count_fetches %}    fetches += 1u;
-{% endif %}
     let leaf = textureLoad(cube_leaves, texel_at(cell.first_leaf + before), 0);
     let in_voxel = CubeRay(ray.origin - vec3f(voxel * 2), ray.direction);
     var nearest = nearer_of(Met(span.y, vec2u(NO_ENTRY)), in_voxel, leaf.xy, span.x);
     let is_long = (leaf.x & MORE_ENTRIES) != 0u;
     nearest = nearer_of(nearest, in_voxel, select(leaf.zw, leaf.xy, is_long), span.x);
     for (var pair = select(leaf.w, leaf.z, is_long); pair < leaf.w; pair++) {
-{% if count_fetches %}        fetches += 1u;
-{% endif %}
         let entries = textureLoad(cube_entries, texel_at(pair), 0);
         nearest = nearer_of(nearest, in_voxel, entries.xy, span.x);
         nearest = nearer_of(nearest, in_voxel, entries.zw, span.x);

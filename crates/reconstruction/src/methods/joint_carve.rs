@@ -45,8 +45,7 @@ impl ShaderVariant for Carve {
     fn all() -> Vec<Self> {
         let levels = |set| {
             let plain = [0, 1, MAX_STOP_LEVEL].map(|stop_level| Self { set, stop_level, bounced: false });
-            let bounced = (!set.count_fetches).then_some(Self { set, stop_level: 0, bounced: true });
-            plain.into_iter().chain(bounced)
+            plain.into_iter().chain([Self { set, stop_level: 0, bounced: true }])
         };
         SetVariant::all().into_iter().flat_map(levels).collect()
     }
@@ -59,7 +58,7 @@ pub(super) fn record(
     stop_level: u32,
     listed: Option<&PixelList>,
 ) -> Result<PixelList, ReconstructionError> {
-    let set = recording.variant();
+    let set = recording.set.variant();
     let mut undecided: Option<PixelList> = None;
     for camera in 0..MARCHES.min(recording.set.cameras.len()) {
         let rays = undecided.as_ref().map(Rays::Left).or(listed.map(Rays::Listed)).unwrap_or(Rays::All);

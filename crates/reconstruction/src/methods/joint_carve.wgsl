@@ -81,8 +81,6 @@ fn evaluate_camera(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, far: f32, l
 
 // By the range of depths in a node of level 1 or coarser.
 fn evaluate_node(camera: SampleCamera, ray: ImageRay, exit: f32, node: vec2u, level: u32, stops: bool) -> Evaluation {
-{% if count_fetches %}    fetches += 1u;
-{% endif %}
     let exit_code = code_beyond(camera, ray.a.z + ray.b.z * exit);
     let index = camera.first_node + node_index(camera.log2_sides, level, node);
     let range = textureLoad(nodes, texel_at(index), 0).x;

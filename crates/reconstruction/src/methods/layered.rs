@@ -85,7 +85,7 @@ impl Walk {
         let is_mapped =
             (highlight == Some(Highlight::Ggx) || in_base && rays.is_bounced()) && recording.set.environment.is_some();
         // Rays off mirrors see no image of the view's set.
-        let set = if rays.is_bounced() { SetVariant::CUBE } else { recording.variant() };
+        let set = if rays.is_bounced() { SetVariant::CUBE } else { recording.set.variant() };
         Self {
             set,
             rays,
@@ -165,26 +165,20 @@ impl ShaderVariant for Walk {
 
     fn all() -> Vec<Self> {
         let lights = [(0, 0), (3, 1), (255, 64)];
-        let matt = switches().map(|[count_fetches, truncated]| Self {
-            set: SetVariant { count_fetches, ..SetVariant::CUBE },
-            truncated,
-            ..Self::PLAIN
-        });
+        let matt = [false, true].map(|truncated| Self { truncated, ..Self::PLAIN });
         let glossy = lights.into_iter().flat_map(|(lights, visibility_words)| {
-            switches().flat_map(move |[count_fetches, truncated, environment_map]| {
-                let set = SetVariant { count_fetches, ..SetVariant::CUBE };
-                let with = Self { set, truncated, lights, visibility_words, ..Self::PLAIN };
+            switches().flat_map(move |[truncated, environment_map]| {
+                let with = Self { truncated, lights, visibility_words, ..Self::PLAIN };
                 let ggx = Self { highlight: Some(Highlight::Ggx), environment_map, ..with };
-                let bounced =
-                    (!count_fetches).then(|| [Walked::Bounced, Walked::IntoLobes].map(|rays| Self { rays, ..ggx }));
+                let bounced = [Walked::Bounced, Walked::IntoLobes].map(|rays| Self { rays, ..ggx });
                 let blinn_phong = (!environment_map).then_some(Self { highlight: Some(Highlight::BlinnPhong), ..with });
-                let mirrored = [ggx].into_iter().chain(bounced.into_iter().flatten());
+                let mirrored = [ggx].into_iter().chain(bounced);
                 let each =
                     |walk: Self| [walk, Self { mirror_cells: Some(1), ..walk }].into_iter().chain(walk.with_lobes());
                 mirrored.flat_map(each).chain(blinn_phong)
             })
         });
-        let own: Vec<Self> = matt.chain(glossy).collect();
+        let own: Vec<Self> = matt.into_iter().chain(glossy).collect();
         let left = own.iter().filter(|walk| walk.lights <= 3 && walk.lobe.is_none()).flat_map(|walk| walk.of_base());
         let without_reflectors = switches().flat_map(|[truncated, environment_map]| {
             let in_base = Self { in_base: true, truncated, environment_map, ..Self::PLAIN };

@@ -18,6 +18,6 @@ shader_variant!(Search(SetVariant), "light_field_search.wgsl", ONE_VIEW);
 /// Gives the pixels that stay unknown.
 pub(super) fn record(recording: &mut Recording<'_>, steps: u32) -> Result<PixelList, ReconstructionError> {
     let steps = recording.device.gpu.buffer_with("steps", &[steps], BufferUsages::UNIFORM);
-    let search = Search(recording.variant());
+    let search = Search(recording.set.variant());
     surface::record(recording, &search, Rays::All, &[Binding::buffer("steps", &steps)])
 }

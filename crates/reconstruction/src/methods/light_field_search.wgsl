@@ -18,8 +18,6 @@ fn depth_in(camera: SampleCamera, p: vec3f) -> Depth {
     let cells = camera.cells;
     let clamped = clamp(uv, vec2f(0.5), cells + 0.49);
     let texel = vec2u(clamped);
-{% if count_fetches %}    fetches += 1u;
-{% endif %}
     // The first of the corners of the cell to its lower right.
     let cell_index = camera.first_cell + texel.y * camera.width_px + texel.x;
     let word = textureLoad(cell_codes, texel_at(cell_index), 0).x;

@@ -18,6 +18,6 @@ pub(crate) fn record(
 ) -> Result<PixelList, ReconstructionError> {
     let mesh = mesh.expect("methods that draw are handed their mesh");
     draw::record(drawing, recording, mesh)?;
-    let resolve = Resolve(recording.variant());
+    let resolve = Resolve(recording.set.variant());
     surface::record(recording, &resolve, Rays::All, &[])
 }

@@ -14,8 +14,6 @@ fn shows_background(camera: SampleCamera, point_in_world: vec3f) -> bool {
     let uv = p.xy / p.z;
     let texel = vec2u(clamp(uv, vec2f(0.0), camera.cells));
     let inside = p.z > 0.0 && all(uv >= vec2f(0.0)) && all(uv < camera.cells + 1.0);
-{% if count_fetches %}    fetches += 1u;
-{% endif %}
     let words = textureLoad(cell_codes, texel_at(camera.first_cell + texel.y * camera.width_px + texel.x), 0);
     // Not where the ray passed what other images hold: bit 15 says so.
     return inside && (words.x & 0xffffu) == BACKGROUND_CODE;
@@ -48,8 +46,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let t = select(span.far, work.view.near_m / depth, drawn);
     let point_in_world = work.view.eye_in_world + pixel.direction * t;
     let blend = blend_two_best(point_in_world, pixel.direction);
-{% if count_fetches %}    fetches += 1u;
-{% endif %}
     let own = linear_from_rgb9e5(textureLoad(cell_colors, texel_at(sample), 0).x);
     let known = blend.origin != 0u;
     let origin = select(origin_of(mask_of(sample), 0u), blend.origin, known);

@@ -2,9 +2,10 @@
 
 use depth_image::{Antialias, Environment, Illumination, View, ViewPlanes, linear_from_srgb8};
 use glam::{Vec2, Vec3};
+use gpu::Turn;
 use reconstruction::{ReconstructionMethod, SampleSet, SetDescription, scalar};
 
-use crate::stage::{CARVE, SEARCH, Stage, corpus, reconstructor};
+use crate::stage::{CARVE, SEARCH, Stage, corpus, reconstruct, reconstructor};
 
 const HYBRID: ReconstructionMethod = ReconstructionMethod::HybridMesh { merged: None };
 
@@ -18,7 +19,7 @@ fn drawn(
     method: ReconstructionMethod,
     planes: ViewPlanes,
 ) -> View {
-    reconstructor().reconstruct(set, &[camera], method, planes).expect("a view").remove(0)
+    reconstruct(set, &[camera], method, planes).expect("a view").remove(0)
 }
 
 /// Mean absolute difference of bytes.
@@ -104,7 +105,7 @@ fn light_beyond_white_counts_in_the_mean() {
         environment: None,
         mips: false,
     };
-    let set = reconstructor().upload(&stage.images, &description).expect("a set");
+    let set = reconstructor().upload(&stage.images, &description, Turn::default()).expect("a set");
     let planes = ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::COLOR };
     let view = drawn(&set, corners.view(), CARVE, planes);
     // A sixteenth of a pixel is half of white: 188 of 255. Were colours cut off at white first, it would be 71.

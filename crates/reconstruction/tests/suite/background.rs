@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use depth_image::{EnvironmentMap, ProvenanceKind, ViewPlanes, srgb8_from_linear};
 use glam::{UVec2, Vec2, Vec3};
-use gpu::GpuEnvironment;
+use gpu::{GpuEnvironment, Turn};
 use reconstruction::{ReconstructionMethod, SetDescription};
 use scene::procedural::uv_sphere;
 
-use crate::stage::{CARVE, Corners, SEARCH, Stage, VIEW_PX, count, depths, gpu, reconstructor};
+use crate::stage::{CARVE, Corners, SEARCH, Stage, VIEW_PX, count, depths, gpu, reconstruct, reconstructor};
 
 /// Colours that differ everywhere.
 fn colorful() -> EnvironmentMap {
@@ -25,11 +25,11 @@ fn a_view_shows_the_map_in_each_direction_without_a_surface() {
     let around = Corners { eye: Vec3::new(0.4, 0.9, 3.6), target: Vec3::ZERO, half_m: 0.6 };
     let stage = Stage::with_corners(uv_sphere(1.0, 32), &around.samples(4));
     let described = SetDescription { environment: Some(&on_device), ..stage.description() };
-    let set = reconstructor().upload(&stage.images, &described).expect("a sample set");
+    let set = reconstructor().upload(&stage.images, &described, Turn::default()).expect("a sample set");
     let methods = [CARVE, SEARCH, ReconstructionMethod::Mesh, ReconstructionMethod::HybridMesh { merged: None }];
     for method in methods {
         let views = [around.view(), around.camera(-0.7, 0.6, VIEW_PX)];
-        let found = reconstructor().reconstruct(&set, &views, method, ViewPlanes::ALL).expect("views");
+        let found = reconstruct(&set, &views, method, ViewPlanes::ALL).expect("views");
         for (camera, view) in views.iter().zip(found) {
             let without = stage.view(camera, method);
             let pixels = (0..VIEW_PX.y).flat_map(|y| (0..VIEW_PX.x).map(move |x| Vec2::new(x as f32, y as f32) + 0.5));

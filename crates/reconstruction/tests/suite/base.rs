@@ -3,7 +3,7 @@
 use depth_image::{Antialias, CubeImages, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use gpu::Turn;
-use reconstruction::{CommonSets, Mirrors, ReconstructionError, ReconstructionMethod, SampleSet};
+use reconstruction::{CommonSets, Mirrors, ReconstructRequest, ReconstructionError, ReconstructionMethod, SampleSet};
 use render::LayerSelection;
 use scene::procedural::teapot_spheres;
 
@@ -23,7 +23,11 @@ fn view(
     (method, planes): (ReconstructionMethod, ViewPlanes),
 ) -> Result<View, ReconstructionError> {
     let shared = CommonSets { mirrors: Mirrors::default(), base };
-    let views = reconstructor().reconstruct_with(set, shared, &[*camera], method, planes, Turn::default());
+    let views = reconstructor().reconstruct(ReconstructRequest {
+        common: shared,
+        planes,
+        ..ReconstructRequest::new(set, &[*camera], method)
+    });
     views.map(|mut views| views.remove(0))
 }
 
@@ -92,7 +96,14 @@ fn views_together_are_those_of_each() {
     let moved = PinholeCamera { eye_in_world: camera.eye_in_world * 1.02, ..camera };
     let made = |cameras: &[PinholeCamera]| {
         let turn = Turn::default();
-        reconstructor().reconstruct_with(&set, shared, cameras, CARVE, ViewPlanes::ALL, turn).expect("views")
+        reconstructor()
+            .reconstruct(ReconstructRequest {
+                common: shared,
+                turn,
+                planes: ViewPlanes::ALL,
+                ..ReconstructRequest::new(&set, cameras, CARVE)
+            })
+            .expect("views")
     };
     assert!(made(&[camera, moved]) == [made(&[camera]), made(&[moved])].concat());
 }
@@ -115,13 +126,19 @@ fn set_of(stage: &Gathering) -> SampleSet {
         looking(eye + aside, Vec3::Y + aside, 44.0, UVec2::new(240, 180))
     };
     let cameras = [(-0.2, -0.2), (0.2, 0.2), (0.2, -0.2), (-0.2, 0.2)].map(sample);
-    reconstructor().upload(&images(&stage.on_device, &cameras), &description(&stage.scene)).expect("a sample set")
+    reconstructor()
+        .upload(&images(&stage.on_device, &cameras), &description(&stage.scene), Turn::default())
+        .expect("a sample set")
 }
 
 fn lit_view(set: &SampleSet, base: Option<&SampleSet>, stage: &Gathering, rays: (u32, u32)) -> View {
     let mirrors = Mirrors { cells: &[], reflections: rays.0, glossy_rays: rays.1 };
     let shared = CommonSets { mirrors, base };
-    let views = reconstructor().reconstruct_with(set, shared, &[stage.camera], CARVE, ViewPlanes::ALL, Turn::default());
+    let views = reconstructor().reconstruct(ReconstructRequest {
+        common: shared,
+        planes: ViewPlanes::ALL,
+        ..ReconstructRequest::new(set, &[stage.camera], CARVE)
+    });
     views.expect("a view").remove(0)
 }
 
@@ -130,7 +147,8 @@ fn rough_surfaces_of_images_show_what_a_base_holds() {
     let floor = GlossyFloor::new();
     // The view's own image: errors are those of what the floor shows.
     let own_image = images(&floor.stage.on_device, &[floor.stage.camera]);
-    let set = reconstructor().upload(&own_image, &description(&floor.stage.scene)).expect("a sample set");
+    let set =
+        reconstructor().upload(&own_image, &description(&floor.stage.scene), Turn::default()).expect("a sample set");
     let base = floor.stage.set(None);
     let plain = lit_view(&set, None, &floor.stage, (0, 0));
     assert!(lit_view(&set, None, &floor.stage, (0, 16)) == plain, "without a base all is as without the term");
@@ -155,7 +173,13 @@ fn a_scene_without_mirrors_looks_the_same_whether_reflections_are_followed_or_no
     let [followed, plain] = [3, 0].map(|reflections| {
         let shared = CommonSets { mirrors: Mirrors { reflections, ..Mirrors::default() }, base: Some(&base) };
         let cameras = [floor.stage.camera];
-        reconstructor().reconstruct_with(&set, shared, &cameras, CARVE, planes, Turn::default()).expect("a view")
+        reconstructor()
+            .reconstruct(ReconstructRequest {
+                common: shared,
+                planes,
+                ..ReconstructRequest::new(&set, &cameras, CARVE)
+            })
+            .expect("a view")
     });
     assert!(followed == plain);
 }
@@ -182,7 +206,9 @@ fn lobes_and_mirrors_beside_images_are_those_of_direct_drawing() {
     let planes = ViewPlanes { antialias: Antialias::of(4).expect("offered"), ..ViewPlanes::ALL };
     let made = |cameras: &[PinholeCamera], reflections, glossy_rays| {
         let shared = CommonSets { mirrors: Mirrors { cells: &[], reflections, glossy_rays }, base: Some(&base) };
-        reconstructor().reconstruct_with(&set, shared, cameras, CARVE, planes, Turn::default()).expect("views")
+        reconstructor()
+            .reconstruct(ReconstructRequest { common: shared, planes, ..ReconstructRequest::new(&set, cameras, CARVE) })
+            .expect("views")
     };
     let views = made(&[camera, other], 2, 16);
     assert!(views[1] == made(&[other], 2, 16)[0], "views of a batch are those of each");

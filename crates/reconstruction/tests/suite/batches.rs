@@ -2,10 +2,11 @@
 
 use depth_image::{Aabb, CameraError, LightPlanes, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
+use gpu::Turn;
 use reconstruction::ReconstructionError;
 use scene::procedural::uv_sphere;
 
-use crate::stage::{CARVE, Corners, SEARCH, Stage, reconstructor};
+use crate::stage::{CARVE, Corners, SEARCH, Stage, reconstruct, reconstructor};
 
 fn corners() -> Corners {
     Corners { eye: Vec3::new(0.4, 0.9, 3.6), target: Vec3::ZERO, half_m: 0.6 }
@@ -22,10 +23,10 @@ fn seventy_views_are_seventy_single_views() {
         .map(|i| corners().camera(i as f32 / 35.0 - 1.0, (i % 7) as f32 / 3.5 - 1.0, UVec2::new(33, 21)))
         .collect();
     for method in [CARVE, SEARCH] {
-        let all = reconstructor().reconstruct(&set, &cameras, method, ViewPlanes::ALL).expect("views");
+        let all = reconstruct(&set, &cameras, method, ViewPlanes::ALL).expect("views");
         assert_eq!(all.len(), 70);
         for (index, (camera, view)) in cameras.iter().zip(&all).enumerate() {
-            let single = reconstructor().reconstruct(&set, &[*camera], method, ViewPlanes::ALL).expect("a view");
+            let single = reconstruct(&set, &[*camera], method, ViewPlanes::ALL).expect("a view");
             assert!(single[0] == *view, "{method}: view {index} differs");
         }
     }
@@ -36,11 +37,11 @@ fn sizes_may_change_from_view_to_view() {
     let set = stage().upload();
     let sizes = [[64, 48], [64, 48], [31, 17], [1, 1], [64, 48], [8, 100]].map(UVec2::from);
     let cameras = sizes.map(|size_px| corners().camera(0.1, 0.2, size_px));
-    let views = reconstructor().reconstruct(&set, &cameras, CARVE, ViewPlanes::ALL).expect("views");
+    let views = reconstruct(&set, &cameras, CARVE, ViewPlanes::ALL).expect("views");
     assert_eq!(views.iter().map(|view| view.size_px).collect::<Vec<_>>(), sizes);
     assert!(views[0] == views[1] && views[0] == views[4], "the same camera, the same view");
     for (camera, view) in cameras.iter().zip(&views) {
-        assert!(reconstructor().reconstruct(&set, &[*camera], CARVE, ViewPlanes::ALL).expect("a view")[0] == *view);
+        assert!(reconstruct(&set, &[*camera], CARVE, ViewPlanes::ALL).expect("a view")[0] == *view);
     }
 }
 
@@ -55,7 +56,7 @@ fn a_set_shows_nothing_of_the_one_before_it() {
     for _ in 0..4 {
         for (stage, view) in [(&small, &small_view), (&large, &large_view)] {
             let set = stage.upload();
-            let views = reconstructor().reconstruct(&set, &[camera], CARVE, ViewPlanes::ALL).expect("a view");
+            let views = reconstruct(&set, &[camera], CARVE, ViewPlanes::ALL).expect("a view");
             assert!(views[0] == *view);
         }
     }
@@ -76,12 +77,12 @@ fn images_of_four_million_samples_are_seen_as_they_are() {
 #[test]
 fn no_views_are_no_views() {
     let set = stage().upload();
-    assert!(reconstructor().reconstruct(&set, &[], CARVE, ViewPlanes::ALL).expect("nothing").is_empty());
+    assert!(reconstruct(&set, &[], CARVE, ViewPlanes::ALL).expect("nothing").is_empty());
 }
 
 /// The error of an upload that must fail.
 fn refused(stage: &Stage) -> ReconstructionError {
-    let done = reconstructor().upload(&stage.images, &stage.description());
+    let done = reconstructor().upload(&stage.images, &stage.description(), Turn::default());
     done.err().expect("an error")
 }
 
@@ -109,7 +110,7 @@ fn assert_light_is_refused(good: &Stage) {
 fn sets_that_cannot_be_used_are_refused() {
     let good = stage();
     let of = |count: usize| Stage { images: vec![good.images[0].clone(); count], ..good.clone() };
-    assert!(reconstructor().upload(&of(16).images, &good.description()).is_ok());
+    assert!(reconstructor().upload(&of(16).images, &good.description(), Turn::default()).is_ok());
     assert!(matches!(refused(&of(17)), ReconstructionError::SampleCount(17)));
     assert!(matches!(refused(&of(0)), ReconstructionError::SampleCount(0)));
     let mut short = good.clone();
@@ -131,7 +132,7 @@ fn a_bad_view_camera_is_named() {
     let set = stage().upload();
     let good = corners().view();
     let bad = PinholeCamera { eye_in_world: Vec3::NAN, ..good };
-    let error = reconstructor().reconstruct(&set, &[good, bad], CARVE, ViewPlanes::ALL).expect_err("NaN");
+    let error = reconstruct(&set, &[good, bad], CARVE, ViewPlanes::ALL).expect_err("NaN");
     let named = matches!(error, ReconstructionError::Camera { index: 1, source: CameraError::NotFinite { .. } });
     assert!(named, "{error}");
 }

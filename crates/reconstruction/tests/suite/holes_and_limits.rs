@@ -4,7 +4,9 @@ use depth_image::{HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, ViewPlanes}
 use glam::{UVec2, Vec3};
 use scene::procedural::{courtyard, quad, tree_terrain};
 
-use crate::stage::{CARVE, Corners, SAMPLE_PX, SEARCH, Stage, VIEW_PX, assert_sane, count, looking, reconstructor};
+use crate::stage::{
+    CARVE, Corners, SAMPLE_PX, SEARCH, Stage, VIEW_PX, assert_sane, count, looking, reconstruct, reconstructor,
+};
 
 pub fn odd_cameras() -> Vec<(&'static str, PinholeCamera)> {
     let size = UVec2::new(40, 30);
@@ -117,7 +119,7 @@ fn small_images_are_images() {
             let set = stage.upload();
             for method in [CARVE, SEARCH] {
                 let view = camera(0.0, UVec2::new(4, 4));
-                let views = reconstructor().reconstruct(&set, &[view], method, ViewPlanes::ALL).expect("a view");
+                let views = reconstruct(&set, &[view], method, ViewPlanes::ALL).expect("a view");
                 assert_sane(&views[0], &format!("{size_px} {method}"));
                 let twin = stage.twin(&view, method);
                 let hits = [&views[0], &twin].map(|v| count(v, ProvenanceKind::Hit));

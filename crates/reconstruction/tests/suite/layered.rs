@@ -1,17 +1,22 @@
 //! Views from layered depth cubes.
 
-use depth_image::{Aabb, CubeGrid, Highlight, LayeredDepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use depth_image::{
+    Aabb, CubeGrid, CubeImages, Highlight, LayeredDepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes,
+};
 use glam::{Affine3A, Quat, UVec2, Vec3};
 use gpu::Turn;
 use metrics::{Rgb8Image, psnr_db};
 use reconstruction::scalar::CubeTwin;
-use reconstruction::{Mirrors, ReconstructionError, ReconstructionMethod, SampleSet, SetDescription};
+use reconstruction::{
+    Mirrors, ReconstructRequest, ReconstructionError, ReconstructionMethod, SampleSet, SetDescription,
+};
 use render::{DrawWork, GpuScene, LayerSelection};
 use scene::procedural::{mirror_box, quad};
 use scene::{Instance, Scene};
 
 use crate::stage::{
-    Agreement, CARVE, Stage, corpus, count, depths, gpu, looking, matt, plainly_lit, reconstructor, renderer,
+    Agreement, CARVE, Stage, corpus, count, depths, gpu, looking, matt, plainly_lit, reconstruct, reconstructor,
+    renderer,
 };
 
 const LAYERED: ReconstructionMethod = ReconstructionMethod::LAYERED;
@@ -33,11 +38,12 @@ impl CubeStage {
 
     pub fn upload(&self) -> SampleSet {
         let set = matt(self.scene.bounds(), self.scene.background);
-        reconstructor().upload_cube(&self.grid, &self.images, &set).expect("a cube")
+        let cube = CubeImages { grid: self.grid, images: self.images.clone(), light_field: None };
+        reconstructor().upload_cube(&cube, &set, Turn::default()).expect("a cube")
     }
 
     pub fn view(&self, camera: &PinholeCamera) -> View {
-        let views = reconstructor().reconstruct(&self.upload(), &[*camera], LAYERED, ViewPlanes::ALL);
+        let views = reconstruct(&self.upload(), &[*camera], LAYERED, ViewPlanes::ALL);
         views.expect("a view").remove(0)
     }
 
@@ -92,12 +98,16 @@ fn mirrors_show_what_direct_drawing_shows() {
         highlight: Some(Highlight::Ggx),
         ..matt(scene.bounds(), scene.background)
     };
-    let set = reconstructor().upload_cube(&grid, &images, &description).expect("a cube");
+    let cube = CubeImages { grid, images, light_field: None };
+    let set = reconstructor().upload_cube(&cube, &description, Turn::default()).expect("a cube");
     let camera = looking(Vec3::new(0.4, 2.0, 6.5), Vec3::Y * 1.2, 40.0, UVec2::new(120, 90));
     let view = |reflections| {
         let mirrors = Mirrors { cells: &[], reflections, glossy_rays: 0 };
-        let views =
-            reconstructor().reconstruct_with(&set, mirrors, &[camera], LAYERED, ViewPlanes::ALL, Turn::default());
+        let views = reconstructor().reconstruct(ReconstructRequest {
+            common: mirrors.into(),
+            planes: ViewPlanes::ALL,
+            ..ReconstructRequest::new(&set, &[camera], LAYERED)
+        });
         views.expect("a view").remove(0)
     };
     let psnr = |a: &View, b: &View| {
@@ -115,18 +125,13 @@ fn mirrors_show_what_direct_drawing_shows() {
 }
 
 #[test]
-fn loads_are_counted_and_several_views_are_those_of_each() {
+fn several_views_are_those_of_each() {
     let (_, scene, corners) = corpus().remove(4);
     let set = CubeStage::new(scene, 64, LayerSelection::Dominant).upload();
     let cameras = [corners.view(), corners.camera(-0.5, 0.5, corners.view().size_px)];
-    let made = |cameras: &[PinholeCamera], counted| {
-        reconstructor().reconstruct_measured(&set, cameras, LAYERED, ViewPlanes::ALL, counted).expect("views")
-    };
-    let (both, statistics) = made(&cameras, true);
-    let loads = statistics.fetches_per_ray.expect("counted");
-    println!("{loads} loads a ray");
-    assert!((2.0..60.0).contains(&loads), "{loads}");
-    let each: Vec<View> = cameras.iter().flat_map(|camera| made(&[*camera], false).0).collect();
+    let made = |cameras: &[PinholeCamera]| reconstruct(&set, cameras, LAYERED, ViewPlanes::ALL).expect("views");
+    let both = made(&cameras);
+    let each: Vec<View> = cameras.iter().flat_map(|camera| made(&[*camera])).collect();
     assert_eq!(both, each);
 }
 
@@ -135,11 +140,10 @@ fn sets_and_methods_that_do_not_belong_together_are_refused() {
     let (_, scene, corners) = corpus().remove(0);
     let cube = CubeStage::new(scene.clone(), 32, LayerSelection::Dominant);
     let images = Stage::new(scene, &corners.samples(2)).upload();
-    let refused =
-        |set: &SampleSet, method| match reconstructor().reconstruct(set, &[corners.view()], method, ViewPlanes::ALL) {
-            Err(error @ ReconstructionError::NoSamples { .. }) => error.to_string(),
-            other => panic!("{other:?}"),
-        };
+    let refused = |set: &SampleSet, method| match reconstruct(set, &[corners.view()], method, ViewPlanes::ALL) {
+        Err(error @ ReconstructionError::NoSamples { .. }) => error.to_string(),
+        other => panic!("{other:?}"),
+    };
     assert_eq!(refused(&images, LAYERED), "layered needs a layered cube, which the sample set lacks");
     assert_eq!(refused(&cube.upload(), CARVE), "joint_carve needs depth images, which the sample set lacks");
 }
@@ -150,7 +154,8 @@ fn images_of_other_lines_are_refused() {
     let stage = CubeStage::new(scene, 32, LayerSelection::Dominant);
     let set = matt(stage.scene.bounds(), stage.scene.background);
     let [x, y, z] = stage.images.clone();
-    let swapped = reconstructor().upload_cube(&stage.grid, &[y, x, z], &set);
+    let cube = CubeImages { grid: stage.grid, images: [y, x, z], light_field: None };
+    let swapped = reconstructor().upload_cube(&cube, &set, Turn::default());
     assert!(matches!(swapped, Err(ReconstructionError::Sample { index: 0, .. })));
 }
 

@@ -8,12 +8,12 @@ use depth_image::{
 use glam::{UVec2, Vec3};
 use gpu::Turn;
 use reconstruction::scalar::{Reflecting, gathered_light};
-use reconstruction::{Mirrors, ReconstructionError, ReconstructionMethod, SampleSet};
+use reconstruction::{Mirrors, ReconstructRequest, ReconstructionError, ReconstructionMethod, SampleSet};
 use render::{DrawWork, GpuScene, LayerSelection};
 use scene::procedural::{mirror_box, teapot_floor, teapot_spheres};
 use scene::{Material, Scene};
 
-use crate::stage::{depths, description, gpu, looking, plainly_lit, psnr_db, reconstructor, renderer};
+use crate::stage::{depths, description, gpu, looking, plainly_lit, psnr_db, reconstruct, reconstructor, renderer};
 
 const SIDE: u32 = 192;
 
@@ -60,13 +60,16 @@ impl Gathering {
     }
 
     pub fn upload(&self, cube: &CubeImages) -> SampleSet {
-        reconstructor().upload_cube_in_turn(cube, &description(&self.scene), Turn::default()).expect("a cube")
+        reconstructor().upload_cube(cube, &description(&self.scene), Turn::default()).expect("a cube")
     }
 
     fn view(&self, set: &SampleSet, method: &str, mirrors: Mirrors<'_>) -> View {
         let method: ReconstructionMethod = method.parse().expect(method);
-        let views =
-            reconstructor().reconstruct_with(set, mirrors, &[self.camera], method, ViewPlanes::ALL, Turn::default());
+        let views = reconstructor().reconstruct(ReconstructRequest {
+            common: mirrors.into(),
+            planes: ViewPlanes::ALL,
+            ..ReconstructRequest::new(set, &[self.camera], method)
+        });
         views.expect("a view").remove(0)
     }
 
@@ -179,7 +182,13 @@ fn mirrors_and_lobes_of_several_samples_in_several_views_are_those_of_direct_dra
     let mirrors = Mirrors { cells: &[], reflections: 2, glossy_rays: 16 };
     let method = ReconstructionMethod::LAYERED;
     let made = |cameras: &[PinholeCamera]| {
-        reconstructor().reconstruct_with(&set, mirrors, cameras, method, planes, Turn::default()).expect("views")
+        reconstructor()
+            .reconstruct(ReconstructRequest {
+                common: mirrors.into(),
+                planes,
+                ..ReconstructRequest::new(&set, cameras, method)
+            })
+            .expect("views")
     };
     let views = made(&[camera, other]);
     assert_eq!(views[1], made(&[other])[0], "views of a batch are those of each");
@@ -253,7 +262,7 @@ fn gathering_is_its_twin() {
 fn a_method_that_gathers_needs_a_light_field_and_damaged_ones_are_refused() {
     let stage = Gathering::mirror_box();
     let gather: ReconstructionMethod = "layered:0".parse().expect("a method");
-    let refused = reconstructor().reconstruct(&stage.set(None), &[stage.camera], gather, ViewPlanes::ALL);
+    let refused = reconstruct(&stage.set(None), &[stage.camera], gather, ViewPlanes::ALL);
     assert!(matches!(refused, Err(ReconstructionError::NoSamples { needed: "a light field", .. })));
     let field = stage.light_field(LightDirections::D66, "shadows, reflections 1");
     let camera = LightFieldCamera { pairs: 1, ..field.camera };
@@ -265,7 +274,7 @@ fn a_method_that_gathers_needs_a_light_field_and_damaged_ones_are_refused() {
             renderer().draw_layers(stage.lit("unlit"), &camera, LayerSelection::Dominant).expect("layers")
         });
         let cube = CubeImages { grid: stage.grid, images, light_field: Some(field) };
-        let refused = reconstructor().upload_cube_in_turn(&cube, &description(&stage.scene), Turn::default());
+        let refused = reconstructor().upload_cube(&cube, &description(&stage.scene), Turn::default());
         assert!(matches!(refused, Err(ReconstructionError::LightField { .. })));
     }
 }

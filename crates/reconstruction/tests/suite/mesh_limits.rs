@@ -1,5 +1,6 @@
 //! Meshes of images without planes or samples, and meshes that are asked for again.
 
+use crate::stage::reconstruct;
 use depth_image::{BACKGROUND_INVERSE_DEPTH, HOLE_INVERSE_DEPTH, ProvenanceKind, ViewPlanes};
 use glam::{UVec2, Vec3};
 use reconstruction::{MeshStatistics, ReconstructionError};
@@ -28,17 +29,13 @@ fn a_missing_plane_is_named() {
     for (stage, expected) in [(without_normals, (1, "normal")), (without_corners, (0, "corner_inverse_depth"))] {
         let set = stage.upload();
         for method in [HYBRID, merged(1.0)] {
-            let error =
-                reconstructor().reconstruct(&set, &[corners().view()], method, ViewPlanes::ALL).expect_err("a plane");
+            let error = reconstruct(&set, &[corners().view()], method, ViewPlanes::ALL).expect_err("a plane");
             let ReconstructionError::MissingPlane { index, plane } = error else { panic!("{error}") };
             assert_eq!((index, plane), expected, "{method}");
         }
         // Others need none of them.
         for method in [MESH, CARVE] {
-            assert!(
-                reconstructor().reconstruct(&set, &[corners().view()], method, ViewPlanes::ALL).is_ok(),
-                "{method}"
-            );
+            assert!(reconstruct(&set, &[corners().view()], method, ViewPlanes::ALL).is_ok(), "{method}");
         }
     }
 }
@@ -107,8 +104,7 @@ fn the_same_set_gives_the_same_quads_and_views() {
         let [a, b] = [stage.upload(), stage.upload()];
         let quads = |set| reconstructor().read_quads(set, method).expect("quads");
         assert!(quads(&a) == quads(&b), "{method}");
-        let view =
-            |set| reconstructor().reconstruct(set, &[corners().view()], method, ViewPlanes::ALL).expect("a view");
+        let view = |set| reconstruct(set, &[corners().view()], method, ViewPlanes::ALL).expect("a view");
         assert!(view(&a) == view(&a) && view(&a) == view(&b), "{method}");
     }
 }
@@ -120,13 +116,10 @@ fn many_views_of_many_sizes_are_single_views() {
     let cameras: Vec<_> =
         sizes.iter().enumerate().map(|(i, &size_px)| corners().camera(i as f32 / 6.0, -0.3, size_px)).collect();
     for method in all_meshes() {
-        let views = reconstructor().reconstruct(&set, &cameras, method, ViewPlanes::ALL).expect("views");
+        let views = reconstruct(&set, &cameras, method, ViewPlanes::ALL).expect("views");
         for (camera, view) in cameras.iter().zip(&views) {
-            let single = reconstructor().reconstruct(&set, &[*camera], method, ViewPlanes::ALL).expect("a view");
+            let single = reconstruct(&set, &[*camera], method, ViewPlanes::ALL).expect("a view");
             assert!(single[0] == *view, "{method} {:?}", camera.size_px);
         }
-        let counted =
-            reconstructor().reconstruct_measured(&set, &cameras, method, ViewPlanes::ALL, true).expect("views");
-        assert!(counted.0 == views && counted.1.fetches_per_ray.is_some_and(|fetches| fetches >= 1.0), "{method}");
     }
 }

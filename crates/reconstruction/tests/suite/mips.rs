@@ -2,6 +2,7 @@
 
 use depth_image::{Camera, DepthImage, Environment, Highlight, Illumination, ProvenanceKind, Ray};
 use glam::{UVec2, Vec2, Vec3};
+use gpu::Turn;
 use reconstruction::scalar::ColorMips;
 use reconstruction::{RayEnd, RayWork, SetDescription};
 use render::{GpuScene, SamplePlanes};
@@ -60,6 +61,7 @@ fn wide_rays_have_the_colours_of_their_twin() {
                 environment: None,
                 mips: true,
             },
+            Turn::default(),
         )
         .expect("a set");
     let (image, mips, rays) = (&images[0], ColorMips::of(&images[0]), rays());

@@ -4,14 +4,17 @@ use depth_image::{
     Aabb, Antialias, Camera, CubeImages, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes,
 };
 use glam::{UVec2, Vec3};
-use reconstruction::{CommonSets, MirrorCell, Mirrors, ReconstructionError, SampleSet, SetDescription};
+use gpu::Turn;
+use reconstruction::{
+    CommonSets, MirrorCell, Mirrors, ReconstructRequest, ReconstructionError, SampleSet, SetDescription,
+};
 use render::{GpuScene, LayerSelection, SamplePlanes};
 use scene::Scene;
 use scene::procedural::{mirror_pair, teapot_mirror};
 
 use crate::layered::CubeStage;
 use crate::light_field::Gathering;
-use crate::stage::{CARVE, count, description, gpu, kinds, looking, reconstructor, renderer, work};
+use crate::stage::{CARVE, count, description, gpu, kinds, looking, reconstruct, reconstructor, renderer, work};
 
 const VIEW_PX: UVec2 = UVec2::new(128, 96);
 
@@ -38,7 +41,7 @@ impl Hall {
         let on_device = GpuScene::upload(gpu(), &scene).expect("a scene");
         let set = |cameras: &[PinholeCamera]| {
             let (images, described) = (images(&on_device, cameras), SetDescription { mips, ..description(&scene) });
-            reconstructor().upload(&images, &described).expect("a sample set")
+            reconstructor().upload(&images, &described, Turn::default()).expect("a sample set")
         };
         let samples = set(samples);
         let cells = cells.iter().map(|(bounds, cameras)| (*bounds, set(cameras))).collect();
@@ -70,7 +73,7 @@ fn reconstruct<'s>(
     cameras: &[PinholeCamera],
     planes: ViewPlanes,
 ) -> Result<Vec<View>, ReconstructionError> {
-    reconstructor().reconstruct_with(set, common, cameras, CARVE, planes, Default::default())
+    reconstructor().reconstruct(ReconstructRequest { common, planes, ..ReconstructRequest::new(set, cameras, CARVE) })
 }
 
 pub fn images(scene: &GpuScene, cameras: &[PinholeCamera]) -> Vec<DepthImage> {
@@ -187,7 +190,7 @@ fn sets_without_mirrors_are_what_they_are_without_cells() {
     for highlight in [None, Some(Highlight::BlinnPhong)] {
         let images = images(&hall.on_device, &[camera]);
         let description = SetDescription { highlight, ..description(&scene) };
-        let set = reconstructor().upload(&images, &description).expect("a sample set");
+        let set = reconstructor().upload(&images, &description, Turn::default()).expect("a sample set");
         let [without, with] = [0, 2].map(|reflections| {
             let (bounds, surroundings) = (hall.cells[0].0, &hall.cells[0].1);
             let cells = [MirrorCell { bounds, surroundings }];
@@ -328,7 +331,8 @@ fn mirrors_that_only_the_base_shows_show_the_scene() {
     let behind = looking(Vec3::new(0.0, 4.0, -16.0), Vec3::new(0.0, 2.0, 5.0), 60.0, UVec2::new(160, 120));
     let scene = teapot_mirror();
     let matt = SetDescription { highlight: None, ..description(&scene) };
-    hall.samples = reconstructor().upload(&images(&hall.on_device, &[behind]), &matt).expect("a sample set");
+    hall.samples =
+        reconstructor().upload(&images(&hall.on_device, &[behind]), &matt, Turn::default()).expect("a sample set");
     let base = Gathering::new(teapot_mirror(), camera).set(None);
     let mut mirrored = Mirrored::of(&hall, &camera, 1);
     let found = kinds(&hall.view_beside(Some(&base), &camera, 0));

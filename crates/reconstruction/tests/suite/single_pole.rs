@@ -1,16 +1,17 @@
 //! Rays in images of single-pole cameras: the walk, its twin, and the same search in steps that miss nothing.
 
+use gpu::Turn;
 use std::sync::OnceLock;
 
 use depth_image::{Aabb, Camera, DepthImage, ProvenanceKind, Ray, SinglePoleCamera, ViewPlanes};
 use glam::{UVec2, Vec3};
 use reconstruction::scalar::{PinholeImages, SinglePoleImages};
-use reconstruction::{CurvedSearch, MirrorCell, Mirrors, RayEnd, RayWork, ReconstructionError};
+use reconstruction::{CurvedSearch, MirrorCell, Mirrors, RayEnd, RayWork, ReconstructRequest, ReconstructionError};
 use render::{DrawWork, GpuScene, SamplePlanes};
 use scene::Scene;
 use scene::procedural::teapot_mirror;
 
-use crate::stage::{CARVE, description, gpu, looking, reconstructor, renderer, work};
+use crate::stage::{CARVE, description, gpu, looking, reconstruct, reconstructor, renderer, work};
 
 const TEAPOT: Aabb = Aabb { min: Vec3::new(-3.2, 0.0, 0.5), max: Vec3::new(3.2, 3.2, 4.5) };
 const MIRROR: Vec3 = Vec3::new(0.0, 3.1, -4.5);
@@ -56,7 +57,7 @@ fn rays(count: usize) -> Vec<Ray> {
 }
 
 fn followed(images: &[DepthImage], search: CurvedSearch, rays: &[Ray]) -> Vec<RayEnd> {
-    let set = reconstructor().upload(images, &description(&stand().scene)).expect("a set");
+    let set = reconstructor().upload(images, &description(&stand().scene), Turn::default()).expect("a set");
     let work = RayWork { curved_search: search, count_steps: true, ..RayWork::new(&set, NEAR_M) };
     reconstructor().follow(work, rays).expect("ends").0
 }
@@ -240,19 +241,20 @@ fn no_ray_ends_at_what_is_not_a_number() {
 #[test]
 fn what_cannot_use_the_images_says_so() {
     let Stand { scene, images } = stand();
-    let set = reconstructor().upload(images, &description(scene)).expect("a set");
+    let set = reconstructor().upload(images, &description(scene), Turn::default()).expect("a set");
     let view = looking(Vec3::new(9.0, 7.0, 12.5), Vec3::Y, 28.0, UVec2::splat(16));
-    let error = reconstructor().reconstruct(&set, &[view], CARVE, ViewPlanes::COLOR).expect_err("bent images");
+    let error = reconstruct(&set, &[view], CARVE, ViewPlanes::COLOR).expect_err("bent images");
     assert!(matches!(error, ReconstructionError::Model { model: "single_pole" }), "{error}");
     let pinhole =
         DepthImage { camera: looking(MIRROR, Vec3::ZERO, 60.0, images[0].size_px()).into(), ..images[0].clone() };
     let mixed = [images[0].clone(), pinhole];
-    let error = reconstructor().upload(&mixed, &description(scene)).map(drop).expect_err("two models");
+    let error = reconstructor().upload(&mixed, &description(scene), Turn::default()).map(drop).expect_err("two models");
     assert!(matches!(error, ReconstructionError::Sample { index: 1, .. }), "{error}");
     let Camera::SinglePole(camera) = images[0].camera else { panic!("a single-pole camera") };
     let beside = Camera::SinglePole(SinglePoleCamera { pole_px: camera.pole_px * 3.0, ..camera });
     let beside = DepthImage { camera: beside, ..images[0].clone() };
-    let error = reconstructor().upload(&[beside], &description(scene)).map(drop).expect_err("a pole outside");
+    let error =
+        reconstructor().upload(&[beside], &description(scene), Turn::default()).map(drop).expect_err("a pole outside");
     assert!(error.to_string().contains("pole"), "{error}");
     for (coarse_px, fine_px) in [(0.0, 0.0), (1.0, 2.0), (f32::NAN, 1.0), (65.0, 1.0), (6.0, 0.01)] {
         let curved_search = CurvedSearch { coarse_px, fine_px };
@@ -266,19 +268,22 @@ fn what_cannot_use_the_images_says_so() {
 #[test]
 fn a_view_shows_the_teapot_in_its_mirror() {
     let Stand { scene, images } = stand();
-    let set = reconstructor().upload(images, &description(scene)).expect("a set");
+    let set = reconstructor().upload(images, &description(scene), Turn::default()).expect("a set");
     let on_device = GpuScene::upload(gpu(), scene).expect("a scene");
     let work = work(&on_device, "shadows");
     let view = looking(Vec3::new(9.1, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, UVec2::new(192, 144));
     let samples = Camera::from(view.resized(view.size_px * 2));
     let planes = SamplePlanes { specular: true, ..SamplePlanes::default() };
     let samples = renderer().draw_depth_images(work, &[samples], planes).expect("an image");
-    let samples = reconstructor().upload(&samples, &description(scene)).expect("a set");
+    let samples = reconstructor().upload(&samples, &description(scene), Turn::default()).expect("a set");
     let cells = [MirrorCell { bounds: Aabb { min: MIRROR - 3.6, max: MIRROR + 3.6 }, surroundings: &set }];
     let shown = |reflections| {
         let mirrors = Mirrors { cells: &cells, reflections, glossy_rays: 0 };
-        let views =
-            reconstructor().reconstruct_with(&samples, mirrors, &[view], CARVE, ViewPlanes::ALL, Default::default());
+        let views = reconstructor().reconstruct(ReconstructRequest {
+            common: mirrors.into(),
+            planes: ViewPlanes::ALL,
+            ..ReconstructRequest::new(&samples, &[view], CARVE)
+        });
         views.expect("a view").remove(0)
     };
     let lit: DrawWork<'_> = DrawWork { lighting: "shadows, reflections 1".parse().expect("a lighting"), ..work };

@@ -7,7 +7,7 @@ use std::thread;
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use gpu::{CompiledOutside, DevicePreference, Gpu, Turn, WorkClass};
-use reconstruction::{ReconstructionMethod, Reconstructor, SampleSet};
+use reconstruction::{ReconstructRequest, ReconstructionMethod, Reconstructor, SampleSet};
 use scene::procedural::uv_sphere;
 
 use crate::stage::{CARVE, Corners, Stage};
@@ -30,14 +30,20 @@ impl Shared {
     }
 
     fn upload(&self, stage: &Stage) -> SampleSet {
-        self.reconstructor.upload(&stage.images, &stage.description()).expect("a set")
+        self.reconstructor.upload(&stage.images, &stage.description(), Turn::default()).expect("a set")
     }
 
     /// Views, and the slices that they took.
     fn views(&self, set: &SampleSet, cameras: &[PinholeCamera], method: &str) -> (Vec<View>, u64) {
         let before = self.gpu.device_queue.slices();
         let method: ReconstructionMethod = method.parse().expect(method);
-        let views = self.reconstructor.reconstruct(set, cameras, method, ViewPlanes::ALL).expect("views");
+        let views = self
+            .reconstructor
+            .reconstruct(ReconstructRequest {
+                planes: ViewPlanes::ALL,
+                ..ReconstructRequest::new(set, cameras, method)
+            })
+            .expect("views");
         (views, self.gpu.device_queue.slices() - before)
     }
 }
@@ -81,8 +87,16 @@ fn a_live_view_goes_between_the_slices_of_a_batch() {
     let set = shared.upload(&Stage::new(uv_sphere(1.0, 24), &corners().samples(2)));
     let (many, one) = (cameras(UVec2::new(320, 240)), cameras(UVec2::new(64, 48)));
     let live = Turn { class: WorkClass::Live, flow: 1 };
-    let view =
-        || shared.reconstructor.reconstruct_in_turn(&set, &one[..1], CARVE, ViewPlanes::ALL, live).expect("a view");
+    let view = || {
+        shared
+            .reconstructor
+            .reconstruct(ReconstructRequest {
+                turn: live,
+                planes: ViewPlanes::ALL,
+                ..ReconstructRequest::new(&set, &one[..1], CARVE)
+            })
+            .expect("a view")
+    };
     let alone = view();
     let _live = shared.gpu.device_queue.force_slices(FEW_PX);
     let batch_ended = AtomicBool::new(false);
@@ -90,7 +104,11 @@ fn a_live_view_goes_between_the_slices_of_a_batch() {
         let before = shared.gpu.device_queue.slices();
         threads.spawn(|| {
             let batch = Turn { class: WorkClass::Batch, flow: 2 };
-            let views = shared.reconstructor.reconstruct_in_turn(&set, &many, CARVE, ViewPlanes::ALL, batch);
+            let views = shared.reconstructor.reconstruct(ReconstructRequest {
+                turn: batch,
+                planes: ViewPlanes::ALL,
+                ..ReconstructRequest::new(&set, &many, CARVE)
+            });
             batch_ended.store(true, Ordering::Release);
             assert_eq!(views.expect("views").len(), many.len());
         });

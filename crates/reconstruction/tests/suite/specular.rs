@@ -8,11 +8,12 @@ use depth_image::{
     rgb9e5_from_linear, srgb8_from_linear,
 };
 use glam::{UVec2, Vec2, Vec3};
-use gpu::GpuEnvironment;
+use gpu::{GpuEnvironment, Turn};
 use reconstruction::{ReconstructionError, SetDescription, scalar};
 
 use crate::stage::{
-    Agreement, CARVE, Corners, SEARCH, VIEW_PX, assert_sane, colors_differ_by, count, gpu, kinds, reconstructor,
+    Agreement, CARVE, Corners, SEARCH, VIEW_PX, assert_sane, colors_differ_by, count, gpu, kinds, reconstruct,
+    reconstructor,
 };
 
 const KINDS: [Highlight; 2] = [Highlight::BlinnPhong, Highlight::Ggx];
@@ -133,8 +134,8 @@ fn pixels(size_px: UVec2) -> impl Iterator<Item = Vec2> {
 }
 
 fn view(images: &[DepthImage], set: &SetDescription<'_>, camera: &PinholeCamera) -> View {
-    let set = reconstructor().upload(images, set).expect("a sample set");
-    reconstructor().reconstruct(&set, &[*camera], CARVE, ViewPlanes::ALL).expect("a view").remove(0)
+    let set = reconstructor().upload(images, set, Turn::default()).expect("a sample set");
+    reconstruct(&set, &[*camera], CARVE, ViewPlanes::ALL).expect("a view").remove(0)
 }
 
 /// Share of the pixels within two codes of what `eye` would see there.
@@ -222,9 +223,8 @@ fn highlights_are_the_twins() {
         images[0].inverse_depth_per_m[4000..4100].fill(depth_image::HOLE_INVERSE_DEPTH);
         for (kind, method) in [(KINDS[0], CARVE), (KINDS[1], CARVE), (KINDS[1], SEARCH)] {
             let set = room.description(Some(kind));
-            let uploaded = reconstructor().upload(&images, &set).expect("a sample set");
-            let seen =
-                reconstructor().reconstruct(&uploaded, &[camera], method, ViewPlanes::ALL).expect("a view").remove(0);
+            let uploaded = reconstructor().upload(&images, &set, Turn::default()).expect("a sample set");
+            let seen = reconstruct(&uploaded, &[camera], method, ViewPlanes::ALL).expect("a view").remove(0);
             let twin = scalar::reconstruct(&images, &set, &camera, method);
             let agreement = Agreement::of(&seen, &twin);
             let matt = scalar::reconstruct(&images, &room.description(None), &camera, method);
@@ -301,10 +301,10 @@ fn planes_that_do_not_fit_are_refused() {
     let room = Room { lit: Some(|_, _| 1.0), illumination: lamps(5), ..wall_only() };
     let good = room.images();
     let refused = |images: &[DepthImage]| {
-        let done = reconstructor().upload(images, &room.description(Some(Highlight::Ggx)));
+        let done = reconstructor().upload(images, &room.description(Some(Highlight::Ggx)), Turn::default());
         matches!(done.err(), Some(ReconstructionError::Sample { index: 2, .. }))
     };
-    assert!(reconstructor().upload(&good, &room.description(Some(Highlight::Ggx))).is_ok());
+    assert!(reconstructor().upload(&good, &room.description(Some(Highlight::Ggx)), Turn::default()).is_ok());
     let mut no_normals = good.clone();
     no_normals[2].normal_oct16 = None;
     let mut too_few = good.clone();

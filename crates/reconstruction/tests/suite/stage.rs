@@ -6,9 +6,11 @@ use depth_image::{
     Aabb, Camera, DepthImage, Environment, Highlight, Illumination, PinholeCamera, ProvenanceKind, View, ViewPlanes,
 };
 use glam::{UVec2, Vec3};
-use gpu::{DevicePreference, Gpu};
+use gpu::{DevicePreference, Gpu, Turn};
 use metrics::Rgb8Image;
-use reconstruction::{ReconstructionMethod, Reconstructor, SampleSet, SetDescription};
+use reconstruction::{
+    ReconstructRequest, ReconstructionError, ReconstructionMethod, Reconstructor, SampleSet, SetDescription,
+};
 use render::{DrawWork, Evidence, GpuScene, Lighting, RedundancyTest, Refinement, Renderer, SamplePlanes, Visibility};
 use scene::Scene;
 
@@ -39,6 +41,15 @@ fn device() -> &'static Device {
 
 pub fn gpu() -> &'static Arc<Gpu> {
     &device().gpu
+}
+
+pub fn reconstruct(
+    set: &SampleSet,
+    cameras: &[PinholeCamera],
+    method: ReconstructionMethod,
+    planes: ViewPlanes,
+) -> Result<Vec<View>, ReconstructionError> {
+    reconstructor().reconstruct(ReconstructRequest { planes, ..ReconstructRequest::new(set, cameras, method) })
 }
 
 pub fn reconstructor() -> &'static Reconstructor {
@@ -93,7 +104,7 @@ impl Stage {
     }
 
     pub fn upload(&self) -> SampleSet {
-        reconstructor().upload(&self.images, &self.description()).expect("a sample set")
+        reconstructor().upload(&self.images, &self.description(), Turn::default()).expect("a sample set")
     }
 
     pub fn description(&self) -> SetDescription<'static> {
@@ -101,7 +112,7 @@ impl Stage {
     }
 
     pub fn views(&self, cameras: &[PinholeCamera], method: ReconstructionMethod) -> Vec<View> {
-        reconstructor().reconstruct(&self.upload(), cameras, method, ViewPlanes::ALL).expect("views")
+        reconstruct(&self.upload(), cameras, method, ViewPlanes::ALL).expect("views")
     }
 
     pub fn view(&self, camera: &PinholeCamera, method: ReconstructionMethod) -> View {

@@ -4,7 +4,7 @@ use depth_image::{Antialias, ExposureEv, ToneCurve, ToneMapping, View, ViewPlane
 use glam::Vec3;
 use reconstruction::scalar;
 
-use crate::stage::{CARVE, Stage, corpus, reconstructor};
+use crate::stage::{CARVE, Stage, corpus, reconstruct, reconstructor};
 
 fn tone(ev: f32, curve: ToneCurve) -> ToneMapping {
     ToneMapping { exposure: ExposureEv::new(ev).expect("within the limits"), curve }
@@ -21,7 +21,7 @@ fn views_in_every_tone_are_their_twins() {
     let (name, scene, corners) = corpus().swap_remove(3);
     let stage = Stage::new(scene, &corners.samples(4));
     let (set, camera) = (stage.upload(), corners.view());
-    let reconstruct = |planes| reconstructor().reconstruct(&set, &[camera], CARVE, planes).expect("a view").remove(0);
+    let reconstruct = |planes| reconstruct(&set, &[camera], CARVE, planes).expect("a view").remove(0);
     let four = Antialias::of(4).expect("offered");
     let tones =
         [tone(-2.0, ToneCurve::None), tone(0.0, ToneCurve::KhronosNeutral), tone(3.0, ToneCurve::KhronosNeutral)];
@@ -46,7 +46,7 @@ fn a_tone_is_applied_to_the_pixel_and_changes_no_sample() {
     let set = stage.upload();
     let shown = |tone| {
         let planes = ViewPlanes { tone, ..ViewPlanes::COLOR };
-        reconstructor().reconstruct(&set, &[corners.view()], CARVE, planes).expect("a view").remove(0)
+        reconstruct(&set, &[corners.view()], CARVE, planes).expect("a view").remove(0)
     };
     let (before, neutral) = (shown(ToneMapping::NONE), shown(tone(0.0, ToneCurve::KhronosNeutral)));
     assert_eq!(before.srgb8, shown(ToneMapping::NONE).srgb8, "the set keeps no tone");

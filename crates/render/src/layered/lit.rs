@@ -110,7 +110,7 @@ fn light_list(stages: &Stages, batch: &Batch<'_>, bounces: &[GpuBounce], light: 
     let sum_buffer = (*sums).clone();
     let (pieces, cameras) = (Pieces { all: Vec::new() }, parts[0].cameras.clone());
     let sums = Sums { buffer: sums, rays };
-    let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, visit_counts: None, frame };
+    let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, frame };
     if lighting.is_lit() {
         illuminate::record_points(&mut recording, &parts, points, &sum_buffer)?;
     }

@@ -23,7 +23,6 @@ pub(crate) struct Primary {
     shading: Option<Highlight>,
     surface_id: bool,
     triangle_normal: bool,
-    count_visits: bool,
     /// Rays around a pole, in place of those through one eye.
     single_pole: bool,
     redundancy: Option<RedundancyVariant>,
@@ -53,7 +52,6 @@ impl ShaderVariant for Primary {
             shading => self.shading.map_or("unlit", highlight_name),
             surface_id => self.surface_id,
             triangle_normal => self.triangle_normal,
-            count_visits => self.count_visits,
             single_pole => self.single_pole,
             ..merge_maps([self.traversal.context(), RedundancyVariant::context(self.redundancy, KNOWN_GROUP)])
         }
@@ -62,16 +60,9 @@ impl ShaderVariant for Primary {
     fn all() -> Vec<Self> {
         let shadings = [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)];
         let each = |shading| {
-            switches().flat_map(move |[surface_id, triangle_normal, count_visits, single_pole]| {
-                let plain = |traversal| Self {
-                    traversal,
-                    shading,
-                    surface_id,
-                    triangle_normal,
-                    count_visits,
-                    single_pole,
-                    redundancy: None,
-                };
+            switches().flat_map(move |[surface_id, triangle_normal, single_pole]| {
+                let plain =
+                    |traversal| Self { traversal, shading, surface_id, triangle_normal, single_pole, redundancy: None };
                 Traversal::ALL.map(plain)
             })
         };
@@ -87,13 +78,12 @@ pub(crate) fn record(
     (first, surfaces): (usize, &[Surfaces]),
     predecessors: Option<&Predecessors>,
 ) -> Result<(), RenderError> {
-    let Recording { passes, batch, visit_counts, .. } = recording;
+    let Recording { passes, batch, .. } = recording;
     let variant = Primary {
         traversal: Traversal::of(traced),
         shading: batch.work.lighting.highlight(),
         surface_id: surfaces.iter().any(|target| target.surface_ids.is_some()),
         triangle_normal: batch.output.triangle_normal,
-        count_visits: visit_counts.is_some(),
         single_pole: batch.is_single_pole(),
         redundancy: predecessors.map(|images| images.variant),
     };
@@ -101,26 +91,20 @@ pub(crate) fn record(
     let rays = pass.bind(1, traced.bindings())?;
     let known = predecessors.map(|images| pass.bind(KNOWN_GROUP, images.bindings())).transpose()?;
     for (camera, target) in (first..).zip(surfaces) {
-        let own = pass.bind(0, bindings(&variant, &recording.cameras, recording.visit_counts, target))?;
+        let own = pass.bind(0, bindings(&variant, &recording.cameras, target))?;
         let groups: Vec<_> = [&own, &rays].into_iter().chain(&known).collect();
         recording.dispatch(&variant, &pass, &groups, (camera, 1));
     }
     Ok(())
 }
 
-fn bindings<'r>(
-    variant: &Primary,
-    cameras: &'r Buffer,
-    visit_counts: Option<&'r Buffer>,
-    target: &'r Surfaces,
-) -> Vec<Binding<'r>> {
+fn bindings<'r>(variant: &Primary, cameras: &'r Buffer, target: &'r Surfaces) -> Vec<Binding<'r>> {
     let mut bindings = vec![Binding::buffer("camera", cameras)];
     bindings.extend(target.bindings());
     let ids = target.surface_ids.as_ref().filter(|_| variant.surface_id);
     bindings.extend(ids.map(|ids| Binding::texture("surface_ids", ids)));
     bindings.extend(target.views.triangle_normal_binding().filter(|_| variant.triangle_normal));
     bindings.extend(variant.redundancy.map(|_| Binding::texture("front_depth", &target.views.front_depth)));
-    bindings.extend(visit_counts.map(|counts| Binding::buffer("visit_counts", counts)));
     bindings
 }
 
@@ -135,8 +119,7 @@ mod tests {
 
     fn check(stage: &TestStage, traced: &Traced, variant: &Primary) {
         let target = stage.surfaces(true, variant.surface_id);
-        let visit_counts = variant.count_visits.then_some(&stage.buffer);
-        stage.check(variant, 0, &bindings(variant, &stage.buffer, visit_counts, &target));
+        stage.check(variant, 0, &bindings(variant, &stage.buffer, &target));
         stage.check(variant, 1, &traced.bindings());
     }
 

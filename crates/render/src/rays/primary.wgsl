@@ -19,9 +19,6 @@
 // The reversed depth of the nearest surface, redundant or not.
 @group(0) var front_depth: texture_storage_2d<r32float, write>;
 {% endif %}
-{% if count_visits %}
-@group(0) var<storage, read_write> visit_counts: array<u32>;
-{% endif %}
 
 const FARTHEST: f32 = 3.0e38;
 {% if redundancy_test %}
@@ -92,10 +89,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% if surface_id %}    textureStore(surface_ids, pixel, vec4u(ids, 0u, 0u));
 {% endif %}
 {% if triangle_normal %}    textureStore(triangle_normals, pixel, vec4u(triangle_normal));
-{% endif %}
-{% if count_visits %}
-    let place = place_of(pixel) * 2u;
-    visit_counts[place] = node_visits;
-    visit_counts[place + 1u] = triangle_tests;
 {% endif %}
 }

@@ -13,10 +13,6 @@
 @group(1) var texels: texture_2d<u32>;
 
 const STACK: u32 = {{ stack }}u;
-{% if count_visits %}
-var<private> node_visits: u32 = 0u;
-var<private> triangle_tests: u32 = 0u;
-{% endif %}
 
 fn node_texel(index: u32) -> vec4u { return textureLoad(bvh_nodes, texel_at(index), 0); }
 fn corner_texel(index: u32) -> vec4u { return textureLoad(triangle_corners, texel_at(index), 0); }
@@ -40,8 +36,6 @@ fn visit(index: u32, ray: Ray, t_max: f32) -> Node {
     let n2 = node_texel(index * 5u + 2u);
     let n3 = node_texel(index * 5u + 3u);
     let n4 = node_texel(index * 5u + 4u);
-{% if count_visits %}    node_visits += 1u;
-{% endif %}
     let exponents = vec3u(n0.w, n0.w >> 8u, n0.w >> 16u) & vec3u(255u);
     let slope = bitcast<vec3f>(exponents << vec3u(23u)) * ray.inverse;
     let start = (bitcast<vec3f>(n0.xyz) - ray.origin) * ray.inverse;
@@ -85,8 +79,6 @@ fn cross_triangle(slot: u32, ray: Ray, t_max: f32) -> Crossing {
     let c0 = corner_texel(slot * 3u);
     let c1 = corner_texel(slot * 3u + 1u);
     let c2 = corner_texel(slot * 3u + 2u);
-{% if count_visits %}    triangle_tests += 1u;
-{% endif %}
     let a = bitcast<vec3f>(c0.xyz) - ray.origin;
     let b = bitcast<vec3f>(c1.xyz) - ray.origin;
     let c = bitcast<vec3f>(c2.xyz) - ray.origin;

@@ -21,7 +21,6 @@ impl ShaderVariant for Follow {
             primary => true,
             from_eye => false,
             shading => highlight_name(Highlight::Ggx),
-            count_visits => false,
         };
         merge_maps([own, self.traversal.context()])
     }

@@ -74,7 +74,7 @@ impl<'a> RadianceWork<'a> {
         let (pieces, cameras) = (Pieces { all: Vec::new() }, parts[0].cameras.clone());
         let sums = Sums { buffer: pool.lend_storage("no sums", 4), rays };
         let frame = Frame::begin(gpu, "light of a light field", work.turn);
-        let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, visit_counts: None, frame };
+        let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, frame };
         recording.frame.encoder.clear_buffer(&memory.reflected, 0, None);
         // Whoever gathers them has met one mirror before.
         let mirrors = work.lighting.reflections().saturating_sub(1);

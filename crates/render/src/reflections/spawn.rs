@@ -32,7 +32,6 @@ impl ShaderVariant for Spawn {
             primary => true,
             from_eye => false,
             shading => highlight_name(Highlight::Ggx),
-            count_visits => false,
             plane_count => self.plane_count,
             highlight => highlight_name(Highlight::Ggx),
             mirrors => true,

@@ -61,22 +61,6 @@ fn rays_find_the_surfaces_that_triangles_draw() {
 }
 
 #[test]
-fn every_ray_visits_what_its_twin_visits() {
-    for scene in [courtyard(), uv_sphere(1.0, 96), tree_terrain(30_000, 1)] {
-        let (on_device, camera) = (upload(&scene), before(&scene));
-        let counted = device().1.count_visits(work(&on_device, "unlit"), &camera).expect("counts");
-        let twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
-        let pixels = (0..SIZE_PX.y).flat_map(|y| (0..SIZE_PX.x).map(move |x| UVec2::new(x, y)));
-        let same = pixels.zip(&counted).filter(|(pixel, counts)| {
-            let (_, visits) = twin.closest(&scalar::rays::pixel_ray(&camera, *pixel), camera.near_m);
-            [visits.nodes, visits.triangles] == **counts
-        });
-        assert_eq!(same.count(), counted.len(), "{}", scene.name);
-        assert!(counted.iter().map(|c| c[0]).sum::<u32>() as usize > counted.len(), "trees were walked");
-    }
-}
-
-#[test]
 fn a_million_rays_find_no_gap_in_a_closed_mesh() {
     let mut scene = uv_sphere(1.0, 160);
     scene.materials[0].double_sided = true;

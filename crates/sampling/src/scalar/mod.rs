@@ -22,7 +22,7 @@ use crate::methods::{Redundancy, SamplingMethod};
 
 pub use candidate::Candidate;
 pub use pixel::{holds, is_pixel_redundant};
-pub use visibility::{is_visibility_redundant, rays_of_visibility};
+pub use visibility::is_visibility_redundant;
 
 /// Depth, normals and surface ids of a set; colours are left black.
 #[must_use]

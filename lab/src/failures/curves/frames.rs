@@ -3,6 +3,7 @@
 use codec::{DecodeLimits, FrameCodec, decode_frame, encode_frame};
 use depth_image::{Antialias, PinholeCamera, View, ViewPlanes, linear_from_srgb8, srgb8_from_linear};
 use glam::{UVec2, Vec2, Vec3};
+use reconstruction::ReconstructRequest;
 use render::Lighting;
 use scene::procedural::poles;
 
@@ -69,7 +70,9 @@ fn by_samples(stand: &Stand, counts: &[f64]) -> anyhow::Result<Rows> {
     rows(counts, |count| {
         let planes = ViewPlanes { antialias: Antialias::of(count as u32).unwrap_or_default(), ..ViewPlanes::ALL };
         let drawn = stand.views(&stage.scene, Lighting::default(), &cameras, planes)?;
-        let views = stand.reconstructor().reconstruct(&set, &cameras, CARVE, planes)?;
+        let views = stand
+            .reconstructor()
+            .reconstruct(ReconstructRequest { planes, ..ReconstructRequest::new(&set, &cameras, CARVE) })?;
         Ok([foreground(&truths, &drawn)?.flip, foreground(&truths, &views)?.flip])
     })
 }

@@ -1,4 +1,4 @@
-//! Light by rays: their number, wide lamps, contact, the terminator, lamps that graze, and the adaptive rate.
+//! Light by rays: their number, contact, the terminator, and the adaptive rate.
 
 use depth_image::{DepthImage, Environment, Illumination, Light, PinholeCamera, linear_from_rgb9e5};
 use glam::{Affine3A, Vec3};
@@ -7,7 +7,7 @@ use scene::procedural::{courtyard, quad, uv_sphere};
 use scene::{Instance, Scene};
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
-use crate::failures::measures::{foreground, light_error, mean, share};
+use crate::failures::measures::{foreground, light_error, share};
 use crate::failures::shape::Shape;
 use crate::failures::stage::{CARVE, Cell, Stage, looking};
 use crate::failures::stand::Stand;
@@ -15,9 +15,8 @@ use crate::failures::stand::Stand;
 const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, half_m: 1.0 };
 /// Rays of the truth.
 const TRUE_RAYS: u32 = 512;
-const SMALL_RATIO: &[Shape] = &[Shape::Bounded { least: 0.0, most: 0.67 }];
 
-pub const CURVES: [Curve; 6] = [
+pub const CURVES: [Curve; 4] = [
     Curve {
         name: "Picture error against rays of light",
         subject: "a courtyard under a wide lamp, sampled and reconstructed",
@@ -26,19 +25,6 @@ pub const CURVES: [Curve; 6] = [
         series: &[Series::new("soft N, joint_carve", &[Shape::FallsThenFlat { least_fall: 0.01, tolerance: 0.003 }])],
         why: "Noise of samples falls with rays, until the reconstruction's own error is all that stays.",
         measure: by_rays,
-    },
-    Curve {
-        name: "Noise against the width of a lamp",
-        subject: "a courtyard under a ceiling lamp of one brightness",
-        x: X::log("width", "diagonals", &[0.25, 0.5, 1.0, 2.0, 4.0]),
-        y: ["RMSE of linear light", ""],
-        series: &[
-            Series::new("soft 4", &[Shape::rises(2e-4, 1e-4), Shape::Bounded { least: 0.0, most: 0.2 }]),
-            Series::new("soft 16 over soft 4", SMALL_RATIO),
-            Series::new("soft 64 over soft 16", SMALL_RATIO),
-        ],
-        why: "The wider a lamp is, the more its rays differ; more rays help at every width.",
-        measure: by_width,
     },
     Curve {
         name: "Contact shadow against the gap",
@@ -65,15 +51,6 @@ pub const CURVES: [Curve; 6] = [
         measure: by_segments,
     },
     Curve {
-        name: "Light of a lamp that sinks into the floor",
-        subject: "a floor and a small lamp beside it",
-        x: X::linear("height", "m", &[0.0, 1e-6, 1e-3, 0.01, 0.1, 1.0]),
-        y: ["mean light of the floor", ""],
-        series: &[Series::new("soft 16", &[Shape::rises(0.01, 0.0), Shape::Bounded { least: 0.0, most: 1.0 }])],
-        why: "A lamp in the plane of a surface lights it by its upper half alone, and never by NaN.",
-        measure: by_height,
-    },
-    Curve {
         name: "Error against the adaptive tolerance",
         subject: "a courtyard under a wide lamp",
         x: X::log("tolerance", "", &[0.01, 0.04, 0.16, 0.64]),
@@ -92,16 +69,15 @@ fn lamp(light: Light) -> Illumination {
     Illumination { lights: vec![light], environment: Environment::default() }
 }
 
-/// A courtyard under a square lamp, as wide as said, of one brightness in all.
-fn yard_under_a_lamp(width_diagonals: f32) -> Scene {
+/// A courtyard under a square lamp that is twice as wide as the courtyard's diagonal.
+fn yard_under_a_lamp() -> Scene {
     let mut scene = courtyard();
     let bounds = scene.bounds();
     let diagonal_m = bounds.size().length();
-    let half_m = 0.5 * width_diagonals * diagonal_m;
     scene.illumination = lamp(Light::Rectangle {
         center_in_world: bounds.center() + Vec3::Y * diagonal_m,
-        half_edges_in_world: [Vec3::X * half_m, Vec3::Z * half_m],
-        radiance_linear: Vec3::splat(width_diagonals.powi(-2)),
+        half_edges_in_world: [Vec3::X * diagonal_m, Vec3::Z * diagonal_m],
+        radiance_linear: Vec3::splat(0.25),
     });
     scene
 }
@@ -137,26 +113,13 @@ fn lit_points(image: &DepthImage) -> Vec<(Vec3, f32)> {
 }
 
 fn by_rays(stand: &Stand, rays: &[f64]) -> anyhow::Result<Rows> {
-    let (scene, samples, cameras) =
-        (yard_under_a_lamp(2.0), YARD.samples(4, stand.sample_px), YARD.views(stand.view_px));
+    let scene = yard_under_a_lamp();
+    let samples = YARD.samples(4, stand.sample_px);
+    let cameras = YARD.views(stand.view_px);
     let truths = Stage::new(stand, &scene, &[])?.relit(soft(TRUE_RAYS)?, &[])?.truth(&cameras)?;
     rows(rays, |rays| {
         let stage = Stage::new(stand, &scene, &[])?.relit(soft(rays as u32)?, &samples)?;
         Ok([foreground(&truths, &stage.views(&cameras, CARVE)?)?.flip])
-    })
-}
-
-fn by_width(stand: &Stand, widths: &[f64]) -> anyhow::Result<Rows> {
-    let bounds = courtyard().bounds();
-    let eye = bounds.center() + Vec3::new(0.4, 1.0, 1.1) * bounds.size().length() * 0.8;
-    let camera = looking(eye, bounds.center(), 45.0, stand.view_px);
-    rows(widths, |width| {
-        let scene = stand.upload(&yard_under_a_lamp(width as f32))?;
-        let converged = image(stand, &scene, soft(1024)?, &camera)?;
-        let error =
-            |rays| Ok::<_, anyhow::Error>(light_error(&image(stand, &scene, soft(rays)?, &camera)?, &converged));
-        let [few, more, most] = [error(4)?, error(16)?, error(64)?];
-        Ok([few, more / few, most / more])
     })
 }
 
@@ -182,27 +145,15 @@ fn by_segments(stand: &Stand, segments: &[f64]) -> anyhow::Result<Rows> {
         let scene = Scene { illumination: sun(Vec3::new(1.0, 0.37, 0.21)), ..uv_sphere(1.0, segments as u32) };
         let scene = stand.upload(&scene)?;
         let lit = |lighting: &str| anyhow::Ok(lit_points(&image(stand, &scene, lighting.parse()?, &camera)?));
-        let (plain, shadowed) = (lit("phong")?, lit("shadows")?);
+        let plain = lit("phong")?;
+        let shadowed = lit("shadows")?;
         let facing = plain.iter().zip(&shadowed).filter(|((_, plain), _)| *plain > 0.0);
         Ok([share(facing.map(|(_, (_, shadowed))| *shadowed == 0.0))])
     })
 }
 
-fn by_height(stand: &Stand, heights_m: &[f64]) -> anyhow::Result<Rows> {
-    let camera = looking(Vec3::new(0.0, 2.5, 0.1), Vec3::ZERO, 52.0, stand.view_px);
-    rows(heights_m, |height_m| {
-        let light = Light::Point {
-            position_in_world: Vec3::new(2.0, height_m as f32, 0.0),
-            intensity_linear: Vec3::ONE,
-            radius_m: 0.05,
-        };
-        let image = image(stand, &stand.upload(&floor(lamp(light)))?, soft(16)?, &camera)?;
-        Ok([mean(lit_points(&image).into_iter().map(|(_, light)| f64::from(light))).unwrap_or(f64::NAN)])
-    })
-}
-
 fn by_tolerance(stand: &Stand, tolerances: &[f64]) -> anyhow::Result<Rows> {
-    let scene = stand.upload(&yard_under_a_lamp(2.0))?;
+    let scene = stand.upload(&yard_under_a_lamp())?;
     let camera = YARD.camera([0.0, 0.0], stand.sample_px);
     let full = image(stand, &scene, soft(16)?, &camera)?;
     rows(tolerances, |tolerance| {

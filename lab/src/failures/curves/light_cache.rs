@@ -1,18 +1,16 @@
-//! Light of samples at surfaces of the scene: edges of light within a texel, steps of depth, other moments, and the points
-//! that no sample knows.
+//! Light of samples at surfaces of the scene: edges of light within a texel, and the points that no sample knows.
 
 use depth_image::LightCacheQuality::{Balanced, Fast, Fine};
 use depth_image::{Environment, Illumination, PinholeCamera, View, nested_places};
 use glam::{UVec2, Vec2, Vec3};
-use scene::procedural::{courtyard, quad, snake};
-use scene::{Instance, Scene};
+use scene::procedural::courtyard;
 
 use crate::failures::cached_light::{
-    ComparedPixels, Cuboid, LitScene, floor_with, mean_light, pixels_where, share_of_other_colors, sun, unknown_share,
+    ComparedPixels, Cuboid, LitScene, floor_with, mean_light, pixels_where, sun, unknown_share,
 };
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::shape::Shape;
-use crate::failures::stage::{Cell, looking};
+use crate::failures::stage::Cell;
 use crate::failures::stand::Stand;
 
 const FLOOR_HALF_M: f32 = 2.5;
@@ -26,14 +24,11 @@ const VIEW_PLACE: Vec2 = Vec2::new(0.23, -0.31);
 const BARS_HEIGHT_M: f32 = 0.25;
 const BARS_APART_M: f32 = 0.5;
 const BARS_HALF_LENGTH_M: f32 = 1.0;
-const SNAKE: Cell = Cell { eye: Vec3::new(0.0, 4.5, 3.0), target: Vec3::ZERO, half_m: 0.4 };
-const SNAKE_GROUND_M: f32 = -0.16;
 const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, half_m: 1.0 };
 const DENSITIES: X = X::log("density of samples", "texels a pixel", &[0.125, 0.25, 0.5, 1.0]);
 const ERROR: [&str; 2] = ["mean difference of colours near by", "of 255"];
-const UNKNOWN: [&str; 2] = ["surfaces whose light no sample knows", ""];
 
-pub const CURVES: [Curve; 7] = [
+pub const CURVES: [Curve; 4] = [
     Curve {
         name: "Light that leaks at the foot of a wall",
         subject: "a wall of 0.3 pixels between a lit and a dark floor, from above, two images",
@@ -73,45 +68,13 @@ pub const CURVES: [Curve; 7] = [
         measure: around_cubes,
     },
     Curve {
-        name: "Light unknown against far over near",
-        subject: "a card at 1 m before a slanted wall with a panel, two images of 16-bit depth",
-        x: X::log("distance of the wall over the card's", "", &[1e1, 1e2, 1e3, 3e3, 1e4, 3e4, 1e5]),
-        y: ["share of surfaces", ""],
-        series: &[
-            Series::new("unknown, fast", &[Shape::Plateau { tolerance: 0.015 }]),
-            Series::new("unknown, balanced", &[Shape::Plateau { tolerance: 0.015 }]),
-            Series::new("another colour, fast", &[Shape::Bounded { least: 0.0, most: 0.05 }]),
-            Series::new("another colour, balanced", &[Shape::Bounded { least: 0.0, most: 0.005 }]),
-        ],
-        why: "A step of the stored depth moves far samples along their rays. The tolerance has what half a step moves them by, so that they stay known.",
-        measure: by_range,
-    },
-    Curve {
-        name: "Light of another moment",
-        subject: "a snake that moves over its ground, two images of the first moment",
-        x: X::linear("time since the samples", "s", &[0.0, 0.03125, 0.0625, 0.125, 0.25, 0.5]),
-        y: ["mean difference of the ground's colours", "of 255"],
-        series: &[Series::new("fast", &[Shape::rises(0.5, 0.1)]), Series::new("balanced", &[Shape::rises(0.5, 0.1)])],
-        why: "Samples keep the shadow of the place where the snake was. Only points whose texels disagree are lit anew.",
-        measure: by_moment,
-    },
-    Curve {
         name: "Light unknown against the number of images",
         subject: "a courtyard under a sun, images of the view's density",
         x: X::log("images", "", &[1.0, 2.0, 4.0]),
-        y: UNKNOWN,
+        y: ["surfaces whose light no sample knows", ""],
         series: &[Series::new("balanced", &[Shape::falls(0.01, 0.002)])],
         why: "Each further image surrounds points that others see at an edge, or not at all.",
         measure: by_images,
-    },
-    Curve {
-        name: "Light unknown against the density of samples",
-        subject: "a courtyard under a sun, four images",
-        x: DENSITIES,
-        y: UNKNOWN,
-        series: &[Series::new("balanced", &[Shape::falls(0.02, 0.002)])],
-        why: "Points near edges have no four texels around them, and the larger a texel is, the more points are near an edge.",
-        measure: by_density,
     },
 ];
 
@@ -217,52 +180,6 @@ fn around_cubes(stand: &Stand, densities: &[f64]) -> anyhow::Result<Rows> {
     })
 }
 
-/// A card at 1 m before a slanted wall, and a panel with its shadow on the wall.
-fn card_before_a_wall(far_m: f32) -> Scene {
-    let slanted = Vec3::new(1.0, 0.0, 1.0).normalize_or(Vec3::Z);
-    let mut scene = quad(Vec3::NEG_Z * far_m, far_m, slanted, [255; 3]);
-    scene.materials[0].unlit = false;
-    let card = quad(Vec3::new(-0.4, 0.0, -1.0), 0.1, Vec3::Z, [255; 3]);
-    let panel = quad((slanted * 0.1 - Vec3::Z) * far_m, 0.2 * far_m, slanted, [255; 3]);
-    for (number, part) in [card, panel].into_iter().enumerate() {
-        scene.instances.push(Instance { mesh: 1 + number as u32, ..part.instances[0] });
-        scene.meshes.extend(part.meshes);
-    }
-    Scene { illumination: sun(Vec3::new(0.3, 0.8, 1.0)), ..scene }
-}
-
-fn by_range(stand: &Stand, ratios: &[f64]) -> anyhow::Result<Rows> {
-    let camera = |x: f32, size_px| looking(Vec3::X * x, Vec3::new(x, 0.0, -1.0), 60.0, size_px);
-    let view_camera = camera(0.02, large_view_px(stand));
-    let sample_px = at_density(view_camera.size_px, 0.5);
-    rows(ratios, |far_m| {
-        let lit = LitScene::new(stand, &card_before_a_wall(far_m as f32), "shadows")?;
-        let decoded = lit.decoded_samples(&[-0.1, 0.1].map(|x| camera(x, sample_px)))?;
-        let truth = lit.direct(view_camera)?;
-        let balanced = lit.cached(&decoded, Balanced, view_camera)?;
-        let fast = lit.cached(&decoded, Fast, view_camera)?;
-        Ok([
-            unknown_share(&fast),
-            unknown_share(&balanced),
-            share_of_other_colors(&truth, &fast),
-            share_of_other_colors(&truth, &balanced),
-        ])
-    })
-}
-
-fn by_moment(stand: &Stand, times_s: &[f64]) -> anyhow::Result<Rows> {
-    let mut lit = LitScene::new(stand, &snake(), "shadows")?;
-    let images = lit.samples(&SNAKE.samples(2, large_view_px(stand)))?;
-    let camera = SNAKE.camera(VIEW_PLACE.to_array(), large_view_px(stand));
-    rows(times_s, |time_s| {
-        lit.scene_time_s = time_s as f32;
-        let truth = lit.direct(camera)?;
-        let ground = pixels_where(&camera, &truth, |p| (p.y - SNAKE_GROUND_M).abs() < 1e-3);
-        let compared = ComparedPixels { camera, truth, pixels: ground };
-        Ok([compared.error(&lit, &images, Fast)?, compared.error(&lit, &images, Balanced)?])
-    })
-}
-
 /// The mean share of views of the courtyard that no sample knows.
 fn unknown_in_the_yard(lit: &LitScene<'_>, cameras: &[PinholeCamera], stand: &Stand) -> anyhow::Result<f64> {
     let images = lit.samples(cameras)?;
@@ -276,14 +193,6 @@ fn by_images(stand: &Stand, counts: &[f64]) -> anyhow::Result<Rows> {
     let lit = LitScene::new(stand, &courtyard().with_default_lights(), "shadows")?;
     rows(counts, |count| {
         let cameras = YARD.samples(count as usize, large_view_px(stand));
-        Ok([unknown_in_the_yard(&lit, &cameras, stand)?])
-    })
-}
-
-fn by_density(stand: &Stand, densities: &[f64]) -> anyhow::Result<Rows> {
-    let lit = LitScene::new(stand, &courtyard().with_default_lights(), "shadows")?;
-    rows(densities, |density| {
-        let cameras = YARD.samples(4, at_density(large_view_px(stand), density));
         Ok([unknown_in_the_yard(&lit, &cameras, stand)?])
     })
 }

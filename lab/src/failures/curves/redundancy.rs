@@ -1,10 +1,10 @@
-//! Redundant samples: triangles of a texel's size, floors at a grazing angle, tolerance, jitter and many instances.
+//! Redundant samples: triangles of a texel's size, floors at a grazing angle, tolerance and jitter. Layers from one place.
 
 use depth_image::{DepthImage, PinholeCamera};
-use glam::{Affine3A, UVec2, Vec3};
+use glam::{Affine3A, Vec3};
 use sampling::{Redundancy, SamplingMethod, scalar};
+use scene::Instance;
 use scene::procedural::{courtyard, poles, quad};
-use scene::{Instance, Scene};
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::{samples, share};
@@ -19,7 +19,7 @@ const TESTS: [SamplingMethod; 3] = [
 ];
 const ALL: &[Shape] = &[Shape::Bounded { least: 0.95, most: 1.0 }];
 
-pub const CURVES: [Curve; 6] = [
+pub const CURVES: [Curve; 5] = [
     Curve {
         name: "Redundant samples found against triangles",
         subject: "a tessellated wall that two images see whole",
@@ -48,22 +48,14 @@ pub const CURVES: [Curve; 6] = [
         measure: by_angle,
     },
     Curve {
-        name: "Samples kept against the tolerance",
-        subject: "a courtyard, two images, the twin",
-        x: TOLERANCES,
-        y: ["share of the second image kept", ""],
-        series: &[Series::new("tolerance", &[Shape::falls(0.05, 1e-3)])],
-        why: "More tolerance calls more samples redundant.",
-        measure: kept_by_tolerance,
-    },
-    Curve {
         name: "Surfaces lost against the tolerance",
         subject: "a courtyard, two images, the twin",
-        x: TOLERANCES,
+        x: X::log("allowed difference, over the default", "", &[0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0])
+            .with_small(&[0.125, 0.5, 1.0, 2.0, 8.0]),
         y: ["share of a view's surfaces that no image holds", ""],
         series: &[Series::new("tolerance", &[Shape::rises(0.002, 2e-3)])],
         why: "From the default on, walls that the other image met at a slant count as fine enough, and samples are omitted that no image holds.",
-        measure: lost_by_tolerance,
+        measure: by_tolerance,
     },
     Curve {
         name: "Flicker against jitter",
@@ -79,19 +71,20 @@ pub const CURVES: [Curve; 6] = [
         measure: by_jitter,
     },
     Curve {
-        name: "Instances told apart",
-        subject: "up to 10,000 instances of a square, two images",
-        x: X::log("instances", "", &[10.0, 100.0, 1000.0, 10_000.0]).with_small(&[10.0, 100.0, 1000.0]),
-        y: ["instances sampled, of those in view", ""],
-        series: &[Series::new("pixel", &[Shape::Bounded { least: 0.999, most: 1.0 }])],
-        why: "The key of a sample is instance and primitive: no instance stands for another.",
-        measure: by_instances,
+        name: "A wall peeled from near its plane",
+        subject: "a wall before another, four layers from one place",
+        x: X::linear("distance from the wall's plane", "m", &[0.0, 0.05, 0.1, 0.2, 0.4, 0.8]),
+        y: ["samples of the wall, of a layer's texels", ""],
+        series: &[Series::new(
+            "depth_peeling:4",
+            &[Shape::rises(0.01, 0.0), Shape::EqualAt { x: 0.0, y: 0.0, tolerance: 0.0 }],
+        )],
+        why: "Layers from one place share its blind spots: a wall that is seen edge-on is in none of them.",
+        measure: by_distance,
     },
 ];
 
 const STILL: Shape = Shape::EqualAt { x: 0.0, y: 0.0, tolerance: 0.0 };
-const TOLERANCES: X = X::log("allowed difference, over the default", "", &[0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0])
-    .with_small(&[0.125, 0.5, 1.0, 2.0, 8.0]);
 
 fn by_leg(stand: &Stand, legs_px: &[f64]) -> anyhow::Result<Rows> {
     rows(legs_px, |leg_px| found_redundant(stand.engine(), leg_px as f32))
@@ -114,31 +107,22 @@ fn by_angle(stand: &Stand, angles_deg: &[f64]) -> anyhow::Result<Rows> {
     })
 }
 
-/// The share of the second image that is kept, and of a view's surfaces that no image holds.
-fn by_tolerance(stand: &Stand, factors: &[f64]) -> anyhow::Result<Vec<[f64; 2]>> {
+fn by_tolerance(stand: &Stand, factors: &[f64]) -> anyhow::Result<Rows> {
     let scene = courtyard();
     let rays = render::scalar::rays::Scene::of(&stand.upload(&scene)?, 0.0)?;
-    let (center, reach) = (scene.bounds().center(), scene.bounds().size().length());
-    let size_px = stand.view_px;
-    let camera =
-        |x: f32| PinholeCamera::looking_at(center + Vec3::new(x, 0.5, 0.9) * reach, center, Vec3::Y, 0.7, size_px);
+    let center = scene.bounds().center();
+    let reach = scene.bounds().size().length();
+    let camera = |x: f32| {
+        let eye = center + Vec3::new(x, 0.5, 0.9) * reach;
+        PinholeCamera::looking_at(eye, center, Vec3::Y, 0.7, stand.view_px)
+    };
     let view = scalar::sample(&rays, &[camera(0.05)], SamplingMethod::CONVENTIONAL).remove(0);
-    let row = |&factor: &f64| {
+    rows(factors, |factor| {
         let settings = scalar::Settings { allowed: factor as f32, ..scalar::Settings::default() };
         let images = scalar::sample_with(&rays, &[camera(-0.15), camera(0.2)], TESTS[2], settings);
         let lost = metrics::unheld_rate(&camera(0.05), &view.inverse_depth_per_m, &images)?;
-        let kept = samples(&images[1]) as f64 / images[1].inverse_depth_per_m.len() as f64;
-        Ok([kept, lost.unwrap_or(f64::NAN)])
-    };
-    factors.iter().map(row).collect()
-}
-
-fn kept_by_tolerance(stand: &Stand, factors: &[f64]) -> anyhow::Result<Rows> {
-    Ok(by_tolerance(stand, factors)?.into_iter().map(|[kept, _]| vec![kept]).collect())
-}
-
-fn lost_by_tolerance(stand: &Stand, factors: &[f64]) -> anyhow::Result<Rows> {
-    Ok(by_tolerance(stand, factors)?.into_iter().map(|[_, lost]| vec![lost]).collect())
+        Ok([lost.unwrap_or(f64::NAN)])
+    })
 }
 
 fn by_jitter(stand: &Stand, jitters_px: &[f64]) -> anyhow::Result<Rows> {
@@ -154,39 +138,27 @@ fn by_jitter(stand: &Stand, jitters_px: &[f64]) -> anyhow::Result<Rows> {
     rows(jitters_px, |jitter_px| {
         let mut flips = [0.0; 3];
         for (flips, method) in flips.iter_mut().zip(TESTS) {
-            let (still, moved) = (mask(method, 0.0)?, mask(method, jitter_px)?);
+            let still = mask(method, 0.0)?;
+            let moved = mask(method, jitter_px)?;
             *flips = share(still.iter().zip(&moved).map(|(a, b)| a != b));
         }
         Ok(flips)
     })
 }
 
-/// Squares in front of each other, ten deep.
-fn squares(count: u32) -> Scene {
-    let mut scene = quad(Vec3::ZERO, 0.03, Vec3::new(0.2, 0.1, 1.0), [180, 90, 40]);
-    let place = |i: u32| {
-        // Spread over the field by a low-discrepancy sequence, so that few are in the field, too.
-        let at = (glam::Vec2::new(0.754_877_7, 0.569_840_3) * i as f32).fract() * 5.0 - 2.5;
-        at.extend(-0.5 * ((i * 7919) % 10) as f32)
+fn by_distance(stand: &Stand, distances_m: &[f64]) -> anyhow::Result<Rows> {
+    let mut scene = quad(Vec3::new(0.0, 0.0, -4.0), 2.0, Vec3::Z, [200; 3]);
+    scene.meshes.extend(quad(Vec3::new(0.0, 0.0, -2.0), 0.8, Vec3::X, [200, 40, 40]).meshes);
+    scene.instances.push(Instance { mesh: 1, world_from_mesh: Affine3A::IDENTITY });
+    let scene = stand.upload(&scene)?;
+    let of_wall = |image: &DepthImage| {
+        let ids = image.surface_id.iter().flatten();
+        image.inverse_depth_per_m.iter().zip(ids).filter(|(depth, id)| **depth > 0.0 && id.instance == 1).count()
     };
-    let instance = |i| Instance { mesh: 0, world_from_mesh: Affine3A::from_translation(place(i)) };
-    scene.instances = (0..count).map(instance).collect();
-    scene
-}
-
-fn by_instances(stand: &Stand, counts: &[f64]) -> anyhow::Result<Rows> {
-    let camera =
-        |x: f32| PinholeCamera::looking_at(Vec3::new(x, 0.0, 4.0), Vec3::ZERO, Vec3::Y, 0.9, UVec2::splat(128));
-    let cameras = [camera(-0.3), camera(0.3)];
-    rows(counts, |count| {
-        let scene = stand.upload(&squares(count as u32))?;
-        let in_view = instances(&stand.sample(&scene, &cameras, SamplingMethod::CONVENTIONAL)?);
-        let sampled = instances(&stand.sample(&scene, &cameras, TESTS[0])?);
-        Ok([share(in_view.iter().map(|instance| sampled.contains(instance)))])
+    rows(distances_m, |x| {
+        let eye = Vec3::new(x as f32, 0.0, 3.0);
+        let camera = PinholeCamera::looking_at(eye, Vec3::NEG_Z * 2.0, Vec3::Y, 0.9, stand.sample_px);
+        let images = stand.sample(&scene, &[camera; 4], SamplingMethod::DepthPeeling { layers: 4 })?;
+        Ok([images.iter().map(of_wall).sum::<usize>() as f64 / camera.pixel_count() as f64])
     })
-}
-
-fn instances(images: &[DepthImage]) -> std::collections::BTreeSet<u32> {
-    let ids = images.iter().flat_map(|image| image.inverse_depth_per_m.iter().zip(image.surface_id.iter().flatten()));
-    ids.filter(|(depth, _)| **depth > 0.0).map(|(_, id)| id.instance).collect()
 }

@@ -1,46 +1,41 @@
-//! Sample sets and the views that they serve: places outside the cell, its width, the number of images and their size.
+//! Sample sets and the views that they serve: places outside the cell, its width, the number of images and their size, and a
+//! yard that no camera sees.
 
-use depth_image::ProvenanceKind;
-use glam::Vec3;
+use depth_image::{PinholeCamera, ProvenanceKind, View};
+use glam::{Vec2, Vec3};
 use metrics::unheld_rate;
 use scene::procedural::{courtyard, poles, tree_terrain};
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
-use crate::failures::measures::{depths, foreground, mean, share_of_kind};
+use crate::failures::measures::{depths, is_kind, mean};
 use crate::failures::shape::Shape;
-use crate::failures::stage::{CARVE, Cell, Stage, search};
+use crate::failures::stage::{CARVE, Cell, Stage, looking, search};
 use crate::failures::stand::Stand;
 
 const TREE: Cell = Cell { eye: Vec3::new(0.3, 2.2, 2.2), target: Vec3::new(0.0, 0.3, 0.0), half_m: 0.3 };
 const POLES: Cell = Cell { eye: Vec3::new(0.0, 0.0, 4.0), target: Vec3::new(0.0, 0.0, -2.0), half_m: 0.4 };
 const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, half_m: 1.0 };
-const OUTSIDE: X = X::linear("distance from the cell", "widths", &[0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0])
-    .with_small(&[0.0, 0.5, 1.0, 2.0, 4.0]);
 const POLES_SUBJECT: &str = "nine poles before a wall, four images";
 const POLE_RADIUS_M: f32 = 0.12;
 const FLIP: [&str; 2] = ["FLIP of the foreground", ""];
+/// The height of the eyes of cameras that do not see the yard, below the walls' tops.
+const LOW_M: f32 = 1.7;
+/// The distance of all these eyes from the middle of the yard.
+const DISTANCE_M: f32 = 9.0;
 
-pub const CURVES: [Curve; 6] = [
+pub const CURVES: [Curve; 5] = [
     Curve {
         name: "Error outside the view cell",
         subject: POLES_SUBJECT,
-        x: OUTSIDE,
+        x: X::linear("distance from the cell", "widths", &[0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0])
+            .with_small(&[0.0, 0.5, 1.0, 2.0, 4.0]),
         y: FLIP,
         series: &[
             Series::new("joint_carve", &[Shape::rises(0.05, 0.02)]),
             Series::new("light_field_search:64", &[Shape::rises(0.05, 0.05)]),
         ],
         why: "Outside of the cameras' hull a view sees what no camera saw, more of it the farther it is.",
-        measure: error_outside,
-    },
-    Curve {
-        name: "Marked pixels outside the view cell",
-        subject: POLES_SUBJECT,
-        x: OUTSIDE,
-        y: ["pixels marked as filled", ""],
-        series: &[Series::new("joint_carve", &[Shape::rises(0.05, 0.02)])],
-        why: "What no camera saw is said to be filled: the marks grow with the error.",
-        measure: marked_outside,
+        measure: outside,
     },
     Curve {
         name: "Error against the cell's width",
@@ -80,50 +75,37 @@ pub const CURVES: [Curve; 6] = [
         measure: by_side,
     },
     Curve {
-        name: "Error against the distance of the view",
-        subject: "a tree over a terrain, four images of one distance",
-        x: X::log("distance over the cameras'", "", &[0.35, 0.5, 0.71, 1.0, 1.41, 2.0])
-            .with_small(&[0.35, 0.5, 0.71, 1.0]),
-        y: FLIP,
-        series: &[Series::new("joint_carve", &[Shape::falls(0.02, 0.03)])],
-        why: "A view that is nearer than the cameras enlarges their texels.",
-        measure: by_distance,
+        name: "A yard that no camera sees",
+        subject: "a courtyard, four images from below the walls' tops",
+        x: X::linear("height of the view", "°", &[15.0, 30.0, 40.0, 50.0, 60.0, 75.0, 88.0])
+            .with_small(&[15.0, 45.0, 60.0, 88.0]),
+        y: ["share of the picture", ""],
+        series: &[
+            Series::new("the yard", &[Shape::rises(0.04, 0.005)]),
+            Series::new("not marked, joint_carve", &[Shape::Bounded { least: 0.0, most: 0.02 }]),
+            Series::new("not marked, light_field_search:64", &[Shape::rises(0.01, 0.01)]),
+        ],
+        why: "The carve marks what it does not know. The search meets the shadow volume that all cameras share, and calls its colour a hit.",
+        measure: unseen_yard,
     },
 ];
 
-fn outside(stand: &Stand, widths: f64) -> Vec<depth_image::PinholeCamera> {
-    // From the cell's edge, in half widths from its middle.
-    let x = 1.0 + 2.0 * widths as f32;
-    [[x, 0.2], [-x, -0.4]].map(|place| POLES.camera(place, stand.view_px)).to_vec()
-}
-
-fn error_outside(stand: &Stand, widths: &[f64]) -> anyhow::Result<Rows> {
+fn outside(stand: &Stand, widths: &[f64]) -> anyhow::Result<Rows> {
     let stage = Stage::new(stand, &poles(POLE_RADIUS_M), &POLES.samples(4, stand.sample_px))?;
     rows(widths, |widths| {
-        let cameras = outside(stand, widths);
-        let truths = stage.truth(&cameras)?;
-        let flip = |method| Ok::<_, anyhow::Error>(foreground(&truths, &stage.views(&cameras, method)?)?.flip);
-        Ok([flip(CARVE)?, flip(search(64))?])
-    })
-}
-
-fn marked_outside(stand: &Stand, widths: &[f64]) -> anyhow::Result<Rows> {
-    let stage = Stage::new(stand, &poles(POLE_RADIUS_M), &POLES.samples(4, stand.sample_px))?;
-    rows(widths, |widths| {
-        let views = stage.views(&outside(stand, widths), CARVE)?;
-        Ok([share_of_kind(&views, ProvenanceKind::Filled)])
+        // From the cell's edge, in half widths from its middle.
+        let x = 1.0 + 2.0 * widths as f32;
+        let cameras = [[x, 0.2], [-x, -0.4]].map(|place| POLES.camera(place, stand.view_px));
+        stage.flips(&cameras, [CARVE, search(64)])
     })
 }
 
 fn by_width(stand: &Stand, widths: &[f64]) -> anyhow::Result<Rows> {
-    let cameras = POLES.views(stand.view_px);
     rows(widths, |width| {
         // Views stay where they are.
         let cell = Cell { half_m: POLES.half_m * width as f32, ..POLES };
         let stage = Stage::new(stand, &poles(POLE_RADIUS_M), &cell.samples(4, stand.sample_px))?;
-        let truths = stage.truth(&cameras)?;
-        let flip = |method| Ok::<_, anyhow::Error>(foreground(&truths, &stage.views(&cameras, method)?)?.flip);
-        Ok([flip(CARVE)?, flip(search(64))?])
+        stage.flips(&POLES.views(stand.view_px), [CARVE, search(64)])
     })
 }
 
@@ -148,21 +130,44 @@ fn by_images(stand: &Stand, counts: &[f64]) -> anyhow::Result<Rows> {
 }
 
 fn by_side(stand: &Stand, ratios: &[f64]) -> anyhow::Result<Rows> {
-    let (scene, cameras) = (tree_terrain(2000, 1), TREE.views(stand.view_px));
+    let scene = tree_terrain(2000, 1);
     rows(ratios, |ratio| {
         let size_px = (stand.sample_px.as_vec2() * ratio as f32).round().as_uvec2();
         let stage = Stage::new(stand, &scene, &TREE.samples(4, size_px))?;
-        let truths = stage.truth(&cameras)?;
-        let flip = |method| Ok::<_, anyhow::Error>(foreground(&truths, &stage.views(&cameras, method)?)?.flip);
-        Ok([flip(CARVE)?, flip(search(64))?])
+        stage.flips(&TREE.views(stand.view_px), [CARVE, search(64)])
     })
 }
 
-fn by_distance(stand: &Stand, ratios: &[f64]) -> anyhow::Result<Rows> {
-    let stage = Stage::new(stand, &tree_terrain(2000, 1), &TREE.samples(4, stand.sample_px))?;
-    rows(ratios, |ratio| {
-        let eye = TREE.target + (TREE.eye - TREE.target) * ratio as f32;
-        let cameras = Cell { eye, half_m: TREE.half_m * ratio as f32, ..TREE }.views(stand.view_px);
-        Ok([foreground(&stage.truth(&cameras)?, &stage.views(&cameras, CARVE)?)?.flip])
+fn unseen_yard(stand: &Stand, heights_deg: &[f64]) -> anyhow::Result<Rows> {
+    let samples = [0.0f32, 0.4, 0.8, 1.2].map(|turn| {
+        looking(Vec3::new(turn.cos() * DISTANCE_M, LOW_M, turn.sin() * DISTANCE_M), Vec3::Y, 45.0, stand.sample_px)
+    });
+    let stage = Stage::new(stand, &courtyard(), &samples)?;
+    rows(heights_deg, |height_deg| {
+        let (sin, cos) = (height_deg as f32).to_radians().sin_cos();
+        let turn = Vec2::from_angle(0.6) * cos * DISTANCE_M;
+        let camera = looking(Vec3::new(turn.x, sin * DISTANCE_M, turn.y), Vec3::ZERO, 35.0, stand.view_px);
+        let yard = yard(&camera, &stage.truth(&[camera])?[0]);
+        let seen = yard.iter().filter(|is| **is).count() as f64 / yard.len() as f64;
+        let carved = share_unmarked(&yard, &stage.views(&[camera], CARVE)?[0]);
+        let searched = share_unmarked(&yard, &stage.views(&[camera], search(64))?[0]);
+        Ok([seen, carved, searched])
     })
+}
+
+/// The pixels of the yard's floor and pillar: lower than the walls, inside them.
+fn yard(camera: &PinholeCamera, truth: &View) -> Vec<bool> {
+    let is_inside = |(index, depth): (usize, &f32)| {
+        let width = camera.size_px.x as usize;
+        let pixel = Vec2::new((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
+        let point = camera.ray(pixel).at(depth.recip());
+        *depth > 0.0 && point.x.abs() < 1.6 && point.z.abs() < 1.6 && point.y < 0.9
+    };
+    depths(truth).iter().enumerate().map(is_inside).collect()
+}
+
+/// Of all pixels, those of the yard that are not marked as filled, although no camera saw them.
+fn share_unmarked(yard: &[bool], view: &View) -> f64 {
+    let unmarked = yard.iter().zip(is_kind(view, ProvenanceKind::Filled)).filter(|(yard, filled)| **yard && !*filled);
+    unmarked.count() as f64 / yard.len() as f64
 }

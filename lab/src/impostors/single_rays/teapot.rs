@@ -2,6 +2,7 @@
 
 use depth_image::{Aabb, Camera, Environment, Illumination, PinholeCamera, Ray, SinglePoleCamera};
 use glam::{UVec2, Vec3};
+use gpu::Turn;
 use rayon::prelude::*;
 use reconstruction::{SampleSet, SetDescription};
 use render::{GpuScene, Lighting, SamplePlanes, scalar};
@@ -86,7 +87,7 @@ pub fn unlit_set(stand: &Stand, scene: &GpuScene, cameras: &[Camera], volume: Aa
         environment: None,
         mips: false,
     };
-    Ok(stand.reconstructor().upload(&images, &description)?)
+    Ok(stand.reconstructor().upload(&images, &description, Turn::default())?)
 }
 
 /// Nothing is met nearer to a reflector.

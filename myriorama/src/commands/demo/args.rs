@@ -14,7 +14,7 @@ const FIRST_PAGE_LIGHT: &str = "soft 16, indirect 64";
 const FIRST_PAGE_SCENE: &str = "gallery";
 
 /// Shows what sharing samples gains. First a page: a room in indirect light whose light comes from four sample images,
-/// beside direct drawing in the same time. Then 290 views of 200×150 of one scene, from four sample images by P nodes in
+/// beside direct drawing in the same time. Then 290 views of 200×150 of one scene, from four sample images by five nodes in
 /// one process, beside views that are drawn directly; once in expensive light, once in plain light. Writes pictures,
 /// tables and a chart to --out. Takes three minutes at most on two slow cores, and a minute with --quick.
 #[derive(Debug, Args)]
@@ -26,9 +26,6 @@ pub struct DemoArgs {
     pub(super) scene: SceneArgs,
     #[command(flatten)]
     pub(super) device: DeviceArgs,
-    /// Nodes P that share the device
-    #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=256))]
-    pub(super) nodes: u16,
     /// Where the report goes
     #[arg(long, default_value = "out/demo", value_name = "DIR")]
     pub(super) out: PathBuf,

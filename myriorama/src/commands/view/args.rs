@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use anyhow::Context as _;
+use app_core::addresses::CoordinatorArgs;
 use app_core::camera_file::{self, Placement};
 use app_core::exit::BadInput;
-use app_core::process::coordinator_url;
 use app_core::quality::QualityArgs;
 use app_core::sizes::{SizePx, grid};
 use clap::Args;
@@ -27,9 +27,8 @@ use crate::tone::ToneArgs;
 /// and the exit status is 130; a second ctrl-c ends at once. --resume then requests the remaining views.
 #[derive(Debug, Args)]
 pub struct ViewArgs {
-    /// The address of the coordinator
-    #[arg(long, value_name = "URL", default_value = "http://127.0.0.1:7420", env = "MYRIORAMA_COORDINATOR", value_parser = coordinator_url)]
-    pub(super) coordinator: String,
+    #[command(flatten)]
+    pub(super) coordinator: CoordinatorArgs,
     /// The scene, by its name or hash at the coordinator [default: the first on offer]
     #[arg(long, value_name = "NAME")]
     pub(super) scene: Option<String>,
@@ -71,12 +70,6 @@ pub struct ViewArgs {
     /// pixels that show a surface and over the whole picture; also in comparison.csv
     #[arg(long)]
     pub(super) compare: bool,
-    /// With --compare: exit status 1 if the PSNR of a view is below
-    #[arg(long, value_name = "DB", requires = "compare")]
-    pub(super) least_psnr: Option<f64>,
-    /// With --frames: starts with one ray a light and pixel, and doubles them from frame to frame
-    #[arg(long)]
-    pub(super) refine: bool,
     /// The codec of frames: lz4 or png (lossless), or jpeg:QUALITY
     #[arg(long, default_value = "lz4", value_name = "NAME")]
     pub(super) codec: FrameCodec,
@@ -84,17 +77,11 @@ pub struct ViewArgs {
     #[arg(long, default_value = "auto", value_name = "NAME")]
     pub(super) policy: PolicyChoice,
     /// The most error, and the most time of a view, as in "flip 0.05" (see `myriorama plan --help`): the cluster chooses what
-    /// is sampled, and how views are reconstructed unless --method says so. Pictures wait for the choice. Where nothing keeps
+    /// is sampled, and how views are reconstructed unless --method says so. Pictures wait for the choice, at most a minute. Where nothing keeps
     /// the budget, they are written all the same, and the exit status is 3. [default: the coordinator's, for which nothing
     /// waits]
     #[arg(long, value_name = "BUDGET")]
     pub(super) budget: Option<Budget>,
-    /// With --budget: the longest wait for the choice
-    #[arg(long, default_value_t = 60.0, value_name = "S", value_parser = wait)]
-    pub(super) promise_wait: f64,
-    /// Tiles of every sample image, shared among samplers [default: the fastest by prediction]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16))]
-    pub(super) tiles: Option<u32>,
     /// Moments of an animated scene; all views are made of each moment
     #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(super) frames: u32,
@@ -111,9 +98,6 @@ pub struct ViewArgs {
     /// With --live: the time to move
     #[arg(long, default_value_t = 10.0, value_name = "S", value_parser = duration)]
     pub(super) seconds: f64,
-    /// With --live: exit status 1 if no new frame came for longer
-    #[arg(long, value_name = "S", requires = "live")]
-    pub(super) longest_gap: Option<f64>,
 }
 
 impl ViewArgs {
@@ -131,10 +115,6 @@ impl ViewArgs {
 
 pub(in crate::commands) fn rate(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|hz| (0.01..=1000.0).contains(hz)).ok_or_else(|| "expected 0.01 to 1000".to_owned())
-}
-
-fn wait(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|s| (0.0..=86_400.0).contains(s)).ok_or_else(|| "expected 0 to 86400".to_owned())
 }
 
 fn duration(text: &str) -> Result<f64, String> {

@@ -10,7 +10,6 @@ use app_core::print_line;
 use client::{Client, Session};
 use cluster::{BudgetRequest, OfferSettings, OfferStatus, Promise, PromiseState, SessionRequest, Timeline};
 use depth_image::PinholeCamera;
-use render::Lighting;
 
 use super::args::ViewArgs;
 use super::file_names::remove_parts;
@@ -31,8 +30,7 @@ impl Job {
     /// # Errors
     /// Arguments cannot be used, no coordinator answers, or the folder cannot be written.
     pub(super) async fn place(args: &ViewArgs) -> anyhow::Result<Self> {
-        let client = Client::connect(&args.coordinator).await;
-        let client = client.with_context(|| format!("no coordinator at {}", args.coordinator))?;
+        let client = args.coordinator.connect().await?;
         let status = client.wait_for_nodes(1, Duration::from_secs(30)).await?;
         let offer = offered(status.offers, args.scene.as_deref())?;
         let cameras = args.viewpoints.cameras(&offer, args.size)?;
@@ -115,37 +113,13 @@ fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamer
     let request = request(settings, Terms { policy: args.policy, budget }, views)?;
     let request = if args.live { at_rate(request, args.rate) } else { request };
     let request = SessionRequest {
-        forced_tile_count: args.tiles,
-        refinement_steps: if args.refine { refinement_steps(&request.lighting) } else { 1 },
         scene: Some(offer.name.clone()),
         codec: args.codec.to_string(),
         planes: args.planes(),
-        timeline: timeline(args.frames, args.frame_step, args.refine),
+        timeline: Timeline { start_s: 0.0, step_s: args.frame_step, set_count: args.frames },
         viewpoints: if args.cells || args.viewpoints.around.is_some() { viewpoints(cameras) } else { Vec::new() },
         ..request
     };
     // Metrics are of light as it is, unless the arguments say otherwise.
     Ok(if args.compare { args.tone.for_metrics(request) } else { args.tone.for_people(request) })
-}
-
-/// A picture that is refined stands still: motion would begin the refinement anew.
-fn timeline(set_count: u32, step_s: f64, refine: bool) -> Timeline {
-    Timeline { start_s: 0.0, step_s: if refine { 0.0 } else { step_s }, set_count }
-}
-
-/// The steps of a lighting; one where a newer coordinator names a lighting that is not known here.
-fn refinement_steps(lighting: &str) -> u32 {
-    lighting.parse().map_or(1, |lighting: Lighting| lighting.refinement_steps())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_refined_timeline_stands_still() {
-        assert!(timeline(4, 0.1, false).moves());
-        assert!(!timeline(4, 0.1, true).moves() && timeline(4, 0.1, true).set_count == 4);
-        assert!(!timeline(1, 0.1, false).moves(), "one set");
-    }
 }

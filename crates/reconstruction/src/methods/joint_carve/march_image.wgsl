@@ -43,8 +43,6 @@ fn march_nodes(line: Line, begin: f32{{ given }}) -> Progress {
         let size = f32(1u << level);
         let exit = exit_of(line, s, vec2f(node) * size, size);
         let nearest = nearest_code(textureLoad(nodes, texel_at(first_node + node_index(log2_sides, level, node)), 0).x);
-{% if count_fetches %}        fetches += 1u;
-{% endif %}
         let free = min(at.z, line.origin.z + line.line.z * exit) > nearest{{ " || nearest < FIRST_SAMPLE" if bounced }};
         let surface = (nearest - line.origin.z) * safe_reciprocal(line.line.z);
         let partial = select(s, clamp(surface, s, exit), at.z > nearest && line.line.z < 0.0);

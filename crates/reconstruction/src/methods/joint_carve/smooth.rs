@@ -62,7 +62,7 @@ pub(crate) fn from_first_px(antialias: Antialias) -> impl Iterator<Item = Vec2> 
 pub(crate) fn record(recording: &mut Recording<'_>) -> Result<PixelList, ReconstructionError> {
     let set = recording.set;
     let variant = Smooth {
-        set: recording.variant(),
+        set: recording.set.variant(),
         antialias: recording.batch.planes.antialias,
         highlights: set.reflectors.is_some(),
         environment_map: set.environment.is_some(),

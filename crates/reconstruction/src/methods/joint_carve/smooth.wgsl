@@ -113,7 +113,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% for channel in ["r", "g", "b"] %}
     sums[3u * pixel.index + {{ loop.index0 }}u] = sum.{{ channel }};
 {% endfor %}
-{% if count_fetches %}    out_fetches[pixel.index] += fetches;
-{% endif %}
     if !is_shared && !found.is_background { leave_undecided(pixel.index); }
 }
