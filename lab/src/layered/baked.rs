@@ -1,7 +1,7 @@
 //! Views whose mirrors do not follow the viewer: they are part of the samples of one camera's image.
 
 use anyhow::Context as _;
-use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes, linear_from_srgb8, rgb9e5_from_linear};
+use depth_image::{DepthImage, PinholeCamera, View, linear_from_srgb8, rgb9e5_from_linear};
 use glam::Vec3;
 use gpu::Turn;
 use reconstruction::ReconstructRequest;

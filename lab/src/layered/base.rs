@@ -77,7 +77,7 @@ fn of_scene(
     let [without, with] = both(stand, &set, &base, &subject.views)?;
     let mut psnr_db = Vec::new();
     for (by, made, load_s) in [("joint_carve", &without, None), ("joint_carve and a base", &with, Some(million_s))] {
-        let figures = views::figures(&subject.truths, &made.views, (f64::NAN, made.view_s))?;
+        let figures = views::figures(&subject.truths, &made.views, made.view_s)?;
         let shares = [ProvenanceKind::Filled, ProvenanceKind::Base].map(|kind| Cell::from(made.share(kind) * 100.0));
         table.push([figures.row(name, by), shares.to_vec(), vec![Cell::from(load_s)]].concat())?;
         psnr_db.push(figures.psnr_db);

@@ -44,7 +44,7 @@ pub(super) fn measure(subject: &Subject<'_>, rays_a_second: f64, report: &mut Re
 
 /// What the primary ray of each pixel visits, by the scalar twin: the device's rays go the same way.
 fn primary_visits(subject: &Subject<'_>) -> anyhow::Result<Vec<Visits>> {
-    let twin = Scene::of(&subject.scene, 0.0)?;
+    let twin = Scene::of(subject.scene, 0.0)?;
     let camera = subject.camera()?;
     let pixels = (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| UVec2::new(x, y)));
     Ok(pixels.map(|pixel| twin.closest(&pixel_ray(camera, pixel), camera.near_m).1).collect())

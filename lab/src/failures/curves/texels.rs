@@ -48,7 +48,7 @@ fn measure(stand: &Stand, sides_px: &[f64]) -> anyhow::Result<Rows> {
     let views = made(&subject, &subject.upload(&cube)?.0, &subject.views, LAYERED)?;
     let places = subject.truths.chunks(TURNS_DEG.len()).zip(views.chunks(TURNS_DEG.len()));
     let row = |(truths, views): (&[View], &[View])| {
-        let wrong_hits = figures(truths, views, (f64::NAN, f64::NAN))?.wrong_hits;
+        let wrong_hits = figures(truths, views, f64::NAN)?.wrong_hits;
         Ok(vec![
             1.0 - foreground(truths, views)?.ssim,
             wrong_hits,
