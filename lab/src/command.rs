@@ -14,6 +14,7 @@ use crate::light_cache_study::{self as light_cache, LightCacheArgs};
 use crate::placement::command::{self as placement, PlacementArgs};
 use crate::planner_study::command::{self as planner_study, PlannerArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
+use crate::scene_file::{self, SceneFileArgs};
 use crate::stability::command::{self as stability, StabilityArgs};
 use crate::view_errors::{self, ErrorsArgs};
 
@@ -25,6 +26,8 @@ pub enum LabCommand {
     /// Repeats the experiments of a paper, or draws how methods fail, and writes a report
     #[command(subcommand)]
     Study(Box<StudyCommand>),
+    /// Writes a scene as a GLB file, for the program
+    Scene(SceneFileArgs),
 }
 
 /// A study.
@@ -81,6 +84,7 @@ impl LabCommand {
         match self {
             Self::Bench(args) => bench::run(args),
             Self::Study(study) => study.run(),
+            Self::Scene(args) => scene_file::run(args),
         }
     }
 }

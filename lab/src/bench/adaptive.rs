@@ -10,7 +10,6 @@ use engine::GpuEngine;
 use metrics::PictureErrors;
 use render::{DrawWork, GpuScene, Lighting, Rate, Refinement, Visibility};
 use report::{Axis, Bar, Check, Point, Report, Series, Table, XyChart};
-use scene::SceneSpec;
 
 use super::args::BenchArgs;
 use super::timing::in_turn;
@@ -52,7 +51,7 @@ const COLUMNS: [(&str, &str); 12] = [
 
 /// Adds a table, charts and checks.
 pub fn compare(args: &BenchArgs, engine: &Arc<GpuEngine>, setup: &Setup, report: &mut Report) -> anyhow::Result<()> {
-    let spec: SceneSpec = SMOOTH.parse()?;
+    let spec = fixtures::spec(SMOOTH)?;
     let smooth = SceneArgs { sample_size: args.scene.sample_size, ..SceneArgs::new(spec) }.load()?;
     engine.put_scene(smooth.offer.hash.as_str(), &smooth.scene)?;
     let mut table = Table::new(format!("Adaptive rate, {FINE}"), &COLUMNS);

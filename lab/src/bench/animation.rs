@@ -9,7 +9,6 @@ use depth_image::Camera;
 use engine::GpuEngine;
 use render::{AccelerationReport, DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 use report::{Axis, Bar, Check, Report, Series, Table, XyChart};
-use scene::SceneSpec;
 
 use super::args::BenchArgs;
 use super::timing::in_turn;
@@ -72,7 +71,7 @@ fn show(
     (name, times_s): (&str, &[f32]),
     report: &mut Report,
 ) -> anyhow::Result<Vec<Moment>> {
-    let spec: SceneSpec = name.parse()?;
+    let spec = fixtures::spec(name)?;
     let setup = SceneArgs::new(spec).load()?;
     engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
     let scene = engine.scene(setup.offer.hash.as_str())?;

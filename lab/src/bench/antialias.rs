@@ -99,7 +99,7 @@ pub fn measure(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -
         Some(folder) => models_of(folder, 2)?,
         None => Vec::new(),
     };
-    let named = SCENES.into_iter().map(|name| Ok((name.to_owned(), name.parse()?)));
+    let named = SCENES.into_iter().map(|name| Ok((name.to_owned(), fixtures::spec(name)?)));
     let named = named.collect::<anyhow::Result<Vec<(String, SceneSpec)>>>()?;
     let models = models.into_iter().map(|path| (path.display().to_string(), SceneSpec::File(path)));
     for (number, (name, spec)) in named.into_iter().chain(models).enumerate() {

@@ -79,7 +79,7 @@ const GAPS: &str = "poles";
 
 /// Evaluates a scene with disocclusions.
 pub fn gaps(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
-    sweep_scene(GAPS, GAPS.parse()?, args, engine, report)
+    sweep_scene(GAPS, fixtures::spec(GAPS)?, args, engine, report)
 }
 
 fn sweep_scene(

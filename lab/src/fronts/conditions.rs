@@ -152,7 +152,7 @@ mod tests {
         assert!(own.len() >= 12 && own.iter().filter(|subject| subject.quick).count() == 4);
         assert!(own.iter().any(|subject| subject.scene.ends_with("-wind")));
         for subject in &own {
-            subject.scene.parse::<scene::SceneSpec>().unwrap();
+            fixtures::spec(&subject.scene).unwrap();
             subject.lighting.parse::<render::Lighting>().unwrap();
         }
     }

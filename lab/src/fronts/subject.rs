@@ -32,7 +32,7 @@ impl Subject {
         let of = || format!("subject {:?}", conditions.name);
         let args = SceneArgs {
             lighting: conditions.lighting.parse().with_context(of)?,
-            ..SceneArgs::new(conditions.scene.parse().with_context(of)?)
+            ..SceneArgs::new(fixtures::spec(&conditions.scene).with_context(of)?)
         };
         let setup = args.load().with_context(of)?;
         engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;

@@ -63,7 +63,7 @@ fn of_scene(
     lighting: Lighting,
     table: &mut Table,
 ) -> anyhow::Result<Vec<Check>> {
-    let around = SceneArgs::new(name.parse()?).load()?.around;
+    let around = SceneArgs::new(fixtures::spec(name)?).load()?.around;
     let cell = ViewCell::between(&around).context("sample cameras")?;
     let subject = Subject::of_views(stand, name, lighting, |_| cell.spread(VIEWS, VIEW_PX))?;
     let images = stand.images(&subject.on_device, lighting, &pinholes(&around), views::PLAIN)?;

@@ -57,6 +57,6 @@ mod tests {
         assert_eq!(names(7), names(7));
         assert!((0..20).map(names).collect::<BTreeSet<_>>().len() > 15);
         assert_eq!(subjects(1, 8).iter().map(|subject| &subject.scene).collect::<BTreeSet<_>>().len(), 8);
-        SCENES.iter().for_each(|scene| drop(scene.parse::<scene::SceneSpec>().unwrap()));
+        SCENES.iter().for_each(|scene| drop(fixtures::spec(scene).unwrap()));
     }
 }

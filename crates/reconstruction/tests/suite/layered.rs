@@ -1,13 +1,13 @@
 //! Views from layered depth cubes.
 
 use depth_image::{Aabb, CubeGrid, Highlight, LayeredDepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use fixtures::{mirror_box, quad};
 use glam::{Affine3A, Quat, UVec2, Vec3};
 use gpu::Turn;
 use metrics::{Rgb8Image, psnr_db};
 use reconstruction::scalar::CubeTwin;
 use reconstruction::{Mirrors, ReconstructionError, ReconstructionMethod, SampleSet, SetDescription};
 use render::{DrawWork, GpuScene, LayerSelection};
-use scene::procedural::{mirror_box, quad};
 use scene::{Instance, Scene};
 
 use crate::stage::{

@@ -3,11 +3,11 @@
 use depth_image::{
     Aabb, Antialias, Camera, CubeImages, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes,
 };
+use fixtures::{mirror_pair, teapot_mirror};
 use glam::{UVec2, Vec3};
 use reconstruction::{CommonSets, MirrorCell, Mirrors, ReconstructionError, SampleSet, SetDescription};
 use render::{GpuScene, LayerSelection, SamplePlanes};
 use scene::Scene;
-use scene::procedural::{mirror_pair, teapot_mirror};
 
 use crate::layered::CubeStage;
 use crate::light_field::Gathering;

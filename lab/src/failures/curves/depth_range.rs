@@ -2,8 +2,8 @@
 
 use codec::{DecodeLimits, decode_depth_plane, encode_depth_plane};
 use depth_image::ProvenanceKind;
+use fixtures::quad;
 use glam::Vec3;
-use scene::procedural::quad;
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::share_of_kind;

@@ -1,10 +1,11 @@
 //! Layers and further images: walls that are seen edge-on, and meadows.
 
 use depth_image::{DepthImage, PinholeCamera};
+use fixtures::quad;
 use glam::{Affine3A, Vec3};
 use sampling::{Redundancy, SamplingMethod};
 use scene::Instance;
-use scene::procedural::{GrassDensity, grass, quad};
+use scene::procedural::{GrassDensity, grass};
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::{mean, samples};

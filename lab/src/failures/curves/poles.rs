@@ -1,9 +1,9 @@
 //! Poles before a wall: what is thinner than a step or a texel is found by chance.
 
 use depth_image::{ProvenanceKind, View};
+use fixtures::poles;
 use glam::Vec3;
 use reconstruction::ReconstructionMethod;
-use scene::procedural::poles;
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::{depths, foreground, is_kind, share};

@@ -1,8 +1,9 @@
 //! Quads of samples: grazing normals, isolated samples, holes, and room behind a surface.
 
 use depth_image::{BACKGROUND_INVERSE_DEPTH, DepthImage, HOLE_INVERSE_DEPTH, ProvenanceKind, oct16_from_unit};
+use fixtures::quad;
 use glam::{UVec2, Vec3};
-use scene::procedural::{quad, tree_terrain};
+use scene::procedural::tree_terrain;
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::{found, is_kind, share};

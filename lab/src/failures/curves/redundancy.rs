@@ -1,9 +1,10 @@
 //! Redundant samples: triangles of a texel's size, floors at a grazing angle, tolerance, jitter and many instances.
 
 use depth_image::{DepthImage, PinholeCamera};
+use fixtures::{poles, quad};
 use glam::{Affine3A, UVec2, Vec3};
 use sampling::{Redundancy, SamplingMethod, scalar};
-use scene::procedural::{courtyard, poles, quad};
+use scene::procedural::courtyard;
 use scene::{Instance, Scene};
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};

@@ -1,9 +1,9 @@
 //! A sphere that four cameras see: steps, bits of depth, and merged quads.
 
 use depth_image::DepthImage;
+use fixtures::uv_sphere;
 use glam::Vec3;
 use reconstruction::MeshStatistics;
-use scene::procedural::uv_sphere;
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::depth_error;

@@ -1,9 +1,10 @@
 //! Sample sets and the views that they serve: places outside the cell, its width, the number of images and their size.
 
 use depth_image::ProvenanceKind;
+use fixtures::poles;
 use glam::Vec3;
 use metrics::unheld_rate;
-use scene::procedural::{courtyard, poles, tree_terrain};
+use scene::procedural::{courtyard, tree_terrain};
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::{depths, foreground, mean, share_of_kind};
