@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 program="${MYRIORAMA:-target/release/myriorama}"
 coordinator=http://127.0.0.1:7420
 services=(coordinator node-1 node-2 node-3 node-4)
-scenes=("${MYRIORAMA_SCENE:-courtyard}" "${MYRIORAMA_OTHER_SCENE:-poles}")
+scenes=("${MYRIORAMA_SCENE:-courtyard}" "${MYRIORAMA_OTHER_SCENE:-mirror-hall}")
 
 compose() {
     if docker compose version >/dev/null 2>&1; then

@@ -15,7 +15,7 @@ cd "$(dirname "$0")/.."
 
 commit="${1:?usage: scripts/same_as.sh COMMIT [--times]}"
 mode="${2:-}"
-scenes=(courtyard tree-terrain-30k-wind blocks bird-nest)
+scenes=(courtyard tree-terrain-30k-wind mirror-hall urban)
 out="target/same_as"
 old_tree="$out/tree"
 mkdir -p "$out"

@@ -12,6 +12,7 @@ use crate::lages::{self, LagesArgs};
 use crate::layered::command as layered;
 use crate::lit::light_cache::{self, LightCacheArgs};
 use crate::sampling_study::command::{self as sampling, SamplingArgs};
+use crate::scene_file::{self, SceneFileArgs};
 use crate::stability::command::{self as stability, StabilityArgs};
 use crate::study::StudyArgs;
 
@@ -23,6 +24,8 @@ pub enum LabCommand {
     /// Repeats the experiments of a paper, or draws how methods fail, and writes a report
     #[command(subcommand)]
     Study(Box<StudyCommand>),
+    /// Writes a scene as a GLB file, for the program
+    Scene(SceneFileArgs),
 }
 
 /// A study.
@@ -77,6 +80,7 @@ impl LabCommand {
         match self {
             Self::Bench(args) => bench::run(args),
             Self::Study(study) => study.run(),
+            Self::Scene(args) => scene_file::run(args),
         }
     }
 }

@@ -1,4 +1,5 @@
-//! `myriorama-lab`: measurements of the product, each as a report. Its commands are `bench` and `study`.
+//! `myriorama-lab`: measurements of the product, each as a report. Its commands are `bench` and `study`. `scene` writes a scene
+//! as a file.
 //!
 //! [`mod@bench`] compares measured values with bars. [`lages`], [`sampling_study`] and [`layered`] repeat the experiments of papers.
 //! All studies are rows that are measured and reported by [`study`].
@@ -25,6 +26,7 @@ mod processes;
 mod reference_views;
 mod sampling_study;
 mod scaling;
+mod scene_file;
 mod section;
 mod sharing;
 mod stability;
@@ -37,7 +39,7 @@ mod viewer;
 use std::process::ExitCode;
 
 use app_core::exit;
-use clap::Parser;
+use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 use command::LabCommand;
 
 /// Measures how fast and how accurate Myriorama is, and how its methods fail.
@@ -53,6 +55,7 @@ Examples:
   myriorama-lab bench --quick                       speed and accuracy against bars: out/bench/index.html
   myriorama-lab bench viewer                        the viewer in a real browser
   myriorama-lab study failures --quick --strict     how methods fail, as curves with the shapes that they must have
+  myriorama-lab scene bird-nest --out bird-nest.glb a scene of the studies as a file for the program
 
 Parts that start coordinators and nodes as processes need the program myriorama in the same folder: `make lab` builds both.
 
@@ -61,7 +64,17 @@ run time. RUST_LOG=info (or debug) says what is going on.";
 
 fn main() -> ExitCode {
     node::init_logging("warn");
-    exit::report("myriorama-lab", &Cli::parse().command.run())
+    let cli = Cli::from_arg_matches(&taking_fixtures(Cli::command()).get_matches());
+    exit::report("myriorama-lab", &cli.unwrap_or_else(|error| error.exit()).command.run())
+}
+
+/// Lets every option that takes a scene take a fixture, too.
+fn taking_fixtures(command: clap::Command) -> clap::Command {
+    let command = command.mut_args(|arg| {
+        let takes_scene = ["scene", "other_scene"].contains(&arg.get_id().as_str());
+        if takes_scene { arg.value_parser(fixtures::spec) } else { arg }
+    });
+    command.mut_subcommands(taking_fixtures)
 }
 
 #[cfg(test)]
@@ -70,7 +83,8 @@ mod command_line_tests {
     use crate::command::StudyCommand;
 
     fn parsed(arguments: &[&str]) -> Result<Cli, clap::Error> {
-        Cli::try_parse_from([&["myriorama-lab"], arguments].concat())
+        let matches = taking_fixtures(Cli::command()).try_get_matches_from([&["myriorama-lab"], arguments].concat())?;
+        Cli::from_arg_matches(&matches)
     }
 
     #[test]
@@ -107,7 +121,6 @@ mod command_line_tests {
 
     #[test]
     fn every_command_has_help() {
-        use clap::CommandFactory as _;
         Cli::command().debug_assert();
         for command in [&["bench", "--help"][..], &["bench", "scaling", "--help"], &["study", "lages", "--help"]] {
             let help = parsed(command).unwrap_err();

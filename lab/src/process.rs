@@ -1,7 +1,7 @@
 //! Processes of the program `myriorama`: a coordinator or a node of its own, for benches.
 
 use std::io::{BufRead as _, BufReader};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
@@ -9,6 +9,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use app_core::exit::BadInput;
 use gpu::DevicePreference;
+use tempfile::TempDir;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::TcpStream;
 
@@ -34,6 +35,8 @@ pub struct Process {
     name: String,
     child: Child,
     lines: mpsc::Receiver<String>,
+    /// Files of the fixtures among its arguments.
+    _fixtures: TempDir,
 }
 
 impl Drop for Process {
@@ -45,11 +48,12 @@ impl Drop for Process {
 impl Process {
     /// Starts a process with arguments as on the command line.
     fn start(name: &str, arguments: &[String]) -> anyhow::Result<Self> {
+        let folder = tempfile::tempdir()?;
         let mut command = Command::new(product()?);
-        command.args(arguments).stdin(Stdio::null()).stdout(Stdio::piped());
+        command.args(with_fixture_files(arguments, folder.path())?).stdin(Stdio::null()).stdout(Stdio::piped());
         let mut child = command.spawn().with_context(|| format!("cannot start {name}"))?;
         let output = child.stdout.take().context("a process without output")?;
-        Ok(Self { name: name.to_owned(), child, lines: lines_of(output) })
+        Ok(Self { name: name.to_owned(), child, lines: lines_of(output), _fixtures: folder })
     }
 
     /// Starts a coordinator on a free port, with further arguments.
@@ -114,6 +118,22 @@ impl Process {
             }
         }
     }
+}
+
+/// Writes each fixture that an argument names to a file, which takes its place.
+fn with_fixture_files(arguments: &[String], folder: &Path) -> anyhow::Result<Vec<String>> {
+    let mut replaced = arguments.to_vec();
+    for place in 1..replaced.len() {
+        if replaced[place - 1] != "--scene" {
+            continue;
+        }
+        if let Some(fixture) = fixtures::by_name(&replaced[place]) {
+            let file = folder.join(format!("{}.glb", fixture.name));
+            fixtures::write_glb(&fixture, &file)?;
+            replaced[place] = file.display().to_string();
+        }
+    }
+    Ok(replaced)
 }
 
 fn owned(arguments: &[&str]) -> Vec<String> {

@@ -35,33 +35,33 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
     let folder = folder.path().to_str().unwrap();
     let many = vec!["flip 0.1"; 200].join(", ");
     let cases: [(&[&str], &str); 24] = [
-        (&["plan", "--scene", "quad"], "--budget"),
-        (&["plan", "--scene", "quad", "--budget", "blur 3"], "blur"),
-        (&["plan", "--scene", "quad", "--budget", "flip NaN"], "flip NaN"),
-        (&["plan", "--scene", "quad", "--budget", "flip 0"], "above 0"),
-        (&["plan", "--scene", "quad", "--budget", &many], "at most one error term"),
-        (&["plan", "--scene", "quad", "--budget", "flip 0.1", "--rate", "0"], "0.01 to 1000"),
+        (&["plan", "--scene", "courtyard"], "--budget"),
+        (&["plan", "--scene", "courtyard", "--budget", "blur 3"], "blur"),
+        (&["plan", "--scene", "courtyard", "--budget", "flip NaN"], "flip NaN"),
+        (&["plan", "--scene", "courtyard", "--budget", "flip 0"], "above 0"),
+        (&["plan", "--scene", "courtyard", "--budget", &many], "at most one error term"),
+        (&["plan", "--scene", "courtyard", "--budget", "flip 0.1", "--rate", "0"], "0.01 to 1000"),
         (&["plan", "--scene", broken, "--budget", "flip 0.1"], "broken.glb"),
         (&["up", "--scene", broken], "broken.glb"),
         (&["demo", "--scene", "/nowhere/absent.glb"], "absent.glb"),
         (&["coordinator", "--scene", broken], "broken.glb"),
-        (&["coordinator", "--scene", "quad", "--scene", "quad"], "scene quad is given twice"),
+        (&["coordinator", "--scene", "courtyard", "--scene", "courtyard"], "scene courtyard is given twice"),
         (&["view", "--cameras", cameras, "--out", folder], "would be written over it"),
-        (&["up", "--scene", "quad", "--samples", cameras], "cameras.json: frame 0, fl_x"),
-        (&["up", "--scene", "quad", "--listen", "0.0.0.0:0"], "--insecure-bind"),
-        (&["up", "--scene", "quad", "--method", "guess"], "guess"),
+        (&["up", "--scene", "courtyard", "--samples", cameras], "cameras.json: frame 0, fl_x"),
+        (&["up", "--scene", "courtyard", "--listen", "0.0.0.0:0"], "--insecure-bind"),
+        (&["up", "--scene", "courtyard", "--method", "guess"], "guess"),
         (&["view", "--size", "0x0"], "0x0"),
         (&["view", "--exposure", "nan"], "exposure must be auto, or from -16 to 16 EV"),
         (&["view", "--exposure", "99"], "exposure must be auto, or from -16 to 16 EV"),
         (&["view", "--tone-map", "foo"], "tone map must be none or khronos-neutral"),
-        (&["up", "--scene", "quad", "--exposure", "-17"], "--exposure"),
+        (&["up", "--scene", "courtyard", "--exposure", "-17"], "--exposure"),
         (&["view", "--orbit", "3", "--grid", "2x2"], "--grid"),
         (&["view", "--quality", "good"], "draft, fast, balanced, fine, exact"),
         (
             &["view", "--quality", "fine", "--method", "mesh"],
             "'--quality <NAME>' cannot be used with '--method <NAME>'",
         ),
-        (&["up", "--scene", "quad", "--quality", "fine", "--method", "mesh"], "'--quality <NAME>' cannot be used"),
+        (&["up", "--scene", "courtyard", "--quality", "fine", "--method", "mesh"], "'--quality <NAME>' cannot be used"),
     ];
     for (arguments, named) in cases {
         let (status, message) = status_and_message(&myriorama(arguments));
@@ -74,7 +74,7 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
 fn the_demo_writes_a_page_whose_checks_hold() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
-    let demo = myriorama(&["demo", "--scene", "blocks", "--quick", "--strict", "--out", out]);
+    let demo = myriorama(&["demo", "--scene", "courtyard", "--quick", "--strict", "--out", out]);
     let (status, message) = status_and_message(&demo);
     assert_eq!(status, Some(0), "{message}");
     for file in ["first-page.png", "index.html", "report.json", "what-sharing-gains.csv", "pictures/first-page.png"] {
@@ -95,34 +95,46 @@ fn what_cannot_be_sampled_as_a_cube_is_named_with_status_2() {
     let fields = "layered_cube:64+light_field:66";
     let cases: [(&[&str], &str); 17] = [
         (&["up", "--scene", "snake", "--base", "layered_cube:64"], "--base layered_cube:64: snake moves"),
-        (&["up", "--scene", "quad", "--base", "conventional"], "--base conventional: a base is a layered cube"),
-        (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--base", "layered_cube:64"], "a cube already"),
-        (&["demo", "--scene", "quad", "--base", "layered_cube:64"], "--base layered_cube:64: this command takes none"),
-        (&["up", "--scene", "snake", "--sampling", "layered_cube:64"], "snake moves"),
-        (&["up", "--scene", "quad", "--sampling", "layered_cube:15"], "layered_cube:15"),
-        (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--method", "mesh"], "--method mesh"),
-        (&["up", "--scene", "quad", "--method", "layered"], "see --sampling"),
-        (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--sample-size", "40x30"], "--sample-size"),
-        (&["plan", "--scene", "quad", "--sampling", "layered_cube:64", "--budget", "flip 0.1"], "needs depth images"),
+        (&["up", "--scene", "courtyard", "--base", "conventional"], "--base conventional: a base is a layered cube"),
         (
-            &["up", "--scene", "quad", "--sampling", "layered_cube:64+light_field:100"],
+            &["up", "--scene", "courtyard", "--sampling", "layered_cube:64", "--base", "layered_cube:64"],
+            "a cube already",
+        ),
+        (
+            &["demo", "--scene", "courtyard", "--base", "layered_cube:64"],
+            "--base layered_cube:64: this command takes none",
+        ),
+        (&["up", "--scene", "snake", "--sampling", "layered_cube:64"], "snake moves"),
+        (&["up", "--scene", "courtyard", "--sampling", "layered_cube:15"], "layered_cube:15"),
+        (&["up", "--scene", "courtyard", "--sampling", "layered_cube:64", "--method", "mesh"], "--method mesh"),
+        (&["up", "--scene", "courtyard", "--method", "layered"], "see --sampling"),
+        (&["up", "--scene", "courtyard", "--sampling", "layered_cube:64", "--sample-size", "40x30"], "--sample-size"),
+        (
+            &["plan", "--scene", "courtyard", "--sampling", "layered_cube:64", "--budget", "flip 0.1"],
+            "needs depth images",
+        ),
+        (
+            &["up", "--scene", "courtyard", "--sampling", "layered_cube:64+light_field:100"],
             "layered_cube:64+light_field:100",
         ),
-        (&["up", "--scene", "quad", "--sampling", fields, "--lighting", "shadows"], "--lighting with reflections N"),
-        (&["up", "--scene", "quad", "--sampling", "layered_cube:64", "--method", "layered:0"], "in a light field"),
         (
-            &["up", "--scene", "quad", "--base", "layered_cube:64", "--budget", "flip 0.1"],
+            &["up", "--scene", "courtyard", "--sampling", fields, "--lighting", "shadows"],
+            "--lighting with reflections N",
+        ),
+        (&["up", "--scene", "courtyard", "--sampling", "layered_cube:64", "--method", "layered:0"], "in a light field"),
+        (
+            &["up", "--scene", "courtyard", "--base", "layered_cube:64", "--budget", "flip 0.1"],
             "--budget flip 0.1: none can be kept with --base layered_cube:64",
         ),
         (
-            &["coordinator", "--scene", "quad", "--base", "layered_cube:64", "--budget", "flip 0.1"],
+            &["coordinator", "--scene", "courtyard", "--base", "layered_cube:64", "--budget", "flip 0.1"],
             "--budget flip 0.1: none can be kept with --base layered_cube:64",
         ),
         (
-            &["up", "--scene", "quad", "--sampling", "layered_cube:64", "--budget", "flip 0.1"],
+            &["up", "--scene", "courtyard", "--sampling", "layered_cube:64", "--budget", "flip 0.1"],
             "--budget flip 0.1: none can be kept with --sampling layered_cube:64",
         ),
-        (&["up", "--scene", "quad", "--base", fields], "--base layered_cube:64+light_field:66: a light field"),
+        (&["up", "--scene", "courtyard", "--base", fields], "--base layered_cube:64+light_field:66: a light field"),
     ];
     for (arguments, named) in cases {
         let (status, message) = status_and_message(&myriorama(arguments));

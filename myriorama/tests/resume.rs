@@ -19,7 +19,7 @@ struct Up {
 impl Up {
     fn start() -> Self {
         let mut program = Command::new(env!("CARGO_BIN_EXE_myriorama"));
-        program.args(["up", "--scene", "quad", "--nodes", "2", "--device", "software", "--listen", "127.0.0.1:0"]);
+        program.args(["up", "--scene", "courtyard", "--nodes", "2", "--device", "software", "--listen", "127.0.0.1:0"]);
         let mut process = program.stdout(Stdio::piped()).spawn().unwrap();
         let lines = BufReader::new(process.stdout.take().unwrap()).lines().map(Result::unwrap);
         let line = lines.into_iter().find(|line| line.contains("http://127.0.0.1:")).unwrap();

@@ -175,7 +175,7 @@ mod tests {
     fn args(more: &[&str]) -> SceneArgs {
         use clap::{Args as _, FromArgMatches as _};
         let command = SceneArgs::augment_args(clap::Command::new("test"));
-        let matches = command.get_matches_from(["test", "--scene", "blocks"].iter().chain(more));
+        let matches = command.get_matches_from(["test", "--scene", "courtyard"].iter().chain(more));
         SceneArgs::from_arg_matches(&matches).unwrap()
     }
 

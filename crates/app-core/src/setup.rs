@@ -50,8 +50,7 @@ pub const DEFAULT_SCENE: &str = "tree-terrain-500k";
 #[allow(rustdoc::broken_intra_doc_links, reason = "help has optional parts in brackets")]
 pub struct SceneArgs {
     /// A scene by name or a file (.gltf, .glb, .obj, .ply). Names: tree-terrain-30k, -125k, -500k, -2m (each also with
-    /// -wind), snake (animated), bird-nest, urban, tree, grass, grass:DENSITY, blocks, courtyard, teapot-mirror, and
-    /// more
+    /// -wind), urban, courtyard, gallery, grass, grass:DENSITY, snake (animated), mirror-hall
     #[arg(long, value_name = "SPEC", default_value = DEFAULT_SCENE,
         value_parser = OsStringValueParser::new().try_map(SceneSpec::try_from))]
     pub scene: SceneSpec,
@@ -396,7 +395,7 @@ impl SceneArgs {
         let bounds = scene.bounds();
         let rig = match self.scene {
             // An interior, seen from within.
-            SceneSpec::BuiltIn(_) if !scene.cameras.is_empty() => {
+            SceneSpec::Procedural(_) if !scene.cameras.is_empty() => {
                 let SourceCamera { world_from_camera, fov_y_rad, .. } = &scene.cameras[0];
                 let distance_m = bounds.size().length() * INTERIOR_SHARE;
                 let rig = Rig::around(world_from_camera, *fov_y_rad, distance_m, MODEL_SPREAD_RAD);

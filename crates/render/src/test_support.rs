@@ -38,7 +38,7 @@ impl TestStage {
         let map = EnvironmentMap::new(UVec2::ONE, &[Vec3::ONE]).expect("a texel");
         Self {
             buffer: gpu.buffer_with("any", &[0_u32; 64], BufferUsages::STORAGE | BufferUsages::UNIFORM),
-            scene: GpuScene::upload(&gpu, &scene::procedural::unit_cube()).expect("a scene"),
+            scene: GpuScene::upload(&gpu, &fixtures::unit_cube()).expect("a scene"),
             environment: GpuEnvironment::upload(&gpu, &map).expect("a map"),
             surfaces: SurfacePool::new(&gpu),
             templates: test_templates(),

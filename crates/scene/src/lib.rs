@@ -39,6 +39,6 @@ pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError, LightSpecErrorK
 pub use limits::{Limits, MAX_COORDINATE_M};
 pub use model::*;
 pub use package::{pack, unpack};
-pub use spec::{BUILT_IN_NAMES, SceneSpec, SceneSpecError};
+pub use spec::{BUILT_IN_NAMES, ProceduralScene, SceneSpec, SceneSpecError};
 pub use texture_use::{TextureUse, Wrap};
 pub use up_axis::{UpAxis, UpAxisError};

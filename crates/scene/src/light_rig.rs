@@ -13,7 +13,7 @@ const DEFAULT_ENVIRONMENT: Environment =
     Environment::gradient(Vec3::new(0.216, 0.232, 0.260), Vec3::new(0.12, 0.10, 0.08));
 
 /// A quiet grey from above to below, which no colour of a model is mistaken for.
-const DEFAULT_BACKGROUND: Environment =
+pub(crate) const DEFAULT_BACKGROUND: Environment =
     Environment::gradient(Vec3::new(0.56, 0.60, 0.66), Vec3::new(0.06, 0.065, 0.075));
 
 impl Scene {

@@ -1,6 +1,5 @@
 //! Lights and environments as text, for the command line.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -21,13 +20,10 @@ use glam::{DVec3, Vec3};
 /// spot's along its light. `angle` and `radius` are half the apparent extent. The vectors `u` and `v` lead from a
 /// rectangle's middle to the middles of two edges; it shines to the side of `u × v`. Positions are in metres, in the
 /// coordinates of the scene's source, as in [`Scene::lit_by`](crate::Scene::lit_by).
-///
-/// The display form parses to the same light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightSpec(pub Light);
 
-/// An environment as text: one colour as in [`LightSpec`], or two, `ZENITH/NADIR`, or the name of a `.hdr` file. The
-/// display form parses to the same environment.
+/// An environment as text: one colour as in [`LightSpec`], or two, `ZENITH/NADIR`, or the name of a `.hdr` file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EnvironmentSpec {
     /// A gradient.
@@ -251,63 +247,4 @@ fn invalid(error: &LightError) -> LightSpecError {
         same => same,
     };
     wrong(field, LightSpecErrorKind::Invalid(error.reason))
-}
-
-impl fmt::Display for LightSpec {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            Light::Directional { towards_light_in_world, irradiance_linear, angular_radius_rad } => {
-                let (towards, irradiance) = (triple(towards_light_in_world), color_text(irradiance_linear));
-                write!(f, "sun towards={towards} irradiance={irradiance} angle={}", degrees(angular_radius_rad))
-            }
-            Light::Point { position_in_world, intensity_linear, radius_m } => {
-                let (at, intensity) = (triple(position_in_world), color_text(intensity_linear));
-                write!(f, "point at={at} intensity={intensity} radius={radius_m}")
-            }
-            Light::Spot {
-                position_in_world,
-                forward_in_world,
-                intensity_linear,
-                inner_cone_rad,
-                outer_cone_rad,
-                radius_m,
-            } => {
-                let (at, towards) = (triple(position_in_world), triple(forward_in_world));
-                write!(f, "spot at={at} towards={towards} intensity={} ", color_text(intensity_linear))?;
-                write!(f, "inner={} outer={} radius={radius_m}", degrees(inner_cone_rad), degrees(outer_cone_rad))
-            }
-            Light::Rectangle { center_in_world, half_edges_in_world: [u, v], radiance_linear } => {
-                let (at, u, v) = (triple(center_in_world), triple(u), triple(v));
-                write!(f, "rectangle at={at} u={u} v={v} radiance={}", color_text(radiance_linear))
-            }
-        }
-    }
-}
-
-impl fmt::Display for EnvironmentSpec {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Environment { zenith_linear, nadir_linear, .. } = match self {
-            Self::Colors(environment) => *environment,
-            Self::File(path) => return path.display().fmt(f),
-        };
-        f.write_str(&color_text(zenith_linear))?;
-        if zenith_linear == nadir_linear { Ok(()) } else { write!(f, "/{}", color_text(nadir_linear)) }
-    }
-}
-
-fn triple(v: Vec3) -> String {
-    format!("{},{},{}", v.x, v.y, v.z)
-}
-
-/// A grey is one number.
-fn color_text(color: Vec3) -> String {
-    if color == Vec3::splat(color.x) { color.x.to_string() } else { triple(color) }
-}
-
-/// Radians as degrees, with the fewest decimals that parse to the same radians.
-fn degrees(angle_rad: f32) -> f64 {
-    let degrees = f64::from(angle_rad).to_degrees();
-    let rounded = |decimals: i32| (degrees * 10f64.powi(decimals)).round() / 10f64.powi(decimals);
-    let shortest = (0..12).map(rounded).find(|d| d.to_radians() as f32 == angle_rad);
-    shortest.unwrap_or(degrees)
 }

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use crate::TextureUse;
 use crate::animation::{Animation, UnknownClip};
 
-/// A renderable scene. All indices of a scene from this crate are valid.
+/// A renderable scene. All indices of a scene from this crate are valid. Serde leaves out the large arrays, which
+/// [`pack`](crate::pack) copies.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
     /// Name of the scene in reports.
@@ -23,6 +24,7 @@ pub struct Scene {
     /// Lamps and environment. A scene without light is black and valid.
     pub illumination: Illumination,
     /// The map of an [environment](Illumination::environment) that is mapped.
+    #[serde(skip)]
     pub environment_map: Option<EnvironmentMap>,
     /// Radiance of rays that meet no surface, by their direction, where there is no map.
     pub background: Environment,
@@ -89,10 +91,13 @@ impl Scene {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mesh {
     /// Corner data.
+    #[serde(skip)]
     pub vertices: Vec<Vertex>,
     /// Further corner data: empty, or one for each of `vertices`.
+    #[serde(skip)]
     pub details: Vec<VertexDetail>,
     /// Three indices into `vertices` a triangle, counter-clockwise seen from the front.
+    #[serde(skip)]
     pub indices: Vec<u32>,
     /// Runs of `indices`; together they cover it in order.
     pub parts: Vec<MeshPart>,
@@ -119,7 +124,7 @@ pub struct MeshPart {
 
 /// One corner. `#[repr(C)]`, 40 bytes: uploaded as it is.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Vertex {
     /// Position in the mesh's space, metres.
     pub position: [f32; 3],
@@ -135,7 +140,7 @@ pub struct Vertex {
 
 /// The data of a corner that only some materials need. `#[repr(C)]`, 24 bytes: uploaded as it is.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct VertexDetail {
     /// A second pair of texture coordinates.
     pub uv: [f32; 2],
@@ -311,6 +316,7 @@ pub struct Texture {
     /// RGB is sRGB-encoded (colours) or linear (other data).
     pub is_srgb: bool,
     /// `width_px * height_px` texels of RGB, encoded as in `is_srgb`, and linear alpha.
+    #[serde(skip)]
     pub srgba8: Vec<u8>,
 }
 

@@ -9,70 +9,50 @@
 //! Arrays have their layout in memory, so that packing and unpacking are copies. The header has their lengths, which
 //! are checked against the remaining bytes before memory is allocated.
 
-use bytemuck::Pod;
-use depth_image::{Environment, EnvironmentMap, Illumination, MAX_ENVIRONMENT_SIZE_PX, SourceSpace};
+use bytemuck::{Pod, cast_slice};
+use depth_image::{EnvironmentMap, MAX_ENVIRONMENT_SIZE_PX};
 use glam::UVec2;
-use serde::{Deserialize, Serialize};
 
 use crate::error::{Fault, at_most};
-use crate::{Animation, Instance, Limits, Material, Mesh, MeshPart, Scene, SceneError, SourceCamera, Texture, Wind};
+use crate::{Limits, Mesh, Scene, SceneError};
 
 #[cfg(target_endian = "big")]
 compile_error!("packages hold arrays as they are in memory, which must be little-endian");
 
 const MAGIC: &[u8; 8] = b"MYRSCENE";
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
-/// A scene without its large arrays.
-#[derive(Serialize, Deserialize)]
-struct Header {
-    name: String,
-    meshes: Vec<MeshHeader>,
-    instances: Vec<Instance>,
-    materials: Vec<Material>,
-    textures: Vec<TextureHeader>,
-    illumination: Illumination,
-    environment_size_px: Option<UVec2>,
-    background: Environment,
-    cameras: Vec<SourceCamera>,
-    wind: Option<Wind>,
-    animation: Option<Animation>,
-    source_space: SourceSpace,
-}
-
-#[derive(Serialize, Deserialize)]
-struct MeshHeader {
-    vertex_count: u32,
-    detail_count: u32,
-    index_count: u32,
-    parts: Vec<MeshPart>,
-}
-
-#[derive(Serialize, Deserialize)]
-struct TextureHeader {
-    width_px: u32,
-    height_px: u32,
-    is_srgb: bool,
-}
+/// A scene without its large arrays, the lengths of each mesh's vertices, details and indices, and the size of the
+/// environment map.
+type Header<S> = (S, Vec<[u32; 3]>, Option<UVec2>);
 
 /// Packs a scene. Equal scenes give equal bytes.
 #[must_use]
 pub fn pack(scene: &Scene) -> Vec<u8> {
+    let lengths = |mesh: &Mesh| [mesh.vertices.len(), mesh.details.len(), mesh.indices.len()].map(|n| n as u32);
+    let mesh_lengths = scene.meshes.iter().map(lengths).collect();
+    let header: Header<&Scene> = (scene, mesh_lengths, scene.environment_map.as_ref().map(EnvironmentMap::size_px));
     // Writing to a growing vector cannot fail, and postcard supports all fields.
-    let header = postcard::to_stdvec(&header_of(scene)).unwrap_or_default();
-    let mut bytes = Vec::with_capacity(16 + header.len() + array_bytes(scene));
+    let header = postcard::to_stdvec(&header).unwrap_or_default();
+    let arrays = arrays(scene);
+    let mut bytes = Vec::with_capacity(16 + header.len() + arrays.iter().map(|array| array.len()).sum::<usize>());
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&VERSION.to_le_bytes());
     bytes.extend_from_slice(&(header.len() as u32).to_le_bytes());
     bytes.extend_from_slice(&header);
-    for mesh in &scene.meshes {
-        bytes.extend_from_slice(bytemuck::cast_slice(&mesh.vertices));
-        bytes.extend_from_slice(bytemuck::cast_slice(&mesh.details));
-        bytes.extend_from_slice(bytemuck::cast_slice(&mesh.indices));
-    }
-    scene.textures.iter().for_each(|texture| bytes.extend_from_slice(&texture.srgba8));
-    scene.environment_map.iter().for_each(|map| bytes.extend_from_slice(bytemuck::cast_slice(map.texels_rgb9e5())));
+    arrays.into_iter().for_each(|array| bytes.extend_from_slice(array));
     bytes
+}
+
+/// The large arrays in the order of the package.
+fn arrays(scene: &Scene) -> Vec<&[u8]> {
+    let meshes = scene
+        .meshes
+        .iter()
+        .flat_map(|mesh| [cast_slice(&mesh.vertices), cast_slice(&mesh.details), cast_slice(&mesh.indices)]);
+    let textures = scene.textures.iter().map(|texture| &texture.srgba8[..]);
+    let environment = scene.environment_map.iter().map(|map| cast_slice(map.texels_rgb9e5()));
+    meshes.chain(textures).chain(environment).collect()
 }
 
 /// Unpacks a scene and validates it, since the bytes are untrusted.
@@ -97,44 +77,11 @@ fn scene_from_bytes(bytes: &[u8], limits: &Limits) -> Result<Scene, Fault> {
     }
     let header_bytes = u32::from_le_bytes(reader.array("header length")?);
     let header = read_header(reader.take("header", u64::from(header_bytes))?)?;
-    let scene = scene_from_header(header, &mut reader, limits)?;
+    let scene = read_arrays(header, &mut reader, limits)?;
     if reader.rest.is_empty() { Ok(scene) } else { Err(Fault::malformed("end", "bytes follow the last array")) }
 }
 
-fn header_of(scene: &Scene) -> Header {
-    let mesh = |m: &Mesh| MeshHeader {
-        vertex_count: m.vertices.len() as u32,
-        detail_count: m.details.len() as u32,
-        index_count: m.indices.len() as u32,
-        parts: m.parts.clone(),
-    };
-    let texture = |t: &Texture| TextureHeader { width_px: t.width_px, height_px: t.height_px, is_srgb: t.is_srgb };
-    Header {
-        name: scene.name.clone(),
-        meshes: scene.meshes.iter().map(mesh).collect(),
-        instances: scene.instances.clone(),
-        materials: scene.materials.clone(),
-        textures: scene.textures.iter().map(texture).collect(),
-        illumination: scene.illumination.clone(),
-        environment_size_px: scene.environment_map.as_ref().map(EnvironmentMap::size_px),
-        background: scene.background,
-        cameras: scene.cameras.clone(),
-        wind: scene.wind,
-        animation: scene.animation.clone(),
-        source_space: scene.source_space,
-    }
-}
-
-fn array_bytes(scene: &Scene) -> usize {
-    let mesh = |m: &Mesh| {
-        size_of_val(m.vertices.as_slice()) + size_of_val(m.details.as_slice()) + size_of_val(m.indices.as_slice())
-    };
-    let environment = scene.environment_map.as_ref().map_or(0, |map| size_of_val(map.texels_rgb9e5()));
-    let textures = scene.textures.iter().map(|t| t.srgba8.len()).sum::<usize>();
-    scene.meshes.iter().map(mesh).sum::<usize>() + textures + environment
-}
-
-fn read_header(bytes: &[u8]) -> Result<Header, Fault> {
+fn read_header(bytes: &[u8]) -> Result<Header<Scene>, Fault> {
     match postcard::take_from_bytes(bytes) {
         Ok((header, [])) => Ok(header),
         Ok(_) => Err(Fault::malformed("header", "it is longer than its contents")),
@@ -142,37 +89,25 @@ fn read_header(bytes: &[u8]) -> Result<Header, Fault> {
     }
 }
 
-fn scene_from_header(header: Header, reader: &mut Reader, limits: &Limits) -> Result<Scene, Fault> {
-    let mut meshes = Vec::new();
-    for (number, mesh) in header.meshes.into_iter().enumerate() {
+fn read_arrays(header: Header<Scene>, reader: &mut Reader, limits: &Limits) -> Result<Scene, Fault> {
+    let (mut scene, mesh_lengths, environment_size_px) = header;
+    if mesh_lengths.len() != scene.meshes.len() {
+        return Err(Fault::malformed("header", "it has lengths for another number of meshes"));
+    }
+    for (number, (mesh, [vertices, details, indices])) in scene.meshes.iter_mut().zip(mesh_lengths).enumerate() {
         let element = format!("mesh {number}");
-        at_most(format!("{element}, vertices"), mesh.vertex_count.into(), limits.vertices)?;
-        let vertices = reader.pods(&element, mesh.vertex_count.into())?;
-        let details = reader.pods(&element, mesh.detail_count.into())?;
-        let indices = reader.pods(&element, mesh.index_count.into())?;
-        meshes.push(Mesh { vertices, details, indices, parts: mesh.parts });
+        at_most(format!("{element}, vertices"), vertices.into(), limits.vertices)?;
+        mesh.vertices = reader.pods(&element, vertices.into())?;
+        mesh.details = reader.pods(&element, details.into())?;
+        mesh.indices = reader.pods(&element, indices.into())?;
     }
-    let mut textures = Vec::new();
-    for (number, TextureHeader { width_px, height_px, is_srgb }) in header.textures.into_iter().enumerate() {
-        let bytes = u64::from(width_px) * u64::from(height_px) * 4;
-        let srgba8 = reader.take(format!("texture {number}"), bytes)?.to_vec();
-        textures.push(Texture { width_px, height_px, is_srgb, srgba8 });
+    for (number, texture) in scene.textures.iter_mut().enumerate() {
+        let texels = u64::from(texture.width_px) * u64::from(texture.height_px);
+        let bytes = texels.saturating_mul(4);
+        texture.srgba8 = reader.take(format!("texture {number}"), bytes)?.to_vec();
     }
-    let environment_map = header.environment_size_px.map(|size_px| read_environment(size_px, reader)).transpose()?;
-    Ok(Scene {
-        name: header.name,
-        meshes,
-        instances: header.instances,
-        materials: header.materials,
-        textures,
-        illumination: header.illumination,
-        environment_map,
-        background: header.background,
-        cameras: header.cameras,
-        wind: header.wind,
-        animation: header.animation,
-        source_space: header.source_space,
-    })
+    scene.environment_map = environment_size_px.map(|size_px| read_environment(size_px, reader)).transpose()?;
+    Ok(scene)
 }
 
 fn read_environment(size_px: UVec2, reader: &mut Reader) -> Result<EnvironmentMap, Fault> {

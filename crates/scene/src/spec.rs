@@ -11,31 +11,44 @@ use crate::{ImportOptions, Limits, Scene, SceneError, load_file};
 
 /// Names of the built-in scenes. A `tree-terrain-…` may have the suffix `-wind`, and `grass` a `:` with a
 /// [density](GrassDensity). A file of such a name is reached as `./name`.
-pub const BUILT_IN_NAMES: [&str; 23] = [
+pub const BUILT_IN_NAMES: [&str; 10] = [
     "tree-terrain-30k",
     "tree-terrain-125k",
     "tree-terrain-500k",
     "tree-terrain-2m",
-    "quad",
-    "unit-cube",
-    "uv-sphere",
-    "checker-sphere",
-    "poles",
     "courtyard",
     "gallery",
-    "blocks",
-    "bird-nest",
     "grass",
     "urban",
-    "tree",
     "snake",
-    "teapot-mirror",
-    "mirror-pair",
     "mirror-hall",
-    "mirror-box",
-    "teapot-floor",
-    "teapot-spheres",
 ];
+
+/// The built-in scenes without an argument.
+const PROCEDURAL: [ProceduralScene; 5] = [
+    ProceduralScene { name: "courtyard", make: procedural::courtyard },
+    ProceduralScene { name: "gallery", make: procedural::gallery },
+    ProceduralScene { name: "urban", make: procedural::urban },
+    ProceduralScene { name: "snake", make: procedural::snake },
+    ProceduralScene { name: "mirror-hall", make: procedural::mirror_hall },
+];
+
+/// A scene that a function makes.
+#[derive(Debug, Clone, Copy)]
+pub struct ProceduralScene {
+    /// Name on the command line and in reports.
+    pub name: &'static str,
+    /// Makes the scene.
+    pub make: fn() -> Scene,
+}
+
+impl PartialEq for ProceduralScene {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Eq for ProceduralScene {}
 
 /// The name before the density of a meadow.
 const GRASS: &str = "grass";
@@ -62,8 +75,8 @@ pub enum SceneSpec {
         /// Density of the blades.
         density: GrassDensity,
     },
-    /// One of the other [`BUILT_IN_NAMES`].
-    BuiltIn(&'static str),
+    /// One of the other [`BUILT_IN_NAMES`], or a scene of a test.
+    Procedural(ProceduralScene),
     /// A file to import.
     File(PathBuf),
 }
@@ -84,7 +97,7 @@ pub enum SceneSpecError {
 }
 
 impl SceneSpec {
-    /// Makes or reads the scene. A file without light gets default lights, and a background.
+    /// Makes or reads the scene. A file without light gets default lights.
     ///
     /// # Errors
     /// The errors of [`load_file`], and a meadow over the limits.
@@ -92,7 +105,7 @@ impl SceneSpec {
         let scene = match self {
             Self::File(path) if path.extension().is_none() && !path.exists() => return Err(no_such_scene(path)),
             Self::File(path) => {
-                return Ok(load_file(path, limits, options)?.with_default_lights().with_default_background());
+                return Ok(load_file(path, limits, options)?.with_default_lights());
             }
             Self::TreeTerrain { triangles, wind: false } => tree_terrain(*triangles, TREE_SEED),
             Self::TreeTerrain { triangles, wind: true } => tree_terrain(*triangles, TREE_SEED).with_wind(),
@@ -103,7 +116,7 @@ impl SceneSpec {
                     .map_err(|fault| fault.in_file(self.to_string()))?;
                 grass(*density)
             }
-            Self::BuiltIn(name) => procedural::by_name(name),
+            Self::Procedural(scene) => (scene.make)(),
         };
         Ok(Scene { name: self.to_string(), ..scene })
     }
@@ -144,8 +157,8 @@ impl FromStr for SceneSpec {
         if let Some(density) = grass_density(text)? {
             return Ok(Self::Grass { density });
         }
-        let built_in = BUILT_IN_NAMES.into_iter().find(|name| *name == text);
-        Ok(built_in.map_or_else(|| Self::File(text.into()), Self::BuiltIn))
+        let built_in = PROCEDURAL.into_iter().find(|scene| scene.name == text);
+        Ok(built_in.map_or_else(|| Self::File(text.into()), Self::Procedural))
     }
 }
 
@@ -177,7 +190,7 @@ impl fmt::Display for SceneSpec {
             }
             Self::Grass { density } if *density == GrassDensity::ONE => f.write_str(GRASS),
             Self::Grass { density } => write!(f, "{GRASS}:{density}"),
-            Self::BuiltIn(name) => f.write_str(name),
+            Self::Procedural(scene) => f.write_str(scene.name),
             Self::File(path) => write!(f, "{}", path.display()),
         }
     }
@@ -210,7 +223,7 @@ mod tests {
         use std::os::unix::ffi::OsStringExt as _;
         let path = OsString::from_vec(b"models/\xff/a.glb".to_vec());
         assert_eq!(SceneSpec::try_from(path.clone()), Ok(SceneSpec::File(path.into())));
-        assert_eq!(SceneSpec::try_from(OsString::from("urban")), Ok(SceneSpec::BuiltIn("urban")));
+        assert_eq!(SceneSpec::try_from(OsString::from("urban")), Ok(parsed("urban")));
     }
 
     #[test]
@@ -226,9 +239,9 @@ mod tests {
     #[test]
     fn any_other_name_is_a_file() {
         for text in [
-            "quad.obj",
-            "./quad",
-            "quad-wind",
+            "urban.obj",
+            "./urban",
+            "urban-wind",
             "tree-terrain-7k",
             "models/a.glb",
             "",

@@ -6,9 +6,9 @@ use depth_image::{
     DepthImage, Environment, Illumination, Light, LightCacheQuality, PinholeCamera, ProvenanceKind, View, ViewPlanes,
     linear_from_srgb8,
 };
+use fixtures::{quad, unit_cube};
 use glam::{Affine3A, UVec2, Vec2, Vec3};
 use render::{DrawWork, GpuScene, LightCache, Lighting, SamplePlanes, Visibility};
-use scene::procedural::{quad, unit_cube};
 use scene::{Instance, Scene};
 
 use super::measures::{depths, is_kind, mean};

@@ -5,7 +5,7 @@ use glam::Vec3;
 use render::Lighting;
 use report::{Bar, Cell, Check, Table};
 use sampling::Impostors;
-use scene::{Limits, MissingTextures, SceneSpec};
+use scene::{Limits, MissingTextures};
 
 use super::measure::{Hall, VIEW_PX};
 use crate::failures::stand::Stand;
@@ -19,7 +19,7 @@ const ORDERS: u32 = 4;
 /// # Errors
 /// The device fails.
 pub fn measure(stand: &Stand, lighting: Lighting, impostors: Impostors) -> anyhow::Result<(Table, Check)> {
-    let scene = SCENE.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?;
+    let scene = fixtures::spec(SCENE)?.load(&Limits::default(), MissingTextures::Refuse)?;
     let hall = Hall::new(stand, &scene, (lighting, 0), &views())?;
     let (bounds, sets) = hall.surroundings(impostors)?;
     let columns =

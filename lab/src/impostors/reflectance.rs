@@ -7,7 +7,7 @@ use glam::Vec3;
 use render::Lighting;
 use report::{Axis, Bar, Check, Series, XyChart};
 use sampling::Impostors;
-use scene::{Limits, MissingTextures, Scene, SceneSpec};
+use scene::{Limits, MissingTextures, Scene};
 
 use super::measure::{Hall, VIEW_PX, cells};
 use super::orders;
@@ -70,7 +70,7 @@ fn falls(Changes { ours, truth }: &Changes) -> impl Iterator<Item = f64> {
 }
 
 fn load(name: &str) -> anyhow::Result<Scene> {
-    Ok(name.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?)
+    Ok(fixtures::spec(name)?.load(&Limits::default(), MissingTextures::Refuse)?)
 }
 
 fn hall_of(reflectance: f32) -> anyhow::Result<Scene> {

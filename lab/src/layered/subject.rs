@@ -10,7 +10,7 @@ use depth_image::{
 };
 use reconstruction::{SampleSet, SetDescription};
 use render::{GpuScene, LayerSelection, Lighting};
-use scene::{Limits, MissingTextures, Scene, SceneSpec};
+use scene::{Limits, MissingTextures, Scene};
 
 use super::paper::LightField;
 use crate::failures::stand::{Stand, work};
@@ -44,7 +44,7 @@ impl<'s> Subject<'s> {
         lighting: Lighting,
         views: impl Fn(&Aabb) -> Vec<PinholeCamera>,
     ) -> anyhow::Result<Self> {
-        let scene = name.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?;
+        let scene = fixtures::spec(name)?.load(&Limits::default(), MissingTextures::Refuse)?;
         let on_device = stand.upload(&scene)?;
         let views = views(&scene.bounds());
         let truths = stand.views(&on_device, lighting, &views, ViewPlanes::WITH_DEPTH)?;

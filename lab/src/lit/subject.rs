@@ -68,7 +68,7 @@ impl Subject {
     /// The subject of a name; `None` for a model without a folder of models.
     pub fn new(name: &'static str, models: Option<&Path>) -> anyhow::Result<Option<Self>> {
         let scene_name = name.split(',').next().unwrap_or(name);
-        let mut scene = scene_name.parse()?;
+        let mut scene = fixtures::spec(scene_name)?;
         if let SceneSpec::File(file) = &mut scene {
             let Some(folder) = models else { return Ok(None) };
             let mut models = models_of(folder, usize::MAX)?.into_iter();

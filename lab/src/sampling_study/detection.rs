@@ -7,7 +7,7 @@ use engine::GpuEngine;
 use glam::{UVec2, Vec3};
 use render::{DrawWork, Lighting, Refinement, SamplePlanes, Visibility};
 use sampling::{Redundancy, SampleWork, Sampler, SamplingMethod};
-use scene::{Mesh, MeshPart, Scene, Vertex, procedural};
+use scene::{Mesh, MeshPart, Scene, Vertex};
 
 const SIDE_PX: u32 = 64;
 const DISTANCE_M: f32 = 4.0;
@@ -87,7 +87,7 @@ fn wall(leg_px: f32) -> Scene {
     };
     let indices: Vec<u32> =
         (0..columns - 1).flat_map(|y| (0..columns - 1).map(move |x| (x, y))).flat_map(square).collect();
-    let mut scene = procedural::quad(Vec3::ZERO, 1.0, Vec3::Z, [200; 3]);
+    let mut scene = fixtures::quad(Vec3::ZERO, 1.0, Vec3::Z, [200; 3]);
     let parts = vec![MeshPart { first_index: 0, index_count: indices.len() as u32, material: 0 }];
     scene.meshes = vec![Mesh { vertices, indices, parts, ..Mesh::default() }];
     scene

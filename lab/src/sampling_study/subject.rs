@@ -56,7 +56,7 @@ impl Subject {
     /// # Errors
     /// The scene cannot be used, or the device fails.
     pub fn load(engine: &Arc<GpuEngine>, name: &str) -> anyhow::Result<Self> {
-        let args = SceneArgs::new(name.parse().with_context(|| name.to_owned())?);
+        let args = SceneArgs::new(fixtures::spec(name).with_context(|| name.to_owned())?);
         let setup = args.load()?;
         let hash = setup.offer.hash.to_string();
         engine.put_scene(&hash, &setup.scene)?;

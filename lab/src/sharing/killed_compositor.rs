@@ -16,7 +16,7 @@ use crate::section::Section;
 /// The longest time without a new frame of the other scene.
 const LONGEST_GAP_S: f64 = 0.5;
 /// The scene whose compositor is killed, and the other one.
-const SCENES: [&str; 2] = ["courtyard", "poles"];
+const SCENES: [&str; 2] = ["courtyard", "mirror-hall"];
 /// Viewers of each scene.
 const VIEWERS: usize = 2;
 const NODES: usize = 4;
@@ -69,7 +69,7 @@ fn section(watched: &[Watched], policies: &str, device: String) -> anyhow::Resul
         let numbers = [gaps_s[at], shown * 100.0].map(Cell::from);
         table.push([Cell::from(scene), policies.into()].into_iter().chain(numbers))?;
     }
-    let name = "a compositor of courtyard killed: longest gap of poles";
+    let name = "a compositor of courtyard killed: longest gap of mirror-hall";
     let checks = vec![Check::new(name, gaps_s[1], "s", Bar::AtMost(LONGEST_GAP_S))];
     Ok(Section { device, tables: vec![table], checks })
 }

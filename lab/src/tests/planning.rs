@@ -34,7 +34,7 @@ struct Stand {
 impl Stand {
     fn new(scene: &str, lighting: &str) -> Self {
         let engine = GpuEngine::shared(DevicePreference::Any).unwrap();
-        let args = SceneArgs { lighting: lighting.parse().unwrap(), ..SceneArgs::new(scene.parse().unwrap()) };
+        let args = SceneArgs { lighting: lighting.parse().unwrap(), ..SceneArgs::new(fixtures::spec(scene).unwrap()) };
         let setup = args.load().unwrap();
         engine.put_scene(setup.offer.hash.as_str(), &setup.scene).unwrap();
         Self { engine, setup, args }

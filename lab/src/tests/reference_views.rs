@@ -23,7 +23,7 @@ const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
 const VIEW_SIZE: UVec2 = UVec2::new(64, 48);
 
 fn args(scene: &str) -> SceneArgs {
-    SceneArgs { sample_size: SampleSize::Fixed(UVec2::new(160, 120)), ..SceneArgs::new(scene.parse().unwrap()) }
+    SceneArgs { sample_size: SampleSize::Fixed(UVec2::new(160, 120)), ..SceneArgs::new(fixtures::spec(scene).unwrap()) }
 }
 
 fn views(setup: &Setup, count: usize) -> Vec<PinholeCamera> {

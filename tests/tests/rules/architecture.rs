@@ -18,6 +18,7 @@ use crate::root;
 const ALLOWED: &[(&str, &[&str])] = &[
     ("depth-image", &[]),
     ("scene", &["depth-image"]),
+    ("fixtures", &["scene", "depth-image"]),
     ("gpu", &["depth-image"]),
     ("render", &["gpu", "scene", "depth-image"]),
     ("sampling", &["render", "gpu", "scene", "depth-image"]),
@@ -74,6 +75,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "coordinator",
             "depth-image",
             "engine",
+            "fixtures",
             "gpu",
             "metrics",
             "network-proxy",
@@ -144,7 +146,7 @@ const MESSAGES: [&str; 5] = ["prost", "prost-types", "prost-build", "tonic-prost
 const DEVICE: [&str; 5] = ["wgpu", "wgpu-core", "wgpu-hal", "naga", "ash"];
 
 /// Crates of the laboratory, which the program must not link.
-const LAB: [&str; 4] = ["browser", "lab", "network-proxy", "simulation"];
+const LAB: [&str; 5] = ["browser", "fixtures", "lab", "network-proxy", "simulation"];
 
 /// Text of code that a decision may not depend on.
 const IMPURE: [&str; 8] =

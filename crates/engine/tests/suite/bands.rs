@@ -2,10 +2,10 @@
 
 use cluster::DIRECT;
 use depth_image::{Antialias, PinholeCamera, VIEW_REACH_PX, View, ViewPart, ViewPlanes};
+use fixtures::uv_sphere;
 use glam::{UVec2, Vec2, Vec3};
 use node::{DirectWork, Engine, SampleSet, Turn, ViewWork, WorkClass};
 use scene::Scene;
-use scene::procedural::uv_sphere;
 
 use crate::stage::{engine, light_set, sample_set};
 

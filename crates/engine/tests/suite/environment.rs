@@ -4,9 +4,9 @@
 use std::f32::consts::PI;
 
 use depth_image::{EnvironmentMap, PinholeCamera, View, ViewPlanes};
+use fixtures::uv_sphere;
 use glam::{UVec2, Vec3};
 use node::{DirectWork, Engine, EngineError, SampleSet, Turn, ViewWork, WorkClass};
-use scene::procedural::uv_sphere;
 use scene::{Material, Scene, pack};
 
 use crate::stage::{engine, sample_set};

@@ -7,7 +7,7 @@ use depth_image::Camera;
 use engine::GpuEngine;
 use gpu::DevicePreference;
 use node::{Engine, SampleSet, SampleWork, Turn, WorkClass};
-use scene::{Limits, MissingTextures, Scene, SceneSpec};
+use scene::{Limits, MissingTextures, Scene};
 
 /// The engine of this program, on the software device; a test without one fails.
 pub fn engine() -> &'static GpuEngine {
@@ -17,7 +17,7 @@ pub fn engine() -> &'static GpuEngine {
 
 /// A procedural scene, which the engine has under `hash` from now on.
 pub fn loaded(hash: &str, name: &str) -> Scene {
-    let spec: SceneSpec = name.parse().expect("a name");
+    let spec = fixtures::spec(name).expect("a name");
     let scene = spec.load(&Limits::default(), MissingTextures::Refuse).expect("a scene");
     engine().put_scene(hash, &scene).expect("a scene");
     scene

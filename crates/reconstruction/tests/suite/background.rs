@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use depth_image::{EnvironmentMap, ProvenanceKind, ViewPlanes, srgb8_from_linear};
+use fixtures::uv_sphere;
 use glam::{UVec2, Vec2, Vec3};
 use gpu::{GpuEnvironment, Turn};
 use reconstruction::{ReconstructionMethod, SetDescription};
-use scene::procedural::uv_sphere;
 
 use crate::stage::{CARVE, Corners, SEARCH, Stage, VIEW_PX, count, depths, gpu, reconstruct, reconstructor};
 

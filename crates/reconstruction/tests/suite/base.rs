@@ -1,11 +1,11 @@
 //! A layered depth cube beside depth images: what these leave unknown is walked in it.
 
 use depth_image::{Antialias, CubeImages, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use fixtures::teapot_spheres;
 use glam::{UVec2, Vec3};
 use gpu::Turn;
 use reconstruction::{CommonSets, Mirrors, ReconstructRequest, ReconstructionError, ReconstructionMethod, SampleSet};
 use render::LayerSelection;
-use scene::procedural::teapot_spheres;
 
 use crate::layered::CubeStage;
 use crate::light_field::{Gathering, GlossyFloor, changed};

@@ -1,10 +1,10 @@
 //! Many views in one call, and requests that are refused.
 
 use depth_image::{Aabb, CameraError, LightPlanes, PinholeCamera, ViewPlanes};
+use fixtures::uv_sphere;
 use glam::{UVec2, Vec3};
 use gpu::Turn;
 use reconstruction::ReconstructionError;
-use scene::procedural::uv_sphere;
 
 use crate::stage::{CARVE, Corners, SEARCH, Stage, reconstruct, reconstructor};
 

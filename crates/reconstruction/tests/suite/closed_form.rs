@@ -1,9 +1,9 @@
 //! Closed forms: views that are known without any oracle.
 
 use depth_image::{DepthImage, Environment, ProvenanceKind, View, srgb8_from_linear};
+use fixtures::{quad, uv_sphere};
 use glam::{UVec2, Vec2, Vec3};
 use reconstruction::{CodedDepth, ReconstructionMethod};
-use scene::procedural::{quad, uv_sphere};
 
 use crate::stage::{
     CARVE, Corners, SAMPLE_PX, SEARCH, Stage, VIEW_PX, colors_differ_by, count, depths, kinds, looking, psnr_db,

@@ -1,8 +1,9 @@
 //! Views from anywhere, and images with holes: every number is finite.
 
 use depth_image::{HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, ViewPlanes};
+use fixtures::quad;
 use glam::{UVec2, Vec3};
-use scene::procedural::{courtyard, quad, tree_terrain};
+use scene::procedural::{courtyard, tree_terrain};
 
 use crate::stage::{CARVE, Corners, SAMPLE_PX, SEARCH, Stage, VIEW_PX, assert_sane, count, looking, reconstruct};
 

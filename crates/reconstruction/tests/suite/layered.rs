@@ -3,6 +3,7 @@
 use depth_image::{
     Aabb, CubeGrid, CubeImages, Highlight, LayeredDepthImage, PinholeCamera, ProvenanceKind, View, ViewPlanes,
 };
+use fixtures::{mirror_box, quad};
 use glam::{Affine3A, Quat, UVec2, Vec3};
 use gpu::Turn;
 use metrics::{Rgb8Image, psnr_db};
@@ -11,7 +12,6 @@ use reconstruction::{
     Mirrors, ReconstructRequest, ReconstructionError, ReconstructionMethod, SampleSet, SetDescription,
 };
 use render::{DrawWork, GpuScene, LayerSelection};
-use scene::procedural::{mirror_box, quad};
 use scene::{Instance, Scene};
 
 use crate::stage::{

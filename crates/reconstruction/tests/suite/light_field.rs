@@ -5,12 +5,12 @@ use depth_image::{
     LightDirections, LightFieldCamera, PinholeCamera, Reflector, View, ViewPlanes, environment_reflectance_linear,
     highlight_linear, linear_from_srgb8, srgb8_from_linear,
 };
+use fixtures::{mirror_box, teapot_floor, teapot_spheres};
 use glam::{UVec2, Vec3};
 use gpu::Turn;
 use reconstruction::scalar::{Reflecting, gathered_light};
 use reconstruction::{Mirrors, ReconstructRequest, ReconstructionError, ReconstructionMethod, SampleSet};
 use render::{DrawWork, GpuScene, LayerSelection};
-use scene::procedural::{mirror_box, teapot_floor, teapot_spheres};
 use scene::{Material, Scene};
 
 use crate::stage::{depths, description, gpu, looking, plainly_lit, psnr_db, reconstruct, reconstructor, renderer};

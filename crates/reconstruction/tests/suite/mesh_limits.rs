@@ -2,9 +2,10 @@
 
 use crate::stage::reconstruct;
 use depth_image::{BACKGROUND_INVERSE_DEPTH, HOLE_INVERSE_DEPTH, ProvenanceKind, ViewPlanes};
+use fixtures::uv_sphere;
 use glam::{UVec2, Vec3};
 use reconstruction::{MeshStatistics, ReconstructionError};
-use scene::procedural::{tree_terrain, uv_sphere};
+use scene::procedural::tree_terrain;
 
 use crate::{
     holes_and_limits::odd_cameras,

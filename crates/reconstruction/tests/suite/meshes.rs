@@ -3,9 +3,10 @@
 use std::time::Instant;
 
 use depth_image::{BACKGROUND_INVERSE_DEPTH, HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, View, ViewPlanes};
+use fixtures::{quad, uv_sphere};
 use glam::{UVec2, Vec3};
 use reconstruction::{ErrorBound, Quad, ReconstructionMethod, scalar};
-use scene::procedural::{quad, tree_terrain, uv_sphere};
+use scene::procedural::tree_terrain;
 
 use crate::stage::{
     Agreement, CARVE, Corners, SAMPLE_PX, Stage, VIEW_PX, assert_sane, corpus, count, depths, kinds, looking, psnr_db,

@@ -1,12 +1,12 @@
 //! The filter of mirrored rays, beside its twin.
 
 use depth_image::{Camera, DepthImage, Environment, Highlight, Illumination, ProvenanceKind, Ray};
+use fixtures::teapot_mirror;
 use glam::{UVec2, Vec2, Vec3};
 use gpu::Turn;
 use reconstruction::scalar::ColorMips;
 use reconstruction::{RayEnd, RayWork, SetDescription};
 use render::{GpuScene, SamplePlanes};
-use scene::procedural::teapot_mirror;
 
 use crate::stage::{gpu, looking, reconstructor, renderer, work};
 

@@ -3,6 +3,7 @@
 use depth_image::{
     Aabb, Antialias, Camera, CubeImages, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes,
 };
+use fixtures::{mirror_pair, teapot_mirror};
 use glam::{UVec2, Vec3};
 use gpu::Turn;
 use reconstruction::{
@@ -10,7 +11,6 @@ use reconstruction::{
 };
 use render::{GpuScene, LayerSelection, SamplePlanes};
 use scene::Scene;
-use scene::procedural::{mirror_pair, teapot_mirror};
 
 use crate::layered::CubeStage;
 use crate::light_field::Gathering;

@@ -3,10 +3,10 @@
 use depth_image::{
     DepthImage, HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, View, linear_from_rgb9e5, rgb9e5_from_linear,
 };
+use fixtures::{poles, quad};
 use glam::{UVec2, Vec3};
 use metrics::{PixelClass, classify};
 use reconstruction::ReconstructionMethod;
-use scene::procedural::{poles, quad};
 
 use crate::stage::{
     Agreement, CARVE, Corners, SAMPLE_PX, SEARCH, Stage, VIEW_PX, assert_sane, colors_differ_by, corpus, count, depths,

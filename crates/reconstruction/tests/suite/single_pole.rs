@@ -4,12 +4,12 @@ use gpu::Turn;
 use std::sync::OnceLock;
 
 use depth_image::{Aabb, Camera, DepthImage, ProvenanceKind, Ray, SinglePoleCamera, ViewPlanes};
+use fixtures::teapot_mirror;
 use glam::{UVec2, Vec3};
 use reconstruction::scalar::{PinholeImages, SinglePoleImages};
 use reconstruction::{CurvedSearch, MirrorCell, Mirrors, RayEnd, RayWork, ReconstructRequest, ReconstructionError};
 use render::{DrawWork, GpuScene, SamplePlanes};
 use scene::Scene;
-use scene::procedural::teapot_mirror;
 
 use crate::stage::{CARVE, description, gpu, looking, reconstruct, reconstructor, renderer, work};
 

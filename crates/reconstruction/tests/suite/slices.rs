@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 use depth_image::{PinholeCamera, View, ViewPlanes};
+use fixtures::uv_sphere;
 use glam::{UVec2, Vec3};
 use gpu::{CompiledOutside, DevicePreference, Gpu, Turn, WorkClass};
 use reconstruction::{ReconstructRequest, ReconstructionMethod, Reconstructor, SampleSet};
-use scene::procedural::uv_sphere;
 
 use crate::stage::{CARVE, Corners, Stage};
 

@@ -170,7 +170,8 @@ impl Corners {
 
 /// The small scenes, each with where its cameras stand.
 pub fn corpus() -> Vec<(&'static str, Scene, Corners)> {
-    use scene::procedural::{courtyard, poles, quad, tree_terrain, uv_sphere};
+    use fixtures::{poles, quad, uv_sphere};
+    use scene::procedural::{courtyard, tree_terrain};
     let red = [200, 60, 40];
     vec![
         ("uv-sphere", uv_sphere(1.0, 32), Corners { eye: Vec3::new(0.4, 0.9, 3.6), target: Vec3::ZERO, half_m: 0.6 }),

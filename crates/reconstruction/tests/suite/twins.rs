@@ -1,9 +1,9 @@
 //! The device's views are the scalar twins'.
 
 use depth_image::{ProvenanceKind, View};
+use fixtures::quad;
 use glam::{UVec2, Vec3};
 use reconstruction::{ReconstructionMethod, scalar};
-use scene::procedural::quad;
 use scene::{Instance, Scene};
 
 use crate::stage::{Agreement, CARVE, Corners, SEARCH, Stage, VIEW_PX, corpus, depths, kinds, looking};

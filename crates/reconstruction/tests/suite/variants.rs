@@ -1,9 +1,9 @@
 //! Every pass is built and bound to its resources in every variant that changes what it binds.
 
 use depth_image::{HOLE_INVERSE_DEPTH, ProvenanceKind, ViewPlanes};
+use fixtures::uv_sphere;
 use glam::{UVec2, Vec3};
 use reconstruction::METHODS;
-use scene::procedural::uv_sphere;
 
 use crate::stage::{Corners, Stage, count, reconstruct};
 

@@ -1,9 +1,10 @@
 //! Instances that follow nodes and joints: drawn, traced and by their twins, at several moments.
 
 use depth_image::{DepthImage, PinholeCamera};
+use fixtures::quad;
 use glam::{DAffine3, Quat, UVec2, Vec3, Vec4};
 use render::{DrawWork, GpuScene, Visibility, scalar};
-use scene::procedural::{quad, snake};
+use scene::procedural::snake;
 use scene::{
     Animation, Channel, Clip, Interpolation, Joint, MovingInstance, Node, NodeTransform, Property, Scene,
     TransformParts,

@@ -4,9 +4,9 @@ use depth_image::{
     Antialias, Camera, DepthImage, Illumination, Light, PinholeCamera, View, ViewPlanes, linear_from_rgb9e5,
     linear_from_srgb8,
 };
+use fixtures::poles;
 use glam::{UVec2, Vec3};
 use render::{DrawWork, GpuScene, SamplePlanes, Visibility};
-use scene::procedural::poles;
 
 use crate::stage::{device, down_from, floor_under, upload, work};
 

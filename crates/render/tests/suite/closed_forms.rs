@@ -4,10 +4,11 @@ use depth_image::{
     Camera, DepthImage, Environment, Highlight, Illumination, Light, PinholeCamera, Ray, Reflector, View, ViewPlanes,
     highlight_linear, linear_from_rgb9e5, linear_from_srgb8, unit_from_oct16,
 };
+use fixtures::{checker_sphere, poles, unit_cube, uv_sphere};
 use glam::{Affine3A, UVec2, Vec3};
 use rayon::prelude::*;
 use render::{DrawWork, Refinement, Visibility, scalar};
-use scene::procedural::{checker_sphere, courtyard, poles, tree_terrain, unit_cube, uv_sphere};
+use scene::procedural::{courtyard, tree_terrain};
 use scene::{Instance, Scene};
 
 use crate::stage::{SIZE_PX, device, down_from, floor_light, floor_under, image, lamps, mean, upload, work};

@@ -1,11 +1,11 @@
 //! Rays into the lobes of glossy surfaces against closed forms, the scalar reference, and many rays.
 
 use depth_image::{Antialias, Environment, PinholeCamera, View, ViewPlanes, environment_reflectance_linear};
+use fixtures::{mirror_pair, quad, teapot_floor};
 use glam::{Affine3A, UVec2, Vec2, Vec3};
 use render::scalar::{self, lobe::lobe_ray, sequence::point_of};
 use render::{DrawWork, Visibility};
 use scene::Material;
-use scene::procedural::{mirror_pair, quad, teapot_floor};
 
 use crate::reflections::{
     ROUNDING, between_the_pair, code_of, dark, floor_mirror, glowing, linear_at, of_parts, pixels, view_of,

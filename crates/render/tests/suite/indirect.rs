@@ -6,10 +6,11 @@ use depth_image::{
     DepthImage, Environment, Illumination, Light, LightCacheQuality, PinholeCamera, ProvenanceKind, View, ViewPlanes,
     linear_from_rgb9e5, rgb9e5_from_linear,
 };
+use fixtures::{quad, uv_sphere};
 use glam::{Affine3A, UVec2, Vec3};
 use render::scalar::{rays, smoothed};
 use render::{DrawWork, Visibility};
-use scene::procedural::{courtyard, quad, uv_sphere};
+use scene::procedural::courtyard;
 use scene::{Instance, Material, Scene};
 
 use crate::stage::{LIGHT, device, floor_under, lamps, mean, upload, work};

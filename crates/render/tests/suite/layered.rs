@@ -1,10 +1,10 @@
 //! Layered images: all surfaces on the lines of a parallel camera.
 
 use depth_image::{Aabb, CubeGrid, Environment, LayeredDepthImage, Light, PinholeCamera, Ray, linear_from_rgb9e5};
+use fixtures::{teapot_mirror, uv_sphere};
 use glam::{UVec2, Vec3};
 use render::{LayerSelection, RenderError, scalar};
 use scene::Scene;
-use scene::procedural::{teapot_mirror, uv_sphere};
 
 use crate::stage::{device, floor_under, image, lamps, upload, work};
 

@@ -5,11 +5,11 @@ use depth_image::{
     Provenance, ProvenanceKind, SinglePoleCamera, View, ViewPlanes, linear_from_srgb8, rgb9e5_from_linear,
     srgb8_from_linear,
 };
+use fixtures::uv_sphere;
 use glam::{Affine3A, UVec2, Vec3};
 use render::scalar::light_cache::{LightSamples, SurfacePoint};
 use render::scalar::rays;
 use render::{DrawWork, SamplePlanes, Visibility};
-use scene::procedural::uv_sphere;
 use scene::{Instance, Scene};
 
 use crate::stage::{LIGHT, device, floor_under, mean, upload, work};

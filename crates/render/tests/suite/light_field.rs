@@ -4,9 +4,9 @@ use depth_image::{
     Aabb, Environment, LayeredLightField, Light, LightDirections, LightFieldCamera, ParallelCamera, PinholeCamera,
     PixelDepth, Reflector, SampleCamera, environment_reflectance_linear, linear_from_rgb9e5,
 };
+use fixtures::{mirror_box, quad, teapot_mirror, uv_sphere};
 use glam::{Affine3A, UVec2, Vec3};
 use render::{GpuScene, LayerSelection, scalar};
-use scene::procedural::{mirror_box, quad, teapot_mirror, uv_sphere};
 use scene::{Material, Scene};
 
 use crate::layered::fronts;

@@ -4,9 +4,9 @@ use depth_image::{
     DepthImage, Environment, Illumination, Light, PinholeCamera, Reflector, linear_from_rgb9e5, srgb8_from_linear,
     unit_from_oct16,
 };
+use fixtures::{quad, uv_sphere};
 use glam::{Affine3A, UVec2, Vec2, Vec3};
 use render::{DrawWork, Visibility, scalar};
-use scene::procedural::{quad, uv_sphere};
 use scene::{Instance, Material, Scene, Texture, TextureUse, VertexDetail, Wrap};
 
 use crate::stage::{SIZE_PX, device, down_from, floor_light, floor_under, image, mean, upload, work};

@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use depth_image::{Camera, CameraError, DepthImage, Environment, PinholeCamera, View, ViewPlanes, linear_from_rgb9e5};
+use fixtures::{poles, quad, unit_cube, uv_sphere};
 use glam::{Affine3A, UVec2, Vec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, RenderError, SamplePlanes, Visibility, scalar};
-use scene::procedural::{courtyard, poles, quad, unit_cube, uv_sphere};
+use scene::procedural::courtyard;
 use scene::{Instance, Material, Scene, Texture, Wind};
 
 use crate::stage::{device, upload};

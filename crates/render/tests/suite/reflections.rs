@@ -4,10 +4,10 @@ use depth_image::{
     Camera, Environment, EnvironmentMap, Illumination, Light, PinholeCamera, PixelDepth, Ray, Reflector, View,
     ViewPlanes, environment_reflectance_linear, linear_from_srgb8,
 };
+use fixtures::{mirror_pair, quad, teapot_mirror, unit_cube, uv_sphere};
 use glam::{Affine3A, UVec2, Vec2, Vec3};
 use render::scalar::reflections::Bounce;
 use render::{DrawWork, GpuScene, Visibility, scalar};
-use scene::procedural::{mirror_pair, quad, teapot_mirror, unit_cube, uv_sphere};
 use scene::{Instance, Material, Scene};
 
 use crate::stage::{SIZE_PX, device, lamps, upload, work};

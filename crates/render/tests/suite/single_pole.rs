@@ -1,9 +1,9 @@
 //! Images around a pole: they are taken by rays.
 
 use depth_image::{Aabb, Camera, DepthImage, PinholeCamera, PixelDepth, SinglePoleCamera};
+use fixtures::teapot_mirror;
 use glam::{UVec2, Vec2, Vec3};
 use render::{DrawWork, RenderError, SamplePlanes, Visibility, scalar};
-use scene::procedural::teapot_mirror;
 
 use crate::stage::{device, upload, work};
 

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use depth_image::{Antialias, Camera, DepthImage, PinholeCamera, View, ViewPlanes};
+use fixtures::mirror_pair;
 use glam::{UVec2, Vec3};
 use gpu::{CompiledOutside, DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Refinement, Renderer, SamplePlanes, Visibility};
 use scene::Scene;
-use scene::procedural::{courtyard, mirror_pair};
+use scene::procedural::courtyard;
 
 const PLANES: SamplePlanes = SamplePlanes {
     antialias: Antialias::NONE,

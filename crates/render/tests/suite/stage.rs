@@ -3,10 +3,10 @@
 use std::sync::{Arc, OnceLock};
 
 use depth_image::{Antialias, Camera, DepthImage, Environment, Illumination, Light, PinholeCamera, linear_from_rgb9e5};
+use fixtures::quad;
 use glam::{Affine3A, UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Refinement, Renderer, SamplePlanes, Visibility};
-use scene::procedural::quad;
 use scene::{Instance, Scene};
 
 pub const SIZE_PX: UVec2 = UVec2::new(96, 72);

@@ -3,9 +3,9 @@
 use depth_image::{
     Antialias, Environment, ExposureEv, PinholeCamera, ToneCurve, ToneMapping, View, ViewPlanes, linear_from_srgb8,
 };
+use fixtures::poles;
 use glam::{UVec2, Vec3};
 use render::GpuScene;
-use scene::procedural::poles;
 
 use crate::stage::{device, upload, work};
 

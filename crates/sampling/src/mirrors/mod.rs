@@ -85,7 +85,7 @@ fn least_roughness(texture: &Texture) -> f32 {
 mod tests {
     use depth_image::PinholeCamera;
     use glam::{UVec2, Vec3};
-    use scene::{Instance, Limits, MissingTextures, SceneSpec, Wind};
+    use scene::{Instance, Limits, MissingTextures, Wind};
 
     use super::*;
 
@@ -94,7 +94,7 @@ mod tests {
     }
 
     fn scene(name: &str) -> Scene {
-        let spec: SceneSpec = name.parse().expect("a name");
+        let spec = fixtures::spec(name).expect("a name");
         spec.load(&Limits::default(), MissingTextures::Refuse).expect("a scene")
     }
 

@@ -92,7 +92,7 @@ fn around(bounds: &Aabb, eyes: &[Vec3], met: &[Vec3], ways: &Ways<'_>) -> Vec<Ca
 
 #[cfg(test)]
 mod tests {
-    use scene::procedural::teapot_mirror;
+    use fixtures::teapot_mirror;
 
     use super::*;
     use crate::mirrors::rays::Triangles;

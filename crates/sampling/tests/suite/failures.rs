@@ -2,11 +2,12 @@
 //! docs/failures.md.
 
 use depth_image::{DepthImage, PinholeCamera};
+use fixtures::{poles, quad};
 use glam::{Affine3A, UVec2, Vec3};
 use render::{DrawWork, GpuScene, SamplePlanes};
 use sampling::{Redundancy, SampleWork, SamplingMethod, scalar};
 use scene::Instance;
-use scene::procedural::{GrassDensity, grass, poles, quad};
+use scene::procedural::{GrassDensity, grass};
 
 use crate::stage::{after, device, pinholes, reference, unlit, upload};
 

@@ -1,10 +1,11 @@
 //! Images that omit what others hold: against the scalar reference, and what must hold of them.
 
 use depth_image::{Antialias, Camera, DepthImage, PinholeCamera};
+use fixtures::{blocks, blocks_viewpoints, poles, quad};
 use glam::{UVec2, Vec3};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 use sampling::{Redundancy, Rig, SampleWork, SamplingError, SamplingMethod, scalar};
-use scene::procedural::{blocks, blocks_viewpoints, courtyard, poles, quad};
+use scene::procedural::courtyard;
 use scene::{Instance, Scene};
 
 use crate::stage::{device, upload};

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use depth_image::PinholeCamera;
+use fixtures::poles;
 use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu};
 use render::{DrawWork, GpuScene, Refinement, SamplePlanes, Visibility};
 use sampling::{SampleWork, Sampler, SamplingMethod};
-use scene::procedural::poles;
 
 use crate::stage::pinholes;
 

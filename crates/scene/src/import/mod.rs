@@ -35,7 +35,7 @@ use warnings::Warnings;
 
 /// Reads a scene from a `.gltf`, `.glb`, `.obj` or `.ply` file. Files that it refers to are read only
 /// from its own folder and below. The scene has the lights that the file lists, which may be none: see
-/// [`Scene::with_default_lights`].
+/// [`Scene::with_default_lights`]. Its background is the default one.
 ///
 /// Axes are kept as in the file (only glTF defines them). Coordinates are kept too, unless `f32` would lose
 /// detail far from the origin. That is the case when the centre of the bounds is more than 10 km, or more than 1000

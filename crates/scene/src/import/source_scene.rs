@@ -7,10 +7,10 @@ use glam::{Affine3A, DAffine3, DVec3};
 use super::extent::{Box3, DRAWABLE_MESH_EXTENT, recentring_offset, scale_to_drawable, source_space};
 use crate::animation::{Animation, Influence, MovingInstance};
 use crate::error::{Fault, at_most};
-use crate::light_rig::{color, color_mut, position_mut, scale_to_metres};
+use crate::light_rig::{DEFAULT_BACKGROUND, color, color_mut, position_mut, scale_to_metres};
 use crate::{
-    Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, SourceSpace, Texture, Vertex,
-    VertexDetail,
+    Environment, Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, SourceSpace,
+    Texture, Vertex, VertexDetail,
 };
 
 /// The result of an importer.
@@ -22,6 +22,9 @@ pub(crate) struct SourceScene {
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
     pub lights: Vec<SourceLight>,
+    pub environment: Environment,
+    /// `None` for the default one.
+    pub background: Option<Environment>,
     pub cameras: Vec<PlacedCamera>,
     /// Its nodes are in the source's coordinates.
     pub animation: Option<Animation>,
@@ -92,8 +95,8 @@ impl SourceScene {
             instances: self.instances.iter().map(instance).collect(),
             materials: self.materials,
             textures: self.textures,
-            illumination: Illumination { lights, ..Illumination::default() },
-            environment_map: None,
+            illumination: Illumination { lights, environment: self.environment },
+            background: self.background.unwrap_or(DEFAULT_BACKGROUND),
             cameras: self.cameras.into_iter().map(camera).collect(),
             animation: self.animation,
             source_space,

@@ -9,48 +9,49 @@ use crate::{Instance, Material, Mesh, MeshPart, Scene, Vertex};
 
 /// A place on a beam's axis: the middle of its section, and the direction of the section's top.
 #[derive(Clone, Copy)]
-pub(super) struct Station {
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct Station {
     pub middle: Vec3,
     pub up: Vec3,
 }
 
+/// Triangles of one mesh, which end up in parts of one material each.
 #[derive(Default)]
-pub(super) struct MeshBuilder {
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct MeshBuilder {
     pub vertices: Vec<Vertex>,
     pub indices: Vec<u32>,
     parts: Vec<MeshPart>,
 }
 
 /// A vertex without texture coordinates or sway; `color_srgb` in codes of 0 to 255.
-pub(super) fn vertex(position: Vec3, normal: Vec3, color_srgb: Vec3) -> Vertex {
+#[must_use]
+pub fn vertex(position: Vec3, normal: Vec3, color_srgb: Vec3) -> Vertex {
     let [r, g, b] = color_srgb.to_array().map(|c| (c.clamp(0.0, 255.0) + 0.5) as u8);
     Vertex { position: position.into(), normal: normal.into(), uv: [0.0; 2], color_srgba8: [r, g, b, 255], sway: 0.0 }
 }
 
 /// A material without highlights, as by default; colours come from the vertices.
-pub(super) fn matt(name: &str) -> Material {
+#[must_use]
+pub fn matt(name: &str) -> Material {
     Material { name: name.into(), ..Material::default() }
 }
 
-/// A point on an ellipse around the y axis, its parameter turning from +x to +z.
-pub(super) fn on_ellipse(half_axes_m: Vec2, angle_rad: f32, y_m: f32) -> Vec3 {
-    Vec3::new(half_axes_m.x * angle_rad.cos(), y_m, half_axes_m.y * angle_rad.sin())
-}
-
 impl MeshBuilder {
-    pub(super) fn push(&mut self, vertex: Vertex) -> u32 {
+    /// Adds a vertex and returns its number.
+    pub fn push(&mut self, vertex: Vertex) -> u32 {
         self.vertices.push(vertex);
         self.vertices.len() as u32 - 1
     }
 
     /// Adds two triangles through corners that run counter-clockwise, seen from the front.
-    pub(super) fn quad(&mut self, corners: [u32; 4]) {
+    pub fn quad(&mut self, corners: [u32; 4]) {
         let [a, b, c, d] = corners;
         self.indices.extend([a, b, c, a, c, d]);
     }
 
     /// Adds a parallelogram that faces `right × up`, with corners at `centre ± right ± up`.
-    pub(super) fn rectangle(&mut self, centre: Vec3, right: Vec3, up: Vec3, color_srgb: Vec3) {
+    pub fn rectangle(&mut self, centre: Vec3, right: Vec3, up: Vec3, color_srgb: Vec3) {
         let normal = right.cross(up).normalize_or(Vec3::Y);
         let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(r, u): (f32, f32)| {
             let uv = Vec2::new(0.5 + 0.5 * r, 0.5 - 0.5 * u).to_array();
@@ -60,7 +61,7 @@ impl MeshBuilder {
     }
 
     /// Adds an axis-aligned box: 12 triangles that face out.
-    pub(super) fn cuboid(&mut self, min: Vec3, max: Vec3, color_srgb: Vec3) {
+    pub fn cuboid(&mut self, min: Vec3, max: Vec3, color_srgb: Vec3) {
         let (centre, half) = ((min + max) * 0.5, (max - min) * 0.5);
         for axis in 0..3 {
             let side = |a: usize| Vec3::AXES[a] * half[a];
@@ -71,7 +72,7 @@ impl MeshBuilder {
     }
 
     /// Adds a flat quadrilateral, its corners counter-clockwise seen from the front.
-    pub(super) fn facet(&mut self, corners: [Vec3; 4], color_srgb: Vec3) {
+    pub fn facet(&mut self, corners: [Vec3; 4], color_srgb: Vec3) {
         let [a, b, c, d] = corners;
         let normal = (c - a).cross(d - b).normalize_or(Vec3::Y);
         let corners = corners.map(|corner| self.push(vertex(corner, normal, color_srgb)));
@@ -80,7 +81,7 @@ impl MeshBuilder {
 
     /// Sweeps a closed outline around the y axis, through `stations` that turn from +x to +z. The outline runs
     /// counter-clockwise with "away from the axis" to the right and +y up; its surface then faces out.
-    pub(super) fn sweep_around(
+    pub fn sweep_around(
         &mut self,
         stations: u32,
         outline_points: u32,
@@ -97,7 +98,7 @@ impl MeshBuilder {
     }
 
     /// A box beam through two or more stations, closed at its ends: 8 triangles a piece and 4 for the ends.
-    pub(super) fn beam(&mut self, stations: &[Station], width_m: f32, depth_m: f32, color_srgb: Vec3) {
+    pub fn beam(&mut self, stations: &[Station], width_m: f32, depth_m: f32, color_srgb: Vec3) {
         let last = stations.len() - 1;
         let sections: Vec<[Vec3; 4]> = (0..=last)
             .map(|i| {
@@ -121,7 +122,7 @@ impl MeshBuilder {
     }
 
     /// An upright frustum, closed: `4 · sides - 4` triangles.
-    pub(super) fn drum(&mut self, foot: Vec3, radii_m: [f32; 2], height_m: f32, sides: u32, color_srgb: Vec3) {
+    pub fn drum(&mut self, foot: Vec3, radii_m: [f32; 2], height_m: f32, sides: u32, color_srgb: Vec3) {
         let corner = |i: u32, top: usize| {
             let (sin, cos) = (TAU * (i % sides) as f32 / sides as f32).sin_cos();
             foot + Vec3::new(sin * radii_m[top], height_m * top as f32, cos * radii_m[top])
@@ -142,7 +143,7 @@ impl MeshBuilder {
     }
 
     /// A lumpy ball, such as the crown of a far tree: `2 · columns · (rows - 1)` triangles.
-    pub(super) fn lumpy_ball(&mut self, centre: Vec3, radii_m: Vec3, noise: &Noise, color_srgb: Vec3) {
+    pub fn lumpy_ball(&mut self, centre: Vec3, radii_m: Vec3, noise: &Noise, color_srgb: Vec3) {
         self.closed([7, 4], |out| {
             let lump = noise.in_space(out * 1.9 + centre);
             let normal = (out / radii_m).normalize_or(Vec3::Y);
@@ -153,7 +154,7 @@ impl MeshBuilder {
     }
 
     /// Adds a closed surface around a middle, with a vertex for each direction from there: `2 · columns · (rows - 1)` triangles.
-    pub(super) fn closed(&mut self, [columns, rows]: [u32; 2], vertex_towards: impl Fn(Vec3) -> Vertex) {
+    pub fn closed(&mut self, [columns, rows]: [u32; 2], vertex_towards: impl Fn(Vec3) -> Vertex) {
         let first = self.vertices.len() as u32;
         for row in 0..=rows {
             for column in 0..columns {
@@ -178,7 +179,7 @@ impl MeshBuilder {
     }
 
     /// Adds `cells`² squares of two triangles, the mesh's first; gets a vertex by its column and row, row by row.
-    pub(super) fn grid(&mut self, cells: u32, mut vertex: impl FnMut(u32, u32) -> Vertex) {
+    pub fn grid(&mut self, cells: u32, mut vertex: impl FnMut(u32, u32) -> Vertex) {
         let side = cells + 1;
         self.vertices.extend((0..side * side).map(|i| vertex(i % side, i / side)));
         for cell in 0..cells * cells {
@@ -187,29 +188,35 @@ impl MeshBuilder {
         }
     }
 
-    pub(super) fn triangle_count(&self) -> u32 {
+    /// The triangles so far.
+    #[must_use]
+    pub fn triangle_count(&self) -> u32 {
         self.indices.len() as u32 / 3
     }
 
     /// Ends a part of all indices since the last one.
-    pub(super) fn finish_part(&mut self, material: u32) {
+    pub fn finish_part(&mut self, material: u32) {
         let first_index = self.parts.last().map_or(0, |p| p.first_index + p.index_count);
         let index_count = self.indices.len() as u32 - first_index;
         self.parts.push(MeshPart { first_index, index_count, material });
     }
 
-    pub(super) fn into_mesh(self) -> Mesh {
+    /// The mesh of all finished parts.
+    #[must_use]
+    pub fn into_mesh(self) -> Mesh {
         Mesh { vertices: self.vertices, indices: self.indices, parts: self.parts, ..Mesh::default() }
     }
 
     /// A scene of this mesh alone, in one material, lit.
-    pub(super) fn into_scene(mut self, name: &str, material: Material) -> Scene {
+    #[must_use]
+    pub fn into_scene(mut self, name: &str, material: Material) -> Scene {
         self.finish_part(0);
         self.into_scene_of(name, vec![material])
     }
 
     /// A scene of this mesh alone, whose parts have been finished, lit.
-    pub(super) fn into_scene_of(self, name: &str, materials: Vec<Material>) -> Scene {
+    #[must_use]
+    pub fn into_scene_of(self, name: &str, materials: Vec<Material>) -> Scene {
         Scene {
             name: name.into(),
             meshes: vec![self.into_mesh()],

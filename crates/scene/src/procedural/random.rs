@@ -3,24 +3,27 @@
 
 use glam::{Vec2, Vec2Swizzles, Vec3};
 
+/// A stream of random numbers.
 #[derive(Clone)]
-pub(super) struct Rng {
+pub struct Rng {
     state: u64,
 }
 
 impl Rng {
     /// Streams of different `purpose` are independent: more numbers from one do not change the others.
-    pub(super) fn new(seed: u64, purpose: u64) -> Self {
+    #[must_use]
+    pub fn new(seed: u64, purpose: u64) -> Self {
         Self { state: mixed(seed ^ mixed(purpose)) }
     }
 
     /// A number from 0 up to, but not, 1.
-    pub(super) fn unit(&mut self) -> f32 {
+    pub fn unit(&mut self) -> f32 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         (mixed(self.state) >> 40) as f32 / (1u64 << 24) as f32
     }
 
-    pub(super) fn between(&mut self, low: f32, high: f32) -> f32 {
+    /// A number from `low` up to `high`.
+    pub fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }
 
@@ -31,7 +34,8 @@ impl Rng {
 }
 
 /// The finaliser, a hash of 64 bits.
-pub(super) fn mixed(value: u64) -> u64 {
+#[must_use]
+pub fn mixed(value: u64) -> u64 {
     let value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     value ^ (value >> 31)
@@ -39,16 +43,20 @@ pub(super) fn mixed(value: u64) -> u64 {
 
 /// Smooth noise, about -1 to 1, with features of size 1.
 #[derive(Clone, Copy)]
-pub(super) struct Noise {
+pub struct Noise {
     seed: u64,
 }
 
 impl Noise {
-    pub(super) fn new(seed: u64) -> Self {
+    /// Noise of a seed.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
         Self { seed: mixed(seed) }
     }
 
-    pub(super) fn at(&self, point: Vec2) -> f32 {
+    /// The noise at a point.
+    #[must_use]
+    pub fn at(&self, point: Vec2) -> f32 {
         let cell = point.floor();
         let within = point - cell;
         let corner = |dx: f32, dy: f32| {
@@ -62,7 +70,8 @@ impl Noise {
     }
 
     /// Octaves of half the size and half the height each; about -1 to 1.
-    pub(super) fn fractal(&self, point: Vec2, octaves: u32) -> f32 {
+    #[must_use]
+    pub fn fractal(&self, point: Vec2, octaves: u32) -> f32 {
         let (mut sum, mut height, mut total) = (0.0, 1.0, 0.0);
         for octave in 0..octaves {
             // An offset per octave keeps the zeros at lattice points from lining up.
@@ -75,7 +84,8 @@ impl Noise {
     }
 
     /// Noise over space, by three planes: good enough for a tint.
-    pub(super) fn in_space(&self, point: Vec3) -> f32 {
+    #[must_use]
+    pub fn in_space(&self, point: Vec3) -> f32 {
         (self.at(point.truncate()) + self.at(point.truncate().yx() + point.z) + self.at(Vec2::new(point.z, point.y)))
             / 2.0
     }
@@ -87,7 +97,9 @@ impl Noise {
     }
 }
 
-pub(super) fn lerp(a: f32, b: f32, t: f32) -> f32 {
+/// Linear interpolation: `a` at t = 0, `b` at t = 1.
+#[must_use]
+pub fn lerp(a: f32, b: f32, t: f32) -> f32 {
     a + (b - a) * t
 }
 
@@ -98,6 +110,7 @@ pub(super) fn smoothstep(low: f32, high: f32, value: f32) -> f32 {
 }
 
 /// Mixes colours by their sRGB codes.
-pub(super) fn mix(a: Vec3, b: Vec3, t: f32) -> Vec3 {
+#[must_use]
+pub fn mix(a: Vec3, b: Vec3, t: f32) -> Vec3 {
     a + (b - a) * t.clamp(0.0, 1.0)
 }

@@ -63,7 +63,7 @@ const TUBES: [[Section; 4]; 4] = [
 
 /// A teapot in a pattern of cubes, with its spout towards +x: 64 · `squares`² triangles.
 #[derive(Clone, Copy)]
-pub(super) struct Teapot {
+pub struct Teapot {
     /// The middle of its bottom.
     pub foot: Vec3,
     /// Its size, over that of Newell's.
@@ -72,7 +72,8 @@ pub(super) struct Teapot {
     pub squares: u32,
 }
 
-pub(super) fn teapot(builder: &mut MeshBuilder, teapot: Teapot) {
+/// Adds a teapot to a mesh.
+pub fn teapot(builder: &mut MeshBuilder, teapot: Teapot) {
     let squares = teapot.squares;
     for patch in patches() {
         for square in 0..squares * squares {

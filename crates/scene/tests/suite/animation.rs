@@ -2,8 +2,9 @@
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
+use fixtures::unit_cube;
 use glam::Vec3;
-use scene::procedural::{snake, unit_cube};
+use scene::procedural::snake;
 use scene::{Limits, MissingTextures, NodeTransform, Scene, Vertex, load_file, pack, unpack};
 
 use crate::samples::skinned::{ChannelOf, Tube};

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use scene::procedural::{checker_sphere, unit_cube};
+use fixtures::{checker_sphere, unit_cube};
 use scene::{Limits, MissingTextures, load_file, pack, unpack};
 
 use crate::samples::compressed::{compressed_cube, diagonals, plain_streams, positions};

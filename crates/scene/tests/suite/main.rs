@@ -18,6 +18,5 @@ mod obj_and_ply_import;
 mod obj_files_and_text;
 mod packages;
 mod ply_contents;
-mod procedural;
 mod samples;
 mod scale;

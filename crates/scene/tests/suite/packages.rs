@@ -1,7 +1,8 @@
 //! Packages, and procedural scenes.
 
+use fixtures::{checker_sphere, poles, quad, unit_cube, uv_sphere};
 use glam::{UVec2, Vec3};
-use scene::procedural::{checker_sphere, courtyard, poles, quad, tree_terrain, unit_cube, uv_sphere};
+use scene::procedural::{courtyard, tree_terrain};
 use scene::{
     Environment, EnvironmentMap, Illumination, Light, LightSpec, Limits, Scene, SceneErrorKind, Texture, TextureUse,
     VertexDetail, Wrap, pack, unpack,

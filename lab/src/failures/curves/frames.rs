@@ -2,10 +2,10 @@
 
 use codec::{DecodeLimits, FrameCodec, decode_frame, encode_frame};
 use depth_image::{Antialias, PinholeCamera, View, ViewPlanes, linear_from_srgb8, srgb8_from_linear};
+use fixtures::poles;
 use glam::{UVec2, Vec2, Vec3};
 use reconstruction::ReconstructRequest;
 use render::Lighting;
-use scene::procedural::poles;
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::foreground;

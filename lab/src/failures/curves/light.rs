@@ -1,9 +1,10 @@
 //! Light by rays: their number, contact, the terminator, and the adaptive rate.
 
 use depth_image::{DepthImage, Environment, Illumination, Light, PinholeCamera, linear_from_rgb9e5};
+use fixtures::{quad, uv_sphere};
 use glam::{Affine3A, Vec3};
 use render::{GpuScene, Lighting, SamplePlanes};
-use scene::procedural::{courtyard, quad, uv_sphere};
+use scene::procedural::courtyard;
 use scene::{Instance, Scene};
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};

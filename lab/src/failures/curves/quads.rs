@@ -1,9 +1,10 @@
 //! Quads of samples: blocks that are merged, and holes.
 
 use depth_image::{DepthImage, HOLE_INVERSE_DEPTH};
+use fixtures::uv_sphere;
 use glam::Vec3;
 use reconstruction::MeshStatistics;
-use scene::procedural::{tree_terrain, uv_sphere};
+use scene::procedural::tree_terrain;
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::{depth_error, found};

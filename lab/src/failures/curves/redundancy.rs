@@ -1,10 +1,11 @@
 //! Redundant samples: triangles of a texel's size, floors at a grazing angle, tolerance and jitter. Layers from one place.
 
 use depth_image::{DepthImage, PinholeCamera};
+use fixtures::{poles, quad};
 use glam::{Affine3A, Vec3};
 use sampling::{Redundancy, SamplingMethod, scalar};
 use scene::Instance;
-use scene::procedural::{courtyard, poles, quad};
+use scene::procedural::courtyard;
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::{samples, share};

@@ -1,9 +1,10 @@
 //! Surfaces that a ray passes or meets by chance: thin poles, far walls, eyes at odd places.
 
 use depth_image::{PinholeCamera, ProvenanceKind, View};
+use fixtures::{poles, quad};
 use glam::Vec3;
 use reconstruction::ReconstructionMethod;
-use scene::procedural::{poles, quad, tree_terrain};
+use scene::procedural::tree_terrain;
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::{depths, foreground, is_kind, share, share_of_kind};

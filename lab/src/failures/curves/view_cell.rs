@@ -2,9 +2,10 @@
 //! yard that no camera sees.
 
 use depth_image::{PinholeCamera, ProvenanceKind, View};
+use fixtures::poles;
 use glam::{Vec2, Vec3};
 use metrics::unheld_rate;
-use scene::procedural::{courtyard, poles, tree_terrain};
+use scene::procedural::{courtyard, tree_terrain};
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::{depths, is_kind, mean};

@@ -1,11 +1,11 @@
 //! Rays that a concave mirror sends to itself: the images of its cell must see it, and a ray must not end where it begins.
 
 use depth_image::{PinholeCamera, ProvenanceKind};
+use fixtures::uv_sphere;
 use glam::{UVec2, Vec3};
 use reconstruction::RayWork;
 use render::scalar;
 use report::{Bar, Check};
-use scene::procedural::uv_sphere;
 use scene::{Material, Scene};
 
 use super::teapot::{mirrored, unlit_set};

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
+use fixtures::{quad, teapot_mirror, uv_sphere};
 use glam::{Affine3A, Quat, UVec2, Vec3};
 use reconstruction::RayWork;
 use render::scalar;
 use report::{Bar, Cell, Check, Table};
 use sampling::{Impostors, Mirror};
-use scene::procedural::{quad, teapot_mirror, uv_sphere};
 use scene::{Instance, Mesh, Scene};
 
 use super::bowl::bowl;

@@ -6,7 +6,7 @@ use gpu::Turn;
 use rayon::prelude::*;
 use reconstruction::{SampleSet, SetDescription};
 use render::{GpuScene, Lighting, SamplePlanes, scalar};
-use scene::{Limits, MissingTextures, Scene, SceneSpec};
+use scene::{Limits, MissingTextures, Scene};
 
 use crate::failures::stand::Stand;
 use crate::impostors::measure::around;
@@ -43,7 +43,7 @@ impl<'s> Teapot<'s> {
     /// # Errors
     /// The device fails.
     pub fn new(stand: &'s Stand) -> anyhow::Result<Self> {
-        let whole = SCENE.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?;
+        let whole = fixtures::spec(SCENE)?.load(&Limits::default(), MissingTextures::Refuse)?;
         let alone = alone(&whole);
         let on_device = stand.upload(&alone)?;
         let twin = scalar::rays::Scene::of(&on_device, 0.0)?;

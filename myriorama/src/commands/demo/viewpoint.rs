@@ -94,7 +94,8 @@ mod tests {
 
     #[test]
     fn sample_cameras_surround_the_view_and_see_its_border() {
-        let (setup, spec) = (SceneArgs::new("poles".parse().unwrap()).load().unwrap(), "poles".parse().unwrap());
+        let spec: SceneSpec = "courtyard".parse().unwrap();
+        let setup = SceneArgs::new(spec.clone()).load().unwrap();
         for viewpoint in [MEADOW, Viewpoint::of(&spec, &setup).unwrap()] {
             let (view, samples) = (viewpoint.camera(SIZE_PX), viewpoint.samples(SIZE_PX * 2));
             let middle = samples.iter().map(|camera| camera.eye_in_world).sum::<Vec3>() / 4.0;

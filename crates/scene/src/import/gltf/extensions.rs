@@ -5,11 +5,11 @@ use std::collections::BTreeSet;
 use gltf::json::Root;
 
 use super::super::warnings::Warnings;
-use super::{compressed, draco};
+use super::{compressed, draco, scene_extension};
 use crate::error::Fault;
 
 /// Extensions that are read. Textures in AVIF and DDS have a warning of their own where a file has them in no other format.
-const READ: [&str; 17] = [
+const READ: [&str; 18] = [
     compressed::NAMES[0],
     compressed::NAMES[1],
     draco::NAME,
@@ -27,6 +27,7 @@ const READ: [&str; 17] = [
     "KHR_texture_basisu",
     "KHR_texture_transform",
     "MSFT_texture_dds",
+    scene_extension::NAME,
 ];
 
 /// Beginnings of the names of extensions that leave all geometry in place: materials, textures, lights, motion, sound,

@@ -31,6 +31,7 @@ mod meshes;
 mod morph;
 mod nodes;
 mod primitives;
+mod scene_extension;
 mod skins;
 mod sources;
 mod specular_glossiness;
@@ -73,7 +74,9 @@ pub(super) fn read(
         let number = nodes::chosen_scene(&root).map_or(0, |scene| scene.value());
         return Err(Fault::malformed("scene", format!("it has no triangles in scene {number}")));
     }
-    lights::expose(&mut scene);
+    if !scene_extension::read(&root, &mut scene)? {
+        lights::expose(&mut scene);
+    }
     Ok(scene)
 }
 

@@ -5,7 +5,7 @@ use std::f32::consts::TAU;
 use glam::{Vec2, Vec3};
 
 use super::super::geometry::{MeshBuilder, Station, vertex};
-use super::super::mirrors::star;
+use super::super::pieces::star;
 use super::super::random::{Noise, mix};
 use super::room::{HALF_LENGTH_M, HALF_WIDTH_M};
 

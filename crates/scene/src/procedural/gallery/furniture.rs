@@ -5,7 +5,7 @@ use std::f32::consts::TAU;
 use glam::Vec3;
 
 use super::super::geometry::{MeshBuilder, vertex};
-use super::super::mirrors::star;
+use super::super::pieces::star;
 use super::super::random::Rng;
 use super::super::teapot::{Teapot, teapot};
 use super::room::{HALF_LENGTH_M, HEIGHT_M};
