@@ -14,8 +14,8 @@ use scene::Scene;
 use super::measure::TEXELS;
 use crate::failures::stand::Stand;
 
-/// Of the views whose rays are followed.
-const VIEW_PX: UVec2 = UVec2::new(320, 240);
+/// The size of the views whose rays are followed, the paper's smallest.
+const VIEW_PX: UVec2 = UVec2::new(640, 480);
 /// What rises less is the floor.
 const FLOOR_M: f32 = 1e-3;
 /// Nothing is met nearer to the mirror.

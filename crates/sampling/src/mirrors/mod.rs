@@ -15,8 +15,6 @@ use crate::impostors::Impostors;
 const MARGIN: f32 = 0.01;
 /// Texels of a roughness map that are looked at, along each side.
 const TEXELS: u32 = 64;
-/// The side of an image. Sessions scale all images of a mirror together.
-const SIDE_PX: u32 = 256;
 
 /// A group of mirrors.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,13 +3,15 @@
 use depth_image::{Aabb, Camera, PinholeCamera};
 use glam::{UVec2, Vec3};
 
-use super::SIDE_PX;
 use super::groups::Group;
 
+/// The side of an image. Sessions scale all images of a mirror together.
+pub(super) const SIDE_PX: u32 = 256;
 /// A mirror whose normals have a mean of this length is flat.
 const FLAT: f32 = 0.9;
-/// How far images lie from the middle of a mirror, in half widths.
+/// How far images lie from the middle of a flat mirror, in half widths.
 const ASIDE_OF_FLAT: f32 = 0.5;
+/// How far images lie from the middle of any other mirror, in half widths.
 pub(super) const ASIDE: f32 = 0.6;
 /// The field of view of a face of the cube around a mirror's middle: neighbours overlap.
 const FACE_DEG: f32 = 94.0;
@@ -49,13 +51,16 @@ fn of_round(group: &Group, middle_of_scene: Vec3, near_m: f32) -> Vec<PinholeCam
     let right = towards.any_orthonormal_vector();
     let aside = (right + right.cross(towards)) * (ASIDE * 0.5 * group.bounds.size().min_element());
     let before = [middle, middle - aside, middle + aside].map(|eye| looking(eye, towards, WIDE_DEG, near_m));
-    before.into_iter().chain(faces(middle, near_m)).collect()
+    let faces = directions(towards).map(|axis| looking(middle, axis, FACE_DEG, near_m));
+    before.into_iter().chain(faces).collect()
 }
 
-/// Images in all directions from one place.
-fn faces(eye: Vec3, near_m: f32) -> [PinholeCamera; 6] {
-    let axes = [Vec3::NEG_Y, Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z, Vec3::Y];
-    axes.map(|axis| looking(eye, axis, FACE_DEG, near_m))
+/// All directions, first those away from what lies before a mirror, and last the sky.
+fn directions(before: Vec3) -> [Vec3; 6] {
+    let mut level = [Vec3::NEG_Y, Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z];
+    level.sort_by(|a, b| a.dot(before).total_cmp(&b.dot(before)));
+    let [first, second, third, fourth, fifth] = level;
+    [first, second, third, fourth, fifth, Vec3::Y]
 }
 
 /// Nothing nearer than `near_m` is seen.
@@ -72,7 +77,7 @@ mod tests {
     #[test]
     fn six_faces_see_every_direction() {
         let eye = Vec3::new(1.0, 2.0, 3.0);
-        let cameras = faces(eye, 0.01);
+        let cameras = directions(Vec3::Z).map(|axis| looking(eye, axis, FACE_DEG, 0.01));
         let directions = (0..500).map(|i| {
             let y = 1.0 - 2.0 * (i as f32 + 0.5) / 500.0;
             let (sin, cos) = (i as f32 * 2.4).sin_cos();

@@ -4,9 +4,8 @@ use depth_image::{Aabb, Camera, SinglePoleCamera};
 use glam::{UVec2, Vec3};
 use scene::Scene;
 
-use super::SIDE_PX;
 use super::groups::{Group, Surface, groups, surfaces};
-use super::pinholes::ASIDE;
+use super::pinholes::{ASIDE, SIDE_PX};
 
 /// The distortion of an image, in half sides: about the one at which most mirrored rays find the teapot (docs/methods/single_pole.md).
 const DISTORTION: f32 = 0.45;
