@@ -88,17 +88,6 @@ pub struct OfferedMirror {
     pub cell: CommonCell,
     /// Sample cameras for what it shows, of sizes in proportion.
     pub cameras: Vec<Camera>,
-    /// The mean side of the images' texels where mirrored rays end, if a base may take the images' place.
-    pub texel_side_m: Option<f32>,
-}
-
-impl OfferedMirror {
-    /// Whether the images, with `texels` in all, resolve the ends of rays no finer than a base of this spacing. The base knows every end and
-    /// needs no images.
-    pub(crate) fn gains_nothing_over(&self, spacing_m: f32, texels: f32) -> bool {
-        let own_texels: usize = self.cameras.iter().map(Camera::pixel_count).sum();
-        self.texel_side_m.is_some_and(|side_m| spacing_m <= side_m * (own_texels as f32 / texels).sqrt())
-    }
 }
 
 /// A way to sample a scene whose cameras depend on no viewer.

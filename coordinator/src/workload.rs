@@ -81,8 +81,7 @@ pub(crate) fn workload_of(
     };
     let workload = if cells.is_empty() { workload } else { workload.with_view_cells(cells) };
     let base = base_of(request, offer, &workload);
-    let spacing_m = base.as_ref().map(|(_, grid)| grid.spacing_m);
-    let mirrors = mirrors_of(request, offer, &workload, spacing_m)?;
+    let mirrors = mirrors_of(request, offer, &workload)?;
     let base = base.map(|(cell, grid)| (cell.clone(), grid.cameras().map(SampleCamera::from).to_vec()));
     Ok(workload.with_common_cells(mirrors.into_iter().chain(base).collect()))
 }
@@ -121,13 +120,11 @@ fn sample_cameras_of(
     cameras.iter().map(|camera| sized(camera).map(SampleCamera::Depth)).collect()
 }
 
-/// The scene's mirrors, where the session follows them, with images of about [`MIRROR_DENSITY`]. Those whose images gain nothing over a
-/// base of this spacing have none.
+/// The scene's mirrors, where the session follows them, with images of about [`MIRROR_DENSITY`].
 fn mirrors_of(
     request: &SessionRequest,
     offer: &SceneOffer,
     workload: &Workload,
-    base_spacing_m: Option<f32>,
 ) -> Result<Vec<(CommonCell, Vec<SampleCamera>)>, Status> {
     // In a cube mirrors show its own samples.
     if !request.follows_mirrors || request.method == DIRECT || workload.samples_cube() {
@@ -135,8 +132,6 @@ fn mirrors_of(
     }
     let image_texels = workload.sample_cameras.first().map_or(1, SampleCamera::pixel_count);
     let texels = image_texels as f32 * MIRROR_DENSITY.min(MIRRORS_DENSITY / offer.mirrors.len().max(1) as f32);
-    let gains =
-        |mirror: &&OfferedMirror| !base_spacing_m.is_some_and(|base_m| mirror.gains_nothing_over(base_m, texels));
     let sized = |mirror: &OfferedMirror| {
         let cameras = Camera::resized_together(&mirror.cameras, texels, MAX_TILES);
         let checked = |camera: Camera| {
@@ -145,7 +140,7 @@ fn mirrors_of(
         };
         Ok((mirror.cell.clone(), cameras.into_iter().map(checked).collect::<Result<_, Status>>()?))
     };
-    offer.mirrors.iter().filter(gains).map(sized).collect()
+    offer.mirrors.iter().map(sized).collect()
 }
 
 /// The scene's base, where the session is made from depth images of the whole scene that hold still.
@@ -228,21 +223,6 @@ mod tests {
     fn camera(width: u32, height: u32) -> PinholeCamera {
         let size_px = UVec2::new(width, height);
         PinholeCamera::looking_at(glam::Vec3::Z, glam::Vec3::ZERO, glam::Vec3::Y, 0.8, size_px)
-    }
-
-    #[test]
-    fn a_base_takes_the_place_of_images_that_are_no_finer() {
-        let bounds = Aabb { min: glam::Vec3::NEG_ONE, max: glam::Vec3::ONE };
-        let cell = CommonCell { kind: cluster::CommonKind::Mirrors, bounds, sampling: "conventional".to_owned() };
-        let cameras = vec![Camera::Pinhole(camera(100, 100)); 4];
-        let mirror = OfferedMirror { cell, cameras, texel_side_m: Some(0.1) };
-        assert!(mirror.gains_nothing_over(0.1, 40_000.0) && !mirror.gains_nothing_over(0.101, 40_000.0));
-        assert!(mirror.gains_nothing_over(0.2, 10_000.0), "coarser images");
-        assert!(!mirror.gains_nothing_over(0.1, 160_000.0), "finer ones");
-        assert!(
-            !OfferedMirror { texel_side_m: None, ..mirror }.gains_nothing_over(0.0, 1.0),
-            "images that are asked for"
-        );
     }
 
     #[test]

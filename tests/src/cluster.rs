@@ -212,7 +212,7 @@ fn mirrors() -> Vec<OfferedMirror> {
         let camera = PinholeCamera::looking_at(place, towards, Vec3::Y, 0.6, UVec2::splat(16));
         let bounds = Aabb { min: place - 0.1, max: place + 0.1 };
         let cell = CommonCell { kind: CommonKind::Mirrors, bounds, sampling: "conventional".to_owned() };
-        OfferedMirror { cell, cameras: vec![camera.into()], texel_side_m: None }
+        OfferedMirror { cell, cameras: vec![camera.into()] }
     };
     vec![mirror(-1.0), mirror(1.0)]
 }

@@ -100,9 +100,9 @@ pub struct SceneArgs {
     /// A layered depth cube of the whole scene, layered_cube:SIDE, beside the sample images: what these leave unknown is found in it
     #[arg(long, value_name = "NAME")]
     pub base: Option<SamplingMethod>,
-    /// Images of what mirrors show, for lighting with reflections: auto[:UNSEEN], as few as see all but UNSEEN percent
-    /// of mirrored rays all the way, and none where --base shows their ends as finely as images would; pinhole[:N], N in the same order; single_pole[:N], 1 or 2 around the object that
-    /// most rays meet; or none. Mirrors without images show what --base holds, or else the environment
+    /// Images of what each mirror shows, for views from samples in lighting with reflections: pinhole[:N] (1 to 8), or
+    /// single_pole[:N], 1 or 2 of the object that the mirror shows largest. Mirrors without images show what --base holds, or
+    /// else the environment
     #[arg(long, default_value_t, value_name = "NAME")]
     pub impostors: Impostors,
     /// Sample cameras from a transforms.json, in the scene file's coordinates [default: four, placed from the scene's
@@ -146,31 +146,10 @@ fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<OfferedMirror> {
     if beyond > 0 {
         tracing::info!(beyond, followed = mirrors.len(), "the smallest mirrors have no images of what they show");
     }
-    for mirror in &mirrors {
-        for candidate in &mirror.candidates {
-            let mark = if candidate.is_chosen { ", chosen" } else { "" };
-            tracing::info!(
-                "images {}: {:.2} % of mirrored rays unseen{mark}",
-                candidate.name,
-                candidate.unseen_ratio * 100.0
-            );
-        }
-        if let Some(side_m) = mirror.texel_side_m {
-            let texels: usize = mirror.cameras.iter().map(Camera::pixel_count).sum();
-            tracing::info!("of {texels} texels together, images resolve {side_m:.3} m where mirrored rays end");
-        }
-        let images = mirror.cameras.len();
-        let of = |ratio: f32| format!("{:.1} %", ratio * 100.0);
-        match mirror.unseen_ratio.map(|ratios| ratios.map(of)) {
-            Some([unseen, checked]) => tracing::info!(images, %unseen, %checked, "a mirror's surroundings"),
-            None => tracing::info!(images, "a mirror's surroundings, in all directions"),
-        }
-    }
     let sampling = SamplingMethod::default().to_string();
-    let offered = |Mirror { bounds, cameras, texel_side_m, .. }| OfferedMirror {
-        cell: CommonCell { kind: CommonKind::Mirrors, bounds, sampling: sampling.clone() },
-        cameras,
-        texel_side_m,
+    let offered = |mirror: Mirror| OfferedMirror {
+        cell: CommonCell { kind: CommonKind::Mirrors, bounds: mirror.bounds, sampling: sampling.clone() },
+        cameras: mirror.cameras,
     };
     mirrors.into_iter().map(offered).collect()
 }

@@ -54,7 +54,7 @@ pub use known_samples::{TemporalReference, view_cell_m};
 pub use layered::LayerSelection;
 pub use light_samples::LightCache;
 pub use lighting::{Ambient, Direct, Lighting, MAX_RAYS, Rate, UnknownLighting};
-pub use rays::{AccelerationReport, host_tree};
+pub use rays::AccelerationReport;
 pub use redundancy_test::{Evidence, RedundancyTest};
 pub use renderer::Renderer;
 pub use shaders::{SHADERS, shader_sources, templates};

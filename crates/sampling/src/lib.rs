@@ -13,7 +13,7 @@ mod work;
 pub use error::SamplingError;
 pub use impostors::{Impostors, UnknownImpostors};
 pub use methods::{LayeredCube, LightFieldSize, METHODS, Redundancy, SamplingMethod, UnknownSampling, templates};
-pub use mirrors::{Candidate, Mirror, faces, looking, mirrors};
+pub use mirrors::{Mirror, mirrors};
 pub use rig::{Rig, RigError};
 pub use sampler::{Sampler, renderer};
 pub use work::SampleWork;

@@ -1,12 +1,9 @@
-//! `myriorama-lab study impostors`: how well images of a mirror's surroundings answer its rays.
+//! `myriorama-lab study impostors`: how well images of a mirror's surroundings answer its rays (Rosen et al.).
 
-mod candidates;
 pub mod command;
-mod costs;
 mod measure;
 mod objects;
-mod orders;
-mod reflectance;
 mod single_rays;
+mod walk;
 
 pub use measure::{around, changed, reflecting};

@@ -8,7 +8,6 @@ use app_core::setup::{SceneArgs, Setup};
 use depth_image::{PinholeCamera, ViewCell};
 use glam::{UVec2, Vec3};
 use render::Lighting;
-use sampling::Impostors;
 use scene::{Scene, SceneSpec};
 
 use crate::failures::cached_light::LitScene;
@@ -85,8 +84,7 @@ impl Subject {
 
     /// Puts the scene on the device.
     pub fn stage<'s>(&self, stand: &'s Stand, lighting: Lighting, views: OrbitViews) -> anyhow::Result<Stage<'s>> {
-        let args = SceneArgs { impostors: Impostors::None, ..SceneArgs::new(self.scene.clone()) };
-        let Setup { scene, around, .. } = args.load()?;
+        let Setup { scene, around, .. } = SceneArgs::new(self.scene.clone()).load()?;
         let corners = match INSIDE.iter().find(|cell| cell.name == self.name) {
             Some(cell) => cell.corners(scene.bounds().near_m())?,
             None => around,

@@ -100,26 +100,6 @@ async fn sessions_that_no_base_suits_have_none() {
     assert!(refused.err().unwrap().to_string().contains("and beside a base"));
 }
 
-/// One mirror has images that are coarser than the base, the other finer ones. A session without a base has both.
-#[tokio::test(flavor = "multi_thread")]
-async fn a_base_takes_the_place_of_images_that_gain_nothing_over_it() {
-    let mut offer = with_base();
-    for (mirror, side_m) in offer.mirrors.iter_mut().zip([10.0, 1e-6]) {
-        mirror.texel_side_m = Some(side_m);
-    }
-    let finer = offer.mirrors[1].cell.bounds;
-    let cluster = Cluster::start_offering(offer, 2).await;
-    let following = SessionRequest { follows_mirrors: true, ..asked(vec![around(0.0)]) };
-    let session = cluster.session(following.clone()).await.unwrap();
-    assert_eq!(kinds(&session), [CommonKind::Mirrors, CommonKind::Base]);
-    assert_eq!(session.plan().assignment.workload.common_cells[0].bounds, finer);
-    assert_eq!(frames(&session, [0.0]).await, 1);
-    cluster.close(session).await;
-    let volume = Some(Aabb { min: Vec3::splat(-2.0), max: Vec3::splat(2.0) });
-    let session = cluster.session(SessionRequest { volume, ..following }).await.unwrap();
-    assert_eq!(kinds(&session), [CommonKind::Mirrors, CommonKind::Mirrors]);
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn mirrors_and_a_base_go_together() {
     let cluster = Cluster::start_offering(with_base(), 2).await;

@@ -14,16 +14,6 @@ pub const MAX_DEPTH: u32 = 48;
 /// A refitted tree whose rays meet this many times the boxes of a new one is built anew.
 pub const WORST_REFIT: f32 = 1.3;
 
-/// Most levels that traversal on the host has room for.
-const MAX_HOST_DEPTH: u32 = 31;
-
-/// The tree over triangles, for rays on the host. `None` where it has too many levels.
-#[must_use]
-pub fn host_tree(corners_in_world: &[[Vec3; 3]]) -> Option<CwBvh> {
-    let bvh = Bvh::build(corners_in_world);
-    (bvh.depth <= MAX_HOST_DEPTH).then_some(bvh.tree)
-}
-
 /// Triangles of a scene at one time, and the tree over them.
 pub struct Bvh {
     pub tree: CwBvh,

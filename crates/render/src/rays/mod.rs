@@ -7,7 +7,6 @@ pub(crate) mod primary;
 pub(crate) mod ray_scene;
 pub(crate) mod traversal;
 
-pub use bvh::host_tree;
 pub(crate) use flat::OrderedMesh;
 pub use ray_scene::AccelerationReport;
 pub(crate) use ray_scene::{RayScene, Traced};

@@ -1,4 +1,4 @@
-//! Which surfaces of a scene form one mirror.
+//! Which surfaces of a scene belong together: those of one mirror, or of one object.
 
 use std::collections::BTreeSet;
 
@@ -6,161 +6,111 @@ use depth_image::Aabb;
 use glam::{UVec3, Vec3};
 use scene::Scene;
 
-/// Cells of a grid along the scene's longest side. Mirrors form one group where they touch the same cell or neighbouring cells.
+/// Cells of a grid along the scene's longest side. Surfaces form one group where they touch the same cell or neighbouring cells.
 const GRID: f32 = 32.0;
 const SIDE: u32 = GRID as u32 + 1;
 /// A triangle that is larger than two cells is split into four, and each part again, at most this many times.
 const SPLITS: u32 = 5;
-/// Points that are spread over a mirror.
-const POINTS: usize = 8192;
 
-/// A mirroring surface.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Surface {
-    /// A triangle that stands still, by its corners; whether its back mirrors, too.
-    Triangle([Vec3; 3], bool),
+    /// The corners of a triangle that stands still.
+    Triangle([Vec3; 3]),
     /// The box of an instance that moves, over all moments.
     Moving(Aabb),
 }
 
 impl Surface {
+    pub fn bounds(&self) -> Aabb {
+        match self {
+            Self::Triangle(corners) => Aabb::around(*corners),
+            Self::Moving(bounds) => *bounds,
+        }
+    }
+
     fn center(&self) -> Vec3 {
         match self {
-            Self::Triangle([a, b, c], _) => (a + b + c) / 3.0,
+            Self::Triangle([a, b, c]) => (a + b + c) / 3.0,
             Self::Moving(bounds) => bounds.center(),
         }
     }
 }
 
-/// Gives each mirroring surface of a scene to `each`.
-pub(super) fn for_each_surface(
-    scene: &Scene,
-    is_mirror: &[bool],
-    of_instances: &[Aabb],
-    each: &mut dyn FnMut(Surface),
-) {
+/// The surfaces of a scene whose materials are wanted.
+pub(super) fn surfaces(scene: &Scene, is_wanted: &[bool], bounds_of_instances: &[Aabb]) -> Vec<Surface> {
     let moving = scene.animation.iter().flat_map(|animation| &animation.moving);
     let moving: BTreeSet<usize> = moving.map(|moving| moving.instance as usize).collect();
-    for (number, (instance, bounds)) in scene.instances.iter().zip(of_instances).enumerate() {
+    let mut surfaces = Vec::new();
+    for (number, (instance, bounds)) in scene.instances.iter().zip(bounds_of_instances).enumerate() {
         let mesh = &scene.meshes[instance.mesh as usize];
-        let mut parts = mesh.parts.iter().filter(|part| is_mirror[part.material as usize]).peekable();
+        let mut parts = mesh.parts.iter().filter(|part| is_wanted[part.material as usize]).peekable();
         if parts.peek().is_none() {
             continue;
         }
         let sways = || scene.wind.is_some() && mesh.vertices.iter().any(|vertex| vertex.sway > 0.0);
         if moving.contains(&number) || sways() {
-            each(Surface::Moving(*bounds));
+            surfaces.push(Surface::Moving(*bounds));
             continue;
         }
         let corner = |index: &u32| {
             instance.world_from_mesh.transform_point3(Vec3::from(mesh.vertices[*index as usize].position))
         };
         for part in parts {
-            let double_sided = scene.materials[part.material as usize].double_sided;
             let indices = &mesh.indices[part.first_index as usize..][..part.index_count as usize];
             let triangles = indices.as_chunks::<3>().0.iter();
-            triangles.for_each(|triangle| each(Surface::Triangle(triangle.each_ref().map(corner), double_sided)));
+            surfaces.extend(triangles.map(|triangle| Surface::Triangle(triangle.each_ref().map(corner))));
         }
     }
+    surfaces
 }
 
-/// Surfaces that form one mirror.
+/// Surfaces that touch one another, about.
 #[derive(Debug, Clone)]
 pub(super) struct Group {
     pub bounds: Aabb,
     pub area_m2: f64,
     /// The sum of the triangles' normals, each as long as the triangle's area.
     pub area_normal_m2: Vec3,
-    /// Some part of it moves.
-    pub moves: bool,
-    /// Points spread over it by area, as soon as its area is known.
-    pub points: Vec<SurfacePoint>,
 }
 
 impl Group {
-    const NONE: Self =
-        Self { bounds: Aabb::EMPTY, area_m2: 0.0, area_normal_m2: Vec3::ZERO, moves: false, points: Vec::new() };
+    const NONE: Self = Self { bounds: Aabb::EMPTY, area_m2: 0.0, area_normal_m2: Vec3::ZERO };
 
-    fn add(&mut self, surface: Surface) {
-        let bounds = match surface {
-            Surface::Triangle([a, b, c], _) => {
+    fn add(&mut self, surface: &Surface) {
+        match surface {
+            Surface::Triangle([a, b, c]) => {
                 let area_normal_m2 = 0.5 * (b - a).cross(c - a);
                 self.area_normal_m2 += area_normal_m2;
                 self.area_m2 += f64::from(area_normal_m2.length());
-                Aabb::around([a, b, c])
             }
-            Surface::Moving(bounds) => {
-                self.moves = true;
-                self.area_m2 += f64::from(area_m2(&bounds));
-                bounds
-            }
-        };
-        self.bounds = Aabb::of_boxes(&[self.bounds, bounds]);
+            Surface::Moving(bounds) => self.area_m2 += f64::from(area_m2(bounds)),
+        }
+        self.bounds = Aabb::of_boxes(&[self.bounds, surface.bounds()]);
     }
+}
 
-    /// Adds the points of a triangle: one for each step of area that ends in it. `passed_m2` is the area before it.
-    fn spread(&mut self, [a, b, c]: [Vec3; 3], double_sided: bool, passed_m2: &mut f64) {
-        let area_normal_m2 = 0.5 * (b - a).cross(c - a);
-        let step_m2 = self.area_m2 / POINTS as f64;
-        *passed_m2 += f64::from(area_normal_m2.length());
-        while self.points.len() < POINTS && *passed_m2 > (self.points.len() as f64 + 0.5) * step_m2 {
-            // Folded into the triangle.
-            let [u, v] = spread_2d(self.points.len());
-            let [u, v] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
-            let normal = area_normal_m2.normalize_or(Vec3::Y);
-            let point_in_world = a + (b - a) * u + (c - a) * v;
-            self.points.push(SurfacePoint { point_in_world, normal, double_sided });
+/// The groups of surfaces, the largest first.
+pub(super) fn groups(volume: &Aabb, surfaces: &[Surface]) -> Vec<Group> {
+    let mut grid = Grid::over(volume);
+    for surface in surfaces {
+        match surface {
+            Surface::Triangle(corners) => grid.occupy_triangle(*corners, SPLITS),
+            Surface::Moving(bounds) => grid.occupy(bounds),
         }
     }
-}
-
-/// A point of a mirror.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct SurfacePoint {
-    pub point_in_world: Vec3,
-    pub normal: Vec3,
-    /// Its back mirrors, too.
-    pub double_sided: bool,
-}
-
-/// Evenly spread numbers from 0 to 1 in pairs (Roberts 2018, R2).
-pub(super) fn spread_2d(number: usize) -> [f32; 2] {
-    [0.754_877_666, 0.569_840_296].map(|step: f64| ((number as f64 + 0.5) * step).fract() as f32)
-}
-
-/// The largest groups of surfaces, at most `most`, and the number of those beyond. `for_each` gives each surface to a function; it
-/// is called three times, so that none is kept.
-pub(super) fn groups(volume: &Aabb, most: usize, for_each: impl Fn(&mut dyn FnMut(Surface))) -> (Vec<Group>, usize) {
-    let mut grid = Grid::over(volume);
-    for_each(&mut |surface| match surface {
-        Surface::Triangle(corners, _) => grid.occupy_triangle(corners, SPLITS),
-        Surface::Moving(bounds) => grid.occupy(&bounds),
-    });
     let mut groups = Vec::new();
-    for_each(&mut |surface| {
+    for surface in surfaces {
         let number = grid.group_at(surface.center(), groups.len());
         if number == groups.len() {
-            groups.push((number, Group::NONE));
+            groups.push(Group::NONE);
         }
-        groups[number].1.add(surface);
-    });
-    let mut place_of = vec![None; groups.len()];
-    groups.sort_by(|(_, a), (_, b)| area_m2(&b.bounds).total_cmp(&area_m2(&a.bounds)));
-    let beyond = groups.split_off(groups.len().min(most)).len();
-    groups.iter().enumerate().for_each(|(place, (number, _))| place_of[*number] = Some(place));
-    let mut followed: Vec<(Group, f64)> = groups.into_iter().map(|(_, group)| (group, 0.0)).collect();
-    for_each(&mut |surface| {
-        if let Surface::Triangle(corners, double_sided) = surface
-            && let Some(place) = place_of[grid.group_at(surface.center(), place_of.len())]
-        {
-            let (group, passed_m2) = &mut followed[place];
-            group.spread(corners, double_sided, passed_m2);
-        }
-    });
-    (followed.into_iter().map(|(group, _)| group).collect(), beyond)
+        groups[number].add(surface);
+    }
+    groups.sort_by(|a, b| area_m2(&b.bounds).total_cmp(&area_m2(&a.bounds)));
+    groups
 }
 
-/// Which cells of a scene hold mirrors.
+/// Which cells of a scene hold surfaces.
 struct Grid {
     origin: Vec3,
     cell_m: f32,

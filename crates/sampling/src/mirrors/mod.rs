@@ -1,21 +1,13 @@
 //! Mirrors of a scene, and sample cameras for what they show.
 
-mod choice;
-mod directions;
 mod groups;
-mod rays;
-mod resolution;
-mod seen;
-mod single_pole;
+mod pinholes;
+mod single_poles;
 
 use depth_image::{Aabb, Camera, MAX_MIRROR_CELLS, ROUGHEST_MIRROR};
 use scene::{Material, Scene, Texture};
 
-pub use choice::Candidate;
-use choice::{Choice, choose};
-pub use directions::{faces, looking};
-use groups::{Group, Surface, for_each_surface, groups};
-use rays::Triangles;
+use groups::{Group, groups, surfaces};
 
 use crate::impostors::Impostors;
 
@@ -31,14 +23,6 @@ pub struct Mirror {
     pub bounds: Aabb,
     /// For images of what it shows, of sizes in proportion. The mirror itself is not seen from within.
     pub cameras: Vec<Camera>,
-    /// What images were chosen from, as far as rays chose.
-    pub candidates: Vec<Candidate>,
-    /// The shares of mirrored rays that images do not see all the way: of those by which the images were chosen, and of as many
-    /// others. `None` where rays did not choose: the mirror moves, few eyes see it, or the scene has too many triangles.
-    pub unseen_ratio: Option<[f32; 2]>,
-    /// The mean side of the images' texels where mirrored rays end at surfaces: a layered cube whose lines are nearer to one another than
-    /// that shows these as finely. `None` where images are asked for by number, and where rays did not choose.
-    pub texel_side_m: Option<f32>,
 }
 
 /// The mirrors of a scene with the images that are asked for, the largest first, at most [`MAX_MIRROR_CELLS`]; and the number of
@@ -46,23 +30,34 @@ pub struct Mirror {
 #[must_use]
 pub fn mirrors(scene: &Scene, impostors: Impostors) -> (Vec<Mirror>, usize) {
     let is_mirror: Vec<bool> = scene.materials.iter().map(|material| mirrors_scene(scene, material)).collect();
-    let Some(limits) = impostors.limits().filter(|_| is_mirror.contains(&true)) else {
+    if impostors == Impostors::None || !is_mirror.contains(&true) {
         return (Vec::new(), 0);
+    }
+    let bounds_of_instances = scene.bounds_of_instances();
+    let volume = Aabb::of_boxes(&bounds_of_instances);
+    let mut groups = groups(&volume, &surfaces(scene, &is_mirror, &bounds_of_instances));
+    let beyond = groups.len().saturating_sub(MAX_MIRROR_CELLS);
+    groups.truncate(MAX_MIRROR_CELLS);
+    let objects = match impostors {
+        Impostors::SinglePoles { .. } => single_poles::objects(scene, &is_mirror, &bounds_of_instances),
+        Impostors::None | Impostors::Pinholes { .. } => Vec::new(),
     };
-    let of_instances = scene.bounds_of_instances();
-    let volume = Aabb::of_boxes(&of_instances);
-    let each = |each: &mut dyn FnMut(Surface)| for_each_surface(scene, &is_mirror, &of_instances, each);
-    let (groups, beyond) = groups(&volume, MAX_MIRROR_CELLS, each);
-    let stands = groups.iter().any(|group| !group.moves);
-    let triangles = stands.then(|| Triangles::of(scene, volume)).flatten();
-    let mirror = |group: &Group| {
-        let triangles = triangles.as_ref().filter(|_| !group.moves);
-        let Choice { cameras, candidates, unseen_ratio, texel_side_m } =
-            choose(group, triangles, limits, (volume.center(), volume.near_m()));
-        let bounds = group.bounds.padded(group.bounds.size().length() * MARGIN);
-        Mirror { bounds, cameras, candidates, unseen_ratio, texel_side_m }
+    let mirror = |group: &Group| Mirror {
+        bounds: group.bounds.padded(group.bounds.size().length() * MARGIN),
+        cameras: cameras(group, &volume, &objects, impostors),
     };
     (groups.iter().map(mirror).collect(), beyond)
+}
+
+fn cameras(group: &Group, volume: &Aabb, objects: &[Aabb], impostors: Impostors) -> Vec<Camera> {
+    let pinholes = |images: u32| pinholes::around(group, volume, images as usize);
+    match impostors {
+        Impostors::None => Vec::new(),
+        Impostors::Pinholes { images } => pinholes(images),
+        Impostors::SinglePoles { images } => {
+            single_poles::around(group, objects, images).unwrap_or_else(|| pinholes(images))
+        }
+    }
 }
 
 fn mirrors_scene(scene: &Scene, material: &Material) -> bool {
@@ -83,14 +78,13 @@ fn least_roughness(texture: &Texture) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use depth_image::PinholeCamera;
-    use glam::{UVec2, Vec3};
+    use glam::Vec3;
     use scene::{Instance, Limits, MissingTextures, Wind};
 
     use super::*;
 
     fn mirrors(scene: &Scene) -> (Vec<Mirror>, usize) {
-        super::mirrors(scene, Impostors::default())
+        super::mirrors(scene, Impostors::Pinholes { images: 8 })
     }
 
     fn scene(name: &str) -> Scene {
@@ -138,7 +132,7 @@ mod tests {
         for mirror in mirrors(&turned).0 {
             let middle = mirror.bounds.center();
             let facing = across * -middle.dot(across).signum();
-            assert!(!mirror.cameras.is_empty());
+            assert_eq!(mirror.cameras.len(), 8);
             for camera in mirror.cameras.iter().map(Camera::reference) {
                 let off_m = (camera.eye_in_world - middle).dot(facing);
                 assert!(off_m.abs() < 0.01, "{off_m} m off its plane");
@@ -149,39 +143,23 @@ mod tests {
     }
 
     #[test]
-    fn few_images_see_what_rays_off_a_mirror_meet() {
+    fn images_are_as_many_as_asked_for() {
         for name in ["teapot-mirror", "mirror-pair", "mirror-hall"] {
-            for mirror in mirrors(&scene(name)).0 {
-                let [chosen, fresh] = mirror.unseen_ratio.expect("it stands still");
-                println!("{name}: {} images leave {chosen}, of fresh rays {fresh}", mirror.cameras.len());
-                // The ball between the two mirrors hides what is behind it.
-                assert!((1..=8).contains(&mirror.cameras.len()) && chosen <= 0.02, "{name}: {chosen}");
-                assert!(mirror.cameras.iter().all(|camera| camera.pinhole().is_some()), "{name}: no single pole");
-                assert!((fresh - chosen).abs() < 0.01, "{name}: {fresh}, promised {chosen}");
+            let scene = scene(name);
+            assert_eq!(super::mirrors(&scene, Impostors::None), (Vec::new(), 0));
+            for images in 1..=8 {
+                let (mirrors, _) = super::mirrors(&scene, Impostors::Pinholes { images });
+                assert!(mirrors.iter().all(|mirror| mirror.cameras.len() == images as usize), "{name}: {images}");
             }
         }
     }
 
     #[test]
-    fn images_are_as_many_as_asked_for() {
+    fn single_poles_stand_around_the_largest_object_before_a_mirror() {
         let teapot = scene("teapot-mirror");
-        assert_eq!(super::mirrors(&teapot, Impostors::None), (Vec::new(), 0));
-        let unseen = [1, 2, 4, 8].map(|images| {
-            let mirror = super::mirrors(&teapot, Impostors::Pinholes { images }).0.remove(0);
-            // An image that sees nothing new is left out.
-            assert!(mirror.cameras.len() == images as usize || images == 8);
-            mirror.unseen_ratio.expect("it stands still")[0]
-        });
-        println!("unseen by 1, 2, 4 and 8 images: {unseen:?}");
-        assert!(unseen.is_sorted_by(|a, b| a >= b) && unseen[0] > 0.2, "{unseen:?}");
-    }
-
-    #[test]
-    fn single_poles_stand_around_what_most_rays_meet() {
-        let teapot = scene("teapot-mirror");
-        let of = |images| super::mirrors(&teapot, Impostors::SinglePoles { images }).0.remove(0);
-        for (images, mirror) in [(1, of(1)), (2, of(2))] {
-            assert_eq!(mirror.cameras.len(), images);
+        for images in [1, 2] {
+            let mirror = super::mirrors(&teapot, Impostors::SinglePoles { images }).0.remove(0);
+            assert_eq!(mirror.cameras.len(), images as usize);
             for camera in &mirror.cameras {
                 let Camera::SinglePole(camera) = camera else { panic!("{camera:?}") };
                 camera.validate().expect("a camera");
@@ -189,68 +167,16 @@ mod tests {
                 let middle_m = 0.5 * (camera.reference.near_m + camera.farthest_m);
                 let pole = camera.reference.ray(camera.pole_px).at(middle_m);
                 assert!(pole.distance(Vec3::new(0.0, 1.6, 2.0)) < 1.0, "{pole}");
-                // Two images without distortion may see as much from both sides.
-                assert!(images == 2 || camera.distortion_px > 0.0, "{camera:?}");
-            }
-            let [chosen, fresh] = mirror.unseen_ratio.expect("it stands still");
-            println!("{images} single poles: {chosen} and {fresh} of rays unseen");
-            // Of all rays: those to the floor and to the sky are not seen.
-            assert!((chosen - fresh).abs() < 0.03 && chosen < 0.95, "{chosen}, {fresh}");
-        }
-    }
-
-    #[test]
-    fn the_choice_says_what_it_was_made_from() {
-        let mirror = mirrors(&scene("teapot-mirror")).0.remove(0);
-        let names: Vec<&str> = mirror.candidates.iter().map(|candidate| candidate.name.as_str()).collect();
-        for name in ["pinhole:8", "single_pole:1", "single_pole:2"] {
-            assert!(names.contains(&name), "{names:?}");
-        }
-        let chosen = mirror.candidates.iter().find(|candidate| candidate.is_chosen).expect("one is chosen");
-        assert_eq!(Some(chosen.unseen_ratio), mirror.unseen_ratio.map(|ratio| ratio[0]));
-    }
-
-    /// Images from within a closed shell whose inside is seen show nothing else.
-    #[test]
-    fn a_mirror_of_which_no_image_sees_anything_has_the_usual_ones() {
-        let mut closed = scene("teapot-mirror");
-        for material in closed.materials.iter_mut().filter(|material| material.roughness < ROUGHEST_MIRROR) {
-            material.double_sided = true;
-        }
-        for (impostors, images) in [(Impostors::Pinholes { images: 1 }, 1), (Impostors::default(), 8)] {
-            let mirror = super::mirrors(&closed, impostors).0.remove(0);
-            assert_eq!(mirror.cameras.len(), images);
-            assert!(mirror.unseen_ratio.is_none_or(|[chosen, _]| chosen > 0.9), "{:?}", mirror.unseen_ratio);
-        }
-    }
-
-    /// Between those of what is close to a mirror and those of the far end of the scene.
-    #[test]
-    fn texels_are_as_large_as_where_rays_end() {
-        for name in ["teapot-mirror", "mirror-pair"] {
-            for mirror in mirrors(&scene(name)).0 {
-                let side_m = mirror.texel_side_m.expect("rays choose");
-                let texel_m = |camera: &Camera, way_m: f32| way_m / camera.reference().focal_px.x;
-                let size_m = scene(name).bounds().size().length();
-                let finest =
-                    mirror.cameras.iter().map(|camera| texel_m(camera, 0.02 * size_m)).fold(f32::MAX, f32::min);
-                let coarsest = mirror.cameras.iter().map(|camera| texel_m(camera, size_m)).fold(0.0, f32::max);
-                println!("{name}: texels of {side_m} m, from {finest} to {coarsest} m");
-                assert!(side_m > finest && side_m < coarsest, "{name}: {side_m}");
+                assert!(camera.distortion_px > 0.0, "{camera:?}");
             }
         }
-        let asked_for = super::mirrors(&scene("teapot-mirror"), Impostors::Pinholes { images: 4 }).0.remove(0);
-        assert_eq!(asked_for.texel_side_m, None);
     }
 
     #[test]
-    fn triangles_on_one_another_do_no_harm() {
-        let mut heaped = scene("teapot-mirror");
-        let mesh = &mut heaped.meshes[0];
-        let heap = [mesh.indices[0]; 60_000];
-        mesh.indices.extend(heap);
-        mesh.parts.last_mut().expect("a part").index_count += heap.len() as u32;
-        assert!(!mirrors(&heaped).0.remove(0).cameras.is_empty());
+    fn where_no_object_lies_before_a_mirror_pinholes_take_the_place_of_single_poles() {
+        let walls = scene("mirror-box");
+        let mirrors = |impostors| super::mirrors(&walls, impostors).0;
+        assert_eq!(mirrors(Impostors::SinglePoles { images: 2 }), mirrors(Impostors::Pinholes { images: 2 }));
     }
 
     #[test]
@@ -262,22 +188,11 @@ mod tests {
             vertex.sway = 0.1;
         }
         let mirror = mirrors(&moving).0.remove(0);
-        assert_eq!((mirror.unseen_ratio, mirror.cameras.len()), (None, 8));
-    }
-
-    #[test]
-    fn six_faces_see_every_direction() {
-        let cameras = faces(Vec3::new(1.0, 2.0, 3.0), 0.01, UVec2::splat(64));
-        let directions = (0..500).map(|i| {
-            let y = 1.0 - 2.0 * (i as f32 + 0.5) / 500.0;
-            let (sin, cos) = (i as f32 * 2.4).sin_cos();
-            Vec3::new(sin, 0.0, cos) * (1.0 - y * y).sqrt() + Vec3::Y * y
-        });
-        for direction in directions {
-            let point = Vec3::new(1.0, 2.0, 3.0) + direction * 5.0;
-            let sees = |camera: &&PinholeCamera| camera.project(point).is_some_and(|at| camera.contains(at.pixel));
-            assert!(cameras.iter().any(|camera| sees(&camera)), "{direction}");
-        }
+        let sees_all = Vec3::AXES
+            .into_iter()
+            .flat_map(|axis| [axis, -axis])
+            .all(|axis| mirror.cameras.iter().any(|camera| camera.reference().forward_in_world().dot(axis) > 0.99));
+        assert!(sees_all && mirror.cameras.len() == 8);
     }
 
     #[test]
