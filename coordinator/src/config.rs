@@ -16,8 +16,6 @@ use crate::plan_store::PlanStore;
 pub struct CoordinatorConfig {
     /// Allows another bind address than loopback, without TLS.
     pub insecure_bind: bool,
-    /// Serves the reflection service.
-    pub reflection: bool,
     /// Sessions that may be open; more are refused with `RESOURCE_EXHAUSTED`.
     pub max_sessions: usize,
     /// Workloads that may be open, from 1 to 64; more are refused with `RESOURCE_EXHAUSTED`.
@@ -36,7 +34,6 @@ impl Default for CoordinatorConfig {
     fn default() -> Self {
         Self {
             insecure_bind: false,
-            reflection: false,
             max_sessions: 1024,
             max_workloads: 8,
             budget: None,

@@ -8,7 +8,7 @@ use cluster::{
     Welcome, WorkReport,
 };
 use codec::MAX_CHUNK_BYTES;
-use node::{Port, ServeError, health, until_drained, with_guard, with_reflection};
+use node::{Port, ServeError, health, until_drained, with_guard};
 use tokio::task::JoinSet;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
@@ -40,7 +40,7 @@ pub async fn serve(
     observers: Observers,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
-    let CoordinatorConfig { insecure_bind, reflection, max_workloads, audit_time_ratio, .. } = config;
+    let CoordinatorConfig { insecure_bind, max_workloads, audit_time_ratio, .. } = config;
     let shared = Arc::new(Shared::new(config, offers, observers));
     shared.step(Event::Limits { max_workloads, audit_time_ratio });
     let mut running = JoinSet::new();
@@ -49,7 +49,7 @@ pub async fn serve(
     running.spawn(measure_when_idle(shared.clone()));
     let service = CoordinatorService { shared, shutdown: shutdown.clone() };
     let routes = Routes::new(health(&["coordinator"]).await).add_service(coordinator_server(service));
-    node::serve(port, with_reflection(routes, reflection)?, insecure_bind, shutdown).await
+    node::serve(port, routes, insecure_bind, shutdown).await
 }
 
 async fn tick(shared: Arc<Shared>) {

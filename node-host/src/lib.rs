@@ -8,7 +8,7 @@ use cluster::NodeStatus;
 use compositor_node::CompositorService;
 use node::{
     DeviceMonitor, Engine, EngineError, NodeConfig, NodeMetrics, NodeService, OpenEngine, PlansInForce, Scenes,
-    ServeError, health, keep_membership, with_reflection,
+    ServeError, health, keep_membership,
 };
 use probe::Probers;
 use sampler_node::SamplerService;
@@ -121,7 +121,6 @@ async fn serve_on(
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))
         .add_service(compositor_server(compositor));
-    let routes = with_reflection(routes, config.reflection)?;
     let (coordinator, away, ends) = (config.coordinator.clone(), config.deadlines.away, shutdown.clone());
     let member = move || {
         let (node, coordinator, plans) = (status.clone(), coordinator.clone(), plans.clone());

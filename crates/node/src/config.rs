@@ -19,8 +19,6 @@ pub struct NodeConfig {
     pub scene_folder: Option<PathBuf>,
     /// Allows another bind address than loopback, without TLS.
     pub insecure_bind: bool,
-    /// Serves reflection: the names of services and messages.
-    pub reflection: bool,
     /// Most bytes of sample sets: half for sets on the device and their relayed images, half for packed images.
     pub set_memory_bytes: usize,
     /// The share of the time that views drawn from the scene by request may take while others are served: above 0, at most 1.
@@ -43,7 +41,6 @@ impl NodeConfig {
             advertised_address: None,
             scene_folder: None,
             insecure_bind: false,
-            reflection: false,
             set_memory_bytes: 2 << 30,
             direct_share: 0.1,
             max_view_s: 120.0,

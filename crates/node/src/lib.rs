@@ -38,7 +38,7 @@ pub use membership::keep_membership;
 pub use plan::{CellPlan, PlansInForce, Relay, beyond_timeline, has_set};
 pub use port::Port;
 pub use scenes::Scenes;
-pub use server::{DRAIN, MAX_STREAMS, ServeError, health, serve, with_reflection};
+pub use server::{DRAIN, MAX_STREAMS, ServeError, health, serve};
 pub use service::NodeService;
 pub use set_bytes::{depth_images_bytes, most_image_bytes, most_set_bytes, set_bytes};
 pub use set_memory::SetMemory;

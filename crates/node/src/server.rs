@@ -9,7 +9,7 @@ use tonic::service::Routes;
 use tonic::transport::Server;
 use tonic_health::ServingStatus;
 use tonic_health::pb::health_server::{Health, HealthServer};
-use wire::rpc::{KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT, reflection_server};
+use wire::rpc::{KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT};
 
 use crate::engine::EngineError;
 use crate::port::Port;
@@ -28,8 +28,6 @@ pub enum ServeError {
     NotLoopback { address: SocketAddr },
     #[error("listening: {0}")]
     Listen(#[from] io::Error),
-    #[error("reflection: {0}")]
-    Reflection(String),
     /// The process can make nothing (any more); a supervisor may start it again.
     #[error("no device could be opened: {0}")]
     Device(#[from] EngineError),
@@ -73,15 +71,6 @@ pub async fn serve(
             Ok(())
         }
     }
-}
-
-/// The routes, with reflection where it is wanted.
-///
-/// # Errors
-/// Where the descriptors cannot be read.
-pub fn with_reflection(routes: Routes, wanted: bool) -> Result<Routes, ServeError> {
-    let described = || reflection_server().map_err(|error| ServeError::Reflection(error.to_string()));
-    if wanted { Ok(routes.add_service(described()?)) } else { Ok(routes) }
 }
 
 /// The health service, with each role serving.

@@ -32,9 +32,6 @@ pub struct CoordinatorArgs {
     /// Records the schedule's events to a file, for `myriorama replay`
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Describes services and messages by gRPC reflection, for grpcurl and the like
-    #[arg(long)]
-    reflection: bool,
     /// The most open sessions; more are refused
     #[arg(long, value_name = "N", default_value_t = CoordinatorConfig::default().max_sessions)]
     max_sessions: usize,
@@ -68,7 +65,6 @@ pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
     let shutdown = CancellationToken::new();
     let config = args.budget.configure(CoordinatorConfig {
         insecure_bind: args.insecure_bind,
-        reflection: args.reflection,
         max_sessions: args.max_sessions,
         max_workloads: args.max_workloads,
         ..CoordinatorConfig::default()

@@ -39,9 +39,6 @@ pub struct NodeArgs {
     /// The address for Prometheus, at /metrics [default: no metrics]
     #[arg(long, value_name = "HOST:PORT", value_parser = listen_address)]
     metrics: Option<SocketAddr>,
-    /// Describes services and messages by gRPC reflection, for grpcurl and the like
-    #[arg(long)]
-    reflection: bool,
     /// The most open streams of clients
     #[arg(long, value_name = "N", default_value_t = Quotas::default().streams)]
     max_streams: usize,
@@ -72,7 +69,6 @@ pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
         scene_folder: args.scene_folder,
         advertised_address: advertise,
         insecure_bind: args.insecure_bind,
-        reflection: args.reflection,
         set_memory_bytes: memory,
         quotas: Quotas { streams: args.max_streams, views: args.max_views, view_bytes: args.memory.view_memory },
         ..args.limits.within(NodeConfig::new(name, args.coordinator))

@@ -3,12 +3,10 @@
 mod backoff;
 mod channel;
 mod liveness;
-mod reflection;
 mod services;
 
 pub use backoff::Backoff;
 pub use channel::{CALL_TIMEOUT, KEEPALIVE_INTERVAL, KEEPALIVE_TIMEOUT, connect, connect_later, is_serving};
-pub use reflection::reflection_server;
 pub use services::{
     Compositor, CompositorClient, Coordinator, CoordinatorClient, Messages, Node, NodeClient, Sampler, SamplerClient,
     compositor_server, coordinator_server, node_server, sampler_server,
