@@ -216,7 +216,7 @@ pub(crate) mod tests {
 
     fn measured(reconstruct_view_s: f64) -> Known {
         let costs = Costs { sample_image_s: 3.0, reconstruct_view_s, encode_view_s: 0.001, ..Costs::default() };
-        Known { measured: Measured::of_costs(costs), is_settled: true }
+        Known { measured: Measured { costs, ..Measured::default() }, is_settled: true }
     }
 
     fn predicted_s(cache: &CostTable, size_px: UVec2) -> Option<f64> {

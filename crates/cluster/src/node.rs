@@ -113,7 +113,7 @@ impl MeasureCosts {
 }
 
 /// What a node has measured.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Measured {
     /// Seconds of each operation.
     pub costs: Costs,
@@ -132,20 +132,6 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Costs alone, of samples without further planes.
-    #[must_use]
-    pub fn of_costs(costs: Costs) -> Self {
-        Self {
-            costs,
-            planes: SamplePlanes::default(),
-            auto_exposure: ExposureEv::ZERO,
-            traced_pixel_count: None,
-            shared_light: None,
-            views: Vec::new(),
-            busy_s: 0.0,
-        }
-    }
-
     /// # Errors
     /// For values that no peer may send.
     pub fn validate(&self) -> Result<(), InvalidField> {

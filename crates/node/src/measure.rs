@@ -204,7 +204,7 @@ impl Measurement<'_> {
         let costs =
             Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles };
         let auto_exposure = auto_exposure(engine, workload, self.turn)?;
-        Ok(Measured { planes, auto_exposure, shared_light, ..Measured::of_costs(costs) })
+        Ok(Measured { costs, planes, auto_exposure, shared_light, ..Measured::default() })
     }
 
     /// The cost of one view, and where it goes. Small views take longer than their share of the pixels: from views of two sizes follows

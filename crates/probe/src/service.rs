@@ -55,7 +55,7 @@ impl ViewProbes for Probers {
             probers.pop_front();
         }
         let (views, costs) = measured?;
-        Ok(Measured { views: views.into_iter().map(probed).collect(), busy_s, ..Measured::of_costs(costs) })
+        Ok(Measured { costs, views: views.into_iter().map(probed).collect(), busy_s, ..Measured::default() })
     }
 
     fn audit(&self, audit: ViewAudit) -> Result<(ProbedView, f64), Status> {

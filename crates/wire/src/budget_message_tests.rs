@@ -50,7 +50,8 @@ fn probes_survive_the_round_trip_and_impossible_ones_are_refused_by_field() {
         assert!(sent(probe(views)).unwrap_err().to_string().contains("views"));
     }
     let view = probed_view();
-    let answer = |view| Measured { views: vec![view; 2], busy_s: 0.2, ..Measured::of_costs(session_plan().costs) };
+    let costs = session_plan().costs;
+    let answer = |view| Measured { costs, views: vec![view; 2], busy_s: 0.2, ..Measured::default() };
     let answered = |answer| read::<Measured, _>(to_message::<proto::MeasureCostsResponse, _>(answer));
     assert_eq!(answered(answer(view)), Ok(answer(view)));
     for flip in [f64::NAN, -0.1, 1.1] {

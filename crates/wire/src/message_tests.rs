@@ -683,8 +683,8 @@ fn a_measured_exposure_survives_within_its_limits() {
     let planes = SamplePlanes { light: true, ..SamplePlanes::default() };
     let traced_pixel_count = Some(1 << 20);
     let shared_light = Some(SharedLightCosts { known_ratio: 0.9, surfaces_s: 0.1, look_up_s: 0.02, unknown_s: 0.3 });
-    let costs = Measured::of_costs(session_plan().costs);
-    let measured = Measured { planes, auto_exposure, traced_pixel_count, shared_light, ..costs };
+    let costs = session_plan().costs;
+    let measured = Measured { costs, planes, auto_exposure, traced_pixel_count, shared_light, ..Measured::default() };
     let message = to_message::<proto::MeasureCostsResponse, _>(measured.clone());
     assert_eq!(read::<Measured, _>(message.clone()), Ok(measured));
     let spoilt = proto::MeasureCostsResponse { auto_exposure_ev: f32::NAN, ..message };
