@@ -1,6 +1,7 @@
 //! The plan in force and its compositors, as a session knows them. It changes: nodes come and go, and the coordinator may be
 //! away for a while.
 
+use std::cmp::Reverse;
 use std::sync::Arc;
 
 use cluster::{Assignment, CompositorShare, Promise, RenderViews, SessionEvent, SessionPlan, SessionRequest};
@@ -68,10 +69,14 @@ impl ActivePlan {
         (is_later && shows_the_same).then(|| self.replaced_by(plan()))
     }
 
-    /// All peers but those that failed lately; where that leaves none, all.
+    /// All peers but those that failed lately; where that leaves none, all. Those of the greatest weight come first.
     pub(crate) fn trusted(&self) -> Vec<Peer> {
-        let trusted: Vec<Peer> = self.peers.iter().filter(|peer| !peer.breaker.is_open()).cloned().collect();
-        if trusted.is_empty() { self.peers.clone() } else { trusted }
+        let mut peers: Vec<Peer> = self.peers.iter().filter(|peer| !peer.breaker.is_open()).cloned().collect();
+        if peers.is_empty() {
+            peers.clone_from(&self.peers);
+        }
+        peers.sort_by_key(|peer| Reverse(peer.share.view_weight));
+        peers
     }
 
     pub(crate) fn plan_epoch(&self) -> u64 {

@@ -3,18 +3,18 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use cluster::Assignment;
+use cluster::RenderViews;
+use depth_image::PinholeCamera;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
+use tokio_stream::wrappers::ReceiverStream;
 use wire::rpc::Backoff;
 
 use crate::active_plan::{ActivePlan, SessionState};
+use crate::batch::Batch;
 use crate::error::ClientError;
 use crate::frames::FrameSink;
 use crate::peer::{Failure, FrameStream, Peer, decode};
-use crate::request_pump::{Started, start_pumps};
-use crate::unrequested::Unrequested;
-use crate::view_request::ViewRequest;
 
 /// A view that waited longer for its sample set does not show its compositor's speed.
 const SET_WAIT_S: f64 = 0.05;
@@ -70,36 +70,33 @@ async fn call_all(
     active: &Arc<ActivePlan>,
     sink: &FrameSink,
 ) -> Result<(), Failure> {
-    let peers = active.trusted();
-    let weights: Vec<u32> = peers.iter().map(|peer| peer.share.view_weight).collect();
-    let plan = active.clone();
-    let arrange = move |views: &mut [ViewRequest]| cell_by_cell(&plan.plan.assignment, views);
-    let views = Unrequested::new(sink.window().clone(), &weights, Box::new(arrange));
+    let mut peers = active.trusted();
     let mut request = active.request();
     {
-        let window = sink.window().lock();
+        let mut window = sink.window().lock();
+        // To make one view of a set, a compositor loads all of it.
+        peers.truncate(window.most_views_of_a_set());
         request.planes = window.planes();
         if let Some(method) = &window.method {
             request.method.clone_from(method);
         }
     }
-    let pumps = start_pumps(request, views, peers.len(), Some(active.plan.view_s()));
+    let weights: Vec<u32> = peers.iter().map(|peer| peer.share.view_weight).collect();
+    let plan = active.clone();
+    let cell_of = move |camera: &PinholeCamera| plan.plan.assignment.cell_of(camera);
+    let started = Batch::start(request, sink.window().clone(), &weights, active.plan.view_s(), cell_of);
     let mut calls = JoinSet::new();
-    for (peer, pump) in peers.iter().zip(pumps) {
-        if let Some(pump) = pump {
-            calls.spawn(receive_all(peer.clone(), pump, sink.clone()));
+    for (compositor, messages) in started.messages.into_iter().enumerate() {
+        if let Some(messages) = messages {
+            let batch = started.batch.clone();
+            let received = move |waited_for_set| batch.lock().received(compositor, Instant::now(), waited_for_set);
+            let plan_epoch = active.plan_epoch();
+            calls.spawn(receive_all(peers[compositor].clone(), messages, plan_epoch, sink.clone(), received));
         }
     }
     tokio::select! {
         ended = all(&mut calls) => ended,
         lost = wait_for_lost_peer(state.clone(), active.plan_epoch(), &peers) => Err(Failure::OfPlan(lost)),
-    }
-}
-
-/// Groups views of a set by view cell: a compositor then needs the images of few cells.
-fn cell_by_cell(plan: &Assignment, views: &mut [ViewRequest]) {
-    if plan.workload.cell_count() > 1 {
-        views.sort_by_cached_key(|view| plan.cell_of(&view.camera));
     }
 }
 
@@ -112,12 +109,19 @@ async fn all(tasks: &mut JoinSet<Result<(), Failure>>) -> Result<(), Failure> {
     Ok(())
 }
 
-async fn receive_all(peer: Peer, (mut pump, messages): Started, sink: FrameSink) -> Result<(), Failure> {
+/// Receives the frames that a compositor is asked for; `received` is called for each, and whether it waited for its set.
+async fn receive_all(
+    peer: Peer,
+    messages: ReceiverStream<RenderViews>,
+    plan_epoch: u64,
+    sink: FrameSink,
+    received: impl Fn(bool),
+) -> Result<(), Failure> {
     let parts = peer.client.render_views(messages).await.map_err(|status| Failure::of_status(&peer, &status))?;
     let mut frames = FrameStream::new(parts);
     let mut decoding = JoinSet::new();
-    while let Some((frame, room)) = frames.next_admitted(&peer, &sink, pump.plan_epoch()).await? {
-        pump.received(Instant::now(), frame.header.stage_times.set_wait_s > SET_WAIT_S);
+    while let Some((frame, room)) = frames.next_admitted(&peer, &sink, plan_epoch).await? {
+        received(frame.header.stage_times.set_wait_s > SET_WAIT_S);
         let Some(decoder) = sink.decoder().await else { break };
         let (peer, sink) = (peer.clone(), sink.clone());
         decoding.spawn(async move {

@@ -91,6 +91,14 @@ impl Window {
         self.due.values().copied().collect()
     }
 
+    /// Views of the largest set among those that are due, or else of the next one.
+    pub(crate) fn most_views_of_a_set(&mut self) -> usize {
+        if self.due.is_empty() {
+            self.draw();
+        }
+        self.due().chunk_by(|a, b| a.set_index == b.set_index).map(<[ViewRequest]>::len).max().unwrap_or(0)
+    }
+
     /// Frames that were received so far.
     pub(crate) fn received(&self) -> u64 {
         self.received

@@ -5,7 +5,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod config;
-mod cost_cache;
+mod cost_table;
 mod executor;
 mod grpc_status;
 mod measuring;

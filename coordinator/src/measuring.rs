@@ -8,7 +8,7 @@ use cluster::{MeasureCosts, Measured, NodeStatus, SessionEvent, SessionStage};
 use tonic::{Code, Status};
 use wire::rpc::{Backoff, NodeClient};
 
-use crate::cost_cache::Known;
+use crate::cost_table::Known;
 use crate::grpc_status::{of_node, within};
 use crate::measuring_queue::Wanted;
 use crate::sessions::EventSender;
@@ -25,15 +25,11 @@ const REPORTED_WITHIN: Duration = Duration::from_millis(1500);
 /// Attempts to measure costs where nodes are lost meanwhile.
 const ATTEMPTS: usize = 11;
 
-/// The slowest device's costs, where those of all devices are known. Those that are not settled are measured later.
+/// The slowest device's costs, where those of all devices are known.
 pub(crate) fn known(shared: &Shared, measurement: &MeasureCosts) -> Option<Measured> {
     let devices: BTreeSet<String> = shared.status().nodes.into_iter().map(|node| node.device_name).collect();
-    let find = |device: String| Some((shared.costs.find(&device, measurement)?, device));
-    let all = devices.into_iter().map(find).collect::<Option<Vec<(Known, String)>>>()?;
-    for (_, device) in all.iter().filter(|(known, _)| !known.is_settled) {
-        shared.to_measure.lock().add(device, measurement);
-    }
-    all.into_iter().map(|(known, _)| known.measured).reduce(slowest)
+    let all = devices.iter().map(|device| shared.costs.find(device, measurement)).collect::<Option<Vec<Measured>>>()?;
+    all.into_iter().reduce(slowest)
 }
 
 /// Measures what waits for idle nodes, one after the other, until it is aborted.
@@ -45,7 +41,7 @@ pub(crate) async fn measure_when_idle(shared: Arc<Shared>) {
         let Some((wanted, node)) = next(&shared) else { continue };
         match measured_on(&shared, &wanted.measurement, &node).await {
             Ok(Known { is_settled: true, .. }) => (),
-            Ok(_) => shared.to_measure.lock().add_again(wanted),
+            Ok(_) => shared.costs.wanted.lock().add_again(wanted),
             Err(status) => tracing::debug!(reason = status.message(), "not measured"),
         }
     }
@@ -53,7 +49,7 @@ pub(crate) async fn measure_when_idle(shared: Arc<Shared>) {
 
 /// The next measurement for which there is an idle node.
 fn next(shared: &Shared) -> Option<(Wanted, NodeStatus)> {
-    let mut queue = shared.to_measure.lock();
+    let mut queue = shared.costs.wanted.lock();
     if !queue.is_quiet_for(IDLE_FOR) {
         return None;
     }
@@ -107,16 +103,15 @@ async fn measured(shared: &Shared, measurement: &MeasureCosts, events: &EventSen
         nodes.into_iter().rev().map(|node| (node.device_name.clone(), node)).collect();
     let mut all = Vec::new();
     for (device, node) in devices {
-        let known = match shared.costs.find(&device, measurement) {
-            Some(known) => known,
-            None => {
-                let detail = format!("{} measures its costs on {device}", node.node_name);
-                send_progress(events, SessionStage::Measuring, detail);
-                measured_on(shared, measurement, &node).await?
-            }
-        };
+        if let Some(known) = shared.costs.find(&device, measurement) {
+            all.push(known);
+            continue;
+        }
+        let detail = format!("{} measures its costs on {device}", node.node_name);
+        send_progress(events, SessionStage::Measuring, detail);
+        let known = measured_on(shared, measurement, &node).await?;
         if !known.is_settled {
-            shared.to_measure.lock().add(&device, measurement);
+            shared.costs.wanted.lock().add(&device, measurement);
         }
         all.push(known.measured);
     }
@@ -143,7 +138,7 @@ async fn measured_on(shared: &Shared, measurement: &MeasureCosts, node: &NodeSta
     }
     let idle_for = shared.with_scheduler(|scheduler| scheduler.idle_for(&node.node_name));
     let known = Known { measured, is_settled: was_idle(idle_for, start.elapsed()) };
-    shared.costs.insert(&node.device_name, measurement, known);
+    shared.costs.insert(&node.device_name, measurement, known.clone());
     Ok(known)
 }
 

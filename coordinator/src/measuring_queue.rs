@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use cluster::MeasureCosts;
 
-use crate::cost_cache::cache_key;
+use crate::cost_table::cache_key;
 
 /// Measurements that may wait; the oldest leave.
 const CAPACITY: usize = 32;
@@ -78,7 +78,7 @@ mod tests {
     use glam::UVec2;
 
     use super::*;
-    use crate::cost_cache::tests::measurement;
+    use crate::cost_table::tests::measurement;
 
     fn taken(queue: &mut MeasuringQueue, idle: &str) -> Option<(String, UVec2)> {
         let wanted = queue.take(|device| device == idle)?;

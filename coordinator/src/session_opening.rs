@@ -53,7 +53,7 @@ async fn measured_opening(
         workload = workload_of(&request, offer, density)?;
         measured = measured_workload(shared, &request, &workload, budgeted.as_ref(), events).await?;
     }
-    let Measured { costs, planes, auto_exposure, traced_pixel_count, shared_light } = measured;
+    let Measured { costs, planes, auto_exposure, traced_pixel_count, shared_light, .. } = measured;
     let note = if is_coarser { density_note(&workload, &request, full_set_s) } else { String::new() };
     let last_view_time_ratio = last_view_time_ratio(&request, &costs, shared_light.as_ref());
     // A cube serves views from anywhere: there are no cells to follow viewers.
@@ -99,6 +99,7 @@ async fn measured_workload(
         // Every tone costs the same.
         planes: ViewPlanes { tone: ToneMapping::NONE, ..request.planes },
         in_background: false,
+        budget: None,
     };
     let admits = || {
         let follows_viewers = !request.viewpoints.is_empty() && !workload.samples_cube();

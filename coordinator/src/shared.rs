@@ -11,8 +11,7 @@ use parking_lot::Mutex;
 use tokio::sync::Notify;
 
 use crate::config::{CoordinatorConfig, SceneOffers};
-use crate::cost_cache::CostCache;
-use crate::measuring_queue::MeasuringQueue;
+use crate::cost_table::CostTable;
 use crate::membership::MembershipRegistry;
 use crate::observers::Observers;
 use crate::schedule::{Command, Event, Scheduler};
@@ -24,9 +23,7 @@ pub(crate) struct Shared {
     pub(crate) connections: Connections,
     /// Costs are measured one session at a time.
     pub(crate) measuring: Arc<tokio::sync::Mutex<()>>,
-    /// Measurements that wait for idle nodes.
-    pub(crate) to_measure: Mutex<MeasuringQueue>,
-    pub(crate) costs: CostCache,
+    pub(crate) costs: CostTable,
     /// Measurements for budgets are read and written one after the other.
     pub(crate) keeping: tokio::sync::Mutex<()>,
     pub(crate) commands: CommandQueue,
@@ -47,8 +44,7 @@ impl Shared {
             offers,
             connections: Connections::default(),
             measuring: Arc::default(),
-            to_measure: Mutex::default(),
-            costs: CostCache::default(),
+            costs: CostTable::default(),
             keeping: tokio::sync::Mutex::default(),
             commands: CommandQueue::default(),
             membership: MembershipRegistry::default(),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use cluster::{MeasureCosts, ProbeViews, ProbedViews};
+use cluster::{MeasureCosts, Measured};
 use node::blocking;
 use planner::{
     Event as PlannerEvent, Kept, KeptKey, MAX_PROBE_VIEWS, ProbeId, Probed, RowCosts, Timed, median_costs,
@@ -104,7 +104,7 @@ async fn probed(shared: &Shared, probe: ViewProbe) -> Result<PlannerEvent, Statu
         }
     }
     let busy_s = answers.iter().flatten().map(|answer| answer.busy_s).sum();
-    let costs = |answers: &[ProbedViews]| median_costs(&answers.iter().map(row_costs).collect::<Vec<_>>());
+    let costs = |answers: &[Measured]| median_costs(&answers.iter().map(row_costs).collect::<Vec<_>>());
     if views.is_empty() {
         let rows = requests.iter().zip(&answers).map(|((row, _), answers)| (*row, costs(answers))).collect();
         return Ok(check(id, PlannerEvent::Timed(Timed { id, rows, busy_s })));
@@ -117,10 +117,11 @@ async fn probed(shared: &Shared, probe: ViewProbe) -> Result<PlannerEvent, Statu
     Ok(check(id, PlannerEvent::Probed(probed)))
 }
 
-async fn ask(node: &NodeClient, request: &ProbeViews, address: &str) -> Result<ProbedViews, Status> {
-    let answer = within(PROBED_WITHIN, "measuring views", node.probe_views(request.clone())).await;
+async fn ask(node: &NodeClient, request: &MeasureCosts, address: &str) -> Result<Measured, Status> {
+    let answer = within(PROBED_WITHIN, "measuring views", node.measure_costs(request.clone())).await;
     let answer = answer.map_err(|status| of_node(address, &status))?;
-    let wanted = if request.with_errors { request.views.len() } else { 0 };
+    let is_compared = request.budget.as_ref().is_some_and(|budget| budget.compared_lighting.is_some());
+    let wanted = if is_compared { request.typical_views.len() } else { 0 };
     match answer.views.len() == wanted {
         true => Ok(answer),
         false => {
@@ -142,7 +143,7 @@ fn is_refusal(status: &Status) -> bool {
     [Code::InvalidArgument, Code::Unimplemented, Code::OutOfRange].contains(&status.code())
 }
 
-fn row_costs(answer: &ProbedViews) -> RowCosts {
+fn row_costs(answer: &Measured) -> RowCosts {
     let costs = &answer.costs;
     RowCosts {
         sample_image_s: costs.sample_image_s,

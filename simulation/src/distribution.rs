@@ -1,19 +1,18 @@
-//! The distribution of views among compositors, and the receivers of images under a relay.
+//! The nodes that clients ask for views, and the receivers of images under a relay.
 
-use client::WorkStealing;
-use cluster::Assignment;
+use std::cmp::Reverse;
+
+use cluster::{Assignment, CompositorShare};
 
 use crate::planning::number_of;
 
-/// Nodes that make views, in the plan's order.
-pub(crate) fn compositors_of(plan: &Assignment) -> Vec<usize> {
-    plan.compositors.iter().filter_map(|share| number_of(&share.node_name)).collect()
-}
-
-/// The views of all sets, shared out as clients do.
-pub(crate) fn unrequested_views(plan: &Assignment, views: usize, sets: u32) -> WorkStealing {
-    let weights: Vec<u32> = plan.compositors.iter().map(|share| share.view_weight).collect();
-    WorkStealing::new((0..sets).map(|_| views), &weights)
+/// Nodes that make views of sets of `views`, as clients choose them: no more than a set has views, by their weights.
+pub(crate) fn compositors_of(plan: &Assignment, views: usize) -> Vec<(usize, u32)> {
+    let weighted = |share: &CompositorShare| Some((number_of(&share.node_name)?, share.view_weight));
+    let mut compositors: Vec<(usize, u32)> = plan.compositors.iter().filter_map(weighted).collect();
+    compositors.sort_by_key(|(_, weight)| Reverse(*weight));
+    compositors.truncate(views);
+    compositors
 }
 
 /// The receivers of each sampler's images, by node: all compositors, from the one behind it on, so that several samplers

@@ -14,6 +14,8 @@ mod run;
 mod world;
 
 #[cfg(test)]
+mod faults_tests;
+#[cfg(test)]
 mod tests;
 
 pub use cluster::{Calls, Cluster, Habits, Machine, Transfer, spread_speeds};

@@ -2,8 +2,6 @@
 
 use std::collections::VecDeque;
 
-use client::FlowControl;
-
 use crate::cluster::Machine;
 use crate::run::Busy;
 
@@ -70,14 +68,13 @@ pub(crate) struct Node {
     /// Messages that the node has not read: the set, and the views that have no credit yet.
     pub(crate) messages: VecDeque<(u32, usize)>,
     pub(crate) credit: usize,
-    /// The client's side: its flow control, and this node's place among the compositors.
-    pub(crate) flow: FlowControl,
+    /// This node's place among the compositors.
     pub(crate) place: usize,
     pub(crate) busy: Busy,
 }
 
 impl Node {
-    pub(crate) fn new(machine: Machine, sets: u32, (credit, view_s): (usize, f64)) -> Self {
+    pub(crate) fn new(machine: Machine, sets: u32, credit: usize) -> Self {
         Self {
             machine,
             urgent: VecDeque::new(),
@@ -90,7 +87,6 @@ impl Node {
             loading: vec![Loading::default(); sets as usize],
             messages: VecDeque::new(),
             credit,
-            flow: FlowControl::new(Some(view_s)),
             place: 0,
             busy: Busy::default(),
         }

@@ -64,7 +64,7 @@ struct Coordinator {
 pub fn plan(cluster: &Cluster, demand: &Demand) -> Result<SessionPlan, PlanError> {
     let mut coordinator = Coordinator::default();
     for (number, _) in cluster.machines.iter().enumerate() {
-        coordinator.tell(join(number));
+        coordinator.tell(joined(&name(number), number as u64 + 1, 0));
     }
     coordinator.tell(open(cluster, demand));
     if demand.nodes_report {
@@ -155,31 +155,41 @@ fn node_names(assignment: &Assignment) -> Vec<String> {
     names
 }
 
-fn join(number: usize) -> Event {
-    let node_name = name(number);
-    let address = format!("http://{node_name}");
-    let node = NodeStatus { node_name, address, device_name: "simulated".to_owned(), is_software: true };
-    Event::Joined { incarnation: number as u64 + 1, join: JoinCluster { node, plan_epoch: 0 } }
+/// A process of a node joins, which has seen plans up to an epoch.
+pub(crate) fn joined(node_name: &str, incarnation: u64, plan_epoch: u64) -> Event {
+    let address = format!("http://{node_name}:{incarnation}");
+    let node =
+        NodeStatus { node_name: node_name.to_owned(), address, device_name: "simulated".to_owned(), is_software: true };
+    Event::Joined { incarnation, join: JoinCluster { node, plan_epoch } }
 }
 
 fn open(cluster: &Cluster, demand: &Demand) -> Event {
     let slowest = cluster.machines.iter().fold(Costs::default(), |slowest, machine| slowest.max(machine.costs));
     Event::Opened(Box::new(Opening {
-        session: 1,
-        workload: workload(cluster.images, demand.sets),
-        method: "simulated".to_owned(),
         views_per_set: demand.views,
         policy_override: PolicyOverride { policy: demand.policy, forced_samplers: None, forced_tiles: demand.tiles },
+        ..opening(1, cluster.images, demand.sets, slowest)
+    }))
+}
+
+/// A session that asks for one view a set.
+pub(crate) fn opening(session: u64, images: usize, sets: u32, costs: Costs) -> Opening {
+    Opening {
+        session,
+        workload: workload(images, sets),
+        method: "simulated".to_owned(),
+        views_per_set: 1,
+        policy_override: PolicyOverride::default(),
         frames_per_s: None,
         fallbacks: Vec::new(),
         viewpoints: Vec::new(),
-        costs: slowest,
+        costs,
         auto_exposure: ExposureEv::ZERO,
         last_view_time_ratio: 1.0,
         shared_light: None,
         note: String::new(),
         budgeted: None,
-    }))
+    }
 }
 
 fn timings(machine: &Machine, image_bytes: f64) -> MeasuredCosts {

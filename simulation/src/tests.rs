@@ -168,7 +168,7 @@ fn unequal_nodes_are_planned_by_their_own_costs() {
     let cluster = Cluster { machines, images: 4, image_bytes: 1e6, frame_bytes: 1e5 };
     let known = Demand { nodes_report: true, ..demand(PolicyChoice::Pipeline, 1000, 16) };
     let ran = ran(&cluster, &known, Habits::default());
-    assert_eq!(ran.limit(), Limit::Views, "fast nodes steal from slow ones");
+    assert_eq!(ran.limit(), Limit::Views, "fast nodes make more views than slow ones");
     let nodes: Vec<_> =
         cluster.machines.iter().map(|machine| NodeCosts { costs: machine.costs, transfer_image_s: None }).collect();
     let samplers = plan(&cluster, &known).unwrap().assignment.samplers;

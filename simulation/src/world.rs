@@ -6,13 +6,12 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::ops::Range;
 
-use client::WorkStealing;
+use client::ViewQueue;
 use cluster::{Assignment, Policy, SessionPlan};
 
 use crate::cluster::{Cluster, Habits, Machine, Transfer};
-use crate::distribution::{compositors_of, receivers, unrequested_views};
+use crate::distribution::{compositors_of, receivers};
 use crate::node::{Job, Node, Parcel, Sampled};
 use crate::planning::number_of;
 use crate::run::Run;
@@ -37,10 +36,9 @@ struct World<'a> {
     habits: Habits,
     sets: u32,
     nodes: Vec<Node>,
-    /// Views of a set.
-    views: usize,
-    unrequested: WorkStealing,
-    /// Nodes that make views, in the plan's order.
+    /// Views that no compositor has been asked for.
+    unrequested: ViewQueue<()>,
+    /// Nodes that make views, in the order of their places.
     compositors: Vec<usize>,
     /// The receivers of each node's images under a relay; none for nodes that do not sample.
     receivers: Vec<Vec<usize>>,
@@ -69,37 +67,41 @@ pub fn run(cluster: &Cluster, plan: &SessionPlan, views: usize, sets: u32, habit
 impl<'a> World<'a> {
     fn new(cluster: &'a Cluster, plan: &'a SessionPlan, views: usize, sets: u32, habits: Habits) -> Self {
         let (view_s, plan) = (plan.view_s(), &plan.assignment);
-        let compositors = compositors_of(plan);
+        let weighted = compositors_of(plan, views);
+        let weights: Vec<u32> = weighted.iter().map(|(_, weight)| *weight).collect();
+        let mut unrequested = ViewQueue::new(&weights, view_s);
+        (0..sets).for_each(|set| unrequested.push(set, vec![(0, ()); views]));
+        let compositors = weighted.into_iter().map(|(node, _)| node).collect();
         let relayed = plan.relay_fanout.map(|fanout| Transfer::Relay(fanout.get() as usize));
         let habits = Habits { transfer: relayed.unwrap_or(habits.transfer), ..habits };
-        let node = |machine| Node::new(machine, sets, (habits.credit_views, view_s));
+        let node = |machine| Node::new(machine, sets, habits.credit_views);
         let nodes: Vec<Node> = cluster.machines.iter().copied().map(node).collect();
-        let (unrequested, due) = (unrequested_views(plan, views, sets), vec![(views, 0.0); sets as usize]);
-        let (receivers, scheduled) = (Vec::new(), BinaryHeap::new());
         Self {
             cluster,
             plan,
             habits,
             sets,
             nodes,
-            views,
             unrequested,
             compositors,
-            receivers,
+            receivers: Vec::new(),
             now_s: 0.0,
-            scheduled,
+            scheduled: BinaryHeap::new(),
             events: 0,
-            due,
+            due: vec![(views, 0.0); sets as usize],
         }
     }
 
-    /// Sends the client's first messages. A compositor without a view of any set is not asked, and loads nothing.
+    /// Sends the client's first messages. A compositor that is left without a view is not asked, and loads nothing.
     fn begin(&mut self) {
-        for (place, node) in self.compositors.clone().into_iter().enumerate() {
+        for (place, &node) in self.compositors.iter().enumerate() {
             self.nodes[node].place = place;
-            while let Some(most) = self.nodes[node].flow.room() {
-                let Some(views) = self.unrequested.take_local(place, most) else { break };
-                self.send_message(node, views);
+        }
+        let mut has_sent = true;
+        while has_sent {
+            has_sent = false;
+            for node in self.compositors.clone() {
+                has_sent |= self.send_message(node);
             }
         }
         let requested: Vec<usize> =
@@ -108,19 +110,19 @@ impl<'a> World<'a> {
         requested.into_iter().for_each(|node| self.advance(node));
     }
 
-    fn send_message(&mut self, node: usize, views: Range<usize>) {
-        let set = (views.start / self.views) as u32;
-        self.nodes[node].flow.sent(views.len());
-        self.nodes[node].messages.push_back((set, views.len()));
+    /// Sends the next message to a compositor, if there is room for one.
+    fn send_message(&mut self, node: usize) -> bool {
+        let message = self.unrequested.next_message(self.nodes[node].place);
+        let sent = message.map(|message| (message.set_index, message.views.len()));
+        self.nodes[node].messages.extend(sent);
+        sent.is_some()
     }
 
     /// The client receives frames, and requests more where there is room.
     fn client_received(&mut self, node: usize, views: usize) {
-        (0..views).for_each(|_| self.nodes[node].flow.received(self.now_s, false));
-        while let Some(most) = self.nodes[node].flow.room() {
-            let Some(views) = self.unrequested.take(self.nodes[node].place, most) else { break };
-            self.send_message(node, views);
-        }
+        let place = self.nodes[node].place;
+        (0..views).for_each(|_| self.unrequested.received(place, self.now_s, false));
+        while self.send_message(node) {}
     }
 
     /// Bytes of an image, or of one of the tiles that the plan cuts it into.

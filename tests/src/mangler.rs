@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use cluster::{ApplyPlan, FetchImages, MeasureCosts, Measured, ProbeViews, ProbedViews, Ready, RenderViews};
+use cluster::{ApplyPlan, FetchImages, MeasureCosts, Measured, Ready, RenderViews};
 use codec::{Chunk, FramePart};
 use node::{ServeError, serve};
 use parking_lot::Mutex;
@@ -137,10 +137,6 @@ impl Sampler for Front {
 impl Node for Front {
     async fn measure_costs(&self, request: MeasureCosts) -> Result<Measured, Status> {
         NodeClient::new(connect(&self.node()).await?).measure_costs(request).await
-    }
-
-    async fn probe_views(&self, request: ProbeViews) -> Result<ProbedViews, Status> {
-        NodeClient::new(connect(&self.node()).await?).probe_views(request).await
     }
 
     async fn apply_assignment(&self, plan: ApplyPlan) -> Result<Ready, Status> {

@@ -134,7 +134,7 @@ fn a_plan_for_the_audited_viewpoints_follows_a_broken_promise() {
     cluster.wait(100);
     let probes = &cluster.probes[before..];
     assert!(!probes.is_empty(), "planned again");
-    let views: Vec<&PinholeCamera> = probes.iter().flat_map(|p| &p.requests[0].1.views).collect();
+    let views: Vec<&PinholeCamera> = probes.iter().flat_map(|p| &p.requests[0].1.typical_views).collect();
     let of_audited: Vec<f32> =
         views.iter().copied().filter(|view| is_audited_place(view)).map(|view| view.eye_in_world.x).collect();
     let share = of_audited.len() as f64 / views.len() as f64;

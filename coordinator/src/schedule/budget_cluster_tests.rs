@@ -162,7 +162,7 @@ impl Cluster {
             return PlannerEvent::Timed(Timed { id, rows, busy_s });
         }
         let (row, request) = &probe.requests[0];
-        assert_eq!(request.views.len(), probe.views.len());
+        assert_eq!(request.typical_views.len(), probe.views.len());
         let of = errors(&rows()[*row]);
         let of = ViewErrors { flip: of.flip * self.error_scale, ..of };
         let views = probe.views.iter().map(|view| (*view, of)).collect();

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cluster::{InvalidField, MeasureCosts, ProbeViews, SceneHash, Workload};
+use cluster::{BudgetMeasurement, InvalidField, MeasureCosts, SceneHash, Workload};
 use depth_image::{Antialias, PinholeCamera, ViewCell, ViewPlanes};
 use glam::{DVec3, Vec3};
 use planner::{
@@ -71,7 +71,7 @@ pub struct ViewProbe {
     /// Views that are compared, in the order of the request; none where rows are only timed.
     pub views: Vec<ProbeView>,
     /// Each row's place in the ladder, and its request. They are timed in turn.
-    pub requests: Vec<(usize, ProbeViews)>,
+    pub requests: Vec<(usize, MeasureCosts)>,
     /// How often they are timed.
     pub repeats: usize,
 }
@@ -271,16 +271,12 @@ impl BudgetPlan {
         })
     }
 
-    fn request(&self, row: usize, views: &[ProbeView], compared: Option<&String>) -> Option<ProbeViews> {
+    fn request(&self, row: usize, views: &[ProbeView], compared: Option<&String>) -> Option<MeasureCosts> {
         let row = self.budgeted.rows.get(row)?;
-        Some(ProbeViews {
-            workload: self.budgeted.sampled_as(row, &self.workload, &self.cells),
-            method: row.method.clone(),
-            compared_lighting: compared.unwrap_or(&self.workload.lighting).clone(),
-            views: views.iter().map(|&view| self.camera(view)).collect(),
-            antialias: self.budgeted.antialias(),
-            with_errors: compared.is_some(),
-        })
+        let budget = BudgetMeasurement { compared_lighting: compared.cloned() };
+        let workload = self.budgeted.sampled_as(row, &self.workload, &self.cells);
+        let typical_views = views.iter().map(|&view| self.camera(view)).collect();
+        Some(MeasureCosts { budget: Some(budget), typical_views, ..self.measurement_of(row, workload) })
     }
 
     /// The camera of a view: one of a cell or, every other time, one of the audited viewpoints.
@@ -326,14 +322,19 @@ impl BudgetPlan {
     /// The measurement before a row is in force: its costs alone, tiles included.
     pub(super) fn measurement(&self, row: &Row) -> MeasureCosts {
         let workload = self.budgeted.sampled_as(row, &self.workload, &self.cells);
+        self.measurement_of(row, workload.of_cell(0).unwrap_or(workload))
+    }
+
+    fn measurement_of(&self, row: &Row, workload: Workload) -> MeasureCosts {
         MeasureCosts {
-            workload: workload.of_cell(0).unwrap_or(workload),
+            workload,
             method: row.method.clone(),
             codec: self.budgeted.codec.clone(),
             typical_views: vec![self.budgeted.typical_view],
             batch_count: (self.views_per_set as u32).clamp(1, MEASURED_BATCH),
             planes: ViewPlanes { antialias: self.budgeted.antialias(), ..ViewPlanes::COLOR },
             in_background: true,
+            budget: None,
         }
     }
 }

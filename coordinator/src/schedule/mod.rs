@@ -52,8 +52,6 @@ mod cells_tests;
 #[cfg(test)]
 mod fault_tests;
 #[cfg(test)]
-mod simulated_cluster;
-#[cfg(test)]
 mod test_support;
 #[cfg(test)]
 mod workloads_tests;

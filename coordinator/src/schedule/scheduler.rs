@@ -27,7 +27,7 @@ use super::workload_state::WorkloadState;
 use super::{Command, Event};
 
 /// Workloads that may be open, unless an event says otherwise.
-const MAX_WORKLOADS: usize = 8;
+const DEFAULT_MAX_WORKLOADS: usize = 8;
 
 /// Sessions of a coordinator before open again within this time.
 const RESUMED_WITHIN: Duration = Duration::from_secs(30);
@@ -65,7 +65,7 @@ impl Default for Scheduler {
             now: Duration::ZERO,
             plan_epoch: 0,
             last_workload: 0,
-            max_workloads: MAX_WORKLOADS,
+            max_workloads: DEFAULT_MAX_WORKLOADS,
             members: BTreeMap::new(),
             workloads: BTreeMap::new(),
             budgets: BTreeMap::new(),
@@ -225,36 +225,6 @@ impl Scheduler {
         commands.extend(self.reevaluate_all());
         commands.extend(self.probe_liveness());
         commands
-    }
-}
-
-/// For tests of the whole schedule.
-#[cfg(test)]
-impl Scheduler {
-    /// Whether a plan in force was made for this node, with or without a role.
-    pub(in crate::schedule) fn plans_with(&self, plan_epoch: u64, name: &str) -> bool {
-        let plan = self.workload_of_plan(plan_epoch).and_then(|number| self.active_plan(number));
-        plan.is_some_and(|active| active.members.contains_key(name))
-    }
-
-    /// The workload whose plan in force has this epoch.
-    pub(in crate::schedule) fn number_of_plan(&self, plan_epoch: u64) -> Option<u64> {
-        self.workload_of_plan(plan_epoch)
-    }
-
-    /// The nodes of each workload.
-    pub(in crate::schedule) fn nodes_of_workloads(&self) -> BTreeMap<u64, std::collections::BTreeSet<String>> {
-        self.workloads.iter().map(|(&number, workload)| (number, workload.nodes.clone())).collect()
-    }
-
-    pub(in crate::schedule) fn is_divided_evenly(&self) -> bool {
-        !self.node_shares().is_uneven()
-    }
-
-    /// Workloads that are not idle, and their weights.
-    pub(in crate::schedule) fn weights_of_workloads(&self) -> BTreeMap<u64, f64> {
-        let weights = self.node_shares().claims.into_iter().map(|claim| claim.weight);
-        self.workloads.keys().copied().zip(weights).filter(|(_, weight)| *weight > 0.0).collect()
     }
 }
 

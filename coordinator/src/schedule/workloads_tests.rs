@@ -25,7 +25,9 @@ impl Cluster {
     }
 
     fn nodes(&self, number: u64) -> BTreeSet<String> {
-        self.scheduler.nodes_of_workloads()[&number].clone()
+        let workloads = self.workloads();
+        let workload = workloads.iter().find(|workload| workload.number == number).expect("a workload");
+        workload.conditions.iter().map(|node| node.node_name.clone()).collect()
     }
 
     /// All plans are taken, and half seconds pass, in which nodes work for these workloads.

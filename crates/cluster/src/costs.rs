@@ -109,6 +109,26 @@ impl Costs {
     }
 }
 
+/// The time of a view of so many pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs, reason = "self-naming fields")]
+pub struct TimedSize {
+    pub pixels: f64,
+    pub seconds: f64,
+}
+
+impl TimedSize {
+    /// The time of a view of `pixels`: a part that every view takes, and a part for each pixel. Another size tells them apart;
+    /// without one, all is for the pixels.
+    #[must_use]
+    pub fn at_size(self, other: Option<Self>, pixels: f64) -> f64 {
+        let slope = other.map(|other| (other.seconds - self.seconds) / (other.pixels - self.pixels));
+        // Timings vary: neither part is negative.
+        let pixel_s = slope.unwrap_or(f64::INFINITY).clamp(0.0, self.seconds / self.pixels);
+        self.seconds + pixel_s * (pixels - self.pixels)
+    }
+}
+
 /// A node's own timings of one report, the mean of each operation; `None` for what it did not do.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct MeasuredCosts {

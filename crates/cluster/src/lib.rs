@@ -36,12 +36,13 @@ pub use check::{
     InvalidField, at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints,
 };
 pub use common_cell::{CommonCell, CommonKind};
-pub use costs::{Costs, MeasuredCosts, ROW_PARTS, TileCosts};
+pub use costs::{Costs, MeasuredCosts, ROW_PARTS, TileCosts, TimedSize};
 pub use node::{
-    JoinCluster, MeasureCosts, Measured, NodeStatus, Ready, SamplerReport, SharedLightCosts, Welcome, WorkReport,
+    BudgetMeasurement, JoinCluster, MeasureCosts, Measured, NodeStatus, Ready, SamplerReport, SharedLightCosts,
+    Welcome, WorkReport,
 };
 pub use policy::{Policy, PolicyChoice, UnknownPolicy};
-pub use probing::{ProbeViews, ProbedView, ProbedViews};
+pub use probing::ProbedView;
 pub use promise::{BudgetRequest, Promise, PromiseState};
 pub use scene::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, ScenePart, SceneRef};
 pub use session::{ChangeSession, Quality, SessionEvent, SessionPlan, SessionRequest, SessionStage};

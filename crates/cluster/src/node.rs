@@ -8,6 +8,7 @@ use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text
 use crate::check_seconds;
 use crate::costs::{Costs, MeasuredCosts};
 use crate::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
+use crate::probing::ProbedView;
 use crate::scene::SceneRef;
 use crate::views::check_view_size;
 use crate::workload::{SamplePlanes, Workload};
@@ -69,6 +70,16 @@ pub struct MeasureCosts {
     pub planes: ViewPlanes,
     /// Nobody waits for it: all other work goes first.
     pub in_background: bool,
+    /// Only samples and views are measured, for a budget.
+    pub budget: Option<BudgetMeasurement>,
+}
+
+/// A measurement of a representation, of which each typical view is made from its own view cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BudgetMeasurement {
+    /// The light in which views are compared with directly drawn ones; `None`: the representation is timed alone, and nothing of
+    /// earlier calls is used.
+    pub compared_lighting: Option<String>,
 }
 
 impl MeasureCosts {
@@ -91,6 +102,9 @@ impl MeasureCosts {
         at_most(self.typical_views.len(), MAX_BATCH as usize, "typical_views")?;
         let first = self.typical_views.first().ok_or(InvalidField::Missing { field: "typical_views" })?;
         check_view_size(first.size_px, "typical_views.size_px")?;
+        for view in &self.typical_views {
+            view.validate().map_err(|source| InvalidField::Camera { field: "typical_views", source })?;
+        }
         match self.typical_views.iter().find(|view| view.size_px != first.size_px) {
             Some(other) => Err(InvalidField::out_of_range("typical_views", other.size_px, "all of one size")),
             None => Ok(()),
@@ -99,7 +113,7 @@ impl MeasureCosts {
 }
 
 /// What a node has measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Measured {
     /// Seconds of each operation.
     pub costs: Costs,
@@ -111,6 +125,20 @@ pub struct Measured {
     pub traced_pixel_count: Option<u32>,
     /// The parts of a view whose light comes from samples; `None` by another method.
     pub shared_light: Option<SharedLightCosts>,
+    /// The errors of the typical views, where they were compared, in their order.
+    pub views: Vec<ProbedView>,
+    /// The node's time for a budget's measurement, in s.
+    pub busy_s: f64,
+}
+
+impl Measured {
+    /// # Errors
+    /// For values that no peer may send.
+    pub fn validate(&self) -> Result<(), InvalidField> {
+        self.costs.validate()?;
+        self.views.iter().try_for_each(ProbedView::validate)?;
+        finite_seconds(self.busy_s, "busy_s")
+    }
 }
 
 /// Where the time of a view goes whose light comes from samples.

@@ -3,7 +3,7 @@
 
 use std::fmt::Display;
 
-use cluster::{Costs, DIRECT, MeasureCosts, Measured, ROW_PARTS, SharedLightCosts, TileCosts, Workload};
+use cluster::{Costs, DIRECT, MeasureCosts, Measured, ROW_PARTS, SharedLightCosts, TileCosts, TimedSize, Workload};
 use codec::{DecodeLimits, EncodedImage, FrameCodec};
 use codec::{decode_sample_image, encode_sample_image, encode_view};
 use depth_image::{PinholeCamera, SampleCamera, SampleImage, View};
@@ -58,23 +58,6 @@ struct Reconstruction {
     made: Vec<View>,
     view_s: f64,
     shared_light: Option<SharedLightCosts>,
-}
-
-/// The time of a view of so many pixels.
-#[derive(Debug, Clone, Copy)]
-struct TimedSize {
-    pixels: f64,
-    seconds: f64,
-}
-
-impl TimedSize {
-    /// The time of a view of `pixels_ratio` times the pixels: a part is the same for all sizes, and a part for each pixel.
-    fn extended(self, larger: Self, pixels_ratio: f64) -> f64 {
-        let a_pixel_s = (larger.seconds - self.seconds) / (larger.pixels - self.pixels);
-        // Timings vary: neither part is negative.
-        let a_pixel_s = a_pixel_s.clamp(0.0, self.seconds / self.pixels);
-        self.seconds + a_pixel_s * self.pixels * (pixels_ratio - 1.0)
-    }
 }
 
 /// A measurement with smaller images and views, whose times are in proportion to their pixels.
@@ -221,7 +204,7 @@ impl Measurement<'_> {
         let costs =
             Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, in_order, tiles };
         let auto_exposure = auto_exposure(engine, workload, self.turn)?;
-        Ok(Measured { costs, planes, auto_exposure, traced_pixel_count: None, shared_light })
+        Ok(Measured { costs, planes, auto_exposure, shared_light, ..Measured::default() })
     }
 
     /// The cost of one view, and where it goes. Small views take longer than their share of the pixels: from views of two sizes follows
@@ -234,8 +217,8 @@ impl Measurement<'_> {
         };
         let (_, larger_s) = self.reconstruct_view_s(set, &larger.request)?;
         let small = TimedSize { pixels: resized.view_pixels(), seconds: small_s };
-        let full_s =
-            small.extended(TimedSize { pixels: larger.view_pixels(), seconds: larger_s }, resized.pixels_ratio);
+        let larger_size = TimedSize { pixels: larger.view_pixels(), seconds: larger_s };
+        let full_s = small.at_size(Some(larger_size), small.pixels * resized.pixels_ratio);
         let view_s = full_s / resized.pixels_ratio;
         let parts = self.shared_light(set, &larger.request, larger_s)?;
         let shared_light = parts.filter(|_| larger_s > 0.0).map(|parts| parts.scaled(view_s / larger_s));

@@ -172,6 +172,7 @@ pub(crate) fn request(batch_count: u32) -> MeasureCosts {
         batch_count,
         planes: ViewPlanes::default(),
         in_background: false,
+        budget: None,
     }
 }
 
@@ -277,9 +278,9 @@ fn the_overhead_of_a_tile_follows_from_tiles_of_two_heights() {
 #[test]
 fn two_sizes_tell_what_every_view_takes_from_what_a_pixel_takes() {
     let at = |pixels: f64| TimedSize { pixels, seconds: 0.04 + 1e-6 * pixels };
-    assert!((at(3_600.0).extended(at(14_400.0), 64.0) - at(230_400.0).seconds).abs() < 1e-9);
+    assert!((at(3_600.0).at_size(Some(at(14_400.0)), 230_400.0) - at(230_400.0).seconds).abs() < 1e-9);
     let slower = TimedSize { pixels: 3_600.0, seconds: 0.1 };
-    assert_eq!(slower.extended(at(14_400.0), 64.0), 0.1, "a larger view that was timed faster");
+    assert_eq!(slower.at_size(Some(at(14_400.0)), 230_400.0), 0.1, "a larger view that was timed faster");
     let faster = TimedSize { pixels: 3_600.0, seconds: 0.001 };
-    assert!((faster.extended(at(14_400.0), 64.0) - 0.064).abs() < 1e-9, "no more than in proportion");
+    assert!((faster.at_size(Some(at(14_400.0)), 230_400.0) - 0.064).abs() < 1e-9, "no more than in proportion");
 }

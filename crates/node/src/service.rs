@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use cluster::{ApplyPlan, Assignment, MeasureCosts, Measured, ProbeViews, ProbedViews, Ready};
+use cluster::{ApplyPlan, Assignment, BudgetMeasurement, MeasureCosts, Measured, Ready};
 use depth_image::ViewPlanes;
 use parking_lot::Mutex;
 use tonic::{Status, async_trait};
@@ -51,13 +51,26 @@ impl NodeService {
         let (engine, request) = (self.scenes.engine(), request.clone());
         blocking(move || measure_costs(engine.as_ref(), &request)).await
     }
+
+    async fn measure_for_budget(&self, request: MeasureCosts, budget: BudgetMeasurement) -> Result<Measured, Status> {
+        let planes = ViewPlanes { inverse_depth: true, ..request.planes };
+        self.quotas.check_views(&request.typical_views, planes)?;
+        // A call that is cancelled is measured to its end, before the next.
+        let probes = self.probes.clone().lock_owned().await;
+        self.scenes.ensure(&request.workload.scene).await?;
+        blocking(move || probes.probe(&request, &budget)).await
+    }
 }
 
 #[async_trait]
 impl rpc::Node for NodeService {
     async fn measure_costs(&self, request: MeasureCosts) -> Result<Measured, Status> {
+        if let Some(budget) = request.budget.clone() {
+            return self.measure_for_budget(request, budget).await;
+        }
         request.typical_views.iter().try_for_each(|view| self.quotas.check_view(view, request.planes))?;
-        let known = self.measured.lock().iter().find(|(known, _)| *known == request).map(|(_, measured)| *measured);
+        let known =
+            self.measured.lock().iter().find(|(known, _)| *known == request).map(|(_, measured)| measured.clone());
         // What is measured in the background was measured before, beside other work.
         if let Some(measured) = known.filter(|_| !request.in_background) {
             return Ok(measured);
@@ -71,20 +84,11 @@ impl rpc::Node for NodeService {
         let request = MeasureCosts { in_background: false, ..request };
         let mut cached = self.measured.lock();
         cached.retain(|(known, _)| *known != request);
-        cached.push_back((request, measured));
+        cached.push_back((request, measured.clone()));
         while cached.len() > MAX_MEASURED {
             cached.pop_front();
         }
         Ok(measured)
-    }
-
-    async fn probe_views(&self, request: ProbeViews) -> Result<ProbedViews, Status> {
-        let planes = ViewPlanes { antialias: request.antialias, inverse_depth: true, ..ViewPlanes::COLOR };
-        self.quotas.check_views(&request.views, planes)?;
-        // A call that is cancelled is measured to its end, before the next.
-        let probes = self.probes.clone().lock_owned().await;
-        self.scenes.ensure(&request.workload.scene).await?;
-        blocking(move || probes.probe(&request)).await
     }
 
     async fn apply_assignment(&self, plan: ApplyPlan) -> Result<Ready, Status> {

@@ -3,7 +3,7 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use cluster::{ProbeViews, ProbedView, ProbedViews};
+use cluster::{BudgetMeasurement, MeasureCosts, Measured, ProbedView};
 use depth_image::{DepthImage, ViewPart};
 use tonic::Status;
 
@@ -11,11 +11,11 @@ use crate::engine::{DirectWork, SharedSet, ViewWork};
 
 /// Measures views, after all other work of the device. Calls block.
 pub trait ViewProbes: Send + Sync + 'static {
-    /// The errors of views, and their costs.
+    /// Measures a representation in the way of a budget.
     ///
     /// # Errors
     /// The device fails, or refuses the representation.
-    fn probe(&self, request: &ProbeViews) -> Result<ProbedViews, Status>;
+    fn probe(&self, request: &MeasureCosts, budget: &BudgetMeasurement) -> Result<Measured, Status>;
 
     /// The errors of one view, or of a part of it, that is made again and drawn directly, and the seconds that this took without waits.
     ///

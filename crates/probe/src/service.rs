@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use cluster::{Costs, ProbeViews, ProbedView, ProbedViews};
+use cluster::{BudgetMeasurement, Costs, MeasureCosts, Measured, ProbedView};
 use depth_image::{PinholeCamera, VIEW_REACH_PX, ViewPlanes};
 use metrics::FLIP_REACH_PX;
 use node::{Engine, EngineError, Turn, ViewAudit, ViewProbes, WorkClass, own_time};
@@ -44,18 +44,18 @@ impl Probers {
 }
 
 impl ViewProbes for Probers {
-    fn probe(&self, request: &ProbeViews) -> Result<ProbedViews, Status> {
+    fn probe(&self, request: &MeasureCosts, budget: &BudgetMeasurement) -> Result<Measured, Status> {
         let mut probers = self.probers.lock();
         // Work that arrives meanwhile goes between slices of a measurement that nobody waits for.
         let _cut = self.engine.live_stream();
-        let mut prober = self.taken(&mut probers, subject_of(request));
-        let (measured, busy_s) = prober.busy(|prober| measured(prober, request));
+        let mut prober = self.taken(&mut probers, subject_of(request, budget));
+        let (measured, busy_s) = prober.busy(|prober| measured(prober, request, budget));
         probers.push_back(prober);
         while probers.len() > MAX_SUBJECTS {
             probers.pop_front();
         }
         let (views, costs) = measured?;
-        Ok(ProbedViews { views: views.into_iter().map(probed).collect(), costs, busy_s })
+        Ok(Measured { costs, views: views.into_iter().map(probed).collect(), busy_s, ..Measured::default() })
     }
 
     fn audit(&self, audit: ViewAudit) -> Result<(ProbedView, f64), Status> {
@@ -86,21 +86,25 @@ fn not_one_view() -> ProbeError {
 }
 
 /// The errors of the views in their order, and the mean costs of their cells.
-fn measured(prober: &mut Prober, request: &ProbeViews) -> Result<(Vec<ViewErrors>, Costs), Status> {
+fn measured(
+    prober: &mut Prober,
+    request: &MeasureCosts,
+    budget: &BudgetMeasurement,
+) -> Result<(Vec<ViewErrors>, Costs), Status> {
     let mut of_cells: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    for (place, view) in request.views.iter().enumerate() {
+    for (place, view) in request.typical_views.iter().enumerate() {
         of_cells.entry(request.workload.cell_of(view)).or_default().push(place);
     }
-    let (mut errors, mut costs) = (vec![None; request.views.len()], Costs::default());
+    let (mut errors, mut costs) = (vec![None; request.typical_views.len()], Costs::default());
     for (cell, places) in of_cells {
-        let cameras: Vec<PinholeCamera> = places.iter().map(|&place| request.views[place]).collect();
+        let cameras: Vec<PinholeCamera> = places.iter().map(|&place| request.typical_views[place]).collect();
         let of = representation(request, cell)?;
-        let (own_errors, own) = if request.with_errors {
+        let (own_errors, own) = if budget.compared_lighting.is_some() {
             prober.probe(&of, Light::Screening, &cameras).map_err(status)?
         } else {
             (Vec::new(), prober.time(&of, &cameras).map_err(status)?)
         };
-        add(&mut costs, &own, cameras.len() as f64 / request.views.len() as f64);
+        add(&mut costs, &own, cameras.len() as f64 / request.typical_views.len() as f64);
         places.iter().zip(own_errors).for_each(|(&place, own)| errors[place] = Some(own));
     }
     Ok((errors.into_iter().flatten().collect(), costs))
@@ -112,7 +116,7 @@ fn add(costs: &mut Costs, own: &RowCosts, share: f64) {
     costs.reconstruct_view_s += share * own.reconstruct_view_s;
 }
 
-fn representation(request: &ProbeViews, cell: u32) -> Result<Representation, Status> {
+fn representation(request: &MeasureCosts, cell: u32) -> Result<Representation, Status> {
     let workload = request.workload.of_cell(cell as usize);
     let workload = workload.ok_or_else(|| Status::invalid_argument(format!("views: there is no view cell {cell}")))?;
     let of_views = || Status::invalid_argument("sample_cameras: budgets choose among depth images alone");
@@ -124,17 +128,17 @@ fn representation(request: &ProbeViews, cell: u32) -> Result<Representation, Sta
     })
 }
 
-fn subject_of(request: &ProbeViews) -> Subject {
-    let ProbeViews { workload, compared_lighting, antialias, .. } = request;
+fn subject_of(request: &MeasureCosts, budget: &BudgetMeasurement) -> Subject {
+    let workload = &request.workload;
     Subject {
         scene_hash: workload.scene.hash.to_string(),
         volume: workload.volume,
         background: workload.background,
         illumination: workload.illumination.clone(),
         lighting: workload.lighting.clone(),
-        screening_lighting: compared_lighting.clone(),
+        screening_lighting: budget.compared_lighting.as_ref().unwrap_or(&workload.lighting).clone(),
         scene_time_s: workload.timeline.start_s as f32,
-        planes: ViewPlanes { antialias: *antialias, ..ViewPlanes::COLOR },
+        planes: ViewPlanes { antialias: request.planes.antialias, ..ViewPlanes::COLOR },
     }
 }
 

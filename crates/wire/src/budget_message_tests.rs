@@ -1,8 +1,8 @@
 //! Messages of probes and audits: bad ones are refused with the field's name, good ones come back as they were.
 
 use cluster::limits::MAX_PROBE_VIEWS;
-use cluster::{Assignment, ProbeViews, ProbedView, ProbedViews, WorkReport};
-use depth_image::Antialias;
+use cluster::{Assignment, BudgetMeasurement, MeasureCosts, Measured, ProbedView, WorkReport};
+use depth_image::{Antialias, ViewPlanes};
 
 use crate::message_tests::{
     assignment, camera, probed_view, read, refusal, session_plan, to_message, work_report, workload,
@@ -33,22 +33,26 @@ fn bad_audits_are_refused_by_field() {
 
 #[test]
 fn probes_survive_the_round_trip_and_impossible_ones_are_refused_by_field() {
-    let probe = |views: usize| ProbeViews {
+    let probe = |views: usize| MeasureCosts {
         workload: workload(),
         method: "joint_carve".to_owned(),
-        compared_lighting: "phong".to_owned(),
-        views: vec![camera(); views],
-        antialias: Antialias::MOST,
-        with_errors: true,
+        codec: "lz4".to_owned(),
+        typical_views: vec![camera(); views],
+        batch_count: 1,
+        planes: ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::COLOR },
+        in_background: true,
+        budget: Some(BudgetMeasurement { compared_lighting: (views > 1).then(|| "phong".to_owned()) }),
     };
-    let sent = |probe: ProbeViews| read::<ProbeViews, _>(to_message::<proto::ProbeViewsRequest, _>(probe));
+    let sent = |probe: MeasureCosts| read::<MeasureCosts, _>(to_message::<proto::MeasureCostsRequest, _>(probe));
+    assert_eq!(sent(probe(1)), Ok(probe(1)));
     assert_eq!(sent(probe(MAX_PROBE_VIEWS)), Ok(probe(MAX_PROBE_VIEWS)));
     for views in [0, MAX_PROBE_VIEWS + 1] {
         assert!(sent(probe(views)).unwrap_err().to_string().contains("views"));
     }
     let view = probed_view();
-    let answer = |view| ProbedViews { views: vec![view; 2], costs: session_plan().costs, busy_s: 0.2 };
-    let answered = |answer| read::<ProbedViews, _>(to_message::<proto::ProbeViewsResponse, _>(answer));
+    let costs = session_plan().costs;
+    let answer = |view| Measured { costs, views: vec![view; 2], busy_s: 0.2, ..Measured::default() };
+    let answered = |answer| read::<Measured, _>(to_message::<proto::MeasureCostsResponse, _>(answer));
     assert_eq!(answered(answer(view)), Ok(answer(view)));
     for flip in [f64::NAN, -0.1, 1.1] {
         assert!(answered(answer(ProbedView { flip, ..view })).unwrap_err().to_string().contains("flip_ratio"));

@@ -4,7 +4,7 @@ use cluster::InvalidField;
 use tonic::Status;
 
 /// Rises whenever the meaning of a message changes: programs that join a cluster must have the coordinator's.
-pub const PROTOCOL_VERSION: u32 = 10;
+pub const PROTOCOL_VERSION: u32 = 11;
 
 /// A message that cannot be converted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -665,6 +665,7 @@ fn typical_views_of_several_sizes_or_none_are_refused() {
         batch_count: 5,
         planes: ViewPlanes::default(),
         in_background: true,
+        budget: None,
     };
     let sent = |measure: MeasureCosts| read::<MeasureCosts, _>(to_message::<proto::MeasureCostsRequest, _>(measure));
     let three = measure(vec![view(8); 3]);
@@ -682,9 +683,10 @@ fn a_measured_exposure_survives_within_its_limits() {
     let planes = SamplePlanes { light: true, ..SamplePlanes::default() };
     let traced_pixel_count = Some(1 << 20);
     let shared_light = Some(SharedLightCosts { known_ratio: 0.9, surfaces_s: 0.1, look_up_s: 0.02, unknown_s: 0.3 });
-    let measured = Measured { costs: session_plan().costs, planes, auto_exposure, traced_pixel_count, shared_light };
-    let message = to_message::<proto::MeasureCostsResponse, _>(measured);
-    assert_eq!(read::<Measured, _>(message), Ok(measured));
+    let costs = session_plan().costs;
+    let measured = Measured { costs, planes, auto_exposure, traced_pixel_count, shared_light, ..Measured::default() };
+    let message = to_message::<proto::MeasureCostsResponse, _>(measured.clone());
+    assert_eq!(read::<Measured, _>(message.clone()), Ok(measured));
     let spoilt = proto::MeasureCostsResponse { auto_exposure_ev: f32::NAN, ..message };
     assert!(refusal::<_, Measured>(spoilt).contains("auto_exposure_ev is NaN"));
     let plan = to_message::<proto::SessionPlan, _>(session_plan());

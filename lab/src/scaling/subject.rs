@@ -96,6 +96,7 @@ impl Subject {
             batch_count,
             planes: ViewPlanes::default(),
             in_background: false,
+            budget: None,
         }
     }
 }

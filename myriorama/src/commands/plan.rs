@@ -71,7 +71,7 @@ Examples:
   myriorama plan --scene tree-terrain-125k --budget \"flip p95 0.06, time 8ms\"
   myriorama plan --scene helmet.gltf --budget \"psnr 32\" --rate 30 --method mesh
 
-Exit status: 0 the budget is kept; 1 nothing keeps it; 2 arguments or input that cannot be used; 3 a failure.";
+Exit status: 0 the budget is kept; 2 arguments or input that cannot be used; 3 nothing keeps the budget, or a failure.";
 
 fn allowance(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|s| (1.0..=1e6).contains(s)).ok_or_else(|| "expected 1 to 1000000".to_owned())
@@ -92,7 +92,7 @@ impl PlanArgs {
 /// Plans, prints and writes.
 ///
 /// # Errors
-/// The scene cannot be used, the device fails, or the folder cannot be written.
+/// The scene cannot be used, the device fails, the folder cannot be written, or nothing keeps the budget.
 pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
     let setup = args.scene.load()?;
     let engine = GpuEngine::shared(args.device.device)?;
@@ -126,5 +126,6 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
     let output = Output { budget: args.budget, out: &args.out, setup: &setup, planning: &planning, outcome: &outcome };
     output.write(&planner.summaries(), pricing.direct())?;
     print_line!("\n{:.1} s of measuring; all rows are in {}", planner.spent_s(), args.out.join("rows.csv").display());
-    Ok(Outcome::of(outcome.state == PromiseState::Kept))
+    anyhow::ensure!(outcome.state == PromiseState::Kept, "the budget {} is not kept: {}", args.budget, outcome.reason);
+    Ok(Outcome::Done)
 }

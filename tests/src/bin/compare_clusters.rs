@@ -263,6 +263,7 @@ impl Subject {
             batch_count,
             planes: ViewPlanes::default(),
             in_background: false,
+            budget: None,
         };
         Ok(Self { node, work })
     }

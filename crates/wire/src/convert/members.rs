@@ -2,9 +2,9 @@
 
 use cluster::limits::{MAX_BATCH, MAX_PROBE_VIEWS, MAX_SCENES, MAX_VIEWPOINTS, MAX_WORKLOADS};
 use cluster::{
-    AchievedTime, AuditReport, AuditedView, ClusterStatus, JoinCluster, MeasureCosts, Measured, NodeCondition,
-    NodeStatus, ProbeViews, ProbedView, ProbedViews, Ready, SamplerReport, SharedLightCosts, Welcome, WorkReport,
-    WorkloadStatus, at_most,
+    AchievedTime, AuditReport, AuditedView, BudgetMeasurement, ClusterStatus, JoinCluster, MeasureCosts, Measured,
+    NodeCondition, NodeStatus, ProbedView, Ready, SamplerReport, SharedLightCosts, Welcome, WorkReport, WorkloadStatus,
+    at_most,
 };
 
 use crate::error::{PROTOCOL_VERSION, check_version};
@@ -17,24 +17,20 @@ messages! {
     JoinClusterResponse = Welcome { scenes }, first |w| at_most(w.scenes.len(), MAX_SCENES, "scenes");
     NodeStatus = NodeStatus { node_name, device_name; address: node_address, is_software: is_software_device };
     MeasureCostsRequest = MeasureCosts {
-        workload, typical_views, batch_count; method: reconstruction_method, codec: frame_codec, in_background: is_background,
+        workload, typical_views, batch_count, budget; method: reconstruction_method, codec: frame_codec, in_background: is_background,
         planes: antialias_sample_count | exposure_ev | tone_curve | with_inverse_depth | with_provenance
     }, first |r| at_most(r.typical_views.len(), MAX_BATCH as usize, "typical_views"), then MeasureCosts::validate;
+    BudgetMeasurement = BudgetMeasurement { compared_lighting };
     MeasureCostsResponse = Measured {
-        costs, traced_pixel_count, shared_light;
+        costs, traced_pixel_count, shared_light, views, busy_s;
         planes: with_normals | with_corner_inverse_depths | with_light, auto_exposure: auto_exposure_ev
-    };
+    }, first |r| at_most(r.views.len(), MAX_BATCH as usize, "views"), then Measured::validate;
     SharedLightCosts = SharedLightCosts { known_ratio, surfaces_s, look_up_s, unknown_s },
         then SharedLightCosts::validate;
-    ProbeViewsRequest = ProbeViews {
-        workload, compared_lighting, views, with_errors; method: reconstruction_method, antialias: antialias_sample_count
-    }, first |r| at_most(r.views.len(), MAX_PROBE_VIEWS, "views"), then ProbeViews::validate;
     ProbedView = ProbedView {
         foreground_ratio, disoccluded_ratio;
         flip: flip_ratio, flip_whole: flip_whole_ratio, mean_square: mean_square_ratio
     };
-    ProbeViewsResponse = ProbedViews { views, costs, busy_s },
-        first |r| at_most(r.views.len(), MAX_PROBE_VIEWS, "views"), then ProbedViews::validate;
     ApplyAssignmentResponse = Ready { plan_epoch, scene_load_s }, then Ready::validate;
     ReportWorkRequest = WorkReport {
         node_name, plan_epoch, workload_number, busy_s, viewpoints, audit;

@@ -3,8 +3,8 @@
 use std::pin::Pin;
 
 use cluster::{
-    ApplyPlan, ChangeSession, ClusterStatus, FetchImages, FetchScene, JoinCluster, MeasureCosts, Measured, ProbeViews,
-    ProbedViews, Ready, RenderViews, SamplerReport, ScenePart, SessionEvent, SessionRequest, Welcome, WorkReport,
+    ApplyPlan, ChangeSession, ClusterStatus, FetchImages, FetchScene, JoinCluster, MeasureCosts, Measured, Ready,
+    RenderViews, SamplerReport, ScenePart, SessionEvent, SessionRequest, Welcome, WorkReport,
 };
 use codec::{Chunk, FramePart};
 use tokio_stream::{Stream, StreamExt as _};
@@ -167,12 +167,10 @@ service! {
     /// Measures its costs and takes plans.
     Node: NodeService(NodeServiceServer, NodeServiceClient) as node_server, NodeAdapter, NodeClient;
     calls {
-        /// Measures each cost alone and warm.
+        /// Measures each cost alone and warm, and, for a budget, the errors of views.
         measure_costs(MeasureCostsRequest as MeasureCosts) -> MeasureCostsResponse as Measured;
         /// Takes a plan; answers when ready for it. `FAILED_PRECONDITION` for an epoch below the one it has.
         apply_assignment(ApplyAssignmentRequest as ApplyPlan) -> ApplyAssignmentResponse as Ready;
-        /// Measures views of a representation, after all other work.
-        probe_views(ProbeViewsRequest as ProbeViews) -> ProbeViewsResponse as ProbedViews;
     }
     streams {}
 }

@@ -1,18 +1,24 @@
 //! Measured costs, kept for sessions that ask for the same, and predicted for other sizes of views.
 
-use cluster::{Costs, MeasureCosts, Measured, SharedLightCosts, TileCosts, Timeline};
+use cluster::{Costs, MeasureCosts, Measured, SharedLightCosts, TileCosts, TimedSize, Timeline};
 use depth_image::{Camera, SampleCamera, ViewPlanes};
 use glam::{Quat, UVec2, Vec3};
 use parking_lot::Mutex;
+
+use crate::measuring_queue::MeasuringQueue;
 
 /// The number of measurements that are kept.
 const CAPACITY: usize = 64;
 /// Costs are predicted for views of at most this many times the pixels of a measured view, or of this share of them.
 const FARTHEST: f64 = 16.0;
 
-/// Costs by device and measurement, the oldest first.
+/// All costs that the coordinator knows, by device and measurement; and what is to be measured once nodes are idle.
 #[derive(Default)]
-pub(crate) struct CostCache(Mutex<Vec<Entry>>);
+pub(crate) struct CostTable {
+    /// The oldest first.
+    entries: Mutex<Vec<Entry>>,
+    pub(crate) wanted: Mutex<MeasuringQueue>,
+}
 
 struct Entry {
     device: String,
@@ -21,34 +27,43 @@ struct Entry {
 }
 
 /// Costs of a device.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Known {
     pub(crate) measured: Measured,
     /// They were measured on an idle node: neither predicted, nor measured beside other work.
     pub(crate) is_settled: bool,
 }
 
-impl CostCache {
-    /// Costs as measured, else as predicted.
-    pub(crate) fn find(&self, device: &str, measurement: &MeasureCosts) -> Option<Known> {
-        let predicted = || Some(Known { measured: self.predict(device, measurement)?, is_settled: false });
-        self.get(device, measurement).or_else(predicted)
+impl CostTable {
+    /// Costs as measured, else as predicted. Those that are not settled are measured later.
+    pub(crate) fn find(&self, device: &str, measurement: &MeasureCosts) -> Option<Measured> {
+        let known = self.get(device, measurement);
+        let is_settled = known.as_ref().is_some_and(|known| known.is_settled);
+        let measured = known.map(|known| known.measured).or_else(|| self.predict(device, measurement))?;
+        if !is_settled {
+            self.wanted.lock().add(device, measurement);
+        }
+        Some(measured)
     }
 
     fn get(&self, device: &str, measurement: &MeasureCosts) -> Option<Known> {
         let key = cache_key(measurement);
-        self.0.lock().iter().find(|entry| entry.device == device && entry.key == key).map(|entry| entry.known)
+        self.entries
+            .lock()
+            .iter()
+            .find(|entry| entry.device == device && entry.key == key)
+            .map(|entry| entry.known.clone())
     }
 
     /// Costs from measurements that differ in the view's size alone, or, where light is shared, in the quality of views and the
     /// density of samples; `None` without any of a size near it.
     fn predict(&self, device: &str, measurement: &MeasureCosts) -> Option<Measured> {
         let key = cache_key(measurement);
-        let entries = self.0.lock();
+        let entries = self.entries.lock();
         let of_device: Vec<&Entry> = entries.iter().filter(|entry| entry.device == device).collect();
         let sized = sizeless(&key);
         let sizes = of_device.iter().filter(|entry| sizeless(&entry.key) == sized);
-        let sizes = sizes.map(|entry| (pixels_of(&entry.key), entry.known.measured)).collect();
+        let sizes = sizes.map(|entry| (pixels_of(&entry.key), entry.known.measured.clone())).collect();
         Self::predict_size(sizes, pixels_of(&key)).or_else(|| {
             let shared = qualityless(&key);
             let others: Vec<&Entry> = of_device.into_iter().filter(|entry| qualityless(&entry.key) == shared).collect();
@@ -70,12 +85,13 @@ impl CostCache {
         sizes.sort_by(|(a, _), (b, _)| distance(*a).total_cmp(&distance(*b)));
         let nearest = sizes.first().filter(|(of_px, _)| distance(*of_px) <= FARTHEST)?;
         let other = sizes.iter().find(|(other, _)| *other != nearest.0);
-        Some(at_size(*nearest, other.copied(), pixels))
+        Some(at_size(nearest, other, pixels))
     }
 
     /// Keeps costs in place of earlier ones. Settled costs are replaced by settled ones alone. The oldest are evicted.
     pub(crate) fn insert(&self, device: &str, measurement: &MeasureCosts, known: Known) {
-        let (mut entries, key) = (self.0.lock(), cache_key(measurement));
+        let key = cache_key(measurement);
+        let mut entries = self.entries.lock();
         let is_same = |entry: &Entry| entry.device == device && entry.key == key;
         if !known.is_settled && entries.iter().any(|entry| is_same(entry) && entry.known.is_settled) {
             return;
@@ -133,7 +149,7 @@ fn qualityless(key: &MeasureCosts) -> MeasureCosts {
 /// and samples for each texel. Points that no sample knows, and encoding, take as long as in the quality that was measured. `None`
 /// where no light is shared.
 fn in_quality(entry: &Entry, wanted: &MeasureCosts) -> Option<Measured> {
-    let Measured { costs, shared_light, .. } = entry.known.measured;
+    let Measured { costs, shared_light, .. } = entry.known.measured.clone();
     let light = shared_light?;
     let positions = |key: &MeasureCosts| f64::from(key.planes.antialias.samples());
     let texels = |key: &MeasureCosts| key.workload.sample_cameras.iter().map(SampleCamera::pixel_count).sum::<usize>();
@@ -154,22 +170,18 @@ fn in_quality(entry: &Entry, wanted: &MeasureCosts) -> Option<Measured> {
         tiles: costs.tiles.and_then(|tiles| TileCosts::of_image(sample_image_s, tiles.overhead_s, tiles.row_shares)),
         ..costs
     };
-    Some(Measured { costs, shared_light: Some(light), ..entry.known.measured })
+    Some(Measured { costs, shared_light: Some(light), ..entry.known.measured.clone() })
 }
 
 fn pixels_of(measurement: &MeasureCosts) -> f64 {
     measurement.typical_views.first().map_or(1.0, |view| view.pixel_count().max(1) as f64)
 }
 
-/// Costs of views of `pixels`: a part that every view has, and a part for each pixel. Two sizes tell them apart; of one, all
-/// is for its pixels.
-fn at_size((near_px, near): (f64, Measured), other: Option<(f64, Measured)>, pixels: f64) -> Measured {
+/// Costs of views of `pixels`, from those of one or two other sizes.
+fn at_size((near_px, near): &(f64, Measured), other: Option<&(f64, Measured)>, pixels: f64) -> Measured {
     let at = |of: fn(&Costs) -> f64| {
-        let near_s = of(&near.costs);
-        let slope = other.map(|(other_px, other)| (of(&other.costs) - near_s) / (other_px - near_px));
-        // Timings vary: neither part is negative.
-        let a_pixel_s = slope.unwrap_or(f64::INFINITY).clamp(0.0, near_s / near_px);
-        near_s + a_pixel_s * (pixels - near_px)
+        let other = other.map(|(pixels, other)| TimedSize { pixels: *pixels, seconds: of(&other.costs) });
+        TimedSize { pixels: *near_px, seconds: of(&near.costs) }.at_size(other, pixels)
     };
     let costs = Costs {
         reconstruct_view_s: at(|costs| costs.reconstruct_view_s),
@@ -179,13 +191,12 @@ fn at_size((near_px, near): (f64, Measured), other: Option<(f64, Measured)>, pix
     };
     let view_ratio = costs.reconstruct_view_s / near.costs.reconstruct_view_s;
     let shared_light = near.shared_light.filter(|_| view_ratio.is_finite()).map(|light| light.scaled(view_ratio));
-    Measured { costs, shared_light, ..near }
+    Measured { costs, shared_light, ..near.clone() }
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use cluster::SamplePlanes;
-    use depth_image::{Antialias, ExposureEv, PinholeCamera};
+    use depth_image::{Antialias, PinholeCamera};
 
     use super::*;
     use crate::schedule::workload_for_tests as workload;
@@ -199,30 +210,22 @@ pub(crate) mod tests {
             batch_count: 32,
             planes: ViewPlanes::default(),
             in_background: false,
+            budget: None,
         }
     }
 
     fn measured(reconstruct_view_s: f64) -> Known {
         let costs = Costs { sample_image_s: 3.0, reconstruct_view_s, encode_view_s: 0.001, ..Costs::default() };
-        Known {
-            measured: Measured {
-                costs,
-                planes: SamplePlanes::default(),
-                auto_exposure: ExposureEv::ZERO,
-                traced_pixel_count: None,
-                shared_light: None,
-            },
-            is_settled: true,
-        }
+        Known { measured: Measured { costs, ..Measured::default() }, is_settled: true }
     }
 
-    fn predicted_s(cache: &CostCache, size_px: UVec2) -> Option<f64> {
+    fn predicted_s(cache: &CostTable, size_px: UVec2) -> Option<f64> {
         Some(cache.predict("d", &measurement(size_px))?.costs.reconstruct_view_s)
     }
 
     #[test]
     fn one_size_predicts_in_proportion_and_two_find_the_part_that_every_view_has() {
-        let cache = CostCache::default();
+        let cache = CostTable::default();
         assert_eq!(predicted_s(&cache, UVec2::new(100, 100)), None);
         cache.insert("d", &measurement(UVec2::new(100, 100)), measured(0.03));
         assert!((predicted_s(&cache, UVec2::new(200, 100)).unwrap() - 0.06).abs() < 1e-12);
@@ -237,7 +240,7 @@ pub(crate) mod tests {
 
     #[test]
     fn sizes_far_from_those_measured_are_not_predicted() {
-        let cache = CostCache::default();
+        let cache = CostTable::default();
         cache.insert("d", &measurement(UVec2::ONE), measured(0.005));
         cache.insert("d", &measurement(UVec2::splat(16_384)), measured(900.0));
         for side in [5, 320, 1280, 4000] {
@@ -251,18 +254,23 @@ pub(crate) mod tests {
 
     #[test]
     fn costs_are_settled_once_they_were_measured_on_an_idle_node() {
-        let (cache, size) = (CostCache::default(), measurement(UVec2::splat(8)));
+        let (cache, size) = (CostTable::default(), measurement(UVec2::splat(8)));
         cache.insert("d", &size, Known { is_settled: false, ..measured(0.09) });
-        assert_eq!(cache.find("d", &size), Some(Known { is_settled: false, ..measured(0.09) }));
-        assert!(!cache.find("d", &measurement(UVec2::splat(9))).unwrap().is_settled, "predicted");
+        assert_eq!(cache.get("d", &size), Some(Known { is_settled: false, ..measured(0.09) }));
+        assert_eq!(cache.find("d", &size), Some(measured(0.09).measured));
+        assert!(cache.find("d", &measurement(UVec2::splat(9))).is_some(), "predicted");
+        let wanted = std::iter::from_fn(|| cache.wanted.lock().take(|_| true));
+        let sizes: Vec<u32> = wanted.map(|wanted| wanted.measurement.typical_views[0].size_px.x).collect();
+        assert_eq!(sizes, [8, 9], "both are measured later");
         cache.insert("d", &size, measured(0.03));
         cache.insert("d", &size, Known { is_settled: false, ..measured(0.2) });
-        assert_eq!(cache.find("d", &size), Some(measured(0.03)), "measured once more, beside other work");
+        assert_eq!(cache.find("d", &size), Some(measured(0.03).measured), "measured once more, beside other work");
+        assert_eq!(cache.wanted.lock().take(|_| true), None);
     }
 
     #[test]
     fn a_larger_size_that_was_timed_faster_predicts_no_negative_cost() {
-        let cache = CostCache::default();
+        let cache = CostTable::default();
         cache.insert("d", &measurement(UVec2::new(100, 100)), measured(0.03));
         cache.insert("d", &measurement(UVec2::new(200, 100)), measured(0.01));
         for side in [30, 50, 100, 200, 400] {
@@ -273,7 +281,7 @@ pub(crate) mod tests {
 
     #[test]
     fn another_method_or_workload_is_not_predicted() {
-        let cache = CostCache::default();
+        let cache = CostTable::default();
         cache.insert("d", &measurement(UVec2::splat(8)), measured(0.03));
         let wanted = measurement(UVec2::splat(9));
         assert!(cache.predict("d", &wanted).is_some());
@@ -295,10 +303,10 @@ pub(crate) mod tests {
         for camera in &mut still.workload.sample_cameras {
             *camera = camera.resized(camera.size_px() / 2);
         }
-        let cache = CostCache::default();
+        let cache = CostTable::default();
         cache.insert("d", &in_motion, measured(0.4));
         assert_eq!(cache.predict("d", &still), None, "no light is shared");
-        cache.insert("d", &in_motion, known);
+        cache.insert("d", &in_motion, known.clone());
         let Measured { costs, shared_light, .. } = cache.predict("d", &still).unwrap();
         let seconds = [costs.sample_image_s, costs.direct_view_s, costs.reconstruct_view_s];
         let expected = [3.0 / 4.0, 2.0 + 0.4, 0.4 + 0.08 + 0.28];
@@ -310,11 +318,11 @@ pub(crate) mod tests {
 
     #[test]
     fn parts_of_a_view_are_predicted_with_its_time() {
-        let (cache, size_px) = (CostCache::default(), UVec2::new(64, 48));
+        let (cache, size_px) = (CostTable::default(), UVec2::new(64, 48));
         let light = SharedLightCosts { known_ratio: 0.9, surfaces_s: 0.1, look_up_s: 0.02, unknown_s: 0.28 };
         let mut known = measured(0.4);
         known.measured.shared_light = Some(light);
-        cache.insert("d", &measurement(size_px), known);
+        cache.insert("d", &measurement(size_px), known.clone());
         let predicted = cache.predict("d", &measurement(size_px * UVec2::new(2, 1))).unwrap();
         let SharedLightCosts { known_ratio, surfaces_s, look_up_s, unknown_s } = predicted.shared_light.unwrap();
         assert_eq!(known_ratio, 0.9);
