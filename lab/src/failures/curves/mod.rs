@@ -1,5 +1,6 @@
 //! All curves: tests measure them at a small size, the study at its full size.
 
+mod background;
 mod courtyard;
 mod cube_edges;
 mod cube_mirrors;
@@ -24,7 +25,7 @@ mod view_cell;
 use super::curve::Curve;
 
 /// Families of curves that share their scene or their parts.
-pub const CURVES: [&[Curve]; 20] = [
+pub const CURVES: [&[Curve]; 21] = [
     &poles::CURVES,
     &sphere::CURVES,
     &[thickness::CURVE],
@@ -38,6 +39,7 @@ pub const CURVES: [&[Curve]; 20] = [
     &view_cell::CURVES,
     &[courtyard::CURVE],
     &depth_range::CURVES,
+    &background::CURVES,
     &light::CURVES,
     &light_cache::CURVES,
     &frames::CURVES,
