@@ -7,6 +7,8 @@ pub(crate) const HOLE_CODE: u16 = 0;
 /// Code of a texel whose ray meets nothing: farther than every sample.
 pub(crate) const BACKGROUND_CODE: u16 = 1;
 const FIRST_CODE: f32 = 2.0;
+/// Between the codes of the background and of the farthest sample.
+pub(crate) const FIRST_SAMPLE: f32 = 1.5;
 const LAST_CODE: f32 = 32_767.0;
 
 /// Neighbours whose depths differ by less than this number of footprints are one surface.

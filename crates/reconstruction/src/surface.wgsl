@@ -4,10 +4,12 @@
 @group(0) var cell_colors: texture_2d<u32>;
 {% include "found.wgsl" %}
 
-// A silhouette runs through a cell that is not connected: what is nearer counts until the cameras vote.
+// A silhouette runs through a cell that is not connected: what is nearer counts until the cameras vote. Before the
+// background all is free, however far beyond the samples of its image.
 fn surface_code(corners: Corners, at: vec2f) -> f32 {
     let nearest = max(max(corners.codes.x, corners.codes.y), max(corners.codes.z, corners.codes.w));
-    return select(nearest, bilinear(corners.codes, at), corners.connected);
+    let code = select(nearest, bilinear(corners.codes, at), corners.connected);
+    return select(code, -FAR_AWAY, code < FIRST_SAMPLE);
 }
 
 {% include "colors.wgsl" %}
@@ -37,7 +39,8 @@ fn vote_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f) -
     // In a connected cell the surface itself counts, else each sample for itself.
     let gaps = code - select(corners.codes, vec4f(bilinear(corners.codes, at)), corners.connected);
     let share = bilinear_shares(at);
-    let shares = select(vec4f(0.0), share, (abs(gaps) < vec4f(reach)) & (corners.codes > vec4f(1.5)));
+    let is_sample = corners.codes > vec4f(FIRST_SAMPLE);
+    let shares = select(vec4f(0.0), share, (abs(gaps) < vec4f(reach)) & is_sample);
     let same = dot(shares, vec4f(1.0));
 {% if holes %}
     // A texel whose way is not proven free proves nothing of the space before it.
@@ -45,7 +48,7 @@ fn vote_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f) -
 {% else %}
     let proven = share;
 {% endif %}
-    let beyond = dot(select(vec4f(0.0), proven, (gaps > vec4f(reach)) & (corners.codes > vec4f(0.5))), vec4f(1.0));
+    let beyond = dot(select(vec4f(0.0), proven, ((gaps > vec4f(reach)) | !is_sample) & (corners.codes > vec4f(0.5))), vec4f(1.0));
     // Angle between the two lines of sight, footprint and distance to the border.
     let eye_to_point = point_in_world - camera.eye_in_world;
     let inverse_distance = inverseSqrt(dot(eye_to_point, eye_to_point));

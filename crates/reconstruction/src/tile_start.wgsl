@@ -38,7 +38,8 @@ fn evaluate_camera(camera: SampleCamera, a: vec3f, b: vec3f, t: f32, t_end: f32,
     let node = camera.first_node + node_index(log2_sides, level, vec2u(first) >> vec2u(level));
     let nearest = nearest_code(textureLoad(nodes, texel_at(node), 0).y);
     let farthest_codes = camera.code_scale / max(depths_m + radii_m, vec2f(1e-20)) + camera.code_offset;
-    let empty = is_covered && all(closest_m > vec2f(0.0)) && min(farthest_codes.x, farthest_codes.y) > nearest;
+    let is_before = min(farthest_codes.x, farthest_codes.y) > nearest || nearest < FIRST_SAMPLE;
+    let empty = is_covered && all(closest_m > vec2f(0.0)) && is_before;
     return select(select(0u, select(UNOPPOSED, PROVEN | UNOPPOSED, whole), empty), UNOPPOSED, unseen);
 }
 

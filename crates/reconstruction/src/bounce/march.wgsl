@@ -7,12 +7,6 @@
 {% include "bounce/ray.wgsl" %}
 @group(0) var<storage, read> rays: array<MirroredRay>;
 
-// Before the background all is free, however far beyond the samples of an image that is taken amid a scene.
-fn surface_before_background(corners: Corners, at: vec2f) -> f32 {
-    let code = surface_code(corners, at);
-    return select(code, -FAR_AWAY, code < FIRST_SAMPLE);
-}
-
 {% include "joint_carve/march_image.wgsl" %}
 
 fn sees(camera: SampleCamera, p: vec3f) -> bool {

@@ -42,8 +42,6 @@ pub(crate) const MARCH_ROUNDS: u32 = 2;
 pub(crate) const LEAST_WAY: f32 = 1e-5;
 /// The cosine between the normals of neighbouring samples below which an edge of the mirror runs between them.
 pub(crate) const EDGE_COSINE: f32 = 0.7;
-/// Moves of a mirrored ray after its marches.
-pub(crate) const MAX_BOUNCE_MOVES: u32 = 96;
 /// Lists of rays: one for each mirror cell, and one for a base.
 pub(crate) const MAX_RAY_LISTS: usize = MAX_MIRROR_CELLS + 1;
 

@@ -12,13 +12,12 @@ use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
 pub(super) const MAX_STOP_LEVEL: u32 = 8;
-/// Moves of a ray. A ray that is not done by then wanders behind all that cameras see, and stays unknown. A surface that
-/// it still met would more likely be wrong than right (docs/methods/joint_carve.md).
-pub(crate) const MAX_MOVES: u32 = 24;
-/// Moves of a ray in a set with holes: texels that prove nothing are crossed one by one.
-pub(crate) const MAX_MOVES_AMONG_HOLES: u32 = 96;
-/// Between the codes of the background and of the farthest sample.
-pub(crate) const FIRST_SAMPLE: f32 = 1.5;
+/// Moves of a ray after its marches.
+pub(crate) const MAX_MOVES: u32 = 96;
+/// Moves after which a ray of a view meets no surface any more, in a set without holes: it wanders behind all that cameras see,
+/// and a surface that it met would more likely be wrong than right (docs/methods/joint_carve.md). Its way may still be proven
+/// free to its end.
+pub(crate) const MAX_MOVES_TO_HIT: u32 = 24;
 /// A ray that leaves no node moves by this share of its way in the volume.
 pub(crate) const BLIND_MOVE: f32 = 0.01;
 /// The least move into the unknown, as a factor.

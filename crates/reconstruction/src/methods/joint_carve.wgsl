@@ -18,6 +18,7 @@
 
 // 0 unless the search is to be cut short.
 const STOP_LEVEL: u32 = {{ stop_level }}u;
+const MOVES_TO_HIT: u32 = {{ "MAX_MOVES" if bounced or holes else "MAX_MOVES_TO_HIT" }};
 const FIRST_LEVEL: u32 = max({{ "BOUNCE_LEVEL" if bounced else "START_LEVEL" }}, STOP_LEVEL);
 
 // A camera's knowledge of the ray from t on.
@@ -52,14 +53,10 @@ fn exit_of(ray: ImageRay, low: vec2f, high: vec2f) -> f32 {
     let edge = select(low - NUDGE_PX, high + NUDGE_PX, turn > vec2f(0.0)) + 0.5;
     let slope = ray.b.xy - edge * ray.b.z;
     let leave = (edge * ray.a.z - ray.a.xy) / select(slope, vec2f(1e-20), abs(slope) < vec2f(1e-20));
-{%- if bounced %}
-    // A ray whose vanishing point lies in the rectangle does not leave it.
+    // A ray whose vanishing point lies in the rectangle does not leave it, and neither does one through the camera's own eye,
+    // which stays in one place.
     let leaves = (abs(turn) > vec2f(1e-12)) & (slope * turn > vec2f(0.0));
     let exit = min(select(FAR_AWAY, leave.x, leaves.x), select(FAR_AWAY, leave.y, leaves.y));
-{%- else %}
-    let exit = min(select(FAR_AWAY, leave.x, abs(turn.x) > 1e-12), select(FAR_AWAY, leave.y, abs(turn.y) > 1e-12));
-{%- endif %}
-    // A ray through the camera's own eye stays in one place and leaves no rectangle.
     return clamp(exit, ray.t, ray.far);
 }
 
@@ -86,12 +83,12 @@ fn evaluate_node(camera: SampleCamera, ray: ImageRay, exit: f32, node: vec2u, le
     let range = textureLoad(nodes, texel_at(index), 0).x;
     let nearest = nearest_code(range);
     let farthest = f32(range >> 16u);
-    if min(ray.code, exit_code) > nearest{{ " || nearest < FIRST_SAMPLE" if bounced }} { return Evaluation(exit, exit, FAR_AWAY, false, 0.0); }
+    if min(ray.code, exit_code) > nearest || nearest < FIRST_SAMPLE { return Evaluation(exit, exit, FAR_AWAY, false, 0.0); }
     // Free up to the depth of the nearest thing in the node.
     let surface_t = (camera.code_scale / (nearest - camera.code_offset) - ray.a.z) * safe_reciprocal(ray.b.z);
     let partial = select(ray.t, clamp(surface_t, ray.t, exit), ray.code > nearest && nearest > 1.0);
     let slack = THICKNESS_FOOTPRINTS * (max(ray.code, exit_code) - camera.code_offset) / camera.focal_px;
-    let behind = max(ray.code, exit_code) + slack < farthest{{ " && farthest > FIRST_SAMPLE" if bounced }};
+    let behind = max(ray.code, exit_code) + slack < farthest && farthest > FIRST_SAMPLE;
     // A search that stops here takes the nearest thing in the node for the surface.
     let penetration = select(FAR_AWAY, 0.0, stops && !behind);
     return Evaluation(partial, exit, penetration, !behind, 1.0);
@@ -127,12 +124,10 @@ fn evaluate_cell(camera: SampleCamera, ray: ImageRay, cell_exit: f32, cell: vec2
     let at = ray.uv - low;
     let exit_at = clamp((ray.a.xy + ray.b.xy * exit) / exit_w - 0.5 - low, vec2f(0.0), vec2f(1.0));
     // A connected cell is its bilinear surface; else each sample is a surface of its own.
-{%- if bounced %}
-    // Before the background all is free, however far beyond the samples of an image that is taken amid a scene.
+    // Before the background all is free, however far beyond the samples of its image.
     let own = select(part.codes, vec4f(-FAR_AWAY), part.codes < vec4f(FIRST_SAMPLE));
-{%- endif %}
-    let samples = select({{ "own" if bounced else "part.codes" }}, vec4f(bilinear(corners.codes, at)), corners.connected);
-    let samples_at_exit = select({{ "own" if bounced else "part.codes" }}, vec4f(bilinear(corners.codes, exit_at)), corners.connected);
+    let samples = select(own, vec4f(bilinear(corners.codes, at)), corners.connected);
+    let samples_at_exit = select(own, vec4f(bilinear(corners.codes, exit_at)), corners.connected);
     let gaps = vec4f(HALF_CODE + ray.code) - samples;
     let gaps_at_exit = vec4f(HALF_CODE + code_beyond(camera, exit_w)) - samples_at_exit;
     let ahead = gaps > vec4f(0.0);
@@ -140,14 +135,10 @@ fn evaluate_cell(camera: SampleCamera, ray: ImageRay, cell_exit: f32, cell: vec2
     let next_gap = least_of(gaps, ahead);
     let next_gap_at_exit = next_gap + least_of(gaps_at_exit - gaps, ahead);
     let meets = any(ahead) && next_gap_at_exit <= 0.0;
-{%- if bounced %}
     // Codes are linear in the image, not in t: a ray away from the camera stays in a cell for long.
     let share = clamp(next_gap / max(next_gap - next_gap_at_exit, 1e-9), 0.0, 1.0);
     let weights = vec2f((1.0 - share) / (ray.a.z + ray.b.z * ray.t), share / max(exit_w, 1e-20));
     let crossing = select(exit, dot(weights, vec2f(ray.t, exit)) / (weights.x + weights.y), meets);
-{%- else %}
-    let crossing = select(exit, ray.t + (exit - ray.t) * next_gap / max(next_gap - next_gap_at_exit, 1e-9), meets);
-{%- endif %}
 {% if holes %}
     // Nothing is proven up to the sample, but the ray may meet it.
     if all(ahead) && !corners.certain { return Evaluation(ray.t, crossing, FAR_AWAY, false, 0.0); }
@@ -173,7 +164,7 @@ fn least_of(values: vec4f, counted: vec4<bool>) -> f32 {
 fn vote_of_cell(corners: Corners, codes: vec4f, gaps: vec4f, footprint: f32, at: vec2f) -> f32 {
     let share = bilinear_shares(at);
     let reach = vec4f(THICKNESS_FOOTPRINTS * footprint);
-    let same = dot(share, select(vec4f(0.0), vec4f(1.0), (abs(gaps) < reach) & (codes > vec4f(1.5))));
+    let same = dot(share, select(vec4f(0.0), vec4f(1.0), (abs(gaps) < reach) & (codes > vec4f(FIRST_SAMPLE))));
     let beyond = {% if holes %}select(0.0, 1.0, corners.certain) * {% endif %}dot(share, select(vec4f(0.0), vec4f(1.0), gaps > reach));
     return same - beyond;
 }
@@ -201,7 +192,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var level = FIRST_LEVEL;
     var hit = false;
     var known = true;
-    for (var i = 0u; i < {{ "MAX_BOUNCE_MOVES" if bounced else "MAX_MOVES_AMONG_HOLES" if holes else "MAX_MOVES" }} && t < span.far; i++) {
+    for (var i = 0u; i < MAX_MOVES && t < span.far && (known || i < MOVES_TO_HIT); i++) {
         var free_until = t;
         var exit = FAR_AWAY;
         var penetration = FAR_AWAY;
@@ -219,7 +210,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         vote += v{{ k }}.vote;
 {% endfor %}{{ "\n        freed = freed || free_until > t;" if bounced }}
         let descend = !free && level > STOP_LEVEL && undecided;
-        let candidate = !free && !descend && penetration < THICKNESS_FOOTPRINTS;
+        let candidate = !free && !descend && penetration < THICKNESS_FOOTPRINTS && i < MOVES_TO_HIT;
         // First go to the very place, then let the cameras vote there.
         let arrived = free_until <= t || STOP_LEVEL > 0u;
         hit = candidate && arrived && vote >= 0.0{{ " && freed" if bounced }};

@@ -17,7 +17,7 @@ use gpu::{ShaderError, ShaderSource, Templates, Turn, shader_sources, wgsl_const
 use self::hybrid_mesh::GREATEST_SLOPE;
 use self::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL};
 use self::joint_carve::smooth::{FAINT_HIGHLIGHT, OPEN_SHARE, SMOOTH_FOOTPRINTS, Smooth};
-use self::joint_carve::{BLIND_MOVE, FIRST_SAMPLE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_AMONG_HOLES, MAX_STOP_LEVEL};
+use self::joint_carve::{BLIND_MOVE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_TO_HIT, MAX_STOP_LEVEL};
 use self::light_field_search::{BISECTIONS, DEFAULT_STEPS, MAX_STEPS};
 use crate::bounce::Bounces;
 use crate::quads::{self, CornerPlanes, ErrorBound, Mesh as QuadMesh, QuadDrawing, RequiredPlanes};
@@ -131,10 +131,10 @@ pub(crate) const SHADERS: [(&str, &str); 8] = wgsl_files! {
 };
 
 /// The numbers that methods share with their shaders.
-pub(crate) fn constants() -> [(&'static str, String); 15] {
+pub(crate) fn constants() -> [(&'static str, String); 14] {
     wgsl_constants! {
-        BISECTIONS, BLIND_MOVE, EYE_SHARE, FAINT_HIGHLIGHT, FIRST_SAMPLE, GREATEST_SLOPE, LEAST_MOVE, MAX_COARSE_MOVES, MAX_FINE_MOVES, MAX_MOVES,
-        MAX_MOVES_AMONG_HOLES, NUDGE_PX, OPEN_SHARE, SMOOTH_FOOTPRINTS, START_LEVEL
+        BISECTIONS, BLIND_MOVE, EYE_SHARE, FAINT_HIGHLIGHT, GREATEST_SLOPE, LEAST_MOVE, MAX_COARSE_MOVES, MAX_FINE_MOVES, MAX_MOVES,
+        MAX_MOVES_TO_HIT, NUDGE_PX, OPEN_SHARE, SMOOTH_FOOTPRINTS, START_LEVEL
     }
 }
 

@@ -8,7 +8,7 @@ use super::sample_camera::SampleCamera;
 use super::surface::{bilinear, bilinear_shares};
 use super::view_ray::span_in;
 use crate::bounce::{LONGEST_STEP, MAX_WALK_STEPS};
-use crate::methods::joint_carve::FIRST_SAMPLE;
+use crate::pyramid::FIRST_SAMPLE;
 use crate::sample_set::searched_volume;
 use crate::surface::{HALF_CODE, THICKNESS_FOOTPRINTS};
 use crate::view_work::{CELL_MARGIN_PX, FAR_AWAY};

@@ -11,11 +11,12 @@ use super::{
     view_ray::ViewRay,
 };
 use crate::{
-    bounce::{BOUNCE_LEVEL, MAX_BOUNCE_MOVES},
+    bounce::BOUNCE_LEVEL,
     methods::joint_carve::{
-        BLIND_MOVE, FIRST_SAMPLE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_AMONG_HOLES,
+        BLIND_MOVE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_TO_HIT,
         march::{MARCHES, NUDGE_PX, START_LEVEL},
     },
+    pyramid::FIRST_SAMPLE,
     surface::HALF_CODE,
     view_work::FAR_AWAY,
 };
@@ -46,7 +47,6 @@ struct InNode {
     exit: f32,
     /// Planar, at t and at the exit.
     depths_m: [f32; 2],
-    is_mirrored: bool,
     code: f32,
     exit_code: f32,
     /// From the node's upper left corner, in pixels, at t and at the exit.
@@ -82,18 +82,18 @@ pub(super) fn joint_carve(cameras: &[SampleCamera], ray: &ViewRay, start: f32, s
 /// All cameras together, from where the marches ended.
 pub(super) fn carve(cameras: &[SampleCamera], ray: &ViewRay, begin: f32, stop_level: u32) -> Pixel {
     let start_level = if ray.is_mirrored { BOUNCE_LEVEL } else { START_LEVEL }.max(stop_level);
-    let (mut t, mut level, mut hit, mut known) = (begin, start_level, false, true);
+    let mut t = begin;
+    let mut level = start_level;
+    let mut hit = false;
+    let mut known = true;
     // A ray that begins on a surface which its images show does not meet it: the way must have been free.
     let mut freed = !ray.is_mirrored || begin > ray.near;
     let among_holes = cameras.iter().any(|camera| camera.among_holes);
     let thickness_footprints = cameras.iter().map(|camera| camera.thickness_footprints).fold(0.0, f32::max);
-    let moves = match (ray.is_mirrored, among_holes) {
-        (true, _) => MAX_BOUNCE_MOVES,
-        (false, true) => MAX_MOVES_AMONG_HOLES,
-        (false, false) => MAX_MOVES,
-    };
-    for _ in 0..moves {
-        if t >= ray.far {
+    let moves_to_hit = if ray.is_mirrored || among_holes { MAX_MOVES } else { MAX_MOVES_TO_HIT };
+    for number in 0..MAX_MOVES {
+        let may_hit = number < moves_to_hit;
+        if t >= ray.far || !(known || may_hit) {
             break;
         }
         let evaluations: Vec<Evaluation> =
@@ -102,7 +102,7 @@ pub(super) fn carve(cameras: &[SampleCamera], ray: &ViewRay, begin: f32, stop_le
         let (free_until, penetration) = joined(&evaluations, t);
         freed |= free_until > t;
         let descend = !free && level > stop_level && evaluations.iter().any(|v| v.undecided);
-        let candidate = !free && !descend && penetration < thickness_footprints;
+        let candidate = !free && !descend && penetration < thickness_footprints && may_hit;
         // First go to the very place, then let the cameras vote there.
         let arrived = free_until <= t || stop_level > 0;
         hit = candidate && arrived && freed && evaluations.iter().map(|v| v.vote).sum::<f32>() >= 0.0;
@@ -153,13 +153,12 @@ fn evaluate_camera(camera: &SampleCamera, ray: &ViewRay, t: f32, level: u32, sto
     let node = uv.as_uvec2() >> pyramid_level;
     let low = (node << pyramid_level).as_vec2();
     let high = (low + (1u32 << pyramid_level) as f32).min(camera.cells);
-    let exit = exit(ray, [a, b], p, [low, high]).max(t).min(ray.far);
+    let exit = exit([a, b], p, [low, high]).max(t).min(ray.far);
     let exit_p = a + b * exit;
     let within = InNode {
         t,
         exit,
         depths_m: [p.z, exit_p.z],
-        is_mirrored: ray.is_mirrored,
         code: camera.code(p.z.recip()),
         exit_code: if exit_p.z <= 0.0 { 1e9 } else { camera.code(exit_p.z.recip()) },
         at: uv - low,
@@ -182,7 +181,7 @@ fn evaluate_quarter(camera: &SampleCamera, ray: &ViewRay, cell: InNode, low: Vec
     let [a, b] = ray.in_image_of(camera);
     let quarter = (cell.at * 2.0).floor();
     let edges = [low + 0.5 * quarter, (low + 0.5 * quarter + 0.5).min(camera.cells)];
-    let exit = exit(ray, [a, b], a + b * cell.t, edges).max(cell.t).min(ray.far);
+    let exit = exit([a, b], a + b * cell.t, edges).max(cell.t).min(ray.far);
     let exit_p = a + b * exit;
     let own = corners.codes[usize::from(quarter.x > 0.5) + 2 * usize::from(quarter.y > 0.5)];
     if own < 0.5 {
@@ -199,14 +198,13 @@ fn evaluate_quarter(camera: &SampleCamera, ray: &ViewRay, cell: InNode, low: Vec
 }
 
 /// Where the ray leaves the rectangle. One through the camera's own eye stays in one place and leaves none.
-fn exit(ray: &ViewRay, [a, b]: [Vec3; 2], p: Vec3, [low, high]: [Vec2; 2]) -> f32 {
+fn exit([a, b]: [Vec3; 2], p: Vec3, [low, high]: [Vec2; 2]) -> f32 {
     let turn = b.xy() * p.z - p.xy() * b.z;
     let edge = Vec2::select(turn.cmpgt(Vec2::ZERO), high + NUDGE_PX, low - NUDGE_PX) + 0.5;
     let slope = (b.xy() - edge * b.z).map(|s| if s.abs() < 1e-20 { 1e-20 } else { s });
     let leave = (edge * a.z - a.xy()) / slope;
-    // A mirrored ray whose vanishing point lies in the rectangle does not leave it.
-    let leaves = turn.abs().cmpgt(Vec2::splat(1e-12));
-    let leaves = if ray.is_mirrored { leaves & (slope * turn).cmpgt(Vec2::ZERO) } else { leaves };
+    // A ray whose vanishing point lies in the rectangle does not leave it.
+    let leaves = turn.abs().cmpgt(Vec2::splat(1e-12)) & (slope * turn).cmpgt(Vec2::ZERO);
     Vec2::select(leaves, leave, Vec2::splat(FAR_AWAY)).min_element()
 }
 
@@ -220,14 +218,14 @@ fn evaluate_node(
 ) -> Evaluation {
     let &InNode { t, exit, code, exit_code, .. } = within;
     let (nearest, farthest) = camera.range(level, node);
-    if code.min(exit_code) > nearest || (within.is_mirrored && nearest < FIRST_SAMPLE) {
+    if code.min(exit_code) > nearest || nearest < FIRST_SAMPLE {
         return Evaluation { free_until: exit, exit, penetration: FAR_AWAY, undecided: false, vote: 0.0 };
     }
     // Free up to the depth of the nearest thing in the node.
     let surface_t = (camera.inverse_depth_per_m(nearest).recip() - a.z) * safe_reciprocal(b.z);
     let free_until = if code > nearest && nearest > 1.0 { surface_t.max(t).min(exit) } else { t };
     let slack = camera.thickness_footprints * (code.max(exit_code) - camera.code_offset()) / camera.focal_px;
-    let behind = code.max(exit_code) + slack < farthest && (!within.is_mirrored || farthest > FIRST_SAMPLE);
+    let behind = code.max(exit_code) + slack < farthest && farthest > FIRST_SAMPLE;
     let penetration = if behind { FAR_AWAY } else { penetration_inside };
     Evaluation { free_until, exit, penetration, undecided: !behind, vote: 1.0 }
 }
@@ -237,7 +235,7 @@ fn evaluate_cell(camera: &SampleCamera, within: &InNode, corners: Corners) -> Ev
     let &InNode { t, exit, code, exit_code, at, exit_at, .. } = within;
     let nothing = Evaluation { free_until: t, exit, penetration: FAR_AWAY, undecided: false, vote: 0.0 };
     // A connected cell is its bilinear surface; else each sample is a surface of its own.
-    let own = corners.codes.map(|code| if within.is_mirrored && code < FIRST_SAMPLE { -FAR_AWAY } else { code });
+    let own = corners.codes.map(|code| if code < FIRST_SAMPLE { -FAR_AWAY } else { code });
     let samples = |at| if corners.connected { [bilinear(corners.codes, at); 4] } else { own };
     let gaps = samples(at).map(|sample| HALF_CODE + code - sample);
     let gaps_at_exit = samples(exit_at).map(|sample| HALF_CODE + exit_code - sample);
@@ -248,11 +246,7 @@ fn evaluate_cell(camera: &SampleCamera, within: &InNode, corners: Corners) -> Ev
     let next_gap_at_exit = next_gap + least(&|i| gaps_at_exit[i] - gaps[i]);
     let meets = !ahead.is_empty() && next_gap_at_exit <= 0.0;
     let share = next_gap / (next_gap - next_gap_at_exit).max(1e-9);
-    let crossing = match (meets, within.is_mirrored) {
-        (false, _) => exit,
-        (true, false) => t + (exit - t) * share,
-        (true, true) => within.at_share(share.clamp(0.0, 1.0)),
-    };
+    let crossing = if meets { within.at_share(share.clamp(0.0, 1.0)) } else { exit };
     if ahead.len() == 4 && !corners.certain {
         // Nothing is proven up to the sample, but the ray may meet it.
         return Evaluation { exit: crossing, ..nothing };
@@ -265,7 +259,7 @@ fn evaluate_cell(camera: &SampleCamera, within: &InNode, corners: Corners) -> Ev
     let reach = camera.thickness_footprints * footprint;
     let vote = |(i, share): (usize, f32)| match gaps[i] {
         gap if gap > reach && corners.certain => -share,
-        gap if gap.abs() < reach && corners.codes[i] > 1.5 => share,
+        gap if gap.abs() < reach && corners.codes[i] > FIRST_SAMPLE => share,
         _ => 0.0,
     };
     // Inside and on the way out of a connected cell: the back of the surface, which no camera saw.

@@ -12,10 +12,8 @@ use super::{
 };
 use crate::{
     bounce::BOUNCE_LEVEL,
-    methods::joint_carve::{
-        FIRST_SAMPLE,
-        march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL},
-    },
+    methods::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL},
+    pyramid::FIRST_SAMPLE,
     surface::HALF_CODE,
     view_work::{CELL_MARGIN_PX, FAR_AWAY},
 };
@@ -71,7 +69,7 @@ pub(super) fn march(camera: &SampleCamera, ray: &ViewRay, near: f32) -> March {
     let border = (Vec2::select(inverse.cmpgt(Vec2::ZERO), camera.cells, Vec2::ZERO) - origin.xy()) * inverse;
     let line = Line { origin, line, inverse, s_end: border.min_element().min(1.0) };
     let (s, blocked) = march_nodes(camera, &line, ray.is_mirrored);
-    let (s, crossed) = if blocked { march_cells(camera, &line, s, ray.is_mirrored) } else { (s, false) };
+    let (s, crossed) = if blocked { march_cells(camera, &line, s) } else { (s, false) };
     // Back to the ray's own parameter: 1/w is linear in s.
     let share = s * p0.z / ((1.0 - s) * p1.z + s * p0.z);
     March { t: near + (end - near) * share, crossed }
@@ -90,7 +88,7 @@ fn march_nodes(camera: &SampleCamera, line: &Line, is_mirrored: bool) -> (f32, b
         let side = (1u32 << level) as f32;
         let exit = line.exit(s, node.as_vec2() * side, side);
         let (nearest, _) = camera.range(level, node);
-        if at.z.min(line.at(exit).z) > nearest || (is_mirrored && nearest < FIRST_SAMPLE) {
+        if at.z.min(line.at(exit).z) > nearest || nearest < FIRST_SAMPLE {
             s = exit;
             level = (level + 1).min(start_level);
             continue;
@@ -108,7 +106,7 @@ fn march_nodes(camera: &SampleCamera, line: &Line, is_mirrored: bool) -> (f32, b
 }
 
 /// From cell to cell, to where the ray crosses the surface or is found behind it.
-fn march_cells(camera: &SampleCamera, line: &Line, mut s: f32, is_mirrored: bool) -> (f32, bool) {
+fn march_cells(camera: &SampleCamera, line: &Line, mut s: f32) -> (f32, bool) {
     for _ in 0..MAX_FINE_MOVES {
         if s >= line.s_end {
             break;
@@ -121,12 +119,9 @@ fn march_cells(camera: &SampleCamera, line: &Line, mut s: f32, is_mirrored: bool
         if !corners.certain {
             break;
         }
-        let surface = |at: Vec2| match surface_code(corners, at) {
-            code if is_mirrored && code < FIRST_SAMPLE => -FAR_AWAY,
-            code => code,
-        };
-        let here = HALF_CODE + at.z - surface(at.xy() - cell);
-        let there = HALF_CODE + beyond.z - surface((beyond.xy() - cell).max(Vec2::ZERO).min(Vec2::ONE));
+        let here = HALF_CODE + at.z - surface_code(corners, at.xy() - cell);
+        let inside_beyond = (beyond.xy() - cell).clamp(Vec2::ZERO, Vec2::ONE);
+        let there = HALF_CODE + beyond.z - surface_code(corners, inside_beyond);
         if here <= 0.0 {
             break;
         }
@@ -138,9 +133,12 @@ fn march_cells(camera: &SampleCamera, line: &Line, mut s: f32, is_mirrored: bool
     (s, false)
 }
 
-/// A silhouette runs through a cell that is not connected: what is nearer counts until the cameras vote.
+/// A silhouette runs through a cell that is not connected: what is nearer counts until the cameras vote. Before the
+/// background all is free, however far beyond the samples of its image.
 fn surface_code(corners: Corners, at: Vec2) -> f32 {
-    if corners.connected { bilinear(corners.codes, at) } else { corners.codes.into_iter().fold(0.0, f32::max) }
+    let code =
+        if corners.connected { bilinear(corners.codes, at) } else { corners.codes.into_iter().fold(0.0, f32::max) };
+    if code < FIRST_SAMPLE { -FAR_AWAY } else { code }
 }
 
 pub(super) fn safe_reciprocal(v: f32) -> f32 {

@@ -4,6 +4,7 @@ use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{pixel::Pixel, sample_camera::SampleCamera, view_ray::ViewRay};
 use crate::{
+    pyramid::FIRST_SAMPLE,
     surface::{ANGLE_FLOOR, BORDER_PX, CARVING_SHARE, HIDDEN_WEIGHT, LEAST_SHARE, WHOLE},
     view_work::CELL_MARGIN_PX,
 };
@@ -112,14 +113,15 @@ fn vote(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> Ca
     let (mut own, mut proven) = (0.0, 0.0);
     for (i, share) in bilinear_shares(at).into_iter().enumerate() {
         let gap = camera.code(inverse_w) - surfaces[i];
-        if gap.abs() < reach && corners.codes[i] > 1.5 {
+        let is_sample = corners.codes[i] > FIRST_SAMPLE;
+        if gap.abs() < reach && is_sample {
             same += share;
             proven += share * corners.proven[i];
             let counted = share * if corners.proven[i] > 0.0 { 1.0 } else { HIDDEN_WEIGHT };
             own += counted;
             color += camera.color_linear(cell + UVec2::new(i as u32 & 1, i as u32 >> 1)) * counted;
         }
-        if gap > reach && corners.codes[i] > 0.5 && corners.certain {
+        if (gap > reach || !is_sample) && corners.codes[i] > 0.5 && corners.certain {
             beyond += share;
         }
     }

@@ -7,6 +7,7 @@ use super::{
     view_ray::{ViewRay, ViewRays},
 };
 use crate::{
+    pyramid::FIRST_SAMPLE,
     tile_start::{GREATEST_TILE_MOVE, HALF_DIAGONAL, LEAST_TILE_MOVE, MAX_TILE_MOVES},
     view_work::{FAR_AWAY, TILE_PX},
 };
@@ -73,7 +74,7 @@ fn evaluate_camera(camera: &SampleCamera, middle: &ViewRay, way: [f32; 2], slope
     let is_covered = wanted <= level;
     let nearest = camera.wide_nearest(level, first.as_uvec2() >> level);
     let farthest_code = farthest_m.map(|m| camera.code(m.max(1e-20).recip())).into_iter().fold(f32::INFINITY, f32::min);
-    let empty = is_covered && in_front && farthest_code > nearest;
+    let empty = is_covered && in_front && (farthest_code > nearest || nearest < FIRST_SAMPLE);
     let whole = low.cmpge(Vec2::ZERO).all() && high.cmple(camera.cells).all();
     Evaluation { proven: empty && whole, unopposed: empty }
 }

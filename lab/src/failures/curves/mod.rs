@@ -1,5 +1,6 @@
 //! All curves: tests measure them at a small size, the study at its full size.
 
+mod background;
 mod cubes;
 mod frames;
 mod light;
@@ -13,8 +14,9 @@ mod view_cell;
 use super::curve::Curve;
 
 /// Families of curves that share their scene or their parts.
-const FAMILIES: [&[Curve]; 9] = [
+const FAMILIES: [&[Curve]; 10] = [
     &surfaces::CURVES,
+    &background::CURVES,
     &view_cell::CURVES,
     &cubes::CURVES,
     &[light_field::CURVE],

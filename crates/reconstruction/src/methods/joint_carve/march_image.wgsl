@@ -1,8 +1,7 @@
 {# The march in one camera's image. Mirrored rays are marched in several cameras, one of which each function is given. #}
 {%- set camera = "camera" if bounced else "work.cameras[CAMERA]" %}
 {%- set given = ", camera: SampleCamera" if bounced else "" %}
-{%- set passed = ", camera" if bounced else "" %}
-{%- set surface_code = "surface_before_background" if bounced else "surface_code" -%}
+{%- set passed = ", camera" if bounced else "" -%}
 // How far the way is free, and whether it ends at a surface.
 struct March { t: f32, crossed: bool }
 
@@ -43,7 +42,7 @@ fn march_nodes(line: Line, begin: f32{{ given }}) -> Progress {
         let size = f32(1u << level);
         let exit = exit_of(line, s, vec2f(node) * size, size);
         let nearest = nearest_code(textureLoad(nodes, texel_at(first_node + node_index(log2_sides, level, node)), 0).x);
-        let free = min(at.z, line.origin.z + line.line.z * exit) > nearest{{ " || nearest < FIRST_SAMPLE" if bounced }};
+        let free = min(at.z, line.origin.z + line.line.z * exit) > nearest || nearest < FIRST_SAMPLE;
         let surface = (nearest - line.origin.z) * safe_reciprocal(line.line.z);
         let partial = select(s, clamp(surface, s, exit), at.z > nearest && line.line.z < 0.0);
         blocked = !free && level == 1u;
@@ -71,8 +70,8 @@ fn march_cells(line: Line, begin: Progress{{ given }}) -> Progress {
         let hole = {% if holes %}!corners.certain{% else %}min(min(corners.codes.x, corners.codes.y), min(corners.codes.z, corners.codes.w)) < 0.5{% endif %};
         let inside = at.xy - cell;
         let inside_beyond = clamp(beyond.xy - cell, vec2f(0.0), vec2f(1.0));
-        let here = HALF_CODE + at.z - {{ surface_code }}(corners, inside);
-        let there = HALF_CODE + beyond.z - {{ surface_code }}(corners, inside_beyond);
+        let here = HALF_CODE + at.z - surface_code(corners, inside);
+        let there = HALF_CODE + beyond.z - surface_code(corners, inside_beyond);
         let through = here > 0.0 && there > 0.0 && !hole;
         crossed = here > 0.0 && there <= 0.0 && !hole;
         let crossing = s + (exit - s) * here / max(here - there, 1e-9);
