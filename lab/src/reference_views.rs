@@ -53,7 +53,7 @@ impl ReferenceViews {
             environment: environment.as_ref(),
             mips: false,
         };
-        let set = engine.reconstructor.upload(&images, &description, Turn::default())?;
+        let set = engine.reconstructor.upload(&images, &description, Default::default())?;
         let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ViewPlanes::ALL), TURN)?;
         let class = |(camera, view): (&PinholeCamera, &View)| Ok(classify(camera, inverse_depth(view)?, &images)?);
         let classes = cameras.iter().zip(&views).map(class).collect::<anyhow::Result<_>>()?;

@@ -10,7 +10,7 @@ use tokio::net::TcpListener;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
-use crate::process::loopback_of;
+use crate::addresses::loopback_of;
 
 /// The longest wait for nodes of one process to join.
 const JOIN: Duration = Duration::from_secs(30);

@@ -16,9 +16,10 @@ use reconstruction::ReconstructionMethod;
 use render::{Choice, Lighting};
 use tokio::runtime::Runtime;
 
+use crate::addresses::listen;
 use crate::cluster::Cluster;
 use crate::delivery::{open, receive, request};
-use crate::process::{listen, runtime};
+use crate::process::runtime;
 use crate::setup::{SceneArgs, Setup};
 
 /// The number of views V of the paper's headline: 290 views of 200×150.

@@ -12,7 +12,7 @@ use gpu::{
 };
 use wgpu::BufferUsages;
 
-use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume, SetVariant, TILE_PX, rows_of};
+use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume, TILE_PX, rows_of};
 use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
 use crate::{quads::QuadTargets, sample_set::SampleSet};
 

@@ -74,7 +74,7 @@ impl<'s> Subject<'s> {
     /// # Errors
     /// The device fails.
     pub fn upload(&self, cube: &Cube) -> anyhow::Result<(SampleSet, f64)> {
-        self.upload_with(cube, None)
+        self.put(cube, None)
     }
 
     /// A light field of the scene with as many lines as the paper's, and the seconds that it takes.
@@ -92,11 +92,15 @@ impl<'s> Subject<'s> {
         Ok((field, start.elapsed().as_secs_f64()))
     }
 
-    /// Puts a cube on the device, with a light field if there is one. Gives also the seconds.
+    /// Puts a cube with a light field on the device. Gives also the seconds.
     ///
     /// # Errors
     /// The device fails.
-    pub fn upload_with(&self, cube: &Cube, light_field: Option<LayeredLightField>) -> anyhow::Result<(SampleSet, f64)> {
+    pub fn upload_with(&self, cube: &Cube, light_field: LayeredLightField) -> anyhow::Result<(SampleSet, f64)> {
+        self.put(cube, Some(light_field))
+    }
+
+    fn put(&self, cube: &Cube, light_field: Option<LayeredLightField>) -> anyhow::Result<(SampleSet, f64)> {
         let images = CubeImages { grid: cube.grid, images: cube.images.clone(), light_field };
         let start = Instant::now();
         let set = self.stand.reconstructor().upload_cube(&images, &self.description(), Default::default())?;

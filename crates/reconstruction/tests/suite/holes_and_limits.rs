@@ -4,9 +4,7 @@ use depth_image::{HOLE_INVERSE_DEPTH, PinholeCamera, ProvenanceKind, ViewPlanes}
 use glam::{UVec2, Vec3};
 use scene::procedural::{courtyard, quad, tree_terrain};
 
-use crate::stage::{
-    CARVE, Corners, SAMPLE_PX, SEARCH, Stage, VIEW_PX, assert_sane, count, looking, reconstruct, reconstructor,
-};
+use crate::stage::{CARVE, Corners, SAMPLE_PX, SEARCH, Stage, VIEW_PX, assert_sane, count, looking, reconstruct};
 
 pub fn odd_cameras() -> Vec<(&'static str, PinholeCamera)> {
     let size = UVec2::new(40, 30);

@@ -14,7 +14,7 @@ use scene::procedural::{mirror_pair, teapot_mirror};
 
 use crate::layered::CubeStage;
 use crate::light_field::Gathering;
-use crate::stage::{CARVE, count, description, gpu, kinds, looking, reconstruct, reconstructor, renderer, work};
+use crate::stage::{CARVE, count, description, gpu, kinds, looking, reconstructor, renderer, work};
 
 const VIEW_PX: UVec2 = UVec2::new(128, 96);
 
@@ -73,6 +73,7 @@ fn reconstruct<'s>(
     cameras: &[PinholeCamera],
     planes: ViewPlanes,
 ) -> Result<Vec<View>, ReconstructionError> {
+    let common = common.into();
     reconstructor().reconstruct(ReconstructRequest { common, planes, ..ReconstructRequest::new(set, cameras, CARVE) })
 }
 

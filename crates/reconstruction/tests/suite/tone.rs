@@ -4,7 +4,7 @@ use depth_image::{Antialias, ExposureEv, ToneCurve, ToneMapping, View, ViewPlane
 use glam::Vec3;
 use reconstruction::scalar;
 
-use crate::stage::{CARVE, Stage, corpus, reconstruct, reconstructor};
+use crate::stage::{CARVE, Stage, corpus, reconstruct};
 
 fn tone(ev: f32, curve: ToneCurve) -> ToneMapping {
     ToneMapping { exposure: ExposureEv::new(ev).expect("within the limits"), curve }
