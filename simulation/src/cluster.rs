@@ -65,18 +65,6 @@ impl Cluster {
     pub fn equal(nodes: usize, machine: Machine, images: usize, image_bytes: f64, frame_bytes: f64) -> Self {
         Self { machines: vec![machine; nodes], images, image_bytes, frame_bytes }
     }
-
-    /// Cuts every image into `parts`, as work units of their own: their costs and bytes add up to the image's.
-    #[must_use]
-    pub fn cut(mut self, parts: usize) -> Self {
-        let share = 1.0 / parts.max(1) as f64;
-        for machine in &mut self.machines {
-            machine.costs.sample_image_s *= share;
-            // Parts are not cut again.
-            machine.costs.tiles = None;
-        }
-        Self { images: self.images * parts.max(1), image_bytes: self.image_bytes * share, ..self }
-    }
 }
 
 /// How images get to compositors.

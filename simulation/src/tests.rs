@@ -190,18 +190,6 @@ fn the_limit_names_sampling_and_loading_where_they_delay_views() {
 }
 
 #[test]
-fn parts_of_images_cost_what_images_cost() {
-    let cut = equal(11, FREE).cut(16);
-    assert_eq!(cut.images, 64);
-    assert!(close(cut.machines[0].costs.sample_image_s * 64.0, 0.4) && close(cut.image_bytes * 64.0, 4e6));
-    let expensive = Machine { costs: Costs { sample_image_s: 2.0, ..COSTS }, ..FREE };
-    let demand = demand(PolicyChoice::Pipeline, 1000, 16);
-    let whole = ran(&equal(11, expensive), &demand, Habits::default()).steady_period_s();
-    let cut = ran(&equal(11, expensive).cut(16), &demand, Habits::default()).steady_period_s();
-    assert!(cut < 0.9 * whole, "{cut} {whole}");
-}
-
-#[test]
 fn a_run_of_a_thousand_nodes_is_quick_and_deterministic() {
     let machine = Machine { bytes_per_s: 1.25e9, ..FREE };
     let demand = demand(PolicyChoice::Auto, 100_000, 12);

@@ -213,15 +213,6 @@ impl GpuScene {
     pub fn forget_acceleration(&self) {
         self.rays.forget();
     }
-
-    /// The nodes of that tree and its triangles: the tables that rays read most.
-    ///
-    /// # Errors
-    /// As [`GpuScene::acceleration`].
-    pub fn tree(&self, scene_time_s: f32) -> Result<[wgpu::TextureView; 2], RenderError> {
-        let traced = self.rays.at(scene_time_s)?;
-        Ok([&traced.nodes, &traced.corners].map(|table| wgpu::TextureView::clone(table)))
-    }
 }
 
 fn check_sizes(gpu: &Gpu, scene: &Scene) -> Result<(), GpuError> {

@@ -67,7 +67,7 @@ pub fn run(args: &FailuresArgs) -> anyhow::Result<Outcome> {
         progress.inc(1);
     }
     progress.finish_and_clear();
-    add_to(&mut report, &results, args.curves.is_empty())?;
+    add_to(&mut report, &results)?;
     report.tables.iter().for_each(|table| println!("{}\n", table.to_text()));
     let ok = report.finish(&args.out)?;
     Ok(Outcome::of(ok || !args.strict))

@@ -94,11 +94,6 @@ impl Curve {
             .zip(&measured.ys)
             .map(|(series, y)| series.shapes.iter().find_map(|shape| shape.check(&measured.x, y).err()))
     }
-
-    /// Some series has a strict shape.
-    pub fn is_strict(&self) -> bool {
-        self.series.iter().any(|series| series.shapes.iter().any(|shape| shape.is_strict()))
-    }
 }
 
 /// Rows of one function of x.

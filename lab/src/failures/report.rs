@@ -5,9 +5,6 @@ use report::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 use super::curve::{Curve, Measured};
 use super::stand::Stand;
 
-/// The least number of curves of the whole list, and of those with a strict shape.
-const LEAST_CURVES: [f64; 2] = [28.0, 18.0];
-
 /// A curve's values and the violations of its series, or why there are none.
 pub struct Result {
     curve: &'static Curve,
@@ -28,21 +25,13 @@ impl Result {
     }
 }
 
-/// Adds the table of shapes, a chart a curve and the checks; the number of curves is checked where all were measured.
+/// Adds the table of shapes, a chart a curve and the check.
 ///
 /// # Errors
 /// A row that does not fit the table.
-pub fn add_to(report: &mut Report, results: &[Result], are_all: bool) -> anyhow::Result<()> {
+pub fn add_to(report: &mut Report, results: &[Result]) -> anyhow::Result<()> {
     report.tables.push(table(results)?);
     report.charts.extend(results.iter().filter_map(chart).map(Into::into));
-    if are_all {
-        let strict = results.iter().filter(|result| result.curve.is_strict()).count();
-        for ((name, count), least) in
-            [("curves", results.len()), ("curves of strict shape", strict)].into_iter().zip(LEAST_CURVES)
-        {
-            report.checks.push(Check::new(name, count as f64, "", Bar::AtLeast(least)));
-        }
-    }
     let lost = results.iter().flat_map(Result::reasons).flatten().count();
     report.checks.push(Check::new("shapes that do not hold", lost as f64, "", Bar::Equal(0.0)));
     Ok(())

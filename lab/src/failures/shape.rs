@@ -63,15 +63,6 @@ impl Shape {
         Monotone { direction: Direction::Down, least_change, tolerance }
     }
 
-    /// Strict shapes demand a change: a flat curve has none of them.
-    pub fn is_strict(self) -> bool {
-        match self {
-            FallsThenFlat { .. } => true,
-            Monotone { least_change, .. } => least_change > 0.0,
-            Bounded { .. } | Plateau { .. } | EqualAt { .. } => false,
-        }
-    }
-
     /// Compares values with the shape.
     ///
     /// # Errors

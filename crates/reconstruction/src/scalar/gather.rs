@@ -18,21 +18,7 @@ pub struct Reflecting {
 /// The mean light of a surface's lobe; `around` is what is seen where the scene ends.
 #[must_use]
 pub fn gathered_light(field: &LayeredLightField, surface: &Reflecting, around: impl Fn(Vec3) -> Vec3) -> Vec3 {
-    gathered_by(&Lobe::of(surface, GpuLightField::of(&field.camera)), field, around)
-}
-
-/// As [`gathered_light`], where the lobe of mirrors has this exponent. The device has one exponent for each number of directions.
-#[must_use]
-pub fn gathered_light_with_exponent(
-    field: &LayeredLightField,
-    surface: &Reflecting,
-    exponent: f32,
-    around: impl Fn(Vec3) -> Vec3,
-) -> Vec3 {
-    gathered_by(&Lobe::of(surface, GpuLightField { exponent, ..GpuLightField::of(&field.camera) }), field, around)
-}
-
-fn gathered_by(lobe: &Lobe, field: &LayeredLightField, around: impl Fn(Vec3) -> Vec3) -> Vec3 {
+    let lobe = Lobe::of(surface, GpuLightField::of(&field.camera));
     let (mut light, mut sum) = (Vec3::ZERO, 0.0);
     for (number, direction) in field.camera.directions.all().into_iter().enumerate() {
         let share = lobe.share(-direction.towards);

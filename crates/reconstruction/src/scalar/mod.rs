@@ -25,7 +25,7 @@ mod view_ray;
 
 pub use self::curved_search::SinglePoleImages;
 pub use self::follow::PinholeImages;
-pub use self::gather::{Reflecting, gathered_light, gathered_light_with_exponent};
+pub use self::gather::{Reflecting, gathered_light};
 pub use self::layered::CubeTwin;
 pub use self::mips::ColorMips;
 use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};
@@ -43,21 +43,6 @@ pub fn reconstruct(
     method: ReconstructionMethod,
 ) -> View {
     view(&pixels(images, set, camera, method), set, camera)
-}
-
-/// As [`reconstruct`], where points within this number of footprints of a sample are on its surface. The device has one
-/// thickness, a constant of its shaders.
-#[must_use]
-pub fn reconstruct_with_thickness(
-    images: &[DepthImage],
-    set: &SetDescription<'_>,
-    camera: &PinholeCamera,
-    method: ReconstructionMethod,
-    thickness_footprints: f32,
-) -> View {
-    let mut cameras = nearest_first(images, camera);
-    cameras.iter_mut().for_each(|camera| camera.thickness_footprints = thickness_footprints);
-    view(&pixels_by(&cameras, images, set, camera, method), set, camera)
 }
 
 /// As [`reconstruct`], with the mean colour of several positions a pixel.
@@ -138,22 +123,13 @@ fn pixels(
     camera: &PinholeCamera,
     method: ReconstructionMethod,
 ) -> Vec<Pixel> {
-    pixels_by(&nearest_first(images, camera), images, set, camera, method)
-}
-
-fn pixels_by(
-    cameras: &[SampleCamera],
-    images: &[DepthImage],
-    set: &SetDescription<'_>,
-    camera: &PinholeCamera,
-    method: ReconstructionMethod,
-) -> Vec<Pixel> {
+    let cameras = nearest_first(images, camera);
     let rays = ViewRays::of(camera, &set.volume, images);
     let found = match quads(images, method) {
-        Some(quads) => draw::drawn(&quads, images, cameras, camera, &rays),
-        None => pixels_from(cameras, &rays, &tile_start::tile_starts(cameras, &rays), method),
+        Some(quads) => draw::drawn(&quads, images, &cameras, camera, &rays),
+        None => pixels_from(&cameras, &rays, &tile_start::tile_starts(&cameras, &rays), method),
     };
-    finished(found, images, set, cameras, &rays)
+    finished(found, images, set, &cameras, &rays)
 }
 
 /// What each pixel shows: its surface, or the background in its direction.
