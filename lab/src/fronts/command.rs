@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
 
 use anyhow::Context as _;
 use app_core::exit::{BadInput, Outcome};
@@ -10,7 +9,7 @@ use app_core::progress::bar;
 use clap::{Args, ValueEnum};
 use depth_image::Antialias;
 use engine::GpuEngine;
-use report::{Bar, Check, Report};
+use report::Report;
 
 use super::checks::checks;
 use super::measure::{Extent, Front};
@@ -21,9 +20,6 @@ use crate::failures::stand::Stand;
 use crate::lit::fronts as lit;
 use crate::lit::light::Light;
 use crate::study::{StudyArgs, is_named};
-
-/// The longest quick run.
-const QUICK_S: f64 = 600.0;
 
 /// The light under which fronts are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -86,7 +82,6 @@ impl FrontsArgs {
 /// # Errors
 /// A subject cannot be used, the device fails, or the folder cannot be written.
 pub fn run(args: &FrontsArgs) -> anyhow::Result<Outcome> {
-    let start = Instant::now();
     let plain = args.plain_subjects();
     let is_wanted = |name: &&str| is_named(name, &args.subjects);
     let lit_names: Vec<&'static str> = lit::subject_names(args.is_short()).iter().copied().filter(is_wanted).collect();
@@ -98,9 +93,6 @@ pub fn run(args: &FrontsArgs) -> anyhow::Result<Outcome> {
     let mut report = args.study.report("fronts", &engine);
     measure_plain(&engine, &plain, args.study.quick, &mut report)?;
     lit::measure(&Stand::new(&engine, false), &lit_work, args.study.quick, &mut report)?;
-    if args.study.quick {
-        report.checks.push(Check::new("time of the run", start.elapsed().as_secs_f64(), "s", Bar::AtMost(QUICK_S)));
-    }
     args.study.finish("fronts", &report)
 }
 

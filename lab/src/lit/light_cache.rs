@@ -9,7 +9,7 @@ use depth_image::LightCacheQuality::{self, Balanced, Draft, Fast, Fine};
 use render::Lighting;
 use report::{Bar, Check};
 
-use super::light::{DIRECT_RAYS, Light, LightRays, SAMPLES_A_PIXEL};
+use super::light::{DIRECT_RAYS, Light, SAMPLES_A_PIXEL};
 use super::measure::{Drawing, LightFront, LightRow, LitRows};
 use super::report::add_to;
 use super::subject::{OrbitViews, SetSize, Subject, VIEW_PX};
@@ -38,9 +38,8 @@ const QUICK_OCCLUSION: [&str; 3] = ["lamborghini", "courtyard", "tree-terrain-12
 /// Scenes under indirect light; the quick ones come first.
 const INDIRECT: [&str; 4] = ["courtyard, inside", "gallery", "urban, inside", EXPENSIVE_SCENE];
 const QUICK_INDIRECT: usize = 2;
-/// Rays of occlusion beyond these change little.
-const OCCLUSION_RAYS: [LightRays; 5] =
-    [LightRays::new(1, 1), LightRays::new(2, 2), LightRays::new(4, 4), LightRays::new(8, 8), LightRays::new(16, 16)];
+/// Numbers of rays of direct drawing under occlusion: more than 16 rays change little.
+const OCCLUSION_RAYS: usize = 5;
 /// The scene that gains most.
 const EXPENSIVE_SCENE: &str = "tree-terrain-500k";
 
@@ -54,7 +53,7 @@ const EXPENSIVE_SCENE: &str = "tree-terrain-500k";
 pub struct LightCacheArgs {
     #[command(flatten)]
     study: StudyArgs,
-    /// A folder with the models FlightHelmet, lamborghini, ingenuity and threejs-shaderball, or with subfolders that have them
+    /// A folder that has, or whose subfolders have, FlightHelmet, lamborghini, ingenuity and threejs-shaderball
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
     /// The lighting, with occlusion or with indirect light; its rays are those of samples
@@ -92,7 +91,7 @@ pub fn run(args: &LightCacheArgs) -> anyhow::Result<Outcome> {
     let mut report = args.study.report("light_cache", &engine);
     report.parameter("views", format!("{} of {VIEW_PX}, {SAMPLES_A_PIXEL} samples a pixel", args.views));
     let rows = LitRows {
-        direct: if light == Light::Occlusion { &OCCLUSION_RAYS } else { &DIRECT_RAYS },
+        direct: &DIRECT_RAYS[..if light == Light::Occlusion { OCCLUSION_RAYS } else { DIRECT_RAYS.len() }],
         qualities: &QUALITIES,
         sets: vec![SetSize::DEFAULT],
         has_joint_carve: false,
