@@ -34,7 +34,8 @@ impl ActivePlan {
         settings: ViewSettings,
         named_plans: mpsc::Sender<Assignment>,
     ) -> Result<Self, ClientError> {
-        let (mut peers, mut failed) = (Vec::new(), None);
+        let mut peers = Vec::new();
+        let mut failed = None;
         for share in &plan.assignment.compositors {
             match connect(&share.address).await {
                 Ok(channel) => peers.push(Peer::new(share, channel, named_plans.clone())),
@@ -59,7 +60,8 @@ impl ActivePlan {
 
     /// The plan that a compositor names as the one in force, if it can be this session's.
     pub(crate) fn succeeded_by(&self, assignment: &Assignment) -> Option<Self> {
-        let (old, new) = (&self.plan.assignment, assignment);
+        let old = &self.plan.assignment;
+        let new = assignment;
         let is_later = new.plan_epoch > old.plan_epoch;
         let shows_the_same = new.workload_number == old.workload_number
             && new.workload.scene == old.workload.scene

@@ -123,7 +123,8 @@ async fn receive_all(
     while let Some((frame, room)) = frames.next_admitted(&peer, &sink, plan_epoch).await? {
         received(frame.header.stage_times.set_wait_s > SET_WAIT_S);
         let Some(decoder) = sink.decoder().await else { break };
-        let (peer, sink) = (peer.clone(), sink.clone());
+        let peer = peer.clone();
+        let sink = sink.clone();
         decoding.spawn(async move {
             let number = frame.frame;
             let (header, view) = decode(frame, &peer).await.map_err(|error| Failure::of_peer(&peer, error))?;
@@ -190,7 +191,8 @@ impl Retries {
         if received > self.received {
             *self = Self::new(received);
         }
-        let (since, delay) = (*self.failing_since.get_or_insert(now), self.backoff.next_delay());
+        let since = *self.failing_since.get_or_insert(now);
+        let delay = self.backoff.next_delay();
         (now.saturating_duration_since(since) < GIVE_UP_AFTER).then_some(delay)
     }
 }

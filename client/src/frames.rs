@@ -43,7 +43,8 @@ impl Frames {
         let window = Arc::new(Mutex::new(window));
         let decoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
         let mut delivery = JoinSet::new();
-        let (room, frame_units) = (Arc::new(Semaphore::new(UNITS_AHEAD as usize)), Arc::default());
+        let room = Arc::new(Semaphore::new(UNITS_AHEAD as usize));
+        let frame_units = Arc::default();
         delivery.spawn(deliver(FrameSink { received: send, window: window.clone(), decoders, room, frame_units }));
         Self { received, window, has_failed: false, _delivery: delivery }
     }

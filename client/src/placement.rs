@@ -28,7 +28,8 @@ impl ClientId {
 
 /// The order in which a client tries compositors of these weights.
 fn order(client_id: u64, weights: &[u32]) -> impl Iterator<Item = usize> + use<> {
-    let (count, first) = (weights.len(), first(client_id, weights));
+    let count = weights.len();
+    let first = first(client_id, weights);
     (0..count).map(move |i| (first + i) % count)
 }
 

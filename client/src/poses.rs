@@ -85,7 +85,8 @@ mod tests {
     use super::*;
 
     fn pose(frame: u64) -> Pose {
-        let (eye, up) = ([0.0, 0.0, 1.0].into(), [0.0, 1.0, 0.0].into());
+        let eye = [0.0, 0.0, 1.0].into();
+        let up = [0.0, 1.0, 0.0].into();
         let camera = PinholeCamera::looking_at(eye, [0.0; 3].into(), up, 1.0, [8, 8].into());
         Pose { request: ViewRequest { frame, set_index: 0, camera }, quality: None, posed: Instant::now() }
     }

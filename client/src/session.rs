@@ -249,7 +249,8 @@ async fn plan_of(
     events: &mut Messages<SessionEvent>,
     mut progress: impl FnMut(&SessionEvent),
 ) -> Result<Opened, ClientError> {
-    let (mut number, mut promised) = (0, None);
+    let mut number = 0;
+    let mut promised = None;
     while let Some(event) = events.next().await {
         let event = event.map_err(ClientError::coordinator)?;
         progress(&event);

@@ -51,7 +51,8 @@ impl Window {
         planes: ViewPlanes,
     ) -> Result<Self, ClientError> {
         let requests: Box<dyn Iterator<Item = ViewRequest> + Send> = Box::new(requests);
-        let (source, due) = (Some(requests.peekable()), BTreeMap::new());
+        let source = Some(requests.peekable());
+        let due = BTreeMap::new();
         let mut window = Self { source, last: None, due, received: 0, fault: None, set_count, planes, method: None };
         while window.due.len() < LEAST_AHEAD_VIEWS && !window.draw().is_empty() {}
         match window.fault.take() {

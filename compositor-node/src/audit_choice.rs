@@ -167,7 +167,8 @@ mod tests {
 
     /// Audits `views` at a time, one after the other without pauses: the streams that were chosen.
     fn streams_of(rounds: usize, views: impl Fn(usize) -> Vec<Candidate>) -> Vec<u64> {
-        let (mut choice, start) = (AuditChoice::default(), Instant::now());
+        let mut choice = AuditChoice::default();
+        let start = Instant::now();
         let mut streams = Vec::new();
         for round in 0..rounds {
             let now = start + Duration::from_secs(2 * round as u64);
@@ -182,7 +183,8 @@ mod tests {
 
     #[test]
     fn the_least_random_number_of_a_batch_is_chosen_once() {
-        let (mut choice, now) = (AuditChoice::default(), Instant::now());
+        let mut choice = AuditChoice::default();
+        let now = Instant::now();
         let views = [view(1, 0.0, 9), view(1, 1.0, 3), view(1, 2.0, 5)];
         assert_eq!(choice.choose(now, &kind(), &views, 1e-3), Some(1));
         assert_eq!(choice.choose(now, &kind(), &views, 1e-3), None, "one at a time");
@@ -201,7 +203,8 @@ mod tests {
 
     #[test]
     fn a_place_is_audited_again_if_its_audit_has_failed() {
-        let (mut choice, mut now) = (AuditChoice::default(), Instant::now());
+        let mut choice = AuditChoice::default();
+        let mut now = Instant::now();
         let views = [view(1, 0.0, 1)];
         for busy_s in [None, None, Some(0.01)] {
             assert_eq!(choice.choose(now, &kind(), &views, 1e-3), Some(0), "{busy_s:?}");
@@ -239,7 +242,8 @@ mod tests {
 
     #[test]
     fn audits_take_their_share_of_the_time_in_the_mean() {
-        let (busy_s, share) = (0.03, 0.01);
+        let busy_s = 0.03;
+        let share = 0.01;
         let number = |place: u64| place.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let pauses_s = (0..10_000).map(|place| random_pause(busy_s, share, number(place)).as_secs_f64());
         let mean_s = pauses_s.sum::<f64>() / 10_000.0;

@@ -68,7 +68,8 @@ impl Auditor {
         let Source::Sets(ViewSets { of_cell: set, .. }) = &first.source else { return None };
         let scene_time_s = plan.workload.timeline.time_s(set_index(&first.key))?;
         let candidate = |waiting: &&Waiting| {
-            let (stream, camera) = (waiting.reply.outbox().stream, waiting.view.camera);
+            let stream = waiting.reply.outbox().stream;
+            let camera = waiting.view.camera;
             let random = random([plan.plan_epoch, stream, waiting.view.frame]);
             Candidate { stream, random, set: set.content, camera }
         };
@@ -81,9 +82,13 @@ impl Auditor {
 
     async fn audit(self: Arc<Self>, chosen: Chosen, order: AuditOrder) {
         let Chosen { plan, stream, random, camera, .. } = &chosen;
-        let (plan_epoch, workload_number, random) = (plan.plan_epoch, plan.workload_number, *random);
+        let plan_epoch = plan.plan_epoch;
+        let workload_number = plan.workload_number;
+        let random = *random;
         let kind = kind_of(plan);
-        let (stream, camera, part) = (*stream, *camera, audited_part(camera.size_px, &order, random));
+        let part = audited_part(camera.size_px, &order, random);
+        let stream = *stream;
+        let camera = *camera;
         let is_part = part != ViewPart::whole(camera.size_px);
         let start = Instant::now();
         // Whatever becomes of the task, the next audit follows.
@@ -190,7 +195,8 @@ mod tests {
     use super::*;
 
     fn order(in_parts: bool) -> AuditOrder {
-        let (antialias, planned_pixel_count) = (Antialias::NONE, 1);
+        let antialias = Antialias::NONE;
+        let planned_pixel_count = 1;
         AuditOrder {
             time_ratio: 0.01,
             least_apart_m: 0.0,
@@ -213,7 +219,8 @@ mod tests {
 
     #[test]
     fn small_views_and_those_of_a_promise_for_single_views_are_compared_as_a_whole() {
-        let (small, large) = (UVec2::new(320, 240), UVec2::new(640, 480));
+        let small = UVec2::new(320, 240);
+        let large = UVec2::new(640, 480);
         assert_eq!(audited_part(small, &order(true), 1), ViewPart::whole(small));
         assert_eq!(audited_part(large, &order(false), 1), ViewPart::whole(large));
         assert_eq!(audited_part(large, &order(true), 1).size_px.max_element(), PART_PX);

@@ -141,7 +141,10 @@ impl Waiting {
             size_px: view.camera.size_px,
             is_preview: set.place.is_preview(),
         };
-        let (source, codec, set_wait_s, queued) = (set.source.clone(), request.codec, set.wait_s, Instant::now());
+        let source = set.source.clone();
+        let codec = request.codec;
+        let set_wait_s = set.wait_s;
+        let queued = Instant::now();
         Self { key, place: set.place, source, view, codec, arrived, set_wait_s, queued, reply, credit }
     }
 

@@ -66,7 +66,8 @@ impl<'a> BatchStream<'a> {
 
     /// Enqueues the views of one view cell after the other.
     async fn enqueue(&mut self, request: RenderViews) -> Result<(), Status> {
-        let (arrived, shared) = (Instant::now(), &self.client.shared);
+        let arrived = Instant::now();
+        let shared = &self.client.shared;
         let plan = shared
             .of_compositor(shared.plans.require(request.workload_number, request.plan_epoch)?, &request.method)?;
         shared.check_views(&plan, &request)?;
@@ -94,7 +95,8 @@ impl<'a> BatchStream<'a> {
         arrived: Instant,
     ) -> Result<(), Status> {
         let shared = self.client.shared.clone();
-        let (mut left, mut set) = (views, Some(shared.source(plan, request.set_index, cell).await?));
+        let mut left = views;
+        let mut set = Some(shared.source(plan, request.set_index, cell).await?);
         while let Some(first) = left.first() {
             let mut credits = self.try_credits(request.planes, left)?;
             if credits.is_empty() {

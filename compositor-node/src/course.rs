@@ -49,7 +49,8 @@ mod tests {
 
     #[test]
     fn a_viewer_that_walks_is_a_second_of_its_speed_further() {
-        let (start, mut course) = (Instant::now(), Course::default());
+        let start = Instant::now();
+        let mut course = Course::default();
         for step in 0..40u32 {
             course.add(start + step * Duration::from_millis(100), &at(0.2 * step as f32));
             let ahead = course.in_a_second(&at(0.2 * step as f32));
@@ -65,7 +66,8 @@ mod tests {
 
     #[test]
     fn poses_without_a_time_between_them_tell_no_speed() {
-        let (start, mut course) = (Instant::now(), Course::default());
+        let start = Instant::now();
+        let mut course = Course::default();
         course.add(start, &at(0.0));
         course.add(start, &at(1e30));
         assert_eq!(course.in_a_second(&at(1e30)), None);

@@ -128,7 +128,8 @@ impl Fetcher {
         let content = set.plan.set_content(set.set_index).ok_or_else(|| beyond_timeline(set.set_index))?;
         let mut fetches = JoinSet::new();
         for request in requests {
-            let (fetcher, set) = (self.clone(), set.clone());
+            let fetcher = self.clone();
+            let set = set.clone();
             fetches.spawn(async move {
                 tokio::select! {
                     fetched = fetch_share(&fetcher.connections, &set, &request) => {

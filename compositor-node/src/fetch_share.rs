@@ -93,7 +93,8 @@ async fn fetch_once(
     set: &SetRequest,
     request: &ShareRequest,
 ) -> Result<FetchedShare, Status> {
-    let (plan, share) = (&set.plan, &request.share);
+    let plan = &set.plan;
+    let share = &request.share;
     let id = SampleSetId { plan_epoch: plan.plan_epoch, index: set.set_index.into() };
     let mut chunks = call(connections, set, request).await?;
     let mut reassembler = Reassembler::new(DecodeLimits::default(), id);
@@ -105,7 +106,8 @@ async fn fetch_once(
             continue;
         };
         check_image(&whole, id, share, &images)?;
-        let (index, encoded) = (whole.image_index, whole.image.clone());
+        let index = whole.image_index;
+        let encoded = whole.image.clone();
         let start = Instant::now();
         let image = decode(&cameras, whole).await?;
         chunks.times.decode_s += start.elapsed().as_secs_f64();
@@ -115,7 +117,8 @@ async fn fetch_once(
         images.push((index, image));
     }
     if images.len() < share.image_indices.len() {
-        let (received, requested) = (images.len(), share.image_indices.len());
+        let received = images.len();
+        let requested = share.image_indices.len();
         return Err(Status::data_loss(format!("{received} of {requested} images were received")));
     }
     Ok(FetchedShare { images, times: chunks.times })
@@ -124,7 +127,8 @@ async fn fetch_once(
 async fn call(connections: &Connections, set: &SetRequest, request: &ShareRequest) -> Result<ChunkStream, Status> {
     let client = SamplerClient::new(connections.to(&request.share.address).await?);
     let image_indices = request.share.image_indices.clone();
-    let (plan, set_index) = (&set.plan, set.set_index);
+    let plan = &set.plan;
+    let set_index = set.set_index;
     let images = FetchImages {
         plan_epoch: plan.plan_epoch,
         workload_number: plan.workload_number,
@@ -134,7 +138,8 @@ async fn call(connections: &Connections, set: &SetRequest, request: &ShareReques
     };
     let answer = tokio::time::timeout(request.answer_within, client.fetch_sample_images(images)).await;
     let chunks = answer.map_err(|_| Status::deadline_exceeded("no images in time"))??;
-    let (first_within, chunk_within) = (Some(request.first_within), request.chunk_within);
+    let first_within = Some(request.first_within);
+    let chunk_within = request.chunk_within;
     Ok(ChunkStream { chunks, first_within, chunk_within, times: FetchTimes::default() })
 }
 
@@ -148,7 +153,8 @@ struct ChunkStream {
 
 impl ChunkStream {
     async fn next(&mut self) -> Result<Option<Chunk>, Status> {
-        let (start, first_within) = (Instant::now(), self.first_within.take());
+        let start = Instant::now();
+        let first_within = self.first_within.take();
         let within = first_within.unwrap_or(self.chunk_within);
         let chunk = next_within(&mut self.chunks, within, "chunks").await?;
         if first_within.is_none() {

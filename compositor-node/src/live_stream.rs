@@ -256,8 +256,10 @@ impl<'a> LiveStream<'a> {
             return;
         }
         let Some(pose) = self.newest.take() else { return };
-        let (shared, plan) = (self.client.shared.clone(), pose.plan.clone());
-        let (set_index, cell) = (pose.request.set_index, pose.cell);
+        let shared = self.client.shared.clone();
+        let plan = pose.plan.clone();
+        let set_index = pose.request.set_index;
+        let cell = pose.cell;
         let work = Box::pin(async move { shared.source(&plan, set_index, cell).await });
         self.without_set.get_or_insert(pose.arrived);
         self.loading = Some(Fetch { pose: Some(pose), work });
@@ -349,7 +351,9 @@ impl<'a> LiveStream<'a> {
             return;
         }
         let Some(pose) = self.waiting() else { return };
-        let (plan, set_index, cell) = (pose.plan.clone(), pose.request.set_index, pose.cell);
+        let plan = pose.plan.clone();
+        let set_index = pose.request.set_index;
+        let cell = pose.cell;
         let camera = pose.view.camera;
         let Some(set) = self.client.shared.meanwhile(&plan, set_index, &camera) else { return };
         if set.place.is_preview() && self.previewed.replace(camera) == Some(camera) {
@@ -394,7 +398,8 @@ impl<'a> LiveStream<'a> {
     }
 
     fn credit(&self, pose: &Pose) -> Pending<Credit> {
-        let (credits, shared) = (self.credits.clone(), self.client.shared.clone());
+        let credits = self.credits.clone();
+        let shared = self.client.shared.clone();
         let bytes = pose.bytes();
         Box::pin(async move {
             let stream = credits.acquire_owned().await.map_err(closed)?;

@@ -22,7 +22,8 @@ fn bench(is_live: bool) -> Bench {
     if is_live {
         outbox.set_live();
     }
-    let (outgoing, reply) = (Outgoing(outbox.clone()), Reply::new(outbox.clone()));
+    let outgoing = Outgoing(outbox.clone());
+    let reply = Reply::new(outbox.clone());
     Bench { outbox, outgoing, reply, credits: Arc::new(Semaphore::new(2)), quota: NodeQuota::new(Quotas::default()) }
 }
 

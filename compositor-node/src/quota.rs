@@ -69,7 +69,8 @@ impl NodeQuota {
     pub(crate) fn new(limits: Quotas) -> Self {
         let units = limits.view_bytes / UNIT;
         let part = |share: f64| (units as f64 * share) as usize;
-        let (live, batches) = (part(LIVE_SHARE), part(BATCH_SHARE));
+        let live = part(LIVE_SHARE);
+        let batches = part(BATCH_SHARE);
         Self {
             limits,
             streams: room(limits.streams),

@@ -37,7 +37,9 @@ pub(crate) struct Rendering {
 impl Rendering {
     pub(crate) fn new(auditor: Arc<Auditor>, times: Arc<ViewTimes>) -> Self {
         let Auditor { scenes, metrics, direct_share, .. } = &*auditor;
-        let (scenes, metrics, direct_share) = (scenes.clone(), metrics.clone(), *direct_share);
+        let scenes = scenes.clone();
+        let metrics = metrics.clone();
+        let direct_share = *direct_share;
         let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
         Self { scenes, metrics, times, encoders, auditor, direct_share }
     }
@@ -75,7 +77,8 @@ impl Rendering {
 
     /// Gives the seconds that the views had the device.
     async fn render(&self, turn: Turn, batch: Vec<Waiting>, place: OwnedSemaphorePermit) -> f64 {
-        let (start, metrics) = (Instant::now(), &self.metrics);
+        let start = Instant::now();
+        let metrics = &self.metrics;
         match self.make(turn, &batch).await {
             Ok((operation, views, busy_s)) => {
                 let batch_s = start.elapsed().as_secs_f64();
@@ -105,7 +108,8 @@ impl Rendering {
 
     /// Makes the views of a batch, which has one at least; with the seconds that they had the device.
     async fn make(&self, turn: Turn, batch: &[Waiting]) -> Result<(Operation, Vec<View>, f64), Status> {
-        let (source, key) = (batch[0].source.clone(), batch[0].key.clone());
+        let source = batch[0].source.clone();
+        let key = batch[0].key.clone();
         let cameras: Vec<_> = batch.iter().map(|waiting| waiting.view.camera).collect();
         let count = cameras.len();
         let scene = source.scene().clone();
@@ -179,7 +183,8 @@ fn stage_times(waiting: &Waiting, start: Instant, batch_s: f64, count: usize) ->
         batch_count: count as u32,
         ..StageTimes::default()
     };
-    let (stream, frame) = (waiting.reply.outbox().stream, waiting.view.frame);
+    let stream = waiting.reply.outbox().stream;
+    let frame = waiting.view.frame;
     let StageTimes { queue_s, batch_count, .. } = times;
     tracing::debug!(stream, frame, set = %waiting.key.sample_set_id, queue_s, batch_s, batch_count, "reconstructed");
     times

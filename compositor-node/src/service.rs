@@ -107,7 +107,8 @@ impl Compositor for CompositorService {
 impl ClientStream {
     /// Runs until either side ends the stream; a client that takes no frames is cut off.
     async fn run(self, requests: Messages<RenderViews>) {
-        let (stream, stall) = (self.stream, self.shared.deadlines.stall);
+        let stream = self.stream;
+        let stall = self.shared.deadlines.stall;
         tokio::select! {
             () = self.answer_and_send(requests) => (),
             () = self.outbox.gone.cancelled() => (),

@@ -149,7 +149,9 @@ impl Sets {
         let Some(relay) = relay.filter(|relay| !relay.has_failed()) else {
             return Err(Status::failed_precondition(format!("sample set {set_index} is not relayed")));
         };
-        let (images, sets, plan) = (relay.images(), self.clone(), plan.clone());
+        let images = relay.images();
+        let sets = self.clone();
+        let plan = plan.clone();
         // The first request begins the loading, whose end the stream of images tells. The set stays while images are sent.
         tokio::spawn(async move {
             let is_sent = async {
@@ -318,7 +320,8 @@ impl Sets {
     /// The most bytes of a cell's set, with its images for others.
     fn most_bytes(&self, plan: &CellPlan) -> usize {
         let relayed = plan.relays(&self.plans.node_name);
-        let (illumination, cameras) = (&plan.workload.illumination, &*plan.workload.sample_cameras);
+        let illumination = &plan.workload.illumination;
+        let cameras = &*plan.workload.sample_cameras;
         let packed = if relayed { most_image_bytes(illumination, cameras) } else { 0 };
         let copies = if compares_images(plan) { 2 } else { 1 };
         copies * most_set_bytes(illumination, cameras) + packed
@@ -330,7 +333,8 @@ impl Sets {
         set_index: u32,
         content: SetContent,
     ) -> impl FnOnce() -> BoxFuture<Result<(ReadySet, usize), Status>> + Send + 'static {
-        let (sets, plan) = (self.clone(), plan.clone());
+        let sets = self.clone();
+        let plan = plan.clone();
         move || {
             Box::pin(async move {
                 let loaded = sets.fetch_and_upload(&plan, set_index, content).await;
@@ -374,7 +378,8 @@ impl Sets {
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
         let moment = moment(plan, set_index).filter(|_| !plan.is_common);
         let cameras = SampleCamera::references(&plan.workload.sample_cameras);
-        let (since, cell) = (Instant::now(), plan.cell);
+        let since = Instant::now();
+        let cell = plan.cell;
         let scene = plan.workload.scene.clone();
         Ok((ReadySet { set, scene, since, content, cell, moment, subject, cameras, sample_images, relay }, bytes))
     }

@@ -119,7 +119,8 @@ impl Shared {
                 Arc::new(Assignment { policy: Policy::Direct, ..(*plan).clone() })
             });
         }
-        let (name, plan_epoch) = (&self.plans.node_name, plan.plan_epoch);
+        let name = &self.plans.node_name;
+        let plan_epoch = plan.plan_epoch;
         Err(Status::failed_precondition(format!("{name} makes no views in plan_epoch {plan_epoch}")))
     }
 

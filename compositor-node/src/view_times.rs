@@ -105,8 +105,10 @@ mod tests {
 
     #[test]
     fn times_grow_with_pixels_and_the_quickest_of_the_last_calls_counts() {
-        let (now, times) = (Instant::now(), ViewTimes::new(120.0));
-        let (slow, size_px) = (kind(1, "joint_carve"), UVec2::new(1024, 1024));
+        let now = Instant::now();
+        let times = ViewTimes::new(120.0);
+        let slow = kind(1, "joint_carve");
+        let size_px = UVec2::new(1024, 1024);
         times.learn(now, &slow, 1 << 16, 60.0);
         assert_eq!(times.predicted_s(&slow, size_px), None, "the first call builds shaders");
         times.learn(now, &slow, 1 << 16, 1.0);
@@ -121,15 +123,18 @@ mod tests {
 
     #[test]
     fn the_overhead_of_small_calls_predicts_no_long_views() {
-        let (now, times) = (Instant::now(), ViewTimes::new(120.0));
+        let now = Instant::now();
+        let times = ViewTimes::new(120.0);
         (0..2).for_each(|_| times.learn(now, &kind(1, "mesh"), 16 * 16, 0.005));
         assert!(times.check(now, &kind(1, "mesh"), UVec2::new(7680, 4320)).is_ok());
     }
 
     #[test]
     fn a_view_that_takes_too_long_is_refused_by_name() {
-        let (now, times) = (Instant::now(), ViewTimes::new(120.0));
-        let (known, size_px) = (kind(1, "direct"), UVec2::new(3840, 2160));
+        let now = Instant::now();
+        let times = ViewTimes::new(120.0);
+        let known = kind(1, "direct");
+        let size_px = UVec2::new(3840, 2160);
         (0..2).for_each(|_| times.learn(now, &known, 1 << 16, 1.0));
         assert!(times.check(now, &kind(2, "direct"), size_px).is_ok(), "not known");
         assert!(times.check(now, &known, UVec2::new(1920, 1080)).is_ok());
@@ -145,7 +150,8 @@ mod tests {
 
     #[test]
     fn the_kinds_that_were_made_long_ago_are_forgotten() {
-        let (now, times) = (Instant::now(), ViewTimes::new(120.0));
+        let now = Instant::now();
+        let times = ViewTimes::new(120.0);
         for _ in 0..2 {
             (0..2 * MAX_KINDS as u64).for_each(|number| times.learn(now, &kind(number, "mesh"), 1, 1.0));
         }

@@ -254,7 +254,8 @@ pub(crate) mod tests {
 
     #[test]
     fn costs_are_settled_once_they_were_measured_on_an_idle_node() {
-        let (cache, size) = (CostTable::default(), measurement(UVec2::splat(8)));
+        let cache = CostTable::default();
+        let size = measurement(UVec2::splat(8));
         cache.insert("d", &size, Known { is_settled: false, ..measured(0.09) });
         assert_eq!(cache.get("d", &size), Some(Known { is_settled: false, ..measured(0.09) }));
         assert_eq!(cache.find("d", &size), Some(measured(0.09).measured));
@@ -318,7 +319,8 @@ pub(crate) mod tests {
 
     #[test]
     fn parts_of_a_view_are_predicted_with_its_time() {
-        let (cache, size_px) = (CostTable::default(), UVec2::new(64, 48));
+        let cache = CostTable::default();
+        let size_px = UVec2::new(64, 48);
         let light = SharedLightCosts { known_ratio: 0.9, surfaces_s: 0.1, look_up_s: 0.02, unknown_s: 0.28 };
         let mut known = measured(0.4);
         known.measured.shared_light = Some(light);

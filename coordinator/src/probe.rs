@@ -66,10 +66,12 @@ async fn check_image(shared: &Shared, address: &str, image: &ProbedImage) -> Res
     while let Some(chunk) = chunks.next().await {
         if let Some(whole) = reassembler.push(chunk?).map_err(data_loss)? {
             if whole.sample_set_id != id || !image_indices.contains(&whole.image_index) {
-                let (got, set) = (whole.image_index, whole.sample_set_id);
+                let got = whole.image_index;
+                let set = whole.sample_set_id;
                 return Err(Status::data_loss(format!("image {got} of sample set {set} came for {id}")));
             }
-            let (camera, limits) = (image.camera, DecodeLimits::default());
+            let camera = image.camera;
+            let limits = DecodeLimits::default();
             let decode = move || decode_sample_image(&whole.image.header, &camera, &whole.image.payload, &limits);
             return blocking(move || decode().map(drop).map_err(data_loss)).await;
         }

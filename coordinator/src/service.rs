@@ -86,7 +86,8 @@ struct CoordinatorService {
 #[async_trait]
 impl Coordinator for CoordinatorService {
     async fn join_cluster(&self, request: JoinCluster) -> Result<Messages<Welcome>, Status> {
-        let (shared, node_name) = (self.shared.clone(), request.node.node_name.clone());
+        let shared = self.shared.clone();
+        let node_name = request.node.node_name.clone();
         let incarnation = shared.next_number();
         let welcome = Welcome { scenes: shared.offers.iter().map(SceneOffer::scene).collect() };
         let _one = self.shared.joining.lock();

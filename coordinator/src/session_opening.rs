@@ -144,7 +144,8 @@ async fn costs_of(
     let one = shared.measuring.clone().lock_owned().await;
     // Others have opened their workloads meanwhile, or measured the same.
     admits()?;
-    let (shared, events) = (shared.clone(), events.clone());
+    let shared = shared.clone();
+    let events = events.clone();
     let measuring = tokio::spawn(async move {
         let _one = one;
         match known(&shared, &measurement) {

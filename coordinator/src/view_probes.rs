@@ -27,7 +27,8 @@ const _: () = assert!(MAX_PROBE_VIEWS <= cluster::limits::MAX_PROBE_VIEWS, "a pl
 
 /// Finds the measurements of earlier plans.
 pub(crate) async fn recall(shared: Arc<Shared>, workload_number: u64, key: KeptKey) {
-    let (store, nothing) = (shared.config.plans.clone(), Kept::empty(key.clone()));
+    let store = shared.config.plans.clone();
+    let nothing = Kept::empty(key.clone());
     let found = blocking(move || {
         let kept = store.map(|store| store.read(&key));
         let is_small = |kept: &Kept| kept.to_json().is_ok_and(|json| json.len() <= MOST_RECALLED_BYTES);
@@ -50,7 +51,9 @@ pub(crate) async fn keep(shared: Arc<Shared>, kept: Kept) {
 
 /// Has a node measure views.
 pub(crate) async fn probe_views(shared: Arc<Shared>, probe: ViewProbe) {
-    let (workload_number, id, start) = (probe.workload_number, probe.id, Instant::now());
+    let workload_number = probe.workload_number;
+    let id = probe.id;
+    let start = Instant::now();
     let asking = tokio::spawn({
         let shared = shared.clone();
         async move { probed(&shared, probe).await }
@@ -60,7 +63,8 @@ pub(crate) async fn probe_views(shared: Arc<Shared>, probe: ViewProbe) {
     match answer {
         Ok(event) => planned(&shared, workload_number, event),
         Err(status) if is_refusal(&status) => {
-            let (reason, busy_s) = (shortened_reason(status.message()), start.elapsed().as_secs_f64());
+            let reason = shortened_reason(status.message());
+            let busy_s = start.elapsed().as_secs_f64();
             planned(&shared, workload_number, PlannerEvent::Failed { id, reason, busy_s });
         }
         Err(status) => {
@@ -80,7 +84,8 @@ pub(crate) async fn represent(shared: Arc<Shared>, workload_number: u64, choice:
     };
     match measured {
         Ok(measured) => {
-            let (costs, planes) = (measured.costs, measured.planes);
+            let costs = measured.costs;
+            let planes = measured.planes;
             shared.step(Event::Represented { workload_number, choice, costs, planes });
         }
         Err(status) => {

@@ -457,7 +457,8 @@ impl Random {
 }
 
 fn random_events(seed: u64) -> String {
-    let (mut script, mut random) = (Script::new(&format!("random events of seed {seed}"), 3), Random(seed));
+    let mut script = Script::new(&format!("random events of seed {seed}"), 3);
+    let mut random = Random(seed);
     // Sessions of one workload, which all ask for the same.
     let policy = POLICIES[random.below(4) as usize];
     let images = if random.below(3) == 0 { 6 } else { 4 };

@@ -69,7 +69,8 @@ impl ViewSpace {
         if size_px.min_element() == 0 || size_px.max_element() > MAX_CANVAS_PX {
             return Err(bad("size", size_px.to_array(), "1 to 16384 pixels a side"));
         }
-        let (eye, target) = (point("eye", page.eye)?, point("target", page.target)?);
+        let eye = point("eye", page.eye)?;
+        let target = point("target", page.target)?;
         let camera = PinholeCamera::looking_at(eye, target, Vec3::Y, page.fov_y_deg.to_radians() as f32, size_px);
         let camera = PinholeCamera { near_m: self.near_m, ..camera };
         camera.validate().map_err(|error| bad("camera", error.to_string(), "a camera"))?;

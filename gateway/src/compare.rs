@@ -43,7 +43,8 @@ pub(crate) async fn compare(
 }
 
 fn compared(frame: &Frame, direct: &Frame) -> Option<Value> {
-    let (test, reference) = (Rgb8Image::of_view(&frame.view).ok()?, Rgb8Image::of_view(&direct.view).ok()?);
+    let test = Rgb8Image::of_view(&frame.view).ok()?;
+    let reference = Rgb8Image::of_view(&direct.view).ok()?;
     let [foreground, whole] = PictureErrors::of(&direct.view, &test).ok()?;
     let flip = flip_map(&reference, &test).ok()?;
     let flip_image = View { srgb8: pictures::error_map(&flip).into_raw(), ..frame.view.clone() };

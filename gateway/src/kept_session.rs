@@ -76,7 +76,8 @@ impl KeptSession {
         let waiting = SessionState::Waiting { stage: "connecting", detail: "the gateway connects".to_owned() };
         let (changes, state) = watch::channel(waiting);
         let (failures, failed) = mpsc::channel(16);
-        let (light_steps, timeline) = (request.refinement_steps.max(1), request.timeline);
+        let light_steps = request.refinement_steps.max(1);
+        let timeline = request.timeline;
         let visits = Arc::new(Visits::default());
         let coordinator = coordinator.to_owned();
         let usual_rate = request.frames_per_s;
@@ -137,7 +138,8 @@ enum Closed {
 
 impl Keeper {
     async fn run(mut self, first: FirstOpened) {
-        let (mut delay, mut is_wanted) = (FIRST_DELAY, first == FirstOpened::AtOnce);
+        let mut delay = FIRST_DELAY;
+        let mut is_wanted = first == FirstOpened::AtOnce;
         loop {
             if !is_wanted {
                 self.visits.somebody().await;
@@ -211,7 +213,8 @@ impl Keeper {
 
     /// Has the session's demand follow the visitors, until it fails or they have left.
     async fn follow(&mut self, session: &Arc<Session>) -> Closed {
-        let (mut ticks, mut told) = (tokio::time::interval(FOLLOW), 1);
+        let mut ticks = tokio::time::interval(FOLLOW);
+        let mut told = 1;
         loop {
             tokio::select! {
                 failed = self.failed.recv() => if failed.is_none_or(|failed| Arc::ptr_eq(&failed, session)) {

@@ -80,11 +80,15 @@ mod tests {
     /// Sends a still of this size over a link. Returns the seconds until the page has it, and the greatest number of bytes
     /// that waited for the link.
     fn sent_over(bytes: usize, bytes_per_s: f64, rtt_s: f64) -> (f64, usize) {
-        let (mut parts, start) = (Parts::default(), Instant::now());
+        let mut parts = Parts::default();
+        let start = Instant::now();
         let at = |s: f64| start + Duration::from_secs_f64(s);
         let first = parts.begin(Bytes::from(vec![0; bytes]), start);
-        let (mut arrivals, mut most, mut left) = (VecDeque::new(), 0, bytes - first.len());
-        let (mut free_s, mut now_s) = (first.len() as f64 / bytes_per_s, 0.0);
+        let mut arrivals = VecDeque::new();
+        let mut most = 0;
+        let mut left = bytes - first.len();
+        let mut free_s = first.len() as f64 / bytes_per_s;
+        let mut now_s = 0.0;
         arrivals.push_back(free_s);
         while let Some(arrival) = arrivals.pop_front() {
             now_s = arrival + rtt_s;
@@ -116,7 +120,8 @@ mod tests {
 
     #[test]
     fn parts_are_the_whole_and_a_pose_ends_them() {
-        let (mut parts, now) = (Parts::default(), Instant::now());
+        let mut parts = Parts::default();
+        let now = Instant::now();
         let message: Bytes = (0..100_000_u32).map(|i| i as u8).collect();
         let mut all = parts.begin(message.clone(), now).to_vec();
         while !parts.rest.is_empty() {

@@ -126,7 +126,8 @@ impl PictureStream {
 
     /// The message of a picture, which is sent now.
     pub(crate) fn message(&mut self, frame: &EncodedFrame, asked: &Asked, about: About) -> Bytes {
-        let (number, size_px) = (asked.pose.number, frame.header.size_px);
+        let number = asked.pose.number;
+        let size_px = frame.header.size_px;
         let chosen = asked.chosen.filter(|_| number > self.last);
         self.last = number;
         self.sent.push_back(Sent { number, frame: frame.request.frame, chosen });
@@ -166,7 +167,8 @@ fn times(frame: &EncodedFrame, arrived: Instant, leaves: Instant) -> PictureTime
     let ms = |seconds: f64| seconds * 1000.0;
     let between = |from: Instant, to: Instant| ms(to.saturating_duration_since(from).as_secs_f64());
     let at = &frame.header.stage_times;
-    let (to_send, forward) = (between(arrived, frame.sent), between(frame.received, leaves));
+    let to_send = between(arrived, frame.sent);
+    let forward = between(frame.received, leaves);
     let gateway = between(arrived, leaves);
     let stages_s = at.set_wait_s + at.credit_wait_s + at.queue_s + at.batch_s + at.encode_s + at.send_wait_s;
     PictureTimes {

@@ -229,7 +229,8 @@ mod tests {
 
         /// Heights over time, by a picture after the other.
         fn run(&mut self, rate: &mut Rate, from_s: f64, to_s: f64) -> Vec<(f64, u32)> {
-            let (mut now_s, mut heights) = (from_s, Vec::new());
+            let mut now_s = from_s;
+            let mut heights = Vec::new();
             while now_s < to_s {
                 let chosen = rate.chosen();
                 let age_s = self.age_s(chosen);
@@ -248,7 +249,8 @@ mod tests {
     #[test]
     fn no_link_makes_the_size_swing_by_more_than_a_rung() {
         for seed in 0..200 {
-            let (mut link, mut rate) = (Link::random(seed), Rate::default());
+            let mut link = Link::random(seed);
+            let mut rate = Rate::default();
             rate.limit(LightCacheQuality::ALL.get(seed as usize % 6).copied());
             let heights = link.run(&mut rate, 0.0, 120.0);
             let late = heights.iter().filter(|(s, _)| *s > 30.0).map(|(_, height)| rung(*height));
@@ -264,7 +266,8 @@ mod tests {
     #[test]
     fn the_age_stays_within_its_budget_where_any_size_does() {
         for seed in 0..200 {
-            let (mut link, mut rate) = (Link::random(seed), Rate::default());
+            let mut link = Link::random(seed);
+            let mut rate = Rate::default();
             link.run(&mut rate, 0.0, 30.0);
             let ages: Vec<f64> = (0..99).map(|_| link.age_s(rate.chosen())).collect();
             let lowest = Chosen { rung: Rung { height: 0, quality: 0 } };

@@ -67,7 +67,8 @@ pub fn accept(listener: TcpListener) -> Connections {
 pub async fn serve(mut connections: Connections, config: GatewayConfig, shutdown: CancellationToken) {
     let tls = config.tls.clone().map(TlsAcceptor::from);
     let gateway = Arc::new(Gateway::new(config, shutdown.clone()));
-    let (router, mut open) = (router(gateway.clone()), JoinSet::new());
+    let router = router(gateway.clone());
+    let mut open = JoinSet::new();
     let until = shutdown.clone();
     open.spawn(async move {
         until.run_until_cancelled(gateway.scenes.prepare()).await;
@@ -85,7 +86,8 @@ pub async fn serve(mut connections: Connections, config: GatewayConfig, shutdown
         let _ = stream.set_nodelay(true);
         let mut stream = Box::pin(TimeoutStream::new(stream));
         stream.as_mut().set_write_timeout_pinned(Some(WRITES_WITHIN));
-        let (router, shutdown) = (router.clone(), shutdown.clone());
+        let router = router.clone();
+        let shutdown = shutdown.clone();
         match tls.clone() {
             None => drop(open.spawn(answer(stream, router, shutdown))),
             Some(tls) => drop(open.spawn(async move {
@@ -160,7 +162,9 @@ mod tests {
         let (mut client, server) = tokio::io::duplex(1 << 16);
         let serving = tokio::spawn(answer(server, router, CancellationToken::new()));
         client.write_all(b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").await.unwrap();
-        let (start, mut chunk, mut total) = (Instant::now(), vec![0; bytes_a_second], 0);
+        let start = Instant::now();
+        let mut chunk = vec![0; bytes_a_second];
+        let mut total = 0;
         loop {
             match client.read(&mut chunk).await.unwrap_or(0) {
                 0 => break,

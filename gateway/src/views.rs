@@ -111,7 +111,8 @@ impl Visited {
     /// The scene and the camera of a query, whose view is within `max_px`.
     pub(crate) async fn of(gateway: &Gateway, query: &ViewQuery, max_px: UVec2) -> Result<Self, Refusal> {
         let scene = gateway.scenes.visit(query.scene.as_deref()).await?;
-        let (moment, moments) = (query.moment, scene.timeline().set_count);
+        let moment = query.moment;
+        let moments = scene.timeline().set_count;
         if moment >= moments {
             return Err(Refusal::bad(format!("moment: {moment}, must be below {moments}")));
         }
@@ -236,8 +237,8 @@ pub(crate) async fn point(
 
 fn surface(visited: &Visited, view: &View, at: UVec2, first_camera: usize) -> Option<Value> {
     let index = (at.y * view.size_px.x + at.x) as usize;
-    let (inverse, provenance) =
-        (*view.inverse_depth_per_m.as_ref()?.get(index)?, *view.provenance.as_ref()?.get(index)?);
+    let inverse = *view.inverse_depth_per_m.as_ref()?.get(index)?;
+    let provenance = *view.provenance.as_ref()?.get(index)?;
     let has_surface = inverse > 0.0 && provenance.kind() != ProvenanceKind::Empty;
     let pixel = at.as_vec2() + Vec2::splat(0.5);
     let in_world = visited.camera.unproject(PixelDepth { pixel, planar_depth_m: 1.0 / inverse });

@@ -216,7 +216,8 @@ impl Visitor {
     ) -> Result<Option<ClientError>, End> {
         self.begin(page, session)?;
         let client = ClientId::new();
-        let (mut motion, mut still) = (PictureStream::new(session, client), PictureStream::new(session, client));
+        let mut motion = PictureStream::new(session, client);
+        let mut still = PictureStream::new(session, client);
         if let Some(pose) = self.newest {
             self.ask(pose, &mut motion, &mut still)?;
         }
@@ -379,7 +380,8 @@ impl Visitor {
             stream.discard(&frame);
             return Ok(());
         };
-        let (pose, plan) = (asked.pose, session.plan().assignment);
+        let pose = asked.pose;
+        let plan = session.plan().assignment;
         self.sent = pose.number;
         let is_drawn = asked.light == PictureLight::Drawn;
         let is_planned_direct =

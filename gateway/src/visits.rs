@@ -81,7 +81,8 @@ mod tests {
 
     #[test]
     fn visitors_count_while_they_move() {
-        let (visits, start) = (Visits::default(), Instant::now());
+        let visits = Visits::default();
+        let start = Instant::now();
         visits.moved(1, start);
         visits.moved(2, start + ACTIVE_FOR / 2);
         assert_eq!(visits.active(start + ACTIVE_FOR / 2), 2);

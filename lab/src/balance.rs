@@ -4,7 +4,8 @@
 /// Eq. 3 as it is printed, with ⌈ ⌉. Kept to show that it is worse.
 #[must_use]
 pub fn k_fd_printed(s: usize, g: f64, v: usize, c: f64, p: usize) -> usize {
-    let (a, b) = (s as f64 * g, v as f64 * c);
+    let a = s as f64 * g;
+    let b = v as f64 * c;
     ((a * p as f64 + b) / (a + b)).ceil() as usize
 }
 
@@ -42,7 +43,9 @@ mod tests {
 
     #[test]
     fn floor_is_optimal_and_the_printed_ceil_is_not() {
-        let (mut sets, mut ceil_worse, mut ceil_leaves_none) = (0, 0, 0);
+        let mut sets = 0;
+        let mut ceil_worse = 0;
+        let mut ceil_leaves_none = 0;
         for (s, g, v, c, p) in parameter_sets() {
             let time = |k| pipeline_time(s, g, v, c, p, k);
             let best = time(brute_force_k(s, g, v, c, p));

@@ -87,7 +87,8 @@ impl Process {
 
     /// Starts a node on a free port. It prints its address, then that of its metrics.
     pub fn node(number: usize, coordinator: &str, device: DevicePreference) -> anyhow::Result<Self> {
-        let (name, device) = (node_name(number), device.to_string());
+        let name = node_name(number);
+        let device = device.to_string();
         let fixed = ["node", "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0"];
         let own = ["--coordinator", coordinator, "--name", &name, "--device", &device];
         let arguments: Vec<String> = fixed.iter().chain(&own).map(|&word| word.to_owned()).collect();

@@ -31,7 +31,8 @@ fn input_that_cannot_be_used_is_named_with_status_2() {
     std::fs::write(&broken, b"no model").unwrap();
     let cameras = folder.path().join("cameras.json");
     std::fs::write(&cameras, b"{\"frames\": [{}]}").unwrap();
-    let (broken, cameras) = (broken.to_str().unwrap(), cameras.to_str().unwrap());
+    let broken = broken.to_str().unwrap();
+    let cameras = cameras.to_str().unwrap();
     let folder = folder.path().to_str().unwrap();
     let many = vec!["flip 0.1"; 200].join(", ");
     let cases: [(&[&str], &str); 24] = [

@@ -23,7 +23,8 @@ fn names_in(text: &str) -> BTreeSet<String> {
 #[test]
 fn every_metric_of_the_dashboard_is_exported() {
     let telemetry = Telemetry::default();
-    let (node, coordinator) = (NodeMetrics::new(&telemetry), CoordinatorMetrics::new(&telemetry));
+    let node = NodeMetrics::new(&telemetry);
+    let coordinator = CoordinatorMetrics::new(&telemetry);
     node.drop_view("client gone");
     let shared_light = Some(SharedLightCosts { known_ratio: 0.9, surfaces_s: 0.1, look_up_s: 0.02, unknown_s: 0.3 });
     let workloads = vec![WorkloadStatus { shared_light, ..WorkloadStatus::default() }];

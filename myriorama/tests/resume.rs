@@ -104,7 +104,8 @@ fn interrupt_twice(mut view: Child) {
 
 #[test]
 fn a_second_signal_ends_a_command_that_writes_a_picture() {
-    let (up, folder) = (Up::start(), tempfile::tempdir().unwrap());
+    let up = Up::start();
+    let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let mut view = up.view(folder, MANY).spawn().unwrap();
     wait_for_first_picture(folder);
@@ -121,7 +122,8 @@ fn a_second_signal_ends_a_command_that_writes_a_picture() {
 
 #[test]
 fn a_second_signal_ends_a_command_that_writes_its_record() {
-    let (up, folder) = (Up::start(), tempfile::tempdir().unwrap());
+    let up = Up::start();
+    let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let view = up.view(folder, MANY).spawn().unwrap();
     wait_for_first_picture(folder);

@@ -35,7 +35,8 @@ pub async fn serve(
     metrics: NodeMetrics,
     shutdown: CancellationToken,
 ) -> Result<(), ServeError> {
-    let (address, away) = (listener.local_addr()?, config.deadlines.away);
+    let address = listener.local_addr()?;
+    let away = config.deadlines.away;
     let mut listening = Some(listener);
     loop {
         let ready = async {
@@ -97,7 +98,8 @@ async fn serve_on(
     let engine: Arc<dyn Engine> = Arc::new(monitor.clone());
     let plans = PlansInForce::new(&config.node_name);
     let scenes = Arc::new(Scenes::new(engine.clone(), config));
-    let (address, left) = (listener.local_addr()?, plans.clone());
+    let address = listener.local_addr()?;
+    let left = plans.clone();
     let status = NodeStatus {
         node_name: config.node_name.clone(),
         address: config.advertised_address.clone().unwrap_or_else(|| format!("http://{address}")),
@@ -113,7 +115,8 @@ async fn serve_on(
         probers.clone(),
         shutdown.clone(),
     );
-    let (relay, done) = (compositor.relay(), metrics.done.clone());
+    let relay = compositor.relay();
+    let done = metrics.done.clone();
     let sampler = SamplerService::new(scenes.clone(), plans.clone(), config, relay, metrics.clone(), shutdown.clone());
     monitor.set_memory(vec![compositor.memory(), sampler.memory()]);
     let service = NodeService::new(plans.clone(), scenes.clone(), config.quotas, metrics, probers);
@@ -121,9 +124,13 @@ async fn serve_on(
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))
         .add_service(compositor_server(compositor));
-    let (coordinator, away, ends) = (config.coordinator.clone(), config.deadlines.away, shutdown.clone());
+    let coordinator = config.coordinator.clone();
+    let away = config.deadlines.away;
+    let ends = shutdown.clone();
     let member = move || {
-        let (node, coordinator, plans) = (status.clone(), coordinator.clone(), plans.clone());
+        let node = status.clone();
+        let coordinator = coordinator.clone();
+        let plans = plans.clone();
         keep_membership(node, coordinator, plans, scenes.clone(), done.clone(), ends.clone())
     };
     let membership = tokio::spawn(stay_while_memory_lasts(member, monitor.clone(), left, away));

@@ -89,13 +89,16 @@ impl SamplerService {
         let content = plan.set_content(set_index).ok_or_else(|| beyond_timeline(set_index))?;
         let indices = plan.images_of(&self.plans.node_name, set_index).to_vec();
         let work = sample_work(plan, &indices, set_index)?;
-        let (scenes, scene, metrics) = (self.scenes.clone(), plan.workload.scene.clone(), self.metrics.clone());
+        let scenes = self.scenes.clone();
+        let scene = plan.workload.scene.clone();
+        let metrics = self.metrics.clone();
         let own: Vec<_> = indices.iter().map(|&index| work.cameras[index as usize]).collect();
         let most_bytes = most_image_bytes(&plan.workload.illumination, &own);
         let key = (content, plan.tile_count, indices.clone());
         let tiles = f64::from(plan.tile_count);
         let number = plan.workload_number;
-        let (turn, plans) = (self.turns.of(number), self.plans.clone());
+        let turn = self.turns.of(number);
+        let plans = self.plans.clone();
         let make = move || async move {
             let _one = turn.lock().await;
             // A later plan may be in force by now: its sets must not wait for sets that no plan has any more.
@@ -121,7 +124,8 @@ impl SamplerService {
     ) -> Messages<Chunk> {
         let id = SampleSetId { plan_epoch: plan.plan_epoch, index: request.set_index.into() };
         let (send, chunks) = mpsc::channel(CHUNKS_AHEAD);
-        let (wanted, stall) = (request.image_indices, self.stall);
+        let wanted = request.image_indices;
+        let stall = self.stall;
         let send_all = async move |send: &mpsc::Sender<Result<Chunk, Status>>| match images.await {
             Ok(images) => send_chunks(images, id, &wanted, send, stall).await,
             Err(status) => drop(send.send_timeout(Err(status), stall).await),
@@ -190,7 +194,8 @@ async fn send_chunks(
 
 /// The work of sampling a set.
 fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<SampleWork, Status> {
-    let (workload, cameras) = (&plan.workload, plan.sampled_cameras());
+    let workload = &plan.workload;
+    let cameras = plan.sampled_cameras();
     if indices.iter().any(|&index| index as usize >= cameras.len()) {
         return Err(Status::internal("image_indices beyond the sample cameras"));
     }
@@ -207,7 +212,8 @@ fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Sam
 /// Images with the seconds that they took.
 fn sample(engine: &dyn Engine, work: &SampleWork) -> Result<(Vec<SampleImage>, f64), EngineError> {
     let (images, sampled_s) = own_time(engine, || engine.sample(work, Turn::of(WorkClass::Batch)));
-    let (scene_time_s, refinement_step) = (work.scene_time_s, work.refinement.step);
+    let scene_time_s = work.scene_time_s;
+    let refinement_step = work.refinement.step;
     tracing::debug!(images = work.wanted.len(), scene_time_s, refinement_step, sampled_s, "sampled");
     Ok((images?, sampled_s))
 }

@@ -95,7 +95,8 @@ impl Node {
     /// Hands over as many views of the first message as have credit; gives whether these were all.
     pub(crate) fn hand_over(&mut self) -> bool {
         let Some((set, left)) = self.messages.front_mut() else { return false };
-        let (set, views) = (*set, (*left).min(self.credit));
+        let set = *set;
+        let views = (*left).min(self.credit);
         self.credit -= views;
         *left -= views;
         let all = *left == 0;
@@ -116,7 +117,8 @@ impl Node {
             return Some(job);
         }
         let (set, waiting) = self.waiting.front_mut()?;
-        let (set, views) = (*set, (*waiting).min(batch_views));
+        let set = *set;
+        let views = (*waiting).min(batch_views);
         *waiting -= views;
         if *waiting == 0 {
             self.waiting.pop_front();

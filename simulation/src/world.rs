@@ -66,7 +66,8 @@ pub fn run(cluster: &Cluster, plan: &SessionPlan, views: usize, sets: u32, habit
 
 impl<'a> World<'a> {
     fn new(cluster: &'a Cluster, plan: &'a SessionPlan, views: usize, sets: u32, habits: Habits) -> Self {
-        let (view_s, plan) = (plan.view_s(), &plan.assignment);
+        let view_s = plan.view_s();
+        let plan = &plan.assignment;
         let weighted = compositors_of(plan, views);
         let weights: Vec<u32> = weighted.iter().map(|(_, weight)| *weight).collect();
         let mut unrequested = ViewQueue::new(&weights, view_s);
@@ -258,7 +259,8 @@ impl<'a> World<'a> {
     }
 
     fn start_device(&mut self, node: usize) {
-        let (policy, tiles) = (self.plan.policy, self.plan.tile_count as usize);
+        let policy = self.plan.policy;
+        let tiles = self.plan.tile_count as usize;
         let this = &mut self.nodes[node];
         if this.running.is_some() {
             return;
@@ -328,7 +330,8 @@ impl<'a> World<'a> {
 
     /// Occupies the receiver's link behind the parcels before.
     fn receive(&mut self, sampler: usize, set: u32, images: usize, place: usize, sending_s: f64) {
-        let (node, part_bytes) = (self.receiver(sampler, place), self.part_bytes());
+        let node = self.receiver(sampler, place);
+        let part_bytes = self.part_bytes();
         let this = &mut self.nodes[node];
         let seconds = images as f64 * part_bytes / this.machine.bytes_per_s;
         let end_s = (this.in_free_s.max(self.now_s) + seconds).max(self.now_s + sending_s);

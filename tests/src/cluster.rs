@@ -319,7 +319,8 @@ impl Cluster {
 
     /// As [`Cluster::start`], with another scene on offer.
     pub async fn start_offering(offer: SceneOffer, nodes: usize) -> Self {
-        let (config, observers) = (CoordinatorConfig::default(), Observers::default());
+        let config = CoordinatorConfig::default();
+        let observers = Observers::default();
         let start = move |listener, shutdown| coordinator::serve(listener, config, offer.into(), observers, shutdown);
         Self::start_after(Server::start(start), nodes, |config| config).await
     }

@@ -70,7 +70,8 @@ impl History {
     #[must_use]
     pub fn longest_wait(&self, since: Instant) -> Duration {
         let answered = self.calls.iter().filter(|call| call.error.is_none() && call.ended > since);
-        let (mut last, mut longest) = (since, Duration::ZERO);
+        let mut last = since;
+        let mut longest = Duration::ZERO;
         for call in answered {
             longest = longest.max(call.ended - last);
             last = call.ended;
@@ -108,7 +109,8 @@ impl History {
 
     /// Each frame number arrived once, in the order of the calls, and was requested.
     fn numbers(&self) -> Vec<String> {
-        let (mut wrong, mut seen) = (Vec::new(), HashSet::new());
+        let mut wrong = Vec::new();
+        let mut seen = HashSet::new();
         let mut highest = None;
         for call in &self.calls {
             for Seen { frame, .. } in &call.frames {
@@ -138,7 +140,8 @@ impl History {
     /// Plan epochs of frames rise from call to call: no frame comes from a replaced plan.
     fn epochs_of_frames(&self) -> Vec<String> {
         let epochs = |call: &Call| call.frames.iter().map(|seen| seen.plan_epoch).collect::<BTreeSet<_>>();
-        let (mut wrong, mut highest) = (Vec::new(), 0);
+        let mut wrong = Vec::new();
+        let mut highest = 0;
         for call in &self.calls {
             let epochs = epochs(call);
             if epochs.first().is_some_and(|&least| least < highest) {
@@ -154,7 +157,8 @@ impl History {
         let mut plans = Vec::new();
         for log in &self.logs {
             let [once, again] = [(); 2].map(|()| replay(Cursor::new(log)).map_err(|error| error.to_string()));
-            let (once, again) = (once?, again?);
+            let once = once?;
+            let again = again?;
             if once != again {
                 return Err("a log is not replayed twice alike".to_owned());
             }
@@ -206,7 +210,8 @@ fn roles(plan: &Assignment) -> Vec<String> {
 
 /// Epochs rise from plan to plan of each workload.
 fn rising(commanded: &[Assignment]) -> Vec<String> {
-    let (mut wrong, mut last) = (Vec::new(), BTreeMap::new());
+    let mut wrong = Vec::new();
+    let mut last = BTreeMap::new();
     for Assignment { workload_number, plan_epoch, .. } in commanded {
         // Later sessions receive the same plan again.
         if let Some(before) = last.insert(workload_number, plan_epoch).filter(|before| *before > plan_epoch) {

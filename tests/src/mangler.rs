@@ -47,7 +47,8 @@ impl Mangler {
     pub async fn start() -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = format!("http://{}", listener.local_addr().expect("an address"));
-        let (node, orders) = (Arc::<Mutex<String>>::default(), Arc::<Mutex<Orders>>::default());
+        let node = Arc::<Mutex<String>>::default();
+        let orders = Arc::<Mutex<Orders>>::default();
         let front = Front { node: node.clone(), orders: orders.clone() };
         let shutdown = CancellationToken::new();
         tokio::spawn(serve_front(listener, front, shutdown.clone()));

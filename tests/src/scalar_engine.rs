@@ -115,8 +115,11 @@ fn ball(ray: &Ray, scene_time_s: f32, refinement: Refinement) -> Option<Meets> {
 
 /// Where a ray's line enters the ball and leaves it.
 fn ball_sides(ray: &Ray, scene_time_s: f32) -> impl Iterator<Item = f32> {
-    let (to_eye, d) = (ray.origin_in_world - ball_center(scene_time_s), ray.direction_in_world);
-    let (a, b, c) = (d.dot(d), to_eye.dot(d), to_eye.dot(to_eye) - BALL_RADIUS_M * BALL_RADIUS_M);
+    let to_eye = ray.origin_in_world - ball_center(scene_time_s);
+    let d = ray.direction_in_world;
+    let a = d.dot(d);
+    let b = to_eye.dot(d);
+    let c = to_eye.dot(to_eye) - BALL_RADIUS_M * BALL_RADIUS_M;
     let root = (b * b - a * c).sqrt();
     [(-b - root) / a, (-b + root) / a].into_iter().filter(|t| t.is_finite())
 }
@@ -172,7 +175,8 @@ fn with_light(image: DepthImage) -> DepthImage {
 
 /// The surfaces of the ball and of the floor's upper side on each line.
 fn layered_image(camera: &ParallelCamera, scene_time_s: f32, refinement: Refinement) -> LayeredDepthImage {
-    let (mut first, mut met) = (vec![0], Vec::new());
+    let mut first = vec![0];
+    let mut met = Vec::new();
     for pixel in pixels(camera.size_px) {
         let ray = camera.ray(pixel);
         let mut line: Vec<(f32, Vec3, Vec3)> = ball_sides(&ray, scene_time_s)
@@ -206,7 +210,8 @@ struct Canvas {
 
 impl Canvas {
     fn new(camera: &PinholeCamera, background: &Environment) -> Self {
-        let (size_px, texels) = (camera.size_px, camera.pixel_count());
+        let size_px = camera.size_px;
+        let texels = camera.pixel_count();
         let towards = |pixel| camera.ray(pixel).direction_in_world.normalize_or_zero();
         Self {
             inverse_depth_per_m: vec![0.0; texels],

@@ -58,7 +58,9 @@ pub async fn walk(cluster: &Cluster, count: usize, lasting: Duration) -> Walked 
         })
     };
     let plan = || walkers[0].session.plan().assignment;
-    let (first_epoch, before, start) = (plan().plan_epoch, counted(), Instant::now());
+    let first_epoch = plan().plan_epoch;
+    let before = counted();
+    let start = Instant::now();
     let watch = walkers[0].session.clone();
     let mut walking = JoinSet::new();
     for walker in walkers {
@@ -68,7 +70,8 @@ pub async fn walk(cluster: &Cluster, count: usize, lasting: Duration) -> Walked 
     while let Some(gap_s) = walking.join_next().await {
         longest_gap_s = longest_gap_s.max(gap_s.expect("a walk to its end"));
     }
-    let (plan, after) = (watch.plan().assignment, counted());
+    let plan = watch.plan().assignment;
+    let after = counted();
     Walked {
         policy: plan.policy.to_string(),
         seconds: start.elapsed().as_secs_f64(),
@@ -104,7 +107,9 @@ impl Walker {
     async fn walk(mut self, lasting: Duration) -> f64 {
         let mut ticks = interval(Duration::from_secs_f64(1.0 / RATE_HZ));
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-        let (start, mut last, mut longest) = (Instant::now(), Instant::now(), Duration::ZERO);
+        let start = Instant::now();
+        let mut last = Instant::now();
+        let mut longest = Duration::ZERO;
         while start.elapsed() < lasting {
             tokio::select! {
                 _ = ticks.tick() => {

@@ -140,7 +140,9 @@ async fn ask_once(session: &Session, number: u64) -> Call {
         set_index,
         camera: camera((frame % VIEWS) as f32 * 0.2 - 0.3, UVec2::new(40, 30)),
     };
-    let (asked, mut frames, mut error) = (Instant::now(), Vec::new(), None);
+    let asked = Instant::now();
+    let mut frames = Vec::new();
+    let mut error = None;
     match session.render_views(wanted.clone().map(view)) {
         Err(refused) => error = Some(refused.to_string()),
         Ok(mut coming) => {

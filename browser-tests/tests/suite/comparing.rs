@@ -50,7 +50,8 @@ fn decoded(url: &str) -> Vec<u8> {
 /// PSNR, SSIM and FLIP of two pictures.
 fn errors(view: &[u8], direct: &[u8]) -> [f64; 3] {
     let image = |srgb8| Rgb8Image::new(COMPARED_PX[0], COMPARED_PX[1], srgb8).unwrap();
-    let (test, reference) = (image(view), image(direct));
+    let test = image(view);
+    let reference = image(direct);
     let psnr_db = psnr_db(&reference, &test, None).unwrap().unwrap();
     let mean = |map: metrics::ScoreMap| map.mean(None).unwrap().unwrap();
     [psnr_db, mean(ssim_map(&reference, &test).unwrap()), mean(flip_map(&reference, &test).unwrap())]
@@ -72,7 +73,8 @@ async fn the_figures_are_those_of_the_two_pictures() {
     assert_eq!(answer.size_px, COMPARED_PX);
     let sources: [String; 3] = visit.browser.value(SOURCES).await.unwrap();
     assert!(sources == [answer.view.clone(), answer.direct.clone(), answer.flip_map], "the same pictures");
-    let (view, direct) = (decoded(&answer.view), decoded(&answer.direct));
+    let view = decoded(&answer.view);
+    let direct = decoded(&answer.direct);
     assert!(view == bench.reference(&camera.into(), COMPARED_PX).await, "the view is a finished still");
     let colors: BTreeSet<_> = direct.as_chunks::<3>().0.iter().copied().collect();
     let surfaces = [ball_linear(0.0, Refinement::default()), FLOOR_LINEAR, SKY_LINEAR].map(srgb8);

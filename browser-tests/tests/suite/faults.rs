@@ -38,7 +38,8 @@ async fn a_page_comes_back_to_its_pose_when_its_gateway_does() {
     let (mut bench, url) = gateway().await;
     let visit = Visit::to(&url).await;
     visit.settled().await;
-    let (before, shown) = (walk(&visit).await, visit.canvas().await);
+    let before = walk(&visit).await;
+    let shown = visit.canvas().await;
     let state = visit.state().await;
     bench.kill_gateway();
     visit.until(BANNER).await;

@@ -21,7 +21,8 @@ const MAX_GAP_MS: f64 = 1500.0;
 
 /// The pictures in motion of a drag that lasts for some time.
 async fn drag_for(visit: &Visit, time: Duration) -> Vec<Picture> {
-    let (start, before) = (Instant::now(), visit.picture_count().await);
+    let start = Instant::now();
+    let before = visit.picture_count().await;
     while start.elapsed() < time {
         visit.browser.drag(&Drag::along(to_and_fro([200.0, 200.0], 40))).await.unwrap();
     }
@@ -88,7 +89,8 @@ async fn a_still_on_a_slow_link_ends_for_a_drag() {
     visit.until(&begun).await;
     let bytes: u64 = visit.browser.value("myriorama.link.picture.header.bytes").await.unwrap();
     assert!(bytes > STILL_BYTES, "a still of {bytes} bytes");
-    let (start, before) = (Instant::now(), visit.picture_count().await);
+    let start = Instant::now();
+    let before = visit.picture_count().await;
     visit.browser.drag(&Drag::along(to_and_fro([200.0, 200.0], 10))).await.unwrap();
     visit.until(&format!("myriorama.statistics.pictures.length > {before}")).await;
     assert!(start.elapsed() < FIRST_MOVE, "{:?}", start.elapsed());

@@ -30,7 +30,8 @@ async fn legend(visit: &Visit) -> Vec<String> {
     let entries: Vec<(String, String)> = visit.browser.value(ENTRIES).await.unwrap();
     let overlay = visit.browser.canvas("#overlay").await.unwrap();
     let colors = overlay.srgb8.as_chunks::<3>().0.iter().map(|[r, g, b]| format!("rgb({r}, {g}, {b})"));
-    let (seen, named) = (BTreeSet::from_iter(colors), entries.iter().map(|(_, color)| color.clone()).collect());
+    let seen = BTreeSet::from_iter(colors);
+    let named = entries.iter().map(|(_, color)| color.clone()).collect();
     assert!(seen.is_superset(&named), "{named:?} in {seen:?}");
     entries.into_iter().map(|(name, _)| name).collect()
 }

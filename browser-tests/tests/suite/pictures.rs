@@ -39,7 +39,8 @@ async fn a_rested_page_shows_the_picture_of_the_rust_client_to_the_bit() {
 
 /// Drags until the page has shown this many pictures in motion.
 async fn drag_for(visit: &Visit, pictures: usize) {
-    let (start, before) = (Instant::now(), visit.picture_count().await);
+    let start = Instant::now();
+    let before = visit.picture_count().await;
     while visit.picture_count().await < before + pictures {
         assert!(start.elapsed() < 2 * SOON, "{} pictures", visit.picture_count().await - before);
         visit.browser.drag(&Drag::along(to_and_fro([200.0, 200.0], 40))).await.unwrap();

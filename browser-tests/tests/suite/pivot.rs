@@ -17,7 +17,8 @@ async fn a_double_click_sets_the_pivot_on_the_surface_and_turns_nothing() {
     visit.click_picture(place, 2).await;
     visit.until(&format!("myriorama.state().target[0] !== {}", before.target[0])).await;
     visit.rested().await;
-    let (after, point) = (visit.state().await, on_ball(&camera, place));
+    let after = visit.state().await;
+    let point = on_ball(&camera, place);
     assert!(after.pivot().distance(point) < TOLERANCE_M, "{after:?} instead of {point}");
     let distance = (after.pivot() - before.eye()).dot(before.forward());
     assert!((after.distance - distance).abs() < 1e-9, "it comes no closer");

@@ -42,7 +42,8 @@ fn expected(camera: &PageCamera, size_px: [u32; 2]) -> Extents {
 /// The ball is where it belongs, to two samples.
 fn assert_round(still: &Picture, canvas: &Pixels) {
     assert_eq!(still.header.size_px, canvas.size_px);
-    let (seen, expected) = (seen(canvas), expected(&still.header.camera.into(), canvas.size_px));
+    let seen = seen(canvas);
+    let expected = expected(&still.header.camera.into(), canvas.size_px);
     let sample_px = canvas.size_px[1] as f32 / SAMPLE_PX.y as f32;
     let is_close = |a: Vec2, b: Vec2| (a - b).abs().max_element() <= 2.0 * sample_px;
     assert!(is_close(seen[0], expected[0]) && is_close(seen[1], expected[1]), "{seen:?} instead of {expected:?}");

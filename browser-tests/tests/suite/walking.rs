@@ -92,7 +92,8 @@ async fn a_held_key_flies_along_the_view_for_as_long_as_it_is_held() {
     browser.key_up('w').await.unwrap();
     let after = visit.settled().await;
     let (state, [down, up]) = (visit.state().await, browser.value::<[f64; 2]>("window.times").await.unwrap());
-    let (moved, held_s) = (state.eye() - before.eye(), (up - down) / 1000.0);
+    let moved = state.eye() - before.eye();
+    let held_s = (up - down) / 1000.0;
     let flown_s = moved.dot(before.forward()) / (FLIGHT_PER_S * before.size);
     assert!((moved - before.forward() * moved.length()).length() < 1e-9, "sideways: {moved}");
     // A frame may come between the release and its event; one that is late counts for a tenth of a second.
@@ -132,7 +133,8 @@ async fn one_finger_turns_and_two_pan_and_come_closer() {
     let (_bench, url) = gateway().await;
     let visit = Visit::in_view(&url, View { is_touch: true, ..View::default() }).await;
     visit.settled().await;
-    let (browser, mut expected) = (&visit.browser, visit.state().await);
+    let browser = &visit.browser;
+    let mut expected = visit.state().await;
     let path = steps([320.0, 240.0], [420.0, 300.0], 4);
     browser.touch(TouchPhase::Start, &path[..1]).await.unwrap();
     for place in &path[1..] {

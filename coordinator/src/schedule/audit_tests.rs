@@ -180,7 +180,8 @@ fn a_third_broken_promise_within_ten_minutes_is_the_last() {
         .windows(2)
         .filter(|pair| pair[0].1.state != PromiseState::Broken && pair[1].1.state == PromiseState::Broken);
     assert!(breaks.count() <= 3, "{:#?}", cluster.promises.iter().map(|(_, p)| p.to_string()).collect::<Vec<_>>());
-    let (plans, probes) = (cluster.plans.len(), cluster.probes.len());
+    let plans = cluster.plans.len();
+    let probes = cluster.probes.len();
     cluster.wait(900);
     assert_eq!((cluster.plans.len(), cluster.probes.len()), (plans, probes), "nothing is planned any more");
     assert_eq!(cluster.promise().state, PromiseState::Kept);
@@ -211,7 +212,8 @@ fn a_viewer_that_stays_above_the_budget_is_named_and_planned_for_once() {
     cluster.wait(60);
     let before = cluster.probes.len();
     let stays = |cluster: &mut Cluster, camera: PinholeCamera| {
-        let (node_name, viewpoints) = ("n0".to_owned(), vec![camera]);
+        let node_name = "n0".to_owned();
+        let viewpoints = vec![camera];
         cluster.tell(Event::ViewersMoved { workload_number: 1, node_name, viewpoints });
     };
     stays(&mut cluster, at(5));

@@ -7,7 +7,8 @@
 /// seconds. P = 1 gives 1: that node does both, in turn. Without views all sample; without samples none.
 #[must_use]
 pub fn k_fd(s: usize, g: f64, v: usize, c: f64, p: usize) -> usize {
-    let (a, b) = (s as f64 * g, v as f64 * c);
+    let a = s as f64 * g;
+    let b = v as f64 * c;
     match (a > 0.0, b > 0.0) {
         (false, _) => 0,
         (true, false) => p,

@@ -156,7 +156,8 @@ impl Cluster {
             let cameras = f64::from(rows()[row].camera_count);
             RowCosts { sample_image_s: 0.01, load_set_s: 0.001 * cameras, reconstruct_view_s: 0.001 * cameras }
         };
-        let (id, busy_s) = (probe.id, self.busy_s);
+        let id = probe.id;
+        let busy_s = self.busy_s;
         if probe.views.is_empty() {
             let rows = probe.requests.iter().map(|(row, _)| (*row, costs(*row))).collect();
             return PlannerEvent::Timed(Timed { id, rows, busy_s });

@@ -91,7 +91,8 @@ impl BudgetPlan {
         if cells.is_empty() {
             return Err(InvalidField::Missing { field: "viewpoints" });
         }
-        let (allowance_s, prices) = (allowance_s(workload), prices(workload));
+        let allowance_s = allowance_s(workload);
+        let prices = prices(workload);
         let is_traced = budgeted.screening_lighting != workload.requested.lighting;
         let request = PlanRequest {
             plan: number,
@@ -249,7 +250,8 @@ impl BudgetPlan {
 
     /// The measurement that is wanted, as a node is asked for it.
     pub(super) fn probe(&self, workload_number: u64, node_name: &str, address: &str) -> Option<ViewProbe> {
-        let (node_name, address) = (node_name.to_owned(), address.to_owned());
+        let node_name = node_name.to_owned();
+        let address = address.to_owned();
         Some(match self.asked.as_ref()? {
             PlannerCommand::Probe { id, row, views, purpose } => {
                 let light = match purpose {
@@ -257,14 +259,17 @@ impl BudgetPlan {
                     Purpose::Certification => &self.workload.lighting,
                 };
                 let requests = vec![(*row, self.request(*row, views, Some(light))?)];
-                let (id, views) = (*id, views.clone());
+                let id = *id;
+                let views = views.clone();
                 ViewProbe { workload_number, id, node_name, address, views, requests, repeats: 1 }
             }
             PlannerCommand::Time { id, rows, view_count, repeats } => {
                 let views: Vec<ProbeView> = (0..*view_count as u32).map(ProbeView::Screening).collect();
                 let request = |&row: &usize| Some((row, self.request(row, &views, None)?));
                 let requests = rows.iter().map(request).collect::<Option<Vec<_>>>()?;
-                let (id, views, repeats) = (*id, Vec::new(), *repeats);
+                let id = *id;
+                let views = Vec::new();
+                let repeats = *repeats;
                 ViewProbe { workload_number, id, node_name, address, views, requests, repeats }
             }
             PlannerCommand::Keep(_) | PlannerCommand::Conclude(_) | PlannerCommand::Refuse(_) => return None,
@@ -341,14 +346,16 @@ impl BudgetPlan {
 
 /// The nodes' time that measuring for a workload may take at once, in s.
 fn allowance_s(workload: &WorkloadState) -> f64 {
-    let (costs, images) = (&workload.costs, workload.requested.sample_cameras.len() as f64);
+    let costs = &workload.costs;
+    let images = workload.requested.sample_cameras.len() as f64;
     let needed_s = ALLOWED_VIEWS * costs.direct_view_s + ALLOWED_SETS * images * costs.sample_image_s;
     needed_s.max(LEAST_ALLOWANCE_S)
 }
 
 /// Prices on the nodes that serve a workload.
 pub(super) fn prices(workload: &WorkloadState) -> EqualNodes {
-    let (load, costs) = (workload.load(), &workload.costs);
+    let load = workload.load();
+    let costs = &workload.costs;
     let shown = (workload.sessions.views_per_s() * STILL_SET_S) as usize;
     let is_still = !workload.requested.timeline.moves();
     let views_a_set = if is_still { workload.sessions.views_at_once() + shown } else { load.views };

@@ -228,7 +228,8 @@ fn what_direct_drawing_has_promised_is_not_promised_where_it_is_forbidden() {
 
 #[test]
 fn of_budgets_that_cannot_be_kept_together_those_that_came_first_are_kept() {
-    let (accurate, quick) = ("flip 0.05", "flip 0.1, time 4.5ms");
+    let accurate = "flip 0.05";
+    let quick = "flip 0.1, time 4.5ms";
     for order in [[accurate, quick], [quick, accurate]] {
         let mut cluster = Cluster::of(3);
         cluster.open(viewer(1, order[0]));
@@ -279,11 +280,13 @@ fn probing_takes_a_fifth_of_one_node_while_anybody_is_served_and_one_probe_runs_
     let mut cluster = Cluster::of(3);
     (cluster.busy_s, cluster.is_slow) = (0.5, true);
     cluster.open(viewer(1, "flip 0.06"));
-    let (mut begun, mut answered) = (Vec::new(), 0);
+    let mut begun = Vec::new();
+    let mut answered = 0;
     for _ in 0..200 {
         let plan_epoch = cluster.plan().assignment.plan_epoch;
         for node in ["n0", "n1", "n2"] {
-            let (node_name, costs) = (node.to_owned(), MeasuredCosts::default());
+            let node_name = node.to_owned();
+            let costs = MeasuredCosts::default();
             cluster.tell(Event::Measured { node_name, plan_epoch, costs, busy_s: 0.25, views: 1, dropped_views: 0 });
         }
         assert!(cluster.probes.len() <= answered + 1);

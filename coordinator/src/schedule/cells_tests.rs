@@ -161,7 +161,8 @@ fn cells_follow_live_viewers_and_change_once_a_second_at_most() {
         node_name: "n1".to_owned(),
         viewpoints: vec![view(azimuth_rad)],
     };
-    let (mut plans, mut now) = (Vec::new(), Duration::from_secs(10));
+    let mut plans = Vec::new();
+    let mut now = Duration::from_secs(10);
     for tenth in 0..100 {
         now += Duration::from_millis(100);
         let event = if tenth % 3 == 0 { seen(tenth as f32 * 0.06) } else { Event::Tick };
@@ -180,7 +181,8 @@ fn cells_follow_live_viewers_and_change_once_a_second_at_most() {
 fn sessions_that_come_and_go_change_cells_once_a_second_at_most() {
     let mut scheduler = of(4);
     step(&mut scheduler, looking_from(1, vec![view(0.0)]));
-    let (mut plans, mut now) = (Vec::new(), Duration::from_secs(2));
+    let mut plans = Vec::new();
+    let mut now = Duration::from_secs(2);
     for i in 0..100 {
         now += Duration::from_millis(50);
         let session = 2 + i / 2;

@@ -74,7 +74,9 @@ mod tests {
         let budget: Budget = "flip 0.06".parse().unwrap();
         let certified = |(place, &expected_ratio): (usize, &f64)| {
             let seconds = 0.001 * f64::from(1 << place);
-            let (views, skipped_views, foreground_ratio) = (32, 0, 0.5);
+            let views = 32;
+            let skipped_views = 0;
+            let foreground_ratio = 0.5;
             let bound_ratio = expected_ratio * 1.1;
             let certificate =
                 Certificate { budget, views, skipped_views, expected_ratio, bound_ratio, foreground_ratio };

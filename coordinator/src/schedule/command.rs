@@ -97,7 +97,8 @@ impl fmt::Display for Command {
 fn write_view_probe(f: &mut fmt::Formatter<'_>, probe: &ViewProbe) -> fmt::Result {
     let ViewProbe { workload_number, id, node_name, views, requests, .. } = probe;
     let rows: Vec<String> = requests.iter().map(|(row, _)| row.to_string()).collect();
-    let (rows, work) = (rows.join(","), if views.is_empty() { "time" } else { "compare" });
+    let rows = rows.join(",");
+    let work = if views.is_empty() { "time" } else { "compare" };
     write!(f, "{node_name} is to {work} rows {rows} for workload {workload_number}, measurement {}", id.number)
 }
 

@@ -264,7 +264,8 @@ mod tests {
         for _ in 0..=RECENT {
             estimate.add(&views, None);
         }
-        let (now_s, slowness) = (estimate.now().costs.sample_image_s, estimate.slowness.value().unwrap());
+        let now_s = estimate.now().costs.sample_image_s;
+        let slowness = estimate.slowness.value().unwrap();
         assert!((now_s - slowness).abs() < 1e-9 && slowness < 4.0, "no longer, after a while: {now_s}");
     }
 

@@ -90,7 +90,8 @@ pub fn replay(mut reader: impl BufRead) -> Result<Vec<Step>, LogError> {
     if version != VERSION {
         return Err(LogError::Version { found: version });
     }
-    let (mut scheduler, mut steps) = (Scheduler::default(), Vec::new());
+    let mut scheduler = Scheduler::default();
+    let mut steps = Vec::new();
     while let Some(text) = next_line(&mut reader, steps.len() + 2)? {
         let line = steps.len() + 2;
         let EventRecord::<Event> { now_ns, event } = parse(&text, line)?;

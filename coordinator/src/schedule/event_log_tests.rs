@@ -44,7 +44,8 @@ fn history() -> Vec<(Duration, Event)> {
 }
 
 fn probed(kind: ProbeKind, failure: Option<&str>) -> Event {
-    let (node_name, failure) = ("n0".to_owned(), failure.map(str::to_owned));
+    let node_name = "n0".to_owned();
+    let failure = failure.map(str::to_owned);
     Event::Probed { plan_epoch: 5, node_name, incarnation: 1, kind, failure }
 }
 
@@ -92,7 +93,9 @@ fn history_of_three_workloads() -> Vec<(Duration, Event)> {
 fn a_replayed_log_of_three_workloads_gives_the_same_commands() {
     let mut text = Vec::new();
     let mut recorder = Recorder::new(&mut text).unwrap();
-    let (mut scheduler, mut workloads, mut refused) = (Scheduler::default(), BTreeMap::new(), 0);
+    let mut scheduler = Scheduler::default();
+    let mut workloads = BTreeMap::new();
+    let mut refused = 0;
     let mut commanded = Vec::new();
     for (now, event) in history_of_three_workloads() {
         recorder.record(now, &event).unwrap();
@@ -133,8 +136,8 @@ fn floats_of_a_log_keep_every_bit() {
         if !(busy_s.is_finite() && eye_m.is_finite()) {
             continue;
         }
-        let (node_name, costs) =
-            ("n".to_owned(), MeasuredCosts { image_bytes: Some(busy_s), ..MeasuredCosts::default() });
+        let node_name = "n".to_owned();
+        let costs = MeasuredCosts { image_bytes: Some(busy_s), ..MeasuredCosts::default() };
         let mut viewpoint = view(0.0);
         viewpoint.eye_in_world.x = eye_m;
         for event in [

@@ -119,7 +119,8 @@ impl Faults {
     }
 
     fn report(&mut self, compositor: String, sampler: String) {
-        let (plan_epoch, reason) = (self.plan().plan_epoch, "no images".to_owned());
+        let plan_epoch = self.plan().plan_epoch;
+        let reason = "no images".to_owned();
         self.later(500, Event::Reported(SamplerReport { plan_epoch, compositor, sampler, reason }));
     }
 
@@ -165,7 +166,8 @@ fn two_samplers_that_fail_within_a_minute_cost_no_honest_node_its_place() {
         let mut faults = Faults::new(seed);
         faults.pass(Duration::from_secs(5));
         // The fault of one request, which a probe does not confirm.
-        let (compositor, sampler) = (faults.a_compositor(), faults.a_sampler());
+        let compositor = faults.a_compositor();
+        let sampler = faults.a_sampler();
         faults.report(compositor, sampler);
         let first = faults.fail_a_sampler();
         let pause = Duration::from_secs(faults.random.below(25));
@@ -215,7 +217,8 @@ fn a_sampler_that_fails_for_long_is_tried_again_after_each_quarantine() {
 fn a_node_that_does_not_serve_is_quarantined_and_an_old_process_is_not() {
     let mut faults = Faults::new(2);
     faults.pass(Duration::from_secs(5));
-    let (name, plan_epoch) = (faults.a_compositor(), faults.plan().plan_epoch);
+    let name = faults.a_compositor();
+    let plan_epoch = faults.plan().plan_epoch;
     let incarnation = name[1..].parse().unwrap();
     let probed = |incarnation, failure: Option<&str>| Event::Probed {
         plan_epoch,
@@ -264,7 +267,8 @@ fn a_plan_that_some_nodes_reject_is_made_without_them_and_one_that_all_reject_is
 #[test]
 fn a_node_that_fails_to_take_a_plan_is_quarantined_until_it_joins_again() {
     let mut faults = Faults::new(3);
-    let (name, plan_epoch) = (faults.a_compositor(), faults.plan().plan_epoch);
+    let name = faults.a_compositor();
+    let plan_epoch = faults.plan().plan_epoch;
     let unready = |plan_epoch| Event::Unready { plan_epoch, node_name: name.clone(), reason: "no disk".to_owned() };
     faults.tell(unready(plan_epoch + 7));
     assert!(faults.has_role(&name), "of another plan");

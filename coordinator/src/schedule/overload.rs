@@ -143,7 +143,8 @@ mod tests {
     fn steps(overload: &mut Overload, from_s: u64, for_s: u64, views_per_s: f64, nodes_slower: f64) -> Vec<usize> {
         let mut taken = Vec::new();
         for tick in from_s * 2..(from_s + for_s) * 2 {
-            let (now, step) = (Duration::from_millis(tick * 500), overload.step);
+            let now = Duration::from_millis(tick * 500);
+            let step = overload.step;
             let ratio = if step == 0 { 1.0 } else { RATIOS[step - 1] };
             let utilisation = VIEW_UTILISATION[step] * nodes_slower * views_per_s * ratio;
             if overload.add(now, UtilizationSample { utilisation, views_per_s, frame_rate_ratios: &RATIOS }) {

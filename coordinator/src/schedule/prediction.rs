@@ -48,7 +48,8 @@ fn pipeline(
     let with_role = |sampling: bool| -> Vec<NodeCosts> {
         nodes.iter().zip(samples).filter(|(_, samples)| **samples == sampling).map(|(node, _)| *node).collect()
     };
-    let (samplers, compositors) = (with_role(true), with_role(false));
+    let samplers = with_role(true);
+    let compositors = with_role(false);
     if samplers.is_empty() && load.images > 0 {
         return direct(f64::INFINITY);
     }
@@ -71,7 +72,8 @@ pub(super) fn time_share_s(load: &Load, nodes: &[NodeCosts]) -> f64 {
     if nodes.is_empty() {
         return f64::INFINITY;
     }
-    let (part_counts, others) = (load.mean_part_counts(nodes), nodes.len() - 1);
+    let part_counts = load.mean_part_counts(nodes);
+    let others = nodes.len() - 1;
     // A node samples its share of every set, and sends it, though it may make no view.
     let own_s =
         |(node, &own): (&NodeCosts, &f64)| (own * load.part_s(&node.costs)).max(load.exchange_s(node, own, others));
@@ -141,7 +143,8 @@ mod tests {
     fn tiles_employ_samplers_that_whole_images_leave_idle() {
         let tiles = Some(TileCosts { overhead_s: 0.02, row_shares: None });
         let node = NodeCosts { costs: Costs { tiles, ..COSTS }, transfer_image_s: None };
-        let (load, nodes) = (Load { views: 1, ..LOAD }, [node; 12]);
+        let load = Load { views: 1, ..LOAD };
+        let nodes = [node; 12];
         assert!(close(pipeline_s(&load, &nodes, &first(8, 12)), 0.1), "four of eight have nothing to do");
         assert!(close(pipeline_s(&load.tiled(2), &nodes, &first(8, 12)), 0.06), "0.02 + 0.08 / 2 each");
         assert!(close(pipeline_s(&load.tiled(4), &nodes, &first(8, 12)), 0.08), "two tiles of 0.02 + 0.08 / 4");

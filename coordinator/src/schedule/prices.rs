@@ -34,7 +34,8 @@ impl Pricing for EqualNodes {
             ..Costs::default()
         };
         let node = NodeCosts { costs, transfer_image_s: None };
-        let (nodes, views) = (self.nodes.max(1), self.views_a_set.max(1));
+        let nodes = self.nodes.max(1);
+        let views = self.views_a_set.max(1);
         let images = row.camera_count as usize * self.cells;
         let load = Load { images, cells: self.cells, views, ..Load::default() };
         let set_s = time_share_s(&load, &vec![node; nodes]);

@@ -6,7 +6,9 @@ use super::{Demand, Load, NodeCosts, Predicted};
 
 /// Every figure that the choice rests on.
 pub(super) fn reason(demand: &Demand<'_>, policy: Policy, samplers: usize, predicted: &Predicted) -> String {
-    let (nodes, views, mean) = (demand.nodes.len(), demand.load.views, NodeCosts::mean(demand.nodes));
+    let nodes = demand.nodes.len();
+    let views = demand.load.views;
+    let mean = NodeCosts::mean(demand.nodes);
     let unequal = if NodeCosts::are_equal(demand.nodes) { "" } else { " Nodes are unequal: costs are their mean." };
     format!(
         "{policy}, {}. {} Time-share: {} a set: each of {nodes} nodes samples and reconstructs its part. Direct: {} a \

@@ -70,7 +70,8 @@ fn roles(plan: &Assignment) -> BTreeMap<&str, (bool, bool)> {
 }
 
 fn changes(from: &Assignment, to: &Assignment) -> usize {
-    let (from, to) = (roles(from), roles(to));
+    let from = roles(from);
+    let to = roles(to);
     from.iter().filter(|(name, role)| to.get(*name).is_some_and(|new| new != *role)).count()
 }
 
@@ -332,7 +333,8 @@ fn what_a_busy_machine_took_refuses_nothing_once_it_is_idle() {
     let mut cluster = Cluster::of(2);
     cluster.step(rated(1, 50.0, Vec::new()));
     cluster.wait(1);
-    let (plan_epoch, now) = (cluster.plan().plan_epoch, cluster.now);
+    let plan_epoch = cluster.plan().plan_epoch;
+    let now = cluster.now;
     let slow = MeasuredCosts { reconstruct_view_s: Some(4.0 * COSTS.reconstruct_view_s), ..MeasuredCosts::default() };
     for second in 1..30 {
         cluster.now = now + Duration::from_secs(second);
@@ -392,9 +394,12 @@ fn mirror_cells_leave_with_the_first_fallback_and_plans_stay_whole() {
     let mut plans = Vec::new();
     for _ in 0..240 {
         for name in ["n0", "n1", "n2"] {
-            let (node_name, plan_epoch) = (name.to_owned(), cluster.plan().plan_epoch);
+            let node_name = name.to_owned();
+            let plan_epoch = cluster.plan().plan_epoch;
             cluster.step(Event::Ready { plan_epoch, node_name: node_name.clone() });
-            let (busy_s, views, dropped_views) = (0.5, 40, 0);
+            let busy_s = 0.5;
+            let views = 40;
+            let dropped_views = 0;
             cluster.step(Event::Measured { node_name, plan_epoch, costs: slow, busy_s, views, dropped_views });
         }
         cluster.now += Duration::from_millis(500);
@@ -418,7 +423,8 @@ fn overload_steps_down_the_fallbacks_and_plans_name_them() {
     let mut seen = Vec::new();
     for _ in 0..240 {
         for name in ["n0", "n1"] {
-            let (node_name, plan_epoch) = (name.to_owned(), cluster.plan().plan_epoch);
+            let node_name = name.to_owned();
+            let plan_epoch = cluster.plan().plan_epoch;
             cluster.step(Event::Ready { plan_epoch, node_name: node_name.clone() });
             cluster.step(Event::Measured {
                 node_name,
@@ -474,7 +480,8 @@ fn expensive_images_are_tiled_so_that_more_nodes_sample_them() {
     let tiles = Some(TileCosts { overhead_s: 0.05, row_shares: None });
     let costs = Costs { sample_image_s: 10.0, tiles, ..COSTS };
     let commands = cluster.step(Event::Opened(Box::new(Opening { costs, ..opening(1, PIPELINE, 1000) })));
-    let (plan, session) = (assignment_of(&commands), applied(&commands).1);
+    let plan = assignment_of(&commands);
+    let session = applied(&commands).1;
     assert!(plan.tile_count > 1 && plan.samplers.len() > 4, "{}", session.reason);
     let whole_s = 10.0f64.max(1000.0 * 0.01 / 7.0);
     let ideal_s = (4.0 * 10.0 + 1000.0 * 0.01) / 11.0;

@@ -27,7 +27,9 @@ fn brute_force_s(load: &Load, nodes: &[NodeCosts]) -> f64 {
 
 #[test]
 fn the_search_is_within_a_hundredth_of_the_best_of_all_divisions() {
-    let (mut worst, mut sum, mut off) = (1.0f64, 0.0, 0);
+    let mut worst = 1.0f64;
+    let mut sum = 0.0;
+    let mut off = 0;
     for seed in 0..1000 {
         let mut random = Random(seed);
         let count = 2 + random.below(7) as usize;
@@ -49,19 +51,22 @@ fn the_search_is_within_a_hundredth_of_the_best_of_all_divisions() {
 
 #[test]
 fn divisions_of_k_and_the_next_k_differ_by_one_role() {
-    let (nodes, load) = (nodes(8, COSTS), Load { images: 6, views: 50, ..Load::default() });
+    let nodes = nodes(8, COSTS);
+    let load = Load { images: 6, views: 50, ..Load::default() };
     let sampled = [false, false, true, false, true, true, false, false];
     let order = order(&nodes, &sampled);
     assert_eq!(first(&load, &nodes, &order, 3).samples, sampled);
     for k in 1..6 {
-        let (a, b) = (first(&load, &nodes, &order, k), first(&load, &nodes, &order, k + 1));
+        let a = first(&load, &nodes, &order, k);
+        let b = first(&load, &nodes, &order, k + 1);
         assert_eq!(a.samples.iter().zip(&b.samples).filter(|(a, b)| a != b).count(), 1);
     }
 }
 
 #[test]
 fn a_step_changes_two_roles_and_gives_new_nodes_theirs() {
-    let (nodes, load) = (nodes(8, COSTS), Load { images: 6, views: 4, ..Load::default() });
+    let nodes = nodes(8, COSTS);
+    let load = Load { images: 6, views: 4, ..Load::default() };
     let target = first(&load, &nodes, &[0, 1, 2, 3, 4, 5, 6, 7], 6);
     let mut present = vec![false; 8];
     present[0] = true;

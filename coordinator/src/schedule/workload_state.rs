@@ -280,7 +280,8 @@ impl WorkloadState {
 
     /// Scene time from set to set. That of a static scene is about a second, or longer where views are rare: its views are whole.
     fn set_s(&self) -> f64 {
-        let (timeline, views_per_s) = (&self.requested.timeline, self.rated_views_per_s());
+        let timeline = &self.requested.timeline;
+        let views_per_s = self.rated_views_per_s();
         match timeline.moves() {
             true => timeline.step_s.abs(),
             false if views_per_s > 0.0 => views_per_s.ceil() / views_per_s,

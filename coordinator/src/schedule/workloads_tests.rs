@@ -236,7 +236,8 @@ fn a_node_that_cannot_take_a_plan_serves_the_other_workloads() {
     let mut commands = Vec::new();
     for _ in 0..2 {
         let Some(plan) = cluster.workloads()[1].plan.clone().map(|plan| plan.assignment) else { break };
-        let (plan_epoch, node_name) = (plan.plan_epoch, plan.compositors[0].node_name.clone());
+        let plan_epoch = plan.plan_epoch;
+        let node_name = plan.compositors[0].node_name.clone();
         commands.extend(cluster.step(Event::Unready { plan_epoch, node_name, reason: "no memory".to_owned() }));
     }
     let scopes = commands.iter().filter_map(|command| match command {
@@ -257,7 +258,8 @@ fn a_sampler_of_faulty_images_serves_the_other_workloads_and_a_dead_node_none() 
     cluster.open(Opening { policy_override: forced(PIPELINE, Some(1)), ..of(4, 1) });
     cluster.open(of(3, 2));
     let plan = cluster.plan_of(1);
-    let (sampler, compositor) = (plan.samplers[0].node_name.clone(), plan.compositors[0].node_name.clone());
+    let sampler = plan.samplers[0].node_name.clone();
+    let compositor = plan.compositors[0].node_name.clone();
     let plan_epoch = plan.plan_epoch;
     let report = SamplerReport { plan_epoch, compositor, sampler: sampler.clone(), reason: "no images".to_owned() };
     cluster.step(Event::Reported(report));
@@ -426,8 +428,11 @@ fn a_batch_that_states_tiny_or_huge_views_and_asks_for_none_costs_viewers_nothin
         let usual = MeasuredCosts { reconstruct_view_s: Some(0.009), ..MeasuredCosts::default() };
         for _ in 0..40 {
             for name in ["n0", "n1"] {
-                let (plan_epoch, node_name) = (cluster.plan_of(1).plan_epoch, name.to_owned());
-                let (costs, busy_s, views) = (usual, 0.3, 30);
+                let plan_epoch = cluster.plan_of(1).plan_epoch;
+                let node_name = name.to_owned();
+                let costs = usual;
+                let busy_s = 0.3;
+                let views = 30;
                 cluster.step(Event::Measured { node_name, plan_epoch, costs, busy_s, views, dropped_views: 0 });
             }
             cluster.pass(1, &[]);

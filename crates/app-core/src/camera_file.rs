@@ -163,7 +163,8 @@ impl Frame<'_> {
         if side.fract() == 0.0 && (1.0..=f64::from(MAX_IMAGE_SIDE_PX)).contains(&side) {
             return Ok(side as u32);
         }
-        let (value, allowed) = (side.to_string(), "a whole number from 1 to 16384");
+        let value = side.to_string();
+        let allowed = "a whole number from 1 to 16384";
         Err(self.fault(field, CameraFault::OutOfRange { value, allowed }))
     }
 
@@ -211,7 +212,8 @@ impl Frame<'_> {
 
     /// Focal lengths, or those of the angles of view: `camera_angle_x` and `_y` in radians, or a path's vertical `fov` in degrees.
     fn focal_px(&self, size_px: UVec2) -> Result<DVec2, CameraFileError> {
-        let (mut x, mut y) = (self.optional("fl_x")?, self.optional("fl_y")?);
+        let mut x = self.optional("fl_x")?;
+        let mut y = self.optional("fl_y")?;
         if x.is_none() {
             let fov_y_rad = self.optional("fov")?.map(f64::to_radians);
             let angle_y_rad = self.optional("camera_angle_y")?.or(fov_y_rad);
@@ -245,7 +247,8 @@ impl Frame<'_> {
         let given = matrix_rows(given).ok_or_else(|| fault(other_form()))?;
         let count = Some(given.len()).filter(|count| !(3..=4).contains(count));
         if let Some(wrong) = count.or_else(|| given.iter().map(Vec::len).find(|length| *length != 4)) {
-            let (value, allowed) = (format!("of {wrong} rows or columns"), "4 rows of 4 numbers");
+            let value = format!("of {wrong} rows or columns");
+            let allowed = "4 rows of 4 numbers";
             return Err(fault(CameraFault::OutOfRange { value, allowed }));
         }
         // The last row may be left out.

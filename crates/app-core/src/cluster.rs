@@ -40,13 +40,16 @@ impl Cluster {
         let port = port.into();
         let address = format!("http://{}", loopback_of(&port.listener)?);
         let mut cluster = Self { address, shutdown: CancellationToken::new(), servers: JoinSet::new() };
-        let (observers, shutdown) = (Observers::default(), cluster.shutdown.clone());
+        let observers = Observers::default();
+        let shutdown = cluster.shutdown.clone();
         cluster.servers.spawn(coordinator::serve(port, config, offers, observers, shutdown));
         for number in 0..nodes {
             let listener = TcpListener::bind("127.0.0.1:0").await.context("no loopback port for a node")?;
             // Enough digits to sort well: members are listed by name.
             let config = configure(NodeConfig::new(format!("node-{number:03}"), &cluster.address));
-            let (open, metrics, shutdown) = (open.clone(), NodeMetrics::default(), cluster.shutdown.clone());
+            let open = open.clone();
+            let metrics = NodeMetrics::default();
+            let shutdown = cluster.shutdown.clone();
             cluster.servers.spawn(node_host::serve(listener, config, open, metrics, shutdown));
         }
         cluster.client().await?.wait_for_nodes(nodes, JOIN).await?;

@@ -120,7 +120,8 @@ fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
     let fewer_rays = unmirrored.or(whole).and_then(|lighting| lighting.with_fewer_rays());
     let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.coarser());
     let method_is_sampled = method != DIRECT;
-    let (lighting, method) = (lighting.to_owned(), method.to_owned());
+    let lighting = lighting.to_owned();
+    let method = method.to_owned();
     let all = Quality { lighting, method, sample_side_ratio: 1.0, frame_rate_ratio: 1.0 };
     let plain = unmirrored.map(|lighting| Quality { lighting: lighting.to_string(), ..all.clone() });
     let above = plain.clone().unwrap_or_else(|| all.clone());
@@ -168,7 +169,8 @@ pub fn viewpoints(views: &[PinholeCamera]) -> Vec<PinholeCamera> {
 /// Requests of all views of all sets, numbered set by set, and view by view in each. They are made as they are drawn.
 pub fn requests(sets: u32, views: Arc<[PinholeCamera]>) -> impl Iterator<Item = ViewRequest> + Send + 'static {
     let of_set = move |set_index| {
-        let (views, count) = (views.clone(), views.len());
+        let count = views.len();
+        let views = views.clone();
         let first = u64::from(set_index) * count as u64;
         (0..count).map(move |at| ViewRequest { frame: first + at as u64, set_index, camera: views[at] })
     };
@@ -263,7 +265,8 @@ mod tests {
             .iter()
             .map(|q| (q.lighting.as_str(), q.method.as_str(), q.sample_side_ratio, q.frame_rate_ratio))
             .collect();
-        let (dim, coarse) = ("soft 4, occlusion 2", "light_field_search:50");
+        let dim = "soft 4, occlusion 2";
+        let coarse = "light_field_search:50";
         assert_eq!(
             steps,
             [

@@ -182,7 +182,8 @@ mod tests {
     fn planning(more: &[&str]) -> Planning {
         let args = args(more);
         let size_px = UVec2::new(200, 150);
-        let (planes, codec) = (ViewPlanes::COLOR, FrameCodec::default());
+        let planes = ViewPlanes::COLOR;
+        let codec = FrameCodec::default();
         let views = PlannedViews { size_px, planes, codec, scene_time_s: 0.0, seed: 0 };
         Planning::new(&args.load().unwrap(), &args, &views).unwrap()
     }

@@ -240,7 +240,8 @@ impl SceneArgs {
         change(&mut scene);
         let around = self.sample_cameras(&scene)?;
         let samples = self.sampling().cameras(around.clone());
-        let (cube, base) = (self.cube(&scene)?, self.base(&scene)?);
+        let cube = self.cube(&scene)?;
+        let base = self.base(&scene)?;
         let package = scene::pack(&scene);
         let offer = SceneOffer {
             name: offer_name(&self.scene),

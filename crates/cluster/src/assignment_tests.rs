@@ -26,7 +26,8 @@ fn relays_reach_every_compositor_at_every_fanout() {
         assert_eq!(plan.validate(), Ok(()));
         let mut asked = std::collections::HashMap::new();
         for i in 0..10 {
-            let (mut steps, mut at) = (0, format!("c{i}"));
+            let mut steps = 0;
+            let mut at = format!("c{i}");
             while let Some(relay) = plan.relay_of(&at) {
                 (steps, at) = (steps + 1, relay.node_name.clone());
             }
@@ -225,7 +226,8 @@ fn with_mirrors() -> Assignment {
 
 #[test]
 fn mirror_cells_come_last_and_are_no_views() {
-    let (plan, view_cells) = (with_mirrors(), of_cells());
+    let plan = with_mirrors();
+    let view_cells = of_cells();
     assert_eq!(plan.validate(), Ok(()));
     assert_eq!((plan.workload.cell_count(), plan.workload.view_cell_count()), (5, 3));
     assert_eq!(plan.workload.cell_first_indices, [0, 1, 3, 4, 6]);

@@ -66,7 +66,8 @@ impl Costs {
     #[must_use]
     pub fn sample_this_tile_s(&self, tile: usize, tile_count: usize) -> f64 {
         let overhead_s = self.tile_overhead_s();
-        let (top, bottom) = (tile as f64 / tile_count as f64, (tile + 1) as f64 / tile_count as f64);
+        let top = tile as f64 / tile_count as f64;
+        let bottom = (tile + 1) as f64 / tile_count as f64;
         let share_above = |height| self.tiles.unwrap_or_default().share_above(height);
         overhead_s + (self.sample_image_s - overhead_s) * (share_above(bottom) - share_above(top))
     }

@@ -139,7 +139,8 @@ impl SceneAssembly {
     /// # Errors
     /// Where it is truncated or is not what its hash says.
     pub fn finish(self) -> Result<Vec<u8>, SceneAssemblyError> {
-        let (have, want) = (self.package.len() as u64, self.scene.package_bytes);
+        let have = self.package.len() as u64;
+        let want = self.scene.package_bytes;
         if have != want {
             return Err(SceneAssemblyError::Truncated { count: have, expected: want });
         }

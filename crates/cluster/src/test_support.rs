@@ -10,7 +10,8 @@ pub(crate) fn camera() -> PinholeCamera {
 }
 
 fn illumination() -> Illumination {
-    let (position_in_world, intensity_linear) = (Vec3::new(0.0, 4.0, 1.0), Vec3::new(3.0, 2.0, 1.0));
+    let position_in_world = Vec3::new(0.0, 4.0, 1.0);
+    let intensity_linear = Vec3::new(3.0, 2.0, 1.0);
     let lights = vec![Light::Point { position_in_world, intensity_linear, radius_m: 0.0 }; 4];
     Illumination { lights, environment: Environment::gradient(Vec3::ONE, Vec3::splat(0.1)) }
 }

@@ -180,7 +180,8 @@ impl Workload {
     /// The workload without common cells.
     #[must_use]
     pub fn without_common_cells(mut self) -> Self {
-        let (cells, cameras) = (self.view_cell_count(), self.view_camera_count());
+        let cells = self.view_cell_count();
+        let cameras = self.view_camera_count();
         self.sample_cameras.truncate(cameras);
         self.cell_first_indices.truncate(cells);
         self.common_cells.clear();

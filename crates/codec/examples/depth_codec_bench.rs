@@ -116,7 +116,8 @@ fn reflectance(plane: &[f32], random: &mut test_planes::Random) -> Vec<u32> {
 /// Shares of four lights by a number of rays; one ray from the light's middle casts a hard shadow.
 fn visibility(plane: &[f32], width: usize, rays: u32, random: &mut test_planes::Random) -> Vec<u32> {
     let mut share = |at: usize, light: usize| {
-        let (x, y) = ((at % width) as f32 / width as f32, (at / width) as f32 / width as f32);
+        let x = (at % width) as f32 / width as f32;
+        let y = (at / width) as f32 / width as f32;
         let lit = ((x * 9.0 + light as f32).sin() + (y * 13.0 + plane[at]).cos()) * 2.0 + 0.5;
         let seen = (0..rays).filter(|_| if rays == 1 { lit > 0.5 } else { random.unit() < lit }).count();
         seen as u32 * 255 / rays
@@ -132,7 +133,8 @@ fn report_words(name: &str, plane: &[f32], words: Vec<u32>, width: u32, height: 
     let dull = DepthImage { normal_oct16: Some(vec![0; plane.len()]), ..black(plane, width, height) };
     let specular = SpecularPlanes { reflectance_srgb8_roughness8: words, visibility8: Vec::new() };
     let shiny = DepthImage { specular: Some(specular), ..dull.clone() };
-    let (without, with) = (image_costs(&dull)?, image_costs(&shiny)?);
+    let without = image_costs(&dull)?;
+    let with = image_costs(&shiny)?;
     print_row(name, &raw, with.0 - without.0, with.1 - without.1, with.2 - without.2);
     Ok(())
 }

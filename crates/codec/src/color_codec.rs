@@ -32,7 +32,8 @@ pub(crate) fn pack_colors(colors_rgb9e5: &[u32], out: &mut Vec<u8>) {
 /// Appends a bit for each colour, the first in the lowest: whether it differs from the one before, 0 before the first.
 /// Puts the colours that differ first in `changed` and gives their count; each of these differs from the one before, too.
 fn pack_changes(colors_rgb9e5: &[u32], changed: &mut [u32], out: &mut Vec<u8>) -> usize {
-    let (mut count, mut last) = (0, 0);
+    let mut count = 0;
+    let mut last = 0;
     out.extend(colors_rgb9e5.chunks(8).map(|eight| {
         (0..).zip(eight).fold(0, |bits, (place, &color)| {
             let is_change = color != last;

@@ -124,7 +124,8 @@ fn residual(code: u16, last: u16, second_last: u16) -> u16 {
 pub(crate) fn restore(numbers: &mut [u16]) {
     // In the upper halves of 32-bit registers sums wrap as 16-bit ones do, without being cut each time.
     const EDGE: u32 = (EDGE_CODES as u32) << 16;
-    let (mut code, mut slope) = (0u32, 0u32);
+    let mut code = 0u32;
+    let mut slope = 0u32;
     for number in numbers {
         let correction = u32::from(unzigzag(*number)) << 16;
         let continued = slope.wrapping_add(correction);

@@ -179,7 +179,8 @@ mod tests {
     #[test]
     fn jpeg_frames_are_close() {
         let rgb: Vec<u8> = (0..64 * 48).flat_map(|i| [(i % 64) as u8 * 2, (i / 64) as u8 * 3, 90]).collect();
-        let (codec, size_px) = (FrameCodec::Jpeg { quality: 95 }, UVec2::new(64, 48));
+        let codec = FrameCodec::Jpeg { quality: 95 };
+        let size_px = UVec2::new(64, 48);
         let data = encode_frame(codec, size_px, &rgb).expect("right size");
         let back = decode_frame(codec, size_px, &data, &limits()).expect("own encoding");
         assert_eq!(back.len(), rgb.len());
@@ -189,7 +190,8 @@ mod tests {
 
     #[test]
     fn damaged_frames_never_panic() {
-        let (rgb, size_px) = (picture(40, 30), UVec2::new(40, 30));
+        let rgb = picture(40, 30);
+        let size_px = UVec2::new(40, 30);
         let mut random = Random::new(16);
         for codec in [FrameCodec::Lz4, FrameCodec::Png, FrameCodec::Jpeg { quality: 80 }] {
             let good = encode_frame(codec, size_px, &rgb).expect("right size");

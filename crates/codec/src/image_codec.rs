@@ -159,7 +159,8 @@ impl Packer {
 
 /// Checks that an image is of its camera's size, and its payload as long as its header says.
 pub(crate) fn check_payload(header: &ImageHeader, camera_px: UVec2, payload: &[u8]) -> Result<(), DecodeError> {
-    let (width, height) = (header.width, header.height);
+    let width = header.width;
+    let height = header.height;
     let [camera_width, camera_height] = camera_px.to_array();
     if (width, height) != (camera_width, camera_height) {
         return Err(DecodeError::CameraSize { width, height, camera_width, camera_height });

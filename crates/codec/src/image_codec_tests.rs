@@ -104,7 +104,8 @@ fn passed_bits_and_corners_survive() {
         let back = decode(&encoded).expect("own encoding");
         assert_eq!(back.passed, image.passed);
         let corners = |image: &DepthImage| image.corner_inverse_depth_per_m.clone().expect("corners");
-        let (was, is) = (corners(&image), corners(&back));
+        let was = corners(&image);
+        let is = corners(&back);
         assert_eq!(was.len(), is.len());
         assert!(was.iter().zip(&is).all(|(was, is)| (was - is).abs() < 1e-4 && (*was > 0.0 || was == is)));
         let without = encode_depth_image(&image, PlaneSet::DEPTH_COLOR).expect("consistent planes");

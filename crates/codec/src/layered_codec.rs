@@ -125,7 +125,8 @@ mod tests {
         for lines in [0, 1, 3, 1000, BLOCK + 5] {
             let mut first = vec![0];
             (0..lines).for_each(|line| first.push(first[line] + random.below(256) as u32));
-            let (samples, mut bytes) = (first[lines] as usize, Vec::new());
+            let samples = first[lines] as usize;
+            let mut bytes = Vec::new();
             pack_layer_counts(&first, &mut bytes);
             assert!(bytes.len() <= max_numbers_bytes(lines));
             assert_eq!(unpack_layer_counts(&mut &bytes[..], lines, samples), Ok(first));

@@ -21,7 +21,8 @@ fn camera(columns: u32, rows: u32) -> ParallelCamera {
 fn image(columns: u32, rows: u32, reflects: bool) -> LayeredDepthImage {
     let camera = camera(columns, rows);
     let mut random = Random::new(31);
-    let (mut first, mut planar_depth_m) = (vec![0], Vec::new());
+    let mut first = vec![0];
+    let mut planar_depth_m = Vec::new();
     for _ in 0..camera.pixel_count() {
         let mut line: Vec<f32> = (0..random.below(10)).map(|_| 8.0 * random.unit()).collect();
         line.sort_by(f32::total_cmp);
@@ -30,7 +31,8 @@ fn image(columns: u32, rows: u32, reflects: bool) -> LayeredDepthImage {
     }
     let mut words = || planar_depth_m.iter().map(|_| random.next_u32()).collect::<Vec<_>>();
     let plane_normal_oct8 = words().into_iter().map(|word| word as u16).collect();
-    let (color_rgb9e5, normals) = (words(), words());
+    let color_rgb9e5 = words();
+    let normals = words();
     let specular = SpecularPlanes { reflectance_srgb8_roughness8: words(), visibility8: vec![words(), words()] };
     LayeredDepthImage {
         camera,

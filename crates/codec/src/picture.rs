@@ -6,7 +6,8 @@ use image::{ColorType, ImageDecoder, ImageError, ImageResult, Limits};
 
 /// Three bytes a pixel of a picture that must be of the given size.
 pub(crate) fn decode_rgb(mut decoder: impl ImageDecoder, size_px: UVec2) -> ImageResult<Vec<u8>> {
-    let (width, height) = (size_px.x, size_px.y);
+    let width = size_px.x;
+    let height = size_px.y;
     if decoder.dimensions() != (width, height) || decoder.color_type() != ColorType::Rgb8 {
         let reason = format!("not an RGB picture of {width}×{height}");
         return Err(ImageError::Parameter(ParameterError::from_kind(ParameterErrorKind::Generic(reason))));

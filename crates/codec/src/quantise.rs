@@ -138,7 +138,8 @@ mod tests {
 
     #[test]
     fn degenerate_ranges_are_exact() {
-        let (hole, background) = (HOLE_INVERSE_DEPTH, BACKGROUND_INVERSE_DEPTH);
+        let hole = HOLE_INVERSE_DEPTH;
+        let background = BACKGROUND_INVERSE_DEPTH;
         for plane in [
             vec![],
             vec![hole; 40],

@@ -90,7 +90,9 @@ impl Reassembler {
         let Some(image) = &self.under_way else {
             return Ok(());
         };
-        let (sample_set_id, image_index, expected) = (image.sample_set_id, image.image_index, image.next_sequence);
+        let sample_set_id = image.sample_set_id;
+        let image_index = image.image_index;
+        let expected = image.next_sequence;
         if (chunk.sample_set_id, chunk.image_index) == (sample_set_id, image_index) && got <= expected {
             return if got == expected { Ok(()) } else { Err(ChunkError::Duplicate { got, expected }) };
         }

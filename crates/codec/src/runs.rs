@@ -169,7 +169,8 @@ mod tests {
         let mut codes = vec![0, 0, 1, 7, 8, 9, 1, 1, 3];
         codes.extend(std::iter::repeat_n(1, LONGEST * 2 + 5));
         codes.extend(std::iter::repeat_n(500, 1000));
-        let (mut runs, mut found) = (Runs::default(), Vec::new());
+        let mut runs = Runs::default();
+        let mut found = Vec::new();
         codes.chunks(1001).for_each(|codes| runs.extend(codes, &mut found));
         assert_eq!(runs.sample_count(), 1004);
         let mut bytes = Vec::new();

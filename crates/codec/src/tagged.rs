@@ -88,7 +88,8 @@ fn pack_fields(numbers: &[u16], tags: &[u8], quads: &[Quad; 256], fields: &mut [
     for (numbers, &tag) in numbers.as_chunks::<4>().0.iter().zip(tags) {
         let quad = &quads[usize::from(tag)];
         let [a, b, c, d] = numbers.map(u64::from);
-        let (first, second) = (a | b << quad.first_bits, c | d << quad.third_bits);
+        let first = a | b << quad.first_bits;
+        let second = c | d << quad.third_bits;
         if quad.bits <= ROOM_BITS {
             writer.push(first | second << quad.pair_bits, quad.bits);
         } else {

@@ -60,7 +60,8 @@ fn terrain(width: usize, height: usize) -> Vec<f32> {
 
 /// A tilted quad within the crown, nearest wins.
 fn draw_leaf(plane: &mut [f32], width: usize, height: usize, random: &mut Random) {
-    let (angle, radius) = (random.unit() * std::f32::consts::TAU, random.unit().sqrt() * 0.3);
+    let angle = random.unit() * std::f32::consts::TAU;
+    let radius = random.unit().sqrt() * 0.3;
     let center = [
         (0.5 + radius * angle.cos() * height as f32 / width as f32) * width as f32,
         (0.4 + radius * angle.sin()) * height as f32,
@@ -73,8 +74,10 @@ fn draw_leaf(plane: &mut [f32], width: usize, height: usize, random: &mut Random
     let rows = (center[1] - reach).max(0.0) as usize..((center[1] + reach).max(0.0) as usize + 1).min(height);
     for y in rows {
         for x in (center[0] - reach).max(0.0) as usize..((center[0] + reach).max(0.0) as usize + 1).min(width) {
-            let (dx, dy) = (x as f32 + 0.5 - center[0], y as f32 + 0.5 - center[1]);
-            let (u, v) = (dx * turn.cos() + dy * turn.sin(), dy * turn.cos() - dx * turn.sin());
+            let dx = x as f32 + 0.5 - center[0];
+            let dy = y as f32 + 0.5 - center[1];
+            let u = dx * turn.cos() + dy * turn.sin();
+            let v = dy * turn.cos() - dx * turn.sin();
             let inverse = depth_m.recip() + slope[0] * dx + slope[1] * dy;
             let texel = &mut plane[y * width + x];
             if u.abs() <= half_px && v.abs() <= half_px * 0.6 && inverse > *texel {

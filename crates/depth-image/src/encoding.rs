@@ -71,7 +71,8 @@ pub fn oct8_from_oct16(packed: u32) -> u16 {
 #[must_use]
 pub fn unit_from_oct8(packed: u16) -> Vec3 {
     let [x, y] = packed.to_le_bytes().map(|byte| (f32::from(byte as i8) / 127.0).max(-1.0));
-    let (flat, z) = (Vec2::new(x, y), 1.0 - x.abs() - y.abs());
+    let flat = Vec2::new(x, y);
+    let z = 1.0 - x.abs() - y.abs();
     let xy = if z < 0.0 { wrapped(flat) } else { flat };
     xy.extend(z).try_normalize().unwrap_or(Vec3::Z)
 }
@@ -94,7 +95,8 @@ mod tests {
     #[test]
     fn a_normal_in_two_bytes_is_within_a_degree() {
         for i in 0..4000 {
-            let (turn, up) = (i as f32 * 2.399_963, 1.0 - (i as f32 + 0.5) / 2000.0);
+            let turn = i as f32 * 2.399_963;
+            let up = 1.0 - (i as f32 + 0.5) / 2000.0;
             let unit = (Vec2::from_angle(turn) * (1.0 - up * up).max(0.0).sqrt()).extend(up);
             let degrees = unit_from_oct8(oct8_from_unit(unit)).angle_between(unit).to_degrees();
             assert!(degrees < 1.0, "{unit} {degrees}");

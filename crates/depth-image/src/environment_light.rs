@@ -186,7 +186,8 @@ fn lobes(cells: &[Cell]) -> Vec<[f32; 4]> {
     for place in 0..directions {
         let at = UVec2::new(place as u32 % LOBE_SIZE_PX.x, place as u32 / LOBE_SIZE_PX.x);
         let middle = direction_at((at.as_vec2() + 0.5) / LOBE_SIZE_PX.as_vec2());
-        let (mut sums, mut weights) = ([Vec3::ZERO; LOBES], [0.0f32; LOBES]);
+        let mut sums = [Vec3::ZERO; LOBES];
+        let mut weights = [0.0f32; LOBES];
         for cell in cells {
             let cosine = middle.dot(cell.towards_in_world);
             if cosine <= 0.0 {

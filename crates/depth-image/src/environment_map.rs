@@ -40,7 +40,8 @@ impl EnvironmentMap {
         check_size(size_px, radiance_linear.len())?;
         let is_bad = |radiance: &Vec3| !radiance.is_finite() || radiance.min_element() < 0.0;
         if let Some(at) = radiance_linear.iter().position(is_bad) {
-            let (column, row) = (at as u32 % size_px.x, at as u32 / size_px.x);
+            let column = at as u32 % size_px.x;
+            let row = at as u32 / size_px.x;
             return Err(EnvironmentMapError::Radiance { radiance_linear: radiance_linear[at], column, row });
         }
         Ok(Self {

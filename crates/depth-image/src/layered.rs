@@ -108,7 +108,8 @@ impl LayeredDepthImage {
 /// Checks the prefix sums of lines, and that depths rise along each.
 pub(crate) fn check_lines(first: &[u32], planar_depth_m: &[f32], range_m: f32) -> Result<(), LayeredError> {
     let samples = planar_depth_m.len();
-    let (ends, mut least) = (&first[1..], 0);
+    let ends = &first[1..];
+    let mut least = 0;
     for (line, &first) in first.iter().enumerate() {
         if first < least || first as usize > samples || (line == 0 && first != 0) {
             return Err(LayeredError::First { line, first, least, samples });

@@ -129,7 +129,8 @@ mod tests {
 
     #[test]
     fn a_part_has_the_lines_of_the_whole() {
-        let (camera, first_px) = (camera(), UVec2::new(8, 16));
+        let camera = camera();
+        let first_px = UVec2::new(8, 16);
         let part = camera.part(&ViewPart { first_px, size_px: UVec2::new(4, 5) });
         let [own, whole] = [part.ray(Vec2::new(1.5, 2.5)), camera.ray(Vec2::new(9.5, 18.5))];
         assert!(own.origin_in_world.distance(whole.origin_in_world) < 1e-5);

@@ -58,7 +58,8 @@ impl TryFrom<Vec<SampleImage>> for SampleImages {
         if matches!(images.first(), None | Some(SampleImage::Depth(_))) {
             return SampleImage::depth_images(images).map(Self::Depth);
         }
-        let (mut layered, mut light_field) = (Vec::new(), None);
+        let mut layered = Vec::new();
+        let mut light_field = None;
         for image in images {
             match image {
                 SampleImage::Layered(image) => layered.push(image),

@@ -40,13 +40,15 @@ impl SinglePoleCamera {
         let corners = bounds.corners();
         let farthest_m = corners.iter().copied().map(depth_m).fold(f32::MIN_POSITIVE, f32::max);
         let nearest_m = corners.iter().copied().map(depth_m).fold(farthest_m, f32::min).max(LEAST_DEPTH * farthest_m);
-        let (near_m, farthest_m) = (nearest_m * (1.0 - DEPTH_SLACK), farthest_m * (1.0 + DEPTH_SLACK));
+        let near_m = nearest_m * (1.0 - DEPTH_SLACK);
+        let farthest_m = farthest_m * (1.0 + DEPTH_SLACK);
         let reference = PinholeCamera { near_m, ..looking };
         let unscaled = Self { reference, pole_px: reference.principal_px, distortion_px, farthest_m };
         // Away from the pole along one axis, nothing moves farther than the distortion.
         let room_px = 0.5 * size_px.min_element() as f32;
         let focal_px = |corner: &Vec3| {
-            let (at, z) = (in_camera(*corner).truncate().abs().max_element(), depth_m(*corner).max(nearest_m));
+            let at = in_camera(*corner).truncate().abs().max_element();
+            let z = depth_m(*corner).max(nearest_m);
             (room_px - unscaled.shift_px(z.recip())).max(1.0) * z / at.max(f32::MIN_POSITIVE)
         };
         let focal_px = corners.iter().map(focal_px).fold(f32::MAX, f32::min).clamp(2e-3, 1e6);

@@ -91,7 +91,8 @@ fn it_sees_sides_that_turn_away_from_its_eye() {
 fn an_edge_bows_by_the_square_of_its_length() {
     let camera = around(120.0);
     let depth_m = 0.5 * (camera.reference.near_m + camera.farthest_m);
-    let (rho_px, shift_px) = (100.0f32, camera.shift_px(depth_m.recip()));
+    let rho_px = 100.0f32;
+    let shift_px = camera.shift_px(depth_m.recip());
     for edge_px in [4.0f32, 8.0, 16.0, 32.0, 64.0] {
         let point = |along_px: f32| {
             let pixel = camera.pole_px + Vec2::new(rho_px, along_px);

@@ -43,7 +43,8 @@ impl SampleCamera {
 /// The rows of a tile.
 fn part(size_px: UVec2, tile: u32, count: u32) -> ViewPart {
     let row = |i: u32| (u64::from(i) * u64::from(size_px.y) / u64::from(count.max(1))) as u32;
-    let (first, end) = (row(tile), row(tile + 1));
+    let first = row(tile);
+    let end = row(tile + 1);
     ViewPart { first_px: UVec2::new(0, first), size_px: UVec2::new(size_px.x, end - first) }
 }
 

@@ -225,7 +225,8 @@ fn extent(cameras: &[PinholeCamera], turn: Quat) -> (Vec3, [Vec3; 3]) {
 fn corners(cameras: &[PinholeCamera]) -> Option<(Vec3, [Vec3; 3])> {
     let [a, b, c, d] =
         <[&PinholeCamera; 4]>::try_from(cameras.iter().collect::<Vec<_>>()).ok()?.map(|camera| camera.eye_in_world);
-    let (right, up) = ((b - a) * 0.5, (c - a) * 0.5);
+    let right = (b - a) * 0.5;
+    let up = (c - a) * 0.5;
     let is_parallelogram = (a + d - b - c).length() <= 1e-3 * (right.length() + up.length());
     let is_area = right.cross(up).length() > 1e-3 * right.length() * up.length();
     (is_parallelogram && is_area).then_some(((a + b + c + d) / 4.0, [right, up, Vec3::ZERO]))

@@ -75,7 +75,8 @@ impl ViewGroup {
     }
 
     fn of(views: Vec<PinholeCamera>, scene: &Aabb) -> Option<Self> {
-        let (bounds, distance_m) = (bounds(&views), least_distance_m(&views, scene));
+        let bounds = bounds(&views);
+        let distance_m = least_distance_m(&views, scene);
         Some(Self { cell: ViewCell::between(&views)?, views, bounds, distance_m })
     }
 
@@ -134,7 +135,8 @@ fn longest(bounds: &Bounds, distance_m: f32) -> (usize, f32) {
 
 /// Distance of a view from bounds, 0 inside.
 fn outside(view: &PinholeCamera, bounds: &Bounds, scene: &Aabb) -> f32 {
-    let (place, distance_m) = (place_of(view), distance_m(view, scene));
+    let place = place_of(view);
+    let distance_m = distance_m(view, scene);
     let off = |axis: usize| {
         let (least, most) = bounds[axis];
         (place[axis] - place[axis].max(least).min(most)) / unit(axis, distance_m)
@@ -143,7 +145,8 @@ fn outside(view: &PinholeCamera, bounds: &Bounds, scene: &Aabb) -> f32 {
 }
 
 fn place_of(view: &PinholeCamera) -> Place {
-    let (eye, forward) = (view.eye_in_world, view.forward_in_world());
+    let eye = view.eye_in_world;
+    let forward = view.forward_in_world();
     [eye.x, eye.y, eye.z, forward.x, forward.y, forward.z]
 }
 

@@ -41,7 +41,8 @@ impl ViewPart {
 
     /// For each pixel of an outer part, row by row, whether it is one of this part.
     pub fn mask_within(&self, outer: &Self) -> impl Iterator<Item = bool> {
-        let (part, first_px) = (*self, outer.first_px);
+        let part = *self;
+        let first_px = outer.first_px;
         let row = move |y: u32, columns: u32| (0..columns).map(move |x| part.contains(first_px + UVec2::new(x, y)));
         let columns = outer.size_px.x;
         (0..outer.size_px.y).flat_map(move |y| row(y, columns))
@@ -96,7 +97,8 @@ mod tests {
     fn a_pixel_of_a_part_has_the_ray_of_the_views_pixel() {
         let camera = PinholeCamera::looking_at(Vec3::new(1.0, 2.0, 5.0), Vec3::ZERO, Vec3::Y, 0.9, VIEW_PX);
         let part = ViewPart { first_px: UVec2::new(120, 64), size_px: UVec2::new(7, 9) };
-        let (at, first) = (Vec2::new(3.5, 2.5), part.first_px.as_vec2());
+        let at = Vec2::new(3.5, 2.5);
+        let first = part.first_px.as_vec2();
         assert_eq!(camera.part(&part).size_px, part.size_px);
         let [own, whole] = [camera.part(&part).ray(at), camera.ray(first + at)];
         assert!(own.at(1.0).distance(whole.at(1.0)) < 1e-5);

@@ -18,25 +18,30 @@ type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 fn main() -> Outcome<()> {
     let engine = GpuEngine::open(DevicePreference::Any)?;
-    let (renderer, reconstructor) = (&engine.renderer, &engine.reconstructor);
+    let renderer = &engine.renderer;
+    let reconstructor = &engine.reconstructor;
     println!("{}: views of {VIEW_PX}, {LIGHTING}, medians of {RUNS}", renderer.gpu().name());
     let scene = scene::procedural::tree_terrain(500_000, 1);
     let bounds = scene.bounds();
-    let (middle, size_m) = ((bounds.min + bounds.max) / 2.0, bounds.size().max_element());
+    let middle = (bounds.min + bounds.max) / 2.0;
+    let size_m = bounds.size().max_element();
     let camera = |x: f32, size_px| {
         let eye = middle + Vec3::new(x, 0.3, 1.0) * size_m * 0.5;
         PinholeCamera::looking_at(eye, middle, Vec3::Y, 0.9, size_px)
     };
     let on_device = GpuScene::upload(renderer.gpu(), &scene)?;
     let draw = |lighting: &str| -> Outcome<DrawWork<'_>> {
-        let (visibility, refinement, turn) = (Visibility::Measured, Refinement::default(), Turn::default());
+        let visibility = Visibility::Measured;
+        let refinement = Refinement::default();
+        let turn = Turn::default();
         let lighting = lighting.parse()?;
         Ok(DrawWork { scene: &on_device, lighting, scene_time_s: 0.0, visibility, refinement, turn })
     };
     let planes = SamplePlanes { normal: true, corners: true, ..SamplePlanes::default() };
     let samples = [-0.2, -0.05, 0.05, 0.2].map(|x| Camera::Pinhole(camera(x, UVec2::new(640, 480))));
     let images = renderer.draw_depth_images(draw("phong")?, &samples, planes)?;
-    let (background, illumination) = (scene.background, &scene.illumination);
+    let background = scene.background;
+    let illumination = &scene.illumination;
     let set =
         SetDescription { volume: bounds, background, illumination, highlight: None, environment: None, mips: false };
     let set = reconstructor.upload(&images, &set, Turn::default())?;
@@ -63,7 +68,8 @@ fn compare(engine: &GpuEngine, what: &str, work: impl Fn() -> Outcome<()>) -> Ou
     for run in 0..2 * (RUNS + 2) {
         let is_cut = run % 2 == 1;
         let live = is_cut.then(|| queue.live_stream());
-        let (start, before) = (Instant::now(), queue.slices());
+        let start = Instant::now();
+        let before = queue.slices();
         work()?;
         if run >= 4 {
             seconds[usize::from(is_cut)].push(start.elapsed().as_secs_f64());
@@ -75,7 +81,8 @@ fn compare(engine: &GpuEngine, what: &str, work: impl Fn() -> Outcome<()>) -> Ou
         seconds.sort_by(f64::total_cmp);
         seconds[seconds.len() / 2]
     });
-    let (whole_ms, cut_ms) = (whole_s * 1e3, cut_s * 1e3);
+    let whole_ms = whole_s * 1e3;
+    let cut_ms = cut_s * 1e3;
     let slice_ms = cut_ms / slices.max(1) as f64;
     println!(
         "{what}: whole {whole_ms:.1} ms, cut {cut_ms:.1} ms ({:+.1} %), {slices} slices of {slice_ms:.1} ms",

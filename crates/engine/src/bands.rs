@@ -74,7 +74,8 @@ fn bands(camera: &PinholeCamera, most_pixels: usize) -> Vec<Band> {
     let rows = rows_seen.saturating_sub(2 * VIEW_REACH_PX).max(VIEW_REACH_PX);
     let band = |first: u32| {
         let end = (first + rows).min(height);
-        let (top, bottom) = (first.saturating_sub(VIEW_REACH_PX), (end + VIEW_REACH_PX).min(height));
+        let top = first.saturating_sub(VIEW_REACH_PX);
+        let bottom = (end + VIEW_REACH_PX).min(height);
         let part = ViewPart { first_px: UVec2::new(0, top), size_px: UVec2::new(columns, bottom - top) };
         Band { camera: camera.part(&part), rows: first - top..end - top }
     };

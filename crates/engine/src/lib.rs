@@ -140,7 +140,9 @@ impl GpuEngine {
     /// engine that a node has: a lost one closes with the last node that leaves it.
     #[must_use]
     pub fn opener(self: Arc<Self>) -> OpenEngine {
-        let (preference, scene_bytes, first) = (self.preference, self.scenes.max_bytes(), Arc::downgrade(&self));
+        let preference = self.preference;
+        let scene_bytes = self.scenes.max_bytes();
+        let first = Arc::downgrade(&self);
         let open = Mutex::new((Some(self), first));
         Arc::new(move || {
             let (unused, open) = &mut *open.lock();
@@ -396,7 +398,8 @@ impl Engine for GpuEngine {
 
     fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
         let &UploadedImages { ref set, reflections, glossy_rays, .. } = Uploaded::images(set.as_ref())?;
-        let (mut mirrors, mut base) = (Vec::new(), None);
+        let mut mirrors = Vec::new();
+        let mut base = None;
         for (cell, common) in common {
             let common = Uploaded::images(common.as_ref())?.set.clone();
             match cell.kind {

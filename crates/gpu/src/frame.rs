@@ -156,7 +156,8 @@ impl<'g> Frame<'g> {
     /// # Errors
     /// When the device is lost.
     pub fn submit(self) -> Result<Submitted<'g>, GpuError> {
-        let (gpu, turn) = (self.gpu, self.turn);
+        let gpu = self.gpu;
+        let turn = self.turn;
         let recorded = self.end();
         let slot = gpu.device_queue.wait(turn, predicted_s(gpu, &recorded.pieces));
         recorded.submit_in(slot)

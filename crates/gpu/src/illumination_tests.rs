@@ -80,7 +80,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 type Answer = [[f32; 4]; 16];
 
 fn text(kind: Highlight, lights: usize, visibility_words: usize, environment_map: bool) -> String {
-    let (highlight, light_slots) = (highlight_name(kind), light_slots(lights));
+    let highlight = highlight_name(kind);
+    let light_slots = light_slots(lights);
     let form = context! { highlight, light_slots, visibility_words, environment_map };
     let templates = Templates::new(&[("test.wgsl", SHADER)]).expect("templates");
     templates.render("test.wgsl", form).expect("a text")
@@ -157,7 +158,8 @@ fn illumination() -> Illumination {
 fn questions() -> Vec<Question> {
     let random = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
     let direction = |i: u32| {
-        let (z, turn) = (2.0 * random(i) - 1.0, 2.0 * PI * random(i + 7));
+        let z = 2.0 * random(i) - 1.0;
+        let turn = 2.0 * PI * random(i + 7);
         (Vec2::from_angle(turn) * (1.0 - z * z).sqrt()).extend(z)
     };
     (0..4000u32)
@@ -186,7 +188,8 @@ fn close(found: [f32; 4], expected: Vec3, slack: f32) -> bool {
 
 #[test]
 fn incident_light_equals_the_scalar_twins() {
-    let (illumination, questions) = (illumination(), questions());
+    let illumination = illumination();
+    let questions = questions();
     for (q, answer) in questions.iter().zip(answers(Highlight::Ggx, &illumination, 0, &questions)) {
         let place = Vec2::from(q.place);
         let incident = illumination.lights[q.light as usize].from_sample(q.point_in_world.into(), place);
@@ -217,9 +220,10 @@ fn noisy_map() -> EnvironmentMap {
 
 #[test]
 fn an_environment_maps_light_equals_the_scalar_twins() {
-    let (map, questions) = (noisy_map(), questions());
-    let (light, lit) =
-        (EnvironmentLight::of(&map), Illumination { environment: Environment::mapped(), ..illumination() });
+    let map = noisy_map();
+    let questions = questions();
+    let light = EnvironmentLight::of(&map);
+    let lit = Illumination { environment: Environment::mapped(), ..illumination() };
     assert!(light.bright_texels.len() > 10);
     let found = answers_under(Some(&map), Highlight::Ggx, &lit, 2, &questions);
     // Rounding takes a direction or a point across the edge of a texel now and then.
@@ -278,7 +282,8 @@ fn highlights_equal_the_scalar_twins() {
 
 #[test]
 fn a_shifted_visibility_byte_is_detected() {
-    let (illumination, questions) = (illumination(), questions());
+    let illumination = illumination();
+    let questions = questions();
     let found = answers(Highlight::BlinnPhong, &illumination, 2, &questions);
     let differ = questions.iter().zip(found).filter(|(q, answer)| {
         let reflector = Reflector::unpack(q.reflector).expect("a reflector");

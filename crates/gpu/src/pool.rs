@@ -171,7 +171,8 @@ mod tests {
     fn returned_items_are_lent_again_and_surplus_ones_dropped() {
         let pool = Pool::keeping(2);
         let lend = |kind: char, value: u32| pool.lend(kind, |_| value);
-        let (a, b) = (lend('a', 1), lend('b', 2));
+        let a = lend('a', 1);
+        let b = lend('b', 2);
         assert_eq!((*a, *lend('a', 3), *a.kind()), (1, 3, 'a'), "the first one is in use");
         drop(a);
         assert_eq!(*lend('a', 4), 1, "what came back last");
@@ -190,7 +191,9 @@ mod tests {
         let pool = Pool(Arc::new(Free::new(10, |weight: &u64| *weight, None)));
         let kept = || pool.0.items.lock().items.iter().map(|(weight, ())| *weight).collect::<Vec<_>>();
         let lend = |weight: u64| pool.lend(weight, |_| ());
-        let (five, four, one) = (lend(5), lend(4), lend(1));
+        let five = lend(5);
+        let four = lend(4);
+        let one = lend(1);
         drop((five, four, one));
         assert_eq!(kept(), [5, 4, 1]);
         drop(lend(5));

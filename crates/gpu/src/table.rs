@@ -117,7 +117,8 @@ impl TablePool {
 
     /// Work that reads the texture's last contents was submitted before.
     fn fill(&self, table: &Table, bytes: &[u8], turn: Turn) -> Result<(), GpuError> {
-        let (texture, row_bytes) = (table.texture(), table.0.kind().row_bytes());
+        let texture = table.texture();
+        let row_bytes = table.0.kind().row_bytes();
         let work = (WorkKind::new(WorkKind::family(&"fill a table"), &row_bytes), bytes.len() as u64);
         // Before the staging memory: whoever holds that waits for nobody.
         let queue = &self.gpu.device_queue;
@@ -219,7 +220,8 @@ mod tests {
         let upload = |texels: usize| {
             pool.upload("words", TextureFormat::Rg32Uint, &vec![[7_u32; 2]; texels], Turn::default()).expect("a table")
         };
-        let (first, second) = (upload(5000), upload(5000));
+        let first = upload(5000);
+        let second = upload(5000);
         assert!(first.texture() != second.texture(), "both are in use");
         let left = first.texture().clone();
         drop(first);

@@ -36,7 +36,8 @@ fn write_pairs(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
 
 fn print_comparison(name: &str, reference: &Rgb8Image, test: &Rgb8Image) -> Result<(), Box<dyn std::error::Error>> {
     let psnr_db = psnr_db(reference, test, None)?;
-    let (ssim, flip) = (ssim_map(reference, test)?.mean(None)?, flip_map(reference, test)?.mean(None)?);
+    let ssim = ssim_map(reference, test)?.mean(None)?;
+    let flip = flip_map(reference, test)?.mean(None)?;
     let failing_px = pdiff_map(reference, test, PdiffSettings::default())?.failing_px(None)?;
     println!(
         "{name} PSNR {psnr_db:?} dB, SSIM {ssim:?}, FLIP {flip:?}, {failing_px} pixels fail the perceptual difference"
@@ -49,7 +50,10 @@ fn read_ppm(path: &str) -> Result<Rgb8Image<'static>, Box<dyn std::error::Error>
     let bytes = std::fs::read(path)?;
     let mut lines = bytes.splitn(4, |&byte| byte == b'\n');
     let mut line = || lines.next().ok_or("short file");
-    let (_magic, size, _maximum, pixels) = (line()?, line()?, line()?, line()?);
+    let _magic = line()?;
+    let size = line()?;
+    let _maximum = line()?;
+    let pixels = line()?;
     let (width, height) = std::str::from_utf8(size)?.split_once(' ').ok_or("no size")?;
     Ok(Rgb8Image::new(width.parse()?, height.parse()?, pixels.to_vec())?)
 }

@@ -44,7 +44,8 @@ mod tests {
 
     #[test]
     fn images_of_different_sizes_are_refused() {
-        let (flat, other) = (flat(1), Rgb8Image::new(1, 2, vec![1; 6]).unwrap());
+        let flat = flat(1);
+        let other = Rgb8Image::new(1, 2, vec![1; 6]).unwrap();
         assert!(change_error_map([&flat, &flat], [&flat, &other]).is_err());
     }
 }

@@ -116,7 +116,8 @@ mod tests {
         let depth_at = |index: usize| {
             let pixel = Vec2::new((index % 160) as f32 + 0.5, (index / 160) as f32 + 0.5);
             let ray = camera.ray(pixel);
-            let (card, wall) = (ray.at(2.0), ray.at(4.0));
+            let card = ray.at(2.0);
+            let wall = ray.at(4.0);
             match (card.x.abs() < 0.4 && card.y.abs() < 0.4, wall.x.abs() < 2.0 && wall.y.abs() < 1.5) {
                 (true, _) => 0.5,
                 (false, true) => 0.25,

@@ -52,7 +52,8 @@ impl Plane {
     }
 
     fn along_columns(&self, kernel: &[f32], edge: Edge) -> Self {
-        let (radius, height) = (kernel.len() as isize / 2, self.values.len() / self.width);
+        let radius = kernel.len() as isize / 2;
+        let height = self.values.len() / self.width;
         let mut values = vec![0.0; self.values.len()];
         values.par_chunks_exact_mut(self.width).enumerate().for_each(|(y, out)| {
             for (weight, offset) in kernel.iter().zip(-radius..) {

@@ -22,8 +22,10 @@ impl PictureErrors {
     /// # Errors
     /// The pictures differ in size, or the reference has no depth.
     pub fn of(reference: &View, test: &Rgb8Image<'_>) -> Result<[Self; 2], MetricsError> {
-        let (foreground, picture) = (foreground(reference, test)?, Rgb8Image::of_view(reference)?);
-        let (ssim, flip) = (ssim_map(&picture, test)?, flip_map(&picture, test)?);
+        let foreground = foreground(reference, test)?;
+        let picture = Rgb8Image::of_view(reference)?;
+        let ssim = ssim_map(&picture, test)?;
+        let flip = flip_map(&picture, test)?;
         let over = |mask: Option<&[bool]>| {
             let errors = (psnr_db(&picture, test, mask)?, ssim.mean(mask)?, flip.mean(mask)?);
             let (Some(psnr_db), Some(ssim), Some(flip)) = errors else { return Ok(None) };

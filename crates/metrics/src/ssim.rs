@@ -26,7 +26,8 @@ pub fn ssim_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<ScoreMap, Met
     if width_px.min(height_px) < SSIM_WINDOW_PX {
         return Err(MetricsError::SmallerThanWindow { size_px: (width_px, height_px), window_px: SSIM_WINDOW_PX });
     }
-    let (width, height) = (width_px as usize, height_px as usize);
+    let width = width_px as usize;
+    let height = height_px as usize;
     let mut values = vec![0.0; width * height];
     let interior = values.par_chunks_exact_mut(width).enumerate().take(height - RADIUS).skip(RADIUS);
     interior.for_each(|(y, row)| fill_row(row, y, reference, test));
@@ -39,7 +40,8 @@ struct Sums([i64; 5]);
 
 impl Sums {
     fn of(a: u8, b: u8) -> Self {
-        let (a, b) = (i64::from(a), i64::from(b));
+        let a = i64::from(a);
+        let b = i64::from(b);
         Self([a, b, a * a, b * b, a * b])
     }
 
@@ -49,7 +51,8 @@ impl Sums {
 
     fn similarity(self) -> f64 {
         let Self([a, b, aa, bb, ab]) = self;
-        let (mean_a, mean_b) = (a as f64 / SAMPLES, b as f64 / SAMPLES);
+        let mean_a = a as f64 / SAMPLES;
+        let mean_b = b as f64 / SAMPLES;
         let covariance = |product: i64, x: i64, y: i64| {
             (SAMPLES * product as f64 - x as f64 * y as f64) / (SAMPLES * (SAMPLES - 1.0))
         };

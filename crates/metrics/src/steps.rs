@@ -55,7 +55,8 @@ impl Line {
 fn jump_is_step(jump: f32, before: Option<f32>, after: Option<f32>, larger: f32) -> bool {
     let first = before.or(after).unwrap_or(0.0);
     let second = after.or(before).unwrap_or(0.0);
-    let (least, greatest) = (first.min(second), first.max(second));
+    let least = first.min(second);
+    let greatest = first.max(second);
     (least - jump).max(jump - greatest) > STEP_RELATIVE * larger
 }
 
@@ -73,7 +74,8 @@ fn dilated(marked: &[bool], width: usize, radius: usize) -> Vec<bool> {
     let mut grown = vec![false; marked.len()];
     let height = marked.len().checked_div(width).unwrap_or(0);
     for index in (0..marked.len()).filter(|&index| marked[index]) {
-        let (x, y) = (index % width, index / width);
+        let x = index % width;
+        let y = index / width;
         for row in y.saturating_sub(radius)..(y + radius + 1).min(height) {
             grown[row * width + x.saturating_sub(radius)..row * width + (x + radius + 1).min(width)].fill(true);
         }

@@ -106,7 +106,8 @@ impl Proxy {
         socket.bind(([127, 0, 0, 1], 0).into()).expect("a port");
         let listener = socket.listen(1024).expect("a listener");
         let address = format!("http://{}", listener.local_addr().expect("an address"));
-        let (target, network) = (watch::Sender::new(None), watch::Sender::new(GOOD));
+        let target = watch::Sender::new(None);
+        let network = watch::Sender::new(GOOD);
         let listening = tokio::spawn(listen(listener, target.subscribe(), network.subscribe(), Random::new(seed)));
         Self { address, target, network, listening }
     }
@@ -166,7 +167,8 @@ async fn listen(
     // Dropped with the listener: connections then end too.
     let mut connections = JoinSet::new();
     while let Ok((near, _)) = listener.accept().await {
-        let (target, network) = (target.clone(), network.clone());
+        let target = target.clone();
+        let network = network.clone();
         connections.spawn(connect(near, target, network, [random.bits(), random.bits()]));
         while connections.try_join_next().is_some() {}
     }
@@ -197,7 +199,8 @@ async fn far_of(target: SocketAddr) -> io::Result<TcpStream> {
 
 /// Copies bytes until one side resets the connection, both have ended, or it is cut.
 async fn carry(mut near: TcpStream, mut far: TcpStream, network: watch::Receiver<Network>, seeds: [u64; 2]) {
-    let (cuts, mut watched) = (network.borrow().cuts, network.clone());
+    let cuts = network.borrow().cuts;
+    let mut watched = network.clone();
     let _ = (near.set_nodelay(true), far.set_nodelay(true));
     let is_reset = {
         let ((near_in, near_out), (far_in, far_out)) = (near.split(), far.split());
@@ -237,7 +240,8 @@ async fn take(
     way: fn(&Network) -> Way,
     mut random: Random,
 ) -> io::Result<()> {
-    let (mut piece, mut last) = (vec![0; PIECE_BYTES], Instant::now());
+    let mut piece = vec![0; PIECE_BYTES];
+    let mut last = Instant::now();
     loop {
         let count = from.read(&mut piece).await?;
         let mut bytes = piece[..count].to_vec();

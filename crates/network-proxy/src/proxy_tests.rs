@@ -39,7 +39,8 @@ async fn bytes_are_delayed_throttled_and_corrupted_as_ordered() {
     let proxy = Proxy::to(&echo().await, 1);
     let mut stream = connected(&proxy).await;
     assert_eq!(echoed(&mut stream, 5000).await.unwrap().0, vec![7; 5000]);
-    let (delay, jitter) = (Duration::from_millis(40), Duration::from_millis(10));
+    let delay = Duration::from_millis(40);
+    let jitter = Duration::from_millis(10);
     proxy.set(Way::Pass, Way::Late { delay, jitter, one_in: 0 });
     assert!(echoed(&mut stream, 100).await.unwrap().1 >= delay);
     proxy.set(Way::Slow { bytes_per_s: 50_000.0 }, Way::Pass);

@@ -113,7 +113,8 @@ mod tests {
     #[test]
     fn four_times_the_light_is_two_ev_less() {
         for light in [0.011, 0.07, 0.3, 0.75, 1.0, 2.9, 13.0] {
-            let (one, four) = (measured_ev(light), measured_ev(4.0 * light));
+            let one = measured_ev(light);
+            let four = measured_ev(4.0 * light);
             assert!((one - four - 2.0).abs() < 0.05, "{light}: {one} and {four}");
             assert!((one - (TARGET / light).log2()).abs() < 0.03, "{light}: {one}");
         }

@@ -33,7 +33,8 @@ impl Bench {
     }
 
     async fn get_sized(&self, key: u32, most_bytes: usize, bytes: usize) -> Result<Pinned<Block>, Status> {
-        let (existing, loads) = (self.existing.clone(), self.loads.clone());
+        let existing = self.existing.clone();
+        let loads = self.loads.clone();
         let load = move || async move {
             loads.fetch_add(1, Ordering::SeqCst);
             existing.fetch_add(bytes, Ordering::SeqCst);
@@ -54,7 +55,8 @@ impl Bench {
     }
 
     fn assert_bounded(&self) {
-        let (used, existing) = (self.cache.used_bytes(), self.existing.load(Ordering::SeqCst));
+        let used = self.cache.used_bytes();
+        let existing = self.existing.load(Ordering::SeqCst);
         assert!(existing <= used && used <= self.cache.max_bytes(), "{existing} of {used}");
     }
 }
@@ -103,7 +105,8 @@ async fn the_value_that_was_used_longest_ago_is_evicted() {
 #[tokio::test]
 async fn a_value_waits_while_all_others_are_in_use() {
     let bench = Bench::new(20);
-    let (first, second) = (bench.get(0, 10).await.unwrap(), bench.get(1, 10).await.unwrap());
+    let first = bench.get(0, 10).await.unwrap();
+    let second = bench.get(1, 10).await.unwrap();
     let waiting = bench.wait_for(2, 10);
     let behind = bench.wait_for(3, 5);
     settle().await;
@@ -120,7 +123,8 @@ async fn a_value_waits_while_all_others_are_in_use() {
 #[tokio::test]
 async fn values_wait_in_order_but_for_one_of_more_than_half_the_bound() {
     let bench = Bench::new(20);
-    let (first, second) = (bench.get(0, 12).await.unwrap(), bench.get(1, 4).await.unwrap());
+    let first = bench.get(0, 12).await.unwrap();
+    let second = bench.get(1, 4).await.unwrap();
     let waiting = bench.wait_for(2, 10);
     let behind = bench.wait_for(3, 2);
     settle().await;
@@ -238,7 +242,8 @@ impl Drop for Looking {
 
 #[tokio::test]
 async fn evicted_values_are_dropped_outside_the_lock() {
-    let (cache, dropped) = (ByteCache::new("values", 10), Arc::<AtomicUsize>::default());
+    let cache = ByteCache::new("values", 10);
+    let dropped = Arc::<AtomicUsize>::default();
     let get = |key: u32, bytes: usize| {
         let value = Looking(cache.clone(), dropped.clone());
         cache.get(key, bytes, move || async move { Ok((value, bytes)) })
@@ -264,7 +269,8 @@ fn next(seed: &mut u64) -> u64 {
 async fn the_bound_holds_at_each_step_of_any_sequence() {
     for mut seed in 0..50 {
         let bench = Bench::new(100);
-        let (mut waiting, mut pins) = (Vec::new(), Vec::<Pinned<Block>>::new());
+        let mut waiting = Vec::new();
+        let mut pins = Vec::<Pinned<Block>>::new();
         for _ in 0..200 {
             if next(&mut seed).is_multiple_of(2) && !pins.is_empty() {
                 pins.swap_remove(next(&mut seed) as usize % pins.len());

@@ -167,7 +167,8 @@ impl Measurement<'_> {
 
     fn costs(&self, resized: &Resized) -> Result<Measured, Status> {
         let request = &resized.request;
-        let (engine, workload) = (self.engine, &request.workload);
+        let engine = self.engine;
+        let workload = &request.workload;
         let planes = engine.sample_planes(&request.method)?;
         // Views are made from all of them: their own cell, and common cells.
         let cells = workload.cells();
@@ -347,7 +348,8 @@ impl Measurement<'_> {
     /// The result of the first run, and the median time of the runs: one long run, or [`RUNS`].
     fn timed_warm<T>(&self, mut run: impl FnMut() -> Result<T, Status>) -> Result<(T, f64), Status> {
         let (result, first_s) = own_time(self.engine, &mut run);
-        let (result, mut seconds) = (result?, vec![first_s]);
+        let result = result?;
+        let mut seconds = vec![first_s];
         while seconds.len() < runs_after(first_s) {
             let (done, own_s) = own_time(self.engine, &mut run);
             done?;

@@ -38,7 +38,8 @@ pub async fn keep_membership(
     done: WorkDone,
     shutdown: CancellationToken,
 ) {
-    let (mut backoff, mut warmed) = (Backoff::reconnect(), false);
+    let mut backoff = Backoff::reconnect();
+    let mut warmed = false;
     loop {
         let mut joined = false;
         let request = JoinCluster { node: node.clone(), plan_epoch: plans.epoch() };
@@ -144,7 +145,8 @@ fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), En
         return engine.draw_direct(&DirectWork::of(&workload, vec![view], ViewPlanes::default()), turn).map(drop);
     }
     let upload = |(number, cell): (usize, &Workload)| {
-        let (images, is_common) = (engine.sample(&SampleWork::of(cell), turn)?, workload.common_cell(number).is_some());
+        let images = engine.sample(&SampleWork::of(cell), turn)?;
+        let is_common = workload.common_cell(number).is_some();
         let set = SampleSet::of(cell, images, is_common);
         engine.upload(&set.map_err(|error| EngineError::Device(error.to_string()))?, turn)
     };

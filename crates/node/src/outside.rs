@@ -5,7 +5,8 @@ use glam::{UVec2, Vec3};
 
 /// The view of a box from outside, slantwise from above.
 pub(crate) fn view_from_outside(volume: &Aabb, size_px: UVec2) -> PinholeCamera {
-    let (middle, size_m) = (volume.center(), volume.size().length());
+    let middle = volume.center();
+    let size_m = volume.size().length();
     let eye = middle + size_m * Vec3::new(0.9, 0.7, 0.9);
     PinholeCamera::looking_at(eye, middle, Vec3::Y, 0.8, size_px)
 }

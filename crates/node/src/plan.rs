@@ -78,7 +78,8 @@ impl Plans {
 
     /// Whether a plan is new; an error where it may not replace the one in force.
     fn admits(&mut self, assignment: &Assignment) -> Result<bool, Status> {
-        let (number, plan_epoch) = (assignment.workload_number, assignment.plan_epoch);
+        let number = assignment.workload_number;
+        let plan_epoch = assignment.plan_epoch;
         if plan_epoch <= self.forgotten_epoch {
             return Err(Status::failed_precondition(format!("plan_epoch {plan_epoch} was forgotten")));
         }
@@ -88,7 +89,8 @@ impl Plans {
         }
         let in_force = self.of(number).and_then(|workload| workload.in_force().cloned());
         let Some(in_force) = in_force else { return Ok(true) };
-        let (old, new) = (in_force.plan_epoch, assignment.plan_epoch);
+        let old = in_force.plan_epoch;
+        let new = assignment.plan_epoch;
         match new > old {
             false if new == old && *in_force == *assignment => Ok(false),
             false => Err(Status::failed_precondition(format!(
@@ -112,7 +114,8 @@ impl Plans {
 
     fn put(&mut self, assignment: Assignment) {
         self.highest_epoch = self.highest_epoch.max(assignment.plan_epoch);
-        let (number, assignment) = (assignment.workload_number, Arc::new(assignment));
+        let number = assignment.workload_number;
+        let assignment = Arc::new(assignment);
         if let Some(workload) = self.of(number) {
             if !workload.in_force().is_some_and(|before| goes_on(&before.workload, &assignment.workload)) {
                 workload.plans.clear();

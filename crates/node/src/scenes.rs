@@ -48,7 +48,8 @@ impl Scenes {
             Some(package) => package,
             None => self.fetch(scene).await?,
         };
-        let (engine, hash) = (self.engine.clone(), scene.hash.clone());
+        let engine = self.engine.clone();
+        let hash = scene.hash.clone();
         blocking(move || engine.load_scene(hash.as_str(), &package)).await?;
         let seconds = start.elapsed().as_secs_f64();
         tracing::info!(scene = %scene.hash, seconds, "scene loaded");
@@ -72,7 +73,8 @@ impl Scenes {
         work: impl Fn(&dyn Engine) -> Result<T, EngineError> + Clone + Send + 'static,
     ) -> Result<T, Status> {
         let attempt = || {
-            let (engine, work) = (self.engine(), work.clone());
+            let engine = self.engine();
+            let work = work.clone();
             blocking(move || Ok::<_, Status>(work(engine.as_ref())))
         };
         match attempt().await? {
@@ -100,7 +102,8 @@ impl Scenes {
         while let Some(part) = next_within(&mut parts, self.config.deadlines.chunk, "scene").await? {
             assembly.push(&part).map_err(spoilt)?;
         }
-        let (folder, hash) = (self.config.scene_folder.clone(), scene.hash.clone());
+        let folder = self.config.scene_folder.clone();
+        let hash = scene.hash.clone();
         blocking(move || {
             let package = assembly.finish().map_err(spoilt)?;
             store(folder.as_deref(), &hash, &package);

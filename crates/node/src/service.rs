@@ -48,7 +48,8 @@ impl NodeService {
 
     async fn measure_now(&self, request: &MeasureCosts) -> Result<Measured, Status> {
         self.scenes.ensure(&request.workload.scene).await?;
-        let (engine, request) = (self.scenes.engine(), request.clone());
+        let engine = self.scenes.engine();
+        let request = request.clone();
         blocking(move || measure_costs(engine.as_ref(), &request)).await
     }
 
@@ -93,7 +94,8 @@ impl rpc::Node for NodeService {
 
     async fn apply_assignment(&self, plan: ApplyPlan) -> Result<Ready, Status> {
         let Assignment { plan_epoch, workload_number, workload, .. } = &plan.assignment;
-        let (plan_epoch, workload_number) = (*plan_epoch, *workload_number);
+        let plan_epoch = *plan_epoch;
+        let workload_number = *workload_number;
         self.plans.admits(&plan.assignment)?;
         let scene_load_s = self.scenes.ensure(&workload.scene).await?;
         let ended = self.plans.apply(plan)?;

@@ -125,7 +125,8 @@ impl NodeMetrics {
     #[must_use]
     pub fn new(telemetry: &Telemetry) -> Self {
         let seconds = || Histogram::new(exponential_buckets(0.0005, 2.0, 16));
-        let (counter, gauge) = (Counter::default, Gauge::default);
+        let counter = Counter::default;
+        let gauge = Gauge::default;
         let to = &mut *telemetry.registry();
         Self {
             images_sampled: registered(to, "images_sampled", "Images sampled and encoded", counter()),

@@ -117,7 +117,8 @@ impl WorkDone {
     /// Takes the work and the movements since the last call, of each workload that has a plan in force.
     pub(crate) fn take_reports(&self, plans: &PlansInForce) -> Vec<WorkReport> {
         let mut work = self.0.lock();
-        let (mut workloads, mut dropped_views) = (std::mem::take(&mut work.workloads), work.dropped_views);
+        let mut workloads = std::mem::take(&mut work.workloads);
+        let mut dropped_views = work.dropped_views;
         for workload_number in work.viewers.take_changed() {
             workloads.entry(workload_number).or_default();
         }
@@ -176,7 +177,8 @@ mod tests {
 
     #[test]
     fn costs_are_the_means_since_the_last_report() {
-        let (done, plans) = (WorkDone::default(), plans(1));
+        let done = WorkDone::default();
+        let plans = plans(1);
         assert!(done.take_reports(&plans).is_empty());
         done.add(1, Operation::ReconstructView, 32.0, 0.32);
         done.clone().add(1, Operation::ReconstructView, 8.0, 0.48);
@@ -198,7 +200,8 @@ mod tests {
 
     #[test]
     fn the_work_of_each_workload_is_reported_alone() {
-        let (done, plans) = (WorkDone::default(), plans(2));
+        let done = WorkDone::default();
+        let plans = plans(2);
         done.dropped();
         assert!(done.take_reports(&plans).is_empty());
         for (number, seconds) in [(1, 1.0), (2, 2.0), (3, 3.0)] {

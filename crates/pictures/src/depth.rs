@@ -30,7 +30,8 @@ pub fn inverse_depth_16(view: &View) -> Option<(Grey16, f32)> {
 pub fn depth(view: &View) -> Option<(RgbImage, Legend)> {
     let plane = view.inverse_depth_per_m.as_ref()?;
     let surfaces = || plane.iter().copied().filter(|&inverse| inverse > 0.0);
-    let (least, greatest) = (surfaces().fold(f32::INFINITY, f32::min), surfaces().fold(0.0, f32::max));
+    let least = surfaces().fold(f32::INFINITY, f32::min);
+    let greatest = surfaces().fold(0.0, f32::max);
     let range = (greatest - least).max(f32::MIN_POSITIVE);
     let color = |inverse: f32| colorous::VIRIDIS.eval_continuous(f64::from((inverse - least) / range)).as_array();
     let pixel = |&inverse: &f32| if inverse > 0.0 { color(inverse) } else { [0; 3] };

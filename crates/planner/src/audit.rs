@@ -88,7 +88,8 @@ impl Audit {
             self.skipped += 1;
             return;
         }
-        let (y, weight) = (self.excess(errors), self.weight(errors));
+        let y = self.excess(errors);
+        let weight = self.weight(errors);
         let scale = 1.0 / (self.limit() * self.bet_weight);
         for (evidence, bet) in self.evidence.iter_mut().zip(BETS) {
             // Below 0 only for a view with twice the foreground of all before it and of the certificate.
@@ -158,7 +159,8 @@ impl Audit {
 
     /// y of a view: at most 0 in the mean while the promise is kept.
     fn excess(&self, errors: &ViewErrors) -> f64 {
-        let (metric, limit) = (self.term.metric(), self.term.most_ratio());
+        let metric = self.term.metric();
+        let limit = self.term.most_ratio();
         match self.term.statistic() {
             Statistic::Mean => errors.excess(metric, limit),
             Statistic::P95 => f64::from(u8::from(errors.error_ratio(metric) > limit)) - MOST_OVER,

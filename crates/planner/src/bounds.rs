@@ -43,7 +43,8 @@ impl Moments {
 
     /// The distance of the upper bound of `count` such values from their mean, in standard deviations. At least 2 values.
     pub(crate) fn deviations_above(&self, count: usize, error_rate: f64) -> f64 {
-        let (t, count_f) = (upper_quantile(count - 1, error_rate), count as f64);
+        let t = upper_quantile(count - 1, error_rate);
+        let count_f = count as f64;
         // A short tail above would take the bound nearer: it stays.
         t / count_f.sqrt() + self.skewness.max(0.0) * (1.0 + 2.0 * t * t) / (6.0 * count_f)
     }

@@ -46,7 +46,8 @@ impl Evidence<'_> {
     pub(crate) fn upper_bound(&self, error_rate: f64) -> Option<f64> {
         match self.term.statistic() {
             Statistic::Mean => {
-                let (limit, weight) = (self.term.most_ratio(), self.weight());
+                let limit = self.term.most_ratio();
+                let weight = self.weight();
                 let excess = self.excess(limit).upper_bound(error_rate)?;
                 (weight > 0.0).then(|| limit + excess / weight)
             }

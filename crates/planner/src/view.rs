@@ -31,7 +31,8 @@ impl ProbeView {
 
 /// The digits of a number in a base, mirrored at the point.
 fn radical_inverse(mut number: u64, base: u64) -> f64 {
-    let (mut inverse, mut digit) = (0.0, 1.0);
+    let mut inverse = 0.0;
+    let mut digit = 1.0;
     while number > 0 {
         digit /= base as f64;
         inverse += digit * (number % base) as f64;

@@ -29,7 +29,8 @@ pub fn errors_of_part(
     sample_images: &[DepthImage],
     part: &[bool],
 ) -> Result<ViewErrors, MetricsError> {
-    let (expected, actual) = (Rgb8Image::of_view(truth)?, Rgb8Image::of_view(view)?);
+    let expected = Rgb8Image::of_view(truth)?;
+    let actual = Rgb8Image::of_view(view)?;
     let mask: Vec<bool> = foreground(truth, &actual)?.iter().zip(part).map(|(&shown, &own)| shown && own).collect();
     let flip = flip_map(&expected, &actual)?;
     let depth = truth.inverse_depth_per_m.as_deref().unwrap_or_default();
@@ -114,7 +115,9 @@ mod tests {
 
     #[test]
     fn errors_of_parts_add_up_to_those_of_the_view() {
-        let (truth, test, images) = (view(100, 0), view(151, 9), [image(2)]);
+        let truth = view(100, 0);
+        let test = view(151, 9);
+        let images = [image(2)];
         let whole = view_errors(&camera(), &truth, &test, &images).unwrap();
         let mut sums = [0.0; 4];
         for first_row in [0, 4, 8, 12] {

@@ -141,7 +141,8 @@ impl Prober {
         let images = &sampled.images[..of.sample_cameras.len()];
         let (set, load_set_s, view_s) = self.loaded(of, light, planes, images, &cameras[..1])?;
         let views_a_call = views_of(CALL_S, view_s, usize::MAX);
-        let (mut views, mut seconds) = (Vec::with_capacity(cameras.len()), 0.0);
+        let mut views = Vec::with_capacity(cameras.len());
+        let mut seconds = 0.0;
         let timed = timed_cameras(cameras, views_a_call);
         for cameras in timed.chunks(views_a_call) {
             let work = self.view_work(of, cameras.to_vec(), planes);

@@ -95,7 +95,8 @@ fn measured(
     for (place, view) in request.typical_views.iter().enumerate() {
         of_cells.entry(request.workload.cell_of(view)).or_default().push(place);
     }
-    let (mut errors, mut costs) = (vec![None; request.typical_views.len()], Costs::default());
+    let mut errors = vec![None; request.typical_views.len()];
+    let mut costs = Costs::default();
     for (cell, places) in of_cells {
         let cameras: Vec<PinholeCamera> = places.iter().map(|&place| request.typical_views[place]).collect();
         let of = representation(request, cell)?;

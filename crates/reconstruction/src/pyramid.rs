@@ -104,7 +104,8 @@ impl CodedDepth {
 
     /// The place of a texel; of positions beyond the border, that of the border's.
     fn index(&self, x: u32, y: u32) -> usize {
-        let (x, y) = (x.min(self.size_px[0] - 1), y.min(self.size_px[1] - 1));
+        let x = x.min(self.size_px[0] - 1);
+        let y = y.min(self.size_px[1] - 1);
         (y * self.size_px[0] + x) as usize
     }
 
@@ -141,7 +142,8 @@ fn uncertain_texels(image: &DepthImage, codes: &[u16]) -> Vec<bool> {
 /// right, lower left and lower right corners. The border's values go on beyond the border.
 pub(crate) fn cell_row<T: Copy>(plane: &[T], columns: usize, y: usize) -> impl Iterator<Item = [T; 4]> {
     let row = |y: usize| &plane[y * columns..][..columns];
-    let (upper, lower) = (row(y), row((y + 1).min(plane.len() / columns - 1)));
+    let upper = row(y);
+    let lower = row((y + 1).min(plane.len() / columns - 1));
     let last = columns - 1;
     let inside = upper.windows(2).zip(lower.windows(2)).map(|(u, l)| [u[0], u[1], l[0], l[1]]);
     inside.chain(std::iter::once([upper[last], upper[last], lower[last], lower[last]]))
@@ -176,7 +178,8 @@ fn connected_cells(image: &DepthImage, focal_px: f32) -> Vec<bool> {
 /// on before or after. They are the `place`-th and the next of `count` in their row or column. Planes are linear in
 /// inverse depth, so that no plane is ever cut, however steep.
 fn is_one_surface(plane: &[f32], index: usize, stride: usize, place: usize, count: usize, focal_px: f32) -> bool {
-    let (a, b) = (plane[index], plane[index + stride]);
+    let a = plane[index];
+    let b = plane[index + stride];
     if a <= 0.0 || b <= 0.0 {
         return false;
     }

@@ -167,7 +167,8 @@ impl Reconstructor {
         let base = base.filter(|_| !method.walks_cube()).map(cube_of_base).transpose()?;
         let [mirrors, lobes] = mirrors.checked_for(set, cube)?.split(base.is_some());
         let cells = [mirrors, lobes].map(|of| of.cells_with(cube));
-        let (mirrors, lobes) = (Mirrors { cells: &cells[0], ..mirrors }, Mirrors { cells: &cells[1], ..lobes });
+        let mirrors = Mirrors { cells: &cells[0], ..mirrors };
+        let lobes = Mirrors { cells: &cells[1], ..lobes };
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;

@@ -209,7 +209,8 @@ impl<'r> Recording<'r> {
         let kind = WorkKind::new(self.family, &variant.name());
         let piece_px = u64::from(self.batch.size_px.x) * u64::from(self.batch.pieces.rows);
         for slice in self.batch.pieces.slices() {
-            let (count, size) = (slice.len() as u64, size(slice.start));
+            let count = slice.len() as u64;
+            let size = size(slice.start);
             pass.dispatch_each(&mut self.frame, &[bound], slice, size);
             self.frame.cut(kind, count * piece_px);
         }
@@ -235,7 +236,8 @@ impl Pieces {
     }
 
     fn slices(&self) -> impl Iterator<Item = Range<u32>> + use<> {
-        let (count, a_slice) = (self.all.len(), self.a_slice);
+        let count = self.all.len();
+        let a_slice = self.a_slice;
         (0..count).step_by(a_slice).map(move |first| first as u32..first.saturating_add(a_slice).min(count) as u32)
     }
 }

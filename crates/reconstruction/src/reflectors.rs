@@ -44,7 +44,8 @@ impl Reflectors {
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
         let Some(highlight) = highlight.filter(|_| planes.iter().any(Planes::reflects)) else { return Ok(None) };
-        let (gpu, bytes) = (&tables.gpu, illumination_bytes(illumination));
+        let gpu = &tables.gpu;
+        let bytes = illumination_bytes(illumination);
         let limit = gpu.device.limits().max_uniform_buffer_binding_size;
         GpuError::check_limit("the scene's lights (bytes)", bytes.len() as u64, limit)?;
         let visibility_words = visibility_words(planes);
@@ -92,12 +93,14 @@ struct Planes<'i> {
 
 impl<'i> Planes<'i> {
     fn of_image(image: &'i DepthImage) -> Self {
-        let (normal_oct16, specular) = (image.normal_oct16.as_deref(), image.specular.as_ref());
+        let normal_oct16 = image.normal_oct16.as_deref();
+        let specular = image.specular.as_ref();
         Self { samples: image.color_rgb9e5.len(), normal_oct16, specular }
     }
 
     fn of_layers(image: &'i LayeredDepthImage) -> Self {
-        let (normal_oct16, specular) = (image.normal_oct16.as_deref(), image.specular.as_ref());
+        let normal_oct16 = image.normal_oct16.as_deref();
+        let specular = image.specular.as_ref();
         Self { samples: image.sample_count(), normal_oct16, specular }
     }
 

@@ -85,7 +85,8 @@ impl SampleSet {
             if is_shared { images.iter().map(coded).collect() } else { images.par_iter().map(coded).collect() };
         let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(Vec::with_capacity);
         let mut colors: Vec<[u32; 2]> = Vec::with_capacity(color_count(images, set.mips));
-        let (mut cameras, mut levels) = (Vec::with_capacity(images.len()), Vec::with_capacity(images.len()));
+        let mut cameras = Vec::with_capacity(images.len());
+        let mut levels = Vec::with_capacity(images.len());
         let uncertain = coded.iter().map(|coded| coded.uncertain).collect();
         for (image, coded) in images.iter().zip(coded) {
             cameras.push(GpuSampleCamera {

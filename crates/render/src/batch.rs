@@ -137,7 +137,9 @@ impl Batch<'_> {
         let set = self.sequence.map_or(&[][..], |sequence| &sequence.known.cameras);
         let set: Vec<Camera> = set.iter().copied().map(Camera::from).collect();
         let redundancy = self.sequence.map(|sequence| sequence.known.variant(sequence.first));
-        let (cameras, by_rays, output) = ([&set, self.cameras].concat(), self.by_rays, self.output);
+        let cameras = [&set, self.cameras].concat();
+        let by_rays = self.by_rays;
+        let output = self.output;
         Key { scene: scene.identity, lighting, scene_time_s, cameras, by_rays, output, redundancy }
     }
 
@@ -215,7 +217,8 @@ impl Batch<'_> {
     /// A uniform for these rays.
     fn uniform(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums, rays: Rays) -> wgpu::Buffer {
         let [planes, sum_planes] = [self.output.layout().count, self.output.sums.count()].map(|count| count as u32);
-        let (mut first_word, mut first_sum) = (0, 0);
+        let mut first_word = 0;
+        let mut first_sum = 0;
         let place = |camera: &Camera| {
             let camera = PixelCamera { first_word, first_sum, ..PixelCamera::of(camera, self.position.offset_px) };
             first_word += camera.pixel_count * planes;

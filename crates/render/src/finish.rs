@@ -50,7 +50,8 @@ impl Finish {
         let is_averaged = batch.output.antialias > Antialias::NONE;
         let antialias = if is_averaged { Antialias::MOST } else { Antialias::NONE };
         let output = Output { depth: false, antialias, ..batch.output };
-        let (lit, environment_map) = (batch.work.lighting.is_lit(), batch.work.scene.environment.is_some());
+        let lit = batch.work.lighting.is_lit();
+        let environment_map = batch.work.scene.environment.is_some();
         Self { by_rays: batch.by_rays, single_pole: batch.is_single_pole(), lit, environment_map, output }
     }
 

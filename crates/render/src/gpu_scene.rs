@@ -279,7 +279,8 @@ impl Geometry {
     ) {
         let material = &scene.materials[clusters[0].material as usize];
         let reach_m = scene.wind.map_or(0.0, |wind: Wind| wind.amplitude_m.abs());
-        let (indices, base_vertex) = (self.indices.len() as u32, self.vertices.len() as i32);
+        let indices = self.indices.len() as u32;
+        let base_vertex = self.vertices.len() as i32;
         let object = self.objects.len() as u32;
         let (texture, _) = self.textures.insert_full(material.textures());
         // A pose's vertices are in the world already.

@@ -131,7 +131,8 @@ impl ShaderVariant for Illuminate {
             variants.extend([bent, lit].iter().flat_map(Self::with_all_sums));
         }
         for [by_rays, continued, environment_map] in switches() {
-            let (shadow_rays, ambient) = (ShadowRays::Many, AmbientRays::Indirect);
+            let shadow_rays = ShadowRays::Many;
+            let ambient = AmbientRays::Indirect;
             let lit =
                 Self { by_rays, listed: true, knows_ambient: true, shadow_rays, ambient, continued, ..Self::UNLIT };
             variants.extend(Self { environment_map, ..lit }.with_all_sums());
@@ -275,7 +276,8 @@ mod tests {
     #[test]
     fn every_variant_is_bound_by_its_names() {
         let stage = TestStage::new();
-        let (traced, buffer) = (stage.scene.rays.at(0.0).expect("a tree"), &stage.buffer);
+        let traced = stage.scene.rays.at(0.0).expect("a tree");
+        let buffer = &stage.buffer;
         let list = PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), 1);
         let bounces = BounceList::new(&stage.gpu);
         let points = Rays { bounces: buffer, list: &bounces, units: 1, generation: 1 };

@@ -52,7 +52,8 @@ pub(crate) fn record(
     lists: &[PixelList],
 ) -> Result<(), RenderError> {
     let Recording { passes, batch, cameras, sums, .. } = recording;
-    let (by_rays, single_pole) = (batch.by_rays, batch.is_single_pole());
+    let by_rays = batch.by_rays;
+    let single_pole = batch.is_single_pole();
     let variant = Interpolate { by_rays, single_pole, step_px, sum_planes: batch.output.sums.count() };
     let pass = passes.get(&variant)?;
     let bound = lists.iter().map(|list| {

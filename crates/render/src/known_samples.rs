@@ -86,7 +86,8 @@ impl RedundancyVariant {
     pub fn all(tests: &[RedundancyTest]) -> HashSet<Self> {
         let with_reference = |test: &RedundancyTest| [false, test.consults == Evidence::Samples];
         let after = |test: &RedundancyTest, earlier| {
-            let (shader, traces_rays) = (test.shader, test.traces_rays());
+            let shader = test.shader;
+            let traces_rays = test.traces_rays();
             let variant = |temporal_reference| Self { shader, traces_rays, temporal_reference, earlier };
             with_reference(test).map(variant)
         };
@@ -155,7 +156,8 @@ impl KnownSamples {
         let reference = self.reference.as_ref().map(|TemporalReference { cameras, layers }| {
             (layers.first(cameras.len()), uniform(&cameras[earlier..=earlier]))
         });
-        let (samples, cameras) = (self.layers.first(earlier), uniform(&self.cameras[..earlier]));
+        let samples = self.layers.first(earlier);
+        let cameras = uniform(&self.cameras[..earlier]);
         Predecessors { variant: self.variant(earlier), samples, cameras, reference }
     }
 }
@@ -168,7 +170,8 @@ impl<'a> ImageSequence<'a> {
 
     /// The layer that an image leaves this evidence in for images after it, and the layer's size.
     pub fn layer(&self, place: usize, evidence: Evidence) -> Option<(&'a TextureView, UVec2)> {
-        let (number, layers) = (self.number(place), &self.known.layers);
+        let number = self.number(place);
+        let layers = &self.known.layers;
         let is_kept = self.known.test.consults == evidence && number < self.kept;
         is_kept.then(|| (&layers.each[number], layers.size_px))
     }

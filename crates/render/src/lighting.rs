@@ -235,7 +235,11 @@ impl Lighting {
 impl FromStr for Lighting {
     type Err = UnknownLighting;
     fn from_str(text: &str) -> Result<Self, UnknownLighting> {
-        let (mut direct, mut ambient, mut reflections, mut glossy, mut rate) = (None, None, None, None, None);
+        let mut direct = None;
+        let mut ambient = None;
+        let mut reflections = None;
+        let mut glossy = None;
+        let mut rate = None;
         for term in text.split(',').map(str::trim) {
             let words: Vec<&str> = term.split_whitespace().collect();
             let again = match words[..] {

@@ -49,7 +49,8 @@ impl Motion {
         let is_mapped = scene.materials.iter().any(Material::is_mapped);
         let rest: BTreeMap<u32, Rest> =
             meshes.iter().map(|&mesh| (mesh, Rest::of(&scene.meshes[mesh as usize], is_mapped))).collect();
-        let (mut places, mut first) = (HashMap::new(), 0);
+        let mut places = HashMap::new();
+        let mut first = 0;
         for (moving, mesh) in animation.moving.iter().zip(&meshes) {
             let end = first + rest[mesh].vertices.len();
             places.insert(moving.instance, first..end);
@@ -89,7 +90,8 @@ impl Motion {
 
     fn posed(&self, scene_time_s: f32) -> Posed {
         let world_from_nodes = self.animation.world_from_nodes(scene_time_s);
-        let (mut vertices, mut details) = (Vec::new(), Vec::new());
+        let mut vertices = Vec::new();
+        let mut details = Vec::new();
         for (moving, mesh) in self.animation.moving.iter().zip(&self.meshes) {
             let rest = &self.rest[mesh];
             vertices.extend(self.animation.posed(moving, &rest.vertices, &world_from_nodes));

@@ -204,7 +204,8 @@ impl Raster {
         let posed = scene.motion.as_ref().map(|motion| motion.at(batch.work.scene_time_s));
         let posed = posed.as_ref().map(|posed| posed.buffers(&self.gpu));
         for (place, (camera, target)) in (0..).zip(cameras.iter().zip(surfaces)) {
-            let (frustum, size_px) = (Frustum::of(camera.reference()), camera.size_px());
+            let frustum = Frustum::of(camera.reference());
+            let size_px = camera.size_px();
             let view = View { scene, posed, place, size_px, frustum, groups: groups.as_ref() };
             if predecessors.is_some() {
                 self.draw_in_slices(frame, &view, front, &[], &target.views.front_depth)?;
@@ -236,7 +237,8 @@ impl Raster {
         let groups = groups.transpose()?;
         let posed = scene.motion.as_ref().map(|motion| motion.at(work.scene_time_s));
         let posed = posed.as_ref().map(|posed| posed.buffers(&self.gpu));
-        let (frustum, size_px) = (Frustum::of_lines(camera), camera.size_px);
+        let frustum = Frustum::of_lines(camera);
+        let size_px = camera.size_px;
         let view = View { scene, posed, place: 0, size_px, frustum, groups: groups.as_ref() };
         self.draw_in_slices(frame, &view, variant, &[], depth)
     }
@@ -299,7 +301,10 @@ impl Raster {
         if let Some(own) = groups.own.as_ref().filter(|_| variant.has_own_group()) {
             pass.set_bind_group(OWN_GROUP, &**own, &[]);
         }
-        let (mut material, mut texture, mut object, mut vertices) = (None, None, None, None);
+        let mut material = None;
+        let mut texture = None;
+        let mut object = None;
+        let mut vertices = None;
         for run in runs {
             let draw = &scene.draws[run.draw];
             let buffers = posed.filter(|_| draw.posed).unwrap_or([&scene.vertices, &scene.details]);
@@ -412,7 +417,8 @@ fn visible_runs(scene: &GpuScene, frustum: &Frustum) -> Vec<Run> {
 /// Runs in their order, cut where a slice has so many indices; one slice at least.
 fn slices(runs: Vec<Run>, most_indices: u64) -> Vec<Vec<Run>> {
     let most = (most_indices / 3 * 3).clamp(3, u32::MAX.into()) as u32 / 3 * 3;
-    let (mut slices, mut room) = (vec![Vec::new()], most);
+    let mut slices = vec![Vec::new()];
+    let mut room = most;
     for Run { draw, indices } in runs {
         let mut first = indices.start;
         while first < indices.end {

@@ -230,7 +230,8 @@ impl Renderer {
         cameras: &[Camera],
         test: RedundancyTest,
     ) -> Result<TemporalReference, RenderError> {
-        let (work, pinholes) = (work.unlit(), pinholes(cameras, "redundancy tests")?);
+        let work = work.unlit();
+        let pinholes = pinholes(cameras, "redundancy tests")?;
         self.check(cameras)?;
         let known = KnownSamples::of(&self.gpu, &self.layer_cache, &pinholes, test, None)?;
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
@@ -253,7 +254,8 @@ impl Renderer {
         let request = DrawRequest { work, output, tone: ToneMapping::NONE, sequence, cached: None };
         let mut images = self.draw(request, cameras, |words, cameras| planes::depth_images(words, output, cameras))?;
         if let Some(pinholes) = corners {
-            let (work, cameras) = (work.unlit(), as_cameras(&corner_cameras(&pinholes)));
+            let work = work.unlit();
+            let cameras = as_cameras(&corner_cameras(&pinholes));
             self.check(&cameras)?;
             let output = images_output(work, SamplePlanes::default(), test);
             let request = DrawRequest { work, output, sequence: of_corners, ..request };
@@ -364,7 +366,8 @@ impl Renderer {
     ) -> Result<Choice, RenderError> {
         let cameras = [Camera::from(*camera)];
         let seconds = |visibility| {
-            let (lighting, refinement) = (Lighting::UNLIT, Default::default());
+            let lighting = Lighting::UNLIT;
+            let refinement = Default::default();
             let work = DrawWork { scene, lighting, scene_time_s, visibility, refinement, turn };
             let run = || {
                 let batch = self.batch(work, &cameras, views_output(work), None)?;
@@ -409,7 +412,9 @@ impl Renderer {
         };
         let needs_tree = by_rays || work.lighting.is_traced();
         let traced = needs_tree.then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
-        let (tone, cached, position) = (ToneMapping::NONE, None, Position::default());
+        let tone = ToneMapping::NONE;
+        let cached = None;
+        let position = Position::default();
         Ok(Batch { work, cameras, by_rays, traced, output, tone, sequence, cached, position })
     }
 

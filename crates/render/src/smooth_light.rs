@@ -55,7 +55,8 @@ fn smoothed_ambient(image: &DepthImage, words: &[u32]) -> Vec<u32> {
 fn mean_around(surfaces: &[Option<Surface>], linear: &[Vec3], size_px: UVec2, place: usize, step_px: i32) -> Vec3 {
     let Some(own) = &surfaces[place] else { return linear[place] };
     let at = IVec2::new(place as i32 % size_px.x as i32, place as i32 / size_px.x as i32);
-    let (mut sum, mut weight) = (Vec3::ZERO, 0.0);
+    let mut sum = Vec3::ZERO;
+    let mut weight = 0.0;
     for (dx, dy) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy))) {
         let near = at + IVec2::new(dx, dy) * step_px;
         if near.cmplt(IVec2::ZERO).any() || near.cmpge(size_px.as_ivec2()).any() {
@@ -73,7 +74,8 @@ fn mean_around(surfaces: &[Option<Surface>], linear: &[Vec3], size_px: UVec2, pl
 
 /// `None` where a texel shows none.
 fn surface(image: &DepthImage, place: usize) -> Option<Surface> {
-    let (light, normals) = (image.light.as_ref()?, image.normal_oct16.as_ref()?);
+    let light = image.light.as_ref()?;
+    let normals = image.normal_oct16.as_ref()?;
     let camera = image.camera.pinhole()?;
     let inverse_depth_per_m = image.inverse_depth_per_m[place];
     let width_px = image.size_px().x;

@@ -80,7 +80,8 @@ impl Stages {
 
     /// Sums to add to: those of the step before, or new ones.
     fn sums(&self, batch: &Batch<'_>) -> Result<Sums, RenderError> {
-        let (lighting, refinement) = (batch.work.lighting, batch.work.refinement);
+        let lighting = batch.work.lighting;
+        let refinement = batch.work.refinement;
         let bytes = batch.bytes(if lighting.is_lit() { batch.output.sums.count() } else { 0 });
         self.gpu.check_storage_bytes("the light of a batch (bytes)", bytes)?;
         let wanted = batch.light_rays().map(|rays| refinement.share_of(rays));
@@ -165,7 +166,8 @@ impl Stages {
         surfaces: &[Surfaces],
         planes: &Planes,
     ) -> Result<Vec<PixelList>, RenderError> {
-        let (batch, mut lists) = (recording.batch, Vec::new());
+        let batch = recording.batch;
+        let mut lists = Vec::new();
         if let Some(cached) = batch.cached {
             return self.look_up(recording, cached, surfaces, planes);
         }

@@ -89,10 +89,12 @@ pub(crate) fn mips(texture: &Texture) -> impl Iterator<Item = Texture> {
 
 /// Half the size, each texel the mean of up to four; of colours in linear light.
 fn halved(texture: &Texture) -> Texture {
-    let (width, height) = ((texture.width_px / 2).max(1), (texture.height_px / 2).max(1));
+    let width = (texture.width_px / 2).max(1);
+    let height = (texture.height_px / 2).max(1);
     let decode: [f32; 256] = std::array::from_fn(|code| linear_from_srgb8(code as u8));
     let texel = |x: u32, y: u32, channel: u32| {
-        let (x, y) = (x.min(texture.width_px - 1), y.min(texture.height_px - 1));
+        let x = x.min(texture.width_px - 1);
+        let y = y.min(texture.height_px - 1);
         texture.srgba8[((y * texture.width_px + x) * 4 + channel) as usize]
     };
     let mean = |x: u32, y: u32, channel: u32| {

@@ -122,7 +122,8 @@ mod tests {
         let choice = |triangles_s, rays_s| Choice { triangles_s, rays_s };
         let costs = Costs::through([(1000, choice(4.0, 1.0)), (4000, choice(4.3, 4.0))]);
         let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
-        let (same, large) = (costs.at(4000), costs.at(10_000));
+        let same = costs.at(4000);
+        let large = costs.at(10_000);
         assert!(near(same.triangles_s, 4.3) && near(same.rays_s, 4.0) && same.rays_are_faster());
         assert!(near(large.triangles_s, 4.9) && near(large.rays_s, 10.0) && !large.rays_are_faster());
     }

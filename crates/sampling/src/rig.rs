@@ -121,7 +121,8 @@ impl Rig {
         let places = [(0.0, 0.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
         let distance_m = places.into_iter().fold(0.0f32, |most, (x, y)| {
             let towards_eye = backwards + (right * x + up * y) * spread;
-            let (axis, length) = (towards_eye.normalize_or(Vec3::Z), towards_eye.length());
+            let axis = towards_eye.normalize_or(Vec3::Z);
+            let length = towards_eye.length();
             let side = up.cross(axis).normalize_or(Vec3::X);
             let share = if x == 0.0 { FRAMED_SHARE } else { CORNER_SHARE };
             let seen = Extent::of(offsets(target), [side, axis.cross(side), axis], slopes * share);
@@ -170,7 +171,9 @@ impl Extent {
     /// `axes` lead right, up and towards the eye; `slopes` are the frame's half sides at unit distance. A point at
     /// (x, y, z) on the axes is inside from a distance of |x| / slope + z, and of |y| / slope + z.
     fn of(offsets: impl Iterator<Item = Vec3>, [right, up, backwards]: [Vec3; 3], slopes: Vec2) -> Self {
-        let (mut high, mut low, mut nearest_m) = (Vec2::MIN, Vec2::MIN, f32::MIN);
+        let mut high = Vec2::MIN;
+        let mut low = Vec2::MIN;
+        let mut nearest_m = f32::MIN;
         for offset in offsets {
             let across = Vec2::new(right.dot(offset), up.dot(offset)) / slopes;
             let towards_eye_m = backwards.dot(offset);
@@ -211,8 +214,8 @@ mod tests {
 
     #[test]
     fn a_rig_is_found_again_from_its_cameras() {
-        let (block, size_px) =
-            (Aabb { min: Vec3::new(-1.0, 0.0, -2.0), max: Vec3::new(1.0, 1.0, 2.0) }, UVec2::new(40, 30));
+        let block = Aabb { min: Vec3::new(-1.0, 0.0, -2.0), max: Vec3::new(1.0, 1.0, 2.0) };
+        let size_px = UVec2::new(40, 30);
         for rig in [Rig::two_plane(&block, 3.0), Rig::in_front_of(&block, 0.12)] {
             let rig = rig.expect("a block");
             let cell = ViewCell::between(&rig.samples(UVec2::new(400, 300))).expect("four cameras");

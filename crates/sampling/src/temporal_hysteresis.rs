@@ -31,7 +31,8 @@ impl TemporalHysteresis {
     ) -> Result<Option<TemporalReference>, RenderError> {
         let moves = |&time_s: &f32| work.method.has_hysteresis() && time_s != work.draw.scene_time_s;
         let Some(time_s) = work.temporal_reference_s.filter(moves) else { return Ok(None) };
-        let (scene, cameras) = (work.draw.scene.identity, work.cameras.to_vec());
+        let scene = work.draw.scene.identity;
+        let cameras = work.cameras.to_vec();
         let moment = Moment { scene, time_s, cameras, method: work.method };
         let mut last = self.0.lock();
         if let Some((_, reference)) = last.as_ref().filter(|(other, _)| *other == moment) {

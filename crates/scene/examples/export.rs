@@ -9,7 +9,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let name = std::env::args().nth(1).ok_or("usage: export SCENE")?;
     let scene = name.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?;
     let glows = |material: u32| scene.materials[material as usize].emissive_linear != Vec3::ZERO;
-    let (mut places, mut normals, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut places = Vec::new();
+    let mut normals = Vec::new();
+    let mut colors = Vec::new();
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh as usize];
         for part in mesh.parts.iter().filter(|part| !glows(part.material)) {

@@ -37,7 +37,8 @@ pub(super) fn camera() -> PinholeCamera {
 }
 
 fn illumination() -> Illumination {
-    let (position_in_world, intensity_linear) = (Vec3::new(0.0, 4.0, 1.0), Vec3::new(3.0, 2.0, 1.0));
+    let position_in_world = Vec3::new(0.0, 4.0, 1.0);
+    let intensity_linear = Vec3::new(3.0, 2.0, 1.0);
     let lights = vec![
         Light::Directional {
             towards_light_in_world: Vec3::Y,
@@ -625,7 +626,8 @@ fn zeros_and_empty_texts_of_the_wire_become_none() {
     let Workload { scene, volume, .. } = workload();
     let sample_cameras = vec![Camera::Pinhole(camera()); 2];
     let name = "scene".to_owned();
-    let (source_space, period_s) = (SourceSpace { origin_in_source: DVec3::X, metres_per_unit: 0.5 }, Some(2.5));
+    let source_space = SourceSpace { origin_in_source: DVec3::X, metres_per_unit: 0.5 };
+    let period_s = Some(2.5);
     let offer = OfferStatus { name, scene, sample_cameras, volume, source_space, settings, period_s };
     let message = to_message::<proto::SceneOffer, _>(offer.clone());
     assert_eq!((message.sampling_method.as_str(), message.lighting.as_str()), ("", "unlit"));

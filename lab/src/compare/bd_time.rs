@@ -11,7 +11,8 @@ use super::pchip::Pchip;
 pub fn bd_time(old: &[Point], new: &[Point]) -> Option<f64> {
     let [old, new] = [curve(old)?, curve(new)?];
     let [[old_from, old_to], [new_from, new_to]] = [old.range(), new.range()];
-    let (from, to) = (old_from.max(new_from), old_to.min(new_to));
+    let from = old_from.max(new_from);
+    let to = old_to.min(new_to);
     (from < to).then(|| (new.mean(from, to) - old.mean(from, to)).exp() - 1.0)
 }
 

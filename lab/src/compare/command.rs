@@ -30,7 +30,8 @@ pub struct CompareArgs {
 /// # Errors
 /// A report cannot be read or is no report of fronts, or both have no subject in common.
 pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
-    let (old, new) = (read(&args.old)?, read(&args.new)?);
+    let old = read(&args.old)?;
+    let new = read(&args.new)?;
     if old.keys().all(|subject| !new.contains_key(subject)) {
         return Err(BadInput("the reports have no subject in common".to_owned()).into());
     }
@@ -95,7 +96,8 @@ mod tests {
 
     #[test]
     fn fronts_without_a_common_error_are_named() {
-        let (old, mut new) = (report(&[("a", 1.0)]), report(&[("a", 1.0)]));
+        let old = report(&[("a", 1.0)]);
+        let mut new = report(&[("a", 1.0)]);
         new.get_mut("a").unwrap().insert("mesh".to_owned(), vec![(1.0, 0.5).into()]);
         assert!(text(&old, &new).unwrap().contains("not comparable"));
     }

@@ -48,7 +48,8 @@ impl Pchip {
         let width = self.x[piece + 1] - self.x[piece];
         let t = (x - self.x[piece]) / width;
         let rise = (3.0 - 2.0 * t) * t * t;
-        let (start, end) = (t * (1.0 - t).powi(2), t * t * (t - 1.0));
+        let start = t * (1.0 - t).powi(2);
+        let end = t * t * (t - 1.0);
         (1.0 - rise) * self.y[piece]
             + rise * self.y[piece + 1]
             + width * (start * self.slopes[piece] + end * self.slopes[piece + 1])
@@ -71,7 +72,8 @@ fn inner_slope([(width_a, secant_a), (width_b, secant_b)]: [(f64, f64); 2]) -> f
     if secant_a * secant_b <= 0.0 {
         return 0.0;
     }
-    let (a, b) = (width_a + 2.0 * width_b, 2.0 * width_a + width_b);
+    let a = width_a + 2.0 * width_b;
+    let b = 2.0 * width_a + width_b;
     (a + b) / (a / secant_a + b / secant_b)
 }
 

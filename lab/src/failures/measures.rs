@@ -118,7 +118,8 @@ mod tests {
 
     #[test]
     fn shares_and_errors_are_those_of_surfaces() {
-        let (truth, test) = ([view([1.0, 1.0, 1.0, 0.0])], [view([1.01, 1.0, 0.0, 0.0])]);
+        let truth = [view([1.0, 1.0, 1.0, 0.0])];
+        let test = [view([1.01, 1.0, 0.0, 0.0])];
         assert!((found(&truth, &test) - 2.0 / 3.0).abs() < 1e-9);
         assert!((depth_error(&truth, &test).unwrap() - 0.005).abs() < 1e-6);
         assert!((not_held(&truth, &test, 0.1) - 1.0 / 3.0).abs() < 1e-9);

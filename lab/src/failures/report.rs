@@ -73,7 +73,8 @@ fn table(results: &[Result]) -> anyhow::Result<Table> {
 
 /// `None` of a curve that was not measured.
 fn chart(result: &Result) -> Option<XyChart> {
-    let (curve, measured) = (result.curve, result.measured.as_ref().ok()?);
+    let curve = result.curve;
+    let measured = result.measured.as_ref().ok()?;
     let x =
         if curve.x.is_log { Axis::log(curve.x.label, curve.x.unit) } else { Axis::linear(curve.x.label, curve.x.unit) };
     let [label, unit] = curve.y;

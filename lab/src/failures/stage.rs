@@ -57,7 +57,9 @@ impl<'s> Stage<'s> {
         cameras: &[PinholeCamera],
         planes: SamplePlanes,
     ) -> anyhow::Result<Self> {
-        let (lighting, volume, background) = (Lighting::default(), scene.bounds(), scene.background);
+        let lighting = Lighting::default();
+        let volume = scene.bounds();
+        let background = scene.background;
         let scene = stand.upload(scene)?;
         let images = stand.images(&scene, lighting, &pinholes(cameras), planes)?;
         Ok(Self { stand, scene, lighting, background, images, volume })
@@ -70,7 +72,8 @@ impl<'s> Stage<'s> {
     }
 
     pub fn description(&self) -> SetDescription<'static> {
-        let (volume, background) = (self.volume, self.background);
+        let volume = self.volume;
+        let background = self.background;
         SetDescription { volume, background, illumination: &DARK, highlight: None, environment: None, mips: false }
     }
 

@@ -87,7 +87,8 @@ impl Subject {
     /// # Errors
     /// The scene cannot be used, or the device fails.
     pub fn load(engine: &Arc<GpuEngine>, conditions: &Conditions) -> anyhow::Result<Self> {
-        let args = SceneArgs { lighting: conditions.lighting.parse()?, ..SceneArgs::new(fixtures::spec(conditions.scene)?) };
+        let args =
+            SceneArgs { lighting: conditions.lighting.parse()?, ..SceneArgs::new(fixtures::spec(conditions.scene)?) };
         let setup = args.load()?;
         engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
         let around = scaled(&setup.around, conditions.cell_ratio);

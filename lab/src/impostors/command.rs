@@ -55,7 +55,7 @@ pub struct ImpostorsArgs {
 /// # Errors
 /// The device fails, or the folder cannot be written.
 pub fn run(args: &ImpostorsArgs) -> anyhow::Result<Outcome> {
-    let scene = scene::procedural::teapot_mirror();
+    let scene = fixtures::teapot_mirror();
     let engine = GpuEngine::shared(args.device.device)?;
     let stand = Stand::new(&engine, false);
     let lighting: Lighting = LIGHTING[usize::from(args.quick)].parse()?;

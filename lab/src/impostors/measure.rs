@@ -204,7 +204,7 @@ pub fn around(bounds: &Aabb, views: usize) -> Vec<PinholeCamera> {
     let size = bounds.size();
     let radius_m = 0.55 * size.x.hypot(size.z);
     let view = |number: usize| {
-        let (sin, cos) = (std::f32::consts::TAU * number as f32 / views as f32).sin_cos();
+        let (sin, cos) = f32::sin_cos(std::f32::consts::TAU * number as f32 / views as f32);
         let eye = middle + Vec3::new(sin * radius_m, 0.6 * size.y, cos * radius_m);
         PinholeCamera::looking_at(eye, middle, Vec3::Y, 0.5, VIEW_PX)
     };

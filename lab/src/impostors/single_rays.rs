@@ -4,6 +4,7 @@ use depth_image::{
     Aabb, Camera, DepthImage, Environment, Illumination, PinholeCamera, ProvenanceKind, Ray, srgb8_from_linear,
 };
 use glam::{UVec2, Vec3};
+use gpu::Turn;
 use rayon::prelude::*;
 use reconstruction::{RayEnd, RayWork, SampleSet, SetDescription};
 use render::{GpuScene, Lighting, SamplePlanes, scalar};
@@ -88,7 +89,7 @@ impl<'s> Teapot<'s> {
             environment: None,
             mips: false,
         };
-        Ok(self.stand.reconstructor().upload(images, &description)?)
+        Ok(self.stand.reconstructor().upload(images, &description, Turn::default())?)
     }
 
     fn figures(&self, name: &str, cameras: &[Camera]) -> anyhow::Result<Figures> {

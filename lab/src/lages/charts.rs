@@ -52,18 +52,22 @@ pub fn stages(times: &Times) -> BarChart {
 }
 
 fn pipeline_stages(run: &Run, images: usize) -> [f64; 6] {
-    let (costs, views) = (run.plan.costs, run.views as f64);
+    let costs = run.plan.costs;
+    let views = run.views as f64;
     let sampling = images as f64 * costs.sample_image_s;
     let loading = run.plan.assignment.compositors.len() as f64 * costs.load_set_s;
     let transfer = (run.set_wait_s - sampling - loading).max(0.0);
-    let (compositing, encode) = (views * costs.reconstruct_view_s, views * costs.encode_view_s);
+    let compositing = views * costs.reconstruct_view_s;
+    let encode = views * costs.encode_view_s;
     let delivery = (run.seconds - sampling - transfer - loading - compositing - encode).max(0.0);
     [sampling, transfer, loading, compositing, encode, delivery]
 }
 
 fn direct_stages(run: &Run, times: &Times) -> [f64; 6] {
-    let (costs, views) = (run.plan.costs, times.headline_views as f64);
-    let (drawing, encode) = (views * costs.direct_view_s, views * costs.encode_view_s);
+    let costs = run.plan.costs;
+    let views = times.headline_views as f64;
+    let drawing = views * costs.direct_view_s;
+    let encode = views * costs.encode_view_s;
     let delivery = (times.direct_view_s() * views - drawing - encode).max(0.0);
     [0.0, 0.0, 0.0, drawing, encode, delivery]
 }

@@ -259,7 +259,9 @@ fn totals(times: &Times) -> anyhow::Result<Table> {
 /// A sentence with the headline.
 pub fn summary(times: &Times) -> String {
     let Some(run) = times.headline() else { return String::new() };
-    let (views, seconds, ratio) = (run.views, run.seconds, times.headline_ratio());
+    let views = run.views;
+    let seconds = run.seconds;
+    let ratio = times.headline_ratio();
     let paper = if views == PAPER_VIEWS { " The paper's five GPUs took 2.61 s." } else { "" };
     format!(
         "{views} views delivered in {seconds:.2} s, {ratio:.1} times the throughput of drawing each from the scene.{paper}"

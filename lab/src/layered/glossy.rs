@@ -96,7 +96,7 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
     }
     for directions in LightDirections::ALL {
         let field = subject.light_field(directions, lighting(1)?)?.0;
-        let set = subject.upload_with(&cube, Some(field))?.0;
+        let set = subject.upload_with(&cube, field)?.0;
         rows.push(row(Way::Gathered(directions), TimedViews::of_cube(&subject, &set, LAYERED, by_rays(1))?)?);
     }
     let title = format!("Glossy pixels of {SCENE}, against {MOST_RAYS} rays drawn directly");

@@ -91,7 +91,7 @@ impl MirrorBox<'_> {
         let (field, sample_s) = self.subject.light_field(directions, reflecting(self.subject.lighting, MOST)?)?;
         let sent_bytes = encode_light_field(&field)?.payload.len();
         let gathered = Gathered { directions, samples: field.sample_count(), sent_bytes, sample_s };
-        let set = self.subject.upload_with(&self.cube, Some(field))?.0;
+        let set = self.subject.upload_with(&self.cube, field)?.0;
         let row = |rays: u32| {
             let method = ReconstructionMethod::Layered { followed: Some(rays) };
             self.row(Some(gathered), rays, &TimedViews::of_cube(&self.subject, &set, method, MIRRORS)?)

@@ -314,7 +314,8 @@ pub mod tests {
         for ray in (0..2000).map(ray) {
             let mut best = None;
             for trees in &pyramids.trees {
-                let (size, in_image) = (trees.image.camera.size_px, ImageRay::new(&trees.image.camera, ray, 0.1));
+                let size = trees.image.camera.size_px;
+                let in_image = ImageRay::new(&trees.image.camera, ray, 0.1);
                 for place in (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y))) {
                     let along = in_image.over(0, place);
                     let samples = trees.image.line((place.y * size.x + place.x) as usize);

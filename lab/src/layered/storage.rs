@@ -13,7 +13,7 @@ use super::views;
 pub fn device_mb(subject: &Subject<'_>, cube: &Cube, field: &LayeredLightField) -> anyhow::Result<[f64; 2]> {
     // After a view has been made from a set no copy is under way.
     let used = |with_field: bool| {
-        let set = subject.upload_with(cube, with_field.then(|| field.clone()))?.0;
+        let set = if with_field { subject.upload_with(cube, field.clone())? } else { subject.upload(cube)? }.0;
         views::made(subject, &set)?;
         anyhow::Ok(set)
     };

@@ -118,7 +118,7 @@ impl Views {
             sent_mb: Some(encode_light_field(&field)?.payload.len() as f64 / MB),
             construction_s: Some(field_s),
         };
-        let (set, load_s) = subject.upload_with(&cube, Some(field))?;
+        let (set, load_s) = subject.upload_with(&cube, field)?;
         let mut view_s = [None; 3];
         let mut shown = Vec::new();
         for (view_s, &followed) in view_s.iter_mut().zip(self.followed) {

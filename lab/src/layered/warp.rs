@@ -64,7 +64,8 @@ fn place(camera: &PinholeCamera, pixel: usize) -> IVec2 {
 /// Nothing is there, or most neighbours are clearly nearer.
 fn is_hole(hits: &[Option<Hit>], camera: &PinholeCamera, pixel: usize) -> bool {
     let Some(own) = hits[pixel] else { return true };
-    let (size, middle) = (camera.size_px.as_ivec2(), place(camera, pixel));
+    let size = camera.size_px.as_ivec2();
+    let middle = place(camera, pixel);
     let around = (-1..=1).flat_map(|y| (-1..=1).map(move |x| IVec2::new(x, y))).filter(|&offset| offset != IVec2::ZERO);
     let is_inside = |at: &IVec2| at.cmpge(IVec2::ZERO).all() && at.cmplt(size).all();
     let neighbours = around.map(|offset| middle + offset).filter(is_inside);

@@ -109,7 +109,8 @@ impl Tour {
 pub async fn follow(tour: &Tour, clients: &Clients) -> anyhow::Result<Vec<Outcome>> {
     let mut running = JoinSet::new();
     for client in 0..clients.count {
-        let (tour, clients) = (tour.clone(), clients.clone());
+        let tour = tour.clone();
+        let clients = clients.clone();
         running.spawn(async move { one(&tour, &clients, client).await });
         tokio::time::sleep(START_INTERVAL).await;
     }

@@ -50,7 +50,8 @@ fn steady(looks: &[(f64, f64)]) -> &[(f64, f64)] {
 pub(super) fn slope_mib_per_s(looks: &[(f64, f64)]) -> f64 {
     let count = looks.len() as f64;
     let mean = |value: fn(&(f64, f64)) -> f64| looks.iter().map(value).sum::<f64>() / count;
-    let (x, y) = (mean(|look| look.0), mean(|look| look.1));
+    let x = mean(|look| look.0);
+    let y = mean(|look| look.1);
     let above: f64 = looks.iter().map(|look| (look.0 - x) * (look.1 - y)).sum();
     above / looks.iter().map(|look| (look.0 - x).powi(2)).sum::<f64>()
 }
@@ -67,7 +68,8 @@ pub(super) fn growth(load: &Load) -> f64 {
 }
 
 pub(super) fn memory_chart(load: &Load) -> XyChart {
-    let (x, y) = (Axis::linear("time", "s"), Axis::linear("resident memory", "MiB"));
+    let x = Axis::linear("time", "s");
+    let y = Axis::linear("resident memory", "MiB");
     let chart = XyChart::new(format!("Memory, {}", load.name), x, y);
     load.memory.iter().fold(chart, |chart, (name, looks)| chart.with(Series::line(name.clone(), looks.iter().copied())))
 }

@@ -76,7 +76,8 @@ async fn load(setting: &Setting, wanted: &Wanted, clients: Clients) -> anyhow::R
     let processes = Processes::start(setting).await?;
     let tour = Tour::of(&processes.address, wanted, clients.rate_hz).await?;
     drop(tour.warm().await?);
-    let (start, mut memory) = (Instant::now(), Memory::default());
+    let start = Instant::now();
+    let mut memory = Memory::default();
     let mut following = Box::pin(follow(&tour, &clients));
     let outcomes = loop {
         memory.read(&processes, start.elapsed().as_secs_f64());

@@ -99,7 +99,8 @@ fn drops(loads: &[Load]) -> anyhow::Result<Table> {
 }
 
 fn ages(loads: &[Load]) -> XyChart {
-    let (x, y) = (Axis::log("age of a frame", "ms"), Axis::linear("frames that are no older", "%"));
+    let x = Axis::log("age of a frame", "ms");
+    let y = Axis::linear("frames that are no older", "%");
     loads.iter().fold(XyChart::new("Age of frames", x, y), |chart, load| {
         let points = (0..=100).map(|percent| (load.age_ms(f64::from(percent) / 100.0), f64::from(percent)));
         chart.with(Series::line(load.name.clone(), points))

@@ -46,7 +46,8 @@ impl<'a> Held<'a> {
     pub fn has(&self, sample: &HeldSample) -> bool {
         let p = sample.point_in_world.extend(1.0);
         let [u, v, w] = self.homogeneous_pixel_from_world.map(|row| row.dot(p));
-        let (x, y) = (u / w, v / w);
+        let x = u / w;
+        let y = v / w;
         if !(w > self.near_m && x >= 0.0 && y >= 0.0 && x < self.columns && y < self.rows) {
             return false;
         }

@@ -61,7 +61,8 @@ impl Subject {
         let hash = setup.offer.hash.to_string();
         engine.put_scene(&hash, &setup.scene)?;
         let rig = raised(&Rig::in_front_of(&setup.scene.bounds(), SPREAD_RAD).with_context(|| name.to_owned())?);
-        let (scene, engine) = (engine.scene(&hash)?, engine.clone());
+        let scene = engine.scene(&hash)?;
+        let engine = engine.clone();
         let sampler = Sampler::sharing(engine.renderer.clone());
         Ok(Self { name: name.to_owned(), rig, engine, scene, sampler })
     }

@@ -35,7 +35,8 @@ pub(super) struct Row {
 /// A client is refused, or its frames end.
 pub(super) async fn measure(up: &Up, guest: &Guest, repeats: usize) -> anyhow::Result<Row> {
     let offers = up.two_offers()?;
-    let (mut in_force, mut visits) = (String::new(), Vec::with_capacity(repeats));
+    let mut in_force = String::new();
+    let mut visits = Vec::with_capacity(repeats);
     for _ in 0..repeats {
         let viewer = Viewer::start(&up.coordinator, offers[0], PolicyChoice::Pipeline).await?;
         let since_s = viewer.now_s();

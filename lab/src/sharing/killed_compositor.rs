@@ -51,7 +51,8 @@ pub(super) async fn measure(device: DevicePreference) -> anyhow::Result<Section>
 
 /// A compositor of the first scene, and of no other where there is one.
 fn victim(viewers: &[Viewer]) -> anyhow::Result<String> {
-    let (own, other) = (viewers[0].plan(), viewers[1].plan());
+    let own = viewers[0].plan();
+    let other = viewers[1].plan();
     let names = || own.compositors.iter().map(|share| &share.node_name);
     let serves_other =
         |name: &str| other.composites(name) || other.samplers.iter().any(|share| share.node_name == name);

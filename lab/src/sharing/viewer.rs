@@ -76,7 +76,8 @@ impl Viewer {
         drop(live);
         let (stop, stopped) = tokio::sync::oneshot::channel::<()>();
         let settings = Drive { path, rate_hz: RATE_HZ, lasting: LONGEST, set_step_s: 1.0, set_count: 1 };
-        let (session, start) = (Arc::new(session), Instant::now());
+        let session = Arc::new(session);
+        let start = Instant::now();
         let driven = session.clone();
         let driving = tokio::spawn(async move { Ok(drive(&driven, &settings, stopped).await?) });
         tokio::time::sleep(SETTLE).await;

@@ -137,7 +137,8 @@ impl Path {
 
 /// Views on a circle in the cell. Without a step they all stand in its middle.
 fn orbit(planning: &Planning, step_px: f32, count: usize) -> Vec<PinholeCamera> {
-    let (cell, view_px) = (&planning.viewpoints.cell, planning.viewpoints.view_px);
+    let cell = &planning.viewpoints.cell;
+    let view_px = planning.viewpoints.view_px;
     let middle = cell.camera_at(Vec2::ZERO, view_px);
     if step_px == 0.0 {
         return vec![middle; count];
@@ -155,7 +156,8 @@ fn across_cells(
     usual: &Representation,
     count: usize,
 ) -> anyhow::Result<(Vec<SetOfPath>, Vec<Frame>)> {
-    let (cell, volume) = (&planning.viewpoints.cell, &planning.subject.volume);
+    let cell = &planning.viewpoints.cell;
+    let volume = &planning.subject.volume;
     let circle = cell.around(volume.center(), CIRCLE_FRAMES, planning.viewpoints.view_px);
     let cameras = &circle[..count.min(CIRCLE_FRAMES)];
     let mut groups = Vec::new();

@@ -16,7 +16,8 @@ const BATCH: usize = 3;
 /// The device fails.
 pub fn differing_rows(stand: &Stand<'_>, planning: &Planning) -> anyhow::Result<(Vec<String>, usize)> {
     let camera = planning.viewpoints.cell.camera_at(Vec2::new(0.3, -0.2), planning.viewpoints.view_px);
-    let (mut differing, mut count) = (Vec::new(), 0);
+    let mut differing = Vec::new();
+    let mut count = 0;
     for (row, of) in planning.ladder.rows().iter().zip(&planning.representations) {
         if (row.camera_count, row.side_ratio) != (CAMERAS, 1.0) {
             continue;

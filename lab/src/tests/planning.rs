@@ -41,7 +41,8 @@ impl Stand {
     }
 
     fn planning(&self, seed: u64) -> Planning {
-        let (planes, codec) = (ViewPlanes::COLOR, FrameCodec::default());
+        let planes = ViewPlanes::COLOR;
+        let codec = FrameCodec::default();
         let views = PlannedViews { size_px: VIEW_PX, planes, codec, scene_time_s: 0.0, seed };
         Planning::new(&self.setup, &self.args, &views).unwrap()
     }
@@ -194,7 +195,9 @@ fn a_representation_that_the_device_refuses_is_an_answer() {
     let mut prober = stand.prober(&planning);
     let broken = Representation { method: "guess".to_owned(), ..planning.representations[0].clone() };
     let id = ProbeId { plan: 1, number: 1 };
-    let (row, views, purpose) = (0, vec![ProbeView::Screening(0)], Purpose::Screening);
+    let row = 0;
+    let views = vec![ProbeView::Screening(0)];
+    let purpose = Purpose::Screening;
     let event = probe::answer(&mut prober, &planning.viewpoints, &[broken], Command::Probe { id, row, views, purpose })
         .unwrap();
     let Event::Failed { id: answered, reason, .. } = &event else { panic!("{event:?}") };
@@ -228,7 +231,9 @@ fn the_price_on_one_node_is_the_set_shared_by_its_views_and_the_view() {
 fn an_audited_part_has_the_errors_of_its_pixels_in_the_whole_view() {
     let stand = Stand::new("blocks", "phong");
     let planning = stand.planning(1);
-    let (subject, engine, turn) = (&planning.subject, stand.engine.clone(), Turn::of(WorkClass::Batch));
+    let subject = &planning.subject;
+    let engine = stand.engine.clone();
+    let turn = Turn::of(WorkClass::Batch);
     let of =
         planning.representations.iter().find(|of| of.method == "joint_carve" && of.sample_cameras.len() == 4).unwrap();
     let images = engine.sample(&subject.sample_work(engine.as_ref(), of, Light::Session).unwrap(), turn).unwrap();
@@ -239,7 +244,8 @@ fn an_audited_part_has_the_errors_of_its_pixels_in_the_whole_view() {
     let direct = subject.direct_work(vec![camera], Light::Session, ViewPlanes::WITH_DEPTH);
     let made = engine.reconstruct(set.as_ref(), &view, turn).unwrap().remove(0);
     let truth = engine.draw_direct(&direct, turn).unwrap().remove(0);
-    let (set, whole) = (set, ViewPart::whole(camera.size_px));
+    let set = set;
+    let whole = ViewPart::whole(camera.size_px);
     for pixel in [UVec2::new(200, 150), UVec2::new(100, 150), UVec2::new(399, 200)] {
         let part = ViewPart::square_of(pixel, 128, camera.size_px);
         let mask: Vec<bool> = part.mask_within(&whole).collect();

@@ -31,7 +31,8 @@ fn views(setup: &Setup, count: usize) -> Vec<PinholeCamera> {
 }
 
 fn reference(scene: &str, count: usize) -> (Arc<GpuEngine>, SceneArgs, Setup, ReferenceViews) {
-    let (engine, args) = (GpuEngine::shared(DevicePreference::Any).unwrap(), args(scene));
+    let engine = GpuEngine::shared(DevicePreference::Any).unwrap();
+    let args = args(scene);
     let setup = args.load().unwrap();
     let reference = ReferenceViews::draw(&engine, &setup, &args, views(&setup, count)).unwrap();
     (engine, args, setup, reference)

@@ -112,7 +112,8 @@ async fn drags(ground: &Ground, stand: &Stand, size_px: [u32; 2]) -> anyhow::Res
     page.watch().await?;
     // Once for the shaders of all sizes.
     page.drag(DRAG_S).await?;
-    let (mut all, mut moves) = (Vec::new(), Vec::new());
+    let mut all = Vec::new();
+    let mut moves = Vec::new();
     for _ in 0..ground.repeats {
         page.wait_for_finished(STILL).await?;
         tokio::time::sleep(REST).await;
@@ -138,7 +139,8 @@ async fn drags(ground: &Ground, stand: &Stand, size_px: [u32; 2]) -> anyhow::Res
 
 async fn one_drag(stand: &Stand, page: &Page) -> anyhow::Result<Drags> {
     let used = || processor_s(stand.gateway.id()).unwrap_or(f64::NAN);
-    let (before_s, start_ms) = (used(), page.now_ms().await?);
+    let before_s = used();
+    let start_ms = page.now_ms().await?;
     let pictures = page.drag(DRAG_S).await?;
     let used_s = used() - before_s;
     let found: Vec<&Picture> = pictures.iter().filter(|picture| picture.painted_ms > start_ms + FOUND_MS).collect();

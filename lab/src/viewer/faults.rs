@@ -46,7 +46,8 @@ async fn killed_compositor(ground: &Ground) -> anyhow::Result<f64> {
     let page = stand.page(SIZE_PX).await?;
     page.drag(3.0).await?;
     let victim: String = page.browser.value("window.myriorama.statistics.pictures.at(-1).header.compositor").await?;
-    let (index, since_ms) = (page.picture_count().await?, page.now_ms().await?);
+    let index = page.picture_count().await?;
+    let since_ms = page.now_ms().await?;
     stand.processes.kill(&victim);
     page.drag(AFTER_S).await?;
     let until_ms = page.now_ms().await?;
@@ -59,7 +60,8 @@ async fn killed_gateway(stand: &mut Stand) -> anyhow::Result<(f64, f64)> {
     page.drag(1.0).await?;
     page.wait_for_finished(WITHIN).await?;
     page.browser.run::<()>(WATCH_BANNER, Vec::new()).await?;
-    let (index, killed_ms) = (page.picture_count().await?, page.now_ms().await?);
+    let index = page.picture_count().await?;
+    let killed_ms = page.now_ms().await?;
     stand.restart_gateway(AWAY).await?;
     let back_ms = page.now_ms().await?;
     let has_more = format!("window.myriorama.statistics.pictures.length > {index}");

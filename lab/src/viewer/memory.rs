@@ -21,7 +21,8 @@ const MIB: f64 = (1 << 20) as f64;
 pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
     let stand = Stand::start(ground, PolicyChoice::Pipeline).await?;
     let page = stand.page(SIZE_PX).await?;
-    let (start, mut readings) = (Instant::now(), Vec::new());
+    let start = Instant::now();
+    let mut readings = Vec::new();
     while start.elapsed().as_secs_f64() < ground.memory_s {
         page.drag(DRAG_S).await?;
         page.wait_for_finished(WITHIN).await?;
@@ -37,7 +38,8 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
     let mut checks = Vec::new();
     for (at, name) in ["the page's scripts", "the gateway"].into_iter().enumerate() {
         let of = |reading: &[f64; 2]| reading[at];
-        let (first, last) = (warm.first().map_or(f64::NAN, of), warm.last().map_or(f64::NAN, of));
+        let first = warm.first().map_or(f64::NAN, of);
+        let last = warm.last().map_or(f64::NAN, of);
         let most = warm.iter().map(of).fold(0.0, f64::max);
         table.push([Cell::from(name), first.into(), last.into(), most.into()])?;
         checks.push(Check::new(format!("memory of {name}: growth"), last - first, "MiB", Bar::AtMost(32.0)));

@@ -104,7 +104,8 @@ impl Page {
     /// that have come meanwhile.
     pub(super) async fn drag(&self, seconds: f64) -> anyhow::Result<Vec<Picture>> {
         let before = self.picture_count().await?;
-        let (start, steps) = (std::time::Instant::now(), (seconds / MOVE.as_secs_f64()).ceil() as usize);
+        let start = std::time::Instant::now();
+        let steps = (seconds / MOVE.as_secs_f64()).ceil() as usize;
         // Moves take longer where the machine is busy: the drag ends in time all the same.
         let mut at = 0;
         while at < steps && start.elapsed().as_secs_f64() < seconds {

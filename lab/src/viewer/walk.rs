@@ -30,7 +30,8 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
     let page = stand.page(SIZE_PX).await?;
     page.drag(2.0).await?;
     page.wait_for_finished(WITHIN).await?;
-    let (index, since_ms) = (page.picture_count().await?, page.now_ms().await?);
+    let index = page.picture_count().await?;
+    let since_ms = page.now_ms().await?;
     for _ in 0..PARTS {
         page.turn(1.0 / PARTS as f64, WALK_S / PARTS as f64).await?;
     }
@@ -40,7 +41,8 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
     let gap_s = longest_gap_s(&pictures, since_ms, until_ms);
     let [foreground_db, psnr_db] = stills(&stand, &page).await?;
     let least = |psnr_db: &[f64]| psnr_db.iter().copied().fold(f64::INFINITY, f64::min);
-    let (least_foreground_db, least_db) = (least(&foreground_db), least(&psnr_db));
+    let least_foreground_db = least(&foreground_db);
+    let least_db = least(&psnr_db);
     let mut table = Table::new(
         "A walk of 360° in 24 s, and 24 stills beside direct drawing",
         &[

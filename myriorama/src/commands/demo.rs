@@ -53,7 +53,8 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
 
 /// The results of each light, the most expensive first.
 fn measure(args: &DemoArgs, experiment: &Experiment) -> anyhow::Result<Vec<LightResult>> {
-    let (scene, triangles) = (&args.scene.scene, experiment.setup.scene.triangle_count());
+    let scene = &args.scene.scene;
+    let triangles = experiment.setup.scene.triangle_count();
     print_line!("{scene}: {triangles} triangles on {}", experiment.engine.device_name());
     let lights = [args.expensive_light()?, Lighting::default()];
     let views = if args.quick { QUICK_VIEWS } else { VIEWS };

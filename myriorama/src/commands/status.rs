@@ -104,7 +104,8 @@ fn workload_row(workload: &WorkloadStatus) -> Vec<Cell> {
     let plan = workload.plan.as_ref().map(|plan| {
         let shown = &plan.assignment.workload;
         let scene: String = shown.scene.hash.as_str().chars().take(SHORT_HASH).collect();
-        let (light, policy) = (shown.lighting.clone(), plan.assignment.policy.to_string());
+        let light = shown.lighting.clone();
+        let policy = plan.assignment.policy.to_string();
         vec![scene.into(), light.into(), policy.into(), (plan.sampler_count() as f64).into()]
     });
     let head = [(*number as f64).into()].into_iter().chain(plan.unwrap_or_else(|| vec![Cell::Missing; 4]));

@@ -57,7 +57,8 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     args.budget.check(&offers)?;
     let listener = listen(args.listen, args.insecure.insecure_bind).await?;
     let engine = GpuEngine::shared(args.device.device)?;
-    let (memory, nodes) = (args.memory.set_memory_bytes(engine.is_software()), usize::from(args.nodes));
+    let memory = args.memory.set_memory_bytes(engine.is_software());
+    let nodes = usize::from(args.nodes);
     engine.bound_scenes(memory);
     for (scene, offer) in scenes.iter().zip(offers.iter()) {
         engine.put_scene(offer.hash.as_str(), scene)?;

@@ -47,7 +47,8 @@ pub async fn run(args: ViewArgs) -> anyhow::Result<Outcome> {
         return follow(&args, &session, job.cameras.to_vec()).await;
     }
     let signals = StopSignals::listen()?;
-    let (second, folder) = (signals.second.clone(), args.out.clone());
+    let second = signals.second.clone();
+    let folder = args.out.clone();
     // A thread of its own: a long record is written without a pause in which the second signal could be heard.
     let work = tokio::task::spawn_blocking(move || Handle::current().block_on(pictures(&args, &signals)));
     tokio::select! {
@@ -125,7 +126,8 @@ async fn write_missing(
     let progress = ProgressBar::new(record.total());
     progress.set_position(record.count());
     let pixels = job.cameras.iter().map(PinholeCamera::pixel_count).max().unwrap_or(0);
-    let (mut writer, before) = (PictureWriter::new(&args.out, pixels, args.planes()), record.count());
+    let mut writer = PictureWriter::new(&args.out, pixels, args.planes());
+    let before = record.count();
     let missing = record.missing();
     let received = async |frame| {
         if let Some((number, depth_scale)) = writer.write(frame).await? {

@@ -298,7 +298,8 @@ async fn times(urls: &[String]) -> anyhow::Result<()> {
         for (subject, url) in urls.iter().enumerate() {
             let seconds = sorted(rounds.iter().map(|round| round[subject][cost]));
             let ratios = sorted(rounds.iter().map(|round| round[subject][cost] / round[0][cost]));
-            let (median_ms, ratio) = (seconds[ROUNDS / 2] * 1e3, ratios[ROUNDS / 2]);
+            let median_ms = seconds[ROUNDS / 2] * 1e3;
+            let ratio = ratios[ROUNDS / 2];
             let [low, high] = [ratios[*INTERVAL.start()], ratios[*INTERVAL.end()]];
             println!("| {name} | {url} | {median_ms:.2} | {ratio:.3} | {low:.3} to {high:.3} |");
         }

@@ -117,9 +117,10 @@ fn tuple_parameters(text: &str) -> usize {
 fn habits_are_seen() {
     let text = "\
 fn f((a, b): (u8, u8)) {
-    let (a, mut b) = (1, 2);
-    let (c, d): (u8, u8) =
-        (1, 2);
+    let a = 1;
+    let mut b = 2;
+    let c: u8 = 1;
+    let d: u8 = 2;
     let (e, f) = pair();
     let g = |x| x + 1;
     let h =
@@ -134,7 +135,8 @@ fn g(
 fn h(x: u8, (a, b): (u8, u8), y: &(u8, u8)) {}
 #[cfg(test)]
 mod tests {
-    let (a, b) = (1, 2);
+    let a = 1;
+    let b = 2;
 }
 ";
     let code = without_test_modules(text);

@@ -49,7 +49,8 @@ fn all_methods() -> [Methods; 2] {
 /// The variants and texts of methods that a source names outside of its tests and comments.
 fn named(source: &str) -> Vec<String> {
     let tokens = TokenStream::from_str(source).expect("Rust");
-    let (methods, mut found) = (all_methods(), Vec::new());
+    let methods = all_methods();
+    let mut found = Vec::new();
     find(&tokens.into_iter().collect::<Vec<_>>(), &methods, &mut found);
     found
 }

@@ -84,7 +84,8 @@ async fn sessions_that_no_base_suits_have_none() {
     let cluster = Cluster::start_offering(with_base(), 1).await;
     let moving = Timeline { start_s: 0.0, step_s: 0.05, set_count: 4 };
     let volume = Some(Aabb { min: Vec3::NEG_ONE, max: Vec3::ONE });
-    let (policy, method) = (PolicyChoice::Direct, DIRECT.to_owned());
+    let policy = PolicyChoice::Direct;
+    let method = DIRECT.to_owned();
     for asked in [
         SessionRequest { timeline: moving, ..asked(Vec::new()) },
         SessionRequest { volume, ..asked(Vec::new()) },

@@ -87,7 +87,8 @@ async fn every_number_of_samplers_gives_the_same_pictures() {
 #[tokio::test(flavor = "multi_thread")]
 async fn frames_say_their_samples_a_pixel() {
     let cluster = Cluster::start(3).await;
-    let (four, mut shown) = (Antialias::of(4).unwrap(), Vec::new());
+    let four = Antialias::of(4).unwrap();
+    let mut shown = Vec::new();
     for antialias in [Antialias::NONE, four] {
         let still = request(PolicyChoice::Pipeline, Timeline::still(0.0));
         let asked = SessionRequest { planes: ViewPlanes { antialias, ..still.planes }, ..still };
@@ -176,7 +177,8 @@ async fn the_direct_policy_draws_on_every_node_and_samples_nothing() {
     let frames = session.render_views(views(3, 12)).unwrap().all().await.unwrap();
     all_came(&frames, 36);
     assert!(cluster.take_counts().is_empty());
-    let (costs, reason) = (session.plan().costs, &session.plan().reason);
+    let costs = session.plan().costs;
+    let reason = &session.plan().reason;
     assert!(
         costs.sample_image_s > 0.0
             && costs.direct_view_s > 0.0

@@ -84,12 +84,14 @@ async fn requests_are_drawn_as_frames_are_received_also_after_a_fault() {
     let session = cluster.session(SessionRequest { planes, ..pipeline(MOVING) }).await.unwrap();
     let victim = session.plan().assignment.compositors.last().unwrap().node_name[1..].parse::<usize>().unwrap();
     let drawn = Arc::new(AtomicUsize::new(0));
-    let (counted, small) = (drawn.clone(), camera(0.1, UVec2::splat(4)));
+    let counted = drawn.clone();
+    let small = camera(0.1, UVec2::splat(4));
     let requests = (0..VIEWS).map(move |i| {
         counted.fetch_add(1, Ordering::Relaxed);
         ViewRequest { frame: i.into(), set_index: i / (VIEWS / 3), camera: small }
     });
-    let (mut frames, mut received) = (session.render_views(requests).unwrap(), Vec::new());
+    let mut frames = session.render_views(requests).unwrap();
+    let mut received = Vec::new();
     while let Some(frame) = frames.next().await {
         received.push(frame.unwrap());
         let lead = drawn.load(Ordering::Relaxed) - received.len();

@@ -205,7 +205,8 @@ async fn divided_by_three() -> (Arc<Memory>, String) {
         let screening = kept.screening.iter().map(|errors| ViewErrors { flip: errors.flip / 3.0, ..*errors });
         let thirds = KeptRow::new(kept.row.clone(), screening.collect());
         let ratio = promise.expected_ratio / 3.0 / f64::from(kept.row.camera_count).sqrt();
-        let (expected_ratio, bound_ratio) = (ratio, ratio * 1.1);
+        let expected_ratio = ratio;
+        let bound_ratio = ratio * 1.1;
         let budget = budget.parse().unwrap();
         let certificate = Certificate { budget, expected_ratio, bound_ratio, ..certificate.clone() };
         // One camera is cheapest, however busy the machine was.
@@ -236,7 +237,8 @@ async fn promised_too_much() -> (Cluster, Session) {
 async fn audits_break_a_promise_of_wrong_measurements_and_another_representation_takes_its_place() {
     let (_cluster, session) = promised_too_much().await;
     let first = session.promise().unwrap();
-    let (mut live, mut seen) = (session.live(), Vec::new());
+    let mut live = session.live();
+    let mut seen = Vec::new();
     let start = std::time::Instant::now();
     for step in 0.. {
         assert!(start.elapsed() < DEADLINE, "{seen:#?}");
@@ -284,7 +286,8 @@ async fn of_large_views_a_square_is_audited() {
     let request = SessionRequest { typical_view, frames_per_s: Some(10.0), views_per_set: 1, ..budgeted(LOOSE) };
     let session = cluster.session(request).await.unwrap();
     settled(&session).await;
-    let (mut live, start) = (session.live(), std::time::Instant::now());
+    let mut live = session.live();
+    let start = std::time::Instant::now();
     for step in 0.. {
         let status = cluster.client.status().await.unwrap();
         let promise = status.workloads[0].promise.clone().unwrap();

@@ -23,7 +23,8 @@ fn pipeline() -> SessionRequest {
 
 /// The share of equal bytes in two deliveries.
 fn alike(a: &[Frame], b: &[Frame]) -> f64 {
-    let (mut same, mut all) = (0, 0);
+    let mut same = 0;
+    let mut all = 0;
     for frame in a {
         let other = b.iter().find(|other| other.request.frame == frame.request.frame).unwrap();
         same += frame.view.srgb8.iter().zip(&other.view.srgb8).filter(|(a, b)| a == b).count();
@@ -140,7 +141,8 @@ async fn next_set_under(change: impl Fn(Assignment) -> Assignment) -> (Result<()
     let _ = engine.take_counts();
     engine.keep_pace(Pace { image: Duration::from_millis(200), ..Pace::default() });
     let fetch = |set_index| {
-        let (address, image_indices) = (share.address.clone(), share.image_indices.clone());
+        let address = share.address.clone();
+        let image_indices = share.image_indices.clone();
         let fetch = FetchImages {
             plan_epoch: plan.plan_epoch,
             workload_number: plan.workload_number,
@@ -195,7 +197,8 @@ async fn sessions_change_their_demand_and_nodes_report_their_work() {
     let status = cluster.client.status().await.unwrap();
     assert_eq!(status.views_per_set(), 500);
     session.change(12, None).await.unwrap();
-    let (start, mut made) = (Instant::now(), 0);
+    let start = Instant::now();
+    let mut made = 0;
     loop {
         made += session.render_views(views(3, 12)).unwrap().all().await.unwrap().len() as u64;
         let status = cluster.client.status().await.unwrap();

@@ -93,7 +93,8 @@ impl Visitor {
     async fn pose(&mut self, eye: [f64; 3], still: bool) -> u64 {
         self.number += 1;
         let camera = json!({ "eye": eye, "target": TARGET, "fov_y_deg": FOV_Y_DEG });
-        let (number, canvas_px) = (self.number, SIZE);
+        let number = self.number;
+        let canvas_px = SIZE;
         self.tell(
             &json!({ "type": "pose", "number": number, "camera": camera, "canvas_px": canvas_px, "still": still }),
         )
@@ -303,11 +304,14 @@ async fn a_page_that_confirms_nothing_is_sent_two_pictures() {
 #[tokio::test(flavor = "multi_thread")]
 async fn two_visitors_see_their_own_pictures_in_one_session() {
     let bench = Bench::start(|config| config).await;
-    let (mut one, mut other) = (bench.welcomed().await, bench.welcomed().await);
+    let mut one = bench.welcomed().await;
+    let mut other = bench.welcomed().await;
     one.pose(EYE, true).await;
     other.pose([0.3, 1.0, 2.5], true).await;
-    let (of_one, of_other) = (one.picture().await, other.picture().await);
-    let (of_one, of_other) = (one.finished(&of_one).await, other.finished(&of_other).await);
+    let of_one = one.picture().await;
+    let of_other = other.picture().await;
+    let of_one = one.finished(&of_one).await;
+    let of_other = other.finished(&of_other).await;
     // A status is told again for half a second.
     tokio::time::sleep(Duration::from_millis(600)).await;
     let (_, body) = bench.get("/api/v1/status.json", "Host: 127.0.0.1\r\n").await;
@@ -396,7 +400,8 @@ async fn a_page_that_sends_600_poses_at_once_gets_the_last() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_page_that_floods_is_refused_and_hurts_nobody() {
     let bench = Bench::start(|config| config).await;
-    let (mut flood, mut watcher) = (bench.welcomed().await, bench.welcomed().await);
+    let mut flood = bench.welcomed().await;
+    let mut watcher = bench.welcomed().await;
     let message = Message::text(r#"{"type":"shown","number":0,"age_ms":1}"#);
     // Those of five seconds at once: the connection may end before the last.
     for _ in 0..1200 {

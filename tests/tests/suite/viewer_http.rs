@@ -57,7 +57,8 @@ fn field<'h>(head: &'h str, name: &str) -> Option<&'h str> {
 
 /// Begins a request; its answer is a status.
 fn ask(bench: &Arc<GatewayBench>, answers: &mut JoinSet<u16>, path: &str) {
-    let (bench, path) = (bench.clone(), path.to_owned());
+    let bench = bench.clone();
+    let path = path.to_owned();
     answers.spawn(async move { status_of(&bench.get(&path, LOCAL).await.0) });
 }
 
@@ -78,7 +79,8 @@ async fn depth_is_that_of_the_rust_client_to_the_bit() {
     let bench = bench().await;
     let (head, file) = bench.get(&format!("/api/v1/depth.npy?{VIEW}"), LOCAL).await;
     assert_eq!(status_of(&head), 200, "{head}");
-    let (seen, expected) = (numbers(&file), reference_depth(&bench).await);
+    let seen = numbers(&file);
+    let expected = reference_depth(&bench).await;
     assert!(seen == expected, "depths differ");
     assert!(seen.iter().any(|depth| depth.is_finite()) && seen.iter().any(|depth| depth.is_infinite()));
 }
@@ -86,7 +88,8 @@ async fn depth_is_that_of_the_rust_client_to_the_bit() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_point_is_the_surface_at_its_pixel() {
     let bench = bench().await;
-    let (depths, camera) = (reference_depth(&bench).await, CAMERA.of_size(UVec2::from_array(SIZE)));
+    let depths = reference_depth(&bench).await;
+    let camera = CAMERA.of_size(UVec2::from_array(SIZE));
     let at = depths.iter().position(|depth| depth.is_finite()).unwrap();
     let [column, row] = [at as u32 % SIZE[0], at as u32 / SIZE[0]];
     let (_, body) = bench.get(&format!("/api/v1/point.json?{VIEW}&at={column},{row}"), LOCAL).await;

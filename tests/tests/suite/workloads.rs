@@ -111,9 +111,11 @@ async fn sessions_that_are_opened_and_dropped_in_numbers_disturb_nobody() {
     let session = cluster.session(numbered(0)).await.unwrap();
     // A connection with thousands of cancelled calls may end, with all of its sessions: the others have one of their own.
     let others = connected(&cluster.coordinator.address).await;
-    let (mut begun, mut dropped) = (tokio::task::JoinSet::new(), 0);
+    let mut begun = tokio::task::JoinSet::new();
+    let mut dropped = 0;
     for number in 0..10_000 {
-        let (client, size_px) = (others.clone(), UVec2::splat(8 + number % 20));
+        let client = others.clone();
+        let size_px = UVec2::splat(8 + number % 20);
         let request = SessionRequest { sample_size_px: Some(size_px), ..numbered(number % 50) };
         begun.spawn(async move { tokio::time::timeout(HASTE, client.open_session(request, |_| ())).await.map(drop) });
         while begun.len() > 100 {

@@ -47,12 +47,15 @@ impl Scheduler {
 
     /// The next safer choice takes the place of one whose promise is broken, and a plan for the audited viewpoints follows.
     fn promise_broken(&mut self, number: u64) -> Vec<Command> {
-        let (now, may_draw) = (self.now, self.may_draw_directly(number));
+        let now = self.now;
+        let may_draw = self.may_draw_directly(number);
         let Some(state) = self.budgets.get_mut(&number) else { return Vec::new() };
         let Some(InForce { chosen, audit: Some(audit), .. }) = &state.in_force else { return Vec::new() };
-        let (choice_number, row) = (chosen.number, chosen.row.as_ref().map(ToString::to_string).unwrap_or_default());
+        let choice_number = chosen.number;
+        let row = chosen.row.as_ref().map(ToString::to_string).unwrap_or_default();
         let reason = format!("Audits found {} with {row}.", audit.finding());
-        let (budget, found_ratio) = (chosen.budget, audit.found_ratio());
+        let budget = chosen.budget;
+        let found_ratio = audit.found_ratio();
         state.findings.is_given_up |= state.findings.note_break(now) && may_draw;
         state.findings.broken = Some(Broken { choice_number, budget, found_ratio, since: now, reason: reason.clone() });
         state.switching = None;

@@ -72,7 +72,8 @@ impl Scheduler {
     /// keeps any of them.
     pub(super) fn planned_budget(&self, number: u64) -> Option<Budget> {
         let workload = self.workloads.get(&number)?;
-        let (state, prices) = (self.budgets.get(&number), prices(workload));
+        let state = self.budgets.get(&number);
+        let prices = prices(workload);
         let is_unreachable = |budget: &Budget| {
             let known = state.and_then(|state| state.unreachable_by(budget));
             known.is_some_and(|known| {
@@ -86,7 +87,8 @@ impl Scheduler {
 
     /// The strictest budget of sessions whose budgets nothing keeps, where what is in force is for others that have left.
     fn abandoned(&self, number: u64) -> Option<Budget> {
-        let (workload, state) = (self.workloads.get(&number)?, self.budgets.get(&number)?);
+        let workload = self.workloads.get(&number)?;
+        let state = self.budgets.get(&number)?;
         let planned = state.plan.budget;
         let is_stated = workload.sessions.budgets().iter().any(|(stated, _)| *stated == planned);
         let strictest = workload.sessions.strictest_budget(|_| true)?;
@@ -146,7 +148,8 @@ impl Scheduler {
 
     /// The least busy node with the plan's device.
     fn node_to_measure(&self, number: u64) -> Option<(String, String)> {
-        let (workload, state) = (self.workloads.get(&number)?, self.budgets.get(&number)?);
+        let workload = self.workloads.get(&number)?;
+        let state = self.budgets.get(&number)?;
         let alike = self.serving(workload).filter(|(_, member)| member.status.device_name == state.plan.device_name);
         let (name, member) = alike.min_by(|(_, a), (_, b)| self.by_work(a, b))?;
         Some((name.clone(), member.status.address.clone()))
@@ -184,11 +187,14 @@ impl Scheduler {
 
     /// A plan is made: a row's costs are measured before it is in force, unless it is in force already.
     fn concluded(&mut self, number: u64, kept: Box<Kept>) -> Vec<Command> {
-        let (mut commands, now) = (vec![Command::Keep(kept)], self.now);
+        let mut commands = vec![Command::Keep(kept)];
+        let now = self.now;
         let Some(state) = self.budgets.get_mut(&number) else { return commands };
         let Some(chosen) = state.plan.chosen().filter(|_| !state.is_superseded()) else { return commands };
         if chosen.outcome.state == PromiseState::Unreachable {
-            let (budget, prices, reason) = (chosen.budget, state.plan.prices, chosen.outcome.reason.clone());
+            let budget = chosen.budget;
+            let prices = state.plan.prices;
+            let reason = chosen.outcome.reason.clone();
             let is_final = state.plan.is_final();
             state.note_unreachable(Unreachable { budget, since: now, prices, is_final, reason });
             // Other sessions have what they had, or a plan of their own.
@@ -270,7 +276,9 @@ impl Scheduler {
         }
         state.is_to_be_tried_again = true;
         let chosen = chosen.without_row(reason);
-        let (budget, prices, reason) = (chosen.budget, state.plan.prices, chosen.outcome.reason.clone());
+        let budget = chosen.budget;
+        let prices = state.plan.prices;
+        let reason = chosen.outcome.reason.clone();
         state.note_unreachable(Unreachable { budget, since: self.now, prices, is_final: false, reason });
         // Other sessions have what they had, or a plan of their own.
         if self.planned_budget(number).is_some() {
@@ -302,7 +310,8 @@ impl Scheduler {
         });
         let commands = self.replan(number, &format!("a representation was chosen for {budget}"));
         let is_new = commands.iter().any(|command| matches!(command, Command::Apply { .. }));
-        let (plan_epoch, has_plan) = (self.plan_epoch, self.active_plan(number).is_some());
+        let plan_epoch = self.plan_epoch;
+        let has_plan = self.active_plan(number).is_some();
         if let Some(in_force) = self.budgets.get_mut(&number).and_then(|state| state.in_force.as_mut()) {
             // Without a plan, the next one is the first with it.
             in_force.plan_epoch = if is_new { plan_epoch } else { plan_epoch + 1 };

@@ -25,7 +25,8 @@ const SETS_AHEAD: f64 = 3.0;
 
 impl Scheduler {
     pub(super) fn ready(&mut self, plan_epoch: u64, name: String) -> Vec<Command> {
-        let (now, number) = (self.now, self.workload_of_plan(plan_epoch));
+        let now = self.now;
+        let number = self.workload_of_plan(plan_epoch);
         if let Some(active) = self.active_plan_for(plan_epoch, &name) {
             active.ready.insert(name);
             let workload = number.and_then(|number| self.workloads.get_mut(&number));
@@ -152,7 +153,8 @@ impl Scheduler {
         let workload_number = self.workload_of_plan(plan_epoch)?;
         let number = self.reports.count_of(workload_number, sampler).saturating_sub(1);
         let member = self.members.get(sampler)?;
-        let (incarnation, address) = (member.incarnation, member.status.address.clone());
+        let incarnation = member.incarnation;
+        let address = member.status.address.clone();
         let estimate = member.estimates.get(&workload_number)?;
         let sample_image_s = estimate.now().costs.sample_image_s;
         let active = self.active_plan_for(plan_epoch, sampler)?;

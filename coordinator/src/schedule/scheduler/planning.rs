@@ -68,7 +68,8 @@ impl Scheduler {
     /// The share of their time that a plan's nodes need for sessions with a rate; `None` without a plan. Batches take what
     /// is left, those of other workloads as well.
     pub(super) fn utilisation(&self, number: u64) -> Option<f64> {
-        let (workload, mut snapshot) = (self.workloads.get(&number)?, self.snapshot(number)?);
+        let workload = self.workloads.get(&number)?;
+        let mut snapshot = self.snapshot(number)?;
         snapshot.load = workload.rated_load();
         let of_viewers = |costs: &Costs| workload.of_viewers(costs);
         snapshot.nodes = self.costs_beside(number, |other| other.sessions.viewers() > 0, of_viewers);
@@ -183,7 +184,8 @@ impl Scheduler {
 
     /// Falls back under overload, and returns where there is room: why, if the quality changes.
     fn step_of_overload(&mut self, number: u64) -> Option<String> {
-        let (utilisation, now) = (self.utilisation(number)?, self.now);
+        let utilisation = self.utilisation(number)?;
+        let now = self.now;
         let workload = self.workloads.get_mut(&number)?;
         let fallbacks = workload.sessions.fallbacks();
         let frame_rate_ratios: Vec<f64> = fallbacks.iter().map(|quality| quality.frame_rate_ratio).collect();

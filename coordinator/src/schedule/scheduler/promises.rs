@@ -40,7 +40,8 @@ impl Scheduler {
 
     /// A session that has joined others with its budget is told what is promised to them.
     pub(super) fn promise_to(&self, session: u64, budget: Option<&Budget>, number: u64) -> Option<Command> {
-        let (known, budget) = (&self.workloads.get(&number)?.announced, budget?.to_string());
+        let known = &self.workloads.get(&number)?.announced;
+        let budget = budget?.to_string();
         let (_, promise) = known.iter().find(|(_, promise)| promise.budget == budget)?;
         Some(Command::Promise { sessions: vec![session], promise: Box::new(promise.clone()) })
     }
@@ -134,7 +135,8 @@ impl Scheduler {
         if let Some(known) = state.unreachable_by(budget) {
             return Some(known.reason.clone());
         }
-        let (planned, together) = (planned?, planned?.and(budget)?);
+        let planned = planned?;
+        let together = planned.and(budget)?;
         let known = state.unreachable_by(&together)?;
         Some(format!("Other sessions that share the samples are promised {planned}. {}", known.reason))
     }

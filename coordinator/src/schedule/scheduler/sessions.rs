@@ -73,14 +73,16 @@ impl Scheduler {
     /// Replans at once where sessions force something else, other images are sampled or another quality is left; else where
     /// it is worth it.
     fn change(&mut self, number: u64, change: impl FnOnce(&mut SessionMix)) -> Vec<Command> {
-        let (now, may_change_cells) = (self.now, self.may_change_cells());
+        let now = self.now;
+        let may_change_cells = self.may_change_cells();
         let Some(workload) = self.workloads.get_mut(&number) else { return Vec::new() };
         let before = workload.trigger();
         workload.change(now, change);
         if may_change_cells {
             workload.update_cells();
         }
-        let (after, costs) = (workload.trigger(), workload.costs);
+        let after = workload.trigger();
+        let costs = workload.costs;
         if before.sample_cameras != after.sample_cameras {
             self.cells_changed_at = Some(now);
         }

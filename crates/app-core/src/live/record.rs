@@ -41,7 +41,8 @@ pub struct Shown {
 
 impl Shown {
     pub(super) fn of(frame: &LiveFrame, start: Instant, fallback: u32) -> Self {
-        let (here, header) = (&frame.times, &frame.frame.header);
+        let here = &frame.times;
+        let header = &frame.frame.header;
         let since = |time: Instant| time.saturating_duration_since(start).as_secs_f64();
         let there = header.stage_times;
         let away_s = here.received.saturating_duration_since(here.sent).as_secs_f64();

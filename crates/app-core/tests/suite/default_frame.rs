@@ -50,13 +50,15 @@ fn surface(at: impl Fn(f32, f32) -> Vec3) -> Vec<[Vec3; 3]> {
 /// Radius and height of a body of revolution along its outline, from 0 to 1.
 fn turned(outline: impl Fn(f32) -> Vec2) -> Vec<[Vec3; 3]> {
     surface(|u, v| {
-        let (at, around) = (outline(v), Vec2::from_angle(u * TAU));
+        let at = outline(v);
+        let around = Vec2::from_angle(u * TAU);
         Vec3::new(around.x * at.x, at.y, around.y * at.x)
     })
 }
 
 fn block(low: [f32; 3], high: [f32; 3]) -> Vec<[Vec3; 3]> {
-    let (low, high) = (Vec3::from(low), Vec3::from(high));
+    let low = Vec3::from(low);
+    let high = Vec3::from(high);
     let corner = |i: usize| Vec3::select(glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), high, low);
     let sides = [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 4, 5], [2, 3, 6, 7], [0, 2, 4, 6], [1, 3, 5, 7]];
     sides.iter().flat_map(|side| [[0, 1, 2], [3, 2, 1]].map(|t| t.map(|i: usize| corner(side[i])))).collect()
@@ -65,7 +67,8 @@ fn block(low: [f32; 3], high: [f32; 3]) -> Vec<[Vec3; 3]> {
 /// Ten shapes of every proportion, some off the origin.
 fn shapes() -> Vec<(&'static str, Vec<[Vec3; 3]>)> {
     let ring = |u: f32, v: f32| {
-        let (around, across) = (Vec2::from_angle(u * TAU), Vec2::from_angle(v * TAU));
+        let around = Vec2::from_angle(u * TAU);
+        let across = Vec2::from_angle(v * TAU);
         let radius = 1.0 + 0.35 * across.x;
         Vec3::new(around.x * radius, 0.35 * across.y, around.y * radius)
     };
@@ -94,12 +97,14 @@ fn shapes() -> Vec<(&'static str, Vec<[Vec3; 3]>)> {
 fn drawn(camera: &PinholeCamera, triangles: impl Iterator<Item = [Vec3; 3]>) -> (f32, [Vec2; 2]) {
     let size = camera.size_px;
     let mut covered = vec![false; size.element_product() as usize];
-    let (mut least, mut most) = (Vec2::MAX, Vec2::MIN);
+    let mut least = Vec2::MAX;
+    let mut most = Vec2::MIN;
     for corners in triangles {
         let seen = corners.map(|corner| camera.project(corner).unwrap());
         assert!(seen.iter().all(|at| at.planar_depth_m > camera.near_m), "a model reaches behind the near plane");
         let [a, b, c] = seen.map(|at| at.pixel);
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let low = a.min(b).min(c);
+        let high = a.max(b).max(c);
         (least, most) = (least.min(low), most.max(high));
         let [low, high] = [low, high].map(|at| at.clamp(Vec2::ZERO, size.as_vec2()));
         for y in low.y as u32..high.y.ceil() as u32 {

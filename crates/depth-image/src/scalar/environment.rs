@@ -79,7 +79,8 @@ fn share_of(towards_in_world: Vec3) -> Vec2 {
 /// Rows wrap around; columns end at the poles.
 fn bilinear(share: Vec2, size_px: IVec2, texel: impl Fn(u32, u32) -> Vec3) -> Vec3 {
     let place = share * size_px.as_vec2() - 0.5;
-    let (first, at) = (place.floor().as_ivec2(), place - place.floor());
+    let first = place.floor().as_ivec2();
+    let at = place - place.floor();
     let texel = |x: i32, y: i32| {
         texel((first.x + x).rem_euclid(size_px.x) as u32, (first.y + y).clamp(0, size_px.y - 1) as u32)
     };
@@ -141,7 +142,8 @@ mod tests {
         let light = EnvironmentLight::of(&map(|towards, _| gradient.radiance_linear(towards)));
         for normal in directions() {
             for lobe in [Lobe::Diffuse, Lobe::DiffuseBase] {
-                let (found, expected) = (light.lobe_linear(lobe, normal), gradient.diffuse_linear(normal));
+                let found = light.lobe_linear(lobe, normal);
+                let expected = gradient.diffuse_linear(normal);
                 assert!((found / expected - 1.0).abs().max_element() < 0.01, "{normal}: {found} {expected}");
             }
         }

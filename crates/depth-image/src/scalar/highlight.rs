@@ -175,7 +175,8 @@ fn apparent_radius(light: &Light, incident: &Incident) -> f32 {
 
 /// Trowbridge-Reitz, times π; 0 for a zero half-way vector. The sine keeps precision where the cosine is almost 1.
 fn ggx_distribution(normal: Vec3, half_way: Vec3, alpha: f32) -> f32 {
-    let (cosine, squared) = (normal.dot(half_way).max(0.0), alpha * alpha);
+    let cosine = normal.dot(half_way).max(0.0);
+    let squared = alpha * alpha;
     let spread = (normal.cross(half_way).length_squared() + cosine * cosine * squared).max(squared);
     half_way.length_squared() * squared / (spread * spread)
 }
@@ -260,7 +261,8 @@ mod tests {
 
     #[test]
     fn blinn_phong_equals_its_closed_form() {
-        let (towards_light, towards_eye) = (tilted(0.5, 0.3), tilted(0.7, 2.9));
+        let towards_light = tilted(0.5, 0.3);
+        let towards_eye = tilted(0.7, 2.9);
         let reflector = Reflector { reflectance_linear: Vec3::splat(0.4), roughness: 0.5 };
         let half_way = (towards_light + towards_eye).normalize_or_zero();
         let expected = 0.4 * towards_light.y * half_way.y.powf(30.0);
@@ -320,7 +322,8 @@ mod tests {
     fn the_contrast_is_within_a_bound_of_the_integral() {
         for roughness in [0.2f32, 0.4, 0.6, 0.8, 1.0] {
             let alpha = roughness * roughness;
-            let (mut sum, mut weights) = (0.0f64, 0.0f64);
+            let mut sum = 0.0f64;
+            let mut weights = 0.0f64;
             for (half_way, solid) in hemisphere() {
                 let towards = 2.0 * half_way.y * half_way - Vec3::Y;
                 let weight = ggx_distribution(Vec3::Y, half_way, alpha) * half_way.y * solid * towards.y.max(0.0);
@@ -335,7 +338,8 @@ mod tests {
     #[test]
     fn ggx_is_reciprocal() {
         for roughness in POLISHED_TO_ROUGH {
-            let (a, b) = (tilted(0.4, 0.2), tilted(1.1, 2.0));
+            let a = tilted(0.4, 0.2);
+            let b = tilted(1.1, 2.0);
             let there = reflected(Highlight::Ggx, &white(roughness), a, b) / a.y;
             let back = reflected(Highlight::Ggx, &white(roughness), b, a) / b.y;
             assert!((there / back - 1.0).abs() < 1e-4, "roughness {roughness}: {there} {back}");

@@ -137,7 +137,8 @@ fn towards(at_in_world: Vec3, point_in_world: Vec3) -> Incident {
 
 /// The share of a spot's intensity at an angle from its axis, as in `KHR_lights_punctual`.
 fn spot_share(axis_cosine: f32, inner_cone_rad: f32, outer_cone_rad: f32) -> f32 {
-    let (inner, outer) = (inner_cone_rad.cos(), outer_cone_rad.cos());
+    let inner = inner_cone_rad.cos();
+    let outer = outer_cone_rad.cos();
     let share = ((axis_cosine - outer) / (inner - outer).max(1e-4)).clamp(0.0, 1.0);
     share * share
 }
@@ -160,7 +161,8 @@ mod tests {
 
     #[test]
     fn a_rectangles_irradiance_equals_its_form_factor() {
-        let (a, h) = (1.5f32, 2.0f32);
+        let a = 1.5f32;
+        let h = 2.0f32;
         let light = Light::Rectangle {
             center_in_world: Vec3::Y * h,
             half_edges_in_world: [Vec3::X * a, Vec3::Z * a],
@@ -177,8 +179,10 @@ mod tests {
     #[test]
     fn a_small_round_lamp_equals_a_point_light() {
         let lamp = |radius_m| Light::Point { position_in_world: Vec3::Y, intensity_linear: Vec3::ONE, radius_m };
-        let (point, normal) = (Vec3::new(0.3, 0.0, 0.1), Vec3::Y);
-        let (small, hard) = (mean_irradiance(&lamp(1e-3), point, normal), mean_irradiance(&lamp(0.0), point, normal));
+        let point = Vec3::new(0.3, 0.0, 0.1);
+        let normal = Vec3::Y;
+        let small = mean_irradiance(&lamp(1e-3), point, normal);
+        let hard = mean_irradiance(&lamp(0.0), point, normal);
         assert!((small - hard).abs() < 1e-3, "{small} {hard}");
         assert!((hard - 1.1f32.powf(-1.5)).abs() < 1e-4, "{hard}");
     }

@@ -62,7 +62,9 @@ fn a_view_in_bands_is_its_crops() {
     for method in ["joint_carve", "light_cache", DIRECT] {
         let views = [view_camera(), crop_camera()].map(|camera| {
             let cameras = vec![camera];
-            let (scene_hash, lighting, method) = (HASH.to_owned(), LIGHTING.to_owned(), method.to_owned());
+            let scene_hash = HASH.to_owned();
+            let lighting = LIGHTING.to_owned();
+            let method = method.to_owned();
             let views = if method == DIRECT {
                 let work =
                     DirectWork { scene_hash, cameras, lighting, scene_time_s: 0.0, planes, surfaces_by_rays: None };

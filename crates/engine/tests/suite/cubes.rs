@@ -75,7 +75,9 @@ impl Stand {
     }
 
     fn direct(&self) -> View {
-        let (scene_hash, lighting, cameras) = (HASH.to_owned(), LIGHTING.to_owned(), vec![camera()]);
+        let scene_hash = HASH.to_owned();
+        let lighting = LIGHTING.to_owned();
+        let cameras = vec![camera()];
         let work = DirectWork {
             scene_hash,
             cameras,
@@ -124,7 +126,8 @@ fn a_cube_that_was_sent_in_tiles_shows_the_scene_and_what_mirrors_show() {
     let count: usize = whole.iter().map(samples).sum();
     println!("{:.1} bytes a sample of {count}", bytes.iter().sum::<usize>() as f64 / count as f64);
     for (whole, tiled) in whole.iter().zip(&tiled) {
-        let (whole, tiled) = (samples(whole), samples(tiled));
+        let whole = samples(whole);
+        let tiled = samples(tiled);
         assert!(whole.abs_diff(tiled) * 1000 <= whole, "{whole} and {tiled} samples");
     }
     let direct = stand.direct();

@@ -64,7 +64,9 @@ fn a_view_from_samples_shows_and_mirrors_the_map_of_the_package() {
         .expect("depth")
         .iter()
         .zip(direct.inverse_depth_per_m.as_ref().expect("depth"));
-    let (mut open, mut surfaces, mut close) = (0, 0, 0);
+    let mut open = 0;
+    let mut surfaces = 0;
+    let mut close = 0;
     for ((a, b), (here, there)) in view.srgb8.as_chunks::<3>().0.iter().zip(direct.srgb8.as_chunks::<3>().0).zip(depths)
     {
         let differs_by = (0..3).map(|i| a[i].abs_diff(b[i])).max().unwrap_or(0);

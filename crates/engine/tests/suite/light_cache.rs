@@ -36,7 +36,8 @@ fn scene() -> &'static Scene {
 
 fn camera(x_share: f32, size_px: UVec2) -> PinholeCamera {
     let bounds = scene().bounds();
-    let (center, size) = ((bounds.min + bounds.max) * 0.5, bounds.size().max_element());
+    let center = (bounds.min + bounds.max) * 0.5;
+    let size = bounds.size().max_element();
     let eye = center + Vec3::new(x_share, 0.5, 0.9) * size;
     PinholeCamera::looking_at(eye, center, Vec3::Y, 0.8, size_px)
 }
@@ -72,7 +73,8 @@ fn view(set: &dyn UploadedSet, method: &str) -> View {
 
 fn direct(surfaces_by_rays: Option<bool>) -> View {
     let ViewWork { cameras, planes, .. } = work(METHOD);
-    let (scene_hash, lighting) = (HASH.to_owned(), LIGHTING.to_owned());
+    let scene_hash = HASH.to_owned();
+    let lighting = LIGHTING.to_owned();
     let work = DirectWork { scene_hash, cameras, lighting, scene_time_s: 0.0, planes, surfaces_by_rays };
     engine().draw_direct(&work, TURN).expect("a view").remove(0)
 }
@@ -141,7 +143,8 @@ fn surfaces_are_found_as_the_plan_says_and_exact_views_are_direct_ones() {
         assert!(exact.srgb8 == direct(Some(by_rays)).srgb8, "by rays: {by_rays}");
     }
     let ViewWork { cameras, planes, .. } = work(METHOD);
-    let (scene_hash, lighting) = (HASH.to_owned(), LIGHTING.to_owned());
+    let scene_hash = HASH.to_owned();
+    let lighting = LIGHTING.to_owned();
     let work = DirectWork { scene_hash, cameras, lighting, scene_time_s: 0.0, planes, surfaces_by_rays: None };
     assert!(engine().traced_pixel_count(&work, TURN).expect("measured").is_some());
 }

@@ -95,7 +95,8 @@ fn camera() -> PinholeCamera {
 /// The mean difference over pixels, in codes.
 fn difference(a: &View, b: &View, of: &[bool]) -> f64 {
     let pixels = a.srgb8.chunks_exact(3).zip(b.srgb8.chunks_exact(3)).zip(of).filter(|(_, of)| **of);
-    let (mut sum, mut count) = (0u32, 0u32);
+    let mut sum = 0u32;
+    let mut count = 0u32;
     for ((a, b), _) in pixels {
         sum += a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(*b))).sum::<u32>();
         count += 3;
@@ -154,7 +155,9 @@ fn single_pole_images_show_the_object_in_mirrors() {
 #[test]
 fn a_base_tells_what_the_images_of_mirrors_leave_unknown() {
     let stand = stand();
-    let (truth, set, base) = (stand.direct(LIGHTING), stand.set(&[camera()], false), stand.base(256));
+    let truth = stand.direct(LIGHTING);
+    let set = stand.set(&[camera()], false);
+    let base = stand.base(256);
     for impostors in [Impostors::Pinholes { images: 1 }, Impostors::SinglePoles { images: 1 }] {
         let mirrors = stand.mirrors(impostors);
         let both = mirrors.iter().cloned().chain([base.clone()]).collect();
@@ -178,7 +181,8 @@ fn a_base_tells_what_the_images_of_mirrors_leave_unknown() {
 #[test]
 fn a_base_shows_what_mirrors_without_images_show() {
     let stand = stand();
-    let (truth, plain) = (stand.direct(LIGHTING), stand.direct("shadows"));
+    let truth = stand.direct(LIGHTING);
+    let plain = stand.direct("shadows");
     let set = stand.set(&[camera()], false);
     let with = stand.view(engine().with_common(set.clone(), vec![stand.base(256)]).expect("a set").as_ref());
     let without = stand.view(set.as_ref());

@@ -192,8 +192,8 @@ mod tests {
         let words = texture(gpu, [width_px, 8, 1], TextureFormat::Rg32Uint, D2);
         let layers = texture(gpu, [8, 8, 3], TextureFormat::Rgba32Uint, D2Array);
         let colors = texture(gpu, [8, 8, 1], TextureFormat::Rgba8UnormSrgb, D2);
-        let (drawn, sampler) =
-            (texture(gpu, [8, 8, 1], TextureFormat::R32Float, D2), gpu.texture_sampler([wgpu::AddressMode::Repeat; 2]));
+        let drawn = texture(gpu, [8, 8, 1], TextureFormat::R32Float, D2);
+        let sampler = gpu.texture_sampler([wgpu::AddressMode::Repeat; 2]);
         let own = [
             Binding::texture("words", &words),
             Binding::buffer("camera", &uniform),

@@ -205,7 +205,8 @@ mod tests {
     #[test]
     fn a_slice_is_charged_to_its_flow_whoever_arrives_while_it_runs() {
         let mut order = FairOrder::default();
-        let (slices_s, mut had_s) = ([1.0, 0.1], [0.0; 2]);
+        let slices_s = [1.0, 0.1];
+        let mut had_s = [0.0; 2];
         (0..2).for_each(|flow| order.enter(flow, turn(Batch, flow), slices_s[flow as usize]));
         for visitor in 2..1000 {
             let flow = order.next().expect("work waits");

@@ -75,7 +75,8 @@ mod tests {
         let (sender, began) = mpsc::channel();
         thread::scope(|threads| {
             for number in 0..3 {
-                let (limit, sender) = (&limit, sender.clone());
+                let limit = &limit;
+                let sender = sender.clone();
                 threads.spawn(move || {
                     let _job = limit.begin(WorkClass::Batch);
                     sender.send(number).expect("a receiver");

@@ -146,7 +146,8 @@ impl DeviceQueue {
         if self.forced_units.load(Ordering::Acquire) > 0 {
             return count.min(1);
         }
-        let (rates, mut sum_s) = (self.rates.lock(), 0.0);
+        let rates = self.rates.lock();
+        let mut sum_s = 0.0;
         let mut fits = |work: &[Work]| {
             sum_s += rates.predicted_s(work).unwrap_or(f64::INFINITY);
             sum_s <= SLICE_S
@@ -177,7 +178,8 @@ impl Drop for LiveStream {
 impl<'q> Slot<'q> {
     /// Ends this slice and waits for the next of the same work, which is in the queue before another is chosen.
     pub fn next(self, predicted_s: f64) -> Self {
-        let (queue, turn) = (self.queue, self.turn);
+        let queue = self.queue;
+        let turn = self.turn;
         let mut state = queue.state.lock();
         state.release(self.since.elapsed().as_secs_f64());
         std::mem::forget(self);
@@ -262,7 +264,8 @@ mod tests {
     #[test]
     fn pieces_are_merged_up_to_a_slice_while_a_live_stream_is_open() {
         let queue = Arc::new(DeviceQueue::default());
-        let (known, unknown) = (WorkKind::new(1, &0), WorkKind::new(1, &1));
+        let known = WorkKind::new(1, &0);
+        let unknown = WorkKind::new(1, &1);
         queue.learn(&[(known, 1000)], SLICE_S);
         let pieces = [[(known, 400)], [(known, 400)], [(known, 400)], [(unknown, 1)]];
         let merged = |from: usize| queue.merged(pieces[from..].iter().map(<[_; 1]>::as_slice));

@@ -98,7 +98,8 @@ impl Rates {
         let of_known = ((seconds - of_new_s) / predicted_s.max(f64::MIN_POSITIVE)).min(MOST_RISE);
         let not_sure_s = (seconds - sure_s).max(LEAST_SHARE * seconds);
         let learned = |(&kind, &units): (&WorkKind, &u64)| {
-            let (units, old) = (units.max(1) as f64, self.rate(kind));
+            let units = units.max(1) as f64;
+            let old = self.rate(kind);
             let was_sure = old.is_some_and(|rate| rate.is_sure);
             let share = if is_alone && !was_sure { 1.0 } else { NEW_SHARE };
             let unit_s = match old {

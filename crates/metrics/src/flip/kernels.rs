@@ -63,7 +63,8 @@ impl FeatureKernels {
 /// Positive weights scaled to sum to 1, negative ones to -1.
 fn balanced(weights: &[f32]) -> Vec<f32> {
     let sum = |sign: f32| weights.iter().map(|weight| (sign * weight).max(0.0)).sum::<f32>();
-    let (positive, negative) = (sum(1.0), sum(-1.0));
+    let positive = sum(1.0);
+    let negative = sum(-1.0);
     let balance = |&weight: &f32| match weight {
         _ if weight > 0.0 => weight / positive,
         _ if weight < 0.0 => weight / negative,

@@ -178,7 +178,9 @@ mod tests {
             let [a, b] = [0, 1].map(|image| Rgb8Image::new(side, side, crop(&images[image], first)).unwrap());
             flip_map(&a, &b).unwrap().values
         };
-        let (whole, part, reach) = (map(0), map(8), FLIP_REACH_PX as usize);
+        let whole = map(0);
+        let part = map(8);
+        let reach = FLIP_REACH_PX as usize;
         let mut differs_nearer = false;
         for (y, x) in (0..48).flat_map(|y| (0..48).map(move |x| (y, x))) {
             let [own, in_whole] = [part[48 * y + x], whole[SIDE * (y + 8) + x + 8]];

@@ -93,8 +93,8 @@ mod tests {
     #[test]
     fn the_threshold_has_no_great_jump_where_its_pieces_meet() {
         for log in [-3.94_f32, -1.44, -0.0184, 1.9] {
-            let (below, above) =
-                (threshold_vs_intensity(10_f32.powf(log - 1e-3)), threshold_vs_intensity(10_f32.powf(log + 1e-3)));
+            let below = threshold_vs_intensity(10_f32.powf(log - 1e-3));
+            let above = threshold_vs_intensity(10_f32.powf(log + 1e-3));
             assert!((below / above - 1.0).abs() < 0.05, "{log}: {below} {above}");
         }
     }

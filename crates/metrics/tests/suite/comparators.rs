@@ -4,7 +4,8 @@ use metrics::{MetricsError, PdiffSettings, PixelClass, Rgb8Image, class_mask, fl
 
 fn pattern(shift: usize) -> Rgb8Image<'static> {
     let bytes = (0..24 * 16).flat_map(|i| {
-        let (x, y) = ((i % 24 + shift) / 4, i / 24 / 4);
+        let x = (i % 24 + shift) / 4;
+        let y = i / 24 / 4;
         [((x * 67 + y * 31) % 256) as u8, ((x * 151 + y * 83) % 256) as u8, ((x * 29 + y * 197) % 256) as u8]
     });
     Rgb8Image::new(24, 16, bytes.collect::<Vec<u8>>()).unwrap()
@@ -20,7 +21,8 @@ fn identical_is_perfect() {
 
 #[test]
 fn every_comparator_sees_a_shift_of_one_pixel() {
-    let (reference, test) = (pattern(0), pattern(1));
+    let reference = pattern(0);
+    let test = pattern(1);
     assert!(psnr_db(&reference, &test, None).unwrap().unwrap() < 25.0);
     assert!(ssim_map(&reference, &test).unwrap().mean(None).unwrap().unwrap() < 0.95);
     assert!(flip_map(&reference, &test).unwrap().mean(None).unwrap().unwrap() > 0.02);
@@ -33,7 +35,8 @@ fn classes_add_up_and_an_empty_class_has_no_means() {
     classes[..100].fill(PixelClass::Silhouette);
     let [silhouette, covered, none] =
         [PixelClass::Silhouette, PixelClass::Covered, PixelClass::Disoccluded].map(|class| class_mask(&classes, class));
-    let (reference, test) = (pattern(0), pattern(1));
+    let reference = pattern(0);
+    let test = pattern(1);
     let pdiff = pdiff_map(&reference, &test, PdiffSettings::default()).unwrap();
     let failing = |mask: Option<&[bool]>| pdiff.failing_px(mask).unwrap();
     assert_eq!(failing(Some(&silhouette)) + failing(Some(&covered)), failing(None));
@@ -48,7 +51,8 @@ fn classes_add_up_and_an_empty_class_has_no_means() {
 
 #[test]
 fn sizes_must_agree() {
-    let (small, large) = (Rgb8Image::new(3, 2, vec![5; 18]).unwrap(), pattern(0));
+    let small = Rgb8Image::new(3, 2, vec![5; 18]).unwrap();
+    let large = pattern(0);
     let differ = |error| matches!(error, MetricsError::SizesDiffer { .. });
     assert!(differ(psnr_db(&small, &large, None).unwrap_err()));
     assert!(differ(ssim_map(&small, &large).unwrap_err()));

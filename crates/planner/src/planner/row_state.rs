@@ -43,7 +43,8 @@ impl RowState {
         if self.is_settled {
             return;
         }
-        let (old, total) = (self.timed_views as f64, (self.timed_views + views) as f64);
+        let old = self.timed_views as f64;
+        let total = (self.timed_views + views) as f64;
         let before = self.costs.unwrap_or(*costs);
         let mean = |before: f64, now: f64| (before * old + now * views as f64) / total;
         self.costs = Some(RowCosts {

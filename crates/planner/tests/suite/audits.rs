@@ -32,7 +32,8 @@ impl Stream {
     /// The views until an alarm of each run, at most `most`.
     fn alarms(&self, most: u64) -> Vec<u64> {
         let run = |seed: u64| {
-            let (mut random, mut audit) = (Random(seed + 1), Audit::new(term("flip 0.05"), self.foreground_ratio));
+            let mut random = Random(seed + 1);
+            let mut audit = Audit::new(term("flip 0.05"), self.foreground_ratio);
             let observe = |_: &u64| {
                 audit.observe(&self.view(&mut random));
                 audit.is_alarmed()
@@ -78,7 +79,8 @@ fn broken_promises_of_small_models_are_found_as_fast() {
 fn broken_promises_of_views_that_are_compared_by_squares_are_found() {
     for (share, most) in [(1.0, 80), (0.3, 250), (0.1, 700)] {
         let found = |seed: u64| {
-            let (mut random, mut audit) = (Random(seed + 1), Audit::new(term("flip 0.05"), 1.0));
+            let mut random = Random(seed + 1);
+            let mut audit = Audit::new(term("flip 0.05"), 1.0);
             (1..=1_000_u64).find(|_| {
                 let foreground_ratio = if random.unit() < share { random.between(0.5, 1.0) } else { 0.0 };
                 audit.observe(&view(foreground_ratio, 0.1 * random.gamma(1.0)));
@@ -97,7 +99,8 @@ fn broken_promises_of_views_that_are_compared_by_squares_are_found() {
 fn kept_promises_of_views_unlike_those_of_the_certificate_are_rarely_alarmed() {
     for [certified, shown] in [[0.02, 0.3], [0.02, 0.9], [0.9, 0.05]] {
         let alarmed = |seed: &u64| {
-            let (mut random, mut audit) = (Random(*seed), Audit::new(term("flip 0.05"), certified));
+            let mut random = Random(*seed);
+            let mut audit = Audit::new(term("flip 0.05"), certified);
             (0..1_000).any(|_| {
                 // Most of the views show little.
                 let foreground_ratio = shown * random.unit().powi(4);
@@ -127,7 +130,8 @@ fn a_promise_that_breaks_late_is_found_as_fast() {
     let kept = Stream { times: 0.6, variation: 0.4, foreground_ratio: 1.0 };
     let broken = Stream { times: 2.0, ..kept };
     for seed in 0..20 {
-        let (mut random, mut audit) = (Random(seed), Audit::new(term("flip 0.05"), 1.0));
+        let mut random = Random(seed);
+        let mut audit = Audit::new(term("flip 0.05"), 1.0);
         (0..2_000).for_each(|_| audit.observe(&kept.view(&mut random)));
         assert!(!audit.is_alarmed());
         let found = (1..=80).find(|_| {
@@ -142,7 +146,8 @@ fn a_promise_that_breaks_late_is_found_as_fast() {
 #[test]
 fn percentiles_are_audited_by_the_share_of_views_over() {
     let alarm = |share: f64, most: usize, seed: u64| {
-        let (mut random, mut audit) = (Random(seed), Audit::new(term("flip p95 0.05"), 1.0));
+        let mut random = Random(seed);
+        let mut audit = Audit::new(term("flip p95 0.05"), 1.0);
         (1..=most).find(|_| {
             audit.observe(&view(0.5, if random.unit() < share { 0.06 } else { 0.04 }));
             audit.is_alarmed()
@@ -160,7 +165,8 @@ fn percentiles_are_audited_by_the_share_of_views_over() {
 }
 
 fn audited(stream: Stream, views: u64, seed: u64) -> Audit {
-    let (mut random, mut audit) = (Random(seed), Audit::new(term("flip 0.05"), stream.foreground_ratio));
+    let mut random = Random(seed);
+    let mut audit = Audit::new(term("flip 0.05"), stream.foreground_ratio);
     (0..views).for_each(|_| audit.observe(&stream.view(&mut random)));
     audit
 }
@@ -189,7 +195,8 @@ fn intervals_hold_at_all_times_together() {
     for (variation, foreground_ratio) in [(0.3, 1.0), (0.6, 1.0), (0.6, 0.3)] {
         let stream = Stream { times: 0.8, variation, foreground_ratio };
         let holds = |seed: u64| {
-            let (mut random, mut audit) = (Random(seed), Audit::new(term("flip 0.05"), 1.0));
+            let mut random = Random(seed);
+            let mut audit = Audit::new(term("flip 0.05"), 1.0);
             (0..500).all(|_| {
                 audit.observe(&stream.view(&mut random));
                 audit.error_interval().is_none_or(|interval| (interval.low..=interval.high).contains(&0.04))
@@ -211,7 +218,8 @@ fn intervals_of_percentiles_hold_at_all_times_together() {
     const MANY_RUNS: u64 = 2_000;
     for share in [0.01, 0.03, 0.05, 0.10, 0.20] {
         let holds = |seed: u64| {
-            let (mut random, mut audit) = (Random(seed), Audit::new(term("flip p95 0.05"), 1.0));
+            let mut random = Random(seed);
+            let mut audit = Audit::new(term("flip p95 0.05"), 1.0);
             (0..500).all(|_| {
                 audit.observe(&view(0.5, if random.unit() < share { 0.06 } else { 0.04 }));
                 audit.error_interval().is_none_or(|interval| (interval.low..=interval.high).contains(&share))

@@ -7,7 +7,8 @@ use crate::random::Random;
 
 /// Powers of S and side that differ by method, as between methods that draw and those that follow rays.
 fn known(row: &Row) -> RowCosts {
-    let (count, draws) = (f64::from(row.camera_count), row.method.len().is_multiple_of(2));
+    let count = f64::from(row.camera_count);
+    let draws = row.method.len().is_multiple_of(2);
     let constant = 2.0 + f64::from(row.rank) / 10.0 + row.sampling.len() as f64;
     let (by_count, by_side) = if draws { (0.8, 1.0) } else { (0.25, 0.0) };
     RowCosts {
@@ -44,7 +45,8 @@ fn powers_that_differ_by_method_are_found_between_the_measured_rows() {
 /// the share of rows that cost no less than one standard deviation below their prediction. `timed_count` rows are timed,
 /// each the one of which least is known.
 fn prediction_errors(timed_count: usize) -> [f64; 3] {
-    let (mut errors, mut above) = (Vec::new(), 0);
+    let mut errors = Vec::new();
+    let mut above = 0;
     for seed in 0..60 {
         let subject = Subject::new(seed);
         let rows = subject.ladder.rows();

@@ -5,7 +5,8 @@ use planner::{Ladder, MAX_ROWS, Row};
 use crate::made_up::ladder;
 
 fn row(kind: &str, camera_count: u32, side_ratio: f64, rank: u32) -> Row {
-    let (sampling, method) = ("plain".to_owned(), format!("{kind}:{rank}"));
+    let sampling = "plain".to_owned();
+    let method = format!("{kind}:{rank}");
     Row { sampling, method, camera_count, place_count: camera_count, side_ratio, kind: kind.to_owned(), rank }
 }
 

@@ -140,7 +140,8 @@ fn costs(ladder: &Ladder, random: &mut Random) -> Vec<RowCosts> {
     let powers = [random.between(0.3, 0.7), random.between(0.1, 0.5)];
     let mut noisy = |cost: f64| cost * (0.05 * random.normal()).exp();
     let cost = |row: &Row| {
-        let (count, side) = (f64::from(row.camera_count), row.side_ratio);
+        let count = f64::from(row.camera_count);
+        let side = row.side_ratio;
         let sampling = constants[hash(&row.sampling) % 16];
         let method = constants[hash(&row.method) % 16] * sampling.sqrt();
         RowCosts {

@@ -23,9 +23,13 @@ impl Stream {
             // Names of subjects may have commas.
             let mut cells = line.rsplitn(4, ',');
             let mut number = || cells.next().and_then(|cell| cell.parse::<f64>().ok()).expect("a number");
-            let (flip, foreground_ratio, cameras) = (number(), number(), number());
+            let flip = number();
+            let foreground_ratio = number();
+            let cameras = number();
             let name = format!("{}, S = {cameras}", cells.next().expect("a name"));
-            let (flip_whole, mean_square, disoccluded_ratio) = (flip * foreground_ratio, 0.0, 0.0);
+            let flip_whole = flip * foreground_ratio;
+            let mean_square = 0.0;
+            let disoccluded_ratio = 0.0;
             let view = ViewErrors { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio };
             match streams.last_mut().filter(|last| last.name == name) {
                 Some(last) => last.views.push(view),
@@ -64,7 +68,8 @@ impl Stream {
     /// The views within which 95 of 100 runs are alarmed, and the share of runs that are alarmed within `most`.
     fn alarms(&self, scale: f64, most: u64) -> (u64, f64) {
         let run = |seed: u64| {
-            let (mut random, mut audit) = (Random(seed + 1), self.audit(scale));
+            let mut random = Random(seed + 1);
+            let mut audit = self.audit(scale);
             let is_alarmed = |_: &u64| {
                 audit.observe(self.view(&mut random));
                 audit.is_alarmed()
@@ -95,7 +100,8 @@ fn bounds_on_means_hold() {
         .iter()
         .map(|stream| {
             let mean = stream.mean();
-            let (mut corrected, mut plain) = (0, 0);
+            let mut corrected = 0;
+            let mut plain = 0;
             for _ in 0..RUNS {
                 let excess: Vec<f64> = (0..64).map(|_| stream.view(&mut random).excess(Metric::Flip, mean)).collect();
                 let moments = Moments::of(excess.into_iter());
@@ -162,13 +168,15 @@ fn audits_find_broken_promises_and_rarely_alarm_at_the_budget() {
 fn intervals_of_audits_are_as_narrow_as_promised() {
     for stream in Stream::all().iter().filter(|stream| stream.variation() <= LOW_VARIATION) {
         let half_width = |views: u64, seed: u64| {
-            let (mut random, mut audit) = (Random(seed), stream.audit(1.0));
+            let mut random = Random(seed);
+            let mut audit = stream.audit(1.0);
             (0..views).for_each(|_| audit.observe(stream.view(&mut random)));
             let interval = audit.error_interval().expect("16 views");
             (interval.high - interval.low) / 2.0 / stream.mean()
         };
         let mean = |views: u64| (0..AUDIT_RUNS).map(|seed| half_width(views, seed)).sum::<f64>() / AUDIT_RUNS as f64;
-        let (early, late) = (mean(100), mean(300));
+        let early = mean(100);
+        let late = mean(300);
         assert!(early <= 0.10 && late <= 0.06, "{}: {early} {late}", stream.name);
     }
 }

@@ -182,7 +182,8 @@ fn a_row_that_no_certificate_has_tested_is_certified_by_the_next_plan() {
 /// Rows that passed, and are too slow or too close in price to another, are not rejected.
 #[test]
 fn rows_are_rejected_only_after_a_failed_certificate() {
-    let (mut without_failure, mut with_failure) = (0, 0);
+    let mut without_failure = 0;
+    let mut with_failure = 0;
     for (seed, time) in (0..40).flat_map(|seed| [(seed, ""), (seed, ", time 5ms")]) {
         let subject = subject(seed);
         let budget = format!("flip {:.5}{time}", limit(&subject));
@@ -261,7 +262,8 @@ fn errors_hold_on_another_device_and_costs_do_not() {
 /// On another device, rows are timed one by one for the prediction of costs, then finalists in turn.
 #[test]
 fn only_costs_of_finalists_are_settled() {
-    let (mut single, mut settled) = (0, 0);
+    let mut single = 0;
+    let mut settled = 0;
     for seed in 0..20 {
         let subject = subject(seed);
         let budget = format!("flip {:.5}", limit(&subject));

@@ -66,7 +66,9 @@ fn screening_goes_through_common_views_in_order() {
 /// The planner's own statuses before each command are the oracle: a row that is pruned stays so.
 #[test]
 fn a_pruned_row_is_never_measured() {
-    let (mut pruned_count, mut tested, mut wrong) = (0, 0, 0);
+    let mut pruned_count = 0;
+    let mut tested = 0;
+    let mut wrong = 0;
     for seed in 0..60 {
         let subject = Subject::new(seed);
         let mut planner = planner(&subject, request(&budget(&subject), seed));
@@ -100,7 +102,8 @@ fn a_pruned_row_is_never_measured() {
 /// A subject in which more effort makes errors larger, in a ladder of one kind: the rule of pruning is false.
 #[test]
 fn wrong_prunings_are_counted() {
-    let (mut tested, mut wrong) = (0, 0);
+    let mut tested = 0;
+    let mut wrong = 0;
     for seed in 0..20 {
         let mut subject = Subject::new(seed).with_direct(1.0);
         let of_one_kind = |row: &Row| Row { kind: "all".to_owned(), ..row.clone() };
@@ -277,7 +280,8 @@ fn a_row_that_fails_while_it_is_certified_is_skipped() {
     let subject = subject();
     let mut planner = planner(&subject, request(&budget(&subject), 1));
     let mut next = Some(Event::Remembered(Kept::empty(key())));
-    let (mut failed, mut run) = (None, Run::default());
+    let mut failed = None;
+    let mut run = Run::default();
     while let Some(event) = next.take() {
         let commands = planner.step(event);
         next = commands.iter().find_map(|command| match command {

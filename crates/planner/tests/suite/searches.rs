@@ -98,7 +98,8 @@ fn least(subject: &Subject, budget: &Budget, share: f64) -> Option<f64> {
 }
 
 fn case(seed: u64) -> Case {
-    let (subject, kind) = (Subject::new(seed), KINDS[seed as usize % KINDS.len()]);
+    let subject = Subject::new(seed);
+    let kind = KINDS[seed as usize % KINDS.len()];
     let text = budget(&subject, seed, kind);
     let budget: Budget = text.parse().unwrap();
     let run = plan(&subject, &text, seed);
@@ -107,7 +108,8 @@ fn case(seed: u64) -> Case {
     let (worth, view_s, error_of_limit) = match choice {
         Choice::Direct => (if is_time_alone { 0.0 } else { subject.direct_s }, subject.direct_s, 0.0),
         Choice::Row(row) => {
-            let (error, price) = (true_error(&subject, row, &budget), subject.price(row));
+            let error = true_error(&subject, row, &budget);
+            let price = subject.price(row);
             let of_limit = budget.error().map_or(0.0, |term| error / term.most_ratio());
             (if is_time_alone { error } else { price.node_s }, price.view_s, of_limit)
         }
@@ -164,7 +166,8 @@ fn print_kind(cases: &[Case], kind: Kind) {
     let of: Vec<&Case> = cases.iter().filter(|case| case.kind == kind).collect();
     let kept = of.iter().filter(|case| case.is_kept).count();
     let median = |value: fn(&Case) -> f64| quantile(of.iter().map(|case| value(case)).collect(), 0.5);
-    let (probes, views) = (median(|case| case.probes as f64), median(|case| case.views as f64));
+    let probes = median(|case| case.probes as f64);
+    let views = median(|case| case.views as f64);
     let spent_s = median(|case| case.spent_s);
     println!("{:28} kept {kept} of {}; medians: {probes} probes, {views} views, {spent_s:.1} s", "", of.len());
 }
@@ -202,7 +205,8 @@ fn is_even(case: &Case) -> bool {
 #[test]
 fn promises_are_kept_at_nearly_the_least_price() {
     let cases = cases(0..SEEDS);
-    let (even, all) = (regrets(&cases, is_even), regrets(&cases, is_mean));
+    let even = regrets(&cases, is_even);
+    let all = regrets(&cases, is_mean);
     assert!(even.len() >= 50, "{}", even.len());
     assert!(share_within(&even, 1.1) >= 0.7 && share_within(&all, 1.25) >= 0.75);
     assert!(quantile(all.clone(), 0.5) <= 1.05 && quantile(all, 1.0) <= 2.0);

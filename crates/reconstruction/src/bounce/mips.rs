@@ -77,7 +77,8 @@ fn fill_from_coarser(levels: &mut [Level]) {
     }
     for number in (1..levels.len()).rev() {
         let (finer, coarser) = levels.split_at_mut(number);
-        let (finer, coarser) = (&mut finer[number - 1], &coarser[0]);
+        let finer = &mut finer[number - 1];
+        let coarser = &coarser[0];
         let empty = finer.means.iter_mut().enumerate().filter(|(_, (_, share))| *share == 0.0);
         for (index, (color, _)) in empty {
             *color = coarser.means[index_of(place_of(index as u32, finer.size_px) / 2, coarser.size_px)].0;

@@ -127,7 +127,8 @@ impl<'s> Bounces<'s> {
         };
         let boxes: Vec<GpuMirrorBox> = cells.iter().enumerate().map(mirror_box).collect();
         let work = |(number, cell): (usize, &MirrorCell<'_>)| {
-            let (number, first_pixel) = (number as u32, first_listed(number));
+            let first_pixel = first_listed(number);
+            let number = number as u32;
             let view = GpuViewCamera { number, first_pixel, size_px: [1; 2], ..GpuViewCamera::zeroed() };
             let work = GpuViewWork { view, volume: cell.surroundings.volume, ..GpuViewWork::zeroed() };
             let cameras = nearest_first(cell.surroundings, cell.bounds.center());
@@ -378,7 +379,8 @@ pub(crate) fn record(
         let Some(lists) = listed else { break };
         let next = (reflection < bounces.reflections).then(|| bounces.next(recording.device, Some(&lists)));
         for (number, cell) in bounces.cells.iter().enumerate() {
-            let (rays, place) = ((&lists, next.as_ref()), (number, reflection));
+            let rays = (&lists, next.as_ref());
+            let place = (number, reflection);
             if cell.is_cube() {
                 walk(recording, InBase::WholeList, rays, place)?;
                 continue;

@@ -110,7 +110,8 @@ fn each_passage(samples: &CubeSamples, size: UVec3, mut take: impl FnMut(usize, 
         if samples.normal[sample][axis].abs() < LEAST_NORMAL_ALONG_LINE {
             continue;
         }
-        let (place, depth) = (samples.place_of(axis, line), samples.depth[sample]);
+        let place = samples.place_of(axis, line);
+        let depth = samples.depth[sample];
         let reach =
             samples.slopes(sample, axis).iter().map(|slope| slope.abs() * SQUARE_REACH).sum::<f32>().min(MOST_REACH);
         let last = (samples.size[axis] - 1) / 2;
@@ -124,7 +125,8 @@ fn each_passage(samples: &CubeSamples, size: UVec3, mut take: impl FnMut(usize, 
             voxel[axis] = along;
             let below = (depth - along as f32 * VOXEL + ENTRY_DEPTH_BELOW) / ENTRY_DEPTH_STEP;
             let words = [sample as u32 | bits, normal | (below.round().clamp(0.0, 16383.0) as u32) << 16];
-            let (cell, within) = (voxel / 4, voxel % 4);
+            let cell = voxel / 4;
+            let within = voxel % 4;
             let number = within.x + 4 * within.y + 16 * within.z;
             take((cell.x + size.x * (cell.y + size.y * cell.z)) as usize, Passage { voxel: number, words });
         }

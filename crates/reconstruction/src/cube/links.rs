@@ -15,7 +15,8 @@ pub(crate) fn links(samples: &CubeSamples) -> Vec<Links> {
 fn of_sample(samples: &CubeSamples, sample: usize) -> Links {
     let line = samples.line[sample];
     let axis = samples.axis_of(line);
-    let (place, slopes) = (samples.place_of(axis, line), samples.slopes(sample, axis));
+    let place = samples.place_of(axis, line);
+    let slopes = samples.slopes(sample, axis);
     let sides = [1, 2].map(|offset| samples.size[(axis + offset) % 3]);
     let steps = [1, sides[0]];
     [0, 1, 2, 3].map(|towards| {

@@ -38,7 +38,8 @@ fn in_octant(size: UVec3, occupied: &[bool], octant: usize) -> Vec<u8> {
                 least_ahead.iter_mut().zip(row).for_each(|(least, &reach)| *least = reach.min(*least));
             }
             let row = columns * (y + rows * z)..columns * (y + rows * z + 1);
-            let (own, occupied) = (&mut all[row.clone()], &occupied[row]);
+            let own = &mut all[row.clone()];
+            let occupied = &occupied[row];
             let mut before = FARTHEST;
             for x in order(0, columns) {
                 let least = before.min(least_ahead[x]);

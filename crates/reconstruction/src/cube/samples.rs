@@ -81,7 +81,8 @@ impl CubeSamples {
 
     /// The place of a line among those of its axis, along the next axis and the one after it.
     pub fn place_of(&self, axis: usize, line: u32) -> UVec2 {
-        let (place, columns) = (line - self.first_line[axis], self.size[(axis + 1) % 3]);
+        let place = line - self.first_line[axis];
+        let columns = self.size[(axis + 1) % 3];
         UVec2::new(place % columns, place / columns)
     }
 

@@ -43,7 +43,8 @@ fn build(
     record: impl Fn(&mut Frame<'_>, &ImageCut<'_>) -> Result<(), ReconstructionError>,
 ) -> Result<Mesh, ReconstructionError> {
     let mut frame = Frame::begin(&device.gpu, "cut meshes", turn);
-    let (mut images, mut reads) = (Vec::new(), Vec::new());
+    let mut images = Vec::new();
+    let mut reads = Vec::new();
     for number in 0..set.cameras.len() {
         let image = ImageCut::new(device, set, number, cut)?;
         record(&mut frame, &image)?;
@@ -79,7 +80,8 @@ fn read_image(device: &Device, mesh: &Mesh, set: &SampleSet, number: usize) -> R
     let done = frame.submit()?.wait()?;
     let count = done.with(draw, |words: &[u32]| words[0] as usize)?;
     let indices = done.with(indices, |words: &[u32]| words[..count].to_vec())?;
-    let (camera, vertices) = (&set.meshes.cameras[number], mesh.cut.vertices);
+    let camera = &set.meshes.cameras[number];
+    let vertices = mesh.cut.vertices;
     let quad = |quad: &[u32], depths: &[f32]| {
         let place = |i: usize| vertex_in_world(camera, vertices, quad[i], depths[quad[i] as usize]);
         let samples = [quad[0], quad[3]].map(|vertex| vertex / vertices.per_sample());

@@ -58,7 +58,8 @@ impl QuadDrawing {
 
     fn targets(&self, gpu: &Gpu, kind: TargetKind) -> Result<QuadTargets, GpuError> {
         let (limits, (size_px, views)) = (gpu.device.limits(), kind);
-        let (side_px, layers) = (limits.max_texture_dimension_2d, limits.max_texture_array_layers);
+        let side_px = limits.max_texture_dimension_2d;
+        let layers = limits.max_texture_array_layers;
         GpuError::check_limit("a drawn view's side (px)", size_px.max_element().into(), side_px.into())?;
         GpuError::check_limit("views drawn together", views.into(), layers.into())?;
         Ok(self.targets.lend(kind, |&kind| Targets::new(gpu, kind)))
@@ -149,7 +150,8 @@ fn quad_work(view: &PinholeCamera, image: &PinholeCamera, first_sample: u32) -> 
 /// `near · weight` to z. Reversed depth is `near / planar depth`, 1 at the near plane and 0 at infinity.
 fn clip_direction(view: &PinholeCamera, direction: Vec3) -> Vec4 {
     let in_camera = view.world_from_camera.conjugate() * direction;
-    let (size, depth) = (view.size_px.as_vec2(), -in_camera.z);
+    let size = view.size_px.as_vec2();
+    let depth = -in_camera.z;
     let column = view.focal_px.x * in_camera.x + view.principal_px.x * depth;
     let row = -view.focal_px.y * in_camera.y + view.principal_px.y * depth;
     Vec4::new(column * 2.0 / size.x - depth, depth - row * 2.0 / size.y, 0.0, depth)

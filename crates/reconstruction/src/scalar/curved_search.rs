@@ -55,7 +55,8 @@ impl SinglePoleImages {
             let walked = walk(&seen);
             end.steps += walked.steps;
             if walked.met {
-                let (way_m, color_linear) = (seen.way_m(walked.s), seen.color(walked.s));
+                let way_m = seen.way_m(walked.s);
+                let color_linear = seen.color(walked.s);
                 end = RayEnd { kind: ProvenanceKind::Hit, way_m, color_linear, ..end };
             }
         }
@@ -121,7 +122,8 @@ impl<'c> Seen<'c> {
     }
 
     fn look(&self, s: f32) -> Look {
-        let (inverse_depth, place) = ((self.origin + self.line * s).z, self.place(s));
+        let inverse_depth = (self.origin + self.line * s).z;
+        let place = self.place(s);
         let inside = place.cmpge(Vec2::ZERO).all() && place.cmplt(self.camera.cells).all();
         let clamped = place.max(Vec2::ZERO).min(self.camera.cells - CELL_MARGIN_PX);
         let corners = self.camera.corners(clamped.as_uvec2());
@@ -147,7 +149,8 @@ impl<'c> Seen<'c> {
 
     fn color(&self, s: f32) -> Vec3 {
         let clamped = self.place(s).max(Vec2::ZERO).min(self.camera.cells - CELL_MARGIN_PX);
-        let (cell, within) = (clamped.as_uvec2(), clamped - clamped.floor());
+        let cell = clamped.as_uvec2();
+        let within = clamped - clamped.floor();
         let at = if self.camera.corners(cell).connected { within } else { within.round() };
         let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| {
             let texel = (cell + glam::UVec2::new(x, y)).min(self.camera.cells.as_uvec2());
@@ -183,7 +186,8 @@ fn walk(seen: &Seen<'_>, CurvedSearch { coarse_px, fine_px }: CurvedSearch) -> W
     let chord_px = seen.place(0.0).distance(seen.place(1.0)).max(seen.line.xy().length());
     let coarse_step = (coarse_px / chord_px.max(1e-3)).min(1.0);
     let fine_steps = (coarse_px / fine_px).ceil() as u32;
-    let (fine_step, fine_px) = (coarse_step / fine_steps as f32, coarse_px / fine_steps as f32);
+    let fine_step = coarse_step / fine_steps as f32;
+    let fine_px = coarse_px / fine_steps as f32;
     let mut walk = Walk { s: 0.0, met: false, steps: 1 };
     let mut to_go = 0;
     while walk.s < 1.0 && walk.steps <= MAX_WALK_STEPS {

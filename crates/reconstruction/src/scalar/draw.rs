@@ -61,7 +61,8 @@ fn draw(
 /// Pixels that a triangle may cover: all where it reaches behind the eye.
 fn bounds_px(view: &PinholeCamera, triangle: [Vec3; 3]) -> [UVec2; 2] {
     let size = view.size_px.as_vec2();
-    let (mut low, mut high) = (Vec2::MAX, Vec2::MIN);
+    let mut low = Vec2::MAX;
+    let mut high = Vec2::MIN;
     for point in triangle {
         let Some(seen) = view.project(point).filter(|seen| seen.planar_depth_m > view.near_m) else {
             return [UVec2::ZERO, view.size_px];
@@ -74,7 +75,8 @@ fn bounds_px(view: &PinholeCamera, triangle: [Vec3; 3]) -> [UVec2; 2] {
 
 /// The ray's parameter at a triangle, from either side.
 fn meets(ray: &ViewRay, [a, b, c]: [Vec3; 3]) -> Option<f32> {
-    let (ab, ac) = (b - a, c - a);
+    let ab = b - a;
+    let ac = c - a;
     let across = ray.direction.cross(ac);
     let determinant = ab.dot(across);
     let from = ray.eye - a;

@@ -37,7 +37,8 @@ impl PinholeImages {
     #[must_use]
     pub fn follow(&self, ray: &Ray, near_m: f32) -> RayEnd {
         let [near, far] = span_in(&self.volume, ray.origin_in_world, ray.direction_in_world, near_m);
-        let (eye, direction) = (ray.origin_in_world, ray.direction_in_world);
+        let eye = ray.origin_in_world;
+        let direction = ray.direction_in_world;
         let ray = ViewRay { eye, direction, near, far, is_mirrored: true };
         let found = self.marched(&ray);
         let blend = blend_two_best(&self.cameras, &ray, found.t);

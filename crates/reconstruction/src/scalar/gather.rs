@@ -19,7 +19,8 @@ pub struct Reflecting {
 #[must_use]
 pub fn gathered_light(field: &LayeredLightField, surface: &Reflecting, around: impl Fn(Vec3) -> Vec3) -> Vec3 {
     let lobe = Lobe::of(surface, GpuLightField::of(&field.camera));
-    let (mut light, mut sum) = (Vec3::ZERO, 0.0);
+    let mut light = Vec3::ZERO;
+    let mut sum = 0.0;
     for (number, direction) in field.camera.directions.all().into_iter().enumerate() {
         let share = lobe.share(-direction.towards);
         if share > LEAST_LOBE_SHARE {
@@ -68,7 +69,8 @@ impl Lobe {
 
     /// Trowbridge-Reitz with height-correlated masking, times the cosine.
     fn microfacets(&self, towards_light: Vec3) -> f32 {
-        let (eye, normal) = (self.surface.towards_eye_in_world, self.surface.normal_in_world);
+        let eye = self.surface.towards_eye_in_world;
+        let normal = self.surface.normal_in_world;
         let squared = self.alpha * self.alpha;
         let half_way = (towards_light + eye).normalize_or_zero();
         let [n_l, n_v, n_h] = [towards_light, eye, half_way].map(|unit| normal.dot(unit).max(1e-4));

@@ -77,9 +77,11 @@ fn tamed(normal: Vec3, ray: Vec3) -> Vec3 {
 
 impl<'i> Cut<'i> {
     fn of(image: &'i DepthImage) -> Option<Self> {
-        let (normals, corners) = (image.normal_oct16.as_ref()?, image.corner_inverse_depth_per_m.as_ref()?);
+        let normals = image.normal_oct16.as_ref()?;
+        let corners = image.corner_inverse_depth_per_m.as_ref()?;
         let camera = image.camera.reference();
-        let (width, focal_px) = (camera.size_px.x, camera.focal_px.min_element());
+        let width = camera.size_px.x;
+        let focal_px = camera.focal_px.min_element();
         let texels = (0..camera.size_px.y).flat_map(|y| (0..width).map(move |x| UVec2::new(x, y)));
         let quad = |(index, texel): (usize, UVec2)| {
             let inverse_depth = image.inverse_depth_per_m[index];
@@ -114,7 +116,8 @@ impl<'i> Cut<'i> {
     }
 
     fn quad(&self, number: usize, sample: usize) -> Quad {
-        let (origin, extent) = (self.texel(sample), self.extents[sample]);
+        let origin = self.texel(sample);
+        let extent = self.extents[sample];
         let depths = self.merged(origin, extent);
         let point = |i: usize| self.camera.ray((origin + CORNERS[i] * extent).as_vec2()).at(depths[i].recip());
         let last = self.index(origin + extent - 1);

@@ -44,7 +44,8 @@ impl CubeTwin {
     }
 
     fn met(&self, sample: usize, origin: Vec3, direction: Vec3) -> Option<CubeHit> {
-        let (samples, line) = (&self.samples, self.samples.line[sample]);
+        let samples = &self.samples;
+        let line = self.samples.line[sample];
         let axis = samples.axis_of(line);
         let at = samples.place_of(axis, line).as_vec2() + 0.5;
         let [along, next, last] = [0, 1, 2].map(|offset| (axis + offset) % 3);

@@ -23,7 +23,9 @@ pub(super) fn light_field_search(cameras: &[SampleCamera], ray: &ViewRay, start:
     let stride = (ray.far - ray.near) / steps as f32;
     // The last step that is proven free need not be taken.
     let first_step = ((start - ray.near) / stride).floor().max(0.0).min(steps as f32) as u32;
-    let (mut entered, mut never_unseen, mut t) = (false, true, ray.near);
+    let mut entered = false;
+    let mut never_unseen = true;
+    let mut t = ray.near;
     for step in first_step..=steps {
         t = ray.near + stride * step as f32;
         let v = evaluate_cameras(cameras, ray, t);
@@ -33,7 +35,8 @@ pub(super) fn light_field_search(cameras: &[SampleCamera], ray: &ViewRay, start:
             break;
         }
     }
-    let (mut low, mut high) = ((t - stride).max(ray.near), t);
+    let mut low = (t - stride).max(ray.near);
+    let mut high = t;
     for _ in 0..BISECTIONS {
         let middle = 0.5 * (low + high);
         if evaluate_cameras(cameras, ray, middle).entered {
@@ -88,7 +91,8 @@ fn most_conservative<'c>(cameras: &'c [SampleCamera], ray: &ViewRay, t: f32) -> 
 fn color(camera: &SampleCamera, ray: &ViewRay, t: f32) -> Vec3 {
     let p = in_image(camera, ray, t);
     let uv = (p.xy() / p.z - 0.5).max(Vec2::ZERO).min(camera.cells - CELL_MARGIN_PX);
-    let (cell, at) = (uv.as_uvec2(), uv - uv.floor());
+    let cell = uv.as_uvec2();
+    let at = uv - uv.floor();
     // Holes have no colour.
     let corners = (0..4u32).map(|i| cell + UVec2::new(i & 1, i >> 1)).zip(bilinear_shares(at));
     let held = corners.filter(|(texel, _)| camera.code_at(*texel) != HOLE_CODE);

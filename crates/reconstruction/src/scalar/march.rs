@@ -78,7 +78,8 @@ pub(super) fn march(camera: &SampleCamera, ray: &ViewRay, near: f32) -> March {
 /// Through nodes in which everything is farther away; ends before 2 × 2 cells that may hold a surface.
 fn march_nodes(camera: &SampleCamera, line: &Line, is_mirrored: bool) -> (f32, bool) {
     let start_level = if is_mirrored { BOUNCE_LEVEL } else { START_LEVEL }.min(camera.top_level());
-    let (mut s, mut level) = (0.0f32, start_level);
+    let mut s = 0.0f32;
+    let mut level = start_level;
     for _ in 0..MAX_COARSE_MOVES {
         if s >= line.s_end {
             break;

@@ -34,7 +34,8 @@ impl ColorMips {
         let (size_px, colors) = &self.0[level - 1];
         let most = size_px.as_vec2() - 1.0 - CELL_MARGIN_PX;
         let uv = (place_px / (level as f32).exp2() - 0.5).clamp(Vec2::ZERO, most);
-        let (cell, share) = (uv.as_uvec2(), uv.fract());
+        let cell = uv.as_uvec2();
+        let share = uv.fract();
         let row = |y: u32| {
             let [left, right] =
                 [0, 1].map(|x| linear_from_rgb9e5(colors[((cell.y + y) * size_px.x + cell.x + x) as usize]));

@@ -84,7 +84,8 @@ fn sums(
     let camera = cameras.next().unwrap_or(*center);
     let found = pixels(images, set, &camera, method);
     let mut sums = shown_linear(&found, set, &camera);
-    let (samples, rays) = (nearest_first(images, &camera), ViewRays::of(&camera, &set.volume, images));
+    let samples = nearest_first(images, &camera);
+    let rays = ViewRays::of(&camera, &set.volume, images);
     let starts = tile_start::tile_starts(&samples, &rays);
     let first = First { pixels: &found, cameras: &samples, rays: &rays, starts: &starts, set, antialias };
     let shares = matches!(method, ReconstructionMethod::JointCarve { .. });
@@ -110,7 +111,8 @@ fn rough(
     if further.iter().all(Option::is_none) {
         return pixels(images, set, camera, method);
     }
-    let (samples, rays) = (nearest_first(images, camera), ViewRays::of(camera, &set.volume, images));
+    let samples = nearest_first(images, camera);
+    let rays = ViewRays::of(camera, &set.volume, images);
     let mut found = pixels_from(&samples, &rays, &tile_start::tile_starts(&samples, &rays), method);
     let kept = found.iter_mut().zip(first).zip(further).filter(|(_, further)| further.is_some());
     kept.for_each(|((found, first), _)| *found = *first);

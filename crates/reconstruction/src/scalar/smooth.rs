@@ -55,7 +55,8 @@ impl First<'_> {
 
     fn surface(&self, index: usize, place: UVec2, shown_linear: Vec3) -> Option<Vec3> {
         let pixel = &self.pixels[index];
-        let (share, center) = (pixel.lowest_share?, pixel.inverse_depth_per_m);
+        let share = pixel.lowest_share?;
+        let center = pixel.inverse_depth_per_m;
         // Between two pixels that cameras show whole, the same cameras show the surface, too.
         let row = self.rays.size_px().x as usize;
         if [index - 1, index + 1, index - row, index + row].iter().any(|&i| self.pixels[i].lowest_share.is_none()) {

@@ -79,7 +79,8 @@ fn shares_on_surface(camera: &SampleCamera, point_in_world: Vec3) -> (UVec2, [f3
     let p = camera.homogeneous(point_in_world.extend(1.0));
     let inverse_w = p.z.recip();
     let uv = (p.xy() * inverse_w - 0.5).max(Vec2::ZERO).min(camera.cells - CELL_MARGIN_PX);
-    let (cell, at) = (uv.as_uvec2(), uv - uv.floor());
+    let cell = uv.as_uvec2();
+    let at = uv - uv.floor();
     let corners = camera.corners(cell);
     let surfaces = if corners.connected { [bilinear(corners.codes, at); 4] } else { corners.codes };
     let reach = camera.thickness_footprints * camera.code_above(inverse_w) / camera.focal_px;

@@ -62,7 +62,8 @@ pub(super) fn blend_two_best(cameras: &[SampleCamera], ray: &ViewRay, t: f32) ->
     let third_weight = best_first.get(2).map_or(0.0, |s| s.weight);
     let first = best_first[0];
     let weight_of = |vote: &CameraVote| (vote.weight - third_weight).max(0.0);
-    let (mut weights, mut color) = (weight_of(&first) + 1e-9, first.color_linear * (weight_of(&first) + 1e-9));
+    let mut weights = weight_of(&first) + 1e-9;
+    let mut color = first.color_linear * (weight_of(&first) + 1e-9);
     let mut camera_mask = if first.weight > 0.0 { first.mask } else { 0 };
     if let Some(second) = best_first.get(1) {
         color += second.color_linear * weight_of(second);
@@ -103,14 +104,18 @@ fn vote(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> Ca
         };
     }
     let clamped = uv.min(camera.cells - CELL_MARGIN_PX);
-    let (cell, at) = (clamped.as_uvec2(), clamped - clamped.floor());
+    let cell = clamped.as_uvec2();
+    let at = clamped - clamped.floor();
     let corners = camera.corners(cell);
     let reach = camera.thickness_footprints * camera.code_above(inverse_w) / camera.focal_px;
     // In a connected cell the surface itself counts, else each sample for itself.
     let surfaces = if corners.connected { [bilinear(corners.codes, at); 4] } else { corners.codes };
-    let (mut same, mut beyond, mut color) = (0.0, 0.0, Vec3::ZERO);
+    let mut same = 0.0;
+    let mut beyond = 0.0;
+    let mut color = Vec3::ZERO;
     // On the same surface: shares that count, and shares whose ways are proven free.
-    let (mut own, mut proven) = (0.0, 0.0);
+    let mut own = 0.0;
+    let mut proven = 0.0;
     for (i, share) in bilinear_shares(at).into_iter().enumerate() {
         let gap = camera.code(inverse_w) - surfaces[i];
         let is_sample = corners.codes[i] > FIRST_SAMPLE;

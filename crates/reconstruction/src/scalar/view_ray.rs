@@ -95,6 +95,7 @@ impl ViewRays {
 pub(super) fn span_in(volume: &Aabb, origin: Vec3, direction: Vec3, near: f32) -> [f32; 2] {
     // No component may be 0: 0 · inf is NaN.
     let d = direction.map(|c| if c.abs() < 1e-20 { 1e-20 } else { c });
-    let (a, b) = ((volume.min - origin) / d, (volume.max - origin) / d);
+    let a = (volume.min - origin) / d;
+    let b = (volume.max - origin) / d;
     [a.min(b).max_element().max(near), a.max(b).min_element()]
 }

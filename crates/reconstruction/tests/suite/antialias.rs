@@ -41,7 +41,8 @@ fn a_pixel_is_the_mean_of_its_positions_in_linear_light() {
     let planes = ViewPlanes { antialias: four(), ..ViewPlanes::ALL };
     for (name, scene, corners) in corpus() {
         let stage = Stage::with_corners(scene, &corners.samples(4));
-        let (set, camera) = (stage.upload(), corners.view());
+        let set = stage.upload();
+        let camera = corners.view();
         for method in [CARVE, SEARCH, HYBRID] {
             let smooth = drawn(&set, camera, method, planes);
             let means = mean_of_whole(&set, &camera, method);

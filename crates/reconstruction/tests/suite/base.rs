@@ -45,15 +45,19 @@ fn gaps() -> Vec<(&'static str, Stage, CubeStage, PinholeCamera)> {
 #[test]
 fn what_images_leave_is_the_walk_and_all_else_stays() {
     for (name, stage, cube, camera) in gaps() {
-        let (set, base, twin) = (stage.upload(), cube.upload(), cube.twin(&camera));
+        let set = stage.upload();
+        let base = cube.upload();
+        let twin = cube.twin(&camera);
         let [without, with] =
             [None, Some(&base)].map(|base| view(&set, base, &camera, (CARVE, ViewPlanes::ALL)).expect("a view"));
         let is_left: Vec<bool> = kinds(&without).iter().map(|&kind| kind == ProvenanceKind::Filled).collect();
         let left = is_left.iter().filter(|&&is| is).count();
-        let (mut known_alike, mut left_alike) = (true, 0);
+        let mut known_alike = true;
+        let mut left_alike = 0;
         for (pixel, &is_left) in is_left.iter().enumerate() {
             let same = |a: &View, b: &View| colors_differ_by(a, b, pixel) <= 2;
-            let (found, walked) = (kinds(&with)[pixel], kinds(&twin)[pixel]);
+            let found = kinds(&with)[pixel];
+            let walked = kinds(&twin)[pixel];
             let is_of_walk = (found == ProvenanceKind::Base) == (walked == ProvenanceKind::Hit);
             match is_left {
                 true => left_alike += usize::from(is_of_walk && same(&with, &twin)),
@@ -73,7 +77,9 @@ fn every_method_gains_where_it_filled_by_several_samples_a_pixel_too() {
     let methods = all_meshes().into_iter().chain([CARVE]);
     let antialias = Antialias::of(4).expect("four samples");
     for (name, stage, cube, camera) in gaps() {
-        let (set, base, truth) = (stage.upload(), cube.upload(), stage.drawn_directly(&camera));
+        let set = stage.upload();
+        let base = cube.upload();
+        let truth = stage.drawn_directly(&camera);
         for (method, antialias) in methods.clone().flat_map(|method| [(method, Antialias::NONE), (method, antialias)]) {
             let made = |base| {
                 view(&set, base, &camera, (method, ViewPlanes { antialias, ..ViewPlanes::ALL })).expect("a view")
@@ -91,7 +97,8 @@ fn every_method_gains_where_it_filled_by_several_samples_a_pixel_too() {
 #[test]
 fn views_together_are_those_of_each() {
     let (_, stage, cube, camera) = gaps().remove(1);
-    let (set, base) = (stage.upload(), cube.upload());
+    let set = stage.upload();
+    let base = cube.upload();
     let shared = CommonSets { base: Some(&base), ..CommonSets::default() };
     let moved = PinholeCamera { eye_in_world: camera.eye_in_world * 1.02, ..camera };
     let made = |cameras: &[PinholeCamera]| {
@@ -111,7 +118,8 @@ fn views_together_are_those_of_each() {
 #[test]
 fn a_base_without_a_cube_is_refused_and_views_of_a_cube_need_none() {
     let (_, stage, cube, camera) = gaps().remove(1);
-    let (set, base) = (stage.upload(), cube.upload());
+    let set = stage.upload();
+    let base = cube.upload();
     let refused = view(&set, Some(&set), &camera, (CARVE, ViewPlanes::COLOR)).expect_err("no cube");
     assert_eq!(refused.to_string(), "a base needs a layered cube, which the sample set lacks");
     let walked = |beside| view(&base, beside, &camera, (ReconstructionMethod::LAYERED, ViewPlanes::ALL));
@@ -168,7 +176,8 @@ fn rough_surfaces_of_images_show_what_a_base_holds() {
 #[test]
 fn a_scene_without_mirrors_looks_the_same_whether_reflections_are_followed_or_not() {
     let floor = GlossyFloor::new();
-    let (set, base) = (set_of(&floor.stage), floor.stage.set(None));
+    let set = set_of(&floor.stage);
+    let base = floor.stage.set(None);
     let planes = ViewPlanes { antialias: Antialias::of(4).expect("offered"), ..ViewPlanes::ALL };
     let [followed, plain] = [3, 0].map(|reflections| {
         let shared = CommonSets { mirrors: Mirrors { reflections, ..Mirrors::default() }, base: Some(&base) };
@@ -202,7 +211,8 @@ fn lobes_and_mirrors_beside_images_are_those_of_direct_drawing() {
     let camera = looking(Vec3::new(8.0, 4.5, 8.0), Vec3::Y, 40.0, UVec2::new(80, 60));
     let stage = Gathering::new(teapot_spheres(), camera);
     let other = looking(Vec3::new(8.2, 4.6, 8.0), Vec3::Y, 40.0, UVec2::new(80, 60));
-    let (set, base) = (set_of(&stage), stage.set(None));
+    let set = set_of(&stage);
+    let base = stage.set(None);
     let planes = ViewPlanes { antialias: Antialias::of(4).expect("offered"), ..ViewPlanes::ALL };
     let made = |cameras: &[PinholeCamera], reflections, glossy_rays| {
         let shared = CommonSets { mirrors: Mirrors { cells: &[], reflections, glossy_rays }, base: Some(&base) };

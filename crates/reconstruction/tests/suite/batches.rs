@@ -49,9 +49,11 @@ fn sizes_may_change_from_view_to_view() {
 #[test]
 fn a_set_shows_nothing_of_the_one_before_it() {
     let camera = corners().camera(0.2, -0.3, UVec2::new(64, 48));
-    let (small, large) = (Stage::new(uv_sphere(0.5, 12), &corners().samples(2)), stage());
+    let small = Stage::new(uv_sphere(0.5, 12), &corners().samples(2));
+    let large = stage();
     let alone = |stage: &Stage| stage.view(&camera, CARVE);
-    let (small_view, large_view) = (alone(&small), alone(&large));
+    let small_view = alone(&small);
+    let large_view = alone(&large);
     assert!(small_view != large_view);
     for _ in 0..4 {
         for (stage, view) in [(&small, &small_view), (&large, &large_view)] {
@@ -68,7 +70,8 @@ fn images_of_four_million_samples_are_seen_as_they_are() {
     let sample = corners().camera(0.0, 0.0, UVec2::splat(2100));
     let stage = Stage::new(uv_sphere(1.0, 24), &[sample]);
     let camera = corners().camera(0.1, 0.05, UVec2::new(32, 24));
-    let (view, twin) = (stage.view(&camera, CARVE), stage.twin(&camera, CARVE));
+    let view = stage.view(&camera, CARVE);
+    let twin = stage.twin(&camera, CARVE);
     let differ = view.srgb8.iter().zip(&twin.srgb8).filter(|(a, b)| a.abs_diff(**b) > 2).count();
     assert!(differ * 100 <= view.srgb8.len(), "{differ} of {}", view.srgb8.len());
     assert!(view.srgb8.iter().any(|&value| value > 30), "something is seen");

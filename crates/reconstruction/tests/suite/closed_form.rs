@@ -96,9 +96,11 @@ fn a_grazing_plane_stays_in_one_piece() {
 
 /// Pixels that are one surface with their neighbours, or all background.
 fn inside(truth: &View) -> Vec<bool> {
-    let (width, height) = (truth.size_px.x as usize, truth.size_px.y as usize);
+    let width = truth.size_px.x as usize;
+    let height = truth.size_px.y as usize;
     let is_inside = |i: usize| {
-        let (x, y) = (i % width, i / width);
+        let x = i % width;
+        let y = i / width;
         let on_border = x == 0 || y == 0 || x + 1 == width || y + 1 == height;
         let around = || (0..9).map(|k| depths(truth)[i + (k / 3) * width + k % 3 - width - 1]);
         !on_border && around().fold(f32::MAX, f32::min) >= 0.9 * around().fold(0.0, f32::max)
@@ -150,7 +152,8 @@ fn a_background_by_direction_is_the_same_drawn_and_reconstructed() {
     let camera = looking(Vec3::ZERO, Vec3::new(0.1, 0.2, -1.0), 60.0, VIEW_PX);
     let drawn = stage.drawn_directly(&camera);
     let expected = |index: usize| {
-        let (x, y) = (index as u32 % VIEW_PX.x, index as u32 / VIEW_PX.x);
+        let x = index as u32 % VIEW_PX.x;
+        let y = index as u32 / VIEW_PX.x;
         let ray = camera.ray(Vec2::new(x as f32, y as f32) + 0.5);
         background.radiance_linear(ray.direction_in_world.normalize_or_zero()).to_array().map(srgb8_from_linear)
     };

@@ -164,7 +164,8 @@ fn images_of_other_lines_are_refused() {
 fn rays_from_anywhere_end_where_their_twins_do() {
     let (_, scene, _) = corpus().remove(2);
     let stage = CubeStage::new(scene, 32, LayerSelection::Dominant);
-    let (bounds, grid) = (stage.scene.bounds(), stage.grid);
+    let bounds = stage.scene.bounds();
+    let grid = stage.grid;
     let middle = grid.corner_in_world + (grid.size / 2).as_vec3() * grid.spacing_m;
     let extent_m = bounds.size().max_element();
     let mut places =
@@ -178,7 +179,8 @@ fn rays_from_anywhere_end_where_their_twins_do() {
         for towards in towards {
             let camera = looking(eye, eye + towards, fov_y_deg, UVec2::new(33, 25));
             let camera = PinholeCamera { near_m: 0.25 * grid.spacing_m, ..camera };
-            let (view, twin) = (stage.view(&camera), stage.twin(&camera));
+            let view = stage.view(&camera);
+            let twin = stage.twin(&camera);
             let Agreement { kind, hits: own, .. } = Agreement::of(&view, &twin);
             println!("{eye} {towards}: {kind} of a kind, {own} hits");
             assert!(depths(&view).iter().all(|depth| depth.is_finite()), "{eye} {towards}");

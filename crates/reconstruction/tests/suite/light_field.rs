@@ -222,7 +222,8 @@ fn gathering_is_its_twin() {
         let gathered = stage.view(&set, "layered:0", Mirrors { reflections: 1, ..GLOSSY });
         let base = Vec3::from_slice(&floor.base_color_linear[..3]);
         let reflectance_linear = base * floor.metallic + Vec3::splat(0.04 * (1.0 - floor.metallic));
-        let (mut close, mut pixels) = (0, 0);
+        let mut close = 0;
+        let mut pixels = 0;
         for (index, &inverse_depth) in depths(&plain).iter().enumerate() {
             let pixel = UVec2::new(index as u32 % camera.size_px.x, index as u32 / camera.size_px.x);
             let ray = camera.ray(pixel.as_vec2() + 0.5);
@@ -230,7 +231,8 @@ fn gathering_is_its_twin() {
             if inverse_depth <= 0.0 || point_in_world.y.abs() > 1e-3 {
                 continue;
             }
-            let (normal_in_world, towards_eye_in_world) = (Vec3::Y, -ray.direction_in_world.normalize_or_zero());
+            let normal_in_world = Vec3::Y;
+            let towards_eye_in_world = -ray.direction_in_world.normalize_or_zero();
             let reflector = Reflector { reflectance_linear, roughness };
             let surface = Reflecting { point_in_world, normal_in_world, towards_eye_in_world, reflector };
             let light = gathered_light(&field, &surface, |towards| sky.radiance_linear(towards));

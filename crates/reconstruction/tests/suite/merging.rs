@@ -27,7 +27,8 @@ impl<'q> Block<'q> {
     }
 
     fn texels(&self) -> impl Iterator<Item = UVec2> {
-        let (origin, size) = (self.origin, self.size);
+        let origin = self.origin;
+        let size = self.size;
         (0..size.y).flat_map(move |y| (0..size.x).map(move |x| origin + UVec2::new(x, y)))
     }
 
@@ -36,7 +37,8 @@ impl<'q> Block<'q> {
         let at = (corner - self.origin).as_vec2() / self.size.as_vec2();
         let [a, b, c, d] = self.quad.corners_in_world;
         let [a, b, c] = if at.element_sum() <= 1.0 { [a, b, c] } else { [d, c, b] };
-        let (normal, sight) = ((b - a).cross(c - a), point - camera.eye_in_world);
+        let normal = (b - a).cross(c - a);
+        let sight = point - camera.eye_in_world;
         let met = normal.dot(a - camera.eye_in_world) / normal.dot(sight);
         let depth_m = sight.dot(camera.forward_in_world());
         (met - 1.0) * sight.length() * camera.focal_px.min_element() / depth_m
@@ -55,7 +57,8 @@ struct Found {
 fn measured(stage: &Stage, px: f64) -> Found {
     let set = stage.upload();
     let read = |method| reconstructor().read_quads(&set, method).expect("quads");
-    let (own, merged) = (read(HYBRID), read(merged(px)));
+    let own = read(HYBRID);
+    let merged = read(merged(px));
     let own: HashMap<_, _> = own.iter().map(|quad| ((quad.image, quad.samples[0]), quad)).collect();
     let mut found = Found::default();
     let mut at_corners: HashMap<_, Vec2> = HashMap::new();

@@ -97,10 +97,12 @@ fn views_are_the_twins() {
 
 /// Pixels inside of the reference's surfaces: they and all pixels around them are hits.
 fn inside(truth: &View, reach_px: usize) -> Vec<usize> {
-    let (width, height) = (truth.size_px.x as usize, truth.size_px.y as usize);
+    let width = truth.size_px.x as usize;
+    let height = truth.size_px.y as usize;
     let known = kinds(truth);
     let is_inside = |i: &usize| {
-        let (x, y) = (i % width, i / width);
+        let x = i % width;
+        let y = i / width;
         let within = x.min(y) >= reach_px && x + reach_px < width && y + reach_px < height;
         let row = |y: usize| &known[y * width + x - reach_px..=y * width + x + reach_px];
         within && (y - reach_px..=y + reach_px).all(|y| row(y).iter().all(|&k| k == ProvenanceKind::Hit))
@@ -110,7 +112,8 @@ fn inside(truth: &View, reach_px: usize) -> Vec<usize> {
 
 /// How many those are, and how many of them are no hit.
 fn inside_and_lost(truth: &View, view: &View) -> (usize, usize) {
-    let (inside, found) = (inside(truth, 1), kinds(view));
+    let inside = inside(truth, 1);
+    let found = kinds(view);
     (inside.len(), inside.into_iter().filter(|&i| found[i] != ProvenanceKind::Hit).count())
 }
 
@@ -182,7 +185,8 @@ fn isolated() -> Stage {
     let mut stage = Stage::with_corners(quad(Vec3::ZERO, 1.0, Vec3::Z, [200, 120, 60]), &[camera]);
     let image = &mut stage.images[0];
     for (i, depth) in image.inverse_depth_per_m.iter_mut().enumerate() {
-        let (x, y) = (i as u32 % SAMPLE_PX.x, i as u32 / SAMPLE_PX.x);
+        let x = i as u32 % SAMPLE_PX.x;
+        let y = i as u32 / SAMPLE_PX.x;
         *depth = if x % 4 == 1 && y % 4 == 1 { *depth } else { BACKGROUND_INVERSE_DEPTH };
     }
     image.corner_inverse_depth_per_m.as_mut().expect("corners").fill(BACKGROUND_INVERSE_DEPTH);
@@ -304,7 +308,8 @@ fn hybrids_hold_images_without_redundance_together() {
 fn hybrids_cover_more_than_meshes() {
     for (name, scene, corners) in corpus() {
         let stage = Stage::with_corners(scene, &corners.samples(4));
-        let (set, truth) = (stage.upload(), stage.drawn_directly(&corners.view()));
+        let set = stage.upload();
+        let truth = stage.drawn_directly(&corners.view());
         let cameras = [corners.view(); 16];
         let everywhere = vec![true; kinds(&truth).len()];
         let shown = |method| {

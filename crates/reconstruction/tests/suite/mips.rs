@@ -64,12 +64,16 @@ fn wide_rays_have_the_colours_of_their_twin() {
             Turn::default(),
         )
         .expect("a set");
-    let (image, mips, rays) = (&images[0], ColorMips::of(&images[0]), rays());
+    let image = &images[0];
+    let mips = ColorMips::of(&images[0]);
+    let rays = rays();
     let follow =
         |width_m| reconstructor().follow(RayWork { width_m, ..RayWork::new(&set, NEAR_M) }, &rays).expect("ends").0;
     let narrow = follow(0.0);
     for width_m in WIDTHS_M {
-        let (mut hits, mut alike, mut changed) = (0, 0, 0);
+        let mut hits = 0;
+        let mut alike = 0;
+        let mut changed = 0;
         for ((ray, own), wide) in rays.iter().zip(&narrow).zip(follow(width_m)) {
             assert_eq!((own.kind, own.way_m), (wide.kind, wide.way_m), "a ray ends where it ends without width");
             let Some(color) = expected(image, &mips, (ray, own), width_m) else { continue };

@@ -40,7 +40,8 @@ impl Hall {
     fn with_mips(scene: Scene, samples: &[PinholeCamera], cells: &[(Aabb, Vec<PinholeCamera>)], mips: bool) -> Self {
         let on_device = GpuScene::upload(gpu(), &scene).expect("a scene");
         let set = |cameras: &[PinholeCamera]| {
-            let (images, described) = (images(&on_device, cameras), SetDescription { mips, ..description(&scene) });
+            let images = images(&on_device, cameras);
+            let described = SetDescription { mips, ..description(&scene) };
             reconstructor().upload(&images, &described, Turn::default()).expect("a sample set")
         };
         let samples = set(samples);
@@ -96,7 +97,8 @@ fn mean_difference(a: &View, b: &View) -> f32 {
 
 /// Whether the truth has a pixel's colour there or in a pixel beside it: mirrors shrink patterns to the size of pixels.
 fn is_near(view: &View, truth: &View, pixel: usize) -> bool {
-    let (width, place) = (view.size_px.x as i32, pixel as i32);
+    let width = view.size_px.x as i32;
+    let place = pixel as i32;
     let color = |view: &View, at: i32| -> Option<[u8; 3]> {
         view.srgb8.get(3 * usize::try_from(at).ok()?..)?.first_chunk().copied()
     };
@@ -132,7 +134,8 @@ fn a_dented_mirror_shows_the_teapot() {
     let share_near = |view: &View| {
         mirrored.iter().filter(|&&pixel| is_near(view, &truth, pixel)).count() as f32 / mirrored.len() as f32
     };
-    let (with, without) = (hall.view(&camera, 1), hall.view(&camera, 0));
+    let with = hall.view(&camera, 1);
+    let without = hall.view(&camera, 0);
     let [with_near, without_near] = [&with, &without].map(share_near);
     let guessed = kinds(&with).iter().filter(|&&kind| kind == ProvenanceKind::Guessed).count();
     println!("{} pixels: {with_near} are near, {without_near} without rays, {guessed} guessed", mirrored.len());
@@ -193,7 +196,8 @@ fn sets_without_mirrors_are_what_they_are_without_cells() {
         let description = SetDescription { highlight, ..description(&scene) };
         let set = reconstructor().upload(&images, &description, Turn::default()).expect("a sample set");
         let [without, with] = [0, 2].map(|reflections| {
-            let (bounds, surroundings) = (hall.cells[0].0, &hall.cells[0].1);
+            let bounds = hall.cells[0].0;
+            let surroundings = &hall.cells[0].1;
             let cells = [MirrorCell { bounds, surroundings }];
             reconstruct(&set, Mirrors { cells: &cells, reflections, glossy_rays: 0 }, &[camera], ViewPlanes::ALL)
                 .expect("a view")
@@ -207,7 +211,8 @@ fn views_with_several_samples_a_pixel_are_the_same_together_and_alone() {
     let hall = before_the_teapot();
     let camera = |x: f32| looking(Vec3::new(9.0 + x, 7.1, 12.5), Vec3::new(0.0, 2.0, -2.5), 28.0, UVec2::new(64, 48));
     let cameras = [camera(-0.3), camera(0.1), camera(0.4)];
-    let (bounds, surroundings) = (hall.cells[0].0, &hall.cells[0].1);
+    let bounds = hall.cells[0].0;
+    let surroundings = &hall.cells[0].1;
     // The smaller of two cells counts.
     let around = Aabb { min: bounds.min - 1.0, max: bounds.max + 1.0 };
     let cells = [MirrorCell { bounds: around, surroundings: &hall.samples }, MirrorCell { bounds, surroundings }];
@@ -264,7 +269,8 @@ struct Mirrored {
 
 impl Mirrored {
     fn of(hall: &Hall, camera: &PinholeCamera, reflections: u32) -> Self {
-        let (plain, truth) = (hall.drawn(camera, 0), hall.drawn(camera, reflections));
+        let plain = hall.drawn(camera, 0);
+        let truth = hall.drawn(camera, reflections);
         let differs = differences(&plain, &truth).into_iter().enumerate().filter(|(_, difference)| *difference > 8);
         Self { pixels: differs.map(|(pixel, _)| pixel).collect(), truth }
     }
@@ -286,7 +292,8 @@ fn onto_the_dented_mirror() -> PinholeCamera {
 
 #[test]
 fn mirrors_in_no_cell_show_what_a_base_holds() {
-    let (mut hall, camera) = (before_the_teapot(), onto_the_dented_mirror());
+    let mut hall = before_the_teapot();
+    let camera = onto_the_dented_mirror();
     let base = Gathering::new(teapot_mirror(), camera).set(None);
     let mirrored = Mirrored::of(&hall, &camera, 2);
     let elsewhere = Aabb { min: Vec3::splat(50.0), max: Vec3::splat(51.0) };
@@ -305,7 +312,8 @@ fn mirrors_in_no_cell_show_what_a_base_holds() {
 
 #[test]
 fn what_a_truncated_base_does_not_hold_is_guessed() {
-    let (mut hall, camera) = (before_the_teapot(), onto_the_dented_mirror());
+    let mut hall = before_the_teapot();
+    let camera = onto_the_dented_mirror();
     hall.cells.clear();
     let stage = Gathering::new(teapot_mirror(), camera);
     let view = |is_truncated| {
@@ -315,10 +323,12 @@ fn what_a_truncated_base_does_not_hold_is_guessed() {
         hall.view_beside(Some(&base), &camera, 1)
     };
     let [whole, truncated] = [false, true].map(view);
-    let (whole, truncated) = (kinds(&whole), kinds(&truncated));
+    let whole = kinds(&whole);
+    let truncated = kinds(&truncated);
     let of_base =
         whole.iter().zip(&truncated).filter(|(kind, _)| **kind == ProvenanceKind::Base).map(|(_, kind)| *kind);
-    let (known, guessed) = (ProvenanceKind::Base, ProvenanceKind::Guessed);
+    let known = ProvenanceKind::Base;
+    let guessed = ProvenanceKind::Guessed;
     let counts = [known, guessed].map(|kind| of_base.clone().filter(|of| *of == kind).count());
     println!("{counts:?} known and guessed of {}", of_base.clone().count());
     assert!(counts[0] > 500 && counts[1] > 200 && counts[0] + counts[1] == of_base.count(), "{counts:?}");
@@ -328,7 +338,8 @@ fn what_a_truncated_base_does_not_hold_is_guessed() {
 /// The view's only image shows the mirror from behind, and its set reflects nothing.
 #[test]
 fn mirrors_that_only_the_base_shows_show_the_scene() {
-    let (mut hall, camera) = (before_the_teapot(), onto_the_dented_mirror());
+    let mut hall = before_the_teapot();
+    let camera = onto_the_dented_mirror();
     let behind = looking(Vec3::new(0.0, 4.0, -16.0), Vec3::new(0.0, 2.0, 5.0), 60.0, UVec2::new(160, 120));
     let scene = teapot_mirror();
     let matt = SetDescription { highlight: None, ..description(&scene) };
@@ -353,7 +364,8 @@ fn mirrors_that_only_the_base_shows_show_the_scene() {
 
 #[test]
 fn rays_go_on_between_a_mirror_with_a_cell_and_one_in_the_base() {
-    let (mut hall, camera) = (between_two_mirrors(true), facing_a_mirror());
+    let mut hall = between_two_mirrors(true);
+    let camera = facing_a_mirror();
     hall.cells.truncate(1);
     let base = Gathering::new(mirror_pair(), camera).set(None);
     for reflections in [1, 2, 4] {
@@ -392,7 +404,8 @@ fn between_two_mirrors(mips: bool) -> Hall {
 
 #[test]
 fn two_mirrors_repeat_the_ball() {
-    let (hall, camera) = (between_two_mirrors(true), facing_a_mirror());
+    let hall = between_two_mirrors(true);
+    let camera = facing_a_mirror();
     let mut errors = Vec::new();
     for reflections in 1..=4 {
         errors.push(mean_difference(&hall.view(&camera, reflections), &hall.drawn(&camera, reflections)));
@@ -409,7 +422,8 @@ fn two_mirrors_repeat_the_ball() {
 #[test]
 fn more_than_the_limits_is_refused() {
     let hall = before_the_teapot();
-    let (bounds, surroundings) = (hall.cells[0].0, &hall.cells[0].1);
+    let bounds = hall.cells[0].0;
+    let surroundings = &hall.cells[0].1;
     let cells = [MirrorCell { bounds, surroundings }; 9];
     let refused = |cells: &[MirrorCell<'_>], reflections| {
         reconstruct(&hall.samples, Mirrors { cells, reflections, glossy_rays: 0 }, &[], ViewPlanes::ALL)

@@ -23,10 +23,15 @@ struct Faults {
 }
 
 fn faults(stage: &Stage, camera: &PinholeCamera, method: ReconstructionMethod) -> Faults {
-    let (view, truth) = (stage.view(camera, method), stage.drawn_directly(camera));
+    let view = stage.view(camera, method);
+    let truth = stage.drawn_directly(camera);
     assert_sane(&view, &method.to_string());
     let classes = classify(camera, depths(&truth), &stage.images).expect("planes of one size");
-    let (mut missing, mut wrong, mut covered, mut disoccluded, mut foreground) = (0, 0, 0, 0, 0);
+    let mut missing = 0;
+    let mut wrong = 0;
+    let mut covered = 0;
+    let mut disoccluded = 0;
+    let mut foreground = 0;
     for (i, class) in classes.iter().enumerate() {
         let surface = depths(&truth)[i] > 0.0;
         foreground += usize::from(surface);
@@ -51,8 +56,10 @@ fn faults(stage: &Stage, camera: &PinholeCamera, method: ReconstructionMethod) -
 fn more_is_seen_and_what_is_seen_is_as_right() {
     println!("covered pixels missing and wrong, and disocclusion: conventional, then apart");
     for (name, scene, corners) in corpus() {
-        let (cameras, view) = (corners.samples(4), corners.camera(0.1, -0.2, VIEW_PX));
-        let (whole, apart) = (Stage::new(scene.clone(), &cameras), Stage::apart(scene, &cameras));
+        let cameras = corners.samples(4);
+        let view = corners.camera(0.1, -0.2, VIEW_PX);
+        let whole = Stage::new(scene.clone(), &cameras);
+        let apart = Stage::apart(scene, &cameras);
         for method in METHODS {
             let [before, after] = [&whole, &apart].map(|stage| faults(stage, &view, method));
             let percent = |f: &Faults| [f.missing, f.wrong, f.disoccluded].map(|share| 100.0 * share);
@@ -96,7 +103,8 @@ fn halves_make_a_closed_wall() {
     beside.images.push(empty);
     let camera = corners.camera(0.1, 0.1, VIEW_PX);
     for method in METHODS {
-        let (alone, beside) = (whole.view(&camera, method), beside.view(&camera, method));
+        let alone = whole.view(&camera, method);
+        let beside = beside.view(&camera, method);
         let far = (0..kinds(&alone).len()).filter(|&i| colors_differ_by(&alone, &beside, i) > 1).count();
         assert!(far == 0 && kinds(&alone) == kinds(&beside), "{method}: {far} pixels differ");
     }
@@ -134,14 +142,16 @@ fn an_omitted_surface_is_not_carved_away() {
     naive.images[1].passed = None;
     let aside = looking(Vec3::new(0.3, 0.0, 4.0), Vec3::Z * -2.0, 40.0, VIEW_PX);
     let kept = |stage: &Stage| {
-        let (view, truth) = (stage.view(&aside, CARVE), stage.drawn_directly(&aside));
+        let view = stage.view(&aside, CARVE);
+        let truth = stage.drawn_directly(&aside);
         // The wall is the farthest.
         let wall = depths(&truth).iter().copied().filter(|&d| d > 0.0).fold(f32::MAX, f32::min);
         let poles: Vec<usize> = (0..depths(&truth).len()).filter(|&i| depths(&truth)[i] > 1.3 * wall).collect();
         let kept = poles.iter().filter(|&&i| (depths(&view)[i] / depths(&truth)[i] - 1.0).abs() < 0.02).count();
         kept as f64 / poles.len().max(1) as f64
     };
-    let (right, wrong) = (kept(&stage), kept(&naive));
+    let right = kept(&stage);
+    let wrong = kept(&naive);
     println!("poles kept: {right:.3}, {wrong:.3} if left-out surfaces counted as free space");
     assert!(right > 0.8 && wrong < 0.6, "{right} {wrong}");
 }
@@ -210,7 +220,8 @@ fn scattered_holes_leave_a_closed_wall() {
         punch(image, |x, y| usize::from(by_chance(x, y)) == number);
     }
     let camera = corners.camera(0.0, 0.0, VIEW_PX);
-    let (view, truth) = (stage.view(&camera, CARVE), stage.drawn_directly(&camera));
+    let view = stage.view(&camera, CARVE);
+    let truth = stage.drawn_directly(&camera);
     assert_eq!(count(&view, ProvenanceKind::Hit), VIEW_PX.element_product() as usize);
     let off = |i: usize| (depths(&view)[i] / depths(&truth)[i] - 1.0).abs();
     let farthest = (0..depths(&view).len()).map(off).fold(0.0, f32::max);

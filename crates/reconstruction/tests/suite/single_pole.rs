@@ -106,7 +106,8 @@ fn the_walk_ends_where_its_twin_does() {
         (2, CurvedSearch { coarse_px: 4.0, fine_px: 0.25 }),
         (1, CurvedSearch { coarse_px: 1.0, fine_px: 1.0 }),
     ] {
-        let (images, rays) = (&images[..count], rays(6000));
+        let images = &images[..count];
+        let rays = rays(6000);
         let twin = SinglePoleImages::of(images, &scene.bounds());
         let ends = followed(images, search, &rays);
         let agree = |(ray, end): (&Ray, &RayEnd)| {
@@ -126,7 +127,8 @@ fn the_walk_ends_where_its_twin_does() {
 #[test]
 fn coarse_steps_miss_little() {
     let Stand { scene, images } = stand();
-    let (images, rays) = (&images[..1], rays(3000));
+    let images = &images[..1];
+    let rays = rays(3000);
     let twin = SinglePoleImages::of(images, &scene.bounds());
     let exhaustive: Vec<RayEnd> = rays.iter().map(|ray| twin.every_eighth_texel(ray, NEAR_M)).collect();
     let hits = exhaustive.iter().filter(|end| is_hit(end)).count() as f32;

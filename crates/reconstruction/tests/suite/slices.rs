@@ -85,7 +85,8 @@ fn a_view_in_slices_is_the_whole_view_with_every_method() {
 fn a_live_view_goes_between_the_slices_of_a_batch() {
     let shared = Shared::new();
     let set = shared.upload(&Stage::new(uv_sphere(1.0, 24), &corners().samples(2)));
-    let (many, one) = (cameras(UVec2::new(320, 240)), cameras(UVec2::new(64, 48)));
+    let many = cameras(UVec2::new(320, 240));
+    let one = cameras(UVec2::new(64, 48));
     let live = Turn { class: WorkClass::Live, flow: 1 };
     let view = || {
         shared

@@ -63,8 +63,10 @@ fn corners() -> Corners {
 
 impl Room {
     fn meet(&self, ray: &Ray) -> Met {
-        let (origin, direction) = (ray.origin_in_world - BALL_AT, ray.direction_in_world);
-        let (a, b) = (direction.length_squared(), origin.dot(direction));
+        let origin = ray.origin_in_world - BALL_AT;
+        let direction = ray.direction_in_world;
+        let a = direction.length_squared();
+        let b = origin.dot(direction);
         let root = b * b - a * (origin.length_squared() - self.ball_m * self.ball_m);
         if self.ball_m > 0.0 && root > 0.0 {
             let t = (-b - root.sqrt()) / a;
@@ -149,7 +151,8 @@ fn share_as_seen_from(room: &Room, kind: Highlight, camera: &PinholeCamera, eye:
 
 fn brightest_px(seen: &View) -> Vec2 {
     let brightest = seen.srgb8.as_chunks::<3>().0.iter().map(|rgb| u32::from(rgb[0])).max();
-    let (mut sum, mut number) = (Vec2::ZERO, 0.0);
+    let mut sum = Vec2::ZERO;
+    let mut number = 0.0;
     for (pixel, rgb) in pixels(seen.size_px).zip(seen.srgb8.as_chunks::<3>().0) {
         if Some(u32::from(rgb[0])) == brightest {
             (sum, number) = (sum + pixel, number + 1.0);
@@ -248,7 +251,8 @@ fn filled_pixels_do_not_shine() {
     assert!(seen.provenance == matt.provenance && seen.inverse_depth_per_m == matt.inverse_depth_per_m);
     let kinds = kinds(&seen);
     let of = |kind| (0..kinds.len()).filter(|&i| kinds[i] == kind).collect::<Vec<_>>();
-    let (filled, hit) = (of(ProvenanceKind::Filled), of(ProvenanceKind::Hit));
+    let filled = of(ProvenanceKind::Filled);
+    let hit = of(ProvenanceKind::Hit);
     assert!(filled.len() > 30, "{} pixels are filled", filled.len());
     assert!(filled.iter().all(|&i| colors_differ_by(&seen, &matt, i) == 0));
     let shining = hit.iter().filter(|&&i| colors_differ_by(&seen, &matt, i) > 2).count();
@@ -322,15 +326,18 @@ fn a_uniform_map_is_mirrored_as_the_constant_environment() {
     let map = EnvironmentMap::new(UVec2::new(8, 4), &[grey; 32]).expect("a map");
     let on_device = Arc::new(GpuEnvironment::upload(gpu(), &map).expect("a map"));
     let lit_by = |environment| Room { illumination: Illumination { environment, ..lamps(1) }, ..with_ball() };
-    let (constant, mapped, dark) =
-        (lit_by(Environment::uniform(grey)), lit_by(Environment::mapped()), lit_by(Environment::default()));
+    let constant = lit_by(Environment::uniform(grey));
+    let mapped = lit_by(Environment::mapped());
+    let dark = lit_by(Environment::default());
     let images = constant.images();
     for kind in KINDS {
         let seen = |room: &Room, environment| {
             let set = SetDescription { environment, ..room.description(Some(kind)) };
             view(&images, &set, &corners().view()).srgb8
         };
-        let (constant, mapped, dark) = (seen(&constant, None), seen(&mapped, Some(&on_device)), seen(&dark, None));
+        let constant = seen(&constant, None);
+        let mapped = seen(&mapped, Some(&on_device));
+        let dark = seen(&dark, None);
         assert!(constant.iter().zip(&mapped).all(|(a, b)| a.abs_diff(*b) <= 1), "{kind:?}");
         assert_eq!(constant != dark, kind == Highlight::Ggx, "{kind:?}: only microfacets mirror the environment");
     }

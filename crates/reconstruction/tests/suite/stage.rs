@@ -211,7 +211,8 @@ pub struct Agreement {
 
 impl Agreement {
     pub fn of(a: &View, b: &View) -> Self {
-        let (ka, kb) = (kinds(a), kinds(b));
+        let ka = kinds(a);
+        let kb = kinds(b);
         let same = ka.iter().zip(&kb).filter(|(a, b)| a == b).count();
         let both: Vec<usize> = (0..ka.len()).filter(|&i| [ka[i], kb[i]] == [ProvenanceKind::Hit; 2]).collect();
         let close = both.iter().filter(|&&i| colors_differ_by(a, b, i) <= 2 && depths_agree(a, b, i)).count();

@@ -20,7 +20,8 @@ fn apart(a: &View, b: &View) -> f64 {
 fn views_in_every_tone_are_their_twins() {
     let (name, scene, corners) = corpus().swap_remove(3);
     let stage = Stage::new(scene, &corners.samples(4));
-    let (set, camera) = (stage.upload(), corners.view());
+    let set = stage.upload();
+    let camera = corners.view();
     let reconstruct = |planes| reconstruct(&set, &[camera], CARVE, planes).expect("a view").remove(0);
     let four = Antialias::of(4).expect("offered");
     let tones =
@@ -48,7 +49,8 @@ fn a_tone_is_applied_to_the_pixel_and_changes_no_sample() {
         let planes = ViewPlanes { tone, ..ViewPlanes::COLOR };
         reconstruct(&set, &[corners.view()], CARVE, planes).expect("a view").remove(0)
     };
-    let (before, neutral) = (shown(ToneMapping::NONE), shown(tone(0.0, ToneCurve::KhronosNeutral)));
+    let before = shown(ToneMapping::NONE);
+    let neutral = shown(tone(0.0, ToneCurve::KhronosNeutral));
     assert_eq!(before.srgb8, shown(ToneMapping::NONE).srgb8, "the set keeps no tone");
     for (plain, mapped) in before.srgb8.chunks_exact(3).zip(neutral.srgb8.chunks_exact(3)) {
         if plain.contains(&255) {

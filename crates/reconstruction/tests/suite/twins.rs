@@ -74,7 +74,8 @@ fn tiles_start_before_every_surface() {
             let tile = (i / across / 8) * across.div_ceil(8) + i % across / 8;
             (inverse.recip(), starts[tile])
         });
-        let (mut covered, mut skipped) = (0, 0);
+        let mut covered = 0;
+        let mut skipped = 0;
         for (depth_m, start_m) in ahead {
             covered += 1;
             skipped += usize::from(start_m > depth_m * 1.002);

@@ -67,7 +67,8 @@ impl<'a> Pair<'a> {
     /// The surfaces on a line that face a direction, by rising depth.
     fn facing(&self, line: usize, towards: Vec3) -> Vec<&'a Crossing> {
         let columns = self.lines.size_px.x as usize;
-        let (row, column) = (line / columns, line % columns);
+        let row = line / columns;
+        let column = line % columns;
         let line = if self.is_opposite { row * columns + (columns - 1 - column) } else { line };
         let on_line = &self.crossings[self.first[line] as usize..self.first[line + 1] as usize];
         let normal = |crossing: &Crossing| unit_from_oct8(oct8_from_oct16(crossing.plane_normal_oct16));

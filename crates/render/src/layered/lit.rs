@@ -93,7 +93,8 @@ fn points_a_list(stages: &Stages, output: Output) -> usize {
 /// Lights one list of surfaces.
 fn light_list(stages: &Stages, batch: &Batch<'_>, bounces: &[GpuBounce], light: &mut Light) -> Result<(), RenderError> {
     let Stages { gpu, pool, passes, .. } = stages;
-    let (count, sum_planes) = (bounces.len() as u32, batch.output.sums.count());
+    let count = bounces.len() as u32;
+    let sum_planes = batch.output.sums.count();
     let plane_bytes = 4 * u64::from(count);
     let _one = stages.batches.begin(batch.work.turn.class);
     let lighting = batch.work.lighting;
@@ -108,7 +109,8 @@ fn light_list(stages: &Stages, batch: &Batch<'_>, bounces: &[GpuBounce], light: 
     let points = Rays { bounces: &memory, list: &list, units: u64::from(count), generation: 1 };
     let frame = Frame::begin(gpu, "light of layers", batch.work.turn);
     let sum_buffer = (*sums).clone();
-    let (pieces, cameras) = (Pieces { all: Vec::new() }, parts[0].cameras.clone());
+    let pieces = Pieces { all: Vec::new() };
+    let cameras = parts[0].cameras.clone();
     let sums = Sums { buffer: sums, rays };
     let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, frame };
     if lighting.is_lit() {
@@ -168,7 +170,8 @@ impl<'a> Points<'a> {
         let Self { camera, first, first_line, seed } = *self;
         let columns = camera.size_px.x;
         let pixel = UVec2::new(crossing.line % columns, crossing.line / columns);
-        let (planar_depth_m, at) = (crossing.planar_depth_m, pixel.as_vec2() + 0.5);
+        let planar_depth_m = crossing.planar_depth_m;
+        let at = pixel.as_vec2() + 0.5;
         let point = camera.unproject(PixelDepth { pixel: at, planar_depth_m });
         let layer = place as u32 - first[crossing.line as usize];
         let line = UVec2::new(first_line.x.wrapping_add(pixel.x), first_line.y.wrapping_add(pixel.y));

@@ -118,7 +118,8 @@ fn two_children(corners_in_world: &[[Vec3; 3]]) -> Bvh2 {
 }
 
 fn levels(tree: &Bvh2) -> usize {
-    let (mut deepest, mut pending) = (0, vec![(0usize, 1usize)]);
+    let mut deepest = 0;
+    let mut pending = vec![(0usize, 1usize)];
     while let Some((node, level)) = pending.pop() {
         deepest = deepest.max(level);
         let Bvh2Node { prim_count, first_index, .. } = tree.nodes[node];
@@ -144,7 +145,8 @@ fn halved(boxes: &[Aabb]) -> Bvh2 {
         let axis = bounds.largest_axis();
         let middle = |i: u32| boxes[i as usize].min[axis] + boxes[i as usize].max[axis];
         own.select_nth_unstable_by(range.len() / 2, |&a, &b| middle(a).total_cmp(&middle(b)));
-        let (first, split) = (nodes.len(), range.start + range.len() / 2);
+        let first = nodes.len();
+        let split = range.start + range.len() / 2;
         nodes.extend([Bvh2Node::default(); 2]);
         nodes[node] = Bvh2Node::new(bounds, 0, first as u32);
         pending.extend([(first, range.start..split), (first + 1, split..range.end)]);

@@ -186,8 +186,10 @@ impl RayScene {
 
     /// Attributes of vertices at a scene time.
     fn attributes(&self, scene_time_s: f32) -> Result<Arc<Attributes>, GpuError> {
-        let (vertices, details) = (self.flat.vertices_at(scene_time_s), self.flat.details_at(scene_time_s));
-        let (words, details) = (TextureFormat::Rgba32Uint, bytemuck::cast_slice::<_, [u32; 4]>(&details));
+        let vertices = self.flat.vertices_at(scene_time_s);
+        let details = self.flat.details_at(scene_time_s);
+        let words = TextureFormat::Rgba32Uint;
+        let details = bytemuck::cast_slice::<_, [u32; 4]>(&details);
         Ok(Arc::new(Attributes {
             vertices: Table::new(&self.gpu, "vertex attributes", words, &vertices)?,
             details: Table::new(&self.gpu, "vertex details", words, details)?,
@@ -235,7 +237,8 @@ impl RayScene {
     fn corner_texels(&self, bvh: &Bvh, corners_in_world: &[[Vec3; 3]]) -> Vec<[[u32; 4]; 3]> {
         let texels = |&triangle: &u32| {
             let triangle = triangle as usize;
-            let (points, numbers) = (corners_in_world[triangle], self.flat.corners[triangle]);
+            let points = corners_in_world[triangle];
+            let numbers = self.flat.corners[triangle];
             let flags = self.flat.triangles[triangle].flags & CORNER_FLAGS;
             std::array::from_fn(|i| {
                 let [x, y, z] = points[i].to_array().map(f32::to_bits);

@@ -71,14 +71,16 @@ impl<'a> RadianceWork<'a> {
         gpu.queue.write_buffer(&memory.bounces[0], 0, bytemuck::cast_slice(points));
         let rays = batch.light_rays().map(|rays| 0..work.refinement.share_of(rays));
         let parts = batch.parts_of_points(gpu, &rays, count);
-        let (pieces, cameras) = (Pieces { all: Vec::new() }, parts[0].cameras.clone());
+        let pieces = Pieces { all: Vec::new() };
+        let cameras = parts[0].cameras.clone();
         let sums = Sums { buffer: pool.lend_storage("no sums", 4), rays };
         let frame = Frame::begin(gpu, "light of a light field", work.turn);
         let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, frame };
         recording.frame.encoder.clear_buffer(&memory.reflected, 0, None);
         // Whoever gathers them has met one mirror before.
         let mirrors = work.lighting.reflections().saturating_sub(1);
-        let (list, units) = (BounceList::of(gpu, count), u64::from(count));
+        let list = BounceList::of(gpu, count);
+        let units = u64::from(count);
         let ends = Rays { bounces: &memory.bounces[0], list: &list, units, generation: 0 };
         let [first, second] = memory.memories();
         let next = memory.record_ends(&mut recording, &parts, ends, (mirrors > 0).then_some(second))?;

@@ -57,7 +57,8 @@ pub(super) fn record(
     let batch = recording.batch;
     // Lighting with mirrors has rays.
     let Some(traced) = batch.traced.as_deref() else { return Ok(()) };
-    let (traversal, plane_count) = (Traversal::of(traced), batch.output.layout().count);
+    let traversal = Traversal::of(traced);
+    let plane_count = batch.output.layout().count;
     let variant = Spawn { by_rays: batch.by_rays, plane_count, traversal };
     let pass = recording.passes.get(&variant)?;
     let illumination = &batch.work.scene.illumination;
@@ -95,7 +96,8 @@ mod tests {
     #[test]
     fn every_variant_is_bound_by_its_names() {
         let stage = TestStage::new();
-        let (list, traced) = (BounceList::new(&stage.gpu), stage.scene.rays.at(0.0).expect("a tree"));
+        let list = BounceList::new(&stage.gpu);
+        let traced = stage.scene.rays.at(0.0).expect("a tree");
         for variant in Spawn::all() {
             let target = stage.surfaces(variant.by_rays, false);
             stage.check(&variant, 0, &bindings([&stage.buffer; 3], &list, &target));

@@ -75,7 +75,8 @@ impl Scene {
             seed: from.seed,
         };
         let point_of = |salt| point_of(number, hashed(from.seed.wrapping_add(salt)));
-        let (place, at) = (point_of(0x68bc_21eb), point_of(0x02e5_be93).x);
+        let place = point_of(0x68bc_21eb);
+        let at = point_of(0x02e5_be93).x;
         look.emission_linear + look.albedo_linear * self.light_of_one_lamp(&spot, place, at, illumination)
     }
 

@@ -135,7 +135,8 @@ impl LightSamples<'_> {
             half_step: half_step_per_m(image) * place.planar_depth_m,
             least_cosine: tests.least_cosine,
         };
-        let (mut own, mut coverage) = (WeightedLight::default(), 0.0);
+        let mut own = WeightedLight::default();
+        let mut coverage = 0.0;
         for step in [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE] {
             let weight = ((1.0 - step) * (1.0 - share) + step * share).to_array();
             let weight = weight[0] * weight[1];

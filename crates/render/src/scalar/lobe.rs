@@ -33,7 +33,7 @@ pub fn lobe_ray([normal, towards_eye]: [Vec3; 2], roughness: f32, place: Vec2) -
     let stretched = Vec3::new(alpha * eye.x, alpha * eye.y, eye.z).normalize_or_zero();
     let up = (1.0 - place.y) * (1.0 + stretched.z) - stretched.z;
     let across = (1.0 - up * up).clamp(0.0, 1.0).sqrt();
-    let (sin, cos) = (TAU * place.x).sin_cos();
+    let (sin, cos) = f32::sin_cos(TAU * place.x);
     let cap = Vec3::new(cos * across, sin * across, up) + stretched;
     let facet = Vec3::new(alpha * cap.x, alpha * cap.y, cap.z).normalize_or_zero();
     let towards = (-eye).reflect(facet);
@@ -56,7 +56,8 @@ impl Scene {
         let ray = pixel_ray(camera, pixel);
         let found = self.closest(&ray, camera.near_m).0.and_then(|hit| Some((hit, self.look(&hit).reflector?)));
         let Some((hit, reflector)) = found else { return Vec::new() };
-        let (normal, towards_eye) = (self.normal_in_world(&hit), -ray.direction_in_world.normalize_or_zero());
+        let normal = self.normal_in_world(&hit);
+        let towards_eye = -ray.direction_in_world.normalize_or_zero();
         let seed = hashed(pixel_seed(camera, pixel).wrapping_add(0x2545_f491));
         let of = |number| lobe_ray([normal, towards_eye], reflector.roughness, point_of(number, seed));
         let sum: f32 = (0..rays).map(|number| of(number).weight).sum();
@@ -83,6 +84,7 @@ impl Scene {
 /// Of `spot.wgsl`.
 pub(super) fn pixel_seed(camera: &PinholeCamera, pixel: UVec2) -> u32 {
     let PixelCamera { seed, first_from_axis: [x, y], .. } = PixelCamera::of(&(*camera).into(), Vec2::ZERO);
-    let (x, y) = (pixel.x.wrapping_add(x), pixel.y.wrapping_add(y));
+    let x = pixel.x.wrapping_add(x);
+    let y = pixel.y.wrapping_add(y);
     hashed(seed ^ hashed((x & 0xffff) | (y << 16)))
 }

@@ -51,7 +51,8 @@ fn blend(corners: [&Vertex; 3], barycentric: [f32; 3], value: impl Fn(&Vertex) -
 
 /// Möller-Trumbore; also says whether the front was hit.
 fn intersect(ray: &Ray, [a, b, c]: [Vec3; 3], double_sided: bool) -> Option<(f32, [f32; 3], bool)> {
-    let (ab, ac) = (b - a, c - a);
+    let ab = b - a;
+    let ac = c - a;
     let p = ray.direction_in_world.cross(ac);
     let determinant = ab.dot(p);
     if determinant == 0.0 || (determinant < 0.0 && !double_sided) {

@@ -198,7 +198,8 @@ impl Scene {
         let texel = |part: u32| self.materials[(material * MATERIAL_TEXELS + part) as usize].map(f32::from_bits);
         let ([r, g, b, _], [metallic, roughness, ..], [dr, dg, db, _]) = (texel(0), texel(2), texel(3));
         let [er, eg, eb, _] = texel(1);
-        let (numbers, shares) = (self.numbers_of(hit), hit.shares());
+        let numbers = self.numbers_of(hit);
+        let shares = hit.shares();
         let vertex_linear = |i: usize| {
             let [r, g, b, _] = self.vertices[numbers[i]].color_srgba8;
             Vec3::from([r, g, b].map(linear_from_srgb8)) * shares[i]
@@ -222,7 +223,8 @@ impl Scene {
         let corners = self.corners_of(hit.slot);
         let normals = self.numbers_of(hit).map(|number| unit_from_oct16(self.vertices[number].normal_oct16));
         let turn = |i: usize| {
-            let (edge, next) = (corners[(i + 1) % 3] - corners[i], normals[(i + 1) % 3]);
+            let edge = corners[(i + 1) % 3] - corners[i];
+            let next = normals[(i + 1) % 3];
             (next - normals[i]).dot(edge) / edge.length_squared().max(1e-20)
         };
         (0..3).map(turn).sum::<f32>() / 3.0 * if hit.front { 1.0 } else { -1.0 }
@@ -255,7 +257,8 @@ impl Scene {
     ) -> Visits {
         let ray = &Traveller::of(ray);
         let mut visits = Visits::default();
-        let (mut stack, mut todo) = (Vec::new(), Todo::ROOT);
+        let mut stack = Vec::new();
+        let mut todo = Todo::ROOT;
         while !todo.is_done() && t_max >= 0.0 {
             let child = todo.nearest_child(ray);
             let rest = todo.without_nearest();
@@ -330,7 +333,8 @@ impl Scene {
     }
 
     fn alpha(&self, material: usize, hit: &Hit) -> f32 {
-        let (numbers, shares) = (self.numbers_of(hit), hit.shares());
+        let numbers = self.numbers_of(hit);
+        let shares = hit.shares();
         let used = self.materials[material + 2][3] & 31;
         let uv_of = |number: usize| {
             let second = used & 1 != 0;
@@ -352,7 +356,8 @@ impl Scene {
         let size = UVec2::new(packed_size & 0xffff, packed_size >> 16);
         let wrapped = Vec2::new(wrapped(uv.x, wraps[0]), wrapped(uv.y, wraps[1]));
         let at = wrapped * size.as_vec2() - 0.5;
-        let (low, share) = (at.floor(), at - at.floor());
+        let low = at.floor();
+        let share = at - at.floor();
         let place = |at: i32, size: u32, wrap: u32| match wrap == Wrap::Repeat as u32 {
             true => at.rem_euclid(size as i32) as u32,
             false => at.clamp(0, size as i32 - 1) as u32,

@@ -46,7 +46,8 @@ impl Scene {
             side_m,
             spread: self.footprint / ray.direction_in_world.length(),
         };
-        let (mut throughput_linear, mut bounces) = (Vec3::ONE, Vec::new());
+        let mut throughput_linear = Vec3::ONE;
+        let mut bounces = Vec::new();
         while bounces.len() < mirrors as usize {
             let Some(share) = self.mirrored_share(&place) else { break };
             throughput_linear *= share;
@@ -58,7 +59,8 @@ impl Scene {
             let along_m = hit.map_or(0.0, |hit| hit.t);
             // A cone that narrows to a focus grows behind it.
             let signed_m = place.side_m + spread * along_m;
-            let (side_m, spread) = (signed_m.abs(), if signed_m < 0.0 { -spread } else { spread });
+            let side_m = signed_m.abs();
+            let spread = if signed_m < 0.0 { -spread } else { spread };
             bounces.push(Bounce { ray, throughput_linear, hit, side_m });
             let Some(hit) = hit else { break };
             place = Place {

@@ -56,7 +56,8 @@ mod tests {
         for seed in (0..50).map(hashed) {
             for power in 0..9 {
                 for across in 0..=power {
-                    let (columns, rows) = (1 << across, 1 << (power - across));
+                    let columns = 1 << across;
+                    let rows = 1 << (power - across);
                     let counts = counts(seed, 0, 1 << power, columns, rows);
                     assert!(counts.iter().all(|&n| n == 1), "{columns} × {rows}, seed {seed}: {counts:?}");
                 }

@@ -64,7 +64,8 @@ fn the_twin_and_every_triangle_say_what_rays_meet() {
         let traced = at(&moving, scene_time_s, Visibility::Rays);
         let twin = scalar::rays::Scene::of(&moving, scene_time_s).expect("a tree");
         let still = scene.frozen_at(scene_time_s);
-        let (mut seen, mut wrong) = (0, 0);
+        let mut seen = 0;
+        let mut wrong = 0;
         for (x, y) in (0..SIZE_PX.y).step_by(6).flat_map(|y| (0..SIZE_PX.x).step_by(6).map(move |x| (x, y))) {
             let ray = scalar::rays::pixel_ray(&camera(), UVec2::new(x, y));
             let (hit, _) = twin.closest(&ray, camera().near_m);
@@ -132,8 +133,12 @@ fn a_rigid_instance_is_seen_where_its_node_is() {
 #[test]
 fn trees_of_a_skinned_model_are_refitted_from_frame_to_frame() {
     let scene = snake();
-    let (moving, fresh) = (upload(&scene), upload(&scene));
-    let (mut refitted, mut worst, mut refit_s, mut build_s) = (0, 0.0f32, 0.0, 0.0);
+    let moving = upload(&scene);
+    let fresh = upload(&scene);
+    let mut refitted = 0;
+    let mut worst = 0.0f32;
+    let mut refit_s = 0.0;
+    let mut build_s = 0.0;
     for frame in 0..60u32 {
         let scene_time_s = frame as f32 / 30.0;
         let report = moving.acceleration(scene_time_s).expect("a tree");

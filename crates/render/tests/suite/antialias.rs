@@ -59,10 +59,12 @@ fn a_texel_is_the_mean_of_its_surface() {
     let antialias = Antialias::of(4).expect("offered");
     for visibility in [Visibility::Triangles, Visibility::Rays] {
         let at = |camera| sampled(&scene, camera, Antialias::NONE, visibility);
-        let (filtered, center) = (sampled(&scene, camera, antialias, visibility), at(camera));
+        let filtered = sampled(&scene, camera, antialias, visibility);
+        let center = at(camera);
         let around: Vec<DepthImage> =
             antialias.offsets_px().map(|offset_px| at(camera.with_offset(offset_px))).collect();
-        let (mut mixed, mut apart) = (0, 0);
+        let mut mixed = 0;
+        let mut apart = 0;
         for texel in 0..center.color_rgb9e5.len() {
             let depth = center.inverse_depth_per_m[texel];
             let is_same = |image: &&DepthImage| (image.inverse_depth_per_m[texel] - depth).abs() <= 0.005 * depth;
@@ -100,6 +102,7 @@ fn light_of_several_positions_is_less_noisy() {
         let squares = view.srgb8.iter().zip(&truth.srgb8).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
         (squares.sum::<f64>() / truth.srgb8.len() as f64).sqrt()
     };
-    let (one, sixteen) = (off(&of(1, 1)), off(&of(16, 1)));
+    let one = off(&of(1, 1));
+    let sixteen = off(&of(16, 1));
     assert!(one > 5.0 && sixteen < 0.4 * one, "one position: {one}, 16: {sixteen}");
 }

@@ -39,11 +39,14 @@ fn rays_find_the_surfaces_that_triangles_draw() {
         })
         .collect();
     for scene in [courtyard(), poles(0.05), unit_cube(), checker_sphere(), instanced, tree_terrain(30_000, 1)] {
-        let (on_device, camera) = (upload(&scene), before(&scene));
+        let on_device = upload(&scene);
+        let camera = before(&scene);
         let by = |visibility| image(DrawWork { visibility, ..work(&on_device, "unlit") }, &camera);
-        let (drawn, traced) = (by(Visibility::Triangles), by(Visibility::Rays));
+        let drawn = by(Visibility::Triangles);
+        let traced = by(Visibility::Rays);
         let ids = |image: &DepthImage| image.surface_id.clone().expect("ids");
-        let (a, b) = (ids(&drawn), ids(&traced));
+        let a = ids(&drawn);
+        let b = ids(&traced);
         let depths = drawn.inverse_depth_per_m.iter().zip(&traced.inverse_depth_per_m);
         let same: Vec<f32> = depths
             .zip(a.iter().zip(&b))
@@ -101,9 +104,11 @@ fn degenerate_and_stacked_triangles_are_harmless() {
         mesh.indices.extend([first, first + 1, first + 2, first, first, first]);
     }
     mesh.parts[0].index_count = mesh.indices.len() as u32;
-    let (on_device, camera) = (upload(&scene), before(&scene));
+    let on_device = upload(&scene);
+    let camera = before(&scene);
     let by = |visibility| view(DrawWork { visibility, ..work(&on_device, "soft 2, occlusion 2") }, &camera);
-    let (drawn, traced) = (by(Visibility::Triangles), by(Visibility::Rays));
+    let drawn = by(Visibility::Triangles);
+    let traced = by(Visibility::Rays);
     let far = |a: &u8, b: &u8| a.abs_diff(*b) > 8;
     let differ = drawn.srgb8.iter().zip(&traced.srgb8).filter(|(a, b)| far(a, b)).count();
     assert!(differ * 50 < drawn.srgb8.len(), "{differ}");
@@ -160,7 +165,8 @@ fn many_lamps_light_as_one_of_their_sum() {
         scene.illumination = lamps(vec![lamp; count]);
         view(work(&upload(scene), "soft 64"), &before(scene))
     };
-    let (many, one) = (lit_by(200, &mut scene), lit_by(1, &mut scene));
+    let many = lit_by(200, &mut scene);
+    let one = lit_by(1, &mut scene);
     let surfaces = one.inverse_depth_per_m.as_ref().expect("depth").iter().map(|&d| d > 0.0);
     let squares = one.srgb8.chunks_exact(3).zip(many.srgb8.chunks_exact(3)).zip(surfaces).filter(|(_, shown)| *shown);
     let square = |((a, b), _): ((&[u8], &[u8]), bool)| {
@@ -236,7 +242,8 @@ fn light_without_rays_equals_the_scalar_reference() {
 #[test]
 fn still_scenes_do_not_flicker_and_refinement_steps_add_up() {
     let scene = courtyard();
-    let (on_device, camera) = (upload(&scene), before(&scene));
+    let on_device = upload(&scene);
+    let camera = before(&scene);
     let lit = work(&on_device, "soft 16, occlusion 16");
     let whole = image(lit, &camera);
     assert!(whole == image(lit, &camera), "the same rays give the same picture");
@@ -263,13 +270,15 @@ fn still_scenes_do_not_flicker_and_refinement_steps_add_up() {
 #[test]
 fn each_kind_of_light_alone_refines_to_the_whole() {
     let scene = courtyard();
-    let (on_device, camera) = (upload(&scene), before(&scene));
+    let on_device = upload(&scene);
+    let camera = before(&scene);
     for lighting in ["soft 8", "phong, occlusion 8", "shadows, occlusion 4", "soft 4, indirect 8", "soft 100"] {
         let lit = work(&on_device, lighting);
         let steps = lit.lighting.refinement_steps();
         let refined = |step| image(DrawWork { refinement: Refinement { step, steps }, ..lit }, &camera);
         let steps: Vec<DepthImage> = (0..steps).map(refined).collect();
-        let (last, whole) = (steps.last().expect("steps"), image(lit, &camera));
+        let last = steps.last().expect("steps");
+        let whole = image(lit, &camera);
         let far = |(&a, &b): (&u32, &u32)| (linear_from_rgb9e5(a) - linear_from_rgb9e5(b)).length() > 5e-3;
         let differ = last.color_rgb9e5.iter().zip(&whole.color_rgb9e5).filter(|pair| far(*pair)).count();
         assert_eq!(differ, 0, "{lighting}");
@@ -286,14 +295,16 @@ fn many_rays_through_foliage_are_all_traced() {
         let image = image(work(&on_device, lighting), &camera);
         mean(image.color_rgb9e5.iter().map(|&c| linear_from_rgb9e5(c).y))
     };
-    let (few, many) = (mean_light("soft 64, occlusion 64"), mean_light("soft 2048, occlusion 2048"));
+    let few = mean_light("soft 64, occlusion 64");
+    let many = mean_light("soft 2048, occlusion 2048");
     assert!((few - many).abs() < 2e-3 * few, "{few} {many}");
 }
 
 #[test]
 fn more_rays_keep_the_mean_brightness() {
     let scene = courtyard();
-    let (on_device, camera) = (upload(&scene), before(&scene));
+    let on_device = upload(&scene);
+    let camera = before(&scene);
     let reference = image(work(&on_device, "soft 1024, occlusion 1024"), &camera);
     let few = image(work(&on_device, "soft 4, occlusion 4"), &camera);
     let differences: Vec<f32> = few
@@ -314,7 +325,8 @@ fn more_rays_keep_the_mean_brightness() {
 #[test]
 fn the_adaptive_rate_stays_near_the_full_one() {
     let scene = courtyard();
-    let (on_device, camera) = (upload(&scene), before(&scene));
+    let on_device = upload(&scene);
+    let camera = before(&scene);
     let full = view(work(&on_device, "soft 64, occlusion 64"), &camera);
     let mut worst_before = f32::INFINITY;
     for tolerance in [0.3, 0.1, 0.02] {
@@ -440,7 +452,8 @@ fn a_refitted_tree_finds_the_surfaces_of_a_new_one() {
         .load(&scene::Limits::default(), scene::MissingTextures::Refuse)
         .expect("a scene");
     let camera = before(&scene);
-    let (moved, fresh) = (upload(&scene), upload(&scene));
+    let moved = upload(&scene);
+    let fresh = upload(&scene);
     moved.acceleration(0.0).expect("a tree");
     let refitted = moved.acceleration(0.35).expect("a tree");
     let built = fresh.acceleration(0.35).expect("a tree");
@@ -451,7 +464,8 @@ fn a_refitted_tree_finds_the_surfaces_of_a_new_one() {
         let at = DrawWork { scene_time_s: 0.35, visibility: Visibility::Rays, ..work(scene, "shadows") };
         image(at, &camera)
     };
-    let (a, b) = (seen(&moved), seen(&fresh));
+    let a = seen(&moved);
+    let b = seen(&fresh);
     let far = |(a, b): (&f32, &f32)| (a - b).abs() > 1e-5 * a.abs().max(1e-3);
     let differ = a.inverse_depth_per_m.iter().zip(&b.inverse_depth_per_m).filter(|pair| far(*pair)).count();
     assert!(differ * 1000 < a.inverse_depth_per_m.len(), "{differ}");

@@ -90,7 +90,8 @@ fn the_sun_of_a_map_casts_its_shadow_at_the_projected_place() {
     let scene = floor_under(&[(Vec3::Y * 0.5, 0.2, Vec3::Y)], lamps(vec![])).surrounded_by(map);
     let on_device = upload(&scene);
     for lighting in ["shadows", "soft 16", "occlusion 16 0.01m", "soft 16, occlusion 16 0.01m"] {
-        let (mut lit, mut dark) = (0, 0);
+        let mut lit = 0;
+        let mut dark = 0;
         for (point, light) in floor_light(&image(work(&on_device, lighting), &down_from(4.0))) {
             let from_edge = (point.x + 0.5).abs().max(point.z.abs()) - 0.2;
             if from_edge.abs() > 0.04 {
@@ -110,13 +111,15 @@ fn rays_to_a_small_sun_have_a_fifth_of_the_error_of_uniform_directions() {
     let scene = Scene { illumination: lamps(vec![]), ..tables() }.surrounded_by(map.clone());
     let on_device = upload(&scene);
     let light = |lighting: &str| floor_light(&image(work(&on_device, lighting), &down_from(3.0)));
-    let (reference, found) = (light("soft 1024, occlusion 1024 10m"), light("soft 16, occlusion 16 10m"));
+    let reference = light("soft 1024, occlusion 1024 10m");
+    let found = light("soft 16, occlusion 16 10m");
     assert!(reference.len() > 1000 && reference.len() == found.len());
     let twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     let uniform = |number: usize, point: Vec3| {
         let ray = |i| {
             let place = scalar::sequence::point_of(i, scalar::sequence::hashed(number as u32));
-            let (up, turn) = (2.0 * place.x - 1.0, Vec2::from_angle(std::f32::consts::TAU * place.y));
+            let up = 2.0 * place.x - 1.0;
+            let turn = Vec2::from_angle(std::f32::consts::TAU * place.y);
             let flat = turn * (1.0 - up * up).sqrt();
             let direction_in_world = Vec3::new(flat.x, up, flat.y);
             let ray = Ray { origin_in_world: point + Vec3::Y * 1e-4, direction_in_world };

@@ -22,14 +22,16 @@ fn greatest_difference(a: &View, b: &View) -> u8 {
 
 /// The share and the mean direction of what a lobe reflects, by its formula on a grid over the hemisphere.
 fn integrated(towards_eye: Vec3, alpha: f32) -> [Vec3; 2] {
-    let (rows, columns, n_v) = (600, 600, towards_eye.z);
+    let rows = 600;
+    let columns = 600;
+    let n_v = towards_eye.z;
     let squared = alpha * alpha;
     let spread = |cosine: f32| (cosine * cosine * (1.0 - squared) + squared).sqrt();
     let solid_angle = std::f32::consts::TAU / (rows * columns) as f32;
     let mut sums = [Vec3::ZERO; 2];
     for place in 0..rows * columns {
         let up = ((place / columns) as f32 + 0.5) / rows as f32;
-        let (sin, cos) = (std::f32::consts::TAU * ((place % columns) as f32 + 0.5) / columns as f32).sin_cos();
+        let (sin, cos) = f32::sin_cos(std::f32::consts::TAU * ((place % columns) as f32 + 0.5) / columns as f32);
         let light = (Vec2::new(cos, sin) * (1.0 - up * up).sqrt()).extend(up);
         let n_h = (light + towards_eye).normalize_or_zero().z;
         let distribution = squared / (std::f32::consts::PI * (n_h * n_h * (squared - 1.0) + 1.0).powi(2));
@@ -65,7 +67,8 @@ fn glossy_pixels_show_what_their_twins_meet() {
     // Matt surfaces are shown as they are, so that their light needs no twin.
     scene.materials[0].unlit = true;
     scene.illumination = dark();
-    let (camera, on_device) = (before_the_floor(), upload(&scene));
+    let camera = before_the_floor();
+    let on_device = upload(&scene);
     let mut twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     twin.footprint = camera.focal_px.min_element().recip();
     for rays in [1, 8] {
@@ -115,7 +118,8 @@ fn a_white_furnace_shows_the_reflectance() {
 #[test]
 fn a_smooth_reflector_is_a_mirror() {
     let scene = mirror_pair();
-    let (on_device, camera) = (upload(&scene), between_the_pair());
+    let on_device = upload(&scene);
+    let camera = between_the_pair();
     let [mirrored, glossy, both, without] =
         ["shadows, reflections 1", "shadows, glossy 4", "shadows, reflections 1, glossy 4", "shadows"]
             .map(|lighting| view_of(&on_device, lighting, &camera));
@@ -156,7 +160,8 @@ fn a_mirror_and_its_lobe_share_what_a_bright_ceiling_sends() {
 
 #[test]
 fn errors_fall_with_the_root_of_the_number_of_rays() {
-    let (on_device, camera) = (upload(&teapot_floor()), before_the_floor());
+    let on_device = upload(&teapot_floor());
+    let camera = before_the_floor();
     let drawn = |rays: u32| view_of(&on_device, &format!("shadows, glossy {rays}"), &camera);
     let truth = drawn(256);
     let error = |rays: u32| {
@@ -174,7 +179,8 @@ fn errors_fall_with_the_root_of_the_number_of_rays() {
 
 #[test]
 fn only_pixels_with_reflectors_change_and_repeats_are_equal() {
-    let (on_device, camera) = (upload(&teapot_floor()), before_the_floor());
+    let on_device = upload(&teapot_floor());
+    let camera = before_the_floor();
     let twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     let [without, with, again] = ["", ", glossy 2", ", glossy 2"]
         .map(|glossy| view_of(&on_device, &format!("soft 2, occlusion 2{glossy}"), &camera));

@@ -66,7 +66,8 @@ fn a_glowing_square_lights_by_its_form_factor() {
     add_quad(&mut scene, (Vec3::Y, 0.5, Vec3::NEG_Y), glowing(1.0));
     let light = floor_light(&scene, "soft 1, indirect 4096");
     let middle = mean(light.iter().filter(|(point, _)| point.length() < 0.06).map(|(_, light)| light.y));
-    let (x, root) = (0.5f32, 1.25f32.sqrt());
+    let x = 0.5f32;
+    let root = 1.25f32.sqrt();
     let wanted = 4.0 * x / root * (x / root).atan() / PI;
     assert!((middle - wanted).abs() < 0.01 * wanted, "{middle}, not {wanted}");
 }
@@ -80,7 +81,8 @@ fn from_wall(wall: (Vec3, f32, Vec3), lamp: Vec3, floor_point: Vec3) -> f32 {
     let place = |number: i32| (number as f32 + 0.5) * step_m - half_m;
     let patch = |(i, j): (i32, i32)| {
         let at = center + along * place(i) + Vec3::Y * place(j);
-        let (to_lamp, from_floor) = (lamp - at, at - floor_point);
+        let to_lamp = lamp - at;
+        let from_floor = at - floor_point;
         let arriving = to_lamp.normalize_or_zero().dot(normal).max(0.0) / to_lamp.length_squared();
         let towards = from_floor.normalize_or_zero();
         arriving * towards.y.max(0.0) * -towards.dot(normal) / (PI * from_floor.length_squared()) * step_m * step_m
@@ -142,11 +144,13 @@ fn light_is_that_of_the_scalar_twin() {
         let mut twin = rays::Scene::of(&upload(&scene), 0.0).expect("tables");
         twin.footprint = camera.focal_px.min_element().recip();
         let words = &image.light.as_ref().expect("light").environment_rgb9e5;
-        let (mut lit, mut unlike) = (0, 0);
+        let mut lit = 0;
+        let mut unlike = 0;
         for (place, &word) in (0..).zip(words) {
             let pixel = UVec2::new(place % 160, place / 160);
             let Some(wanted) = twin.indirect_light(&camera, pixel, &scene.illumination, 8) else { continue };
-            let (got, wanted) = (linear_from_rgb9e5(word), linear_from_rgb9e5(rgb9e5_from_linear(wanted)));
+            let got = linear_from_rgb9e5(word);
+            let wanted = linear_from_rgb9e5(rgb9e5_from_linear(wanted));
             lit += 1;
             unlike += usize::from((got - wanted).abs().max_element() > 0.01 * wanted.max_element().max(0.05));
         }
@@ -166,7 +170,8 @@ fn smoothed_samples_have_a_third_of_the_noise() {
         let pairs = ambient_light(image).into_iter().zip(ambient_light(&many));
         mean(pairs.map(|((_, light), (_, wanted))| (light - wanted).length_squared())).sqrt()
     };
-    let (raw, smooth_off) = (off(&few), off(&smooth));
+    let raw = off(&few);
+    let smooth_off = off(&smooth);
     println!("RMSE of 16 rays beside 1,024: {raw}, smoothed {smooth_off}");
     assert!(smooth_off < 0.34 * raw, "{raw} {smooth_off}");
     let light = |image: &DepthImage| image.light.clone().expect("light");
@@ -197,7 +202,8 @@ fn at_the_edges_of_shadows_indirect_light_is_that_of_samples() {
         let squares = channels.map(|at| (f32::from(other.srgb8[at]) - f32::from(wanted[0].srgb8[at])).powi(2));
         mean(squares).sqrt()
     };
-    let (own, traced) = (off(&view), off(&noisy[0]));
+    let own = off(&view);
+    let traced = off(&noisy[0]);
     println!("{} unknown pixels: RMSE {own}, with rays of their own {traced}", unknown.len());
     assert!(unknown.len() > 100, "{}", unknown.len());
     assert!(own < 0.5 * traced, "{own} {traced}");
@@ -212,9 +218,11 @@ fn more_rays_than_a_dispatch_traces_keep_the_mean_brightness() {
         let image = device().1.draw_depth_images(work(&uploaded, lighting), &[camera.into()], LIGHT).expect("an image");
         ambient_light(&image[0])
     };
-    let (few, many) = (light("shadows, indirect 64"), light("shadows, indirect 1024"));
+    let few = light("shadows, indirect 64");
+    let many = light("shadows, indirect 1024");
     let brightness = |light: &[(Vec3, Vec3)]| mean(light.iter().map(|(_, light)| light.y));
-    let (few, many) = (brightness(&few), brightness(&many));
+    let few = brightness(&few);
+    let many = brightness(&many);
     assert!((few - many).abs() < 2e-3 * many, "{few} {many}");
 }
 

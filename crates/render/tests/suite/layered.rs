@@ -36,7 +36,10 @@ fn lines_hold_what_their_twins_rays_meet() {
     let on_device = upload(&scene);
     let twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     for (axis, image) in layers(&scene, 64, LayerSelection::All, "unlit").into_iter().enumerate() {
-        let (camera, mut same, mut lines, mut samples) = (image.camera, 0, 0, 0);
+        let camera = image.camera;
+        let mut same = 0;
+        let mut lines = 0;
+        let mut samples = 0;
         for line in 0..camera.pixel_count() {
             let pixel = UVec2::new(line as u32 % camera.size_px.x, line as u32 / camera.size_px.x).as_vec2() + 0.5;
             let ray = camera.ray(pixel);
@@ -59,7 +62,8 @@ fn lines_hold_what_their_twins_rays_meet() {
 fn a_sphere_has_two_sides_and_each_axis_its_own_part_of_them() {
     let scene = uv_sphere(1.0, 96);
     let bounds = Aabb::around(scene.bounds().corners());
-    let (center, radius) = (bounds.center(), 0.5 * bounds.size().max_element());
+    let center = bounds.center();
+    let radius = 0.5 * bounds.size().max_element();
     let [all, dominant] = [LayerSelection::All, LayerSelection::Dominant].map(|kept| layers(&scene, 64, kept, "unlit"));
     let counts =
         |images: &[LayeredDepthImage; 3]| images.iter().map(LayeredDepthImage::sample_count).sum::<usize>() as f32;
@@ -147,7 +151,8 @@ fn light_does_not_depend_on_how_often_it_is_made_and_a_part_has_the_light_of_the
     let draw = |camera| {
         device().1.draw_layers(work(&on_device, "soft 4, occlusion 4"), &camera, LayerSelection::All).expect("layers")
     };
-    let (once, again) = (draw(camera), draw(camera));
+    let once = draw(camera);
+    let again = draw(camera);
     assert_eq!(once, again);
     let part = depth_image::ViewPart { first_px: UVec2::new(0, 4), size_px: UVec2::new(camera.size_px.x, 8) };
     let part = draw(camera.part(&part));

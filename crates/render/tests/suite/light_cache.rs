@@ -72,7 +72,8 @@ fn most_light_of_a_floor_is_known_and_as_if_it_were_traced() {
         let mut last = f32::INFINITY;
         for quality in [LightCacheQuality::Fast, LightCacheQuality::Balanced, LightCacheQuality::Fine] {
             let view = cached(work, &images, quality, ViewPlanes::ALL);
-            let (error, unknown) = (difference(&view, &traced), share_of(&view, ProvenanceKind::LitHere));
+            let error = difference(&view, &traced);
+            let unknown = share_of(&view, ProvenanceKind::LitHere);
             assert_eq!(view.inverse_depth_per_m, traced.inverse_depth_per_m, "{quality}");
             assert!(error < 4.0 && error <= 1.1 * last, "{visibility} {quality}: {error}, before {last}");
             assert!(unknown < 0.35, "{quality}: {unknown}");
@@ -106,7 +107,8 @@ fn sphere_on_a_floor(lights: Vec<Light>) -> Scene {
 }
 
 fn lamp(x: f32, strength: f32) -> Light {
-    let (position_in_world, intensity_linear) = (Vec3::new(x, 2.0, 0.7), Vec3::splat(strength));
+    let position_in_world = Vec3::new(x, 2.0, 0.7);
+    let intensity_linear = Vec3::splat(strength);
     Light::Point { position_in_world, intensity_linear, radius_m: 0.1 }
 }
 
@@ -135,14 +137,16 @@ fn share_like_the_twin(scene: &Scene, lighting: &str, quality: LightCacheQuality
     let view = cached(work, &images, quality, ViewPlanes::ALL);
     let traced = direct(work);
     let lamps = is_indirect.then(|| direct(DrawWork { lighting: "soft 16".parse().expect("lighting"), ..work }));
-    let (twin, camera) = (rays::Scene::of(&gpu_scene, 0.0).expect("tables"), view_camera());
+    let twin = rays::Scene::of(&gpu_scene, 0.0).expect("tables");
+    let camera = view_camera();
     let smooth: Vec<DepthImage> = images.iter().map(render::scalar::smoothed).collect();
     let images = if is_indirect { &smooth } else { &images };
     let light = LightSamples { images, illumination: &scene.illumination };
     let provenance = view.provenance.as_ref().expect("provenance");
     let color = |view: &View, place: usize| <[u8; 3]>::try_from(&view.srgb8[3 * place..][..3]).expect("a pixel");
     let lit_here = Provenance::new(ProvenanceKind::LitHere, 0);
-    let (mut like, mut known) = (0, 0);
+    let mut like = 0;
+    let mut known = 0;
     for (place, &shown) in provenance.iter().enumerate() {
         let pixel = UVec2::new(place as u32 % VIEW_PX.x, place as u32 / VIEW_PX.x);
         let surface = surface(&twin, &camera, pixel);

@@ -73,7 +73,8 @@ fn all_samples(directions: &[Direction]) -> impl Iterator<Item = (Vec3, &LightSa
 #[test]
 fn tiles_are_the_whole_to_the_bit() {
     let scene = teapot_mirror();
-    let (on_device, camera) = (upload(&scene), around(&scene, 24));
+    let on_device = upload(&scene);
+    let camera = around(&scene, 24);
     let lighting = "soft 4, occlusion 4, reflections 2";
     let whole = drawn(&on_device, &camera, lighting);
     for count in [2, 5, 33] {
@@ -90,14 +91,18 @@ fn tiles_are_the_whole_to_the_bit() {
 
 #[test]
 fn a_mirror_sends_what_its_mirrored_rays_meet() {
-    let (glow, sky, height_m, half_m) = (0.5, 0.1, 2.0, 1.0);
+    let glow = 0.5;
+    let sky = 0.1;
+    let height_m = 2.0;
+    let half_m = 1.0;
     let bright = Material { base_color_linear: [glow, glow, glow, 1.0], ..glowing() };
     let plate = quad(Vec3::Y * height_m, half_m, Vec3::NEG_Y, [255; 3]);
     let mut scene = of_parts(vec![floor_mirror(0.9), (plate, bright, Affine3A::IDENTITY)]);
     scene.illumination.environment = Environment::uniform(Vec3::splat(sky));
     let reflector = Reflector { reflectance_linear: Vec3::splat(0.9), roughness: 0.0 };
     let field = directions(&drawn(&upload(&scene), &around(&scene, 32), "shadows, reflections 2"));
-    let (mut by_end, mut farthest_off) = ([0; 2], 0.0_f32);
+    let mut by_end = [0; 2];
+    let mut farthest_off = 0.0_f32;
     for (towards, sample) in all_samples(&field) {
         let LightSample { point_in_world: point, radiance_linear: radiance } = sample;
         if point.y > 1.0 {
@@ -127,7 +132,8 @@ fn samples_of_a_direction_are_the_surfaces_that_its_twins_rays_meet() {
     let on_device = upload(&scene);
     let twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     let field = directions(&drawn(&on_device, &around(&scene, 16), "shadows, reflections 1"));
-    let (mut same, mut met) = (0, 0);
+    let mut same = 0;
+    let mut met = 0;
     for Direction { lines, samples, .. } in &field {
         for (line, found) in samples.iter().enumerate() {
             let ray = lines.ray(pixel_of(lines, line).as_vec2() + 0.5);
@@ -186,7 +192,8 @@ fn lie_at<'a>(
 
 #[test]
 fn a_matt_scene_and_lighting_without_mirrors_have_no_samples() {
-    let (matt, mirrors) = (uv_sphere(1.0, 32), mirror_box());
+    let matt = uv_sphere(1.0, 32);
+    let mirrors = mirror_box();
     for (scene, lighting, is_empty) in [
         (&matt, "shadows, reflections 1", true),
         (&matt, "shadows, glossy 1", true),
@@ -216,8 +223,11 @@ fn balls_over_a_mirror() -> Scene {
 
 /// Codes between what samples send to a direction and what a view from far away shows there; none of what it does not see.
 fn codes_off(scene: &GpuScene, direction: &Direction, bounds: &Aabb) -> Vec<Vec<Option<f32>>> {
-    let (far_m, side_px, towards) = (400.0, 256, direction.towards);
-    let (eye, across) = (bounds.center() + towards * far_m, towards.any_orthonormal_vector());
+    let far_m = 400.0;
+    let side_px = 256;
+    let towards = direction.towards;
+    let eye = bounds.center() + towards * far_m;
+    let across = towards.any_orthonormal_vector();
     let fov_rad = bounds.size().length() / far_m;
     let camera = PinholeCamera::looking_at(eye, bounds.center(), across, fov_rad, UVec2::splat(side_px));
     let view = view_of(scene, MIRRORED, &camera);
@@ -235,7 +245,9 @@ fn codes_off(scene: &GpuScene, direction: &Direction, bounds: &Aabb) -> Vec<Vec<
 #[test]
 fn a_sample_sends_what_is_seen_of_its_surface_from_afar() {
     let scene = balls_over_a_mirror();
-    let (on_device, bounds, camera) = (upload(&scene), scene.bounds(), around(&scene, 56));
+    let on_device = upload(&scene);
+    let bounds = scene.bounds();
+    let camera = around(&scene, 56);
     // Without rays mirrors show the sky alone.
     let [field, without_rays] =
         [MIRRORED, "shadows, glossy 1"].map(|lighting| directions(&drawn(&on_device, &camera, lighting)));
@@ -262,7 +274,8 @@ fn a_sample_sends_what_is_seen_of_its_surface_from_afar() {
 #[test]
 fn a_camera_that_cannot_be_used_is_refused() {
     let scene = mirror_box();
-    let (on_device, good) = (upload(&scene), around(&scene, 16));
+    let on_device = upload(&scene);
+    let good = around(&scene, 16);
     for camera in [
         LightFieldCamera { side_px: 15, ..good },
         LightFieldCamera { first_pair: 33, ..good },

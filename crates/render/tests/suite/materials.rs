@@ -58,7 +58,8 @@ fn a_normal_map_tilts_along_the_tangent_and_the_bitangent() {
         scene.instances = vec![Instance { mesh: 0, world_from_mesh: placed }];
         scene
     };
-    let (right, up) = (Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, 0.6, 0.8));
+    let right = Vec3::new(0.6, 0.0, 0.8);
+    let up = Vec3::new(0.0, 0.6, 0.8);
     let here = Affine3A::IDENTITY;
     // A quarter turn about the view's axis moves the tangent with the mesh.
     let turned = Affine3A::from_rotation_z(std::f32::consts::FRAC_PI_2);
@@ -273,7 +274,8 @@ fn holes_move_with_the_mesh_and_stay_for_near_cameras() {
 
 #[test]
 fn rays_meet_a_hashed_surface_where_their_twin_does() {
-    let (on_device, camera) = (upload(&veil(0.5)), ahead());
+    let on_device = upload(&veil(0.5));
+    let camera = ahead();
     let traced = coverage(&image(DrawWork { visibility: Visibility::Rays, ..work(&on_device, "unlit") }, &camera));
     let mut twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     twin.footprint = camera.focal_px.min_element().recip();

@@ -105,16 +105,20 @@ fn a_plane_mirror_shows_the_view_from_behind_it() {
         let on = |v: Vec3| Vec3::new(v.x, v.y * flip, v.z);
         PinholeCamera::looking_at(on(eye), on(target), Vec3::Y * flip, 0.9, UVec2::new(160, 120))
     };
-    let (camera, other) = (looking(1.0), looking(-1.0));
-    let (mirrored, behind) = (upload(&mirrored), upload(&behind));
+    let camera = looking(1.0);
+    let other = looking(-1.0);
+    let mirrored = upload(&mirrored);
+    let behind = upload(&behind);
     let twin = scalar::rays::Scene::of(&mirrored, 0.0).expect("a tree");
     for visibility in [Visibility::Triangles, Visibility::Rays] {
         let draw = |scene, camera: &PinholeCamera| {
             let work = DrawWork { visibility, ..work(scene, "shadows, reflections 1") };
             device().1.draw_views(work, &[*camera], ViewPlanes::WITH_DEPTH).expect("a view").remove(0)
         };
-        let (seen, expected) = (draw(&mirrored, &camera), draw(&behind, &other));
-        let (mut compared, mut differ) = (0, 0);
+        let seen = draw(&mirrored, &camera);
+        let expected = draw(&behind, &other);
+        let mut compared = 0;
+        let mut differ = 0;
         for pixel in pixels(camera.size_px) {
             let ray = scalar::rays::pixel_ray(&camera, pixel);
             let Some(hit) = twin.closest(&ray, camera.near_m).0 else { continue };
@@ -178,9 +182,11 @@ fn two_facing_mirrors_repeat_a_ball_at_twice_their_distance() {
 
 /// Where a ball of radius 1 at the origin mirrors a point to an eye: Alhazen's problem, by bisection on the arc between.
 fn alhazen(point: Vec3, eye: Vec3) -> Vec3 {
-    let (from, to) = (point.normalize_or_zero(), eye.normalize_or_zero());
+    let from = point.normalize_or_zero();
+    let to = eye.normalize_or_zero();
     let arc = |share: f32| (from * (1.0 - share) + to * share).normalize_or_zero();
-    let (mut low, mut high) = (0.0, 1.0);
+    let mut low = 0.0;
+    let mut high = 1.0;
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
         let normal = arc(middle);
@@ -245,7 +251,8 @@ fn mirrored_pixels_show_what_their_twins_meet() {
 #[test]
 fn a_mirror_under_an_empty_sky_is_what_it_is_without_rays() {
     let mut scene = of_parts(vec![(uv_sphere(1.0, 64), mirror(0.8), Affine3A::IDENTITY)]);
-    let (zenith_linear, nadir_linear) = (Vec3::new(0.3, 0.5, 0.9), Vec3::new(0.2, 0.1, 0.05));
+    let zenith_linear = Vec3::new(0.3, 0.5, 0.9);
+    let nadir_linear = Vec3::new(0.2, 0.1, 0.05);
     scene.illumination.environment = Environment { zenith_linear, nadir_linear, ..Environment::default() };
     for roughness in [0.0, 0.1, 0.15, 0.3] {
         scene.materials[0].roughness = roughness;
@@ -276,7 +283,8 @@ fn a_mirror_under_an_empty_map_is_what_it_is_without_rays() {
 
 #[test]
 fn a_rough_mirror_mixes_what_its_ray_brings_with_the_environment() {
-    let (glow, sky) = (0.5, 0.1);
+    let glow = 0.5;
+    let sky = 0.1;
     let ceiling = quad(Vec3::Y * 2.0, 400.0, Vec3::NEG_Y, [255; 3]);
     let bright = Material { base_color_linear: [glow, glow, glow, 1.0], ..glowing() };
     let mut scene = of_parts(vec![floor_mirror(0.9), (ceiling, bright, Affine3A::IDENTITY)]);

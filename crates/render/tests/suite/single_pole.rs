@@ -77,7 +77,8 @@ fn samples_lie_on_the_triangles_that_their_rays_meet() {
     let image = images(work(&scene, "unlit"), &[camera]).remove(0);
     let places = (0..SIDE_PX).flat_map(|y| (0..SIDE_PX).map(move |x| UVec2::new(x, y)));
     let on_triangle = places.filter_map(|place| {
-        let (point, center) = (image.sample_in_world(place.x, place.y)?, place.as_vec2() + 0.5);
+        let point = image.sample_in_world(place.x, place.y)?;
+        let center = place.as_vec2() + 0.5;
         let [near, far] = camera.depths_m(center);
         let [a, b, c] = triangles[twin.closest_between(&camera.ray(center), near, far).0?.slot as usize];
         let off_m = (b - a).cross(c - a).normalize_or_zero().dot(point - a).abs();

@@ -49,7 +49,8 @@ impl Shared {
 
     fn work(&self, lighting: &str, visibility: Visibility) -> DrawWork<'_> {
         let lighting = lighting.parse().expect(lighting);
-        let (scene_time_s, refinement) = (0.0, Refinement::default());
+        let scene_time_s = 0.0;
+        let refinement = Refinement::default();
         DrawWork { scene: &self.scene, lighting, scene_time_s, visibility, refinement, turn: Default::default() }
     }
 

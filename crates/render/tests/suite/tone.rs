@@ -47,7 +47,8 @@ fn the_background_is_shown_as_the_curve_says() {
 fn surfaces_are_shown_as_the_curve_says() {
     let scene = upload(&poles(0.08));
     let planes = |tone| ViewPlanes { tone, ..ViewPlanes::ALL };
-    let (plain, dark) = (drawn(&scene, planes(ToneMapping::NONE)), drawn(&scene, planes(tone(-1.0, ToneCurve::None))));
+    let plain = drawn(&scene, planes(ToneMapping::NONE));
+    let dark = drawn(&scene, planes(tone(-1.0, ToneCurve::None)));
     assert_eq!(plain, drawn(&scene, ViewPlanes::ALL), "no tone changes no bit");
     let neutral = drawn(&scene, planes(tone(0.0, ToneCurve::KhronosNeutral)));
     assert_eq!(plain.inverse_depth_per_m, neutral.inverse_depth_per_m);

@@ -134,7 +134,8 @@ impl BarChart {
             for (bar, (&value, end)) in
                 stage.values.iter().zip(&mut ends).enumerate().filter(|(_, (value, _))| **value > 0.0)
             {
-                let (start, y) = (*end, self.middle(bar));
+                let start = *end;
+                let y = self.middle(bar);
                 *end += value;
                 parts.push(Rectangle::new([(start, y - HALF_BAR), (*end, y + HALF_BAR)], style));
             }

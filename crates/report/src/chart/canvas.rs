@@ -140,7 +140,8 @@ fn draw_header(area: &Area, name: &str, rows: &[Vec<(i32, &LegendEntry)>]) -> Re
 }
 
 fn draw_entry(area: &Area, (x, y): (i32, i32), entry: &LegendEntry) -> Result<(), String> {
-    let (line, middle) = ([(x, y), (x + GLYPH_WIDTH_PX - 8, y)], (x + GLYPH_WIDTH_PX / 2 - 4, y));
+    let line = [(x, y), (x + GLYPH_WIDTH_PX - 8, y)];
+    let middle = (x + GLYPH_WIDTH_PX / 2 - 4, y);
     match &entry.glyph {
         Glyph::Swatch(color) => {
             area.draw(&Rectangle::new([(x + 10, y - 6), (x + 24, y + 6)], color.filled())).map_err(message)?

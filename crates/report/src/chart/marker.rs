@@ -32,7 +32,8 @@ impl Marker {
 
     /// Offsets from the centre. A triangle's first corner counts twice.
     fn corners(self) -> [(i32, i32); 4] {
-        let (small, large) = (RADIUS_PX - 1, RADIUS_PX + 1);
+        let small = RADIUS_PX - 1;
+        let large = RADIUS_PX + 1;
         match self.shape % 4 {
             1 => [(-small, -small), (small, -small), (small, small), (-small, small)],
             2 => [(0, -large), (large, 0), (0, large), (-large, 0)],

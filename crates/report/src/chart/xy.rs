@@ -101,8 +101,10 @@ impl XyChart {
     }
 
     fn axes<'a>(&self, area: &Area<'a>, x: Range<f64>, y: Range<f64>) -> Result<Plot<'a>, String> {
-        let (x, y) = (Ruler::new(&self.x, x), Ruler::new(&self.y, y));
-        let (x_count, y_count) = (x.tick_count(), y.tick_count());
+        let x = Ruler::new(&self.x, x);
+        let y = Ruler::new(&self.y, y);
+        let x_count = x.tick_count();
+        let y_count = y.tick_count();
         let mut plot = ChartBuilder::on(area)
             .margin_right(18)
             .margin_top(6)

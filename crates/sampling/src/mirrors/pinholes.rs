@@ -80,7 +80,7 @@ mod tests {
         let cameras = directions(Vec3::Z).map(|axis| looking(eye, axis, FACE_DEG, 0.01));
         let directions = (0..500).map(|i| {
             let y = 1.0 - 2.0 * (i as f32 + 0.5) / 500.0;
-            let (sin, cos) = (i as f32 * 2.4).sin_cos();
+            let (sin, cos) = f32::sin_cos(i as f32 * 2.4);
             Vec3::new(sin, 0.0, cos) * (1.0 - y * y).sqrt() + Vec3::Y * y
         });
         for direction in directions {

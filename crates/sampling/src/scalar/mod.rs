@@ -81,13 +81,15 @@ struct Query<'a> {
 fn texel(query: &Query<'_>, camera: &PinholeCamera, pixel: UVec2) -> Texel {
     let scene = query.scene;
     let ray = pixel_ray(camera, pixel);
-    let (mut near, mut passed_m) = (camera.near_m, None);
+    let mut near = camera.near_m;
+    let mut passed_m = None;
     for _ in 0..MOST_LAYERS {
         let Some(hit) = scene.closest(&ray, near).0 else { break };
         let candidate = Candidate::of(scene, camera, pixel, &ray, &hit);
         let was_kept = query.reference.is_some_and(|reference| was_kept(&candidate, reference));
         if !query.images.iter().any(|image| is_redundant(query, &candidate, was_kept, image)) {
-            let (id, normal_oct16) = (candidate.id, oct16_from_unit(candidate.normal));
+            let id = candidate.id;
+            let normal_oct16 = oct16_from_unit(candidate.normal);
             return Texel { inverse_depth_per_m: hit.t.recip(), normal_oct16, id, passed_m };
         }
         (near, passed_m) = (hit.t, passed_m.or(Some(hit.t)));

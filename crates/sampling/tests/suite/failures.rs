@@ -35,7 +35,8 @@ fn samples_of_other_instances_are_not_redundant() {
     let mesh = scene.instances[0].mesh;
     scene.instances = (0..10_000u32)
         .map(|i| {
-            let (x, y) = ((i % 100) as f32 - 49.5, (i / 100) as f32 - 49.5);
+            let x = (i % 100) as f32 - 49.5;
+            let y = (i / 100) as f32 - 49.5;
             let depth = -0.5 * ((i * 7919) % 10) as f32;
             let at = Vec3::new(0.05 * x, 0.05 * y, depth);
             Instance { mesh, world_from_mesh: Affine3A::from_translation(at) }
@@ -46,7 +47,8 @@ fn samples_of_other_instances_are_not_redundant() {
         |x: f32| PinholeCamera::looking_at(Vec3::new(x, 0.0, 4.0), Vec3::ZERO, Vec3::Y, 0.9, UVec2::splat(128));
     let cameras = [camera(-0.3), camera(0.3)];
     let rays = render::scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
-    let (device, reference) = (sample(&on_device, &cameras, PIXEL), scalar::sample(&rays, &cameras, PIXEL));
+    let device = sample(&on_device, &cameras, PIXEL);
+    let reference = scalar::sample(&rays, &cameras, PIXEL);
     let pairs = device[1].inverse_depth_per_m.iter().zip(&reference[1].inverse_depth_per_m);
     let differ = pairs.filter(|(a, b)| (*a - *b).abs() > 1e-3 * a.abs()).count();
     let instances: std::collections::HashSet<u32> =

@@ -116,7 +116,8 @@ fn every_conventional_sample_is_held_by_some_image() {
     let apart = sample(&on_device, &cameras, SamplingMethod::NonRedundant(Redundancy::Pixel));
     for (number, (whole, part)) in conventional.iter().zip(&apart).enumerate() {
         let ids = whole.surface_id.as_ref().expect("ids");
-        let (mut lost, mut samples) = (0, 0);
+        let mut lost = 0;
+        let mut samples = 0;
         for (x, y) in (0..SIZE_PX.y).flat_map(|y| (0..SIZE_PX.x).map(move |x| (x, y))) {
             let index = (y * SIZE_PX.x + x) as usize;
             let Some(point) = whole.sample_in_world(x, y) else { continue };

@@ -57,7 +57,9 @@ pub fn reference(scene: &GpuScene, cameras: &[PinholeCamera]) -> TemporalReferen
 /// A set by tolerance, which keeps on to another's samples.
 pub fn after(scene: &GpuScene, cameras: &[PinholeCamera], reference: Option<&TemporalReference>) -> Vec<DepthImage> {
     let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
-    let (work, cameras, planes) = (unlit(scene), pinholes(cameras), SamplePlanes::default());
+    let work = unlit(scene);
+    let cameras = pinholes(cameras);
+    let planes = SamplePlanes::default();
     let images = device().renderer.draw_image_sequence(work, &cameras, &wanted, planes, tolerance(), reference);
     images.expect("images")
 }

@@ -101,8 +101,10 @@ impl Channel {
     /// The cubic Hermite spline of glTF 2.0, appendix C.
     fn on_spline(&self, key: usize, span_s: f32, share: f32) -> Vec4 {
         let at = |index: usize| self.values.get(index).copied().unwrap_or(Vec4::ZERO);
-        let (slope_after, slope_before_next) = (at(key * 3 + 2), at((key + 1) * 3));
-        let (square, cube) = (share * share, share * share * share);
+        let slope_after = at(key * 3 + 2);
+        let slope_before_next = at((key + 1) * 3);
+        let square = share * share;
+        let cube = share * share * share;
         self.value(key) * (2.0 * cube - 3.0 * square + 1.0)
             + slope_after * (span_s * (cube - 2.0 * square + share))
             + self.value(key + 1) * (3.0 * square - 2.0 * cube)
@@ -169,7 +171,8 @@ mod tests {
         let spline = channel(Property::Translation, Interpolation::CubicSpline, &times_s, &values);
         for step in 0..=50 {
             let time_s = 0.5 + 2.5 * step as f32 / 50.0;
-            let (found, expected) = (spline.value_at(time_s).x, position(time_s));
+            let found = spline.value_at(time_s).x;
+            let expected = position(time_s);
             assert!((found - expected).abs() < 1e-4 * expected.abs().max(1.0), "{time_s}: {found}, not {expected}");
         }
     }

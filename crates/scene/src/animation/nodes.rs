@@ -38,7 +38,8 @@ impl TransformParts {
     /// The transform as a matrix. Rotations between keys of a spline are made unit here.
     #[must_use]
     pub fn parent_from_node(&self) -> DAffine3 {
-        let (rotation, length) = (self.rotation.as_dquat(), self.rotation.as_dquat().length());
+        let rotation = self.rotation.as_dquat();
+        let length = self.rotation.as_dquat().length();
         let rotation = if length > 1e-6 && length.is_finite() { rotation / length } else { DQuat::IDENTITY };
         DAffine3::from_scale_rotation_translation(self.scale.as_dvec3(), rotation, self.translation.as_dvec3())
     }

@@ -108,7 +108,8 @@ fn reduced(size_px: UVec2, texels: Vec<Vec3>) -> (UVec2, Vec<Vec3>) {
     }
     let reduced_px = (size_px + side - 1) / side;
     let mean = |place: UVec2| {
-        let (first, end) = (place * side, ((place + 1) * side).min(size_px));
+        let first = place * side;
+        let end = ((place + 1) * side).min(size_px);
         let rows = (first.y..end.y).map(|y| (y * size_px.x) as usize);
         let sum: Vec3 = rows.flat_map(|row| &texels[row + first.x as usize..row + end.x as usize]).sum();
         sum / (end - first).element_product() as f32

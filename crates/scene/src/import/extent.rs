@@ -49,7 +49,8 @@ pub(super) fn recentring_offset(bounds: Box3, scale: f64) -> DVec3 {
     if bounds.is_empty() {
         return DVec3::ZERO;
     }
-    let (centre, diagonal) = (bounds.center(), bounds.diagonal());
+    let centre = bounds.center();
+    let diagonal = bounds.diagonal();
     let distance = centre.length();
     if distance * scale <= FAR_M && distance <= FAR_IN_DIAGONALS * diagonal {
         DVec3::ZERO

@@ -89,7 +89,8 @@ fn compute(mesh: &mut SourceMesh, is_given: &[bool], crease_cosine: impl Fn(usiz
 fn repair(mesh: &mut SourceMesh) {
     let length = |n: [f32; 3]| DVec3::from(n.map(f64::from)).length();
     if mesh.vertices.iter().any(|v| length(v.normal) < 1e-6) {
-        let (faces, corners_at) = (Faces::of(mesh), CornersByPosition::of(mesh));
+        let faces = Faces::of(mesh);
+        let corners_at = CornersByPosition::of(mesh);
         for corner in 0..mesh.indices.len() {
             let vertex = mesh.indices[corner];
             if length(mesh.vertices[vertex as usize].normal) < 1e-6 {
@@ -203,7 +204,8 @@ impl Faces {
 }
 
 fn corner_angle_rad(at: DVec3, next: DVec3, last: DVec3) -> f64 {
-    let (a, b) = (next - at, last - at);
+    let a = next - at;
+    let b = last - at;
     let lengths = (a.length_squared() * b.length_squared()).sqrt();
     if lengths > 0.0 { (a.dot(b) / lengths).clamp(-1.0, 1.0).acos() } else { 0.0 }
 }

@@ -17,7 +17,8 @@ pub(crate) fn generate(mesh: &mut SourceMesh, second_uv: bool) -> Result<(), Err
         true => mesh.details.iter().map(|d| d.uv).collect(),
     };
     let positions = Positions::from_packed(&positions);
-    let (indices, workspace) = (Some(&*mesh.indices), &mut Workspace::default());
+    let indices = Some(&*mesh.indices);
+    let workspace = &mut Workspace::default();
     let count = mesh.indices.len();
     let tangents = generate_tangents(indices, count, positions, &normals, &uvs, TANGENT_COMPATIBLE, workspace)?;
     let mut number_of = HashMap::new();

@@ -16,7 +16,8 @@ const WALL_HEIGHT_M: f32 = 2.0;
 pub fn courtyard() -> Scene {
     let mut builder = MeshBuilder::default();
     add_ground(&mut builder);
-    let (outer, inner) = (HALF_WIDTH_M, HALF_WIDTH_M - WALL_THICKNESS_M);
+    let outer = HALF_WIDTH_M;
+    let inner = HALF_WIDTH_M - WALL_THICKNESS_M;
     let stone = Vec3::new(186.0, 176.0, 158.0);
     let mut wall = |min_x, min_z, max_x, max_z| {
         builder.cuboid(Vec3::new(min_x, 0.0, min_z), Vec3::new(max_x, WALL_HEIGHT_M, max_z), stone);

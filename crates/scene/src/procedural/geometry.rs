@@ -62,10 +62,13 @@ impl MeshBuilder {
 
     /// Adds an axis-aligned box: 12 triangles that face out.
     pub fn cuboid(&mut self, min: Vec3, max: Vec3, color_srgb: Vec3) {
-        let (centre, half) = ((min + max) * 0.5, (max - min) * 0.5);
+        let centre = (min + max) * 0.5;
+        let half = (max - min) * 0.5;
         for axis in 0..3 {
             let side = |a: usize| Vec3::AXES[a] * half[a];
-            let (out, right, up) = (side(axis), side((axis + 1) % 3), side((axis + 2) % 3));
+            let out = side(axis);
+            let right = side((axis + 1) % 3);
+            let up = side((axis + 2) % 3);
             self.rectangle(centre + out, right, up, color_srgb);
             self.rectangle(centre - out, up, right, color_srgb);
         }
@@ -90,7 +93,8 @@ impl MeshBuilder {
     ) {
         for station in 0..stations {
             for i in 0..outline_points {
-                let (after, next) = ((station + 1) % stations, (i + 1) % outline_points);
+                let after = (station + 1) % stations;
+                let next = (i + 1) % outline_points;
                 let corners = [point(station, i), point(station, next), point(after, next), point(after, i)];
                 self.facet(corners, color_srgb(station, i));
             }
@@ -106,7 +110,8 @@ impl MeshBuilder {
                 let along = stations[(i + 1).min(last)].middle - stations[i.saturating_sub(1)].middle;
                 let along = along.normalize_or(Vec3::X);
                 let side = along.cross(up).normalize_or(along.any_orthonormal_vector());
-                let (side, up) = (side * (0.5 * width_m), side.cross(along) * (0.5 * depth_m));
+                let up = side.cross(along) * (0.5 * depth_m);
+                let side = side * (0.5 * width_m);
                 [middle - side - up, middle + side - up, middle + side + up, middle - side + up]
             })
             .collect();
@@ -124,7 +129,7 @@ impl MeshBuilder {
     /// An upright frustum, closed: `4 · sides - 4` triangles.
     pub fn drum(&mut self, foot: Vec3, radii_m: [f32; 2], height_m: f32, sides: u32, color_srgb: Vec3) {
         let corner = |i: u32, top: usize| {
-            let (sin, cos) = (TAU * (i % sides) as f32 / sides as f32).sin_cos();
+            let (sin, cos) = f32::sin_cos(TAU * (i % sides) as f32 / sides as f32);
             foot + Vec3::new(sin * radii_m[top], height_m * top as f32, cos * radii_m[top])
         };
         for i in 0..sides {
@@ -158,7 +163,8 @@ impl MeshBuilder {
         let first = self.vertices.len() as u32;
         for row in 0..=rows {
             for column in 0..columns {
-                let (azimuth, polar) = (TAU * column as f32 / columns as f32, PI * row as f32 / rows as f32);
+                let azimuth = TAU * column as f32 / columns as f32;
+                let polar = PI * row as f32 / rows as f32;
                 // Each pole is one point.
                 let ring = if row % rows == 0 { 0.0 } else { polar.sin() };
                 self.push(vertex_towards(Vec3::new(ring * azimuth.sin(), polar.cos(), ring * azimuth.cos())));
@@ -167,7 +173,8 @@ impl MeshBuilder {
         for row in 0..rows {
             for column in 0..columns {
                 let next = (column + 1) % columns;
-                let (above, below) = (first + row * columns, first + (row + 1) * columns);
+                let above = first + row * columns;
+                let below = first + (row + 1) * columns;
                 if row > 0 {
                     self.indices.extend([above + column, below + column, above + next]);
                 }

@@ -228,7 +228,8 @@ mod tests {
             let double = |t: &[u32]| (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length();
             blades.chunks_exact(3).map(double).sum::<f32>() * 0.5
         };
-        let (coarse, fine) = (area_m2(1.0), area_m2(4.0));
+        let coarse = area_m2(1.0);
+        let fine = area_m2(4.0);
         assert!((fine / coarse - 1.0).abs() < 0.03, "{coarse} and {fine} m²");
     }
 

@@ -72,7 +72,9 @@ impl Noise {
     /// Octaves of half the size and half the height each; about -1 to 1.
     #[must_use]
     pub fn fractal(&self, point: Vec2, octaves: u32) -> f32 {
-        let (mut sum, mut height, mut total) = (0.0, 1.0, 0.0);
+        let mut sum = 0.0;
+        let mut height = 1.0;
+        let mut total = 0.0;
         for octave in 0..octaves {
             // An offset per octave keeps the zeros at lattice points from lining up.
             let shift = Vec2::splat(17.3 * octave as f32);

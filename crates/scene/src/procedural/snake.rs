@@ -88,7 +88,7 @@ fn body() -> (Mesh, Vec<Influence>) {
         let step = 0.5 / RINGS as f32;
         let slope = (radius_m((share + step).min(1.0)) - radius_m((share - step).max(0.0))) / (2.0 * step * LENGTH_M);
         for side in 0..SIDES {
-            let (sin, cos) = (TAU * side as f32 / SIDES as f32).sin_cos();
+            let (sin, cos) = f32::sin_cos(TAU * side as f32 / SIDES as f32);
             let out = Vec3::new(0.0, cos, sin);
             let normal = (out - Vec3::X * slope).normalize_or(out);
             builder.push(vertex(Vec3::X * x_m + out * radius_m(share), normal, color(share, cos)));
@@ -97,7 +97,8 @@ fn body() -> (Mesh, Vec<Influence>) {
     }
     for ring in 1..RINGS {
         for side in 0..SIDES {
-            let (near, far) = ((ring - 1) * SIDES, ring * SIDES);
+            let near = (ring - 1) * SIDES;
+            let far = ring * SIDES;
             let next = (side + 1) % SIDES;
             builder.quad([near + side, near + next, far + next, far + side]);
         }
@@ -116,7 +117,8 @@ fn color(share: f32, up: f32) -> Vec3 {
 /// Between two joints, both count by their distance.
 fn influence(x_m: f32) -> Influence {
     let place = ((x_m - joint_x_m(0)) / BONE_M).clamp(0.0, (JOINTS - 1) as f32);
-    let (before, share) = (place.floor(), place.fract());
+    let before = place.floor();
+    let share = place.fract();
     let after = (before as u16 + 1).min(JOINTS as u16 - 1);
     Influence { joints: [before as u16, after, 0, 0], weights: [1.0 - share, share, 0.0, 0.0] }
 }

@@ -130,7 +130,8 @@ fn a_skin_without_clips_is_shown_as_its_joints_stand() {
     );
     let scene = load("still.glb", &tube.glb()).unwrap();
     assert!(!scene.is_animated());
-    let (rest, stands) = (&scene.meshes[0].vertices, posed(&scene, 3.0));
+    let rest = &scene.meshes[0].vertices;
+    let stands = posed(&scene, 3.0);
     let tip = rest.iter().position(|v| v.position == [2.0, 0.2, 0.0]).unwrap();
     assert!(is_near(&stands[tip], Vec3::new(0.8, 1.0, 0.0), Vec3::NEG_X), "{:?}", stands[tip]);
 }
@@ -176,7 +177,8 @@ fn bounds_hold_all_moments_and_little_more() {
             let at = scene.frozen_at(step as f32 * period_s / 777.0).bounds();
             around = around.grown_to(at.min).grown_to(at.max);
         }
-        let (spare, size) = ((around.min - all.min).min(all.max - around.max), around.size().max_element());
+        let spare = (around.min - all.min).min(all.max - around.max);
+        let size = around.size().max_element();
         println!("{}: {around:?} in {all:?}", scene.name);
         assert!(spare.min_element() >= -1e-5 * size, "{}: {spare}", scene.name);
         assert!(all.size().max_element() < 1.2 * size, "{}: {all:?}", scene.name);

@@ -100,7 +100,9 @@ fn damaged(bytes: &[u8], changed: usize, mut take: impl FnMut(&[u8])) {
 fn load_damaged(name: &str, bytes: &[u8], changed: usize) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join(name);
-    let (mut loaded, mut refused, mut slowest) = (0, 0, Duration::ZERO);
+    let mut loaded = 0;
+    let mut refused = 0;
+    let mut slowest = Duration::ZERO;
     damaged(bytes, changed, |bytes| {
         rewrite(&path, bytes);
         let start = Instant::now();
@@ -139,9 +141,11 @@ fn glb_with_other_numbers_in_its_json() {
 
 /// Loads 6000 copies of a file with other numbers in its JSON. At least `least` must load, and at least `least` must be refused.
 fn load_with_other_numbers(json: &str, binary: &[u8], least: u32) {
-    let (dir, mut random) = (tempfile::tempdir().unwrap(), Random(11));
+    let dir = tempfile::tempdir().unwrap();
+    let mut random = Random(11);
     let path = dir.path().join("a.glb");
-    let (mut loaded, mut slowest) = (0, Duration::ZERO);
+    let mut loaded = 0;
+    let mut slowest = Duration::ZERO;
     for _ in 0..6000 {
         let json = with_other_numbers(json.as_bytes(), &mut random);
         rewrite(&path, &samples::glb(std::str::from_utf8(&json).unwrap(), binary));
@@ -172,7 +176,8 @@ fn draco_glb() {
 fn damage_binary(cube: &GltfCube, changed: usize) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.glb");
-    let (mut loaded, mut slowest) = (0, Duration::ZERO);
+    let mut loaded = 0;
+    let mut slowest = Duration::ZERO;
     damaged(&cube.binary, changed, |binary| {
         rewrite(&path, &samples::glb(&cube.json(), binary));
         let start = Instant::now();
@@ -345,9 +350,11 @@ fn hdr() -> Vec<u8> {
 
 #[test]
 fn environment_maps() {
-    let (dir, bytes) = (tempfile::tempdir().unwrap(), hdr());
+    let dir = tempfile::tempdir().unwrap();
+    let bytes = hdr();
     let path = dir.path().join("a.hdr");
-    let (mut loaded, mut refused) = (0, 0);
+    let mut loaded = 0;
+    let mut refused = 0;
     damaged(&bytes, 3000, |bytes| {
         rewrite(&path, bytes);
         match scene::load_environment(&path) {

@@ -16,7 +16,8 @@ fn png_of(texels: &[[u8; 4]]) -> String {
 
 /// A cube with one material, `pbr` its `pbrMetallicRoughness`, and the textures 0 and 1 of two images.
 fn textured_cube(pbr: &str) -> Vec<u8> {
-    let (image, other) = (png_of(&[[10, 200, 255, 255], [20, 100, 0, 255]]), png_of(&[[255; 4]]));
+    let image = png_of(&[[10, 200, 255, 255], [20, 100, 0, 255]]);
+    let other = png_of(&[[255; 4]]);
     cube(|c| {
         c.primitive = r#"{"attributes":{"POSITION":0,"TEXCOORD_0":2},"indices":1,"material":0}"#.into();
         c.accessors += r#",{"bufferView":0,"componentType":5126,"count":8,"type":"VEC2"}"#;

@@ -71,9 +71,11 @@ fn an_environment_is_one_colour_or_two() {
 fn an_invalid_light_is_refused_by_field() {
     use LightSpecErrorKind::{Invalid, Malformed, Missing, Repeated, Unknown};
     type IsKind = fn(&LightSpecErrorKind) -> bool;
-    let (unknown, repeated, missing): (IsKind, IsKind, IsKind) =
-        (|k| matches!(k, Unknown(_)), |k| matches!(k, Repeated), |k| matches!(k, Missing));
-    let (malformed, invalid): (IsKind, IsKind) = (|k| matches!(k, Malformed { .. }), |k| matches!(k, Invalid(_)));
+    let unknown: IsKind = |k| matches!(k, Unknown(_));
+    let repeated: IsKind = |k| matches!(k, Repeated);
+    let missing: IsKind = |k| matches!(k, Missing);
+    let malformed: IsKind = |k| matches!(k, Malformed { .. });
+    let invalid: IsKind = |k| matches!(k, Invalid(_));
     let cases = [
         ("", "light", missing),
         ("moon towards=0,1,0", "moon", unknown),
@@ -163,7 +165,8 @@ fn the_default_lights_are_soft_and_under_a_sky() {
     let [Light::Directional { angular_radius_rad, .. }] = lights[..] else { panic!("{lights:?}") };
     assert!((angular_radius_rad.to_degrees() - 2.0).abs() < 1e-4);
     assert!(environment.diffuse_linear(Vec3::Y).distance(Vec3::new(0.20, 0.21, 0.23)) < 1e-3);
-    let (sky, ground) = (environment.zenith_linear, environment.nadir_linear);
+    let sky = environment.zenith_linear;
+    let ground = environment.nadir_linear;
     assert!(sky.z > sky.x && ground.x > ground.z && ground.cmplt(sky).all(), "blue above, warm and darker below");
     assert!(!quad(Vec3::ZERO, 1.0, Vec3::Z, [1, 2, 3]).has_light(), "what is unlit needs none");
 }
@@ -171,7 +174,8 @@ fn the_default_lights_are_soft_and_under_a_sky() {
 #[test]
 fn a_scene_without_a_background_gets_a_quiet_gradient() {
     let background = Scene::default().with_default_background().background;
-    let (above, below) = (background.zenith_linear, background.nadir_linear);
+    let above = background.zenith_linear;
+    let below = background.nadir_linear;
     assert!(below.cmplt(above).all() && below.min_element() > 0.0 && above.max_element() < 1.0, "{background:?}");
     for color in [above, below] {
         assert!(color.max_element() < 1.3 * color.min_element(), "{color} is no grey");

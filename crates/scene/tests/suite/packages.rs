@@ -13,7 +13,8 @@ use crate::samples::{signed_volume, world_triangles};
 #[test]
 fn packing_is_deterministic_and_loses_nothing() {
     for make in [unit_cube, checker_sphere, courtyard, || tree_terrain(10_000, 1).with_wind()] {
-        let (package, again) = (pack(&make()), pack(&make()));
+        let package = pack(&make());
+        let again = pack(&make());
         assert!(package == again);
         assert_eq!(unpack(&package, &Limits::default()).unwrap(), make());
     }

@@ -2,7 +2,6 @@
 
 use depth_image::LightCacheQuality::{Balanced, Fast, Fine};
 use depth_image::{Environment, Illumination, PinholeCamera, View, nested_places};
-use fixtures::quad;
 use glam::{UVec2, Vec2, Vec3};
 use scene::procedural::courtyard;
 

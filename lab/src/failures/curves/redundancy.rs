@@ -96,7 +96,7 @@ fn by_angle(stand: &Stand, angles_deg: &[f64]) -> anyhow::Result<Rows> {
     let above = PinholeCamera::looking_at(Vec3::Y * 3.0, Vec3::ZERO, Vec3::NEG_Z, 0.6, stand.sample_px);
     let whole = samples(&stand.sample(&scene, &[above], SamplingMethod::CONVENTIONAL)?[0]);
     rows(angles_deg, |angle_deg| {
-        let (sin, cos) = (angle_deg as f32).to_radians().sin_cos();
+        let (sin, cos) = f32::sin_cos((angle_deg as f32).to_radians());
         let up = Vec3::new(0.0, 0.3, -1.0);
         let first = PinholeCamera::looking_at(Vec3::new(0.01, cos, sin) * 3.0, Vec3::ZERO, up, 0.6, stand.sample_px);
         let mut omitted = [0.0; 3];

@@ -145,7 +145,7 @@ fn unseen_yard(stand: &Stand, heights_deg: &[f64]) -> anyhow::Result<Rows> {
     });
     let stage = Stage::new(stand, &courtyard(), &samples)?;
     rows(heights_deg, |height_deg| {
-        let (sin, cos) = (height_deg as f32).to_radians().sin_cos();
+        let (sin, cos) = f32::sin_cos((height_deg as f32).to_radians());
         let turn = Vec2::from_angle(0.6) * cos * DISTANCE_M;
         let camera = looking(Vec3::new(turn.x, sin * DISTANCE_M, turn.y), Vec3::ZERO, 35.0, stand.view_px);
         let yard = yard(&camera, &stage.truth(&[camera])?[0]);

@@ -113,7 +113,9 @@ impl LightResult {
     }
 
     fn sentence(&self) -> String {
-        let (lighting, views, shared_s) = (self.lighting, self.views.len(), self.shared_s);
+        let lighting = self.lighting;
+        let views = self.views.len();
+        let shared_s = self.shared_s;
         let direct_s = self.direct_view_s * views as f64;
         format!(
             "{lighting}: {views} views from {} shared samples in {shared_s:.1} s; drawn directly, {direct_s:.1} s ({:.1} times as long).",

@@ -85,7 +85,8 @@ mod tests {
         for corner in [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE] {
             let at =
                 |planar_depth_m| camera.unproject(PixelDepth { pixel: corner * SIZE_PX.as_vec2(), planar_depth_m });
-            let (near, far) = (at(0.5), at(1.0));
+            let near = at(0.5);
+            let far = at(1.0);
             // The ray falls to the least height that the ground has.
             let ground = near + (far - near) * (near.y / (near.y - far.y));
             assert!(near.y > far.y && ground.x.abs() < 1.0 && ground.z.abs() < 1.0, "{ground}");
@@ -97,7 +98,8 @@ mod tests {
         let spec: SceneSpec = "courtyard".parse().unwrap();
         let setup = SceneArgs::new(spec.clone()).load().unwrap();
         for viewpoint in [MEADOW, Viewpoint::of(&spec, &setup).unwrap()] {
-            let (view, samples) = (viewpoint.camera(SIZE_PX), viewpoint.samples(SIZE_PX * 2));
+            let view = viewpoint.camera(SIZE_PX);
+            let samples = viewpoint.samples(SIZE_PX * 2);
             let middle = samples.iter().map(|camera| camera.eye_in_world).sum::<Vec3>() / 4.0;
             assert!(middle.distance(view.eye_in_world) < 1e-4 * (1.0 + middle.length()), "{viewpoint:?}");
             let planar_depth_m = viewpoint.eye_in_world.distance(viewpoint.target_in_world);

@@ -108,7 +108,8 @@ impl ViewArgs {
 
     /// The planes of the views, without their tone, which may be the plan's.
     pub(super) fn planes(&self) -> ViewPlanes {
-        let (inverse_depth, provenance) = (self.depth, self.provenance);
+        let inverse_depth = self.depth;
+        let provenance = self.provenance;
         ViewPlanes { antialias: self.antialias, inverse_depth, provenance, ..ViewPlanes::COLOR }
     }
 }

@@ -66,9 +66,11 @@ impl Record {
             let sets = format!("{} views of {set_count} moments", cameras.len());
             return Err(BadInput(format!("--frames: {sets} are {total} pictures, at most {MAX_VIEWS} are allowed")));
         }
-        let (folder, written) = (folder.to_owned(), vec![None; total as usize]);
+        let folder = folder.to_owned();
+        let written = vec![None; total as usize];
         let next_save = Instant::now() + PAUSE;
-        let (exposure, promise) = (None, None);
+        let exposure = None;
+        let promise = None;
         Ok(Self {
             folder,
             source_space,
@@ -231,7 +233,8 @@ impl Record {
     }
 
     fn named(&self, number: u64, depth_scale: f32) -> NamedCamera {
-        let (views, files) = (self.cameras.len() as u64, FileNames::of(number, self.planes));
+        let views = self.cameras.len() as u64;
+        let files = FileNames::of(number, self.planes);
         let mut more = Map::from_iter([("set_index".to_owned(), json!(number / views))]);
         if let Some(name) = files.depth {
             more.insert("depth_file_path".to_owned(), json!(name));

@@ -31,7 +31,8 @@ pub(super) async fn until<T>(
 
 /// What is written, and the command that goes on from there.
 pub(super) fn how_to_resume(record: &Record, folder: &Path) -> String {
-    let (count, total) = (record.count(), record.total());
+    let count = record.count();
+    let total = record.total();
     let command = resuming(std::env::args().skip(1));
     format!("{count} of {total} views are written to {}; `myriorama {command}` asks for the rest", folder.display())
 }

@@ -60,7 +60,8 @@ impl PictureWriter {
 
 /// Writes the planes of a frame, each as a picture.
 fn write_frame(folder: &Path, frame: &Frame) -> anyhow::Result<Written> {
-    let (number, view) = (frame.request.frame, &frame.view);
+    let number = frame.request.frame;
+    let view = &frame.view;
     let planes = ViewPlanes {
         inverse_depth: view.inverse_depth_per_m.is_some(),
         provenance: view.provenance.is_some(),

@@ -56,7 +56,8 @@ async fn refusal<T>(call: impl Future<Output = Result<T, Status>>) -> Status {
 #[tokio::test(flavor = "multi_thread")]
 async fn other_versions_and_malformed_messages_are_refused() {
     let beside = Beside::start(2).await;
-    let (coordinator, node) = (&beside.cluster.coordinator.address, &beside.cluster.nodes[0].address);
+    let coordinator = &beside.cluster.coordinator.address;
+    let node = &beside.cluster.nodes[0].address;
     let join = [raw::text_field(1, "old"), raw::text_field(2, "http://127.0.0.1:1")].concat();
     let versions =
         [(None, "protocol_version is 0"), (Some(1), "protocol_version is 1"), (Some(77), "protocol_version is 77")];
@@ -158,7 +159,9 @@ fn socket(address: &str) -> TcpStream {
 
 /// The bytes until the server ends the connection, and the time that takes.
 fn answer(address: &str, bytes: &[u8]) -> (Vec<u8>, Duration) {
-    let (mut stream, start, mut all) = (socket(address), Instant::now(), Vec::new());
+    let mut stream = socket(address);
+    let start = Instant::now();
+    let mut all = Vec::new();
     let _ = stream.write_all(bytes);
     let ended = stream.read_to_end(&mut all);
     let timed_out = ended.is_err_and(|error| error.kind() == std::io::ErrorKind::WouldBlock);
@@ -174,7 +177,8 @@ async fn connections_without_http2_are_cut() {
     let garbled = [raw::http2_start(), noise.clone()].concat();
     for server in [&beside.cluster.coordinator.address, &beside.cluster.nodes[0].address] {
         for bytes in [b"GET / HTTP/1.1\r\nHost: here\r\n\r\n".to_vec(), noise.clone(), garbled.clone()] {
-            let (server, bytes) = (server.clone(), bytes.clone());
+            let server = server.clone();
+            let bytes = bytes.clone();
             let (_, took) = tokio::task::spawn_blocking(move || answer(&server, &bytes)).await.unwrap();
             assert!(took < AT_ONCE, "{took:?}");
         }
@@ -189,7 +193,9 @@ async fn connections_without_http2_are_cut() {
 /// Reads until the headers that end the call, which have its status.
 fn until_refused(mut stream: TcpStream) -> Duration {
     const HEADERS_AND_END: [u8; 6] = [1, 5, 0, 0, 0, 1];
-    let (mut all, mut part, start) = (Vec::new(), [0; 4096], Instant::now());
+    let mut all = Vec::new();
+    let mut part = [0; 4096];
+    let start = Instant::now();
     while !all.windows(HEADERS_AND_END.len()).any(|bytes| bytes == HEADERS_AND_END) {
         let count = stream.read(&mut part).unwrap();
         assert!(count > 0, "cut off without a word");

@@ -29,7 +29,8 @@ const SPOILT: [(&str, Spoil); 8] = [
 
 /// Every node has a mangler before it.
 async fn start(nodes: usize) -> (Cluster, Vec<Mangler>) {
-    let (mut cluster, mut manglers) = (Cluster::start(0).await, Vec::new());
+    let mut cluster = Cluster::start(0).await;
+    let mut manglers = Vec::new();
     for number in 0..nodes {
         let mangler = Mangler::start().await;
         let advertised = Some(mangler.address.clone());
@@ -65,7 +66,8 @@ async fn corrupt_chunks_are_fetched_again() {
     let (cluster, manglers) = start(2).await;
     let session = session(&cluster).await;
     show(&session, 0).await;
-    let (epoch, sampler) = (session.plan().assignment.plan_epoch, number_of(&sampler_of(&session)));
+    let epoch = session.plan().assignment.plan_epoch;
+    let sampler = number_of(&sampler_of(&session));
     // Some sets ahead are fetched ahead.
     for (number, (what, spoil)) in (1..).zip(SPOILT) {
         manglers[sampler].spoil(2, spoil);
@@ -146,7 +148,8 @@ async fn a_compositor_whose_reports_no_probe_confirms_is_quarantined() {
     let (cluster, _manglers) = start(3).await;
     let session = session(&cluster).await;
     show(&session, 0).await;
-    let (liar, sampler) = (compositor_of(&session), sampler_of(&session));
+    let liar = compositor_of(&session);
+    let sampler = sampler_of(&session);
     let plan_epoch = session.plan().assignment.plan_epoch;
     let coordinator = CoordinatorClient::new(connect(&cluster.coordinator.address).await.unwrap());
     let report = || SamplerReport {

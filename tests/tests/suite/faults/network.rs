@@ -31,10 +31,11 @@ struct Network {
 impl Network {
     async fn start(nodes: usize) -> Self {
         let mut cluster = Processes::start(PROGRAM, 0).await;
-        let (mut to_node, mut to_coordinator) = (Vec::new(), Vec::new());
+        let mut to_node = Vec::new();
+        let mut to_coordinator = Vec::new();
         for number in 0..nodes {
-            let (front, up) =
-                (Proxy::start(number as u64), Proxy::to(&cluster.coordinator.address, 100 + number as u64));
+            let front = Proxy::start(number as u64);
+            let up = Proxy::to(&cluster.coordinator.address, 100 + number as u64);
             let node = cluster.node_by(&up.address, &format!("n{number}"), &["--advertise", &front.address]);
             front.lead_to(&node.address);
             cluster.nodes.push(node);
@@ -177,7 +178,8 @@ async fn a_node_that_refuses_connections_is_replaced() {
 async fn frames_go_on_over_late_slow_and_lossy_links() {
     let network = Network::start(3).await;
     let all = || network.to_node.iter().chain(&network.to_coordinator).chain([&network.of_client]);
-    let (delay, jitter) = (Duration::from_millis(20), Duration::from_millis(10));
+    let delay = Duration::from_millis(20);
+    let jitter = Duration::from_millis(10);
     let late = Way::Late { delay, jitter, one_in: 20 };
     all().for_each(|link| link.set(late, late));
     network.through("40 ms of delay and 5 % loss", Duration::from_secs(3), CLOSED).await;

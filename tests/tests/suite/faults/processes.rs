@@ -34,7 +34,8 @@ async fn a_killed_compositor_is_replaced() {
 async fn frames_go_on_without_a_coordinator_and_a_plan_follows_its_return() {
     let mut cluster = Processes::start(PROGRAM, 3).await;
     let watcher = Watcher::start(&cluster.client).await;
-    let (epoch, since) = (watcher.epoch(), Instant::now());
+    let epoch = watcher.epoch();
+    let since = Instant::now();
     cluster.coordinator.kill();
     tokio::time::sleep(Duration::from_secs(2)).await;
     watcher.calls_after(Instant::now(), 5, Duration::from_secs(1)).await;
@@ -55,7 +56,8 @@ async fn frames_go_on_without_a_coordinator_and_a_plan_follows_its_return() {
 async fn stopped(what: &str, nodes: usize, victim: fn(&Session) -> String, deadline: Duration) {
     let cluster = Processes::start(PROGRAM, nodes).await;
     let watcher = Watcher::start(&cluster.client).await;
-    let (name, epoch) = (victim(&watcher.session), watcher.epoch());
+    let name = victim(&watcher.session);
+    let epoch = watcher.epoch();
     let since = Instant::now();
     let zombie = &cluster.nodes[number_of(&name)];
     zombie.signal(Signal::STOP);
@@ -96,7 +98,8 @@ async fn a_node_that_is_terminated_under_load_ends_and_no_frame_is_lost() {
     let mut cluster = Processes::start(PROGRAM, 3).await;
     let watcher = Watcher::start(&cluster.client).await;
     for victim in [compositor_of, sampler_of] {
-        let (name, since) = (victim(&watcher.session), Instant::now());
+        let name = victim(&watcher.session);
+        let since = Instant::now();
         let node = &mut cluster.nodes[number_of(&name)];
         node.signal(Signal::TERM);
         let (status, took) = node.ended(Duration::from_secs(10)).await;
@@ -110,7 +113,8 @@ async fn a_node_that_is_terminated_under_load_ends_and_no_frame_is_lost() {
 async fn a_node_whose_device_is_lost_is_replaced_and_comes_back() {
     let cluster = Processes::start(PROGRAM, 3).await;
     let watcher = Watcher::start(&cluster.client).await;
-    let (name, since) = (compositor_of(&watcher.session), Instant::now());
+    let name = compositor_of(&watcher.session);
+    let since = Instant::now();
     cluster.nodes[number_of(&name)].signal(Signal::USR1);
     let wait = watcher.healed(since, CLOSED, |session| !has_role(session, &name)).await;
     cluster.client.wait_for_nodes(3, CLOSED).await.expect("it has opened its device again");

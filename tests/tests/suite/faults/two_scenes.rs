@@ -31,7 +31,9 @@ async fn killed(what: &str, victim: fn(&Session) -> String) {
     // Both plans have nodes of their own by then.
     one.healed(Instant::now(), CLOSED, |session| nodes_of(session).len() < 4).await;
     let name = victim(&one.session);
-    let (before, epoch, since) = (nodes_of(&other.session), other.epoch(), Instant::now());
+    let before = nodes_of(&other.session);
+    let epoch = other.epoch();
+    let since = Instant::now();
     assert!(!has_role(&other.session, &name), "{name} serves one scene");
     cluster.nodes[number_of(&name)].kill();
     let wait = one.healed(since, CLOSED, |session| !has_role(session, &name)).await;

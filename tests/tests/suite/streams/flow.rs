@@ -316,7 +316,8 @@ async fn a_long_view_keeps_neither_viewers_nor_batches_of_others_waiting() {
     let cluster = Cluster::start(1).await;
     let session = cluster.session(pipeline(STILL)).await.unwrap();
     let engine = &cluster.engines[0];
-    let (long_live_px, long_batch_side_px) = (UVec2::new(1200, 1000), 1100);
+    let long_live_px = UVec2::new(1200, 1000);
+    let long_batch_side_px = 1100;
     engine.hold_views_of(long_live_px);
     engine.hold_views_of(UVec2::splat(long_batch_side_px));
     let (address, plan_epoch) = compositor_of(&session);
@@ -328,7 +329,8 @@ async fn a_long_view_keeps_neither_viewers_nor_batches_of_others_waiting() {
     };
     let mut long_batch = ask(long_batch_side_px, 1).await;
     eventually("both are on the device", HEALED, || engine.held_calls() == 2).await;
-    let (mut live, mut batch) = (session.live(), ask(32, 8).await);
+    let mut live = session.live();
+    let mut batch = ask(32, 8).await;
     for i in 0..5 {
         seen(&mut live, i as f32 * 0.01, 0).await;
     }

@@ -72,7 +72,8 @@ async fn live_views_follow_the_plan() {
     let mut cluster = Cluster::start(3).await;
     let session = cluster.session(SessionRequest { forced_sampler_count: Some(1), ..pipeline(STILL) }).await.unwrap();
     let mut live = session.live();
-    let (mut epoch, start) = (seen(&mut live, 0.0, 0).await.frame.header.sample_set_id.plan_epoch, Instant::now());
+    let mut epoch = seen(&mut live, 0.0, 0).await.frame.header.sample_set_id.plan_epoch;
+    let start = Instant::now();
     let first = epoch;
     // Its compositor may have become a sampler.
     let sampler = session.plan().assignment.samplers[0].node_name[1..].parse::<usize>().unwrap();

@@ -40,7 +40,8 @@ fn pair(name: &'static str, width: usize, height: usize, test: fn(usize, usize) 
 /// Gradients, a disc, stripes one to four pixels wide and a dark corner.
 fn base(x: usize, y: usize) -> [u8; 3] {
     let gradient = [(x * 2) % 256, (y * 3) % 256, (x + 2 * y) % 256].map(|value| value as u8);
-    let (dx, dy) = (x.abs_diff(60), y.abs_diff(30));
+    let dx = x.abs_diff(60);
+    let dy = y.abs_diff(30);
     if dx * dx + dy * dy < 20 * 20 {
         [230, (40 + dx * 5) as u8, (20 + dy * 7) as u8]
     } else if x > 100 && (y / (1 + x / 50)).is_multiple_of(2) {

@@ -145,7 +145,8 @@ impl Compressed {
 
     fn decode(&self, bytes: &[u8], limit_bytes: u64) -> Result<Vec<u8>, Error> {
         let size = |size: u64| usize::try_from(size).map_err(|_| Error::SizeOverflow);
-        let (count, stride) = (size(self.count)?, size(self.byte_stride)?);
+        let count = size(self.count)?;
+        let stride = size(self.byte_stride)?;
         let max_bytes = usize::try_from(limit_bytes).unwrap_or(usize::MAX);
         let workspace = &mut Workspace::new(Limits { max_bytes, ..Limits::default() });
         let mut decoded = match self.mode {

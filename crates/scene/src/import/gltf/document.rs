@@ -141,7 +141,8 @@ impl<'a> Document<'a> {
         if layout.components != N {
             return Err(layout.wrong(format!("it has {} components where {N} are needed", layout.components)));
         }
-        let (component, normalized) = (layout.component, layout.accessor.normalized);
+        let component = layout.component;
+        let normalized = layout.accessor.normalized;
         let float = |bytes: &[u8], i: usize| {
             float(&bytes[i * component.size()..(i + 1) * component.size()], component, normalized)
         };

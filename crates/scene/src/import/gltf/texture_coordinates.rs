@@ -40,7 +40,8 @@ impl UvSource {
     pub(super) fn apply(&self, [u, v]: [f32; 2]) -> [f32; 2] {
         let Some(Transform { offset, scale, rotation_rad }) = self.transform else { return [u, v] };
         let (sin, cos) = rotation_rad.sin_cos();
-        let (u, v) = (u * scale[0], v * scale[1]);
+        let u = u * scale[0];
+        let v = v * scale[1];
         [cos * u + sin * v + offset[0], cos * v - sin * u + offset[1]]
     }
 }

@@ -61,12 +61,14 @@ pub(super) fn add(builder: &mut MeshBuilder) {
 fn add_picture(builder: &mut MeshBuilder, picture: &Picture) {
     const CELLS: [i32; 2] = [56, 40];
     let &Picture { middle, right, half_height_m, seed, colors } = picture;
-    let (up, noise) = (Vec3::Y * half_height_m, Noise::new(seed));
+    let up = Vec3::Y * half_height_m;
+    let noise = Noise::new(seed);
     let normal = right.cross(up).normalize_or(Vec3::Z);
     for row in 0..CELLS[1] {
         for column in 0..CELLS[0] {
             let place = |number: i32, axis: usize| (2 * number + 1 - CELLS[axis]) as f32 / CELLS[axis] as f32;
-            let (x, y) = (place(column, 0), place(row, 1));
+            let x = place(column, 0);
+            let y = place(row, 1);
             let at = Vec2::new(x * right.length(), y * half_height_m);
             let bend = noise.at(at * 1.3);
             let high = (0.5 + 0.5 * (y + 0.9 * bend)).clamp(0.0, 1.0);
@@ -77,7 +79,8 @@ fn add_picture(builder: &mut MeshBuilder, picture: &Picture) {
         }
     }
     let dark = Vec3::new(40.0, 34.0, 30.0);
-    let (out, over) = (right * (1.0 + 0.03 / right.length()), up * (1.0 + 0.03 / half_height_m));
+    let out = right * (1.0 + 0.03 / right.length());
+    let over = up * (1.0 + 0.03 / half_height_m);
     for [from, to] in
         [[-out - over, out - over], [-out + over, out + over], [-out - over, over - out], [out - over, out + over]]
     {
@@ -89,7 +92,8 @@ fn add_picture(builder: &mut MeshBuilder, picture: &Picture) {
 /// A tube along a knot that winds twice around one axis and three times around the other.
 fn add_knot(builder: &mut MeshBuilder, middle: Vec3, scale_m: f32, color: Vec3) {
     let at = |t: f32| {
-        let (ring, wind) = (TAU * 2.0 * t, TAU * 3.0 * t);
+        let ring = TAU * 2.0 * t;
+        let wind = TAU * 3.0 * t;
         let radius = 1.6 + 0.7 * wind.cos();
         middle + scale_m * Vec3::new(radius * ring.cos(), 0.9 * wind.sin() + 0.3, radius * ring.sin())
     };
@@ -100,7 +104,7 @@ fn add_knot(builder: &mut MeshBuilder, middle: Vec3, scale_m: f32, color: Vec3) 
 pub(super) fn add_ring(builder: &mut MeshBuilder) {
     let middle = Vec3::new(HALF_LENGTH_M - 0.12, 2.0, 0.9);
     add_tube(builder, 128, 12, 0.06, Vec3::splat(255.0), |t| {
-        let (sin, cos) = (TAU * t).sin_cos();
+        let (sin, cos) = f32::sin_cos(TAU * t);
         middle + Vec3::new(0.0, 0.75 * sin, 0.75 * cos)
     });
 }
@@ -121,7 +125,7 @@ fn add_tube(
         let up = (Vec3::Y - along * along.y).normalize_or(along.any_orthonormal_vector());
         let side = along.cross(up);
         for number in 0..sides {
-            let (sin, cos) = (TAU * number as f32 / sides as f32).sin_cos();
+            let (sin, cos) = f32::sin_cos(TAU * number as f32 / sides as f32);
             let normal = side * cos + up * sin;
             builder.push(vertex(at(t) + normal * radius_m, normal, color));
         }

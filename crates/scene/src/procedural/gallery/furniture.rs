@@ -38,7 +38,8 @@ fn add_rug(builder: &mut MeshBuilder) {
     let colors = [Vec3::new(172.0, 52.0, 48.0), Vec3::new(222.0, 200.0, 160.0), Vec3::new(44.0, 58.0, 92.0)];
     for row in 0..rows {
         for column in 0..columns {
-            let (x, z) = ((2 * column + 1 - columns) as f32 * 0.5, (2 * row + 1 - rows) as f32 * 0.5);
+            let x = (2 * column + 1 - columns) as f32 * 0.5;
+            let z = (2 * row + 1 - rows) as f32 * 0.5;
             let from_edge = (column.min(columns - 1 - column)).min(row.min(rows - 1 - row));
             let diamond = ((x.abs() * 0.5) as i32 + z.abs() as i32) / 4;
             let color = if from_edge < 3 { colors[1 + from_edge as usize % 2] } else { colors[diamond as usize % 3] };
@@ -65,7 +66,7 @@ fn add_table(builder: &mut MeshBuilder) {
     let middle = Vec3::new(-1.3, 0.0, 0.6);
     builder.drum(middle + Vec3::Y * 0.36, [0.62, 0.62], 0.05, 64, OAK);
     for leg in 0..3 {
-        let (sin, cos) = (TAU * leg as f32 / 3.0).sin_cos();
+        let (sin, cos) = f32::sin_cos(TAU * leg as f32 / 3.0);
         builder.drum(middle + Vec3::new(0.42 * cos, 0.0, 0.42 * sin), [0.02, 0.035], 0.36, 16, OAK * 0.8);
     }
     teapot(builder, Teapot { foot: middle + Vec3::new(0.12, 0.41, 0.05), scale: 0.075, squares: 10 });
@@ -112,8 +113,9 @@ pub(super) fn add_leaves(builder: &mut MeshBuilder) {
     let mut rng = Rng::new(5, 1);
     for foot in POTS {
         for _ in 0..70 {
-            let (sin, cos) = (TAU * rng.unit()).sin_cos();
-            let (out, length_m) = (Vec3::new(cos, 0.0, sin), rng.between(0.7, 1.35));
+            let (sin, cos) = f32::sin_cos(TAU * rng.unit());
+            let out = Vec3::new(cos, 0.0, sin);
+            let length_m = rng.between(0.7, 1.35);
             let lean = rng.between(0.15, 0.75);
             let color = Vec3::new(54.0, 110.0, 58.0) * rng.between(0.75, 1.25);
             add_leaf(builder, foot + Vec3::Y * 0.44 + out * 0.08, out * lean, length_m, color);

@@ -25,7 +25,9 @@ const FRAME: Vec3 = Vec3::new(70.0, 62.0, 54.0);
 
 pub(super) fn add(builder: &mut MeshBuilder) {
     add_floor(builder);
-    let (up, along, across) = (Vec3::Y * (0.5 * HEIGHT_M), Vec3::X * HALF_LENGTH_M, Vec3::Z * HALF_WIDTH_M);
+    let up = Vec3::Y * (0.5 * HEIGHT_M);
+    let along = Vec3::X * HALF_LENGTH_M;
+    let across = Vec3::Z * HALF_WIDTH_M;
     builder.rectangle(up * 2.0, along, across, PLASTER);
     builder.rectangle(up - along, -across, up, TERRACOTTA);
     builder.rectangle(up + along, across, up, TEAL);
@@ -33,8 +35,8 @@ pub(super) fn add(builder: &mut MeshBuilder) {
     add_windows(builder);
     for beam in 0..6 {
         let x = -5.0 + 2.0 * beam as f32;
-        let (min, max) =
-            (Vec3::new(x - 0.1, HEIGHT_M - 0.28, -HALF_WIDTH_M), Vec3::new(x + 0.1, HEIGHT_M, HALF_WIDTH_M));
+        let min = Vec3::new(x - 0.1, HEIGHT_M - 0.28, -HALF_WIDTH_M);
+        let max = Vec3::new(x + 0.1, HEIGHT_M, HALF_WIDTH_M);
         builder.cuboid(min, max, WOOD * 0.8);
     }
     add_skirting(builder);
@@ -88,7 +90,8 @@ fn add_frame(builder: &mut MeshBuilder, middle: f32) {
     let mut bar = |x: [f32; 2], y: [f32; 2]| {
         builder.cuboid(Vec3::new(x[0], y[0], z[0]), Vec3::new(x[1], y[1], z[1]), FRAME);
     };
-    let (left, right) = (middle - HALF_WINDOW_M, middle + HALF_WINDOW_M);
+    let left = middle - HALF_WINDOW_M;
+    let right = middle + HALF_WINDOW_M;
     for x in [left, middle - 0.03, right - 0.06] {
         bar([x, x + 0.06], [SILL_M, LINTEL_M]);
     }
@@ -103,7 +106,8 @@ fn add_frame(builder: &mut MeshBuilder, middle: f32) {
 }
 
 fn add_skirting(builder: &mut MeshBuilder) {
-    let (x, z) = (HALF_LENGTH_M, HALF_WIDTH_M);
+    let x = HALF_LENGTH_M;
+    let z = HALF_WIDTH_M;
     for [min, max] in [
         [Vec3::new(-x, 0.0, -z), Vec3::new(x, 0.14, 0.025 - z)],
         [Vec3::new(-x, 0.0, z - 0.025), Vec3::new(x, 0.14, z)],

@@ -88,7 +88,8 @@ fn add_tube(builder: &mut MeshBuilder, branch: &Branch, rings: u32, sides: u32, 
     }
     for ring in 0..rings {
         for i in 0..sides {
-            let (below, above) = (first + ring * sides, first + (ring + 1) * sides);
+            let below = first + ring * sides;
+            let above = first + (ring + 1) * sides;
             let next = (i + 1) % sides;
             builder.quad([below + i, below + next, above + next, above + i]);
         }

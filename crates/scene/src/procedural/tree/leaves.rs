@@ -83,7 +83,9 @@ impl Leaf {
         let width_axis = self.across.normalize_or(Vec3::X);
         let tilted = |s: f32| (self.up - width_axis * (0.35 * s)).normalize_or(self.up);
         let mut push = |t: f32, s: f32, shade: f32| builder.push(self.vertex(t, s, tilted(s), shade));
-        let (base, middle, tip) = (push(0.0, 0.0, 0.95), push(0.5, 0.0, 1.1), push(1.0, 0.0, 1.05));
+        let base = push(0.0, 0.0, 0.95);
+        let middle = push(0.5, 0.0, 1.1);
+        let tip = push(1.0, 0.0, 1.05);
         let right = [push(0.28, 0.9, 0.97), push(0.62, 0.78, 1.0)];
         let left = [push(0.28, -0.9, 0.97), push(0.62, -0.78, 1.0)];
         // `across` is `along × up`, to the right as seen from above with the tip ahead.

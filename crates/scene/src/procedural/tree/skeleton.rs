@@ -82,7 +82,8 @@ impl Skeleton {
 
     fn measure_crown(&mut self) {
         let twigs = self.branches.iter().filter(|b| b.level + 1 == LEVELS).flat_map(|b| &b.knots);
-        let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let mut min = Vec3::INFINITY;
+        let mut max = Vec3::NEG_INFINITY;
         for knot in twigs {
             (min, max) = (min.min(knot.position), max.max(knot.position));
         }
@@ -101,7 +102,10 @@ impl Branch {
         let i = (along as usize).min(last - 1);
         let f = along - i as f32;
         let [a, b, c, d] = [i.saturating_sub(1), i, i + 1, (i + 2).min(last)].map(|k| self.knots[k]);
-        let (p0, p1, p2, p3) = (a.position, b.position, c.position, d.position);
+        let p0 = a.position;
+        let p1 = b.position;
+        let p2 = c.position;
+        let p3 = d.position;
         let curve = p1 * 2.0
             + (p2 - p0) * f
             + (p0 * 2.0 - p1 * 5.0 + p2 * 4.0 - p3) * (f * f)
@@ -110,7 +114,8 @@ impl Branch {
     }
 
     pub(super) fn direction_at(&self, t: f32) -> Vec3 {
-        let (before, after) = (self.at(t - 0.05), self.at(t + 0.05));
+        let before = self.at(t - 0.05);
+        let after = self.at(t + 0.05);
         (after.position - before.position).normalize_or(Vec3::Y)
     }
 
@@ -122,7 +127,8 @@ impl Branch {
 fn grow(level: usize, foot: Knot, direction: Vec3, length: f32, rng: &mut Rng) -> Branch {
     let step = length / KNOTS[level] as f32;
     let mut knots = vec![foot];
-    let (mut position, mut direction) = (foot.position, direction);
+    let mut position = foot.position;
+    let mut direction = direction;
     for i in 1..=KNOTS[level] {
         let t = i as f32 / KNOTS[level] as f32;
         // Limbs sag in the middle under their weight and lift their ends to the light.
@@ -138,7 +144,8 @@ fn grow(level: usize, foot: Knot, direction: Vec3, length: f32, rng: &mut Rng) -
 }
 
 fn children_of(parent: &Branch, rng: &mut Rng) -> Vec<Branch> {
-    let (level, children) = (parent.level + 1, CHILDREN[parent.level]);
+    let level = parent.level + 1;
+    let children = CHILDREN[parent.level];
     if children == 0 {
         return Vec::new();
     }

@@ -32,7 +32,8 @@ pub(super) fn add(builder: &mut MeshBuilder, middle: Vec2, half_m: f32, is_centr
         return;
     }
     // A tower over a broader base.
-    let (base_top_m, slim) = (KERB_M + rng.between(9.0, 14.0), half * rng.between(0.58, 0.74));
+    let base_top_m = KERB_M + rng.between(9.0, 14.0);
+    let slim = half * rng.between(0.58, 0.74);
     add_body(builder, at(middle - half, KERB_M), at(middle + half, base_top_m), 0.35 * WINDOWS, wall * 0.92, rng);
     add_body(builder, at(middle - slim, base_top_m), at(middle + slim, top_m), 0.8 * WINDOWS, wall, rng);
     add_roof_details(builder, middle, slim, top_m, rng);
@@ -86,7 +87,8 @@ fn add_walls(
         (Vec3::new(min.x, min.y, min.z), Vec3::Z * (max.z - min.z), columns[1]),
     ];
     for (corner, right, columns) in walls {
-        let (right, up) = (right / columns as f32, Vec3::Y * ((max.y - min.y) / rows as f32));
+        let right = right / columns as f32;
+        let up = Vec3::Y * ((max.y - min.y) / rows as f32);
         for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
             let tint = if row == 0 { 0.8 } else { 1.0 };
             add_cell(builder, corner + right * column as f32 + up * row as f32, right, up, color_srgb * tint, rng);
@@ -97,7 +99,8 @@ fn add_walls(
 /// A piece of wall with a window: 18 triangles. It shares its neighbours' corners, so that no gap shows.
 fn add_cell(builder: &mut MeshBuilder, corner: Vec3, right: Vec3, up: Vec3, color_srgb: Vec3, rng: &mut Rng) {
     let inwards = up.cross(right).normalize_or(Vec3::X) * RECESS_M;
-    let (width_m, height_m) = (right.length(), up.length());
+    let width_m = right.length();
+    let height_m = up.length();
     let [side, sill, lintel] = [0.9f32.min(0.2 * width_m) / width_m, 0.26, 1.0 - 0.5 / height_m];
     let at = |(s, t): (f32, f32)| corner + right * s + up * t;
     let wall = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(at);

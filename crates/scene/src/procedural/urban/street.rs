@@ -45,7 +45,8 @@ pub(super) fn add_ground(builder: &mut MeshBuilder) {
         let across_m = -HALF_WIDTH_M + 0.5 * STREET_M + street as f32 * (BLOCK_M + STREET_M);
         for dash in 0..DASHES {
             let along_m = (2.0 * (dash as f32 + 0.5) / DASHES as f32 - 1.0) * HALF_WIDTH_M;
-            let (long_m, wide_m) = (3.2, 0.2);
+            let long_m = 3.2;
+            let wide_m = 0.2;
             let [x, z] = [along_m, across_m];
             builder.rectangle(Vec3::new(x, PAINT_M, z), Vec3::Z * wide_m, Vec3::X * long_m, paint);
             builder.rectangle(Vec3::new(z, PAINT_M, x), Vec3::Z * long_m, Vec3::X * wide_m, paint);
@@ -56,13 +57,15 @@ pub(super) fn add_ground(builder: &mut MeshBuilder) {
 /// A block's slab, up to the kerb.
 pub(super) fn add_pavement(builder: &mut MeshBuilder, corner: Vec2) {
     let far = corner + BLOCK_M;
-    let (min, max) = (Vec3::new(corner.x, -0.2, corner.y), Vec3::new(far.x, KERB_M, far.y));
+    let min = Vec3::new(corner.x, -0.2, corner.y);
+    let max = Vec3::new(far.x, KERB_M, far.y);
     builder.cuboid(min, max, Vec3::new(160.0, 156.0, 150.0));
 }
 
 /// A lawn with trees, `half_m` to each side.
 pub(super) fn add_park(builder: &mut MeshBuilder, middle: Vec2, half_m: f32, rng: &mut Rng) {
-    let (min, max) = (middle - half_m, middle + half_m);
+    let min = middle - half_m;
+    let max = middle + half_m;
     let lawn = Vec3::new(104.0, 130.0, 70.0);
     builder.cuboid(Vec3::new(min.x, 0.0, min.y), Vec3::new(max.x, KERB_M + 0.3, max.y), lawn);
     for i in 0..9 {

@@ -20,7 +20,8 @@ pub struct Stream {
 impl Stream {
     /// Attributes in this version of the format.
     pub fn attributes(version: u8, decoded: &[u8], stride: usize, filter: &'static str) -> Self {
-        let (count, encoding) = (decoded.len() / stride, VertexEncoding::new(version, 2).unwrap());
+        let count = decoded.len() / stride;
+        let encoding = VertexEncoding::new(version, 2).unwrap();
         let bytes = encode_vertex_buffer(decoded, count, stride, encoding, &mut Workspace::default()).unwrap();
         Self { bytes, count, stride, mode: "ATTRIBUTES", filter }
     }
@@ -60,7 +61,9 @@ pub fn quaternions(quaternion: [f32; 4]) -> Stream {
 /// The cube of positions and indices, whose views lie in a fallback buffer without data. Further streams become views 2
 /// and on.
 pub fn compressed_cube(extension: &str, streams: &[Stream]) -> GltfCube {
-    let (mut views, mut binary, mut decoded_bytes) = (Vec::new(), Vec::new(), 0);
+    let mut views = Vec::new();
+    let mut binary = Vec::new();
+    let mut decoded_bytes = 0;
     for Stream { bytes, count, stride, mode, filter } in streams {
         let length = count * stride;
         let of_attributes = if *mode == "ATTRIBUTES" { format!(r#""byteStride":{stride},"#) } else { String::new() };

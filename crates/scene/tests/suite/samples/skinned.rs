@@ -32,9 +32,12 @@ impl Tube {
     pub fn new(joints: u32, rings: u32, sides: u32) -> Self {
         let mut tube = Self::default();
         let ring_count = joints * rings + 1;
-        let (mut positions, mut normals, mut numbers, mut weights) = (vec![], vec![], vec![], vec![]);
+        let mut positions = vec![];
+        let mut normals = vec![];
+        let mut numbers = vec![];
+        let mut weights = vec![];
         for (ring, side) in (0..ring_count).flat_map(|ring| (0..sides).map(move |side| (ring, side))) {
-            let (sin, cos) = (TAU * side as f32 / sides as f32).sin_cos();
+            let (sin, cos) = f32::sin_cos(TAU * side as f32 / sides as f32);
             let x = ring as f32 / rings as f32;
             positions.extend([x, cos * 0.2, sin * 0.2]);
             normals.extend([0.0, cos, sin]);
@@ -47,7 +50,9 @@ impl Tube {
         }
         let quads = (1..ring_count).flat_map(|ring| (0..sides).map(move |side| (ring, side)));
         let triangles = quads.flat_map(|(ring, side)| {
-            let (near, far, next) = ((ring - 1) * sides, ring * sides, (side + 1) % sides);
+            let near = (ring - 1) * sides;
+            let far = ring * sides;
+            let next = (side + 1) % sides;
             [near + side, near + next, far + next, near + side, far + next, far + side]
         });
         let indices: Vec<u8> = triangles.flat_map(u32::to_le_bytes).collect();
@@ -91,7 +96,8 @@ impl Tube {
 
     /// Adds a clip.
     pub fn animate(&mut self, name: &str, channels: &[ChannelOf<'_>]) {
-        let (mut targets, mut samplers) = (Vec::new(), Vec::new());
+        let mut targets = Vec::new();
+        let mut samplers = Vec::new();
         for (number, (node, path, curve, times_s, values)) in channels.iter().enumerate() {
             let input = self.floats(times_s, "SCALAR");
             let output = self.floats(values, if *path == "rotation" { "VEC4" } else { "VEC3" });
@@ -99,7 +105,8 @@ impl Tube {
             samplers.push(format!(r#"{{"input":{input},"output":{output},"interpolation":"{curve}"}}"#));
         }
         let comma = if self.animations.is_empty() { "" } else { "," };
-        let (targets, samplers) = (targets.join(","), samplers.join(","));
+        let targets = targets.join(",");
+        let samplers = samplers.join(",");
         self.animations += &format!(r#"{comma}{{"name":"{name}","channels":[{targets}],"samplers":[{samplers}]}}"#);
     }
 
@@ -122,7 +129,8 @@ impl Tube {
     fn add(&mut self, bytes: &[u8], component: u32, count: usize, shape: &str) -> usize {
         self.binary.resize(self.binary.len().next_multiple_of(4), 0);
         let number = self.views.len();
-        let (offset, length) = (self.binary.len(), bytes.len());
+        let offset = self.binary.len();
+        let length = bytes.len();
         self.views.push(format!(r#"{{"buffer":0,"byteOffset":{offset},"byteLength":{length}}}"#));
         self.accessors
             .push(format!(r#"{{"bufferView":{number},"componentType":{component},"count":{count},"type":"{shape}"}}"#));
@@ -139,7 +147,8 @@ impl Tube {
 
     pub fn json(&self) -> String {
         let Self { nodes, roots, attributes, skins, animations, .. } = self;
-        let (views, accessors) = (self.views.join(","), self.accessors.join(","));
+        let views = self.views.join(",");
+        let accessors = self.accessors.join(",");
         format!(
             r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[{roots}]}}],"nodes":[{nodes}],
             "skins":[{skins}],"animations":[{animations}],"meshes":[{{"primitives":[{{{attributes}}}]}}],
