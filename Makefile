@@ -11,6 +11,10 @@ export CARGO
 ifndef XDG_RUNTIME_DIR
 export NODEVICE_SELECT = 1
 endif
+# By default glibc has eight arenas a core. Each keeps freed memory that its next large buffers do not fit.
+ifndef MALLOC_ARENA_MAX
+export MALLOC_ARENA_MAX := $(shell nproc 2>/dev/null || echo 4)
+endif
 
 .DEFAULT_GOAL := help
 .PHONY: help build announce demo lab cluster cluster-test test fmt-check lint unit bench doc audit vulkan browser toolchain lint-toolchain clean bench-scaling
