@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn a_table_has_a_row_for_each_row_and_a_chart_a_series_for_each_name() {
-        let rows = measure_rows("rows", [1, 2, 3], |rays| Ok((rays, f64::from(rays) * 0.5))).unwrap();
+        let rows = measure_rows("rows", [1_u32, 2, 3], |rays| Ok((rays, f64::from(rays) * 0.5))).unwrap();
         let table = table("Rays", &COLUMNS, &rows).unwrap();
         assert_eq!(table.rows[2], [Cell::from(3_u32), Cell::from(1.5)]);
         assert_eq!(table.columns[1].unit, "ms");

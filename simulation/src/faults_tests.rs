@@ -75,6 +75,8 @@ impl LastPlan {
 struct World {
     random: Random,
     scheduler: Scheduler,
+    /// As after the last step.
+    workloads: Vec<WorkloadStatus>,
     now: Duration,
     /// Workloads that clients choose from.
     kinds: u64,
@@ -103,6 +105,7 @@ impl World {
         Self {
             random: Random(seed),
             scheduler: Scheduler::default(),
+            workloads: Vec::new(),
             now: Duration::ZERO,
             kinds,
             next_incarnation: 1,
@@ -121,8 +124,8 @@ impl World {
 
     /// The nodes of each workload.
     fn nodes_of_workloads(&self) -> BTreeMap<u64, BTreeSet<String>> {
-        let names = |workload: WorkloadStatus| workload.conditions.into_iter().map(|node| node.node_name).collect();
-        self.scheduler.status().workloads.into_iter().map(|workload| (workload.number, names(workload))).collect()
+        let names = |workload: &WorkloadStatus| workload.conditions.iter().map(|node| node.node_name.clone()).collect();
+        self.workloads.iter().map(|workload| (workload.number, names(workload))).collect()
     }
 
     /// The workload whose plan in force has this epoch.
@@ -152,6 +155,7 @@ impl World {
         let concerned = self.concerned(&event);
         self.note(&event);
         let commands = self.scheduler.step(self.now, event.clone());
+        self.workloads = self.scheduler.status().workloads;
         let moved = self.moved(&before, &event);
         for command in commands {
             match command {
@@ -359,10 +363,10 @@ impl World {
         let incarnation = self.next_incarnation;
         self.next_incarnation += 1;
         let slowness = if self.random.below(4) == 0 { self.random.between(1.5, 8.0) } else { 1.0 };
+        self.alive.insert(name.clone(), (incarnation, slowness));
         // A node may have seen plans of an earlier coordinator.
         let seen = if self.random.below(20) == 0 { self.random.below(1000) } else { 0 };
         self.tell(joined(&name, incarnation, seen));
-        self.alive.insert(name, (incarnation, slowness));
     }
 
     /// The coordinator learns of it, sometimes late.
@@ -458,7 +462,7 @@ impl World {
 
     /// Nodes do something for every workload, which is therefore not idle.
     fn work(&mut self) {
-        for workload in self.scheduler.status().workloads {
+        for workload in self.workloads.clone() {
             let Some(plan) = workload.plan else { continue };
             let name = plan.assignment.compositors[0].node_name.clone();
             self.tell(measured(name, plan.assignment.plan_epoch, MeasuredCosts::default()));
@@ -509,11 +513,11 @@ impl World {
 
     /// A workload has a plan while it has sessions and there is a node for it; every node that can serve one does.
     fn check_always(&self) {
-        let workloads = self.scheduler.status().workloads;
+        let workloads = &self.workloads;
         let nodes = self.nodes_of_workloads();
         let kinds: BTreeSet<usize> = self.sessions.values().copied().collect();
         assert_eq!(workloads.len(), kinds.len(), "{:?}", self.sessions);
-        for WorkloadStatus { number, plan, .. } in &workloads {
+        for WorkloadStatus { number, plan, .. } in workloads {
             let usable = self.members.keys().any(|name| self.may_use(*number, name));
             assert_eq!(plan.is_some(), usable, "{number} of {:?} {:?}", self.members, self.quarantined);
             assert_eq!(nodes[number].is_empty(), !usable, "every workload has a node");
@@ -533,8 +537,8 @@ impl World {
         // A node that serves several counts in part.
         let count = |number: &u64| nodes[number].iter().map(|node| 1.0 / carriers(node) as f64).sum::<f64>();
         let all = nodes.values().flatten().collect::<BTreeSet<_>>().len();
-        let workloads = self.scheduler.status().workloads;
-        let batches = workloads.iter().filter(|workload| workload.viewer_count == 0).map(|workload| workload.number);
+        let batches =
+            self.workloads.iter().filter(|workload| workload.viewer_count == 0).map(|workload| workload.number);
         let batches: Vec<u64> = batches.filter(|_| nodes.len() <= all).collect();
         for a in &batches {
             for b in &batches {

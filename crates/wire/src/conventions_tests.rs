@@ -79,7 +79,7 @@ fn calls_have_their_own_messages() {
             calls += 1;
         }
     }
-    assert_eq!(calls, 12);
+    assert_eq!(calls, 11);
 }
 
 #[test]
