@@ -6,7 +6,6 @@ mod light;
 mod loaded;
 mod run;
 mod throughput;
-pub(crate) mod timing;
 
 pub use args::BenchArgs;
 pub use run::run;

@@ -13,7 +13,6 @@ use scene::{Instance, Scene};
 
 use super::measures::{depths, is_kind, mean};
 use super::stand::{Stand, pinholes, work};
-use crate::reference_views::encoded_and_decoded;
 
 /// A box with sides along the axes.
 #[derive(Debug, Clone, Copy)]
@@ -120,11 +119,6 @@ impl<'s> LitScene<'s> {
         let lighting = self.lighting.without_reflections().unwrap_or(self.lighting);
         let work = DrawWork { lighting, ..self.work() };
         Ok(self.stand.engine().renderer.draw_depth_images(work, &pinholes(cameras), planes)?)
-    }
-
-    /// Samples of light as compositors decode them.
-    pub fn decoded_samples(&self, cameras: &[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>> {
-        self.samples(cameras)?.iter().map(encoded_and_decoded).collect()
     }
 
     pub fn views(&self, cameras: &[PinholeCamera], planes: ViewPlanes) -> anyhow::Result<Vec<View>> {
