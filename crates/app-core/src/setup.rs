@@ -70,8 +70,7 @@ pub struct SceneArgs {
     /// How surfaces are lit, as terms with commas between them. Direct light: unlit, phong, shadows, or soft N (N rays
     /// a light). Light from all around: occlusion N [RADIUSm], or indirect N, with what surfaces send back. Mirrors that
     /// show the scene: reflections N (mirrors that a ray meets, 1 to 8). Glossy surfaces that show it, in views drawn
-    /// directly, from a cube or beside a base: glossy N (rays a pixel, 1 to 256). Rate: adaptive [TOLERANCE] traces rays
-    /// only where light changes
+    /// directly, from a cube or beside a base: glossy N (rays a pixel, 1 to 256)
     #[arg(long, default_value_t, value_name = "TERMS")]
     pub lighting: Lighting,
     /// A lamp in place of the scene's lamps, in the scene file's coordinates; may be repeated. Forms: "sun

@@ -10,9 +10,7 @@ use gpu::{BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVa
 use crate::accumulation::{Key, Sums};
 use crate::pieces::{Piece, Pieces};
 use crate::pixel_camera::{PixelCamera, uniform};
-use crate::{
-    Rate, known_samples::ImageSequence, light_samples::CachedLight, planes::Output, rays::Traced, work::DrawWork,
-};
+use crate::{known_samples::ImageSequence, light_samples::CachedLight, planes::Output, rays::Traced, work::DrawWork};
 
 /// The share of the scene's diagonal within which occlusion is looked for, where a lighting names no radius.
 const OCCLUSION_OF_DIAGONAL: f32 = 0.05;
@@ -209,7 +207,6 @@ impl Batch<'_> {
             shadow_rays_in_sum: shadow.end.max(1),
             ambient_rays_in_sum: ambient.end.max(1),
             occlusion_radius_m: lighting.occlusion_radius_m().unwrap_or(diagonal_m * OCCLUSION_OF_DIAGONAL),
-            tolerance: if let Rate::Adaptive { tolerance } = lighting.rate { tolerance } else { 0.0 },
             ..camera
         }
     }
@@ -233,18 +230,17 @@ impl Batch<'_> {
 }
 
 impl Recording<'_> {
-    /// Records a dispatch of a pass over all pixels of a picture, or over each `step_px`-th in both directions.
+    /// Records a dispatch of a pass over all pixels of a picture.
     pub fn dispatch(
         &mut self,
         variant: &impl ShaderVariant,
         pass: &ComputePass,
         groups: &[&BoundGroup],
-        (camera, step_px): (usize, u32),
+        camera: usize,
     ) {
         let kind = WorkKind::new(self.batch.family(), &variant.name());
         self.dispatch_pieces(kind, pass, camera, |_, piece, width_px| {
-            let [columns, rows] = [width_px, piece.end_row - piece.first_row].map(|side| side.div_ceil(step_px));
-            (groups.to_vec(), DispatchSize::Invocations([columns, rows, 1]))
+            (groups.to_vec(), DispatchSize::Invocations([width_px, piece.end_row - piece.first_row, 1]))
         });
     }
 

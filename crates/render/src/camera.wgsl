@@ -12,6 +12,8 @@ struct PixelCamera {
     corner_in_world: vec3f,
     first_sum: u32,
     size_px: vec2u,
+    // The first pixel, from where the forward axis meets the image; wraps.
+    first_from_axis: vec2u,
     pixel_count: u32,
     seed: u32,
     // Numbers of the rays that are traced now, and of all that the sums hold afterwards.
@@ -22,9 +24,6 @@ struct PixelCamera {
     shadow_rays_in_sum: u32,
     ambient_rays_in_sum: u32,
     occlusion_radius_m: f32,
-    tolerance: f32,
-    // The first pixel, from where the forward axis meets the image; wraps.
-    first_from_axis: vec2u,
     // This dispatch's rows of the picture: the first, a multiple of 8, and the one after the last.
     first_row: u32,
     end_row: u32,
@@ -32,17 +31,17 @@ struct PixelCamera {
     first_light: u32,
     end_light: u32,
 {%- if single_pole %}
-    pole_px: vec2f,
     // The pixels that a point moves for each inverse metre of depth.
     bend_px_m: f32,
+    pole_px: vec2f,
     farthest_m: f32,
 {%- endif %}
 }
 
 @group(0) var<uniform> camera: PixelCamera;
 
-// The pixel of an invocation over every `step`-th pixel of some rows. Beyond them where it has none.
-fn pixel_at(id: vec3u, step: u32) -> vec2u { return vec2u(id.x, id.y) * step + vec2u(0u, camera.first_row); }
+// The pixel of an invocation over some rows. Beyond them where it has none.
+fn pixel_at(id: vec3u) -> vec2u { return vec2u(id.x, id.y + camera.first_row); }
 
 fn is_beyond(pixel: vec2u) -> bool { return pixel.x >= camera.size_px.x || pixel.y >= camera.end_row; }
 

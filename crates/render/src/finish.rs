@@ -188,7 +188,7 @@ pub(crate) fn record(
             reflected.unwrap_or(&planes.words),
         ];
         let own = pass.bind(0, bindings(&variant, buffers, target, scene.environment.as_deref()))?;
-        recording.dispatch(&variant, &pass, &[&own], (camera, 1));
+        recording.dispatch(&variant, &pass, &[&own], camera);
     }
     Ok(())
 }

@@ -19,9 +19,6 @@ use crate::{
     surfaces::Surfaces,
 };
 
-/// Pixels for which an adaptive rate traces rays in any case lie this far apart.
-pub(crate) const GRID_PX: u32 = 4;
-
 /// The rays to a lamp that a shader is written for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum ShadowRays {
@@ -47,8 +44,6 @@ pub(crate) struct Illuminate {
     by_rays: bool,
     /// The pixels' own rays lie around a pole.
     single_pole: bool,
-    /// The distance of the pixels that are lit, where they are not listed.
-    step_px: u32,
     listed: bool,
     /// Ambient light of the pixels at the list's end is in the sums already.
     knows_ambient: bool,
@@ -70,7 +65,6 @@ impl Illuminate {
     const UNLIT: Self = Self {
         by_rays: false,
         single_pole: false,
-        step_px: 1,
         listed: false,
         knows_ambient: false,
         bounces: false,
@@ -91,7 +85,6 @@ impl ShaderVariant for Illuminate {
         context! {
             by_rays => self.by_rays,
             single_pole => self.single_pole,
-            step_px => self.step_px,
             listed => self.listed,
             knows_ambient => self.knows_ambient,
             bounces => self.bounces,
@@ -118,15 +111,15 @@ impl ShaderVariant for Illuminate {
     fn all() -> Vec<Self> {
         let mut variants = Vec::new();
         for [by_rays, continued, environment_map] in switches() {
-            for (step_px, listed) in [(1, false), (GRID_PX, false), (1, true)] {
+            for listed in [false, true] {
                 for (shadow_rays, ambient) in Self::RAYS {
-                    let lit = Self { by_rays, step_px, listed, shadow_rays, ambient, continued, ..Self::UNLIT };
+                    let lit = Self { by_rays, listed, shadow_rays, ambient, continued, ..Self::UNLIT };
                     variants.extend(Self { environment_map, ..lit }.with_all_sums());
                 }
             }
         }
-        for (step_px, listed) in [(1, false), (GRID_PX, false), (1, true)] {
-            let bent = Self { by_rays: true, single_pole: true, step_px, listed, ..Self::UNLIT };
+        for listed in [false, true] {
+            let bent = Self { by_rays: true, single_pole: true, listed, ..Self::UNLIT };
             let lit = Self { shadow_rays: ShadowRays::Many, ambient: AmbientRays::Occlusion, ..bent };
             variants.extend([bent, lit].iter().flat_map(Self::with_all_sums));
         }
@@ -193,13 +186,13 @@ impl Illuminate {
     }
 }
 
-/// Records one dispatch for each piece of these cameras and part of the rays. Lit are all pixels of a list for each piece of
-/// the one camera, or else those `step_px` apart.
+/// Records one dispatch for each piece of these cameras and part of the rays. Lit are the pixels of a list for each piece of
+/// the one camera, or else all.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     parts: &[Part],
     (first, surfaces): (usize, &[Surfaces]),
-    (step_px, lists): (u32, Option<&[PixelList]>),
+    lists: Option<&[PixelList]>,
 ) -> Result<(), RenderError> {
     let batch = recording.batch;
     let lighting = batch.work.lighting;
@@ -208,7 +201,7 @@ pub(crate) fn record(
         let continued = number > 0 || recording.sums.rays.iter().any(|rays| rays.start > 0);
         let of_batch = Illuminate::of(batch);
         let knows_ambient = batch.cached.is_some() && of_batch.ambient == AmbientRays::Indirect;
-        let variant = Illuminate { step_px, listed: lists.is_some(), knows_ambient, continued, ..of_batch };
+        let variant = Illuminate { listed: lists.is_some(), knows_ambient, continued, ..of_batch };
         let pass = recording.passes.get(&variant)?;
         let rays = traced.map(|traced| pass.bind(1, traced.bindings())).transpose()?;
         let kind = WorkKind::new(batch.family(), &(variant.name(), part.counts));
@@ -224,8 +217,7 @@ pub(crate) fn record(
                 None => vec![bind(None)?],
             };
             recording.dispatch_pieces(kind, &pass, camera, |place, piece, width_px| {
-                let [columns, rows] = [width_px, piece.end_row - piece.first_row].map(|side| side.div_ceil(step_px));
-                let all = DispatchSize::Invocations([columns, rows, 1]);
+                let all = DispatchSize::Invocations([width_px, piece.end_row - piece.first_row, 1]);
                 let (own, size) = lists.map_or((&own[0], all), |lists| (&own[place], lists[place].size()));
                 (std::iter::once(own).chain(&rays).collect(), size)
             });

@@ -225,7 +225,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {% else %}
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let pixel = pixel_at(id, {{ step_px }}u);
+    let pixel = pixel_at(id);
     if is_beyond(pixel) { return; }
     light_pixel(pixel, false);
 }

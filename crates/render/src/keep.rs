@@ -33,6 +33,6 @@ pub(crate) fn record(
     let pass = recording.passes.get(&variant)?;
     let own = [Binding::buffer("camera", &recording.cameras), Binding::texture("held", held)];
     let bound = pass.bind(0, own.into_iter().chain(target.bindings()))?;
-    recording.dispatch(&variant, &pass, &[&bound], (camera, 1));
+    recording.dispatch(&variant, &pass, &[&bound], camera);
     Ok(())
 }

@@ -9,7 +9,7 @@
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let pixel = pixel_at(id, 1u);
+    let pixel = pixel_at(id);
     if is_beyond(pixel) { return; }
     let inverse_depth = reversed_depth_at(pixel) / camera.near_m;
     let normal = unit_from_oct16(surface_at(pixel).z);

@@ -9,7 +9,7 @@ use naga::{TypeInner, valid::Capabilities};
 
 use crate::finish::{Finish, GpuFinish};
 use crate::gpu_scene::{GpuObject, GpuSurroundings};
-use crate::interpolate::Interpolate;
+use crate::illuminate::Illuminate;
 use crate::keep::Keep;
 use crate::known_samples::KnownCamera;
 use crate::lamp_shares::GpuLampShares;
@@ -120,6 +120,7 @@ fn a_pixel_camera_has_the_wgsl_layout() {
         corner_in_world,
         first_sum,
         size_px,
+        first_from_axis,
         pixel_count,
         seed,
         first_shadow_ray,
@@ -129,18 +130,16 @@ fn a_pixel_camera_has_the_wgsl_layout() {
         shadow_rays_in_sum,
         ambient_rays_in_sum,
         occlusion_radius_m,
-        tolerance,
-        first_from_axis,
         first_row,
         end_row,
         first_light,
         end_light,
-        pole_px,
         bend_px_m,
+        pole_px,
         farthest_m,
         padding
     });
-    let bent = Interpolate::all()
+    let bent = Illuminate::all()
         .into_iter()
         .find(|variant| variant.context().get_attr("single_pole").is_ok_and(|is| is.is_true()));
     assert_eq!(shader(&parsed(&bent.expect("a variant")), "PixelCamera"), host);

@@ -410,7 +410,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let pixel = pixel_at(id, 1u);
+    let pixel = pixel_at(id);
     if is_beyond(pixel) { return; }
     let place = place_of(pixel);
     let depth = reversed_depth_at(pixel);

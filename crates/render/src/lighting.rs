@@ -27,8 +27,6 @@ pub struct Lighting {
     /// Rays a pixel into the lobe of what it shows, as far as `reflections` does not follow its mirrored ray; without them rough
     /// reflectors mirror the environment alone, but where a light field is gathered.
     pub glossy: Option<NonZeroU32>,
-    /// The pixels that get rays of their own.
-    pub rate: Rate,
 }
 
 /// Light of lamps.
@@ -70,28 +68,12 @@ impl Ambient {
     }
 }
 
-/// The pixels that get rays of their own.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Rate {
-    /// All.
-    #[default]
-    Full,
-    /// A grid of pixels, and those between whose neighbours on it disagree by more than this, relatively.
-    Adaptive {
-        /// Relative to the light that arrives.
-        tolerance: f32,
-    },
-}
-
-/// The tolerance of adaptive shading, where none is given: below a step of 8-bit sRGB in the middle greys.
-const DEFAULT_TOLERANCE: f32 = 0.04;
-
 /// A text that names no lighting.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[allow(missing_docs, reason = "self-naming variants")]
 pub enum UnknownLighting {
     #[error(
-        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, occlusion N, occlusion N RADIUSm, indirect N, reflections N, glossy N, adaptive, adaptive TOLERANCE with commas between them"
+        "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, occlusion N, occlusion N RADIUSm, indirect N, reflections N and glossy N with commas between them"
     )]
     Term(String),
     #[error("lighting {0:?}: rays must be from 1 to {MAX_RAYS}")]
@@ -108,8 +90,7 @@ pub enum UnknownLighting {
 
 impl Lighting {
     /// Base colours as they are.
-    pub const UNLIT: Self =
-        Self { direct: Direct::Unlit, ambient: None, reflections: None, glossy: None, rate: Rate::Full };
+    pub const UNLIT: Self = Self { direct: Direct::Unlit, ambient: None, reflections: None, glossy: None };
 
     /// Whether anything arrives at surfaces.
     #[must_use]
@@ -239,7 +220,6 @@ impl FromStr for Lighting {
         let mut ambient = None;
         let mut reflections = None;
         let mut glossy = None;
-        let mut rate = None;
         for term in text.split(',').map(str::trim) {
             let words: Vec<&str> = term.split_whitespace().collect();
             let again = match words[..] {
@@ -255,10 +235,6 @@ impl FromStr for Lighting {
                 ["indirect", n] => ambient.replace(Ambient::Indirect(rays(text, n)?)).is_some(),
                 ["reflections", n] => reflections.replace(mirrors(text, n)?).is_some(),
                 ["glossy", n] => glossy.replace(lobe_rays(text, n)?).is_some(),
-                ["adaptive"] => rate.replace(Rate::Adaptive { tolerance: DEFAULT_TOLERANCE }).is_some(),
-                ["adaptive", n] => {
-                    rate.replace(Rate::Adaptive { tolerance: positive(text, n, "the tolerance")? }).is_some()
-                }
                 _ => return Err(UnknownLighting::Term(term.to_owned())),
             };
             if again {
@@ -271,8 +247,7 @@ impl FromStr for Lighting {
                 return Err(UnknownLighting::Conflict(text.to_owned(), reason));
             }
         }
-        let lighting =
-            Self { direct: direct.unwrap_or_default(), ambient, reflections, glossy, rate: rate.unwrap_or_default() };
+        let lighting = Self { direct: direct.unwrap_or_default(), ambient, reflections, glossy };
         if lighting.is_indirect() && lighting.shadow_rays() == 0 {
             let reason = "indirect light needs shadows or soft N: phong and unlit have none of lamps";
             return Err(UnknownLighting::Conflict(text.to_owned(), reason));
@@ -285,9 +260,6 @@ impl FromStr for Lighting {
                 text.to_owned(),
                 "mirrors show the scene under shadows and soft N only",
             ));
-        }
-        if !lighting.is_traced() && rate.is_some() {
-            return Err(UnknownLighting::Conflict(text.to_owned(), "there are no rays to be adaptive with"));
         }
         Ok(lighting)
     }
@@ -333,11 +305,7 @@ impl fmt::Display for Lighting {
         if let Some(rays) = self.glossy {
             write!(f, ", glossy {rays}")?;
         }
-        match self.rate {
-            Rate::Full => Ok(()),
-            Rate::Adaptive { tolerance } if tolerance == DEFAULT_TOLERANCE => write!(f, ", adaptive"),
-            Rate::Adaptive { tolerance } => write!(f, ", adaptive {tolerance}"),
-        }
+        Ok(())
     }
 }
 
@@ -354,14 +322,13 @@ mod tests {
             "soft 16",
             "soft 16, occlusion 16",
             "phong, occlusion 4 0.5m",
-            "shadows, occlusion 8, adaptive",
+            "shadows, occlusion 8",
             "soft 16, indirect 64",
             "shadows, indirect 1, reflections 2",
-            "soft 4, adaptive 0.1",
             "shadows, reflections 8",
-            "soft 16, occlusion 16, reflections 2, adaptive",
+            "soft 16, occlusion 16, reflections 2",
             "shadows, glossy 256",
-            "soft 16, occlusion 16, reflections 2, glossy 16, adaptive",
+            "soft 16, occlusion 16, reflections 2, glossy 16",
         ] {
             assert_eq!(name.parse::<Lighting>().expect(name).to_string(), name);
         }
@@ -383,15 +350,25 @@ mod tests {
         for text in ["shadows, glossy 0", "shadows, glossy 257", "shadows, glossy -1"] {
             assert!(matches!(parsed(text), Glossy(_)), "{text}");
         }
-        for text in ["", "soft", "reflections", "glossy", "bright", "unlit;phong", "occlusion", "occlusion 1 2 3"] {
+        for text in [
+            "",
+            "soft",
+            "reflections",
+            "glossy",
+            "bright",
+            "unlit;phong",
+            "occlusion",
+            "occlusion 1 2 3",
+            "soft 4, adaptive",
+        ] {
             assert!(matches!(parsed(text), Term(_)), "{text}");
         }
-        for text in ["occlusion 4 -1m", "occlusion 4 NaN", "soft 4, adaptive inf", "soft 4, adaptive 0"] {
+        for text in ["occlusion 4 -1m", "occlusion 4 NaN", "occlusion 4 0m"] {
             assert!(matches!(parsed(text), Number(..)), "{text}");
         }
         let unmirrored = ["phong, reflections 1", "unlit, reflections 1", "reflections 2", "glossy 4"];
         let twice = ["unlit, phong", "occlusion 4, occlusion 8", "shadows, reflections 1, reflections 1"];
-        for text in [&unmirrored[..], &twice, &["unlit, occlusion 4", "phong, adaptive"]].concat() {
+        for text in [&unmirrored[..], &twice, &["unlit, occlusion 4"]].concat() {
             assert!(matches!(parsed(text), Conflict(..)), "{text}");
         }
         for text in ["unlit, indirect 4", "phong, indirect 4", "indirect 4", "soft 4, occlusion 4, indirect 4"] {
@@ -413,7 +390,7 @@ mod tests {
     fn unknown_points_have_a_quarter_of_the_rays_but_no_fewer_than_16() {
         let here = |text: &str, quality| text.parse::<Lighting>().expect(text).for_unknown_points(quality).to_string();
         let balanced = LightCacheQuality::Balanced;
-        assert_eq!(here("soft 128, occlusion 256 2m, adaptive", balanced), "soft 32, occlusion 64 2m, adaptive");
+        assert_eq!(here("soft 128, occlusion 256 2m", balanced), "soft 32, occlusion 64 2m");
         assert_eq!(here("soft 32, occlusion 8", balanced), "soft 16, occlusion 8");
         assert_eq!(here("shadows, occlusion 64, reflections 2", balanced), "shadows, occlusion 16, reflections 2");
         assert_eq!(here("soft 128, occlusion 64", LightCacheQuality::Fine), "soft 128, occlusion 64");

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use depth_image::Camera;
 
-/// Pieces begin with whole workgroups, and at rows of the grid of an adaptive rate.
+/// Pieces begin with whole workgroups.
 const ROWS_ALIGNED: u32 = 8;
 
 /// Some rows of a picture.

@@ -19,6 +19,8 @@ pub(crate) struct PixelCamera {
     pub corner_in_world: [f32; 3],
     pub first_sum: u32,
     pub size_px: [u32; 2],
+    /// The first pixel, from where the forward axis meets the image; wraps.
+    pub first_from_axis: [u32; 2],
     pub pixel_count: u32,
     pub seed: u32,
     pub first_shadow_ray: u32,
@@ -28,9 +30,6 @@ pub(crate) struct PixelCamera {
     pub shadow_rays_in_sum: u32,
     pub ambient_rays_in_sum: u32,
     pub occlusion_radius_m: f32,
-    pub tolerance: f32,
-    /// The first pixel, from where the forward axis meets the image; wraps.
-    pub first_from_axis: [u32; 2],
     /// The rows of a dispatch.
     pub first_row: u32,
     pub end_row: u32,
@@ -38,10 +37,10 @@ pub(crate) struct PixelCamera {
     pub first_light: u32,
     pub end_light: u32,
     /// Of a single-pole camera, as the two numbers that follow.
-    pub pole_px: [f32; 2],
     pub bend_px_m: f32,
+    pub pole_px: [f32; 2],
     pub farthest_m: f32,
-    pub padding: [u32; 2],
+    pub padding: [u32; 3],
 }
 
 /// The trait of `camera` in all shaders that include `camera.wgsl`.

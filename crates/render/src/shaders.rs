@@ -10,7 +10,6 @@ use crate::rays::traversal::{BOX_SLACK, EDGE_ROUNDINGS};
 use crate::{
     finish::{Finish, SAME_SURFACE},
     illuminate::Illuminate,
-    interpolate::Interpolate,
     keep::Keep,
     layered::{BIAS_FOOTPRINTS, BIAS_ROUNDINGS, Lit},
     light_cache::{LookUp, PROVENANCE_EMPTY, PROVENANCE_HIT, PROVENANCE_LIT_HERE},
@@ -31,7 +30,7 @@ const MAX_LAMP_SHARES: u32 = depth_image::MAX_LAMP_SHARES as u32;
 /// The shader templates of this crate.
 pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
     "raster.wgsl", "append.wgsl", "layered/lit.wgsl", "packed_surface.wgsl", "surfaces.wgsl", "albedo.wgsl", "camera.wgsl", "single_pole.wgsl", "sums.wgsl",
-    "illuminate.wgsl", "indirect.wgsl", "interpolate.wgsl", "light_cache.wgsl", "lamp_shares.wgsl", "pixel_list.wgsl", "triangle_normal.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl", "hashed_alpha.wgsl",
+    "illuminate.wgsl", "indirect.wgsl", "light_cache.wgsl", "lamp_shares.wgsl", "pixel_list.wgsl", "triangle_normal.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl", "hashed_alpha.wgsl",
     "rise.wgsl", "spot.wgsl", "shaded.wgsl", "visibility.wgsl", "reflections/bounce.wgsl", "reflections/bounce_off.wgsl", "reflections/curvature.wgsl",
     "reflections/spawn.wgsl", "reflections/follow.wgsl", "reflections/land.wgsl", "reflections/lobe.wgsl",
     "rays/traverse.wgsl", "rays/material.wgsl", "rays/primary.wgsl"
@@ -59,7 +58,6 @@ pub fn shader_sources<'t>(
         Primary,
         Keep,
         Illuminate,
-        Interpolate,
         LookUp,
         Spawn,
         Lobe,

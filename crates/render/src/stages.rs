@@ -14,7 +14,7 @@ use crate::light_samples::CachedLight;
 use crate::pieces::{Piece, Pieces};
 use crate::reflections::{self, Reflections};
 use crate::surfaces::{SurfaceKind, SurfacePool, Surfaces};
-use crate::{Rate, RenderError, finish, illuminate, interpolate, keep, pixel_list::PixelList, raster::Raster};
+use crate::{RenderError, finish, illuminate, keep, pixel_list::PixelList, raster::Raster};
 use crate::{rays::primary, redundancy_test::Evidence};
 
 /// Batches of one class that are under way at once: each holds memory for its surfaces, light and planes.
@@ -167,28 +167,15 @@ impl Stages {
         planes: &Planes,
     ) -> Result<Vec<PixelList>, RenderError> {
         let batch = recording.batch;
-        let mut lists = Vec::new();
         if let Some(cached) = batch.cached {
             return self.look_up(recording, cached, surfaces, planes);
         }
         if !batch.work.lighting.is_lit() || !batch.has_color() {
-            return Ok(lists);
+            return Ok(Vec::new());
         }
         let parts = batch.parts(&self.gpu, &recording.pieces, &recording.sums);
-        if batch.work.lighting.rate == Rate::Full {
-            illuminate::record(recording, &parts, (0, surfaces), (1, None))?;
-            return Ok(lists);
-        }
-        illuminate::record(recording, &parts, (0, surfaces), (illuminate::GRID_PX, None))?;
-        for halvings in 1..=illuminate::GRID_PX.ilog2() {
-            for (camera, target) in surfaces.iter().enumerate() {
-                let own = self.lists(recording, camera);
-                interpolate::record(recording, (camera, target), illuminate::GRID_PX >> halvings, &own)?;
-                illuminate::record(recording, &parts, (camera, slice::from_ref(target)), (1, Some(&own)))?;
-                lists.extend(own);
-            }
-        }
-        Ok(lists)
+        illuminate::record(recording, &parts, (0, surfaces), None)?;
+        Ok(Vec::new())
     }
 
     /// Records the look-up of light in samples, and the light of the pixels that no sample knows. The lists of those must live
@@ -212,7 +199,7 @@ impl Stages {
             let picture = Picture { camera, target, planes, lists: &lists, asked: &asked };
             light_cache::record(recording, cached, picture)?;
             if batch.has_color() {
-                illuminate::record(recording, &parts, (camera, slice::from_ref(target)), (1, Some(&lists)))?;
+                illuminate::record(recording, &parts, (camera, slice::from_ref(target)), Some(&lists))?;
             }
             all.extend(lists.into_iter().chain(asked));
         }

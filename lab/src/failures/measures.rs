@@ -82,14 +82,6 @@ pub fn samples(image: &DepthImage) -> usize {
     image.inverse_depth_per_m.iter().filter(|&&depth| depth > 0.0).count()
 }
 
-/// The root mean square difference of linear green light, over the samples of the second image.
-pub fn light_error(a: &DepthImage, b: &DepthImage) -> f64 {
-    let texels = a.color_rgb9e5.iter().zip(&b.color_rgb9e5).zip(&b.inverse_depth_per_m);
-    let surfaces = texels.filter(|(_, depth)| **depth > 0.0);
-    let squares = surfaces.map(|((&a, &b), _)| f64::from((linear_from_rgb9e5(a) - linear_from_rgb9e5(b)).y).powi(2));
-    mean(squares).unwrap_or(f64::NAN).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use glam::UVec2;

@@ -93,7 +93,7 @@ pub(crate) fn record(
     for (camera, target) in (first..).zip(surfaces) {
         let own = pass.bind(0, bindings(&variant, &recording.cameras, target))?;
         let groups: Vec<_> = [&own, &rays].into_iter().chain(&known).collect();
-        recording.dispatch(&variant, &pass, &groups, (camera, 1));
+        recording.dispatch(&variant, &pass, &groups, camera);
     }
     Ok(())
 }

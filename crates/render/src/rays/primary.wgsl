@@ -39,7 +39,7 @@ fn candidate_at(hit: Hit, pixel: vec2u, direction: vec3f) -> Candidate {
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let pixel = pixel_at(id, 1u);
+    let pixel = pixel_at(id);
     if is_beyond(pixel) { return; }
     let direction = direction_of(pixel);
     let ray = ray_from({{ "origin_of(pixel)" if single_pole else "camera.eye_in_world" }}, direction);

@@ -24,7 +24,7 @@ struct Lobe { first_ray: u32, ray: u32, ray_count: u32, whole: u32 }
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let pixel = pixel_at(id, 1u);
+    let pixel = pixel_at(id);
     if is_beyond(pixel) { return; }
     let place = camera.first_word / {{ plane_count }}u + place_of(pixel);
     let depth = reversed_depth_at(pixel);

@@ -34,7 +34,7 @@ fn curvature_at(direction: vec3f, planar_depth_m: f32) -> f32 {
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let pixel = pixel_at(id, 1u);
+    let pixel = pixel_at(id);
     if is_beyond(pixel) { return; }
     let place = camera.first_word / {{ plane_count }}u + place_of(pixel);
     let depth = reversed_depth_at(pixel);

@@ -89,9 +89,7 @@ impl Shared {
 fn a_picture_in_slices_is_the_whole_picture_with_every_light() {
     let shared = Shared::new();
     for visibility in [Visibility::Triangles, Visibility::Rays] {
-        for lighting in
-            ["phong", "shadows", "soft 2, occlusion 2", "soft 40, occlusion 3", "soft 2, occlusion 2, adaptive"]
-        {
+        for lighting in ["phong", "shadows", "soft 2, occlusion 2", "soft 40, occlusion 3"] {
             let work = shared.work(lighting, visibility);
             shared.check(&format!("views, {lighting}, {visibility}"), || shared.views(work));
             shared.check(&format!("images, {lighting}, {visibility}"), || shared.images(work));
@@ -139,7 +137,7 @@ fn shaders_are_compiled_outside_the_queue_beside_a_live_stream() {
     let _live = shared.gpu.device_queue.live_stream();
     let lightings = [
         ("soft 2, occlusion 2", Visibility::Rays),
-        ("shadows, adaptive", Visibility::Triangles),
+        ("shadows", Visibility::Triangles),
         ("unlit", Visibility::Triangles),
     ];
     for (lighting, visibility) in lightings {

@@ -1,4 +1,4 @@
-//! Light by rays: their number, contact, the terminator, and the adaptive rate.
+//! Light by rays: their number, contact and the terminator.
 
 use depth_image::{DepthImage, Environment, Illumination, Light, PinholeCamera, linear_from_rgb9e5};
 use fixtures::{quad, uv_sphere};
@@ -8,7 +8,7 @@ use scene::procedural::courtyard;
 use scene::{Instance, Scene};
 
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
-use crate::failures::measures::{foreground, light_error, share};
+use crate::failures::measures::{foreground, share};
 use crate::failures::shape::Shape;
 use crate::failures::stage::{CARVE, Cell, Stage, looking};
 use crate::failures::stand::Stand;
@@ -17,7 +17,7 @@ const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, hal
 /// Rays of the truth.
 const TRUE_RAYS: u32 = 512;
 
-pub const CURVES: [Curve; 4] = [
+pub const CURVES: [Curve; 3] = [
     Curve {
         name: "Picture error against rays of light",
         subject: "a courtyard under a wide lamp, sampled and reconstructed",
@@ -50,15 +50,6 @@ pub const CURVES: [Curve; 4] = [
         )],
         why: "Normals are smooth, facets are flat: where light grazes, a facet that faces away shadows what the normals call lit.",
         measure: by_segments,
-    },
-    Curve {
-        name: "Error against the adaptive tolerance",
-        subject: "a courtyard under a wide lamp",
-        x: X::log("tolerance", "", &[0.01, 0.04, 0.16, 0.64]),
-        y: ["RMSE of linear light", ""],
-        series: &[Series::new("soft 16, adaptive", &[Shape::rises(1e-4, 1e-4)])],
-        why: "A looser tolerance takes more pixels from their neighbours, and misses finer shadows.",
-        measure: by_tolerance,
     },
 ];
 
@@ -150,15 +141,5 @@ fn by_segments(stand: &Stand, segments: &[f64]) -> anyhow::Result<Rows> {
         let shadowed = lit("shadows")?;
         let facing = plain.iter().zip(&shadowed).filter(|((_, plain), _)| *plain > 0.0);
         Ok([share(facing.map(|(_, (_, shadowed))| *shadowed == 0.0))])
-    })
-}
-
-fn by_tolerance(stand: &Stand, tolerances: &[f64]) -> anyhow::Result<Rows> {
-    let scene = stand.upload(&yard_under_a_lamp())?;
-    let camera = YARD.camera([0.0, 0.0], stand.sample_px);
-    let full = image(stand, &scene, soft(16)?, &camera)?;
-    rows(tolerances, |tolerance| {
-        let adaptive = image(stand, &scene, format!("soft 16, adaptive {tolerance}").parse()?, &camera)?;
-        Ok([light_error(&adaptive, &full)])
     })
 }
