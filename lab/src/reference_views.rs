@@ -24,8 +24,6 @@ pub struct ReferenceViews {
     pub cameras: Vec<PinholeCamera>,
     /// Views drawn from the scene.
     pub views: Vec<View>,
-    /// Sample images, decoded from what travels.
-    pub images: Vec<DepthImage>,
     set: SampleSet,
     classes: Vec<Vec<PixelClass>>,
 }
@@ -57,7 +55,7 @@ impl ReferenceViews {
         let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ViewPlanes::ALL), TURN)?;
         let class = |(camera, view): (&PinholeCamera, &View)| Ok(classify(camera, inverse_depth(view)?, &images)?);
         let classes = cameras.iter().zip(&views).map(class).collect::<anyhow::Result<_>>()?;
-        Ok(Self { engine: engine.clone(), cameras, views, images, set, classes })
+        Ok(Self { engine: engine.clone(), cameras, views, set, classes })
     }
 
     /// The classes of the pixels of every view.
@@ -94,7 +92,7 @@ impl ReferenceViews {
 }
 
 /// The sample set as compositors decode it.
-fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result<Vec<DepthImage>> {
+pub(crate) fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> anyhow::Result<Vec<DepthImage>> {
     let work = SampleWork {
         scene_hash: setup.offer.hash.to_string(),
         wanted: (0..setup.samples.len() as u32).collect(),

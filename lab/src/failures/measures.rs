@@ -1,7 +1,7 @@
 //! Figures of views beside the truth. A view with a depth that is no number has no figure: it is NaN, which no shape has.
 
 use anyhow::Context as _;
-use depth_image::{DepthImage, ProvenanceKind, View, linear_from_rgb9e5};
+use depth_image::{DepthImage, ProvenanceKind, View};
 use metrics::PictureErrors;
 
 use crate::evaluation::mean_errors;

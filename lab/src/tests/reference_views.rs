@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::reference_views::ReferenceViews;
+use crate::reference_views::{self, ReferenceViews};
 use app_core::addresses::listen;
 use app_core::cluster::Cluster;
 use app_core::delivery::{open, receive, request};
@@ -93,7 +93,7 @@ fn unknown_names_are_refused_with_their_field() {
     assert!(is_invalid(&sample(&hash, "layered_cube:64", "unlit"), "sample_cameras"));
     let set = node::SampleSet {
         scene_hash: hash.clone(),
-        images: SampleImages::Depth(reference.images.clone()),
+        images: SampleImages::Depth(reference_views::sample(&engine, &setup, &args).unwrap()),
         volume: setup.offer.volume,
         background: Environment::default(),
         illumination: setup.offer.illumination.clone(),
