@@ -100,7 +100,7 @@ impl DrawPass {
         let corners = gpu.buffer("nothing", 1024, BufferUsages::VERTEX | BufferUsages::INDEX);
         let mut frame = Frame::begin(gpu, "compile", Turn::default());
         let colors: Vec<_> = colors.iter().collect();
-        let depth: _ = target(Self::DEPTH_FORMAT);
+        let depth = target(Self::DEPTH_FORMAT);
         let mut pass = frame.begin_drawing("compile", &colors, Some(wgpu::Color::TRANSPARENT), &depth);
         pass.set_pipeline(&self.pipeline);
         (0..self.state.vertices.len() as u32).for_each(|slot| pass.set_vertex_buffer(slot, corners.slice(..)));
