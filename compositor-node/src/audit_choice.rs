@@ -72,8 +72,7 @@ impl AuditChoice {
         least_apart_m: f32,
     ) -> Option<usize> {
         let seen = self.audited.iter().filter(|(of, ..)| of == kind);
-        let is_new =
-            |view: &Candidate| !seen.clone().any(|(_, set, camera)| is_near((set, camera), view, least_apart_m));
+        let is_new = |view: &Candidate| !seen.clone().any(|(_, set, camera)| is_near(set, camera, view, least_apart_m));
         let is_other = |view: &Candidate| !self.recent.contains(&view.stream);
         let new: Vec<usize> = (0..views.len()).filter(|&place| is_new(&views[place])).collect();
         let mut eligible: Vec<usize> = new.iter().copied().filter(|&place| is_other(&views[place])).collect();
@@ -137,7 +136,7 @@ fn random_pause(busy_s: f64, share: f64, random: u64) -> Duration {
 }
 
 /// Whether a view was audited from the same set and about the same place.
-fn is_near((set, camera): (&SetContent, &PinholeCamera), view: &Candidate, least_apart_m: f32) -> bool {
+fn is_near(set: &SetContent, camera: &PinholeCamera, view: &Candidate, least_apart_m: f32) -> bool {
     *set == view.set
         && is_one_place(camera, &view.camera, least_apart_m)
         && camera.size_px == view.camera.size_px

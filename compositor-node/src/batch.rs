@@ -127,7 +127,9 @@ pub(crate) struct Waiting {
 impl Waiting {
     /// A view of a request that is ready for the device now.
     pub(crate) fn new(
-        (request, view, arrived): (&RenderViews, RequestedView, Instant),
+        request: &RenderViews,
+        view: RequestedView,
+        arrived: Instant,
         set: &Loaded,
         reply: Reply,
         credit: Credit,

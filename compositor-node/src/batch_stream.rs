@@ -80,7 +80,7 @@ impl<'a> BatchStream<'a> {
             // The sets of the next cells are fetched meanwhile, unpinned: one that is not needed yet must not keep out another.
             let next = cells[at..].iter().take(CELLS_AHEAD).map(|(cell, _)| *cell);
             shared.begin_to_load(&plan, request.set_index, next);
-            self.enqueue_of_cell(&request, &plan, (*cell, views), arrived).await?;
+            self.enqueue_of_cell(&request, &plan, *cell, views, arrived).await?;
         }
         Ok(())
     }
@@ -91,7 +91,8 @@ impl<'a> BatchStream<'a> {
         &mut self,
         request: &RenderViews,
         plan: &Arc<Assignment>,
-        (cell, views): (u32, &[RequestedView]),
+        cell: u32,
+        views: &[RequestedView],
         arrived: Instant,
     ) -> Result<(), Status> {
         let shared = self.client.shared.clone();
@@ -113,7 +114,7 @@ impl<'a> BatchStream<'a> {
             };
             let (now, later) = left.split_at(credits.len());
             let waiting = |(view, credit): (&RequestedView, Credit)| {
-                Waiting::new((request, *view, arrived), &loaded, self.reply.clone(), credit)
+                Waiting::new(request, *view, arrived, &loaded, self.reply.clone(), credit)
             };
             self.client.queue(false, now.iter().zip(credits).map(waiting).collect());
             (left, set) = (later, Some(loaded));

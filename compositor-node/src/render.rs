@@ -93,7 +93,7 @@ impl Rendering {
                     metrics.queue_s.observe(start.saturating_duration_since(view.queued).as_secs_f64());
                 }
                 self.auditor.note(&batch);
-                tokio::spawn(self.clone().encode_all(batch, views, (start, batch_s), place));
+                tokio::spawn(self.clone().encode_all(batch, views, start, batch_s, place));
                 busy_s
             }
             Err(status) => {
@@ -145,7 +145,8 @@ impl Rendering {
         self,
         batch: Vec<Waiting>,
         views: Vec<View>,
-        (start, batch_s): (Instant, f64),
+        start: Instant,
+        batch_s: f64,
         place: OwnedSemaphorePermit,
     ) {
         let count = batch.len();

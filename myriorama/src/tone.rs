@@ -22,16 +22,16 @@ impl ToneArgs {
     /// The request with this tone; what is not given suits people.
     #[must_use]
     pub fn for_people(self, request: SessionRequest) -> SessionRequest {
-        self.applied(request, (Exposure::Auto, ToneCurve::KhronosNeutral))
+        self.applied(request, Exposure::Auto, ToneCurve::KhronosNeutral)
     }
 
     /// The request with this tone; what is not given changes no light, as metrics need it.
     #[must_use]
     pub fn for_metrics(self, request: SessionRequest) -> SessionRequest {
-        self.applied(request, (Exposure::Ev(ExposureEv::ZERO), ToneCurve::None))
+        self.applied(request, Exposure::Ev(ExposureEv::ZERO), ToneCurve::None)
     }
 
-    fn applied(self, mut request: SessionRequest, (exposure, curve): (Exposure, ToneCurve)) -> SessionRequest {
+    fn applied(self, mut request: SessionRequest, exposure: Exposure, curve: ToneCurve) -> SessionRequest {
         let exposure = self.exposure.unwrap_or(exposure);
         request.auto_exposure = exposure == Exposure::Auto;
         request.planes.tone.exposure = match exposure {

@@ -94,7 +94,7 @@ impl SamplerService {
         let metrics = self.metrics.clone();
         let own: Vec<_> = indices.iter().map(|&index| work.cameras[index as usize]).collect();
         let most_bytes = most_image_bytes(&plan.workload.illumination, &own);
-        let key = (content, plan.tile_count, indices.clone());
+        let key = (content, plan.tile_count, indices);
         let tiles = f64::from(plan.tile_count);
         let number = plan.workload_number;
         let turn = self.turns.of(number);
@@ -106,7 +106,7 @@ impl SamplerService {
                 return Err(Status::failed_precondition(format!("no plan in force has this set {set_index}")));
             }
             let sampled = scenes.on_device(&scene, move |engine| sample(engine, &work)).await?;
-            let images = blocking(move || pack(sampled, (&indices, tiles), (number, &metrics))).await?;
+            let images = blocking(move || pack(&sampled, tiles, number, &metrics)).await?;
             let bytes = images.iter().map(|(_, image)| image.payload.len()).sum();
             Ok((images, bytes))
         };
@@ -209,31 +209,36 @@ fn sample_work(plan: &Assignment, indices: &[u32], set_index: u32) -> Result<Sam
     })
 }
 
-/// Images with the seconds that they took.
-fn sample(engine: &dyn Engine, work: &SampleWork) -> Result<(Vec<SampleImage>, f64), EngineError> {
-    let (images, sampled_s) = own_time(engine, || engine.sample(work, Turn::of(WorkClass::Batch)));
-    let scene_time_s = work.scene_time_s;
-    let refinement_step = work.refinement.step;
-    tracing::debug!(images = work.wanted.len(), scene_time_s, refinement_step, sampled_s, "sampled");
-    Ok((images?, sampled_s))
+/// Images, or one tile of each.
+struct Sampled {
+    images: Vec<SampleImage>,
+    camera_indices: Vec<u32>,
+    duration_s: f64,
 }
 
-fn pack(
-    (images, sampled_s): (Vec<SampleImage>, f64),
-    (indices, tiles): (&[u32], f64),
-    (workload_number, metrics): (u64, &NodeMetrics),
-) -> Result<PackedImages, Status> {
+fn sample(engine: &dyn Engine, work: &SampleWork) -> Result<Sampled, EngineError> {
+    let (images, duration_s) = own_time(engine, || engine.sample(work, Turn::of(WorkClass::Batch)));
+    let scene_time_s = work.scene_time_s;
+    let refinement_step = work.refinement.step;
+    tracing::debug!(images = work.wanted.len(), scene_time_s, refinement_step, duration_s, "sampled");
+    Ok(Sampled { images: images?, camera_indices: work.wanted.clone(), duration_s })
+}
+
+/// Encodes images and counts the work; an image has so many tiles.
+fn pack(sampled: &Sampled, tiles: f64, workload_number: u64, metrics: &NodeMetrics) -> Result<PackedImages, Status> {
     let encoding = Instant::now();
-    if images.len() != indices.len() {
-        return Err(Status::internal(format!("{} images were sampled for {} cameras", images.len(), indices.len())));
+    let Sampled { images, camera_indices, duration_s } = sampled;
+    if images.len() != camera_indices.len() {
+        let message = format!("{} images were sampled for {} cameras", images.len(), camera_indices.len());
+        return Err(Status::internal(message));
     }
     let encode = |(index, image): (&u32, &_)| {
         let encoded = encode_sample_image(image).map_err(|error| Status::internal(error.to_string()))?;
         Ok((*index, encoded))
     };
-    let encoded = indices.iter().zip(&images).map(encode).collect::<Result<Vec<_>, Status>>()?;
+    let encoded = camera_indices.iter().zip(images).map(encode).collect::<Result<Vec<_>, Status>>()?;
     let whole_images = images.len() as f64 / tiles;
-    let total_s = sampled_s + encoding.elapsed().as_secs_f64();
+    let total_s = duration_s + encoding.elapsed().as_secs_f64();
     let image_s = total_s / whole_images.max(f64::MIN_POSITIVE);
     images.iter().for_each(|_| metrics.image_s.observe(image_s));
     metrics.images_sampled.inc_by(images.len() as u64);

@@ -82,7 +82,8 @@ impl BudgetPlan {
         now: Duration,
         number: u64,
         workload: &WorkloadState,
-        (budget, device_name): (Budget, &str),
+        budget: Budget,
+        device_name: &str,
         poses: Vec<PinholeCamera>,
     ) -> Result<Self, InvalidField> {
         let missing = || InvalidField::Missing { field: "budget" };

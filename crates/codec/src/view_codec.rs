@@ -27,8 +27,11 @@ impl EncodedView {
     #[must_use]
     pub fn header(
         &self,
-        (sample_set_id, cell, is_neighbour_cell): (SampleSetId, u32, bool),
-        (camera, planes): (PinholeCamera, ViewPlanes),
+        sample_set_id: SampleSetId,
+        cell: u32,
+        is_neighbour_cell: bool,
+        camera: PinholeCamera,
+        planes: ViewPlanes,
         stage_times: StageTimes,
     ) -> FrameHeader {
         let [color_bytes, inverse_depth_bytes, provenance_bytes] = self.lengths;
@@ -161,8 +164,11 @@ mod tests {
         let encoded = encode_view(view, FrameCodec::Lz4).unwrap();
         let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, view.size_px);
         let header = encoded.header(
-            (SampleSetId { plan_epoch: 3, index: 2 }, 0, false),
-            (camera, ViewPlanes::ALL),
+            SampleSetId { plan_epoch: 3, index: 2 },
+            0,
+            false,
+            camera,
+            ViewPlanes::ALL,
             StageTimes::default(),
         );
         WholeFrame { frame: 1, header, data: encoded.data }

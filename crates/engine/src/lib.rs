@@ -192,7 +192,8 @@ impl GpuEngine {
     fn sample_cube(
         &self,
         request: &SampleWork,
-        (draw, mirrored): (DrawWork<'_>, Lighting),
+        draw: DrawWork<'_>,
+        mirrored: Lighting,
         method: SamplingMethod,
     ) -> Result<Vec<SampleImage>, EngineError> {
         let wanted = request.wanted.iter().filter_map(|&wanted| request.cameras.get(wanted as usize));
@@ -344,7 +345,7 @@ impl Engine for GpuEngine {
                 let reason = "light is taken from the images of view cells, not from a layered cube";
                 return Err(invalid("reconstruction_method", reason));
             }
-            return self.sample_cube(request, (draw, mirrored), method);
+            return self.sample_cube(request, draw, mirrored, method);
         }
         let cameras: Vec<Camera> = request.cameras.iter().filter_map(SampleCamera::depth).copied().collect();
         let SamplePlanes { normals: normal, corner_inverse_depths: corners, light } = request.planes;

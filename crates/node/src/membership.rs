@@ -44,7 +44,7 @@ pub async fn keep_membership(
         let mut joined = false;
         let request = JoinCluster { node: node.clone(), plan_epoch: plans.epoch() };
         let ended = tokio::select! {
-            ended = member(request, &coordinator, &scenes, (&plans, &done), (&mut warmed, &mut joined)) => ended,
+            ended = member(request, &coordinator, &scenes, &plans, &done, &mut warmed, &mut joined) => ended,
             () = shutdown.cancelled() => return,
         };
         if joined {
@@ -63,8 +63,10 @@ async fn member(
     request: JoinCluster,
     coordinator: &str,
     scenes: &Arc<Scenes>,
-    (plans, done): (&PlansInForce, &WorkDone),
-    (warmed, joined): (&mut bool, &mut bool),
+    plans: &PlansInForce,
+    done: &WorkDone,
+    warmed: &mut bool,
+    joined: &mut bool,
 ) -> Status {
     let client = match connect(coordinator).await {
         Ok(channel) => CoordinatorClient::new(channel),

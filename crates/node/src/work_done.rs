@@ -145,7 +145,10 @@ impl WorkDone {
 impl Sums {
     /// The mean time of each operation; `None` where it was not done.
     fn costs(&self) -> MeasuredCosts {
-        let mean = |operation: Operation| quotient(self.operations[operation as usize]);
+        let mean = |operation: Operation| {
+            let (count, seconds) = self.operations[operation as usize];
+            quotient(count, seconds)
+        };
         let (images, bytes) = self.encoded;
         let (received, seconds) = self.transferred;
         MeasuredCosts {
@@ -154,14 +157,14 @@ impl Sums {
             reconstruct_view_s: mean(Operation::ReconstructView),
             load_set_s: mean(Operation::LoadSet),
             encode_view_s: mean(Operation::EncodeView),
-            transfer_bytes_per_s: quotient((seconds, received)),
-            image_bytes: quotient((images, bytes)),
+            transfer_bytes_per_s: quotient(seconds, received),
+            image_bytes: quotient(images, bytes),
         }
     }
 }
 
 /// The sum divided by the count; `None` for a count of 0.
-fn quotient((count, sum): (f64, f64)) -> Option<f64> {
+fn quotient(count: f64, sum: f64) -> Option<f64> {
     (count > 0.0).then(|| sum / count)
 }
 

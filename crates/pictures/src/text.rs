@@ -69,12 +69,12 @@ impl TextStyle {
             for (column, bits) in (0..).zip(shape(letter)) {
                 (0..LETTER_PX.1)
                     .filter(|row| bits >> row & 1 == 1)
-                    .for_each(|row| self.dot(image, (left + column * self.dot_px, at.1 + row * self.dot_px)));
+                    .for_each(|row| self.dot(image, left + column * self.dot_px, at.1 + row * self.dot_px));
             }
         }
     }
 
-    fn dot(&self, image: &mut RgbImage, (left, top): (u32, u32)) {
+    fn dot(&self, image: &mut RgbImage, left: u32, top: u32) {
         for y in top..(top + self.dot_px).min(image.height()) {
             for x in left..(left + self.dot_px).min(image.width()) {
                 image.put_pixel(x, y, Rgb(self.color));

@@ -29,7 +29,7 @@ impl LobeLight {
     pub const ALL: [Self; 5] = [Self::GatheredMirrors, Self::GatheredRest, Self::Gathered, Self::SentRest, Self::Sent];
 
     /// For the surfaces that pixels show. `followed` of `mirrors` are followed; rough surfaces may be glossy.
-    pub fn of_pixels((followed, mirrors): (u32, u32), glossy: bool, has_light_field: bool) -> Option<Self> {
+    pub fn of_pixels(followed: u32, mirrors: u32, glossy: bool, has_light_field: bool) -> Option<Self> {
         match (followed < mirrors && followed == 0, glossy, has_light_field) {
             (true, true, _) => Some(Self::Gathered),
             (true, false, _) => Some(Self::GatheredMirrors),
@@ -141,7 +141,8 @@ impl ShaderVariant for Lobe {
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     bounces: &Bounces<'_>,
-    (glossy, number): (&GlossyList<'_>, u32),
+    glossy: &GlossyList<'_>,
+    number: u32,
     illumination: &Buffer,
 ) -> Result<RayLists, ReconstructionError> {
     let pass = recording.device.passes.get(&Lobe)?;
@@ -155,7 +156,7 @@ pub(crate) fn record(
     ];
     bindings.extend(bounces.spawn_bindings(&lists));
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&Lobe, &pass, &bound, (&glossy.list, 0), ());
+    recording.dispatch_listed(&Lobe, &pass, &bound, &glossy.list, 0, ());
     Ok(lists)
 }
 
@@ -186,6 +187,6 @@ pub(crate) fn record_sum(recording: &mut Recording<'_>, glossy: &GlossyList<'_>)
         Binding::buffer("out_color", &recording.batch.color),
     ];
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&LobeSum, &pass, &bound, (&glossy.list, 0), ());
+    recording.dispatch_listed(&LobeSum, &pass, &bound, &glossy.list, 0, ());
     Ok(())
 }

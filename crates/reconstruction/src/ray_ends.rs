@@ -67,7 +67,7 @@ pub(crate) fn follow_rays(
     let mirrors = Mirrors { cells: &cells, reflections: 1, glossy_rays: 0 };
     let size_px = UVec2::new(COLUMNS, (rays.len() as u32).div_ceil(COLUMNS).max(1));
     let camera = PinholeCamera::looking_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 1.0, size_px);
-    let mut recording = Recording::begin(device, surroundings, &[camera], ViewPlanes::ALL, (0, Turn::default()))?;
+    let mut recording = Recording::begin(device, surroundings, &[camera], ViewPlanes::ALL, 0, Turn::default())?;
     let Some(mut bounces) = Bounces::lend(device, mirrors, camera.pixel_count(), curved_search.checked()?)? else {
         return Ok((Vec::new(), 0.0));
     };
@@ -91,16 +91,17 @@ pub(crate) fn follow_rays(
         let shown = (*recording.batch.color).clone();
         recording.frame.encoder.clear_buffer(&shown, 0, None);
         land(&mut recording, &bounces, (&lists, None), (0, 1))?;
-        return read(device, recording, &bounces, (&shown, rays.len()));
+        return read(device, recording, &bounces, &shown, rays.len());
     }
-    read(device, recording, &bounces, (bounces.planes()[0], rays.len()))
+    read(device, recording, &bounces, bounces.planes()[0], rays.len())
 }
 
 fn read(
     device: &Device,
     recording: Recording<'_>,
     bounces: &Bounces<'_>,
-    (color, count): (&wgpu::Buffer, usize),
+    color: &wgpu::Buffer,
+    count: usize,
 ) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
     let Recording { mut frame, batch, .. } = recording;
     let bytes = 4 * count.max(1) as u64;

@@ -207,7 +207,7 @@ impl Reconstructor {
         let Prepared { request, mirrors, lobes, .. } = prepared;
         let ReconstructRequest { set, method, planes, turn, .. } = request;
         let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), mirrors.cells.len()));
-        let mut recording = Recording::begin(&self.device, set, cameras, planes, (family, turn))?;
+        let mut recording = Recording::begin(&self.device, set, cameras, planes, family, turn)?;
         let rays = recording.batch.plane_bytes as usize / 4;
         let lend = |of| Bounces::lend(&self.device, of, rays, CurvedSearch::default());
         let bounces = [lend(mirrors)?, lend(lobes)?];
@@ -286,14 +286,14 @@ impl Reconstructor {
         let first = mirrored.as_ref().map(|(bounces, first)| (*bounces, first));
         let glossy = lobes.and_then(|lobes| GlossyList::of(recording, lobes));
         let unknown = match base {
-            Some(base) => layered::record_left(recording, base, &unknown, (first, glossy.as_ref()))?,
+            Some(base) => layered::record_left(recording, base, &unknown, first, glossy.as_ref())?,
             None => unknown,
         };
         fill::record(recording, &unknown)?;
-        specular::record(recording, listed, (first, glossy.as_ref()))?;
+        specular::record(recording, listed, first, glossy.as_ref())?;
         if let Some((bounces, first)) = mirrored {
             bounce::record(recording, bounces, first, |recording, which, lists, place| match base {
-                Some(base) => layered::follow_in_base(recording, base, (bounces, which), lists, place),
+                Some(base) => layered::follow_in_base(recording, base, bounces, which, lists, place),
                 None => Ok(()),
             })?;
         }

@@ -93,7 +93,8 @@ impl<'r> Recording<'r> {
         set: &'r SampleSet,
         cameras: &[PinholeCamera],
         planes: ViewPlanes,
-        (family, turn): (u64, Turn),
+        family: u64,
+        turn: Turn,
     ) -> Result<Self, ReconstructionError> {
         let plane_bytes = 4 * (cameras[0].pixel_count() * cameras.len()) as u64;
         let sum_bytes = (planes.antialias > Antialias::NONE).then_some(3 * plane_bytes);
@@ -185,7 +186,8 @@ impl<'r> Recording<'r> {
         variant: &impl ShaderVariant,
         pass: &ComputePass,
         bound: &BoundGroup,
-        (lists, number): (&wgpu::Buffer, usize),
+        lists: &wgpu::Buffer,
+        number: usize,
         what: impl Hash,
     ) {
         pass.dispatch(&mut self.frame, &[bound], DispatchSize::Indirect(lists, number as u32));

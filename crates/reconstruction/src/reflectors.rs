@@ -32,14 +32,15 @@ impl Reflectors {
     ) -> Result<Option<Self>, ReconstructionError> {
         let planes: Vec<Planes<'_>> = images.iter().map(Planes::of_image).collect();
         check(&planes, illumination)?;
-        Self::of_planes(tables, &planes, (illumination, highlight), |_, words| words, turn)
+        Self::of_planes(tables, &planes, illumination, highlight, |_, words| words, turn)
     }
 
     /// `sorted` receives the number of words of a sample and the words of all samples; it gives them in the set's order.
     fn of_planes(
         tables: &TablePool,
         planes: &[Planes<'_>],
-        (illumination, highlight): (&Illumination, Option<Highlight>),
+        illumination: &Illumination,
+        highlight: Option<Highlight>,
         sorted: impl FnOnce(usize, Vec<u32>) -> Vec<u32>,
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
@@ -63,7 +64,8 @@ impl Reflectors {
     /// As [`Reflectors::upload`], of a layered cube: its samples are in the order of `places` in their images, image after image.
     pub fn of_cube(
         tables: &TablePool,
-        (images, places): (&[LayeredDepthImage; 3], &[u32]),
+        images: &[LayeredDepthImage; 3],
+        places: &[u32],
         set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
@@ -75,7 +77,7 @@ impl Reflectors {
             let place = |(sample, &place): (usize, &u32)| (first[image_of(sample)] + place as usize) * stride;
             places.iter().enumerate().flat_map(|at| words[place(at)..][..stride].iter().copied()).collect()
         };
-        Self::of_planes(tables, &planes, (set.illumination, set.highlight), words, turn)
+        Self::of_planes(tables, &planes, set.illumination, set.highlight, words, turn)
     }
 }
 

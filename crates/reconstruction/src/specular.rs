@@ -87,7 +87,8 @@ impl ShaderVariant for Specular {
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     listed: Option<&PixelList>,
-    (mirrored, glossy): (Option<(&Bounces<'_>, &RayLists)>, Option<&GlossyList<'_>>),
+    mirrored: Option<(&Bounces<'_>, &RayLists)>,
+    glossy: Option<&GlossyList<'_>>,
 ) -> Result<(), ReconstructionError> {
     let Some(reflectors) = &recording.set.reflectors else { return Ok(()) };
     let mirrors = |_: &&Arc<GpuEnvironment>| reflectors.highlight == Highlight::Ggx;

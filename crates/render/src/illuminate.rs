@@ -191,7 +191,8 @@ impl Illuminate {
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     parts: &[Part],
-    (first, surfaces): (usize, &[Surfaces]),
+    first: usize,
+    surfaces: &[Surfaces],
     lists: Option<&[PixelList]>,
 ) -> Result<(), RenderError> {
     let batch = recording.batch;

@@ -26,7 +26,8 @@ impl ShaderVariant for Keep {
 /// Records the pass of one image, whose camera is the `camera`-th of the batch, into a layer of known samples.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
-    (camera, target): (usize, &Surfaces),
+    camera: usize,
+    target: &Surfaces,
     held: &wgpu::TextureView,
 ) -> Result<(), RenderError> {
     let variant = Keep { by_rays: recording.batch.by_rays };

@@ -123,7 +123,7 @@ impl Stages {
                 (earlier > 0).then(|| sequence.known.predecessors(&self.gpu, earlier, camera.reference()));
             self.find(recording, (place, slice::from_ref(target)), predecessors.as_ref())?;
             if let Some((held, _)) = sequence.layer(place, Evidence::Samples) {
-                keep::record(recording, (place, target), held)?;
+                keep::record(recording, place, target, held)?;
             }
         }
         Ok(())
@@ -174,7 +174,7 @@ impl Stages {
             return Ok(Vec::new());
         }
         let parts = batch.parts(&self.gpu, &recording.pieces, &recording.sums);
-        illuminate::record(recording, &parts, (0, surfaces), None)?;
+        illuminate::record(recording, &parts, 0, surfaces, None)?;
         Ok(Vec::new())
     }
 
@@ -199,7 +199,7 @@ impl Stages {
             let picture = Picture { camera, target, planes, lists: &lists, asked: &asked };
             light_cache::record(recording, cached, picture)?;
             if batch.has_color() {
-                illuminate::record(recording, &parts, (camera, slice::from_ref(target)), Some(&lists))?;
+                illuminate::record(recording, &parts, camera, slice::from_ref(target), Some(&lists))?;
             }
             all.extend(lists.into_iter().chain(asked));
         }

@@ -56,7 +56,7 @@ impl Scheduler {
         }
         let plan_number = self.last_budget_plan + 1;
         let poses = self.budgets.get(&number).map(|state| state.findings.poses_to_join()).unwrap_or_default();
-        let begun = BudgetPlan::begin(self.now, plan_number, workload, (budget, &device_name), poses);
+        let begun = BudgetPlan::begin(self.now, plan_number, workload, budget, &device_name, poses);
         self.workloads.get_mut(&number)?.not_planned = begun.as_ref().err().map(ToString::to_string);
         let plan = begun.ok()?;
         self.last_budget_plan = plan_number;

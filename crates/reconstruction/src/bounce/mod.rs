@@ -402,7 +402,7 @@ pub(crate) fn follow(
     (cell, reflection): (usize, u32),
 ) -> Result<(), ReconstructionError> {
     if bounces.poles[cell].is_some() {
-        return follow_curved(recording, bounces, lists, (cell, reflection));
+        return follow_curved(recording, bounces, lists, cell, reflection);
     }
     let set = bounces.cells[cell].surroundings.variant();
     let [left, unknown] = [2, 3]
@@ -412,14 +412,14 @@ pub(crate) fn follow(
     let mut bindings = bounces.search_bindings(cell, &left);
     bindings.extend(bounces.list_bindings(lists));
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&march, &pass, &bound, (&lists.lists, cell), (cell, reflection));
+    recording.dispatch_listed(&march, &pass, &bound, &lists.lists, cell, (cell, reflection));
     let carve = Carve { set, stop_level: 0, bounced: true };
     let pass = recording.device.passes.get(&carve)?;
     let mut bindings = bounces.search_bindings(cell, &unknown);
     bindings.push(Binding::buffer("rays", &bounces.rays[lists.memory]));
     bindings.extend(left.bindings());
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&carve, &pass, &bound, (&left.lists, cell), (cell, reflection));
+    recording.dispatch_listed(&carve, &pass, &bound, &left.lists, cell, (cell, reflection));
     Ok(())
 }
 
@@ -428,7 +428,8 @@ fn follow_curved(
     recording: &mut Recording<'_>,
     bounces: &Bounces<'_>,
     lists: &RayLists,
-    (cell, reflection): (usize, u32),
+    cell: usize,
+    reflection: u32,
 ) -> Result<(), ReconstructionError> {
     let set = bounces.cells[cell].surroundings.variant();
     let walk = CurvedWalk { set, count_steps: bounces.steps.is_some() };
@@ -439,7 +440,7 @@ fn follow_curved(
     bindings.extend(bounces.steps.as_ref().map(|steps| Binding::buffer("out_steps", steps)));
     bindings.extend(bounces.list_bindings(lists));
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&walk, &pass, &bound, (&lists.lists, cell), (cell, reflection));
+    recording.dispatch_listed(&walk, &pass, &bound, &lists.lists, cell, (cell, reflection));
     Ok(())
 }
 
@@ -485,7 +486,7 @@ pub(crate) fn land(
     let next = next.filter(|_| variant.next_cells.is_some());
     bindings.extend(next.into_iter().flat_map(|next| bounces.spawn_bindings(next)));
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&variant, &pass, &bound, (&lists.lists, cell), (cell, reflection));
+    recording.dispatch_listed(&variant, &pass, &bound, &lists.lists, cell, (cell, reflection));
     Ok(())
 }
 

@@ -98,7 +98,7 @@ impl Cube {
             leaves: tables.upload("leaves of a cube", TextureFormat::Rgba32Uint, &bricks.leaves, turn)?,
             entries: tables.upload("entries of a cube", TextureFormat::Rgba32Uint, &bricks.entries, turn)?,
             samples: tables.upload("samples of a cube", TextureFormat::Rgba32Uint, &words, turn)?,
-            reflectors: Reflectors::of_cube(tables, (images, &samples.place), set, turn)?,
+            reflectors: Reflectors::of_cube(tables, images, &samples.place, set, turn)?,
             start_m,
             light_field: light_field.as_ref().map(|field| LightField::upload(tables, field, turn)).transpose()?,
             truncated: images.iter().any(|image| image.truncated),

@@ -200,11 +200,11 @@ pub(crate) fn record(
     let mirrors = bounces.map_or(0, Bounces::reflections);
     let followed = followed.map_or(mirrors, |followed| followed.min(mirrors));
     let is_glossy = bounces.is_some_and(|bounces| bounces.glossy_rays() > 0);
-    let lobe = LobeLight::of_pixels((followed, mirrors), is_glossy, cube.light_field.is_some());
+    let lobe = LobeLight::of_pixels(followed, mirrors, is_glossy, cube.light_field.is_some());
     let sent = bounces.filter(|_| lobe.is_some_and(LobeLight::is_sent));
     let sent = sent.and_then(|bounces| GlossyList::of(recording, bounces));
     let first = bounces.filter(|_| followed > 0).map(|bounces| bounces.next(recording.device, None));
-    walk_pixels(recording, &cube, (None, &undecided), (bounces.zip(first.as_ref()), lobe, sent.as_ref()))?;
+    walk_pixels(recording, &cube, None, &undecided, bounces.zip(first.as_ref()), lobe, sent.as_ref())?;
     let Some(bounces) = bounces else { return Ok(undecided) };
     if let Some(first) = first {
         let last = (followed < mirrors).then_some(LobeLight::GatheredMirrors);
@@ -225,7 +225,7 @@ pub(crate) fn follow_lobes(
 ) -> Result<(), ReconstructionError> {
     let Some(reflectors) = cube.reflectors.as_ref().or(recording.set.reflectors.as_ref()) else { return Ok(()) };
     for number in 0..glossy.rays {
-        let first = lobes::record(recording, bounces, (glossy, number), &reflectors.illumination)?;
+        let first = lobes::record(recording, bounces, glossy, number, &reflectors.illumination)?;
         // Costs are learned by generation, and are others than those of rays off mirrors.
         let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + bounces.reflections().max(1);
         follow_mirrors(recording, cube, bounces, (first, None, Some(glossy)), generations)?;
@@ -260,11 +260,12 @@ pub(crate) fn record_left(
     recording: &mut Recording<'_>,
     base: &Cube,
     left: &PixelList,
-    (mirrored, glossy): (Option<(&Bounces<'_>, &RayLists)>, Option<&GlossyList<'_>>),
+    mirrored: Option<(&Bounces<'_>, &RayLists)>,
+    glossy: Option<&GlossyList<'_>>,
 ) -> Result<PixelList, ReconstructionError> {
     let undecided = recording.empty_list();
     let lobe = glossy.map(|_| LobeLight::sent(mirrored.is_some()));
-    walk_pixels(recording, base, (Some(left), &undecided), (mirrored, lobe, glossy))?;
+    walk_pixels(recording, base, Some(left), &undecided, mirrored, lobe, glossy)?;
     Ok(undecided)
 }
 
@@ -273,7 +274,8 @@ pub(crate) fn record_left(
 pub(crate) fn follow_in_base(
     recording: &mut Recording<'_>,
     base: &Cube,
-    (bounces, which): (&Bounces<'_>, InBase),
+    bounces: &Bounces<'_>,
+    which: InBase,
     lists: (&RayLists, Option<&RayLists>),
     place: (usize, u32),
 ) -> Result<(), ReconstructionError> {
@@ -287,8 +289,11 @@ pub(crate) fn follow_in_base(
 fn walk_pixels(
     recording: &mut Recording<'_>,
     cube: &Cube,
-    (listed, undecided): (Option<&PixelList>, &PixelList),
-    (mirrored, lobe, sent): (Option<(&Bounces<'_>, &RayLists)>, Option<LobeLight>, Option<&GlossyList<'_>>),
+    listed: Option<&PixelList>,
+    undecided: &PixelList,
+    mirrored: Option<(&Bounces<'_>, &RayLists)>,
+    lobe: Option<LobeLight>,
+    sent: Option<&GlossyList<'_>>,
 ) -> Result<(), ReconstructionError> {
     let rays = if listed.is_some() { Walked::LeftPixels } else { Walked::Pixels };
     let variant = Walk::of(recording, cube, rays, (mirrored.map(|(bounces, _)| bounces), lobe));
@@ -336,7 +341,7 @@ fn follow(
     let next = next.filter(|_| variant.mirror_cells.is_some());
     bindings.extend(next.into_iter().flat_map(|next| bounces.spawn_bindings(next)));
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&variant, &pass, &bound, (bounces.lists_of(lists), cell), (cell, reflection));
+    recording.dispatch_listed(&variant, &pass, &bound, bounces.lists_of(lists), cell, (cell, reflection));
     Ok(())
 }
 

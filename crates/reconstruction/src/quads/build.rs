@@ -23,7 +23,7 @@ pub(crate) fn mesh(
         return Ok(mesh);
     }
     // Not under the lock: a live view would wait for the turn of a batch.
-    let mesh = Arc::new(build(device, set, (cut, turn), record)?);
+    let mesh = Arc::new(build(device, set, cut, turn, record)?);
     let mut meshes = set.meshes.meshes.lock();
     if let Some(mesh) = kept(&meshes) {
         return Ok(mesh);
@@ -39,7 +39,8 @@ pub(crate) fn mesh(
 fn build(
     device: &Device,
     set: &SampleSet,
-    (cut, turn): (Cut, Turn),
+    cut: Cut,
+    turn: Turn,
     record: impl Fn(&mut Frame<'_>, &ImageCut<'_>) -> Result<(), ReconstructionError>,
 ) -> Result<Mesh, ReconstructionError> {
     let mut frame = Frame::begin(&device.gpu, "cut meshes", turn);

@@ -31,7 +31,7 @@ pub(super) fn drawn(
     for quad in quads {
         let [a, b, c, d] = quad.corners_in_world;
         for (triangle, sample) in [[a, b, c], [d, c, b]].into_iter().zip(quad.samples) {
-            draw(&mut nearest, view, rays, triangle, (quad.image, sample));
+            draw(&mut nearest, view, rays, triangle, quad.image, sample);
         }
     }
     let resolve = |(place, drawn): (UVec2, Option<Drawn>)| match drawn {
@@ -46,7 +46,8 @@ fn draw(
     view: &PinholeCamera,
     rays: &ViewRays,
     triangle: [Vec3; 3],
-    (image, sample): (usize, u32),
+    image: usize,
+    sample: u32,
 ) {
     let [low, high] = bounds_px(view, triangle);
     for place in (low.y..high.y).flat_map(|y| (low.x..high.x).map(move |x| UVec2::new(x, y))) {

@@ -26,7 +26,7 @@ pub fn gathered_light(field: &LayeredLightField, surface: &Reflecting, around: i
         if share > LEAST_LOBE_SHARE {
             let weight = share * direction.solid_angle_sr;
             let to = (lobe.surface.point_in_world, lobe.is_rough());
-            light += light_through(field, (number, direction), to, &around) * weight;
+            light += light_through(field, number, direction, to, &around) * weight;
             sum += weight;
         }
     }
@@ -83,7 +83,8 @@ impl Lobe {
 /// The light that comes to a point from around a direction.
 fn light_through(
     field: &LayeredLightField,
-    (number, direction): (usize, LightDirection),
+    number: usize,
+    direction: LightDirection,
     (point_in_world, is_rough): (Vec3, bool),
     around: &impl Fn(Vec3) -> Vec3,
 ) -> Vec3 {

@@ -166,7 +166,7 @@ fn evaluate_camera(camera: &SampleCamera, ray: &ViewRay, t: f32, level: u32, sto
     };
     if level > 0 {
         let penetration_inside = if level == stop_level { 0.0 } else { FAR_AWAY };
-        evaluate_node(camera, &within, [a, b], (pyramid_level, node), penetration_inside)
+        evaluate_node(camera, &within, [a, b], pyramid_level, node, penetration_inside)
     } else {
         let corners = camera.corners(node);
         if corners.certain || corners.connected {
@@ -213,7 +213,8 @@ fn evaluate_node(
     camera: &SampleCamera,
     within: &InNode,
     [a, b]: [Vec3; 2],
-    (level, node): (u32, UVec2),
+    level: u32,
+    node: UVec2,
     penetration_inside: f32,
 ) -> Evaluation {
     let &InNode { t, exit, code, exit_code, .. } = within;

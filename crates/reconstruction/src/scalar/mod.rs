@@ -93,7 +93,7 @@ fn sums(
     let further: Vec<Option<Vec3>> = (0..found.len()).map(further).collect();
     sums.iter_mut().zip(&further).for_each(|(sum, further)| *sum += further.unwrap_or_default());
     for camera in cameras {
-        let shown = shown_linear(&rough(images, set, &camera, method, (&found, &further)), set, &camera);
+        let shown = shown_linear(&rough(images, set, &camera, method, &found, &further), set, &camera);
         let own = sums.iter_mut().zip(shown).zip(&further).filter(|(_, further)| further.is_none());
         own.for_each(|((sum, shown), _)| *sum += shown);
     }
@@ -106,7 +106,8 @@ fn rough(
     set: &SetDescription<'_>,
     camera: &PinholeCamera,
     method: ReconstructionMethod,
-    (first, further): (&[Pixel], &[Option<Vec3>]),
+    first: &[Pixel],
+    further: &[Option<Vec3>],
 ) -> Vec<Pixel> {
     if further.iter().all(Option::is_none) {
         return pixels(images, set, camera, method);

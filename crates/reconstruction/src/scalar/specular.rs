@@ -31,14 +31,15 @@ pub(super) fn add_highlights(
 ) {
     let Some(highlight) = set.highlight else { return };
     for (pixel, place) in pixels.iter_mut().zip(rays.places()) {
-        pixel.color_linear += added_linear(pixel, images, (set, highlight), cameras, &rays.ray(place));
+        pixel.color_linear += added_linear(pixel, images, set, highlight, cameras, &rays.ray(place));
     }
 }
 
 fn added_linear(
     pixel: &Pixel,
     images: &[DepthImage],
-    (set, highlight): (&SetDescription<'_>, Highlight),
+    set: &SetDescription<'_>,
+    highlight: Highlight,
     cameras: &[SampleCamera],
     ray: &ViewRay,
 ) -> Vec3 {

@@ -57,7 +57,7 @@ pub(super) fn met(
     let rows = camera.size_px.y;
     let a_band = (MOST_LINES / camera.size_px.x).max(1);
     for first in (0..rows).step_by(a_band as usize) {
-        draw_rows(stages, work, (camera, kept), first..(first + a_band).min(rows), &mut crossings)?;
+        draw_rows(stages, work, camera, kept, first..(first + a_band).min(rows), &mut crossings)?;
     }
     Ok(by_line(camera.pixel_count(), &crossings))
 }
@@ -66,7 +66,8 @@ pub(super) fn met(
 fn draw_rows(
     stages: &Stages,
     work: &DrawWork<'_>,
-    (camera, kept): (&ParallelCamera, LayerSelection),
+    camera: &ParallelCamera,
+    kept: LayerSelection,
     rows: std::ops::Range<u32>,
     crossings: &mut Vec<Crossing>,
 ) -> Result<(), RenderError> {
@@ -76,21 +77,21 @@ fn draw_rows(
     let size_px = UVec2::new(camera.size_px.x, rows.len() as u32);
     let part = camera.part(&ViewPart { first_px: UVec2::new(0, rows.start), size_px });
     let expected = (part.pixel_count() as u64 * EXPECTED_LAYERS).clamp(1024, most);
-    let drawn = Drawn::draw(stages, work, (&part, kept), expected)?;
+    let drawn = Drawn::draw(stages, work, &part, kept, expected)?;
     let count = u64::from(drawn.count);
     let first_line = rows.start * camera.size_px.x;
     if count <= expected {
         return drawn.read(stages, work, first_line, crossings);
     }
     if count <= most {
-        return Drawn::draw(stages, work, (&part, kept), count)?.read(stages, work, first_line, crossings);
+        return Drawn::draw(stages, work, &part, kept, count)?.read(stages, work, first_line, crossings);
     }
     if rows.len() == 1 {
         GpuError::check_limit("the surfaces on one row of lines", count, most)?;
     }
     let middle = rows.start + rows.len() as u32 / 2;
-    draw_rows(stages, work, (camera, kept), rows.start..middle, crossings)?;
-    draw_rows(stages, work, (camera, kept), middle..rows.end, crossings)
+    draw_rows(stages, work, camera, kept, rows.start..middle, crossings)?;
+    draw_rows(stages, work, camera, kept, middle..rows.end, crossings)
 }
 
 /// Crossings on the device.
@@ -104,7 +105,8 @@ impl Drawn {
     fn draw(
         stages: &Stages,
         work: &DrawWork<'_>,
-        (camera, kept): (&ParallelCamera, LayerSelection),
+        camera: &ParallelCamera,
+        kept: LayerSelection,
         capacity: u64,
     ) -> Result<Self, RenderError> {
         let Stages { gpu, pool, raster, .. } = stages;

@@ -55,7 +55,8 @@ pub(super) fn light(
     stages: &Stages,
     work: DrawWork<'_>,
     camera: &ParallelCamera,
-    (first, crossings): (&[u32], &[Crossing]),
+    first: &[u32],
+    crossings: &[Crossing],
 ) -> Result<Light, RenderError> {
     let traced = work.lighting.is_traced().then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
     let output = Output { samples: true, ..Output::of(work, work.highlight().is_some()) };

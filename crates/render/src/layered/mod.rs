@@ -23,7 +23,7 @@ pub(crate) fn draw(
     kept: LayerSelection,
 ) -> Result<LayeredDepthImage, RenderError> {
     let (first, crossings, truncated) = crossings::met(stages, &work, camera, kept)?;
-    let lit = lit::light(stages, work, camera, (&first, &crossings))?;
+    let lit = lit::light(stages, work, camera, &first, &crossings)?;
     let reflects = crossings.par_iter().any(|crossing| crossing.surface[3] != 0) && work.highlight().is_some();
     let word = |word: usize| crossings.par_iter().map(|crossing| crossing.surface[word]).collect::<Vec<u32>>();
     Ok(LayeredDepthImage {

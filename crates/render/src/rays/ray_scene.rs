@@ -163,7 +163,7 @@ impl RayScene {
         let took = start.elapsed();
         let fixed = Arc::new(self.fixed(&bvh)?);
         let attributes = self.attributes(scene_time_s)?;
-        let traced = self.traced(&bvh, &corners, (attributes, fixed), took, false)?;
+        let traced = self.traced(&bvh, &corners, attributes, fixed, took, false)?;
         Ok(Built { bvh, scene_time_s, traced, last_refit: None, last_build: took })
     }
 
@@ -180,7 +180,7 @@ impl RayScene {
         let took = start.elapsed();
         let Traced { attributes, fixed, .. } = &*built.traced;
         let attributes = if self.flat.turns() { self.attributes(scene_time_s)? } else { attributes.clone() };
-        let traced = self.traced(&built.bvh, &corners, (attributes, fixed.clone()), took, true)?;
+        let traced = self.traced(&built.bvh, &corners, attributes, fixed.clone(), took, true)?;
         Ok(Built { scene_time_s, traced, last_refit: Some(took), ..built })
     }
 
@@ -210,7 +210,8 @@ impl RayScene {
         &self,
         bvh: &Bvh,
         corners_in_world: &[[Vec3; 3]],
-        (attributes, fixed): (Arc<Attributes>, Arc<Fixed>),
+        attributes: Arc<Attributes>,
+        fixed: Arc<Fixed>,
         took: Duration,
         refitted: bool,
     ) -> Result<Arc<Traced>, GpuError> {

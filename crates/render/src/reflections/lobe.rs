@@ -54,7 +54,8 @@ impl ShaderVariant for Lobe {
 /// Records the pass over a piece of a picture.
 pub(super) fn record(
     recording: &mut Recording<'_>,
-    (ray, weights): (u32, &Buffer),
+    ray: u32,
+    weights: &Buffer,
     (element, piece, units): (u32, Piece, u64),
     target: &Surfaces,
     (next_bounces, next): (&Buffer, &BounceList),

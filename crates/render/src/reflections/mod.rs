@@ -57,7 +57,7 @@ impl Reflections {
         }
         let pixels = |piece: &Piece| (piece.end_row - piece.first_row) * batch.cameras[piece.camera].size_px().x;
         let capacity = pieces.iter().map(pixels).max().unwrap_or(0).max(1);
-        Self::lend_for(gpu, pool, batch, (capacity, batch.bytes(1))).map(Some)
+        Self::lend_for(gpu, pool, batch, capacity, batch.bytes(1)).map(Some)
     }
 
     /// Memory for `capacity` rays, and for planes of `plane_bytes` each.
@@ -65,7 +65,8 @@ impl Reflections {
         gpu: &Gpu,
         pool: &BufferPool,
         batch: &Batch<'_>,
-        (capacity, plane_bytes): (u32, u64),
+        capacity: u32,
+        plane_bytes: u64,
     ) -> Result<Self, RenderError> {
         let lend = |label, bytes| {
             gpu.check_storage_bytes(label, bytes)?;
@@ -99,7 +100,7 @@ impl Reflections {
         let parts = batch.parts_of_points(recording.gpu, &rays, self.capacity);
         for (camera, target) in surfaces.iter().enumerate() {
             for (element, piece) in recording.pieces.of_camera(camera).collect::<Vec<_>>() {
-                self.record_piece(recording, &parts, (element, piece), target)?;
+                self.record_piece(recording, &parts, element, piece, target)?;
             }
         }
         Ok(())
@@ -110,7 +111,8 @@ impl Reflections {
         &self,
         recording: &mut Recording<'_>,
         parts: &[Part],
-        (element, piece): (u32, Piece),
+        element: u32,
+        piece: Piece,
         target: &Surfaces,
     ) -> Result<(), RenderError> {
         let lighting = recording.batch.work.lighting;
@@ -125,7 +127,7 @@ impl Reflections {
         let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + mirrors.max(1);
         for ray in 0..recording.batch.glossy_rays() {
             let first = BounceList::new(recording.gpu);
-            lobe::record(recording, (ray, &self.lobe_weights), piece, target, (&self.bounces[0], &first))?;
+            lobe::record(recording, ray, &self.lobe_weights, piece, target, (&self.bounces[0], &first))?;
             self.record_rays(recording, parts, (self.memories(), first, piece.2), generations.clone())?;
         }
         Ok(())

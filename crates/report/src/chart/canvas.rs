@@ -134,12 +134,12 @@ fn draw_header(area: &Area, name: &str, rows: &[Vec<(i32, &LegendEntry)>]) -> Re
     area.draw(&Text::new(name.to_owned(), (MARGIN_PX, 9), title)).map_err(message)?;
     for (row, entries) in rows.iter().enumerate() {
         let y = TITLE_HEIGHT_PX + LEGEND_ROW_PX * row as i32 + LEGEND_ROW_PX / 2;
-        entries.iter().try_for_each(|(x, entry)| draw_entry(area, (*x, y), entry))?;
+        entries.iter().try_for_each(|(x, entry)| draw_entry(area, *x, y, entry))?;
     }
     Ok(())
 }
 
-fn draw_entry(area: &Area, (x, y): (i32, i32), entry: &LegendEntry) -> Result<(), String> {
+fn draw_entry(area: &Area, x: i32, y: i32, entry: &LegendEntry) -> Result<(), String> {
     let line = [(x, y), (x + GLYPH_WIDTH_PX - 8, y)];
     let middle = (x + GLYPH_WIDTH_PX / 2 - 4, y);
     match &entry.glyph {

@@ -88,7 +88,7 @@ fn channel(
     *keys_left -= keys;
     let times_s: Vec<f32> = document.floats::<1>(sampler.input, &input)?.into_iter().flatten().collect();
     check_times(&times_s).map_err(|why| Fault::malformed(input, why))?;
-    let values = values(document, sampler, property, (interpolation, times_s.len()), element)?;
+    let values = values(document, sampler, property, interpolation, times_s.len(), element)?;
     Ok(Channel { node: node.value() as u32, property, interpolation, times_s, values })
 }
 
@@ -96,7 +96,8 @@ fn values(
     document: &Document,
     sampler: &Sampler,
     property: Property,
-    (interpolation, keys): (Interpolation, usize),
+    interpolation: Interpolation,
+    keys: usize,
     element: &str,
 ) -> Result<Vec<Vec4>, Fault> {
     let output = format!("{element}, output");
