@@ -6,7 +6,7 @@ use depth_image::{
 use glam::{UVec2, Vec3};
 use gpu::Turn;
 
-use crate::bounce::{Bounces, CurvedSearch, GpuMirroredRay, MirrorCell, Mirrors, follow, land};
+use crate::bounce::{Bounces, CellRays, CurvedSearch, GpuMirroredRay, MirrorCell, Mirrors, follow, land};
 use crate::device::Device;
 use crate::error::ReconstructionError;
 use crate::recording::Recording;
@@ -86,11 +86,12 @@ pub(crate) fn follow_rays(
         spread: 0.0,
     };
     let lists = bounces.listing(device, &(0..).zip(rays).map(of_ray).collect::<Vec<_>>());
-    follow(&mut recording, &bounces, &lists, (0, 1))?;
+    let cell_rays = CellRays { lists: &lists, next: None, cell: 0, reflection: 1 };
+    follow(&mut recording, &bounces, cell_rays)?;
     if width_m > 0.0 {
         let shown = (*recording.batch.color).clone();
         recording.frame.encoder.clear_buffer(&shown, 0, None);
-        land(&mut recording, &bounces, (&lists, None), (0, 1))?;
+        land(&mut recording, &bounces, cell_rays)?;
         return read(device, recording, &bounces, &shown, rays.len());
     }
     read(device, recording, &bounces, bounces.planes()[0], rays.len())

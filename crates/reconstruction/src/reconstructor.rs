@@ -292,8 +292,8 @@ impl Reconstructor {
         fill::record(recording, &unknown)?;
         specular::record(recording, listed, first, glossy.as_ref())?;
         if let Some((bounces, first)) = mirrored {
-            bounce::record(recording, bounces, first, |recording, which, lists, place| match base {
-                Some(base) => layered::follow_in_base(recording, base, bounces, which, lists, place),
+            bounce::record(recording, bounces, first, |recording, which, rays| match base {
+                Some(base) => layered::follow_in_base(recording, base, bounces, which, rays),
                 None => Ok(()),
             })?;
         }

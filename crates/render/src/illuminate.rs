@@ -244,7 +244,7 @@ pub(crate) fn record_points(
         let own = pass.bind(0, own)?;
         let tree = tree.map(|tree| pass.bind(1, tree.bindings())).transpose()?;
         let groups: Vec<&BoundGroup> = std::iter::once(&own).chain(&tree).collect();
-        points.dispatch(recording, (&variant, part.counts), &pass, &groups);
+        points.dispatch(recording, &variant, part.counts, &pass, &groups);
     }
     Ok(())
 }

@@ -181,7 +181,8 @@ impl Raster {
     pub fn record(
         &self,
         recording: &mut Recording<'_>,
-        (first, surfaces): (usize, &[Surfaces]),
+        first: usize,
+        surfaces: &[Surfaces],
         predecessors: Option<&Predecessors>,
     ) -> Result<(), RenderError> {
         let Recording { batch, frame, .. } = recording;

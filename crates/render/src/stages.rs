@@ -100,7 +100,7 @@ impl Stages {
     ) -> Result<Vec<PixelList>, RenderError> {
         match recording.batch.sequence {
             Some(sequence) => self.find_in_sequence(recording, sequence, surfaces)?,
-            None => self.find(recording, (0, surfaces), None)?,
+            None => self.find(recording, 0, surfaces, None)?,
         }
         let lists = self.light(recording, surfaces, planes)?;
         if let Some(mirrored) = mirrored.filter(|_| recording.batch.has_color()) {
@@ -121,7 +121,7 @@ impl Stages {
             let earlier = sequence.number(place);
             let predecessors =
                 (earlier > 0).then(|| sequence.known.predecessors(&self.gpu, earlier, camera.reference()));
-            self.find(recording, (place, slice::from_ref(target)), predecessors.as_ref())?;
+            self.find(recording, place, slice::from_ref(target), predecessors.as_ref())?;
             if let Some((held, _)) = sequence.layer(place, Evidence::Samples) {
                 keep::record(recording, place, target, held)?;
             }
@@ -129,17 +129,18 @@ impl Stages {
         Ok(())
     }
 
-    /// The surfaces of the cameras from the first of `surfaces` on.
+    /// The surfaces of the cameras from the `first` on.
     fn find(
         &self,
         recording: &mut Recording<'_>,
-        surfaces: (usize, &[Surfaces]),
+        first: usize,
+        surfaces: &[Surfaces],
         predecessors: Option<&Predecessors>,
     ) -> Result<(), RenderError> {
         let batch = recording.batch;
         match batch.traced.as_deref().filter(|_| batch.by_rays) {
-            Some(traced) => primary::record(recording, traced, surfaces, predecessors),
-            None => self.raster.record(recording, surfaces, predecessors),
+            Some(traced) => primary::record(recording, traced, first, surfaces, predecessors),
+            None => self.raster.record(recording, first, surfaces, predecessors),
         }
     }
 

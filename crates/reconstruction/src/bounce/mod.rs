@@ -361,33 +361,38 @@ pub(crate) enum InBase {
     LeftByImages,
 }
 
+/// The listed rays of a mirror cell.
+#[derive(Clone, Copy)]
+pub(crate) struct CellRays<'r> {
+    pub lists: &'r RayLists,
+    /// Takes the rays off mirrors that these rays meet.
+    pub next: Option<&'r RayLists>,
+    pub cell: usize,
+    /// Mirrors on the way so far.
+    pub reflection: u32,
+}
+
 /// Records the passes over the rays that the view's mirrors have listed, mirror after mirror. `walk` follows rays in the base, where
 /// there is one.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     bounces: &Bounces<'_>,
     first: RayLists,
-    walk: impl Fn(
-        &mut Recording<'_>,
-        InBase,
-        (&RayLists, Option<&RayLists>),
-        (usize, u32),
-    ) -> Result<(), ReconstructionError>,
+    walk: impl Fn(&mut Recording<'_>, InBase, CellRays<'_>) -> Result<(), ReconstructionError>,
 ) -> Result<(), ReconstructionError> {
     let mut listed = Some(first);
     for reflection in 1..=bounces.reflections {
         let Some(lists) = listed else { break };
         let next = (reflection < bounces.reflections).then(|| bounces.next(recording.device, Some(&lists)));
         for (number, cell) in bounces.cells.iter().enumerate() {
-            let rays = (&lists, next.as_ref());
-            let place = (number, reflection);
+            let rays = CellRays { lists: &lists, next: next.as_ref(), cell: number, reflection };
             if cell.is_cube() {
-                walk(recording, InBase::WholeList, rays, place)?;
+                walk(recording, InBase::WholeList, rays)?;
                 continue;
             }
-            follow(recording, bounces, &lists, place)?;
-            walk(recording, InBase::LeftByImages, rays, place)?;
-            land(recording, bounces, rays, place)?;
+            follow(recording, bounces, rays)?;
+            walk(recording, InBase::LeftByImages, rays)?;
+            land(recording, bounces, rays)?;
         }
         listed = next;
     }
@@ -398,11 +403,11 @@ pub(crate) fn record(
 pub(crate) fn follow(
     recording: &mut Recording<'_>,
     bounces: &Bounces<'_>,
-    lists: &RayLists,
-    (cell, reflection): (usize, u32),
+    rays: CellRays<'_>,
 ) -> Result<(), ReconstructionError> {
+    let CellRays { lists, cell, reflection, .. } = rays;
     if bounces.poles[cell].is_some() {
-        return follow_curved(recording, bounces, lists, cell, reflection);
+        return follow_curved(recording, bounces, rays);
     }
     let set = bounces.cells[cell].surroundings.variant();
     let [left, unknown] = [2, 3]
@@ -427,9 +432,7 @@ pub(crate) fn follow(
 fn follow_curved(
     recording: &mut Recording<'_>,
     bounces: &Bounces<'_>,
-    lists: &RayLists,
-    cell: usize,
-    reflection: u32,
+    CellRays { lists, cell, reflection, .. }: CellRays<'_>,
 ) -> Result<(), ReconstructionError> {
     let set = bounces.cells[cell].surroundings.variant();
     let walk = CurvedWalk { set, count_steps: bounces.steps.is_some() };
@@ -448,8 +451,7 @@ fn follow_curved(
 pub(crate) fn land(
     recording: &mut Recording<'_>,
     bounces: &Bounces<'_>,
-    (lists, next): (&RayLists, Option<&RayLists>),
-    (cell, reflection): (usize, u32),
+    CellRays { lists, next, cell, reflection }: CellRays<'_>,
 ) -> Result<(), ReconstructionError> {
     let set = bounces.cells[cell].surroundings;
     // Rays come from reflectors: of the view's images, or of the base alone.

@@ -6,7 +6,7 @@ use depth_image::{Highlight, MAX_REFLECTIONS};
 use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots, switches};
 use minijinja::{Value, context};
 
-use crate::bounce::{Bounces, InBase, MAX_RAY_LISTS, RayLists};
+use crate::bounce::{Bounces, CellRays, InBase, MAX_RAY_LISTS, RayLists};
 use crate::cube::{Cube, LightField};
 use crate::lobes::{self, GlossyList, LobeLight};
 use crate::reflectors::sample_texels;
@@ -76,7 +76,8 @@ impl Walk {
         recording: &Recording<'_>,
         cube: &Cube,
         rays: Walked,
-        (spawning, lobe): (Option<&Bounces<'_>>, Option<LobeLight>),
+        spawning: Option<&Bounces<'_>>,
+        lobe: Option<LobeLight>,
     ) -> Self {
         let reflectors = cube.reflectors.as_ref();
         let highlight = reflectors.map(|reflectors| reflectors.highlight);
@@ -246,8 +247,9 @@ fn follow_mirrors(
         let goes_on = generation < *generations.end();
         let next = goes_on.then(|| bounces.next(recording.device, Some(&lists)));
         let ends = Ends { gathered: last.filter(|_| !goes_on), lobes };
-        let rays = if lobes.is_some() { Walked::IntoLobes } else { Walked::Bounced };
-        follow(recording, (cube, rays, ends), bounces, (&lists, next.as_ref()), (0, generation))?;
+        let walked = if lobes.is_some() { Walked::IntoLobes } else { Walked::Bounced };
+        let rays = CellRays { lists: &lists, next: next.as_ref(), cell: 0, reflection: generation };
+        follow(recording, cube, bounces, rays, walked, ends)?;
         let Some(next) = next else { break };
         lists = next;
     }
@@ -276,14 +278,13 @@ pub(crate) fn follow_in_base(
     base: &Cube,
     bounces: &Bounces<'_>,
     which: InBase,
-    lists: (&RayLists, Option<&RayLists>),
-    place: (usize, u32),
+    rays: CellRays<'_>,
 ) -> Result<(), ReconstructionError> {
-    let rays = match which {
+    let walked = match which {
         InBase::WholeList => Walked::Bounced,
         InBase::LeftByImages => Walked::LeftBounced,
     };
-    follow(recording, (base, rays, Ends::default()), bounces, lists, place)
+    follow(recording, base, bounces, rays, walked, Ends::default())
 }
 
 fn walk_pixels(
@@ -296,7 +297,7 @@ fn walk_pixels(
     sent: Option<&GlossyList<'_>>,
 ) -> Result<(), ReconstructionError> {
     let rays = if listed.is_some() { Walked::LeftPixels } else { Walked::Pixels };
-    let variant = Walk::of(recording, cube, rays, (mirrored.map(|(bounces, _)| bounces), lobe));
+    let variant = Walk::of(recording, cube, rays, mirrored.map(|(bounces, _)| bounces), lobe);
     let pass = recording.device.passes.get(&variant)?;
     let mut bindings = recording.view_bindings();
     bindings.extend(shared_bindings(recording, cube, &variant));
@@ -322,26 +323,28 @@ struct Ends<'g> {
 /// Records the walk of rays off the mirrors of a mirror cell, whose light is added to their pixels.
 fn follow(
     recording: &mut Recording<'_>,
-    (cube, rays, ends): (&Cube, Walked, Ends<'_>),
+    cube: &Cube,
     bounces: &Bounces<'_>,
-    (lists, next): (&RayLists, Option<&RayLists>),
-    (cell, reflection): (usize, u32),
+    rays: CellRays<'_>,
+    walked: Walked,
+    ends: Ends<'_>,
 ) -> Result<(), ReconstructionError> {
-    let variant = Walk::of(recording, cube, rays, (next.map(|_| bounces), ends.gathered));
+    let variant = Walk::of(recording, cube, walked, rays.next.map(|_| bounces), ends.gathered);
     let pass = recording.device.passes.get(&variant)?;
     let mut bindings = shared_bindings(recording, cube, &variant);
     let [_, _, ray_provenance] = bounces.planes();
     bindings.extend([
-        bounces.work_binding(cell),
+        bounces.work_binding(rays.cell),
         ends.lobes.map_or(Binding::buffer("out_color", &recording.batch.color), GlossyList::light_binding),
         Binding::buffer("out_provenance", &recording.batch.provenance),
     ]);
-    bindings.extend(rays.is_left().then(|| Binding::buffer("ray_provenance", ray_provenance)));
-    bindings.extend(bounces.list_bindings(lists));
-    let next = next.filter(|_| variant.mirror_cells.is_some());
+    bindings.extend(walked.is_left().then(|| Binding::buffer("ray_provenance", ray_provenance)));
+    bindings.extend(bounces.list_bindings(rays.lists));
+    let next = rays.next.filter(|_| variant.mirror_cells.is_some());
     bindings.extend(next.into_iter().flat_map(|next| bounces.spawn_bindings(next)));
     let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&variant, &pass, &bound, bounces.lists_of(lists), cell, (cell, reflection));
+    let kind = (rays.cell, rays.reflection);
+    recording.dispatch_listed(&variant, &pass, &bound, bounces.lists_of(rays.lists), rays.cell, kind);
     Ok(())
 }
 

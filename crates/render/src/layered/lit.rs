@@ -141,7 +141,7 @@ fn record(
     let pass = recording.passes.get(&variant)?;
     let own = bindings([&parts[0].cameras, sums, words], &points);
     let own = pass.bind(0, own)?;
-    points.dispatch(recording, (&variant, [0; 3]), &pass, &[&own]);
+    points.dispatch(recording, &variant, [0; 3], &pass, &[&own]);
     Ok(())
 }
 

@@ -75,7 +75,8 @@ impl ShaderVariant for Primary {
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     traced: &Traced,
-    (first, surfaces): (usize, &[Surfaces]),
+    first: usize,
+    surfaces: &[Surfaces],
     predecessors: Option<&Predecessors>,
 ) -> Result<(), RenderError> {
     let Recording { passes, batch, .. } = recording;

@@ -70,7 +70,8 @@ impl Rays<'_> {
     pub fn dispatch(
         &self,
         recording: &mut Recording<'_>,
-        (variant, counts): (&impl ShaderVariant, [u32; 3]),
+        variant: &impl ShaderVariant,
+        counts: [u32; 3],
         pass: &ComputePass,
         groups: &[&BoundGroup],
     ) {

@@ -38,7 +38,7 @@ pub(super) fn record(recording: &mut Recording<'_>, rays: Rays<'_>) -> Result<()
     let pass = recording.passes.get(&variant)?;
     let own = pass.bind(0, rays.bindings())?;
     let tree = pass.bind(1, traced.bindings())?;
-    rays.dispatch(recording, (&variant, [0; 3]), &pass, &[&own, &tree]);
+    rays.dispatch(recording, &variant, [0; 3], &pass, &[&own, &tree]);
     Ok(())
 }
 

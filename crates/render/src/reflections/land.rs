@@ -50,7 +50,7 @@ pub(super) fn record(
     let pass = recording.passes.get(&variant)?;
     let buffers = [camera, &scene.illumination, sums, reflected];
     let own = pass.bind(0, bindings(buffers, rays, next, map))?;
-    rays.dispatch(recording, (&variant, [0; 3]), &pass, &[&own]);
+    rays.dispatch(recording, &variant, [0; 3], &pass, &[&own]);
     Ok(())
 }
 

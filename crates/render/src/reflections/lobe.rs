@@ -6,9 +6,9 @@ use gpu::{Binding, DispatchSize, ResourceTraits, ShaderVariant, WorkKind, highli
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
-use super::bounces::BounceList;
 use super::spawn::{self, VIEW_PLANES};
-use crate::{RenderError, batch::Recording, pieces::Piece, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
+use super::{PicturePiece, bounces::BounceList};
+use crate::{RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
 
 /// `Lobe` of the shader.
 #[repr(C)]
@@ -56,9 +56,10 @@ pub(super) fn record(
     recording: &mut Recording<'_>,
     ray: u32,
     weights: &Buffer,
-    (element, piece, units): (u32, Piece, u64),
+    PicturePiece { element, piece, units }: PicturePiece,
     target: &Surfaces,
-    (next_bounces, next): (&Buffer, &BounceList),
+    next_bounces: &Buffer,
+    next: &BounceList,
 ) -> Result<(), RenderError> {
     let batch = recording.batch;
     let variant = Lobe { by_rays: batch.by_rays, plane_count: batch.output.layout().count, first: ray == 0 };

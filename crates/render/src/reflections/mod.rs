@@ -116,19 +116,20 @@ impl Reflections {
         target: &Surfaces,
     ) -> Result<(), RenderError> {
         let lighting = recording.batch.work.lighting;
-        let piece = (element, piece, units(recording, piece));
+        let units = units(recording, piece);
+        let piece = PicturePiece { element, piece, units };
         let mirrors = lighting.reflections();
         if mirrors > 0 {
             let first = BounceList::new(recording.gpu);
-            spawn::record(recording, piece, target, (&self.bounces[0], &first))?;
-            self.record_rays(recording, parts, (self.memories(), first, piece.2), 1..=mirrors)?;
+            spawn::record(recording, piece, target, &self.bounces[0], &first)?;
+            self.record_rays(recording, parts, (self.memories(), first, units), 1..=mirrors)?;
         }
         // Costs are learned by generation, and are others than those of rays off mirrors.
         let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + mirrors.max(1);
         for ray in 0..recording.batch.glossy_rays() {
             let first = BounceList::new(recording.gpu);
-            lobe::record(recording, ray, &self.lobe_weights, piece, target, (&self.bounces[0], &first))?;
-            self.record_rays(recording, parts, (self.memories(), first, piece.2), generations.clone())?;
+            lobe::record(recording, ray, &self.lobe_weights, piece, target, &self.bounces[0], &first)?;
+            self.record_rays(recording, parts, (self.memories(), first, units), generations.clone())?;
         }
         Ok(())
     }
@@ -165,6 +166,16 @@ impl Reflections {
         land::record(recording, [&parts[0].cameras, &self.sums, &self.reflected], ends, onward)?;
         Ok(next)
     }
+}
+
+/// A piece of a picture whose pixels send rays.
+#[derive(Clone, Copy)]
+struct PicturePiece {
+    /// Of the uniform of cameras.
+    element: u32,
+    piece: Piece,
+    /// Pixels.
+    units: u64,
 }
 
 fn units(recording: &Recording<'_>, piece: Piece) -> u64 {

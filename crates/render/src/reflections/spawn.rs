@@ -5,10 +5,8 @@ use gpu::{Binding, DispatchSize, ResourceTraits, ShaderVariant, WorkKind, highli
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
-use super::bounces::BounceList;
-use crate::{
-    RenderError, batch::Recording, pieces::Piece, pixel_camera::CAMERA_TRAITS, rays::Traversal, surfaces::Surfaces,
-};
+use super::{PicturePiece, bounces::BounceList};
+use crate::{RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, rays::Traversal, surfaces::Surfaces};
 
 /// Planes of a view: colour and depth.
 pub(super) const VIEW_PLANES: usize = 2;
@@ -50,9 +48,10 @@ impl ShaderVariant for Spawn {
 /// Records the pass over a piece of a picture.
 pub(super) fn record(
     recording: &mut Recording<'_>,
-    (element, piece, units): (u32, Piece, u64),
+    PicturePiece { element, piece, units }: PicturePiece,
     target: &Surfaces,
-    (next_bounces, next): (&Buffer, &BounceList),
+    next_bounces: &Buffer,
+    next: &BounceList,
 ) -> Result<(), RenderError> {
     let batch = recording.batch;
     // Lighting with mirrors has rays.
