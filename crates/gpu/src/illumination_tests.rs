@@ -233,7 +233,7 @@ fn an_environment_maps_light_equals_the_scalar_twins() {
         let reflector = Reflector::unpack(q.reflector).expect("a reflector");
         let visible = |place| share(2, q.visibility, place);
         let lamps = highlight_linear(Highlight::Ggx, &lit, &visible, q.point_in_world.into(), normal, eye, &reflector);
-        let mirrored = environment_highlight_linear((&light, &map), normal, eye, &reflector) * visible(0);
+        let mirrored = environment_highlight_linear(&light, &map, normal, eye, &reflector) * visible(0);
         let bright = light.bright_incident(&map, q.place.into()).expect("bright texels");
         let checks = [
             close(answer[2], map.radiance_linear(normal), 5e-3),

@@ -101,7 +101,8 @@ pub fn environment_reflectance_linear(
 /// The highlight of an unoccluded environment map under GGX. The two directions are unit vectors.
 #[must_use]
 pub fn environment_highlight_linear(
-    (light, map): (&EnvironmentLight, &EnvironmentMap),
+    light: &EnvironmentLight,
+    map: &EnvironmentMap,
     normal_in_world: Vec3,
     towards_eye_in_world: Vec3,
     reflector: &Reflector,

@@ -24,7 +24,7 @@ pub(super) fn mesh(
     let planes = set.meshes.planes.as_ref();
     let planes = planes.map_err(|&(index, plane)| ReconstructionError::MissingPlane { index, plane })?;
     let cut = Cut { vertices: QuadVertices::AtTexelCorners, merged };
-    quads::mesh(device, set, (cut, turn), |frame, image| {
+    quads::mesh(device, set, cut, turn, |frame, image| {
         let [depths, extents] = image.quad_bindings();
         let own = [depths, extents, Binding::texture("planes", &planes.texels)];
         image.dispatch(frame, &CutTexels, image.work(), &own, image.size_px.to_array())?;

@@ -13,7 +13,7 @@ shader_variant!(CutBetweenSamples, "mesh.wgsl", &[]);
 
 /// The set's mesh, cut when it is first asked for.
 pub(super) fn mesh(device: &Device, set: &SampleSet, turn: Turn) -> Result<Arc<Mesh>, ReconstructionError> {
-    quads::mesh(device, set, (CUT, turn), |frame, image| {
+    quads::mesh(device, set, CUT, turn, |frame, image| {
         let [depths, extents] = image.quad_bindings();
         let own = [depths, extents, Binding::texture("cell_codes", &set.cell_codes)];
         image.dispatch(frame, &CutBetweenSamples, image.work(), &own, image.size_px.to_array())

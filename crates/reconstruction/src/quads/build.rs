@@ -15,7 +15,8 @@ use crate::{device::Device, error::ReconstructionError, sample_set::SampleSet};
 pub(crate) fn mesh(
     device: &Device,
     set: &SampleSet,
-    (cut, turn): (Cut, Turn),
+    cut: Cut,
+    turn: Turn,
     record: impl Fn(&mut Frame<'_>, &ImageCut<'_>) -> Result<(), ReconstructionError>,
 ) -> Result<Arc<Mesh>, ReconstructionError> {
     let kept = |meshes: &[Arc<Mesh>]| meshes.iter().find(|mesh| mesh.cut == cut).cloned();

@@ -25,8 +25,8 @@ pub fn gathered_light(field: &LayeredLightField, surface: &Reflecting, around: i
         let share = lobe.share(-direction.towards);
         if share > LEAST_LOBE_SHARE {
             let weight = share * direction.solid_angle_sr;
-            let to = (lobe.surface.point_in_world, lobe.is_rough());
-            light += light_through(field, number, direction, to, &around) * weight;
+            let point_in_world = lobe.surface.point_in_world;
+            light += light_through(field, number, direction, point_in_world, lobe.is_rough(), &around) * weight;
             sum += weight;
         }
     }
@@ -85,7 +85,8 @@ fn light_through(
     field: &LayeredLightField,
     number: usize,
     direction: LightDirection,
-    (point_in_world, is_rough): (Vec3, bool),
+    point_in_world: Vec3,
+    is_rough: bool,
     around: &impl Fn(Vec3) -> Vec3,
 ) -> Vec3 {
     let lines = field.camera.lines(direction.towards);

@@ -141,19 +141,19 @@ fn draw_header(area: &Area, name: &str, rows: &[Vec<(i32, &LegendEntry)>]) -> Re
 
 fn draw_entry(area: &Area, x: i32, y: i32, entry: &LegendEntry) -> Result<(), String> {
     let line = [(x, y), (x + GLYPH_WIDTH_PX - 8, y)];
-    let middle = (x + GLYPH_WIDTH_PX / 2 - 4, y);
+    let middle_x = x + GLYPH_WIDTH_PX / 2 - 4;
     match &entry.glyph {
         Glyph::Swatch(color) => {
             area.draw(&Rectangle::new([(x + 10, y - 6), (x + 24, y + 6)], color.filled())).map_err(message)?
         }
-        Glyph::Point(marker) => marker.draw(area, middle)?,
+        Glyph::Point(marker) => marker.draw(area, middle_x, y)?,
         Glyph::Line(marker) => {
             area.draw(&PathElement::new(line.to_vec(), marker.color.stroke_width(2))).map_err(message)?;
-            marker.draw(area, middle)?;
+            marker.draw(area, middle_x, y)?;
         }
         Glyph::Dashes(marker) => {
             area.draw(&DashedPathElement::new(line, 5, 4, marker.color.stroke_width(2))).map_err(message)?;
-            marker.draw(area, middle)?;
+            marker.draw(area, middle_x, y)?;
         }
     }
     let text = Text::new(entry.text.clone(), (x + GLYPH_WIDTH_PX, y), text_style(HPos::Left, VPos::Center));

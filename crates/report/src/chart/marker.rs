@@ -19,7 +19,7 @@ pub(super) struct Marker {
 
 impl Marker {
     /// Draws it at a pixel of the area.
-    pub(super) fn draw(self, area: &Area, (x, y): (i32, i32)) -> Result<(), String> {
+    pub(super) fn draw(self, area: &Area, x: i32, y: i32) -> Result<(), String> {
         let style = ShapeStyle { color: self.color.to_rgba(), filled: self.filled, stroke_width: 2 };
         let corners = self.corners().map(|(dx, dy)| (x + dx, y + dy));
         match (self.shape % 4, self.filled) {

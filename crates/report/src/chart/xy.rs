@@ -160,7 +160,7 @@ impl XyChart {
         let (left_px, top_px) = pixels.get_base_pixel();
         places.iter().try_for_each(|(index, place)| {
             let (x, y) = plot.backend_coord(place);
-            marker(series, palette, !series.is_extrapolated(*index)).draw(&pixels, (x - left_px, y - top_px))
+            marker(series, palette, !series.is_extrapolated(*index)).draw(&pixels, x - left_px, y - top_px)
         })
     }
 
