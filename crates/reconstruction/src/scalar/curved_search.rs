@@ -99,12 +99,12 @@ impl<'c> Seen<'c> {
         let b = camera.homogeneous(ray.direction_in_world.extend(0.0));
         let size_px = camera.cells + 1.0;
         let borders = [
-            (a.z - pole.reference.near_m, b.z),
-            (pole.farthest_m - a.z, -b.z),
-            (a.x, b.x),
-            (a.y, b.y),
-            (size_px.x * a.z - a.x, size_px.x * b.z - b.x),
-            (size_px.y * a.z - a.y, size_px.y * b.z - b.y),
+            [a.z - pole.reference.near_m, b.z],
+            [pole.farthest_m - a.z, -b.z],
+            [a.x, b.x],
+            [a.y, b.y],
+            [size_px.x * a.z - a.x, size_px.x * b.z - b.x],
+            [size_px.y * a.z - a.y, size_px.y * b.z - b.y],
         ];
         let [near, far] = borders.into_iter().fold(span, cut);
         let [p, q] = [a + b * near, a + b * far.max(near)];
@@ -161,7 +161,7 @@ impl<'c> Seen<'c> {
 }
 
 /// The part of a span in which `start + by · t` is not negative.
-fn cut([near, far]: [f32; 2], (start, by): (f32, f32)) -> [f32; 2] {
+fn cut([near, far]: [f32; 2], [start, by]: [f32; 2]) -> [f32; 2] {
     let t = -start * safe_reciprocal(by);
     if by > 0.0 { [near.max(t), far] } else { [near, far.min(t)] }
 }
