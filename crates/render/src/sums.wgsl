@@ -18,3 +18,6 @@ fn environment_at(place: u32, open: f32) -> vec3f {
     let sum = vec3f(sum_at(ENVIRONMENT, place), sum_at(ENVIRONMENT + 1u, place), sum_at(ENVIRONMENT + 2u, place));
     return sum * (open / f32(camera.ambient_rays_in_sum));
 }
+
+// The light of a white surface at which this share of the environment's light arrives.
+fn light_at(place: u32, open: f32) -> vec3f { return lamps_at(place) + environment_at(place, open); }
