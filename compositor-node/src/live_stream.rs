@@ -388,8 +388,8 @@ impl<'a> LiveStream<'a> {
     }
 
     fn queue(&self, pose: Pose, set: &Loaded, credit: Credit) {
-        let requested = (&pose.request, pose.view, pose.arrived);
-        self.client.queue(true, vec![Waiting::new(requested, set, self.reply.clone(), credit)]);
+        let view = Waiting::new(&pose.request, pose.view, pose.arrived, set, self.reply.clone(), credit);
+        self.client.queue(true, vec![view]);
     }
 
     fn try_credit(&self, pose: &Pose) -> Option<Credit> {

@@ -203,7 +203,7 @@ async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes, me
         metrics.done.add(key.workload_number, Operation::EncodeView, 1.0, encode_s);
         metrics.frame_bytes.inc_by(encoded.data.len() as u64);
         let header =
-            encoded.header((key.sample_set_id, place.cell, place.is_neighbour), (requested.camera, key.planes), times);
+            encoded.header(key.sample_set_id, place.cell, place.is_neighbour, requested.camera, key.planes, times);
         Output { frame: requested.frame, header, data: encoded.data, arrived, credit }
     });
     reply.send(output);

@@ -1,11 +1,11 @@
 //! Measured costs, kept for sessions that ask for the same, and predicted for other sizes of views.
 
-use cluster::{Costs, MeasureCosts, Measured, SharedLightCosts, TileCosts, TimedSize, Timeline};
+use cluster::{Costs, MeasureCosts, Measured, SharedLightCosts, TileCosts, TimedSize};
 use depth_image::{Camera, SampleCamera, ViewPlanes};
-use glam::{Quat, UVec2, Vec3};
+use glam::UVec2;
 use parking_lot::Mutex;
 
-use crate::measuring_queue::MeasuringQueue;
+use crate::measuring_queue::{MeasuringQueue, cache_key};
 
 /// The number of measurements that are kept.
 const CAPACITY: usize = 64;
@@ -104,19 +104,6 @@ impl CostTable {
     }
 }
 
-/// Costs are those of finished pictures. They depend neither on the scene's time nor, as far as sessions are concerned, on
-/// the place of a view.
-pub(crate) fn cache_key(measurement: &MeasureCosts) -> MeasureCosts {
-    let mut key = measurement.clone();
-    key.workload.timeline = Timeline::still(0.0);
-    key.workload.refinement_steps = 1;
-    key.in_background = false;
-    for view in &mut key.typical_views {
-        (view.eye_in_world, view.world_from_camera) = (Vec3::ZERO, Quat::IDENTITY);
-    }
-    key
-}
-
 /// The key without what a prediction accounts for: the size and the number of views. Fields of view matter little.
 fn sizeless(key: &MeasureCosts) -> MeasureCosts {
     let mut key = key.clone();
@@ -197,6 +184,7 @@ fn at_size((near_px, near): &(f64, Measured), other: Option<&(f64, Measured)>, p
 #[cfg(test)]
 pub(crate) mod tests {
     use depth_image::{Antialias, PinholeCamera};
+    use glam::Vec3;
 
     use super::*;
     use crate::schedule::workload_for_tests as workload;

@@ -3,9 +3,8 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use cluster::MeasureCosts;
-
-use crate::cost_table::cache_key;
+use cluster::{MeasureCosts, Timeline};
+use glam::{Quat, Vec3};
 
 /// Measurements that may wait; the oldest leave.
 const CAPACITY: usize = 32;
@@ -71,6 +70,19 @@ impl MeasuringQueue {
         let first = self.waiting.iter().position(|wanted| is_idle(&wanted.device))?;
         self.waiting.remove(first)
     }
+}
+
+/// Costs are those of finished pictures. They depend neither on the scene's time nor, as far as sessions are concerned, on
+/// the place of a view.
+pub(crate) fn cache_key(measurement: &MeasureCosts) -> MeasureCosts {
+    let mut key = measurement.clone();
+    key.workload.timeline = Timeline::still(0.0);
+    key.workload.refinement_steps = 1;
+    key.in_background = false;
+    for view in &mut key.typical_views {
+        (view.eye_in_world, view.world_from_camera) = (Vec3::ZERO, Quat::IDENTITY);
+    }
+    key
 }
 
 #[cfg(test)]

@@ -23,7 +23,8 @@ const MAY_NAME: [&str; 6] = [
 
 /// Words that mean something else in a folder: a scene's meshes are no method, and a method that takes surfaces from the scene has
 /// its passes where surfaces are found.
-const OTHER_MEANINGS: [(&str, &str); 2] = [("crates/scene", "mesh"), ("crates/render", "light_cache")];
+const OTHER_MEANINGS: [(&str, &str); 3] =
+    [("crates/scene", "mesh"), ("crates/fixtures", "mesh"), ("crates/render", "light_cache")];
 
 /// A closed set of methods.
 struct Methods {
