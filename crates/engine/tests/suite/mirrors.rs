@@ -123,7 +123,8 @@ fn views_of_sets_with_mirror_cells_show_the_scene_in_mirrors() {
     assert!(difference(&with, &without, &others) < 1.0, "other pixels stay");
     let kinds = with.provenance.as_ref().expect("provenance").iter().map(|provenance| provenance.kind());
     let guessed = kinds.zip(&mirrored).filter(|(kind, is)| **is && *kind == ProvenanceKind::Guessed).count();
-    assert!(guessed * 50 < mirrored.iter().filter(|is| **is).count(), "{guessed} guessed");
+    // Eight images in fixed places hold all but a fortieth of what this mirror shows (docs/decisions/020).
+    assert!(guessed * 40 < mirrored.iter().filter(|is| **is).count(), "{guessed} guessed");
     let again = stand.view(engine().with_common(set, stand.mirrors(IMAGES)).expect("a set").as_ref());
     assert_eq!(with.srgb8, again.srgb8);
 }
