@@ -90,8 +90,8 @@ fn holes_block_nothing_and_certify_nothing() {
         // The search asks all cameras that see a point, and so finds less with more of them.
         let least = hits[0].min(hits[2]);
         assert!(least > 1000 && hits[1] * 100 >= least * 97, "{method}: {hits:?}");
-        // An image of holes only is no image, but costs the carve some of its moves.
-        assert!(hits[3] <= hits[2] && hits[3] * 100 >= hits[2] * 96, "{method}: {hits:?}");
+        // An image of holes only is no image. It costs the carve some of its moves, and sets with holes have more of them.
+        assert!(hits[3].abs_diff(hits[2]) * 100 <= hits[2] * 4, "{method}: {hits:?}");
     }
 }
 
@@ -117,7 +117,8 @@ fn small_images_are_images() {
             let stage = Stage::new(wall, &[camera(-0.05, size_px), camera(0.05, size_px)]);
             let set = stage.upload();
             for method in [CARVE, SEARCH] {
-                let view = camera(0.0, UVec2::new(4, 4));
+                // Rays along the border between texels end in one or the other by rounding: five pixels have none.
+                let view = camera(0.0, UVec2::new(5, 5));
                 let views = reconstruct(&set, &[view], method, ViewPlanes::ALL).expect("a view");
                 assert_sane(&views[0], &format!("{size_px} {method}"));
                 let twin = stage.twin(&view, method);
