@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use gpu::{Binding, BoundGroup, ComputePass, DispatchSize, Gpu, ShaderVariant, WorkKind};
 use wgpu::{Buffer, BufferUsages};
 
-use crate::{batch::Recording, pixel_list::LIST_WORKGROUP};
+use crate::{batch::Recording, pieces::Piece, pixel_list::LIST_WORKGROUP};
 
 /// `Bounce` of `reflections/bounce.wgsl`.
 #[repr(C)]
@@ -48,6 +48,16 @@ impl BounceList {
     pub fn binding(&self, name: &'static str) -> Binding<'_> {
         Binding::buffer(name, &self.0)
     }
+}
+
+/// A piece of a picture whose pixels send rays.
+#[derive(Clone, Copy)]
+pub(crate) struct PicturePiece {
+    /// Of the uniform of cameras.
+    pub element: u32,
+    pub piece: Piece,
+    /// Pixels.
+    pub units: u64,
 }
 
 /// The rays of a piece off one mirror.

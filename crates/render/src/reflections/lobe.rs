@@ -6,8 +6,8 @@ use gpu::{Binding, DispatchSize, ResourceTraits, ShaderVariant, WorkKind, highli
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
+use super::bounces::{BounceList, PicturePiece};
 use super::spawn::{self, VIEW_PLANES};
-use super::{PicturePiece, bounces::BounceList};
 use crate::{RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
 
 /// `Lobe` of the shader.

@@ -18,7 +18,7 @@ pub(crate) use land::Land;
 pub(crate) use lobe::Lobe;
 pub(crate) use spawn::Spawn;
 
-use self::bounces::{BounceList, GpuBounce, Rays};
+use self::bounces::{BounceList, GpuBounce, PicturePiece, Rays};
 use crate::batch::{Batch, Part, Recording};
 use crate::pieces::Piece;
 use crate::surfaces::Surfaces;
@@ -166,16 +166,6 @@ impl Reflections {
         land::record(recording, [&parts[0].cameras, &self.sums, &self.reflected], ends, onward)?;
         Ok(next)
     }
-}
-
-/// A piece of a picture whose pixels send rays.
-#[derive(Clone, Copy)]
-struct PicturePiece {
-    /// Of the uniform of cameras.
-    element: u32,
-    piece: Piece,
-    /// Pixels.
-    units: u64,
 }
 
 fn units(recording: &Recording<'_>, piece: Piece) -> u64 {

@@ -5,7 +5,7 @@ use gpu::{Binding, DispatchSize, ResourceTraits, ShaderVariant, WorkKind, highli
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
-use super::{PicturePiece, bounces::BounceList};
+use super::bounces::{BounceList, PicturePiece};
 use crate::{RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, rays::Traversal, surfaces::Surfaces};
 
 /// Planes of a view: colour and depth.
