@@ -16,7 +16,7 @@ pub(super) const NAME: &str = "MYRIORAMA_scene";
 struct SceneExtension {
     illumination: Illumination,
     background: Environment,
-    /// Strength and exponent for each of the file's materials.
+    /// Strength and exponent of each of the file's materials.
     phong: Vec<[f32; 2]>,
 }
 
@@ -27,6 +27,10 @@ pub(super) fn read(root: &Root, scene: &mut SourceScene) -> Result<bool, Fault> 
     let Some(value) = extensions.and_then(|extensions| extensions.others.get(NAME)) else { return Ok(false) };
     let extension: SceneExtension =
         deserialize::from_value(value.clone()).map_err(|error| Fault::malformed(NAME, error.to_string()))?;
+    if extension.phong.len() != root.materials.len() {
+        let reason = format!("phong is that of {} materials, of {}", extension.phong.len(), root.materials.len());
+        return Err(Fault::malformed(NAME, reason));
+    }
     let placed = |mut light| {
         let position_in_source = position_mut(&mut light).map_or_else(Default::default, |p| p.as_dvec3());
         SourceLight { light, position_in_source }
