@@ -9,7 +9,7 @@ use depth_image::{Aabb, Highlight, MAX_LIGHTS};
 use glam::{Affine3A, Mat3, Vec3};
 use gpu::{Gpu, GpuEnvironment, GpuError, switches};
 use indexmap::IndexSet;
-use scene::{Material, Scene, TextureUse, VertexDetail, Wind};
+use scene::{Material, Scene, Texture, TextureUse, VertexDetail, Wind};
 use wgpu::BufferUsages;
 
 use crate::lamp_shares::GpuLampShares;
@@ -132,14 +132,17 @@ impl GpuScene {
         let boxes = scene.bounds_of_instances();
         let geometry = Geometry::gather(scene, &ordered, motion.as_deref(), &boxes);
         let samplers = texture::samplers(gpu);
-        let white = texture::upload(gpu, &texture::white());
+        let white = Texture { width_px: 1, height_px: 1, is_srgb: true, srgba8: vec![255; 4] };
+        let white = texture::upload(gpu, &white);
         // Drawing and rays show the same textures; those of rays are one table.
         let textures = texture::within(&scene.textures, gpu.most_table_texels());
         let uploaded: Vec<_> = textures.iter().map(|t| texture::upload(gpu, t)).collect();
-        let sampled = |t: &Option<TextureUse>| {
-            let view = t.map_or(&white, |t| &uploaded[t.texture as usize]);
-            (view.clone(), samplers[&t.map_or_else(Default::default, |t| t.wrap)].clone())
-        };
+        let of_materials = geometry.textures.iter().map(|textures| {
+            textures.map(|used| {
+                let view = used.map_or(&white, |used| &uploaded[used.texture as usize]);
+                (view.clone(), samplers[&used.map_or_else(Default::default, |used| used.wrap)].clone())
+            })
+        });
         let illumination = gpu::illumination_bytes(&scene.illumination);
         let environment = scene.environment_map.as_ref().map(|map| GpuEnvironment::upload(gpu, map)).transpose()?;
         Ok(Self {
@@ -148,7 +151,7 @@ impl GpuScene {
             indices: gpu.buffer_with("indices", &geometry.indices, BufferUsages::INDEX),
             objects: uniform(gpu, "objects", geometry.objects.into_iter()),
             surroundings: gpu.buffer_with("surroundings", &[surroundings(scene)], BufferUsages::UNIFORM),
-            textures: geometry.textures.iter().map(|textures| textures.each_ref().map(sampled)).collect(),
+            textures: of_materials.collect(),
             background: gpu.buffer_with("background", &gpu::background_bytes(&scene.background), BufferUsages::UNIFORM),
             illumination: gpu.buffer_with("illumination", &illumination, BufferUsages::UNIFORM),
             light_count: scene.illumination.lights.len(),
@@ -207,11 +210,6 @@ impl GpuScene {
     /// When the device's textures are too small for the scene.
     pub fn acceleration(&self, scene_time_s: f32) -> Result<AccelerationReport, RenderError> {
         Ok(self.rays.at(scene_time_s)?.report)
-    }
-
-    /// Forgets the tree, so that the next is not refitted from it.
-    pub fn forget_acceleration(&self) {
-        self.rays.forget();
     }
 }
 
@@ -305,16 +303,10 @@ impl Geometry {
 impl MaterialTraits {
     /// Every combination that occurs.
     pub fn all() -> impl Iterator<Item = Self> {
-        let each = |[double_sided, alpha_tested, textured, coat_textured, unlit, specular, mapped]: [bool; 7]| Self {
-            double_sided,
-            alpha_tested,
-            textured,
-            coat_textured,
-            unlit,
-            specular,
-            mapped,
-        };
-        switches().map(each).filter(|material| !material.mapped || material.textured && material.coat_textured)
+        let all = switches().map(|[double_sided, alpha_tested, textured, coat_textured, unlit, specular, mapped]| {
+            Self { double_sided, alpha_tested, textured, coat_textured, unlit, specular, mapped }
+        });
+        all.filter(|material| !material.mapped || material.textured && material.coat_textured)
     }
 
     fn of(material: &Material) -> Self {

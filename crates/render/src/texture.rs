@@ -8,21 +8,19 @@ use gpu::Gpu;
 use scene::{Texture, Wrap};
 use wgpu::util::{DeviceExt as _, TextureDataOrder};
 
-/// One texel of white, for materials without a texture.
-pub(crate) fn white() -> Texture {
-    Texture { width_px: 1, height_px: 1, is_srgb: true, srgba8: vec![255; 4] }
-}
-
 /// The samplers of all wrap modes.
 pub(crate) fn samplers(gpu: &Gpu) -> HashMap<[Wrap; 2], wgpu::Sampler> {
-    let mode = |wrap| match wrap {
-        Wrap::Repeat => wgpu::AddressMode::Repeat,
-        Wrap::Mirror => wgpu::AddressMode::MirrorRepeat,
-        Wrap::Clamp => wgpu::AddressMode::ClampToEdge,
-    };
     let all = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
     let pairs = all.into_iter().flat_map(|u| all.map(|v| [u, v]));
-    pairs.map(|wrap| (wrap, gpu.texture_sampler(wrap.map(mode)))).collect()
+    let samplers = pairs.map(|wraps| {
+        let modes = wraps.map(|wrap| match wrap {
+            Wrap::Repeat => wgpu::AddressMode::Repeat,
+            Wrap::Mirror => wgpu::AddressMode::MirrorRepeat,
+            Wrap::Clamp => wgpu::AddressMode::ClampToEdge,
+        });
+        (wraps, gpu.texture_sampler(modes))
+    });
+    samplers.collect()
 }
 
 /// Uploads a texture and all of its mip levels.
@@ -47,33 +45,39 @@ pub(crate) fn upload(gpu: &Gpu, texture: &Texture) -> wgpu::TextureView {
 /// finest level first, with a warning that names each and the size that is left.
 pub(crate) fn within(textures: &[Texture], most_texels: u64) -> Vec<Cow<'_, Texture>> {
     let levels = finest_levels(textures, most_texels);
-    let at_level = |(number, (texture, &level)): (usize, (_, &u32))| match level {
-        0 => Cow::Borrowed(texture),
-        _ => {
-            let [width, height] = size_at(texture, level);
-            tracing::warn!(
-                "texture {number} is shown at {width}×{height}: the device's table holds {most_texels} texels"
-            );
-            mips(texture).nth(level as usize).map_or(Cow::Borrowed(texture), Cow::Owned)
+    let shown = textures.iter().zip(levels).enumerate().map(|(number, (texture, level))| {
+        if level == 0 {
+            return Cow::Borrowed(texture);
         }
-    };
-    textures.iter().zip(&levels).enumerate().map(at_level).collect()
+        let [width, height] = size_at(texture, level);
+        tracing::warn!("texture {number} is shown at {width}×{height}: the device's table holds {most_texels} texels");
+        mips(texture).nth(level as usize).map_or(Cow::Borrowed(texture), Cow::Owned)
+    });
+    shown.collect()
 }
 
 /// The finest level of each texture's mip chain that there is room for.
 fn finest_levels(textures: &[Texture], most_texels: u64) -> Vec<u32> {
     let mut levels = vec![0; textures.len()];
-    let area = |texture: &Texture, level: u32| size_at(texture, level).map(u64::from).iter().product::<u64>();
-    let chain =
-        |texture: &Texture| (0..32).map(|level| area(texture, level)).take_while(|&texels| texels > 1).sum::<u64>() + 1;
-    let mut texels: u64 = textures.iter().map(chain).sum();
+    let chains = textures.iter().map(|texture| {
+        let areas = (0..32).map(|level| texels_at(texture, level));
+        areas.take_while(|&texels| texels > 1).sum::<u64>() + 1
+    });
+    let mut texels: u64 = chains.sum();
     while texels > most_texels {
-        let largest = (0..textures.len()).rev().max_by_key(|&number| area(&textures[number], levels[number]));
-        let Some(largest) = largest.filter(|&number| area(&textures[number], levels[number]) > 1) else { break };
-        texels -= area(&textures[largest], levels[largest]);
+        let areas = textures.iter().zip(&levels).map(|(texture, &level)| texels_at(texture, level));
+        let Some((largest, area)) = areas.enumerate().rev().max_by_key(|&(_, area)| area) else { break };
+        if area <= 1 {
+            break;
+        }
+        texels -= area;
         levels[largest] += 1;
     }
     levels
+}
+
+fn texels_at(texture: &Texture, level: u32) -> u64 {
+    size_at(texture, level).map(u64::from).iter().product()
 }
 
 /// The sides of a level of a mip chain in texels, 1 at least.
@@ -83,8 +87,9 @@ fn size_at(texture: &Texture, level: u32) -> [u32; 2] {
 
 /// The texture and its halves, down to one texel.
 pub(crate) fn mips(texture: &Texture) -> impl Iterator<Item = Texture> {
-    let next = |level: &Texture| (level.width_px.max(level.height_px) > 1).then(|| halved(level));
-    std::iter::successors(Some(texture.clone()), next)
+    std::iter::successors(Some(texture.clone()), |level| {
+        (level.width_px.max(level.height_px) > 1).then(|| halved(level))
+    })
 }
 
 /// Half the size, each texel the mean of up to four; of colours in linear light.
@@ -92,20 +97,23 @@ fn halved(texture: &Texture) -> Texture {
     let width = (texture.width_px / 2).max(1);
     let height = (texture.height_px / 2).max(1);
     let decode: [f32; 256] = std::array::from_fn(|code| linear_from_srgb8(code as u8));
-    let texel = |x: u32, y: u32, channel: u32| {
-        let x = x.min(texture.width_px - 1);
-        let y = y.min(texture.height_px - 1);
-        texture.srgba8[((y * texture.width_px + x) * 4 + channel) as usize]
-    };
-    let mean = |x: u32, y: u32, channel: u32| {
-        let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| texel(2 * x + i, 2 * y + j, channel));
-        match channel {
-            0..3 if texture.is_srgb => srgb8_from_linear(four.iter().map(|&v| decode[v as usize]).sum::<f32>() * 0.25),
-            _ => (four.iter().map(|&v| u32::from(v)).sum::<u32>() / 4) as u8,
+    let mut srgba8 = Vec::with_capacity((4 * width * height) as usize);
+    for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+        let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| {
+            let x = (2 * x + i).min(texture.width_px - 1);
+            let y = (2 * y + j).min(texture.height_px - 1);
+            4 * (y * texture.width_px + x) as usize
+        });
+        for channel in 0..4 {
+            let four = four.map(|first| texture.srgba8[first + channel]);
+            srgba8.push(match channel {
+                0..3 if texture.is_srgb => {
+                    srgb8_from_linear(four.iter().map(|&v| decode[v as usize]).sum::<f32>() * 0.25)
+                }
+                _ => (four.iter().map(|&v| u32::from(v)).sum::<u32>() / 4) as u8,
+            });
         }
-    };
-    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-    let srgba8 = pixels.flat_map(|(x, y)| (0..4).map(move |c| (x, y, c))).map(|(x, y, c)| mean(x, y, c)).collect();
+    }
     Texture { width_px: width, height_px: height, is_srgb: texture.is_srgb, srgba8 }
 }
 

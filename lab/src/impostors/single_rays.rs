@@ -55,7 +55,7 @@ impl<'s> Teapot<'s> {
         let bounds = Aabb::around(twin.triangles_in_world().flatten());
         let whole = scalar::rays::Scene::of(&stand.upload(scene)?, 0.0)?;
         let met = |ray: Ray| {
-            let hit = twin.closest(&ray, NEAR_M).0?;
+            let hit = twin.closest(&ray, NEAR_M)?;
             Some((ray, (hit.t, twin.look(&hit).base_linear)))
         };
         let (rays, truth) = mirrored(&whole, views).into_par_iter().filter_map(met).unzip();
@@ -136,7 +136,7 @@ fn alone(whole: &Scene) -> Scene {
 fn mirrored(scene: &scalar::rays::Scene, views: &[PinholeCamera]) -> Vec<Ray> {
     let off = |camera: &PinholeCamera, pixel: UVec2| {
         let ray = scalar::rays::pixel_ray(camera, pixel);
-        let hit = scene.closest(&ray, camera.near_m).0?;
+        let hit = scene.closest(&ray, camera.near_m)?;
         scene.look(&hit).reflector?;
         let towards = ray.direction_in_world.normalize_or_zero().reflect(scene.normal_in_world(&hit));
         Some(Ray { origin_in_world: ray.at(hit.t), direction_in_world: towards })

@@ -1,8 +1,6 @@
 //! The bounding volume hierarchy: eight children a node, boxes in eight bits (Ylitie et al. 2017). `obvhs` builds
 //! it; moving triangles are refitted here, for the crate refits only its two-child form.
 
-use std::time::{Duration, Instant};
-
 use glam::{Vec3, Vec3A};
 use obvhs::bvh2::{Bvh2, node::Bvh2Node, reinsertion::ReinsertionOptimizer};
 use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh, node::CwBvhNode};
@@ -24,27 +22,22 @@ pub struct Bvh {
     pub cost: f32,
     /// The cost of the tree when it was built.
     pub cost_when_built: f32,
-    /// The duration of the last build or refit.
-    pub took: Duration,
 }
 
 impl Bvh {
     /// Builds a tree over triangles, given by three points each.
     pub fn build(corners_in_world: &[[Vec3; 3]]) -> Self {
-        let start = Instant::now();
         let tree = bvh2_to_cwbvh(&two_children(corners_in_world), MOST_TRIANGLES_A_LEAF, true, false);
-        let mut bvh = Self { tree, depth: 0, cost: 0.0, cost_when_built: 0.0, took: Duration::ZERO };
+        let mut bvh = Self { tree, depth: 0, cost: 0.0, cost_when_built: 0.0 };
         bvh.refit(corners_in_world);
         bvh.cost_when_built = bvh.cost;
         bvh.depth = bvh.measured_depth();
-        bvh.took = start.elapsed();
         bvh
     }
 
     /// Fits the boxes to where the triangles are now. Children come after their parents, so that one pass from
     /// the last node to the first sees every box complete.
     pub fn refit(&mut self, corners_in_world: &[[Vec3; 3]]) {
-        let start = Instant::now();
         let mut bounds = vec![Aabb::empty(); self.tree.nodes.len()];
         let mut area_sum = 0.0;
         for index in (0..self.tree.nodes.len()).rev() {
@@ -55,7 +48,6 @@ impl Bvh {
             quantise(node, &bounds[index], &children);
         }
         self.cost = bounds.first().map_or(0.0, |root| area_sum / half_area(root).max(f32::MIN_POSITIVE));
-        self.took = start.elapsed();
     }
 
     /// Boxes have grown so that a new tree would be worth its time.
@@ -73,12 +65,9 @@ impl Bvh {
                 return Some(nodes[node.child_node_index(child) as usize]);
             }
             let (first, count) = node.child_primitives(child);
-            let slots = &self.tree.primitive_indices[first as usize..(first + count) as usize];
-            Some(
-                slots
-                    .iter()
-                    .fold(Aabb::empty(), |all, &triangle| all.union(&around(&corners_in_world[triangle as usize]))),
-            )
+            let slots = self.tree.primitive_indices[first as usize..(first + count) as usize].iter();
+            let boxes = slots.map(|&triangle| around(&corners_in_world[triangle as usize]));
+            Some(boxes.fold(Aabb::empty(), |all, triangle| all.union(&triangle)))
         })
     }
 
@@ -143,8 +132,10 @@ fn halved(boxes: &[Aabb]) -> Bvh2 {
             continue;
         }
         let axis = bounds.largest_axis();
-        let middle = |i: u32| boxes[i as usize].min[axis] + boxes[i as usize].max[axis];
-        own.select_nth_unstable_by(range.len() / 2, |&a, &b| middle(a).total_cmp(&middle(b)));
+        own.select_nth_unstable_by(range.len() / 2, |&a, &b| {
+            let [a, b] = [a, b].map(|i| boxes[i as usize].min[axis] + boxes[i as usize].max[axis]);
+            a.total_cmp(&b)
+        });
         let first = nodes.len();
         let split = range.start + range.len() / 2;
         nodes.extend([Bvh2Node::default(); 2]);
@@ -180,11 +171,10 @@ fn quantise(node: &mut CwBvhNode, bounds: &Aabb, children: &[Option<Aabb>; 8]) {
     let scale = node.e.map(|e| f32::from_bits(u32::from(e) << 23));
     for (child, bounds_of_child) in children.iter().enumerate() {
         let Some(b) = bounds_of_child else { continue };
-        let steps = |v: Vec3A, axis: usize| (v[axis] - bounds.min[axis]) / scale[axis];
-        let low: [u8; 3] = std::array::from_fn(|axis| (steps(b.min, axis) - ROUNDING).floor() as u8);
-        let high: [u8; 3] = std::array::from_fn(|axis| (steps(b.max, axis) + ROUNDING).ceil() as u8);
-        (node.child_min_x[child], node.child_min_y[child], node.child_min_z[child]) = low.into();
-        (node.child_max_x[child], node.child_max_y[child], node.child_max_z[child]) = high.into();
+        let low = [0, 1, 2].map(|axis| ((b.min[axis] - bounds.min[axis]) / scale[axis] - ROUNDING).floor() as u8);
+        let high = [0, 1, 2].map(|axis| ((b.max[axis] - bounds.min[axis]) / scale[axis] + ROUNDING).ceil() as u8);
+        [node.child_min_x[child], node.child_min_y[child], node.child_min_z[child]] = low;
+        [node.child_max_x[child], node.child_max_y[child], node.child_max_z[child]] = high;
     }
 }
 

@@ -116,8 +116,8 @@ impl FlatScene {
             if detailed {
                 let details = mesh.mesh.details.iter().copied().chain(repeat(VertexDetail::default()));
                 let placed = &instance.world_from_mesh;
-                let detail = |(vertex, detail): (&Vertex, _)| FlatDetail::of(vertex, detail, placed);
-                flat.details.extend(mesh.mesh.vertices.iter().zip(details).map(detail));
+                let detailed = mesh.mesh.vertices.iter().zip(details);
+                flat.details.extend(detailed.map(|(vertex, detail)| FlatDetail::of(vertex, detail, placed)));
             }
         }
         flat
@@ -151,8 +151,9 @@ impl FlatScene {
         let mut positions = self.rest_in_world.clone();
         self.for_posed(scene_time_s, |vertex, posed, _| positions[vertex] = posed.position.into());
         if let Some(wind) = self.wind {
-            let sway = |(at, &sway): (&mut Vec3, &f32)| *at += wind.displacement_in_world(*at, sway, scene_time_s);
-            positions.par_iter_mut().zip(&self.sway).for_each(sway);
+            positions.par_iter_mut().zip(&self.sway).for_each(|(at, &sway)| {
+                *at += wind.displacement_in_world(*at, sway, scene_time_s);
+            });
         }
         positions
     }
@@ -200,12 +201,11 @@ impl FlatScene {
 }
 
 fn flags_of(material: &Material) -> u32 {
-    let flag = |is: bool, bit: u32| if is { bit } else { 0 };
-    flag(material.is_alpha_tested(), ALPHA_TESTED)
-        | flag(material.alpha_hashed, ALPHA_HASHED)
-        | flag(material.double_sided, DOUBLE_SIDED)
-        | flag(material.unlit, UNLIT)
-        | flag(material.is_specular(), SPECULAR)
+    (u32::from(material.is_alpha_tested()) * ALPHA_TESTED)
+        | (u32::from(material.alpha_hashed) * ALPHA_HASHED)
+        | (u32::from(material.double_sided) * DOUBLE_SIDED)
+        | (u32::from(material.unlit) * UNLIT)
+        | (u32::from(material.is_specular()) * SPECULAR)
 }
 
 /// A mesh with its triangles in the order that gives them their numbers.

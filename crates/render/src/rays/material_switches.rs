@@ -13,11 +13,12 @@ pub(crate) struct MaterialSwitches {
 
 impl MaterialSwitches {
     pub fn of(scene: &Scene) -> Self {
-        let is_wrapped =
-            |material: &Material| material.textures().iter().flatten().any(|texture| texture.wrap != [Wrap::Repeat; 2]);
         Self {
             alpha_tested: scene.materials.iter().any(Material::is_alpha_tested),
-            mapped: scene.materials.iter().any(|material| material.is_mapped() || is_wrapped(material)),
+            mapped: scene.materials.iter().any(|material| {
+                let mut textures = material.textures().into_iter().flatten();
+                material.is_mapped() || textures.any(|texture| texture.wrap != [Wrap::Repeat; 2])
+            }),
         }
     }
 }

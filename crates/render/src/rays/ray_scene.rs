@@ -6,13 +6,14 @@ use std::time::{Duration, Instant};
 
 use glam::{Vec3, Vec4};
 use gpu::{Binding, Gpu, GpuError, Table};
+use obvhs::cwbvh::node::CwBvhNode;
 use parking_lot::Mutex;
 use rayon::prelude::*;
 use scene::{Material, Scene, Texture, TextureUse};
 use wgpu::TextureFormat;
 
 use super::bvh::{Bvh, MAX_DEPTH};
-use super::flat::{CORNER_FLAGS, FlatScene, FlatTriangle, MAX_VERTICES, OrderedMesh};
+use super::flat::{CORNER_FLAGS, FlatDetail, FlatScene, FlatTriangle, FlatVertex, MAX_VERTICES, OrderedMesh};
 use super::material_switches::MaterialSwitches;
 use crate::material::{normal_scale, phong_reflector};
 use crate::{few_cores::on_free_cores, motion::Motion, texture};
@@ -83,15 +84,17 @@ struct Fixed {
     texels: Table,
 }
 
-/// The same on the host.
-pub(crate) struct HostTables<'t> {
-    pub nodes: &'t [obvhs::cwbvh::node::CwBvhNode],
+/// The tables of a scene time on the host, with triangles in the order of the tree's leaves.
+#[derive(Debug, Clone)]
+pub(crate) struct HostTables {
+    pub nodes: Vec<CwBvhNode>,
+    /// Corners, and their numbers with the triangle's flags.
     pub corners: Vec<[[u32; 4]; 3]>,
     pub triangles: Vec<FlatTriangle>,
-    pub vertices: &'t [super::flat::FlatVertex],
-    pub details: &'t [super::flat::FlatDetail],
-    pub materials: &'t [[u32; 4]],
-    pub texels: &'t [[u8; 4]],
+    pub vertices: Vec<FlatVertex>,
+    pub details: Vec<FlatDetail>,
+    pub materials: Vec<[u32; 4]>,
+    pub texels: Vec<[u8; 4]>,
 }
 
 impl RayScene {
@@ -129,11 +132,6 @@ impl RayScene {
         state.and_then(|state| state.as_ref().map(|built| built.traced.bytes())).unwrap_or(0)
     }
 
-    /// Forgets the tree: the next is a new one.
-    pub fn forget(&self) {
-        *self.state.lock() = None;
-    }
-
     fn moved_to<'s>(&self, scene_time_s: f32, state: &'s mut Option<Built>) -> Result<&'s Built, GpuError> {
         let next = match state.take() {
             Some(built) if !self.flat.moves() || built.scene_time_s == scene_time_s => built,
@@ -161,7 +159,12 @@ impl RayScene {
         });
         GpuError::check_limit("levels of the tree over the scene", u64::from(bvh.depth), u64::from(MAX_DEPTH))?;
         let took = start.elapsed();
-        let fixed = Arc::new(self.fixed(&bvh)?);
+        let words = TextureFormat::Rgba32Uint;
+        let fixed = Arc::new(Fixed {
+            triangles: Table::new(&self.gpu, "triangle attributes", words, &self.triangles_of_leaves(&bvh))?,
+            materials: Table::new(&self.gpu, "materials", words, &self.tables.materials)?,
+            texels: Table::new(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?,
+        });
         let attributes = self.attributes(scene_time_s)?;
         let traced = self.traced(&bvh, &corners, attributes, fixed, took, false)?;
         Ok(Built { bvh, scene_time_s, traced, last_refit: None, last_build: took })
@@ -196,16 +199,6 @@ impl RayScene {
         }))
     }
 
-    /// Attributes of triangles and textures; triangles in the order of the tree's leaves.
-    fn fixed(&self, bvh: &Bvh) -> Result<Fixed, GpuError> {
-        let words = TextureFormat::Rgba32Uint;
-        Ok(Fixed {
-            triangles: Table::new(&self.gpu, "triangle attributes", words, &self.triangles_of_leaves(bvh))?,
-            materials: Table::new(&self.gpu, "materials", words, &self.tables.materials)?,
-            texels: Table::new(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?,
-        })
-    }
-
     fn traced(
         &self,
         bvh: &Bvh,
@@ -236,7 +229,7 @@ impl RayScene {
     /// Three texels a triangle in the order of the tree's leaves: a corner's position, and its number with the
     /// triangle's flags.
     fn corner_texels(&self, bvh: &Bvh, corners_in_world: &[[Vec3; 3]]) -> Vec<[[u32; 4]; 3]> {
-        let texels = |&triangle: &u32| {
+        let triangles = bvh.tree.primitive_indices.par_iter().map(|&triangle| {
             let triangle = triangle as usize;
             let points = corners_in_world[triangle];
             let numbers = self.flat.corners[triangle];
@@ -245,27 +238,23 @@ impl RayScene {
                 let [x, y, z] = points[i].to_array().map(f32::to_bits);
                 [x, y, z, numbers[i] | flags]
             })
-        };
-        bvh.tree.primitive_indices.par_iter().map(texels).collect()
+        });
+        triangles.collect()
     }
 
-    /// The tables of a scene time, before they are put on the device.
-    pub(crate) fn host_tables<R>(
-        &self,
-        scene_time_s: f32,
-        read: impl FnOnce(HostTables<'_>) -> R,
-    ) -> Result<R, GpuError> {
+    /// The tables of a scene time, as they are put on the device.
+    pub(crate) fn host_tables(&self, scene_time_s: f32) -> Result<HostTables, GpuError> {
         let mut state = self.state.lock();
         let Built { bvh, .. } = self.moved_to(scene_time_s, &mut state)?;
-        Ok(read(HostTables {
-            nodes: &bvh.tree.nodes,
+        Ok(HostTables {
+            nodes: bvh.tree.nodes.clone(),
             corners: self.corner_texels(bvh, &self.corners_in_world(scene_time_s)),
             triangles: self.triangles_of_leaves(bvh),
-            vertices: &self.flat.vertices_at(scene_time_s),
-            details: &self.flat.details_at(scene_time_s),
-            materials: &self.tables.materials,
-            texels: &self.tables.texels,
-        }))
+            vertices: self.flat.vertices_at(scene_time_s).into_owned(),
+            details: self.flat.details_at(scene_time_s).into_owned(),
+            materials: self.tables.materials.clone(),
+            texels: self.tables.texels.clone(),
+        })
     }
 
     fn triangles_of_leaves(&self, bvh: &Bvh) -> Vec<FlatTriangle> {
@@ -300,14 +289,12 @@ impl Traced {
 impl Tables {
     fn of(scene: &Scene, textures: &[Cow<'_, Texture>]) -> Self {
         let mut texels: Vec<[u8; 4]> = Vec::new();
-        let mut place = |texture: &Texture| {
-            let first = texels.len() as u32;
+        let mut places = Vec::with_capacity(textures.len());
+        for texture in textures {
+            places.push([texels.len() as u32, texture.width_px | texture.height_px << 16]);
             texture::mips(texture).for_each(|level| texels.extend(level.srgba8.as_chunks::<4>().0));
-            [first, texture.width_px | texture.height_px << 16]
-        };
-        let places: Vec<[u32; 2]> = textures.iter().map(|texture| place(texture)).collect();
-        let place_of = |texture: Option<TextureUse>| texture.map_or([0, 0], |t| places[t.texture as usize]);
-        let materials = scene.materials.iter().flat_map(|material| material_texels(material, place_of)).collect();
+        }
+        let materials = scene.materials.iter().flat_map(|material| material_texels(material, &places)).collect();
         Self { materials, texels, switches: MaterialSwitches::of(scene) }
     }
 }
@@ -315,18 +302,20 @@ impl Tables {
 /// Texels of a material, which rays/material.wgsl lists.
 pub(crate) const MATERIAL_TEXELS: u32 = 7;
 
-fn material_texels(material: &Material, place_of: impl Fn(Option<TextureUse>) -> [u32; 2]) -> [[u32; 4]; 7] {
-    let bits = |v: Vec4| v.to_array().map(f32::to_bits);
+/// `places` are the first texel and the packed size of each texture.
+fn material_texels(material: &Material, places: &[[u32; 2]]) -> [[u32; 4]; 7] {
+    let emission = Vec4::from((material.emissive_linear, material.alpha_cutoff));
+    let dielectric = Vec4::from((material.dielectric_reflectance_linear, normal_scale(material)));
     let [[base, base_size], [coat, coat_size], [normal, normal_size], [emissive, emissive_size], [open, open_size]] =
-        material.textures().map(place_of);
+        material.textures().map(|texture| texture.map_or([0, 0], |used| places[used.texture as usize]));
     let uses = material.textures().map(|texture| texture.map_or(0, use_bits));
     let uses = uses.into_iter().rev().fold(0, |all, bits| all << 5 | bits);
     let strength = material.occlusion_strength.to_bits();
     [
         material.base_color_linear.map(f32::to_bits),
-        bits(Vec4::from((material.emissive_linear, material.alpha_cutoff))),
+        emission.to_array().map(f32::to_bits),
         [material.metallic.to_bits(), material.roughness.to_bits(), phong_reflector(material), uses],
-        bits(Vec4::from((material.dielectric_reflectance_linear, normal_scale(material)))),
+        dielectric.to_array().map(f32::to_bits),
         [base, base_size, coat, coat_size],
         [normal, normal_size, emissive, emissive_size],
         [open, open_size, strength, 0],

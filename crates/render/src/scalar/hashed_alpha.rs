@@ -4,17 +4,16 @@ use glam::{IVec3, UVec3, Vec3};
 
 /// The hash of a cell, 0 to 1.
 fn hash_of_cell(cell: IVec3) -> f32 {
-    let mixed = |v: UVec3| {
-        let step = |v: UVec3, to: usize, a: usize, b: usize| {
-            let mut v = v;
-            v[to] = v[to].wrapping_add(v[a].wrapping_mul(v[b]));
-            v
-        };
-        step(step(step(v, 0, 1, 2), 1, 2, 0), 2, 0, 1)
-    };
     let v = cell.as_uvec3().to_array().map(|c| c.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
     let v = mixed(v.into());
     (mixed(v ^ (v >> 16)).z >> 8) as f32 * 5.960_464_5e-8
+}
+
+fn mixed(mut v: UVec3) -> UVec3 {
+    for [to, a, b] in [[0, 1, 2], [1, 2, 0], [2, 0, 1]] {
+        v[to] = v[to].wrapping_add(v[a].wrapping_mul(v[b]));
+    }
+    v
 }
 
 /// The alpha below which a place in the mesh's space, in metres of the world, is not there; for pixels of this side on
@@ -24,8 +23,8 @@ pub fn hashed_cutoff(place_m: Vec3, side_m: f32) -> f32 {
     let cells_per_m = 1.0 / side_m.clamp(1e-20, 1e20);
     let coarse = f32::from_bits(cells_per_m.to_bits() & 0x7f80_0000);
     let share = cells_per_m / coarse - 1.0;
-    let hash = |cells_per_m: f32| hash_of_cell((place_m * cells_per_m).floor().as_ivec3());
-    let x = hash(coarse) * (1.0 - share) + hash(2.0 * coarse) * share;
+    let [low, high] = [coarse, 2.0 * coarse].map(|scale| hash_of_cell((place_m * scale).floor().as_ivec3()));
+    let x = low * (1.0 - share) + high * share;
     let a = share.min(1.0 - share).max(1e-6);
     let sides = 2.0 * a * (1.0 - a);
     let cutoff = if x < a {

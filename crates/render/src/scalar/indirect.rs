@@ -7,8 +7,9 @@ use glam::{UVec2, Vec2, Vec3};
 
 use super::lobe::pixel_seed;
 use super::rays::{Hit, Scene, pixel_ray};
-use super::reflections::{BIAS_ROUNDINGS, bias_m};
+use super::reflections::bias_m;
 use super::sequence::{hashed, point_of};
+use crate::layered::BIAS_ROUNDINGS;
 
 /// A place from which rays of light begin.
 struct Spot {
@@ -36,10 +37,8 @@ impl Scene {
         rays: u32,
     ) -> Option<Vec3> {
         let ray = pixel_ray(camera, pixel);
-        let (hit, _) = self.closest(&ray, camera.near_m);
-        let spot = self.spot(camera, pixel, &ray, &hit?);
-        let brought = |number| self.brought(&spot, number, illumination);
-        Some((0..rays).map(brought).sum::<Vec3>() / rays as f32)
+        let spot = self.spot(camera, pixel, &ray, &self.closest(&ray, camera.near_m)?);
+        Some((0..rays).map(|number| self.brought(&spot, number, illumination)).sum::<Vec3>() / rays as f32)
     }
 
     fn spot(&self, camera: &PinholeCamera, pixel: UVec2, ray: &Ray, hit: &Hit) -> Spot {
@@ -60,8 +59,8 @@ impl Scene {
         let towards = tangent * disc.x + bitangent * disc.y + spot.normal * up;
         let ray = Ray { origin_in_world: spot.origin(), direction_in_world: towards };
         match self.closest(&ray, 0.0) {
-            (Some(hit), _) => self.sent_back(&ray, &hit, spot, number, illumination),
-            (None, _) => illumination.environment.radiance_linear(towards),
+            Some(hit) => self.sent_back(&ray, &hit, spot, number, illumination),
+            None => illumination.environment.radiance_linear(towards),
         }
     }
 
@@ -74,29 +73,28 @@ impl Scene {
             bias_m: from.bias_m + BIAS_ROUNDINGS * (ray.origin_in_world.abs() + offset.abs()).max_element(),
             seed: from.seed,
         };
-        let point_of = |salt| point_of(number, hashed(from.seed.wrapping_add(salt)));
-        let place = point_of(0x68bc_21eb);
-        let at = point_of(0x02e5_be93).x;
-        look.emission_linear + look.albedo_linear * self.light_of_one_lamp(&spot, place, at, illumination)
+        let [place, at] = [0x68bc_21eb, 0x02e5_be93].map(|salt| point_of(number, hashed(from.seed.wrapping_add(salt))));
+        look.emission_linear + look.albedo_linear * self.light_of_one_lamp(&spot, place, at.x, illumination)
     }
 
     /// The light of one lamp as if it were that of all.
     fn light_of_one_lamp(&self, spot: &Spot, place: Vec2, at: f32, illumination: &Illumination) -> Vec3 {
-        let brings = |incident: &Incident| {
-            incident.irradiance_linear * spot.normal.dot(incident.towards_light_in_world).max(0.0)
-        };
-        let weight = |incident: &Incident| brings(incident).dot(Vec3::new(0.2126, 0.7152, 0.0722));
-        let all: Vec<Incident> =
-            illumination.lights.iter().map(|light| light.from_sample(spot.point_in_world, place)).collect();
-        let sum: f32 = all.iter().map(weight).sum();
+        // What each lamp would bring, and the luminance of that.
+        let lamps = illumination.lights.iter().map(|light| {
+            let incident = light.from_sample(spot.point_in_world, place);
+            let brought = incident.irradiance_linear * spot.normal.dot(incident.towards_light_in_world).max(0.0);
+            (incident, brought, brought.dot(Vec3::new(0.2126, 0.7152, 0.0722)))
+        });
+        let lamps: Vec<(Incident, Vec3, f32)> = lamps.collect();
+        let sum: f32 = lamps.iter().map(|(_, _, weight)| weight).sum();
         let mut before = 0.0;
-        let chosen = all.iter().find(|incident| {
-            before += weight(incident);
+        let chosen = lamps.iter().find(|(_, _, weight)| {
+            before += weight;
             before > at * sum
         });
-        let Some(incident) = chosen else { return Vec3::ZERO };
+        let Some((incident, brought, weight)) = chosen else { return Vec3::ZERO };
         let ray = Ray { origin_in_world: spot.origin(), direction_in_world: incident.towards_light_in_world };
-        let (is_blocked, _) = self.is_blocked(&ray, incident.distance_m - spot.bias_m);
-        if is_blocked { Vec3::ZERO } else { brings(incident) * (sum / weight(incident)) }
+        let is_blocked = self.is_blocked(&ray, incident.distance_m - spot.bias_m);
+        if is_blocked { Vec3::ZERO } else { *brought * (sum / weight) }
     }
 }

@@ -43,18 +43,11 @@ struct WeightedLight {
     weight: f32,
 }
 
-/// Light of one texel.
-#[derive(Clone, Copy)]
-struct TexelLight {
-    lamps_linear: Vec3,
-    environment_linear: Vec3,
-}
-
 impl WeightedLight {
-    fn add(&mut self, light: TexelLight, weight: f32) {
-        self.lamps_linear += light.lamps_linear * weight;
-        self.environment_linear += light.environment_linear * weight;
-        self.weight += weight;
+    fn add(&mut self, light: &Self, share: f32) {
+        self.lamps_linear += light.lamps_linear * share;
+        self.environment_linear += light.environment_linear * share;
+        self.weight += light.weight * share;
     }
 }
 
@@ -145,7 +138,7 @@ impl LightSamples<'_> {
             if inside && weight > 0.0 && is_same_surface(image, texel.as_uvec2(), point, &tolerance) {
                 coverage += weight;
                 let light = self.light_of_texel(image, texel.as_uvec2(), point);
-                own.add(light, weight * closeness);
+                own.add(&light, weight * closeness);
                 if weight > LEAST_WEIGHT {
                     let total = luminance(light.lamps_linear + light.environment_linear);
                     found.least_luminance = found.least_luminance.min(total);
@@ -154,51 +147,46 @@ impl LightSamples<'_> {
             }
         }
         if coverage > 0.0 {
-            let certainty = coverage * coverage;
-            found.light.lamps_linear += own.lamps_linear * certainty;
-            found.light.environment_linear += own.environment_linear * certainty;
-            found.light.weight += own.weight * certainty;
+            found.light.add(&own, coverage * coverage);
             found.coverage = found.coverage.max(coverage);
             found.camera_mask |= 1 << number;
         }
     }
 
     /// The light of a texel, as it would be with the point's own normal.
-    fn light_of_texel(&self, image: &DepthImage, texel: UVec2, point: &SurfacePoint) -> TexelLight {
+    fn light_of_texel(&self, image: &DepthImage, texel: UVec2, point: &SurfacePoint) -> WeightedLight {
         let place = (texel.y * image.size_px().x + texel.x) as usize;
         let light = image.light.as_ref().expect("light");
         let normal = unit_from_oct16(image.normal_oct16.as_ref().expect("normals")[place]);
         let mut lamps_linear = linear_from_rgb9e5(light.lamps_rgb9e5[place]);
         let mut environment_linear = linear_from_rgb9e5(light.environment_rgb9e5[place]);
         if normal.dot(point.normal_in_world) < SAME_NORMAL {
-            let of_lamps = |normal| self.expected_of_lamps(light, place, point.point_in_world, normal);
-            let of_environment = |normal| luminance(self.illumination.environment.diffuse_linear(normal));
-            lamps_linear *= ratio(of_lamps(point.normal_in_world), of_lamps(normal));
-            let expected = of_environment(normal);
-            if expected > 0.0 {
-                environment_linear *= ratio(of_environment(point.normal_in_world), expected);
+            let normals = [point.normal_in_world, normal];
+            let [here, there] = normals.map(|n| self.expected_of_lamps(light, place, point.point_in_world, n));
+            lamps_linear *= ratio(here, there);
+            let [here, there] = normals.map(|n| luminance(self.illumination.environment.diffuse_linear(n)));
+            if there > 0.0 {
+                environment_linear *= ratio(here, there);
             }
         }
-        TexelLight { lamps_linear, environment_linear }
+        WeightedLight { lamps_linear, environment_linear, weight: 1.0 }
     }
 
     /// The light that lamps would bring to a surface with the shares of a texel. Lamps without a share of their own have one
     /// together, and one direction.
     fn expected_of_lamps(&self, light: &LightPlanes, place: usize, point: Vec3, normal: Vec3) -> f32 {
         let named = self.illumination.lamps_with_shares();
-        let share =
-            |number: usize| light.share8.get(number / 4).map_or(1.0, |plane| unpacked(plane[place], number % 4));
         let mut expected = 0.0;
         let mut others = Vec3::ZERO;
         for (number, lamp) in (0..).zip(&self.illumination.lights) {
             let incident = lamp.from_middle(point);
             let vector = incident.towards_light_in_world * luminance(incident.irradiance_linear);
             match named.iter().position(|&lamp| lamp == number) {
-                Some(named) => expected += vector.dot(normal).max(0.0) * share(named + 1),
+                Some(named) => expected += vector.dot(normal).max(0.0) * share_of(light, place, named + 1),
                 None => others += vector,
             }
         }
-        expected + others.dot(normal).max(0.0) * share(MAX_LAMP_SHARES + 1)
+        expected + others.dot(normal).max(0.0) * share_of(light, place, MAX_LAMP_SHARES + 1)
     }
 }
 
@@ -223,9 +211,9 @@ fn is_same_surface(image: &DepthImage, texel: UVec2, point: &SurfacePoint, toler
     let between = point.point_in_world - texel_in_world;
     // What half a step of the depth moves the texel by.
     let step = (texel_in_world - image.camera.reference().eye_in_world) * tolerance.half_step;
-    let is_near = |normal: Vec3| between.dot(normal).abs() <= tolerance.plane_m + step.dot(normal).abs();
     let is_turned_alike = normal.dot(point.triangle_normal_in_world) >= tolerance.least_cosine;
-    is_turned_alike && is_near(normal) && is_near(point.triangle_normal_in_world)
+    let mut normals = [normal, point.triangle_normal_in_world].into_iter();
+    is_turned_alike && normals.all(|n| between.dot(n).abs() <= tolerance.plane_m + step.dot(n).abs())
 }
 
 /// Half a step of the stored inverse depth.
@@ -242,6 +230,7 @@ fn ratio(here: f32, there: f32) -> f32 {
     (here / there.max(1e-6)).clamp(0.0, MOST_RATIO)
 }
 
-fn unpacked(word: u32, byte: usize) -> f32 {
-    f32::from(word.to_le_bytes()[byte]) / 255.0
+fn share_of(light: &LightPlanes, place: usize, number: usize) -> f32 {
+    let bytes = light.share8.get(number / 4).map(|plane| plane[place].to_le_bytes());
+    bytes.map_or(1.0, |bytes| f32::from(bytes[number % 4]) / 255.0)
 }

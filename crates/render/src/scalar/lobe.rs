@@ -43,9 +43,10 @@ pub fn lobe_ray([normal, towards_eye]: [Vec3; 2], roughness: f32, place: Vec2) -
 
 /// Height-correlated masking and shadowing over masking alone.
 fn weight(n_l: f32, n_v: f32, alpha: f32) -> f32 {
-    let spread = |cosine: f32| (cosine * cosine * (1.0 - alpha * alpha) + alpha * alpha).sqrt();
-    let masking = 2.0 * n_v / (n_v + spread(n_v));
-    let both = 2.0 * n_l * n_v / (n_v * spread(n_l) + n_l * spread(n_v));
+    let [spread_l, spread_v] =
+        [n_l, n_v].map(|cosine| (cosine * cosine * (1.0 - alpha * alpha) + alpha * alpha).sqrt());
+    let masking = 2.0 * n_v / (n_v + spread_v);
+    let both = 2.0 * n_l * n_v / (n_v * spread_l + n_l * spread_v);
     both / masking
 }
 
@@ -54,30 +55,29 @@ impl Scene {
     #[must_use]
     pub fn lobe(&self, camera: &PinholeCamera, pixel: UVec2, rays: u32) -> Vec<Bounce> {
         let ray = pixel_ray(camera, pixel);
-        let found = self.closest(&ray, camera.near_m).0.and_then(|hit| Some((hit, self.look(&hit).reflector?)));
+        let found = self.closest(&ray, camera.near_m).and_then(|hit| Some((hit, self.look(&hit).reflector?)));
         let Some((hit, reflector)) = found else { return Vec::new() };
         let normal = self.normal_in_world(&hit);
         let towards_eye = -ray.direction_in_world.normalize_or_zero();
         let seed = hashed(pixel_seed(camera, pixel).wrapping_add(0x2545_f491));
-        let of = |number| lobe_ray([normal, towards_eye], reflector.roughness, point_of(number, seed));
-        let sum: f32 = (0..rays).map(|number| of(number).weight).sum();
+        let lobe = (0..rays).map(|n| lobe_ray([normal, towards_eye], reflector.roughness, point_of(n, seed)));
+        let mut lobe: Vec<LobeRay> = lobe.collect();
+        let mut sum: f32 = lobe.iter().map(|ray| ray.weight).sum();
+        if sum <= 0.0 {
+            lobe.truncate(1);
+            lobe.fill(LobeRay { direction_in_world: (-towards_eye).reflect(normal), weight: 1.0 });
+            sum = 1.0;
+        }
         let reflectance = environment_reflectance_linear(normal, towards_eye, &reflector);
         let side_m = hit.t * self.footprint;
         let bias_m = bias_m(ray.origin_in_world, ray.direction_in_world * hit.t, side_m);
         let origin_in_world = ray.at(hit.t) + normal * bias_m;
-        let bounce = |number| {
-            let LobeRay { direction_in_world, weight } = match of(number) {
-                _ if sum <= 0.0 && number == 0 => {
-                    LobeRay { direction_in_world: (-towards_eye).reflect(normal), weight: 1.0 }
-                }
-                sampled => sampled,
-            };
+        let bounces = lobe.into_iter().map(|LobeRay { direction_in_world, weight }| {
             let ray = Ray { origin_in_world, direction_in_world };
-            let hit = self.closest(&ray, side_m).0;
-            let throughput_linear = reflectance * (weight / if sum <= 0.0 { 1.0 } else { sum });
-            Bounce { ray, throughput_linear, hit, side_m }
-        };
-        (0..rays).map(bounce).filter(|bounce| bounce.throughput_linear != Vec3::ZERO).collect()
+            let hit = self.closest(&ray, side_m);
+            Bounce { ray, throughput_linear: reflectance * (weight / sum), hit, side_m }
+        });
+        bounces.filter(|bounce| bounce.throughput_linear != Vec3::ZERO).collect()
     }
 }
 

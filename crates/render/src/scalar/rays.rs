@@ -3,14 +3,12 @@
 //! and a sum are rounded once or twice.
 
 use depth_image::{PinholeCamera, Ray, Reflector, SurfaceId, linear_from_srgb8, unit_from_oct16};
-use glam::{UVec2, Vec2, Vec3};
+use glam::{FloatExt as _, UVec2, Vec2, Vec3, Vec4};
 use obvhs::cwbvh::node::CwBvhNode;
 use scene::Wrap;
 
 use super::hashed_alpha::hashed_cutoff;
-use crate::rays::flat::{
-    ALPHA_HASHED, ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatDetail, FlatTriangle, FlatVertex, SPECULAR, UNLIT,
-};
+use crate::rays::flat::{ALPHA_HASHED, ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatTriangle, SPECULAR, UNLIT};
 use crate::rays::ray_scene::{HostTables, MATERIAL_TEXELS};
 use crate::rays::traversal::{BOX_SLACK, EDGE_ROUNDINGS};
 use crate::{GpuScene, RenderError, pixel_camera::PixelCamera};
@@ -18,14 +16,7 @@ use crate::{GpuScene, RenderError, pixel_camera::PixelCamera};
 /// The tables that a device has of a scene at one time.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    nodes: Vec<CwBvhNode>,
-    /// In the order of the tree's leaves: corners, and their numbers with the triangle's flags.
-    corners: Vec<[[u32; 4]; 3]>,
-    triangles: Vec<FlatTriangle>,
-    vertices: Vec<FlatVertex>,
-    details: Vec<FlatDetail>,
-    materials: Vec<[u32; 4]>,
-    texels: Vec<[u8; 4]>,
+    tables: HostTables,
     /// The side of a pixel on a surface where a ray's parameter is 1: the size of cells of hashed alpha.
     pub footprint: f32,
 }
@@ -56,15 +47,6 @@ pub struct Look {
     pub reflector: Option<Reflector>,
 }
 
-/// The steps of a search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Visits {
-    /// Nodes of the tree.
-    pub nodes: u32,
-    /// Triangles.
-    pub triangles: u32,
-}
-
 /// The ray through the middle of a pixel, as on a device; its parameter is planar depth.
 #[must_use]
 pub fn pixel_ray(camera: &PinholeCamera, pixel: UVec2) -> Ray {
@@ -77,6 +59,7 @@ pub fn pixel_ray(camera: &PinholeCamera, pixel: UVec2) -> Ray {
 
 /// Greater than any parameter of a hit.
 const FAR_AWAY: f32 = 3.0e38;
+
 struct Traveller {
     origin: Vec3,
     direction: Vec3,
@@ -87,13 +70,11 @@ struct Traveller {
 impl Traveller {
     fn of(ray: &Ray) -> Self {
         let direction = ray.direction_in_world;
-        let steep = |d: f32| if d.abs() < 1e-20 { 1e-20 } else { d };
-        let bit = |d: f32, bit: u32| if d < 0.0 { 0 } else { bit };
-        let octant = bit(direction.x, 4) | bit(direction.y, 2) | bit(direction.z, 1);
+        let octant: u32 = (0..3).map(|axis| if direction[axis] < 0.0 { 0 } else { 4 >> axis }).sum();
         Self {
             origin: ray.origin_in_world,
             direction,
-            inverse: direction.map(|d| 1.0 / steep(d)),
+            inverse: direction.map(|d| 1.0 / if d.abs() < 1e-20 { 1e-20 } else { d }),
             octant4: octant * 0x0101_0101,
         }
     }
@@ -129,55 +110,45 @@ impl Scene {
     /// # Errors
     /// When the device's textures are too small for the scene.
     pub fn of(scene: &GpuScene, scene_time_s: f32) -> Result<Self, RenderError> {
-        let tables = |tables: HostTables<'_>| Self {
-            nodes: tables.nodes.to_vec(),
-            corners: tables.corners,
-            triangles: tables.triangles,
-            vertices: tables.vertices.to_vec(),
-            details: tables.details.to_vec(),
-            materials: tables.materials.to_vec(),
-            texels: tables.texels.to_vec(),
-            footprint: 0.0,
-        };
-        Ok(scene.rays.host_tables(scene_time_s, tables)?)
+        Ok(Self { tables: scene.rays.host_tables(scene_time_s)?, footprint: 0.0 })
     }
 
     /// The nearest triangle beyond `near`; backs of single-sided ones are not there.
     #[must_use]
-    pub fn closest(&self, ray: &Ray, near: f32) -> (Option<Hit>, Visits) {
+    pub fn closest(&self, ray: &Ray, near: f32) -> Option<Hit> {
         self.closest_between(ray, near, FAR_AWAY)
     }
 
     /// As [`Scene::closest`], among the triangles before `far`.
     #[must_use]
-    pub fn closest_between(&self, ray: &Ray, near: f32, far: f32) -> (Option<Hit>, Visits) {
+    pub fn closest_between(&self, ray: &Ray, near: f32, far: f32) -> Option<Hit> {
         let mut hit = None;
-        let visits = self.search(ray, far, |scene, ray, slot, t_max| {
-            let crossing = scene.crossing(slot, ray, t_max)?;
-            let seen = crossing.front || scene.has(slot, DOUBLE_SIDED);
-            if seen && crossing.t > near && scene.is_there(&crossing) {
+        self.search(ray, far, |ray, slot, t_max| {
+            let crossing = self.crossing(slot, ray, t_max)?;
+            let seen = crossing.front || self.has(slot, DOUBLE_SIDED);
+            if seen && crossing.t > near && self.is_there(&crossing) {
                 hit = Some(crossing);
             }
             hit.map(|hit| hit.t)
         });
-        (hit, visits)
+        hit
     }
 
     /// Whether anything lies before `t_max`, whichever way it faces.
     #[must_use]
-    pub fn is_blocked(&self, ray: &Ray, t_max: f32) -> (bool, Visits) {
+    pub fn is_blocked(&self, ray: &Ray, t_max: f32) -> bool {
         let mut blocked = false;
-        let visits = self.search(ray, t_max, |scene, ray, slot, t_max| {
-            blocked = scene.crossing(slot, ray, t_max).is_some_and(|crossing| scene.is_there(&crossing));
+        self.search(ray, t_max, |ray, slot, t_max| {
+            blocked = self.crossing(slot, ray, t_max).is_some_and(|crossing| self.is_there(&crossing));
             blocked.then_some(f32::NEG_INFINITY)
         });
-        (blocked, visits)
+        blocked
     }
 
     /// The surface that a hit lies on.
     #[must_use]
     pub fn surface_id(&self, hit: &Hit) -> SurfaceId {
-        let FlatTriangle { instance, primitive, .. } = self.triangles[hit.slot as usize];
+        let FlatTriangle { instance, primitive, .. } = self.tables.triangles[hit.slot as usize];
         SurfaceId { instance, primitive }
     }
 
@@ -185,8 +156,8 @@ impl Scene {
     #[must_use]
     pub fn normal_in_world(&self, hit: &Hit) -> Vec3 {
         let [b, c] = hit.barycentric;
-        let corners = self.corners[hit.slot as usize].map(|corner| corner[3] & !CORNER_FLAGS);
-        let normals = corners.map(|number| unit_from_oct16(self.vertices[number as usize].normal_oct16));
+        let corners = self.tables.corners[hit.slot as usize].map(|corner| corner[3] & !CORNER_FLAGS);
+        let normals = corners.map(|number| unit_from_oct16(self.tables.vertices[number as usize].normal_oct16));
         let normal = normals[0] * (1.0 - b - c) + normals[1] * b + normals[2] * c;
         normal.normalize_or_zero() * if hit.front { 1.0 } else { -1.0 }
     }
@@ -194,69 +165,51 @@ impl Scene {
     /// The look of a triangle whose material has no textures.
     #[must_use]
     pub fn look(&self, hit: &Hit) -> Look {
-        let FlatTriangle { material, flags, .. } = self.triangles[hit.slot as usize];
-        let texel = |part: u32| self.materials[(material * MATERIAL_TEXELS + part) as usize].map(f32::from_bits);
-        let ([r, g, b, _], [metallic, roughness, ..], [dr, dg, db, _]) = (texel(0), texel(2), texel(3));
-        let [er, eg, eb, _] = texel(1);
+        let FlatTriangle { material, flags, .. } = self.tables.triangles[hit.slot as usize];
+        let [base, emission, coat, dielectric] = [0, 1, 2, 3].map(|part| {
+            Vec4::from(self.tables.materials[(material * MATERIAL_TEXELS + part) as usize].map(f32::from_bits))
+        });
+        let [metallic, roughness, ..] = coat.to_array();
         let numbers = self.numbers_of(hit);
         let shares = hit.shares();
-        let vertex_linear = |i: usize| {
-            let [r, g, b, _] = self.vertices[numbers[i]].color_srgba8;
+        let vertex_linear = (0..3).map(|i| {
+            let [r, g, b, _] = self.tables.vertices[numbers[i]].color_srgba8;
             Vec3::from([r, g, b].map(linear_from_srgb8)) * shares[i]
-        };
-        let base_linear = Vec3::new(r, g, b) * (0..3).map(vertex_linear).sum::<Vec3>();
-        let reflectance_linear = Vec3::new(dr, dg, db).lerp(base_linear, metallic);
+        });
+        let base_linear = base.truncate() * vertex_linear.sum::<Vec3>();
+        let reflectance_linear = dielectric.truncate().lerp(base_linear, metallic);
         let is_unlit = flags & UNLIT != 0;
         let is_glossy = flags & SPECULAR != 0 && !is_unlit;
         Look {
             base_linear,
             albedo_linear: if is_unlit { Vec3::ZERO } else { base_linear * (1.0 - metallic) },
-            emission_linear: Vec3::new(er, eg, eb) + if is_unlit { base_linear } else { Vec3::ZERO },
+            emission_linear: emission.truncate() + if is_unlit { base_linear } else { Vec3::ZERO },
             // In the bits that a device has of it.
             reflector: Reflector::unpack(Reflector { reflectance_linear, roughness }.pack()).filter(|_| is_glossy),
         }
     }
 
     /// Mean curvature of a triangle's surface, by how its normal turns along the edges; positive where convex.
-    #[must_use]
-    pub fn curvature_per_m(&self, hit: &Hit) -> f32 {
+    pub(super) fn curvature_per_m(&self, hit: &Hit) -> f32 {
         let corners = self.corners_of(hit.slot);
-        let normals = self.numbers_of(hit).map(|number| unit_from_oct16(self.vertices[number].normal_oct16));
-        let turn = |i: usize| {
+        let normals = self.numbers_of(hit).map(|number| unit_from_oct16(self.tables.vertices[number].normal_oct16));
+        let turns = (0..3).map(|i| {
             let edge = corners[(i + 1) % 3] - corners[i];
             let next = normals[(i + 1) % 3];
             (next - normals[i]).dot(edge) / edge.length_squared().max(1e-20)
-        };
-        (0..3).map(turn).sum::<f32>() / 3.0 * if hit.front { 1.0 } else { -1.0 }
+        });
+        turns.sum::<f32>() / 3.0 * if hit.front { 1.0 } else { -1.0 }
     }
 
     /// Corners of all triangles.
     pub fn triangles_in_world(&self) -> impl Iterator<Item = [Vec3; 3]> {
-        (0..self.corners.len() as u32).map(|slot| self.corners_of(slot))
-    }
-
-    /// Levels of nodes.
-    #[must_use]
-    pub fn depth(&self) -> u32 {
-        let mut depths = vec![1; self.nodes.len()];
-        for (index, node) in self.nodes.iter().enumerate() {
-            for child in (0..8).filter(|&child| !node.is_child_empty(child) && !node.is_leaf(child)) {
-                depths[node.child_node_index(child) as usize] = depths[index] + 1;
-            }
-        }
-        depths.into_iter().max().unwrap_or(0)
+        (0..self.tables.corners.len() as u32).map(|slot| self.corners_of(slot))
     }
 
     /// Walks the tree front to back. `test` is asked about triangles with the greatest parameter that matters, and
     /// gives a lesser one once it is known; below zero the search is over.
-    fn search(
-        &self,
-        ray: &Ray,
-        mut t_max: f32,
-        mut test: impl FnMut(&Self, &Traveller, u32, f32) -> Option<f32>,
-    ) -> Visits {
+    fn search(&self, ray: &Ray, mut t_max: f32, mut test: impl FnMut(&Traveller, u32, f32) -> Option<f32>) {
         let ray = &Traveller::of(ray);
-        let mut visits = Visits::default();
         let mut stack = Vec::new();
         let mut todo = Todo::ROOT;
         while !todo.is_done() && t_max >= 0.0 {
@@ -265,30 +218,27 @@ impl Scene {
             if !rest.is_done() {
                 stack.push(rest);
             }
-            let node = &self.nodes[child as usize];
+            let node = &self.tables.nodes[child as usize];
             let hits = met_children(node, ray, t_max);
-            visits.nodes += 1;
             todo = Todo { first_child: node.child_base_idx, hits: hits & 0xff00_0000 | u32::from(node.imask) };
             let mut triangles = hits & 0x00ff_ffff;
             while triangles != 0 && t_max >= 0.0 {
-                visits.triangles += 1;
                 let slot = node.primitive_base_idx + triangles.trailing_zeros();
-                t_max = test(self, ray, slot, t_max).unwrap_or(t_max);
+                t_max = test(ray, slot, t_max).unwrap_or(t_max);
                 triangles &= triangles - 1;
             }
             if todo.is_done() {
                 todo = stack.pop().unwrap_or(todo);
             }
         }
-        visits
     }
 
     fn corners_of(&self, slot: u32) -> [Vec3; 3] {
-        self.corners[slot as usize].map(|[x, y, z, _]| Vec3::from([x, y, z].map(f32::from_bits)))
+        self.tables.corners[slot as usize].map(|[x, y, z, _]| Vec3::from([x, y, z].map(f32::from_bits)))
     }
 
     fn has(&self, slot: u32, flag: u32) -> bool {
-        self.corners[slot as usize][0][3] & flag != 0
+        self.tables.corners[slot as usize][0][3] & flag != 0
     }
 
     fn crossing(&self, slot: u32, ray: &Traveller, t_max: f32) -> Option<Hit> {
@@ -315,37 +265,39 @@ impl Scene {
         if !self.has(hit.slot, ALPHA_TESTED) {
             return true;
         }
-        let FlatTriangle { material, flags, .. } = self.triangles[hit.slot as usize];
+        let FlatTriangle { material, flags, .. } = self.tables.triangles[hit.slot as usize];
         let material = (material * MATERIAL_TEXELS) as usize;
         let cutoff = if flags & ALPHA_HASHED != 0 {
-            let places = self.numbers_of(hit).map(|number| Vec3::from(self.details[number].place_m));
+            let places = self.numbers_of(hit).map(|number| Vec3::from(self.tables.details[number].place_m));
             let place_m = (0..3).map(|i| places[i] * hit.shares()[i]).sum();
             hashed_cutoff(place_m, hit.t * self.footprint)
         } else {
-            f32::from_bits(self.materials[material + 1][3])
+            f32::from_bits(self.tables.materials[material + 1][3])
         };
         self.alpha(material, hit) >= cutoff
     }
 
     /// Numbers of a triangle's vertices.
     fn numbers_of(&self, hit: &Hit) -> [usize; 3] {
-        self.corners[hit.slot as usize].map(|corner| (corner[3] & !CORNER_FLAGS) as usize)
+        self.tables.corners[hit.slot as usize].map(|corner| (corner[3] & !CORNER_FLAGS) as usize)
     }
 
     fn alpha(&self, material: usize, hit: &Hit) -> f32 {
         let numbers = self.numbers_of(hit);
         let shares = hit.shares();
-        let used = self.materials[material + 2][3] & 31;
-        let uv_of = |number: usize| {
+        let used = self.tables.materials[material + 2][3] & 31;
+        let uvs = numbers.map(|number| {
             let second = used & 1 != 0;
-            Vec2::from(if second { self.details[number].uv } else { self.vertices[number].uv })
-        };
-        let uv: Vec2 = (0..3).map(|i| uv_of(numbers[i]) * shares[i]).sum();
-        let color = |i: usize| f32::from(self.vertices[numbers[i]].color_srgba8[3]) / 255.0;
-        let vertex_alpha: f32 = (0..3).map(|i| color(i) * shares[i]).sum();
-        let [first, packed_size, ..] = self.materials[material + 4];
+            Vec2::from(if second { self.tables.details[number].uv } else { self.tables.vertices[number].uv })
+        });
+        let uv: Vec2 = (0..3).map(|i| uvs[i] * shares[i]).sum();
+        let alphas = numbers.map(|number| f32::from(self.tables.vertices[number].color_srgba8[3]) / 255.0);
+        let vertex_alpha: f32 = (0..3).map(|i| alphas[i] * shares[i]).sum();
+        let [first, packed_size, ..] = self.tables.materials[material + 4];
         let wraps = [used >> 1 & 3, used >> 3 & 3];
-        f32::from_bits(self.materials[material][3]) * vertex_alpha * self.texture_alpha(first, packed_size, uv, wraps)
+        f32::from_bits(self.tables.materials[material][3])
+            * vertex_alpha
+            * self.texture_alpha(first, packed_size, uv, wraps)
     }
 
     /// Bilinear, of the finest level; 1 where there is no texture.
@@ -358,17 +310,21 @@ impl Scene {
         let at = wrapped * size.as_vec2() - 0.5;
         let low = at.floor();
         let share = at - at.floor();
-        let place = |at: i32, size: u32, wrap: u32| match wrap == Wrap::Repeat as u32 {
-            true => at.rem_euclid(size as i32) as u32,
-            false => at.clamp(0, size as i32 - 1) as u32,
-        };
-        let texel = |x: i32, y: i32| {
-            let [x, y] = [place(low.x as i32 + x, size.x, wraps[0]), place(low.y as i32 + y, size.y, wraps[1])];
-            f32::from(self.texels[(first + y * size.x + x) as usize][3]) / 255.0
-        };
-        let mix = |a: f32, b: f32, share: f32| a * (1.0 - share) + b * share;
-        mix(mix(texel(0, 0), texel(1, 0), share.x), mix(texel(0, 1), texel(1, 1), share.x), share.y)
+        let [a, b, c, d] = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| {
+            let x = texel_place(low.x as i32 + x, size.x, wraps[0]);
+            let y = texel_place(low.y as i32 + y, size.y, wraps[1]);
+            f32::from(self.tables.texels[(first + y * size.x + x) as usize][3]) / 255.0
+        });
+        mix(mix(a, b, share.x), mix(c, d, share.x), share.y)
     }
+}
+
+fn texel_place(at: i32, size: u32, wrap: u32) -> u32 {
+    if wrap == Wrap::Repeat as u32 { at.rem_euclid(size as i32) as u32 } else { at.clamp(0, size as i32 - 1) as u32 }
+}
+
+fn mix(a: f32, b: f32, share: f32) -> f32 {
+    a * (1.0 - share) + b * share
 }
 
 impl Hit {
@@ -381,13 +337,12 @@ impl Hit {
 
 /// A place in a texture, from 0 to 1.
 fn wrapped(at: f32, wrap: u32) -> f32 {
-    let fract = |v: f32| v - v.floor();
     if wrap == Wrap::Mirror as u32 {
-        1.0 - (1.0 - 2.0 * fract(at * 0.5)).abs()
+        1.0 - (1.0 - 2.0 * (at * 0.5).fract_gl()).abs()
     } else if wrap == Wrap::Clamp as u32 {
         at.clamp(0.0, 1.0)
     } else {
-        fract(at)
+        at.fract_gl()
     }
 }
 
@@ -409,14 +364,12 @@ fn met_children(node: &CwBvhNode, ray: &Traveller, t_max: f32) -> u32 {
         (&node.child_min_y, &node.child_max_y),
         (&node.child_min_z, &node.child_max_z),
     ];
-    let places = |child: usize, axis: usize| {
-        let (min, max) = planes[axis];
-        let at = |byte: u8| f32::from(byte) * slope[axis] + start[axis];
-        let [near, far] = if ray.direction[axis] < 0.0 { [max, min] } else { [min, max] };
-        [at(near[child]), at(far[child])]
-    };
     (0..8).fold(0, |hits, child| {
-        let [x, y, z] = [0, 1, 2].map(|axis| places(child, axis));
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            let (min, max) = planes[axis];
+            let [near, far] = if ray.direction[axis] < 0.0 { [max, min] } else { [min, max] };
+            [near, far].map(|bytes| f32::from(bytes[child]) * slope[axis] + start[axis])
+        });
         let enter = x[0].max(y[0]).max(z[0].max(0.0));
         let leave = x[1].min(y[1]).min(z[1].min(t_max));
         let meta = u32::from(node.child_meta[child]);

@@ -4,10 +4,7 @@ use depth_image::{Ray, environment_reflectance_linear};
 use glam::Vec3;
 
 use super::rays::{Hit, Scene};
-
-/// Of `rise.wgsl`.
-const BIAS_FOOTPRINTS: f32 = 0.015_625;
-pub(super) const BIAS_ROUNDINGS: f32 = 4e-7;
+use crate::layered::{BIAS_FOOTPRINTS, BIAS_ROUNDINGS};
 
 /// A ray off a mirror.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +52,7 @@ impl Scene {
             let spread = place.spread + 2.0 * self.curvature_per_m(&place.hit) * place.side_m;
             let origin_in_world = place.point_in_world + normal * place.bias_m;
             let ray = Ray { origin_in_world, direction_in_world: place.direction.reflect(normal) };
-            let (hit, _) = self.closest(&ray, near_m);
+            let hit = self.closest(&ray, near_m);
             let along_m = hit.map_or(0.0, |hit| hit.t);
             // A cone that narrows to a focus grows behind it.
             let signed_m = place.side_m + spread * along_m;

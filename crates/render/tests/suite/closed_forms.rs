@@ -78,7 +78,7 @@ fn a_million_rays_find_no_gap_in_a_closed_mesh() {
         let escapes = |&n: &u32| {
             let origin_in_world = place(n, 0x9e37) * 0.5;
             let direction_in_world = aim(n, origin_in_world);
-            twin.closest(&Ray { origin_in_world, direction_in_world }, 0.0).0.is_none()
+            twin.closest(&Ray { origin_in_world, direction_in_world }, 0.0).is_none()
         };
         (0..1_000_000u32).into_par_iter().filter(escapes).count()
     };

@@ -123,7 +123,7 @@ fn rays_to_a_small_sun_have_a_fifth_of_the_error_of_uniform_directions() {
             let flat = turn * (1.0 - up * up).sqrt();
             let direction_in_world = Vec3::new(flat.x, up, flat.y);
             let ray = Ray { origin_in_world: point + Vec3::Y * 1e-4, direction_in_world };
-            let is_open = up > 0.0 && !twin.is_blocked(&ray, 1e9).0;
+            let is_open = up > 0.0 && !twin.is_blocked(&ray, 1e9);
             // The density is 1/4π.
             if is_open { 4.0 * up * map.radiance_linear(direction_in_world).y } else { 0.0 }
         };

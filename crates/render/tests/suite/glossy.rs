@@ -104,7 +104,7 @@ fn a_white_furnace_shows_the_reflectance() {
             let view = view_of(&on_device, &format!("shadows, glossy {rays}"), &camera);
             for pixel in pixels(SIZE_PX) {
                 let ray = scalar::rays::pixel_ray(&camera, pixel);
-                let Some(hit) = twin.closest(&ray, camera.near_m).0 else { continue };
+                let Some(hit) = twin.closest(&ray, camera.near_m) else { continue };
                 let reflector = twin.look(&hit).reflector.expect("a reflector");
                 let towards_eye = -ray.direction_in_world.normalize_or_zero();
                 let expected = code_of(environment_reflectance_linear(Vec3::Y, towards_eye, &reflector) * 0.5);
@@ -149,7 +149,7 @@ fn a_mirror_and_its_lobe_share_what_a_bright_ceiling_sends() {
         let twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
         let view = view_of(&on_device, "shadows, reflections 1, glossy 8", &camera);
         let ray = scalar::rays::pixel_ray(&camera, UVec2::splat(8));
-        let hit = twin.closest(&ray, camera.near_m).0.expect("the floor");
+        let hit = twin.closest(&ray, camera.near_m).expect("the floor");
         let reflector = twin.look(&hit).reflector.expect("a reflector");
         let towards_eye = -ray.direction_in_world.normalize_or_zero();
         let expected = code_of(environment_reflectance_linear(Vec3::Y, towards_eye, &reflector) * glow);
@@ -188,7 +188,7 @@ fn only_pixels_with_reflectors_change_and_repeats_are_equal() {
     let mut changed = 0;
     for pixel in pixels(SIZE_PX) {
         let differs = linear_at(&without, pixel) != linear_at(&with, pixel);
-        let hit = twin.closest(&scalar::rays::pixel_ray(&camera, pixel), camera.near_m).0;
+        let hit = twin.closest(&scalar::rays::pixel_ray(&camera, pixel), camera.near_m);
         let is_glossy = hit.is_some_and(|hit| twin.look(&hit).reflector.is_some());
         assert!(is_glossy || !differs, "{pixel}");
         changed += u32::from(differs);

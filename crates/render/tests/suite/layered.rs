@@ -22,7 +22,7 @@ fn layers(scene: &Scene, side: u32, kept: LayerSelection, lighting: &str) -> [La
 pub fn fronts(twin: &scalar::rays::Scene, ray: Ray, range_m: f32) -> Vec<f32> {
     let mut from_m = 0.0;
     let next = || {
-        let hit = twin.closest_between(&ray, from_m, range_m).0?;
+        let hit = twin.closest_between(&ray, from_m, range_m)?;
         from_m = hit.t + 1e-4 * range_m;
         Some(hit.t)
     };

@@ -115,7 +115,7 @@ fn lamp(x: f32, strength: f32) -> Light {
 /// The surface that a pixel shows, and its colour.
 fn surface(scene: &rays::Scene, camera: &PinholeCamera, pixel: UVec2) -> Option<(SurfacePoint, Vec3)> {
     let ray = rays::pixel_ray(camera, pixel);
-    let hit = scene.closest(&ray, camera.near_m).0?;
+    let hit = scene.closest(&ray, camera.near_m)?;
     let [a, b, c] = scene.triangles_in_world().nth(hit.slot as usize).expect("a triangle");
     let across = (b - a).cross(c - a).normalize_or_zero();
     let point = SurfacePoint {

@@ -280,7 +280,7 @@ fn rays_meet_a_hashed_surface_where_their_twin_does() {
     let mut twin = scalar::rays::Scene::of(&on_device, 0.0).expect("a tree");
     twin.footprint = camera.focal_px.min_element().recip();
     let pixels = (0..SIZE_PX.y).flat_map(|y| (0..SIZE_PX.x).map(move |x| UVec2::new(x, y)));
-    let hit = |pixel| twin.closest(&scalar::rays::pixel_ray(&camera, pixel), camera.near_m).0.is_some();
+    let hit = |pixel| twin.closest(&scalar::rays::pixel_ray(&camera, pixel), camera.near_m).is_some();
     let differ = pixels.zip(&traced).filter(|&(pixel, &there)| hit(pixel) != there).count();
     assert!(differ < 20 && traced.iter().filter(|&&there| there).count() > 300, "{differ}");
 }

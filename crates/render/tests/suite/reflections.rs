@@ -121,7 +121,7 @@ fn a_plane_mirror_shows_the_view_from_behind_it() {
         let mut differ = 0;
         for pixel in pixels(camera.size_px) {
             let ray = scalar::rays::pixel_ray(&camera, pixel);
-            let Some(hit) = twin.closest(&ray, camera.near_m).0 else { continue };
+            let Some(hit) = twin.closest(&ray, camera.near_m) else { continue };
             let Some(reflector) = twin.look(&hit).reflector.filter(|r| r.mirror_share() > 0.0) else { continue };
             let towards_eye = -ray.direction_in_world.normalize_or_zero();
             let share = environment_reflectance_linear(Vec3::Y, towards_eye, &reflector);
@@ -231,7 +231,7 @@ fn mirrored_pixels_show_what_their_twins_meet() {
         let view = view_of(&on_device, &format!("shadows, reflections {mirrors}"), &camera);
         let expected = |pixel: UVec2| {
             let ray: Ray = scalar::rays::pixel_ray(&camera, pixel);
-            let hit = twin.closest(&ray, camera.near_m).0?;
+            let hit = twin.closest(&ray, camera.near_m)?;
             let bounces = twin.bounces(&ray, hit, mirrors);
             let last = bounces.last()?;
             let end = last.hit.map(|hit| twin.look(&hit)).filter(|look| look.reflector.is_none());
@@ -317,7 +317,7 @@ fn only_pixels_with_mirrors_change() {
     let mut changed = 0;
     for pixel in pixels(SIZE_PX) {
         let differs = linear_at(&without, pixel) != linear_at(&with, pixel);
-        let hit = twin.closest(&scalar::rays::pixel_ray(&camera, pixel), camera.near_m).0;
+        let hit = twin.closest(&scalar::rays::pixel_ray(&camera, pixel), camera.near_m);
         let is_mirror = hit.is_some_and(|hit| twin.look(&hit).reflector.is_some());
         assert!(is_mirror || !differs, "{pixel}");
         changed += u32::from(differs);
@@ -337,7 +337,7 @@ fn the_footprint_behind_a_ball_is_what_neighbouring_rays_span() {
     twin.footprint = camera.focal_px.min_element().recip();
     let bounce = |pixel: UVec2| {
         let ray = scalar::rays::pixel_ray(&camera, pixel);
-        let hit = twin.closest(&ray, camera.near_m).0?;
+        let hit = twin.closest(&ray, camera.near_m)?;
         twin.bounces(&ray, hit, 1).first().copied()
     };
     let end = |bounce: &Bounce| bounce.ray.at(bounce.hit.map_or(0.0, |hit| hit.t));

@@ -57,7 +57,7 @@ fn texels_hold_what_their_twins_rays_meet() {
         let same = pixels.zip(&image.inverse_depth_per_m).filter(|(pixel, inverse_depth)| {
             let center = pixel.as_vec2() + 0.5;
             let [near, far] = camera.depths_m(center);
-            let hit = if near < far { twin.closest_between(&camera.ray(center), near, far).0 } else { None };
+            let hit = if near < far { twin.closest_between(&camera.ray(center), near, far) } else { None };
             seen += usize::from(hit.is_some());
             let expected = hit.map_or(0.0, |hit| hit.t.recip());
             (expected - **inverse_depth).abs() <= 1e-4 * expected
@@ -80,7 +80,7 @@ fn samples_lie_on_the_triangles_that_their_rays_meet() {
         let point = image.sample_in_world(place.x, place.y)?;
         let center = place.as_vec2() + 0.5;
         let [near, far] = camera.depths_m(center);
-        let [a, b, c] = triangles[twin.closest_between(&camera.ray(center), near, far).0?.slot as usize];
+        let [a, b, c] = triangles[twin.closest_between(&camera.ray(center), near, far)?.slot as usize];
         let off_m = (b - a).cross(c - a).normalize_or_zero().dot(point - a).abs();
         Some(off_m <= 1e-4 * camera.project(point)?.planar_depth_m)
     });

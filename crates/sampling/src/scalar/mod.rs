@@ -84,7 +84,7 @@ fn texel(query: &Query<'_>, camera: &PinholeCamera, pixel: UVec2) -> Texel {
     let mut near = camera.near_m;
     let mut passed_m = None;
     for _ in 0..MOST_LAYERS {
-        let Some(hit) = scene.closest(&ray, near).0 else { break };
+        let Some(hit) = scene.closest(&ray, near) else { break };
         let candidate = Candidate::of(scene, camera, pixel, &ray, &hit);
         let was_kept = query.reference.is_some_and(|reference| was_kept(&candidate, reference));
         if !query.images.iter().any(|image| is_redundant(query, &candidate, was_kept, image)) {

@@ -14,6 +14,6 @@ pub fn is_visibility_redundant(scene: &Scene, point_in_world: Vec3, footprint_m:
     let room_m = SAME_DEPTH * depth_m + SAME_FOOTPRINTS * footprint_m;
     let direction_in_world = (point_in_world - camera.eye_in_world) / depth_m;
     let ray = Ray { origin_in_world: camera.eye_in_world, direction_in_world };
-    let met = scene.closest_between(&ray, camera.near_m, depth_m + room_m).0;
+    let met = scene.closest_between(&ray, camera.near_m, depth_m + room_m);
     met.is_some_and(|hit| hit.t >= depth_m - room_m)
 }
