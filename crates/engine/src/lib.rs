@@ -318,7 +318,7 @@ impl Engine for GpuEngine {
     }
 
     fn preview_lighting(&self, lighting: &str) -> Result<String, EngineError> {
-        Ok(parsed::<Lighting>("lighting", lighting)?.with_single_rays().to_string())
+        Ok(parsed::<Lighting>("lighting", lighting)?.with_at_most_rays(std::num::NonZeroU32::MIN).to_string())
     }
 
     fn live_stream(&self) -> Box<dyn Any + Send + Sync> {

@@ -82,8 +82,8 @@ pub enum UnknownLighting {
     Reflections(String),
     #[error("lighting {0:?}: rays of glossy must be from 1 to {MAX_GLOSSY_RAYS}")]
     Glossy(String),
-    #[error("lighting {0:?}: {1} must be a positive number")]
-    Number(String, &'static str),
+    #[error("lighting {0:?}: the radius must be a positive number")]
+    Radius(String),
     #[error("lighting {0:?}: {1}")]
     Conflict(String, &'static str),
 }
@@ -154,7 +154,7 @@ impl Lighting {
     /// A quarter of the rays, at least one each; `None` where there are no fewer.
     #[must_use]
     pub fn with_fewer_rays(&self) -> Option<Self> {
-        let lighting = self.with_rays(|rays| NonZeroU32::new(rays.get() / 4).unwrap_or(NonZeroU32::MIN));
+        let lighting = self.with_rays(quarter_of);
         (lighting != *self).then_some(lighting)
     }
 
@@ -162,12 +162,6 @@ impl Lighting {
     #[must_use]
     pub fn with_at_most_rays(&self, most: NonZeroU32) -> Self {
         self.with_rays(|rays| rays.min(most))
-    }
-
-    /// One ray to each lamp and one of the light from all around: the first step of refinement.
-    #[must_use]
-    pub fn with_single_rays(&self) -> Self {
-        self.with_at_most_rays(NonZeroU32::MIN)
     }
 
     /// With other numbers of rays.
@@ -188,8 +182,7 @@ impl Lighting {
             return *self;
         }
         let least = if quality < LightCacheQuality::Balanced { LEAST_RAYS_IN_MOTION } else { LEAST_RAYS_HERE };
-        let quarter = |rays: NonZeroU32| NonZeroU32::new(rays.get() / 4).unwrap_or(NonZeroU32::MIN);
-        self.with_rays(|rays| rays.min(quarter(rays).max(least)))
+        self.with_rays(|rays| rays.min(quarter_of(rays).max(least)))
     }
 
     /// The formula of highlights; none for unlit surfaces.
@@ -229,12 +222,17 @@ impl FromStr for Lighting {
                 ["soft", n] => direct.replace(Direct::Soft(rays(text, n)?)).is_some(),
                 ["occlusion", n] => ambient.replace(Ambient::Occlusion(rays(text, n)?, None)).is_some(),
                 ["occlusion", n, radius] => {
-                    let radius_m = Some(positive(text, radius.strip_suffix('m').unwrap_or(radius), "the radius")?);
-                    ambient.replace(Ambient::Occlusion(rays(text, n)?, radius_m)).is_some()
+                    let radius_m = radius.strip_suffix('m').unwrap_or(radius).parse().ok();
+                    let radius_m = radius_m.filter(|radius_m: &f32| radius_m.is_finite() && *radius_m > 0.0);
+                    let radius_m = radius_m.ok_or_else(|| UnknownLighting::Radius(text.to_owned()))?;
+                    ambient.replace(Ambient::Occlusion(rays(text, n)?, Some(radius_m))).is_some()
                 }
                 ["indirect", n] => ambient.replace(Ambient::Indirect(rays(text, n)?)).is_some(),
-                ["reflections", n] => reflections.replace(mirrors(text, n)?).is_some(),
-                ["glossy", n] => glossy.replace(lobe_rays(text, n)?).is_some(),
+                ["reflections", n] => {
+                    let mirrors = count(text, n, MAX_REFLECTIONS, UnknownLighting::Reflections)?;
+                    reflections.replace(mirrors).is_some()
+                }
+                ["glossy", n] => glossy.replace(count(text, n, MAX_GLOSSY_RAYS, UnknownLighting::Glossy)?).is_some(),
                 _ => return Err(UnknownLighting::Term(term.to_owned())),
             };
             if again {
@@ -248,41 +246,37 @@ impl FromStr for Lighting {
             }
         }
         let lighting = Self { direct: direct.unwrap_or_default(), ambient, reflections, glossy };
-        if lighting.is_indirect() && lighting.shadow_rays() == 0 {
-            let reason = "indirect light needs shadows or soft N: phong and unlit have none of lamps";
-            return Err(UnknownLighting::Conflict(text.to_owned(), reason));
-        }
-        if !lighting.is_lit() && ambient.is_some() {
-            return Err(UnknownLighting::Conflict(text.to_owned(), "unlit surfaces have no occlusion"));
-        }
-        if lighting.shadow_rays() == 0 && lighting.without_reflections().is_some() {
-            return Err(UnknownLighting::Conflict(
-                text.to_owned(),
-                "mirrors show the scene under shadows and soft N only",
-            ));
-        }
-        Ok(lighting)
+        let conflict = if lighting.is_indirect() && lighting.shadow_rays() == 0 {
+            "indirect light needs shadows or soft N: phong and unlit have none of lamps"
+        } else if !lighting.is_lit() && ambient.is_some() {
+            "unlit surfaces have no occlusion"
+        } else if lighting.shadow_rays() == 0 && lighting.without_reflections().is_some() {
+            "mirrors show the scene under shadows and soft N only"
+        } else {
+            return Ok(lighting);
+        };
+        Err(UnknownLighting::Conflict(text.to_owned(), conflict))
     }
 }
 
 fn rays(text: &str, number: &str) -> Result<NonZeroU32, UnknownLighting> {
-    let rays = number.parse().ok().filter(|rays: &NonZeroU32| rays.get() <= MAX_RAYS);
-    rays.ok_or_else(|| UnknownLighting::Rays(text.to_owned()))
+    count(text, number, MAX_RAYS, UnknownLighting::Rays)
 }
 
-fn mirrors(text: &str, number: &str) -> Result<NonZeroU32, UnknownLighting> {
-    let mirrors = number.parse().ok().filter(|mirrors: &NonZeroU32| mirrors.get() <= MAX_REFLECTIONS);
-    mirrors.ok_or_else(|| UnknownLighting::Reflections(text.to_owned()))
+/// A number from 1 to `most`.
+fn count(
+    text: &str,
+    number: &str,
+    most: u32,
+    error: fn(String) -> UnknownLighting,
+) -> Result<NonZeroU32, UnknownLighting> {
+    let count = number.parse().ok().filter(|count: &NonZeroU32| count.get() <= most);
+    count.ok_or_else(|| error(text.to_owned()))
 }
 
-fn lobe_rays(text: &str, number: &str) -> Result<NonZeroU32, UnknownLighting> {
-    let rays = number.parse().ok().filter(|rays: &NonZeroU32| rays.get() <= MAX_GLOSSY_RAYS);
-    rays.ok_or_else(|| UnknownLighting::Glossy(text.to_owned()))
-}
-
-fn positive(text: &str, number: &str, what: &'static str) -> Result<f32, UnknownLighting> {
-    let value = number.parse().ok().filter(|v: &f32| v.is_finite() && *v > 0.0);
-    value.ok_or_else(|| UnknownLighting::Number(text.to_owned(), what))
+/// A quarter of a number of rays, at least one.
+fn quarter_of(rays: NonZeroU32) -> NonZeroU32 {
+    NonZeroU32::new(rays.get() / 4).unwrap_or(NonZeroU32::MIN)
 }
 
 impl fmt::Display for Lighting {
@@ -337,7 +331,7 @@ mod tests {
 
     #[test]
     fn invalid_lightings_are_refused_with_the_reason() {
-        use UnknownLighting::{Conflict, Glossy, Number, Rays, Reflections, Term};
+        use UnknownLighting::{Conflict, Glossy, Radius, Rays, Reflections, Term};
         let parsed = |text: &str| text.parse::<Lighting>().expect_err(text);
         for text in
             ["soft 0", "soft -1", "soft 4097", "soft many", "occlusion 0", "soft 99999999999", "soft 4, indirect 0"]
@@ -364,7 +358,7 @@ mod tests {
             assert!(matches!(parsed(text), Term(_)), "{text}");
         }
         for text in ["occlusion 4 -1m", "occlusion 4 NaN", "occlusion 4 0m"] {
-            assert!(matches!(parsed(text), Number(..)), "{text}");
+            assert!(matches!(parsed(text), Radius(_)), "{text}");
         }
         let unmirrored = ["phong, reflections 1", "unlit, reflections 1", "reflections 2", "glossy 4"];
         let twice = ["unlit, phong", "occlusion 4, occlusion 8", "shadows, reflections 1, reflections 1"];
