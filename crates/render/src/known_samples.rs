@@ -84,14 +84,16 @@ pub(crate) struct Predecessors {
 impl RedundancyVariant {
     /// Each test after few and many images, with a temporal reference where samples are consulted.
     pub fn all(tests: &[RedundancyTest]) -> HashSet<Self> {
-        let with_reference = |test: &RedundancyTest| [false, test.consults == Evidence::Samples];
-        let after = |test: &RedundancyTest, earlier| {
-            let shader = test.shader;
-            let traces_rays = test.traces_rays();
-            let variant = |temporal_reference| Self { shader, traces_rays, temporal_reference, earlier };
-            with_reference(test).map(variant)
-        };
-        tests.iter().flat_map(|test| [1, 3, 15].into_iter().flat_map(|earlier| after(test, earlier))).collect()
+        let mut all = HashSet::new();
+        for test in tests {
+            for earlier in [1, 3, 15] {
+                for temporal_reference in [false, test.consults == Evidence::Samples] {
+                    let shader = test.shader;
+                    all.insert(Self { shader, traces_rays: test.traces_rays(), temporal_reference, earlier });
+                }
+            }
+        }
+        all
     }
 
     /// The values of `known_samples.wgsl`, whose resources are in `group`.
@@ -149,15 +151,11 @@ impl KnownSamples {
 
     /// The first `earlier` images, for the next one, whose camera is `own`.
     pub fn predecessors(&self, gpu: &Gpu, earlier: usize, own: &PinholeCamera) -> Predecessors {
-        let uniform = |cameras: &[PinholeCamera]| {
-            let cameras: Vec<_> = cameras.iter().map(|camera| KnownCamera::of(camera, own)).collect();
-            gpu.buffer_with("known cameras", &cameras, BufferUsages::UNIFORM)
-        };
         let reference = self.reference.as_ref().map(|TemporalReference { cameras, layers }| {
-            (layers.first(cameras.len()), uniform(&cameras[earlier..=earlier]))
+            (layers.first(cameras.len()), KnownCamera::uniform(gpu, &cameras[earlier..=earlier], own))
         });
         let samples = self.layers.first(earlier);
-        let cameras = uniform(&self.cameras[..earlier]);
+        let cameras = KnownCamera::uniform(gpu, &self.cameras[..earlier], own);
         Predecessors { variant: self.variant(earlier), samples, cameras, reference }
     }
 }
@@ -190,6 +188,11 @@ impl Predecessors {
 }
 
 impl KnownCamera {
+    fn uniform(gpu: &Gpu, cameras: &[PinholeCamera], own: &PinholeCamera) -> wgpu::Buffer {
+        let cameras: Vec<Self> = cameras.iter().map(|camera| Self::of(camera, own)).collect();
+        gpu.buffer_with("known cameras", &cameras, BufferUsages::UNIFORM)
+    }
+
     /// `own` is the camera of the image that consults this one.
     fn of(camera: &PinholeCamera, own: &PinholeCamera) -> Self {
         let column = camera.world_from_camera * Vec3::X / camera.focal_px.x;
@@ -212,11 +215,11 @@ impl KnownCamera {
 /// Rows that take (column · w, row · w, w, 1) of `own` to the same, without the 1, of `camera`; w is planar depth. In
 /// double precision: both cameras may be far from the origin.
 fn homogeneous_pixel_from_own(camera: &PinholeCamera, own: &PinholeCamera) -> [[f32; 4]; 3] {
-    let from_world = |camera: &PinholeCamera| {
+    let [camera_from_world, own_from_world] = [camera, own].map(|camera| {
         let [column, row, depth] = camera.homogeneous_pixel_from_world().map(|row| row.as_dvec4());
         DMat4::from_cols(column, row, depth, DVec4::W).transpose()
-    };
-    let rows = (from_world(camera) * from_world(own).inverse()).transpose();
+    });
+    let rows = (camera_from_world * own_from_world.inverse()).transpose();
     [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.as_vec4().to_array())
 }
 

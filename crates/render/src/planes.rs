@@ -83,10 +83,12 @@ impl Output {
     }
 }
 
-/// A camera and its planes.
-type Picture<'a> = (&'a Camera, Vec<&'a [u32]>);
-
-fn split<'a>(mut words: &'a [u32], planes: usize, cameras: &'a [Camera]) -> impl Iterator<Item = Picture<'a>> {
+/// The cameras, each with its planes.
+fn split<'a>(
+    mut words: &'a [u32],
+    planes: usize,
+    cameras: &'a [Camera],
+) -> impl Iterator<Item = (&'a Camera, Vec<&'a [u32]>)> {
     cameras.iter().map(move |camera| {
         let (own, rest) = words.split_at(camera.pixel_count() * planes);
         words = rest;
@@ -103,51 +105,53 @@ pub(crate) fn views(
     lit: ProvenanceKind,
 ) -> Vec<View> {
     let layout = output.layout();
-    let view = |(camera, own): Picture<'_>| {
+    let views = split(words, layout.count, cameras).map(|(camera, own)| {
         let inverse_depth: &[f32] = bytemuck::cast_slice(own[1]);
-        let hit = |&inverse: &f32| if inverse > 0.0 { Provenance::new(lit, 0) } else { Provenance::EMPTY };
-        let rgb = |word: &u32| word.to_le_bytes().into_iter().take(3);
         View {
             size_px: camera.size_px(),
-            srgb8: own[0].iter().flat_map(rgb).collect(),
+            srgb8: own[0].iter().flat_map(|word| word.to_le_bytes().into_iter().take(3)).collect(),
             inverse_depth_per_m: planes.inverse_depth.then(|| inverse_depth.to_vec()),
             provenance: planes.provenance.then(|| match layout.provenance {
                 Some(plane) => own[plane].iter().map(|&word| Provenance(word)).collect(),
-                None => inverse_depth.iter().map(hit).collect(),
+                None => inverse_depth
+                    .iter()
+                    .map(|&inverse| if inverse > 0.0 { Provenance::new(lit, 0) } else { Provenance::EMPTY })
+                    .collect(),
             }),
         }
-    };
-    split(words, layout.count, cameras).map(view).collect()
+    });
+    views.collect()
 }
 
 pub(crate) fn depth_images(words: &[u32], output: Output, cameras: &[Camera]) -> Vec<DepthImage> {
     let layout = output.layout();
-    let image = |(camera, own): Picture<'_>| {
-        let visibility = |reflector: usize| &own[reflector + 1..][..output.sums.visibility_words()];
-        let specular = |reflector: usize| SpecularPlanes {
+    let images = split(words, layout.count, cameras).map(|(camera, own)| DepthImage {
+        camera: *camera,
+        inverse_depth_per_m: bytemuck::cast_slice(own[1]).to_vec(),
+        color_rgb9e5: if output.light { Vec::new() } else { own[0].to_vec() },
+        normal_oct16: layout.normal.map(|normal| own[normal].to_vec()),
+        surface_id: layout.surface_id.map(|ids| {
+            let ids = own[ids].iter().zip(own[ids + 1]);
+            ids.map(|(&instance, &primitive)| SurfaceId { instance, primitive }).collect()
+        }),
+        specular: layout.reflector.map(|reflector| SpecularPlanes {
             reflectance_srgb8_roughness8: own[reflector].to_vec(),
-            visibility8: visibility(reflector).iter().map(|plane| plane.to_vec()).collect(),
-        };
-        let light = |first: usize| LightPlanes {
+            visibility8: to_vecs(&own[reflector + 1..][..output.sums.visibility_words()]),
+        }),
+        passed: layout.passed.and_then(|passed| passed_plane(own[passed])),
+        corner_inverse_depth_per_m: None,
+        light: layout.light.map(|first| LightPlanes {
             triangle_normal_oct16: own[first].to_vec(),
             lamps_rgb9e5: own[0].to_vec(),
             environment_rgb9e5: own[first + 1].to_vec(),
-            share8: own[first + 2..][..output.share_words()].iter().map(|plane| plane.to_vec()).collect(),
-        };
-        let id = |(&instance, &primitive): (&u32, &u32)| SurfaceId { instance, primitive };
-        DepthImage {
-            camera: *camera,
-            inverse_depth_per_m: bytemuck::cast_slice(own[1]).to_vec(),
-            color_rgb9e5: if output.light { Vec::new() } else { own[0].to_vec() },
-            normal_oct16: layout.normal.map(|normal| own[normal].to_vec()),
-            surface_id: layout.surface_id.map(|ids| own[ids].iter().zip(own[ids + 1]).map(id).collect()),
-            specular: layout.reflector.map(specular),
-            passed: layout.passed.and_then(|passed| passed_plane(own[passed])),
-            corner_inverse_depth_per_m: None,
-            light: layout.light.map(light),
-        }
-    };
-    split(words, layout.count, cameras).map(image).collect()
+            share8: to_vecs(&own[first + 2..][..output.share_words()]),
+        }),
+    });
+    images.collect()
+}
+
+fn to_vecs(planes: &[&[u32]]) -> Vec<Vec<u32>> {
+    planes.iter().map(|plane| plane.to_vec()).collect()
 }
 
 /// `None` where no ray passed anything.

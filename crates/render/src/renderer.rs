@@ -17,7 +17,7 @@ use crate::light_samples::{CachedLight, LightCache, LookUpTests};
 use crate::planes::{self, Output};
 use crate::smooth_light::smoothed;
 use crate::visibility::{Choice, Costs, Visibility};
-use crate::work::{DrawWork, SamplePlanes};
+use crate::work::{DrawWork, Refinement, SamplePlanes};
 use crate::{GpuScene, Lighting, RenderError, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages};
 
 /// Pixels in one submission: bounds the memory for surfaces, light and read-back.
@@ -47,6 +47,12 @@ pub struct Renderer {
     layer_cache: LayerCache,
     /// By scene; the one that was measured first is at the front.
     costs: Mutex<VecDeque<(u64, Costs)>>,
+}
+
+impl<'a> DrawRequest<'a> {
+    fn new(work: DrawWork<'a>, output: Output) -> Self {
+        Self { work, output, tone: ToneMapping::NONE, sequence: None, cached: None }
+    }
 }
 
 impl Renderer {
@@ -134,9 +140,8 @@ impl Renderer {
             provenance: cached.is_some() && planes.provenance,
             ..views_output(work)
         };
-        let read = |words: &[u32], cameras: &[Camera]| planes::views(words, output, cameras, planes, lit);
-        let request = DrawRequest { work, output, tone: planes.tone, sequence: None, cached };
-        self.draw(request, &cameras, read)
+        let request = DrawRequest { tone: planes.tone, cached, ..DrawRequest::new(work, output) };
+        self.draw(request, &cameras, |words, cameras| planes::views(words, output, cameras, planes, lit))
     }
 
     /// Depth images, in as few submissions as memory allows.
@@ -204,15 +209,13 @@ impl Renderer {
     ) -> Result<Vec<DepthImage>, RenderError> {
         let all = pinholes(cameras, "redundancy tests")?;
         self.check(cameras)?;
-        let known = |cameras: &[PinholeCamera], reference| {
-            KnownSamples::of(&self.gpu, &self.layer_cache, cameras, test, reference)
-        };
         let own: Vec<Camera> = wanted.iter().map(|&number| cameras[number as usize]).collect();
-        let samples = known(&all, reference)?;
+        let samples = KnownSamples::of(&self.gpu, &self.layer_cache, &all, test, reference)?;
         let sequence = ImageSequence { known: &samples, wanted, first: 0, kept: all.len().saturating_sub(1) };
         // Where pixels are compared with the same pixel, corners are compared with corners.
-        let corners =
-            (planes.corners && test.from_one_place).then(|| known(&corner_cameras(&all), None)).transpose()?;
+        let corners = (planes.corners && test.from_one_place).then(|| corner_cameras(&all));
+        let corners = corners.map(|cameras| KnownSamples::of(&self.gpu, &self.layer_cache, &cameras, test, None));
+        let corners = corners.transpose()?;
         let of_corners = match &corners {
             Some(known) => ImageSequence { known, ..sequence },
             None => ImageSequence { kept: 0, ..sequence },
@@ -251,16 +254,12 @@ impl Renderer {
     ) -> Result<Vec<DepthImage>, RenderError> {
         let corners = planes.corners.then(|| pinholes(cameras, "depths at corners")).transpose()?;
         let output = images_output(work, planes, test);
-        let request = DrawRequest { work, output, tone: ToneMapping::NONE, sequence, cached: None };
+        let request = DrawRequest { sequence, ..DrawRequest::new(work, output) };
         let mut images = self.draw(request, cameras, |words, cameras| planes::depth_images(words, output, cameras))?;
         if let Some(pinholes) = corners {
-            let work = work.unlit();
             let cameras = as_cameras(&corner_cameras(&pinholes));
             self.check(&cameras)?;
-            let output = images_output(work, SamplePlanes::default(), test);
-            let request = DrawRequest { work, output, sequence: of_corners, ..request };
-            let corners =
-                self.draw(request, &cameras, |words, cameras| planes::depth_images(words, output, cameras))?;
+            let corners = self.images(work.unlit(), &cameras, SamplePlanes::default(), test, [of_corners, None])?;
             for (image, corners) in images.iter_mut().zip(corners) {
                 image.corner_inverse_depth_per_m = Some(corners.inverse_depth_per_m);
             }
@@ -275,11 +274,10 @@ impl Renderer {
         cameras: &[Camera],
         read: impl Fn(&[u32], &[Camera]) -> Vec<T>,
     ) -> Result<Vec<T>, RenderError> {
-        let DrawRequest { work, output, tone, sequence, cached } = request;
         let mut pictures = Vec::with_capacity(cameras.len());
-        for cameras in batches(cameras, self.most_pixels(output)) {
-            let sequence = sequence.map(|sequence| ImageSequence { first: pictures.len(), ..sequence });
-            let batch = Batch { tone, cached, ..self.batch(work, cameras, output, sequence)? };
+        for cameras in batches(cameras, self.most_pixels(request.output)) {
+            let sequence = request.sequence.map(|sequence| ImageSequence { first: pictures.len(), ..sequence });
+            let batch = self.batch(DrawRequest { sequence, ..request }, cameras)?;
             let (result, words) = self.stages.draw(&batch)?;
             result.with(words, |words: &[u32]| pictures.extend(read(words, cameras)))?;
         }
@@ -292,7 +290,11 @@ impl Renderer {
     /// # Errors
     /// The device's.
     pub fn choice(&self, scene: &GpuScene, camera: &PinholeCamera, scene_time_s: f32) -> Result<Choice, RenderError> {
-        Ok(self.costs_in_turn(scene, camera, scene_time_s, Turn::default())?.at(camera.pixel_count()))
+        let lighting = Lighting::UNLIT;
+        let refinement = Refinement::default();
+        let turn = Turn::default();
+        let work = DrawWork { scene, lighting, scene_time_s, visibility: Visibility::Measured, refinement, turn };
+        Ok(self.costs(work, camera)?.at(camera.pixel_count()))
     }
 
     /// The pixels up to which pictures of a scene find surfaces faster by rays: measured with the scene's first pictures.
@@ -303,23 +305,16 @@ impl Renderer {
         if is_drawn_at_each_moment(work) {
             return Ok(0);
         }
-        let costs = self.costs_in_turn(work.scene, camera, work.scene_time_s, work.turn)?;
-        Ok(costs.most_traced_pixels(camera.pixel_count()))
+        Ok(self.costs(work, camera)?.most_traced_pixels(camera.pixel_count()))
     }
 
     /// Whether surfaces are found by rays. A live stream does not wait for the measurement: where there is none, it traces rays
     /// if the scene has more triangles than the picture pixels.
-    fn is_by_rays(
-        &self,
-        scene: &GpuScene,
-        camera: &PinholeCamera,
-        scene_time_s: f32,
-        turn: Turn,
-    ) -> Result<bool, RenderError> {
-        if turn.class == WorkClass::Live && self.known_costs(scene).is_none() {
-            return Ok(scene.triangle_count() > camera.pixel_count());
+    fn is_by_rays(&self, work: DrawWork<'_>, camera: &PinholeCamera) -> Result<bool, RenderError> {
+        if work.turn.class == WorkClass::Live && self.known_costs(work.scene).is_none() {
+            return Ok(work.scene.triangle_count() > camera.pixel_count());
         }
-        Ok(self.costs_in_turn(scene, camera, scene_time_s, turn)?.at(camera.pixel_count()).rays_are_faster())
+        Ok(self.costs(work, camera)?.at(camera.pixel_count()).rays_are_faster())
     }
 
     fn known_costs(&self, scene: &GpuScene) -> Option<Costs> {
@@ -327,59 +322,49 @@ impl Renderer {
     }
 
     /// Not under a lock: work of one class would wait for the turn of another.
-    fn costs_in_turn(
-        &self,
-        scene: &GpuScene,
-        camera: &PinholeCamera,
-        scene_time_s: f32,
-        turn: Turn,
-    ) -> Result<Costs, RenderError> {
-        if let Some(costs) = self.known_costs(scene) {
+    fn costs(&self, work: DrawWork<'_>, camera: &PinholeCamera) -> Result<Costs, RenderError> {
+        if let Some(costs) = self.known_costs(work.scene) {
             return Ok(costs);
         }
         let large = at_least(camera, LEAST_TIMED_PX);
         let small = large.resized((large.size_px / 2).max(UVec2::ONE));
-        let measured = |camera: &PinholeCamera| {
-            let choice = self.measure(scene, camera, scene_time_s, turn)?;
-            tracing::info!(size_px = %camera.size_px, %choice, "surfaces are found by");
-            Ok::<_, RenderError>((camera.pixel_count(), choice))
-        };
-        let measured = Costs::through([measured(&small)?, measured(&large)?]);
+        let measured = Costs::through([self.measure(work, &small)?, self.measure(work, &large)?]);
         let mut costs = self.costs.lock();
         // Of several that were measured at once the first counts.
-        if let Some((_, first)) = costs.iter().find(|(identity, _)| *identity == scene.identity) {
+        if let Some((_, first)) = costs.iter().find(|(identity, _)| *identity == work.scene.identity) {
             return Ok(*first);
         }
         if costs.len() >= MOST_SCENES {
             costs.pop_front();
         }
-        costs.push_back((scene.identity, measured));
+        costs.push_back((work.scene.identity, measured));
         Ok(measured)
     }
 
-    fn measure(
-        &self,
-        scene: &GpuScene,
-        camera: &PinholeCamera,
-        scene_time_s: f32,
-        turn: Turn,
-    ) -> Result<Choice, RenderError> {
+    /// The pixels of a camera's pictures, and their costs.
+    fn measure(&self, work: DrawWork<'_>, camera: &PinholeCamera) -> Result<(usize, Choice), RenderError> {
+        let work = work.unlit();
+        let triangles_s = self.seconds_a_view(DrawWork { visibility: Visibility::Triangles, ..work }, camera)?;
+        let rays_s = self.seconds_a_view(DrawWork { visibility: Visibility::Rays, ..work }, camera)?;
+        let choice = Choice { triangles_s, rays_s };
+        tracing::info!(size_px = %camera.size_px, %choice, "surfaces are found by");
+        Ok((camera.pixel_count(), choice))
+    }
+
+    fn seconds_a_view(&self, work: DrawWork<'_>, camera: &PinholeCamera) -> Result<f64, RenderError> {
         let cameras = [Camera::from(*camera)];
-        let seconds = |visibility| {
-            let lighting = Lighting::UNLIT;
-            let refinement = Default::default();
-            let work = DrawWork { scene, lighting, scene_time_s, visibility, refinement, turn };
-            let run = || {
-                let batch = self.batch(work, &cameras, views_output(work), None)?;
-                // Waiting for turns does not count.
-                Ok(self.stages.draw(&batch)?.0.device_s)
-            };
-            self.check(&cameras)?;
+        self.check(&cameras)?;
+        let mut least_s = f64::INFINITY;
+        for number in 0..4 {
+            let batch = self.batch(DrawRequest::new(work, views_output(work)), &cameras)?;
+            // Waiting for turns does not count.
+            let device_s = self.stages.draw(&batch)?.0.device_s;
             // Pipelines and trees are made by the first; of the others the quickest was disturbed least.
-            run()?;
-            (0..3).map(|_| run()).try_fold(f64::INFINITY, |least, s: Result<f64, RenderError>| s.map(|s| least.min(s)))
-        };
-        Ok(Choice { triangles_s: seconds(Visibility::Triangles)?, rays_s: seconds(Visibility::Rays)? })
+            if number > 0 {
+                least_s = least_s.min(device_s);
+            }
+        }
+        Ok(least_s)
     }
 
     fn check(&self, cameras: &[Camera]) -> Result<(), RenderError> {
@@ -392,13 +377,8 @@ impl Renderer {
         Ok(())
     }
 
-    fn batch<'a>(
-        &self,
-        work: DrawWork<'a>,
-        cameras: &'a [Camera],
-        output: Output,
-        sequence: Option<ImageSequence<'a>>,
-    ) -> Result<Batch<'a>, RenderError> {
+    fn batch<'a>(&self, request: DrawRequest<'a>, cameras: &'a [Camera]) -> Result<Batch<'a>, RenderError> {
+        let DrawRequest { work, output, tone, sequence, cached } = request;
         let by_rays = match work.visibility {
             // Triangles are drawn through one eye.
             _ if cameras[0].pinhole().is_none() => true,
@@ -406,14 +386,10 @@ impl Renderer {
             Visibility::Triangles => false,
             Visibility::Rays => true,
             Visibility::Measured if is_drawn_at_each_moment(work) => false,
-            Visibility::Measured => {
-                self.is_by_rays(work.scene, cameras[0].reference(), work.scene_time_s, work.turn)?
-            }
+            Visibility::Measured => self.is_by_rays(work, cameras[0].reference())?,
         };
         let needs_tree = by_rays || work.lighting.is_traced();
         let traced = needs_tree.then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
-        let tone = ToneMapping::NONE;
-        let cached = None;
         let position = Position::default();
         Ok(Batch { work, cameras, by_rays, traced, output, tone, sequence, cached, position })
     }
@@ -442,10 +418,10 @@ fn as_cameras(pinholes: &[PinholeCamera]) -> Vec<Camera> {
 }
 
 fn pinholes(cameras: &[Camera], what: &'static str) -> Result<Vec<PinholeCamera>, RenderError> {
-    let pinhole = |(index, camera): (usize, &Camera)| {
+    let pinholes = cameras.iter().enumerate().map(|(index, camera)| {
         camera.pinhole().copied().ok_or(RenderError::Model { index, model: camera.model_name(), what })
-    };
-    cameras.iter().enumerate().map(pinhole).collect()
+    });
+    pinholes.collect()
 }
 
 fn corner_cameras(cameras: &[PinholeCamera]) -> Vec<PinholeCamera> {

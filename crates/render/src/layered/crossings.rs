@@ -1,9 +1,11 @@
 //! Where the lines of a parallel camera meet surfaces: `append.wgsl`.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use depth_image::{MAX_LAYERS, ParallelCamera, ViewPart};
 use glam::UVec2;
-use gpu::{Binding, BufferPool, DrawPass, Frame, Gpu, GpuError, PooledBuffer};
+use gpu::{Binding, DrawPass, Frame, GpuError, PooledBuffer};
 use rayon::prelude::*;
 use wgpu::{BufferUsages, TextureUsages};
 
@@ -45,77 +47,66 @@ pub(crate) struct GpuLines {
     pub capacity: u32,
 }
 
+/// The lines whose crossings are wanted.
+struct LayerWork<'a> {
+    stages: &'a Stages,
+    work: &'a DrawWork<'a>,
+    camera: &'a ParallelCamera,
+    selection: LayerSelection,
+}
+
 /// The number of the first crossing of each line, and of all; the crossings, line after line by rising depth; and whether some
 /// line has met more than [`MAX_LAYERS`].
 pub(super) fn met(
     stages: &Stages,
     work: &DrawWork<'_>,
     camera: &ParallelCamera,
-    kept: LayerSelection,
+    selection: LayerSelection,
 ) -> Result<(Vec<u32>, Vec<Crossing>, bool), RenderError> {
+    let layers = LayerWork { stages, work, camera, selection };
     let mut crossings = Vec::new();
     let rows = camera.size_px.y;
     let a_band = (MOST_LINES / camera.size_px.x).max(1);
     for first in (0..rows).step_by(a_band as usize) {
-        draw_rows(stages, work, camera, kept, first..(first + a_band).min(rows), &mut crossings)?;
+        layers.draw_rows(first..(first + a_band).min(rows), &mut crossings)?;
     }
     Ok(by_line(camera.pixel_count(), &crossings))
 }
 
-/// Draws some rows, in halves where there is no room for all that they meet.
-fn draw_rows(
-    stages: &Stages,
-    work: &DrawWork<'_>,
-    camera: &ParallelCamera,
-    kept: LayerSelection,
-    rows: std::ops::Range<u32>,
-    crossings: &mut Vec<Crossing>,
-) -> Result<(), RenderError> {
-    let limits = stages.gpu.device.limits();
-    let most_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(MOST_BYTES);
-    let most = most_bytes / size_of::<Crossing>() as u64 - SIDES;
-    let size_px = UVec2::new(camera.size_px.x, rows.len() as u32);
-    let part = camera.part(&ViewPart { first_px: UVec2::new(0, rows.start), size_px });
-    let expected = (part.pixel_count() as u64 * EXPECTED_LAYERS).clamp(1024, most);
-    let drawn = Drawn::draw(stages, work, &part, kept, expected)?;
-    let count = u64::from(drawn.count);
-    let first_line = rows.start * camera.size_px.x;
-    if count <= expected {
-        return drawn.read(stages, work, first_line, crossings);
+impl LayerWork<'_> {
+    /// Draws some rows, in halves where there is no room for all that they meet.
+    fn draw_rows(&self, rows: Range<u32>, crossings: &mut Vec<Crossing>) -> Result<(), RenderError> {
+        let limits = self.stages.gpu.device.limits();
+        let most_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(MOST_BYTES);
+        let most = most_bytes / size_of::<Crossing>() as u64 - SIDES;
+        let size_px = UVec2::new(self.camera.size_px.x, rows.len() as u32);
+        let part = self.camera.part(&ViewPart { first_px: UVec2::new(0, rows.start), size_px });
+        let expected = (part.pixel_count() as u64 * EXPECTED_LAYERS).clamp(1024, most);
+        let drawn = self.draw(&part, expected)?;
+        let count = u64::from(drawn.count);
+        if count <= expected {
+            return self.read(&drawn, rows.start, crossings);
+        }
+        if count <= most {
+            return self.read(&self.draw(&part, count)?, rows.start, crossings);
+        }
+        if rows.len() == 1 {
+            GpuError::check_limit("the surfaces on one row of lines", count, most)?;
+        }
+        let middle = rows.start + rows.len() as u32 / 2;
+        self.draw_rows(rows.start..middle, crossings)?;
+        self.draw_rows(middle..rows.end, crossings)
     }
-    if count <= most {
-        return Drawn::draw(stages, work, &part, kept, count)?.read(stages, work, first_line, crossings);
-    }
-    if rows.len() == 1 {
-        GpuError::check_limit("the surfaces on one row of lines", count, most)?;
-    }
-    let middle = rows.start + rows.len() as u32 / 2;
-    draw_rows(stages, work, camera, kept, rows.start..middle, crossings)?;
-    draw_rows(stages, work, camera, kept, middle..rows.end, crossings)
-}
 
-/// Crossings on the device.
-struct Drawn {
-    crossings: PooledBuffer,
-    count: u32,
-}
-
-impl Drawn {
-    /// Draws with room for `capacity` crossings; the count is that of all.
-    fn draw(
-        stages: &Stages,
-        work: &DrawWork<'_>,
-        camera: &ParallelCamera,
-        kept: LayerSelection,
-        capacity: u64,
-    ) -> Result<Self, RenderError> {
-        let Stages { gpu, pool, raster, .. } = stages;
+    /// Draws a part with room for `capacity` crossings; the count is that of all.
+    fn draw(&self, part: &ParallelCamera, capacity: u64) -> Result<Drawn, RenderError> {
+        let Stages { gpu, pool, raster, .. } = self.stages;
         let lines = GpuLines {
-            forward_in_world: camera.axes_in_world()[2].to_array(),
-            spacing_m: camera.spacing_m,
-            range_m: camera.range_m,
-            columns: camera.size_px.x,
-            least_share: kept.least_share(),
+            forward_in_world: part.axes_in_world()[2].to_array(),
+            spacing_m: part.spacing_m,
+            range_m: part.range_m,
+            columns: part.size_px.x,
+            least_share: self.selection.least_share(),
             capacity: capacity as u32,
         };
         let lines = gpu.buffer_with("lines", &[lines], BufferUsages::UNIFORM);
@@ -126,45 +117,40 @@ impl Drawn {
             Binding::buffer("crossings", &crossings),
             Binding::buffer("crossing_count", &counter),
         ];
-        let mut frame = Frame::begin(gpu, "layers", work.turn);
+        // A pass needs a target, though nothing is drawn into it.
+        let size = [part.size_px.x, part.size_px.y, 1];
+        let depth = gpu.texture("lines", size, DrawPass::DEPTH_FORMAT, TextureUsages::RENDER_ATTACHMENT);
+        let mut frame = Frame::begin(gpu, "layers", self.work.turn);
         frame.encoder.clear_buffer(&counter, 0, None);
-        raster.record_lines(&mut frame, work, camera, &memory, &depth_target(gpu, camera.size_px))?;
-        let count = read_count(&mut frame, pool, &counter)?;
+        raster.record_lines(&mut frame, self.work, part, &memory, &depth.create_view(&Default::default()))?;
+        let count = frame.read_back(&counter, 0..4, pool.lend_host("number of crossings", 4));
         let result = frame.submit()?.wait()?;
-        Ok(Self { count: result.with(count, |words: &[u32]| words[0])?, crossings })
+        Ok(Drawn { count: result.with(count, |words: &[u32]| words[0])?, crossings })
     }
 
-    fn read(
-        &self,
-        stages: &Stages,
-        work: &DrawWork<'_>,
-        first_line: u32,
-        crossings: &mut Vec<Crossing>,
-    ) -> Result<(), RenderError> {
-        let all = crossings.len() as u64 + u64::from(self.count);
+    fn read(&self, drawn: &Drawn, first_row: u32, crossings: &mut Vec<Crossing>) -> Result<(), RenderError> {
+        let all = crossings.len() as u64 + u64::from(drawn.count);
         GpuError::check_limit("the surfaces of a layered image", all, MOST_CROSSINGS)?;
-        let bytes = u64::from(self.count) * size_of::<Crossing>() as u64;
+        let bytes = u64::from(drawn.count) * size_of::<Crossing>() as u64;
         if bytes == 0 {
             return Ok(());
         }
-        let mut frame = Frame::begin(&stages.gpu, "read layers", work.turn);
-        let read = frame.read_back(&self.crossings, 0..bytes, stages.pool.lend_host("crossings", bytes));
-        let own = |crossing: &Crossing| Crossing { line: crossing.line + first_line, ..*crossing };
+        let mut frame = Frame::begin(&self.stages.gpu, "read layers", self.work.turn);
+        let read = frame.read_back(&drawn.crossings, 0..bytes, self.stages.pool.lend_host("crossings", bytes));
+        let first_line = first_row * self.camera.size_px.x;
         let result = frame.submit()?.wait()?;
-        result.with(read, |all: &[Crossing]| crossings.extend(all[..self.count as usize].iter().map(own)))?;
+        result.with(read, |all: &[Crossing]| {
+            let drawn = all[..drawn.count as usize].iter();
+            crossings.extend(drawn.map(|crossing| Crossing { line: crossing.line + first_line, ..*crossing }));
+        })?;
         Ok(())
     }
 }
 
-fn read_count(frame: &mut Frame<'_>, pool: &BufferPool, counter: &wgpu::Buffer) -> Result<gpu::Readback, RenderError> {
-    Ok(frame.read_back(counter, 0..4, pool.lend_host("number of crossings", 4)))
-}
-
-/// A pass needs a target, though nothing is drawn into it.
-fn depth_target(gpu: &Gpu, size_px: UVec2) -> wgpu::TextureView {
-    let size = [size_px.x, size_px.y, 1];
-    gpu.texture("lines", size, DrawPass::DEPTH_FORMAT, TextureUsages::RENDER_ATTACHMENT)
-        .create_view(&Default::default())
+/// Crossings on the device.
+struct Drawn {
+    crossings: PooledBuffer,
+    count: u32,
 }
 
 /// Sorted by line and depth; of equal depths by their words, so that the order in which the device met them is no matter.
@@ -180,7 +166,6 @@ fn by_line(lines: usize, crossings: &[Crossing]) -> (Vec<u32>, Vec<Crossing>, bo
         sorted[*place as usize] = *crossing;
         *place += 1;
     }
-    let key = |c: &Crossing| (c.planar_depth_m.max(0.0).to_bits(), c.plane_normal_oct16, c.surface);
     let mut rest = &mut *sorted;
     let mut each: Vec<&mut [Crossing]> = Vec::with_capacity(lines);
     for ends in first.windows(2) {
@@ -190,19 +175,20 @@ fn by_line(lines: usize, crossings: &[Crossing]) -> (Vec<u32>, Vec<Crossing>, bo
             each.push(own);
         }
     }
-    each.into_par_iter().for_each(|own| own.sort_unstable_by_key(key));
+    each.into_par_iter().for_each(|own| {
+        own.sort_unstable_by_key(|c| (c.planar_depth_m.max(0.0).to_bits(), c.plane_normal_oct16, c.surface));
+    });
     if !truncated {
         return (first, sorted, false);
     }
-    let kept = |ends: &[u32]| ends[0] as usize..ends[0] as usize + (ends[1] - ends[0]).min(MAX_LAYERS) as usize;
-    let shortened = first.windows(2).flat_map(|ends| sorted[kept(ends)].to_vec()).collect();
-    let mut sum = 0;
-    let lengths = first.windows(2).map(|ends| kept(ends).len() as u32);
-    let ends = lengths.map(|length| {
-        sum += length;
-        sum
-    });
-    (std::iter::once(0).chain(ends).collect(), shortened, true)
+    let mut shortened = Vec::new();
+    let mut first_shortened = vec![0];
+    for ends in first.windows(2) {
+        let own = &sorted[ends[0] as usize..ends[1] as usize];
+        shortened.extend(own.iter().take(MAX_LAYERS as usize));
+        first_shortened.push(shortened.len() as u32);
+    }
+    (first_shortened, shortened, true)
 }
 
 #[cfg(test)]

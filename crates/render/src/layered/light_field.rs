@@ -71,9 +71,10 @@ impl<'a> Pair<'a> {
         let column = line % columns;
         let line = if self.is_opposite { row * columns + (columns - 1 - column) } else { line };
         let on_line = &self.crossings[self.first[line] as usize..self.first[line + 1] as usize];
-        let normal = |crossing: &Crossing| unit_from_oct8(oct8_from_oct16(crossing.plane_normal_oct16));
-        let faces = |crossing: &&Crossing| normal(crossing).dot(towards) > 0.0;
-        let mut facing: Vec<&Crossing> = on_line.iter().filter(faces).collect();
+        let facing = on_line
+            .iter()
+            .filter(|crossing| unit_from_oct8(oct8_from_oct16(crossing.plane_normal_oct16)).dot(towards) > 0.0);
+        let mut facing: Vec<&Crossing> = facing.collect();
         if self.is_opposite {
             facing.reverse();
         }

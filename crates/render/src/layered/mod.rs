@@ -25,15 +25,16 @@ pub(crate) fn draw(
     let (first, crossings, truncated) = crossings::met(stages, &work, camera, kept)?;
     let lit = lit::light(stages, work, camera, &first, &crossings)?;
     let reflects = crossings.par_iter().any(|crossing| crossing.surface[3] != 0) && work.highlight().is_some();
-    let word = |word: usize| crossings.par_iter().map(|crossing| crossing.surface[word]).collect::<Vec<u32>>();
     Ok(LayeredDepthImage {
         camera: *camera,
         planar_depth_m: crossings.par_iter().map(|crossing| crossing.planar_depth_m).collect(),
         plane_normal_oct8: crossings.par_iter().map(|crossing| oct8_from_oct16(crossing.plane_normal_oct16)).collect(),
         color_rgb9e5: lit.color_rgb9e5,
-        normal_oct16: reflects.then(|| word(2)),
-        specular: reflects
-            .then(|| SpecularPlanes { reflectance_srgb8_roughness8: word(3), visibility8: lit.visibility8 }),
+        normal_oct16: reflects.then(|| crossings.par_iter().map(|crossing| crossing.surface[2]).collect()),
+        specular: reflects.then(|| SpecularPlanes {
+            reflectance_srgb8_roughness8: crossings.par_iter().map(|crossing| crossing.surface[3]).collect(),
+            visibility8: lit.visibility8,
+        }),
         first,
         truncated,
     })
