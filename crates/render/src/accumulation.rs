@@ -38,8 +38,9 @@ impl Accumulations {
     /// Sums with no more rays than `wanted`, which are now to be reached.
     pub fn take(&self, key: &Key, wanted: [u32; 2]) -> Option<Sums> {
         let mut kept = self.0.lock();
-        let fits = |sums: &Sums| sums.rays.iter().zip(wanted).all(|(rays, wanted)| rays.end <= wanted);
-        let at = kept.iter().position(|(other, sums)| other == key && fits(sums))?;
+        let at = kept.iter().position(|(other, sums)| {
+            other == key && sums.rays.iter().zip(wanted).all(|(rays, wanted)| rays.end <= wanted)
+        })?;
         let (_, Sums { buffer, rays }) = kept.remove(at)?;
         Some(Sums { buffer, rays: array::from_fn(|kind| rays[kind].end..wanted[kind]) })
     }

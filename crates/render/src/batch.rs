@@ -8,9 +8,9 @@ use glam::Vec2;
 use gpu::{BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVariant, WorkKind};
 
 use crate::accumulation::{Key, Sums};
-use crate::pieces::{Piece, Pieces};
 use crate::pixel_camera::{PixelCamera, uniform};
-use crate::{known_samples::ImageSequence, light_samples::CachedLight, planes::Output, rays::Traced, work::DrawWork};
+use crate::{known_samples::ImageSequence, light_samples::CachedLight, pieces::Piece, planes::Output};
+use crate::{rays::Traced, work::DrawWork};
 
 /// The share of the scene's diagonal within which occlusion is looked for, where a lighting names no radius.
 const OCCLUSION_OF_DIAGONAL: f32 = 0.05;
@@ -55,7 +55,7 @@ pub(crate) struct Recording<'a> {
     pub passes: &'a PassCache,
     pub batch: &'a Batch<'a>,
     /// The pictures, as dispatches make them.
-    pub pieces: Pieces,
+    pub pieces: Vec<Piece>,
     /// A uniform of the batch's cameras, with an element for each piece.
     pub cameras: wgpu::Buffer,
     pub sums: Sums,
@@ -70,29 +70,27 @@ pub(crate) struct Position {
     pub offset_px: Vec2,
 }
 
-/// A position, and the cameras whose pixels' centres are there.
-pub(crate) struct ShiftedCameras {
-    position: Position,
-    cameras: Vec<Camera>,
-}
-
-impl Batch<'_> {
-    /// All positions within the pixels. The centre of a depth image comes first; that of a view last, for depth alone.
-    pub fn positions(&self) -> Vec<ShiftedCameras> {
-        let Output { antialias, depth, samples, .. } = self.output;
-        let center = |is: bool| (is && antialias > Antialias::NONE).then_some(Vec2::ZERO);
-        let all = center(samples).into_iter().chain(antialias.offsets_px()).chain(center(depth && !samples));
-        let shifted = |(number, offset_px)| ShiftedCameras {
-            position: Position { number, offset_px },
-            cameras: self.cameras.iter().map(|camera| camera.with_offset(offset_px)).collect(),
-        };
-        (0..).zip(all).map(shifted).collect()
+impl<'a> Batch<'a> {
+    /// A batch of points, which no camera sees.
+    pub fn of_points(work: DrawWork<'a>, traced: Option<Arc<Traced>>, output: Output) -> Self {
+        let position = Position::default();
+        let tone = ToneMapping::NONE;
+        Self { work, cameras: &[], by_rays: false, traced, output, tone, sequence: None, cached: None, position }
     }
 
-    /// The batch at one position.
-    pub fn at<'b>(&'b self, shifted: &'b ShiftedCameras) -> Batch<'b> {
-        let ShiftedCameras { position, ref cameras } = *shifted;
-        Batch { cameras, traced: self.traced.clone(), position, ..*self }
+    /// All positions within the pixels, and the cameras whose pixels' centres are there. The centre of a depth image comes first;
+    /// that of a view last, for depth alone.
+    pub fn positions(&self) -> Vec<(Position, Vec<Camera>)> {
+        let Output { antialias, depth, samples, .. } = self.output;
+        let center = (antialias > Antialias::NONE).then_some(Vec2::ZERO);
+        let first = center.filter(|_| samples);
+        let last = center.filter(|_| depth && !samples);
+        let all = (0..).zip(first.into_iter().chain(antialias.offsets_px()).chain(last));
+        let shifted = all.map(|(number, offset_px)| {
+            let cameras = self.cameras.iter().map(|camera| camera.with_offset(offset_px)).collect();
+            (Position { number, offset_px }, cameras)
+        });
+        shifted.collect()
     }
 
     /// Whether its cameras are single-pole cameras.
@@ -133,9 +131,8 @@ impl Batch<'_> {
         let DrawWork { scene, lighting, scene_time_s, .. } = self.work;
         // The samples of a sequence's image depend on all cameras of its set, and on its place among them.
         let set = self.sequence.map_or(&[][..], |sequence| &sequence.known.cameras);
-        let set: Vec<Camera> = set.iter().copied().map(Camera::from).collect();
+        let cameras = set.iter().copied().map(Camera::from).chain(self.cameras.iter().copied()).collect();
         let redundancy = self.sequence.map(|sequence| sequence.known.variant(sequence.first));
-        let cameras = [&set, self.cameras].concat();
         let by_rays = self.by_rays;
         let output = self.output;
         Key { scene: scene.identity, lighting, scene_time_s, cameras, by_rays, output, redundancy }
@@ -149,12 +146,14 @@ impl Batch<'_> {
 
     /// The pixels of a slice of pictures whose cost is unknown.
     pub fn unknown_slice_px(&self) -> u64 {
-        let DrawWork { scene, lighting, .. } = self.work;
         let [shadow_rays, ambient_rays] = self.light_rays();
-        let to_lamps = shadow_rays * scene.traced_lamps(lighting);
-        let around = ambient_rays * self.rays_around();
-        let [shadow, ambient] = [to_lamps, around].map(|rays| u64::from(rays.min(RAYS_A_DISPATCH)));
-        UNKNOWN_SLICE_RAYS / (1 + shadow + ambient)
+        let rays = [shadow_rays * self.lamps(), ambient_rays * self.rays_around()];
+        UNKNOWN_SLICE_RAYS / (1 + rays.map(|rays| u64::from(rays.min(RAYS_A_DISPATCH))).iter().sum::<u64>())
+    }
+
+    /// Lamps that take rays.
+    fn lamps(&self) -> u32 {
+        self.work.scene.traced_lamps(self.work.lighting)
     }
 
     /// Rays that are traced for each ray of ambient light: where it meets a surface, one goes on to a lamp; where lamps have no
@@ -166,28 +165,25 @@ impl Batch<'_> {
     }
 
     /// A uniform of the pieces with their cameras' places in the batch's planes, for each part of the rays.
-    pub fn parts(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums) -> Vec<Part> {
-        let part = |rays: Rays| Part { counts: rays.counts(), cameras: self.uniform(gpu, pieces, sums, rays) };
-        let lamps = self.work.scene.traced_lamps(self.work.lighting);
-        parts_of(&sums.rays, lamps, self.rays_around()).into_iter().map(part).collect()
+    pub fn parts(&self, gpu: &Gpu, pieces: &[Piece], sums: &Sums) -> Vec<Part> {
+        let parts = parts_of(&sums.rays, self.lamps(), self.rays_around()).into_iter();
+        parts.map(|rays| Part { counts: rays.counts(), cameras: self.uniform(gpu, pieces, sums, &rays) }).collect()
     }
 
     /// A uniform for all rays.
-    pub fn uniform_of_all(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums) -> wgpu::Buffer {
-        let lamps = 0..self.work.scene.traced_lamps(self.work.lighting);
+    pub fn uniform_of_all(&self, gpu: &Gpu, pieces: &[Piece], sums: &Sums) -> wgpu::Buffer {
         let [shadow, ambient] = sums.rays.clone();
-        self.uniform(gpu, pieces, sums, Rays { shadow, lamps, ambient })
+        self.uniform(gpu, pieces, sums, &Rays { shadow, lamps: 0..self.lamps(), ambient })
     }
 
     /// A uniform for each part of `rays`, for a list with room for `capacity` points.
     pub fn parts_of_points(&self, gpu: &Gpu, rays: &[Range<u32>; 2], capacity: u32) -> Vec<Part> {
         let list = PixelCamera { pixel_count: capacity, ..PixelCamera::zeroed() };
-        let part = |part: Rays| Part {
-            counts: part.counts(),
-            cameras: uniform(gpu, "points", std::iter::once(self.with_rays(list, &part, rays))),
-        };
-        let lamps = self.work.scene.traced_lamps(self.work.lighting);
-        parts_of(rays, lamps, self.rays_around()).into_iter().map(part).collect()
+        let parts = parts_of(rays, self.lamps(), self.rays_around()).into_iter().map(|part| {
+            let cameras = uniform(gpu, "points", std::iter::once(self.with_rays(list, &part, rays)));
+            Part { counts: part.counts(), cameras }
+        });
+        parts.collect()
     }
 
     /// A camera with these rays, and those that its sums hold afterwards.
@@ -212,24 +208,37 @@ impl Batch<'_> {
     }
 
     /// A uniform for these rays.
-    fn uniform(&self, gpu: &Gpu, pieces: &Pieces, sums: &Sums, rays: Rays) -> wgpu::Buffer {
+    fn uniform(&self, gpu: &Gpu, pieces: &[Piece], sums: &Sums, rays: &Rays) -> wgpu::Buffer {
         let [planes, sum_planes] = [self.output.layout().count, self.output.sums.count()].map(|count| count as u32);
         let mut first_word = 0;
         let mut first_sum = 0;
-        let place = |camera: &Camera| {
+        let mut placed = Vec::with_capacity(self.cameras.len());
+        for camera in self.cameras {
             let camera = PixelCamera { first_word, first_sum, ..PixelCamera::of(camera, self.position.offset_px) };
             first_word += camera.pixel_count * planes;
             first_sum += camera.pixel_count * sum_planes;
-            self.with_rays(camera, &rays, &sums.rays)
-        };
-        let placed: Vec<PixelCamera> = self.cameras.iter().map(place).collect();
-        let of_piece =
-            |&Piece { camera, first_row, end_row }: &Piece| PixelCamera { first_row, end_row, ..placed[camera] };
-        uniform(gpu, "pixel cameras", pieces.all.iter().map(of_piece))
+            placed.push(self.with_rays(camera, rays, &sums.rays));
+        }
+        let cameras = pieces.iter().map(|&Piece { camera, first_row, end_row, .. }| PixelCamera {
+            first_row,
+            end_row,
+            ..placed[camera]
+        });
+        uniform(gpu, "pixel cameras", cameras)
     }
 }
 
 impl Recording<'_> {
+    /// The pieces of a picture.
+    pub fn pieces_of(&self, camera: usize) -> Vec<Piece> {
+        self.pieces.iter().copied().filter(|piece| piece.camera == camera).collect()
+    }
+
+    /// The kind of the passes of a variant over pixels.
+    pub fn kind_of(&self, variant: &impl ShaderVariant) -> WorkKind {
+        WorkKind::new(self.batch.family(), &variant.name())
+    }
+
     /// Records a dispatch of a pass over all pixels of a picture.
     pub fn dispatch(
         &mut self,
@@ -238,27 +247,23 @@ impl Recording<'_> {
         groups: &[&BoundGroup],
         camera: usize,
     ) {
-        let kind = WorkKind::new(self.batch.family(), &variant.name());
-        self.dispatch_pieces(kind, pass, camera, |_, piece, width_px| {
-            (groups.to_vec(), DispatchSize::Invocations([width_px, piece.end_row - piece.first_row, 1]))
-        });
+        let kind = self.kind_of(variant);
+        for piece in self.pieces_of(camera) {
+            self.dispatch_piece(kind, pass, groups, piece, piece.size());
+        }
     }
 
-    /// Records a dispatch for each piece of a picture: `of_piece` gives its groups and its size, for its place among the
-    /// picture's, and the width.
-    pub fn dispatch_pieces<'b>(
+    /// Records a dispatch of this size for a piece of a picture.
+    pub fn dispatch_piece(
         &mut self,
         kind: WorkKind,
         pass: &ComputePass,
-        camera: usize,
-        of_piece: impl Fn(usize, Piece, u32) -> (Vec<&'b BoundGroup>, DispatchSize<'b>),
+        groups: &[&BoundGroup],
+        piece: Piece,
+        size: DispatchSize<'_>,
     ) {
-        let width_px = self.batch.cameras[camera].size_px().x;
-        for (place, (element, piece)) in self.pieces.of_camera(camera).enumerate() {
-            let (groups, size) = of_piece(place, piece, width_px);
-            pass.dispatch_each(&mut self.frame, &groups, element..element + 1, size);
-            self.frame.cut(kind, u64::from(width_px) * u64::from(piece.end_row - piece.first_row));
-        }
+        pass.dispatch_each(&mut self.frame, groups, piece.element..piece.element + 1, size);
+        self.frame.cut(kind, piece.pixel_count().into());
     }
 }
 
@@ -267,11 +272,11 @@ pub(crate) fn batches(cameras: &[Camera], most_pixels: usize) -> impl Iterator<I
     let mut rest = cameras;
     std::iter::from_fn(move || {
         let mut pixels = 0;
-        let fits = |camera: &&Camera| {
+        let fitting = rest.iter().take(CAMERAS_A_SUBMISSION).take_while(|camera| {
             pixels += camera.pixel_count();
             pixels <= most_pixels && camera.is_of_model(&rest[0])
-        };
-        let count = rest.iter().take(CAMERAS_A_SUBMISSION).take_while(fits).count().max(1).min(rest.len());
+        });
+        let count = fitting.count().max(1).min(rest.len());
         let (batch, others) = rest.split_at(count);
         rest = others;
         (!batch.is_empty()).then_some(batch)
@@ -304,8 +309,7 @@ fn parts_of([shadow, ambient]: &[Range<u32>; 2], lamp_count: u32, rays_around: u
     let count = to_lamps.len().max(around.len());
     to_lamps.resize(count, (shadow.end..shadow.end, 0..0));
     around.resize(count, ambient.end..ambient.end);
-    let part = |((shadow, lamps), ambient)| Rays { shadow, lamps, ambient };
-    to_lamps.into_iter().zip(around).map(part).collect()
+    to_lamps.into_iter().zip(around).map(|((shadow, lamps), ambient)| Rays { shadow, lamps, ambient }).collect()
 }
 
 /// A range in pieces of at most this length; one piece where it is empty.

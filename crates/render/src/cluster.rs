@@ -41,13 +41,12 @@ pub(crate) fn clustered(mesh: &Mesh) -> (Vec<u32>, Vec<Cluster>) {
 fn morton_ordered(mesh: &Mesh, part: &MeshPart, bounds: &Aabb) -> Vec<[u32; 3]> {
     let range = part.first_index as usize..(part.first_index + part.index_count) as usize;
     let scale = 1023.0 / bounds.size().max(Vec3::splat(1e-20));
-    let key = |triangle: &[u32; 3]| {
+    let mut triangles: Vec<[u32; 3]> = mesh.indices[range].as_chunks().0.to_vec();
+    triangles.sort_by_cached_key(|triangle| {
         let center = triangle.iter().map(|&i| Vec3::from(mesh.vertices[i as usize].position)).sum::<Vec3>() / 3.0;
         let cell = ((center - bounds.min) * scale).as_uvec3();
         spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
-    };
-    let mut triangles: Vec<[u32; 3]> = mesh.indices[range].as_chunks().0.to_vec();
-    triangles.sort_by_cached_key(key);
+    });
     triangles
 }
 
@@ -74,14 +73,8 @@ impl Frustum {
     pub fn of_lines(camera: &ParallelCamera) -> Self {
         let [right, down, forward] = camera.axes_in_world();
         let size_m = camera.size_px.as_vec2() * camera.spacing_m;
-        let beyond = |axis: Vec3, least_m: f32| axis.extend(-axis.dot(camera.corner_in_world) - least_m);
-        Self([
-            beyond(right, 0.0),
-            beyond(-right, -size_m.x),
-            beyond(down, 0.0),
-            beyond(-down, -size_m.y),
-            beyond(forward, 0.0),
-        ])
+        let sides = [(right, 0.0), (-right, -size_m.x), (down, 0.0), (-down, -size_m.y), (forward, 0.0)];
+        Self(sides.map(|(axis, least_m)| axis.extend(-axis.dot(camera.corner_in_world) - least_m)))
     }
 
     /// True for a box of which some may be seen.

@@ -8,11 +8,11 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 /// Does work of many threads, on half the cores where live streams need the others.
 pub(crate) fn on_free_cores<T: Send>(is_shared: bool, work: impl FnOnce() -> T + Send) -> T {
     static HALF: OnceLock<Option<ThreadPool>> = OnceLock::new();
-    let half = || {
+    let half = HALF.get_or_init(|| {
         let cores = available_parallelism().map_or(1, usize::from);
         ThreadPoolBuilder::new().num_threads((cores / 2).max(1)).build().ok()
-    };
-    match HALF.get_or_init(half) {
+    });
+    match half {
         Some(half) if is_shared => half.install(work),
         _ => work(),
     }

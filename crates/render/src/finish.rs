@@ -57,10 +57,10 @@ impl Finish {
 
     /// The variants with each usefulness test.
     pub fn with_tests(tests: &[RedundancyTest]) -> impl Iterator<Item = Self> {
-        let useful: HashSet<_> = tests.iter().filter_map(|test| test.usefulness).collect();
+        let useful: HashSet<_> = tests.iter().map(|test| test.usefulness).filter(Option::is_some).collect();
         useful
             .into_iter()
-            .flat_map(|test| Self::of_images(Output { passed: true, usefulness_test: Some(test), ..Output::default() }))
+            .flat_map(|usefulness_test| Self::of_images(Output { passed: true, usefulness_test, ..Output::default() }))
     }
 
     fn of_images(output: Output) -> impl Iterator<Item = Self> {
@@ -72,7 +72,7 @@ impl Finish {
     }
 
     fn of_output(output: Output) -> impl Iterator<Item = Self> {
-        let each = move |sums| {
+        SumPlanes::all().flat_map(move |sums| {
             let output = Output { sums, ..output };
             switches().map(move |[by_rays, lit, environment_map]| Self {
                 by_rays,
@@ -81,8 +81,7 @@ impl Finish {
                 environment_map,
                 output,
             })
-        };
-        SumPlanes::all().flat_map(each)
+        })
     }
 }
 
@@ -111,24 +110,24 @@ impl ShaderVariant for Finish {
     }
 
     fn all() -> Vec<Self> {
-        let highlights = [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)].into_iter();
-        let colors = highlights.flat_map(|highlight| {
-            [Antialias::NONE, Antialias::MOST].map(|antialias| Output { highlight, antialias, ..Output::default() })
-        });
-        let mirrored = |output: Output| {
-            let is_mirror = output.highlight == Some(Highlight::Ggx);
-            let mirrored = [false, true].map(|glossy| Output { mirrors: true, glossy, ..output });
-            std::iter::once(output).chain(mirrored.into_iter().filter(move |_| is_mirror))
-        };
-        let views = colors.flat_map(mirrored).flat_map(Self::of_output);
         let plain = Output::default();
+        let mut views = Vec::new();
+        for highlight in [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)] {
+            for antialias in [Antialias::NONE, Antialias::MOST] {
+                let output = Output { highlight, antialias, ..plain };
+                views.push(output);
+                if highlight == Some(Highlight::Ggx) {
+                    views.extend([false, true].map(|glossy| Output { mirrors: true, glossy, ..output }));
+                }
+            }
+        }
         let light = Output { light: true, ..plain };
         let passed = [Output { passed: true, ..plain }, Output { passed: true, ..light }];
         let images = [plain, Output { antialias: Antialias::MOST, ..plain }, light].into_iter().chain(passed);
         // Views have one eye.
         let bent = Self::of_images(plain).filter(|variant| variant.by_rays);
         let bent = bent.map(|variant| Self { single_pole: true, ..variant });
-        views.chain(images.flat_map(Self::of_images)).chain(bent).collect()
+        views.into_iter().flat_map(Self::of_output).chain(images.flat_map(Self::of_images)).chain(bent).collect()
     }
 }
 

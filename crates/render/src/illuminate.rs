@@ -1,10 +1,7 @@
 //! Light of lamps and the environment, summed over rays.
 
 use depth_image::Highlight;
-use gpu::{
-    Binding, BoundGroup, DispatchSize, GpuEnvironment, ResourceTraits, ShaderVariant, WorkKind, highlight_name,
-    switches,
-};
+use gpu::{Binding, BoundGroup, GpuEnvironment, ResourceTraits, ShaderVariant, WorkKind, highlight_name, switches};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
@@ -20,8 +17,9 @@ use crate::{
 };
 
 /// The rays to a lamp that a shader is written for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 enum ShadowRays {
+    #[default]
     None,
     /// One, to the middle.
     One,
@@ -30,8 +28,9 @@ enum ShadowRays {
 }
 
 /// The rays of ambient light that a shader is written for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 enum AmbientRays {
+    #[default]
     None,
     /// They look for surfaces that occlude the environment.
     Occlusion,
@@ -39,7 +38,7 @@ enum AmbientRays {
     Indirect,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Illuminate {
     by_rays: bool,
     /// The pixels' own rays lie around a pole.
@@ -58,23 +57,6 @@ pub(crate) struct Illuminate {
     environment_map: bool,
     /// Present where rays are traced.
     traversal: Option<Traversal>,
-}
-
-impl Illuminate {
-    /// The variant without any of the switches.
-    const UNLIT: Self = Self {
-        by_rays: false,
-        single_pole: false,
-        listed: false,
-        knows_ambient: false,
-        bounces: false,
-        shadow_rays: ShadowRays::None,
-        ambient: AmbientRays::None,
-        continued: false,
-        sums: SumPlanes { light_count: 0, visibility: false },
-        environment_map: false,
-        traversal: None,
-    };
 }
 
 impl ShaderVariant for Illuminate {
@@ -109,34 +91,22 @@ impl ShaderVariant for Illuminate {
     }
 
     fn all() -> Vec<Self> {
-        let mut variants = Vec::new();
-        for [by_rays, continued, environment_map] in switches() {
-            for listed in [false, true] {
-                for (shadow_rays, ambient) in Self::RAYS {
-                    let lit = Self { by_rays, listed, shadow_rays, ambient, continued, ..Self::UNLIT };
-                    variants.extend(Self { environment_map, ..lit }.with_all_sums());
-                }
+        let mut lit = Vec::new();
+        for [by_rays, listed, bounces, continued, environment_map] in switches() {
+            // Points have a list of their own.
+            if !(bounces && (by_rays || listed)) {
+                let plain = Self { by_rays, listed, bounces, continued, environment_map, ..Self::default() };
+                lit.extend(Self::RAYS.map(|(shadow_rays, ambient)| Self { shadow_rays, ambient, ..plain }));
             }
         }
-        for listed in [false, true] {
-            let bent = Self { by_rays: true, single_pole: true, listed, ..Self::UNLIT };
-            let lit = Self { shadow_rays: ShadowRays::Many, ambient: AmbientRays::Occlusion, ..bent };
-            variants.extend([bent, lit].iter().flat_map(Self::with_all_sums));
-        }
-        for [by_rays, continued, environment_map] in switches() {
-            let shadow_rays = ShadowRays::Many;
-            let ambient = AmbientRays::Indirect;
-            let lit =
-                Self { by_rays, listed: true, knows_ambient: true, shadow_rays, ambient, continued, ..Self::UNLIT };
-            variants.extend(Self { environment_map, ..lit }.with_all_sums());
-        }
-        for [continued, environment_map] in switches() {
-            for (shadow_rays, ambient) in Self::RAYS {
-                let lit = Self { bounces: true, shadow_rays, ambient, continued, ..Self::UNLIT };
-                variants.extend(Self { environment_map, ..lit }.with_all_sums());
-            }
-        }
-        variants
+        let many_indirect = (ShadowRays::Many, AmbientRays::Indirect);
+        let indirect = lit.iter().filter(|variant| variant.listed && variant.rays() == many_indirect);
+        let indirect = indirect.map(|variant| Self { knows_ambient: true, ..*variant });
+        let kinds = [(ShadowRays::None, AmbientRays::None), (ShadowRays::Many, AmbientRays::Occlusion)];
+        let bent = lit.iter().filter(|variant| variant.by_rays && !variant.continued && !variant.environment_map);
+        let bent = bent.filter(|variant| kinds.contains(&variant.rays()));
+        let bent = bent.map(|variant| Self { single_pole: true, ..*variant });
+        lit.iter().copied().chain(indirect).chain(bent).flat_map(Self::with_all_sums).collect()
     }
 }
 
@@ -153,12 +123,16 @@ impl Illuminate {
         (ShadowRays::Many, AmbientRays::Indirect),
     ];
 
+    fn rays(&self) -> (ShadowRays, AmbientRays) {
+        (self.shadow_rays, self.ambient)
+    }
+
     /// With each kind of sums, and with each traversal where rays are traced.
-    fn with_all_sums(&self) -> Vec<Self> {
-        let is_traced = self.ambient != AmbientRays::None || self.shadow_rays != ShadowRays::None;
-        let each =
-            |sums| Traversal::ALL.map(|traversal| Self { sums, traversal: is_traced.then_some(traversal), ..*self });
-        SumPlanes::all().flat_map(each).collect()
+    fn with_all_sums(self) -> impl Iterator<Item = Self> {
+        let is_traced = self.rays() != (ShadowRays::None, AmbientRays::None);
+        SumPlanes::all().flat_map(move |sums| {
+            Traversal::ALL.map(|traversal| Self { sums, traversal: is_traced.then_some(traversal), ..self })
+        })
     }
 
     /// The variant for all pixels of a batch.
@@ -181,7 +155,7 @@ impl Illuminate {
             sums: batch.output.sums,
             environment_map: batch.work.scene.environment.is_some(),
             traversal: traced.map(Traversal::of),
-            ..Self::UNLIT
+            ..Self::default()
         }
     }
 }
@@ -206,22 +180,20 @@ pub(crate) fn record(
         let pass = recording.passes.get(&variant)?;
         let rays = traced.map(|traced| pass.bind(1, traced.bindings())).transpose()?;
         let kind = WorkKind::new(batch.family(), &(variant.name(), part.counts));
+        let map = batch.work.scene.environment.as_deref();
         for (camera, target) in (first..).zip(surfaces) {
             let buffers = [&part.cameras, &batch.work.scene.illumination, &recording.sums.buffer];
-            let map = batch.work.scene.environment.as_deref();
-            let bind = |list: Option<&PixelList>| {
-                let listed = list.into_iter().flat_map(PixelList::bindings);
+            let lists_of_pieces = lists.map_or(vec![None], |lists| lists.iter().map(Some).collect());
+            let own = lists_of_pieces.iter().map(|list| {
+                let listed = list.iter().flat_map(|list| list.bindings());
                 pass.bind(0, bindings(buffers, map).chain(target.bindings()).chain(listed))
-            };
-            let own = match lists {
-                Some(lists) => lists.iter().map(|list| bind(Some(list))).collect::<Result<Vec<_>, _>>()?,
-                None => vec![bind(None)?],
-            };
-            recording.dispatch_pieces(kind, &pass, camera, |place, piece, width_px| {
-                let all = DispatchSize::Invocations([width_px, piece.end_row - piece.first_row, 1]);
-                let (own, size) = lists.map_or((&own[0], all), |lists| (&own[place], lists[place].size()));
-                (std::iter::once(own).chain(&rays).collect(), size)
             });
+            let own = own.collect::<Result<Vec<_>, _>>()?;
+            for (place, piece) in recording.pieces_of(camera).into_iter().enumerate() {
+                let (own, size) = lists.map_or((&own[0], piece.size()), |lists| (&own[place], lists[place].size()));
+                let groups: Vec<&BoundGroup> = std::iter::once(own).chain(&rays).collect();
+                recording.dispatch_piece(kind, &pass, &groups, piece, size);
+            }
         }
     }
     Ok(())
@@ -272,8 +244,8 @@ mod tests {
         let traced = stage.scene.rays.at(0.0).expect("a tree");
         let buffer = &stage.buffer;
         let list = PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), 1);
-        let bounces = BounceList::new(&stage.gpu);
-        let points = Rays { bounces: buffer, list: &bounces, units: 1, generation: 1 };
+        let bounces = BounceList::new(&stage.gpu, 1);
+        let points = Rays { bounces: buffer, list: &bounces, generation: 1 };
         for variant in Illuminate::all() {
             let target = stage.surfaces(variant.by_rays, false);
             let map = variant.environment_map.then_some(&stage.environment);

@@ -24,11 +24,12 @@ impl LayerCache {
     /// Layers that nobody else uses; they hold what is left over. `size` is columns, rows and layers.
     pub fn of(&self, gpu: &Gpu, size: [u32; 3], format: TextureFormat) -> Arc<Layers> {
         let mut kept = self.0.lock();
-        let fits = |Layers { all, shortages, .. }: &Layers| {
+        let free = kept.as_ref().filter(|layers| Arc::strong_count(layers) == 1).filter(|layers| {
+            let Layers { all, shortages, .. } = &***layers;
             ([all.width(), all.height(), all.depth_or_array_layers()], all.format()) == (size, format)
                 && *shortages == gpu.shortages()
-        };
-        match kept.as_ref().filter(|layers| fits(layers) && Arc::strong_count(layers) == 1) {
+        });
+        match free {
             Some(layers) => layers.clone(),
             None => kept.insert(Arc::new(Layers::new(gpu, size, format))).clone(),
         }
@@ -39,20 +40,15 @@ impl Layers {
     fn new(gpu: &Gpu, size: [u32; 3], format: TextureFormat) -> Self {
         let usage = TextureUsages::RENDER_ATTACHMENT | TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING;
         let all = gpu.texture("held samples", size, format, usage);
-        let layer = |base_array_layer| {
+        let each = (0..size[2]).map(|base_array_layer| {
             all.create_view(&TextureViewDescriptor {
                 dimension: Some(TextureViewDimension::D2),
                 base_array_layer,
                 array_layer_count: Some(1),
                 ..Default::default()
             })
-        };
-        Self {
-            each: (0..size[2]).map(layer).collect(),
-            size_px: UVec2::new(size[0], size[1]),
-            shortages: gpu.shortages(),
-            all,
-        }
+        });
+        Self { each: each.collect(), size_px: UVec2::new(size[0], size[1]), shortages: gpu.shortages(), all }
     }
 
     /// The first `count` layers, to be read while others are written.

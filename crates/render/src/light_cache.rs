@@ -1,7 +1,7 @@
 //! The look-up of light in samples, at the surfaces of views.
 
 use depth_image::{Antialias, MAX_LAMP_SHARES, ProvenanceKind};
-use gpu::{Binding, DispatchSize, GpuEnvironment, ResourceTraits, ShaderVariant, WorkKind, light_slots, switches};
+use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, light_slots, switches};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
@@ -176,12 +176,11 @@ fn dispatch(
         pass.bind(0, bindings.chain(list.bindings()).chain(asked))
     });
     let bound = bound.collect::<Result<Vec<_>, _>>()?;
-    let kind = WorkKind::new(batch.family(), &variant.name());
-    recording.dispatch_pieces(kind, &pass, camera, |place, piece, width_px| {
-        let all = DispatchSize::Invocations([width_px, piece.end_row - piece.first_row, 1]);
-        let size = if is_asked { asked[place].size() } else { all };
-        (vec![&bound[place]], size)
-    });
+    let kind = recording.kind_of(&variant);
+    for (place, piece) in recording.pieces_of(camera).into_iter().enumerate() {
+        let size = if is_asked { asked[place].size() } else { piece.size() };
+        recording.dispatch_piece(kind, &pass, &[&bound[place]], piece, size);
+    }
     Ok(())
 }
 

@@ -117,14 +117,14 @@ impl LightCache {
         share_words: usize,
         turn: Turn,
     ) -> Result<Self, RenderError> {
-        let refused = |index: usize, reason: String| RenderError::Samples { index, reason };
         if images.is_empty() || images.len() > MAX_CACHE_CAMERAS as usize {
-            return Err(refused(images.len(), format!("a set of light has 1 to {MAX_CACHE_CAMERAS} images")));
+            let reason = format!("a set of light has 1 to {MAX_CACHE_CAMERAS} images");
+            return Err(RenderError::Samples { index: images.len(), reason });
         }
         let mut cached = Vec::new();
         let mut first_sample = 0_usize;
         for (index, image) in images.iter().enumerate() {
-            let camera = checked(image, share_words).map_err(|reason| refused(index, reason))?;
+            let camera = checked(image, share_words).map_err(|reason| RenderError::Samples { index, reason })?;
             let range = image.inverse_depth_range().map_or(0.0, |(least, greatest)| greatest - least);
             let half_step_per_m = 0.5 * range / DEPTH_CODES;
             cached.push(CachedImage { camera, first_sample: first_sample as u32, half_step_per_m });
@@ -180,10 +180,10 @@ fn packed(image: &DepthImage, texels: usize) -> Vec<[u32; 4]> {
     for (place, &normal) in normals.iter().enumerate() {
         let inverse_depth = image.inverse_depth_per_m[place].to_bits();
         words.push([inverse_depth, light.triangle_normal_oct16[place], normal, light.lamps_rgb9e5[place]]);
-        let share = |word: usize| light.share8.get(word).map_or(0, |plane| plane[place]);
-        words.push([light.environment_rgb9e5[place], share(0), share(1), share(2)]);
+        let [a, b, c, d, e] = std::array::from_fn(|word| light.share8.get(word).map_or(0, |plane| plane[place]));
+        words.push([light.environment_rgb9e5[place], a, b, c]);
         if texels > 2 {
-            words.push([share(3), share(4), 0, 0]);
+            words.push([d, e, 0, 0]);
         }
     }
     words

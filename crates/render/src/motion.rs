@@ -62,8 +62,8 @@ impl Motion {
     /// Vertices that [`Motion::of`] makes for a scene.
     pub fn vertex_count(scene: &Scene) -> usize {
         let moving = scene.animation.iter().flat_map(|animation| &animation.moving);
-        let mesh = |instance: u32| &scene.meshes[scene.instances[instance as usize].mesh as usize];
-        moving.map(|moving| mesh(moving.instance)).map(|mesh: &Mesh| mesh.vertices.len()).sum()
+        let meshes = moving.map(|moving| scene.instances[moving.instance as usize].mesh);
+        meshes.map(|mesh| scene.meshes[mesh as usize].vertices.len()).sum()
     }
 
     /// Whether poses depend on scene time.
@@ -78,8 +78,9 @@ impl Motion {
 
     /// The pose of a moment.
     pub fn at(&self, scene_time_s: f32) -> Arc<Posed> {
-        let is_good = |(time_s, _): &&(f32, Arc<Posed>)| !self.moves() || *time_s == scene_time_s;
-        if let Some((_, posed)) = self.last.lock().as_ref().filter(is_good) {
+        if let Some((time_s, posed)) = &*self.last.lock()
+            && (!self.moves() || *time_s == scene_time_s)
+        {
             return posed.clone();
         }
         // Not under the lock: the pool's threads may ask for a pose, too.
@@ -102,11 +103,9 @@ impl Motion {
 
     /// The bytes of the last pose on the device.
     pub fn bytes(&self) -> u64 {
-        let last = self.last.try_lock();
-        let sizes = |(_, posed): &(f32, Arc<Posed>)| {
-            posed.buffers.get().map(|buffers| buffers.iter().map(wgpu::Buffer::size).sum())
-        };
-        last.and_then(|last| last.as_ref().and_then(sizes)).unwrap_or(0)
+        let Some(last) = self.last.try_lock() else { return 0 };
+        let buffers = last.as_ref().and_then(|(_, posed)| posed.buffers.get());
+        buffers.into_iter().flatten().map(wgpu::Buffer::size).sum()
     }
 }
 

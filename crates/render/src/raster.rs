@@ -4,14 +4,14 @@ use std::{ops::Range, sync::Arc};
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Highlight, ParallelCamera, PinholeCamera};
-use glam::{Mat4, UVec2, Vec3, Vec4};
+use glam::{Mat4, UVec2, Vec4};
 use gpu::{
     Binding, BoundGroup, DrawPass, DrawState, DrawVariant, Frame, Gpu, PassCache, ResourceTrait, ResourceTraits,
     ShaderVariant, Templates, WorkKind, highlight_name, switches, uniform_stride,
 };
 use minijinja::{Value, context};
 
-use crate::gpu_scene::{Draw, GpuObject, MaterialTraits};
+use crate::gpu_scene::{GpuObject, MaterialTraits};
 use crate::known_samples::{Predecessors, RedundancyVariant};
 use crate::surfaces::{NOTHING, SURFACE_FORMAT, SURFACE_ID_FORMAT, Surfaces, TRIANGLE_NORMAL_FORMAT};
 use crate::{
@@ -32,7 +32,7 @@ const TEXTURES: [(&str, &str); 5] = [
 /// The indices of a slice of a scene whose cost is unknown.
 const UNKNOWN_SLICE_INDICES: u64 = 3 << 14;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub(crate) struct RasterVariant {
     material: MaterialTraits,
     /// `None` shows colours as they are.
@@ -76,22 +76,13 @@ impl RasterVariant {
     pub fn with_tests(tests: &[RedundancyTest]) -> impl Iterator<Item = Self> {
         let tests: Vec<_> = tests.iter().copied().filter(|test| !test.traces_rays()).collect();
         let bases: Vec<_> = Self::all().into_iter().filter(|variant| !variant.depth_only).rev().take(4).collect();
-        let each = move |test| bases.clone().into_iter().map(move |base| Self { redundancy: Some(test), ..base });
-        RedundancyVariant::all(&tests).into_iter().flat_map(each)
+        let tests = RedundancyVariant::all(&tests).into_iter();
+        tests.flat_map(move |test| bases.clone().into_iter().map(move |base| Self { redundancy: Some(test), ..base }))
     }
 
     /// Of a plain material, without any plane beside the surface.
     fn of(work: &DrawWork<'_>) -> Self {
-        Self {
-            material: MaterialTraits::default(),
-            shading: work.lighting.highlight(),
-            surface_id: false,
-            triangle_normal: false,
-            depth_only: false,
-            wind: work.scene.wind,
-            redundancy: None,
-            appended: false,
-        }
+        Self { shading: work.lighting.highlight(), wind: work.scene.wind, ..Self::default() }
     }
 
     /// That of parallel cameras, of a plain material.
@@ -134,22 +125,18 @@ impl ShaderVariant for RasterVariant {
     }
 
     fn all() -> Vec<Self> {
-        let shadings = [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)];
-        let each = |shading| {
-            MaterialTraits::all().flat_map(move |material| {
-                switches().map(move |[surface_id, depth_only, wind]| Self {
-                    material,
-                    shading,
+        let mut nearest = Vec::new();
+        for shading in [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)] {
+            for material in MaterialTraits::all() {
+                let plain = Self { material, shading, ..Self::default() };
+                nearest.extend(switches().map(|[surface_id, depth_only, wind]| Self {
                     surface_id,
-                    triangle_normal: false,
                     depth_only,
                     wind,
-                    redundancy: None,
-                    appended: false,
-                })
-            })
-        };
-        let nearest: Vec<Self> = shadings.into_iter().flat_map(each).collect();
+                    ..plain
+                }));
+            }
+        }
         let appended = nearest.iter().filter(|variant| !variant.surface_id && !variant.depth_only);
         let appended: Vec<Self> = appended.map(|variant| Self { appended: true, ..*variant }).collect();
         let with_normals = nearest.iter().filter(|variant| !variant.depth_only);
@@ -195,13 +182,8 @@ impl Raster {
         };
         let front = RasterVariant { depth_only: true, redundancy: None, ..shown };
         let cameras = &batch.cameras[first..][..surfaces.len()];
-        let groups = scene.draws.first().map(|draw| {
-            let pass = self.passes.get(&RasterVariant { material: draw.material, ..shown })?;
-            let own = predecessors.map(|images| pass.bind(OWN_GROUP, images.bindings())).transpose()?;
-            let cameras = cameras.iter().map(|camera| RasterCamera::of(camera.reference(), batch.work.scene_time_s));
-            self.groups(&pass, scene, cameras, own)
-        });
-        let groups = groups.transpose()?;
+        let of_pinholes = cameras.iter().map(|camera| RasterCamera::of(camera.reference(), batch.work.scene_time_s));
+        let groups = self.groups(scene, shown, of_pinholes, predecessors.map(Predecessors::bindings))?;
         let posed = scene.motion.as_ref().map(|motion| motion.at(batch.work.scene_time_s));
         let posed = posed.as_ref().map(|posed| posed.buffers(&self.gpu));
         for (place, (camera, target)) in (0..).zip(cameras.iter().zip(surfaces)) {
@@ -229,13 +211,8 @@ impl Raster {
     ) -> Result<(), RenderError> {
         let scene = work.scene;
         let variant = RasterVariant { appended: true, ..RasterVariant::of(work) };
-        let groups = scene.draws.first().map(|draw| {
-            let pass = self.passes.get(&RasterVariant { material: draw.material, ..variant })?;
-            let own = pass.bind(OWN_GROUP, memory.iter().cloned())?;
-            let cameras = std::iter::once(RasterCamera::of_lines(camera, work.scene_time_s));
-            self.groups(&pass, scene, cameras, Some(own))
-        });
-        let groups = groups.transpose()?;
+        let camera_of_lines = std::iter::once(RasterCamera::of_lines(camera, work.scene_time_s));
+        let groups = self.groups(scene, variant, camera_of_lines, Some(memory.to_vec()))?;
         let posed = scene.motion.as_ref().map(|motion| motion.at(work.scene_time_s));
         let posed = posed.as_ref().map(|posed| posed.buffers(&self.gpu));
         let frustum = Frustum::of_lines(camera);
@@ -258,7 +235,8 @@ impl Raster {
         let a_slice = self.gpu.device_queue.slice_units(family, UNKNOWN_SLICE_INDICES);
         for (number, runs) in slices(runs, a_slice).into_iter().enumerate() {
             self.announce(frame, view, variant, &runs)?;
-            let mut pass = begin_pass(frame, colors, reversed_depth, number == 0);
+            let clear = (number == 0).then_some(CLEAR);
+            let mut pass = frame.begin_drawing("raster", colors, clear, reversed_depth);
             self.draw(&mut pass, view, variant, &runs)?;
             drop(pass);
             let indices = runs.iter().map(|run| run.indices.len() as u64).sum();
@@ -328,29 +306,33 @@ impl Raster {
         Ok(())
     }
 
-    /// Groups that fit the variants of all materials.
+    /// Groups that fit the variants of all materials; none for a scene without triangles.
     fn groups(
         &self,
-        pass: &DrawPass,
         scene: &GpuScene,
+        variant: RasterVariant,
         cameras: impl Iterator<Item = RasterCamera>,
-        own: Option<BoundGroup>,
-    ) -> Result<Groups, RenderError> {
+        own: Option<Vec<Binding<'_>>>,
+    ) -> Result<Option<Groups>, RenderError> {
+        let Some(draw) = scene.draws.first() else { return Ok(None) };
+        let pass = self.passes.get(&RasterVariant { material: draw.material, ..variant })?;
         let cameras = uniform(&self.gpu, "raster cameras", cameras);
-        let textures = |textures: &[(wgpu::TextureView, wgpu::Sampler); 5]| {
-            let bindings =
-                TEXTURES.iter().zip(textures).flat_map(|(&(texture_name, sampler_name), (view, sampler))| {
-                    [Binding::texture(texture_name, view), Binding::sampler(sampler_name, sampler)]
-                });
-            pass.bind(2, bindings)
-        };
         let common = [Binding::buffer("camera", &cameras), Binding::buffer("surroundings", &scene.surroundings)];
-        Ok(Groups {
+        let textures = scene.textures.iter().map(|textures| {
+            let named = TEXTURES.iter().zip(textures);
+            pass.bind(
+                2,
+                named.flat_map(|(&(texture, sampler), (view, of_view))| {
+                    [Binding::texture(texture, view), Binding::sampler(sampler, of_view)]
+                }),
+            )
+        });
+        Ok(Some(Groups {
+            own: own.map(|bindings| pass.bind(OWN_GROUP, bindings)).transpose()?,
             scene: pass.bind(0, common)?,
             object: pass.bind(1, [Binding::buffer("object", &scene.objects)])?,
-            textures: scene.textures.iter().map(textures).collect::<Result<_, _>>()?,
-            own,
-        })
+            textures: textures.collect::<Result<_, _>>()?,
+        }))
     }
 }
 
@@ -404,11 +386,10 @@ struct Run {
 fn visible_runs(scene: &GpuScene, frustum: &Frustum) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     let visible = scene.draws.iter().enumerate().filter(|(_, draw)| frustum.may_see(&draw.bounds_in_world));
-    let joins =
-        |run: &Run, draw: &Draw| (scene.draws[run.draw].object, run.indices.end) == (draw.object, draw.indices.start);
     for (number, draw) in visible {
+        let first = (draw.object, draw.indices.start);
         match runs.last_mut() {
-            Some(run) if joins(run, draw) => run.indices.end = draw.indices.end,
+            Some(run) if (scene.draws[run.draw].object, run.indices.end) == first => run.indices.end = draw.indices.end,
             _ => runs.push(Run { draw: number, indices: draw.indices.clone() }),
         }
     }
@@ -439,10 +420,10 @@ fn slices(runs: Vec<Run>, most_indices: u64) -> Vec<Vec<Run>> {
 /// Planar depth, 1 where the camera's range ends.
 fn clip_from_lines(camera: &ParallelCamera) -> Mat4 {
     let [right, down, forward] = camera.axes_in_world();
-    let row = |axis: Vec3| axis.extend(-axis.dot(camera.corner_in_world));
+    let [right, down, forward] = [right, down, forward].map(|axis| axis.extend(-axis.dot(camera.corner_in_world)));
     let size_m = camera.size_px.as_vec2() * camera.spacing_m;
-    let [x, y] = [row(right) * (2.0 / size_m.x) - Vec4::W, Vec4::W - row(down) * (2.0 / size_m.y)];
-    Mat4::from_cols(x, y, row(forward) / camera.range_m, Vec4::W).transpose()
+    let [x, y] = [right * (2.0 / size_m.x) - Vec4::W, Vec4::W - down * (2.0 / size_m.y)];
+    Mat4::from_cols(x, y, forward / camera.range_m, Vec4::W).transpose()
 }
 
 /// Reversed depth: `near / planar depth`, 1 at the near plane and 0 at infinity.
@@ -478,30 +459,6 @@ const CLEAR: wgpu::Color = {
     let word = NOTHING as f64;
     wgpu::Color { r: word, g: word, b: word, a: word }
 };
-
-/// A pass over targets, which the first clears.
-fn begin_pass<'f>(
-    frame: &'f mut Frame<'_>,
-    colors: &[&wgpu::TextureView],
-    reversed_depth: &wgpu::TextureView,
-    is_first: bool,
-) -> wgpu::RenderPass<'f> {
-    let ops = wgpu::Operations { load: first_or_kept(is_first, CLEAR), store: wgpu::StoreOp::Store };
-    let color = |&view| Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops });
-    let ops = wgpu::Operations { load: first_or_kept(is_first, 0.0), store: wgpu::StoreOp::Store };
-    let depth =
-        wgpu::RenderPassDepthStencilAttachment { view: reversed_depth, depth_ops: Some(ops), stencil_ops: None };
-    frame.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some("raster"),
-        color_attachments: &colors.iter().map(color).collect::<Vec<_>>(),
-        depth_stencil_attachment: Some(depth),
-        ..Default::default()
-    })
-}
-
-fn first_or_kept<V>(is_first: bool, clear: V) -> wgpu::LoadOp<V> {
-    if is_first { wgpu::LoadOp::Clear(clear) } else { wgpu::LoadOp::Load }
-}
 
 #[cfg(test)]
 mod tests {

@@ -45,8 +45,8 @@ fn smoothed_ambient(image: &DepthImage, words: &[u32]) -> Vec<u32> {
     let surfaces: Vec<Option<Surface>> = (0..words.len()).into_par_iter().map(|place| surface(image, place)).collect();
     let mut linear: Vec<Vec3> = words.iter().map(|&word| linear_from_rgb9e5(word)).collect();
     for step_px in STEPS_PX {
-        let mean = |place| mean_around(&surfaces, &linear, size_px, place, step_px);
-        linear = (0..words.len()).into_par_iter().map(mean).collect();
+        let places = (0..words.len()).into_par_iter();
+        linear = places.map(|place| mean_around(&surfaces, &linear, size_px, place, step_px)).collect();
     }
     linear.into_iter().map(rgb9e5_from_linear).collect()
 }

@@ -11,7 +11,7 @@ use crate::finish::Planes;
 use crate::known_samples::{ImageSequence, Predecessors};
 use crate::light_cache::{self, Picture};
 use crate::light_samples::CachedLight;
-use crate::pieces::{Piece, Pieces};
+use crate::pieces::Piece;
 use crate::reflections::{self, Reflections};
 use crate::surfaces::{SurfaceKind, SurfacePool, Surfaces};
 use crate::{RenderError, finish, illuminate, keep, pixel_list::PixelList, raster::Raster};
@@ -52,11 +52,15 @@ impl Stages {
         let Self { gpu, passes, pool, .. } = self;
         let slice_px = gpu.device_queue.slice_units(batch.family(), batch.unknown_slice_px());
         let most_px = if batch.output.mirrors { reflections::PIXELS_A_PIECE } else { u64::MAX };
-        let pieces = Pieces::of(batch.cameras, slice_px.min(most_px));
-        let mirrored = Reflections::lend(gpu, pool, batch, &pieces.all)?;
+        let pieces = Piece::all(batch.cameras, slice_px.min(most_px));
+        let mirrored = Reflections::lend(gpu, pool, batch, &pieces)?;
         let cameras = batch.uniform_of_all(gpu, &pieces, &sums);
         let shifted = batch.positions();
-        let positions: Vec<Batch<'_>> = shifted.iter().map(|position| batch.at(position)).collect();
+        let positions = shifted.iter().map(|(position, cameras)| {
+            let position = *position;
+            Batch { cameras, traced: batch.traced.clone(), position, ..*batch }
+        });
+        let positions: Vec<Batch<'_>> = positions.collect();
         let frame = Frame::begin(gpu, "draw", turn);
         let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, frame };
         let surfaces: Vec<Surfaces> = (0..batch.cameras.len()).map(|place| self.lend(batch, place)).collect();
@@ -86,8 +90,10 @@ impl Stages {
         self.gpu.check_storage_bytes("the light of a batch (bytes)", bytes)?;
         let wanted = batch.light_rays().map(|rays| refinement.share_of(rays));
         let kept = (refinement.steps > 1).then(|| self.accumulations.take(&batch.key(), wanted)).flatten();
-        let buffer = || self.pool.lend_storage("light", bytes.max(4));
-        Ok(kept.unwrap_or_else(|| Sums { buffer: buffer(), rays: wanted.map(|rays| 0..rays) }))
+        Ok(kept.unwrap_or_else(|| {
+            let buffer = self.pool.lend_storage("light", bytes.max(4));
+            Sums { buffer, rays: wanted.map(|rays| 0..rays) }
+        }))
     }
 
     /// Records one position within the pixels: which surface each shows, its light, what mirrors show, and its planes.
@@ -209,9 +215,7 @@ impl Stages {
 
     /// An empty list for each piece of a picture.
     fn lists(&self, recording: &Recording<'_>, camera: usize) -> Vec<PixelList> {
-        let width_px = recording.batch.cameras[camera].size_px().x;
-        let pixels = |(_, piece): (u32, Piece)| width_px * (piece.end_row - piece.first_row);
-        let pieces = recording.pieces.of_camera(camera);
-        pieces.map(|piece| PixelList::new(&self.gpu, &self.pool, pixels(piece))).collect()
+        let pieces = recording.pieces_of(camera).into_iter();
+        pieces.map(|piece| PixelList::new(&self.gpu, &self.pool, piece.pixel_count())).collect()
     }
 }

@@ -18,8 +18,7 @@ pub(crate) struct SumPlanes {
 impl SumPlanes {
     /// Few and many lights, with and without visibility.
     pub fn all() -> impl Iterator<Item = Self> {
-        let both = |light_count| [false, true].map(|visibility| Self { light_count, visibility });
-        [0, 1, 9].into_iter().flat_map(both)
+        [0, 1, 9].into_iter().flat_map(|light_count| [false, true].map(|visibility| Self { light_count, visibility }))
     }
 
     /// Planes of a pixel.

@@ -53,9 +53,10 @@ struct Line {
 impl Costs {
     /// Straight lines through measured costs over the number of pixels, the view with fewer pixels first.
     pub fn through(measured: [(usize, Choice); 2]) -> Self {
-        let line =
-            |seconds: fn(&Choice) -> f64| Line::through(measured.map(|(pixels, choice)| (pixels, seconds(&choice))));
-        Self { triangles: line(|choice| choice.triangles_s), rays: line(|choice| choice.rays_s) }
+        Self {
+            triangles: Line::through(measured.map(|(pixels, choice)| (pixels, choice.triangles_s))),
+            rays: Line::through(measured.map(|(pixels, choice)| (pixels, choice.rays_s))),
+        }
     }
 
     /// The pixels up to which rays are faster. Lines that do not cross where pictures are have one answer for all sizes, that of
@@ -90,8 +91,8 @@ impl Line {
 impl fmt::Display for Choice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let chosen = if self.rays_are_faster() { Visibility::Rays } else { Visibility::Triangles };
-        let ms = |s: f64| s * 1e3;
-        write!(f, "{chosen} (triangles {:.2} ms, rays {:.2} ms a view)", ms(self.triangles_s), ms(self.rays_s))
+        let [triangles_ms, rays_ms] = [self.triangles_s, self.rays_s].map(|s| s * 1e3);
+        write!(f, "{chosen} (triangles {triangles_ms:.2} ms, rays {rays_ms:.2} ms a view)")
     }
 }
 

@@ -1,15 +1,14 @@
 //! The light of listed surfaces, as their colours and as the shares of lamps that they see.
 
 use bytemuck::Zeroable;
-use depth_image::{ParallelCamera, PixelDepth, ToneMapping};
+use depth_image::{ParallelCamera, PixelDepth};
 use glam::{UVec2, Vec2};
 use gpu::{Binding, Frame, ResourceTraits, ShaderVariant};
 use minijinja::{Value, context, value::merge_maps};
 
 use super::crossings::Crossing;
 use crate::accumulation::Sums;
-use crate::batch::{Batch, Part, Position, Recording};
-use crate::pieces::Pieces;
+use crate::batch::{Batch, Recording};
 use crate::pixel_camera::CAMERA_TRAITS;
 use crate::planes::Output;
 use crate::reflections::bounces::{BounceList, GpuBounce, Rays};
@@ -60,17 +59,7 @@ pub(super) fn light(
 ) -> Result<Light, RenderError> {
     let traced = work.lighting.is_traced().then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
     let output = Output { samples: true, ..Output::of(work, work.highlight().is_some()) };
-    let batch = Batch {
-        work,
-        cameras: &[],
-        by_rays: false,
-        traced,
-        output,
-        tone: ToneMapping::NONE,
-        sequence: None,
-        cached: None,
-        position: Position::default(),
-    };
+    let batch = Batch::of_points(work, traced, output);
     let points = Points::of(camera, first);
     let mut light = Light { visibility8: vec![Vec::new(); output.sums.visibility_words()], ..Light::default() };
     let a_list = points_a_list(stages, output);
@@ -98,7 +87,6 @@ fn light_list(stages: &Stages, batch: &Batch<'_>, bounces: &[GpuBounce], light: 
     let sum_planes = batch.output.sums.count();
     let plane_bytes = 4 * u64::from(count);
     let _one = stages.batches.begin(batch.work.turn.class);
-    let lighting = batch.work.lighting;
     let rays = batch.light_rays().map(|rays| 0..batch.work.refinement.share_of(rays));
     let sums = pool.lend_storage("light of layers", plane_bytes * sum_planes as u64);
     let memory = pool.lend_storage("surfaces of layers", size_of_val(bounces) as u64);
@@ -107,17 +95,20 @@ fn light_list(stages: &Stages, batch: &Batch<'_>, bounces: &[GpuBounce], light: 
     let words = pool.lend_storage("colours of layers", plane_bytes * planes as u64);
     let parts = batch.parts_of_points(gpu, &rays, count);
     let list = BounceList::of(gpu, count);
-    let points = Rays { bounces: &memory, list: &list, units: u64::from(count), generation: 1 };
+    let points = Rays { bounces: &memory, list: &list, generation: 1 };
     let frame = Frame::begin(gpu, "light of layers", batch.work.turn);
     let sum_buffer = (*sums).clone();
-    let pieces = Pieces { all: Vec::new() };
     let cameras = parts[0].cameras.clone();
     let sums = Sums { buffer: sums, rays };
-    let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, frame };
-    if lighting.is_lit() {
+    let mut recording = Recording { gpu, passes, batch, pieces: Vec::new(), cameras, sums, frame };
+    let lit = batch.work.lighting.is_lit();
+    if lit {
         illuminate::record_points(&mut recording, &parts, points, &sum_buffer)?;
     }
-    record(&mut recording, &parts, points, [&sum_buffer, &words])?;
+    let variant = Lit { lit, sums: batch.output.sums };
+    let pass = passes.get(&variant)?;
+    let own = pass.bind(0, bindings([&parts[0].cameras, &sum_buffer, &words], &points))?;
+    points.dispatch(&mut recording, &variant, [0; 3], &pass, &[&own]);
     let mut frame = recording.frame;
     let bytes = plane_bytes * planes as u64;
     let read = frame.read_back(&words, 0..bytes, pool.lend_host("colours of layers", bytes));
@@ -127,21 +118,6 @@ fn light_list(stages: &Stages, batch: &Batch<'_>, bounces: &[GpuBounce], light: 
         light.color_rgb9e5.extend_from_slice(planes.next().unwrap_or_default());
         light.visibility8.iter_mut().zip(planes).for_each(|(plane, own)| plane.extend_from_slice(own));
     })?;
-    Ok(())
-}
-
-/// Records the pass that finishes the colours of listed surfaces.
-fn record(
-    recording: &mut Recording<'_>,
-    parts: &[Part],
-    points: Rays<'_>,
-    [sums, words]: [&wgpu::Buffer; 2],
-) -> Result<(), RenderError> {
-    let variant = Lit { lit: recording.batch.work.lighting.is_lit(), sums: recording.batch.output.sums };
-    let pass = recording.passes.get(&variant)?;
-    let own = bindings([&parts[0].cameras, sums, words], &points);
-    let own = pass.bind(0, own)?;
-    points.dispatch(recording, &variant, [0; 3], &pass, &[&own]);
     Ok(())
 }
 
@@ -203,8 +179,8 @@ mod tests {
     #[test]
     fn every_variant_is_bound_by_its_names() {
         let stage = TestStage::new();
-        let list = BounceList::new(&stage.gpu);
-        let points = Rays { bounces: &stage.buffer, list: &list, units: 1, generation: 1 };
+        let list = BounceList::new(&stage.gpu, 1);
+        let points = Rays { bounces: &stage.buffer, list: &list, generation: 1 };
         for variant in Lit::all() {
             stage.check(&variant, 0, &bindings([&stage.buffer; 3], &points));
         }

@@ -36,8 +36,9 @@ impl Primary {
 
     /// The variants with each redundancy test.
     pub fn with_tests(tests: &[RedundancyTest]) -> impl Iterator<Item = Self> {
-        let each = |redundancy| Self::pinholes().map(move |variant| Self { redundancy: Some(redundancy), ..variant });
-        RedundancyVariant::all(tests).into_iter().flat_map(each)
+        RedundancyVariant::all(tests).into_iter().flat_map(|redundancy| {
+            Self::pinholes().map(move |variant| Self { redundancy: Some(redundancy), ..variant })
+        })
     }
 }
 
@@ -58,15 +59,20 @@ impl ShaderVariant for Primary {
     }
 
     fn all() -> Vec<Self> {
-        let shadings = [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)];
-        let each = |shading| {
-            switches().flat_map(move |[surface_id, triangle_normal, single_pole]| {
-                let plain =
-                    |traversal| Self { traversal, shading, surface_id, triangle_normal, single_pole, redundancy: None };
-                Traversal::ALL.map(plain)
-            })
-        };
-        shadings.into_iter().flat_map(each).collect()
+        let mut all = Vec::new();
+        for shading in [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)] {
+            for [surface_id, triangle_normal, single_pole] in switches() {
+                all.extend(Traversal::ALL.map(|traversal| Self {
+                    traversal,
+                    shading,
+                    surface_id,
+                    triangle_normal,
+                    single_pole,
+                    redundancy: None,
+                }));
+            }
+        }
+        all
     }
 }
 

@@ -1,5 +1,7 @@
 //! The switches of `rays/traverse.wgsl`, and the numbers that it shares with its scalar twin.
 
+use depth_image::Highlight;
+use gpu::highlight_name;
 use minijinja::{Value, context};
 
 use super::{material_switches::MaterialSwitches, ray_scene::Traced};
@@ -32,5 +34,10 @@ impl Traversal {
     pub fn context(self) -> Value {
         let MaterialSwitches { alpha_tested, mapped } = self.materials;
         context! { stack => self.stack, alpha_tested, mapped }
+    }
+
+    /// The values of shaders that follow rays off mirrors.
+    pub fn context_of_mirrored_rays(self) -> Value {
+        context! { primary => true, from_eye => false, shading => highlight_name(Highlight::Ggx), ..self.context() }
     }
 }

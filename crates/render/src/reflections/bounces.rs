@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use gpu::{Binding, BoundGroup, ComputePass, DispatchSize, Gpu, ShaderVariant, WorkKind};
 use wgpu::{Buffer, BufferUsages};
 
-use crate::{batch::Recording, pieces::Piece, pixel_list::LIST_WORKGROUP};
+use crate::{batch::Recording, pixel_list::LIST_WORKGROUP};
 
 /// `Bounce` of `reflections/bounce.wgsl`.
 #[repr(C)]
@@ -27,37 +27,32 @@ pub(crate) struct GpuBounce {
 }
 
 /// The arguments of the dispatches over the rays of one piece off one mirror.
-pub(crate) struct BounceList(Buffer);
+pub(crate) struct BounceList {
+    arguments: Buffer,
+    /// Pixels of the piece.
+    pub units: u32,
+}
 
 impl BounceList {
-    pub fn new(gpu: &Gpu) -> Self {
+    /// An empty list, for a piece of so many pixels.
+    pub fn new(gpu: &Gpu, units: u32) -> Self {
         // Workgroups along x, y and z, and the list's length.
-        Self(gpu.buffer_with("mirrored rays", &[0u32, 1, 1, 0], BufferUsages::STORAGE | BufferUsages::INDIRECT))
+        Self { arguments: arguments(gpu, "mirrored rays", [0, 1, 1, 0]), units }
     }
 
     /// The list of `count` points.
     pub fn of(gpu: &Gpu, count: u32) -> Self {
-        let arguments = [count.div_ceil(LIST_WORKGROUP), 1, 1, count];
-        Self(gpu.buffer_with("listed points", &arguments, BufferUsages::STORAGE | BufferUsages::INDIRECT))
-    }
-
-    pub fn size(&self) -> DispatchSize<'_> {
-        DispatchSize::Indirect(&self.0, 0)
+        let workgroups = count.div_ceil(LIST_WORKGROUP);
+        Self { arguments: arguments(gpu, "listed points", [workgroups, 1, 1, count]), units: count }
     }
 
     pub fn binding(&self, name: &'static str) -> Binding<'_> {
-        Binding::buffer(name, &self.0)
+        Binding::buffer(name, &self.arguments)
     }
 }
 
-/// A piece of a picture whose pixels send rays.
-#[derive(Clone, Copy)]
-pub(crate) struct PicturePiece {
-    /// Of the uniform of cameras.
-    pub element: u32,
-    pub piece: Piece,
-    /// Pixels.
-    pub units: u64,
+fn arguments(gpu: &Gpu, label: &str, words: [u32; 4]) -> Buffer {
+    gpu.buffer_with(label, &words, BufferUsages::STORAGE | BufferUsages::INDIRECT)
 }
 
 /// The rays of a piece off one mirror.
@@ -65,8 +60,6 @@ pub(crate) struct PicturePiece {
 pub(crate) struct Rays<'r> {
     pub bounces: &'r Buffer,
     pub list: &'r BounceList,
-    /// Pixels of the piece.
-    pub units: u64,
     /// Mirrors on the way so far; counted from [`depth_image::MAX_REFLECTIONS`] on where the first is a glossy surface.
     pub generation: u32,
 }
@@ -85,9 +78,9 @@ impl Rays<'_> {
         pass: &ComputePass,
         groups: &[&BoundGroup],
     ) {
-        pass.dispatch(&mut recording.frame, groups, self.list.size());
+        pass.dispatch(&mut recording.frame, groups, DispatchSize::Indirect(&self.list.arguments, 0));
         // Each mirror on the way leaves fewer rays.
         let kind = WorkKind::new(recording.batch.family(), &(variant.name(), counts, self.generation));
-        recording.frame.cut(kind, self.units);
+        recording.frame.cut(kind, self.list.units.into());
     }
 }

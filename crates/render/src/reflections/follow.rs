@@ -1,8 +1,7 @@
 //! The surfaces where mirrored rays end.
 
-use depth_image::Highlight;
-use gpu::{ResourceTraits, ShaderVariant, highlight_name};
-use minijinja::{Value, context, value::merge_maps};
+use gpu::{ResourceTraits, ShaderVariant};
+use minijinja::Value;
 
 use super::bounces::Rays;
 use crate::{RenderError, batch::Recording, rays::Traversal};
@@ -17,12 +16,7 @@ impl ShaderVariant for Follow {
     const TRAITS: ResourceTraits = &[];
 
     fn context(&self) -> Value {
-        let own = context! {
-            primary => true,
-            from_eye => false,
-            shading => highlight_name(Highlight::Ggx),
-        };
-        merge_maps([own, self.traversal.context()])
+        self.traversal.context_of_mirrored_rays()
     }
 
     fn all() -> Vec<Self> {
@@ -52,9 +46,9 @@ mod tests {
     fn every_variant_is_bound_by_its_names() {
         let stage = TestStage::new();
         let traced = stage.scene.rays.at(0.0).expect("a tree");
-        let list = BounceList::new(&stage.gpu);
+        let list = BounceList::new(&stage.gpu, 1);
         for variant in Follow::all() {
-            stage.check(&variant, 0, &Rays { bounces: &stage.buffer, list: &list, units: 1, generation: 1 }.bindings());
+            stage.check(&variant, 0, &Rays { bounces: &stage.buffer, list: &list, generation: 1 }.bindings());
             stage.check(&variant, 1, &traced.bindings());
         }
     }

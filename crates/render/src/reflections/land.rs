@@ -32,8 +32,9 @@ impl ShaderVariant for Land {
     }
 
     fn all() -> Vec<Self> {
-        let each = |sums| switches().map(move |[mirrors, environment_map]| Self { mirrors, environment_map, sums });
-        SumPlanes::all().filter(|sums| sums.visibility).flat_map(each).collect()
+        let sums = SumPlanes::all().filter(|sums| sums.visibility);
+        sums.flat_map(|sums| switches().map(move |[mirrors, environment_map]| Self { mirrors, environment_map, sums }))
+            .collect()
     }
 }
 
@@ -83,8 +84,8 @@ mod tests {
     #[test]
     fn every_variant_is_bound_by_its_names() {
         let stage = TestStage::new();
-        let list = BounceList::new(&stage.gpu);
-        let rays = Rays { bounces: &stage.buffer, list: &list, units: 1, generation: 1 };
+        let list = BounceList::new(&stage.gpu, 1);
+        let rays = Rays { bounces: &stage.buffer, list: &list, generation: 1 };
         for variant in Land::all() {
             let map = variant.environment_map.then_some(&stage.environment);
             let next = variant.mirrors.then_some((&stage.buffer, &list));

@@ -1,14 +1,13 @@
 //! Rays into the lobes of what a picture shows, pass by pass one of each pixel.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::Highlight;
-use gpu::{Binding, DispatchSize, ResourceTraits, ShaderVariant, WorkKind, highlight_name, light_slots, switches};
+use gpu::{Binding, ResourceTraits, ShaderVariant, switches};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
-use super::bounces::{BounceList, PicturePiece};
+use super::bounces::BounceList;
 use super::spawn::{self, VIEW_PLANES};
-use crate::{RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
+use crate::{RenderError, batch::Recording, pieces::Piece, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
 
 /// `Lobe` of the shader.
 #[repr(C)]
@@ -34,16 +33,7 @@ impl ShaderVariant for Lobe {
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
-        context! {
-            single_pole => false,
-            by_rays => self.by_rays,
-            first => self.first,
-            plane_count => self.plane_count,
-            highlight => highlight_name(Highlight::Ggx),
-            mirrors => true,
-            environment_map => false,
-            light_count => 0, light_slots => light_slots(0), visibility_words => 0,
-        }
+        context! { first => self.first, ..spawn::context(self.by_rays, self.plane_count) }
     }
 
     fn all() -> Vec<Self> {
@@ -56,7 +46,7 @@ pub(super) fn record(
     recording: &mut Recording<'_>,
     ray: u32,
     weights: &Buffer,
-    PicturePiece { element, piece, units }: PicturePiece,
+    piece: Piece,
     target: &Surfaces,
     next_bounces: &Buffer,
     next: &BounceList,
@@ -64,17 +54,14 @@ pub(super) fn record(
     let batch = recording.batch;
     let variant = Lobe { by_rays: batch.by_rays, plane_count: batch.output.layout().count, first: ray == 0 };
     let pass = recording.passes.get(&variant)?;
-    let lighting = batch.work.lighting;
-    let whole = u32::from(lighting.reflections.is_none());
+    let whole = u32::from(batch.work.lighting.reflections.is_none());
     let ray_count = batch.glossy_rays();
     let first_ray = batch.position.number * ray_count;
     let lobe = GpuLobe { first_ray, ray: first_ray + ray, ray_count, whole };
     let lobe = recording.gpu.buffer_with("lobe", &[lobe], BufferUsages::UNIFORM);
     let buffers = [&recording.cameras, &batch.work.scene.illumination, &lobe, weights, next_bounces];
     let own = pass.bind(0, bindings(buffers, next, target))?;
-    let size = [batch.cameras[piece.camera].size_px().x, piece.end_row - piece.first_row, 1];
-    pass.dispatch_each(&mut recording.frame, &[&own], element..element + 1, DispatchSize::Invocations(size));
-    recording.frame.cut(WorkKind::new(batch.family(), &variant.name()), units);
+    recording.dispatch_piece(recording.kind_of(&variant), &pass, &[&own], piece, piece.size());
     Ok(())
 }
 
@@ -96,7 +83,7 @@ mod tests {
     #[test]
     fn every_variant_is_bound_by_its_names() {
         let stage = TestStage::new();
-        let list = BounceList::new(&stage.gpu);
+        let list = BounceList::new(&stage.gpu, 1);
         for variant in Lobe::all() {
             let target = stage.surfaces(variant.by_rays, false);
             stage.check(&variant, 0, &bindings([&stage.buffer; 5], &list, &target));

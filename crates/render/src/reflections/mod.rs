@@ -8,7 +8,7 @@ pub(crate) mod lobe;
 pub(crate) mod radiance;
 mod spawn;
 
-use std::ops::{Range, RangeInclusive};
+use std::ops::RangeInclusive;
 
 use depth_image::MAX_REFLECTIONS;
 use gpu::{BufferPool, Gpu, PooledBuffer};
@@ -18,7 +18,7 @@ pub(crate) use land::Land;
 pub(crate) use lobe::Lobe;
 pub(crate) use spawn::Spawn;
 
-use self::bounces::{BounceList, GpuBounce, PicturePiece, Rays};
+use self::bounces::{BounceList, GpuBounce, Rays};
 use crate::batch::{Batch, Part, Recording};
 use crate::pieces::Piece;
 use crate::surfaces::Surfaces;
@@ -55,8 +55,7 @@ impl Reflections {
         if !batch.output.mirrors {
             return Ok(None);
         }
-        let pixels = |piece: &Piece| (piece.end_row - piece.first_row) * batch.cameras[piece.camera].size_px().x;
-        let capacity = pieces.iter().map(pixels).max().unwrap_or(0).max(1);
+        let capacity = pieces.iter().map(Piece::pixel_count).max().unwrap_or(0).max(1);
         Self::lend_for(gpu, pool, batch, capacity, batch.bytes(1)).map(Some)
     }
 
@@ -83,11 +82,6 @@ impl Reflections {
         })
     }
 
-    fn memories(&self) -> [&PooledBuffer; 2] {
-        let [first, second] = &self.bounces;
-        [first, second]
-    }
-
     /// Records the mirror images of all pictures at one position within their pixels.
     ///
     /// # Errors
@@ -96,11 +90,11 @@ impl Reflections {
         let batch = recording.batch;
         recording.frame.encoder.clear_buffer(&self.reflected, 0, None);
         // Light that is refined is summed up for pixels alone: mirrored points have the same rays anew.
-        let rays = recording.sums.rays.clone().map(|rays| Range { start: 0, ..rays });
+        let rays = recording.sums.rays.each_ref().map(|rays| 0..rays.end);
         let parts = batch.parts_of_points(recording.gpu, &rays, self.capacity);
         for (camera, target) in surfaces.iter().enumerate() {
-            for (element, piece) in recording.pieces.of_camera(camera).collect::<Vec<_>>() {
-                self.record_piece(recording, &parts, element, piece, target)?;
+            for piece in recording.pieces_of(camera) {
+                self.record_piece(recording, &parts, piece, target)?;
             }
         }
         Ok(())
@@ -111,25 +105,22 @@ impl Reflections {
         &self,
         recording: &mut Recording<'_>,
         parts: &[Part],
-        element: u32,
         piece: Piece,
         target: &Surfaces,
     ) -> Result<(), RenderError> {
-        let lighting = recording.batch.work.lighting;
-        let units = units(recording, piece);
-        let piece = PicturePiece { element, piece, units };
-        let mirrors = lighting.reflections();
+        let mirrors = recording.batch.work.lighting.reflections();
+        let memories = self.bounces.each_ref();
         if mirrors > 0 {
-            let first = BounceList::new(recording.gpu);
-            spawn::record(recording, piece, target, &self.bounces[0], &first)?;
-            self.record_rays(recording, parts, (self.memories(), first, units), 1..=mirrors)?;
+            let first = BounceList::new(recording.gpu, piece.pixel_count());
+            spawn::record(recording, piece, target, memories[0], &first)?;
+            self.record_rays(recording, parts, memories, first, 1..=mirrors)?;
         }
         // Costs are learned by generation, and are others than those of rays off mirrors.
         let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + mirrors.max(1);
         for ray in 0..recording.batch.glossy_rays() {
-            let first = BounceList::new(recording.gpu);
-            lobe::record(recording, ray, &self.lobe_weights, piece, target, &self.bounces[0], &first)?;
-            self.record_rays(recording, parts, (self.memories(), first, units), generations.clone())?;
+            let first = BounceList::new(recording.gpu, piece.pixel_count());
+            lobe::record(recording, ray, &self.lobe_weights, piece, target, memories[0], &first)?;
+            self.record_rays(recording, parts, memories, first, generations.clone())?;
         }
         Ok(())
     }
@@ -140,11 +131,12 @@ impl Reflections {
         &self,
         recording: &mut Recording<'_>,
         parts: &[Part],
-        ([mut from, mut to], mut list, units): ([&PooledBuffer; 2], BounceList, u64),
+        [mut from, mut to]: [&PooledBuffer; 2],
+        mut list: BounceList,
         generations: RangeInclusive<u32>,
     ) -> Result<(), RenderError> {
         for generation in generations.clone() {
-            let rays = Rays { bounces: from, list: &list, units, generation };
+            let rays = Rays { bounces: from, list: &list, generation };
             follow::record(recording, rays)?;
             list = self.record_ends(recording, parts, rays, (generation < *generations.end()).then_some(to))?;
             std::mem::swap(&mut from, &mut to);
@@ -161,14 +153,9 @@ impl Reflections {
         onward: Option<&PooledBuffer>,
     ) -> Result<BounceList, RenderError> {
         illuminate::record_points(recording, parts, ends, &self.sums)?;
-        let next = BounceList::new(recording.gpu);
+        let next = BounceList::new(recording.gpu, ends.list.units);
         let onward = onward.map(|memory| (&**memory, &next));
         land::record(recording, [&parts[0].cameras, &self.sums, &self.reflected], ends, onward)?;
         Ok(next)
     }
-}
-
-fn units(recording: &Recording<'_>, piece: Piece) -> u64 {
-    let width_px = recording.batch.cameras[piece.camera].size_px().x;
-    u64::from(width_px) * u64::from(piece.end_row - piece.first_row)
 }

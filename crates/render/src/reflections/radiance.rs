@@ -1,14 +1,12 @@
 //! The light that listed surfaces send towards one direction each, with what their mirrors show.
 
-use depth_image::ToneMapping;
 use glam::Vec3;
 use gpu::Frame;
 
 use super::Reflections;
 use super::bounces::{BounceList, GpuBounce, Rays};
 use crate::accumulation::Sums;
-use crate::batch::{Batch, Position, Recording};
-use crate::pieces::Pieces;
+use crate::batch::{Batch, Recording};
 use crate::planes::Output;
 use crate::{RenderError, stages::Stages, work::DrawWork};
 
@@ -27,17 +25,8 @@ pub(crate) struct RadianceWork<'a> {
 impl<'a> RadianceWork<'a> {
     /// No surfaces as yet. The lighting has shadows.
     pub fn of(stages: &'a Stages, work: DrawWork<'a>) -> Result<Self, RenderError> {
-        let batch = Batch {
-            work,
-            cameras: &[],
-            by_rays: false,
-            traced: Some(work.scene.rays.at(work.scene_time_s)?),
-            output: Output { mirrors: true, ..Output::of(work, true) },
-            tone: ToneMapping::NONE,
-            sequence: None,
-            cached: None,
-            position: Position::default(),
-        };
+        let traced = Some(work.scene.rays.at(work.scene_time_s)?);
+        let batch = Batch::of_points(work, traced, Output { mirrors: true, ..Output::of(work, true) });
         Ok(Self { stages, batch, points: Vec::new(), lit: Vec::new() })
     }
 
@@ -71,20 +60,18 @@ impl<'a> RadianceWork<'a> {
         gpu.queue.write_buffer(&memory.bounces[0], 0, bytemuck::cast_slice(points));
         let rays = batch.light_rays().map(|rays| 0..work.refinement.share_of(rays));
         let parts = batch.parts_of_points(gpu, &rays, count);
-        let pieces = Pieces { all: Vec::new() };
         let cameras = parts[0].cameras.clone();
         let sums = Sums { buffer: pool.lend_storage("no sums", 4), rays };
         let frame = Frame::begin(gpu, "light of a light field", work.turn);
-        let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, frame };
+        let mut recording = Recording { gpu, passes, batch, pieces: Vec::new(), cameras, sums, frame };
         recording.frame.encoder.clear_buffer(&memory.reflected, 0, None);
         // Whoever gathers them has met one mirror before.
         let mirrors = work.lighting.reflections().saturating_sub(1);
         let list = BounceList::of(gpu, count);
-        let units = u64::from(count);
-        let ends = Rays { bounces: &memory.bounces[0], list: &list, units, generation: 0 };
-        let [first, second] = memory.memories();
+        let [first, second] = memory.bounces.each_ref();
+        let ends = Rays { bounces: first, list: &list, generation: 0 };
         let next = memory.record_ends(&mut recording, &parts, ends, (mirrors > 0).then_some(second))?;
-        memory.record_rays(&mut recording, &parts, ([second, first], next, units), 1..=mirrors)?;
+        memory.record_rays(&mut recording, &parts, [second, first], next, 1..=mirrors)?;
         let mut frame = recording.frame;
         let read = frame.read_back(&memory.reflected, 0..3 * plane_bytes, pool.lend_host("radiance", 3 * plane_bytes));
         let result = frame.submit()?.wait()?;

@@ -1,12 +1,14 @@
 //! Rays off the mirrors that a picture shows.
 
 use depth_image::Highlight;
-use gpu::{Binding, DispatchSize, ResourceTraits, ShaderVariant, WorkKind, highlight_name, light_slots};
+use gpu::{Binding, ResourceTraits, ShaderVariant, highlight_name, light_slots};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
-use super::bounces::{BounceList, PicturePiece};
-use crate::{RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, rays::Traversal, surfaces::Surfaces};
+use super::bounces::BounceList;
+use crate::{
+    RenderError, batch::Recording, pieces::Piece, pixel_camera::CAMERA_TRAITS, rays::Traversal, surfaces::Surfaces,
+};
 
 /// Planes of a view: colour and depth.
 pub(super) const VIEW_PLANES: usize = 2;
@@ -24,31 +26,30 @@ impl ShaderVariant for Spawn {
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
-        let own = context! {
-            single_pole => false,
-            by_rays => self.by_rays,
-            primary => true,
-            from_eye => false,
-            shading => highlight_name(Highlight::Ggx),
-            plane_count => self.plane_count,
-            highlight => highlight_name(Highlight::Ggx),
-            mirrors => true,
-            environment_map => false,
-            light_count => 0, light_slots => light_slots(0), visibility_words => 0,
-        };
-        merge_maps([own, self.traversal.context()])
+        merge_maps([context(self.by_rays, self.plane_count), self.traversal.context_of_mirrored_rays()])
     }
 
     fn all() -> Vec<Self> {
-        let each = |by_rays| Traversal::ALL.map(|traversal| Self { by_rays, plane_count: VIEW_PLANES, traversal });
-        [false, true].into_iter().flat_map(each).collect()
+        [false, true]
+            .into_iter()
+            .flat_map(|by_rays| Traversal::ALL.map(|traversal| Self { by_rays, plane_count: VIEW_PLANES, traversal }))
+            .collect()
+    }
+}
+
+/// The values of shaders that list rays of a picture's pixels.
+pub(super) fn context(by_rays: bool, plane_count: usize) -> Value {
+    context! {
+        single_pole => false, by_rays, plane_count,
+        highlight => highlight_name(Highlight::Ggx), mirrors => true, environment_map => false,
+        light_count => 0, light_slots => light_slots(0), visibility_words => 0,
     }
 }
 
 /// Records the pass over a piece of a picture.
 pub(super) fn record(
     recording: &mut Recording<'_>,
-    PicturePiece { element, piece, units }: PicturePiece,
+    piece: Piece,
     target: &Surfaces,
     next_bounces: &Buffer,
     next: &BounceList,
@@ -56,18 +57,13 @@ pub(super) fn record(
     let batch = recording.batch;
     // Lighting with mirrors has rays.
     let Some(traced) = batch.traced.as_deref() else { return Ok(()) };
-    let traversal = Traversal::of(traced);
     let plane_count = batch.output.layout().count;
-    let variant = Spawn { by_rays: batch.by_rays, plane_count, traversal };
+    let variant = Spawn { by_rays: batch.by_rays, plane_count, traversal: Traversal::of(traced) };
     let pass = recording.passes.get(&variant)?;
-    let illumination = &batch.work.scene.illumination;
-    let buffers = [&recording.cameras, illumination, next_bounces];
+    let buffers = [&recording.cameras, &batch.work.scene.illumination, next_bounces];
     let own = pass.bind(0, bindings(buffers, next, target))?;
     let tree = pass.bind(1, traced.bindings())?;
-    let size = [batch.cameras[piece.camera].size_px().x, piece.end_row - piece.first_row, 1];
-    pass.dispatch_each(&mut recording.frame, &[&own, &tree], element..element + 1, DispatchSize::Invocations(size));
-    let kind = WorkKind::new(batch.family(), &variant.name());
-    recording.frame.cut(kind, units);
+    recording.dispatch_piece(recording.kind_of(&variant), &pass, &[&own, &tree], piece, piece.size());
     Ok(())
 }
 
@@ -95,7 +91,7 @@ mod tests {
     #[test]
     fn every_variant_is_bound_by_its_names() {
         let stage = TestStage::new();
-        let list = BounceList::new(&stage.gpu);
+        let list = BounceList::new(&stage.gpu, 1);
         let traced = stage.scene.rays.at(0.0).expect("a tree");
         for variant in Spawn::all() {
             let target = stage.surfaces(variant.by_rays, false);
