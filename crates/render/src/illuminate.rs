@@ -64,12 +64,9 @@ impl ShaderVariant for Illuminate {
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
+        let Self { by_rays, single_pole, listed, knows_ambient, bounces, continued, environment_map, .. } = *self;
         context! {
-            by_rays => self.by_rays,
-            single_pole => self.single_pole,
-            listed => self.listed,
-            knows_ambient => self.knows_ambient,
-            bounces => self.bounces,
+            by_rays, single_pole, listed, knows_ambient, bounces, continued, environment_map,
             shadow_rays => match self.shadow_rays {
                 ShadowRays::None => "none",
                 ShadowRays::One => "one",
@@ -80,8 +77,6 @@ impl ShaderVariant for Illuminate {
                 AmbientRays::Occlusion => "occlusion",
                 AmbientRays::Indirect => "indirect",
             },
-            continued => self.continued,
-            environment_map => self.environment_map,
             traced => self.traversal.is_some(),
             primary => self.ambient == AmbientRays::Indirect,
             from_eye => false,
@@ -93,12 +88,16 @@ impl ShaderVariant for Illuminate {
     fn all() -> Vec<Self> {
         let mut lit = Vec::new();
         for [by_rays, listed, bounces, continued, environment_map] in switches() {
-            // Points have a list of their own.
-            if !(bounces && (by_rays || listed)) {
-                let plain = Self { by_rays, listed, bounces, continued, environment_map, ..Self::default() };
-                lit.extend(Self::RAYS.map(|(shadow_rays, ambient)| Self { shadow_rays, ambient, ..plain }));
+            for shadow_rays in [ShadowRays::None, ShadowRays::One, ShadowRays::Many] {
+                for ambient in [AmbientRays::None, AmbientRays::Occlusion, AmbientRays::Indirect] {
+                    let plain = Self { by_rays, listed, bounces, continued, environment_map, ..Self::default() };
+                    lit.push(Self { shadow_rays, ambient, ..plain });
+                }
             }
         }
+        // Points have a list of their own, and indirect light is that of lamps with rays.
+        lit.retain(|variant| !(variant.bounces && (variant.by_rays || variant.listed)));
+        lit.retain(|variant| variant.rays() != (ShadowRays::None, AmbientRays::Indirect));
         let many_indirect = (ShadowRays::Many, AmbientRays::Indirect);
         let indirect = lit.iter().filter(|variant| variant.listed && variant.rays() == many_indirect);
         let indirect = indirect.map(|variant| Self { knows_ambient: true, ..*variant });
@@ -111,18 +110,6 @@ impl ShaderVariant for Illuminate {
 }
 
 impl Illuminate {
-    /// The kinds of rays that go together.
-    const RAYS: [(ShadowRays, AmbientRays); 8] = [
-        (ShadowRays::None, AmbientRays::None),
-        (ShadowRays::None, AmbientRays::Occlusion),
-        (ShadowRays::One, AmbientRays::None),
-        (ShadowRays::One, AmbientRays::Occlusion),
-        (ShadowRays::One, AmbientRays::Indirect),
-        (ShadowRays::Many, AmbientRays::None),
-        (ShadowRays::Many, AmbientRays::Occlusion),
-        (ShadowRays::Many, AmbientRays::Indirect),
-    ];
-
     fn rays(&self) -> (ShadowRays, AmbientRays) {
         (self.shadow_rays, self.ambient)
     }

@@ -4,12 +4,13 @@ use std::{collections::HashSet, sync::Arc};
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
-use glam::{DMat4, DVec4, UVec2, Vec3};
+use glam::{DMat4, DVec4, UVec2, Vec2};
 use gpu::{Binding, Gpu, GpuError};
 use minijinja::{Value, context};
 use wgpu::{BufferUsages, TextureFormat, TextureView};
 
 use crate::layers::{LayerCache, Layers};
+use crate::pixel_camera::PixelCamera;
 use crate::redundancy_test::{Evidence, RedundancyTest};
 use crate::surfaces::SURFACE_ID_FORMAT;
 
@@ -195,18 +196,17 @@ impl KnownCamera {
 
     /// `own` is the camera of the image that consults this one.
     fn of(camera: &PinholeCamera, own: &PinholeCamera) -> Self {
-        let column = camera.world_from_camera * Vec3::X / camera.focal_px.x;
-        let row = camera.world_from_camera * Vec3::NEG_Y / camera.focal_px.y;
-        let size = camera.size_px.as_vec2();
+        let rays = PixelCamera::of(&(*camera).into(), Vec2::ZERO);
+        let [columns, rows] = camera.size_px.as_vec2().to_array();
         Self {
             homogeneous_pixel_from_own: homogeneous_pixel_from_own(camera, own),
-            eye_in_world: camera.eye_in_world.to_array(),
-            footprint: camera.focal_px.min_element().recip(),
-            column_in_world: column.to_array(),
-            columns: size.x,
-            row_in_world: row.to_array(),
-            rows: size.y,
-            near_m: camera.near_m,
+            eye_in_world: rays.eye_in_world,
+            footprint: rays.footprint,
+            column_in_world: rays.column_in_world,
+            columns,
+            row_in_world: rays.row_in_world,
+            rows,
+            near_m: rays.near_m,
             ..Self::zeroed()
         }
     }

@@ -83,7 +83,10 @@ fn structs_of_draws_have_the_wgsl_layout() {
     });
     let lines = host!(GpuLines { forward_in_world, spacing_m, range_m, columns, least_share, capacity });
     let crossing = host!(Crossing { line, planar_depth_m, plane_normal_oct16, padding, surface });
-    let appended = parsed(&RasterVariant::appended());
+    let appended = RasterVariant::all()
+        .into_iter()
+        .find(|variant| variant.context().get_attr("appended").is_ok_and(|is| is.is_true()));
+    let appended = parsed(&appended.expect("a variant"));
     assert_eq!(lines, shader(&appended, "Lines"));
     assert_eq!(crossing, shader(&appended, "Crossing"));
     let surroundings = host!(GpuSurroundings { wind_direction, wind_amplitude_m, wind_waves_per_m, wind_frequency_hz });

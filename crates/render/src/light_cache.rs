@@ -84,31 +84,25 @@ impl ShaderVariant for LookUp {
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
-        let light_count = self.sums.light_count;
-        let lamps_with_shares = shares_of_lamps(light_count);
+        let Self { by_rays, environment_map, bright_traced, indirect, sums, share_words, .. } = *self;
+        let Self { camera_count, plane_count, provenance_plane, .. } = *self;
+        let lamps_with_shares = shares_of_lamps(sums.light_count);
         let own = context! {
-            by_rays => self.by_rays,
+            by_rays, environment_map, bright_traced, indirect, share_words, camera_count, plane_count, provenance_plane,
+            lamps_with_shares,
             single_pole => false,
-            environment_map => self.environment_map,
-            bright_traced => self.bright_traced,
-            indirect => self.indirect,
-            provenance_plane => self.provenance_plane,
             max_lamp_shares => MAX_LAMP_SHARES,
-            lamp_vectors => lamps_with_shares + usize::from(self.bright_traced),
-            sample_texels => sample_texels(self.share_words),
-            light_slots => light_slots(light_count),
-            share_words => self.share_words,
-            camera_count => self.camera_count,
+            lamp_vectors => lamps_with_shares + usize::from(bright_traced),
+            sample_texels => sample_texels(share_words),
+            light_slots => light_slots(sums.light_count),
             positions => match self.positions {
                 Positions::Only => "only",
                 Positions::First => "first",
                 Positions::Later => "later",
                 Positions::Asked => "asked",
             },
-            plane_count => self.plane_count,
-            lamps_with_shares,
         };
-        merge_maps([own, self.sums.context()])
+        merge_maps([own, sums.context()])
     }
 
     fn all() -> Vec<Self> {
@@ -159,16 +153,11 @@ fn dispatch(
     let scene = batch.work.scene;
     let Picture { camera, target, planes, lists, asked } = picture;
     let uniform = cache.uniform(recording.gpu, scene, tests, &batch.cameras[camera]);
-    let buffers = Buffers {
-        cameras: &recording.cameras,
-        cache: &uniform,
-        sums: &recording.sums.buffer,
-        words: &planes.words,
-        kept: planes.kept.as_deref().unwrap_or(&planes.words),
-    };
+    let kept = planes.kept.as_deref().unwrap_or(&planes.words);
+    let buffers: [&Buffer; 5] = [&recording.cameras, &uniform, &recording.sums.buffer, &planes.words, kept];
     let is_asked = variant.positions == Positions::Asked;
     let bound = lists.iter().enumerate().map(|(place, list)| {
-        let own = bindings(&variant, &buffers, scene, &cache.samples);
+        let own = bindings(&variant, buffers, scene, &cache.samples);
         let normals = target.views.triangle_normal_binding();
         let first = target.views.first_surface_binding().filter(|_| variant.positions.are_compared());
         let asked = asked.get(place).filter(|_| is_asked).into_iter().flat_map(PixelList::asked_bindings);
@@ -197,30 +186,22 @@ pub(crate) struct Picture<'p> {
     pub asked: &'p [PixelList],
 }
 
-struct Buffers<'r> {
-    cameras: &'r Buffer,
-    cache: &'r Buffer,
-    sums: &'r Buffer,
-    words: &'r Buffer,
-    kept: &'r Buffer,
-}
-
 /// Those that are not the picture's own.
 fn bindings<'r>(
     variant: &LookUp,
-    buffers: &Buffers<'r>,
+    [camera, cache, sums, words, kept]: [&'r Buffer; 5],
     scene: &'r GpuScene,
     samples: &'r wgpu::TextureView,
 ) -> Vec<Binding<'r>> {
     let mut bindings = vec![
-        Binding::buffer("camera", buffers.cameras),
-        Binding::buffer("cache", buffers.cache),
-        Binding::buffer("sums", buffers.sums),
+        Binding::buffer("camera", camera),
+        Binding::buffer("cache", cache),
+        Binding::buffer("sums", sums),
         Binding::buffer("illumination", &scene.illumination),
         Binding::texture("samples", samples),
     ];
-    bindings.extend(variant.provenance_plane.map(|_| Binding::buffer("words", buffers.words)));
-    bindings.extend(variant.positions.are_compared().then(|| Binding::buffer("kept", buffers.kept)));
+    bindings.extend(variant.provenance_plane.map(|_| Binding::buffer("words", words)));
+    bindings.extend(variant.positions.are_compared().then(|| Binding::buffer("kept", kept)));
     let map = scene.environment.as_deref().filter(|_| variant.environment_map);
     bindings.extend(map.into_iter().flat_map(GpuEnvironment::bindings));
     bindings
@@ -239,11 +220,9 @@ mod tests {
         let stage = TestStage::new();
         let table = Table::new(&stage.gpu, "samples", TextureFormat::Rgba32Uint, &[[0_u32; 4]; 2]).expect("a table");
         let [list, asked] = [(); 2].map(|()| PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), 1));
-        let buffer = &stage.buffer;
-        let buffers = Buffers { cameras: buffer, cache: buffer, sums: buffer, words: buffer, kept: buffer };
         for variant in LookUp::all() {
             let target = stage.surfaces(variant.by_rays, false);
-            let mut own = bindings(&variant, &buffers, &stage.scene, &table);
+            let mut own = bindings(&variant, [&stage.buffer; 5], &stage.scene, &table);
             own.extend(variant.environment_map.then(|| stage.environment.bindings()).into_iter().flatten());
             own.extend(target.bindings());
             own.extend(target.views.triangle_normal_binding());

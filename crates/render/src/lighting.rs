@@ -53,21 +53,6 @@ pub enum Ambient {
     Indirect(NonZeroU32),
 }
 
-impl Ambient {
-    fn with_rays(self, change: impl Fn(NonZeroU32) -> NonZeroU32) -> Self {
-        match self {
-            Self::Occlusion(rays, radius_m) => Self::Occlusion(change(rays), radius_m),
-            Self::Indirect(rays) => Self::Indirect(change(rays)),
-        }
-    }
-
-    fn rays(self) -> NonZeroU32 {
-        match self {
-            Self::Occlusion(rays, _) | Self::Indirect(rays) => rays,
-        }
-    }
-}
-
 /// A text that names no lighting.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[allow(missing_docs, reason = "self-naming variants")]
@@ -117,7 +102,10 @@ impl Lighting {
     /// Rays a pixel of the light from all around.
     #[must_use]
     pub fn ambient_rays(&self) -> u32 {
-        self.ambient.map_or(0, |ambient| ambient.rays().get())
+        match self.ambient {
+            Some(Ambient::Occlusion(rays, _) | Ambient::Indirect(rays)) => rays.get(),
+            None => 0,
+        }
     }
 
     /// Whether light that surfaces send back is traced.
@@ -170,7 +158,11 @@ impl Lighting {
             Direct::Soft(to_lamps) => Direct::Soft(rays(to_lamps)),
             other => other,
         };
-        Self { direct, ambient: self.ambient.map(|ambient| ambient.with_rays(&rays)), ..*self }
+        let ambient = self.ambient.map(|ambient| match ambient {
+            Ambient::Occlusion(number, radius_m) => Ambient::Occlusion(rays(number), radius_m),
+            Ambient::Indirect(number) => Ambient::Indirect(rays(number)),
+        });
+        Self { direct, ambient, ..*self }
     }
 
     /// The light of points that no sample knows: a quarter of the rays but at least [`LEAST_RAYS_HERE`], or [`LEAST_RAYS_IN_MOTION`]

@@ -61,11 +61,8 @@ impl PixelCamera {
         let column = camera.world_from_camera * Vec3::X / camera.focal_px.x;
         let row = camera.world_from_camera * Vec3::NEG_Y / camera.focal_px.y;
         let corner = camera.forward_in_world() - column * camera.principal_px.x - row * camera.principal_px.y;
-        let seed = camera
-            .eye_in_world
-            .to_array()
-            .iter()
-            .fold(0_u32, |seed, c| (seed ^ c.to_bits()).wrapping_mul(0x9e37_79b1).rotate_left(13));
+        let eye = camera.eye_in_world.to_array().into_iter();
+        let seed = eye.fold(0_u32, |seed, c| (seed ^ c.to_bits()).wrapping_mul(0x9e37_79b1).rotate_left(13));
         Self {
             eye_in_world: camera.eye_in_world.to_array(),
             near_m: camera.near_m,

@@ -138,7 +138,11 @@ pub(crate) fn depth_images(words: &[u32], output: Output, cameras: &[Camera]) ->
             reflectance_srgb8_roughness8: own[reflector].to_vec(),
             visibility8: to_vecs(&own[reflector + 1..][..output.sums.visibility_words()]),
         }),
-        passed: layout.passed.and_then(|passed| passed_plane(own[passed])),
+        // None where no ray passed anything.
+        passed: layout
+            .passed
+            .map(|passed| own[passed].iter().map(|&word| word != 0).collect::<Vec<bool>>())
+            .filter(|passed| passed.contains(&true)),
         corner_inverse_depth_per_m: None,
         light: layout.light.map(|first| LightPlanes {
             triangle_normal_oct16: own[first].to_vec(),
@@ -152,9 +156,4 @@ pub(crate) fn depth_images(words: &[u32], output: Output, cameras: &[Camera]) ->
 
 fn to_vecs(planes: &[&[u32]]) -> Vec<Vec<u32>> {
     planes.iter().map(|plane| plane.to_vec()).collect()
-}
-
-/// `None` where no ray passed anything.
-fn passed_plane(words: &[u32]) -> Option<Vec<bool>> {
-    words.iter().any(|&word| word != 0).then(|| words.iter().map(|&word| word != 0).collect())
 }

@@ -4,12 +4,13 @@ use std::{ops::Range, sync::Arc};
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Highlight, ParallelCamera, PinholeCamera};
-use glam::{Mat4, UVec2, Vec4};
+use glam::{UVec2, Vec4};
 use gpu::{
     Binding, BoundGroup, DrawPass, DrawState, DrawVariant, Frame, Gpu, PassCache, ResourceTrait, ResourceTraits,
     ShaderVariant, Templates, WorkKind, highlight_name, switches, uniform_stride,
 };
 use minijinja::{Value, context};
+use scene::{Vertex, VertexDetail};
 
 use crate::gpu_scene::{GpuObject, MaterialTraits};
 use crate::known_samples::{Predecessors, RedundancyVariant};
@@ -85,12 +86,6 @@ impl RasterVariant {
         Self { shading: work.lighting.highlight(), wind: work.scene.wind, ..Self::default() }
     }
 
-    /// That of parallel cameras, of a plain material.
-    #[cfg(test)]
-    pub fn appended() -> Self {
-        Self::all().into_iter().find(|variant| variant.appended).expect("a variant")
-    }
-
     fn has_own_group(&self) -> bool {
         self.redundancy.is_some() || self.appended
     }
@@ -109,18 +104,14 @@ impl ShaderVariant for RasterVariant {
     ];
 
     fn context(&self) -> Value {
-        let MaterialTraits { double_sided, alpha_tested, textured, coat_textured, unlit, specular, mapped } =
-            self.material;
+        let Self { material, shading, surface_id, triangle_normal, depth_only, wind, redundancy, appended } = *self;
+        let MaterialTraits { double_sided, alpha_tested, textured, coat_textured, unlit, specular, mapped } = material;
         context! {
-            shading => self.shading.map_or("unlit", highlight_name),
-            surface_id => self.surface_id,
-            triangle_normal => self.triangle_normal,
-            depth_only => self.depth_only,
-            wind => self.wind,
-            appended => self.appended,
+            surface_id, triangle_normal, depth_only, wind, appended,
             double_sided, alpha_tested, textured, unlit, specular, mapped,
-            coat_textured => coat_textured && self.shading == Some(Highlight::Ggx),
-            ..RedundancyVariant::context(self.redundancy, OWN_GROUP)
+            shading => shading.map_or("unlit", highlight_name),
+            coat_textured => coat_textured && shading == Some(Highlight::Ggx),
+            ..RedundancyVariant::context(redundancy, OWN_GROUP)
         }
     }
 
@@ -152,7 +143,8 @@ impl DrawVariant for RasterVariant {
         color_formats.extend((!self.depth_only && self.surface_id).then_some(SURFACE_ID_FORMAT));
         color_formats.extend((!self.depth_only && self.triangle_normal).then_some(TRIANGLE_NORMAL_FORMAT));
         let cull_mode = (!self.material.double_sided && !self.appended).then_some(wgpu::Face::Back);
-        let vertices = [vertex_layout()].into_iter().chain(self.material.mapped.then(detail_layout)).collect();
+        let details = self.material.mapped.then(|| layout::<VertexDetail>(&DETAIL_ATTRIBUTES));
+        let vertices = [layout::<Vertex>(&VERTEX_ATTRIBUTES)].into_iter().chain(details).collect();
         DrawState { vertices, cull_mode, color_formats, nearest_only: !self.appended }
     }
 }
@@ -340,9 +332,13 @@ const CAMERA_STRIDE: u32 = uniform_stride(size_of::<RasterCamera>() as u32);
 const OBJECT_STRIDE: u32 = uniform_stride(size_of::<GpuObject>() as u32);
 
 impl RasterCamera {
+    /// Depth is reversed: `near / planar depth`, 1 at the near plane and 0 at infinity.
     fn of(camera: &PinholeCamera, scene_time_s: f32) -> Self {
+        let [u, v, w] = camera.homogeneous_pixel_from_world();
+        let size = camera.size_px.as_vec2();
+        let rows = [u * (2.0 / size.x) - w, w - v * (2.0 / size.y), Vec4::W * camera.near_m, w];
         Self {
-            clip_from_world: clip_from_world(camera).to_cols_array_2d(),
+            clip_from_world: columns_of(rows),
             eye_in_world: camera.eye_in_world.to_array(),
             scene_time_s,
             near_m: camera.near_m,
@@ -351,10 +347,14 @@ impl RasterCamera {
         }
     }
 
-    /// A pixel's side is the same at all depths.
+    /// Depth is planar, 1 where the camera's range ends. A pixel's side is the same at all depths.
     fn of_lines(camera: &ParallelCamera, scene_time_s: f32) -> Self {
+        let axes = camera.axes_in_world();
+        let [right, down, forward] = axes.map(|axis| axis.extend(-axis.dot(camera.corner_in_world)));
+        let size_m = camera.size_px.as_vec2() * camera.spacing_m;
+        let [x, y] = [right * (2.0 / size_m.x) - Vec4::W, Vec4::W - down * (2.0 / size_m.y)];
         Self {
-            clip_from_world: clip_from_lines(camera).to_cols_array_2d(),
+            clip_from_world: columns_of([x, y, forward / camera.range_m, Vec4::W]),
             eye_in_world: camera.corner_in_world.to_array(),
             scene_time_s,
             near_m: 0.0,
@@ -417,48 +417,23 @@ fn slices(runs: Vec<Run>, most_indices: u64) -> Vec<Vec<Run>> {
     slices
 }
 
-/// Planar depth, 1 where the camera's range ends.
-fn clip_from_lines(camera: &ParallelCamera) -> Mat4 {
-    let [right, down, forward] = camera.axes_in_world();
-    let [right, down, forward] = [right, down, forward].map(|axis| axis.extend(-axis.dot(camera.corner_in_world)));
-    let size_m = camera.size_px.as_vec2() * camera.spacing_m;
-    let [x, y] = [right * (2.0 / size_m.x) - Vec4::W, Vec4::W - down * (2.0 / size_m.y)];
-    Mat4::from_cols(x, y, forward / camera.range_m, Vec4::W).transpose()
+/// The columns of a matrix with these rows.
+fn columns_of(rows: [Vec4; 4]) -> [[f32; 4]; 4] {
+    std::array::from_fn(|column| rows.map(|row| row[column]))
 }
 
-/// Reversed depth: `near / planar depth`, 1 at the near plane and 0 at infinity.
-fn clip_from_world(camera: &PinholeCamera) -> Mat4 {
-    let [u, v, w] = camera.homogeneous_pixel_from_world();
-    let size = camera.size_px.as_vec2();
-    let rows = [u * (2.0 / size.x) - w, w - v * (2.0 / size.y), Vec4::W * camera.near_m, w];
-    Mat4::from_cols_array_2d(&rows.map(|row| row.to_array())).transpose()
-}
+const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 5] =
+    wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2, 3 => Unorm8x4, 4 => Float32];
+const DETAIL_ATTRIBUTES: [wgpu::VertexAttribute; 2] = wgpu::vertex_attr_array![5 => Float32x2, 6 => Float32x4];
 
-fn vertex_layout() -> wgpu::VertexBufferLayout<'static> {
-    const ATTRIBUTES: [wgpu::VertexAttribute; 5] =
-        wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2, 3 => Unorm8x4, 4 => Float32];
-    wgpu::VertexBufferLayout {
-        array_stride: size_of::<scene::Vertex>() as u64,
-        step_mode: wgpu::VertexStepMode::Vertex,
-        attributes: &ATTRIBUTES,
-    }
-}
-
-/// The attributes of `scene::VertexDetail`.
-fn detail_layout() -> wgpu::VertexBufferLayout<'static> {
-    const ATTRIBUTES: [wgpu::VertexAttribute; 2] = wgpu::vertex_attr_array![5 => Float32x2, 6 => Float32x4];
-    wgpu::VertexBufferLayout {
-        array_stride: size_of::<scene::VertexDetail>() as u64,
-        step_mode: wgpu::VertexStepMode::Vertex,
-        attributes: &ATTRIBUTES,
-    }
+/// A buffer of `V`, with these attributes.
+fn layout<V>(attributes: &'static [wgpu::VertexAttribute]) -> wgpu::VertexBufferLayout<'static> {
+    let step_mode = wgpu::VertexStepMode::Vertex;
+    wgpu::VertexBufferLayout { array_stride: size_of::<V>() as u64, step_mode, attributes }
 }
 
 /// [`NOTHING`] in each channel.
-const CLEAR: wgpu::Color = {
-    let word = NOTHING as f64;
-    wgpu::Color { r: word, g: word, b: word, a: word }
-};
+const CLEAR: wgpu::Color = wgpu::Color { r: NOTHING as f64, g: NOTHING as f64, b: NOTHING as f64, a: NOTHING as f64 };
 
 #[cfg(test)]
 mod tests {

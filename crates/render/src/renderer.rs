@@ -12,12 +12,12 @@ use parking_lot::Mutex;
 
 use crate::batch::{Batch, Position, batches};
 use crate::known_samples::{ImageSequence, KnownSamples, TemporalReference};
-use crate::layered::{self, LayerSelection};
+use crate::layered;
 use crate::light_samples::{CachedLight, LightCache, LookUpTests};
 use crate::planes::{self, Output};
 use crate::smooth_light::smoothed;
 use crate::visibility::{Choice, Costs, Visibility};
-use crate::work::{DrawWork, Refinement, SamplePlanes};
+use crate::work::{DrawWork, LayerSelection, Refinement, SamplePlanes};
 use crate::{GpuScene, Lighting, RenderError, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages};
 
 /// Pixels in one submission: bounds the memory for surfaces, light and read-back.

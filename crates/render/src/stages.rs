@@ -10,7 +10,6 @@ use crate::batch::{Batch, Recording};
 use crate::finish::Planes;
 use crate::known_samples::{ImageSequence, Predecessors};
 use crate::light_cache::{self, Picture};
-use crate::light_samples::CachedLight;
 use crate::pieces::Piece;
 use crate::reflections::{self, Reflections};
 use crate::surfaces::{SurfaceKind, SurfacePool, Surfaces};
@@ -53,7 +52,9 @@ impl Stages {
         let slice_px = gpu.device_queue.slice_units(batch.family(), batch.unknown_slice_px());
         let most_px = if batch.output.mirrors { reflections::PIXELS_A_PIECE } else { u64::MAX };
         let pieces = Piece::all(batch.cameras, slice_px.min(most_px));
-        let mirrored = Reflections::lend(gpu, pool, batch, &pieces)?;
+        let most_rays = pieces.iter().map(Piece::pixel_count).max().unwrap_or(0).max(1);
+        let mirrored = batch.output.mirrors.then(|| Reflections::lend(gpu, pool, batch, most_rays, batch.bytes(1)));
+        let mirrored = mirrored.transpose()?;
         let cameras = batch.uniform_of_all(gpu, &pieces, &sums);
         let shifted = batch.positions();
         let positions = shifted.iter().map(|(position, cameras)| {
@@ -165,8 +166,9 @@ impl Stages {
         }
     }
 
-    /// Records the light that arrives at surfaces: rays for all pixels, or for a grid of pixels and those where light between
-    /// them would be wrong. The lists of those must live until the frame is done.
+    /// Records the light that arrives at surfaces: rays for all pixels, or a look-up in samples and rays for the pixels that no
+    /// sample knows. The lists of those must live until the frame is done. A position without colour is looked up for its
+    /// provenance alone.
     fn light(
         &self,
         recording: &mut Recording<'_>,
@@ -174,32 +176,15 @@ impl Stages {
         planes: &Planes,
     ) -> Result<Vec<PixelList>, RenderError> {
         let batch = recording.batch;
-        if let Some(cached) = batch.cached {
-            return self.look_up(recording, cached, surfaces, planes);
-        }
-        if !batch.work.lighting.is_lit() || !batch.has_color() {
-            return Ok(Vec::new());
-        }
-        let parts = batch.parts(&self.gpu, &recording.pieces, &recording.sums);
-        illuminate::record(recording, &parts, 0, surfaces, None)?;
-        Ok(Vec::new())
-    }
-
-    /// Records the look-up of light in samples, and the light of the pixels that no sample knows. The lists of those must live
-    /// until the frame is done. A position without colour is looked up for its provenance alone.
-    fn look_up(
-        &self,
-        recording: &mut Recording<'_>,
-        cached: CachedLight<'_>,
-        surfaces: &[Surfaces],
-        planes: &Planes,
-    ) -> Result<Vec<PixelList>, RenderError> {
-        let batch = recording.batch;
         let mut all = Vec::new();
-        if !batch.has_color() && !batch.output.provenance {
+        if !batch.work.lighting.is_lit() || !batch.has_color() && !batch.output.provenance {
             return Ok(all);
         }
         let parts = batch.parts(&self.gpu, &recording.pieces, &recording.sums);
+        let Some(cached) = batch.cached else {
+            illuminate::record(recording, &parts, 0, surfaces, None)?;
+            return Ok(all);
+        };
         for (camera, target) in surfaces.iter().enumerate() {
             let lists = self.lists(recording, camera);
             let asked = if batch.position.number > 0 { self.lists(recording, camera) } else { Vec::new() };

@@ -40,30 +40,30 @@ impl Choice {
 /// The costs of both ways as lines over a view's pixels, measured at two sizes: they predict every other.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Costs {
-    triangles: Line,
-    rays: Line,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Line {
-    fixed_s: f64,
-    pixel_s: f64,
+    fixed: Choice,
+    a_pixel: Choice,
 }
 
 impl Costs {
-    /// Straight lines through measured costs over the number of pixels, the view with fewer pixels first.
-    pub fn through(measured: [(usize, Choice); 2]) -> Self {
-        Self {
-            triangles: Line::through(measured.map(|(pixels, choice)| (pixels, choice.triangles_s))),
-            rays: Line::through(measured.map(|(pixels, choice)| (pixels, choice.rays_s))),
-        }
+    /// Straight lines through measured costs over the number of pixels, the view with fewer pixels first. More pixels never
+    /// cost less, and no pixels no less than nothing.
+    pub fn through([(least_px, least), (px, most)]: [(usize, Choice); 2]) -> Self {
+        let costs = [(least.triangles_s, most.triangles_s), (least.rays_s, most.rays_s)];
+        let [triangles_s, rays_s] = costs.map(|(least_s, s)| {
+            ((s - least_s) / px.saturating_sub(least_px).max(1) as f64).clamp(0.0, s / px.max(1) as f64)
+        });
+        let fixed = Choice {
+            triangles_s: most.triangles_s - triangles_s * px as f64,
+            rays_s: most.rays_s - rays_s * px as f64,
+        };
+        Self { fixed, a_pixel: Choice { triangles_s, rays_s } }
     }
 
     /// The pixels up to which rays are faster. Lines that do not cross where pictures are have one answer for all sizes, that of
     /// a view of `pixels`.
     pub fn most_traced_pixels(&self, pixels: usize) -> u32 {
-        let gain_s = self.triangles.fixed_s - self.rays.fixed_s;
-        let loss_a_pixel_s = self.rays.pixel_s - self.triangles.pixel_s;
+        let gain_s = self.fixed.triangles_s - self.fixed.rays_s;
+        let loss_a_pixel_s = self.a_pixel.rays_s - self.a_pixel.triangles_s;
         if gain_s > 0.0 && loss_a_pixel_s > 0.0 {
             return (gain_s / loss_a_pixel_s) as u32;
         }
@@ -72,19 +72,11 @@ impl Costs {
 
     /// The predicted costs of a view with this number of pixels.
     pub fn at(&self, pixels: usize) -> Choice {
-        Choice { triangles_s: self.triangles.at(pixels), rays_s: self.rays.at(pixels) }
-    }
-}
-
-impl Line {
-    /// More pixels never cost less, and no pixels no less than nothing.
-    fn through([(least_px, least_s), (px, s)]: [(usize, f64); 2]) -> Self {
-        let pixel_s = ((s - least_s) / px.saturating_sub(least_px).max(1) as f64).clamp(0.0, s / px.max(1) as f64);
-        Self { fixed_s: s - pixel_s * px as f64, pixel_s }
-    }
-
-    fn at(&self, pixels: usize) -> f64 {
-        self.fixed_s + self.pixel_s * pixels as f64
+        let Self { fixed, a_pixel } = self;
+        Choice {
+            triangles_s: fixed.triangles_s + a_pixel.triangles_s * pixels as f64,
+            rays_s: fixed.rays_s + a_pixel.rays_s * pixels as f64,
+        }
     }
 }
 

@@ -9,8 +9,7 @@ use gpu::{Binding, DrawPass, Frame, GpuError, PooledBuffer};
 use rayon::prelude::*;
 use wgpu::{BufferUsages, TextureUsages};
 
-use super::selection::LayerSelection;
-use crate::{RenderError, stages::Stages, work::DrawWork};
+use crate::{LayerSelection, RenderError, stages::Stages, work::DrawWork};
 
 /// Crossings of a line for which there is room at first.
 const EXPECTED_LAYERS: u64 = 4;
@@ -166,16 +165,7 @@ fn by_line(lines: usize, crossings: &[Crossing]) -> (Vec<u32>, Vec<Crossing>, bo
         sorted[*place as usize] = *crossing;
         *place += 1;
     }
-    let mut rest = &mut *sorted;
-    let mut each: Vec<&mut [Crossing]> = Vec::with_capacity(lines);
-    for ends in first.windows(2) {
-        let (own, others) = rest.split_at_mut((ends[1] - ends[0]) as usize);
-        rest = others;
-        if own.len() > 1 {
-            each.push(own);
-        }
-    }
-    each.into_par_iter().for_each(|own| {
+    sorted.par_chunk_by_mut(|a, b| a.line == b.line).for_each(|own| {
         own.sort_unstable_by_key(|c| (c.planar_depth_m.max(0.0).to_bits(), c.plane_normal_oct16, c.surface));
     });
     if !truncated {

@@ -10,9 +10,8 @@ use gpu::GpuError;
 
 use super::crossings::{self, Crossing};
 use super::lit::{BIAS_FOOTPRINTS, BIAS_ROUNDINGS, mixed};
-use super::selection::LayerSelection;
 use crate::reflections::{bounces::GpuBounce, radiance::RadianceWork};
-use crate::{RenderError, stages::Stages, work::DrawWork};
+use crate::{LayerSelection, RenderError, stages::Stages, work::DrawWork};
 
 /// A ray off a mirror meets nothing nearer than this share of the lines' spacing.
 const NEAR_SPACINGS: f32 = 0.1;

@@ -3,7 +3,6 @@
 mod crossings;
 pub(crate) mod light_field;
 mod lit;
-mod selection;
 
 use depth_image::{LayeredDepthImage, ParallelCamera, SpecularPlanes, oct8_from_oct16};
 use rayon::prelude::*;
@@ -11,9 +10,8 @@ use rayon::prelude::*;
 #[cfg(test)]
 pub(crate) use crossings::{Crossing, GpuLines};
 pub(crate) use lit::{BIAS_FOOTPRINTS, BIAS_ROUNDINGS, Lit};
-pub use selection::LayerSelection;
 
-use crate::{RenderError, stages::Stages, work::DrawWork};
+use crate::{LayerSelection, RenderError, stages::Stages, work::DrawWork};
 
 /// All surfaces of a scene on the lines of a camera. What sides send to all directions alike is their colour.
 pub(crate) fn draw(

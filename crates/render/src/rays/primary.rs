@@ -47,14 +47,11 @@ impl ShaderVariant for Primary {
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
+        let Self { traversal, shading, surface_id, triangle_normal, single_pole, redundancy } = *self;
         context! {
-            primary => true,
-            from_eye => true,
-            shading => self.shading.map_or("unlit", highlight_name),
-            surface_id => self.surface_id,
-            triangle_normal => self.triangle_normal,
-            single_pole => self.single_pole,
-            ..merge_maps([self.traversal.context(), RedundancyVariant::context(self.redundancy, KNOWN_GROUP)])
+            primary => true, from_eye => true, surface_id, triangle_normal, single_pole,
+            shading => shading.map_or("unlit", highlight_name),
+            ..merge_maps([traversal.context(), RedundancyVariant::context(redundancy, KNOWN_GROUP)])
         }
     }
 

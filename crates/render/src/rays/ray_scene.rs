@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use bytemuck::NoUninit;
 use glam::{Vec3, Vec4};
 use gpu::{Binding, Gpu, GpuError, Table};
 use obvhs::cwbvh::node::CwBvhNode;
@@ -60,28 +61,18 @@ struct Built {
     last_build: Duration,
 }
 
+/// The tables of `traverse.wgsl`: two of the tree, two of vertices, which change where normals turn, and three that stay while
+/// triangles move.
+const TABLES: [&str; 7] =
+    ["bvh_nodes", "triangle_corners", "flat_vertices", "flat_details", "flat_triangles", "materials", "texels"];
+
 /// Bound to shaders that trace rays.
 pub struct Traced {
-    pub(crate) nodes: Table,
-    pub(crate) corners: Table,
-    attributes: Arc<Attributes>,
-    fixed: Arc<Fixed>,
+    /// In the order of [`TABLES`].
+    tables: [Arc<Table>; 7],
     pub(crate) switches: MaterialSwitches,
     /// The making of the tree.
     pub report: AccelerationReport,
-}
-
-/// Tables of vertices, which change where normals turn.
-struct Attributes {
-    vertices: Table,
-    details: Table,
-}
-
-/// Tables that stay while triangles move; a new tree changes the order of triangles.
-struct Fixed {
-    triangles: Table,
-    materials: Table,
-    texels: Table,
 }
 
 /// The tables of a scene time on the host, with triangles in the order of the tree's leaves.
@@ -159,12 +150,11 @@ impl RayScene {
         });
         GpuError::check_limit("levels of the tree over the scene", u64::from(bvh.depth), u64::from(MAX_DEPTH))?;
         let took = start.elapsed();
-        let words = TextureFormat::Rgba32Uint;
-        let fixed = Arc::new(Fixed {
-            triangles: Table::new(&self.gpu, "triangle attributes", words, &self.triangles_of_leaves(&bvh))?,
-            materials: Table::new(&self.gpu, "materials", words, &self.tables.materials)?,
-            texels: Table::new(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?,
-        });
+        let fixed = [
+            self.table("triangle attributes", &self.triangles_of_leaves(&bvh))?,
+            self.table("materials", &self.tables.materials)?,
+            Arc::new(Table::new(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?),
+        ];
         let attributes = self.attributes(scene_time_s)?;
         let traced = self.traced(&bvh, &corners, attributes, fixed, took, false)?;
         Ok(Built { bvh, scene_time_s, traced, last_refit: None, last_build: took })
@@ -181,37 +171,37 @@ impl RayScene {
             return self.built(scene_time_s);
         }
         let took = start.elapsed();
-        let Traced { attributes, fixed, .. } = &*built.traced;
-        let attributes = if self.flat.turns() { self.attributes(scene_time_s)? } else { attributes.clone() };
-        let traced = self.traced(&built.bvh, &corners, attributes, fixed.clone(), took, true)?;
+        let [_, _, vertices, details, fixed @ ..] = built.traced.tables.clone();
+        let attributes = if self.flat.turns() { self.attributes(scene_time_s)? } else { [vertices, details] };
+        let traced = self.traced(&built.bvh, &corners, attributes, fixed, took, true)?;
         Ok(Built { scene_time_s, traced, last_refit: Some(took), ..built })
     }
 
     /// Attributes of vertices at a scene time.
-    fn attributes(&self, scene_time_s: f32) -> Result<Arc<Attributes>, GpuError> {
-        let vertices = self.flat.vertices_at(scene_time_s);
+    fn attributes(&self, scene_time_s: f32) -> Result<[Arc<Table>; 2], GpuError> {
         let details = self.flat.details_at(scene_time_s);
-        let words = TextureFormat::Rgba32Uint;
         let details = bytemuck::cast_slice::<_, [u32; 4]>(&details);
-        Ok(Arc::new(Attributes {
-            vertices: Table::new(&self.gpu, "vertex attributes", words, &vertices)?,
-            details: Table::new(&self.gpu, "vertex details", words, details)?,
-        }))
+        let vertices = self.table("vertex attributes", &self.flat.vertices_at(scene_time_s))?;
+        Ok([vertices, self.table("vertex details", details)?])
+    }
+
+    /// A table of texels of four words.
+    fn table<T: NoUninit>(&self, label: &str, elements: &[T]) -> Result<Arc<Table>, GpuError> {
+        Ok(Arc::new(Table::new(&self.gpu, label, TextureFormat::Rgba32Uint, elements)?))
     }
 
     fn traced(
         &self,
         bvh: &Bvh,
         corners_in_world: &[[Vec3; 3]],
-        attributes: Arc<Attributes>,
-        fixed: Arc<Fixed>,
+        [vertices, details]: [Arc<Table>; 2],
+        [triangles, materials, texels]: [Arc<Table>; 3],
         took: Duration,
         refitted: bool,
     ) -> Result<Arc<Traced>, GpuError> {
         let start = Instant::now();
-        let words = TextureFormat::Rgba32Uint;
-        let nodes = Table::new(&self.gpu, "nodes", words, &bvh.tree.nodes)?;
-        let corners = Table::new(&self.gpu, "triangles", words, &self.corner_texels(bvh, corners_in_world))?;
+        let nodes = self.table("nodes", &bvh.tree.nodes)?;
+        let corners = self.table("triangles", &self.corner_texels(bvh, corners_in_world))?;
         let report = AccelerationReport {
             refitted,
             build_s: took.as_secs_f64(),
@@ -222,8 +212,8 @@ impl RayScene {
             depth: bvh.depth,
         };
         tracing::debug!(?report, "rays are ready");
-        let switches = self.tables.switches;
-        Ok(Arc::new(Traced { nodes, corners, attributes, fixed, switches, report }))
+        let tables = [nodes, corners, vertices, details, triangles, materials, texels];
+        Ok(Arc::new(Traced { tables, switches: self.tables.switches, report }))
     }
 
     /// Three texels a triangle in the order of the tree's leaves: a corner's position, and its number with the
@@ -264,25 +254,12 @@ impl RayScene {
 
 impl Traced {
     fn bytes(&self) -> u64 {
-        let Fixed { triangles, materials, texels } = &*self.fixed;
-        let Attributes { vertices, details } = &*self.attributes;
-        let tables = [&self.nodes, &self.corners, vertices, details, triangles, materials, texels];
-        tables.map(|table| gpu::texture_bytes(table.texture())).iter().sum()
+        self.tables.iter().map(|table| gpu::texture_bytes(table.texture())).sum()
     }
 
     /// The variables of `traverse.wgsl`.
     pub fn bindings(&self) -> [Binding<'_>; 7] {
-        let Fixed { triangles, materials, texels } = &*self.fixed;
-        let Attributes { vertices, details } = &*self.attributes;
-        [
-            Binding::texture("bvh_nodes", &self.nodes),
-            Binding::texture("triangle_corners", &self.corners),
-            Binding::texture("flat_vertices", vertices),
-            Binding::texture("flat_details", details),
-            Binding::texture("flat_triangles", triangles),
-            Binding::texture("materials", materials),
-            Binding::texture("texels", texels),
-        ]
+        std::array::from_fn(|number| Binding::texture(TABLES[number], &self.tables[number]))
     }
 }
 

@@ -42,25 +42,11 @@ pub(crate) struct Reflections {
 }
 
 impl Reflections {
-    /// Memory for the pictures of a batch; none where they have no mirrors.
+    /// Memory for `capacity` rays, and for planes of `plane_bytes` each.
     ///
     /// # Errors
     /// More memory than the device binds.
     pub fn lend(
-        gpu: &Gpu,
-        pool: &BufferPool,
-        batch: &Batch<'_>,
-        pieces: &[Piece],
-    ) -> Result<Option<Self>, RenderError> {
-        if !batch.output.mirrors {
-            return Ok(None);
-        }
-        let capacity = pieces.iter().map(Piece::pixel_count).max().unwrap_or(0).max(1);
-        Self::lend_for(gpu, pool, batch, capacity, batch.bytes(1)).map(Some)
-    }
-
-    /// Memory for `capacity` rays, and for planes of `plane_bytes` each.
-    fn lend_for(
         gpu: &Gpu,
         pool: &BufferPool,
         batch: &Batch<'_>,

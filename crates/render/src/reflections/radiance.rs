@@ -56,7 +56,7 @@ impl<'a> RadianceWork<'a> {
         let plane_bytes = 4 * u64::from(count);
         let work = batch.work;
         let _one = batches.begin(work.turn.class);
-        let memory = Reflections::lend_for(gpu, pool, batch, count, plane_bytes)?;
+        let memory = Reflections::lend(gpu, pool, batch, count, plane_bytes)?;
         gpu.queue.write_buffer(&memory.bounces[0], 0, bytemuck::cast_slice(points));
         let rays = batch.light_rays().map(|rays| 0..work.refinement.share_of(rays));
         let parts = batch.parts_of_points(gpu, &rays, count);
