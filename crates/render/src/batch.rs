@@ -219,12 +219,12 @@ impl<'a> Batch<'a> {
             first_sum += camera.pixel_count * sum_planes;
             placed.push(self.with_rays(camera, rays, &sums.rays));
         }
-        let cameras = pieces.iter().map(|&Piece { camera, first_row, end_row, .. }| PixelCamera {
+        let all = pieces.iter().map(|&Piece { camera, first_row, end_row, .. }| PixelCamera {
             first_row,
             end_row,
             ..placed[camera]
         });
-        uniform(gpu, "pixel cameras", cameras)
+        uniform(gpu, "pixel cameras", all)
     }
 }
 

@@ -90,21 +90,16 @@ impl ShaderVariant for Finish {
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
-        let Output { sums, samples, antialias, highlight, passed: redundancy, usefulness_test, .. } = self.output;
-        let PlaneLayout { normal, reflector, surface_id, passed, light, count, .. } = self.output.layout();
+        let Self { by_rays, single_pole, lit, environment_map, output } = *self;
+        let Output { sums, samples, mirrors, glossy, passed: redundancy, usefulness_test, .. } = output;
+        let PlaneLayout { normal, reflector, surface_id, passed, light, count, .. } = output.layout();
         context! {
-            by_rays => self.by_rays,
-            single_pole => self.single_pole,
-            lit => self.lit,
-            environment_map => self.environment_map,
-            highlight => highlight.map(highlight_name),
-            mirrors => self.output.mirrors,
-            glossy => self.output.glossy,
+            by_rays, single_pole, lit, environment_map, samples, mirrors, glossy, redundancy, usefulness_test,
+            highlight => output.highlight.map(highlight_name),
             surface_id => surface_id.is_some(),
             normal_plane => normal, reflector_plane => reflector, id_plane => surface_id, passed_plane => passed,
-            averaged => antialias > Antialias::NONE, plane_count => count,
-            light => light.is_some(), light_plane => light, share_words => self.output.share_words(),
-            samples, redundancy, usefulness_test,
+            averaged => output.antialias > Antialias::NONE, plane_count => count,
+            light => light.is_some(), light_plane => light, share_words => output.share_words(),
             ..sums.context()
         }
     }

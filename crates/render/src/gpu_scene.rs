@@ -80,9 +80,9 @@ pub(crate) struct Draw {
 }
 
 impl Draw {
-    /// Whether another draw has the same pipeline and textures.
-    pub fn is_like(&self, other: &Self) -> bool {
-        (self.material, self.texture) == (other.material, other.texture)
+    /// Draws with equal ones have one pipeline, and the same textures.
+    pub fn state(&self) -> (MaterialTraits, u32) {
+        (self.material, self.texture)
     }
 }
 
@@ -143,6 +143,12 @@ impl GpuScene {
                 (view.clone(), samplers[&used.map_or_else(Default::default, |used| used.wrap)].clone())
             })
         });
+        let surroundings = scene.wind.map_or(GpuSurroundings::zeroed(), |wind| GpuSurroundings {
+            wind_direction: wind.direction_in_world.to_array(),
+            wind_amplitude_m: wind.amplitude_m,
+            wind_waves_per_m: wind.waves_per_m.to_array(),
+            wind_frequency_hz: wind.frequency_hz,
+        });
         let illumination = gpu::illumination_bytes(&scene.illumination);
         let environment = scene.environment_map.as_ref().map(|map| GpuEnvironment::upload(gpu, map)).transpose()?;
         Ok(Self {
@@ -150,7 +156,7 @@ impl GpuScene {
             details: gpu.buffer_with("vertex details", &geometry.details, BufferUsages::VERTEX),
             indices: gpu.buffer_with("indices", &geometry.indices, BufferUsages::INDEX),
             objects: uniform(gpu, "objects", geometry.objects.into_iter()),
-            surroundings: gpu.buffer_with("surroundings", &[surroundings(scene)], BufferUsages::UNIFORM),
+            surroundings: gpu.buffer_with("surroundings", &[surroundings], BufferUsages::UNIFORM),
             textures: of_materials.collect(),
             background: gpu.buffer_with("background", &gpu::background_bytes(&scene.background), BufferUsages::UNIFORM),
             illumination: gpu.buffer_with("illumination", &illumination, BufferUsages::UNIFORM),
@@ -262,7 +268,7 @@ impl Geometry {
             geometry.indices.extend(indices);
         }
         // Few changes of pipeline and texture; the sort is stable, so clusters stay along their curve.
-        geometry.draws.sort_by_key(|draw| (draw.material, draw.texture));
+        geometry.draws.sort_by_key(Draw::state);
         geometry
     }
 
@@ -348,13 +354,4 @@ fn gpu_object(world_from_mesh: &Affine3A, material: &Material, instance: u32) ->
         alpha_hashed: material.alpha_hashed.into(),
         scale: world_metres(world_from_mesh),
     }
-}
-
-fn surroundings(scene: &Scene) -> GpuSurroundings {
-    scene.wind.map_or(GpuSurroundings::zeroed(), |wind| GpuSurroundings {
-        wind_direction: wind.direction_in_world.to_array(),
-        wind_amplitude_m: wind.amplitude_m,
-        wind_waves_per_m: wind.waves_per_m.to_array(),
-        wind_frequency_hz: wind.frequency_hz,
-    })
 }

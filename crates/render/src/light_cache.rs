@@ -67,7 +67,7 @@ impl LookUp {
             indirect: work.lighting.is_indirect(),
             sums: output.sums,
             share_words: cache.share_words,
-            camera_count: cache.image_count(),
+            camera_count: cache.images.len(),
             positions: match batch.position.number {
                 _ if output.antialias == Antialias::NONE => Positions::Only,
                 0 => Positions::First,

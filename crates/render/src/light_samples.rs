@@ -17,16 +17,16 @@ pub(crate) const DEPTH_CODES: f32 = 65_534.0;
 /// Samples of light on a device.
 pub struct LightCache {
     pub(crate) samples: Table,
-    images: Vec<CachedImage>,
+    pub(crate) images: Vec<CachedImage>,
     /// Words of packed shares of each sample.
     pub(crate) share_words: usize,
 }
 
 /// A sample image of a [`LightCache`].
-struct CachedImage {
+pub(crate) struct CachedImage {
     camera: PinholeCamera,
-    first_sample: u32,
-    half_step_per_m: f32,
+    /// What is the same for all views.
+    uniform: GpuCacheCamera,
 }
 
 /// Samples of light for the views of a batch, and when they know the light of a point.
@@ -126,8 +126,19 @@ impl LightCache {
         for (index, image) in images.iter().enumerate() {
             let camera = checked(image, share_words).map_err(|reason| RenderError::Samples { index, reason })?;
             let range = image.inverse_depth_range().map_or(0.0, |(least, greatest)| greatest - least);
-            let half_step_per_m = 0.5 * range / DEPTH_CODES;
-            cached.push(CachedImage { camera, first_sample: first_sample as u32, half_step_per_m });
+            let rays = PixelCamera::of(&camera.into(), Vec2::ZERO);
+            let uniform = GpuCacheCamera {
+                footprint: rays.footprint,
+                column_in_world: rays.column_in_world,
+                first_sample: first_sample as u32,
+                row_in_world: rays.row_in_world,
+                half_step_per_m: 0.5 * range / DEPTH_CODES,
+                corner_in_world: rays.corner_in_world,
+                near_m: rays.near_m,
+                size_px: rays.size_px,
+                ..GpuCacheCamera::zeroed()
+            };
+            cached.push(CachedImage { camera, uniform });
             first_sample += camera.pixel_count();
         }
         let texels = sample_texels(share_words);
@@ -135,11 +146,6 @@ impl LightCache {
         let words: Vec<[u32; 4]> = images.iter().flat_map(|image| packed(image, texels)).collect();
         let samples = tables.upload("samples of light", TextureFormat::Rgba32Uint, &words, turn)?;
         Ok(Self { samples, images: cached, share_words })
-    }
-
-    /// Sample images.
-    pub(crate) fn image_count(&self) -> usize {
-        self.images.len()
     }
 
     /// The uniform of a view.
@@ -192,25 +198,12 @@ fn packed(image: &DepthImage, texels: usize) -> Vec<[u32; 4]> {
 impl CachedImage {
     /// The numbers of the image's camera for a view from `eye_in_world`. In double precision: both may be far from the origin.
     fn seen_from(&self, eye_in_world: Vec3) -> GpuCacheCamera {
-        let camera = &self.camera;
-        let eye_offset: DVec3 = camera.eye_in_world.as_dvec3() - eye_in_world.as_dvec3();
-        let rows = camera.homogeneous_pixel_from_world().map(|row| {
+        let eye_offset: DVec3 = self.camera.eye_in_world.as_dvec3() - eye_in_world.as_dvec3();
+        let homogeneous_texel_from_offset = self.camera.homogeneous_pixel_from_world().map(|row| {
             let axis = row.truncate();
             axis.extend(-axis.as_dvec3().dot(eye_offset) as f32).to_array()
         });
-        let rays = PixelCamera::of(&(*camera).into(), Vec2::ZERO);
-        GpuCacheCamera {
-            homogeneous_texel_from_offset: rows,
-            eye_offset: eye_offset.as_vec3().to_array(),
-            footprint: rays.footprint,
-            column_in_world: rays.column_in_world,
-            first_sample: self.first_sample,
-            row_in_world: rays.row_in_world,
-            half_step_per_m: self.half_step_per_m,
-            corner_in_world: rays.corner_in_world,
-            near_m: rays.near_m,
-            size_px: rays.size_px,
-            padding: [0; 2],
-        }
+        let eye_offset = eye_offset.as_vec3().to_array();
+        GpuCacheCamera { homogeneous_texel_from_offset, eye_offset, ..self.uniform }
     }
 }

@@ -47,8 +47,13 @@ impl Motion {
         let animation = scene.animation.as_ref().filter(|animation| !animation.moving.is_empty())?.clone();
         let meshes: Vec<u32> = animation.moving.iter().map(|m| scene.instances[m.instance as usize].mesh).collect();
         let is_mapped = scene.materials.iter().any(Material::is_mapped);
-        let rest: BTreeMap<u32, Rest> =
-            meshes.iter().map(|&mesh| (mesh, Rest::of(&scene.meshes[mesh as usize], is_mapped))).collect();
+        let rest = meshes.iter().map(|&number| {
+            let Mesh { vertices, details, .. } = &scene.meshes[number as usize];
+            let mut details = if is_mapped { details.clone() } else { Vec::new() };
+            details.resize(if is_mapped { vertices.len() } else { 0 }, VertexDetail::default());
+            (number, Rest { vertices: vertices.clone(), details })
+        });
+        let rest: BTreeMap<u32, Rest> = rest.collect();
         let mut places = HashMap::new();
         let mut first = 0;
         for (moving, mesh) in animation.moving.iter().zip(&meshes) {
@@ -106,14 +111,6 @@ impl Motion {
         let Some(last) = self.last.try_lock() else { return 0 };
         let buffers = last.as_ref().and_then(|(_, posed)| posed.buffers.get());
         buffers.into_iter().flatten().map(wgpu::Buffer::size).sum()
-    }
-}
-
-impl Rest {
-    fn of(mesh: &Mesh, is_mapped: bool) -> Self {
-        let mut details = if is_mapped { mesh.details.clone() } else { Vec::new() };
-        details.resize(if is_mapped { mesh.vertices.len() } else { 0 }, VertexDetail::default());
-        Self { vertices: mesh.vertices.clone(), details }
     }
 }
 

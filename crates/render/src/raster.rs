@@ -247,7 +247,7 @@ impl Raster {
     ) -> Result<(), RenderError> {
         let Some(groups) = groups else { return Ok(()) };
         let own = groups.own.as_ref().filter(|_| variant.has_own_group());
-        for run in runs.chunk_by(|a, b| scene.draws[a.draw].is_like(&scene.draws[b.draw])) {
+        for run in runs.chunk_by(|a, b| scene.draws[a.draw].state() == scene.draws[b.draw].state()) {
             let draw = &scene.draws[run[0].draw];
             let textures = &groups.textures[draw.texture as usize];
             let bound: Vec<_> = [&groups.scene, &groups.object, textures].into_iter().chain(own).collect();
@@ -311,13 +311,10 @@ impl Raster {
         let cameras = uniform(&self.gpu, "raster cameras", cameras);
         let common = [Binding::buffer("camera", &cameras), Binding::buffer("surroundings", &scene.surroundings)];
         let textures = scene.textures.iter().map(|textures| {
-            let named = TEXTURES.iter().zip(textures);
-            pass.bind(
-                2,
-                named.flat_map(|(&(texture, sampler), (view, of_view))| {
-                    [Binding::texture(texture, view), Binding::sampler(sampler, of_view)]
-                }),
-            )
+            let bindings = TEXTURES.iter().zip(textures).flat_map(|(names, (view, sampler))| {
+                [Binding::texture(names.0, view), Binding::sampler(names.1, sampler)]
+            });
+            pass.bind(2, bindings)
         });
         Ok(Some(Groups {
             own: own.map(|bindings| pass.bind(OWN_GROUP, bindings)).transpose()?,

@@ -32,11 +32,8 @@ impl SumPlanes {
     }
 
     pub fn context(self) -> Value {
-        context! {
-            light_count => self.light_count,
-            light_slots => light_slots(self.light_count),
-            visibility => self.visibility,
-            visibility_words => self.visibility_words(),
-        }
+        let Self { light_count, visibility } = self;
+        let visibility_words = self.visibility_words();
+        context! { light_count, visibility, visibility_words, light_slots => light_slots(light_count) }
     }
 }

@@ -81,13 +81,13 @@ impl LayerWork<'_> {
         let size_px = UVec2::new(self.camera.size_px.x, rows.len() as u32);
         let part = self.camera.part(&ViewPart { first_px: UVec2::new(0, rows.start), size_px });
         let expected = (part.pixel_count() as u64 * EXPECTED_LAYERS).clamp(1024, most);
-        let drawn = self.draw(&part, expected)?;
+        let mut drawn = self.draw(&part, expected)?;
         let count = u64::from(drawn.count);
-        if count <= expected {
-            return self.read(&drawn, rows.start, crossings);
+        if count > expected && count <= most {
+            drawn = self.draw(&part, count)?;
         }
         if count <= most {
-            return self.read(&self.draw(&part, count)?, rows.start, crossings);
+            return self.read(&drawn, rows.start, crossings);
         }
         if rows.len() == 1 {
             GpuError::check_limit("the surfaces on one row of lines", count, most)?;

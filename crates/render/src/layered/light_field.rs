@@ -38,11 +38,19 @@ pub(crate) fn draw(
         // Of a line with more surfaces than an image holds the first ones count.
         let (first_of_line, crossings, _) = crossings::met(stages, &work, &lines, LayerSelection::All)?;
         GpuError::check_limit("the samples of a light field", planar_depth_m.len() as u64, MOST_SAMPLES)?;
+        let columns = lines.size_px.x as usize;
         for (is_opposite, direction) in [false, true].into_iter().zip(pair) {
-            let pair = Pair { lines: &lines, first: &first_of_line, crossings: &crossings, is_opposite };
-            for line in 0..lines.pixel_count() {
-                let facing = pair.facing(line, direction.towards);
-                planar_depth_m.extend(facing.iter().map(|crossing| pair.depth_m(crossing)));
+            for number in 0..lines.pixel_count() {
+                // The opposite direction counts columns and depths from their other ends.
+                let mirrored = number - number % columns + (columns - 1 - number % columns);
+                let line = if is_opposite { mirrored } else { number };
+                let on_line = &crossings[first_of_line[line] as usize..first_of_line[line + 1] as usize];
+                let mut facing: Vec<&Crossing> = on_line.iter().filter(|c| faces(c, direction.towards)).collect();
+                if is_opposite {
+                    facing.reverse();
+                }
+                let depths_m = facing.iter().map(|crossing| crossing.planar_depth_m);
+                planar_depth_m.extend(depths_m.map(|depth| if is_opposite { lines.range_m - depth } else { depth }));
                 first.push(planar_depth_m.len() as u32);
                 light.add(facing.into_iter().map(|crossing| point(&lines, crossing, direction.towards)))?;
             }
@@ -52,38 +60,8 @@ pub(crate) fn draw(
     Ok(LayeredLightField { camera: *camera, first, planar_depth_m, radiance_rgb9e5 })
 }
 
-/// The surfaces on the lines of two opposite directions, as one of the two counts them.
-struct Pair<'a> {
-    /// Of the first direction.
-    lines: &'a ParallelCamera,
-    first: &'a [u32],
-    crossings: &'a [Crossing],
-    /// Counts columns and depths from their other ends.
-    is_opposite: bool,
-}
-
-impl<'a> Pair<'a> {
-    /// The surfaces on a line that face a direction, by rising depth.
-    fn facing(&self, line: usize, towards: Vec3) -> Vec<&'a Crossing> {
-        let columns = self.lines.size_px.x as usize;
-        let row = line / columns;
-        let column = line % columns;
-        let line = if self.is_opposite { row * columns + (columns - 1 - column) } else { line };
-        let on_line = &self.crossings[self.first[line] as usize..self.first[line + 1] as usize];
-        let facing = on_line
-            .iter()
-            .filter(|crossing| unit_from_oct8(oct8_from_oct16(crossing.plane_normal_oct16)).dot(towards) > 0.0);
-        let mut facing: Vec<&Crossing> = facing.collect();
-        if self.is_opposite {
-            facing.reverse();
-        }
-        facing
-    }
-
-    fn depth_m(&self, crossing: &Crossing) -> f32 {
-        let depth_m = crossing.planar_depth_m;
-        if self.is_opposite { self.lines.range_m - depth_m } else { depth_m }
-    }
+fn faces(crossing: &Crossing, towards: Vec3) -> bool {
+    unit_from_oct8(oct8_from_oct16(crossing.plane_normal_oct16)).dot(towards) > 0.0
 }
 
 /// A surface as a point that is seen from where its light goes.

@@ -4,7 +4,7 @@ use bytemuck::Zeroable;
 use depth_image::{ParallelCamera, PixelDepth};
 use glam::{UVec2, Vec2};
 use gpu::{Binding, Frame, ResourceTraits, ShaderVariant};
-use minijinja::{Value, context, value::merge_maps};
+use minijinja::{Value, context};
 
 use super::crossings::Crossing;
 use crate::accumulation::Sums;
@@ -33,7 +33,7 @@ impl ShaderVariant for Lit {
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
-        merge_maps([context! { single_pole => false, lit => self.lit }, self.sums.context()])
+        context! { single_pole => false, lit => self.lit, ..self.sums.context() }
     }
 
     fn all() -> Vec<Self> {

@@ -91,18 +91,11 @@ const DEEPEST: usize = 160;
 /// makes chains.
 fn two_children(corners_in_world: &[[Vec3; 3]]) -> Bvh2 {
     let boxes: Vec<Aabb> = corners_in_world.iter().map(around).collect();
-    let BvhBuildParams {
-        ploc_search_distance, sort_precision, search_depth_threshold, reinsertion_batch_ratio, ..
-    } = BvhBuildParams::medium_build();
+    let plan = BvhBuildParams::medium_build();
     let all = (0..boxes.len() as u32).collect();
-    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
-        ploc_search_distance,
-        &boxes,
-        all,
-        sort_precision,
-        search_depth_threshold,
-    );
-    ReinsertionOptimizer::default().run(&mut tree, reinsertion_batch_ratio, None);
+    let mut ploc = PlocBuilder::with_capacity(boxes.len());
+    let mut tree = ploc.build(plan.ploc_search_distance, &boxes, all, plan.sort_precision, plan.search_depth_threshold);
+    ReinsertionOptimizer::default().run(&mut tree, plan.reinsertion_batch_ratio, None);
     if levels(&tree) > DEEPEST { halved(&boxes) } else { tree }
 }
 

@@ -110,40 +110,35 @@ impl FlatScene {
     /// Writes out the instances, with the details of vertices if they are asked for.
     pub fn of(scene: &Scene, ordered: &[OrderedMesh<'_>], motion: Option<Arc<Motion>>, detailed: bool) -> Self {
         let mut flat = Self { wind: scene.wind, motion, ..Self::default() };
+        let flags: Vec<u32> = scene.materials.iter().map(flags_of).collect();
         for (number, instance) in (0..).zip(&scene.instances) {
             let mesh = &ordered[instance.mesh as usize];
-            flat.add(scene, number, mesh);
+            let vertices = &mesh.mesh.vertices;
+            let placed = &instance.world_from_mesh;
+            let normals = Mat3::from(placed.matrix3).inverse().transpose();
+            let first_vertex = flat.rest_in_world.len() as u32;
+            if let Some(posed) = flat.motion.as_ref().and_then(|motion| motion.place(number)) {
+                flat.moving.push((first_vertex as usize, posed));
+            }
+            flat.rest_in_world.extend(vertices.iter().map(|v| placed.transform_point3(v.position.into())));
+            flat.sway.extend(vertices.iter().map(|v| v.sway));
+            flat.vertices.extend(vertices.iter().map(|v| FlatVertex {
+                normal_oct16: oct16_from_unit((normals * Vec3::from(v.normal)).normalize_or(Vec3::Y)),
+                uv: v.uv,
+                color_srgba8: v.color_srgba8,
+            }));
+            for (primitive, (triangle, material)) in (mesh.first_primitive..).zip(mesh.triangles()) {
+                flat.corners.push(triangle.map(|v| v + first_vertex));
+                let flags = flags[material as usize];
+                flat.triangles.push(FlatTriangle { instance: number, primitive, material, flags });
+            }
             if detailed {
                 let details = mesh.mesh.details.iter().copied().chain(repeat(VertexDetail::default()));
-                let placed = &instance.world_from_mesh;
-                let detailed = mesh.mesh.vertices.iter().zip(details);
+                let detailed = vertices.iter().zip(details);
                 flat.details.extend(detailed.map(|(vertex, detail)| FlatDetail::of(vertex, detail, placed)));
             }
         }
         flat
-    }
-
-    fn add(&mut self, scene: &Scene, number: u32, mesh: &OrderedMesh<'_>) {
-        let placed = &scene.instances[number as usize].world_from_mesh;
-        let normals = Mat3::from(placed.matrix3).inverse().transpose();
-        let first_vertex = self.rest_in_world.len() as u32;
-        if let Some(posed) = self.motion.as_ref().and_then(|motion| motion.place(number)) {
-            self.moving.push((first_vertex as usize, posed));
-        }
-        let vertices = &mesh.mesh.vertices;
-        self.rest_in_world.extend(vertices.iter().map(|v| placed.transform_point3(v.position.into())));
-        self.sway.extend(vertices.iter().map(|v| v.sway));
-        self.vertices.extend(vertices.iter().map(|v| FlatVertex {
-            normal_oct16: oct16_from_unit((normals * Vec3::from(v.normal)).normalize_or(Vec3::Y)),
-            uv: v.uv,
-            color_srgba8: v.color_srgba8,
-        }));
-        let flags: Vec<u32> = scene.materials.iter().map(flags_of).collect();
-        for (primitive, (triangle, material)) in (mesh.first_primitive..).zip(mesh.triangles()) {
-            self.corners.push(triangle.map(|v| v + first_vertex));
-            let flags = flags[material as usize];
-            self.triangles.push(FlatTriangle { instance: number, primitive, material, flags });
-        }
     }
 
     /// The positions of all vertices at a scene time.

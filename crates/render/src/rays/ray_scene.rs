@@ -42,15 +42,10 @@ pub struct AccelerationReport {
 pub struct RayScene {
     gpu: Arc<Gpu>,
     flat: FlatScene,
-    tables: Tables,
-    state: Mutex<Option<Built>>,
-}
-
-/// Tables that do not depend on the tree.
-struct Tables {
     materials: Vec<[u32; 4]>,
     texels: Vec<[u8; 4]>,
     switches: MaterialSwitches,
+    state: Mutex<Option<Built>>,
 }
 
 struct Built {
@@ -98,13 +93,16 @@ impl RayScene {
         ordered: &[OrderedMesh<'_>],
         motion: Option<Arc<Motion>>,
     ) -> Self {
-        let tables = Tables::of(scene, textures);
-        Self {
-            gpu: gpu.clone(),
-            flat: FlatScene::of(scene, ordered, motion, tables.switches.mapped),
-            tables,
-            state: Mutex::default(),
+        let mut texels: Vec<[u8; 4]> = Vec::new();
+        let mut places = Vec::with_capacity(textures.len());
+        for texture in textures {
+            places.push([texels.len() as u32, texture.width_px | texture.height_px << 16]);
+            texture::mips(texture).for_each(|level| texels.extend(level.srgba8.as_chunks::<4>().0));
         }
+        let materials = scene.materials.iter().flat_map(|material| material_texels(material, &places)).collect();
+        let switches = MaterialSwitches::of(scene);
+        let flat = FlatScene::of(scene, ordered, motion, switches.mapped);
+        Self { gpu: gpu.clone(), flat, materials, texels, switches, state: Mutex::default() }
     }
 
     /// Triangles and the tree over them at a scene time. A tree of another time is refitted where that costs less
@@ -152,8 +150,8 @@ impl RayScene {
         let took = start.elapsed();
         let fixed = [
             self.table("triangle attributes", &self.triangles_of_leaves(&bvh))?,
-            self.table("materials", &self.tables.materials)?,
-            Arc::new(Table::new(&self.gpu, "texels", TextureFormat::R32Uint, &self.tables.texels)?),
+            self.table("materials", &self.materials)?,
+            Arc::new(Table::new(&self.gpu, "texels", TextureFormat::R32Uint, &self.texels)?),
         ];
         let attributes = self.attributes(scene_time_s)?;
         let traced = self.traced(&bvh, &corners, attributes, fixed, took, false)?;
@@ -213,7 +211,7 @@ impl RayScene {
         };
         tracing::debug!(?report, "rays are ready");
         let tables = [nodes, corners, vertices, details, triangles, materials, texels];
-        Ok(Arc::new(Traced { tables, switches: self.tables.switches, report }))
+        Ok(Arc::new(Traced { tables, switches: self.switches, report }))
     }
 
     /// Three texels a triangle in the order of the tree's leaves: a corner's position, and its number with the
@@ -242,8 +240,8 @@ impl RayScene {
             triangles: self.triangles_of_leaves(bvh),
             vertices: self.flat.vertices_at(scene_time_s).into_owned(),
             details: self.flat.details_at(scene_time_s).into_owned(),
-            materials: self.tables.materials.clone(),
-            texels: self.tables.texels.clone(),
+            materials: self.materials.clone(),
+            texels: self.texels.clone(),
         })
     }
 
@@ -260,19 +258,6 @@ impl Traced {
     /// The variables of `traverse.wgsl`.
     pub fn bindings(&self) -> [Binding<'_>; 7] {
         std::array::from_fn(|number| Binding::texture(TABLES[number], &self.tables[number]))
-    }
-}
-
-impl Tables {
-    fn of(scene: &Scene, textures: &[Cow<'_, Texture>]) -> Self {
-        let mut texels: Vec<[u8; 4]> = Vec::new();
-        let mut places = Vec::with_capacity(textures.len());
-        for texture in textures {
-            places.push([texels.len() as u32, texture.width_px | texture.height_px << 16]);
-            texture::mips(texture).for_each(|level| texels.extend(level.srgba8.as_chunks::<4>().0));
-        }
-        let materials = scene.materials.iter().flat_map(|material| material_texels(material, &places)).collect();
-        Self { materials, texels, switches: MaterialSwitches::of(scene) }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use depth_image::Highlight;
 use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, switches};
-use minijinja::{Value, context, value::merge_maps};
+use minijinja::{Value, context};
 use wgpu::Buffer;
 
 use super::bounces::{BounceList, Rays};
@@ -21,14 +21,9 @@ impl ShaderVariant for Land {
     const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
-        let own = context! {
-            single_pole => false,
-            mirrors => self.mirrors,
-            environment_map => self.environment_map,
-            highlight => highlight_name(Highlight::Ggx),
-            lit => true,
-        };
-        merge_maps([own, self.sums.context()])
+        let Self { mirrors, environment_map, sums } = *self;
+        let highlight = highlight_name(Highlight::Ggx);
+        context! { mirrors, environment_map, highlight, lit => true, single_pole => false, ..sums.context() }
     }
 
     fn all() -> Vec<Self> {
