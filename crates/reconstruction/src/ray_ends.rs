@@ -72,20 +72,21 @@ pub(crate) fn follow_rays(
         return Ok((Vec::new(), 0.0));
     };
     if count_steps {
-        let steps = bounces.count_steps(device, camera.pixel_count());
+        let bytes = 4 * camera.pixel_count() as u64;
+        let steps = bounces.steps.insert(device.buffers.lend_storage("steps", bytes));
         recording.frame.encoder.clear_buffer(steps, 0, None);
     }
-    let of_ray = |(number, ray): (u32, &Ray)| GpuMirroredRay {
+    let mirrored = (0..).zip(rays).map(|(pixel, ray)| GpuMirroredRay {
         origin_in_world: ray.origin_in_world.to_array(),
-        pixel: number,
+        pixel,
         direction: ray.direction_in_world.to_array(),
         near_m,
         guess: 0,
         throughput_rgb9e5: rgb9e5_from_linear(Vec3::ONE),
         width_m,
         spread: 0.0,
-    };
-    let lists = bounces.listing(device, &(0..).zip(rays).map(of_ray).collect::<Vec<_>>());
+    });
+    let lists = bounces.listing(device, &mirrored.collect::<Vec<_>>());
     let cell_rays = CellRays { lists: &lists, next: None, cell: 0, reflection: 1 };
     follow(&mut recording, &bounces, cell_rays)?;
     if width_m > 0.0 {
@@ -94,7 +95,7 @@ pub(crate) fn follow_rays(
         land(&mut recording, &bounces, cell_rays)?;
         return read(device, recording, &bounces, &shown, rays.len());
     }
-    read(device, recording, &bounces, bounces.planes()[0], rays.len())
+    read(device, recording, &bounces, &bounces.planes[0], rays.len())
 }
 
 fn read(
@@ -107,19 +108,19 @@ fn read(
     let Recording { mut frame, batch, .. } = recording;
     let bytes = 4 * count.max(1) as u64;
     let mut read = |plane: &wgpu::Buffer| frame.read_back(plane, 0..bytes, device.buffers.lend_host("ends", bytes));
-    let [_, inverse_way, provenance] = bounces.planes();
+    let [_, inverse_way, provenance] = &bounces.planes;
     let [color, inverse_way, provenance] = [color, inverse_way, provenance].map(&mut read);
-    let steps = bounces.steps().map(read);
+    let steps = bounces.steps.as_deref().map(read);
     let result = frame.submit()?.wait()?;
     drop(batch);
     let words = |plane| result.with(plane, |words: &[u32]| words[..count].to_vec());
     let [colors, inverse_ways, provenances] = [words(color)?, words(inverse_way)?, words(provenance)?];
     let steps = steps.map(words).transpose()?.unwrap_or_else(|| vec![0; count]);
-    let end = |ray: usize| RayEnd {
+    let ends = (0..count).map(|ray| RayEnd {
         kind: Provenance(provenances[ray] & 0xff).kind(),
         way_m: f32::from_bits(inverse_ways[ray]).recip(),
         color_linear: linear_from_rgb9e5(colors[ray]),
         steps: steps[ray],
-    };
-    Ok(((0..count).map(end).collect(), result.device_s))
+    });
+    Ok((ends.collect(), result.device_s))
 }

@@ -153,18 +153,16 @@ impl Reconstructor {
     /// A camera that is not valid (all are checked first), a set without the samples that the method needs, too many mirror
     /// cells, a cell without depth images, a base without a cube, or the device.
     pub fn reconstruct(&self, request: ReconstructRequest<'_>) -> Result<Vec<View>, ReconstructionError> {
-        let ReconstructRequest { set, common: CommonSets { mirrors, base }, cameras, method, planes, turn, .. } =
-            request;
+        let ReconstructRequest { set, common: CommonSets { mirrors, base }, cameras, method, turn, .. } = request;
         for (index, camera) in cameras.iter().enumerate() {
             camera.validate().map_err(|source| ReconstructionError::Camera { index, source })?;
         }
         check_samples(set, method)?;
         // All mirrors of a cube show the cube, whatever cells there are.
-        let (mirrors, cube) = match method.walks_cube() {
-            true => (Mirrors { cells: &[], ..mirrors }, Some(set)),
-            false => (mirrors, base),
+        let (mirrors, cube, base) = match method.walks_cube() {
+            true => (Mirrors { cells: &[], ..mirrors }, Some(set), None),
+            false => (mirrors, base, base.map(cube_of_base).transpose()?),
         };
-        let base = base.filter(|_| !method.walks_cube()).map(cube_of_base).transpose()?;
         let [mirrors, lobes] = mirrors.checked_for(set, cube)?.split(base.is_some());
         let cells = [mirrors, lobes].map(|of| of.cells_with(cube));
         let mirrors = Mirrors { cells: &cells[0], ..mirrors };
@@ -180,7 +178,7 @@ impl Reconstructor {
             let recording = self.record(prepared, batch)?;
             // Whoever holds the device asks for no other turn.
             let done = in_flight.take().map(InFlight::wait).transpose()?;
-            in_flight = Some(InFlight::submit(recording, planes)?);
+            in_flight = Some(InFlight::submit(recording)?);
             done.map_or(Ok(()), |done| done.unpack(&mut views))?;
         }
         if let Some(last) = in_flight {
@@ -209,12 +207,11 @@ impl Reconstructor {
         let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), mirrors.cells.len()));
         let mut recording = Recording::begin(&self.device, set, cameras, planes, family, turn)?;
         let rays = recording.batch.plane_bytes as usize / 4;
-        let lend = |of| Bounces::lend(&self.device, of, rays, CurvedSearch::default());
-        let bounces = [lend(mirrors)?, lend(lobes)?];
-        self.record_positions(
-            Prepared { bounces: bounces.each_ref().map(Option::as_ref), ..prepared },
-            &mut recording,
-        )?;
+        let [mirrors, lobes] =
+            [mirrors, lobes].map(|of| Bounces::lend(&self.device, of, rays, CurvedSearch::default()));
+        let bounces = [mirrors?, lobes?];
+        let prepared = Prepared { bounces: bounces.each_ref().map(Option::as_ref), ..prepared };
+        self.record_positions(prepared, &mut recording)?;
         recording.batch.bounces = bounces.into_iter().flatten().flat_map(Bounces::into_memory).collect();
         Ok(recording)
     }
@@ -292,10 +289,7 @@ impl Reconstructor {
         fill::record(recording, &unknown)?;
         specular::record(recording, listed, first, glossy.as_ref())?;
         if let Some((bounces, first)) = mirrored {
-            bounce::record(recording, bounces, first, |recording, which, rays| match base {
-                Some(base) => layered::follow_in_base(recording, base, bounces, which, rays),
-                None => Ok(()),
-            })?;
+            bounce::record(recording, bounces, first, base)?;
         }
         match (base, lobes, &glossy) {
             (Some(base), Some(lobes), Some(glossy)) => layered::follow_lobes(recording, base, lobes, glossy),
@@ -337,8 +331,7 @@ impl Reconstructor {
 }
 
 fn cube_of_base(base: &SampleSet) -> Result<&Cube, ReconstructionError> {
-    let none = || ReconstructionError::NoSamples { what: "a base".to_owned(), needed: "a layered cube" };
-    base.cube.as_deref().ok_or_else(none)
+    base.cube.as_deref().ok_or(ReconstructionError::NoSamples { what: "a base".to_owned(), needed: "a layered cube" })
 }
 
 /// Views come from pinholes or from a cube, as the method needs.
@@ -349,13 +342,12 @@ fn check_samples(set: &SampleSet, method: ReconstructionMethod) -> Result<(), Re
     if method.light_cache_quality().is_some() {
         return Err(ReconstructionError::NoScene { method: method.to_string() });
     }
-    let has_light_field = || set.cube.as_ref().is_some_and(|cube| cube.light_field.is_some());
-    if method.gathers() && !has_light_field() {
-        return Err(ReconstructionError::NoSamples { what: method.to_string(), needed: "a light field" });
-    }
-    let (is_there, needed) = match method.walks_cube() {
-        true => (set.cube.is_some(), "a layered cube"),
-        false => (!set.cameras.is_empty(), "depth images"),
+    let has_light_field = set.cube.as_ref().is_some_and(|cube| cube.light_field.is_some());
+    let needed = match method.walks_cube() {
+        true if method.gathers() && !has_light_field => "a light field",
+        true if set.cube.is_none() => "a layered cube",
+        false if set.cameras.is_empty() => "depth images",
+        _ => return Ok(()),
     };
-    if is_there { Ok(()) } else { Err(ReconstructionError::NoSamples { what: method.to_string(), needed }) }
+    Err(ReconstructionError::NoSamples { what: method.to_string(), needed })
 }

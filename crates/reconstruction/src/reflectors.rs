@@ -31,26 +31,27 @@ impl Reflectors {
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
         let planes: Vec<Planes<'_>> = images.iter().map(Planes::of_image).collect();
-        check(&planes, illumination)?;
-        Self::of_planes(tables, &planes, illumination, highlight, |_, words| words, turn)
+        Self::of_planes(tables, &planes, illumination, highlight, None, turn)
     }
 
-    /// `sorted` receives the number of words of a sample and the words of all samples; it gives them in the set's order.
+    /// The samples are in the order of `places` in their images, image after image, or as they are.
     fn of_planes(
         tables: &TablePool,
         planes: &[Planes<'_>],
         illumination: &Illumination,
         highlight: Option<Highlight>,
-        sorted: impl FnOnce(usize, Vec<u32>) -> Vec<u32>,
+        places: Option<&[u32]>,
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
+        check(planes, illumination)?;
         let Some(highlight) = highlight.filter(|_| planes.iter().any(Planes::reflects)) else { return Ok(None) };
         let gpu = &tables.gpu;
         let bytes = illumination_bytes(illumination);
         let limit = gpu.device.limits().max_uniform_buffer_binding_size;
         GpuError::check_limit("the scene's lights (bytes)", bytes.len() as u64, limit)?;
         let visibility_words = visibility_words(planes);
-        let words = sorted(4 * sample_texels(visibility_words), sample_words(planes, visibility_words));
+        let words = sample_words(planes, visibility_words);
+        let words = if let Some(places) = places { ordered(&words, planes, places) } else { words };
         Ok(Some(Self {
             highlight,
             lights: illumination.lights.len(),
@@ -70,14 +71,7 @@ impl Reflectors {
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
         let planes = images.each_ref().map(Planes::of_layers);
-        check(&planes, set.illumination)?;
-        let words = |stride: usize, words: Vec<u32>| {
-            let first = [0, images[0].sample_count(), images[0].sample_count() + images[1].sample_count()];
-            let image_of = |sample: usize| first.iter().rposition(|&first| sample >= first).unwrap_or(0);
-            let place = |(sample, &place): (usize, &u32)| (first[image_of(sample)] + place as usize) * stride;
-            places.iter().enumerate().flat_map(|at| words[place(at)..][..stride].iter().copied()).collect()
-        };
-        Self::of_planes(tables, &planes, set.illumination, set.highlight, words, turn)
+        Self::of_planes(tables, &planes, set.illumination, set.highlight, Some(places), turn)
     }
 }
 
@@ -122,17 +116,32 @@ impl<'i> Planes<'i> {
 fn check(images: &[Planes<'_>], illumination: &Illumination) -> Result<(), ReconstructionError> {
     let expected = SpecularPlanes::visibility_planes(illumination.lights.len());
     for (index, image) in images.iter().enumerate() {
-        let wrong = |reason: String| Err(ReconstructionError::Sample { index, reason });
         let Some(planes) = image.specular else { continue };
         if image.normal_oct16.is_none() {
-            return wrong("a highlight needs normals".to_owned());
+            return Err(ReconstructionError::sample(index, "a highlight needs normals"));
         }
         let found = planes.visibility8.len();
         if found != 0 && found != expected {
-            return wrong(format!("{found} planes of visibility, the lights need {expected} or none"));
+            let reason = format!("{found} planes of visibility, the lights need {expected} or none");
+            return Err(ReconstructionError::sample(index, reason));
         }
     }
     Ok(())
+}
+
+/// The words of samples, image after image, in the order of `places` in their images.
+fn ordered(words: &[u32], images: &[Planes<'_>], places: &[u32]) -> Vec<u32> {
+    let stride = words.len() / places.len().max(1);
+    let mut places = places.iter();
+    let mut ordered = Vec::with_capacity(words.len());
+    let mut first = 0;
+    for image in images {
+        for &place in places.by_ref().take(image.samples) {
+            ordered.extend_from_slice(&words[(first + place as usize) * stride..][..stride]);
+        }
+        first += image.samples;
+    }
+    ordered
 }
 
 fn visibility_words(images: &[Planes<'_>]) -> usize {
@@ -151,8 +160,8 @@ fn sample_words(images: &[Planes<'_>], visibility_words: usize) -> Vec<u32> {
         for (index, (&normal, &reflector)) in normals.iter().zip(&planes.reflectance_srgb8_roughness8).enumerate() {
             let end = words.len() + stride;
             words.extend([normal, reflector]);
-            let visible = |word: usize| planes.visibility8.get(word).map_or(ALL_VISIBLE, |plane| plane[index]);
-            words.extend((0..visibility_words).map(visible));
+            let visibility = (0..visibility_words).map(|word| planes.visibility8.get(word));
+            words.extend(visibility.map(|plane| plane.map_or(ALL_VISIBLE, |plane| plane[index])));
             words.resize(end, 0);
         }
     }

@@ -80,9 +80,10 @@ impl SampleSet {
         let among_holes = is_among_holes(images);
         let coded = |image| CodedImage::of(image, among_holes, set.mips);
         // One thread leaves the other cores to live streams.
-        let is_shared = tables.gpu.device_queue.cuts();
-        let coded: Vec<CodedImage> =
-            if is_shared { images.iter().map(coded).collect() } else { images.par_iter().map(coded).collect() };
+        let coded: Vec<CodedImage> = match tables.gpu.device_queue.cuts() {
+            true => images.iter().map(coded).collect(),
+            false => images.par_iter().map(coded).collect(),
+        };
         let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(Vec::with_capacity);
         let mut colors: Vec<[u32; 2]> = Vec::with_capacity(color_count(images, set.mips));
         let mut cameras = Vec::with_capacity(images.len());
@@ -128,16 +129,17 @@ impl SampleSet {
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
         check_volume(&set.volume)?;
-        let none = |label| tables.upload(label, TextureFormat::Rg32Uint, &[[0u32; 2]], turn);
+        let [nodes, cell_codes, cell_colors] = ["no pyramids", "no cells", "no colours"]
+            .map(|label| tables.upload(label, TextureFormat::Rg32Uint, &[[0u32; 2]], turn));
         Ok(Self {
             cameras: Vec::new(),
             uncertain: Vec::new(),
             poles: Vec::new(),
             volume: gpu_volume(&searched_volume(&set.volume, &[])),
             background: background_buffer(tables, &set.background),
-            nodes: none("no pyramids")?,
-            cell_codes: none("no cells")?,
-            cell_colors: none("no colours")?,
+            nodes: nodes?,
+            cell_codes: cell_codes?,
+            cell_colors: cell_colors?,
             reflectors: None,
             environment: set.environment.cloned(),
             meshes: SetMeshes::upload(tables, &[], turn)?,
@@ -190,15 +192,14 @@ fn check(tables: &TablePool, images: &[DepthImage], set: &SetDescription<'_>) ->
     }
     check_volume(&set.volume)?;
     for (index, image) in images.iter().enumerate() {
-        let camera = &image.camera;
-        let wrong = |reason: String| ReconstructionError::Sample { index, reason };
-        camera.validate().map_err(|error| wrong(error.to_string()))?;
-        image.validate().map_err(|error| wrong(error.to_string()))?;
+        image.camera.validate().map_err(|error| ReconstructionError::sample(index, error))?;
+        image.validate().map_err(|error| ReconstructionError::sample(index, error))?;
         if image.light.is_some() {
             return Err(ReconstructionError::LightForColor { index });
         }
-        if camera.size_px().min_element() < 2 {
-            return Err(wrong("an image of one row or column has no surface between samples".to_owned()));
+        if image.size_px().min_element() < 2 {
+            let reason = "an image of one row or column has no surface between samples";
+            return Err(ReconstructionError::sample(index, reason));
         }
     }
     tables.gpu.check_table("depth pyramids", node_count(images))?;
@@ -218,8 +219,7 @@ fn with_below(colors: &[u32], columns: usize) -> impl Iterator<Item = [u32; 2]> 
 }
 
 fn node_count(images: &[DepthImage]) -> usize {
-    let log2_sides = |image: &DepthImage| image.size_px().to_array().map(|side| side.next_power_of_two().ilog2());
-    images.iter().map(|image| Pyramid::word_count(log2_sides(image))).sum()
+    images.iter().map(|image| Pyramid::word_count(Pyramid::log2_sides(image.size_px().to_array()))).sum()
 }
 
 /// One cell a texel.

@@ -16,14 +16,13 @@ pub(crate) const HALF_DIAGONAL: f32 = 0.7072;
 shader_variant!(TileStart(SetVariant), "tile_start.wgsl", ONE_VIEW);
 
 pub(crate) fn record(recording: &mut Recording<'_>) -> Result<(), ReconstructionError> {
-    let variant = TileStart(recording.set.variant());
-    let pass = recording.device.passes.get(&variant)?;
     let [across, down] = tiles_of(recording.batch.size_px).to_array();
     let bytes = 4 * u64::from(across * down) * recording.batch.cameras.len() as u64;
     let starts = recording.device.buffers.lend_storage("tile starts", bytes);
     let own = Binding::buffer("tile_start_m", &starts);
-    let bound = pass.bind(0, recording.view_bindings().into_iter().chain([own]))?;
-    recording.dispatch_tiles(&variant, &pass, &bound);
+    let variant = TileStart(recording.set.variant());
+    let pass = recording.bind(&variant, recording.view_bindings().into_iter().chain([own]))?;
+    recording.dispatch_tiles(&pass);
     recording.batch.tile_start_m = Some(starts);
     Ok(())
 }

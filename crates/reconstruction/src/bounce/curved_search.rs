@@ -55,9 +55,7 @@ impl ShaderVariant for CurvedWalk {
     }
 
     fn all() -> Vec<Self> {
-        SetVariant::all()
-            .into_iter()
-            .flat_map(|set| [false, true].map(|count_steps| Self { set, count_steps }))
-            .collect()
+        let sets = SetVariant::all().into_iter();
+        sets.flat_map(|set| [false, true].map(|count_steps| Self { set, count_steps })).collect()
     }
 }

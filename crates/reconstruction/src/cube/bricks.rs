@@ -1,5 +1,6 @@
 //! A cube's samples in voxels, for rays: cells of 8 spacings, bricks of 4 × 4 × 4 voxels in those that have samples, and entries.
 
+use depth_image::oct8_from_unit;
 use glam::UVec3;
 
 use super::reaches::reaches;
@@ -73,16 +74,19 @@ impl Bricks {
     }
 
     fn leaf(&mut self, passages: &[Passage]) -> [u32; 4] {
-        // The last of an odd number is there twice, which changes nothing.
-        let pair = |two: &[Passage]| bytemuck::cast([two[0].words, two[two.len() - 1].words]);
         if passages.len() <= 2 {
-            return pair(passages);
+            return pair_of(passages);
         }
         let [sample, place] = passages[0].words;
         let first = self.entries.len() as u32;
-        self.entries.extend(passages[1..].chunks(2).map(pair));
+        self.entries.extend(passages[1..].chunks(2).map(pair_of));
         [sample | MORE_ENTRIES, place, first, self.entries.len() as u32]
     }
+}
+
+/// The words of one or two passages: the last of an odd number is there twice, which changes nothing.
+fn pair_of(passages: &[Passage]) -> [u32; 4] {
+    bytemuck::cast([passages[0].words, passages[passages.len() - 1].words])
 }
 
 /// The first passage of each cell, and the passages, sorted by cell and voxel.
@@ -104,7 +108,12 @@ fn by_cell(samples: &CubeSamples, size: UVec3) -> (Vec<u32>, Vec<Passage>) {
 
 /// Calls `take` for each voxel that a surface's plane passes through, with the voxel's cell.
 fn each_passage(samples: &CubeSamples, size: UVec3, mut take: impl FnMut(usize, Passage)) {
-    for (sample, is_two_sided) in surfaces(samples) {
+    let mut next = 0;
+    while next < samples.len() {
+        let sample = next;
+        // The next sample may be the same surface's other side.
+        let is_two_sided = samples.has_other_side(sample);
+        next += 1 + usize::from(is_two_sided);
         let line = samples.line[sample];
         let axis = samples.axis_of(line);
         if samples.normal[sample][axis].abs() < LEAST_NORMAL_ALONG_LINE {
@@ -118,9 +127,9 @@ fn each_passage(samples: &CubeSamples, size: UVec3, mut take: impl FnMut(usize, 
         let [from, to] = [depth - reach, depth + reach].map(|end| ((end / VOXEL).floor().max(0.0) as u32).min(last));
         let mut voxel = UVec3::ZERO;
         (voxel[(axis + 1) % 3], voxel[(axis + 2) % 3]) = (place.x / 2, place.y / 2);
-        let bit = |offset: usize, is_set: u32| is_set << (28 + (axis + offset) % 3);
-        let bits = bit(0, is_two_sided.into()) | bit(1, place.x & 1) | bit(2, place.y & 1);
-        let normal = u32::from(samples.normal_oct8(sample)) | (axis as u32) << 30;
+        let flags = [u32::from(is_two_sided), place.x & 1, place.y & 1].into_iter().enumerate();
+        let bits = flags.fold(0, |bits, (offset, is_set)| bits | is_set << (28 + (axis + offset) % 3));
+        let normal = u32::from(oct8_from_unit(samples.normal[sample])) | (axis as u32) << 30;
         for along in from..=to {
             voxel[axis] = along;
             let below = (depth - along as f32 * VOXEL + ENTRY_DEPTH_BELOW) / ENTRY_DEPTH_STEP;
@@ -131,10 +140,4 @@ fn each_passage(samples: &CubeSamples, size: UVec3, mut take: impl FnMut(usize, 
             take((cell.x + size.x * (cell.y + size.y * cell.z)) as usize, Passage { voxel: number, words });
         }
     }
-}
-
-/// The sample of each surface, and whether the next sample is the same surface's other side.
-fn surfaces(samples: &CubeSamples) -> impl Iterator<Item = (usize, bool)> {
-    let of = |sample: usize| (sample < samples.len()).then(|| (sample, samples.has_other_side(sample)));
-    std::iter::successors(of(0), move |&(sample, is_two_sided)| of(sample + 1 + usize::from(is_two_sided)))
 }
