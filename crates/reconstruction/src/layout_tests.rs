@@ -8,8 +8,8 @@ use naga::{Module, TypeInner};
 
 use crate::cube::{GpuCube, GpuLightField};
 use crate::{
-    bounce::{GpuMirrorBox, GpuMirroredRay},
-    lobes::{GpuGlossySurface, GpuLobeRays},
+    bounce::{GpuGlossySurface, GpuMirrorBox, GpuMirroredRay},
+    lobes::GpuLobeRays,
     pixel_list::GpuPixelList,
     quads::{GpuCutWork, GpuQuadWork},
     shaders::{shader_sources, templates},

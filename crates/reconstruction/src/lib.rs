@@ -37,7 +37,7 @@ pub use bounce::{CurvedSearch, MirrorCell, Mirrors};
 pub use error::ReconstructionError;
 pub use methods::{METHODS, ReconstructionMethod, UnknownMethod};
 pub use pyramid::CodedDepth;
-pub use quads::{ErrorBound, MeshStatistics, Quad, RequiredPlanes};
+pub use quads::{ErrorBound, MeshStatistics, Quad};
 pub use ray_ends::{RayEnd, RayWork};
 pub use reconstructor::{CommonSets, Positions, ReconstructRequest, Reconstructor};
 pub use sample_set::SampleSet;

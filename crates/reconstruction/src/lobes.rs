@@ -66,21 +66,6 @@ pub(crate) struct GpuLobeRays {
     pub number: u32,
 }
 
-/// `GlossySurface` of `bounce/glossy.wgsl`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(crate) struct GpuGlossySurface {
-    pub point_in_world: [f32; 3],
-    pub pixel: u32,
-    pub towards_eye: [f32; 3],
-    pub normal_oct16: u32,
-    pub throughput_linear: [f32; 3],
-    pub roughness: f32,
-    pub open: f32,
-    pub is_mirrored: u32,
-    pub padding: [u32; 2],
-}
-
 /// The rough surfaces of one position within the pixels.
 pub(crate) struct GlossyList<'b> {
     surfaces: &'b Buffer,

@@ -8,7 +8,7 @@ use glam::Vec2;
 use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
-use crate::bounce::{self, Bounces, CurvedSearch, Mirrors};
+use crate::bounce::{self, Bounces, CellRays, CurvedSearch, Mirrors, RayLists};
 use crate::cube::Cube;
 use crate::in_flight::InFlight;
 use crate::lobes::GlossyList;
@@ -289,7 +289,7 @@ impl Reconstructor {
         fill::record(recording, &unknown)?;
         specular::record(recording, listed, first, glossy.as_ref())?;
         if let Some((bounces, first)) = mirrored {
-            bounce::record(recording, bounces, first, base)?;
+            record_mirrored(recording, bounces, first, base)?;
         }
         match (base, lobes, &glossy) {
             (Some(base), Some(lobes), Some(glossy)) => layered::follow_lobes(recording, base, lobes, glossy),
@@ -328,6 +328,35 @@ impl Reconstructor {
         let mesh = method.mesh(&self.device, set, Turn::default())?;
         mesh.map_or(Ok(Vec::new()), |mesh| quads::read(&self.device, &mesh, set))
     }
+}
+
+/// Records the passes over the rays that the view's mirrors have listed, mirror after mirror. Rays are followed in the images of mirror
+/// cells and in the base, where there is one.
+fn record_mirrored(
+    recording: &mut Recording<'_>,
+    bounces: &Bounces<'_>,
+    first: RayLists,
+    base: Option<&Cube>,
+) -> Result<(), ReconstructionError> {
+    let mut lists = first;
+    for reflection in 1..=bounces.reflections {
+        let next = (reflection < bounces.reflections).then(|| bounces.next(recording.device, Some(&lists)));
+        for (number, cell) in bounces.cells.iter().enumerate() {
+            let rays = CellRays { lists: &lists, next: next.as_ref(), cell: number, reflection };
+            if !cell.is_cube() {
+                bounce::follow(recording, bounces, rays)?;
+            }
+            if let Some(base) = base {
+                layered::follow_in_base(recording, base, bounces, rays, !cell.is_cube())?;
+            }
+            if !cell.is_cube() {
+                bounce::land(recording, bounces, rays)?;
+            }
+        }
+        let Some(next) = next else { break };
+        lists = next;
+    }
+    Ok(())
 }
 
 fn cube_of_base(base: &SampleSet) -> Result<&Cube, ReconstructionError> {

@@ -23,7 +23,7 @@ impl<'s> MirrorCell<'s> {
     }
 
     /// Its surroundings are a cube: the base, or the set of a view from a cube.
-    pub(super) fn is_cube(&self) -> bool {
+    pub(crate) fn is_cube(&self) -> bool {
         self.surroundings.cube.is_some()
     }
 

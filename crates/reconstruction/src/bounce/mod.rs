@@ -19,9 +19,7 @@ pub(crate) use curved_search::{CurvedWalk, LONGEST_STEP, MAX_WALK_STEPS};
 use mirror_cells::reflectors_of_cube;
 pub use mirror_cells::{MirrorCell, Mirrors};
 
-use crate::cube::Cube;
-use crate::lobes::GpuGlossySurface;
-use crate::methods::{joint_carve::Carve, layered};
+use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList, empty_lists};
 use crate::recording::nearest_first;
 use crate::reflectors::{Reflectors, sample_texels};
@@ -67,6 +65,21 @@ pub(crate) struct GpuMirroredRay {
     pub near_m: f32,
     pub width_m: f32,
     pub spread: f32,
+}
+
+/// `GlossySurface` of `bounce/glossy.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct GpuGlossySurface {
+    pub point_in_world: [f32; 3],
+    pub pixel: u32,
+    pub towards_eye: [f32; 3],
+    pub normal_oct16: u32,
+    pub throughput_linear: [f32; 3],
+    pub roughness: f32,
+    pub open: f32,
+    pub is_mirrored: u32,
+    pub padding: [u32; 2],
 }
 
 /// The memory for the mirrored rays of a batch.
@@ -320,35 +333,6 @@ pub(crate) struct CellRays<'r> {
     pub cell: usize,
     /// Mirrors on the way so far.
     pub reflection: u32,
-}
-
-/// Records the passes over the rays that the view's mirrors have listed, mirror after mirror. Rays are followed in the base, too, where
-/// there is one.
-pub(crate) fn record(
-    recording: &mut Recording<'_>,
-    bounces: &Bounces<'_>,
-    first: RayLists,
-    base: Option<&Cube>,
-) -> Result<(), ReconstructionError> {
-    let mut listed = Some(first);
-    for reflection in 1..=bounces.reflections {
-        let Some(lists) = listed else { break };
-        let next = (reflection < bounces.reflections).then(|| bounces.next(recording.device, Some(&lists)));
-        for (number, cell) in bounces.cells.iter().enumerate() {
-            let rays = CellRays { lists: &lists, next: next.as_ref(), cell: number, reflection };
-            if !cell.is_cube() {
-                follow(recording, bounces, rays)?;
-            }
-            if let Some(base) = base {
-                layered::follow_in_base(recording, base, bounces, rays, !cell.is_cube())?;
-            }
-            if !cell.is_cube() {
-                land(recording, bounces, rays)?;
-            }
-        }
-        listed = next;
-    }
-    Ok(())
 }
 
 /// Where the rays of a cell end, in its images.

@@ -34,10 +34,10 @@ impl GpuLightField {
     pub fn of(camera: &LightFieldCamera) -> Self {
         // The lobe with which mirrors are gathered: the exponent of the cosine to the mirrored ray. Narrower lobes hold fewer than
         // three directions too often. Lischinski's figure 3 has 40.
-        let exponent = match camera.directions {
+        let exponent: f32 = match camera.directions {
             LightDirections::D66 => 30.0,
             LightDirections::D258 => 120.0,
-            LightDirections::D1026 => 480.0f32,
+            LightDirections::D1026 => 480.0,
         };
         Self {
             directions: camera.directions.count(),

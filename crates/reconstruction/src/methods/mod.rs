@@ -20,7 +20,7 @@ use self::joint_carve::smooth::{FAINT_HIGHLIGHT, OPEN_SHARE, SMOOTH_FOOTPRINTS, 
 use self::joint_carve::{BLIND_MOVE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_TO_HIT, MAX_STOP_LEVEL};
 use self::light_field_search::{BISECTIONS, DEFAULT_STEPS, MAX_STEPS};
 use crate::bounce::Bounces;
-use crate::quads::{self, CornerPlanes, ErrorBound, Mesh as QuadMesh, QuadDrawing, RequiredPlanes};
+use crate::quads::{self, ErrorBound, Mesh as QuadMesh, QuadDrawing};
 use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
 use crate::{recording::Recording, sample_set::SampleSet};
 
@@ -163,15 +163,10 @@ impl ReconstructionMethod {
     /// Walks through a layered cube, and follows all mirrors.
     pub const LAYERED: Self = Layered { followed: None };
 
-    /// Planes that sample images need beside colour and depth.
+    /// Sample images need normals and the inverse depths at corners of texels, beside colour and depth.
     #[must_use]
-    pub fn required_planes(self) -> RequiredPlanes {
-        match self {
-            LightFieldSearch { .. } | JointCarve { .. } | Mesh | Layered { .. } | LightCache { .. } => {
-                RequiredPlanes::default()
-            }
-            HybridMesh { .. } => CornerPlanes::REQUIRED,
-        }
+    pub fn needs_corners(self) -> bool {
+        matches!(self, HybridMesh { .. })
     }
 
     /// The settings of all methods among which budgets choose. Those of one method follow each other, by rising effort.

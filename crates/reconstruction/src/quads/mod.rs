@@ -2,19 +2,15 @@
 
 mod build;
 mod corner_planes;
-mod count;
 mod cut;
 mod draw;
-mod indices;
+mod list;
 mod merge;
 mod mesh;
 mod resolve;
-mod scan;
 mod targets;
 
 pub(crate) use build::{mesh, read};
-pub(crate) use corner_planes::CornerPlanes;
-pub use corner_planes::RequiredPlanes;
 #[cfg(test)]
 pub(crate) use cut::GpuCutWork;
 #[cfg(test)]
@@ -42,6 +38,6 @@ pub(crate) fn constants() -> [(&'static str, String); 2] {
 
 /// The texts of all variants of all passes over quads.
 pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    let list = shader_sources!(templates, count::Count, scan::Scan, indices::Indices, merge::Merge);
+    let list = shader_sources!(templates, list::Count, list::Scan, list::Indices, merge::Merge);
     list.chain(shader_sources!(templates, draw::DrawQuads, resolve::Resolve))
 }
