@@ -34,12 +34,7 @@ impl ShaderVariant for Shown {
     const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
-        let sums = match self.sums {
-            Sums::None => "none",
-            Sums::Begun => "begun",
-            Sums::Continued => "continued",
-            Sums::Read => "read",
-        };
+        let sums = format!("{:?}", self.sums);
         context! { sums, listed => self.listed, environment_map => self.environment_map, ..self.set.context() }
     }
 

@@ -13,14 +13,8 @@ pub(crate) struct InFlight<'g> {
     views: BatchViews,
 }
 
-/// The views of a batch that the device is done with.
-pub(crate) struct Finished {
-    result: FrameResult,
-    views: BatchViews,
-}
-
 /// What is read back of a batch.
-struct BatchViews {
+pub(crate) struct BatchViews {
     colors: Readback,
     inverse_depth: Option<Readback>,
     provenance: Option<Readback>,
@@ -42,28 +36,32 @@ impl<'g> InFlight<'g> {
     }
 
     /// Waits until the device is free of it.
-    pub fn wait(self) -> Result<Finished, ReconstructionError> {
-        Ok(Finished { result: self.submitted.wait()?, views: self.views })
+    pub fn wait(self) -> Result<(FrameResult, BatchViews), ReconstructionError> {
+        Ok((self.submitted.wait()?, self.views))
     }
 }
 
-impl Finished {
+impl BatchViews {
     /// Appends the batch's views.
-    pub fn unpack(self, views: &mut Vec<View>) -> Result<(), ReconstructionError> {
-        let Self { result, views: BatchViews { colors, inverse_depth, provenance, batch } } = self;
-        let rgb = each_view(&result, colors, &batch, rgb_bytes)?;
-        let planes = [inverse_depth, provenance].map(|plane| match plane {
-            Some(plane) => each_view(&result, plane, &batch, <[u32]>::to_vec),
+    pub fn unpack(self, result: &FrameResult, views: &mut Vec<View>) -> Result<(), ReconstructionError> {
+        let Self { colors, inverse_depth, provenance, batch } = self;
+        let rgb = each_view(result, colors, &batch, rgb_bytes)?;
+        let [depths, provenances] = [inverse_depth, provenance].map(|plane| match plane {
+            Some(plane) => each_view(result, plane, &batch, <[u32]>::to_vec),
             None => Ok(Vec::new()),
         });
-        let [depths, provenances] = planes;
         let mut depths = depths?.into_iter();
         let mut provenances = provenances?.into_iter();
-        views.extend(rgb.into_iter().map(|srgb8| View {
-            size_px: batch.size_px,
-            srgb8,
-            inverse_depth_per_m: depths.next().map(bytemuck::cast_vec),
-            provenance: provenances.next().map(|words| words.into_iter().map(provenance_of).collect()),
+        views.extend(rgb.into_iter().map(|srgb8| {
+            View {
+                size_px: batch.size_px,
+                srgb8,
+                inverse_depth_per_m: depths.next().map(bytemuck::cast_vec),
+                // Without what stays on the device.
+                provenance: provenances
+                    .next()
+                    .map(|words| words.into_iter().map(|word| Provenance(word & ((1 << SPLIT_SHIFT) - 1))).collect()),
+            }
         }));
         Ok(())
     }
@@ -84,9 +82,4 @@ fn rgb_bytes(rgba: &[u32]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(rgba.len() * 3);
     rgba.iter().for_each(|word| bytes.extend_from_slice(&word.to_le_bytes()[..3]));
     bytes
-}
-
-/// Without what stays on the device.
-fn provenance_of(word: u32) -> Provenance {
-    Provenance(word & ((1 << SPLIT_SHIFT) - 1))
 }

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use depth_image::{Antialias, CubeImages, DepthImage, PinholeCamera, Ray, View, ViewPlanes};
+use depth_image::{Antialias, CubeImages, DepthImage, PinholeCamera, View, ViewPlanes};
 use glam::Vec2;
 use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
@@ -14,7 +14,6 @@ use crate::in_flight::InFlight;
 use crate::lobes::GlossyList;
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
-use crate::ray_ends::{RayEnd, RayWork, follow_rays};
 use crate::recording::{MIRRORED_PIXELS_A_BATCH, MIRRORED_PIXELS_A_SLICE, PIXELS_A_BATCH, Recording, batches};
 use crate::sample_set::SampleSet;
 use crate::set_description::SetDescription;
@@ -26,7 +25,7 @@ const CALLS_OF_A_CLASS: usize = 4;
 
 /// Passes for every method and number of cameras that has been asked for.
 pub struct Reconstructor {
-    device: Device,
+    pub(crate) device: Device,
     tables: TablePool,
     drawing: QuadDrawing,
     calls: JobLimit,
@@ -61,8 +60,6 @@ pub struct ReconstructRequest<'r> {
     pub method: ReconstructionMethod,
     /// The planes beside colour, and how colour is sampled.
     pub planes: ViewPlanes,
-    /// Only with several positions a pixel.
-    pub positions: Positions,
     /// The place in the device's order.
     pub turn: Turn,
 }
@@ -71,15 +68,7 @@ impl<'r> ReconstructRequest<'r> {
     /// A request for colour alone, without common sets.
     #[must_use]
     pub fn new(set: &'r SampleSet, cameras: &'r [PinholeCamera], method: ReconstructionMethod) -> Self {
-        Self {
-            set,
-            common: CommonSets::default(),
-            cameras,
-            method,
-            planes: ViewPlanes::COLOR,
-            positions: Positions::Shared,
-            turn: Turn::default(),
-        }
+        Self { set, common: CommonSets::default(), cameras, method, planes: ViewPlanes::COLOR, turn: Turn::default() }
     }
 }
 
@@ -95,15 +84,6 @@ struct Prepared<'r> {
     bounces: [Option<&'r Bounces<'r>>; 2],
     /// The quads of the set, where the method draws them.
     mesh: Option<&'r Mesh>,
-}
-
-/// How the positions within a pixel are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Positions {
-    /// Where the method can, later positions take the surface of the first.
-    Shared,
-    /// Each position is reconstructed by itself, as the reference of shared positions.
-    Whole,
 }
 
 impl Reconstructor {
@@ -171,29 +151,29 @@ impl Reconstructor {
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;
         let prepared = Prepared { request, mirrors, lobes, base, bounces: [None; 2], mesh: mesh.as_deref() };
+        // Rays off mirrors take memory, and are followed at once beside live streams.
+        let most_pixels = match (cells.iter().all(Vec::is_empty), self.device.gpu.device_queue.cuts()) {
+            (true, _) => PIXELS_A_BATCH,
+            (false, false) => MIRRORED_PIXELS_A_BATCH,
+            (false, true) => MIRRORED_PIXELS_A_SLICE,
+        };
         let mut views = Vec::with_capacity(cameras.len());
         let mut in_flight: Option<InFlight<'_>> = None;
         // The device works on one batch while the host takes the one before apart.
-        for batch in batches(cameras, self.most_pixels(cells.iter().any(|cells| !cells.is_empty()))) {
+        for batch in batches(cameras, most_pixels) {
             let recording = self.record(prepared, batch)?;
             // Whoever holds the device asks for no other turn.
             let done = in_flight.take().map(InFlight::wait).transpose()?;
             in_flight = Some(InFlight::submit(recording)?);
-            done.map_or(Ok(()), |done| done.unpack(&mut views))?;
+            if let Some((result, batch)) = done {
+                batch.unpack(&result, &mut views)?;
+            }
         }
         if let Some(last) = in_flight {
-            last.wait()?.unpack(&mut views)?;
+            let (result, batch) = last.wait()?;
+            batch.unpack(&result, &mut views)?;
         }
         Ok(views)
-    }
-
-    /// The pixels of a batch. Rays off mirrors take memory, and are followed at once beside live streams.
-    fn most_pixels(&self, follows_rays: bool) -> usize {
-        match (follows_rays, self.device.gpu.device_queue.cuts()) {
-            (false, _) => PIXELS_A_BATCH,
-            (true, false) => MIRRORED_PIXELS_A_BATCH,
-            (true, true) => MIRRORED_PIXELS_A_SLICE,
-        }
     }
 
     /// All passes over a batch.
@@ -248,13 +228,9 @@ impl Reconstructor {
         let mut offsets_px = request.planes.antialias.offsets_px();
         recording.go_to(offsets_px.next().unwrap_or_default());
         self.record_position(prepared, recording, None)?;
-        let rough = match request.positions {
-            Positions::Shared if prepared.bounces.iter().all(Option::is_none) => {
-                request.method.share_positions(recording)?
-            }
-            // What a mirror shows is not shared.
-            Positions::Shared | Positions::Whole => None,
-        };
+        // What a mirror shows is not shared.
+        let is_shared = prepared.bounces.iter().all(Option::is_none);
+        let rough = if is_shared { request.method.share_positions(recording)? } else { None };
         if rough.is_none() {
             antialias::record(recording, Sums::Begun, None)?;
         }
@@ -295,15 +271,6 @@ impl Reconstructor {
             (Some(base), Some(lobes), Some(glossy)) => layered::follow_lobes(recording, base, lobes, glossy),
             _ => Ok(()),
         }
-    }
-
-    /// Where single rays end in images of a mirror's surroundings, followed as rays off mirrors are; also the seconds on the
-    /// device. Directions are of unit length.
-    ///
-    /// # Errors
-    /// Steps that cannot be used, too many rays, or the device.
-    pub fn follow(&self, work: RayWork<'_>, rays: &[Ray]) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
-        follow_rays(&self.device, work, rays)
     }
 
     /// Statistics of the quads that a method draws; `None` for methods that draw none.

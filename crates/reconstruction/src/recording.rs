@@ -57,7 +57,7 @@ struct Piece {
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Pieces {
     all: Vec<Piece>,
-    rows: u32,
+    pub rows: u32,
     /// Pieces that a slice of a pass holds.
     a_slice: usize,
 }
@@ -204,14 +204,8 @@ impl<'r> Recording<'r> {
         self.frame.cut(WorkKind::new(self.family, &(&pass.name, what)), self.batch.plane_bytes / 4);
     }
 
-    /// One dispatch a tile of a piece.
-    pub fn dispatch_tiles(&mut self, pass: &BoundPass) {
-        let [across, down] = [self.batch.size_px.x, self.batch.pieces.rows].map(|side| side.div_ceil(TILE_PX));
-        self.dispatch(pass, |_| DispatchSize::Invocations([across, down, 1]));
-    }
-
     /// One dispatch a piece, of a size that may depend on the first piece.
-    fn dispatch<'b>(&mut self, pass: &BoundPass, size: impl Fn(u32) -> DispatchSize<'b>) {
+    pub fn dispatch<'b>(&mut self, pass: &BoundPass, size: impl Fn(u32) -> DispatchSize<'b>) {
         let kind = WorkKind::new(self.family, &pass.name);
         let piece_px = u64::from(self.batch.size_px.x) * u64::from(self.batch.pieces.rows);
         for slice in self.batch.pieces.slices() {

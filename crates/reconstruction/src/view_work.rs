@@ -18,7 +18,7 @@ pub(crate) const CELL_MARGIN_PX: f32 = 0.01;
 pub(crate) const ONE_VIEW: ResourceTraits = &[("work", ResourceTrait::DynamicOffset)];
 
 /// Switches of shaders that include `view_work.wgsl`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SetVariant {
     /// None of a set that is a layered cube alone.
     pub cameras: usize,

@@ -8,10 +8,6 @@
 {% include "bounce/ray.wgsl" %}
 {% include "single_pole.wgsl" %}
 @group(0) var<storage, read> rays: array<MirroredRay>;
-{% if count_steps %}
-@group(0) var<storage, read_write> out_steps: array<u32>;
-var<private> steps: u32 = 0u;
-{% endif %}
 
 // Linear along a ray: columns and rows before they move, and inverse depth.
 struct Line { origin: vec3f, line: vec3f }
@@ -20,8 +16,6 @@ struct Line { origin: vec3f, line: vec3f }
 struct Look { place: vec2f, gap: f32, footprint: f32, connected: bool }
 
 fn look_at(line: Line, s: f32, camera: SampleCamera, pole: Pole) -> Look {
-{% if count_steps %}    steps += 1u;
-{% endif %}
     let at = line.origin + line.line * s;
     let place = moved(pole, at.xy, at.z) - 0.5;
     let inside = all(place >= vec2f(0.0)) && all(place < camera.cells);
@@ -162,6 +156,4 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let color = color_at(camera, found.place);
     // Coarse steps prove nothing to be free: only what never comes into the volume meets nothing for certain.
     write_found(index, found.met, found.t, color, origin_of(camera.mask, 0u), span.near >= span.far);
-{% if count_steps %}    out_steps[index] += steps;
-{% endif %}
 }

@@ -103,8 +103,6 @@ pub(crate) struct Bounces<'s> {
     listed: [PooledBuffer; 4],
     /// Colours, inverse ways and provenance of rays.
     pub planes: [PooledBuffer; 3],
-    /// The steps of each ray in images of single-pole cameras, where they are counted.
-    pub steps: Option<PooledBuffer>,
 }
 
 /// Rays off one mirror: the numbers of those of each cell.
@@ -152,7 +150,10 @@ impl<'s> Bounces<'s> {
             works.push(device.gpu.buffer_with("mirror cell", &uniform_elements([bytes]), BufferUsages::UNIFORM));
             poles.push(poles_of(device, cell, &cameras, curved_search));
         }
-        let lobes = if mirrors.glossy_rays > 0 && cells.iter().any(MirrorCell::is_plain_cube) {
+        // In a light field lobes are gathered.
+        let has_plain_cube =
+            cells.iter().filter_map(|cell| cell.surroundings.cube.as_ref()).any(|cube| cube.light_field.is_none());
+        let lobes = if mirrors.glossy_rays > 0 && has_plain_cube {
             let surfaces = device.lend("glossy surfaces", size_of::<GpuGlossySurface>() * pixels)?;
             Some([surfaces, device.lend("light of lobes", 12 * pixels)?])
         } else {
@@ -171,7 +172,6 @@ impl<'s> Bounces<'s> {
             rays: [rays()?, rays()?],
             listed: [listed()?, listed()?, listed()?, listed()?],
             planes: [plane("mirrored colour")?, plane("mirrored depth")?, plane("mirrored provenance")?],
-            steps: None,
             cells,
         }))
     }
@@ -206,7 +206,7 @@ impl<'s> Bounces<'s> {
     /// What must live until the device is done.
     pub fn into_memory(self) -> impl Iterator<Item = PooledBuffer> {
         let lobes = self.lobes.into_iter().flatten();
-        self.rays.into_iter().chain(self.listed).chain(self.planes).chain(self.steps).chain(lobes)
+        self.rays.into_iter().chain(self.listed).chain(self.planes).chain(lobes)
     }
 
     /// What the base reflects, if there is one in which anything does.
@@ -346,10 +346,8 @@ pub(crate) fn follow(
     let unknown = bounces.left(recording.device, 3);
     let mut bindings = bounces.search_bindings(cell, &unknown);
     if bounces.poles[cell].is_some() {
-        let walk = CurvedWalk { set, count_steps: bounces.steps.is_some() };
-        bindings.extend(bounces.steps.as_ref().map(|steps| Binding::buffer("out_steps", steps)));
         bindings.extend(bounces.list_bindings(lists));
-        let walk = recording.bind(&walk, bindings)?;
+        let walk = recording.bind(&CurvedWalk(set), bindings)?;
         recording.dispatch_listed(&walk, &lists.lists, cell, (cell, reflection));
         return Ok(());
     }

@@ -22,9 +22,6 @@ pub(crate) const MORE_ENTRIES: u32 = 1 << 31;
 
 /// The tables of `cube/walk.wgsl`.
 pub(super) struct Bricks {
-    /// Columns and rows of cells.
-    pub columns: u32,
-    pub rows: u32,
     pub cells: Vec<u32>,
     pub bricks: Vec<[u32; 4]>,
     /// Two entries; or the first entry of more, and the places of the first pair of the others and of the one after their last.
@@ -46,14 +43,8 @@ impl Bricks {
         let size = samples.size.map(|side| side.div_ceil(8));
         let (first, passages) = by_cell(samples, size);
         let occupied: Vec<bool> = first.windows(2).map(|ends| ends[1] > ends[0]).collect();
-        let mut all = Self {
-            columns: size.x,
-            rows: size.y,
-            cells: reaches(size, &occupied),
-            bricks: Vec::new(),
-            leaves: Vec::new(),
-            entries: Vec::new(),
-        };
+        let cells = reaches(size, &occupied);
+        let mut all = Self { cells, bricks: Vec::new(), leaves: Vec::new(), entries: Vec::new() };
         for (cell, ends) in first.windows(2).enumerate().filter(|(_, ends)| ends[1] > ends[0]) {
             all.cells[cell] = all.bricks.len() as u32;
             all.add_brick(&passages[ends[0] as usize..ends[1] as usize]);

@@ -71,8 +71,10 @@ impl Cube {
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
         check(grid, images)?;
-        let cells = grid.size.map(|side| side.div_ceil(8)).to_array().map(|side| side as usize);
-        tables.gpu.check_table("cells of a layered cube", cells.iter().product())?;
+        let cells = grid.size.map(|side| side.div_ceil(8));
+        tables
+            .gpu
+            .check_table("cells of a layered cube", cells.to_array().map(|side| side as usize).iter().product())?;
         let count: usize = images.iter().map(LayeredDepthImage::sample_count).sum();
         GpuError::check_limit("the samples of a layered cube", count as u64, MAX_SAMPLES as u64)?;
         tables.gpu.check_table("samples of a layered cube", count)?;
@@ -83,8 +85,8 @@ impl Cube {
         let cube = GpuCube {
             cube_from_world: cube_from_world(grid),
             size: grid.size.to_array(),
-            columns: bricks.columns,
-            rows: bricks.rows,
+            columns: cells.x,
+            rows: cells.y,
             start_m,
             padding: [0; 2],
         };

@@ -15,9 +15,10 @@ use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
 /// The rays that are walked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Walked {
     /// Those of all pixels.
+    #[default]
     Pixels,
     /// Those of pixels that another method leaves: the cube is the base beside its images.
     LeftPixels,
@@ -40,7 +41,7 @@ impl Walked {
 }
 
 /// The switches of `layered.wgsl`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Walk {
     set: SetVariant,
     rays: Walked,
@@ -59,19 +60,6 @@ pub(crate) struct Walk {
 }
 
 impl Walk {
-    const PLAIN: Self = Self {
-        set: SetVariant::CUBE,
-        rays: Walked::Pixels,
-        in_base: false,
-        truncated: false,
-        highlight: None,
-        mirror_cells: None,
-        lobe: None,
-        lights: 0,
-        environment_map: false,
-        visibility_words: 0,
-    };
-
     fn of(
         recording: &Recording<'_>,
         cube: &Cube,
@@ -160,10 +148,10 @@ impl ShaderVariant for Walk {
     }
 
     fn all() -> Vec<Self> {
-        let mut all = [false, true].map(|truncated| Self { truncated, ..Self::PLAIN }).to_vec();
+        let mut all = [false, true].map(|truncated| Self { truncated, ..Self::default() }).to_vec();
         for (lights, visibility_words) in [(0, 0), (3, 1), (255, 64)] {
             for [truncated, environment_map] in switches() {
-                let with = Self { truncated, lights, visibility_words, ..Self::PLAIN };
+                let with = Self { truncated, lights, visibility_words, ..Self::default() };
                 for rays in [Walked::Pixels, Walked::Bounced, Walked::IntoLobes] {
                     let ggx = Self { rays, highlight: Some(Highlight::Ggx), environment_map, ..with };
                     all.extend([ggx, Self { mirror_cells: Some(1), ..ggx }]);
@@ -177,7 +165,7 @@ impl ShaderVariant for Walk {
         let left: Vec<Self> = left.collect();
         all.extend(left);
         for [truncated, environment_map] in switches() {
-            let without_reflectors = Self { in_base: true, truncated, environment_map, ..Self::PLAIN };
+            let without_reflectors = Self { in_base: true, truncated, environment_map, ..Self::default() };
             let bounced = [Walked::Bounced, Walked::IntoLobes, Walked::LeftBounced];
             all.extend(bounced.map(|rays| Self { rays, ..without_reflectors }));
         }
@@ -192,8 +180,7 @@ pub(crate) fn record(
     bounces: Option<&Bounces<'_>>,
     followed: Option<u32>,
 ) -> Result<PixelList, ReconstructionError> {
-    let undecided = recording.empty_list();
-    let Some(cube) = recording.set.cube.clone() else { return Ok(undecided) };
+    let Some(cube) = recording.set.cube.clone() else { return Ok(recording.empty_list()) };
     let mirrors = bounces.map_or(0, |bounces| bounces.reflections);
     let followed = followed.map_or(mirrors, |followed| followed.min(mirrors));
     let is_glossy = bounces.is_some_and(|bounces| bounces.glossy_rays > 0);
@@ -201,7 +188,7 @@ pub(crate) fn record(
     let sent = bounces.filter(|_| lobe.is_some_and(LobeLight::is_sent));
     let sent = sent.and_then(|bounces| GlossyList::of(recording, bounces));
     let first = bounces.filter(|_| followed > 0).map(|bounces| bounces.next(recording.device, None));
-    walk_pixels(recording, &cube, None, &undecided, bounces.zip(first.as_ref()), lobe, sent.as_ref())?;
+    let undecided = walk_pixels(recording, &cube, None, bounces.zip(first.as_ref()), lobe, sent.as_ref())?;
     let Some(bounces) = bounces else { return Ok(undecided) };
     if let Some(first) = first {
         let gathered = (followed < mirrors).then_some(LobeLight::GatheredMirrors);
@@ -260,10 +247,8 @@ pub(crate) fn record_left(
     mirrored: Option<(&Bounces<'_>, &RayLists)>,
     glossy: Option<&GlossyList<'_>>,
 ) -> Result<PixelList, ReconstructionError> {
-    let undecided = recording.empty_list();
     let lobe = glossy.map(|_| LobeLight::sent(mirrored.is_some()));
-    walk_pixels(recording, base, Some(left), &undecided, mirrored, lobe, glossy)?;
-    Ok(undecided)
+    walk_pixels(recording, base, Some(left), mirrored, lobe, glossy)
 }
 
 /// Records the walk of listed rays off mirrors in the cube beside a view's images: of all, or of those whose end the images of their
@@ -283,23 +268,23 @@ fn walk_pixels(
     recording: &mut Recording<'_>,
     cube: &Cube,
     listed: Option<&PixelList>,
-    undecided: &PixelList,
     mirrored: Option<(&Bounces<'_>, &RayLists)>,
     lobe: Option<LobeLight>,
     sent: Option<&GlossyList<'_>>,
-) -> Result<(), ReconstructionError> {
+) -> Result<PixelList, ReconstructionError> {
+    let undecided = recording.empty_list();
     let rays = if listed.is_some() { Walked::LeftPixels } else { Walked::Pixels };
     let variant = Walk::of(recording, cube, rays, mirrored.map(|(bounces, _)| bounces), lobe);
     let mut bindings = recording.view_bindings();
     bindings.extend(shared_bindings(recording, cube, &variant));
-    bindings.extend(found_bindings(recording.batch.pixel_planes(), undecided));
+    bindings.extend(found_bindings(recording.batch.pixel_planes(), &undecided));
     bindings.extend(listed.into_iter().flat_map(PixelList::bindings));
     let spawning = mirrored.filter(|_| variant.mirror_cells.is_some());
     bindings.extend(spawning.into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
     bindings.extend(sent.filter(|_| variant.lobe.is_some()).into_iter().flat_map(GlossyList::bindings));
     let pass = recording.bind(&variant, bindings)?;
     recording.dispatch_pixels(&pass, listed);
-    Ok(())
+    Ok(undecided)
 }
 
 /// What becomes of the light at the ends of rays.

@@ -9,6 +9,7 @@ pub(crate) mod layered;
 pub(crate) mod light_field_search;
 mod mesh;
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use depth_image::{LightCacheQuality, MAX_REFLECTIONS, NamedMethod, Setting, named_methods};
@@ -65,10 +66,7 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 6] = [
         method: JointCarve { stop_level: 0 },
         setting: Some(Setting {
             form: "LEVEL (0 to 8)",
-            parse: |text| {
-                let level = text.parse().ok().filter(|&level| level <= MAX_STOP_LEVEL);
-                level.map(|stop_level| JointCarve { stop_level })
-            },
+            parse: |text| number(text, 0..=MAX_STOP_LEVEL).map(|stop_level| JointCarve { stop_level }),
         }),
         help: "traverses the depth pyramids of all cameras together, down to a level; 0 is exact",
     },
@@ -77,10 +75,7 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 6] = [
         method: LightFieldSearch { steps: DEFAULT_STEPS },
         setting: Some(Setting {
             form: "STEPS (1 to 1024)",
-            parse: |text| {
-                let steps = text.parse().ok().filter(|steps| (1..=MAX_STEPS).contains(steps));
-                steps.map(|steps| LightFieldSearch { steps })
-            },
+            parse: |text| number(text, 1..=MAX_STEPS).map(|steps| LightFieldSearch { steps }),
         }),
         help: "searches along each ray in equal steps, 100 by default",
     },
@@ -90,10 +85,7 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 6] = [
         method: HybridMesh { merged: None },
         setting: Some(Setting {
             form: "PX (0.01 to 100)",
-            parse: |text| {
-                let bound = text.parse().ok().and_then(ErrorBound::from_px)?;
-                Some(HybridMesh { merged: Some(bound) })
-            },
+            parse: |text| ErrorBound::from_px(text.parse().ok()?).map(|bound| HybridMesh { merged: Some(bound) }),
         }),
         help: "draws a quad for each sample, and merges quads where nothing moves by more than PX pixels",
     },
@@ -102,10 +94,7 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 6] = [
         method: ReconstructionMethod::LAYERED,
         setting: Some(Setting {
             form: "MIRRORS (0 to 8)",
-            parse: |text| {
-                let followed = text.parse().ok().filter(|&mirrors| mirrors <= MAX_REFLECTIONS)?;
-                Some(Layered { followed: Some(followed) })
-            },
+            parse: |text| number(text, 0..=MAX_REFLECTIONS).map(|mirrors| Layered { followed: Some(mirrors) }),
         }),
         help: "walks through a layered cube, and meets the planes of its samples; with MIRRORS, rays are followed off at most that \
                many mirrors, and what the next one shows is gathered in a light field",
@@ -120,6 +109,11 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 6] = [
         help: "takes surfaces from the scene and light from the samples; lights points that no sample knows in the view, balanced by default",
     },
 ];
+
+/// A whole number within bounds.
+fn number(text: &str, bounds: RangeInclusive<u32>) -> Option<u32> {
+    text.parse().ok().filter(|number| bounds.contains(number))
+}
 
 /// The steps of the search, and the bound of merged quads in pixels, among which budgets choose.
 const LADDER_STEPS: u32 = 64;
@@ -169,22 +163,18 @@ impl ReconstructionMethod {
         matches!(self, HybridMesh { .. })
     }
 
-    /// The settings of all methods among which budgets choose. Those of one method follow each other, by rising effort.
+    /// The settings of all methods among which budgets choose: those of methods for images. Settings of one method follow each other, by
+    /// rising effort.
     pub fn ladder() -> impl Iterator<Item = Self> {
-        METHODS.into_iter().flat_map(|row| row.method.by_effort())
-    }
-
-    fn by_effort(self) -> Vec<Self> {
-        match self {
-            JointCarve { .. } => vec![JointCarve { stop_level: 1 }, JointCarve { stop_level: 0 }],
-            LightFieldSearch { .. } => vec![LightFieldSearch { steps: LADDER_STEPS }],
-            Mesh => vec![Mesh],
-            // Budgets choose among sets of images.
-            Layered { .. } | LightCache { .. } => Vec::new(),
-            HybridMesh { .. } => {
-                vec![HybridMesh { merged: ErrorBound::from_px(LADDER_BOUND_PX) }, HybridMesh { merged: None }]
-            }
-        }
+        [
+            JointCarve { stop_level: 1 },
+            JointCarve { stop_level: 0 },
+            LightFieldSearch { steps: LADDER_STEPS },
+            Mesh,
+            HybridMesh { merged: ErrorBound::from_px(LADDER_BOUND_PX) },
+            HybridMesh { merged: None },
+        ]
+        .into_iter()
     }
 
     /// The same method with less to do for coarser views; `None` where it has no coarser setting.
@@ -247,10 +237,7 @@ impl ReconstructionMethod {
         self,
         recording: &mut Recording<'_>,
     ) -> Result<Option<PixelList>, ReconstructionError> {
-        match self {
-            JointCarve { .. } => joint_carve::smooth::record(recording).map(Some),
-            LightFieldSearch { .. } | Mesh | HybridMesh { .. } | Layered { .. } | LightCache { .. } => Ok(None),
-        }
+        if let JointCarve { .. } = self { joint_carve::smooth::record(recording).map(Some) } else { Ok(None) }
     }
 
     /// The set's quads, cut when they are first asked for; `None` for methods that draw none.
