@@ -70,7 +70,7 @@ pub(crate) struct GpuLobeRays {
 pub(crate) struct GlossyList<'b> {
     surfaces: &'b Buffer,
     /// Of their pixels, from all of their rays.
-    light: &'b Buffer,
+    pub light: &'b Buffer,
     list: Buffer,
     /// Rays of each.
     pub rays: u32,
@@ -93,13 +93,8 @@ impl<'b> GlossyList<'b> {
             Binding::buffer("lobe_rays", &self.count),
             Binding::buffer("glossy_surfaces", self.surfaces),
             Binding::buffer("glossy_list", &self.list),
-            self.light_binding(),
+            Binding::buffer("lobe_light", self.light),
         ]
-    }
-
-    /// The light of passes that add to it.
-    pub fn light_binding(&self) -> Binding<'_> {
-        Binding::buffer("lobe_light", self.light)
     }
 }
 
@@ -160,7 +155,7 @@ pub(crate) fn record_sum(recording: &mut Recording<'_>, glossy: &GlossyList<'_>)
     let bindings = [
         Binding::buffer("glossy", glossy.surfaces),
         Binding::buffer("glossy_list", &glossy.list),
-        glossy.light_binding(),
+        Binding::buffer("lobe_light", glossy.light),
         Binding::buffer("out_color", &recording.batch.color),
     ];
     let pass = recording.bind(&LobeSum, bindings)?;

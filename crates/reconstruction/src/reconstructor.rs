@@ -12,12 +12,13 @@ use crate::bounce::{self, Bounces, CellRays, CurvedSearch, Mirrors, RayLists};
 use crate::cube::Cube;
 use crate::in_flight::InFlight;
 use crate::lobes::GlossyList;
+use crate::methods::layered::{self, Ends, Walked};
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
 use crate::recording::{MIRRORED_PIXELS_A_BATCH, MIRRORED_PIXELS_A_SLICE, PIXELS_A_BATCH, Recording, batches};
 use crate::sample_set::SampleSet;
 use crate::set_description::SetDescription;
-use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod, methods::layered};
+use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
 use crate::{fill, shaders::templates, specular, tile_start};
 
 /// Calls of one class that are under way at once: each holds the memory of two batches.
@@ -282,8 +283,7 @@ impl Reconstructor {
         set: &SampleSet,
         method: ReconstructionMethod,
     ) -> Result<Option<MeshStatistics>, ReconstructionError> {
-        check_samples(set, method)?;
-        Ok(method.mesh(&self.device, set, Turn::default())?.map(|mesh| mesh.statistics))
+        Ok(self.mesh(set, method)?.map(|mesh| mesh.statistics))
     }
 
     /// The quads that a method draws, image after image in the order of their samples; none for methods that draw none.
@@ -291,9 +291,12 @@ impl Reconstructor {
     /// # Errors
     /// As [`Reconstructor::mesh_statistics`].
     pub fn read_quads(&self, set: &SampleSet, method: ReconstructionMethod) -> Result<Vec<Quad>, ReconstructionError> {
+        self.mesh(set, method)?.map_or(Ok(Vec::new()), |mesh| quads::read(&self.device, &mesh, set))
+    }
+
+    fn mesh(&self, set: &SampleSet, method: ReconstructionMethod) -> Result<Option<Arc<Mesh>>, ReconstructionError> {
         check_samples(set, method)?;
-        let mesh = method.mesh(&self.device, set, Turn::default())?;
-        mesh.map_or(Ok(Vec::new()), |mesh| quads::read(&self.device, &mesh, set))
+        method.mesh(&self.device, set, Turn::default())
     }
 }
 
@@ -314,7 +317,8 @@ fn record_mirrored(
                 bounce::follow(recording, bounces, rays)?;
             }
             if let Some(base) = base {
-                layered::follow_in_base(recording, base, bounces, rays, !cell.is_cube())?;
+                let walked = if cell.is_cube() { Walked::Bounced } else { Walked::LeftBounced };
+                layered::follow(recording, base, bounces, rays, walked, Ends::default())?;
             }
             if !cell.is_cube() {
                 bounce::land(recording, bounces, rays)?;
@@ -332,7 +336,7 @@ fn cube_of_base(base: &SampleSet) -> Result<&Cube, ReconstructionError> {
 
 /// Views come from pinholes or from a cube, as the method needs.
 fn check_samples(set: &SampleSet, method: ReconstructionMethod) -> Result<(), ReconstructionError> {
-    if set.is_single_pole() {
+    if !set.poles.is_empty() {
         return Err(ReconstructionError::Model { model: "single_pole" });
     }
     if method.light_cache_quality().is_some() {

@@ -49,11 +49,6 @@ impl SampleSet {
         SetVariant { cameras: self.cameras.len(), holes: self.uncertain.contains(&true) }
     }
 
-    /// Its images are those of single-pole cameras.
-    pub(crate) fn is_single_pole(&self) -> bool {
-        !self.poles.is_empty()
-    }
-
     /// The resources of `background.wgsl`.
     pub(crate) fn background_bindings(&self) -> Vec<Binding<'_>> {
         match &self.environment {

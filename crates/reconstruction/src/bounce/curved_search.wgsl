@@ -139,9 +139,7 @@ fn color_at(camera: SampleCamera, place: vec2f) -> vec3f {
     let cell_index = camera.first_cell + cell.y * camera.width_px + cell.x;
     let within = clamped - floor(clamped);
     let smooth_at = select(round(within), within, corners_of(cell_index).connected);
-    let shares = bilinear_shares(smooth_at);
-    let colors = colors_of(cell_index).corners;
-    return shares.x * colors[0] + shares.y * colors[1] + shares.z * colors[2] + shares.w * colors[3];
+    return mixed_color(cell_index, bilinear_shares(smooth_at));
 }
 
 @compute @workgroup_size(LIST_WORKGROUP)

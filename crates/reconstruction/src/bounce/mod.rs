@@ -381,7 +381,7 @@ pub(crate) fn land(
         set: set.variant(),
         next_cells: next.filter(|_| reflectors.is_some()).map(|_| bounces.cells.len()),
         reflects: reflectors.is_some(),
-        single_pole: set.is_single_pole(),
+        single_pole: !set.poles.is_empty(),
         lights: view_reflectors.lights,
         environment_map: environment.is_some(),
         visibility_words: reflectors.map_or(0, |reflectors| reflectors.visibility_words),

@@ -16,7 +16,7 @@ use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Record
 
 /// The rays that are walked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-enum Walked {
+pub(crate) enum Walked {
     /// Those of all pixels.
     #[default]
     Pixels,
@@ -251,19 +251,6 @@ pub(crate) fn record_left(
     walk_pixels(recording, base, Some(left), mirrored, lobe, glossy)
 }
 
-/// Records the walk of listed rays off mirrors in the cube beside a view's images: of all, or of those whose end the images of their
-/// mirror cell leave unknown.
-pub(crate) fn follow_in_base(
-    recording: &mut Recording<'_>,
-    base: &Cube,
-    bounces: &Bounces<'_>,
-    rays: CellRays<'_>,
-    left_by_images: bool,
-) -> Result<(), ReconstructionError> {
-    let walked = if left_by_images { Walked::LeftBounced } else { Walked::Bounced };
-    follow(recording, base, bounces, rays, walked, Ends::default())
-}
-
 fn walk_pixels(
     recording: &mut Recording<'_>,
     cube: &Cube,
@@ -289,15 +276,15 @@ fn walk_pixels(
 
 /// What becomes of the light at the ends of rays.
 #[derive(Clone, Copy, Default)]
-struct Ends<'g> {
+pub(crate) struct Ends<'g> {
     /// What mirrors show there.
     gathered: Option<LobeLight>,
     /// It is summed up, where rays go into lobes.
     lobes: Option<&'g GlossyList<'g>>,
 }
 
-/// Records the walk of rays off the mirrors of a mirror cell, whose light is added to their pixels.
-fn follow(
+/// Records the walk of listed rays off mirrors or into lobes, whose light is added to their pixels.
+pub(crate) fn follow(
     recording: &mut Recording<'_>,
     cube: &Cube,
     bounces: &Bounces<'_>,
@@ -310,7 +297,9 @@ fn follow(
     let [_, _, ray_provenance] = &bounces.planes;
     bindings.extend([
         Binding::buffer("work", &bounces.works[rays.cell]),
-        ends.lobes.map_or(Binding::buffer("out_color", &recording.batch.color), GlossyList::light_binding),
+        ends.lobes.map_or(Binding::buffer("out_color", &recording.batch.color), |glossy| {
+            Binding::buffer("lobe_light", glossy.light)
+        }),
         Binding::buffer("out_provenance", &recording.batch.provenance),
     ]);
     bindings.extend(walked.is_left().then(|| Binding::buffer("ray_provenance", ray_provenance)));

@@ -15,11 +15,12 @@ use std::sync::Arc;
 use depth_image::{LightCacheQuality, MAX_REFLECTIONS, NamedMethod, Setting, named_methods};
 use gpu::{ShaderError, ShaderSource, Templates, Turn, shader_sources, wgsl_constants, wgsl_files};
 
-use self::hybrid_mesh::GREATEST_SLOPE;
-use self::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL};
+use self::hybrid_mesh::{CutTexels, GREATEST_SLOPE};
+use self::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, March, NUDGE_PX, START_LEVEL};
 use self::joint_carve::smooth::{FAINT_HIGHLIGHT, OPEN_SHARE, SMOOTH_FOOTPRINTS, Smooth};
-use self::joint_carve::{BLIND_MOVE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_TO_HIT, MAX_STOP_LEVEL};
-use self::light_field_search::{BISECTIONS, DEFAULT_STEPS, MAX_STEPS};
+use self::joint_carve::{BLIND_MOVE, Carve, LEAST_MOVE, MAX_MOVES, MAX_MOVES_TO_HIT, MAX_STOP_LEVEL};
+use self::light_field_search::{BISECTIONS, DEFAULT_STEPS, MAX_STEPS, Search};
+use self::{layered::Walk, mesh::CutBetweenSamples};
 use crate::bounce::Bounces;
 use crate::quads::{self, ErrorBound, Mesh as QuadMesh, QuadDrawing};
 use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
@@ -134,15 +135,7 @@ pub(crate) fn constants() -> [(&'static str, String); 14] {
 
 /// The texts of all variants of all methods' passes.
 pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    let searches = shader_sources!(
-        templates,
-        joint_carve::march::March,
-        Smooth,
-        joint_carve::Carve,
-        light_field_search::Search,
-        layered::Walk
-    );
-    searches.chain(shader_sources!(templates, mesh::CutBetweenSamples, hybrid_mesh::CutTexels))
+    shader_sources!(templates, March, Smooth, Carve, Search, Walk, CutBetweenSamples, CutTexels)
 }
 
 named_methods!(ReconstructionMethod, UnknownMethod, "reconstruction method");
