@@ -26,35 +26,34 @@ impl Reflectors {
     pub fn upload(
         tables: &TablePool,
         images: &[DepthImage],
-        illumination: &Illumination,
-        highlight: Option<Highlight>,
+        set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
         let planes: Vec<Planes<'_>> = images.iter().map(Planes::of_image).collect();
-        Self::of_planes(tables, &planes, illumination, highlight, None, turn)
+        Self::of_planes(tables, &planes, None, set, turn)
     }
 
     /// The samples are in the order of `places` in their images, image after image, or as they are.
     fn of_planes(
         tables: &TablePool,
         planes: &[Planes<'_>],
-        illumination: &Illumination,
-        highlight: Option<Highlight>,
         places: Option<&[u32]>,
+        set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
-        check(planes, illumination)?;
-        let Some(highlight) = highlight.filter(|_| planes.iter().any(Planes::reflects)) else { return Ok(None) };
+        check(planes, set.illumination)?;
+        let Some(highlight) = set.highlight.filter(|_| planes.iter().any(Planes::reflects)) else { return Ok(None) };
         let gpu = &tables.gpu;
-        let bytes = illumination_bytes(illumination);
+        let bytes = illumination_bytes(set.illumination);
         let limit = gpu.device.limits().max_uniform_buffer_binding_size;
         GpuError::check_limit("the scene's lights (bytes)", bytes.len() as u64, limit)?;
-        let visibility_words = visibility_words(planes);
+        let visible = planes.iter().filter_map(|image| image.specular).map(|planes| planes.visibility8.len());
+        let visibility_words = visible.max().unwrap_or(0);
         let words = sample_words(planes, visibility_words);
         let words = if let Some(places) = places { ordered(&words, planes, places) } else { words };
         Ok(Some(Self {
             highlight,
-            lights: illumination.lights.len(),
+            lights: set.illumination.lights.len(),
             visibility_words,
             has_mirrors: planes.iter().any(Planes::has_mirrors),
             samples: tables.upload("reflectors", TextureFormat::Rgba32Uint, &words, turn)?,
@@ -71,7 +70,7 @@ impl Reflectors {
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
         let planes = images.each_ref().map(Planes::of_layers);
-        Self::of_planes(tables, &planes, set.illumination, set.highlight, Some(places), turn)
+        Self::of_planes(tables, &planes, Some(places), set, turn)
     }
 }
 
@@ -142,10 +141,6 @@ fn ordered(words: &[u32], images: &[Planes<'_>], places: &[u32]) -> Vec<u32> {
         first += image.samples;
     }
     ordered
-}
-
-fn visibility_words(images: &[Planes<'_>]) -> usize {
-    images.iter().filter_map(|image| image.specular).map(|planes| planes.visibility8.len()).max().unwrap_or(0)
 }
 
 /// Sample after sample, image after image; those of images without highlights reflect nothing.

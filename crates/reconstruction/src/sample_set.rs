@@ -136,7 +136,7 @@ impl SampleSet {
             nodes: tables.upload("depth pyramids", TextureFormat::Rg32Uint, &nodes, turn)?,
             cell_codes: tables.upload("cells", TextureFormat::Rg32Uint, &codes, turn)?,
             cell_colors: tables.upload("sample colours", TextureFormat::Rg32Uint, &colors, turn)?,
-            reflectors: Reflectors::upload(tables, images, set.illumination, set.highlight, turn)?,
+            reflectors: Reflectors::upload(tables, images, set, turn)?,
             environment: set.environment.cloned(),
             meshes: SetMeshes::upload(tables, images, turn)?,
             cube: None,

@@ -22,7 +22,7 @@ pub use mirror_cells::{MirrorCell, Mirrors};
 use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList, empty_lists};
 use crate::recording::nearest_first;
-use crate::reflectors::{Reflectors, sample_texels};
+use crate::reflectors::sample_texels;
 use crate::single_pole::GpuPole;
 use crate::surface::found_bindings;
 use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, ONE_VIEW, SetVariant};
@@ -209,11 +209,6 @@ impl<'s> Bounces<'s> {
         self.rays.into_iter().chain(self.listed).chain(self.planes).chain(lobes)
     }
 
-    /// What the base reflects, if there is one in which anything does.
-    fn base_reflectors(&self) -> Option<&'s Reflectors> {
-        self.cells.last().and_then(|cell| reflectors_of_cube(cell.surroundings))
-    }
-
     /// The rays of a list.
     pub fn list_bindings<'b>(&'b self, lists: &'b RayLists) -> [Binding<'b>; 3] {
         [
@@ -371,8 +366,8 @@ pub(crate) fn land(
     let CellRays { lists, next, cell, reflection } = rays;
     let set = bounces.cells[cell].surroundings;
     // Rays come from reflectors: of the view's images, or of the base alone.
-    let view_reflectors = recording.set.reflectors.as_ref().or(bounces.base_reflectors());
-    let Some(view_reflectors) = view_reflectors else { return Ok(()) };
+    let base = bounces.cells.last().and_then(|cell| reflectors_of_cube(cell.surroundings));
+    let Some(view_reflectors) = recording.set.reflectors.as_ref().or(base) else { return Ok(()) };
     let reflectors = set.reflectors.as_ref().filter(|reflectors| {
         reflectors.highlight == view_reflectors.highlight && reflectors.lights == view_reflectors.lights
     });

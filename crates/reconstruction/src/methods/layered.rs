@@ -107,10 +107,10 @@ impl Walk {
 
     /// The same with all ways to light lobes.
     fn with_lobes(self) -> impl Iterator<Item = Self> {
-        let lobes = LobeLight::ALL.into_iter().filter(move |&lobe| match self.rays {
-            Walked::IntoLobes => false,
-            rays => lobe == LobeLight::GatheredMirrors || !rays.is_bounced(),
-        });
+        let may_gather = self.rays != Walked::IntoLobes;
+        let shows_all = !self.rays.is_bounced();
+        let lobes = LobeLight::ALL.into_iter();
+        let lobes = lobes.filter(move |&lobe| may_gather && (shows_all || lobe == LobeLight::GatheredMirrors));
         lobes.map(move |lobe| {
             let follows = matches!(lobe, LobeLight::GatheredRest | LobeLight::SentRest);
             Self { mirror_cells: follows.then_some(1), lobe: Some(lobe), ..self }

@@ -26,8 +26,7 @@ pub(super) fn fill(pixels: &mut [Pixel], size_px: UVec2) {
 
 fn fill_pixel(pixel: &mut Pixel, neighbours: &[Neighbour]) {
     let farthest = neighbours.iter().fold(f32::INFINITY, |least, n| least.min(n.pixel.inverse_depth_per_m));
-    let far_side = neighbours.iter().filter(|n| n.pixel.inverse_depth_per_m * SAME_SIDE <= farthest);
-    let far_side: Vec<_> = far_side.collect();
+    let far_side: Vec<_> = neighbours.iter().filter(|n| n.pixel.inverse_depth_per_m * SAME_SIDE <= farthest).collect();
     let weights: f32 = far_side.iter().map(|n| n.weight).sum();
     // Nothing is known within reach: the background stays.
     if weights > 0.0 {
