@@ -19,7 +19,7 @@ use node::{
 use parking_lot::Mutex;
 use reconstruction::{
     CommonSets, MirrorCell, Mirrors, ReconstructRequest, ReconstructionError, ReconstructionMethod, Reconstructor,
-    RequiredPlanes, SetDescription,
+    SetDescription,
 };
 use render::{DrawWork, GpuScene, LightCache, Lighting, Refinement, RenderError, Renderer, Visibility};
 use sampling::{Sampler, SamplingError, SamplingMethod};
@@ -312,9 +312,11 @@ impl Engine for GpuEngine {
             return Ok(SamplePlanes::default());
         }
         let method: ReconstructionMethod = parsed("reconstruction_method", method)?;
-        let RequiredPlanes { normal, corner_inverse_depth } = method.required_planes();
-        let light = method.light_cache_quality().is_some();
-        Ok(SamplePlanes { normals: normal, corner_inverse_depths: corner_inverse_depth, light })
+        Ok(SamplePlanes {
+            normals: method.needs_corners(),
+            corner_inverse_depths: method.needs_corners(),
+            light: method.light_cache_quality().is_some(),
+        })
     }
 
     fn preview_lighting(&self, lighting: &str) -> Result<String, EngineError> {

@@ -34,25 +34,20 @@ impl ShaderVariant for Shown {
     const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
-        let sums = match self.sums {
-            Sums::None => "none",
-            Sums::Begun => "begun",
-            Sums::Continued => "continued",
-            Sums::Read => "read",
-        };
+        let sums = format!("{:?}", self.sums);
         context! { sums, listed => self.listed, environment_map => self.environment_map, ..self.set.context() }
     }
 
     fn all() -> Vec<Self> {
-        let whole = [Sums::None, Sums::Begun, Sums::Continued, Sums::Read].map(|sums| (sums, false));
-        let sums = whole.into_iter().chain([(Sums::Continued, true)]);
-        let sets = SetVariant::all().into_iter().filter(|set| !set.holes).chain([SetVariant::CUBE]);
-        let each = |set| {
-            sums.clone().flat_map(move |(sums, listed)| {
-                [false, true].map(|environment_map| Self { set, sums, listed, environment_map })
-            })
-        };
-        sets.flat_map(each).collect()
+        let mut all = Vec::new();
+        for set in SetVariant::all().into_iter().filter(|set| !set.holes).chain([SetVariant::CUBE]) {
+            for environment_map in [false, true] {
+                let whole = [Sums::None, Sums::Begun, Sums::Continued, Sums::Read];
+                all.extend(whole.map(|sums| Self { set, sums, listed: false, environment_map }));
+                all.push(Self { set, sums: Sums::Continued, listed: true, environment_map });
+            }
+        }
+        all
     }
 }
 
@@ -66,15 +61,14 @@ pub(crate) fn record(
     let set = SetVariant { holes: false, ..recording.set.variant() };
     let environment_map = recording.set.environment.is_some();
     let variant = Shown { set, sums, listed: listed.is_some(), environment_map };
-    let pass = recording.device.passes.get(&variant)?;
     let batch = &recording.batch;
     let mut bindings = recording.view_bindings();
     bindings.extend(recording.set.background_bindings());
     bindings.push(Binding::buffer("color", &batch.color));
     bindings.push(Binding::buffer("inverse_depth", &batch.inverse_depth_per_m));
     bindings.extend(batch.sums.as_ref().filter(|_| sums != Sums::None).map(|sums| Binding::buffer("sums", sums)));
-    bindings.extend(listed.map(PixelList::bindings).into_iter().flatten());
-    let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&variant, &pass, &bound, listed);
+    bindings.extend(listed.into_iter().flat_map(PixelList::bindings));
+    let pass = recording.bind(&variant, bindings)?;
+    recording.dispatch_pixels(&pass, listed);
     Ok(())
 }

@@ -9,7 +9,7 @@
 // Linear, as RGB9E5, of one position; sRGB once the view is finished.
 @group(0) var<storage, read_write> color: array<u32>;
 @group(0) var<storage, read> inverse_depth: array<f32>;
-{% if sums != "none" %}
+{% if sums != "None" %}
 // Red, green and blue of each pixel: linear light, over the positions so far.
 @group(0) var<storage, read_write> sums: array<f32>;
 {% endif %}
@@ -42,15 +42,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(place >= work.view.size_px) { return; }
     let index = work.view.first_pixel + place.y * work.view.size_px.x + place.x;
 {% endif %}
-{% if sums == "none" %}
+{% if sums == "None" %}
     color[index] = pack4x8unorm(vec4f(srgb_from_linear(shown_from_mean(shown_linear(index, place), work.tone)), 1.0));
-{% elif sums == "read" %}
+{% elif sums == "Read" %}
     let mean = vec3f(sums[3u * index], sums[3u * index + 1u], sums[3u * index + 2u]) * work.position_share;
     color[index] = pack4x8unorm(vec4f(srgb_from_linear(shown_from_mean(mean, work.tone)), 1.0));
 {% else %}
     let shown = shown_linear(index, place);
 {% for channel in ["r", "g", "b"] %}
-    sums[3u * index + {{ loop.index0 }}u] {{ "=" if sums == "begun" else "+=" }} shown.{{ channel }};
+    sums[3u * index + {{ loop.index0 }}u] {{ "=" if sums == "Begun" else "+=" }} shown.{{ channel }};
 {% endfor %}
 {% endif %}
 }

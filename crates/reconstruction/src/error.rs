@@ -48,3 +48,10 @@ pub enum ReconstructionError {
     #[error("the volume of the sample set is empty or not finite")]
     Volume,
 }
+
+impl ReconstructionError {
+    /// The sample image with this place in the set is invalid.
+    pub(crate) fn sample(index: usize, reason: impl ToString) -> Self {
+        Self::Sample { index, reason: reason.to_string() }
+    }
+}

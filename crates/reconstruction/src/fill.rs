@@ -33,16 +33,15 @@ impl ShaderVariant for Fill {
 
 pub(crate) fn record(recording: &mut Recording<'_>, unknown: &PixelList) -> Result<(), ReconstructionError> {
     let variant = Fill(recording.set.variant());
-    let pass = recording.device.passes.get(&variant)?;
-    let batch = &recording.batch;
+    let [color, inverse_depth, provenance] = recording.batch.pixel_planes();
     let mut bindings = recording.view_bindings();
     bindings.extend([
-        Binding::buffer("color", &batch.color),
-        Binding::buffer("inverse_depth", &batch.inverse_depth_per_m),
-        Binding::buffer("provenance", &batch.provenance),
+        Binding::buffer("color", color),
+        Binding::buffer("inverse_depth", inverse_depth),
+        Binding::buffer("provenance", provenance),
     ]);
     bindings.extend(unknown.bindings());
-    let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&variant, &pass, &bound, Some(unknown));
+    let pass = recording.bind(&variant, bindings)?;
+    recording.dispatch_pixels(&pass, Some(unknown));
     Ok(())
 }

@@ -2,12 +2,12 @@
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::Highlight;
-use gpu::{Binding, ResourceTraits, ShaderVariant, highlight_name, light_slots};
+use gpu::{Binding, ResourceTraits, ShaderVariant, highlight_name, light_slots, shader_variant};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
 use crate::bounce::{Bounces, RayLists};
-use crate::pixel_list::GpuPixelList;
+use crate::pixel_list::empty_lists;
 use crate::{device::Device, error::ReconstructionError, recording::Recording};
 
 /// How a surface's lobe is lit, beside the rays off mirrors.
@@ -70,7 +70,7 @@ pub(crate) struct GpuLobeRays {
 pub(crate) struct GlossyList<'b> {
     surfaces: &'b Buffer,
     /// Of their pixels, from all of their rays.
-    light: &'b Buffer,
+    pub light: &'b Buffer,
     list: Buffer,
     /// Rays of each.
     pub rays: u32,
@@ -80,17 +80,11 @@ pub(crate) struct GlossyList<'b> {
 impl<'b> GlossyList<'b> {
     /// None as yet. `None` where no rays are sent.
     pub fn of(recording: &Recording<'_>, bounces: &'b Bounces<'_>) -> Option<Self> {
+        let [surfaces, light] = bounces.lobes.as_ref()?;
         // The positions within a pixel share its rays.
-        let rays = bounces.glossy_rays().div_ceil(recording.batch.planes.antialias.samples());
-        Some(Self::empty(recording.device, bounces.lobes()?, rays))
-    }
-
-    /// None as yet.
-    fn empty(device: &Device, [surfaces, light]: [&'b Buffer; 2], rays: u32) -> Self {
-        let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT;
-        let list = GpuPixelList { workgroups: [0, 1, 1], count: 0 };
-        let list = device.gpu.buffer_with("glossy surfaces", &[list], usage);
-        Self { surfaces, light, list, rays, count: uniform(device, rays, 0) }
+        let rays = bounces.glossy_rays.div_ceil(recording.batch.planes.antialias.samples());
+        let list = empty_lists(&recording.device.gpu, "glossy surfaces", 1);
+        Some(Self { surfaces, light, list, rays, count: uniform(recording.device, rays, 0) })
     }
 
     /// The resources of passes that list surfaces.
@@ -99,13 +93,8 @@ impl<'b> GlossyList<'b> {
             Binding::buffer("lobe_rays", &self.count),
             Binding::buffer("glossy_surfaces", self.surfaces),
             Binding::buffer("glossy_list", &self.list),
-            self.light_binding(),
+            Binding::buffer("lobe_light", self.light),
         ]
-    }
-
-    /// The light of passes that add to it.
-    pub fn light_binding(&self) -> Binding<'_> {
-        Binding::buffer("lobe_light", self.light)
     }
 }
 
@@ -145,7 +134,6 @@ pub(crate) fn record(
     number: u32,
     illumination: &Buffer,
 ) -> Result<RayLists, ReconstructionError> {
-    let pass = recording.device.passes.get(&Lobe)?;
     let lists = bounces.next(recording.device, None);
     let own = uniform(recording.device, glossy.rays, number);
     let mut bindings = vec![
@@ -155,38 +143,22 @@ pub(crate) fn record(
         Binding::buffer("glossy_list", &glossy.list),
     ];
     bindings.extend(bounces.spawn_bindings(&lists));
-    let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&Lobe, &pass, &bound, &glossy.list, 0, ());
+    let pass = recording.bind(&Lobe, bindings)?;
+    recording.dispatch_listed(&pass, &glossy.list, 0, ());
     Ok(lists)
 }
 
-/// The sum of all rays.
-#[derive(Debug)]
-pub(crate) struct LobeSum;
-
-impl ShaderVariant for LobeSum {
-    const TEMPLATE: &'static str = "bounce/lobe_sum.wgsl";
-    const TRAITS: ResourceTraits = &[];
-
-    fn context(&self) -> Value {
-        context! {}
-    }
-
-    fn all() -> Vec<Self> {
-        vec![Self]
-    }
-}
+shader_variant!(LobeSum, "bounce/lobe_sum.wgsl", &[]);
 
 /// Records the pass that adds the light of all rays to the pixels.
 pub(crate) fn record_sum(recording: &mut Recording<'_>, glossy: &GlossyList<'_>) -> Result<(), ReconstructionError> {
-    let pass = recording.device.passes.get(&LobeSum)?;
-    let bindings = vec![
+    let bindings = [
         Binding::buffer("glossy", glossy.surfaces),
         Binding::buffer("glossy_list", &glossy.list),
-        glossy.light_binding(),
+        Binding::buffer("lobe_light", glossy.light),
         Binding::buffer("out_color", &recording.batch.color),
     ];
-    let bound = pass.bind(0, bindings)?;
-    recording.dispatch_listed(&LobeSum, &pass, &bound, &glossy.list, 0, ());
+    let pass = recording.bind(&LobeSum, bindings)?;
+    recording.dispatch_listed(&pass, &glossy.list, 0, ());
     Ok(())
 }

@@ -23,12 +23,16 @@ pub(crate) struct GpuPixelList {
     pub count: u32,
 }
 
+/// The arguments of dispatches over lists of which nothing is listed yet.
+pub(crate) fn empty_lists(gpu: &Gpu, label: &str, count: usize) -> wgpu::Buffer {
+    let empty = GpuPixelList { workgroups: [0, 1, 1], count: 0 };
+    gpu.buffer_with(label, &vec![empty; count], BufferUsages::STORAGE | BufferUsages::INDIRECT)
+}
+
 impl PixelList {
     /// Empty lists for `pieces` pieces of views, with four bytes for each of their pixels.
     pub fn empty(gpu: &Gpu, pixels: wgpu::Buffer, pieces: usize) -> Self {
-        let empty = GpuPixelList { workgroups: [0, 1, 1], count: 0 };
-        let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT;
-        Self { pixels, lists: gpu.buffer_with("lists of undecided pixels", &vec![empty; pieces], usage) }
+        Self { pixels, lists: empty_lists(gpu, "lists of undecided pixels", pieces) }
     }
 
     /// As the next pass reads it.

@@ -43,20 +43,19 @@ impl CodedDepth {
         let [least, range] = least_and_range(image);
         let scale = (LAST_CODE - FIRST_CODE) / range;
         let offset = FIRST_CODE - least * scale;
-        let code = |&inverse: &f32| match inverse {
+        let codes = image.inverse_depth_per_m.iter().map(|&inverse| match inverse {
             d if d > 0.0 => (d * scale + offset).round().clamp(FIRST_CODE, LAST_CODE) as u16,
             0.0 => BACKGROUND_CODE,
             _ => HOLE_CODE,
-        };
-        let camera = image.camera.reference();
-        let codes: Vec<u16> = image.inverse_depth_per_m.iter().map(code).collect();
+        });
+        let codes: Vec<u16> = codes.collect();
         Self {
             size_px: image.size_px().to_array(),
             uncertain: uncertain_texels(image, &codes),
             codes,
             scale,
             offset,
-            connected: connected_cells(image, camera.focal_px.min_element()),
+            connected: connected_cells(image, image.camera.reference().focal_px.min_element()),
         }
     }
 
@@ -84,11 +83,11 @@ impl CodedDepth {
     /// its lower corners, left in the low half and right in the high half. The highest bit of the first says that the cell is
     /// connected; that of the second, that some corner is uncertain. Bit 15 of the first says that the texel is uncertain.
     pub(crate) fn cell_words(&self) -> Vec<[u32; 2]> {
-        let pair = |left: u16, right: u16| u32::from(left) | u32::from(right) << 16;
         let [columns, rows] = self.size_px.map(|side| side as usize);
         let mut words = Vec::with_capacity(columns * rows);
         for y in 0..rows {
-            words.extend(cell_row(&self.codes, columns, y).map(|[a, b, c, d]| [pair(a, b), pair(c, d)]));
+            let corners = cell_row(&self.codes, columns, y).map(|corners| corners.map(u32::from));
+            words.extend(corners.map(|[a, b, c, d]| [a | b << 16, c | d << 16]));
         }
         for (word, &connected) in words.iter_mut().zip(&self.connected) {
             word[0] |= u32::from(connected) << 31;
@@ -127,23 +126,22 @@ impl CodedDepth {
 
 /// Some texel of a set is uncertain. Holes are counted as they are coded: a depth that is not a number is one, too.
 pub(crate) fn is_among_holes(images: &[DepthImage]) -> bool {
-    let is_hole = |&inverse: &f32| inverse.is_nan() || inverse < 0.0;
-    let passes = |image: &DepthImage| image.passed.as_ref().is_some_and(|passed| passed.contains(&true));
-    images.iter().any(|image| passes(image) || image.inverse_depth_per_m.iter().any(is_hole))
+    images.iter().any(|image| {
+        image.passed.as_ref().is_some_and(|passed| passed.contains(&true))
+            || image.inverse_depth_per_m.iter().any(|&inverse| inverse.is_nan() || inverse < 0.0)
+    })
 }
 
 fn uncertain_texels(image: &DepthImage, codes: &[u16]) -> Vec<bool> {
-    let uncertain = |(index, &code): (usize, &u16)| code == HOLE_CODE || image.has_passed(index);
-    let texels: Vec<bool> = codes.iter().enumerate().map(uncertain).collect();
+    let texels = codes.iter().enumerate().map(|(index, &code)| code == HOLE_CODE || image.has_passed(index));
+    let texels: Vec<bool> = texels.collect();
     if texels.contains(&true) { texels } else { Vec::new() }
 }
 
 /// A row of cells, one to the lower right of each texel. Their values are those of a plane at their upper left, upper
 /// right, lower left and lower right corners. The border's values go on beyond the border.
 pub(crate) fn cell_row<T: Copy>(plane: &[T], columns: usize, y: usize) -> impl Iterator<Item = [T; 4]> {
-    let row = |y: usize| &plane[y * columns..][..columns];
-    let upper = row(y);
-    let lower = row((y + 1).min(plane.len() / columns - 1));
+    let [upper, lower] = [y, (y + 1).min(plane.len() / columns - 1)].map(|y| &plane[y * columns..][..columns]);
     let last = columns - 1;
     let inside = upper.windows(2).zip(lower.windows(2)).map(|(u, l)| [u[0], u[1], l[0], l[1]]);
     inside.chain(std::iter::once([upper[last], upper[last], lower[last], lower[last]]))
@@ -208,7 +206,7 @@ pub(crate) struct Pyramid {
 
 impl Pyramid {
     pub fn of(depth: &CodedDepth) -> Self {
-        let log2_sides = depth.size_px.map(|side| side.max(2).next_power_of_two().ilog2());
+        let log2_sides = Self::log2_sides(depth.size_px);
         let mut words = Vec::with_capacity(Self::word_count(log2_sides));
         words.extend(nodes(log2_sides, 1).map(|(x, y)| corner_range(depth, 2 * x as u32, 2 * y as u32)));
         for level in 2..=log2_sides[0].min(log2_sides[1]) {
@@ -221,6 +219,11 @@ impl Pyramid {
             }
         }
         Self { log2_sides, words }
+    }
+
+    /// The padded sides of an image.
+    pub fn log2_sides(size_px: [u32; 2]) -> [u32; 2] {
+        size_px.map(|side| side.max(2).next_power_of_two().ilog2())
     }
 
     /// Words of all levels of padded sides.
@@ -242,13 +245,12 @@ impl Pyramid {
         for level in 1..=self.log2_sides[0].min(self.log2_sides[1]) {
             let begin = Self::level_begin(self.log2_sides, level);
             let [columns, rows] = self.log2_sides.map(|side| 1usize << (side - level));
-            let nearest =
-                |x: usize, y: usize| self.words[begin + y.min(rows - 1) * columns + x.min(columns - 1)] & 0xffff;
-            wide.extend(
-                nodes(self.log2_sides, level).map(|(x, y)| {
-                    nearest(x, y).max(nearest(x + 1, y)).max(nearest(x, y + 1)).max(nearest(x + 1, y + 1))
-                }),
-            );
+            wide.extend(nodes(self.log2_sides, level).map(|(x, y)| {
+                let right = (x + 1).min(columns - 1);
+                let [upper, lower] = [y, (y + 1).min(rows - 1)].map(|y| begin + y * columns);
+                let places = [upper + x, upper + right, lower + x, lower + right];
+                places.into_iter().fold(0, |nearest, place| nearest.max(self.words[place] & 0xffff))
+            }));
         }
         wide
     }

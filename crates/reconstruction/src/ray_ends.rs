@@ -7,8 +7,8 @@ use glam::{UVec2, Vec3};
 use gpu::Turn;
 
 use crate::bounce::{Bounces, CellRays, CurvedSearch, GpuMirroredRay, MirrorCell, Mirrors, follow, land};
-use crate::device::Device;
 use crate::error::ReconstructionError;
+use crate::reconstructor::Reconstructor;
 use crate::recording::Recording;
 use crate::sample_set::SampleSet;
 
@@ -25,7 +25,7 @@ pub struct RayEnd {
     pub way_m: f32,
     /// At a hit.
     pub color_linear: Vec3,
-    /// Look-ups in images of single-pole cameras; 0 where they are not counted.
+    /// Look-ups in images of single-pole cameras, which the twin alone counts.
     pub steps: u32,
 }
 
@@ -38,8 +38,6 @@ pub struct RayWork<'s> {
     pub near_m: f32,
     /// In images of single-pole cameras.
     pub curved_search: CurvedSearch,
-    /// Counting slows it down.
-    pub count_steps: bool,
     /// The side of each ray's footprint, at all places. Where it is more than 0, colours are those that a mirror shows: filtered, and
     /// with highlights. A set in which nothing reflects gives black.
     pub width_m: f32,
@@ -49,77 +47,64 @@ impl<'s> RayWork<'s> {
     /// Rays without width, by the usual search.
     #[must_use]
     pub fn new(surroundings: &'s SampleSet, near_m: f32) -> Self {
-        Self { surroundings, near_m, curved_search: CurvedSearch::default(), count_steps: false, width_m: 0.0 }
+        Self { surroundings, near_m, curved_search: CurvedSearch::default(), width_m: 0.0 }
     }
 }
 
-/// Follows rays with directions of unit length. Gives also the seconds on the device.
-pub(crate) fn follow_rays(
-    device: &Device,
-    work: RayWork<'_>,
-    rays: &[Ray],
-) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
-    let RayWork { surroundings, near_m, curved_search, count_steps, width_m } = work;
-    if surroundings.cameras.is_empty() {
-        return Err(ReconstructionError::NoSamples { what: "a ray off a mirror".to_owned(), needed: "depth images" });
+impl Reconstructor {
+    /// Where single rays end in images of a mirror's surroundings, followed as rays off mirrors are; also the seconds on the
+    /// device. Directions are of unit length.
+    ///
+    /// # Errors
+    /// Steps that cannot be used, too many rays, or the device.
+    pub fn follow(&self, work: RayWork<'_>, rays: &[Ray]) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
+        let RayWork { surroundings, near_m, curved_search, width_m } = work;
+        let device = &self.device;
+        let Some(first) = surroundings.cameras.first() else {
+            let what = "a ray off a mirror".to_owned();
+            return Err(ReconstructionError::NoSamples { what, needed: "depth images" });
+        };
+        let cells = [MirrorCell { bounds: Aabb::around([first.eye_in_world.into()]), surroundings }];
+        let mirrors = Mirrors { cells: &cells, reflections: 1, glossy_rays: 0 };
+        let size_px = UVec2::new(COLUMNS, (rays.len() as u32).div_ceil(COLUMNS).max(1));
+        let camera = PinholeCamera::looking_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 1.0, size_px);
+        let mut recording = Recording::begin(device, surroundings, &[camera], ViewPlanes::ALL, 0, Turn::default())?;
+        let Some(bounces) = Bounces::lend(device, mirrors, camera.pixel_count(), curved_search.checked()?)? else {
+            return Ok((Vec::new(), 0.0));
+        };
+        let mirrored = (0..).zip(rays).map(|(pixel, ray)| GpuMirroredRay {
+            origin_in_world: ray.origin_in_world.to_array(),
+            pixel,
+            direction: ray.direction_in_world.to_array(),
+            near_m,
+            guess: 0,
+            throughput_rgb9e5: rgb9e5_from_linear(Vec3::ONE),
+            width_m,
+            spread: 0.0,
+        });
+        let lists = bounces.listing(device, &mirrored.collect::<Vec<_>>());
+        let cell_rays = CellRays { lists: &lists, next: None, cell: 0, reflection: 1 };
+        follow(&mut recording, &bounces, cell_rays)?;
+        if width_m > 0.0 {
+            recording.frame.encoder.clear_buffer(&recording.batch.color, 0, None);
+            land(&mut recording, &bounces, cell_rays)?;
+        }
+        let Recording { mut frame, batch, .. } = recording;
+        let [color, inverse_way, provenance] = &bounces.planes;
+        let color = if width_m > 0.0 { &batch.color } else { color };
+        let bytes = 4 * rays.len().max(1) as u64;
+        let planes = [color, inverse_way, provenance]
+            .map(|plane| frame.read_back(plane, 0..bytes, device.buffers.lend_host("ends", bytes)));
+        let result = frame.submit()?.wait()?;
+        let [colors, inverse_ways, provenances] =
+            planes.map(|plane| result.with(plane, |words: &[u32]| words[..rays.len()].to_vec()));
+        let ends = colors?.into_iter().zip(inverse_ways?).zip(provenances?);
+        let ends = ends.map(|((color, inverse_way), provenance)| RayEnd {
+            kind: Provenance(provenance & 0xff).kind(),
+            way_m: f32::from_bits(inverse_way).recip(),
+            color_linear: linear_from_rgb9e5(color),
+            steps: 0,
+        });
+        Ok((ends.collect(), result.device_s))
     }
-    let cells = [MirrorCell { bounds: Aabb::around([surroundings.eye_in_world()]), surroundings }];
-    let mirrors = Mirrors { cells: &cells, reflections: 1, glossy_rays: 0 };
-    let size_px = UVec2::new(COLUMNS, (rays.len() as u32).div_ceil(COLUMNS).max(1));
-    let camera = PinholeCamera::looking_at(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 1.0, size_px);
-    let mut recording = Recording::begin(device, surroundings, &[camera], ViewPlanes::ALL, 0, Turn::default())?;
-    let Some(mut bounces) = Bounces::lend(device, mirrors, camera.pixel_count(), curved_search.checked()?)? else {
-        return Ok((Vec::new(), 0.0));
-    };
-    if count_steps {
-        let steps = bounces.count_steps(device, camera.pixel_count());
-        recording.frame.encoder.clear_buffer(steps, 0, None);
-    }
-    let of_ray = |(number, ray): (u32, &Ray)| GpuMirroredRay {
-        origin_in_world: ray.origin_in_world.to_array(),
-        pixel: number,
-        direction: ray.direction_in_world.to_array(),
-        near_m,
-        guess: 0,
-        throughput_rgb9e5: rgb9e5_from_linear(Vec3::ONE),
-        width_m,
-        spread: 0.0,
-    };
-    let lists = bounces.listing(device, &(0..).zip(rays).map(of_ray).collect::<Vec<_>>());
-    let cell_rays = CellRays { lists: &lists, next: None, cell: 0, reflection: 1 };
-    follow(&mut recording, &bounces, cell_rays)?;
-    if width_m > 0.0 {
-        let shown = (*recording.batch.color).clone();
-        recording.frame.encoder.clear_buffer(&shown, 0, None);
-        land(&mut recording, &bounces, cell_rays)?;
-        return read(device, recording, &bounces, &shown, rays.len());
-    }
-    read(device, recording, &bounces, bounces.planes()[0], rays.len())
-}
-
-fn read(
-    device: &Device,
-    recording: Recording<'_>,
-    bounces: &Bounces<'_>,
-    color: &wgpu::Buffer,
-    count: usize,
-) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
-    let Recording { mut frame, batch, .. } = recording;
-    let bytes = 4 * count.max(1) as u64;
-    let mut read = |plane: &wgpu::Buffer| frame.read_back(plane, 0..bytes, device.buffers.lend_host("ends", bytes));
-    let [_, inverse_way, provenance] = bounces.planes();
-    let [color, inverse_way, provenance] = [color, inverse_way, provenance].map(&mut read);
-    let steps = bounces.steps().map(read);
-    let result = frame.submit()?.wait()?;
-    drop(batch);
-    let words = |plane| result.with(plane, |words: &[u32]| words[..count].to_vec());
-    let [colors, inverse_ways, provenances] = [words(color)?, words(inverse_way)?, words(provenance)?];
-    let steps = steps.map(words).transpose()?.unwrap_or_else(|| vec![0; count]);
-    let end = |ray: usize| RayEnd {
-        kind: Provenance(provenances[ray] & 0xff).kind(),
-        way_m: f32::from_bits(inverse_ways[ray]).recip(),
-        color_linear: linear_from_rgb9e5(colors[ray]),
-        steps: steps[ray],
-    };
-    Ok(((0..count).map(end).collect(), result.device_s))
 }

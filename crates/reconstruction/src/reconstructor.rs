@@ -3,22 +3,22 @@
 
 use std::sync::Arc;
 
-use depth_image::{Antialias, CubeImages, DepthImage, PinholeCamera, Ray, View, ViewPlanes};
+use depth_image::{Antialias, CubeImages, DepthImage, PinholeCamera, View, ViewPlanes};
 use glam::Vec2;
 use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
-use crate::bounce::{self, Bounces, CurvedSearch, Mirrors};
+use crate::bounce::{self, Bounces, CellRays, CurvedSearch, Mirrors, RayLists};
 use crate::cube::Cube;
 use crate::in_flight::InFlight;
 use crate::lobes::GlossyList;
+use crate::methods::layered::{self, Ends, Walked};
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
-use crate::ray_ends::{RayEnd, RayWork, follow_rays};
 use crate::recording::{MIRRORED_PIXELS_A_BATCH, MIRRORED_PIXELS_A_SLICE, PIXELS_A_BATCH, Recording, batches};
 use crate::sample_set::SampleSet;
 use crate::set_description::SetDescription;
-use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod, methods::layered};
+use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
 use crate::{fill, shaders::templates, specular, tile_start};
 
 /// Calls of one class that are under way at once: each holds the memory of two batches.
@@ -26,7 +26,7 @@ const CALLS_OF_A_CLASS: usize = 4;
 
 /// Passes for every method and number of cameras that has been asked for.
 pub struct Reconstructor {
-    device: Device,
+    pub(crate) device: Device,
     tables: TablePool,
     drawing: QuadDrawing,
     calls: JobLimit,
@@ -61,8 +61,6 @@ pub struct ReconstructRequest<'r> {
     pub method: ReconstructionMethod,
     /// The planes beside colour, and how colour is sampled.
     pub planes: ViewPlanes,
-    /// Only with several positions a pixel.
-    pub positions: Positions,
     /// The place in the device's order.
     pub turn: Turn,
 }
@@ -71,15 +69,7 @@ impl<'r> ReconstructRequest<'r> {
     /// A request for colour alone, without common sets.
     #[must_use]
     pub fn new(set: &'r SampleSet, cameras: &'r [PinholeCamera], method: ReconstructionMethod) -> Self {
-        Self {
-            set,
-            common: CommonSets::default(),
-            cameras,
-            method,
-            planes: ViewPlanes::COLOR,
-            positions: Positions::Shared,
-            turn: Turn::default(),
-        }
+        Self { set, common: CommonSets::default(), cameras, method, planes: ViewPlanes::COLOR, turn: Turn::default() }
     }
 }
 
@@ -95,15 +85,6 @@ struct Prepared<'r> {
     bounces: [Option<&'r Bounces<'r>>; 2],
     /// The quads of the set, where the method draws them.
     mesh: Option<&'r Mesh>,
-}
-
-/// How the positions within a pixel are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Positions {
-    /// Where the method can, later positions take the surface of the first.
-    Shared,
-    /// Each position is reconstructed by itself, as the reference of shared positions.
-    Whole,
 }
 
 impl Reconstructor {
@@ -153,18 +134,16 @@ impl Reconstructor {
     /// A camera that is not valid (all are checked first), a set without the samples that the method needs, too many mirror
     /// cells, a cell without depth images, a base without a cube, or the device.
     pub fn reconstruct(&self, request: ReconstructRequest<'_>) -> Result<Vec<View>, ReconstructionError> {
-        let ReconstructRequest { set, common: CommonSets { mirrors, base }, cameras, method, planes, turn, .. } =
-            request;
+        let ReconstructRequest { set, common: CommonSets { mirrors, base }, cameras, method, turn, .. } = request;
         for (index, camera) in cameras.iter().enumerate() {
             camera.validate().map_err(|source| ReconstructionError::Camera { index, source })?;
         }
         check_samples(set, method)?;
         // All mirrors of a cube show the cube, whatever cells there are.
-        let (mirrors, cube) = match method.walks_cube() {
-            true => (Mirrors { cells: &[], ..mirrors }, Some(set)),
-            false => (mirrors, base),
+        let (mirrors, cube, base) = match method.walks_cube() {
+            true => (Mirrors { cells: &[], ..mirrors }, Some(set), None),
+            false => (mirrors, base, base.map(cube_of_base).transpose()?),
         };
-        let base = base.filter(|_| !method.walks_cube()).map(cube_of_base).transpose()?;
         let [mirrors, lobes] = mirrors.checked_for(set, cube)?.split(base.is_some());
         let cells = [mirrors, lobes].map(|of| of.cells_with(cube));
         let mirrors = Mirrors { cells: &cells[0], ..mirrors };
@@ -173,29 +152,29 @@ impl Reconstructor {
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;
         let prepared = Prepared { request, mirrors, lobes, base, bounces: [None; 2], mesh: mesh.as_deref() };
+        // Rays off mirrors take memory, and are followed at once beside live streams.
+        let most_pixels = match (cells.iter().all(Vec::is_empty), self.device.gpu.device_queue.cuts()) {
+            (true, _) => PIXELS_A_BATCH,
+            (false, false) => MIRRORED_PIXELS_A_BATCH,
+            (false, true) => MIRRORED_PIXELS_A_SLICE,
+        };
         let mut views = Vec::with_capacity(cameras.len());
         let mut in_flight: Option<InFlight<'_>> = None;
         // The device works on one batch while the host takes the one before apart.
-        for batch in batches(cameras, self.most_pixels(cells.iter().any(|cells| !cells.is_empty()))) {
+        for batch in batches(cameras, most_pixels) {
             let recording = self.record(prepared, batch)?;
             // Whoever holds the device asks for no other turn.
             let done = in_flight.take().map(InFlight::wait).transpose()?;
-            in_flight = Some(InFlight::submit(recording, planes)?);
-            done.map_or(Ok(()), |done| done.unpack(&mut views))?;
+            in_flight = Some(InFlight::submit(recording)?);
+            if let Some((result, batch)) = done {
+                batch.unpack(&result, &mut views)?;
+            }
         }
         if let Some(last) = in_flight {
-            last.wait()?.unpack(&mut views)?;
+            let (result, batch) = last.wait()?;
+            batch.unpack(&result, &mut views)?;
         }
         Ok(views)
-    }
-
-    /// The pixels of a batch. Rays off mirrors take memory, and are followed at once beside live streams.
-    fn most_pixels(&self, follows_rays: bool) -> usize {
-        match (follows_rays, self.device.gpu.device_queue.cuts()) {
-            (false, _) => PIXELS_A_BATCH,
-            (true, false) => MIRRORED_PIXELS_A_BATCH,
-            (true, true) => MIRRORED_PIXELS_A_SLICE,
-        }
     }
 
     /// All passes over a batch.
@@ -209,12 +188,11 @@ impl Reconstructor {
         let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), mirrors.cells.len()));
         let mut recording = Recording::begin(&self.device, set, cameras, planes, family, turn)?;
         let rays = recording.batch.plane_bytes as usize / 4;
-        let lend = |of| Bounces::lend(&self.device, of, rays, CurvedSearch::default());
-        let bounces = [lend(mirrors)?, lend(lobes)?];
-        self.record_positions(
-            Prepared { bounces: bounces.each_ref().map(Option::as_ref), ..prepared },
-            &mut recording,
-        )?;
+        let [mirrors, lobes] =
+            [mirrors, lobes].map(|of| Bounces::lend(&self.device, of, rays, CurvedSearch::default()));
+        let bounces = [mirrors?, lobes?];
+        let prepared = Prepared { bounces: bounces.each_ref().map(Option::as_ref), ..prepared };
+        self.record_positions(prepared, &mut recording)?;
         recording.batch.bounces = bounces.into_iter().flatten().flat_map(Bounces::into_memory).collect();
         Ok(recording)
     }
@@ -251,13 +229,9 @@ impl Reconstructor {
         let mut offsets_px = request.planes.antialias.offsets_px();
         recording.go_to(offsets_px.next().unwrap_or_default());
         self.record_position(prepared, recording, None)?;
-        let rough = match request.positions {
-            Positions::Shared if prepared.bounces.iter().all(Option::is_none) => {
-                request.method.share_positions(recording)?
-            }
-            // What a mirror shows is not shared.
-            Positions::Shared | Positions::Whole => None,
-        };
+        // What a mirror shows is not shared.
+        let is_shared = prepared.bounces.iter().all(Option::is_none);
+        let rough = if is_shared { request.method.share_positions(recording)? } else { None };
         if rough.is_none() {
             antialias::record(recording, Sums::Begun, None)?;
         }
@@ -292,24 +266,12 @@ impl Reconstructor {
         fill::record(recording, &unknown)?;
         specular::record(recording, listed, first, glossy.as_ref())?;
         if let Some((bounces, first)) = mirrored {
-            bounce::record(recording, bounces, first, |recording, which, rays| match base {
-                Some(base) => layered::follow_in_base(recording, base, bounces, which, rays),
-                None => Ok(()),
-            })?;
+            record_mirrored(recording, bounces, first, base)?;
         }
         match (base, lobes, &glossy) {
             (Some(base), Some(lobes), Some(glossy)) => layered::follow_lobes(recording, base, lobes, glossy),
             _ => Ok(()),
         }
-    }
-
-    /// Where single rays end in images of a mirror's surroundings, followed as rays off mirrors are; also the seconds on the
-    /// device. Directions are of unit length.
-    ///
-    /// # Errors
-    /// Steps that cannot be used, too many rays, or the device.
-    pub fn follow(&self, work: RayWork<'_>, rays: &[Ray]) -> Result<(Vec<RayEnd>, f64), ReconstructionError> {
-        follow_rays(&self.device, work, rays)
     }
 
     /// Statistics of the quads that a method draws; `None` for methods that draw none.
@@ -321,8 +283,7 @@ impl Reconstructor {
         set: &SampleSet,
         method: ReconstructionMethod,
     ) -> Result<Option<MeshStatistics>, ReconstructionError> {
-        check_samples(set, method)?;
-        Ok(method.mesh(&self.device, set, Turn::default())?.map(|mesh| mesh.statistics))
+        Ok(self.mesh(set, method)?.map(|mesh| mesh.statistics))
     }
 
     /// The quads that a method draws, image after image in the order of their samples; none for methods that draw none.
@@ -330,32 +291,63 @@ impl Reconstructor {
     /// # Errors
     /// As [`Reconstructor::mesh_statistics`].
     pub fn read_quads(&self, set: &SampleSet, method: ReconstructionMethod) -> Result<Vec<Quad>, ReconstructionError> {
+        self.mesh(set, method)?.map_or(Ok(Vec::new()), |mesh| quads::read(&self.device, &mesh, set))
+    }
+
+    fn mesh(&self, set: &SampleSet, method: ReconstructionMethod) -> Result<Option<Arc<Mesh>>, ReconstructionError> {
         check_samples(set, method)?;
-        let mesh = method.mesh(&self.device, set, Turn::default())?;
-        mesh.map_or(Ok(Vec::new()), |mesh| quads::read(&self.device, &mesh, set))
+        method.mesh(&self.device, set, Turn::default())
     }
 }
 
+/// Records the passes over the rays that the view's mirrors have listed, mirror after mirror. Rays are followed in the images of mirror
+/// cells and in the base, where there is one.
+fn record_mirrored(
+    recording: &mut Recording<'_>,
+    bounces: &Bounces<'_>,
+    first: RayLists,
+    base: Option<&Cube>,
+) -> Result<(), ReconstructionError> {
+    let mut lists = first;
+    for reflection in 1..=bounces.reflections {
+        let next = (reflection < bounces.reflections).then(|| bounces.next(recording.device, Some(&lists)));
+        for (number, cell) in bounces.cells.iter().enumerate() {
+            let rays = CellRays { lists: &lists, next: next.as_ref(), cell: number, reflection };
+            if !cell.is_cube() {
+                bounce::follow(recording, bounces, rays)?;
+            }
+            if let Some(base) = base {
+                let walked = if cell.is_cube() { Walked::Bounced } else { Walked::LeftBounced };
+                layered::follow(recording, base, bounces, rays, walked, Ends::default())?;
+            }
+            if !cell.is_cube() {
+                bounce::land(recording, bounces, rays)?;
+            }
+        }
+        let Some(next) = next else { break };
+        lists = next;
+    }
+    Ok(())
+}
+
 fn cube_of_base(base: &SampleSet) -> Result<&Cube, ReconstructionError> {
-    let none = || ReconstructionError::NoSamples { what: "a base".to_owned(), needed: "a layered cube" };
-    base.cube.as_deref().ok_or_else(none)
+    base.cube.as_deref().ok_or(ReconstructionError::NoSamples { what: "a base".to_owned(), needed: "a layered cube" })
 }
 
 /// Views come from pinholes or from a cube, as the method needs.
 fn check_samples(set: &SampleSet, method: ReconstructionMethod) -> Result<(), ReconstructionError> {
-    if set.is_single_pole() {
+    if !set.poles.is_empty() {
         return Err(ReconstructionError::Model { model: "single_pole" });
     }
     if method.light_cache_quality().is_some() {
         return Err(ReconstructionError::NoScene { method: method.to_string() });
     }
-    let has_light_field = || set.cube.as_ref().is_some_and(|cube| cube.light_field.is_some());
-    if method.gathers() && !has_light_field() {
-        return Err(ReconstructionError::NoSamples { what: method.to_string(), needed: "a light field" });
-    }
-    let (is_there, needed) = match method.walks_cube() {
-        true => (set.cube.is_some(), "a layered cube"),
-        false => (!set.cameras.is_empty(), "depth images"),
+    let has_light_field = set.cube.as_ref().is_some_and(|cube| cube.light_field.is_some());
+    let needed = match method.walks_cube() {
+        true if method.gathers() && !has_light_field => "a light field",
+        true if set.cube.is_none() => "a layered cube",
+        false if set.cameras.is_empty() => "depth images",
+        _ => return Ok(()),
     };
-    if is_there { Ok(()) } else { Err(ReconstructionError::NoSamples { what: method.to_string(), needed }) }
+    Err(ReconstructionError::NoSamples { what: method.to_string(), needed })
 }

@@ -3,6 +3,7 @@
 
 use std::hash::Hash;
 use std::ops::Range;
+use std::sync::Arc;
 
 use depth_image::{Antialias, PinholeCamera, ViewPlanes};
 use glam::{UVec2, Vec2, Vec3};
@@ -12,7 +13,7 @@ use gpu::{
 };
 use wgpu::BufferUsages;
 
-use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume, TILE_PX, rows_of};
+use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, GpuVolume, TILE_PX};
 use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
 use crate::{quads::QuadTargets, sample_set::SampleSet};
 
@@ -37,6 +38,14 @@ pub(crate) struct Recording<'r> {
     family: u64,
 }
 
+/// A pass with its resources.
+pub(crate) struct BoundPass {
+    pass: Arc<ComputePass>,
+    bound: BoundGroup,
+    /// The shader and its switches, by which costs are learned.
+    name: String,
+}
+
 /// Some rows of a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Piece {
@@ -48,7 +57,7 @@ struct Piece {
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Pieces {
     all: Vec<Piece>,
-    rows: u32,
+    pub rows: u32,
     /// Pieces that a slice of a pass holds.
     a_slice: usize,
 }
@@ -97,13 +106,16 @@ impl<'r> Recording<'r> {
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
         let plane_bytes = 4 * (cameras[0].pixel_count() * cameras.len()) as u64;
-        let sum_bytes = (planes.antialias > Antialias::NONE).then_some(3 * plane_bytes);
+        let has_sums = planes.antialias > Antialias::NONE;
+        let sum_bytes = if has_sums { 3 * plane_bytes } else { 0 };
         device.gpu.check_storage_bytes("a batch of views (bytes)", plane_bytes)?;
-        device.gpu.check_storage_bytes("the sums of several samples a pixel (bytes)", sum_bytes.unwrap_or(0))?;
+        device.gpu.check_storage_bytes("the sums of several samples a pixel (bytes)", sum_bytes)?;
         let slice_px = device.gpu.device_queue.slice_units(family, UNKNOWN_SLICE_PX);
         let pieces = Pieces::of(cameras.len(), cameras[0].size_px, slice_px);
         let works = works(device, set, cameras, &pieces, planes);
-        let plane = |label| device.buffers.lend_storage(label, plane_bytes);
+        let [color, inverse_depth_per_m, provenance, undecided, still_undecided] =
+            ["color", "inverse depth", "provenance", "undecided pixels", "pixels still undecided"]
+                .map(|label| device.buffers.lend_storage(label, plane_bytes));
         let batch = Batch {
             centers: cameras.to_vec(),
             cameras: cameras.to_vec(),
@@ -113,13 +125,13 @@ impl<'r> Recording<'r> {
             pieces,
             works,
             tile_start_m: None,
-            color: plane("color"),
-            sums: sum_bytes.map(|bytes| device.buffers.lend_storage("sums of positions", bytes)),
-            inverse_depth_per_m: plane("inverse depth"),
-            provenance: plane("provenance"),
-            undecided_pixels: ["undecided pixels", "pixels still undecided"].map(plane),
+            color,
+            sums: has_sums.then(|| device.buffers.lend_storage("sums of positions", sum_bytes)),
+            inverse_depth_per_m,
+            provenance,
+            undecided_pixels: [undecided, still_undecided],
             lists_made: 0,
-            rough_pixels: (planes.antialias > Antialias::NONE).then(|| plane("pixels of further positions")),
+            rough_pixels: has_sums.then(|| device.buffers.lend_storage("pixels of further positions", plane_bytes)),
             targets: None,
             bounces: Vec::new(),
         };
@@ -165,57 +177,50 @@ impl<'r> Recording<'r> {
         bindings
     }
 
-    /// One dispatch a piece, over its listed pixels or over all.
-    pub fn dispatch_pixels(
-        &mut self,
+    /// A pass of `variant`, with its resources.
+    pub fn bind<'b>(
+        &self,
         variant: &impl ShaderVariant,
-        pass: &ComputePass,
-        bound: &BoundGroup,
-        listed: Option<&PixelList>,
-    ) {
-        let all = [self.batch.size_px.x, self.batch.pieces.rows];
-        self.dispatch(variant, pass, bound, |first| match listed {
+        bindings: impl IntoIterator<Item = Binding<'b>>,
+    ) -> Result<BoundPass, ReconstructionError> {
+        let pass = self.device.passes.get(variant)?;
+        let bound = pass.bind(0, bindings)?;
+        Ok(BoundPass { pass, bound, name: variant.name() })
+    }
+
+    /// One dispatch a piece, over its listed pixels or over all.
+    pub fn dispatch_pixels(&mut self, pass: &BoundPass, listed: Option<&PixelList>) {
+        let all = [self.batch.size_px.x, self.batch.pieces.rows, 1];
+        self.dispatch(pass, |first| match listed {
             Some(listed) => DispatchSize::Indirect(&listed.lists, first),
-            None => DispatchSize::Invocations([all[0], all[1], 1]),
+            None => DispatchSize::Invocations(all),
         });
     }
 
     /// One dispatch over the `number`-th of some lists, of rays of any of the batch's pixels. Equal `what` cost the same.
-    pub fn dispatch_listed(
-        &mut self,
-        variant: &impl ShaderVariant,
-        pass: &ComputePass,
-        bound: &BoundGroup,
-        lists: &wgpu::Buffer,
-        number: usize,
-        what: impl Hash,
-    ) {
-        pass.dispatch(&mut self.frame, &[bound], DispatchSize::Indirect(lists, number as u32));
-        self.frame.cut(WorkKind::new(self.family, &(variant.name(), what)), self.batch.plane_bytes / 4);
-    }
-
-    /// One dispatch a tile of a piece.
-    pub fn dispatch_tiles(&mut self, variant: &impl ShaderVariant, pass: &ComputePass, bound: &BoundGroup) {
-        let [across, down] = [self.batch.size_px.x, self.batch.pieces.rows].map(|side| side.div_ceil(TILE_PX));
-        self.dispatch(variant, pass, bound, |_| DispatchSize::Invocations([across, down, 1]));
+    pub fn dispatch_listed(&mut self, pass: &BoundPass, lists: &wgpu::Buffer, number: usize, what: impl Hash) {
+        let size = DispatchSize::Indirect(lists, number as u32);
+        pass.pass.dispatch(&mut self.frame, &[&pass.bound], size);
+        self.frame.cut(WorkKind::new(self.family, &(&pass.name, what)), self.batch.plane_bytes / 4);
     }
 
     /// One dispatch a piece, of a size that may depend on the first piece.
-    fn dispatch<'b>(
-        &mut self,
-        variant: &impl ShaderVariant,
-        pass: &ComputePass,
-        bound: &BoundGroup,
-        size: impl Fn(u32) -> DispatchSize<'b>,
-    ) {
-        let kind = WorkKind::new(self.family, &variant.name());
+    pub fn dispatch<'b>(&mut self, pass: &BoundPass, size: impl Fn(u32) -> DispatchSize<'b>) {
+        let kind = WorkKind::new(self.family, &pass.name);
         let piece_px = u64::from(self.batch.size_px.x) * u64::from(self.batch.pieces.rows);
         for slice in self.batch.pieces.slices() {
             let count = slice.len() as u64;
             let size = size(slice.start);
-            pass.dispatch_each(&mut self.frame, &[bound], slice, size);
+            pass.pass.dispatch_each(&mut self.frame, &[&pass.bound], slice, size);
             self.frame.cut(kind, count * piece_px);
         }
+    }
+}
+
+impl Batch {
+    /// Colours, inverse depths and provenance of all pixels.
+    pub fn pixel_planes(&self) -> [&wgpu::Buffer; 3] {
+        [&self.color, &self.inverse_depth_per_m, &self.provenance]
     }
 }
 
@@ -227,9 +232,10 @@ impl Pieces {
         let count = size_px.y.div_ceil(most_rows);
         // Pieces of a view are about equal, and begin with whole tiles.
         let rows = if count == 1 { size_px.y } else { size_px.y.div_ceil(count).next_multiple_of(TILE_PX) };
-        let of_view = |view| (0..size_px.y).step_by(rows as usize).map(move |first_row| Piece { view, first_row });
         let piece_px = u64::from(rows) * u64::from(size_px.x);
-        Self { all: (0..views).flat_map(of_view).collect(), rows, a_slice: (slice_px / piece_px).max(1) as usize }
+        let all = (0..views)
+            .flat_map(|view| (0..size_px.y).step_by(rows as usize).map(move |first_row| Piece { view, first_row }));
+        Self { all: all.collect(), rows, a_slice: (slice_px / piece_px).max(1) as usize }
     }
 
     /// How many there are.
@@ -252,6 +258,7 @@ pub(crate) fn batches(cameras: &[PinholeCamera], most_pixels: usize) -> impl Ite
     })
 }
 
+/// The `ViewWork` of each piece.
 fn works(
     device: &Device,
     set: &SampleSet,
@@ -259,33 +266,26 @@ fn works(
     pieces: &Pieces,
     planes: ViewPlanes,
 ) -> wgpu::Buffer {
-    let elements = uniform_elements(view_works(set, cameras, pieces, planes));
-    device.gpu.buffer_with("views", &elements, BufferUsages::UNIFORM)
-}
-
-/// The `ViewWork` of each piece.
-fn view_works(set: &SampleSet, cameras: &[PinholeCamera], pieces: &Pieces, planes: ViewPlanes) -> Vec<Vec<u8>> {
     let volume = GpuVolume { position_share: (planes.antialias.samples() as f32).recip(), ..set.volume };
-    let tone = planes.tone.into();
     let sorted: Vec<_> = cameras.iter().map(|camera| nearest_first(set, camera.eye_in_world)).collect();
-    let work = |(number, &Piece { view, first_row }): (u32, &Piece)| {
+    let works = (0..).zip(&pieces.all).map(|(number, &Piece { view, first_row })| {
         let end_row = (first_row + pieces.rows).min(cameras[view].size_px.y);
-        let rows = rows_of(first_row..end_row);
+        let rows = first_row | end_row << 16;
         let view_camera = GpuViewCamera { number, rows, ..GpuViewCamera::of(&cameras[view], view as u32) };
-        let work = GpuViewWork { view: view_camera, volume, tone };
+        let work = GpuViewWork { view: view_camera, volume, tone: planes.tone.into() };
         [bytemuck::bytes_of(&work), bytemuck::cast_slice(&sorted[view])].concat()
-    };
-    (0..).zip(&pieces.all).map(work).collect()
+    });
+    device.gpu.buffer_with("views", &uniform_elements(works), BufferUsages::UNIFORM)
 }
 
 /// The sample cameras in the order of their distance from a place.
 pub(crate) fn nearest_first(set: &SampleSet, place_in_world: Vec3) -> Vec<GpuSampleCamera> {
     let mut nearest_first = set.cameras.clone();
     nearest_first.sort_by(|a, b| {
-        let distance = |c: &GpuSampleCamera| Vec3::from(c.eye_in_world).distance_squared(place_in_world);
         // Images that prove nothing everywhere are no use to march in.
-        let uncertain = |c: &GpuSampleCamera| set.uncertain[c.mask.trailing_zeros() as usize];
-        uncertain(a).cmp(&uncertain(b)).then(distance(a).total_cmp(&distance(b)))
+        let [a_uncertain, b_uncertain] = [a, b].map(|c| set.uncertain[c.mask.trailing_zeros() as usize]);
+        let [to_a, to_b] = [a, b].map(|c| Vec3::from(c.eye_in_world).distance_squared(place_in_world));
+        a_uncertain.cmp(&b_uncertain).then(to_a.total_cmp(&to_b))
     });
     nearest_first
 }

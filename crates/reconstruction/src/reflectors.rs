@@ -26,34 +26,34 @@ impl Reflectors {
     pub fn upload(
         tables: &TablePool,
         images: &[DepthImage],
-        illumination: &Illumination,
-        highlight: Option<Highlight>,
+        set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
         let planes: Vec<Planes<'_>> = images.iter().map(Planes::of_image).collect();
-        check(&planes, illumination)?;
-        Self::of_planes(tables, &planes, illumination, highlight, |_, words| words, turn)
+        Self::of_planes(tables, &planes, None, set, turn)
     }
 
-    /// `sorted` receives the number of words of a sample and the words of all samples; it gives them in the set's order.
+    /// The samples are in the order of `places` in their images, image after image, or as they are.
     fn of_planes(
         tables: &TablePool,
         planes: &[Planes<'_>],
-        illumination: &Illumination,
-        highlight: Option<Highlight>,
-        sorted: impl FnOnce(usize, Vec<u32>) -> Vec<u32>,
+        places: Option<&[u32]>,
+        set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
-        let Some(highlight) = highlight.filter(|_| planes.iter().any(Planes::reflects)) else { return Ok(None) };
+        check(planes, set.illumination)?;
+        let Some(highlight) = set.highlight.filter(|_| planes.iter().any(Planes::reflects)) else { return Ok(None) };
         let gpu = &tables.gpu;
-        let bytes = illumination_bytes(illumination);
+        let bytes = illumination_bytes(set.illumination);
         let limit = gpu.device.limits().max_uniform_buffer_binding_size;
         GpuError::check_limit("the scene's lights (bytes)", bytes.len() as u64, limit)?;
-        let visibility_words = visibility_words(planes);
-        let words = sorted(4 * sample_texels(visibility_words), sample_words(planes, visibility_words));
+        let visible = planes.iter().filter_map(|image| image.specular).map(|planes| planes.visibility8.len());
+        let visibility_words = visible.max().unwrap_or(0);
+        let words = sample_words(planes, visibility_words);
+        let words = if let Some(places) = places { ordered(&words, planes, places) } else { words };
         Ok(Some(Self {
             highlight,
-            lights: illumination.lights.len(),
+            lights: set.illumination.lights.len(),
             visibility_words,
             has_mirrors: planes.iter().any(Planes::has_mirrors),
             samples: tables.upload("reflectors", TextureFormat::Rgba32Uint, &words, turn)?,
@@ -70,14 +70,7 @@ impl Reflectors {
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
         let planes = images.each_ref().map(Planes::of_layers);
-        check(&planes, set.illumination)?;
-        let words = |stride: usize, words: Vec<u32>| {
-            let first = [0, images[0].sample_count(), images[0].sample_count() + images[1].sample_count()];
-            let image_of = |sample: usize| first.iter().rposition(|&first| sample >= first).unwrap_or(0);
-            let place = |(sample, &place): (usize, &u32)| (first[image_of(sample)] + place as usize) * stride;
-            places.iter().enumerate().flat_map(|at| words[place(at)..][..stride].iter().copied()).collect()
-        };
-        Self::of_planes(tables, &planes, set.illumination, set.highlight, words, turn)
+        Self::of_planes(tables, &planes, Some(places), set, turn)
     }
 }
 
@@ -122,21 +115,32 @@ impl<'i> Planes<'i> {
 fn check(images: &[Planes<'_>], illumination: &Illumination) -> Result<(), ReconstructionError> {
     let expected = SpecularPlanes::visibility_planes(illumination.lights.len());
     for (index, image) in images.iter().enumerate() {
-        let wrong = |reason: String| Err(ReconstructionError::Sample { index, reason });
         let Some(planes) = image.specular else { continue };
         if image.normal_oct16.is_none() {
-            return wrong("a highlight needs normals".to_owned());
+            return Err(ReconstructionError::sample(index, "a highlight needs normals"));
         }
         let found = planes.visibility8.len();
         if found != 0 && found != expected {
-            return wrong(format!("{found} planes of visibility, the lights need {expected} or none"));
+            let reason = format!("{found} planes of visibility, the lights need {expected} or none");
+            return Err(ReconstructionError::sample(index, reason));
         }
     }
     Ok(())
 }
 
-fn visibility_words(images: &[Planes<'_>]) -> usize {
-    images.iter().filter_map(|image| image.specular).map(|planes| planes.visibility8.len()).max().unwrap_or(0)
+/// The words of samples, image after image, in the order of `places` in their images.
+fn ordered(words: &[u32], images: &[Planes<'_>], places: &[u32]) -> Vec<u32> {
+    let stride = words.len() / places.len().max(1);
+    let mut places = places.iter();
+    let mut ordered = Vec::with_capacity(words.len());
+    let mut first = 0;
+    for image in images {
+        for &place in places.by_ref().take(image.samples) {
+            ordered.extend_from_slice(&words[(first + place as usize) * stride..][..stride]);
+        }
+        first += image.samples;
+    }
+    ordered
 }
 
 /// Sample after sample, image after image; those of images without highlights reflect nothing.
@@ -151,8 +155,8 @@ fn sample_words(images: &[Planes<'_>], visibility_words: usize) -> Vec<u32> {
         for (index, (&normal, &reflector)) in normals.iter().zip(&planes.reflectance_srgb8_roughness8).enumerate() {
             let end = words.len() + stride;
             words.extend([normal, reflector]);
-            let visible = |word: usize| planes.visibility8.get(word).map_or(ALL_VISIBLE, |plane| plane[index]);
-            words.extend((0..visibility_words).map(visible));
+            let visibility = (0..visibility_words).map(|word| planes.visibility8.get(word));
+            words.extend(visibility.map(|plane| plane.map_or(ALL_VISIBLE, |plane| plane[index])));
             words.resize(end, 0);
         }
     }

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
-use depth_image::{Aabb, CubeImages, DepthImage, Environment, PinholeCamera};
-use glam::{UVec2, Vec2, Vec3};
+use depth_image::{Aabb, CubeImages, DepthImage, PinholeCamera};
+use glam::{UVec2, Vec2};
 use gpu::{Binding, GpuEnvironment, Table, TablePool, Turn};
 use rayon::prelude::*;
-use wgpu::TextureFormat;
+use wgpu::{BufferUsages, TextureFormat};
 
 use crate::bounce::mips::{mip_texels, mips};
 use crate::cube::Cube;
@@ -49,16 +49,6 @@ impl SampleSet {
         SetVariant { cameras: self.cameras.len(), holes: self.uncertain.contains(&true) }
     }
 
-    /// The eye of its first image.
-    pub(crate) fn eye_in_world(&self) -> Vec3 {
-        self.cameras[0].eye_in_world.into()
-    }
-
-    /// Its images are those of single-pole cameras.
-    pub(crate) fn is_single_pole(&self) -> bool {
-        !self.poles.is_empty()
-    }
-
     /// The resources of `background.wgsl`.
     pub(crate) fn background_bindings(&self) -> Vec<Binding<'_>> {
         match &self.environment {
@@ -76,13 +66,36 @@ impl SampleSet {
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
         check(tables, images, set)?;
+        Self::of_images(tables, images, set, turn)
+    }
+
+    /// A layered depth cube, without any other image.
+    pub(crate) fn upload_cube(
+        tables: &TablePool,
+        cube: &CubeImages,
+        set: &SetDescription<'_>,
+        turn: Turn,
+    ) -> Result<Self, ReconstructionError> {
+        check_volume(&set.volume)?;
+        let without_images = Self::of_images(tables, &[], set, turn)?;
+        Ok(Self { cube: Some(Arc::new(Cube::upload(tables, cube, set, turn)?)), ..without_images })
+    }
+
+    /// A set of images that were checked, of which there may be none.
+    fn of_images(
+        tables: &TablePool,
+        images: &[DepthImage],
+        set: &SetDescription<'_>,
+        turn: Turn,
+    ) -> Result<Self, ReconstructionError> {
         let poles = poles(images)?;
         let among_holes = is_among_holes(images);
         let coded = |image| CodedImage::of(image, among_holes, set.mips);
         // One thread leaves the other cores to live streams.
-        let is_shared = tables.gpu.device_queue.cuts();
-        let coded: Vec<CodedImage> =
-            if is_shared { images.iter().map(coded).collect() } else { images.par_iter().map(coded).collect() };
+        let coded: Vec<CodedImage> = match tables.gpu.device_queue.cuts() {
+            true => images.iter().map(coded).collect(),
+            false => images.par_iter().map(coded).collect(),
+        };
         let [mut nodes, mut codes] = [node_count(images), cell_count(images)].map(Vec::with_capacity);
         let mut colors: Vec<[u32; 2]> = Vec::with_capacity(color_count(images, set.mips));
         let mut cameras = Vec::with_capacity(images.len());
@@ -104,44 +117,29 @@ impl SampleSet {
             camera.first_mip = colors.len() as u32;
             levels.iter().for_each(|(size_px, level)| colors.extend(with_below(level, size_px.x as usize)));
         }
+        // A table has one texel at least.
+        for texels in [&mut nodes, &mut codes, &mut colors] {
+            texels.resize(texels.len().max(1), [0; 2]);
+        }
+        let searched = searched_volume(&set.volume, images);
+        let background = gpu::background_bytes(&set.background);
         Ok(Self {
             cameras,
             uncertain,
             poles,
-            volume: gpu_volume(&searched_volume(&set.volume, images)),
-            background: background_buffer(tables, &set.background),
+            volume: GpuVolume {
+                min_in_world: searched.min.to_array(),
+                max_in_world: searched.max.to_array(),
+                ..GpuVolume::zeroed()
+            },
+            background: tables.gpu.buffer_with("background", &background, BufferUsages::UNIFORM),
             nodes: tables.upload("depth pyramids", TextureFormat::Rg32Uint, &nodes, turn)?,
             cell_codes: tables.upload("cells", TextureFormat::Rg32Uint, &codes, turn)?,
             cell_colors: tables.upload("sample colours", TextureFormat::Rg32Uint, &colors, turn)?,
-            reflectors: Reflectors::upload(tables, images, set.illumination, set.highlight, turn)?,
+            reflectors: Reflectors::upload(tables, images, set, turn)?,
             environment: set.environment.cloned(),
             meshes: SetMeshes::upload(tables, images, turn)?,
             cube: None,
-        })
-    }
-
-    /// A layered depth cube, without any other image.
-    pub(crate) fn upload_cube(
-        tables: &TablePool,
-        cube: &CubeImages,
-        set: &SetDescription<'_>,
-        turn: Turn,
-    ) -> Result<Self, ReconstructionError> {
-        check_volume(&set.volume)?;
-        let none = |label| tables.upload(label, TextureFormat::Rg32Uint, &[[0u32; 2]], turn);
-        Ok(Self {
-            cameras: Vec::new(),
-            uncertain: Vec::new(),
-            poles: Vec::new(),
-            volume: gpu_volume(&searched_volume(&set.volume, &[])),
-            background: background_buffer(tables, &set.background),
-            nodes: none("no pyramids")?,
-            cell_codes: none("no cells")?,
-            cell_colors: none("no colours")?,
-            reflectors: None,
-            environment: set.environment.cloned(),
-            meshes: SetMeshes::upload(tables, &[], turn)?,
-            cube: Some(Arc::new(Cube::upload(tables, cube, set, turn)?)),
         })
     }
 }
@@ -190,15 +188,14 @@ fn check(tables: &TablePool, images: &[DepthImage], set: &SetDescription<'_>) ->
     }
     check_volume(&set.volume)?;
     for (index, image) in images.iter().enumerate() {
-        let camera = &image.camera;
-        let wrong = |reason: String| ReconstructionError::Sample { index, reason };
-        camera.validate().map_err(|error| wrong(error.to_string()))?;
-        image.validate().map_err(|error| wrong(error.to_string()))?;
+        image.camera.validate().map_err(|error| ReconstructionError::sample(index, error))?;
+        image.validate().map_err(|error| ReconstructionError::sample(index, error))?;
         if image.light.is_some() {
             return Err(ReconstructionError::LightForColor { index });
         }
-        if camera.size_px().min_element() < 2 {
-            return Err(wrong("an image of one row or column has no surface between samples".to_owned()));
+        if image.size_px().min_element() < 2 {
+            let reason = "an image of one row or column has no surface between samples";
+            return Err(ReconstructionError::sample(index, reason));
         }
     }
     tables.gpu.check_table("depth pyramids", node_count(images))?;
@@ -218,8 +215,7 @@ fn with_below(colors: &[u32], columns: usize) -> impl Iterator<Item = [u32; 2]> 
 }
 
 fn node_count(images: &[DepthImage]) -> usize {
-    let log2_sides = |image: &DepthImage| image.size_px().to_array().map(|side| side.next_power_of_two().ilog2());
-    images.iter().map(|image| Pyramid::word_count(log2_sides(image))).sum()
+    images.iter().map(|image| Pyramid::word_count(Pyramid::log2_sides(image.size_px().to_array()))).sum()
 }
 
 /// One cell a texel.
@@ -248,12 +244,4 @@ pub(crate) fn searched_volume(volume: &Aabb, images: &[DepthImage]) -> Aabb {
     let among_holes = is_among_holes(images);
     let depth_error_m = images.iter().map(|image| CodedDepth::greatest_error_m(image, among_holes)).fold(0.0, f32::max);
     volume.padded(volume.size().max_element() * VOLUME_MARGIN + depth_error_m)
-}
-
-fn background_buffer(tables: &TablePool, background: &Environment) -> wgpu::Buffer {
-    tables.gpu.buffer_with("background", &gpu::background_bytes(background), wgpu::BufferUsages::UNIFORM)
-}
-
-fn gpu_volume(searched: &Aabb) -> GpuVolume {
-    GpuVolume { min_in_world: searched.min.to_array(), max_in_world: searched.max.to_array(), ..GpuVolume::zeroed() }
 }

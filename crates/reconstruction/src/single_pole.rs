@@ -1,7 +1,7 @@
 //! Images of single-pole occlusion cameras on the device: `single_pole.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{Camera, DepthImage, SinglePoleCamera};
+use depth_image::{Camera, DepthImage};
 
 use crate::error::ReconstructionError;
 
@@ -22,27 +22,21 @@ pub(crate) struct GpuPole {
 pub(crate) fn poles(images: &[DepthImage]) -> Result<Vec<GpuPole>, ReconstructionError> {
     let mut poles = Vec::new();
     for (index, image) in images.iter().enumerate() {
-        let wrong = |reason: String| Err(ReconstructionError::Sample { index, reason });
         if !image.camera.is_of_model(&images[0].camera) {
-            return wrong(format!("a {} image, the first is of another model", image.camera.model_name()));
+            let reason = format!("a {} image, the first is of another model", image.camera.model_name());
+            return Err(ReconstructionError::sample(index, reason));
         }
         let Camera::SinglePole(camera) = image.camera else { continue };
         if !camera.reference.contains(camera.pole_px) {
-            return wrong("the pole lies outside of the image".to_owned());
+            return Err(ReconstructionError::sample(index, "the pole lies outside of the image"));
         }
-        poles.push(GpuPole::of(&camera));
-    }
-    Ok(poles)
-}
-
-impl GpuPole {
-    fn of(camera: &SinglePoleCamera) -> Self {
-        Self {
+        poles.push(GpuPole {
             pole_px: camera.pole_px.to_array(),
             bend_px_m: camera.bend_px_m(),
             nearest_per_m: camera.reference.near_m.recip(),
             farthest_per_m: camera.farthest_m.recip(),
-            ..Self::zeroed()
-        }
+            ..GpuPole::zeroed()
+        });
     }
+    Ok(poles)
 }

@@ -1,7 +1,5 @@
 //! Adds the light that depends on the viewer to pixels that show a surface.
 
-use std::sync::Arc;
-
 use depth_image::Highlight;
 use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots};
 use minijinja::{Value, context};
@@ -53,32 +51,35 @@ impl ShaderVariant for Specular {
     }
 
     fn all() -> Vec<Self> {
+        let kinds = [(Highlight::BlinnPhong, false), (Highlight::Ggx, false), (Highlight::Ggx, true)];
         let lights = [(0, 0), (0, 1), (3, 0), (3, 1), (9, 3), (255, 64)];
-        let kinds = [(Highlight::BlinnPhong, false), (Highlight::Ggx, false), (Highlight::Ggx, true)].into_iter();
-        let lit = kinds.flat_map(|kind| lights.map(|(lights, words)| (kind, lights, words)));
-        lit.flat_map(|((highlight, environment_map), lights, visibility_words)| {
-            SetVariant::all().into_iter().flat_map(move |set| {
-                let is_ggx = highlight == Highlight::Ggx;
-                let mirrored = [Some(1), Some(MAX_RAY_LISTS)].into_iter().filter(move |_| is_ggx);
-                std::iter::once(None).chain(mirrored).flat_map(move |mirror_cells| {
-                    let with = Self {
+        let mut all = Vec::new();
+        for set in SetVariant::all() {
+            for (highlight, environment_map) in kinds {
+                for (lights, visibility_words) in lights {
+                    let matt = Self {
                         set,
                         highlight,
                         lights,
                         environment_map,
                         listed: false,
                         visibility_words,
-                        mirror_cells,
+                        mirror_cells: None,
                         lists_glossy: false,
                     };
-                    let glossy = (is_ggx && lights <= 3).then_some(Self { lists_glossy: true, ..with });
                     // Pixels that show mirrors are found anew at each position, not listed.
-                    let listed = mirror_cells.is_none().then_some(Self { listed: true, ..with });
-                    std::iter::once(with).chain(listed).chain(glossy)
-                })
-            })
-        })
-        .collect()
+                    all.push(Self { listed: true, ..matt });
+                    let is_ggx = highlight == Highlight::Ggx;
+                    let mirrored = [Some(1), Some(MAX_RAY_LISTS)].into_iter().filter(|_| is_ggx);
+                    for mirror_cells in std::iter::once(None).chain(mirrored) {
+                        let with = Self { mirror_cells, ..matt };
+                        all.push(with);
+                        all.extend((is_ggx && lights <= 3).then_some(Self { lists_glossy: true, ..with }));
+                    }
+                }
+            }
+        }
+        all
     }
 }
 
@@ -91,8 +92,7 @@ pub(crate) fn record(
     glossy: Option<&GlossyList<'_>>,
 ) -> Result<(), ReconstructionError> {
     let Some(reflectors) = &recording.set.reflectors else { return Ok(()) };
-    let mirrors = |_: &&Arc<GpuEnvironment>| reflectors.highlight == Highlight::Ggx;
-    let environment = recording.set.environment.as_ref().filter(mirrors);
+    let environment = recording.set.environment.as_deref().filter(|_| reflectors.highlight == Highlight::Ggx);
     let variant = Specular {
         set: recording.set.variant(),
         highlight: reflectors.highlight,
@@ -101,23 +101,23 @@ pub(crate) fn record(
         environment_map: environment.is_some(),
         listed: listed.is_some(),
         visibility_words: reflectors.visibility_words,
-        mirror_cells: mirrored.map(|(bounces, _)| bounces.cell_count()),
+        mirror_cells: mirrored.map(|(bounces, _)| bounces.cells.len()),
         lists_glossy: glossy.is_some(),
     };
-    let pass = recording.device.passes.get(&variant)?;
+    let [color, inverse_depth, provenance] = recording.batch.pixel_planes();
     let mut bindings = recording.cell_bindings();
     bindings.extend([
-        Binding::buffer("out_color", &recording.batch.color),
-        Binding::buffer("inverse_depth", &recording.batch.inverse_depth_per_m),
-        Binding::buffer("provenance", &recording.batch.provenance),
+        Binding::buffer("out_color", color),
+        Binding::buffer("inverse_depth", inverse_depth),
+        Binding::buffer("provenance", provenance),
         Binding::buffer("illumination", &reflectors.illumination),
         Binding::texture("samples", &reflectors.samples),
     ]);
-    bindings.extend(environment.into_iter().flat_map(|map| map.bindings()));
-    bindings.extend(listed.map(PixelList::bindings).into_iter().flatten());
+    bindings.extend(environment.into_iter().flat_map(GpuEnvironment::bindings));
+    bindings.extend(listed.into_iter().flat_map(PixelList::bindings));
     bindings.extend(mirrored.into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
     bindings.extend(glossy.into_iter().flat_map(GlossyList::bindings));
-    let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&variant, &pass, &bound, listed);
+    let pass = recording.bind(&variant, bindings)?;
+    recording.dispatch_pixels(&pass, listed);
     Ok(())
 }

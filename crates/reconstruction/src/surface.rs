@@ -1,6 +1,7 @@
 //! The vote of all cameras on a point: `surface.wgsl`, the common part of passes that find surfaces.
 
 use gpu::{Binding, ShaderVariant};
+use wgpu::Buffer;
 
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
@@ -51,17 +52,16 @@ pub(crate) fn record(
     rays: Rays<'_>,
     own: &[Binding<'_>],
 ) -> Result<PixelList, ReconstructionError> {
-    let pass = recording.device.passes.get(variant)?;
     let undecided = recording.empty_list();
     let batch = &recording.batch;
     let mut bindings = bindings(recording, &undecided);
     let starts = batch.tile_start_m.as_ref().filter(|_| !matches!(rays, Rays::Left(_)));
     bindings.extend(starts.map(|starts| Binding::buffer("tile_start_m", starts)));
     bindings.extend(batch.targets.iter().flat_map(|drawn| drawn.bindings()));
-    bindings.extend(rays.list().map(PixelList::bindings).into_iter().flatten());
+    bindings.extend(rays.list().into_iter().flat_map(PixelList::bindings));
     bindings.extend(own.iter().cloned());
-    let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(variant, &pass, &bound, rays.list());
+    let pass = recording.bind(variant, bindings)?;
+    recording.dispatch_pixels(&pass, rays.list());
     Ok(undecided)
 }
 
@@ -69,17 +69,17 @@ pub(crate) fn record(
 pub(crate) fn bindings<'b>(recording: &'b Recording<'_>, undecided: &'b PixelList) -> Vec<Binding<'b>> {
     let mut bindings = recording.cell_bindings();
     bindings.push(Binding::texture("cell_colors", &recording.set.cell_colors));
-    bindings.extend(found_bindings(recording, undecided));
+    bindings.extend(found_bindings(recording.batch.pixel_planes(), undecided));
     bindings
 }
 
-/// The resources of `found.wgsl`.
-pub(crate) fn found_bindings<'b>(recording: &'b Recording<'_>, undecided: &'b PixelList) -> [Binding<'b>; 5] {
-    let batch = &recording.batch;
+/// The resources of `found.wgsl`: colours, inverse depths and provenance of what is found, and what stays undecided.
+pub(crate) fn found_bindings<'b>(planes: [&'b Buffer; 3], undecided: &'b PixelList) -> [Binding<'b>; 5] {
+    let [color, inverse_depth, provenance] = planes;
     [
-        Binding::buffer("out_color", &batch.color),
-        Binding::buffer("out_inverse_depth", &batch.inverse_depth_per_m),
-        Binding::buffer("out_provenance", &batch.provenance),
+        Binding::buffer("out_color", color),
+        Binding::buffer("out_inverse_depth", inverse_depth),
+        Binding::buffer("out_provenance", provenance),
         Binding::buffer("undecided_pixels", &undecided.pixels),
         Binding::buffer("undecided", &undecided.lists),
     ]

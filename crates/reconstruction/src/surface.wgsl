@@ -73,8 +73,7 @@ fn vote_of(camera: SampleCamera, point_in_world: vec3f, view_direction: vec3f) -
 struct Blend { color_linear: vec3f, origin: u32, occupied: bool }
 
 fn color_of(vote: CameraVote) -> vec3f {
-    let colors = colors_of(vote.cell).corners;
-    let color = vote.shares.x * colors[0] + vote.shares.y * colors[1] + vote.shares.z * colors[2] + vote.shares.w * colors[3];
+    let color = mixed_color(vote.cell, vote.shares);
 {% if holes %}
     return color / max(dot(vote.shares, vec4f(1.0)), 1e-6);
 {% else %}

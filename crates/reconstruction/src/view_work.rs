@@ -1,7 +1,5 @@
 //! The uniform of a view in passes over sample cameras: `view_work.wgsl`. A test compares layouts with the WGSL.
 
-use std::ops::Range;
-
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
 use glam::{UVec2, Vec3};
@@ -20,7 +18,7 @@ pub(crate) const CELL_MARGIN_PX: f32 = 0.01;
 pub(crate) const ONE_VIEW: ResourceTraits = &[("work", ResourceTrait::DynamicOffset)];
 
 /// Switches of shaders that include `view_work.wgsl`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SetVariant {
     /// None of a set that is a layered cube alone.
     pub cameras: usize,
@@ -37,8 +35,7 @@ impl SetVariant {
     pub const CUBE: Self = Self { cameras: 0, holes: false };
 
     pub fn all() -> Vec<Self> {
-        let counts = [1, 2, 4, MAX_SAMPLE_CAMERAS].into_iter();
-        counts.flat_map(|cameras| [false, true].map(|holes| Self { cameras, holes })).collect()
+        [1, 2, 4, MAX_SAMPLE_CAMERAS].map(|cameras| [false, true].map(|holes| Self { cameras, holes })).concat()
     }
 }
 
@@ -75,6 +72,7 @@ pub(crate) struct GpuViewCamera {
     pub first_tile: u32,
     pub size_px: [u32; 2],
     pub number: u32,
+    /// The first row in the low half, and the row after the last in the high half: sides of views have less than 16 bits.
     pub rows: u32,
 }
 
@@ -102,11 +100,6 @@ pub(crate) fn tiles_of(size_px: UVec2) -> UVec2 {
     size_px.map(|side| side.div_ceil(TILE_PX))
 }
 
-/// A view's rows in one word; a side of a view has less than 16 bits.
-pub(crate) fn rows_of(rows: Range<u32>) -> u32 {
-    rows.start | rows.end << 16
-}
-
 impl GpuViewCamera {
     /// The camera of the `number`-th view of a batch.
     pub fn of(camera: &PinholeCamera, number: u32) -> Self {
@@ -124,7 +117,7 @@ impl GpuViewCamera {
             first_tile: number * tiles_of(camera.size_px).element_product(),
             size_px: camera.size_px.to_array(),
             number,
-            rows: rows_of(0..camera.size_px.y),
+            rows: camera.size_px.y << 16,
         }
     }
 }

@@ -1,7 +1,6 @@
 //! The walk along curved rays in images of single-pole cameras: `curved_search.wgsl`.
 
-use gpu::{ResourceTraits, ShaderVariant};
-use minijinja::{Value, context};
+use gpu::shader_variant;
 
 use crate::error::ReconstructionError;
 use crate::view_work::{ONE_VIEW, SetVariant};
@@ -38,26 +37,4 @@ impl Default for CurvedSearch {
     }
 }
 
-/// The switches of `bounce/curved_search.wgsl`.
-#[derive(Debug)]
-pub(crate) struct CurvedWalk {
-    pub set: SetVariant,
-    /// Counts the steps of each ray, for a study.
-    pub count_steps: bool,
-}
-
-impl ShaderVariant for CurvedWalk {
-    const TEMPLATE: &'static str = "bounce/curved_search.wgsl";
-    const TRAITS: ResourceTraits = ONE_VIEW;
-
-    fn context(&self) -> Value {
-        context! { count_steps => self.count_steps, ..self.set.context() }
-    }
-
-    fn all() -> Vec<Self> {
-        SetVariant::all()
-            .into_iter()
-            .flat_map(|set| [false, true].map(|count_steps| Self { set, count_steps }))
-            .collect()
-    }
-}
+shader_variant!(CurvedWalk(SetVariant), "bounce/curved_search.wgsl", ONE_VIEW);

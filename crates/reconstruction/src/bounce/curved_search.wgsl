@@ -8,10 +8,6 @@
 {% include "bounce/ray.wgsl" %}
 {% include "single_pole.wgsl" %}
 @group(0) var<storage, read> rays: array<MirroredRay>;
-{% if count_steps %}
-@group(0) var<storage, read_write> out_steps: array<u32>;
-var<private> steps: u32 = 0u;
-{% endif %}
 
 // Linear along a ray: columns and rows before they move, and inverse depth.
 struct Line { origin: vec3f, line: vec3f }
@@ -20,8 +16,6 @@ struct Line { origin: vec3f, line: vec3f }
 struct Look { place: vec2f, gap: f32, footprint: f32, connected: bool }
 
 fn look_at(line: Line, s: f32, camera: SampleCamera, pole: Pole) -> Look {
-{% if count_steps %}    steps += 1u;
-{% endif %}
     let at = line.origin + line.line * s;
     let place = moved(pole, at.xy, at.z) - 0.5;
     let inside = all(place >= vec2f(0.0)) && all(place < camera.cells);
@@ -145,9 +139,7 @@ fn color_at(camera: SampleCamera, place: vec2f) -> vec3f {
     let cell_index = camera.first_cell + cell.y * camera.width_px + cell.x;
     let within = clamped - floor(clamped);
     let smooth_at = select(round(within), within, corners_of(cell_index).connected);
-    let shares = bilinear_shares(smooth_at);
-    let colors = colors_of(cell_index).corners;
-    return shares.x * colors[0] + shares.y * colors[1] + shares.z * colors[2] + shares.w * colors[3];
+    return mixed_color(cell_index, bilinear_shares(smooth_at));
 }
 
 @compute @workgroup_size(LIST_WORKGROUP)
@@ -162,6 +154,4 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let color = color_at(camera, found.place);
     // Coarse steps prove nothing to be free: only what never comes into the volume meets nothing for certain.
     write_found(index, found.met, found.t, color, origin_of(camera.mask, 0u), span.near >= span.far);
-{% if count_steps %}    out_steps[index] += steps;
-{% endif %}
 }

@@ -16,8 +16,8 @@ pub(crate) fn mip_count(size_px: UVec2) -> u32 {
 
 /// The texels of all levels together.
 pub(crate) fn mip_texels(size_px: UVec2) -> usize {
-    let texels = |level: u32| size_px.map(|side| side.div_ceil(1 << level)).element_product() as usize;
-    (1..=mip_count(size_px)).map(texels).sum()
+    let levels = (1..=mip_count(size_px)).map(|level| size_px.map(|side| side.div_ceil(1 << level)));
+    levels.map(|size_px| size_px.element_product() as usize).sum()
 }
 
 /// The colours of all levels, the finest first, row by row, as RGB9E5, and the sizes of levels. A texel is the mean over the
@@ -36,11 +36,10 @@ pub(crate) fn mips(image: &DepthImage) -> Vec<(UVec2, Vec<u32>)> {
 impl Level {
     fn of(image: &DepthImage) -> Self {
         let samples = image.color_rgb9e5.iter().zip(&image.inverse_depth_per_m);
-        let means =
-            samples.map(|(&color, &inverse_depth_per_m)| match inverse_depth_per_m > BACKGROUND_INVERSE_DEPTH {
-                true => (linear_from_rgb9e5(color), 1.0),
-                false => (Vec3::ZERO, 0.0),
-            });
+        let means = samples.map(|(&color, &inverse_depth)| match inverse_depth > BACKGROUND_INVERSE_DEPTH {
+            true => (linear_from_rgb9e5(color), 1.0),
+            false => (Vec3::ZERO, 0.0),
+        });
         Self { size_px: image.size_px(), means: means.collect() }
     }
 
@@ -54,11 +53,8 @@ impl Level {
     fn mean(&self, first: UVec2) -> (Vec3, f32) {
         let end = (first + 2).min(self.size_px);
         let texels = (first.y..end.y).flat_map(|y| (first.x..end.x).map(move |x| UVec2::new(x, y)));
-        let (sum, shares) = texels.fold((Vec3::ZERO, 0.0), |(sum, shares), texel| {
-            let (color, share) = self.means[index_of(texel, self.size_px)];
-            (sum + color * share, shares + share)
-        });
-        (sum / f32::max(shares, f32::MIN_POSITIVE), shares / (end - first).element_product() as f32)
+        let (mean, shares) = weighted_mean(texels.map(|texel| self.means[index_of(texel, self.size_px)]));
+        (mean, shares / (end - first).element_product() as f32)
     }
 
     fn packed(self) -> (UVec2, Vec<u32>) {
@@ -66,13 +62,16 @@ impl Level {
     }
 }
 
+/// The mean of colours by their shares, and the sum of these.
+fn weighted_mean(means: impl Iterator<Item = (Vec3, f32)>) -> (Vec3, f32) {
+    let (sum, shares) =
+        means.fold((Vec3::ZERO, 0.0), |(sum, shares), (color, share)| (sum + color * share, shares + share));
+    (sum / f32::max(shares, f32::MIN_POSITIVE), shares)
+}
+
 fn fill_from_coarser(levels: &mut [Level]) {
     if let Some(coarsest) = levels.last_mut() {
-        let (sum, shares) = coarsest
-            .means
-            .iter()
-            .fold((Vec3::ZERO, 0.0), |(sum, shares), (color, share)| (sum + *color * *share, shares + *share));
-        let mean = sum / f32::max(shares, f32::MIN_POSITIVE);
+        let (mean, _) = weighted_mean(coarsest.means.iter().copied());
         coarsest.means.iter_mut().filter(|(_, share)| *share == 0.0).for_each(|(color, _)| *color = mean);
     }
     for number in (1..levels.len()).rev() {

@@ -10,9 +10,7 @@ fn mip_color(camera: SampleCamera, level: u32, place_px: vec2f) -> vec3f {
     }
     let uv = clamp(place_px / exp2(f32(level)) - 0.5, vec2f(0.0), vec2f(size_px - 1u) - CELL_MARGIN_PX);
     let cell = vec2u(uv);
-    let colors = colors_of(first + cell.y * size_px.x + cell.x).corners;
-    let shares = bilinear_shares(uv - floor(uv));
-    return shares.x * colors[0] + shares.y * colors[1] + shares.z * colors[2] + shares.w * colors[3];
+    return mixed_color(first + cell.y * size_px.x + cell.x, bilinear_shares(uv - floor(uv)));
 }
 
 // `color` is that of a ray without width. Interpolation is a tent two texels wide, so that a level's texels have half the ray's

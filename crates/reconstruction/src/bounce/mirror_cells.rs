@@ -15,21 +15,10 @@ pub struct MirrorCell<'s> {
     pub surroundings: &'s SampleSet,
 }
 
-impl<'s> MirrorCell<'s> {
-    /// A cube in which all mirrors are followed that are in no other cell.
-    fn everywhere(cube: &'s SampleSet) -> Self {
-        let bounds = Aabb { min: Vec3::splat(f32::MIN), max: Vec3::splat(f32::MAX) };
-        Self { bounds, surroundings: cube }
-    }
-
+impl MirrorCell<'_> {
     /// Its surroundings are a cube: the base, or the set of a view from a cube.
-    pub(super) fn is_cube(&self) -> bool {
+    pub(crate) fn is_cube(&self) -> bool {
         self.surroundings.cube.is_some()
-    }
-
-    /// A cube without a light field, in which lobes would be gathered.
-    pub(super) fn is_plain_cube(&self) -> bool {
-        self.surroundings.cube.as_ref().is_some_and(|cube| cube.light_field.is_none())
     }
 }
 
@@ -80,7 +69,9 @@ impl<'s> Mirrors<'s> {
         if self.reflections == 0 && self.glossy_rays == 0 {
             return Vec::new();
         }
-        self.cells.iter().copied().chain(cube.map(MirrorCell::everywhere)).collect()
+        let everywhere = Aabb { min: Vec3::splat(f32::MIN), max: Vec3::splat(f32::MAX) };
+        let cube = cube.map(|surroundings| MirrorCell { bounds: everywhere, surroundings });
+        self.cells.iter().copied().chain(cube).collect()
     }
 }
 

@@ -1,5 +1,6 @@
 //! A cube's samples in voxels, for rays: cells of 8 spacings, bricks of 4 × 4 × 4 voxels in those that have samples, and entries.
 
+use depth_image::oct8_from_unit;
 use glam::UVec3;
 
 use super::reaches::reaches;
@@ -21,9 +22,6 @@ pub(crate) const MORE_ENTRIES: u32 = 1 << 31;
 
 /// The tables of `cube/walk.wgsl`.
 pub(super) struct Bricks {
-    /// Columns and rows of cells.
-    pub columns: u32,
-    pub rows: u32,
     pub cells: Vec<u32>,
     pub bricks: Vec<[u32; 4]>,
     /// Two entries; or the first entry of more, and the places of the first pair of the others and of the one after their last.
@@ -45,14 +43,8 @@ impl Bricks {
         let size = samples.size.map(|side| side.div_ceil(8));
         let (first, passages) = by_cell(samples, size);
         let occupied: Vec<bool> = first.windows(2).map(|ends| ends[1] > ends[0]).collect();
-        let mut all = Self {
-            columns: size.x,
-            rows: size.y,
-            cells: reaches(size, &occupied),
-            bricks: Vec::new(),
-            leaves: Vec::new(),
-            entries: Vec::new(),
-        };
+        let cells = reaches(size, &occupied);
+        let mut all = Self { cells, bricks: Vec::new(), leaves: Vec::new(), entries: Vec::new() };
         for (cell, ends) in first.windows(2).enumerate().filter(|(_, ends)| ends[1] > ends[0]) {
             all.cells[cell] = all.bricks.len() as u32;
             all.add_brick(&passages[ends[0] as usize..ends[1] as usize]);
@@ -73,16 +65,19 @@ impl Bricks {
     }
 
     fn leaf(&mut self, passages: &[Passage]) -> [u32; 4] {
-        // The last of an odd number is there twice, which changes nothing.
-        let pair = |two: &[Passage]| bytemuck::cast([two[0].words, two[two.len() - 1].words]);
         if passages.len() <= 2 {
-            return pair(passages);
+            return pair_of(passages);
         }
         let [sample, place] = passages[0].words;
         let first = self.entries.len() as u32;
-        self.entries.extend(passages[1..].chunks(2).map(pair));
+        self.entries.extend(passages[1..].chunks(2).map(pair_of));
         [sample | MORE_ENTRIES, place, first, self.entries.len() as u32]
     }
+}
+
+/// The words of one or two passages: the last of an odd number is there twice, which changes nothing.
+fn pair_of(passages: &[Passage]) -> [u32; 4] {
+    bytemuck::cast([passages[0].words, passages[passages.len() - 1].words])
 }
 
 /// The first passage of each cell, and the passages, sorted by cell and voxel.
@@ -104,7 +99,12 @@ fn by_cell(samples: &CubeSamples, size: UVec3) -> (Vec<u32>, Vec<Passage>) {
 
 /// Calls `take` for each voxel that a surface's plane passes through, with the voxel's cell.
 fn each_passage(samples: &CubeSamples, size: UVec3, mut take: impl FnMut(usize, Passage)) {
-    for (sample, is_two_sided) in surfaces(samples) {
+    let mut next = 0;
+    while next < samples.len() {
+        let sample = next;
+        // The next sample may be the same surface's other side.
+        let is_two_sided = samples.has_other_side(sample);
+        next += 1 + usize::from(is_two_sided);
         let line = samples.line[sample];
         let axis = samples.axis_of(line);
         if samples.normal[sample][axis].abs() < LEAST_NORMAL_ALONG_LINE {
@@ -118,9 +118,9 @@ fn each_passage(samples: &CubeSamples, size: UVec3, mut take: impl FnMut(usize, 
         let [from, to] = [depth - reach, depth + reach].map(|end| ((end / VOXEL).floor().max(0.0) as u32).min(last));
         let mut voxel = UVec3::ZERO;
         (voxel[(axis + 1) % 3], voxel[(axis + 2) % 3]) = (place.x / 2, place.y / 2);
-        let bit = |offset: usize, is_set: u32| is_set << (28 + (axis + offset) % 3);
-        let bits = bit(0, is_two_sided.into()) | bit(1, place.x & 1) | bit(2, place.y & 1);
-        let normal = u32::from(samples.normal_oct8(sample)) | (axis as u32) << 30;
+        let flags = [u32::from(is_two_sided), place.x & 1, place.y & 1].into_iter().enumerate();
+        let bits = flags.fold(0, |bits, (offset, is_set)| bits | is_set << (28 + (axis + offset) % 3));
+        let normal = u32::from(oct8_from_unit(samples.normal[sample])) | (axis as u32) << 30;
         for along in from..=to {
             voxel[axis] = along;
             let below = (depth - along as f32 * VOXEL + ENTRY_DEPTH_BELOW) / ENTRY_DEPTH_STEP;
@@ -131,10 +131,4 @@ fn each_passage(samples: &CubeSamples, size: UVec3, mut take: impl FnMut(usize, 
             take((cell.x + size.x * (cell.y + size.y * cell.z)) as usize, Passage { voxel: number, words });
         }
     }
-}
-
-/// The sample of each surface, and whether the next sample is the same surface's other side.
-fn surfaces(samples: &CubeSamples) -> impl Iterator<Item = (usize, bool)> {
-    let of = |sample: usize| (sample < samples.len()).then(|| (sample, samples.has_other_side(sample)));
-    std::iter::successors(of(0), move |&(sample, is_two_sided)| of(sample + 1 + usize::from(is_two_sided)))
 }

@@ -36,10 +36,10 @@ fn same_surface(samples: &CubeSamples, sample: usize, line: u32, depth: f32) -> 
     let on_line = samples.on_line(line);
     let share = own[samples.axis_of(line)].abs();
     // Depths rise along a line.
-    let is_below = |&d: &f32| (d - depth) * share < -SAME_PLANE;
-    let begin = on_line.start + samples.depth[on_line.clone()].partition_point(is_below);
-    let near = (begin..on_line.end).take_while(|&other| (samples.depth[other] - depth) * share <= SAME_PLANE);
+    let below = samples.depth[on_line.clone()].partition_point(|&d| (d - depth) * share < -SAME_PLANE);
+    let near =
+        (on_line.start + below..on_line.end).take_while(|&other| (samples.depth[other] - depth) * share <= SAME_PLANE);
     let same = near.filter(|&other| samples.normal[other].dot(own) > 0.0);
-    let gap = |&other: &usize| (samples.depth[other] - depth).abs();
-    same.min_by(|a, b| gap(a).total_cmp(&gap(b)))
+    let gaps = same.map(|other| (other, (samples.depth[other] - depth).abs()));
+    gaps.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(other, _)| other)
 }

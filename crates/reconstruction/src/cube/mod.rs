@@ -12,14 +12,11 @@ use glam::Vec3;
 use gpu::{Binding, GpuError, Table, TablePool, Turn};
 use wgpu::{BufferUsages, TextureFormat};
 
-pub(crate) use bricks::LEAST_NORMAL_ALONG_LINE;
-pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, MORE_ENTRIES, SQUARE_REACH};
-pub(crate) use light_field::GpuLightField;
-pub(crate) use light_field::NEAREST_SPACINGS;
-pub(crate) use light_field::{FOOTPRINT_SHARE, LEAST_LOBE_SHARE, LightField, MOST_MASKING};
+pub(crate) use bricks::{ENTRY_DEPTH_BELOW, ENTRY_DEPTH_STEP, LEAST_NORMAL_ALONG_LINE, MORE_ENTRIES, SQUARE_REACH};
+pub(crate) use light_field::{FOOTPRINT_SHARE, GpuLightField, LEAST_LOBE_SHARE, LightField};
+pub(crate) use light_field::{MOST_MASKING, NEAREST_SPACINGS};
 pub(crate) use links::links;
-pub(crate) use samples::CubeSamples;
-pub(crate) use samples::Links;
+pub(crate) use samples::{CubeSamples, Links};
 
 use self::bricks::Bricks;
 use crate::{error::ReconstructionError, reflectors::Reflectors, set_description::SetDescription};
@@ -74,8 +71,10 @@ impl Cube {
         turn: Turn,
     ) -> Result<Self, ReconstructionError> {
         check(grid, images)?;
-        let cells = grid.size.map(|side| side.div_ceil(8)).to_array().map(|side| side as usize);
-        tables.gpu.check_table("cells of a layered cube", cells.iter().product())?;
+        let cells = grid.size.map(|side| side.div_ceil(8));
+        tables
+            .gpu
+            .check_table("cells of a layered cube", cells.to_array().map(|side| side as usize).iter().product())?;
         let count: usize = images.iter().map(LayeredDepthImage::sample_count).sum();
         GpuError::check_limit("the samples of a layered cube", count as u64, MAX_SAMPLES as u64)?;
         tables.gpu.check_table("samples of a layered cube", count)?;
@@ -86,8 +85,8 @@ impl Cube {
         let cube = GpuCube {
             cube_from_world: cube_from_world(grid),
             size: grid.size.to_array(),
-            columns: bricks.columns,
-            rows: bricks.rows,
+            columns: cells.x,
+            rows: cells.y,
             start_m,
             padding: [0; 2],
         };
@@ -119,13 +118,12 @@ impl Cube {
 }
 
 fn check(grid: &CubeGrid, images: &[LayeredDepthImage; 3]) -> Result<(), ReconstructionError> {
-    let reason = |error: depth_image::CameraError| ReconstructionError::Sample { index: 0, reason: error.to_string() };
-    grid.validate().map_err(reason)?;
+    grid.validate().map_err(|error| ReconstructionError::sample(0, error))?;
     for (index, image) in images.iter().enumerate() {
-        let wrong = |reason: String| ReconstructionError::Sample { index, reason };
-        image.validate().map_err(|error| wrong(error.to_string()))?;
+        image.validate().map_err(|error| ReconstructionError::sample(index, error))?;
         if !grid.has_camera(index, &image.camera) {
-            return Err(wrong(format!("its lines are not those of the cube's grid along axis {index}")));
+            let reason = format!("its lines are not those of the cube's grid along axis {index}");
+            return Err(ReconstructionError::sample(index, reason));
         }
     }
     Ok(())

@@ -14,11 +14,9 @@ const FARTHEST: u8 = (1 << BITS) - 1;
 pub(super) fn reaches(size: UVec3, occupied: &[bool]) -> Vec<u32> {
     let mut words = vec![0; occupied.len()];
     for octant in 0..OCTANTS {
-        let own = in_octant(size, occupied, octant);
-        words
-            .iter_mut()
-            .zip(own)
-            .for_each(|(word, reach): (&mut u32, u8)| *word |= u32::from(reach) << (BITS * octant));
+        for (word, reach) in words.iter_mut().zip(in_octant(size, occupied, octant)) {
+            *word |= u32::from(reach) << (BITS * octant);
+        }
     }
     words
 }
@@ -26,12 +24,10 @@ pub(super) fn reaches(size: UVec3, occupied: &[bool]) -> Vec<u32> {
 /// A cube reaches one cell farther than the least of those that begin at the seven cells ahead.
 fn in_octant(size: UVec3, occupied: &[bool], octant: usize) -> Vec<u8> {
     let [columns, rows, layers] = size.to_array().map(|side| side as usize);
-    let order =
-        |axis: usize, count: usize| (0..count).map(move |i| if rises(octant, axis) { count - 1 - i } else { i });
     let mut all = vec![0; occupied.len()];
     let mut least_ahead = vec![FARTHEST; columns];
-    for z in order(2, layers) {
-        for y in order(1, rows) {
+    for z in in_order(octant, 2, layers) {
+        for y in in_order(octant, 1, rows) {
             least_ahead.fill(FARTHEST);
             for (y, z) in rows_ahead([y, z], [rows, layers], octant) {
                 let row = &all[columns * (y + rows * z)..][..columns];
@@ -41,7 +37,7 @@ fn in_octant(size: UVec3, occupied: &[bool], octant: usize) -> Vec<u8> {
             let own = &mut all[row.clone()];
             let occupied = &occupied[row];
             let mut before = FARTHEST;
-            for x in order(0, columns) {
+            for x in in_order(octant, 0, columns) {
                 let least = before.min(least_ahead[x]);
                 own[x] = if occupied[x] { 0 } else { (least + 1).min(FARTHEST) };
                 before = own[x].min(least_ahead[x]);
@@ -55,13 +51,17 @@ fn rises(octant: usize, axis: usize) -> bool {
     octant >> axis & 1 != 0
 }
 
+/// The places along an axis, those ahead of a ray first.
+fn in_order(octant: usize, axis: usize, count: usize) -> impl Iterator<Item = usize> {
+    (0..count).map(move |i| if rises(octant, axis) { count - 1 - i } else { i })
+}
+
 /// The rows ahead of a row and within the grid: along y, along z, and along both.
 fn rows_ahead(row: [usize; 2], size: [usize; 2], octant: usize) -> impl Iterator<Item = (usize, usize)> {
-    let next = |axis: usize| {
+    let [y, z] = [0, 1].map(|axis| {
         let next = if rises(octant, axis + 1) { row[axis].checked_add(1) } else { row[axis].checked_sub(1) };
         next.filter(|&next| next < size[axis])
-    };
-    let [y, z] = [next(0), next(1)];
+    });
     [y.map(|y| (y, row[1])), z.map(|z| (row[0], z)), y.zip(z)].into_iter().flatten()
 }
 

@@ -1,6 +1,6 @@
 //! The samples of a cube's three images, in the cube's own space.
 
-use depth_image::{CubeGrid, LayeredDepthImage, oct8_from_unit};
+use depth_image::{CubeGrid, LayeredDepthImage};
 use glam::{UVec2, UVec3, Vec3};
 use rayon::prelude::*;
 
@@ -102,29 +102,19 @@ impl CubeSamples {
 
     /// The texels of `cube_samples` in `cube/colors.wgsl`.
     pub(super) fn words(&self, links: &[Links]) -> Vec<[u32; 4]> {
-        let words = |sample: usize| {
-            let [before, after, above, below] = links[sample];
-            let beside = (sample as u32 - before) | (after - sample as u32) << 16;
-            [self.color_rgb9e5[sample], beside, above, below]
-        };
-        (0..self.len()).into_par_iter().map(words).collect()
+        let words = self.color_rgb9e5.par_iter().zip(links).enumerate();
+        let words = words.map(|(sample, (&color_rgb9e5, &[before, after, above, below]))| {
+            [color_rgb9e5, (sample as u32 - before) | (after - sample as u32) << 16, above, below]
+        });
+        words.collect()
     }
 
     /// Slopes of a sample's plane: how far it moves along its line from one line to the next, along the next axis and the one after
     /// it.
     pub(super) fn slopes(&self, sample: usize, axis: usize) -> [f32; 2] {
         let normal = self.normal[sample];
-        let own = if normal[axis].abs() < LEAST_SLOPE_DIVISOR {
-            LEAST_SLOPE_DIVISOR.copysign(normal[axis])
-        } else {
-            normal[axis]
-        };
+        let own = normal[axis].abs().max(LEAST_SLOPE_DIVISOR).copysign(normal[axis]);
         [1, 2].map(|offset| -normal[(axis + offset) % 3] / own)
-    }
-
-    /// Octahedral in two bytes.
-    pub(super) fn normal_oct8(&self, sample: usize) -> u16 {
-        oct8_from_unit(self.normal[sample])
     }
 }
 

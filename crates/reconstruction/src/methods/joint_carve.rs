@@ -42,11 +42,9 @@ impl ShaderVariant for Carve {
     }
 
     fn all() -> Vec<Self> {
-        let levels = |set| {
-            let plain = [0, 1, MAX_STOP_LEVEL].map(|stop_level| Self { set, stop_level, bounced: false });
-            plain.into_iter().chain([Self { set, stop_level: 0, bounced: true }])
-        };
-        SetVariant::all().into_iter().flat_map(levels).collect()
+        let kinds = [(0, false), (1, false), (MAX_STOP_LEVEL, false), (0, true)];
+        let sets = SetVariant::all().into_iter();
+        sets.flat_map(|set| kinds.map(|(stop_level, bounced)| Self { set, stop_level, bounced })).collect()
     }
 }
 

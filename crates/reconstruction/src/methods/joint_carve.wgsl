@@ -181,13 +181,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let a{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f({{ eye }}, 1.0));
     let b{{ k }} = homogeneous(camera{{ k }}.homogeneous_pixel_from_world, vec4f({{ direction }}, 0.0));
 {% endfor %}
-{%- if bounced %}
-    var t = out_inverse_depth[index];
-    // A ray that begins on a surface which its images show does not meet it: the way must have been free.
-    var freed = t > span.near;
-{%- else %}
     // The pass before left how far it got.
     var t = out_inverse_depth[index];
+{%- if bounced %}
+    // A ray that begins on a surface which its images show does not meet it: the way must have been free.
+    var freed = t > span.near;
 {%- endif %}
     var level = FIRST_LEVEL;
     var hit = false;

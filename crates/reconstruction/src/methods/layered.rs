@@ -6,7 +6,7 @@ use depth_image::{Highlight, MAX_REFLECTIONS};
 use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots, switches};
 use minijinja::{Value, context};
 
-use crate::bounce::{Bounces, CellRays, InBase, MAX_RAY_LISTS, RayLists};
+use crate::bounce::{Bounces, CellRays, MAX_RAY_LISTS, RayLists};
 use crate::cube::{Cube, LightField};
 use crate::lobes::{self, GlossyList, LobeLight};
 use crate::reflectors::sample_texels;
@@ -15,9 +15,10 @@ use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
 /// The rays that are walked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Walked {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Walked {
     /// Those of all pixels.
+    #[default]
     Pixels,
     /// Those of pixels that another method leaves: the cube is the base beside its images.
     LeftPixels,
@@ -40,7 +41,7 @@ impl Walked {
 }
 
 /// The switches of `layered.wgsl`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Walk {
     set: SetVariant,
     rays: Walked,
@@ -59,19 +60,6 @@ pub(crate) struct Walk {
 }
 
 impl Walk {
-    const PLAIN: Self = Self {
-        set: SetVariant::CUBE,
-        rays: Walked::Pixels,
-        in_base: false,
-        truncated: false,
-        highlight: None,
-        mirror_cells: None,
-        lobe: None,
-        lights: 0,
-        environment_map: false,
-        visibility_words: 0,
-    };
-
     fn of(
         recording: &Recording<'_>,
         cube: &Cube,
@@ -94,16 +82,14 @@ impl Walk {
             truncated: cube.truncated,
             highlight,
             // Mirrors of a matt base are not in it.
-            mirror_cells: spawning.filter(|_| highlight == Some(Highlight::Ggx)).map(Bounces::cell_count),
+            mirror_cells: spawning.filter(|_| highlight == Some(Highlight::Ggx)).map(|bounces| bounces.cells.len()),
             lobe: lobe.filter(|_| highlight == Some(Highlight::Ggx)),
             lights: reflectors.map_or(0, |reflectors| reflectors.lights),
             environment_map: is_mapped,
             visibility_words: reflectors.map_or(0, |reflectors| reflectors.visibility_words),
         }
     }
-}
 
-impl Walk {
     /// The same in a base, beside four images.
     fn of_base(self) -> Vec<Self> {
         let mirror_cells = self.mirror_cells.map(|_| MAX_RAY_LISTS);
@@ -118,16 +104,13 @@ impl Walk {
             Walked::IntoLobes => vec![Self { in_base: true, ..self }],
         }
     }
-}
 
-impl Walk {
     /// The same with all ways to light lobes.
     fn with_lobes(self) -> impl Iterator<Item = Self> {
-        let is_of_ends = |lobe: &LobeLight| *lobe == LobeLight::GatheredMirrors;
-        let lobes = LobeLight::ALL.into_iter().filter(move |lobe| match self.rays {
-            Walked::IntoLobes => false,
-            rays => is_of_ends(lobe) || !rays.is_bounced(),
-        });
+        let may_gather = self.rays != Walked::IntoLobes;
+        let shows_all = !self.rays.is_bounced();
+        let lobes = LobeLight::ALL.into_iter();
+        let lobes = lobes.filter(move |&lobe| may_gather && (shows_all || lobe == LobeLight::GatheredMirrors));
         lobes.map(move |lobe| {
             let follows = matches!(lobe, LobeLight::GatheredRest | LobeLight::SentRest);
             Self { mirror_cells: follows.then_some(1), lobe: Some(lobe), ..self }
@@ -165,27 +148,28 @@ impl ShaderVariant for Walk {
     }
 
     fn all() -> Vec<Self> {
-        let lights = [(0, 0), (3, 1), (255, 64)];
-        let matt = [false, true].map(|truncated| Self { truncated, ..Self::PLAIN });
-        let glossy = lights.into_iter().flat_map(|(lights, visibility_words)| {
-            switches().flat_map(move |[truncated, environment_map]| {
-                let with = Self { truncated, lights, visibility_words, ..Self::PLAIN };
-                let ggx = Self { highlight: Some(Highlight::Ggx), environment_map, ..with };
-                let bounced = [Walked::Bounced, Walked::IntoLobes].map(|rays| Self { rays, ..ggx });
-                let blinn_phong = (!environment_map).then_some(Self { highlight: Some(Highlight::BlinnPhong), ..with });
-                let mirrored = [ggx].into_iter().chain(bounced);
-                let each =
-                    |walk: Self| [walk, Self { mirror_cells: Some(1), ..walk }].into_iter().chain(walk.with_lobes());
-                mirrored.flat_map(each).chain(blinn_phong)
-            })
-        });
-        let own: Vec<Self> = matt.into_iter().chain(glossy).collect();
-        let left = own.iter().filter(|walk| walk.lights <= 3 && walk.lobe.is_none()).flat_map(|walk| walk.of_base());
-        let without_reflectors = switches().flat_map(|[truncated, environment_map]| {
-            let in_base = Self { in_base: true, truncated, environment_map, ..Self::PLAIN };
-            [Walked::Bounced, Walked::IntoLobes, Walked::LeftBounced].map(|rays| Self { rays, ..in_base })
-        });
-        own.iter().copied().chain(left).chain(without_reflectors).collect()
+        let mut all = [false, true].map(|truncated| Self { truncated, ..Self::default() }).to_vec();
+        for (lights, visibility_words) in [(0, 0), (3, 1), (255, 64)] {
+            for [truncated, environment_map] in switches() {
+                let with = Self { truncated, lights, visibility_words, ..Self::default() };
+                for rays in [Walked::Pixels, Walked::Bounced, Walked::IntoLobes] {
+                    let ggx = Self { rays, highlight: Some(Highlight::Ggx), environment_map, ..with };
+                    all.extend([ggx, Self { mirror_cells: Some(1), ..ggx }]);
+                    all.extend(ggx.with_lobes());
+                }
+                let blinn_phong = Self { highlight: Some(Highlight::BlinnPhong), ..with };
+                all.extend((!environment_map).then_some(blinn_phong));
+            }
+        }
+        let left = all.iter().filter(|walk| walk.lights <= 3 && walk.lobe.is_none()).flat_map(|walk| walk.of_base());
+        let left: Vec<Self> = left.collect();
+        all.extend(left);
+        for [truncated, environment_map] in switches() {
+            let without_reflectors = Self { in_base: true, truncated, environment_map, ..Self::default() };
+            let bounced = [Walked::Bounced, Walked::IntoLobes, Walked::LeftBounced];
+            all.extend(bounced.map(|rays| Self { rays, ..without_reflectors }));
+        }
+        all
     }
 }
 
@@ -196,20 +180,19 @@ pub(crate) fn record(
     bounces: Option<&Bounces<'_>>,
     followed: Option<u32>,
 ) -> Result<PixelList, ReconstructionError> {
-    let undecided = recording.empty_list();
-    let Some(cube) = recording.set.cube.clone() else { return Ok(undecided) };
-    let mirrors = bounces.map_or(0, Bounces::reflections);
+    let Some(cube) = recording.set.cube.clone() else { return Ok(recording.empty_list()) };
+    let mirrors = bounces.map_or(0, |bounces| bounces.reflections);
     let followed = followed.map_or(mirrors, |followed| followed.min(mirrors));
-    let is_glossy = bounces.is_some_and(|bounces| bounces.glossy_rays() > 0);
+    let is_glossy = bounces.is_some_and(|bounces| bounces.glossy_rays > 0);
     let lobe = LobeLight::of_pixels(followed, mirrors, is_glossy, cube.light_field.is_some());
     let sent = bounces.filter(|_| lobe.is_some_and(LobeLight::is_sent));
     let sent = sent.and_then(|bounces| GlossyList::of(recording, bounces));
     let first = bounces.filter(|_| followed > 0).map(|bounces| bounces.next(recording.device, None));
-    walk_pixels(recording, &cube, None, &undecided, bounces.zip(first.as_ref()), lobe, sent.as_ref())?;
+    let undecided = walk_pixels(recording, &cube, None, bounces.zip(first.as_ref()), lobe, sent.as_ref())?;
     let Some(bounces) = bounces else { return Ok(undecided) };
     if let Some(first) = first {
-        let last = (followed < mirrors).then_some(LobeLight::GatheredMirrors);
-        follow_mirrors(recording, &cube, bounces, (first, last, None), 1..=followed)?;
+        let gathered = (followed < mirrors).then_some(LobeLight::GatheredMirrors);
+        follow_mirrors(recording, &cube, bounces, first, Ends { gathered, lobes: None }, 1..=followed)?;
     }
     if let Some(glossy) = &sent {
         follow_lobes(recording, &cube, bounces, glossy)?;
@@ -228,28 +211,27 @@ pub(crate) fn follow_lobes(
     for number in 0..glossy.rays {
         let first = lobes::record(recording, bounces, glossy, number, &reflectors.illumination)?;
         // Costs are learned by generation, and are others than those of rays off mirrors.
-        let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + bounces.reflections().max(1);
-        follow_mirrors(recording, cube, bounces, (first, None, Some(glossy)), generations)?;
+        let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + bounces.reflections.max(1);
+        follow_mirrors(recording, cube, bounces, first, Ends { gathered: None, lobes: Some(glossy) }, generations)?;
     }
     lobes::record_sum(recording, glossy)
 }
 
-/// Records the walk of listed rays, and of those off the mirrors that they meet; what the `last` ones show may be gathered. The light of
-/// rays into lobes is summed up.
+/// Records the walk of listed rays, and of those off the mirrors that they meet; what the last mirrors show may be gathered.
 fn follow_mirrors(
     recording: &mut Recording<'_>,
     cube: &Cube,
     bounces: &Bounces<'_>,
-    (mut lists, last, lobes): (RayLists, Option<LobeLight>, Option<&GlossyList<'_>>),
+    mut lists: RayLists,
+    ends: Ends<'_>,
     generations: RangeInclusive<u32>,
 ) -> Result<(), ReconstructionError> {
+    let walked = if ends.lobes.is_some() { Walked::IntoLobes } else { Walked::Bounced };
     for generation in generations.clone() {
-        let goes_on = generation < *generations.end();
-        let next = goes_on.then(|| bounces.next(recording.device, Some(&lists)));
-        let ends = Ends { gathered: last.filter(|_| !goes_on), lobes };
-        let walked = if lobes.is_some() { Walked::IntoLobes } else { Walked::Bounced };
+        let next = (generation < *generations.end()).then(|| bounces.next(recording.device, Some(&lists)));
+        let gathered = ends.gathered.filter(|_| next.is_none());
         let rays = CellRays { lists: &lists, next: next.as_ref(), cell: 0, reflection: generation };
-        follow(recording, cube, bounces, rays, walked, ends)?;
+        follow(recording, cube, bounces, rays, walked, Ends { gathered, ..ends })?;
         let Some(next) = next else { break };
         lists = next;
     }
@@ -265,63 +247,44 @@ pub(crate) fn record_left(
     mirrored: Option<(&Bounces<'_>, &RayLists)>,
     glossy: Option<&GlossyList<'_>>,
 ) -> Result<PixelList, ReconstructionError> {
-    let undecided = recording.empty_list();
     let lobe = glossy.map(|_| LobeLight::sent(mirrored.is_some()));
-    walk_pixels(recording, base, Some(left), &undecided, mirrored, lobe, glossy)?;
-    Ok(undecided)
-}
-
-/// Records the walk of rays off mirrors in the cube beside a view's images: of a list's, or of those whose end the images of a mirror
-/// cell leave unknown.
-pub(crate) fn follow_in_base(
-    recording: &mut Recording<'_>,
-    base: &Cube,
-    bounces: &Bounces<'_>,
-    which: InBase,
-    rays: CellRays<'_>,
-) -> Result<(), ReconstructionError> {
-    let walked = match which {
-        InBase::WholeList => Walked::Bounced,
-        InBase::LeftByImages => Walked::LeftBounced,
-    };
-    follow(recording, base, bounces, rays, walked, Ends::default())
+    walk_pixels(recording, base, Some(left), mirrored, lobe, glossy)
 }
 
 fn walk_pixels(
     recording: &mut Recording<'_>,
     cube: &Cube,
     listed: Option<&PixelList>,
-    undecided: &PixelList,
     mirrored: Option<(&Bounces<'_>, &RayLists)>,
     lobe: Option<LobeLight>,
     sent: Option<&GlossyList<'_>>,
-) -> Result<(), ReconstructionError> {
+) -> Result<PixelList, ReconstructionError> {
+    let undecided = recording.empty_list();
     let rays = if listed.is_some() { Walked::LeftPixels } else { Walked::Pixels };
     let variant = Walk::of(recording, cube, rays, mirrored.map(|(bounces, _)| bounces), lobe);
-    let pass = recording.device.passes.get(&variant)?;
     let mut bindings = recording.view_bindings();
     bindings.extend(shared_bindings(recording, cube, &variant));
-    bindings.extend(found_bindings(recording, undecided));
+    bindings.extend(found_bindings(recording.batch.pixel_planes(), &undecided));
     bindings.extend(listed.into_iter().flat_map(PixelList::bindings));
     let spawning = mirrored.filter(|_| variant.mirror_cells.is_some());
     bindings.extend(spawning.into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
     bindings.extend(sent.filter(|_| variant.lobe.is_some()).into_iter().flat_map(GlossyList::bindings));
-    let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&variant, &pass, &bound, listed);
-    Ok(())
+    let pass = recording.bind(&variant, bindings)?;
+    recording.dispatch_pixels(&pass, listed);
+    Ok(undecided)
 }
 
 /// What becomes of the light at the ends of rays.
 #[derive(Clone, Copy, Default)]
-struct Ends<'g> {
+pub(crate) struct Ends<'g> {
     /// What mirrors show there.
     gathered: Option<LobeLight>,
     /// It is summed up, where rays go into lobes.
     lobes: Option<&'g GlossyList<'g>>,
 }
 
-/// Records the walk of rays off the mirrors of a mirror cell, whose light is added to their pixels.
-fn follow(
+/// Records the walk of listed rays off mirrors or into lobes, whose light is added to their pixels.
+pub(crate) fn follow(
     recording: &mut Recording<'_>,
     cube: &Cube,
     bounces: &Bounces<'_>,
@@ -330,21 +293,21 @@ fn follow(
     ends: Ends<'_>,
 ) -> Result<(), ReconstructionError> {
     let variant = Walk::of(recording, cube, walked, rays.next.map(|_| bounces), ends.gathered);
-    let pass = recording.device.passes.get(&variant)?;
     let mut bindings = shared_bindings(recording, cube, &variant);
-    let [_, _, ray_provenance] = bounces.planes();
+    let [_, _, ray_provenance] = &bounces.planes;
     bindings.extend([
-        bounces.work_binding(rays.cell),
-        ends.lobes.map_or(Binding::buffer("out_color", &recording.batch.color), GlossyList::light_binding),
+        Binding::buffer("work", &bounces.works[rays.cell]),
+        ends.lobes.map_or(Binding::buffer("out_color", &recording.batch.color), |glossy| {
+            Binding::buffer("lobe_light", glossy.light)
+        }),
         Binding::buffer("out_provenance", &recording.batch.provenance),
     ]);
     bindings.extend(walked.is_left().then(|| Binding::buffer("ray_provenance", ray_provenance)));
     bindings.extend(bounces.list_bindings(rays.lists));
     let next = rays.next.filter(|_| variant.mirror_cells.is_some());
     bindings.extend(next.into_iter().flat_map(|next| bounces.spawn_bindings(next)));
-    let bound = pass.bind(0, bindings)?;
-    let kind = (rays.cell, rays.reflection);
-    recording.dispatch_listed(&variant, &pass, &bound, bounces.lists_of(rays.lists), rays.cell, kind);
+    let pass = recording.bind(&variant, bindings)?;
+    recording.dispatch_listed(&pass, &rays.lists.lists, rays.cell, (rays.cell, rays.reflection));
     Ok(())
 }
 

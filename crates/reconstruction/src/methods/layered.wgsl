@@ -118,16 +118,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {%- endif %}
 }
 {%- else %}
-{%- if left %}
 
-@compute @workgroup_size(LIST_WORKGROUP)
+@compute @workgroup_size({{ "LIST_WORKGROUP" if left else "TILE_PX, TILE_PX" }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
+{%- if left %}
     if id.x >= lists[work.view.number].count { return; }
     let pixel = pixel_of(place_of(listed_pixels[first_listed() + id.x]));
 {%- else %}
-
-@compute @workgroup_size(TILE_PX, TILE_PX)
-fn main(@builtin(global_invocation_id) id: vec3u) {
     let at = pixel_at(id);
     if any(at >= work.view.size_px) { return; }
     let pixel = pixel_of(at);

@@ -9,18 +9,20 @@ pub(crate) mod layered;
 pub(crate) mod light_field_search;
 mod mesh;
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use depth_image::{LightCacheQuality, MAX_REFLECTIONS, NamedMethod, Setting, named_methods};
 use gpu::{ShaderError, ShaderSource, Templates, Turn, shader_sources, wgsl_constants, wgsl_files};
 
-use self::hybrid_mesh::GREATEST_SLOPE;
-use self::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, NUDGE_PX, START_LEVEL};
+use self::hybrid_mesh::{CutTexels, GREATEST_SLOPE};
+use self::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, March, NUDGE_PX, START_LEVEL};
 use self::joint_carve::smooth::{FAINT_HIGHLIGHT, OPEN_SHARE, SMOOTH_FOOTPRINTS, Smooth};
-use self::joint_carve::{BLIND_MOVE, LEAST_MOVE, MAX_MOVES, MAX_MOVES_TO_HIT, MAX_STOP_LEVEL};
-use self::light_field_search::{BISECTIONS, DEFAULT_STEPS, MAX_STEPS};
+use self::joint_carve::{BLIND_MOVE, Carve, LEAST_MOVE, MAX_MOVES, MAX_MOVES_TO_HIT, MAX_STOP_LEVEL};
+use self::light_field_search::{BISECTIONS, DEFAULT_STEPS, MAX_STEPS, Search};
+use self::{layered::Walk, mesh::CutBetweenSamples};
 use crate::bounce::Bounces;
-use crate::quads::{self, CornerPlanes, ErrorBound, Mesh as QuadMesh, QuadDrawing, RequiredPlanes};
+use crate::quads::{self, ErrorBound, Mesh as QuadMesh, QuadDrawing};
 use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
 use crate::{recording::Recording, sample_set::SampleSet};
 
@@ -65,10 +67,7 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 6] = [
         method: JointCarve { stop_level: 0 },
         setting: Some(Setting {
             form: "LEVEL (0 to 8)",
-            parse: |text| {
-                let level = text.parse().ok().filter(|&level| level <= MAX_STOP_LEVEL);
-                level.map(|stop_level| JointCarve { stop_level })
-            },
+            parse: |text| number(text, 0..=MAX_STOP_LEVEL).map(|stop_level| JointCarve { stop_level }),
         }),
         help: "traverses the depth pyramids of all cameras together, down to a level; 0 is exact",
     },
@@ -77,10 +76,7 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 6] = [
         method: LightFieldSearch { steps: DEFAULT_STEPS },
         setting: Some(Setting {
             form: "STEPS (1 to 1024)",
-            parse: |text| {
-                let steps = text.parse().ok().filter(|steps| (1..=MAX_STEPS).contains(steps));
-                steps.map(|steps| LightFieldSearch { steps })
-            },
+            parse: |text| number(text, 1..=MAX_STEPS).map(|steps| LightFieldSearch { steps }),
         }),
         help: "searches along each ray in equal steps, 100 by default",
     },
@@ -90,10 +86,7 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 6] = [
         method: HybridMesh { merged: None },
         setting: Some(Setting {
             form: "PX (0.01 to 100)",
-            parse: |text| {
-                let bound = text.parse().ok().and_then(ErrorBound::from_px)?;
-                Some(HybridMesh { merged: Some(bound) })
-            },
+            parse: |text| ErrorBound::from_px(text.parse().ok()?).map(|bound| HybridMesh { merged: Some(bound) }),
         }),
         help: "draws a quad for each sample, and merges quads where nothing moves by more than PX pixels",
     },
@@ -102,10 +95,7 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 6] = [
         method: ReconstructionMethod::LAYERED,
         setting: Some(Setting {
             form: "MIRRORS (0 to 8)",
-            parse: |text| {
-                let followed = text.parse().ok().filter(|&mirrors| mirrors <= MAX_REFLECTIONS)?;
-                Some(Layered { followed: Some(followed) })
-            },
+            parse: |text| number(text, 0..=MAX_REFLECTIONS).map(|mirrors| Layered { followed: Some(mirrors) }),
         }),
         help: "walks through a layered cube, and meets the planes of its samples; with MIRRORS, rays are followed off at most that \
                many mirrors, and what the next one shows is gathered in a light field",
@@ -120,6 +110,11 @@ pub const METHODS: [NamedMethod<ReconstructionMethod>; 6] = [
         help: "takes surfaces from the scene and light from the samples; lights points that no sample knows in the view, balanced by default",
     },
 ];
+
+/// A whole number within bounds.
+fn number(text: &str, bounds: RangeInclusive<u32>) -> Option<u32> {
+    text.parse().ok().filter(|number| bounds.contains(number))
+}
 
 /// The steps of the search, and the bound of merged quads in pixels, among which budgets choose.
 const LADDER_STEPS: u32 = 64;
@@ -140,15 +135,7 @@ pub(crate) fn constants() -> [(&'static str, String); 14] {
 
 /// The texts of all variants of all methods' passes.
 pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    let searches = shader_sources!(
-        templates,
-        joint_carve::march::March,
-        Smooth,
-        joint_carve::Carve,
-        light_field_search::Search,
-        layered::Walk
-    );
-    searches.chain(shader_sources!(templates, mesh::CutBetweenSamples, hybrid_mesh::CutTexels))
+    shader_sources!(templates, March, Smooth, Carve, Search, Walk, CutBetweenSamples, CutTexels)
 }
 
 named_methods!(ReconstructionMethod, UnknownMethod, "reconstruction method");
@@ -163,33 +150,24 @@ impl ReconstructionMethod {
     /// Walks through a layered cube, and follows all mirrors.
     pub const LAYERED: Self = Layered { followed: None };
 
-    /// Planes that sample images need beside colour and depth.
+    /// Sample images need normals and the inverse depths at corners of texels, beside colour and depth.
     #[must_use]
-    pub fn required_planes(self) -> RequiredPlanes {
-        match self {
-            LightFieldSearch { .. } | JointCarve { .. } | Mesh | Layered { .. } | LightCache { .. } => {
-                RequiredPlanes::default()
-            }
-            HybridMesh { .. } => CornerPlanes::REQUIRED,
-        }
+    pub fn needs_corners(self) -> bool {
+        matches!(self, HybridMesh { .. })
     }
 
-    /// The settings of all methods among which budgets choose. Those of one method follow each other, by rising effort.
+    /// The settings of all methods among which budgets choose: those of methods for images. Settings of one method follow each other, by
+    /// rising effort.
     pub fn ladder() -> impl Iterator<Item = Self> {
-        METHODS.into_iter().flat_map(|row| row.method.by_effort())
-    }
-
-    fn by_effort(self) -> Vec<Self> {
-        match self {
-            JointCarve { .. } => vec![JointCarve { stop_level: 1 }, JointCarve { stop_level: 0 }],
-            LightFieldSearch { .. } => vec![LightFieldSearch { steps: LADDER_STEPS }],
-            Mesh => vec![Mesh],
-            // Budgets choose among sets of images.
-            Layered { .. } | LightCache { .. } => Vec::new(),
-            HybridMesh { .. } => {
-                vec![HybridMesh { merged: ErrorBound::from_px(LADDER_BOUND_PX) }, HybridMesh { merged: None }]
-            }
-        }
+        [
+            JointCarve { stop_level: 1 },
+            JointCarve { stop_level: 0 },
+            LightFieldSearch { steps: LADDER_STEPS },
+            Mesh,
+            HybridMesh { merged: ErrorBound::from_px(LADDER_BOUND_PX) },
+            HybridMesh { merged: None },
+        ]
+        .into_iter()
     }
 
     /// The same method with less to do for coarser views; `None` where it has no coarser setting.
@@ -252,10 +230,7 @@ impl ReconstructionMethod {
         self,
         recording: &mut Recording<'_>,
     ) -> Result<Option<PixelList>, ReconstructionError> {
-        match self {
-            JointCarve { .. } => joint_carve::smooth::record(recording).map(Some),
-            LightFieldSearch { .. } | Mesh | HybridMesh { .. } | Layered { .. } | LightCache { .. } => Ok(None),
-        }
+        if let JointCarve { .. } = self { joint_carve::smooth::record(recording).map(Some) } else { Ok(None) }
     }
 
     /// The set's quads, cut when they are first asked for; `None` for methods that draw none.

@@ -7,8 +7,8 @@ use glam::{UVec2, Vec2, Vec3};
 use gpu::{Frame, Readback, Turn};
 
 use super::cut::ImageCut;
+use super::list;
 use super::mesh::{Cut, INDICES_A_QUAD, MAX_MESHES, Mesh, MeshStatistics, Quad, QuadVertices};
-use super::{count, indices, scan};
 use crate::{device::Device, error::ReconstructionError, sample_set::SampleSet};
 
 /// The set's mesh of a cut, made when it is first asked for; `record` records the passes that cut one image.
@@ -19,14 +19,13 @@ pub(crate) fn mesh(
     turn: Turn,
     record: impl Fn(&mut Frame<'_>, &ImageCut<'_>) -> Result<(), ReconstructionError>,
 ) -> Result<Arc<Mesh>, ReconstructionError> {
-    let kept = |meshes: &[Arc<Mesh>]| meshes.iter().find(|mesh| mesh.cut == cut).cloned();
-    if let Some(mesh) = kept(&set.meshes.meshes.lock()) {
+    if let Some(mesh) = kept(&set.meshes.meshes.lock(), cut) {
         return Ok(mesh);
     }
     // Not under the lock: a live view would wait for the turn of a batch.
     let mesh = Arc::new(build(device, set, cut, turn, record)?);
     let mut meshes = set.meshes.meshes.lock();
-    if let Some(mesh) = kept(&meshes) {
+    if let Some(mesh) = kept(&meshes, cut) {
         return Ok(mesh);
     }
     if meshes.len() >= MAX_MESHES {
@@ -34,6 +33,10 @@ pub(crate) fn mesh(
     }
     meshes.push(mesh.clone());
     Ok(mesh)
+}
+
+fn kept(meshes: &[Arc<Mesh>], cut: Cut) -> Option<Arc<Mesh>> {
+    meshes.iter().find(|mesh| mesh.cut == cut).cloned()
 }
 
 /// Quads are listed in the order of their samples, so that the same set gives the same list.
@@ -50,10 +53,7 @@ fn build(
     for number in 0..set.cameras.len() {
         let image = ImageCut::new(device, set, number, cut)?;
         record(&mut frame, &image)?;
-        let counts = device.buffers.lend_storage("quads of chunks", 4 * u64::from(image.chunks()));
-        count::record(&mut frame, &image, &counts)?;
-        scan::record(&mut frame, &image, &counts)?;
-        indices::record(&mut frame, &image, &counts, cut.vertices)?;
+        list::record(&mut frame, &image, cut.vertices)?;
         reads.push([&image.quads.draw, &image.report].map(|buffer| read_back(device, &mut frame, buffer)));
         images.push(image.quads);
     }
@@ -70,8 +70,11 @@ fn build(
 
 /// The quads of a mesh, image after image.
 pub(crate) fn read(device: &Device, mesh: &Mesh, set: &SampleSet) -> Result<Vec<Quad>, ReconstructionError> {
-    let images = (0..mesh.images.len()).map(|number| read_image(device, mesh, set, number));
-    Ok(images.collect::<Result<Vec<_>, _>>()?.concat())
+    let mut quads = Vec::new();
+    for number in 0..mesh.images.len() {
+        quads.extend(read_image(device, mesh, set, number)?);
+    }
+    Ok(quads)
 }
 
 fn read_image(device: &Device, mesh: &Mesh, set: &SampleSet, number: usize) -> Result<Vec<Quad>, ReconstructionError> {
@@ -82,16 +85,16 @@ fn read_image(device: &Device, mesh: &Mesh, set: &SampleSet, number: usize) -> R
     let done = frame.submit()?.wait()?;
     let count = done.with(draw, |words: &[u32]| words[0] as usize)?;
     let indices = done.with(indices, |words: &[u32]| words[..count].to_vec())?;
+    let depths = done.with(depths, <[f32]>::to_vec)?;
     let camera = &set.meshes.cameras[number];
     let vertices = mesh.cut.vertices;
-    let quad = |quad: &[u32], depths: &[f32]| {
-        let place = |i: usize| vertex_in_world(camera, vertices, quad[i], depths[quad[i] as usize]);
+    let quads = indices.chunks_exact(INDICES_A_QUAD as usize).map(|quad| {
+        let corners = [quad[0], quad[1], quad[2], quad[3]];
         let samples = [quad[0], quad[3]].map(|vertex| vertex / vertices.per_sample());
-        Quad { image: number, corners_in_world: [0, 1, 2, 3].map(place), samples }
-    };
-    Ok(done.with(depths, |depths: &[f32]| {
-        indices.chunks_exact(INDICES_A_QUAD as usize).map(|indices| quad(indices, depths)).collect()
-    })?)
+        let corners_in_world = corners.map(|vertex| vertex_in_world(camera, vertices, vertex, depths[vertex as usize]));
+        Quad { image: number, corners_in_world, samples }
+    });
+    Ok(quads.collect())
 }
 
 fn read_back(device: &Device, frame: &mut Frame<'_>, buffer: &wgpu::Buffer) -> Readback {

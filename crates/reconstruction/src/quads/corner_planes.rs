@@ -1,31 +1,10 @@
-//! The planes that methods need, and on the device those that corners of quads are made from.
+//! Normals and corner depths of sample images, from which corners of quads are made.
 
 use depth_image::{DepthImage, HOLE_INVERSE_DEPTH};
 use gpu::{Table, TablePool, Turn};
 use wgpu::TextureFormat;
 
 use crate::error::ReconstructionError;
-
-/// Planes of sample images that a method needs beside colour and depth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct RequiredPlanes {
-    /// Normals of the samples.
-    pub normal: bool,
-    /// Inverse depths at the corners of texels.
-    pub corner_inverse_depth: bool,
-}
-
-impl RequiredPlanes {
-    /// The first image that lacks a plane, and the plane's name in [`depth_image::DepthImageError`].
-    pub(crate) fn missing(self, images: &[DepthImage]) -> Option<(usize, &'static str)> {
-        let missing = |image: &DepthImage| {
-            let normal = self.normal && image.normal_oct16.is_none();
-            let corners = self.corner_inverse_depth && image.corner_inverse_depth_per_m.is_none();
-            normal.then_some("normal").or(corners.then_some("corner_inverse_depth"))
-        };
-        images.iter().enumerate().find_map(|(index, image)| Some((index, missing(image)?)))
-    }
-}
 
 /// Normals and inverse depths of samples and texel corners: a texel for each corner of each image.
 pub(crate) struct CornerPlanes {
@@ -35,7 +14,14 @@ pub(crate) struct CornerPlanes {
 }
 
 impl CornerPlanes {
-    pub const REQUIRED: RequiredPlanes = RequiredPlanes { normal: true, corner_inverse_depth: true };
+    /// The first image that lacks a plane, and the plane's name in [`depth_image::DepthImageError`].
+    pub fn missing(images: &[DepthImage]) -> Option<(usize, &'static str)> {
+        images.iter().enumerate().find_map(|(index, image)| {
+            let normal = image.normal_oct16.is_none().then_some("normal");
+            let corners = image.corner_inverse_depth_per_m.is_none().then_some("corner_inverse_depth");
+            Some((index, normal.or(corners)?))
+        })
+    }
 
     /// Uploads images that have all planes.
     pub fn upload(tables: &TablePool, images: &[DepthImage], turn: Turn) -> Result<Self, ReconstructionError> {

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::UVec2;
-use gpu::{Binding, DispatchSize, Frame, GpuError, PooledBuffer, ShaderVariant, WorkKind};
+use gpu::{Binding, DispatchSize, Frame, Gpu, GpuError, PooledBuffer, ShaderVariant, WorkKind};
 use wgpu::BufferUsages;
 
 use super::mesh::{Cut, INDICES_A_QUAD, ImageQuads};
@@ -34,6 +34,12 @@ pub(crate) struct GpuCutWork {
     pub segment: u32,
 }
 
+/// A buffer of zeros, which may be read back.
+fn storage(gpu: &Gpu, label: &str, bytes: u64, usage: BufferUsages) -> Result<wgpu::Buffer, GpuError> {
+    gpu.check_storage_bytes(label, bytes)?;
+    Ok(gpu.buffer(label, bytes, usage | BufferUsages::STORAGE | BufferUsages::COPY_SRC))
+}
+
 /// An image on its way to quads.
 pub(crate) struct ImageCut<'s> {
     pub device: &'s Device,
@@ -50,19 +56,15 @@ impl<'s> ImageCut<'s> {
     pub fn new(device: &'s Device, set: &'s SampleSet, number: usize, cut: Cut) -> Result<Self, GpuError> {
         let size_px = set.meshes.cameras[number].size_px;
         let samples = u64::from(size_px.element_product());
-        let storage = |label: &str, bytes: u64, usage: BufferUsages| {
-            device.gpu.check_storage_bytes(label, bytes)?;
-            Ok::<_, GpuError>(device.gpu.buffer(label, bytes, usage | BufferUsages::STORAGE | BufferUsages::COPY_SRC))
-        };
         let vertices = u64::from(cut.vertices.per_sample()) * samples;
         let indices = u64::from(INDICES_A_QUAD) * samples;
         let quads = ImageQuads {
-            inverse_depths: storage("corners of quads", 4 * vertices, BufferUsages::VERTEX)?,
-            indices: storage("indices of quads (bytes)", 4 * indices, BufferUsages::INDEX)?,
-            draw: storage("quads to draw", BYTES_OF_DRAW, BufferUsages::INDIRECT)?,
+            inverse_depths: storage(&device.gpu, "corners of quads", 4 * vertices, BufferUsages::VERTEX)?,
+            indices: storage(&device.gpu, "indices of quads (bytes)", 4 * indices, BufferUsages::INDEX)?,
+            draw: storage(&device.gpu, "quads to draw", BYTES_OF_DRAW, BufferUsages::INDIRECT)?,
         };
         // New buffers are zero, as the report's sums need.
-        let report = storage("mesh report", BYTES_OF_REPORT, BufferUsages::empty())?;
+        let report = storage(&device.gpu, "mesh report", BYTES_OF_REPORT, BufferUsages::empty())?;
         let extents = device.buffers.lend_storage("extents of quads", 4 * samples);
         Ok(Self { device, set, number, size_px, quads, extents, report })
     }

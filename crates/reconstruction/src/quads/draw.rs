@@ -57,11 +57,11 @@ impl QuadDrawing {
     }
 
     fn targets(&self, gpu: &Gpu, kind: TargetKind) -> Result<QuadTargets, GpuError> {
-        let (limits, (size_px, views)) = (gpu.device.limits(), kind);
-        let side_px = limits.max_texture_dimension_2d;
-        let layers = limits.max_texture_array_layers;
-        GpuError::check_limit("a drawn view's side (px)", size_px.max_element().into(), side_px.into())?;
-        GpuError::check_limit("views drawn together", views.into(), layers.into())?;
+        let limits = gpu.device.limits();
+        let (size_px, views) = kind;
+        let side_px = size_px.max_element().into();
+        GpuError::check_limit("a drawn view's side (px)", side_px, limits.max_texture_dimension_2d.into())?;
+        GpuError::check_limit("views drawn together", views.into(), limits.max_texture_array_layers.into())?;
         Ok(self.targets.lend(kind, |&kind| Targets::new(gpu, kind)))
     }
 }
@@ -79,7 +79,7 @@ pub(super) fn record(
     let works = gpu.buffer_with("quads of views", &quad_works(recording), BufferUsages::UNIFORM);
     let bound = quads.bind(0, [Binding::buffer("work", &works)])?;
     let mut offsets = (0..).step_by(uniform_stride(size_of::<GpuQuadWork>() as u32) as usize);
-    let kind = kind(mesh);
+    let kind = WorkKind::new(family(), &format!("{:?}", mesh.cut));
     for (samples, depth) in targets.samples.each.iter().zip(&targets.depth.each) {
         for (number, images) in slices(gpu, mesh).enumerate() {
             let clear = (number == 0).then_some(wgpu::Color::TRANSPARENT);
@@ -105,10 +105,6 @@ fn family() -> u64 {
     WorkKind::family(&"draw quads")
 }
 
-fn kind(mesh: &Mesh) -> WorkKind {
-    WorkKind::new(family(), &format!("{:?}", mesh.cut))
-}
-
 fn vertices(image: &ImageQuads) -> u64 {
     image.inverse_depths.size() / 4
 }
@@ -123,23 +119,26 @@ fn slices<'m>(gpu: &Gpu, mesh: &'m Mesh) -> impl Iterator<Item = &'m [ImageQuads
 /// A uniform for each view and image.
 fn quad_works(recording: &Recording<'_>) -> Vec<u8> {
     let set = recording.set;
-    let images = || set.meshes.cameras.iter().zip(&set.cameras);
-    let pairs = recording.batch.cameras.iter().flat_map(|view| images().map(move |image| (view, image)));
-    uniform_elements(pairs.map(|(view, (image, sample_camera))| {
-        bytemuck::bytes_of(&quad_work(view, image, sample_camera.first_cell)).to_vec()
-    }))
+    let mut works = Vec::new();
+    for view in &recording.batch.cameras {
+        for (image, sample_camera) in set.meshes.cameras.iter().zip(&set.cameras) {
+            works.push(quad_work(view, image, sample_camera.first_cell));
+        }
+    }
+    uniform_elements(works.iter().map(bytemuck::bytes_of))
 }
 
 fn quad_work(view: &PinholeCamera, image: &PinholeCamera, first_sample: u32) -> GpuQuadWork {
     let rays = GpuViewCamera::of(image, 0);
-    let clip_of = |direction: Vec3| clip_direction(view, direction).to_array();
+    let [column, row, corner] = [rays.column_in_world, rays.row_in_world, rays.corner_in_world]
+        .map(|direction| clip_direction(view, direction.into()).to_array());
     // As a difference of eyes: nothing is lost far from the origin.
     let eye = clip_direction(view, image.eye_in_world - view.eye_in_world) + Vec4::Z * view.near_m;
     GpuQuadWork {
         clip_from_inverse_depth: eye.to_array(),
-        clip_from_column: clip_of(rays.column_in_world.into()),
-        clip_from_row: clip_of(rays.row_in_world.into()),
-        clip_from_corner: clip_of(rays.corner_in_world.into()),
+        clip_from_column: column,
+        clip_from_row: row,
+        clip_from_corner: corner,
         width_px: image.size_px.x,
         first_sample,
         padding: [0; 2],

@@ -126,11 +126,11 @@ pub(crate) struct SetMeshes {
 impl SetMeshes {
     /// Planes go to the device where every image has them.
     pub fn upload(tables: &TablePool, images: &[DepthImage], turn: Turn) -> Result<Self, ReconstructionError> {
-        let camera = |image: &DepthImage| *image.camera.reference();
-        let planes = match CornerPlanes::REQUIRED.missing(images) {
+        let planes = match CornerPlanes::missing(images) {
             Some(missing) => Err(missing),
             None => Ok(CornerPlanes::upload(tables, images, turn)?),
         };
-        Ok(Self { cameras: images.iter().map(camera).collect(), planes, meshes: Mutex::default() })
+        let cameras = images.iter().map(|image| *image.camera.reference());
+        Ok(Self { cameras: cameras.collect(), planes, meshes: Mutex::default() })
     }
 }

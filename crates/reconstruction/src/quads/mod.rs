@@ -2,19 +2,15 @@
 
 mod build;
 mod corner_planes;
-mod count;
 mod cut;
 mod draw;
-mod indices;
+mod list;
 mod merge;
 mod mesh;
 mod resolve;
-mod scan;
 mod targets;
 
 pub(crate) use build::{mesh, read};
-pub(crate) use corner_planes::CornerPlanes;
-pub use corner_planes::RequiredPlanes;
 #[cfg(test)]
 pub(crate) use cut::GpuCutWork;
 #[cfg(test)]
@@ -29,7 +25,8 @@ pub(crate) use targets::QuadTargets;
 
 use gpu::{ShaderError, ShaderSource, Templates, shader_sources, wgsl_constants, wgsl_files};
 
-use self::{cut::CHUNK, mesh::INDICES_A_QUAD};
+use self::list::{Count, Indices, Scan};
+use self::{cut::CHUNK, draw::DrawQuads, merge::Merge, mesh::INDICES_A_QUAD, resolve::Resolve};
 
 pub(crate) const SHADERS: [(&str, &str); 7] = wgsl_files! {
     "cut.wgsl", "count.wgsl", "scan.wgsl", "indices.wgsl", "merge.wgsl", "draw.wgsl", "resolve.wgsl"
@@ -42,6 +39,5 @@ pub(crate) fn constants() -> [(&'static str, String); 2] {
 
 /// The texts of all variants of all passes over quads.
 pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    let list = shader_sources!(templates, count::Count, scan::Scan, indices::Indices, merge::Merge);
-    list.chain(shader_sources!(templates, draw::DrawQuads, resolve::Resolve))
+    shader_sources!(templates, Count, Scan, Indices, Merge, DrawQuads, Resolve)
 }

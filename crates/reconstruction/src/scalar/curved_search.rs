@@ -4,7 +4,7 @@ use depth_image::{Aabb, Camera, DepthImage, ProvenanceKind, Ray, SinglePoleCamer
 use glam::{Vec2, Vec3, Vec3Swizzles};
 
 use super::march::safe_reciprocal;
-use super::sample_camera::SampleCamera;
+use super::sample_camera::{CORNERS, SampleCamera};
 use super::surface::{bilinear, bilinear_shares};
 use super::view_ray::span_in;
 use crate::bounce::{LONGEST_STEP, MAX_WALK_STEPS};
@@ -27,11 +27,11 @@ impl SinglePoleImages {
     /// Of images within a volume; those of pinholes are left out.
     #[must_use]
     pub fn of(images: &[DepthImage], volume: &Aabb) -> Self {
-        let of = |(bit, image): (u32, &DepthImage)| match image.camera {
+        let cameras = (0..).zip(images).filter_map(|(bit, image)| match image.camera {
             Camera::Pinhole(_) => None,
             Camera::SinglePole(pole) => Some((SampleCamera::of(image, 1 << bit, false), pole)),
-        };
-        Self { cameras: (0..).zip(images).filter_map(of).collect(), volume: searched_volume(volume, images) }
+        });
+        Self { cameras: cameras.collect(), volume: searched_volume(volume, images) }
     }
 
     /// The end of a ray with a direction of unit length, from `near_m` on.
@@ -152,11 +152,9 @@ impl<'c> Seen<'c> {
         let cell = clamped.as_uvec2();
         let within = clamped - clamped.floor();
         let at = if self.camera.corners(cell).connected { within } else { within.round() };
-        let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| {
-            let texel = (cell + glam::UVec2::new(x, y)).min(self.camera.cells.as_uvec2());
-            self.camera.color_linear(texel)
-        });
-        corners.into_iter().zip(bilinear_shares(at)).map(|(color, share)| color * share).sum()
+        let corners = CORNERS.map(|corner| (cell + corner).min(self.camera.cells.as_uvec2()));
+        let shared = corners.into_iter().zip(bilinear_shares(at));
+        shared.map(|(texel, share)| self.camera.color_linear(texel) * share).sum()
     }
 }
 

@@ -7,7 +7,7 @@ use super::{
     pixel::Pixel,
     sample_camera::SampleCamera,
     surface,
-    view_ray::{ViewRay, ViewRays},
+    view_ray::{ViewRay, ViewRays, places},
 };
 use crate::{pyramid::BACKGROUND_CODE, quads::Quad};
 
@@ -34,11 +34,11 @@ pub(super) fn drawn(
             draw(&mut nearest, view, rays, triangle, quad.image, sample);
         }
     }
-    let resolve = |(place, drawn): (UVec2, Option<Drawn>)| match drawn {
+    let pixels = rays.places().zip(nearest).map(|(place, drawn)| match drawn {
         Some(drawn) => resolved(drawn, images, cameras, &rays.ray(place)),
         None => Pixel::without_surface(kind_of_nothing(cameras, &rays.ray(place))),
-    };
-    rays.places().zip(nearest).map(resolve).collect()
+    });
+    pixels.collect()
 }
 
 fn draw(
@@ -50,7 +50,7 @@ fn draw(
     sample: u32,
 ) {
     let [low, high] = bounds_px(view, triangle);
-    for place in (low.y..high.y).flat_map(|y| (low.x..high.x).map(move |x| UVec2::new(x, y))) {
+    for place in places(high - low).map(|place| low + place) {
         let slot = &mut nearest[(place.y * view.size_px.x + place.x) as usize];
         let farthest = slot.map_or(f32::INFINITY, |drawn: Drawn| drawn.t);
         if let Some(t) = meets(&rays.ray(place), triangle).filter(|&t| t >= view.near_m && t < farthest) {

@@ -3,7 +3,7 @@
 use depth_image::ProvenanceKind;
 use glam::{IVec2, UVec2, Vec3};
 
-use super::pixel::Pixel;
+use super::{pixel::Pixel, view_ray::places};
 use crate::fill::{DIRECTIONS, REACH_PX, SAME_SIDE};
 
 /// The first known pixel in one direction, and what it counts.
@@ -15,25 +15,23 @@ struct Neighbour {
 
 pub(super) fn fill(pixels: &mut [Pixel], size_px: UVec2) {
     let known = pixels.to_vec();
-    for (index, pixel) in pixels.iter_mut().enumerate() {
+    for (place, pixel) in places(size_px).zip(pixels) {
         if pixel.provenance.kind() == ProvenanceKind::Filled {
-            let place = UVec2::new(index as u32 % size_px.x, index as u32 / size_px.x).as_ivec2();
             let towards = DIRECTIONS.into_iter().map(IVec2::from);
-            let neighbours: Vec<_> =
-                towards.filter_map(|towards| known_towards(&known, size_px, place, towards)).collect();
-            fill_pixel(pixel, &neighbours);
+            let neighbours = towards.filter_map(|towards| known_towards(&known, size_px, place.as_ivec2(), towards));
+            fill_pixel(pixel, &neighbours.collect::<Vec<_>>());
         }
     }
 }
 
 fn fill_pixel(pixel: &mut Pixel, neighbours: &[Neighbour]) {
     let farthest = neighbours.iter().fold(f32::INFINITY, |least, n| least.min(n.pixel.inverse_depth_per_m));
-    let far_side = || neighbours.iter().filter(|n| n.pixel.inverse_depth_per_m * SAME_SIDE <= farthest);
-    let weights: f32 = far_side().map(|n| n.weight).sum();
+    let far_side: Vec<_> = neighbours.iter().filter(|n| n.pixel.inverse_depth_per_m * SAME_SIDE <= farthest).collect();
+    let weights: f32 = far_side.iter().map(|n| n.weight).sum();
     // Nothing is known within reach: the background stays.
     if weights > 0.0 {
-        let color: Vec3 = far_side().map(|n| n.pixel.color_linear * n.weight).sum();
-        let depth: f32 = far_side().map(|n| n.pixel.inverse_depth_per_m * n.weight).sum();
+        let color: Vec3 = far_side.iter().map(|n| n.pixel.color_linear * n.weight).sum();
+        let depth: f32 = far_side.iter().map(|n| n.pixel.inverse_depth_per_m * n.weight).sum();
         pixel.color_linear = color / weights;
         pixel.inverse_depth_per_m = depth / weights;
     }

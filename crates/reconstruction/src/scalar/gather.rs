@@ -75,8 +75,8 @@ impl Lobe {
         let half_way = (towards_light + eye).normalize_or_zero();
         let [n_l, n_v, n_h] = [towards_light, eye, half_way].map(|unit| normal.dot(unit).max(1e-4));
         let spread = n_h * n_h * (squared - 1.0) + 1.0;
-        let masked = |a: f32, b: f32| a * (b * b * (1.0 - squared) + squared).sqrt();
-        squared / (spread * spread) * 0.5 / (masked(n_l, n_v) + masked(n_v, n_l)) * n_l
+        let [by_light, by_eye] = [(n_l, n_v), (n_v, n_l)].map(|(a, b)| a * (b * b * (1.0 - squared) + squared).sqrt());
+        squared / (spread * spread) * 0.5 / (by_light + by_eye) * n_l
     }
 }
 
@@ -125,20 +125,21 @@ impl DirectionLines<'_> {
         samples.find(|&sample| self.field.planar_depth_m[sample] >= self.least_depth_m)
     }
 
+    /// Beside the square the scene has nothing.
     fn light(&self, place: Vec2) -> Vec3 {
-        self.met(place).map_or(self.around, |sample| linear_from_rgb9e5(self.field.radiance_rgb9e5[sample]))
+        let is_beside = place.min_element() < -1.0 || place.max_element() > self.field.camera.side_px as f32;
+        let met = if is_beside { None } else { self.met(place) };
+        met.map_or(self.around, |sample| linear_from_rgb9e5(self.field.radiance_rgb9e5[sample]))
     }
 
     /// Between the four lines around a place.
     fn light_between(&self, place: Vec2) -> Vec3 {
         let first = (place - 0.5).floor();
         let share = place - 0.5 - first;
-        let side = self.field.camera.side_px as f32;
-        let light = |at: Vec2| match at.min_element() < -1.0 || at.max_element() > side {
-            true => self.around,
-            false => self.light(at),
-        };
-        let row = |y: f32| light(first + Vec2::new(0.0, y)).lerp(light(first + Vec2::new(1.0, y)), share.x);
-        row(0.0).lerp(row(1.0), share.y)
+        let [upper, lower] = [0.0, 1.0].map(|y| {
+            let [left, right] = [0.0, 1.0].map(|x| self.light(first + Vec2::new(x, y)));
+            left.lerp(right, share.x)
+        });
+        upper.lerp(lower, share.y)
     }
 }

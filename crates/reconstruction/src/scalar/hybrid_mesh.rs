@@ -3,14 +3,12 @@
 use depth_image::{DepthImage, PinholeCamera, unit_from_oct16};
 use glam::{UVec2, Vec2, Vec3};
 
+use super::{sample_camera::CORNERS, view_ray::places};
 use crate::{
     methods::hybrid_mesh::GREATEST_SLOPE,
     pyramid::{FLAT_FOOTPRINTS, SLOPE_SHARE},
     quads::{ErrorBound, GREATEST_EXTENT, Quad},
 };
-
-/// The corners of a quad: upper left, upper right, lower left, lower right.
-const CORNERS: [UVec2; 4] = [UVec2::ZERO, UVec2::X, UVec2::Y, UVec2::ONE];
 
 /// An image, cut.
 struct Cut<'i> {
@@ -82,8 +80,7 @@ impl<'i> Cut<'i> {
         let camera = image.camera.reference();
         let width = camera.size_px.x;
         let focal_px = camera.focal_px.min_element();
-        let texels = (0..camera.size_px.y).flat_map(|y| (0..width).map(move |x| UVec2::new(x, y)));
-        let quad = |(index, texel): (usize, UVec2)| {
+        let inverse_depths = places(camera.size_px).enumerate().map(|(index, texel)| {
             let inverse_depth = image.inverse_depth_per_m[index];
             let ray = camera.ray(texel.as_vec2() + 0.5).direction_in_world;
             let sample = Sample { inverse_depth, ray, normal: unit_from_oct16(normals[index]) };
@@ -93,10 +90,10 @@ impl<'i> Cut<'i> {
                 let ray = camera.ray(at.as_vec2()).direction_in_world;
                 if sample.shares(held, ray, focal_px) { held } else { sample.guess(held, ray, focal_px) }
             })
-        };
+        });
         Some(Self {
             camera,
-            inverse_depths: texels.enumerate().map(quad).collect(),
+            inverse_depths: inverse_depths.collect(),
             extents: image.inverse_depth_per_m.iter().map(|&d| UVec2::splat(u32::from(d > 0.0))).collect(),
         })
     }
@@ -119,9 +116,10 @@ impl<'i> Cut<'i> {
         let origin = self.texel(sample);
         let extent = self.extents[sample];
         let depths = self.merged(origin, extent);
-        let point = |i: usize| self.camera.ray((origin + CORNERS[i] * extent).as_vec2()).at(depths[i].recip());
+        let corners_in_world =
+            [0, 1, 2, 3].map(|i| self.camera.ray((origin + CORNERS[i] * extent).as_vec2()).at(depths[i].recip()));
         let last = self.index(origin + extent - 1);
-        Quad { image: number, corners_in_world: [0, 1, 2, 3].map(point), samples: [sample as u32, last as u32] }
+        Quad { image: number, corners_in_world, samples: [sample as u32, last as u32] }
     }
 
     /// Rows into runs, then columns of equal runs into rectangles.
@@ -143,8 +141,8 @@ impl<'i> Cut<'i> {
         while place < length {
             let origin = first + along * place;
             let extent = self.extents[self.index(origin)];
-            let is_alike = |&i: &u32| self.extents[self.index(origin + along * i)] == extent;
-            let alike = (0..length - place).take_while(is_alike).count() as u32;
+            let following = (0..length - place).map(|i| self.extents[self.index(origin + along * i)]);
+            let alike = following.take_while(|&other| other == extent).count() as u32;
             let count = if extent.x > 0 { self.longest_run(origin, extent, along, alike, bound_px) } else { alike };
             (0..count).for_each(|i| self.set_extent(origin + along * i, UVec2::ZERO));
             self.set_extent(origin, times(extent, along, count));
@@ -159,18 +157,23 @@ impl<'i> Cut<'i> {
 
     /// How many of the quads that are alike become one.
     fn longest_run(&self, origin: UVec2, extent: UVec2, along: UVec2, alike: u32, bound_px: f32) -> u32 {
-        let fits = |count| count <= alike && self.error_px(origin, times(extent, along, count)) <= bound_px;
-        let greatest = GREATEST_EXTENT.dot(along) / 2;
-        let steps = std::iter::successors(Some(greatest), |step| Some(step / 2)).take_while(|&step| step > 0);
-        steps.fold(1, |count, step| if fits(count + step) { count + step } else { count })
+        let mut count = 1;
+        let mut step = GREATEST_EXTENT.dot(along) / 2;
+        while step > 0 {
+            let longer = count + step;
+            if longer <= alike && self.error_px(origin, times(extent, along, longer)) <= bound_px {
+                count = longer;
+            }
+            step /= 2;
+        }
+        count
     }
 
     /// How far the merged quad is off the corners of all samples in the block. On the outline it counts twice: there a
     /// crack opens to both sides.
     fn error_px(&self, origin: UVec2, size: UVec2) -> f32 {
         let merged = self.merged(origin, size);
-        let places = (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y)));
-        let corners = places.flat_map(|place| (0..4).map(move |i| (place, i)));
+        let corners = places(size).flat_map(|place| (0..4).map(move |i| (place, i)));
         let errors = corners.map(|(place, i)| {
             let depth = self.inverse_depths[self.index(origin + place)][i];
             let at = place + CORNERS[i];

@@ -17,7 +17,7 @@ use crate::{
         march::{MARCHES, NUDGE_PX, START_LEVEL},
     },
     pyramid::FIRST_SAMPLE,
-    surface::HALF_CODE,
+    surface::{HALF_CODE, THICKNESS_FOOTPRINTS},
     view_work::FAR_AWAY,
 };
 
@@ -89,7 +89,6 @@ pub(super) fn carve(cameras: &[SampleCamera], ray: &ViewRay, begin: f32, stop_le
     // A ray that begins on a surface which its images show does not meet it: the way must have been free.
     let mut freed = !ray.is_mirrored || begin > ray.near;
     let among_holes = cameras.iter().any(|camera| camera.among_holes);
-    let thickness_footprints = cameras.iter().map(|camera| camera.thickness_footprints).fold(0.0, f32::max);
     let moves_to_hit = if ray.is_mirrored || among_holes { MAX_MOVES } else { MAX_MOVES_TO_HIT };
     for number in 0..MAX_MOVES {
         let may_hit = number < moves_to_hit;
@@ -102,7 +101,7 @@ pub(super) fn carve(cameras: &[SampleCamera], ray: &ViewRay, begin: f32, stop_le
         let (free_until, penetration) = joined(&evaluations, t);
         freed |= free_until > t;
         let descend = !free && level > stop_level && evaluations.iter().any(|v| v.undecided);
-        let candidate = !free && !descend && penetration < thickness_footprints && may_hit;
+        let candidate = !free && !descend && penetration < THICKNESS_FOOTPRINTS && may_hit;
         // First go to the very place, then let the cameras vote there.
         let arrived = free_until <= t || stop_level > 0;
         hit = candidate && arrived && freed && evaluations.iter().map(|v| v.vote).sum::<f32>() >= 0.0;
@@ -225,7 +224,7 @@ fn evaluate_node(
     // Free up to the depth of the nearest thing in the node.
     let surface_t = (camera.inverse_depth_per_m(nearest).recip() - a.z) * safe_reciprocal(b.z);
     let free_until = if code > nearest && nearest > 1.0 { surface_t.max(t).min(exit) } else { t };
-    let slack = camera.thickness_footprints * (code.max(exit_code) - camera.code_offset()) / camera.focal_px;
+    let slack = THICKNESS_FOOTPRINTS * (code.max(exit_code) - camera.code_offset()) / camera.focal_px;
     let behind = code.max(exit_code) + slack < farthest && farthest > FIRST_SAMPLE;
     let penetration = if behind { FAR_AWAY } else { penetration_inside };
     Evaluation { free_until, exit, penetration, undecided: !behind, vote: 1.0 }
@@ -237,14 +236,14 @@ fn evaluate_cell(camera: &SampleCamera, within: &InNode, corners: Corners) -> Ev
     let nothing = Evaluation { free_until: t, exit, penetration: FAR_AWAY, undecided: false, vote: 0.0 };
     // A connected cell is its bilinear surface; else each sample is a surface of its own.
     let own = corners.codes.map(|code| if code < FIRST_SAMPLE { -FAR_AWAY } else { code });
-    let samples = |at| if corners.connected { [bilinear(corners.codes, at); 4] } else { own };
-    let gaps = samples(at).map(|sample| HALF_CODE + code - sample);
-    let gaps_at_exit = samples(exit_at).map(|sample| HALF_CODE + exit_code - sample);
+    let [gaps, gaps_at_exit] = [(at, code), (exit_at, exit_code)].map(|(at, code)| {
+        let samples = if corners.connected { [bilinear(corners.codes, at); 4] } else { own };
+        samples.map(|sample| HALF_CODE + code - sample)
+    });
     let ahead: Vec<usize> = (0..4).filter(|&i| gaps[i] > 0.0).collect();
     // The nearest of the surfaces still ahead is met first.
-    let least = |values: &dyn Fn(usize) -> f32| ahead.iter().fold(FAR_AWAY, |least, &i| least.min(values(i)));
-    let next_gap = least(&|i| gaps[i]);
-    let next_gap_at_exit = next_gap + least(&|i| gaps_at_exit[i] - gaps[i]);
+    let next_gap = ahead.iter().fold(FAR_AWAY, |least, &i| least.min(gaps[i]));
+    let next_gap_at_exit = next_gap + ahead.iter().fold(FAR_AWAY, |least, &i| least.min(gaps_at_exit[i] - gaps[i]));
     let meets = !ahead.is_empty() && next_gap_at_exit <= 0.0;
     let share = next_gap / (next_gap - next_gap_at_exit).max(1e-9);
     let crossing = if meets { within.at_share(share.clamp(0.0, 1.0)) } else { exit };
@@ -257,12 +256,12 @@ fn evaluate_cell(camera: &SampleCamera, within: &InNode, corners: Corners) -> Ev
         return Evaluation { free_until: crossing, exit, penetration, ..nothing };
     }
     let footprint = (code - camera.code_offset()) / camera.focal_px;
-    let reach = camera.thickness_footprints * footprint;
-    let vote = |(i, share): (usize, f32)| match gaps[i] {
+    let reach = THICKNESS_FOOTPRINTS * footprint;
+    let votes = bilinear_shares(at).into_iter().enumerate().map(|(i, share)| match gaps[i] {
         gap if gap > reach && corners.certain => -share,
         gap if gap.abs() < reach && corners.codes[i] > FIRST_SAMPLE => share,
         _ => 0.0,
-    };
+    });
     // Inside and on the way out of a connected cell: the back of the surface, which no camera saw.
     let leaving = corners.connected && gaps_at_exit[0] > gaps[0];
     let shallowest = gaps.iter().filter(|&&gap| gap <= 0.0).fold(FAR_AWAY, |least, &gap| least.min(-gap));
@@ -271,6 +270,6 @@ fn evaluate_cell(camera: &SampleCamera, within: &InNode, corners: Corners) -> Ev
         exit: crossing,
         penetration: if leaving { FAR_AWAY } else { shallowest / footprint },
         undecided: false,
-        vote: bilinear_shares(at).into_iter().enumerate().map(vote).sum(),
+        vote: votes.sum(),
     }
 }

@@ -3,7 +3,7 @@
 use depth_image::{CubeGrid, LayeredDepthImage, PinholeCamera, ProvenanceKind, Ray, View, linear_from_rgb9e5};
 use glam::{IVec2, Vec2, Vec3};
 
-use super::{pixel::Pixel, view};
+use super::{pixel::Pixel, surface::bilinear_shares, view, view_ray::places};
 use crate::cube::{CubeSamples, LEAST_NORMAL_ALONG_LINE, Links, SQUARE_REACH, links};
 use crate::set_description::SetDescription;
 
@@ -73,12 +73,14 @@ impl CubeTwin {
             beside.and_then(|beside| self.neighbour(beside, towards.y)),
         ];
         let at = hit.place.abs().min(Vec2::splat(0.5));
-        let shares = [(1.0 - at.x) * (1.0 - at.y), at.x * (1.0 - at.y), (1.0 - at.x) * at.y, at.x * at.y];
-        let mut sum = (Vec3::ZERO, 0.0);
-        for (sample, share) in around.into_iter().zip(shares).filter_map(|(sample, share)| Some((sample?, share))) {
-            sum = (sum.0 + linear_from_rgb9e5(self.samples.color_rgb9e5[sample]) * share, sum.1 + share);
+        let mut sum = Vec3::ZERO;
+        let mut shares = 0.0;
+        for (sample, share) in around.into_iter().zip(bilinear_shares(at)) {
+            let Some(sample) = sample else { continue };
+            sum += linear_from_rgb9e5(self.samples.color_rgb9e5[sample]) * share;
+            shares += share;
         }
-        sum.0 / sum.1
+        sum / shares
     }
 
     fn neighbour(&self, sample: usize, towards: i32) -> Option<usize> {
@@ -89,15 +91,13 @@ impl CubeTwin {
     /// A view with depth and provenance.
     #[must_use]
     pub fn reconstruct(&self, set: &SetDescription<'_>, camera: &PinholeCamera) -> View {
-        let places =
-            (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| Vec2::new(x as f32, y as f32)));
-        let pixel = |place: Vec2| match self.walk(camera.ray(place + 0.5), camera.near_m) {
-            Some(hit) => {
-                let axis = self.samples.axis_of(self.samples.line[hit.sample]);
-                Pixel::hit(self.color_linear(&hit), hit.t, 1 << axis)
-            }
-            None => Pixel::without_surface(ProvenanceKind::Empty),
-        };
-        view(&places.map(pixel).collect::<Vec<_>>(), set, camera)
+        let pixels = places(camera.size_px).map(|place| {
+            let Some(hit) = self.walk(camera.ray(place.as_vec2() + 0.5), camera.near_m) else {
+                return Pixel::without_surface(ProvenanceKind::Empty);
+            };
+            let axis = self.samples.axis_of(self.samples.line[hit.sample]);
+            Pixel::hit(self.color_linear(&hit), hit.t, 1 << axis)
+        });
+        view(&pixels.collect::<Vec<_>>(), set, camera)
     }
 }

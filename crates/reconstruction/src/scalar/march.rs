@@ -59,9 +59,8 @@ pub(super) fn march(camera: &SampleCamera, ray: &ViewRay, near: f32) -> March {
     // The line ends before the plane through the camera's eye.
     let end = if b.z < 0.0 { far.min((EYE_SHARE * p0.z - a.z) * safe_reciprocal(b.z)) } else { far };
     let p1 = a + b * end;
-    let in_image = |p: Vec3| (p.xy() / p.z - 0.5).extend(camera.code(p.z.recip()));
-    let origin = in_image(p0);
-    let line = in_image(p1) - origin;
+    let [origin, to] = [p0, p1].map(|p| (p.xy() / p.z - 0.5).extend(camera.code(p.z.recip())));
+    let line = to - origin;
     if !(p0.z > 0.0 && origin.xy().cmpge(Vec2::ZERO).all() && origin.xy().cmplt(camera.cells).all()) {
         return March { t: near, crossed: false };
     }

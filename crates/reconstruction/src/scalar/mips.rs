@@ -36,11 +36,11 @@ impl ColorMips {
         let uv = (place_px / (level as f32).exp2() - 0.5).clamp(Vec2::ZERO, most);
         let cell = uv.as_uvec2();
         let share = uv.fract();
-        let row = |y: u32| {
+        let [upper, lower] = [0, 1].map(|y| {
             let [left, right] =
                 [0, 1].map(|x| linear_from_rgb9e5(colors[((cell.y + y) * size_px.x + cell.x + x) as usize]));
             left.lerp(right, share.x)
-        };
-        row(0).lerp(row(1), share.y)
+        });
+        upper.lerp(lower, share.y)
     }
 }

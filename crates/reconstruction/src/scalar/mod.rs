@@ -29,9 +29,10 @@ pub use self::gather::{Reflecting, gathered_light};
 pub use self::layered::CubeTwin;
 pub use self::mips::ColorMips;
 use depth_image::{Aabb, Antialias, DepthImage, PinholeCamera, ToneMapping, View, ViewPlanes};
-use glam::{UVec2, Vec3};
+use glam::Vec3;
 
-use self::{pixel::Pixel, sample_camera::SampleCamera, smooth::First, view_ray::ViewRays};
+use self::view_ray::{ViewRays, places};
+use self::{pixel::Pixel, sample_camera::SampleCamera, smooth::First};
 use crate::{methods::ReconstructionMethod, pyramid::is_among_holes, quads::Quad, set_description::SetDescription};
 
 /// One view with depth and provenance.
@@ -45,18 +46,6 @@ pub fn reconstruct(
     view(&pixels(images, set, camera, method), set, camera)
 }
 
-/// As [`reconstruct`], with the mean colour of several positions a pixel.
-#[must_use]
-pub fn reconstruct_antialiased(
-    images: &[DepthImage],
-    set: &SetDescription<'_>,
-    camera: &PinholeCamera,
-    method: ReconstructionMethod,
-    antialias: Antialias,
-) -> View {
-    reconstruct_shown(images, set, camera, method, ViewPlanes { antialias, ..ViewPlanes::COLOR })
-}
-
 /// As [`reconstruct`], with the colour that the planes describe.
 #[must_use]
 pub fn reconstruct_shown(
@@ -67,8 +56,7 @@ pub fn reconstruct_shown(
     ViewPlanes { antialias, tone, .. }: ViewPlanes,
 ) -> View {
     let sums = sums(images, set, camera, method, antialias);
-    let mean = |sum: &Vec3| *sum / antialias.samples() as f32;
-    let srgb8 = sums.iter().flat_map(|sum| tone.srgb8(mean(sum))).collect();
+    let srgb8 = sums.iter().flat_map(|sum| tone.srgb8(*sum / antialias.samples() as f32)).collect();
     View { srgb8, ..reconstruct(images, set, camera, method) }
 }
 
@@ -89,8 +77,8 @@ fn sums(
     let starts = tile_start::tile_starts(&samples, &rays);
     let first = First { pixels: &found, cameras: &samples, rays: &rays, starts: &starts, set, antialias };
     let shares = matches!(method, ReconstructionMethod::JointCarve { .. });
-    let further = |index| if shares { first.further(index, sums[index]) } else { None };
-    let further: Vec<Option<Vec3>> = (0..found.len()).map(further).collect();
+    let further = (0..found.len()).map(|index| if shares { first.further(index, sums[index]) } else { None });
+    let further: Vec<Option<Vec3>> = further.collect();
     sums.iter_mut().zip(&further).for_each(|(sum, further)| *sum += further.unwrap_or_default());
     for camera in cameras {
         let shown = shown_linear(&rough(images, set, &camera, method, &found, &further), set, &camera);
@@ -137,15 +125,14 @@ fn pixels(
 
 /// What each pixel shows: its surface, or the background in its direction.
 fn shown_linear(pixels: &[Pixel], set: &SetDescription<'_>, camera: &PinholeCamera) -> Vec<Vec3> {
-    let place = |index: usize| UVec2::new(index as u32 % camera.size_px.x, index as u32 / camera.size_px.x);
-    let background = |index| {
-        set.background.radiance_linear(camera.ray(place(index).as_vec2() + 0.5).direction_in_world.normalize_or_zero())
-    };
-    let shown = |(index, pixel): (usize, &Pixel)| match pixel.inverse_depth_per_m > 0.0 {
-        true => pixel.color_linear,
-        false => background(index),
-    };
-    pixels.iter().enumerate().map(shown).collect()
+    let shown = places(camera.size_px).zip(pixels).map(|(place, pixel)| {
+        if pixel.inverse_depth_per_m > 0.0 {
+            return pixel.color_linear;
+        }
+        let direction = camera.ray(place.as_vec2() + 0.5).direction_in_world;
+        set.background.radiance_linear(direction.normalize_or_zero())
+    });
+    shown.collect()
 }
 
 fn view(pixels: &[Pixel], set: &SetDescription<'_>, camera: &PinholeCamera) -> View {
@@ -184,27 +171,26 @@ pub fn tile_starts_m(images: &[DepthImage], volume: &Aabb, camera: &PinholeCamer
 /// Images without the planes that the method needs give none.
 #[must_use]
 pub fn quads(images: &[DepthImage], method: ReconstructionMethod) -> Option<Vec<Quad>> {
-    let images = || images.iter().enumerate();
-    match method {
-        ReconstructionMethod::Mesh => Some(images().flat_map(|(n, image)| mesh::quads(n, image)).collect()),
-        ReconstructionMethod::HybridMesh { merged } => {
-            Some(images().flat_map(|(n, image)| hybrid_mesh::quads(n, image, merged)).collect())
-        }
-        ReconstructionMethod::LightFieldSearch { .. }
-        | ReconstructionMethod::JointCarve { .. }
-        | ReconstructionMethod::Layered { .. }
-        | ReconstructionMethod::LightCache { .. } => None,
+    if !matches!(method, ReconstructionMethod::Mesh | ReconstructionMethod::HybridMesh { .. }) {
+        return None;
     }
+    let quads = images.iter().enumerate().flat_map(|(number, image)| match method {
+        ReconstructionMethod::HybridMesh { merged } => hybrid_mesh::quads(number, image, merged),
+        _ => mesh::quads(number, image),
+    });
+    Some(quads.collect())
 }
 
 /// Camera 0 is the nearest to the view's eye and so knows most; each keeps its bit. Images that do not prove all ways
 /// free come after those that do.
 fn nearest_first(images: &[DepthImage], camera: &PinholeCamera) -> Vec<SampleCamera> {
     let among_holes = is_among_holes(images);
-    let camera_of = |(bit, image): (u32, &DepthImage)| SampleCamera::of(image, 1 << bit, among_holes);
-    let mut cameras: Vec<_> = (0..).zip(images).map(camera_of).collect();
-    let distance = |c: &SampleCamera| c.eye_in_world.distance_squared(camera.eye_in_world);
-    cameras.sort_by(|a, b| a.has_uncertain().cmp(&b.has_uncertain()).then(distance(a).total_cmp(&distance(b))));
+    let cameras = (0..).zip(images).map(|(bit, image)| SampleCamera::of(image, 1 << bit, among_holes));
+    let mut cameras: Vec<_> = cameras.collect();
+    cameras.sort_by(|a, b| {
+        let [to_a, to_b] = [a, b].map(|c| c.eye_in_world.distance_squared(camera.eye_in_world));
+        a.has_uncertain().cmp(&b.has_uncertain()).then(to_a.total_cmp(&to_b))
+    });
     cameras
 }
 
@@ -221,11 +207,10 @@ fn pixels_from(cameras: &[SampleCamera], rays: &ViewRays, starts: &[f32], method
                 ReconstructionMethod::JointCarve { stop_level } => {
                     joint_carve::joint_carve(cameras, &ray, start, stop_level)
                 }
-                ReconstructionMethod::Mesh | ReconstructionMethod::HybridMesh { .. } => {
-                    unreachable!("meshes are drawn, not searched")
-                }
-                ReconstructionMethod::Layered { .. } => unreachable!("it walks through a cube, not through images"),
-                ReconstructionMethod::LightCache { .. } => unreachable!("its surfaces come from the scene"),
+                ReconstructionMethod::Mesh
+                | ReconstructionMethod::HybridMesh { .. }
+                | ReconstructionMethod::Layered { .. }
+                | ReconstructionMethod::LightCache { .. } => unreachable!("{method} searches no images along rays"),
             }
         })
         .collect()

@@ -6,7 +6,6 @@ use glam::{UVec2, Vec2, Vec3, Vec4};
 use crate::{
     pyramid::{BACKGROUND_CODE, CodedDepth, Pyramid},
     sample_set::stretch,
-    surface::THICKNESS_FOOTPRINTS,
     view_work::FAR_AWAY,
 };
 
@@ -23,13 +22,14 @@ pub(super) struct SampleCamera {
     pub mask: u32,
     /// Some texels of some image of the set prove nothing of what lies before them.
     pub among_holes: bool,
-    /// Points within this number of footprints of a sample are on its surface.
-    pub thickness_footprints: f32,
     depth: CodedDepth,
     pyramid: Pyramid,
     wide_words: Vec<u32>,
     colors_linear: Vec<Vec3>,
 }
+
+/// The corners of a cell or of a texel, in their order.
+pub(super) const CORNERS: [UVec2; 4] = [UVec2::ZERO, UVec2::X, UVec2::Y, UVec2::ONE];
 
 /// A cell's corners: codes of the upper left, upper right, lower left and lower right sample, and whether
 /// they are one surface.
@@ -61,7 +61,6 @@ impl SampleCamera {
             stretch: stretch(camera),
             mask,
             among_holes,
-            thickness_footprints: THICKNESS_FOOTPRINTS,
             wide_words: pyramid.wide_words(),
             pyramid,
             depth,
@@ -110,15 +109,13 @@ impl SampleCamera {
     }
 
     pub fn corners(&self, cell: UVec2) -> Corners {
-        let raw = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| self.depth.at(cell.x + x, cell.y + y));
-        let is_marked = |code: u16| self.among_holes && code > BACKGROUND_CODE && code & 1 == 1;
+        let raw = CORNERS.map(|corner| self.code_at(cell + corner));
+        let marks = raw.map(|code| if self.among_holes && code > BACKGROUND_CODE { code & 1 } else { 0 });
         Corners {
-            codes: raw.map(|code| f32::from(if is_marked(code) { code & !1 } else { code })),
-            proven: raw.map(|code| if is_marked(code) { 0.0 } else { 1.0 }),
+            codes: [0, 1, 2, 3].map(|i| f32::from(raw[i] - marks[i])),
+            proven: marks.map(|mark| f32::from(1 - mark)),
             connected: self.depth.connected[(cell.y * self.depth.size_px[0] + cell.x) as usize],
-            certain: ![(0, 0), (1, 0), (0, 1), (1, 1)]
-                .iter()
-                .any(|(x, y)| self.is_uncertain(cell + UVec2::new(*x, *y))),
+            certain: !CORNERS.iter().any(|&corner| self.is_uncertain(cell + corner)),
         }
     }
 

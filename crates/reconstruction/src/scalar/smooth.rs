@@ -5,7 +5,7 @@ use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{
     pixel::Pixel,
-    sample_camera::SampleCamera,
+    sample_camera::{CORNERS, SampleCamera},
     surface::bilinear_shares,
     view_ray::{ViewRay, ViewRays},
 };
@@ -38,19 +38,19 @@ impl First<'_> {
 
     /// Inverse depths to the left and above, and to the right and below.
     fn around(&self, index: usize) -> [Vec2; 2] {
-        let depth = |index: usize| self.pixels[index].inverse_depth_per_m;
         let row = self.rays.size_px().x as usize;
-        [Vec2::new(depth(index - 1), depth(index - row)), Vec2::new(depth(index + 1), depth(index + row))]
+        [[index - 1, index - row], [index + 1, index + row]]
+            .map(|places| Vec2::from_array(places.map(|place| self.pixels[place].inverse_depth_per_m)))
     }
 
     fn background(&self, index: usize, place: UVec2) -> Option<Vec3> {
         let is_clear = self.starts[self.rays.tile_index(place)] >= self.rays.ray(place).far;
         let is_alone = is_clear && self.around(index).iter().all(|sides| sides.cmple(Vec2::ZERO).all());
-        let radiance = |offset_px: Vec2| {
+        let radiances = from_first_px(self.antialias).map(|offset_px| {
             let ray = self.rays.ray_at(place.as_vec2() + 0.5 + offset_px);
             self.set.background.radiance_linear(ray.direction.normalize_or_zero())
-        };
-        is_alone.then(|| from_first_px(self.antialias).map(radiance).sum())
+        });
+        is_alone.then(|| radiances.sum())
     }
 
     fn surface(&self, index: usize, place: UVec2, shown_linear: Vec3) -> Option<Vec3> {
@@ -80,26 +80,25 @@ impl First<'_> {
         };
         // A highlight may be smaller than a pixel: a bright one is found at each position.
         let added = if self.set.highlight.is_some() { shown_linear - color(Vec2::ZERO) } else { Vec3::ZERO };
-        let light = || from_first_px(self.antialias).map(|offset_px| color(offset_px) + added).sum();
-        added.abs().cmple(Vec3::splat(FAINT_HIGHLIGHT)).all().then(light)
+        let lights = from_first_px(self.antialias).map(|offset_px| color(offset_px) + added);
+        added.abs().cmple(Vec3::splat(FAINT_HIGHLIGHT)).all().then(|| lights.sum())
     }
 
     fn color(&self, pixel: &Pixel, ray: &ViewRay, t: f32, share: f32) -> Vec3 {
         let mask = pixel.provenance.camera_mask();
-        let of = |mask: u32| {
-            let shown = self.cameras.iter().find(|camera| camera.mask & mask != 0);
-            shown.map_or(Vec3::ZERO, |camera| color_in(camera, ray.at(t)))
-        };
         let lowest = mask & mask.wrapping_neg();
         let others = if mask == lowest { lowest } else { mask & !lowest };
-        of(others).lerp(of(lowest), share)
+        let [others, lowest] = [others, lowest].map(|mask| {
+            let shown = self.cameras.iter().find(|camera| camera.mask & mask != 0);
+            shown.map_or(Vec3::ZERO, |camera| color_in(camera, ray.at(t)))
+        });
+        others.lerp(lowest, share)
     }
 }
 
 fn color_in(camera: &SampleCamera, point_in_world: Vec3) -> Vec3 {
     let p = camera.homogeneous(point_in_world.extend(1.0));
     let uv = (p.xy() / p.z - 0.5).max(Vec2::ZERO).min(camera.cells - CELL_MARGIN_PX);
-    let texel = |i: u32| uv.as_uvec2() + UVec2::new(i & 1, i >> 1);
-    let shares = (0..4).zip(bilinear_shares(uv - uv.floor()));
-    shares.map(|(i, share)| camera.color_linear(texel(i)) * share).sum()
+    let shares = CORNERS.into_iter().zip(bilinear_shares(uv - uv.floor()));
+    shares.map(|(corner, share)| camera.color_linear(uv.as_uvec2() + corner) * share).sum()
 }

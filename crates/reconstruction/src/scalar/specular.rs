@@ -5,11 +5,11 @@ use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{
     pixel::Pixel,
-    sample_camera::SampleCamera,
+    sample_camera::{CORNERS, SampleCamera},
     surface::{bilinear, bilinear_shares},
     view_ray::{ViewRay, ViewRays},
 };
-use crate::{set_description::SetDescription, view_work::CELL_MARGIN_PX};
+use crate::{set_description::SetDescription, surface::THICKNESS_FOOTPRINTS, view_work::CELL_MARGIN_PX};
 
 /// The mean of the samples around a point.
 struct Gathered {
@@ -43,9 +43,11 @@ fn added_linear(
     cameras: &[SampleCamera],
     ray: &ViewRay,
 ) -> Vec3 {
-    let contributed = |camera: &&SampleCamera| camera.mask & pixel.provenance.camera_mask() != 0;
-    let is_hit = pixel.provenance.kind() == ProvenanceKind::Hit;
-    let Some(nearest) = cameras.iter().find(contributed).filter(|_| is_hit) else { return Vec3::ZERO };
+    if pixel.provenance.kind() != ProvenanceKind::Hit {
+        return Vec3::ZERO;
+    }
+    let contributed = pixel.provenance.camera_mask();
+    let Some(nearest) = cameras.iter().find(|camera| camera.mask & contributed != 0) else { return Vec3::ZERO };
     let point = ray.at(pixel.inverse_depth_per_m.recip());
     let image = &images[nearest.mask.trailing_zeros() as usize];
     let Some(around) = gathered(image, nearest, point, set.illumination.lights.len()) else { return Vec3::ZERO };
@@ -69,7 +71,7 @@ fn gathered(image: &DepthImage, camera: &SampleCamera, point_in_world: Vec3, lig
         reflecting: 0.0,
     };
     for (i, share) in shares.into_iter().enumerate() {
-        let texel = cell + UVec2::new(i as u32 & 1, i as u32 >> 1);
+        let texel = cell + CORNERS[i];
         sum.add(image, (texel.y * image.size_px().x + texel.x) as usize, share);
     }
     (sum.reflecting > 0.0).then(|| sum.divided_by(all))
@@ -84,7 +86,7 @@ fn shares_on_surface(camera: &SampleCamera, point_in_world: Vec3) -> (UVec2, [f3
     let at = uv - uv.floor();
     let corners = camera.corners(cell);
     let surfaces = if corners.connected { [bilinear(corners.codes, at); 4] } else { corners.codes };
-    let reach = camera.thickness_footprints * camera.code_above(inverse_w) / camera.focal_px;
+    let reach = THICKNESS_FOOTPRINTS * camera.code_above(inverse_w) / camera.focal_px;
     let mut shares = bilinear_shares(at);
     for i in 0..4 {
         let on_surface = (camera.code(inverse_w) - surfaces[i]).abs() < reach && corners.codes[i] > 1.5;

@@ -1,11 +1,12 @@
 //! Twin of `surface.wgsl`: what the cameras together say of a point, its colour and whether it is occupied.
 
-use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
+use glam::{Vec2, Vec3, Vec3Swizzles};
 
-use super::{pixel::Pixel, sample_camera::SampleCamera, view_ray::ViewRay};
+use super::sample_camera::{CORNERS, SampleCamera};
+use super::{pixel::Pixel, view_ray::ViewRay};
 use crate::{
     pyramid::FIRST_SAMPLE,
-    surface::{ANGLE_FLOOR, BORDER_PX, CARVING_SHARE, HIDDEN_WEIGHT, LEAST_SHARE, WHOLE},
+    surface::{ANGLE_FLOOR, BORDER_PX, CARVING_SHARE, HIDDEN_WEIGHT, LEAST_SHARE, THICKNESS_FOOTPRINTS, WHOLE},
     view_work::CELL_MARGIN_PX,
 };
 
@@ -61,13 +62,13 @@ pub(super) fn blend_two_best(cameras: &[SampleCamera], ray: &ViewRay, t: f32) ->
     best_first.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     let third_weight = best_first.get(2).map_or(0.0, |s| s.weight);
     let first = best_first[0];
-    let weight_of = |vote: &CameraVote| (vote.weight - third_weight).max(0.0);
-    let mut weights = weight_of(&first) + 1e-9;
-    let mut color = first.color_linear * (weight_of(&first) + 1e-9);
+    let surplus: Vec<f32> = best_first.iter().map(|vote| (vote.weight - third_weight).max(0.0)).collect();
+    let mut weights = surplus[0] + 1e-9;
+    let mut color = first.color_linear * (surplus[0] + 1e-9);
     let mut camera_mask = if first.weight > 0.0 { first.mask } else { 0 };
     if let Some(second) = best_first.get(1) {
-        color += second.color_linear * weight_of(second);
-        weights += weight_of(second);
+        color += second.color_linear * surplus[1];
+        weights += surplus[1];
         camera_mask |= if second.weight > third_weight { second.mask } else { 0 };
     }
     let [same, beyond]: [f32; 2] = [votes.iter().map(|s| s.same).sum(), votes.iter().map(|s| s.beyond).sum()];
@@ -76,7 +77,7 @@ pub(super) fn blend_two_best(cameras: &[SampleCamera], ray: &ViewRay, t: f32) ->
         color_linear: color / weights,
         camera_mask,
         occupied: same >= beyond && camera_mask != 0 && !carved,
-        lowest_share: lowest_share(&best_first, camera_mask, weight_of(&first) / weights),
+        lowest_share: lowest_share(&best_first, camera_mask, surplus[0] / weights),
     }
 }
 
@@ -87,6 +88,10 @@ fn lowest_share(best_first: &[CameraVote], camera_mask: u32, share: f32) -> Opti
     let is_whole = first.own > WHOLE && (is_single || best_first.get(1).is_some_and(|second| second.own > WHOLE));
     let share = if camera_mask.trailing_zeros() == first.mask.trailing_zeros() { share } else { 1.0 - share };
     is_whole.then_some((share * 254.0).round() / 254.0)
+}
+
+fn faded(share: f32) -> f32 {
+    ((share - LEAST_SHARE) / (1.0 - LEAST_SHARE)).clamp(0.0, 1.0)
 }
 
 fn vote(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> CameraVote {
@@ -107,7 +112,7 @@ fn vote(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> Ca
     let cell = clamped.as_uvec2();
     let at = clamped - clamped.floor();
     let corners = camera.corners(cell);
-    let reach = camera.thickness_footprints * camera.code_above(inverse_w) / camera.focal_px;
+    let reach = THICKNESS_FOOTPRINTS * camera.code_above(inverse_w) / camera.focal_px;
     // In a connected cell the surface itself counts, else each sample for itself.
     let surfaces = if corners.connected { [bilinear(corners.codes, at); 4] } else { corners.codes };
     let mut same = 0.0;
@@ -124,13 +129,12 @@ fn vote(camera: &SampleCamera, point_in_world: Vec3, view_direction: Vec3) -> Ca
             proven += share * corners.proven[i];
             let counted = share * if corners.proven[i] > 0.0 { 1.0 } else { HIDDEN_WEIGHT };
             own += counted;
-            color += camera.color_linear(cell + UVec2::new(i as u32 & 1, i as u32 >> 1)) * counted;
+            color += camera.color_linear(cell + CORNERS[i]) * counted;
         }
         if (gap > reach || !is_sample) && corners.codes[i] > 0.5 && corners.certain {
             beyond += share;
         }
     }
-    let faded = |share: f32| ((share - LEAST_SHARE) / (1.0 - LEAST_SHARE)).clamp(0.0, 1.0);
     let fade = if camera.among_holes { faded(proven) + HIDDEN_WEIGHT * faded(same) } else { 1.0 };
     let of: f32 = if camera.among_holes { own.max(1e-6) } else { same.max(LEAST_SHARE) };
     let weight = if same > LEAST_SHARE { weight(camera, uv, point_in_world, view_direction) * fade } else { 0.0 };

@@ -4,7 +4,7 @@ use glam::{UVec2, Vec2, Vec3, Vec3Swizzles};
 
 use super::{
     sample_camera::SampleCamera,
-    view_ray::{ViewRay, ViewRays},
+    view_ray::{ViewRay, ViewRays, places},
 };
 use crate::{
     pyramid::FIRST_SAMPLE,
@@ -22,9 +22,7 @@ struct Evaluation {
 
 /// Row by row.
 pub(super) fn tile_starts(cameras: &[SampleCamera], rays: &ViewRays) -> Vec<f32> {
-    let tiles = rays.tiles();
-    let places = (0..tiles.y).flat_map(|y| (0..tiles.x).map(move |x| UVec2::new(x, y)));
-    places.map(|tile| tile_start(cameras, rays, tile)).collect()
+    places(rays.tiles()).map(|tile| tile_start(cameras, rays, tile)).collect()
 }
 
 fn tile_start(cameras: &[SampleCamera], rays: &ViewRays, tile: UVec2) -> f32 {

@@ -50,8 +50,7 @@ impl ViewRays {
 
     /// All pixels, row by row.
     pub fn places(&self) -> impl Iterator<Item = UVec2> + use<> {
-        let size_px = self.size_px();
-        (0..size_px.y).flat_map(move |y| (0..size_px.x).map(move |x| UVec2::new(x, y)))
+        places(self.size_px())
     }
 
     /// The smaller focal length, in pixels.
@@ -89,6 +88,11 @@ impl ViewRays {
         let [near, far] = span_in(&self.volume, self.eye(), direction, self.near_m());
         ViewRay { eye: self.eye(), direction, near, far, is_mirrored: false }
     }
+}
+
+/// All places in a rectangle, row by row.
+pub(super) fn places(size: UVec2) -> impl Iterator<Item = UVec2> + Clone {
+    (0..size.y).flat_map(move |y| (0..size.x).map(move |x| UVec2::new(x, y)))
 }
 
 /// Where a ray is inside a volume; nowhere where the first is the greater.

@@ -69,7 +69,7 @@ fn views_with_several_positions_are_their_twins() {
             let planes = ViewPlanes { antialias, ..ViewPlanes::COLOR };
             let view = drawn(&stage.upload(), camera, CARVE, planes);
             let description = stage.description();
-            let twin = scalar::reconstruct_antialiased(&stage.images, &description, &camera, CARVE, antialias);
+            let twin = scalar::reconstruct_shown(&stage.images, &description, &camera, CARVE, planes);
             let off = difference(&view, &twin);
             assert!(off < 0.25, "{name}, {samples} samples: {off}");
         }

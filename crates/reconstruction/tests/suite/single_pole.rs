@@ -58,7 +58,7 @@ fn rays(count: usize) -> Vec<Ray> {
 
 fn followed(images: &[DepthImage], search: CurvedSearch, rays: &[Ray]) -> Vec<RayEnd> {
     let set = reconstructor().upload(images, &description(&stand().scene), Turn::default()).expect("a set");
-    let work = RayWork { curved_search: search, count_steps: true, ..RayWork::new(&set, NEAR_M) };
+    let work = RayWork { curved_search: search, ..RayWork::new(&set, NEAR_M) };
     reconstructor().follow(work, rays).expect("ends").0
 }
 
@@ -114,7 +114,7 @@ fn the_walk_ends_where_its_twin_does() {
             let expected = twin.curved_search(ray, NEAR_M, search);
             let near = !is_hit(end) || (end.way_m - expected.way_m).abs() <= 1e-3 * expected.way_m;
             let color = !is_hit(end) || (end.color_linear - expected.color_linear).abs().max_element() < 0.02;
-            end.kind == expected.kind && end.steps == expected.steps && near && color
+            end.kind == expected.kind && near && color
         };
         let same = rays.iter().zip(&ends).filter(|pair| agree(*pair)).count() as f32 / rays.len() as f32;
         let hits = ends.iter().filter(|end| is_hit(end)).count();
@@ -140,8 +140,7 @@ fn coarse_steps_miss_little() {
             .zip(&exhaustive)
             .filter(|(a, b)| is_hit(a) && is_hit(b) && (a.way_m - b.way_m).abs() < 0.02 * b.way_m);
         found.push(both.count() as f32 / hits);
-        let steps = ends.iter().map(|end| end.steps as f32).sum::<f32>() / ends.len() as f32;
-        println!("coarse {coarse_px}: {} of {hits} hits, {steps} steps a ray", found[found.len() - 1]);
+        println!("coarse {coarse_px}: {} of {hits} hits", found[found.len() - 1]);
     }
     assert!(found[0] > 0.97 && found[1] > 0.95, "{found:?}");
     assert!(found.is_sorted_by(|a, b| a + 0.005 >= *b), "longer steps miss more: {found:?}");

@@ -37,10 +37,11 @@ impl ShaderVariant for March {
     }
 
     fn all() -> Vec<Self> {
-        let marches = |set: SetVariant| {
-            let later = (1..set.cameras.min(MARCHES)).map(move |camera| Self { set, camera, listed: true });
-            later.chain([false, true].map(|listed| Self { set, camera: 0, listed }))
-        };
-        SetVariant::all().into_iter().flat_map(marches).collect()
+        let mut all = Vec::new();
+        for set in SetVariant::all() {
+            all.extend((1..set.cameras.min(MARCHES)).map(|camera| Self { set, camera, listed: true }));
+            all.extend([false, true].map(|listed| Self { set, camera: 0, listed }));
+        }
+        all
     }
 }

@@ -37,18 +37,14 @@ impl ShaderVariant for Smooth {
     }
 
     fn all() -> Vec<Self> {
-        let counts = [2, 4, 8, 16].into_iter().filter_map(Antialias::of);
-        let each = |antialias| {
-            SetVariant::all().into_iter().flat_map(move |set| {
-                gpu::switches().map(move |[highlights, environment_map]| Self {
-                    set,
-                    antialias,
-                    highlights,
-                    environment_map,
-                })
-            })
-        };
-        counts.flat_map(each).collect()
+        let mut all = Vec::new();
+        for antialias in [2, 4, 8, 16].into_iter().filter_map(Antialias::of) {
+            for [highlights, environment_map] in gpu::switches() {
+                let sets = SetVariant::all().into_iter();
+                all.extend(sets.map(|set| Self { set, antialias, highlights, environment_map }));
+            }
+        }
+        all
     }
 }
 
@@ -62,19 +58,18 @@ pub(crate) fn from_first_px(antialias: Antialias) -> impl Iterator<Item = Vec2> 
 pub(crate) fn record(recording: &mut Recording<'_>) -> Result<PixelList, ReconstructionError> {
     let set = recording.set;
     let variant = Smooth {
-        set: recording.set.variant(),
+        set: set.variant(),
         antialias: recording.batch.planes.antialias,
         highlights: set.reflectors.is_some(),
         environment_map: set.environment.is_some(),
     };
-    let pass = recording.device.passes.get(&variant)?;
     let rough = recording.rough_list();
     let mut bindings = surface::bindings(recording, &rough);
     bindings.extend(set.background_bindings());
     bindings.extend(recording.batch.sums.as_ref().map(|sums| Binding::buffer("sums", sums)));
     let starts = recording.batch.tile_start_m.as_ref();
     bindings.extend(starts.map(|starts| Binding::buffer("tile_start_m", starts)));
-    let bound = pass.bind(0, bindings)?;
-    recording.dispatch_pixels(&variant, &pass, &bound, None);
+    let pass = recording.bind(&variant, bindings)?;
+    recording.dispatch_pixels(&pass, None);
     Ok(rough)
 }

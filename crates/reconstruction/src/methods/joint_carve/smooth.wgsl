@@ -60,9 +60,8 @@ fn color_in(camera: u32, point_in_world: vec3f) -> vec3f {
     let p = homogeneous(work.cameras[camera].homogeneous_pixel_from_world, vec4f(point_in_world, 1.0));
     let uv = clamp(p.xy / p.z - 0.5, vec2f(0.0), work.cameras[camera].cells - CELL_MARGIN_PX);
     let cell = vec2u(uv);
-    let colors = colors_of(work.cameras[camera].first_cell + cell.y * work.cameras[camera].width_px + cell.x).corners;
-    let shares = bilinear_shares(uv - floor(uv));
-    return colors[0] * shares.x + colors[1] * shares.y + colors[2] * shares.z + colors[3] * shares.w;
+    let cell_index = work.cameras[camera].first_cell + cell.y * work.cameras[camera].width_px + cell.x;
+    return mixed_color(cell_index, bilinear_shares(uv - floor(uv)));
 }
 
 fn direction_at(pixel: Pixel, offset_px: vec2f) -> vec3f {
