@@ -177,7 +177,6 @@ fn os_name(part: &[u8]) -> Option<OsString> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::missing_textures::MissingTextures;
     use super::*;
     use crate::Limits;
 
@@ -188,8 +187,7 @@ mod tests {
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::write(path, b"x").unwrap();
         }
-        let (folder, _) =
-            Folder::opened_with(&dir.path().join("scene/a.obj"), &Limits::default(), MissingTextures::Refuse).unwrap();
+        let (folder, _) = Folder::open(&dir.path().join("scene/a.obj"), &Limits::default()).unwrap();
         let bases: Vec<&Path> = bases.iter().map(Path::new).collect();
         match search(&folder, &bases, &[name], &Warnings::default()) {
             Found::File(path) => path.display().to_string(),
@@ -220,7 +218,7 @@ mod tests {
             std::fs::write(dir.path().join(format!("T{number}.PNG")), b"x").unwrap();
         }
         let limits = Limits::default();
-        let (folder, _) = Folder::opened_with(&dir.path().join("a.obj"), &limits, MissingTextures::Refuse).unwrap();
+        let (folder, _) = Folder::open(&dir.path().join("a.obj"), &limits).unwrap();
         let warnings = Warnings::default();
         let bases = [Path::new(""), Path::new("")];
         for number in 0..100 {

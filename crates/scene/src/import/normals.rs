@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::source_scene::SourceMesh;
+use crate::Vertex;
 
 /// Smooth, with edges sharper than 60° kept, for formats without shading information.
 pub(crate) const CREASE_60_DEGREES: f64 = 0.5;
@@ -28,8 +29,7 @@ pub(crate) fn fill(mesh: &mut SourceMesh, is_flat: impl Fn(usize) -> bool) {
         vertex.normal = normal.unwrap_or(DVec3::ZERO).as_vec3().to_array();
     }
     turn_to_given_normals(mesh, &is_given);
-    let crease_cosine = |triangle| if is_flat(triangle) { FLAT } else { CREASE_60_DEGREES };
-    compute(mesh, &is_given, crease_cosine);
+    compute(mesh, &is_given, |triangle| if is_flat(triangle) { FLAT } else { CREASE_60_DEGREES });
 }
 
 fn turn_to_given_normals(mesh: &mut SourceMesh, is_given: &[bool]) {
@@ -45,13 +45,8 @@ fn turn_to_given_normals(mesh: &mut SourceMesh, is_given: &[bool]) {
     }
 }
 
-/// Makes normals for a source without normals, and fills gaps otherwise.
-pub(crate) fn complete(mesh: &mut SourceMesh, has_normals: bool, crease_cosine: f64) {
-    if has_normals { repair(mesh) } else { generate(mesh, crease_cosine) }
-}
-
 /// Sets every normal; may add vertices.
-fn generate(mesh: &mut SourceMesh, crease_cosine: f64) {
+pub(crate) fn generate(mesh: &mut SourceMesh, crease_cosine: f64) {
     compute(mesh, &vec![false; mesh.vertices.len()], |_| crease_cosine);
 }
 
@@ -86,14 +81,13 @@ fn compute(mesh: &mut SourceMesh, is_given: &[bool], crease_cosine: impl Fn(usiz
 }
 
 /// Normalises the given normals, and replaces those of zero length by the mean of their faces.
-fn repair(mesh: &mut SourceMesh) {
-    let length = |n: [f32; 3]| DVec3::from(n.map(f64::from)).length();
-    if mesh.vertices.iter().any(|v| length(v.normal) < 1e-6) {
+pub(crate) fn repair(mesh: &mut SourceMesh) {
+    if mesh.vertices.iter().any(has_no_normal) {
         let faces = Faces::of(mesh);
         let corners_at = CornersByPosition::of(mesh);
         for corner in 0..mesh.indices.len() {
             let vertex = mesh.indices[corner];
-            if length(mesh.vertices[vertex as usize].normal) < 1e-6 {
+            if has_no_normal(&mesh.vertices[vertex as usize]) {
                 let normal = faces.smooth_normal(corner, corners_at.around(vertex), -2.0);
                 mesh.vertices[vertex as usize].normal = normal.as_vec3().to_array();
             }
@@ -103,6 +97,10 @@ fn repair(mesh: &mut SourceMesh) {
         let normal = DVec3::from(vertex.normal.map(f64::from));
         vertex.normal = normal.try_normalize().unwrap_or(DVec3::Y).as_vec3().to_array();
     }
+}
+
+fn has_no_normal(vertex: &Vertex) -> bool {
+    DVec3::from(vertex.normal.map(f64::from)).length() < 1e-6
 }
 
 /// The copies of vertices whose corners disagree.
@@ -191,14 +189,14 @@ impl Faces {
         if !compares && crease_cosine == FLAT {
             return own.try_normalize().unwrap_or(DVec3::Y);
         }
-        let weighted = |&other: &u32| {
+        // A hub's sum would be as long for each of its corners; a stride keeps the total linear.
+        let stride = if compares { 1 } else { around.len() / MAX_CORNERS_COMPARED };
+        let weighted = around.iter().step_by(stride).map(|&other| {
             let normal = self.normals[other as usize / 3];
             let joins = !compares || normal.dot(own) >= crease_cosine;
             if joins { normal * self.corner_angles_rad[other as usize] } else { DVec3::ZERO }
-        };
-        // A hub's sum would be as long for each of its corners; a stride keeps the total linear.
-        let stride = if compares { 1 } else { around.len() / MAX_CORNERS_COMPARED };
-        let sum: DVec3 = around.iter().step_by(stride).map(weighted).sum();
+        });
+        let sum: DVec3 = weighted.sum();
         sum.try_normalize().or_else(|| own.try_normalize()).unwrap_or(DVec3::Y)
     }
 }
@@ -247,12 +245,11 @@ impl CornersByPosition {
 
 fn groups_by_position(positions: &[DVec3]) -> Vec<u32> {
     let mut group_of: HashMap<[u64; 3], u32> = HashMap::with_capacity(positions.len());
-    let key = |p: &DVec3| (*p + DVec3::ZERO).to_array().map(f64::to_bits);
-    let mut group = |p| {
+    let groups = positions.iter().map(|p| {
         let next = group_of.len() as u32;
-        *group_of.entry(key(p)).or_insert(next)
-    };
-    positions.iter().map(&mut group).collect()
+        *group_of.entry((*p + DVec3::ZERO).to_array().map(f64::to_bits)).or_insert(next)
+    });
+    groups.collect()
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use image::{ImageFormat, ImageReader};
 use rayon::prelude::*;
 
 use super::ktx2;
-use super::missing_textures::MissingTextures;
+use super::options::MissingTextures;
 use crate::error::{Fault, at_most};
 use crate::{Limits, SceneErrorKind, Texture};
 

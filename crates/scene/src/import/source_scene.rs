@@ -188,8 +188,6 @@ impl SourceMesh {
     /// Appends `other` as one part of `material`.
     pub(crate) fn append_part(&mut self, other: SourceMesh, material: u32) {
         let first_vertex = self.vertices.len() as u32;
-        let first_index = self.indices.len() as u32;
-        let index_count = other.indices.len() as u32;
         let vertex_count = self.vertices.len() + other.vertices.len();
         if !self.details.is_empty() || !other.details.is_empty() {
             self.details.resize(self.vertices.len(), VertexDetail::default());
@@ -203,8 +201,15 @@ impl SourceMesh {
         }
         self.positions_in_mesh.extend(other.positions_in_mesh);
         self.vertices.extend(other.vertices);
-        self.indices.extend(other.indices.into_iter().map(|i| i + first_vertex));
-        self.parts.push(MeshPart { first_index, index_count, material });
+        self.push_part(other.indices.into_iter().map(|i| i + first_vertex), material);
+    }
+
+    /// Appends triangles of this mesh's vertices as one part of `material`.
+    pub(crate) fn push_part(&mut self, indices: impl IntoIterator<Item = u32>, material: u32) {
+        let first_index = self.indices.len();
+        self.indices.extend(indices);
+        let index_count = (self.indices.len() - first_index) as u32;
+        self.parts.push(MeshPart { first_index: first_index as u32, index_count, material });
     }
 
     /// Appends a copy of a vertex and returns its number.

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use std::collections::HashSet;
 use std::fmt::Display;
 
-use crate::error::shortened;
+use crate::error::{Fault, shortened};
 
 /// Most names that a warning lists.
 const MAX_NAMES: usize = 8;
@@ -58,10 +58,11 @@ impl Warnings {
         change(&mut kinds[number]);
     }
 
-    /// The first place of a kind.
-    pub(crate) fn first(&self, text: &str) -> Option<String> {
+    /// The fault of a file without triangles, by the first of `reasons` that left out a face.
+    pub(crate) fn no_triangles(&self, reasons: [&str; 3]) -> Option<Fault> {
         let kinds = self.0.borrow();
-        kinds.iter().find(|kind| kind.text == text)?.places.first().cloned()
+        let kind = reasons.iter().find_map(|why| kinds.iter().find(|kind| kind.text == *why))?;
+        Some(Fault::malformed(kind.places.first()?, format!("there are no triangles: {}", kind.text)))
     }
 
     /// Logs one warning of each kind.

@@ -16,8 +16,7 @@ use crate::error::{Fault, at_most};
 /// Reads clips and skins. A scene in which no mesh follows them has no animation.
 pub(super) fn read(document: &Document, tree: &NodeTree, scene: &mut SourceScene) -> Result<(), Fault> {
     let clips = channels::read(document)?;
-    let placements = Placements::read(document, tree, &clips, scene)?;
-    let Placements { mut moving, degenerate } = placements;
+    let Placements { mut moving, degenerate } = Placements::read(document, tree, &clips, scene)?;
     degenerate::settle(&degenerate, scene, &mut moving, document.limits)?;
     if moving.is_empty() {
         return Ok(());
@@ -102,25 +101,25 @@ impl<'d> Skins<'d> {
         place: u32,
     ) -> Result<Skinned, Fault> {
         let node = format!("node {}", node.number);
-        let skin = skins::skin(self.document, index, &node)?;
-        let joints = skin.joints.len() as u64 + 1;
+        let skin = self.document.root.get(index);
+        let skin = skin.ok_or_else(|| Fault::malformed(&node, format!("skin {} does not exist", index.value())))?;
+        let joint_count = skin.joints.len() as u64 + 1;
         let vertices = mesh.vertices.len() as u64;
-        at_most(format_args!("{node}, joints of all skinned meshes"), joints, self.joints_left)?;
+        at_most(format_args!("{node}, joints of all skinned meshes"), joint_count, self.joints_left)?;
         at_most(format_args!("{node}, vertices of all skinned meshes"), vertices, self.influences_left)?;
-        self.joints_left -= joints;
+        self.joints_left -= joint_count;
         self.influences_left -= vertices;
         let element = format!("skin {}", index.value());
         let matrices = skins::bind_matrices(self.document, skin, &element)?;
         check_influences(&mesh.influences, skin.joints.len(), &element)?;
-        let joint = |(number, (joint, joint_from_mesh)): (usize, (&Index<JsonNode>, DAffine3))| {
-            let place = self.place_in_tree.get(joint.value()).copied().flatten();
-            let outside = || {
+        let mut joints = Vec::with_capacity(skin.joints.len());
+        for (number, (joint, joint_from_mesh)) in skin.joints.iter().zip(matrices).enumerate() {
+            let Some(node) = self.place_in_tree.get(joint.value()).copied().flatten() else {
                 let why = format!("node {} is not in the scene, or in a cycle", joint.value());
-                Fault::malformed(format_args!("{element}, joint {number}"), why)
+                return Err(Fault::malformed(format_args!("{element}, joint {number}"), why));
             };
-            Ok(Joint { node: place.ok_or_else(outside)?, joint_from_mesh })
-        };
-        let joints = skin.joints.iter().zip(matrices).enumerate().map(joint).collect::<Result<Vec<_>, _>>()?;
+            joints.push(Joint { node, joint_from_mesh });
+        }
         let mut skinned = Skinned { joints, influences: mesh.influences.clone() };
         skinned.make_rigid_without_weights(place);
         Ok(skinned)
@@ -162,13 +161,14 @@ fn targets(document: &Document, clips: &[Clip]) -> Vec<bool> {
 /// The placement at rest by the first joint whose scale is not 0: most skins are bound at rest, where all joints agree.
 /// If there is none, the placement is the place of the first joint.
 fn at_rest(tree: &NodeTree, joints: &[Joint], element: &str) -> Result<DAffine3, Fault> {
-    let placed = |joint: &Joint| tree.nodes[joint.node as usize].source_from_node * joint.joint_from_mesh;
-    let place = || {
-        let translation = joints.first().map(|joint| tree.nodes[joint.node as usize].source_from_node.translation);
-        translation.filter(|translation| translation.is_finite()).map(DAffine3::from_translation)
-    };
-    let usable = joints.iter().map(placed).find(is_invertible).or_else(place);
-    usable.ok_or_else(|| Fault::malformed(element, "the transforms of all its joints are not finite"))
+    let first_place = joints.first().map(|joint| tree.nodes[joint.node as usize].source_from_node.translation);
+    let first_place = first_place.filter(|place| place.is_finite()).map(DAffine3::from_translation);
+    let mut placed =
+        joints.iter().map(|joint| tree.nodes[joint.node as usize].source_from_node * joint.joint_from_mesh);
+    placed
+        .find(is_invertible)
+        .or(first_place)
+        .ok_or_else(|| Fault::malformed(element, "the transforms of all its joints are not finite"))
 }
 
 fn check_influences(influences: &[Influence], joints: usize, skin: &str) -> Result<(), Fault> {

@@ -1,6 +1,6 @@
 //! Clips: what moves which node, and when.
 
-use std::collections::HashMap;
+use std::collections::HashSet;
 
 use glam::{Quat, Vec4};
 use gltf::json::animation::{
@@ -24,15 +24,17 @@ pub(super) fn read(document: &Document) -> Result<Vec<Clip>, Fault> {
 fn clip(document: &Document, number: usize, animation: &JsonAnimation, keys_left: &mut u64) -> Result<Clip, Fault> {
     let name = animation.name.clone().unwrap_or_else(|| format!("animation {number}"));
     // A node's property has one channel.
-    let mut channels = HashMap::new();
+    let mut channels = Vec::new();
+    let mut moved = HashSet::new();
     for (place, json) in animation.channels.iter().enumerate() {
         let element = format!("animation {number}, channel {place}");
         match property(json, &element)? {
             Some(property) => {
                 let channel = channel(document, animation, json, property, &element, keys_left)?;
-                if channels.insert((channel.node, channel.property), (place, channel)).is_some() {
+                if !moved.insert((channel.node, channel.property)) {
                     return Err(Fault::malformed(element, "an earlier channel moves the same property"));
                 }
+                channels.push(channel);
             }
             None => {
                 let element = format_args!("animation {number} ({name})");
@@ -40,9 +42,7 @@ fn clip(document: &Document, number: usize, animation: &JsonAnimation, keys_left
             }
         }
     }
-    let mut channels: Vec<_> = channels.into_values().collect();
-    channels.sort_unstable_by_key(|(place, _)| *place);
-    Ok(Clip { name, channels: channels.into_iter().map(|(_, channel)| channel).collect() })
+    Ok(Clip { name, channels })
 }
 
 /// `None` for the weights of morph targets.
@@ -83,7 +83,7 @@ fn channel(
         Curve::CubicSpline => Interpolation::CubicSpline,
     };
     let input = format!("{element}, input");
-    let keys = document.element_count(sampler.input, &input)?;
+    let keys = document.layout(sampler.input, &input)?.count;
     at_most(format_args!("{input}, keys"), keys, *keys_left)?;
     *keys_left -= keys;
     let times_s: Vec<f32> = document.floats::<1>(sampler.input, &input)?.into_iter().flatten().collect();
@@ -101,11 +101,10 @@ fn values(
     element: &str,
 ) -> Result<Vec<Vec4>, Fault> {
     let output = format!("{element}, output");
-    let wrong = |why: String| Fault::malformed(&output, why);
     let expected = keys as u64 * interpolation.values_a_key() as u64;
-    let has = document.element_count(sampler.output, &output)?;
+    let has = document.layout(sampler.output, &output)?.count;
     if has != expected {
-        return Err(wrong(format!("{has} values where its keys need {expected}")));
+        return Err(Fault::malformed(output, format!("{has} values where its keys need {expected}")));
     }
     let mut values: Vec<Vec4> = match property {
         Property::Rotation => document.floats::<4>(sampler.output, &output)?.into_iter().map(Vec4::from).collect(),
@@ -115,10 +114,10 @@ fn values(
         }
     };
     if let Some(bad) = values.iter().position(|value| !value.is_finite()) {
-        return Err(wrong(format!("value {bad} is not finite")));
+        return Err(Fault::malformed(output, format!("value {bad} is not finite")));
     }
     if property == Property::Rotation {
-        make_unit(&mut values, interpolation).map_err(wrong)?;
+        make_unit(&mut values, interpolation).map_err(|why| Fault::malformed(output, why))?;
     }
     Ok(values)
 }

@@ -18,8 +18,8 @@ pub(super) fn settle(
     moving: &mut [MovingInstance],
     limits: &Limits,
 ) -> Result<(), Fault> {
-    let is_flat = |number: &usize| has_area(&scene.instances[*number].source_from_mesh.matrix3);
-    let (flat, without_area): (Vec<usize>, Vec<usize>) = degenerate.iter().copied().partition(is_flat);
+    let (flat, without_area): (Vec<usize>, Vec<usize>) =
+        degenerate.iter().partition(|&&number| has_area(&scene.instances[number].source_from_mesh.matrix3));
     check_sizes(&flat, scene, limits)?;
     for number in flat {
         let instance = scene.instances[number];

@@ -10,9 +10,10 @@ use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::buffer::View;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
-use gltf::json::{Index, Root, deserialize};
+use gltf::json::{Index, Root};
 use serde::Deserialize;
 
+use super::json::parsed;
 use crate::Limits;
 use crate::error::{Fault, at_most};
 
@@ -64,8 +65,7 @@ pub(super) fn decode_all<'a>(
             let extension = primitive.extensions.as_ref().and_then(|extensions| extensions.others.get(NAME));
             let Some(extension) = extension.filter(|_| is_needed(root, primitive, &decoded)) else { continue };
             let element = format!("mesh {number}, primitive {part}, {NAME}");
-            let wrong = |error: gltf::json::Error| Fault::malformed(&element, error.to_string());
-            let compressed: Compressed = deserialize::from_value(extension.clone()).map_err(wrong)?;
+            let compressed: Compressed = parsed(extension, &element)?;
             let bytes = view_bytes(compressed.buffer_view, &element)?;
             let mesh = decoded_mesh(bytes, &element, &mut budget)?;
             add_accessors(primitive, &compressed, &mesh, &element, &mut budget, &mut decoded)?;
@@ -121,8 +121,9 @@ fn add_accessors(
     for (semantic, accessor) in &primitive.attributes {
         let Checked::Valid(semantic) = semantic else { continue };
         let Some(&id) = compressed.attributes.get(&semantic.to_string()) else { continue };
-        let missing = || Fault::malformed(element, format!("{semantic:?} has number {id}, which its stream lacks"));
-        let attribute = mesh.attribute_by_unique_id(id).ok_or_else(missing)?;
+        let Some(attribute) = mesh.attribute_by_unique_id(id) else {
+            return Err(Fault::malformed(element, format!("{semantic:?} has number {id}, which its stream lacks")));
+        };
         let packed = packed(attribute, mesh.num_points(), &format!("{element}, {semantic:?}"), budget)?;
         decoded.insert(accessor.value(), packed);
     }
@@ -154,8 +155,10 @@ fn packed(
     for point in 0..points as u32 {
         let start = (attribute.mapped_index(PointIndex(point)).0 as usize).checked_mul(stride);
         let value = start.and_then(|start| data.get(start..start.checked_add(size)?));
-        let missing = || Fault::malformed(element, format!("its stream has no value for vertex {point}"));
-        bytes.extend_from_slice(value.ok_or_else(missing)?);
+        let Some(value) = value else {
+            return Err(Fault::malformed(element, format!("its stream has no value for vertex {point}")));
+        };
+        bytes.extend_from_slice(value);
     }
     Ok(DecodedAccessor { component, components, bytes })
 }

@@ -19,10 +19,12 @@ use crate::{DIELECTRIC_REFLECTANCE, Material};
 pub(super) fn read(document: &Document, scene: &mut SourceScene) -> Result<(), Fault> {
     let materials = &document.root.materials;
     let mut pictures = Pictures::default();
-    let of_material = |(i, m): (usize, &JsonMaterial)| Uses::of(document, m, &mut pictures, &format!("material {i}"));
-    let uses: Vec<_> = materials.iter().enumerate().map(of_material).collect::<Result<_, _>>()?;
+    let mut uses = Vec::with_capacity(materials.len());
+    for (number, material) in materials.iter().enumerate() {
+        uses.push(Uses::of(document, material, &mut pictures, &format!("material {number}"))?);
+    }
     let encoded = pictures.encoded(document)?;
-    let textures = decode_all(&encoded, document.limits, document.folder.missing_textures)?;
+    let textures = decode_all(&encoded, document.limits, document.missing_textures)?;
     let means = Means::of(&textures);
     for (number, (material, uses)) in materials.iter().zip(&uses).enumerate() {
         scene.materials.push(converted(material, uses, &means, number)?);

@@ -3,7 +3,7 @@
 use depth_image::srgb8_from_linear;
 use glam::Vec3;
 use gltf::json::Index;
-use gltf::json::accessor::Accessor;
+use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
@@ -11,8 +11,8 @@ use super::super::normals;
 use super::super::source_scene::{SourceMesh, plain_vertex};
 use super::super::tangents;
 use super::document::{Document, same_count};
+use super::skins;
 use super::texture_coordinates::{Coordinates, UvSource};
-use super::{morph, skins};
 use crate::error::{Fault, at_most};
 use crate::{Vertex, VertexDetail};
 
@@ -44,7 +44,7 @@ pub(super) fn read(
     let attributes = Attributes { document, primitive, weights, element };
     let position = attributes.index(Semantic::Positions);
     let position = position.ok_or_else(|| Fault::malformed(element, "it has no POSITION"))?;
-    let count = document.element_count(position, element)?;
+    let count = document.layout(position, element)?.count;
     at_most(format_args!("{element}, vertices"), count, document.limits.vertices)?;
     let mut positions = document.floats::<3>(position, element)?;
     attributes.morph(|target| target.positions, &mut positions)?;
@@ -56,12 +56,16 @@ pub(super) fn read(
     let mut mesh = SourceMesh { vertices, details, positions_in_mesh, indices, parts: Vec::new(), influences };
     drop_unused(&mut mesh);
     if mesh.positions_in_mesh.iter().all(|p| p.is_finite()) {
-        normals::complete(&mut mesh, has_normals, normals::FLAT);
+        if has_normals {
+            normals::repair(&mut mesh);
+        } else {
+            normals::generate(&mut mesh, normals::FLAT);
+        }
         // Tangents without normals do not count (glTF 2.0, 3.7.2.1).
         let has_tangents = has_normals && attributes.index(Semantic::Tangents).is_some();
         if let Some(second_uv) = coordinates.tangents_along_second.filter(|_| !has_tangents) {
-            let wrong = |error| Fault::malformed(element, format!("its tangents cannot be computed: {error}"));
-            tangents::generate(&mut mesh, second_uv).map_err(wrong)?;
+            tangents::generate(&mut mesh, second_uv)
+                .map_err(|error| Fault::malformed(element, format!("its tangents cannot be computed: {error}")))?;
         }
     }
     Ok(Some(Geometry { mesh, color_scale }))
@@ -91,17 +95,31 @@ impl Attributes<'_> {
     /// `count` elements of an attribute; `None` where the primitive lacks it.
     fn floats<const N: usize>(&self, semantic: Semantic, count: usize) -> Result<Option<Vec<[f32; N]>>, Fault> {
         let name = semantic.to_string();
-        let read = |index| same_count(self.document.floats::<N>(index, self.element)?, count, &name, self.element);
-        self.index(semantic).map(read).transpose()
+        let Some(index) = self.index(semantic) else { return Ok(None) };
+        same_count(self.document.floats(index, self.element)?, count, &name, self.element).map(Some)
     }
 
-    /// Adds what morph targets change.
+    /// Adds to `values` what morph targets change, times their weights. No clip moves them. `accessor_of` picks the
+    /// attribute.
     fn morph<const N: usize>(
         &self,
         accessor_of: impl Fn(&MorphTarget) -> Option<Index<Accessor>>,
         values: &mut [[f32; N]],
     ) -> Result<(), Fault> {
-        morph::add(self.document, self.primitive, self.weights, accessor_of, values, self.element)
+        let targets = self.primitive.targets.iter().flatten().zip(self.weights);
+        for (number, (target, &weight)) in targets.enumerate().filter(|(_, (_, weight))| **weight != 0.0) {
+            let Some(index) = accessor_of(target) else { continue };
+            let element = format!("{}, morph target {number}", self.element);
+            if !weight.is_finite() {
+                return Err(Fault::malformed(element, "its weight is not finite"));
+            }
+            let changes = self.document.floats::<3>(index, &element)?;
+            let changes = same_count(changes, values.len(), "an attribute", &element)?;
+            for (value, change) in values.iter_mut().zip(changes) {
+                value.iter_mut().zip(change).for_each(|(value, change)| *value += weight * change);
+            }
+        }
+        Ok(())
     }
 
     fn corners(&self, count: usize, uv: &UvSource) -> Result<Corners, Fault> {
@@ -177,21 +195,20 @@ fn drop_unused(mesh: &mut SourceMesh) {
 }
 
 fn linear_colors(document: &Document, index: Index<Accessor>, element: &str) -> Result<Vec<[f32; 4]>, Fault> {
-    let mut colors = if document.component_count(index, element)? == 3 {
-        let rgb = document.floats::<3>(index, element)?;
-        rgb.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
-    } else {
-        document.floats::<4>(index, element)?
-    };
+    let layout = document.layout(index, element)?;
     // Integers are shares of their largest value (glTF 2.0, 3.7.2.1), also where a file does not say so.
-    if let Some(largest) = document.largest_of_plain_integers(index, element)? {
-        let has_alpha = document.component_count(index, element)? == 4;
-        for color in &mut colors {
-            let channels = if has_alpha { 4 } else { 3 };
-            color[..channels].iter_mut().for_each(|channel| *channel /= largest);
-        }
+    let largest = match layout.component {
+        ComponentType::U8 if !layout.accessor.normalized => 255.0,
+        ComponentType::U16 if !layout.accessor.normalized => 65_535.0,
+        _ => 1.0,
+    };
+    if layout.components == 3 {
+        let rgb = document.floats::<3>(index, element)?;
+        Ok(rgb.into_iter().map(|[r, g, b]| [r / largest, g / largest, b / largest, 1.0]).collect())
+    } else {
+        let rgba = document.floats::<4>(index, element)?;
+        Ok(rgba.into_iter().map(|color| color.map(|channel| channel / largest)).collect())
     }
-    Ok(colors)
 }
 
 fn srgba8_from_linear([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {

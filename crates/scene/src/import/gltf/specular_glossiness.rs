@@ -3,11 +3,11 @@
 //! A surface without metal has the same two parts: a diffuse colour, and a reflectance at normal incidence of any colour. The
 //! texture of specular colour and glossiness counts by its mean.
 
-use gltf::json::deserialize;
 use gltf::json::material::Material as JsonMaterial;
 use gltf::json::texture::Info;
 use serde::Deserialize;
 
+use super::json::parsed;
 use crate::error::Fault;
 
 const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
@@ -40,6 +40,5 @@ pub(super) fn of(material: &JsonMaterial, element: &str) -> Result<Option<Specul
     let extension = material.extensions.as_ref().and_then(|extensions| extensions.others.get(NAME));
     let has_newer = material.pbr_metallic_roughness.metallic_roughness_texture.is_some();
     let Some(extension) = extension.filter(|_| !has_newer) else { return Ok(None) };
-    let wrong = |error: gltf::json::Error| Fault::malformed(element, format!("{NAME}: {error}"));
-    deserialize::from_value(extension.clone()).map(Some).map_err(wrong)
+    parsed(extension, format_args!("{element}: {NAME}")).map(Some)
 }

@@ -44,8 +44,9 @@ impl Pictures {
         element: &str,
     ) -> Result<Option<usize>, Fault> {
         let number = texture.value();
-        let missing = || Fault::malformed(element, format!("texture {number} does not exist"));
-        let json = document.root.get(texture).ok_or_else(missing)?;
+        let Some(json) = document.root.get(texture) else {
+            return Err(Fault::malformed(element, format!("texture {number} does not exist")));
+        };
         let image = match sources::image_of(document, json) {
             Ok(image) => image,
             Err(reason) => {
@@ -65,8 +66,8 @@ impl Pictures {
     /// The files of all images.
     pub(super) fn encoded(&self, document: &Document) -> Result<Vec<EncodedPicture>, Fault> {
         let mut bytes_left = document.limits.file_bytes;
-        let encoded = |&(image, content): &_| encoded_picture(document, image, content, &mut bytes_left);
-        self.uses.iter().map(encoded).collect()
+        let uses = self.uses.iter();
+        uses.map(|&(image, content)| encoded_picture(document, image, content, &mut bytes_left)).collect()
     }
 }
 
@@ -148,15 +149,21 @@ fn wrap_of(root: &Root, texture: Index<JsonTexture>, element: &str) -> Result<[W
     let Some(index) = root.get(texture).and_then(|texture| texture.sampler) else {
         return Ok([Wrap::Repeat; 2]);
     };
-    let missing = || Fault::malformed(element, format!("sampler {} does not exist", index.value()));
-    let sampler = root.get(index).ok_or_else(missing)?;
-    let wrap = |mode: Checked<WrappingMode>| match mode {
-        Checked::Valid(WrappingMode::Repeat) => Ok(Wrap::Repeat),
-        Checked::Valid(WrappingMode::MirroredRepeat) => Ok(Wrap::Mirror),
-        Checked::Valid(WrappingMode::ClampToEdge) => Ok(Wrap::Clamp),
-        Checked::Invalid => Err(Fault::malformed(format!("sampler {}", index.value()), "unknown wrap mode")),
+    let Some(sampler) = root.get(index) else {
+        return Err(Fault::malformed(element, format!("sampler {} does not exist", index.value())));
     };
-    Ok([wrap(sampler.wrap_s)?, wrap(sampler.wrap_t)?])
+    let mut wraps = [Wrap::Repeat; 2];
+    for (wrap, mode) in wraps.iter_mut().zip([sampler.wrap_s, sampler.wrap_t]) {
+        *wrap = match mode {
+            Checked::Valid(WrappingMode::Repeat) => Wrap::Repeat,
+            Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::Mirror,
+            Checked::Valid(WrappingMode::ClampToEdge) => Wrap::Clamp,
+            Checked::Invalid => {
+                return Err(Fault::malformed(format_args!("sampler {}", index.value()), "unknown wrap mode"));
+            }
+        };
+    }
+    Ok(wraps)
 }
 
 /// Many images may share a buffer view: `bytes_left` bounds their copies together.
@@ -213,9 +220,8 @@ pub(super) fn keep_referred_to(textures: Vec<Texture>, materials: &mut [Material
     let mut kept = vec![false; textures.len()];
     let used = materials.iter().flat_map(Material::textures).flatten();
     used.for_each(|used| kept[used.texture as usize] = true);
-    let number_of = |place: u32| kept[..place as usize].iter().filter(|&&k| k).count() as u32;
     for used in materials.iter_mut().flat_map(Material::textures_mut).flatten() {
-        used.texture = number_of(used.texture);
+        used.texture = kept[..used.texture as usize].iter().filter(|&&is_kept| is_kept).count() as u32;
     }
     textures.into_iter().zip(&kept).filter(|(_, kept)| **kept).map(|(texture, _)| texture).collect()
 }

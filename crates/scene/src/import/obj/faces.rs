@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
+use super::super::Import;
 use super::super::normals;
 use super::super::polygons::{PolygonCutter, TOO_COSTLY};
 use super::super::source_scene::SourceMesh;
@@ -13,7 +14,6 @@ use super::attributes::{Attributes, Corner, NONE};
 use super::map::UvTransform;
 use super::text::Line;
 use crate::error::{Fault, at_most};
-use crate::{Limits, MeshPart};
 
 const TOO_SHORT: &str = "faces of fewer than three corners are left out";
 const UNREADABLE: &str = "faces with a corner that is no vertex of the file are left out";
@@ -66,13 +66,7 @@ impl Faces {
         self.is_flat = line.words().next().is_none_or(|word| word.eq_ignore_ascii_case(b"off") || word == b"0");
     }
 
-    pub(super) fn push(
-        &mut self,
-        line: &Line,
-        attributes: &Attributes,
-        limits: &Limits,
-        warnings: &Warnings,
-    ) -> Result<(), Fault> {
+    pub(super) fn push(&mut self, line: &Line, attributes: &Attributes, import: &Import) -> Result<(), Fault> {
         let start = self.corners.len();
         let counts = attributes.counts();
         let mut is_readable = true;
@@ -84,14 +78,14 @@ impl Faces {
         let count = self.corners.len() - start;
         if !is_readable || count < 3 {
             self.corners.truncate(start);
-            warnings.count(if is_readable { TOO_SHORT } else { UNREADABLE }, line);
+            import.warnings.count(if is_readable { TOO_SHORT } else { UNREADABLE }, line);
             return Ok(());
         }
         if self.current_material.is_none() {
             self.use_material(b"");
         }
         self.triangle_count += count as u64 - 2;
-        at_most(line, self.triangle_count, limits.triangles)?;
+        at_most(line, self.triangle_count, import.limits.triangles)?;
         let material = self.current_material.unwrap_or(0);
         let line = u32::try_from(line.number).unwrap_or(u32::MAX);
         self.faces.push(Face { line, material, is_flat: self.is_flat, end: self.corners.len() });
@@ -102,8 +96,7 @@ impl Faces {
         self,
         attributes: &Attributes,
         materials: &[MaterialUse],
-        limits: &Limits,
-        warnings: &Warnings,
+        import: &Import,
     ) -> Result<SourceMesh, Fault> {
         let mut builder = Builder::new(attributes, self.material_names.len());
         let placements = numbered_placements(materials);
@@ -111,17 +104,15 @@ impl Faces {
         for face in &self.faces {
             let corners = &self.corners[start..face.end];
             start = face.end;
-            builder.add(face, corners, placements[face.material as usize], warnings);
-            at_most(format_args!("line {} (f)", face.line), builder.mesh.vertices.len() as u64, limits.vertices)?;
+            builder.add(face, corners, placements[face.material as usize], &import.warnings);
+            let vertices = builder.mesh.vertices.len() as u64;
+            at_most(format_args!("line {} (f)", face.line), vertices, import.limits.vertices)?;
         }
         let mut mesh = builder.mesh;
         let mut is_flat = Vec::new();
         for (triangles, material) in builder.triangles.into_iter().zip(materials) {
-            let first_index = mesh.indices.len() as u32;
-            let index_count = triangles.indices.len() as u32;
-            if index_count > 0 {
-                mesh.parts.push(MeshPart { first_index, index_count, material: material.number });
-                mesh.indices.extend(triangles.indices);
+            if !triangles.indices.is_empty() {
+                mesh.push_part(triangles.indices, material.number);
                 is_flat.extend(triangles.is_flat);
             }
         }
@@ -129,10 +120,8 @@ impl Faces {
             return Err(Fault::unsupported("faces", "more than 2^32 corners"));
         }
         if mesh.indices.is_empty() {
-            let reason =
-                [UNREADABLE, NOT_FINITE, TOO_SHORT].into_iter().find_map(|why| Some((why, warnings.first(why)?)));
-            let reason = reason.map(|(why, place)| Fault::malformed(place, format!("there are no triangles: {why}")));
-            return Err(reason.unwrap_or_else(|| Fault::malformed("scene", "it has no triangles")));
+            let fault = import.warnings.no_triangles([UNREADABLE, NOT_FINITE, TOO_SHORT]);
+            return Err(fault.unwrap_or_else(|| Fault::malformed("scene", "it has no triangles")));
         }
         normals::fill(&mut mesh, |triangle| is_flat[triangle]);
         Ok(mesh)
@@ -208,27 +197,24 @@ impl<'a> Builder<'a> {
         }
         self.vertices.clear();
         let mut has_all = true;
+        let mut have_uvs = true;
         for corner in corners {
             let existing = self.attributes.existing(*corner).unwrap_or(*corner);
             has_all &= existing == *corner;
+            have_uvs &= existing[1] != NONE;
             let vertex = self.vertex(existing, placement);
             self.vertices.push(vertex);
         }
         if !has_all {
             warnings.count(WITHOUT_ATTRIBUTES, place);
         }
-        if placement.has_texture && self.has_corner_without_uv(corners) {
+        if placement.has_texture && !have_uvs {
             warnings.count(TEXTURE_WITHOUT_COORDINATES, place);
         }
         let triangles = self.cutter.triangles(&self.polygon_in_source, || warnings.count(TOO_COSTLY, place));
         let into = &mut self.triangles[face.material as usize];
         into.indices.extend(triangles.iter().map(|&corner| self.vertices[corner as usize]));
         into.is_flat.resize(into.indices.len() / 3, face.is_flat);
-    }
-
-    fn has_corner_without_uv(&self, corners: &[Corner]) -> bool {
-        let has_uv = |corner: &Corner| self.attributes.existing(*corner).is_some_and(|[_, uv, _]| uv != NONE);
-        !corners.iter().all(has_uv)
     }
 
     fn vertex(&mut self, corner: Corner, placement: NumberedPlacement) -> u32 {
