@@ -97,8 +97,8 @@ pub fn grass(density: GrassDensity) -> Scene {
 
 /// Places spread evenly over the unit square for any number of them: the R2 sequence (Roberts 2018).
 fn spread(number: u32) -> Vec2 {
-    let at = |step: f64| (0.5 + step * f64::from(number)).fract() as f32;
-    Vec2::new(at(0.754_877_666_246_693), at(0.569_840_290_998_053))
+    let steps = [0.754_877_666_246_693, 0.569_840_290_998_053];
+    Vec2::from(steps.map(|step: f64| (0.5 + step * f64::from(number)).fract() as f32))
 }
 
 struct Meadow {

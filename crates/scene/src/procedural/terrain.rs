@@ -77,10 +77,10 @@ fn grid_point(column: u32, row: u32, cells: u32) -> Vec2 {
 
 fn normal_on_grid(heights: &[f32], column: u32, row: u32, cells: u32) -> Vec3 {
     let height = |c: u32, r: u32| heights[(r * (cells + 1) + c) as usize];
-    let around = |i: u32| (i.saturating_sub(1), (i + 1).min(cells));
-    let ((left, right), (back, front)) = (around(column), around(row));
-    let run_m = |a: u32, b: u32| (b - a) as f32 * (2.0 / cells as f32);
-    let slope_x = (height(right, row) - height(left, row)) / run_m(left, right);
-    let slope_z = (height(column, front) - height(column, back)) / run_m(back, front);
+    let [left, back] = [column, row].map(|i| i.saturating_sub(1));
+    let [right, front] = [column, row].map(|i| (i + 1).min(cells));
+    let cell_m = 2.0 / cells as f32;
+    let slope_x = (height(right, row) - height(left, row)) / ((right - left) as f32 * cell_m);
+    let slope_z = (height(column, front) - height(column, back)) / ((front - back) as f32 * cell_m);
     Vec3::new(-slope_x, 1.0, -slope_z).normalize_or(Vec3::Y)
 }
