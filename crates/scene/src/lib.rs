@@ -12,7 +12,6 @@
 
 mod animation;
 mod bounds;
-mod contents;
 mod error;
 mod import;
 mod light_rig;
@@ -23,7 +22,6 @@ mod package;
 mod pose;
 pub mod procedural;
 mod spec;
-mod texture_use;
 mod up_axis;
 mod validate;
 mod validate_animation;
@@ -40,5 +38,4 @@ pub use limits::{Limits, MAX_COORDINATE_M};
 pub use model::*;
 pub use package::{pack, unpack};
 pub use spec::{BUILT_IN_NAMES, ProceduralScene, SceneSpec, SceneSpecError};
-pub use texture_use::{TextureUse, Wrap};
 pub use up_axis::{UpAxis, UpAxisError};

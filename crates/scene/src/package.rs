@@ -14,7 +14,7 @@ use depth_image::{EnvironmentMap, MAX_ENVIRONMENT_SIZE_PX};
 use glam::UVec2;
 
 use crate::error::{Fault, at_most};
-use crate::{Limits, Mesh, Scene, SceneError};
+use crate::{Limits, Scene, SceneError};
 
 #[cfg(target_endian = "big")]
 compile_error!("packages hold arrays as they are in memory, which must be little-endian");
@@ -29,9 +29,10 @@ type Header<S> = (S, Vec<[u32; 3]>, Option<UVec2>);
 /// Packs a scene. Equal scenes give equal bytes.
 #[must_use]
 pub fn pack(scene: &Scene) -> Vec<u8> {
-    let lengths = |mesh: &Mesh| [mesh.vertices.len(), mesh.details.len(), mesh.indices.len()].map(|n| n as u32);
-    let mesh_lengths = scene.meshes.iter().map(lengths).collect();
-    let header: Header<&Scene> = (scene, mesh_lengths, scene.environment_map.as_ref().map(EnvironmentMap::size_px));
+    let meshes = scene.meshes.iter();
+    let mesh_lengths = meshes.map(|m| [m.vertices.len(), m.details.len(), m.indices.len()].map(|n| n as u32));
+    let header: Header<&Scene> =
+        (scene, mesh_lengths.collect(), scene.environment_map.as_ref().map(EnvironmentMap::size_px));
     // Writing to a growing vector cannot fail, and postcard supports all fields.
     let header = postcard::to_stdvec(&header).unwrap_or_default();
     let arrays = arrays(scene);

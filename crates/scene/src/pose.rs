@@ -38,15 +38,13 @@ impl Animation {
             let normals = normals_from(first.matrix3);
             return rest.par_iter().map(|vertex| placed(first, normals, vertex)).collect();
         }
-        let posed = |(vertex, influence): (&Vertex, &Influence)| {
+        let posed = rest.par_iter().zip(&moving.influences).map(|(vertex, influence)| {
             let blended = blended(&world_from_mesh, influence);
             placed(&blended, normals_from(blended.matrix3), vertex)
-        };
-        rest.par_iter().zip(&moving.influences).map(posed).collect()
+        });
+        posed.collect()
     }
-}
 
-impl Animation {
     /// As [`Animation::posed`], the details of vertices: tangents turn.
     #[must_use]
     pub fn posed_details(
@@ -60,9 +58,8 @@ impl Animation {
         if moving.influences.is_empty() {
             return rest.par_iter().map(|detail| turned(first, detail)).collect();
         }
-        let posed =
-            |(detail, influence): (&VertexDetail, &Influence)| turned(&blended(&world_from_mesh, influence), detail);
-        rest.par_iter().zip(&moving.influences).map(posed).collect()
+        let influenced = rest.par_iter().zip(&moving.influences);
+        influenced.map(|(detail, influence)| turned(&blended(&world_from_mesh, influence), detail)).collect()
     }
 }
 
@@ -74,8 +71,12 @@ fn turned(world_from_mesh: &Affine3A, detail: &VertexDetail) -> VertexDetail {
 
 /// The mesh's placement in the world by each joint.
 fn by_joints(moving: &MovingInstance, world_from_nodes: &[DAffine3]) -> Vec<Affine3A> {
-    let node = |node: u32| world_from_nodes.get(node as usize).unwrap_or(&DAffine3::IDENTITY);
-    moving.joints.iter().map(|joint| as_f32(&(*node(joint.node) * joint.joint_from_mesh))).collect()
+    let world_from_joints = moving.joints.iter().map(|joint| {
+        let world_from_node = world_from_nodes.get(joint.node as usize).copied().unwrap_or_default();
+        let world_from_mesh = world_from_node * joint.joint_from_mesh;
+        Affine3A::from_cols_array(&world_from_mesh.to_cols_array().map(bounded))
+    });
+    world_from_joints.collect()
 }
 
 fn blended(world_from_mesh: &[Affine3A], influence: &Influence) -> Affine3A {
@@ -102,10 +103,6 @@ fn normals_from(linear: Mat3A) -> Mat3A {
     let [x, y, z] = columns.map(|column| column / largest);
     let side = if x.cross(y).dot(z) < 0.0 { -1.0 } else { 1.0 };
     Mat3A::from_cols(y.cross(z) * side, z.cross(x) * side, x.cross(y) * side)
-}
-
-fn as_f32(world_from_mesh: &DAffine3) -> Affine3A {
-    Affine3A::from_cols_array(&world_from_mesh.to_cols_array().map(bounded))
 }
 
 /// A number of a pose that vertices can be computed with: between keys, a spline swings as far as it likes.

@@ -86,22 +86,19 @@ pub(crate) fn ensure(holds: bool, reason: impl FnOnce() -> String) -> Result<(),
 }
 
 fn check_mesh(mesh: &Mesh, material_count: usize) -> Result<(), String> {
-    let bad_vertex = mesh.vertices.iter().position(|v| !is_vertex_valid(v));
-    ensure(bad_vertex.is_none(), || {
-        format!("vertex {} is not finite, out of range or without a unit normal", bad_vertex.unwrap_or(0))
-    })?;
+    if let Some(bad) = mesh.vertices.iter().position(|v| !is_vertex_valid(v)) {
+        return Err(format!("vertex {bad} is not finite, out of range or without a unit normal"));
+    }
     let details = mesh.details.len();
     ensure(details == 0 || details == mesh.vertices.len(), || {
         format!("{details} vertex details for {} vertices", mesh.vertices.len())
     })?;
-    let bad_detail = mesh.details.iter().position(|d| !is_detail_valid(d));
-    ensure(bad_detail.is_none(), || {
-        format!("the detail of vertex {} is not finite or without a unit tangent", bad_detail.unwrap_or(0))
-    })?;
-    let bad_index = mesh.indices.iter().find(|&&i| i as usize >= mesh.vertices.len());
-    ensure(bad_index.is_none(), || {
-        format!("index {} is beyond its {} vertices", bad_index.unwrap_or(&0), mesh.vertices.len())
-    })?;
+    if let Some(bad) = mesh.details.iter().position(|d| !is_detail_valid(d)) {
+        return Err(format!("the detail of vertex {bad} is not finite or without a unit tangent"));
+    }
+    if let Some(bad) = mesh.indices.iter().find(|&&i| i as usize >= mesh.vertices.len()) {
+        return Err(format!("index {bad} is beyond its {} vertices", mesh.vertices.len()));
+    }
     check_parts(&mesh.parts, mesh.indices.len(), material_count)
 }
 
@@ -124,7 +121,12 @@ fn is_vertex_valid(vertex: &Vertex) -> bool {
     vertex.position.iter().all(|c| c.abs() <= MAX_COORDINATE_M)
         && (normal_length_squared - 1.0).abs() < 1e-2
         && vertex.uv.iter().all(|c| c.is_finite())
-        && (0.0..=1.0).contains(&vertex.sway)
+        && is_share(vertex.sway)
+}
+
+/// Returns whether a number is from 0 to 1, which NaN is not.
+fn is_share(v: f32) -> bool {
+    (0.0..=1.0).contains(&v)
 }
 
 fn is_detail_valid(detail: &VertexDetail) -> bool {
@@ -151,15 +153,15 @@ fn check_material(material: &Material, textures: &[Texture]) -> Result<(), Strin
         let holds_colors = matches!(name, "base colour" | "emissive");
         texture.map_or(Ok(()), |texture| check_texture_use(name, holds_colors, texture, textures))?;
     }
-    let unit = |v: f32| (0.0..=1.0).contains(&v);
     ensure(material.base_color_linear.iter().all(|c| c.is_finite() && *c >= 0.0), || "bad base colour".into())?;
-    ensure(is_radiance(material.emissive_linear), || "bad emissive colour".into())?;
-    ensure(unit(material.metallic), || "metallic is not from 0 to 1".into())?;
-    ensure(unit(material.roughness), || "roughness is not from 0 to 1".into())?;
-    ensure(unit(material.occlusion_strength), || "occlusion strength is not from 0 to 1".into())?;
+    let emissive = material.emissive_linear;
+    ensure(emissive.is_finite() && emissive.min_element() >= 0.0, || "bad emissive colour".into())?;
+    ensure(is_share(material.metallic), || "metallic is not from 0 to 1".into())?;
+    ensure(is_share(material.roughness), || "roughness is not from 0 to 1".into())?;
+    ensure(is_share(material.occlusion_strength), || "occlusion strength is not from 0 to 1".into())?;
     ensure(material.normal_scale.is_finite(), || "normal scale is not finite".into())?;
     let reflectance = material.dielectric_reflectance_linear;
-    ensure(reflectance.to_array().into_iter().all(unit), || "bad dielectric reflectance".into())?;
+    ensure(reflectance.to_array().into_iter().all(is_share), || "bad dielectric reflectance".into())?;
     let phong = [material.phong_specular, material.phong_exponent, material.alpha_cutoff];
     ensure(phong.iter().all(|v| v.is_finite() && *v >= 0.0), || "bad Phong terms or alpha cutoff".into())
 }
@@ -192,9 +194,13 @@ fn check_light(light: &Light) -> Result<(), LightError> {
             vec![("center", center_in_world), ("half_edges", u), ("half_edges", v)]
         }
     };
-    let is_near = |v: Vec3| v.abs().max_element() <= MAX_COORDINATE_M;
     let far = reach.into_iter().find(|(_, v)| !is_near(*v));
     far.map_or(Ok(()), |(field, _)| Err(LightError { field, reason: "over 1e9 m" }))
+}
+
+/// Returns whether all coordinates are within [`MAX_COORDINATE_M`], which NaN is not.
+pub(crate) fn is_near(v: Vec3) -> bool {
+    v.abs().max_element() <= MAX_COORDINATE_M
 }
 
 fn check_camera(camera: &SourceCamera) -> Result<(), String> {
@@ -209,8 +215,4 @@ fn check_wind(wind: &Wind) -> Result<(), Fault> {
         && wind.frequency_hz.is_finite()
         && wind.waves_per_m.is_finite();
     require(is_direction_valid && are_numbers_valid, "wind", "not finite or out of range")
-}
-
-fn is_radiance(colour: Vec3) -> bool {
-    colour.is_finite() && colour.min_element() >= 0.0
 }

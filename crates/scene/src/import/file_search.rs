@@ -57,13 +57,13 @@ fn distinct<T: PartialEq + Copy>(items: &[T]) -> Vec<T> {
 /// the name counts without its query (`?…`), and then without regard to upper and lower case. `None` for a file that
 /// does not exist.
 pub(crate) fn read_uri(folder: &Folder, element: &str, uri: &str) -> Result<Option<Vec<u8>>, Fault> {
-    let decoded = |uri| percent_decode_str(uri).decode_utf8();
-    let name = decoded(uri).map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
+    let name = percent_decode_str(uri).decode_utf8();
+    let name = name.map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
     if let Some(bytes) = existing(folder.read_name(element, &name))? {
         return Ok(Some(bytes));
     }
-    let path = uri.split(['?', '#']).next().and_then(|path| decoded(path).ok()).filter(|path| !path.is_empty());
-    let Some(path) = path else { return Ok(None) };
+    let path = uri.split(['?', '#']).next().and_then(|path| percent_decode_str(path).decode_utf8().ok());
+    let Some(path) = path.filter(|path| !path.is_empty()) else { return Ok(None) };
     if let Some(bytes) = existing(folder.read_name(element, &path))? {
         return Ok(Some(bytes));
     }
@@ -108,7 +108,6 @@ struct ReferredName<'n> {
 
 impl<'n> ReferredName<'n> {
     fn parse(name: &'n [u8]) -> Self {
-        let is_separator = |byte: &u8| matches!(byte, b'/' | b'\\');
         let has_scheme = name.split(is_separator).next().is_some_and(|first| first.contains(&b':'));
         let is_absolute = has_scheme || name.first().is_some_and(is_separator);
         // A drive may stand before a name without a separator: `C:t.png`.
@@ -116,6 +115,10 @@ impl<'n> ReferredName<'n> {
         let parts = name[after_drive..].split(is_separator).filter(|part| !part.is_empty() && *part != b".");
         Self { parts: parts.collect(), is_absolute }
     }
+}
+
+fn is_separator(byte: &u8) -> bool {
+    matches!(byte, b'/' | b'\\')
 }
 
 fn is_special(part: &[u8]) -> bool {

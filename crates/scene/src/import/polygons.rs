@@ -73,11 +73,11 @@ fn sees_all_from_first(outline: &[DVec2]) -> bool {
 
 /// Turns all triangles counter-clockwise where most are clockwise: an outline along its own normal is counter-clockwise.
 fn turn_round_with(corners: &mut [u32], outline: &[DVec2]) {
-    let area = |triangle: &[u32]| {
+    let areas = corners.chunks_exact(3).map(|triangle| {
         let [a, b, c] = [0, 1, 2].map(|i| outline[triangle[i] as usize]);
         (b - a).perp_dot(c - a)
-    };
-    if corners.chunks_exact(3).map(area).sum::<f64>() < 0.0 {
+    });
+    if areas.sum::<f64>() < 0.0 {
         corners.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
     }
 }

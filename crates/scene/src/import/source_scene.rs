@@ -7,7 +7,7 @@ use glam::{Affine3A, DAffine3, DVec3};
 use super::extent::{Box3, DRAWABLE_MESH_EXTENT, recentring_offset, scale_to_drawable, source_space};
 use crate::animation::{Animation, Influence, MovingInstance};
 use crate::error::{Fault, at_most};
-use crate::light_rig::{DEFAULT_BACKGROUND, color, color_mut, position_mut, scale_to_metres};
+use crate::light_rig::{DEFAULT_BACKGROUND, color, position_mut, scale_to_metres};
 use crate::{
     Environment, Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, SourceSpace,
     Texture, Vertex, VertexDetail,
@@ -76,28 +76,28 @@ impl SourceScene {
         self.unmirror();
         let lights = self.lights.iter().map(|l| l.placed_in(source_space)).collect();
         let world_from_source = world_from_source(source_space);
-        let instance = |i: &SourceInstance| Instance {
+        let instances = self.instances.iter().map(|i| Instance {
             mesh: i.mesh as u32,
             world_from_mesh: in_f32(&(world_from_source * i.source_from_mesh)),
-        };
-        let camera = |PlacedCamera { name, source_from_camera, fov_y_rad }| {
+        });
+        let cameras = self.cameras.into_iter().map(|PlacedCamera { name, source_from_camera, fov_y_rad }| {
             // A camera has a place and a direction, and no size.
             let place_in_world = world_from_source.transform_point3(source_from_camera.translation);
             let placed = DAffine3 { translation: place_in_world, ..source_from_camera };
             SourceCamera { name, world_from_camera: in_f32(&placed), fov_y_rad }
-        };
+        });
         if let Some(animation) = &mut self.animation {
             animation.world_from_source = world_from_source;
         }
         let scene = Scene {
             name: self.name,
             meshes: self.meshes.into_iter().map(SourceMesh::into_f32).collect(),
-            instances: self.instances.iter().map(instance).collect(),
+            instances: instances.collect(),
             materials: self.materials,
             textures: self.textures,
             illumination: Illumination { lights, environment: self.environment },
             background: self.background.unwrap_or(DEFAULT_BACKGROUND),
-            cameras: self.cameras.into_iter().map(camera).collect(),
+            cameras: cameras.collect(),
             animation: self.animation,
             source_space,
             ..Scene::default()
@@ -108,8 +108,8 @@ impl SourceScene {
 
     fn check_sizes(&self, limits: &Limits) -> Result<(), Fault> {
         at_most("instances", self.instances.len() as u64, limits.instances)?;
-        let of = |i: &SourceInstance| self.meshes[i.mesh].indices.len() as u64 / 3;
-        let triangles = self.instances.iter().map(of).fold(0, u64::saturating_add);
+        let triangles = self.instances.iter().map(|i| self.meshes[i.mesh].indices.len() as u64 / 3);
+        let triangles = triangles.fold(0, u64::saturating_add);
         at_most("triangles of all instances", triangles, limits.triangles)?;
         if triangles == 0 {
             return Err(Fault::malformed("scene", "it has no triangles"));
@@ -251,12 +251,6 @@ impl SourceLight {
         let color = color(self.light).as_dvec3();
         let distance = self.position_in_source.distance(point_in_source).max(least_distance);
         if matches!(self.light, Light::Directional { .. }) { color } else { color / (distance * distance) }
-    }
-
-    /// Scales in double precision: a factor may be too small for `f32` where the result is not.
-    pub(crate) fn scale(&mut self, factor: f64) {
-        let color = color_mut(&mut self.light);
-        *color = (color.as_dvec3() * factor).as_vec3();
     }
 
     fn placed_in(&self, source_space: SourceSpace) -> Light {

@@ -13,6 +13,7 @@ use super::super::source_scene::{SourceLight, SourceScene};
 use super::document::Document;
 use crate::Light;
 use crate::error::Fault;
+use crate::light_rig::{color_mut, scaled};
 
 /// Range of the largest channel of irradiance at the middle of a scene that is not exposed: two stops to either side of
 /// white.
@@ -102,6 +103,9 @@ pub(super) fn expose(scene: &mut SourceScene) {
     let arriving: DVec3 = scene.lights.iter().map(|light| light.arriving_at(bounds.center(), least)).sum();
     let most = arriving.max_element();
     if most > 0.0 && most.is_finite() && !UNEXPOSED.contains(&most) {
-        scene.lights.iter_mut().for_each(|light| light.scale(most.recip()));
+        for light in &mut scene.lights {
+            let color = color_mut(&mut light.light);
+            *color = scaled(*color, most.recip());
+        }
     }
 }

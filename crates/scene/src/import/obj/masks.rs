@@ -60,9 +60,9 @@ fn combined(color: Option<&Texture>, mask: &Texture, channel: Option<Channel>) -
     let mut srgba8 = Vec::with_capacity(size_px.x as usize * size_px.y as usize * 4);
     for y in 0..size_px.y {
         for x in 0..size_px.x {
-            let at = |texture: &Texture| nearest(texture, UVec2::new(x, y), size_px);
-            let [r, g, b, _] = color.map_or([255; 4], at);
-            srgba8.extend([r, g, b, opacity(at(mask), channel)]);
+            let at_px = UVec2::new(x, y);
+            let [r, g, b, _] = color.map_or([255; 4], |color| nearest(color, at_px, size_px));
+            srgba8.extend([r, g, b, opacity(nearest(mask, at_px, size_px), channel)]);
         }
     }
     Texture { width_px: size_px.x, height_px: size_px.y, is_srgb: true, srgba8 }
