@@ -150,8 +150,11 @@ fn check_transform(world_from_mesh: &Affine3A) -> Result<(), String> {
 fn check_material(material: &Material, textures: &[Texture]) -> Result<(), String> {
     let names = ["base colour", "metallic-roughness", "normal", "emissive", "occlusion"];
     for (name, texture) in names.into_iter().zip(material.textures()) {
+        let Some(TextureUse { texture: number, .. }) = texture else { continue };
+        let texture = textures.get(number as usize);
+        let texture = texture.ok_or_else(|| format!("its {name} texture {number} does not exist"))?;
         let holds_colors = matches!(name, "base colour" | "emissive");
-        texture.map_or(Ok(()), |texture| check_texture_use(name, holds_colors, texture, textures))?;
+        ensure(holds_colors || !texture.is_srgb, || format!("its {name} texture holds colours"))?;
     }
     ensure(material.base_color_linear.iter().all(|c| c.is_finite() && *c >= 0.0), || "bad base colour".into())?;
     let emissive = material.emissive_linear;
@@ -164,13 +167,6 @@ fn check_material(material: &Material, textures: &[Texture]) -> Result<(), Strin
     ensure(reflectance.to_array().into_iter().all(is_share), || "bad dielectric reflectance".into())?;
     let phong = [material.phong_specular, material.phong_exponent, material.alpha_cutoff];
     ensure(phong.iter().all(|v| v.is_finite() && *v >= 0.0), || "bad Phong terms or alpha cutoff".into())
-}
-
-fn check_texture_use(name: &str, holds_colors: bool, used: TextureUse, textures: &[Texture]) -> Result<(), String> {
-    let number = used.texture;
-    let texture = textures.get(number as usize);
-    let texture = texture.ok_or_else(|| format!("its {name} texture {number} does not exist"))?;
-    ensure(holds_colors || !texture.is_srgb, || format!("its {name} texture holds colours"))
 }
 
 fn check_texture(texture: &Texture, limits: &Limits) -> Result<(), String> {

@@ -29,7 +29,7 @@ pub struct Animation {
 
 /// A clip that is not there.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{name:?} is no clip of the scene, which has {}", listed(clips))]
+#[error("{name:?} is no clip of the scene, which has {}", if clips.is_empty() { "none".into() } else { clips.join(", ") })]
 pub struct UnknownClip {
     /// The name asked for.
     pub name: String,
@@ -37,22 +37,11 @@ pub struct UnknownClip {
     pub clips: Vec<String>,
 }
 
-fn listed(clips: &[String]) -> String {
-    if clips.is_empty() { "none".to_owned() } else { clips.join(", ") }
-}
-
 impl Animation {
     /// The clip that plays.
     #[must_use]
     pub fn clip(&self) -> Option<&Clip> {
         self.clips.get(self.playing? as usize)
-    }
-
-    /// The transforms of all nodes at a scene time. The clip that plays repeats.
-    #[must_use]
-    pub fn world_from_nodes(&self, scene_time_s: f32) -> Vec<DAffine3> {
-        let clip = self.clip().map(|clip| (clip, clip.time_s(scene_time_s)));
-        nodes::world_from_nodes(&self.nodes, &self.world_from_source, clip)
     }
 
     /// The period of the motion, seconds; `None` where nothing moves.

@@ -1,7 +1,6 @@
 //! Import of scene files. Each format fills a [`source_scene::SourceScene`] in double precision. Its `finish` does the
 //! common steps: re-centring, mirrored placements, limits, validation.
 
-mod clamped;
 mod environment;
 mod extent;
 mod file_search;

@@ -69,11 +69,13 @@ fn compute(mesh: &mut SourceMesh, is_given: &[bool], crease_cosine: impl Fn(usiz
         let around = corners_at.around(vertex);
         let normal = faces.smooth_normal(corner, around, crease_cosine).as_vec3().to_array();
         let is_first = !std::mem::replace(&mut is_set[vertex as usize], true);
-        mesh.indices[corner] = if is_hub(around) {
-            copies.with_normal_at_hub(mesh, vertex, normal, is_first)
+        if is_first {
+            mesh.vertices[vertex as usize].normal = normal;
+        } else if is_hub(around) {
+            mesh.indices[corner] = copies.with_normal_at_hub(mesh, vertex, normal);
         } else {
-            copies.with_normal(mesh, vertex, normal, is_first)
-        };
+            mesh.indices[corner] = copies.with_normal(mesh, vertex, normal);
+        }
     }
     // Vertices without a triangle are never drawn, but must be valid.
     let unused = is_set.iter().enumerate().filter(|(_, set)| !**set);
@@ -112,12 +114,8 @@ struct Copies {
 }
 
 impl Copies {
-    /// The vertex itself for its first corner, or else its copy with this normal, which may be a new one.
-    fn with_normal(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3], is_first: bool) -> u32 {
-        if is_first {
-            mesh.vertices[vertex as usize].normal = normal;
-            return vertex;
-        }
+    /// The vertex or its copy with about this normal, which may be a new one.
+    fn with_normal(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3]) -> u32 {
         let mut at = vertex as usize;
         loop {
             if is_same_direction(mesh.vertices[at].normal, normal) {
@@ -134,19 +132,17 @@ impl Copies {
     }
 
     /// Does what [`Self::with_normal`] does, in constant time.
-    fn with_normal_at_hub(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3], is_first: bool) -> u32 {
-        let key = (vertex, normal.map(|c| (c / SAME_DIRECTION).round() as i32));
-        if let Some(&copy) = self.at_hub.get(&key) {
+    fn with_normal_at_hub(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3]) -> u32 {
+        let rounded = |normal: [f32; 3]| normal.map(|c| (c / SAME_DIRECTION).round() as i32);
+        if rounded(mesh.vertices[vertex as usize].normal) == rounded(normal) {
+            return vertex;
+        }
+        if let Some(&copy) = self.at_hub.get(&(vertex, rounded(normal))) {
             return copy;
         }
-        let number = if is_first {
-            mesh.vertices[vertex as usize].normal = normal;
-            vertex
-        } else {
-            self.add(mesh, vertex, normal)
-        };
-        self.at_hub.insert(key, number);
-        number
+        let copy = self.add(mesh, vertex, normal);
+        self.at_hub.insert((vertex, rounded(normal)), copy);
+        copy
     }
 
     fn add(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3]) -> u32 {

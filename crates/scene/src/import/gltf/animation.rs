@@ -120,24 +120,17 @@ impl<'d> Skins<'d> {
             };
             joints.push(Joint { node, joint_from_mesh });
         }
-        let mut skinned = Skinned { joints, influences: mesh.influences.clone() };
-        skinned.make_rigid_without_weights(place);
-        Ok(skinned)
-    }
-}
-
-impl Skinned {
-    fn make_rigid_without_weights(&mut self, place: u32) {
-        let own_joint = self.joints.len() as u16;
-        let rigid = Influence { joints: [own_joint, 0, 0, 0], weights: [1.0, 0.0, 0.0, 0.0] };
-        let mut is_needed = false;
-        for influence in self.influences.iter_mut().filter(|influence| influence.shares().next().is_none()) {
+        let rigid = Influence { joints: [joints.len() as u16, 0, 0, 0], weights: [1.0, 0.0, 0.0, 0.0] };
+        let mut influences = mesh.influences.clone();
+        let mut is_rigid_somewhere = false;
+        for influence in influences.iter_mut().filter(|influence| influence.shares().next().is_none()) {
             *influence = rigid;
-            is_needed = true;
+            is_rigid_somewhere = true;
         }
-        if is_needed {
-            self.joints.push(Joint { node: place, joint_from_mesh: DAffine3::IDENTITY });
+        if is_rigid_somewhere {
+            joints.push(Joint { node: place, joint_from_mesh: DAffine3::IDENTITY });
         }
+        Ok(Skinned { joints, influences })
     }
 }
 

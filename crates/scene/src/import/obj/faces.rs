@@ -48,6 +48,8 @@ pub(super) struct MaterialUse {
     /// Number in the scene.
     pub number: u32,
     pub placement: UvTransform,
+    /// Equal for equal placements: the corners of their faces share vertices.
+    pub placement_number: u32,
     pub has_texture: bool,
 }
 
@@ -99,12 +101,11 @@ impl Faces {
         import: &Import,
     ) -> Result<SourceMesh, Fault> {
         let mut builder = Builder::new(attributes, self.material_names.len());
-        let placements = numbered_placements(materials);
         let mut start = 0;
         for face in &self.faces {
             let corners = &self.corners[start..face.end];
             start = face.end;
-            builder.add(face, corners, placements[face.material as usize], &import.warnings);
+            builder.add(face, corners, materials[face.material as usize], &import.warnings);
             let vertices = builder.mesh.vertices.len() as u64;
             at_most(format_args!("line {} (f)", face.line), vertices, import.limits.vertices)?;
         }
@@ -126,25 +127,6 @@ impl Faces {
         normals::fill(&mut mesh, |triangle| is_flat[triangle]);
         Ok(mesh)
     }
-}
-
-/// A placement of textures with a number: corners of equal placements are one vertex.
-#[derive(Clone, Copy)]
-struct NumberedPlacement {
-    number: u32,
-    transform: UvTransform,
-    has_texture: bool,
-}
-
-fn numbered_placements(materials: &[MaterialUse]) -> Vec<NumberedPlacement> {
-    let mut number_of = HashMap::new();
-    let numbered = materials.iter().map(|&MaterialUse { placement: transform, has_texture, .. }| {
-        let UvTransform { scale, offset } = transform;
-        let next = number_of.len() as u32;
-        let bits = [scale.x, scale.y, offset.x, offset.y].map(f64::to_bits);
-        NumberedPlacement { number: *number_of.entry(bits).or_insert(next), transform, has_texture }
-    });
-    numbered.collect()
 }
 
 /// Makes vertices of corners and triangles of faces.
@@ -182,7 +164,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn add(&mut self, face: &Face, corners: &[Corner], placement: NumberedPlacement, warnings: &Warnings) {
+    fn add(&mut self, face: &Face, corners: &[Corner], material: MaterialUse, warnings: &Warnings) {
         let place = format_args!("line {} (f)", face.line);
         self.polygon_in_source.clear();
         for corner in corners {
@@ -202,13 +184,13 @@ impl<'a> Builder<'a> {
             let existing = self.attributes.existing(*corner).unwrap_or(*corner);
             has_all &= existing == *corner;
             have_uvs &= existing[1] != NONE;
-            let vertex = self.vertex(existing, placement);
+            let vertex = self.vertex(existing, material);
             self.vertices.push(vertex);
         }
         if !has_all {
             warnings.count(WITHOUT_ATTRIBUTES, place);
         }
-        if placement.has_texture && !have_uvs {
+        if material.has_texture && !have_uvs {
             warnings.count(TEXTURE_WITHOUT_COORDINATES, place);
         }
         let triangles = self.cutter.triangles(&self.polygon_in_source, || warnings.count(TOO_COSTLY, place));
@@ -217,14 +199,14 @@ impl<'a> Builder<'a> {
         into.is_flat.resize(into.indices.len() / 3, face.is_flat);
     }
 
-    fn vertex(&mut self, corner: Corner, placement: NumberedPlacement) -> u32 {
+    fn vertex(&mut self, corner: Corner, material: MaterialUse) -> u32 {
         let next = self.mesh.vertices.len() as u32;
-        let number = *self.vertex_of_corner.entry((corner, placement.number)).or_insert(next);
+        let number = *self.vertex_of_corner.entry((corner, material.placement_number)).or_insert(next);
         if number == next {
             let mut vertex = self.attributes.vertex(corner);
             vertex.color_srgba8 = self.colors_srgba8.get(corner[0] as usize).copied().unwrap_or(vertex.color_srgba8);
-            if placement.transform != UvTransform::IDENTITY {
-                vertex.uv = placement.transform.apply(vertex.uv);
+            if material.placement != UvTransform::IDENTITY {
+                vertex.uv = material.placement.apply(vertex.uv);
             }
             self.mesh.positions_in_mesh.push(self.attributes.positions_in_source[corner[0] as usize]);
             self.mesh.vertices.push(vertex);

@@ -12,7 +12,7 @@ use super::super::texture_files::{TextureFiles, TextureReference};
 use super::faces::MaterialUse;
 use super::map::{TextureMap, UvTransform, spellings};
 use super::masks::{MaskedTexture, masked};
-use super::mtl::{Entry, parse};
+use super::mtl::{Entry, folded_name, parse};
 use super::text::words;
 use crate::error::{Fault, at_most};
 use crate::{Material, TextureUse, Wrap};
@@ -85,12 +85,16 @@ pub(super) fn read_materials(
 ) -> Result<Vec<MaterialUse>, Fault> {
     let Import { limits, warnings, .. } = import;
     at_most("materials", names.len() as u64, limits.attributes)?;
-    let lookup = Lookup::new(entries);
+    // The last of equal names counts.
+    let by_name: HashMap<&[u8], &Entry> = entries.iter().map(|entry| (&*entry.name, entry)).collect();
+    let by_folded_name: HashMap<_, _> = entries.iter().map(|entry| (folded_name(&entry.name), entry)).collect();
     let mut textures = Textures::default();
     let mut uses = Vec::new();
+    let mut placement_numbers = HashMap::new();
     for name in names {
         let shown_name = decoded(name).into_owned();
-        let entry = lookup.find(name);
+        let exact = by_name.get(name.as_slice()).copied();
+        let entry = exact.or_else(|| by_folded_name.get(&folded_name(name)).copied());
         if entry.is_none() && !name.is_empty() {
             warnings.list(UNKNOWN_MATERIALS, &shown_name);
         }
@@ -108,8 +112,13 @@ pub(super) fn read_materials(
                 warnings.list("opacity maps are placed as the colours of their materials", &material.name);
             }
         }
+        let UvTransform { scale, offset } = placement;
+        let next = placement_numbers.len() as u32;
+        let bits = [scale.x, scale.y, offset.x, offset.y].map(f64::to_bits);
+        let placement_number = *placement_numbers.entry(bits).or_insert(next);
         let has_texture = material.base_color_texture.is_some();
-        uses.push(MaterialUse { number: scene.materials.len() as u32, placement, has_texture });
+        let number = scene.materials.len() as u32;
+        uses.push(MaterialUse { number, placement, placement_number, has_texture });
         scene.materials.push(material);
     }
     if scene.materials.is_empty() {
@@ -118,26 +127,6 @@ pub(super) fn read_materials(
     let decoded = textures.files.decode(import)?;
     scene.textures = masked(decoded, &textures.used, limits)?;
     Ok(uses)
-}
-
-/// Entries by their names. The last of equal names counts.
-struct Lookup<'e> {
-    by_name: HashMap<&'e [u8], &'e Entry>,
-    by_folded_name: HashMap<Vec<u8>, &'e Entry>,
-}
-
-impl<'e> Lookup<'e> {
-    fn new(entries: &'e [Entry]) -> Self {
-        Self {
-            by_name: entries.iter().map(|entry| (&*entry.name, entry)).collect(),
-            by_folded_name: entries.iter().map(|entry| (Entry::folded_name(&entry.name), entry)).collect(),
-        }
-    }
-
-    fn find(&self, name: &[u8]) -> Option<&'e Entry> {
-        let exact = self.by_name.get(name).copied();
-        exact.or_else(|| self.by_folded_name.get(&Entry::folded_name(name)).copied())
-    }
 }
 
 #[derive(Default)]

@@ -134,13 +134,13 @@ impl Entry {
         }
         opacity.clamp(0.0, 1.0)
     }
+}
 
-    /// The name without comment and quotes, to compare where no name is equal to the byte.
-    pub(super) fn folded_name(name: &[u8]) -> Vec<u8> {
-        let bare = without_comment(name);
-        let unquoted = bare.strip_prefix(b"\"").and_then(|inner| inner.strip_suffix(b"\"")).unwrap_or(bare);
-        unquoted.to_ascii_lowercase()
-    }
+/// The name without comment and quotes, to compare where no name is equal to the byte.
+pub(super) fn folded_name(name: &[u8]) -> Vec<u8> {
+    let bare = without_comment(name);
+    let unquoted = bare.strip_prefix(b"\"").and_then(|inner| inner.strip_suffix(b"\"")).unwrap_or(bare);
+    unquoted.to_ascii_lowercase()
 }
 
 /// A colour of one or three numbers. Exporters disagree on their encoding; they count as linear, as in the glTF
