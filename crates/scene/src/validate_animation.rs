@@ -57,7 +57,7 @@ impl Scene {
         }
     }
 
-    /// Moments between the sampled ones are bounded by [`Animation::posed`].
+    /// Moments between the sampled ones are bounded by [`MovingInstance::posed`].
     fn check_reach(&self, animation: &Animation) -> Result<(), Fault> {
         // The box without points is nowhere.
         each("moving instance", &self.swept(animation), |b| {

@@ -133,7 +133,6 @@ impl Copies {
 
     /// Does what [`Self::with_normal`] does, in constant time.
     fn with_normal_at_hub(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3]) -> u32 {
-        let rounded = |normal: [f32; 3]| normal.map(|c| (c / SAME_DIRECTION).round() as i32);
         if rounded(mesh.vertices[vertex as usize].normal) == rounded(normal) {
             return vertex;
         }
@@ -156,6 +155,10 @@ impl Copies {
 /// Whether so many corners meet at a point that they are not compared with each other.
 fn is_hub(around: &[u32]) -> bool {
     around.len() > MAX_CORNERS_COMPARED
+}
+
+fn rounded(normal: [f32; 3]) -> [i32; 3] {
+    normal.map(|c| (c / SAME_DIRECTION).round() as i32)
 }
 
 fn is_same_direction(a: [f32; 3], b: [f32; 3]) -> bool {

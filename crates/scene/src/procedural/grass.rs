@@ -111,11 +111,6 @@ impl Meadow {
         0.22 * self.noise.fractal(at * 0.45 + 3.0, 3) + 0.02 * self.noise.at(at * 4.0)
     }
 
-    /// 0 where it is lush, 1 where it is dry.
-    fn dryness(&self, at: Vec2) -> f32 {
-        0.5 + 0.6 * self.noise.fractal(at * 0.9 + 30.0, 3)
-    }
-
     fn add_ground(&self, builder: &mut MeshBuilder, cells: u32) {
         builder.grid(cells, |column, row| {
             let at = Vec2::new(column as f32, row as f32) * (2.0 * HALF_WIDTH_M / cells as f32) - HALF_WIDTH_M;
@@ -164,7 +159,9 @@ struct Blade {
 
 impl Blade {
     fn sprouting(meadow: &Meadow, at: Vec2, rng: &mut Rng) -> Self {
-        let dryness = (meadow.dryness(at) + rng.between(-0.25, 0.25)).clamp(0.0, 1.0);
+        // 0 where it is lush, 1 where it is dry.
+        let dryness = 0.5 + 0.6 * meadow.noise.fractal(at * 0.9 + 30.0, 3);
+        let dryness = (dryness + rng.between(-0.25, 0.25)).clamp(0.0, 1.0);
         let growth = 0.85 + 0.45 * meadow.noise.fractal(at * 1.3 + 60.0, 3);
         // Most blades lean in any direction, all a little with the wind.
         let heading = Vec2::from_angle(rng.between(0.0, TAU)) + Vec2::new(0.45, 0.2);

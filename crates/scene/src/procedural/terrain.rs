@@ -23,7 +23,8 @@ impl Terrain {
         let hills = 0.5 + 0.5 * self.noise.fractal(at * 1.1 + 5.0, 4);
         let knoll = (-at.distance_squared(self.tree_foot) / 0.12).exp();
         let ridges = 1.0 - self.noise.fractal(at * 3.0 + 40.0, 4).abs();
-        let rocks = ridges.powi(6) * smoothstep(0.55, 1.0, at.distance(self.tree_foot)) * self.rockiness(at);
+        let rockiness = smoothstep(0.0, 0.5, self.noise.at(at * 1.3 + 90.0));
+        let rocks = ridges.powi(6) * smoothstep(0.55, 1.0, at.distance(self.tree_foot)) * rockiness;
         let tussocks = self.noise.fractal(at * 28.0, 2);
         (0.02 + 0.15 * hills + 0.05 * knoll + 0.07 * rocks + 0.0035 * tussocks).clamp(0.0, 0.3)
     }
@@ -44,10 +45,6 @@ impl Terrain {
         });
         builder.finish_part(0);
         builder.into_mesh()
-    }
-
-    fn rockiness(&self, at: Vec2) -> f32 {
-        smoothstep(0.0, 0.5, self.noise.at(at * 1.3 + 90.0))
     }
 
     /// sRGB codes: grass by patches, earth where it is steep or trodden, rock where steeper.

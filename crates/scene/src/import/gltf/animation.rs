@@ -16,8 +16,9 @@ use crate::error::{Fault, at_most};
 /// Reads clips and skins. A scene in which no mesh follows them has no animation.
 pub(super) fn read(document: &Document, tree: &NodeTree, scene: &mut SourceScene) -> Result<(), Fault> {
     let clips = channels::read(document)?;
-    let Placements { mut moving, degenerate } = Placements::read(document, tree, &clips, scene)?;
-    degenerate::settle(&degenerate, scene, &mut moving, document.limits)?;
+    let mut placements = Placements::read(document, tree, &clips, scene)?;
+    degenerate::settle(&mut placements, scene, document.limits)?;
+    let moving = placements.moving;
     if moving.is_empty() {
         return Ok(());
     }
@@ -30,11 +31,11 @@ pub(super) fn read(document: &Document, tree: &NodeTree, scene: &mut SourceScene
 
 /// The placements of meshes that need more than a transform.
 #[derive(Default)]
-struct Placements {
+pub(super) struct Placements {
     /// All instances that move or are skinned. `Joint::node` is the node's place in the tree.
-    moving: Vec<MovingInstance>,
+    pub moving: Vec<MovingInstance>,
     /// The numbers of instances that stand still and whose transform has no inverse.
-    degenerate: Vec<usize>,
+    pub degenerate: Vec<usize>,
 }
 
 impl Placements {

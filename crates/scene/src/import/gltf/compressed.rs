@@ -2,8 +2,8 @@
 //!
 //! `meshoptimizer-rs` decodes. It is a port of the reference without unsafe code, and checks every read of a stream.
 
+use gltf::json::Value;
 use gltf::json::buffer::{Buffer, View};
-use gltf::json::{Root, Value};
 use meshoptimizer_rs::codec::{
     decode_filter_color, decode_filter_exp, decode_filter_oct, decode_filter_quat, decode_index_buffer,
     decode_index_sequence, decode_vertex_buffer,
@@ -11,6 +11,7 @@ use meshoptimizer_rs::codec::{
 use meshoptimizer_rs::{Error, Limits, Workspace};
 use serde::Deserialize;
 
+use super::document::Document;
 use super::json::parsed;
 use crate::error::{Fault, at_most};
 
@@ -24,13 +25,11 @@ pub(super) fn is_fallback(buffer: &Buffer) -> bool {
     extension.and_then(|value| value.get("fallback")?.as_bool()).unwrap_or(false)
 }
 
-/// The decoded bytes of each buffer view that is compressed. `source` returns a range of a buffer: its number, an offset
-/// and a length. All decoded bytes together count against `limit_bytes`, before memory is allocated.
-pub(super) fn decode_all<'a>(
-    root: &Root,
-    limit_bytes: u64,
-    source: impl Fn(u64, u64, u64) -> Option<&'a [u8]>,
-) -> Result<Vec<Option<Vec<u8>>>, Fault> {
+/// The decoded bytes of each buffer view that is compressed. All of them together count against the limit of a file,
+/// before memory is allocated.
+pub(super) fn decode_all(document: &Document) -> Result<Vec<Option<Vec<u8>>>, Fault> {
+    let Document { root, limits, .. } = document;
+    let limit_bytes = limits.file_bytes;
     let mut decoded_bytes = 0u64;
     let mut decoded = vec![None; root.buffer_views.len()];
     for (number, view) in root.buffer_views.iter().enumerate() {
@@ -43,7 +42,7 @@ pub(super) fn decode_all<'a>(
         decoded_bytes = decoded_bytes.saturating_add(compressed.count * compressed.byte_stride);
         at_most(format_args!("{element}: decoded views in bytes"), decoded_bytes, limit_bytes)?;
         let Compressed { buffer, byte_offset, byte_length, .. } = compressed;
-        let Some(bytes) = source(buffer, byte_offset, byte_length) else {
+        let Some(bytes) = document.buffer_range(buffer, byte_offset, byte_length) else {
             return Err(Fault::malformed(element, format!("its {byte_length} bytes leave buffer {buffer}")));
         };
         let bytes = compressed.decode(bytes, limit_bytes);

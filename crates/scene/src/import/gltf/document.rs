@@ -56,11 +56,8 @@ impl<'a> Document<'a> {
             elements_left: Cell::new(elements),
         };
         document.read_buffers(binary_chunk)?;
-        document.decoded_views = compressed::decode_all(root, limits.file_bytes, |buffer, offset, length| {
-            slice_of(document.buffers.get(usize::try_from(buffer).ok()?)?, offset, length)
-        })?;
-        document.decoded_accessors =
-            draco::decode_all(root, limits, |view, element| document.view(view, element).map(|(_, bytes)| bytes))?;
+        document.decoded_views = compressed::decode_all(&document)?;
+        document.decoded_accessors = draco::decode_all(&document)?;
         Ok(document)
     }
 
@@ -96,6 +93,11 @@ impl<'a> Document<'a> {
         let url = DataUrl::process(uri).map_err(|e| Fault::malformed(element, format!("data URI: {e:?}")))?;
         let (bytes, _) = url.decode_to_vec().map_err(|e| Fault::malformed(element, format!("data URI: {e:?}")))?;
         Ok(Some(bytes))
+    }
+
+    /// A range of a buffer.
+    pub(super) fn buffer_range(&self, buffer: u64, offset: u64, length: u64) -> Option<&[u8]> {
+        slice_of(self.buffers.get(usize::try_from(buffer).ok()?)?, offset, length)
     }
 
     /// A buffer view and its bytes.
@@ -187,7 +189,7 @@ impl<'a> Document<'a> {
         if let Some(bytes) = layout.decoded {
             return Ok(bytes.chunks_exact(layout.element_bytes()).map(read).collect());
         }
-        let mut elements = match layout.accessor.buffer_view {
+        let mut elements: Vec<T> = match layout.accessor.buffer_view {
             Some(view) => {
                 let offset = layout.accessor.byte_offset.map_or(0, |o| o.0);
                 let chunks = self.chunks(view, offset, layout.count, layout.element_bytes(), &layout.name)?;
@@ -202,20 +204,7 @@ impl<'a> Document<'a> {
                 vec![zero; layout.count as usize]
             }
         };
-        if let Some(sparse) = &layout.accessor.sparse {
-            self.overwrite(layout, sparse, &mut elements, read)?;
-        }
-        Ok(elements)
-    }
-
-    fn overwrite<T>(
-        &self,
-        layout: &Layout,
-        sparse: &Sparse,
-        elements: &mut [T],
-        read: impl Fn(&[u8]) -> T,
-    ) -> Result<(), Fault> {
-        let Sparse { count, indices, values, .. } = sparse;
+        let Some(Sparse { count, indices, values, .. }) = &layout.accessor.sparse else { return Ok(elements) };
         let Checked::Valid(index_type) = indices.component_type else {
             return Err(layout.wrong("unknown type of sparse indices".into()));
         };
@@ -232,7 +221,7 @@ impl<'a> Document<'a> {
             let slot = elements.get_mut(place);
             *slot.ok_or_else(|| layout.wrong(format!("sparse index {place} is out of range")))? = read(value);
         }
-        Ok(())
+        Ok(elements)
     }
 }
 

@@ -13,8 +13,8 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 use serde::Deserialize;
 
+use super::document::Document;
 use super::json::parsed;
-use crate::Limits;
 use crate::error::{Fault, at_most};
 
 /// The name of the extension.
@@ -44,13 +44,9 @@ struct Streams {
     bytes_left: u64,
 }
 
-/// The accessors of all compressed primitives, by their numbers. `view_bytes` returns the bytes of a buffer view; its second
-/// argument names the primitive. All streams together count against `limits`.
-pub(super) fn decode_all<'a>(
-    root: &Root,
-    limits: &Limits,
-    view_bytes: impl Fn(Index<View>, &str) -> Result<&'a [u8], Fault>,
-) -> Result<HashMap<usize, DecodedAccessor>, Fault> {
+/// The accessors of all compressed primitives, by their numbers. All streams together count against the limits.
+pub(super) fn decode_all(document: &Document) -> Result<HashMap<usize, DecodedAccessor>, Fault> {
+    let Document { root, limits, .. } = document;
     let mut streams = Streams {
         decoded: HashMap::new(),
         points_left: limits.vertices,
@@ -63,7 +59,7 @@ pub(super) fn decode_all<'a>(
             let Some(extension) = extension.filter(|_| is_needed(root, primitive, &streams.decoded)) else { continue };
             let element = format!("mesh {number}, primitive {part}, {NAME}");
             let compressed: Compressed = parsed(extension, &element)?;
-            let bytes = view_bytes(compressed.buffer_view, &element)?;
+            let (_, bytes) = document.view(compressed.buffer_view, &element)?;
             let mesh = streams.mesh(bytes, &element)?;
             streams.add_accessors(primitive, &compressed, &mesh, &element)?;
         }

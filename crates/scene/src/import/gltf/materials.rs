@@ -19,12 +19,12 @@ use crate::{DIELECTRIC_REFLECTANCE, Material};
 /// Fills the scene's materials, one more than the file's (its default), and its textures.
 pub(super) fn read(document: &Document, scene: &mut SourceScene) -> Result<(), Fault> {
     let materials = &document.root.materials;
-    let mut pictures = Pictures::default();
+    let mut pictures = Pictures::new(document);
     let mut uses = Vec::with_capacity(materials.len());
     for (number, material) in materials.iter().enumerate() {
-        uses.push(Uses::of(document, material, &mut pictures, &format!("material {number}"))?);
+        uses.push(Uses::of(material, &mut pictures, &format!("material {number}"))?);
     }
-    let encoded = pictures.encoded(document)?;
+    let encoded = pictures.encoded()?;
     let textures = decode_all(&encoded, document.limits, document.missing_textures)?;
     let means = &Means::of(&textures);
     for (number, (material, uses)) in materials.iter().zip(&uses).enumerate() {

@@ -8,7 +8,7 @@ use gltf::json::{Mesh as JsonMesh, Node};
 
 use super::super::source_scene::{SourceMesh, SourceScene};
 use super::document::Document;
-use super::primitives::{self, Geometry};
+use super::primitives::{Geometry, PrimitiveReader};
 use super::texture_coordinates::Coordinates;
 use super::textures::material_number;
 use crate::error::{Fault, at_most};
@@ -74,8 +74,8 @@ impl MeshReader<'_> {
             let element = format!("mesh {number}, primitive {part}");
             let coordinates = Coordinates::of_material(root, primitive.material)?;
             let material = material_number(root, primitive.material, &element)?;
-            let geometry = primitives::read(self.document, primitive, &coordinates, weights, &element)?;
-            let Some(Geometry { mesh, color_scale }) = geometry else { continue };
+            let reader = PrimitiveReader { document: self.document, primitive, weights, element: &element };
+            let Some(Geometry { mesh, color_scale }) = reader.read(&coordinates)? else { continue };
             self.warn_of_missing_coordinates(primitive, &coordinates, material, &element);
             at_most("materials", self.scene.materials.len() as u64, limits.attributes.saturating_add(1))?;
             let material = self.bright_material(material, color_scale);

@@ -35,7 +35,7 @@ pub(super) fn read(document: &Document, meshes: &Meshes, scene: &mut SourceScene
         if is_visible {
             place_mesh(document, meshes, node, &place, scene, &mut tree)?;
             if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
-                scene.lights.extend(lights::placed(document, light.light, &place.source_from_node, &place.element)?);
+                scene.lights.extend(lights::placed(document, light.light, &place)?);
             }
         }
         if node.camera.is_some() {
@@ -112,9 +112,9 @@ fn is_hidden(node: &Node) -> bool {
 }
 
 /// A node's name in messages, and its transform.
-struct Place {
-    element: String,
-    source_from_node: DAffine3,
+pub(super) struct Place {
+    pub element: String,
+    pub source_from_node: DAffine3,
 }
 
 fn place_mesh(

@@ -1,11 +1,11 @@
 //! Skins: joints of vertices, and where meshes are bound to them.
 
 use glam::{DAffine3, Mat4};
-use gltf::json::mesh::{Primitive, Semantic};
+use gltf::json::mesh::Semantic;
 use gltf::json::skin::Skin;
-use gltf::json::validation::Checked;
 
 use super::document::{Document, same_count};
+use super::primitives::PrimitiveReader;
 use super::transforms::affine_from;
 use crate::animation::Influence;
 use crate::error::{Fault, at_most};
@@ -18,18 +18,13 @@ const MOST_SETS: u32 = 4;
 /// Joints and weights of each vertex; empty for a primitive without. Of more than four joints the strongest four count, and
 /// weights are made to sum to 1. A vertex without weights has [`Influence::NONE`]. Vertices that no triangle uses are not
 /// checked.
-pub(super) fn influences(
-    document: &Document,
-    primitive: &Primitive,
-    indices: &[u32],
-    vertices: usize,
-    element: &str,
-) -> Result<Vec<Influence>, Fault> {
+pub(super) fn influences(reader: &PrimitiveReader, indices: &[u32], vertices: usize) -> Result<Vec<Influence>, Fault> {
+    let PrimitiveReader { document, element, .. } = reader;
     let mut shares: Vec<Vec<(f32, f32)>> = Vec::new();
     for set in 0..MOST_SETS {
-        let joints = primitive.attributes.get(&Checked::Valid(Semantic::Joints(set)));
-        let weights = primitive.attributes.get(&Checked::Valid(Semantic::Weights(set)));
-        let (Some(&joints), Some(&weights)) = (joints, weights) else { break };
+        let joints = reader.index(Semantic::Joints(set));
+        let weights = reader.index(Semantic::Weights(set));
+        let (Some(joints), Some(weights)) = (joints, weights) else { break };
         let joints = same_count(document.floats::<4>(joints, element)?, vertices, "JOINTS", element)?;
         let weights = same_count(document.floats::<4>(weights, element)?, vertices, "WEIGHTS", element)?;
         shares.resize(vertices, Vec::new());

@@ -100,7 +100,16 @@ impl Faces {
         materials: &[MaterialUse],
         import: &Import,
     ) -> Result<SourceMesh, Fault> {
-        let mut builder = Builder::new(attributes, self.material_names.len());
+        let mut builder = Builder {
+            attributes,
+            colors_srgba8: attributes.colors_srgba8(),
+            mesh: SourceMesh::default(),
+            triangles: vec![Triangles::default(); self.material_names.len()],
+            vertex_of_corner: HashMap::new(),
+            cutter: PolygonCutter::new(),
+            polygon_in_source: Vec::new(),
+            vertices: Vec::new(),
+        };
         let mut start = 0;
         for face in &self.faces {
             let corners = &self.corners[start..face.end];
@@ -150,20 +159,7 @@ struct Triangles {
     is_flat: Vec<bool>,
 }
 
-impl<'a> Builder<'a> {
-    fn new(attributes: &'a Attributes, material_count: usize) -> Self {
-        Self {
-            attributes,
-            colors_srgba8: attributes.colors_srgba8(),
-            mesh: SourceMesh::default(),
-            triangles: vec![Triangles::default(); material_count],
-            vertex_of_corner: HashMap::new(),
-            cutter: PolygonCutter::new(),
-            polygon_in_source: Vec::new(),
-            vertices: Vec::new(),
-        }
-    }
-
+impl Builder<'_> {
     fn add(&mut self, face: &Face, corners: &[Corner], material: MaterialUse, warnings: &Warnings) {
         let place = format_args!("line {} (f)", face.line);
         self.polygon_in_source.clear();

@@ -88,18 +88,25 @@ impl Surface {
 
     /// The triangles of texture 0, then of texture 1 and so on, whose materials have the same numbers; those without a texture
     /// come last.
-    pub(super) fn into_mesh(
-        self,
-        vertices: &Vertices,
-        texture_count: u32,
-        import: &Import,
-    ) -> Result<SourceMesh, Fault> {
-        let has_texture = texture_count > 0;
+    pub(super) fn into_mesh(self, vertices: &Vertices, textures: u32, import: &Import) -> Result<SourceMesh, Fault> {
+        let has_texture = textures > 0;
         let has_colors = vertices.colors != ColorRange::None || !self.colors.is_empty();
         if has_texture && has_colors {
             import.warnings.list("colours beside a texture are not shown", "vertex or face");
         }
-        let mut builder = Builder::new(&self, vertices, has_texture, texture_count as usize + 1);
+        let takes_face_colors = vertices.colors == ColorRange::None && !has_texture;
+        let mut builder = Builder {
+            surface: &self,
+            vertices,
+            colored: vertices.colored(),
+            face_colors_srgba8: if takes_face_colors { self.colors_srgba8() } else { Vec::new() },
+            has_texture,
+            mesh: SourceMesh::default(),
+            indices_of_material: vec![Vec::new(); textures as usize + 1],
+            number_of: HashMap::new(),
+            number_of_plain: vec![NO_VERTEX; vertices.positions_in_source.len()],
+            cutter: PolygonCutter::new(),
+        };
         let mut start = 0;
         for (number, face) in self.faces.iter().enumerate() {
             builder.add(number, face, start..face.end, &import.warnings);
@@ -145,23 +152,7 @@ struct Builder<'a> {
     cutter: PolygonCutter,
 }
 
-impl<'a> Builder<'a> {
-    fn new(surface: &'a Surface, vertices: &'a Vertices, has_texture: bool, material_count: usize) -> Self {
-        let takes_face_colors = vertices.colors == ColorRange::None && !has_texture;
-        Self {
-            surface,
-            vertices,
-            colored: vertices.colored(),
-            face_colors_srgba8: if takes_face_colors { surface.colors_srgba8() } else { Vec::new() },
-            has_texture,
-            mesh: SourceMesh::default(),
-            indices_of_material: vec![Vec::new(); material_count],
-            number_of: HashMap::new(),
-            number_of_plain: vec![NO_VERTEX; vertices.positions_in_source.len()],
-            cutter: PolygonCutter::new(),
-        }
-    }
-
+impl Builder<'_> {
     fn add(&mut self, number: usize, face: &Face, corners: std::ops::Range<usize>, warnings: &Warnings) {
         let place = format_args!("face {}", face.row);
         let positions = self.surface.corners[corners.clone()].iter();
