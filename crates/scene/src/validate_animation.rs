@@ -4,9 +4,7 @@ use std::collections::HashSet;
 
 use glam::Quat;
 
-use crate::animation::{
-    Animation, Channel, Clip, Influence, MovingInstance, Node, NodeTransform, Property, TransformParts,
-};
+use crate::animation::{Animation, Channel, Influence, MovingInstance, Node, NodeTransform, Property, TransformParts};
 use crate::error::{Fault, at_most};
 use crate::validate::{each, ensure, is_near, require};
 use crate::{Limits, Scene};
@@ -23,7 +21,12 @@ impl Scene {
         let are_in_order = nodes.all(|(number, node)| node.parent.is_none_or(|parent| parent < number));
         require(are_in_order, "animation, nodes", "a parent is not before its child")?;
         each("animation, node", &animation.nodes, check_node)?;
-        each("clip", &animation.clips, |clip| check_clip(clip, &animation.nodes))?;
+        each("clip", &animation.clips, |clip| {
+            let mut channels = clip.channels.iter().enumerate();
+            channels.try_for_each(|(number, channel)| {
+                check_channel(channel, &animation.nodes).map_err(|why| format!("channel {number}: {why}"))
+            })
+        })?;
         let is_there = animation.playing.is_none_or(|playing| (playing as usize) < animation.clips.len());
         require(is_there, "animation, playing", "the clip does not exist")?;
         require(animation.world_from_source.is_finite(), "animation, world_from_source", "not finite")?;
@@ -89,15 +92,8 @@ fn check_node(node: &Node) -> Result<(), String> {
     ensure(is_rest_valid, || "its transform is not finite, or its rotation no unit quaternion".into())
 }
 
-fn check_clip(clip: &Clip, nodes: &[Node]) -> Result<(), String> {
-    for (number, channel) in clip.channels.iter().enumerate() {
-        check_channel(channel, nodes).map_err(|why| format!("channel {number}: {why}"))?;
-    }
-    Ok(())
-}
-
 /// The reason for which a channel cannot be played.
-pub(crate) fn check_channel(channel: &Channel, nodes: &[Node]) -> Result<(), String> {
+fn check_channel(channel: &Channel, nodes: &[Node]) -> Result<(), String> {
     let node = nodes.get(channel.node as usize);
     let has_parts = node.is_some_and(|node| matches!(node.rest, NodeTransform::Parts(_)));
     ensure(has_parts, || format!("node {} does not exist, or is fixed", channel.node))?;

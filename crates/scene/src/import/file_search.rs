@@ -145,9 +145,9 @@ fn resolved(folder: &Folder, base: &Path, parts: &[&[u8]], matching: Matching) -
         relative.push(name);
     }
     let is_normal = relative.components().all(|c| matches!(c, Component::Normal(_)));
-    match folder.root().join(&relative).canonicalize() {
+    match folder.root.join(&relative).canonicalize() {
         _ if parts.is_empty() || !is_normal => Found::Missing,
-        Ok(path) if !path.starts_with(folder.root()) => Found::Outside("is a link that leaves the scene's folder"),
+        Ok(path) if !path.starts_with(&folder.root) => Found::Outside("is a link that leaves the scene's folder"),
         Ok(path) if path.is_file() => Found::File(relative),
         _ => Found::Missing,
     }
@@ -158,7 +158,7 @@ fn entry_name(folder: &Folder, relative: &Path, part: &[u8], matching: Matching)
     if part.contains(&0) {
         return None;
     }
-    let path = folder.root().join(relative);
+    let path = folder.root.join(relative);
     let exact = os_name(part).filter(|name| path.join(name).symlink_metadata().is_ok());
     if exact.is_some() || matching == Matching::Exact {
         return exact;

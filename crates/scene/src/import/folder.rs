@@ -13,7 +13,8 @@ use crate::{Limits, SceneErrorKind};
 
 /// A scene's folder. No file outside it is read, and the bytes of all files together are limited.
 pub(crate) struct Folder {
-    canonical_root: PathBuf,
+    /// The folder's path, without links.
+    pub(crate) root: PathBuf,
     bytes_left: Cell<u64>,
     /// The names in folders that were searched, by the folder's path below this one.
     listings: RefCell<HashMap<PathBuf, Rc<Listing>>>,
@@ -23,9 +24,9 @@ impl Folder {
     /// Opens the folder of the scene file `path`; returns it with that file's bytes.
     pub(crate) fn open(path: &Path, limits: &Limits) -> Result<(Self, Vec<u8>), Fault> {
         let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let canonical_root = parent.canonicalize().map_err(|e| Fault::io("folder", e))?;
+        let root = parent.canonicalize().map_err(|e| Fault::io("folder", e))?;
         let bytes_left = Cell::new(limits.file_bytes);
-        let folder = Self { canonical_root, bytes_left, listings: RefCell::default() };
+        let folder = Self { root, bytes_left, listings: RefCell::default() };
         let bytes = folder.read_path("file", path)?;
         Ok((folder, bytes))
     }
@@ -40,26 +41,21 @@ impl Folder {
         self.read_relative(element, Path::new(&relative))
     }
 
-    /// The folder's path, without links.
-    pub(crate) fn root(&self) -> &Path {
-        &self.canonical_root
-    }
-
     /// The names in a folder below this one, which is read once.
     pub(super) fn listing(&self, relative: &Path) -> Rc<Listing> {
         let mut listings = self.listings.borrow_mut();
         if let Some(listing) = listings.get(relative) {
             return Rc::clone(listing);
         }
-        let listing = Rc::new(Listing::read(&self.canonical_root.join(relative)));
+        let listing = Rc::new(Listing::read(&self.root.join(relative)));
         listings.insert(relative.to_owned(), Rc::clone(&listing));
         listing
     }
 
     /// Reads a file by a path below this folder, as a search finds it.
     pub(crate) fn read_relative(&self, element: &str, relative: &Path) -> Result<Vec<u8>, Fault> {
-        let path = self.canonical_root.join(relative).canonicalize().map_err(|e| Fault::io(element, e))?;
-        if !path.starts_with(&self.canonical_root) {
+        let path = self.root.join(relative).canonicalize().map_err(|e| Fault::io(element, e))?;
+        if !path.starts_with(&self.root) {
             let name = relative.display().to_string();
             return Err(Fault::forbidden(element, &name, "is a link that leaves the scene's folder"));
         }

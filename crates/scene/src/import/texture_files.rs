@@ -23,17 +23,17 @@ pub(crate) struct TextureReference<'n> {
     pub element: String,
     /// Spellings of the file's name. The last one is that of messages.
     pub names: Vec<&'n [u8]>,
-    /// Folders relative to the scene's folder, in which the file is looked for in turn.
-    pub bases: Vec<&'n Path>,
+    /// A folder relative to the scene's folder, in which the file is looked for before that.
+    pub base: &'n Path,
     pub content: Content,
 }
 
 impl TextureFiles {
     /// Reads the file unless it is known, and returns its number.
     pub(crate) fn number_of(&mut self, reference: TextureReference, import: &Import) -> Result<u32, Fault> {
-        let TextureReference { element, names, bases, content } = reference;
+        let TextureReference { element, names, base, content } = reference;
         let name = names.last().map(|name| decoded(name).into_owned()).unwrap_or_default();
-        let (file, bytes) = match search(&import.folder, &bases, &names, &import.warnings) {
+        let (file, bytes) = match search(&import.folder, &[base, Path::new("")], &names, &import.warnings) {
             Found::File(path) => {
                 let file = path.display().to_string();
                 if let Some(&number) = self.number_of.get(&(file.clone(), content)) {

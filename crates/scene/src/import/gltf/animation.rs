@@ -112,7 +112,12 @@ impl<'d> Skins<'d> {
         self.influences_left -= vertices;
         let element = format!("skin {}", index.value());
         let matrices = skins::bind_matrices(self.document, skin, &element)?;
-        check_influences(&mesh.influences, skin.joints.len(), &element)?;
+        for (vertex, influence) in mesh.influences.iter().enumerate() {
+            if let Some((joint, _)) = influence.shares().find(|(joint, _)| *joint >= skin.joints.len()) {
+                let why = format!("joint {joint} is beyond the skin's {}", skin.joints.len());
+                return Err(Fault::malformed(format_args!("{element}, vertex {vertex}"), why));
+            }
+        }
         let mut joints = Vec::with_capacity(skin.joints.len());
         for (number, (joint, joint_from_mesh)) in skin.joints.iter().zip(matrices).enumerate() {
             let Some(node) = self.place_in_tree.get(joint.value()).copied().flatten() else {
@@ -163,16 +168,6 @@ fn at_rest(tree: &NodeTree, joints: &[Joint], element: &str) -> Result<DAffine3,
         .find(is_invertible)
         .or(first_place)
         .ok_or_else(|| Fault::malformed(element, "the transforms of all its joints are not finite"))
-}
-
-fn check_influences(influences: &[Influence], joints: usize, skin: &str) -> Result<(), Fault> {
-    for (vertex, influence) in influences.iter().enumerate() {
-        if let Some((joint, _)) = influence.shares().find(|(joint, _)| *joint >= joints) {
-            let why = format!("joint {joint} is beyond the skin's {joints}");
-            return Err(Fault::malformed(format_args!("{skin}, vertex {vertex}"), why));
-        }
-    }
-    Ok(())
 }
 
 /// Copies the nodes that joints follow, with all above them, and renumbers joints and channels. Channels of other nodes

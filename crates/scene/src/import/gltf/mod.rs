@@ -41,11 +41,9 @@ mod transforms;
 use std::borrow::Cow;
 
 use gltf::binary::Glb;
-use gltf::json::Root;
 
 use super::Import;
 use super::source_scene::SourceScene;
-use crate::Limits;
 use crate::error::{Fault, at_most};
 use document::Document;
 
@@ -56,7 +54,10 @@ pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> 
     let (json, binary_chunk) = if bytes.starts_with(GLB_MAGIC) { split(bytes)? } else { (bytes, None) };
     let root = json::parse(json, import.limits, &import.warnings)?;
     extensions::check(&root, import)?;
-    check_counts(&root, import.limits)?;
+    at_most("nodes", root.nodes.len() as u64, import.limits.nodes)?;
+    at_most("meshes", root.meshes.len() as u64, import.limits.nodes)?;
+    at_most("materials", root.materials.len() as u64, import.limits.attributes)?;
+    at_most("images", root.images.len() as u64, import.limits.attributes)?;
     let document = Document::open(&root, binary_chunk, import)?;
     let mut scene = SourceScene::default();
     materials::read(&document, &mut scene)?;
@@ -93,11 +94,4 @@ fn borrowed(chunk: Cow<'_, [u8]>) -> Option<&[u8]> {
         Cow::Borrowed(slice) => Some(slice),
         Cow::Owned(_) => None,
     }
-}
-
-fn check_counts(root: &Root, limits: &Limits) -> Result<(), Fault> {
-    at_most("nodes", root.nodes.len() as u64, limits.nodes)?;
-    at_most("meshes", root.meshes.len() as u64, limits.nodes)?;
-    at_most("materials", root.materials.len() as u64, limits.attributes)?;
-    at_most("images", root.images.len() as u64, limits.attributes)
 }

@@ -33,13 +33,6 @@ const UNREAD: [UnreadFormat; 2] = [
     },
 ];
 
-impl UnreadFormat {
-    fn reason(&self) -> String {
-        let Self { name, extension, advice, .. } = self;
-        format!("pictures in {name} ({extension}), which are not read: materials show their factors{advice}")
-    }
-}
-
 /// The image of a texture: in WebP, where the file has it in another format, too; in KTX2 where it has no other. The error is
 /// the reason for which there is none, with advice.
 pub(super) fn image_of(document: &Document, texture: &JsonTexture) -> Result<Index<Image>, String> {
@@ -60,7 +53,10 @@ pub(super) fn image_of(document: &Document, texture: &JsonTexture) -> Result<Ind
         }
     }
     let format = by_content.or_else(|| UNREAD.iter().find(|format| of_extension(format.extension).is_some()));
-    Err(format.map_or_else(|| "textures without a picture: materials show their factors".into(), UnreadFormat::reason))
+    let Some(UnreadFormat { name, extension, advice, .. }) = format else {
+        return Err("textures without a picture: materials show their factors".into());
+    };
+    Err(format!("pictures in {name} ({extension}), which are not read: materials show their factors{advice}"))
 }
 
 /// The format of an image, by what the file says of it and by its first bytes.

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::super::Import;
 use super::super::normals;
-use super::super::polygons::{PolygonCutter, TOO_COSTLY};
+use super::super::polygons::{NOT_FINITE, PolygonCutter, TOO_COSTLY, TOO_SHORT};
 use super::super::source_scene::SourceMesh;
 use super::super::warnings::Warnings;
 use super::attributes::{Attributes, Corner, NONE};
@@ -15,9 +15,7 @@ use super::map::UvTransform;
 use super::text::Line;
 use crate::error::{Fault, at_most};
 
-const TOO_SHORT: &str = "faces of fewer than three corners are left out";
 const UNREADABLE: &str = "faces with a corner that is no vertex of the file are left out";
-const NOT_FINITE: &str = "faces with a vertex that is not finite are left out";
 const TEXTURE_WITHOUT_COORDINATES: &str = "textures without coordinates show one texel";
 const WITHOUT_ATTRIBUTES: &str = "texture coordinates and normals that the file does not have are dropped";
 

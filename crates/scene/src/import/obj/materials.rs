@@ -141,8 +141,7 @@ impl Textures {
     fn number_of(&mut self, entry: &Entry, import: &Import) -> Result<u32, Fault> {
         let mut file = |map: &TextureMap, content| {
             let names = map.names.iter().map(Vec::as_slice).collect();
-            let bases = vec![&*entry.folder, Path::new("")];
-            let reference = TextureReference { element: map.place.clone(), names, bases, content };
+            let reference = TextureReference { element: map.place.clone(), names, base: &entry.folder, content };
             self.files.number_of(reference, import)
         };
         let color = entry.color_map.as_ref().map(|map| file(map, Content::Colors)).transpose()?;

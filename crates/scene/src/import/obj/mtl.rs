@@ -116,16 +116,15 @@ impl Entry {
     /// `d`, or else `Tr`. MeshLab and openMVS write `Tr 1` for an opaque material, where others write `Tr 0`: 1 alone counts as
     /// transparent only where another statement is a sign of it.
     fn opacity(&self, name: &str, warnings: &Warnings) -> f32 {
+        let has_glass_model = matches!(self.model, Some(4 | 6 | 7 | 9));
         let opacity = match (self.opacity, self.transparency) {
             (Some(opacity), _) => opacity,
-            (None, Some(transparency)) => {
-                let has_glass_model = matches!(self.model, Some(4 | 6 | 7 | 9));
-                if transparency >= 1.0 && self.alpha_map.is_none() && !has_glass_model {
-                    warnings.list("materials with Tr 1 alone count as opaque", name);
-                    1.0
-                } else {
-                    1.0 - transparency
-                }
+            (None, Some(transparency)) if transparency < 1.0 || self.alpha_map.is_some() || has_glass_model => {
+                1.0 - transparency
+            }
+            (None, Some(_)) => {
+                warnings.list("materials with Tr 1 alone count as opaque", name);
+                1.0
             }
             (None, None) => 1.0,
         };

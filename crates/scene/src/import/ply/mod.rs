@@ -61,8 +61,8 @@ fn read_textures(names: &[&[u8]], import: &Import, scene: &mut SourceScene) -> R
     for name in names {
         let shown_name = decoded(name).into_owned();
         let element = format!("TextureFile {shown_name}");
-        let bases = vec![Path::new("")];
-        let reference = TextureReference { element, names: vec![name], bases, content: Content::Colors };
+        let base = Path::new("");
+        let reference = TextureReference { element, names: vec![name], base, content: Content::Colors };
         let texture = files.number_of(reference, import)?;
         let base_color_texture = Some(TextureUse::from(texture));
         let material = Material { name: shown_name, double_sided: true, base_color_texture, ..Material::default() };
@@ -82,50 +82,36 @@ fn read_elements(mut reader: PlyReader<impl BufRead>, import: &Import) -> Result
             "vertex" => {
                 vertices.colors = color_range(element);
                 vertices.has_uvs = element.has_property("s");
-                let read = each_row(&mut reader, |row: VertexRow| {
-                    vertices.push(&row, warnings);
-                    Ok(())
-                });
-                read.map_err(|why| Fault::malformed(format!("vertex {}", vertices.positions_in_source.len()), why))?;
+                each_row(&mut reader, |row: VertexRow| vertices.push(&row, warnings))
+                    .map_err(|why| Fault::malformed(format!("vertex {}", vertices.positions_in_source.len()), why))?;
             }
             "face" | "tristrips" => {
                 let are_strips = name == "tristrips";
                 surface.set_colors(color_range(element));
                 let mut row_number = 0u64;
                 let read = each_row(&mut reader, |row: FaceRow| {
-                    if are_strips {
+                    // A file over the limit is refused below: further rows would only take memory.
+                    let is_within_limit = surface.triangle_count <= limits.triangles;
+                    if is_within_limit && are_strips {
                         surface.push_strips(&row.vertex_indices);
-                    } else {
+                    } else if is_within_limit {
                         surface.push(&row, row_number, warnings);
                     }
                     row_number += 1;
-                    if surface.triangle_count > limits.triangles { Err(TOO_MANY.to_owned()) } else { Ok(()) }
                 });
                 at_most("triangles", surface.triangle_count, limits.triangles)?;
                 read.map_err(|why| Fault::malformed(format!("{name} {row_number}"), why))?;
             }
-            _ => each_row(&mut reader, |_: SkippedRow| Ok(())).map_err(|why| Fault::malformed(&name, why))?,
+            _ => each_row(&mut reader, |_: SkippedRow| ()).map_err(|why| Fault::malformed(&name, why))?,
         }
     }
     Ok((vertices, surface))
 }
 
-const TOO_MANY: &str = "too many triangles";
-
-/// Passes the rows of the reader's next element to `take`, up to the first that it refuses.
+/// Passes the rows of the reader's next element to `take`.
 fn each_row<'de, R: BufRead, T: Deserialize<'de>>(
     mut reader: &mut PlyReader<R>,
-    mut take: impl FnMut(T) -> Result<(), String>,
+    take: impl FnMut(T),
 ) -> Result<(), String> {
-    let mut refused = None;
-    let mut visitor = RowVisitor::new(|row| {
-        if refused.is_none() {
-            refused = take(row).err();
-        }
-    });
-    let read = reader.next_value_seed(&mut visitor);
-    match refused {
-        Some(why) => Err(why),
-        None => read.map_err(|e| e.0.to_string()),
-    }
+    reader.next_value_seed(&mut RowVisitor::new(take)).map_err(|e| e.0.to_string())
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::super::Import;
-use super::super::polygons::{PolygonCutter, TOO_COSTLY};
+use super::super::polygons::{NOT_FINITE, PolygonCutter, TOO_COSTLY, TOO_SHORT};
 use super::super::source_scene::SourceMesh;
 use super::super::vertex_colors::{bytes, scale_to_bytes};
 use super::super::warnings::Warnings;
@@ -13,9 +13,7 @@ use super::vertices::{Vertices, v_downwards};
 use crate::Vertex;
 use crate::error::{Fault, at_most};
 
-const TOO_SHORT: &str = "faces of fewer than three corners are left out";
 const UNKNOWN_VERTEX: &str = "faces with a vertex that is not there are left out";
-const NOT_FINITE: &str = "faces with a vertex that is not finite are left out";
 
 /// The number of a vertex that no file has.
 const NO_VERTEX: u32 = u32::MAX;

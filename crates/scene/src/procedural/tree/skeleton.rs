@@ -116,10 +116,6 @@ impl Branch {
         let after = self.at(t + 0.05);
         (after.position - before.position).normalize_or(Vec3::Y)
     }
-
-    pub(super) fn length_m(&self) -> f32 {
-        self.knots.windows(2).map(|w| w[0].position.distance(w[1].position)).sum()
-    }
 }
 
 fn grow(level: usize, foot: Knot, direction: Vec3, length: f32, rng: &mut Rng) -> Branch {
@@ -147,7 +143,7 @@ fn children_of(parent: &Branch, rng: &mut Rng) -> Vec<Branch> {
     if children == 0 {
         return Vec::new();
     }
-    let parent_length = parent.length_m();
+    let parent_length = parent.knots.windows(2).map(|w| w[0].position.distance(w[1].position)).sum::<f32>();
     let first_turn = rng.between(0.0, std::f32::consts::TAU);
     let branches = (0..children).map(|i| {
         let u = (i as f32 + rng.between(0.1, 0.9)) / children as f32;

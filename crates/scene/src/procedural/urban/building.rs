@@ -50,7 +50,21 @@ fn add_body(builder: &mut MeshBuilder, min: Vec3, max: Vec3, windows: f32, color
     // Columns are as wide on all four sides.
     let share = 2.0 / (size.x + size.z);
     let columns = [size.x * share, size.z * share].map(|side| (columns * side).round().max(1.0) as u32);
-    add_walls(builder, [min, max], rows as u32, columns, color_srgb, rng);
+    // Each from its lower left corner to the right.
+    let walls = [
+        (Vec3::new(min.x, min.y, max.z), Vec3::X * (max.x - min.x), columns[0]),
+        (Vec3::new(max.x, min.y, max.z), Vec3::NEG_Z * (max.z - min.z), columns[1]),
+        (Vec3::new(max.x, min.y, min.z), Vec3::NEG_X * (max.x - min.x), columns[0]),
+        (Vec3::new(min.x, min.y, min.z), Vec3::Z * (max.z - min.z), columns[1]),
+    ];
+    for (corner, right, columns) in walls {
+        let right = right / columns as f32;
+        let up = Vec3::Y * ((max.y - min.y) / rows);
+        for (row, column) in (0..rows as u32).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+            let tint = if row == 0 { 0.8 } else { 1.0 };
+            add_cell(builder, corner + right * column as f32 + up * row as f32, right, up, color_srgb * tint, rng);
+        }
+    }
     let roof_m = Vec3::new(0.0, 0.0, size.z * 0.5);
     let middle = (min + max) * 0.5;
     let roof = Vec3::new(middle.x, max.y, middle.z);
@@ -74,33 +88,6 @@ fn add_frame(builder: &mut MeshBuilder, [min, max]: [Vec3; 2], y_m: [f32; 2], re
         },
         |_, _| color,
     );
-}
-
-/// The walls of an upright box, divided into rows and columns with a window each. The first number of columns is that
-/// of the walls across x, the second of those across z.
-fn add_walls(
-    builder: &mut MeshBuilder,
-    [min, max]: [Vec3; 2],
-    rows: u32,
-    columns: [u32; 2],
-    color_srgb: Vec3,
-    rng: &mut Rng,
-) {
-    // Each from its lower left corner to the right.
-    let walls = [
-        (Vec3::new(min.x, min.y, max.z), Vec3::X * (max.x - min.x), columns[0]),
-        (Vec3::new(max.x, min.y, max.z), Vec3::NEG_Z * (max.z - min.z), columns[1]),
-        (Vec3::new(max.x, min.y, min.z), Vec3::NEG_X * (max.x - min.x), columns[0]),
-        (Vec3::new(min.x, min.y, min.z), Vec3::Z * (max.z - min.z), columns[1]),
-    ];
-    for (corner, right, columns) in walls {
-        let right = right / columns as f32;
-        let up = Vec3::Y * ((max.y - min.y) / rows as f32);
-        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
-            let tint = if row == 0 { 0.8 } else { 1.0 };
-            add_cell(builder, corner + right * column as f32 + up * row as f32, right, up, color_srgb * tint, rng);
-        }
-    }
 }
 
 /// A piece of wall with a window: 18 triangles. It shares its neighbours' corners, so that no gap shows.
