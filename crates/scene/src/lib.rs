@@ -24,7 +24,6 @@ pub mod procedural;
 mod spec;
 mod up_axis;
 mod validate;
-mod validate_animation;
 
 pub use animation::{
     Animation, Channel, Clip, Influence, Interpolation, Joint, MovingInstance, Node, NodeTransform, Property,

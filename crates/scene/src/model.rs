@@ -87,12 +87,6 @@ impl Scene {
         Ok(())
     }
 
-    /// Returns whether the picture depends on scene time.
-    #[must_use]
-    pub fn is_animated(&self) -> bool {
-        self.period_s().is_some()
-    }
-
     /// The time after which the motion repeats, seconds: that of the clip that plays, or else of the wind. `None` where
     /// nothing moves.
     #[must_use]

@@ -77,17 +77,13 @@ fn scene_from_bytes(bytes: &[u8], limits: &Limits) -> Result<Scene, Fault> {
         return Err(Fault::unsupported("version", format!("package version {version}")));
     }
     let header_bytes = u32::from_le_bytes(reader.array("header length")?);
-    let header = read_header(reader.take("header", u64::from(header_bytes))?)?;
+    let header = match postcard::take_from_bytes(reader.take("header", u64::from(header_bytes))?) {
+        Ok((header, [])) => header,
+        Ok(_) => return Err(Fault::malformed("header", "it is longer than its contents")),
+        Err(e) => return Err(Fault::malformed("header", e.to_string())),
+    };
     let scene = read_arrays(header, &mut reader, limits)?;
     if reader.rest.is_empty() { Ok(scene) } else { Err(Fault::malformed("end", "bytes follow the last array")) }
-}
-
-fn read_header(bytes: &[u8]) -> Result<Header<Scene>, Fault> {
-    match postcard::take_from_bytes(bytes) {
-        Ok((header, [])) => Ok(header),
-        Ok(_) => Err(Fault::malformed("header", "it is longer than its contents")),
-        Err(e) => Err(Fault::malformed("header", e.to_string())),
-    }
 }
 
 fn read_arrays(header: Header<Scene>, reader: &mut Reader, limits: &Limits) -> Result<Scene, Fault> {

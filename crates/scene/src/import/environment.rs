@@ -25,7 +25,7 @@ const MAX_RADIANCE: f32 = 65_408.0;
 /// # Errors
 /// The file, the element at fault, and the reason.
 pub fn load_environment(path: &Path) -> Result<EnvironmentMap, SceneError> {
-    read(path).map_err(|fault| fault.in_path(path))
+    read(path).map_err(|fault| fault.in_file(path.display().to_string()))
 }
 
 fn read(path: &Path) -> Result<EnvironmentMap, Fault> {

@@ -84,7 +84,7 @@ fn by_last_part(folder: &Folder, bases: &[&Path], names: &[&[u8]], warnings: &Wa
     for matching in [Matching::Exact, Matching::Loose] {
         for name in names {
             let parts = ReferredName::parse(name).parts;
-            let Some(last) = parts.last().filter(|last| !is_special(last)) else { continue };
+            let Some(last) = parts.last().filter(|last| **last != b".." && !last.contains(&0)) else { continue };
             for base in bases {
                 if let Found::File(path) = resolved(folder, base, &[last], matching) {
                     let name = shortened(decoded(name).into_owned());
@@ -119,10 +119,6 @@ impl<'n> ReferredName<'n> {
 
 fn is_separator(byte: &u8) -> bool {
     matches!(byte, b'/' | b'\\')
-}
-
-fn is_special(part: &[u8]) -> bool {
-    part == b".." || part.contains(&0)
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]

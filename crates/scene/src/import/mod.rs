@@ -44,7 +44,7 @@ use warnings::Warnings;
 pub fn load_file(path: &Path, limits: &Limits, options: impl Into<ImportOptions>) -> Result<Scene, SceneError> {
     let _importing = tracing::warn_span!("import", file = %path.display()).entered();
     let scene = read_source(path, limits, &options.into()).and_then(|source| source.finish(limits));
-    scene.map_err(|fault| fault.in_path(path))
+    scene.map_err(|fault| fault.in_file(path.display().to_string()))
 }
 
 /// What the readers of all formats share: where files are, how large they may be, and where warnings go.

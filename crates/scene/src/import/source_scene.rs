@@ -7,7 +7,7 @@ use glam::{Affine3A, DAffine3, DVec3};
 use super::extent::{Box3, DRAWABLE_MESH_EXTENT, recentring_offset, scale_to_drawable, source_space};
 use crate::animation::{Animation, Influence, MovingInstance};
 use crate::error::{Fault, at_most};
-use crate::light_rig::{DEFAULT_BACKGROUND, color, position_mut, scale_to_metres};
+use crate::light_rig::{DEFAULT_BACKGROUND, position_mut, scale_to_metres};
 use crate::{
     Environment, Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, SourceSpace,
     Texture, Vertex, VertexDetail,
@@ -75,7 +75,9 @@ impl SourceScene {
         let source_space = source_space(self.bounds_in_source(), self.animation.is_some())?;
         self.unmirror();
         let lights = self.lights.iter().map(|l| l.placed_in(source_space)).collect();
-        let world_from_source = world_from_source(source_space);
+        let SourceSpace { origin_in_source, metres_per_unit } = source_space;
+        let world_from_source =
+            DAffine3::from_scale(DVec3::splat(metres_per_unit)) * DAffine3::from_translation(-origin_in_source);
         let instances = self.instances.iter().map(|i| Instance {
             mesh: i.mesh as u32,
             world_from_mesh: in_f32(&(world_from_source * i.source_from_mesh)),
@@ -245,14 +247,6 @@ impl SourceMesh {
 }
 
 impl SourceLight {
-    /// Unoccluded irradiance at a point, with spots aimed at it; distances count as at least `least_distance`, in the file's
-    /// unit.
-    pub(crate) fn arriving_at(&self, point_in_source: DVec3, least_distance: f64) -> DVec3 {
-        let color = color(self.light).as_dvec3();
-        let distance = self.position_in_source.distance(point_in_source).max(least_distance);
-        if matches!(self.light, Light::Directional { .. }) { color } else { color / (distance * distance) }
-    }
-
     fn placed_in(&self, source_space: SourceSpace) -> Light {
         let mut light = self.light;
         if let Some(position) = position_mut(&mut light) {
@@ -261,10 +255,6 @@ impl SourceLight {
         scale_to_metres(&mut light, source_space.metres_per_unit);
         light
     }
-}
-
-fn world_from_source(SourceSpace { origin_in_source, metres_per_unit }: SourceSpace) -> DAffine3 {
-    DAffine3::from_scale(DVec3::splat(metres_per_unit)) * DAffine3::from_translation(-origin_in_source)
 }
 
 fn in_f32(transform: &DAffine3) -> Affine3A {

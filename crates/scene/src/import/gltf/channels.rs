@@ -11,7 +11,7 @@ use gltf::json::validation::Checked;
 use super::document::Document;
 use crate::animation::{Channel, Clip, Interpolation, Property};
 use crate::error::{Fault, at_most};
-use crate::validate_animation::check_times;
+use crate::validate::check_times;
 
 /// All clips of a file. `Channel::node` is the file's number of the node.
 pub(super) fn read(document: &Document) -> Result<Vec<Clip>, Fault> {

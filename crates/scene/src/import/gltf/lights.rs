@@ -14,7 +14,7 @@ use super::document::Document;
 use super::nodes::Place;
 use crate::Light;
 use crate::error::Fault;
-use crate::light_rig::{color_mut, scaled};
+use crate::light_rig::{color as color_of, color_mut, scaled};
 
 /// Range of the largest channel of irradiance at the middle of a scene that is not exposed: two stops to either side of
 /// white.
@@ -101,7 +101,13 @@ pub(super) fn expose(scene: &mut SourceScene) {
     let bounds = scene.bounds_in_source();
     let diagonal = bounds.diagonal();
     let least = if diagonal > 0.0 { diagonal * LEAST_DISTANCE_IN_DIAGONALS } else { LEAST_DISTANCE_FROM_POINT };
-    let arriving: DVec3 = scene.lights.iter().map(|light| light.arriving_at(bounds.center(), least)).sum();
+    // Unoccluded irradiance, with spots aimed at the middle.
+    let arriving = scene.lights.iter().map(|SourceLight { light, position_in_source }| {
+        let color = color_of(*light).as_dvec3();
+        let distance = position_in_source.distance(bounds.center()).max(least);
+        if matches!(light, Light::Directional { .. }) { color } else { color / (distance * distance) }
+    });
+    let arriving: DVec3 = arriving.sum();
     let most = arriving.max_element();
     if most > 0.0 && most.is_finite() && !UNEXPOSED.contains(&most) {
         for light in &mut scene.lights {

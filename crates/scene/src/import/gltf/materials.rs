@@ -1,7 +1,5 @@
 //! Materials.
 
-use std::ops::RangeInclusive;
-
 use glam::{Vec3, Vec4};
 use gltf::json::material::{AlphaMode, Material as JsonMaterial};
 use gltf::json::validation::Checked;
@@ -86,16 +84,16 @@ impl MaterialReader<'_> {
             metallic_roughness_texture: uses.texture(METALLIC_ROUGHNESS),
             dielectric_reflectance_linear: reflectance,
             normal_texture: uses.texture(NORMAL),
-            normal_scale: self.clamped("normal scale", scale, f32::MIN..=f32::MAX)?,
+            normal_scale: self.finite("normal scale", scale)?,
             occlusion_texture: uses.texture(OCCLUSION),
-            occlusion_strength: self.clamped("occlusion strength", strength, 0.0..=1.0)?,
+            occlusion_strength: self.clamped("occlusion strength", strength, 1.0)?,
             emissive_linear: self.emissive()?,
             emissive_texture: uses.texture(EMISSIVE),
             phong_specular,
             phong_exponent,
             alpha_cutoff: match alpha_mode {
                 AlphaMode::Mask => {
-                    self.clamped("alpha cutoff", material.alpha_cutoff.map_or(0.5, |c| c.0), 0.0..=f32::MAX)?
+                    self.clamped("alpha cutoff", material.alpha_cutoff.map_or(0.5, |c| c.0), f32::MAX)?
                 }
                 AlphaMode::Opaque | AlphaMode::Blend => 0.0,
             },
@@ -108,10 +106,10 @@ impl MaterialReader<'_> {
 
     fn metallic_roughness_surface(&self) -> Result<Surface, Fault> {
         let pbr = &self.material.pbr_metallic_roughness;
-        let base_color = self.all_clamped("base colour", pbr.base_color_factor.0, 0.0..=1.0)?;
+        let base_color = self.all_clamped("base colour", pbr.base_color_factor.0, 1.0)?;
         let reflectance = self.dielectric_reflectance()?;
-        let metallic = self.clamped("metallic", pbr.metallic_factor.0, 0.0..=1.0)?;
-        let roughness = self.clamped("roughness", pbr.roughness_factor.0, 0.0..=1.0)?;
+        let metallic = self.clamped("metallic", pbr.metallic_factor.0, 1.0)?;
+        let roughness = self.clamped("roughness", pbr.roughness_factor.0, 1.0)?;
         let factors = [metallic, roughness];
         let Some(place) = self.uses.place(METALLIC_ROUGHNESS) else {
             return Ok(Surface { base_color, reflectance, factors, mean_factors: factors });
@@ -124,9 +122,9 @@ impl MaterialReader<'_> {
     }
 
     fn specular_glossiness_surface(&self, json: &SpecularGlossiness) -> Result<Surface, Fault> {
-        let [r, g, b, alpha] = self.all_clamped("diffuse colour", json.diffuse_factor, 0.0..=1.0)?;
-        let specular = self.all_clamped("specular colour", json.specular_factor, 0.0..=1.0)?;
-        let glossiness = self.clamped("glossiness", json.glossiness_factor, 0.0..=1.0)?;
+        let [r, g, b, alpha] = self.all_clamped("diffuse colour", json.diffuse_factor.unwrap_or([1.0; 4]), 1.0)?;
+        let specular = self.all_clamped("specular colour", json.specular_factor.unwrap_or([1.0; 3]), 1.0)?;
+        let glossiness = self.clamped("glossiness", json.glossiness_factor.unwrap_or(1.0), 1.0)?;
         let of_texture = self.uses.specular_glossiness.map_or(Vec4::ONE, |place| self.means.linear(place));
         let reflectance = Vec3::from(specular) * of_texture.truncate();
         let factors = [0.0, 1.0 - glossiness * of_texture.w];
@@ -142,16 +140,15 @@ impl MaterialReader<'_> {
         let Self { uses, means, .. } = self;
         let extensions = self.material.extensions.as_ref();
         let ior = extensions.and_then(|e| e.ior.as_ref());
-        let from_ior = match ior.map(|ior| self.clamped("ior", ior.ior.0, 0.0..=f32::MAX)).transpose()? {
+        let from_ior = match ior.map(|ior| self.clamped("ior", ior.ior.0, f32::MAX)).transpose()? {
             None => DIELECTRIC_REFLECTANCE,
             // The extension's text: 0 stands for an infinite index.
             Some(0.0) => 1.0,
             Some(ior) => ((ior.max(1.0) - 1.0) / (ior.max(1.0) + 1.0)).powi(2),
         };
         let Some(specular) = extensions.and_then(|e| e.specular.as_ref()) else { return Ok(Vec3::splat(from_ior)) };
-        let factor = self.clamped("specular", specular.specular_factor.0, 0.0..=1.0)?;
-        let color =
-            Vec3::from(self.all_clamped("specular colour", specular.specular_color_factor.0, 0.0..=f32::MAX)?);
+        let factor = self.clamped("specular", specular.specular_factor.0, 1.0)?;
+        let color = Vec3::from(self.all_clamped("specular colour", specular.specular_color_factor.0, f32::MAX)?);
         let factor = factor * uses.specular.map_or(1.0, |place| means.linear(place).w);
         let color = color * uses.specular_color.map_or(Vec3::ONE, |place| means.linear(place).truncate());
         Ok((color * from_ior).min(Vec3::ONE) * factor)
@@ -163,31 +160,30 @@ impl MaterialReader<'_> {
         let place = self.uses.without_coordinates(EMISSIVE);
         let mean = place.map_or(Vec3::ONE, |place| self.means.linear(place).truncate());
         let color = (Vec3::from(self.material.emissive_factor.0) * mean * strength).to_array();
-        self.all_clamped("emissive colour", color, 0.0..=f32::MAX).map(Vec3::from)
+        self.all_clamped("emissive colour", color, f32::MAX).map(Vec3::from)
     }
 
-    /// Clamps `value` to `range`: a colour of −0.01 or a roughness of 1.5 is an exporter's rounding and no reason to
-    /// refuse a model. A value that is not a finite number is refused.
-    fn clamped(&self, name: &str, value: f32, range: RangeInclusive<f32>) -> Result<f32, Fault> {
-        let element = format_args!("{}: {name}", self.element);
-        if !value.is_finite() {
-            return Err(Fault::malformed(element, "not finite"));
+    fn finite(&self, name: &str, value: f32) -> Result<f32, Fault> {
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            Err(Fault::malformed(format_args!("{}: {name}", self.element), "not finite"))
         }
-        let within = value.clamp(*range.start(), *range.end());
+    }
+
+    /// Clamps a finite value to 0 and `most`: a colour of −0.01 or a roughness of 1.5 is an exporter's rounding and no
+    /// reason to refuse a model.
+    fn clamped(&self, name: &str, value: f32, most: f32) -> Result<f32, Fault> {
+        let within = self.finite(name, value)?.clamp(0.0, most);
         if within != value {
-            tracing::warn!("{element}: {value} is out of range, {within} is taken");
+            tracing::warn!("{}: {name}: {value} is out of range, {within} is taken", self.element);
         }
         Ok(within)
     }
 
-    fn all_clamped<const N: usize>(
-        &self,
-        name: &str,
-        mut values: [f32; N],
-        range: RangeInclusive<f32>,
-    ) -> Result<[f32; N], Fault> {
+    fn all_clamped<const N: usize>(&self, name: &str, mut values: [f32; N], most: f32) -> Result<[f32; N], Fault> {
         for value in &mut values {
-            *value = self.clamped(name, *value, range.clone())?;
+            *value = self.clamped(name, *value, most)?;
         }
         Ok(values)
     }

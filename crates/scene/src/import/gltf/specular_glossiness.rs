@@ -12,27 +12,15 @@ use crate::error::Fault;
 
 const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
 
-/// The extension's JSON.
-#[derive(Deserialize)]
+/// The extension's JSON. Factors that are not there are 1.
+#[derive(Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct SpecularGlossiness {
-    pub diffuse_factor: [f32; 4],
+    pub diffuse_factor: Option<[f32; 4]>,
     pub diffuse_texture: Option<Info>,
-    pub specular_factor: [f32; 3],
-    pub glossiness_factor: f32,
+    pub specular_factor: Option<[f32; 3]>,
+    pub glossiness_factor: Option<f32>,
     pub specular_glossiness_texture: Option<Info>,
-}
-
-impl Default for SpecularGlossiness {
-    fn default() -> Self {
-        Self {
-            diffuse_factor: [1.0; 4],
-            diffuse_texture: None,
-            specular_factor: [1.0; 3],
-            glossiness_factor: 1.0,
-            specular_glossiness_texture: None,
-        }
-    }
 }
 
 /// The description of a material; `None` where it has none, or has the newer one with a texture of its own.

@@ -29,14 +29,11 @@ struct Transform {
 
 impl UvSource {
     fn of(set: u32, transform: Option<&TextureTransform>) -> Self {
-        Self {
-            set: transform.and_then(|t| t.tex_coord).unwrap_or(set),
-            transform: transform.map(|t| Transform {
-                offset: t.offset.0,
-                scale: t.scale.0,
-                rotation_rad: t.rotation.0,
-            }),
-        }
+        let Some(TextureTransform { offset, scale, rotation, tex_coord, .. }) = transform else {
+            return Self { set, transform: None };
+        };
+        let transform = Transform { offset: offset.0, scale: scale.0, rotation_rad: rotation.0 };
+        Self { set: tex_coord.unwrap_or(set), transform: Some(transform) }
     }
 
     /// Scale, then rotate counter-clockwise as seen with v downwards, then offset.

@@ -25,7 +25,7 @@ use super::source_scene::{SourceInstance, SourceScene};
 use super::texture_files::{TextureFiles, TextureReference};
 use crate::error::{Fault, at_most};
 use crate::{Material, TextureUse};
-use header::{PlyText, color_range};
+use header::{ColorRange, PlyText, color_range};
 use rows::{FaceRow, SkippedRow, VertexRow};
 use surface::Surface;
 use vertices::Vertices;
@@ -87,7 +87,8 @@ fn read_elements(mut reader: PlyReader<impl BufRead>, import: &Import) -> Result
             }
             "face" | "tristrips" => {
                 let are_strips = name == "tristrips";
-                surface.set_colors(color_range(element));
+                let range = color_range(element);
+                surface.color_range = if range == ColorRange::None { surface.color_range } else { range };
                 let mut row_number = 0u64;
                 let read = each_row(&mut reader, |row: FaceRow| {
                     // A file over the limit is refused below: further rows would only take memory.

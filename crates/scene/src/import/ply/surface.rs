@@ -27,7 +27,7 @@ pub(super) struct Surface {
     pub uvs: Vec<[f32; 2]>,
     /// One for each face once any has one, as the file has them.
     colors: Vec<[f32; 4]>,
-    color_range: ColorRange,
+    pub color_range: ColorRange,
     pub triangle_count: u64,
 }
 
@@ -40,12 +40,6 @@ struct Face {
 }
 
 impl Surface {
-    pub(super) fn set_colors(&mut self, range: ColorRange) {
-        if range != ColorRange::None {
-            self.color_range = range;
-        }
-    }
-
     pub(super) fn push(&mut self, row: &FaceRow, number: u64, warnings: &Warnings) {
         let count = row.vertex_indices.len();
         if count < 3 {
