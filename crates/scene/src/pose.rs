@@ -28,7 +28,8 @@ impl Scene {
 }
 
 impl MovingInstance {
-    /// The vertices of the instance in the world, by [`Animation::world_from_nodes`](crate::Animation::world_from_nodes) and its mesh's vertices at rest.
+    /// The vertices of the instance in the world, by [`crate::Animation::world_from_nodes`] and its mesh's vertices at
+    /// rest.
     /// Every coordinate is finite and at most [`MAX_COORDINATE_M`].
     #[must_use]
     pub fn posed(&self, rest: &[Vertex], world_from_nodes: &[DAffine3]) -> Vec<Vertex> {

@@ -46,7 +46,8 @@ impl Warnings {
             return;
         }
         kind.count += 1;
-        if kind.places.len() < if lists_names { MAX_NAMES } else { 1 } {
+        let most = if lists_names { MAX_NAMES } else { 1 };
+        if kind.places.len() < most {
             kind.places.push(shortened(place.to_string()));
         }
     }

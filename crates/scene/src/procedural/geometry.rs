@@ -81,7 +81,8 @@ impl MeshBuilder {
 
     /// Joins `rings` of `sides` vertices each, the first of which is `first`, to a tube. A closed one ends where it begins.
     pub(super) fn join_rings(&mut self, first: u32, rings: u32, sides: u32, is_closed: bool) {
-        for ring in 0..if is_closed { rings } else { rings - 1 } {
+        let pieces = if is_closed { rings } else { rings - 1 };
+        for ring in 0..pieces {
             for side in 0..sides {
                 let near = first + ring * sides;
                 let far = first + (ring + 1) % rings * sides;

@@ -40,7 +40,12 @@ pub(super) struct Placements {
 
 impl Placements {
     fn read(document: &Document, tree: &NodeTree, clips: &[Clip], scene: &mut SourceScene) -> Result<Self, Fault> {
-        let moves = moving_nodes(document, tree, clips);
+        // Whether each node of the tree is moved by some clip, itself or with its parents.
+        let is_target = targets(document, clips);
+        let mut moves: Vec<bool> = Vec::with_capacity(tree.nodes.len());
+        for node in &tree.nodes {
+            moves.push(is_target[node.number] || node.parent.is_some_and(|parent| moves[parent]));
+        }
         let mut skins = Skins::of(document, tree);
         let mut placements = Self::default();
         for (place, node) in (0u32..).zip(&tree.nodes) {
@@ -138,16 +143,6 @@ impl<'d> Skins<'d> {
         }
         Ok(Skinned { joints, influences })
     }
-}
-
-/// Whether each node of the tree is moved by some clip, itself or with its parents.
-fn moving_nodes(document: &Document, tree: &NodeTree, clips: &[Clip]) -> Vec<bool> {
-    let is_target = targets(document, clips);
-    let mut moves: Vec<bool> = Vec::with_capacity(tree.nodes.len());
-    for node in &tree.nodes {
-        moves.push(is_target[node.number] || node.parent.is_some_and(|parent| moves[parent]));
-    }
-    moves
 }
 
 /// Whether each node of the file is the target of a channel. A channel's node exists.

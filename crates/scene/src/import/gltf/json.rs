@@ -41,8 +41,7 @@ pub(super) fn parsed<T: DeserializeOwned>(value: &Value, element: impl Display) 
 
 /// Refuses other versions than 2. In version 1, which some files do not state, lists are objects.
 fn check_version(root: &Value) -> Result<(), Fault> {
-    let version = root.get("asset").and_then(|asset| asset.get("version")).map(ToString::to_string);
-    let version = version.unwrap_or_default();
+    let version = root.get("asset").and_then(|asset| asset.get("version")).map(ToString::to_string).unwrap_or_default();
     let version = version.trim_matches('"');
     let has_objects = ["buffers", "meshes", "nodes"].iter().any(|name| root.get(name).is_some_and(Value::is_object));
     if version.starts_with('2') || version.is_empty() && !has_objects {

@@ -112,9 +112,7 @@ impl Branch {
     }
 
     pub(super) fn direction_at(&self, t: f32) -> Vec3 {
-        let before = self.at(t - 0.05);
-        let after = self.at(t + 0.05);
-        (after.position - before.position).normalize_or(Vec3::Y)
+        (self.at(t + 0.05).position - self.at(t - 0.05).position).normalize_or(Vec3::Y)
     }
 }
 
