@@ -169,7 +169,7 @@ impl GpuScene {
                 scene.materials.iter().any(Material::is_specular),
             ],
             identity: NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed),
-            animated: scene.wind.is_some() || scene.is_animated(),
+            animated: scene.wind.is_some() || scene.period_s().is_some(),
             wind: scene.wind.is_some(),
             motion,
             bounds_in_world: Aabb::of_boxes(&boxes),

@@ -100,8 +100,8 @@ impl Motion {
         let mut details = Vec::new();
         for (moving, mesh) in self.animation.moving.iter().zip(&self.meshes) {
             let rest = &self.rest[mesh];
-            vertices.extend(self.animation.posed(moving, &rest.vertices, &world_from_nodes));
-            details.extend(self.animation.posed_details(moving, &rest.details, &world_from_nodes));
+            vertices.extend(moving.posed(&rest.vertices, &world_from_nodes));
+            details.extend(moving.posed_details(&rest.details, &world_from_nodes));
         }
         Posed { vertices, details, buffers: OnceLock::new() }
     }

@@ -1,11 +1,11 @@
 //! Boxes around what moves, over all moments.
 
 use depth_image::Aabb;
-use glam::{Affine3A, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::animation::{Animation, MovingInstance};
-use crate::model::{Mesh, Scene};
+use crate::model::{Instance, Mesh, Scene};
 
 /// Most moments at which a clip is sampled.
 const MOST_MOMENTS: usize = 2048;
@@ -35,23 +35,20 @@ impl Scene {
     /// two moments by half of that way: as far as an arc of 180°.
     #[must_use]
     pub fn bounds_of_instances(&self) -> Vec<Aabb> {
-        let of = |instance: &crate::Instance| {
-            let mesh = self.meshes.get(instance.mesh as usize);
-            mesh.map_or(Aabb::EMPTY, |mesh| self.at_rest(mesh, instance.world_from_mesh))
-        };
-        let mut boxes: Vec<Aabb> = self.instances.iter().map(of).collect();
+        let mut boxes: Vec<Aabb> = self.instances.iter().map(|instance| self.at_rest(instance)).collect();
         let Some(animation) = &self.animation else { return boxes };
         for (moving, swept) in animation.moving.iter().zip(self.swept(animation)) {
-            let mesh = self.instances.get(moving.instance as usize).and_then(|i| self.meshes.get(i.mesh as usize));
-            if let (Some(place), Some(mesh)) = (boxes.get_mut(moving.instance as usize), mesh) {
+            let place = boxes.get_mut(moving.instance as usize);
+            if let (Some(place), Some(mesh)) = (place, self.mesh_of(moving)) {
                 *place = self.swayed(swept, mesh);
             }
         }
         boxes
     }
 
-    fn at_rest(&self, mesh: &Mesh, world_from_mesh: Affine3A) -> Aabb {
-        let points = mesh.vertices.iter().map(|v| world_from_mesh.transform_point3(Vec3::from(v.position)));
+    fn at_rest(&self, instance: &Instance) -> Aabb {
+        let Some(mesh) = self.meshes.get(instance.mesh as usize) else { return Aabb::EMPTY };
+        let points = mesh.vertices.iter().map(|v| instance.world_from_mesh.transform_point3(Vec3::from(v.position)));
         self.swayed(Aabb::around(points), mesh)
     }
 
@@ -68,19 +65,12 @@ impl Scene {
         let channels = animation.clip().map_or(0, |clip| clip.channels.len());
         let most = MOST_STEPS / (animation.nodes.len() + channels + corners).max(1);
         let moments = moments(animation, most);
-        let corners_at = |&time_s: &f32| -> Vec<Vec<DVec3>> {
-            let placed = animation.world_from_nodes(time_s);
-            let of_box = |b: &Carried| {
-                let world_from_node = placed.get(b.node as usize).copied().unwrap_or_default();
-                b.corners_in_node.map(|corner| world_from_node.transform_point3(corner))
-            };
-            carried.iter().map(|boxes| boxes.iter().flat_map(of_box).collect()).collect()
-        };
         // Corners of all moments at once would fill memory.
         let mut boxes = vec![Aabb::EMPTY; carried.len()];
         let mut before: Option<(f32, Vec<Vec<DVec3>>)> = None;
         for some in moments.chunks((MOST_CORNERS / corners.max(1)).clamp(1, 32)) {
-            for (&time_s, corners) in some.iter().zip(some.par_iter().map(corners_at).collect::<Vec<_>>()) {
+            let corners_at = some.par_iter().map(|&time_s| corners_in_world(animation, &carried, time_s));
+            for (&time_s, corners) in some.iter().zip(corners_at.collect::<Vec<_>>()) {
                 // Nothing moves between neighbouring numbers: a step there is a jump.
                 let from = before.as_ref().filter(|(then_s, _)| then_s.next_up() < time_s).map(|(_, corners)| corners);
                 for (number, (b, at)) in boxes.iter_mut().zip(&corners).enumerate() {
@@ -94,8 +84,7 @@ impl Scene {
 
     /// The boxes that joints carry: all vertices lie between them.
     fn carried_by(&self, moving: &MovingInstance) -> Vec<Carried> {
-        let mesh = self.instances.get(moving.instance as usize).and_then(|i| self.meshes.get(i.mesh as usize));
-        let vertices = mesh.map_or(&[][..], |mesh| &mesh.vertices);
+        let vertices = self.mesh_of(moving).map_or(&[][..], |mesh| &mesh.vertices);
         let mut boxes = vec![Aabb::EMPTY; moving.joints.len()];
         if moving.influences.is_empty() {
             boxes.truncate(1);
@@ -121,6 +110,19 @@ impl Scene {
 struct Carried {
     node: u32,
     corners_in_node: [DVec3; 8],
+}
+
+/// The corners of all boxes of each moving instance at a moment.
+fn corners_in_world(animation: &Animation, carried: &[Vec<Carried>], time_s: f32) -> Vec<Vec<DVec3>> {
+    let world_from_nodes = animation.world_from_nodes(time_s);
+    let corners_of = carried.iter().map(|boxes| {
+        let corners = boxes.iter().flat_map(|b| {
+            let world_from_node = world_from_nodes.get(b.node as usize).copied().unwrap_or_default();
+            b.corners_in_node.map(|corner| world_from_node.transform_point3(corner))
+        });
+        corners.collect()
+    });
+    corners_of.collect()
 }
 
 /// A box grown to ways from point to point, each half as wide to all sides as it is long.

@@ -1,7 +1,6 @@
 //! Errors of scenes: the file, the element and the reason.
 
 use std::fmt;
-use std::path::Path;
 
 use depth_image::LightError;
 
@@ -76,10 +75,6 @@ impl Fault {
 
     pub(crate) fn in_file(self, file: impl Into<String>) -> SceneError {
         SceneError { file: file.into(), element: shortened(self.element), kind: self.kind }
-    }
-
-    pub(crate) fn in_path(self, path: &Path) -> SceneError {
-        self.in_file(path.display().to_string())
     }
 }
 

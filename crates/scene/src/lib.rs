@@ -12,7 +12,6 @@
 
 mod animation;
 mod bounds;
-mod contents;
 mod error;
 mod import;
 mod light_rig;
@@ -23,10 +22,8 @@ mod package;
 mod pose;
 pub mod procedural;
 mod spec;
-mod texture_use;
 mod up_axis;
 mod validate;
-mod validate_animation;
 
 pub use animation::{
     Animation, Channel, Clip, Influence, Interpolation, Joint, MovingInstance, Node, NodeTransform, Property,
@@ -40,5 +37,4 @@ pub use limits::{Limits, MAX_COORDINATE_M};
 pub use model::*;
 pub use package::{pack, unpack};
 pub use spec::{BUILT_IN_NAMES, ProceduralScene, SceneSpec, SceneSpecError};
-pub use texture_use::{TextureUse, Wrap};
 pub use up_axis::{UpAxis, UpAxisError};

@@ -95,7 +95,6 @@ pub(crate) fn color(mut light: Light) -> Vec3 {
 
 /// Scales the lengths of a light, and its intensity, which is that at a distance of one unit.
 pub(crate) fn scale_to_metres(light: &mut Light, metres_per_unit: f64) {
-    let scaled = |v: Vec3, factor: f64| (v.as_dvec3() * factor).as_vec3();
     match light {
         Light::Directional { .. } => {}
         Light::Point { intensity_linear, radius_m, .. } | Light::Spot { intensity_linear, radius_m, .. } => {
@@ -106,6 +105,11 @@ pub(crate) fn scale_to_metres(light: &mut Light, metres_per_unit: f64) {
             *half_edges_in_world = half_edges_in_world.map(|edge| scaled(edge, metres_per_unit));
         }
     }
+}
+
+/// Scales in double precision: a factor may be too small for `f32` where the result is not.
+pub(crate) fn scaled(v: Vec3, factor: f64) -> Vec3 {
+    (v.as_dvec3() * factor).as_vec3()
 }
 
 /// Position of a light; `None` for parallel light.

@@ -183,8 +183,8 @@ impl<'a> Fields<'a> {
         if (vector.length_squared() - 1.0).abs() < UNIT_TOLERANCE {
             return Ok(vector.as_vec3());
         }
-        let no_length = || wrong(name, LightSpecErrorKind::Invalid("it has no length"));
-        vector.try_normalize().map(|unit| unit.as_vec3()).ok_or_else(no_length)
+        let unit = vector.try_normalize().map(|unit| unit.as_vec3());
+        unit.ok_or_else(|| wrong(name, LightSpecErrorKind::Invalid("it has no length")))
     }
 
     fn color(&self, name: &str) -> Result<Vec3, LightSpecError> {
@@ -214,8 +214,8 @@ fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
 }
 
 fn color_from(field: &str, text: &str) -> Result<Vec3, LightSpecError> {
-    let grey = || numbers(text).map(|[v]| DVec3::splat(v));
-    let color = srgb_color(text).or_else(|| grey().or_else(|| numbers(text).map(DVec3::from)).map(|c| c.as_vec3()));
+    let linear = numbers(text).map(|[v]| DVec3::splat(v)).or_else(|| numbers(text).map(DVec3::from));
+    let color = srgb_color(text).or(linear.map(|color| color.as_vec3()));
     let color = color.ok_or_else(|| malformed(field, text, "a number, three numbers R,G,B or #rrggbb"))?;
     let is_light = color.min_element() >= 0.0;
     if is_light { Ok(color) } else { Err(wrong(field, LightSpecErrorKind::Invalid("negative"))) }

@@ -4,8 +4,7 @@ use depth_image::{Environment, EnvironmentMap, Illumination, SourceSpace};
 use glam::{Affine3A, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::TextureUse;
-use crate::animation::{Animation, UnknownClip};
+use crate::animation::{Animation, MovingInstance, UnknownClip};
 
 /// A renderable scene. All indices of a scene from this crate are valid. Serde leaves out the large arrays, which
 /// [`pack`](crate::pack) copies.
@@ -41,17 +40,37 @@ pub struct Scene {
 impl Scene {
     /// Every vertex of every instance, at rest.
     pub fn vertices_in_world(&self) -> impl Iterator<Item = Vec3> + Clone {
-        let placed = |instance: &Instance| Some((self.meshes.get(instance.mesh as usize)?, instance.world_from_mesh));
-        self.instances.iter().filter_map(placed).flat_map(|(mesh, world_from_mesh)| {
-            mesh.vertices.iter().map(move |v| world_from_mesh.transform_point3(Vec3::from(v.position)))
+        self.instances.iter().flat_map(|instance| {
+            let vertices = self.meshes.get(instance.mesh as usize).map_or(&[][..], |mesh| &mesh.vertices);
+            vertices.iter().map(move |v| instance.world_from_mesh.transform_point3(Vec3::from(v.position)))
         })
     }
 
     /// Triangles as drawn: a mesh's count once for each of its instances.
     #[must_use]
     pub fn triangle_count(&self) -> u64 {
-        let of = |mesh: u32| self.meshes.get(mesh as usize).map_or(0, Mesh::triangle_count);
-        self.instances.iter().map(|i| of(i.mesh)).sum()
+        let meshes = self.instances.iter().filter_map(|i| self.meshes.get(i.mesh as usize));
+        meshes.map(Mesh::triangle_count).sum()
+    }
+
+    /// The number of triangles, and the clips with their durations, as in "12 triangles; clips: walk (1.5 s, plays), run
+    /// (0.8 s)".
+    #[must_use]
+    pub fn contents(&self) -> String {
+        let triangles = format!("{} triangles", self.triangle_count());
+        let Some(animation) = self.animation.as_ref().filter(|animation| !animation.clips.is_empty()) else {
+            return triangles;
+        };
+        let clips = (0..).zip(&animation.clips).map(|(number, clip)| {
+            let plays = if animation.playing == Some(number) { ", plays" } else { "" };
+            format!("{} ({} s{plays})", clip.name, clip.duration_s())
+        });
+        format!("{triangles}; clips: {}", clips.collect::<Vec<_>>().join(", "))
+    }
+
+    /// The mesh of an instance that moves.
+    pub(crate) fn mesh_of(&self, moving: &MovingInstance) -> Option<&Mesh> {
+        self.meshes.get(self.instances.get(moving.instance as usize)?.mesh as usize)
     }
 
     /// Plays the first clip of a name.
@@ -60,30 +79,24 @@ impl Scene {
     /// When no clip has the name: lists all.
     pub fn play(&mut self, name: &str) -> Result<(), UnknownClip> {
         let clips = self.animation.as_ref().map_or(&[][..], |animation| &animation.clips);
-        let names = || clips.iter().map(|clip| clip.name.clone()).collect();
-        let number = clips.iter().position(|clip| clip.name == name);
-        let number = number.ok_or_else(|| UnknownClip { name: name.to_owned(), clips: names() })?;
+        let Some(number) = clips.iter().position(|clip| clip.name == name) else {
+            let clips = clips.iter().map(|clip| clip.name.clone()).collect();
+            return Err(UnknownClip { name: name.to_owned(), clips });
+        };
         self.animation.iter_mut().for_each(|animation| animation.playing = Some(number as u32));
         Ok(())
-    }
-
-    /// Returns whether the picture depends on scene time.
-    #[must_use]
-    pub fn is_animated(&self) -> bool {
-        self.period_s().is_some()
     }
 
     /// The time after which the motion repeats, seconds: that of the clip that plays, or else of the wind. `None` where
     /// nothing moves.
     #[must_use]
     pub fn period_s(&self) -> Option<f32> {
-        let sways = |wind: &Wind| {
-            let has_effect = wind.amplitude_m > 0.0 && wind.frequency_hz != 0.0;
-            has_effect && self.meshes.iter().any(|m| m.vertices.iter().any(|v| v.sway > 0.0))
-        };
         let of_clip = self.animation.as_ref().and_then(Animation::period_s);
-        of_clip
-            .or_else(|| self.wind.filter(sways).map(|wind| wind.frequency_hz.abs().recip()).filter(|s| s.is_finite()))
+        of_clip.or_else(|| {
+            let wind = self.wind.filter(|wind| wind.amplitude_m > 0.0 && wind.frequency_hz != 0.0)?;
+            let sways = self.meshes.iter().any(|m| m.vertices.iter().any(|v| v.sway > 0.0));
+            Some(wind.frequency_hz.abs().recip()).filter(|period_s| sways && period_s.is_finite())
+        })
     }
 }
 
@@ -318,6 +331,36 @@ pub struct Texture {
     /// `width_px * height_px` texels of RGB, encoded as in `is_srgb`, and linear alpha.
     #[serde(skip)]
     pub srgba8: Vec<u8>,
+}
+
+/// A texture as a material uses it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct TextureUse {
+    /// Index into [`Scene::textures`].
+    pub texture: u32,
+    /// The coordinates are the second pair: [`VertexDetail::uv`].
+    pub second_uv: bool,
+    /// The texture beyond its borders, along u and v.
+    pub wrap: [Wrap; 2],
+}
+
+/// A texture beyond its borders, along one axis. The numbers are those of shaders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize)]
+pub enum Wrap {
+    /// It begins again.
+    #[default]
+    Repeat = 0,
+    /// It runs back and forth.
+    Mirror = 1,
+    /// Its border goes on.
+    Clamp = 2,
+}
+
+/// The first pair of coordinates, repeated along both axes.
+impl From<u32> for TextureUse {
+    fn from(texture: u32) -> Self {
+        Self { texture, second_uv: false, wrap: [Wrap::Repeat; 2] }
+    }
 }
 
 /// A camera named by the source file, for use as a view.

@@ -14,7 +14,7 @@ use depth_image::{EnvironmentMap, MAX_ENVIRONMENT_SIZE_PX};
 use glam::UVec2;
 
 use crate::error::{Fault, at_most};
-use crate::{Limits, Mesh, Scene, SceneError};
+use crate::{Limits, Scene, SceneError};
 
 #[cfg(target_endian = "big")]
 compile_error!("packages hold arrays as they are in memory, which must be little-endian");
@@ -29,9 +29,10 @@ type Header<S> = (S, Vec<[u32; 3]>, Option<UVec2>);
 /// Packs a scene. Equal scenes give equal bytes.
 #[must_use]
 pub fn pack(scene: &Scene) -> Vec<u8> {
-    let lengths = |mesh: &Mesh| [mesh.vertices.len(), mesh.details.len(), mesh.indices.len()].map(|n| n as u32);
-    let mesh_lengths = scene.meshes.iter().map(lengths).collect();
-    let header: Header<&Scene> = (scene, mesh_lengths, scene.environment_map.as_ref().map(EnvironmentMap::size_px));
+    let meshes = scene.meshes.iter();
+    let mesh_lengths = meshes.map(|m| [m.vertices.len(), m.details.len(), m.indices.len()].map(|n| n as u32));
+    let header: Header<&Scene> =
+        (scene, mesh_lengths.collect(), scene.environment_map.as_ref().map(EnvironmentMap::size_px));
     // Writing to a growing vector cannot fail, and postcard supports all fields.
     let header = postcard::to_stdvec(&header).unwrap_or_default();
     let arrays = arrays(scene);
@@ -76,17 +77,13 @@ fn scene_from_bytes(bytes: &[u8], limits: &Limits) -> Result<Scene, Fault> {
         return Err(Fault::unsupported("version", format!("package version {version}")));
     }
     let header_bytes = u32::from_le_bytes(reader.array("header length")?);
-    let header = read_header(reader.take("header", u64::from(header_bytes))?)?;
+    let header = match postcard::take_from_bytes(reader.take("header", u64::from(header_bytes))?) {
+        Ok((header, [])) => header,
+        Ok(_) => return Err(Fault::malformed("header", "it is longer than its contents")),
+        Err(e) => return Err(Fault::malformed("header", e.to_string())),
+    };
     let scene = read_arrays(header, &mut reader, limits)?;
     if reader.rest.is_empty() { Ok(scene) } else { Err(Fault::malformed("end", "bytes follow the last array")) }
-}
-
-fn read_header(bytes: &[u8]) -> Result<Header<Scene>, Fault> {
-    match postcard::take_from_bytes(bytes) {
-        Ok((header, [])) => Ok(header),
-        Ok(_) => Err(Fault::malformed("header", "it is longer than its contents")),
-        Err(e) => Err(Fault::malformed("header", e.to_string())),
-    }
 }
 
 fn read_arrays(header: Header<Scene>, reader: &mut Reader, limits: &Limits) -> Result<Scene, Fault> {

@@ -3,7 +3,7 @@
 use glam::{Affine3A, DAffine3, Mat3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
-use crate::animation::{Animation, Influence, MovingInstance};
+use crate::animation::{Influence, MovingInstance};
 use crate::limits::MAX_COORDINATE_M;
 use crate::model::{Mesh, Scene, Vertex, VertexDetail};
 
@@ -18,8 +18,8 @@ impl Scene {
         for moving in &animation.moving {
             let Some(instance) = frozen.instances.get_mut(moving.instance as usize) else { continue };
             let Some(mesh) = self.meshes.get(instance.mesh as usize) else { continue };
-            let vertices = animation.posed(moving, &mesh.vertices, &world_from_nodes);
-            let details = animation.posed_details(moving, &mesh.details, &world_from_nodes);
+            let vertices = moving.posed(&mesh.vertices, &world_from_nodes);
+            let details = moving.posed_details(&mesh.details, &world_from_nodes);
             (instance.mesh, instance.world_from_mesh) = (frozen.meshes.len() as u32, Affine3A::IDENTITY);
             frozen.meshes.push(Mesh { vertices, details, ..mesh.clone() });
         }
@@ -27,42 +27,45 @@ impl Scene {
     }
 }
 
-impl Animation {
-    /// The vertices of an instance in the world, by [`Animation::world_from_nodes`] and its mesh's vertices at rest.
+impl MovingInstance {
+    /// The vertices of the instance in the world, by [`crate::Animation::world_from_nodes`] and its mesh's vertices at
+    /// rest.
     /// Every coordinate is finite and at most [`MAX_COORDINATE_M`].
     #[must_use]
-    pub fn posed(&self, moving: &MovingInstance, rest: &[Vertex], world_from_nodes: &[DAffine3]) -> Vec<Vertex> {
-        let world_from_mesh = by_joints(moving, world_from_nodes);
+    pub fn posed(&self, rest: &[Vertex], world_from_nodes: &[DAffine3]) -> Vec<Vertex> {
+        let world_from_mesh = self.world_from_mesh(world_from_nodes);
         let Some(first) = world_from_mesh.first() else { return rest.to_vec() };
-        if moving.influences.is_empty() {
+        if self.influences.is_empty() {
             let normals = normals_from(first.matrix3);
             return rest.par_iter().map(|vertex| placed(first, normals, vertex)).collect();
         }
-        let posed = |(vertex, influence): (&Vertex, &Influence)| {
+        let posed = rest.par_iter().zip(&self.influences).map(|(vertex, influence)| {
             let blended = blended(&world_from_mesh, influence);
             placed(&blended, normals_from(blended.matrix3), vertex)
-        };
-        rest.par_iter().zip(&moving.influences).map(posed).collect()
+        });
+        posed.collect()
     }
-}
 
-impl Animation {
-    /// As [`Animation::posed`], the details of vertices: tangents turn.
+    /// As [`Self::posed`], the details of vertices: tangents turn.
     #[must_use]
-    pub fn posed_details(
-        &self,
-        moving: &MovingInstance,
-        rest: &[VertexDetail],
-        world_from_nodes: &[DAffine3],
-    ) -> Vec<VertexDetail> {
-        let world_from_mesh = by_joints(moving, world_from_nodes);
+    pub fn posed_details(&self, rest: &[VertexDetail], world_from_nodes: &[DAffine3]) -> Vec<VertexDetail> {
+        let world_from_mesh = self.world_from_mesh(world_from_nodes);
         let Some(first) = world_from_mesh.first() else { return rest.to_vec() };
-        if moving.influences.is_empty() {
+        if self.influences.is_empty() {
             return rest.par_iter().map(|detail| turned(first, detail)).collect();
         }
-        let posed =
-            |(detail, influence): (&VertexDetail, &Influence)| turned(&blended(&world_from_mesh, influence), detail);
-        rest.par_iter().zip(&moving.influences).map(posed).collect()
+        let influenced = rest.par_iter().zip(&self.influences);
+        influenced.map(|(detail, influence)| turned(&blended(&world_from_mesh, influence), detail)).collect()
+    }
+
+    /// The mesh's placement in the world by each joint.
+    fn world_from_mesh(&self, world_from_nodes: &[DAffine3]) -> Vec<Affine3A> {
+        let world_from_joints = self.joints.iter().map(|joint| {
+            let world_from_node = world_from_nodes.get(joint.node as usize).copied().unwrap_or_default();
+            let world_from_mesh = world_from_node * joint.joint_from_mesh;
+            Affine3A::from_cols_array(&world_from_mesh.to_cols_array().map(bounded))
+        });
+        world_from_joints.collect()
     }
 }
 
@@ -70,12 +73,6 @@ fn turned(world_from_mesh: &Affine3A, detail: &VertexDetail) -> VertexDetail {
     let [x, y, z, sign] = detail.tangent;
     let tangent = world_from_mesh.transform_vector3(Vec3::new(x, y, z)).try_normalize().unwrap_or(Vec3::X);
     VertexDetail { tangent: tangent.extend(sign).to_array(), ..*detail }
-}
-
-/// The mesh's placement in the world by each joint.
-fn by_joints(moving: &MovingInstance, world_from_nodes: &[DAffine3]) -> Vec<Affine3A> {
-    let node = |node: u32| world_from_nodes.get(node as usize).unwrap_or(&DAffine3::IDENTITY);
-    moving.joints.iter().map(|joint| as_f32(&(*node(joint.node) * joint.joint_from_mesh))).collect()
 }
 
 fn blended(world_from_mesh: &[Affine3A], influence: &Influence) -> Affine3A {
@@ -102,10 +99,6 @@ fn normals_from(linear: Mat3A) -> Mat3A {
     let [x, y, z] = columns.map(|column| column / largest);
     let side = if x.cross(y).dot(z) < 0.0 { -1.0 } else { 1.0 };
     Mat3A::from_cols(y.cross(z) * side, z.cross(x) * side, x.cross(y) * side)
-}
-
-fn as_f32(world_from_mesh: &DAffine3) -> Affine3A {
-    Affine3A::from_cols_array(&world_from_mesh.to_cols_array().map(bounded))
 }
 
 /// A number of a pose that vertices can be computed with: between keys, a spline swings as far as it likes.

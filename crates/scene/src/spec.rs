@@ -104,9 +104,7 @@ impl SceneSpec {
     pub fn load(&self, limits: &Limits, options: impl Into<ImportOptions>) -> Result<Scene, SceneError> {
         let scene = match self {
             Self::File(path) if path.extension().is_none() && !path.exists() => return Err(no_such_scene(path)),
-            Self::File(path) => {
-                return Ok(load_file(path, limits, options)?.with_default_lights());
-            }
+            Self::File(path) => return Ok(load_file(path, limits, options)?.with_default_lights()),
             Self::TreeTerrain { triangles, wind: false } => tree_terrain(*triangles, TREE_SEED),
             Self::TreeTerrain { triangles, wind: true } => tree_terrain(*triangles, TREE_SEED).with_wind(),
             Self::Grass { density } => {

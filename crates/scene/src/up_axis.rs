@@ -78,12 +78,8 @@ impl FromStr for UpAxis {
     type Err = UpAxisError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        match text {
-            "x" => Ok(Self::X),
-            "y" => Ok(Self::Y),
-            "z" => Ok(Self::Z),
-            other => Err(UpAxisError::Unknown(other.to_owned())),
-        }
+        let named = [Self::X, Self::Y, Self::Z].into_iter().find(|axis| axis.to_string() == text);
+        named.ok_or_else(|| UpAxisError::Unknown(text.to_owned()))
     }
 }
 

@@ -1,17 +1,21 @@
 //! Validation of scenes from any source.
 
+use std::collections::HashSet;
+
 use depth_image::LightError;
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Quat, Vec3};
 
 use crate::error::{Fault, at_most};
 use crate::limits::MAX_COORDINATE_M;
 use crate::{
-    Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SceneError, SourceCamera, Texture, TextureUse, Vertex,
-    VertexDetail, Wind,
+    Animation, Channel, Influence, Light, Limits, Material, Mesh, MeshPart, MovingInstance, Node, NodeTransform,
+    Property, Scene, SceneError, SourceCamera, Texture, TextureUse, TransformParts, Vertex, VertexDetail, Wind,
 };
 
 /// Smallest determinant relative to the cube of the largest column that counts as invertible.
 const MIN_RELATIVE_DETERMINANT: f32 = 1e-12;
+/// The error of a unit length or of a sum of weights that rounding explains.
+const ROUNDING: f32 = 1e-2;
 
 impl Scene {
     /// Checks every guarantee of the model: indices in range, numbers finite, sizes within `limits`.
@@ -25,7 +29,10 @@ impl Scene {
     pub(crate) fn check(&self, limits: &Limits) -> Result<(), Fault> {
         self.check_sizes(limits)?;
         each("mesh", &self.meshes, |mesh| check_mesh(mesh, self.materials.len()))?;
-        each("instance", &self.instances, |instance| self.check_instance(instance))?;
+        each("instance", &self.instances, |instance| {
+            ensure((instance.mesh as usize) < self.meshes.len(), || format!("mesh {} does not exist", instance.mesh))?;
+            check_transform(&instance.world_from_mesh)
+        })?;
         each("material", &self.materials, |material| check_material(material, &self.textures))?;
         each("texture", &self.textures, |texture| check_texture(texture, limits))?;
         self.check_illumination()?;
@@ -66,42 +73,84 @@ impl Scene {
         checked.map_err(|e| Fault::malformed("environment map", e.to_string()))
     }
 
-    fn check_instance(&self, instance: &Instance) -> Result<(), String> {
-        ensure((instance.mesh as usize) < self.meshes.len(), || format!("mesh {} does not exist", instance.mesh))?;
-        check_transform(&instance.world_from_mesh)
+    /// Checks every guarantee of the animation, and that all moments stay within [`MAX_COORDINATE_M`].
+    fn check_animation(&self, limits: &Limits) -> Result<(), Fault> {
+        let Some(animation) = &self.animation else { return Ok(()) };
+        check_animation_sizes(animation, limits)?;
+        let mut nodes = (0u32..).zip(&animation.nodes);
+        let are_in_order = nodes.all(|(number, node)| node.parent.is_none_or(|parent| parent < number));
+        require(are_in_order, "animation, nodes", "a parent is not before its child")?;
+        each("animation, node", &animation.nodes, check_node)?;
+        each("clip", &animation.clips, |clip| {
+            let mut channels = clip.channels.iter().enumerate();
+            channels.try_for_each(|(number, channel)| {
+                check_channel(channel, &animation.nodes).map_err(|why| format!("channel {number}: {why}"))
+            })
+        })?;
+        let is_there = animation.playing.is_none_or(|playing| (playing as usize) < animation.clips.len());
+        require(is_there, "animation, playing", "the clip does not exist")?;
+        require(animation.world_from_source.is_finite(), "animation, world_from_source", "not finite")?;
+        let instances: HashSet<u32> = animation.moving.iter().map(|moving| moving.instance).collect();
+        require(instances.len() == animation.moving.len(), "animation, moving", "an instance moves twice")?;
+        each("moving instance", &animation.moving, |moving| self.check_moving(moving, animation.nodes.len()))?;
+        let meshes = animation.moving.iter().filter_map(|moving| self.mesh_of(moving));
+        let moved = meshes.map(|mesh| mesh.vertices.len() as u64).sum();
+        at_most("animation, vertices of all moving instances", moved, limits.vertices)?;
+        // Moments between the sampled ones are bounded by `MovingInstance::posed`. The box without points is nowhere.
+        each("moving instance", &self.swept(animation), |b| {
+            ensure(b.is_empty() || is_near(b.min) && is_near(b.max), || "it moves beyond 1e9 m".into())
+        })
+    }
+
+    fn check_moving(&self, moving: &MovingInstance, nodes: usize) -> Result<(), String> {
+        let is_there = (moving.instance as usize) < self.instances.len();
+        ensure(is_there, || format!("instance {} does not exist", moving.instance))?;
+        ensure(!moving.joints.is_empty(), || "it follows no joint".into())?;
+        for (number, joint) in moving.joints.iter().enumerate() {
+            ensure((joint.node as usize) < nodes, || format!("joint {number}: node {} does not exist", joint.node))?;
+            ensure(joint.joint_from_mesh.is_finite(), || format!("joint {number}: its bind matrix is not finite"))?;
+        }
+        if moving.influences.is_empty() {
+            return Ok(());
+        }
+        let vertices = self.mesh_of(moving).map_or(0, |mesh| mesh.vertices.len());
+        ensure(vertices == moving.influences.len(), || {
+            format!("it has joints of {} vertices, its mesh {vertices}", moving.influences.len())
+        })?;
+        match moving.influences.iter().position(|influence| !is_influence_valid(influence, moving.joints.len())) {
+            Some(bad) => Err(format!("vertex {bad}: its joints are out of range, or their weights")),
+            None => Ok(()),
+        }
     }
 }
 
-pub(crate) fn each<T>(kind: &str, items: &[T], check: impl Fn(&T) -> Result<(), String>) -> Result<(), Fault> {
+fn each<T>(kind: &str, items: &[T], check: impl Fn(&T) -> Result<(), String>) -> Result<(), Fault> {
     let mut numbered = items.iter().enumerate();
     numbered.try_for_each(|(i, item)| check(item).map_err(|why| Fault::malformed(format!("{kind} {i}"), why)))
 }
 
-pub(crate) fn require(holds: bool, element: &str, reason: &str) -> Result<(), Fault> {
+fn require(holds: bool, element: &str, reason: &str) -> Result<(), Fault> {
     if holds { Ok(()) } else { Err(Fault::malformed(element, reason)) }
 }
 
-pub(crate) fn ensure(holds: bool, reason: impl FnOnce() -> String) -> Result<(), String> {
+fn ensure(holds: bool, reason: impl FnOnce() -> String) -> Result<(), String> {
     if holds { Ok(()) } else { Err(reason()) }
 }
 
 fn check_mesh(mesh: &Mesh, material_count: usize) -> Result<(), String> {
-    let bad_vertex = mesh.vertices.iter().position(|v| !is_vertex_valid(v));
-    ensure(bad_vertex.is_none(), || {
-        format!("vertex {} is not finite, out of range or without a unit normal", bad_vertex.unwrap_or(0))
-    })?;
+    if let Some(bad) = mesh.vertices.iter().position(|v| !is_vertex_valid(v)) {
+        return Err(format!("vertex {bad} is not finite, out of range or without a unit normal"));
+    }
     let details = mesh.details.len();
     ensure(details == 0 || details == mesh.vertices.len(), || {
         format!("{details} vertex details for {} vertices", mesh.vertices.len())
     })?;
-    let bad_detail = mesh.details.iter().position(|d| !is_detail_valid(d));
-    ensure(bad_detail.is_none(), || {
-        format!("the detail of vertex {} is not finite or without a unit tangent", bad_detail.unwrap_or(0))
-    })?;
-    let bad_index = mesh.indices.iter().find(|&&i| i as usize >= mesh.vertices.len());
-    ensure(bad_index.is_none(), || {
-        format!("index {} is beyond its {} vertices", bad_index.unwrap_or(&0), mesh.vertices.len())
-    })?;
+    if let Some(bad) = mesh.details.iter().position(|d| !is_detail_valid(d)) {
+        return Err(format!("the detail of vertex {bad} is not finite or without a unit tangent"));
+    }
+    if let Some(bad) = mesh.indices.iter().find(|&&i| i as usize >= mesh.vertices.len()) {
+        return Err(format!("index {bad} is beyond its {} vertices", mesh.vertices.len()));
+    }
     check_parts(&mesh.parts, mesh.indices.len(), material_count)
 }
 
@@ -124,7 +173,12 @@ fn is_vertex_valid(vertex: &Vertex) -> bool {
     vertex.position.iter().all(|c| c.abs() <= MAX_COORDINATE_M)
         && (normal_length_squared - 1.0).abs() < 1e-2
         && vertex.uv.iter().all(|c| c.is_finite())
-        && (0.0..=1.0).contains(&vertex.sway)
+        && is_share(vertex.sway)
+}
+
+/// Returns whether a number is from 0 to 1, which NaN is not.
+fn is_share(v: f32) -> bool {
+    (0.0..=1.0).contains(&v)
 }
 
 fn is_detail_valid(detail: &VertexDetail) -> bool {
@@ -148,27 +202,23 @@ fn check_transform(world_from_mesh: &Affine3A) -> Result<(), String> {
 fn check_material(material: &Material, textures: &[Texture]) -> Result<(), String> {
     let names = ["base colour", "metallic-roughness", "normal", "emissive", "occlusion"];
     for (name, texture) in names.into_iter().zip(material.textures()) {
+        let Some(TextureUse { texture: number, .. }) = texture else { continue };
+        let texture = textures.get(number as usize);
+        let texture = texture.ok_or_else(|| format!("its {name} texture {number} does not exist"))?;
         let holds_colors = matches!(name, "base colour" | "emissive");
-        texture.map_or(Ok(()), |texture| check_texture_use(name, holds_colors, texture, textures))?;
+        ensure(holds_colors || !texture.is_srgb, || format!("its {name} texture holds colours"))?;
     }
-    let unit = |v: f32| (0.0..=1.0).contains(&v);
     ensure(material.base_color_linear.iter().all(|c| c.is_finite() && *c >= 0.0), || "bad base colour".into())?;
-    ensure(is_radiance(material.emissive_linear), || "bad emissive colour".into())?;
-    ensure(unit(material.metallic), || "metallic is not from 0 to 1".into())?;
-    ensure(unit(material.roughness), || "roughness is not from 0 to 1".into())?;
-    ensure(unit(material.occlusion_strength), || "occlusion strength is not from 0 to 1".into())?;
+    let emissive = material.emissive_linear;
+    ensure(emissive.is_finite() && emissive.min_element() >= 0.0, || "bad emissive colour".into())?;
+    ensure(is_share(material.metallic), || "metallic is not from 0 to 1".into())?;
+    ensure(is_share(material.roughness), || "roughness is not from 0 to 1".into())?;
+    ensure(is_share(material.occlusion_strength), || "occlusion strength is not from 0 to 1".into())?;
     ensure(material.normal_scale.is_finite(), || "normal scale is not finite".into())?;
     let reflectance = material.dielectric_reflectance_linear;
-    ensure(reflectance.to_array().into_iter().all(unit), || "bad dielectric reflectance".into())?;
+    ensure(reflectance.to_array().into_iter().all(is_share), || "bad dielectric reflectance".into())?;
     let phong = [material.phong_specular, material.phong_exponent, material.alpha_cutoff];
     ensure(phong.iter().all(|v| v.is_finite() && *v >= 0.0), || "bad Phong terms or alpha cutoff".into())
-}
-
-fn check_texture_use(name: &str, holds_colors: bool, used: TextureUse, textures: &[Texture]) -> Result<(), String> {
-    let number = used.texture;
-    let texture = textures.get(number as usize);
-    let texture = texture.ok_or_else(|| format!("its {name} texture {number} does not exist"))?;
-    ensure(holds_colors || !texture.is_srgb, || format!("its {name} texture holds colours"))
 }
 
 fn check_texture(texture: &Texture, limits: &Limits) -> Result<(), String> {
@@ -192,9 +242,13 @@ fn check_light(light: &Light) -> Result<(), LightError> {
             vec![("center", center_in_world), ("half_edges", u), ("half_edges", v)]
         }
     };
-    let is_near = |v: Vec3| v.abs().max_element() <= MAX_COORDINATE_M;
     let far = reach.into_iter().find(|(_, v)| !is_near(*v));
     far.map_or(Ok(()), |(field, _)| Err(LightError { field, reason: "over 1e9 m" }))
+}
+
+/// Returns whether all coordinates are within [`MAX_COORDINATE_M`], which NaN is not.
+fn is_near(v: Vec3) -> bool {
+    v.abs().max_element() <= MAX_COORDINATE_M
 }
 
 fn check_camera(camera: &SourceCamera) -> Result<(), String> {
@@ -211,6 +265,69 @@ fn check_wind(wind: &Wind) -> Result<(), Fault> {
     require(is_direction_valid && are_numbers_valid, "wind", "not finite or out of range")
 }
 
-fn is_radiance(colour: Vec3) -> bool {
-    colour.is_finite() && colour.min_element() >= 0.0
+fn check_animation_sizes(animation: &Animation, limits: &Limits) -> Result<(), Fault> {
+    let joints = animation.moving.iter().map(|moving| moving.joints.len() as u64).sum();
+    let influences = animation.moving.iter().map(|moving| moving.influences.len() as u64).sum();
+    let channels: u64 = animation.clips.iter().map(|clip| clip.channels.len() as u64).sum();
+    let keys = animation.clips.iter().flat_map(|clip| &clip.channels).map(|channel| channel.times_s.len() as u64);
+    at_most("animation, nodes", animation.nodes.len() as u64, limits.nodes)?;
+    at_most("animation, joints", joints, limits.nodes)?;
+    at_most("animation, vertices with joints", influences, limits.vertices)?;
+    at_most("animation, clips", animation.clips.len() as u64, limits.attributes)?;
+    at_most("animation, channels", channels, limits.json_objects)?;
+    at_most("animation, keys", keys.sum(), limits.keys)
+}
+
+fn check_node(node: &Node) -> Result<(), String> {
+    let is_rest_valid = match node.rest {
+        NodeTransform::Fixed(transform) => transform.is_finite(),
+        NodeTransform::Parts(TransformParts { translation, rotation, scale }) => {
+            translation.is_finite() && scale.is_finite() && is_unit(rotation)
+        }
+    };
+    ensure(is_rest_valid, || "its transform is not finite, or its rotation no unit quaternion".into())
+}
+
+/// The reason for which a channel cannot be played.
+fn check_channel(channel: &Channel, nodes: &[Node]) -> Result<(), String> {
+    let node = nodes.get(channel.node as usize);
+    let has_parts = node.is_some_and(|node| matches!(node.rest, NodeTransform::Parts(_)));
+    ensure(has_parts, || format!("node {} does not exist, or is fixed", channel.node))?;
+    check_times(&channel.times_s)?;
+    let stride = channel.interpolation.values_a_key();
+    let expected = channel.times_s.len() * stride;
+    ensure(channel.values.len() == expected, || {
+        format!("{} values where its keys need {expected}", channel.values.len())
+    })?;
+    for (number, value) in channel.values.iter().enumerate() {
+        ensure(value.is_finite(), || format!("value {number} is not finite"))?;
+    }
+    // Slopes of a spline have any length.
+    for (number, value) in channel.values.iter().enumerate().skip(stride / 2).step_by(stride) {
+        let is_valid = channel.property != Property::Rotation || is_unit(Quat::from_vec4(*value));
+        ensure(is_valid, || format!("value {number} is no unit quaternion"))?;
+    }
+    Ok(())
+}
+
+/// The reason for which times are no keys.
+pub(crate) fn check_times(times_s: &[f32]) -> Result<(), String> {
+    ensure(!times_s.is_empty(), || "it has no keys".into())?;
+    for (number, time) in times_s.iter().enumerate() {
+        ensure(time.is_finite() && *time >= 0.0, || format!("time {number} is negative or not finite"))?;
+    }
+    for (number, pair) in times_s.windows(2).enumerate() {
+        ensure(pair[0] <= pair[1], || format!("time {} is before the one before it", number + 1))?;
+    }
+    Ok(())
+}
+
+fn is_unit(rotation: Quat) -> bool {
+    (rotation.length_squared() - 1.0).abs() < ROUNDING
+}
+
+fn is_influence_valid(influence: &Influence, joints: usize) -> bool {
+    influence.weights.iter().all(|weight| (0.0..=1.0 + ROUNDING).contains(weight))
+        && (influence.weights.iter().sum::<f32>() - 1.0).abs() < ROUNDING
+        && influence.joints.iter().all(|&joint| usize::from(joint) < joints)
 }

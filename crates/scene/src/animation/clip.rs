@@ -95,14 +95,17 @@ impl Channel {
     /// The value of a key, without slopes.
     fn value(&self, key: usize) -> Vec4 {
         let stride = self.interpolation.values_a_key();
-        self.values.get(key * stride + stride / 2).copied().unwrap_or(Vec4::ZERO)
+        self.stored(key * stride + stride / 2)
+    }
+
+    fn stored(&self, index: usize) -> Vec4 {
+        self.values.get(index).copied().unwrap_or(Vec4::ZERO)
     }
 
     /// The cubic Hermite spline of glTF 2.0, appendix C.
     fn on_spline(&self, key: usize, span_s: f32, share: f32) -> Vec4 {
-        let at = |index: usize| self.values.get(index).copied().unwrap_or(Vec4::ZERO);
-        let slope_after = at(key * 3 + 2);
-        let slope_before_next = at((key + 1) * 3);
+        let slope_after = self.stored(key * 3 + 2);
+        let slope_before_next = self.stored((key + 1) * 3);
         let square = share * share;
         let cube = share * share * share;
         self.value(key) * (2.0 * cube - 3.0 * square + 1.0)

@@ -3,7 +3,8 @@
 use glam::{DAffine3, DQuat, DVec3, Quat, Vec3, Vec4Swizzles};
 use serde::{Deserialize, Serialize};
 
-use super::clip::{Clip, Property};
+use super::Animation;
+use super::clip::Property;
 
 /// A place that moves with its parent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -61,31 +62,31 @@ impl NodeTransform {
     }
 }
 
-/// The transforms of all nodes at a time of a clip, or at rest.
-pub(super) fn world_from_nodes(
-    nodes: &[Node],
-    world_from_source: &DAffine3,
-    clip: Option<(&Clip, f32)>,
-) -> Vec<DAffine3> {
-    let mut transforms: Vec<NodeTransform> = nodes.iter().map(|node| node.rest).collect();
-    if let Some((clip, clip_time_s)) = clip {
-        for channel in &clip.channels {
-            if let Some(NodeTransform::Parts(parts)) = transforms.get_mut(channel.node as usize) {
-                let value = channel.value_at(clip_time_s);
-                match channel.property {
-                    Property::Translation => parts.translation = value.xyz(),
-                    Property::Rotation => parts.rotation = Quat::from_vec4(value),
-                    Property::Scale => parts.scale = value.xyz(),
+impl Animation {
+    /// The transforms of all nodes at a scene time. The clip that plays repeats.
+    #[must_use]
+    pub fn world_from_nodes(&self, scene_time_s: f32) -> Vec<DAffine3> {
+        let mut transforms: Vec<NodeTransform> = self.nodes.iter().map(|node| node.rest).collect();
+        if let Some(clip) = self.clip() {
+            let clip_time_s = clip.time_s(scene_time_s);
+            for channel in &clip.channels {
+                if let Some(NodeTransform::Parts(parts)) = transforms.get_mut(channel.node as usize) {
+                    let value = channel.value_at(clip_time_s);
+                    match channel.property {
+                        Property::Translation => parts.translation = value.xyz(),
+                        Property::Rotation => parts.rotation = Quat::from_vec4(value),
+                        Property::Scale => parts.scale = value.xyz(),
+                    }
                 }
             }
         }
+        let mut placed: Vec<DAffine3> = Vec::with_capacity(self.nodes.len());
+        for (node, transform) in self.nodes.iter().zip(&transforms) {
+            let parent = node.parent.and_then(|parent| placed.get(parent as usize));
+            placed.push(*parent.unwrap_or(&self.world_from_source) * transform.parent_from_node());
+        }
+        placed
     }
-    let mut placed: Vec<DAffine3> = Vec::with_capacity(nodes.len());
-    for (node, transform) in nodes.iter().zip(&transforms) {
-        let parent = node.parent.and_then(|parent| placed.get(parent as usize)).unwrap_or(world_from_source);
-        placed.push(*parent * transform.parent_from_node());
-    }
-    placed
 }
 
 /// Whether a transform has an inverse, by the share of its determinant in the cube of its longest column.

@@ -9,7 +9,6 @@ use image::ImageDecoder as _;
 use image::codecs::hdr::HdrDecoder;
 
 use super::folder::Folder;
-use super::missing_textures::MissingTextures;
 use crate::error::Fault;
 use crate::{Limits, SceneError};
 
@@ -26,12 +25,12 @@ const MAX_RADIANCE: f32 = 65_408.0;
 /// # Errors
 /// The file, the element at fault, and the reason.
 pub fn load_environment(path: &Path) -> Result<EnvironmentMap, SceneError> {
-    read(path).map_err(|fault| fault.in_path(path))
+    read(path).map_err(|fault| fault.in_file(path.display().to_string()))
 }
 
 fn read(path: &Path) -> Result<EnvironmentMap, Fault> {
     let limits = Limits { file_bytes: MAX_FILE_BYTES, ..Limits::default() };
-    let (_, bytes) = Folder::opened_with(path, &limits, MissingTextures::Refuse)?;
+    let (_, bytes) = Folder::open(path, &limits)?;
     let (size_px, radiance_linear) = decoded(&with_plain_line_ends(&bytes))?;
     let clamped = radiance_linear.iter().filter(|radiance| radiance.max_element() > MAX_RADIANCE).count();
     let (reduced_px, radiance_linear) = reduced(size_px, radiance_linear);
@@ -73,11 +72,10 @@ fn with_plain_line_ends(bytes: &[u8]) -> Cow<'_, [u8]> {
 
 /// Size and radiances, row by row.
 fn decoded(bytes: &[u8]) -> Result<(UVec2, Vec<Vec3>), Fault> {
-    let failed = |part| move |e: image::ImageError| malformed(&format!("{part}: {e}"));
     // Some programs write another name into the first line; all else is equal.
     let is_named_otherwise = bytes.starts_with(b"#?RGBE");
     let open = if is_named_otherwise { HdrDecoder::new_nonstrict } else { HdrDecoder::new };
-    let decoder = open(bytes).map_err(failed("header"))?;
+    let decoder = open(bytes).map_err(|e| malformed(&format!("header: {e}")))?;
     let size_px = UVec2::from(decoder.dimensions());
     if size_px.min_element() == 0 || size_px.cmpgt(MAX_FILE_SIZE_PX).any() {
         let UVec2 { x, y } = size_px;
@@ -85,7 +83,8 @@ fn decoded(bytes: &[u8]) -> Result<(UVec2, Vec<Vec3>), Fault> {
     }
     let scale = scale_of(&decoder)?;
     let mut texels = vec![Vec3::ZERO; size_px.element_product() as usize];
-    decoder.read_image(bytemuck::cast_slice_mut(&mut texels)).map_err(failed("texels"))?;
+    let read = decoder.read_image(bytemuck::cast_slice_mut(&mut texels));
+    read.map_err(|e| malformed(&format!("texels: {e}")))?;
     texels.iter_mut().for_each(|texel| *texel *= scale);
     Ok((size_px, texels))
 }
@@ -96,8 +95,10 @@ fn scale_of(decoder: &HdrDecoder<&[u8]>) -> Result<Vec3, Fault> {
     let (r, g, b) = header.color_correction.unwrap_or((1.0, 1.0, 1.0));
     let divisor = Vec3::new(r, g, b) * header.exposure.unwrap_or(1.0);
     let is_usable = divisor.is_finite() && divisor.min_element() > 0.0 && divisor.recip().is_finite();
-    let refusal = || malformed(&format!("EXPOSURE and COLORCORR: {divisor} is not positive and finite"));
-    is_usable.then(|| divisor.recip()).ok_or_else(refusal)
+    if !is_usable {
+        return Err(malformed(&format!("EXPOSURE and COLORCORR: {divisor} is not positive and finite")));
+    }
+    Ok(divisor.recip())
 }
 
 /// Means of squares of texels, where there are too many.
@@ -107,15 +108,15 @@ fn reduced(size_px: UVec2, texels: Vec<Vec3>) -> (UVec2, Vec<Vec3>) {
         return (size_px, texels);
     }
     let reduced_px = (size_px + side - 1) / side;
-    let mean = |place: UVec2| {
+    let places = (0..reduced_px.y).flat_map(|y| (0..reduced_px.x).map(move |x| UVec2::new(x, y)));
+    let means = places.map(|place| {
         let first = place * side;
         let end = ((place + 1) * side).min(size_px);
         let rows = (first.y..end.y).map(|y| (y * size_px.x) as usize);
         let sum: Vec3 = rows.flat_map(|row| &texels[row + first.x as usize..row + end.x as usize]).sum();
         sum / (end - first).element_product() as f32
-    };
-    let places = (0..reduced_px.y).flat_map(|y| (0..reduced_px.x).map(move |x| UVec2::new(x, y)));
-    (reduced_px, places.map(mean).collect())
+    });
+    (reduced_px, means.collect())
 }
 
 #[cfg(test)]

@@ -91,7 +91,6 @@ impl Box3 {
     }
 
     pub(super) fn corners(&self) -> [DVec3; 8] {
-        let is_max = |i: usize| BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0);
-        std::array::from_fn(|i| DVec3::select(is_max(i), self.max, self.min))
+        std::array::from_fn(|i| DVec3::select(BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), self.max, self.min))
     }
 }

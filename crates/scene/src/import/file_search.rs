@@ -57,13 +57,13 @@ fn distinct<T: PartialEq + Copy>(items: &[T]) -> Vec<T> {
 /// the name counts without its query (`?…`), and then without regard to upper and lower case. `None` for a file that
 /// does not exist.
 pub(crate) fn read_uri(folder: &Folder, element: &str, uri: &str) -> Result<Option<Vec<u8>>, Fault> {
-    let decoded = |uri| percent_decode_str(uri).decode_utf8();
-    let name = decoded(uri).map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
+    let name = percent_decode_str(uri).decode_utf8();
+    let name = name.map_err(|_| Fault::forbidden(element, uri, "is not UTF-8 once decoded"))?;
     if let Some(bytes) = existing(folder.read_name(element, &name))? {
         return Ok(Some(bytes));
     }
-    let path = uri.split(['?', '#']).next().and_then(|path| decoded(path).ok()).filter(|path| !path.is_empty());
-    let Some(path) = path else { return Ok(None) };
+    let path = uri.split(['?', '#']).next().and_then(|path| percent_decode_str(path).decode_utf8().ok());
+    let Some(path) = path.filter(|path| !path.is_empty()) else { return Ok(None) };
     if let Some(bytes) = existing(folder.read_name(element, &path))? {
         return Ok(Some(bytes));
     }
@@ -84,7 +84,7 @@ fn by_last_part(folder: &Folder, bases: &[&Path], names: &[&[u8]], warnings: &Wa
     for matching in [Matching::Exact, Matching::Loose] {
         for name in names {
             let parts = ReferredName::parse(name).parts;
-            let Some(last) = parts.last().filter(|last| !is_special(last)) else { continue };
+            let Some(last) = parts.last().filter(|last| **last != b".." && !last.contains(&0)) else { continue };
             for base in bases {
                 if let Found::File(path) = resolved(folder, base, &[last], matching) {
                     let name = shortened(decoded(name).into_owned());
@@ -108,7 +108,6 @@ struct ReferredName<'n> {
 
 impl<'n> ReferredName<'n> {
     fn parse(name: &'n [u8]) -> Self {
-        let is_separator = |byte: &u8| matches!(byte, b'/' | b'\\');
         let has_scheme = name.split(is_separator).next().is_some_and(|first| first.contains(&b':'));
         let is_absolute = has_scheme || name.first().is_some_and(is_separator);
         // A drive may stand before a name without a separator: `C:t.png`.
@@ -118,8 +117,8 @@ impl<'n> ReferredName<'n> {
     }
 }
 
-fn is_special(part: &[u8]) -> bool {
-    part == b".." || part.contains(&0)
+fn is_separator(byte: &u8) -> bool {
+    matches!(byte, b'/' | b'\\')
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -142,9 +141,9 @@ fn resolved(folder: &Folder, base: &Path, parts: &[&[u8]], matching: Matching) -
         relative.push(name);
     }
     let is_normal = relative.components().all(|c| matches!(c, Component::Normal(_)));
-    match folder.root().join(&relative).canonicalize() {
+    match folder.root.join(&relative).canonicalize() {
         _ if parts.is_empty() || !is_normal => Found::Missing,
-        Ok(path) if !path.starts_with(folder.root()) => Found::Outside("is a link that leaves the scene's folder"),
+        Ok(path) if !path.starts_with(&folder.root) => Found::Outside("is a link that leaves the scene's folder"),
         Ok(path) if path.is_file() => Found::File(relative),
         _ => Found::Missing,
     }
@@ -155,7 +154,7 @@ fn entry_name(folder: &Folder, relative: &Path, part: &[u8], matching: Matching)
     if part.contains(&0) {
         return None;
     }
-    let path = folder.root().join(relative);
+    let path = folder.root.join(relative);
     let exact = os_name(part).filter(|name| path.join(name).symlink_metadata().is_ok());
     if exact.is_some() || matching == Matching::Exact {
         return exact;
@@ -177,7 +176,6 @@ fn os_name(part: &[u8]) -> Option<OsString> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::missing_textures::MissingTextures;
     use super::*;
     use crate::Limits;
 
@@ -188,8 +186,7 @@ mod tests {
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::write(path, b"x").unwrap();
         }
-        let (folder, _) =
-            Folder::opened_with(&dir.path().join("scene/a.obj"), &Limits::default(), MissingTextures::Refuse).unwrap();
+        let (folder, _) = Folder::open(&dir.path().join("scene/a.obj"), &Limits::default()).unwrap();
         let bases: Vec<&Path> = bases.iter().map(Path::new).collect();
         match search(&folder, &bases, &[name], &Warnings::default()) {
             Found::File(path) => path.display().to_string(),
@@ -220,7 +217,7 @@ mod tests {
             std::fs::write(dir.path().join(format!("T{number}.PNG")), b"x").unwrap();
         }
         let limits = Limits::default();
-        let (folder, _) = Folder::opened_with(&dir.path().join("a.obj"), &limits, MissingTextures::Refuse).unwrap();
+        let (folder, _) = Folder::open(&dir.path().join("a.obj"), &limits).unwrap();
         let warnings = Warnings::default();
         let bases = [Path::new(""), Path::new("")];
         for number in 0..100 {

@@ -8,34 +8,25 @@ use std::path::{Component, Path, PathBuf};
 use std::rc::Rc;
 
 use super::listing::Listing;
-use super::missing_textures::MissingTextures;
 use crate::error::{Fault, at_most};
 use crate::{Limits, SceneErrorKind};
 
 /// A scene's folder. No file outside it is read, and the bytes of all files together are limited.
 pub(crate) struct Folder {
-    canonical_root: PathBuf,
+    /// The folder's path, without links.
+    pub(crate) root: PathBuf,
     bytes_left: Cell<u64>,
     /// The names in folders that were searched, by the folder's path below this one.
     listings: RefCell<HashMap<PathBuf, Rc<Listing>>>,
-    pub(crate) missing_textures: MissingTextures,
 }
 
 impl Folder {
     /// Opens the folder of the scene file `path`; returns it with that file's bytes.
-    pub(crate) fn opened_with(
-        path: &Path,
-        limits: &Limits,
-        missing_textures: MissingTextures,
-    ) -> Result<(Self, Vec<u8>), Fault> {
+    pub(crate) fn open(path: &Path, limits: &Limits) -> Result<(Self, Vec<u8>), Fault> {
         let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let canonical_root = parent.canonicalize().map_err(|e| Fault::io("folder", e))?;
-        let folder = Self {
-            canonical_root,
-            bytes_left: Cell::new(limits.file_bytes),
-            listings: RefCell::default(),
-            missing_textures,
-        };
+        let root = parent.canonicalize().map_err(|e| Fault::io("folder", e))?;
+        let bytes_left = Cell::new(limits.file_bytes);
+        let folder = Self { root, bytes_left, listings: RefCell::default() };
         let bytes = folder.read_path("file", path)?;
         Ok((folder, bytes))
     }
@@ -50,26 +41,21 @@ impl Folder {
         self.read_relative(element, Path::new(&relative))
     }
 
-    /// The folder's path, without links.
-    pub(crate) fn root(&self) -> &Path {
-        &self.canonical_root
-    }
-
     /// The names in a folder below this one, which is read once.
     pub(super) fn listing(&self, relative: &Path) -> Rc<Listing> {
         let mut listings = self.listings.borrow_mut();
         if let Some(listing) = listings.get(relative) {
             return Rc::clone(listing);
         }
-        let listing = Rc::new(Listing::read(&self.canonical_root.join(relative)));
+        let listing = Rc::new(Listing::read(&self.root.join(relative)));
         listings.insert(relative.to_owned(), Rc::clone(&listing));
         listing
     }
 
     /// Reads a file by a path below this folder, as a search finds it.
     pub(crate) fn read_relative(&self, element: &str, relative: &Path) -> Result<Vec<u8>, Fault> {
-        let path = self.canonical_root.join(relative).canonicalize().map_err(|e| Fault::io(element, e))?;
-        if !path.starts_with(&self.canonical_root) {
+        let path = self.root.join(relative).canonicalize().map_err(|e| Fault::io(element, e))?;
+        if !path.starts_with(&self.root) {
             let name = relative.display().to_string();
             return Err(Fault::forbidden(element, &name, "is a link that leaves the scene's folder"));
         }
@@ -93,8 +79,10 @@ impl Folder {
 
 /// `None` for a file that does not exist.
 pub(crate) fn existing(read: Result<Vec<u8>, Fault>) -> Result<Option<Vec<u8>>, Fault> {
-    let is_missing = |kind: &_| matches!(kind, SceneErrorKind::Io(e) if e.kind() == std::io::ErrorKind::NotFound);
-    read.map(Some).or_else(|fault| if is_missing(&fault.kind) { Ok(None) } else { Err(fault) })
+    match read {
+        Err(Fault { kind: SceneErrorKind::Io(e), .. }) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        other => other.map(Some),
+    }
 }
 
 fn reason_to_refuse(relative: &str) -> Option<&'static str> {
@@ -117,17 +105,13 @@ mod tests {
     use super::super::file_search::read_uri;
     use super::*;
 
-    fn opened(path: &Path, limits: &Limits) -> Result<(Folder, Vec<u8>), Fault> {
-        Folder::opened_with(path, limits, MissingTextures::Refuse)
-    }
-
     fn folder_with_file() -> (tempfile::TempDir, Folder) {
         let dir = tempfile::tempdir().unwrap();
         std::fs::create_dir(dir.path().join("scene")).unwrap();
         std::fs::write(dir.path().join("secret.bin"), b"secret").unwrap();
         std::fs::write(dir.path().join("scene/a.gltf"), b"{}").unwrap();
         std::fs::write(dir.path().join("scene/a b.bin"), b"inside").unwrap();
-        let (folder, bytes) = opened(&dir.path().join("scene/a.gltf"), &Limits::default()).unwrap();
+        let (folder, bytes) = Folder::open(&dir.path().join("scene/a.gltf"), &Limits::default()).unwrap();
         assert_eq!(bytes, b"{}");
         (dir, folder)
     }
@@ -185,7 +169,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("a.gltf"), [0; 60]).unwrap();
         let limits = Limits { file_bytes: 100, ..Limits::default() };
-        let (folder, _) = opened(&dir.path().join("a.gltf"), &limits).unwrap();
+        let (folder, _) = Folder::open(&dir.path().join("a.gltf"), &limits).unwrap();
         let fault = folder.read_name("buffer 0", "a.gltf").unwrap_err().in_file("a.gltf");
         assert!(matches!(fault.kind, SceneErrorKind::TooLarge { actual: 60, limit: 40 }), "{fault}");
     }

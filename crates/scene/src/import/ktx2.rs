@@ -18,24 +18,10 @@ pub(crate) fn is_ktx2(bytes: &[u8]) -> bool {
     bytes.starts_with(&MAGIC)
 }
 
-/// Columns and rows. The error is the reason for which the picture is not read, with advice.
+/// Columns and rows. The error is the reason for which the picture is not read.
 pub(crate) fn size_px(bytes: &[u8]) -> Result<(u32, u32), String> {
-    checked_size_px(bytes).map_err(with_advice)
-}
-
-/// The texels of the largest level, RGBA, row by row. The caller has checked [`size_px`] against its limits.
-pub(crate) fn rgba8(bytes: &[u8]) -> Result<Vec<u8>, String> {
-    transcoded(bytes).map_err(with_advice)
-}
-
-fn with_advice(reason: String) -> String {
-    format!("{reason}; `npx @gltf-transform/cli ktxdecompress IN OUT` converts a file that is intact")
-}
-
-fn checked_size_px(bytes: &[u8]) -> Result<(u32, u32), String> {
     let header = bytes.get(..HEADER_BYTES).ok_or("its KTX2 header is cut off")?;
     let word = |at: usize| u32::from_le_bytes([header[at], header[at + 1], header[at + 2], header[at + 3]]);
-    let long = |at: usize| u64::from(word(at)) | u64::from(word(at + 4)) << 32;
     let [vulkan_format, width_px, height_px, depth_px] = [word(12), word(20), word(24), word(28)];
     let [layers, faces, scheme] = [word(32), word(36), word(44)];
     if vulkan_format != 0 {
@@ -45,7 +31,7 @@ fn checked_size_px(bytes: &[u8]) -> Result<(u32, u32), String> {
         return Err("its KTX2 holds something other than one flat picture".into());
     }
     let blocks = u64::from(width_px).div_ceil(BLOCK_SIDE_PX) * u64::from(height_px).div_ceil(BLOCK_SIDE_PX);
-    let decoded_bytes = long(96);
+    let decoded_bytes = u64::from(word(96)) | u64::from(word(100)) << 32;
     match scheme {
         PLAIN | BASIS_LZ => {}
         ZSTANDARD if decoded_bytes == blocks * UASTC_BLOCK_BYTES => {}
@@ -55,9 +41,9 @@ fn checked_size_px(bytes: &[u8]) -> Result<(u32, u32), String> {
     Ok((width_px, height_px))
 }
 
-fn transcoded(bytes: &[u8]) -> Result<Vec<u8>, String> {
-    let (width_px, height_px) = checked_size_px(bytes)?;
-    let damaged = |error: basisu::Error| format!("its KTX2 is cut off, damaged, or not Basis Universal: {error:?}");
+/// The texels of the largest level, RGBA, row by row. The caller has checked [`size_px`] against its limits.
+pub(crate) fn rgba8(bytes: &[u8]) -> Result<Vec<u8>, String> {
+    let (width_px, height_px) = size_px(bytes)?;
     let transcoder = Transcoder::new(bytes).map_err(damaged)?;
     if transcoder.is_video() || !transcoder.supports(TargetFormat::Rgba32) {
         return Err("its KTX2 holds a video, or high dynamic range".into());
@@ -65,4 +51,8 @@ fn transcoded(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let texels = transcoder.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE).map_err(damaged)?;
     let expected = u64::from(width_px) * u64::from(height_px) * 4;
     if texels.len() as u64 == expected { Ok(texels) } else { Err("its KTX2 decodes to another size".into()) }
+}
+
+fn damaged(error: basisu::Error) -> String {
+    format!("its KTX2 is cut off, damaged, or not Basis Universal: {error:?}")
 }

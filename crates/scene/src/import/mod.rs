@@ -1,7 +1,6 @@
 //! Import of scene files. Each format fills a [`source_scene::SourceScene`] in double precision. Its `finish` does the
 //! common steps: re-centring, mirrored placements, limits, validation.
 
-mod clamped;
 mod environment;
 mod extent;
 mod file_search;
@@ -9,7 +8,6 @@ mod folder;
 mod gltf;
 mod ktx2;
 mod listing;
-mod missing_textures;
 mod normals;
 mod obj;
 mod options;
@@ -28,8 +26,7 @@ use crate::error::Fault;
 use crate::{Limits, Scene, SceneError};
 pub use environment::load_environment;
 use folder::Folder;
-pub use missing_textures::{MissingTextures, MissingTexturesError};
-pub use options::ImportOptions;
+pub use options::{ImportOptions, MissingTextures, MissingTexturesError};
 use source_scene::SourceScene;
 use warnings::Warnings;
 
@@ -47,41 +44,32 @@ use warnings::Warnings;
 pub fn load_file(path: &Path, limits: &Limits, options: impl Into<ImportOptions>) -> Result<Scene, SceneError> {
     let _importing = tracing::warn_span!("import", file = %path.display()).entered();
     let scene = read_source(path, limits, &options.into()).and_then(|source| source.finish(limits));
-    scene.map_err(|fault| fault.in_path(path))
+    scene.map_err(|fault| fault.in_file(path.display().to_string()))
+}
+
+/// What the readers of all formats share: where files are, how large they may be, and where warnings go.
+pub(crate) struct Import<'a> {
+    pub folder: Folder,
+    pub limits: &'a Limits,
+    pub options: &'a ImportOptions,
+    pub warnings: Warnings,
 }
 
 fn read_source(path: &Path, limits: &Limits, options: &ImportOptions) -> Result<SourceScene, Fault> {
-    let format = Format::from_path(path)?;
-    let (folder, bytes) = Folder::opened_with(path, limits, options.missing_textures)?;
-    let warnings = Warnings::default();
-    let read = match format {
-        Format::Gltf => gltf::read(&bytes, &folder, limits, &options.ignore_required, &warnings),
-        Format::Obj => obj::read(&bytes, &folder, limits, &warnings),
-        Format::Ply => ply::read(&bytes, &folder, limits, &warnings),
-    };
-    warnings.log();
-    let mut source = read?;
-    source.name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    Ok(source)
-}
-
-enum Format {
-    Gltf,
-    Obj,
-    Ply,
-}
-
-impl Format {
-    fn from_path(path: &Path) -> Result<Self, Fault> {
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-        match extension.as_str() {
-            "gltf" | "glb" => Ok(Self::Gltf),
-            "obj" => Ok(Self::Obj),
-            "ply" => Ok(Self::Ply),
-            _ => {
-                let known = format!("extension {extension:?}; known are gltf, glb, obj and ply");
-                Err(Fault::unsupported("file name", known))
-            }
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let read: fn(&[u8], &Import) -> Result<SourceScene, Fault> = match extension.as_str() {
+        "gltf" | "glb" => gltf::read,
+        "obj" => obj::read,
+        "ply" => ply::read,
+        _ => {
+            let known = format!("extension {extension:?}; known are gltf, glb, obj and ply");
+            return Err(Fault::unsupported("file name", known));
         }
-    }
+    };
+    let (folder, bytes) = Folder::open(path, limits)?;
+    let import = Import { folder, limits, options, warnings: Warnings::default() };
+    let source = read(&bytes, &import);
+    import.warnings.log();
+    let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    Ok(SourceScene { name, ..source? })
 }

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::source_scene::SourceMesh;
+use crate::Vertex;
 
 /// Smooth, with edges sharper than 60° kept, for formats without shading information.
 pub(crate) const CREASE_60_DEGREES: f64 = 0.5;
@@ -28,8 +29,7 @@ pub(crate) fn fill(mesh: &mut SourceMesh, is_flat: impl Fn(usize) -> bool) {
         vertex.normal = normal.unwrap_or(DVec3::ZERO).as_vec3().to_array();
     }
     turn_to_given_normals(mesh, &is_given);
-    let crease_cosine = |triangle| if is_flat(triangle) { FLAT } else { CREASE_60_DEGREES };
-    compute(mesh, &is_given, crease_cosine);
+    compute(mesh, &is_given, |triangle| if is_flat(triangle) { FLAT } else { CREASE_60_DEGREES });
 }
 
 fn turn_to_given_normals(mesh: &mut SourceMesh, is_given: &[bool]) {
@@ -45,13 +45,8 @@ fn turn_to_given_normals(mesh: &mut SourceMesh, is_given: &[bool]) {
     }
 }
 
-/// Makes normals for a source without normals, and fills gaps otherwise.
-pub(crate) fn complete(mesh: &mut SourceMesh, has_normals: bool, crease_cosine: f64) {
-    if has_normals { repair(mesh) } else { generate(mesh, crease_cosine) }
-}
-
 /// Sets every normal; may add vertices.
-fn generate(mesh: &mut SourceMesh, crease_cosine: f64) {
+pub(crate) fn generate(mesh: &mut SourceMesh, crease_cosine: f64) {
     compute(mesh, &vec![false; mesh.vertices.len()], |_| crease_cosine);
 }
 
@@ -74,11 +69,13 @@ fn compute(mesh: &mut SourceMesh, is_given: &[bool], crease_cosine: impl Fn(usiz
         let around = corners_at.around(vertex);
         let normal = faces.smooth_normal(corner, around, crease_cosine).as_vec3().to_array();
         let is_first = !std::mem::replace(&mut is_set[vertex as usize], true);
-        mesh.indices[corner] = if is_hub(around) {
-            copies.with_normal_at_hub(mesh, vertex, normal, is_first)
+        if is_first {
+            mesh.vertices[vertex as usize].normal = normal;
+        } else if is_hub(around) {
+            mesh.indices[corner] = copies.with_normal_at_hub(mesh, vertex, normal);
         } else {
-            copies.with_normal(mesh, vertex, normal, is_first)
-        };
+            mesh.indices[corner] = copies.with_normal(mesh, vertex, normal);
+        }
     }
     // Vertices without a triangle are never drawn, but must be valid.
     let unused = is_set.iter().enumerate().filter(|(_, set)| !**set);
@@ -86,14 +83,13 @@ fn compute(mesh: &mut SourceMesh, is_given: &[bool], crease_cosine: impl Fn(usiz
 }
 
 /// Normalises the given normals, and replaces those of zero length by the mean of their faces.
-fn repair(mesh: &mut SourceMesh) {
-    let length = |n: [f32; 3]| DVec3::from(n.map(f64::from)).length();
-    if mesh.vertices.iter().any(|v| length(v.normal) < 1e-6) {
+pub(crate) fn repair(mesh: &mut SourceMesh) {
+    if mesh.vertices.iter().any(has_no_normal) {
         let faces = Faces::of(mesh);
         let corners_at = CornersByPosition::of(mesh);
         for corner in 0..mesh.indices.len() {
             let vertex = mesh.indices[corner];
-            if length(mesh.vertices[vertex as usize].normal) < 1e-6 {
+            if has_no_normal(&mesh.vertices[vertex as usize]) {
                 let normal = faces.smooth_normal(corner, corners_at.around(vertex), -2.0);
                 mesh.vertices[vertex as usize].normal = normal.as_vec3().to_array();
             }
@@ -105,6 +101,10 @@ fn repair(mesh: &mut SourceMesh) {
     }
 }
 
+fn has_no_normal(vertex: &Vertex) -> bool {
+    DVec3::from(vertex.normal.map(f64::from)).length() < 1e-6
+}
+
 /// The copies of vertices whose corners disagree.
 struct Copies {
     /// The copies of a vertex form a chain, which is at most as long as the number of corners around the vertex.
@@ -114,12 +114,8 @@ struct Copies {
 }
 
 impl Copies {
-    /// The vertex itself for its first corner, or else its copy with this normal, which may be a new one.
-    fn with_normal(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3], is_first: bool) -> u32 {
-        if is_first {
-            mesh.vertices[vertex as usize].normal = normal;
-            return vertex;
-        }
+    /// The vertex or its copy with about this normal, which may be a new one.
+    fn with_normal(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3]) -> u32 {
         let mut at = vertex as usize;
         loop {
             if is_same_direction(mesh.vertices[at].normal, normal) {
@@ -136,19 +132,16 @@ impl Copies {
     }
 
     /// Does what [`Self::with_normal`] does, in constant time.
-    fn with_normal_at_hub(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3], is_first: bool) -> u32 {
-        let key = (vertex, normal.map(|c| (c / SAME_DIRECTION).round() as i32));
-        if let Some(&copy) = self.at_hub.get(&key) {
+    fn with_normal_at_hub(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3]) -> u32 {
+        if rounded(mesh.vertices[vertex as usize].normal) == rounded(normal) {
+            return vertex;
+        }
+        if let Some(&copy) = self.at_hub.get(&(vertex, rounded(normal))) {
             return copy;
         }
-        let number = if is_first {
-            mesh.vertices[vertex as usize].normal = normal;
-            vertex
-        } else {
-            self.add(mesh, vertex, normal)
-        };
-        self.at_hub.insert(key, number);
-        number
+        let copy = self.add(mesh, vertex, normal);
+        self.at_hub.insert((vertex, rounded(normal)), copy);
+        copy
     }
 
     fn add(&mut self, mesh: &mut SourceMesh, vertex: u32, normal: [f32; 3]) -> u32 {
@@ -162,6 +155,10 @@ impl Copies {
 /// Whether so many corners meet at a point that they are not compared with each other.
 fn is_hub(around: &[u32]) -> bool {
     around.len() > MAX_CORNERS_COMPARED
+}
+
+fn rounded(normal: [f32; 3]) -> [i32; 3] {
+    normal.map(|c| (c / SAME_DIRECTION).round() as i32)
 }
 
 fn is_same_direction(a: [f32; 3], b: [f32; 3]) -> bool {
@@ -191,14 +188,14 @@ impl Faces {
         if !compares && crease_cosine == FLAT {
             return own.try_normalize().unwrap_or(DVec3::Y);
         }
-        let weighted = |&other: &u32| {
+        // A hub's sum would be as long for each of its corners; a stride keeps the total linear.
+        let stride = if compares { 1 } else { around.len() / MAX_CORNERS_COMPARED };
+        let weighted = around.iter().step_by(stride).map(|&other| {
             let normal = self.normals[other as usize / 3];
             let joins = !compares || normal.dot(own) >= crease_cosine;
             if joins { normal * self.corner_angles_rad[other as usize] } else { DVec3::ZERO }
-        };
-        // A hub's sum would be as long for each of its corners; a stride keeps the total linear.
-        let stride = if compares { 1 } else { around.len() / MAX_CORNERS_COMPARED };
-        let sum: DVec3 = around.iter().step_by(stride).map(weighted).sum();
+        });
+        let sum: DVec3 = weighted.sum();
         sum.try_normalize().or_else(|| own.try_normalize()).unwrap_or(DVec3::Y)
     }
 }
@@ -247,12 +244,11 @@ impl CornersByPosition {
 
 fn groups_by_position(positions: &[DVec3]) -> Vec<u32> {
     let mut group_of: HashMap<[u64; 3], u32> = HashMap::with_capacity(positions.len());
-    let key = |p: &DVec3| (*p + DVec3::ZERO).to_array().map(f64::to_bits);
-    let mut group = |p| {
+    let groups = positions.iter().map(|p| {
         let next = group_of.len() as u32;
-        *group_of.entry(key(p)).or_insert(next)
-    };
-    positions.iter().map(&mut group).collect()
+        *group_of.entry((*p + DVec3::ZERO).to_array().map(f64::to_bits)).or_insert(next)
+    });
+    groups.collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! What the reader of a scene file does where the file asks for something that is not there or not known.
 
-use super::missing_textures::MissingTextures;
+use std::fmt;
+use std::str::FromStr;
 
 /// Options of [`load_file`](super::load_file).
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -14,5 +15,35 @@ pub struct ImportOptions {
 impl From<MissingTextures> for ImportOptions {
     fn from(missing_textures: MissingTextures) -> Self {
         Self { missing_textures, ..Self::default() }
+    }
+}
+
+/// What is done about missing textures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MissingTextures {
+    /// The scene is refused, and all missing files are named.
+    #[default]
+    Refuse,
+    /// A grey texel takes the place of each.
+    Grey,
+}
+
+/// A text that names no choice.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0:?} is neither refuse nor grey")]
+pub struct MissingTexturesError(String);
+
+impl FromStr for MissingTextures {
+    type Err = MissingTexturesError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let named = [Self::Refuse, Self::Grey].into_iter().find(|choice| choice.to_string() == text);
+        named.ok_or_else(|| MissingTexturesError(text.to_owned()))
+    }
+}
+
+impl fmt::Display for MissingTextures {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if *self == Self::Refuse { "refuse" } else { "grey" })
     }
 }

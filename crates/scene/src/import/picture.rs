@@ -6,7 +6,7 @@ use image::{ImageFormat, ImageReader};
 use rayon::prelude::*;
 
 use super::ktx2;
-use super::missing_textures::MissingTextures;
+use super::options::MissingTextures;
 use crate::error::{Fault, at_most};
 use crate::{Limits, SceneErrorKind, Texture};
 
@@ -30,10 +30,6 @@ impl Content {
             Self::Data => [255; 4],
             Self::Normals => [128, 128, 255, 255],
         }
-    }
-
-    fn is_srgb(self) -> bool {
-        self == Self::Colors
     }
 }
 
@@ -85,22 +81,25 @@ fn reader<'b>(picture: &EncodedPicture, bytes: &'b [u8]) -> Result<ImageReader<C
 
 fn size_px(picture: &EncodedPicture, bytes: &[u8]) -> Result<(u32, u32), Fault> {
     if ktx2::is_ktx2(bytes) {
-        return ktx2::size_px(bytes).map_err(|reason| Fault::malformed(&picture.element, reason));
+        return ktx2::size_px(bytes).map_err(|reason| ktx2_fault(picture, &reason));
     }
     reader(picture, bytes)?.into_dimensions().map_err(|e| Fault::malformed(&picture.element, e.to_string()))
 }
 
-/// The texture in place of a missing one.
-fn stand_in(content: Content) -> Texture {
-    Texture { width_px: 1, height_px: 1, is_srgb: content.is_srgb(), srgba8: content.stand_in().to_vec() }
+fn ktx2_fault(picture: &EncodedPicture, reason: &str) -> Fault {
+    let advice = "`npx @gltf-transform/cli ktxdecompress IN OUT` converts a file that is intact";
+    Fault::malformed(&picture.element, format!("{reason}; {advice}"))
 }
 
 fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
-    let Some(bytes) = &picture.bytes else { return Ok(stand_in(picture.content)) };
+    let is_srgb = picture.content == Content::Colors;
+    let Some(bytes) = &picture.bytes else {
+        return Ok(Texture { width_px: 1, height_px: 1, is_srgb, srgba8: picture.content.stand_in().to_vec() });
+    };
     if ktx2::is_ktx2(bytes) {
         let (width_px, height_px) = size_px(picture, bytes)?;
-        let srgba8 = ktx2::rgba8(bytes).map_err(|reason| Fault::malformed(&picture.element, reason))?;
-        return Ok(Texture { width_px, height_px, is_srgb: picture.content.is_srgb(), srgba8 });
+        let srgba8 = ktx2::rgba8(bytes).map_err(|reason| ktx2_fault(picture, &reason))?;
+        return Ok(Texture { width_px, height_px, is_srgb, srgba8 });
     }
     let mut reader = reader(picture, bytes)?;
     let mut image_limits = image::Limits::default();
@@ -111,7 +110,7 @@ fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
     reader.limits(image_limits);
     let pixels = reader.decode().map_err(|e| Fault::malformed(&picture.element, e.to_string()))?.into_rgba8();
     let (width_px, height_px) = pixels.dimensions();
-    Ok(Texture { width_px, height_px, is_srgb: picture.content.is_srgb(), srgba8: pixels.into_raw() })
+    Ok(Texture { width_px, height_px, is_srgb, srgba8: pixels.into_raw() })
 }
 
 #[cfg(test)]

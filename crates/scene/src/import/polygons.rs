@@ -12,7 +12,9 @@ const MAX_CORNERS_CUT: usize = 1024;
 /// The most that a file's polygons may cost together, which takes some seconds. A polygon costs the cube of its number of corners, and
 /// nothing if it is convex.
 const MAX_COST: u64 = 1 << 36;
-/// The warning of polygons that are not cut.
+// Warnings of polygons that are left out, and of those that are not cut.
+pub(crate) const TOO_SHORT: &str = "faces of fewer than three corners are left out";
+pub(crate) const NOT_FINITE: &str = "faces with a vertex that is not finite are left out";
 pub(crate) const TOO_COSTLY: &str = "faces of too many corners to be cut are shown as if they were convex";
 
 /// Cuts the polygons of a file into triangles; keeps its memory from one to the next.
@@ -73,11 +75,11 @@ fn sees_all_from_first(outline: &[DVec2]) -> bool {
 
 /// Turns all triangles counter-clockwise where most are clockwise: an outline along its own normal is counter-clockwise.
 fn turn_round_with(corners: &mut [u32], outline: &[DVec2]) {
-    let area = |triangle: &[u32]| {
+    let areas = corners.chunks_exact(3).map(|triangle| {
         let [a, b, c] = [0, 1, 2].map(|i| outline[triangle[i] as usize]);
         (b - a).perp_dot(c - a)
-    };
-    if corners.chunks_exact(3).map(area).sum::<f64>() < 0.0 {
+    });
+    if areas.sum::<f64>() < 0.0 {
         corners.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
     }
 }

@@ -7,7 +7,7 @@ use glam::{Affine3A, DAffine3, DVec3};
 use super::extent::{Box3, DRAWABLE_MESH_EXTENT, recentring_offset, scale_to_drawable, source_space};
 use crate::animation::{Animation, Influence, MovingInstance};
 use crate::error::{Fault, at_most};
-use crate::light_rig::{DEFAULT_BACKGROUND, color, color_mut, position_mut, scale_to_metres};
+use crate::light_rig::{DEFAULT_BACKGROUND, position_mut, scale_to_metres};
 use crate::{
     Environment, Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, SourceSpace,
     Texture, Vertex, VertexDetail,
@@ -75,29 +75,31 @@ impl SourceScene {
         let source_space = source_space(self.bounds_in_source(), self.animation.is_some())?;
         self.unmirror();
         let lights = self.lights.iter().map(|l| l.placed_in(source_space)).collect();
-        let world_from_source = world_from_source(source_space);
-        let instance = |i: &SourceInstance| Instance {
+        let SourceSpace { origin_in_source, metres_per_unit } = source_space;
+        let world_from_source =
+            DAffine3::from_scale(DVec3::splat(metres_per_unit)) * DAffine3::from_translation(-origin_in_source);
+        let instances = self.instances.iter().map(|i| Instance {
             mesh: i.mesh as u32,
             world_from_mesh: in_f32(&(world_from_source * i.source_from_mesh)),
-        };
-        let camera = |PlacedCamera { name, source_from_camera, fov_y_rad }| {
+        });
+        let cameras = self.cameras.into_iter().map(|PlacedCamera { name, source_from_camera, fov_y_rad }| {
             // A camera has a place and a direction, and no size.
             let place_in_world = world_from_source.transform_point3(source_from_camera.translation);
             let placed = DAffine3 { translation: place_in_world, ..source_from_camera };
             SourceCamera { name, world_from_camera: in_f32(&placed), fov_y_rad }
-        };
+        });
         if let Some(animation) = &mut self.animation {
             animation.world_from_source = world_from_source;
         }
         let scene = Scene {
             name: self.name,
             meshes: self.meshes.into_iter().map(SourceMesh::into_f32).collect(),
-            instances: self.instances.iter().map(instance).collect(),
+            instances: instances.collect(),
             materials: self.materials,
             textures: self.textures,
             illumination: Illumination { lights, environment: self.environment },
             background: self.background.unwrap_or(DEFAULT_BACKGROUND),
-            cameras: self.cameras.into_iter().map(camera).collect(),
+            cameras: cameras.collect(),
             animation: self.animation,
             source_space,
             ..Scene::default()
@@ -108,8 +110,8 @@ impl SourceScene {
 
     fn check_sizes(&self, limits: &Limits) -> Result<(), Fault> {
         at_most("instances", self.instances.len() as u64, limits.instances)?;
-        let of = |i: &SourceInstance| self.meshes[i.mesh].indices.len() as u64 / 3;
-        let triangles = self.instances.iter().map(of).fold(0, u64::saturating_add);
+        let triangles = self.instances.iter().map(|i| self.meshes[i.mesh].indices.len() as u64 / 3);
+        let triangles = triangles.fold(0, u64::saturating_add);
         at_most("triangles of all instances", triangles, limits.triangles)?;
         if triangles == 0 {
             return Err(Fault::malformed("scene", "it has no triangles"));
@@ -188,8 +190,6 @@ impl SourceMesh {
     /// Appends `other` as one part of `material`.
     pub(crate) fn append_part(&mut self, other: SourceMesh, material: u32) {
         let first_vertex = self.vertices.len() as u32;
-        let first_index = self.indices.len() as u32;
-        let index_count = other.indices.len() as u32;
         let vertex_count = self.vertices.len() + other.vertices.len();
         if !self.details.is_empty() || !other.details.is_empty() {
             self.details.resize(self.vertices.len(), VertexDetail::default());
@@ -203,8 +203,15 @@ impl SourceMesh {
         }
         self.positions_in_mesh.extend(other.positions_in_mesh);
         self.vertices.extend(other.vertices);
-        self.indices.extend(other.indices.into_iter().map(|i| i + first_vertex));
-        self.parts.push(MeshPart { first_index, index_count, material });
+        self.push_part(other.indices.into_iter().map(|i| i + first_vertex), material);
+    }
+
+    /// Appends triangles of this mesh's vertices as one part of `material`.
+    pub(crate) fn push_part(&mut self, indices: impl IntoIterator<Item = u32>, material: u32) {
+        let first_index = self.indices.len();
+        self.indices.extend(indices);
+        let index_count = (self.indices.len() - first_index) as u32;
+        self.parts.push(MeshPart { first_index: first_index as u32, index_count, material });
     }
 
     /// Appends a copy of a vertex and returns its number.
@@ -240,20 +247,6 @@ impl SourceMesh {
 }
 
 impl SourceLight {
-    /// Unoccluded irradiance at a point, with spots aimed at it; distances count as at least `least_distance`, in the file's
-    /// unit.
-    pub(crate) fn arriving_at(&self, point_in_source: DVec3, least_distance: f64) -> DVec3 {
-        let color = color(self.light).as_dvec3();
-        let distance = self.position_in_source.distance(point_in_source).max(least_distance);
-        if matches!(self.light, Light::Directional { .. }) { color } else { color / (distance * distance) }
-    }
-
-    /// Scales in double precision: a factor may be too small for `f32` where the result is not.
-    pub(crate) fn scale(&mut self, factor: f64) {
-        let color = color_mut(&mut self.light);
-        *color = (color.as_dvec3() * factor).as_vec3();
-    }
-
     fn placed_in(&self, source_space: SourceSpace) -> Light {
         let mut light = self.light;
         if let Some(position) = position_mut(&mut light) {
@@ -262,10 +255,6 @@ impl SourceLight {
         scale_to_metres(&mut light, source_space.metres_per_unit);
         light
     }
-}
-
-fn world_from_source(SourceSpace { origin_in_source, metres_per_unit }: SourceSpace) -> DAffine3 {
-    DAffine3::from_scale(DVec3::splat(metres_per_unit)) * DAffine3::from_translation(-origin_in_source)
 }
 
 fn in_f32(transform: &DAffine3) -> Affine3A {

@@ -15,3 +15,8 @@ pub(crate) fn scale_to_bytes(channels: impl Iterator<Item = f32>) -> f32 {
         255.0 / 65_535.0
     }
 }
+
+/// A channel that is not there, or no number, is 255.
+pub(crate) fn bytes(color: [f32; 4], scale: f32) -> [u8; 4] {
+    color.map(|c| if c.is_finite() { (c * scale + 0.5) as u8 } else { 255 })
+}

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use std::collections::HashSet;
 use std::fmt::Display;
 
-use crate::error::shortened;
+use crate::error::{Fault, shortened};
 
 /// Most names that a warning lists.
 const MAX_NAMES: usize = 8;
@@ -27,41 +27,36 @@ struct Kind {
 impl Warnings {
     /// Counts one more of a kind. Its first place is named.
     pub(crate) fn count(&self, text: impl Into<Cow<'static, str>>, place: impl Display) {
-        self.add(text.into(), false, |kind| {
-            kind.count += 1;
-            if kind.places.is_empty() {
-                kind.places.push(shortened(place.to_string()));
-            }
-        });
+        self.add(text.into(), place, false);
     }
 
     /// Adds a name to those of a kind.
     pub(crate) fn list(&self, text: impl Into<Cow<'static, str>>, name: impl Display) {
-        let name = shortened(name.to_string());
-        self.add(text.into(), true, |kind| {
-            if !kind.names.contains(&name) {
-                kind.count += 1;
-                if kind.places.len() < MAX_NAMES {
-                    kind.places.push(name.clone());
-                }
-                kind.names.insert(name);
-            }
-        });
+        self.add(text.into(), name, true);
     }
 
-    fn add(&self, text: Cow<'static, str>, lists_names: bool, change: impl FnOnce(&mut Kind)) {
+    fn add(&self, text: Cow<'static, str>, place: impl Display, lists_names: bool) {
         let mut kinds = self.0.borrow_mut();
         let number = kinds.iter().position(|kind| kind.text == text).unwrap_or(kinds.len());
         if number == kinds.len() {
             kinds.push(Kind { text, places: Vec::new(), count: 0, names: HashSet::new(), lists_names });
         }
-        change(&mut kinds[number]);
+        let kind = &mut kinds[number];
+        if lists_names && !kind.names.insert(shortened(place.to_string())) {
+            return;
+        }
+        kind.count += 1;
+        let most = if lists_names { MAX_NAMES } else { 1 };
+        if kind.places.len() < most {
+            kind.places.push(shortened(place.to_string()));
+        }
     }
 
-    /// The first place of a kind.
-    pub(crate) fn first(&self, text: &str) -> Option<String> {
+    /// The fault of a file without triangles, by the first of `reasons` that left out a face.
+    pub(crate) fn no_triangles(&self, reasons: [&str; 3]) -> Option<Fault> {
         let kinds = self.0.borrow();
-        kinds.iter().find(|kind| kind.text == text)?.places.first().cloned()
+        let kind = reasons.iter().find_map(|why| kinds.iter().find(|kind| kind.text == *why))?;
+        Some(Fault::malformed(kind.places.first()?, format!("there are no triangles: {}", kind.text)))
     }
 
     /// Logs one warning of each kind.

@@ -26,8 +26,7 @@ pub fn courtyard() -> Scene {
     wall(-outer, inner, outer, outer);
     wall(-outer, -inner, -inner, inner);
     wall(inner, -inner, outer, inner);
-    let floor_right = Vec3::Z * inner;
-    builder.rectangle(Vec3::ZERO, floor_right, Vec3::X * inner, Vec3::new(200.0, 60.0, 50.0));
+    builder.rectangle(Vec3::ZERO, Vec3::Z * inner, Vec3::X * inner, Vec3::new(200.0, 60.0, 50.0));
     builder.cuboid(Vec3::new(-0.2, 0.0, -0.2), Vec3::new(0.2, 0.8, 0.2), Vec3::new(70.0, 90.0, 200.0));
     builder.into_scene("courtyard", Material::default())
 }

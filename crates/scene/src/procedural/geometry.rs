@@ -65,10 +65,7 @@ impl MeshBuilder {
         let centre = (min + max) * 0.5;
         let half = (max - min) * 0.5;
         for axis in 0..3 {
-            let side = |a: usize| Vec3::AXES[a] * half[a];
-            let out = side(axis);
-            let right = side((axis + 1) % 3);
-            let up = side((axis + 2) % 3);
+            let [out, right, up] = [axis, (axis + 1) % 3, (axis + 2) % 3].map(|a| Vec3::AXES[a] * half[a]);
             self.rectangle(centre + out, right, up, color_srgb);
             self.rectangle(centre - out, up, right, color_srgb);
         }
@@ -80,6 +77,19 @@ impl MeshBuilder {
         let normal = (c - a).cross(d - b).normalize_or(Vec3::Y);
         let corners = corners.map(|corner| self.push(vertex(corner, normal, color_srgb)));
         self.quad(corners);
+    }
+
+    /// Joins `rings` of `sides` vertices each, the first of which is `first`, to a tube. A closed one ends where it begins.
+    pub(super) fn join_rings(&mut self, first: u32, rings: u32, sides: u32, is_closed: bool) {
+        let pieces = if is_closed { rings } else { rings - 1 };
+        for ring in 0..pieces {
+            for side in 0..sides {
+                let near = first + ring * sides;
+                let far = first + (ring + 1) % rings * sides;
+                let next = (side + 1) % sides;
+                self.quad([near + side, near + next, far + next, far + side]);
+            }
+        }
     }
 
     /// Sweeps a closed outline around the y axis, through `stations` that turn from +x to +z. The outline runs

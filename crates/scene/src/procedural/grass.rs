@@ -97,8 +97,8 @@ pub fn grass(density: GrassDensity) -> Scene {
 
 /// Places spread evenly over the unit square for any number of them: the R2 sequence (Roberts 2018).
 fn spread(number: u32) -> Vec2 {
-    let at = |step: f64| (0.5 + step * f64::from(number)).fract() as f32;
-    Vec2::new(at(0.754_877_666_246_693), at(0.569_840_290_998_053))
+    let steps = [0.754_877_666_246_693, 0.569_840_290_998_053];
+    Vec2::from(steps.map(|step: f64| (0.5 + step * f64::from(number)).fract() as f32))
 }
 
 struct Meadow {
@@ -109,11 +109,6 @@ struct Meadow {
 impl Meadow {
     fn height_m(&self, at: Vec2) -> f32 {
         0.22 * self.noise.fractal(at * 0.45 + 3.0, 3) + 0.02 * self.noise.at(at * 4.0)
-    }
-
-    /// 0 where it is lush, 1 where it is dry.
-    fn dryness(&self, at: Vec2) -> f32 {
-        0.5 + 0.6 * self.noise.fractal(at * 0.9 + 30.0, 3)
     }
 
     fn add_ground(&self, builder: &mut MeshBuilder, cells: u32) {
@@ -164,7 +159,9 @@ struct Blade {
 
 impl Blade {
     fn sprouting(meadow: &Meadow, at: Vec2, rng: &mut Rng) -> Self {
-        let dryness = (meadow.dryness(at) + rng.between(-0.25, 0.25)).clamp(0.0, 1.0);
+        // 0 where it is lush, 1 where it is dry.
+        let dryness = 0.5 + 0.6 * meadow.noise.fractal(at * 0.9 + 30.0, 3);
+        let dryness = (dryness + rng.between(-0.25, 0.25)).clamp(0.0, 1.0);
         let growth = 0.85 + 0.45 * meadow.noise.fractal(at * 1.3 + 60.0, 3);
         // Most blades lean in any direction, all a little with the wind.
         let heading = Vec2::from_angle(rng.between(0.0, TAU)) + Vec2::new(0.45, 0.2);

@@ -47,7 +47,9 @@ pub fn star(builder: &mut MeshBuilder, segments: [u32; 2], color_srgb: Vec3, poi
 fn normal_of(point: &impl Fn(Vec3) -> Vec3, out: Vec3) -> Vec3 {
     let right = out.any_orthonormal_vector();
     let up = out.cross(right);
-    let beside = |aside: Vec3| point((out + aside * STEP).normalize_or(out));
-    let slope = |aside: Vec3| beside(aside) - beside(-aside);
-    slope(right).cross(slope(up)).normalize_or(out)
+    let [to_right, upwards] = [right, up].map(|aside| {
+        let [ahead, behind] = [aside, -aside].map(|step| point((out + step * STEP).normalize_or(out)));
+        ahead - behind
+    });
+    to_right.cross(upwards).normalize_or(out)
 }

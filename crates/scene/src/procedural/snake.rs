@@ -95,14 +95,7 @@ fn body() -> (Mesh, Vec<Influence>) {
             influences.push(influence(x_m));
         }
     }
-    for ring in 1..RINGS {
-        for side in 0..SIDES {
-            let near = (ring - 1) * SIDES;
-            let far = ring * SIDES;
-            let next = (side + 1) % SIDES;
-            builder.quad([near + side, near + next, far + next, far + side]);
-        }
-    }
+    builder.join_rings(0, RINGS, SIDES, false);
     builder.finish_part(0);
     (builder.into_mesh(), influences)
 }
@@ -123,35 +116,38 @@ fn influence(x_m: f32) -> Influence {
     Influence { joints: [before as u16, after, 0, 0], weights: [1.0 - share, share, 0.0, 0.0] }
 }
 
+fn bend_rad(joint: u32, time_s: f32) -> f32 {
+    BEND_RAD * (TAU * (time_s / SLITHER_S - WAVES * joint as f32 / JOINTS as f32)).sin()
+}
+
+/// The mean direction of all bones, against which the tail turns, so that the snake stays on its ground.
+fn mean_rad(time_s: f32) -> f32 {
+    (1..JOINTS).map(|joint| bend_rad(joint, time_s) * ((JOINTS - joint) as f32 / JOINTS as f32)).sum()
+}
+
 fn slither() -> Clip {
-    let bend_rad =
-        |joint: u32, time_s: f32| BEND_RAD * (TAU * (time_s / SLITHER_S - WAVES * joint as f32 / JOINTS as f32)).sin();
-    // The tail turns against the mean direction of all bones, so that the snake stays on its ground.
-    let mean_rad = |time_s: f32| {
-        let after = |joint: u32| (JOINTS - joint) as f32 / JOINTS as f32;
-        (1..JOINTS).map(|joint| bend_rad(joint, time_s) * after(joint)).sum::<f32>()
-    };
-    let turn_at = |joint: u32, time_s: f32| {
-        Quat::from_rotation_y(if joint == 0 { -mean_rad(time_s) } else { bend_rad(joint, time_s) })
-    };
     let keys = (SLITHER_S / KEY_S) as u32;
     let times_s: Vec<f32> = (0..=keys).map(|key| key as f32 * KEY_S).collect();
-    let channel = |node: u32| Channel {
-        node,
-        property: Property::Rotation,
-        interpolation: Interpolation::Linear,
-        values: times_s.iter().map(|&time_s| turn_at(node, time_s).into()).collect(),
-        times_s: times_s.clone(),
-    };
-    Clip { name: "slither".into(), channels: (0..JOINTS).map(channel).collect() }
+    let channels = (0..JOINTS).map(|node| {
+        let turns_rad =
+            times_s.iter().map(|&time_s| if node == 0 { -mean_rad(time_s) } else { bend_rad(node, time_s) });
+        Channel {
+            node,
+            property: Property::Rotation,
+            interpolation: Interpolation::Linear,
+            values: turns_rad.map(|turn_rad| Quat::from_rotation_y(turn_rad).into()).collect(),
+            times_s: times_s.clone(),
+        }
+    });
+    Clip { name: "slither".into(), channels: channels.collect() }
 }
 
 fn rear() -> Clip {
     let at_rest = Quat::IDENTITY.into();
     let level = glam::Vec4::ZERO;
-    let channel = |joint: u32| {
+    let foot = JOINTS - NECK_JOINTS;
+    let channels = (foot..JOINTS).map(|joint| {
         // The neck rises at its foot, and levels out again towards the head.
-        let foot = JOINTS - NECK_JOINTS;
         let turn_rad = if joint < foot + NECK_JOINTS / 2 { REAR_RAD } else { -REAR_RAD };
         let up = Quat::from_rotation_z(turn_rad).into();
         Channel {
@@ -161,8 +157,8 @@ fn rear() -> Clip {
             times_s: vec![0.0, REAR_S * 0.4, REAR_S * 0.6, REAR_S],
             values: [at_rest, up, up, at_rest].into_iter().flat_map(|value| [level, value, level]).collect(),
         }
-    };
-    Clip { name: "rear".into(), channels: (JOINTS - NECK_JOINTS..JOINTS).map(channel).collect() }
+    });
+    Clip { name: "rear".into(), channels: channels.collect() }
 }
 
 fn ground() -> Mesh {

@@ -115,10 +115,11 @@ fn mirrored(patch: Patch) -> Patch {
 /// Two triangles of one colour.
 fn add_square(builder: &mut MeshBuilder, patch: &Patch, [row, column]: [u32; 2], teapot: Teapot) {
     let Teapot { foot, scale, squares } = teapot;
-    let at = |r: u32, c: u32| Vec2::new((row + r) as f32, (column + c) as f32) / squares as f32;
-    let color_srgb = pattern(point(patch, (at(0, 0) + at(1, 1)) * 0.5));
-    let corners = [at(0, 0), at(0, 1), at(1, 1), at(1, 0)]
-        .map(|place| builder.push(vertex(point(patch, place) * scale + foot, normal(patch, place), color_srgb)));
+    let places = [[0, 0], [0, 1], [1, 1], [1, 0]]
+        .map(|[r, c]| Vec2::new((row + r) as f32, (column + c) as f32) / squares as f32);
+    let color_srgb = pattern(point(patch, (places[0] + places[2]) * 0.5));
+    let corners =
+        places.map(|place| builder.push(vertex(point(patch, place) * scale + foot, normal(patch, place), color_srgb)));
     builder.quad(corners);
 }
 

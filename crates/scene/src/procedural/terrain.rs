@@ -23,7 +23,8 @@ impl Terrain {
         let hills = 0.5 + 0.5 * self.noise.fractal(at * 1.1 + 5.0, 4);
         let knoll = (-at.distance_squared(self.tree_foot) / 0.12).exp();
         let ridges = 1.0 - self.noise.fractal(at * 3.0 + 40.0, 4).abs();
-        let rocks = ridges.powi(6) * smoothstep(0.55, 1.0, at.distance(self.tree_foot)) * self.rockiness(at);
+        let rockiness = smoothstep(0.0, 0.5, self.noise.at(at * 1.3 + 90.0));
+        let rocks = ridges.powi(6) * smoothstep(0.55, 1.0, at.distance(self.tree_foot)) * rockiness;
         let tussocks = self.noise.fractal(at * 28.0, 2);
         (0.02 + 0.15 * hills + 0.05 * knoll + 0.07 * rocks + 0.0035 * tussocks).clamp(0.0, 0.3)
     }
@@ -44,10 +45,6 @@ impl Terrain {
         });
         builder.finish_part(0);
         builder.into_mesh()
-    }
-
-    fn rockiness(&self, at: Vec2) -> f32 {
-        smoothstep(0.0, 0.5, self.noise.at(at * 1.3 + 90.0))
     }
 
     /// sRGB codes: grass by patches, earth where it is steep or trodden, rock where steeper.
@@ -77,10 +74,10 @@ fn grid_point(column: u32, row: u32, cells: u32) -> Vec2 {
 
 fn normal_on_grid(heights: &[f32], column: u32, row: u32, cells: u32) -> Vec3 {
     let height = |c: u32, r: u32| heights[(r * (cells + 1) + c) as usize];
-    let around = |i: u32| (i.saturating_sub(1), (i + 1).min(cells));
-    let ((left, right), (back, front)) = (around(column), around(row));
-    let run_m = |a: u32, b: u32| (b - a) as f32 * (2.0 / cells as f32);
-    let slope_x = (height(right, row) - height(left, row)) / run_m(left, right);
-    let slope_z = (height(column, front) - height(column, back)) / run_m(back, front);
+    let [left, back] = [column, row].map(|i| i.saturating_sub(1));
+    let [right, front] = [column, row].map(|i| (i + 1).min(cells));
+    let cell_m = 2.0 / cells as f32;
+    let slope_x = (height(right, row) - height(left, row)) / ((right - left) as f32 * cell_m);
+    let slope_z = (height(column, front) - height(column, back)) / ((front - back) as f32 * cell_m);
     Vec3::new(-slope_x, 1.0, -slope_z).normalize_or(Vec3::Y)
 }

@@ -62,13 +62,9 @@ impl Scene {
 /// All materials are matt under GGX, leaves too. The paper's scene then has no view-dependent light, and its samples
 /// need no planes for it. The paper's highlights belong to `phong` lighting.
 fn materials() -> Vec<Material> {
-    let shining = |name: &str, phong_specular: f32, phong_exponent: f32| Material {
-        phong_specular,
-        phong_exponent,
-        ..matt(name)
-    };
-    let leaves = Material { double_sided: true, ..shining("leaves", 0.10, 20.0) };
-    vec![shining("ground", 0.02, 8.0), shining("bark", 0.05, 12.0), leaves]
+    let [ground, bark, leaves] = [("ground", 0.02, 8.0), ("bark", 0.05, 12.0), ("leaves", 0.10, 20.0)]
+        .map(|(name, phong_specular, phong_exponent)| Material { phong_specular, phong_exponent, ..matt(name) });
+    vec![ground, bark, Material { double_sided: true, ..leaves }]
 }
 
 /// A late sun, and a weak lamp on the shaded side. The lamp appears twice as wide as the sun from the tree, because a

@@ -144,7 +144,7 @@ fn trees_have_the_requested_triangles_and_stay_in_their_block() {
         let bounds = scene.bounds();
         assert!(bounds.min.cmpge(Vec3::new(-1.0, 0.0, -1.0)).all() && bounds.max.cmple(Vec3::ONE).all(), "{bounds:?}");
         assert!(bounds.max.y > 0.8, "{bounds:?}");
-        assert!(!scene.is_animated());
+        assert_eq!(scene.period_s(), None);
     }
 }
 
@@ -170,7 +170,7 @@ fn other_seeds_grow_other_trees_that_fit_too() {
 #[test]
 fn the_wind_moves_leaves_and_neither_ground_nor_roots() {
     let scene = tree_terrain(30_000, 2007).with_wind();
-    assert!(scene.is_animated());
+    assert!(scene.period_s().is_some());
     let wind = scene.wind.unwrap();
     let [ground, tree] = [&scene.meshes[0], &scene.meshes[1]];
     let moved = |v: &scene::Vertex, t: f32| wind.displacement_in_world(v.position.into(), v.sway, t).length();

@@ -16,9 +16,9 @@ use crate::error::{Fault, at_most};
 /// Reads clips and skins. A scene in which no mesh follows them has no animation.
 pub(super) fn read(document: &Document, tree: &NodeTree, scene: &mut SourceScene) -> Result<(), Fault> {
     let clips = channels::read(document)?;
-    let placements = Placements::read(document, tree, &clips, scene)?;
-    let Placements { mut moving, degenerate } = placements;
-    degenerate::settle(&degenerate, scene, &mut moving, document.limits)?;
+    let mut placements = Placements::read(document, tree, &clips, scene)?;
+    degenerate::settle(&mut placements, scene, document.limits)?;
+    let moving = placements.moving;
     if moving.is_empty() {
         return Ok(());
     }
@@ -31,16 +31,21 @@ pub(super) fn read(document: &Document, tree: &NodeTree, scene: &mut SourceScene
 
 /// The placements of meshes that need more than a transform.
 #[derive(Default)]
-struct Placements {
+pub(super) struct Placements {
     /// All instances that move or are skinned. `Joint::node` is the node's place in the tree.
-    moving: Vec<MovingInstance>,
+    pub moving: Vec<MovingInstance>,
     /// The numbers of instances that stand still and whose transform has no inverse.
-    degenerate: Vec<usize>,
+    pub degenerate: Vec<usize>,
 }
 
 impl Placements {
     fn read(document: &Document, tree: &NodeTree, clips: &[Clip], scene: &mut SourceScene) -> Result<Self, Fault> {
-        let moves = moving_nodes(document, tree, clips);
+        // Whether each node of the tree is moved by some clip, itself or with its parents.
+        let is_target = targets(document, clips);
+        let mut moves: Vec<bool> = Vec::with_capacity(tree.nodes.len());
+        for node in &tree.nodes {
+            moves.push(is_target[node.number] || node.parent.is_some_and(|parent| moves[parent]));
+        }
         let mut skins = Skins::of(document, tree);
         let mut placements = Self::default();
         for (place, node) in (0u32..).zip(&tree.nodes) {
@@ -102,54 +107,42 @@ impl<'d> Skins<'d> {
         place: u32,
     ) -> Result<Skinned, Fault> {
         let node = format!("node {}", node.number);
-        let skin = skins::skin(self.document, index, &node)?;
-        let joints = skin.joints.len() as u64 + 1;
+        let skin = self.document.root.get(index);
+        let skin = skin.ok_or_else(|| Fault::malformed(&node, format!("skin {} does not exist", index.value())))?;
+        let joint_count = skin.joints.len() as u64 + 1;
         let vertices = mesh.vertices.len() as u64;
-        at_most(format_args!("{node}, joints of all skinned meshes"), joints, self.joints_left)?;
+        at_most(format_args!("{node}, joints of all skinned meshes"), joint_count, self.joints_left)?;
         at_most(format_args!("{node}, vertices of all skinned meshes"), vertices, self.influences_left)?;
-        self.joints_left -= joints;
+        self.joints_left -= joint_count;
         self.influences_left -= vertices;
         let element = format!("skin {}", index.value());
         let matrices = skins::bind_matrices(self.document, skin, &element)?;
-        check_influences(&mesh.influences, skin.joints.len(), &element)?;
-        let joint = |(number, (joint, joint_from_mesh)): (usize, (&Index<JsonNode>, DAffine3))| {
-            let place = self.place_in_tree.get(joint.value()).copied().flatten();
-            let outside = || {
+        for (vertex, influence) in mesh.influences.iter().enumerate() {
+            if let Some((joint, _)) = influence.shares().find(|(joint, _)| *joint >= skin.joints.len()) {
+                let why = format!("joint {joint} is beyond the skin's {}", skin.joints.len());
+                return Err(Fault::malformed(format_args!("{element}, vertex {vertex}"), why));
+            }
+        }
+        let mut joints = Vec::with_capacity(skin.joints.len());
+        for (number, (joint, joint_from_mesh)) in skin.joints.iter().zip(matrices).enumerate() {
+            let Some(node) = self.place_in_tree.get(joint.value()).copied().flatten() else {
                 let why = format!("node {} is not in the scene, or in a cycle", joint.value());
-                Fault::malformed(format_args!("{element}, joint {number}"), why)
+                return Err(Fault::malformed(format_args!("{element}, joint {number}"), why));
             };
-            Ok(Joint { node: place.ok_or_else(outside)?, joint_from_mesh })
-        };
-        let joints = skin.joints.iter().zip(matrices).enumerate().map(joint).collect::<Result<Vec<_>, _>>()?;
-        let mut skinned = Skinned { joints, influences: mesh.influences.clone() };
-        skinned.make_rigid_without_weights(place);
-        Ok(skinned)
-    }
-}
-
-impl Skinned {
-    fn make_rigid_without_weights(&mut self, place: u32) {
-        let own_joint = self.joints.len() as u16;
-        let rigid = Influence { joints: [own_joint, 0, 0, 0], weights: [1.0, 0.0, 0.0, 0.0] };
-        let mut is_needed = false;
-        for influence in self.influences.iter_mut().filter(|influence| influence.shares().next().is_none()) {
+            joints.push(Joint { node, joint_from_mesh });
+        }
+        let rigid = Influence { joints: [joints.len() as u16, 0, 0, 0], weights: [1.0, 0.0, 0.0, 0.0] };
+        let mut influences = mesh.influences.clone();
+        let mut is_rigid_somewhere = false;
+        for influence in influences.iter_mut().filter(|influence| influence.shares().next().is_none()) {
             *influence = rigid;
-            is_needed = true;
+            is_rigid_somewhere = true;
         }
-        if is_needed {
-            self.joints.push(Joint { node: place, joint_from_mesh: DAffine3::IDENTITY });
+        if is_rigid_somewhere {
+            joints.push(Joint { node: place, joint_from_mesh: DAffine3::IDENTITY });
         }
+        Ok(Skinned { joints, influences })
     }
-}
-
-/// Whether each node of the tree is moved by some clip, itself or with its parents.
-fn moving_nodes(document: &Document, tree: &NodeTree, clips: &[Clip]) -> Vec<bool> {
-    let is_target = targets(document, clips);
-    let mut moves: Vec<bool> = Vec::with_capacity(tree.nodes.len());
-    for node in &tree.nodes {
-        moves.push(is_target[node.number] || node.parent.is_some_and(|parent| moves[parent]));
-    }
-    moves
 }
 
 /// Whether each node of the file is the target of a channel. A channel's node exists.
@@ -162,23 +155,14 @@ fn targets(document: &Document, clips: &[Clip]) -> Vec<bool> {
 /// The placement at rest by the first joint whose scale is not 0: most skins are bound at rest, where all joints agree.
 /// If there is none, the placement is the place of the first joint.
 fn at_rest(tree: &NodeTree, joints: &[Joint], element: &str) -> Result<DAffine3, Fault> {
-    let placed = |joint: &Joint| tree.nodes[joint.node as usize].source_from_node * joint.joint_from_mesh;
-    let place = || {
-        let translation = joints.first().map(|joint| tree.nodes[joint.node as usize].source_from_node.translation);
-        translation.filter(|translation| translation.is_finite()).map(DAffine3::from_translation)
-    };
-    let usable = joints.iter().map(placed).find(is_invertible).or_else(place);
-    usable.ok_or_else(|| Fault::malformed(element, "the transforms of all its joints are not finite"))
-}
-
-fn check_influences(influences: &[Influence], joints: usize, skin: &str) -> Result<(), Fault> {
-    for (vertex, influence) in influences.iter().enumerate() {
-        if let Some((joint, _)) = influence.shares().find(|(joint, _)| *joint >= joints) {
-            let why = format!("joint {joint} is beyond the skin's {joints}");
-            return Err(Fault::malformed(format_args!("{skin}, vertex {vertex}"), why));
-        }
-    }
-    Ok(())
+    let first_place = joints.first().map(|joint| tree.nodes[joint.node as usize].source_from_node.translation);
+    let first_place = first_place.filter(|place| place.is_finite()).map(DAffine3::from_translation);
+    let mut placed =
+        joints.iter().map(|joint| tree.nodes[joint.node as usize].source_from_node * joint.joint_from_mesh);
+    placed
+        .find(is_invertible)
+        .or(first_place)
+        .ok_or_else(|| Fault::malformed(element, "the transforms of all its joints are not finite"))
 }
 
 /// Copies the nodes that joints follow, with all above them, and renumbers joints and channels. Channels of other nodes

@@ -2,10 +2,8 @@
 //!
 //! `meshoptimizer-rs` decodes. It is a port of the reference without unsafe code, and checks every read of a stream.
 
-use std::fmt;
-
+use gltf::json::Value;
 use gltf::json::buffer::{Buffer, View};
-use gltf::json::{Root, Value, deserialize};
 use meshoptimizer_rs::codec::{
     decode_filter_color, decode_filter_exp, decode_filter_oct, decode_filter_quat, decode_index_buffer,
     decode_index_sequence, decode_vertex_buffer,
@@ -13,6 +11,8 @@ use meshoptimizer_rs::codec::{
 use meshoptimizer_rs::{Error, Limits, Workspace};
 use serde::Deserialize;
 
+use super::document::Document;
+use super::json::parsed;
 use crate::error::{Fault, at_most};
 
 /// The names of the extension. Their JSON is the same.
@@ -25,49 +25,30 @@ pub(super) fn is_fallback(buffer: &Buffer) -> bool {
     extension.and_then(|value| value.get("fallback")?.as_bool()).unwrap_or(false)
 }
 
-/// The decoded bytes of each buffer view that is compressed. `source` returns a range of a buffer: its number, an offset
-/// and a length. All decoded bytes together count against `limit_bytes`, before memory is allocated.
-pub(super) fn decode_all<'a>(
-    root: &Root,
-    limit_bytes: u64,
-    source: impl Fn(u64, u64, u64) -> Option<&'a [u8]>,
-) -> Result<Vec<Option<Vec<u8>>>, Fault> {
+/// The decoded bytes of each buffer view that is compressed. All of them together count against the limit of a file,
+/// before memory is allocated.
+pub(super) fn decode_all(document: &Document) -> Result<Vec<Option<Vec<u8>>>, Fault> {
+    let Document { root, limits, .. } = document;
+    let limit_bytes = limits.file_bytes;
     let mut decoded_bytes = 0u64;
-    let decode = |(number, view): (usize, &View)| {
-        let Some((name, value)) = extension_of(view) else { return Ok(None) };
-        let element = Element { number, name };
+    let mut decoded = vec![None; root.buffer_views.len()];
+    for (number, view) in root.buffer_views.iter().enumerate() {
+        let others = view.extensions.as_ref().map(|extensions| &extensions.others);
+        let extension = NAMES.into_iter().find_map(|name| Some((name, others?.get(name)?)));
+        let Some((name, value)) = extension else { continue };
+        let element = format!("buffer view {number}, {name}");
         let compressed = Compressed::of(value, view, &element)?;
-        decoded_bytes = decoded_bytes.saturating_add(compressed.decoded_bytes());
+        // The product is the view's length, as has been checked.
+        decoded_bytes = decoded_bytes.saturating_add(compressed.count * compressed.byte_stride);
         at_most(format_args!("{element}: decoded views in bytes"), decoded_bytes, limit_bytes)?;
         let Compressed { buffer, byte_offset, byte_length, .. } = compressed;
-        let outside = || element.wrong(format!("its {byte_length} bytes leave buffer {buffer}"));
-        let bytes = source(buffer, byte_offset, byte_length).ok_or_else(outside)?;
-        compressed.decode(bytes, limit_bytes).map(Some).map_err(|error| element.wrong(reason(error)))
-    };
-    root.buffer_views.iter().enumerate().map(decode).collect()
-}
-
-/// A buffer view in messages.
-struct Element {
-    number: usize,
-    name: &'static str,
-}
-
-impl Element {
-    fn wrong(&self, reason: impl Into<String>) -> Fault {
-        Fault::malformed(self, reason)
+        let Some(bytes) = document.buffer_range(buffer, byte_offset, byte_length) else {
+            return Err(Fault::malformed(element, format!("its {byte_length} bytes leave buffer {buffer}")));
+        };
+        let bytes = compressed.decode(bytes, limit_bytes);
+        decoded[number] = Some(bytes.map_err(|error| Fault::malformed(element, reason(error)))?);
     }
-}
-
-impl fmt::Display for Element {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "buffer view {}, {}", self.number, self.name)
-    }
-}
-
-fn extension_of(view: &View) -> Option<(&'static str, &Value)> {
-    let others = &view.extensions.as_ref()?.others;
-    NAMES.into_iter().find_map(|name| Some((name, others.get(name)?)))
+    Ok(decoded)
 }
 
 /// The extension's JSON.
@@ -106,9 +87,8 @@ enum Filter {
 
 impl Compressed {
     /// Checks the count, the stride and the filter, also against the view that is replaced.
-    fn of(value: &Value, view: &View, element: &Element) -> Result<Self, Fault> {
-        let compressed: Self =
-            deserialize::from_value(value.clone()).map_err(|error| element.wrong(error.to_string()))?;
+    fn of(value: &Value, view: &View, element: &str) -> Result<Self, Fault> {
+        let compressed: Self = parsed(value, element)?;
         let Self { byte_stride, count, mode, filter, .. } = compressed;
         let is_stride_valid = match mode {
             Mode::Attributes => byte_stride.is_multiple_of(4) && (4..=256).contains(&byte_stride),
@@ -136,17 +116,13 @@ impl Compressed {
         } else {
             return Ok(compressed);
         };
-        Err(element.wrong(problem))
-    }
-
-    fn decoded_bytes(&self) -> u64 {
-        self.count * self.byte_stride
+        Err(Fault::malformed(element, problem))
     }
 
     fn decode(&self, bytes: &[u8], limit_bytes: u64) -> Result<Vec<u8>, Error> {
-        let size = |size: u64| usize::try_from(size).map_err(|_| Error::SizeOverflow);
-        let count = size(self.count)?;
-        let stride = size(self.byte_stride)?;
+        let (Ok(count), Ok(stride)) = (usize::try_from(self.count), usize::try_from(self.byte_stride)) else {
+            return Err(Error::SizeOverflow);
+        };
         let max_bytes = usize::try_from(limit_bytes).unwrap_or(usize::MAX);
         let workspace = &mut Workspace::new(Limits { max_bytes, ..Limits::default() });
         let mut decoded = match self.mode {

@@ -3,23 +3,19 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::super::source_scene::{SourceMesh, SourceScene};
+use super::animation::Placements;
 use crate::Limits;
-use crate::animation::MovingInstance;
 use crate::error::{Fault, at_most};
 
 /// The area of a figure, relative to the square of its longest side, from which on it counts as more than a line.
 const LEAST_RELATIVE_AREA: f64 = 1e-9;
 
 /// Gives each placement that flattens its mesh a flat mesh of its own, and removes the others, whose meshes have no area.
-/// `moving` keeps to its placements. The limits are checked before the first mesh is copied.
-pub(super) fn settle(
-    degenerate: &[usize],
-    scene: &mut SourceScene,
-    moving: &mut [MovingInstance],
-    limits: &Limits,
-) -> Result<(), Fault> {
-    let is_flat = |number: &usize| has_area(&scene.instances[*number].source_from_mesh.matrix3);
-    let (flat, without_area): (Vec<usize>, Vec<usize>) = degenerate.iter().copied().partition(is_flat);
+/// Moving instances keep to their placements. The limits are checked before the first mesh is copied.
+pub(super) fn settle(placements: &mut Placements, scene: &mut SourceScene, limits: &Limits) -> Result<(), Fault> {
+    let Placements { moving, degenerate } = placements;
+    let (flat, without_area): (Vec<usize>, Vec<usize>) =
+        degenerate.iter().partition(|&&number| has_area(&scene.instances[number].source_from_mesh.matrix3));
     check_sizes(&flat, scene, limits)?;
     for number in flat {
         let instance = scene.instances[number];

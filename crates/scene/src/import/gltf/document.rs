@@ -10,8 +10,10 @@ use gltf::json::buffer::View;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
+use super::super::Import;
 use super::super::file_search::read_uri;
 use super::super::folder::Folder;
+use super::super::options::MissingTextures;
 use super::super::warnings::Warnings;
 use super::compressed;
 use super::draco::{self, DecodedAccessor};
@@ -22,8 +24,9 @@ use crate::{Limits, SceneErrorKind};
 pub(super) struct Document<'a> {
     pub root: &'a Root,
     pub limits: &'a Limits,
-    pub folder: &'a Folder,
+    pub missing_textures: MissingTextures,
     pub warnings: &'a Warnings,
+    folder: &'a Folder,
     buffers: Vec<Cow<'a, [u8]>>,
     /// The bytes of each buffer view that is compressed in the file.
     decoded_views: Vec<Option<Vec<u8>>>,
@@ -35,34 +38,26 @@ pub(super) struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    pub(super) fn open(
-        root: &'a Root,
-        binary_chunk: Option<&'a [u8]>,
-        folder: &'a Folder,
-        limits: &'a Limits,
-        warnings: &'a Warnings,
-    ) -> Result<Self, Fault> {
+    pub(super) fn open(root: &'a Root, binary_chunk: Option<&'a [u8]>, import: &'a Import) -> Result<Self, Fault> {
+        let limits = import.limits;
         // Positions, normals, tangents, two pairs of coordinates, colours, joints, weights: eight elements a vertex, and four of
         // further joints; three indices a triangle.
         let of_triangles = limits.triangles.saturating_mul(3);
         let elements = limits.vertices.saturating_mul(12).saturating_add(of_triangles).saturating_add(limits.keys);
-        let elements_left = Cell::new(elements);
         let mut document = Self {
             root,
             limits,
-            folder,
-            warnings,
+            missing_textures: import.options.missing_textures,
+            warnings: &import.warnings,
+            folder: &import.folder,
             buffers: Vec::new(),
             decoded_views: Vec::new(),
             decoded_accessors: HashMap::new(),
-            elements_left,
+            elements_left: Cell::new(elements),
         };
         document.read_buffers(binary_chunk)?;
-        let of_buffer =
-            |buffer, offset, length| slice_of(document.buffers.get(usize::try_from(buffer).ok()?)?, offset, length);
-        document.decoded_views = compressed::decode_all(root, limits.file_bytes, of_buffer)?;
-        let view_bytes = |view, element: &str| document.view(view, element).map(|(_, bytes)| bytes);
-        document.decoded_accessors = draco::decode_all(root, limits, view_bytes)?;
+        document.decoded_views = compressed::decode_all(&document)?;
+        document.decoded_accessors = draco::decode_all(&document)?;
         Ok(document)
     }
 
@@ -74,10 +69,10 @@ impl<'a> Document<'a> {
                 continue;
             }
             let bytes: Cow<[u8]> = match (&buffer.uri, binary_chunk) {
-                (Some(uri), _) => {
-                    let missing = || Fault::new(&element, SceneErrorKind::MissingFiles(vec![uri.clone()]));
-                    self.read_uri(&element, uri)?.ok_or_else(missing)?.into()
-                }
+                (Some(uri), _) => match self.read_uri(&element, uri)? {
+                    Some(bytes) => bytes.into(),
+                    None => return Err(Fault::new(element, SceneErrorKind::MissingFiles(vec![uri.clone()]))),
+                },
                 (None, Some(chunk)) if number == 0 => chunk.into(),
                 (None, _) => return Err(Fault::malformed(element, "it has neither a uri nor a binary chunk")),
             };
@@ -98,6 +93,11 @@ impl<'a> Document<'a> {
         let url = DataUrl::process(uri).map_err(|e| Fault::malformed(element, format!("data URI: {e:?}")))?;
         let (bytes, _) = url.decode_to_vec().map_err(|e| Fault::malformed(element, format!("data URI: {e:?}")))?;
         Ok(Some(bytes))
+    }
+
+    /// A range of a buffer.
+    pub(super) fn buffer_range(&self, buffer: u64, offset: u64, length: u64) -> Option<&[u8]> {
+        slice_of(self.buffers.get(usize::try_from(buffer).ok()?)?, offset, length)
     }
 
     /// A buffer view and its bytes.
@@ -143,40 +143,15 @@ impl<'a> Document<'a> {
         }
         let component = layout.component;
         let normalized = layout.accessor.normalized;
-        let float = |bytes: &[u8], i: usize| {
-            float(&bytes[i * component.size()..(i + 1) * component.size()], component, normalized)
-        };
-        self.elements(&layout, [0.0; N], |bytes| std::array::from_fn(|i| float(bytes, i)))
-    }
-
-    /// Components of an accessor: 3 or 4 for colours.
-    pub(super) fn component_count(&self, index: Index<Accessor>, element: &str) -> Result<usize, Fault> {
-        Ok(self.layout(index, element)?.components)
-    }
-
-    /// The largest value of an accessor's unsigned integers that are not normalized.
-    pub(super) fn largest_of_plain_integers(
-        &self,
-        index: Index<Accessor>,
-        element: &str,
-    ) -> Result<Option<f32>, Fault> {
-        let layout = self.layout(index, element)?;
-        let is_plain = !layout.accessor.normalized;
-        Ok(match layout.component {
-            ComponentType::U8 if is_plain => Some(255.0),
-            ComponentType::U16 if is_plain => Some(65_535.0),
-            _ => None,
+        self.elements(&layout, [0.0; N], |bytes| {
+            let size = component.size();
+            std::array::from_fn(|i| float(&bytes[i * size..(i + 1) * size], component, normalized))
         })
     }
 
     /// Whether the accessor's primitive is compressed in the file.
     pub(super) fn is_decoded(&self, index: Index<Accessor>) -> bool {
         self.decoded_accessors.contains_key(&index.value())
-    }
-
-    /// Elements of an accessor, before they are read.
-    pub(super) fn element_count(&self, index: Index<Accessor>, element: &str) -> Result<u64, Fault> {
-        Ok(self.layout(index, element)?.count)
     }
 
     /// An accessor's elements as vertex numbers.
@@ -189,7 +164,8 @@ impl<'a> Document<'a> {
         self.elements(&layout, 0, unsigned)
     }
 
-    fn layout(&self, index: Index<Accessor>, element: &str) -> Result<Layout<'_>, Fault> {
+    /// An accessor's description, before its elements are read.
+    pub(super) fn layout(&self, index: Index<Accessor>, element: &str) -> Result<Layout<'_>, Fault> {
         let name = format!("{element}, accessor {}", index.value());
         let accessor = self.root.get(index).ok_or_else(|| Fault::malformed(&name, "it does not exist"))?;
         let (Checked::Valid(component), Checked::Valid(shape)) = (accessor.component_type, accessor.type_) else {
@@ -213,7 +189,7 @@ impl<'a> Document<'a> {
         if let Some(bytes) = layout.decoded {
             return Ok(bytes.chunks_exact(layout.element_bytes()).map(read).collect());
         }
-        let mut elements = match layout.accessor.buffer_view {
+        let mut elements: Vec<T> = match layout.accessor.buffer_view {
             Some(view) => {
                 let offset = layout.accessor.byte_offset.map_or(0, |o| o.0);
                 let chunks = self.chunks(view, offset, layout.count, layout.element_bytes(), &layout.name)?;
@@ -228,20 +204,7 @@ impl<'a> Document<'a> {
                 vec![zero; layout.count as usize]
             }
         };
-        if let Some(sparse) = &layout.accessor.sparse {
-            self.overwrite(layout, sparse, &mut elements, read)?;
-        }
-        Ok(elements)
-    }
-
-    fn overwrite<T>(
-        &self,
-        layout: &Layout,
-        sparse: &Sparse,
-        elements: &mut [T],
-        read: impl Fn(&[u8]) -> T,
-    ) -> Result<(), Fault> {
-        let Sparse { count, indices, values, .. } = sparse;
+        let Some(Sparse { count, indices, values, .. }) = &layout.accessor.sparse else { return Ok(elements) };
         let Checked::Valid(index_type) = indices.component_type else {
             return Err(layout.wrong("unknown type of sparse indices".into()));
         };
@@ -258,17 +221,17 @@ impl<'a> Document<'a> {
             let slot = elements.get_mut(place);
             *slot.ok_or_else(|| layout.wrong(format!("sparse index {place} is out of range")))? = read(value);
         }
-        Ok(())
+        Ok(elements)
     }
 }
 
 /// An accessor's description with checked types.
-struct Layout<'a> {
+pub(super) struct Layout<'a> {
     name: String,
-    accessor: &'a Accessor,
-    component: ComponentType,
-    components: usize,
-    count: u64,
+    pub accessor: &'a Accessor,
+    pub component: ComponentType,
+    pub components: usize,
+    pub count: u64,
     /// Its elements, packed, where they are compressed in the file.
     decoded: Option<&'a [u8]>,
 }
@@ -291,9 +254,10 @@ fn slice_of(bytes: &[u8], offset: u64, length: u64) -> Option<&[u8]> {
 
 /// The elements of an attribute, as many as there are positions.
 pub(super) fn same_count<T>(items: Vec<T>, needs: usize, what: &str, element: &str) -> Result<Vec<T>, Fault> {
-    let has = items.len();
-    let wrong = || Fault::malformed(element, format!("{what} has {has} elements, POSITION {needs}"));
-    (has == needs).then_some(items).ok_or_else(wrong)
+    if items.len() != needs {
+        return Err(Fault::malformed(element, format!("{what} has {} elements, POSITION {needs}", items.len())));
+    }
+    Ok(items)
 }
 
 /// Reads one component, little-endian; `bytes` has the component's length.

@@ -10,10 +10,11 @@ use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::buffer::View;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
-use gltf::json::{Index, Root, deserialize};
+use gltf::json::{Index, Root};
 use serde::Deserialize;
 
-use crate::Limits;
+use super::document::Document;
+use super::json::parsed;
 use crate::error::{Fault, at_most};
 
 /// The name of the extension.
@@ -35,43 +36,35 @@ struct Compressed {
     attributes: BTreeMap<String, u32>,
 }
 
-/// What all streams of a file may still decode to.
-struct Budget {
-    points: u64,
-    faces: u64,
-    bytes: u64,
+/// What all streams of a file have been decoded to, and what they may still decode to.
+struct Streams {
+    decoded: HashMap<usize, DecodedAccessor>,
+    points_left: u64,
+    faces_left: u64,
+    bytes_left: u64,
 }
 
-impl Budget {
-    fn take_bytes(&mut self, element: &str, bytes: u64) -> Result<(), Fault> {
-        at_most(format_args!("{element}: decoded attributes in bytes"), bytes, self.bytes)?;
-        self.bytes -= bytes;
-        Ok(())
-    }
-}
-
-/// The accessors of all compressed primitives, by their numbers. `view_bytes` returns the bytes of a buffer view; its second
-/// argument names the primitive. All streams together count against `limits`.
-pub(super) fn decode_all<'a>(
-    root: &Root,
-    limits: &Limits,
-    view_bytes: impl Fn(Index<View>, &str) -> Result<&'a [u8], Fault>,
-) -> Result<HashMap<usize, DecodedAccessor>, Fault> {
-    let mut budget = Budget { points: limits.vertices, faces: limits.triangles, bytes: limits.file_bytes };
-    let mut decoded = HashMap::new();
+/// The accessors of all compressed primitives, by their numbers. All streams together count against the limits.
+pub(super) fn decode_all(document: &Document) -> Result<HashMap<usize, DecodedAccessor>, Fault> {
+    let Document { root, limits, .. } = document;
+    let mut streams = Streams {
+        decoded: HashMap::new(),
+        points_left: limits.vertices,
+        faces_left: limits.triangles,
+        bytes_left: limits.file_bytes,
+    };
     for (number, mesh) in root.meshes.iter().enumerate() {
         for (part, primitive) in mesh.primitives.iter().enumerate() {
             let extension = primitive.extensions.as_ref().and_then(|extensions| extensions.others.get(NAME));
-            let Some(extension) = extension.filter(|_| is_needed(root, primitive, &decoded)) else { continue };
+            let Some(extension) = extension.filter(|_| is_needed(root, primitive, &streams.decoded)) else { continue };
             let element = format!("mesh {number}, primitive {part}, {NAME}");
-            let wrong = |error: gltf::json::Error| Fault::malformed(&element, error.to_string());
-            let compressed: Compressed = deserialize::from_value(extension.clone()).map_err(wrong)?;
-            let bytes = view_bytes(compressed.buffer_view, &element)?;
-            let mesh = decoded_mesh(bytes, &element, &mut budget)?;
-            add_accessors(primitive, &compressed, &mesh, &element, &mut budget, &mut decoded)?;
+            let compressed: Compressed = parsed(extension, &element)?;
+            let (_, bytes) = document.view(compressed.buffer_view, &element)?;
+            let mesh = streams.mesh(bytes, &element)?;
+            streams.add_accessors(primitive, &compressed, &mesh, &element)?;
         }
     }
-    Ok(decoded)
+    Ok(streams.decoded)
 }
 
 /// Whether a primitive has triangles and no uncompressed positions, and its accessors have not been decoded for another
@@ -86,76 +79,81 @@ fn is_needed(root: &Root, primitive: &Primitive, decoded: &HashMap<usize, Decode
     has_triangles && !is_uncompressed && !accessors.all(|index| decoded.contains_key(&index.value()))
 }
 
-fn decoded_mesh(bytes: &[u8], element: &str, budget: &mut Budget) -> Result<Mesh, Fault> {
-    let limits = DecodeLimits::default()
-        .with_max_points(budget.points)
-        .with_max_faces(budget.faces)
-        .with_max_decoded_bytes(budget.bytes);
-    let mut mesh = Mesh::new();
-    let mut buffer = DecoderBuffer::new(bytes).with_limits(limits);
-    MeshDecoder::new()
-        .decode(&mut buffer, &mut mesh)
-        .map_err(|error| Fault::malformed(element, format!("its stream is cut off or damaged: {error}")))?;
-    let points = mesh.num_points() as u64;
-    let faces = mesh.num_faces() as u64;
-    at_most(format_args!("{element}: decoded vertices"), points, budget.points)?;
-    at_most(format_args!("{element}: decoded triangles"), faces, budget.faces)?;
-    budget.points -= points;
-    budget.faces -= faces;
-    Ok(mesh)
-}
-
-fn add_accessors(
-    primitive: &Primitive,
-    compressed: &Compressed,
-    mesh: &Mesh,
-    element: &str,
-    budget: &mut Budget,
-    decoded: &mut HashMap<usize, DecodedAccessor>,
-) -> Result<(), Fault> {
-    let indices = primitive.indices.ok_or_else(|| Fault::malformed(element, "its primitive has no indices"))?;
-    budget.take_bytes(element, mesh.num_faces() as u64 * 12)?;
-    let corners = mesh.faces().iter().flatten();
-    let bytes = corners.flat_map(|corner| corner.0.to_le_bytes()).collect();
-    decoded.insert(indices.value(), DecodedAccessor { component: ComponentType::U32, components: 1, bytes });
-    for (semantic, accessor) in &primitive.attributes {
-        let Checked::Valid(semantic) = semantic else { continue };
-        let Some(&id) = compressed.attributes.get(&semantic.to_string()) else { continue };
-        let missing = || Fault::malformed(element, format!("{semantic:?} has number {id}, which its stream lacks"));
-        let attribute = mesh.attribute_by_unique_id(id).ok_or_else(missing)?;
-        let packed = packed(attribute, mesh.num_points(), &format!("{element}, {semantic:?}"), budget)?;
-        decoded.insert(accessor.value(), packed);
+impl Streams {
+    fn mesh(&mut self, bytes: &[u8], element: &str) -> Result<Mesh, Fault> {
+        let limits = DecodeLimits::default()
+            .with_max_points(self.points_left)
+            .with_max_faces(self.faces_left)
+            .with_max_decoded_bytes(self.bytes_left);
+        let mut mesh = Mesh::new();
+        let mut buffer = DecoderBuffer::new(bytes).with_limits(limits);
+        MeshDecoder::new()
+            .decode(&mut buffer, &mut mesh)
+            .map_err(|error| Fault::malformed(element, format!("its stream is cut off or damaged: {error}")))?;
+        let points = mesh.num_points() as u64;
+        let faces = mesh.num_faces() as u64;
+        at_most(format_args!("{element}: decoded vertices"), points, self.points_left)?;
+        at_most(format_args!("{element}: decoded triangles"), faces, self.faces_left)?;
+        self.points_left -= points;
+        self.faces_left -= faces;
+        Ok(mesh)
     }
-    Ok(())
-}
 
-/// The values of all points, one after another: a stream stores equal values once.
-fn packed(
-    attribute: &PointAttribute,
-    points: usize,
-    element: &str,
-    budget: &mut Budget,
-) -> Result<DecodedAccessor, Fault> {
-    let component = match attribute.data_type() {
-        DataType::Int8 => ComponentType::I8,
-        DataType::Uint8 => ComponentType::U8,
-        DataType::Int16 => ComponentType::I16,
-        DataType::Uint16 => ComponentType::U16,
-        DataType::Uint32 => ComponentType::U32,
-        DataType::Float32 => ComponentType::F32,
-        other => return Err(Fault::unsupported(element, format!("components of type {other:?}"))),
-    };
-    let components = usize::from(attribute.num_components());
-    let size = components * component.size();
-    budget.take_bytes(element, (points as u64).saturating_mul(size as u64))?;
-    let stride = usize::try_from(attribute.byte_stride()).unwrap_or(0);
-    let data = attribute.buffer().data();
-    let mut bytes = Vec::with_capacity(points * size);
-    for point in 0..points as u32 {
-        let start = (attribute.mapped_index(PointIndex(point)).0 as usize).checked_mul(stride);
-        let value = start.and_then(|start| data.get(start..start.checked_add(size)?));
-        let missing = || Fault::malformed(element, format!("its stream has no value for vertex {point}"));
-        bytes.extend_from_slice(value.ok_or_else(missing)?);
+    fn add_accessors(
+        &mut self,
+        primitive: &Primitive,
+        compressed: &Compressed,
+        mesh: &Mesh,
+        element: &str,
+    ) -> Result<(), Fault> {
+        let indices = primitive.indices.ok_or_else(|| Fault::malformed(element, "its primitive has no indices"))?;
+        self.take_bytes(element, mesh.num_faces() as u64 * 12)?;
+        let corners = mesh.faces().iter().flatten();
+        let bytes = corners.flat_map(|corner| corner.0.to_le_bytes()).collect();
+        self.decoded.insert(indices.value(), DecodedAccessor { component: ComponentType::U32, components: 1, bytes });
+        for (semantic, accessor) in &primitive.attributes {
+            let Checked::Valid(semantic) = semantic else { continue };
+            let Some(&id) = compressed.attributes.get(&semantic.to_string()) else { continue };
+            let Some(attribute) = mesh.attribute_by_unique_id(id) else {
+                return Err(Fault::malformed(element, format!("{semantic:?} has number {id}, which its stream lacks")));
+            };
+            let packed = self.packed(attribute, mesh.num_points(), &format!("{element}, {semantic:?}"))?;
+            self.decoded.insert(accessor.value(), packed);
+        }
+        Ok(())
     }
-    Ok(DecodedAccessor { component, components, bytes })
+
+    /// The values of all points, one after another: a stream stores equal values once.
+    fn packed(&mut self, attribute: &PointAttribute, points: usize, element: &str) -> Result<DecodedAccessor, Fault> {
+        let component = match attribute.data_type() {
+            DataType::Int8 => ComponentType::I8,
+            DataType::Uint8 => ComponentType::U8,
+            DataType::Int16 => ComponentType::I16,
+            DataType::Uint16 => ComponentType::U16,
+            DataType::Uint32 => ComponentType::U32,
+            DataType::Float32 => ComponentType::F32,
+            other => return Err(Fault::unsupported(element, format!("components of type {other:?}"))),
+        };
+        let components = usize::from(attribute.num_components());
+        let size = components * component.size();
+        self.take_bytes(element, (points as u64).saturating_mul(size as u64))?;
+        let stride = usize::try_from(attribute.byte_stride()).unwrap_or(0);
+        let data = attribute.buffer().data();
+        let mut bytes = Vec::with_capacity(points * size);
+        for point in 0..points as u32 {
+            let start = (attribute.mapped_index(PointIndex(point)).0 as usize).checked_mul(stride);
+            let value = start.and_then(|start| data.get(start..start.checked_add(size)?));
+            let Some(value) = value else {
+                return Err(Fault::malformed(element, format!("its stream has no value for vertex {point}")));
+            };
+            bytes.extend_from_slice(value);
+        }
+        Ok(DecodedAccessor { component, components, bytes })
+    }
+
+    fn take_bytes(&mut self, element: &str, bytes: u64) -> Result<(), Fault> {
+        at_most(format_args!("{element}: decoded attributes in bytes"), bytes, self.bytes_left)?;
+        self.bytes_left -= bytes;
+        Ok(())
+    }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use gltf::json::Root;
 
-use super::super::warnings::Warnings;
+use super::super::Import;
 use super::{compressed, draco, scene_extension};
 use crate::error::Fault;
 
@@ -32,7 +32,7 @@ const READ: [&str; 18] = [
 
 /// Beginnings of the names of extensions that leave all geometry in place: materials, textures, lights, motion, sound,
 /// interaction, and data about the scene. A file may require them.
-const WITHOUT_GEOMETRY: [&str; 35] = [
+const WITHOUT_GEOMETRY: [&str; 34] = [
     "ADOBE_materials_",
     "AGI_stk_metadata",
     "CESIUM_primitive_outline",
@@ -63,21 +63,18 @@ const WITHOUT_GEOMETRY: [&str; 35] = [
     "MSFT_audio_emitter",
     "MSFT_lod",
     "MSFT_packing_",
-    "MSFT_texture_dds",
     "NV_materials_",
     "OMI_",
     "SHAPEWAYS_materials_",
     "VRM",
 ];
 
-/// Refuses a file that requires an extension that may change geometry, unless `ignore_required` names it. Those that the
-/// file uses and that are not read become one warning.
-pub(super) fn check(root: &Root, ignore_required: &[String], warnings: &Warnings) -> Result<(), Fault> {
-    let is_unread = |name: &&String| !READ.contains(&name.as_str());
-    let leaves_geometry = |name: &str| WITHOUT_GEOMETRY.iter().any(|start| name.starts_with(start));
+/// Refuses a file that requires an extension that may change geometry, unless the options say to ignore it. Those that
+/// the file uses and that are not read become one warning.
+pub(super) fn check(root: &Root, import: &Import) -> Result<(), Fault> {
     let refused = root.extensions_required.iter().filter(is_unread).find(|name| {
-        let is_ignored = ignore_required.contains(name);
-        !is_ignored && !leaves_geometry(name)
+        let is_ignored = import.options.ignore_required.contains(name);
+        !is_ignored && !WITHOUT_GEOMETRY.iter().any(|start| name.starts_with(start))
     });
     if let Some(name) = refused {
         let advice = format!("{name}; `--ignore-required {name}` shows the scene without it");
@@ -86,7 +83,11 @@ pub(super) fn check(root: &Root, ignore_required: &[String], warnings: &Warnings
     let named = root.extensions_used.iter().chain(&root.extensions_required);
     let unread: BTreeSet<&str> = named.filter(is_unread).map(String::as_str).collect();
     for name in unread {
-        warnings.list("extensions that are not read", name);
+        import.warnings.list("extensions that are not read", name);
     }
     Ok(())
+}
+
+fn is_unread(name: &&String) -> bool {
+    !READ.contains(&name.as_str())
 }

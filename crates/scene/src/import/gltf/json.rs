@@ -2,9 +2,11 @@
 //! order marks, whole numbers written as `24.0`, members that are `null`, scenes without nodes, animation channels without a
 //! target node.
 
+use std::fmt::Display;
 use std::mem::take;
 
 use gltf::json::{Root, Value, deserialize};
+use serde::de::DeserializeOwned;
 
 use super::super::warnings::Warnings;
 use crate::Limits;
@@ -17,25 +19,29 @@ const VALUES_AN_OBJECT: u64 = 16;
 /// Parses the JSON. Its size is bounded before memory is allocated for the parsed form.
 pub(super) fn parse(json: &[u8], limits: &Limits, warnings: &Warnings) -> Result<Root, Fault> {
     // Each object of the JSON, even `{}`, becomes a struct of some hundred bytes, and each value 32 bytes.
-    let count = |wanted: u8| json.iter().filter(|&&byte| byte == wanted).count() as u64;
-    at_most("JSON objects", count(b'{'), limits.json_objects)?;
-    at_most("JSON values", count(b','), limits.json_objects.saturating_mul(VALUES_AN_OBJECT))?;
-    let wrong = |error: gltf::json::Error| Fault::malformed("JSON", error.to_string());
+    let most_values = limits.json_objects.saturating_mul(VALUES_AN_OBJECT);
+    for (what, sign, limit) in [("JSON objects", b'{', limits.json_objects), ("JSON values", b',', most_values)] {
+        at_most(what, json.iter().filter(|&&byte| byte == sign).count() as u64, limit)?;
+    }
     // Names in another encoding are no reason to refuse a model.
     let text = String::from_utf8_lossy(json);
     let text = text.trim_start_matches(BYTE_ORDER_MARK).trim_end_matches('\0');
     // The parser admits 128 levels, so that the recursion below ends.
-    let mut value: Value = deserialize::from_str(text).map_err(wrong)?;
+    let mut value: Value = deserialize::from_str(text).map_err(|e| Fault::malformed("JSON", e.to_string()))?;
     check_version(&value)?;
     simplify(&mut value);
     complete(&mut value, warnings);
-    deserialize::from_value(value).map_err(wrong)
+    deserialize::from_value(value).map_err(|e| Fault::malformed("JSON", e.to_string()))
+}
+
+/// Reads the JSON of an extension that the `gltf` crate leaves unparsed.
+pub(super) fn parsed<T: DeserializeOwned>(value: &Value, element: impl Display) -> Result<T, Fault> {
+    deserialize::from_value(value.clone()).map_err(|e| Fault::malformed(element, e.to_string()))
 }
 
 /// Refuses other versions than 2. In version 1, which some files do not state, lists are objects.
 fn check_version(root: &Value) -> Result<(), Fault> {
-    let version = root.get("asset").and_then(|asset| asset.get("version")).map(ToString::to_string);
-    let version = version.unwrap_or_default();
+    let version = root.get("asset").and_then(|asset| asset.get("version")).map(ToString::to_string).unwrap_or_default();
     let version = version.trim_matches('"');
     let has_objects = ["buffers", "meshes", "nodes"].iter().any(|name| root.get(name).is_some_and(Value::is_object));
     if version.starts_with('2') || version.is_empty() && !has_objects {

@@ -4,15 +4,17 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
 use std::ops::RangeInclusive;
 
 use depth_image::LightError;
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use gltf::json::Index;
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Spot, Type};
 use gltf::json::validation::Checked;
 
 use super::super::source_scene::{SourceLight, SourceScene};
 use super::document::Document;
+use super::nodes::Place;
 use crate::Light;
 use crate::error::Fault;
+use crate::light_rig::{color as color_of, color_mut, scaled};
 
 /// Range of the largest channel of irradiance at the middle of a scene that is not exposed: two stops to either side of
 /// white.
@@ -27,15 +29,15 @@ const LEAST_DISTANCE_FROM_POINT: f64 = 1e-3;
 /// Angles over 90° by less than this, radians, are 90°.
 const ANGLE_ROUNDING_RAD: f32 = 1e-3;
 
-/// The light of a node; `element` names the node. `None` for a light of negative strength, and for one whose node has no
+/// The light of a node. `None` for a light of negative strength, and for one whose node has no
 /// direction.
 pub(super) fn placed(
     document: &Document,
     index: Index<JsonLight>,
-    source_from_node: &DAffine3,
-    element: &str,
+    place: &Place,
 ) -> Result<Option<SourceLight>, Fault> {
-    let json = document.root.get(index).ok_or_else(|| Fault::malformed(element, "its light does not exist"))?;
+    let source_from_node = place.source_from_node;
+    let json = document.root.get(index).ok_or_else(|| Fault::malformed(&place.element, "its light does not exist"))?;
     let element = format!("light {}", index.value());
     let left_out = |reason: &str| {
         let name = json.name.as_deref().unwrap_or("no name");
@@ -99,9 +101,18 @@ pub(super) fn expose(scene: &mut SourceScene) {
     let bounds = scene.bounds_in_source();
     let diagonal = bounds.diagonal();
     let least = if diagonal > 0.0 { diagonal * LEAST_DISTANCE_IN_DIAGONALS } else { LEAST_DISTANCE_FROM_POINT };
-    let arriving: DVec3 = scene.lights.iter().map(|light| light.arriving_at(bounds.center(), least)).sum();
+    // Unoccluded irradiance, with spots aimed at the middle.
+    let arriving = scene.lights.iter().map(|SourceLight { light, position_in_source }| {
+        let color = color_of(*light).as_dvec3();
+        let distance = position_in_source.distance(bounds.center()).max(least);
+        if matches!(light, Light::Directional { .. }) { color } else { color / (distance * distance) }
+    });
+    let arriving: DVec3 = arriving.sum();
     let most = arriving.max_element();
     if most > 0.0 && most.is_finite() && !UNEXPOSED.contains(&most) {
-        scene.lights.iter_mut().for_each(|light| light.scale(most.recip()));
+        for light in &mut scene.lights {
+            let color = color_mut(&mut light.light);
+            *color = scaled(*color, most.recip());
+        }
     }
 }

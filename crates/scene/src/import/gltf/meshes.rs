@@ -8,10 +8,9 @@ use gltf::json::{Mesh as JsonMesh, Node};
 
 use super::super::source_scene::{SourceMesh, SourceScene};
 use super::document::Document;
-use super::primitives::{self, Geometry};
+use super::primitives::{Geometry, PrimitiveReader};
 use super::texture_coordinates::Coordinates;
 use super::textures::material_number;
-use crate::Material;
 use crate::error::{Fault, at_most};
 
 /// The scene's numbers of the file's meshes.
@@ -37,11 +36,9 @@ fn bits(weights: &[f32]) -> Vec<u32> {
 /// Mesh `i` of the file becomes mesh `i` of the scene; a mesh of lines alone stays empty.
 pub(super) fn read(document: &Document, scene: &mut SourceScene) -> Result<Meshes, Fault> {
     let json = &document.root.meshes;
-    let mut materials = BrightMaterials::default();
+    let mut reader = MeshReader { document, scene, bright_materials: HashMap::new() };
     for (number, mesh) in json.iter().enumerate() {
-        let weights = mesh.weights.as_deref().unwrap_or_default();
-        let merged = merged(document, number, mesh, weights, &mut materials, scene)?;
-        scene.meshes.push(merged);
+        reader.add(number, mesh, mesh.weights.as_deref().unwrap_or_default())?;
     }
     let mut meshes = Meshes { count: json.len(), with_weights: HashMap::new() };
     for node in &document.root.nodes {
@@ -52,82 +49,76 @@ pub(super) fn read(document: &Document, scene: &mut SourceScene) -> Result<Meshe
         if !has_targets || mesh.weights.as_ref() == Some(weights) || meshes.with_weights.contains_key(&key) {
             continue;
         }
-        at_most("meshes with weights of their own", scene.meshes.len() as u64, document.limits.nodes)?;
-        let merged = merged(document, index.value(), mesh, weights, &mut materials, scene)?;
-        meshes.with_weights.insert(key, scene.meshes.len());
-        scene.meshes.push(merged);
+        let number = reader.scene.meshes.len();
+        at_most("meshes with weights of their own", number as u64, document.limits.nodes)?;
+        reader.add(index.value(), mesh, weights)?;
+        meshes.with_weights.insert(key, number);
     }
     Ok(meshes)
 }
 
-fn merged(
-    document: &Document,
-    number: usize,
-    mesh: &JsonMesh,
-    weights: &[f32],
-    materials: &mut BrightMaterials,
-    scene: &mut SourceScene,
-) -> Result<SourceMesh, Fault> {
-    let mut merged = SourceMesh::default();
-    for (part, primitive) in mesh.primitives.iter().enumerate() {
-        let element = format!("mesh {number}, primitive {part}");
-        let coordinates = Coordinates::of_material(document.root, primitive.material)?;
-        let material = material_number(document.root, primitive.material, &element)?;
-        if let Some(geometry) = primitives::read(document, primitive, &coordinates, weights, &element)? {
-            let Geometry { mesh, color_scale } = geometry;
-            warn_of_missing_coordinates(
-                document,
-                primitive,
-                &coordinates,
-                &scene.materials[material as usize],
-                &element,
-            );
-            at_most("materials", scene.materials.len() as u64, document.limits.attributes.saturating_add(1))?;
-            let material = materials.number(material, color_scale, scene);
-            if color_scale > 1.0 && scene.materials[material as usize].base_color_linear[..3].iter().any(|c| *c > 1.0) {
-                document
-                    .warnings
-                    .count("colours of vertices are above 1: surfaces that stay so are shown as 1", &element);
+/// Adds meshes to a scene whose materials have been read.
+struct MeshReader<'a> {
+    document: &'a Document<'a>,
+    scene: &'a mut SourceScene,
+    /// Copies of materials for vertex colours above 1, which a vertex has no room for: the material takes over their
+    /// scale. The key is a material and the bits of the scale.
+    bright_materials: HashMap<(u32, u32), u32>,
+}
+
+impl MeshReader<'_> {
+    fn add(&mut self, number: usize, mesh: &JsonMesh, weights: &[f32]) -> Result<(), Fault> {
+        let Document { root, limits, warnings, .. } = self.document;
+        let mut merged = SourceMesh::default();
+        for (part, primitive) in mesh.primitives.iter().enumerate() {
+            let element = format!("mesh {number}, primitive {part}");
+            let coordinates = Coordinates::of_material(root, primitive.material)?;
+            let material = material_number(root, primitive.material, &element)?;
+            let reader = PrimitiveReader { document: self.document, primitive, weights, element: &element };
+            let Some(Geometry { mesh, color_scale }) = reader.read(&coordinates)? else { continue };
+            self.warn_of_missing_coordinates(primitive, &coordinates, material, &element);
+            at_most("materials", self.scene.materials.len() as u64, limits.attributes.saturating_add(1))?;
+            let material = self.bright_material(material, color_scale);
+            let color = self.scene.materials[material as usize].base_color_linear;
+            if color_scale > 1.0 && color[..3].iter().any(|c| *c > 1.0) {
+                warnings.count("colours of vertices are above 1: surfaces that stay so are shown as 1", &element);
             }
             merged.append_part(mesh, material);
         }
+        self.scene.meshes.push(merged);
+        Ok(())
     }
-    Ok(merged)
-}
 
-/// Warns of textures that show one texel, because the primitive lacks their coordinates.
-fn warn_of_missing_coordinates(
-    document: &Document,
-    primitive: &Primitive,
-    coordinates: &Coordinates,
-    material: &Material,
-    element: &str,
-) {
-    let needed = material.textures().into_iter().flatten();
-    let sources = needed.filter_map(|used| if used.second_uv { coordinates.second } else { Some(coordinates.first) });
-    let sets: BTreeSet<u32> = sources.map(|source| source.set).collect();
-    for set in sets {
-        if !primitive.attributes.contains_key(&Checked::Valid(Semantic::TexCoords(set))) {
-            let place = format_args!("{element}, TEXCOORD_{set}");
-            document.warnings.count("textures without coordinates show one texel", place);
+    /// Warns of textures that show one texel, because the primitive lacks their coordinates.
+    fn warn_of_missing_coordinates(
+        &self,
+        primitive: &Primitive,
+        coordinates: &Coordinates,
+        material: u32,
+        element: &str,
+    ) {
+        let needed = self.scene.materials[material as usize].textures().into_iter().flatten();
+        let sources =
+            needed.filter_map(|used| if used.second_uv { coordinates.second } else { Some(coordinates.first) });
+        let sets: BTreeSet<u32> = sources.map(|source| source.set).collect();
+        for set in sets {
+            if !primitive.attributes.contains_key(&Checked::Valid(Semantic::TexCoords(set))) {
+                let place = format_args!("{element}, TEXCOORD_{set}");
+                self.document.warnings.count("textures without coordinates show one texel", place);
+            }
         }
     }
-}
 
-/// Copies of materials for vertex colours above 1, which a vertex has no room for: the material takes over their scale.
-#[derive(Default)]
-struct BrightMaterials(HashMap<(u32, u32), u32>);
-
-impl BrightMaterials {
-    fn number(&mut self, material: u32, color_scale: f32, scene: &mut SourceScene) -> u32 {
+    fn bright_material(&mut self, material: u32, color_scale: f32) -> u32 {
         if color_scale == 1.0 {
             return material;
         }
-        *self.0.entry((material, color_scale.to_bits())).or_insert_with(|| {
-            let mut bright = scene.materials[material as usize].clone();
+        let materials = &mut self.scene.materials;
+        *self.bright_materials.entry((material, color_scale.to_bits())).or_insert_with(|| {
+            let mut bright = materials[material as usize].clone();
             bright.base_color_linear[..3].iter_mut().for_each(|c| *c = (*c * color_scale).min(f32::MAX));
-            scene.materials.push(bright);
-            scene.materials.len() as u32 - 1
+            materials.push(bright);
+            materials.len() as u32 - 1
         })
     }
 }

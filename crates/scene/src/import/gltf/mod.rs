@@ -28,7 +28,6 @@ mod json;
 mod lights;
 mod materials;
 mod meshes;
-mod morph;
 mod nodes;
 mod primitives;
 mod scene_extension;
@@ -39,32 +38,27 @@ mod texture_coordinates;
 mod textures;
 mod transforms;
 
-use gltf::binary::Glb;
-use gltf::json::Root;
+use std::borrow::Cow;
 
-use super::folder::Folder;
+use gltf::binary::Glb;
+
+use super::Import;
 use super::source_scene::SourceScene;
-use super::warnings::Warnings;
-use crate::Limits;
 use crate::error::{Fault, at_most};
 use document::Document;
 
 const GLB_MAGIC: &[u8] = b"glTF";
 const GLB_HEADER_BYTES: u32 = 12;
 
-/// Reads a file. It may require extensions in `ignore_required` that are not read.
-pub(super) fn read(
-    bytes: &[u8],
-    folder: &Folder,
-    limits: &Limits,
-    ignore_required: &[String],
-    warnings: &Warnings,
-) -> Result<SourceScene, Fault> {
+pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> {
     let (json, binary_chunk) = if bytes.starts_with(GLB_MAGIC) { split(bytes)? } else { (bytes, None) };
-    let root = json::parse(json, limits, warnings)?;
-    extensions::check(&root, ignore_required, warnings)?;
-    check_counts(&root, limits)?;
-    let document = Document::open(&root, binary_chunk, folder, limits, warnings)?;
+    let root = json::parse(json, import.limits, &import.warnings)?;
+    extensions::check(&root, import)?;
+    at_most("nodes", root.nodes.len() as u64, import.limits.nodes)?;
+    at_most("meshes", root.meshes.len() as u64, import.limits.nodes)?;
+    at_most("materials", root.materials.len() as u64, import.limits.attributes)?;
+    at_most("images", root.images.len() as u64, import.limits.attributes)?;
+    let document = Document::open(&root, binary_chunk, import)?;
     let mut scene = SourceScene::default();
     materials::read(&document, &mut scene)?;
     let meshes = meshes::read(&document, &mut scene)?;
@@ -90,18 +84,14 @@ fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Fault> {
         return Err(json::other_version("1.0"));
     }
     let glb = Glb::from_slice(bytes).map_err(|e| Fault::malformed("GLB header", e.to_string()))?;
-    // A slice only gives the borrowed form; an owned one would not outlive this function.
-    let borrowed = |chunk| match chunk {
-        std::borrow::Cow::Borrowed(slice) => Some(slice),
-        std::borrow::Cow::Owned(_) => None,
-    };
     let json = borrowed(glb.json).ok_or_else(|| Fault::malformed("GLB", "no JSON chunk"))?;
     Ok((json, glb.bin.and_then(borrowed)))
 }
 
-fn check_counts(root: &Root, limits: &Limits) -> Result<(), Fault> {
-    at_most("nodes", root.nodes.len() as u64, limits.nodes)?;
-    at_most("meshes", root.meshes.len() as u64, limits.nodes)?;
-    at_most("materials", root.materials.len() as u64, limits.attributes)?;
-    at_most("images", root.images.len() as u64, limits.attributes)
+/// A chunk of a file that was read from a slice: the crate then gives the borrowed form alone.
+fn borrowed(chunk: Cow<'_, [u8]>) -> Option<&[u8]> {
+    match chunk {
+        Cow::Borrowed(slice) => Some(slice),
+        Cow::Owned(_) => None,
+    }
 }

@@ -34,20 +34,21 @@ pub(super) fn read(document: &Document, meshes: &Meshes, scene: &mut SourceScene
         let place = Place { element, source_from_node };
         if is_visible {
             place_mesh(document, meshes, node, &place, scene, &mut tree)?;
-            add_light(document, node, &place, scene)?;
+            if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
+                scene.lights.extend(lights::placed(document, light.light, &place)?);
+            }
         }
         if node.camera.is_some() {
             scene.cameras.extend(placed_camera(document, node, &place)?);
         }
         let instances = first_instance..scene.instances.len();
-        let child = |index: &Index<Node>| Pending {
-            index: *index,
+        pending.extend(node.children.iter().flatten().map(|&index| Pending {
+            index,
             parent: Some(tree.nodes.len()),
             source_from_parent: source_from_node,
             depth: depth + 1,
             is_visible,
-        };
-        pending.extend(node.children.iter().flatten().map(child));
+        }));
         tree.nodes.push(PlacedNode { number: index.value(), parent, instances, source_from_node });
     }
     Ok(tree)
@@ -111,9 +112,9 @@ fn is_hidden(node: &Node) -> bool {
 }
 
 /// A node's name in messages, and its transform.
-struct Place {
-    element: String,
-    source_from_node: DAffine3,
+pub(super) struct Place {
+    pub element: String,
+    pub source_from_node: DAffine3,
 }
 
 fn place_mesh(
@@ -125,8 +126,9 @@ fn place_mesh(
     tree: &mut NodeTree,
 ) -> Result<(), Fault> {
     let Some(number) = node.mesh.map(|mesh| mesh.value()) else { return Ok(()) };
-    let missing = || Fault::malformed(&place.element, format!("mesh {number} does not exist"));
-    let mesh = meshes.number(node).ok_or_else(missing)?;
+    let Some(mesh) = meshes.number(node) else {
+        return Err(Fault::malformed(&place.element, format!("mesh {number} does not exist")));
+    };
     if scene.meshes[mesh].indices.is_empty() {
         return Ok(());
     }
@@ -142,33 +144,22 @@ fn place_mesh(
     Ok(())
 }
 
-fn add_light(document: &Document, node: &Node, place: &Place, scene: &mut SourceScene) -> Result<(), Fault> {
-    let light = node.extensions.as_ref().and_then(|extensions| extensions.khr_lights_punctual.as_ref());
-    if let Some(light) = light {
-        scene.lights.extend(lights::placed(document, light.light, &place.source_from_node, &place.element)?);
-    }
-    Ok(())
-}
-
 /// `None`, with a warning, for an orthographic camera, and for one whose node or field of view has no size. The pose is
 /// rigid: a node's scale does not affect a view.
 fn placed_camera(document: &Document, node: &Node, place: &Place) -> Result<Option<PlacedCamera>, Fault> {
     let camera = node.camera.and_then(|index| document.root.get(index));
     let camera = camera.ok_or_else(|| Fault::malformed(&place.element, "its camera does not exist"))?;
-    let fallback = || format!("camera {}", node.camera.map_or(0, |c| c.value()));
-    let name = camera.name.clone().or_else(|| node.name.clone()).unwrap_or_else(fallback);
+    let name = camera.name.clone().or_else(|| node.name.clone());
+    let name = name.unwrap_or_else(|| format!("camera {}", node.camera.map_or(0, |c| c.value())));
+    let element = format_args!("{}, camera {name:?}", place.element);
     let Some(perspective) = &camera.perspective else {
-        document
-            .warnings
-            .count("orthographic cameras are left out", format_args!("{}, camera {name:?}", place.element));
+        document.warnings.count("orthographic cameras are left out", element);
         return Ok(None);
     };
     let is_open = perspective.yfov > 0.0 && perspective.yfov < std::f32::consts::PI;
     if !(is_open && is_invertible(&place.source_from_node)) {
-        let element = format_args!("{}, camera {name:?}", place.element);
-        document
-            .warnings
-            .count("cameras whose transform has no inverse, or field of view no size, are left out", element);
+        let warning = "cameras whose transform has no inverse, or field of view no size, are left out";
+        document.warnings.count(warning, element);
         return Ok(None);
     }
     let backwards = (place.source_from_node.matrix3 * DVec3::Z).normalize_or(DVec3::Z);

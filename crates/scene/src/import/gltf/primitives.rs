@@ -3,7 +3,7 @@
 use depth_image::srgb8_from_linear;
 use glam::Vec3;
 use gltf::json::Index;
-use gltf::json::accessor::Accessor;
+use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
@@ -11,8 +11,8 @@ use super::super::normals;
 use super::super::source_scene::{SourceMesh, plain_vertex};
 use super::super::tangents;
 use super::document::{Document, same_count};
+use super::skins;
 use super::texture_coordinates::{Coordinates, UvSource};
-use super::{morph, skins};
 use crate::error::{Fault, at_most};
 use crate::{Vertex, VertexDetail};
 
@@ -23,50 +23,6 @@ pub(super) struct Geometry {
     pub color_scale: f32,
 }
 
-/// `None` for points and lines. `weights` are those of the morph targets.
-pub(super) fn read(
-    document: &Document,
-    primitive: &Primitive,
-    coordinates: &Coordinates,
-    weights: &[f32],
-    element: &str,
-) -> Result<Option<Geometry>, Fault> {
-    let Checked::Valid(mode) = primitive.mode else {
-        return Err(Fault::malformed(element, "unknown mode"));
-    };
-    if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
-        document.warnings.count("points and lines are left out", element);
-        return Ok(None);
-    }
-    // Compressed strips are decoded to triangles.
-    let is_decoded = primitive.indices.is_some_and(|indices| document.is_decoded(indices));
-    let mode = if is_decoded { Mode::Triangles } else { mode };
-    let attributes = Attributes { document, primitive, weights, element };
-    let position = attributes.index(Semantic::Positions);
-    let position = position.ok_or_else(|| Fault::malformed(element, "it has no POSITION"))?;
-    let count = document.element_count(position, element)?;
-    at_most(format_args!("{element}, vertices"), count, document.limits.vertices)?;
-    let mut positions = document.floats::<3>(position, element)?;
-    attributes.morph(|target| target.positions, &mut positions)?;
-    let indices = triangles(document, primitive.indices, mode, positions.len(), element)?;
-    let Corners { vertices, has_normals, color_scale } = attributes.corners(positions.len(), &coordinates.first)?;
-    let details = attributes.details(positions.len(), coordinates)?;
-    let positions_in_mesh: Vec<_> = positions.iter().map(|p| Vec3::from(*p).as_dvec3()).collect();
-    let influences = skins::influences(document, primitive, &indices, positions.len(), element)?;
-    let mut mesh = SourceMesh { vertices, details, positions_in_mesh, indices, parts: Vec::new(), influences };
-    drop_unused(&mut mesh);
-    if mesh.positions_in_mesh.iter().all(|p| p.is_finite()) {
-        normals::complete(&mut mesh, has_normals, normals::FLAT);
-        // Tangents without normals do not count (glTF 2.0, 3.7.2.1).
-        let has_tangents = has_normals && attributes.index(Semantic::Tangents).is_some();
-        if let Some(second_uv) = coordinates.tangents_along_second.filter(|_| !has_tangents) {
-            let wrong = |error| Fault::malformed(element, format!("its tangents cannot be computed: {error}"));
-            tangents::generate(&mut mesh, second_uv).map_err(wrong)?;
-        }
-    }
-    Ok(Some(Geometry { mesh, color_scale }))
-}
-
 /// The vertices of a primitive without their positions.
 struct Corners {
     vertices: Vec<Vertex>,
@@ -75,33 +31,91 @@ struct Corners {
     color_scale: f32,
 }
 
-/// The attributes of a primitive.
-struct Attributes<'a> {
-    document: &'a Document<'a>,
-    primitive: &'a Primitive,
-    weights: &'a [f32],
-    element: &'a str,
+/// Reads the attributes of a primitive.
+pub(super) struct PrimitiveReader<'a> {
+    pub document: &'a Document<'a>,
+    pub primitive: &'a Primitive,
+    /// Those of the morph targets.
+    pub weights: &'a [f32],
+    /// The primitive in messages.
+    pub element: &'a str,
 }
 
-impl Attributes<'_> {
-    fn index(&self, semantic: Semantic) -> Option<Index<Accessor>> {
+impl PrimitiveReader<'_> {
+    /// `None` for points and lines.
+    pub(super) fn read(&self, coordinates: &Coordinates) -> Result<Option<Geometry>, Fault> {
+        let Self { document, primitive, element, .. } = self;
+        let Checked::Valid(mode) = primitive.mode else {
+            return Err(Fault::malformed(element, "unknown mode"));
+        };
+        if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+            document.warnings.count("points and lines are left out", element);
+            return Ok(None);
+        }
+        // Compressed strips are decoded to triangles.
+        let is_decoded = primitive.indices.is_some_and(|indices| document.is_decoded(indices));
+        let mode = if is_decoded { Mode::Triangles } else { mode };
+        let position = self.index(Semantic::Positions);
+        let position = position.ok_or_else(|| Fault::malformed(element, "it has no POSITION"))?;
+        let count = document.layout(position, element)?.count;
+        at_most(format_args!("{element}, vertices"), count, document.limits.vertices)?;
+        let mut positions = document.floats::<3>(position, element)?;
+        self.morph(|target| target.positions, &mut positions)?;
+        let indices = self.triangles(mode, positions.len())?;
+        let Corners { vertices, has_normals, color_scale } = self.corners(positions.len(), &coordinates.first)?;
+        let details = self.details(positions.len(), coordinates)?;
+        let positions_in_mesh: Vec<_> = positions.iter().map(|p| Vec3::from(*p).as_dvec3()).collect();
+        let influences = skins::influences(self, &indices, positions.len())?;
+        let mut mesh = SourceMesh { vertices, details, positions_in_mesh, indices, parts: Vec::new(), influences };
+        drop_unused(&mut mesh);
+        if mesh.positions_in_mesh.iter().all(|p| p.is_finite()) {
+            if has_normals {
+                normals::repair(&mut mesh);
+            } else {
+                normals::generate(&mut mesh, normals::FLAT);
+            }
+            // Tangents without normals do not count (glTF 2.0, 3.7.2.1).
+            let has_tangents = has_normals && self.index(Semantic::Tangents).is_some();
+            if let Some(second_uv) = coordinates.tangents_along_second.filter(|_| !has_tangents) {
+                tangents::generate(&mut mesh, second_uv)
+                    .map_err(|error| Fault::malformed(element, format!("its tangents cannot be computed: {error}")))?;
+            }
+        }
+        Ok(Some(Geometry { mesh, color_scale }))
+    }
+
+    pub(super) fn index(&self, semantic: Semantic) -> Option<Index<Accessor>> {
         self.primitive.attributes.get(&Checked::Valid(semantic)).copied()
     }
 
     /// `count` elements of an attribute; `None` where the primitive lacks it.
     fn floats<const N: usize>(&self, semantic: Semantic, count: usize) -> Result<Option<Vec<[f32; N]>>, Fault> {
         let name = semantic.to_string();
-        let read = |index| same_count(self.document.floats::<N>(index, self.element)?, count, &name, self.element);
-        self.index(semantic).map(read).transpose()
+        let Some(index) = self.index(semantic) else { return Ok(None) };
+        same_count(self.document.floats(index, self.element)?, count, &name, self.element).map(Some)
     }
 
-    /// Adds what morph targets change.
+    /// Adds to `values` what morph targets change, times their weights. No clip moves them. `accessor_of` picks the
+    /// attribute.
     fn morph<const N: usize>(
         &self,
         accessor_of: impl Fn(&MorphTarget) -> Option<Index<Accessor>>,
         values: &mut [[f32; N]],
     ) -> Result<(), Fault> {
-        morph::add(self.document, self.primitive, self.weights, accessor_of, values, self.element)
+        let targets = self.primitive.targets.iter().flatten().zip(self.weights);
+        for (number, (target, &weight)) in targets.enumerate().filter(|(_, (_, weight))| **weight != 0.0) {
+            let Some(index) = accessor_of(target) else { continue };
+            let element = format!("{}, morph target {number}", self.element);
+            if !weight.is_finite() {
+                return Err(Fault::malformed(element, "its weight is not finite"));
+            }
+            let changes = self.document.floats::<3>(index, &element)?;
+            let changes = same_count(changes, values.len(), "an attribute", &element)?;
+            for (value, change) in values.iter_mut().zip(changes) {
+                value.iter_mut().zip(change).for_each(|(value, change)| *value += weight * change);
+            }
+        }
+        Ok(())
     }
 
     fn corners(&self, count: usize, uv: &UvSource) -> Result<Corners, Fault> {
@@ -111,7 +125,7 @@ impl Attributes<'_> {
             v.uv = uv.apply(at);
         }
         if let Some(index) = self.index(Semantic::Colors(0)) {
-            let colors = linear_colors(self.document, index, self.element)?;
+            let colors = self.linear_colors(index)?;
             let colors = same_count(colors, count, "COLOR_0", self.element)?;
             let channels = colors.iter().flat_map(|color| &color[..3]).filter(|channel| channel.is_finite());
             color_scale = channels.fold(1.0, |most: f32, &channel| most.max(channel));
@@ -129,6 +143,39 @@ impl Attributes<'_> {
         }
         vertices.iter_mut().zip(normals).for_each(|(v, normal)| v.normal = normal);
         Ok(Corners { vertices, has_normals: true, color_scale })
+    }
+
+    fn linear_colors(&self, index: Index<Accessor>) -> Result<Vec<[f32; 4]>, Fault> {
+        let layout = self.document.layout(index, self.element)?;
+        // Integers are shares of their largest value (glTF 2.0, 3.7.2.1), also where a file does not say so.
+        let largest = match layout.component {
+            ComponentType::U8 if !layout.accessor.normalized => 255.0,
+            ComponentType::U16 if !layout.accessor.normalized => 65_535.0,
+            _ => 1.0,
+        };
+        if layout.components == 3 {
+            let rgb = self.document.floats::<3>(index, self.element)?;
+            Ok(rgb.into_iter().map(|[r, g, b]| [r / largest, g / largest, b / largest, 1.0]).collect())
+        } else {
+            let rgba = self.document.floats::<4>(index, self.element)?;
+            Ok(rgba.into_iter().map(|color| color.map(|channel| channel / largest)).collect())
+        }
+    }
+
+    fn triangles(&self, mode: Mode, vertex_count: usize) -> Result<Vec<u32>, Fault> {
+        let indices = match self.primitive.indices {
+            Some(index) => self.document.indices(index, self.element)?,
+            None => (0..vertex_count as u32).collect(),
+        };
+        if let Some(bad) = indices.iter().find(|&&i| i as usize >= vertex_count) {
+            return Err(Fault::malformed(self.element, format!("index {bad} is beyond its {vertex_count} vertices")));
+        }
+        match mode {
+            Mode::TriangleStrip => Ok(from_strip(&indices)),
+            Mode::TriangleFan => Ok(from_fan(&indices)),
+            _ if indices.len().is_multiple_of(3) => Ok(indices),
+            _ => Err(Fault::malformed(self.element, format!("{} indices are not whole triangles", indices.len()))),
+        }
     }
 
     /// Second coordinates and tangents, where the material needs them.
@@ -176,49 +223,9 @@ fn drop_unused(mesh: &mut SourceMesh) {
     mesh.indices.iter_mut().for_each(|i| *i = new_number[*i as usize]);
 }
 
-fn linear_colors(document: &Document, index: Index<Accessor>, element: &str) -> Result<Vec<[f32; 4]>, Fault> {
-    let mut colors = if document.component_count(index, element)? == 3 {
-        let rgb = document.floats::<3>(index, element)?;
-        rgb.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
-    } else {
-        document.floats::<4>(index, element)?
-    };
-    // Integers are shares of their largest value (glTF 2.0, 3.7.2.1), also where a file does not say so.
-    if let Some(largest) = document.largest_of_plain_integers(index, element)? {
-        let has_alpha = document.component_count(index, element)? == 4;
-        for color in &mut colors {
-            let channels = if has_alpha { 4 } else { 3 };
-            color[..channels].iter_mut().for_each(|channel| *channel /= largest);
-        }
-    }
-    Ok(colors)
-}
-
 fn srgba8_from_linear([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {
     let [r, g, b] = [r, g, b].map(srgb8_from_linear);
     [r, g, b, (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
-}
-
-fn triangles(
-    document: &Document,
-    index: Option<Index<Accessor>>,
-    mode: Mode,
-    vertex_count: usize,
-    element: &str,
-) -> Result<Vec<u32>, Fault> {
-    let indices = match index {
-        Some(index) => document.indices(index, element)?,
-        None => (0..vertex_count as u32).collect(),
-    };
-    if let Some(bad) = indices.iter().find(|&&i| i as usize >= vertex_count) {
-        return Err(Fault::malformed(element, format!("index {bad} is beyond its {vertex_count} vertices")));
-    }
-    match mode {
-        Mode::TriangleStrip => Ok(from_strip(&indices)),
-        Mode::TriangleFan => Ok(from_fan(&indices)),
-        _ if indices.len().is_multiple_of(3) => Ok(indices),
-        _ => Err(Fault::malformed(element, format!("{} indices are not whole triangles", indices.len()))),
-    }
 }
 
 /// The triangles of a strip. Every other triangle is reversed; those that repeat a vertex only connect parts of the

@@ -1,10 +1,11 @@
 //! `MYRIORAMA_scene`, an extension of a glTF scene for what glTF has no words for: lamps with a size, light from all around, the
 //! background, and Phong's highlights. `myriorama-lab scene` writes it. Its lamps take the place of those of nodes.
 
-use gltf::json::{Root, deserialize};
+use gltf::json::Root;
 use serde::Deserialize;
 
 use super::super::source_scene::{SourceLight, SourceScene};
+use super::json::parsed;
 use super::nodes::chosen_scene;
 use crate::error::Fault;
 use crate::light_rig::position_mut;
@@ -25,17 +26,16 @@ pub(super) fn read(root: &Root, scene: &mut SourceScene) -> Result<bool, Fault> 
     let json = chosen_scene(root).and_then(|number| root.get(number));
     let extensions = json.and_then(|json| json.extensions.as_ref());
     let Some(value) = extensions.and_then(|extensions| extensions.others.get(NAME)) else { return Ok(false) };
-    let extension: SceneExtension =
-        deserialize::from_value(value.clone()).map_err(|error| Fault::malformed(NAME, error.to_string()))?;
+    let extension: SceneExtension = parsed(value, NAME)?;
     if extension.phong.len() != root.materials.len() {
         let reason = format!("phong is that of {} materials, of {}", extension.phong.len(), root.materials.len());
         return Err(Fault::malformed(NAME, reason));
     }
-    let placed = |mut light| {
+    scene.lights.clear();
+    for mut light in extension.illumination.lights {
         let position_in_source = position_mut(&mut light).map_or_else(Default::default, |p| p.as_dvec3());
-        SourceLight { light, position_in_source }
-    };
-    scene.lights = extension.illumination.lights.into_iter().map(placed).collect();
+        scene.lights.push(SourceLight { light, position_in_source });
+    }
     scene.environment = extension.illumination.environment;
     scene.background = Some(extension.background);
     for (material, [strength, exponent]) in scene.materials.iter_mut().zip(extension.phong) {

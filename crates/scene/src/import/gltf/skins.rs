@@ -1,11 +1,11 @@
 //! Skins: joints of vertices, and where meshes are bound to them.
 
 use glam::{DAffine3, Mat4};
-use gltf::json::mesh::{Primitive, Semantic};
-use gltf::json::validation::Checked;
-use gltf::json::{Index, skin::Skin};
+use gltf::json::mesh::Semantic;
+use gltf::json::skin::Skin;
 
 use super::document::{Document, same_count};
+use super::primitives::PrimitiveReader;
 use super::transforms::affine_from;
 use crate::animation::Influence;
 use crate::error::{Fault, at_most};
@@ -18,20 +18,13 @@ const MOST_SETS: u32 = 4;
 /// Joints and weights of each vertex; empty for a primitive without. Of more than four joints the strongest four count, and
 /// weights are made to sum to 1. A vertex without weights has [`Influence::NONE`]. Vertices that no triangle uses are not
 /// checked.
-pub(super) fn influences(
-    document: &Document,
-    primitive: &Primitive,
-    indices: &[u32],
-    vertices: usize,
-    element: &str,
-) -> Result<Vec<Influence>, Fault> {
-    let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
+pub(super) fn influences(reader: &PrimitiveReader, indices: &[u32], vertices: usize) -> Result<Vec<Influence>, Fault> {
+    let PrimitiveReader { document, element, .. } = reader;
     let mut shares: Vec<Vec<(f32, f32)>> = Vec::new();
     for set in 0..MOST_SETS {
-        let (Some(joints), Some(weights)) = (attribute(Semantic::Joints(set)), attribute(Semantic::Weights(set)))
-        else {
-            break;
-        };
+        let joints = reader.index(Semantic::Joints(set));
+        let weights = reader.index(Semantic::Weights(set));
+        let (Some(joints), Some(weights)) = (joints, weights) else { break };
         let joints = same_count(document.floats::<4>(joints, element)?, vertices, "JOINTS", element)?;
         let weights = same_count(document.floats::<4>(weights, element)?, vertices, "WEIGHTS", element)?;
         shares.resize(vertices, Vec::new());
@@ -46,8 +39,8 @@ pub(super) fn influences(
     for &vertex in indices {
         let vertex = vertex as usize;
         if influences[vertex] == Influence::NONE {
-            let wrong = |why| Fault::malformed(format_args!("{element}, vertex {vertex}"), why);
-            influences[vertex] = influence(&mut shares[vertex]).map_err(wrong)?;
+            influences[vertex] = influence(&mut shares[vertex])
+                .map_err(|why| Fault::malformed(format_args!("{element}, vertex {vertex}"), why))?;
         }
     }
     Ok(influences)
@@ -59,8 +52,8 @@ fn influence(shares: &mut [(f32, f32)]) -> Result<Influence, String> {
     }
     // The sort is stable: equal weights stay in the file's order.
     shares.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let strongest = || shares.iter().take(4);
-    let kept: f32 = strongest().map(|(_, weight)| weight).sum();
+    let strongest = &shares[..shares.len().min(4)];
+    let kept: f32 = strongest.iter().map(|(_, weight)| weight).sum();
     let mut influence = Influence::NONE;
     if kept < LEAST_SUM {
         return Ok(influence);
@@ -68,7 +61,7 @@ fn influence(shares: &mut [(f32, f32)]) -> Result<Influence, String> {
     if !kept.is_finite() {
         return Err("the sum of its weights is not finite".into());
     }
-    for (place, &(joint, weight)) in strongest().enumerate().filter(|(_, (_, weight))| *weight > 0.0) {
+    for (place, &(joint, weight)) in strongest.iter().enumerate().filter(|(_, (_, weight))| *weight > 0.0) {
         let is_number = joint.fract() == 0.0 && (0.0..=f32::from(u16::MAX)).contains(&joint);
         influence.joints[place] =
             if is_number { Ok(joint as u16) } else { Err(format!("joint {joint} is no number")) }?;
@@ -85,28 +78,21 @@ pub(super) fn bind_matrices(document: &Document, skin: &Skin, element: &str) -> 
     }
     let Some(index) = skin.inverse_bind_matrices else { return Ok(vec![DAffine3::IDENTITY; skin.joints.len()]) };
     let element = format!("{element}, inverseBindMatrices");
-    at_most(format_args!("{element}, matrices"), document.element_count(index, &element)?, u64::from(u16::MAX))?;
+    at_most(format_args!("{element}, matrices"), document.layout(index, &element)?.count, u64::from(u16::MAX))?;
     let matrices = document.floats::<16>(index, &element)?;
     if matrices.len() < skin.joints.len() {
         let why = format!("{} matrices for {} joints", matrices.len(), skin.joints.len());
         return Err(Fault::malformed(element, why));
     }
-    let bind = |(number, matrix): (usize, &[f32; 16])| {
+    let mut transforms = Vec::with_capacity(skin.joints.len());
+    for (number, matrix) in matrices.iter().take(skin.joints.len()).enumerate() {
+        let place = format_args!("{element}, matrix {number}");
         let transform = affine_from(Mat4::from_cols_array(matrix).as_dmat4()).filter(DAffine3::is_finite);
-        let why = "it is not finite, or not affine";
-        if transform.is_some_and(|transform| transform.matrix3.determinant() == 0.0) {
-            document.warnings.count(
-                "bind matrices without an inverse hide their vertices",
-                format_args!("{element}, matrix {number}"),
-            );
+        let transform = transform.ok_or_else(|| Fault::malformed(place, "it is not finite, or not affine"))?;
+        if transform.matrix3.determinant() == 0.0 {
+            document.warnings.count("bind matrices without an inverse hide their vertices", place);
         }
-        transform.ok_or_else(|| Fault::malformed(format_args!("{element}, matrix {number}"), why))
-    };
-    matrices.iter().take(skin.joints.len()).enumerate().map(bind).collect()
-}
-
-/// A skin by its number.
-pub(super) fn skin<'d>(document: &Document<'d>, index: Index<Skin>, element: &str) -> Result<&'d Skin, Fault> {
-    let missing = || Fault::malformed(element, format!("skin {} does not exist", index.value()));
-    document.root.get(index).ok_or_else(missing)
+        transforms.push(transform);
+    }
+    Ok(transforms)
 }

@@ -33,13 +33,6 @@ const UNREAD: [UnreadFormat; 2] = [
     },
 ];
 
-impl UnreadFormat {
-    fn reason(&self) -> String {
-        let Self { name, extension, advice, .. } = self;
-        format!("pictures in {name} ({extension}), which are not read: materials show their factors{advice}")
-    }
-}
-
 /// The image of a texture: in WebP, where the file has it in another format, too; in KTX2 where it has no other. The error is
 /// the reason for which there is none, with advice.
 pub(super) fn image_of(document: &Document, texture: &JsonTexture) -> Result<Index<Image>, String> {
@@ -49,15 +42,21 @@ pub(super) fn image_of(document: &Document, texture: &JsonTexture) -> Result<Ind
         u32::try_from(source).ok().map(Index::new)
     };
     let sources = [of_extension("EXT_texture_webp"), Some(texture.source), of_extension("KHR_texture_basisu")];
-    let has_bytes = |image: &Image| image.uri.is_some() || image.buffer_view.is_some();
-    let existing = || sources.into_iter().flatten().filter(|image| document.root.get(*image).is_some_and(has_bytes));
-    if let Some(image) = existing().find(|image| unread_format(document, *image).is_none()) {
-        return Ok(image);
+    let mut by_content = None;
+    for index in sources.into_iter().flatten() {
+        let image = document.root.get(index);
+        if image.is_some_and(|image| image.uri.is_some() || image.buffer_view.is_some()) {
+            match unread_format(document, index) {
+                None => return Ok(index),
+                format => by_content = by_content.or(format),
+            }
+        }
     }
-    let by_content = existing().find_map(|image| unread_format(document, image));
-    let by_extension = || UNREAD.iter().find(|format| of_extension(format.extension).is_some());
-    let format = by_content.or_else(by_extension);
-    Err(format.map_or_else(|| "textures without a picture: materials show their factors".into(), UnreadFormat::reason))
+    let format = by_content.or_else(|| UNREAD.iter().find(|format| of_extension(format.extension).is_some()));
+    let Some(UnreadFormat { name, extension, advice, .. }) = format else {
+        return Err("textures without a picture: materials show their factors".into());
+    };
+    Err(format!("pictures in {name} ({extension}), which are not read: materials show their factors{advice}"))
 }
 
 /// The format of an image, by what the file says of it and by its first bytes.

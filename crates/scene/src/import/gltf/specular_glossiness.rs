@@ -3,36 +3,24 @@
 //! A surface without metal has the same two parts: a diffuse colour, and a reflectance at normal incidence of any colour. The
 //! texture of specular colour and glossiness counts by its mean.
 
-use gltf::json::deserialize;
 use gltf::json::material::Material as JsonMaterial;
 use gltf::json::texture::Info;
 use serde::Deserialize;
 
+use super::json::parsed;
 use crate::error::Fault;
 
 const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
 
-/// The extension's JSON.
-#[derive(Deserialize)]
+/// The extension's JSON. Factors that are not there are 1.
+#[derive(Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct SpecularGlossiness {
-    pub diffuse_factor: [f32; 4],
+    pub diffuse_factor: Option<[f32; 4]>,
     pub diffuse_texture: Option<Info>,
-    pub specular_factor: [f32; 3],
-    pub glossiness_factor: f32,
+    pub specular_factor: Option<[f32; 3]>,
+    pub glossiness_factor: Option<f32>,
     pub specular_glossiness_texture: Option<Info>,
-}
-
-impl Default for SpecularGlossiness {
-    fn default() -> Self {
-        Self {
-            diffuse_factor: [1.0; 4],
-            diffuse_texture: None,
-            specular_factor: [1.0; 3],
-            glossiness_factor: 1.0,
-            specular_glossiness_texture: None,
-        }
-    }
 }
 
 /// The description of a material; `None` where it has none, or has the newer one with a texture of its own.
@@ -40,6 +28,5 @@ pub(super) fn of(material: &JsonMaterial, element: &str) -> Result<Option<Specul
     let extension = material.extensions.as_ref().and_then(|extensions| extensions.others.get(NAME));
     let has_newer = material.pbr_metallic_roughness.metallic_roughness_texture.is_some();
     let Some(extension) = extension.filter(|_| !has_newer) else { return Ok(None) };
-    let wrong = |error: gltf::json::Error| Fault::malformed(element, format!("{NAME}: {error}"));
-    deserialize::from_value(extension.clone()).map(Some).map_err(wrong)
+    parsed(extension, format_args!("{element}: {NAME}")).map(Some)
 }

@@ -5,10 +5,13 @@
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::material::Material as JsonMaterial;
 use gltf::json::texture::{Info, Texture as JsonTexture};
-use gltf::json::{Index, Root, Value, deserialize};
+use gltf::json::{Index, Root, Value};
 
+use super::json::parsed;
 use super::specular_glossiness;
 use crate::error::Fault;
+
+const TRANSFORM: &str = "KHR_texture_transform";
 
 /// A set of texture coordinates and their transform.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -26,14 +29,11 @@ struct Transform {
 
 impl UvSource {
     fn of(set: u32, transform: Option<&TextureTransform>) -> Self {
-        Self {
-            set: transform.and_then(|t| t.tex_coord).unwrap_or(set),
-            transform: transform.map(|t| Transform {
-                offset: t.offset.0,
-                scale: t.scale.0,
-                rotation_rad: t.rotation.0,
-            }),
-        }
+        let Some(TextureTransform { offset, scale, rotation, tex_coord, .. }) = transform else {
+            return Self { set, transform: None };
+        };
+        let transform = Transform { offset: offset.0, scale: scale.0, rotation_rad: rotation.0 };
+        Self { set: tex_coord.unwrap_or(set), transform: Some(transform) }
     }
 
     /// Scale, then rotate counter-clockwise as seen with v downwards, then offset.
@@ -66,16 +66,14 @@ impl Map {
         transform: Option<&Value>,
         element: &str,
     ) -> Result<Self, Fault> {
-        let wrong = |e: gltf::json::Error| Fault::malformed(element, format!("KHR_texture_transform: {e}"));
-        let transform: Option<TextureTransform> =
-            transform.map(|value| deserialize::from_value(value.clone())).transpose().map_err(wrong)?;
+        let element = format_args!("{element}: {TRANSFORM}");
+        let transform: Option<TextureTransform> = transform.map(|value| parsed(value, element)).transpose()?;
         Ok(Self { texture, source: UvSource::of(set, transform.as_ref()) })
     }
 }
 
 /// The textures of a material in the order of [`crate::Material::textures`].
 pub(super) fn maps_of(material: &JsonMaterial, element: &str) -> Result<[Option<Map>; 5], Fault> {
-    const TRANSFORM: &str = "KHR_texture_transform";
     let pbr = &material.pbr_metallic_roughness;
     let normal = material.normal_texture.as_ref().map(|t| {
         let transform = t.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM));

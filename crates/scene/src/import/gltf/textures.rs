@@ -28,29 +28,28 @@ pub(super) fn material_number(root: &Root, material: Option<Index<JsonMaterial>>
 }
 
 /// The images that materials use. An image that holds colours here and data there occurs twice.
-#[derive(Default)]
-pub(super) struct Pictures {
+pub(super) struct Pictures<'a> {
+    document: &'a Document<'a>,
     uses: Vec<(Index<Image>, Content)>,
     place_of: HashMap<(usize, Content), usize>,
 }
 
-impl Pictures {
+impl<'a> Pictures<'a> {
+    pub(super) fn new(document: &'a Document<'a>) -> Self {
+        Self { document, uses: Vec::new(), place_of: HashMap::new() }
+    }
+
     /// The place of a texture's image; `None` for a texture without one that is read, with a warning.
-    fn place(
-        &mut self,
-        document: &Document,
-        texture: Index<JsonTexture>,
-        content: Content,
-        element: &str,
-    ) -> Result<Option<usize>, Fault> {
-        let number = texture.value();
-        let missing = || Fault::malformed(element, format!("texture {number} does not exist"));
-        let json = document.root.get(texture).ok_or_else(missing)?;
-        let image = match sources::image_of(document, json) {
+    fn place(&mut self, index: Index<JsonTexture>, content: Content, element: &str) -> Result<Option<usize>, Fault> {
+        let number = index.value();
+        let Some(json) = self.document.root.get(index) else {
+            return Err(Fault::malformed(element, format!("texture {number} does not exist")));
+        };
+        let image = match sources::image_of(self.document, json) {
             Ok(image) => image,
             Err(reason) => {
                 let name = json.name.as_deref().unwrap_or("no name");
-                document.warnings.count(reason, format_args!("{element}, texture {number} ({name})"));
+                self.document.warnings.count(reason, format_args!("{element}, texture {number} ({name})"));
                 return Ok(None);
             }
         };
@@ -62,11 +61,27 @@ impl Pictures {
         Ok(Some(place))
     }
 
-    /// The files of all images.
-    pub(super) fn encoded(&self, document: &Document) -> Result<Vec<EncodedPicture>, Fault> {
-        let mut bytes_left = document.limits.file_bytes;
-        let encoded = |&(image, content): &_| encoded_picture(document, image, content, &mut bytes_left);
-        self.uses.iter().map(encoded).collect()
+    /// The files of all images. Many images may share a buffer view: the limit of a file bounds their copies together.
+    pub(super) fn encoded(&self) -> Result<Vec<EncodedPicture>, Fault> {
+        let mut bytes_left = self.document.limits.file_bytes;
+        let mut encoded = Vec::with_capacity(self.uses.len());
+        for &(index, content) in &self.uses {
+            let element = format!("image {}", index.value());
+            let image = self.document.root.get(index);
+            let image = image.ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
+            let bytes = match (&image.uri, image.buffer_view) {
+                (Some(uri), _) => self.document.read_uri(&element, uri)?,
+                (None, Some(view)) => {
+                    let (_, bytes) = self.document.view(view, &element)?;
+                    at_most(format_args!("{element}, bytes of images"), bytes.len() as u64, bytes_left)?;
+                    bytes_left -= bytes.len() as u64;
+                    Some(bytes.to_vec())
+                }
+                (None, None) => return Err(Fault::malformed(element, "it has neither a uri nor a buffer view")),
+            };
+            encoded.push(EncodedPicture { file: image.uri.clone().unwrap_or_default(), element, bytes, content });
+        }
+        Ok(encoded)
     }
 }
 
@@ -87,12 +102,7 @@ pub(super) struct Uses {
 }
 
 impl Uses {
-    pub(super) fn of(
-        document: &Document,
-        material: &JsonMaterial,
-        pictures: &mut Pictures,
-        element: &str,
-    ) -> Result<Self, Fault> {
+    pub(super) fn of(material: &JsonMaterial, pictures: &mut Pictures, element: &str) -> Result<Self, Fault> {
         use Content::{Colors, Data, Normals};
         let maps = maps_of(material, element)?;
         let coordinates = Coordinates::of(&maps);
@@ -100,8 +110,8 @@ impl Uses {
         let mut uses = [const { None }; 5];
         for ((used, map), content) in uses.iter_mut().zip(&maps).zip(contents) {
             let Some(map) = map else { continue };
-            let Some(place) = pictures.place(document, map.texture, content, element)? else { continue };
-            let wrap = wrap_of(document.root, map.texture, element)?;
+            let Some(place) = pictures.place(map.texture, content, element)? else { continue };
+            let wrap = wrap_of(pictures.document.root, map.texture, element)?;
             let second_uv = coordinates.is_second(&map.source);
             let texture = second_uv.map(|second_uv| TextureUse { texture: place as u32, second_uv, wrap });
             *used = Some(Used { place, texture });
@@ -110,7 +120,7 @@ impl Uses {
         let specular_glossiness = specular_glossiness::of(material, element)?;
         let specular_glossiness = specular_glossiness.as_ref().and_then(|s| s.specular_glossiness_texture.as_ref());
         let mut place = |info: Option<&Info>, content| match info {
-            Some(info) => pictures.place(document, info.index, content, element),
+            Some(info) => pictures.place(info.index, content, element),
             None => Ok(None),
         };
         Ok(Self {
@@ -148,37 +158,21 @@ fn wrap_of(root: &Root, texture: Index<JsonTexture>, element: &str) -> Result<[W
     let Some(index) = root.get(texture).and_then(|texture| texture.sampler) else {
         return Ok([Wrap::Repeat; 2]);
     };
-    let missing = || Fault::malformed(element, format!("sampler {} does not exist", index.value()));
-    let sampler = root.get(index).ok_or_else(missing)?;
-    let wrap = |mode: Checked<WrappingMode>| match mode {
-        Checked::Valid(WrappingMode::Repeat) => Ok(Wrap::Repeat),
-        Checked::Valid(WrappingMode::MirroredRepeat) => Ok(Wrap::Mirror),
-        Checked::Valid(WrappingMode::ClampToEdge) => Ok(Wrap::Clamp),
-        Checked::Invalid => Err(Fault::malformed(format!("sampler {}", index.value()), "unknown wrap mode")),
+    let Some(sampler) = root.get(index) else {
+        return Err(Fault::malformed(element, format!("sampler {} does not exist", index.value())));
     };
-    Ok([wrap(sampler.wrap_s)?, wrap(sampler.wrap_t)?])
-}
-
-/// Many images may share a buffer view: `bytes_left` bounds their copies together.
-fn encoded_picture(
-    document: &Document,
-    index: Index<Image>,
-    content: Content,
-    bytes_left: &mut u64,
-) -> Result<EncodedPicture, Fault> {
-    let element = format!("image {}", index.value());
-    let image = document.root.get(index).ok_or_else(|| Fault::malformed(&element, "it does not exist"))?;
-    let bytes = match (&image.uri, image.buffer_view) {
-        (Some(uri), _) => document.read_uri(&element, uri)?,
-        (None, Some(view)) => {
-            let bytes = document.view(view, &element)?.1;
-            at_most(format_args!("{element}, bytes of images"), bytes.len() as u64, *bytes_left)?;
-            *bytes_left -= bytes.len() as u64;
-            Some(bytes.to_vec())
-        }
-        (None, None) => return Err(Fault::malformed(element, "it has neither a uri nor a buffer view")),
-    };
-    Ok(EncodedPicture { file: image.uri.clone().unwrap_or_default(), element, bytes, content })
+    let mut wraps = [Wrap::Repeat; 2];
+    for (wrap, mode) in wraps.iter_mut().zip([sampler.wrap_s, sampler.wrap_t]) {
+        *wrap = match mode {
+            Checked::Valid(WrappingMode::Repeat) => Wrap::Repeat,
+            Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::Mirror,
+            Checked::Valid(WrappingMode::ClampToEdge) => Wrap::Clamp,
+            Checked::Invalid => {
+                return Err(Fault::malformed(format_args!("sampler {}", index.value()), "unknown wrap mode"));
+            }
+        };
+    }
+    Ok(wraps)
 }
 
 /// Means of textures. Each is computed once, on first use: many materials may share a large texture.
@@ -213,9 +207,8 @@ pub(super) fn keep_referred_to(textures: Vec<Texture>, materials: &mut [Material
     let mut kept = vec![false; textures.len()];
     let used = materials.iter().flat_map(Material::textures).flatten();
     used.for_each(|used| kept[used.texture as usize] = true);
-    let number_of = |place: u32| kept[..place as usize].iter().filter(|&&k| k).count() as u32;
     for used in materials.iter_mut().flat_map(Material::textures_mut).flatten() {
-        used.texture = number_of(used.texture);
+        used.texture = kept[..used.texture as usize].iter().filter(|&&is_kept| is_kept).count() as u32;
     }
     textures.into_iter().zip(&kept).filter(|(_, kept)| **kept).map(|(texture, _)| texture).collect()
 }

@@ -10,7 +10,11 @@ use crate::error::Fault;
 pub(super) fn parent_from_node(node: &Node, element: &str) -> Result<DAffine3, Fault> {
     let transform = match node.matrix {
         Some(matrix) => affine_from(Mat4::from_cols_array(&matrix).as_dmat4()),
-        None => from_parts(node),
+        None => {
+            let parts = parts_of(node);
+            let length = parts.rotation.as_dquat().length();
+            (length > 1e-6 && length.is_finite()).then(|| parts.parent_from_node())
+        }
     };
     let transform = transform.filter(DAffine3::is_finite);
     transform.ok_or_else(|| Fault::malformed(element, "its transform is not finite, not affine, or has no rotation"))
@@ -23,12 +27,6 @@ pub(super) fn affine_from(matrix: DMat4) -> Option<DAffine3> {
     }
     let is_affine = (matrix.row(3) - glam::DVec4::W).abs().max_element() < 1e-6;
     is_affine.then(|| DAffine3::from_mat4(matrix))
-}
-
-fn from_parts(node: &Node) -> Option<DAffine3> {
-    let parts = parts_of(node);
-    let length = parts.rotation.as_dquat().length();
-    (length > 1e-6 && length.is_finite()).then(|| parts.parent_from_node())
 }
 
 /// The parts of a node's transform as in the file; a rotation may have any length.

@@ -2,13 +2,13 @@
 
 use glam::DVec3;
 
+use super::super::Import;
 use super::super::source_scene::plain_vertex;
-use super::super::vertex_colors::scale_to_bytes;
+use super::super::vertex_colors::{bytes, scale_to_bytes};
 use super::super::warnings::Warnings;
 use super::text::Line;
-use crate::Limits;
-use crate::Vertex;
 use crate::error::{Fault, at_most};
+use crate::{Limits, Vertex};
 
 /// The number of an element that a corner does not have.
 pub(super) const NONE: u32 = u32::MAX;
@@ -31,12 +31,12 @@ pub(super) struct Attributes {
 
 impl Attributes {
     /// `v x y z`, optionally followed by a weight or a colour, as several programs write it.
-    pub(super) fn push_position(&mut self, line: &Line, limits: &Limits, warnings: &Warnings) -> Result<(), Fault> {
-        at_most(line, self.positions_in_source.len() as u64 + 1, limits.vertices)?;
+    pub(super) fn push_position(&mut self, line: &Line, import: &Import) -> Result<(), Fault> {
+        at_most(line, self.positions_in_source.len() as u64 + 1, import.limits.vertices)?;
         let [x, y, z, a, g, b] = line.numbers();
         let position = DVec3::from([x, y, z].map(|c| c.unwrap_or(f64::NAN)));
         if !position.is_finite() {
-            warnings.count("vertices without three finite coordinates", line);
+            import.warnings.count("vertices without three finite coordinates", line);
         }
         if let [Some(r), Some(g), Some(b)] = [a, g, b] {
             self.colors.resize(self.positions_in_source.len(), [f32::NAN; 3]);
@@ -79,9 +79,9 @@ impl Attributes {
 
     /// Drops the parts of a corner that are not there; `None` without a position.
     pub(super) fn existing(&self, [position, uv, normal]: Corner) -> Option<Corner> {
-        let within = |number: u32, count: usize| if (number as usize) < count { number } else { NONE };
-        let is_there = (position as usize) < self.positions_in_source.len();
-        is_there.then(|| [position, within(uv, self.uvs.len()), within(normal, self.normals.len())])
+        let uv = if (uv as usize) < self.uvs.len() { uv } else { NONE };
+        let normal = if (normal as usize) < self.normals.len() { normal } else { NONE };
+        ((position as usize) < self.positions_in_source.len()).then_some([position, uv, normal])
     }
 
     /// How many elements of each kind there are so far: negative numbers count back from here.
@@ -95,8 +95,7 @@ impl Attributes {
             return self.mrgb_srgb8.iter().map(|[r, g, b]| [*r, *g, *b, 255]).collect();
         }
         let scale = scale_to_bytes(self.colors.iter().flatten().copied());
-        let byte = |c: f32| if c.is_finite() { (c * scale + 0.5) as u8 } else { 255 };
-        self.colors.iter().map(|rgb| rgb.map(byte)).map(|[r, g, b]| [r, g, b, 255]).collect()
+        self.colors.iter().map(|&[r, g, b]| bytes([r, g, b, f32::NAN], scale)).collect()
     }
 
     /// A vertex without its colour. An element that is not there has its default.

@@ -5,19 +5,17 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
+use super::super::Import;
 use super::super::normals;
-use super::super::polygons::{PolygonCutter, TOO_COSTLY};
+use super::super::polygons::{NOT_FINITE, PolygonCutter, TOO_COSTLY, TOO_SHORT};
 use super::super::source_scene::SourceMesh;
 use super::super::warnings::Warnings;
 use super::attributes::{Attributes, Corner, NONE};
 use super::map::UvTransform;
 use super::text::Line;
 use crate::error::{Fault, at_most};
-use crate::{Limits, MeshPart};
 
-const TOO_SHORT: &str = "faces of fewer than three corners are left out";
 const UNREADABLE: &str = "faces with a corner that is no vertex of the file are left out";
-const NOT_FINITE: &str = "faces with a vertex that is not finite are left out";
 const TEXTURE_WITHOUT_COORDINATES: &str = "textures without coordinates show one texel";
 const WITHOUT_ATTRIBUTES: &str = "texture coordinates and normals that the file does not have are dropped";
 
@@ -48,6 +46,8 @@ pub(super) struct MaterialUse {
     /// Number in the scene.
     pub number: u32,
     pub placement: UvTransform,
+    /// Equal for equal placements: the corners of their faces share vertices.
+    pub placement_number: u32,
     pub has_texture: bool,
 }
 
@@ -66,13 +66,7 @@ impl Faces {
         self.is_flat = line.words().next().is_none_or(|word| word.eq_ignore_ascii_case(b"off") || word == b"0");
     }
 
-    pub(super) fn push(
-        &mut self,
-        line: &Line,
-        attributes: &Attributes,
-        limits: &Limits,
-        warnings: &Warnings,
-    ) -> Result<(), Fault> {
+    pub(super) fn push(&mut self, line: &Line, attributes: &Attributes, import: &Import) -> Result<(), Fault> {
         let start = self.corners.len();
         let counts = attributes.counts();
         let mut is_readable = true;
@@ -84,14 +78,14 @@ impl Faces {
         let count = self.corners.len() - start;
         if !is_readable || count < 3 {
             self.corners.truncate(start);
-            warnings.count(if is_readable { TOO_SHORT } else { UNREADABLE }, line);
+            import.warnings.count(if is_readable { TOO_SHORT } else { UNREADABLE }, line);
             return Ok(());
         }
         if self.current_material.is_none() {
             self.use_material(b"");
         }
         self.triangle_count += count as u64 - 2;
-        at_most(line, self.triangle_count, limits.triangles)?;
+        at_most(line, self.triangle_count, import.limits.triangles)?;
         let material = self.current_material.unwrap_or(0);
         let line = u32::try_from(line.number).unwrap_or(u32::MAX);
         self.faces.push(Face { line, material, is_flat: self.is_flat, end: self.corners.len() });
@@ -102,26 +96,31 @@ impl Faces {
         self,
         attributes: &Attributes,
         materials: &[MaterialUse],
-        limits: &Limits,
-        warnings: &Warnings,
+        import: &Import,
     ) -> Result<SourceMesh, Fault> {
-        let mut builder = Builder::new(attributes, self.material_names.len());
-        let placements = numbered_placements(materials);
+        let mut builder = Builder {
+            attributes,
+            colors_srgba8: attributes.colors_srgba8(),
+            mesh: SourceMesh::default(),
+            triangles: vec![Triangles::default(); self.material_names.len()],
+            vertex_of_corner: HashMap::new(),
+            cutter: PolygonCutter::new(),
+            polygon_in_source: Vec::new(),
+            vertices: Vec::new(),
+        };
         let mut start = 0;
         for face in &self.faces {
             let corners = &self.corners[start..face.end];
             start = face.end;
-            builder.add(face, corners, placements[face.material as usize], warnings);
-            at_most(format_args!("line {} (f)", face.line), builder.mesh.vertices.len() as u64, limits.vertices)?;
+            builder.add(face, corners, materials[face.material as usize], &import.warnings);
+            let vertices = builder.mesh.vertices.len() as u64;
+            at_most(format_args!("line {} (f)", face.line), vertices, import.limits.vertices)?;
         }
         let mut mesh = builder.mesh;
         let mut is_flat = Vec::new();
         for (triangles, material) in builder.triangles.into_iter().zip(materials) {
-            let first_index = mesh.indices.len() as u32;
-            let index_count = triangles.indices.len() as u32;
-            if index_count > 0 {
-                mesh.parts.push(MeshPart { first_index, index_count, material: material.number });
-                mesh.indices.extend(triangles.indices);
+            if !triangles.indices.is_empty() {
+                mesh.push_part(triangles.indices, material.number);
                 is_flat.extend(triangles.is_flat);
             }
         }
@@ -129,33 +128,12 @@ impl Faces {
             return Err(Fault::unsupported("faces", "more than 2^32 corners"));
         }
         if mesh.indices.is_empty() {
-            let reason =
-                [UNREADABLE, NOT_FINITE, TOO_SHORT].into_iter().find_map(|why| Some((why, warnings.first(why)?)));
-            let reason = reason.map(|(why, place)| Fault::malformed(place, format!("there are no triangles: {why}")));
-            return Err(reason.unwrap_or_else(|| Fault::malformed("scene", "it has no triangles")));
+            let fault = import.warnings.no_triangles([UNREADABLE, NOT_FINITE, TOO_SHORT]);
+            return Err(fault.unwrap_or_else(|| Fault::malformed("scene", "it has no triangles")));
         }
         normals::fill(&mut mesh, |triangle| is_flat[triangle]);
         Ok(mesh)
     }
-}
-
-/// A placement of textures with a number: corners of equal placements are one vertex.
-#[derive(Clone, Copy)]
-struct NumberedPlacement {
-    number: u32,
-    transform: UvTransform,
-    has_texture: bool,
-}
-
-fn numbered_placements(materials: &[MaterialUse]) -> Vec<NumberedPlacement> {
-    let mut number_of = HashMap::new();
-    let numbered = materials.iter().map(|&MaterialUse { placement: transform, has_texture, .. }| {
-        let UvTransform { scale, offset } = transform;
-        let next = number_of.len() as u32;
-        let bits = [scale.x, scale.y, offset.x, offset.y].map(f64::to_bits);
-        NumberedPlacement { number: *number_of.entry(bits).or_insert(next), transform, has_texture }
-    });
-    numbered.collect()
 }
 
 /// Makes vertices of corners and triangles of faces.
@@ -179,21 +157,8 @@ struct Triangles {
     is_flat: Vec<bool>,
 }
 
-impl<'a> Builder<'a> {
-    fn new(attributes: &'a Attributes, material_count: usize) -> Self {
-        Self {
-            attributes,
-            colors_srgba8: attributes.colors_srgba8(),
-            mesh: SourceMesh::default(),
-            triangles: vec![Triangles::default(); material_count],
-            vertex_of_corner: HashMap::new(),
-            cutter: PolygonCutter::new(),
-            polygon_in_source: Vec::new(),
-            vertices: Vec::new(),
-        }
-    }
-
-    fn add(&mut self, face: &Face, corners: &[Corner], placement: NumberedPlacement, warnings: &Warnings) {
+impl Builder<'_> {
+    fn add(&mut self, face: &Face, corners: &[Corner], material: MaterialUse, warnings: &Warnings) {
         let place = format_args!("line {} (f)", face.line);
         self.polygon_in_source.clear();
         for corner in corners {
@@ -208,16 +173,18 @@ impl<'a> Builder<'a> {
         }
         self.vertices.clear();
         let mut has_all = true;
+        let mut have_uvs = true;
         for corner in corners {
             let existing = self.attributes.existing(*corner).unwrap_or(*corner);
             has_all &= existing == *corner;
-            let vertex = self.vertex(existing, placement);
+            have_uvs &= existing[1] != NONE;
+            let vertex = self.vertex(existing, material);
             self.vertices.push(vertex);
         }
         if !has_all {
             warnings.count(WITHOUT_ATTRIBUTES, place);
         }
-        if placement.has_texture && self.has_corner_without_uv(corners) {
+        if material.has_texture && !have_uvs {
             warnings.count(TEXTURE_WITHOUT_COORDINATES, place);
         }
         let triangles = self.cutter.triangles(&self.polygon_in_source, || warnings.count(TOO_COSTLY, place));
@@ -226,19 +193,14 @@ impl<'a> Builder<'a> {
         into.is_flat.resize(into.indices.len() / 3, face.is_flat);
     }
 
-    fn has_corner_without_uv(&self, corners: &[Corner]) -> bool {
-        let has_uv = |corner: &Corner| self.attributes.existing(*corner).is_some_and(|[_, uv, _]| uv != NONE);
-        !corners.iter().all(has_uv)
-    }
-
-    fn vertex(&mut self, corner: Corner, placement: NumberedPlacement) -> u32 {
+    fn vertex(&mut self, corner: Corner, material: MaterialUse) -> u32 {
         let next = self.mesh.vertices.len() as u32;
-        let number = *self.vertex_of_corner.entry((corner, placement.number)).or_insert(next);
+        let number = *self.vertex_of_corner.entry((corner, material.placement_number)).or_insert(next);
         if number == next {
             let mut vertex = self.attributes.vertex(corner);
             vertex.color_srgba8 = self.colors_srgba8.get(corner[0] as usize).copied().unwrap_or(vertex.color_srgba8);
-            if placement.transform != UvTransform::IDENTITY {
-                vertex.uv = placement.transform.apply(vertex.uv);
+            if material.placement != UvTransform::IDENTITY {
+                vertex.uv = material.placement.apply(vertex.uv);
             }
             self.mesh.positions_in_mesh.push(self.attributes.positions_in_source[corner[0] as usize]);
             self.mesh.vertices.push(vertex);

@@ -48,19 +48,6 @@ pub(super) enum Channel {
     Luminance,
 }
 
-/// Options whose arguments are skipped, with the number of these. Filters and resolutions change little that is seen.
-const SKIPPED: [(&str, usize); 9] = [
-    ("-colorspace", 1),
-    ("-blendu", 1),
-    ("-blendv", 1),
-    ("-boost", 1),
-    ("-bm", 1),
-    ("-cc", 1),
-    ("-t", 3),
-    ("-texres", 1),
-    ("-type", 1),
-];
-
 impl TextureMap {
     /// Reads `-option arguments… file name`; `None` without a name.
     pub(super) fn parse(line: &Line, warnings: &Warnings) -> Option<Self> {
@@ -110,20 +97,21 @@ impl TextureMap {
                     warnings.count("brightness (-mm) of texture maps is not shown", line);
                 }
             }
-            _ => match SKIPPED.iter().find(|(name, _)| name.as_bytes() == option) {
-                Some(("-t", _)) => {
-                    if rest.vector(0.0) != DVec2::ZERO {
-                        warnings.count("turbulence (-t) of texture maps is not shown", line);
-                    }
+            b"-t" => {
+                if rest.vector(0.0) != DVec2::ZERO {
+                    warnings.count("turbulence (-t) of texture maps is not shown", line);
                 }
-                Some((_, count)) => rest.skip(*count),
-                None => {
-                    warnings.count("unknown options of texture maps are skipped", line);
-                    while rest.is_argument() {
-                        rest.next();
-                    }
+            }
+            // Filters and resolutions change little that is seen. Each has one argument.
+            b"-colorspace" | b"-blendu" | b"-blendv" | b"-boost" | b"-bm" | b"-cc" | b"-texres" | b"-type" => {
+                rest.next();
+            }
+            _ => {
+                warnings.count("unknown options of texture maps are skipped", line);
+                while rest.is_argument() {
+                    rest.next();
                 }
-            },
+            }
         }
     }
 }
@@ -166,12 +154,6 @@ impl<'a> Words<'a> {
         let word = self.peek();
         let is_last = word.len() == self.rest.len();
         !is_last && (finite(word).is_some() || word.eq_ignore_ascii_case(b"on") || word.eq_ignore_ascii_case(b"off"))
-    }
-
-    fn skip(&mut self, count: usize) {
-        for _ in 0..count {
-            self.next();
-        }
     }
 
     /// One to three numbers, of which two count.

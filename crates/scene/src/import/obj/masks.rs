@@ -27,10 +27,10 @@ pub(super) fn masked(
         let color = color.map(|color| &decoded[color as usize]);
         let texture = mask.map(|mask| {
             let mask = &decoded[mask as usize];
-            let size_px = common_size_px(color, mask);
+            let size_px = color.map_or(UVec2::ONE, size_px).max(size_px(mask));
             bytes += u64::from(size_px.x) * u64::from(size_px.y) * 4;
             at_most("map_d, textures with opacity in bytes", bytes, limits.texture_bytes)?;
-            Ok(combined(color, mask, channel))
+            Ok(combined(color, mask, channel, size_px))
         });
         textures.push(texture.transpose()?);
     }
@@ -48,21 +48,16 @@ fn size_px(texture: &Texture) -> UVec2 {
     UVec2::new(texture.width_px, texture.height_px)
 }
 
-fn common_size_px(color: Option<&Texture>, mask: &Texture) -> UVec2 {
-    color.map_or(UVec2::ONE, size_px).max(size_px(mask))
-}
-
 /// Colours, white without a texture, with the mask's channel as alpha. Each texel takes the nearest one of both.
-fn combined(color: Option<&Texture>, mask: &Texture, channel: Option<Channel>) -> Texture {
+fn combined(color: Option<&Texture>, mask: &Texture, channel: Option<Channel>, size_px: UVec2) -> Texture {
     let has_alpha = mask.srgba8.chunks_exact(4).any(|texel| texel[3] < 255);
     let channel = channel.unwrap_or(if has_alpha { Channel::Alpha } else { Channel::Luminance });
-    let size_px = common_size_px(color, mask);
     let mut srgba8 = Vec::with_capacity(size_px.x as usize * size_px.y as usize * 4);
     for y in 0..size_px.y {
         for x in 0..size_px.x {
-            let at = |texture: &Texture| nearest(texture, UVec2::new(x, y), size_px);
-            let [r, g, b, _] = color.map_or([255; 4], at);
-            srgba8.extend([r, g, b, opacity(at(mask), channel)]);
+            let at_px = UVec2::new(x, y);
+            let [r, g, b, _] = color.map_or([255; 4], |color| nearest(color, at_px, size_px));
+            srgba8.extend([r, g, b, opacity(nearest(mask, at_px, size_px), channel)]);
         }
     }
     Texture { width_px: size_px.x, height_px: size_px.y, is_srgb: true, srgba8 }

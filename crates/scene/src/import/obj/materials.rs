@@ -3,31 +3,26 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
+use super::super::Import;
 use super::super::file_search::{Found, search};
-use super::super::folder::Folder;
 use super::super::listing::decoded;
 use super::super::picture::Content;
 use super::super::source_scene::SourceScene;
 use super::super::texture_files::{TextureFiles, TextureReference};
-use super::super::warnings::Warnings;
 use super::faces::MaterialUse;
 use super::map::{TextureMap, UvTransform, spellings};
 use super::masks::{MaskedTexture, masked};
-use super::mtl::{Entry, parse};
+use super::mtl::{Entry, folded_name, parse};
 use super::text::words;
 use crate::error::{Fault, at_most};
-use crate::{Limits, Material, TextureUse, Wrap};
+use crate::{Material, TextureUse, Wrap};
 
 const UNKNOWN_MATERIALS: &str = "materials that no library has are white";
 const MISSING_LIBRARIES: &str = "material libraries are missing";
 
 /// Reads all libraries that are in the scene's folder. `mtllib` names one file, with spaces, or several.
-pub(super) fn read_libraries(
-    statements: &[Vec<u8>],
-    folder: &Folder,
-    limits: &Limits,
-    warnings: &Warnings,
-) -> Result<Vec<Entry>, Fault> {
+pub(super) fn read_libraries(statements: &[Vec<u8>], import: &Import) -> Result<Vec<Entry>, Fault> {
+    let Import { folder, warnings, .. } = import;
     let mut entries = Vec::new();
     // Some programs repeat the statement before each object.
     let mut known = HashSet::new();
@@ -37,13 +32,13 @@ pub(super) fn read_libraries(
             let whole = spellings(statement);
             let whole: Vec<&[u8]> = whole.iter().map(Vec::as_slice).collect();
             if let Found::File(path) = search(folder, &[Path::new("")], &whole, warnings) {
-                read_library(&path, folder, limits, warnings, &mut entries)?;
+                read_library(&path, import, &mut entries)?;
                 continue;
             }
         }
         for name in names {
             match search(folder, &[Path::new("")], &[&name], warnings) {
-                Found::File(path) => read_library(&path, folder, limits, warnings, &mut entries)?,
+                Found::File(path) => read_library(&path, import, &mut entries)?,
                 Found::Missing => warnings.list(MISSING_LIBRARIES, decoded(&name)),
                 Found::Outside(why) => {
                     warnings.list(MISSING_LIBRARIES, format_args!("{} (it {why})", decoded(&name)));
@@ -54,16 +49,10 @@ pub(super) fn read_libraries(
     Ok(entries)
 }
 
-fn read_library(
-    path: &Path,
-    folder: &Folder,
-    limits: &Limits,
-    warnings: &Warnings,
-    entries: &mut Vec<Entry>,
-) -> Result<(), Fault> {
+fn read_library(path: &Path, import: &Import, entries: &mut Vec<Entry>) -> Result<(), Fault> {
     let element = format!("mtllib {}", path.display());
-    let bytes = folder.read_relative(&element, path)?;
-    parse(&bytes, &element, path.parent().unwrap_or(Path::new("")), limits, warnings, entries)
+    let bytes = import.folder.read_relative(&element, path)?;
+    parse(&bytes, &element, path.parent().unwrap_or(Path::new("")), import, entries)
 }
 
 fn is_library_name(name: &[u8]) -> bool {
@@ -91,18 +80,21 @@ fn several_names(statement: &[u8]) -> Vec<Vec<u8>> {
 pub(super) fn read_materials(
     entries: &[Entry],
     names: &[Vec<u8>],
-    folder: &Folder,
-    limits: &Limits,
-    warnings: &Warnings,
+    import: &Import,
     scene: &mut SourceScene,
 ) -> Result<Vec<MaterialUse>, Fault> {
+    let Import { limits, warnings, .. } = import;
     at_most("materials", names.len() as u64, limits.attributes)?;
-    let lookup = Lookup::new(entries);
+    // The last of equal names counts.
+    let by_name: HashMap<&[u8], &Entry> = entries.iter().map(|entry| (&*entry.name, entry)).collect();
+    let by_folded_name: HashMap<_, _> = entries.iter().map(|entry| (folded_name(&entry.name), entry)).collect();
     let mut textures = Textures::default();
     let mut uses = Vec::new();
+    let mut placement_numbers = HashMap::new();
     for name in names {
         let shown_name = decoded(name).into_owned();
-        let entry = lookup.find(name);
+        let exact = by_name.get(name.as_slice()).copied();
+        let entry = exact.or_else(|| by_folded_name.get(&folded_name(name)).copied());
         if entry.is_none() && !name.is_empty() {
             warnings.list(UNKNOWN_MATERIALS, &shown_name);
         }
@@ -111,7 +103,7 @@ pub(super) fn read_materials(
         let maps = entry.and_then(|entry| Some((entry, entry.color_map.as_ref().or(entry.alpha_map.as_ref())?)));
         let mut placement = UvTransform::IDENTITY;
         if let Some((entry, map)) = maps {
-            let texture = textures.number_of(entry, folder, warnings)?;
+            let texture = textures.number_of(entry, import)?;
             let wrap = if map.clamps { Wrap::Clamp } else { Wrap::Repeat };
             material.base_color_texture = Some(TextureUse { wrap: [wrap; 2], ..TextureUse::from(texture) });
             material.alpha_hashed |= entry.alpha_map.is_some();
@@ -120,36 +112,21 @@ pub(super) fn read_materials(
                 warnings.list("opacity maps are placed as the colours of their materials", &material.name);
             }
         }
+        let UvTransform { scale, offset } = placement;
+        let next = placement_numbers.len() as u32;
+        let bits = [scale.x, scale.y, offset.x, offset.y].map(f64::to_bits);
+        let placement_number = *placement_numbers.entry(bits).or_insert(next);
         let has_texture = material.base_color_texture.is_some();
-        uses.push(MaterialUse { number: scene.materials.len() as u32, placement, has_texture });
+        let number = scene.materials.len() as u32;
+        uses.push(MaterialUse { number, placement, placement_number, has_texture });
         scene.materials.push(material);
     }
     if scene.materials.is_empty() {
         scene.materials.push(Material { double_sided: true, ..Material::default() });
     }
-    let decoded = textures.files.decode(limits, folder.missing_textures)?;
+    let decoded = textures.files.decode(import)?;
     scene.textures = masked(decoded, &textures.used, limits)?;
     Ok(uses)
-}
-
-/// Entries by their names. The last of equal names counts.
-struct Lookup<'e> {
-    by_name: HashMap<&'e [u8], &'e Entry>,
-    by_folded_name: HashMap<Vec<u8>, &'e Entry>,
-}
-
-impl<'e> Lookup<'e> {
-    fn new(entries: &'e [Entry]) -> Self {
-        Self {
-            by_name: entries.iter().map(|entry| (&*entry.name, entry)).collect(),
-            by_folded_name: entries.iter().map(|entry| (Entry::folded_name(&entry.name), entry)).collect(),
-        }
-    }
-
-    fn find(&self, name: &[u8]) -> Option<&'e Entry> {
-        let exact = self.by_name.get(name).copied();
-        exact.or_else(|| self.by_folded_name.get(&Entry::folded_name(name)).copied())
-    }
 }
 
 #[derive(Default)]
@@ -161,16 +138,15 @@ struct Textures {
 
 impl Textures {
     /// The number of the texture of colours and opacity.
-    fn number_of(&mut self, entry: &Entry, folder: &Folder, warnings: &Warnings) -> Result<u32, Fault> {
+    fn number_of(&mut self, entry: &Entry, import: &Import) -> Result<u32, Fault> {
         let mut file = |map: &TextureMap, content| {
             let names = map.names.iter().map(Vec::as_slice).collect();
-            let bases = vec![&*entry.folder, Path::new("")];
-            let reference = TextureReference { element: map.place.clone(), names, bases, content };
-            self.files.number_of(reference, folder, warnings)
+            let reference = TextureReference { element: map.place.clone(), names, base: &entry.folder, content };
+            self.files.number_of(reference, import)
         };
         let color = entry.color_map.as_ref().map(|map| file(map, Content::Colors)).transpose()?;
         let mask = entry.alpha_map.as_ref().map(|map| file(map, Content::Data)).transpose()?;
-        let texture = MaskedTexture { color, mask, channel: entry.alpha_channel() };
+        let texture = MaskedTexture { color, mask, channel: entry.alpha_map.as_ref().and_then(|map| map.channel) };
         let next = self.used.len() as u32;
         let number = *self.number_of.entry(texture).or_insert(next);
         if number == next {

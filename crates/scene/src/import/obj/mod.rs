@@ -19,23 +19,20 @@ mod text;
 
 use glam::DAffine3;
 
-use super::folder::Folder;
+use super::Import;
 use super::source_scene::{SourceInstance, SourceScene};
-use super::warnings::Warnings;
-use crate::Limits;
 use crate::error::Fault;
 use attributes::Attributes;
 use faces::Faces;
 use text::{Line, for_each_line, without_byte_order_mark};
 
-pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &Warnings) -> Result<SourceScene, Fault> {
+pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> {
     let mut file = ObjFile::default();
-    for_each_line(&without_byte_order_mark(bytes), "", |line| file.read_line(line, limits, warnings))?;
+    for_each_line(&without_byte_order_mark(bytes), "", |line| file.read_line(line, import))?;
     let mut scene = SourceScene::default();
-    let libraries = materials::read_libraries(&file.libraries, folder, limits, warnings)?;
-    let materials =
-        materials::read_materials(&libraries, &file.faces.material_names, folder, limits, warnings, &mut scene)?;
-    scene.meshes.push(file.faces.into_mesh(&file.attributes, &materials, limits, warnings)?);
+    let libraries = materials::read_libraries(&file.libraries, import)?;
+    let materials = materials::read_materials(&libraries, &file.faces.material_names, import, &mut scene)?;
+    scene.meshes.push(file.faces.into_mesh(&file.attributes, &materials, import)?);
     scene.instances.push(SourceInstance { mesh: 0, source_from_mesh: DAffine3::IDENTITY });
     Ok(scene)
 }
@@ -52,15 +49,15 @@ struct ObjFile {
 }
 
 impl ObjFile {
-    fn read_line(&mut self, line: &Line, limits: &Limits, warnings: &Warnings) -> Result<(), Fault> {
+    fn read_line(&mut self, line: &Line, import: &Import) -> Result<(), Fault> {
         if line.is("v") {
-            self.attributes.push_position(line, limits, warnings)?;
+            self.attributes.push_position(line, import)?;
         } else if line.is("vt") {
-            self.attributes.push_uv(line, warnings);
+            self.attributes.push_uv(line, &import.warnings);
         } else if line.is("vn") {
-            self.attributes.push_normal(line, warnings);
+            self.attributes.push_normal(line, &import.warnings);
         } else if line.is("f") || line.is("fo") {
-            self.faces.push(line, &self.attributes, limits, warnings)?;
+            self.faces.push(line, &self.attributes, import)?;
         } else if line.is("s") {
             self.faces.set_smoothing(line);
         } else if line.is("usemtl") {
@@ -68,9 +65,9 @@ impl ObjFile {
         } else if line.is("mtllib") {
             self.libraries.push(line.rest.to_owned());
         } else if line.is("#MRGB") {
-            self.attributes.push_mrgb(line, limits);
+            self.attributes.push_mrgb(line, import.limits);
         } else if let Some(statement) = LEFT_OUT.iter().find(|statement| line.is(statement)) {
-            warnings.list("points, lines, free-form shapes and other files are left out", statement);
+            import.warnings.list("points, lines, free-form shapes and other files are left out", statement);
         }
         Ok(())
     }

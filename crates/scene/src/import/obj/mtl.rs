@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
+use super::super::Import;
 use super::super::listing::decoded;
 use super::super::warnings::Warnings;
-use super::map::{Channel, TextureMap};
+use super::map::TextureMap;
 use super::text::{Line, finite, for_each_line, without_byte_order_mark, without_comment};
+use crate::Material;
 use crate::error::{Fault, at_most};
-use crate::{Limits, Material};
 
 /// Statements that are not read and change little of what is seen: ambient light, the index of refraction, and the filters
 /// of reflections and textures.
@@ -38,8 +39,7 @@ pub(super) fn parse(
     bytes: &[u8],
     element: &str,
     folder: &Path,
-    limits: &Limits,
-    warnings: &Warnings,
+    import: &Import,
     entries: &mut Vec<Entry>,
 ) -> Result<(), Fault> {
     let mut is_first = true;
@@ -47,11 +47,12 @@ pub(super) fn parse(
         if line.is("newmtl") {
             is_first = false;
             entries.push(Entry { name: line.rest.to_owned(), folder: folder.to_owned(), ..Entry::default() });
-            return at_most(element, entries.len() as u64, limits.attributes);
+            return at_most(element, entries.len() as u64, import.limits.attributes);
         }
-        let is_usable = entries.last_mut().filter(|_| !is_first).is_none_or(|entry| entry.read_line(line, warnings));
+        let is_usable =
+            entries.last_mut().filter(|_| !is_first).is_none_or(|entry| entry.read_line(line, &import.warnings));
         if !is_usable {
-            warnings.count("statements of materials without usable numbers are left out", line);
+            import.warnings.count("statements of materials without usable numbers are left out", line);
         }
         Ok(())
     })
@@ -115,16 +116,15 @@ impl Entry {
     /// `d`, or else `Tr`. MeshLab and openMVS write `Tr 1` for an opaque material, where others write `Tr 0`: 1 alone counts as
     /// transparent only where another statement is a sign of it.
     fn opacity(&self, name: &str, warnings: &Warnings) -> f32 {
+        let has_glass_model = matches!(self.model, Some(4 | 6 | 7 | 9));
         let opacity = match (self.opacity, self.transparency) {
             (Some(opacity), _) => opacity,
-            (None, Some(transparency)) => {
-                let has_glass_model = matches!(self.model, Some(4 | 6 | 7 | 9));
-                if transparency >= 1.0 && self.alpha_map.is_none() && !has_glass_model {
-                    warnings.list("materials with Tr 1 alone count as opaque", name);
-                    1.0
-                } else {
-                    1.0 - transparency
-                }
+            (None, Some(transparency)) if transparency < 1.0 || self.alpha_map.is_some() || has_glass_model => {
+                1.0 - transparency
+            }
+            (None, Some(_)) => {
+                warnings.list("materials with Tr 1 alone count as opaque", name);
+                1.0
             }
             (None, None) => 1.0,
         };
@@ -133,18 +133,13 @@ impl Entry {
         }
         opacity.clamp(0.0, 1.0)
     }
+}
 
-    /// The name without comment and quotes, to compare where no name is equal to the byte.
-    pub(super) fn folded_name(name: &[u8]) -> Vec<u8> {
-        let bare = without_comment(name);
-        let unquoted = bare.strip_prefix(b"\"").and_then(|inner| inner.strip_suffix(b"\"")).unwrap_or(bare);
-        unquoted.to_ascii_lowercase()
-    }
-
-    /// The channel of the alpha map that is opacity, where the file chooses one.
-    pub(super) fn alpha_channel(&self) -> Option<Channel> {
-        self.alpha_map.as_ref().and_then(|map| map.channel)
-    }
+/// The name without comment and quotes, to compare where no name is equal to the byte.
+pub(super) fn folded_name(name: &[u8]) -> Vec<u8> {
+    let bare = without_comment(name);
+    let unquoted = bare.strip_prefix(b"\"").and_then(|inner| inner.strip_suffix(b"\"")).unwrap_or(bare);
+    unquoted.to_ascii_lowercase()
 }
 
 /// A colour of one or three numbers. Exporters disagree on their encoding; they count as linear, as in the glTF

@@ -53,23 +53,25 @@ pub(super) fn finite(word: &[u8]) -> Option<f64> {
 
 /// A text without its comment, which begins with `#` at the start of a word.
 pub(super) fn without_comment(text: &[u8]) -> &[u8] {
-    let is_start = |&at: &usize| text[at] == b'#' && (at == 0 || text[at - 1].is_ascii_whitespace());
-    text[..(0..text.len()).find(is_start).unwrap_or(text.len())].trim_ascii()
+    let mut places = 0..text.len();
+    let start = places.find(|&at| text[at] == b'#' && (at == 0 || text[at - 1].is_ascii_whitespace()));
+    text[..start.unwrap_or(text.len())].trim_ascii()
 }
 
 /// Removes a byte order mark, and changes UTF-16 that has one to UTF-8. Bytes without a mark stay as they are.
 pub(super) fn without_byte_order_mark(bytes: &[u8]) -> Cow<'_, [u8]> {
-    let units = |pairs: &[u8], unit: fn([u8; 2]) -> u16| {
-        let units = pairs.chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
-        let letters = char::decode_utf16(units).map(|letter| letter.unwrap_or(char::REPLACEMENT_CHARACTER));
-        Cow::Owned(letters.collect::<String>().into_bytes())
-    };
     match bytes {
         [0xef, 0xbb, 0xbf, rest @ ..] => Cow::Borrowed(rest),
-        [0xff, 0xfe, rest @ ..] => units(rest, u16::from_le_bytes),
-        [0xfe, 0xff, rest @ ..] => units(rest, u16::from_be_bytes),
+        [0xff, 0xfe, rest @ ..] => Cow::Owned(from_utf_16(rest, u16::from_le_bytes)),
+        [0xfe, 0xff, rest @ ..] => Cow::Owned(from_utf_16(rest, u16::from_be_bytes)),
         _ => Cow::Borrowed(bytes),
     }
+}
+
+fn from_utf_16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Vec<u8> {
+    let units = bytes.as_chunks::<2>().0.iter().map(|&pair| unit(pair));
+    let letters = char::decode_utf16(units).map(|letter| letter.unwrap_or(char::REPLACEMENT_CHARACTER));
+    letters.collect::<String>().into_bytes()
 }
 
 /// Visits all lines except empty ones and comments, of which only `#MRGB` has data. Lines end with LF, CR

@@ -96,7 +96,6 @@ fn renamed(lines: Vec<Vec<&[u8]>>) -> String {
 
 /// Changes what the parser of numbers does not know: lines that end with CR alone, and the NaN of Microsoft's library.
 fn readable<'b>(body: &'b [u8], end: &[u8]) -> Cow<'b, [u8]> {
-    let is_odd = |byte: &u8| matches!(byte, b'#' | b'(');
     if end != b"\r" && !body.iter().any(is_odd) {
         return Cow::Borrowed(body);
     }
@@ -108,6 +107,11 @@ fn readable<'b>(body: &'b [u8], end: &[u8]) -> Cow<'b, [u8]> {
         changed.extend(space.iter().map(|&byte| if byte == b'\r' { b'\n' } else { byte }));
     }
     Cow::Owned(changed)
+}
+
+/// Returns whether a byte is part of Microsoft's NaN, as in `1.#IND` and `-nan(ind)`.
+fn is_odd(byte: &u8) -> bool {
+    matches!(byte, b'#' | b'(')
 }
 
 /// Refuses counts that exceed the file's length or the limits, rows without properties, and files without vertices or

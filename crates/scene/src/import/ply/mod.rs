@@ -17,38 +17,37 @@ use glam::DAffine3;
 use serde::{Deserialize, de::MapAccess};
 use serde_ply::{PlyReader, RowVisitor};
 
-use super::folder::Folder;
+use super::Import;
 use super::listing::decoded;
 use super::normals;
 use super::picture::Content;
 use super::source_scene::{SourceInstance, SourceScene};
 use super::texture_files::{TextureFiles, TextureReference};
-use super::warnings::Warnings;
 use crate::error::{Fault, at_most};
-use crate::{Limits, Material, TextureUse};
-use header::{PlyText, color_range};
+use crate::{Material, TextureUse};
+use header::{ColorRange, PlyText, color_range};
 use rows::{FaceRow, SkippedRow, VertexRow};
 use surface::Surface;
 use vertices::Vertices;
 
-pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &Warnings) -> Result<SourceScene, Fault> {
+pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> {
     let text = PlyText::parse(bytes)?;
     // The last number of an ASCII file may lack the white space that ends it.
     let rows = text.header.as_bytes().chain(&*text.body).chain(&b"\n"[..]);
     let reader = PlyReader::from_reader(rows).map_err(|e| Fault::malformed("header", e.to_string()))?;
-    header::check(reader.header(), bytes.len() as u64, limits)?;
-    let (vertices, surface) = read_elements(reader, limits, warnings)?;
-    let has_uvs = vertices.has_uvs || surface.has_uvs();
+    header::check(reader.header(), bytes.len() as u64, import.limits)?;
+    let (vertices, surface) = read_elements(reader, import)?;
+    let has_uvs = vertices.has_uvs || !surface.uvs.is_empty();
     let mut scene = SourceScene::default();
     if !has_uvs && !text.texture_files.is_empty() {
-        warnings.list("textures without coordinates are not shown", decoded(text.texture_files[0]));
+        import.warnings.list("textures without coordinates are not shown", decoded(text.texture_files[0]));
     } else if !text.texture_files.is_empty() {
-        read_textures(&text.texture_files, folder, limits, warnings, &mut scene)?;
+        read_textures(&text.texture_files, import, &mut scene)?;
     }
     let textured_count = scene.materials.len() as u32;
     let white = Material { name: "vertex colours".into(), double_sided: true, ..Material::default() };
     scene.materials.push(white);
-    let mut mesh = surface.into_mesh(&vertices, textured_count, limits, warnings)?;
+    let mut mesh = surface.into_mesh(&vertices, textured_count, import)?;
     normals::fill(&mut mesh, |_| false);
     scene.meshes.push(mesh);
     scene.instances.push(SourceInstance { mesh: 0, source_from_mesh: DAffine3::IDENTITY });
@@ -56,34 +55,25 @@ pub(super) fn read(bytes: &[u8], folder: &Folder, limits: &Limits, warnings: &Wa
 }
 
 /// Reads the texture files, and makes a material of each.
-fn read_textures(
-    names: &[&[u8]],
-    folder: &Folder,
-    limits: &Limits,
-    warnings: &Warnings,
-    scene: &mut SourceScene,
-) -> Result<(), Fault> {
-    at_most("texture files", names.len() as u64, limits.attributes)?;
+fn read_textures(names: &[&[u8]], import: &Import, scene: &mut SourceScene) -> Result<(), Fault> {
+    at_most("texture files", names.len() as u64, import.limits.attributes)?;
     let mut files = TextureFiles::default();
     for name in names {
         let shown_name = decoded(name).into_owned();
         let element = format!("TextureFile {shown_name}");
-        let bases = vec![Path::new("")];
-        let reference = TextureReference { element, names: vec![name], bases, content: Content::Colors };
-        let texture = files.number_of(reference, folder, warnings)?;
+        let base = Path::new("");
+        let reference = TextureReference { element, names: vec![name], base, content: Content::Colors };
+        let texture = files.number_of(reference, import)?;
         let base_color_texture = Some(TextureUse::from(texture));
         let material = Material { name: shown_name, double_sided: true, base_color_texture, ..Material::default() };
         scene.materials.push(material);
     }
-    scene.textures = files.decode(limits, folder.missing_textures)?;
+    scene.textures = files.decode(import)?;
     Ok(())
 }
 
-fn read_elements(
-    mut reader: PlyReader<impl BufRead>,
-    limits: &Limits,
-    warnings: &Warnings,
-) -> Result<(Vertices, Surface), Fault> {
+fn read_elements(mut reader: PlyReader<impl BufRead>, import: &Import) -> Result<(Vertices, Surface), Fault> {
+    let Import { limits, warnings, .. } = import;
     let mut vertices = Vertices::default();
     let mut surface = Surface::default();
     while let Some(element) = reader.current_element() {
@@ -92,50 +82,37 @@ fn read_elements(
             "vertex" => {
                 vertices.colors = color_range(element);
                 vertices.has_uvs = element.has_property("s");
-                let read = each_row(&mut reader, |row: VertexRow| {
-                    vertices.push(&row, warnings);
-                    Ok(())
-                });
-                read.map_err(|why| Fault::malformed(format!("vertex {}", vertices.len()), why))?;
+                each_row(&mut reader, |row: VertexRow| vertices.push(&row, warnings))
+                    .map_err(|why| Fault::malformed(format!("vertex {}", vertices.positions_in_source.len()), why))?;
             }
             "face" | "tristrips" => {
                 let are_strips = name == "tristrips";
-                surface.set_colors(color_range(element));
+                let range = color_range(element);
+                surface.color_range = if range == ColorRange::None { surface.color_range } else { range };
                 let mut row_number = 0u64;
                 let read = each_row(&mut reader, |row: FaceRow| {
-                    if are_strips {
+                    // A file over the limit is refused below: further rows would only take memory.
+                    let is_within_limit = surface.triangle_count <= limits.triangles;
+                    if is_within_limit && are_strips {
                         surface.push_strips(&row.vertex_indices);
-                    } else {
+                    } else if is_within_limit {
                         surface.push(&row, row_number, warnings);
                     }
                     row_number += 1;
-                    if surface.triangle_count() > limits.triangles { Err(TOO_MANY.to_owned()) } else { Ok(()) }
                 });
-                at_most("triangles", surface.triangle_count(), limits.triangles)?;
+                at_most("triangles", surface.triangle_count, limits.triangles)?;
                 read.map_err(|why| Fault::malformed(format!("{name} {row_number}"), why))?;
             }
-            _ => each_row(&mut reader, |_: SkippedRow| Ok(())).map_err(|why| Fault::malformed(&name, why))?,
+            _ => each_row(&mut reader, |_: SkippedRow| ()).map_err(|why| Fault::malformed(&name, why))?,
         }
     }
     Ok((vertices, surface))
 }
 
-const TOO_MANY: &str = "too many triangles";
-
-/// Passes the rows of the reader's next element to `take`, up to the first that it refuses.
+/// Passes the rows of the reader's next element to `take`.
 fn each_row<'de, R: BufRead, T: Deserialize<'de>>(
     mut reader: &mut PlyReader<R>,
-    mut take: impl FnMut(T) -> Result<(), String>,
+    take: impl FnMut(T),
 ) -> Result<(), String> {
-    let mut refused = None;
-    let mut visitor = RowVisitor::new(|row| {
-        if refused.is_none() {
-            refused = take(row).err();
-        }
-    });
-    let read = reader.next_value_seed(&mut visitor);
-    match refused {
-        Some(why) => Err(why),
-        None => read.map_err(|e| e.0.to_string()),
-    }
+    reader.next_value_seed(&mut RowVisitor::new(take)).map_err(|e| e.0.to_string())
 }

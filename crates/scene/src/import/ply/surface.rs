@@ -2,19 +2,18 @@
 
 use std::collections::HashMap;
 
-use super::super::polygons::{PolygonCutter, TOO_COSTLY};
+use super::super::Import;
+use super::super::polygons::{NOT_FINITE, PolygonCutter, TOO_COSTLY, TOO_SHORT};
 use super::super::source_scene::SourceMesh;
-use super::super::vertex_colors::scale_to_bytes;
+use super::super::vertex_colors::{bytes, scale_to_bytes};
 use super::super::warnings::Warnings;
 use super::header::ColorRange;
 use super::rows::FaceRow;
-use super::vertices::{Vertices, bytes, v_downwards};
+use super::vertices::{Vertices, v_downwards};
+use crate::Vertex;
 use crate::error::{Fault, at_most};
-use crate::{Limits, MeshPart, Vertex};
 
-const TOO_SHORT: &str = "faces of fewer than three corners are left out";
 const UNKNOWN_VERTEX: &str = "faces with a vertex that is not there are left out";
-const NOT_FINITE: &str = "faces with a vertex that is not finite are left out";
 
 /// The number of a vertex that no file has.
 const NO_VERTEX: u32 = u32::MAX;
@@ -25,11 +24,11 @@ pub(super) struct Surface {
     faces: Vec<Face>,
     corners: Vec<u32>,
     /// One for each corner once any face has them.
-    uvs: Vec<[f32; 2]>,
+    pub uvs: Vec<[f32; 2]>,
     /// One for each face once any has one, as the file has them.
     colors: Vec<[f32; 4]>,
-    color_range: ColorRange,
-    triangle_count: u64,
+    pub color_range: ColorRange,
+    pub triangle_count: u64,
 }
 
 struct Face {
@@ -41,20 +40,6 @@ struct Face {
 }
 
 impl Surface {
-    pub(super) fn triangle_count(&self) -> u64 {
-        self.triangle_count
-    }
-
-    pub(super) fn has_uvs(&self) -> bool {
-        !self.uvs.is_empty()
-    }
-
-    pub(super) fn set_colors(&mut self, range: ColorRange) {
-        if range != ColorRange::None {
-            self.color_range = range;
-        }
-    }
-
     pub(super) fn push(&mut self, row: &FaceRow, number: u64, warnings: &Warnings) {
         let count = row.vertex_indices.len();
         if count < 3 {
@@ -95,39 +80,40 @@ impl Surface {
 
     /// The triangles of texture 0, then of texture 1 and so on, whose materials have the same numbers; those without a texture
     /// come last.
-    pub(super) fn into_mesh(
-        self,
-        vertices: &Vertices,
-        texture_count: u32,
-        limits: &Limits,
-        warnings: &Warnings,
-    ) -> Result<SourceMesh, Fault> {
-        let has_texture = texture_count > 0;
+    pub(super) fn into_mesh(self, vertices: &Vertices, textures: u32, import: &Import) -> Result<SourceMesh, Fault> {
+        let has_texture = textures > 0;
         let has_colors = vertices.colors != ColorRange::None || !self.colors.is_empty();
         if has_texture && has_colors {
-            warnings.list("colours beside a texture are not shown", "vertex or face");
+            import.warnings.list("colours beside a texture are not shown", "vertex or face");
         }
-        let mut builder = Builder::new(&self, vertices, has_texture, texture_count as usize + 1);
+        let takes_face_colors = vertices.colors == ColorRange::None && !has_texture;
+        let mut builder = Builder {
+            surface: &self,
+            vertices,
+            colored: vertices.colored(),
+            face_colors_srgba8: if takes_face_colors { self.colors_srgba8() } else { Vec::new() },
+            has_texture,
+            mesh: SourceMesh::default(),
+            indices_of_material: vec![Vec::new(); textures as usize + 1],
+            number_of: HashMap::new(),
+            number_of_plain: vec![NO_VERTEX; vertices.positions_in_source.len()],
+            cutter: PolygonCutter::new(),
+        };
         let mut start = 0;
         for (number, face) in self.faces.iter().enumerate() {
-            builder.add(number, face, start..face.end, warnings);
+            builder.add(number, face, start..face.end, &import.warnings);
             start = face.end;
-            at_most("vertices of faces", builder.mesh.vertices.len() as u64, limits.vertices)?;
+            at_most("vertices of faces", builder.mesh.vertices.len() as u64, import.limits.vertices)?;
         }
         let mut mesh = builder.mesh;
         for (material, indices) in builder.indices_of_material.into_iter().enumerate() {
-            let first_index = mesh.indices.len() as u32;
-            let index_count = indices.len() as u32;
-            if index_count > 0 {
-                mesh.parts.push(MeshPart { first_index, index_count, material: material as u32 });
-                mesh.indices.extend(indices);
+            if !indices.is_empty() {
+                mesh.push_part(indices, material as u32);
             }
         }
         if mesh.indices.is_empty() {
-            let reasons = [UNKNOWN_VERTEX, NOT_FINITE, TOO_SHORT].into_iter();
-            let reason = reasons.filter_map(|why| Some((why, warnings.first(why)?))).next();
-            let (why, place) = reason.unwrap_or_else(|| ("all are empty", "file".to_owned()));
-            return Err(Fault::malformed(place, format!("there are no triangles: {why}")));
+            let fault = import.warnings.no_triangles([UNKNOWN_VERTEX, NOT_FINITE, TOO_SHORT]);
+            return Err(fault.unwrap_or_else(|| Fault::malformed("file", "there are no triangles: all are empty")));
         }
         Ok(mesh)
     }
@@ -158,23 +144,7 @@ struct Builder<'a> {
     cutter: PolygonCutter,
 }
 
-impl<'a> Builder<'a> {
-    fn new(surface: &'a Surface, vertices: &'a Vertices, has_texture: bool, material_count: usize) -> Self {
-        let takes_face_colors = vertices.colors == ColorRange::None && !has_texture;
-        Self {
-            surface,
-            vertices,
-            colored: vertices.colored(),
-            face_colors_srgba8: if takes_face_colors { surface.colors_srgba8() } else { Vec::new() },
-            has_texture,
-            mesh: SourceMesh::default(),
-            indices_of_material: vec![Vec::new(); material_count],
-            number_of: HashMap::new(),
-            number_of_plain: vec![NO_VERTEX; vertices.len()],
-            cutter: PolygonCutter::new(),
-        }
-    }
-
+impl Builder<'_> {
     fn add(&mut self, number: usize, face: &Face, corners: std::ops::Range<usize>, warnings: &Warnings) {
         let place = format_args!("face {}", face.row);
         let positions = self.surface.corners[corners.clone()].iter();
@@ -189,7 +159,7 @@ impl<'a> Builder<'a> {
         let last = self.indices_of_material.len() - 1;
         let texture = usize::try_from(face.texture).ok().filter(|texture| *texture < last);
         if self.has_texture && texture.is_none() {
-            warnings.count("faces of a texture that is not there are white", format_args!("face {}", face.row));
+            warnings.count("faces of a texture that is not there are white", place);
         }
         let triangles = self.cutter.triangles(&polygon, || warnings.count(TOO_COSTLY, place));
         let triangles = triangles.iter().map(|&corner| in_mesh[corner as usize]);

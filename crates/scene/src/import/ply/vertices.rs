@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::super::source_scene::plain_vertex;
-use super::super::vertex_colors::scale_to_bytes;
+use super::super::vertex_colors::{bytes, scale_to_bytes};
 use super::super::warnings::Warnings;
 use super::header::ColorRange;
 use super::rows::VertexRow;
@@ -21,23 +21,22 @@ pub(super) struct Vertices {
 }
 
 impl Vertices {
-    pub(super) fn len(&self) -> usize {
-        self.vertices.len()
-    }
-
     pub(super) fn push(&mut self, row: &VertexRow, warnings: &Warnings) {
         let number = self.vertices.len();
-        let position = row.position();
+        let place = format_args!("vertex {number}");
+        let position = DVec3::new(row.x, row.y, row.z);
         if !position.is_finite() {
-            warnings.count("vertices that are not finite", format_args!("vertex {number}"));
+            warnings.count("vertices that are not finite", place);
         }
-        let normal = row.normal().try_normalize();
-        if normal.is_none() && row.normal() != DVec3::ZERO {
-            warnings.count("normals that are not finite are computed", format_args!("vertex {number}"));
+        // A normal of length 0 is computed from the faces.
+        let given_normal = DVec3::new(row.nx.into(), row.ny.into(), row.nz.into());
+        let normal = given_normal.try_normalize();
+        if normal.is_none() && given_normal != DVec3::ZERO {
+            warnings.count("normals that are not finite are computed", place);
         }
-        let uv = row.uv();
+        let uv = [row.s.unwrap_or(0.0), row.t.unwrap_or(0.0)];
         if !uv.iter().all(|c| c.is_finite()) {
-            warnings.count("texture coordinates that are not finite count as 0", format_args!("vertex {number}"));
+            warnings.count("texture coordinates that are not finite count as 0", place);
         }
         let plain = plain_vertex();
         let color_srgba8 = match self.colors {
@@ -63,11 +62,6 @@ impl Vertices {
         }
         vertices
     }
-}
-
-/// A channel that is not there, or no number, is 255.
-pub(super) fn bytes(color: [f32; 4], scale: f32) -> [u8; 4] {
-    color.map(|c| if c.is_finite() { (c * scale + 0.5) as u8 } else { 255 })
 }
 
 /// PLY's v runs upwards. Coordinates that are not finite are 0.

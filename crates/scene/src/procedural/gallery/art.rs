@@ -21,27 +21,19 @@ struct Picture {
 }
 
 pub(super) fn add(builder: &mut MeshBuilder) {
-    let left = |z: f32, half_width_m: f32, half_height_m: f32, seed: u64, colors: [Vec3; 3]| Picture {
-        middle: Vec3::new(0.02 - HALF_LENGTH_M, 1.95, z),
-        right: Vec3::NEG_Z * half_width_m,
-        half_height_m,
-        seed,
-        colors,
-    };
     let [ink, sand, sky] = [Vec3::new(30.0, 40.0, 62.0), Vec3::new(232.0, 206.0, 160.0), Vec3::new(96.0, 160.0, 206.0)];
     let [rust, leaf, gold] =
         [Vec3::new(190.0, 70.0, 40.0), Vec3::new(60.0, 120.0, 84.0), Vec3::new(236.0, 180.0, 70.0)];
-    add_picture(builder, &left(-0.75, 1.05, 0.75, 3, [ink, sky, sand]));
-    let front = |x: f32, half_width_m: f32, seed: u64, colors: [Vec3; 3]| Picture {
-        middle: Vec3::new(x, 1.9, HALF_WIDTH_M - 0.02),
-        right: Vec3::NEG_X * half_width_m,
-        half_height_m: 0.6,
-        seed,
-        colors,
-    };
-    add_picture(builder, &front(-4.2, 0.5, 8, [rust, gold, sand]));
-    add_picture(builder, &front(1.2, 0.8, 13, [ink, rust, gold]));
-    add_picture(builder, &front(3.9, 0.6, 21, [leaf, sand, sky]));
+    let on_left_wall = Vec3::new(0.02 - HALF_LENGTH_M, 1.95, -0.75);
+    let colors = [ink, sky, sand];
+    let right = Vec3::NEG_Z * 1.05;
+    add_picture(builder, &Picture { middle: on_left_wall, right, half_height_m: 0.75, seed: 3, colors });
+    for (x, half_width_m, seed, colors) in
+        [(-4.2, 0.5, 8, [rust, gold, sand]), (1.2, 0.8, 13, [ink, rust, gold]), (3.9, 0.6, 21, [leaf, sand, sky])]
+    {
+        let middle = Vec3::new(x, 1.9, HALF_WIDTH_M - 0.02);
+        add_picture(builder, &Picture { middle, right: Vec3::NEG_X * half_width_m, half_height_m: 0.6, seed, colors });
+    }
     builder.cuboid(Vec3::new(-3.85, 0.0, -2.35), Vec3::new(-3.35, 1.0, -1.85), PLINTH);
     add_knot(builder, Vec3::new(-3.6, 1.47, -2.1), 0.17, Vec3::new(214.0, 158.0, 66.0));
     builder.cuboid(Vec3::new(0.9, 0.0, -2.6), Vec3::new(1.5, 0.75, -2.0), PLINTH);
@@ -66,9 +58,8 @@ fn add_picture(builder: &mut MeshBuilder, picture: &Picture) {
     let normal = right.cross(up).normalize_or(Vec3::Z);
     for row in 0..CELLS[1] {
         for column in 0..CELLS[0] {
-            let place = |number: i32, axis: usize| (2 * number + 1 - CELLS[axis]) as f32 / CELLS[axis] as f32;
-            let x = place(column, 0);
-            let y = place(row, 1);
+            let x = (2 * column + 1 - CELLS[0]) as f32 / CELLS[0] as f32;
+            let y = (2 * row + 1 - CELLS[1]) as f32 / CELLS[1] as f32;
             let at = Vec2::new(x * right.length(), y * half_height_m);
             let bend = noise.at(at * 1.3);
             let high = (0.5 + 0.5 * (y + 0.9 * bend)).clamp(0.0, 1.0);
@@ -91,13 +82,12 @@ fn add_picture(builder: &mut MeshBuilder, picture: &Picture) {
 
 /// A tube along a knot that winds twice around one axis and three times around the other.
 fn add_knot(builder: &mut MeshBuilder, middle: Vec3, scale_m: f32, color: Vec3) {
-    let at = |t: f32| {
+    add_tube(builder, 320, 20, 0.42 * scale_m, color, |t| {
         let ring = TAU * 2.0 * t;
         let wind = TAU * 3.0 * t;
         let radius = 1.6 + 0.7 * wind.cos();
         middle + scale_m * Vec3::new(radius * ring.cos(), 0.9 * wind.sin() + 0.3, radius * ring.sin())
-    };
-    add_tube(builder, 320, 20, 0.42 * scale_m, color, at);
+    });
 }
 
 /// A ring of light on the wall.
@@ -130,15 +120,5 @@ fn add_tube(
             builder.push(vertex(at(t) + normal * radius_m, normal, color));
         }
     }
-    for station in 0..stations {
-        for number in 0..sides {
-            let corner = |station: u32, number: u32| first + (station % stations) * sides + number % sides;
-            builder.quad([
-                corner(station, number),
-                corner(station, number + 1),
-                corner(station + 1, number + 1),
-                corner(station + 1, number),
-            ]);
-        }
-    }
+    builder.join_rings(first, stations, sides, true);
 }

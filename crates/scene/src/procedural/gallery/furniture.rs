@@ -152,8 +152,7 @@ pub(super) fn add_lanterns(builder: &mut MeshBuilder) {
 
 /// A box with rounded edges, as of cloth.
 fn cushion(builder: &mut MeshBuilder, middle: Vec3, half: Vec3, color_srgb: Vec3) {
-    let rounded = |at: f32| at.signum() * at.abs().powf(0.35);
     star(builder, [48, 24], color_srgb, |out| {
-        middle + Vec3::new(rounded(out.x), rounded(out.y), rounded(out.z)) * half
+        middle + Vec3::from(out.to_array().map(|at| at.signum() * at.abs().powf(0.35))) * half
     });
 }

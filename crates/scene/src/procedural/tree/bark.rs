@@ -39,16 +39,17 @@ pub(super) fn add(builder: &mut MeshBuilder, skeleton: &Skeleton, budget: u32, s
 
 impl Detail {
     fn at(scale: f32) -> Self {
-        let count = |at_one: f32, least: f32| (at_one * scale).round().max(least) as u32;
-        Self { rings: RINGS.map(|r| count(r, 1.0)), sides: SIDES.map(|s| count(s, 3.0)), share: [1.0; LEVELS] }
+        let rings = RINGS.map(|rings| (rings * scale).round().max(1.0) as u32);
+        let sides = SIDES.map(|sides| (sides * scale).round().max(3.0) as u32);
+        Self { rings, sides, share: [1.0; LEVELS] }
     }
 
     fn within(budget: u32, skeleton: &Skeleton) -> Self {
         let mut branches = [0u32; LEVELS];
         skeleton.branches.iter().for_each(|b| branches[b.level] += 1);
-        let scales = (0..40).map(|step| 4.0 * 0.92f32.powi(step));
-        let fits = |detail: &Self| detail.triangles(&branches) <= budget as f32;
-        scales.map(Self::at).find(fits).unwrap_or_else(|| Self::at(0.2).thinned_to(budget as f32, &branches))
+        let mut details = (0..40).map(|step| Self::at(4.0 * 0.92f32.powi(step)));
+        let fitting = details.find(|detail| detail.triangles(&branches) <= budget as f32);
+        fitting.unwrap_or_else(|| Self::at(0.2).thinned_to(budget as f32, &branches))
     }
 
     /// Drops twigs first, then shoots, and so on.
@@ -86,14 +87,7 @@ fn add_tube(builder: &mut MeshBuilder, branch: &Branch, rings: u32, sides: u32, 
             builder.push(bark_vertex(branch, t, outwards, angle, noise));
         }
     }
-    for ring in 0..rings {
-        for i in 0..sides {
-            let below = first + ring * sides;
-            let above = first + (ring + 1) * sides;
-            let next = (i + 1) % sides;
-            builder.quad([below + i, below + next, above + next, above + i]);
-        }
-    }
+    builder.join_rings(first, rings + 1, sides, false);
 }
 
 fn bark_vertex(branch: &Branch, t: f32, outwards: Vec3, angle_rad: f32, noise: &Noise) -> Vertex {

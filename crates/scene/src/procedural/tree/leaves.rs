@@ -81,8 +81,10 @@ impl Leaf {
 
     fn add_folded(&self, builder: &mut MeshBuilder) {
         let width_axis = self.across.normalize_or(Vec3::X);
-        let tilted = |s: f32| (self.up - width_axis * (0.35 * s)).normalize_or(self.up);
-        let mut push = |t: f32, s: f32, shade: f32| builder.push(self.vertex(t, s, tilted(s), shade));
+        let mut push = |t: f32, s: f32, shade: f32| {
+            let normal = (self.up - width_axis * (0.35 * s)).normalize_or(self.up);
+            builder.push(self.vertex(t, s, normal, shade))
+        };
         let base = push(0.0, 0.0, 0.95);
         let middle = push(0.5, 0.0, 1.1);
         let tip = push(1.0, 0.0, 1.05);

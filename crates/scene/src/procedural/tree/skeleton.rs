@@ -1,6 +1,7 @@
 //! Branches by recursion, after Weber and Penn (1995). Each bears shorter ones along its length, turned by the golden
 //! angle. All bend towards the light and under their own weight.
 
+use depth_image::Aabb;
 use glam::{Quat, Vec3};
 
 use super::super::random::{Rng, lerp};
@@ -68,29 +69,24 @@ impl Skeleton {
         /// Room for the leaves at the very top, and for the crown within the block.
         const LEAF_MARGIN_M: f32 = 0.02;
         const MAX_REACH_M: f32 = 0.62;
-        let knots = || self.branches.iter().flat_map(|b| &b.knots);
-        let top = knots().fold(1e-3f32, |top, k| top.max(k.position.y));
-        let reach = knots().fold(1e-3f32, |reach, k| reach.max(k.position.x.hypot(k.position.z)));
+        let mut top = 1e-3f32;
+        let mut reach = 1e-3f32;
+        for knot in self.branches.iter().flat_map(|b| &b.knots) {
+            top = top.max(knot.position.y);
+            reach = reach.max(knot.position.x.hypot(knot.position.z));
+        }
         let scale = ((height_m - LEAF_MARGIN_M) / top).min(MAX_REACH_M / reach);
         for knot in self.branches.iter_mut().flat_map(|b| &mut b.knots) {
             knot.position = foot + knot.position * scale;
             knot.radius_m *= scale;
         }
-        self.measure_crown();
-        self
-    }
-
-    fn measure_crown(&mut self) {
         let twigs = self.branches.iter().filter(|b| b.level + 1 == LEVELS).flat_map(|b| &b.knots);
-        let mut min = Vec3::INFINITY;
-        let mut max = Vec3::NEG_INFINITY;
-        for knot in twigs {
-            (min, max) = (min.min(knot.position), max.max(knot.position));
+        let crown = Aabb::around(twigs.map(|knot| knot.position));
+        if crown.min.is_finite() {
+            self.crown_centre = crown.center();
+            self.crown_radii = (crown.size() * 0.5).max(Vec3::splat(1e-3));
         }
-        if min.is_finite() {
-            self.crown_centre = (min + max) * 0.5;
-            self.crown_radii = ((max - min) * 0.5).max(Vec3::splat(1e-3));
-        }
+        self
     }
 }
 
@@ -101,26 +97,22 @@ impl Branch {
         let along = t.clamp(0.0, 1.0) * last as f32;
         let i = (along as usize).min(last - 1);
         let f = along - i as f32;
-        let [a, b, c, d] = [i.saturating_sub(1), i, i + 1, (i + 2).min(last)].map(|k| self.knots[k]);
-        let p0 = a.position;
-        let p1 = b.position;
-        let p2 = c.position;
-        let p3 = d.position;
+        let around = [i.saturating_sub(1), i, i + 1, (i + 2).min(last)].map(|k| self.knots[k]);
+        let [_, before, after, _] = around;
+        let [p0, p1, p2, p3] = around.map(|knot| knot.position);
         let curve = p1 * 2.0
             + (p2 - p0) * f
             + (p0 * 2.0 - p1 * 5.0 + p2 * 4.0 - p3) * (f * f)
             + (p1 * 3.0 - p0 - p2 * 3.0 + p3) * (f * f * f);
-        Knot { position: curve * 0.5, radius_m: lerp(b.radius_m, c.radius_m, f), sway: lerp(b.sway, c.sway, f) }
+        Knot {
+            position: curve * 0.5,
+            radius_m: lerp(before.radius_m, after.radius_m, f),
+            sway: lerp(before.sway, after.sway, f),
+        }
     }
 
     pub(super) fn direction_at(&self, t: f32) -> Vec3 {
-        let before = self.at(t - 0.05);
-        let after = self.at(t + 0.05);
-        (after.position - before.position).normalize_or(Vec3::Y)
-    }
-
-    pub(super) fn length_m(&self) -> f32 {
-        self.knots.windows(2).map(|w| w[0].position.distance(w[1].position)).sum()
+        (self.at(t + 0.05).position - self.at(t - 0.05).position).normalize_or(Vec3::Y)
     }
 }
 
@@ -149,9 +141,9 @@ fn children_of(parent: &Branch, rng: &mut Rng) -> Vec<Branch> {
     if children == 0 {
         return Vec::new();
     }
-    let parent_length = parent.length_m();
+    let parent_length = parent.knots.windows(2).map(|w| w[0].position.distance(w[1].position)).sum::<f32>();
     let first_turn = rng.between(0.0, std::f32::consts::TAU);
-    let child = |i: u32| {
+    let branches = (0..children).map(|i| {
         let u = (i as f32 + rng.between(0.1, 0.9)) / children as f32;
         let t = lerp(FIRST_CHILD[parent.level], 0.98, u);
         let turn = first_turn + GOLDEN_ANGLE_RAD * i as f32 + rng.between(-0.35, 0.35);
@@ -162,8 +154,8 @@ fn children_of(parent: &Branch, rng: &mut Rng) -> Vec<Branch> {
         let thickness = if level == 1 { 0.52 } else { 0.6 };
         let radius_m = (knot.radius_m * thickness).min(0.05 * length).max(4e-4);
         grow(level, Knot { radius_m, ..knot }, direction, length, rng)
-    };
-    (0..children).map(child).collect()
+    });
+    branches.collect()
 }
 
 /// Limbs are longest a third up the crown, which makes it a dome; others shorten towards the tip.

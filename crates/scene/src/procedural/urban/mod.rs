@@ -33,6 +33,11 @@ pub fn urban() -> Scene {
 /// Quarters of blocks that are parks: (block, quarter).
 const PARKS: [(usize, u32); 5] = [(1, 3), (4, 1), (4, 3), (6, 1), (8, 0)];
 
+/// A place on the plan, at a height.
+fn at_height(on_plan: Vec2, y_m: f32) -> Vec3 {
+    Vec3::new(on_plan.x, y_m, on_plan.y)
+}
+
 fn add_block(builder: &mut MeshBuilder, number: usize, corner: Vec2, rng: &mut Rng) {
     street::add_pavement(builder, corner);
     let quarter_m = (BLOCK_M - 2.0 * PAVEMENT_M) * 0.5;

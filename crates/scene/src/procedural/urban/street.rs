@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::super::geometry::MeshBuilder;
 use super::super::random::{Noise, Rng, mix};
+use super::at_height;
 
 pub(super) const SEED: u64 = 1950;
 
@@ -33,8 +34,9 @@ const CARS_SRGB: [[f32; 3]; 6] = [
 
 /// The corner of least x and z of each block.
 pub(super) fn blocks() -> impl Iterator<Item = Vec2> {
-    let along = |i: u32| -HALF_WIDTH_M + STREET_M + i as f32 * (BLOCK_M + STREET_M);
-    (0..BLOCKS * BLOCKS).map(move |i| Vec2::new(along(i % BLOCKS), along(i / BLOCKS)))
+    (0..BLOCKS * BLOCKS).map(|i| {
+        Vec2::from([i % BLOCKS, i / BLOCKS].map(|i| -HALF_WIDTH_M + STREET_M + i as f32 * (BLOCK_M + STREET_M)))
+    })
 }
 
 /// One large square, with dashes along the middle of each street.
@@ -56,22 +58,18 @@ pub(super) fn add_ground(builder: &mut MeshBuilder) {
 
 /// A block's slab, up to the kerb.
 pub(super) fn add_pavement(builder: &mut MeshBuilder, corner: Vec2) {
-    let far = corner + BLOCK_M;
-    let min = Vec3::new(corner.x, -0.2, corner.y);
-    let max = Vec3::new(far.x, KERB_M, far.y);
-    builder.cuboid(min, max, Vec3::new(160.0, 156.0, 150.0));
+    let grey = Vec3::new(160.0, 156.0, 150.0);
+    builder.cuboid(at_height(corner, -0.2), at_height(corner + BLOCK_M, KERB_M), grey);
 }
 
 /// A lawn with trees, `half_m` to each side.
 pub(super) fn add_park(builder: &mut MeshBuilder, middle: Vec2, half_m: f32, rng: &mut Rng) {
-    let min = middle - half_m;
-    let max = middle + half_m;
     let lawn = Vec3::new(104.0, 130.0, 70.0);
-    builder.cuboid(Vec3::new(min.x, 0.0, min.y), Vec3::new(max.x, KERB_M + 0.3, max.y), lawn);
+    builder.cuboid(at_height(middle - half_m, 0.0), at_height(middle + half_m, KERB_M + 0.3), lawn);
     for i in 0..9 {
         let cell = Vec2::new((i % 3) as f32 - 1.0, (i / 3) as f32 - 1.0) * 0.62;
         let at = middle + (cell + Vec2::new(rng.between(-0.2, 0.2), rng.between(-0.2, 0.2))) * half_m;
-        add_tree(builder, Vec3::new(at.x, KERB_M + 0.3, at.y), rng.between(0.9, 1.5), rng);
+        add_tree(builder, at_height(at, KERB_M + 0.3), rng.between(0.9, 1.5), rng);
     }
 }
 
@@ -108,8 +106,7 @@ struct Side {
 
 impl Side {
     fn at(&self, along_m: f32, out_m: f32, y_m: f32) -> Vec3 {
-        let at = self.corner + self.along * along_m + self.out * out_m;
-        Vec3::new(at.x, y_m, at.y)
+        at_height(self.corner + self.along * along_m + self.out * out_m, y_m)
     }
 
     /// A box between two places along, out and up.
@@ -152,8 +149,8 @@ fn add_lamp(builder: &mut MeshBuilder, side: &Side, along_m: f32) {
 
 fn add_car(builder: &mut MeshBuilder, side: &Side, along_m: f32, rng: &mut Rng) {
     let color = Vec3::from(CARS_SRGB[(rng.unit() * CARS_SRGB.len() as f32) as usize]);
-    let along_m = along_m + rng.between(-0.8, 0.8);
-    let at = |along: f32, out: f32, y_m: f32| Vec3::new(along_m + along, 1.4 + out, y_m);
-    side.cuboid(builder, at(-2.2, -0.9, 0.25), at(2.2, 0.9, 0.95), color);
-    side.cuboid(builder, at(-1.3, -0.78, 0.95), at(1.2, 0.78, 1.5), Vec3::new(52.0, 60.0, 68.0));
+    let middle = Vec3::new(along_m + rng.between(-0.8, 0.8), 1.4, 0.0);
+    side.cuboid(builder, middle + Vec3::new(-2.2, -0.9, 0.25), middle + Vec3::new(2.2, 0.9, 0.95), color);
+    let glass = Vec3::new(52.0, 60.0, 68.0);
+    side.cuboid(builder, middle + Vec3::new(-1.3, -0.78, 0.95), middle + Vec3::new(1.2, 0.78, 1.5), glass);
 }
