@@ -27,8 +27,9 @@ pub(crate) async fn within<T>(
     what: &str,
     call: impl Future<Output = Result<T, Status>>,
 ) -> Result<T, Status> {
-    let late = |_| Status::deadline_exceeded(format!("{what} took longer than {} s", deadline.as_secs()));
-    tokio::time::timeout(deadline, call).await.map_err(late)?
+    tokio::time::timeout(deadline, call)
+        .await
+        .unwrap_or_else(|_| Err(Status::deadline_exceeded(format!("{what} took longer than {} s", deadline.as_secs()))))
 }
 
 /// A status that names the node it is of.

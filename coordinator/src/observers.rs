@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
-use cluster::{ClusterStatus, ErrorInterval, PromiseState, WorkloadStatus};
+use cluster::{ClusterStatus, ErrorInterval, PromiseState};
 use node::Telemetry;
 use parking_lot::Mutex;
 use prometheus_client::encoding::EncodeLabelSet;
@@ -114,20 +114,23 @@ impl CoordinatorMetrics {
             let count = promises.filter(|promise| promise.state == state).count();
             self.promises.get_or_create(&State { state: state.to_string() }).set(count as i64);
         }
-        let number = |count: u64| i64::try_from(count).unwrap_or(i64::MAX);
-        self.nodes.set(number(status.nodes.len() as u64));
-        self.workloads.set(number(status.workloads.len() as u64));
-        self.samplers.set(number(status.sampler_count() as u64));
-        self.sessions.set(number(status.session_count()));
-        self.views_per_set.set(number(status.views_per_set()));
-        self.plan_epoch.set(number(status.plan_epoch));
+        for (gauge, count) in [
+            (&self.nodes, status.nodes.len() as u64),
+            (&self.workloads, status.workloads.len() as u64),
+            (&self.samplers, status.sampler_count() as u64),
+            (&self.sessions, status.session_count()),
+            (&self.views_per_set, status.views_per_set()),
+            (&self.plan_epoch, status.plan_epoch),
+        ] {
+            gauge.set(i64::try_from(count).unwrap_or(i64::MAX));
+        }
     }
 
     fn show_audits(&self, status: &ClusterStatus) {
-        let is_broken = |workload: &&WorkloadStatus| {
-            workload.promise.as_ref().is_some_and(|promise| promise.state == PromiseState::Broken)
-        };
-        let broken: BTreeSet<u64> = status.workloads.iter().filter(is_broken).map(|workload| workload.number).collect();
+        let promised =
+            status.workloads.iter().filter_map(|workload| Some((workload.number, workload.promise.as_ref()?)));
+        let broken = promised.filter(|(_, promise)| promise.state == PromiseState::Broken);
+        let broken: BTreeSet<u64> = broken.map(|(number, _)| number).collect();
         let before = std::mem::replace(&mut *self.broken_workloads.lock(), broken.clone());
         self.broken.inc_by(broken.difference(&before).count() as u64);
         self.audit_errors.clear();
@@ -187,7 +190,7 @@ impl Observers {
 
 #[cfg(test)]
 mod tests {
-    use cluster::SharedLightCosts;
+    use cluster::{SharedLightCosts, WorkloadStatus};
 
     use super::*;
 

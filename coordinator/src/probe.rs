@@ -72,8 +72,11 @@ async fn check_image(shared: &Shared, address: &str, image: &ProbedImage) -> Res
             }
             let camera = image.camera;
             let limits = DecodeLimits::default();
-            let decode = move || decode_sample_image(&whole.image.header, &camera, &whole.image.payload, &limits);
-            return blocking(move || decode().map(drop).map_err(data_loss)).await;
+            return blocking(move || {
+                let image = decode_sample_image(&whole.image.header, &camera, &whole.image.payload, &limits);
+                image.map(drop).map_err(data_loss)
+            })
+            .await;
         }
     }
     Err(Status::data_loss("no whole image came"))

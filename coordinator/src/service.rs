@@ -130,18 +130,15 @@ impl Coordinator for CoordinatorService {
     async fn fetch_scene(&self, request: FetchScene) -> Result<Messages<ScenePart>, Status> {
         let offer = self.shared.offers.find(Some(request.hash.as_str()))?;
         let start = usize::try_from(request.offset_bytes).unwrap_or(usize::MAX);
-        if start > offer.package.len() {
-            return Err(Status::invalid_argument(format!(
-                "offset_bytes is {start}, the package has {}",
-                offer.package.len()
-            )));
-        }
         let package = offer.package.clone();
-        let part = move |start: usize| ScenePart {
-            offset_bytes: start as u64,
-            data: package.slice(start..package.len().min(start + MAX_CHUNK_BYTES)),
-        };
-        let parts = (start..offer.package.len()).step_by(MAX_CHUNK_BYTES).map(part).map(Ok);
+        if start > package.len() {
+            let length = package.len();
+            return Err(Status::invalid_argument(format!("offset_bytes is {start}, the package has {length}")));
+        }
+        let parts = (start..package.len()).step_by(MAX_CHUNK_BYTES).map(move |start| {
+            let data = package.slice(start..package.len().min(start + MAX_CHUNK_BYTES));
+            Ok(ScenePart { offset_bytes: start as u64, data })
+        });
         Ok(until_drained(Box::pin(tokio_stream::iter(parts)), self.shutdown.clone()))
     }
 

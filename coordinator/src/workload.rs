@@ -6,7 +6,7 @@ use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera, SampleCamera, ViewGroup
 use glam::UVec2;
 use tonic::Status;
 
-use crate::config::{OfferedCube, OfferedMirror, SceneOffer};
+use crate::config::{OfferedCube, SceneOffer};
 use crate::grpc_status::refusal;
 use crate::schedule::ChoiceError;
 
@@ -23,21 +23,17 @@ const MIRRORS_DENSITY: f32 = 4.4;
 /// Steps of √2 by which images are smaller than the offered ones at most.
 const LEAST_STEPS: f32 = -2.0;
 
-/// Texels of an image of light a pixel of a view, each way.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LightDensity(f32);
+/// Texels of an image of light a pixel of a view, each way. Surfaces come from the scene: they need no finer samples.
+pub(crate) const FULL_LIGHT_DENSITY: f32 = 1.0;
+/// The longest time of a device for a set of light in full density.
+const LONGEST_LIGHT_SET_S: f64 = 10.0;
 
-impl LightDensity {
-    /// Surfaces come from the scene: they need no finer samples.
-    pub(crate) const FULL: Self = Self(1.0);
-
-    /// The finest of full, half and a quarter of the density in which a set takes at most so long, by its number of texels.
-    pub(crate) fn for_set(full_set_s: f64, longest_s: f64) -> Self {
-        match full_set_s / longest_s {
-            ratio if ratio <= 1.0 => Self::FULL,
-            ratio if ratio <= 4.0 => Self(0.5),
-            _ => Self(0.25),
-        }
+/// The finest of full, half and a quarter of the density in which a set does not take too long, by its number of texels.
+pub(crate) fn light_density_for_set(full_set_s: f64) -> f32 {
+    match full_set_s / LONGEST_LIGHT_SET_S {
+        ratio if ratio <= 1.0 => FULL_LIGHT_DENSITY,
+        ratio if ratio <= 4.0 => 0.5,
+        _ => 0.25,
     }
 }
 
@@ -49,7 +45,7 @@ impl LightDensity {
 pub(crate) fn workload_of(
     request: &SessionRequest,
     offer: &SceneOffer,
-    light_density: LightDensity,
+    light_density: f32,
 ) -> Result<Workload, Status> {
     let volume = request.volume.unwrap_or(offer.volume);
     let offered = offer.cube.as_ref().filter(|cube| cube.sampling == request.sampling);
@@ -116,8 +112,11 @@ fn sample_cameras_of(
     if cameras.is_empty() {
         return Err(Status::invalid_argument("sample_cameras is missing, and the scene came without a rig"));
     }
-    let sized = |camera: &Camera| size_px.map_or(Ok(*camera), |size_px| resized(camera, size_px));
-    cameras.iter().map(|camera| sized(camera).map(SampleCamera::Depth)).collect()
+    let sized = cameras.iter().map(|camera| match size_px {
+        Some(size_px) => resized(camera, size_px).map(SampleCamera::Depth),
+        None => Ok(SampleCamera::Depth(*camera)),
+    });
+    sized.collect()
 }
 
 /// The scene's mirrors, where the session follows them, with images of about [`MIRROR_DENSITY`].
@@ -132,15 +131,14 @@ fn mirrors_of(
     }
     let image_texels = workload.sample_cameras.first().map_or(1, SampleCamera::pixel_count);
     let texels = image_texels as f32 * MIRROR_DENSITY.min(MIRRORS_DENSITY / offer.mirrors.len().max(1) as f32);
-    let sized = |mirror: &OfferedMirror| {
+    let mut mirrors = Vec::with_capacity(offer.mirrors.len());
+    for mirror in &offer.mirrors {
         let cameras = Camera::resized_together(&mirror.cameras, texels, MAX_TILES);
-        let checked = |camera: Camera| {
-            let usable = camera.validate().map(|()| SampleCamera::Depth(camera));
-            usable.map_err(|error| Status::internal(format!("mirrors of scene {}: {error}", offer.name)))
-        };
-        Ok((mirror.cell.clone(), cameras.into_iter().map(checked).collect::<Result<_, Status>>()?))
-    };
-    offer.mirrors.iter().map(sized).collect()
+        let valid = cameras.iter().try_for_each(Camera::validate);
+        valid.map_err(|error| Status::internal(format!("mirrors of scene {}: {error}", offer.name)))?;
+        mirrors.push((mirror.cell.clone(), cameras.into_iter().map(SampleCamera::Depth).collect()));
+    }
+    Ok(mirrors)
 }
 
 /// The scene's base, where the session is made from depth images of the whole scene that hold still.
@@ -168,29 +166,32 @@ fn cells_of(
     if groups.len() > MAX_CELLS {
         return Err(refusal(&ChoiceError::Cells { cells: groups.len() }));
     }
-    let checked = |camera: PinholeCamera| {
-        let usable = camera.validate().map(|()| SampleCamera::from(camera));
-        usable.map_err(|error| Status::invalid_argument(format!("viewpoints: {error}")))
-    };
-    let cameras = |group: &ViewGroup| group.sample_cameras(size_px).into_iter().map(checked).collect();
-    groups.iter().map(cameras).collect()
+    let cells: Vec<Vec<PinholeCamera>> = groups.iter().map(|group| group.sample_cameras(size_px)).collect();
+    let valid = cells.iter().flatten().try_for_each(PinholeCamera::validate);
+    valid.map_err(|error| Status::invalid_argument(format!("viewpoints: {error}")))?;
+    Ok(cells.into_iter().map(|cell| cell.into_iter().map(SampleCamera::from).collect()).collect())
 }
 
 /// The size of a session's images; `None` where the offer's is fixed, or the session brings its own cameras.
-fn session_size_px(request: &SessionRequest, offer: &SceneOffer, light_density: LightDensity) -> Option<UVec2> {
-    let is_fitted = offer.fits_views && request.sample_cameras.is_empty();
+fn session_size_px(request: &SessionRequest, offer: &SceneOffer, light_density: f32) -> Option<UVec2> {
+    if !has_fitted_size(request, offer) {
+        return request.sample_size_px;
+    }
     let (density, most_texels) = match request.takes_light {
-        true => (light_density.0, MAX_LIGHT_TEXELS),
+        true => (light_density, MAX_LIGHT_TEXELS),
         false => (SAMPLE_DENSITY, MAX_FITTING_TEXELS),
     };
-    let fitting = || size_of_density(&offer.rig, &request.typical_view, density, most_texels).filter(|_| is_fitted);
-    request.sample_size_px.or_else(fitting)
+    size_of_density(&offer.rig, &request.typical_view, density, most_texels)
+}
+
+/// Whether the size of a session's images follows its views.
+fn has_fitted_size(request: &SessionRequest, offer: &SceneOffer) -> bool {
+    offer.fits_views && request.sample_cameras.is_empty() && request.sample_size_px.is_none()
 }
 
 /// Whether the density of a session's samples of light may be chosen.
 pub(crate) fn chooses_light_density(request: &SessionRequest, offer: &SceneOffer) -> bool {
-    let is_fitted = offer.fits_views && request.sample_cameras.is_empty() && request.sample_size_px.is_none();
-    request.takes_light && is_fitted
+    request.takes_light && has_fitted_size(request, offer)
 }
 
 /// The size of offered images that makes them about `SAMPLE_DENSITY` times as dense as a view. Sizes are whole steps of √2
@@ -243,8 +244,7 @@ mod tests {
         assert!((1..=40).all(|cameras| texels(cameras).is_some_and(|texels| texels < MAX_FITTING_TEXELS + 4096)));
         assert_eq!(fitting_size_px(&[], &camera(4, 3)), None);
         assert_eq!(size_of_density(&rig, &camera(400, 300), 1.0, MAX_LIGHT_TEXELS), Some(UVec2::new(400, 300)));
-        let density = |set_s| LightDensity::for_set(set_s, 10.0).0;
-        assert_eq!([0.0, 10.0, 10.1, 40.0, 40.1, 900.0].map(density), [1.0, 1.0, 0.5, 0.5, 0.25, 0.25]);
+        assert_eq!([0.0, 10.0, 10.1, 40.0, 40.1, 900.0].map(light_density_for_set), [1.0, 1.0, 0.5, 0.5, 0.25, 0.25]);
         assert_eq!(size_of_density(&rig, &camera(800, 600), 0.5, MAX_LIGHT_TEXELS), Some(UVec2::new(400, 300)));
     }
 }

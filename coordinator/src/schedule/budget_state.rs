@@ -97,11 +97,10 @@ impl BudgetState {
 
     /// The broken promise, until another choice is in force and applied.
     pub(super) fn broken(&self) -> Option<&Broken> {
-        let is_replaced = |broken: &&Broken| {
+        self.findings.broken.as_ref().filter(|broken| {
             let other = self.in_force.as_ref().filter(|in_force| in_force.chosen.number != broken.choice_number);
-            other.is_some_and(|in_force| in_force.is_applied)
-        };
-        self.findings.broken.as_ref().filter(|broken| !is_replaced(broken))
+            other.is_none_or(|in_force| !in_force.is_applied)
+        })
     }
 }
 

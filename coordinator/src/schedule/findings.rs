@@ -50,8 +50,8 @@ pub(super) struct Broken {
 impl Broken {
     /// Whether the promise of a budget is broken with it.
     pub(super) fn is_of(&self, budget: &Budget) -> bool {
-        let is_above = |found: f64| budget.error().is_some_and(|term| term.most_ratio() < found);
-        budget.implies(&self.budget) || self.found_ratio.is_none_or(is_above)
+        let Some(found) = self.found_ratio else { return true };
+        budget.implies(&self.budget) || budget.error().is_some_and(|term| term.most_ratio() < found)
     }
 }
 

@@ -23,8 +23,8 @@ impl Scheduler {
         (self.audit_time_ratio > 0.0).then(|| AuditOrder {
             time_ratio: self.audit_time_ratio,
             least_apart_m: LEAST_APART * f64::from(plan.cell_side_m()),
-            antialias: plan.antialias(),
-            planned_pixel_count: u32::try_from(plan.planned_pixels()).unwrap_or(u32::MAX),
+            antialias: plan.budgeted.antialias(),
+            planned_pixel_count: u32::try_from(plan.budgeted.typical_view.pixel_count()).unwrap_or(u32::MAX),
             with_sample_images: term.metric() == Metric::Disocclusion,
             in_parts: term.statistic() == Statistic::Mean,
         })
