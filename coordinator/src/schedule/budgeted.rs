@@ -32,12 +32,8 @@ impl Budgeted {
     /// one size.
     pub(super) fn is_shareable(&self, other: &Self) -> bool {
         let pixels_ratio = other.typical_view.pixel_count() as f64 / self.typical_view.pixel_count() as f64;
-        let with_own_views = Self {
-            budget: self.budget,
-            typical_view: self.typical_view,
-            codec: self.codec.clone(),
-            ..other.clone()
-        };
+        let with_own_views =
+            Self { budget: self.budget, typical_view: self.typical_view, codec: self.codec.clone(), ..other.clone() };
         *self == with_own_views && (MOST_PLANNED_PIXELS.recip()..=MOST_PLANNED_PIXELS).contains(&pixels_ratio)
     }
 

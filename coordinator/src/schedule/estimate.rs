@@ -187,9 +187,8 @@ impl Estimate {
         let own = self.ratios();
         let to_others = array::from_fn(|i| Some(own[i]? / common[i]?));
         let than_others = self.mean_ratio(to_others).unwrap_or(1.0);
-        let now_s = array::from_fn(|i| {
-            self.operations[i].now_s(common[i].map_or(slowness, |common| common * than_others))
-        });
+        let now_s =
+            array::from_fn(|i| self.operations[i].now_s(common[i].map_or(slowness, |common| common * than_others)));
         let mut costs = with_operations(&self.alone, now_s);
         // The overhead of a tile grows with the cost of an image.
         let times = costs.sample_image_s / self.alone.sample_image_s;

@@ -24,6 +24,12 @@ pub(super) struct Relaying {
     pub(super) time_s: f64,
 }
 
+impl Relaying {
+    pub(super) fn direct(time_s: f64) -> Self {
+        Self { fanout: None, time_s }
+    }
+}
+
 impl Links {
     /// The shortest way that is not clearly slower than the best. All other work takes `rest_s`.
     pub(super) fn best(&self, rest_s: f64) -> Relaying {
@@ -32,7 +38,7 @@ impl Links {
             fanouts.map(|fanout| Relaying { fanout, time_s: self.slowest_s(fanout).max(rest_s) }).collect();
         let best_s = all.iter().map(|relaying| relaying.time_s).fold(f64::INFINITY, f64::min);
         let good = all.into_iter().find(|relaying| relaying.time_s <= best_s * WORTH);
-        good.unwrap_or(Relaying { fanout: None, time_s: best_s })
+        good.unwrap_or(Relaying::direct(best_s))
     }
 
     /// Seconds of the slowest link.

@@ -139,9 +139,9 @@ impl Scheduler {
 
     /// The number of the workload whose plan in force has this epoch.
     fn workload_of_plan(&self, plan_epoch: u64) -> Option<u64> {
-        let has_epoch =
-            |workload: &WorkloadState| workload.active_plan.as_ref().is_some_and(|a| a.epoch() == plan_epoch);
-        self.workloads.iter().find(|(_, workload)| has_epoch(workload)).map(|(&number, _)| number)
+        let mut plans =
+            self.workloads.iter().filter_map(|(&number, workload)| Some((number, workload.active_plan.as_ref()?)));
+        plans.find(|(_, active)| active.epoch() == plan_epoch).map(|(number, _)| number)
     }
 
     fn workload_of_session(&self, session: u64) -> Option<u64> {

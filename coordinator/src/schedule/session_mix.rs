@@ -1,9 +1,12 @@
 //! The sessions of one workload, and what they ask for together.
 
+use std::array;
+
 use cluster::{Costs, Quality, SharedLightCosts};
 use depth_image::PinholeCamera;
 use planner::Budget;
 
+use super::operations::operations;
 use super::{Opening, PolicyOverride};
 
 /// The demand of one session.
@@ -25,6 +28,11 @@ struct Session {
 impl Session {
     fn views_per_s(&self) -> Option<f64> {
         Some(self.frames_per_s? * self.views as f64)
+    }
+
+    /// Views in the time of a set, at least 1.
+    fn weight(&self, set_s: f64) -> f64 {
+        self.views_per_s().map_or(self.views as f64, |rate| rate * set_s).max(1.0)
     }
 }
 
@@ -123,8 +131,8 @@ impl SessionMix {
 
     /// The method by which most sessions have their views reconstructed; of several, the first.
     pub(super) fn usual_method(&self) -> Option<&str> {
-        let count = |of: &Session| self.0.iter().filter(|session| session.method == of.method).count();
-        self.0.iter().rev().max_by_key(|session| count(session)).map(|session| session.method.as_str())
+        let methods = self.0.iter().map(|session| session.method.as_str());
+        methods.clone().rev().max_by_key(|method| methods.clone().filter(|other| other == method).count())
     }
 
     /// Where the time of views goes by the method of most sessions, as measured for the first of them.
@@ -158,9 +166,9 @@ impl SessionMix {
     /// The qualities that every session with a rate falls back to, in the same order.
     pub(super) fn fallbacks(&self) -> &[Quality] {
         let Some(first) = self.rated().next().map(|session| &session.fallbacks) else { return &[] };
-        let common =
-            |other: &Session| first.iter().zip(&other.fallbacks).take_while(|(own, other)| own == other).count();
-        &first[..self.rated().map(common).min().unwrap_or(0)]
+        let pairs = self.rated().map(|other| first.iter().zip(&other.fallbacks));
+        let common = pairs.map(|pairs| pairs.take_while(|(own, other)| own == other).count()).min();
+        &first[..common.unwrap_or(0)]
     }
 
     /// Costs of the mean view, where each is shown for `set_s`; sampling costs are those of the first session. `None`
@@ -181,16 +189,11 @@ fn mean_costs<'a>(sessions: impl Iterator<Item = &'a Session> + Clone, set_s: f6
     if sessions.clone().all(|session| session.costs == first) {
         return Some(first);
     }
-    let weight = |session: &Session| session.views_per_s().map_or(session.views as f64, |rate| rate * set_s).max(1.0);
-    let all: f64 = sessions.clone().map(weight).sum();
-    let mean =
-        |of: fn(&Costs) -> f64| sessions.clone().map(|session| weight(session) * of(&session.costs)).sum::<f64>() / all;
-    Some(Costs {
-        direct_view_s: mean(|costs| costs.direct_view_s),
-        reconstruct_view_s: mean(|costs| costs.reconstruct_view_s),
-        encode_view_s: mean(|costs| costs.encode_view_s),
-        ..first
-    })
+    let all: f64 = sessions.clone().map(|session| session.weight(set_s)).sum();
+    let [_, direct_view_s, reconstruct_view_s, _, encode_view_s] = array::from_fn(|i| {
+        sessions.clone().map(|session| session.weight(set_s) * operations(&session.costs)[i]).sum::<f64>() / all
+    });
+    Some(Costs { direct_view_s, reconstruct_view_s, encode_view_s, ..first })
 }
 
 #[cfg(test)]

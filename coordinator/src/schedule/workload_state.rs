@@ -1,5 +1,6 @@
 //! One workload: its sessions, its nodes, and the plan that serves it.
 
+use std::array;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -11,6 +12,7 @@ use super::active_plan::ActivePlan;
 use super::budgeted::Budgeted;
 use super::cells::Cells;
 use super::node_costs::view_s;
+use super::operations::operations;
 use super::overload::{FULL, Overload};
 use super::representation::Representation;
 use super::session_mix::SessionMix;
@@ -62,7 +64,7 @@ pub(super) struct WorkloadState {
     /// Where live viewers are, as their compositors have said.
     live_viewpoints: BTreeMap<String, Vec<PinholeCamera>>,
     /// Viewers have moved, come or gone since cells were placed.
-    viewers_have_moved: bool,
+    pub(super) viewers_have_moved: bool,
 }
 
 /// The part of the demand that a plan follows at once.
@@ -145,8 +147,10 @@ impl WorkloadState {
     /// The view cells that budgets are planned for: those that viewpoints may grow to, or the one between the sessions' own
     /// sample cameras.
     pub(super) fn planned_cells(&self) -> Vec<ViewCell> {
-        let own = || ViewCell::between(&SampleCamera::references(&self.requested.sample_cameras));
-        self.cells.as_ref().map_or_else(|| own().into_iter().collect(), Cells::grown)
+        match &self.cells {
+            Some(cells) => cells.grown(),
+            None => ViewCell::between(&SampleCamera::references(&self.requested.sample_cameras)).into_iter().collect(),
+        }
     }
 
     /// The workload in the representation in force.
@@ -217,10 +221,6 @@ impl WorkloadState {
     pub(super) fn note_movement(&mut self, now: Duration) {
         self.viewers_have_moved = true;
         self.note_activity(now);
-    }
-
-    pub(super) fn viewers_have_moved(&self) -> bool {
-        self.viewers_have_moved
     }
 
     /// Places cells around the viewpoints of sessions, and of live viewers on nodes that serve it.
@@ -375,19 +375,18 @@ impl WorkloadState {
         let Some(rated) = self.sessions.rated_costs(self.set_s()).map(|asked| self.represented(asked)) else {
             return *node;
         };
-        let of = |node_s: f64, rated_s: f64, mean_s: f64| {
-            let ratio = rated_s / mean_s;
-            let is_mixed = ratio.is_finite() && rated_s != mean_s;
-            let scaled = || (node_s * ratio).clamp(node_s.min(rated_s), node_s.max(rated_s));
-            if is_mixed { scaled() } else { node_s }
-        };
-        let mean = &self.costs;
-        Costs {
-            direct_view_s: of(node.direct_view_s, rated.direct_view_s, mean.direct_view_s),
-            reconstruct_view_s: of(node.reconstruct_view_s, rated.reconstruct_view_s, mean.reconstruct_view_s),
-            encode_view_s: of(node.encode_view_s, rated.encode_view_s, mean.encode_view_s),
-            ..*node
-        }
+        let node_s = operations(node);
+        let rated_s = operations(&rated);
+        let mean_s = operations(&self.costs);
+        let [_, direct_view_s, reconstruct_view_s, _, encode_view_s] = array::from_fn(|i| {
+            let ratio = rated_s[i] / mean_s[i];
+            let is_mixed = ratio.is_finite() && rated_s[i] != mean_s[i];
+            if !is_mixed {
+                return node_s[i];
+            }
+            (node_s[i] * ratio).clamp(node_s[i].min(rated_s[i]), node_s[i].max(rated_s[i]))
+        });
+        Costs { direct_view_s, reconstruct_view_s, encode_view_s, ..*node }
     }
 
     /// Nodes that do nothing but serve sessions with a rate, at these mean costs. It does not depend on the policy in force,
@@ -435,15 +434,11 @@ impl WorkloadState {
     pub(super) fn degraded(&self) -> Workload {
         let workload = self.in_representation();
         let Some(quality) = self.quality() else { return workload };
-        let sized = |camera: &SampleCamera| {
-            let size_px = (camera.size_px().as_dvec2() * quality.sample_side_ratio).round().as_uvec2().max(UVec2::ONE);
-            camera.resized(size_px)
-        };
-        let workload = workload.without_common_cells();
-        Workload {
-            lighting: quality.lighting.clone(),
-            sample_cameras: workload.sample_cameras.iter().map(sized).collect(),
-            ..workload
+        let mut workload = workload.without_common_cells();
+        for camera in &mut workload.sample_cameras {
+            let size_px = (camera.size_px().as_dvec2() * quality.sample_side_ratio).round().as_uvec2();
+            *camera = camera.resized(size_px.max(UVec2::ONE));
         }
+        Workload { lighting: quality.lighting.clone(), ..workload }
     }
 }

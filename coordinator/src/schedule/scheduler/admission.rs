@@ -81,19 +81,18 @@ impl Scheduler {
 
     /// The workload that a session belongs to, if it is open.
     pub(super) fn workload_for(&self, opening: &Opening) -> Option<u64> {
-        let is_shared = |open: &WorkloadState| {
+        let mut open = self.workloads.iter().filter(|(_, open)| {
             open.is_shared_by(&opening.workload, opening.budgeted.as_ref(), !opening.viewpoints.is_empty())
-        };
-        self.workloads.iter().find(|(_, workload)| is_shared(workload)).map(|(&number, _)| number)
+        });
+        open.next().map(|(&number, _)| number)
     }
 
     /// Whether a session can be served.
     pub(super) fn check(&self, opening: &Opening) -> Result<(), ChoiceError> {
+        let alone = self.costs_alone(opening);
         let Some(number) = self.workload_for(opening) else {
             self.admits_workload(&opening.workload, opening.budgeted.as_ref(), !opening.viewpoints.is_empty())?;
-            let alone = NodeCosts { costs: opening.costs, ..NodeCosts::default() };
-            let nodes = vec![alone; self.usable().count()];
-            return self.admit(&Change { before: None, after: WorkloadState::new(self.now, opening), nodes });
+            return self.admit(&Change { before: None, after: WorkloadState::new(self.now, opening), nodes: alone });
         };
         let before = &self.workloads[&number];
         let forced = opening.policy_override;
@@ -102,9 +101,13 @@ impl Scheduler {
         }
         let after = before.changed(self.now, |sessions| sessions.add(opening));
         // It has to be possible without the others, too: they may leave.
-        let alone = vec![NodeCosts { costs: opening.costs, ..NodeCosts::default() }; self.usable().count()];
         check(&Demand { load: after.load(), nodes: &alone, policy_override: forced, current: None })?;
         self.admit(&self.change_of(number, before, after))
+    }
+
+    /// Costs of all usable nodes before any has worked for a session.
+    pub(super) fn costs_alone(&self, opening: &Opening) -> Vec<NodeCosts> {
+        vec![NodeCosts { costs: opening.costs, ..NodeCosts::default() }; self.usable().count()]
     }
 
     fn change_of<'a>(&self, number: u64, before: &'a WorkloadState, after: WorkloadState) -> Change<'a> {
@@ -160,8 +163,8 @@ pub(super) fn rated_set_s(workload: &WorkloadState, nodes: &[NodeCosts]) -> Opti
     }
     let load = workload.rated_load();
     let policy_override = workload.policy_override().possible(&load, nodes.len());
-    let of_viewers = |node: &NodeCosts| NodeCosts { costs: workload.of_viewers(&node.costs), ..*node };
-    let nodes: Vec<NodeCosts> = nodes.iter().map(of_viewers).collect();
+    let of_viewers = nodes.iter().map(|node| NodeCosts { costs: workload.of_viewers(&node.costs), ..*node });
+    let nodes: Vec<NodeCosts> = of_viewers.collect();
     // Nodes that can do none of it do not work for it.
     choose(&Demand { load, nodes: &nodes, policy_override, current: None }).ok().map(|choice| choice.time_s())
 }

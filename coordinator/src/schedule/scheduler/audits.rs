@@ -1,7 +1,6 @@
 //! Audits: promises that views in force do not keep, and their replacement.
 
 use cluster::{AuditOrder, AuditReport};
-use depth_image::PinholeCamera;
 use planner::{Metric, Pricing as _, Statistic};
 
 use super::Scheduler;
@@ -108,8 +107,7 @@ impl Scheduler {
         for (number, state) in &mut self.budgets {
             let Some(workload) = self.workloads.get(number) else { continue };
             let least_apart_m = LEAST_APART as f32 * state.plan.cell_side_m();
-            let is_there = |node: &str, camera: &PinholeCamera| workload.is_viewed_from(node, camera, least_apart_m);
-            state.findings.follow_viewers(now, is_there);
+            state.findings.follow_viewers(now, |node, camera| workload.is_viewed_from(node, camera, least_apart_m));
             if state.broken().is_none() {
                 state.findings.broken = None;
             }

@@ -6,8 +6,6 @@ use cluster::{Assignment, FetchImages, SamplerReport};
 
 use super::Scheduler;
 use crate::schedule::active_plan::ActivePlan;
-use crate::schedule::member::Member;
-use crate::schedule::workload_state::WorkloadState;
 use crate::schedule::{ChoiceError, Command, Probe, ProbeKind, ProbedImage};
 
 /// Duration of a quarantine, after which a link may be restored.
@@ -67,8 +65,8 @@ impl Scheduler {
 
     fn refuse_all(&mut self, number: u64, error: &ChoiceError) -> Vec<Command> {
         let sessions = self.workloads.get(&number).map(|workload| workload.sessions.numbers()).unwrap_or_default();
-        let refuse = |session| Command::Refuse { session, error: error.clone() };
-        let mut commands: Vec<Command> = sessions.into_iter().map(refuse).collect();
+        let refusals = sessions.into_iter().map(|session| Command::Refuse { session, error: error.clone() });
+        let mut commands: Vec<Command> = refusals.collect();
         commands.extend(self.end(number));
         commands
     }
@@ -108,8 +106,8 @@ impl Scheduler {
     /// Ends quarantines that have lasted. Nodes then wait for a role as if they had just joined.
     pub(super) fn readmit(&mut self) -> Vec<Command> {
         let now = self.now;
-        let is_planned = |workload: &WorkloadState| workload.active_plan.is_some();
-        let all_are_planned = !self.workloads.is_empty() && self.workloads.values().all(is_planned);
+        let all_are_planned =
+            !self.workloads.is_empty() && self.workloads.values().all(|workload| workload.active_plan.is_some());
         let mut commands = Vec::new();
         for (name, member) in &mut self.members {
             if member.quarantined_at.is_some_and(|since| has_lasted(now, since, all_are_planned)) {
@@ -120,8 +118,7 @@ impl Scheduler {
         for (&number, workload) in &mut self.workloads {
             let is_planned = workload.active_plan.is_some();
             let ended = workload.excluded.extract_if(.., |_, since| has_lasted(now, *since, is_planned));
-            let readmit = |(node_name, _)| Command::Readmit { node_name, workload_number: Some(number) };
-            commands.extend(ended.map(readmit));
+            commands.extend(ended.map(|(node_name, _)| Command::Readmit { node_name, workload_number: Some(number) }));
         }
         if !commands.is_empty() {
             commands.extend(self.nodes_changed("a quarantine ended"));
@@ -213,7 +210,7 @@ impl Scheduler {
         if plans.is_empty() || self.now.saturating_sub(self.liveness_probed_at) < LIVENESS_INTERVAL {
             return Vec::new();
         }
-        let probe = |(name, member): (&String, &Member)| {
+        let probes = self.members.iter().filter_map(|(name, member)| {
             let active = plans.iter().find(|active| active.ready.contains(name))?;
             Some(Command::Probe(Box::new(Probe {
                 plan_epoch: active.epoch(),
@@ -223,8 +220,8 @@ impl Scheduler {
                 image: None,
                 deadline: PROBE_DEADLINE,
             })))
-        };
-        let commands = self.members.iter().filter_map(probe).collect();
+        });
+        let commands = probes.collect();
         self.liveness_probed_at = self.now;
         commands
     }

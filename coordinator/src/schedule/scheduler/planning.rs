@@ -71,8 +71,8 @@ impl Scheduler {
         let workload = self.workloads.get(&number)?;
         let mut snapshot = self.snapshot(number)?;
         snapshot.load = workload.rated_load();
-        let of_viewers = |costs: &Costs| workload.of_viewers(costs);
-        snapshot.nodes = self.costs_beside(number, |other| other.sessions.viewers() > 0, of_viewers);
+        snapshot.nodes =
+            self.costs_beside(number, |other| other.sessions.viewers() > 0, |costs| workload.of_viewers(costs));
         Some(workload.utilisation(snapshot.current_s(&self.has_role(number, &snapshot)?)?))
     }
 
@@ -173,10 +173,9 @@ impl Scheduler {
             return self.replan(number, &why);
         }
         let Some(BetterPlan { choice, gain }) = self.better_plan(number) else { return Vec::new() };
-        let confirms =
-            |active: &mut ActivePlan| active.hysteresis.confirms(now, gain, active.ready.len() >= active.members.len());
         let active = self.workloads.get_mut(&number).and_then(|workload| workload.active_plan.as_mut());
-        match active.is_some_and(confirms) {
+        let Some(ActivePlan { hysteresis, ready, members, .. }) = active else { return Vec::new() };
+        match hysteresis.confirms(now, gain, ready.len() >= members.len()) {
             true => self.activate(number, &choice, "demand, costs or nodes have changed"),
             false => Vec::new(),
         }
@@ -247,9 +246,10 @@ impl Scheduler {
     /// sessions would wait for them.
     pub(super) fn apply(&self, active: &ActivePlan, workload: &WorkloadState, sessions: Vec<u64>) -> Command {
         let before = workload.active_plan.as_ref().map(|active| &active.members);
-        let had_one = |name: &String| before.is_some_and(|before| before.contains_key(name));
-        let is_told = |name: &String| active.members.contains_key(name) || had_one(name);
-        let nodes = self.usable().filter(|(name, _)| is_told(name) && !workload.excluded.contains_key(*name));
+        let nodes = self.usable().filter(|(name, _)| {
+            let is_told = active.members.contains_key(*name) || before.is_some_and(|b| b.contains_key(*name));
+            is_told && !workload.excluded.contains_key(*name)
+        });
         let nodes = nodes.map(|(_, member)| member.status.clone()).collect();
         Command::Apply { sessions, plan: Box::new(active.plan.clone()), nodes }
     }

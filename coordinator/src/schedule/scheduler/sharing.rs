@@ -30,11 +30,12 @@ impl Scheduler {
         let names: Vec<&String> = self.usable().map(|(name, _)| name).collect();
         let needs: Vec<Need> = self.workloads.iter().map(|(&number, workload)| self.need(number, workload)).collect();
         let weights = weights(&needs, names.len());
-        let claim = |(workload, weight): (&WorkloadState, f64)| Claim {
-            weight,
-            ties: names.iter().map(|name| tie(workload, name)).collect(),
-        };
-        NodeShares::new(self.workloads.values().zip(weights).map(claim).collect(), names.len())
+        let claims = self
+            .workloads
+            .values()
+            .zip(weights)
+            .map(|(workload, weight)| Claim { weight, ties: names.iter().map(|name| tie(workload, name)).collect() });
+        NodeShares::new(claims.collect(), names.len())
     }
 
     /// The mean costs are those of all nodes, so that they do not depend on the division.
@@ -89,8 +90,8 @@ impl Scheduler {
         }
         self.sharing.note_move(self.now);
         let gained = self.put(&shares);
-        let changed = |number: &u64| gained.contains(number) || !self.is_plan_whole(*number);
-        let changed: Vec<u64> = self.workload_numbers().into_iter().filter(changed).collect();
+        let mut changed = self.workload_numbers();
+        changed.retain(|number| gained.contains(number) || !self.is_plan_whole(*number));
         let why = format!("nodes are divided anew among {} workloads", self.workloads.len());
         changed.into_iter().flat_map(|number| self.replan(number, &why)).collect()
     }
@@ -102,11 +103,10 @@ impl Scheduler {
     /// Whether the plan in force, if any, has all the processes that it was made for.
     fn is_plan_whole(&self, number: u64) -> bool {
         let Some(workload) = self.workloads.get(&number) else { return true };
-        let serves = |name: &str, incarnation: u64| {
+        let mut members = workload.active_plan.iter().flat_map(|active| &active.members);
+        members.all(|(name, &incarnation)| {
             workload.nodes.contains(name) && self.members.get(name).is_some_and(|m| m.incarnation == incarnation)
-        };
-        let members = workload.active_plan.iter().flat_map(|active| &active.members);
-        members.into_iter().all(|(name, &incarnation)| serves(name, incarnation))
+        })
     }
 }
 

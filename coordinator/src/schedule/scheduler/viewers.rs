@@ -54,14 +54,13 @@ impl Scheduler {
         if !self.may_change_cells() {
             return Vec::new();
         }
-        let moved: Vec<u64> = self.workloads.iter().filter(|(_, w)| w.viewers_have_moved()).map(|(&n, _)| n).collect();
-        let changed = |number: &u64| {
-            let workload = self.workloads.get_mut(number)?;
+        let moved = self.workloads.iter_mut().filter(|(_, workload)| workload.viewers_have_moved);
+        let changed = moved.filter_map(|(&number, workload)| {
             let before = workload.trigger();
             workload.update_cells();
-            (workload.trigger() != before).then_some(*number)
-        };
-        let changed: Vec<u64> = moved.iter().filter_map(changed).collect();
+            (workload.trigger() != before).then_some(number)
+        });
+        let changed: Vec<u64> = changed.collect();
         if changed.is_empty() {
             return Vec::new();
         }
