@@ -306,9 +306,10 @@ impl<P: Pricing> Planner<P> {
             Some(term) => self.evidence(row, term).estimate(),
             None => {
                 let errors = &self.rows[row].errors;
-                let sum = |limit: f64| errors.iter().map(|errors| errors.excess(Metric::Flip, limit)).sum::<f64>();
+                let [at_0, at_1] =
+                    [0.0, 1.0].map(|limit| errors.iter().map(|errors| errors.excess(Metric::Flip, limit)).sum::<f64>());
                 // The sum of the weights is that of y at 0 less that of y at 1.
-                sum(0.0) / (sum(0.0) - sum(1.0)).max(f64::MIN_POSITIVE)
+                at_0 / (at_0 - at_1).max(f64::MIN_POSITIVE)
             }
         }
     }
