@@ -8,7 +8,7 @@ use tokio::task::JoinSet;
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
 
-use crate::grpc_status::{of_node, refusal, within};
+use crate::grpc_status::{of_node, within};
 use crate::probe::probe;
 use crate::schedule::{Command, Event, Scheduler};
 use crate::shared::Shared;
@@ -54,7 +54,7 @@ pub(crate) async fn execute(shared: Arc<Shared>) {
                     shared.send(session, SessionEvent::Promise((*promise).clone()));
                 }
             }
-            Command::Refuse { session, error } => shared.sessions.refuse(session, refusal(&error)),
+            Command::Refuse { session, error } => shared.sessions.refuse(session, error.into()),
         }
     }
 }

@@ -18,10 +18,9 @@ use wire::rpc::{Coordinator, Messages, coordinator_server};
 
 use crate::config::{CoordinatorConfig, SceneOffer, SceneOffers};
 use crate::executor::execute;
-use crate::grpc_status::refusal;
 use crate::measuring::measure_when_idle;
 use crate::observers::Observers;
-use crate::schedule::{Event, Scheduler};
+use crate::schedule::Event;
 use crate::session_opening::open;
 use crate::shared::Shared;
 
@@ -111,7 +110,7 @@ impl Coordinator for CoordinatorService {
         if !self.shared.sessions.contains(request.session) {
             return Err(Status::not_found(format!("session_number: no session {} is open", request.session)));
         }
-        self.shared.step_with(|scheduler| admitted_changes(scheduler, request))
+        self.shared.change_session(request)
     }
 
     async fn report_work(&self, request: WorkReport) -> Result<(), Status> {
@@ -156,21 +155,4 @@ impl Coordinator for CoordinatorService {
         self.shared.step(Event::Reported(report));
         Ok(())
     }
-}
-
-/// The events of a change that the schedule admits.
-fn admitted_changes(
-    scheduler: &Scheduler,
-    change: ChangeSession,
-) -> Result<impl Iterator<Item = Event> + use<>, Status> {
-    let ChangeSession { session, views_per_set, frames_per_s, viewpoints } = change;
-    let views_per_set = views_per_set as usize;
-    if !scheduler.has_session(session) {
-        return Err(Status::unavailable(format!("session_number: session {session} is still being opened")));
-    }
-    let admitted = scheduler.admits(session, views_per_set, frames_per_s, viewpoints.as_deref());
-    admitted.map_err(|error| refusal(&error))?;
-    let demand = Event::DemandChanged { session, views_per_set, frames_per_s };
-    let viewpoints = viewpoints.map(|viewpoints| Event::ViewpointsChanged { session, viewpoints });
-    Ok([demand].into_iter().chain(viewpoints))
 }

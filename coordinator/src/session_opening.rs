@@ -6,7 +6,6 @@ use cluster::{Costs, MeasureCosts, Measured, SessionRequest, SessionStage, Share
 use depth_image::{SampleCamera, ToneMapping, ViewPlanes};
 use tonic::Status;
 
-use crate::grpc_status::refusal;
 use crate::measuring::{known, known_or_measured, send_progress};
 use crate::schedule::{Budgeted, Event, MEASURED_BATCH, Opening, PolicyOverride};
 use crate::session_budget::budgeted;
@@ -101,11 +100,7 @@ async fn measured_workload(
         budget: None,
     };
     let follows_viewers = !request.viewpoints.is_empty() && !workload.samples_cube();
-    let admits = || {
-        let admitted =
-            shared.with_scheduler(|scheduler| scheduler.admits_workload(workload, budgeted, follows_viewers));
-        admitted.map_err(|error| refusal(&error))
-    };
+    let admits = || shared.with_scheduler(|scheduler| scheduler.admits_workload(workload, budgeted, follows_viewers));
     admits()?;
     if let Some(known) = known(shared, &measurement) {
         return Ok(known);

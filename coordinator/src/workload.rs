@@ -2,12 +2,11 @@
 
 use cluster::limits::{MAX_CELLS, MAX_TILES};
 use cluster::{CommonCell, DIRECT, SamplePlanes, SessionRequest, Workload};
-use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera, SampleCamera, ViewGroup};
+use depth_image::{Aabb, Camera, PinholeCamera, SampleCamera, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
 
 use crate::config::{OfferedCube, SceneOffer};
-use crate::grpc_status::refusal;
 use crate::schedule::ChoiceError;
 
 /// Texels of a sample image a pixel of a view, each way: what brings most for its cost (docs/benchmarks.md).
@@ -78,7 +77,6 @@ pub(crate) fn workload_of(
     let workload = if cells.is_empty() { workload } else { workload.with_view_cells(cells) };
     let base = base_of(request, offer, &workload);
     let mirrors = mirrors_of(request, offer, &workload)?;
-    let base = base.map(|(cell, grid)| (cell.clone(), grid.cameras().map(SampleCamera::from).to_vec()));
     Ok(workload.with_common_cells(mirrors.into_iter().chain(base).collect()))
 }
 
@@ -112,11 +110,13 @@ fn sample_cameras_of(
     if cameras.is_empty() {
         return Err(Status::invalid_argument("sample_cameras is missing, and the scene came without a rig"));
     }
-    let sized = cameras.iter().map(|camera| match size_px {
-        Some(size_px) => resized(camera, size_px).map(SampleCamera::Depth),
-        None => Ok(SampleCamera::Depth(*camera)),
-    });
-    sized.collect()
+    let mut cameras = cameras.clone();
+    if let Some(size_px) = size_px {
+        cameras.iter_mut().for_each(|camera| *camera = camera.resized(size_px));
+        let valid = cameras.iter().try_for_each(Camera::validate);
+        valid.map_err(|error| Status::invalid_argument(format!("sample_image_size: {error}")))?;
+    }
+    Ok(cameras.into_iter().map(SampleCamera::Depth).collect())
 }
 
 /// The scene's mirrors, where the session follows them, with images of about [`MIRROR_DENSITY`].
@@ -142,14 +142,16 @@ fn mirrors_of(
 }
 
 /// The scene's base, where the session is made from depth images of the whole scene that hold still.
-fn base_of<'o>(
+fn base_of(
     request: &SessionRequest,
-    offer: &'o SceneOffer,
+    offer: &SceneOffer,
     workload: &Workload,
-) -> Option<&'o (CommonCell, CubeGrid)> {
-    let is_suited = request.method != DIRECT && request.volume.is_none();
-    let is_suited = is_suited && !workload.samples_cube() && !workload.timeline.moves();
-    offer.base.as_ref().filter(|_| is_suited)
+) -> Option<(CommonCell, Vec<SampleCamera>)> {
+    if request.method == DIRECT || request.volume.is_some() || workload.samples_cube() || workload.timeline.moves() {
+        return None;
+    }
+    let (cell, grid) = offer.base.as_ref()?;
+    Some((cell.clone(), grid.cameras().map(SampleCamera::from).to_vec()))
 }
 
 /// The sample cameras of each view cell of the session's viewpoints, as if it were alone, in the size of the offered ones.
@@ -164,7 +166,7 @@ fn cells_of(
     let mut groups = Vec::new();
     ViewGroup::add(&mut groups, &request.viewpoints, volume);
     if groups.len() > MAX_CELLS {
-        return Err(refusal(&ChoiceError::Cells { cells: groups.len() }));
+        return Err(ChoiceError::Cells { cells: groups.len() }.into());
     }
     let cells: Vec<Vec<PinholeCamera>> = groups.iter().map(|group| group.sample_cameras(size_px)).collect();
     let valid = cells.iter().flatten().try_for_each(PinholeCamera::validate);
@@ -208,13 +210,6 @@ fn size_of_density(rig: &[Camera], view: &PinholeCamera, density: f32, most_texe
     let steps = (2.0 * wanted.log2()).round().max(LEAST_STEPS).min(most);
     let size_px = (offered.size_px.as_vec2() * (0.5 * steps).exp2()).round();
     steps.is_finite().then(|| size_px.as_uvec2().max(UVec2::ONE))
-}
-
-/// The same field of view in another size.
-fn resized(camera: &Camera, size_px: UVec2) -> Result<Camera, Status> {
-    let camera = camera.resized(size_px);
-    camera.validate().map_err(|error| Status::invalid_argument(format!("sample_image_size: {error}")))?;
-    Ok(camera)
 }
 
 #[cfg(test)]

@@ -36,7 +36,10 @@ pub(super) fn assignment(
         Policy::Pipeline if nodes.len() > 1 => by_role(nodes, &choice.division.samples),
         Policy::Pipeline | Policy::TimeShare => [nodes.to_vec(), nodes.to_vec()],
     };
-    let relays = choice.policy == Policy::Pipeline && nodes.len() > 1;
+    let relay_fanout = match choice.policy {
+        Policy::Pipeline => relay_fanout(&choice.load, &Candidate::costs(nodes), &choice.division.samples),
+        Policy::Direct | Policy::TimeShare => None,
+    };
     Assignment {
         plan_epoch,
         workload_number,
@@ -45,11 +48,7 @@ pub(super) fn assignment(
         samplers: sampler_shares(&choice.load, &sampling),
         compositors: compositor_shares(choice, &compositing),
         tile_count: choice.load.tiles as u32,
-        relay_fanout: if relays {
-            relay_fanout(&choice.load, &Candidate::costs(nodes), &choice.division.samples)
-        } else {
-            None
-        },
+        relay_fanout,
         method: None,
         audit: None,
     }

@@ -6,14 +6,14 @@ use std::num::NonZeroU32;
 
 use super::load::drawers;
 use super::makespan::makespan_s;
-use super::relay_tree::{Links, Relaying};
+use super::relay_tree::Links;
 use super::{Load, NodeCosts};
 
 /// T of the pipeline: max(sampling, transfer, compositing), where `samples[i]` says whether node i samples; the others
 /// composite. Images take the best way. One node does all in turn.
 #[must_use]
 pub fn pipeline_s(load: &Load, nodes: &[NodeCosts], samples: &[bool]) -> f64 {
-    pipeline(load, nodes, samples, Links::best).time_s
+    links(load, nodes, samples).best().time_s
 }
 
 /// T of the pipeline, where images take a given way: from the samplers, or by relays with this fan-out.
@@ -23,43 +23,35 @@ pub(super) fn pipeline_by_s(
     samples: &[bool],
     relay_fanout: Option<NonZeroU32>,
 ) -> f64 {
-    let pipeline = pipeline(load, nodes, samples, |links, rest_s| Relaying {
-        fanout: relay_fanout,
-        time_s: rest_s.max(links.slowest_s(relay_fanout)),
-    });
-    pipeline.time_s
+    links(load, nodes, samples).time_s(relay_fanout)
 }
 
 /// The fan-out by which images reach the compositors of a division soonest.
 pub(super) fn relay_fanout(load: &Load, nodes: &[NodeCosts], samples: &[bool]) -> Option<NonZeroU32> {
-    pipeline(load, nodes, samples, Links::best).fanout
+    links(load, nodes, samples).best().fanout
 }
 
-fn pipeline(
-    load: &Load,
-    nodes: &[NodeCosts],
-    samples: &[bool],
-    relaying: impl Fn(&Links, f64) -> Relaying,
-) -> Relaying {
+/// The load of links in a pipeline, and the time of all other work.
+fn links(load: &Load, nodes: &[NodeCosts], samples: &[bool]) -> Links {
     if nodes.len() == 1 {
-        return Relaying::direct(time_share_s(load, nodes));
+        return Links { rest_s: time_share_s(load, nodes), ..Links::default() };
     }
     let [samplers, compositors] = by_role(nodes, samples);
     if samplers.is_empty() && load.images > 0 {
-        return Relaying::direct(f64::INFINITY);
+        return Links { rest_s: f64::INFINITY, ..Links::default() };
     }
     let part_counts = load.mean_part_counts(&samplers);
     let sample_s = samplers.iter().zip(&part_counts).map(|(node, parts)| parts * load.part_s(&node.costs));
     let rest_s = sample_s.fold(makespan_s(load.views, &load.compositors(&compositors)), f64::max);
     if load.is_already_sampled {
-        return Relaying::direct(rest_s);
+        return Links { rest_s, ..Links::default() };
     }
     let images = part_counts.iter().map(|parts| parts / load.tiles as f64);
-    let links = Links {
+    Links {
         sends_s: samplers.iter().zip(images).map(|(node, images)| images * node.transfer_s()).collect(),
         receives_s: compositors.iter().map(|node| load.images as f64 * node.transfer_s()).collect(),
-    };
-    relaying(&links, rest_s)
+        rest_s,
+    }
 }
 
 /// The nodes that sample, and the others.

@@ -19,8 +19,8 @@ impl Scheduler {
         let BudgetState { plan, in_force, .. } = self.budgets.get(&number)?;
         let audited = in_force.as_ref().filter(|in_force| in_force.audit.is_some())?;
         let term = audited.chosen.budget.error()?;
-        (self.audit_time_ratio > 0.0).then(|| AuditOrder {
-            time_ratio: self.audit_time_ratio,
+        (self.limits.audit_time_ratio > 0.0).then(|| AuditOrder {
+            time_ratio: self.limits.audit_time_ratio,
             least_apart_m: LEAST_APART * f64::from(plan.cell_side_m()),
             antialias: plan.budgeted.antialias(),
             planned_pixel_count: u32::try_from(plan.budgeted.typical_view.pixel_count()).unwrap_or(u32::MAX),

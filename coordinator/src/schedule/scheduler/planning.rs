@@ -2,8 +2,7 @@
 
 use std::num::NonZeroU32;
 
-use cluster::{Assignment, Costs, Policy, SessionPlan};
-use depth_image::ExposureEv;
+use cluster::{Costs, Policy, SessionPlan};
 
 use super::Scheduler;
 use crate::schedule::active_plan::ActivePlan;
@@ -56,12 +55,6 @@ impl PlanningSnapshot<'_> {
         };
         (!nodes.is_empty()).then_some(time_s)
     }
-}
-
-/// The next plan, and the gain of the best one.
-struct BetterPlan {
-    choice: Choice,
-    gain: Gain,
 }
 
 impl Scheduler {
@@ -172,7 +165,7 @@ impl Scheduler {
             estimates.for_each(Estimate::restart);
             return self.replan(number, &why);
         }
-        let Some(BetterPlan { choice, gain }) = self.better_plan(number) else { return Vec::new() };
+        let Some((choice, gain)) = self.better_plan(number) else { return Vec::new() };
         let active = self.workloads.get_mut(&number).and_then(|workload| workload.active_plan.as_mut());
         let Some(ActivePlan { hysteresis, ready, members, .. }) = active else { return Vec::new() };
         match hysteresis.confirms(now, gain, ready.len() >= members.len()) {
@@ -200,7 +193,7 @@ impl Scheduler {
     }
 
     /// The next plan towards the best one, and the gain of the best one.
-    fn better_plan(&self, number: u64) -> Option<BetterPlan> {
+    fn better_plan(&self, number: u64) -> Option<(Choice, Gain)> {
         let snapshot = self.snapshot(number)?;
         let choice = choose(&snapshot.demand()).ok()?;
         let has_role = self.has_role(number, &snapshot)?;
@@ -212,7 +205,7 @@ impl Scheduler {
             worth: if has_role.contains(&false) { WORTH_OF_IDLE } else { WORTH },
             switch_s: snapshot.load.sets.min(SETS_LOST) as f64 * sampled_s + mean.load_set_s,
         };
-        Some(BetterPlan { choice: step_from(&snapshot.demand(), choice, &has_role, MOST_CHANGES), gain })
+        Some((step_from(&snapshot.demand(), choice, &has_role, MOST_CHANGES), gain))
     }
 
     /// Puts a choice in force. A plan that changes nothing is not made: epochs rise only where roles change.
@@ -227,11 +220,24 @@ impl Scheduler {
         let old = workload.active_plan.as_ref();
         let slowest = candidates.iter().fold(Costs::default(), |slowest, node| slowest.max(node.costs.costs));
         let again = if old.is_some() { format!(" Planned again: {why}.") } else { String::new() };
-        let mut plan = session_plan(assignment, slowest, choice, format!("{}{}{again}", choice.reason, workload.note));
-        plan.fallback = NonZeroU32::new(workload.overload.step as u32);
-        plan.frame_rate_ratio = workload.frame_rate_ratio();
-        plan.method = workload.method();
-        plan.auto_exposure = workload.auto_exposure;
+        let predicted = &choice.predicted;
+        let plan = SessionPlan {
+            assignment,
+            costs: slowest,
+            reason: format!("{}{}{again}", choice.reason, workload.note),
+            predicted_pipeline_s: predicted.pipeline_s,
+            predicted_direct_s: predicted.direct_s,
+            predicted_time_share_s: predicted.time_share_s,
+            k_fd_sampler_count: predicted.k_fd as u32,
+            predicted_k_fd_s: predicted.k_fd_s,
+            enumerated_sampler_count: predicted.enumerated as u32,
+            predicted_enumerated_s: predicted.enumerated_s,
+            scene_load_s: 0.0,
+            fallback: NonZeroU32::new(workload.overload.step as u32),
+            method: workload.method(),
+            frame_rate_ratio: workload.frame_rate_ratio(),
+            auto_exposure: workload.auto_exposure,
+        };
         if old.is_some_and(|old| old.members == members && old.is_like(&plan)) {
             return Vec::new();
         }
@@ -260,25 +266,4 @@ fn costs_among<'a>(estimates: impl Iterator<Item = &'a Estimate>) -> Vec<NodeCos
     let estimates: Vec<&Estimate> = estimates.collect();
     let common = common_ratios(estimates.iter().copied());
     estimates.into_iter().map(|estimate| estimate.now_among(&common)).collect()
-}
-
-fn session_plan(assignment: Assignment, costs: Costs, choice: &Choice, reason: String) -> SessionPlan {
-    let predicted = &choice.predicted;
-    SessionPlan {
-        assignment,
-        costs,
-        reason,
-        predicted_pipeline_s: predicted.pipeline_s,
-        predicted_direct_s: predicted.direct_s,
-        predicted_time_share_s: predicted.time_share_s,
-        k_fd_sampler_count: predicted.k_fd as u32,
-        predicted_k_fd_s: predicted.k_fd_s,
-        enumerated_sampler_count: predicted.enumerated as u32,
-        predicted_enumerated_s: predicted.enumerated_s,
-        scene_load_s: 0.0,
-        fallback: None,
-        method: String::new(),
-        frame_rate_ratio: 1.0,
-        auto_exposure: ExposureEv::ZERO,
-    }
 }

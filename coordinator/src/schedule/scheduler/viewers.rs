@@ -12,15 +12,11 @@ use crate::schedule::workload_state::WorkloadState;
 const CELLS_INTERVAL: Duration = Duration::from_secs(1);
 
 impl Scheduler {
-    /// Whether the sample cameras of a workload follow viewpoints.
-    fn follows_viewers(&self, workload_number: u64) -> bool {
-        self.workloads.get(&workload_number).is_some_and(|workload| workload.cell_count().is_some())
-    }
-
     /// Whether the places of a workload's live viewers matter: to its sample cameras, or to a promise.
     #[must_use]
     pub fn wants_viewpoints(&self, workload_number: u64) -> bool {
-        self.follows_viewers(workload_number) || self.budgets.contains_key(&workload_number)
+        let workload = self.workloads.get(&workload_number);
+        workload.is_some_and(|workload| workload.cell_count().is_some()) || self.budgets.contains_key(&workload_number)
     }
 
     pub(super) fn viewpoints_changed(&mut self, session: u64, viewpoints: &[PinholeCamera]) -> Vec<Command> {
