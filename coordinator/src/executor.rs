@@ -24,29 +24,19 @@ const PAUSE: Duration = Duration::from_millis(100);
 pub(crate) async fn execute(shared: Arc<Shared>) {
     loop {
         match shared.commands.next().await {
-            Command::Apply { sessions, plan, nodes } => {
-                tokio::spawn(apply(shared.clone(), sessions, *plan, nodes));
-            }
-            Command::Probe(asked) => {
-                tokio::spawn(probe(shared.clone(), *asked));
-            }
+            Command::Apply { sessions, plan, nodes } => spawn(apply(shared.clone(), sessions, *plan, nodes)),
+            Command::Probe(asked) => spawn(probe(shared.clone(), *asked)),
             Command::Quarantine { node_name, workload_number, reason } => {
                 tracing::warn!(node = node_name, workload_number, reason, "quarantined");
             }
             Command::Readmit { node_name, workload_number } => {
                 tracing::info!(node = node_name, workload_number, "readmitted");
             }
-            Command::Recall { workload_number, key } => {
-                tokio::spawn(recall(shared.clone(), workload_number, key));
-            }
-            Command::ProbeViews(probe) => {
-                tokio::spawn(probe_views(shared.clone(), *probe));
-            }
-            Command::Keep(kept) => {
-                tokio::spawn(keep(shared.clone(), *kept));
-            }
+            Command::Recall { workload_number, key } => spawn(recall(shared.clone(), workload_number, key)),
+            Command::ProbeViews(probe) => spawn(probe_views(shared.clone(), *probe)),
+            Command::Keep(kept) => spawn(keep(shared.clone(), *kept)),
             Command::Represent { workload_number, choice, measurement } => {
-                tokio::spawn(represent(shared.clone(), workload_number, choice, *measurement));
+                spawn(represent(shared.clone(), workload_number, choice, *measurement));
             }
             Command::Promise { sessions, promise } => {
                 tracing::info!(%promise, "promise");
@@ -57,6 +47,11 @@ pub(crate) async fn execute(shared: Arc<Shared>) {
             Command::Refuse { session, error } => shared.sessions.refuse(session, error.into()),
         }
     }
+}
+
+/// Tasks report to the schedule: nobody waits for them.
+fn spawn(task: impl Future<Output = ()> + Send + 'static) {
+    tokio::spawn(task);
 }
 
 async fn apply(shared: Arc<Shared>, sessions: Vec<u64>, mut plan: SessionPlan, nodes: Vec<NodeStatus>) {

@@ -29,11 +29,10 @@ pub struct CoordinatorMetrics {
     plans: Counter,
     promises: Family<[(&'static str, String); 1], Gauge>,
     view_probes: Counter,
-    /// By workload; bounds of an audited error, and its mean.
+    /// The bounds of each workload's audited error, and its mean.
     audit_errors: Gauges<2>,
-    /// By workload whose views take their light from samples.
     known_light: Gauges<1>,
-    /// By workload; parts of the time of such a workload's view.
+    /// The parts of a view of each workload whose views take their light from samples.
     view_parts_s: Gauges<2>,
     broken: Counter,
     /// Workloads whose promise is broken now.

@@ -87,7 +87,8 @@ impl Shared {
         if is_tick || !commands.is_empty() {
             observers.metrics.show(&scheduler.status(), &commands);
         }
-        self.commands.push(commands);
+        self.commands.waiting.lock().extend(commands);
+        self.commands.added.notify_one();
     }
 
     /// Reads the schedule.
@@ -120,11 +121,6 @@ pub(crate) struct CommandQueue {
 }
 
 impl CommandQueue {
-    fn push(&self, commands: Vec<Command>) {
-        self.waiting.lock().extend(commands);
-        self.added.notify_one();
-    }
-
     pub(crate) async fn next(&self) -> Command {
         loop {
             let next = self.waiting.lock().pop_front();

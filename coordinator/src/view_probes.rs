@@ -61,14 +61,16 @@ pub(crate) async fn probe_views(shared: Arc<Shared>, probe: ViewProbe) {
     let answer = asking.await.unwrap_or_else(|error| Err(Status::unavailable(error.to_string())));
     match answer {
         Ok(event) => planned(&shared, workload_number, event),
-        Err(status) if is_refusal(&status) => {
-            let reason = shortened_reason(status.message());
-            let busy_s = start.elapsed().as_secs_f64();
-            planned(&shared, workload_number, PlannerEvent::Failed { id, reason, busy_s });
-        }
         Err(status) => {
             let reason = shortened_reason(status.message());
-            shared.step(Event::ProbeLost { workload_number, id, reason });
+            let busy_s = start.elapsed().as_secs_f64();
+            match status.code() {
+                // The node answered, and would answer the same again.
+                Code::InvalidArgument | Code::Unimplemented | Code::OutOfRange => {
+                    planned(&shared, workload_number, PlannerEvent::Failed { id, reason, busy_s });
+                }
+                _ => shared.step(Event::ProbeLost { workload_number, id, reason }),
+            }
         }
     }
 }
@@ -136,11 +138,6 @@ fn check(id: ProbeId, event: PlannerEvent) -> PlannerEvent {
         Ok(()) => event,
         Err(error) => PlannerEvent::Failed { id, reason: shortened_reason(&error.to_string()), busy_s: 0.0 },
     }
-}
-
-/// Whether the node answered, and would answer the same again.
-fn is_refusal(status: &Status) -> bool {
-    [Code::InvalidArgument, Code::Unimplemented, Code::OutOfRange].contains(&status.code())
 }
 
 fn row_costs(answer: &Measured) -> RowCosts {

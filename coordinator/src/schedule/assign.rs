@@ -3,7 +3,7 @@
 use cluster::{Assignment, CompositorShare, NodeStatus, Policy, SamplerShare, Workload};
 
 use super::makespan::distribute;
-use super::prediction::{by_role, relay_fanout};
+use super::prediction::{by_role, pipeline_links};
 use super::{Choice, Load, NodeCosts};
 
 /// Weights are found by distributing this many views at least: of fewer, some nodes would get none.
@@ -37,7 +37,9 @@ pub(super) fn assignment(
         Policy::Pipeline | Policy::TimeShare => [nodes.to_vec(), nodes.to_vec()],
     };
     let relay_fanout = match choice.policy {
-        Policy::Pipeline => relay_fanout(&choice.load, &Candidate::costs(nodes), &choice.division.samples),
+        Policy::Pipeline => {
+            pipeline_links(&choice.load, &Candidate::costs(nodes), &choice.division.samples).best().fanout
+        }
         Policy::Direct | Policy::TimeShare => None,
     };
     Assignment {

@@ -82,7 +82,7 @@ impl BudgetState {
 
     /// Whether the plan began before the last promise was broken: it does not know the audited viewpoints.
     pub(super) fn is_superseded(&self) -> bool {
-        self.findings.is_given_up || self.findings.last_break().is_some_and(|at| self.plan.began < at)
+        self.findings.is_given_up || self.findings.breaks.last().is_some_and(|at| self.plan.began < *at)
     }
 
     /// The choice in force, chosen again. Its audits go on, unless its promise is broken or another.

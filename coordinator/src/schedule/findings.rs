@@ -22,7 +22,8 @@ const STAYS_AFTER: Duration = Duration::from_secs(5);
 pub(super) struct Findings {
     /// The last audited viewpoints, the newest last.
     poses: VecDeque<PinholeCamera>,
-    breaks: Vec<Duration>,
+    /// The times of broken promises, the last one last.
+    pub(super) breaks: Vec<Duration>,
     /// The promise that is broken, if another representation is not in force yet.
     pub(super) broken: Option<Broken>,
     viewers: BTreeMap<(String, u64), ViewerAbove>,
@@ -93,11 +94,6 @@ impl Findings {
         self.breaks.push(now);
         (self.joins_poses, self.is_to_be_planned) = (true, true);
         self.breaks.len() >= MOST_BREAKS
-    }
-
-    /// The time of the last broken promise.
-    pub(super) fn last_break(&self) -> Option<Duration> {
-        self.breaks.last().copied()
     }
 
     /// The viewpoints that a plan has to be for, beside the view cells: those of viewers above the budget, and the last.

@@ -2,8 +2,6 @@
 //!
 //! Tiles of images, and views, are whole. A set is loaded once on each node that makes views of it.
 
-use std::num::NonZeroU32;
-
 use super::load::drawers;
 use super::makespan::makespan_s;
 use super::relay_tree::Links;
@@ -13,26 +11,11 @@ use super::{Load, NodeCosts};
 /// composite. Images take the best way. One node does all in turn.
 #[must_use]
 pub fn pipeline_s(load: &Load, nodes: &[NodeCosts], samples: &[bool]) -> f64 {
-    links(load, nodes, samples).best().time_s
-}
-
-/// T of the pipeline, where images take a given way: from the samplers, or by relays with this fan-out.
-pub(super) fn pipeline_by_s(
-    load: &Load,
-    nodes: &[NodeCosts],
-    samples: &[bool],
-    relay_fanout: Option<NonZeroU32>,
-) -> f64 {
-    links(load, nodes, samples).time_s(relay_fanout)
-}
-
-/// The fan-out by which images reach the compositors of a division soonest.
-pub(super) fn relay_fanout(load: &Load, nodes: &[NodeCosts], samples: &[bool]) -> Option<NonZeroU32> {
-    links(load, nodes, samples).best().fanout
+    pipeline_links(load, nodes, samples).best().time_s
 }
 
 /// The load of links in a pipeline, and the time of all other work.
-fn links(load: &Load, nodes: &[NodeCosts], samples: &[bool]) -> Links {
+pub(super) fn pipeline_links(load: &Load, nodes: &[NodeCosts], samples: &[bool]) -> Links {
     if nodes.len() == 1 {
         return Links { rest_s: time_share_s(load, nodes), ..Links::default() };
     }

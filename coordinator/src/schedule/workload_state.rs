@@ -155,13 +155,12 @@ impl WorkloadState {
 
     /// The workload in the representation in force.
     fn in_representation(&self) -> Workload {
-        let row = self.representation.as_ref().and_then(Representation::row).zip(self.budgeted.as_ref());
-        let Some((row, budgeted)) = row else { return self.requested.clone() };
-        let mut workload = budgeted.sampled_as(row, &self.requested, &self.planned_cells());
-        if let Some(Representation::Row { planes, .. }) = self.representation {
-            workload.planes = planes;
+        match (&self.representation, &self.budgeted) {
+            (Some(Representation::Row { row, planes, .. }), Some(budgeted)) => {
+                Workload { planes: *planes, ..budgeted.sampled_as(row, &self.requested, &self.planned_cells()) }
+            }
+            _ => self.requested.clone(),
         }
-        workload
     }
 
     pub(super) fn trigger(&self) -> PlanTrigger {
@@ -204,10 +203,9 @@ impl WorkloadState {
 
     /// Where a compositor's live viewers are, in place of where they were.
     pub(super) fn set_live_viewpoints(&mut self, node: String, viewpoints: Vec<PinholeCamera>) {
-        if viewpoints.is_empty() {
-            self.live_viewpoints.remove(&node)
-        } else {
-            self.live_viewpoints.insert(node, viewpoints)
+        match viewpoints.is_empty() {
+            true => self.live_viewpoints.remove(&node),
+            false => self.live_viewpoints.insert(node, viewpoints),
         };
     }
 

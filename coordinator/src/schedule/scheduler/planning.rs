@@ -11,7 +11,7 @@ use crate::schedule::choose::{WORTH, step_from};
 use crate::schedule::estimate::{Estimate, common_ratios};
 use crate::schedule::hysteresis::Gain;
 use crate::schedule::overload::UtilizationSample;
-use crate::schedule::prediction::{direct_s, pipeline_by_s, time_share_s};
+use crate::schedule::prediction::{direct_s, pipeline_links, time_share_s};
 use crate::schedule::workload_state::WorkloadState;
 use crate::schedule::{Choice, Command, CurrentRoles, Demand, Load, NodeCosts, PolicyOverride, choose};
 
@@ -23,15 +23,16 @@ const SETS_LOST: usize = 3;
 const MOST_CHANGES: usize = 2;
 
 /// The members that serve a workload, in the order of their names, and the demand.
-struct PlanningSnapshot<'a> {
-    names: Vec<&'a str>,
+struct PlanningSnapshot {
     nodes: Vec<NodeCosts>,
     current: Option<CurrentRoles>,
+    /// Whether each node has a role in the plan in force.
+    has_role: Vec<bool>,
     load: Load,
     policy_override: PolicyOverride,
 }
 
-impl PlanningSnapshot<'_> {
+impl PlanningSnapshot {
     fn demand(&self) -> Demand<'_> {
         Demand {
             load: self.load,
@@ -42,14 +43,15 @@ impl PlanningSnapshot<'_> {
     }
 
     /// Predicted seconds of a set by the plan in force, at present costs and demand; `None` where it has no node.
-    fn current_s(&self, has_role: &[bool]) -> Option<f64> {
+    fn current_s(&self) -> Option<f64> {
         let current = self.current.as_ref()?;
-        let with_role = self.nodes.iter().zip(&current.samples).zip(has_role).filter(|(_, has_role)| **has_role);
+        let roles = self.nodes.iter().zip(&current.samples).zip(&self.has_role);
+        let with_role = roles.filter(|(_, has_role)| **has_role);
         let (nodes, samples): (Vec<NodeCosts>, Vec<bool>) =
             with_role.map(|((node, samples), _)| (*node, *samples)).unzip();
         let load = self.load.tiled(current.tiles);
         let time_s = match current.policy {
-            Policy::Pipeline => pipeline_by_s(&load, &nodes, &samples, current.relay_fanout),
+            Policy::Pipeline => pipeline_links(&load, &nodes, &samples).time_s(current.relay_fanout),
             Policy::Direct => direct_s(&load, &nodes),
             Policy::TimeShare => time_share_s(&load, &nodes),
         };
@@ -66,13 +68,7 @@ impl Scheduler {
         snapshot.load = workload.rated_load();
         snapshot.nodes =
             self.costs_beside(number, |other| other.sessions.viewers() > 0, |costs| workload.of_viewers(costs));
-        Some(workload.utilisation(snapshot.current_s(&self.has_role(number, &snapshot)?)?))
-    }
-
-    /// For each node of the snapshot, whether it has a role in the plan in force.
-    fn has_role(&self, number: u64, snapshot: &PlanningSnapshot<'_>) -> Option<Vec<bool>> {
-        let active = self.active_plan(number)?;
-        Some(snapshot.names.iter().map(|name| active.has_role(name)).collect())
+        Some(workload.utilisation(snapshot.current_s()?))
     }
 
     /// Present costs of a workload's operations on each usable node, as if it served nothing else.
@@ -123,10 +119,12 @@ impl Scheduler {
         nodes
     }
 
-    fn snapshot(&self, number: u64) -> Option<PlanningSnapshot<'_>> {
+    fn snapshot(&self, number: u64) -> Option<PlanningSnapshot> {
         let workload = self.workloads.get(&number)?;
         let names: Vec<_> = self.serving(workload).map(|(name, _)| name.as_str()).collect();
-        let current = workload.active_plan.as_ref().map(|active| CurrentRoles {
+        let active = workload.active_plan.as_ref();
+        let has_role = names.iter().map(|name| active.is_some_and(|active| active.has_role(name))).collect();
+        let current = active.map(|active| CurrentRoles {
             policy: active.policy(),
             samples: names.iter().map(|name| active.samples(name)).collect(),
             tiles: active.plan.assignment.tile_count as usize,
@@ -134,7 +132,7 @@ impl Scheduler {
         });
         let load = workload.load();
         let policy_override = workload.policy_override().possible(&load, names.len());
-        Some(PlanningSnapshot { names, nodes: self.costs_now(number), current, load, policy_override })
+        Some(PlanningSnapshot { nodes: self.costs_now(number), current, has_role, load, policy_override })
     }
 
     /// Plans at once, for any plan in force; without nodes, sessions wait for the next one that joins.
@@ -196,16 +194,16 @@ impl Scheduler {
     fn better_plan(&self, number: u64) -> Option<(Choice, Gain)> {
         let snapshot = self.snapshot(number)?;
         let choice = choose(&snapshot.demand()).ok()?;
-        let has_role = self.has_role(number, &snapshot)?;
+        let has_role = &snapshot.has_role;
         let mean = NodeCosts::mean(&snapshot.nodes);
         let samplers = choice.division.sampler_count().max(1);
         let sampled_s = snapshot.load.images as f64 * mean.sample_image_s / samplers as f64;
         let gain = Gain {
-            ratio: snapshot.current_s(&has_role)? / choice.time_s(),
+            ratio: snapshot.current_s()? / choice.time_s(),
             worth: if has_role.contains(&false) { WORTH_OF_IDLE } else { WORTH },
             switch_s: snapshot.load.sets.min(SETS_LOST) as f64 * sampled_s + mean.load_set_s,
         };
-        Some((step_from(&snapshot.demand(), choice, &has_role, MOST_CHANGES), gain))
+        Some((step_from(&snapshot.demand(), choice, has_role, MOST_CHANGES), gain))
     }
 
     /// Puts a choice in force. A plan that changes nothing is not made: epochs rise only where roles change.

@@ -75,7 +75,7 @@ impl Scheduler {
             return Some(direct(budget, price.view_s, reason.clone()));
         }
         let broken = state.broken().filter(|broken| broken.is_of(budget));
-        // Not of a choice that does not serve the budget.
+        // A choice in force that does not serve the budget is left out.
         let in_force = in_force.filter(|InForce { chosen, .. }| {
             let is_own = chosen.budget == *budget && chosen.outcome.state != planner::PromiseState::Kept;
             broken.is_some() || is_own || (chosen.row.is_some() && state.keeps(budget))
