@@ -86,7 +86,7 @@ impl BudgetPlan {
         device_name: &str,
         poses: Vec<PinholeCamera>,
     ) -> Result<Self, InvalidField> {
-        let budgeted = workload.budgeted.clone().ok_or(InvalidField::Missing { field: "budget" })?;
+        let budgeted = workload.first.budgeted.clone().ok_or(InvalidField::Missing { field: "budget" })?;
         let cells = workload.planned_cells();
         if cells.is_empty() {
             return Err(InvalidField::Missing { field: "viewpoints" });

@@ -2,10 +2,11 @@
 
 use std::array;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Duration;
 
 use cluster::{AchievedTime, AuditOrder, Costs, Policy, PolicyChoice, Promise, Quality, Workload, is_one_place};
-use depth_image::{ExposureEv, PinholeCamera, SampleCamera, ViewCell};
+use depth_image::{PinholeCamera, SampleCamera, ViewCell};
 use glam::UVec2;
 
 use super::active_plan::ActivePlan;
@@ -30,15 +31,9 @@ pub(super) struct WorkloadState {
     cells: Option<Cells>,
     /// Of the mean view of its sessions, as measured when they were opened.
     pub(super) costs: Costs,
-    /// As measured when it was opened: views of all cells, moments and plans have one exposure.
-    pub(super) auto_exposure: ExposureEv,
-    /// The time of a view at the last fallback over that of one as it was asked for.
-    last_view_time_ratio: f64,
-    /// What the reasons of its plans say beside their figures.
-    pub(super) note: String,
+    /// Its first session as it was opened: its exposure is that of views of all cells, moments and plans.
+    pub(super) first: Arc<Opening>,
     pub(super) sessions: SessionMix,
-    /// The representations among which budgets of its sessions choose; `None`: its sessions have no budget.
-    pub(super) budgeted: Option<Budgeted>,
     /// The choice of budgets, in place of the sessions' own.
     pub(super) representation: Option<Representation>,
     /// The promises that sessions know, one a budget, and since when.
@@ -82,11 +77,8 @@ impl WorkloadState {
             requested: opening.workload.clone(),
             cells: (!opening.viewpoints.is_empty()).then(|| Cells::of(&opening.workload)),
             costs: opening.costs,
-            auto_exposure: opening.auto_exposure,
-            last_view_time_ratio: opening.last_view_time_ratio,
-            note: opening.note.clone(),
+            first: Arc::new(opening.clone()),
             sessions: SessionMix::default(),
-            budgeted: opening.budgeted.clone(),
             representation: None,
             announced: Vec::new(),
             audit: None,
@@ -155,7 +147,7 @@ impl WorkloadState {
 
     /// The workload in the representation in force.
     fn in_representation(&self) -> Workload {
-        match (&self.representation, &self.budgeted) {
+        match (&self.representation, &self.first.budgeted) {
             (Some(Representation::Row { row, planes, .. }), Some(budgeted)) => {
                 Workload { planes: *planes, ..budgeted.sampled_as(row, &self.requested, &self.planned_cells()) }
             }
@@ -185,7 +177,7 @@ impl WorkloadState {
     }
 
     fn shares_budget(&self, asked: Option<&Budgeted>) -> bool {
-        match (&self.budgeted, asked) {
+        match (&self.first.budgeted, asked) {
             (Some(own), Some(asked)) => {
                 let strictest = self.sessions.strictest_budget(|_| true);
                 own.is_shareable(asked) && strictest.is_none_or(|budget| budget.and(&asked.budget).is_some())
@@ -298,7 +290,7 @@ impl WorkloadState {
             None => self.requested.sample_cameras.len(),
             Some(_) => self.requested.view_camera_count(),
         };
-        match (self.representation.as_ref().and_then(Representation::row), &self.budgeted) {
+        match (self.representation.as_ref().and_then(Representation::row), &self.first.budgeted) {
             (Some(row), Some(budgeted)) if !budgeted.keeps_cameras => {
                 row.camera_count as usize * self.cells.as_ref().map_or(1, |cells| cells.grown().len())
             }
@@ -351,13 +343,13 @@ impl WorkloadState {
     /// The time of a view at a fallback over that of one as it was asked for.
     pub(super) fn view_time_ratio(&self, step: usize) -> f64 {
         let steps = self.sessions.fallbacks().iter().take_while(|quality| quality.frame_rate_ratio >= 1.0).count();
-        self.last_view_time_ratio.powf(step.min(steps) as f64 / steps.max(1) as f64)
+        self.first.last_view_time_ratio.powf(step.min(steps) as f64 / steps.max(1) as f64)
     }
 
     /// Begins at the first fallback that has room, where views as asked for would take this share of the nodes' time, and the time of
     /// others is known.
     pub(super) fn begin_with_room(&mut self, now: Duration, utilisation: f64) {
-        if self.last_view_time_ratio >= 1.0 || self.sessions.viewers() == 0 {
+        if self.first.last_view_time_ratio >= 1.0 || self.sessions.viewers() == 0 {
             return;
         }
         let last = self.sessions.fallbacks().len();

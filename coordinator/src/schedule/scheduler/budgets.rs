@@ -28,7 +28,7 @@ impl Scheduler {
     pub(super) fn follow_budgets(&mut self) -> Vec<Command> {
         let mut commands = self.end_plans();
         self.follow_audits();
-        let with_budget = self.workloads.iter().filter(|(_, workload)| workload.budgeted.is_some());
+        let with_budget = self.workloads.iter().filter(|(_, workload)| workload.first.budgeted.is_some());
         let numbers: Vec<u64> = with_budget.map(|(&number, _)| number).collect();
         commands.extend(numbers.iter().filter_map(|&number| self.plan_for_budget(number)).flatten());
         commands.extend(self.probe_views());

@@ -222,7 +222,7 @@ impl Scheduler {
         let plan = SessionPlan {
             assignment,
             costs: slowest,
-            reason: format!("{}{}{again}", choice.reason, workload.note),
+            reason: format!("{}{}{again}", choice.reason, workload.first.note),
             predicted_pipeline_s: predicted.pipeline_s,
             predicted_direct_s: predicted.direct_s,
             predicted_time_share_s: predicted.time_share_s,
@@ -234,7 +234,7 @@ impl Scheduler {
             fallback: NonZeroU32::new(workload.overload.step as u32),
             method: workload.method(),
             frame_rate_ratio: workload.frame_rate_ratio(),
-            auto_exposure: workload.auto_exposure,
+            auto_exposure: workload.first.auto_exposure,
         };
         if old.is_some_and(|old| old.members == members && old.is_like(&plan)) {
             return Vec::new();
