@@ -19,6 +19,8 @@ const READY_WITHIN: Duration = Duration::from_secs(300);
 /// A call that breaks sooner than this is tried again, after a pause.
 const SOON: Duration = Duration::from_secs(1);
 const PAUSE: Duration = Duration::from_millis(100);
+/// The codes of calls whose connection broke.
+const BROKEN: [Code; 5] = [Code::Unavailable, Code::Unknown, Code::Internal, Code::Cancelled, Code::DataLoss];
 
 /// Runs until it is aborted. Plans do not wait for one another: nodes refuse a plan that a later one has replaced.
 pub(crate) async fn execute(shared: Arc<Shared>) {
@@ -125,14 +127,10 @@ async fn call(shared: &Shared, assignment: &Assignment, address: &str) -> Result
     };
     let start = Instant::now();
     match apply().await {
-        Err(status) if is_of_connection(&status) && start.elapsed() < SOON => {
+        Err(status) if BROKEN.contains(&status.code()) && start.elapsed() < SOON => {
             tokio::time::sleep(PAUSE).await;
             apply().await
         }
         done => done,
     }
-}
-
-fn is_of_connection(status: &Status) -> bool {
-    [Code::Unavailable, Code::Unknown, Code::Internal, Code::Cancelled, Code::DataLoss].contains(&status.code())
 }

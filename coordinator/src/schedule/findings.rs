@@ -21,7 +21,7 @@ const STAYS_AFTER: Duration = Duration::from_secs(5);
 #[derive(Debug, Clone, Default)]
 pub(super) struct Findings {
     /// The last audited viewpoints, the newest last.
-    poses: VecDeque<PinholeCamera>,
+    pub(super) poses: VecDeque<PinholeCamera>,
     /// The times of broken promises, the last one last.
     pub(super) breaks: Vec<Duration>,
     /// The promise that is broken, if another representation is not in force yet.
@@ -103,11 +103,6 @@ impl Findings {
         }
         let above = self.viewers.values().map(|viewer| viewer.camera);
         above.chain(self.poses.iter().copied()).collect()
-    }
-
-    /// View cells have moved: earlier viewpoints are of others.
-    pub(super) fn forget_poses(&mut self) {
-        self.poses.clear();
     }
 
     /// Forgets viewers that have moved on, as `is_there` says of a node and a camera, and asks for a plan for those that

@@ -209,7 +209,7 @@ impl Scheduler {
         let mut commands = self.readmit();
         commands.extend(self.share_evenly());
         commands.extend(self.follow_viewers());
-        commands.extend(self.reevaluate_all());
+        commands.extend(self.workload_numbers().into_iter().flat_map(|number| self.reevaluate(number)));
         commands.extend(self.probe_liveness());
         commands
     }

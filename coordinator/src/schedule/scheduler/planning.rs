@@ -97,7 +97,7 @@ impl Scheduler {
     }
 
     /// Present costs as `of_views` changes them, of nodes that take turns with those of the other workloads that `counts`
-    /// chooses.
+    /// chooses and that are not idle.
     fn costs_beside(
         &self,
         number: u64,
@@ -111,9 +111,12 @@ impl Scheduler {
         }
         for ((name, _), node) in self.serving(workload).zip(&mut nodes) {
             node.costs = of_views(&node.costs);
-            let carried = self.carried(number, name, &counts);
-            if carried > 1 {
-                *node = node.times(carried as f64);
+            let others = self.workloads.iter().filter(|(other, _)| **other != number).map(|(_, other)| other);
+            let sharing =
+                others.filter(|other| other.nodes.contains(name) && !other.is_idle(self.now) && counts(other));
+            match sharing.count() {
+                0 => (),
+                count => *node = node.times((1 + count) as f64),
             }
         }
         nodes
@@ -145,10 +148,6 @@ impl Scheduler {
                 Vec::new()
             }
         }
-    }
-
-    pub(super) fn reevaluate_all(&mut self) -> Vec<Command> {
-        self.workload_numbers().into_iter().flat_map(|number| self.reevaluate(number)).collect()
     }
 
     /// Plans where there is no plan, where overload asks for another quality, or where a better plan is worth the switch.
