@@ -24,7 +24,7 @@ use crate::invalid::{InvalidField, MAX_NAME_BYTES, name, seconds, within};
 use crate::kept::{Certificate, Kept, KeptKey, KeptSearch};
 use crate::ladder::{Ladder, Row};
 use crate::metric::Metric;
-use crate::outcome::{Choice, Outcome, RowSummary};
+use crate::outcome::{Choice, Outcome, PromiseState, RowSummary};
 
 /// Views and repetitions with which finalists are timed.
 const TIMED_VIEWS: usize = 32;
@@ -157,7 +157,7 @@ impl<P: Pricing> Planner<P> {
     /// The result, or the state of a plan that is being made.
     #[must_use]
     pub fn outcome(&self) -> Outcome {
-        self.outcome.clone().unwrap_or_else(|| self.outcome_so_far())
+        self.outcome.clone().unwrap_or_else(|| self.outcome_of(self.choice().0, PromiseState::Measuring, false))
     }
 
     /// The rows of the ladder, in order.

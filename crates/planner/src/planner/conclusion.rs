@@ -16,10 +16,6 @@ impl<P: Pricing> Planner<P> {
         vec![Command::Keep(Box::new(self.kept(choice, is_spent))), Command::Conclude(Box::new(outcome))]
     }
 
-    pub(super) fn outcome_so_far(&self) -> Outcome {
-        self.outcome_of(self.choice().0, PromiseState::Measuring, false)
-    }
-
     pub(super) fn price_of(&self, choice: Choice) -> Price {
         match choice {
             Choice::Row(row) => self.prices[row],
@@ -33,7 +29,7 @@ impl<P: Pricing> Planner<P> {
         self.rows[row].certificates.iter().rev().find(|certificate| certificate.serves(&term))
     }
 
-    fn outcome_of(&self, choice: Choice, state: PromiseState, is_spent: bool) -> Outcome {
+    pub(super) fn outcome_of(&self, choice: Choice, state: PromiseState, is_spent: bool) -> Outcome {
         Outcome {
             state,
             choice,
@@ -44,7 +40,7 @@ impl<P: Pricing> Planner<P> {
         }
     }
 
-    fn choice(&self) -> (Choice, PromiseState) {
+    pub(super) fn choice(&self) -> (Choice, PromiseState) {
         let direct = self.direct_in_time();
         let best = self.eligible(EXACT).into_iter().find(|&row| self.is_measured_for_time(row));
         match (self.term(), best, direct) {

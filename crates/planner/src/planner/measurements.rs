@@ -15,11 +15,11 @@ impl<P: Pricing> Planner<P> {
         let (row, is_screening) = match self.pending_work(probed.id)? {
             Work::Screen { row, views } if *views == probed_views => (*row, true),
             Work::Certify { row, views } if *views == probed_views => (*row, false),
-            Work::Time { .. } => return Err(other("id", "that of a timing", "that of a probe")),
-            _ => return Err(other("views", "others", "those that were asked for")),
+            Work::Time { .. } => return Err(InvalidField::new("id", "that of a timing", "that of a probe")),
+            _ => return Err(InvalidField::new("views", "others", "those that were asked for")),
         };
         if row != probed.row {
-            return Err(other("row", probed.row, "the row that was asked for"));
+            return Err(InvalidField::new("row", probed.row, "the row that was asked for"));
         }
         self.finish(probed.busy_s);
         self.learn_costs(row, &probed.costs, probed.views.len());
@@ -37,10 +37,10 @@ impl<P: Pricing> Planner<P> {
 
     pub(super) fn timed(&mut self, timed: &Timed) -> Result<(), InvalidField> {
         let Work::Time { rows } = self.pending_work(timed.id)? else {
-            return Err(other("id", "that of a probe", "that of a timing"));
+            return Err(InvalidField::new("id", "that of a probe", "that of a timing"));
         };
         if !rows.iter().eq(timed.rows.iter().map(|(row, _)| row)) {
-            return Err(other("rows", "others", "those that were asked for"));
+            return Err(InvalidField::new("rows", "others", "those that were asked for"));
         }
         self.finish(timed.busy_s);
         // Rows that are timed for the prediction of costs were not timed in turn with other finalists.
@@ -80,9 +80,9 @@ impl<P: Pricing> Planner<P> {
 
     fn pending_work(&self, id: ProbeId) -> Result<&Work, InvalidField> {
         let pending = self.pending.as_ref().filter(|(pending, _)| *pending == id);
-        pending
-            .map(|(_, work)| work)
-            .ok_or_else(|| other("id", format!("{} of plan {}", id.number, id.plan), "that of the pending measurement"))
+        pending.map(|(_, work)| work).ok_or_else(|| {
+            InvalidField::new("id", format!("{} of plan {}", id.number, id.plan), "that of the pending measurement")
+        })
     }
 
     fn finish(&mut self, busy_s: f64) {
@@ -116,8 +116,4 @@ impl<P: Pricing> Planner<P> {
         let is_valid = [price.node_s, price.view_s].iter().all(|seconds| seconds.is_finite() && *seconds >= 0.0);
         if is_valid { price } else { Price { node_s: f64::INFINITY, view_s: f64::INFINITY } }
     }
-}
-
-fn other(field: &'static str, value: impl ToString, allowed: &'static str) -> InvalidField {
-    InvalidField::new(field, value, allowed)
 }
