@@ -130,8 +130,8 @@ impl SceneOffers {
             _ => (),
         }
         for (place, offer) in offers.iter().enumerate() {
-            let is_same = |other: &&SceneOffer| other.name == offer.name || other.hash == offer.hash;
-            if let Some(other) = offers[..place].iter().find(is_same) {
+            let mut before = offers[..place].iter();
+            if let Some(other) = before.find(|other| other.name == offer.name || other.hash == offer.hash) {
                 return Err(OfferError::Twice { name: other.name.clone() });
             }
         }
@@ -145,9 +145,11 @@ impl SceneOffers {
 
     /// The offer of a name or a hash; the first where none is named.
     pub(crate) fn find(&self, scene: Option<&str>) -> Result<&SceneOffer, Status> {
-        let is_named =
-            |offer: &&SceneOffer| scene.is_none_or(|scene| scene == offer.name || scene == offer.hash.as_str());
-        self.iter().find(is_named).ok_or_else(|| {
+        let named = match scene {
+            Some(scene) => self.iter().find(|offer| scene == offer.name || scene == offer.hash.as_str()),
+            None => self.0.first(),
+        };
+        named.ok_or_else(|| {
             let names: Vec<&str> = self.iter().map(|offer| offer.name.as_str()).collect();
             Status::not_found(format!("scene: {} is not on offer; {} are", scene.unwrap_or_default(), names.join(", ")))
         })

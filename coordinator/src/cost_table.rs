@@ -69,10 +69,9 @@ impl CostTable {
             let others: Vec<&Entry> = of_device.into_iter().filter(|entry| qualityless(&entry.key) == shared).collect();
             // Sizes are compared in one quality.
             let latest = &others.last()?.key;
-            let is_alike = |entry: &&&Entry| {
+            let alike = others.iter().filter(|entry| {
                 entry.key.method == latest.method && entry.key.planes.antialias == latest.planes.antialias
-            };
-            let alike = others.iter().filter(is_alike);
+            });
             let sizes = alike.filter_map(|entry| Some((pixels_of(&entry.key), in_quality(entry, &key)?))).collect();
             Self::predict_size(sizes, pixels_of(&key))
         })
@@ -80,10 +79,9 @@ impl CostTable {
 
     /// Costs from those of views of other sizes, each with its number of pixels.
     fn predict_size(mut sizes: Vec<(f64, Measured)>, pixels: f64) -> Option<Measured> {
-        let distance = |of_px: f64| (of_px / pixels).max(pixels / of_px);
         // The nearest first.
-        sizes.sort_by(|(a, _), (b, _)| distance(*a).total_cmp(&distance(*b)));
-        let nearest = sizes.first().filter(|(of_px, _)| distance(*of_px) <= FARTHEST)?;
+        sizes.sort_by(|(a, _), (b, _)| ratio_above_one(*a, pixels).total_cmp(&ratio_above_one(*b, pixels)));
+        let nearest = sizes.first().filter(|(of_px, _)| ratio_above_one(*of_px, pixels) <= FARTHEST)?;
         let other = sizes.iter().find(|(other, _)| *other != nearest.0);
         Some(at_size(nearest, other, pixels))
     }
@@ -92,16 +90,21 @@ impl CostTable {
     pub(crate) fn insert(&self, device: &str, measurement: &MeasureCosts, known: Known) {
         let key = cache_key(measurement);
         let mut entries = self.entries.lock();
-        let is_same = |entry: &Entry| entry.device == device && entry.key == key;
-        if !known.is_settled && entries.iter().any(|entry| is_same(entry) && entry.known.is_settled) {
-            return;
-        }
-        entries.retain(|entry| !is_same(entry));
-        if entries.len() >= CAPACITY {
+        if let Some(at) = entries.iter().position(|entry| entry.device == device && entry.key == key) {
+            if entries[at].known.is_settled && !known.is_settled {
+                return;
+            }
+            entries.remove(at);
+        } else if entries.len() >= CAPACITY {
             entries.remove(0);
         }
         entries.push(Entry { device: device.to_owned(), key, known });
     }
+}
+
+/// How many times the larger of two sizes is the smaller.
+fn ratio_above_one(a_px: f64, b_px: f64) -> f64 {
+    (a_px / b_px).max(b_px / a_px)
 }
 
 /// The key without what a prediction accounts for: the size and the number of views. Fields of view matter little.
@@ -138,10 +141,11 @@ fn qualityless(key: &MeasureCosts) -> MeasureCosts {
 fn in_quality(entry: &Entry, wanted: &MeasureCosts) -> Option<Measured> {
     let Measured { costs, shared_light, .. } = entry.known.measured.clone();
     let light = shared_light?;
-    let positions = |key: &MeasureCosts| f64::from(key.planes.antialias.samples());
-    let texels = |key: &MeasureCosts| key.workload.sample_cameras.iter().map(SampleCamera::pixel_count).sum::<usize>();
-    let positions_ratio = positions(wanted) / positions(&entry.key);
-    let texels_ratio = texels(wanted) as f64 / texels(&entry.key).max(1) as f64;
+    let [wanted_positions, positions] = [wanted, &entry.key].map(|key| f64::from(key.planes.antialias.samples()));
+    let [wanted_texels, texels] = [wanted, &entry.key]
+        .map(|key| key.workload.sample_cameras.iter().map(SampleCamera::pixel_count).sum::<usize>());
+    let positions_ratio = wanted_positions / positions;
+    let texels_ratio = wanted_texels as f64 / texels.max(1) as f64;
     let light = SharedLightCosts {
         surfaces_s: light.surfaces_s * positions_ratio,
         look_up_s: light.look_up_s * positions_ratio,

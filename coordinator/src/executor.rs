@@ -8,7 +8,7 @@ use tokio::task::JoinSet;
 use tonic::{Code, Status};
 use wire::rpc::NodeClient;
 
-use crate::grpc_status::{of_node, refusal, within};
+use crate::grpc_status::{of_node, within};
 use crate::probe::probe;
 use crate::schedule::{Command, Event, Scheduler};
 use crate::shared::Shared;
@@ -19,34 +19,26 @@ const READY_WITHIN: Duration = Duration::from_secs(300);
 /// A call that breaks sooner than this is tried again, after a pause.
 const SOON: Duration = Duration::from_secs(1);
 const PAUSE: Duration = Duration::from_millis(100);
+/// The codes of calls whose connection broke.
+const BROKEN: [Code; 5] = [Code::Unavailable, Code::Unknown, Code::Internal, Code::Cancelled, Code::DataLoss];
 
 /// Runs until it is aborted. Plans do not wait for one another: nodes refuse a plan that a later one has replaced.
 pub(crate) async fn execute(shared: Arc<Shared>) {
     loop {
         match shared.commands.next().await {
-            Command::Apply { sessions, plan, nodes } => {
-                tokio::spawn(apply(shared.clone(), sessions, *plan, nodes));
-            }
-            Command::Probe(asked) => {
-                tokio::spawn(probe(shared.clone(), *asked));
-            }
+            Command::Apply { sessions, plan, nodes } => spawn(apply(shared.clone(), sessions, *plan, nodes)),
+            Command::Probe(asked) => spawn(probe(shared.clone(), *asked)),
             Command::Quarantine { node_name, workload_number, reason } => {
                 tracing::warn!(node = node_name, workload_number, reason, "quarantined");
             }
             Command::Readmit { node_name, workload_number } => {
                 tracing::info!(node = node_name, workload_number, "readmitted");
             }
-            Command::Recall { workload_number, key } => {
-                tokio::spawn(recall(shared.clone(), workload_number, key));
-            }
-            Command::ProbeViews(probe) => {
-                tokio::spawn(probe_views(shared.clone(), *probe));
-            }
-            Command::Keep(kept) => {
-                tokio::spawn(keep(shared.clone(), *kept));
-            }
+            Command::Recall { workload_number, key } => spawn(recall(shared.clone(), workload_number, key)),
+            Command::ProbeViews(probe) => spawn(probe_views(shared.clone(), *probe)),
+            Command::Keep(kept) => spawn(keep(shared.clone(), *kept)),
             Command::Represent { workload_number, choice, measurement } => {
-                tokio::spawn(represent(shared.clone(), workload_number, choice, *measurement));
+                spawn(represent(shared.clone(), workload_number, choice, *measurement));
             }
             Command::Promise { sessions, promise } => {
                 tracing::info!(%promise, "promise");
@@ -54,9 +46,14 @@ pub(crate) async fn execute(shared: Arc<Shared>) {
                     shared.send(session, SessionEvent::Promise((*promise).clone()));
                 }
             }
-            Command::Refuse { session, error } => shared.sessions.refuse(session, refusal(&error)),
+            Command::Refuse { session, error } => shared.sessions.refuse(session, error.into()),
         }
     }
+}
+
+/// Tasks report to the schedule: nobody waits for them.
+fn spawn(task: impl Future<Output = ()> + Send + 'static) {
+    tokio::spawn(task);
 }
 
 async fn apply(shared: Arc<Shared>, sessions: Vec<u64>, mut plan: SessionPlan, nodes: Vec<NodeStatus>) {
@@ -130,14 +127,10 @@ async fn call(shared: &Shared, assignment: &Assignment, address: &str) -> Result
     };
     let start = Instant::now();
     match apply().await {
-        Err(status) if is_of_connection(&status) && start.elapsed() < SOON => {
+        Err(status) if BROKEN.contains(&status.code()) && start.elapsed() < SOON => {
             tokio::time::sleep(PAUSE).await;
             apply().await
         }
         done => done,
     }
-}
-
-fn is_of_connection(status: &Status) -> bool {
-    [Code::Unavailable, Code::Unknown, Code::Internal, Code::Cancelled, Code::DataLoss].contains(&status.code())
 }

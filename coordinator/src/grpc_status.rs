@@ -3,21 +3,20 @@
 use std::future::Future;
 use std::time::Duration;
 
-use tonic::Status;
+use tonic::{Code, Status};
 
 use crate::schedule::ChoiceError;
 
 /// The status of a demand that cannot be planned.
-pub(crate) fn refusal(error: &ChoiceError) -> Status {
-    match error {
-        ChoiceError::Overload { .. } | ChoiceError::Workloads { .. } => Status::resource_exhausted(error.to_string()),
-        ChoiceError::Rejected { .. }
-        | ChoiceError::ForcedTiles { .. }
-        | ChoiceError::Cells { .. }
-        | ChoiceError::NoCells { .. } => Status::invalid_argument(error.to_string()),
-        ChoiceError::NoNodes | ChoiceError::ForcedSamplers { .. } | ChoiceError::Override { .. } => {
-            Status::failed_precondition(error.to_string())
-        }
+impl From<ChoiceError> for Status {
+    fn from(error: ChoiceError) -> Self {
+        use ChoiceError as E;
+        let code = match error {
+            E::Overload { .. } | E::Workloads { .. } => Code::ResourceExhausted,
+            E::Rejected { .. } | E::ForcedTiles { .. } | E::Cells { .. } | E::NoCells { .. } => Code::InvalidArgument,
+            E::NoNodes | E::ForcedSamplers { .. } | E::Override { .. } => Code::FailedPrecondition,
+        };
+        Self::new(code, error.to_string())
     }
 }
 
@@ -27,8 +26,9 @@ pub(crate) async fn within<T>(
     what: &str,
     call: impl Future<Output = Result<T, Status>>,
 ) -> Result<T, Status> {
-    let late = |_| Status::deadline_exceeded(format!("{what} took longer than {} s", deadline.as_secs()));
-    tokio::time::timeout(deadline, call).await.map_err(late)?
+    tokio::time::timeout(deadline, call)
+        .await
+        .unwrap_or_else(|_| Err(Status::deadline_exceeded(format!("{what} took longer than {} s", deadline.as_secs()))))
 }
 
 /// A status that names the node it is of.

@@ -54,29 +54,25 @@ fn next(shared: &Shared) -> Option<(Wanted, NodeStatus)> {
         return None;
     }
     let devices: BTreeSet<&str> = queue.devices().collect();
-    let is_idle = |name: &str| shared.with_scheduler(|scheduler| scheduler.idle_for(name)) >= IDLE_FOR;
     let mut nodes = shared.status().nodes;
-    // Nodes of one host share its device, or its processors.
-    let busy = nodes.iter().filter(|node| !is_idle(&node.node_name));
-    let busy_hosts: BTreeSet<String> = busy.map(|node| host_of(&node.address).to_owned()).collect();
-    let is_wanted = |node: &NodeStatus| devices.contains(node.device_name.as_str());
-    nodes.retain(|node| is_wanted(node) && !busy_hosts.contains(host_of(&node.address)));
+    nodes.retain(|node| {
+        let idle_for = shared.with_scheduler(|scheduler| scheduler.idle_for(&node.node_name));
+        devices.contains(node.device_name.as_str()) && idle_for >= IDLE_FOR
+    });
     let wanted = queue.take(|device| nodes.iter().any(|node| node.device_name == device))?;
     let node = nodes.into_iter().find(|node| node.device_name == wanted.device)?;
     Some((wanted, node))
 }
 
-/// The part of a node's address before its port.
-fn host_of(address: &str) -> &str {
-    address.rsplit_once(':').map_or(address, |(host, _)| host)
-}
-
-/// A node may be lost while it measures: others of its kind are asked once it has left.
-pub(crate) async fn measured_on_present_nodes(
+/// Known costs, else measured ones. A node may be lost while it measures: others of its kind are asked once it has left.
+pub(crate) async fn known_or_measured(
     shared: &Shared,
     measurement: &MeasureCosts,
     events: &EventSender,
 ) -> Result<Measured, Status> {
+    if let Some(known) = known(shared, measurement) {
+        return Ok(known);
+    }
     let mut backoff = Backoff::reconnect();
     for _ in 1..ATTEMPTS {
         match measured(shared, measurement, events).await {

@@ -44,8 +44,8 @@ impl MeasuringQueue {
 
     fn push(&mut self, wanted: Wanted) {
         let key = cache_key(&wanted.measurement);
-        let is_same = |other: &Wanted| other.device == wanted.device && cache_key(&other.measurement) == key;
-        if self.waiting.iter().any(is_same) {
+        let mut waiting = self.waiting.iter();
+        if waiting.any(|other| other.device == wanted.device && cache_key(&other.measurement) == key) {
             return;
         }
         if self.waiting.len() >= CAPACITY {

@@ -6,40 +6,16 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
-use cluster::{ClusterStatus, ErrorInterval, PromiseState, WorkloadStatus};
+use cluster::{ClusterStatus, ErrorInterval, PromiseState};
 use node::Telemetry;
 use parking_lot::Mutex;
-use prometheus_client::encoding::EncodeLabelSet;
 use prometheus_client::metrics::{counter::Counter, family::Family, gauge::Gauge};
-use prometheus_client::registry::Unit;
+use prometheus_client::registry::{Metric, Registry, Unit};
 
 use crate::schedule::{Command, Event, Recorder};
 
-/// The state of promises.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct State {
-    state: String,
-}
-
-/// A bound of an audited error, or its mean.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct AuditedError {
-    workload: u64,
-    value: &'static str,
-}
-
-/// A workload whose views take their light from samples.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct LitWorkload {
-    workload: u64,
-}
-
-/// A part of the time of such a workload's view.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct ViewPart {
-    workload: u64,
-    part: &'static str,
-}
+/// A gauge for each value of its labels: names and values.
+type Gauges<const LABELS: usize> = Family<[(&'static str, String); LABELS], Gauge<f64, AtomicU64>>;
 
 /// Registered gauges of the cluster's state, and counters of plans and measurements.
 #[derive(Debug, Clone)]
@@ -51,11 +27,13 @@ pub struct CoordinatorMetrics {
     views_per_set: Gauge,
     plan_epoch: Gauge,
     plans: Counter,
-    promises: Family<State, Gauge>,
+    promises: Family<[(&'static str, String); 1], Gauge>,
     view_probes: Counter,
-    audit_errors: Family<AuditedError, Gauge<f64, AtomicU64>>,
-    known_light: Family<LitWorkload, Gauge<f64, AtomicU64>>,
-    view_parts_s: Family<ViewPart, Gauge<f64, AtomicU64>>,
+    /// The bounds of each workload's audited error, and its mean.
+    audit_errors: Gauges<2>,
+    known_light: Gauges<1>,
+    /// The parts of a view of each workload whose views take their light from samples.
+    view_parts_s: Gauges<2>,
     broken: Counter,
     /// Workloads whose promise is broken now.
     broken_workloads: Arc<Mutex<BTreeSet<u64>>>,
@@ -65,40 +43,36 @@ impl CoordinatorMetrics {
     /// Registered, all at zero.
     #[must_use]
     pub fn new(telemetry: &Telemetry) -> Self {
-        let mut registry = telemetry.registry();
-        let mut gauge = |name: &str, help: &str| {
-            let gauge = Gauge::default();
-            registry.register(name, help, gauge.clone());
-            gauge
-        };
-        let metrics = Self {
-            nodes: gauge("cluster_nodes", "P: nodes that have joined"),
-            workloads: gauge("cluster_workloads", "Workloads that are open"),
-            samplers: gauge("cluster_samplers", "K: nodes that sample, of all workloads"),
-            sessions: gauge("cluster_sessions", "Sessions of all workloads"),
-            views_per_set: gauge("cluster_views_per_set", "V: views of a sample set, of all workloads"),
-            plan_epoch: gauge("cluster_plan_epoch", "The last plan"),
-            plans: Counter::default(),
-            promises: Family::default(),
-            view_probes: Counter::default(),
-            audit_errors: Family::default(),
-            known_light: Family::default(),
-            view_parts_s: Family::default(),
-            broken: Counter::default(),
+        let registry = &mut *telemetry.registry();
+        Self {
+            nodes: registered(registry, "cluster_nodes", "P: nodes that have joined"),
+            workloads: registered(registry, "cluster_workloads", "Workloads that are open"),
+            samplers: registered(registry, "cluster_samplers", "K: nodes that sample, of all workloads"),
+            sessions: registered(registry, "cluster_sessions", "Sessions of all workloads"),
+            views_per_set: registered(registry, "cluster_views_per_set", "V: views of a sample set, of all workloads"),
+            plan_epoch: registered(registry, "cluster_plan_epoch", "The last plan"),
+            plans: registered(registry, "cluster_plans", "Plans made"),
+            promises: registered(registry, "cluster_promises", "Promises to the sessions of a workload"),
+            view_probes: registered(registry, "cluster_view_probes", "Measurements for budgets"),
+            audit_errors: registered(
+                registry,
+                "cluster_audit_error_ratio",
+                "The error of a workload's audited views: the interval that has it with 95 % confidence, and the mean",
+            ),
+            known_light: registered(
+                registry,
+                "cluster_known_light_ratio",
+                "The share of a view's surface points whose light samples know, as measured",
+            ),
+            view_parts_s: {
+                let parts_s = Gauges::default();
+                let help = "Parts of a view whose light comes from samples, as measured";
+                registry.register_with_unit("cluster_view_part", help, Unit::Seconds, parts_s.clone());
+                parts_s
+            },
+            broken: registered(registry, "cluster_promises_broken", "Promises that audits have found broken"),
             broken_workloads: Arc::default(),
-        };
-        registry.register("cluster_plans", "Plans made", metrics.plans.clone());
-        registry.register("cluster_promises", "Promises to the sessions of a workload", metrics.promises.clone());
-        registry.register("cluster_view_probes", "Measurements for budgets", metrics.view_probes.clone());
-        let help =
-            "The error of a workload's audited views: the interval that has it with 95 % confidence, and the mean";
-        registry.register("cluster_audit_error_ratio", help, metrics.audit_errors.clone());
-        let help = "The share of a view's surface points whose light samples know, as measured";
-        registry.register("cluster_known_light_ratio", help, metrics.known_light.clone());
-        let help = "Parts of a view whose light comes from samples, as measured";
-        registry.register_with_unit("cluster_view_part", help, Unit::Seconds, metrics.view_parts_s.clone());
-        registry.register("cluster_promises_broken", "Promises that audits have found broken", metrics.broken.clone());
-        metrics
+        }
     }
 
     /// Shows the cluster's state, and counts what the schedule has ordered.
@@ -112,22 +86,25 @@ impl CoordinatorMetrics {
         for state in [PromiseState::Measuring, PromiseState::Kept, PromiseState::Broken, PromiseState::Unreachable] {
             let promises = status.workloads.iter().filter_map(|workload| workload.promise.as_ref());
             let count = promises.filter(|promise| promise.state == state).count();
-            self.promises.get_or_create(&State { state: state.to_string() }).set(count as i64);
+            self.promises.get_or_create(&[("state", state.to_string())]).set(count as i64);
         }
-        let number = |count: u64| i64::try_from(count).unwrap_or(i64::MAX);
-        self.nodes.set(number(status.nodes.len() as u64));
-        self.workloads.set(number(status.workloads.len() as u64));
-        self.samplers.set(number(status.sampler_count() as u64));
-        self.sessions.set(number(status.session_count()));
-        self.views_per_set.set(number(status.views_per_set()));
-        self.plan_epoch.set(number(status.plan_epoch));
+        for (gauge, count) in [
+            (&self.nodes, status.nodes.len() as u64),
+            (&self.workloads, status.workloads.len() as u64),
+            (&self.samplers, status.sampler_count() as u64),
+            (&self.sessions, status.session_count()),
+            (&self.views_per_set, status.views_per_set()),
+            (&self.plan_epoch, status.plan_epoch),
+        ] {
+            gauge.set(i64::try_from(count).unwrap_or(i64::MAX));
+        }
     }
 
     fn show_audits(&self, status: &ClusterStatus) {
-        let is_broken = |workload: &&WorkloadStatus| {
-            workload.promise.as_ref().is_some_and(|promise| promise.state == PromiseState::Broken)
-        };
-        let broken: BTreeSet<u64> = status.workloads.iter().filter(is_broken).map(|workload| workload.number).collect();
+        let promised =
+            status.workloads.iter().filter_map(|workload| Some((workload.number, workload.promise.as_ref()?)));
+        let broken = promised.filter(|(_, promise)| promise.state == PromiseState::Broken);
+        let broken: BTreeSet<u64> = broken.map(|(number, _)| number).collect();
         let before = std::mem::replace(&mut *self.broken_workloads.lock(), broken.clone());
         self.broken.inc_by(broken.difference(&before).count() as u64);
         self.audit_errors.clear();
@@ -135,7 +112,7 @@ impl CoordinatorMetrics {
             let audit = workload.promise.as_ref().and_then(|promise| promise.audit);
             let Some(ErrorInterval { least, mean, greatest }) = audit.and_then(|audit| audit.error) else { continue };
             for (value, ratio) in [("low", least), ("mean", mean), ("high", greatest)] {
-                let labels = AuditedError { workload: workload.number, value };
+                let labels = [("workload", workload.number.to_string()), ("value", value.to_owned())];
                 self.audit_errors.get_or_create(&labels).set(ratio);
             }
         }
@@ -146,15 +123,23 @@ impl CoordinatorMetrics {
         self.view_parts_s.clear();
         for status in &status.workloads {
             let Some(light) = status.shared_light else { continue };
-            let workload = status.number;
-            self.known_light.get_or_create(&LitWorkload { workload }).set(light.known_ratio);
+            let workload = status.number.to_string();
+            self.known_light.get_or_create(&[("workload", workload.clone())]).set(light.known_ratio);
             let parts =
                 [("surfaces", light.surfaces_s), ("look_up", light.look_up_s), ("unknown_points", light.unknown_s)];
             for (part, seconds) in parts {
-                self.view_parts_s.get_or_create(&ViewPart { workload, part }).set(seconds);
+                self.view_parts_s
+                    .get_or_create(&[("workload", workload.clone()), ("part", part.to_owned())])
+                    .set(seconds);
             }
         }
     }
+}
+
+fn registered<M: Metric + Clone + Default>(registry: &mut Registry, name: &str, help: &str) -> M {
+    let metric = M::default();
+    registry.register(name, help, metric.clone());
+    metric
 }
 
 impl Default for CoordinatorMetrics {
@@ -187,7 +172,7 @@ impl Observers {
 
 #[cfg(test)]
 mod tests {
-    use cluster::SharedLightCosts;
+    use cluster::{SharedLightCosts, WorkloadStatus};
 
     use super::*;
 

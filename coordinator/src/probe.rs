@@ -40,18 +40,13 @@ async fn attempts(shared: &Shared, probe: &Probe) -> Result<(), Status> {
 }
 
 async fn attempt(shared: &Shared, probe: &Probe) -> Result<(), Status> {
-    match &probe.image {
-        None => serves(&probe.address).await,
-        Some(image) => check_image(shared, &probe.address, image).await,
+    if let Some(image) = &probe.image {
+        return check_image(shared, &probe.address, image).await;
     }
-}
-
-/// A node without a health service, or with too much work, answers as well.
-async fn serves(address: &str) -> Result<(), Status> {
-    match is_serving(address, "").await {
-        Err(status) if ![Code::Unimplemented, Code::NotFound, Code::ResourceExhausted].contains(&status.code()) => {
-            Err(status)
-        }
+    // A node without a health service, or with too much work, answers as well.
+    let served = [Code::Unimplemented, Code::NotFound, Code::ResourceExhausted];
+    match is_serving(&probe.address, "").await {
+        Err(status) if !served.contains(&status.code()) => Err(status),
         _ => Ok(()),
     }
 }
@@ -72,8 +67,11 @@ async fn check_image(shared: &Shared, address: &str, image: &ProbedImage) -> Res
             }
             let camera = image.camera;
             let limits = DecodeLimits::default();
-            let decode = move || decode_sample_image(&whole.image.header, &camera, &whole.image.payload, &limits);
-            return blocking(move || decode().map(drop).map_err(data_loss)).await;
+            return blocking(move || {
+                let image = decode_sample_image(&whole.image.header, &camera, &whole.image.payload, &limits);
+                image.map(drop).map_err(data_loss)
+            })
+            .await;
         }
     }
     Err(Status::data_loss("no whole image came"))

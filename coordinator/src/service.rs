@@ -18,10 +18,9 @@ use wire::rpc::{Coordinator, Messages, coordinator_server};
 
 use crate::config::{CoordinatorConfig, SceneOffer, SceneOffers};
 use crate::executor::execute;
-use crate::grpc_status::refusal;
 use crate::measuring::measure_when_idle;
 use crate::observers::Observers;
-use crate::schedule::{Event, Scheduler};
+use crate::schedule::Event;
 use crate::session_opening::open;
 use crate::shared::Shared;
 
@@ -111,7 +110,7 @@ impl Coordinator for CoordinatorService {
         if !self.shared.sessions.contains(request.session) {
             return Err(Status::not_found(format!("session_number: no session {} is open", request.session)));
         }
-        self.shared.step_with(|scheduler| admitted_changes(scheduler, request))
+        self.shared.change_session(request)
     }
 
     async fn report_work(&self, request: WorkReport) -> Result<(), Status> {
@@ -130,18 +129,15 @@ impl Coordinator for CoordinatorService {
     async fn fetch_scene(&self, request: FetchScene) -> Result<Messages<ScenePart>, Status> {
         let offer = self.shared.offers.find(Some(request.hash.as_str()))?;
         let start = usize::try_from(request.offset_bytes).unwrap_or(usize::MAX);
-        if start > offer.package.len() {
-            return Err(Status::invalid_argument(format!(
-                "offset_bytes is {start}, the package has {}",
-                offer.package.len()
-            )));
-        }
         let package = offer.package.clone();
-        let part = move |start: usize| ScenePart {
-            offset_bytes: start as u64,
-            data: package.slice(start..package.len().min(start + MAX_CHUNK_BYTES)),
-        };
-        let parts = (start..offer.package.len()).step_by(MAX_CHUNK_BYTES).map(part).map(Ok);
+        if start > package.len() {
+            let length = package.len();
+            return Err(Status::invalid_argument(format!("offset_bytes is {start}, the package has {length}")));
+        }
+        let parts = (start..package.len()).step_by(MAX_CHUNK_BYTES).map(move |start| {
+            let data = package.slice(start..package.len().min(start + MAX_CHUNK_BYTES));
+            Ok(ScenePart { offset_bytes: start as u64, data })
+        });
         Ok(until_drained(Box::pin(tokio_stream::iter(parts)), self.shutdown.clone()))
     }
 
@@ -159,21 +155,4 @@ impl Coordinator for CoordinatorService {
         self.shared.step(Event::Reported(report));
         Ok(())
     }
-}
-
-/// The events of a change that the schedule admits.
-fn admitted_changes(
-    scheduler: &Scheduler,
-    change: ChangeSession,
-) -> Result<impl Iterator<Item = Event> + use<>, Status> {
-    let ChangeSession { session, views_per_set, frames_per_s, viewpoints } = change;
-    let views_per_set = views_per_set as usize;
-    if !scheduler.has_session(session) {
-        return Err(Status::unavailable(format!("session_number: session {session} is still being opened")));
-    }
-    let admitted = scheduler.admits(session, views_per_set, frames_per_s, viewpoints.as_deref());
-    admitted.map_err(|error| refusal(&error))?;
-    let demand = Event::DemandChanged { session, views_per_set, frames_per_s };
-    let viewpoints = viewpoints.map(|viewpoints| Event::ViewpointsChanged { session, viewpoints });
-    Ok([demand].into_iter().chain(viewpoints))
 }

@@ -22,28 +22,21 @@ pub(crate) fn budgeted(
     let own = request.budget.budget.as_deref().map(str::parse::<Budget>).transpose();
     let own = own.map_err(|error| Status::invalid_argument(format!("budget: {error}")))?;
     let Some(budget) = own.or(config.budget) else { return Ok(None) };
-    if !workload.common_cells.is_empty() {
-        return match own {
-            None => Ok(None),
-            Some(_) => Err(Status::invalid_argument(
-                "budget: none can be kept for mirrors that show the scene, and beside a base",
-            )),
-        };
-    }
-    if workload.samples_cube() {
-        return match own {
-            None => Ok(None),
-            Some(_) => Err(Status::invalid_argument("budget: none can be kept for a layered cube")),
-        };
-    }
     let has_own = offer.keeps_cameras || !request.sample_cameras.is_empty();
     let keeps_cameras = has_own && request.viewpoints.is_empty();
     let rows = rows(request, offer, keeps_cameras.then_some(workload.sample_cameras.len() as u32));
-    let Some(first) = workload.sample_cameras.first().filter(|_| !rows.is_empty()) else {
-        return match own {
-            None => Ok(None),
-            Some(_) => Err(Status::invalid_argument("budget: the session's own choices leave no representation")),
-        };
+    let first = match workload.sample_cameras.first() {
+        _ if !workload.common_cells.is_empty() => {
+            Err("budget: none can be kept for mirrors that show the scene, and beside a base")
+        }
+        _ if workload.samples_cube() => Err("budget: none can be kept for a layered cube"),
+        Some(first) if !rows.is_empty() => Ok(first),
+        _ => Err("budget: the session's own choices leave no representation"),
+    };
+    let first = match first {
+        Ok(first) => first,
+        Err(reason) if own.is_some() => return Err(Status::invalid_argument(reason)),
+        Err(_) => return Ok(None),
     };
     let screening = (config.screening_light)(&workload.lighting);
     let budgeted = Budgeted {
@@ -88,12 +81,9 @@ fn with_method(rows: Vec<Row>, method: &str) -> Vec<Row> {
     if rows.iter().any(|row| row.method == method) {
         return rows.into_iter().filter(|row| row.method == method).collect();
     }
-    let base = |text: &str| text.split(':').next().unwrap_or_default().to_owned();
-    let renamed = |row: Row| Row {
-        method: method.to_owned(),
-        kind: format!("{} {}", base(&row.sampling), base(method)),
-        rank: 0,
-        ..row
-    };
-    rows.into_iter().map(renamed).collect()
+    let renamed = rows.into_iter().map(|row| {
+        let [sampling, base] = [&row.sampling, method].map(|name| name.split(':').next().unwrap_or_default());
+        Row { method: method.to_owned(), kind: format!("{sampling} {base}"), rank: 0, ..row }
+    });
+    renamed.collect()
 }

@@ -6,16 +6,12 @@ use cluster::{Costs, MeasureCosts, Measured, SessionRequest, SessionStage, Share
 use depth_image::{SampleCamera, ToneMapping, ViewPlanes};
 use tonic::Status;
 
-use crate::grpc_status::refusal;
-use crate::measuring::{known, measured_on_present_nodes, send_progress};
+use crate::measuring::{known, known_or_measured, send_progress};
 use crate::schedule::{Budgeted, Event, MEASURED_BATCH, Opening, PolicyOverride};
 use crate::session_budget::budgeted;
 use crate::sessions::EventSender;
 use crate::shared::Shared;
-use crate::workload::{LightDensity, chooses_light_density, workload_of};
-
-/// The longest time of a device for a set of light in full density.
-const LONGEST_LIGHT_SET_S: f64 = 10.0;
+use crate::workload::{FULL_LIGHT_DENSITY, chooses_light_density, light_density_for_set, workload_of};
 
 /// Measures the costs of a session, and hands it to the schedule; its plans come through `events`, as do refusals.
 pub(crate) async fn open(shared: Arc<Shared>, session: u64, request: SessionRequest, events: EventSender) {
@@ -43,12 +39,12 @@ async fn measured_opening(
     events: &EventSender,
 ) -> Result<Opening, Status> {
     let offer = shared.offers.find(request.scene.as_deref())?;
-    let mut workload = workload_of(&request, offer, LightDensity::FULL)?;
+    let mut workload = workload_of(&request, offer, FULL_LIGHT_DENSITY)?;
     let budgeted = budgeted(&request, &workload, offer, &shared.config)?;
     let mut measured = measured_workload(shared, &request, &workload, budgeted.as_ref(), events).await?;
     let full_set_s = measured.costs.sample_image_s * workload.of_one_view().view_camera_count() as f64;
-    let density = LightDensity::for_set(full_set_s, LONGEST_LIGHT_SET_S);
-    let is_coarser = density != LightDensity::FULL && chooses_light_density(&request, offer);
+    let density = light_density_for_set(full_set_s);
+    let is_coarser = density != FULL_LIGHT_DENSITY && chooses_light_density(&request, offer);
     if is_coarser {
         workload = workload_of(&request, offer, density)?;
         measured = measured_workload(shared, &request, &workload, budgeted.as_ref(), events).await?;
@@ -81,7 +77,9 @@ async fn measured_opening(
     })
 }
 
-/// The costs of a workload, once it is admitted.
+/// The costs of a workload, once it is admitted: known ones, else they are measured, one session at a time. A session that
+/// would not be admitted is not measured for. A measurement that was begun ends, and its costs are kept, though its client
+/// may leave meanwhile.
 async fn measured_workload(
     shared: &Arc<Shared>,
     request: &SessionRequest,
@@ -101,13 +99,22 @@ async fn measured_workload(
         in_background: false,
         budget: None,
     };
-    let admits = || {
-        let follows_viewers = !request.viewpoints.is_empty() && !workload.samples_cube();
-        let admitted =
-            shared.with_scheduler(|scheduler| scheduler.admits_workload(workload, budgeted, follows_viewers));
-        admitted.map_err(|error| refusal(&error))
-    };
-    costs_of(shared, measurement, events, admits).await
+    let follows_viewers = !request.viewpoints.is_empty() && !workload.samples_cube();
+    let admits = || shared.with_scheduler(|scheduler| scheduler.admits_workload(workload, budgeted, follows_viewers));
+    admits()?;
+    if let Some(known) = known(shared, &measurement) {
+        return Ok(known);
+    }
+    let one = shared.measuring.clone().lock_owned().await;
+    // Others have opened their workloads meanwhile, or measured the same.
+    admits()?;
+    let shared = shared.clone();
+    let events = events.clone();
+    let measuring = tokio::spawn(async move {
+        let _one = one;
+        known_or_measured(&shared, &measurement, &events).await
+    });
+    measuring.await.map_err(|error| Status::internal(format!("measuring failed: {error}")))?
 }
 
 /// The time of a view at the last fallback over that of one as it is asked for: light has the lowest quality there. 1 where the parts
@@ -127,31 +134,4 @@ fn density_note(workload: &Workload, request: &SessionRequest, full_set_s: f64) 
     format!(
         " Samples have {density:.2} times the density of views: in full density a set would take {full_set_s:.0} s."
     )
-}
-
-/// Known costs; else they are measured, one session at a time. A session that would not be admitted is not measured for.
-/// A measurement that was begun ends, and its costs are kept, though its client may leave meanwhile.
-async fn costs_of(
-    shared: &Arc<Shared>,
-    measurement: MeasureCosts,
-    events: &EventSender,
-    admits: impl Fn() -> Result<(), Status>,
-) -> Result<Measured, Status> {
-    admits()?;
-    if let Some(known) = known(shared, &measurement) {
-        return Ok(known);
-    }
-    let one = shared.measuring.clone().lock_owned().await;
-    // Others have opened their workloads meanwhile, or measured the same.
-    admits()?;
-    let shared = shared.clone();
-    let events = events.clone();
-    let measuring = tokio::spawn(async move {
-        let _one = one;
-        match known(&shared, &measurement) {
-            Some(known) => Ok(known),
-            None => measured_on_present_nodes(&shared, &measurement, &events).await,
-        }
-    });
-    measuring.await.map_err(|error| Status::internal(format!("measuring failed: {error}")))?
 }

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use cluster::{ClusterStatus, SessionEvent};
+use cluster::{ChangeSession, ClusterStatus, SessionEvent};
 use node::Connections;
 use parking_lot::Mutex;
 use tokio::sync::Notify;
+use tonic::Status;
 
 use crate::config::{CoordinatorConfig, SceneOffers};
 use crate::cost_table::CostTable;
@@ -61,13 +62,19 @@ impl Shared {
         self.step_locked(&mut self.schedule.lock(), event);
     }
 
-    /// Tells the schedule the events that follow from its state. No other event comes in between.
-    pub(crate) fn step_with<E, I: IntoIterator<Item = Event>>(
-        &self,
-        events: impl FnOnce(&Scheduler) -> Result<I, E>,
-    ) -> Result<(), E> {
+    /// Tells the schedule a change, where it admits the change. No other event comes in between.
+    pub(crate) fn change_session(&self, change: ChangeSession) -> Result<(), Status> {
+        let ChangeSession { session, views_per_set, frames_per_s, viewpoints } = change;
+        let views_per_set = views_per_set as usize;
         let mut schedule = self.schedule.lock();
-        events(&schedule.0)?.into_iter().for_each(|event| self.step_locked(&mut schedule, event));
+        if !schedule.0.has_session(session) {
+            return Err(Status::unavailable(format!("session_number: session {session} is still being opened")));
+        }
+        schedule.0.admits(session, views_per_set, frames_per_s, viewpoints.as_deref())?;
+        self.step_locked(&mut schedule, Event::DemandChanged { session, views_per_set, frames_per_s });
+        if let Some(viewpoints) = viewpoints {
+            self.step_locked(&mut schedule, Event::ViewpointsChanged { session, viewpoints });
+        }
         Ok(())
     }
 
@@ -80,7 +87,8 @@ impl Shared {
         if is_tick || !commands.is_empty() {
             observers.metrics.show(&scheduler.status(), &commands);
         }
-        self.commands.push(commands);
+        self.commands.waiting.lock().extend(commands);
+        self.commands.added.notify_one();
     }
 
     /// Reads the schedule.
@@ -113,11 +121,6 @@ pub(crate) struct CommandQueue {
 }
 
 impl CommandQueue {
-    fn push(&self, commands: Vec<Command>) {
-        self.waiting.lock().extend(commands);
-        self.added.notify_one();
-    }
-
     pub(crate) async fn next(&self) -> Command {
         loop {
             let next = self.waiting.lock().pop_front();

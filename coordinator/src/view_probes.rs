@@ -14,7 +14,7 @@ use tonic::{Code, Status};
 use wire::rpc::NodeClient;
 
 use crate::grpc_status::{of_node, within};
-use crate::measuring::{known, measured_on_present_nodes};
+use crate::measuring::known_or_measured;
 use crate::schedule::{Event, ViewProbe, view_errors};
 use crate::shared::Shared;
 
@@ -31,8 +31,7 @@ pub(crate) async fn recall(shared: Arc<Shared>, workload_number: u64, key: KeptK
     let nothing = Kept::empty(key.clone());
     let found = blocking(move || {
         let kept = store.map(|store| store.read(&key));
-        let is_small = |kept: &Kept| kept.to_json().is_ok_and(|json| json.len() <= MOST_RECALLED_BYTES);
-        Ok::<_, Status>(kept.filter(is_small))
+        Ok::<_, Status>(kept.filter(|kept| kept.to_json().is_ok_and(|json| json.len() <= MOST_RECALLED_BYTES)))
     });
     let _one = shared.keeping.lock().await;
     let kept = found.await.ok().flatten().unwrap_or(nothing);
@@ -62,14 +61,16 @@ pub(crate) async fn probe_views(shared: Arc<Shared>, probe: ViewProbe) {
     let answer = asking.await.unwrap_or_else(|error| Err(Status::unavailable(error.to_string())));
     match answer {
         Ok(event) => planned(&shared, workload_number, event),
-        Err(status) if is_refusal(&status) => {
-            let reason = shortened_reason(status.message());
-            let busy_s = start.elapsed().as_secs_f64();
-            planned(&shared, workload_number, PlannerEvent::Failed { id, reason, busy_s });
-        }
         Err(status) => {
             let reason = shortened_reason(status.message());
-            shared.step(Event::ProbeLost { workload_number, id, reason });
+            let busy_s = start.elapsed().as_secs_f64();
+            match status.code() {
+                // The node answered, and would answer the same again.
+                Code::InvalidArgument | Code::Unimplemented | Code::OutOfRange => {
+                    planned(&shared, workload_number, PlannerEvent::Failed { id, reason, busy_s });
+                }
+                _ => shared.step(Event::ProbeLost { workload_number, id, reason }),
+            }
         }
     }
 }
@@ -78,11 +79,7 @@ pub(crate) async fn probe_views(shared: Arc<Shared>, probe: ViewProbe) {
 pub(crate) async fn represent(shared: Arc<Shared>, workload_number: u64, choice: u64, measurement: MeasureCosts) {
     // Nobody reads how the measuring goes on.
     let (events, _progress) = mpsc::channel(1);
-    let measured = match known(&shared, &measurement) {
-        Some(known) => Ok(known),
-        None => measured_on_present_nodes(&shared, &measurement, &events).await,
-    };
-    match measured {
+    match known_or_measured(&shared, &measurement, &events).await {
         Ok(measured) => {
             let costs = measured.costs;
             let planes = measured.planes;
@@ -109,10 +106,12 @@ async fn probed(shared: &Shared, probe: ViewProbe) -> Result<PlannerEvent, Statu
         }
     }
     let busy_s = answers.iter().flatten().map(|answer| answer.busy_s).sum();
-    let costs = |answers: &[Measured]| median_costs(&answers.iter().map(row_costs).collect::<Vec<_>>());
     if views.is_empty() {
-        let rows = requests.iter().zip(&answers).map(|((row, _), answers)| (*row, costs(answers))).collect();
-        return Ok(check(id, PlannerEvent::Timed(Timed { id, rows, busy_s })));
+        let rows = requests.iter().zip(&answers).map(|((row, _), answers)| {
+            let costs: Vec<RowCosts> = answers.iter().map(row_costs).collect();
+            (*row, median_costs(&costs))
+        });
+        return Ok(check(id, PlannerEvent::Timed(Timed { id, rows: rows.collect(), busy_s })));
     }
     let (Some((row, _)), Some([answer])) = (requests.first(), answers.first().map(Vec::as_slice)) else {
         return Err(Status::out_of_range("a comparison is of one row"));
@@ -127,11 +126,9 @@ async fn ask(node: &NodeClient, request: &MeasureCosts, address: &str) -> Result
     let answer = answer.map_err(|status| of_node(address, &status))?;
     let is_compared = request.budget.as_ref().is_some_and(|budget| budget.compared_lighting.is_some());
     let wanted = if is_compared { request.typical_views.len() } else { 0 };
-    match answer.views.len() == wanted {
-        true => Ok(answer),
-        false => {
-            Err(Status::out_of_range(format!("{address} has compared {} views, not {wanted}", answer.views.len())))
-        }
+    match answer.views.len() {
+        count if count == wanted => Ok(answer),
+        count => Err(Status::out_of_range(format!("{address} has compared {count} views, not {wanted}"))),
     }
 }
 
@@ -141,11 +138,6 @@ fn check(id: ProbeId, event: PlannerEvent) -> PlannerEvent {
         Ok(()) => event,
         Err(error) => PlannerEvent::Failed { id, reason: shortened_reason(&error.to_string()), busy_s: 0.0 },
     }
-}
-
-/// Whether the node answered, and would answer the same again.
-fn is_refusal(status: &Status) -> bool {
-    [Code::InvalidArgument, Code::Unimplemented, Code::OutOfRange].contains(&status.code())
 }
 
 fn row_costs(answer: &Measured) -> RowCosts {

@@ -2,12 +2,11 @@
 
 use cluster::limits::{MAX_CELLS, MAX_TILES};
 use cluster::{CommonCell, DIRECT, SamplePlanes, SessionRequest, Workload};
-use depth_image::{Aabb, Camera, CubeGrid, PinholeCamera, SampleCamera, ViewGroup};
+use depth_image::{Aabb, Camera, PinholeCamera, SampleCamera, ViewGroup};
 use glam::UVec2;
 use tonic::Status;
 
-use crate::config::{OfferedCube, OfferedMirror, SceneOffer};
-use crate::grpc_status::refusal;
+use crate::config::{OfferedCube, SceneOffer};
 use crate::schedule::ChoiceError;
 
 /// Texels of a sample image a pixel of a view, each way: what brings most for its cost (docs/benchmarks.md).
@@ -23,21 +22,17 @@ const MIRRORS_DENSITY: f32 = 4.4;
 /// Steps of √2 by which images are smaller than the offered ones at most.
 const LEAST_STEPS: f32 = -2.0;
 
-/// Texels of an image of light a pixel of a view, each way.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LightDensity(f32);
+/// Texels of an image of light a pixel of a view, each way. Surfaces come from the scene: they need no finer samples.
+pub(crate) const FULL_LIGHT_DENSITY: f32 = 1.0;
+/// The longest time of a device for a set of light in full density.
+const LONGEST_LIGHT_SET_S: f64 = 10.0;
 
-impl LightDensity {
-    /// Surfaces come from the scene: they need no finer samples.
-    pub(crate) const FULL: Self = Self(1.0);
-
-    /// The finest of full, half and a quarter of the density in which a set takes at most so long, by its number of texels.
-    pub(crate) fn for_set(full_set_s: f64, longest_s: f64) -> Self {
-        match full_set_s / longest_s {
-            ratio if ratio <= 1.0 => Self::FULL,
-            ratio if ratio <= 4.0 => Self(0.5),
-            _ => Self(0.25),
-        }
+/// The finest of full, half and a quarter of the density in which a set does not take too long, by its number of texels.
+pub(crate) fn light_density_for_set(full_set_s: f64) -> f32 {
+    match full_set_s / LONGEST_LIGHT_SET_S {
+        ratio if ratio <= 1.0 => FULL_LIGHT_DENSITY,
+        ratio if ratio <= 4.0 => 0.5,
+        _ => 0.25,
     }
 }
 
@@ -49,7 +44,7 @@ impl LightDensity {
 pub(crate) fn workload_of(
     request: &SessionRequest,
     offer: &SceneOffer,
-    light_density: LightDensity,
+    light_density: f32,
 ) -> Result<Workload, Status> {
     let volume = request.volume.unwrap_or(offer.volume);
     let offered = offer.cube.as_ref().filter(|cube| cube.sampling == request.sampling);
@@ -82,7 +77,6 @@ pub(crate) fn workload_of(
     let workload = if cells.is_empty() { workload } else { workload.with_view_cells(cells) };
     let base = base_of(request, offer, &workload);
     let mirrors = mirrors_of(request, offer, &workload)?;
-    let base = base.map(|(cell, grid)| (cell.clone(), grid.cameras().map(SampleCamera::from).to_vec()));
     Ok(workload.with_common_cells(mirrors.into_iter().chain(base).collect()))
 }
 
@@ -116,8 +110,13 @@ fn sample_cameras_of(
     if cameras.is_empty() {
         return Err(Status::invalid_argument("sample_cameras is missing, and the scene came without a rig"));
     }
-    let sized = |camera: &Camera| size_px.map_or(Ok(*camera), |size_px| resized(camera, size_px));
-    cameras.iter().map(|camera| sized(camera).map(SampleCamera::Depth)).collect()
+    let mut cameras = cameras.clone();
+    if let Some(size_px) = size_px {
+        cameras.iter_mut().for_each(|camera| *camera = camera.resized(size_px));
+        let valid = cameras.iter().try_for_each(Camera::validate);
+        valid.map_err(|error| Status::invalid_argument(format!("sample_image_size: {error}")))?;
+    }
+    Ok(cameras.into_iter().map(SampleCamera::Depth).collect())
 }
 
 /// The scene's mirrors, where the session follows them, with images of about [`MIRROR_DENSITY`].
@@ -132,26 +131,27 @@ fn mirrors_of(
     }
     let image_texels = workload.sample_cameras.first().map_or(1, SampleCamera::pixel_count);
     let texels = image_texels as f32 * MIRROR_DENSITY.min(MIRRORS_DENSITY / offer.mirrors.len().max(1) as f32);
-    let sized = |mirror: &OfferedMirror| {
+    let mut mirrors = Vec::with_capacity(offer.mirrors.len());
+    for mirror in &offer.mirrors {
         let cameras = Camera::resized_together(&mirror.cameras, texels, MAX_TILES);
-        let checked = |camera: Camera| {
-            let usable = camera.validate().map(|()| SampleCamera::Depth(camera));
-            usable.map_err(|error| Status::internal(format!("mirrors of scene {}: {error}", offer.name)))
-        };
-        Ok((mirror.cell.clone(), cameras.into_iter().map(checked).collect::<Result<_, Status>>()?))
-    };
-    offer.mirrors.iter().map(sized).collect()
+        let valid = cameras.iter().try_for_each(Camera::validate);
+        valid.map_err(|error| Status::internal(format!("mirrors of scene {}: {error}", offer.name)))?;
+        mirrors.push((mirror.cell.clone(), cameras.into_iter().map(SampleCamera::Depth).collect()));
+    }
+    Ok(mirrors)
 }
 
 /// The scene's base, where the session is made from depth images of the whole scene that hold still.
-fn base_of<'o>(
+fn base_of(
     request: &SessionRequest,
-    offer: &'o SceneOffer,
+    offer: &SceneOffer,
     workload: &Workload,
-) -> Option<&'o (CommonCell, CubeGrid)> {
-    let is_suited = request.method != DIRECT && request.volume.is_none();
-    let is_suited = is_suited && !workload.samples_cube() && !workload.timeline.moves();
-    offer.base.as_ref().filter(|_| is_suited)
+) -> Option<(CommonCell, Vec<SampleCamera>)> {
+    if request.method == DIRECT || request.volume.is_some() || workload.samples_cube() || workload.timeline.moves() {
+        return None;
+    }
+    let (cell, grid) = offer.base.as_ref()?;
+    Some((cell.clone(), grid.cameras().map(SampleCamera::from).to_vec()))
 }
 
 /// The sample cameras of each view cell of the session's viewpoints, as if it were alone, in the size of the offered ones.
@@ -166,31 +166,34 @@ fn cells_of(
     let mut groups = Vec::new();
     ViewGroup::add(&mut groups, &request.viewpoints, volume);
     if groups.len() > MAX_CELLS {
-        return Err(refusal(&ChoiceError::Cells { cells: groups.len() }));
+        return Err(ChoiceError::Cells { cells: groups.len() }.into());
     }
-    let checked = |camera: PinholeCamera| {
-        let usable = camera.validate().map(|()| SampleCamera::from(camera));
-        usable.map_err(|error| Status::invalid_argument(format!("viewpoints: {error}")))
-    };
-    let cameras = |group: &ViewGroup| group.sample_cameras(size_px).into_iter().map(checked).collect();
-    groups.iter().map(cameras).collect()
+    let cells: Vec<Vec<PinholeCamera>> = groups.iter().map(|group| group.sample_cameras(size_px)).collect();
+    let valid = cells.iter().flatten().try_for_each(PinholeCamera::validate);
+    valid.map_err(|error| Status::invalid_argument(format!("viewpoints: {error}")))?;
+    Ok(cells.into_iter().map(|cell| cell.into_iter().map(SampleCamera::from).collect()).collect())
 }
 
 /// The size of a session's images; `None` where the offer's is fixed, or the session brings its own cameras.
-fn session_size_px(request: &SessionRequest, offer: &SceneOffer, light_density: LightDensity) -> Option<UVec2> {
-    let is_fitted = offer.fits_views && request.sample_cameras.is_empty();
+fn session_size_px(request: &SessionRequest, offer: &SceneOffer, light_density: f32) -> Option<UVec2> {
+    if !has_fitted_size(request, offer) {
+        return request.sample_size_px;
+    }
     let (density, most_texels) = match request.takes_light {
-        true => (light_density.0, MAX_LIGHT_TEXELS),
+        true => (light_density, MAX_LIGHT_TEXELS),
         false => (SAMPLE_DENSITY, MAX_FITTING_TEXELS),
     };
-    let fitting = || size_of_density(&offer.rig, &request.typical_view, density, most_texels).filter(|_| is_fitted);
-    request.sample_size_px.or_else(fitting)
+    size_of_density(&offer.rig, &request.typical_view, density, most_texels)
+}
+
+/// Whether the size of a session's images follows its views.
+fn has_fitted_size(request: &SessionRequest, offer: &SceneOffer) -> bool {
+    offer.fits_views && request.sample_cameras.is_empty() && request.sample_size_px.is_none()
 }
 
 /// Whether the density of a session's samples of light may be chosen.
 pub(crate) fn chooses_light_density(request: &SessionRequest, offer: &SceneOffer) -> bool {
-    let is_fitted = offer.fits_views && request.sample_cameras.is_empty() && request.sample_size_px.is_none();
-    request.takes_light && is_fitted
+    request.takes_light && has_fitted_size(request, offer)
 }
 
 /// The size of offered images that makes them about `SAMPLE_DENSITY` times as dense as a view. Sizes are whole steps of √2
@@ -207,13 +210,6 @@ fn size_of_density(rig: &[Camera], view: &PinholeCamera, density: f32, most_texe
     let steps = (2.0 * wanted.log2()).round().max(LEAST_STEPS).min(most);
     let size_px = (offered.size_px.as_vec2() * (0.5 * steps).exp2()).round();
     steps.is_finite().then(|| size_px.as_uvec2().max(UVec2::ONE))
-}
-
-/// The same field of view in another size.
-fn resized(camera: &Camera, size_px: UVec2) -> Result<Camera, Status> {
-    let camera = camera.resized(size_px);
-    camera.validate().map_err(|error| Status::invalid_argument(format!("sample_image_size: {error}")))?;
-    Ok(camera)
 }
 
 #[cfg(test)]
@@ -243,8 +239,7 @@ mod tests {
         assert!((1..=40).all(|cameras| texels(cameras).is_some_and(|texels| texels < MAX_FITTING_TEXELS + 4096)));
         assert_eq!(fitting_size_px(&[], &camera(4, 3)), None);
         assert_eq!(size_of_density(&rig, &camera(400, 300), 1.0, MAX_LIGHT_TEXELS), Some(UVec2::new(400, 300)));
-        let density = |set_s| LightDensity::for_set(set_s, 10.0).0;
-        assert_eq!([0.0, 10.0, 10.1, 40.0, 40.1, 900.0].map(density), [1.0, 1.0, 0.5, 0.5, 0.25, 0.25]);
+        assert_eq!([0.0, 10.0, 10.1, 40.0, 40.1, 900.0].map(light_density_for_set), [1.0, 1.0, 0.5, 0.5, 0.25, 0.25]);
         assert_eq!(size_of_density(&rig, &camera(800, 600), 0.5, MAX_LIGHT_TEXELS), Some(UVec2::new(400, 300)));
     }
 }

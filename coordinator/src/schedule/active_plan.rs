@@ -46,19 +46,9 @@ impl ActivePlan {
 
     /// Whether another plan would change nothing: neither the roles of nodes nor the quality of views.
     pub(super) fn is_like(&self, other: &SessionPlan) -> bool {
-        let rate = |plan: &SessionPlan| plan.frame_rate_ratio.to_bits();
-        self.plan.fallback == other.fallback && rate(&self.plan) == rate(other) && self.assigns(&other.assignment)
-    }
-
-    /// Whether another plan would give every node the same roles.
-    fn assigns(&self, other: &Assignment) -> bool {
-        // Weights of views follow every timing, and are no reason for a plan.
-        let roles = |plan: &Assignment| {
-            let mut plan = Assignment { plan_epoch: 0, ..plan.clone() };
-            plan.compositors.iter_mut().for_each(|share| share.view_weight = 0);
-            plan
-        };
-        roles(&self.plan.assignment) == roles(other)
+        self.plan.fallback == other.fallback
+            && self.plan.frame_rate_ratio.to_bits() == other.frame_rate_ratio.to_bits()
+            && roles(&self.plan.assignment) == roles(&other.assignment)
     }
 
     pub(super) fn policy(&self) -> Policy {
@@ -99,4 +89,11 @@ impl ActivePlan {
         let sets = self.views as f64 / views_per_set.max(1) as f64;
         (sets >= 1.0).then(|| AchievedTime { policy: self.policy(), busy_s: busiest_s / sets })
     }
+}
+
+/// The roles of all nodes. Weights of views follow every timing, and are no reason for a plan.
+fn roles(plan: &Assignment) -> Assignment {
+    let mut roles = Assignment { plan_epoch: 0, ..plan.clone() };
+    roles.compositors.iter_mut().for_each(|share| share.view_weight = 0);
+    roles
 }

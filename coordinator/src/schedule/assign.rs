@@ -3,7 +3,7 @@
 use cluster::{Assignment, CompositorShare, NodeStatus, Policy, SamplerShare, Workload};
 
 use super::makespan::distribute;
-use super::prediction::relay_fanout;
+use super::prediction::{by_role, pipeline_links};
 use super::{Choice, Load, NodeCosts};
 
 /// Weights are found by distributing this many views at least: of fewer, some nodes would get none.
@@ -31,16 +31,17 @@ pub(super) fn assignment(
     choice: &Choice,
     nodes: &[Candidate<'_>],
 ) -> Assignment {
-    let with_role = |sampling: bool| -> Vec<Candidate<'_>> {
-        nodes.iter().zip(&choice.division.samples).filter(|(_, s)| **s == sampling).map(|(node, _)| *node).collect()
+    let [sampling, compositing] = match choice.policy {
+        Policy::Direct => [Vec::new(), nodes.to_vec()],
+        Policy::Pipeline if nodes.len() > 1 => by_role(nodes, &choice.division.samples),
+        Policy::Pipeline | Policy::TimeShare => [nodes.to_vec(), nodes.to_vec()],
     };
-    let (sampling, compositing) = match choice.policy {
-        Policy::Direct => (Vec::new(), nodes.to_vec()),
-        Policy::TimeShare => (nodes.to_vec(), nodes.to_vec()),
-        Policy::Pipeline if nodes.len() == 1 => (nodes.to_vec(), nodes.to_vec()),
-        Policy::Pipeline => (with_role(true), with_role(false)),
+    let relay_fanout = match choice.policy {
+        Policy::Pipeline => {
+            pipeline_links(&choice.load, &Candidate::costs(nodes), &choice.division.samples).best().fanout
+        }
+        Policy::Direct | Policy::TimeShare => None,
     };
-    let relays = choice.policy == Policy::Pipeline && nodes.len() > 1;
     Assignment {
         plan_epoch,
         workload_number,
@@ -49,11 +50,7 @@ pub(super) fn assignment(
         samplers: sampler_shares(&choice.load, &sampling),
         compositors: compositor_shares(choice, &compositing),
         tile_count: choice.load.tiles as u32,
-        relay_fanout: if relays {
-            relay_fanout(&choice.load, &Candidate::costs(nodes), &choice.division.samples)
-        } else {
-            None
-        },
+        relay_fanout,
         method: None,
         audit: None,
     }
@@ -63,12 +60,12 @@ pub(super) fn assignment(
 fn compositor_shares(choice: &Choice, compositing: &[Candidate<'_>]) -> Vec<CompositorShare> {
     let workers = choice.load.view_workers(choice.policy, &Candidate::costs(compositing));
     let weights = distribute(choice.load.views.max(LEAST_VIEWS), &workers);
-    let share = |(candidate, weight): (&Candidate<'_>, usize)| CompositorShare {
+    let shares = compositing.iter().zip(weights).map(|(candidate, weight)| CompositorShare {
         node_name: candidate.node.node_name.clone(),
         address: candidate.node.address.clone(),
         view_weight: u32::try_from(weight).unwrap_or(u32::MAX),
-    };
-    compositing.iter().zip(weights).map(share).collect()
+    });
+    shares.collect()
 }
 
 /// Nodes without an image get no share: no compositor would ask them.
@@ -76,16 +73,20 @@ fn sampler_shares(load: &Load, sampling: &[Candidate<'_>]) -> Vec<SamplerShare> 
     let costs = Candidate::costs(sampling);
     let counts = load.part_counts(&costs);
     let mean = NodeCosts::mean(&costs);
-    let part_s = |part: usize| mean.sample_this_tile_s(part % load.tiles, load.tiles);
-    let parts_s: Vec<f64> = (0..load.parts()).map(part_s).collect();
-    let images =
-        if load.images_are_sequential { share_sets(load.images, &counts) } else { share_images(&counts, &parts_s) };
-    let share = |(candidate, image_indices): (&Candidate<'_>, Vec<u32>)| SamplerShare {
+    let parts_s: Vec<f64> =
+        (0..load.parts()).map(|part| mean.sample_this_tile_s(part % load.tiles, load.tiles)).collect();
+    let images = match load.images_are_sequential {
+        // All images for each node that has any; these nodes then sample sets in turn.
+        true => counts.iter().map(|&count| (0..load.images.min(count) as u32).collect()).collect(),
+        false => share_images(&counts, &parts_s),
+    };
+    let with_images = sampling.iter().zip(images).filter(|(_, image_indices)| !image_indices.is_empty());
+    let shares = with_images.map(|(candidate, image_indices)| SamplerShare {
         node_name: candidate.node.node_name.clone(),
         address: candidate.node.address.clone(),
         image_indices,
-    };
-    sampling.iter().zip(images).map(share).filter(|share| !share.image_indices.is_empty()).collect()
+    });
+    shares.collect()
 }
 
 /// `counts[i]` images, or tiles, for node i: the most expensive first, each to the node with the least work for its count.
@@ -102,11 +103,6 @@ fn share_images(counts: &[usize], images_s: &[f64]) -> Vec<Vec<u32>> {
     }
     shares.iter_mut().for_each(|(_, share)| share.sort_unstable());
     shares.into_iter().map(|(_, share)| share).collect()
-}
-
-/// All images for each node that has any; these nodes then sample sets in turn.
-fn share_sets(images: usize, counts: &[usize]) -> Vec<Vec<u32>> {
-    counts.iter().map(|&count| (0..images.min(count) as u32).collect()).collect()
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cluster::{BudgetMeasurement, InvalidField, MeasureCosts, SceneHash, Workload};
-use depth_image::{Antialias, PinholeCamera, ViewCell, ViewPlanes};
+use depth_image::{PinholeCamera, ViewCell, ViewPlanes};
 use glam::{DVec3, Vec3};
 use planner::{
     Budget, Choice, Command as PlannerCommand, Event as PlannerEvent, Kept, KeptKey, Outcome, PlanRequest, Planner,
@@ -40,7 +40,7 @@ pub(super) struct BudgetPlan {
     pub(super) began: Duration,
     /// The result, once there is one.
     pub(super) outcome: Option<Outcome>,
-    budgeted: Budgeted,
+    pub(super) budgeted: Budgeted,
     /// The workload as sessions ask for it, the cells that are planned for, and V of all sessions.
     workload: Workload,
     cells: Vec<ViewCell>,
@@ -86,8 +86,7 @@ impl BudgetPlan {
         device_name: &str,
         poses: Vec<PinholeCamera>,
     ) -> Result<Self, InvalidField> {
-        let missing = || InvalidField::Missing { field: "budget" };
-        let budgeted = workload.budgeted.clone().ok_or_else(missing)?;
+        let budgeted = workload.first.budgeted.clone().ok_or(InvalidField::Missing { field: "budget" })?;
         let cells = workload.planned_cells();
         if cells.is_empty() {
             return Err(InvalidField::Missing { field: "viewpoints" });
@@ -146,16 +145,6 @@ impl BudgetPlan {
             Some(Certified { row: self.row(choice)?.clone(), choice, price, certificate })
         });
         Some(Chosen { number: self.number, budget: self.budget, row, outcome, certified: certified.collect() })
-    }
-
-    /// A view of the usual size.
-    pub(super) fn planned_pixels(&self) -> usize {
-        self.budgeted.typical_view.pixel_count()
-    }
-
-    /// Samples a pixel.
-    pub(super) fn antialias(&self) -> Antialias {
-        self.budgeted.antialias()
     }
 
     /// The shortest side of a view cell that has one, in m; 0 for a cell that is a point.
@@ -266,8 +255,8 @@ impl BudgetPlan {
             }
             PlannerCommand::Time { id, rows, view_count, repeats } => {
                 let views: Vec<ProbeView> = (0..*view_count as u32).map(ProbeView::Screening).collect();
-                let request = |&row: &usize| Some((row, self.request(row, &views, None)?));
-                let requests = rows.iter().map(request).collect::<Option<Vec<_>>>()?;
+                let requests = rows.iter().map(|&row| Some((row, self.request(row, &views, None)?)));
+                let requests = requests.collect::<Option<Vec<_>>>()?;
                 let id = *id;
                 let views = Vec::new();
                 let repeats = *repeats;
@@ -389,7 +378,6 @@ pub(super) fn answered(event: &PlannerEvent) -> Option<(ProbeId, f64)> {
 
 /// The name of the measurements that a plan may use.
 fn key(budgeted: &Budgeted, workload: &Workload, cells: &[ViewCell], poses: &[PinholeCamera]) -> KeptKey {
-    let hash = |text: String| SceneHash::of(text.as_bytes()).to_string();
     let Budgeted { rows, whole_px, keeps_cameras, typical_view, antialias_samples, screening_lighting, .. } = budgeted;
     let light = format!(
         "{}; screened in {screening_lighting}; at {} s; {:?}; {:?}",
@@ -400,9 +388,13 @@ fn key(budgeted: &Budgeted, workload: &Workload, cells: &[ViewCell], poses: &[Pi
     let [width_px, height_px] = typical_view.size_px.to_array();
     KeptKey {
         scene: workload.scene.hash.to_string(),
-        cell: hash(format!("{cells:?} {:?} {:?}{audited}", typical_view.focal_px, workload.volume)),
-        lighting: hash(light),
+        cell: hashed(&format!("{cells:?} {:?} {:?}{audited}", typical_view.focal_px, workload.volume)),
+        lighting: hashed(&light),
         view_size: format!("{width_px}x{height_px}, {antialias_samples} samples a pixel"),
-        ladder_version: hash(format!("{rows:?} {whole_px} {cameras:?}")),
+        ladder_version: hashed(&format!("{rows:?} {whole_px} {cameras:?}")),
     }
+}
+
+fn hashed(text: &str) -> String {
+    SceneHash::of(text.as_bytes()).to_string()
 }

@@ -82,7 +82,7 @@ impl BudgetState {
 
     /// Whether the plan began before the last promise was broken: it does not know the audited viewpoints.
     pub(super) fn is_superseded(&self) -> bool {
-        self.findings.is_given_up || self.findings.last_break().is_some_and(|at| self.plan.began < at)
+        self.findings.is_given_up || self.findings.breaks.last().is_some_and(|at| self.plan.began < *at)
     }
 
     /// The choice in force, chosen again. Its audits go on, unless its promise is broken or another.
@@ -97,11 +97,10 @@ impl BudgetState {
 
     /// The broken promise, until another choice is in force and applied.
     pub(super) fn broken(&self) -> Option<&Broken> {
-        let is_replaced = |broken: &&Broken| {
+        self.findings.broken.as_ref().filter(|broken| {
             let other = self.in_force.as_ref().filter(|in_force| in_force.chosen.number != broken.choice_number);
-            other.is_some_and(|in_force| in_force.is_applied)
-        };
-        self.findings.broken.as_ref().filter(|broken| !is_replaced(broken))
+            other.is_none_or(|in_force| !in_force.is_applied)
+        })
     }
 }
 

@@ -31,15 +31,10 @@ impl Budgeted {
     /// Whether sessions with comparable budgets can share a representation: they choose among the same, for views of about
     /// one size.
     pub(super) fn is_shareable(&self, other: &Self) -> bool {
-        let of_any_view = |of: &Self| Self {
-            budget: self.budget,
-            typical_view: self.typical_view,
-            codec: self.codec.clone(),
-            ..of.clone()
-        };
-        let pixels = |of: &Self| of.typical_view.pixel_count() as f64;
-        let is_of_size = (MOST_PLANNED_PIXELS.recip()..=MOST_PLANNED_PIXELS).contains(&(pixels(other) / pixels(self)));
-        of_any_view(self) == of_any_view(other) && is_of_size
+        let pixels_ratio = other.typical_view.pixel_count() as f64 / self.typical_view.pixel_count() as f64;
+        let with_own_views =
+            Self { budget: self.budget, typical_view: self.typical_view, codec: self.codec.clone(), ..other.clone() };
+        *self == with_own_views && (MOST_PLANNED_PIXELS.recip()..=MOST_PLANNED_PIXELS).contains(&pixels_ratio)
     }
 
     pub(super) fn ladder(&self) -> Result<Ladder, InvalidField> {
@@ -52,11 +47,12 @@ impl Budgeted {
 
     /// The workload as a row samples it, in these view cells.
     pub(super) fn sampled_as(&self, row: &Row, workload: &Workload, cells: &[ViewCell]) -> Workload {
-        let resized = |camera: &SampleCamera| camera.resized(row.size_px(camera.size_px()));
-        let of_cell = |cell| row.cameras(cell, self.whole_px).into_iter().map(SampleCamera::from).collect();
-        let cameras: Vec<Vec<SampleCamera>> = match self.keeps_cameras {
-            true => vec![workload.sample_cameras.iter().map(resized).collect()],
-            false => cells.iter().map(of_cell).collect(),
+        let cameras: Vec<Vec<SampleCamera>> = if self.keeps_cameras {
+            let own = workload.sample_cameras.iter();
+            vec![own.map(|camera| camera.resized(row.size_px(camera.size_px()))).collect()]
+        } else {
+            let of_cells = cells.iter().map(|cell| row.cameras(cell, self.whole_px));
+            of_cells.map(|cameras| cameras.into_iter().map(SampleCamera::from).collect()).collect()
         };
         let workload = Workload { sampling: row.sampling.clone(), ..workload.clone() };
         match workload.cell_first_indices.is_empty() {

@@ -32,12 +32,11 @@ impl Cells {
 
     /// Adapts the cells to the viewpoints that sessions have declared, and to those of live viewers as far as there is room.
     pub(super) fn follow(&mut self, declared: &[PinholeCamera], live: &[PinholeCamera], scene: &Aabb) {
-        let serves = |group: &ViewGroup, views: &[PinholeCamera]| views.iter().any(|view| group.serves(view, scene));
-        self.groups.retain(|group| serves(group, declared) || serves(group, live));
+        self.groups.retain(|group| serves_any(group, declared, scene) || serves_any(group, live, scene));
         ViewGroup::add(&mut self.groups, declared, scene);
         ViewGroup::add(&mut self.groups, live, scene);
         for i in (0..self.groups.len()).rev() {
-            if self.groups.len() > MAX_CELLS && !serves(&self.groups[i], declared) {
+            if self.groups.len() > MAX_CELLS && !serves_any(&self.groups[i], declared, scene) {
                 self.groups.remove(i);
             }
         }
@@ -46,22 +45,25 @@ impl Cells {
     /// Gives the workload the cameras of these cells, up to the limit of a plan. Views of further cells are made from
     /// the nearest.
     pub(super) fn place_cameras(&self, workload: &mut Workload) {
-        let cameras = |group: &ViewGroup| group.sample_cameras(self.size_px);
-        let usable = |cameras: &Vec<PinholeCamera>| cameras.iter().all(|camera| camera.validate().is_ok());
-        let cells: Vec<_> = self.groups.iter().map(cameras).filter(usable).take(MAX_CELLS).collect();
-        let cameras = |cell: Vec<PinholeCamera>| cell.into_iter().map(SampleCamera::from).collect();
-        *workload = workload.clone().with_view_cells(cells.into_iter().map(cameras).collect());
+        let cells = self.groups.iter().map(|group| group.sample_cameras(self.size_px));
+        let usable = cells.filter(|cameras| cameras.iter().all(|camera| camera.validate().is_ok())).take(MAX_CELLS);
+        let cells = usable.map(|cameras| cameras.into_iter().map(SampleCamera::from).collect());
+        *workload = workload.clone().with_view_cells(cells.collect());
     }
 
     /// Whether sessions of two workloads can share cells.
     pub(super) fn are_shareable(&self, own: &Workload, other: &Workload) -> bool {
-        let alike = |workload: &Workload| Workload {
-            sample_cameras: Vec::new(),
-            cell_first_indices: Vec::new(),
-            ..workload.clone()
+        let with_own_cameras = Workload {
+            sample_cameras: own.sample_cameras.clone(),
+            cell_first_indices: own.cell_first_indices.clone(),
+            ..other.clone()
         };
-        self.size_px == sample_size_px(other) && alike(own) == alike(other)
+        self.size_px == sample_size_px(other) && *own == with_own_cameras
     }
+}
+
+fn serves_any(group: &ViewGroup, views: &[PinholeCamera], scene: &Aabb) -> bool {
+    views.iter().any(|view| group.serves(view, scene))
 }
 
 fn sample_size_px(workload: &Workload) -> UVec2 {

@@ -20,14 +20,13 @@ pub(super) const WORTH: f64 = 1.1;
 /// Without nodes, or for an override that is impossible.
 pub fn choose(demand: &Demand<'_>) -> Result<Choice, ChoiceError> {
     check(demand)?;
-    let tiled = |tiles: usize| Demand { load: demand.load.tiled(tiles), ..*demand };
     let counts = tile_counts(demand);
     let tiles = match counts[..] {
         [only] => only,
         // Moves of single nodes decide nothing here, and cost most.
-        _ => best_tiles(demand, counts.into_iter().map(|tiles| choose_tiled(&tiled(tiles), false)).collect()),
+        _ => best_tiles(demand, counts.into_iter().map(|tiles| choose_tiled(demand, tiles, false)).collect()),
     };
-    Ok(choose_tiled(&tiled(tiles), true))
+    Ok(choose_tiled(demand, tiles, true))
 }
 
 /// The present number of tiles, or else the least, where that is not clearly slower than the best.
@@ -44,8 +43,8 @@ fn tile_counts(demand: &Demand<'_>) -> Vec<usize> {
         None if demand.load.is_already_sampled || !is_tileable(demand) => vec![1],
         // More than two tiles for every node would only add overhead.
         None => {
-            let useful = |tiles: &usize| *tiles == 1 || demand.load.images * tiles < 4 * demand.nodes.len();
-            TILES.into_iter().filter(useful).collect()
+            let most = 4 * demand.nodes.len();
+            TILES.into_iter().filter(|tiles| *tiles == 1 || demand.load.images * tiles < most).collect()
         }
     }
 }
@@ -54,8 +53,9 @@ fn is_tileable(demand: &Demand<'_>) -> bool {
     !demand.load.images_are_sequential && NodeCosts::mean(demand.nodes).tiles.is_some()
 }
 
-/// The choice for the load's number of tiles.
-fn choose_tiled(demand: &Demand<'_>, moves: bool) -> Choice {
+/// The choice for a number of tiles of each image.
+fn choose_tiled(demand: &Demand<'_>, tiles: usize, moves: bool) -> Choice {
+    let demand = &Demand { load: demand.load.tiled(tiles), ..*demand };
     let Demand { load, nodes, .. } = demand;
     let sampled = demand.current.map_or(&[][..], |current| &current.samples);
     let order = order(nodes, sampled);
@@ -130,11 +130,11 @@ fn divide(demand: &Demand<'_>, order: &[usize], k_fd: &Division, enumerated: &Di
     };
     let pipeline = current.filter(|current| current.policy == Policy::Pipeline);
     let now = pipeline.map(|current| Division::new(load, nodes, current.samples.clone()));
-    let possible = |now: &Division| match policy_override.forced_samplers {
+    let possible = now.filter(|now| match policy_override.forced_samplers {
         Some(forced) => now.sampler_count() == forced,
         None => (1..=load.most_samplers(nodes.len())).contains(&now.sampler_count()),
-    };
-    now.filter(|now| possible(now) && now.time_s <= best.time_s * WORTH).unwrap_or(best)
+    });
+    possible.filter(|now| now.time_s <= best.time_s * WORTH).unwrap_or(best)
 }
 
 fn policy(demand: &Demand<'_>, predicted: &Predicted) -> Policy {
@@ -145,11 +145,10 @@ fn policy(demand: &Demand<'_>, predicted: &Predicted) -> Policy {
         PolicyChoice::Direct => Policy::Direct,
         PolicyChoice::TimeShare => Policy::TimeShare,
         PolicyChoice::Auto => {
-            let time_s = |policy: &Policy| predicted.of(*policy);
-            let best = all.min_by(|a, b| time_s(a).total_cmp(&time_s(b))).unwrap_or(Policy::Direct);
+            let best = all.min_by(|a, b| predicted.of(*a).total_cmp(&predicted.of(*b))).unwrap_or(Policy::Direct);
             // Pictures that are drawn directly are exact: to begin with, samples must be clearly faster.
             let now = demand.current.map_or(Policy::Direct, |current| current.policy);
-            if time_s(&now) <= time_s(&best) * WORTH { now } else { best }
+            if predicted.of(now) <= predicted.of(best) * WORTH { now } else { best }
         }
     }
 }

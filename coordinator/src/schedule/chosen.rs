@@ -29,8 +29,8 @@ impl Chosen {
     /// The cheapest row that is certified to be more accurate than this choice, in its place for a reason.
     pub(super) fn safer(&self, number: u64, reason: &str) -> Option<Self> {
         let own = self.outcome.certificate.as_ref()?.expected_ratio;
-        let is_safer = |certified: &&Certified| certified.certificate.expected_ratio < own;
-        let Certified { row, choice, price, certificate } = self.certified.iter().find(is_safer)?.clone();
+        let mut safer = self.certified.iter().filter(|certified| certified.certificate.expected_ratio < own);
+        let Certified { row, choice, price, certificate } = safer.next()?.clone();
         let shown = self.budget.error().map(|term| term.shown(certificate.bound_ratio)).unwrap_or_default();
         let reason = format!(
             "{row} keeps {}: at most {shown} with 95 % confidence, on {} views. {reason}",

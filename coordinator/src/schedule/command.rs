@@ -96,10 +96,13 @@ impl fmt::Display for Command {
 
 fn write_view_probe(f: &mut fmt::Formatter<'_>, probe: &ViewProbe) -> fmt::Result {
     let ViewProbe { workload_number, id, node_name, views, requests, .. } = probe;
-    let rows: Vec<String> = requests.iter().map(|(row, _)| row.to_string()).collect();
-    let rows = rows.join(",");
+    let rows = joined(requests.iter().map(|(row, _)| row), ",");
     let work = if views.is_empty() { "time" } else { "compare" };
     write!(f, "{node_name} is to {work} rows {rows} for workload {workload_number}, measurement {}", id.number)
+}
+
+fn joined<T: ToString>(values: impl IntoIterator<Item = T>, separator: &str) -> String {
+    values.into_iter().map(|value| value.to_string()).collect::<Vec<_>>().join(separator)
 }
 
 fn of_workload(number: Option<u64>) -> String {
@@ -119,17 +122,16 @@ fn write_probe(f: &mut fmt::Formatter<'_>, probe: &Probe) -> fmt::Result {
 
 fn write_plan(f: &mut fmt::Formatter<'_>, sessions: &[u64], plan: &SessionPlan) -> fmt::Result {
     let assignment = &plan.assignment;
-    let images = |images: &[u32]| images.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
-    let samplers = assignment.samplers.iter().map(|s| format!("{}[{}]", s.node_name, images(&s.image_indices)));
-    let compositors = assignment.compositors.iter().map(|share| share.node_name.clone());
+    let samplers =
+        assignment.samplers.iter().map(|share| format!("{}[{}]", share.node_name, joined(&share.image_indices, ",")));
     write!(
         f,
         "apply plan {} of workload {} to sessions {sessions:?}: {}, samplers {}, compositors {}, predicted {:.6} s a set: {}",
         assignment.plan_epoch,
         assignment.workload_number,
         assignment.policy,
-        samplers.collect::<Vec<_>>().join(" "),
-        compositors.collect::<Vec<_>>().join(" "),
+        joined(samplers, " "),
+        joined(assignment.compositors.iter().map(|share| &share.node_name), " "),
         plan.predicted_s(),
         plan.reason,
     )

@@ -31,9 +31,7 @@ impl PolicyOverride {
         let tiles = self.forced_tiles.map(|tiles| u32::try_from(tiles).unwrap_or(u32::MAX));
         tiles.map_or(Ok(()), tile_count)
     }
-}
 
-impl PolicyOverride {
     /// With no more samplers than a load allows: a K that was possible when it was asked for may be too many when nodes are
     /// lost.
     pub(super) fn possible(self, load: &Load, nodes: usize) -> Self {

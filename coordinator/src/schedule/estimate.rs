@@ -1,9 +1,11 @@
 //! The costs of one node, estimated from its own timings.
 
-use cluster::{Costs, MeasuredCosts, TileCosts};
+use std::array;
+
+use cluster::{Costs, MeasuredCosts};
 
 use super::node_costs::{NodeCosts, is_within_tiles_error};
-use super::operations::PerOperation;
+use super::operations::{DEVICE_OPERATIONS, PerOperation, SAMPLE_IMAGE, operations, timings, with_operations};
 use super::smoothing::{Smoothed, geometric_mean, is_valid};
 
 /// Reports without a timing after which the operation counts as not timed.
@@ -82,17 +84,10 @@ pub(super) type Ratios = PerOperation<Option<f64>>;
 /// every node. The timings of a single node say as much of that node as of the operation, and do not count.
 pub(super) fn common_ratios<'a>(estimates: impl Iterator<Item = &'a Estimate>) -> Ratios {
     let all: Vec<Ratios> = estimates.map(Estimate::ratios).collect();
-    let common = |of: fn(&Ratios) -> Option<f64>| {
-        let timed = all.iter().filter_map(of);
+    array::from_fn(|operation| {
+        let timed = all.iter().filter_map(|ratios| ratios[operation]);
         geometric_mean(timed.clone()).filter(|_| timed.count() > 1)
-    };
-    Ratios {
-        sample_image: common(|ratios| ratios.sample_image),
-        direct_view: common(|ratios| ratios.direct_view),
-        reconstruct_view: common(|ratios| ratios.reconstruct_view),
-        load_set: common(|ratios| ratios.load_set),
-        encode_view: common(|ratios| ratios.encode_view),
-    }
+    })
 }
 
 /// One node's costs as its timings come in.
@@ -119,19 +114,19 @@ pub(super) struct SampledParts<'a> {
 impl Estimate {
     /// As measured when the session was opened.
     pub(super) fn starting_at(costs: &Costs) -> Self {
-        Self { alone: *costs, operations: PerOperation::from(costs).map(Operation::starting_at), ..Self::default() }
+        Self { alone: *costs, operations: operations(costs).map(Operation::starting_at), ..Self::default() }
     }
 
     /// Adds the timings of one report. `sampled` is the node's share in the plan that the report is of.
     pub(super) fn add(&mut self, measured: &MeasuredCosts, sampled: Option<SampledParts<'_>>) {
         let slowness = self.slowness.value().unwrap_or(1.0);
-        let mut timings = PerOperation::from(measured);
+        let mut timings = timings(measured);
         // Tiles of a plan that is gone are not known any more.
         let is_known = sampled.is_some() || !self.samples_tiles;
-        timings.sample_image = timings.sample_image.filter(|_| is_known).map(|s| self.whole_image_s(s, sampled));
+        let sampled_s = &mut timings[SAMPLE_IMAGE];
+        *sampled_s = sampled_s.filter(|_| is_known).map(|s| self.whole_image_s(s, sampled));
         self.samples_tiles = sampled.map_or(self.samples_tiles, |sampled| sampled.tiles > 1);
-        let ratios =
-            self.operations.as_mut().zip_with(timings, |operation, timing_s| operation.add(timing_s, slowness));
+        let ratios = array::from_fn(|i| self.operations[i].add(timings[i], slowness));
         self.slowness.add(self.mean_ratio(ratios));
         // A rate of 0 bytes/s is no rate: nothing was transferred.
         self.transfer_bytes_per_s.add(measured.transfer_bytes_per_s.filter(|rate| *rate > 0.0));
@@ -141,17 +136,19 @@ impl Estimate {
     /// The mean ratio of the device's operations. A tile that takes somewhat longer than expected does not say that the
     /// node is slow.
     fn mean_ratio(&self, mut ratios: Ratios) -> Option<f64> {
-        let without_error = |ratio| if self.samples_tiles && is_within_tiles_error(ratio) { 1.0 } else { ratio };
-        ratios.sample_image = ratios.sample_image.map(without_error);
-        geometric_mean(ratios.of_device().into_iter().flatten())
+        if self.samples_tiles && ratios[SAMPLE_IMAGE].is_some_and(is_within_tiles_error) {
+            ratios[SAMPLE_IMAGE] = Some(1.0);
+        }
+        geometric_mean(ratios[..DEVICE_OPERATIONS].iter().copied().flatten())
     }
 
     /// The cost of a mean image on a node whose tiles take `tiles_s`, each times their number in an image. Tiles have an
     /// overhead each, and show the sky or not: unscaled, equal nodes would seem unequal.
     fn whole_image_s(&self, tiles_s: f64, sampled: Option<SampledParts<'_>>) -> f64 {
         let Some(SampledParts { parts, tiles }) = sampled.filter(|sampled| sampled.tiles > 1) else { return tiles_s };
-        let tile_s = |&part: &u32| self.alone.sample_this_tile_s((part % tiles) as usize, tiles as usize);
-        let expected_s = parts.iter().map(tile_s).sum::<f64>() / parts.len() as f64 * f64::from(tiles);
+        let tiles_alone_s =
+            parts.iter().map(|part| self.alone.sample_this_tile_s((part % tiles) as usize, tiles as usize));
+        let expected_s = tiles_alone_s.sum::<f64>() / parts.len() as f64 * f64::from(tiles);
         let ratio = tiles_s / expected_s;
         if ratio.is_finite() { self.alone.sample_image_s * ratio } else { tiles_s }
     }
@@ -160,17 +157,17 @@ impl Estimate {
     pub(super) fn rebase(&mut self, costs: &Costs) {
         if self.alone != *costs {
             self.alone = *costs;
-            self.operations.as_mut().zip_with(PerOperation::from(costs), Operation::rebase);
+            self.operations.iter_mut().zip(operations(costs)).for_each(|(own, alone_s)| own.rebase(alone_s));
         }
     }
 
     /// Forgets all timings: other work is done from here on.
     pub(super) fn restart(&mut self) {
-        self.operations.as_mut().map(|operation| operation.timed.restart());
+        self.operations.iter_mut().for_each(|operation| operation.timed.restart());
     }
 
     fn ratios(&self) -> Ratios {
-        self.operations.as_ref().map(Operation::ratio)
+        self.operations.each_ref().map(Operation::ratio)
     }
 
     /// As if nothing had been timed since the session was opened.
@@ -187,24 +184,17 @@ impl Estimate {
     pub(super) fn now_among(&self, common: &Ratios) -> NodeCosts {
         let slowness = self.slowness.value().unwrap_or(1.0);
         // How many times slower than other nodes this one is, by operations that both have timed.
-        let to_others = self.ratios().zip_with(*common, |own, common| Some(own? / common?));
+        let own = self.ratios();
+        let to_others = array::from_fn(|i| Some(own[i]? / common[i]?));
         let than_others = self.mean_ratio(to_others).unwrap_or(1.0);
-        let now_s = self.operations.as_ref().zip_with(*common, |operation, common| {
-            operation.now_s(common.map_or(slowness, |common| common * than_others))
-        });
+        let now_s =
+            array::from_fn(|i| self.operations[i].now_s(common[i].map_or(slowness, |common| common * than_others)));
+        let mut costs = with_operations(&self.alone, now_s);
         // The overhead of a tile grows with the cost of an image.
-        let times =
-            Some(now_s.sample_image / self.alone.sample_image_s).filter(|times| times.is_finite()).unwrap_or(1.0);
-        let tiles = self.alone.tiles.map(|tiles| TileCosts { overhead_s: tiles.overhead_s * times, ..tiles });
-        let costs = Costs {
-            sample_image_s: now_s.sample_image,
-            direct_view_s: now_s.direct_view,
-            reconstruct_view_s: now_s.reconstruct_view,
-            load_set_s: now_s.load_set,
-            encode_view_s: now_s.encode_view,
-            in_order: self.alone.in_order,
-            tiles,
-        };
+        let times = costs.sample_image_s / self.alone.sample_image_s;
+        if let Some(tiles) = costs.tiles.as_mut().filter(|_| times.is_finite()) {
+            tiles.overhead_s *= times;
+        }
         let image_bytes = self.image_bytes.value().unwrap_or(0.0);
         NodeCosts { costs, transfer_image_s: self.transfer_bytes_per_s.value().map(|rate| image_bytes / rate) }
     }

@@ -114,9 +114,11 @@ impl Event {
     /// For values that no peer may send, as a damaged log may have them.
     pub(super) fn validate(&self) -> Result<(), InvalidField> {
         match self {
-            Self::Limits { max_workloads, audit_time_ratio } => {
-                max_workloads_within(*max_workloads)?;
-                audit_time_within(*audit_time_ratio)
+            Self::Limits { max_workloads, .. } if !(1..=MAX_WORKLOADS).contains(max_workloads) => {
+                Err(InvalidField::out_of_range("max_workloads", max_workloads, "from 1 to 64"))
+            }
+            Self::Limits { audit_time_ratio, .. } if !(0.0..=MAX_AUDIT_TIME_RATIO).contains(audit_time_ratio) => {
+                Err(InvalidField::out_of_range("audit_time_ratio", audit_time_ratio, "from 0 to 0.5"))
             }
             Self::Joined { join, .. } => join.validate(),
             Self::Opened(opening) => opening.validate(),
@@ -146,7 +148,7 @@ impl Event {
             }
             Self::ProbeLost { reason: why, .. } | Self::Unrepresented { reason: why, .. } => reason(why, "reason"),
             Self::Represented { costs, .. } => costs.validate(),
-            Self::Applied { .. } | Self::Closed { .. } | Self::Tick => Ok(()),
+            Self::Limits { .. } | Self::Applied { .. } | Self::Closed { .. } | Self::Tick => Ok(()),
         }
     }
 }
@@ -168,20 +170,6 @@ impl Opening {
         self.shared_light.as_ref().map_or(Ok(()), SharedLightCosts::validate)?;
         reason(&self.note, "note")?;
         viewpoints(&self.viewpoints)
-    }
-}
-
-fn max_workloads_within(most: usize) -> Result<(), InvalidField> {
-    match (1..=MAX_WORKLOADS).contains(&most) {
-        true => Ok(()),
-        false => Err(InvalidField::out_of_range("max_workloads", most, "from 1 to 64")),
-    }
-}
-
-fn audit_time_within(ratio: f64) -> Result<(), InvalidField> {
-    match (0.0..=MAX_AUDIT_TIME_RATIO).contains(&ratio) {
-        true => Ok(()),
-        false => Err(InvalidField::out_of_range("audit_time_ratio", ratio, "from 0 to 0.5")),
     }
 }
 

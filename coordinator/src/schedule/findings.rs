@@ -21,8 +21,9 @@ const STAYS_AFTER: Duration = Duration::from_secs(5);
 #[derive(Debug, Clone, Default)]
 pub(super) struct Findings {
     /// The last audited viewpoints, the newest last.
-    poses: VecDeque<PinholeCamera>,
-    breaks: Vec<Duration>,
+    pub(super) poses: VecDeque<PinholeCamera>,
+    /// The times of broken promises, the last one last.
+    pub(super) breaks: Vec<Duration>,
     /// The promise that is broken, if another representation is not in force yet.
     pub(super) broken: Option<Broken>,
     viewers: BTreeMap<(String, u64), ViewerAbove>,
@@ -50,8 +51,8 @@ pub(super) struct Broken {
 impl Broken {
     /// Whether the promise of a budget is broken with it.
     pub(super) fn is_of(&self, budget: &Budget) -> bool {
-        let is_above = |found: f64| budget.error().is_some_and(|term| term.most_ratio() < found);
-        budget.implies(&self.budget) || self.found_ratio.is_none_or(is_above)
+        let Some(found) = self.found_ratio else { return true };
+        budget.implies(&self.budget) || budget.error().is_some_and(|term| term.most_ratio() < found)
     }
 }
 
@@ -95,11 +96,6 @@ impl Findings {
         self.breaks.len() >= MOST_BREAKS
     }
 
-    /// The time of the last broken promise.
-    pub(super) fn last_break(&self) -> Option<Duration> {
-        self.breaks.last().copied()
-    }
-
     /// The viewpoints that a plan has to be for, beside the view cells: those of viewers above the budget, and the last.
     pub(super) fn poses_to_join(&self) -> Vec<PinholeCamera> {
         if !self.joins_poses {
@@ -107,11 +103,6 @@ impl Findings {
         }
         let above = self.viewers.values().map(|viewer| viewer.camera);
         above.chain(self.poses.iter().copied()).collect()
-    }
-
-    /// View cells have moved: earlier viewpoints are of others.
-    pub(super) fn forget_poses(&mut self) {
-        self.poses.clear();
     }
 
     /// Forgets viewers that have moved on, as `is_there` says of a node and a camera, and asks for a plan for those that

@@ -71,20 +71,20 @@ impl Load {
 
     /// Nodes that load the set and make views.
     pub(super) fn compositors(&self, nodes: &[NodeCosts]) -> Vec<Worker> {
-        let worker = |node: &NodeCosts| Worker { start_s: self.load_set_s(node, nodes.len()), job_s: node.view_s() };
-        nodes.iter().map(worker).collect()
+        let workers =
+            nodes.iter().map(|node| Worker { start_s: self.load_set_s(node, nodes.len()), job_s: node.view_s() });
+        workers.collect()
     }
 
     /// Each samples its part and gets the rest before it makes views.
     pub(super) fn sharers(&self, nodes: &[NodeCosts]) -> Vec<Worker> {
         let others = nodes.len().saturating_sub(1);
-        let worker = |(node, own): (&NodeCosts, f64)| Worker {
-            start_s: own * self.part_s(&node.costs)
-                + self.exchange_s(node, own, others)
-                + self.load_set_s(node, nodes.len()),
-            job_s: node.view_s(),
-        };
-        nodes.iter().zip(self.mean_part_counts(nodes)).map(worker).collect()
+        let workers = nodes.iter().zip(self.mean_part_counts(nodes)).map(|(node, own)| {
+            let sampled_s = own * self.part_s(&node.costs);
+            let exchanged_s = self.exchange_s(node, own, others);
+            Worker { start_s: sampled_s + exchanged_s + self.load_set_s(node, nodes.len()), job_s: node.view_s() }
+        });
+        workers.collect()
     }
 
     /// Seconds in which a node that samples and composites gets all images but its own, and sends those to all others.
@@ -120,8 +120,8 @@ impl Load {
         if self.images_are_sequential {
             return (0..samplers.len()).map(|i| if i < self.sets.max(1) { self.parts() } else { 0 }).collect();
         }
-        let worker = |node: &NodeCosts| Worker { start_s: 0.0, job_s: self.part_s(&node.costs) };
-        distribute(self.parts(), &samplers.iter().map(worker).collect::<Vec<_>>())
+        let workers = samplers.iter().map(|node| Worker { start_s: 0.0, job_s: self.part_s(&node.costs) });
+        distribute(self.parts(), &workers.collect::<Vec<_>>())
     }
 
     /// The same, as the mean over all sets: where samplers take sets in turn, each makes some of the sets.
@@ -135,6 +135,6 @@ impl Load {
 
 /// Nodes that draw views from the scene.
 pub(super) fn drawers(nodes: &[NodeCosts]) -> Vec<Worker> {
-    let worker = |node: &NodeCosts| Worker { start_s: 0.0, job_s: node.costs.direct_view_s + node.costs.encode_view_s };
-    nodes.iter().map(worker).collect()
+    let views_s = nodes.iter().map(|node| node.costs.direct_view_s + node.costs.encode_view_s);
+    views_s.map(|job_s| Worker { start_s: 0.0, job_s }).collect()
 }

@@ -21,14 +21,19 @@ impl Worker {
     fn end_s(&self, jobs: usize) -> f64 {
         if jobs == 0 { 0.0 } else { self.start_s + jobs as f64 * self.job_s() }
     }
+
+    /// Times are not negative, so that their bits are in their order.
+    fn end_bits(&self, jobs: usize) -> u64 {
+        self.end_s(jobs).to_bits()
+    }
 }
 
 /// The number of jobs of each worker.
 pub(super) fn distribute(jobs: usize, workers: &[Worker]) -> Vec<usize> {
     let level_s = level_s(jobs, workers);
     // Rounded down a little, so that the sum never exceeds the jobs.
-    let below = |worker: &Worker| ((level_s - worker.start_s) / worker.job_s() * (1.0 - 1e-12)).max(0.0) as usize;
-    let mut shares: Vec<usize> = workers.iter().map(below).collect();
+    let below = workers.iter().map(|worker| (level_s - worker.start_s) / worker.job_s() * (1.0 - 1e-12));
+    let mut shares: Vec<usize> = below.map(|jobs| jobs.max(0.0) as usize).collect();
     let left = jobs.saturating_sub(shares.iter().sum());
     distribute_rest(left, workers, &mut shares);
     shares
@@ -36,13 +41,12 @@ pub(super) fn distribute(jobs: usize, workers: &[Worker]) -> Vec<usize> {
 
 /// Gives each of the jobs left to the worker that ends it first; among several, to the first.
 fn distribute_rest(left: usize, workers: &[Worker], shares: &mut [usize]) {
-    // Times are not negative, so that their bits are in their order.
-    let next = |i: usize, share: usize| Reverse((workers[i].end_s(share + 1).to_bits(), i));
-    let mut ends: BinaryHeap<_> = shares.iter().enumerate().map(|(i, &share)| next(i, share)).collect();
+    let ends = workers.iter().zip(&*shares).enumerate();
+    let mut ends: BinaryHeap<_> = ends.map(|(i, (worker, share))| Reverse((worker.end_bits(share + 1), i))).collect();
     for _ in 0..left {
         let Some(Reverse((_, first))) = ends.pop() else { return };
         shares[first] += 1;
-        ends.push(next(first, shares[first]));
+        ends.push(Reverse((workers[first].end_bits(shares[first] + 1), first)));
     }
 }
 

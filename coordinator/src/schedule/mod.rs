@@ -37,7 +37,6 @@ mod representation;
 mod scheduler;
 mod search;
 mod session_mix;
-mod sharing_hysteresis;
 mod smoothing;
 mod workload_state;
 

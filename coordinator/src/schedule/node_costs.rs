@@ -1,7 +1,10 @@
 //! Costs of one node, and their comparison between nodes.
 
+use std::array;
+
 use cluster::{Costs, TileCosts};
 
+use super::operations::{SAMPLE_IMAGE, operations, with_operations};
 use super::smoothing::median;
 
 /// Nodes are equal when none needs this many times what another does.
@@ -32,20 +35,11 @@ impl NodeCosts {
 
     /// Costs of a node that serves several workloads in turn.
     pub(super) fn times(self, times: f64) -> Self {
-        let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, .. } = self.costs;
-        let tiles = |tiles: TileCosts| TileCosts { overhead_s: tiles.overhead_s * times, ..tiles };
-        Self {
-            costs: Costs {
-                sample_image_s: sample_image_s * times,
-                direct_view_s: direct_view_s * times,
-                reconstruct_view_s: reconstruct_view_s * times,
-                load_set_s: load_set_s * times,
-                encode_view_s: encode_view_s * times,
-                in_order: self.costs.in_order,
-                tiles: self.costs.tiles.map(tiles),
-            },
-            transfer_image_s: self.transfer_image_s.map(|transfer_s| transfer_s * times),
+        let mut costs = with_operations(&self.costs, operations(&self.costs).map(|seconds| seconds * times));
+        if let Some(tiles) = &mut costs.tiles {
+            tiles.overhead_s *= times;
         }
+        Self { costs, transfer_image_s: self.transfer_image_s.map(|transfer_s| transfer_s * times) }
     }
 
     /// A link that is not measured counts as free.
@@ -55,27 +49,26 @@ impl NodeCosts {
 
     /// The mean of each cost. Shares of rows are the scene's: the first node's.
     pub(super) fn mean(nodes: &[Self]) -> Costs {
-        let mean =
-            |of: fn(&Costs) -> f64| nodes.iter().map(|node| of(&node.costs)).sum::<f64>() / nodes.len().max(1) as f64;
-        let sample_image_s = mean(|costs| costs.sample_image_s);
+        let count = nodes.len().max(1) as f64;
+        let means_s = array::from_fn(|i| nodes.iter().map(|node| operations(&node.costs)[i]).sum::<f64>() / count);
+        let overhead_s = nodes.iter().map(|node| node.costs.tile_overhead_s()).sum::<f64>() / count;
         let row_shares = nodes.first().and_then(|node| node.costs.tiles?.row_shares);
-        Costs {
-            sample_image_s,
-            direct_view_s: mean(|costs| costs.direct_view_s),
-            reconstruct_view_s: mean(|costs| costs.reconstruct_view_s),
-            load_set_s: mean(|costs| costs.load_set_s),
-            encode_view_s: mean(|costs| costs.encode_view_s),
+        let rest = Costs {
             in_order: nodes.iter().any(|node| node.costs.in_order),
-            tiles: TileCosts::of_image(sample_image_s, mean(Costs::tile_overhead_s), row_shares),
-        }
+            tiles: TileCosts::of_image(means_s[SAMPLE_IMAGE], overhead_s, row_shares),
+            ..Costs::default()
+        };
+        with_operations(&rest, means_s)
     }
 
     /// Levels the cost of sampling where nodes sample tiles: a node about as slow as most had more expensive tiles.
     pub(super) fn level_sampling(nodes: &mut [Self]) {
         let Some(middle_s) = median(nodes.iter().map(|node| node.costs.sample_image_s)) else { return };
-        let is_like_most = |node: &Self| is_within_tiles_error(node.costs.sample_image_s / middle_s);
-        let mean = Self::mean(&nodes.iter().copied().filter(is_like_most).collect::<Vec<_>>());
-        for node in nodes.iter_mut().filter(|node| is_like_most(node)) {
+        let all = nodes.iter_mut();
+        let alike: Vec<&mut Self> =
+            all.filter(|node| is_within_tiles_error(node.costs.sample_image_s / middle_s)).collect();
+        let mean = Self::mean(&alike.iter().map(|node| **node).collect::<Vec<_>>());
+        for node in alike {
             node.costs.sample_image_s = mean.sample_image_s;
             let tiles = node.costs.tiles.zip(mean.tiles);
             node.costs.tiles = tiles.map(|(tiles, mean)| TileCosts { overhead_s: mean.overhead_s, ..tiles });
@@ -85,12 +78,13 @@ impl NodeCosts {
     /// Whether all nodes are about as fast, so that any may have any role.
     #[must_use]
     pub fn are_equal(nodes: &[Self]) -> bool {
-        let equal = |of: fn(&Self) -> f64| {
-            let least = nodes.iter().map(of).fold(f64::INFINITY, f64::min);
-            nodes.iter().all(|node| of(node) <= least * EQUAL_WITHIN)
-        };
-        equal(|node| node.costs.sample_image_s) && equal(Self::view_s)
+        are_close(nodes.iter().map(|node| node.costs.sample_image_s)) && are_close(nodes.iter().map(Self::view_s))
     }
+}
+
+fn are_close(mut seconds: impl Iterator<Item = f64> + Clone) -> bool {
+    let least_s = seconds.clone().fold(f64::INFINITY, f64::min);
+    seconds.all(|seconds| seconds <= least_s * EQUAL_WITHIN)
 }
 
 /// c + e.

@@ -2,8 +2,6 @@
 //!
 //! A workload has nodes of its own. Idle workloads, and workloads that outnumber the nodes, share nodes with others.
 
-use std::cmp::{Ordering, Reverse};
-
 /// The least share of all nodes for a workload with batches, so that they end.
 const LEAST_BATCH_SHARE: f64 = 0.05;
 /// The weight of a workload that asks for next to nothing, which is more than that of an idle one.
@@ -24,12 +22,16 @@ pub(super) struct Need {
 
 /// Nodes' worth of work of each workload: live before batch. 0 for idle ones.
 pub(super) fn weights(needs: &[Need], nodes: usize) -> Vec<f64> {
-    let awake = || needs.iter().filter(|need| !need.is_idle);
-    let live: f64 = awake().map(|need| need.live_nodes).sum();
-    let batches = awake().filter(|need| need.has_batch).count().max(1) as f64;
+    let awake = needs.iter().filter(|need| !need.is_idle);
+    let live: f64 = awake.clone().map(|need| need.live_nodes).sum();
+    let batches = awake.filter(|need| need.has_batch).count().max(1) as f64;
     let batch = ((nodes as f64 - live) / batches).max(LEAST_BATCH_SHARE * nodes as f64);
-    let weight = |need: &Need| need.live_nodes + if need.has_batch { batch } else { 0.0 };
-    needs.iter().map(|need| if need.is_idle { 0.0 } else { weight(need).max(LEAST_WEIGHT) }).collect()
+    let weights = needs.iter().map(|need| match (need.is_idle, need.has_batch) {
+        (true, _) => 0.0,
+        (false, true) => (need.live_nodes + batch).max(LEAST_WEIGHT),
+        (false, false) => need.live_nodes.max(LEAST_WEIGHT),
+    });
+    weights.collect()
 }
 
 /// Nodes of each workload in proportion to its weight: one at least, the rest by largest remainder; none for weights of 0.
@@ -41,15 +43,18 @@ pub(super) fn even_counts(weights: &[f64], nodes: usize) -> Vec<usize> {
     if awake >= nodes {
         return counts;
     }
-    let quota = |rest: &[usize], of: usize| {
+    let mut quotas = loop {
         let all: f64 = rest.iter().map(|&i| weights[i]).sum();
-        weights[of] / all * (nodes - (awake - rest.len())) as f64
+        let nodes_of_rest = (nodes - (awake - rest.len())) as f64;
+        let quotas: Vec<(usize, f64)> = rest.iter().map(|&i| (i, weights[i] / all * nodes_of_rest)).collect();
+        // Those whose share is less than the one node that they have leave the others less.
+        match quotas.iter().position(|(_, quota)| *quota < 1.0) {
+            Some(small) => {
+                rest.remove(small);
+            }
+            None => break quotas,
+        }
     };
-    // Those whose share is less than the one node that they have leave the others less.
-    while let Some(small) = rest.iter().position(|&i| quota(&rest, i) < 1.0) {
-        rest.remove(small);
-    }
-    let mut quotas: Vec<(usize, f64)> = rest.iter().map(|&i| (i, quota(&rest, i))).collect();
     quotas.iter().for_each(|&(i, quota)| counts[i] = quota as usize);
     quotas.sort_by(|(_, a), (_, b)| b.fract().total_cmp(&a.fract()));
     let left = nodes.saturating_sub(counts.iter().sum());
@@ -98,12 +103,6 @@ struct Loss {
     node: usize,
 }
 
-impl Loss {
-    fn compare(&self, other: &Self) -> Ordering {
-        self.work_per_node.total_cmp(&other.work_per_node).then(self.worth.total_cmp(&other.worth))
-    }
-}
-
 /// The division, and its changes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct NodeShares {
@@ -149,6 +148,11 @@ impl NodeShares {
         (0..self.nodes).map(|node| self.carried_awake(node).map(|i| each[i]).sum()).collect()
     }
 
+    /// The work of the worst node.
+    fn worst_work(&self) -> f64 {
+        self.work().into_iter().fold(0.0, f64::max)
+    }
+
     fn outnumber(&self) -> bool {
         self.awake().count() > self.nodes
     }
@@ -156,9 +160,8 @@ impl NodeShares {
     /// Whether a node has clearly more work than the worst node of an even division, or a workload only shares nodes though
     /// there is one for it.
     pub(super) fn is_uneven(&self) -> bool {
-        let worst = self.work().into_iter().fold(0.0, f64::max);
         let only_shares = !self.outnumber() && self.awake().any(|i| self.own(i) == 0);
-        only_shares || worst > UNEVEN * self.even_work()
+        only_shares || self.worst_work() > UNEVEN * self.even_work()
     }
 
     /// The work of the worst node of an even division.
@@ -188,16 +191,14 @@ impl NodeShares {
                 continue;
             }
             let candidates = (0..self.claims.len()).filter(|&i| self.claims[i].ties[node].is_usable);
-            let need = |i: usize| {
-                let held = self.claims[i].held();
-                (held == 0, self.claims[i].is_awake(), self.work_per_node(i), Reverse(held))
-            };
-            let compare = |a: &usize, b: &usize| {
-                let ((no_a, awake_a, work_a, held_a), (no_b, awake_b, work_b, held_b)) = (need(*a), need(*b));
-                (no_a, awake_a).cmp(&(no_b, awake_b)).then(work_a.total_cmp(&work_b)).then(held_a.cmp(&held_b))
-            };
             // The first of equals.
-            if let Some(neediest) = candidates.rev().max_by(compare) {
+            let neediest = candidates.rev().max_by(|&a, &b| {
+                let [held_a, held_b] = [a, b].map(|i| self.claims[i].held());
+                let [awake_a, awake_b] = [a, b].map(|i| self.claims[i].is_awake());
+                let by_work = self.work_per_node(a).total_cmp(&self.work_per_node(b));
+                (held_a == 0, awake_a).cmp(&(held_b == 0, awake_b)).then(by_work).then(held_b.cmp(&held_a))
+            });
+            if let Some(neediest) = neediest {
                 self.claims[neediest].ties[node].is_held = true;
             }
         }
@@ -223,9 +224,11 @@ impl NodeShares {
 
     fn share_least(&mut self, homeless: usize) {
         let work = self.work();
-        let carried = |node: usize| self.claims.iter().filter(|claim| claim.holds(node)).count();
         let usable = (0..self.nodes).filter(|&node| self.claims[homeless].ties[node].is_usable);
-        let least = usable.min_by(|&a, &b| work[a].total_cmp(&work[b]).then(carried(a).cmp(&carried(b))));
+        let least = usable.min_by(|&a, &b| {
+            let [carried_a, carried_b] = [a, b].map(|node| self.claims.iter().filter(|c| c.holds(node)).count());
+            work[a].total_cmp(&work[b]).then(carried_a.cmp(&carried_b))
+        });
         if let Some(node) = least {
             self.claims[homeless].ties[node].is_held = true;
         }
@@ -239,24 +242,30 @@ impl NodeShares {
         if self.outnumber() || own[receiver] >= counts[receiver] {
             return false;
         }
-        let losers = |node: usize| self.carried_awake(node).filter(move |&i| i != receiver);
-        let can_lose = |i: usize, node: usize| {
-            if self.is_own(i, node) { own[i] > counts[i] } else { self.claims[i].held() > 1 }
-        };
-        let is_open = |node: &usize| {
-            let is_usable = self.claims[receiver].ties[*node].is_usable && !self.is_own(receiver, *node);
-            is_usable && losers(*node).all(|i| can_lose(i, *node))
-        };
-        let loss = |node: usize| {
-            let work_per_node = |i: usize| self.claims[i].weight / own[i] as f64;
-            let worth = self.claims.iter().filter(|claim| claim.holds(node)).map(|claim| claim.ties[node].worth);
-            Loss { work_per_node: losers(node).map(work_per_node).fold(0.0, f64::max), worth: worth.sum(), node }
-        };
-        let least = (0..self.nodes).filter(is_open).map(loss).min_by(Loss::compare);
-        least.is_some_and(|Loss { node, .. }| {
-            self.hand_over(node, receiver);
-            true
-        })
+        let losses = (0..self.nodes).filter_map(|node| self.loss_of(node, receiver, &own, &counts));
+        let least = losses.min_by(|a, b| a.work_per_node.total_cmp(&b.work_per_node).then(a.worth.total_cmp(&b.worth)));
+        let Some(Loss { node, .. }) = least else { return false };
+        self.hand_over(node, receiver);
+        true
+    }
+
+    /// What those that a node serves would lose with it; `None` where the receiver cannot take the node. `own` has the number of
+    /// each workload's own nodes, `counts` the even one.
+    fn loss_of(&self, node: usize, receiver: usize, own: &[usize], counts: &[usize]) -> Option<Loss> {
+        if !self.claims[receiver].ties[node].is_usable || self.is_own(receiver, node) {
+            return None;
+        }
+        let mut work_per_node = 0.0_f64;
+        for loser in self.carried_awake(node).filter(|&i| i != receiver) {
+            let can_lose =
+                if self.is_own(loser, node) { own[loser] > counts[loser] } else { self.claims[loser].held() > 1 };
+            if !can_lose {
+                return None;
+            }
+            work_per_node = work_per_node.max(self.claims[loser].weight / own[loser] as f64);
+        }
+        let worth = self.claims.iter().filter(|claim| claim.holds(node)).map(|claim| claim.ties[node].worth).sum();
+        Some(Loss { work_per_node, worth, node })
     }
 
     fn hand_over(&mut self, node: usize, receiver: usize) {
@@ -286,26 +295,24 @@ impl NodeShares {
 
     /// Moves a workload from the node with the most work to another, where that makes the worst node better.
     fn relieve(&mut self) -> bool {
-        let worst_of = |shares: &Self| shares.work().into_iter().fold(0.0, f64::max);
         let work = self.work();
         let Some(from) = (0..self.nodes).max_by(|&a, &b| work[a].total_cmp(&work[b])) else { return false };
-        let moved = |carried: usize, to: Option<usize>| {
-            let mut shares = self.clone();
-            shares.claims[carried].ties[from].is_held = false;
-            if let Some(to) = to {
-                shares.claims[carried].ties[to].is_held = true;
-            }
-            shares
-        };
         let moves = self.carried_awake(from).flat_map(|carried| {
             let claim = &self.claims[carried];
             let elsewhere = (0..self.nodes).filter(|&to| claim.ties[to].is_usable && !claim.holds(to)).map(Some);
             let away = (claim.held() > 1).then_some(None);
             elsewhere.chain(away).map(move |to| (carried, to))
         });
-        let all = moves.map(|(carried, to)| moved(carried, to)).map(|shares| (worst_of(&shares), shares));
+        let all = moves.map(|(carried, to)| {
+            let mut shares = self.clone();
+            shares.claims[carried].ties[from].is_held = false;
+            if let Some(to) = to {
+                shares.claims[carried].ties[to].is_held = true;
+            }
+            (shares.worst_work(), shares)
+        });
         match all.min_by(|(a, _), (b, _)| a.total_cmp(b)) {
-            Some((worst, shares)) if worst < worst_of(self) * (1.0 - 1e-9) => {
+            Some((worst, shares)) if worst < self.worst_work() * (1.0 - 1e-9) => {
                 *self = shares;
                 true
             }

@@ -66,12 +66,16 @@ impl Overload {
         self.count(sample, view_utilisation / settled_view);
         if self.full_in_a_row >= CONFIRMATIONS_DOWN && self.step < sample.frame_rate_ratios.len() {
             self.view_utilisation_when_left.push(view_utilisation);
-            self.count_trial(now);
+            // A step that is left soon after it was tried is a trial that failed.
+            let failed = self.tried_at.is_some_and(|tried_at| now.saturating_sub(tried_at) < self.trial_after());
+            self.failed_trials = if failed { self.failed_trials + 1 } else { 0 };
             self.change(now, self.step + 1);
             return true;
         }
         self.roomy_since = (sample.utilisation < ROOMY).then(|| self.roomy_since.unwrap_or(now));
-        if self.roomy_in_a_row >= CONFIRMATIONS_UP || self.is_trial_due(now) {
+        let is_trial_due =
+            self.step > 0 && self.roomy_since.is_some_and(|since| now.saturating_sub(since) >= self.trial_after());
+        if self.roomy_in_a_row >= CONFIRMATIONS_UP || is_trial_due {
             self.tried_at = Some(now);
             self.view_utilisation_when_left.pop();
             self.change(now, self.step - 1);
@@ -103,26 +107,13 @@ impl Overload {
         let full = sample.utilisation > FULL;
         self.full_in_a_row = if full { self.full_in_a_row + 1 } else { 0 };
         // One step up costs as much as when it was left, times how nodes have changed since.
-        let above = self
-            .view_utilisation_when_left
-            .last()
-            .map(|view_utilisation| view_utilisation * slower * sample.rate(self.step - 1));
-        let roomy = above.is_some_and(|utilisation| utilisation < ROOMY);
+        let when_left = self.view_utilisation_when_left.last();
+        let roomy = when_left.is_some_and(|when_left| when_left * slower * sample.rate(self.step - 1) < ROOMY);
         self.roomy_in_a_row = if roomy { self.roomy_in_a_row + 1 } else { 0 };
     }
 
     fn trial_after(&self) -> Duration {
         FIRST_TRIAL.saturating_mul(1 << self.failed_trials.min(8)).min(LAST_TRIAL)
-    }
-
-    fn is_trial_due(&self, now: Duration) -> bool {
-        self.step > 0 && self.roomy_since.is_some_and(|since| now.saturating_sub(since) >= self.trial_after())
-    }
-
-    /// A step that is left soon after it was tried is a trial that failed.
-    fn count_trial(&mut self, now: Duration) {
-        let failed = self.tried_at.is_some_and(|tried_at| now.saturating_sub(tried_at) < self.trial_after());
-        self.failed_trials = if failed { self.failed_trials + 1 } else { 0 };
     }
 
     fn change(&mut self, now: Duration, step: usize) {

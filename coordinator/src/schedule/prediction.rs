@@ -2,69 +2,45 @@
 //!
 //! Tiles of images, and views, are whole. A set is loaded once on each node that makes views of it.
 
-use std::num::NonZeroU32;
-
 use super::load::drawers;
 use super::makespan::makespan_s;
-use super::relay_tree::{Links, Relaying};
+use super::relay_tree::Links;
 use super::{Load, NodeCosts};
 
 /// T of the pipeline: max(sampling, transfer, compositing), where `samples[i]` says whether node i samples; the others
 /// composite. Images take the best way. One node does all in turn.
 #[must_use]
 pub fn pipeline_s(load: &Load, nodes: &[NodeCosts], samples: &[bool]) -> f64 {
-    pipeline(load, nodes, samples, Links::best).time_s
+    pipeline_links(load, nodes, samples).best().time_s
 }
 
-/// T of the pipeline, where images take a given way: from the samplers, or by relays with this fan-out.
-pub(super) fn pipeline_by_s(
-    load: &Load,
-    nodes: &[NodeCosts],
-    samples: &[bool],
-    relay_fanout: Option<NonZeroU32>,
-) -> f64 {
-    let given = |links: &Links, rest_s: f64| Relaying {
-        fanout: relay_fanout,
-        time_s: rest_s.max(links.slowest_s(relay_fanout)),
-    };
-    pipeline(load, nodes, samples, given).time_s
-}
-
-/// The fan-out by which images reach the compositors of a division soonest.
-pub(super) fn relay_fanout(load: &Load, nodes: &[NodeCosts], samples: &[bool]) -> Option<NonZeroU32> {
-    pipeline(load, nodes, samples, Links::best).fanout
-}
-
-fn pipeline(
-    load: &Load,
-    nodes: &[NodeCosts],
-    samples: &[bool],
-    relaying: impl Fn(&Links, f64) -> Relaying,
-) -> Relaying {
-    let direct = |time_s| Relaying { fanout: None, time_s };
+/// The load of links in a pipeline, and the time of all other work.
+pub(super) fn pipeline_links(load: &Load, nodes: &[NodeCosts], samples: &[bool]) -> Links {
     if nodes.len() == 1 {
-        return direct(time_share_s(load, nodes));
+        return Links { rest_s: time_share_s(load, nodes), ..Links::default() };
     }
-    let with_role = |sampling: bool| -> Vec<NodeCosts> {
-        nodes.iter().zip(samples).filter(|(_, samples)| **samples == sampling).map(|(node, _)| *node).collect()
-    };
-    let samplers = with_role(true);
-    let compositors = with_role(false);
+    let [samplers, compositors] = by_role(nodes, samples);
     if samplers.is_empty() && load.images > 0 {
-        return direct(f64::INFINITY);
+        return Links { rest_s: f64::INFINITY, ..Links::default() };
     }
     let part_counts = load.mean_part_counts(&samplers);
     let sample_s = samplers.iter().zip(&part_counts).map(|(node, parts)| parts * load.part_s(&node.costs));
     let rest_s = sample_s.fold(makespan_s(load.views, &load.compositors(&compositors)), f64::max);
     if load.is_already_sampled {
-        return direct(rest_s);
+        return Links { rest_s, ..Links::default() };
     }
     let images = part_counts.iter().map(|parts| parts / load.tiles as f64);
-    let links = Links {
+    Links {
         sends_s: samplers.iter().zip(images).map(|(node, images)| images * node.transfer_s()).collect(),
         receives_s: compositors.iter().map(|node| load.images as f64 * node.transfer_s()).collect(),
-    };
-    relaying(&links, rest_s)
+        rest_s,
+    }
+}
+
+/// The nodes that sample, and the others.
+pub(super) fn by_role<T: Copy>(nodes: &[T], samples: &[bool]) -> [Vec<T>; 2] {
+    [true, false]
+        .map(|role| nodes.iter().zip(samples).filter(|(_, samples)| **samples == role).map(|(node, _)| *node).collect())
 }
 
 /// T of time-share: every node samples its share, gets the rest, and makes its share of the views.
@@ -75,9 +51,11 @@ pub(super) fn time_share_s(load: &Load, nodes: &[NodeCosts]) -> f64 {
     let part_counts = load.mean_part_counts(nodes);
     let others = nodes.len() - 1;
     // A node samples its share of every set, and sends it, though it may make no view.
-    let own_s =
-        |(node, &own): (&NodeCosts, &f64)| (own * load.part_s(&node.costs)).max(load.exchange_s(node, own, others));
-    nodes.iter().zip(&part_counts).map(own_s).fold(makespan_s(load.views, &load.sharers(nodes)), f64::max)
+    let own_s = nodes
+        .iter()
+        .zip(part_counts)
+        .map(|(node, own_parts)| (own_parts * load.part_s(&node.costs)).max(load.exchange_s(node, own_parts, others)));
+    own_s.fold(makespan_s(load.views, &load.sharers(nodes)), f64::max)
 }
 
 /// T of direct rendering: every node draws its share of the views from the scene.

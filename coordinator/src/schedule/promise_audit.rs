@@ -111,8 +111,8 @@ impl PromiseAudit {
     /// The rate of late. In the first minute it is that of an audit a minute at least.
     fn audits_per_h(&self, now: Duration) -> f64 {
         let since = now.saturating_sub(self.began);
-        let is_recent = |(at, _): &&(Duration, usize)| now.saturating_sub(*at) <= RATE_OVER;
-        let audits: usize = self.recent.iter().filter(is_recent).map(|(_, count)| count).sum();
+        let recent = self.recent.iter().filter(|(at, _)| now.saturating_sub(*at) <= RATE_OVER);
+        let audits: usize = recent.map(|(_, count)| count).sum();
         let audits = if since < RATE_AFTER { audits.max(1) } else { audits };
         audits as f64 * HOUR_S / since.clamp(RATE_AFTER, RATE_OVER).as_secs_f64()
     }
@@ -133,14 +133,21 @@ impl PromiseAudit {
         let parts = if self.parts > 0 { "parts of " } else { "" };
         let of = format!("{parts}{audited} of {} views", self.covered_views.max(audited));
         let Some(mean) = self.audit.mean_error() else { return format!("nothing on {of}") };
-        let is_mean = self.term.statistic() == Statistic::Mean;
-        let shown = |ratio: f64| if is_mean { self.term.shown(ratio) } else { format!("{:.1} %", ratio * 100.0) };
-        let interval = self.audit.error_interval();
-        let interval = interval.map(|Interval { low, high, .. }| format!(" ({} to {})", shown(low), shown(high)));
-        let interval = interval.unwrap_or_default();
-        match is_mean {
-            true => format!("{}{interval} on {of}", self.shown(mean)),
-            false => format!("{}{interval} of views over {}, on {of}", shown(mean), self.term),
+        let mean = self.shown_audited(mean);
+        let interval = self.audit.error_interval().map_or_else(String::new, |Interval { low, high, .. }| {
+            format!(" ({} to {})", self.shown_audited(low), self.shown_audited(high))
+        });
+        match self.term.statistic() {
+            Statistic::Mean => format!("{} {mean}{interval} on {of}", self.term.metric()),
+            Statistic::P95 => format!("{mean}{interval} of views over {}, on {of}", self.term),
+        }
+    }
+
+    /// What audits find in words: a mean error, or a share of views.
+    fn shown_audited(&self, ratio: f64) -> String {
+        match self.term.statistic() {
+            Statistic::Mean => self.term.shown(ratio),
+            Statistic::P95 => format!("{:.1} %", ratio * 100.0),
         }
     }
 

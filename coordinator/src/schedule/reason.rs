@@ -35,9 +35,12 @@ fn ms(seconds: f64) -> String {
     format!("{:.3} ms", seconds * 1e3)
 }
 
+fn counted(count: usize, of: &str) -> String {
+    format!("{count} {of}{}", if count == 1 { "" } else { "s" })
+}
+
 /// The cells that images belong to, where there are several.
 fn near(load: &Load) -> String {
-    let counted = |count: usize, of: &str| format!("{count} {of}{}", if count == 1 { "" } else { "s" });
     match (load.cells, load.common_cells) {
         (1, 0) => String::new(),
         (cells, 0) => format!(" for {}", counted(cells, "view cell")),

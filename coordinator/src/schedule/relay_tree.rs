@@ -15,6 +15,8 @@ pub(super) struct Links {
     pub(super) sends_s: Vec<f64>,
     /// For each compositor, in the order of the plan, seconds of one copy of the set.
     pub(super) receives_s: Vec<f64>,
+    /// Seconds of all other work.
+    pub(super) rest_s: f64,
 }
 
 /// A relay tree, and the seconds of a set by it. Fan-out `None`: every compositor asks the samplers.
@@ -25,24 +27,23 @@ pub(super) struct Relaying {
 }
 
 impl Links {
-    /// The shortest way that is not clearly slower than the best. All other work takes `rest_s`.
-    pub(super) fn best(&self, rest_s: f64) -> Relaying {
+    /// The shortest way that is not clearly slower than the best.
+    pub(super) fn best(&self) -> Relaying {
         let fanouts = std::iter::once(None).chain(FANOUTS.into_iter().map(NonZeroU32::new));
-        let all: Vec<_> =
-            fanouts.map(|fanout| Relaying { fanout, time_s: self.slowest_s(fanout).max(rest_s) }).collect();
+        let all: Vec<_> = fanouts.map(|fanout| Relaying { fanout, time_s: self.time_s(fanout) }).collect();
         let best_s = all.iter().map(|relaying| relaying.time_s).fold(f64::INFINITY, f64::min);
         let good = all.into_iter().find(|relaying| relaying.time_s <= best_s * WORTH);
         good.unwrap_or(Relaying { fanout: None, time_s: best_s })
     }
 
-    /// Seconds of the slowest link.
-    pub(super) fn slowest_s(&self, fanout: Option<NonZeroU32>) -> f64 {
+    /// Seconds of the slowest link, or of all other work where that takes longer.
+    pub(super) fn time_s(&self, fanout: Option<NonZeroU32>) -> f64 {
         let count = self.receives_s.len();
         let asking = fanout.map_or(count, |fanout| (fanout.get() as usize).min(count));
         let sent_s = self.sends_s.iter().map(|send_s| send_s * asking as f64);
         let copies = self.receives_s.iter().enumerate();
         let relayed_s = copies.map(|(place, copy_s)| copy_s * relayed_copies(fanout, place, count) as f64);
-        sent_s.chain(relayed_s).chain(self.receives_s.iter().copied()).fold(0.0, f64::max)
+        sent_s.chain(relayed_s).chain(self.receives_s.iter().copied()).fold(self.rest_s, f64::max)
     }
 }
 
@@ -58,8 +59,8 @@ mod tests {
     use super::*;
 
     fn best(sends_s: &[f64], receives_s: &[f64], rest_s: f64) -> (Option<NonZeroU32>, f64) {
-        let links = Links { sends_s: sends_s.to_vec(), receives_s: receives_s.to_vec() };
-        let Relaying { fanout, time_s } = links.best(rest_s);
+        let links = Links { sends_s: sends_s.to_vec(), receives_s: receives_s.to_vec(), rest_s };
+        let Relaying { fanout, time_s } = links.best();
         (fanout, time_s)
     }
 

@@ -30,15 +30,21 @@ struct Filed {
     is_refuted: bool,
 }
 
+impl Filed {
+    fn is_about(&self, workload: u64, sampler: &str) -> bool {
+        self.workload == workload && self.sampler == sampler
+    }
+}
+
 impl SamplerReports {
     /// Files a report; whether another compositor agrees, so that the sampler is at fault. Else it has to be probed.
     pub(super) fn file(&mut self, now: Duration, workload: u64, report: SamplerReport) -> bool {
         self.0.retain(|filed| now.saturating_sub(filed.at) < WINDOW);
         let SamplerReport { compositor, sampler, reason, .. } = report;
-        let of_sampler = |filed: &Filed| filed.workload == workload && filed.sampler == sampler;
-        let agrees = self.0.iter().any(|filed| of_sampler(filed) && filed.compositor != compositor);
+        let agrees = self.0.iter().any(|filed| filed.is_about(workload, &sampler) && filed.compositor != compositor);
         // One probe answers all reports before it.
-        self.0.retain(|filed| filed.is_refuted || !of_sampler(filed) || filed.compositor != compositor);
+        self.0
+            .retain(|filed| filed.is_refuted || !filed.is_about(workload, &sampler) || filed.compositor != compositor);
         self.0.push(Filed { at: now, workload, compositor, sampler, reason, is_refuted: false });
         agrees
     }
@@ -46,25 +52,28 @@ impl SamplerReports {
     /// A probe of the sampler has passed. Gives the compositors that are now at fault, and the reasons of their reports.
     pub(super) fn refute(&mut self, workload: u64, sampler: &str) -> Vec<(String, String)> {
         let mut at_fault = Vec::new();
-        let mut own: Vec<&mut Filed> = self.0.iter_mut().filter(|filed| filed.workload == workload).collect();
-        for filed in own.iter_mut().filter(|filed| filed.sampler == sampler && !filed.is_refuted) {
+        for filed in self.0.iter_mut().filter(|filed| filed.is_about(workload, sampler) && !filed.is_refuted) {
             filed.is_refuted = true;
             at_fault.push((filed.compositor.clone(), filed.reason.clone()));
         }
-        let refuted = |of: &str| own.iter().filter(|filed| filed.is_refuted && filed.compositor == of).count();
-        at_fault.retain(|(compositor, _)| refuted(compositor) >= REFUTED_LIMIT);
+        at_fault.retain(|(compositor, _)| {
+            let own = self.0.iter().filter(|filed| filed.workload == workload && filed.compositor == *compositor);
+            own.filter(|filed| filed.is_refuted).count() >= REFUTED_LIMIT
+        });
         at_fault
     }
 
     /// Reports on file of a sampler: the number of the image that is probed next.
     pub(super) fn count_of(&self, workload: u64, sampler: &str) -> usize {
-        self.0.iter().filter(|filed| filed.workload == workload && filed.sampler == sampler).count()
+        self.0.iter().filter(|filed| filed.is_about(workload, sampler)).count()
     }
 
     /// A node is quarantined, from one workload or from all: neither reports of it nor by it count any more.
     pub(super) fn forget(&mut self, workload: Option<u64>, node_name: &str) {
-        let concerns = |filed: &Filed| filed.sampler == node_name || filed.compositor == node_name;
-        self.0.retain(|filed| workload.is_some_and(|number| number != filed.workload) || !concerns(filed));
+        self.0.retain(|filed| {
+            let is_of_another = workload.is_some_and(|number| number != filed.workload);
+            is_of_another || (filed.sampler != node_name && filed.compositor != node_name)
+        });
     }
 }
 

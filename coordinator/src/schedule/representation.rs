@@ -1,12 +1,9 @@
 //! The representation that a budget has chosen for a workload.
 
-use cluster::{Costs, Policy, PolicyChoice, SamplePlanes};
+use cluster::{Costs, PolicyChoice, SamplePlanes};
 use planner::Row;
 
 use super::PolicyOverride;
-
-/// Direct drawing in words.
-pub(super) const DRAWN: &str = "every view drawn directly";
 
 /// A representation in force.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,17 +45,6 @@ impl Representation {
                 PolicyOverride { policy: PolicyChoice::Direct, ..PolicyOverride::default() }
             }
             _ => asked,
-        }
-    }
-
-    /// The representation in words; `asked` names the one that sessions asked for.
-    pub(super) fn name(of: Option<&Self>, asked: impl FnOnce() -> String, policy: Option<Policy>) -> String {
-        let drawn = || DRAWN.to_owned();
-        match of {
-            _ if policy == Some(Policy::Direct) => drawn(),
-            Some(Self::Row { row, .. }) => row.to_string(),
-            Some(Self::Direct) => drawn(),
-            None => asked(),
         }
     }
 }

@@ -20,33 +20,28 @@ use planner::ProbeId;
 use super::active_plan::ActivePlan;
 use super::budget_state::BudgetState;
 use super::estimate::SampledParts;
+use super::hysteresis::SharingHysteresis;
 use super::member::Member;
 use super::reports::SamplerReports;
-use super::sharing_hysteresis::SharingHysteresis;
 use super::workload_state::WorkloadState;
 use super::{Command, Event};
-
-/// Workloads that may be open, unless an event says otherwise.
-const DEFAULT_MAX_WORKLOADS: usize = 8;
 
 /// Sessions of a coordinator before open again within this time.
 const RESUMED_WITHIN: Duration = Duration::from_secs(30);
 
 /// Members by name, workloads by number, and the last epoch.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Scheduler {
     now: Duration,
     /// Of all workloads together: no two plans have the same.
     plan_epoch: u64,
     last_workload: u64,
-    max_workloads: usize,
+    limits: Limits,
     members: BTreeMap<String, Member>,
     workloads: BTreeMap<u64, WorkloadState>,
     /// The budget of each workload that has one.
     budgets: BTreeMap<u64, BudgetState>,
     last_budget_plan: u64,
-    /// The share of compositors' time that audits may take.
-    audit_time_ratio: f64,
     /// The measurement that a node makes for a budget, and the time before which no other begins.
     running_probe: Option<ProbeId>,
     probing_paused_until: Duration,
@@ -59,26 +54,17 @@ pub struct Scheduler {
     resumed_at: Option<Duration>,
 }
 
-impl Default for Scheduler {
+/// Limits that hold unless an event says otherwise.
+#[derive(Debug, Clone)]
+struct Limits {
+    max_workloads: usize,
+    /// The share of compositors' time that audits may take.
+    audit_time_ratio: f64,
+}
+
+impl Default for Limits {
     fn default() -> Self {
-        Self {
-            now: Duration::ZERO,
-            plan_epoch: 0,
-            last_workload: 0,
-            max_workloads: DEFAULT_MAX_WORKLOADS,
-            members: BTreeMap::new(),
-            workloads: BTreeMap::new(),
-            budgets: BTreeMap::new(),
-            last_budget_plan: 0,
-            audit_time_ratio: 0.0,
-            running_probe: None,
-            probing_paused_until: Duration::ZERO,
-            sharing: SharingHysteresis::default(),
-            reports: SamplerReports::default(),
-            liveness_probed_at: Duration::ZERO,
-            cells_changed_at: None,
-            resumed_at: None,
-        }
+        Self { max_workloads: 8, audit_time_ratio: 0.0 }
     }
 }
 
@@ -95,7 +81,7 @@ impl Scheduler {
     fn take(&mut self, event: Event) -> Vec<Command> {
         match event {
             Event::Limits { max_workloads, audit_time_ratio } => {
-                (self.max_workloads, self.audit_time_ratio) = (max_workloads, audit_time_ratio);
+                self.limits = Limits { max_workloads, audit_time_ratio };
                 Vec::new()
             }
             Event::Joined { incarnation, join } => self.joined(incarnation, join),
@@ -139,9 +125,9 @@ impl Scheduler {
 
     /// The number of the workload whose plan in force has this epoch.
     fn workload_of_plan(&self, plan_epoch: u64) -> Option<u64> {
-        let has_epoch =
-            |workload: &WorkloadState| workload.active_plan.as_ref().is_some_and(|a| a.epoch() == plan_epoch);
-        self.workloads.iter().find(|(_, workload)| has_epoch(workload)).map(|(&number, _)| number)
+        let mut plans =
+            self.workloads.iter().filter_map(|(&number, workload)| Some((number, workload.active_plan.as_ref()?)));
+        plans.find(|(_, active)| active.epoch() == plan_epoch).map(|(number, _)| number)
     }
 
     fn workload_of_session(&self, session: u64) -> Option<u64> {
@@ -152,15 +138,16 @@ impl Scheduler {
         self.workloads.get(&number)?.active_plan.as_ref()
     }
 
-    /// The plan in force with this epoch.
-    fn active_plan_of(&mut self, plan_epoch: u64) -> Option<&mut ActivePlan> {
-        let plans = self.workloads.values_mut().filter_map(|workload| workload.active_plan.as_mut());
-        plans.into_iter().find(|active| active.epoch() == plan_epoch)
+    /// The plan in force with this epoch, and the number of its workload.
+    fn active_plan_of(&mut self, plan_epoch: u64) -> Option<(u64, &mut ActivePlan)> {
+        let workloads = self.workloads.iter_mut();
+        let mut plans = workloads.filter_map(|(&number, workload)| Some((number, workload.active_plan.as_mut()?)));
+        plans.find(|(_, active)| active.epoch() == plan_epoch)
     }
 
     /// The plan in force with this epoch, if it is for this node.
-    fn active_plan_for(&mut self, plan_epoch: u64, name: &str) -> Option<&mut ActivePlan> {
-        self.active_plan_of(plan_epoch).filter(|active| active.members.contains_key(name))
+    fn active_plan_for(&mut self, plan_epoch: u64, name: &str) -> Option<(u64, &mut ActivePlan)> {
+        self.active_plan_of(plan_epoch).filter(|(_, active)| active.members.contains_key(name))
     }
 
     /// The later of two processes with one name counts. A node's epoch may be above ours where the coordinator was
@@ -222,7 +209,7 @@ impl Scheduler {
         let mut commands = self.readmit();
         commands.extend(self.share_evenly());
         commands.extend(self.follow_viewers());
-        commands.extend(self.reevaluate_all());
+        commands.extend(self.workload_numbers().into_iter().flat_map(|number| self.reevaluate(number)));
         commands.extend(self.probe_liveness());
         commands
     }

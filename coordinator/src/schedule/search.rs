@@ -47,11 +47,13 @@ impl Division {
 /// change of role. Unequal nodes: by s/q, how much faster they sample than they composite.
 pub(super) fn order(nodes: &[NodeCosts], sampled: &[bool]) -> Vec<usize> {
     let equal = NodeCosts::are_equal(nodes);
-    let ratio = |i: usize| nodes[i].view_s() / nodes[i].costs.sample_image_s.max(f64::MIN_POSITIVE);
-    let by_speed = |a: usize, b: usize| if equal { Ordering::Equal } else { ratio(b).total_cmp(&ratio(a)) };
-    let samples = |i: usize| sampled.get(i).copied().unwrap_or(false);
+    let ratios = nodes.iter().map(|node| node.view_s() / node.costs.sample_image_s.max(f64::MIN_POSITIVE));
+    let ratios: Vec<f64> = ratios.collect();
     let mut order: Vec<usize> = (0..nodes.len()).collect();
-    order.sort_by(|&a, &b| by_speed(a, b).then(samples(b).cmp(&samples(a))));
+    order.sort_by_key(|&i| !sampled.get(i).copied().unwrap_or(false));
+    if !equal {
+        order.sort_by(|&a, &b| ratios[b].total_cmp(&ratios[a]));
+    }
     order
 }
 
@@ -98,10 +100,10 @@ fn neighbours<'a>(
 ) -> impl Iterator<Item = Division> + 'a {
     let count = nodes.len();
     let singles = (0..if k_may_change { count } else { 0 }).map(|i| vec![i]);
-    let differ = |i: usize, j: usize| from.samples[i] != from.samples[j];
-    let swaps = (0..count).flat_map(move |i| (0..i).filter(move |&j| differ(i, j)).map(move |j| vec![i, j]));
-    let possible = |division: &Division| (1..=load.most_samplers(nodes.len())).contains(&division.sampler_count());
-    singles.chain(swaps).map(|flips| from.flipped(load, nodes, &flips)).filter(possible)
+    let swaps = (0..count)
+        .flat_map(move |i| (0..i).filter(move |&j| from.samples[i] != from.samples[j]).map(move |j| vec![i, j]));
+    let divisions = singles.chain(swaps).map(|flips| from.flipped(load, nodes, &flips));
+    divisions.filter(|division| (1..=load.most_samplers(nodes.len())).contains(&division.sampler_count()))
 }
 
 /// A step from the present division towards another by at most `changes` changes of role, the best change first. Nodes
@@ -114,8 +116,8 @@ pub(super) fn towards(
     has_role: &[bool],
     changes: usize,
 ) -> Division {
-    let start = |i: usize| if has_role[i] { present[i] } else { target.samples[i] };
-    let mut division = Division::new(load, nodes, (0..nodes.len()).map(start).collect());
+    let start = (0..nodes.len()).map(|i| if has_role[i] { present[i] } else { target.samples[i] });
+    let mut division = Division::new(load, nodes, start.collect());
     for _ in 0..changes {
         let open = (0..nodes.len()).filter(|&i| division.samples[i] != target.samples[i]);
         let Some(next) = open.map(|i| division.flipped(load, nodes, &[i])).min_by(by_time) else { break };

@@ -1,60 +1,46 @@
 //! The sessions of one workload, and what they ask for together.
 
+use std::array;
+use std::sync::Arc;
+
 use cluster::{Costs, Quality, SharedLightCosts};
 use depth_image::PinholeCamera;
 use planner::Budget;
 
+use super::operations::operations;
 use super::{Opening, PolicyOverride};
 
-/// The demand of one session.
-#[derive(Debug, Clone)]
-struct Session {
-    number: u64,
-    views: usize,
-    frames_per_s: Option<f64>,
-    policy_override: PolicyOverride,
-    fallbacks: Vec<Quality>,
-    viewpoints: Vec<PinholeCamera>,
-    method: String,
-    /// As measured for its own views.
-    costs: Costs,
-    shared_light: Option<SharedLightCosts>,
-    budget: Option<Budget>,
-}
-
-impl Session {
+impl Opening {
     fn views_per_s(&self) -> Option<f64> {
-        Some(self.frames_per_s? * self.views as f64)
+        Some(self.frames_per_s? * self.views_per_set as f64)
+    }
+
+    /// Views in the time of a set, at least 1.
+    fn weight(&self, set_s: f64) -> f64 {
+        self.views_per_s().map_or(self.views_per_set as f64, |rate| rate * set_s).max(1.0)
+    }
+
+    fn budget(&self) -> Option<Budget> {
+        self.budgeted.as_ref().map(|budgeted| budgeted.budget)
     }
 }
 
-/// Sessions in the order in which they were opened.
+/// Sessions in the order in which they were opened, with the demand that each has now.
 #[derive(Debug, Clone, Default)]
-pub(super) struct SessionMix(Vec<Session>);
+pub(super) struct SessionMix(Vec<Arc<Opening>>);
 
 impl SessionMix {
     pub(super) fn add(&mut self, opening: &Opening) {
         self.remove(opening.session);
-        self.0.push(Session {
-            number: opening.session,
-            views: opening.views_per_set,
-            frames_per_s: opening.frames_per_s,
-            policy_override: opening.policy_override,
-            fallbacks: opening.fallbacks.clone(),
-            viewpoints: opening.viewpoints.clone(),
-            method: opening.method.clone(),
-            costs: opening.costs,
-            shared_light: opening.shared_light,
-            budget: opening.budgeted.as_ref().map(|budgeted| budgeted.budget),
-        });
+        self.0.push(Arc::new(opening.clone()));
     }
 
     pub(super) fn remove(&mut self, number: u64) {
-        self.0.retain(|session| session.number != number);
+        self.0.retain(|session| session.session != number);
     }
 
-    fn of_number(&mut self, number: u64) -> impl Iterator<Item = &mut Session> {
-        self.0.iter_mut().filter(move |session| session.number == number)
+    fn of_number(&mut self, number: u64) -> impl Iterator<Item = &mut Opening> {
+        self.0.iter_mut().filter(move |session| session.session == number).map(Arc::make_mut)
     }
 
     pub(super) fn set_viewpoints(&mut self, number: u64, viewpoints: &[PinholeCamera]) {
@@ -62,7 +48,8 @@ impl SessionMix {
     }
 
     pub(super) fn set_demand(&mut self, number: u64, views: usize, frames_per_s: Option<f64>) {
-        self.of_number(number).for_each(|session| (session.views, session.frames_per_s) = (views, frames_per_s));
+        self.of_number(number)
+            .for_each(|session| (session.views_per_set, session.frames_per_s) = (views, frames_per_s));
     }
 
     pub(super) fn len(&self) -> usize {
@@ -70,18 +57,18 @@ impl SessionMix {
     }
 
     pub(super) fn numbers(&self) -> Vec<u64> {
-        self.0.iter().map(|session| session.number).collect()
+        self.0.iter().map(|session| session.session).collect()
     }
 
     pub(super) fn contains(&self, number: u64) -> bool {
-        self.0.iter().any(|session| session.number == number)
+        self.0.iter().any(|session| session.session == number)
     }
 
     pub(super) fn viewpoints(&self) -> Vec<PinholeCamera> {
         self.0.iter().flat_map(|session| session.viewpoints.iter().copied()).collect()
     }
 
-    fn rated(&self) -> impl Iterator<Item = &Session> + Clone {
+    fn rated(&self) -> impl Iterator<Item = &Arc<Opening>> + Clone {
         self.0.iter().filter(|session| session.frames_per_s.is_some())
     }
 
@@ -96,18 +83,18 @@ impl SessionMix {
 
     /// V of all sessions.
     pub(super) fn views(&self) -> usize {
-        self.0.iter().fold(0, |sum, session| sum.saturating_add(session.views))
+        self.0.iter().fold(0, |sum, session| sum.saturating_add(session.views_per_set))
     }
 
     /// Views of sessions without a rate, which ask for all of a set at once.
     pub(super) fn views_at_once(&self) -> usize {
         let batches = self.0.iter().filter(|session| session.frames_per_s.is_none());
-        batches.fold(0, |sum, session| sum.saturating_add(session.views))
+        batches.fold(0, |sum, session| sum.saturating_add(session.views_per_set))
     }
 
     /// Views a second that sessions with a rate ask for, undegraded.
     pub(super) fn views_per_s(&self) -> f64 {
-        self.rated().filter_map(Session::views_per_s).sum()
+        self.rated().filter_map(|session| session.views_per_s()).sum()
     }
 
     /// What sessions force: it holds while all of them state the same.
@@ -123,8 +110,8 @@ impl SessionMix {
 
     /// The method by which most sessions have their views reconstructed; of several, the first.
     pub(super) fn usual_method(&self) -> Option<&str> {
-        let count = |of: &Session| self.0.iter().filter(|session| session.method == of.method).count();
-        self.0.iter().rev().max_by_key(|session| count(session)).map(|session| session.method.as_str())
+        let methods = self.0.iter().map(|session| session.method.as_str());
+        methods.clone().rev().max_by_key(|method| methods.clone().filter(|other| other == method).count())
     }
 
     /// Where the time of views goes by the method of most sessions, as measured for the first of them.
@@ -136,7 +123,7 @@ impl SessionMix {
     /// The least strict budget that implies those of all sessions. A session is left out where its budget may not be kept
     /// together with those before it. Budgets of one workload are comparable.
     pub(super) fn strictest_budget(&self, may_be_kept: impl Fn(&Budget) -> bool) -> Option<Budget> {
-        let budgets = self.0.iter().filter_map(|session| session.budget);
+        let budgets = self.0.iter().filter_map(|session| session.budget());
         budgets.fold(None, |before: Option<Budget>, budget| {
             let together = before.map_or(Some(budget), |before| before.and(&budget));
             together.filter(&may_be_kept).or(before)
@@ -146,7 +133,7 @@ impl SessionMix {
     /// The sessions of each budget.
     pub(super) fn budgets(&self) -> Vec<(Budget, Vec<u64>)> {
         let mut of: Vec<(Budget, Vec<u64>)> = Vec::new();
-        for (budget, number) in self.0.iter().filter_map(|session| Some((session.budget?, session.number))) {
+        for (budget, number) in self.0.iter().filter_map(|session| Some((session.budget()?, session.session))) {
             match of.iter_mut().find(|(other, _)| *other == budget) {
                 Some((_, numbers)) => numbers.push(number),
                 None => of.push((budget, vec![number])),
@@ -158,9 +145,9 @@ impl SessionMix {
     /// The qualities that every session with a rate falls back to, in the same order.
     pub(super) fn fallbacks(&self) -> &[Quality] {
         let Some(first) = self.rated().next().map(|session| &session.fallbacks) else { return &[] };
-        let common =
-            |other: &Session| first.iter().zip(&other.fallbacks).take_while(|(own, other)| own == other).count();
-        &first[..self.rated().map(common).min().unwrap_or(0)]
+        let pairs = self.rated().map(|other| first.iter().zip(&other.fallbacks));
+        let common = pairs.map(|pairs| pairs.take_while(|(own, other)| own == other).count()).min();
+        &first[..common.unwrap_or(0)]
     }
 
     /// Costs of the mean view, where each is shown for `set_s`; sampling costs are those of the first session. `None`
@@ -175,22 +162,17 @@ impl SessionMix {
     }
 }
 
-fn mean_costs<'a>(sessions: impl Iterator<Item = &'a Session> + Clone, set_s: f64) -> Option<Costs> {
+fn mean_costs<'a>(sessions: impl Iterator<Item = &'a Arc<Opening>> + Clone, set_s: f64) -> Option<Costs> {
     let first = sessions.clone().next()?.costs;
     // A mean of equal costs would differ from them by rounding.
     if sessions.clone().all(|session| session.costs == first) {
         return Some(first);
     }
-    let weight = |session: &Session| session.views_per_s().map_or(session.views as f64, |rate| rate * set_s).max(1.0);
-    let all: f64 = sessions.clone().map(weight).sum();
-    let mean =
-        |of: fn(&Costs) -> f64| sessions.clone().map(|session| weight(session) * of(&session.costs)).sum::<f64>() / all;
-    Some(Costs {
-        direct_view_s: mean(|costs| costs.direct_view_s),
-        reconstruct_view_s: mean(|costs| costs.reconstruct_view_s),
-        encode_view_s: mean(|costs| costs.encode_view_s),
-        ..first
-    })
+    let all: f64 = sessions.clone().map(|session| session.weight(set_s)).sum();
+    let [_, direct_view_s, reconstruct_view_s, _, encode_view_s] = array::from_fn(|i| {
+        sessions.clone().map(|session| session.weight(set_s) * operations(&session.costs)[i]).sum::<f64>() / all
+    });
+    Some(Costs { direct_view_s, reconstruct_view_s, encode_view_s, ..first })
 }
 
 #[cfg(test)]

@@ -1,16 +1,19 @@
 //! One workload: its sessions, its nodes, and the plan that serves it.
 
+use std::array;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Duration;
 
 use cluster::{AchievedTime, AuditOrder, Costs, Policy, PolicyChoice, Promise, Quality, Workload, is_one_place};
-use depth_image::{ExposureEv, PinholeCamera, SampleCamera, ViewCell};
+use depth_image::{PinholeCamera, SampleCamera, ViewCell};
 use glam::UVec2;
 
 use super::active_plan::ActivePlan;
 use super::budgeted::Budgeted;
 use super::cells::Cells;
 use super::node_costs::view_s;
+use super::operations::operations;
 use super::overload::{FULL, Overload};
 use super::representation::Representation;
 use super::session_mix::SessionMix;
@@ -28,15 +31,9 @@ pub(super) struct WorkloadState {
     cells: Option<Cells>,
     /// Of the mean view of its sessions, as measured when they were opened.
     pub(super) costs: Costs,
-    /// As measured when it was opened: views of all cells, moments and plans have one exposure.
-    pub(super) auto_exposure: ExposureEv,
-    /// The time of a view at the last fallback over that of one as it was asked for.
-    last_view_time_ratio: f64,
-    /// What the reasons of its plans say beside their figures.
-    pub(super) note: String,
+    /// Its first session as it was opened: its exposure is that of views of all cells, moments and plans.
+    pub(super) first: Arc<Opening>,
     pub(super) sessions: SessionMix,
-    /// The representations among which budgets of its sessions choose; `None`: its sessions have no budget.
-    pub(super) budgeted: Option<Budgeted>,
     /// The choice of budgets, in place of the sessions' own.
     pub(super) representation: Option<Representation>,
     /// The promises that sessions know, one a budget, and since when.
@@ -62,7 +59,7 @@ pub(super) struct WorkloadState {
     /// Where live viewers are, as their compositors have said.
     live_viewpoints: BTreeMap<String, Vec<PinholeCamera>>,
     /// Viewers have moved, come or gone since cells were placed.
-    viewers_have_moved: bool,
+    pub(super) viewers_have_moved: bool,
 }
 
 /// The part of the demand that a plan follows at once.
@@ -80,11 +77,8 @@ impl WorkloadState {
             requested: opening.workload.clone(),
             cells: (!opening.viewpoints.is_empty()).then(|| Cells::of(&opening.workload)),
             costs: opening.costs,
-            auto_exposure: opening.auto_exposure,
-            last_view_time_ratio: opening.last_view_time_ratio,
-            note: opening.note.clone(),
+            first: Arc::new(opening.clone()),
             sessions: SessionMix::default(),
-            budgeted: opening.budgeted.clone(),
             representation: None,
             announced: Vec::new(),
             audit: None,
@@ -145,19 +139,20 @@ impl WorkloadState {
     /// The view cells that budgets are planned for: those that viewpoints may grow to, or the one between the sessions' own
     /// sample cameras.
     pub(super) fn planned_cells(&self) -> Vec<ViewCell> {
-        let own = || ViewCell::between(&SampleCamera::references(&self.requested.sample_cameras));
-        self.cells.as_ref().map_or_else(|| own().into_iter().collect(), Cells::grown)
+        match &self.cells {
+            Some(cells) => cells.grown(),
+            None => ViewCell::between(&SampleCamera::references(&self.requested.sample_cameras)).into_iter().collect(),
+        }
     }
 
     /// The workload in the representation in force.
     fn in_representation(&self) -> Workload {
-        let row = self.representation.as_ref().and_then(Representation::row).zip(self.budgeted.as_ref());
-        let Some((row, budgeted)) = row else { return self.requested.clone() };
-        let mut workload = budgeted.sampled_as(row, &self.requested, &self.planned_cells());
-        if let Some(Representation::Row { planes, .. }) = self.representation {
-            workload.planes = planes;
+        match (&self.representation, &self.first.budgeted) {
+            (Some(Representation::Row { row, planes, .. }), Some(budgeted)) => {
+                Workload { planes: *planes, ..budgeted.sampled_as(row, &self.requested, &self.planned_cells()) }
+            }
+            _ => self.requested.clone(),
         }
-        workload
     }
 
     pub(super) fn trigger(&self) -> PlanTrigger {
@@ -182,7 +177,7 @@ impl WorkloadState {
     }
 
     fn shares_budget(&self, asked: Option<&Budgeted>) -> bool {
-        match (&self.budgeted, asked) {
+        match (&self.first.budgeted, asked) {
             (Some(own), Some(asked)) => {
                 let strictest = self.sessions.strictest_budget(|_| true);
                 own.is_shareable(asked) && strictest.is_none_or(|budget| budget.and(&asked.budget).is_some())
@@ -200,10 +195,9 @@ impl WorkloadState {
 
     /// Where a compositor's live viewers are, in place of where they were.
     pub(super) fn set_live_viewpoints(&mut self, node: String, viewpoints: Vec<PinholeCamera>) {
-        if viewpoints.is_empty() {
-            self.live_viewpoints.remove(&node)
-        } else {
-            self.live_viewpoints.insert(node, viewpoints)
+        match viewpoints.is_empty() {
+            true => self.live_viewpoints.remove(&node),
+            false => self.live_viewpoints.insert(node, viewpoints),
         };
     }
 
@@ -217,10 +211,6 @@ impl WorkloadState {
     pub(super) fn note_movement(&mut self, now: Duration) {
         self.viewers_have_moved = true;
         self.note_activity(now);
-    }
-
-    pub(super) fn viewers_have_moved(&self) -> bool {
-        self.viewers_have_moved
     }
 
     /// Places cells around the viewpoints of sessions, and of live viewers on nodes that serve it.
@@ -300,7 +290,7 @@ impl WorkloadState {
             None => self.requested.sample_cameras.len(),
             Some(_) => self.requested.view_camera_count(),
         };
-        match (self.representation.as_ref().and_then(Representation::row), &self.budgeted) {
+        match (self.representation.as_ref().and_then(Representation::row), &self.first.budgeted) {
             (Some(row), Some(budgeted)) if !budgeted.keeps_cameras => {
                 row.camera_count as usize * self.cells.as_ref().map_or(1, |cells| cells.grown().len())
             }
@@ -353,13 +343,13 @@ impl WorkloadState {
     /// The time of a view at a fallback over that of one as it was asked for.
     pub(super) fn view_time_ratio(&self, step: usize) -> f64 {
         let steps = self.sessions.fallbacks().iter().take_while(|quality| quality.frame_rate_ratio >= 1.0).count();
-        self.last_view_time_ratio.powf(step.min(steps) as f64 / steps.max(1) as f64)
+        self.first.last_view_time_ratio.powf(step.min(steps) as f64 / steps.max(1) as f64)
     }
 
     /// Begins at the first fallback that has room, where views as asked for would take this share of the nodes' time, and the time of
     /// others is known.
     pub(super) fn begin_with_room(&mut self, now: Duration, utilisation: f64) {
-        if self.last_view_time_ratio >= 1.0 || self.sessions.viewers() == 0 {
+        if self.first.last_view_time_ratio >= 1.0 || self.sessions.viewers() == 0 {
             return;
         }
         let last = self.sessions.fallbacks().len();
@@ -375,19 +365,18 @@ impl WorkloadState {
         let Some(rated) = self.sessions.rated_costs(self.set_s()).map(|asked| self.represented(asked)) else {
             return *node;
         };
-        let of = |node_s: f64, rated_s: f64, mean_s: f64| {
-            let ratio = rated_s / mean_s;
-            let is_mixed = ratio.is_finite() && rated_s != mean_s;
-            let scaled = || (node_s * ratio).clamp(node_s.min(rated_s), node_s.max(rated_s));
-            if is_mixed { scaled() } else { node_s }
-        };
-        let mean = &self.costs;
-        Costs {
-            direct_view_s: of(node.direct_view_s, rated.direct_view_s, mean.direct_view_s),
-            reconstruct_view_s: of(node.reconstruct_view_s, rated.reconstruct_view_s, mean.reconstruct_view_s),
-            encode_view_s: of(node.encode_view_s, rated.encode_view_s, mean.encode_view_s),
-            ..*node
-        }
+        let node_s = operations(node);
+        let rated_s = operations(&rated);
+        let mean_s = operations(&self.costs);
+        let [_, direct_view_s, reconstruct_view_s, _, encode_view_s] = array::from_fn(|i| {
+            let ratio = rated_s[i] / mean_s[i];
+            let is_mixed = ratio.is_finite() && rated_s[i] != mean_s[i];
+            if !is_mixed {
+                return node_s[i];
+            }
+            (node_s[i] * ratio).clamp(node_s[i].min(rated_s[i]), node_s[i].max(rated_s[i]))
+        });
+        Costs { direct_view_s, reconstruct_view_s, encode_view_s, ..*node }
     }
 
     /// Nodes that do nothing but serve sessions with a rate, at these mean costs. It does not depend on the policy in force,
@@ -435,15 +424,11 @@ impl WorkloadState {
     pub(super) fn degraded(&self) -> Workload {
         let workload = self.in_representation();
         let Some(quality) = self.quality() else { return workload };
-        let sized = |camera: &SampleCamera| {
-            let size_px = (camera.size_px().as_dvec2() * quality.sample_side_ratio).round().as_uvec2().max(UVec2::ONE);
-            camera.resized(size_px)
-        };
-        let workload = workload.without_common_cells();
-        Workload {
-            lighting: quality.lighting.clone(),
-            sample_cameras: workload.sample_cameras.iter().map(sized).collect(),
-            ..workload
+        let mut workload = workload.without_common_cells();
+        for camera in &mut workload.sample_cameras {
+            let size_px = (camera.size_px().as_dvec2() * quality.sample_side_ratio).round().as_uvec2();
+            *camera = camera.resized(size_px.max(UVec2::ONE));
         }
+        Workload { lighting: quality.lighting.clone(), ..workload }
     }
 }

@@ -27,9 +27,10 @@ impl Moments {
     pub fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
         let count = values.clone().count();
         let mean = values.clone().sum::<f64>() / count.max(1) as f64;
-        let power = |exponent: i32| values.clone().map(|value| (value - mean).powi(exponent)).sum::<f64>();
-        let deviation = (power(2) / count.saturating_sub(1).max(1) as f64).sqrt();
-        let skewness = power(3) / count.max(1) as f64 / deviation.powi(3);
+        let [squares, cubes] =
+            [2, 3].map(|exponent| values.clone().map(|value| (value - mean).powi(exponent)).sum::<f64>());
+        let deviation = (squares / count.saturating_sub(1).max(1) as f64).sqrt();
+        let skewness = cubes / count.max(1) as f64 / deviation.powi(3);
         Self { count, mean, deviation, skewness: if deviation == 0.0 { 0.0 } else { skewness } }
     }
 

@@ -89,15 +89,13 @@ impl Budget {
     }
 
     fn add(&mut self, term: &str) -> Result<(), BudgetError> {
-        let repeated = |kind| BudgetError::Repeated { term: shown(term), kind };
         match term.split_whitespace().collect::<Vec<_>>()[..] {
             ["time", limit] if self.most_view_ms.is_none() => self.most_view_ms = Some(milliseconds(limit, term)?),
-            ["time", _] => return Err(repeated("time")),
-            ["time", ..] => return Err(BudgetError::Malformed { term: shown(term) }),
+            ["time", _] => return Err(BudgetError::Repeated { term: shown(term), kind: "time" }),
+            ["time", ..] => return Err(malformed(term)),
             _ => {
-                let error = ErrorTerm::parse(term)?;
-                if self.error.replace(error).is_some() {
-                    return Err(repeated("error"));
+                if self.error.replace(ErrorTerm::parse(term)?).is_some() {
+                    return Err(BudgetError::Repeated { term: shown(term), kind: "error" });
                 }
             }
         }
@@ -179,14 +177,13 @@ impl ErrorTerm {
 
     fn parse(term: &str) -> Result<Self, BudgetError> {
         let words: Vec<&str> = term.split_whitespace().take(5).collect();
-        let malformed = || BudgetError::Malformed { term: shown(term) };
-        let (limit, words) = words.split_last().ok_or_else(malformed)?;
+        let (limit, words) = words.split_last().ok_or_else(|| malformed(term))?;
         let (statistic, words) = match words.split_last() {
             Some((&"p95", name)) => (Statistic::P95, name),
             _ => (Statistic::Mean, words),
         };
         if words.is_empty() {
-            return Err(malformed());
+            return Err(malformed(term));
         }
         let metric = shown(&words.join(" ")).parse();
         let metric = metric.map_err(|source| BudgetError::UnknownMetric { term: shown(term), source })?;
@@ -205,9 +202,9 @@ impl fmt::Display for ErrorTerm {
 /// The limit of an error term in the unit of its metric.
 fn limit_of(metric: Metric, limit: &str, term: &str) -> Result<f64, BudgetError> {
     let (number, is_percent) = limit.strip_suffix('%').map_or((limit, false), |number| (number, true));
-    let number: f64 = number.parse().map_err(|_| BudgetError::Malformed { term: shown(term) })?;
+    let number: f64 = number.parse().map_err(|_| malformed(term))?;
     let (limit, most, allowed) = match (metric, is_percent) {
-        (Metric::Psnr, true) => return Err(BudgetError::Malformed { term: shown(term) }),
+        (Metric::Psnr, true) => return Err(malformed(term)),
         (Metric::Psnr, false) => (number, MAX_PSNR_DB, "above 0 and at most 100 dB"),
         (Metric::Disocclusion, true) => (number, 100.0, "above 0 and at most 100 %"),
         (Metric::Disocclusion, false) => (number * 100.0, 100.0, "above 0 and at most 1"),
@@ -219,18 +216,21 @@ fn limit_of(metric: Metric, limit: &str, term: &str) -> Result<f64, BudgetError>
 
 /// A time in ms, from a text with its unit.
 fn milliseconds(limit: &str, term: &str) -> Result<f64, BudgetError> {
-    let malformed = || BudgetError::Malformed { term: shown(term) };
     let (number, unit_ms) = match limit.strip_suffix("ms") {
         Some(number) => (number, 1.0),
-        None => (limit.strip_suffix('s').ok_or_else(malformed)?, 1e3),
+        None => (limit.strip_suffix('s').ok_or_else(|| malformed(term))?, 1e3),
     };
-    let number: f64 = number.parse().map_err(|_| malformed())?;
+    let number: f64 = number.parse().map_err(|_| malformed(term))?;
     in_range(number * unit_ms, MAX_VIEW_MS, term, "above 0 and at most 60 s")
 }
 
 fn in_range(limit: f64, most: f64, term: &str, allowed: &'static str) -> Result<f64, BudgetError> {
     let is_valid = limit > 0.0 && limit <= most;
     if is_valid { Ok(limit) } else { Err(BudgetError::OutOfRange { term: shown(term), allowed }) }
+}
+
+fn malformed(term: &str) -> BudgetError {
+    BudgetError::Malformed { term: shown(term) }
 }
 
 /// The beginning of a text, for an error.

@@ -59,8 +59,7 @@ impl CostModel {
         });
         let weights = residuals.each_ref().map(|residuals| process.weights(residuals));
         // The most likely scale, with the prior's as one more measurement.
-        let scale = |cost: usize| (1.0 + dot(&residuals[cost], &weights[cost])) / (1.0 + timed.len() as f64);
-        let scales = [0, 1, 2].map(scale);
+        let scales = [0, 1, 2].map(|cost| (1.0 + dot(&residuals[cost], &weights[cost])) / (1.0 + timed.len() as f64));
         let rows = points.iter().map(|point| point.row.clone()).collect();
         let logs = points.iter().map(|point| point.logs).collect();
         Self { rows, logs, process, weights, scales }

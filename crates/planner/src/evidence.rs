@@ -77,9 +77,8 @@ impl Evidence<'_> {
                 -excess.mean / excess.deviation.max(1e-3 * self.term.most_ratio())
             }
             Statistic::P95 => {
-                let log = |ratio: f64| ratio.max(LEAST_ERROR_RATIO).ln();
-                let logs = Moments::of(self.ratios().map(log));
-                (log(self.term.most_ratio()) - logs.mean) / logs.deviation.max(0.05) - NORMAL_P95
+                let logs = Moments::of(self.ratios().map(log_error));
+                (log_error(self.term.most_ratio()) - logs.mean) / logs.deviation.max(0.05) - NORMAL_P95
             }
         }
     }
@@ -148,6 +147,10 @@ impl Evidence<'_> {
     fn weight(&self) -> f64 {
         self.counting().map(|errors| errors.weight(self.term.metric())).sum::<f64>() / self.count().max(1) as f64
     }
+}
+
+fn log_error(ratio: f64) -> f64 {
+    ratio.max(LEAST_ERROR_RATIO).ln()
 }
 
 /// The normal distribution to 0.01, by the logistic function: it orders candidates and decides nothing.

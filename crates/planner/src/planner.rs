@@ -24,7 +24,7 @@ use crate::invalid::{InvalidField, MAX_NAME_BYTES, name, seconds, within};
 use crate::kept::{Certificate, Kept, KeptKey, KeptSearch};
 use crate::ladder::{Ladder, Row};
 use crate::metric::Metric;
-use crate::outcome::{Choice, Outcome, RowSummary};
+use crate::outcome::{Choice, Outcome, PromiseState, RowSummary};
 
 /// Views and repetitions with which finalists are timed.
 const TIMED_VIEWS: usize = 32;
@@ -157,7 +157,7 @@ impl<P: Pricing> Planner<P> {
     /// The result, or the state of a plan that is being made.
     #[must_use]
     pub fn outcome(&self) -> Outcome {
-        self.outcome.clone().unwrap_or_else(|| self.outcome_so_far())
+        self.outcome.clone().unwrap_or_else(|| self.outcome_of(self.choice().0, PromiseState::Measuring, false))
     }
 
     /// The rows of the ladder, in order.
@@ -306,9 +306,10 @@ impl<P: Pricing> Planner<P> {
             Some(term) => self.evidence(row, term).estimate(),
             None => {
                 let errors = &self.rows[row].errors;
-                let sum = |limit: f64| errors.iter().map(|errors| errors.excess(Metric::Flip, limit)).sum::<f64>();
+                let [at_0, at_1] =
+                    [0.0, 1.0].map(|limit| errors.iter().map(|errors| errors.excess(Metric::Flip, limit)).sum::<f64>());
                 // The sum of the weights is that of y at 0 less that of y at 1.
-                sum(0.0) / (sum(0.0) - sum(1.0)).max(f64::MIN_POSITIVE)
+                at_0 / (at_0 - at_1).max(f64::MIN_POSITIVE)
             }
         }
     }

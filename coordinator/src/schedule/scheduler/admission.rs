@@ -14,14 +14,6 @@ use crate::schedule::{ChoiceError, Demand, NodeCosts, Opening, PolicyOverride, c
 /// batches, and are higher among many viewers.
 const MOST_ADMITTED: f64 = 0.9;
 
-/// A workload as it would be, and the one that it is of, if there is one.
-struct Change<'a> {
-    before: Option<(u64, &'a WorkloadState)>,
-    after: WorkloadState,
-    /// Costs of all usable nodes.
-    nodes: Vec<NodeCosts>,
-}
-
 impl Scheduler {
     /// Whether a session is open and planned.
     #[must_use]
@@ -57,7 +49,7 @@ impl Scheduler {
         let asks_for_more_views = after.sessions.views_per_s() > before.sessions.views_per_s();
         let needs_more_images = after.cell_count() > before.cell_count() || after.load().images > before.load().images;
         if asks_for_more_views || (viewpoints.is_some() && needs_more_images) {
-            self.admit(&self.change_of(number, before, after))?;
+            self.admit(Some((number, before)), &after, &self.costs_to_admit(number, &after.costs))?;
         }
         Ok(())
     }
@@ -73,27 +65,26 @@ impl Scheduler {
         follows_viewers: bool,
     ) -> Result<(), ChoiceError> {
         let is_open = self.workloads.values().any(|open| open.is_shared_by(workload, budgeted, follows_viewers));
-        if is_open || self.workloads.len() < self.max_workloads {
+        if is_open || self.workloads.len() < self.limits.max_workloads {
             return Ok(());
         }
-        Err(ChoiceError::Workloads { most: self.max_workloads })
+        Err(ChoiceError::Workloads { most: self.limits.max_workloads })
     }
 
     /// The workload that a session belongs to, if it is open.
     pub(super) fn workload_for(&self, opening: &Opening) -> Option<u64> {
-        let is_shared = |open: &WorkloadState| {
+        let mut open = self.workloads.iter().filter(|(_, open)| {
             open.is_shared_by(&opening.workload, opening.budgeted.as_ref(), !opening.viewpoints.is_empty())
-        };
-        self.workloads.iter().find(|(_, workload)| is_shared(workload)).map(|(&number, _)| number)
+        });
+        open.next().map(|(&number, _)| number)
     }
 
     /// Whether a session can be served.
     pub(super) fn check(&self, opening: &Opening) -> Result<(), ChoiceError> {
+        let alone = self.costs_alone(opening);
         let Some(number) = self.workload_for(opening) else {
             self.admits_workload(&opening.workload, opening.budgeted.as_ref(), !opening.viewpoints.is_empty())?;
-            let alone = NodeCosts { costs: opening.costs, ..NodeCosts::default() };
-            let nodes = vec![alone; self.usable().count()];
-            return self.admit(&Change { before: None, after: WorkloadState::new(self.now, opening), nodes });
+            return self.admit(None, &WorkloadState::new(self.now, opening), &alone);
         };
         let before = &self.workloads[&number];
         let forced = opening.policy_override;
@@ -102,26 +93,31 @@ impl Scheduler {
         }
         let after = before.changed(self.now, |sessions| sessions.add(opening));
         // It has to be possible without the others, too: they may leave.
-        let alone = vec![NodeCosts { costs: opening.costs, ..NodeCosts::default() }; self.usable().count()];
         check(&Demand { load: after.load(), nodes: &alone, policy_override: forced, current: None })?;
-        self.admit(&self.change_of(number, before, after))
+        self.admit(Some((number, before)), &after, &self.costs_to_admit(number, &after.costs))
     }
 
-    fn change_of<'a>(&self, number: u64, before: &'a WorkloadState, after: WorkloadState) -> Change<'a> {
-        let nodes = self.costs_to_admit(number, &after.costs);
-        Change { before: Some((number, before)), after, nodes }
+    /// Costs of all usable nodes before any has worked for a session.
+    pub(super) fn costs_alone(&self, opening: &Opening) -> Vec<NodeCosts> {
+        vec![NodeCosts { costs: opening.costs, ..NodeCosts::default() }; self.usable().count()]
     }
 
-    /// Whether a demand can be met; that of sessions with a rate, beside all others, at their last fallback.
-    fn admit(&self, change: &Change<'_>) -> Result<(), ChoiceError> {
-        let Change { before, after, nodes } = change;
+    /// Whether a workload as it would be can be served by nodes with these costs, which are all usable ones: its sessions with a
+    /// rate beside all others, at their last fallback. `before` is the open workload that it is of, with its number.
+    fn admit(
+        &self,
+        before: Option<(u64, &WorkloadState)>,
+        after: &WorkloadState,
+        nodes: &[NodeCosts],
+    ) -> Result<(), ChoiceError> {
         let policy_override = after.policy_override();
         check(&Demand { load: after.load(), nodes, policy_override, current: None })?;
         if let Some(cells) = after.cell_count().filter(|&cells| cells > MAX_CELLS) {
             return Err(ChoiceError::Cells { cells });
         }
         let own = before.map_or(0.0, |(number, workload)| self.promised_to(number, workload));
-        let asked = promised(after, nodes).max(self.without_fallbacks(change));
+        let left = before.map_or(0.0, |(_, workload)| self.without_fallbacks(workload, after, nodes.len()));
+        let asked = promised(after, nodes).max(left);
         // Batches take what is left, and add nothing to what is promised.
         if asked <= own {
             return Ok(());
@@ -138,13 +134,14 @@ impl Scheduler {
 
     /// The share of the nodes' time at the last fallback that is left, where a session does not accept the one in force:
     /// it took as much when it was left.
-    fn without_fallbacks(&self, Change { before, after, nodes }: &Change<'_>) -> f64 {
-        let Some((_, before)) = before.filter(|(_, before)| !before.is_idle(self.now)) else { return 0.0 };
-        let when_left = before.overload.view_utilisation_when_left(after.overload.step);
-        let own_nodes = before.nodes.len() as f64 / nodes.len().max(1) as f64;
-        when_left.map_or(0.0, |view_utilisation| {
-            view_utilisation * after.sessions.views_per_s() * after.frame_rate_ratio() * own_nodes
-        })
+    fn without_fallbacks(&self, before: &WorkloadState, after: &WorkloadState, nodes: usize) -> f64 {
+        match before.overload.view_utilisation_when_left(after.overload.step) {
+            Some(view_utilisation) if !before.is_idle(self.now) => {
+                let own_nodes = before.nodes.len() as f64 / nodes.max(1) as f64;
+                view_utilisation * after.sessions.views_per_s() * after.frame_rate_ratio() * own_nodes
+            }
+            _ => 0.0,
+        }
     }
 }
 
@@ -160,8 +157,8 @@ pub(super) fn rated_set_s(workload: &WorkloadState, nodes: &[NodeCosts]) -> Opti
     }
     let load = workload.rated_load();
     let policy_override = workload.policy_override().possible(&load, nodes.len());
-    let of_viewers = |node: &NodeCosts| NodeCosts { costs: workload.of_viewers(&node.costs), ..*node };
-    let nodes: Vec<NodeCosts> = nodes.iter().map(of_viewers).collect();
+    let of_viewers = nodes.iter().map(|node| NodeCosts { costs: workload.of_viewers(&node.costs), ..*node });
+    let nodes: Vec<NodeCosts> = of_viewers.collect();
     // Nodes that can do none of it do not work for it.
     choose(&Demand { load, nodes: &nodes, policy_override, current: None }).ok().map(|choice| choice.time_s())
 }

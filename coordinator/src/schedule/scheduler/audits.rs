@@ -1,7 +1,6 @@
 //! Audits: promises that views in force do not keep, and their replacement.
 
 use cluster::{AuditOrder, AuditReport};
-use depth_image::PinholeCamera;
 use planner::{Metric, Pricing as _, Statistic};
 
 use super::Scheduler;
@@ -20,11 +19,11 @@ impl Scheduler {
         let BudgetState { plan, in_force, .. } = self.budgets.get(&number)?;
         let audited = in_force.as_ref().filter(|in_force| in_force.audit.is_some())?;
         let term = audited.chosen.budget.error()?;
-        (self.audit_time_ratio > 0.0).then(|| AuditOrder {
-            time_ratio: self.audit_time_ratio,
+        (self.limits.audit_time_ratio > 0.0).then(|| AuditOrder {
+            time_ratio: self.limits.audit_time_ratio,
             least_apart_m: LEAST_APART * f64::from(plan.cell_side_m()),
-            antialias: plan.antialias(),
-            planned_pixel_count: u32::try_from(plan.planned_pixels()).unwrap_or(u32::MAX),
+            antialias: plan.budgeted.antialias(),
+            planned_pixel_count: u32::try_from(plan.budgeted.typical_view.pixel_count()).unwrap_or(u32::MAX),
             with_sample_images: term.metric() == Metric::Disocclusion,
             in_parts: term.statistic() == Statistic::Mean,
         })
@@ -108,8 +107,7 @@ impl Scheduler {
         for (number, state) in &mut self.budgets {
             let Some(workload) = self.workloads.get(number) else { continue };
             let least_apart_m = LEAST_APART as f32 * state.plan.cell_side_m();
-            let is_there = |node: &str, camera: &PinholeCamera| workload.is_viewed_from(node, camera, least_apart_m);
-            state.findings.follow_viewers(now, is_there);
+            state.findings.follow_viewers(now, |node, camera| workload.is_viewed_from(node, camera, least_apart_m));
             if state.broken().is_none() {
                 state.findings.broken = None;
             }

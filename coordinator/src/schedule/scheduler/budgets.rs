@@ -28,7 +28,7 @@ impl Scheduler {
     pub(super) fn follow_budgets(&mut self) -> Vec<Command> {
         let mut commands = self.end_plans();
         self.follow_audits();
-        let with_budget = self.workloads.iter().filter(|(_, workload)| workload.budgeted.is_some());
+        let with_budget = self.workloads.iter().filter(|(_, workload)| workload.first.budgeted.is_some());
         let numbers: Vec<u64> = with_budget.map(|(&number, _)| number).collect();
         commands.extend(numbers.iter().filter_map(|&number| self.plan_for_budget(number)).flatten());
         commands.extend(self.probe_views());
@@ -38,8 +38,8 @@ impl Scheduler {
 
     /// Plans of workloads that have ended.
     fn end_plans(&mut self) -> Vec<Command> {
-        let has_ended = |number: &u64| !self.workloads.contains_key(number);
-        let ended: Vec<u64> = self.budgets.keys().copied().filter(has_ended).collect();
+        let numbers = self.budgets.keys().copied();
+        let ended: Vec<u64> = numbers.filter(|number| !self.workloads.contains_key(number)).collect();
         let ended = ended.into_iter().filter_map(|number| self.budgets.remove(&number)?.plan.unfinished());
         ended.map(|kept| Command::Keep(Box::new(kept))).collect()
     }
@@ -74,15 +74,14 @@ impl Scheduler {
         let workload = self.workloads.get(&number)?;
         let state = self.budgets.get(&number);
         let prices = prices(workload);
-        let is_unreachable = |budget: &Budget| {
-            let known = state.and_then(|state| state.unreachable_by(budget));
-            known.is_some_and(|known| {
+        workload.sessions.strictest_budget(|budget| {
+            let unreachable = state.and_then(|state| state.unreachable_by(budget)).filter(|known| {
                 let is_recent = self.now.saturating_sub(known.since) < DWELL;
                 let is_valid = known.is_final && !is_other_demand(&known.prices, &prices);
                 may_draw(&known.prices) == may_draw(&prices) && (is_recent || is_valid)
-            })
-        };
-        workload.sessions.strictest_budget(|budget| !is_unreachable(budget))
+            });
+            unreachable.is_none()
+        })
     }
 
     /// The strictest budget of sessions whose budgets nothing keeps, where what is in force is for others that have left.
@@ -132,8 +131,8 @@ impl Scheduler {
         if self.running_probe.is_some() || now < self.probing_paused_until {
             return Vec::new();
         }
-        let is_open = |state: &&BudgetState| !state.findings.is_given_up && state.plan.outcome.is_none();
-        let plans = self.budgets.values().filter(is_open).count();
+        let states = self.budgets.values();
+        let plans = states.filter(|state| !state.findings.is_given_up && state.plan.outcome.is_none()).count();
         let due = self.budgets.iter().filter(|(_, state)| !state.findings.is_given_up && state.plan.is_due(now));
         let mut with_node = due.filter_map(|(&number, _)| Some((number, self.node_to_measure(number)?)));
         let Some((number, (name, address))) = with_node.next() else { return Vec::new() };
@@ -155,15 +154,12 @@ impl Scheduler {
         Some((name.clone(), member.status.address.clone()))
     }
 
-    /// Whether some node works for a session; measuring is no such work.
-    fn is_serving(&self) -> bool {
-        self.members.values().any(|member| member.activity.busy_ratio(self.now) > 0.0)
-    }
-
     /// Takes an event of a workload's plan.
     pub(super) fn planned(&mut self, number: u64, event: planner::Event) -> Vec<Command> {
         if let Some((id, busy_s)) = answered(&event) {
-            let share = if self.is_serving() { PROBING_SHARE } else { 1.0 };
+            // Some node works for a session; measuring is no such work.
+            let is_serving = self.members.values().any(|member| member.activity.busy_ratio(self.now) > 0.0);
+            let share = if is_serving { PROBING_SHARE } else { 1.0 };
             self.probe_ended(id, busy_s * (1.0 / share - 1.0));
         }
         let measured = self.budgets.get_mut(&number).and_then(|state| state.plan.take(event));
@@ -336,6 +332,6 @@ fn may_draw(prices: &EqualNodes) -> bool {
 
 /// Whether another representation may be the cheapest.
 fn is_other_demand(a: &EqualNodes, b: &EqualNodes) -> bool {
-    let is_other = |a: usize, b: usize| (a as f64 / b as f64).max(b as f64 / a as f64) >= OTHER_DEMAND;
-    is_other(a.nodes, b.nodes) || is_other(a.views_a_set, b.views_a_set) || is_other(a.cells, b.cells)
+    let pairs = [[a.nodes, b.nodes], [a.views_a_set, b.views_a_set], [a.cells, b.cells]];
+    pairs.iter().any(|[a, b]| (*a as f64 / *b as f64).max(*b as f64 / *a as f64) >= OTHER_DEMAND)
 }

@@ -6,8 +6,6 @@ use cluster::{Assignment, FetchImages, SamplerReport};
 
 use super::Scheduler;
 use crate::schedule::active_plan::ActivePlan;
-use crate::schedule::member::Member;
-use crate::schedule::workload_state::WorkloadState;
 use crate::schedule::{ChoiceError, Command, Probe, ProbeKind, ProbedImage};
 
 /// Duration of a quarantine, after which a link may be restored.
@@ -26,51 +24,42 @@ const SETS_AHEAD: f64 = 3.0;
 impl Scheduler {
     pub(super) fn ready(&mut self, plan_epoch: u64, name: String) -> Vec<Command> {
         let now = self.now;
-        let number = self.workload_of_plan(plan_epoch);
-        if let Some(active) = self.active_plan_for(plan_epoch, &name) {
+        if let Some((number, active)) = self.active_plan_for(plan_epoch, &name) {
             active.ready.insert(name);
-            let workload = number.and_then(|number| self.workloads.get_mut(&number));
-            workload.into_iter().for_each(|workload| workload.note_ready(now));
+            self.workloads.get_mut(&number).into_iter().for_each(|workload| workload.note_ready(now));
         }
         Vec::new()
     }
 
     pub(super) fn rejected(&mut self, plan_epoch: u64, name: String, reason: String) -> Vec<Command> {
-        if let Some(active) = self.active_plan_for(plan_epoch, &name) {
+        if let Some((_, active)) = self.active_plan_for(plan_epoch, &name) {
             active.rejected.insert(name, reason);
         }
         Vec::new()
     }
 
     pub(super) fn unready(&mut self, plan_epoch: u64, name: &str, reason: &str) -> Vec<Command> {
-        let Some(number) = self.workload_of_plan(plan_epoch) else { return Vec::new() };
-        if self.active_plan_for(plan_epoch, name).is_none() {
-            return Vec::new();
-        }
+        let Some((number, _)) = self.active_plan_for(plan_epoch, name) else { return Vec::new() };
         self.exclude(number, name, &format!("could not take plan {plan_epoch}: {reason}"))
     }
 
     /// A plan that every node rejects is the sessions' fault; one that some nodes have taken is the fault of the others.
     pub(super) fn applied(&mut self, plan_epoch: u64) -> Vec<Command> {
-        let Some(number) = self.workload_of_plan(plan_epoch) else { return Vec::new() };
-        let Some(active) = self.active_plan_of(plan_epoch) else { return Vec::new() };
+        let Some((number, active)) = self.active_plan_of(plan_epoch) else { return Vec::new() };
         let rejected = std::mem::take(&mut active.rejected);
         let Some(reason) = rejected.values().next().cloned() else { return Vec::new() };
         if active.ready.is_empty() {
-            return self.refuse_all(number, &ChoiceError::Rejected { reason });
+            let error = ChoiceError::Rejected { reason };
+            let sessions = self.workloads.get(&number).map(|workload| workload.sessions.numbers()).unwrap_or_default();
+            let refusals = sessions.into_iter().map(|session| Command::Refuse { session, error: error.clone() });
+            let mut commands: Vec<Command> = refusals.collect();
+            commands.extend(self.end(number));
+            return commands;
         }
         let excluded = rejected
             .into_iter()
             .map(|(name, reason)| self.exclude(number, &name, &format!("cannot take plan {plan_epoch}: {reason}")));
         excluded.flatten().collect()
-    }
-
-    fn refuse_all(&mut self, number: u64, error: &ChoiceError) -> Vec<Command> {
-        let sessions = self.workloads.get(&number).map(|workload| workload.sessions.numbers()).unwrap_or_default();
-        let refuse = |session| Command::Refuse { session, error: error.clone() };
-        let mut commands: Vec<Command> = sessions.into_iter().map(refuse).collect();
-        commands.extend(self.end(number));
-        commands
     }
 
     /// The node gets no role in any plan until it is readmitted or joins again.
@@ -108,8 +97,8 @@ impl Scheduler {
     /// Ends quarantines that have lasted. Nodes then wait for a role as if they had just joined.
     pub(super) fn readmit(&mut self) -> Vec<Command> {
         let now = self.now;
-        let is_planned = |workload: &WorkloadState| workload.active_plan.is_some();
-        let all_are_planned = !self.workloads.is_empty() && self.workloads.values().all(is_planned);
+        let all_are_planned =
+            !self.workloads.is_empty() && self.workloads.values().all(|workload| workload.active_plan.is_some());
         let mut commands = Vec::new();
         for (name, member) in &mut self.members {
             if member.quarantined_at.is_some_and(|since| has_lasted(now, since, all_are_planned)) {
@@ -120,8 +109,7 @@ impl Scheduler {
         for (&number, workload) in &mut self.workloads {
             let is_planned = workload.active_plan.is_some();
             let ended = workload.excluded.extract_if(.., |_, since| has_lasted(now, *since, is_planned));
-            let readmit = |(node_name, _)| Command::Readmit { node_name, workload_number: Some(number) };
-            commands.extend(ended.map(readmit));
+            commands.extend(ended.map(|(node_name, _)| Command::Readmit { node_name, workload_number: Some(number) }));
         }
         if !commands.is_empty() {
             commands.extend(self.nodes_changed("a quarantine ended"));
@@ -157,7 +145,7 @@ impl Scheduler {
         let address = member.status.address.clone();
         let estimate = member.estimates.get(&workload_number)?;
         let sample_image_s = estimate.now().costs.sample_image_s;
-        let active = self.active_plan_for(plan_epoch, sampler)?;
+        let (_, active) = self.active_plan_for(plan_epoch, sampler)?;
         let plan = &active.plan.assignment;
         let images = plan.samplers.iter().find(|share| share.node_name == sampler)?.image_indices.len();
         let image = probed_image(plan, sampler, number)?;
@@ -193,11 +181,10 @@ impl Scheduler {
     }
 
     fn image_probed(&mut self, plan_epoch: u64, sampler: &str, failure: Option<String>) -> Vec<Command> {
-        let probed = self.active_plan_for(plan_epoch, sampler);
-        if !probed.is_some_and(|active| active.probed_samplers.remove(sampler)) {
+        let Some((number, active)) = self.active_plan_for(plan_epoch, sampler) else { return Vec::new() };
+        if !active.probed_samplers.remove(sampler) {
             return Vec::new();
         }
-        let Some(number) = self.workload_of_plan(plan_epoch) else { return Vec::new() };
         if let Some(reason) = failure {
             return self.exclude(number, sampler, &format!("sends no images: {reason}"));
         }
@@ -213,7 +200,7 @@ impl Scheduler {
         if plans.is_empty() || self.now.saturating_sub(self.liveness_probed_at) < LIVENESS_INTERVAL {
             return Vec::new();
         }
-        let probe = |(name, member): (&String, &Member)| {
+        let probes = self.members.iter().filter_map(|(name, member)| {
             let active = plans.iter().find(|active| active.ready.contains(name))?;
             Some(Command::Probe(Box::new(Probe {
                 plan_epoch: active.epoch(),
@@ -223,8 +210,8 @@ impl Scheduler {
                 image: None,
                 deadline: PROBE_DEADLINE,
             })))
-        };
-        let commands = self.members.iter().filter_map(probe).collect();
+        });
+        let commands = probes.collect();
         self.liveness_probed_at = self.now;
         commands
     }

@@ -2,8 +2,7 @@
 
 use std::num::NonZeroU32;
 
-use cluster::{Assignment, Costs, Policy, SessionPlan};
-use depth_image::ExposureEv;
+use cluster::{Costs, Policy, SessionPlan};
 
 use super::Scheduler;
 use crate::schedule::active_plan::ActivePlan;
@@ -12,7 +11,7 @@ use crate::schedule::choose::{WORTH, step_from};
 use crate::schedule::estimate::{Estimate, common_ratios};
 use crate::schedule::hysteresis::Gain;
 use crate::schedule::overload::UtilizationSample;
-use crate::schedule::prediction::{direct_s, pipeline_by_s, time_share_s};
+use crate::schedule::prediction::{direct_s, pipeline_links, time_share_s};
 use crate::schedule::workload_state::WorkloadState;
 use crate::schedule::{Choice, Command, CurrentRoles, Demand, Load, NodeCosts, PolicyOverride, choose};
 
@@ -24,15 +23,16 @@ const SETS_LOST: usize = 3;
 const MOST_CHANGES: usize = 2;
 
 /// The members that serve a workload, in the order of their names, and the demand.
-struct PlanningSnapshot<'a> {
-    names: Vec<&'a str>,
+struct PlanningSnapshot {
     nodes: Vec<NodeCosts>,
     current: Option<CurrentRoles>,
+    /// Whether each node has a role in the plan in force.
+    has_role: Vec<bool>,
     load: Load,
     policy_override: PolicyOverride,
 }
 
-impl PlanningSnapshot<'_> {
+impl PlanningSnapshot {
     fn demand(&self) -> Demand<'_> {
         Demand {
             load: self.load,
@@ -43,25 +43,20 @@ impl PlanningSnapshot<'_> {
     }
 
     /// Predicted seconds of a set by the plan in force, at present costs and demand; `None` where it has no node.
-    fn current_s(&self, has_role: &[bool]) -> Option<f64> {
+    fn current_s(&self) -> Option<f64> {
         let current = self.current.as_ref()?;
-        let with_role = self.nodes.iter().zip(&current.samples).zip(has_role).filter(|(_, has_role)| **has_role);
+        let roles = self.nodes.iter().zip(&current.samples).zip(&self.has_role);
+        let with_role = roles.filter(|(_, has_role)| **has_role);
         let (nodes, samples): (Vec<NodeCosts>, Vec<bool>) =
             with_role.map(|((node, samples), _)| (*node, *samples)).unzip();
         let load = self.load.tiled(current.tiles);
         let time_s = match current.policy {
-            Policy::Pipeline => pipeline_by_s(&load, &nodes, &samples, current.relay_fanout),
+            Policy::Pipeline => pipeline_links(&load, &nodes, &samples).time_s(current.relay_fanout),
             Policy::Direct => direct_s(&load, &nodes),
             Policy::TimeShare => time_share_s(&load, &nodes),
         };
         (!nodes.is_empty()).then_some(time_s)
     }
-}
-
-/// The next plan, and the gain of the best one.
-struct BetterPlan {
-    choice: Choice,
-    gain: Gain,
 }
 
 impl Scheduler {
@@ -71,15 +66,9 @@ impl Scheduler {
         let workload = self.workloads.get(&number)?;
         let mut snapshot = self.snapshot(number)?;
         snapshot.load = workload.rated_load();
-        let of_viewers = |costs: &Costs| workload.of_viewers(costs);
-        snapshot.nodes = self.costs_beside(number, |other| other.sessions.viewers() > 0, of_viewers);
-        Some(workload.utilisation(snapshot.current_s(&self.has_role(number, &snapshot)?)?))
-    }
-
-    /// For each node of the snapshot, whether it has a role in the plan in force.
-    fn has_role(&self, number: u64, snapshot: &PlanningSnapshot<'_>) -> Option<Vec<bool>> {
-        let active = self.active_plan(number)?;
-        Some(snapshot.names.iter().map(|name| active.has_role(name)).collect())
+        snapshot.nodes =
+            self.costs_beside(number, |other| other.sessions.viewers() > 0, |costs| workload.of_viewers(costs));
+        Some(workload.utilisation(snapshot.current_s()?))
     }
 
     /// Present costs of a workload's operations on each usable node, as if it served nothing else.
@@ -108,7 +97,7 @@ impl Scheduler {
     }
 
     /// Present costs as `of_views` changes them, of nodes that take turns with those of the other workloads that `counts`
-    /// chooses.
+    /// chooses and that are not idle.
     fn costs_beside(
         &self,
         number: u64,
@@ -122,18 +111,23 @@ impl Scheduler {
         }
         for ((name, _), node) in self.serving(workload).zip(&mut nodes) {
             node.costs = of_views(&node.costs);
-            let carried = self.carried(number, name, &counts);
-            if carried > 1 {
-                *node = node.times(carried as f64);
+            let others = self.workloads.iter().filter(|(other, _)| **other != number).map(|(_, other)| other);
+            let sharing =
+                others.filter(|other| other.nodes.contains(name) && !other.is_idle(self.now) && counts(other));
+            match sharing.count() {
+                0 => (),
+                count => *node = node.times((1 + count) as f64),
             }
         }
         nodes
     }
 
-    fn snapshot(&self, number: u64) -> Option<PlanningSnapshot<'_>> {
+    fn snapshot(&self, number: u64) -> Option<PlanningSnapshot> {
         let workload = self.workloads.get(&number)?;
         let names: Vec<_> = self.serving(workload).map(|(name, _)| name.as_str()).collect();
-        let current = workload.active_plan.as_ref().map(|active| CurrentRoles {
+        let active = workload.active_plan.as_ref();
+        let has_role = names.iter().map(|name| active.is_some_and(|active| active.has_role(name))).collect();
+        let current = active.map(|active| CurrentRoles {
             policy: active.policy(),
             samples: names.iter().map(|name| active.samples(name)).collect(),
             tiles: active.plan.assignment.tile_count as usize,
@@ -141,7 +135,7 @@ impl Scheduler {
         });
         let load = workload.load();
         let policy_override = workload.policy_override().possible(&load, names.len());
-        Some(PlanningSnapshot { names, nodes: self.costs_now(number), current, load, policy_override })
+        Some(PlanningSnapshot { nodes: self.costs_now(number), current, has_role, load, policy_override })
     }
 
     /// Plans at once, for any plan in force; without nodes, sessions wait for the next one that joins.
@@ -156,10 +150,6 @@ impl Scheduler {
         }
     }
 
-    pub(super) fn reevaluate_all(&mut self) -> Vec<Command> {
-        self.workload_numbers().into_iter().flat_map(|number| self.reevaluate(number)).collect()
-    }
-
     /// Plans where there is no plan, where overload asks for another quality, or where a better plan is worth the switch.
     pub(super) fn reevaluate(&mut self, number: u64) -> Vec<Command> {
         let now = self.now;
@@ -172,11 +162,10 @@ impl Scheduler {
             estimates.for_each(Estimate::restart);
             return self.replan(number, &why);
         }
-        let Some(BetterPlan { choice, gain }) = self.better_plan(number) else { return Vec::new() };
-        let confirms =
-            |active: &mut ActivePlan| active.hysteresis.confirms(now, gain, active.ready.len() >= active.members.len());
+        let Some((choice, gain)) = self.better_plan(number) else { return Vec::new() };
         let active = self.workloads.get_mut(&number).and_then(|workload| workload.active_plan.as_mut());
-        match active.is_some_and(confirms) {
+        let Some(ActivePlan { hysteresis, ready, members, .. }) = active else { return Vec::new() };
+        match hysteresis.confirms(now, gain, ready.len() >= members.len()) {
             true => self.activate(number, &choice, "demand, costs or nodes have changed"),
             false => Vec::new(),
         }
@@ -201,19 +190,19 @@ impl Scheduler {
     }
 
     /// The next plan towards the best one, and the gain of the best one.
-    fn better_plan(&self, number: u64) -> Option<BetterPlan> {
+    fn better_plan(&self, number: u64) -> Option<(Choice, Gain)> {
         let snapshot = self.snapshot(number)?;
         let choice = choose(&snapshot.demand()).ok()?;
-        let has_role = self.has_role(number, &snapshot)?;
+        let has_role = &snapshot.has_role;
         let mean = NodeCosts::mean(&snapshot.nodes);
         let samplers = choice.division.sampler_count().max(1);
         let sampled_s = snapshot.load.images as f64 * mean.sample_image_s / samplers as f64;
         let gain = Gain {
-            ratio: snapshot.current_s(&has_role)? / choice.time_s(),
+            ratio: snapshot.current_s()? / choice.time_s(),
             worth: if has_role.contains(&false) { WORTH_OF_IDLE } else { WORTH },
             switch_s: snapshot.load.sets.min(SETS_LOST) as f64 * sampled_s + mean.load_set_s,
         };
-        Some(BetterPlan { choice: step_from(&snapshot.demand(), choice, &has_role, MOST_CHANGES), gain })
+        Some((step_from(&snapshot.demand(), choice, has_role, MOST_CHANGES), gain))
     }
 
     /// Puts a choice in force. A plan that changes nothing is not made: epochs rise only where roles change.
@@ -228,11 +217,24 @@ impl Scheduler {
         let old = workload.active_plan.as_ref();
         let slowest = candidates.iter().fold(Costs::default(), |slowest, node| slowest.max(node.costs.costs));
         let again = if old.is_some() { format!(" Planned again: {why}.") } else { String::new() };
-        let mut plan = session_plan(assignment, slowest, choice, format!("{}{}{again}", choice.reason, workload.note));
-        plan.fallback = NonZeroU32::new(workload.overload.step as u32);
-        plan.frame_rate_ratio = workload.frame_rate_ratio();
-        plan.method = workload.method();
-        plan.auto_exposure = workload.auto_exposure;
+        let predicted = &choice.predicted;
+        let plan = SessionPlan {
+            assignment,
+            costs: slowest,
+            reason: format!("{}{}{again}", choice.reason, workload.first.note),
+            predicted_pipeline_s: predicted.pipeline_s,
+            predicted_direct_s: predicted.direct_s,
+            predicted_time_share_s: predicted.time_share_s,
+            k_fd_sampler_count: predicted.k_fd as u32,
+            predicted_k_fd_s: predicted.k_fd_s,
+            enumerated_sampler_count: predicted.enumerated as u32,
+            predicted_enumerated_s: predicted.enumerated_s,
+            scene_load_s: 0.0,
+            fallback: NonZeroU32::new(workload.overload.step as u32),
+            method: workload.method(),
+            frame_rate_ratio: workload.frame_rate_ratio(),
+            auto_exposure: workload.first.auto_exposure,
+        };
         if old.is_some_and(|old| old.members == members && old.is_like(&plan)) {
             return Vec::new();
         }
@@ -247,9 +249,10 @@ impl Scheduler {
     /// sessions would wait for them.
     pub(super) fn apply(&self, active: &ActivePlan, workload: &WorkloadState, sessions: Vec<u64>) -> Command {
         let before = workload.active_plan.as_ref().map(|active| &active.members);
-        let had_one = |name: &String| before.is_some_and(|before| before.contains_key(name));
-        let is_told = |name: &String| active.members.contains_key(name) || had_one(name);
-        let nodes = self.usable().filter(|(name, _)| is_told(name) && !workload.excluded.contains_key(*name));
+        let nodes = self.usable().filter(|(name, _)| {
+            let is_told = active.members.contains_key(*name) || before.is_some_and(|b| b.contains_key(*name));
+            is_told && !workload.excluded.contains_key(*name)
+        });
         let nodes = nodes.map(|(_, member)| member.status.clone()).collect();
         Command::Apply { sessions, plan: Box::new(active.plan.clone()), nodes }
     }
@@ -260,25 +263,4 @@ fn costs_among<'a>(estimates: impl Iterator<Item = &'a Estimate>) -> Vec<NodeCos
     let estimates: Vec<&Estimate> = estimates.collect();
     let common = common_ratios(estimates.iter().copied());
     estimates.into_iter().map(|estimate| estimate.now_among(&common)).collect()
-}
-
-fn session_plan(assignment: Assignment, costs: Costs, choice: &Choice, reason: String) -> SessionPlan {
-    let predicted = &choice.predicted;
-    SessionPlan {
-        assignment,
-        costs,
-        reason,
-        predicted_pipeline_s: predicted.pipeline_s,
-        predicted_direct_s: predicted.direct_s,
-        predicted_time_share_s: predicted.time_share_s,
-        k_fd_sampler_count: predicted.k_fd as u32,
-        predicted_k_fd_s: predicted.k_fd_s,
-        enumerated_sampler_count: predicted.enumerated as u32,
-        predicted_enumerated_s: predicted.enumerated_s,
-        scene_load_s: 0.0,
-        fallback: None,
-        method: String::new(),
-        frame_rate_ratio: 1.0,
-        auto_exposure: ExposureEv::ZERO,
-    }
 }

@@ -2,15 +2,17 @@
 
 use std::time::Duration;
 
-use cluster::{AuditSummary, Costs, Policy, PolicyChoice, Promise, PromiseState};
+use cluster::{AuditSummary, Policy, PolicyChoice, Promise, PromiseState};
 use planner::{Budget, CHOICE_OF_BUDGETS, Outcome};
 
 use super::Scheduler;
+use crate::schedule::Command;
 use crate::schedule::budget_state::{BudgetState, InForce};
-use crate::schedule::representation::{DRAWN, Representation};
+use crate::schedule::representation::Representation;
 use crate::schedule::workload_state::WorkloadState;
-use crate::schedule::{Command, Load};
 
+/// Direct drawing in words.
+const DRAWN: &str = "every view drawn directly";
 /// The time between two reports to sessions of how measuring goes on.
 const NEWS: Duration = Duration::from_secs(5);
 /// The same of figures of audits.
@@ -48,15 +50,19 @@ impl Scheduler {
 
     /// The promise for the budget that is planned for, or for the strictest where nothing keeps any; `None` without a budget.
     pub(super) fn workload_promise(&self, number: u64) -> Option<Promise> {
-        let strictest = || self.workloads.get(&number)?.sessions.strictest_budget(|_| true);
-        self.promise(number, &self.planned_budget(number).or_else(strictest)?)
+        let sessions = &self.workloads.get(&number)?.sessions;
+        let budget = self.planned_budget(number).or_else(|| sessions.strictest_budget(|_| true))?;
+        self.promise(number, &budget)
     }
 
     /// The promise to a workload's sessions with a budget.
     fn promise(&self, number: u64, budget: &Budget) -> Option<Promise> {
         let workload = self.workloads.get(&number)?;
         if workload.sessions.policy_override().policy == PolicyChoice::Direct {
-            return Some(drawn_directly(budget, &workload.costs));
+            let view_s = workload.costs.direct_view_s + workload.costs.encode_view_s;
+            let took =
+                format!("Sessions have every view drawn directly, in {:.1} ms: there is no error.", view_s * 1e3);
+            return Some(direct(budget, view_s, took));
         }
         if let Some(reason) = workload.not_planned.as_ref().filter(|_| !self.budgets.contains_key(&number)) {
             return Some(without_figures(budget, PromiseState::Unreachable, reason.clone()));
@@ -69,12 +75,11 @@ impl Scheduler {
             return Some(direct(budget, price.view_s, reason.clone()));
         }
         let broken = state.broken().filter(|broken| broken.is_of(budget));
-        let serves = |in_force: &&InForce| {
-            let is_own =
-                in_force.chosen.budget == *budget && in_force.chosen.outcome.state != planner::PromiseState::Kept;
-            broken.is_some() || is_own || (in_force.chosen.row.is_some() && state.keeps(budget))
-        };
-        let in_force = in_force.filter(serves);
+        // A choice in force that does not serve the budget is left out.
+        let in_force = in_force.filter(|InForce { chosen, .. }| {
+            let is_own = chosen.budget == *budget && chosen.outcome.state != planner::PromiseState::Kept;
+            broken.is_some() || is_own || (chosen.row.is_some() && state.keeps(budget))
+        });
         if let Some(reason) = self.unreachable_reason(number, state, budget).filter(|_| in_force.is_none()) {
             let representation = representation_in_words(workload);
             return Some(Promise { representation, ..without_figures(budget, PromiseState::Unreachable, reason) });
@@ -144,32 +149,26 @@ impl Scheduler {
 
 /// Whether sessions are told of a promise that they know in an earlier form.
 fn is_news(now: Duration, (at, known): &(Duration, Promise), promise: &Promise) -> bool {
-    let facts = |promise: &Promise| {
-        let viewers_above = promise.audit.map_or(0, |audit| audit.viewers_above);
-        (promise.state, promise.budget.clone(), promise.representation.clone(), viewers_above)
-    };
-    let figures = |promise: &Promise| (promise.reason.clone(), promise.audit);
+    let [known_above, above] = [known, promise].map(|promise| promise.audit.map_or(0, |audit| audit.viewers_above));
+    let is_other = known.state != promise.state
+        || known.budget != promise.budget
+        || known.representation != promise.representation
+        || known_above != above;
     let interval = if promise.state == PromiseState::Measuring { NEWS } else { NEWS_OF_AUDITS };
     let is_due = now.saturating_sub(*at) >= interval;
-    facts(known) != facts(promise) || (is_due && figures(known) != figures(promise))
+    is_other || (is_due && (known.reason != promise.reason || known.audit != promise.audit))
 }
 
 fn representation_in_words(workload: &WorkloadState) -> String {
-    let asked = || {
-        let Load { images, .. } = workload.load();
-        format!("{}, S = {images}, {}", workload.requested.sampling, workload.method())
-    };
-    Representation::name(workload.representation.as_ref(), asked, workload.policy())
-}
-
-/// The promise where sessions have every view drawn directly.
-fn drawn_directly(budget: &Budget, costs: &Costs) -> Promise {
-    let view_s = costs.direct_view_s + costs.encode_view_s;
-    direct(
-        budget,
-        view_s,
-        format!("Sessions have every view drawn directly, in {:.1} ms: there is no error.", view_s * 1e3),
-    )
+    match &workload.representation {
+        _ if workload.policy() == Some(Policy::Direct) => DRAWN.to_owned(),
+        Some(Representation::Row { row, .. }) => row.to_string(),
+        Some(Representation::Direct) => DRAWN.to_owned(),
+        None => {
+            let images = workload.load().images;
+            format!("{}, S = {images}, {}", workload.requested.sampling, workload.method())
+        }
+    }
 }
 
 /// The promise where every view is drawn directly, in `view_s` seconds: it has no error.

@@ -6,7 +6,7 @@ use super::admission::rated_set_s;
 use super::{RESUMED_WITHIN, Scheduler};
 use crate::schedule::session_mix::SessionMix;
 use crate::schedule::workload_state::{PlanTrigger, WorkloadState};
-use crate::schedule::{Command, NodeCosts, Opening};
+use crate::schedule::{Command, Opening};
 
 impl Scheduler {
     /// Numbers of all open workloads. None for a while after a restart: streams under plans of the coordinator before go on
@@ -40,8 +40,7 @@ impl Scheduler {
         let number = self.last_workload.max(self.plan_epoch) + 1;
         self.last_workload = number;
         let mut workload = WorkloadState::new(self.now, opening);
-        let alone = vec![NodeCosts { costs: opening.costs, ..NodeCosts::default() }; self.usable().count()];
-        if let Some(time_s) = rated_set_s(&workload, &alone) {
+        if let Some(time_s) = rated_set_s(&workload, &self.costs_alone(opening)) {
             workload.begin_with_room(self.now, workload.utilisation(time_s));
         }
         let view_time_ratio = workload.view_time_ratio(workload.overload.step);

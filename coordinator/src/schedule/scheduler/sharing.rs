@@ -19,29 +19,21 @@ impl Scheduler {
         self.usable().filter(|(name, _)| workload.nodes.contains(*name))
     }
 
-    /// How many workloads a node serves: this one, and others that count and are not idle.
-    pub(super) fn carried(&self, number: u64, name: &str, counts: impl Fn(&WorkloadState) -> bool) -> usize {
-        let others = self.workloads.iter().filter(|(other, _)| **other != number).map(|(_, other)| other);
-        1 + others.filter(|other| other.nodes.contains(name) && !other.is_idle(self.now) && counts(other)).count()
-    }
-
     /// The division in force, without nodes that are gone.
     pub(super) fn node_shares(&self) -> NodeShares {
         let names: Vec<&String> = self.usable().map(|(name, _)| name).collect();
-        let needs: Vec<Need> = self.workloads.iter().map(|(&number, workload)| self.need(number, workload)).collect();
-        let weights = weights(&needs, names.len());
-        let claim = |(workload, weight): (&WorkloadState, f64)| Claim {
-            weight,
-            ties: names.iter().map(|name| tie(workload, name)).collect(),
-        };
-        NodeShares::new(self.workloads.values().zip(weights).map(claim).collect(), names.len())
-    }
-
-    /// The mean costs are those of all nodes, so that they do not depend on the division.
-    fn need(&self, number: u64, workload: &WorkloadState) -> Need {
-        let is_idle = workload.is_idle(self.now);
-        let mean = NodeCosts::mean(&self.costs_of_all(number));
-        Need { live_nodes: workload.live_nodes(&mean), has_batch: workload.sessions.has_batch(), is_idle }
+        let needs = self.workloads.iter().map(|(&number, workload)| {
+            // The mean costs are those of all nodes, so that they do not depend on the division.
+            let live_nodes = workload.live_nodes(&NodeCosts::mean(&self.costs_of_all(number)));
+            Need { live_nodes, has_batch: workload.sessions.has_batch(), is_idle: workload.is_idle(self.now) }
+        });
+        let weights = weights(&needs.collect::<Vec<_>>(), names.len());
+        let claims = self
+            .workloads
+            .values()
+            .zip(weights)
+            .map(|(workload, weight)| Claim { weight, ties: names.iter().map(|name| tie(workload, name)).collect() });
+        NodeShares::new(claims.collect(), names.len())
     }
 
     /// Puts a division in force. Gives the workloads that have another node than before.
@@ -89,8 +81,8 @@ impl Scheduler {
         }
         self.sharing.note_move(self.now);
         let gained = self.put(&shares);
-        let changed = |number: &u64| gained.contains(number) || !self.is_plan_whole(*number);
-        let changed: Vec<u64> = self.workload_numbers().into_iter().filter(changed).collect();
+        let mut changed = self.workload_numbers();
+        changed.retain(|number| gained.contains(number) || !self.is_plan_whole(*number));
         let why = format!("nodes are divided anew among {} workloads", self.workloads.len());
         changed.into_iter().flat_map(|number| self.replan(number, &why)).collect()
     }
@@ -102,11 +94,10 @@ impl Scheduler {
     /// Whether the plan in force, if any, has all the processes that it was made for.
     fn is_plan_whole(&self, number: u64) -> bool {
         let Some(workload) = self.workloads.get(&number) else { return true };
-        let serves = |name: &str, incarnation: u64| {
+        let mut members = workload.active_plan.iter().flat_map(|active| &active.members);
+        members.all(|(name, &incarnation)| {
             workload.nodes.contains(name) && self.members.get(name).is_some_and(|m| m.incarnation == incarnation)
-        };
-        let members = workload.active_plan.iter().flat_map(|active| &active.members);
-        members.into_iter().all(|(name, &incarnation)| serves(name, incarnation))
+        })
     }
 }
 

@@ -6,7 +6,6 @@ use cluster::{ClusterStatus, NodeCondition, WorkloadStatus};
 
 use super::Scheduler;
 use crate::schedule::NodeCosts;
-use crate::schedule::member::Member;
 use crate::schedule::workload_state::WorkloadState;
 
 /// Views a second of a viewer, where there is none to compare with.
@@ -16,15 +15,12 @@ impl Scheduler {
     /// The state of the cluster: members, and every workload.
     #[must_use]
     pub fn status(&self) -> ClusterStatus {
+        let workloads = self.workloads.iter().map(|(&number, workload)| self.workload_status(number, workload));
         ClusterStatus {
             plan_epoch: self.plan_epoch,
             nodes: self.members.values().map(|member| member.status.clone()).collect(),
             offers: Vec::new(),
-            workloads: self
-                .workloads
-                .iter()
-                .map(|(&number, workload)| self.workload_status(number, workload))
-                .collect(),
+            workloads: workloads.collect(),
         }
     }
 
@@ -63,15 +59,14 @@ impl Scheduler {
     }
 
     fn conditions(&self, number: u64, workload: &WorkloadState) -> Vec<NodeCondition> {
-        let is_ready = |name: &str| workload.active_plan.as_ref().is_some_and(|active| active.ready.contains(name));
-        let condition = |(name, member): (&String, &Member)| NodeCondition {
+        let conditions = self.serving(workload).map(|(name, member)| NodeCondition {
             node_name: name.clone(),
-            is_ready: is_ready(name),
+            is_ready: workload.active_plan.as_ref().is_some_and(|active| active.ready.contains(name)),
             costs: member.estimates.get(&number).map(|estimate| estimate.now().costs).unwrap_or_default(),
             views: member.activity.views,
             dropped_views: member.activity.dropped_views,
             busy_ratio: member.activity.busy_ratio(self.now),
-        };
-        self.serving(workload).map(condition).collect()
+        });
+        conditions.collect()
     }
 }

@@ -12,15 +12,11 @@ use crate::schedule::workload_state::WorkloadState;
 const CELLS_INTERVAL: Duration = Duration::from_secs(1);
 
 impl Scheduler {
-    /// Whether the sample cameras of a workload follow viewpoints.
-    fn follows_viewers(&self, workload_number: u64) -> bool {
-        self.workloads.get(&workload_number).is_some_and(|workload| workload.cell_count().is_some())
-    }
-
     /// Whether the places of a workload's live viewers matter: to its sample cameras, or to a promise.
     #[must_use]
     pub fn wants_viewpoints(&self, workload_number: u64) -> bool {
-        self.follows_viewers(workload_number) || self.budgets.contains_key(&workload_number)
+        let workload = self.workloads.get(&workload_number);
+        workload.is_some_and(|workload| workload.cell_count().is_some()) || self.budgets.contains_key(&workload_number)
     }
 
     pub(super) fn viewpoints_changed(&mut self, session: u64, viewpoints: &[PinholeCamera]) -> Vec<Command> {
@@ -54,20 +50,20 @@ impl Scheduler {
         if !self.may_change_cells() {
             return Vec::new();
         }
-        let moved: Vec<u64> = self.workloads.iter().filter(|(_, w)| w.viewers_have_moved()).map(|(&n, _)| n).collect();
-        let changed = |number: &u64| {
-            let workload = self.workloads.get_mut(number)?;
+        let moved = self.workloads.iter_mut().filter(|(_, workload)| workload.viewers_have_moved);
+        let changed = moved.filter_map(|(&number, workload)| {
             let before = workload.trigger();
             workload.update_cells();
-            (workload.trigger() != before).then_some(*number)
-        };
-        let changed: Vec<u64> = moved.iter().filter_map(changed).collect();
+            (workload.trigger() != before).then_some(number)
+        });
+        let changed: Vec<u64> = changed.collect();
         if changed.is_empty() {
             return Vec::new();
         }
         self.cells_changed_at = Some(self.now);
         for number in &changed {
-            self.budgets.get_mut(number).into_iter().for_each(|state| state.findings.forget_poses());
+            // Earlier viewpoints are of other cells.
+            self.budgets.get_mut(number).into_iter().for_each(|state| state.findings.poses.clear());
         }
         changed.into_iter().flat_map(|number| self.replan(number, "sessions look from elsewhere")).collect()
     }

@@ -84,11 +84,9 @@ impl<P: Pricing> Planner<P> {
     fn sequence(&self) -> Vec<usize> {
         let Some(term) = self.term() else { return Vec::new() };
         let most_s = self.worthwhile_s();
-        let is_candidate = |&row: &usize| {
-            let is_passed = self.rows[row].status == RowStatus::Passed;
-            is_passed && self.prices[row].node_s < most_s && self.is_in_time(row, TOLERANCE)
-        };
-        let mut rows: Vec<usize> = (0..self.rows.len()).filter(is_candidate).collect();
+        let passed = (0..self.rows.len()).filter(|&row| self.rows[row].status == RowStatus::Passed);
+        let mut rows: Vec<usize> =
+            passed.filter(|&row| self.prices[row].node_s < most_s && self.is_in_time(row, TOLERANCE)).collect();
         rows.sort_by(|&a, &b| self.evidence(b, term).margin().total_cmp(&self.evidence(a, term).margin()));
         let mut step = LEAST_STEP;
         loop {
@@ -114,15 +112,16 @@ impl<P: Pricing> Planner<P> {
     /// Each row saves at least a share of `step`.
     fn thinned(&self, rows: &[usize], step: f64) -> Vec<usize> {
         let mut last_s = f64::INFINITY;
-        let mut is_worth = |row: &usize| {
-            let price_s = self.prices[*row].node_s;
+        let mut thinned = rows.to_vec();
+        thinned.retain(|&row| {
+            let price_s = self.prices[row].node_s;
             let is_cheaper = last_s.is_infinite() || price_s < last_s * (1.0 - step);
             if is_cheaper {
                 last_s = price_s;
             }
             is_cheaper
-        };
-        rows.iter().copied().filter(&mut is_worth).collect()
+        });
+        thinned
     }
 
     /// Chooses the number of views from what screening says, before a fresh view is measured.

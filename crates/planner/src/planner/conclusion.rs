@@ -16,10 +16,6 @@ impl<P: Pricing> Planner<P> {
         vec![Command::Keep(Box::new(self.kept(choice, is_spent))), Command::Conclude(Box::new(outcome))]
     }
 
-    pub(super) fn outcome_so_far(&self) -> Outcome {
-        self.outcome_of(self.choice().0, PromiseState::Measuring, false)
-    }
-
     pub(super) fn price_of(&self, choice: Choice) -> Price {
         match choice {
             Choice::Row(row) => self.prices[row],
@@ -33,7 +29,7 @@ impl<P: Pricing> Planner<P> {
         self.rows[row].certificates.iter().rev().find(|certificate| certificate.serves(&term))
     }
 
-    fn outcome_of(&self, choice: Choice, state: PromiseState, is_spent: bool) -> Outcome {
+    pub(super) fn outcome_of(&self, choice: Choice, state: PromiseState, is_spent: bool) -> Outcome {
         Outcome {
             state,
             choice,
@@ -44,7 +40,7 @@ impl<P: Pricing> Planner<P> {
         }
     }
 
-    fn choice(&self) -> (Choice, PromiseState) {
+    pub(super) fn choice(&self) -> (Choice, PromiseState) {
         let direct = self.direct_in_time();
         let best = self.eligible(EXACT).into_iter().find(|&row| self.is_measured_for_time(row));
         match (self.term(), best, direct) {
@@ -60,16 +56,15 @@ impl<P: Pricing> Planner<P> {
 
     /// Where no row passed in time: the most accurate that seems to be in time, as after a spent allowance; else the fastest.
     fn nearest_to_time(&self) -> (Choice, PromiseState) {
-        let is_usable = |&row: &usize| {
+        let usable = (0..self.rows.len()).filter(|&row| {
             let is_failed = self.rows[row].status == RowStatus::Failed;
             !is_failed && self.rows[row].costs.is_some() && !self.rows[row].errors.is_empty()
-        };
-        let usable = || (0..self.rows.len()).filter(is_usable);
-        let in_time = usable().filter(|&row| self.is_in_time(row, EXACT));
+        });
+        let in_time = usable.clone().filter(|&row| self.is_in_time(row, EXACT));
         if let Some(row) = in_time.min_by(|&a, &b| self.error_ratio(a).total_cmp(&self.error_ratio(b))) {
             return (Choice::Row(row), PromiseState::Kept);
         }
-        let fastest = usable().min_by(|&a, &b| self.prices[a].view_s.total_cmp(&self.prices[b].view_s));
+        let fastest = usable.min_by(|&a, &b| self.prices[a].view_s.total_cmp(&self.prices[b].view_s));
         let fastest = fastest.filter(|&row| self.prices[row].view_s < self.pricing.direct().view_s);
         (fastest.map_or(Choice::Direct, Choice::Row), PromiseState::Unreachable)
     }
@@ -83,8 +78,8 @@ impl<P: Pricing> Planner<P> {
 
     /// The row that comes nearest to the limit on errors, of those that may be in time.
     pub(super) fn nearest_to_error(&self) -> Option<usize> {
-        let is_known = |&row: &usize| !self.rows[row].errors.is_empty() && self.is_in_time(row, TOLERANCE);
-        let known = (0..self.rows.len()).filter(is_known);
-        known.min_by(|&a, &b| self.error_ratio(a).total_cmp(&self.error_ratio(b)))
+        let known = (0..self.rows.len()).filter(|&row| !self.rows[row].errors.is_empty());
+        let in_time = known.filter(|&row| self.is_in_time(row, TOLERANCE));
+        in_time.min_by(|&a, &b| self.error_ratio(a).total_cmp(&self.error_ratio(b)))
     }
 }

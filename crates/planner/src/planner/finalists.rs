@@ -26,8 +26,8 @@ impl<P: Pricing> Planner<P> {
     /// Rows that may be chosen, the best first.
     pub(super) fn eligible(&self, tolerance: f64) -> Vec<usize> {
         let status = self.status_to_choose();
-        let is_eligible = |&row: &usize| self.rows[row].status == status && self.is_in_time(row, tolerance);
-        let mut rows: Vec<usize> = (0..self.rows.len()).filter(is_eligible).collect();
+        let mut rows: Vec<usize> = (0..self.rows.len()).filter(|&row| self.rows[row].status == status).collect();
+        rows.retain(|&row| self.is_in_time(row, tolerance));
         rows.sort_by(|&a, &b| self.rank(a).total_cmp(&self.rank(b)));
         rows
     }
@@ -40,9 +40,9 @@ impl<P: Pricing> Planner<P> {
     pub(super) fn finalists(&self) -> Vec<usize> {
         let eligible = self.eligible(TOLERANCE);
         let Some(&best) = eligible.first() else { return eligible };
-        let is_close =
-            |&row: &usize| self.term().is_none() || self.prices[row].node_s <= CLOSE * self.prices[best].node_s;
-        let mut finalists: Vec<usize> = eligible.iter().copied().filter(is_close).take(MOST_FINALISTS).collect();
+        let most_s = if self.term().is_some() { CLOSE * self.prices[best].node_s } else { f64::INFINITY };
+        let close = eligible.iter().copied().filter(|&row| self.prices[row].node_s <= most_s);
+        let mut finalists: Vec<usize> = close.take(MOST_FINALISTS).collect();
         // Where all are at the edge of the time, one that is clearly within it must be among them.
         let safe = eligible.into_iter().find(|&row| self.is_clearly_in_time(row));
         if let Some(safe) = safe.filter(|safe| !finalists.contains(safe)) {

@@ -11,15 +11,15 @@ use crate::view::ProbeView;
 
 impl<P: Pricing> Planner<P> {
     pub(super) fn probed(&mut self, probed: &Probed) -> Result<(), InvalidField> {
-        let is_same = |views: &[ProbeView]| views.iter().eq(probed.views.iter().map(|(view, _)| view));
+        let probed_views: Vec<ProbeView> = probed.views.iter().map(|(view, _)| *view).collect();
         let (row, is_screening) = match self.pending_work(probed.id)? {
-            Work::Screen { row, views } if is_same(views) => (*row, true),
-            Work::Certify { row, views } if is_same(views) => (*row, false),
-            Work::Time { .. } => return Err(other("id", "that of a timing", "that of a probe")),
-            _ => return Err(other("views", "others", "those that were asked for")),
+            Work::Screen { row, views } if *views == probed_views => (*row, true),
+            Work::Certify { row, views } if *views == probed_views => (*row, false),
+            Work::Time { .. } => return Err(InvalidField::new("id", "that of a timing", "that of a probe")),
+            _ => return Err(InvalidField::new("views", "others", "those that were asked for")),
         };
         if row != probed.row {
-            return Err(other("row", probed.row, "the row that was asked for"));
+            return Err(InvalidField::new("row", probed.row, "the row that was asked for"));
         }
         self.finish(probed.busy_s);
         self.learn_costs(row, &probed.costs, probed.views.len());
@@ -37,10 +37,10 @@ impl<P: Pricing> Planner<P> {
 
     pub(super) fn timed(&mut self, timed: &Timed) -> Result<(), InvalidField> {
         let Work::Time { rows } = self.pending_work(timed.id)? else {
-            return Err(other("id", "that of a probe", "that of a timing"));
+            return Err(InvalidField::new("id", "that of a probe", "that of a timing"));
         };
         if !rows.iter().eq(timed.rows.iter().map(|(row, _)| row)) {
-            return Err(other("rows", "others", "those that were asked for"));
+            return Err(InvalidField::new("rows", "others", "those that were asked for"));
         }
         self.finish(timed.busy_s);
         // Rows that are timed for the prediction of costs were not timed in turn with other finalists.
@@ -72,16 +72,17 @@ impl<P: Pricing> Planner<P> {
 
     /// Predicts the prices of all rows from those that were measured.
     pub(super) fn predict(&mut self) {
-        let timed = |row: usize| Some(self.timed_row(row, self.rows[row].costs?));
-        let timed: Vec<TimedRow> = (0..self.rows.len()).filter_map(timed).collect();
-        self.model = CostModel::fit(&timed);
+        let states = self.ladder.rows().iter().zip(&self.rows);
+        let timed = states.filter_map(|(row, state)| Some(TimedRow { row: row.clone(), costs: state.costs? }));
+        self.model = CostModel::fit(&timed.collect::<Vec<_>>());
         (self.prices, self.least_prices) = (0..self.rows.len()).map(|row| self.price_range(row)).unzip();
     }
 
     fn pending_work(&self, id: ProbeId) -> Result<&Work, InvalidField> {
         let pending = self.pending.as_ref().filter(|(pending, _)| *pending == id);
-        let shown = || format!("{} of plan {}", id.number, id.plan);
-        pending.map(|(_, work)| work).ok_or_else(|| other("id", shown(), "that of the pending measurement"))
+        pending.map(|(_, work)| work).ok_or_else(|| {
+            InvalidField::new("id", format!("{} of plan {}", id.number, id.plan), "that of the pending measurement")
+        })
     }
 
     fn finish(&mut self, busy_s: f64) {
@@ -102,11 +103,11 @@ impl<P: Pricing> Planner<P> {
 
     /// The price of a row, and the least that it may be.
     fn price_range(&self, row: usize) -> (Price, Price) {
-        let of = |deviations: f64| {
-            let predicted = || self.model.predict(self.row(row), deviations);
-            self.price(row, &self.rows[row].costs.unwrap_or_else(predicted))
-        };
-        (of(0.0), of(1.0))
+        let [price, least] = [0.0, 1.0].map(|deviations| {
+            let measured = self.rows[row].costs;
+            self.price(row, &measured.unwrap_or_else(|| self.model.predict(self.row(row), deviations)))
+        });
+        (price, least)
     }
 
     fn price(&self, row: usize, costs: &RowCosts) -> Price {
@@ -115,12 +116,4 @@ impl<P: Pricing> Planner<P> {
         let is_valid = [price.node_s, price.view_s].iter().all(|seconds| seconds.is_finite() && *seconds >= 0.0);
         if is_valid { price } else { Price { node_s: f64::INFINITY, view_s: f64::INFINITY } }
     }
-
-    fn timed_row(&self, row: usize, costs: RowCosts) -> TimedRow {
-        TimedRow { row: self.row(row).clone(), costs }
-    }
-}
-
-fn other(field: &'static str, value: impl ToString, allowed: &'static str) -> InvalidField {
-    InvalidField::new(field, value, allowed)
 }

@@ -32,12 +32,12 @@ impl<P: Pricing> Planner<P> {
 
     /// The rows that tested the rule and are decided.
     pub(super) fn pruning_check(&self) -> PruningCheck {
-        let is_decided = |status| ![RowStatus::Open, RowStatus::Failed].contains(&status);
-        let tested = || self.rows.iter().filter(|row| row.is_spared && is_decided(row.status));
+        let spared = self.rows.iter().filter(|row| row.is_spared);
+        let tested = spared.filter(|row| ![RowStatus::Open, RowStatus::Failed].contains(&row.status));
         PruningCheck {
             pruned: self.rows.iter().filter(|row| row.status == RowStatus::Pruned).count(),
-            tested: tested().count(),
-            wrong: tested().filter(|row| row.status != RowStatus::Over).count(),
+            tested: tested.clone().count(),
+            wrong: tested.filter(|row| row.status != RowStatus::Over).count(),
         }
     }
 }

@@ -7,7 +7,6 @@ use crate::budget::Budget;
 use crate::costs::Pricing;
 use crate::invalid::InvalidField;
 use crate::kept::{Kept, KeptCosts, KeptRow, KeptSearch, newest};
-use crate::ladder::Row;
 use crate::outcome::{Choice, RowStatus};
 
 impl<P: Pricing> Planner<P> {
@@ -38,13 +37,11 @@ impl<P: Pricing> Planner<P> {
 
     /// Whether an earlier plan has made this search to its end. Its row may have lost its certificate meanwhile.
     fn is_searched(&self) -> bool {
-        let may_be_chosen = |row: &Row| {
-            let place = self.ladder.rows().iter().position(|other| other == row);
-            place.is_some_and(|row| self.rows[row].status == self.status_to_choose())
-        };
         let own = self.search(Choice::Direct);
-        let made = self.searches.iter().find(|search| search.is_like(&own));
-        made.is_some_and(|search| search.row.as_ref().is_none_or(may_be_chosen))
+        let Some(made) = self.searches.iter().find(|search| search.is_like(&own)) else { return false };
+        let Some(chosen) = &made.row else { return true };
+        let place = self.ladder.rows().iter().position(|row| row == chosen);
+        place.is_some_and(|row| self.rows[row].status == self.status_to_choose())
     }
 
     fn search(&self, choice: Choice) -> KeptSearch {
@@ -63,8 +60,8 @@ impl<P: Pricing> Planner<P> {
     /// Everything that is known, for later plans. A search has not come to its end where the allowance was spent, or where a
     /// row could not be measured.
     pub(super) fn kept(&self, choice: Choice, is_spent: bool) -> Kept {
-        let is_known = |state: &RowState| !state.errors.is_empty() || state.costs.is_some();
-        let known = (0..self.rows.len()).filter(|&row| is_known(&self.rows[row]));
+        let known =
+            (0..self.rows.len()).filter(|&row| !self.rows[row].errors.is_empty() || self.rows[row].costs.is_some());
         let mut kept = Kept {
             key: self.request.key.clone(),
             fresh_views_drawn: self.fresh_views_drawn,
@@ -81,16 +78,16 @@ impl<P: Pricing> Planner<P> {
         let term = self.term();
         let is_certified = term.is_some_and(|term| kept.certificates.iter().any(|own| own.serves(&term)));
         // A row that failed at a budget fails at a stricter one.
-        let fails = |budget: &Budget| term.zip(budget.error()).is_some_and(|(term, failed)| term.implies(&failed));
-        let status = match (is_certified, kept.rejected.iter().any(fails)) {
+        let mut failed = kept.rejected.iter().filter_map(Budget::error);
+        let is_rejected = term.is_some_and(|term| failed.any(|failed| term.implies(&failed)));
+        let status = match (is_certified, is_rejected) {
             (true, _) => RowStatus::Certified,
             (false, true) => RowStatus::Rejected,
             (false, false) => RowStatus::Open,
         };
-        let is_own = |costs: &KeptCosts| {
+        let (own, foreign_costs): (Vec<_>, Vec<_>) = kept.costs.into_iter().partition(|costs| {
             costs.device == self.request.device && costs.program_version == self.request.program_version
-        };
-        let (own, foreign_costs): (Vec<_>, Vec<_>) = kept.costs.into_iter().partition(is_own);
+        });
         let own = own.last();
         RowState {
             status,

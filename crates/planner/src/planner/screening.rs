@@ -94,28 +94,27 @@ impl<P: Pricing> Planner<P> {
         if known >= MODEL_ROWS {
             return None;
         }
-        let is_useful = |&row: &usize| {
+        let useful = (0..self.rows.len()).filter(|&row| {
             let state = &self.rows[row];
             let may_be_chosen = [RowStatus::Open, RowStatus::Passed, RowStatus::Certified].contains(&state.status);
             state.costs.is_none() && may_be_chosen
-        };
-        let uncertainty = |row: usize| self.model.uncertainty(self.row(row));
-        let rows = (0..self.rows.len()).filter(is_useful).map(|row| (row, uncertainty(row)));
+        });
+        let rows = useful.map(|row| (row, self.model.uncertainty(self.row(row))));
         let (row, _) = rows.min_by(|a, b| b.1.total_cmp(&a.1))?;
         Some(if self.rows[row].errors.is_empty() { self.screen(row) } else { Work::Time { rows: vec![row] } })
     }
 
     /// The next row in the order of the search.
     fn next_candidate(&self) -> Option<usize> {
-        let is_open = |&row: &usize| self.rows[row].status == RowStatus::Open && self.is_in_time(row, TOLERANCE);
-        let open = (0..self.rows.len()).filter(is_open);
+        let open = (0..self.rows.len()).filter(|&row| self.rows[row].status == RowStatus::Open);
+        let open = open.filter(|&row| self.is_in_time(row, TOLERANCE));
         if self.term().is_none() {
             return open.max_by(|&a, &b| self.prices[a].node_s.total_cmp(&self.prices[b].node_s));
         }
-        let least_s = |row: usize| self.least_prices[row].node_s;
         let direct_s = self.direct_in_time().map_or(f64::INFINITY, |direct| direct.node_s);
         let enough_s = self.cheapest_assured_s().min(direct_s);
-        open.min_by(|&a, &b| least_s(a).total_cmp(&least_s(b))).filter(|&row| least_s(row) < enough_s)
+        let cheapest = open.min_by(|&a, &b| self.least_prices[a].node_s.total_cmp(&self.least_prices[b].node_s));
+        cheapest.filter(|&row| self.least_prices[row].node_s < enough_s)
     }
 
     fn screen(&self, row: usize) -> Work {
