@@ -15,9 +15,9 @@ use codec::{
 use depth_image::{Camera, DepthImage, PinholeCamera, SpecularPlanes, rgb9e5_from_linear};
 use glam::{UVec2, Vec3};
 
-#[path = "../src/test_planes.rs"]
+#[path = "../src/test_support.rs"]
 #[allow(dead_code)] // The tests use more of it.
-mod test_planes;
+mod test_support;
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("| what | raw bytes | raw LZ4 | ours | of LZ4 | encode MB/s | decode MB/s |");
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if arguments.is_empty() {
         for (width, height) in [(400, 300), (1024, 1024)] {
-            report("tree", &test_planes::tree_over_terrain(width, height, 1), width as u32, height as u32)?;
+            report("tree", &test_support::tree_over_terrain(width, height, 1), width as u32, height as u32)?;
         }
     }
     for plane in arguments.chunks(3) {
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn report(name: &str, plane: &[f32], width: u32, height: u32) -> Result<(), Box<dyn Error>> {
     report_depth(&format!("{name} {width}×{height} depth"), plane, width, height)?;
-    let mut random = test_planes::Random::new(2);
+    let mut random = test_support::Random::new(2);
     let shade = |&inverse: &f32| {
         let light = inverse * (1.5 + 0.02 * random.unit());
         if inverse > 0.0 { Vec3::new(light, light * 1.3, light * 0.4) } else { Vec3::ZERO }
@@ -104,7 +104,7 @@ fn black(plane: &[f32], width: u32, height: u32) -> DepthImage {
 }
 
 /// Two materials by depth, one of them of uneven roughness; nothing where there is no sample.
-fn reflectance(plane: &[f32], random: &mut test_planes::Random) -> Vec<u32> {
+fn reflectance(plane: &[f32], random: &mut test_support::Random) -> Vec<u32> {
     let mut word = |&inverse: &f32| match inverse {
         inverse if inverse <= 0.0 => 0,
         inverse if inverse * 40.0 % 2.0 < 1.0 => 0x6038_3838,
@@ -114,7 +114,7 @@ fn reflectance(plane: &[f32], random: &mut test_planes::Random) -> Vec<u32> {
 }
 
 /// Shares of four lights by a number of rays; one ray from the light's middle casts a hard shadow.
-fn visibility(plane: &[f32], width: usize, rays: u32, random: &mut test_planes::Random) -> Vec<u32> {
+fn visibility(plane: &[f32], width: usize, rays: u32, random: &mut test_support::Random) -> Vec<u32> {
     let mut share = |at: usize, light: usize| {
         let x = (at % width) as f32 / width as f32;
         let y = (at / width) as f32 / width as f32;

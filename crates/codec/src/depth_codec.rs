@@ -102,9 +102,11 @@ pub(crate) fn decode_depth(
 
 /// The residual of each code of a block.
 pub(crate) fn predict(codes: &[u16], residuals: &mut [u16]) {
-    let before = |index: usize, back: usize| index.checked_sub(back).map_or(0, |index| codes[index]);
-    for index in 0..codes.len().min(2) {
-        residuals[index] = residual(codes[index], before(index, 1), before(index, 2));
+    // Those before the first two are 0.
+    let mut last = 0;
+    for (out, &code) in residuals.iter_mut().zip(codes).take(2) {
+        *out = residual(code, last, 0);
+        last = code;
     }
     let shifted = codes.iter().zip(codes.iter().skip(1)).zip(codes.iter().skip(2));
     for (out, ((&second_last, &last), &code)) in residuals.iter_mut().skip(2).zip(shifted) {
@@ -180,7 +182,7 @@ pub fn decode_depth_plane(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_planes::{Random, tree_over_terrain};
+    use crate::test_support::{Random, tree_over_terrain};
 
     #[test]
     fn decoding_inverts_prediction() {

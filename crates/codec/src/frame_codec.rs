@@ -130,7 +130,7 @@ mod tests {
     use glam::Vec2Swizzles as _;
 
     use super::*;
-    use crate::test_planes::{Random, tree_over_terrain};
+    use crate::test_support::{Random, tree_over_terrain};
 
     fn picture(width: usize, height: usize) -> Vec<u8> {
         let plane = tree_over_terrain(width, height, 15);

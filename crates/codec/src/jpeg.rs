@@ -14,10 +14,12 @@ pub(crate) fn encode(width: u32, height: u32, rgb: &[u8], quality: u8) -> Result
     if !(1..=100).contains(&quality) {
         return Err(FrameError::Quality(quality));
     }
-    let side = |side: u32| u16::try_from(side).map_err(|_| FrameError::Size { width, height, rgb_bytes: rgb.len() });
+    let (Ok(columns), Ok(rows)) = (u16::try_from(width), u16::try_from(height)) else {
+        return Err(FrameError::Size { width, height, rgb_bytes: rgb.len() });
+    };
     let mut data = Vec::new();
     Encoder::new(&mut data, quality)
-        .encode(rgb, side(width)?, side(height)?, jpeg_encoder::ColorType::Rgb)
+        .encode(rgb, columns, rows, jpeg_encoder::ColorType::Rgb)
         .map_err(|error| FrameError::Jpeg(error.to_string()))?;
     Ok(data)
 }

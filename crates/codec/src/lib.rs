@@ -30,7 +30,7 @@ mod runs;
 mod sample_image_codec;
 mod tagged;
 #[cfg(test)]
-mod test_planes;
+mod test_support;
 mod view_codec;
 mod words_codec;
 

@@ -138,14 +138,13 @@ fn check_header(header: &ImageHeader, count: u32, limits: &DecodeLimits) -> Resu
 
 impl UnderWay {
     fn append(&mut self, sequence: u32, chunk_count: u32, data: Bytes) -> Result<(), ChunkError> {
-        let malformed = |field| Err(ChunkError::Malformed { sequence, field });
         if chunk_count != self.chunk_count {
-            return malformed("chunk_count");
+            return Err(ChunkError::Malformed { sequence, field: "chunk_count" });
         }
         let before = (u64::from(sequence) - 1) * MAX_CHUNK_BYTES as u64;
         let left = self.header.payload_bytes().saturating_sub(before);
         if data.len() as u64 != left.min(MAX_CHUNK_BYTES as u64) {
-            return malformed("data length");
+            return Err(ChunkError::Malformed { sequence, field: "data length" });
         }
         self.pieces.push(data);
         self.next_sequence += 1;
