@@ -23,10 +23,7 @@ pub fn psnr_db(reference: &Rgb8Image, test: &Rgb8Image, mask: Option<&[bool]>) -
 
 /// 10 · log10(255² / MSE).
 fn db_from_mean_squared_error(mean_squared_error: f64) -> f64 {
-    match mean_squared_error > 0.0 {
-        true => 10.0 * (255.0 * 255.0 / mean_squared_error).log10(),
-        false => f64::INFINITY,
-    }
+    if mean_squared_error > 0.0 { 10.0 * (255.0 * 255.0 / mean_squared_error).log10() } else { f64::INFINITY }
 }
 
 fn squared_distance(a: [u8; 3], b: [u8; 3]) -> u32 {

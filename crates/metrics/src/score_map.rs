@@ -23,8 +23,8 @@ impl ScoreMap {
     /// The mask has another size.
     pub fn mean(&self, mask: Option<&[bool]>) -> Result<Option<f64>, MetricsError> {
         expect_mask(mask, self.values.len())?;
-        let selected = |index: &usize| mask.is_none_or(|mask| mask[*index]);
-        let values = self.valued_pixels().filter(selected).map(|index| f64::from(self.values[index]));
+        let selected = self.valued_pixels().filter(|&index| mask.is_none_or(|mask| mask[index]));
+        let values = selected.map(|index| f64::from(self.values[index]));
         let (sum, count) = values.fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
         Ok((count > 0).then(|| sum / count as f64))
     }
