@@ -27,8 +27,8 @@ fn line([name, value, bar, outcome]: &[String; 4], widths: [usize; 4]) -> String
 }
 
 fn totals(checks: &[Check]) -> String {
-    let count = |outcome| checks.iter().filter(|check| check.outcome() == outcome).count();
-    let [holds, short, not_run] = [Outcome::Holds, Outcome::FallsShort, Outcome::NotRun].map(count);
+    let [holds, short, not_run] = [Outcome::Holds, Outcome::FallsShort, Outcome::NotRun]
+        .map(|outcome| checks.iter().filter(|check| check.outcome() == outcome).count());
     format!("{} checks: {holds} hold, {short} fall short, {not_run} not run", checks.len())
 }
 

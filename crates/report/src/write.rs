@@ -22,7 +22,23 @@ impl Report {
     /// # Errors
     /// Parts do not fit together, names collide, or the folder cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), ReportError> {
-        write(self, folder)
+        // Everything is validated and drawn before the first file is written.
+        self.validate()?;
+        let palette = Palette::for_names(self.charts.iter().flat_map(Chart::series_names));
+        let charts = self.charts.iter().map(|chart| chart.draw(&palette)).collect::<Result<Vec<_>, _>>()?;
+        let page = html::page(self, &charts)?;
+        self.make_folders(folder)?;
+        for (chart, drawing) in self.charts.iter().zip(&charts) {
+            write_file(&folder.join(chart_path(chart)), standalone(drawing).as_bytes())?;
+        }
+        for table in &self.tables {
+            write_file(&folder.join(table_path(table)), &table.to_csv()?)?;
+        }
+        for picture in self.all_pictures() {
+            picture.image.save_with_format(folder.join(picture_path(&picture.name)), image::ImageFormat::Png)?;
+        }
+        write_file(&folder.join("report.json"), serde_json::to_string_pretty(self)?.as_bytes())?;
+        write_file(&folder.join("index.html"), page.as_bytes())
     }
 
     /// Writes the report, prints its path and its checks, and returns [`Report::exit_ok`].
@@ -36,31 +52,22 @@ impl Report {
         let _ = writeln!(io::stdout(), "{}", checks_text(&self.checks));
         Ok(self.exit_ok())
     }
-}
 
-/// Everything is validated and drawn before the first file is written.
-fn write(report: &Report, folder: &Path) -> Result<(), ReportError> {
-    validate(report)?;
-    let palette = Palette::for_names(report.charts.iter().flat_map(Chart::series_names));
-    let charts = report.charts.iter().map(|chart| chart.draw(&palette)).collect::<Result<Vec<_>, _>>()?;
-    let page = html::page(report, charts.iter().map(|chart| chart.inline()).collect())?;
-    make_folders(report, folder)?;
-    for (chart, drawing) in report.charts.iter().zip(&charts) {
-        write_file(&folder.join(chart_path(chart)), drawing.standalone().as_bytes())?;
+    fn validate(&self) -> Result<(), ReportError> {
+        self.tables.iter().try_for_each(Table::validate)?;
+        expect_distinct("tables", self.tables.iter().map(|table| table.name.as_str()))?;
+        expect_distinct("charts", self.charts.iter().map(Chart::name))?;
+        expect_distinct("pictures", self.all_pictures().map(|picture| picture.name.as_str()))
     }
-    for table in &report.tables {
-        write_file(&folder.join(table_path(table)), &table.to_csv()?)?;
-    }
-    write_pictures(report, folder)?;
-    write_file(&folder.join("report.json"), serde_json::to_string_pretty(report)?.as_bytes())?;
-    write_file(&folder.join("index.html"), page.as_bytes())
-}
 
-fn validate(report: &Report) -> Result<(), ReportError> {
-    report.tables.iter().try_for_each(Table::validate)?;
-    expect_distinct("tables", report.tables.iter().map(|table| table.name.as_str()))?;
-    expect_distinct("charts", report.charts.iter().map(Chart::name))?;
-    expect_distinct("pictures", report.all_pictures().map(|picture| picture.name.as_str()))
+    fn make_folders(&self, folder: &Path) -> Result<(), ReportError> {
+        let parts = [("charts", self.charts.is_empty()), ("pictures", self.all_pictures().next().is_none())];
+        let used = parts.iter().filter(|(_, empty)| !empty).map(|(part, _)| folder.join(part));
+        for path in std::iter::once(folder.to_path_buf()).chain(used) {
+            fs::create_dir_all(&path).map_err(|source| ReportError::Io { path, source })?;
+        }
+        Ok(())
+    }
 }
 
 fn expect_distinct<'a>(kind: &'static str, names: impl Iterator<Item = &'a str>) -> Result<(), ReportError> {
@@ -71,20 +78,10 @@ fn expect_distinct<'a>(kind: &'static str, names: impl Iterator<Item = &'a str>)
     }
 }
 
-fn make_folders(report: &Report, folder: &Path) -> Result<(), ReportError> {
-    let parts = [("charts", report.charts.is_empty()), ("pictures", report.all_pictures().next().is_none())];
-    let used = parts.iter().filter(|(_, empty)| !empty).map(|(part, _)| folder.join(part));
-    for path in std::iter::once(folder.to_path_buf()).chain(used) {
-        fs::create_dir_all(&path).map_err(|source| ReportError::Io { path, source })?;
-    }
-    Ok(())
-}
-
-fn write_pictures(report: &Report, folder: &Path) -> Result<(), ReportError> {
-    for picture in report.all_pictures() {
-        picture.image.save_with_format(folder.join(picture_path(&picture.name)), image::ImageFormat::Png)?;
-    }
-    Ok(())
+/// A chart as a file of its own: black on white.
+fn standalone(svg: &str) -> String {
+    let ink = " color=\"#1b1f24\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>";
+    svg.replacen('>', ink, 1)
 }
 
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {

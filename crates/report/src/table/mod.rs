@@ -6,4 +6,5 @@ mod rows;
 
 pub use cell::Cell;
 pub(crate) use number::format_number;
+pub(crate) use rows::heading;
 pub use rows::{Column, Table, TableError};

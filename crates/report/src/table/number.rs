@@ -21,10 +21,7 @@ pub fn format_number(value: f64) -> String {
 }
 
 fn without_trailing_zeros(number: &str) -> String {
-    match number.contains('.') {
-        true => number.trim_end_matches('0').trim_end_matches('.').into(),
-        false => number.into(),
-    }
+    if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.').into() } else { number.into() }
 }
 
 #[cfg(test)]

@@ -29,11 +29,13 @@ impl Column {
     /// `name (unit)`.
     #[must_use]
     pub fn heading(&self) -> String {
-        match self.unit.is_empty() {
-            true => self.name.clone(),
-            false => format!("{} ({})", self.name, self.unit),
-        }
+        heading(&self.name, &self.unit)
     }
+}
+
+/// `name (unit)`, or the name alone where there is no unit.
+pub(crate) fn heading(name: &str, unit: &str) -> String {
+    if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") }
 }
 
 /// A table, written as `{slug(name)}.csv`.
@@ -51,8 +53,8 @@ impl Table {
     /// An empty table of `(heading, unit)` columns.
     #[must_use]
     pub fn new(name: impl Into<String>, columns: &[(&str, &str)]) -> Self {
-        let column = |&(name, unit): &(&str, &str)| Column { name: name.into(), unit: unit.into() };
-        Self { name: name.into(), columns: columns.iter().map(column).collect(), rows: Vec::new() }
+        let columns = columns.iter().map(|&(name, unit)| Column { name: name.into(), unit: unit.into() });
+        Self { name: name.into(), columns: columns.collect(), rows: Vec::new() }
     }
 
     /// Adds a row.
@@ -93,30 +95,33 @@ impl Table {
     pub fn to_text(&self) -> String {
         let heads: Vec<String> = self.columns.iter().map(Column::heading).collect();
         let rows: Vec<Vec<String>> = self.rows.iter().map(|row| row.iter().map(Cell::display).collect()).collect();
-        let width =
-            |column: usize| rows.iter().chain([&heads]).map(|row| row[column].chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..heads.len()).map(width).collect();
-        let is_number = |cell: &Cell| cell.is_numeric() || *cell == Cell::Missing;
-        let line = |row: &Vec<String>| {
-            let cell = |(column, text): (usize, &String)| match self.rows.iter().all(|row| is_number(&row[column])) {
-                true => format!("{text:>0$}", widths[column]),
-                false => format!("{text:<0$}", widths[column]),
-            };
-            row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()
-        };
-        let lines = [&heads].into_iter().chain(&rows).map(line);
+        let columns = (0..heads.len()).map(|column| {
+            let width = rows.iter().chain([&heads]).map(|row| row[column].chars().count()).max().unwrap_or(0);
+            let is_number = self.rows.iter().all(|row| row[column].is_numeric() || row[column] == Cell::Missing);
+            (width, is_number)
+        });
+        let columns: Vec<(usize, bool)> = columns.collect();
+        let lines = [&heads].into_iter().chain(&rows).map(|row| {
+            let cells = row.iter().zip(&columns).map(|(text, &(width, is_number))| {
+                if is_number { format!("{text:>width$}") } else { format!("{text:<width$}") }
+            });
+            cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+        });
         format!("{}\n{}", self.name, lines.collect::<Vec<_>>().join("\n"))
     }
 
     /// The table as Markdown, with numbers as in [`Cell::display`].
     #[must_use]
     pub fn to_markdown(&self) -> String {
-        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
-        let heads = line(self.columns.iter().map(Column::heading).collect());
+        let heads = markdown_row(self.columns.iter().map(Column::heading));
         let rule = format!("|{}\n", "---|".repeat(self.columns.len()));
-        let rows: String = self.rows.iter().map(|row| line(row.iter().map(Cell::display).collect())).collect();
+        let rows: String = self.rows.iter().map(|row| markdown_row(row.iter().map(Cell::display))).collect();
         format!("**{}**\n\n{heads}{rule}{rows}", self.name)
     }
+}
+
+fn markdown_row(cells: impl Iterator<Item = String>) -> String {
+    format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
 }
 
 #[cfg(test)]
