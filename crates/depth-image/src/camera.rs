@@ -34,10 +34,7 @@ impl Camera {
     /// `None` of another model.
     #[must_use]
     pub fn pinhole(&self) -> Option<&PinholeCamera> {
-        match self {
-            Self::Pinhole(camera) => Some(camera),
-            Self::SinglePole(_) => None,
-        }
+        if let Self::Pinhole(camera) = self { Some(camera) } else { None }
     }
 
     /// The model, as it is named everywhere.

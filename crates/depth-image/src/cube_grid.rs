@@ -64,7 +64,6 @@ impl CubeGrid {
         let frame = Mat3A::from_quat(first.world_from_camera);
         let axes = Mat3A::from_cols(frame.z_axis, frame.x_axis, frame.y_axis);
         let [own, rows] = [second.size_px.y, first.size_px.y];
-
         let grid = Self {
             corner_in_world: first.corner_in_world
                 - Vec3::from(frame.y_axis) * (rows as f32 * first.spacing_m)
@@ -83,7 +82,6 @@ impl CubeGrid {
     pub fn has_camera(&self, axis: usize, camera: &ParallelCamera) -> bool {
         let own = self.camera(axis);
         let [right, end] = [Vec2::new(own.size_px.x as f32, 0.0), own.size_px.as_vec2()];
-
         let places = [(Vec2::ZERO, 0.0), (right, 0.0), (end, 0.0), (Vec2::ZERO, own.range_m)];
         let is_alike =
             own.size_px == camera.size_px && (own.range_m - camera.range_m).abs() < CAMERA_ROUNDING * own.spacing_m;

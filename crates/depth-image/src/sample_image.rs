@@ -78,28 +78,7 @@ impl SampleImages {
     /// The depth images; none of a cube.
     #[must_use]
     pub fn depth(&self) -> &[DepthImage] {
-        match self {
-            Self::Depth(images) => images,
-            Self::Cube(_) => &[],
-        }
-    }
-}
-
-impl From<DepthImage> for SampleImage {
-    fn from(image: DepthImage) -> Self {
-        Self::Depth(image)
-    }
-}
-
-impl From<LayeredDepthImage> for SampleImage {
-    fn from(image: LayeredDepthImage) -> Self {
-        Self::Layered(image)
-    }
-}
-
-impl From<LayeredLightField> for SampleImage {
-    fn from(image: LayeredLightField) -> Self {
-        Self::LightField(image)
+        if let Self::Depth(images) = self { images } else { &[] }
     }
 }
 

@@ -227,8 +227,7 @@ fn extent(cameras: &[PinholeCamera], turn: Quat) -> (Vec3, [Vec3; 3]) {
 
 /// Middle and half edges of four cameras in rows from the bottom left, as rigs list them.
 fn corners(cameras: &[PinholeCamera]) -> Option<(Vec3, [Vec3; 3])> {
-    let [a, b, c, d] =
-        <[&PinholeCamera; 4]>::try_from(cameras.iter().collect::<Vec<_>>()).ok()?.map(|camera| camera.eye_in_world);
+    let [a, b, c, d] = <&[PinholeCamera; 4]>::try_from(cameras).ok()?.each_ref().map(|camera| camera.eye_in_world);
     let right = (b - a) * 0.5;
     let up = (c - a) * 0.5;
     let is_parallelogram = (a + d - b - c).length() <= 1e-3 * (right.length() + up.length());
