@@ -80,7 +80,6 @@ pub fn encode_view(view: &View, codec: FrameCodec) -> Result<EncodedView, FrameE
 /// For sizes over the limits, and data that does not decode to the planes of the header.
 pub fn decode_view(frame: &WholeFrame, limits: &DecodeLimits) -> Result<View, FrameError> {
     let FrameHeader { size_px, codec, .. } = frame.header;
-
     let texels = limits.texels(size_px.x, size_px.y).map_err(plane_error("size"))?;
     let [color, depth, provenance] = planes(frame)?;
     let depth = (!depth.is_empty()).then(|| unpack_f32_plane(&depth, texels).map_err(plane_error("inverse_depth")));

@@ -83,9 +83,7 @@ fn differences(words: &[u32], layout: WordLayout, shift: usize, out: &mut [u16])
 /// Applies `number` to each word and the one before, which is 0 before the first.
 #[inline]
 pub(crate) fn for_neighbours(words: &[u32], out: &mut [u16], number: impl Fn(u32, u32) -> u16) {
-    let Some((first, others)) = out.split_first_mut() else {
-        return;
-    };
+    let Some((first, others)) = out.split_first_mut() else { return };
     *first = number(words[0], 0);
     for ((out, &last), &word) in others.iter_mut().zip(words).zip(&words[1..]) {
         *out = number(word, last);
