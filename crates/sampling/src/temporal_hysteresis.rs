@@ -7,7 +7,7 @@ use depth_image::Camera;
 use parking_lot::Mutex;
 use render::{DrawWork, RedundancyTest, RenderError, Renderer, TemporalReference};
 
-use crate::{methods::SamplingMethod, work::SampleWork};
+use crate::{SampleWork, methods::SamplingMethod};
 
 /// The last temporal reference: it serves the sets after it.
 #[derive(Default)]
