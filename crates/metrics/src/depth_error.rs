@@ -79,7 +79,6 @@ mod tests {
     fn hits_of_more_than_a_hundredth_are_wrong() {
         let test: Vec<f32> = (1..=100).map(|i| 1.0 / (1.0 + i as f32 * 1e-3)).collect();
         let errors = depth_errors(&[1.0; 100], &test, None).unwrap();
-
         assert_eq!(errors.wrong_hit_px, 90, "those of more than 1 %, the tenth being on the bound or beside it");
     }
 

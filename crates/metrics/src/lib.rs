@@ -37,7 +37,7 @@ pub use error::MetricsError;
 pub use flip::{FLIP_PIXELS_PER_DEGREE, FLIP_REACH_PX, flip_map, flip_map_at};
 pub use foreground::{PictureErrors, foreground};
 pub use image::Rgb8Image;
-pub use pdiff::{PdiffMap, pdiff_map};
+pub use pdiff::pdiff_map;
 pub use psnr::{PSNR_CAP_DB, psnr_db};
 pub use score_map::ScoreMap;
 pub use ssim::{SSIM_WINDOW_PX, ssim_map};

@@ -53,7 +53,6 @@ impl Sums {
         let Self([a, b, aa, bb, ab]) = self;
         let mean_a = a as f64 / SAMPLES;
         let mean_b = b as f64 / SAMPLES;
-
         let variances = covariance(aa, a, a) + covariance(bb, b, b);
         let luminance = (2.0 * mean_a * mean_b + C1) / (mean_a * mean_a + mean_b * mean_b + C1);
         luminance * (2.0 * covariance(ab, a, b) + C2) / (variances + C2)

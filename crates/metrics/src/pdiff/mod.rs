@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::color::{ADOBE_RGB, WhiteRelative, convert_pixels, lab_from_relative_xyz};
 use crate::convolution::{Edge, Plane};
-use crate::{MetricsError, Rgb8Image, error::expect_mask};
+use crate::{MetricsError, Rgb8Image};
 use vision::{FrequencyBands, LEVELS, threshold_vs_intensity};
 
 /// Burt and Adelson's generating kernel.
@@ -31,37 +31,17 @@ const GAMMA: f32 = 2.2;
 /// The luminance of white.
 const WHITE_CD_M2: f32 = 100.0;
 
-/// The pixels that a viewer sees differ.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PdiffMap {
-    /// One flag a pixel, row by row.
-    pub failing: Vec<bool>,
-}
-
-impl PdiffMap {
-    /// The number of failing pixels, of all or of the mask.
-    ///
-    /// # Errors
-    /// The mask has another size.
-    pub fn failing_px(&self, mask: Option<&[bool]>) -> Result<usize, MetricsError> {
-        expect_mask(mask, self.failing.len())?;
-        let selected = self.failing.iter().enumerate().filter(|(index, _)| mask.is_none_or(|mask| mask[*index]));
-        Ok(selected.filter(|(_, fails)| **fails).count())
-    }
-}
-
-/// Yee's perceptual difference. The channels have the primaries of Adobe RGB (1998), as the public tool assumes; they weigh
+/// Yee's perceptual difference: whether a viewer sees a pixel differ, for each pixel, row by row. The channels have the primaries of Adobe RGB (1998), as the public tool assumes; they weigh
 /// chroma a little more than those of sRGB.
 ///
 /// # Errors
 /// Images differ in size.
-pub fn pdiff_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<PdiffMap, MetricsError> {
+pub fn pdiff_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<Vec<bool>, MetricsError> {
     reference.expect_same_size(test)?;
     let bands = FrequencyBands::new(reference.width_px(), FIELD_OF_VIEW_DEG);
     let [reference, test] = [reference, test].map(Seen::new);
     let pixels = (0..reference.ab.len()).into_par_iter();
-    let failing = pixels.map(|index| fails(&reference, &test, &bands, index)).collect();
-    Ok(PdiffMap { failing })
+    Ok(pixels.map(|index| fails(&reference, &test, &bands, index)).collect())
 }
 
 /// One image as the eye adapts to it.
@@ -108,8 +88,10 @@ fn fails(reference: &Seen, test: &Seen, bands: &FrequencyBands, index: usize) ->
     let contrast = std::array::from_fn(|band| contrast([reference, test], index, band));
     let elevation = bands.threshold_elevation(&contrast, adaptation_cd_m2);
     let delta_cd_m2 = (reference.luminance(0, index) - test.luminance(0, index)).abs();
+    // Colour is seen in full above 10 cd/m² and fades, squared, to nothing in the dark.
+    let color_scale = (adaptation_cd_m2 / COLOR_VISION_CD_M2).min(1.0).powi(2);
     delta_cd_m2 > elevation * threshold_vs_intensity(adaptation_cd_m2)
-        || reference.ab[index].distance_squared(test.ab[index]) * color_scale(adaptation_cd_m2) > elevation
+        || reference.ab[index].distance_squared(test.ab[index]) * color_scale > elevation
 }
 
 /// The contrast of a band: the stronger amplitude against the brighter background of two images.
@@ -117,11 +99,6 @@ fn contrast(images: [&Seen; 2], index: usize, band: usize) -> f32 {
     let amplitudes_cd_m2 = images.map(|seen| (seen.luminance(band, index) - seen.luminance(band + 1, index)).abs());
     let [a, b] = images.map(|seen| seen.luminance(band + 2, index).abs());
     amplitudes_cd_m2[0].max(amplitudes_cd_m2[1]) / a.max(b).max(DARKEST_CD_M2)
-}
-
-/// Colour is seen in full above 10 cd/m² and fades, squared, to nothing in the dark.
-fn color_scale(adaptation_cd_m2: f32) -> f32 {
-    (adaptation_cd_m2 / COLOR_VISION_CD_M2).min(1.0).powi(2)
 }
 
 #[cfg(test)]
@@ -133,7 +110,7 @@ mod tests {
     }
 
     fn failing(a: [u8; 3], b: [u8; 3]) -> usize {
-        pdiff_map(&flat(a), &flat(b)).unwrap().failing_px(None).unwrap()
+        pdiff_map(&flat(a), &flat(b)).unwrap().into_iter().filter(|&fails| fails).count()
     }
 
     #[test]

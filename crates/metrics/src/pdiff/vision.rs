@@ -24,7 +24,6 @@ impl FrequencyBands {
         let pixels_per_degree = width_px as f32 / image_deg;
         let cycles_per_degree: [f32; BANDS] = std::array::from_fn(|band| 0.5 * pixels_per_degree / (1 << band) as f32);
         let peak = contrast_sensitivity(PEAK_CYCLES_PER_DEGREE, 100.0);
-
         Self {
             cycles_per_degree,
             inverse_relative_sensitivity: cycles_per_degree.map(|cycles| peak / contrast_sensitivity(cycles, 100.0)),
