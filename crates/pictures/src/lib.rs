@@ -5,7 +5,6 @@
 mod camera_frame;
 mod depth;
 mod error_map;
-
 mod provenance;
 mod text;
 
@@ -15,7 +14,6 @@ use image::RgbImage;
 pub use camera_frame::camera_frame;
 pub use depth::{Grey16, depth, inverse_depth_16};
 pub use error_map::error_map;
-
 pub use provenance::provenance;
 pub use text::TextStyle;
 

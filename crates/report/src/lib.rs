@@ -17,15 +17,13 @@ mod html;
 mod paths;
 mod picture;
 mod report;
-mod slug;
 mod table;
 mod write;
 
 pub use chart::{Axis, BarChart, Better, Chart, Limit, Mark, Point, Scale, Series, Stage, XyChart, pareto_front};
 pub use check::{Bar, Check, Outcome};
-pub use check_text::checks_text;
 pub use error::ReportError;
+pub use paths::slug;
 pub use picture::{Legend, Picture, PictureRow, comparison_row, contact_sheet};
 pub use report::{Report, SCHEMA_VERSION};
-pub use slug::slug;
-pub use table::{Cell, Column, Table, TableError};
+pub use table::{Cell, Column, Table};

@@ -2,18 +2,16 @@
 
 use std::collections::HashSet;
 use std::fs;
-use std::io::{self, Write as _};
+use std::io::{self, Cursor, Write as _};
 use std::path::Path;
-
-use crate::table::Table;
 
 use crate::chart::{Chart, Palette};
 use crate::check_text::checks_text;
 use crate::error::ReportError;
 use crate::html;
-use crate::paths::{chart_path, picture_path, table_path};
+use crate::paths::{chart_path, picture_path, slug, table_path};
 use crate::report::Report;
-use crate::slug::slug;
+use crate::table::Table;
 
 impl Report {
     /// Writes the report to a folder, which is made if need be: `report.json`, `index.html`, a CSV file a table,
@@ -27,7 +25,6 @@ impl Report {
         let palette = Palette::for_names(self.charts.iter().flat_map(Chart::series_names));
         let charts = self.charts.iter().map(|chart| chart.draw(&palette)).collect::<Result<Vec<_>, _>>()?;
         let page = html::page(self, &charts)?;
-        self.make_folders(folder)?;
         for (chart, drawing) in self.charts.iter().zip(&charts) {
             write_file(&folder.join(chart_path(chart)), standalone(drawing).as_bytes())?;
         }
@@ -35,7 +32,9 @@ impl Report {
             write_file(&folder.join(table_path(table)), &table.to_csv()?)?;
         }
         for picture in self.all_pictures() {
-            picture.image.save_with_format(folder.join(picture_path(&picture.name)), image::ImageFormat::Png)?;
+            let mut png = Cursor::new(Vec::new());
+            picture.image.write_to(&mut png, image::ImageFormat::Png)?;
+            write_file(&folder.join(picture_path(&picture.name)), png.get_ref())?;
         }
         write_file(&folder.join("report.json"), serde_json::to_string_pretty(self)?.as_bytes())?;
         write_file(&folder.join("index.html"), page.as_bytes())
@@ -59,15 +58,6 @@ impl Report {
         expect_distinct("charts", self.charts.iter().map(Chart::name))?;
         expect_distinct("pictures", self.all_pictures().map(|picture| picture.name.as_str()))
     }
-
-    fn make_folders(&self, folder: &Path) -> Result<(), ReportError> {
-        let parts = [("charts", self.charts.is_empty()), ("pictures", self.all_pictures().next().is_none())];
-        let used = parts.iter().filter(|(_, empty)| !empty).map(|(part, _)| folder.join(part));
-        for path in std::iter::once(folder.to_path_buf()).chain(used) {
-            fs::create_dir_all(&path).map_err(|source| ReportError::Io { path, source })?;
-        }
-        Ok(())
-    }
 }
 
 fn expect_distinct<'a>(kind: &'static str, names: impl Iterator<Item = &'a str>) -> Result<(), ReportError> {
@@ -85,5 +75,6 @@ fn standalone(svg: &str) -> String {
 }
 
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
-    fs::write(path, bytes).map_err(|source| ReportError::Io { path: path.into(), source })
+    let written = path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::write(path, bytes));
+    written.map_err(|source| ReportError::Io { path: path.into(), source })
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use image::RgbImage;
 use report::{
     Axis, Bar, BarChart, Better, Cell, Check, Outcome, Picture, PictureRow, Point, Report, ReportError, Series, Table,
-    TableError, XyChart,
+    XyChart,
 };
 
 const HOSTILE: &str = "a<script>&\"b\"";
@@ -179,7 +179,7 @@ fn parts_that_do_not_fit_are_named() {
     let duplicate = write(|report| report.charts.push(BarChart::new("Stages!", Axis::linear("t", ""), ["a"]).into()));
     assert!(matches!(duplicate, ReportError::DuplicateName { kind: "charts", .. }));
     let ragged = write(|report| report.tables[0].rows[0].truncate(1));
-    assert!(matches!(ragged, ReportError::Table(TableError::RowLength { row: 0, .. })));
+    assert!(matches!(ragged, ReportError::RowLength { row: 0, .. }));
     let stage = write(|report| {
         report.charts.push(BarChart::new("b", Axis::linear("t", ""), ["a"]).with("s", [1.0, 2.0]).into())
     });

@@ -130,7 +130,6 @@ fn linear_ticks(range: &Range<f64>) -> Vec<f64> {
 /// Decades over a wide range; 1, 2, 5 over a middling one; even steps over a narrow one.
 fn log_ticks(range: &Range<f64>) -> Vec<f64> {
     let span = range.end - range.start;
-
     if span < 0.7 {
         let values = linear_ticks(&(10_f64.powf(range.start)..10_f64.powf(range.end)));
         return values.into_iter().map(f64::log10).filter(|place| range.contains(place)).collect();

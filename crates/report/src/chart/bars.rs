@@ -5,8 +5,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 use serde::{Deserialize, Serialize};
 
-use super::area::{Area, message};
-use super::canvas::{self, Glyph, LegendEntry, style_mesh, text_style, text_width_px};
+use super::canvas::{self, Area, Glyph, LegendEntry, message, style_mesh, text_style, text_width_px};
 use super::ruler::Ruler;
 use super::{Axis, Palette};
 use crate::ReportError;

@@ -1,14 +1,17 @@
 //! The frame of all charts: a title, a legend above the data, and ink that follows the page.
 
 use plotters::chart::MeshStyle;
+use plotters::coord::Shift;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::area::{Area, message};
 use super::marker::Marker;
 use crate::ReportError;
+
+/// Part of a drawing.
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// Charts are drawn at this width and may be scaled.
 pub(super) const WIDTH_PX: u32 = 700;
@@ -65,6 +68,11 @@ pub(super) fn draw(
     }
     let described = format!("<svg role=\"img\" aria-label=\"{}\" ", minijinja::HtmlEscape(name));
     Ok(svg.replace(INK_IN_SVG, "currentColor").replacen("<svg ", &described, 1))
+}
+
+/// The text of an error of the chart library, which borrows the drawing.
+pub(super) fn message(error: impl std::error::Error) -> String {
+    error.to_string()
 }
 
 /// Text in the page's ink.

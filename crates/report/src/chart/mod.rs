@@ -1,6 +1,5 @@
 //! Charts: their data, and their drawing as SVG.
 
-mod area;
 mod axis;
 mod bars;
 mod canvas;
@@ -16,7 +15,6 @@ use serde::{Deserialize, Serialize};
 use crate::ReportError;
 pub use axis::{Axis, Scale};
 pub use bars::{BarChart, Stage};
-
 pub use front::{Better, pareto_front};
 pub(crate) use palette::Palette;
 pub use series::{Limit, Mark, Point, Series};

@@ -7,8 +7,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 use serde::{Deserialize, Serialize};
 
-use super::area::{Area, message};
-use super::canvas::{self, Glyph, INK, LegendEntry, WIDTH_PX, style_mesh, text_style, text_width_px};
+use super::canvas::{self, Area, Glyph, INK, LegendEntry, WIDTH_PX, message, style_mesh, text_style, text_width_px};
 use super::marker::Marker;
 use super::ruler::Ruler;
 use super::{Axis, Better, Limit, Mark, Palette, Point, Series, pareto_front};
@@ -123,9 +122,7 @@ impl XyChart {
     }
 
     fn draw_limit(&self, plot: &mut Plot, limit: &Limit, x: &Range<f64>) -> Result<(), String> {
-        let Some(y) = self.y.place(limit.y) else {
-            return Ok(());
-        };
+        let Some(y) = self.y.place(limit.y) else { return Ok(()) };
         let style = INK.mix(0.55).stroke_width(1);
         draw_path(plot, vec![(x.start, y), (x.end, y)], style, true)?;
         let text = EmptyElement::at((x.end, y))
@@ -134,9 +131,7 @@ impl XyChart {
     }
 
     fn draw_front(&self, plot: &mut Plot) -> Result<(), String> {
-        let Some(better) = self.front else {
-            return Ok(());
-        };
+        let Some(better) = self.front else { return Ok(()) };
         let all =
             self.series.iter().flat_map(|series| series.points.iter().enumerate().map(move |point| (series, point)));
         let measured = all.filter(|(series, (index, _))| !series.is_extrapolated(*index)).map(|(_, (_, point))| point);

@@ -3,18 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::cell::Cell;
-
-/// A table that cannot be made or written.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "self-naming fields")]
-pub enum TableError {
-    /// A row and the columns differ in number.
-    #[error("row {row} of table {table:?} has {cells} cells, its columns are {columns}")]
-    RowLength { table: String, row: usize, cells: usize, columns: usize },
-    /// The CSV writer failed.
-    #[error("cannot write a table: {0}")]
-    Csv(#[from] csv::Error),
-}
+use crate::ReportError;
 
 /// A column.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -61,17 +50,17 @@ impl Table {
     ///
     /// # Errors
     /// Cells and columns differ in number.
-    pub fn push(&mut self, row: impl IntoIterator<Item = Cell>) -> Result<(), TableError> {
+    pub fn push(&mut self, row: impl IntoIterator<Item = Cell>) -> Result<(), ReportError> {
         self.rows.push(row.into_iter().collect());
         self.validate()
     }
 
     /// Checks that every row has one cell a column.
-    pub fn validate(&self) -> Result<(), TableError> {
+    pub fn validate(&self) -> Result<(), ReportError> {
         let columns = self.columns.len();
         match self.rows.iter().enumerate().find(|(_, row)| row.len() != columns) {
             Some((row, cells)) => {
-                Err(TableError::RowLength { table: self.name.clone(), row, cells: cells.len(), columns })
+                Err(ReportError::RowLength { table: self.name.clone(), row, cells: cells.len(), columns })
             }
             None => Ok(()),
         }
@@ -81,7 +70,7 @@ impl Table {
     ///
     /// # Errors
     /// Cells and columns differ in number.
-    pub fn to_csv(&self) -> Result<Vec<u8>, TableError> {
+    pub fn to_csv(&self) -> Result<Vec<u8>, ReportError> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(self.columns.iter().map(Column::heading))?;
         for row in &self.rows {
@@ -147,7 +136,7 @@ mod tests {
     #[test]
     fn a_row_with_too_few_cells_is_refused() {
         let mut table = Table::new("costs", &[("what", ""), ("time", "ms")]);
-        assert!(matches!(table.push([1_u32.into()]), Err(TableError::RowLength { cells: 1, columns: 2, .. })));
+        assert!(matches!(table.push([1_u32.into()]), Err(ReportError::RowLength { cells: 1, columns: 2, .. })));
     }
 
     #[test]
