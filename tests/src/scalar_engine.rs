@@ -498,10 +498,12 @@ impl Engine for ScalarEngine {
         let image = |camera: &SampleCamera| match camera {
             SampleCamera::Depth(camera) => {
                 let image = depth_image(camera, request.scene_time_s, request.refinement);
-                if request.planes.light { with_light(image) } else { image }.into()
+                SampleImage::Depth(if request.planes.light { with_light(image) } else { image })
             }
-            SampleCamera::Layered(camera) => layered_image(camera, request.scene_time_s, request.refinement).into(),
-            SampleCamera::LightField(camera) => no_light(camera).into(),
+            SampleCamera::Layered(camera) => {
+                SampleImage::Layered(layered_image(camera, request.scene_time_s, request.refinement))
+            }
+            SampleCamera::LightField(camera) => SampleImage::LightField(no_light(camera)),
         };
         sleep(self.pace().image * cameras.len() as u32);
         Ok(cameras.into_iter().map(image).collect())

@@ -9,15 +9,15 @@
 use std::{error::Error, hint::black_box, time::Instant};
 
 use codec::{
-    DecodeLimits, FrameCodec, PlaneSet, decode_depth_image, decode_depth_plane, decode_frame, encode_depth_image,
-    encode_depth_plane, encode_frame, inverse_depth_codes,
+    DecodeLimits, FrameCodec, InverseDepthRange, PlaneSet, decode_depth_image, decode_frame, encode_depth_image,
+    encode_frame,
 };
 use depth_image::{Camera, DepthImage, PinholeCamera, SpecularPlanes, rgb9e5_from_linear};
 use glam::{UVec2, Vec3};
 
-#[path = "../src/test_planes.rs"]
+#[path = "../src/test_support.rs"]
 #[allow(dead_code)] // The tests use more of it.
-mod test_planes;
+mod test_support;
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("| what | raw bytes | raw LZ4 | ours | of LZ4 | encode MB/s | decode MB/s |");
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if arguments.is_empty() {
         for (width, height) in [(400, 300), (1024, 1024)] {
-            report("tree", &test_planes::tree_over_terrain(width, height, 1), width as u32, height as u32)?;
+            report("tree", &test_support::tree_over_terrain(width, height, 1), width as u32, height as u32)?;
         }
     }
     for plane in arguments.chunks(3) {
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn report(name: &str, plane: &[f32], width: u32, height: u32) -> Result<(), Box<dyn Error>> {
     report_depth(&format!("{name} {width}×{height} depth"), plane, width, height)?;
-    let mut random = test_planes::Random::new(2);
+    let mut random = test_support::Random::new(2);
     let shade = |&inverse: &f32| {
         let light = inverse * (1.5 + 0.02 * random.unit());
         if inverse > 0.0 { Vec3::new(light, light * 1.3, light * 0.4) } else { Vec3::ZERO }
@@ -59,32 +59,37 @@ fn report(name: &str, plane: &[f32], width: u32, height: u32) -> Result<(), Box<
     report_frame(&format!("{name} {width}×{height} frame"), &colors, width, height)
 }
 
+/// The depths of a black image, whose colours take next to no time.
 fn report_depth(name: &str, plane: &[f32], width: u32, height: u32) -> Result<(), Box<dyn Error>> {
-    let limits = DecodeLimits::default();
-    let raw: Vec<u8> = inverse_depth_codes(plane).iter().flat_map(|code| code.to_le_bytes()).collect();
-    let encoded = encode_depth_plane(plane);
-    decode_depth_plane(&encoded, width, height, &limits)?;
-    let encode_s = median_secs(|| drop(black_box(encode_depth_plane(black_box(plane)))));
-    let decode_s = median_secs(|| drop(black_box(decode_depth_plane(black_box(&encoded), width, height, &limits))));
-    print_row(name, &raw, encoded.packed.len(), encode_s, decode_s);
+    let image = black(plane, width, height);
+    let header = encode_depth_image(&image, PlaneSet::ALL)?.header;
+    let codes = plane.iter().map(|&inverse| code_of(inverse, header.inverse_depth_range));
+    let raw: Vec<u8> = codes.flat_map(u16::to_le_bytes).collect();
+    let (_, encode_s, decode_s) = image_costs(&image)?;
+    print_row(name, &raw, header.planes[0].packed_bytes as usize, encode_s, decode_s);
     Ok(())
 }
 
-/// The colour plane's share of a whole image: what it adds to an image without colours.
+/// The 16-bit code of an inverse depth: 0 for a hole, 1 for background, and the others over the range of the plane.
+fn code_of(inverse_depth_per_m: f32, range: InverseDepthRange) -> u16 {
+    let InverseDepthRange { least_per_m, greatest_per_m } = range;
+    let share = (inverse_depth_per_m - least_per_m) / (greatest_per_m - least_per_m).max(f32::MIN_POSITIVE);
+    match inverse_depth_per_m {
+        inverse if inverse > 0.0 => 2 + (f64::from(share) * f64::from(u16::MAX - 2)).round() as u16,
+        inverse => u16::from(inverse == 0.0),
+    }
+}
+
+/// The colour plane's share of a whole image: what it adds to a black one.
 fn report_color(name: &str, plane: &[f32], colors: &[Vec3], width: u32, height: u32) -> Result<(), Box<dyn Error>> {
     let color_rgb9e5 = colors.iter().map(|&color| rgb9e5_from_linear(color)).collect();
-    let image = DepthImage { color_rgb9e5, ..black(plane, width, height) };
-    let limits = DecodeLimits::default();
-    let encoded = encode_depth_image(&image, PlaneSet::ALL)?;
-    let decode = || decode_depth_image(&encoded.header, image.camera, &encoded.payload, &limits);
-    decode()?;
-    let depth = encode_depth_plane(plane);
-    let encode_s = median_secs(|| drop(black_box(encode_depth_image(&image, PlaneSet::ALL))))
-        - median_secs(|| drop(black_box(encode_depth_plane(plane))));
-    let decode_s = median_secs(|| drop(black_box(decode())))
-        - median_secs(|| drop(black_box(decode_depth_plane(&depth, width, height, &limits))));
+    let black = black(plane, width, height);
+    let image = DepthImage { color_rgb9e5, ..black.clone() };
+    let header = encode_depth_image(&image, PlaneSet::ALL)?.header;
+    let without = image_costs(&black)?;
+    let with = image_costs(&image)?;
     let raw: Vec<u8> = image.color_rgb9e5.iter().flat_map(|color| color.to_le_bytes()).collect();
-    print_row(name, &raw, encoded.payload.len() - depth.packed.len(), encode_s, decode_s);
+    print_row(name, &raw, header.planes[1].packed_bytes as usize, with.1 - without.1, with.2 - without.2);
     Ok(())
 }
 
@@ -104,7 +109,7 @@ fn black(plane: &[f32], width: u32, height: u32) -> DepthImage {
 }
 
 /// Two materials by depth, one of them of uneven roughness; nothing where there is no sample.
-fn reflectance(plane: &[f32], random: &mut test_planes::Random) -> Vec<u32> {
+fn reflectance(plane: &[f32], random: &mut test_support::Random) -> Vec<u32> {
     let mut word = |&inverse: &f32| match inverse {
         inverse if inverse <= 0.0 => 0,
         inverse if inverse * 40.0 % 2.0 < 1.0 => 0x6038_3838,
@@ -114,7 +119,7 @@ fn reflectance(plane: &[f32], random: &mut test_planes::Random) -> Vec<u32> {
 }
 
 /// Shares of four lights by a number of rays; one ray from the light's middle casts a hard shadow.
-fn visibility(plane: &[f32], width: usize, rays: u32, random: &mut test_planes::Random) -> Vec<u32> {
+fn visibility(plane: &[f32], width: usize, rays: u32, random: &mut test_support::Random) -> Vec<u32> {
     let mut share = |at: usize, light: usize| {
         let x = (at % width) as f32 / width as f32;
         let y = (at / width) as f32 / width as f32;

@@ -85,9 +85,9 @@ pub fn split_into_chunks(
 ) -> impl Iterator<Item = Chunk> {
     let EncodedImage { header, payload } = image;
     let chunk_count = chunk_count(payload.len() as u64) as u32;
-    let piece = move |start: usize| payload.slice(start..payload.len().min(start + MAX_CHUNK_BYTES));
-    let starts = (1..chunk_count).map(|sequence| (sequence as usize - 1) * MAX_CHUNK_BYTES);
-    let bodies = std::iter::once(ChunkBody::Header(header)).chain(starts.map(piece).map(ChunkBody::Data));
+    let starts = (0..payload.len()).step_by(MAX_CHUNK_BYTES);
+    let pieces = starts.map(move |start| payload.slice(start..payload.len().min(start + MAX_CHUNK_BYTES)));
+    let bodies = std::iter::once(ChunkBody::Header(header)).chain(pieces.map(ChunkBody::Data));
     (0..).zip(bodies).map(move |(sequence, body)| Chunk {
         sample_set_id,
         image_index,

@@ -48,16 +48,14 @@ fn pack_changes(colors_rgb9e5: &[u32], changed: &mut [u32], out: &mut Vec<u8>) -
 }
 
 fn pack_differences(colors_rgb9e5: &[u32], packer: &mut Packer, out: &mut Vec<u8>) {
-    let green = |color: u32, last: u32| change(color >> 9, last >> 9, MANTISSA);
-    let red = |color, last| change(color, last, MANTISSA).wrapping_sub(green(color, last));
-    let blue = |color, last| change(color >> 18, last >> 18, MANTISSA).wrapping_sub(green(color, last));
-    let exponent = |color: u32, last: u32| change(color >> 27, last >> 27, EXPONENT);
-    let colors = colors_rgb9e5;
-    let count = colors.len();
-    packer.pack(count, out, |out| for_neighbours(colors, out, |color, last| fold(green(color, last), MANTISSA)));
-    packer.pack(count, out, |out| for_neighbours(colors, out, |color, last| fold(red(color, last), MANTISSA)));
-    packer.pack(count, out, |out| for_neighbours(colors, out, |color, last| fold(blue(color, last), MANTISSA)));
-    packer.pack(count, out, |out| for_neighbours(colors, out, |color, last| fold(exponent(color, last), EXPONENT)));
+    pack_channel(colors_rgb9e5, packer, out, |color, last| fold(green(color, last), MANTISSA));
+    pack_channel(colors_rgb9e5, packer, out, |color, last| fold(beside_green(color, last, 0), MANTISSA));
+    pack_channel(colors_rgb9e5, packer, out, |color, last| fold(beside_green(color, last, 18), MANTISSA));
+    pack_channel(colors_rgb9e5, packer, out, |color, last| fold(change(color, last, 27, EXPONENT), EXPONENT));
+}
+
+fn pack_channel(colors: &[u32], packer: &mut Packer, out: &mut Vec<u8>, number: impl Fn(u32, u32) -> u16) {
+    packer.pack(colors.len(), out, |out| for_neighbours(colors, out, number));
 }
 
 /// Reads `count` colours from the front of `input`.
@@ -130,8 +128,19 @@ fn apply([r, g, b, e]: [u32; 4], numbers: [u16; 4]) -> [u32; 4] {
 }
 
 #[inline]
-fn change(value: u32, last: u32, mask: u32) -> u32 {
-    (value & mask).wrapping_sub(last & mask)
+fn change(color: u32, last: u32, shift: u32, mask: u32) -> u32 {
+    (color >> shift & mask).wrapping_sub(last >> shift & mask)
+}
+
+#[inline]
+fn green(color: u32, last: u32) -> u32 {
+    change(color, last, 9, MANTISSA)
+}
+
+/// How much more the mantissa at a bit changes than green.
+#[inline]
+fn beside_green(color: u32, last: u32, shift: u32) -> u32 {
+    change(color, last, shift, MANTISSA).wrapping_sub(green(color, last))
 }
 
 /// A change modulo a field's size, as a small number: the shorter way round.
@@ -145,7 +154,7 @@ fn fold(change: u32, mask: u32) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_planes::Random;
+    use crate::test_support::Random;
 
     #[test]
     fn colors_survive() {

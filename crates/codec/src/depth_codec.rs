@@ -24,11 +24,10 @@
 
 use std::hint::select_unpredictable;
 
-use crate::lz4::expand_lz4_up_to;
+use crate::DecodeError;
 use crate::quantise::{InverseDepthRange, dequantise, empty_inverse_depth, quantise};
 use crate::runs::Runs;
 use crate::tagged::{BLOCK, Packer, max_packed_bytes, unpack, unzigzag, zigzag};
-use crate::{DecodeError, DecodeLimits};
 
 /// Differences of this many codes and more are edges: they predict nothing.
 const EDGE_CODES: u16 = 256;
@@ -102,9 +101,11 @@ pub(crate) fn decode_depth(
 
 /// The residual of each code of a block.
 pub(crate) fn predict(codes: &[u16], residuals: &mut [u16]) {
-    let before = |index: usize, back: usize| index.checked_sub(back).map_or(0, |index| codes[index]);
-    for index in 0..codes.len().min(2) {
-        residuals[index] = residual(codes[index], before(index, 1), before(index, 2));
+    // Those before the first two are 0.
+    let mut last = 0;
+    for (out, &code) in residuals.iter_mut().zip(codes).take(2) {
+        *out = residual(code, last, 0);
+        last = code;
     }
     let shifted = codes.iter().zip(codes.iter().skip(1)).zip(codes.iter().skip(2));
     for (out, ((&second_last, &last), &code)) in residuals.iter_mut().skip(2).zip(shifted) {
@@ -137,50 +138,16 @@ pub(crate) fn restore(numbers: &mut [u16]) {
     }
 }
 
-/// A plane by itself, for benches of the codec.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EncodedDepthPlane {
-    /// The range that the codes span.
-    pub range: InverseDepthRange,
-    /// An LZ4 block.
-    pub packed: Vec<u8>,
-}
-
-/// The 16-bit codes of a plane, over its own range.
-#[must_use]
-pub fn inverse_depth_codes(inverse_depth_per_m: &[f32]) -> Vec<u16> {
-    let mut codes = vec![0; inverse_depth_per_m.len()];
-    quantise(inverse_depth_per_m, InverseDepthRange::of_plane(inverse_depth_per_m), &mut codes);
-    codes
-}
-
-/// Quantises and packs a plane.
-#[must_use]
-pub fn encode_depth_plane(inverse_depth_per_m: &[f32]) -> EncodedDepthPlane {
-    let depth = encode_depth(inverse_depth_per_m);
-    EncodedDepthPlane { range: depth.range, packed: lz4_flex::block::compress(&depth.bytes) }
-}
-
-/// Unpacks a plane.
-///
-/// # Errors
-/// A size over the limits, or bytes that do not decode to exactly that size.
-pub fn decode_depth_plane(
-    plane: &EncodedDepthPlane,
-    width: u32,
-    height: u32,
-    limits: &DecodeLimits,
-) -> Result<Vec<f32>, DecodeError> {
-    let texels = limits.texels(width, height)?;
-    plane.range.validate()?;
-    let bytes = expand_lz4_up_to(&plane.packed, max_unpacked_bytes(texels), "inverse_depth")?;
-    decode_depth(&bytes, texels, plane.range).map(|(_, plane)| plane)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_planes::{Random, tree_over_terrain};
+    use crate::test_support::{Random, tree_over_terrain};
+
+    fn codes_of(inverse_depth_per_m: &[f32]) -> Vec<u16> {
+        let mut codes = vec![0; inverse_depth_per_m.len()];
+        quantise(inverse_depth_per_m, InverseDepthRange::of_plane(inverse_depth_per_m), &mut codes);
+        codes
+    }
 
     #[test]
     fn decoding_inverts_prediction() {
@@ -208,12 +175,12 @@ mod tests {
         let plane = tree_over_terrain(400, 300, 4);
         let encoded = encode_depth(&plane);
         let packed = lz4_flex::block::compress(&encoded.bytes).len();
-        let codes = inverse_depth_codes(&plane);
+        let codes = codes_of(&plane);
         let raw: Vec<u8> = codes.iter().flat_map(|code| code.to_le_bytes()).collect();
         let raw_packed = lz4_flex::block::compress(&raw).len();
         assert!(packed * 2 <= raw_packed, "{packed} bytes against {raw_packed}");
         let (runs, back) = decode_depth(&encoded.bytes, plane.len(), encoded.range).expect("own stream");
         assert_eq!(runs.sample_count(), encoded.runs.sample_count());
-        assert_eq!(inverse_depth_codes(&back), codes);
+        assert_eq!(codes_of(&back), codes);
     }
 }

@@ -90,9 +90,8 @@ impl DecodeLimits {
         if width == 0 || height == 0 {
             return Err(DecodeError::Header { field: "size", reason: "zero" });
         }
-        for (field, side) in [("width", width), ("height", height)] {
-            check_limit(field, u64::from(side), u64::from(self.max_side_px))?;
-        }
+        check_limit("width", u64::from(width), u64::from(self.max_side_px))?;
+        check_limit("height", u64::from(height), u64::from(self.max_side_px))?;
         let texels = u64::from(width) * u64::from(height);
         check_limit("texels", texels, self.max_texels as u64)?;
         Ok(texels as usize)

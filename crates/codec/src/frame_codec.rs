@@ -13,7 +13,8 @@ use glam::UVec2;
 
 use crate::error::check_limit;
 use crate::lz4::expand_lz4;
-use crate::{DecodeLimits, FrameError, jpeg, png};
+use crate::picture::{decode_jpeg, decode_png, encode_jpeg, encode_png};
+use crate::{DecodeLimits, FrameError};
 
 /// The packing of frames: `lz4`, `png`, `jpeg` or `jpeg:QUALITY` in settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -74,8 +75,8 @@ pub fn encode_frame(codec: FrameCodec, size_px: UVec2, rgb: &[u8]) -> Result<Byt
     }
     Ok(match codec {
         FrameCodec::Lz4 => lz4_flex::block::compress(&filter(pixels)).into(),
-        FrameCodec::Png => png::encode(width, height, rgb)?.into(),
-        FrameCodec::Jpeg { quality } => jpeg::encode(width, height, rgb, quality)?.into(),
+        FrameCodec::Png => encode_png(width, height, rgb)?.into(),
+        FrameCodec::Jpeg { quality } => encode_jpeg(width, height, rgb, quality)?.into(),
     })
 }
 
@@ -97,8 +98,8 @@ pub fn decode_frame(
             unfilter(&mut rgb);
             Ok(rgb)
         }
-        FrameCodec::Png => png::decode(size_px, data),
-        FrameCodec::Jpeg { .. } => jpeg::decode(size_px, data),
+        FrameCodec::Png => decode_png(size_px, data),
+        FrameCodec::Jpeg { .. } => decode_jpeg(size_px, data),
     }
 }
 
@@ -130,7 +131,7 @@ mod tests {
     use glam::Vec2Swizzles as _;
 
     use super::*;
-    use crate::test_planes::{Random, tree_over_terrain};
+    use crate::test_support::{Random, tree_over_terrain};
 
     fn picture(width: usize, height: usize) -> Vec<u8> {
         let plane = tree_over_terrain(width, height, 15);

@@ -73,15 +73,11 @@ pub struct StageTimes {
 }
 
 impl StageTimes {
-    /// The sum of the stages up to encoding.
-    fn made_s(&self) -> f64 {
-        self.set_wait_s + self.credit_wait_s + self.queue_s + self.batch_s + self.encode_s
-    }
-
     /// The times of a frame that leaves `compositor_s` after its request: time that no other stage accounts for is a wait.
     #[must_use]
     pub fn leaving_after(self, compositor_s: f64) -> Self {
-        Self { compositor_s, send_wait_s: (compositor_s - self.made_s()).max(0.0), ..self }
+        let made_s = self.set_wait_s + self.credit_wait_s + self.queue_s + self.batch_s + self.encode_s;
+        Self { compositor_s, send_wait_s: (compositor_s - made_s).max(0.0), ..self }
     }
 }
 
@@ -102,7 +98,7 @@ mod tests {
             ..StageTimes::default()
         };
         let left = made.leaving_after(2.0);
-        assert!((left.made_s() + left.send_wait_s - left.compositor_s).abs() < 1e-12);
+        assert!((1.5 + left.send_wait_s - left.compositor_s).abs() < 1e-12);
         assert_eq!(made.leaving_after(1.0).send_wait_s, 0.0, "clocks that were read in another order");
     }
 }

@@ -78,9 +78,7 @@ impl FrameAssembly {
             (None, Some(header)) => (part.frame, header, Vec::new()),
             (Some((frame, header, data)), None) if frame == part.frame => (frame, header, data),
             (None, None) => return Err(FrameAssemblyError::NoHeader),
-            (Some((open, ..)), _) => {
-                return Err(FrameAssemblyError::CutOff { open, next: part.frame });
-            }
+            (Some((open, ..)), _) => return Err(FrameAssemblyError::CutOff { open, next: part.frame }),
         };
         self.extend(frame, header, data, part.offset_bytes, &part.data)
     }
@@ -113,10 +111,8 @@ impl FrameAssembly {
     /// # Errors
     /// Names the frame that is cut off.
     pub fn finish(&self) -> Result<(), FrameAssemblyError> {
-        match &self.open {
-            Some((frame, ..)) => Err(FrameAssemblyError::Truncated { frame: *frame }),
-            None => Ok(()),
-        }
+        let open = self.open.as_ref();
+        open.map_or(Ok(()), |&(frame, ..)| Err(FrameAssemblyError::Truncated { frame }))
     }
 }
 

@@ -6,10 +6,10 @@ use glam::UVec2;
 
 use crate::color_codec::{pack_colors, unpack_colors};
 use crate::depth_codec::{decode_depth, encode_depth};
-use crate::image_header::CORNER_RANGE_BYTES;
+use crate::image_header::wrong_kinds;
 use crate::lz4::expand_lz4;
 use crate::runs::Runs;
-use crate::tagged::take;
+use crate::tagged::{take, take_array};
 use crate::words_codec::{WordLayout, pack_words, unpack_words};
 use crate::{DecodeError, DecodeLimits, ImageHeader, InverseDepthRange, PlaneHeader, PlaneKind, PlaneSet};
 
@@ -81,15 +81,12 @@ fn pack_color(image: &DepthImage, planes: PlaneSet, runs: &Runs, packer: &mut Pa
 
 /// Packs light and both normals, of an image that has passed its validation.
 fn pack_light(image: &DepthImage, light: &LightPlanes, runs: &Runs, packer: &mut Packer) {
-    let write_changes = |packer: &mut Packer, kind, plane: &[u32]| {
-        packer.write(kind, |out| pack_colors(&runs.gather(plane), out));
-    };
-    write_changes(packer, PlaneKind::TriangleNormalOct16, &light.triangle_normal_oct16);
+    packer.write(PlaneKind::TriangleNormalOct16, |out| pack_colors(&runs.gather(&light.triangle_normal_oct16), out));
     if let Some(normals) = &image.normal_oct16 {
         packer.write(PlaneKind::NormalOct16, |out| pack_words(&runs.gather(normals), WordLayout::Halves, out));
     }
-    write_changes(packer, PlaneKind::LampsRgb9e5, &light.lamps_rgb9e5);
-    write_changes(packer, PlaneKind::EnvironmentRgb9e5, &light.environment_rgb9e5);
+    packer.write(PlaneKind::LampsRgb9e5, |out| pack_colors(&runs.gather(&light.lamps_rgb9e5), out));
+    packer.write(PlaneKind::EnvironmentRgb9e5, |out| pack_colors(&runs.gather(&light.environment_rgb9e5), out));
     for share in &light.share8 {
         packer.write(PlaneKind::LightShare8, |out| pack_words(&runs.gather(share), WordLayout::Bytes, out));
     }
@@ -126,7 +123,7 @@ pub fn decode_depth_image(
         light: None,
     };
     for plane in others {
-        decode_plane(plane, &mut packed, &runs, header.corners(), &mut image)?;
+        unpack_plane(plane, &mut packed, |input| decode_plane(plane.kind, input, &runs, header.corners(), &mut image))?;
     }
     Ok(image)
 }
@@ -171,7 +168,22 @@ pub(crate) fn check_payload(header: &ImageHeader, camera_px: UVec2, payload: &[u
     Ok(())
 }
 
-pub(crate) fn expand_plane(plane: &PlaneHeader, packed: &mut &[u8]) -> Result<Vec<u8>, DecodeError> {
+/// Unpacks the next plane with `unpack`, which must leave none of its bytes.
+pub(crate) fn unpack_plane<T>(
+    plane: &PlaneHeader,
+    packed: &mut &[u8],
+    unpack: impl FnOnce(&mut &[u8]) -> Result<T, DecodeError>,
+) -> Result<T, DecodeError> {
+    let raw = expand_plane(plane, packed)?;
+    let mut input = &raw[..];
+    let unpacked = unpack(&mut input)?;
+    if input.is_empty() {
+        return Ok(unpacked);
+    }
+    Err(DecodeError::Corrupt { field: plane.kind.name(), reason: "bytes left over" })
+}
+
+fn expand_plane(plane: &PlaneHeader, packed: &mut &[u8]) -> Result<Vec<u8>, DecodeError> {
     let field = plane.kind.name();
     let (own, rest) = packed
         .split_at_checked(plane.packed_bytes as usize)
@@ -181,46 +193,44 @@ pub(crate) fn expand_plane(plane: &PlaneHeader, packed: &mut &[u8]) -> Result<Ve
 }
 
 fn decode_plane(
-    plane: &PlaneHeader,
-    packed: &mut &[u8],
+    kind: PlaneKind,
+    input: &mut &[u8],
     runs: &Runs,
     corners: usize,
     image: &mut DepthImage,
 ) -> Result<(), DecodeError> {
-    let raw = expand_plane(plane, packed)?;
-    let mut input = &raw[..];
     let samples = runs.sample_count();
     let words = |input: &mut &[u8], layout| -> Result<Vec<u32>, DecodeError> {
         Ok(runs.scatter(&unpack_words(input, samples, layout)?, 0))
     };
-    match plane.kind {
+    match kind {
         PlaneKind::InverseDepth => {}
-        PlaneKind::ColorRgb9e5 => image.color_rgb9e5 = runs.scatter(&unpack_colors(&mut input, samples)?, 0),
-        PlaneKind::NormalOct16 => image.normal_oct16 = Some(words(&mut input, WordLayout::Halves)?),
+        PlaneKind::ColorRgb9e5 => image.color_rgb9e5 = runs.scatter(&unpack_colors(input, samples)?, 0),
+        PlaneKind::NormalOct16 => image.normal_oct16 = Some(words(input, WordLayout::Halves)?),
         PlaneKind::SurfaceId => {
             let nothing = SurfaceId { instance: 0, primitive: 0 };
-            image.surface_id = Some(runs.scatter(&unpack_surface_ids(&mut input, samples)?, nothing));
+            image.surface_id = Some(runs.scatter(&unpack_surface_ids(input, samples)?, nothing));
         }
         PlaneKind::ReflectanceRoughness8 | PlaneKind::Visibility8 => {
-            put_specular(&mut image.specular, plane.kind, words(&mut input, WordLayout::Bytes)?);
+            put_specular(&mut image.specular, kind, words(input, WordLayout::Bytes)?);
         }
         PlaneKind::TriangleNormalOct16 | PlaneKind::LampsRgb9e5 | PlaneKind::EnvironmentRgb9e5 => {
-            put_light(&mut image.light, plane.kind, runs.scatter(&unpack_colors(&mut input, samples)?, 0));
+            put_light(&mut image.light, kind, runs.scatter(&unpack_colors(input, samples)?, 0));
         }
-        PlaneKind::LightShare8 => put_light(&mut image.light, plane.kind, words(&mut input, WordLayout::Bytes)?),
+        PlaneKind::LightShare8 => put_light(&mut image.light, kind, words(input, WordLayout::Bytes)?),
         PlaneKind::Passed1 => {
             let texels = image.inverse_depth_per_m.len();
-            let bits = take(&mut input, texels.div_ceil(8))?;
+            let bits = take(input, texels.div_ceil(8))?;
             image.passed = Some((0..texels).map(|index| bits[index / 8] >> (index % 8) & 1 != 0).collect());
         }
         PlaneKind::CornerInverseDepth => {
-            image.corner_inverse_depth_per_m = Some(unpack_corners(std::mem::take(&mut input), corners)?);
+            image.corner_inverse_depth_per_m = Some(unpack_corners(std::mem::take(input), corners)?);
         }
         PlaneKind::LayerCount8 | PlaneKind::LayerDepth | PlaneKind::PlaneNormalOct8 => {
-            return Err(DecodeError::Header { field: "planes.kind", reason: "of layered images alone" });
+            return Err(wrong_kinds("of layered images alone"));
         }
     }
-    check_end(plane.kind, input)
+    Ok(())
 }
 
 /// Adds a plane of inputs of highlights.
@@ -243,14 +253,6 @@ fn put_light(light: &mut Option<LightPlanes>, kind: PlaneKind, words: Vec<u32>) 
     }
 }
 
-/// Nothing may be left of a plane.
-pub(crate) fn check_end(kind: PlaneKind, input: &[u8]) -> Result<(), DecodeError> {
-    match input.is_empty() {
-        true => Ok(()),
-        false => Err(DecodeError::Corrupt { field: kind.name(), reason: "bytes left over" }),
-    }
-}
-
 fn pack_bits(bits: &[bool]) -> Vec<u8> {
     bits.chunks(8).map(|eight| (0..).zip(eight).map(|(place, &bit)| u8::from(bit) << place).sum()).collect()
 }
@@ -262,9 +264,9 @@ fn pack_corners(corners: &[f32]) -> Vec<u8> {
 }
 
 fn unpack_corners(mut input: &[u8], corners: usize) -> Result<Vec<f32>, DecodeError> {
-    let range = take(&mut input, CORNER_RANGE_BYTES)?;
-    let at = |place: usize| range[place..].first_chunk().map_or(0.0, |&bytes| f32::from_le_bytes(bytes));
-    let range = InverseDepthRange { least_per_m: at(0), greatest_per_m: at(4) };
+    let least_per_m = f32::from_le_bytes(take_array(&mut input)?);
+    let greatest_per_m = f32::from_le_bytes(take_array(&mut input)?);
+    let range = InverseDepthRange { least_per_m, greatest_per_m };
     range.validate()?;
     Ok(decode_depth(input, corners, range)?.1)
 }

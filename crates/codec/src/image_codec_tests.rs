@@ -6,7 +6,7 @@ use glam::{UVec2, Vec3};
 use super::*;
 use crate::{
     InverseDepthRange, MAX_LIGHT_SHARE_PLANES, PlaneEncoding,
-    test_planes::{Random, tree_over_terrain},
+    test_support::{Random, tree_over_terrain},
 };
 
 fn camera(width: u32, height: u32) -> Camera {

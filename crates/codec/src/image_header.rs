@@ -7,7 +7,7 @@ use depth_image::{LightPlanes, MAX_LAYERS, MAX_LIGHTS, SpecularPlanes};
 use crate::color_codec::max_colors_bytes;
 use crate::depth_codec::max_unpacked_bytes;
 use crate::error::check_limit;
-use crate::layered_codec::max_numbers_bytes;
+use crate::tagged::max_packed_bytes;
 use crate::words_codec::{WordLayout, max_words_bytes};
 use crate::{DecodeError, DecodeLimits, InverseDepthRange};
 
@@ -157,7 +157,7 @@ impl PlaneKind {
             }
             Self::Passed1 => values.div_ceil(8),
             Self::CornerInverseDepth => CORNER_RANGE_BYTES + max_unpacked_bytes(values),
-            Self::LayerCount8 | Self::LayerDepth => max_numbers_bytes(values),
+            Self::LayerCount8 | Self::LayerDepth => max_packed_bytes(values),
             Self::PlaneNormalOct8 => max_words_bytes(values, WordLayout::TwoBytes),
         }
     }
@@ -209,7 +209,7 @@ pub struct PlaneSet {
 }
 
 /// Bytes of a plane of corners before its codes.
-pub(crate) const CORNER_RANGE_BYTES: usize = 8;
+const CORNER_RANGE_BYTES: usize = 8;
 
 impl PlaneSet {
     /// Inverse depth and colour only, and the bits of passed surfaces, without which depths would be misread.
@@ -248,15 +248,16 @@ impl ImageHeader {
         let samples = self.layered.map_or(texels, |layered| layered.sample_count as usize);
         check_limit("sample_count", samples as u64, texels as u64 * u64::from(MAX_LAYERS))?;
         let counts = Counts { samples, corners: self.corners(), lines: texels };
+        let mut image_bytes = 0;
         for plane in &self.planes {
             if plane.encoding != plane.kind.encoding() {
                 return Err(DecodeError::Header { field: "planes.encoding", reason: "not the encoding of this kind" });
             }
-            let most_bytes = plane.kind.max_raw_bytes(plane.kind.values(counts));
-            check_limit("planes.raw_bytes", u64::from(plane.raw_bytes), most_bytes as u64)?;
+            let values = plane.kind.values(counts);
+            check_limit("planes.raw_bytes", u64::from(plane.raw_bytes), plane.kind.max_raw_bytes(values) as u64)?;
+            image_bytes += values as u64 * plane.kind.texel_bytes() as u64;
         }
-        let plane_bytes = |plane: &PlaneHeader| plane.kind.values(counts) as u64 * plane.kind.texel_bytes() as u64;
-        check_limit("image_bytes", self.planes.iter().map(plane_bytes).sum(), limits.max_image_bytes as u64)?;
+        check_limit("image_bytes", image_bytes, limits.max_image_bytes as u64)?;
         check_limit("payload_bytes", self.payload_bytes(), limits.max_payload_bytes as u64)?;
         Ok(texels)
     }
@@ -265,10 +266,9 @@ impl ImageHeader {
     /// \[reflectance, visibility*\], \[passed\], \[corners\]; reflectance only with normals.
     fn validate_kinds(&self) -> Result<(), DecodeError> {
         use PlaneKind::{ColorRgb9e5, InverseDepth, LayerCount8, LayerDepth, PlaneNormalOct8};
-        let error = |reason| Err(DecodeError::Header { field: "planes.kind", reason });
         let kinds: Vec<_> = self.planes.iter().map(|plane| plane.kind).collect();
         match kinds.iter().any(|kind| kind.belongs_to_light()) {
-            true if self.layered.is_some() => return error("of depth images alone"),
+            true if self.layered.is_some() => return Err(wrong_kinds("of depth images alone")),
             true => return validate_light_kinds(&kinds),
             false => {}
         }
@@ -281,7 +281,7 @@ impl ImageHeader {
             }
         };
         let Some(rest) = kinds.strip_prefix(first) else {
-            return error(reason);
+            return Err(wrong_kinds(reason));
         };
         let (normals, rest) = leading(rest, PlaneKind::NormalOct16);
         let (surface_ids, rest) = leading(rest, PlaneKind::SurfaceId);
@@ -290,13 +290,13 @@ impl ImageHeader {
         let (passed, rest) = leading(rest, PlaneKind::Passed1);
         let (corners, rest) = leading(rest, PlaneKind::CornerInverseDepth);
         if !rest.is_empty() || [normals, surface_ids, reflectances, passed, corners].iter().any(|&count| count > 1) {
-            return error("repeated or out of order");
+            return Err(wrong_kinds("repeated or out of order"));
         }
         if self.layered.is_some() && [surface_ids, passed, corners] != [0; 3] {
-            return error("of depth images alone");
+            return Err(wrong_kinds("of depth images alone"));
         }
         if reflectances > normals || (visibilities > 0 && reflectances == 0) {
-            return error("reflectance without normals, or visibility without reflectance");
+            return Err(wrong_kinds("reflectance without normals, or visibility without reflectance"));
         }
         check_limit("planes.visibility8", visibilities as u64, MAX_VISIBILITY_PLANES as u64)
     }
@@ -333,16 +333,20 @@ impl ImageHeader {
     }
 }
 
+pub(crate) const fn wrong_kinds(reason: &'static str) -> DecodeError {
+    DecodeError::Header { field: "planes.kind", reason }
+}
+
 /// The planes of [`FIRST_LIGHT_PLANES`], then \[share*\], \[passed\].
 fn validate_light_kinds(kinds: &[PlaneKind]) -> Result<(), DecodeError> {
-    let error = |reason| Err(DecodeError::Header { field: "planes.kind", reason });
     let Some(rest) = kinds.strip_prefix(&FIRST_LIGHT_PLANES) else {
-        return error("must begin with inverse depth, normals of triangles, normals, lamps and environment");
+        let reason = "must begin with inverse depth, normals of triangles, normals, lamps and environment";
+        return Err(wrong_kinds(reason));
     };
     let (shares, rest) = leading(rest, PlaneKind::LightShare8);
     let (passed, rest) = leading(rest, PlaneKind::Passed1);
     if !rest.is_empty() || passed > 1 {
-        return error("repeated or out of order, or not of an image with light");
+        return Err(wrong_kinds("repeated or out of order, or not of an image with light"));
     }
     check_limit("planes.light_share8", shares as u64, MAX_LIGHT_SHARE_PLANES as u64)
 }

@@ -7,12 +7,7 @@ use depth_image::MAX_LAYERS;
 
 use crate::DecodeError;
 use crate::depth_codec::{predict, restore};
-use crate::tagged::{BLOCK, Packer, max_packed_bytes, unpack, unzigzag, zigzag};
-
-/// Most bytes before LZ4 of a number of 16 bits for each of `count` lines or samples.
-pub(crate) const fn max_numbers_bytes(count: usize) -> usize {
-    max_packed_bytes(count)
-}
+use crate::tagged::{BLOCK, Packer, unpack, unzigzag, zigzag};
 
 /// The places of samples in the order in which they are packed, for lines that begin at `first`.
 pub(crate) fn layer_by_layer(first: &[u32]) -> Vec<u32> {
@@ -53,7 +48,6 @@ pub(crate) fn pack_layer_counts(first: &[u32], out: &mut Vec<u8>) {
 
 /// The number of the first sample of each line, and after the last line that of all samples, which must be `samples`.
 pub(crate) fn unpack_layer_counts(input: &mut &[u8], lines: usize, samples: usize) -> Result<Vec<u32>, DecodeError> {
-    let corrupt = |reason| Err(DecodeError::Corrupt { field: "layer_count", reason });
     let counts = unpack_blocks(input, lines, |numbers| {
         let mut count = 0u16;
         for number in numbers {
@@ -62,7 +56,7 @@ pub(crate) fn unpack_layer_counts(input: &mut &[u8], lines: usize, samples: usiz
         }
     })?;
     if counts.iter().any(|&count| u32::from(count) > MAX_LAYERS) {
-        return corrupt("more than 255");
+        return Err(DecodeError::Corrupt { field: "layer_count", reason: "more than 255" });
     }
     let mut next = 0;
     let ends = counts.iter().map(|&count| {
@@ -70,7 +64,10 @@ pub(crate) fn unpack_layer_counts(input: &mut &[u8], lines: usize, samples: usiz
         next
     });
     let first: Vec<u32> = std::iter::once(0).chain(ends).collect();
-    if next as usize == samples { Ok(first) } else { corrupt("not as many as the header says") }
+    if next as usize != samples {
+        return Err(DecodeError::Corrupt { field: "layer_count", reason: "not as many as the header says" });
+    }
+    Ok(first)
 }
 
 /// Appends depths as codes of 16 bits, linear from 0 to `range_m`.
@@ -108,7 +105,8 @@ fn unpack_blocks(input: &mut &[u8], count: usize, values: impl Fn(&mut [u16])) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_planes::Random;
+    use crate::tagged::max_packed_bytes;
+    use crate::test_support::Random;
 
     #[test]
     fn samples_go_layer_by_layer_and_come_back() {
@@ -128,7 +126,7 @@ mod tests {
             let samples = first[lines] as usize;
             let mut bytes = Vec::new();
             pack_layer_counts(&first, &mut bytes);
-            assert!(bytes.len() <= max_numbers_bytes(lines));
+            assert!(bytes.len() <= max_packed_bytes(lines));
             assert_eq!(unpack_layer_counts(&mut &bytes[..], lines, samples), Ok(first));
             assert!(unpack_layer_counts(&mut &bytes[..], lines, samples + 1).is_err());
         }
@@ -145,7 +143,7 @@ mod tests {
         let depths: Vec<f32> = (0..BLOCK + 9).map(|_| range_m * random.below(100_001) as f32 / 100_000.0).collect();
         let mut bytes = Vec::new();
         pack_depths(&depths, range_m, &mut bytes);
-        assert!(bytes.len() <= max_numbers_bytes(depths.len()));
+        assert!(bytes.len() <= max_packed_bytes(depths.len()));
         let back = unpack_depths(&mut &bytes[..], depths.len(), range_m).unwrap();
         let most_m = 0.51 * range_m / f32::from(u16::MAX);
         assert!(depths.iter().zip(&back).all(|(a, b)| (a - b).abs() <= most_m && *b <= range_m));

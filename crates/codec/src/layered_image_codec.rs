@@ -4,7 +4,8 @@ use depth_image::{LayeredDepthImage, LayeredError, ParallelCamera};
 use glam::UVec2;
 
 use crate::color_codec::{pack_colors, unpack_colors};
-use crate::image_codec::{Packer, check_end, check_payload, expand_plane, put_specular};
+use crate::image_codec::{Packer, check_payload, put_specular, unpack_plane};
+use crate::image_header::wrong_kinds;
 use crate::layered_codec::{
     gather, layer_by_layer, pack_depths, pack_layer_counts, scatter, unpack_depths, unpack_layer_counts,
 };
@@ -77,16 +78,13 @@ pub(crate) fn unpack_lines<'p>(
     let lines = header.validate(limits)?;
     check_payload(header, size_px, payload)?;
     let Some(LayeredCounts { sample_count, truncated }) = header.layered else {
-        return Err(DecodeError::Header { field: "planes.kind", reason: "not those of a layered image" });
+        return Err(wrong_kinds("not those of a layered image"));
     };
     let [counts, planes @ ..] = &header.planes[..] else {
         return Err(DecodeError::Header { field: "planes", reason: "none" });
     };
     let mut packed = payload;
-    let raw = expand_plane(counts, &mut packed)?;
-    let mut input = &raw[..];
-    let first = unpack_layer_counts(&mut input, lines, sample_count as usize)?;
-    check_end(counts.kind, input)?;
+    let first = unpack_plane(counts, &mut packed, |input| unpack_layer_counts(input, lines, sample_count as usize))?;
     Ok(PackedLines { places: layer_by_layer(&first), first, truncated, planes, payload: packed })
 }
 
@@ -104,7 +102,7 @@ pub fn decode_layered_image(
     let PackedLines { first, places, truncated, planes, payload: mut packed } =
         unpack_lines(header, camera.size_px, payload, limits)?;
     if planes.get(1).is_none_or(|plane| plane.kind != PlaneKind::PlaneNormalOct8) {
-        return Err(DecodeError::Header { field: "planes.kind", reason: "those of a light field" });
+        return Err(wrong_kinds("those of a light field"));
     }
     let mut image = LayeredDepthImage {
         camera,
@@ -117,40 +115,38 @@ pub fn decode_layered_image(
         truncated,
     };
     for plane in planes {
-        let raw = expand_plane(plane, &mut packed)?;
-        decode_plane(plane, &raw, &places, &mut image)?;
+        unpack_plane(plane, &mut packed, |input| decode_plane(plane.kind, input, &places, &mut image))?;
     }
     image.validate().map_err(|_| DecodeError::Corrupt { field: "layer_depth", reason: "falls along a line" })?;
     Ok(image)
 }
 
 fn decode_plane(
-    plane: &PlaneHeader,
-    raw: &[u8],
+    kind: PlaneKind,
+    input: &mut &[u8],
     places: &[u32],
     image: &mut LayeredDepthImage,
 ) -> Result<(), DecodeError> {
-    let mut input = raw;
     let samples = places.len();
     let words = |input: &mut &[u8], layout| -> Result<Vec<u32>, DecodeError> {
         Ok(scatter(&unpack_words(input, samples, layout)?, places))
     };
-    match plane.kind {
+    match kind {
         PlaneKind::LayerDepth => {
-            image.planar_depth_m = scatter(&unpack_depths(&mut input, samples, image.camera.range_m)?, places);
+            image.planar_depth_m = scatter(&unpack_depths(input, samples, image.camera.range_m)?, places);
         }
         PlaneKind::PlaneNormalOct8 => {
-            let normals = words(&mut input, WordLayout::TwoBytes)?;
+            let normals = words(input, WordLayout::TwoBytes)?;
             image.plane_normal_oct8 = normals.into_iter().map(|normal| normal as u16).collect();
         }
-        PlaneKind::ColorRgb9e5 => image.color_rgb9e5 = scatter(&unpack_colors(&mut input, samples)?, places),
-        PlaneKind::NormalOct16 => image.normal_oct16 = Some(words(&mut input, WordLayout::Halves)?),
+        PlaneKind::ColorRgb9e5 => image.color_rgb9e5 = scatter(&unpack_colors(input, samples)?, places),
+        PlaneKind::NormalOct16 => image.normal_oct16 = Some(words(input, WordLayout::Halves)?),
         PlaneKind::ReflectanceRoughness8 | PlaneKind::Visibility8 => {
-            put_specular(&mut image.specular, plane.kind, words(&mut input, WordLayout::Bytes)?);
+            put_specular(&mut image.specular, kind, words(input, WordLayout::Bytes)?);
         }
-        _ => return Err(DecodeError::Header { field: "planes.kind", reason: "of depth images alone" }),
+        _ => return Err(wrong_kinds("of depth images alone")),
     }
-    check_end(plane.kind, input)
+    Ok(())
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use glam::{Quat, UVec2, Vec3};
 
 use super::*;
 use crate::PlaneEncoding;
-use crate::test_planes::Random;
+use crate::test_support::Random;
 
 fn camera(columns: u32, rows: u32) -> ParallelCamera {
     ParallelCamera {

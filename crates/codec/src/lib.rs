@@ -17,25 +17,22 @@ mod frame_header;
 mod frame_parts;
 mod image_codec;
 mod image_header;
-mod jpeg;
 mod layered_codec;
 mod layered_image_codec;
 mod light_field_codec;
 mod lz4;
 mod picture;
-mod png;
 mod quantise;
 mod reassembler;
 mod runs;
 mod sample_image_codec;
 mod tagged;
 #[cfg(test)]
-mod test_planes;
+mod test_support;
 mod view_codec;
 mod words_codec;
 
 pub use chunk::{Chunk, ChunkBody, MAX_CHUNK_BYTES, SampleSetId, split_into_chunks};
-pub use depth_codec::{EncodedDepthPlane, decode_depth_plane, encode_depth_plane, inverse_depth_codes};
 pub use error::{DecodeError, DecodeLimits, FrameError};
 pub use frame_codec::{FrameCodec, ParseFrameCodecError, decode_frame, encode_frame};
 pub use frame_header::{FrameHeader, MAX_FRAME_BYTES, StageTimes};

@@ -3,7 +3,8 @@
 use depth_image::{LayeredError, LayeredLightField, LightFieldCamera};
 
 use crate::color_codec::{pack_colors, unpack_colors};
-use crate::image_codec::{Packer, check_end, expand_plane};
+use crate::image_codec::{Packer, unpack_plane};
+use crate::image_header::wrong_kinds;
 use crate::layered_codec::{gather, layer_by_layer, pack_depths, pack_layer_counts, scatter, unpack_depths};
 use crate::layered_image_codec::{PackedLines, encoded, unpack_lines};
 use crate::{DecodeError, DecodeLimits, EncodedImage, ImageHeader, LayeredCounts, PlaneKind};
@@ -42,16 +43,12 @@ pub fn decode_light_field(
         return Err(DecodeError::Header { field: "layered.truncated", reason: "of layered depth images alone" });
     }
     let [depths, colors] = planes else {
-        return Err(DecodeError::Header { field: "planes.kind", reason: "not those of a light field" });
+        return Err(wrong_kinds("not those of a light field"));
     };
-    let raw = expand_plane(depths, &mut packed)?;
-    let mut input = &raw[..];
-    let planar_depth_m = scatter(&unpack_depths(&mut input, places.len(), camera.range_m())?, &places);
-    check_end(depths.kind, input)?;
-    let raw = expand_plane(colors, &mut packed)?;
-    let mut input = &raw[..];
-    let radiance_rgb9e5 = scatter(&unpack_colors(&mut input, places.len())?, &places);
-    check_end(colors.kind, input)?;
+    let depths_m = unpack_plane(depths, &mut packed, |input| unpack_depths(input, places.len(), camera.range_m()))?;
+    let colors = unpack_plane(colors, &mut packed, |input| unpack_colors(input, places.len()))?;
+    let planar_depth_m = scatter(&depths_m, &places);
+    let radiance_rgb9e5 = scatter(&colors, &places);
     let field = LayeredLightField { camera, first, planar_depth_m, radiance_rgb9e5 };
     field.validate().map_err(|_| DecodeError::Corrupt { field: "layer_depth", reason: "falls along a line" })?;
     Ok(field)
@@ -63,7 +60,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::test_planes::Random;
+    use crate::test_support::Random;
 
     fn field() -> LayeredLightField {
         let mut random = Random::new(24);

@@ -9,10 +9,10 @@ pub(crate) fn expand_lz4(packed: &[u8], unpacked_bytes: usize, field: &'static s
         return Err(DecodeError::Corrupt { field, reason: "claims more than LZ4 can hold" });
     }
     let unpacked = expand_lz4_up_to(packed, unpacked_bytes, field)?;
-    match unpacked.len() == unpacked_bytes {
-        true => Ok(unpacked),
-        false => Err(DecodeError::Corrupt { field, reason: "LZ4 block is too short" }),
+    if unpacked.len() < unpacked_bytes {
+        return Err(DecodeError::Corrupt { field, reason: "LZ4 block is too short" });
     }
+    Ok(unpacked)
 }
 
 /// Expands an LZ4 block that gives at most `max_unpacked_bytes`, a bound that follows from an image's size.

@@ -105,7 +105,7 @@ pub(crate) fn empty_inverse_depth(code: u16) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_planes::Random;
+    use crate::test_support::Random;
 
     fn round_trip(plane: &[f32]) -> (InverseDepthRange, Vec<f32>) {
         let range = InverseDepthRange::of_plane(plane);

@@ -87,9 +87,7 @@ impl Reassembler {
     /// A header of a later set may cut off an image; no other chunk may be out of turn.
     fn check_sequence(&mut self, chunk: &Chunk) -> Result<(), ChunkError> {
         let got = chunk.sequence;
-        let Some(image) = &self.under_way else {
-            return Ok(());
-        };
+        let Some(image) = &self.under_way else { return Ok(()) };
         let sample_set_id = image.sample_set_id;
         let image_index = image.image_index;
         let expected = image.next_sequence;
@@ -116,12 +114,8 @@ impl Reassembler {
                     Some(UnderWay { sample_set_id, image_index, next_sequence: 1, chunk_count, header, pieces });
             }
             (1.., ChunkBody::Data(data), Some(image)) => image.append(sequence, chunk_count, data)?,
-            (1.., ChunkBody::Data(_), None) => {
-                return Err(ChunkError::NoHeader { image_index, got: sequence });
-            }
-            _ => {
-                return Err(ChunkError::Malformed { sequence, field: "body" });
-            }
+            (1.., ChunkBody::Data(_), None) => return Err(ChunkError::NoHeader { image_index, got: sequence }),
+            _ => return Err(ChunkError::Malformed { sequence, field: "body" }),
         }
         Ok(self.under_way.take_if(|image| image.next_sequence == image.chunk_count).map(UnderWay::finish))
     }
@@ -138,14 +132,13 @@ fn check_header(header: &ImageHeader, count: u32, limits: &DecodeLimits) -> Resu
 
 impl UnderWay {
     fn append(&mut self, sequence: u32, chunk_count: u32, data: Bytes) -> Result<(), ChunkError> {
-        let malformed = |field| Err(ChunkError::Malformed { sequence, field });
         if chunk_count != self.chunk_count {
-            return malformed("chunk_count");
+            return Err(ChunkError::Malformed { sequence, field: "chunk_count" });
         }
         let before = (u64::from(sequence) - 1) * MAX_CHUNK_BYTES as u64;
         let left = self.header.payload_bytes().saturating_sub(before);
         if data.len() as u64 != left.min(MAX_CHUNK_BYTES as u64) {
-            return malformed("data length");
+            return Err(ChunkError::Malformed { sequence, field: "data length" });
         }
         self.pieces.push(data);
         self.next_sequence += 1;

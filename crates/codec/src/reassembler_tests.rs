@@ -1,7 +1,7 @@
 //! Chunks that come as they should, and in every other way.
 
 use super::*;
-use crate::{InverseDepthRange, PlaneHeader, PlaneKind, split_into_chunks, test_planes::Random};
+use crate::{InverseDepthRange, PlaneHeader, PlaneKind, split_into_chunks, test_support::Random};
 
 const SET: SampleSetId = SampleSetId { plan_epoch: 3, index: 14 };
 const LATER: SampleSetId = SampleSetId { plan_epoch: 4, index: 0 };

@@ -5,7 +5,7 @@
 
 use crate::DecodeError;
 use crate::quantise::{BACKGROUND_CODE, FIRST_SAMPLE_CODE, HOLE_CODE};
-use crate::tagged::take;
+use crate::tagged::{take, take_array};
 
 const LONGEST: usize = (u16::MAX >> 2) as usize;
 
@@ -73,20 +73,19 @@ impl Runs {
 
     /// Reads the runs of a plane of `texels` from the front of `input`.
     pub fn read(input: &mut &[u8], texels: usize) -> Result<Self, DecodeError> {
-        let corrupt = |reason| DecodeError::Corrupt { field: "runs", reason };
-        let length = take(input, 4)?.first_chunk().map_or(0, |&bytes| u32::from_le_bytes(bytes));
+        let length = u32::from_le_bytes(take_array(input)?);
         // `take` refuses a length beyond the input before anything of that size is allocated.
         let (words, odd) = take(input, length as usize)?.as_chunks::<2>();
         if !odd.is_empty() {
-            return Err(corrupt("odd number of bytes"));
+            return Err(DecodeError::Corrupt { field: "runs", reason: "odd number of bytes" });
         }
-        let parse = |word: u16| Run { kind: word & 3, texels: usize::from(word >> 2) };
-        let runs: Vec<Run> = words.iter().map(|&word| parse(u16::from_le_bytes(word))).collect();
+        let words = words.iter().map(|&word| u16::from_le_bytes(word));
+        let runs: Vec<Run> = words.map(|word| Run { kind: word & 3, texels: usize::from(word >> 2) }).collect();
         if runs.iter().any(|run| run.texels == 0 || run.kind > FIRST_SAMPLE_CODE) {
-            return Err(corrupt("empty run or unknown kind"));
+            return Err(DecodeError::Corrupt { field: "runs", reason: "empty run or unknown kind" });
         }
         if runs.iter().map(|run| run.texels).sum::<usize>() != texels {
-            return Err(corrupt("do not fill the plane"));
+            return Err(DecodeError::Corrupt { field: "runs", reason: "do not fill the plane" });
         }
         let sample_count = runs.iter().filter(|run| run.kind == FIRST_SAMPLE_CODE).map(|run| run.texels).sum();
         Ok(Self { runs, sample_count })
@@ -153,8 +152,8 @@ impl Runs {
 fn leading(codes: &[u16], holds: impl Fn(u16) -> bool) -> usize {
     const BLOCK: usize = 32;
     let (blocks, _) = codes.as_chunks::<BLOCK>();
-    let all = |block: &[u16; BLOCK]| block.iter().fold(true, |all, &code| all & holds(code));
-    let whole = blocks.iter().take_while(|block| all(block)).count() * BLOCK;
+    let full = blocks.iter().take_while(|block| block.iter().fold(true, |all, &code| all & holds(code)));
+    let whole = full.count() * BLOCK;
     whole + codes[whole..].iter().take_while(|&&code| holds(code)).count()
 }
 

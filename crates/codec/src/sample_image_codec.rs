@@ -41,8 +41,10 @@ pub fn decode_sample_image(
     limits: &DecodeLimits,
 ) -> Result<SampleImage, DecodeError> {
     Ok(match camera {
-        SampleCamera::Depth(camera) => decode_depth_image(header, *camera, payload, limits)?.into(),
-        SampleCamera::Layered(camera) => decode_layered_image(header, *camera, payload, limits)?.into(),
-        SampleCamera::LightField(camera) => decode_light_field(header, *camera, payload, limits)?.into(),
+        SampleCamera::Depth(camera) => SampleImage::Depth(decode_depth_image(header, *camera, payload, limits)?),
+        SampleCamera::Layered(camera) => SampleImage::Layered(decode_layered_image(header, *camera, payload, limits)?),
+        SampleCamera::LightField(camera) => {
+            SampleImage::LightField(decode_light_field(header, *camera, payload, limits)?)
+        }
     })
 }

@@ -130,17 +130,14 @@ fn choose_widths(numbers: &[u16]) -> [u8; 4] {
     for length in 1..up_to.len() {
         up_to[length] += up_to[length - 1];
     }
+    let pairs = (0..14).flat_map(|a| (a + 1..15).map(move |b| (a, b)));
+    let candidates = pairs.flat_map(|(a, b)| (b + 1..16).map(move |c| [a, b, c, WIDEST_BITS]));
     // Against 16 bits for all, each width saves its distance to the next for every number that fits it.
-    let saved_bits = |&[a, b, c, _]: &[u8; 4]| {
-        let saved = |narrow: u8, wide: u8| up_to[usize::from(narrow)] * u32::from(wide - narrow);
-        saved(a, b) + saved(b, c) + saved(c, WIDEST_BITS)
-    };
-    candidate_widths().max_by_key(saved_bits).unwrap_or([0, 5, 10, WIDEST_BITS])
-}
-
-fn candidate_widths() -> impl Iterator<Item = [u8; 4]> {
-    let ordered = |a| (a + 1..15).flat_map(move |b| (b + 1..16).map(move |c| [a, b, c, WIDEST_BITS]));
-    (0..14).flat_map(ordered)
+    let chosen = candidates.max_by_key(|widths| {
+        let saved = widths.windows(2).map(|pair| up_to[usize::from(pair[0])] * u32::from(pair[1] - pair[0]));
+        saved.sum::<u32>()
+    });
+    chosen.unwrap_or([0, 5, 10, WIDEST_BITS])
 }
 
 /// The meaning of a byte of four tags.
@@ -212,16 +209,19 @@ fn last_bytes(from: &[u8]) -> [u8; 8] {
 
 /// Splits `count` bytes off the front.
 pub(crate) fn take<'a>(input: &mut &'a [u8], count: usize) -> Result<&'a [u8], DecodeError> {
-    let (taken, rest) =
-        input.split_at_checked(count).ok_or(DecodeError::Corrupt { field: "payload", reason: "ends too early" })?;
-    *input = rest;
-    Ok(taken)
+    input.split_off(..count).ok_or(DecodeError::Corrupt { field: "payload", reason: "ends too early" })
+}
+
+/// Splits an array off the front.
+pub(crate) fn take_array<const N: usize>(input: &mut &[u8]) -> Result<[u8; N], DecodeError> {
+    let array = take(input, N)?.first_chunk();
+    array.copied().ok_or(DecodeError::Corrupt { field: "payload", reason: "ends too early" })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_planes::Random;
+    use crate::test_support::Random;
 
     fn round_trip(numbers: &[u16]) -> usize {
         let mut packed = vec![7];

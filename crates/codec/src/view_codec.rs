@@ -59,11 +59,8 @@ impl EncodedView {
 /// For planes that are not of the view's size, or a size that the codec cannot have.
 pub fn encode_view(view: &View, codec: FrameCodec) -> Result<EncodedView, FrameError> {
     let texels = view.size_px.element_product() as usize;
-    let right = |plane, len| {
-        if len == texels { Ok(()) } else { Err(FrameError::Length { plane, len, expected: texels }) }
-    };
-    right("inverse_depth", view.inverse_depth_per_m.as_ref().map_or(texels, Vec::len))?;
-    right("provenance", view.provenance.as_ref().map_or(texels, Vec::len))?;
+    check_length("inverse_depth", view.inverse_depth_per_m.as_ref().map_or(texels, Vec::len), texels)?;
+    check_length("provenance", view.provenance.as_ref().map_or(texels, Vec::len), texels)?;
     let color = encode_frame(codec, view.size_px, &view.srgb8)?;
     let depth = view.inverse_depth_per_m.as_deref().map_or_else(Vec::new, pack_f32_plane);
     let provenance =
@@ -83,12 +80,11 @@ pub fn encode_view(view: &View, codec: FrameCodec) -> Result<EncodedView, FrameE
 /// For sizes over the limits, and data that does not decode to the planes of the header.
 pub fn decode_view(frame: &WholeFrame, limits: &DecodeLimits) -> Result<View, FrameError> {
     let FrameHeader { size_px, codec, .. } = frame.header;
-    let plane_error = |plane| move |source| FrameError::Plane { plane, source };
     let texels = limits.texels(size_px.x, size_px.y).map_err(plane_error("size"))?;
     let [color, depth, provenance] = planes(frame)?;
-    let some = |data: Bytes| (!data.is_empty()).then_some(data);
-    let depth = some(depth).map(|data| unpack_f32_plane(&data, texels).map_err(plane_error("inverse_depth")));
-    let provenance = some(provenance).map(|data| unpack_u32_plane(&data, texels).map_err(plane_error("provenance")));
+    let depth = (!depth.is_empty()).then(|| unpack_f32_plane(&depth, texels).map_err(plane_error("inverse_depth")));
+    let provenance =
+        (!provenance.is_empty()).then(|| unpack_u32_plane(&provenance, texels).map_err(plane_error("provenance")));
     Ok(View {
         size_px,
         srgb8: decode_frame(codec, size_px, &color, limits)?,
@@ -97,15 +93,17 @@ pub fn decode_view(frame: &WholeFrame, limits: &DecodeLimits) -> Result<View, Fr
     })
 }
 
+fn check_length(plane: &'static str, len: usize, expected: usize) -> Result<(), FrameError> {
+    if len == expected { Ok(()) } else { Err(FrameError::Length { plane, len, expected }) }
+}
+
+fn plane_error(plane: &'static str) -> impl FnOnce(DecodeError) -> FrameError {
+    move |source| FrameError::Plane { plane, source }
+}
+
 fn planes(frame: &WholeFrame) -> Result<[Bytes; 3], FrameError> {
     let header = &frame.header;
-    if frame.data.len() as u64 != header.total_bytes() {
-        return Err(FrameError::Length {
-            plane: "data",
-            len: frame.data.len(),
-            expected: header.total_bytes() as usize,
-        });
-    }
+    check_length("data", frame.data.len(), usize::try_from(header.total_bytes()).unwrap_or(usize::MAX))?;
     let mut rest = frame.data.clone();
     let color = rest.split_to(header.color_bytes as usize);
     let depth = rest.split_to(header.inverse_depth_bytes as usize);
@@ -129,10 +127,8 @@ fn unpack_u32_plane(data: &[u8], texels: usize) -> Result<Vec<u32>, DecodeError>
 
 /// Packs a plane of inverse depths to the bit; numbers that are not finite become holes.
 fn pack_f32_plane(inverse_depth_per_m: &[f32]) -> Vec<u8> {
-    let finite = |&value: &f32| {
-        if value.is_finite() { value } else { HOLE_INVERSE_DEPTH }
-    };
-    pack_u32_plane(inverse_depth_per_m.iter().map(|value| finite(value).to_bits()))
+    let finite = inverse_depth_per_m.iter().map(|&value| if value.is_finite() { value } else { HOLE_INVERSE_DEPTH });
+    pack_u32_plane(finite.map(f32::to_bits))
 }
 
 /// The inverse of [`pack_f32_plane`], with `texels` as in [`unpack_u32_plane`].
@@ -149,7 +145,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::test_planes::{Random, tree_over_terrain};
+    use crate::test_support::{Random, tree_over_terrain};
 
     fn view(planes: bool) -> View {
         View {

@@ -83,9 +83,7 @@ fn differences(words: &[u32], layout: WordLayout, shift: usize, out: &mut [u16])
 /// Applies `number` to each word and the one before, which is 0 before the first.
 #[inline]
 pub(crate) fn for_neighbours(words: &[u32], out: &mut [u16], number: impl Fn(u32, u32) -> u16) {
-    let Some((first, others)) = out.split_first_mut() else {
-        return;
-    };
+    let Some((first, others)) = out.split_first_mut() else { return };
     *first = number(words[0], 0);
     for ((out, &last), &word) in others.iter_mut().zip(words).zip(&words[1..]) {
         *out = number(word, last);
@@ -118,22 +116,23 @@ fn extend_by_changes(words: &mut Vec<u32>, numbers: &[u16], block: usize, layout
             let number = u32::from(low) | u32::from(high) << 16;
             (number >> 1) ^ (number & 1).wrapping_neg()
         })),
-        WordLayout::Halves => {
-            let half = |number| u32::from(unzigzag(number));
-            words.extend(low.iter().zip(high).map(|(&low, &high)| half(low) | half(high) << 16));
-        }
-        WordLayout::TwoBytes => {
-            let byte = |number| u32::from(unzigzag(number) as u8);
-            words.extend(low.iter().zip(high).map(|(&low, &high)| byte(low) | byte(high) << 8));
-        }
+        WordLayout::Halves => words.extend(
+            low.iter().zip(high).map(|(&low, &high)| u32::from(unzigzag(low)) | u32::from(unzigzag(high)) << 16),
+        ),
+        WordLayout::TwoBytes => words.extend(low.iter().zip(high).map(|(&low, &high)| two_bytes(low, high))),
         WordLayout::Bytes => {
-            let byte = |number| u32::from(unzigzag(number) as u8);
-            let two = |(&low, &high)| byte(low) | byte(high) << 8;
-            let ((a, b), (c, d)) = (low.split_at(block), high.split_at(block));
-            let lows = a.iter().zip(b).map(two);
-            words.extend(lows.zip(c.iter().zip(d).map(two)).map(|(low, high)| low | high << 16));
+            let (a, b) = low.split_at(block);
+            let (c, d) = high.split_at(block);
+            let lows = a.iter().zip(b).map(|(&a, &b)| two_bytes(a, b));
+            let highs = c.iter().zip(d).map(|(&c, &d)| two_bytes(c, d));
+            words.extend(lows.zip(highs).map(|(low, high)| low | high << 16));
         }
     }
+}
+
+#[inline]
+fn two_bytes(low: u16, high: u16) -> u32 {
+    u32::from(unzigzag(low) as u8) | u32::from(unzigzag(high) as u8) << 8
 }
 
 /// Words from their changes to the one before, which is 0 before the first.
@@ -169,7 +168,7 @@ fn whole_difference(word: u32, last: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_planes::Random;
+    use crate::test_support::Random;
 
     #[test]
     fn words_survive() {

@@ -57,11 +57,10 @@ impl Antialias {
 
     /// Where the samples are, in pixels from the centre.
     pub fn offsets_px(self) -> impl ExactSizeIterator<Item = Vec2> {
-        let is_one = self.0 == 1;
-        let offset = move |[x, y]: [u8; 2]| {
-            if is_one { Vec2::ZERO } else { Vec2::new(f32::from(x), f32::from(y)) / 32.0 - 0.5 }
-        };
-        POSITIONS.into_iter().take(self.0 as usize).map(offset)
+        POSITIONS.into_iter().take(self.0 as usize).map(move |[x, y]| match self {
+            Self::NONE => Vec2::ZERO,
+            _ => Vec2::new(f32::from(x), f32::from(y)) / 32.0 - 0.5,
+        })
     }
 }
 

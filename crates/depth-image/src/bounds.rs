@@ -68,7 +68,6 @@ impl Aabb {
     /// The eight corners.
     #[must_use]
     pub fn corners(&self) -> [Vec3; 8] {
-        let is_least = |i: usize| BVec3::new(i & 1 == 0, i & 2 == 0, i & 4 == 0);
-        std::array::from_fn(|i| Vec3::select(is_least(i), self.min, self.max))
+        std::array::from_fn(|i| Vec3::select(BVec3::new(i & 1 == 0, i & 2 == 0, i & 4 == 0), self.min, self.max))
     }
 }

@@ -34,10 +34,7 @@ impl Camera {
     /// `None` of another model.
     #[must_use]
     pub fn pinhole(&self) -> Option<&PinholeCamera> {
-        match self {
-            Self::Pinhole(camera) => Some(camera),
-            Self::SinglePole(_) => None,
-        }
+        if let Self::Pinhole(camera) = self { Some(camera) } else { None }
     }
 
     /// The model, as it is named everywhere.
@@ -93,11 +90,11 @@ impl Camera {
     pub fn resized_together(cameras: &[Self], pixels: f32, least_px: u32) -> Vec<Self> {
         let all: usize = cameras.iter().map(Self::pixel_count).sum();
         let scale = (pixels / all.max(1) as f32).sqrt();
-        let sized = |camera: &Self| {
+        let resized = cameras.iter().map(|camera| {
             let size_px = (camera.size_px().as_vec2() * scale).round().as_uvec2();
             camera.resized(size_px.clamp(UVec2::splat(least_px), UVec2::splat(MAX_IMAGE_SIDE_PX)))
-        };
-        cameras.iter().map(sized).collect()
+        });
+        resized.collect()
     }
 
     /// The camera whose pixels' centres are those points of this one's pixels, in pixels from their centres.

@@ -2,6 +2,7 @@
 
 use glam::{Mat3A, Quat, UVec2, UVec3, Vec2, Vec3};
 
+use crate::projection::{check_finite, check_range};
 use crate::{Aabb, CameraError, ParallelCamera, PixelDepth};
 
 /// A box of cubic cells. Through the middle of each row of cells, along each of the three axes, runs a line on which a scene is
@@ -31,14 +32,10 @@ impl CubeGrid {
     /// # Errors
     /// A side beyond [`CUBE_SIDES`], and a box that is empty or not finite.
     pub fn around(bounds: &Aabb, side: u32) -> Result<Self, CameraError> {
-        if !CUBE_SIDES.contains(&side) {
-            let value = f64::from(side);
-            return Err(CameraError::OutOfRange { field: "side", value, allowed: "from 16 to 4096" });
-        }
+        check_range("side", side, CUBE_SIDES.contains(&side), "from 16 to 4096")?;
         let extent_m = bounds.size().max_element();
-        if !(bounds.min.is_finite() && bounds.max.is_finite() && extent_m.is_finite() && extent_m > 0.0) {
-            return Err(CameraError::NotFinite { field: "bounds" });
-        }
+        let is_finite = bounds.min.is_finite() && bounds.max.is_finite() && extent_m.is_finite();
+        check_finite("bounds", is_finite && extent_m > 0.0)?;
         let spacing_m = extent_m / (side - 1) as f32;
         // Half a cell of room on each side, and for the rounding of coordinates.
         let size = (bounds.size() / spacing_m + 1.0 - 1e-3).ceil().as_uvec3();
@@ -53,16 +50,10 @@ impl CubeGrid {
     /// The first field that is not finite or out of range.
     pub fn validate(&self) -> Result<(), CameraError> {
         let length = f64::from(self.world_from_cube.length());
-        let side = f64::from(self.size.max_element());
-        if !(self.corner_in_world.is_finite() && length.is_finite()) {
-            return Err(CameraError::NotFinite { field: "corner_in_world or world_from_cube" });
-        }
-        if (length - 1.0).abs() >= 1e-3 {
-            return Err(CameraError::OutOfRange { field: "world_from_cube", value: length, allowed: "of unit length" });
-        }
-        if self.size.max_element() > *CUBE_SIDES.end() {
-            return Err(CameraError::OutOfRange { field: "size", value: side, allowed: "at most 4096" });
-        }
+        let side = self.size.max_element();
+        check_finite("corner_in_world or world_from_cube", self.corner_in_world.is_finite() && length.is_finite())?;
+        check_range("world_from_cube", length, (length - 1.0).abs() < 1e-3, "of unit length")?;
+        check_range("size", side, side <= *CUBE_SIDES.end(), "at most 4096")?;
         (0..3).try_for_each(|axis| self.camera(axis).validate())
     }
 
@@ -73,17 +64,17 @@ impl CubeGrid {
         let frame = Mat3A::from_quat(first.world_from_camera);
         let axes = Mat3A::from_cols(frame.z_axis, frame.x_axis, frame.y_axis);
         let [own, rows] = [second.size_px.y, first.size_px.y];
-        let edge_m = |cells: u32| cells as f32 * first.spacing_m;
         let grid = Self {
             corner_in_world: first.corner_in_world
-                - Vec3::from(frame.y_axis) * edge_m(rows)
-                - Vec3::from(frame.z_axis) * edge_m(own),
+                - Vec3::from(frame.y_axis) * (rows as f32 * first.spacing_m)
+                - Vec3::from(frame.z_axis) * (own as f32 * first.spacing_m),
             world_from_cube: Quat::from_mat3a(&axes).normalize(),
             spacing_m: first.spacing_m,
             size: UVec3::new(own, first.size_px.x, rows),
         };
-        let is_own = |(axis, camera)| grid.has_camera(axis, camera);
-        (grid.validate().is_ok() && cameras.iter().enumerate().all(is_own)).then_some(grid)
+        let has_all =
+            grid.validate().is_ok() && cameras.iter().enumerate().all(|(axis, camera)| grid.has_camera(axis, camera));
+        has_all.then_some(grid)
     }
 
     /// Whether a camera has the lines along an axis, but for rounding.
@@ -91,14 +82,14 @@ impl CubeGrid {
     pub fn has_camera(&self, axis: usize, camera: &ParallelCamera) -> bool {
         let own = self.camera(axis);
         let [right, end] = [Vec2::new(own.size_px.x as f32, 0.0), own.size_px.as_vec2()];
-        let is_near = |pixel, planar_depth_m| {
-            let at = PixelDepth { pixel, planar_depth_m };
-            own.unproject(at).distance(camera.unproject(at)) < CAMERA_ROUNDING * self.spacing_m
-        };
         let places = [(Vec2::ZERO, 0.0), (right, 0.0), (end, 0.0), (Vec2::ZERO, own.range_m)];
         let is_alike =
             own.size_px == camera.size_px && (own.range_m - camera.range_m).abs() < CAMERA_ROUNDING * own.spacing_m;
-        is_alike && places.into_iter().all(|(pixel, planar_depth_m)| is_near(pixel, planar_depth_m))
+        is_alike
+            && places.into_iter().all(|(pixel, planar_depth_m)| {
+                let at = PixelDepth { pixel, planar_depth_m };
+                own.unproject(at).distance(camera.unproject(at)) < CAMERA_ROUNDING * self.spacing_m
+            })
     }
 
     /// The cameras along the three axes.
@@ -114,15 +105,15 @@ impl CubeGrid {
         let axes = Mat3A::from_quat(self.world_from_cube);
         let [own, columns, rows] = [0, 1, 2].map(|offset| (axis + offset) % 3);
         let frame = Mat3A::from_cols(axes.col(columns), axes.col(rows), axes.col(own));
-        let edge_m = |axis: usize| self.size[axis] as f32 * self.spacing_m;
+        let edges_m = self.size.as_vec3() * self.spacing_m;
         ParallelCamera {
             corner_in_world: self.corner_in_world
-                + Vec3::from(axes.col(rows)) * edge_m(rows)
-                + Vec3::from(axes.col(own)) * edge_m(own),
+                + Vec3::from(axes.col(rows)) * edges_m[rows]
+                + Vec3::from(axes.col(own)) * edges_m[own],
             world_from_camera: Quat::from_mat3a(&frame).normalize(),
             spacing_m: self.spacing_m,
             size_px: UVec2::new(self.size[columns], self.size[rows]),
-            range_m: edge_m(own),
+            range_m: edges_m[own],
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Encodings: 8-bit sRGB at the client, RGB9E5 for radiance, octahedral unit vectors in two signed 16-bit numbers (Cigolle
 //! et al. 2014).
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec2Swizzles as _, Vec3};
 
 /// One channel of sRGB (IEC 61966-2-1) to linear.
 #[must_use]
@@ -23,17 +23,19 @@ pub fn srgb8_from_linear(linear: f32) -> u8 {
 #[must_use]
 pub fn rgb9e5_from_linear(linear: Vec3) -> u32 {
     const MAX: f32 = 65_408.0;
-    let clamp = |v: f32| if v > 0.0 { v.min(MAX) } else { 0.0 };
-    let c = linear.to_array().map(clamp);
+    let c = linear.to_array().map(|v| if v > 0.0 { v.min(MAX) } else { 0.0 });
     let largest = c[0].max(c[1]).max(c[2]);
     let floor_log2 = ((largest.to_bits() >> 23) as i32 - 127).max(-16);
-    let quantise = |v: f32, exponent: i32| (v * 2f32.powi(24 - exponent) + 0.5).floor() as u32;
     let mut exponent = floor_log2 + 16;
-    if quantise(largest, exponent) == 512 {
+    if mantissa(largest, exponent) == 512 {
         exponent += 1;
     }
-    let [r, g, b] = c.map(|v| quantise(v, exponent));
+    let [r, g, b] = c.map(|v| mantissa(v, exponent));
     r | g << 9 | b << 18 | (exponent as u32) << 27
+}
+
+fn mantissa(v: f32, exponent: i32) -> u32 {
+    (v * 2f32.powi(24 - exponent) + 0.5).floor() as u32
 }
 
 /// The inverse of [`rgb9e5_from_linear`].
@@ -50,8 +52,8 @@ pub fn oct16_from_unit(unit: Vec3) -> u32 {
     let n = if length > 0.0 { unit / length } else { Vec3::Z };
     let flat = n.truncate();
     let folded = if n.z < 0.0 { wrapped(flat) } else { flat };
-    let quantise = |v: f32| u32::from(((v.clamp(-1.0, 1.0) * 32767.0).round() as i16) as u16);
-    quantise(folded.x) | quantise(folded.y) << 16
+    let [x, y] = folded.to_array().map(|v| u32::from(((v.clamp(-1.0, 1.0) * 32767.0).round() as i16) as u16));
+    x | y << 16
 }
 
 /// Packs a unit vector in two signed bytes. Any other input unpacks to some unit vector, never NaN.
@@ -63,24 +65,27 @@ pub fn oct8_from_unit(unit: Vec3) -> u16 {
 /// An octahedral vector in two signed bytes, of one in two signed 16-bit numbers.
 #[must_use]
 pub fn oct8_from_oct16(packed: u32) -> u16 {
-    let quantise = |bits: u32| ((f32::from(bits as u16 as i16) / 32767.0 * 127.0).round() as i8) as u8;
-    u16::from_le_bytes([quantise(packed), quantise(packed >> 16)])
+    let halves = [packed, packed >> 16].map(|bits| f32::from(bits as u16 as i16) / 32767.0);
+    u16::from_le_bytes(halves.map(|v| ((v * 127.0).round() as i8) as u8))
 }
 
 /// The inverse of [`oct8_from_unit`]; the result has unit length.
 #[must_use]
 pub fn unit_from_oct8(packed: u16) -> Vec3 {
     let [x, y] = packed.to_le_bytes().map(|byte| (f32::from(byte as i8) / 127.0).max(-1.0));
-    let flat = Vec2::new(x, y);
-    let z = 1.0 - x.abs() - y.abs();
+    unit_from_flat(Vec2::new(x, y))
+}
+
+/// The unit vector of a place on the octahedron that is folded flat.
+pub(crate) fn unit_from_flat(flat: Vec2) -> Vec3 {
+    let z = 1.0 - flat.x.abs() - flat.y.abs();
     let xy = if z < 0.0 { wrapped(flat) } else { flat };
     xy.extend(z).try_normalize().unwrap_or(Vec3::Z)
 }
 
 /// The octahedron's lower half, turned outwards; its own inverse.
-pub(crate) fn wrapped(v: Vec2) -> Vec2 {
-    let sign = |x: f32| if x >= 0.0 { 1.0 } else { -1.0 };
-    Vec2::new((1.0 - v.y.abs()) * sign(v.x), (1.0 - v.x.abs()) * sign(v.y))
+fn wrapped(v: Vec2) -> Vec2 {
+    (1.0 - v.yx().abs()) * Vec2::select(v.cmpge(Vec2::ZERO), Vec2::ONE, Vec2::NEG_ONE)
 }
 
 #[cfg(test)]

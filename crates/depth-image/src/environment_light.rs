@@ -99,11 +99,12 @@ fn base_limit(map: &EnvironmentMap) -> f32 {
 
 /// The mean over all directions, of luminance up to a limit.
 fn mean_luminance(map: &EnvironmentMap, limit: f32) -> f64 {
-    let row = |row| {
-        let luminance = |column| f64::from(map.texel_linear(column, row).dot(LUMINANCE).min(limit));
-        (0..map.size_px().x).map(luminance).sum::<f64>() * f64::from(map.solid_angle_sr(row))
-    };
-    (0..map.size_px().y).map(row).sum::<f64>() / (4.0 * std::f64::consts::PI)
+    let [columns, rows] = map.size_px().to_array();
+    let sums = (0..rows).map(|row| {
+        let luminances = (0..columns).map(|column| f64::from(map.texel_linear(column, row).dot(LUMINANCE).min(limit)));
+        luminances.sum::<f64>() * f64::from(map.solid_angle_sr(row))
+    });
+    sums.sum::<f64>() / (4.0 * std::f64::consts::PI)
 }
 
 /// The texels above the limit with their shares, and their irradiance together.
@@ -137,11 +138,13 @@ fn bright_texels(map: &EnvironmentMap, limit: f32) -> (Vec<BrightTexel>, f32) {
 
 /// The bits of column and row of a place, interleaved.
 fn z_order(place: u32) -> u32 {
-    let spread = |half: u32| (0..16).fold(0, |bits, i| bits | (half >> i & 1) << (2 * i));
-    spread(place & 0xffff) | spread(place >> 16) << 1
+    let halves = [place & 0xffff, place >> 16];
+    let [column, row] = halves.map(|half| (0..16).fold(0, |bits, i| bits | (half >> i & 1) << (2 * i)));
+    column | row << 1
 }
 
 /// The light of some texels of the map, as if it came from one direction.
+#[derive(Clone, Default)]
 struct Cell {
     towards_in_world: Vec3,
     solid_angle_sr: f32,
@@ -153,9 +156,7 @@ struct Cell {
 /// The map in cells of [`LOBE_SIZE_PX`]. A cell's direction is the mean of its texels', weighted by luminance, so that a
 /// small sun keeps its place.
 fn cells(map: &EnvironmentMap, base_limit: f32) -> Vec<Cell> {
-    let empty =
-        || Cell { towards_in_world: Vec3::ZERO, solid_angle_sr: 0.0, all_linear: Vec3::ZERO, base_linear: Vec3::ZERO };
-    let mut cells: Vec<Cell> = (0..LOBE_SIZE_PX.element_product()).map(|_| empty()).collect();
+    let mut cells = vec![Cell::default(); LOBE_SIZE_PX.element_product() as usize];
     // Texels of a small map are cut, so that each cell has some.
     let size_px = map.size_px();
     let parts = (LOBE_SIZE_PX + size_px - 1) / size_px;

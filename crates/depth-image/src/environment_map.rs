@@ -38,8 +38,8 @@ impl EnvironmentMap {
     /// A size beyond the limits, another number of radiances, or one that is negative or not finite.
     pub fn new(size_px: UVec2, radiance_linear: &[Vec3]) -> Result<Self, EnvironmentMapError> {
         check_size(size_px, radiance_linear.len())?;
-        let is_bad = |radiance: &Vec3| !radiance.is_finite() || radiance.min_element() < 0.0;
-        if let Some(at) = radiance_linear.iter().position(is_bad) {
+        let bad = radiance_linear.iter().position(|radiance| !radiance.is_finite() || radiance.min_element() < 0.0);
+        if let Some(at) = bad {
             let column = at as u32 % size_px.x;
             let row = at as u32 / size_px.x;
             return Err(EnvironmentMapError::Radiance { radiance_linear: radiance_linear[at], column, row });
@@ -89,8 +89,8 @@ impl EnvironmentMap {
     #[must_use]
     pub fn solid_angle_sr(&self, row: u32) -> f32 {
         let height = f64::from(self.size_px.y);
-        let cosine = |edge: u32| (std::f64::consts::PI * f64::from(edge) / height).cos();
-        (std::f64::consts::TAU / f64::from(self.size_px.x) * (cosine(row) - cosine(row + 1))) as f32
+        let [top, bottom] = [row, row + 1].map(|edge| (std::f64::consts::PI * f64::from(edge) / height).cos());
+        (std::f64::consts::TAU / f64::from(self.size_px.x) * (top - bottom)) as f32
     }
 }
 

@@ -63,19 +63,13 @@ impl LayeredDepthImage {
     pub fn validate(&self) -> Result<(), LayeredError> {
         self.camera.validate()?;
         let samples = self.planar_depth_m.len();
-        let specular = self.specular.iter();
-        let visibilities =
-            specular.clone().flat_map(|s| &s.visibility8).map(|plane| ("visibility", plane.len(), samples));
-        let reflectances = specular.map(|s| ("reflectance", s.reflectance_srgb8_roughness8.len(), samples));
-        let planes = [
-            ("first", self.first.len(), self.camera.pixel_count() + 1),
-            ("plane_normal", self.plane_normal_oct8.len(), samples),
-            ("color", self.color_rgb9e5.len(), samples),
-            ("normal", self.normal_oct16.as_ref().map_or(samples, Vec::len), samples),
-        ];
-        let mut planes = planes.into_iter().chain(reflectances).chain(visibilities);
-        if let Some((plane, len, expected)) = planes.find(|(_, len, expected)| len != expected) {
-            return Err(LayeredError::Plane { plane, len, expected });
+        check_plane("first", self.first.len(), self.camera.pixel_count() + 1)?;
+        check_plane("plane_normal", self.plane_normal_oct8.len(), samples)?;
+        check_plane("color", self.color_rgb9e5.len(), samples)?;
+        check_plane("normal", self.normal_oct16.as_ref().map_or(samples, Vec::len), samples)?;
+        if let Some(specular) = &self.specular {
+            check_plane("reflectance", specular.reflectance_srgb8_roughness8.len(), samples)?;
+            specular.visibility8.iter().try_for_each(|plane| check_plane("visibility", plane.len(), samples))?;
         }
         check_lines(&self.first, &self.planar_depth_m, self.camera.range_m)
     }
@@ -103,6 +97,10 @@ impl LayeredDepthImage {
     pub fn plane_normal_in_world(&self, sample: usize) -> Vec3 {
         crate::unit_from_oct8(self.plane_normal_oct8[sample])
     }
+}
+
+pub(crate) fn check_plane(plane: &'static str, len: usize, expected: usize) -> Result<(), LayeredError> {
+    if len == expected { Ok(()) } else { Err(LayeredError::Plane { plane, len, expected }) }
 }
 
 /// Checks the prefix sums of lines, and that depths rise along each.

@@ -94,8 +94,8 @@ impl Illumination {
     #[must_use]
     pub fn lamps_with_shares(&self) -> Vec<u32> {
         let mut lamps: Vec<u32> = (0..self.lights.len() as u32).collect();
-        let power = |lamp: &u32| self.lights[*lamp as usize].power();
-        lamps.sort_by(|a, b| power(b).total_cmp(&power(a)).then(a.cmp(b)));
+        let powers: Vec<f32> = self.lights.iter().map(Light::power).collect();
+        lamps.sort_by(|&a, &b| powers[b as usize].total_cmp(&powers[a as usize]).then(a.cmp(&b)));
         lamps.truncate(MAX_LAMP_SHARES);
         lamps.sort_unstable();
         lamps

@@ -70,20 +70,21 @@ impl LightDirections {
     #[must_use]
     pub fn all(self) -> Vec<LightDirection> {
         let solid_angles = self.solid_angles_sr();
-        let direction = |vertex: IVec3| LightDirection {
+        let vertices = self.first_vertices().flat_map(|vertex| [vertex, -vertex]);
+        let directions = vertices.map(|vertex| LightDirection {
             towards: unit(vertex),
             solid_angle_sr: solid_angles.get(&vertex).copied().unwrap_or(0.0),
-        };
-        self.first_vertices().flat_map(|vertex| [vertex, -vertex].map(direction)).collect()
+        });
+        directions.collect()
     }
 
     /// One vertex of each opposite two.
     fn first_vertices(self) -> impl Iterator<Item = IVec3> {
         let n = self.divisions() as i32;
-        let square = move |k: i32| (-n..=n).flat_map(move |j| (-n..=n).map(move |i| IVec3::new(i, j, k)));
-        let is_vertex = move |v: &IVec3| v.abs().element_sum() == n;
-        let is_first = |v: &IVec3| [v.z, v.y, v.x].into_iter().find(|&c| c != 0).is_some_and(|c| c > 0);
-        (0..=n).flat_map(square).filter(is_vertex).filter(is_first)
+        let lines = (0..=n).flat_map(move |k| (-n..=n).map(move |j| (j, k)));
+        let places = lines.flat_map(move |(j, k)| (-n..=n).map(move |i| IVec3::new(i, j, k)));
+        let vertices = places.filter(move |v| v.abs().element_sum() == n);
+        vertices.filter(|v| [v.z, v.y, v.x].into_iter().find(|&c| c != 0).is_some_and(|c| c > 0))
     }
 
     fn solid_angles_sr(self) -> HashMap<IVec3, f32> {
@@ -103,13 +104,13 @@ impl LightDirections {
     }
 
     /// The triangles of the face whose coordinates are not negative.
-    fn face_triangles(self) -> impl Iterator<Item = [IVec3; 3]> {
+    fn face_triangles(self) -> Vec<[IVec3; 3]> {
         let n = self.divisions() as i32;
-        let at = move |i: i32, j: i32| IVec3::new(i, j, n - i - j);
-        let up = move |(i, j): (i32, i32)| [at(i, j), at(i + 1, j), at(i, j + 1)];
-        let down = move |(i, j): (i32, i32)| (i + j + 2 <= n).then(|| [at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
-        let places = move || (0..n).flat_map(move |i| (0..n - i).map(move |j| (i, j)));
-        places().map(up).chain(places().filter_map(down))
+        let corners = (0..n).flat_map(|i| (0..n - i).map(move |j| IVec3::new(i, j, n - i - j)));
+        let [right, up] = [IVec3::new(1, 0, -1), IVec3::new(0, 1, -1)];
+        let upright = corners.clone().map(|at| [at, at + right, at + up]);
+        let inverted = corners.filter(|at| at.z >= 2).map(|at| [at + right, at + right + up, at + up]);
+        upright.chain(inverted).collect()
     }
 }
 

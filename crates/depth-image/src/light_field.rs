@@ -3,7 +3,8 @@
 use glam::{Mat3A, Quat, UVec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::layered::check_lines;
+use crate::layered::{check_lines, check_plane};
+use crate::projection::{check_finite, check_range};
 use crate::{Aabb, CameraError, LayeredError, LightDirections, ParallelCamera, ViewPart};
 
 /// Lines along each side of the square of a direction.
@@ -39,24 +40,12 @@ impl LightFieldCamera {
     pub fn validate(&self) -> Result<(), CameraError> {
         let Self { bounds, directions, side_px, first_pair, pairs } = *self;
         let diagonal_m = bounds.size().length();
-        if !(bounds.min.is_finite() && bounds.max.is_finite() && diagonal_m.is_finite()) {
-            return Err(CameraError::NotFinite { field: "bounds" });
-        }
+        check_finite("bounds", bounds.min.is_finite() && bounds.max.is_finite() && diagonal_m.is_finite())?;
+        check_range("bounds", diagonal_m, diagonal_m > 1e-6 && !bounds.is_empty(), "a box with an extent")?;
+        check_range("side_px", side_px, LIGHT_FIELD_SIDES.contains(&side_px), "from 16 to 90")?;
         let end = u64::from(first_pair) + u64::from(pairs);
-        let checks = [
-            ("bounds", f64::from(diagonal_m), diagonal_m > 1e-6 && !bounds.is_empty(), "a box with an extent"),
-            ("side_px", f64::from(side_px), LIGHT_FIELD_SIDES.contains(&side_px), "from 16 to 90"),
-            (
-                "pairs",
-                end as f64,
-                end <= u64::from(directions.pairs()) && pairs > 0,
-                "at least 1, and not beyond the last",
-            ),
-        ];
-        match checks.iter().find(|(_, _, ok, _)| !ok) {
-            Some(&(field, value, _, allowed)) => Err(CameraError::OutOfRange { field, value, allowed }),
-            None => Ok(()),
-        }
+        let are_pairs = end <= u64::from(directions.pairs()) && pairs > 0;
+        check_range("pairs", end as f64, are_pairs, "at least 1, and not beyond the last")
     }
 
     /// Columns and rows as an image: lines of a pair, and pairs.
@@ -100,10 +89,10 @@ impl LightFieldCamera {
         let right = forward.cross(across).normalize_or_zero();
         let up = right.cross(forward);
         let frame = Mat3A::from_cols(right.into(), up.into(), (-forward).into());
-        let extent_m = |axis: Vec3| axis.abs().dot(self.bounds.size());
+        let [width_m, height_m] = [right, up].map(|axis| axis.abs().dot(self.bounds.size()));
         let range_m = self.range_m();
         // The outermost lines pass along the faces. A box may be seen edge-on.
-        let spacing_m = extent_m(right).max(extent_m(up)).max(range_m * 1e-3) / (self.side_px - 1) as f32;
+        let spacing_m = width_m.max(height_m).max(range_m * 1e-3) / (self.side_px - 1) as f32;
         let half_m = 0.5 * self.side_px as f32 * spacing_m;
         ParallelCamera {
             corner_in_world: self.bounds.center() + (up - right) * half_m - forward * (0.5 * range_m),
@@ -136,13 +125,8 @@ impl LayeredLightField {
     pub fn validate(&self) -> Result<(), LayeredError> {
         self.camera.validate()?;
         let samples = self.planar_depth_m.len();
-        let planes = [
-            ("first", self.first.len(), self.camera.line_count() + 1),
-            ("radiance", self.radiance_rgb9e5.len(), samples),
-        ];
-        if let Some((plane, len, expected)) = planes.into_iter().find(|(_, len, expected)| len != expected) {
-            return Err(LayeredError::Plane { plane, len, expected });
-        }
+        check_plane("first", self.first.len(), self.camera.line_count() + 1)?;
+        check_plane("radiance", self.radiance_rgb9e5.len(), samples)?;
         check_lines(&self.first, &self.planar_depth_m, self.camera.range_m())
     }
 

@@ -52,8 +52,8 @@ pub fn method_forms<M>(table: &[NamedMethod<M>]) -> String {
 /// All methods and what they do, as `--help` lists them.
 #[must_use]
 pub fn method_help<M>(table: &[NamedMethod<M>]) -> String {
-    let row = |row: &NamedMethod<M>| format!("{}: {}", row.forms().collect::<Vec<_>>().join(" or "), row.help);
-    table.iter().map(row).collect::<Vec<_>>().join("; ")
+    let rows = table.iter().map(|row| format!("{}: {}", row.forms().collect::<Vec<_>>().join(" or "), row.help));
+    rows.collect::<Vec<_>>().join("; ")
 }
 
 /// Gives an enum of methods the texts of `METHODS` beside it: its default, its help, parsing with an error of its own, and

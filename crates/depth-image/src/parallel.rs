@@ -3,6 +3,7 @@
 use glam::{Mat3A, Quat, UVec2, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::projection::{check_finite, check_range};
 use crate::{CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray, ViewPart};
 
 /// A camera of parallel lines. Planar depth is the distance from its reference plane; planes are linear in depth, not in inverse
@@ -27,29 +28,18 @@ impl ParallelCamera {
     /// # Errors
     /// The first field that is not finite or out of range.
     pub fn validate(&self) -> Result<(), CameraError> {
-        let finite = [
-            ("corner_in_world", self.corner_in_world.is_finite()),
-            ("world_from_camera", self.world_from_camera.is_finite()),
-            ("spacing_m", self.spacing_m.is_finite()),
-            ("range_m", self.range_m.is_finite()),
-        ];
-        if let Some((field, _)) = finite.iter().find(|(_, ok)| !ok) {
-            return Err(CameraError::NotFinite { field });
-        }
+        check_finite("corner_in_world", self.corner_in_world.is_finite())?;
+        check_finite("world_from_camera", self.world_from_camera.is_finite())?;
+        check_finite("spacing_m", self.spacing_m.is_finite())?;
+        check_finite("range_m", self.range_m.is_finite())?;
         let length = f64::from(self.world_from_camera.length());
-        let [spacing, range] = [self.spacing_m, self.range_m].map(f64::from);
-        let [least_side, side] = [self.size_px.min_element(), self.size_px.max_element()].map(f64::from);
-        let checks = [
-            ("world_from_camera", length, (length - 1.0).abs() < 1e-3, "of unit length"),
-            ("spacing_m", spacing, (1e-9..=1e9).contains(&spacing), "from 1e-9 to 1e9"),
-            ("range_m", range, (1e-9..=1e9).contains(&range), "from 1e-9 to 1e9"),
-            ("size_px", least_side, least_side >= 1.0, "at least 1"),
-            ("size_px", side, side <= f64::from(MAX_IMAGE_SIDE_PX), "at most 16384"),
-        ];
-        match checks.iter().find(|(_, _, ok, _)| !ok) {
-            Some(&(field, value, _, allowed)) => Err(CameraError::OutOfRange { field, value, allowed }),
-            None => Ok(()),
+        check_range("world_from_camera", length, (length - 1.0).abs() < 1e-3, "of unit length")?;
+        for (field, metres) in [("spacing_m", self.spacing_m), ("range_m", self.range_m)] {
+            check_range(field, metres, (1e-9..=1e9).contains(&f64::from(metres)), "from 1e-9 to 1e9")?;
         }
+        let [least_side, side] = [self.size_px.min_element(), self.size_px.max_element()];
+        check_range("size_px", least_side, least_side >= 1, "at least 1")?;
+        check_range("size_px", side, side <= MAX_IMAGE_SIDE_PX, "at most 16384")
     }
 
     /// The direction in which columns, rows and depths rise: unit vectors.

@@ -3,6 +3,7 @@
 use glam::{Mat3A, Quat, UVec2, Vec2, Vec3, Vec3A, Vec4};
 use serde::{Deserialize, Serialize};
 
+use crate::projection::{check_finite, check_range};
 use crate::{CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray};
 
 /// A pinhole camera; the principal point may lie anywhere (lens shift).
@@ -46,32 +47,22 @@ impl PinholeCamera {
     /// # Errors
     /// The first field that is not finite or out of range.
     pub fn validate(&self) -> Result<(), CameraError> {
-        let finite = [
-            ("eye_in_world", self.eye_in_world.is_finite()),
-            ("world_from_camera", self.world_from_camera.is_finite()),
-            ("focal_px", self.focal_px.is_finite()),
-            ("principal_px", self.principal_px.is_finite()),
-            ("near_m", self.near_m.is_finite()),
-        ];
-        if let Some((field, _)) = finite.iter().find(|(_, ok)| !ok) {
-            return Err(CameraError::NotFinite { field });
-        }
+        check_finite("eye_in_world", self.eye_in_world.is_finite())?;
+        check_finite("world_from_camera", self.world_from_camera.is_finite())?;
+        check_finite("focal_px", self.focal_px.is_finite())?;
+        check_finite("principal_px", self.principal_px.is_finite())?;
+        check_finite("near_m", self.near_m.is_finite())?;
         let length = f64::from(self.world_from_camera.length());
-        let [least_side, side] = [self.size_px.min_element(), self.size_px.max_element()].map(f64::from);
+        check_range("world_from_camera", length, (length - 1.0).abs() < 1e-3, "of unit length")?;
         let focal = f64::from(self.focal_px.min_element());
-        let principal = f64::from(self.principal_px.abs().max_element());
-        let checks = [
-            ("world_from_camera", length, (length - 1.0).abs() < 1e-3, "of unit length"),
-            ("focal_px", focal, focal > 1e-3 && self.focal_px.max_element() < 1e7, "above 0.001 and below 1e7"),
-            ("principal_px", principal, principal < 1e6, "within a million pixels"),
-            ("near_m", f64::from(self.near_m), self.near_m > 0.0, "above 0"),
-            ("size_px", least_side, least_side >= 1.0, "at least 1"),
-            ("size_px", side, side <= f64::from(MAX_IMAGE_SIDE_PX), "at most 16384"),
-        ];
-        match checks.iter().find(|(_, _, ok, _)| !ok) {
-            Some(&(field, value, _, allowed)) => Err(CameraError::OutOfRange { field, value, allowed }),
-            None => Ok(()),
-        }
+        let is_focal = focal > 1e-3 && self.focal_px.max_element() < 1e7;
+        check_range("focal_px", focal, is_focal, "above 0.001 and below 1e7")?;
+        let principal = self.principal_px.abs().max_element();
+        check_range("principal_px", principal, principal < 1e6, "within a million pixels")?;
+        check_range("near_m", self.near_m, self.near_m > 0.0, "above 0")?;
+        let [least_side, side] = [self.size_px.min_element(), self.size_px.max_element()];
+        check_range("size_px", least_side, least_side >= 1, "at least 1")?;
+        check_range("size_px", side, side <= MAX_IMAGE_SIDE_PX, "at most 16384")
     }
 
     /// The same field of view in another size.
@@ -103,14 +94,11 @@ impl PinholeCamera {
     /// is the planar depth in metres.
     #[must_use]
     pub fn homogeneous_pixel_from_world(&self) -> [Vec4; 3] {
-        let right = self.world_from_camera * Vec3::X;
-        let down = self.world_from_camera * Vec3::NEG_Y;
-        let forward = self.forward_in_world();
-        let row = |axis: Vec3| axis.extend(-axis.dot(self.eye_in_world));
-        let depth = row(forward);
+        let axes = [Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z].map(|axis| self.world_from_camera * axis);
+        let [right, down, depth] = axes.map(|axis| axis.extend(-axis.dot(self.eye_in_world)));
         [
-            row(right) * self.focal_px.x + depth * self.principal_px.x,
-            row(down) * self.focal_px.y + depth * self.principal_px.y,
+            right * self.focal_px.x + depth * self.principal_px.x,
+            down * self.focal_px.y + depth * self.principal_px.y,
             depth,
         ]
     }

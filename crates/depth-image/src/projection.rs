@@ -39,3 +39,18 @@ pub enum CameraError {
     #[error("camera {field} is {value}, must be {allowed}")]
     OutOfRange { field: &'static str, value: f64, allowed: &'static str },
 }
+
+/// Refuses a field that is not finite.
+pub(crate) fn check_finite(field: &'static str, is_finite: bool) -> Result<(), CameraError> {
+    if is_finite { Ok(()) } else { Err(CameraError::NotFinite { field }) }
+}
+
+/// Refuses a value that is not allowed.
+pub(crate) fn check_range(
+    field: &'static str,
+    value: impl Into<f64>,
+    is_allowed: bool,
+    allowed: &'static str,
+) -> Result<(), CameraError> {
+    if is_allowed { Ok(()) } else { Err(CameraError::OutOfRange { field, value: value.into(), allowed }) }
+}

@@ -44,28 +44,19 @@ impl SampleCamera {
     /// The camera of a depth image; `None` of others.
     #[must_use]
     pub fn depth(&self) -> Option<&Camera> {
-        match self {
-            Self::Depth(camera) => Some(camera),
-            Self::Layered(_) | Self::LightField(_) => None,
-        }
+        if let Self::Depth(camera) = self { Some(camera) } else { None }
     }
 
     /// The camera of a layered image; `None` of others.
     #[must_use]
     pub fn layered(&self) -> Option<&ParallelCamera> {
-        match self {
-            Self::Layered(camera) => Some(camera),
-            Self::Depth(_) | Self::LightField(_) => None,
-        }
+        if let Self::Layered(camera) = self { Some(camera) } else { None }
     }
 
     /// The camera of a light field; `None` of others.
     #[must_use]
     pub fn light_field(&self) -> Option<&LightFieldCamera> {
-        match self {
-            Self::LightField(camera) => Some(camera),
-            Self::Depth(_) | Self::Layered(_) => None,
-        }
+        if let Self::LightField(camera) = self { Some(camera) } else { None }
     }
 
     /// The pinholes by which cameras of depth images are placed.
@@ -122,9 +113,6 @@ impl SampleCamera {
     /// The same field of view in another size. Lines of a cube or of a light field stay.
     #[must_use]
     pub fn resized(&self, size_px: UVec2) -> Self {
-        match self {
-            Self::Depth(camera) => Self::Depth(camera.resized(size_px)),
-            Self::Layered(_) | Self::LightField(_) => *self,
-        }
+        if let Self::Depth(camera) = self { Self::Depth(camera.resized(size_px)) } else { *self }
     }
 }

@@ -78,28 +78,7 @@ impl SampleImages {
     /// The depth images; none of a cube.
     #[must_use]
     pub fn depth(&self) -> &[DepthImage] {
-        match self {
-            Self::Depth(images) => images,
-            Self::Cube(_) => &[],
-        }
-    }
-}
-
-impl From<DepthImage> for SampleImage {
-    fn from(image: DepthImage) -> Self {
-        Self::Depth(image)
-    }
-}
-
-impl From<LayeredDepthImage> for SampleImage {
-    fn from(image: LayeredDepthImage) -> Self {
-        Self::Layered(image)
-    }
-}
-
-impl From<LayeredLightField> for SampleImage {
-    fn from(image: LayeredLightField) -> Self {
-        Self::LightField(image)
+        if let Self::Depth(images) = self { images } else { &[] }
     }
 }
 
@@ -112,10 +91,13 @@ impl SampleImage {
         Ok(match camera {
             SampleCamera::Depth(camera) => Self::Depth(DepthImage::from_tiles(*camera, Self::depth_images(tiles)?)?),
             SampleCamera::Layered(camera) => {
-                Self::Layered(LayeredDepthImage::from_tiles(*camera, &Self::layered_images(tiles)?)?)
+                let tiles = Self::all_of(tiles, |tile| if let Self::Layered(tile) = tile { Some(tile) } else { None })?;
+                Self::Layered(LayeredDepthImage::from_tiles(*camera, &tiles)?)
             }
             SampleCamera::LightField(camera) => {
-                Self::LightField(LayeredLightField::from_tiles(*camera, &Self::light_fields(tiles)?)?)
+                let tiles =
+                    Self::all_of(tiles, |tile| if let Self::LightField(tile) = tile { Some(tile) } else { None })?;
+                Self::LightField(LayeredLightField::from_tiles(*camera, &tiles)?)
             }
         })
     }
@@ -125,27 +107,12 @@ impl SampleImage {
     /// # Errors
     /// Some are layered.
     pub fn depth_images(images: Vec<Self>) -> Result<Vec<DepthImage>, SampleImageError> {
-        let depth = |image| match image {
-            Self::Depth(image) => Ok(image),
-            Self::Layered(_) | Self::LightField(_) => Err(SampleImageError::Mixed),
-        };
-        images.into_iter().map(depth).collect()
+        Self::all_of(images, |image| if let Self::Depth(image) = image { Some(image) } else { None })
     }
 
-    fn layered_images(images: Vec<Self>) -> Result<Vec<LayeredDepthImage>, SampleImageError> {
-        let layered = |image| match image {
-            Self::Layered(image) => Ok(image),
-            Self::Depth(_) | Self::LightField(_) => Err(SampleImageError::Mixed),
-        };
-        images.into_iter().map(layered).collect()
-    }
-
-    fn light_fields(images: Vec<Self>) -> Result<Vec<LayeredLightField>, SampleImageError> {
-        let light_field = |image| match image {
-            Self::LightField(image) => Ok(image),
-            Self::Depth(_) | Self::Layered(_) => Err(SampleImageError::Mixed),
-        };
-        images.into_iter().map(light_field).collect()
+    /// The images of one kind, where all are.
+    fn all_of<T>(images: Vec<Self>, kind: fn(Self) -> Option<T>) -> Result<Vec<T>, SampleImageError> {
+        images.into_iter().map(kind).collect::<Option<_>>().ok_or(SampleImageError::Mixed)
     }
 
     /// Inputs of highlights, where the image has them.

@@ -7,6 +7,7 @@
 use glam::{UVec2, Vec2, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
+use crate::projection::{check_finite, check_range};
 use crate::{Aabb, CameraError, MAX_IMAGE_SIDE_PX, PinholeCamera, PixelDepth, Ray};
 
 /// The least depth of what a camera is placed around, as a share of its greatest.
@@ -35,23 +36,22 @@ impl SinglePoleCamera {
         let middle = bounds.center();
         let up = if (middle - eye).normalize_or(Vec3::Z).y.abs() > 0.95 { Vec3::NEG_Z } else { Vec3::Y };
         let looking = PinholeCamera::looking_at(eye, middle, up, 1.0, size_px);
-        let in_camera = |corner: Vec3| looking.world_from_camera.conjugate() * (corner - eye);
-        let depth_m = |corner: Vec3| -in_camera(corner).z;
-        let corners = bounds.corners();
-        let farthest_m = corners.iter().copied().map(depth_m).fold(f32::MIN_POSITIVE, f32::max);
-        let nearest_m = corners.iter().copied().map(depth_m).fold(farthest_m, f32::min).max(LEAST_DEPTH * farthest_m);
+        let corners_in_camera = bounds.corners().map(|corner| looking.world_from_camera.conjugate() * (corner - eye));
+        let depths_m = corners_in_camera.map(|corner| -corner.z);
+        let farthest_m = depths_m.into_iter().fold(f32::MIN_POSITIVE, f32::max);
+        let nearest_m = depths_m.into_iter().fold(farthest_m, f32::min).max(LEAST_DEPTH * farthest_m);
         let near_m = nearest_m * (1.0 - DEPTH_SLACK);
         let farthest_m = farthest_m * (1.0 + DEPTH_SLACK);
         let reference = PinholeCamera { near_m, ..looking };
         let unscaled = Self { reference, pole_px: reference.principal_px, distortion_px, farthest_m };
         // Away from the pole along one axis, nothing moves farther than the distortion.
         let room_px = 0.5 * size_px.min_element() as f32;
-        let focal_px = |corner: &Vec3| {
-            let at = in_camera(*corner).truncate().abs().max_element();
-            let z = depth_m(*corner).max(nearest_m);
+        let focals_px = corners_in_camera.map(|corner| {
+            let at = corner.truncate().abs().max_element();
+            let z = (-corner.z).max(nearest_m);
             (room_px - unscaled.shift_px(z.recip())).max(1.0) * z / at.max(f32::MIN_POSITIVE)
-        };
-        let focal_px = corners.iter().map(focal_px).fold(f32::MAX, f32::min).clamp(2e-3, 1e6);
+        });
+        let focal_px = focals_px.into_iter().fold(f32::MAX, f32::min).clamp(2e-3, 1e6);
         Self { reference: PinholeCamera { focal_px: Vec2::splat(focal_px), ..reference }, ..unscaled }
     }
 
@@ -61,29 +61,19 @@ impl SinglePoleCamera {
     /// The first field that is not finite or out of range.
     pub fn validate(&self) -> Result<(), CameraError> {
         self.reference.validate()?;
-        let finite = [
-            ("pole_px", self.pole_px.is_finite()),
-            ("distortion_px", self.distortion_px.is_finite()),
-            ("farthest_m", self.farthest_m.is_finite()),
-        ];
-        if let Some((field, _)) = finite.iter().find(|(_, ok)| !ok) {
-            return Err(CameraError::NotFinite { field });
-        }
-        let pole = f64::from(self.pole_px.abs().max_element());
-        let [distortion, farthest_m] = [self.distortion_px, self.farthest_m].map(f64::from);
-        let least_farthest_m = f64::from(self.reference.near_m) * (1.0 + f64::from(DEPTH_SLACK));
+        check_finite("pole_px", self.pole_px.is_finite())?;
+        check_finite("distortion_px", self.distortion_px.is_finite())?;
+        check_finite("farthest_m", self.farthest_m.is_finite())?;
         // A tile of an image does not hold the image's pole.
-        let checks = [
-            ("pole_px", pole, pole < 1e6, "within a million pixels"),
-            ("distortion_px", distortion, self.distortion_px >= 0.0, "at least 0"),
-            ("distortion_px", distortion, distortion <= f64::from(MAX_IMAGE_SIDE_PX), "at most 16384"),
-            ("near_m", f64::from(self.reference.near_m), self.reference.near_m >= 1e-6, "at least 1e-6"),
-            ("farthest_m", farthest_m, farthest_m >= least_farthest_m, "beyond near_m by a thousandth"),
-        ];
-        match checks.iter().find(|(_, _, ok, _)| !ok) {
-            Some(&(field, value, _, allowed)) => Err(CameraError::OutOfRange { field, value, allowed }),
-            None => Ok(()),
-        }
+        let pole = self.pole_px.abs().max_element();
+        check_range("pole_px", pole, pole < 1e6, "within a million pixels")?;
+        let distortion = self.distortion_px;
+        check_range("distortion_px", distortion, distortion >= 0.0, "at least 0")?;
+        check_range("distortion_px", distortion, distortion <= MAX_IMAGE_SIDE_PX as f32, "at most 16384")?;
+        check_range("near_m", self.reference.near_m, self.reference.near_m >= 1e-6, "at least 1e-6")?;
+        let [near_m, farthest_m] = [self.reference.near_m, self.farthest_m].map(f64::from);
+        let is_beyond = farthest_m >= near_m * (1.0 + f64::from(DEPTH_SLACK));
+        check_range("farthest_m", farthest_m, is_beyond, "beyond near_m by a thousandth")
     }
 
     /// The same field of view in another size. Of other proportions the distortion is that of the side that shrinks more.

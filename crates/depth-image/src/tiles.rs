@@ -42,9 +42,8 @@ impl SampleCamera {
 
 /// The rows of a tile.
 fn part(size_px: UVec2, tile: u32, count: u32) -> ViewPart {
-    let row = |i: u32| (u64::from(i) * u64::from(size_px.y) / u64::from(count.max(1))) as u32;
-    let first = row(tile);
-    let end = row(tile + 1);
+    let [first, end] =
+        [tile, tile + 1].map(|tile| (u64::from(tile) * u64::from(size_px.y) / u64::from(count.max(1))) as u32);
     ViewPart { first_px: UVec2::new(0, first), size_px: UVec2::new(size_px.x, end - first) }
 }
 
@@ -61,15 +60,15 @@ impl LayeredDepthImage {
             }
             tile.validate()?;
         }
-        let concat = |plane: fn(&Self) -> &[u32]| tiles.iter().flat_map(|tile| plane(tile).iter().copied()).collect();
+        let specular = specular(tiles, Self::sample_count, |tile| tile.specular.as_ref());
         Ok(Self {
             camera,
             first: joined_lines(tiles.iter().map(|tile| &tile.first[..])),
-            planar_depth_m: tiles.iter().flat_map(|tile| tile.planar_depth_m.iter().copied()).collect(),
-            plane_normal_oct8: tiles.iter().flat_map(|tile| tile.plane_normal_oct8.iter().copied()).collect(),
-            color_rgb9e5: concat(|tile| &tile.color_rgb9e5),
+            planar_depth_m: concat(tiles, |tile| &tile.planar_depth_m),
+            plane_normal_oct8: concat(tiles, |tile| &tile.plane_normal_oct8),
+            color_rgb9e5: concat(tiles, |tile| &tile.color_rgb9e5),
             normal_oct16: filled(tiles, Self::sample_count, |tile| tile.normal_oct16.as_deref()),
-            specular: layered_specular(tiles)?,
+            specular: specular.ok_or(LayeredError::MixedTiles)?,
             truncated: tiles.iter().any(|tile| tile.truncated),
         })
     }
@@ -92,8 +91,8 @@ impl LayeredLightField {
         Ok(Self {
             camera,
             first: joined_lines(tiles.iter().map(|tile| &tile.first[..])),
-            planar_depth_m: tiles.iter().flat_map(|tile| tile.planar_depth_m.iter().copied()).collect(),
-            radiance_rgb9e5: tiles.iter().flat_map(|tile| tile.radiance_rgb9e5.iter().copied()).collect(),
+            planar_depth_m: concat(tiles, |tile| &tile.planar_depth_m),
+            radiance_rgb9e5: concat(tiles, |tile| &tile.radiance_rgb9e5),
         })
     }
 }
@@ -106,11 +105,6 @@ fn joined_lines<'a>(tiles: impl Iterator<Item = &'a [u32]>) -> Vec<u32> {
         joined.extend(first.iter().skip(1).map(|line| before + line));
     }
     joined
-}
-
-fn layered_specular(tiles: &[LayeredDepthImage]) -> Result<Option<SpecularPlanes>, LayeredError> {
-    let specular = tiles.iter().map(|tile| (tile.sample_count(), tile.specular.as_ref()));
-    specular_of(specular.collect()).ok_or(LayeredError::MixedTiles)
 }
 
 impl DepthImage {
@@ -128,21 +122,24 @@ impl DepthImage {
             tile.validate().map_err(|source| TileError::Planes { tile: number, source })?;
         }
         let corners = joined(&tiles, "corner_inverse_depth", |tile| tile.corner_inverse_depth_per_m.as_deref())?;
+        let surface_id = joined(&tiles, "surface_id", |tile| tile.surface_id.as_deref())?;
+        let specular = specular(&tiles, texel_count, |tile| tile.specular.as_ref());
         Ok(Self {
             camera,
             inverse_depth_per_m: concat(&tiles, |tile| &tile.inverse_depth_per_m),
             color_rgb9e5: concat(&tiles, |tile| &tile.color_rgb9e5),
-            surface_id: joined(&tiles, "surface_id", |tile| tile.surface_id.as_deref())?,
+            surface_id,
             normal_oct16: filled(&tiles, texel_count, |tile| tile.normal_oct16.as_deref()),
             passed: filled(&tiles, texel_count, |tile| tile.passed.as_deref()),
-            specular: specular(&tiles)?,
+            specular: specular.ok_or(TileError::Mixed { plane: "visibility" })?,
             corner_inverse_depth_per_m: corners.map(|_| shared_corners(&tiles)),
             light: light(&tiles)?,
         })
     }
 }
 
-fn concat<T: Copy>(tiles: &[DepthImage], plane: impl Fn(&DepthImage) -> &Vec<T>) -> Vec<T> {
+/// Joins a plane that all tiles have.
+fn concat<I, T: Copy>(tiles: &[I], plane: impl Fn(&I) -> &[T]) -> Vec<T> {
     tiles.iter().flat_map(|tile| plane(tile).iter().copied()).collect()
 }
 
@@ -167,20 +164,13 @@ fn filled<I, T: Copy + Default>(
     plane: impl Fn(&I) -> Option<&[T]>,
 ) -> Option<Vec<T>> {
     tiles.iter().any(|tile| plane(tile).is_some()).then(|| {
-        let zeros = |tile: &I| vec![T::default(); len(tile)];
-        let of = |tile: &I| plane(tile).map_or_else(|| zeros(tile), <[T]>::to_vec);
-        tiles.iter().flat_map(of).collect()
+        let planes = tiles.iter().map(|tile| plane(tile).map_or_else(|| vec![T::default(); len(tile)], <[T]>::to_vec));
+        planes.flatten().collect()
     })
 }
 
 fn texel_count(tile: &DepthImage) -> usize {
     tile.size_px().element_product() as usize
-}
-
-/// Joins the inputs of highlights.
-fn specular(tiles: &[DepthImage]) -> Result<Option<SpecularPlanes>, TileError> {
-    let specular = tiles.iter().map(|tile| (texel_count(tile), tile.specular.as_ref()));
-    specular_of(specular.collect()).ok_or(TileError::Mixed { plane: "visibility" })
 }
 
 /// Joins the planes of light. No tile has colour beside another's light, and all have shares of the same lamps.
@@ -194,31 +184,32 @@ fn light(tiles: &[DepthImage]) -> Result<Option<LightPlanes>, TileError> {
     if lights.iter().any(|light| light.share8.len() != share_count) {
         return Err(TileError::Mixed { plane: "share" });
     }
-    let concat = |plane: &dyn Fn(&LightPlanes) -> &[u32]| -> Vec<u32> {
-        lights.iter().flat_map(|light| plane(light).iter().copied()).collect()
-    };
     Ok(Some(LightPlanes {
-        triangle_normal_oct16: concat(&|light| &light.triangle_normal_oct16),
-        lamps_rgb9e5: concat(&|light| &light.lamps_rgb9e5),
-        environment_rgb9e5: concat(&|light| &light.environment_rgb9e5),
-        share8: (0..share_count).map(|number| concat(&|light| &light.share8[number])).collect(),
+        triangle_normal_oct16: concat(&lights, |light| &light.triangle_normal_oct16),
+        lamps_rgb9e5: concat(&lights, |light| &light.lamps_rgb9e5),
+        environment_rgb9e5: concat(&lights, |light| &light.environment_rgb9e5),
+        share8: (0..share_count).map(|number| concat(&lights, |light| &light.share8[number])).collect(),
     }))
 }
 
 /// Joins the inputs of highlights of tiles, whose lengths are known. A tile without highlights has no visibility either. `None` for
 /// tiles of different lamps.
-fn specular_of(tiles: Vec<(usize, Option<&SpecularPlanes>)>) -> Option<Option<SpecularPlanes>> {
-    let mut counts = tiles.iter().filter_map(|(_, specular)| Some(specular.as_ref()?.visibility8.len()));
+fn specular<I>(
+    tiles: &[I],
+    len: fn(&I) -> usize,
+    specular: fn(&I) -> Option<&SpecularPlanes>,
+) -> Option<Option<SpecularPlanes>> {
+    let mut counts = tiles.iter().filter_map(specular).map(|specular| specular.visibility8.len());
     let Some(count) = counts.next() else { return Some(None) };
     if counts.any(|other| other != count) {
         return None;
     }
-    let len = |tile: &(usize, Option<&SpecularPlanes>)| tile.0;
-    let reflectance = filled(&tiles, len, |tile| Some(tile.1?.reflectance_srgb8_roughness8.as_slice()));
-    let visibility = |number: usize| filled(&tiles, len, |tile| Some(tile.1?.visibility8[number].as_slice()));
+    let reflectance = filled(tiles, len, |tile| Some(specular(tile)?.reflectance_srgb8_roughness8.as_slice()));
+    let visibilities =
+        (0..count).filter_map(|plane| filled(tiles, len, |tile| Some(specular(tile)?.visibility8[plane].as_slice())));
     Some(Some(SpecularPlanes {
         reflectance_srgb8_roughness8: reflectance.unwrap_or_default(),
-        visibility8: (0..count).filter_map(visibility).collect(),
+        visibility8: visibilities.collect(),
     }))
 }
 

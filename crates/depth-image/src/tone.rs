@@ -160,17 +160,6 @@ impl FromStr for ToneCurve {
     }
 }
 
-impl ToneCurve {
-    /// The shown light of exposed light.
-    #[must_use]
-    pub fn shown_linear(self, exposed_linear: Vec3) -> Vec3 {
-        match self {
-            Self::None => exposed_linear,
-            Self::KhronosNeutral => khronos_neutral(exposed_linear),
-        }
-    }
-}
-
 impl ToneMapping {
     /// Light as it is, cut off at white.
     pub const NONE: Self = Self { exposure: ExposureEv::ZERO, curve: ToneCurve::None };
@@ -178,7 +167,11 @@ impl ToneMapping {
     /// The light that a screen shows, for a pixel's mean colour.
     #[must_use]
     pub fn shown_linear(self, mean_linear: Vec3) -> Vec3 {
-        self.curve.shown_linear(mean_linear * self.exposure.factor())
+        let exposed_linear = mean_linear * self.exposure.factor();
+        match self.curve {
+            ToneCurve::None => exposed_linear,
+            ToneCurve::KhronosNeutral => khronos_neutral(exposed_linear),
+        }
     }
 
     /// The same as sRGB.
@@ -190,8 +183,7 @@ impl ToneMapping {
 
 /// The published function, with the twin in `tone.wgsl`.
 fn khronos_neutral(exposed_linear: Vec3) -> Vec3 {
-    let limited = |v: f32| if v > 0.0 { v.min(BRIGHTEST) } else { 0.0 };
-    let color = Vec3::from(exposed_linear.to_array().map(limited));
+    let color = Vec3::from(exposed_linear.to_array().map(|v| if v > 0.0 { v.min(BRIGHTEST) } else { 0.0 }));
     let least = color.min_element();
     let offset = if least < 2.0 * DIELECTRIC { least - 0.25 / DIELECTRIC * least * least } else { DIELECTRIC };
     let based = color - offset;
@@ -209,7 +201,7 @@ fn khronos_neutral(exposed_linear: Vec3) -> Vec3 {
 mod tests {
     use super::*;
 
-    const NEUTRAL: ToneCurve = ToneCurve::KhronosNeutral;
+    const NEUTRAL: ToneMapping = ToneMapping { exposure: ExposureEv::ZERO, curve: ToneCurve::KhronosNeutral };
 
     #[test]
     fn base_colors_of_dielectrics_stay_as_they_are() {

@@ -78,8 +78,8 @@ impl ViewCell {
         let [x, y, z] = self.half_edges_in_world.map(|half| -> &[f32] {
             if 2.0 * half.length() > shortest_edge_m { &[-1.0, 1.0] } else { &[0.0] }
         });
-        let row = |y: f32, z: f32| x.iter().map(move |&x| Vec3::new(x, y, z));
-        let places = z.iter().flat_map(|&z| y.iter().flat_map(move |&y| row(y, z)));
+        let rows = z.iter().flat_map(|&z| y.iter().map(move |&y| (y, z)));
+        let places = rows.flat_map(|(y, z)| x.iter().map(move |&x| Vec3::new(x, y, z)));
         places.map(|place| self.camera(place, focal_px, size_px)).collect()
     }
 
@@ -129,14 +129,13 @@ impl ViewCell {
     #[must_use]
     pub fn spread(&self, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
         const STEP: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
-        let place = |i: usize| (Vec2::splat(0.5) + STEP * i as f32).fract() * 2.0 - 1.0;
-        (0..count).map(|i| self.camera_at(place(i), size_px)).collect()
+        let places = (0..count).map(|i| (Vec2::splat(0.5) + STEP * i as f32).fract() * 2.0 - 1.0);
+        places.map(|place| self.camera_at(place, size_px)).collect()
     }
 
     /// `columns` × `rows` views over the whole rectangle, row by row from the bottom.
     #[must_use]
     pub fn grid(&self, columns: u32, rows: u32, size_px: UVec2) -> Vec<PinholeCamera> {
-        let step = |i: u32, n: u32| if n < 2 { 0.0 } else { 2.0 * i as f32 / (n - 1) as f32 - 1.0 };
         let places = (0..rows).flat_map(|y| (0..columns).map(move |x| Vec2::new(step(x, columns), step(y, rows))));
         places.map(|place| self.camera_at(place, size_px)).collect()
     }
@@ -144,8 +143,8 @@ impl ViewCell {
     /// `count` views on an ellipse inside the rectangle.
     #[must_use]
     pub fn orbit(&self, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
-        let place = |i: usize| Vec2::from_angle(std::f32::consts::TAU * i as f32 / count as f32) * 0.8;
-        (0..count).map(|i| self.camera_at(place(i), size_px)).collect()
+        let places = (0..count).map(|i| Vec2::from_angle(std::f32::consts::TAU * i as f32 / count as f32) * 0.8);
+        places.map(|place| self.camera_at(place, size_px)).collect()
     }
 
     /// `count` views on a full circle around an upright axis. They have the cell's height and field of view, and are
@@ -153,15 +152,15 @@ impl ViewCell {
     #[must_use]
     pub fn around(&self, axis_in_world: Vec3, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
         let middle = self.camera_at(Vec2::ZERO, size_px);
-        let turned = |i: usize| {
+        let turned = (0..count).map(|i| {
             let turn = Quat::from_rotation_y(std::f32::consts::TAU * i as f32 / count as f32);
             PinholeCamera {
                 eye_in_world: axis_in_world + turn * (middle.eye_in_world - axis_in_world),
                 world_from_camera: (turn * middle.world_from_camera).normalize(),
                 ..middle
             }
-        };
-        (0..count).map(turned).collect()
+        });
+        turned.collect()
     }
 
     fn eye_at(&self, place: Vec3) -> Vec3 {
@@ -195,12 +194,12 @@ impl ViewCell {
         let cell_from_camera = self.turn_at(camera.eye_in_world).conjugate() * camera.world_from_camera;
         let near = -camera.principal_px / camera.focal_px;
         let far = (camera.size_px.as_vec2() - camera.principal_px) / camera.focal_px;
-        let slope = |corner: Vec2| {
+        let corners = [near, far, Vec2::new(near.x, far.y), Vec2::new(far.x, near.y)];
+        let slopes = corners.map(|corner| {
             let direction = cell_from_camera * Vec3::new(corner.x, -corner.y, -1.0);
             direction.truncate().abs() / (-direction.z).max(1e-6)
-        };
-        let corners = [near, far, Vec2::new(near.x, far.y), Vec2::new(far.x, near.y)];
-        corners.into_iter().map(slope).fold(Vec2::ZERO, Vec2::max).min(Vec2::splat(STEEPEST))
+        });
+        slopes.into_iter().fold(Vec2::ZERO, Vec2::max).min(Vec2::splat(STEEPEST))
     }
 }
 
@@ -209,6 +208,11 @@ impl ViewCell {
 #[must_use]
 pub fn nested_places(count: usize) -> &'static [Vec2] {
     if count == 1 { &NESTED[4..5] } else { &NESTED[..count.min(NESTED.len())] }
+}
+
+/// The place of the `i`-th of `n` views along an edge, -1 to 1.
+fn step(i: u32, n: u32) -> f32 {
+    if n < 2 { 0.0 } else { 2.0 * i as f32 / (n - 1) as f32 - 1.0 }
 }
 
 /// Middle and half edges of the box in the cameras' orientation.
@@ -223,8 +227,7 @@ fn extent(cameras: &[PinholeCamera], turn: Quat) -> (Vec3, [Vec3; 3]) {
 
 /// Middle and half edges of four cameras in rows from the bottom left, as rigs list them.
 fn corners(cameras: &[PinholeCamera]) -> Option<(Vec3, [Vec3; 3])> {
-    let [a, b, c, d] =
-        <[&PinholeCamera; 4]>::try_from(cameras.iter().collect::<Vec<_>>()).ok()?.map(|camera| camera.eye_in_world);
+    let [a, b, c, d] = <&[PinholeCamera; 4]>::try_from(cameras).ok()?.each_ref().map(|camera| camera.eye_in_world);
     let right = (b - a) * 0.5;
     let up = (c - a) * 0.5;
     let is_parallelogram = (a + d - b - c).length() <= 1e-3 * (right.length() + up.length());
@@ -267,12 +270,12 @@ fn common_target(cameras: &[PinholeCamera]) -> Option<Vec3> {
     }
     let is_parallel = matrix.determinant() < 1e-4 * (cameras.len() as f32).powi(3);
     let target = (!is_parallel).then(|| matrix.inverse() * right_side)?;
-    let looks_at_it = |camera: &PinholeCamera| {
+    let is_aimed_at = cameras.iter().all(|camera| {
         let to_target = target - camera.eye_in_world;
         let off = to_target.cross(camera.forward_in_world()).length();
         to_target.dot(camera.forward_in_world()) > 0.0 && off <= CONVERGENCE * to_target.length()
-    };
-    cameras.iter().all(looks_at_it).then_some(target)
+    });
+    is_aimed_at.then_some(target)
 }
 
 #[cfg(test)]

@@ -88,10 +88,7 @@ impl ViewGroup {
     }
 
     fn length_with(&self, view: &PinholeCamera, scene: &Aabb) -> f32 {
-        let place = place_of(view);
-        let with =
-            std::array::from_fn(|axis| (self.bounds[axis].0.min(place[axis]), self.bounds[axis].1.max(place[axis])));
-        longest(&with, self.distance_m.min(distance_m(view, scene))).1
+        longest(&extended(self.bounds, place_of(view)), self.distance_m.min(distance_m(view, scene))).1
     }
 }
 
@@ -102,13 +99,12 @@ pub fn nearest_set(
     sets: impl IntoIterator<Item = Vec<PinholeCamera>>,
     scene: &Aabb,
 ) -> Option<usize> {
-    let far = |cameras: Vec<PinholeCamera>| {
+    let distances = sets.into_iter().map(|cameras| {
         let bounds = bounds(&cameras);
         let middle = bounds.map(|(least, most)| ((least + most) * 0.5, (least + most) * 0.5));
         outside(view, &bounds, scene) + OF_MIDDLE * outside(view, &middle, scene)
-    };
-    let far = sets.into_iter().map(far).enumerate();
-    far.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(set, _)| set)
+    });
+    distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map(|(set, _)| set)
 }
 
 /// Halves views that spread too far along their longest axis, until each group is within the limit.
@@ -137,11 +133,11 @@ fn longest(bounds: &Bounds, distance_m: f32) -> (usize, f32) {
 fn outside(view: &PinholeCamera, bounds: &Bounds, scene: &Aabb) -> f32 {
     let place = place_of(view);
     let distance_m = distance_m(view, scene);
-    let off = |axis: usize| {
-        let (least, most) = bounds[axis];
-        (place[axis] - place[axis].max(least).min(most)) / unit(axis, distance_m)
-    };
-    (0..6).map(|axis| off(axis).powi(2)).sum::<f32>().sqrt()
+    let squares = bounds.iter().zip(place).enumerate().map(|(axis, (&(least, most), at))| {
+        let off = (at - at.max(least).min(most)) / unit(axis, distance_m);
+        off.powi(2)
+    });
+    squares.sum::<f32>().sqrt()
 }
 
 fn place_of(view: &PinholeCamera) -> Place {
@@ -151,9 +147,11 @@ fn place_of(view: &PinholeCamera) -> Place {
 }
 
 fn bounds(views: &[PinholeCamera]) -> Bounds {
-    views.iter().map(place_of).fold([(f32::INFINITY, f32::NEG_INFINITY); 6], |bounds, place| {
-        std::array::from_fn(|axis| (bounds[axis].0.min(place[axis]), bounds[axis].1.max(place[axis])))
-    })
+    views.iter().map(place_of).fold([(f32::INFINITY, f32::NEG_INFINITY); 6], extended)
+}
+
+fn extended(bounds: Bounds, place: Place) -> Bounds {
+    std::array::from_fn(|axis| (bounds[axis].0.min(place[axis]), bounds[axis].1.max(place[axis])))
 }
 
 /// Divisor of a coordinate.

@@ -42,10 +42,9 @@ impl ViewPart {
     /// For each pixel of an outer part, row by row, whether it is one of this part.
     pub fn mask_within(&self, outer: &Self) -> impl Iterator<Item = bool> {
         let part = *self;
-        let first_px = outer.first_px;
-        let row = move |y: u32, columns: u32| (0..columns).map(move |x| part.contains(first_px + UVec2::new(x, y)));
-        let columns = outer.size_px.x;
-        (0..outer.size_px.y).flat_map(move |y| row(y, columns))
+        let Self { first_px, size_px } = *outer;
+        let places = (0..size_px.y).flat_map(move |y| (0..size_px.x).map(move |x| UVec2::new(x, y)));
+        places.map(move |place| part.contains(first_px + place))
     }
 
     fn contains(&self, pixel: UVec2) -> bool {

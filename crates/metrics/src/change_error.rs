@@ -11,13 +11,16 @@ pub fn change_error_map(reference: [&Rgb8Image; 2], test: [&Rgb8Image; 2]) -> Re
     for image in [reference[1], test[0], test[1]] {
         reference[0].expect_same_size(image)?;
     }
-    let change =
-        |[from, to]: [&Rgb8Image; 2], index: usize| i32::from(to.srgb8()[index]) - i32::from(from.srgb8()[index]);
-    let off = |index: usize| (change(test, index) - change(reference, index)).abs();
-    let of_pixel = |pixel: usize| (3 * pixel..3 * pixel + 3).map(off).sum::<i32>() as f32 / (3.0 * 255.0);
+    let off: Vec<i32> =
+        changes(test).zip(changes(reference)).map(|(test, reference)| (test - reference).abs()).collect();
+    let pixels = off.as_chunks::<3>().0.iter().map(|channels| channels.iter().sum::<i32>() as f32 / (3.0 * 255.0));
     let (width_px, height_px) = reference[0].size_px();
-    let values = (0..reference[0].pixel_count()).map(of_pixel).collect();
-    Ok(ScoreMap { width_px, height_px, border_px: 0, values })
+    Ok(ScoreMap { width_px, height_px, border_px: 0, values: pixels.collect() })
+}
+
+/// The change of each channel of each pixel.
+fn changes([from, to]: [&Rgb8Image; 2]) -> impl Iterator<Item = i32> {
+    from.srgb8().iter().zip(to.srgb8()).map(|(&from, &to)| i32::from(to) - i32::from(from))
 }
 
 #[cfg(test)]

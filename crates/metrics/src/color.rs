@@ -55,11 +55,10 @@ impl WhiteRelative {
 /// CIE 1976 L*a*b* of XYZ relative to white.
 pub(crate) fn lab_from_relative_xyz(xyz: Vec3) -> Vec3 {
     const DELTA: f32 = 6.0 / 29.0;
-    let curve = |t: f32| match t > DELTA.powi(3) {
+    let [x, y, z] = xyz.to_array().map(|t| match t > DELTA.powi(3) {
         true => t.cbrt(),
         false => t / (3.0 * DELTA * DELTA) + 4.0 / 29.0,
-    };
-    let [x, y, z] = xyz.to_array().map(curve);
+    });
     Vec3::new(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
 }
 

@@ -26,10 +26,7 @@ pub enum MetricsError {
 
 /// Fails unless `len` is what is expected.
 pub(crate) fn expect_len(what: &'static str, len: usize, expected: usize) -> Result<(), MetricsError> {
-    match len == expected {
-        true => Ok(()),
-        false => Err(MetricsError::BufferSize { what, len, expected }),
-    }
+    if len == expected { Ok(()) } else { Err(MetricsError::BufferSize { what, len, expected }) }
 }
 
 /// Fails if there is a mask without one entry a pixel.

@@ -67,10 +67,9 @@ impl<'a> Rgb8Image<'a> {
 
     /// Fails unless `test` has this image's size.
     pub(crate) fn expect_same_size(&self, test: &Rgb8Image) -> Result<(), MetricsError> {
-        match self.size_px() == test.size_px() {
-            true => Ok(()),
-            false => Err(MetricsError::SizesDiffer { reference_px: self.size_px(), test_px: test.size_px() }),
-        }
+        let reference_px = self.size_px();
+        let test_px = test.size_px();
+        if reference_px == test_px { Ok(()) } else { Err(MetricsError::SizesDiffer { reference_px, test_px }) }
     }
 }
 

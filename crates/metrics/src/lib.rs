@@ -31,13 +31,13 @@ mod ssim;
 mod steps;
 
 pub use change_error::change_error_map;
-pub use classes::{PixelClass, class_mask, classify, unheld_rate};
+pub use classes::{PixelClass, classify, unheld_rate};
 pub use depth_error::{DepthErrors, WRONG_HIT_RELATIVE, depth_errors};
 pub use error::MetricsError;
 pub use flip::{FLIP_PIXELS_PER_DEGREE, FLIP_REACH_PX, flip_map, flip_map_at};
 pub use foreground::{PictureErrors, foreground};
 pub use image::Rgb8Image;
-pub use pdiff::{PdiffMap, PdiffPrimaries, PdiffSettings, pdiff_map};
+pub use pdiff::pdiff_map;
 pub use psnr::{PSNR_CAP_DB, psnr_db};
 pub use score_map::ScoreMap;
 pub use ssim::{SSIM_WINDOW_PX, ssim_map};

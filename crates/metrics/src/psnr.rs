@@ -18,15 +18,9 @@ pub fn psnr_db(reference: &Rgb8Image, test: &Rgb8Image, mask: Option<&[bool]>) -
     let selected = pairs.filter(|(index, _)| mask.is_none_or(|mask| mask[*index]));
     let (sum, pixels) = selected
         .fold((0_u64, 0_u64), |(sum, pixels), (_, (a, b))| (sum + u64::from(squared_distance(a, b)), pixels + 1));
-    Ok((pixels > 0).then(|| db_from_mean_squared_error(sum as f64 / (3 * pixels) as f64)))
-}
-
-/// 10 · log10(255² / MSE).
-fn db_from_mean_squared_error(mean_squared_error: f64) -> f64 {
-    match mean_squared_error > 0.0 {
-        true => 10.0 * (255.0 * 255.0 / mean_squared_error).log10(),
-        false => f64::INFINITY,
-    }
+    let mean = sum as f64 / (3 * pixels) as f64;
+    let db = if mean > 0.0 { 10.0 * (255.0 * 255.0 / mean).log10() } else { f64::INFINITY };
+    Ok((pixels > 0).then_some(db))
 }
 
 fn squared_distance(a: [u8; 3], b: [u8; 3]) -> u32 {

@@ -23,17 +23,13 @@ impl ScoreMap {
     /// The mask has another size.
     pub fn mean(&self, mask: Option<&[bool]>) -> Result<Option<f64>, MetricsError> {
         expect_mask(mask, self.values.len())?;
-        let selected = |index: &usize| mask.is_none_or(|mask| mask[*index]);
-        let values = self.valued_pixels().filter(selected).map(|index| f64::from(self.values[index]));
-        let (sum, count) = values.fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
-        Ok((count > 0).then(|| sum / count as f64))
-    }
-
-    /// Indices of the pixels that have a value.
-    fn valued_pixels(&self) -> impl Iterator<Item = usize> + '_ {
         let columns = self.border_px..self.width_px.saturating_sub(self.border_px);
         let rows = self.border_px..self.height_px.saturating_sub(self.border_px);
-        rows.flat_map(move |y| columns.clone().map(move |x| (y * self.width_px + x) as usize))
+        let pixels = rows.flat_map(|y| columns.clone().map(move |x| (y * self.width_px + x) as usize));
+        let selected = pixels.filter(|&index| mask.is_none_or(|mask| mask[index]));
+        let values = selected.map(|index| f64::from(self.values[index]));
+        let (sum, count) = values.fold((0.0, 0_u64), |(sum, count), value| (sum + value, count + 1));
+        Ok((count > 0).then(|| sum / count as f64))
     }
 }
 

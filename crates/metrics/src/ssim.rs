@@ -53,13 +53,15 @@ impl Sums {
         let Self([a, b, aa, bb, ab]) = self;
         let mean_a = a as f64 / SAMPLES;
         let mean_b = b as f64 / SAMPLES;
-        let covariance = |product: i64, x: i64, y: i64| {
-            (SAMPLES * product as f64 - x as f64 * y as f64) / (SAMPLES * (SAMPLES - 1.0))
-        };
         let variances = covariance(aa, a, a) + covariance(bb, b, b);
         let luminance = (2.0 * mean_a * mean_b + C1) / (mean_a * mean_a + mean_b * mean_b + C1);
         luminance * (2.0 * covariance(ab, a, b) + C2) / (variances + C2)
     }
+}
+
+/// The sample covariance of two sums, from that of their products.
+fn covariance(product: i64, x: i64, y: i64) -> f64 {
+    (SAMPLES * product as f64 - x as f64 * y as f64) / (SAMPLES * (SAMPLES - 1.0))
 }
 
 /// One row of the map.

@@ -47,7 +47,7 @@ fn camera() -> PinholeCamera {
 fn image(camera: &SampleCamera) -> SampleImage {
     let size_px = camera.size_px();
     let texels = size_px.element_product() as usize;
-    DepthImage {
+    SampleImage::Depth(DepthImage {
         camera: *camera.depth().expect("a camera of a view"),
         inverse_depth_per_m: vec![0.5; texels],
         color_rgb9e5: vec![0; texels],
@@ -57,8 +57,7 @@ fn image(camera: &SampleCamera) -> SampleImage {
         passed: None,
         corner_inverse_depth_per_m: None,
         light: None,
-    }
-    .into()
+    })
 }
 
 fn views(cameras: &[PinholeCamera]) -> Vec<View> {

@@ -3,7 +3,7 @@
 use depth_image::View;
 use image::{ImageBuffer, Luma, RgbImage};
 
-use crate::legend::Legend;
+use crate::Legend;
 
 /// 16-bit grey.
 pub type Grey16 = ImageBuffer<Luma<u16>, Vec<u16>>;
@@ -19,8 +19,8 @@ pub fn inverse_depth_16(view: &View) -> Option<(Grey16, f32)> {
     let greatest = plane.iter().copied().fold(0.0, f32::max);
     let scale = if greatest > 0.0 { 65_535.0 / greatest } else { 0.0 };
     // A surface is never background, however far away it is.
-    let code = |&inverse: &f32| if inverse > 0.0 { ((inverse * scale + 0.5) as u16).max(1) } else { 0 };
-    let image = Grey16::from_raw(view.size_px.x, view.size_px.y, plane.iter().map(code).collect())?;
+    let codes = plane.iter().map(|&inverse| if inverse > 0.0 { ((inverse * scale + 0.5) as u16).max(1) } else { 0 });
+    let image = Grey16::from_raw(view.size_px.x, view.size_px.y, codes.collect())?;
     Some((image, greatest))
 }
 
@@ -29,17 +29,16 @@ pub fn inverse_depth_16(view: &View) -> Option<(Grey16, f32)> {
 #[must_use]
 pub fn depth(view: &View) -> Option<(RgbImage, Legend)> {
     let plane = view.inverse_depth_per_m.as_ref()?;
-    let surfaces = || plane.iter().copied().filter(|&inverse| inverse > 0.0);
-    let least = surfaces().fold(f32::INFINITY, f32::min);
-    let greatest = surfaces().fold(0.0, f32::max);
+    let surfaces = plane.iter().copied().filter(|&inverse| inverse > 0.0);
+    let least = surfaces.clone().fold(f32::INFINITY, f32::min);
+    let greatest = surfaces.fold(0.0, f32::max);
     let range = (greatest - least).max(f32::MIN_POSITIVE);
     let color = |inverse: f32| colorous::VIRIDIS.eval_continuous(f64::from((inverse - least) / range)).as_array();
-    let pixel = |&inverse: &f32| if inverse > 0.0 { color(inverse) } else { [0; 3] };
-    let image = RgbImage::from_raw(view.size_px.x, view.size_px.y, plane.iter().flat_map(pixel).collect())?;
-    let step = |step: usize| greatest - (greatest - least) * step as f32 / (STEPS - 1) as f32;
-    let named = |inverse: f32| (format!("{:.3}", 1.0 / inverse), color(inverse));
-    let legend = if greatest > 0.0 { (0..STEPS).map(step).map(named).collect() } else { Vec::new() };
-    Some((image, legend))
+    let pixels = plane.iter().flat_map(|&inverse| if inverse > 0.0 { color(inverse) } else { [0; 3] });
+    let image = RgbImage::from_raw(view.size_px.x, view.size_px.y, pixels.collect())?;
+    let steps = (0..STEPS).map(|step| greatest - (greatest - least) * step as f32 / (STEPS - 1) as f32);
+    let legend = steps.map(|inverse| (format!("{:.3}", 1.0 / inverse), color(inverse)));
+    Some((image, if greatest > 0.0 { legend.collect() } else { Vec::new() }))
 }
 
 #[cfg(test)]

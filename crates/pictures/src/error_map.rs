@@ -7,11 +7,11 @@ use metrics::ScoreMap;
 #[must_use]
 pub fn error_map(map: &ScoreMap) -> RgbImage {
     let ScoreMap { width_px, height_px, values, .. } = map;
-    let color = |value: f32| {
+    RgbImage::from_fn(*width_px, *height_px, |x, y| {
+        let value = values[(y * width_px + x) as usize];
         let share = if value.is_nan() { 0.0 } else { f64::from(value.clamp(0.0, 1.0)) };
         Rgb(colorous::MAGMA.eval_continuous(share).as_array())
-    };
-    RgbImage::from_fn(*width_px, *height_px, |x, y| color(values[(y * width_px + x) as usize]))
+    })
 }
 
 #[cfg(test)]

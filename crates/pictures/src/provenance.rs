@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use depth_image::{Provenance, ProvenanceKind, View};
 use image::RgbImage;
 
-use crate::legend::Legend;
+use crate::Legend;
 
 /// Colours of sample cameras; more cameras repeat them.
 const CAMERAS: [[u8; 3]; 8] = [
@@ -75,11 +75,11 @@ pub fn provenance(view: &View, first_camera: usize) -> Option<(RgbImage, Legend)
     let sources: Vec<Source> = view.provenance.as_ref()?.iter().map(Source::of).collect();
     let pixels = sources.iter().flat_map(|source| source.name_and_color().1).collect();
     let image = RgbImage::from_raw(view.size_px.x, view.size_px.y, pixels)?;
-    let named = |source: Source| match (source, source.name_and_color()) {
+    let legend = BTreeSet::from_iter(sources).into_iter().map(|source| match (source, source.name_and_color()) {
         (Source::Sample(camera), (name, color)) => (format!("{name} {}", first_camera + usize::from(camera)), color),
         (_, (name, color)) => (name.to_owned(), color),
-    };
-    Some((image, BTreeSet::from_iter(sources).into_iter().map(named).collect()))
+    });
+    Some((image, legend.collect()))
 }
 
 #[cfg(test)]

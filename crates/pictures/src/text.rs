@@ -84,8 +84,8 @@ impl TextStyle {
 }
 
 fn shape(letter: char) -> [u8; 5] {
-    let of = |letter: char| SHAPES.get((letter as usize).checked_sub(FIRST)?).copied();
-    of(letter).or_else(|| of('?')).unwrap_or_default()
+    let known = if (' '..='~').contains(&letter) { letter } else { '?' };
+    SHAPES[known as usize - FIRST]
 }
 
 #[cfg(test)]

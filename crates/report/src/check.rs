@@ -99,15 +99,7 @@ impl Check {
     /// A check that was not run.
     #[must_use]
     pub fn not_run(name: impl Into<String>, unit: impl Into<String>, bar: Bar, reason: impl Into<String>) -> Self {
-        Self {
-            name: name.into(),
-            value: None,
-            unit: unit.into(),
-            bar,
-            foreground: None,
-            holds: None,
-            reason: Some(reason.into()),
-        }
+        Self { holds: None, reason: Some(reason.into()), ..Self::new(name, f64::NAN, unit, bar) }
     }
 
     /// Compares a value with the bar; without a value, the check was not run for `reason`.
@@ -143,18 +135,6 @@ impl Check {
         self.value
     }
 
-    /// The unit of value and bar; empty for none.
-    #[must_use]
-    pub fn unit(&self) -> &str {
-        &self.unit
-    }
-
-    /// The bar.
-    #[must_use]
-    pub fn bar(&self) -> Bar {
-        self.bar
-    }
-
     /// The reason why the check was not run.
     #[must_use]
     pub fn reason(&self) -> Option<&str> {
@@ -178,12 +158,8 @@ impl Check {
             None if self.holds.is_some() => "not finite".into(),
             None => "–".into(),
         };
-        match self.foreground {
-            Some(foreground) => {
-                format!("foreground {}, whole {value}", with_unit(&format_number(foreground), &self.unit))
-            }
-            None => value,
-        }
+        let Some(foreground) = self.foreground else { return value };
+        format!("foreground {}, whole {value}", with_unit(&format_number(foreground), &self.unit))
     }
 
     /// The bar with the unit.

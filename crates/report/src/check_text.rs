@@ -3,12 +3,11 @@
 use crate::{Check, Outcome};
 
 /// An aligned table of name, value, bar and outcome, then one line of totals.
-#[must_use]
-pub fn checks_text(checks: &[Check]) -> String {
+pub(crate) fn checks_text(checks: &[Check]) -> String {
     let header = ["check", "value", "bar", "outcome"].map(String::from);
     let rows: Vec<[String; 4]> = std::iter::once(header).chain(checks.iter().map(row)).collect();
     let widths: [usize; 4] =
-        std::array::from_fn(|column| rows.iter().map(|row| width(&row[column])).max().unwrap_or(0));
+        std::array::from_fn(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0));
     let lines = rows.iter().map(|row| line(row, widths));
     lines.chain([totals(checks)]).collect::<Vec<_>>().join("\n")
 }
@@ -27,14 +26,9 @@ fn line([name, value, bar, outcome]: &[String; 4], widths: [usize; 4]) -> String
 }
 
 fn totals(checks: &[Check]) -> String {
-    let count = |outcome| checks.iter().filter(|check| check.outcome() == outcome).count();
-    let [holds, short, not_run] = [Outcome::Holds, Outcome::FallsShort, Outcome::NotRun].map(count);
+    let [holds, short, not_run] = [Outcome::Holds, Outcome::FallsShort, Outcome::NotRun]
+        .map(|outcome| checks.iter().filter(|check| check.outcome() == outcome).count());
     format!("{} checks: {holds} hold, {short} fall short, {not_run} not run", checks.len())
-}
-
-/// Width in characters, as `format!` pads them.
-fn width(text: &str) -> usize {
-    text.chars().count()
 }
 
 #[cfg(test)]

@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 
-use crate::table::TableError;
-
 /// A report, chart or picture that cannot be made.
 #[allow(missing_docs, reason = "self-naming fields")]
 #[derive(Debug, thiserror::Error)]
@@ -14,9 +12,12 @@ pub enum ReportError {
     /// Two parts would share a file.
     #[error("two {kind} are named {name:?}, as a file name")]
     DuplicateName { kind: &'static str, name: String },
-    /// A table cannot be written.
-    #[error(transparent)]
-    Table(#[from] TableError),
+    /// A row and the columns of a table differ in number.
+    #[error("row {row} of table {table:?} has {cells} cells, its columns are {columns}")]
+    RowLength { table: String, row: usize, cells: usize, columns: usize },
+    /// The CSV writer failed.
+    #[error("cannot write a table: {0}")]
+    Csv(#[from] csv::Error),
     /// The values of a stage and the bars of its chart differ in number.
     #[error("stage {stage:?} of chart {chart:?} has {values} values, its bars are {bars}")]
     StageLength { chart: String, stage: String, values: usize, bars: usize },

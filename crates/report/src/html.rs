@@ -2,7 +2,7 @@
 
 use minijinja::{Environment, Value, context};
 
-use crate::table::{Cell, Column, Table};
+use crate::table::{Column, Table};
 
 use crate::check::{Check, Outcome};
 use crate::error::ReportError;
@@ -11,7 +11,7 @@ use crate::picture::{Picture, PictureRow};
 use crate::report::Report;
 
 /// Fills in the page. All text of the report is escaped; charts are SVG.
-pub(crate) fn page(report: &Report, charts: Vec<String>) -> Result<String, ReportError> {
+pub(crate) fn page(report: &Report, charts: &[String]) -> Result<String, ReportError> {
     let mut environment = Environment::new();
     // Names that end in .html are escaped.
     environment.add_template("index.html", include_str!("index.html"))?;
@@ -24,7 +24,7 @@ pub(crate) fn page(report: &Report, charts: Vec<String>) -> Result<String, Repor
         parameters => named(report.parameters.iter().map(|(name, value)| (name, value.display()))),
         checks => report.checks.iter().map(check).collect::<Vec<_>>(),
         charts => report.charts.iter().zip(charts).map(|(chart, svg)| context! {
-            svg => Value::from_safe_string(svg),
+            svg => Value::from_safe_string(svg.clone()),
             file => chart_path(chart),
             note => chart.note(),
         }).collect::<Vec<_>>(),
@@ -54,15 +54,15 @@ fn check(check: &Check) -> Value {
 }
 
 fn table(table: &Table) -> Value {
-    let row = |row: &Vec<Cell>| {
+    let rows = table.rows.iter().map(|row| {
         let cells = row.iter().map(|cell| context! { text => cell.display(), numeric => cell.is_numeric() });
         cells.collect::<Vec<_>>()
-    };
+    });
     context! {
         name => table.name.as_str(),
         file => table_path(table),
         columns => table.columns.iter().map(Column::heading).collect::<Vec<_>>(),
-        rows => table.rows.iter().map(row).collect::<Vec<_>>(),
+        rows => rows.collect::<Vec<_>>(),
     }
 }
 

@@ -4,7 +4,7 @@
 //! [`Report::write`] makes files of them, and [`Report::finish`] also prints the checks. Nothing here measures, and
 //! nothing draws on a GPU: data in, files out. The format is described in `docs/report-format.md`.
 //!
-//! Charts share one look: a name has the same colour in all of them ([`Palette`]), axes carry units, and extrapolated
+//! Charts share one look: a name has the same colour in all of them, axes carry units, and extrapolated
 //! parts are dashed.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -17,17 +17,13 @@ mod html;
 mod paths;
 mod picture;
 mod report;
-mod slug;
 mod table;
 mod write;
 
-pub use chart::{
-    Axis, BarChart, Better, Chart, Limit, Mark, Palette, Point, Scale, Series, Stage, XyChart, pareto_front,
-};
+pub use chart::{Axis, BarChart, Better, Chart, Limit, Mark, Point, Scale, Series, Stage, XyChart, pareto_front};
 pub use check::{Bar, Check, Outcome};
-pub use check_text::checks_text;
 pub use error::ReportError;
+pub use paths::slug;
 pub use picture::{Legend, Picture, PictureRow, comparison_row, contact_sheet};
 pub use report::{Report, SCHEMA_VERSION};
-pub use slug::slug;
-pub use table::{Cell, Column, Table, TableError};
+pub use table::{Cell, Column, Table};

@@ -50,17 +50,13 @@ impl FromStr for Impostors {
 
     fn from_str(text: &str) -> Result<Self, UnknownImpostors> {
         let (model, images) = text.split_once(':').map_or((text, None), |(model, images)| (model, Some(images)));
-        let number = |most: u32| {
-            let images = images.map_or(Some(1), |images| images.parse().ok());
-            images.filter(|images| (1..=most).contains(images))
-        };
-        let impostors = match model {
-            "none" => images.is_none().then_some(Self::None),
-            "pinhole" => number(MOST_IMAGES).map(|images| Self::Pinholes { images }),
-            "single_pole" => number(MOST_SINGLE_POLES).map(|images| Self::SinglePoles { images }),
-            _ => None,
-        };
-        impostors.ok_or_else(|| UnknownImpostors { text: text.to_owned() })
+        let count: Option<u32> = images.map_or(Some(1), |images| images.parse().ok());
+        match (model, count) {
+            ("none", _) if images.is_none() => Ok(Self::None),
+            ("pinhole", Some(images @ 1..=MOST_IMAGES)) => Ok(Self::Pinholes { images }),
+            ("single_pole", Some(images @ 1..=MOST_SINGLE_POLES)) => Ok(Self::SinglePoles { images }),
+            _ => Err(UnknownImpostors { text: text.to_owned() }),
+        }
     }
 }
 

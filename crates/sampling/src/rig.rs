@@ -114,8 +114,8 @@ impl Rig {
         let backwards = THREE_QUARTER.normalize_or(Vec3::Z);
         let right = Vec3::Y.cross(backwards).normalize_or(Vec3::X);
         let up = backwards.cross(right);
-        let offsets = |middle: Vec3| points_in_world.clone().map(move |point| point - middle);
-        let seen = Extent::of(offsets(volume.center()), [right, up, backwards], slopes * FRAMED_SHARE);
+        let axes = [right, up, backwards];
+        let seen = Extent::of(points_in_world.clone(), volume.center(), axes, slopes * FRAMED_SHARE);
         let target = volume.center() + right * seen.off_center.x + up * seen.off_center.y;
         let spread = spread_rad.tan();
         let places = [(0.0, 0.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
@@ -125,7 +125,8 @@ impl Rig {
             let length = towards_eye.length();
             let side = up.cross(axis).normalize_or(Vec3::X);
             let share = if x == 0.0 { FRAMED_SHARE } else { CORNER_SHARE };
-            let seen = Extent::of(offsets(target), [side, axis.cross(side), axis], slopes * share);
+            let axes = [side, axis.cross(side), axis];
+            let seen = Extent::of(points_in_world.clone(), target, axes, slopes * share);
             most.max(seen.distance_m.max(seen.nearest_m + LEAST_GAP_RADII * radius_m) / length)
         });
         let half = distance_m * spread;
@@ -157,11 +158,11 @@ impl Rig {
     }
 }
 
-/// What a camera that looks at the origin of some points must do to see all of them.
+/// What a camera that looks at the middle of some points must do to see all of them.
 struct Extent {
-    /// The least distance of the eye from the origin.
+    /// The least distance of the eye from the middle.
     distance_m: f32,
-    /// The point to look at, to the right and above the origin, so that the points are in the middle of the picture.
+    /// The point to look at, to the right and above the middle, so that the points are in the middle of the picture.
     off_center: Vec2,
     /// The greatest offset of a point towards the eye.
     nearest_m: f32,
@@ -169,12 +170,12 @@ struct Extent {
 
 impl Extent {
     /// `axes` lead right, up and towards the eye; `slopes` are the frame's half sides at unit distance. A point at
-    /// (x, y, z) on the axes is inside from a distance of |x| / slope + z, and of |y| / slope + z.
-    fn of(offsets: impl Iterator<Item = Vec3>, [right, up, backwards]: [Vec3; 3], slopes: Vec2) -> Self {
+    /// (x, y, z) on the axes from the middle is inside from a distance of |x| / slope + z, and of |y| / slope + z.
+    fn of(points: impl Iterator<Item = Vec3>, middle: Vec3, [right, up, backwards]: [Vec3; 3], slopes: Vec2) -> Self {
         let mut high = Vec2::MIN;
         let mut low = Vec2::MIN;
         let mut nearest_m = f32::MIN;
-        for offset in offsets {
+        for offset in points.map(|point| point - middle) {
             let across = Vec2::new(right.dot(offset), up.dot(offset)) / slopes;
             let towards_eye_m = backwards.dot(offset);
             high = high.max(across + towards_eye_m);

@@ -12,8 +12,24 @@ use crate::{
     error::SamplingError,
     methods::{SamplingMethod, templates},
     temporal_hysteresis::TemporalHysteresis,
-    work::SampleWork,
 };
+
+/// Images of a set, and how they are taken.
+#[derive(Clone, Copy)]
+pub struct SampleWork<'a> {
+    /// The scene, its moment and its light.
+    pub draw: DrawWork<'a>,
+    /// The cameras of the whole set: a later image depends on those before it.
+    pub cameras: &'a [Camera],
+    /// The images that are taken. Images in sequence are taken all together.
+    pub wanted: &'a [u32],
+    /// The choice of samples.
+    pub method: SamplingMethod,
+    /// Planes beside colour and depth.
+    pub planes: SamplePlanes,
+    /// The moment of the temporal reference, where the method has hysteresis.
+    pub temporal_reference_s: Option<f32>,
+}
 
 /// Takes samples; shares its pipelines with direct rendering.
 pub struct Sampler {
@@ -58,8 +74,10 @@ impl Sampler {
         camera: &ParallelCamera,
         method: SamplingMethod,
     ) -> Result<LayeredDepthImage, SamplingError> {
-        let other = || SamplingError::Cameras { method: method.to_string() };
-        Ok(self.renderer.draw_layers(draw, camera, method.layer_selection().ok_or_else(other)?)?)
+        let Some(kept) = method.layer_selection() else {
+            return Err(SamplingError::Cameras { method: method.to_string() });
+        };
+        Ok(self.renderer.draw_layers(draw, camera, kept)?)
     }
 
     /// The light field of a scene, under a lighting that follows mirrors.
@@ -78,9 +96,9 @@ impl Sampler {
 /// Images in sequence are all wanted, in their order.
 fn check_wanted(work: &SampleWork<'_>) -> Result<(), SamplingError> {
     let cameras = work.cameras.len();
-    let all = || (0..cameras as u32).eq(work.wanted.iter().copied());
     let missing = work.wanted.iter().copied().find(|&index| index as usize >= cameras);
-    let broken = (work.method.images_are_sequential() && !all()).then(|| work.wanted.first().copied().unwrap_or(0));
+    let is_broken = work.method.images_are_sequential() && (0..cameras as u32).ne(work.wanted.iter().copied());
+    let broken = is_broken.then(|| work.wanted.first().copied().unwrap_or(0));
     match missing.or(broken) {
         Some(index) => Err(SamplingError::Selection { index, cameras, method: work.method.to_string() }),
         None => Ok(()),

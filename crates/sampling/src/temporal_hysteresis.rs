@@ -7,7 +7,7 @@ use depth_image::Camera;
 use parking_lot::Mutex;
 use render::{DrawWork, RedundancyTest, RenderError, Renderer, TemporalReference};
 
-use crate::{methods::SamplingMethod, work::SampleWork};
+use crate::{SampleWork, methods::SamplingMethod};
 
 /// The last temporal reference: it serves the sets after it.
 #[derive(Default)]
@@ -29,8 +29,10 @@ impl TemporalHysteresis {
         work: &SampleWork<'_>,
         test: RedundancyTest,
     ) -> Result<Option<TemporalReference>, RenderError> {
-        let moves = |&time_s: &f32| work.method.has_hysteresis() && time_s != work.draw.scene_time_s;
-        let Some(time_s) = work.temporal_reference_s.filter(moves) else { return Ok(None) };
+        let Some(time_s) = work.temporal_reference_s else { return Ok(None) };
+        if !work.method.has_hysteresis() || time_s == work.draw.scene_time_s {
+            return Ok(None);
+        }
         let scene = work.draw.scene.identity;
         let cameras = work.cameras.to_vec();
         let moment = Moment { scene, time_s, cameras, method: work.method };

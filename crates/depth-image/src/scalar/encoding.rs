@@ -2,16 +2,13 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::encoding::wrapped;
+use crate::encoding::unit_from_flat;
 
 /// The inverse of [`crate::oct16_from_unit`]; the result has unit length.
 #[must_use]
 pub fn unit_from_oct16(packed: u32) -> Vec3 {
-    let signed = |bits: u32| (f32::from(bits as u16 as i16) / 32767.0).max(-1.0);
-    let flat = Vec2::new(signed(packed), signed(packed >> 16));
-    let z = 1.0 - flat.x.abs() - flat.y.abs();
-    let xy = if z < 0.0 { wrapped(flat) } else { flat };
-    xy.extend(z).try_normalize().unwrap_or(Vec3::Z)
+    let [x, y] = [packed, packed >> 16].map(|bits| (f32::from(bits as u16 as i16) / 32767.0).max(-1.0));
+    unit_from_flat(Vec2::new(x, y))
 }
 
 #[cfg(test)]

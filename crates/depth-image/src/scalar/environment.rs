@@ -13,8 +13,7 @@ impl EnvironmentMap {
     /// Radiance that arrives from a direction, a unit vector, interpolated between texels.
     #[must_use]
     pub fn radiance_linear(&self, towards_in_world: Vec3) -> Vec3 {
-        let texel = |column, row| self.texel_linear(column, row);
-        bilinear(share_of(towards_in_world), self.size_px().as_ivec2(), texel)
+        bilinear(share_of(towards_in_world), self.size_px().as_ivec2(), |column, row| self.texel_linear(column, row))
     }
 }
 
@@ -31,10 +30,9 @@ impl EnvironmentLight {
     #[must_use]
     pub fn lobe_linear(&self, lobe: Lobe, middle_in_world: Vec3) -> Vec3 {
         let first = lobe.index() * LOBE_SIZE_PX.element_product() as usize;
-        let mean = |column: u32, row: u32| {
+        bilinear(share_of(middle_in_world), LOBE_SIZE_PX.as_ivec2(), |column, row| {
             Vec3::from_slice(&self.lobes[first + (row * LOBE_SIZE_PX.x + column) as usize][..3])
-        };
-        bilinear(share_of(middle_in_world), LOBE_SIZE_PX.as_ivec2(), mean)
+        })
     }
 
     /// The map as a surface of some roughness mirrors it.

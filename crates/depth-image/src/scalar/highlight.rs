@@ -78,9 +78,10 @@ pub fn highlight_linear(
     match kind {
         Highlight::BlinnPhong => lamps,
         Highlight::Ggx => {
-            let environment = &illumination.environment;
-            let gradient = |mirrored: Vec3, roughness| environment.radiance_linear(mirrored * contrast(roughness));
-            lamps + mirror.environment(gradient) * visibility(0)
+            let reflected = mirror.environment(|mirrored, roughness| {
+                illumination.environment.radiance_linear(mirrored * contrast(roughness))
+            });
+            lamps + reflected * visibility(0)
         }
     }
 }

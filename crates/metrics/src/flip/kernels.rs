@@ -27,8 +27,8 @@ impl Sensitivity {
     /// this sensitivity had before.
     pub(super) fn kernel(self, pixels_per_degree: f32) -> (Vec<f32>, f32) {
         let radius = sensitivity_radius_px(pixels_per_degree);
-        let weight = |x: i32| (-PI * PI * (x as f32 / pixels_per_degree).powi(2) / self.b).exp();
-        let weights: Vec<f32> = (-radius..=radius).map(weight).collect();
+        let weights = (-radius..=radius).map(|x| (-PI * PI * (x as f32 / pixels_per_degree).powi(2) / self.b).exp());
+        let weights: Vec<f32> = weights.collect();
         let sum: f32 = weights.iter().sum();
         let volume = self.a * (PI / self.b).sqrt() * sum * sum;
         (weights.iter().map(|weight| weight * sum.recip()).collect(), volume)
@@ -50,27 +50,26 @@ impl FeatureKernels {
         const WIDTH_DEGREES: f32 = 0.082;
         let deviation_px = 0.5 * WIDTH_DEGREES * pixels_per_degree;
         let radius = (3.0 * deviation_px).ceil() as i32;
-        let sampled = |weight: &dyn Fn(f32) -> f32| (-radius..=radius).map(|x| weight(x as f32)).collect::<Vec<f32>>();
-        let gaussian = |x: f32| (-x * x / (2.0 * deviation_px * deviation_px)).exp();
+        let gaussian =
+            (-radius..=radius).map(|x| x as f32).map(|x| (x, (-x * x / (2.0 * deviation_px * deviation_px)).exp()));
         Self {
-            smooth: balanced(&sampled(&gaussian)),
-            edge: balanced(&sampled(&|x| -x * gaussian(x))),
-            point: balanced(&sampled(&|x| ((x / deviation_px).powi(2) - 1.0) * gaussian(x))),
+            smooth: balanced(gaussian.clone().map(|(_, weight)| weight)),
+            edge: balanced(gaussian.clone().map(|(x, weight)| -x * weight)),
+            point: balanced(gaussian.map(|(x, weight)| ((x / deviation_px).powi(2) - 1.0) * weight)),
         }
     }
 }
 
 /// Positive weights scaled to sum to 1, negative ones to -1.
-fn balanced(weights: &[f32]) -> Vec<f32> {
-    let sum = |sign: f32| weights.iter().map(|weight| (sign * weight).max(0.0)).sum::<f32>();
-    let positive = sum(1.0);
-    let negative = sum(-1.0);
-    let balance = |&weight: &f32| match weight {
+fn balanced(weights: impl Iterator<Item = f32> + Clone) -> Vec<f32> {
+    let [positive, negative] =
+        [1.0, -1.0].map(|sign: f32| weights.clone().map(|weight| (sign * weight).max(0.0)).sum::<f32>());
+    let balanced = weights.map(|weight| match weight {
         _ if weight > 0.0 => weight / positive,
         _ if weight < 0.0 => weight / negative,
         _ => 0.0,
-    };
-    weights.iter().map(balance).collect()
+    });
+    balanced.collect()
 }
 
 #[cfg(test)]

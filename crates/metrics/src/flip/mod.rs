@@ -60,16 +60,17 @@ fn color_difference(reference_ycxcz: &[Vec3], test_ycxcz: &[Vec3], width: usize,
     let space = WhiteRelative::new(REC_709);
     let [reference, test] =
         [reference_ycxcz, test_ycxcz].map(|image| perceived(image, width, pixels_per_degree, &space));
-    let greatest = greatest_difference(&space);
+    // Green against blue is the greatest difference that a display can show.
+    let greatest = hyab(hunt_adjusted(&space, Vec3::Y), hunt_adjusted(&space, Vec3::Z)).powf(POWER);
     reference.par_iter().zip(&test).map(|(a, b)| remapped(hyab(*a, *b).powf(POWER), greatest)).collect()
 }
 
 /// Hunt-adjusted L*a*b* of what the eye resolves.
 fn perceived(ycxcz: &[Vec3], width: usize, pixels_per_degree: f32, space: &WhiteRelative) -> Vec<Vec3> {
-    let channel = |of: fn(&Vec3) -> f32| Plane { width, values: ycxcz.iter().map(of).collect() };
-    let y = filtered(&channel(|c| c.x), &[ACHROMATIC], pixels_per_degree);
-    let cx = filtered(&channel(|c| c.y), &[RED_GREEN], pixels_per_degree);
-    let cz = filtered(&channel(|c| c.z), &BLUE_YELLOW, pixels_per_degree);
+    let channels = [0, 1, 2].map(|channel| Plane { width, values: ycxcz.iter().map(|color| color[channel]).collect() });
+    let y = filtered(&channels[0], &[ACHROMATIC], pixels_per_degree);
+    let cx = filtered(&channels[1], &[RED_GREEN], pixels_per_degree);
+    let cz = filtered(&channels[2], &BLUE_YELLOW, pixels_per_degree);
     let pixels = y.par_iter().zip(&cx).zip(&cz).map(|((&y, &cx), &cz)| Vec3::new(y, cx, cz));
     pixels.map(|ycxcz| hunt_adjusted(space, space.linear_from_ycxcz(ycxcz).clamp(Vec3::ZERO, Vec3::ONE))).collect()
 }
@@ -98,25 +99,20 @@ fn hyab(a: Vec3, b: Vec3) -> f32 {
     delta.x.abs() + delta.y.hypot(delta.z)
 }
 
-/// Green against blue: the greatest difference a display can show.
-fn greatest_difference(space: &WhiteRelative) -> f32 {
-    hyab(hunt_adjusted(space, Vec3::Y), hunt_adjusted(space, Vec3::Z)).powf(POWER)
-}
-
 /// To 0…1, most of it for the small differences.
 fn remapped(difference: f32, greatest: f32) -> f32 {
     let knee = KNEE * greatest;
-    match difference < knee {
+    let remapped = match difference < knee {
         true => KNEE_OUTPUT / knee * difference,
         false => KNEE_OUTPUT + (difference - knee) / (greatest - knee) * (1.0 - KNEE_OUTPUT),
-    }
-    .clamp(0.0, 1.0)
+    };
+    remapped.clamp(0.0, 1.0)
 }
 
 /// The feature difference of every pixel, 0 to 1 (§4.2): edges and points that only one image has.
 fn feature_difference(reference_ycxcz: &[Vec3], test_ycxcz: &[Vec3], width: usize, pixels_per_degree: f32) -> Vec<f32> {
     let kernels = FeatureKernels::new(pixels_per_degree);
-    let [reference, test] = [reference_ycxcz, test_ycxcz].map(|image| Features::of(&luminance(image, width), &kernels));
+    let [reference, test] = [reference_ycxcz, test_ycxcz].map(|image| Features::of(image, width, &kernels));
     let edges = reference.edge.par_iter().zip(&test.edge).map(|(a, b)| (a - b).abs());
     let points = reference.point.par_iter().zip(&test.point).map(|(a, b)| (a - b).abs());
     edges.zip(points).map(|(edge, point)| (edge.max(point) / 2.0_f32.sqrt()).sqrt().min(1.0)).collect()
@@ -129,19 +125,16 @@ struct Features {
 }
 
 impl Features {
-    fn of(luminance: &Plane, kernels: &FeatureKernels) -> Self {
-        let strength = |derivative: &[f32]| {
+    fn of(ycxcz: &[Vec3], width: usize, kernels: &FeatureKernels) -> Self {
+        // Y is scaled to 0…1.
+        let luminance = Plane { width, values: ycxcz.iter().map(|color| (color.x + 16.0) / 116.0).collect() };
+        let [edge, point] = [&kernels.edge, &kernels.point].map(|derivative| {
             let along_rows = luminance.convolved(derivative, &kernels.smooth, Edge::Repeat).values;
             let along_columns = luminance.convolved(&kernels.smooth, derivative, Edge::Repeat).values;
             along_rows.par_iter().zip(&along_columns).map(|(x, y)| x.hypot(*y)).collect()
-        };
-        Self { edge: strength(&kernels.edge), point: strength(&kernels.point) }
+        });
+        Self { edge, point }
     }
-}
-
-/// Y of YCxCz, scaled to 0…1.
-fn luminance(ycxcz: &[Vec3], width: usize) -> Plane {
-    Plane { width, values: ycxcz.iter().map(|color| (color.x + 16.0) / 116.0).collect() }
 }
 
 #[cfg(test)]

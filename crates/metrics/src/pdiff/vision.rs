@@ -22,12 +22,11 @@ impl FrequencyBands {
     pub(super) fn new(width_px: u32, field_of_view_deg: f32) -> Self {
         let image_deg = 2.0 * (field_of_view_deg.to_radians() / 2.0).tan().to_degrees();
         let pixels_per_degree = width_px as f32 / image_deg;
-        let cycles_per_degree = std::array::from_fn(|band| 0.5 * pixels_per_degree / (1 << band) as f32);
+        let cycles_per_degree: [f32; BANDS] = std::array::from_fn(|band| 0.5 * pixels_per_degree / (1 << band) as f32);
         let peak = contrast_sensitivity(PEAK_CYCLES_PER_DEGREE, 100.0);
-        let inverse = |cycles: f32| peak / contrast_sensitivity(cycles, 100.0);
         Self {
             cycles_per_degree,
-            inverse_relative_sensitivity: cycles_per_degree.map(inverse),
+            inverse_relative_sensitivity: cycles_per_degree.map(|cycles| peak / contrast_sensitivity(cycles, 100.0)),
             adaptation_level: adaptation_level(image_deg),
         }
     }

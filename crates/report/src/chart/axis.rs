@@ -7,6 +7,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use crate::table::heading;
+
 /// The scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -50,10 +52,7 @@ impl Axis {
 
     /// `label (unit)`.
     pub(super) fn description(&self) -> String {
-        match self.unit.is_empty() {
-            true => self.label.clone(),
-            false => format!("{} ({})", self.label, self.unit),
-        }
+        heading(&self.label, &self.unit)
     }
 
     /// A value's place in axis space; `None` where the axis cannot show it.
@@ -102,10 +101,8 @@ fn padded_linear(least: f64, greatest: f64) -> Range<f64> {
         return least - room..greatest + room;
     }
     let padding = (greatest - least) * PADDING;
-    match least >= 0.0 && least < NEAR_ZERO * greatest {
-        true => 0.0..greatest + padding,
-        false => least - padding..greatest + padding,
-    }
+    let start = if least >= 0.0 && least < NEAR_ZERO * greatest { 0.0 } else { least - padding };
+    start..greatest + padding
 }
 
 fn padded_log(least: f64, greatest: f64) -> Range<f64> {
@@ -119,7 +116,7 @@ fn padded_log(least: f64, greatest: f64) -> Range<f64> {
 fn step(span: f64) -> f64 {
     let rough = span / TICKS;
     let power = 10_f64.powf(rough.log10().floor());
-    let multiples = [1.0, 2.0, 5.0, 10.0].into_iter().map(|multiple| multiple * power);
+    let multiples = [1.0, 2.0, 5.0, 10.0].map(|multiple| multiple * power);
     multiples.into_iter().find(|&step| step >= rough * 0.999).unwrap_or(10.0 * power)
 }
 
@@ -133,16 +130,15 @@ fn linear_ticks(range: &Range<f64>) -> Vec<f64> {
 /// Decades over a wide range; 1, 2, 5 over a middling one; even steps over a narrow one.
 fn log_ticks(range: &Range<f64>) -> Vec<f64> {
     let span = range.end - range.start;
-    let inside = |place: &f64| range.contains(place);
     if span < 0.7 {
         let values = linear_ticks(&(10_f64.powf(range.start)..10_f64.powf(range.end)));
-        return values.into_iter().map(f64::log10).filter(inside).collect();
+        return values.into_iter().map(f64::log10).filter(|place| range.contains(place)).collect();
     }
     let decades = range.start.floor() as i32..=range.end.ceil() as i32;
     let stride = (span / (TICKS + 2.0)).ceil() as usize;
     let multiples: &[f64] = if span < 2.6 { &[1.0, 2.0, 5.0] } else { &[1.0] };
     let ticks = decades.step_by(stride).flat_map(|decade| multiples.iter().map(move |m| f64::from(decade) + m.log10()));
-    ticks.filter(inside).collect()
+    ticks.filter(|place| range.contains(place)).collect()
 }
 
 #[cfg(test)]

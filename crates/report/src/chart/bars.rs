@@ -5,8 +5,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 use serde::{Deserialize, Serialize};
 
-use super::area::{Area, message};
-use super::canvas::{self, Drawing, Glyph, LegendEntry, style_mesh, text_style, text_width_px};
+use super::canvas::{self, Area, Glyph, LegendEntry, message, style_mesh, text_style, text_width_px};
 use super::ruler::Ruler;
 use super::{Axis, Palette};
 use crate::ReportError;
@@ -57,18 +56,16 @@ impl BarChart {
     /// The same chart with one more part in every bar. Values that are not finite or below 0 count as 0.
     #[must_use]
     pub fn with(mut self, name: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
-        let drawable = |value: f64| {
-            if value.is_finite() { value.max(0.0) } else { 0.0 }
-        };
-        self.stages.push(Stage { name: name.into(), values: values.into_iter().map(drawable).collect() });
+        let values = values.into_iter().map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 });
+        self.stages.push(Stage { name: name.into(), values: values.collect() });
         self
     }
 
-    pub(super) fn draw(&self, palette: &Palette) -> Result<Drawing, ReportError> {
+    pub(super) fn draw(&self, palette: &Palette) -> Result<String, ReportError> {
         self.validate()?;
-        let entry =
-            |stage: &Stage| LegendEntry { text: stage.name.clone(), glyph: Glyph::Swatch(palette.color(&stage.name)) };
-        let legend: Vec<LegendEntry> = self.stages.iter().map(entry).collect();
+        let names = self.stages.iter().map(|stage| stage.name.clone());
+        let legend = names.map(|text| LegendEntry { glyph: Glyph::Swatch(palette.color(&text)), text });
+        let legend: Vec<LegendEntry> = legend.collect();
         let height_px = AXIS_HEIGHT_PX + BAR_PITCH_PX * self.bars.len().max(1) as u32;
         canvas::draw(&self.name, &legend, height_px, |area| self.draw_plot(area, palette))
     }
@@ -146,15 +143,14 @@ impl BarChart {
     /// Names stand to the left of the bars, totals to the right.
     fn draw_texts(&self, area: &Area, plot: &Plot) -> Result<(), String> {
         let (left_px, top_px) = area.get_base_pixel();
-        let at = |value: f64, bar: usize, offset_px: i32| {
-            let (x, y) = plot.backend_coord(&(value, self.middle(bar)));
-            (x - left_px + offset_px, y - top_px)
-        };
         for (bar, name) in self.bars.iter().enumerate() {
             let total = self.total(bar);
-            let name = Text::new(cut(name), at(0.0, bar, -8), text_style(HPos::Right, VPos::Center));
-            let total = Text::new(format_number(total), at(total, bar, 6), text_style(HPos::Left, VPos::Center));
-            area.draw(&name).and_then(|()| area.draw(&total)).map_err(message)?;
+            let texts = [(0.0, -8, cut(name), HPos::Right), (total, 6, format_number(total), HPos::Left)];
+            for (value, offset_px, text, anchor) in texts {
+                let (x, y) = plot.backend_coord(&(value, self.middle(bar)));
+                let at = (x - left_px + offset_px, y - top_px);
+                area.draw(&Text::new(text, at, text_style(anchor, VPos::Center))).map_err(message)?;
+            }
         }
         Ok(())
     }
@@ -162,12 +158,8 @@ impl BarChart {
 
 /// A name that fits beside its bar.
 fn cut(name: &str) -> String {
-    let fits = |text: &str| text_width_px(text) <= GREATEST_NAME_PX;
-    if fits(name) {
-        return name.into();
-    }
     let letters: Vec<char> = name.chars().collect();
-    let longest =
-        (0..letters.len()).rev().map(|count| letters[..count].iter().collect::<String>() + "…").find(|text| fits(text));
-    longest.unwrap_or_default()
+    let shorter = (0..letters.len()).rev().map(|count| letters[..count].iter().collect::<String>() + "…");
+    let mut texts = std::iter::once(name.to_owned()).chain(shorter);
+    texts.find(|text| text_width_px(text) <= GREATEST_NAME_PX).unwrap_or_default()
 }

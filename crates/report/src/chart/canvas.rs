@@ -1,14 +1,17 @@
 //! The frame of all charts: a title, a legend above the data, and ink that follows the page.
 
 use plotters::chart::MeshStyle;
+use plotters::coord::Shift;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::area::{Area, message};
 use super::marker::Marker;
 use crate::ReportError;
+
+/// Part of a drawing.
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// Charts are drawn at this width and may be scaled.
 pub(super) const WIDTH_PX: u32 = 700;
@@ -25,28 +28,6 @@ const GLYPH_WIDTH_PX: i32 = 34;
 /// A stand-in for the page's text colour, replaced by `currentColor` at the end.
 pub(super) const INK: RGBColor = RGBColor(1, 2, 3);
 const INK_IN_SVG: &str = "#010203";
-
-/// A finished chart.
-pub(crate) struct Drawing {
-    svg: String,
-}
-
-impl Drawing {
-    /// As part of a page: no paper, the page's ink.
-    pub(crate) fn inline(&self) -> String {
-        self.svg.clone()
-    }
-
-    /// As a file: black on white.
-    pub(crate) fn standalone(&self) -> String {
-        match self.svg.split_once('>') {
-            Some((tag, rest)) => {
-                format!("{tag} color=\"#1b1f24\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>{rest}")
-            }
-            None => self.svg.clone(),
-        }
-    }
-}
 
 /// The glyph of a legend's entry.
 pub(super) enum Glyph {
@@ -66,13 +47,14 @@ pub(super) struct LegendEntry {
     pub(super) glyph: Glyph,
 }
 
-/// Draws title and legend, and the rest by `plot` in an area `plot_height_px` high below them.
+/// Draws title and legend, and the rest by `plot` in an area `plot_height_px` high below them. The SVG has no paper, and the ink of
+/// the page that it is on.
 pub(super) fn draw(
     name: &str,
     legend: &[LegendEntry],
     plot_height_px: u32,
     plot: impl FnOnce(&Area) -> Result<(), String>,
-) -> Result<Drawing, ReportError> {
+) -> Result<String, ReportError> {
     let rows = legend_rows(legend);
     let header_px = TITLE_HEIGHT_PX + LEGEND_ROW_PX * rows.len() as i32 + 4;
     let mut svg = String::new();
@@ -85,7 +67,12 @@ pub(super) fn draw(
         drawn.map_err(|message| ReportError::Draw { chart: name.into(), message })?;
     }
     let described = format!("<svg role=\"img\" aria-label=\"{}\" ", minijinja::HtmlEscape(name));
-    Ok(Drawing { svg: svg.replace(INK_IN_SVG, "currentColor").replacen("<svg ", &described, 1) })
+    Ok(svg.replace(INK_IN_SVG, "currentColor").replacen("<svg ", &described, 1))
+}
+
+/// The text of an error of the chart library, which borrows the drawing.
+pub(super) fn message(error: impl std::error::Error) -> String {
+    error.to_string()
 }
 
 /// Text in the page's ink.

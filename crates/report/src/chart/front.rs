@@ -30,15 +30,14 @@ pub fn pareto_front<'a>(
     points: impl IntoIterator<Item = &'a Point>,
     [x_better, y_better]: [Better; 2],
 ) -> Vec<&'a Point> {
-    let costs = |point: &Point| (x_better.cost(point.x), y_better.cost(point.y));
     let mut sorted: Vec<&Point> = points.into_iter().collect();
     sorted.sort_by(|a, b| {
-        let ((ax, ay), (bx, by)) = (costs(a), costs(b));
-        ax.total_cmp(&bx).then(ay.total_cmp(&by))
+        let by_x = x_better.cost(a.x).total_cmp(&x_better.cost(b.x));
+        by_x.then(y_better.cost(a.y).total_cmp(&y_better.cost(b.y)))
     });
     let mut least = f64::INFINITY;
     sorted.retain(|point| {
-        let (_, y) = costs(point);
+        let y = y_better.cost(point.y);
         let is_better = y < least;
         least = least.min(y);
         is_better

@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::area::{Area, message};
+use super::canvas::{Area, message};
 
 /// Half a marker's size in pixels.
 const RADIUS_PX: i32 = 4;

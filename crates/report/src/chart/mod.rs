@@ -1,6 +1,5 @@
 //! Charts: their data, and their drawing as SVG.
 
-mod area;
 mod axis;
 mod bars;
 mod canvas;
@@ -16,9 +15,8 @@ use serde::{Deserialize, Serialize};
 use crate::ReportError;
 pub use axis::{Axis, Scale};
 pub use bars::{BarChart, Stage};
-pub(crate) use canvas::Drawing;
 pub use front::{Better, pareto_front};
-pub use palette::Palette;
+pub(crate) use palette::Palette;
 pub use series::{Limit, Mark, Point, Series};
 pub use xy::XyChart;
 
@@ -52,23 +50,15 @@ impl Chart {
     }
 
     /// The names that have colours in the chart.
-    #[must_use]
-    pub fn series_names(&self) -> Vec<&str> {
+    pub(crate) fn series_names(&self) -> Vec<&str> {
         match self {
             Self::Xy(chart) => chart.series.iter().map(|series| series.name.as_str()).collect(),
             Self::Bars(chart) => chart.stages.iter().map(|stage| stage.name.as_str()).collect(),
         }
     }
 
-    /// The chart as a file of its own, in the palette's colours.
-    ///
-    /// # Errors
-    /// Stages and bars do not fit together.
-    pub fn to_svg(&self, palette: &Palette) -> Result<String, ReportError> {
-        Ok(self.draw(palette)?.standalone())
-    }
-
-    pub(crate) fn draw(&self, palette: &Palette) -> Result<Drawing, ReportError> {
+    /// The chart as SVG, in the palette's colours.
+    pub(crate) fn draw(&self, palette: &Palette) -> Result<String, ReportError> {
         match self {
             Self::Xy(chart) => chart.draw(palette),
             Self::Bars(chart) => chart.draw(palette),

@@ -27,13 +27,12 @@ const BASELINE: (&str, RGBColor) = ("direct", RGBColor(133, 141, 150));
 /// A name prefers a colour by its own letters, so that other reports have it, too. Where two names prefer one colour,
 /// the later name takes the next free one.
 #[derive(Debug, Clone, Default)]
-pub struct Palette {
+pub(crate) struct Palette {
     slots: HashMap<String, usize>,
 }
 
 impl Palette {
     /// Colours for names in order of their first appearance.
-    #[must_use]
     pub fn for_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
         let mut palette = Self::default();
         for name in names {
@@ -54,10 +53,7 @@ impl Palette {
 
     /// The colour of a name, known or not.
     pub(super) fn color(&self, name: &str) -> RGBColor {
-        match name == BASELINE.0 {
-            true => BASELINE.1,
-            false => COLORS[self.slot(name)],
-        }
+        if name == BASELINE.0 { BASELINE.1 } else { COLORS[self.slot(name)] }
     }
 
     /// A number that selects the marker's shape.

@@ -7,8 +7,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 use serde::{Deserialize, Serialize};
 
-use super::area::{Area, message};
-use super::canvas::{self, Drawing, Glyph, INK, LegendEntry, WIDTH_PX, style_mesh, text_style, text_width_px};
+use super::canvas::{self, Area, Glyph, INK, LegendEntry, WIDTH_PX, message, style_mesh, text_style, text_width_px};
 use super::marker::Marker;
 use super::ruler::Ruler;
 use super::{Axis, Better, Limit, Mark, Palette, Point, Series, pareto_front};
@@ -68,7 +67,7 @@ impl XyChart {
         self
     }
 
-    pub(super) fn draw(&self, palette: &Palette) -> Result<Drawing, ReportError> {
+    pub(super) fn draw(&self, palette: &Palette) -> Result<String, ReportError> {
         canvas::draw(&self.name, &self.legend(palette), PLOT_HEIGHT_PX, |area| self.draw_plot(area, palette))
     }
 
@@ -89,10 +88,11 @@ impl XyChart {
 
     /// Both axes' ranges, in axis space.
     fn ranges(&self) -> (Range<f64>, Range<f64>) {
-        let points =
-            || self.series.iter().flat_map(|series| &series.points).filter(|point| self.place(point).is_some());
+        let points = self.series.iter().flat_map(|series| &series.points);
+        let points = points.filter(|point| self.place(point).is_some());
         let limits = self.limits.iter().map(|limit| limit.y);
-        (self.x.range(points().map(|point| point.x)), self.y.range(points().map(|point| point.y).chain(limits)))
+        let x_range = self.x.range(points.clone().map(|point| point.x));
+        (x_range, self.y.range(points.map(|point| point.y).chain(limits)))
     }
 
     /// A point in axis space; `None` where an axis cannot show it.
@@ -122,9 +122,7 @@ impl XyChart {
     }
 
     fn draw_limit(&self, plot: &mut Plot, limit: &Limit, x: &Range<f64>) -> Result<(), String> {
-        let Some(y) = self.y.place(limit.y) else {
-            return Ok(());
-        };
+        let Some(y) = self.y.place(limit.y) else { return Ok(()) };
         let style = INK.mix(0.55).stroke_width(1);
         draw_path(plot, vec![(x.start, y), (x.end, y)], style, true)?;
         let text = EmptyElement::at((x.end, y))
@@ -133,9 +131,7 @@ impl XyChart {
     }
 
     fn draw_front(&self, plot: &mut Plot) -> Result<(), String> {
-        let Some(better) = self.front else {
-            return Ok(());
-        };
+        let Some(better) = self.front else { return Ok(()) };
         let all =
             self.series.iter().flat_map(|series| series.points.iter().enumerate().map(move |point| (series, point)));
         let measured = all.filter(|(series, (index, _))| !series.is_extrapolated(*index)).map(|(_, (_, point))| point);
@@ -149,12 +145,11 @@ impl XyChart {
             series.points.iter().enumerate().filter_map(|(index, point)| Some((index, self.place(point)?))).collect();
         let style = palette.color(&series.name).stroke_width(2);
         if series.mark == Mark::Line {
-            let part = |keep: &dyn Fn(usize) -> bool| {
-                places.iter().filter(|(index, _)| keep(*index)).map(|&(_, place)| place).collect()
-            };
-            draw_path(plot, part(&|index| !series.is_extrapolated(index)), style, false)?;
+            let measured = places.iter().filter(|(index, _)| !series.is_extrapolated(*index));
+            draw_path(plot, measured.map(|(_, place)| *place).collect(), style, false)?;
             // The line starts at the last measured point, so that it does not break.
-            draw_path(plot, part(&|index| series.is_extrapolated(index + 1)), style, true)?;
+            let extrapolated = places.iter().filter(|(index, _)| series.is_extrapolated(index + 1));
+            draw_path(plot, extrapolated.map(|(_, place)| *place).collect(), style, true)?;
         }
         let pixels = plot.plotting_area().strip_coord_spec();
         let (left_px, top_px) = pixels.get_base_pixel();
@@ -187,19 +182,18 @@ fn marker(series: &Series, palette: &Palette, filled: bool) -> Marker {
 
 /// Legend entries: one for measured points, one for extrapolated ones.
 fn legend_entries(series: &Series, palette: &Palette) -> Vec<LegendEntry> {
-    let is_line = series.mark == Mark::Line;
-    let entry = |text: String, filled: bool| {
+    let measured = (series.extrapolated_from != Some(0)).then(|| (series.name.clone(), true));
+    let extrapolated = series.extrapolated_from.map(|_| (format!("{}, extrapolated", series.name), false));
+    let entries = measured.into_iter().chain(extrapolated).map(|(text, filled)| {
         let marker = marker(series, palette, filled);
-        let glyph = match (is_line, filled) {
-            (false, _) => Glyph::Point(marker),
-            (true, true) => Glyph::Line(marker),
-            (true, false) => Glyph::Dashes(marker),
+        let glyph = match (series.mark, filled) {
+            (Mark::Points, _) => Glyph::Point(marker),
+            (Mark::Line, true) => Glyph::Line(marker),
+            (Mark::Line, false) => Glyph::Dashes(marker),
         };
         LegendEntry { text, glyph }
-    };
-    let measured = (series.extrapolated_from != Some(0)).then(|| entry(series.name.clone(), true));
-    let extrapolated = series.extrapolated_from.map(|_| entry(format!("{}, extrapolated", series.name), false));
-    measured.into_iter().chain(extrapolated).collect()
+    });
+    entries.collect()
 }
 
 fn draw_path(plot: &mut Plot, points: Vec<(f64, f64)>, style: ShapeStyle, dashed: bool) -> Result<(), String> {

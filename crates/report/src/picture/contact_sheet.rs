@@ -14,10 +14,11 @@ pub fn contact_sheet(images: &[RgbImage], columns: u32, gap_px: u32) -> RgbImage
     let rows = count.div_ceil(columns);
     let cell_width = images.iter().map(RgbImage::width).max().unwrap_or(0);
     let cell_height = images.iter().map(RgbImage::height).max().unwrap_or(0);
-    let side = |cells: u32, cell: u32| {
-        if count == 0 { 0 } else { gap_px + cells * (cell + gap_px) }
+    let [width, height] = match count {
+        0 => [0, 0],
+        _ => [gap_px + columns * (cell_width + gap_px), gap_px + rows * (cell_height + gap_px)],
     };
-    let mut sheet = RgbImage::from_pixel(side(columns, cell_width), side(rows, cell_height), GAP_COLOR);
+    let mut sheet = RgbImage::from_pixel(width, height, GAP_COLOR);
     for (index, image) in (0..count).zip(images) {
         let x = gap_px + index % columns * (cell_width + gap_px);
         let y = gap_px + index / columns * (cell_height + gap_px);

@@ -51,12 +51,16 @@ pub fn comparison_row(
     flip: &ScoreMap,
     provenance: Option<(RgbImage, Legend)>,
 ) -> PictureRow {
-    let picture = |what: &str, image| Picture::new(format!("{title} {what}"), what, image);
-    let mut pictures = vec![
-        picture("direct", direct),
-        picture("reconstructed", reconstructed),
-        picture("error map (FLIP, 0 to 1)", error_map(flip)),
+    let [direct, reconstructed, errors] = [direct, reconstructed, error_map(flip)].map(|image| (image, Legend::new()));
+    let images = [
+        ("direct", Some(direct)),
+        ("reconstructed", Some(reconstructed)),
+        ("error map (FLIP, 0 to 1)", Some(errors)),
+        ("provenance", provenance),
     ];
-    pictures.extend(provenance.map(|(image, legend)| Picture { legend, ..picture("provenance", image) }));
-    PictureRow { title: title.into(), pictures }
+    let pictures = images.into_iter().filter_map(|(what, image)| {
+        let (image, legend) = image?;
+        Some(Picture { legend, ..Picture::new(format!("{title} {what}"), what, image) })
+    });
+    PictureRow { title: title.into(), pictures: pictures.collect() }
 }

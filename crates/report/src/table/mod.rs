@@ -1,9 +1,9 @@
 //! Tables of measured values: columns with units, rows of cells, written as text, CSV or Markdown.
 
 mod cell;
-mod number;
 mod rows;
 
 pub use cell::Cell;
-pub(crate) use number::format_number;
-pub use rows::{Column, Table, TableError};
+pub(crate) use cell::format_number;
+pub(crate) use rows::heading;
+pub use rows::{Column, Table};

@@ -3,18 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::cell::Cell;
-
-/// A table that cannot be made or written.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "self-naming fields")]
-pub enum TableError {
-    /// A row and the columns differ in number.
-    #[error("row {row} of table {table:?} has {cells} cells, its columns are {columns}")]
-    RowLength { table: String, row: usize, cells: usize, columns: usize },
-    /// The CSV writer failed.
-    #[error("cannot write a table: {0}")]
-    Csv(#[from] csv::Error),
-}
+use crate::ReportError;
 
 /// A column.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,11 +18,13 @@ impl Column {
     /// `name (unit)`.
     #[must_use]
     pub fn heading(&self) -> String {
-        match self.unit.is_empty() {
-            true => self.name.clone(),
-            false => format!("{} ({})", self.name, self.unit),
-        }
+        heading(&self.name, &self.unit)
     }
+}
+
+/// `name (unit)`, or the name alone where there is no unit.
+pub(crate) fn heading(name: &str, unit: &str) -> String {
+    if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") }
 }
 
 /// A table, written as `{slug(name)}.csv`.
@@ -51,25 +42,25 @@ impl Table {
     /// An empty table of `(heading, unit)` columns.
     #[must_use]
     pub fn new(name: impl Into<String>, columns: &[(&str, &str)]) -> Self {
-        let column = |&(name, unit): &(&str, &str)| Column { name: name.into(), unit: unit.into() };
-        Self { name: name.into(), columns: columns.iter().map(column).collect(), rows: Vec::new() }
+        let columns = columns.iter().map(|&(name, unit)| Column { name: name.into(), unit: unit.into() });
+        Self { name: name.into(), columns: columns.collect(), rows: Vec::new() }
     }
 
     /// Adds a row.
     ///
     /// # Errors
     /// Cells and columns differ in number.
-    pub fn push(&mut self, row: impl IntoIterator<Item = Cell>) -> Result<(), TableError> {
+    pub fn push(&mut self, row: impl IntoIterator<Item = Cell>) -> Result<(), ReportError> {
         self.rows.push(row.into_iter().collect());
         self.validate()
     }
 
     /// Checks that every row has one cell a column.
-    pub fn validate(&self) -> Result<(), TableError> {
+    pub fn validate(&self) -> Result<(), ReportError> {
         let columns = self.columns.len();
         match self.rows.iter().enumerate().find(|(_, row)| row.len() != columns) {
             Some((row, cells)) => {
-                Err(TableError::RowLength { table: self.name.clone(), row, cells: cells.len(), columns })
+                Err(ReportError::RowLength { table: self.name.clone(), row, cells: cells.len(), columns })
             }
             None => Ok(()),
         }
@@ -79,7 +70,7 @@ impl Table {
     ///
     /// # Errors
     /// Cells and columns differ in number.
-    pub fn to_csv(&self) -> Result<Vec<u8>, TableError> {
+    pub fn to_csv(&self) -> Result<Vec<u8>, ReportError> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(self.columns.iter().map(Column::heading))?;
         for row in &self.rows {
@@ -93,30 +84,33 @@ impl Table {
     pub fn to_text(&self) -> String {
         let heads: Vec<String> = self.columns.iter().map(Column::heading).collect();
         let rows: Vec<Vec<String>> = self.rows.iter().map(|row| row.iter().map(Cell::display).collect()).collect();
-        let width =
-            |column: usize| rows.iter().chain([&heads]).map(|row| row[column].chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..heads.len()).map(width).collect();
-        let is_number = |cell: &Cell| cell.is_numeric() || *cell == Cell::Missing;
-        let line = |row: &Vec<String>| {
-            let cell = |(column, text): (usize, &String)| match self.rows.iter().all(|row| is_number(&row[column])) {
-                true => format!("{text:>0$}", widths[column]),
-                false => format!("{text:<0$}", widths[column]),
-            };
-            row.iter().enumerate().map(cell).collect::<Vec<_>>().join("  ").trim_end().to_owned()
-        };
-        let lines = [&heads].into_iter().chain(&rows).map(line);
+        let columns = (0..heads.len()).map(|column| {
+            let width = rows.iter().chain([&heads]).map(|row| row[column].chars().count()).max().unwrap_or(0);
+            let is_number = self.rows.iter().all(|row| row[column].is_numeric() || row[column] == Cell::Missing);
+            (width, is_number)
+        });
+        let columns: Vec<(usize, bool)> = columns.collect();
+        let lines = [&heads].into_iter().chain(&rows).map(|row| {
+            let cells = row.iter().zip(&columns).map(|(text, &(width, is_number))| {
+                if is_number { format!("{text:>width$}") } else { format!("{text:<width$}") }
+            });
+            cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+        });
         format!("{}\n{}", self.name, lines.collect::<Vec<_>>().join("\n"))
     }
 
     /// The table as Markdown, with numbers as in [`Cell::display`].
     #[must_use]
     pub fn to_markdown(&self) -> String {
-        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
-        let heads = line(self.columns.iter().map(Column::heading).collect());
+        let heads = markdown_row(self.columns.iter().map(Column::heading));
         let rule = format!("|{}\n", "---|".repeat(self.columns.len()));
-        let rows: String = self.rows.iter().map(|row| line(row.iter().map(Cell::display).collect())).collect();
+        let rows: String = self.rows.iter().map(|row| markdown_row(row.iter().map(Cell::display))).collect();
         format!("**{}**\n\n{heads}{rule}{rows}", self.name)
     }
+}
+
+fn markdown_row(cells: impl Iterator<Item = String>) -> String {
+    format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
 }
 
 #[cfg(test)]
@@ -142,7 +136,7 @@ mod tests {
     #[test]
     fn a_row_with_too_few_cells_is_refused() {
         let mut table = Table::new("costs", &[("what", ""), ("time", "ms")]);
-        assert!(matches!(table.push([1_u32.into()]), Err(TableError::RowLength { cells: 1, columns: 2, .. })));
+        assert!(matches!(table.push([1_u32.into()]), Err(ReportError::RowLength { cells: 1, columns: 2, .. })));
     }
 
     #[test]

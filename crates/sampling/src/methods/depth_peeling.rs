@@ -29,16 +29,14 @@ pub(super) fn parse_layers(text: &str) -> Option<u32> {
 /// One camera in the middle of a rig, for each layer; it looks as the rig's cameras do together.
 pub(super) fn cameras(rig: &[PinholeCamera], layers: usize) -> Vec<PinholeCamera> {
     let Some(first) = rig.first() else { return Vec::new() };
-    let mean = |of: fn(&PinholeCamera) -> Vec3| rig.iter().map(of).sum::<Vec3>() / rig.len() as f32;
-    let backwards = mean(|camera| camera.world_from_camera * Vec3::Z).normalize_or(first.world_from_camera * Vec3::Z);
+    let count = rig.len() as f32;
+    let eyes: Vec3 = rig.iter().map(|camera| camera.eye_in_world).sum();
+    let backwards: Vec3 = rig.iter().map(|camera| camera.world_from_camera * Vec3::Z).sum();
+    let backwards = (backwards / count).normalize_or(first.world_from_camera * Vec3::Z);
     let up = first.world_from_camera * Vec3::Y;
     let right = up.cross(backwards).normalize_or(first.world_from_camera * Vec3::X);
     let axes = Mat3::from_cols(right, backwards.cross(right), backwards);
-    let middle = PinholeCamera {
-        eye_in_world: mean(|camera| camera.eye_in_world),
-        world_from_camera: Quat::from_mat3(&axes),
-        ..*first
-    };
+    let middle = PinholeCamera { eye_in_world: eyes / count, world_from_camera: Quat::from_mat3(&axes), ..*first };
     vec![middle; layers]
 }
 

@@ -127,19 +127,13 @@ impl SamplingMethod {
     /// The number of images of a set, where it is part of the method.
     #[must_use]
     pub fn own_image_count(self) -> Option<u32> {
-        match self {
-            DepthPeeling { layers } => Some(layers),
-            Conventional(_) | NonRedundant(_) | Useful(_) | Cube(_) => None,
-        }
+        if let DepthPeeling { layers } = self { Some(layers) } else { None }
     }
 
     /// The method for sets of `count` images.
     #[must_use]
     pub fn with_images(self, count: u32) -> Self {
-        match self {
-            DepthPeeling { .. } => DepthPeeling { layers: count },
-            Conventional(_) | NonRedundant(_) | Useful(_) | Cube(_) => self,
-        }
+        if let DepthPeeling { .. } = self { DepthPeeling { layers: count } } else { self }
     }
 
     /// The cube of a scene within these bounds; `None` where images are those of cameras.
@@ -147,39 +141,26 @@ impl SamplingMethod {
     /// # Errors
     /// Bounds that are empty or not finite.
     pub fn cube(self, bounds: &Aabb) -> Result<Option<CubeGrid>, CameraError> {
-        match self {
-            Cube(cube) => CubeGrid::around(bounds, cube.side).map(Some),
-            Conventional(_) | NonRedundant(_) | Useful(_) | DepthPeeling { .. } => Ok(None),
-        }
+        if let Cube(cube) = self { CubeGrid::around(bounds, cube.side).map(Some) } else { Ok(None) }
     }
 
     /// The lines of a light field of a scene within these bounds; `None` without one.
     #[must_use]
     pub fn light_field(self, bounds: &Aabb) -> Option<LightFieldCamera> {
-        match self {
-            Cube(LayeredCube { light_field: Some(LightFieldSize { directions, side_px }), .. }) => {
-                Some(LightFieldCamera::around(*bounds, directions, side_px))
-            }
-            Cube(_) | Conventional(_) | NonRedundant(_) | Useful(_) | DepthPeeling { .. } => None,
-        }
+        let Cube(cube) = self else { return None };
+        cube.light_field.map(|field| LightFieldCamera::around(*bounds, field.directions, field.side_px))
     }
 
     /// The surfaces that images of all surfaces keep; `None` where images have the first ones alone.
     #[must_use]
     pub fn layer_selection(self) -> Option<LayerSelection> {
-        match self {
-            Cube(cube) => Some(cube.kept),
-            Conventional(_) | NonRedundant(_) | Useful(_) | DepthPeeling { .. } => None,
-        }
+        if let Cube(cube) = self { Some(cube.kept) } else { None }
     }
 
     /// The cameras that images are taken with, for a rig of these cameras. Those of a cube follow from the scene.
     #[must_use]
     pub fn cameras(self, rig: Vec<PinholeCamera>) -> Vec<PinholeCamera> {
-        match self {
-            DepthPeeling { layers } => depth_peeling::cameras(&rig, layers as usize),
-            Conventional(_) | NonRedundant(_) | Useful(_) | Cube(_) => rig,
-        }
+        if let DepthPeeling { layers } = self { depth_peeling::cameras(&rig, layers as usize) } else { rig }
     }
 
     /// Checks that the method can take images with these cameras.
@@ -197,10 +178,7 @@ impl SamplingMethod {
     /// The positions around a texel's centre whose colours count.
     #[must_use]
     pub fn antialias(self) -> Antialias {
-        match self {
-            Conventional(antialias) => antialias,
-            NonRedundant(_) | Useful(_) | DepthPeeling { .. } | Cube(_) => Antialias::NONE,
-        }
+        if let Conventional(antialias) = self { antialias } else { Antialias::NONE }
     }
 
     /// Whether samples may hold light in place of colour: those of one position a texel, in depth images of several places.
@@ -239,10 +217,7 @@ impl SamplingMethod {
     /// Whether samples of a moving scene are held against a temporal reference.
     #[must_use]
     pub fn has_hysteresis(self) -> bool {
-        match self {
-            Conventional(_) | DepthPeeling { .. } | Cube(_) => false,
-            NonRedundant(redundancy) | Useful(redundancy) => redundancy == Redundancy::Tolerance,
-        }
+        matches!(self, NonRedundant(Redundancy::Tolerance) | Useful(Redundancy::Tolerance))
     }
 
     /// The setting as users spell it.

@@ -47,18 +47,17 @@ pub(super) fn surfaces(scene: &Scene, is_wanted: &[bool], bounds_of_instances: &
         if parts.peek().is_none() {
             continue;
         }
-        let sways = || scene.wind.is_some() && mesh.vertices.iter().any(|vertex| vertex.sway > 0.0);
-        if moving.contains(&number) || sways() {
+        if moving.contains(&number) || (scene.wind.is_some() && mesh.vertices.iter().any(|vertex| vertex.sway > 0.0)) {
             surfaces.push(Surface::Moving(*bounds));
             continue;
         }
-        let corner = |index: &u32| {
-            instance.world_from_mesh.transform_point3(Vec3::from(mesh.vertices[*index as usize].position))
-        };
         for part in parts {
             let indices = &mesh.indices[part.first_index as usize..][..part.index_count as usize];
-            let triangles = indices.as_chunks::<3>().0.iter();
-            surfaces.extend(triangles.map(|triangle| Surface::Triangle(triangle.each_ref().map(corner))));
+            for triangle in indices.as_chunks::<3>().0 {
+                let corners = triangle.map(|index| Vec3::from(mesh.vertices[index as usize].position));
+                let corners = corners.map(|corner| instance.world_from_mesh.transform_point3(corner));
+                surfaces.push(Surface::Triangle(corners));
+            }
         }
     }
     surfaces

@@ -42,20 +42,19 @@ pub fn mirrors(scene: &Scene, impostors: Impostors) -> (Vec<Mirror>, usize) {
         Impostors::SinglePoles { .. } => single_poles::objects(scene, &is_mirror, &bounds_of_instances),
         Impostors::None | Impostors::Pinholes { .. } => Vec::new(),
     };
-    let mirror = |group: &Group| Mirror {
+    let mirrors = groups.iter().map(|group| Mirror {
         bounds: group.bounds.padded(group.bounds.size().length() * MARGIN),
         cameras: cameras(group, &volume, &objects, impostors),
-    };
-    (groups.iter().map(mirror).collect(), beyond)
+    });
+    (mirrors.collect(), beyond)
 }
 
 fn cameras(group: &Group, volume: &Aabb, objects: &[Aabb], impostors: Impostors) -> Vec<Camera> {
-    let pinholes = |images: u32| pinholes::around(group, volume, images as usize);
     match impostors {
         Impostors::None => Vec::new(),
-        Impostors::Pinholes { images } => pinholes(images),
+        Impostors::Pinholes { images } => pinholes::around(group, volume, images),
         Impostors::SinglePoles { images } => {
-            single_poles::around(group, objects, images).unwrap_or_else(|| pinholes(images))
+            single_poles::around(group, objects, images).unwrap_or_else(|| pinholes::around(group, volume, images))
         }
     }
 }
@@ -68,12 +67,12 @@ fn mirrors_scene(scene: &Scene, material: &Material) -> bool {
 /// The least green of texels that are spread over a texture.
 fn least_roughness(texture: &Texture) -> f32 {
     let [columns, rows] = [texture.width_px, texture.height_px].map(|side| side.clamp(1, TEXELS));
-    let texel = |at: u32| {
+    let greens = (0..columns * rows).map(|at| {
         let x = (at % columns) * texture.width_px / columns;
         let y = (at / columns) * texture.height_px / rows;
         texture.srgba8.get(4 * (y * texture.width_px + x) as usize + 1).copied().unwrap_or(u8::MAX)
-    };
-    f32::from((0..columns * rows).map(texel).min().unwrap_or(u8::MAX)) / 255.0
+    });
+    f32::from(greens.min().unwrap_or(u8::MAX)) / 255.0
 }
 
 #[cfg(test)]

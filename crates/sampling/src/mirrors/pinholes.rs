@@ -19,12 +19,12 @@ const FACE_DEG: f32 = 94.0;
 const WIDE_DEG: f32 = 110.0;
 
 /// A number of images, from within a mirror or, of a flat one, from its plane. One alone stands in its middle.
-pub(super) fn around(group: &Group, scene_bounds: &Aabb, images: usize) -> Vec<Camera> {
+pub(super) fn around(group: &Group, scene_bounds: &Aabb, images: u32) -> Vec<Camera> {
     let facing = group.area_normal_m2 / (group.area_m2 as f32).max(f32::MIN_POSITIVE);
     let is_flat = facing.length() > FLAT;
     let near_m = scene_bounds.near_m();
     let all = if is_flat { of_flat(group, facing, near_m) } else { of_round(group, scene_bounds.center(), near_m) };
-    all.into_iter().skip(usize::from(images > 1)).take(images).map(Camera::Pinhole).collect()
+    all.into_iter().skip(usize::from(images > 1)).take(images as usize).map(Camera::Pinhole).collect()
 }
 
 /// From the middle and from four places around it off the mirror, then from the middle along it.
@@ -35,12 +35,12 @@ fn of_flat(group: &Group, facing: Vec3, near_m: f32) -> Vec<PinholeCamera> {
     let right = facing.any_orthonormal_vector();
     // From the middle to the border of the mirror, which lies in its own plane however it is turned.
     let [right, up] = [right, facing.cross(right)].map(|axis| axis * half.dot(axis.abs()));
-    let corner = |x: f32, y: f32| middle + (right * x + up * y) * ASIDE_OF_FLAT;
-    let eyes = [middle, corner(-1.0, -1.0), corner(1.0, 1.0), corner(1.0, -1.0), corner(-1.0, 1.0)];
-    let off = eyes.map(|eye| looking(eye, facing, WIDE_DEG, near_m));
+    let corners = [(-1.0, -1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0)];
+    let aside = corners.map(|(x, y)| middle + (right * x + up * y) * ASIDE_OF_FLAT);
+    let off = std::iter::once(middle).chain(aside).map(|eye| looking(eye, facing, WIDE_DEG, near_m));
     let along = [right, -right, up, -up].map(|along| along.normalize_or(facing));
     let along = along.map(|along| looking(middle, along, FACE_DEG, near_m));
-    off.into_iter().chain(along).collect()
+    off.chain(along).collect()
 }
 
 /// Towards the middle of the scene from the mirror's middle and from two opposite sides, then from the middle in all directions: what

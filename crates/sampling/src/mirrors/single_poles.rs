@@ -27,18 +27,20 @@ pub(super) fn objects(scene: &Scene, is_mirror: &[bool], bounds_of_instances: &[
 /// One image from a mirror's middle, or two from both sides of it. `None` where no object lies before the mirror.
 pub(super) fn around(group: &Group, objects: &[Aabb], images: u32) -> Option<Vec<Camera>> {
     let middle = group.bounds.center();
-    let lies_before = |object: &&Aabb| {
+    let before = objects.iter().filter(|object| {
         let axis = object.center() - middle;
         object.corners().iter().all(|corner| (corner - middle).dot(axis) > LEAST_DEPTH * axis.length_squared())
-    };
-    let apparent_size = |object: &Aabb| object.size().length_squared() / object.center().distance_squared(middle);
-    let before = objects.iter().filter(lies_before);
-    let object = before.max_by(|a, b| apparent_size(a).total_cmp(&apparent_size(b)))?;
+    });
+    let object = before.max_by(|a, b| apparent_size(a, middle).total_cmp(&apparent_size(b, middle)))?;
     let towards = (object.center() - middle).normalize_or(Vec3::Z);
     let right = towards.cross(Vec3::Y).try_normalize().unwrap_or(Vec3::X);
     let aside = right * (ASIDE * 0.5 * group.bounds.size().min_element());
     let eyes = if images == 1 { vec![middle] } else { vec![middle - aside, middle + aside] };
     let distortion_px = DISTORTION * 0.5 * SIDE_PX as f32;
-    let camera = |eye: Vec3| SinglePoleCamera::around(object, eye, distortion_px, UVec2::splat(SIDE_PX));
-    Some(eyes.into_iter().map(camera).map(Camera::SinglePole).collect())
+    let cameras = eyes.iter().map(|&eye| SinglePoleCamera::around(object, eye, distortion_px, UVec2::splat(SIDE_PX)));
+    Some(cameras.map(Camera::SinglePole).collect())
+}
+
+fn apparent_size(object: &Aabb, eye: Vec3) -> f32 {
+    object.size().length_squared() / object.center().distance_squared(eye)
 }

@@ -36,7 +36,7 @@ pub(super) fn is_tolerance_redundant(candidate: &Candidate, was_kept: bool, allo
     let room_m = allowed * (DEPTH_FOOTPRINTS * depth_m / camera.focal_px.min_element()).max(SLOPE_PX * slope);
     let first = (pixel - 0.5).floor().as_ivec2();
     let last = camera.size_px.as_ivec2() - 1;
-    let stands_for_it = |(x, y): (i32, i32)| {
+    let mut stand_for_it = [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().map(|(x, y)| {
         let texel = (first + glam::IVec2::new(x, y)).clamp(glam::IVec2::ZERO, last).as_uvec2();
         let index = index_of(camera, texel);
         let inverse_depth = image.inverse_depth_per_m[index];
@@ -45,7 +45,6 @@ pub(super) fn is_tolerance_redundant(candidate: &Candidate, was_kept: bool, allo
             && (inverse_depth.recip() - depth_m).abs() < room_m
             && normal.dot(candidate.normal) > least_facing
             && footprint_m(camera, texel, inverse_depth, normal) <= allowed * COARSER * candidate.footprint_m
-    };
-    let four = [(0, 0), (1, 0), (0, 1), (1, 1)];
-    if was_kept { four.into_iter().all(stands_for_it) } else { four.into_iter().any(stands_for_it) }
+    });
+    if was_kept { stand_for_it.all(|stands| stands) } else { stand_for_it.any(|stands| stands) }
 }
