@@ -71,8 +71,9 @@ impl ComputePass {
             }
             match size {
                 DispatchSize::Invocations(invocations) => {
-                    let axis = |axis: usize| invocations[axis].div_ceil(interface.workgroup_size[axis]);
-                    pass.dispatch_workgroups(axis(0), axis(1), axis(2));
+                    let size = interface.workgroup_size;
+                    let [x, y, z] = std::array::from_fn(|axis| invocations[axis].div_ceil(size[axis]));
+                    pass.dispatch_workgroups(x, y, z);
                 }
                 DispatchSize::Indirect(arguments, first) => {
                     pass.dispatch_workgroups_indirect(arguments, 16 * u64::from(first + number));

@@ -96,11 +96,10 @@ impl ShaderInterface {
     /// # Errors
     /// WGSL that cannot be parsed, or a trait of a resource that is not declared.
     pub fn of(shader: &str, wgsl: &str, traits: ResourceTraits) -> Result<Self, ShaderError> {
-        let invalid = |message: String| ShaderError::Invalid { shader: shader.to_owned(), message };
         let mut options = Options::new();
         options.capabilities = Capabilities::all();
         let module = Frontend::new_with_options(options).parse(wgsl);
-        let module = module.map_err(|error| invalid(error.emit_to_string_with_path(wgsl, shader)))?;
+        let module = module.map_err(|error| invalid(shader, error.emit_to_string_with_path(wgsl, shader)))?;
         let mut interface = Self {
             shader: shader.to_owned(),
             groups: Vec::new(),
@@ -112,11 +111,12 @@ impl ShaderInterface {
         for (_, variable) in module.global_variables.iter() {
             let Some(place) = variable.binding else { continue };
             let name = variable.name.clone().unwrap_or_default();
-            let has = |wanted| traits.contains(&(name.as_str(), wanted));
-            let ty = binding_type(&module, variable, &has)
-                .ok_or_else(|| invalid(format!("{name} has a type that is not supported")))?;
+            let has_dynamic_offset = traits.contains(&(name.as_str(), ResourceTrait::DynamicOffset));
+            let is_filterable = traits.contains(&(name.as_str(), ResourceTrait::Filterable));
+            let ty = binding_type(&module, variable, has_dynamic_offset, is_filterable)
+                .ok_or_else(|| invalid(shader, format!("{name} has a type that is not supported")))?;
             let bytes = module.types[variable.ty].inner.try_size(module.to_ctx());
-            let element_bytes = bytes.filter(|_| has(ResourceTrait::DynamicOffset));
+            let element_bytes = bytes.filter(|_| has_dynamic_offset);
             let groups = interface.groups.len().max(place.group as usize + 1);
             interface.groups.resize(groups, Vec::new());
             // Vertices write nothing.
@@ -124,9 +124,9 @@ impl ShaderInterface {
             let layout = wgpu::BindGroupLayoutEntry { binding: place.binding, visibility, ty, count: None };
             interface.groups[place.group as usize].push(Resource { name, layout, element_bytes });
         }
-        let declared = |name: &str| interface.groups.iter().flatten().any(|resource| resource.name == name);
-        match traits.iter().find(|(name, _)| !declared(name)) {
-            Some((name, _)) => Err(invalid(format!("{name} has a trait but is not declared"))),
+        let mut names = traits.iter().map(|(name, _)| name);
+        match names.find(|name| !interface.groups.iter().flatten().any(|resource| resource.name == **name)) {
+            Some(name) => Err(invalid(shader, format!("{name} has a trait but is not declared"))),
             None => Ok(interface),
         }
     }
@@ -172,6 +172,10 @@ impl ShaderInterface {
     }
 }
 
+fn invalid(shader: &str, message: String) -> ShaderError {
+    ShaderError::Invalid { shader: shader.to_owned(), message }
+}
+
 fn stage(stage: ShaderStage) -> ShaderStages {
     match stage {
         ShaderStage::Vertex => ShaderStages::VERTEX,
@@ -188,24 +192,23 @@ fn is_written(ty: BindingType) -> bool {
 fn binding_type(
     module: &Module,
     variable: &GlobalVariable,
-    has: &impl Fn(ResourceTrait) -> bool,
+    has_dynamic_offset: bool,
+    is_filterable: bool,
 ) -> Option<BindingType> {
-    let has_dynamic_offset = has(ResourceTrait::DynamicOffset);
-    let buffer = |ty| Some(BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None });
-    match (variable.space, &module.types[variable.ty].inner) {
-        (AddressSpace::Uniform, _) => buffer(BufferBindingType::Uniform),
+    let ty = match (variable.space, &module.types[variable.ty].inner) {
+        (AddressSpace::Uniform, _) => BufferBindingType::Uniform,
         (AddressSpace::Storage { access }, _) => {
-            buffer(BufferBindingType::Storage { read_only: !access.contains(StorageAccess::STORE) })
+            BufferBindingType::Storage { read_only: !access.contains(StorageAccess::STORE) }
         }
         (AddressSpace::Handle, &TypeInner::Image { dim, arrayed, class }) => {
-            image_type(dim, arrayed, class, has(ResourceTrait::Filterable))
+            return image_type(dim, arrayed, class, is_filterable);
         }
-        (AddressSpace::Handle, TypeInner::Sampler { comparison }) => {
-            let ty = if *comparison { SamplerBindingType::Comparison } else { SamplerBindingType::Filtering };
-            Some(BindingType::Sampler(ty))
+        (AddressSpace::Handle, TypeInner::Sampler { comparison: false }) => {
+            return Some(BindingType::Sampler(SamplerBindingType::Filtering));
         }
-        _ => None,
-    }
+        _ => return None,
+    };
+    Some(BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None })
 }
 
 fn image_type(dim: ImageDimension, arrayed: bool, class: ImageClass, filterable: bool) -> Option<BindingType> {
@@ -213,20 +216,17 @@ fn image_type(dim: ImageDimension, arrayed: bool, class: ImageClass, filterable:
         return None;
     }
     let view_dimension = if arrayed { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
-    let texture = |sample_type, multisampled| Some(BindingType::Texture { sample_type, view_dimension, multisampled });
-    match class {
-        ImageClass::Sampled { kind: ScalarKind::Float, multi } => {
-            texture(wgpu::TextureSampleType::Float { filterable }, multi)
+    let sample_type = match class {
+        ImageClass::Sampled { kind: ScalarKind::Float, multi: false } => wgpu::TextureSampleType::Float { filterable },
+        ImageClass::Sampled { kind: ScalarKind::Uint, multi: false } => wgpu::TextureSampleType::Uint,
+        ImageClass::Depth { multi: false } => wgpu::TextureSampleType::Depth,
+        ImageClass::Storage { format, access: StorageAccess::STORE } => {
+            let access = wgpu::StorageTextureAccess::WriteOnly;
+            return Some(BindingType::StorageTexture { access, format: texture_format(format)?, view_dimension });
         }
-        ImageClass::Sampled { kind: ScalarKind::Uint, multi } => texture(wgpu::TextureSampleType::Uint, multi),
-        ImageClass::Depth { multi } => texture(wgpu::TextureSampleType::Depth, multi),
-        ImageClass::Storage { format, access } if access == StorageAccess::STORE => Some(BindingType::StorageTexture {
-            access: wgpu::StorageTextureAccess::WriteOnly,
-            format: texture_format(format)?,
-            view_dimension,
-        }),
-        _ => None,
-    }
+        _ => return None,
+    };
+    Some(BindingType::Texture { sample_type, view_dimension, multisampled: false })
 }
 
 fn texture_format(format: StorageFormat) -> Option<TextureFormat> {

@@ -107,8 +107,8 @@ impl Templates {
     /// # Errors
     /// When the template uses what the context lacks.
     pub fn render(&self, name: &str, context: Value) -> Result<String, ShaderError> {
-        let render = || self.environment.get_template(name)?.render(context);
-        let text = render().map_err(|source| ShaderError::Template { name: name.to_owned(), source })?;
+        let text = self.environment.get_template(name).and_then(|template| template.render(context));
+        let text = text.map_err(|source| ShaderError::Template { name: name.to_owned(), source })?;
         let named = self.declared.iter().filter(|(name, _)| text.contains(name));
         // At the end: directives come first.
         let declarations = named.map(|(name, literal)| format!("\nconst {name} = {literal};"));

@@ -3,6 +3,7 @@
 //! and with resources of the same form. The driver keeps what it compiled on disk, where the device of the queue finds it.
 
 use std::collections::HashMap;
+use std::error::Error;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Once};
 
@@ -13,7 +14,7 @@ use super::bound_group::{BoundGroup, Form};
 use super::compiled::Shader;
 use super::interface::Resource;
 use crate::device::{DevicePreference, Gpu};
-use crate::error::{GpuError, ShaderError};
+use crate::error::GpuError;
 
 /// The forms that a pass remembers; all are forgotten when there are more.
 const MOST_FORMS: usize = 1024;
@@ -102,14 +103,6 @@ impl FirstUses {
     }
 }
 
-#[derive(Debug, thiserror::Error)]
-enum WarmingError {
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-    #[error(transparent)]
-    Shader(#[from] ShaderError),
-}
-
 /// Has the second device use a shader with resources of these forms, where the device compiles at the first use and others
 /// would wait for it.
 pub(super) fn warm(
@@ -123,13 +116,13 @@ pub(super) fn warm(
     }
     // One shader is compiled at a time: on one core.
     let mut count = gpu.compiled_outside.lock();
-    let done = Gpu::open(DevicePreference::Software).map_err(WarmingError::from).and_then(|second| {
+    let done = Gpu::open(DevicePreference::Software).map_err(Box::<dyn Error>::from).and_then(|second| {
         second.catching(|| {
             let twin = shader.on(&second)?;
             let groups =
                 groups.iter().zip(0..).map(|(bound, number)| empty_group(&second, &twin, number, &bound.forms));
             let groups: Vec<BoundGroup> = groups.collect();
-            Ok::<_, WarmingError>(use_it(&second, twin, &groups)?)
+            Ok(use_it(&second, twin, &groups)?)
         })
     });
     // With the second device closed, the driver has written what it compiled.
