@@ -4,7 +4,6 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use depth_image::View;
-use image::ImageReader;
 use metrics::{PictureErrors, Rgb8Image};
 use report::{Cell, Table};
 
@@ -28,11 +27,13 @@ const COLUMNS: [(&str, &str); 7] = [
 pub fn table(mut rows: Vec<(usize, Row)>) -> anyhow::Result<Table> {
     let mut table = Table::new("Against views drawn directly", &COLUMNS);
     rows.sort_by_key(|(number, _)| *number);
-    let of = |column: usize| rows.iter().map(move |(_, row)| row[column]);
-    let means = [0, 1, 2, 3, 4, 5].map(|column| of(column).sum::<f64>() / rows.len() as f64);
-    let least = |column| of(column).fold(f64::INFINITY, f64::min);
-    let most = |column| of(column).fold(f64::NEG_INFINITY, f64::max);
-    let worst = [least(0), least(1), most(2), least(3), least(4), most(5)];
+    let columns: [Vec<f64>; 6] = std::array::from_fn(|column| rows.iter().map(|(_, row)| row[column]).collect());
+    let means = columns.each_ref().map(|numbers| numbers.iter().sum::<f64>() / rows.len() as f64);
+    let worst = std::array::from_fn(|column| match column {
+        // FLIP is an error, and the others are likenesses.
+        2 | 5 => columns[column].iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        _ => columns[column].iter().copied().fold(f64::INFINITY, f64::min),
+    });
     let views = rows.iter().map(|(number, row)| (Cell::from(*number), *row));
     for (name, numbers) in views.chain([("mean".into(), means), ("worst".into(), worst)]) {
         table.push([name].into_iter().chain(numbers.map(Cell::from)))?;
@@ -45,11 +46,8 @@ pub fn table(mut rows: Vec<(usize, Row)>) -> anyhow::Result<Table> {
 /// # Errors
 /// The picture cannot be read, or has another size.
 pub fn row(truth: &View, written: &Path) -> anyhow::Result<Row> {
-    let read = || anyhow::Ok(ImageReader::open(written)?.decode()?.into_rgb8());
-    let picture = read().with_context(|| format!("cannot read {}", written.display()))?;
+    let picture = image::open(written).with_context(|| format!("cannot read {}", written.display()))?.into_rgb8();
     let test = Rgb8Image::new(picture.width(), picture.height(), picture.as_raw().as_slice())?;
     let [foreground, whole] = PictureErrors::of(truth, &test)?;
-    let three = |PictureErrors { psnr_db, ssim, flip }| [psnr_db, ssim, flip];
-    let [[a, b, c], [d, e, f]] = [three(foreground), three(whole)];
-    Ok([a, b, c, d, e, f])
+    Ok([foreground.psnr_db, foreground.ssim, foreground.flip, whole.psnr_db, whole.ssim, whole.flip])
 }

@@ -79,8 +79,12 @@ fn text(status: &ClusterStatus) -> anyhow::Result<String> {
     for workload in &status.workloads {
         parts.push(workload_text(workload, &status.nodes)?);
     }
-    let is_idle = |node: &&NodeStatus| !status.workloads.iter().any(|workload| condition(workload, node).is_some());
-    let idle: Vec<String> = status.nodes.iter().filter(is_idle).map(|node| node.node_name.clone()).collect();
+    let mut idle = Vec::new();
+    for node in &status.nodes {
+        if !status.workloads.iter().any(|workload| condition(workload, node).is_some()) {
+            idle.push(node.node_name.as_str());
+        }
+    }
     if !idle.is_empty() {
         parts.push(format!("Nodes without a workload: {}.", idle.join(", ")));
     }

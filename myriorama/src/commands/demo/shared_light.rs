@@ -65,12 +65,12 @@ impl LightResult {
         let direct_views = affordable.clamp(*DIRECT_VIEWS.start(), *DIRECT_VIEWS.end()).min(count);
         let step = count / direct_views;
         let timed_cameras: Vec<PinholeCamera> = cameras.iter().copied().step_by(step).take(direct_views).collect();
-        let draw = || deliver(experiment, PolicyChoice::Direct, lighting, &timed_cameras);
-        let (direct, direct_pictures) = draw()?;
+        let (direct, direct_pictures) = deliver(experiment, PolicyChoice::Direct, lighting, &timed_cameras)?;
         // The first delivery also compiles shaders. Those of reconstruction are compiled when its costs are measured.
         let mut direct_s = direct.seconds;
         for _ in 1..DIRECT_REPEATS {
-            direct_s = direct_s.min(draw()?.0.seconds);
+            let (repeated, _) = deliver(experiment, PolicyChoice::Direct, lighting, &timed_cameras)?;
+            direct_s = direct_s.min(repeated.seconds);
         }
         let pairs = direct_pictures.into_iter().zip(views.iter().step_by(step));
         let compared = pairs.map(|(direct, reconstructed)| ComparedView::new(direct, reconstructed.clone()));
@@ -243,11 +243,10 @@ fn total_time(results: &[LightResult]) -> XyChart {
 }
 
 fn all_views(result: &LightResult) -> PictureRow {
-    let halved = |view: &View| {
-        let image = pictures::rgb(view)?;
-        Some(imageops::thumbnail(&image, (image.width() / 2).max(1), (image.height() / 2).max(1)))
-    };
-    let images: Vec<_> = result.views.iter().filter_map(halved).collect();
+    let images = result.views.iter().filter_map(pictures::rgb);
+    let halved =
+        images.map(|image| imageops::thumbnail(&image, (image.width() / 2).max(1), (image.height() / 2).max(1)));
+    let images: Vec<_> = halved.collect();
     let name = format!("contact sheet, {}", result.lighting);
     let caption = format!("{} delivered views, {}, at half their size", images.len(), result.lighting);
     let sheet = contact_sheet(&images, SHEET_COLUMNS, 2);

@@ -7,7 +7,6 @@ use app_core::camera_record::{self, NamedCamera};
 use app_core::planning::Planning;
 use app_core::print_line;
 use app_core::setup::Setup;
-use depth_image::Camera;
 use planner::{Budget, CHOICE_OF_BUDGETS, Choice, Metric, Outcome, Price, RowSummary};
 use probe::Representation;
 use report::{Cell, Table};
@@ -55,18 +54,18 @@ impl Output<'_> {
 
     /// All rows and direct drawing, the cheapest first.
     fn lines(&self, rows: &[RowSummary], direct: Price) -> Vec<Line> {
-        let line = |(place, (row, summary)): (usize, (&planner::Row, &RowSummary))| {
+        let mut lines = Vec::with_capacity(rows.len() + 1);
+        for (place, (row, summary)) in self.planning.ladder.rows().iter().zip(rows).enumerate() {
             let is_chosen = self.outcome.choice == Choice::Row(place);
-            Line {
+            lines.push(Line {
                 name: row.to_string(),
                 state: if is_chosen { "chosen".to_owned() } else { summary.status.to_string() },
                 error_ratio: summary.error_ratio,
                 price: summary.price,
                 is_measured: summary.is_measured,
                 views: summary.screening_views,
-            }
-        };
-        let mut lines: Vec<Line> = self.planning.ladder.rows().iter().zip(rows).enumerate().map(line).collect();
+            });
+        }
         let is_chosen = self.outcome.choice == Choice::Direct;
         lines.push(Line {
             name: "direct".to_owned(),
@@ -112,12 +111,11 @@ impl Output<'_> {
     }
 
     fn write_cameras(&self, path: &Path, chosen: &Representation) -> anyhow::Result<()> {
-        let named = |(index, camera): (usize, &Camera)| NamedCamera {
+        let cameras = chosen.sample_cameras.iter().enumerate().map(|(index, camera)| NamedCamera {
             file_path: format!("sample_{index:04}.png"),
             camera: *camera.reference(),
             more: Map::new(),
-        };
-        let cameras = chosen.sample_cameras.iter().enumerate().map(named);
+        });
         Ok(camera_record::write(path, cameras, self.setup.offer.source_space, Map::new())?)
     }
 }
