@@ -8,7 +8,7 @@ use tokio_util::sync::CancellationToken;
 
 use crate::config::GatewayConfig;
 use crate::scenes::Scenes;
-use crate::single_views::SingleViews;
+use crate::single_views;
 
 /// Pages that wait for a place.
 const MAX_WAITING: usize = 64;
@@ -22,7 +22,8 @@ pub(crate) struct Gateway {
     pub(crate) shutdown: CancellationToken,
     /// Places of all pages, those that wait included.
     pub(crate) pages: Arc<Semaphore>,
-    pub(crate) single_views: SingleViews,
+    /// Places of views over HTTP.
+    pub(crate) single_views: Arc<Semaphore>,
     /// The place of a view that is compared.
     pub(crate) comparison: Semaphore,
     last_visitor: AtomicU64,
@@ -34,7 +35,7 @@ impl Gateway {
             scenes: Scenes::new(config.clone()),
             visitors: Semaphore::new(config.max_visitors),
             pages: Arc::new(Semaphore::new(config.max_visitors + MAX_WAITING)),
-            single_views: SingleViews::default(),
+            single_views: Arc::new(Semaphore::new(single_views::PLACES)),
             comparison: Semaphore::new(1),
             last_visitor: AtomicU64::default(),
             config,

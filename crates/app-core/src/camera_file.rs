@@ -238,7 +238,8 @@ impl Frame<'_> {
         let axes = DMat3::from_cols(x, y, z);
         let offs = (axes.transpose() * axes - DMat3::IDENTITY).to_cols_array();
         let off = offs.into_iter().fold(0.0f64, |most, v| most.max(v.abs()));
-        if off > RIGID_TOLERANCE || axes.determinant() < 0.0 || !is_last_row(rows[3]) {
+        let is_last_row = (DVec4::from_array(rows[3]) - DVec4::W).abs().max_element() <= RIGID_TOLERANCE;
+        if off > RIGID_TOLERANCE || axes.determinant() < 0.0 || !is_last_row {
             let value = format!("no rotation (determinant {:.4}, axes off by {off:.4})", axes.determinant());
             let allowed = "rigid: a rotation, a translation and the row 0 0 0 1";
             return Err(self.out_of_range(MATRIX, value, allowed));
@@ -275,10 +276,6 @@ fn matrix_rows(value: &Value) -> Option<Vec<Vec<Value>>> {
         return Some(given.chunks(4).map(<[Value]>::to_vec).collect());
     }
     given.iter().map(|row| row.as_array().cloned()).collect()
-}
-
-fn is_last_row(row: [f64; 4]) -> bool {
-    (DVec4::from_array(row) - DVec4::W).abs().max_element() <= RIGID_TOLERANCE
 }
 
 fn finite(value: &Value) -> Result<f64, CameraFault> {

@@ -1,5 +1,7 @@
 //! The representations among which budgets choose, from the methods that are known.
 
+use std::mem::discriminant;
+
 use planner::Row;
 use reconstruction::ReconstructionMethod;
 use sampling::SamplingMethod;
@@ -42,19 +44,14 @@ pub fn rows(args: &SceneArgs, cameras: u32) -> Vec<Row> {
                     place_count: if is_of_layers { 1 } else { camera_count },
                     side_ratio,
                     kind: format!("{} {}", without_setting(sampling), without_setting(&method.to_string())),
-                    rank: rank(&methods, place),
+                    // The place of a setting among those of its method.
+                    rank: methods[..place].iter().filter(|other| discriminant(*other) == discriminant(method)).count()
+                        as u32,
                 }));
             }
         }
     }
     rows
-}
-
-/// The place of a setting among those of its method.
-fn rank(methods: &[ReconstructionMethod], place: usize) -> u32 {
-    let is_same =
-        |other: &&ReconstructionMethod| std::mem::discriminant(*other) == std::mem::discriminant(&methods[place]);
-    methods[..place].iter().filter(is_same).count() as u32
 }
 
 fn without_setting(method: &str) -> &str {

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser as _};
+use clap::{Args, Command, FromArgMatches as _};
 use cluster::{CommonCell, CommonKind, OfferSettings, PolicyChoice, SceneHash};
 use coordinator::{OfferedCube, OfferedMirror, SceneOffer};
 use depth_image::{Camera, CubeGrid, PinholeCamera};
@@ -165,22 +165,9 @@ impl SceneArgs {
     /// A scene with all other arguments by default.
     #[must_use]
     pub fn new(scene: SceneSpec) -> Self {
-        Self {
-            scene,
-            missing_textures: MissingTextures::default(),
-            ignore_required: Vec::new(),
-            clip: None,
-            up: UpAxis::default(),
-            lighting: Lighting::default(),
-            lights: Vec::new(),
-            environment: None,
-            method: None,
-            sampling: None,
-            sample_size: SampleSize::default(),
-            base: None,
-            impostors: Impostors::default(),
-            samples: None,
-        }
+        let given = Self::augment_args(Command::new("scene")).try_get_matches_from(["scene"]);
+        let defaults = given.and_then(|given| Self::from_arg_matches(&given)).expect("no argument is required");
+        Self { scene, ..defaults }
     }
 
     /// The reconstruction method; without one, the first that the samples suit.

@@ -74,7 +74,6 @@ impl FromStr for SizePx {
 }
 
 /// A parser of numbers within a range.
-#[must_use]
 pub fn within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
     move |text: &str| {
         let number = text.parse().ok().filter(|number| range.contains(number));

@@ -57,12 +57,9 @@ pub struct GatewayArgs {
 /// # Errors
 /// The port is taken, or the address is not allowed.
 pub async fn run(args: GatewayArgs) -> anyhow::Result<Outcome> {
-    let tls = match args.tls_cert.as_deref().zip(args.tls_key.as_deref()) {
-        Some((certificates, key)) => {
-            Some(tls_config(certificates, key).map_err(|error| BadInput(format!("--tls-cert, --tls-key: {error}")))?)
-        }
-        None => None,
-    };
+    let files = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
+    let tls = files.map(|(certificates, key)| tls_config(certificates, key)).transpose();
+    let tls = tls.map_err(|error| BadInput(format!("--tls-cert, --tls-key: {error}")))?;
     let listener = listen(args.listen, args.insecure.insecure_bind || tls.is_some()).await?;
     let address = listener.local_addr()?;
     // Whoever can reach the port needs the link.

@@ -77,7 +77,7 @@ impl Shader {
             layout: &self.groups[group as usize],
             entries: &entries,
         };
-        BoundGroup::new(self.device.create_bind_group(&descriptor), forms)
+        BoundGroup { group: self.device.create_bind_group(&descriptor), forms }
     }
 }
 

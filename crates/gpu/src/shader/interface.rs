@@ -151,24 +151,25 @@ impl ShaderInterface {
         group: u32,
         names: impl Iterator<Item = &'n str>,
     ) -> Result<Vec<&Resource>, ShaderError> {
-        let shader = self.shader.clone();
-        let Some(resources) = self.groups.get(group as usize) else {
-            return Err(ShaderError::NoGroup { shader, group });
-        };
+        let resources =
+            self.groups.get(group as usize).ok_or_else(|| self.misbound(group, "the group", "is not declared"))?;
         let mut matched: Vec<&Resource> = Vec::with_capacity(resources.len());
         for name in names {
-            let Some(resource) = resources.iter().find(|resource| resource.name == name) else {
-                return Err(ShaderError::NotInGroup { shader, group, name: name.to_owned() });
-            };
+            let resource = resources.iter().find(|resource| resource.name == name);
+            let resource = resource.ok_or_else(|| self.misbound(group, name, "is bound, but is not declared"))?;
             if matched.iter().any(|other| other.name == name) {
-                return Err(ShaderError::BoundTwice { shader, group, name: name.to_owned() });
+                return Err(self.misbound(group, name, "is bound twice"));
             }
             matched.push(resource);
         }
         match resources.iter().find(|resource| !matched.iter().any(|other| other.name == resource.name)) {
-            Some(Resource { name, .. }) => Err(ShaderError::Unbound { shader, group, name: name.clone() }),
+            Some(Resource { name, .. }) => Err(self.misbound(group, name, "is not bound")),
             None => Ok(matched),
         }
+    }
+
+    fn misbound(&self, group: u32, name: &str, fault: &'static str) -> ShaderError {
+        ShaderError::Binding { shader: self.shader.clone(), group, name: name.to_owned(), fault }
     }
 }
 
@@ -256,8 +257,8 @@ mod tests {
         ShaderInterface::of("test", WGSL, CAMERA).expect("an interface")
     }
 
-    fn matched(group: u32, names: &[&str]) -> Result<usize, ShaderError> {
-        interface().matched(group, names.iter().copied()).map(|resources| resources.len())
+    fn fault(group: u32, names: &[&str]) -> String {
+        interface().matched(group, names.iter().copied()).map(|_| ()).expect_err("a fault").to_string()
     }
 
     #[test]
@@ -268,18 +269,18 @@ mod tests {
         let storage = BufferBindingType::Storage { read_only: false };
         let words = BindingType::Buffer { ty: storage, has_dynamic_offset: false, min_binding_size: None };
         assert_eq!(interface.groups[1][0].layout.ty, words);
-        let found = matched(0, &["depth", "camera"]).expect("both names");
-        assert_eq!(found, 2);
+        let found = interface.matched(0, ["depth", "camera"].into_iter()).expect("both names");
+        assert_eq!(found.len(), 2);
     }
 
     #[test]
     fn a_missing_an_extra_and_a_repeated_name_are_errors() {
-        assert!(matches!(matched(0, &["camera"]), Err(ShaderError::Unbound { name, .. }) if name == "depth"));
-        let extra = matched(0, &["camera", "depth", "words"]);
-        assert!(matches!(extra, Err(ShaderError::NotInGroup { name, .. }) if name == "words"));
-        let twice = matched(0, &["camera", "depth", "depth"]);
-        assert!(matches!(twice, Err(ShaderError::BoundTwice { name, .. }) if name == "depth"));
-        assert!(matches!(matched(2, &[]), Err(ShaderError::NoGroup { group: 2, .. })));
+        assert_eq!(fault(0, &["camera"]), "shader test, group 0: depth is not bound");
+        let extra = fault(0, &["camera", "depth", "words"]);
+        assert_eq!(extra, "shader test, group 0: words is bound, but is not declared");
+        let twice = fault(0, &["camera", "depth", "depth"]);
+        assert_eq!(twice, "shader test, group 0: depth is bound twice");
+        assert_eq!(fault(2, &[]), "shader test, group 2: the group is not declared");
     }
 
     #[test]

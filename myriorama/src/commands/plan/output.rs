@@ -7,7 +7,7 @@ use app_core::camera_record::{self, NamedCamera};
 use app_core::planning::Planning;
 use app_core::print_line;
 use app_core::setup::Setup;
-use planner::{Budget, CHOICE_OF_BUDGETS, Choice, Metric, Outcome, Price, RowSummary};
+use planner::{Budget, CHOICE_OF_BUDGETS, Choice, Metric, Outcome, Price, RowStatus, RowSummary};
 use probe::Representation;
 use report::{Cell, Table};
 use serde_json::Map;
@@ -26,10 +26,7 @@ pub(super) struct Output<'a> {
 struct Line {
     name: String,
     state: String,
-    error_ratio: Option<f64>,
-    price: Price,
-    is_measured: bool,
-    views: usize,
+    summary: RowSummary,
 }
 
 impl Output<'_> {
@@ -57,25 +54,20 @@ impl Output<'_> {
         let mut lines = Vec::with_capacity(rows.len() + 1);
         for (place, (row, summary)) in self.planning.ladder.rows().iter().zip(rows).enumerate() {
             let is_chosen = self.outcome.choice == Choice::Row(place);
-            lines.push(Line {
-                name: row.to_string(),
-                state: if is_chosen { "chosen".to_owned() } else { summary.status.to_string() },
-                error_ratio: summary.error_ratio,
-                price: summary.price,
-                is_measured: summary.is_measured,
-                views: summary.screening_views,
-            });
+            let state = if is_chosen { "chosen".to_owned() } else { summary.status.to_string() };
+            lines.push(Line { name: row.to_string(), state, summary: *summary });
         }
         let is_chosen = self.outcome.choice == Choice::Direct;
-        lines.push(Line {
-            name: "direct".to_owned(),
-            state: if is_chosen { "chosen" } else { "open" }.to_owned(),
+        let summary = RowSummary {
+            status: RowStatus::Open,
+            screening_views: 0,
             error_ratio: Some(0.0),
             price: direct,
             is_measured: true,
-            views: 0,
-        });
-        lines.sort_by(|a, b| a.price.node_s.total_cmp(&b.price.node_s));
+        };
+        let state = if is_chosen { "chosen" } else { "open" }.to_owned();
+        lines.push(Line { name: "direct".to_owned(), state, summary });
+        lines.sort_by(|a, b| a.summary.price.node_s.total_cmp(&b.summary.price.node_s));
         lines
     }
 
@@ -96,15 +88,15 @@ impl Output<'_> {
             ("views", ""),
         ];
         let mut table = Table::new(name, &columns);
-        for line in lines {
+        for Line { name, state, summary } in lines {
             table.push([
-                Cell::from(line.name.clone()),
-                line.state.clone().into(),
-                line.error_ratio.unwrap_or(f64::NAN).into(),
-                (line.price.node_s * 1e3).into(),
-                (line.price.view_s * 1e3).into(),
-                if line.is_measured { "measured" } else { "predicted" }.into(),
-                line.views.into(),
+                Cell::from(name.clone()),
+                state.clone().into(),
+                summary.error_ratio.unwrap_or(f64::NAN).into(),
+                (summary.price.node_s * 1e3).into(),
+                (summary.price.view_s * 1e3).into(),
+                if summary.is_measured { "measured" } else { "predicted" }.into(),
+                summary.screening_views.into(),
             ])?;
         }
         Ok(table)
@@ -123,12 +115,12 @@ impl Output<'_> {
 /// The lines with an error below that of every cheaper one.
 fn front(by_price: &[Line]) -> Vec<&Line> {
     let mut least = f64::INFINITY;
-    let mut improves = |line: &&Line| {
-        let is_less = line.error_ratio.is_some_and(|error| error < least);
-        least = line.error_ratio.map_or(least, |error| error.min(least));
-        is_less
-    };
-    by_price.iter().filter(&mut improves).collect()
+    let lines = by_price.iter().filter(|line| {
+        let before = least;
+        least = line.summary.error_ratio.map_or(least, |error| error.min(least));
+        line.summary.error_ratio.is_some_and(|error| error < before)
+    });
+    lines.collect()
 }
 
 fn flags(chosen: &Representation, cameras: &Path) -> String {
