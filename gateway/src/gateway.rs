@@ -1,7 +1,7 @@
 //! State that all requests share.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
 
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
@@ -26,7 +26,7 @@ pub(crate) struct Gateway {
     pub(crate) single_views: Arc<Semaphore>,
     /// The place of a view that is compared.
     pub(crate) comparison: Semaphore,
-    last_visitor: AtomicU64,
+    pub(crate) last_visitor: AtomicU64,
 }
 
 impl Gateway {
@@ -41,9 +41,5 @@ impl Gateway {
             config,
             shutdown,
         }
-    }
-
-    pub(crate) fn next_visitor(&self) -> u64 {
-        self.last_visitor.fetch_add(1, Ordering::Relaxed)
     }
 }

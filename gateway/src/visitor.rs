@@ -6,6 +6,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use axum::extract::ws::WebSocket;
 use client::{ClientError, ClientId, EncodedFrame, PictureQuality, Session};
@@ -54,7 +55,7 @@ async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
         bounds: [scene.offer.volume.min, scene.offer.volume.max].map(|corner| scene.space.in_source(corner)),
     })?;
     let mut visitor = Visitor {
-        number: gateway.next_visitor(),
+        number: gateway.last_visitor.fetch_add(1, Ordering::Relaxed),
         is_moving: false,
         light_step: 0,
         made_with: None,
@@ -357,13 +358,18 @@ impl Visitor {
         let is_planned_direct =
             plan.policy == Policy::Direct && plan.plan_epoch == frame.header.sample_set_id.plan_epoch;
         let is_own_cell = is_drawn || !frame.header.is_neighbour_cell;
-        let is_near = is_drawn || !pose.still || is_near(&plan, &frame);
+        // Where the plan has no view cell near the frame's camera, the next plan will.
+        let is_near = is_drawn
+            || !pose.still
+            || plan.policy == Policy::Direct
+            || plan.workload.has_cell_near(&frame.request.camera);
         let shown = self.light_step_of(&plan, &frame);
         if pose.still && plan.policy != Policy::Direct && !self.is_moving {
             // Another cell's light begins anew.
             self.light_step = if is_own_cell { self.light_step.max(shown) } else { 0 };
         }
-        let is_of_plan = is_drawn || cameras.is_some() && cameras == cell_cameras(&plan, &frame.request.camera);
+        let own_cell = plan.workload.cell_of(&frame.request.camera);
+        let is_of_plan = is_drawn || cameras.is_some() && cameras == cell_cameras(&plan, own_cell);
         let is_newest = pose.number == self.newest_number();
         let next = self.next(&asked, &frame, shown, is_own_cell);
         // A visitor that rests would see a neighbouring cell's picture, an earlier plan's, unfinished light or few samples a
@@ -442,8 +448,7 @@ impl Visitor {
     /// The sample cameras of a picture, by the plan that it was made under.
     fn cameras_of(&self, frame: &EncodedFrame) -> Option<Vec<SampleCamera>> {
         let plan_epoch = frame.header.sample_set_id.plan_epoch;
-        let workload = &self.plans.iter().find(|plan| plan.plan_epoch == plan_epoch)?.workload;
-        Some(workload.sample_cameras[workload.cameras_of_cell(frame.header.cell as usize)?].to_vec())
+        cell_cameras(self.plans.iter().find(|plan| plan.plan_epoch == plan_epoch)?, frame.header.cell)
     }
 
     /// A new plan may have a view cell that is nearer to a visitor who rests: the still is then asked for again.
@@ -457,7 +462,8 @@ impl Visitor {
         let camera = self.scene.space.camera(&pose.camera, UVec2::from_array(pose.canvas_px));
         let camera = camera.map_err(|error| End::Refused(error.to_string()))?;
         // What is on its way goes on under the new plan, and what was drawn from the scene is the same under any.
-        if self.is_drawn || cell_cameras(&plan.assignment, &camera) == self.made_with {
+        let own_cell = plan.assignment.workload.cell_of(&camera);
+        if self.is_drawn || cell_cameras(&plan.assignment, own_cell) == self.made_with {
             return Ok(());
         }
         if self.is_finished {
@@ -507,13 +513,7 @@ impl Visitor {
     }
 }
 
-/// Whether a plan has a view cell near a frame's camera. Where it has none, the next plan will.
-fn is_near(plan: &Assignment, frame: &EncodedFrame) -> bool {
-    plan.policy == Policy::Direct || plan.workload.has_cell_near(&frame.request.camera)
-}
-
-/// The sample cameras of the cell that a plan has for a view.
-fn cell_cameras(plan: &Assignment, camera: &PinholeCamera) -> Option<Vec<SampleCamera>> {
-    let cameras = plan.workload.cameras_of_cell(plan.workload.cell_of(camera) as usize)?;
-    Some(plan.workload.sample_cameras[cameras].to_vec())
+/// The sample cameras of a plan's view cell.
+fn cell_cameras(plan: &Assignment, cell: u32) -> Option<Vec<SampleCamera>> {
+    Some(plan.workload.sample_cameras[plan.workload.cameras_of_cell(cell as usize)?].to_vec())
 }

@@ -42,16 +42,13 @@ pub struct DeviceArgs {
     pub device: DevicePreference,
 }
 
-/// The scene of those who name none.
-pub const DEFAULT_SCENE: &str = "tree-terrain-500k";
-
 /// The scene, its sampling and its lighting.
 #[derive(Debug, Clone, Args)]
 #[allow(rustdoc::broken_intra_doc_links, reason = "help has optional parts in brackets")]
 pub struct SceneArgs {
     /// A scene by name or a file (.gltf, .glb, .obj, .ply). Names: tree-terrain-30k, -125k, -500k, -2m (each also with
     /// -wind), urban, courtyard, gallery, grass, grass:DENSITY, snake (animated), mirror-hall
-    #[arg(long, value_name = "SPEC", default_value = DEFAULT_SCENE,
+    #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k",
         value_parser = OsStringValueParser::new().try_map(SceneSpec::try_from))]
     pub scene: SceneSpec,
     /// What is done about textures that a scene's file names and that are not there: refuse the scene, or show grey
@@ -153,14 +150,6 @@ fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<OfferedMirror> {
     offered.collect()
 }
 
-/// The name by which sessions ask for a scene: a built-in scene's own, or a file's without folder and ending.
-fn offer_name(scene: &SceneSpec) -> String {
-    match scene {
-        SceneSpec::File(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-        _ => scene.to_string(),
-    }
-}
-
 impl SceneArgs {
     /// A scene with all other arguments by default.
     #[must_use]
@@ -214,7 +203,11 @@ impl SceneArgs {
         let base = self.base(&scene)?;
         let package = scene::pack(&scene);
         let offer = SceneOffer {
-            name: offer_name(&self.scene),
+            // A built-in scene's own name, or a file's without folder and ending.
+            name: match &self.scene {
+                SceneSpec::File(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+                built_in => built_in.to_string(),
+            },
             hash: SceneHash::of(&package),
             package: package.into(),
             mirrors: if cube.is_some() { Vec::new() } else { mirrors_of(&scene, self.impostors) },

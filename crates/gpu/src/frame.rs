@@ -12,7 +12,7 @@ const LONG_SLICE_S: f64 = 0.3;
 
 /// Work that is being recorded.
 pub struct Frame<'g> {
-    gpu: &'g Gpu,
+    pub(crate) gpu: &'g Gpu,
     label: &'static str,
     turn: Turn,
     /// The commands of the piece that is being recorded, to which passes add theirs.
@@ -130,16 +130,6 @@ impl<'g> Frame<'g> {
             depth_stencil_attachment: Some(RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }),
             ..Default::default()
         })
-    }
-
-    /// The device.
-    pub(crate) fn gpu(&self) -> &'g Gpu {
-        self.gpu
-    }
-
-    /// Says that a shader is used for the first time since the last cut.
-    pub(crate) fn count_first_use(&mut self) {
-        self.count((WorkKind::FIRST_USE, 1));
     }
 
     /// Says what was recorded, without a cut.

@@ -8,7 +8,8 @@ use super::bound_group::BoundGroup;
 use super::compiled::Shader;
 use super::variant::{Pass, ShaderVariant};
 use super::warming::{FirstUses, warm};
-use crate::{device::Gpu, error::GpuError, frame::Frame, sharing::Turn};
+use crate::sharing::{Turn, WorkKind};
+use crate::{device::Gpu, error::GpuError, frame::Frame};
 
 /// A render pipeline with its layout. The shader's entry points are `vertex` and, unless it draws depth alone, `fragment`.
 pub struct DrawPass {
@@ -83,12 +84,12 @@ impl DrawPass {
     /// pass begins.
     pub fn announce(&self, frame: &mut Frame<'_>, groups: &[&BoundGroup]) {
         let is_first_use = self.first_uses.make_ready(groups, || {
-            warm(frame.gpu(), &self.shader, groups, |gpu, shader, groups| {
+            warm(frame.gpu, &self.shader, groups, |gpu, shader, groups| {
                 Self::new(gpu, shader, self.state.clone()).draw_nothing(gpu, groups)
             });
         });
         if is_first_use {
-            frame.count_first_use();
+            frame.count((WorkKind::FIRST_USE, 1));
         }
     }
 

@@ -120,7 +120,9 @@ impl ShaderInterface {
             let groups = interface.groups.len().max(place.group as usize + 1);
             interface.groups.resize(groups, Vec::new());
             // Vertices write nothing.
-            let visibility = if is_written(ty) && !computes { ShaderStages::FRAGMENT } else { visibility };
+            let is_written =
+                matches!(ty, BindingType::Buffer { ty: BufferBindingType::Storage { read_only: false }, .. });
+            let visibility = if is_written && !computes { ShaderStages::FRAGMENT } else { visibility };
             let layout = wgpu::BindGroupLayoutEntry { binding: place.binding, visibility, ty, count: None };
             interface.groups[place.group as usize].push(Resource { name, layout, element_bytes });
         }
@@ -183,10 +185,6 @@ fn stage(stage: ShaderStage) -> ShaderStages {
         ShaderStage::Fragment => ShaderStages::FRAGMENT,
         _ => ShaderStages::COMPUTE,
     }
-}
-
-fn is_written(ty: BindingType) -> bool {
-    matches!(ty, BindingType::Buffer { ty: BufferBindingType::Storage { read_only: false }, .. })
 }
 
 /// The type of a variable's binding; `None` for types that no shader here uses.

@@ -8,7 +8,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Once};
 
 use parking_lot::Mutex;
-use wgpu::{BindingResource, BindingType, BufferUsages, TextureFormat, TextureUsages, TextureView};
+use wgpu::{BindingResource, BindingType, BufferUsages, TextureUsages, TextureView};
 
 use super::bound_group::{BoundGroup, Form};
 use super::compiled::Shader;
@@ -34,46 +34,33 @@ enum Empty {
     Sampler(wgpu::Sampler),
 }
 
-fn texture(
-    gpu: &Gpu,
-    format: TextureFormat,
-    is_power_of_two: [bool; 2],
-    has_mips: bool,
-    ty: BindingType,
-) -> TextureView {
-    let [width, height] = is_power_of_two.map(|is| SIDES_PX[usize::from(is)]);
-    let (dimension, usage) = match ty {
-        BindingType::StorageTexture { view_dimension, .. } => (view_dimension, TextureUsages::STORAGE_BINDING),
-        BindingType::Texture { view_dimension, .. } => (view_dimension, TextureUsages::TEXTURE_BINDING),
-        _ => (wgpu::TextureViewDimension::D2, TextureUsages::TEXTURE_BINDING),
-    };
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("empty"),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        mip_level_count: if has_mips { 2 } else { 1 },
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage,
-        view_formats: &[],
-    });
-    texture.create_view(&wgpu::TextureViewDescriptor { dimension: Some(dimension), ..Default::default() })
-}
-
 impl Empty {
     fn of(gpu: &Gpu, resource: &Resource, form: Form) -> Self {
-        match (form, resource.layout.ty) {
-            (Form::Texture { format, is_power_of_two, has_mips }, ty) => {
-                Self::Texture(texture(gpu, format, is_power_of_two, has_mips, ty))
+        let (dimension, usage) = match resource.layout.ty {
+            BindingType::Sampler(_) => return Self::Sampler(gpu.texture_sampler([wgpu::AddressMode::Repeat; 2])),
+            BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, .. } => {
+                return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM));
             }
-            (Form::OfLayout, BindingType::Sampler(_)) => {
-                Self::Sampler(gpu.texture_sampler([wgpu::AddressMode::Repeat; 2]))
-            }
-            (Form::OfLayout, BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, .. }) => {
-                Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM))
-            }
-            (Form::OfLayout, _) => Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::STORAGE)),
-        }
+            BindingType::StorageTexture { view_dimension, .. } => (view_dimension, TextureUsages::STORAGE_BINDING),
+            BindingType::Texture { view_dimension, .. } => (view_dimension, TextureUsages::TEXTURE_BINDING),
+            _ => return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::STORAGE)),
+        };
+        let Form::Texture { format, is_power_of_two, has_mips } = form else {
+            return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::STORAGE));
+        };
+        let [width, height] = is_power_of_two.map(|is| SIDES_PX[usize::from(is)]);
+        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("empty"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: if has_mips { 2 } else { 1 },
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: &[],
+        });
+        let view = wgpu::TextureViewDescriptor { dimension: Some(dimension), ..Default::default() };
+        Self::Texture(texture.create_view(&view))
     }
 
     fn resource(&self) -> BindingResource<'_> {
@@ -145,6 +132,8 @@ fn empty_group(gpu: &Gpu, shader: &Shader, number: u32, forms: &[Form]) -> Bound
 
 #[cfg(test)]
 mod tests {
+    use wgpu::TextureFormat;
+
     use super::*;
     use crate::frame::Frame;
     use crate::shader::{Binding, ComputePass, DispatchSize, ResourceTrait};

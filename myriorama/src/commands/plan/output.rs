@@ -7,9 +7,10 @@ use app_core::camera_record::{self, NamedCamera};
 use app_core::planning::Planning;
 use app_core::print_line;
 use app_core::setup::Setup;
+use app_core::table::table;
 use planner::{Budget, CHOICE_OF_BUDGETS, Choice, Metric, Outcome, Price, RowStatus, RowSummary};
 use probe::Representation;
-use report::{Cell, Table};
+use report::{Table, TableError};
 use serde_json::Map;
 
 /// A plan that is made.
@@ -23,6 +24,7 @@ pub(super) struct Output<'a> {
 }
 
 /// A line of the table.
+#[derive(Clone)]
 struct Line {
     name: String,
     state: String,
@@ -36,14 +38,19 @@ impl Output<'_> {
         let out = self.out;
         std::fs::create_dir_all(out).with_context(|| format!("cannot create {}", out.display()))?;
         let csv = out.join("rows.csv");
-        let all = self.table("all rows", lines.iter())?.to_csv()?;
+        let all = self.table("all rows", &lines)?.to_csv()?;
         std::fs::write(&csv, all).with_context(|| format!("cannot write {}", csv.display()))?;
         print_line!("{}\n{CHOICE_OF_BUDGETS}\n", self.outcome.reason);
-        print_line!("{}", self.table("Front of cost against error", front(&lines).into_iter())?.to_text());
+        print_line!("{}", self.table("Front of cost against error", &front(&lines))?.to_text());
         if let Choice::Row(row) = self.outcome.choice {
             let chosen = &self.planning.representations[row];
             let cameras = out.join("samples.json");
-            self.write_cameras(&cameras, chosen)?;
+            let named = chosen.sample_cameras.iter().enumerate().map(|(index, camera)| NamedCamera {
+                file_path: format!("sample_{index:04}.png"),
+                camera: *camera.reference(),
+                more: Map::new(),
+            });
+            camera_record::write(&cameras, named, self.setup.offer.source_space, Map::new())?;
             print_line!("\nThe flags that repeat it, for up, coordinator and demo:\n  {}", flags(chosen, &cameras));
         }
         Ok(())
@@ -71,56 +78,38 @@ impl Output<'_> {
         lines
     }
 
-    fn table<'a>(&self, name: &str, lines: impl Iterator<Item = &'a Line>) -> anyhow::Result<Table> {
+    fn table(&self, name: &str, lines: &[Line]) -> Result<Table, TableError> {
         let error = match self.budget.error().map(|term| term.metric()) {
             None | Some(Metric::Flip) => "FLIP of the foreground",
             Some(Metric::FlipWhole) => "FLIP",
             Some(Metric::Psnr) => "mean squared error",
             Some(Metric::Disocclusion) => "disocclusion",
         };
-        let columns = [
-            ("representation", ""),
-            ("state", ""),
-            (error, ""),
-            ("cost of a view", "ms"),
-            ("time of a view", "ms"),
-            ("costs are", ""),
-            ("views", ""),
-        ];
-        let mut table = Table::new(name, &columns);
-        for Line { name, state, summary } in lines {
-            table.push([
-                Cell::from(name.clone()),
-                state.clone().into(),
-                summary.error_ratio.unwrap_or(f64::NAN).into(),
-                (summary.price.node_s * 1e3).into(),
-                (summary.price.view_s * 1e3).into(),
-                if summary.is_measured { "measured" } else { "predicted" }.into(),
-                summary.screening_views.into(),
-            ])?;
-        }
-        Ok(table)
-    }
-
-    fn write_cameras(&self, path: &Path, chosen: &Representation) -> anyhow::Result<()> {
-        let cameras = chosen.sample_cameras.iter().enumerate().map(|(index, camera)| NamedCamera {
-            file_path: format!("sample_{index:04}.png"),
-            camera: *camera.reference(),
-            more: Map::new(),
-        });
-        Ok(camera_record::write(path, cameras, self.setup.offer.source_space, Map::new())?)
+        table(
+            name,
+            lines,
+            &[
+                ("representation", "", |line| line.name.clone().into()),
+                ("state", "", |line| line.state.clone().into()),
+                (error, "", |line| line.summary.error_ratio.unwrap_or(f64::NAN).into()),
+                ("cost of a view", "ms", |line| (line.summary.price.node_s * 1e3).into()),
+                ("time of a view", "ms", |line| (line.summary.price.view_s * 1e3).into()),
+                ("costs are", "", |line| if line.summary.is_measured { "measured" } else { "predicted" }.into()),
+                ("views", "", |line| line.summary.screening_views.into()),
+            ],
+        )
     }
 }
 
 /// The lines with an error below that of every cheaper one.
-fn front(by_price: &[Line]) -> Vec<&Line> {
+fn front(by_price: &[Line]) -> Vec<Line> {
     let mut least = f64::INFINITY;
     let lines = by_price.iter().filter(|line| {
         let before = least;
         least = line.summary.error_ratio.map_or(least, |error| error.min(least));
         line.summary.error_ratio.is_some_and(|error| error < before)
     });
-    lines.collect()
+    lines.cloned().collect()
 }
 
 fn flags(chosen: &Representation, cameras: &Path) -> String {

@@ -24,7 +24,7 @@ pub(super) async fn until<T>(
 pub(super) fn how_to_resume(record: &Record, folder: &Path) -> String {
     let count = record.count();
     let total = record.total();
-    let command = resuming(std::env::args().skip(1));
+    let command = resuming(std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()));
     format!("{count} of {total} views are written to {}; `myriorama {command}` asks for the rest", folder.display())
 }
 
