@@ -54,7 +54,7 @@ impl Table {
     /// When the device has no texture of that size.
     pub fn new<T: NoUninit>(gpu: &Gpu, label: &str, format: TextureFormat, elements: &[T]) -> Result<Self, GpuError> {
         let shape = Shape::of(gpu, label, format, elements)?;
-        let table = Self(Pool::keeping(0).lend(shape, |&shape| texture(gpu, label, shape)));
+        let table = Self(Lent::unpooled(shape, texture(gpu, label, shape)));
         table.write(gpu, bytemuck::cast_slice(elements));
         Ok(table)
     }
