@@ -69,7 +69,7 @@ impl Job {
 
     /// Shows all views at one exposure, once it is known: those of later sessions, too.
     pub(super) fn expose(&mut self, record: &Record) {
-        if let Some(exposure) = record.exposure() {
+        if let Some(exposure) = record.exposure {
             self.request.auto_exposure = false;
             self.request.planes.tone.exposure = exposure;
         }

@@ -38,8 +38,8 @@ pub(super) struct Record {
     cameras: Arc<[PinholeCamera]>,
     set_count: u32,
     planes: ViewPlanes,
-    /// `None`: it is the plan's, and not known yet.
-    exposure: Option<ExposureEv>,
+    /// The exposure of all views. `None`: it is the plan's, and not known yet.
+    pub(super) exposure: Option<ExposureEv>,
     /// The promise when these pictures came, as the record has it; one that was not kept stays.
     promise: Option<Value>,
     /// The scale of each written view's depth picture, per metre; 0 without that picture. `None`: the view is not written.
@@ -89,11 +89,6 @@ impl Record {
     /// Written views.
     pub(super) fn count(&self) -> u64 {
         self.count
-    }
-
-    /// The exposure of all views, once it is known.
-    pub(super) fn exposure(&self) -> Option<ExposureEv> {
-        self.exposure
     }
 
     /// Notes how the views are shown.
