@@ -79,11 +79,6 @@ export function fly(state, [x, y, z], seconds, isFast) {
   return { ...state, target: add(state.target, moved) };
 }
 
-/** Flies, or turns around the pivot; the camera stays where it is. */
-export function withMode(state, isFlying) {
-  return { ...state, isFlying };
-}
-
 /** Shows all of a scene with these corners, in a window with this ratio of width to height. */
 export function fit(state, [low, high], aspect) {
   const size = length(add(high, scale(low, -1)));

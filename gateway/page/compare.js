@@ -1,6 +1,6 @@
 // The view from samples beside the view drawn directly, with the measures of their difference.
 
-import { $, element, on, press, say } from "./dom.js";
+import { $, element, on, press, say, tell } from "./dom.js";
 import { queryOf, requestJson } from "./api.js";
 
 const PICTURES = { "compare-view": "view", "compare-direct": "direct", "compare-flip": "flip_map" };
@@ -9,7 +9,7 @@ export class Compare {
   /** `restView()` gives the view that rests on the screen, or null; `pause()` stops the time. */
   constructor(restView, pause) {
     Object.assign(this, { restView, pause });
-    on("compare", () => this.toggle());
+    on("compare", () => (this.isOpen ? this.close() : this.open()));
     on("compare-close", () => this.close());
     on("flip", () => this.showsFlip($("compare-flip").hidden));
     $("split").addEventListener("input", () => this.split());
@@ -17,11 +17,6 @@ export class Compare {
 
   get isOpen() {
     return !$("comparison").hidden;
-  }
-
-  toggle() {
-    if (this.isOpen) this.close();
-    else this.open();
   }
 
   open() {
@@ -48,8 +43,7 @@ export class Compare {
   }
 
   tell(text) {
-    $("compare-state").textContent = text;
-    $("compare-state").hidden = !text;
+    tell("compare-state", text);
     if (text) say(text);
   }
 

@@ -19,6 +19,12 @@ export function press(button, isOn) {
   button.setAttribute("aria-pressed", String(isOn));
 }
 
+/** Shows a text in an element, which is hidden without one. */
+export function tell(id, text) {
+  $(id).textContent = text;
+  $(id).hidden = !text;
+}
+
 /** Says a change of state to those who hear the page. */
 export function say(text) {
   $("spoken").textContent = text;

@@ -34,12 +34,8 @@ export class Frusta {
   toggle() {
     this.isOn = !this.isOn;
     press($("cameras"), this.isOn);
-    if (this.isOn) this.load();
-    else this.hide();
     this.marks.redraw();
-  }
-
-  hide() {
+    if (this.isOn) return this.load();
     clearTimeout(this.timer);
     this.asked?.abort();
     say("Cameras are hidden.");

@@ -59,7 +59,9 @@ const pivot = new Pivot(poses, view);
 const frusta = new Frusta(marks, () => ({ scene: welcome.scene, moment: poses.moment ?? 0 }), () => poses.state.size, () => shown?.header.cell);
 const panels = new Panels(() => statistics.rows(performance.now(), plan, welcome?.light_steps ?? 1), () => statistics.csv());
 const isFlying = () => poses.state?.isFlying ?? false;
-new Input($("picture"), { change: steer, command, click, doubleClick: (place) => measure.isOn || pivot.at(place), isFlying });
+new Input($("picture"), {
+  change: steer, command, click: (place) => measure.take(place), doubleClick: (place) => measure.isOn || pivot.at(place), isFlying,
+});
 // For tests and for the curious.
 window.myriorama = {
   statistics, screen, link, camera, measure, view,
@@ -123,16 +125,14 @@ function nameScene({ scene, scenes }) {
 function enter({ home, bounds }) {
   pivot.cancel();
   const linked = poses.state ? null : camera.fromFragment(location.hash);
-  poses.state = camera.fromCamera(linked ?? home, sizeOf(bounds), isFlying());
+  const size = camera.length(camera.add(bounds[1], camera.scale(bounds[0], -1)));
+  poses.state = camera.fromCamera(linked ?? home, size, isFlying());
   [shown, plan] = [null, null];
   $("quality").value = welcome.quality;
-  measure.restart();
+  // Points of another scene are others.
+  measure.clear();
   moved();
   marks.redraw();
-}
-
-function sizeOf([low, high]) {
-  return camera.length(camera.add(high, camera.scale(low, -1)));
 }
 
 function planned(message) {
@@ -200,27 +200,17 @@ function restView() {
   return isAtRest() ? view() : null;
 }
 
-function click(place) {
-  if (measure.isOn) measure.take(place);
-}
-
 function command(key) {
   if (COMMANDS[key]) $(COMMANDS[key]).click();
-  else if (key === "Enter") click([0.5, 0.5]);
+  else if (key === "Enter") measure.take([0.5, 0.5]);
   else return false;
   return true;
-}
-
-/** Leaves the comparison, or measuring. */
-function escape() {
-  if (compare.isOpen) compare.close();
-  else measure.leave();
 }
 
 on("reset", () => welcome && steer((s) => camera.fromCamera(welcome.home, s.size, s.isFlying)));
 on("fit", () => welcome && steer((s) => camera.fit(s, welcome.bounds, screen.size[0] / screen.size[1])));
 on("mode", (button) => {
-  steer((s) => camera.withMode(s, !s.isFlying));
+  steer((s) => ({ ...s, isFlying: !s.isFlying }));
   press(button, isFlying());
   document.body.classList.toggle("flying", isFlying());
   say(isFlying() ? "Flying." : "Turning around the pivot.");
@@ -235,7 +225,7 @@ $("quality").addEventListener("change", () => {
   poses.again();
 });
 document.addEventListener("visibilitychange", () => !document.hidden && !(poses.number && isAtRest()) && poses.again());
-addEventListener("keydown", (event) => event.key === "Escape" && escape());
+addEventListener("keydown", (event) => event.key === "Escape" && (compare.isOpen ? compare.close() : measure.leave()));
 addEventListener("hashchange", () => {
   const linked = camera.fromFragment(location.hash);
   if (linked) steer((s) => camera.fromCamera(linked, s.size, s.isFlying));

@@ -1,6 +1,6 @@
 // Points of the scene's surface: their coordinates, the distance of two, and the cameras that saw them.
 
-import { $, element, on, press, say } from "./dom.js";
+import { $, element, on, press, say, tell } from "./dom.js";
 import { queryOf, requestJson } from "./api.js";
 import { add, length, scale } from "./camera.js";
 
@@ -44,11 +44,7 @@ export class Measure {
   }
 
   toggle() {
-    if (this.isOn) this.leave();
-    else this.enter();
-  }
-
-  enter() {
+    if (this.isOn) return this.leave();
     this.isOn = true;
     this.show("Measuring. Click on a surface, or press Enter for the centre.");
   }
@@ -62,22 +58,18 @@ export class Measure {
   }
 
   clear() {
+    if (!this.isOn) return;
     this.asked?.abort();
     this.results = [];
     this.show("No points.");
   }
 
-  /** Another scene: its points are others. */
-  restart() {
-    if (this.isOn) this.clear();
-  }
-
   async take(place) {
     const view = this.view();
-    if (!view) return;
+    if (!this.isOn || !view) return;
     this.asked?.abort();
     const { signal } = (this.asked = new AbortController());
-    this.tell("Loading…");
+    tell("measure-state", "Loading…");
     try {
       this.taken(await pointAt(view, place, signal));
     } catch (error) {
@@ -108,18 +100,13 @@ export class Measure {
     press($("measure"), this.isOn);
     $("measured").hidden = !this.isOn;
     $("picture").classList.toggle("measuring", this.isOn);
-    this.tell(isInRows ? "" : sentence);
+    tell("measure-state", isInRows ? "" : sentence);
     say(sentence);
     $("points").replaceChildren(...this.results.flatMap((result, i) => this.rows(result, i)));
     $("distance").hidden = this.results.length < 2;
     if (this.results.length === 2) $("distance-value").textContent = figure(this.distance());
     $("measure-clear").disabled = !this.results.length;
     this.marks.redraw();
-  }
-
-  tell(text) {
-    $("measure-state").textContent = text;
-    $("measure-state").hidden = !text;
   }
 
   rows(result, i) {

@@ -1,6 +1,6 @@
 // Provenance and depth of a view that rests, above its picture, with their legend.
 
-import { $, element, on, press, say } from "./dom.js";
+import { $, element, on, press, say, tell } from "./dom.js";
 import { queryOf, request } from "./api.js";
 
 const NAMES = { provenance: "Provenance", depth: "Depth" };
@@ -35,7 +35,7 @@ export class Overlays {
     $("entries").replaceChildren();
     if (!this.kind) return say(`${NAMES[kind]} is hidden.`);
     $("legend-name").textContent = NAMES[this.kind];
-    this.tell("Shown when the camera rests.");
+    tell("legend-state", "Shown when the camera rests.");
     this.rested();
   }
 
@@ -43,16 +43,11 @@ export class Overlays {
     $("overlay").style.opacity = $("opacity").value / 100;
   }
 
-  tell(text) {
-    $("legend-state").textContent = text;
-    $("legend-state").hidden = !text;
-  }
-
   /** The camera moves: what was shown is of another view. */
   moved() {
     if (!this.kind) return;
     this.hide();
-    this.tell("Shown when the camera rests.");
+    tell("legend-state", "Shown when the camera rests.");
   }
 
   hide() {
@@ -65,13 +60,13 @@ export class Overlays {
     if (!this.kind || !view) return;
     this.asked?.abort();
     const { signal } = (this.asked = new AbortController());
-    this.tell("Loading…");
+    tell("legend-state", "Loading…");
     try {
       await this.load(view, this.kind, signal);
     } catch (error) {
       if (signal.aborted) return;
       $("overlay").hidden = true;
-      this.tell(error.message);
+      tell("legend-state", error.message);
       say(error.message);
     }
   }
@@ -93,7 +88,7 @@ export class Overlays {
     Object.assign(overlay, { width: image.naturalWidth, height: image.naturalHeight });
     overlay.getContext("2d").drawImage(image, 0, 0);
     overlay.hidden = false;
-    this.tell("");
+    tell("legend-state", "");
     $("entries").replaceChildren(...legend.map(([text, color]) => {
       const swatch = element("span");
       swatch.className = "swatch";

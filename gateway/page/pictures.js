@@ -42,12 +42,9 @@ export class Pictures {
     const age = drop ? this.statistics.dropped(drop, shown) : this.statistics.add(shown);
     // A picture that is dropped gives back its credit, too.
     this.link.send({ type: "shown", number: header.number, age_ms: Math.max(0, age) });
-    if (!drop) this.showed(header, pose, times.receivedAt);
-  }
-
-  showed(header, pose, receivedAt) {
+    if (drop) return;
     this.shownNumber = header.number;
     if (pose) this.moment = pose.moment;
-    this.shows(header, this.moment, receivedAt);
+    this.shows(header, this.moment, times.receivedAt);
   }
 }

@@ -17,13 +17,11 @@ export class Playback {
     this.stepMs = 1000 * moment_step_s;
     $("playback").hidden = this.moments < 2;
     $("time").max = this.moments - 1;
-    if (isNew || this.poses.moment >= this.moments) this.rewind();
+    if (isNew || this.poses.moment >= this.moments) {
+      if (this.isPlaying) this.stop();
+      this.poses.moment = this.moments > 1 ? 0 : null;
+    }
     this.show();
-  }
-
-  rewind() {
-    if (this.isPlaying) this.stop();
-    this.poses.moment = this.moments > 1 ? 0 : null;
   }
 
   toggle() {

@@ -96,15 +96,13 @@ export class Statistics {
     const last = this.pictures[this.pictures.length - 1];
     if (!last) return [["pictures", "none yet"]];
     const origin = originOf(last.header, lightSteps);
-    return [...ratesOf(recent, last), ...agesOf(recent), ...origin, ...this.dropRows(), ...planRows(plan)];
-  }
-
-  dropRows() {
     return [
+      ...ratesOf(recent, last), ...agesOf(recent), ...origin,
       ["dropped", this.replaced + this.drops.late + this.drops.undecoded],
       ["poses replaced", this.replaced, "part"],
       ["pictures late", this.drops.late, "part"],
       ["pictures not decoded", this.drops.undecoded, "part"],
+      ...planRows(plan),
     ];
   }
 

@@ -75,14 +75,12 @@ function show(status) {
     ["Plan", whole(status.plan_epoch)], ["Scenes", list(status.scenes)], ["Version", status.version ?? UNKNOWN],
   ];
   draw("figures", summary, () => figures(summary));
-  draw("nodes", nodes ?? [], () => [nodeTable(nodes ?? [])]);
+  draw("nodes", nodes ?? [], () => {
+    const rows = (nodes ?? []).map((node) => [node.name ?? UNKNOWN, node.device ?? UNKNOWN, list(node.roles), percent(node.busy_ratio)]);
+    return [table(rows.length ? "" : "No node has joined.", ["Node", "Device", "Roles", "Busy"], rows)];
+  });
   draw("workloads", workloads ?? [], () => (workloads ?? []).map(workloadSection));
   for (const [chart, value] of charts) chart.add(value(status));
-}
-
-function nodeTable(nodes) {
-  const rows = nodes.map((node) => [node.name ?? UNKNOWN, node.device ?? UNKNOWN, list(node.roles), percent(node.busy_ratio)]);
-  return table(nodes.length ? "" : "No node has joined.", ["Node", "Device", "Roles", "Busy"], rows);
 }
 
 function workloadSection(workload) {

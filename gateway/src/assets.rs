@@ -10,38 +10,22 @@ const VERSION_PLACE: &str = "{version}";
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
     connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
+/// Names, media types and texts of files, by their endings.
 macro_rules! files {
-    ($($name:literal, $media_type:literal;)*) => {
-        &[$(($name, $media_type, include_str!(concat!("../page/", $name)))),*]
+    ($($ending:literal $media_type:literal: $($name:ident)*;)*) => {
+        &[$($((
+            concat!(stringify!($name), ".", $ending),
+            concat!($media_type, "; charset=utf-8"),
+            include_str!(concat!("../page/", stringify!($name), ".", $ending)),
+        )),*),*]
     };
 }
 
 const FILES: &[(&str, &str, &str)] = files! {
-    "index.html", "text/html; charset=utf-8";
-    "status.html", "text/html; charset=utf-8";
-    "style.css", "text/css; charset=utf-8";
-    "api.js", "text/javascript; charset=utf-8";
-    "camera.js", "text/javascript; charset=utf-8";
-    "chart.js", "text/javascript; charset=utf-8";
-    "compare.js", "text/javascript; charset=utf-8";
-    "dom.js", "text/javascript; charset=utf-8";
-    "frusta.js", "text/javascript; charset=utf-8";
-    "input.js", "text/javascript; charset=utf-8";
-    "link.js", "text/javascript; charset=utf-8";
-    "main.js", "text/javascript; charset=utf-8";
-    "marks.js", "text/javascript; charset=utf-8";
-    "measure.js", "text/javascript; charset=utf-8";
-    "notices.js", "text/javascript; charset=utf-8";
-    "overlays.js", "text/javascript; charset=utf-8";
-    "panels.js", "text/javascript; charset=utf-8";
-    "pictures.js", "text/javascript; charset=utf-8";
-    "pivot.js", "text/javascript; charset=utf-8";
-    "playback.js", "text/javascript; charset=utf-8";
-    "poses.js", "text/javascript; charset=utf-8";
-    "projection.js", "text/javascript; charset=utf-8";
-    "screen.js", "text/javascript; charset=utf-8";
-    "statistics.js", "text/javascript; charset=utf-8";
-    "status.js", "text/javascript; charset=utf-8";
+    "html" "text/html": index status;
+    "css" "text/css": style;
+    "js" "text/javascript": api camera chart compare dom frusta input link main marks measure notices overlays panels pictures
+        pivot playback poses projection screen statistics status;
 };
 
 /// The answer to a request for a file; without a body where the browser has it already.

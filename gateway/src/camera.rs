@@ -54,27 +54,25 @@ impl ViewSpace {
     /// # Errors
     /// For numbers that are not finite or out of range.
     pub(crate) fn camera(&self, page: &PageCamera, size_px: UVec2) -> Result<PinholeCamera, BadView> {
-        let point = |field, point: [f64; 3]| {
-            let in_world = self.source_space.world_from_source(DVec3::from_array(point));
-            let is_near = point.iter().all(|v| v.abs() <= FARTHEST) && in_world.abs().max_element() <= FARTHEST as f32;
-            if is_near {
-                Ok(in_world)
-            } else {
-                Err(bad(field, point, "within ±1e12, and not further from the model for its size"))
-            }
-        };
         if !(1.0..=170.0).contains(&page.fov_y_deg) {
             return Err(bad("fov_y_deg", page.fov_y_deg, "from 1 to 170"));
         }
         if size_px.min_element() == 0 || size_px.max_element() > MAX_CANVAS_PX {
             return Err(bad("size", size_px.to_array(), "1 to 16384 pixels a side"));
         }
-        let eye = point("eye", page.eye)?;
-        let target = point("target", page.target)?;
+        let eye = self.point("eye", page.eye)?;
+        let target = self.point("target", page.target)?;
         let camera = PinholeCamera::looking_at(eye, target, Vec3::Y, page.fov_y_deg.to_radians() as f32, size_px);
         let camera = PinholeCamera { near_m: self.near_m, ..camera };
         camera.validate().map_err(|error| bad("camera", error.to_string(), "a camera"))?;
         Ok(camera)
+    }
+
+    fn point(&self, field: &'static str, point: [f64; 3]) -> Result<Vec3, BadView> {
+        let in_world = self.source_space.world_from_source(DVec3::from_array(point));
+        let is_near = point.iter().all(|v| v.abs() <= FARTHEST) && in_world.abs().max_element() <= FARTHEST as f32;
+        let allowed = "within ±1e12, and not further from the model for its size";
+        if is_near { Ok(in_world) } else { Err(bad(field, point, allowed)) }
     }
 
     /// A camera in front of the scene: in the middle of its sample cameras, looking at the scene's middle.
@@ -92,8 +90,7 @@ impl ViewSpace {
         let fov_y_deg = middle_camera.map_or(FOV_Y_DEG, |camera| {
             f64::from((camera.size_px.y as f32 * 0.5 / camera.focal_px.y).atan() * 2.0).to_degrees()
         });
-        let in_source = |point: Vec3| self.source_space.source_from_world(point).to_array();
-        PageCamera { eye: in_source(eye), target: in_source(target), fov_y_deg }
+        PageCamera { eye: self.in_source(eye), target: self.in_source(target), fov_y_deg }
     }
 
     /// A point of the world, in the coordinates of the scene's file.

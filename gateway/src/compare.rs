@@ -24,18 +24,21 @@ pub(crate) async fn compare(
     State(gateway): State<Arc<Gateway>>,
     Query(query): Query<ViewQuery>,
 ) -> Result<Response, Refusal> {
-    let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
+    let visited = Visited::of(&gateway, &query).await?;
     let shown = visited.shown();
     // Those that wait for a session hold up no other comparison.
     let session = shown.opened().await?;
-    let busy = |_| Refusal(StatusCode::TOO_MANY_REQUESTS, "another view is being compared: try again later".to_owned());
-    let _place = gateway.comparison.try_acquire().map_err(busy)?;
+    let _place = gateway.comparison.try_acquire().map_err(|_| {
+        Refusal(StatusCode::TOO_MANY_REQUESTS, "another view is being compared: try again later".to_owned())
+    })?;
     // As finished stills are.
     let planes = ViewPlanes { antialias: Antialias::MOST, tone: session.tone(), ..ViewPlanes::COLOR };
     let with_depth = ViewPlanes { inverse_depth: true, ..planes };
-    let draw = |planes, method| gateway.single_views.draw(shown, visited.camera, planes, method, visited.moment);
-    let SingleView { frame: view, place, .. } = draw(planes, visited.method(&gateway, &session)).await?;
-    let SingleView { frame: direct, .. } = draw(with_depth, Some(DIRECT.to_owned())).await?;
+    let Visited { camera, moment, .. } = visited;
+    let method = visited.method(&gateway, &session);
+    let SingleView { frame: view, place, .. } = gateway.draw(shown, camera, planes, method, moment).await?;
+    let direct = Some(DIRECT.to_owned());
+    let SingleView { frame: direct, .. } = gateway.draw(shown, camera, with_depth, direct, moment).await?;
     let compared = tokio::task::spawn_blocking(move || compared(&view, &direct));
     let compared = compared.await.map_err(Refusal::internal)?;
     let compared = compared.ok_or_else(|| Refusal::internal("the views cannot be compared"))?;
@@ -48,13 +51,13 @@ fn compared(frame: &Frame, direct: &Frame) -> Option<Value> {
     let [foreground, whole] = PictureErrors::of(&direct.view, &test).ok()?;
     let flip = flip_map(&reference, &test).ok()?;
     let flip_image = View { srgb8: pictures::error_map(&flip).into_raw(), ..frame.view.clone() };
-    let ms = |frame: &Frame| frame.header.stage_times.batch_s * 1000.0;
+    let [view_s, direct_s] = [frame, direct].map(|frame| frame.header.stage_times.batch_s);
     Some(json!({
         "size_px": frame.view.size_px.to_array(),
         "foreground_psnr_db": foreground.psnr_db, "foreground_ssim": foreground.ssim,
         "foreground_flip": foreground.flip,
         "psnr_db": whole.psnr_db, "ssim": whole.ssim, "flip": whole.flip,
-        "view_ms": ms(frame), "direct_ms": ms(direct),
+        "view_ms": view_s * 1000.0, "direct_ms": direct_s * 1000.0,
         "view": data_url(&frame.view)?, "direct": data_url(&direct.view)?, "flip_map": data_url(&flip_image)?,
     }))
 }

@@ -1,14 +1,14 @@
 //! State that all requests share.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
 
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 use crate::config::GatewayConfig;
 use crate::scenes::Scenes;
-use crate::single_views::SingleViews;
+use crate::single_views;
 
 /// Pages that wait for a place.
 const MAX_WAITING: usize = 64;
@@ -22,10 +22,11 @@ pub(crate) struct Gateway {
     pub(crate) shutdown: CancellationToken,
     /// Places of all pages, those that wait included.
     pub(crate) pages: Arc<Semaphore>,
-    pub(crate) single_views: SingleViews,
+    /// Places of views over HTTP.
+    pub(crate) single_views: Arc<Semaphore>,
     /// The place of a view that is compared.
     pub(crate) comparison: Semaphore,
-    last_visitor: AtomicU64,
+    pub(crate) last_visitor: AtomicU64,
 }
 
 impl Gateway {
@@ -34,15 +35,11 @@ impl Gateway {
             scenes: Scenes::new(config.clone()),
             visitors: Semaphore::new(config.max_visitors),
             pages: Arc::new(Semaphore::new(config.max_visitors + MAX_WAITING)),
-            single_views: SingleViews::default(),
+            single_views: Arc::new(Semaphore::new(single_views::PLACES)),
             comparison: Semaphore::new(1),
             last_visitor: AtomicU64::default(),
             config,
             shutdown,
         }
-    }
-
-    pub(crate) fn next_visitor(&self) -> u64 {
-        self.last_visitor.fetch_add(1, Ordering::Relaxed)
     }
 }

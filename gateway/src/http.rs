@@ -24,7 +24,7 @@ use crate::visitor::visit;
 /// All requests that are answered.
 pub(crate) fn router(gateway: Arc<Gateway>) -> Router {
     Router::new()
-        .route("/", get(index))
+        .route("/", get(async |headers: HeaderMap| assets::answer("index.html", &headers)))
         .route("/{file}", get(file))
         .route("/api/v1/socket", get(socket))
         .route("/api/v1/{picture}", get(picture))
@@ -52,10 +52,6 @@ async fn admitted(State(gateway): State<Arc<Gateway>>, request: Request, next: N
             Refusal(StatusCode::UNAUTHORIZED, reason.to_owned()).into_response()
         }
     }
-}
-
-async fn index(headers: HeaderMap) -> Response {
-    assets::answer("index.html", &headers)
 }
 
 async fn file(Path(name): Path<String>, headers: HeaderMap) -> Response {

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use axum::http::StatusCode;
 use client::{Client, ClientError, Session};
 use cluster::{SessionEvent, SessionRequest, SessionStage, Timeline};
 use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::task::JoinSet;
 
+use crate::responses::Refusal;
 use crate::visits::Visits;
 
 /// The delays between attempts to reach the coordinator.
@@ -37,14 +39,6 @@ pub(crate) enum SessionState {
     },
     /// It is open.
     Open(Arc<Session>),
-}
-
-/// A session did not open in time.
-#[derive(Debug, thiserror::Error)]
-#[error("the scene's session is not open yet: {stage}: {detail}")]
-pub(crate) struct NotOpen {
-    stage: &'static str,
-    detail: String,
 }
 
 /// A session that all visitors of a scene share.
@@ -96,13 +90,16 @@ impl KeptSession {
     }
 
     /// The session, once it is open.
-    pub(crate) async fn opened(&self) -> Result<Arc<Session>, NotOpen> {
+    pub(crate) async fn opened(&self) -> Result<Arc<Session>, Refusal> {
         let mut state = self.state.clone();
         let opened = state.wait_for(|state| matches!(state, SessionState::Open(_)));
         let _ = tokio::time::timeout(OPEN_WITHIN, opened).await;
         match &*self.state.borrow() {
             SessionState::Open(session) => Ok(session.clone()),
-            SessionState::Waiting { stage, detail } => Err(NotOpen { stage, detail: detail.clone() }),
+            SessionState::Waiting { stage, detail } => {
+                let reason = format!("the scene's session is not open yet: {stage}: {detail}");
+                Err(Refusal(StatusCode::SERVICE_UNAVAILABLE, reason))
+            }
         }
     }
 
@@ -130,12 +127,6 @@ struct Keeper {
     failed: mpsc::Receiver<Arc<Session>>,
 }
 
-/// Why a session is closed.
-enum Closed {
-    Failed,
-    Left,
-}
-
 impl Keeper {
     async fn run(mut self, first: FirstOpened) {
         let mut delay = FIRST_DELAY;
@@ -151,7 +142,7 @@ impl Keeper {
                     let opened_at = Instant::now();
                     let session = Arc::new(session);
                     self.changes.send_replace(SessionState::Open(session.clone()));
-                    if let Closed::Left = self.follow(&session).await {
+                    if self.follow(&session).await {
                         self.wait("preparing", "the scene's session is opened");
                         is_wanted = false;
                         self.request.frames_per_s = self.usual_rate;
@@ -211,33 +202,30 @@ impl Keeper {
         }
     }
 
-    /// Has the session's demand follow the visitors, until it fails or they have left.
-    async fn follow(&mut self, session: &Arc<Session>) -> Closed {
+    /// Has the session's demand follow the visitors, until it fails or they have left. Returns whether they have left.
+    async fn follow(&mut self, session: &Arc<Session>) -> bool {
         let mut ticks = tokio::time::interval(FOLLOW);
         let mut told = 1;
         loop {
             tokio::select! {
                 failed = self.failed.recv() => if failed.is_none_or(|failed| Arc::ptr_eq(&failed, session)) {
-                    return Closed::Failed;
+                    return false;
                 },
                 _ = ticks.tick() => {
                     if self.visits.is_left(Instant::now(), LINGERS) {
-                        return Closed::Left;
+                        return true;
                     }
-                    self.ask_for(self.visits.active(Instant::now()).max(1) as u32, &mut told, session).await;
+                    let active = self.visits.active(Instant::now()).max(1) as u32;
+                    // A session without a rate follows nobody.
+                    if active == told || self.request.frames_per_s.is_none() {
+                        continue;
+                    }
+                    match session.change(active, self.request.frames_per_s).await {
+                        Ok(()) => told = active,
+                        Err(error) => tracing::debug!(active, %error, "the demand is not changed"),
+                    }
                 }
             }
-        }
-    }
-
-    async fn ask_for(&self, active: u32, told: &mut u32, session: &Session) {
-        // A session without a rate follows nobody.
-        if active == *told || self.request.frames_per_s.is_none() {
-            return;
-        }
-        match session.change(active, self.request.frames_per_s).await {
-            Ok(()) => *told = active,
-            Err(error) => tracing::debug!(active, %error, "the demand is not changed"),
         }
     }
 }

@@ -111,7 +111,8 @@ impl Page {
                     if self.heard.elapsed() > SILENCE {
                         return Err(End::Gone);
                     }
-                    self.ping()?;
+                    let now_s = self.started.elapsed().as_secs_f64();
+                    self.send(Message::Ping(Bytes::copy_from_slice(&now_s.to_le_bytes())))?;
                     self.tell(&ToPage::Alive)?;
                     continue;
                 }
@@ -168,8 +169,10 @@ impl Page {
         let earned = MAX_MESSAGES_PER_S * now.duration_since(self.heard).as_secs_f64();
         self.allowance = (self.allowance + earned).min(MAX_BURST) - 1.0;
         self.heard = now;
-        let too_many = || End::Refused(format!("messages: more than {MAX_MESSAGES_PER_S} a second"));
-        if self.allowance < 0.0 { Err(too_many()) } else { Ok(()) }
+        if self.allowance < 0.0 {
+            return Err(End::Refused(format!("messages: more than {MAX_MESSAGES_PER_S} a second")));
+        }
+        Ok(())
     }
 
     fn learn_round_trip(&mut self, sent: &[u8]) {
@@ -179,11 +182,6 @@ impl Page {
         if (0.0..SILENCE.as_secs_f64()).contains(&rtt_s) {
             self.rtt_s = Some(self.rtt_s.map_or(rtt_s, |least| least.min(rtt_s)));
         }
-    }
-
-    fn ping(&self) -> Result<(), End> {
-        let now_s = self.started.elapsed().as_secs_f64();
-        self.send(Message::Ping(Bytes::copy_from_slice(&now_s.to_le_bytes())))
     }
 
     /// The scene that the first message names.

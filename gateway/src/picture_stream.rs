@@ -6,10 +6,10 @@ use std::time::Instant;
 use bytes::Bytes;
 use client::{ClientError, ClientId, EncodedFrame, EncodedLiveView, PictureQuality, Session};
 use codec::FrameCodec;
-use depth_image::PinholeCamera;
+use depth_image::{Antialias, PinholeCamera};
 
 use crate::protocol::{self, PictureHeader, PictureTimes, Pose};
-use crate::rate::Chosen;
+use crate::rate::Rung;
 use crate::still::PictureLight;
 
 /// Poses that are remembered: a client replaces those that were not sent.
@@ -20,8 +20,8 @@ const MAX_ASKED: usize = 512;
 pub(crate) struct Asked {
     pub(crate) pose: Pose,
     pub(crate) light: PictureLight,
-    /// The choice that it was asked for by; `None` for a still.
-    chosen: Option<Chosen>,
+    /// The rung that was chosen for it; `None` for a still.
+    chosen: Option<Rung>,
     /// The live stream's own number.
     frame: u64,
     arrived: Instant,
@@ -29,14 +29,12 @@ pub(crate) struct Asked {
     replaced: u64,
 }
 
-/// A picture to ask for, beside its pose.
-#[derive(Debug)]
+/// A picture of a pose to ask for.
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Wanted {
     pub(crate) set_index: u32,
-    pub(crate) quality: PictureQuality,
+    pub(crate) samples: Antialias,
     pub(crate) light: PictureLight,
-    /// The choice in motion; `None` for a still.
-    pub(crate) chosen: Option<Chosen>,
 }
 
 /// A picture that was sent and not shown yet.
@@ -45,7 +43,7 @@ struct Sent {
     number: u64,
     frame: u64,
     /// `None` for a picture whose age says nothing of the link: a still, one that was discarded, or one that repeats a pose.
-    chosen: Option<Chosen>,
+    chosen: Option<Rung>,
 }
 
 /// What the page is told of a picture, beside its frame's own header.
@@ -76,14 +74,20 @@ impl PictureStream {
         Self { view: session.live_encoded(client), last: 0, asked: VecDeque::new(), sent: VecDeque::new() }
     }
 
-    /// Asks for a picture of a pose.
-    pub(crate) fn ask(&mut self, pose: Pose, camera: PinholeCamera, wanted: Wanted) -> Result<(), ClientError> {
-        let Wanted { set_index, quality, light, chosen } = wanted;
-        let frame = self.view.set_pose(camera, set_index, quality)?;
+    /// Asks for a picture of a pose; `chosen` is its rung in motion.
+    pub(crate) fn ask(
+        &mut self,
+        pose: Pose,
+        camera: PinholeCamera,
+        quality: PictureQuality,
+        wanted: Wanted,
+        chosen: Option<Rung>,
+    ) -> Result<(), ClientError> {
+        let frame = self.view.set_pose(camera, wanted.set_index, quality)?;
         if self.asked.len() >= MAX_ASKED {
             self.asked.pop_front();
         }
-        self.asked.push_back(Asked { pose, light, chosen, frame, arrived: Instant::now(), replaced: 0 });
+        self.asked.push_back(Asked { pose, light: wanted.light, chosen, frame, arrived: Instant::now(), replaced: 0 });
         Ok(())
     }
 
@@ -111,8 +115,8 @@ impl PictureStream {
         }
     }
 
-    /// The choice that a picture was made by that was sent and not shown yet.
-    pub(crate) fn chosen_for(&self, number: u64) -> Option<Chosen> {
+    /// The rung of a picture that was sent and not shown yet.
+    pub(crate) fn chosen_for(&self, number: u64) -> Option<Rung> {
         self.sent.iter().find(|sent| sent.number == number)?.chosen
     }
 
@@ -127,7 +131,6 @@ impl PictureStream {
     /// The message of a picture, which is sent now.
     pub(crate) fn message(&mut self, frame: &EncodedFrame, asked: &Asked, about: About) -> Bytes {
         let number = asked.pose.number;
-        let size_px = frame.header.size_px;
         let chosen = asked.chosen.filter(|_| number > self.last);
         self.last = number;
         self.sent.push_back(Sent { number, frame: frame.request.frame, chosen });
@@ -143,7 +146,7 @@ impl PictureStream {
             media_type,
             jpeg_quality,
             rtt_ms: about.rtt_s.map(|rtt_s| rtt_s * 1000.0),
-            size_px: size_px.to_array(),
+            size_px: header.size_px.to_array(),
             bytes: header.color_bytes as usize,
             camera: asked.pose.camera,
             set: header.sample_set_id.to_string(),
@@ -162,14 +165,15 @@ impl PictureStream {
     }
 }
 
+fn ms(seconds: f64) -> f64 {
+    seconds * 1000.0
+}
+
 /// The parts of a picture's time between its pose's arrival and its departure, which add up.
 fn times(frame: &EncodedFrame, arrived: Instant, leaves: Instant) -> PictureTimes {
-    let ms = |seconds: f64| seconds * 1000.0;
-    let between = |from: Instant, to: Instant| ms(to.saturating_duration_since(from).as_secs_f64());
     let at = &frame.header.stage_times;
-    let to_send = between(arrived, frame.sent);
-    let forward = between(frame.received, leaves);
-    let gateway = between(arrived, leaves);
+    let [to_send, forward, gateway] = [(arrived, frame.sent), (frame.received, leaves), (arrived, leaves)]
+        .map(|(from, to)| ms(to.saturating_duration_since(from).as_secs_f64()));
     let stages_s = at.set_wait_s + at.credit_wait_s + at.queue_s + at.batch_s + at.encode_s + at.send_wait_s;
     PictureTimes {
         gateway,

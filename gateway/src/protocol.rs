@@ -55,9 +55,10 @@ pub(crate) struct Pose {
 /// A quality by its name.
 pub(crate) fn quality<'de, D: Deserializer<'de>>(text: D) -> Result<Option<LightCacheQuality>, D::Error> {
     let Some(text) = Option::<String>::deserialize(text)? else { return Ok(None) };
-    let names = || LightCacheQuality::ALL.map(LightCacheQuality::name).join(", ");
-    let unknown = || D::Error::custom(format!("quality: {text:?}, must be one of {}", names()));
-    LightCacheQuality::named(&text).map(Some).ok_or_else(unknown)
+    LightCacheQuality::named(&text).map(Some).ok_or_else(|| {
+        let names = LightCacheQuality::ALL.map(LightCacheQuality::name).join(", ");
+        D::Error::custom(format!("quality: {text:?}, must be one of {names}"))
+    })
 }
 
 /// The gateway's messages.

@@ -29,7 +29,7 @@ const LONGEST_PAUSE_S: f64 = 64.0;
 
 /// A height, and the quality of shared light at that height, both by their places. A greater rung costs more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Rung {
+pub(crate) struct Rung {
     height: usize,
     quality: usize,
 }
@@ -41,28 +41,22 @@ pub(crate) struct Shown {
     pub(crate) age_s: f64,
     /// The least round trip so far.
     pub(crate) rtt_s: f64,
-    /// The choice that the picture was made by.
-    pub(crate) chosen: Chosen,
+    /// The rung that was chosen for the picture.
+    pub(crate) chosen: Rung,
 }
 
-/// The choice for the next pictures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Chosen {
-    rung: Rung,
-}
-
-impl Chosen {
+impl Rung {
     pub(crate) fn height_px(self) -> u32 {
-        HEIGHTS_PX[self.rung.height]
+        HEIGHTS_PX[self.height]
     }
 
     pub(crate) fn jpeg_quality(self) -> u8 {
-        JPEG_QUALITIES[self.rung.height]
+        JPEG_QUALITIES[self.height]
     }
 
     /// The quality of shared light, where light is shared.
     pub(crate) fn light(self) -> LightCacheQuality {
-        LightCacheQuality::ALL[self.rung.quality]
+        LightCacheQuality::ALL[self.quality]
     }
 
     /// The size of a picture for a canvas. Its pixels need not be square.
@@ -103,10 +97,11 @@ impl Default for Rate {
 }
 
 impl Rate {
-    pub(crate) fn chosen(&self) -> Chosen {
+    /// The rung of the next pictures.
+    pub(crate) fn chosen(&self) -> Rung {
         let height = self.rung.height.min(self.highest);
         let quality = if height < self.rung.height { QUALITIES_PER_HEIGHT - 1 } else { self.rung.quality };
-        Chosen { rung: Rung { height, quality: quality.min(self.qualities_at(height) - 1) } }
+        Rung { height, quality: quality.min(self.qualities_at(height) - 1) }
     }
 
     /// Pictures are not larger than the canvas.
@@ -144,12 +139,11 @@ impl Rate {
         if shown.chosen != self.chosen() {
             return;
         }
-        let rung = shown.chosen.rung;
+        let rung = shown.chosen;
         self.ages_s.push(shown.age_s);
-        let is_far_beyond = |age_s: &f64| age_s - shown.rtt_s > 2.0 * BUDGET_S;
         let below = self.below(rung);
         if let Some(below) = below.filter(|_| self.ages_s.len() >= 2)
-            && self.ages_s.iter().rev().take(2).all(is_far_beyond)
+            && self.ages_s.iter().rev().take(2).all(|age_s| age_s - shown.rtt_s > 2.0 * BUDGET_S)
         {
             return self.fail(now_s, rung, below);
         }
@@ -220,9 +214,9 @@ mod tests {
         }
 
         /// The age of a picture of this height, beside 16:9, with noise of a tenth. Each quality takes a third more time.
-        fn age_s(&mut self, chosen: Chosen) -> f64 {
+        fn age_s(&mut self, chosen: Rung) -> f64 {
             let pixels = f64::from(chosen.height_px()).powi(2) * 16.0 / 9.0;
-            let pixel_s = self.pixel_s * 1.33_f64.powi(chosen.rung.quality as i32);
+            let pixel_s = self.pixel_s * 1.33_f64.powi(chosen.quality as i32);
             let work_s = 0.008 + pixels * pixel_s + pixels * 0.2 / self.bytes_s;
             self.rtt_s + work_s * (0.95 + 0.1 * self.uniform())
         }
@@ -270,7 +264,7 @@ mod tests {
             let mut rate = Rate::default();
             link.run(&mut rate, 0.0, 30.0);
             let ages: Vec<f64> = (0..99).map(|_| link.age_s(rate.chosen())).collect();
-            let lowest = Chosen { rung: Rung { height: 0, quality: 0 } };
+            let lowest = Rung { height: 0, quality: 0 };
             let fits = link.age_s(lowest) - link.rtt_s < 0.9 * BUDGET_S;
             assert!(!fits || median(&ages) <= link.rtt_s + 1.1 * BUDGET_S, "seed {seed}: {:?}", rate.chosen());
         }
@@ -323,14 +317,14 @@ mod tests {
     fn a_picture_that_is_far_too_old_makes_the_next_ones_smaller_at_once() {
         let mut rate = Rate::default();
         for number in 0..2 {
-            rate.step(number as f64 * 0.05, Shown { age_s: 1.0, rtt_s: 0.01, chosen: Chosen { rung: FIRST } });
+            rate.step(number as f64 * 0.05, Shown { age_s: 1.0, rtt_s: 0.01, chosen: FIRST });
         }
         assert_eq!(rate.chosen().height_px(), HEIGHTS_PX[FIRST.height - 1]);
     }
 
     #[test]
     fn sizes_keep_the_canvas_shape_to_half_a_step() {
-        let chosen = |height| Chosen { rung: Rung { height, quality: 0 } };
+        let chosen = |height| Rung { height, quality: 0 };
         assert_eq!(chosen(2).size_px(UVec2::new(640, 360)), UVec2::new(320, 180));
         assert_eq!(chosen(4).size_px(UVec2::new(640, 360)), UVec2::new(640, 360));
         assert_eq!(chosen(0).size_px(UVec2::new(1, 10_000)), UVec2::new(32, 90));

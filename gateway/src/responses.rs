@@ -9,9 +9,7 @@ use futures_util::stream;
 use serde_json::Value;
 use tokio::sync::OwnedSemaphorePermit;
 
-use crate::kept_session::NotOpen;
 use crate::scenes::SceneError;
-use crate::single_views::SingleViewError;
 
 const CHUNK_BYTES: usize = 64 << 10;
 
@@ -49,24 +47,6 @@ impl From<SceneError> for Refusal {
 impl From<client::ClientError> for Refusal {
     fn from(error: client::ClientError) -> Self {
         Self(StatusCode::BAD_GATEWAY, error.to_string())
-    }
-}
-
-impl From<NotOpen> for Refusal {
-    fn from(error: NotOpen) -> Self {
-        Self(StatusCode::SERVICE_UNAVAILABLE, error.to_string())
-    }
-}
-
-impl From<SingleViewError> for Refusal {
-    fn from(error: SingleViewError) -> Self {
-        match error {
-            SingleViewError::Full => Self(StatusCode::TOO_MANY_REQUESTS, error.to_string()),
-            SingleViewError::PlanOver => Self(StatusCode::SERVICE_UNAVAILABLE, error.to_string()),
-            SingleViewError::NotOpen(error) => error.into(),
-            SingleViewError::Client(error @ client::ClientError::Invalid { .. }) => Self::bad(error),
-            SingleViewError::Client(error) => error.into(),
-        }
     }
 }
 

@@ -106,9 +106,10 @@ impl Scenes {
         let names: Vec<String> = offers.iter().map(|offer| offer.name.clone()).collect();
         let offered = names.join(", ");
         self.known.lock().names = names;
-        let is_wanted = |offer: &OfferStatus| name.is_none_or(|name| name == offer.name);
-        let unknown = || SceneError::Unknown { name: name.unwrap_or("(the first)").to_owned(), offered };
-        let offer = offers.iter().find(|offer| is_wanted(offer)).ok_or_else(unknown)?;
+        let offer = offers
+            .iter()
+            .find(|offer| name.is_none_or(|name| name == offer.name))
+            .ok_or_else(|| SceneError::Unknown { name: name.unwrap_or("(the first)").to_owned(), offered })?;
         let mut known = self.known.lock();
         if let Some(scene) = known.scenes.get(&offer.name).filter(|scene| scene.offer == *offer) {
             return Ok(scene.clone());
@@ -143,10 +144,9 @@ impl SceneSessions {
         let moving = offer.period_s.map(|period_s| moving(shown.clone(), period_s));
         let offered = offer.settings.method.as_deref().and_then(config.methods.quality_of);
         let quality = config.quality.or(offered).unwrap_or(LightCacheQuality::Fine);
-        let start = |request, first| KeptSession::start(&config.coordinator, request, first);
         Ok(Self {
-            shown: start(shown, first),
-            moving: moving.map(|request| start(request, FirstOpened::AtVisit)),
+            shown: KeptSession::start(&config.coordinator, shown, first),
+            moving: moving.map(|request| KeptSession::start(&config.coordinator, request, FirstOpened::AtVisit)),
             offer,
             space,
             home,

@@ -1,19 +1,17 @@
 //! Single views over HTTP: some of each session are made at a time, and others wait.
 
-use std::sync::Arc;
-
+use axum::http::StatusCode;
 use client::{ClientError, Frame, Session, ViewRequest};
 use cluster::SessionPlan;
 use depth_image::{PinholeCamera, ViewPlanes};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::OwnedSemaphorePermit;
 
-use crate::kept_session::{KeptSession, NotOpen};
+use crate::gateway::Gateway;
+use crate::kept_session::KeptSession;
+use crate::responses::Refusal;
 
 /// Views that are made, wait, or are read.
-const PLACES: usize = 68;
-
-/// The places of views over HTTP.
-pub(crate) struct SingleViews(Arc<Semaphore>);
+pub(crate) const PLACES: usize = 68;
 
 /// A view, and the plan that it was made under.
 pub(crate) struct SingleView {
@@ -24,30 +22,7 @@ pub(crate) struct SingleView {
     pub(crate) place: OwnedSemaphorePermit,
 }
 
-/// Why a view is not made.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum SingleViewError {
-    /// Too many wait.
-    #[error("{PLACES} views are under way already: try again later")]
-    Full,
-    /// The scene's session is not open.
-    #[error(transparent)]
-    NotOpen(#[from] NotOpen),
-    /// The cluster's reason.
-    #[error(transparent)]
-    Client(#[from] ClientError),
-    /// The cameras of the view are those of a plan that is over.
-    #[error("the plan has changed: try again")]
-    PlanOver,
-}
-
-impl Default for SingleViews {
-    fn default() -> Self {
-        Self(Arc::new(Semaphore::new(PLACES)))
-    }
-}
-
-impl SingleViews {
+impl Gateway {
     /// One view: of a moment of a scene that moves, else in its finished light. By a method of the session's samples where one is
     /// named.
     pub(crate) async fn draw(
@@ -57,11 +32,14 @@ impl SingleViews {
         planes: ViewPlanes,
         method: Option<String>,
         moment: u32,
-    ) -> Result<SingleView, SingleViewError> {
+    ) -> Result<SingleView, Refusal> {
         // A session that does not open takes no place from others.
         let session = kept.opened().await?;
-        let place = self.0.clone().try_acquire_owned().map_err(|_| SingleViewError::Full)?;
-        let _made = kept.single_views.acquire().await.map_err(|_| SingleViewError::Full)?;
+        let place = self.single_views.clone().try_acquire_owned().map_err(|_| {
+            let reason = format!("{PLACES} views are under way already: try again later");
+            Refusal(StatusCode::TOO_MANY_REQUESTS, reason)
+        })?;
+        let _made = kept.single_views.acquire().await.map_err(Refusal::internal)?;
         match made(&session, camera, planes, method, moment).await {
             Ok((frame, plan)) => Ok(SingleView { frame, plan, place }),
             Err(error) => {
@@ -69,7 +47,10 @@ impl SingleViews {
                 if !kept.visits.has_pages() {
                     kept.has_failed(session, &error);
                 }
-                Err(error.into())
+                Err(match error {
+                    ClientError::Invalid { .. } => Refusal::bad(error),
+                    error => error.into(),
+                })
             }
         }
     }
@@ -87,8 +68,8 @@ async fn made(
     let set_index = if timeline.moves() { moment } else { timeline.set_count - 1 };
     let request = ViewRequest { frame: 1, set_index, camera };
     let frames = session.render_views_with(planes, method, [request])?.all().await?;
-    let none = || ClientError::Ended { reason: "no frame was received".to_owned() };
-    let frame = frames.into_iter().next().ok_or_else(none)?;
+    let frame = frames.into_iter().next();
+    let frame = frame.ok_or_else(|| ClientError::Ended { reason: "no frame was received".to_owned() })?;
     let plan_epoch = frame.header.sample_set_id.plan_epoch;
     let plan = [plan, session.plan()].into_iter().find(|plan| plan.assignment.plan_epoch == plan_epoch);
     Ok((frame, plan))
@@ -96,8 +77,12 @@ async fn made(
 
 impl SingleView {
     /// The number of the first sample camera of its view cell.
-    pub(crate) fn first_camera(&self) -> Result<usize, SingleViewError> {
-        let workload = &self.plan.as_ref().ok_or(SingleViewError::PlanOver)?.assignment.workload;
+    pub(crate) fn first_camera(&self) -> Result<usize, Refusal> {
+        let plan = self
+            .plan
+            .as_ref()
+            .ok_or_else(|| Refusal(StatusCode::SERVICE_UNAVAILABLE, "the plan has changed: try again".to_owned()))?;
+        let workload = &plan.assignment.workload;
         Ok(workload.cameras_of_cell(self.frame.header.cell as usize).map_or(0, |cameras| cameras.start))
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::extract::{Query, State};
 use axum::response::Response;
-use cluster::{AchievedTime, ClusterStatus, Costs, NodeStatus, Policy, SessionPlan, SharedLightCosts, WorkloadStatus};
+use cluster::{AchievedTime, ClusterStatus, NodeStatus, Policy, SessionPlan, WorkloadStatus};
 use depth_image::SampleCamera;
 use pictures::camera_frame;
 use serde::Deserialize;
@@ -31,18 +31,15 @@ pub(crate) async fn cameras(
     let shown = scene.session_of(query.moment);
     let _visit = shown.visits.begin();
     let workload = shown.opened().await?.plan().assignment.workload;
-    let cells = (0..workload.view_cell_count()).filter_map(|cell| Some((cell, workload.cameras_of_cell(cell)?)));
-    let frames: Vec<Value> = cells
-        .flat_map(|(cell, cameras)| {
-            let cameras = SampleCamera::references(&workload.sample_cameras[cameras]);
-            cameras.into_iter().map(move |camera| (cell, camera))
-        })
-        .map(|(cell, camera)| {
+    let mut frames = Vec::new();
+    for cell in 0..workload.view_cell_count() {
+        let cameras = workload.cameras_of_cell(cell).map_or(&[][..], |cameras| &workload.sample_cameras[cameras]);
+        for camera in SampleCamera::references(cameras) {
             let mut frame = camera_frame(&camera, scene.offer.source_space);
             frame.insert("cell".to_owned(), json!(cell));
-            Value::Object(frame)
-        })
-        .collect();
+            frames.push(Value::Object(frame));
+        }
+    }
     Ok(as_json(&json!({ "camera_model": "PINHOLE", "frames": frames })))
 }
 
@@ -66,9 +63,9 @@ fn described(status: &ClusterStatus, visitors: usize) -> Value {
 /// A node, with its roles in all plans and its busiest second.
 fn described_node(status: &ClusterStatus, node: &NodeStatus) -> Value {
     let name = node.node_name.as_str();
-    let assignments = || status.workloads.iter().filter_map(|workload| Some(&workload.plan.as_ref()?.assignment));
-    let samples = assignments().any(|plan| plan.samplers.iter().any(|share| share.node_name == name));
-    let composites = assignments().any(|plan| plan.composites(name));
+    let plans: Vec<&SessionPlan> = status.workloads.iter().filter_map(|workload| workload.plan.as_ref()).collect();
+    let samples = plans.iter().any(|plan| plan.assignment.samplers.iter().any(|share| share.node_name == name));
+    let composites = plans.iter().any(|plan| plan.assignment.composites(name));
     let roles: Vec<&str> = [(samples, "sampler"), (composites, "compositor")]
         .into_iter()
         .filter_map(|(is, role)| is.then_some(role))
@@ -83,15 +80,11 @@ fn described_workload(workload: &WorkloadStatus) -> Value {
         "number": workload.number, "sessions": workload.session_count, "viewers": workload.viewer_count,
         "views_per_set": workload.views_per_set, "utilisation": workload.utilisation,
         "promise": workload.promise.as_ref().map(ToString::to_string),
-        "shared_light": workload.shared_light.as_ref().map(described_light),
+        "shared_light": workload.shared_light.as_ref().map(|light| json!({
+            "known_ratio": light.known_ratio, "surfaces_s": light.surfaces_s, "look_up_s": light.look_up_s,
+            "unknown_points_s": light.unknown_s,
+        })),
         "plan": workload.plan.as_ref().map(|plan| described_plan(plan, &workload.achieved)),
-    })
-}
-
-fn described_light(light: &SharedLightCosts) -> Value {
-    json!({
-        "known_ratio": light.known_ratio, "surfaces_s": light.surfaces_s, "look_up_s": light.look_up_s,
-        "unknown_points_s": light.unknown_s,
     })
 }
 
@@ -115,14 +108,11 @@ fn described_plan(plan: &SessionPlan, achieved: &[AchievedTime]) -> Value {
         "epoch": assignment.plan_epoch, "policy": assignment.policy.to_string(), "reason": plan.reason,
         "samplers": samplers, "compositors": compositors, "cells": assignment.workload.view_cell_count(),
         "common_cells": assignment.workload.common_cells.len(),
-        "costs": described_costs(&plan.costs), "policies": policies,
-    })
-}
-
-fn described_costs(costs: &Costs) -> Value {
-    json!({
-        "sample_image_s": costs.sample_image_s, "direct_view_s": costs.direct_view_s,
-        "reconstruct_view_s": costs.reconstruct_view_s, "load_set_s": costs.load_set_s,
-        "encode_view_s": costs.encode_view_s,
+        "costs": {
+            "sample_image_s": plan.costs.sample_image_s, "direct_view_s": plan.costs.direct_view_s,
+            "reconstruct_view_s": plan.costs.reconstruct_view_s, "load_set_s": plan.costs.load_set_s,
+            "encode_view_s": plan.costs.encode_view_s,
+        },
+        "policies": policies,
     })
 }

@@ -62,7 +62,7 @@ pub(crate) struct Still {
     pub(crate) made_s: f64,
 }
 
-/// The stills of one visitor.
+/// What the stills of a visitor may be.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stills {
     /// The quality of shared light that the visitor wants.

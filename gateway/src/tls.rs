@@ -29,13 +29,10 @@ pub enum TlsError {
 /// # Errors
 /// The files cannot be read, or do not belong together.
 pub fn tls_config(certificates: &Path, key: &Path) -> Result<Arc<ServerConfig>, TlsError> {
-    let fault = |file: &Path| {
-        let file = file.to_owned();
-        move |source| TlsError::File { file, source }
-    };
-    let chain = CertificateDer::pem_file_iter(certificates).map_err(fault(certificates))?;
-    let chain = chain.collect::<Result<Vec<_>, _>>().map_err(fault(certificates))?;
-    let key = PrivateKeyDer::from_pem_file(key).map_err(fault(key))?;
+    let chain = CertificateDer::pem_file_iter(certificates)
+        .and_then(Iterator::collect)
+        .map_err(|source| TlsError::File { file: certificates.to_owned(), source })?;
+    let key = PrivateKeyDer::from_pem_file(key).map_err(|source| TlsError::File { file: key.to_owned(), source })?;
     let config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
         .with_safe_default_protocol_versions()?
         .with_no_client_auth()

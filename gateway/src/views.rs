@@ -61,13 +61,9 @@ enum Plane {
 
 impl ViewQuery {
     fn camera(&self, scene: &SceneSessions, max_px: UVec2) -> Result<PinholeCamera, Refusal> {
-        let point = |field: &str, text: &Option<String>, home: [f64; 3]| match text {
-            None => Ok(home),
-            Some(text) => numbers(text).ok_or_else(|| Refusal::bad(format!("{field}: {text:?}, must be X,Y,Z"))),
-        };
         let page = PageCamera {
-            eye: point("eye", &self.eye, scene.home.eye)?,
-            target: point("target", &self.target, scene.home.target)?,
+            eye: point_or("eye", self.eye.as_deref(), scene.home.eye)?,
+            target: point_or("target", self.target.as_deref(), scene.home.target)?,
             fov_y_deg: self.fov.unwrap_or(scene.home.fov_y_deg),
         };
         let size_px = match &self.size {
@@ -86,6 +82,11 @@ impl ViewQuery {
         let at = numbers(text).map(UVec2::from_array).filter(|at| at.cmplt(size_px).all());
         at.ok_or_else(|| Refusal::bad(format!("at: {text:?}, must be COLUMN,ROW within the view")))
     }
+}
+
+fn point_or(field: &str, text: Option<&str>, home: [f64; 3]) -> Result<[f64; 3], Refusal> {
+    let Some(text) = text else { return Ok(home) };
+    numbers(text).ok_or_else(|| Refusal::bad(format!("{field}: {text:?}, must be X,Y,Z")))
 }
 
 fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
@@ -108,8 +109,8 @@ pub(crate) struct Visited {
 }
 
 impl Visited {
-    /// The scene and the camera of a query, whose view is within `max_px`.
-    pub(crate) async fn of(gateway: &Gateway, query: &ViewQuery, max_px: UVec2) -> Result<Self, Refusal> {
+    /// The scene and the camera of a query, whose view is no larger than a still.
+    pub(crate) async fn of(gateway: &Gateway, query: &ViewQuery) -> Result<Self, Refusal> {
         let scene = gateway.scenes.visit(query.scene.as_deref()).await?;
         let moment = query.moment;
         let moments = scene.timeline().set_count;
@@ -117,7 +118,7 @@ impl Visited {
             return Err(Refusal::bad(format!("moment: {moment}, must be below {moments}")));
         }
         let visit = scene.session_of(moment).visits.begin();
-        let camera = query.camera(&scene, max_px)?;
+        let camera = query.camera(&scene, gateway.config.max_still_px)?;
         let quality = query.quality.unwrap_or(scene.quality);
         Ok(Self { scene, camera, moment, quality, _visit: visit })
     }
@@ -140,7 +141,7 @@ impl Visited {
         let is_near = session.plan().assignment.workload.has_cell_near(&self.camera);
         let planes = ViewPlanes { tone: session.tone(), ..planes };
         let method = if is_near { self.method(gateway, &session) } else { Some(DIRECT.to_owned()) };
-        Ok(gateway.single_views.draw(shown, self.camera, planes, method, self.moment).await?)
+        gateway.draw(shown, self.camera, planes, method, self.moment).await
     }
 }
 
@@ -155,7 +156,7 @@ pub(crate) async fn picture(
         "view.jpg" => (FrameCodec::Jpeg { quality: QUALITY }, "image/jpeg"),
         _ => return Err(Refusal(StatusCode::NOT_FOUND, "the pictures are view.png and view.jpg".to_owned())),
     };
-    let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
+    let visited = Visited::of(&gateway, &query).await?;
     let planes = match query.show {
         // As finished stills are.
         Plane::Color => ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::default() },
@@ -165,12 +166,12 @@ pub(crate) async fn picture(
     let drawn = visited.draw(&gateway, planes).await?;
     let first_camera = if query.show == Plane::Provenance { drawn.first_camera()? } else { 0 };
     let SingleView { frame: Frame { view, .. }, place, .. } = drawn;
-    let encode = move || {
+    let encoded = tokio::task::spawn_blocking(move || {
         let size_px = view.size_px;
         let (rgb, legend) = colored(view, query.show, first_camera)?;
         encode_frame(codec, size_px, &rgb).ok().map(|encoded| (encoded, legend))
-    };
-    let encoded = tokio::task::spawn_blocking(encode).await.map_err(Refusal::internal)?;
+    });
+    let encoded = encoded.await.map_err(Refusal::internal)?;
     let (encoded, legend) = encoded.ok_or_else(|| Refusal::internal("the view lacks a plane"))?;
     let mut response = held(media_type, encoded, place);
     if let Some(legend) = header_of(&legend) {
@@ -200,9 +201,9 @@ pub(crate) async fn depth(
     State(gateway): State<Arc<Gateway>>,
     Query(query): Query<ViewQuery>,
 ) -> Result<Response, Refusal> {
-    let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
-    let planes = ViewPlanes::WITH_DEPTH;
-    let SingleView { frame: Frame { view, .. }, place, .. } = visited.draw(&gateway, planes).await?;
+    let visited = Visited::of(&gateway, &query).await?;
+    let drawn = visited.draw(&gateway, ViewPlanes::WITH_DEPTH).await?;
+    let SingleView { frame: Frame { view, .. }, place, .. } = drawn;
     let inverse = view.inverse_depth_per_m.ok_or_else(|| Refusal::internal("the view lacks depth"))?;
     let metres_per_unit = visited.scene.space.source_space.metres_per_unit as f32;
     // One over zero is infinite, as it should be.
@@ -227,10 +228,9 @@ pub(crate) async fn point(
     State(gateway): State<Arc<Gateway>>,
     Query(query): Query<ViewQuery>,
 ) -> Result<Response, Refusal> {
-    let visited = Visited::of(&gateway, &query, gateway.config.max_still_px).await?;
+    let visited = Visited::of(&gateway, &query).await?;
     let at = query.pixel(visited.camera.size_px)?;
-    let planes = ViewPlanes::ALL;
-    let drawn = visited.draw(&gateway, planes).await?;
+    let drawn = visited.draw(&gateway, ViewPlanes::ALL).await?;
     let found = surface(&visited, &drawn.frame.view, at, drawn.first_camera()?);
     Ok(as_json(&found.ok_or_else(|| Refusal::internal("the view lacks a plane"))?))
 }

@@ -6,6 +6,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use axum::extract::ws::WebSocket;
 use client::{ClientError, ClientId, EncodedFrame, PictureQuality, Session};
@@ -31,21 +32,6 @@ const MAX_AGE_MS: f64 = 10_000.0;
 /// Plans that are remembered.
 const PLANS: usize = 2;
 
-/// The picture of a pose after another of the same pose.
-#[derive(Debug, Clone, Copy)]
-struct Next {
-    set_index: u32,
-    samples: Antialias,
-    light: PictureLight,
-}
-
-impl Next {
-    /// The same picture once more.
-    fn again(asked: &Asked, frame: &EncodedFrame) -> Self {
-        Self { set_index: frame.request.set_index, samples: frame.header.antialias, light: asked.light }
-    }
-}
-
 /// Serves a page until it leaves.
 pub(crate) async fn visit(socket: WebSocket, gateway: Arc<Gateway>) {
     with_page(socket, &gateway, async |page| serve(page, &gateway).await).await;
@@ -69,14 +55,18 @@ async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
         bounds: [scene.offer.volume.min, scene.offer.volume.max].map(|corner| scene.space.in_source(corner)),
     })?;
     let mut visitor = Visitor {
-        number: gateway.next_visitor(),
+        number: gateway.last_visitor.fetch_add(1, Ordering::Relaxed),
         is_moving: false,
         light_step: 0,
         made_with: None,
         is_finished: false,
         is_drawn: false,
-        most_samples: Antialias::MOST,
-        may_draw: true,
+        stills: Stills {
+            quality: scene.quality,
+            most_samples: Antialias::MOST,
+            may_draw: true,
+            light_steps: scene.shown.light_steps,
+        },
         scene,
         max_still_px: gateway.config.max_still_px,
         methods: gateway.config.methods,
@@ -125,10 +115,7 @@ struct Visitor {
     is_finished: bool,
     /// Whether the last picture was drawn from the scene.
     is_drawn: bool,
-    /// Samples a pixel of a finished still: fewer where the cluster has refused more.
-    most_samples: Antialias,
-    /// Whether stills may be drawn directly: not where the cluster has refused one.
-    may_draw: bool,
+    stills: Stills,
     max_still_px: UVec2,
     methods: SharedLightMethods,
     newest: Option<Pose>,
@@ -218,9 +205,7 @@ impl Visitor {
         let client = ClientId::new();
         let mut motion = PictureStream::new(session, client);
         let mut still = PictureStream::new(session, client);
-        if let Some(pose) = self.newest {
-            self.ask(pose, &mut motion, &mut still)?;
-        }
+        self.ask(Antialias::NONE, &mut motion, &mut still)?;
         loop {
             tokio::select! {
                 message = page.next() => match message? {
@@ -234,9 +219,7 @@ impl Visitor {
                         if !self.is_at(kept) {
                             return Ok(None);
                         }
-                        if let Some(pose) = self.newest {
-                            self.ask(pose, &mut motion, &mut still)?;
-                        }
+                        self.ask(Antialias::NONE, &mut motion, &mut still)?;
                     }
                 },
                 changed = states.changed() => return changed.map(|()| None).map_err(|_| End::Gone),
@@ -254,12 +237,10 @@ impl Visitor {
                 },
                 frame = still.next() => match frame {
                     Ok((frame, asked)) => self.forward(page, session, &mut still, frame, asked)?,
-                    Err(ClientError::Exhausted { .. }) if still.draws() || self.most_samples > Antialias::NONE => {
+                    Err(ClientError::Exhausted { .. }) if still.draws() || self.stills.most_samples > Antialias::NONE => {
                         let samples = self.with_less(&still);
                         still = PictureStream::new(session, client);
-                        if let Some(pose) = self.newest {
-                            self.ask_with(pose, samples, &mut motion, &mut still)?;
-                        }
+                        self.ask(samples, &mut motion, &mut still)?;
                     }
                     Err(error) => return Ok(Some(error)),
                 },
@@ -270,10 +251,10 @@ impl Visitor {
     /// The cluster has refused the last still: gives the samples a pixel to go on with.
     fn with_less(&mut self, still: &PictureStream) -> Antialias {
         if still.draws() {
-            self.may_draw = false;
-            return self.most_samples;
+            self.stills.may_draw = false;
+            return self.stills.most_samples;
         }
-        self.most_samples = fewer(self.most_samples);
+        self.stills.most_samples = fewer(self.stills.most_samples);
         Antialias::NONE
     }
 
@@ -304,6 +285,7 @@ impl Visitor {
                 checked.map_err(|error| End::Refused(error.to_string()))?;
                 self.rate.fit(canvas_px);
                 self.newest = Some(pose);
+                self.stills.quality = pose.quality.unwrap_or(self.scene.quality);
                 self.limit_rate();
                 page.end_still();
                 // A scene that moves passes its first moment, too.
@@ -314,19 +296,10 @@ impl Visitor {
         }
     }
 
-    /// Asks for the picture of a pose. The first still comes soon: more samples follow once its light is finished.
-    fn ask(&self, pose: Pose, motion: &mut PictureStream, still: &mut PictureStream) -> Result<(), End> {
-        self.ask_with(pose, Antialias::NONE, motion, still)
-    }
-
-    /// The same, with so many samples a pixel in a still.
-    fn ask_with(
-        &self,
-        pose: Pose,
-        still_samples: Antialias,
-        motion: &mut PictureStream,
-        still: &mut PictureStream,
-    ) -> Result<(), End> {
+    /// Asks for the picture of the newest pose. The first still has one sample a pixel, so that it comes soon: more samples
+    /// follow once its light is finished.
+    fn ask(&self, still_samples: Antialias, motion: &mut PictureStream, still: &mut PictureStream) -> Result<(), End> {
+        let Some(pose) = self.newest else { return Ok(()) };
         let canvas_px = UVec2::from_array(pose.canvas_px);
         let chosen = self.rate.chosen();
         let (stream, size_px, codec) = if pose.still {
@@ -338,32 +311,30 @@ impl Visitor {
         let camera = camera.map_err(|error| End::Refused(error.to_string()))?;
         let samples = if pose.still { still_samples } else { Antialias::NONE };
         let light = match self.planned {
-            Some(planned) if pose.still => self.stills().light(planned, samples),
+            Some(planned) if pose.still => self.stills.light(planned, samples),
             Some(planned) if planned.is_shared => PictureLight::Shared(chosen.light()),
             _ => PictureLight::Session,
         };
         let set_index = if self.is_moving { pose.moment } else { self.light_step };
-        let next = Next { set_index, samples, light };
-        self.ask_next(pose, camera, codec, next, stream)
+        self.ask_for(pose, camera, codec, Wanted { set_index, samples, light }, stream)
     }
 
-    fn ask_next(
+    fn ask_for(
         &self,
         pose: Pose,
         camera: PinholeCamera,
         codec: FrameCodec,
-        next: Next,
+        wanted: Wanted,
         stream: &mut PictureStream,
     ) -> Result<(), End> {
-        let method = match next.light {
+        let method = match wanted.light {
             PictureLight::Session => None,
             PictureLight::Shared(quality) => Some((self.methods.of_quality)(quality)),
             PictureLight::Drawn => Some(DIRECT.to_owned()),
         };
-        let quality = PictureQuality { codec, antialias: next.samples, method, waits_for_set: pose.still };
+        let quality = PictureQuality { codec, antialias: wanted.samples, method, waits_for_set: pose.still };
         let chosen = (!pose.still).then(|| self.rate.chosen());
-        let wanted = Wanted { set_index: next.set_index, quality, light: next.light, chosen };
-        stream.ask(pose, camera, wanted).map_err(|error| End::Refused(error.to_string()))
+        stream.ask(pose, camera, quality, wanted, chosen).map_err(|error| End::Refused(error.to_string()))
     }
 
     /// Passes a picture on, unless a later one was sent, or it is a still of an earlier pose. What follows it is asked for.
@@ -387,19 +358,24 @@ impl Visitor {
         let is_planned_direct =
             plan.policy == Policy::Direct && plan.plan_epoch == frame.header.sample_set_id.plan_epoch;
         let is_own_cell = is_drawn || !frame.header.is_neighbour_cell;
-        let is_near = is_drawn || !pose.still || is_near(&plan, &frame);
+        // Where the plan has no view cell near the frame's camera, the next plan will.
+        let is_near = is_drawn
+            || !pose.still
+            || plan.policy == Policy::Direct
+            || plan.workload.has_cell_near(&frame.request.camera);
         let shown = self.light_step_of(&plan, &frame);
         if pose.still && plan.policy != Policy::Direct && !self.is_moving {
             // Another cell's light begins anew.
             self.light_step = if is_own_cell { self.light_step.max(shown) } else { 0 };
         }
-        let is_of_plan = is_drawn || cameras.is_some() && cameras == cell_cameras(&plan, &frame.request.camera);
+        let own_cell = plan.workload.cell_of(&frame.request.camera);
+        let is_of_plan = is_drawn || cameras.is_some() && cameras == cell_cameras(&plan, own_cell);
         let is_newest = pose.number == self.newest_number();
         let next = self.next(&asked, &frame, shown, is_own_cell);
         // A visitor that rests would see a neighbouring cell's picture, an earlier plan's, unfinished light or few samples a
         // pixel for ever.
-        let follows = next.or_else(|| (pose.still && !is_of_plan).then(|| Next::again(&asked, &frame)));
-        let follows = follows.filter(|_| is_newest);
+        let again = Wanted { set_index: frame.request.set_index, samples: frame.header.antialias, light: asked.light };
+        let follows = next.or_else(|| (pose.still && !is_of_plan).then_some(again)).filter(|_| is_newest);
         let about = About {
             light_step: shown + 1,
             is_own_cell: is_own_cell && is_near,
@@ -418,24 +394,24 @@ impl Visitor {
             self.is_drawn = is_drawn;
         }
         match follows {
-            Some(next) => self.ask_next(pose, frame.request.camera, frame.header.codec, next, stream),
+            Some(next) => self.ask_for(pose, frame.request.camera, frame.header.codec, next, stream),
             None => Ok(()),
         }
     }
 
     /// The picture of the same pose that follows one, under the same plan; `None` after the last.
-    fn next(&self, asked: &Asked, frame: &EncodedFrame, shown: u32, is_own_cell: bool) -> Option<Next> {
-        let last = self.scene.shown.light_steps - 1;
+    fn next(&self, asked: &Asked, frame: &EncodedFrame, shown: u32, is_own_cell: bool) -> Option<Wanted> {
+        let last = self.stills.light_steps - 1;
         let samples = Antialias::NONE;
         if !is_own_cell {
             let set_index = if self.is_moving { frame.request.set_index } else { self.light_step };
-            return Some(Next { set_index, samples, light: asked.light });
+            return Some(Wanted { set_index, samples, light: asked.light });
         }
         if !asked.pose.still {
             return None;
         }
         if shown < last && asked.light != PictureLight::Drawn {
-            return Some(Next { set_index: shown + 1, samples, light: asked.light });
+            return Some(Wanted { set_index: shown + 1, samples, light: asked.light });
         }
         let still = Still {
             samples: frame.header.antialias,
@@ -443,24 +419,9 @@ impl Visitor {
             pixel_count: frame.request.camera.pixel_count(),
             made_s: frame.header.stage_times.batch_s,
         };
-        let (samples, light) = self.stills().after(self.planned?, still)?;
+        let (samples, light) = self.stills.after(self.planned?, still)?;
         let set_index = if self.is_moving { frame.request.set_index } else { last };
-        Some(Next { set_index, samples, light })
-    }
-
-    /// The stills of the newest pose.
-    fn stills(&self) -> Stills {
-        Stills {
-            quality: self.quality(),
-            most_samples: self.most_samples,
-            may_draw: self.may_draw,
-            light_steps: self.scene.shown.light_steps,
-        }
-    }
-
-    /// The quality of shared light that the visitor wants.
-    fn quality(&self) -> LightCacheQuality {
-        self.newest.and_then(|pose| pose.quality).unwrap_or(self.scene.quality)
+        Some(Wanted { set_index, samples, light })
     }
 
     fn newest_number(&self) -> u64 {
@@ -487,8 +448,7 @@ impl Visitor {
     /// The sample cameras of a picture, by the plan that it was made under.
     fn cameras_of(&self, frame: &EncodedFrame) -> Option<Vec<SampleCamera>> {
         let plan_epoch = frame.header.sample_set_id.plan_epoch;
-        let workload = &self.plans.iter().find(|plan| plan.plan_epoch == plan_epoch)?.workload;
-        Some(workload.sample_cameras[workload.cameras_of_cell(frame.header.cell as usize)?].to_vec())
+        cell_cameras(self.plans.iter().find(|plan| plan.plan_epoch == plan_epoch)?, frame.header.cell)
     }
 
     /// A new plan may have a view cell that is nearer to a visitor who rests: the still is then asked for again.
@@ -502,23 +462,20 @@ impl Visitor {
         let camera = self.scene.space.camera(&pose.camera, UVec2::from_array(pose.canvas_px));
         let camera = camera.map_err(|error| End::Refused(error.to_string()))?;
         // What is on its way goes on under the new plan, and what was drawn from the scene is the same under any.
-        if self.is_drawn || cell_cameras(&plan.assignment, &camera) == self.made_with {
+        let own_cell = plan.assignment.workload.cell_of(&camera);
+        if self.is_drawn || cell_cameras(&plan.assignment, own_cell) == self.made_with {
             return Ok(());
         }
         if self.is_finished {
             self.light_step = 0;
         }
-        self.ask(pose, motion, still)
+        self.ask(Antialias::NONE, motion, still)
     }
 
     /// The step of a picture's light, from 0. Views that are drawn directly show the last, and so do scenes that move.
     fn light_step_of(&self, plan: &Assignment, frame: &EncodedFrame) -> u32 {
-        let last = self.scene.shown.light_steps - 1;
-        match plan.policy {
-            _ if self.is_moving => last,
-            Policy::Direct => last,
-            Policy::Pipeline | Policy::TimeShare => frame.request.set_index.min(last),
-        }
+        let last = self.stills.light_steps - 1;
+        if self.is_moving || plan.policy == Policy::Direct { last } else { frame.request.set_index.min(last) }
     }
 
     fn tell_plan(&mut self, page: &Page, plan: &SessionPlan) -> Result<(), End> {
@@ -541,7 +498,7 @@ impl Visitor {
 
     /// Bounds the light of pictures in motion by what the visitor wants, and by the fallback of all.
     fn limit_rate(&mut self) {
-        let wanted = self.quality();
+        let wanted = self.stills.quality;
         let best = self.fallback.map_or(wanted, |fallback| fallback.min(wanted));
         self.rate.limit(self.planned.filter(|planned| planned.is_shared).map(|_| best));
     }
@@ -556,13 +513,7 @@ impl Visitor {
     }
 }
 
-/// Whether a plan has a view cell near a frame's camera. Where it has none, the next plan will.
-fn is_near(plan: &Assignment, frame: &EncodedFrame) -> bool {
-    plan.policy == Policy::Direct || plan.workload.has_cell_near(&frame.request.camera)
-}
-
-/// The sample cameras of the cell that a plan has for a view.
-fn cell_cameras(plan: &Assignment, camera: &PinholeCamera) -> Option<Vec<SampleCamera>> {
-    let cameras = plan.workload.cameras_of_cell(plan.workload.cell_of(camera) as usize)?;
-    Some(plan.workload.sample_cameras[cameras].to_vec())
+/// The sample cameras of a plan's view cell.
+fn cell_cameras(plan: &Assignment, cell: u32) -> Option<Vec<SampleCamera>> {
+    Some(plan.workload.sample_cameras[plan.workload.cameras_of_cell(cell as usize)?].to_vec())
 }

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use app_core::exit::BadInput;
 use app_core::plan_files::PlanFiles;
 use app_core::planning::screening_light;
+use app_core::sizes::within;
 use clap::Args;
 use cluster::MAX_AUDIT_TIME_RATIO;
-use coordinator::{CoordinatorConfig, PlanStore, SceneOffer, SceneOffers};
+use coordinator::{CoordinatorConfig, PlanStore, SceneOffers};
 use planner::Budget;
 
 /// Arguments of commands with a coordinator.
@@ -21,18 +22,10 @@ pub struct BudgetArgs {
     budget: Option<Budget>,
     /// The share of a compositor's time that audits of promises may take, from 0 to 0.5: they draw some views directly as well,
     /// and compare. 0 is off
-    #[arg(long, value_name = "RATIO", default_value_t = 0.01, value_parser = audit_ratio)]
+    #[arg(long, value_name = "RATIO", default_value_t = 0.01, value_parser = within(0.0..=MAX_AUDIT_TIME_RATIO))]
     audit: f64,
     #[command(flatten)]
     plans: PlansArgs,
-}
-
-fn audit_ratio(text: &str) -> Result<f64, String> {
-    let ratio: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    match (0.0..=MAX_AUDIT_TIME_RATIO).contains(&ratio) {
-        true => Ok(ratio),
-        false => Err("not from 0 to 0.5".to_owned()),
-    }
 }
 
 /// Where measurements are kept.
@@ -54,15 +47,15 @@ impl BudgetArgs {
     /// None can be kept for an offered scene: it is sampled as a layered cube, or has one beside its samples.
     pub fn check(&self, offers: &SceneOffers) -> Result<(), BadInput> {
         let Some(budget) = self.budget else { return Ok(()) };
-        let cube = |offer: &SceneOffer| match (&offer.cube, &offer.base) {
-            (Some(cube), _) => Some(format!("--sampling {}", cube.sampling)),
-            (None, Some((base, _))) => Some(format!("--base {}", base.sampling)),
-            (None, None) => None,
-        };
-        match offers.iter().find_map(cube) {
-            Some(cube) => Err(BadInput(format!("--budget {budget}: none can be kept with {cube}"))),
-            None => Ok(()),
+        for offer in offers.iter() {
+            let cube = match (&offer.cube, &offer.base) {
+                (Some(cube), _) => format!("--sampling {}", cube.sampling),
+                (None, Some((base, _))) => format!("--base {}", base.sampling),
+                (None, None) => continue,
+            };
+            return Err(BadInput(format!("--budget {budget}: none can be kept with {cube}")));
         }
+        Ok(())
     }
 
     /// A coordinator's configuration with this budget.

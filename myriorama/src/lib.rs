@@ -6,6 +6,5 @@
 pub mod budget;
 pub mod cli;
 pub mod commands;
-pub mod comparison;
 pub mod tone;
 pub mod viewer;

@@ -127,13 +127,15 @@ async fn serve_on(
     let coordinator = config.coordinator.clone();
     let away = config.deadlines.away;
     let ends = shutdown.clone();
-    let member = move || {
-        let node = status.clone();
-        let coordinator = coordinator.clone();
-        let plans = plans.clone();
-        keep_membership(node, coordinator, plans, scenes.clone(), done.clone(), ends.clone())
-    };
-    let membership = tokio::spawn(stay_while_memory_lasts(member, monitor.clone(), left, away));
+    let membership = tokio::spawn(stay_while_memory_lasts(
+        move || {
+            let plans = plans.clone();
+            keep_membership(status.clone(), coordinator.clone(), plans, scenes.clone(), done.clone(), ends.clone())
+        },
+        monitor.clone(),
+        left,
+        away,
+    ));
     let mut serving = pin!(node::serve(listener, routes, config.insecure_bind, shutdown.clone()));
     let served = tokio::select! {
         served = &mut serving => served.map(|()| None),

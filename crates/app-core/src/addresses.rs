@@ -1,6 +1,6 @@
 //! Addresses on the command line: of the coordinator, to listen on, and for metrics.
 
-use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs as _};
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs as _, UdpSocket};
 
 use anyhow::Context as _;
 use clap::Args;
@@ -98,6 +98,15 @@ pub async fn listen(address: SocketAddr, insecure_bind: bool) -> anyhow::Result<
         return Err(BadInput(reason).into());
     }
     TcpListener::bind(address).await.with_context(|| format!("cannot listen on {address}"))
+}
+
+/// An address that is bound to all interfaces, with that of the interface towards another machine.
+#[must_use]
+pub fn address_towards(bound: SocketAddr, other: &str) -> Option<SocketAddr> {
+    let socket = UdpSocket::bind((bound.ip(), 0)).ok()?;
+    // No packet is sent: the system only chooses the interface.
+    socket.connect(other).ok()?;
+    Some(SocketAddr::new(socket.local_addr().ok()?.ip(), bound.port()))
 }
 
 /// The address at which this process reaches a listener, which may be bound to all addresses.

@@ -22,6 +22,7 @@ const RIGID_TOLERANCE: f64 = 1e-3;
 /// Pinholes, where their distortion is zero.
 const MODELS: [&str; 6] = ["FULL_OPENCV", "OPENCV", "PINHOLE", "RADIAL", "SIMPLE_PINHOLE", "SIMPLE_RADIAL"];
 const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
+const MATRIX: &str = "transform_matrix";
 
 /// Facts that a camera file does not state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,6 +80,12 @@ pub enum CameraFault {
     Camera(#[from] CameraError),
 }
 
+impl CameraFileError {
+    pub(crate) fn in_file(self, path: &Path) -> Self {
+        Self { file: path.display().to_string(), ..self }
+    }
+}
+
 /// A fault at a place, before the file is named.
 pub(crate) fn fault(place: impl Into<String>, kind: impl Into<CameraFault>) -> CameraFileError {
     CameraFileError { file: String::new(), place: place.into(), kind: kind.into() }
@@ -89,8 +96,7 @@ pub(crate) fn fault(place: impl Into<String>, kind: impl Into<CameraFault>) -> C
 /// # Errors
 /// The error names the file, the frame, the field and the reason.
 pub fn read(path: &Path, placement: Placement) -> Result<Vec<PinholeCamera>, CameraFileError> {
-    let cameras = text_of(path).and_then(|text| parse(&text, placement));
-    cameras.map_err(|error| CameraFileError { file: path.display().to_string(), ..error })
+    text_of(path).and_then(|text| parse(&text, placement)).map_err(|error| error.in_file(path))
 }
 
 fn text_of(path: &Path) -> Result<String, CameraFileError> {
@@ -114,19 +120,20 @@ fn parse(text: &str, placement: Placement) -> Result<Vec<PinholeCamera>, CameraF
     let frames = frames.and_then(Value::as_array).filter(|frames| !frames.is_empty());
     let frames = frames.ok_or_else(|| fault("frames", CameraFault::Missing))?;
     at_most("frames", frames.len() as u64, MAX_FRAMES as u64)?;
-    let camera = |(index, frame): (usize, &Value)| {
+    let cameras = frames.iter().enumerate().map(|(index, frame)| {
         let own = frame.as_object().ok_or_else(|| fault(format!("frame {index}"), CameraFault::Missing))?;
         Frame { index, own, shared }.camera(placement)
-    };
-    frames.iter().enumerate().map(camera).collect()
+    });
+    cameras.collect()
 }
 
 /// Replaces NaN and Infinity, which Python writes and JSON does not have, by `null`: they are reported with frame and
 /// field. Strings of camera files hold no escaped quotes.
 fn without_nan(text: &str) -> String {
-    let numbers = |part: &str| part.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null");
-    let parts = text.split('"').enumerate();
-    let parts = parts.map(|(index, part)| if index % 2 == 0 { numbers(part) } else { part.to_owned() });
+    let parts = text.split('"').enumerate().map(|(index, part)| match index % 2 {
+        0 => part.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null"),
+        _ => part.to_owned(),
+    });
     parts.collect::<Vec<_>>().join("\"")
 }
 
@@ -140,6 +147,10 @@ struct Frame<'a> {
 impl Frame<'_> {
     fn fault(&self, field: &str, kind: impl Into<CameraFault>) -> CameraFileError {
         fault(format!("frame {}, {field}", self.index), kind)
+    }
+
+    fn out_of_range(&self, field: &str, value: impl Into<String>, allowed: &'static str) -> CameraFileError {
+        self.fault(field, CameraFault::OutOfRange { value: value.into(), allowed })
     }
 
     fn value(&self, field: &str) -> Option<&Value> {
@@ -163,9 +174,7 @@ impl Frame<'_> {
         if side.fract() == 0.0 && (1.0..=f64::from(MAX_IMAGE_SIDE_PX)).contains(&side) {
             return Ok(side as u32);
         }
-        let value = side.to_string();
-        let allowed = "a whole number from 1 to 16384";
-        Err(self.fault(field, CameraFault::OutOfRange { value, allowed }))
+        Err(self.out_of_range(field, side.to_string(), "a whole number from 1 to 16384"))
     }
 
     fn check_model(&self) -> Result<(), CameraFileError> {
@@ -173,8 +182,7 @@ impl Frame<'_> {
         if !MODELS.contains(&model) {
             return Err(self.fault("camera_model", CameraFault::Unsupported(model.to_owned())));
         }
-        let is_fisheye = self.value("is_fisheye").and_then(Value::as_bool).unwrap_or(false);
-        if is_fisheye {
+        if self.value("is_fisheye").and_then(Value::as_bool).unwrap_or(false) {
             return Err(self.fault("is_fisheye", CameraFault::Unsupported("a fisheye".to_owned())));
         }
         let kind = self.value("camera_type").and_then(Value::as_str).unwrap_or("perspective");
@@ -226,35 +234,32 @@ impl Frame<'_> {
 
     fn pose(&self) -> Result<(DQuat, DVec3), CameraFileError> {
         let rows = self.rows()?;
-        let column = |i: usize| DVec3::new(rows[0][i], rows[1][i], rows[2][i]);
-        let axes = DMat3::from_cols(column(0), column(1), column(2));
+        let [x, y, z, eye_in_source] = std::array::from_fn(|i| DVec3::new(rows[0][i], rows[1][i], rows[2][i]));
+        let axes = DMat3::from_cols(x, y, z);
         let offs = (axes.transpose() * axes - DMat3::IDENTITY).to_cols_array();
         let off = offs.into_iter().fold(0.0f64, |most, v| most.max(v.abs()));
-        if off > RIGID_TOLERANCE || axes.determinant() < 0.0 || !is_last_row(rows[3]) {
+        let is_last_row = (DVec4::from_array(rows[3]) - DVec4::W).abs().max_element() <= RIGID_TOLERANCE;
+        if off > RIGID_TOLERANCE || axes.determinant() < 0.0 || !is_last_row {
             let value = format!("no rotation (determinant {:.4}, axes off by {off:.4})", axes.determinant());
             let allowed = "rigid: a rotation, a translation and the row 0 0 0 1";
-            return Err(self.fault("transform_matrix", CameraFault::OutOfRange { value, allowed }));
+            return Err(self.out_of_range(MATRIX, value, allowed));
         }
-        Ok((DQuat::from_mat3(&axes).normalize(), column(3)))
+        Ok((DQuat::from_mat3(&axes).normalize(), eye_in_source))
     }
 
     fn rows(&self) -> Result<[[f64; 4]; 4], CameraFileError> {
-        let fault = |kind| self.fault("transform_matrix", kind);
-        let given = self.own.get("transform_matrix").or_else(|| self.own.get("camera_to_world"));
-        let given = given.ok_or_else(|| fault(CameraFault::Missing))?;
-        let other_form =
-            || CameraFault::OutOfRange { value: "of another form".to_owned(), allowed: "4 rows of 4 numbers" };
-        let given = matrix_rows(given).ok_or_else(|| fault(other_form()))?;
+        let allowed = "4 rows of 4 numbers";
+        let given = self.own.get(MATRIX).or_else(|| self.own.get("camera_to_world"));
+        let given = given.ok_or_else(|| self.fault(MATRIX, CameraFault::Missing))?;
+        let given = matrix_rows(given).ok_or_else(|| self.out_of_range(MATRIX, "of another form", allowed))?;
         let count = Some(given.len()).filter(|count| !(3..=4).contains(count));
         if let Some(wrong) = count.or_else(|| given.iter().map(Vec::len).find(|length| *length != 4)) {
-            let value = format!("of {wrong} rows or columns");
-            let allowed = "4 rows of 4 numbers";
-            return Err(fault(CameraFault::OutOfRange { value, allowed }));
+            return Err(self.out_of_range(MATRIX, format!("of {wrong} rows or columns"), allowed));
         }
         // The last row may be left out.
         let mut rows = [[0.0, 0.0, 0.0, 1.0]; 4];
         for (number, value) in rows.iter_mut().flatten().zip(given.iter().flatten()) {
-            *number = finite(value).map_err(fault)?;
+            *number = finite(value).map_err(|kind| self.fault(MATRIX, kind))?;
         }
         Ok(rows)
     }
@@ -273,11 +278,8 @@ fn matrix_rows(value: &Value) -> Option<Vec<Vec<Value>>> {
     given.iter().map(|row| row.as_array().cloned()).collect()
 }
 
-fn is_last_row(row: [f64; 4]) -> bool {
-    (DVec4::from_array(row) - DVec4::W).abs().max_element() <= RIGID_TOLERANCE
-}
-
 fn finite(value: &Value) -> Result<f64, CameraFault> {
-    let told = || if value.is_null() { "null, NaN or infinite".to_owned() } else { value.to_string() };
-    value.as_f64().filter(|v| v.is_finite()).ok_or_else(|| CameraFault::NotFinite(told()))
+    value.as_f64().filter(|v| v.is_finite()).ok_or_else(|| {
+        CameraFault::NotFinite(if value.is_null() { "null, NaN or infinite".to_owned() } else { value.to_string() })
+    })
 }

@@ -51,9 +51,8 @@ pub fn write(
 ) -> Result<(), CameraFileError> {
     let part = path.with_extension("part");
     let lines = cameras.into_iter().map(|camera| camera.line(source_space));
-    let written = write_lines(&part, lines, about);
-    let written = written.and_then(|()| std::fs::rename(&part, path));
-    written.map_err(|error| CameraFileError { file: path.display().to_string(), ..fault("file", error) })
+    let written = write_lines(&part, lines, about).and_then(|()| std::fs::rename(&part, path));
+    written.map_err(|error| fault("file", error).in_file(path))
 }
 
 fn write_lines(
@@ -78,11 +77,10 @@ fn write_lines(
 /// # Errors
 /// The file cannot be read, or was not written by [`write()`].
 pub fn read(path: &Path, frame: impl FnMut(&str)) -> Result<Option<Map<String, Value>>, CameraFileError> {
-    let named = |error: CameraFileError| CameraFileError { file: path.display().to_string(), ..error };
     match File::open(path) {
-        Ok(file) => read_lines(BufReader::new(file), frame).map(Some).map_err(named),
+        Ok(file) => read_lines(BufReader::new(file), frame).map(Some).map_err(|error| error.in_file(path)),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(named(fault("file", error))),
+        Err(error) => Err(fault("file", error).in_file(path)),
     }
 }
 
@@ -98,9 +96,8 @@ fn read_lines(mut file: BufReader<File>, mut frame: impl FnMut(&str)) -> Result<
         whole.ok_or_else(|| fault(format!("line {number}"), CameraFault::NotAsWritten))
     };
     let first = next_line()?;
-    let not_written = || fault("line 1", CameraFault::NotAsWritten);
-    let about = first.strip_suffix(FRAMES).map(|about| format!("{about}}}")).ok_or_else(not_written)?;
-    let about = serde_json::from_str(&about).map_err(|_| not_written())?;
+    let about = first.strip_suffix(FRAMES).and_then(|about| serde_json::from_str(&format!("{about}}}")).ok());
+    let about = about.ok_or_else(|| fault("line 1", CameraFault::NotAsWritten))?;
     loop {
         match next_line()?.as_str() {
             END => return Ok(about),

@@ -52,7 +52,7 @@ pub fn request(
         scene: None,
         sampling: sampling.unwrap_or_else(|| SamplingMethod::default().to_string()),
         // Where surfaces come from the scene, so does what mirrors show.
-        follows_mirrors: has_reflections(&lighting) && !takes_light,
+        follows_mirrors: !takes_light && lighting.parse().is_ok_and(|lighting: Lighting| lighting.reflections() > 0),
         takes_light,
         method,
         lighting,
@@ -93,11 +93,6 @@ fn takes_light_from_samples(method: &str) -> bool {
     method.parse().is_ok_and(|method: ReconstructionMethod| method.light_cache_quality().is_some())
 }
 
-/// Whether mirrors show the scene in a lighting.
-fn has_reflections(lighting: &str) -> bool {
-    lighting.parse().is_ok_and(|lighting: Lighting| lighting.reflections() > 0)
-}
-
 /// The same at a rate, with fallbacks under overload.
 #[must_use]
 pub fn at_rate(request: SessionRequest, frames_per_s: f64) -> SessionRequest {
@@ -109,46 +104,42 @@ pub fn at_rate(request: SessionRequest, frames_per_s: f64) -> SessionRequest {
 /// images, fewer pictures a second. Each includes those before it. Steps that the lighting and the method do not have are skipped.
 /// Shared light stays as it is, and the views' quality goes down step by step: other samples would have to be lit first.
 fn fallbacks(lighting: &str, method: &str) -> Vec<Quality> {
-    if takes_light_from_samples(method) {
-        return fallbacks_of_quality(lighting, method);
-    }
-    let whole: Option<Lighting> = lighting.parse().ok();
-    // Views from depth images have glossy reflections beside a base alone, and no fallback has a base.
-    let walks_cube = method.parse().is_ok_and(ReconstructionMethod::walks_cube);
-    let loses = |lighting: &Lighting| lighting.reflections() > 0 || method == DIRECT || walks_cube;
-    let unmirrored = whole.filter(loses).and_then(|lighting| lighting.without_reflections());
-    let fewer_rays = unmirrored.or(whole).and_then(|lighting| lighting.with_fewer_rays());
-    let fewer_steps = method.parse().ok().and_then(|method: ReconstructionMethod| method.coarser());
-    let method_is_sampled = method != DIRECT;
-    let lighting = lighting.to_owned();
-    let method = method.to_owned();
-    let all = Quality { lighting, method, sample_side_ratio: 1.0, frame_rate_ratio: 1.0 };
-    let plain = unmirrored.map(|lighting| Quality { lighting: lighting.to_string(), ..all.clone() });
-    let above = plain.clone().unwrap_or_else(|| all.clone());
-    let dim = fewer_rays.map(|lighting| Quality { lighting: lighting.to_string(), ..above.clone() });
-    let above = dim.clone().unwrap_or(above);
-    let coarse = fewer_steps.map(|method| Quality { method: method.to_string(), ..above.clone() });
-    let above = coarse.clone().unwrap_or(above);
-    // The images of a cube have one size, and direct views have none.
-    let small =
-        (!walks_cube && method_is_sampled).then(|| Quality { sample_side_ratio: SAMPLE_SIDE_RATIO, ..above.clone() });
-    let above = small.clone().unwrap_or(above);
-    let slow = Quality { frame_rate_ratio: FRAME_RATE_RATIO, ..above };
-    plain.into_iter().chain(dim).chain(coarse).chain(small).chain([slow]).collect()
-}
-
-fn fallbacks_of_quality(lighting: &str, method: &str) -> Vec<Quality> {
-    let of = |method: String| Quality {
+    let mut fallbacks = Vec::new();
+    let mut quality = Quality {
         lighting: lighting.to_owned(),
-        method,
+        method: method.to_owned(),
         sample_side_ratio: 1.0,
         frame_rate_ratio: 1.0,
     };
-    let lower = |method: &ReconstructionMethod| method.coarser();
-    let lower = std::iter::successors(method.parse().ok(), lower).skip(1);
-    let mut fallbacks: Vec<Quality> = lower.map(|method| of(method.to_string())).collect();
-    let lowest = fallbacks.last().cloned().unwrap_or_else(|| of(method.to_owned()));
-    fallbacks.push(Quality { frame_rate_ratio: FRAME_RATE_RATIO, ..lowest });
+    let known: Option<ReconstructionMethod> = method.parse().ok();
+    let mut coarser = std::iter::successors(known, |method| method.coarser()).skip(1);
+    if takes_light_from_samples(method) {
+        for coarser in coarser {
+            quality.method = coarser.to_string();
+            fallbacks.push(quality.clone());
+        }
+    } else {
+        let whole: Option<Lighting> = lighting.parse().ok();
+        // Views from depth images have glossy reflections beside a base alone, and no fallback has a base.
+        let walks_cube = known.is_some_and(ReconstructionMethod::walks_cube);
+        let reflecting = whole.filter(|lighting| lighting.reflections() > 0 || method == DIRECT || walks_cube);
+        let unmirrored = reflecting.and_then(|lighting| lighting.without_reflections());
+        let fewer_rays = unmirrored.or(whole).and_then(|lighting| lighting.with_fewer_rays());
+        for lighting in unmirrored.into_iter().chain(fewer_rays) {
+            quality.lighting = lighting.to_string();
+            fallbacks.push(quality.clone());
+        }
+        if let Some(coarser) = coarser.next() {
+            quality.method = coarser.to_string();
+            fallbacks.push(quality.clone());
+        }
+        // The images of a cube have one size, and direct views have none.
+        if !walks_cube && method != DIRECT {
+            quality.sample_side_ratio = SAMPLE_SIDE_RATIO;
+            fallbacks.push(quality.clone());
+        }
+    }
+    fallbacks.push(Quality { frame_rate_ratio: FRAME_RATE_RATIO, ..quality });
     fallbacks
 }
 
@@ -168,13 +159,12 @@ pub fn viewpoints(views: &[PinholeCamera]) -> Vec<PinholeCamera> {
 
 /// Requests of all views of all sets, numbered set by set, and view by view in each. They are made as they are drawn.
 pub fn requests(sets: u32, views: Arc<[PinholeCamera]>) -> impl Iterator<Item = ViewRequest> + Send + 'static {
-    let of_set = move |set_index| {
+    (0..sets).flat_map(move |set_index| {
         let count = views.len();
         let views = views.clone();
         let first = u64::from(set_index) * count as u64;
         (0..count).map(move |at| ViewRequest { frame: first + at as u64, set_index, camera: views[at] })
-    };
-    (0..sets).flat_map(of_set)
+    })
 }
 
 /// Asks for all views of all sets, as [`requests`] numbers them; `received` is given each as it comes, and is waited for.

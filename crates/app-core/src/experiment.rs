@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use anyhow::Context as _;
-use client::{Client, Frame, Session};
+use client::{Client, Frame};
 use cluster::{PolicyChoice, SessionPlan, SessionRequest, Timeline};
 use coordinator::CoordinatorConfig;
 use depth_image::{PinholeCamera, SampleCamera, ViewCell};
@@ -53,31 +53,12 @@ pub struct Delivered {
     pub seconds: f64,
 }
 
-/// Receives all views of all sets, in the order in which they come; `arrived` is called for each.
-///
-/// # Errors
-/// As [`receive`].
-pub async fn receive_all(
-    session: &Session,
-    views: &[PinholeCamera],
-    mut arrived: impl FnMut(Frame),
-) -> anyhow::Result<Delivered> {
-    let received = async |frame| {
-        arrived(frame);
-        Ok(())
-    };
-    let seconds = receive(session, views, received).await?;
-    Ok(Delivered { plan: session.plan(), seconds })
-}
-
-/// Sample sets for which a node has room: one in use and one to come. Every run has sets of its own, and none needs them again.
-const SETS_IN_MEMORY: usize = 1;
-
-/// Half of a node's memory is for sets on the device, with the images that are relayed.
+/// Half of a node's memory is for sets on the device, with the images that are relayed. There is room for one set in use and one
+/// to come: every run has sets of its own, and none needs them again.
 fn set_memory_bytes(setup: &Setup) -> usize {
     let illumination = &setup.scene.illumination;
     let cameras: Vec<_> = setup.samples.iter().copied().map(SampleCamera::from).collect();
-    2 * SETS_IN_MEMORY * (most_set_bytes(illumination, &cameras) + most_image_bytes(illumination, &cameras))
+    2 * (most_set_bytes(illumination, &cameras) + most_image_bytes(illumination, &cameras))
 }
 
 /// A cluster that runs until it is stopped.
@@ -106,10 +87,15 @@ impl Experiment {
         let runtime = runtime()?;
         let (cluster, client) = runtime.block_on(async {
             let listener = listen(([127, 0, 0, 1], 0).into(), false).await?;
-            let configure = |config| NodeConfig { set_memory_bytes: set_memory_bytes(&setup), ..config };
-            let open = engine.clone().opener();
-            let config = CoordinatorConfig::default();
-            let cluster = Cluster::start(configure, listener, config, setup.offer.clone().into(), open, nodes).await?;
+            let cluster = Cluster::start(
+                |config| NodeConfig { set_memory_bytes: set_memory_bytes(&setup), ..config },
+                listener,
+                CoordinatorConfig::default(),
+                setup.offer.clone().into(),
+                engine.clone().opener(),
+                nodes,
+            )
+            .await?;
             let client = cluster.client().await?;
             anyhow::Ok((cluster, client))
         })?;
@@ -155,11 +141,16 @@ impl Experiment {
         &self,
         request: SessionRequest,
         views: &[PinholeCamera],
-        arrived: impl FnMut(Frame),
+        mut arrived: impl FnMut(Frame),
     ) -> anyhow::Result<Delivered> {
         self.runtime.block_on(async {
             let session = open(&self.client, request).await?;
-            receive_all(&session, views, arrived).await
+            let received = async |frame| {
+                arrived(frame);
+                Ok(())
+            };
+            let seconds = receive(&session, views, received).await?;
+            Ok(Delivered { plan: session.plan(), seconds })
         })
     }
 

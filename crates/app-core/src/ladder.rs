@@ -1,44 +1,37 @@
 //! The representations among which budgets choose, from the methods that are known.
 
+use std::mem::discriminant;
+
 use planner::Row;
 use reconstruction::ReconstructionMethod;
 use sampling::SamplingMethod;
+
+use crate::setup::SceneArgs;
 
 /// Numbers of sample cameras.
 pub(crate) const CAMERA_COUNTS: [u32; 4] = [1, 2, 4, 8];
 /// Sides of sample images, as shares of the side that `--sample-size auto` chooses.
 const SIDE_RATIOS: [f64; 3] = [0.5, 0.71, 1.0];
 
-/// The choices that a user names.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Named {
-    /// The sampling method.
-    pub sampling: Option<SamplingMethod>,
-    /// The reconstruction method.
-    pub method: Option<ReconstructionMethod>,
-    /// The size of sample images is named.
-    pub has_size: bool,
-    /// The number of the user's own sample cameras.
-    pub cameras: Option<u32>,
-}
-
-/// The rows that a user's choices leave: a named choice is the same in all of them. Budgets do not choose cubes.
+/// The rows that a user's choices leave, for a scene with `cameras` sample cameras: a named choice is the same in all rows.
+/// Budgets do not choose cubes.
 #[must_use]
-pub fn rows(named: &Named) -> Vec<Row> {
-    if named.sampling.is_some_and(|sampling| sampling.layer_selection().is_some()) {
+pub fn rows(args: &SceneArgs, cameras: u32) -> Vec<Row> {
+    if args.sampling.is_some_and(|sampling| sampling.layer_selection().is_some()) {
         return Vec::new();
     }
-    let samplings: Vec<(String, u32)> = match named.sampling {
+    let samplings: Vec<(String, u32)> = match args.sampling {
         Some(sampling) => vec![(sampling.to_string(), 1)],
         None => SamplingMethod::ladder().map(|(name, images)| (name.to_owned(), images)).collect(),
     };
-    let methods: Vec<ReconstructionMethod> = match named.method {
+    let methods: Vec<ReconstructionMethod> = match args.method {
         Some(method) => vec![method],
         None => ReconstructionMethod::ladder().collect(),
     };
-    let own_count = named.sampling.and_then(SamplingMethod::own_image_count);
-    let counts = own_count.or(named.cameras).map_or_else(|| CAMERA_COUNTS.to_vec(), |count| vec![count]);
-    let sides = if named.has_size { &SIDE_RATIOS[2..] } else { &SIDE_RATIOS[..] };
+    let own_count = args.sampling.and_then(SamplingMethod::own_image_count);
+    let count = own_count.or(args.samples.is_some().then_some(cameras));
+    let counts = count.map_or_else(|| CAMERA_COUNTS.to_vec(), |count| vec![count]);
+    let sides = if args.sample_size.fixed_px().is_some() { &SIDE_RATIOS[2..] } else { &SIDE_RATIOS[..] };
     let mut rows = Vec::new();
     for (sampling, least_images) in &samplings {
         let is_of_layers = sampling.parse().is_ok_and(|method: SamplingMethod| method.own_image_count().is_some());
@@ -51,19 +44,14 @@ pub fn rows(named: &Named) -> Vec<Row> {
                     place_count: if is_of_layers { 1 } else { camera_count },
                     side_ratio,
                     kind: format!("{} {}", without_setting(sampling), without_setting(&method.to_string())),
-                    rank: rank(&methods, place),
+                    // The place of a setting among those of its method.
+                    rank: methods[..place].iter().filter(|other| discriminant(*other) == discriminant(method)).count()
+                        as u32,
                 }));
             }
         }
     }
     rows
-}
-
-/// The place of a setting among those of its method.
-fn rank(methods: &[ReconstructionMethod], place: usize) -> u32 {
-    let is_same =
-        |other: &&ReconstructionMethod| std::mem::discriminant(*other) == std::mem::discriminant(&methods[place]);
-    methods[..place].iter().filter(is_same).count() as u32
 }
 
 fn without_setting(method: &str) -> &str {

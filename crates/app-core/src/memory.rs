@@ -25,8 +25,7 @@ impl MemoryArgs {
     /// The bytes that were given, or else the default for a device.
     #[must_use]
     pub fn set_memory_bytes(self, is_software: bool) -> usize {
-        let quarter = || available_bytes() / 4;
-        self.set_memory.unwrap_or_else(|| if is_software { quarter() } else { GPU_BYTES })
+        self.set_memory.unwrap_or_else(|| if is_software { available_bytes() / 4 } else { GPU_BYTES })
     }
 }
 

@@ -27,9 +27,9 @@ impl PlanFiles {
     /// `myriorama/plans` in the user's folder for caches; `None` where the environment names none.
     #[must_use]
     pub fn default_folder() -> Option<PathBuf> {
-        let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-        let caches = absolute("XDG_CACHE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".cache")))?;
-        Some(caches.join("myriorama").join("plans"))
+        let [caches, home] = ["XDG_CACHE_HOME", "HOME"]
+            .map(|name| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute()));
+        Some(caches.or(home.map(|home| home.join(".cache")))?.join("myriorama").join("plans"))
     }
 
     fn path(&self, key: &KeptKey) -> PathBuf {
@@ -63,19 +63,17 @@ impl PlanStore for PlanFiles {
     /// The measurements of a key; none where there is no file. A file that cannot be used is ignored with a warning.
     fn read(&self, key: &KeptKey) -> Kept {
         let path = self.path(key);
-        let ignored = |reason: String| {
+        let read = match fs::metadata(&path) {
+            Ok(file) if file.len() > MAX_KEPT_BYTES as u64 => Err(format!("it has {} bytes", file.len())),
+            Ok(_) => fs::read(&path).map_err(|error| error.to_string()),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Kept::empty(key.clone()),
+            Err(error) => Err(error.to_string()),
+        };
+        let kept = read.and_then(|json| Kept::from_json(&json, key).map_err(|error| error.to_string()));
+        kept.unwrap_or_else(|reason| {
             tracing::warn!("{} is ignored: {reason}", path.display());
             Kept::empty(key.clone())
-        };
-        match fs::metadata(&path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Kept::empty(key.clone()),
-            Err(error) => ignored(error.to_string()),
-            Ok(file) if file.len() > MAX_KEPT_BYTES as u64 => ignored(format!("it has {} bytes", file.len())),
-            Ok(_) => match fs::read(&path) {
-                Ok(json) => Kept::from_json(&json, key).unwrap_or_else(|error| ignored(error.to_string())),
-                Err(error) => ignored(error.to_string()),
-            },
-        }
+        })
     }
 
     /// Writes the measurements of a key, whole or not at all. The files that were written longest ago are removed where all

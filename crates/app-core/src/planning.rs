@@ -5,9 +5,9 @@ use cluster::SceneHash;
 use codec::FrameCodec;
 use coordinator::fitting_size_px;
 use coordinator::schedule::EqualNodes;
-use depth_image::{Camera, PinholeCamera, ViewCell, ViewPlanes};
+use depth_image::{Camera, ViewCell, ViewPlanes};
 use glam::{UVec2, Vec2};
-use planner::{Budget, KeptKey, Ladder, PlanRequest, Row, most_certified};
+use planner::{Budget, KeptKey, Ladder, PlanRequest, most_certified};
 use probe::{DirectCosts, Representation, Subject, Viewpoints};
 use render::Lighting;
 use sampling::SamplingMethod;
@@ -62,20 +62,22 @@ impl Planning {
         let rig: Vec<Camera> = setup.around.iter().copied().map(Camera::Pinhole).collect();
         let fixed_px = args.sample_size.fixed_px();
         let whole_px = fixed_px.or_else(|| fitting_size_px(&rig, &view)).context("the views have no size")?;
-        let rows = rows(&args.named(setup.around.len() as u32));
-        let cameras = Cameras { cell: &cell, whole_px, given: args.samples.is_some().then_some(&setup.around) };
-        let representations = rows.iter().map(|row| cameras.representation(row)).collect::<anyhow::Result<_>>()?;
-        let lighting = args.lighting.to_string();
-        let subject = Subject {
-            scene_hash: setup.offer.hash.to_string(),
-            volume: setup.offer.volume,
-            background: setup.offer.background,
-            illumination: setup.offer.illumination.clone(),
-            screening_lighting: screening_light(&lighting).unwrap_or_else(|| lighting.clone()),
-            lighting,
-            scene_time_s: views.scene_time_s,
-            planes: views.planes,
-        };
+        let rows = rows(args, setup.around.len() as u32);
+        let mut representations = Vec::with_capacity(rows.len());
+        for row in &rows {
+            let sampling = row.sampling.parse::<SamplingMethod>()?.with_images(row.camera_count);
+            let cameras = match args.samples {
+                Some(_) => {
+                    let size_px = row.size_px(whole_px);
+                    sampling.cameras(setup.around.iter().map(|camera| camera.resized(size_px)).collect())
+                }
+                None => row.cameras(&cell, whole_px),
+            };
+            let sample_cameras = cameras.into_iter().map(Camera::Pinhole).collect();
+            let sampling = sampling.to_string();
+            representations.push(Representation { sampling, method: row.method.clone(), sample_cameras });
+        }
+        let subject = setup.subject(args.lighting, views.planes, views.scene_time_s);
         let viewpoints = Viewpoints { cell, view_px: views.size_px, seed: views.seed };
         Ok(Self { ladder: Ladder::new(rows)?, representations, subject, viewpoints, codec: views.codec })
     }
@@ -127,27 +129,21 @@ fn hash(text: &str) -> String {
     SceneHash::of(text.as_bytes()).to_string()
 }
 
-/// The places of a ladder's sample cameras.
-struct Cameras<'a> {
-    cell: &'a ViewCell,
-    /// The size of images at a side ratio of 1.
-    whole_px: UVec2,
-    /// Those of the user.
-    given: Option<&'a Vec<PinholeCamera>>,
-}
-
-impl Cameras<'_> {
-    fn representation(&self, row: &Row) -> anyhow::Result<Representation> {
-        let sampling = row.sampling.parse::<SamplingMethod>()?.with_images(row.camera_count);
-        let cameras = match self.given {
-            Some(given) => {
-                let size_px = row.size_px(self.whole_px);
-                sampling.cameras(given.iter().map(|camera| camera.resized(size_px)).collect())
-            }
-            None => row.cameras(self.cell, self.whole_px),
-        };
-        let sample_cameras = cameras.into_iter().map(Camera::Pinhole).collect();
-        Ok(Representation { sampling: sampling.to_string(), method: row.method.clone(), sample_cameras })
+impl Setup {
+    /// The scene as it is measured in a light.
+    #[must_use]
+    pub fn subject(&self, lighting: Lighting, planes: ViewPlanes, scene_time_s: f32) -> Subject {
+        let lighting = lighting.to_string();
+        Subject {
+            scene_hash: self.offer.hash.to_string(),
+            volume: self.offer.volume,
+            background: self.offer.background,
+            illumination: self.offer.illumination.clone(),
+            screening_lighting: screening_light(&lighting).unwrap_or_else(|| lighting.clone()),
+            lighting,
+            scene_time_s,
+            planes,
+        }
     }
 }
 
@@ -163,7 +159,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use codec::FrameCodec;
-    use planner::MAX_ROWS;
+    use planner::{MAX_ROWS, Row};
 
     use reconstruction::ReconstructionMethod;
 

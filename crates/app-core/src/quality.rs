@@ -25,6 +25,6 @@ impl QualityArgs {
 /// # Errors
 /// For another text.
 pub fn quality(text: &str) -> Result<LightCacheQuality, String> {
-    let names = || LightCacheQuality::ALL.map(LightCacheQuality::name).join(", ");
-    LightCacheQuality::named(text).ok_or_else(|| format!("expected one of {}", names()))
+    LightCacheQuality::named(text)
+        .ok_or_else(|| format!("expected one of {}", LightCacheQuality::ALL.map(LightCacheQuality::name).join(", ")))
 }

@@ -24,17 +24,17 @@ impl ScenesArgs {
     /// # Errors
     /// A scene cannot be used, or is given twice.
     pub fn load(&self, has_budget: bool) -> anyhow::Result<(Vec<Scene>, SceneOffers)> {
-        let setup = |scene: &SceneSpec| {
+        let mut scenes = Vec::with_capacity(self.scenes.len());
+        let mut offers = Vec::with_capacity(self.scenes.len());
+        for scene in &self.scenes {
             let args = SceneArgs { scene: scene.clone(), ..self.first.clone() };
-            let mut setup = args.load()?;
+            let Setup { scene, mut offer, .. } = args.load()?;
             if !has_budget {
-                setup.offer.settings.method = args.offered_method().map(|method| method.to_string());
+                offer.settings.method = args.offered_method().map(|method| method.to_string());
             }
-            anyhow::Ok(setup)
-        };
-        let setups = self.scenes.iter().map(setup).collect::<anyhow::Result<Vec<Setup>>>()?;
-        let (scenes, mut offers): (_, Vec<SceneOffer>) =
-            setups.into_iter().map(|setup| (setup.scene, setup.offer)).unzip();
+            scenes.push(scene);
+            offers.push(offer);
+        }
         number_equal_names(&mut offers);
         Ok((scenes, SceneOffers::new(offers).map_err(|error| BadInput(error.to_string()))?))
     }

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser as _};
+use clap::{Args, Command, FromArgMatches as _};
 use cluster::{CommonCell, CommonKind, OfferSettings, PolicyChoice, SceneHash};
 use coordinator::{OfferedCube, OfferedMirror, SceneOffer};
 use depth_image::{Camera, CubeGrid, PinholeCamera};
@@ -12,7 +12,7 @@ use glam::UVec2;
 use gpu::DevicePreference;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
-use sampling::{Impostors, Mirror, Rig, SamplingMethod};
+use sampling::{Impostors, Rig, SamplingMethod};
 use scene::{
     EnvironmentSpec, ImportOptions, LightSpec, Limits, MissingTextures, Scene, SceneSpec, SourceCamera, UpAxis,
 };
@@ -20,7 +20,7 @@ use scene::{
 use crate::camera_file::{self, Placement};
 use crate::delivery::default_method;
 use crate::exit::BadInput;
-use crate::ladder::{Named, rows};
+use crate::ladder::rows;
 use crate::sizes::SampleSize;
 
 /// The size of the sample images, as in the paper.
@@ -42,16 +42,13 @@ pub struct DeviceArgs {
     pub device: DevicePreference,
 }
 
-/// The scene of those who name none.
-pub const DEFAULT_SCENE: &str = "tree-terrain-500k";
-
 /// The scene, its sampling and its lighting.
 #[derive(Debug, Clone, Args)]
 #[allow(rustdoc::broken_intra_doc_links, reason = "help has optional parts in brackets")]
 pub struct SceneArgs {
     /// A scene by name or a file (.gltf, .glb, .obj, .ply). Names: tree-terrain-30k, -125k, -500k, -2m (each also with
     /// -wind), urban, courtyard, gallery, grass, grass:DENSITY, snake (animated), mirror-hall
-    #[arg(long, value_name = "SPEC", default_value = DEFAULT_SCENE,
+    #[arg(long, value_name = "SPEC", default_value = "tree-terrain-500k",
         value_parser = OsStringValueParser::new().try_map(SceneSpec::try_from))]
     pub scene: SceneSpec,
     /// What is done about textures that a scene's file names and that are not there: refuse the scene, or show grey
@@ -146,49 +143,29 @@ fn mirrors_of(scene: &Scene, impostors: Impostors) -> Vec<OfferedMirror> {
         tracing::info!(beyond, followed = mirrors.len(), "the smallest mirrors have no images of what they show");
     }
     let sampling = SamplingMethod::default().to_string();
-    let offered = |mirror: Mirror| OfferedMirror {
+    let offered = mirrors.into_iter().map(|mirror| OfferedMirror {
         cell: CommonCell { kind: CommonKind::Mirrors, bounds: mirror.bounds, sampling: sampling.clone() },
         cameras: mirror.cameras,
-    };
-    mirrors.into_iter().map(offered).collect()
-}
-
-/// The name by which sessions ask for a scene: a built-in scene's own, or a file's without folder and ending.
-fn offer_name(scene: &SceneSpec) -> String {
-    match scene {
-        SceneSpec::File(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-        _ => scene.to_string(),
-    }
+    });
+    offered.collect()
 }
 
 impl SceneArgs {
     /// A scene with all other arguments by default.
     #[must_use]
     pub fn new(scene: SceneSpec) -> Self {
-        Self {
-            scene,
-            missing_textures: MissingTextures::default(),
-            ignore_required: Vec::new(),
-            clip: None,
-            up: UpAxis::default(),
-            lighting: Lighting::default(),
-            lights: Vec::new(),
-            environment: None,
-            method: None,
-            sampling: None,
-            sample_size: SampleSize::default(),
-            base: None,
-            impostors: Impostors::default(),
-            samples: None,
-        }
+        let given = Self::augment_args(Command::new("scene")).try_get_matches_from(["scene"]);
+        let defaults = given.and_then(|given| Self::from_arg_matches(&given)).expect("no argument is required");
+        Self { scene, ..defaults }
     }
 
     /// The reconstruction method; without one, the first that the samples suit.
     #[must_use]
     pub fn method(&self) -> ReconstructionMethod {
-        let suits_cube =
-            || reconstruction::METHODS.into_iter().map(|row| row.method).find(|method| method.walks_cube());
-        let suited = self.sampling().layer_selection().and_then(|_| suits_cube());
+        let suited = self
+            .sampling()
+            .layer_selection()
+            .and_then(|_| reconstruction::METHODS.into_iter().map(|row| row.method).find(|method| method.walks_cube()));
         self.method.or(suited).unwrap_or_default()
     }
 
@@ -202,8 +179,10 @@ impl SceneArgs {
     /// The method of views from samples in a light, as a client that names none would ask for.
     #[must_use]
     pub fn method_in(&self, lighting: Lighting) -> String {
-        let of_light = || default_method(&lighting.to_string(), &PolicyChoice::Pipeline.into());
-        self.offered_method().map_or_else(of_light, |method| method.to_string())
+        match self.offered_method() {
+            Some(method) => method.to_string(),
+            None => default_method(&lighting.to_string(), &PolicyChoice::Pipeline.into()),
+        }
     }
 
     /// The sampling method.
@@ -212,38 +191,23 @@ impl SceneArgs {
         self.sampling.unwrap_or_default()
     }
 
-    /// The named choices, where the scene has `cameras` sample cameras.
-    pub(crate) fn named(&self, cameras: u32) -> Named {
-        Named {
-            sampling: self.sampling,
-            method: self.method,
-            has_size: self.sample_size.fixed_px().is_some(),
-            cameras: self.samples.is_some().then_some(cameras),
-        }
-    }
-
     /// Loads the scene and places its sample cameras.
     ///
     /// # Errors
     /// A scene or a camera file cannot be used.
     pub fn load(&self) -> anyhow::Result<Setup> {
-        self.load_changed(|_| ())
-    }
-
-    /// Loads the scene as [`SceneArgs::load`] does, after a change to it.
-    ///
-    /// # Errors
-    /// A scene or a camera file cannot be used.
-    pub fn load_changed(&self, change: impl FnOnce(&mut Scene)) -> anyhow::Result<Setup> {
-        let mut scene = self.load_scene()?;
-        change(&mut scene);
+        let scene = self.load_scene()?;
         let around = self.sample_cameras(&scene)?;
         let samples = self.sampling().cameras(around.clone());
         let cube = self.cube(&scene)?;
         let base = self.base(&scene)?;
         let package = scene::pack(&scene);
         let offer = SceneOffer {
-            name: offer_name(&self.scene),
+            // A built-in scene's own name, or a file's without folder and ending.
+            name: match &self.scene {
+                SceneSpec::File(path) => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+                built_in => built_in.to_string(),
+            },
             hash: SceneHash::of(&package),
             package: package.into(),
             mirrors: if cube.is_some() { Vec::new() } else { mirrors_of(&scene, self.impostors) },
@@ -256,7 +220,7 @@ impl SceneArgs {
             base,
             rig: samples.iter().copied().map(Camera::Pinhole).collect(),
             fits_views: self.sample_size == SampleSize::Auto && self.samples.is_none(),
-            rows: rows(&self.named(around.len() as u32)),
+            rows: rows(self, around.len() as u32),
             keeps_cameras: self.samples.is_some(),
             volume: scene.bounds(),
             background: scene.background,
@@ -284,18 +248,17 @@ impl SceneArgs {
     /// The scene's base, where there is to be one.
     fn base(&self, scene: &Scene) -> anyhow::Result<Option<(CommonCell, CubeGrid)>> {
         let Some(base) = self.base else { return Ok(None) };
-        let refused = |reason: &str| Err(BadInput(format!("--base {base}: {reason}")).into());
-        if self.sampling().layer_selection().is_some() {
-            return refused("the samples are a cube already");
-        }
-        if base.light_field(&scene.bounds()).is_some() {
-            return refused("a light field shows the mirrors of a cube that is the sampling itself");
-        }
-        let Some(grid) = self.grid(scene, "--base", base)? else {
-            return refused("a base is a layered cube: see --sampling");
+        let reason = if self.sampling().layer_selection().is_some() {
+            "the samples are a cube already"
+        } else if base.light_field(&scene.bounds()).is_some() {
+            "a light field shows the mirrors of a cube that is the sampling itself"
+        } else if let Some(grid) = self.grid(scene, "--base", base)? {
+            let cell = CommonCell { kind: CommonKind::Base, bounds: scene.bounds(), sampling: base.to_string() };
+            return Ok(Some((cell, grid)));
+        } else {
+            "a base is a layered cube: see --sampling"
         };
-        let cell = CommonCell { kind: CommonKind::Base, bounds: scene.bounds(), sampling: base.to_string() };
-        Ok(Some((cell, grid)))
+        Err(BadInput(format!("--base {base}: {reason}")).into())
     }
 
     /// The grid of the scene's cube, where that is how it is sampled.
@@ -332,9 +295,10 @@ impl SceneArgs {
 
     fn load_scene(&self) -> anyhow::Result<Scene> {
         match &self.scene {
-            SceneSpec::File(file) => self.up.check(file).context("--up")?,
-            built_in => self.up.check(Path::new(&built_in.to_string())).context("--up")?,
+            SceneSpec::File(file) => self.up.check(file),
+            built_in => self.up.check(Path::new(&built_in.to_string())),
         }
+        .context("--up")?;
         let options =
             ImportOptions { missing_textures: self.missing_textures, ignore_required: self.ignore_required.clone() };
         let mut scene = self.scene.load(&Limits::default(), options).context("the scene cannot be used")?;
@@ -359,15 +323,12 @@ impl SceneArgs {
     }
 
     fn sample_cameras(&self, scene: &Scene) -> anyhow::Result<Vec<PinholeCamera>> {
-        let size_px = self.sample_size.fixed_px();
-        let Some(path) = &self.samples else {
-            return self.rig_cameras(scene, size_px.unwrap_or(SAMPLE_SIZE_PX));
-        };
+        let fixed_px = self.sample_size.fixed_px();
+        let size_px = fixed_px.unwrap_or(SAMPLE_SIZE_PX);
+        let Some(path) = &self.samples else { return self.rig_cameras(scene, size_px) };
         let near_m = scene.bounds().near_m();
-        let size_of_views_px = size_px.unwrap_or(SAMPLE_SIZE_PX);
-        let placement = Placement { source_space: scene.source_space, near_m, size_px: size_of_views_px };
-        let cameras = camera_file::read(path, placement)?;
-        Ok(cameras.into_iter().map(|camera| size_px.map_or(camera, |size_px| camera.resized(size_px))).collect())
+        let cameras = camera_file::read(path, Placement { source_space: scene.source_space, near_m, size_px })?;
+        Ok(cameras.into_iter().map(|camera| fixed_px.map_or(camera, |size_px| camera.resized(size_px))).collect())
     }
 
     fn rig_cameras(&self, scene: &Scene, size_px: UVec2) -> anyhow::Result<Vec<PinholeCamera>> {

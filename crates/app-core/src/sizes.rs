@@ -1,6 +1,7 @@
-//! `WxH` on the command line.
+//! `WxH`, and numbers within limits, on the command line.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use depth_image::MAX_IMAGE_SIDE_PX;
@@ -72,6 +73,14 @@ impl FromStr for SizePx {
     }
 }
 
+/// A parser of numbers within a range.
+pub fn within(range: RangeInclusive<f64>) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
+    move |text: &str| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("expected {} to {}", range.start(), range.end()))
+    }
+}
+
 /// Columns and rows of a grid of views.
 ///
 /// # Errors
@@ -98,5 +107,14 @@ mod tests {
             assert!(bad.parse::<SizePx>().is_err(), "{bad}");
         }
         assert!(grid("1001x1").is_err());
+    }
+
+    #[test]
+    fn numbers_outside_of_a_range_are_refused() {
+        for text in ["0", "-1", "NaN", "inf", "a day", ""] {
+            assert!(within(0.01..=1.0)(text).is_err() && within(0.001..=86_400.0)(text).is_err(), "{text}");
+        }
+        assert_eq!((within(0.01..=1.0)("0.5"), within(0.001..=86_400.0)("600")), (Ok(0.5), Ok(600.0)));
+        assert_eq!(within(0.01..=1000.0)("0"), Err("expected 0.01 to 1000".to_owned()));
     }
 }

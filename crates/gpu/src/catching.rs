@@ -15,25 +15,19 @@ impl Gpu {
         let scopes = filters.map(|filter| self.device.push_error_scope(filter));
         let done = work();
         // The last scope is popped first.
-        let mut caught = scopes.into_iter().rev().filter_map(|scope| pollster::block_on(scope.pop()));
-        match caught.next() {
+        let caught = scopes.into_iter().rev().filter_map(|scope| pollster::block_on(scope.pop()));
+        let caught: Vec<wgpu::Error> = caught.collect();
+        match caught.first() {
             // Of several, the shortage is the first to be popped; the others follow from it.
             Some(wgpu::Error::OutOfMemory { source }) => {
-                caught.for_each(drop);
                 self.faults.run_short();
-                Err(GpuError::OutOfMemory(source.to_string()).into())
+                return Err(GpuError::OutOfMemory(source.to_string()).into());
             }
-            Some(other) => {
-                caught.for_each(drop);
-                notice_loss(self);
-                self.faults.check_lost()?;
-                Err(GpuError::Refused(other.to_string()).into())
-            }
-            None => {
-                self.faults.check_lost()?;
-                done
-            }
+            Some(_) => notice_loss(self),
+            None => (),
         }
+        self.faults.check_lost()?;
+        caught.first().map_or(done, |refused| Err(GpuError::Refused(refused.to_string()).into()))
     }
 
     /// Whether the device is lost for all work.

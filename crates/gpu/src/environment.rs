@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use bytemuck::cast_slice;
 use depth_image::{EnvironmentLight, EnvironmentMap};
 use wgpu::TextureFormat;
 
@@ -30,11 +29,10 @@ impl GpuEnvironment {
         let header = [count, floats[0], floats[1], size_px.x | size_px.y << 16];
         let listed = light.bright_texels.iter().map(|&texel| bytemuck::cast(texel));
         let words: Vec<[u32; 4]> = std::iter::once(header).chain(listed).collect();
-        let table = |label, format, bytes: &[u8]| Table::new(gpu, label, format, bytes);
         Ok(Self {
-            texels: table("environment texels", TextureFormat::R32Uint, cast_slice(map.texels_rgb9e5()))?,
-            lobes: table("environment lobes", TextureFormat::Rgba32Float, cast_slice(&light.lobes))?,
-            bright_texels: table("bright texels", TextureFormat::Rgba32Uint, cast_slice(&words))?,
+            texels: Table::new(gpu, "environment texels", TextureFormat::R32Uint, map.texels_rgb9e5())?,
+            lobes: Table::new(gpu, "environment lobes", TextureFormat::Rgba32Float, &light.lobes)?,
+            bright_texels: Table::new(gpu, "bright texels", TextureFormat::Rgba32Uint, &words)?,
             has_bright_texels: count > 0,
         })
     }

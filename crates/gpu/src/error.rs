@@ -32,14 +32,9 @@ pub enum ShaderError {
     Template { name: String, source: minijinja::Error },
     #[error("shader {shader} is invalid: {message}")]
     Invalid { shader: String, message: String },
-    #[error("shader {shader} has no group {group}")]
-    NoGroup { shader: String, group: u32 },
-    #[error("shader {shader}: {name} of group {group} is not bound")]
-    Unbound { shader: String, group: u32, name: String },
-    #[error("shader {shader}: {name} is bound, but is not in group {group}")]
-    NotInGroup { shader: String, group: u32, name: String },
-    #[error("shader {shader}: {name} of group {group} is bound twice")]
-    BoundTwice { shader: String, group: u32, name: String },
+    /// Resources are not bound as the shader declares them: a fault of this program.
+    #[error("shader {shader}, group {group}: {name} {fault}")]
+    Binding { shader: String, group: u32, name: String, fault: &'static str },
 }
 
 impl GpuError {

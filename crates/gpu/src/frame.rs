@@ -12,7 +12,7 @@ const LONG_SLICE_S: f64 = 0.3;
 
 /// Work that is being recorded.
 pub struct Frame<'g> {
-    gpu: &'g Gpu,
+    pub(crate) gpu: &'g Gpu,
     label: &'static str,
     turn: Turn,
     /// The commands of the piece that is being recorded, to which passes add theirs.
@@ -117,26 +117,19 @@ impl<'g> Frame<'g> {
         reversed_depth: &wgpu::TextureView,
     ) -> wgpu::RenderPass<'_> {
         let ops = Operations { load: clear.map_or(LoadOp::Load, LoadOp::Clear), store: StoreOp::Store };
-        let color = |view| Some(RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops });
+        let color_attachments: Vec<_> = colors
+            .iter()
+            .map(|view| Some(RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops }))
+            .collect();
         let depth_load = if clear.is_some() { LoadOp::Clear(0.0) } else { LoadOp::Load };
         let depth_ops = Some(Operations { load: depth_load, store: StoreOp::Store });
         let view = reversed_depth;
         self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(label),
-            color_attachments: &colors.iter().copied().map(color).collect::<Vec<_>>(),
+            color_attachments: &color_attachments,
             depth_stencil_attachment: Some(RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }),
             ..Default::default()
         })
-    }
-
-    /// The device.
-    pub(crate) fn gpu(&self) -> &'g Gpu {
-        self.gpu
-    }
-
-    /// Says that a shader is used for the first time since the last cut.
-    pub(crate) fn count_first_use(&mut self) {
-        self.count((WorkKind::FIRST_USE, 1));
     }
 
     /// Says what was recorded, without a cut.
@@ -179,23 +172,20 @@ impl<'g> Frame<'g> {
 }
 
 impl<'g> Recorded<'g> {
-    fn submit_in(mut self, mut slot: Slot<'g>) -> Result<Submitted<'g>, GpuError> {
-        self.gpu.faults.check_injected()?;
+    fn submit_in(self, mut slot: Slot<'g>) -> Result<Submitted<'g>, GpuError> {
+        let Self { gpu, label, mut pieces, timer, reads } = self;
+        gpu.faults.check_injected()?;
         let mut earlier_s = 0.0;
-        loop {
-            self.gpu.faults.check_lost()?;
-            let slice = Slice::submit(self.gpu, slot, &mut self.pieces);
-            if self.pieces.is_empty() {
-                return self.submitted(slice, earlier_s);
+        let last = loop {
+            gpu.faults.check_lost()?;
+            let slice = Slice::submit(gpu, slot, &mut pieces);
+            if pieces.is_empty() {
+                break slice;
             }
-            let (held, slice_s) = slice.ended(self.gpu, self.label)?;
+            let (held, slice_s) = slice.ended(gpu, label)?;
             earlier_s += slice_s;
-            slot = held.next(predicted_s(self.gpu, &self.pieces));
-        }
-    }
-
-    fn submitted(self, last: Slice<'g>, earlier_s: f64) -> Result<Submitted<'g>, GpuError> {
-        let Self { gpu, label, timer, reads, .. } = self;
+            slot = held.next(predicted_s(gpu, &pieces));
+        };
         let mapped = map(&reads, timer.as_ref());
         let mut submitted = Submitted { gpu, slice: None, earlier_s, timer, reads, mapped };
         if gpu.device_queue.cuts() {
@@ -256,9 +246,7 @@ impl<'g> Slice<'g> {
         let index = gpu.queue.submit(commands);
         Self { slot, index, work: works.concat(), started }
     }
-}
 
-impl<'g> Slice<'g> {
     /// Waits for the device and learns from the time that it took.
     fn ended(self, gpu: &Gpu, label: &str) -> Result<(Slot<'g>, f64), GpuError> {
         let Self { slot, index, work, started } = self;
@@ -339,12 +327,11 @@ impl Drop for FrameResult {
 
 impl Timer {
     fn new(gpu: &Gpu) -> Self {
-        let buffer = |usage| gpu.buffer("timestamps", 16, usage);
         let descriptor = wgpu::QuerySetDescriptor { label: Some("frame"), ty: wgpu::QueryType::Timestamp, count: 2 };
         Self {
             queries: gpu.device.create_query_set(&descriptor),
-            resolved: buffer(BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC),
-            host: buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST),
+            resolved: gpu.buffer("timestamps", 16, BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC),
+            host: gpu.buffer("timestamps", 16, BufferUsages::MAP_READ | BufferUsages::COPY_DST),
         }
     }
 

@@ -52,20 +52,21 @@ const NOTHING: GpuLight = GpuLight {
     cone_scale: 1.0,
 };
 
+impl GpuLight {
+    fn round(middle: Vec3, color: Vec3, extent: f32) -> Self {
+        Self { middle_in_world: middle.to_array(), color_linear: color.to_array(), extent, ..NOTHING }
+    }
+}
+
 impl From<&Light> for GpuLight {
     fn from(light: &Light) -> Self {
-        let round = |middle: Vec3, color: Vec3, extent: f32| Self {
-            middle_in_world: middle.to_array(),
-            color_linear: color.to_array(),
-            extent,
-            ..NOTHING
-        };
         match *light {
-            Light::Directional { towards_light_in_world, irradiance_linear, angular_radius_rad } => {
-                Self { kind: PARALLEL, ..round(towards_light_in_world, irradiance_linear, angular_radius_rad.tan()) }
-            }
+            Light::Directional { towards_light_in_world, irradiance_linear, angular_radius_rad } => Self {
+                kind: PARALLEL,
+                ..Self::round(towards_light_in_world, irradiance_linear, angular_radius_rad.tan())
+            },
             Light::Point { position_in_world, intensity_linear, radius_m } => {
-                round(position_in_world, intensity_linear, radius_m)
+                Self::round(position_in_world, intensity_linear, radius_m)
             }
             Light::Spot {
                 position_in_world,
@@ -78,13 +79,13 @@ impl From<&Light> for GpuLight {
                 axis_in_world: forward_in_world.to_array(),
                 outer_cosine: outer_cone_rad.cos(),
                 cone_scale: (inner_cone_rad.cos() - outer_cone_rad.cos()).max(1e-4).recip(),
-                ..round(position_in_world, intensity_linear, radius_m)
+                ..Self::round(position_in_world, intensity_linear, radius_m)
             },
             Light::Rectangle { center_in_world, half_edges_in_world: [u, v], radiance_linear } => Self {
                 kind: RECTANGLE,
                 axis_in_world: u.to_array(),
                 next_edge_in_world: v.to_array(),
-                ..round(center_in_world, radiance_linear, 0.0)
+                ..Self::round(center_in_world, radiance_linear, 0.0)
             },
         }
     }

@@ -18,7 +18,7 @@ struct Free<K, T> {
     /// The most weight of all of them.
     most: u64,
     weight: fn(&K) -> u64,
-    faults: Option<Arc<Faults>>,
+    faults: Arc<Faults>,
 }
 
 struct FreeItems<K, T> {
@@ -27,17 +27,6 @@ struct FreeItems<K, T> {
     /// The one that came back last is at the end.
     items: VecDeque<(K, T)>,
     weight: u64,
-}
-
-impl<K, T> Free<K, T> {
-    fn new(most: u64, weight: fn(&K) -> u64, faults: Option<Arc<Faults>>) -> Self {
-        let items = FreeItems { shortages: 0, items: VecDeque::new(), weight: 0 };
-        Self { items: Mutex::new(items), most, weight, faults }
-    }
-
-    fn shortages(&self) -> u64 {
-        self.faults.as_ref().map_or(0, |faults| faults.shortages())
-    }
 }
 
 /// Lends items of a kind; they come back when dropped.
@@ -63,17 +52,16 @@ pub struct BufferPool {
 }
 
 impl<K, T> Pool<K, T> {
-    /// A pool that keeps at most `most_free` items that nobody has; the one that came back first goes first.
-    #[must_use]
-    pub fn keeping(most_free: usize) -> Self {
-        Self(Arc::new(Free::new(most_free as u64, |_| 1, None)))
-    }
-
-    /// A pool of resources of a device that keeps at most `most_bytes` of them free. What was lent before the device's memory
-    /// ran out is not lent again.
+    /// A pool of resources of a device that keeps at most `most_bytes` of them free: the one that came back first goes first.
+    /// What was lent before the device's memory ran out is not lent again.
     #[must_use]
     pub fn of_device(gpu: &Gpu, most_bytes: u64, bytes: fn(&K) -> u64) -> Self {
-        Self(Arc::new(Free::new(most_bytes, bytes, Some(gpu.faults.clone()))))
+        Self::new(gpu.faults.clone(), most_bytes, bytes)
+    }
+
+    fn new(faults: Arc<Faults>, most: u64, weight: fn(&K) -> u64) -> Self {
+        let items = FreeItems { shortages: 0, items: VecDeque::new(), weight: 0 };
+        Self(Arc::new(Free { items: Mutex::new(items), most, weight, faults }))
     }
 }
 
@@ -81,7 +69,7 @@ impl<K: PartialEq, T> Pool<K, T> {
     /// An item of this kind, made where none is free.
     #[must_use]
     pub fn lend(&self, kind: K, make: impl FnOnce(&K) -> T) -> Lent<K, T> {
-        let shortages = self.0.shortages();
+        let shortages = self.0.faults.shortages();
         let kept = {
             let mut free = self.0.items.lock();
             if std::mem::replace(&mut free.shortages, shortages) != shortages {
@@ -100,6 +88,11 @@ impl<K: PartialEq, T> Pool<K, T> {
 }
 
 impl<K, T> Lent<K, T> {
+    /// An item of no pool.
+    pub(crate) fn unpooled(kind: K, item: T) -> Self {
+        Self { lent: Some((kind, item)), home: Weak::new(), shortages: 0 }
+    }
+
     fn lent(&self) -> &(K, T) {
         self.lent.as_ref().expect("present until dropped")
     }
@@ -122,7 +115,7 @@ impl<K, T> Drop for Lent<K, T> {
     fn drop(&mut self) {
         let (Some(home), Some(lent)) = (self.home.upgrade(), self.lent.take()) else { return };
         let mut free = home.items.lock();
-        if free.shortages != self.shortages || home.shortages() != self.shortages {
+        if free.shortages != self.shortages || home.faults.shortages() != self.shortages {
             return;
         }
         let weight = (home.weight)(&lent.0);
@@ -169,7 +162,7 @@ mod tests {
 
     #[test]
     fn returned_items_are_lent_again_and_surplus_ones_dropped() {
-        let pool = Pool::keeping(2);
+        let pool = Pool::new(Arc::default(), 2, |_| 1);
         let lend = |kind: char, value: u32| pool.lend(kind, |_| value);
         let a = lend('a', 1);
         let b = lend('b', 2);
@@ -188,7 +181,7 @@ mod tests {
 
     #[test]
     fn free_items_are_bounded_in_weight_and_those_unused_for_longest_go_first() {
-        let pool = Pool(Arc::new(Free::new(10, |weight: &u64| *weight, None)));
+        let pool = Pool::new(Arc::default(), 10, |weight: &u64| *weight);
         let kept = || pool.0.items.lock().items.iter().map(|(weight, ())| *weight).collect::<Vec<_>>();
         let lend = |weight: u64| pool.lend(weight, |_| ());
         let five = lend(5);

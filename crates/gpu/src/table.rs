@@ -54,7 +54,7 @@ impl Table {
     /// When the device has no texture of that size.
     pub fn new<T: NoUninit>(gpu: &Gpu, label: &str, format: TextureFormat, elements: &[T]) -> Result<Self, GpuError> {
         let shape = Shape::of(gpu, label, format, elements)?;
-        let table = Self(Pool::keeping(0).lend(shape, |&shape| texture(gpu, label, shape)));
+        let table = Self(Lent::unpooled(shape, texture(gpu, label, shape)));
         table.write(gpu, bytemuck::cast_slice(elements));
         Ok(table)
     }
@@ -125,8 +125,7 @@ impl TablePool {
         let slot = queue.wait(turn, queue.predicted_s([&[work][..]].into_iter()));
         let mut staging = self.staging.lock();
         let chunk = staging.chunk(&self.gpu, row_bytes as u64 * u64::from(texture.height()));
-        let lost = |error: wgpu::MapRangeError| GpuError::Lost(error.to_string());
-        let mut mapped = chunk.get_mapped_range_mut().map_err(lost)?;
+        let mut mapped = chunk.get_mapped_range_mut().map_err(|error| GpuError::Lost(error.to_string()))?;
         mapped.slice(..bytes.len()).copy_from_slice(bytes);
         mapped.slice(bytes.len()..).fill(0);
         drop(mapped);
@@ -188,11 +187,10 @@ impl Shape {
 pub fn texture_bytes(texture: &wgpu::Texture) -> u64 {
     let size = texture.size();
     let texel = texture.format().block_copy_size(None).unwrap_or(4);
-    let level = |level| {
-        let extent = size.mip_level_size(level, texture.dimension());
-        u64::from(extent.width) * u64::from(extent.height) * u64::from(extent.depth_or_array_layers)
-    };
-    u64::from(texel) * (0..texture.mip_level_count()).map(level).sum::<u64>()
+    let levels = (0..texture.mip_level_count()).map(|level| size.mip_level_size(level, texture.dimension()));
+    let texels =
+        levels.map(|level| u64::from(level.width) * u64::from(level.height) * u64::from(level.depth_or_array_layers));
+    u64::from(texel) * texels.sum::<u64>()
 }
 
 fn texel_bytes(format: TextureFormat) -> usize {

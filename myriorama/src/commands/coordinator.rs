@@ -80,6 +80,6 @@ pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
 }
 
 fn event_log(path: &Path) -> anyhow::Result<EventLog> {
-    let begin = || Recorder::new(Box::new(File::create(path)?) as Box<dyn std::io::Write + Send>);
-    begin().with_context(|| format!("cannot write {}", path.display()))
+    let log = File::create(path).and_then(|file| Recorder::new(Box::new(file) as Box<dyn std::io::Write + Send>));
+    log.with_context(|| format!("cannot write {}", path.display()))
 }

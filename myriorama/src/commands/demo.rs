@@ -7,7 +7,7 @@ mod shared_light;
 mod viewpoint;
 
 use app_core::exit::Outcome;
-use app_core::experiment::Experiment;
+use app_core::experiment::{Experiment, PAPER_VIEWS};
 use app_core::print_line;
 use app_core::progress::bar;
 use node::Engine as _;
@@ -17,8 +17,7 @@ use report::{Bar, Check, Report};
 pub use args::DemoArgs;
 use shared_light::LightResult;
 
-/// The number of views V of Lages et al., and of the quick form.
-const VIEWS: usize = app_core::experiment::PAPER_VIEWS;
+/// The number of views V of the quick form.
 const QUICK_VIEWS: usize = 64;
 /// Nodes that share the device.
 const NODES: usize = 5;
@@ -43,7 +42,10 @@ pub fn run(args: &DemoArgs) -> anyhow::Result<Outcome> {
     }
     report.cover = Some(cover);
     shared_light::report(&results, &mut report)?;
-    report.checks.extend(results.iter().map(check_of_k));
+    for result in &results {
+        let name = format!("{}: samplers K, off the formula's", result.lighting);
+        report.checks.push(Check::new(name, result.samplers_off_formula() as f64, "", Bar::Equal(0.0)));
+    }
     experiment.stop()?;
     report.tables.iter().for_each(|table| print_line!("\n{}", table.to_text()));
     print_line!("\n{}", report.summary);
@@ -57,7 +59,7 @@ fn measure(args: &DemoArgs, experiment: &Experiment) -> anyhow::Result<Vec<Light
     let triangles = experiment.setup.scene.triangle_count();
     print_line!("{scene}: {triangles} triangles on {}", experiment.engine.device_name());
     let lights = [args.expensive_light()?, Lighting::default()];
-    let views = if args.quick { QUICK_VIEWS } else { VIEWS };
+    let views = if args.quick { QUICK_VIEWS } else { PAPER_VIEWS };
     let progress = bar("light", lights.len());
     let mut results = Vec::with_capacity(lights.len());
     for lighting in lights {
@@ -78,9 +80,4 @@ fn new_report(args: &DemoArgs, experiment: &Experiment) -> Report {
     report.parameter("sampling", args.scene.sampling().to_string());
     report.parameter("quick", args.quick);
     report
-}
-
-fn check_of_k(result: &LightResult) -> Check {
-    let name = format!("{}: samplers K, off the formula's", result.lighting);
-    Check::new(name, result.samplers_off_formula() as f64, "", Bar::Equal(0.0))
 }

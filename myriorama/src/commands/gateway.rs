@@ -1,9 +1,9 @@
 //! `myriorama gateway`: thin clients in browsers.
 
-use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use app_core::addresses::{CoordinatorArgs, InsecureArgs, listen, listen_address};
+use app_core::addresses::{CoordinatorArgs, InsecureArgs, address_towards, listen, listen_address};
 use app_core::exit::{BadInput, Outcome};
 use app_core::print_line;
 use app_core::process::cancel_at_signal;
@@ -57,12 +57,9 @@ pub struct GatewayArgs {
 /// # Errors
 /// The port is taken, or the address is not allowed.
 pub async fn run(args: GatewayArgs) -> anyhow::Result<Outcome> {
-    let tls = match args.tls_cert.as_deref().zip(args.tls_key.as_deref()) {
-        Some((certificates, key)) => {
-            Some(tls_config(certificates, key).map_err(|error| BadInput(format!("--tls-cert, --tls-key: {error}")))?)
-        }
-        None => None,
-    };
+    let files = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
+    let tls = files.map(|(certificates, key)| tls_config(certificates, key)).transpose();
+    let tls = tls.map_err(|error| BadInput(format!("--tls-cert, --tls-key: {error}")))?;
     let listener = listen(args.listen, args.insecure.insecure_bind || tls.is_some()).await?;
     let address = listener.local_addr()?;
     // Whoever can reach the port needs the link.
@@ -94,11 +91,8 @@ fn reachable(address: SocketAddr, name: Option<&String>) -> String {
     }
 }
 
-/// The address from which this machine would reach others. Nothing is sent.
+/// The address from which this machine would reach others.
 fn outbound(address: SocketAddr) -> Option<SocketAddr> {
-    let socket = UdpSocket::bind((address.ip(), 0)).ok()?;
-    let elsewhere: IpAddr =
-        if address.is_ipv4() { Ipv4Addr::new(192, 0, 2, 1).into() } else { "2001:db8::1".parse().ok()? };
-    socket.connect((elsewhere, 9)).ok()?;
-    Some(SocketAddr::new(socket.local_addr().ok()?.ip(), address.port()))
+    let elsewhere = if address.is_ipv4() { "192.0.2.1:9" } else { "[2001:db8::1]:9" };
+    address_towards(address, elsewhere)
 }

@@ -22,9 +22,8 @@ pub struct HealthArgs {
 /// # Errors
 /// The process does not serve, or does not answer within seconds.
 pub async fn run(args: &HealthArgs) -> anyhow::Result<Outcome> {
-    let answer = tokio::time::timeout(DEADLINE, wire::rpc::is_serving(&args.address, "")).await;
-    let no_answer = || format!("{} does not answer", args.address);
-    if !answer.with_context(no_answer)?.with_context(no_answer)? {
+    let answer = async { anyhow::Ok(tokio::time::timeout(DEADLINE, wire::rpc::is_serving(&args.address, "")).await??) };
+    if !answer.await.with_context(|| format!("{} does not answer", args.address))? {
         bail!("{} does not serve", args.address);
     }
     print_line!("{} serves", args.address);

@@ -1,9 +1,9 @@
 //! `myriorama node`: samples and composites by the coordinator's plan.
 
-use std::net::{SocketAddr, UdpSocket};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use app_core::addresses::{CoordinatorArgs, InsecureArgs, MetricsArgs, listen, listen_address};
+use app_core::addresses::{CoordinatorArgs, InsecureArgs, MetricsArgs, address_towards, listen, listen_address};
 use app_core::exit::Outcome;
 use app_core::memory::MemoryArgs;
 use app_core::print_line;
@@ -83,9 +83,6 @@ fn name_of(address: SocketAddr) -> String {
 /// The address of the network interface towards the coordinator, for a node that listens on all addresses.
 fn own_address(coordinator: &str, address: SocketAddr) -> Option<String> {
     let authority = coordinator.split("://").last()?.split('/').next()?;
-    let unspecified = SocketAddr::new(address.ip(), 0);
-    // No packet is sent: the system only chooses the interface.
-    let socket = UdpSocket::bind(unspecified).ok().filter(|_| address.ip().is_unspecified())?;
-    socket.connect(authority).ok()?;
-    Some(format!("http://{}", SocketAddr::new(socket.local_addr().ok()?.ip(), address.port())))
+    let own = Some(address).filter(|address| address.ip().is_unspecified())?;
+    Some(format!("http://{}", address_towards(own, authority)?))
 }

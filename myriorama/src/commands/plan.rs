@@ -9,11 +9,11 @@ use app_core::exit::Outcome;
 use app_core::planning::{PlannedViews, Planning, one_node};
 use app_core::print_line;
 use app_core::setup::{DeviceArgs, SceneArgs, Setup};
-use app_core::sizes::SizePx;
+use app_core::sizes::{SizePx, within};
 use clap::Args;
 use codec::FrameCodec;
 use coordinator::PlanStore as _;
-use coordinator::schedule::{EqualNodes, STILL_SET_S};
+use coordinator::schedule::STILL_SET_S;
 use depth_image::{Antialias, ViewPlanes};
 use engine::GpuEngine;
 use indicatif::ProgressBar;
@@ -22,7 +22,6 @@ use output::Output;
 use planner::{Budget, Kept, Planner, Pricing as _, PromiseState, device_name};
 use probe::Prober;
 
-use super::view::rate;
 use crate::budget::PlansArgs;
 
 /// Finds the cheapest representation of a scene that keeps a budget: how it is sampled, from how many cameras, in images of
@@ -53,10 +52,10 @@ pub struct PlanArgs {
     #[arg(long, default_value_t = 290, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     views: u32,
     /// Poses a second of a moving viewer, in place of --views: a set of a still scene serves 60 s of them
-    #[arg(long, value_name = "HZ", conflicts_with = "views", value_parser = rate)]
+    #[arg(long, value_name = "HZ", conflicts_with = "views", value_parser = within(0.01..=1000.0))]
     rate: Option<f64>,
     /// The most time of measuring
-    #[arg(long, default_value_t = 300.0, value_name = "S", value_parser = allowance)]
+    #[arg(long, default_value_t = 300.0, value_name = "S", value_parser = within(1.0..=1e6))]
     allowance: f64,
     #[command(flatten)]
     plans: PlansArgs,
@@ -72,10 +71,6 @@ Examples:
   myriorama plan --scene helmet.gltf --budget \"psnr 32\" --rate 30 --method mesh
 
 Exit status: 0 the budget is kept; 2 arguments or input that cannot be used; 3 nothing keeps the budget, or a failure.";
-
-fn allowance(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|s| (1.0..=1e6).contains(s)).ok_or_else(|| "expected 1 to 1000000".to_owned())
-}
 
 impl PlanArgs {
     /// V: the views that share the cost of a set.
@@ -115,9 +110,10 @@ pub fn run(args: &PlanArgs) -> anyhow::Result<Outcome> {
     let mut planner = Planner::new(request, planning.ladder.clone(), pricing)?;
     let progress = ProgressBar::new_spinner();
     progress.enable_steady_tick(Duration::from_millis(200));
-    let observe = |planner: &Planner<EqualNodes>| progress.set_message(planner.outcome().reason);
     let Planning { viewpoints, representations, .. } = &planning;
-    let (outcome, kept) = probe::plan(&mut planner, &mut prober, viewpoints, representations, remembered, observe);
+    let (outcome, kept) = probe::plan(&mut planner, &mut prober, viewpoints, representations, remembered, |planner| {
+        progress.set_message(planner.outcome().reason);
+    });
     progress.finish_and_clear();
     if let Some(files) = files {
         // The plan is made, whether a later one can use what was measured or not.

@@ -6,38 +6,13 @@ use std::time::Duration;
 use app_core::addresses::CoordinatorArgs;
 use app_core::exit::Outcome;
 use app_core::print_line;
+use app_core::table::table;
 use clap::Args;
-use cluster::{ClusterStatus, Costs, NodeCondition, NodeStatus, SharedLightCosts, WorkloadStatus};
-use report::{Cell, Table};
+use cluster::{ClusterStatus, NodeCondition, NodeStatus, SessionPlan, SharedLightCosts, Workload, WorkloadStatus};
+use report::{Cell, Table, TableError};
 
-const WORKLOAD_COLUMNS: [(&str, &str); 10] = [
-    ("workload", ""),
-    ("scene", ""),
-    ("light", ""),
-    ("policy", ""),
-    ("K", ""),
-    ("sessions", ""),
-    ("viewers", ""),
-    ("V", ""),
-    ("used", "%"),
-    ("one more viewer", "%"),
-];
 /// Characters of a scene's hash that tell scenes apart.
 const SHORT_HASH: usize = 8;
-const COLUMNS: [(&str, &str); 12] = [
-    ("node", ""),
-    ("roles", ""),
-    ("plan", ""),
-    ("g", "ms"),
-    ("g_v", "ms"),
-    ("c", "ms"),
-    ("d", "ms"),
-    ("e", "ms"),
-    ("busy", "%"),
-    ("views", ""),
-    ("dropped", ""),
-    ("device", ""),
-];
 
 /// Prints the workloads of a cluster, the nodes of each with their roles and costs, and the reasons of the plans.
 #[derive(Debug, Args)]
@@ -71,57 +46,90 @@ pub async fn run(args: &StatusArgs) -> anyhow::Result<Outcome> {
 
 /// The workloads, then the nodes of each.
 fn text(status: &ClusterStatus) -> anyhow::Result<String> {
-    let mut workloads = Table::new(headline(status), &WORKLOAD_COLUMNS);
-    for workload in &status.workloads {
-        workloads.push(workload_row(workload))?;
-    }
-    let mut parts = vec![workloads.to_text()];
+    let mut parts = vec![workload_table(status)?.to_text()];
     for workload in &status.workloads {
         parts.push(workload_text(workload, &status.nodes)?);
     }
-    let is_idle = |node: &&NodeStatus| !status.workloads.iter().any(|workload| condition(workload, node).is_some());
-    let idle: Vec<String> = status.nodes.iter().filter(is_idle).map(|node| node.node_name.clone()).collect();
+    let mut idle = Vec::new();
+    for node in &status.nodes {
+        if !status.workloads.iter().any(|workload| condition(workload, node).is_some()) {
+            idle.push(node.node_name.as_str());
+        }
+    }
     if !idle.is_empty() {
         parts.push(format!("Nodes without a workload: {}.", idle.join(", ")));
     }
     Ok(parts.join("\n\n"))
 }
 
-fn headline(status: &ClusterStatus) -> String {
-    format!(
+fn workload_table(status: &ClusterStatus) -> Result<Table, TableError> {
+    let headline = format!(
         "Plan {}: P = {} nodes, K = {} samplers, V = {} views a set of {} sessions",
         status.plan_epoch,
         status.nodes.len(),
         status.sampler_count(),
         status.views_per_set(),
         status.session_count()
+    );
+    table(
+        headline,
+        &status.workloads,
+        &[
+            ("workload", "", |workload| (workload.number as f64).into()),
+            ("scene", "", |workload| of_plan(workload, |plan| short_hash(&plan.assignment.workload).into())),
+            ("light", "", |workload| of_plan(workload, |plan| plan.assignment.workload.lighting.clone().into())),
+            ("policy", "", |workload| of_plan(workload, |plan| plan.assignment.policy.to_string().into())),
+            ("K", "", |workload| of_plan(workload, |plan| (plan.sampler_count() as f64).into())),
+            ("sessions", "", |workload| f64::from(workload.session_count).into()),
+            ("viewers", "", |workload| f64::from(workload.viewer_count).into()),
+            ("V", "", |workload| (workload.views_per_set as f64).into()),
+            ("used", "%", |workload| workload.utilisation.map_or(Cell::Missing, |used| (used * 100.0).into())),
+            ("one more viewer", "%", |workload| (workload.one_more_viewer * 100.0).into()),
+        ],
     )
 }
 
-fn workload_row(workload: &WorkloadStatus) -> Vec<Cell> {
-    let WorkloadStatus { number, session_count, viewer_count, views_per_set, utilisation, one_more_viewer, .. } =
-        workload;
-    let plan = workload.plan.as_ref().map(|plan| {
-        let shown = &plan.assignment.workload;
-        let scene: String = shown.scene.hash.as_str().chars().take(SHORT_HASH).collect();
-        let light = shown.lighting.clone();
-        let policy = plan.assignment.policy.to_string();
-        vec![scene.into(), light.into(), policy.into(), (plan.sampler_count() as f64).into()]
-    });
-    let head = [(*number as f64).into()].into_iter().chain(plan.unwrap_or_else(|| vec![Cell::Missing; 4]));
-    let counts = [f64::from(*session_count), f64::from(*viewer_count), *views_per_set as f64].map(Cell::from);
-    let used = utilisation.map_or(Cell::Missing, |utilisation| (utilisation * 100.0).into());
-    head.chain(counts).chain([used, (one_more_viewer * 100.0).into()]).collect()
+fn of_plan(workload: &WorkloadStatus, cell: fn(&SessionPlan) -> Cell) -> Cell {
+    workload.plan.as_ref().map_or(Cell::Missing, cell)
+}
+
+fn short_hash(workload: &Workload) -> String {
+    workload.scene.hash.as_str().chars().take(SHORT_HASH).collect()
+}
+
+/// A node and its part in a workload.
+struct NodeRow<'a> {
+    node: &'a NodeStatus,
+    condition: &'a NodeCondition,
+    roles: String,
 }
 
 /// The nodes of a workload, its plan's reason, and what it achieves.
 fn workload_text(workload: &WorkloadStatus, nodes: &[NodeStatus]) -> anyhow::Result<String> {
-    let mut table = Table::new(format!("Workload {}", workload.number), &COLUMNS);
+    let mut rows = Vec::new();
     for node in nodes {
         if let Some(condition) = condition(workload, node) {
-            table.push(row(workload, node, condition))?;
+            rows.push(NodeRow { node, condition, roles: roles(workload, &node.node_name) });
         }
     }
+    let table = table(
+        format!("Workload {}", workload.number),
+        &rows,
+        &[
+            ("node", "", |row| row.node.node_name.clone().into()),
+            ("roles", "", |row| row.roles.clone().into()),
+            ("plan", "", |row| if row.condition.is_ready { "ready" } else { "not yet" }.into()),
+            ("g", "ms", |row| (row.condition.costs.sample_image_s * 1e3).into()),
+            ("g_v", "ms", |row| (row.condition.costs.direct_view_s * 1e3).into()),
+            ("c", "ms", |row| (row.condition.costs.reconstruct_view_s * 1e3).into()),
+            ("d", "ms", |row| (row.condition.costs.load_set_s * 1e3).into()),
+            ("e", "ms", |row| (row.condition.costs.encode_view_s * 1e3).into()),
+            ("busy", "%", |row| (row.condition.busy_ratio * 100.0).into()),
+            ("views", "", |row| (row.condition.views as f64).into()),
+            ("dropped", "", |row| (row.condition.dropped_views as f64).into()),
+            ("device", "", |row| row.node.device_name.clone().into()),
+        ],
+    )?;
     let why = workload.plan.as_ref().map_or("No plan: no node can serve it now.", |plan| &plan.reason);
     let promise = workload.promise.as_ref().map_or_else(String::new, |promise| format!("\n{promise}"));
     Ok(format!("{}\n\n{why}{promise}\n{}", table.to_text(), achieved(workload)))
@@ -155,16 +163,6 @@ fn light_text(light: &SharedLightCosts) -> String {
 
 fn condition<'a>(workload: &'a WorkloadStatus, node: &NodeStatus) -> Option<&'a NodeCondition> {
     workload.conditions.iter().find(|condition| condition.node_name == node.node_name)
-}
-
-fn row(workload: &WorkloadStatus, node: &NodeStatus, condition: &NodeCondition) -> Vec<Cell> {
-    let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s, .. } = condition.costs;
-    let times_ms = [sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s].map(|s| s * 1e3);
-    let counts = [condition.busy_ratio * 100.0, condition.views as f64, condition.dropped_views as f64];
-    let plan = if condition.is_ready { "ready" } else { "not yet" };
-    let head = [node.node_name.clone().into(), roles(workload, &node.node_name).into(), plan.into()];
-    let figures = times_ms.into_iter().chain(counts).map(Cell::from);
-    head.into_iter().chain(figures).chain([node.device_name.clone().into()]).collect()
 }
 
 fn roles(workload: &WorkloadStatus, name: &str) -> String {

@@ -67,16 +67,23 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     // The device and the packages hold the scenes now; the third copy is dropped.
     drop(scenes);
     let view_bytes = args.memory.view_memory;
-    let configure = |config: NodeConfig| NodeConfig {
-        set_memory_bytes: memory / nodes,
-        quotas: Quotas { view_bytes, ..config.quotas },
-        ..args.limits.within(config)
-    };
     let device_name = engine.device_name();
     let (port, browsers) = args.viewer.share(listener);
     let config = CoordinatorConfig { insecure_bind: args.insecure.insecure_bind, ..CoordinatorConfig::default() };
     let config = args.budget.configure(config);
-    let mut cluster = Cluster::start(configure, port, config, offers, engine.opener(), nodes).await?;
+    let mut cluster = Cluster::start(
+        |config| NodeConfig {
+            set_memory_bytes: memory / nodes,
+            quotas: Quotas { view_bytes, ..config.quotas },
+            ..args.limits.within(config)
+        },
+        port,
+        config,
+        offers,
+        engine.opener(),
+        nodes,
+    )
+    .await?;
     print_line!("{nodes} nodes on {device_name}, at {}", cluster.address);
     let viewer = args.viewer.serve(browsers, &cluster.address, CancellationToken::new());
     tokio::select! {

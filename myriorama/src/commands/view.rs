@@ -24,12 +24,11 @@ use indicatif::ProgressBar;
 use tokio::runtime::Handle;
 
 pub use args::ViewArgs;
-pub(super) use args::rate;
 use comparing::compare;
 use file_names::remove_parts;
 use job::Job;
 use record::Record;
-use stopping::{Ended, how_to_resume, until};
+use stopping::{how_to_resume, until};
 use writer::PictureWriter;
 
 /// The longest wait for the choice of a budget.
@@ -80,10 +79,10 @@ async fn pictures(args: &ViewArgs, signals: &StopSignals) -> anyhow::Result<Outc
     job.expose(&record);
     if record.count() < record.total() {
         let ended = write_missing(args, &job, &mut record, signals).await;
-        if matches!(ended, Ok(Ended::Stopped)) || ended.is_err() && record.count() > 0 {
+        if matches!(ended, Ok(None)) || ended.is_err() && record.count() > 0 {
             eprintln!("{}", how_to_resume(&record, &args.out));
         }
-        if let Ended::Stopped = ended? {
+        if ended?.is_none() {
             return Ok(Outcome::Interrupted);
         }
     } else {
@@ -105,16 +104,17 @@ async fn pictures(args: &ViewArgs, signals: &StopSignals) -> anyhow::Result<Outc
     }
 }
 
-/// Receives the views that are missing. Writes each picture as it comes, and the record now and then and at the end.
+/// Receives the views that are missing. Writes each picture as it comes, and the record now and then and at the end. `None` where
+/// a signal ended it.
 async fn write_missing(
     args: &ViewArgs,
     job: &Job,
     record: &mut Record,
     signals: &StopSignals,
-) -> anyhow::Result<Ended> {
-    let Some(session) = until(&signals.first, job.open()).await? else { return Ok(Ended::Stopped) };
+) -> anyhow::Result<Option<()>> {
+    let Some(session) = until(&signals.first, job.open()).await? else { return Ok(None) };
     if until(&signals.first, job.wait_for_promise(&session, LONGEST_WAIT)).await?.is_none() {
-        return Ok(Ended::Stopped);
+        return Ok(None);
     }
     record.set_tone(session.tone());
     // Neither do pictures of an earlier request stay beside those of this one, nor their record.
@@ -141,9 +141,9 @@ async fn write_missing(
     let finished = finish(&mut writer, record).await;
     progress.finish_and_clear();
     let seconds = received.and_then(|received| finished.map(|()| received))?;
-    let Some(seconds) = seconds else { return Ok(Ended::Stopped) };
+    let Some(seconds) = seconds else { return Ok(None) };
     print_line!("{} views in {seconds:.3} s, in {}", record.count() - before, args.out.display());
-    Ok(Ended::Done)
+    Ok(Some(()))
 }
 
 /// Waits for the pictures that are being written, and writes the record.

@@ -96,8 +96,8 @@ impl Record {
         let shown = self.shown.iter().map(|shown| shown.shown_s).filter(|&shown_s| shown_s > since_s);
         let ends = shown.chain([self.seconds.max(since_s)]);
         let mut last_s = since_s;
-        let gap = |end_s: f64| (end_s - std::mem::replace(&mut last_s, end_s), end_s);
-        let longest = ends.map(gap).fold((0.0, since_s), |a, b| if b.0 > a.0 { b } else { a });
+        let gaps = ends.map(|end_s| (end_s - std::mem::replace(&mut last_s, end_s), end_s));
+        let longest = gaps.fold((0.0, since_s), |a, b| if b.0 > a.0 { b } else { a });
         (longest.0, longest.1 - longest.0)
     }
 
@@ -147,8 +147,8 @@ pub fn latencies<'a>(name: &str, shown: impl Iterator<Item = &'a Shown>) -> anyh
     let columns = [("stage", ""), ("mean", "ms"), ("median", "ms"), ("95 %", "ms"), ("99 %", "ms"), ("most", "ms")];
     let mut table = Table::new(name, &columns);
     let shown: Vec<&Shown> = shown.collect();
-    let stage = |at: usize| shown.iter().map(|shown| shown.stages_s[at]).collect();
-    let stages = STAGES.into_iter().enumerate().map(|(at, name)| (name, stage(at)));
+    let stages = STAGES.into_iter().enumerate();
+    let stages = stages.map(|(at, name)| (name, shown.iter().map(|shown| shown.stages_s[at]).collect()));
     let whole = [
         ("age of a frame", shown.iter().map(|shown| shown.age_s()).collect()),
         ("age of its samples", shown.iter().map(|shown| shown.set_age_s).collect::<Vec<f64>>()),

@@ -6,7 +6,7 @@ use wgpu::{BindGroup, BindingResource, TextureFormat};
 
 /// Resources that are bound to a group of a shader.
 pub struct BoundGroup {
-    group: BindGroup,
+    pub(super) group: BindGroup,
     /// Of each resource in the order of the group's layout.
     pub(super) forms: Vec<Form>,
 }
@@ -22,12 +22,6 @@ pub(super) enum Form {
         is_power_of_two: [bool; 2],
         has_mips: bool,
     },
-}
-
-impl BoundGroup {
-    pub(super) fn new(group: BindGroup, forms: Vec<Form>) -> Self {
-        Self { group, forms }
-    }
 }
 
 impl Form {

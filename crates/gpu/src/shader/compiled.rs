@@ -30,11 +30,12 @@ impl Shader {
     pub fn new(gpu: &Gpu, label: &str, wgsl: &str, traits: ResourceTraits) -> Result<Self, ShaderError> {
         let interface = ShaderInterface::of(label, wgsl, traits)?;
         let device = gpu.device.clone();
-        let group_layout = |group: &Vec<Resource>| {
+        let mut groups = Vec::with_capacity(interface.groups.len());
+        for group in &interface.groups {
             let entries: Vec<_> = group.iter().map(|resource| resource.layout).collect();
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
-        };
-        let groups: Vec<BindGroupLayout> = interface.groups.iter().map(group_layout).collect();
+            let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries };
+            groups.push(device.create_bind_group_layout(&descriptor));
+        }
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(label),
             bind_group_layouts: &groups.iter().map(Some).collect::<Vec<_>>(),
@@ -76,7 +77,7 @@ impl Shader {
             layout: &self.groups[group as usize],
             entries: &entries,
         };
-        BoundGroup::new(self.device.create_bind_group(&descriptor), forms)
+        BoundGroup { group: self.device.create_bind_group(&descriptor), forms }
     }
 }
 

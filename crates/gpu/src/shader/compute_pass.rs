@@ -6,7 +6,8 @@ use super::bound_group::BoundGroup;
 use super::compiled::Shader;
 use super::variant::{Pass, ShaderVariant};
 use super::warming::{FirstUses, warm};
-use crate::{device::Gpu, error::GpuError, frame::Frame, sharing::Turn};
+use crate::sharing::{Turn, WorkKind};
+use crate::{device::Gpu, error::GpuError, frame::Frame};
 
 /// A compute pipeline with its layout. The shader's entry point is `main`.
 pub struct ComputePass {
@@ -55,8 +56,8 @@ impl ComputePass {
         elements: Range<u32>,
         size: DispatchSize<'_>,
     ) {
-        if self.first_uses.make_ready(groups, || warm(frame.gpu(), &self.shader, groups, use_without_work)) {
-            frame.count_first_use();
+        if self.first_uses.make_ready(groups, || warm(frame.gpu, &self.shader, groups, use_without_work)) {
+            frame.count((WorkKind::FIRST_USE, 1));
         }
         let interface = &self.shader.interface;
         let label = Some(interface.shader.as_str());
@@ -71,8 +72,9 @@ impl ComputePass {
             }
             match size {
                 DispatchSize::Invocations(invocations) => {
-                    let axis = |axis: usize| invocations[axis].div_ceil(interface.workgroup_size[axis]);
-                    pass.dispatch_workgroups(axis(0), axis(1), axis(2));
+                    let size = interface.workgroup_size;
+                    let [x, y, z] = std::array::from_fn(|axis| invocations[axis].div_ceil(size[axis]));
+                    pass.dispatch_workgroups(x, y, z);
                 }
                 DispatchSize::Indirect(arguments, first) => {
                     pass.dispatch_workgroups_indirect(arguments, 16 * u64::from(first + number));

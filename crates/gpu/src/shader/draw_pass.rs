@@ -8,7 +8,8 @@ use super::bound_group::BoundGroup;
 use super::compiled::Shader;
 use super::variant::{Pass, ShaderVariant};
 use super::warming::{FirstUses, warm};
-use crate::{device::Gpu, error::GpuError, frame::Frame, sharing::Turn};
+use crate::sharing::{Turn, WorkKind};
+use crate::{device::Gpu, error::GpuError, frame::Frame};
 
 /// A render pipeline with its layout. The shader's entry points are `vertex` and, unless it draws depth alone, `fragment`.
 pub struct DrawPass {
@@ -82,25 +83,23 @@ impl DrawPass {
     /// Says that a pass of the frame will draw with this pipeline and these groups: all, from 0. It has to be said before the
     /// pass begins.
     pub fn announce(&self, frame: &mut Frame<'_>, groups: &[&BoundGroup]) {
-        let draw_nothing = |gpu: &Gpu, shader, groups: &[BoundGroup]| {
-            Self::new(gpu, shader, self.state.clone()).draw_nothing(gpu, groups)
-        };
-        if self.first_uses.make_ready(groups, || warm(frame.gpu(), &self.shader, groups, draw_nothing)) {
-            frame.count_first_use();
+        let is_first_use = self.first_uses.make_ready(groups, || {
+            warm(frame.gpu, &self.shader, groups, |gpu, shader, groups| {
+                Self::new(gpu, shader, self.state.clone()).draw_nothing(gpu, groups)
+            });
+        });
+        if is_first_use {
+            frame.count((WorkKind::FIRST_USE, 1));
         }
     }
 
     /// Draws one triangle of no extent, for which the device compiles the shader.
     fn draw_nothing(&self, gpu: &Gpu, groups: &[BoundGroup]) -> Result<(), GpuError> {
-        let target = |format| {
-            let texture = gpu.texture("nothing", [4, 4, 1], format, TextureUsages::RENDER_ATTACHMENT);
-            texture.create_view(&Default::default())
-        };
-        let colors: Vec<_> = self.state.color_formats.iter().map(|&format| target(format)).collect();
+        let colors: Vec<_> = self.state.color_formats.iter().map(|&format| small_target(gpu, format)).collect();
         let corners = gpu.buffer("nothing", 1024, BufferUsages::VERTEX | BufferUsages::INDEX);
         let mut frame = Frame::begin(gpu, "compile", Turn::default());
         let colors: Vec<_> = colors.iter().collect();
-        let depth = target(Self::DEPTH_FORMAT);
+        let depth = small_target(gpu, Self::DEPTH_FORMAT);
         let mut pass = frame.begin_drawing("compile", &colors, Some(wgpu::Color::TRANSPARENT), &depth);
         pass.set_pipeline(&self.pipeline);
         (0..self.state.vertices.len() as u32).for_each(|slot| pass.set_vertex_buffer(slot, corners.slice(..)));
@@ -119,6 +118,11 @@ impl DrawPass {
     pub fn pipeline(&self) -> &RenderPipeline {
         &self.pipeline
     }
+}
+
+fn small_target(gpu: &Gpu, format: TextureFormat) -> wgpu::TextureView {
+    let texture = gpu.texture("nothing", [4, 4, 1], format, TextureUsages::RENDER_ATTACHMENT);
+    texture.create_view(&Default::default())
 }
 
 impl Deref for DrawPass {

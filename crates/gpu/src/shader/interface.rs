@@ -96,11 +96,10 @@ impl ShaderInterface {
     /// # Errors
     /// WGSL that cannot be parsed, or a trait of a resource that is not declared.
     pub fn of(shader: &str, wgsl: &str, traits: ResourceTraits) -> Result<Self, ShaderError> {
-        let invalid = |message: String| ShaderError::Invalid { shader: shader.to_owned(), message };
         let mut options = Options::new();
         options.capabilities = Capabilities::all();
         let module = Frontend::new_with_options(options).parse(wgsl);
-        let module = module.map_err(|error| invalid(error.emit_to_string_with_path(wgsl, shader)))?;
+        let module = module.map_err(|error| invalid(shader, error.emit_to_string_with_path(wgsl, shader)))?;
         let mut interface = Self {
             shader: shader.to_owned(),
             groups: Vec::new(),
@@ -112,21 +111,24 @@ impl ShaderInterface {
         for (_, variable) in module.global_variables.iter() {
             let Some(place) = variable.binding else { continue };
             let name = variable.name.clone().unwrap_or_default();
-            let has = |wanted| traits.contains(&(name.as_str(), wanted));
-            let ty = binding_type(&module, variable, &has)
-                .ok_or_else(|| invalid(format!("{name} has a type that is not supported")))?;
+            let has_dynamic_offset = traits.contains(&(name.as_str(), ResourceTrait::DynamicOffset));
+            let is_filterable = traits.contains(&(name.as_str(), ResourceTrait::Filterable));
+            let ty = binding_type(&module, variable, has_dynamic_offset, is_filterable)
+                .ok_or_else(|| invalid(shader, format!("{name} has a type that is not supported")))?;
             let bytes = module.types[variable.ty].inner.try_size(module.to_ctx());
-            let element_bytes = bytes.filter(|_| has(ResourceTrait::DynamicOffset));
+            let element_bytes = bytes.filter(|_| has_dynamic_offset);
             let groups = interface.groups.len().max(place.group as usize + 1);
             interface.groups.resize(groups, Vec::new());
             // Vertices write nothing.
-            let visibility = if is_written(ty) && !computes { ShaderStages::FRAGMENT } else { visibility };
+            let is_written =
+                matches!(ty, BindingType::Buffer { ty: BufferBindingType::Storage { read_only: false }, .. });
+            let visibility = if is_written && !computes { ShaderStages::FRAGMENT } else { visibility };
             let layout = wgpu::BindGroupLayoutEntry { binding: place.binding, visibility, ty, count: None };
             interface.groups[place.group as usize].push(Resource { name, layout, element_bytes });
         }
-        let declared = |name: &str| interface.groups.iter().flatten().any(|resource| resource.name == name);
-        match traits.iter().find(|(name, _)| !declared(name)) {
-            Some((name, _)) => Err(invalid(format!("{name} has a trait but is not declared"))),
+        let mut names = traits.iter().map(|(name, _)| name);
+        match names.find(|name| !interface.groups.iter().flatten().any(|resource| resource.name == **name)) {
+            Some(name) => Err(invalid(shader, format!("{name} has a trait but is not declared"))),
             None => Ok(interface),
         }
     }
@@ -151,25 +153,30 @@ impl ShaderInterface {
         group: u32,
         names: impl Iterator<Item = &'n str>,
     ) -> Result<Vec<&Resource>, ShaderError> {
-        let shader = self.shader.clone();
-        let Some(resources) = self.groups.get(group as usize) else {
-            return Err(ShaderError::NoGroup { shader, group });
-        };
+        let resources =
+            self.groups.get(group as usize).ok_or_else(|| self.misbound(group, "the group", "is not declared"))?;
         let mut matched: Vec<&Resource> = Vec::with_capacity(resources.len());
         for name in names {
-            let Some(resource) = resources.iter().find(|resource| resource.name == name) else {
-                return Err(ShaderError::NotInGroup { shader, group, name: name.to_owned() });
-            };
+            let resource = resources.iter().find(|resource| resource.name == name);
+            let resource = resource.ok_or_else(|| self.misbound(group, name, "is bound, but is not declared"))?;
             if matched.iter().any(|other| other.name == name) {
-                return Err(ShaderError::BoundTwice { shader, group, name: name.to_owned() });
+                return Err(self.misbound(group, name, "is bound twice"));
             }
             matched.push(resource);
         }
         match resources.iter().find(|resource| !matched.iter().any(|other| other.name == resource.name)) {
-            Some(Resource { name, .. }) => Err(ShaderError::Unbound { shader, group, name: name.clone() }),
+            Some(Resource { name, .. }) => Err(self.misbound(group, name, "is not bound")),
             None => Ok(matched),
         }
     }
+
+    fn misbound(&self, group: u32, name: &str, fault: &'static str) -> ShaderError {
+        ShaderError::Binding { shader: self.shader.clone(), group, name: name.to_owned(), fault }
+    }
+}
+
+fn invalid(shader: &str, message: String) -> ShaderError {
+    ShaderError::Invalid { shader: shader.to_owned(), message }
 }
 
 fn stage(stage: ShaderStage) -> ShaderStages {
@@ -180,32 +187,27 @@ fn stage(stage: ShaderStage) -> ShaderStages {
     }
 }
 
-fn is_written(ty: BindingType) -> bool {
-    matches!(ty, BindingType::Buffer { ty: BufferBindingType::Storage { read_only: false }, .. })
-}
-
 /// The type of a variable's binding; `None` for types that no shader here uses.
 fn binding_type(
     module: &Module,
     variable: &GlobalVariable,
-    has: &impl Fn(ResourceTrait) -> bool,
+    has_dynamic_offset: bool,
+    is_filterable: bool,
 ) -> Option<BindingType> {
-    let has_dynamic_offset = has(ResourceTrait::DynamicOffset);
-    let buffer = |ty| Some(BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None });
-    match (variable.space, &module.types[variable.ty].inner) {
-        (AddressSpace::Uniform, _) => buffer(BufferBindingType::Uniform),
+    let ty = match (variable.space, &module.types[variable.ty].inner) {
+        (AddressSpace::Uniform, _) => BufferBindingType::Uniform,
         (AddressSpace::Storage { access }, _) => {
-            buffer(BufferBindingType::Storage { read_only: !access.contains(StorageAccess::STORE) })
+            BufferBindingType::Storage { read_only: !access.contains(StorageAccess::STORE) }
         }
         (AddressSpace::Handle, &TypeInner::Image { dim, arrayed, class }) => {
-            image_type(dim, arrayed, class, has(ResourceTrait::Filterable))
+            return image_type(dim, arrayed, class, is_filterable);
         }
-        (AddressSpace::Handle, TypeInner::Sampler { comparison }) => {
-            let ty = if *comparison { SamplerBindingType::Comparison } else { SamplerBindingType::Filtering };
-            Some(BindingType::Sampler(ty))
+        (AddressSpace::Handle, TypeInner::Sampler { comparison: false }) => {
+            return Some(BindingType::Sampler(SamplerBindingType::Filtering));
         }
-        _ => None,
-    }
+        _ => return None,
+    };
+    Some(BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None })
 }
 
 fn image_type(dim: ImageDimension, arrayed: bool, class: ImageClass, filterable: bool) -> Option<BindingType> {
@@ -213,20 +215,17 @@ fn image_type(dim: ImageDimension, arrayed: bool, class: ImageClass, filterable:
         return None;
     }
     let view_dimension = if arrayed { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
-    let texture = |sample_type, multisampled| Some(BindingType::Texture { sample_type, view_dimension, multisampled });
-    match class {
-        ImageClass::Sampled { kind: ScalarKind::Float, multi } => {
-            texture(wgpu::TextureSampleType::Float { filterable }, multi)
+    let sample_type = match class {
+        ImageClass::Sampled { kind: ScalarKind::Float, multi: false } => wgpu::TextureSampleType::Float { filterable },
+        ImageClass::Sampled { kind: ScalarKind::Uint, multi: false } => wgpu::TextureSampleType::Uint,
+        ImageClass::Depth { multi: false } => wgpu::TextureSampleType::Depth,
+        ImageClass::Storage { format, access: StorageAccess::STORE } => {
+            let access = wgpu::StorageTextureAccess::WriteOnly;
+            return Some(BindingType::StorageTexture { access, format: texture_format(format)?, view_dimension });
         }
-        ImageClass::Sampled { kind: ScalarKind::Uint, multi } => texture(wgpu::TextureSampleType::Uint, multi),
-        ImageClass::Depth { multi } => texture(wgpu::TextureSampleType::Depth, multi),
-        ImageClass::Storage { format, access } if access == StorageAccess::STORE => Some(BindingType::StorageTexture {
-            access: wgpu::StorageTextureAccess::WriteOnly,
-            format: texture_format(format)?,
-            view_dimension,
-        }),
-        _ => None,
-    }
+        _ => return None,
+    };
+    Some(BindingType::Texture { sample_type, view_dimension, multisampled: false })
 }
 
 fn texture_format(format: StorageFormat) -> Option<TextureFormat> {
@@ -256,8 +255,8 @@ mod tests {
         ShaderInterface::of("test", WGSL, CAMERA).expect("an interface")
     }
 
-    fn matched(group: u32, names: &[&str]) -> Result<usize, ShaderError> {
-        interface().matched(group, names.iter().copied()).map(|resources| resources.len())
+    fn fault(group: u32, names: &[&str]) -> String {
+        interface().matched(group, names.iter().copied()).map(|_| ()).expect_err("a fault").to_string()
     }
 
     #[test]
@@ -268,18 +267,18 @@ mod tests {
         let storage = BufferBindingType::Storage { read_only: false };
         let words = BindingType::Buffer { ty: storage, has_dynamic_offset: false, min_binding_size: None };
         assert_eq!(interface.groups[1][0].layout.ty, words);
-        let found = matched(0, &["depth", "camera"]).expect("both names");
-        assert_eq!(found, 2);
+        let found = interface.matched(0, ["depth", "camera"].into_iter()).expect("both names");
+        assert_eq!(found.len(), 2);
     }
 
     #[test]
     fn a_missing_an_extra_and_a_repeated_name_are_errors() {
-        assert!(matches!(matched(0, &["camera"]), Err(ShaderError::Unbound { name, .. }) if name == "depth"));
-        let extra = matched(0, &["camera", "depth", "words"]);
-        assert!(matches!(extra, Err(ShaderError::NotInGroup { name, .. }) if name == "words"));
-        let twice = matched(0, &["camera", "depth", "depth"]);
-        assert!(matches!(twice, Err(ShaderError::BoundTwice { name, .. }) if name == "depth"));
-        assert!(matches!(matched(2, &[]), Err(ShaderError::NoGroup { group: 2, .. })));
+        assert_eq!(fault(0, &["camera"]), "shader test, group 0: depth is not bound");
+        let extra = fault(0, &["camera", "depth", "words"]);
+        assert_eq!(extra, "shader test, group 0: words is bound, but is not declared");
+        let twice = fault(0, &["camera", "depth", "depth"]);
+        assert_eq!(twice, "shader test, group 0: depth is bound twice");
+        assert_eq!(fault(2, &[]), "shader test, group 2: the group is not declared");
     }
 
     #[test]

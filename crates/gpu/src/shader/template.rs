@@ -56,30 +56,27 @@ macro_rules! wgsl_files {
     ($($name:literal),+ $(,)?) => { [$(($name, include_str!($name))),+] };
 }
 
+macro_rules! shared_files {
+    ($($name:ident)*) => {
+        [$((concat!(stringify!($name), ".wgsl"), include_str!(concat!("../wgsl/", stringify!($name), ".wgsl")))),*]
+    };
+}
+
+const SHARED: [(&str, &str); 10] =
+    shared_files! { background color normal light environment highlight sequence lobe table tone };
+
 impl Templates {
     /// The shared includes, and `own` templates as (name, text).
     ///
     /// # Errors
     /// When a text is not a template.
     pub fn new(own: &[(&'static str, &'static str)]) -> Result<Self, ShaderError> {
-        let shared = [
-            ("background.wgsl", include_str!("../wgsl/background.wgsl")),
-            ("color.wgsl", include_str!("../wgsl/color.wgsl")),
-            ("normal.wgsl", include_str!("../wgsl/normal.wgsl")),
-            ("light.wgsl", include_str!("../wgsl/light.wgsl")),
-            ("environment.wgsl", include_str!("../wgsl/environment.wgsl")),
-            ("highlight.wgsl", include_str!("../wgsl/highlight.wgsl")),
-            ("sequence.wgsl", include_str!("../wgsl/sequence.wgsl")),
-            ("lobe.wgsl", include_str!("../wgsl/lobe.wgsl")),
-            ("table.wgsl", include_str!("../wgsl/table.wgsl")),
-            ("tone.wgsl", include_str!("../wgsl/tone.wgsl")),
-        ];
         let mut environment = Environment::new();
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
         environment.add_global("table_width_log2", TABLE_WIDTH_LOG2);
         environment.add_global("lobe_size_px", LOBE_SIZE_PX.to_array().to_vec());
         environment.add_global("lobe_roughness", LOBE_ROUGHNESS.to_vec());
-        for &(name, text) in shared.iter().chain(own) {
+        for &(name, text) in SHARED.iter().chain(own) {
             environment
                 .add_template(name, text)
                 .map_err(|source| ShaderError::Template { name: name.to_owned(), source })?;
@@ -107,8 +104,8 @@ impl Templates {
     /// # Errors
     /// When the template uses what the context lacks.
     pub fn render(&self, name: &str, context: Value) -> Result<String, ShaderError> {
-        let render = || self.environment.get_template(name)?.render(context);
-        let text = render().map_err(|source| ShaderError::Template { name: name.to_owned(), source })?;
+        let text = self.environment.get_template(name).and_then(|template| template.render(context));
+        let text = text.map_err(|source| ShaderError::Template { name: name.to_owned(), source })?;
         let named = self.declared.iter().filter(|(name, _)| text.contains(name));
         // At the end: directives come first.
         let declarations = named.map(|(name, literal)| format!("\nconst {name} = {literal};"));

@@ -3,17 +3,18 @@
 //! and with resources of the same form. The driver keeps what it compiled on disk, where the device of the queue finds it.
 
 use std::collections::HashMap;
+use std::error::Error;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::{Arc, Once};
 
 use parking_lot::Mutex;
-use wgpu::{BindingResource, BindingType, BufferUsages, TextureFormat, TextureUsages, TextureView};
+use wgpu::{BindingResource, BindingType, BufferUsages, TextureUsages, TextureView};
 
 use super::bound_group::{BoundGroup, Form};
 use super::compiled::Shader;
 use super::interface::Resource;
 use crate::device::{DevicePreference, Gpu};
-use crate::error::{GpuError, ShaderError};
+use crate::error::GpuError;
 
 /// The forms that a pass remembers; all are forgotten when there are more.
 const MOST_FORMS: usize = 1024;
@@ -33,46 +34,33 @@ enum Empty {
     Sampler(wgpu::Sampler),
 }
 
-fn texture(
-    gpu: &Gpu,
-    format: TextureFormat,
-    is_power_of_two: [bool; 2],
-    has_mips: bool,
-    ty: BindingType,
-) -> TextureView {
-    let [width, height] = is_power_of_two.map(|is| SIDES_PX[usize::from(is)]);
-    let (dimension, usage) = match ty {
-        BindingType::StorageTexture { view_dimension, .. } => (view_dimension, TextureUsages::STORAGE_BINDING),
-        BindingType::Texture { view_dimension, .. } => (view_dimension, TextureUsages::TEXTURE_BINDING),
-        _ => (wgpu::TextureViewDimension::D2, TextureUsages::TEXTURE_BINDING),
-    };
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("empty"),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        mip_level_count: if has_mips { 2 } else { 1 },
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage,
-        view_formats: &[],
-    });
-    texture.create_view(&wgpu::TextureViewDescriptor { dimension: Some(dimension), ..Default::default() })
-}
-
 impl Empty {
     fn of(gpu: &Gpu, resource: &Resource, form: Form) -> Self {
-        match (form, resource.layout.ty) {
-            (Form::Texture { format, is_power_of_two, has_mips }, ty) => {
-                Self::Texture(texture(gpu, format, is_power_of_two, has_mips, ty))
+        let (dimension, usage) = match resource.layout.ty {
+            BindingType::Sampler(_) => return Self::Sampler(gpu.texture_sampler([wgpu::AddressMode::Repeat; 2])),
+            BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, .. } => {
+                return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM));
             }
-            (Form::OfLayout, BindingType::Sampler(_)) => {
-                Self::Sampler(gpu.texture_sampler([wgpu::AddressMode::Repeat; 2]))
-            }
-            (Form::OfLayout, BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, .. }) => {
-                Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM))
-            }
-            (Form::OfLayout, _) => Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::STORAGE)),
-        }
+            BindingType::StorageTexture { view_dimension, .. } => (view_dimension, TextureUsages::STORAGE_BINDING),
+            BindingType::Texture { view_dimension, .. } => (view_dimension, TextureUsages::TEXTURE_BINDING),
+            _ => return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::STORAGE)),
+        };
+        let Form::Texture { format, is_power_of_two, has_mips } = form else {
+            return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::STORAGE));
+        };
+        let [width, height] = is_power_of_two.map(|is| SIDES_PX[usize::from(is)]);
+        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("empty"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: if has_mips { 2 } else { 1 },
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: &[],
+        });
+        let view = wgpu::TextureViewDescriptor { dimension: Some(dimension), ..Default::default() };
+        Self::Texture(texture.create_view(&view))
     }
 
     fn resource(&self) -> BindingResource<'_> {
@@ -102,14 +90,6 @@ impl FirstUses {
     }
 }
 
-#[derive(Debug, thiserror::Error)]
-enum WarmingError {
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-    #[error(transparent)]
-    Shader(#[from] ShaderError),
-}
-
 /// Has the second device use a shader with resources of these forms, where the device compiles at the first use and others
 /// would wait for it.
 pub(super) fn warm(
@@ -123,13 +103,13 @@ pub(super) fn warm(
     }
     // One shader is compiled at a time: on one core.
     let mut count = gpu.compiled_outside.lock();
-    let done = Gpu::open(DevicePreference::Software).map_err(WarmingError::from).and_then(|second| {
+    let done = Gpu::open(DevicePreference::Software).map_err(Box::<dyn Error>::from).and_then(|second| {
         second.catching(|| {
             let twin = shader.on(&second)?;
             let groups =
                 groups.iter().zip(0..).map(|(bound, number)| empty_group(&second, &twin, number, &bound.forms));
             let groups: Vec<BoundGroup> = groups.collect();
-            Ok::<_, WarmingError>(use_it(&second, twin, &groups)?)
+            Ok(use_it(&second, twin, &groups)?)
         })
     });
     // With the second device closed, the driver has written what it compiled.
@@ -152,6 +132,8 @@ fn empty_group(gpu: &Gpu, shader: &Shader, number: u32, forms: &[Form]) -> Bound
 
 #[cfg(test)]
 mod tests {
+    use wgpu::TextureFormat;
+
     use super::*;
     use crate::frame::Frame;
     use crate::shader::{Binding, ComputePass, DispatchSize, ResourceTrait};

@@ -122,9 +122,9 @@ impl ClassOrder {
 
     /// The place of the work that goes first, and where it starts on the clock of the flows.
     fn first(&self) -> Option<(usize, f64)> {
-        let end_s = |id| self.flows.iter().find(|flow| flow.id == id).map_or(self.virtual_s, |flow| flow.end_s);
-        let starts = self.waiting.iter().map(|work| end_s(work.flow)).enumerate();
-        starts.min_by(|(_, a), (_, b)| a.total_cmp(b))
+        let flows = self.waiting.iter().map(|work| self.flows.iter().find(|flow| flow.id == work.flow));
+        let starts = flows.map(|flow| flow.map_or(self.virtual_s, |flow| flow.end_s));
+        starts.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b))
     }
 
     fn has_credit(&self) -> bool {

@@ -89,15 +89,17 @@ impl Rates {
     /// The rates of kinds after they took so long together.
     fn learned(&self, sums: &HashMap<WorkKind, u64>, seconds: f64) -> Vec<(WorkKind, Known)> {
         let is_alone = sums.len() == 1;
-        let rates = || sums.iter().filter_map(|(&kind, &units)| Some((self.rate(kind)?, units as f64)));
-        let predicted_s: f64 = rates().map(|(rate, units)| rate.unit_s * units).sum();
-        let sure_s: f64 = rates().filter(|(rate, _)| rate.is_sure).map(|(rate, units)| rate.unit_s * units).sum();
-        let new_kinds = sums.len() - rates().count();
+        let known = sums.iter().filter_map(|(&kind, &units)| Some((self.rate(kind)?, units as f64)));
+        let known: Vec<(Rate, f64)> = known.collect();
+        let predicted_s: f64 = known.iter().map(|(rate, units)| rate.unit_s * units).sum();
+        let sure = known.iter().filter(|(rate, _)| rate.is_sure);
+        let sure_s: f64 = sure.map(|(rate, units)| rate.unit_s * units).sum();
+        let new_kinds = sums.len() - known.len();
         let least_s = if new_kinds == sums.len() { seconds } else { LEAST_SHARE * seconds };
         let of_new_s = if new_kinds == 0 { 0.0 } else { (seconds - predicted_s).max(least_s) };
         let of_known = ((seconds - of_new_s) / predicted_s.max(f64::MIN_POSITIVE)).min(MOST_RISE);
         let not_sure_s = (seconds - sure_s).max(LEAST_SHARE * seconds);
-        let learned = |(&kind, &units): (&WorkKind, &u64)| {
+        let learned = sums.iter().map(|(&kind, &units)| {
             let units = units.max(1) as f64;
             let old = self.rate(kind);
             let was_sure = old.is_some_and(|rate| rate.is_sure);
@@ -109,8 +111,8 @@ impl Rates {
             };
             let is_sure = is_alone || was_sure;
             (kind, Some(Rate { unit_s, most_unit_s: if is_sure { unit_s } else { not_sure_s / units }, is_sure }))
-        };
-        sums.iter().map(learned).collect()
+        });
+        learned.collect()
     }
 
     fn rate(&self, kind: WorkKind) -> Known {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use app_core::setup::{DEFAULT_SCENE, DeviceArgs, SceneArgs};
+use app_core::setup::{DeviceArgs, SceneArgs};
 use clap::Args;
 use render::Lighting;
 
@@ -50,7 +50,9 @@ impl DemoArgs {
     /// The scene and light of the first page.
     pub(super) fn first_page_scene(&self) -> anyhow::Result<SceneArgs> {
         let mut page_scene = self.scene.clone();
-        if page_scene.scene == DEFAULT_SCENE.parse()? {
+        // The parsed value does not tell a scene by default from the same scene by name.
+        let mut arguments = std::env::args_os();
+        if !arguments.any(|argument| argument.to_string_lossy().split('=').next() == Some("--scene")) {
             page_scene.scene = FIRST_PAGE_SCENE.parse()?;
         }
         if page_scene.lighting == Lighting::default() {

@@ -7,19 +7,19 @@ use std::time::Instant;
 use anyhow::Context as _;
 use app_core::print_line;
 use app_core::setup::{SceneArgs, Setup};
-use cluster::{Refinement, SamplePlanes};
-use depth_image::{Antialias, PinholeCamera, SampleImage, View, ViewPlanes};
+use depth_image::{Antialias, Camera, PinholeCamera, View, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
 use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use metrics::{PictureErrors, Rgb8Image, flip_map};
-use node::{DirectWork, Engine as _, SampleSet, SampleWork, Turn, ViewWork, WorkClass};
+use node::{DirectWork, Engine as _, SampleSet, Turn, ViewWork, WorkClass};
+use probe::{Light, Representation};
 use render::Lighting;
 use report::Picture;
 
 use super::args::DemoArgs;
-use super::page_layout::{PageParts, TitledPicture, VIEW_PX};
+use super::page_layout::{self, TitledPicture, VIEW_PX};
 use super::viewpoint::Viewpoint;
 
 /// The side of sample images over that of the view, unless the user names a size: light needs no more.
@@ -67,8 +67,10 @@ struct TimedView {
 
 /// The view of the page.
 struct PageViews {
-    /// With light from samples.
+    /// Made from samples.
     shared: TimedView,
+    /// Whether samples give the view their light, and the scene its surfaces.
+    shares_light: bool,
     /// Drawn directly in about the same time, with fewer rays.
     hurried: TimedView,
     /// Drawn directly with all rays.
@@ -85,25 +87,31 @@ impl PageViews {
         let antialias = Antialias::of(SAMPLES_A_PIXEL).context("four samples are offered")?;
         let planes = ViewPlanes { antialias, ..ViewPlanes::WITH_DEPTH };
         let lighting = page_scene.lighting;
-        let method = page_scene.method_in(lighting);
-        let set_work = sample_work(page_scene, setup, engine.sample_planes(&method)?);
+        let subject = setup.subject(lighting, planes, 0.0);
+        let sampled = Representation {
+            sampling: page_scene.sampling().to_string(),
+            method: page_scene.method_in(lighting),
+            sample_cameras: setup.samples.iter().copied().map(Camera::Pinhole).collect(),
+        };
+        let set_work = subject.sample_work(engine.as_ref(), &sampled, Light::Session)?;
         let (images, samples_s) = timed(|| Ok(engine.sample(&set_work, TURN)?))?;
-        let set = engine.upload(&sample_set(setup, images, lighting)?, TURN)?;
-        let view_work = ViewWork { cameras: vec![camera], method, planes };
-        let reconstruct = || one(engine.reconstruct(set.as_ref(), &view_work, TURN)?);
+        let set = SampleSet { images: images.try_into()?, ..subject.sample_set(&[], Light::Session) };
+        let set = engine.upload(&set, TURN)?;
+        let view_work = ViewWork { cameras: vec![camera], method: sampled.method, planes };
         // The first view of a size also makes its buffers and shaders.
-        reconstruct()?;
-        let (view, seconds) = timed(reconstruct)?;
+        engine.reconstruct(set.as_ref(), &view_work, TURN)?;
+        let (view, seconds) = timed(|| one(engine.reconstruct(set.as_ref(), &view_work, TURN)?))?;
         let shared = TimedView { view, seconds, lighting };
         let draw = |camera: PinholeCamera, lighting: Lighting| {
-            let work = direct_work(setup, camera, lighting, planes);
+            let work = subject.direct_work(vec![camera], Light::Session, planes);
+            let work = DirectWork { lighting: lighting.to_string(), ..work };
             let (view, seconds) = timed(|| one(engine.draw_direct(&work, TURN)?))?;
             anyhow::Ok(TimedView { view, seconds, lighting })
         };
         draw(camera.resized(WARM_UP_PX), lighting)?;
         let hurried = most_rays_within(seconds, lighting, |lighting| draw(camera, lighting))?;
         let reference = draw(camera, lighting)?;
-        Ok(Self { shared, hurried, reference, samples_s })
+        Ok(Self { shared, shares_light: set_work.planes.light, hurried, reference, samples_s })
     }
 }
 
@@ -126,46 +134,6 @@ fn most_rays_within(
     Ok(best)
 }
 
-fn sample_set(setup: &Setup, images: Vec<SampleImage>, lighting: Lighting) -> anyhow::Result<SampleSet> {
-    Ok(SampleSet {
-        scene_hash: setup.offer.hash.to_string(),
-        images: images.try_into()?,
-        volume: setup.offer.volume,
-        background: setup.offer.background,
-        illumination: setup.offer.illumination.clone(),
-        lighting: lighting.to_string(),
-        scene_time_s: 0.0,
-        traced_pixel_count: None,
-        is_common: false,
-    })
-}
-
-fn direct_work(setup: &Setup, camera: PinholeCamera, lighting: Lighting, planes: ViewPlanes) -> DirectWork {
-    DirectWork {
-        scene_hash: setup.offer.hash.to_string(),
-        cameras: vec![camera],
-        lighting: lighting.to_string(),
-        scene_time_s: 0.0,
-        planes,
-        surfaces_by_rays: None,
-    }
-}
-
-fn sample_work(page_scene: &SceneArgs, setup: &Setup, planes: SamplePlanes) -> SampleWork {
-    SampleWork {
-        scene_hash: setup.offer.hash.to_string(),
-        cameras: setup.samples.iter().copied().map(Into::into).collect(),
-        wanted: (0..setup.samples.len() as u32).collect(),
-        sampling: page_scene.sampling().to_string(),
-        planes,
-        lighting: page_scene.lighting.to_string(),
-        scene_time_s: 0.0,
-        temporal_reference_s: None,
-        refinement: Refinement::default(),
-        surfaces_by_rays: None,
-    }
-}
-
 fn one(mut views: Vec<View>) -> anyhow::Result<View> {
     views.pop().context("no view")
 }
@@ -177,7 +145,8 @@ fn timed<T>(make: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<(T, f64)
 }
 
 fn page(setup: &Setup, views: &PageViews) -> anyhow::Result<Picture> {
-    let PageViews { shared, hurried, reference, samples_s } = views;
+    let PageViews { shared, shares_light, hurried, reference, samples_s } = views;
+    let (title, source) = if *shares_light { ("with shared light", "the light of ") } else { ("from samples", "") };
     let shared_error = FlipError::new(reference, shared)?;
     let hurried_error = FlipError::new(reference, hurried)?;
     let size_px = setup.samples.first().context("no sample cameras")?.size_px;
@@ -185,7 +154,7 @@ fn page(setup: &Setup, views: &PageViews) -> anyhow::Result<Picture> {
     let samples = format!("{images} images of {}x{} px in {}", size_px.x, size_px.y, duration(*samples_s));
     let scene = format!("{}, {} triangles", setup.offer.name, setup.scene.triangle_count());
     let caption = format!(
-        "{scene}, {}: {} with the light of {samples}, FLIP {:.3}; drawn directly with fewer rays {}, FLIP {:.3}; with all rays {}",
+        "{scene}, {}: {} with {source}{samples}, FLIP {:.3}; drawn directly with fewer rays {}, FLIP {:.3}; with all rays {}",
         reference.lighting,
         duration(shared.seconds),
         shared_error.mean,
@@ -193,22 +162,24 @@ fn page(setup: &Setup, views: &PageViews) -> anyhow::Result<Picture> {
         hurried_error.mean,
         duration(reference.seconds),
     );
-    let parts = PageParts {
-        hurried: TitledPicture::new(format!("drawn directly in {}", duration(hurried.seconds)), rgb(hurried)?),
-        shared: TitledPicture::new(format!("with shared light in {}", duration(shared.seconds)), rgb(shared)?),
-        reference: TitledPicture::new(format!("directly, all rays: {}", duration(reference.seconds)), rgb(reference)?),
-        hurried_error: hurried_error.titled("left"),
-        shared_error: shared_error.titled("right"),
-        facts: [
-            format!("{scene}; {}; {SAMPLES_A_PIXEL} positions a pixel", reference.lighting),
-            format!("left: {}. right: light of {samples}, for all views", hurried.lighting),
-        ],
-    };
-    Ok(Picture::new("first page", caption, parts.page()))
+    let large = [
+        titled(format!("drawn directly in {}", duration(hurried.seconds)), hurried)?,
+        titled(format!("{title} in {}", duration(shared.seconds)), shared)?,
+    ];
+    let small = [
+        titled(format!("directly, all rays: {}", duration(reference.seconds)), reference)?,
+        hurried_error.titled("left"),
+        shared_error.titled("right"),
+    ];
+    let facts = [
+        format!("{scene}; {}; {SAMPLES_A_PIXEL} positions a pixel", reference.lighting),
+        format!("left: {}. right: {source}{samples}, for all views", hurried.lighting),
+    ];
+    Ok(Picture::new("first page", caption, page_layout::page(large, small, facts)))
 }
 
-fn rgb(timed: &TimedView) -> anyhow::Result<RgbImage> {
-    pictures::rgb(&timed.view).context("a view is not of its size")
+fn titled(title: String, timed: &TimedView) -> anyhow::Result<TitledPicture> {
+    Ok(TitledPicture { title, image: pictures::rgb(&timed.view).context("a view is not of its size")? })
 }
 
 /// The error of a view against one with all rays.
@@ -227,7 +198,7 @@ impl FlipError {
     }
 
     fn titled(self, place: &str) -> TitledPicture {
-        TitledPicture::new(format!("error, {place}: FLIP {:.3}", self.mean), self.map)
+        TitledPicture { title: format!("error, {place}: FLIP {:.3}", self.mean), image: self.map }
     }
 }
 

@@ -22,46 +22,28 @@ const SOFT: TextStyle = TextStyle { dot_px: 2, color: [154, 164, 174] };
 
 /// A picture and the title above it.
 pub(super) struct TitledPicture {
-    title: String,
-    image: RgbImage,
+    pub(super) title: String,
+    pub(super) image: RgbImage,
 }
 
-impl TitledPicture {
-    pub(super) fn new(title: String, image: RgbImage) -> Self {
-        Self { title, image }
+/// The page.
+pub(super) fn page(large: [TitledPicture; 2], small: [TitledPicture; 3], facts: [String; 2]) -> RgbImage {
+    let mut page = RgbImage::from_pixel(PAGE_PX.0, PAGE_PX.1, PAPER);
+    for (column, picture) in (0..).zip(large) {
+        let left = MARGIN_PX + column * (VIEW_PX.0 + MARGIN_PX);
+        INK.write(&mut page, (left, ROWS_PX[0] - TITLE_PX), &picture.title);
+        imageops::replace(&mut page, &picture.image, left.into(), ROWS_PX[0].into());
     }
-}
-
-/// The parts of the page.
-pub(super) struct PageParts {
-    pub hurried: TitledPicture,
-    pub shared: TitledPicture,
-    pub reference: TitledPicture,
-    pub hurried_error: TitledPicture,
-    pub shared_error: TitledPicture,
-    pub facts: [String; 2],
-}
-
-impl PageParts {
-    /// The page.
-    pub(super) fn page(&self) -> RgbImage {
-        let mut page = RgbImage::from_pixel(PAGE_PX.0, PAGE_PX.1, PAPER);
-        for (column, picture) in (0..).zip([&self.hurried, &self.shared]) {
-            let left = MARGIN_PX + column * (VIEW_PX.0 + MARGIN_PX);
-            INK.write(&mut page, (left, ROWS_PX[0] - TITLE_PX), &picture.title);
-            imageops::replace(&mut page, &picture.image, left.into(), ROWS_PX[0].into());
-        }
-        for (column, picture) in (0..).zip([&self.reference, &self.hurried_error, &self.shared_error]) {
-            let left = MARGIN_PX + column * (SMALL_PX.0 + MARGIN_PX);
-            INK.write(&mut page, (left, ROWS_PX[1] - TITLE_PX), &picture.title);
-            let image = imageops::resize(&picture.image, SMALL_PX.0, SMALL_PX.1, FilterType::Triangle);
-            imageops::replace(&mut page, &image, left.into(), ROWS_PX[1].into());
-        }
-        for (top, fact) in FACTS_PX.into_iter().zip(&self.facts) {
-            SOFT.write(&mut page, (MARGIN_PX, top), fact);
-        }
-        page
+    for (column, picture) in (0..).zip(small) {
+        let left = MARGIN_PX + column * (SMALL_PX.0 + MARGIN_PX);
+        INK.write(&mut page, (left, ROWS_PX[1] - TITLE_PX), &picture.title);
+        let image = imageops::resize(&picture.image, SMALL_PX.0, SMALL_PX.1, FilterType::Triangle);
+        imageops::replace(&mut page, &image, left.into(), ROWS_PX[1].into());
     }
+    for (top, fact) in FACTS_PX.into_iter().zip(&facts) {
+        SOFT.write(&mut page, (MARGIN_PX, top), fact);
+    }
+    page
 }
 
 #[cfg(test)]
@@ -69,20 +51,12 @@ mod tests {
     use super::*;
 
     fn flat(value: u8) -> TitledPicture {
-        TitledPicture::new("title".to_owned(), RgbImage::from_pixel(VIEW_PX.0, VIEW_PX.1, Rgb([value; 3])))
+        TitledPicture { title: "title".to_owned(), image: RgbImage::from_pixel(VIEW_PX.0, VIEW_PX.1, Rgb([value; 3])) }
     }
 
     #[test]
     fn every_part_is_on_the_page() {
-        let parts = PageParts {
-            hurried: flat(100),
-            shared: flat(110),
-            reference: flat(120),
-            hurried_error: flat(130),
-            shared_error: flat(140),
-            facts: ["first", "second"].map(str::to_owned),
-        };
-        let page = parts.page();
+        let page = page([100, 110].map(flat), [120, 130, 140].map(flat), ["first", "second"].map(str::to_owned));
         assert_eq!(page.dimensions(), PAGE_PX);
         let at = |x: u32, y: u32| page[(x, y)].0;
         assert_eq!([at(8, 30), at(635, 421), at(644, 30), at(1271, 421)], [[100; 3], [100; 3], [110; 3], [110; 3]]);

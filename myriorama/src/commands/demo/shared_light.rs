@@ -3,13 +3,16 @@
 use anyhow::Context as _;
 use app_core::delivery::request;
 use app_core::experiment::{Delivered, Experiment};
+use app_core::table::table;
 use cluster::{Costs, OfferSettings, PolicyChoice, SessionPlan, SessionRequest};
 use coordinator::schedule::k_fd;
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use image::imageops;
 use metrics::{PictureErrors, Rgb8Image, flip_map};
 use render::Lighting;
-use report::{Axis, Picture, PictureRow, Point, Report, Series, Table, XyChart, comparison_row, contact_sheet};
+use report::{
+    Axis, Picture, PictureRow, Point, Report, Series, Table, TableError, XyChart, comparison_row, contact_sheet,
+};
 
 /// The time for which direct drawing is timed; the time of more views is extended linearly.
 const DIRECT_S: f64 = 2.0;
@@ -65,12 +68,12 @@ impl LightResult {
         let direct_views = affordable.clamp(*DIRECT_VIEWS.start(), *DIRECT_VIEWS.end()).min(count);
         let step = count / direct_views;
         let timed_cameras: Vec<PinholeCamera> = cameras.iter().copied().step_by(step).take(direct_views).collect();
-        let draw = || deliver(experiment, PolicyChoice::Direct, lighting, &timed_cameras);
-        let (direct, direct_pictures) = draw()?;
+        let (direct, direct_pictures) = deliver(experiment, PolicyChoice::Direct, lighting, &timed_cameras)?;
         // The first delivery also compiles shaders. Those of reconstruction are compiled when its costs are measured.
         let mut direct_s = direct.seconds;
         for _ in 1..DIRECT_REPEATS {
-            direct_s = direct_s.min(draw()?.0.seconds);
+            let (repeated, _) = deliver(experiment, PolicyChoice::Direct, lighting, &timed_cameras)?;
+            direct_s = direct_s.min(repeated.seconds);
         }
         let pairs = direct_pictures.into_iter().zip(views.iter().step_by(step));
         let compared = pairs.map(|(direct, reconstructed)| ComparedView::new(direct, reconstructed.clone()));
@@ -165,63 +168,40 @@ pub(super) fn report(results: &[LightResult], report: &mut Report) -> anyhow::Re
     Ok(())
 }
 
-fn gains(results: &[LightResult]) -> anyhow::Result<Table> {
-    let columns = [
-        ("light", ""),
-        ("views V", ""),
-        ("from samples", "s"),
-        ("drawn directly, extended", "s"),
-        ("timed on views", ""),
-        ("gain", "×"),
-        ("foreground PSNR", "dB"),
-        ("foreground SSIM", ""),
-        ("foreground FLIP", ""),
-    ];
-    let mut table = Table::new("What sharing gains", &columns);
-    for result in results {
-        table.push([
-            result.lighting.to_string().into(),
-            result.views.len().into(),
-            result.shared_s.into(),
-            (result.direct_view_s * result.views.len() as f64).into(),
-            result.compared.len().into(),
-            result.gain().into(),
-            result.mean_error(|errors| errors.psnr_db).into(),
-            result.mean_error(|errors| errors.ssim).into(),
-            result.mean_error(|errors| errors.flip).into(),
-        ])?;
-    }
-    Ok(table)
+fn gains(results: &[LightResult]) -> Result<Table, TableError> {
+    table(
+        "What sharing gains",
+        results,
+        &[
+            ("light", "", |result| result.lighting.to_string().into()),
+            ("views V", "", |result| result.views.len().into()),
+            ("from samples", "s", |result| result.shared_s.into()),
+            ("drawn directly, extended", "s", |result| (result.direct_view_s * result.views.len() as f64).into()),
+            ("timed on views", "", |result| result.compared.len().into()),
+            ("gain", "×", |result| result.gain().into()),
+            ("foreground PSNR", "dB", |result| result.mean_error(|errors| errors.psnr_db).into()),
+            ("foreground SSIM", "", |result| result.mean_error(|errors| errors.ssim).into()),
+            ("foreground FLIP", "", |result| result.mean_error(|errors| errors.flip).into()),
+        ],
+    )
 }
 
-fn costs(results: &[LightResult]) -> anyhow::Result<Table> {
-    let columns = [
-        ("light", ""),
-        ("g_s a sample", "ms"),
-        ("g_v a view", "ms"),
-        ("d a set", "ms"),
-        ("c a view", "ms"),
-        ("e a view", "ms"),
-        ("c / g_v", ""),
-        ("samplers K", ""),
-        ("K of the formula", ""),
-    ];
-    let mut table = Table::new("Costs of one operation, alone and warm", &columns);
-    for result in results {
-        let costs = result.plan.costs;
-        table.push([
-            result.lighting.to_string().into(),
-            (costs.sample_image_s * 1e3).into(),
-            (costs.direct_view_s * 1e3).into(),
-            (costs.load_set_s * 1e3).into(),
-            (costs.reconstruct_view_s * 1e3).into(),
-            (costs.encode_view_s * 1e3).into(),
-            (costs.reconstruct_view_s / costs.direct_view_s).into(),
-            result.plan.sampler_count().into(),
-            result.formula_samplers().into(),
-        ])?;
-    }
-    Ok(table)
+fn costs(results: &[LightResult]) -> Result<Table, TableError> {
+    table(
+        "Costs of one operation, alone and warm",
+        results,
+        &[
+            ("light", "", |result| result.lighting.to_string().into()),
+            ("g_s a sample", "ms", |result| (result.plan.costs.sample_image_s * 1e3).into()),
+            ("g_v a view", "ms", |result| (result.plan.costs.direct_view_s * 1e3).into()),
+            ("d a set", "ms", |result| (result.plan.costs.load_set_s * 1e3).into()),
+            ("c a view", "ms", |result| (result.plan.costs.reconstruct_view_s * 1e3).into()),
+            ("e a view", "ms", |result| (result.plan.costs.encode_view_s * 1e3).into()),
+            ("c / g_v", "", |result| (result.plan.costs.reconstruct_view_s / result.plan.costs.direct_view_s).into()),
+            ("samplers K", "", |result| result.plan.sampler_count().into()),
+            ("K of the formula", "", |result| result.formula_samplers().into()),
+        ],
+    )
 }
 
 /// Figure 5 of Lages et al.
@@ -243,11 +223,10 @@ fn total_time(results: &[LightResult]) -> XyChart {
 }
 
 fn all_views(result: &LightResult) -> PictureRow {
-    let halved = |view: &View| {
-        let image = pictures::rgb(view)?;
-        Some(imageops::thumbnail(&image, (image.width() / 2).max(1), (image.height() / 2).max(1)))
-    };
-    let images: Vec<_> = result.views.iter().filter_map(halved).collect();
+    let images = result.views.iter().filter_map(pictures::rgb);
+    let halved =
+        images.map(|image| imageops::thumbnail(&image, (image.width() / 2).max(1), (image.height() / 2).max(1)));
+    let images: Vec<_> = halved.collect();
     let name = format!("contact sheet, {}", result.lighting);
     let caption = format!("{} delivered views, {}, at half their size", images.len(), result.lighting);
     let sheet = contact_sheet(&images, SHEET_COLUMNS, 2);

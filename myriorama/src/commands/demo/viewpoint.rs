@@ -12,61 +12,45 @@ const SPREAD: f32 = 0.015;
 /// The field of view of sample cameras over the view's: they stand beside it, and its border is to be in their images.
 const WIDER: f32 = 1.1;
 
-/// A place to look from.
+/// A place to look from: the middle of a rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Viewpoint {
-    eye_in_world: Vec3,
-    target_in_world: Vec3,
-    fov_y_rad: f32,
-    near_m: f32,
-}
-
-/// Over the meadow towards the tree, steep enough that the meadow's border is nowhere in the picture.
-const MEADOW: Viewpoint = Viewpoint {
-    eye_in_world: Vec3::new(0.0, 1.4, 1.1),
-    target_in_world: Vec3::new(0.0, 0.2, 0.03),
-    fov_y_rad: 0.465,
-    near_m: 0.02,
-};
+pub(super) struct Viewpoint(Rig);
 
 impl Viewpoint {
     /// The meadow's own, or the middle of the places between a scene's sample cameras.
     pub(super) fn of(spec: &SceneSpec, setup: &Setup) -> anyhow::Result<Self> {
         if matches!(spec, SceneSpec::TreeTerrain { .. }) {
-            return Ok(MEADOW);
+            return Ok(Self::meadow());
         }
         let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
         let middle = cell.camera_at(Vec2::ZERO, UVec2::ONE);
         let distance_m = middle.eye_in_world.distance(setup.offer.volume.center());
-        Ok(Self {
-            eye_in_world: middle.eye_in_world,
-            target_in_world: middle.eye_in_world + middle.forward_in_world() * distance_m,
-            fov_y_rad: 2.0 * (0.5 / middle.focal_px.y).atan(),
-            near_m: middle.near_m,
-        })
+        let target_in_world = middle.eye_in_world + middle.forward_in_world() * distance_m;
+        let fov_y_rad = 2.0 * (0.5 / middle.focal_px.y).atan();
+        Ok(Self::new(middle.eye_in_world, target_in_world, fov_y_rad, middle.near_m))
+    }
+
+    /// Over the meadow towards the tree, steep enough that the meadow's border is nowhere in the picture.
+    fn meadow() -> Self {
+        Self::new(Vec3::new(0.0, 1.4, 1.1), Vec3::new(0.0, 0.2, 0.03), 0.465, 0.02)
+    }
+
+    fn new(eye_in_world: Vec3, target_in_world: Vec3, fov_y_rad: f32, near_m: f32) -> Self {
+        let offset = eye_in_world - target_in_world;
+        let right = Vec3::Y.cross(offset).normalize_or(Vec3::X);
+        let half_m = offset.length() * SPREAD;
+        let half_edges_in_world = [right * half_m, offset.cross(right).normalize_or(Vec3::Y) * half_m];
+        Self(Rig { center_in_world: eye_in_world, half_edges_in_world, target_in_world, fov_y_rad, near_m })
     }
 
     /// The view from the place.
     pub(super) fn camera(&self, size_px: UVec2) -> PinholeCamera {
-        self.rig(1.0).camera_at(Vec2::ZERO, size_px)
+        self.0.camera_at(Vec2::ZERO, size_px)
     }
 
     /// Four sample cameras around it.
     pub(super) fn samples(&self, size_px: UVec2) -> Vec<PinholeCamera> {
-        self.rig(WIDER).samples(size_px)
-    }
-
-    fn rig(&self, wider: f32) -> Rig {
-        let offset = self.eye_in_world - self.target_in_world;
-        let right = Vec3::Y.cross(offset).normalize_or(Vec3::X);
-        let half_m = offset.length() * SPREAD;
-        Rig {
-            center_in_world: self.eye_in_world,
-            half_edges_in_world: [right * half_m, offset.cross(right).normalize_or(Vec3::Y) * half_m],
-            target_in_world: self.target_in_world,
-            fov_y_rad: self.fov_y_rad * wider,
-            near_m: self.near_m,
-        }
+        Rig { fov_y_rad: self.0.fov_y_rad * WIDER, ..self.0 }.samples(size_px)
     }
 }
 
@@ -81,7 +65,7 @@ mod tests {
 
     #[test]
     fn no_corner_of_the_meadows_picture_leaves_the_meadow() {
-        let camera = MEADOW.camera(SIZE_PX);
+        let camera = Viewpoint::meadow().camera(SIZE_PX);
         for corner in [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE] {
             let at =
                 |planar_depth_m| camera.unproject(PixelDepth { pixel: corner * SIZE_PX.as_vec2(), planar_depth_m });
@@ -97,12 +81,12 @@ mod tests {
     fn sample_cameras_surround_the_view_and_see_its_border() {
         let spec: SceneSpec = "courtyard".parse().unwrap();
         let setup = SceneArgs::new(spec.clone()).load().unwrap();
-        for viewpoint in [MEADOW, Viewpoint::of(&spec, &setup).unwrap()] {
+        for viewpoint in [Viewpoint::meadow(), Viewpoint::of(&spec, &setup).unwrap()] {
             let view = viewpoint.camera(SIZE_PX);
             let samples = viewpoint.samples(SIZE_PX * 2);
             let middle = samples.iter().map(|camera| camera.eye_in_world).sum::<Vec3>() / 4.0;
             assert!(middle.distance(view.eye_in_world) < 1e-4 * (1.0 + middle.length()), "{viewpoint:?}");
-            let planar_depth_m = viewpoint.eye_in_world.distance(viewpoint.target_in_world);
+            let planar_depth_m = viewpoint.0.center_in_world.distance(viewpoint.0.target_in_world);
             for corner in [Vec2::ZERO, Vec2::ONE] {
                 let point = view.unproject(PixelDepth { pixel: corner * SIZE_PX.as_vec2(), planar_depth_m });
                 for camera in &samples {

@@ -7,7 +7,7 @@ use app_core::addresses::CoordinatorArgs;
 use app_core::camera_file::{self, Placement};
 use app_core::exit::BadInput;
 use app_core::quality::QualityArgs;
-use app_core::sizes::{SizePx, grid};
+use app_core::sizes::{SizePx, grid, within};
 use clap::Args;
 use cluster::{OfferStatus, PolicyChoice};
 use codec::FrameCodec;
@@ -93,10 +93,10 @@ pub struct ViewArgs {
     #[arg(long, conflicts_with_all = ["compare", "depth", "provenance"])]
     pub(super) live: bool,
     /// With --live: poses a second
-    #[arg(long, default_value_t = 10.0, value_name = "HZ", value_parser = rate)]
+    #[arg(long, default_value_t = 10.0, value_name = "HZ", value_parser = within(0.01..=1000.0))]
     pub(super) rate: f64,
     /// With --live: the time to move
-    #[arg(long, default_value_t = 10.0, value_name = "S", value_parser = duration)]
+    #[arg(long, default_value_t = 10.0, value_name = "S", value_parser = within(0.1..=86_400.0))]
     pub(super) seconds: f64,
 }
 
@@ -108,18 +108,13 @@ impl ViewArgs {
 
     /// The planes of the views, without their tone, which may be the plan's.
     pub(super) fn planes(&self) -> ViewPlanes {
-        let inverse_depth = self.depth;
-        let provenance = self.provenance;
-        ViewPlanes { antialias: self.antialias, inverse_depth, provenance, ..ViewPlanes::COLOR }
+        ViewPlanes {
+            antialias: self.antialias,
+            inverse_depth: self.depth,
+            provenance: self.provenance,
+            ..ViewPlanes::COLOR
+        }
     }
-}
-
-pub(in crate::commands) fn rate(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|hz| (0.01..=1000.0).contains(hz)).ok_or_else(|| "expected 0.01 to 1000".to_owned())
-}
-
-fn duration(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|s| (0.1..=86_400.0).contains(s)).ok_or_else(|| "expected 0.1 to 86400".to_owned())
 }
 
 /// One way to place the views; without any, an orbit of 24.
@@ -174,10 +169,10 @@ impl Viewpoints {
 fn one_camera(text: &str, placement: Placement, size: SizePx) -> anyhow::Result<PinholeCamera> {
     let bad =
         || BadInput(format!("--camera {text:?}: expected EYE:TARGET or EYE:TARGET:DEGREES, as in 0,1,3:0,0.5,0:45"));
-    let numbers = |part: &str| {
+    let parts = text.split(':').map(|part| {
         part.split(',').map(|v| v.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect::<Option<Vec<_>>>()
-    };
-    let parts = text.split(':').map(numbers).collect::<Option<Vec<_>>>().ok_or_else(bad)?;
+    });
+    let parts = parts.collect::<Option<Vec<_>>>().ok_or_else(bad)?;
     let parts: Vec<&[f64]> = parts.iter().map(Vec::as_slice).collect();
     let (eye, target, fov_deg) = match parts[..] {
         [&[x, y, z], &[u, v, w]] => ([x, y, z], [u, v, w], 45.0),

@@ -13,11 +13,10 @@ pub(super) struct FileNames {
 
 impl FileNames {
     pub(super) fn of(number: u64, planes: ViewPlanes) -> Self {
-        let name = |ending: &str| format!("view_{number:04}.{ending}");
         Self {
-            color: name("png"),
-            depth: planes.inverse_depth.then(|| name("depth.png")),
-            provenance: planes.provenance.then(|| name("provenance.png")),
+            color: format!("view_{number:04}.png"),
+            depth: planes.inverse_depth.then(|| format!("view_{number:04}.depth.png")),
+            provenance: planes.provenance.then(|| format!("view_{number:04}.provenance.png")),
         }
     }
 

@@ -8,7 +8,7 @@ use app_core::delivery::{Terms, at_rate, open, request, viewpoints};
 use app_core::exit::BadInput;
 use app_core::print_line;
 use client::{Client, Session};
-use cluster::{BudgetRequest, OfferSettings, OfferStatus, Promise, PromiseState, SessionRequest, Timeline};
+use cluster::{BudgetRequest, OfferSettings, OfferStatus, PromiseState, SessionRequest, Timeline};
 use depth_image::PinholeCamera;
 
 use super::args::ViewArgs;
@@ -56,9 +56,9 @@ impl Job {
             return Ok(());
         }
         let settled = async {
+            let open = [PromiseState::Measuring, PromiseState::Broken];
             let mut promise = session.promise();
-            let is_open = |promise: &Promise| [PromiseState::Measuring, PromiseState::Broken].contains(&promise.state);
-            while promise.as_ref().is_none_or(is_open) {
+            while promise.as_ref().is_none_or(|promise| open.contains(&promise.state)) {
                 promise = Some(session.another_promise(promise.as_ref()).await);
             }
         };
@@ -69,7 +69,7 @@ impl Job {
 
     /// Shows all views at one exposure, once it is known: those of later sessions, too.
     pub(super) fn expose(&mut self, record: &Record) {
-        if let Some(exposure) = record.exposure() {
+        if let Some(exposure) = record.exposure {
             self.request.auto_exposure = false;
             self.request.planes.tone.exposure = exposure;
         }
@@ -94,10 +94,11 @@ impl Job {
 /// The offer of a scene by name or hash; the first where none is named.
 fn offered(offers: Vec<OfferStatus>, scene: Option<&str>) -> anyhow::Result<OfferStatus> {
     let names: Vec<String> = offers.iter().map(|offer| offer.name.clone()).collect();
-    let is_named =
-        |offer: &OfferStatus| scene.is_none_or(|scene| scene == offer.name || scene == offer.scene.hash.as_str());
-    let missing = || BadInput(format!("--scene {}: on offer are {}", scene.unwrap_or("?"), names.join(", ")));
-    Ok(offers.into_iter().find(is_named).ok_or_else(missing)?)
+    let mut offers = offers.into_iter();
+    let named =
+        offers.find(|offer| scene.is_none_or(|scene| scene == offer.name || scene == offer.scene.hash.as_str()));
+    let reason = format!("--scene {}: on offer are {}", scene.unwrap_or("?"), names.join(", "));
+    Ok(named.ok_or(BadInput(reason))?)
 }
 
 fn session_request(args: &ViewArgs, offer: &OfferStatus, cameras: &[PinholeCamera]) -> anyhow::Result<SessionRequest> {

@@ -38,8 +38,8 @@ pub(super) struct Record {
     cameras: Arc<[PinholeCamera]>,
     set_count: u32,
     planes: ViewPlanes,
-    /// `None`: it is the plan's, and not known yet.
-    exposure: Option<ExposureEv>,
+    /// The exposure of all views. `None`: it is the plan's, and not known yet.
+    pub(super) exposure: Option<ExposureEv>,
     /// The promise when these pictures came, as the record has it; one that was not kept stays.
     promise: Option<Value>,
     /// The scale of each written view's depth picture, per metre; 0 without that picture. `None`: the view is not written.
@@ -66,23 +66,18 @@ impl Record {
             let sets = format!("{} views of {set_count} moments", cameras.len());
             return Err(BadInput(format!("--frames: {sets} are {total} pictures, at most {MAX_VIEWS} are allowed")));
         }
-        let folder = folder.to_owned();
-        let written = vec![None; total as usize];
-        let next_save = Instant::now() + PAUSE;
-        let exposure = None;
-        let promise = None;
         Ok(Self {
-            folder,
+            folder: folder.to_owned(),
             source_space,
             settings,
             cameras,
             set_count,
             planes,
-            exposure,
-            promise,
-            written,
+            exposure: None,
+            promise: None,
+            written: vec![None; total as usize],
             count: 0,
-            next_save,
+            next_save: Instant::now() + PAUSE,
         })
     }
 
@@ -94,11 +89,6 @@ impl Record {
     /// Written views.
     pub(super) fn count(&self) -> u64 {
         self.count
-    }
-
-    /// The exposure of all views, once it is known.
-    pub(super) fn exposure(&self) -> Option<ExposureEv> {
-        self.exposure
     }
 
     /// Notes how the views are shown.
@@ -116,12 +106,11 @@ impl Record {
 
     /// The promise, where it is not kept.
     pub(super) fn unkept_promise(&self) -> Option<String> {
-        let text = |name: &str| self.promise.as_ref()?.get(name)?.as_str();
+        let promise = self.promise.as_ref()?;
+        let [state, budget, reason] =
+            ["state", "budget", "reason"].map(|name| promise.get(name).and_then(Value::as_str).unwrap_or("?"));
         let unkept = [PromiseState::Broken, PromiseState::Unreachable].map(|state| state.to_string());
-        let is_unkept = unkept.iter().any(|state| text("state") == Some(state));
-        is_unkept.then(|| {
-            format!("the budget {} is not kept: {}", text("budget").unwrap_or("?"), text("reason").unwrap_or("?"))
-        })
+        unkept.iter().any(|unkept| unkept == state).then(|| format!("the budget {budget} is not kept: {reason}"))
     }
 
     /// Requests of the views that are not written.
@@ -165,11 +154,11 @@ impl Record {
         if record.is_err() {
             return 0;
         }
-        let is_deleted = |files: &FileNames| {
-            let deleted = files.all().filter(|name| std::fs::remove_file(self.folder.join(name)).is_ok());
-            deleted.count() > 0
-        };
-        named.iter().filter(|files| is_deleted(files)).count()
+        let deleted = named.iter().filter(|files| {
+            // All files of the view are deleted, whether one of them was there or not.
+            files.all().filter(|name| std::fs::remove_file(self.folder.join(name)).is_ok()).count() > 0
+        });
+        deleted.count()
     }
 
     /// The view of a line of the record, with the scale of its depth picture.
@@ -189,8 +178,8 @@ impl Record {
             None => Ok(()),
             Some((name, value)) => {
                 let found = found.get(name).unwrap_or(&Value::Null);
-                let reason = format!("{} is of {name} {found}, this request of {value}", path.display());
-                Err(BadInput(format!("--resume: {reason}")))
+                let path = path.display();
+                Err(BadInput(format!("--resume: {path} is of {name} {found}, this request of {value}")))
             }
         }
     }

@@ -6,15 +6,6 @@ use tokio_util::sync::CancellationToken;
 
 use super::record::Record;
 
-/// How writing ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Ended {
-    /// All views are written.
-    Done,
-    /// A signal ended it.
-    Stopped,
-}
-
 /// The result of some work; `None` where `stop` came first.
 ///
 /// # Errors
@@ -33,7 +24,7 @@ pub(super) async fn until<T>(
 pub(super) fn how_to_resume(record: &Record, folder: &Path) -> String {
     let count = record.count();
     let total = record.total();
-    let command = resuming(std::env::args().skip(1));
+    let command = resuming(std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()));
     format!("{count} of {total} views are written to {}; `myriorama {command}` asks for the rest", folder.display())
 }
 
@@ -47,8 +38,7 @@ fn resuming(arguments: impl Iterator<Item = String>) -> String {
 }
 
 fn quoted(argument: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,@%+".contains(c);
-    if !argument.is_empty() && argument.chars().all(is_plain) {
+    if !argument.is_empty() && argument.chars().all(|c| c.is_ascii_alphanumeric() || "-_./:=,@%+".contains(c)) {
         return argument.to_owned();
     }
     format!("'{}'", argument.replace('\'', r"'\''"))
