@@ -75,8 +75,8 @@ impl<'a> World<'a> {
         let compositors = weighted.into_iter().map(|(node, _)| node).collect();
         let relayed = plan.relay_fanout.map(|fanout| Transfer::Relay(fanout.get() as usize));
         let habits = Habits { transfer: relayed.unwrap_or(habits.transfer), ..habits };
-        let node = |machine| Node::new(machine, sets, habits.credit_views);
-        let nodes: Vec<Node> = cluster.machines.iter().copied().map(node).collect();
+        let machines = cluster.machines.iter();
+        let nodes = machines.map(|&machine| Node::new(machine, sets, habits.credit_views)).collect();
         Self {
             cluster,
             plan,
