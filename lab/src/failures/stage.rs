@@ -27,6 +27,11 @@ pub fn merged(px: f64) -> ReconstructionMethod {
     ReconstructionMethod::HybridMesh { merged: ErrorBound::from_px(px) }
 }
 
+/// Sample sets without lamps and highlights.
+pub fn in_the_dark(volume: Aabb, background: Environment) -> SetDescription<'static> {
+    SetDescription { volume, background, illumination: &DARK, highlight: None, environment: None, mips: false }
+}
+
 static DARK: Illumination = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
 
 /// A scene, depth images of it, and the volume in which views look for surfaces.
@@ -71,14 +76,9 @@ impl<'s> Stage<'s> {
         Ok(Self { images, lighting, ..self })
     }
 
-    pub fn description(&self) -> SetDescription<'static> {
-        let volume = self.volume;
-        let background = self.background;
-        SetDescription { volume, background, illumination: &DARK, highlight: None, environment: None, mips: false }
-    }
-
     pub fn set(&self) -> anyhow::Result<SampleSet> {
-        Ok(self.stand.reconstructor().upload(&self.images, &self.description(), Turn::default())?)
+        let description = in_the_dark(self.volume, self.background);
+        Ok(self.stand.reconstructor().upload(&self.images, &description, Turn::default())?)
     }
 
     /// Views by a method, with depth and provenance.

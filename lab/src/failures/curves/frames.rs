@@ -3,7 +3,7 @@
 use codec::{DecodeLimits, FrameCodec, decode_frame, encode_frame};
 use depth_image::{Antialias, PinholeCamera, View, ViewPlanes, linear_from_srgb8, srgb8_from_linear};
 use fixtures::poles;
-use glam::{UVec2, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use reconstruction::ReconstructRequest;
 use render::Lighting;
 
@@ -81,14 +81,16 @@ fn by_samples(stand: &Stand, counts: &[f64]) -> anyhow::Result<Rows> {
 fn supersampled(stand: &Stand, stage: &Stage<'_>, camera: &PinholeCamera) -> anyhow::Result<View> {
     let fine = camera.resized(camera.size_px * SIDE as u32);
     let drawn = stand.views(&stage.scene, Lighting::default(), &[fine], ViewPlanes::COLOR)?.remove(0);
-    let UVec2 { x: width, y: height } = camera.size_px;
-    let mean = |x: usize, y: usize, channel: usize| {
-        let place = |i: usize| (y * SIDE + i / SIDE) * width as usize * SIDE + x * SIDE + i % SIDE;
-        let sum: f32 = (0..SIDE * SIDE).map(|i| linear_from_srgb8(drawn.srgb8[3 * place(i) + channel])).sum();
-        srgb8_from_linear(sum / (SIDE * SIDE) as f32)
-    };
-    let pixels = (0..height as usize).flat_map(|y| (0..width as usize).map(move |x| (x, y)));
-    let srgb8 = pixels.flat_map(|(x, y)| [0, 1, 2].map(|channel| mean(x, y, channel))).collect();
+    let [width, height] = camera.size_px.to_array().map(|side| side as usize);
+    let mut srgb8 = Vec::with_capacity(3 * width * height);
+    for pixel in 0..width * height {
+        let first = (pixel / width * width * SIDE + pixel % width) * SIDE;
+        for channel in 0..3 {
+            let places = (0..SIDE * SIDE).map(|i| first + i / SIDE * width * SIDE + i % SIDE);
+            let sum: f32 = places.map(|place| linear_from_srgb8(drawn.srgb8[3 * place + channel])).sum();
+            srgb8.push(srgb8_from_linear(sum / (SIDE * SIDE) as f32));
+        }
+    }
     let center = stage.truth(&[camera.with_offset(Vec2::ZERO)])?.remove(0);
     Ok(View { srgb8, ..center })
 }

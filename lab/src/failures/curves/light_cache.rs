@@ -129,26 +129,20 @@ fn under_bars(stand: &Stand, widths: &[f64]) -> anyhow::Result<Rows> {
         let scene = floor_with(&bars, FLOOR_HALF_M, sun(Vec3::new(1.0, 1.0, 0.0)));
         let lit = LitScene::new(stand, &scene, "shadows")?;
         let images = lit.samples(&sample_cameras)?;
-        let contrast = |view: &View| shadow_contrast(&camera, view, width_m);
-        Ok([
-            contrast(&lit.cached(&images, Fast, camera)?),
-            contrast(&lit.cached(&images, Balanced, camera)?),
-            contrast(&lit.direct(camera)?),
-        ])
+        let fast = lit.cached(&images, Fast, camera)?;
+        let balanced = lit.cached(&images, Balanced, camera)?;
+        Ok([fast, balanced, lit.direct(camera)?].map(|view| shadow_contrast(&camera, &view, width_m)))
     })
 }
 
 /// How much darker the shadows of bars are than the floor beside the bars.
 fn shadow_contrast(camera: &PinholeCamera, view: &View, width_m: f32) -> f64 {
-    let on_floor = |p: Vec3| p.y.abs() < 1e-3;
-    let from_shadow_m = |p: Vec3| {
-        let across = p.x + BARS_HEIGHT_M;
-        (across - (across / BARS_APART_M).round().clamp(-1.0, 1.0) * BARS_APART_M).abs()
-    };
     let dark = pixels_where(camera, view, |p| {
-        on_floor(p) && p.z.abs() < BARS_HALF_LENGTH_M - 0.1 && from_shadow_m(p) < 0.4 * width_m
+        let across = p.x + BARS_HEIGHT_M;
+        let from_shadow_m = (across - (across / BARS_APART_M).round().clamp(-1.0, 1.0) * BARS_APART_M).abs();
+        p.y.abs() < 1e-3 && p.z.abs() < BARS_HALF_LENGTH_M - 0.1 && from_shadow_m < 0.4 * width_m
     });
-    let bright = pixels_where(camera, view, |p| on_floor(p) && p.x.abs() > 1.2);
+    let bright = pixels_where(camera, view, |p| p.y.abs() < 1e-3 && p.x.abs() > 1.2);
     1.0 - mean_light(view, &dark) / mean_light(view, &bright)
 }
 
