@@ -122,6 +122,13 @@ pub struct Cell {
     pub half_m: f32,
 }
 
+/// Before nine poles.
+pub const POLES: Cell = Cell { eye: Vec3::new(0.0, 0.0, 4.0), target: Vec3::new(0.0, 0.0, -2.0), half_m: 0.4 };
+/// Above a tree on its terrain.
+pub const TREE: Cell = Cell { eye: Vec3::new(0.3, 2.2, 2.2), target: Vec3::new(0.0, 0.3, 0.0), half_m: 0.3 };
+/// Above the courtyard.
+pub const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, half_m: 1.0 };
+
 /// Views within the cell.
 const VIEWS: [[f32; 2]; 3] = [[0.23, -0.31], [-0.58, 0.44], [0.71, 0.52]];
 const FOV_DEG: f32 = 45.0;

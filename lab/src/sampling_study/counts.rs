@@ -4,7 +4,7 @@ use depth_image::DepthImage;
 use rayon::prelude::*;
 use sampling::SamplingMethod;
 
-use super::held::{Held, HeldSample, held_samples};
+use super::held::{Held, HeldSample, held_samples, is_held};
 use super::methods::METHODS;
 
 /// Samples of one image of one method, before dilation and hysteresis.
@@ -54,10 +54,6 @@ fn counts_of(method: SamplingMethod, set: &[DepthImage], conventional: &[Held<'_
         }
     });
     counts.collect()
-}
-
-fn is_held(sample: &HeldSample, images: &[Held<'_>]) -> bool {
-    images.iter().any(|image| image.has(sample))
 }
 
 /// Marks samples that a frame needs: it shows their surface at the same pixel.

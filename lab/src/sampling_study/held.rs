@@ -65,6 +65,11 @@ pub fn held_samples(image: &DepthImage) -> Vec<HeldSample> {
     samples.collect()
 }
 
+/// Whether one of some images has a sample.
+pub fn is_held(sample: &HeldSample, images: &[Held<'_>]) -> bool {
+    images.iter().any(|image| image.has(sample))
+}
+
 #[cfg(test)]
 mod tests {
     use depth_image::{HOLE_INVERSE_DEPTH, PinholeCamera};

@@ -29,7 +29,7 @@ struct ImageRow<'s> {
 struct SetRow<'s> {
     scene: &'s str,
     method: SamplingMethod,
-    available: Availability,
+    available: &'s Availability,
     /// The paper's average and least.
     paper: [Option<f64>; 2],
 }
@@ -105,7 +105,7 @@ fn image_rows(scene: &SceneRow) -> Vec<ImageRow<'_>> {
 }
 
 fn set_rows(scene: &SceneRow) -> Vec<SetRow<'_>> {
-    let rows = METHODS.into_iter().zip(&scene.available).map(|(method, &available)| {
+    let rows = METHODS.into_iter().zip(&scene.available).map(|(method, available)| {
         let paper = paper_available(&scene.name, method);
         SetRow { scene: scene.name.as_str(), method, available, paper }
     });

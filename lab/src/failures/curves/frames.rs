@@ -3,21 +3,20 @@
 use codec::{DecodeLimits, FrameCodec, decode_frame, encode_frame};
 use depth_image::{Antialias, PinholeCamera, View, ViewPlanes, linear_from_srgb8, srgb8_from_linear};
 use fixtures::poles;
-use glam::{Vec2, Vec3};
+use glam::Vec2;
 use reconstruction::ReconstructRequest;
 use render::Lighting;
 
-use crate::failures::curve::{Curve, Rows, Series, X, rows};
+use crate::failures::curve::{Curve, FLIP, Rows, Series, X, rows};
 use crate::failures::measures::foreground;
 use crate::failures::shape::Shape;
-use crate::failures::stage::{CARVE, Cell, Stage};
+use crate::failures::stage::{CARVE, Cell, POLES, Stage};
 use crate::failures::stand::Stand;
 
-const POLES: Cell = Cell { eye: Vec3::new(0.0, 0.0, 4.0), target: Vec3::new(0.0, 0.0, -2.0), half_m: 0.2 };
+const NEAR_POLES: Cell = Cell { half_m: 0.2, ..POLES };
 const RADIUS_M: f32 = 0.06;
 /// Positions along each side of a pixel of the truth: 64 samples.
 const SIDE: usize = 8;
-const FLIP: [&str; 2] = ["FLIP of the foreground", ""];
 
 pub const CURVES: [Curve; 2] = [
     Curve {
@@ -47,7 +46,7 @@ pub const CURVES: [Curve; 2] = [
 fn by_quality(stand: &Stand, qualities: &[f64]) -> anyhow::Result<Rows> {
     // Ringing around a model would count as foreground, and lower its mean.
     let stage = Stage::new(stand, &poles(RADIUS_M), &[])?;
-    let cameras = POLES.views(stand.view_px);
+    let cameras = NEAR_POLES.views(stand.view_px);
     let truths = stage.truth(&cameras)?;
     rows(qualities, |quality| {
         let views = truths.iter().map(|truth| delivered(truth, FrameCodec::Jpeg { quality: quality as u8 }));
@@ -62,8 +61,8 @@ fn delivered(view: &View, codec: FrameCodec) -> anyhow::Result<View> {
 }
 
 fn by_samples(stand: &Stand, counts: &[f64]) -> anyhow::Result<Rows> {
-    let stage = Stage::new(stand, &poles(RADIUS_M), &POLES.samples(4, 2 * stand.sample_px))?;
-    let cameras = POLES.views(stand.view_px);
+    let stage = Stage::new(stand, &poles(RADIUS_M), &NEAR_POLES.samples(4, 2 * stand.sample_px))?;
+    let cameras = NEAR_POLES.views(stand.view_px);
     let truths =
         cameras.iter().map(|camera| supersampled(stand, &stage, camera)).collect::<anyhow::Result<Vec<_>>>()?;
     let set = stage.set()?;

@@ -7,13 +7,12 @@ use render::{GpuScene, Lighting, SamplePlanes};
 use scene::procedural::courtyard;
 use scene::{Instance, Scene};
 
-use crate::failures::curve::{Curve, Rows, Series, X, rows};
+use crate::failures::curve::{Curve, FLIP, Rows, Series, X, rows};
 use crate::failures::measures::{foreground, share};
 use crate::failures::shape::Shape;
-use crate::failures::stage::{CARVE, Cell, Stage, looking};
+use crate::failures::stage::{CARVE, Stage, YARD, looking};
 use crate::failures::stand::Stand;
 
-const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, half_m: 1.0 };
 /// Rays of the truth.
 const TRUE_RAYS: u32 = 512;
 
@@ -22,7 +21,7 @@ pub const CURVES: [Curve; 3] = [
         name: "Picture error against rays of light",
         subject: "a courtyard under a wide lamp, sampled and reconstructed",
         x: X::log("rays a pixel and lamp", "", &[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0]),
-        y: ["FLIP of the foreground", ""],
+        y: FLIP,
         series: &[Series::new("soft N, joint_carve", &[Shape::FallsThenFlat { least_fall: 0.01, tolerance: 0.003 }])],
         why: "Noise of samples falls with rays, until the reconstruction's own error is all that stays.",
         measure: by_rays,

@@ -10,7 +10,7 @@ use crate::failures::cached_light::{
 };
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::shape::Shape;
-use crate::failures::stage::Cell;
+use crate::failures::stage::YARD;
 use crate::failures::stand::Stand;
 
 const FLOOR_HALF_M: f32 = 2.5;
@@ -24,7 +24,6 @@ const VIEW_PLACE: Vec2 = Vec2::new(0.23, -0.31);
 const BARS_HEIGHT_M: f32 = 0.25;
 const BARS_APART_M: f32 = 0.5;
 const BARS_HALF_LENGTH_M: f32 = 1.0;
-const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, half_m: 1.0 };
 const DENSITIES: X = X::log("density of samples", "texels a pixel", &[0.125, 0.25, 0.5, 1.0]);
 const ERROR: [&str; 2] = ["mean difference of colours near by", "of 255"];
 

@@ -6,14 +6,13 @@ use glam::Vec3;
 use reconstruction::ReconstructionMethod;
 use scene::procedural::tree_terrain;
 
-use crate::failures::curve::{Curve, Rows, Series, X, rows};
+use crate::failures::curve::{Curve, FLIP, Rows, Series, X, rows};
 use crate::failures::measures::{depths, foreground, is_kind, share, share_of_kind};
 use crate::failures::shape::Shape;
-use crate::failures::stage::{CARVE, Cell, HYBRID, MESH, Stage, looking, search};
+use crate::failures::stage::{CARVE, Cell, HYBRID, MESH, POLES, Stage, TREE, looking, search};
 use crate::failures::stand::Stand;
 
-const POLES: Cell = Cell { eye: Vec3::new(0.0, 0.0, 4.0), target: Vec3::new(0.0, 0.0, -2.0), half_m: 0.4 };
-const TREE: Cell = Cell { eye: Vec3::new(0.3, 2.2, 2.2), target: Vec3::new(0.0, 0.3, 0.0), half_m: 0.4 };
+const WIDE_TREE: Cell = Cell { half_m: 0.4, ..TREE };
 /// The distance of the poles, and one between them and the wall.
 const POLES_M: f32 = 5.0;
 const BETWEEN_M: f32 = 6.0;
@@ -21,7 +20,6 @@ const BETWEEN_M: f32 = 6.0;
 const RADIUS_M: f32 = 0.12;
 const POLES_SUBJECT: &str = "nine poles before a wall, four images";
 const TREE_SUBJECT: &str = "a tree over a terrain, four images from above";
-const FLIP: [&str; 2] = ["FLIP of the foreground", ""];
 const FINITE: &[Shape] = &[Shape::Bounded { least: 0.0, most: 1.0 }];
 const ALL_METHODS: &[Series] = &[
     Series::new("joint_carve", FINITE),
@@ -174,7 +172,7 @@ fn by_pitch(stand: &Stand, pitches_deg: &[f64]) -> anyhow::Result<Rows> {
 
 /// The error of each method, for a view at each x.
 fn errors_from(stand: &Stand, x: &[f64], camera: impl Fn(&Stage<'_>, f32) -> PinholeCamera) -> anyhow::Result<Rows> {
-    let stage = Stage::with_corners(stand, &tree_terrain(2000, 1), &TREE.samples(4, stand.sample_px))?;
+    let stage = Stage::with_corners(stand, &tree_terrain(2000, 1), &WIDE_TREE.samples(4, stand.sample_px))?;
     let cameras: Vec<PinholeCamera> = x.iter().map(|&x| camera(&stage, x as f32)).collect();
     let truths = stage.truth(&cameras)?;
     let views = [CARVE, search(64), MESH, HYBRID].map(|method| stage.views(&cameras, method));

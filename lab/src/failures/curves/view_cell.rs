@@ -8,18 +8,14 @@ use metrics::unheld_rate;
 use scene::procedural::{courtyard, tree_terrain};
 
 use crate::failures::cached_light::pixels_where;
-use crate::failures::curve::{Curve, Rows, Series, X, rows};
+use crate::failures::curve::{Curve, FLIP, Rows, Series, X, rows};
 use crate::failures::measures::{depths, is_kind, mean};
 use crate::failures::shape::Shape;
-use crate::failures::stage::{CARVE, Cell, Stage, looking, search};
+use crate::failures::stage::{CARVE, Cell, POLES, Stage, TREE, YARD, looking, search};
 use crate::failures::stand::Stand;
 
-const TREE: Cell = Cell { eye: Vec3::new(0.3, 2.2, 2.2), target: Vec3::new(0.0, 0.3, 0.0), half_m: 0.3 };
-const POLES: Cell = Cell { eye: Vec3::new(0.0, 0.0, 4.0), target: Vec3::new(0.0, 0.0, -2.0), half_m: 0.4 };
-const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, half_m: 1.0 };
 const POLES_SUBJECT: &str = "nine poles before a wall, four images";
 const POLE_RADIUS_M: f32 = 0.12;
-const FLIP: [&str; 2] = ["FLIP of the foreground", ""];
 /// The height of the eyes of cameras that do not see the yard, below the walls' tops.
 const LOW_M: f32 = 1.7;
 /// The distance of all these eyes from the middle of the yard.
