@@ -100,29 +100,15 @@ impl Ways {
     }
 
     fn checks(&self) -> [Check; 3] {
-        let Self { scene, pyramid, warp, walk, .. } = self;
+        let Self { pyramid, warp, walk, .. } = self;
         let wrong_hits = walk.wrong_hits / pyramid.wrong_hits;
-        let gained_db = [pyramid, warp].map(|way| walk.psnr_db - way.psnr_db);
+        let [over_quadtrees_db, over_warp_db] = [pyramid, warp].map(|way| walk.psnr_db - way.psnr_db);
         [
-            Check::new(
-                format!("{scene}: wrong hits of a walk over quadtrees"),
-                wrong_hits,
-                "",
-                Bar::AtMost(MOST_WRONG_HITS),
-            ),
-            Check::new(
-                format!("{scene}: PSNR of a walk over quadtrees"),
-                gained_db[0],
-                "dB",
-                Bar::AtLeast(LEAST_GAIN_DB),
-            ),
-            Check::new(
-                format!("{scene}: PSNR of a walk over the warp"),
-                gained_db[1],
-                "dB",
-                Bar::AtLeast(LEAST_GAIN_DB),
-            ),
+            ("wrong hits of a walk over quadtrees", wrong_hits, "", Bar::AtMost(MOST_WRONG_HITS)),
+            ("PSNR of a walk over quadtrees", over_quadtrees_db, "dB", Bar::AtLeast(LEAST_GAIN_DB)),
+            ("PSNR of a walk over the warp", over_warp_db, "dB", Bar::AtLeast(LEAST_GAIN_DB)),
         ]
+        .map(|(what, value, unit, bar)| Check::new(format!("{}: {what}", self.scene), value, unit, bar))
     }
 }
 

@@ -89,8 +89,8 @@ impl<'s> Subject<'s> {
     /// The device fails.
     pub fn upload(&self, cube: &Cube, light_field: Option<LayeredLightField>) -> anyhow::Result<(SampleSet, f64)> {
         let images = CubeImages { grid: cube.grid, images: cube.images.clone(), light_field };
-        let description = description(&self.scene, self.lighting.highlight());
         let start = Instant::now();
+        let description = description(&self.scene, self.lighting.highlight());
         let set = self.stand.reconstructor().upload_cube(&images, &description, Default::default())?;
         Ok((set, start.elapsed().as_secs_f64()))
     }

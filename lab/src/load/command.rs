@@ -46,7 +46,8 @@ pub struct LoadArgs {
     #[arg(long, value_name = "CORES", value_parser = |text: &str| number_within(text, 0.0..=1024.0))]
     share: Option<f64>,
     /// The time of each load
-    #[arg(long, default_value_t = 10.0, value_name = "MIN", value_parser = |text: &str| number_within(text, 0.1..=1440.0))]
+    #[arg(long, default_value_t = 10.0, value_name = "MIN",
+        value_parser = |text: &str| number_within(text, 0.1..=1440.0))]
     minutes: f64,
     #[command(flatten)]
     run: RunArgs,
