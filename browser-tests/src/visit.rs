@@ -279,7 +279,7 @@ impl Visit {
         let console = self.browser.console().await.expect("a console");
         let is_expected = |of_network| of_network && expected == Expected::LostConnections;
         let wrong: Vec<_> =
-            console.iter().filter(|entry| entry.is_error() && !is_expected(entry.is_of_network())).collect();
+            console.iter().filter(|entry| entry.is_error && !is_expected(entry.is_of_network())).collect();
         assert!(wrong.is_empty(), "{wrong:#?}");
         self.has_ended = true;
     }

@@ -2,7 +2,6 @@
 //! compared with.
 
 /// Eq. 3 as it is printed, with ⌈ ⌉. Kept to show that it is worse.
-#[must_use]
 pub fn k_fd_printed(s: usize, g: f64, v: usize, c: f64, p: usize) -> usize {
     let a = s as f64 * g;
     let b = v as f64 * c;
@@ -10,17 +9,18 @@ pub fn k_fd_printed(s: usize, g: f64, v: usize, c: f64, p: usize) -> usize {
 }
 
 /// Eq. 2: seconds a sample set when `k` of `p` nodes sample. Infinite where work has no node.
-#[must_use]
 pub fn pipeline_time(s: usize, g: f64, v: usize, c: f64, p: usize, k: usize) -> f64 {
-    let over = |work_s: f64, nodes: usize| if work_s > 0.0 { work_s / nodes as f64 } else { 0.0 };
-    over(s as f64 * g, k).max(over(v as f64 * c, p.saturating_sub(k)))
+    shared_s(s as f64 * g, k).max(shared_s(v as f64 * c, p.saturating_sub(k)))
+}
+
+/// The time of work that nodes share.
+fn shared_s(work_s: f64, nodes: usize) -> f64 {
+    if work_s > 0.0 { work_s / nodes as f64 } else { 0.0 }
 }
 
 /// The least K with the least time, by trying all that leave a node for each kind of work.
-#[must_use]
 pub fn brute_force_k(s: usize, g: f64, v: usize, c: f64, p: usize) -> usize {
-    let time = |k: &usize| pipeline_time(s, g, v, c, p, *k);
-    (1..p).min_by(|a, b| time(a).total_cmp(&time(b))).unwrap_or(p)
+    (1..p).min_by(|a, b| pipeline_time(s, g, v, c, p, *a).total_cmp(&pipeline_time(s, g, v, c, p, *b))).unwrap_or(p)
 }
 
 #[cfg(test)]

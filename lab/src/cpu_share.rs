@@ -59,16 +59,16 @@ impl Hierarchy {
 
     /// Version 1 where it holds the controller: version 2 is then mounted without it.
     fn parse(mounts: &str) -> Option<Self> {
-        let fields = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-        let mounted: Vec<_> = mounts.lines().map(fields).filter(|fields| fields.len() > 3).collect();
-        let with = |controller: &str| {
-            let holds = |fields: &&Vec<String>| fields[2] == "cgroup" && fields[3].split(',').any(|o| o == controller);
-            mounted.iter().find(holds).map(|fields| PathBuf::from(&fields[1]))
-        };
-        let v2 = || mounted.iter().find(|fields| fields[2] == "cgroup2").map(|fields| Self::V2((&fields[1]).into()));
-        match (with("cpu"), with("cpuacct")) {
-            (Some(cpu), Some(accounting)) => Some(Self::V1 { cpu, accounting }),
-            _ => v2(),
+        let lines = mounts.lines().map(|line| line.split_whitespace().collect());
+        let mounted: Vec<Vec<&str>> = lines.filter(|fields: &Vec<&str>| fields.len() > 3).collect();
+        let folders = ["cpu", "cpuacct"].map(|controller| {
+            let mut v1 = mounted.iter().filter(|fields| fields[2] == "cgroup");
+            let found = v1.find(|fields| fields[3].split(',').any(|option| option == controller));
+            found.map(|fields| PathBuf::from(fields[1]))
+        });
+        match folders {
+            [Some(cpu), Some(accounting)] => Some(Self::V1 { cpu, accounting }),
+            _ => mounted.iter().find(|fields| fields[2] == "cgroup2").map(|fields| Self::V2(fields[1].into())),
         }
     }
 }
@@ -156,15 +156,16 @@ impl CpuGroup {
     pub fn used_s(&self) -> Result<f64, CpuShareError> {
         let file = if self.is_v2 { "cpu.stat" } else { "cpuacct.usage" };
         let path = self.folders[self.folders.len() - 1].join(file);
-        let failed = |reason: String| CpuShareError::Read { path: path.clone(), reason };
-        let text = fs::read_to_string(&path).map_err(|error| failed(error.to_string()))?;
+        let text = fs::read_to_string(&path)
+            .map_err(|error| CpuShareError::Read { path: path.clone(), reason: error.to_string() })?;
         let number = match self.is_v2 {
             true => text.lines().find_map(|line| line.strip_prefix("usage_usec")),
             false => Some(text.as_str()),
         };
         let number = number.and_then(|number| number.trim().parse::<f64>().ok());
         let unit_s = if self.is_v2 { 1e-6 } else { 1e-9 };
-        number.map(|number| number * unit_s).ok_or_else(|| failed("no processor time".to_owned()))
+        let used_s = number.map(|number| number * unit_s);
+        used_s.ok_or_else(|| CpuShareError::Read { path, reason: "no processor time".to_owned() })
     }
 }
 

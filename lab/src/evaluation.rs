@@ -2,11 +2,12 @@
 
 use anyhow::Context as _;
 use depth_image::{Provenance, ProvenanceKind, View, ViewPlanes};
-use metrics::{PictureErrors, PixelClass, Rgb8Image, depth_errors};
+use metrics::{DepthErrors, PictureErrors, PixelClass, Rgb8Image, depth_errors};
 use rayon::prelude::*;
 use reconstruction::ReconstructionMethod;
 
 use crate::reference_views::ReferenceViews;
+use crate::statistics::{mean_of, sum_of};
 
 /// A channel off by more than this, out of 255, is a wrong colour.
 const WRONG_COLOR: u8 = 16;
@@ -20,22 +21,14 @@ pub struct Evaluation {
     pub method: ReconstructionMethod,
     /// One view in a batch, to host pixels.
     pub ms_a_view: f64,
-    /// Over the pixels that show a surface; mean over views.
-    pub foreground_psnr_db: f64,
-    /// As `foreground_psnr_db`.
-    pub foreground_flip: f64,
-    /// As `foreground_psnr_db`.
-    pub foreground_ssim: f64,
-    /// As `foreground_psnr_db`, of the worst view.
+    /// Over the pixels that show a surface; means over views.
+    pub foreground: PictureErrors,
+    /// The foreground's PSNR of the worst view.
     pub foreground_psnr_min_db: f64,
-    /// Mean over views.
-    pub psnr_db: f64,
-    /// The worst view.
+    /// Over whole pictures; means over views.
+    pub whole: PictureErrors,
+    /// PSNR of the worst view.
     pub psnr_min_db: f64,
-    /// Mean over views.
-    pub ssim: f64,
-    /// Mean over views.
-    pub flip: f64,
     /// Hits off by more than 1 % in depth, of all hits.
     pub wrong_hits: f64,
     /// Pixels that no sample camera knows, of all.
@@ -62,80 +55,56 @@ impl ReferenceViews {
     }
 }
 
-/// Errors of one view, to be added up.
-#[derive(Debug, Clone, Copy, Default)]
+/// Errors of one view.
 struct Errors {
-    foreground_psnr_db: f64,
-    foreground_flip: f64,
-    foreground_ssim: f64,
-    psnr_db: f64,
-    ssim: f64,
-    flip: f64,
-    pixels: usize,
-    hits: usize,
-    wrong_hits: usize,
-    unknown: usize,
+    /// Over the foreground, then over the whole picture.
+    pictures: [PictureErrors; 2],
+    depth: DepthErrors,
     disoccluded: usize,
+    /// Disoccluded pixels of a wrong colour.
     disoccluded_wrong: usize,
+    /// Those of a wrong colour that are not marked as filled.
     disoccluded_unmarked: usize,
 }
 
 impl Errors {
     fn of(reference: &View, view: &View, classes: &[PixelClass]) -> anyhow::Result<Self> {
-        let actual = Rgb8Image::of_view(view)?;
+        let pictures = PictureErrors::of(reference, &Rgb8Image::of_view(view)?)?;
         let depth = depth_errors(&known_depth(reference)?, &known_depth(view)?, None)?;
-        let [foreground, whole] = PictureErrors::of(reference, &actual)?;
-        let errors = Self {
-            foreground_psnr_db: foreground.psnr_db,
-            foreground_flip: foreground.flip,
-            foreground_ssim: foreground.ssim,
-            psnr_db: whole.psnr_db,
-            ssim: whole.ssim,
-            flip: whole.flip,
-            pixels: depth.pixels,
-            hits: depth.hit_px,
-            wrong_hits: depth.wrong_hit_px,
-            unknown: depth.unknown_px,
-            ..Self::default()
-        };
-        errors.with_disocclusions(reference, view, classes)
-    }
-
-    /// Counts disoccluded pixels, those of a wrong colour, and those of these that are not marked as filled.
-    fn with_disocclusions(mut self, reference: &View, view: &View, classes: &[PixelClass]) -> anyhow::Result<Self> {
+        let mut errors = Self { pictures, depth, disoccluded: 0, disoccluded_wrong: 0, disoccluded_unmarked: 0 };
         let provenance = view.provenance.as_ref().context("a view without provenance")?;
         let colors = reference.srgb8.as_chunks::<3>().0.iter().zip(view.srgb8.as_chunks::<3>().0);
         let wrong = colors.map(|(a, b)| (0..3).any(|i| a[i].abs_diff(b[i]) > WRONG_COLOR));
         for ((class, wrong), provenance) in classes.iter().zip(wrong).zip(provenance) {
             if *class == PixelClass::Disoccluded {
-                self.disoccluded += 1;
-                self.disoccluded_wrong += usize::from(wrong);
-                self.disoccluded_unmarked += usize::from(wrong && !is_marked(provenance));
+                errors.disoccluded += 1;
+                errors.disoccluded_wrong += usize::from(wrong);
+                errors.disoccluded_unmarked += usize::from(wrong && !is_marked(provenance));
             }
         }
-        Ok(self)
+        Ok(errors)
     }
 }
 
 fn evaluation(method: ReconstructionMethod, ms_a_view: f64, errors: &[Errors]) -> Evaluation {
-    let mean = |value: fn(&Errors) -> f64| errors.iter().map(value).sum::<f64>() / errors.len() as f64;
-    let sum = |value: fn(&Errors) -> usize| errors.iter().map(value).sum::<usize>() as f64;
+    let pictures: Vec<[PictureErrors; 2]> = errors.iter().map(|e| e.pictures).collect();
+    let [foreground, whole] = mean_pictures(&pictures);
+    let [foreground_psnr_min_db, psnr_min_db] =
+        [0, 1].map(|part| pictures.iter().map(|e| e[part].psnr_db).fold(f64::INFINITY, f64::min));
+    let pixels = sum_of(errors, |e| e.depth.pixels);
+    let disoccluded = sum_of(errors, |e| e.disoccluded);
     Evaluation {
         method,
         ms_a_view,
-        foreground_psnr_db: mean(|e| e.foreground_psnr_db),
-        foreground_flip: mean(|e| e.foreground_flip),
-        foreground_ssim: mean(|e| e.foreground_ssim),
-        foreground_psnr_min_db: errors.iter().map(|e| e.foreground_psnr_db).fold(f64::INFINITY, f64::min),
-        psnr_db: mean(|e| e.psnr_db),
-        psnr_min_db: errors.iter().map(|e| e.psnr_db).fold(f64::INFINITY, f64::min),
-        ssim: mean(|e| e.ssim),
-        flip: mean(|e| e.flip),
-        wrong_hits: sum(|e| e.wrong_hits) / sum(|e| e.hits),
-        unknown: sum(|e| e.unknown) / sum(|e| e.pixels),
-        disoccluded_wrong: sum(|e| e.disoccluded_wrong) / sum(|e| e.disoccluded),
-        disoccluded_unmarked: sum(|e| e.disoccluded_unmarked) / sum(|e| e.disoccluded),
-        disoccluded: sum(|e| e.disoccluded) / sum(|e| e.pixels),
+        foreground,
+        foreground_psnr_min_db,
+        whole,
+        psnr_min_db,
+        wrong_hits: sum_of(errors, |e| e.depth.wrong_hit_px) / sum_of(errors, |e| e.depth.hit_px),
+        unknown: sum_of(errors, |e| e.depth.unknown_px) / pixels,
+        disoccluded_wrong: sum_of(errors, |e| e.disoccluded_wrong) / disoccluded,
+        disoccluded_unmarked: sum_of(errors, |e| e.disoccluded_unmarked) / disoccluded,
+        disoccluded: disoccluded / pixels,
     }
 }
 
@@ -144,15 +113,17 @@ fn evaluation(method: ReconstructionMethod, ms_a_view: f64, errors: &[Errors]) -
 /// # Errors
 /// Views differ in size, or a reference has no depth.
 pub fn mean_errors(references: &[View], tests: &[View]) -> anyhow::Result<[PictureErrors; 2]> {
-    let errors = |(reference, test): (&View, &View)| PictureErrors::of(reference, &Rgb8Image::of_view(test)?);
-    let errors = references.par_iter().zip(tests).map(errors).collect::<Result<Vec<_>, _>>()?;
-    let mean = |part: usize| {
-        let mean = |value: fn(&PictureErrors) -> f64| {
-            errors.iter().map(|e| value(&e[part])).sum::<f64>() / errors.len() as f64
-        };
-        PictureErrors { psnr_db: mean(|e| e.psnr_db), ssim: mean(|e| e.ssim), flip: mean(|e| e.flip) }
-    };
-    Ok([mean(0), mean(1)])
+    let pairs = references.par_iter().zip(tests);
+    let errors = pairs.map(|(reference, test)| PictureErrors::of(reference, &Rgb8Image::of_view(test)?));
+    Ok(mean_pictures(&errors.collect::<Result<Vec<_>, _>>()?))
+}
+
+fn mean_pictures(errors: &[[PictureErrors; 2]]) -> [PictureErrors; 2] {
+    [0, 1].map(|part| PictureErrors {
+        psnr_db: mean_of(errors, |e| e[part].psnr_db),
+        ssim: mean_of(errors, |e| e[part].ssim),
+        flip: mean_of(errors, |e| e[part].flip),
+    })
 }
 
 /// Whether a pixel is said to be uncertain.

@@ -46,9 +46,10 @@ impl Drop for Process {
 }
 
 impl Process {
-    /// Starts a process with arguments as on the command line.
-    fn start(name: &str, arguments: &[String]) -> anyhow::Result<Self> {
+    /// Starts a process of a name with further arguments.
+    fn start(name: &str, arguments: &[&str], further: &[impl AsRef<str>]) -> anyhow::Result<Self> {
         let folder = tempfile::tempdir()?;
+        let arguments = arguments.iter().copied().chain(further.iter().map(AsRef::as_ref));
         let mut command = Command::new(product()?);
         command.args(with_fixture_files(arguments, folder.path())?).stdin(Stdio::null()).stdout(Stdio::piped());
         let mut child = command.spawn().with_context(|| format!("cannot start {name}"))?;
@@ -58,24 +59,22 @@ impl Process {
 
     /// Starts a coordinator on a free port, with further arguments.
     pub fn coordinator(arguments: &[String]) -> anyhow::Result<Self> {
-        let fixed = ["coordinator", "--no-viewer", "--listen", "127.0.0.1:0"].map(str::to_owned);
-        Self::start("coordinator", &[&fixed, arguments].concat())
+        Self::start("coordinator", &["coordinator", "--no-viewer", "--listen", "127.0.0.1:0"], arguments)
     }
 
     /// Starts a whole cluster in one process on a free port, with further arguments.
     pub fn up(arguments: &[String]) -> anyhow::Result<Self> {
-        let fixed = ["up", "--no-viewer", "--listen", "127.0.0.1:0"].map(str::to_owned);
-        Self::start("up", &[&fixed, arguments].concat())
+        Self::start("up", &["up", "--no-viewer", "--listen", "127.0.0.1:0"], arguments)
     }
 
     /// Starts a whole cluster in one process on a free port, with its viewer. It prints its address, then the viewer's.
     pub fn up_with_viewer(arguments: &[&str]) -> anyhow::Result<Self> {
-        Self::start("up", &owned(&[&["up", "--listen", "127.0.0.1:0"], arguments].concat()))
+        Self::start("up", &["up", "--listen", "127.0.0.1:0"], arguments)
     }
 
     /// Starts a gateway. It prints the address of its page.
     pub fn gateway(arguments: &[&str]) -> anyhow::Result<Self> {
-        Self::start("gateway", &owned(&[&["gateway"], arguments].concat()))
+        Self::start("gateway", &["gateway"], arguments)
     }
 
     /// Kills the process as `kill -9` does.
@@ -87,22 +86,18 @@ impl Process {
 
     /// Starts a node on a free port. It prints its address, then that of its metrics.
     pub fn node(number: usize, coordinator: &str, device: DevicePreference) -> anyhow::Result<Self> {
-        let name = node_name(number);
-        let device = device.to_string();
-        let fixed = ["node", "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0"];
-        let own = ["--coordinator", coordinator, "--name", &name, "--device", &device];
-        let arguments: Vec<String> = fixed.iter().chain(&own).map(|&word| word.to_owned()).collect();
-        Self::start(&name, &arguments)
+        // Enough digits to sort well.
+        let name = format!("node-{number:03}");
+        let own = ["--coordinator", coordinator, "--name", &name, "--device", &device.to_string()];
+        Self::start(&name, &["node", "--listen", "127.0.0.1:0", "--metrics", "127.0.0.1:0"], &own)
     }
 
     /// The name that it was started with.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// The system's number of the process.
-    #[must_use]
     pub fn id(&self) -> u32 {
         self.child.id()
     }
@@ -122,8 +117,8 @@ impl Process {
 }
 
 /// Writes each fixture that an argument names to a file, which takes its place.
-fn with_fixture_files(arguments: &[String], folder: &Path) -> anyhow::Result<Vec<String>> {
-    let mut replaced = arguments.to_vec();
+fn with_fixture_files<'a>(arguments: impl Iterator<Item = &'a str>, folder: &Path) -> anyhow::Result<Vec<String>> {
+    let mut replaced: Vec<String> = arguments.map(str::to_owned).collect();
     for place in 1..replaced.len() {
         if replaced[place - 1] != "--scene" {
             continue;
@@ -135,16 +130,6 @@ fn with_fixture_files(arguments: &[String], folder: &Path) -> anyhow::Result<Vec
         }
     }
     Ok(replaced)
-}
-
-fn owned(arguments: &[&str]) -> Vec<String> {
-    arguments.iter().map(|&word| word.to_owned()).collect()
-}
-
-/// The name of a node, with enough digits to sort well.
-#[must_use]
-pub fn node_name(number: usize) -> String {
-    format!("node-{number:03}")
 }
 
 /// Output is read to the end: a process that cannot print stops.

@@ -3,7 +3,11 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use anyhow::Context as _;
 use client::Client;
+use cluster::OfferStatus;
+use depth_image::{PinholeCamera, ViewCell};
+use glam::UVec2;
 use gpu::DevicePreference;
 
 use crate::cpu_share::{CpuGroup, Hierarchy};
@@ -74,11 +78,11 @@ impl Processes {
     }
 
     /// Memory of each process in MiB: the coordinator, then the nodes.
-    #[must_use]
     pub fn memory_mib(&self) -> Vec<(String, f64)> {
-        let of = |process: &Process| memory_mib(&process.id().to_string()).unwrap_or(f64::NAN);
         let all = [&self.coordinator].into_iter().chain(self.nodes.iter().map(|node| &node.process));
-        all.map(|process| (process.name().to_owned(), of(process))).collect()
+        let memory =
+            all.map(|process| (process.name().to_owned(), memory_mib(&process.id().to_string()).unwrap_or(f64::NAN)));
+        memory.collect()
     }
 
     /// Kills a node as `kill -9` does.
@@ -116,6 +120,15 @@ impl Member {
     }
 }
 
+/// Views between the sample cameras of a scene on offer.
+///
+/// # Errors
+/// There are no sample cameras.
+pub fn orbit(offer: &OfferStatus, count: usize, size_px: UVec2) -> anyhow::Result<Vec<PinholeCamera>> {
+    let samples: Vec<_> = offer.sample_cameras.iter().map(|camera| *camera.reference()).collect();
+    Ok(ViewCell::between(&samples).context("no sample cameras")?.orbit(count, size_px))
+}
+
 /// A control group with a process in it.
 fn group_of(process: &Process) -> anyhow::Result<CpuGroup> {
     let group = CpuGroup::new(&Hierarchy::find()?, &format!("myriorama-{}-{}", std::process::id(), process.name()))?;
@@ -124,12 +137,12 @@ fn group_of(process: &Process) -> anyhow::Result<CpuGroup> {
 }
 
 fn dropped_in(page: &str) -> Vec<(String, u64)> {
-    let reason = |line: &str| {
+    let dropped = page.lines().filter_map(|line| {
         let rest = line.strip_prefix("myriorama_dropped_views_total{reason=\"")?;
         let (reason, count) = rest.split_once("\"} ")?;
         Some((reason.to_owned(), count.trim().parse().ok()?))
-    };
-    page.lines().filter_map(reason).collect()
+    });
+    dropped.collect()
 }
 
 #[cfg(test)]

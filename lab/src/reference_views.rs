@@ -1,7 +1,6 @@
 //! Reference views: drawn from the scene, beside the sample set that other views are reconstructed from.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use anyhow::Context as _;
 use app_core::setup::{SceneArgs, Setup};
@@ -13,7 +12,7 @@ use node::{DirectWork, Engine as _, SampleWork, Turn, WorkClass};
 use reconstruction::{ReconstructRequest, ReconstructionMethod, SampleSet, SetDescription};
 use render::Lighting;
 
-use crate::statistics::median;
+use crate::statistics::median_seconds;
 
 const TURN: Turn = Turn { class: WorkClass::Batch, flow: Turn::COMMON_FLOW };
 
@@ -53,8 +52,11 @@ impl ReferenceViews {
         };
         let set = engine.reconstructor.upload(&images, &description, Default::default())?;
         let views = engine.draw_direct(&direct_work(setup, args.lighting, &cameras, ViewPlanes::ALL), TURN)?;
-        let class = |(camera, view): (&PinholeCamera, &View)| Ok(classify(camera, inverse_depth(view)?, &images)?);
-        let classes = cameras.iter().zip(&views).map(class).collect::<anyhow::Result<_>>()?;
+        let mut classes = Vec::with_capacity(views.len());
+        for (camera, view) in cameras.iter().zip(&views) {
+            let inverse_depth = view.inverse_depth_per_m.as_ref().context("a view without depth")?;
+            classes.push(classify(camera, inverse_depth, &images)?);
+        }
         Ok(Self { engine: engine.clone(), cameras, views, set, classes })
     }
 
@@ -80,14 +82,11 @@ impl ReferenceViews {
     pub fn ms_a_view(&self, method: ReconstructionMethod, at_least: usize, runs: usize) -> anyhow::Result<f64> {
         let times = at_least.div_ceil(self.cameras.len().max(1)).max(1);
         let cameras = self.cameras.repeat(times);
-        let run = || {
-            let start = Instant::now();
+        let batch_s = median_seconds(runs.max(1), || {
             self.engine.reconstructor.reconstruct(ReconstructRequest::new(&self.set, &cameras, method))?;
-            anyhow::Ok(start.elapsed().as_secs_f64())
-        };
-        run()?;
-        let seconds = (0..runs.max(1)).map(|_| run()).collect::<anyhow::Result<Vec<_>>>()?;
-        Ok(median(seconds) * 1e3 / cameras.len() as f64)
+            Ok(())
+        })?;
+        Ok(batch_s * 1e3 / cameras.len() as f64)
     }
 }
 
@@ -113,7 +112,13 @@ pub(crate) fn encoded_and_decoded(image: &DepthImage) -> anyhow::Result<DepthIma
     Ok(decode_depth_image(&encoded.header, image.camera, &encoded.payload, &DecodeLimits::default())?)
 }
 
-fn direct_work(setup: &Setup, lighting: Lighting, cameras: &[PinholeCamera], planes: ViewPlanes) -> DirectWork {
+/// Direct drawing of the scene at its start.
+pub(crate) fn direct_work(
+    setup: &Setup,
+    lighting: Lighting,
+    cameras: &[PinholeCamera],
+    planes: ViewPlanes,
+) -> DirectWork {
     DirectWork {
         scene_hash: setup.offer.hash.to_string(),
         cameras: cameras.to_vec(),
@@ -122,8 +127,4 @@ fn direct_work(setup: &Setup, lighting: Lighting, cameras: &[PinholeCamera], pla
         planes,
         surfaces_by_rays: None,
     }
-}
-
-fn inverse_depth(view: &View) -> anyhow::Result<&[f32]> {
-    Ok(view.inverse_depth_per_m.as_ref().context("a view without depth")?)
 }

@@ -1,11 +1,10 @@
 //! Reports of several parts, each measured by itself.
 
-use std::path::Path;
-
-use app_core::exit::Outcome;
 use app_core::progress::bar;
 use clap::ValueEnum;
 use report::{Bar, Check, Report, Table};
+
+use crate::study::new_report;
 
 /// The result of a part.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -51,23 +50,15 @@ pub(crate) async fn measure_parts<P: ValueEnum>(
 /// A report of this title about the device of the sections.
 pub(crate) fn report(title: &str, sections: &[Section]) -> Report {
     let device = sections.iter().map(|section| section.device.as_str()).find(|device| !device.is_empty());
-    let mut report = Report::new(title, device.unwrap_or_default());
-    report.version("myriorama", env!("CARGO_PKG_VERSION"));
-    report
+    new_report(title, device.unwrap_or_default())
 }
 
-/// Adds the sections to the report, prints and writes it.
-///
-/// # Errors
-/// The report cannot be written.
-pub(crate) fn finish(mut report: Report, sections: Vec<Section>, out: &Path, strict: bool) -> anyhow::Result<Outcome> {
+/// Adds the sections to the report.
+pub(crate) fn add(report: &mut Report, sections: Vec<Section>) {
     for section in sections {
         report.tables.extend(section.tables);
         report.checks.extend(section.checks);
     }
-    report.tables.iter().for_each(|table| println!("{}", table.to_markdown()));
-    let ok = report.finish(out)?;
-    Ok(Outcome::of(ok || !strict))
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 //!
 //! A study is a list of rows and a function that measures one. What it reports of a row is a list of [`Column`]s.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -13,15 +14,15 @@ use engine::GpuEngine;
 use node::Engine as _;
 use report::{Cell, Mark, Point, Report, Series, Table, XyChart};
 
-/// Options of every study.
+/// Options of every bench and study.
 #[derive(Debug, Args)]
-pub struct StudyArgs {
+pub struct RunArgs {
     #[command(flatten)]
     pub device: DeviceArgs,
-    /// Where the report goes, in place of out/study/NAME
+    /// Where the report goes, in place of out/bench, out/bench-NAME or out/study/NAME
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Runs a smaller form: fewer subjects, fewer or smaller views
+    /// Runs a smaller form: fewer subjects or repeats, fewer or smaller views
     #[arg(long)]
     pub quick: bool,
     /// Exit status 1 when a check falls short
@@ -36,7 +37,7 @@ pub struct Column<R> {
     cell: fn(&R) -> Cell,
 }
 
-impl StudyArgs {
+impl RunArgs {
     /// # Errors
     /// There is no such device.
     pub fn engine(&self) -> anyhow::Result<Arc<GpuEngine>> {
@@ -44,22 +45,49 @@ impl StudyArgs {
     }
 
     pub fn report(&self, title: &str, engine: &GpuEngine) -> Report {
-        let mut report = Report::new(format!("Myriorama study: {title}"), engine.device_name());
-        report.version("myriorama", env!("CARGO_PKG_VERSION"));
+        let mut report = new_report(format!("Myriorama study: {title}"), &engine.device_name());
         report.parameter("quick", self.quick);
         report
     }
 
-    /// Prints the tables and writes the report of the study of this name.
+    /// The folder of the report, unless another is given.
+    pub fn folder<'a>(&'a self, usual: &'a str) -> &'a Path {
+        self.out.as_deref().unwrap_or(Path::new(usual))
+    }
+
+    /// Prints the tables and writes the report to its usual folder, unless another is given.
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub fn finish(&self, name: &str, report: &Report) -> anyhow::Result<Outcome> {
+    pub fn finish(&self, usual_folder: &str, report: &Report) -> anyhow::Result<Outcome> {
         report.tables.iter().for_each(|table| println!("{}", table.to_markdown()));
-        let out = self.out.clone().unwrap_or_else(|| Path::new("out/study").join(name));
-        let holds = report.finish(&out)?;
+        self.write(usual_folder, report)
+    }
+
+    /// As [`Self::finish`], without the tables.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn write(&self, usual_folder: &str, report: &Report) -> anyhow::Result<Outcome> {
+        let holds = report.finish(self.folder(usual_folder))?;
         Ok(Outcome::of(holds || !self.strict))
     }
+}
+
+/// A report with the program's version.
+pub fn new_report(title: impl Into<String>, device: &str) -> Report {
+    let mut report = Report::new(title, device);
+    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    report
+}
+
+/// Parses a number within a range, for an option.
+///
+/// # Errors
+/// The text is no such number; the message states the range.
+pub fn number_within(text: &str, range: RangeInclusive<f64>) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| range.contains(number));
+    number.ok_or_else(|| format!("expected {} to {}", range.start(), range.end()))
 }
 
 impl<R> Column<R> {

@@ -59,14 +59,6 @@ pub struct Cluster {
     pub frame_bytes: f64,
 }
 
-impl Cluster {
-    /// A cluster of `nodes` equal nodes.
-    #[must_use]
-    pub fn equal(nodes: usize, machine: Machine, images: usize, image_bytes: f64, frame_bytes: f64) -> Self {
-        Self { machines: vec![machine; nodes], images, image_bytes, frame_bytes }
-    }
-}
-
 /// How images get to compositors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Transfer {

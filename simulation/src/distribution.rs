@@ -2,14 +2,14 @@
 
 use std::cmp::Reverse;
 
-use cluster::{Assignment, CompositorShare};
+use cluster::Assignment;
 
 use crate::planning::number_of;
 
 /// Nodes that make views of sets of `views`, as clients choose them: no more than a set has views, by their weights.
 pub(crate) fn compositors_of(plan: &Assignment, views: usize) -> Vec<(usize, u32)> {
-    let weighted = |share: &CompositorShare| Some((number_of(&share.node_name)?, share.view_weight));
-    let mut compositors: Vec<(usize, u32)> = plan.compositors.iter().filter_map(weighted).collect();
+    let weighted = plan.compositors.iter().filter_map(|share| Some((number_of(&share.node_name)?, share.view_weight)));
+    let mut compositors: Vec<(usize, u32)> = weighted.collect();
     compositors.sort_by_key(|(_, weight)| Reverse(*weight));
     compositors.truncate(views);
     compositors

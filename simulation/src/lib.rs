@@ -19,6 +19,6 @@ mod faults_tests;
 mod tests;
 
 pub use cluster::{Calls, Cluster, Habits, Machine, Transfer, spread_speeds};
-pub use planning::{Demand, PlanError, plan};
+pub use planning::{Demand, plan};
 pub use run::{Busy, Limit, Run};
 pub use world::run;

@@ -6,7 +6,7 @@ use cluster::{
     Assignment, Costs, JoinCluster, NodeStatus, PolicyChoice, SamplePlanes, SceneHash, SceneRef, SessionPlan, Timeline,
     Workload,
 };
-use coordinator::schedule::{ChoiceError, Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
+use coordinator::schedule::{Command, Event, MeasuredCosts, Opening, PolicyOverride, Scheduler};
 use depth_image::{Aabb, Environment, ExposureEv, Illumination, PinholeCamera};
 use glam::{UVec2, Vec3};
 
@@ -37,31 +37,18 @@ pub struct Demand {
     pub nodes_report: bool,
 }
 
-/// Why there is no plan.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum PlanError {
-    /// The schedule refuses the session.
-    #[error(transparent)]
-    Refused(#[from] ChoiceError),
-    /// The schedule gave no command.
-    #[error("the schedule made no plan")]
-    None,
-}
-
 /// A schedule and its last commands.
 #[derive(Default)]
 struct Coordinator {
     scheduler: Scheduler,
     now: Duration,
     plan: Option<SessionPlan>,
-    refused: Option<ChoiceError>,
+    is_refused: bool,
 }
 
-/// The stable plan of the schedule.
-///
-/// # Errors
-/// Where the schedule refuses.
-pub fn plan(cluster: &Cluster, demand: &Demand) -> Result<SessionPlan, PlanError> {
+/// The stable plan of the schedule; `None` where the schedule refuses the session.
+#[must_use]
+pub fn plan(cluster: &Cluster, demand: &Demand) -> Option<SessionPlan> {
     let mut coordinator = Coordinator::default();
     for (number, _) in cluster.machines.iter().enumerate() {
         coordinator.tell(joined(&name(number), number as u64 + 1, 0));
@@ -71,11 +58,7 @@ pub fn plan(cluster: &Cluster, demand: &Demand) -> Result<SessionPlan, PlanError
         (0..REPORTS).for_each(|_| coordinator.report_costs(cluster));
     }
     coordinator.wait_until_stable();
-    match (coordinator.plan, coordinator.refused) {
-        (_, Some(error)) => Err(error.into()),
-        (Some(plan), None) => Ok(plan),
-        (None, None) => Err(PlanError::None),
-    }
+    coordinator.plan.filter(|_| !coordinator.is_refused)
 }
 
 impl Coordinator {
@@ -83,7 +66,7 @@ impl Coordinator {
         for command in self.scheduler.step(self.now, event) {
             match command {
                 Command::Apply { plan, .. } => self.apply(*plan),
-                Command::Refuse { error, .. } => self.refused = Some(error),
+                Command::Refuse { .. } => self.is_refused = true,
                 // Sessions here have no budget, and nodes no faults.
                 Command::Recall { .. }
                 | Command::ProbeViews(_)
@@ -99,10 +82,10 @@ impl Coordinator {
 
     /// Nodes are ready at once.
     fn apply(&mut self, plan: SessionPlan) {
-        let ready = |node_name| Event::Ready { plan_epoch: plan.assignment.plan_epoch, node_name };
+        let plan_epoch = plan.assignment.plan_epoch;
         let names = node_names(&plan.assignment);
-        self.plan = Some(plan.clone());
-        names.into_iter().for_each(|name| self.tell(ready(name)));
+        self.plan = Some(plan);
+        names.into_iter().for_each(|node_name| self.tell(Event::Ready { plan_epoch, node_name }));
     }
 
     fn report_costs(&mut self, cluster: &Cluster) {

@@ -81,8 +81,11 @@ impl Run {
     /// T as it is measured: from the end of set 0 to the end of the set `counted_sets` later, a set.
     #[must_use]
     pub fn period_s(&self, counted_sets: usize) -> f64 {
-        let at = |set: usize| self.complete_s.get(set).copied().unwrap_or(f64::NAN);
-        (at(counted_sets) - at(0)) / counted_sets as f64
+        (self.set_complete_s(counted_sets) - self.set_complete_s(0)) / counted_sets as f64
+    }
+
+    fn set_complete_s(&self, set: usize) -> f64 {
+        self.complete_s.get(set).copied().unwrap_or(f64::NAN)
     }
 
     /// T once the first sets have filled the cluster. The last ones do not count: while they are made nothing is sampled
@@ -91,8 +94,7 @@ impl Run {
     pub fn steady_period_s(&self) -> f64 {
         let last = self.complete_s.len().saturating_sub(1 + DRAINING);
         let first = last / 2;
-        let at = |set: usize| self.complete_s.get(set).copied().unwrap_or(f64::NAN);
-        (at(last) - at(first)) / last.saturating_sub(first) as f64
+        (self.set_complete_s(last) - self.set_complete_s(first)) / last.saturating_sub(first) as f64
     }
 
     /// The limit: the part that is busy for the greatest share of T.

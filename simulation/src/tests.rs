@@ -27,7 +27,7 @@ fn ran(cluster: &Cluster, demand: &Demand, habits: Habits) -> Run {
 }
 
 fn equal(nodes: usize, machine: Machine) -> Cluster {
-    Cluster::equal(nodes, machine, 4, 1e6, 1e5)
+    Cluster { machines: vec![machine; nodes], images: 4, image_bytes: 1e6, frame_bytes: 1e5 }
 }
 
 fn close(a: f64, b: f64) -> bool {

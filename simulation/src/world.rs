@@ -56,7 +56,14 @@ pub fn run(cluster: &Cluster, plan: &SessionPlan, views: usize, sets: u32, habit
     world.begin();
     while let Some(Reverse((at, _, event))) = world.scheduled.pop() {
         world.now_s = f64::from_bits(at);
-        world.handle(event);
+        match event {
+            Event::Done { node } => world.done(node),
+            Event::Sent { node } => world.sent(node),
+            Event::Arrived { sampler, set, place, node } => {
+                world.relay(node, sampler, set, Some(place));
+                world.images_arrived(node, set);
+            }
+        }
     }
     Run {
         complete_s: world.due.iter().map(|(due, last_s)| if *due == 0 { *last_s } else { f64::NAN }).collect(),
@@ -75,8 +82,8 @@ impl<'a> World<'a> {
         let compositors = weighted.into_iter().map(|(node, _)| node).collect();
         let relayed = plan.relay_fanout.map(|fanout| Transfer::Relay(fanout.get() as usize));
         let habits = Habits { transfer: relayed.unwrap_or(habits.transfer), ..habits };
-        let node = |machine| Node::new(machine, sets, habits.credit_views);
-        let nodes: Vec<Node> = cluster.machines.iter().copied().map(node).collect();
+        let machines = cluster.machines.iter();
+        let nodes = machines.map(|&machine| Node::new(machine, sets, habits.credit_views)).collect();
         Self {
             cluster,
             plan,
@@ -135,14 +142,6 @@ impl<'a> World<'a> {
         // Times are not negative, so that their bits are in their order.
         self.scheduled.push(Reverse((at_s.to_bits(), self.events, event)));
         self.events += 1;
-    }
-
-    fn handle(&mut self, event: Event) {
-        match event {
-            Event::Done { node } => self.done(node),
-            Event::Sent { node } => self.sent(node),
-            Event::Arrived { sampler, set, place, node } => self.arrived(sampler, set, place, node),
-        }
     }
 
     /// Reads a compositor's messages: it waits for a set, fetches the next ones, and hands views over as credit allows.
@@ -232,18 +231,6 @@ impl<'a> World<'a> {
         }
     }
 
-    fn receiver(&self, sampler: usize, place: usize) -> usize {
-        match self.habits.transfer {
-            Transfer::Unicast => place,
-            Transfer::Relay(_) => self.receivers[sampler][place],
-        }
-    }
-
-    fn arrived(&mut self, sampler: usize, set: u32, place: usize, node: usize) {
-        self.relay(node, sampler, set, Some(place));
-        self.images_arrived(node, set);
-    }
-
     fn images_arrived(&mut self, node: usize, set: u32) {
         self.nodes[node].loading[set as usize].arrived += 1;
         self.load_if_complete(node, set);
@@ -330,7 +317,10 @@ impl<'a> World<'a> {
 
     /// Occupies the receiver's link behind the parcels before.
     fn receive(&mut self, sampler: usize, set: u32, images: usize, place: usize, sending_s: f64) {
-        let node = self.receiver(sampler, place);
+        let node = match self.habits.transfer {
+            Transfer::Unicast => place,
+            Transfer::Relay(_) => self.receivers[sampler][place],
+        };
         let part_bytes = self.part_bytes();
         let this = &mut self.nodes[node];
         let seconds = images as f64 * part_bytes / this.machine.bytes_per_s;

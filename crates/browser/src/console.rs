@@ -2,36 +2,11 @@
 
 use serde_json::Value;
 
-/// The level of a message.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ConsoleLevel {
-    /// For developers.
-    Debug,
-    /// Neither a warning nor an error.
-    Info,
-    /// A warning.
-    Warning,
-    /// An error of a script, a policy, or a file that is missing.
-    Error,
-}
-
-impl ConsoleLevel {
-    /// Reads a level of `Log.entryAdded`, or a type of `Runtime.consoleAPICalled`.
-    fn read(name: &Value) -> Self {
-        match name.as_str() {
-            Some("error" | "assert") => Self::Error,
-            Some("warning") => Self::Warning,
-            Some("debug" | "verbose") => Self::Debug,
-            _ => Self::Info,
-        }
-    }
-}
-
 /// One message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConsoleEntry {
-    /// The level of the message.
-    pub level: ConsoleLevel,
+    /// Whether it is an error: of a script, a policy, or a file that is missing.
+    pub is_error: bool,
     /// Where it is from: `console-api`, `javascript`, `network`, `security`.
     pub source: String,
     /// The place in the sources, and the text.
@@ -42,32 +17,26 @@ impl ConsoleEntry {
     /// The message in an event of the DevTools protocol, where the event has one.
     pub(crate) fn read(event: &Value) -> Option<Self> {
         let parameters = &event["params"];
-        let (level, source, place, text) = match event["method"].as_str()? {
+        let (is_error, source, place, text) = match event["method"].as_str()? {
             "Runtime.consoleAPICalled" => {
                 let arguments: Vec<String> = parameters["args"].as_array()?.iter().map(text_of_object).collect();
                 let place = &parameters["stackTrace"]["callFrames"][0];
-                (ConsoleLevel::read(&parameters["type"]), "console-api", place, arguments.join(" "))
+                (is_level_of_errors(&parameters["type"]), "console-api", place, arguments.join(" "))
             }
             "Runtime.exceptionThrown" => {
                 let details = &parameters["exceptionDetails"];
-                (ConsoleLevel::Error, "javascript", details, text_of_exception(details))
+                (true, "javascript", details, text_of_exception(details))
             }
             "Log.entryAdded" => {
                 let entry = &parameters["entry"];
                 let text = entry["text"].as_str()?.to_owned();
-                (ConsoleLevel::read(&entry["level"]), entry["source"].as_str()?, entry, text)
+                (is_level_of_errors(&entry["level"]), entry["source"].as_str()?, entry, text)
             }
             _ => return None,
         };
         let url = place["url"].as_str().unwrap_or("-");
         let message = format!("{url} {}:{} {text}", place["lineNumber"], place["columnNumber"]);
-        Some(Self { level, source: source.to_owned(), message })
-    }
-
-    /// Whether it is an error: of a script, a policy, or a file that is missing.
-    #[must_use]
-    pub fn is_error(&self) -> bool {
-        self.level == ConsoleLevel::Error
+        Some(Self { is_error, source: source.to_owned(), message })
     }
 
     /// Whether it is about a connection, which a test may have cut.
@@ -75,6 +44,11 @@ impl ConsoleEntry {
     pub fn is_of_network(&self) -> bool {
         self.source == "network" || self.message.contains("WebSocket connection to")
     }
+}
+
+/// A level of `Log.entryAdded`, or a type of `Runtime.consoleAPICalled`.
+fn is_level_of_errors(name: &Value) -> bool {
+    matches!(name.as_str(), Some("error" | "assert"))
 }
 
 /// The text of a `Runtime.RemoteObject`.
@@ -110,7 +84,7 @@ mod tests {
         let details =
             json!({ "text": "Uncaught", "url": "main.js", "lineNumber": 9, "columnNumber": 1, "exception": exception });
         let fault = entry("Runtime.exceptionThrown", json!({ "exceptionDetails": details }));
-        assert!([&lost, &missing, &fault].iter().all(|entry| entry.is_error()));
+        assert!([&lost, &missing, &fault].iter().all(|entry| entry.is_error));
         assert!(lost.is_of_network() && missing.is_of_network() && !fault.is_of_network());
         assert_eq!(fault.message, "main.js 9:1 Uncaught TypeError: null is no object");
         assert_eq!(ConsoleEntry::read(&json!({ "method": "Page.loadEventFired", "params": {} })), None);
@@ -121,8 +95,8 @@ mod tests {
         let texts =
             json!([{ "type": "string", "value": "hello" }, { "type": "number", "value": 2, "description": "2" }]);
         let greeting = entry("Runtime.consoleAPICalled", json!({ "type": "log", "args": texts }));
-        assert_eq!((greeting.level, greeting.source.as_str()), (ConsoleLevel::Info, "console-api"));
-        assert!(greeting.message.ends_with("hello 2") && !greeting.is_error());
-        assert!(entry("Runtime.consoleAPICalled", json!({ "type": "assert", "args": texts })).is_error());
+        assert_eq!((greeting.is_error, greeting.source.as_str()), (false, "console-api"));
+        assert!(greeting.message.ends_with("hello 2"));
+        assert!(entry("Runtime.consoleAPICalled", json!({ "type": "assert", "args": texts })).is_error);
     }
 }

@@ -24,18 +24,11 @@ pub enum MouseButton {
 }
 
 impl MouseButton {
-    fn name(self) -> &'static str {
+    /// The name of the button, and its bit among the buttons that are down.
+    fn name_and_bit(self) -> (&'static str, u32) {
         match self {
-            Self::Left => "left",
-            Self::Right => "right",
-        }
-    }
-
-    /// Its bit among the buttons that are down.
-    fn bit(self) -> u32 {
-        match self {
-            Self::Left => 1,
-            Self::Right => 2,
+            Self::Left => ("left", 1),
+            Self::Right => ("right", 2),
         }
     }
 }
@@ -91,9 +84,9 @@ impl Browser {
 
     async fn mouse(&self, event: &str, [x, y]: Place, drag: &Drag) -> Result<(), BrowserError> {
         let is_down = event != "mouseReleased";
+        let (name, bit) = drag.button.name_and_bit();
         let parameters = json!({
-            "type": event, "x": x, "y": y, "button": drag.button.name(), "clickCount": 1,
-            "buttons": if is_down { drag.button.bit() } else { 0 },
+            "type": event, "x": x, "y": y, "button": name, "clickCount": 1, "buttons": if is_down { bit } else { 0 },
             "modifiers": if drag.is_shifted { SHIFT } else { 0 },
         });
         self.devtools("Input.dispatchMouseEvent", parameters).await.map(drop)

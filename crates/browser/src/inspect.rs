@@ -21,11 +21,11 @@ pub struct AccessibleNode {
 impl AccessibleNode {
     /// A node of the DevTools protocol, unless screen readers skip it.
     fn read(node: &Value) -> Option<Self> {
-        let text = |field: &str| node[field]["value"].as_str().unwrap_or_default().to_owned();
+        let [role, name] = ["role", "name"].map(|field| node[field]["value"].as_str().unwrap_or_default().to_owned());
         let properties = node["properties"].as_array();
         let is_focusable = properties.into_iter().flatten().any(|property| property["name"] == "focusable");
         let is_seen = node["ignored"] != true;
-        is_seen.then(|| Self { role: text("role"), name: text("name"), is_focusable })
+        is_seen.then_some(Self { role, name, is_focusable })
     }
 }
 

@@ -62,24 +62,19 @@ impl Key {
     }
 
     fn names(self) -> KeyNames {
-        let named = |name: &str, windows_code, text: &str| KeyNames {
-            key: name.to_owned(),
-            code: name.to_owned(),
-            windows_code,
-            text: text.to_owned(),
+        let (name, windows_code, text) = match self {
+            Self::Character(character) => return names_of_character(character),
+            Self::Enter => ("Enter", 13, "\r"),
+            Self::Escape => ("Escape", 27, ""),
+            Self::Tab => ("Tab", 9, ""),
+            Self::Left => ("ArrowLeft", 37, ""),
+            Self::Up => ("ArrowUp", 38, ""),
+            Self::Right => ("ArrowRight", 39, ""),
+            Self::Down => ("ArrowDown", 40, ""),
+            Self::Home => ("Home", 36, ""),
+            Self::End => ("End", 35, ""),
         };
-        match self {
-            Self::Character(character) => names_of_character(character),
-            Self::Enter => named("Enter", 13, "\r"),
-            Self::Escape => named("Escape", 27, ""),
-            Self::Tab => named("Tab", 9, ""),
-            Self::Left => named("ArrowLeft", 37, ""),
-            Self::Up => named("ArrowUp", 38, ""),
-            Self::Right => named("ArrowRight", 39, ""),
-            Self::Down => named("ArrowDown", 40, ""),
-            Self::Home => named("Home", 36, ""),
-            Self::End => named("End", 35, ""),
-        }
+        KeyNames { key: name.to_owned(), code: name.to_owned(), windows_code, text: text.to_owned() }
     }
 }
 

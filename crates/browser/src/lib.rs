@@ -21,7 +21,7 @@ mod profile;
 mod record;
 
 pub use browser::Browser;
-pub use console::{ConsoleEntry, ConsoleLevel};
+pub use console::ConsoleEntry;
 pub use error::BrowserError;
 pub use key::Key;
 pub use options::{BrowserOptions, View};

@@ -113,10 +113,10 @@ async fn commands_are_in_flight_at_once_and_end_with_their_page() {
 #[tokio::test(flavor = "multi_thread")]
 async fn errors_of_a_page_are_seen() {
     let browser = opened(View::default()).await;
-    assert!(browser.console().await.unwrap().iter().all(|entry| !entry.is_error()));
+    assert!(browser.console().await.unwrap().iter().all(|entry| !entry.is_error));
     browser.run::<()>("setTimeout(() => { throw new Error('a fault') })", Vec::new()).await.unwrap();
     let start = Instant::now();
-    while !browser.console().await.unwrap().iter().any(|entry| entry.is_error() && !entry.is_of_network()) {
+    while !browser.console().await.unwrap().iter().any(|entry| entry.is_error && !entry.is_of_network()) {
         assert!(start.elapsed() < SOON, "no error on the console");
     }
     let thrown = browser.value::<u32>("nothing.there").await.unwrap_err();

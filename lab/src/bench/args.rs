@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use app_core::setup::{DeviceArgs, SceneArgs};
+use app_core::setup::SceneArgs;
 use clap::{Args, Subcommand};
 
 use crate::load::command::LoadArgs;
 use crate::scaling::command::ScalingArgs;
 use crate::sharing::command::SharingArgs;
+use crate::study::RunArgs;
 use crate::viewer::command::ViewerBenchArgs;
 
 /// Holds measured values against bars and writes a report. A check without its input is not run and does not fall
@@ -23,7 +24,7 @@ pub struct BenchArgs {
     #[command(flatten)]
     pub(super) scene: SceneArgs,
     #[command(flatten)]
-    pub(super) device: DeviceArgs,
+    pub(super) run: RunArgs,
     /// A folder of models (.gltf, .glb, .obj, .ply), with its subfolders. All are loaded, and methods are compared on the
     /// largest
     #[arg(long, value_name = "DIR")]
@@ -34,15 +35,6 @@ pub struct BenchArgs {
     /// Loads the files of --models alone: contents, time to load, and the share of the first picture that each covers
     #[arg(long, requires = "models")]
     pub(super) loading: bool,
-    /// Where the report goes
-    #[arg(long, default_value = "out/bench", value_name = "DIR")]
-    pub(super) out: PathBuf,
-    /// Runs a smaller form: fewer repeats, views and models
-    #[arg(long)]
-    pub(super) quick: bool,
-    /// Exit status 1 when a check falls short
-    #[arg(long)]
-    pub(super) strict: bool,
 }
 
 /// A measurement of its own.
@@ -61,11 +53,11 @@ pub(super) enum Part {
 impl BenchArgs {
     /// Repeats of a measurement; the median counts.
     pub(super) fn runs(&self) -> usize {
-        if self.quick { 1 } else { 3 }
+        if self.run.quick { 1 } else { 3 }
     }
 
     /// The number of views that are compared pixel by pixel.
     pub(super) fn compared_views(&self) -> usize {
-        if self.quick { 4 } else { 8 }
+        if self.run.quick { 4 } else { 8 }
     }
 }

@@ -4,18 +4,18 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use app_core::experiment::VIEW_SIZE_PX;
-use app_core::progress::bar;
 use app_core::setup::SceneArgs;
 use depth_image::ViewCell;
 use engine::GpuEngine;
 use reconstruction::ReconstructionMethod;
-use report::{Axis, Bar, Better, Cell, Check, Point, Report, ReportError, Series, Table, XyChart};
+use report::{Axis, Bar, Better, Check, Point, Report, Series, XyChart};
 use scene::SceneSpec;
 
 use super::args::BenchArgs;
 use crate::evaluation::Evaluation;
 use crate::models::models_of;
 use crate::reference_views::ReferenceViews;
+use crate::study::{Column, measure_rows, table};
 
 /// A scene with gaps wide enough to count: in foliage, every pixel that no camera sees is a silhouette's.
 const GAPS: &str = "poles";
@@ -25,6 +25,24 @@ const MODELS: usize = 4;
 const STEPS: [u32; 6] = [8, 16, 32, 64, 128, 256];
 /// Levels at which joint carve stops.
 const STOP_LEVELS: [u32; 4] = [0, 1, 2, 3];
+
+const COLUMNS: [Column<Evaluation>; 15] = [
+    Column::new("method", |row| row.method.to_string().into()),
+    Column::with_unit("time a view", "ms", |row| row.ms_a_view.into()),
+    Column::with_unit("foreground PSNR", "dB", |row| row.foreground.psnr_db.into()),
+    Column::with_unit("foreground PSNR of the worst view", "dB", |row| row.foreground_psnr_min_db.into()),
+    Column::new("foreground SSIM", |row| row.foreground.ssim.into()),
+    Column::new("foreground FLIP", |row| row.foreground.flip.into()),
+    Column::with_unit("PSNR", "dB", |row| row.whole.psnr_db.into()),
+    Column::with_unit("PSNR of the worst view", "dB", |row| row.psnr_min_db.into()),
+    Column::new("SSIM", |row| row.whole.ssim.into()),
+    Column::new("FLIP", |row| row.whole.flip.into()),
+    Column::with_unit("wrong hits", "%", |row| (row.wrong_hits * 100.0).into()),
+    Column::with_unit("unknown", "%", |row| (row.unknown * 100.0).into()),
+    Column::with_unit("disoccluded coloured wrong", "%", |row| (row.disoccluded_wrong * 100.0).into()),
+    Column::with_unit("of these not marked", "%", |row| (row.disoccluded_unmarked * 100.0).into()),
+    Column::with_unit("disoccluded", "%", |row| (row.disoccluded * 100.0).into()),
+];
 
 /// The settings that are compared. A quick run skips every other one.
 fn settings(quick: bool) -> Vec<ReconstructionMethod> {
@@ -36,15 +54,10 @@ fn settings(quick: bool) -> Vec<ReconstructionMethod> {
 
 /// Evaluates all settings on one scene; adds a table, a chart and checks.
 pub fn compare(name: &str, reference: &ReferenceViews, args: &BenchArgs, report: &mut Report) -> anyhow::Result<()> {
-    let settings = settings(args.quick);
-    let progress = bar(format!("error against time, {name}"), settings.len());
-    let mut rows = Vec::with_capacity(settings.len());
-    for method in settings {
-        rows.push(reference.evaluate(method, args.runs())?);
-        progress.inc(1);
-    }
-    progress.finish_and_clear();
-    report.tables.push(table(name, &rows)?);
+    let rows = measure_rows(&format!("error against time, {name}"), settings(args.run.quick), |method| {
+        reference.evaluate(method, args.runs())
+    })?;
+    report.tables.push(table(format!("Error against time, {name}"), &COLUMNS, &rows)?);
     report.charts.push(chart(name, &rows).into());
     report.checks.extend(checks(name, &rows, args.scene.method()));
     Ok(())
@@ -58,7 +71,7 @@ pub fn gaps(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> a
 /// Evaluates the models of the folder, if one is given.
 pub fn models(args: &BenchArgs, engine: &Arc<GpuEngine>, report: &mut Report) -> anyhow::Result<()> {
     let Some(folder) = &args.models else { return Ok(()) };
-    for path in models_of(folder, if args.quick { 2 } else { MODELS })? {
+    for path in models_of(folder, if args.run.quick { 2 } else { MODELS })? {
         let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         compare_scene(&name, SceneSpec::File(path), args, engine, report)?;
     }
@@ -79,45 +92,13 @@ fn compare_scene(
     compare(name, &reference, args, report)
 }
 
-fn table(name: &str, rows: &[Evaluation]) -> Result<Table, ReportError> {
-    let columns = [
-        ("method", ""),
-        ("time a view", "ms"),
-        ("foreground PSNR", "dB"),
-        ("foreground PSNR of the worst view", "dB"),
-        ("foreground SSIM", ""),
-        ("foreground FLIP", ""),
-        ("PSNR", "dB"),
-        ("PSNR of the worst view", "dB"),
-        ("SSIM", ""),
-        ("FLIP", ""),
-        ("wrong hits", "%"),
-        ("unknown", "%"),
-        ("disoccluded coloured wrong", "%"),
-        ("of these not marked", "%"),
-        ("disoccluded", "%"),
-    ];
-    let mut table = Table::new(format!("Error against time, {name}"), &columns);
-    for row in rows {
-        let shares = [row.wrong_hits, row.unknown, row.disoccluded_wrong, row.disoccluded_unmarked, row.disoccluded]
-            .map(|share| share * 100.0);
-        let foreground = [row.foreground_psnr_db, row.foreground_psnr_min_db, row.foreground_ssim, row.foreground_flip];
-        let whole = [row.psnr_db, row.psnr_min_db, row.ssim, row.flip];
-        let numbers = [&[row.ms_a_view], &foreground[..], &whole, &shares].concat();
-        table.push([Cell::from(row.method.to_string())].into_iter().chain(numbers.into_iter().map(Cell::from)))?;
-    }
-    Ok(table)
-}
-
 fn chart(name: &str, rows: &[Evaluation]) -> XyChart {
-    let point =
-        |row: &Evaluation, setting: u32| Point::labelled(row.ms_a_view, row.foreground_flip, setting.to_string());
     let searches = rows.iter().filter_map(|row| match row.method {
-        ReconstructionMethod::LightFieldSearch { steps } => Some(point(row, steps)),
+        ReconstructionMethod::LightFieldSearch { steps } => Some(setting_point(row, steps)),
         _ => None,
     });
     let carves = rows.iter().filter_map(|row| match row.method {
-        ReconstructionMethod::JointCarve { stop_level } => Some(point(row, stop_level)),
+        ReconstructionMethod::JointCarve { stop_level } => Some(setting_point(row, stop_level)),
         _ => None,
     });
     let x = Axis::log("time a view", "ms");
@@ -128,30 +109,41 @@ fn chart(name: &str, rows: &[Evaluation]) -> XyChart {
         .with_front(Better::Low, Better::Low)
 }
 
-/// Joint carve beside the best search, and the default method beside all. Disoccluded pixels count where a view has some.
-fn checks(name: &str, rows: &[Evaluation], default: ReconstructionMethod) -> [Check; 3] {
+fn setting_point(row: &Evaluation, setting: u32) -> Point {
+    Point::labelled(row.ms_a_view, row.foreground.flip, setting.to_string())
+}
+
+/// A value of joint carve over the least of any search.
+fn over_the_least(rows: &[Evaluation], value: fn(&Evaluation) -> f64) -> f64 {
     let carve = rows.iter().find(|row| row.method == ReconstructionMethod::JointCarve { stop_level: 0 });
     let searches = rows.iter().filter(|row| matches!(row.method, ReconstructionMethod::LightFieldSearch { .. }));
-    let over_the_least = |value: fn(&Evaluation) -> f64| {
-        carve.map_or(f64::NAN, value) / searches.clone().map(value).fold(f64::NAN, f64::min)
-    };
-    let wrong_hits = over_the_least(|row| row.wrong_hits);
-    let disoccluded = Some(over_the_least(|row| row.disoccluded_wrong)).filter(|ratio| !ratio.is_nan());
-    let beats = |row: &&Evaluation, own: &Evaluation| row.ms_a_view < own.ms_a_view && row.flip < own.flip;
+    carve.map_or(f64::NAN, value) / searches.map(value).fold(f64::NAN, f64::min)
+}
+
+/// Joint carve beside the best search, and the default method beside all. Disoccluded pixels count where a view has some.
+fn checks(name: &str, rows: &[Evaluation], default: ReconstructionMethod) -> [Check; 3] {
+    let wrong_hits = over_the_least(rows, |row| row.wrong_hits);
+    let disoccluded = Some(over_the_least(rows, |row| row.disoccluded_wrong)).filter(|ratio| !ratio.is_nan());
     let own = rows.iter().find(|row| row.method == default);
-    let better = own.map(|own| rows.iter().filter(|row| beats(row, own)).count() as f64);
-    let named = |what: &str| format!("{name}: {what}");
+    let better = own.map(|own| {
+        rows.iter().filter(|row| row.ms_a_view < own.ms_a_view && row.whole.flip < own.whole.flip).count() as f64
+    });
     [
-        Check::new(named("wrong hits, the carve's over the fewest of any search"), wrong_hits, "×", Bar::AtMost(1.0)),
+        Check::new(
+            format!("{name}: wrong hits, the carve's over the fewest of any search"),
+            wrong_hits,
+            "×",
+            Bar::AtMost(1.0),
+        ),
         Check::maybe(
-            named("disoccluded coloured wrong, the carve's over the least of any search"),
+            format!("{name}: disoccluded coloured wrong, the carve's over the least of any search"),
             disoccluded,
             "×",
             Bar::AtMost(1.0),
             "no view has disocclusions",
         ),
         Check::maybe(
-            named("settings that beat the default in time and FLIP"),
+            format!("{name}: settings that beat the default in time and FLIP"),
             better,
             "",
             Bar::Equal(0.0),

@@ -1,12 +1,12 @@
 //! The cost of light, and the gain of sharing it: every lighting with its parts alone, and delivered to a client.
 
 use app_core::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
-use app_core::progress::bar;
 use cluster::{Costs, PolicyChoice};
 use render::Lighting;
-use report::{Bar, Check, Report, Table};
+use report::{Bar, Check, Report};
 
 use super::args::BenchArgs;
+use crate::study::{Column, measure_rows, table};
 
 /// The lighting of the checks.
 const FINE: &str = "soft 16, occlusion 16";
@@ -37,36 +37,37 @@ struct Row {
 
 /// Measures every lighting on the scene; adds tables and checks.
 pub fn measure(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
-    let qualities = if args.quick { &QUALITIES[..QUICK_QUALITIES] } else { &QUALITIES[..] };
-    let progress = bar("light", qualities.len());
-    let mut rows = Vec::with_capacity(qualities.len());
-    for &name in qualities {
-        let views: &[usize] = match (args.quick, name == FINE) {
+    let is_quick = args.run.quick;
+    let qualities = if is_quick { &QUALITIES[..QUICK_QUALITIES] } else { &QUALITIES[..] };
+    let rows = measure_rows("light", qualities, |&name| {
+        let views: &[usize] = match (is_quick, name == FINE) {
             (true, _) => &[QUICK_VIEWS],
             (false, true) => &[PAPER_VIEWS, MANY_VIEWS],
             (false, false) => &[PAPER_VIEWS],
         };
-        rows.push(row(experiment, name.parse()?, views)?);
-        progress.inc(1);
-    }
-    progress.finish_and_clear();
-    report.tables.push(gains(&rows)?);
-    report.tables.push(parts(&rows)?);
-    report.checks.extend(checks(&rows));
+        row(experiment, name.parse()?, views)
+    })?;
+    let gains =
+        rows.iter().flat_map(|row| row.pipelines.iter().map(move |&(views, seconds)| Gain { row, views, seconds }));
+    let gains: Vec<Gain<'_>> = gains.collect();
+    report.tables.push(table("What sharing gains", &gain_columns(), &gains)?);
+    report.tables.push(table("What light costs", &PARTS, &rows)?);
+    report.checks.extend(checks(&gains));
     still(args, experiment, report)
 }
 
 fn row(experiment: &Experiment, lighting: Lighting, views: &[usize]) -> anyhow::Result<Row> {
-    let settings = |policy, count| DeliverySettings { lighting, ..experiment.delivery(policy, count) };
     let mut pipelines = Vec::with_capacity(views.len());
     let mut costs = Costs::default();
     for &count in views {
-        let delivered = experiment.deliver(settings(PolicyChoice::Pipeline, count), drop)?;
+        let settings = DeliverySettings { lighting, ..experiment.delivery(PolicyChoice::Pipeline, count) };
+        let delivered = experiment.deliver(settings, drop)?;
         pipelines.push((count, delivered.seconds));
         costs = delivered.plan.costs;
     }
     let direct_views = ((DIRECT_S / costs.direct_view_s) as usize).clamp(4, 48);
-    let direct = experiment.deliver(settings(PolicyChoice::Direct, direct_views), drop)?;
+    let settings = DeliverySettings { lighting, ..experiment.delivery(PolicyChoice::Direct, direct_views) };
+    let direct = experiment.deliver(settings, drop)?;
     Ok(Row {
         lighting,
         costs,
@@ -77,81 +78,63 @@ fn row(experiment: &Experiment, lighting: Lighting, views: &[usize]) -> anyhow::
     })
 }
 
-impl Row {
+/// The delivery of a number of views.
+struct Gain<'r> {
+    row: &'r Row,
+    views: usize,
+    seconds: f64,
+}
+
+impl Gain<'_> {
     /// The pipeline's throughput over that of direct rendering.
-    fn gain(&self, views: usize, seconds: f64) -> f64 {
-        self.direct_view_s * views as f64 / seconds
+    fn over_direct(&self) -> f64 {
+        self.row.direct_view_s * self.views as f64 / self.seconds
     }
 
     /// The gain that the parts allow: V·g_v / (S·g_s + d + V·c).
-    fn allowed(&self, views: usize) -> f64 {
-        let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, .. } = self.costs;
-        let views = views as f64;
-        views * direct_view_s / (self.images as f64 * sample_image_s + load_set_s + views * reconstruct_view_s)
+    fn allowed(&self) -> f64 {
+        let Costs { sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, .. } = self.row.costs;
+        let views = self.views as f64;
+        views * direct_view_s / (self.row.images as f64 * sample_image_s + load_set_s + views * reconstruct_view_s)
     }
 }
 
-fn parts(rows: &[Row]) -> anyhow::Result<Table> {
-    let columns = [
-        ("lighting", ""),
-        ("g_s a sample", "ms"),
-        ("g_v a view", "ms"),
-        ("d a set", "ms"),
-        ("c a view", "ms"),
-        ("e a view", "ms"),
-        ("c / g_v", ""),
-    ];
-    let mut table = Table::new("What light costs", &columns);
-    for row in rows {
-        let c = row.costs;
-        let seconds = [c.sample_image_s, c.direct_view_s, c.load_set_s, c.reconstruct_view_s, c.encode_view_s];
-        let ratio = c.reconstruct_view_s / c.direct_view_s;
-        let numbers = seconds.map(|s| s * 1e3).into_iter().chain([ratio]);
-        table.push([row.lighting.to_string().into()].into_iter().chain(numbers.map(Into::into)))?;
-    }
-    Ok(table)
+/// What light costs.
+const PARTS: [Column<Row>; 7] = [
+    Column::new("lighting", |row| row.lighting.to_string().into()),
+    Column::with_unit("g_s a sample", "ms", |row| (row.costs.sample_image_s * 1e3).into()),
+    Column::with_unit("g_v a view", "ms", |row| (row.costs.direct_view_s * 1e3).into()),
+    Column::with_unit("d a set", "ms", |row| (row.costs.load_set_s * 1e3).into()),
+    Column::with_unit("c a view", "ms", |row| (row.costs.reconstruct_view_s * 1e3).into()),
+    Column::with_unit("e a view", "ms", |row| (row.costs.encode_view_s * 1e3).into()),
+    Column::new("c / g_v", |row| (row.costs.reconstruct_view_s / row.costs.direct_view_s).into()),
+];
+
+/// What sharing gains at a number of views.
+fn gain_columns<'r>() -> [Column<Gain<'r>>; 7] {
+    [
+        Column::new("lighting", |gain| gain.row.lighting.to_string().into()),
+        Column::new("views V", |gain| gain.views.into()),
+        Column::with_unit("pipeline", "s", |gain| gain.seconds.into()),
+        Column::with_unit("direct, extended", "s", |gain| (gain.row.direct_view_s * gain.views as f64).into()),
+        Column::new("timed on views", |gain| gain.row.direct_views.into()),
+        Column::with_unit("gain", "×", |gain| gain.over_direct().into()),
+        Column::with_unit("its parts allow", "×", |gain| gain.allowed().into()),
+    ]
 }
 
-fn gains(rows: &[Row]) -> anyhow::Result<Table> {
-    let columns = [
-        ("lighting", ""),
-        ("views V", ""),
-        ("pipeline", "s"),
-        ("direct, extended", "s"),
-        ("timed on views", ""),
-        ("gain", "×"),
-        ("its parts allow", "×"),
-    ];
-    let mut table = Table::new("What sharing gains", &columns);
-    for row in rows {
-        for &(views, seconds) in &row.pipelines {
-            table.push([
-                row.lighting.to_string().into(),
-                views.into(),
-                seconds.into(),
-                (row.direct_view_s * views as f64).into(),
-                row.direct_views.into(),
-                row.gain(views, seconds).into(),
-                row.allowed(views).into(),
-            ])?;
-        }
-    }
-    Ok(table)
-}
-
-fn checks(rows: &[Row]) -> Vec<Check> {
-    let fine = rows.iter().filter(|row| row.lighting.to_string() == FINE);
-    let delivered = fine.flat_map(|row| row.pipelines.iter().map(move |&(views, seconds)| (row, views, seconds)));
-    let check = |(row, views, seconds): (&Row, usize, f64)| {
-        let name = format!("{FINE}, {views} views: gain over direct, share of what the parts allow");
-        Check::new(name, row.gain(views, seconds) / row.allowed(views), "", Bar::AtLeast(SHARE_OF_PARTS))
-    };
-    delivered.map(check).collect()
+fn checks(gains: &[Gain<'_>]) -> Vec<Check> {
+    let fine = gains.iter().filter(|gain| gain.row.lighting.to_string() == FINE);
+    fine.map(|gain| {
+        let name = format!("{FINE}, {} views: gain over direct, share of what the parts allow", gain.views);
+        Check::new(name, gain.over_direct() / gain.allowed(), "", Bar::AtLeast(SHARE_OF_PARTS))
+    })
+    .collect()
 }
 
 /// Measures a second set of a still scene: only c and e are spent on it.
 fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
-    let views = if args.quick { QUICK_VIEWS } else { PAPER_VIEWS };
+    let views = if args.run.quick { QUICK_VIEWS } else { PAPER_VIEWS };
     let settings =
         DeliverySettings { lighting: FINE.parse()?, sets: 2, ..experiment.delivery(PolicyChoice::Pipeline, views) };
     let mut waited_s = 0.0_f64;

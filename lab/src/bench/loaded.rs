@@ -12,11 +12,12 @@ use app_core::setup::{SceneArgs, Setup};
 use depth_image::{View, ViewCell, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec2};
-use render::{DrawWork, Lighting, Refinement, Visibility};
+use render::{DrawWork, Lighting, Visibility};
 use report::{Bar, Cell, Check, Report, Table};
 use scene::SceneSpec;
 
 use super::args::BenchArgs;
+use crate::failures::stand::work;
 use crate::models::models_of;
 
 /// The size of the pictures whose covered share counts.
@@ -131,14 +132,7 @@ fn first_picture(engine: &Arc<GpuEngine>, setup: &Setup) -> anyhow::Result<View>
     engine.put_scene(setup.offer.hash.as_str(), &setup.scene)?;
     let scene = engine.scene(setup.offer.hash.as_str())?;
     let cell = ViewCell::between(&setup.around).context("no sample cameras")?;
-    let work = DrawWork {
-        scene: &scene,
-        lighting: Lighting::UNLIT,
-        scene_time_s: 0.0,
-        visibility: Visibility::Measured,
-        refinement: Refinement::default(),
-        turn: Default::default(),
-    };
+    let work = DrawWork { visibility: Visibility::Measured, ..work(&scene, Lighting::UNLIT) };
     let camera = cell.camera_at(Vec2::ZERO, PICTURE_PX);
     engine.renderer.draw_views(work, &[camera], ViewPlanes::WITH_DEPTH)?.pop().context("no view")
 }

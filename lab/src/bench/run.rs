@@ -2,7 +2,6 @@
 
 use app_core::exit::Outcome;
 use app_core::experiment::Experiment;
-use engine::GpuEngine;
 use node::Engine as _;
 use report::{Bar, Check, Report};
 
@@ -10,6 +9,7 @@ use super::args::{BenchArgs, Part};
 use super::{errors, light, loaded, throughput};
 use crate::memory::peak_memory_mb;
 use crate::reference_views::ReferenceViews;
+use crate::study::new_report;
 use crate::{load, scaling, sharing, viewer};
 
 /// Measures everything, or one part, and writes the report.
@@ -26,8 +26,8 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
         None => (),
     }
     let experiment =
-        Experiment::start(args.scene.clone(), args.scene.load()?, args.device.device, usize::from(args.nodes))?;
-    let mut report = new_report(args, &experiment.engine.device_name());
+        Experiment::start(args.scene.clone(), args.scene.load()?, args.run.device.device, usize::from(args.nodes))?;
+    let mut report = bench_report(args, &experiment.engine.device_name());
     println!("{} on {}", args.scene.scene, experiment.engine.device_name());
     throughput::delivered(args, &experiment, &mut report)?;
     let views = experiment.views(args.compared_views())?;
@@ -54,8 +54,8 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
 
 /// Only loads the model files.
 fn loading(args: &BenchArgs) -> anyhow::Result<Outcome> {
-    let engine = GpuEngine::shared(args.device.device)?;
-    let mut report = new_report(args, &engine.device_name());
+    let engine = args.run.engine()?;
+    let mut report = bench_report(args, &engine.device_name());
     loaded::measure(args, &engine, &mut report)?;
     print_and_write(args, &report)
 }
@@ -63,17 +63,15 @@ fn loading(args: &BenchArgs) -> anyhow::Result<Outcome> {
 fn print_and_write(args: &BenchArgs, report: &Report) -> anyhow::Result<Outcome> {
     report.tables.iter().for_each(|table| println!("\n{}", table.to_text()));
     println!();
-    let ok = report.finish(&args.out)?;
-    Ok(Outcome::of(ok || !args.strict))
+    args.run.write("out/bench", report)
 }
 
-fn new_report(args: &BenchArgs, device: &str) -> Report {
-    let mut report = Report::new("Myriorama bench", device);
-    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+fn bench_report(args: &BenchArgs, device: &str) -> Report {
+    let mut report = new_report("Myriorama bench", device);
     report.parameter("scene", args.scene.scene.to_string());
     report.parameter("method", args.scene.method().to_string());
     report.parameter("nodes P", u32::from(args.nodes));
     report.parameter("repeats", args.runs());
-    report.parameter("quick", args.quick);
+    report.parameter("quick", args.run.quick);
     report
 }

@@ -1,18 +1,16 @@
 //! Views a second at the client, and nanoseconds a pixel on the device.
 
-use std::time::Instant;
-
 use anyhow::Context as _;
 use app_core::experiment::{Experiment, PAPER_VIEWS};
 use app_core::progress::bar;
 use cluster::PolicyChoice;
 use depth_image::{PinholeCamera, ViewPlanes};
-use node::{DirectWork, Engine as _, Turn, WorkClass};
+use node::{Engine as _, Turn, WorkClass};
 use report::{Report, Table};
 
 use super::args::BenchArgs;
-use crate::reference_views::ReferenceViews;
-use crate::statistics::median;
+use crate::reference_views::{ReferenceViews, direct_work};
+use crate::statistics::{median, median_seconds};
 
 /// The number of views that direct rendering is timed on.
 const DIRECT_VIEWS: usize = 48;
@@ -62,19 +60,10 @@ pub fn nanoseconds(
 }
 
 fn direct_s_a_view(reference: &ReferenceViews, experiment: &Experiment, runs: usize) -> anyhow::Result<f64> {
-    let work = DirectWork {
-        scene_hash: experiment.setup.offer.hash.to_string(),
-        cameras: reference.cameras.clone(),
-        lighting: experiment.args.lighting.to_string(),
-        scene_time_s: 0.0,
-        planes: ViewPlanes::default(),
-        surfaces_by_rays: None,
-    };
-    let run = || {
-        let start = Instant::now();
+    let work = direct_work(&experiment.setup, experiment.args.lighting, &reference.cameras, ViewPlanes::default());
+    let batch_s = median_seconds(runs, || {
         experiment.engine.draw_direct(&work, Turn::of(WorkClass::Batch)).context("drawing views")?;
-        anyhow::Ok(start.elapsed().as_secs_f64() / work.cameras.len() as f64)
-    };
-    run()?;
-    Ok(median((0..runs).map(|_| run()).collect::<anyhow::Result<_>>()?))
+        Ok(())
+    })?;
+    Ok(batch_s / work.cameras.len() as f64)
 }

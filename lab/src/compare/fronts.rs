@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use anyhow::{Context as _, ensure};
 use app_core::exit::BadInput;
 use report::{Cell, Point, Report, Table};
 
@@ -22,30 +23,26 @@ pub type Methods = BTreeMap<String, Vec<Point>>;
 /// # Errors
 /// The file cannot be read, is too large, or is no report of fronts; the text names the file and the reason.
 pub fn read(path: &Path) -> Result<BTreeMap<String, Methods>, BadInput> {
-    let wrong = |reason: String| BadInput(format!("{}: {reason}", path.display()));
-    let bytes = fs::metadata(path).map_err(|error| wrong(error.to_string()))?.len();
-    if bytes > MAX_BYTES {
-        return Err(wrong(format!("{bytes} bytes are over the limit of {MAX_BYTES}")));
-    }
-    let text = fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
-    let report: Report = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
-    let subjects = report.tables.iter().filter_map(|table| Some((table.name.strip_prefix(ROWS)?.to_owned(), table)));
-    let read: BTreeMap<String, Methods> =
-        subjects.map(|(name, table)| Ok((name, methods(table).map_err(wrong)?))).collect::<Result<_, BadInput>>()?;
-    if read.is_empty() {
-        Err(wrong("no table of rows: it is no report of `study fronts`".to_owned()))
-    } else {
-        Ok(read)
-    }
+    subjects(path).map_err(|error| BadInput(format!("{}: {error}", path.display())))
 }
 
-fn methods(table: &Table) -> Result<Methods, String> {
-    table.validate().map_err(|error| error.to_string())?;
-    let place = |name: &str| {
-        let place = table.columns.iter().position(|column| column.name == name);
-        place.ok_or_else(|| format!("table {:?} has no column {name:?}", table.name))
-    };
-    let [method, cost, error] = [place(RECONSTRUCTION)?, place(COST)?, place(FOREGROUND_FLIP)?];
+fn subjects(path: &Path) -> anyhow::Result<BTreeMap<String, Methods>> {
+    let bytes = fs::metadata(path)?.len();
+    ensure!(bytes <= MAX_BYTES, "{bytes} bytes are over the limit of {MAX_BYTES}");
+    let report: Report = serde_json::from_str(&fs::read_to_string(path)?)?;
+    let mut subjects = BTreeMap::new();
+    for table in &report.tables {
+        if let Some(name) = table.name.strip_prefix(ROWS) {
+            subjects.insert(name.to_owned(), methods(table)?);
+        }
+    }
+    ensure!(!subjects.is_empty(), "no table of rows: it is no report of `study fronts`");
+    Ok(subjects)
+}
+
+fn methods(table: &Table) -> anyhow::Result<Methods> {
+    table.validate()?;
+    let [method, cost, error] = [place(table, RECONSTRUCTION)?, place(table, COST)?, place(table, FOREGROUND_FLIP)?];
     let mut methods = Methods::new();
     for row in &table.rows {
         // Direct drawing has no method, and no error.
@@ -60,6 +57,12 @@ fn methods(table: &Table) -> Result<Methods, String> {
         }
     }
     Ok(methods)
+}
+
+/// The place of a column in a table.
+fn place(table: &Table, name: &str) -> anyhow::Result<usize> {
+    let place = table.columns.iter().position(|column| column.name == name);
+    place.with_context(|| format!("table {:?} has no column {name:?}", table.name))
 }
 
 fn number(cell: &Cell) -> Option<f64> {

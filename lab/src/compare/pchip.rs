@@ -34,11 +34,12 @@ impl Pchip {
     pub fn mean(&self, from: f64, to: f64) -> f64 {
         let inner = self.x.iter().copied().filter(|x| (from..to).contains(x) && *x > from);
         let cuts: Vec<f64> = [from].into_iter().chain(inner).chain([to]).collect();
-        // Simpson's rule is exact for cubics.
-        let integral = |a: f64, b: f64| {
-            (b - a) / 6.0 * (self.value(a, a, b) + 4.0 * self.value(0.5 * (a + b), a, b) + self.value(b, a, b))
-        };
-        cuts.windows(2).map(|pair| integral(pair[0], pair[1])).sum::<f64>() / (to - from)
+        cuts.windows(2).map(|pair| self.piece_integral(pair[0], pair[1])).sum::<f64>() / (to - from)
+    }
+
+    /// The integral of y over a part of one piece. Simpson's rule is exact for cubics.
+    fn piece_integral(&self, a: f64, b: f64) -> f64 {
+        (b - a) / 6.0 * (self.value(a, a, b) + 4.0 * self.value(0.5 * (a + b), a, b) + self.value(b, a, b))
     }
 
     /// y at an x of the piece that has all from `a` to `b`.

@@ -155,19 +155,19 @@ impl ComparedPixels {
 
 /// The share of a view's surfaces whose light no sample knew.
 pub fn unknown_share(view: &View) -> f64 {
-    let count = |kind| is_kind(view, kind).filter(|is| *is).count() as f64;
-    let unknown = count(ProvenanceKind::LitHere);
-    unknown / (unknown + count(ProvenanceKind::Hit))
+    let [unknown, known] =
+        [ProvenanceKind::LitHere, ProvenanceKind::Hit].map(|kind| is_kind(view, kind).filter(|is| *is).count() as f64);
+    unknown / (unknown + known)
 }
 
 /// The pixels of a view whose surfaces are at some places in the world.
 pub fn pixels_where(camera: &PinholeCamera, view: &View, is_wanted: impl Fn(Vec3) -> bool) -> Vec<usize> {
-    let shows = |&(index, depth): &(usize, &f32)| {
+    let shown = depths(view).iter().enumerate().filter(|&(index, &depth)| {
         let place = UVec2::new(index as u32 % camera.size_px.x, index as u32 / camera.size_px.x);
         let ray = camera.ray(place.as_vec2() + Vec2::splat(0.5));
-        *depth > 0.0 && is_wanted(ray.at(depth.recip()))
-    };
-    depths(view).iter().enumerate().filter(shows).map(|(index, _)| index).collect()
+        depth > 0.0 && is_wanted(ray.at(depth.recip()))
+    });
+    shown.map(|(index, _)| index).collect()
 }
 
 /// The mean absolute difference of 8-bit colours over some pixels.

@@ -32,15 +32,14 @@ pub fn grid(side: u32) -> anyhow::Result<CubeGrid> {
 /// The image along an axis.
 pub fn image(grid: &CubeGrid, axis: usize, crossings: impl Fn(Ray) -> Vec<Crossing>) -> LayeredDepthImage {
     let camera = grid.camera(axis);
-    let is_held = |crossing: &Crossing| {
-        let normal = (grid.world_from_cube.inverse() * crossing.normal_in_world).abs();
-        normal[axis] >= DOMINANT * normal.max_element() && (0.0..=camera.range_m).contains(&crossing.t)
-    };
     let mut first = vec![0];
     let mut samples = Vec::new();
     for place in (0..camera.size_px.y).flat_map(|y| (0..camera.size_px.x).map(move |x| Vec2::new(x as f32, y as f32))) {
         let mut line = crossings(camera.ray(place + 0.5));
-        line.retain(is_held);
+        line.retain(|crossing| {
+            let normal = (grid.world_from_cube.inverse() * crossing.normal_in_world).abs();
+            normal[axis] >= DOMINANT * normal.max_element() && (0.0..=camera.range_m).contains(&crossing.t)
+        });
         line.sort_by(|a, b| a.t.total_cmp(&b.t));
         samples.extend(line);
         first.push(samples.len() as u32);
@@ -64,8 +63,10 @@ pub fn cube(grid: &CubeGrid, crossings: impl Fn(Ray) -> Vec<Crossing>) -> CubeTw
 
 /// The first surface that faces a ray.
 pub fn nearest(ray: Ray, crossings: impl Fn(Ray) -> Vec<Crossing>) -> Option<f32> {
-    let facing = |crossing: &Crossing| crossing.t >= 0.0 && crossing.normal_in_world.dot(ray.direction_in_world) < 0.0;
-    crossings(ray).into_iter().filter(facing).map(|crossing| crossing.t).min_by(f32::total_cmp)
+    let facing = crossings(ray)
+        .into_iter()
+        .filter(|crossing| crossing.t >= 0.0 && crossing.normal_in_world.dot(ray.direction_in_world) < 0.0);
+    facing.map(|crossing| crossing.t).min_by(f32::total_cmp)
 }
 
 /// A ray of unit direction to a point, from a direction.
@@ -95,8 +96,8 @@ pub fn missed(of: impl IntoIterator<Item = (Option<f32>, Option<f32>)>) -> f64 {
 
 /// The share of rays that meet something where nothing is, or before the first surface.
 pub fn met_wrongly(of: impl IntoIterator<Item = (Option<f32>, Option<f32>)>) -> f64 {
-    let is_wrong = |truth: Option<f32>, met: f32| truth.is_none_or(|truth| met < truth - ANOTHER);
-    share(of.into_iter().map(|(truth, met)| met.is_some_and(|met| is_wrong(truth, met))))
+    let met = of.into_iter();
+    share(met.map(|(truth, met)| met.is_some_and(|met| truth.is_none_or(|truth| met < truth - ANOTHER))))
 }
 
 /// From 0 to 1, without order; others for each seed.

@@ -61,6 +61,9 @@ pub struct Curve {
     pub measure: fn(&Stand, &[f64]) -> anyhow::Result<Rows>,
 }
 
+/// The quantity of curves of picture errors.
+pub const FLIP: [&str; 2] = ["FLIP of the foreground", ""];
+
 /// A row for each x, in which each series has a value.
 pub type Rows = Vec<Vec<f64>>;
 

@@ -47,9 +47,9 @@ pub fn found(truths: &[View], views: &[View]) -> f64 {
 /// The share of the truth's surfaces that views do not hold: they show nothing there, or something more than `behind_m` farther away.
 pub fn not_held(truths: &[View], views: &[View], behind_m: f32) -> f64 {
     let pairs = truths.iter().zip(views).flat_map(|(truth, view)| depths(truth).iter().zip(depths(view)));
+    let surfaces = pairs.filter(|(truth, _)| **truth > 0.0);
     // No surface is as far away as it can be: its inverse depth is 0.
-    let is_farther = |(truth, view): (&f32, &f32)| 1.0 / view.max(0.0) > 1.0 / truth + behind_m;
-    share(pairs.filter(|(truth, _)| **truth > 0.0).map(is_farther))
+    share(surfaces.map(|(truth, view)| 1.0 / view.max(0.0) > 1.0 / truth + behind_m))
 }
 
 /// The mean relative error of depth, where the truth and the view have a surface.

@@ -27,6 +27,11 @@ pub fn merged(px: f64) -> ReconstructionMethod {
     ReconstructionMethod::HybridMesh { merged: ErrorBound::from_px(px) }
 }
 
+/// Sample sets without lamps and highlights.
+pub fn in_the_dark(volume: Aabb, background: Environment) -> SetDescription<'static> {
+    SetDescription { volume, background, illumination: &DARK, highlight: None, environment: None, mips: false }
+}
+
 static DARK: Illumination = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
 
 /// A scene, depth images of it, and the volume in which views look for surfaces.
@@ -71,14 +76,9 @@ impl<'s> Stage<'s> {
         Ok(Self { images, lighting, ..self })
     }
 
-    pub fn description(&self) -> SetDescription<'static> {
-        let volume = self.volume;
-        let background = self.background;
-        SetDescription { volume, background, illumination: &DARK, highlight: None, environment: None, mips: false }
-    }
-
     pub fn set(&self) -> anyhow::Result<SampleSet> {
-        Ok(self.stand.reconstructor().upload(&self.images, &self.description(), Turn::default())?)
+        let description = in_the_dark(self.volume, self.background);
+        Ok(self.stand.reconstructor().upload(&self.images, &description, Turn::default())?)
     }
 
     /// Views by a method, with depth and provenance.
@@ -121,6 +121,13 @@ pub struct Cell {
     pub target: Vec3,
     pub half_m: f32,
 }
+
+/// Before nine poles.
+pub const POLES: Cell = Cell { eye: Vec3::new(0.0, 0.0, 4.0), target: Vec3::new(0.0, 0.0, -2.0), half_m: 0.4 };
+/// Above a tree on its terrain.
+pub const TREE: Cell = Cell { eye: Vec3::new(0.3, 2.2, 2.2), target: Vec3::new(0.0, 0.3, 0.0), half_m: 0.3 };
+/// Above the courtyard.
+pub const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, half_m: 1.0 };
 
 /// Views within the cell.
 const VIEWS: [[f32; 2]; 3] = [[0.23, -0.31], [-0.58, 0.44], [0.71, 0.52]];

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use depth_image::{Camera, DepthImage, PinholeCamera, View, ViewPlanes};
+use depth_image::{Camera, DepthImage, Highlight, PinholeCamera, View, ViewPlanes};
 use engine::GpuEngine;
 use glam::UVec2;
-use reconstruction::Reconstructor;
+use reconstruction::{Reconstructor, SetDescription};
 use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
 use sampling::{SampleWork, Sampler, SamplingMethod};
 use scene::Scene;
@@ -88,6 +88,18 @@ impl Stand {
 
 pub fn pinholes(cameras: &[PinholeCamera]) -> Vec<Camera> {
     cameras.iter().copied().map(Camera::Pinhole).collect()
+}
+
+/// What sample sets of a scene share.
+pub fn description(scene: &Scene, highlight: Option<Highlight>) -> SetDescription<'_> {
+    SetDescription {
+        volume: scene.bounds(),
+        background: scene.background,
+        illumination: &scene.illumination,
+        highlight,
+        environment: None,
+        mips: false,
+    }
 }
 
 /// By triangles, so that no measurement of times decides what is drawn.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use planner::{Metric, Row};
+use planner::Metric;
 use reconstruction::ReconstructionMethod;
 use report::{Bar, Check};
 use sampling::SamplingMethod;
@@ -11,14 +11,16 @@ use super::measure::Front;
 use super::row::MeasuredRow;
 
 pub fn checks(fronts: &[Front]) -> Vec<Check> {
-    let rows = || fronts.iter().flat_map(|front| &front.rows);
-    let names = |of: fn(&Row) -> &str| rows().map(|row| of(&row.row).to_owned()).collect::<BTreeSet<_>>().len() as f64;
-    let [samplings, methods] = [SamplingMethod::ladder().count(), ReconstructionMethod::ladder().count()];
-    let not_finite = rows().filter(|row| !figures(row).iter().all(|figure| figure.is_finite())).count();
+    let rows: Vec<&MeasuredRow> = fronts.iter().flat_map(|front| &front.rows).collect();
+    let samplings: BTreeSet<&str> = rows.iter().map(|row| row.row.sampling.as_str()).collect();
+    let methods: BTreeSet<&str> = rows.iter().map(|row| row.row.method.as_str()).collect();
+    let all_samplings = Bar::Equal(SamplingMethod::ladder().count() as f64);
+    let all_methods = Bar::Equal(ReconstructionMethod::ladder().count() as f64);
+    let not_finite = rows.iter().filter(|row| !figures(row).iter().all(|figure| figure.is_finite())).count();
     let repeated = fronts.iter().map(repeated).sum::<usize>();
     vec![
-        Check::new("sampling methods with a row", names(|row| &row.sampling), "", Bar::Equal(samplings as f64)),
-        Check::new("reconstructions with a row", names(|row| &row.method), "", Bar::Equal(methods as f64)),
+        Check::new("sampling methods with a row", samplings.len() as f64, "", all_samplings),
+        Check::new("reconstructions with a row", methods.len() as f64, "", all_methods),
         Check::new("rows with a figure that is no number", not_finite as f64, "", Bar::Equal(0.0)),
         Check::new("rows with all errors of the row before", repeated as f64, "", Bar::Equal(0.0)),
     ]

@@ -19,7 +19,7 @@ use super::subject::{Conditions, SUBJECTS, Subject};
 use crate::failures::stand::Stand;
 use crate::lit::fronts as lit;
 use crate::lit::light::Light;
-use crate::study::{StudyArgs, is_named};
+use crate::study::{RunArgs, is_named};
 
 /// The light under which fronts are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -40,7 +40,7 @@ enum FrontLight {
   myriorama-lab study fronts --light indirect --light occlusion --models models/   expensive light alone")]
 pub struct FrontsArgs {
     #[command(flatten)]
-    study: StudyArgs,
+    study: RunArgs,
     /// The light of the subjects; may be repeated. All unless it is given
     #[arg(long = "light", value_name = "LIGHT")]
     lights: Vec<FrontLight>,
@@ -63,12 +63,12 @@ impl FrontsArgs {
     }
 
     fn plain_subjects(&self) -> Vec<Conditions> {
-        let is_wanted = |subject: &Conditions| {
+        let subjects = SUBJECTS.into_iter().filter(|subject| {
             self.has_light(FrontLight::Plain)
                 && is_named(subject.name, &self.subjects)
                 && (subject.is_quick || !self.is_short())
-        };
-        SUBJECTS.into_iter().filter(is_wanted).collect()
+        });
+        subjects.collect()
     }
 
     fn lights(&self) -> Vec<Light> {
@@ -83,8 +83,8 @@ impl FrontsArgs {
 /// A subject cannot be used, the device fails, or the folder cannot be written.
 pub fn run(args: &FrontsArgs) -> anyhow::Result<Outcome> {
     let plain = args.plain_subjects();
-    let is_wanted = |name: &&str| is_named(name, &args.subjects);
-    let lit_names: Vec<&'static str> = lit::subject_names(args.is_short()).iter().copied().filter(is_wanted).collect();
+    let lit_names = lit::subject_names(args.is_short()).iter().copied();
+    let lit_names: Vec<&'static str> = lit_names.filter(|name| is_named(name, &args.subjects)).collect();
     let lit_work = lit::wanted(&lit_names, &args.lights(), args.models.as_deref())?;
     if plain.is_empty() && lit_names.is_empty() {
         return Err(BadInput(format!("no subject's name contains {:?}", args.subjects)).into());
@@ -93,7 +93,7 @@ pub fn run(args: &FrontsArgs) -> anyhow::Result<Outcome> {
     let mut report = args.study.report("fronts", &engine);
     measure_plain(&engine, &plain, args.study.quick, &mut report)?;
     lit::measure(&Stand::new(&engine, false), &lit_work, args.study.quick, &mut report)?;
-    args.study.finish("fronts", &report)
+    args.study.finish("out/study/fronts", &report)
 }
 
 /// The ladder in plain light.

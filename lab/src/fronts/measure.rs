@@ -106,9 +106,9 @@ impl Front {
 
     /// Makes plans for budgets between the least and the greatest error of the rows.
     fn plan(&mut self, subject: &Subject, planning: &Planning, pricing: EqualNodes) -> anyhow::Result<()> {
-        let errors = || self.rows.iter().map(|row| row.error_ratio(Metric::Flip));
-        let least = errors().fold(1.0, f64::min).max(1e-3);
-        let most = errors().fold(1e-3, f64::max);
+        let errors: Vec<f64> = self.rows.iter().map(|row| row.error_ratio(Metric::Flip)).collect();
+        let least = errors.iter().copied().fold(1.0, f64::min).max(1e-3);
+        let most = errors.into_iter().fold(1e-3, f64::max);
         for level in BUDGET_LEVELS {
             let limit = least * (most / least).powf(level);
             let budget: Budget = format!("flip {limit:.3}").parse()?;

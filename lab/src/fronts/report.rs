@@ -106,8 +106,8 @@ pub fn add_to(report: &mut Report, front: &Front) -> anyhow::Result<()> {
     let direct =
         [Cell::from("direct"), Cell::Missing, Cell::Missing, Cell::Missing, (front.direct.node_s * 1e3).into()];
     rows.push(direct.into_iter().chain(vec![Cell::Missing; ROW_COLUMNS.len() - 5]))?;
-    let plan = |planned| PlanRow { planned, cheapest_s: cheapest_s(front, planned) };
-    let plans: Vec<PlanRow<'_>> = front.planned.iter().map(plan).collect();
+    let plans = front.planned.iter().map(|planned| PlanRow { planned, cheapest_s: cheapest_s(front, planned) });
+    let plans: Vec<PlanRow<'_>> = plans.collect();
     report.tables.extend([rows, table(format!("Plans, {name}"), &plan_columns(), &plans)?]);
     report.charts.extend(FIGURES.iter().map(|figure| chart(front, figure).into()));
     Ok(())

@@ -1,15 +1,14 @@
 //! The figures of one row on one subject.
 
-use std::sync::Arc;
-
 use app_core::planning::Planning;
-use depth_image::{PinholeCamera, View, ViewPlanes};
-use metrics::{DepthErrors, depth_errors};
+use depth_image::{PinholeCamera, ViewPlanes};
+use metrics::depth_errors;
 use planner::{Metric, Price, Pricing, Row, RowCosts, ViewErrors, median_costs};
 use probe::{Light, Prober, view_errors};
 use rayon::prelude::*;
 
 use crate::evaluation::known_depth;
+use crate::statistics::sum_of;
 
 /// Times that rows are timed again.
 pub const REPEATS: usize = 2;
@@ -55,13 +54,13 @@ impl MeasuredRow {
         let with_depth = ViewPlanes { inverse_depth: true, provenance: true, ..delivered };
         let measured = prober.measure(representation, Light::Session, cameras, with_depth)?;
         let pairs: Vec<_> = cameras.iter().zip(&truths).zip(&measured.views).collect();
-        let of_view = |((camera, truth), made): ((&PinholeCamera, &Arc<View>), &View)| {
+        let of_views = pairs.into_par_iter().map(|((camera, truth), made)| {
             let errors = view_errors(camera, truth, made, &measured.sample_images)?;
-            let depth = depth_errors(&known_depth(truth)?, &known_depth(made)?, None)?;
-            anyhow::Ok((errors, depth))
-        };
-        let of_views = pairs.into_par_iter().map(of_view).collect::<anyhow::Result<Vec<_>>>()?;
-        let sum = |of: fn(&DepthErrors) -> usize| of_views.iter().map(|(_, depth)| of(depth)).sum::<usize>() as f64;
+            anyhow::Ok((errors, depth_errors(&known_depth(truth)?, &known_depth(made)?, None)?))
+        });
+        let of_views = of_views.collect::<anyhow::Result<Vec<_>>>()?;
+        let hits = sum_of(&of_views, |(_, depth)| depth.hit_px);
+        let pixels = sum_of(&of_views, |(_, depth)| depth.pixels);
         Ok(Self {
             place,
             row: row.clone(),
@@ -69,19 +68,17 @@ impl MeasuredRow {
             price: pricing.row(row, &costs),
             set_bytes: measured.set_bytes,
             errors: of_views.iter().map(|(errors, _)| *errors).collect(),
-            wrong_hits: sum(|depth| depth.wrong_hit_px) / sum(|depth| depth.hit_px).max(1.0),
-            filled: sum(|depth| depth.unknown_px) / sum(|depth| depth.pixels).max(1.0),
+            wrong_hits: sum_of(&of_views, |(_, depth)| depth.wrong_hit_px) / hits.max(1.0),
+            filled: sum_of(&of_views, |(_, depth)| depth.unknown_px) / pixels.max(1.0),
         })
     }
 
     /// The error in the mean over the foreground of all views.
-    #[must_use]
     pub fn error_ratio(&self, metric: Metric) -> f64 {
         mean_error(&self.errors, metric)
     }
 
     /// PSNR of the mean squared error over the foreground, in dB; at most that of reports.
-    #[must_use]
     pub fn psnr_db(&self) -> f64 {
         (-10.0 * self.error_ratio(Metric::Psnr).log10()).min(metrics::PSNR_CAP_DB)
     }

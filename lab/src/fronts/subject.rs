@@ -12,7 +12,7 @@ use depth_image::{Antialias, PinholeCamera, ViewCell, ViewPlanes};
 use engine::GpuEngine;
 use glam::{UVec2, Vec2};
 use node::{Turn, WorkClass};
-use planner::{Ladder, Row};
+use planner::Ladder;
 use probe::Prober;
 
 /// The side of sample images that `--sample-size auto` chooses.
@@ -130,13 +130,13 @@ impl Subject {
 /// # Errors
 /// The ladder lacks it.
 pub fn default_place(ladder: &Ladder, camera_count: u32) -> anyhow::Result<usize> {
-    let is_default = |row: &Row| {
+    let place = ladder.rows().iter().position(|row| {
         row.sampling == sampling::METHODS[0].name
             && row.method == reconstruction::METHODS[0].name
             && row.side_ratio == DEFAULT_SIDE_RATIO
             && row.camera_count == camera_count
-    };
-    ladder.rows().iter().position(is_default).context("the ladder lacks the default row")
+    });
+    place.context("the ladder lacks the default row")
 }
 
 /// The corner cameras of a cell with a side `scale` times as long.

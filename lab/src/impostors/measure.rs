@@ -12,7 +12,8 @@ use scene::Scene;
 
 use super::objects::{is_of_object, painted};
 use crate::failures::stage::CARVE;
-use crate::failures::stand::Stand;
+use crate::failures::stand::{Stand, description};
+use crate::statistics::mean_of;
 
 const VIEW_PX: UVec2 = UVec2::new(200, 150);
 /// Texels of all images of a mirror together.
@@ -51,6 +52,7 @@ pub struct Hall<'s> {
 /// What images of mirrors' surroundings show.
 #[derive(Debug, Clone, Copy)]
 pub struct Figures {
+    pub impostors: Impostors,
     pub texels: usize,
     /// Over the pixels in which a mirror shows an object.
     pub of_objects: Errors,
@@ -90,14 +92,9 @@ impl<'s> Hall<'s> {
 
     /// `None` where no mirror shows an object.
     fn subject(&self, camera: PinholeCamera, painted: &GpuScene) -> anyhow::Result<Option<Subject>> {
-        let draw = |scene, reflections| -> anyhow::Result<View> {
-            let lighting = reflecting(self.lighting, reflections)?;
-            let views = self.stand.views(scene, lighting, &[camera], ViewPlanes::COLOR)?;
-            views.into_iter().next().context("a view")
-        };
-        let truth = draw(&self.on_device, 1)?;
-        let mirrored = changed(&draw(&self.on_device, 0)?, &truth);
-        let shows_object = is_of_object(&draw(painted, 0)?, &draw(painted, 1)?);
+        let truth = self.draw(&self.on_device, camera, 1)?;
+        let mirrored = changed(&self.draw(&self.on_device, camera, 0)?, &truth);
+        let shows_object = is_of_object(&self.draw(painted, camera, 0)?, &self.draw(painted, camera, 1)?);
         let of_objects: Vec<bool> = shows_object.iter().zip(&mirrored).map(|(shows, is)| *shows && *is).collect();
         if !of_objects.contains(&true) {
             return Ok(None);
@@ -106,19 +103,17 @@ impl<'s> Hall<'s> {
         Ok(Some(Subject { camera, set, truth, mirrored, of_objects }))
     }
 
+    fn draw(&self, scene: &GpuScene, camera: PinholeCamera, reflections: u32) -> anyhow::Result<View> {
+        let lighting = reflecting(self.lighting, reflections)?;
+        Ok(self.stand.views(scene, lighting, &[camera], ViewPlanes::COLOR)?.remove(0))
+    }
+
     fn images(&self, cameras: &[Camera]) -> anyhow::Result<Vec<DepthImage>> {
         self.stand.images(&self.on_device, reflecting(self.lighting, 0)?, cameras, PLANES)
     }
 
     fn set(&self, images: &[DepthImage], mips: bool) -> anyhow::Result<SampleSet> {
-        let description = SetDescription {
-            volume: self.scene.bounds(),
-            background: self.scene.background,
-            illumination: &self.scene.illumination,
-            highlight: Some(Highlight::Ggx),
-            environment: None,
-            mips,
-        };
+        let description = SetDescription { mips, ..description(self.scene, Some(Highlight::Ggx)) };
         Ok(self.stand.reconstructor().upload(images, &description, Turn::default())?)
     }
 
@@ -139,6 +134,7 @@ impl<'s> Hall<'s> {
             sets.iter().map(|(bounds, surroundings)| MirrorCell { bounds: *bounds, surroundings }).collect();
         let views = self.views(&cells)?;
         Ok(Figures {
+            impostors,
             texels,
             of_objects: self.errors(&views, |subject| &subject.of_objects)?,
             of_scene: self.errors(&views, |subject| &subject.mirrored)?,
@@ -147,28 +143,26 @@ impl<'s> Hall<'s> {
 
     fn views(&self, cells: &[MirrorCell<'_>]) -> anyhow::Result<Vec<View>> {
         let mirrors = Mirrors { cells, reflections: 1, glossy_rays: 0 };
-        let view = |subject: &Subject| {
-            let cameras = [subject.camera];
-            let reconstructor = self.stand.reconstructor();
-            let views = reconstructor.reconstruct(ReconstructRequest {
+        let mut views = Vec::with_capacity(self.subjects.len());
+        for subject in &self.subjects {
+            views.extend(self.stand.reconstructor().reconstruct(ReconstructRequest {
                 common: mirrors.into(),
                 planes: ViewPlanes::ALL,
-                ..ReconstructRequest::new(&subject.set, &cameras, CARVE)
-            })?;
-            views.into_iter().next().context("a view")
-        };
-        self.subjects.iter().map(view).collect()
+                ..ReconstructRequest::new(&subject.set, &[subject.camera], CARVE)
+            })?);
+        }
+        Ok(views)
     }
 
     /// The means over all views.
     fn errors(&self, views: &[View], pixels: fn(&Subject) -> &Vec<bool>) -> anyhow::Result<Errors> {
-        let of_view = |(subject, view)| errors_of_view(subject, view, pixels(subject));
-        let errors = self.subjects.iter().zip(views).map(of_view).collect::<anyhow::Result<Vec<Errors>>>()?;
-        let mean = |of: fn(&Errors) -> f64| errors.iter().map(of).sum::<f64>() / errors.len() as f64;
+        let pairs = self.subjects.iter().zip(views);
+        let errors = pairs.map(|(subject, view)| errors_of_view(subject, view, pixels(subject)));
+        let errors = errors.collect::<anyhow::Result<Vec<Errors>>>()?;
         Ok(Errors {
-            flip: mean(|errors| errors.flip),
-            psnr_db: mean(|errors| errors.psnr_db),
-            guessed_ratio: mean(|errors| errors.guessed_ratio),
+            flip: mean_of(&errors, |errors| errors.flip),
+            psnr_db: mean_of(&errors, |errors| errors.psnr_db),
+            guessed_ratio: mean_of(&errors, |errors| errors.guessed_ratio),
         })
     }
 }
@@ -203,10 +197,10 @@ pub fn around(bounds: &Aabb, views: usize) -> Vec<PinholeCamera> {
     let middle = bounds.center();
     let size = bounds.size();
     let radius_m = 0.55 * size.x.hypot(size.z);
-    let view = |number: usize| {
+    let cameras = (0..views).map(|number| {
         let (sin, cos) = f32::sin_cos(std::f32::consts::TAU * number as f32 / views as f32);
         let eye = middle + Vec3::new(sin * radius_m, 0.6 * size.y, cos * radius_m);
         PinholeCamera::looking_at(eye, middle, Vec3::Y, 0.5, VIEW_PX)
-    };
-    (0..views).map(view).collect()
+    });
+    cameras.collect()
 }

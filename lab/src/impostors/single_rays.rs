@@ -1,19 +1,19 @@
 //! Single rays off the mirror that meet the teapot, in images of the teapot alone (Rosen et al., section 4).
 
-use depth_image::{
-    Aabb, Camera, DepthImage, Environment, Illumination, PinholeCamera, ProvenanceKind, Ray, srgb8_from_linear,
-};
+use depth_image::{Aabb, Camera, DepthImage, Environment, PinholeCamera, ProvenanceKind, Ray, srgb8_from_linear};
 use glam::{UVec2, Vec3};
 use gpu::Turn;
 use rayon::prelude::*;
-use reconstruction::{RayEnd, RayWork, SampleSet, SetDescription};
+use reconstruction::{RayEnd, RayWork, SampleSet};
 use render::{GpuScene, Lighting, SamplePlanes, scalar};
-use report::{Bar, Cell, Check, Table};
+use report::{Bar, Check};
 use sampling::Impostors;
 use scene::Scene;
 
 use super::measure::TEXELS;
+use crate::failures::stage::in_the_dark;
 use crate::failures::stand::Stand;
+use crate::study::Column;
 
 /// The size of the views whose rays are followed, the paper's smallest.
 const VIEW_PX: UVec2 = UVec2::new(640, 480);
@@ -46,6 +46,14 @@ pub struct Figures {
     psnr_db: f64,
 }
 
+pub const TITLE: &str = "Rays off the mirror that meet the teapot, in images of the teapot";
+pub const COLUMNS: [Column<Figures>; 4] = [
+    Column::new("images", |row| row.images.as_str().into()),
+    Column::with_unit("found", "%", |row| (row.found_ratio * 100.0).into()),
+    Column::with_unit("wrong", "%", |row| (row.wrong_ratio * 100.0).into()),
+    Column::with_unit("PSNR", "dB", |row| row.psnr_db.into()),
+];
+
 impl<'s> Teapot<'s> {
     /// # Errors
     /// The device fails.
@@ -54,11 +62,11 @@ impl<'s> Teapot<'s> {
         let twin = scalar::rays::Scene::of(&on_device, 0.0)?;
         let bounds = Aabb::around(twin.triangles_in_world().flatten());
         let whole = scalar::rays::Scene::of(&stand.upload(scene)?, 0.0)?;
-        let met = |ray: Ray| {
+        let met = mirrored(&whole, views).into_par_iter().filter_map(|ray| {
             let hit = twin.closest(&ray, NEAR_M)?;
             Some((ray, (hit.t, twin.look(&hit).base_linear)))
-        };
-        let (rays, truth) = mirrored(&whole, views).into_par_iter().filter_map(met).unzip();
+        });
+        let (rays, truth) = met.unzip();
         Ok(Self { stand, on_device, bounds, mirrored: scene, rays, truth })
     }
 
@@ -80,15 +88,7 @@ impl<'s> Teapot<'s> {
     /// # Errors
     /// The device fails.
     pub fn set(&self, images: &[DepthImage]) -> anyhow::Result<SampleSet> {
-        let dark = Illumination { lights: Vec::new(), environment: Environment::uniform(Vec3::ZERO) };
-        let description = SetDescription {
-            volume: self.bounds,
-            background: Environment::uniform(Vec3::ZERO),
-            illumination: &dark,
-            highlight: None,
-            environment: None,
-            mips: false,
-        };
+        let description = in_the_dark(self.bounds, Environment::uniform(Vec3::ZERO));
         Ok(self.stand.reconstructor().upload(images, &description, Turn::default())?)
     }
 
@@ -124,8 +124,9 @@ fn alone(whole: &Scene) -> Scene {
     mesh.parts.truncate(1);
     let part = &mut mesh.parts[0];
     let matt = &mesh.indices[part.first_index as usize..][..part.index_count as usize];
-    let rises = |triangle: &&[u32; 3]| triangle.iter().any(|&at| mesh.vertices[at as usize].position[1] > FLOOR_M);
-    let kept: Vec<u32> = matt.as_chunks::<3>().0.iter().filter(rises).flatten().copied().collect();
+    let triangles = matt.as_chunks::<3>().0.iter();
+    let rising = triangles.filter(|corners| corners.iter().any(|&at| mesh.vertices[at as usize].position[1] > FLOOR_M));
+    let kept: Vec<u32> = rising.flatten().copied().collect();
     part.first_index = 0;
     part.index_count = kept.len() as u32;
     mesh.indices = kept;
@@ -134,27 +135,30 @@ fn alone(whole: &Scene) -> Scene {
 
 /// The rays off the mirrors that these views show, at [`VIEW_PX`].
 fn mirrored(scene: &scalar::rays::Scene, views: &[PinholeCamera]) -> Vec<Ray> {
-    let off = |camera: &PinholeCamera, pixel: UVec2| {
-        let ray = scalar::rays::pixel_ray(camera, pixel);
-        let hit = scene.closest(&ray, camera.near_m)?;
-        scene.look(&hit).reflector?;
-        let towards = ray.direction_in_world.normalize_or_zero().reflect(scene.normal_in_world(&hit));
-        Some(Ray { origin_in_world: ray.at(hit.t), direction_in_world: towards })
-    };
-    let of_view = |camera: &PinholeCamera| {
+    let rays = views.par_iter().flat_map(|camera| {
         let camera = camera.resized(VIEW_PX);
         let pixels = (0..VIEW_PX.y).flat_map(|y| (0..VIEW_PX.x).map(move |x| UVec2::new(x, y)));
-        pixels.filter_map(|pixel| off(&camera, pixel)).collect::<Vec<Ray>>()
-    };
-    views.par_iter().flat_map(of_view).collect()
+        pixels.filter_map(|pixel| off_mirror(scene, &camera, pixel)).collect::<Vec<Ray>>()
+    });
+    rays.collect()
+}
+
+/// The ray off the mirror that a pixel shows.
+fn off_mirror(scene: &scalar::rays::Scene, camera: &PinholeCamera, pixel: UVec2) -> Option<Ray> {
+    let ray = scalar::rays::pixel_ray(camera, pixel);
+    let hit = scene.closest(&ray, camera.near_m)?;
+    scene.look(&hit).reflector?;
+    let towards = ray.direction_in_world.normalize_or_zero().reflect(scene.normal_in_world(&hit));
+    Some(Ray { origin_in_world: ray.at(hit.t), direction_in_world: towards })
 }
 
 /// Of sRGB from 0 to 1; rays that find nothing are black.
 fn squared_error(end: &RayEnd, truth_linear: Vec3) -> f64 {
     let found = if end.kind == ProvenanceKind::Hit { end.color_linear } else { Vec3::ZERO };
-    let channel = |color: Vec3, channel: usize| f64::from(srgb8_from_linear(color[channel])) / 255.0;
-    let squared = |number: usize| (channel(found, number) - channel(truth_linear, number)).powi(2);
-    (squared(0) + squared(1) + squared(2)) / 3.0
+    let [found, truth] = [found, truth_linear]
+        .map(|color| color.to_array().map(|channel| f64::from(srgb8_from_linear(channel)) / 255.0));
+    let [r, g, b] = [0, 1, 2].map(|channel| (found[channel] - truth[channel]).powi(2));
+    (r + g + b) / 3.0
 }
 
 /// Single-pole images, and the pinholes that they are made from, at equal texels.
@@ -177,18 +181,6 @@ fn undistorted(teapot: &Teapot<'_>, camera: &Camera) -> Camera {
     let reference = camera.reference();
     let eye = reference.eye_in_world;
     depth_image::SinglePoleCamera::around(&teapot.bounds, eye, 0.0, reference.size_px).reference.into()
-}
-
-/// # Errors
-/// A row is incomplete.
-pub fn table(rows: &[Figures]) -> anyhow::Result<Table> {
-    let columns = [("images", ""), ("found", "%"), ("wrong", "%"), ("PSNR", "dB")];
-    let mut table = Table::new("Rays off the mirror that meet the teapot, in images of the teapot", &columns);
-    for row in rows {
-        let numbers = [row.found_ratio * 100.0, row.wrong_ratio * 100.0, row.psnr_db].map(Cell::from);
-        table.push([Cell::from(row.images.as_str())].into_iter().chain(numbers))?;
-    }
-    Ok(table)
 }
 
 /// # Errors

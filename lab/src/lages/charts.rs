@@ -14,9 +14,9 @@ pub fn total_time(times: &Times) -> XyChart {
     let direct = Series::line("direct", timed).then_extrapolated(beyond);
     let chart =
         XyChart::new("Total time against views", Axis::log("views V", ""), Axis::log("total time", "s")).with(direct);
-    let line = |runs: &[Run]| runs.iter().map(|run| (run.views as f64, run.seconds)).collect::<Vec<_>>();
-    let mut chart =
-        times.pipelines.iter().fold(chart, |chart, (name, runs)| chart.with(Series::line(name.clone(), line(runs))));
+    let mut chart = times.pipelines.iter().fold(chart, |chart, (name, runs)| {
+        chart.with(Series::line(name.clone(), runs.iter().map(|run| (run.views as f64, run.seconds))))
+    });
     chart.note = "From the request until the last view is decoded by the client, the samples included.".to_owned();
     chart
 }
@@ -39,14 +39,14 @@ pub fn stages(times: &Times) -> BarChart {
             .map(|run| (format!("direct, extended from {} views", run.views), direct_stages(run, times))),
     );
     let names: Vec<String> = bars.iter().map(|(name, _)| name.clone()).collect();
-    let chart = BarChart::new(
+    let mut chart = BarChart::new(
         format!("Time per stage, {} views", times.headline_views),
         Axis::linear("total time", "s"),
         names,
     );
-    let part =
-        |chart: BarChart, (stage, name): (usize, &&str)| chart.with(*name, bars.iter().map(|(_, parts)| parts[stage]));
-    let mut chart = STAGES.iter().enumerate().fold(chart, part);
+    for (stage, name) in STAGES.into_iter().enumerate() {
+        chart = chart.with(name, bars.iter().map(|(_, parts)| parts[stage]));
+    }
     chart.note = "Sampling, decode and upload, compositing and encode are costs measured alone, times their number; transfer is the rest of the wait for the set, delivery the rest of the total. Stages overlap: where the parts exceed the total, the rest is 0.".to_owned();
     chart
 }

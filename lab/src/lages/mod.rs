@@ -9,7 +9,7 @@ use app_core::setup::SceneArgs;
 use clap::Args;
 use report::{Bar, Check, Report};
 
-use crate::study::StudyArgs;
+use crate::study::RunArgs;
 use timing::Times;
 
 /// The number of nodes P of the paper.
@@ -22,7 +22,7 @@ pub struct LagesArgs {
     #[command(flatten)]
     scene: SceneArgs,
     #[command(flatten)]
-    study: StudyArgs,
+    study: RunArgs,
 }
 
 /// Measures deliveries and writes the report.
@@ -37,7 +37,7 @@ pub fn run(args: &LagesArgs) -> anyhow::Result<Outcome> {
     report.parameter("direct finds surfaces by", experiment.visibility()?.to_string());
     experiment.stop()?;
     println!("{}", report.summary);
-    args.study.finish("lages", &report)
+    args.study.finish("out/study/lages", &report)
 }
 
 fn report(args: &LagesArgs, experiment: &Experiment, times: &Times) -> anyhow::Result<Report> {

@@ -130,13 +130,8 @@ impl Times {
     /// The difference of the coordinator's K from the formula's, with whole images.
     pub fn headline_k_off_formula(&self) -> f64 {
         let Some(run) = self.headline() else { return f64::NAN };
-        let formula = self.formula(run).clamp(1, self.images.max(1));
+        let formula = SamplersRow { times: self, run }.k_by(k_fd).clamp(1, self.images.max(1));
         run.plan.sampler_count().abs_diff(formula) as f64
-    }
-
-    fn formula(&self, run: &Run) -> usize {
-        let Costs { sample_image_s, reconstruct_view_s, encode_view_s, .. } = run.plan.costs;
-        k_fd(self.images, sample_image_s, run.views, reconstruct_view_s + encode_view_s, self.nodes)
     }
 }
 
@@ -173,9 +168,9 @@ impl Errors {
 
 impl<'t> CostRow<'t> {
     fn new(times: &Times, method: &'t str, runs: &[Run]) -> anyhow::Result<Option<Self>> {
-        let compared = |runs: &[Run]| runs.iter().position(|run| run.views == COMPARED_VIEWS);
-        let Some((direct, own)) = compared(&times.direct).zip(compared(runs)) else { return Ok(None) };
-        let errors = Errors::new(&times.direct[direct].made, &runs[own].made)?;
+        let compared = [&times.direct[..], runs].map(|runs| runs.iter().find(|run| run.views == COMPARED_VIEWS));
+        let [Some(direct), Some(own)] = compared else { return Ok(None) };
+        let errors = Errors::new(&direct.made, &own.made)?;
         Ok(runs.last().map(|last| Self { method, costs: last.plan.costs, errors }))
     }
 }

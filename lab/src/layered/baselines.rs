@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use render::{LayerSelection, Lighting};
 use report::{Bar, Check, Report};
 
-use super::pyramid::{EPSILON_FACTOR, Hit, Pyramids};
+use super::pyramid::{Hit, Pyramids};
 use super::subject::{Cube, Subject};
 use super::views::{self, Figures};
 use super::warp::warp;
@@ -85,30 +85,30 @@ impl Ways {
             dominant_pyramid: cubes.traced(&cubes.dominant)?,
             warp,
             holes,
-            walk: views::of_cube(&subject, &subject.upload(&cubes.dominant)?.0)?,
+            walk: views::of_cube(&subject, &subject.upload(&cubes.dominant, None)?.0)?,
         })
     }
 
     fn rows(self) -> [WayRow; 4] {
-        let row = |way, figures| WayRow { scene: self.scene, way, figures, holes: None };
         [
-            row("pyramid", self.pyramid),
-            row("pyramid, dominant axis", self.dominant_pyramid),
-            WayRow { holes: Some(self.holes), ..row("warp", self.warp) },
-            row("layered", self.walk),
+            ("pyramid", self.pyramid, None),
+            ("pyramid, dominant axis", self.dominant_pyramid, None),
+            ("warp", self.warp, Some(self.holes)),
+            ("layered", self.walk, None),
         ]
+        .map(|(way, figures, holes)| WayRow { scene: self.scene, way, figures, holes })
     }
 
     fn checks(&self) -> [Check; 3] {
         let Self { pyramid, warp, walk, .. } = self;
-        let name = |what: &str| format!("{}: {what}", self.scene);
         let wrong_hits = walk.wrong_hits / pyramid.wrong_hits;
-        let gained_db = [pyramid, warp].map(|way| walk.psnr_db - way.psnr_db);
+        let [over_quadtrees_db, over_warp_db] = [pyramid, warp].map(|way| walk.psnr_db - way.psnr_db);
         [
-            Check::new(name("wrong hits of a walk over quadtrees"), wrong_hits, "", Bar::AtMost(MOST_WRONG_HITS)),
-            Check::new(name("PSNR of a walk over quadtrees"), gained_db[0], "dB", Bar::AtLeast(LEAST_GAIN_DB)),
-            Check::new(name("PSNR of a walk over the warp"), gained_db[1], "dB", Bar::AtLeast(LEAST_GAIN_DB)),
+            ("wrong hits of a walk over quadtrees", wrong_hits, "", Bar::AtMost(MOST_WRONG_HITS)),
+            ("PSNR of a walk over quadtrees", over_quadtrees_db, "dB", Bar::AtLeast(LEAST_GAIN_DB)),
+            ("PSNR of a walk over the warp", over_warp_db, "dB", Bar::AtLeast(LEAST_GAIN_DB)),
         ]
+        .map(|(what, value, unit, bar)| Check::new(format!("{}: {what}", self.scene), value, unit, bar))
     }
 }
 
@@ -131,7 +131,7 @@ impl<'s> Cubes<'s> {
 
     /// By quadtrees; rays are shared among the cores.
     fn traced(&self, cube: &Cube) -> anyhow::Result<Figures> {
-        let pyramids = Pyramids::new(&cube.images, EPSILON_FACTOR);
+        let pyramids = Pyramids::new(&cube.images);
         self.figures(cube, |camera| {
             let found = (0..camera.pixel_count())
                 .into_par_iter()
@@ -148,7 +148,7 @@ impl<'s> Cubes<'s> {
     /// # Errors
     /// Views of other sizes.
     pub fn warped(&self) -> anyhow::Result<(Figures, f64)> {
-        let pyramids = Pyramids::new(&self.all.images, EPSILON_FACTOR);
+        let pyramids = Pyramids::new(&self.all.images);
         let mut are_holes = Vec::new();
         let figures = self.figures(&self.all, |camera| {
             let warped = warp(&self.all.images, &pyramids, camera);
@@ -178,13 +178,12 @@ impl<'s> Cubes<'s> {
     }
 
     fn view(&self, cube: &Cube, camera: &PinholeCamera, hits: &[Option<Hit>]) -> View {
-        let background = |pixel| {
-            let towards = camera.ray(center(camera, pixel)).direction_in_world.normalize_or_zero();
-            self.subject.scene.background.radiance_linear(towards)
-        };
         let shown = hits.iter().enumerate().map(|(pixel, hit)| match hit {
             Some(hit) => linear_from_rgb9e5(cube.images[hit.image].color_rgb9e5[hit.sample]),
-            None => background(pixel),
+            None => {
+                let towards = camera.ray(center(camera, pixel)).direction_in_world.normalize_or_zero();
+                self.subject.scene.background.radiance_linear(towards)
+            }
         });
         View {
             size_px: camera.size_px,

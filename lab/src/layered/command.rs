@@ -4,13 +4,13 @@ use app_core::exit::Outcome;
 
 use super::{baselines, glossy, light_fields, table_one};
 use crate::failures::stand::Stand;
-use crate::study::StudyArgs;
+use crate::study::RunArgs;
 
 /// Measures the paper's scenes and writes the report.
 ///
 /// # Errors
 /// The device fails, or the folder cannot be written.
-pub fn run(args: &StudyArgs) -> anyhow::Result<Outcome> {
+pub fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     let engine = args.engine()?;
     let stand = Stand::new(&engine, false);
     let mut report = args.report("layered depth cubes", &engine);
@@ -18,5 +18,5 @@ pub fn run(args: &StudyArgs) -> anyhow::Result<Outcome> {
     light_fields::measure(&stand, args.quick, &mut report)?;
     glossy::measure(&stand, args.quick, &mut report)?;
     table_one::measure(&stand, &mut report)?;
-    args.finish("layered", &report)
+    args.finish("out/study/layered", &report)
 }

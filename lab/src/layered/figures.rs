@@ -13,10 +13,10 @@ pub fn row<'v>(
     title: &str,
     views: impl IntoIterator<Item = (String, &'v View)>,
 ) -> anyhow::Result<PictureRow> {
-    let picture = |(caption, view): (String, &View)| {
+    let mut pictures = Vec::new();
+    for (caption, view) in views {
         let image = pictures::rgb(view).context("a view of its size")?;
-        Ok(Picture::new(format!("figure {figure}, {caption}"), caption, image))
-    };
-    let pictures = views.into_iter().map(picture).collect::<anyhow::Result<_>>()?;
+        pictures.push(Picture::new(format!("figure {figure}, {caption}"), caption, image));
+    }
     Ok(PictureRow { title: format!("{title} (Fig. {figure})"), pictures })
 }

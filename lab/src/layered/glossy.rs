@@ -63,6 +63,13 @@ impl Way {
         }
     }
 
+    fn is_pictured(self) -> bool {
+        match self {
+            Self::Drawn(rays) | Self::InCube(rays) => rays == PICTURED_RAYS,
+            Self::Gathered(directions) => directions != LightDirections::D66,
+        }
+    }
+
     fn count(self) -> u32 {
         match self {
             Self::Drawn(rays) | Self::InCube(rays) => rays,
@@ -81,7 +88,7 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
     let glossy: Vec<Vec<bool>> = subject.truths.iter().zip(&truths).map(|(none, all)| changed(none, all)).collect();
     let row = |way: Way, timed: TimedViews| -> anyhow::Result<GlossyRow> {
         let [psnr_db, flip] = errors(&truths, &timed.views, &glossy)?;
-        Ok(GlossyRow { way, psnr_db, flip, view_s: timed.view_s, view: timed.middle()?.clone() })
+        Ok(GlossyRow { way, psnr_db, flip, view_s: timed.view_s, view: mirrors::middle(&timed.views)?.clone() })
     };
     let rays = &RAYS[..if is_quick { QUICK } else { RAYS.len() }];
     let mut rows = Vec::new();
@@ -89,15 +96,16 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
         rows.push(row(Way::Drawn(rays), TimedViews::drawn(&subject, lighting(rays)?)?)?);
     }
     let cube = subject.cube(SIDE, LayerSelection::Dominant, subject.lighting, 1)?;
-    let set = subject.upload(&cube)?.0;
-    let by_rays = |glossy_rays| Mirrors { glossy_rays, ..Mirrors::default() };
+    let set = subject.upload(&cube, None)?.0;
     for &rays in rays {
-        rows.push(row(Way::InCube(rays), TimedViews::of_cube(&subject, &set, LAYERED, by_rays(rays))?)?);
+        let mirrors = Mirrors { glossy_rays: rays, ..Mirrors::default() };
+        rows.push(row(Way::InCube(rays), TimedViews::of_cube(&subject, &set, LAYERED, mirrors)?)?);
     }
+    let mirrors = Mirrors { glossy_rays: 1, ..Mirrors::default() };
     for directions in LightDirections::ALL {
         let field = subject.light_field(directions, lighting(1)?)?.0;
-        let set = subject.upload_with(&cube, field)?.0;
-        rows.push(row(Way::Gathered(directions), TimedViews::of_cube(&subject, &set, LAYERED, by_rays(1))?)?);
+        let set = subject.upload(&cube, Some(field))?.0;
+        rows.push(row(Way::Gathered(directions), TimedViews::of_cube(&subject, &set, LAYERED, mirrors)?)?);
     }
     let title = format!("Glossy pixels of {SCENE}, against {MOST_RAYS} rays drawn directly");
     report.tables.push(table(&title, &COLUMNS, &rows)?);
@@ -110,26 +118,28 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
 fn chart(rows: &[GlossyRow]) -> XyChart {
     let title = format!("Glossy pixels of {SCENE}: PSNR over time");
     let chart = XyChart::new(title, Axis::log("a view", "ms"), Axis::linear("PSNR", "dB"));
-    let point = |row: &GlossyRow| Point::labelled(row.view_s * 1e3, row.psnr_db, row.way.count().to_string());
-    let name = |row: &GlossyRow| row.way.kind().to_owned();
-    let mut chart = with_series(chart, rows, Mark::Line, name, point).with_front(Better::Low, Better::High);
+    let chart = with_series(
+        chart,
+        rows,
+        Mark::Line,
+        |row| row.way.kind().to_owned(),
+        |row| Point::labelled(row.view_s * 1e3, row.psnr_db, row.way.count().to_string()),
+    );
+    let mut chart = chart.with_front(Better::Low, Better::High);
     chart.note = "Numbers of rays a pixel and of directions stand beside the points.".to_owned();
     chart
 }
 
 fn check(rows: &[GlossyRow]) -> Option<Check> {
-    let psnr_db = |way: Way| rows.iter().find(|row| row.way == way).map(|row| row.psnr_db);
-    let gain_db = psnr_db(Way::Gathered(LightDirections::D258))? - psnr_db(Way::Drawn(FEW_RAYS))?;
+    let gathered = rows.iter().find(|row| row.way == Way::Gathered(LightDirections::D258))?;
+    let drawn = rows.iter().find(|row| row.way == Way::Drawn(FEW_RAYS))?;
+    let gain_db = gathered.psnr_db - drawn.psnr_db;
     let name = format!("{SCENE}: gathering in 258 directions over {FEW_RAYS} rays");
     Some(Check::new(name, gain_db, "dB", Bar::AtLeast(0.0)))
 }
 
 fn picture_row(rows: &[GlossyRow], truth: &View) -> anyhow::Result<PictureRow> {
-    let is_shown = |row: &&GlossyRow| match row.way {
-        Way::Drawn(rays) | Way::InCube(rays) => rays == PICTURED_RAYS,
-        Way::Gathered(directions) => directions != LightDirections::D66,
-    };
-    let shown = rows.iter().rev().filter(is_shown);
+    let shown = rows.iter().rev().filter(|row| row.way.is_pictured());
     let captioned = shown.map(|row| (format!("{} {}", row.way.count(), row.way.kind()), &row.view));
     let truth = (format!("{MOST_RAYS} rays, drawn directly"), truth);
     figures::row(5, "A teapot on a glossy floor", captioned.chain([truth]))
@@ -137,11 +147,11 @@ fn picture_row(rows: &[GlossyRow], truth: &View) -> anyhow::Result<PictureRow> {
 
 /// Cameras towards the corner of the room, from left to right.
 pub fn cameras() -> Vec<PinholeCamera> {
-    let view = |number: usize| {
+    let cameras = (0..VIEWS).map(|number| {
         let aside = number as f32 - 0.5 * (VIEWS - 1) as f32;
         PinholeCamera::looking_at(Vec3::new(8.0 + aside, 4.5, 8.0 - aside), Vec3::Y, Vec3::Y, 0.7, VIEW_PX)
-    };
-    (0..VIEWS).map(view).collect()
+    });
+    cameras.collect()
 }
 
 fn lighting(rays: u32) -> anyhow::Result<Lighting> {

@@ -91,23 +91,30 @@ impl MirrorBox<'_> {
         let (field, sample_s) = self.subject.light_field(directions, reflecting(self.subject.lighting, MOST)?)?;
         let sent_bytes = encode_light_field(&field)?.payload.len();
         let gathered = Gathered { directions, samples: field.sample_count(), sent_bytes, sample_s };
-        let set = self.subject.upload_with(&self.cube, field)?.0;
-        let row = |rays: u32| {
+        let set = self.subject.upload(&self.cube, Some(field))?.0;
+        let [alone, after_one] = [0, 1].map(|rays| {
             let method = ReconstructionMethod::Layered { followed: Some(rays) };
             self.row(Some(gathered), rays, &TimedViews::of_cube(&self.subject, &set, method, MIRRORS)?)
-        };
-        Ok([row(0)?, row(1)?])
+        });
+        Ok([alone?, after_one?])
     }
 
     /// All mirrors are followed, and nothing is gathered.
     fn by_rays(&self) -> anyhow::Result<MirrorRow> {
-        let set = self.subject.upload(&self.cube)?.0;
+        let set = self.subject.upload(&self.cube, None)?.0;
         self.row(None, MOST, &TimedViews::of_cube(&self.subject, &set, LAYERED, MIRRORS)?)
     }
 
     fn row(&self, gathered: Option<Gathered>, rays: u32, timed: &TimedViews) -> anyhow::Result<MirrorRow> {
         let [psnr_db, flip] = errors(&self.truths, &timed.views, &self.mirrored)?;
-        Ok(MirrorRow { gathered, rays, psnr_db, flip, view_s: timed.view_s, view: timed.middle()?.clone() })
+        Ok(MirrorRow {
+            gathered,
+            rays,
+            psnr_db,
+            flip,
+            view_s: timed.view_s,
+            view: mirrors::middle(&timed.views)?.clone(),
+        })
     }
 }
 
@@ -143,8 +150,8 @@ fn checks(rows: &[MirrorRow]) -> Vec<Check> {
 }
 
 fn pictures(rows: &[MirrorRow], truth: &View) -> anyhow::Result<[PictureRow; 2]> {
-    let is_in_middle = |row: &&MirrorRow| row.gathered.is_none() || row.is_gathered_in(MIDDLE);
-    let middle = rows.iter().filter(is_in_middle).map(|row| (row.caption(), &row.view));
+    let middle = rows.iter().filter(|row| row.gathered.is_none() || row.is_gathered_in(MIDDLE));
+    let middle = middle.map(|row| (row.caption(), &row.view));
     let gathered = rows.iter().filter(|row| row.gathered.is_some()).map(|row| (row.caption(), &row.view));
     Ok([
         figures::row(3, "Mirrors gathered, and by rays", middle.chain([("drawn directly".to_owned(), truth)]))?,

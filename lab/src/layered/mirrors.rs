@@ -23,12 +23,12 @@ pub struct TimedViews {
 
 /// Cameras before the box, from left to right.
 pub fn cameras() -> Vec<PinholeCamera> {
-    let view = |number: usize| {
+    let cameras = (0..VIEWS).map(|number| {
         let right = number as f32 / (VIEWS - 1) as f32 * 2.0 - 1.0;
         let eye = Vec3::new(2.2 * right, 1.9, 6.0);
         PinholeCamera::looking_at(eye, Vec3::Y * 1.1, Vec3::Y, 0.7, VIEW_PX)
-    };
-    (0..VIEWS).map(view).collect()
+    });
+    cameras.collect()
 }
 
 impl TimedViews {
@@ -58,14 +58,6 @@ impl TimedViews {
     fn timed(make: impl Fn() -> anyhow::Result<Vec<View>>) -> anyhow::Result<Self> {
         let view_s = seconds_a_view(&make)?;
         Ok(Self { views: make()?, view_s })
-    }
-
-    /// The view that pictures show.
-    ///
-    /// # Errors
-    /// There is none.
-    pub fn middle(&self) -> anyhow::Result<&View> {
-        middle(&self.views)
     }
 }
 

@@ -7,8 +7,6 @@ use std::ops::Range;
 use depth_image::{LayeredDepthImage, ParallelCamera, Ray};
 use glam::{UVec2, Vec3};
 
-/// ε is this times half a texel at the slope of the sample's surface.
-pub const EPSILON_FACTOR: f32 = 1.0;
 /// The slope of 89°: normals in two bytes are within a degree, and no ε is infinite.
 const MAX_SLOPE: f32 = 57.3;
 /// A ray along an axis of the image leans by this much, so that nothing divides by zero.
@@ -40,7 +38,6 @@ struct Trees<'c> {
     number: usize,
     image: &'c LayeredDepthImage,
     forward_in_world: Vec3,
-    epsilon_factor: f32,
     /// From single texels, whose nodes are the samples, to one place for the whole image.
     levels: Vec<Level>,
 }
@@ -73,9 +70,8 @@ struct ImageRay {
 }
 
 impl<'c> Pyramids<'c> {
-    pub fn new(images: &'c [LayeredDepthImage], epsilon_factor: f32) -> Self {
-        let trees = |(number, image)| Trees::new(number, image, epsilon_factor);
-        Self { trees: images.iter().enumerate().map(trees).collect() }
+    pub fn new(images: &'c [LayeredDepthImage]) -> Self {
+        Self { trees: images.iter().enumerate().map(|(number, image)| Trees::new(number, image)).collect() }
     }
 
     /// The nearest sample that faces the ray and whose depth is within ε of the ray's over its texel, from `near` on. Images follow
@@ -93,11 +89,11 @@ impl<'c> Pyramids<'c> {
 }
 
 impl<'c> Trees<'c> {
-    fn new(number: usize, image: &'c LayeredDepthImage, epsilon_factor: f32) -> Self {
+    fn new(number: usize, image: &'c LayeredDepthImage) -> Self {
         let first = image.first.clone();
         let size = image.camera.size_px;
         let forward_in_world = image.camera.axes_in_world()[2];
-        let mut trees = Self { number, image, forward_in_world, epsilon_factor, levels: Vec::new() };
+        let mut trees = Self { number, image, forward_in_world, levels: Vec::new() };
         let mut reach: Vec<[f32; 2]> = (0..image.sample_count()).map(|sample| trees.reach(sample)).collect();
         for line in 0..image.camera.pixel_count() {
             let deepest_first = image.line(line).rev();
@@ -118,7 +114,8 @@ impl<'c> Trees<'c> {
         let cos = self.image.plane_normal_in_world(sample).dot(self.forward_in_world).abs().min(1.0);
         let slope = ((1.0 - cos * cos).sqrt() / cos).min(MAX_SLOPE);
         let depth = self.depth(sample);
-        let epsilon = self.epsilon_factor * 0.5 * slope;
+        // ε is half a texel at the slope of the sample's surface.
+        let epsilon = 0.5 * slope;
         [depth - epsilon, depth + epsilon]
     }
 
@@ -211,15 +208,10 @@ const CORNERS: [UVec2; 4] = [UVec2::ZERO, UVec2::X, UVec2::Y, UVec2::ONE];
 impl ImageRay {
     fn new(camera: &ParallelCamera, ray: Ray, near: f32) -> Self {
         let axes = camera.axes_in_world();
-        let along = |v: Vec3| Vec3::from(axes.map(|axis| axis.dot(v) / camera.spacing_m));
-        let leaning = |v: f32| if v.abs() < LEAST_LEAN { LEAST_LEAN } else { v };
-        let direction = along(ray.direction_in_world);
-        Self {
-            origin: along(ray.origin_in_world - camera.corner_in_world),
-            direction: Vec3::new(leaning(direction.x), leaning(direction.y), direction.z),
-            direction_in_world: ray.direction_in_world,
-            near,
-        }
+        let [origin, direction] = [ray.origin_in_world - camera.corner_in_world, ray.direction_in_world]
+            .map(|v| Vec3::from(axes.map(|axis| axis.dot(v) / camera.spacing_m)));
+        let [x, y] = [direction.x, direction.y].map(|v| if v.abs() < LEAST_LEAN { LEAST_LEAN } else { v });
+        Self { origin, direction: Vec3::new(x, y, direction.z), direction_in_world: ray.direction_in_world, near }
     }
 
     /// The ray's parameters where it is within a node's columns and rows.
@@ -309,7 +301,7 @@ pub mod tests {
     #[test]
     fn quadtrees_find_what_every_texel_of_the_way_holds() {
         let images = [noisy(UVec2::new(37, 29)), noisy(UVec2::new(16, 1))];
-        let pyramids = Pyramids::new(&images, 1.0);
+        let pyramids = Pyramids::new(&images);
         let mut hits = 0;
         for ray in (0..2000).map(ray) {
             let mut best = None;
@@ -333,7 +325,7 @@ pub mod tests {
     #[test]
     fn a_slab_that_faces_the_eye_is_met_at_its_depth() {
         let images = [image(UVec2::new(32, 24), |_| vec![(4.0, Vec3::Z), (6.0, Vec3::Z)])];
-        let pyramids = Pyramids::new(&images, EPSILON_FACTOR);
+        let pyramids = Pyramids::new(&images);
         for at in (0..50).map(|number| (Vec2::new(noise(number), noise(number + 99)) - 0.5) * 0.58) {
             let towards = Vec3::new(at.x, at.y, -1.0);
             let ray = Ray { origin_in_world: Vec3::Z * 3.0, direction_in_world: towards * 0.5 };

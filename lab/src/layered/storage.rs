@@ -1,6 +1,7 @@
 //! What cubes and light fields take on a device, and the layers of the paper's six images.
 
 use depth_image::{LayeredDepthImage, LayeredLightField};
+use reconstruction::SampleSet;
 
 use super::paper::{Layers, MB};
 use super::subject::{Cube, Subject};
@@ -11,20 +12,21 @@ use super::views;
 /// # Errors
 /// The device fails.
 pub fn device_mb(subject: &Subject<'_>, cube: &Cube, field: &LayeredLightField) -> anyhow::Result<[f64; 2]> {
-    // After a view has been made from a set no copy is under way.
-    let used = |with_field: bool| {
-        let set = if with_field { subject.upload_with(cube, field.clone())? } else { subject.upload(cube)? }.0;
-        views::made(subject, &set)?;
-        anyhow::Ok(set)
-    };
     // The memory of earlier sets may serve the first ones. All are kept, so that the others take their own.
-    let _first = [used(false)?, used(true)?];
+    let _first = [used_set(subject, cube, None)?, used_set(subject, cube, Some(field))?];
     let none = allocated_bytes(subject);
-    let _second = used(false)?;
+    let _second = used_set(subject, cube, None)?;
     let one = allocated_bytes(subject);
-    let _third = used(true)?;
+    let _third = used_set(subject, cube, Some(field))?;
     let both = allocated_bytes(subject);
     Ok([one - none, both - one - (one - none)].map(|bytes| bytes / MB))
+}
+
+/// A set from which a view has been made: no copy is under way any more.
+fn used_set(subject: &Subject<'_>, cube: &Cube, field: Option<&LayeredLightField>) -> anyhow::Result<SampleSet> {
+    let (set, _) = subject.upload(cube, field.cloned())?;
+    views::made(subject, &set)?;
+    Ok(set)
 }
 
 fn allocated_bytes(subject: &Subject<'_>) -> f64 {
@@ -34,15 +36,19 @@ fn allocated_bytes(subject: &Subject<'_>) -> f64 {
 
 /// As measured in the paper: two images an axis, each with the surfaces that face it.
 pub fn six_images(images: &[LayeredDepthImage]) -> Layers {
-    let facing = |image: &LayeredDepthImage, line: usize| {
+    let mut samples = 0;
+    let mut lines = 0;
+    let mut most = 0;
+    for image in images {
         let forward = image.camera.axes_in_world()[2];
-        let front = image.line(line).filter(|&sample| image.plane_normal_in_world(sample).dot(forward) < 0.0).count();
-        [front, image.line(line).len() - front]
-    };
-    let each =
-        images.iter().flat_map(|image| (0..image.camera.pixel_count()).flat_map(move |line| facing(image, line)));
-    let (samples, most) = each.fold((0, 0), |(samples, most), layers| (samples + layers, layers.max(most)));
-    let lines: usize = images.iter().map(|image| image.camera.pixel_count()).sum();
+        lines += image.camera.pixel_count();
+        for line in (0..image.camera.pixel_count()).map(|line| image.line(line)) {
+            let all = line.len();
+            let front = line.filter(|&sample| image.plane_normal_in_world(sample).dot(forward) < 0.0).count();
+            samples += all;
+            most = most.max(front).max(all - front);
+        }
+    }
     Layers { mean: samples as f64 / (2 * lines) as f64, most }
 }
 

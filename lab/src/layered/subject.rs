@@ -8,12 +8,12 @@ use depth_image::{
     Aabb, CubeGrid, CubeImages, LayeredDepthImage, LayeredLightField, LightDirections, LightFieldCamera, PinholeCamera,
     View, ViewPlanes,
 };
-use reconstruction::{SampleSet, SetDescription};
+use reconstruction::SampleSet;
 use render::{GpuScene, LayerSelection, Lighting};
 use scene::{Limits, MissingTextures, Scene};
 
 use super::paper::LightField;
-use crate::failures::stand::{Stand, work};
+use crate::failures::stand::{Stand, description, work};
 
 /// A scene on the device, and views around it, drawn directly.
 pub struct Subject<'s> {
@@ -57,24 +57,15 @@ impl<'s> Subject<'s> {
     /// The device fails.
     pub fn cube(&self, side: u32, kept: LayerSelection, lighting: Lighting, times: usize) -> anyhow::Result<Cube> {
         let grid = CubeGrid::around(&self.scene.bounds(), side)?;
-        let draw = || -> anyhow::Result<Cube> {
+        let renderer = &self.stand.engine().renderer;
+        let mut all = Vec::new();
+        for _ in 0..times {
             let start = Instant::now();
-            let image = |axis| {
-                self.stand.engine().renderer.draw_layers(work(&self.on_device, lighting), &grid.camera(axis), kept)
-            };
-            let images = [image(0)?, image(1)?, image(2)?];
-            Ok(Cube { grid, images, sample_s: start.elapsed().as_secs_f64() })
-        };
-        let all = (0..times).map(|_| draw()).collect::<anyhow::Result<Vec<Cube>>>()?;
+            let [x, y, z] =
+                [0, 1, 2].map(|axis| renderer.draw_layers(work(&self.on_device, lighting), &grid.camera(axis), kept));
+            all.push(Cube { grid, images: [x?, y?, z?], sample_s: start.elapsed().as_secs_f64() });
+        }
         all.into_iter().min_by(|a, b| a.sample_s.total_cmp(&b.sample_s)).context("a cube")
-    }
-
-    /// Puts a cube on the device. Gives also the seconds.
-    ///
-    /// # Errors
-    /// The device fails.
-    pub fn upload(&self, cube: &Cube) -> anyhow::Result<(SampleSet, f64)> {
-        self.put(cube, None)
     }
 
     /// A light field of the scene with as many lines as the paper's, and the seconds that it takes.
@@ -92,31 +83,16 @@ impl<'s> Subject<'s> {
         Ok((field, start.elapsed().as_secs_f64()))
     }
 
-    /// Puts a cube with a light field on the device. Gives also the seconds.
+    /// Puts a cube on the device, with a light field if there is one. Gives also the seconds.
     ///
     /// # Errors
     /// The device fails.
-    pub fn upload_with(&self, cube: &Cube, light_field: LayeredLightField) -> anyhow::Result<(SampleSet, f64)> {
-        self.put(cube, Some(light_field))
-    }
-
-    fn put(&self, cube: &Cube, light_field: Option<LayeredLightField>) -> anyhow::Result<(SampleSet, f64)> {
+    pub fn upload(&self, cube: &Cube, light_field: Option<LayeredLightField>) -> anyhow::Result<(SampleSet, f64)> {
         let images = CubeImages { grid: cube.grid, images: cube.images.clone(), light_field };
         let start = Instant::now();
-        let set = self.stand.reconstructor().upload_cube(&images, &self.description(), Default::default())?;
+        let description = description(&self.scene, self.lighting.highlight());
+        let set = self.stand.reconstructor().upload_cube(&images, &description, Default::default())?;
         Ok((set, start.elapsed().as_secs_f64()))
-    }
-
-    /// What all images of the scene share.
-    pub fn description(&self) -> SetDescription<'_> {
-        SetDescription {
-            volume: self.scene.bounds(),
-            background: self.scene.background,
-            illumination: &self.scene.illumination,
-            highlight: self.lighting.highlight(),
-            environment: None,
-            mips: false,
-        }
     }
 }
 

@@ -98,7 +98,7 @@ impl Views {
         let subject = Subject::of_views(stand, self.scene, Lighting::default(), |_| (self.cameras)())?;
         let cubes = Cubes::new(&subject, SIDE)?;
         let (warped, holes) = cubes.warped()?;
-        let set = subject.upload(&cubes.dominant)?.0;
+        let set = subject.upload(&cubes.dominant, None)?.0;
         let walk = TimedViews::of_cube(&subject, &set, LAYERED, Mirrors::default())?;
         let layers = storage::six_images(&cubes.all.images);
         Ok(Plain { layers, warp_s: warped.view_s, holes, walk_s: walk.view_s })
@@ -118,18 +118,18 @@ impl Views {
             sent_mb: Some(encode_light_field(&field)?.payload.len() as f64 / MB),
             construction_s: Some(field_s),
         };
-        let (set, load_s) = subject.upload_with(&cube, field)?;
+        let (set, load_s) = subject.upload(&cube, Some(field))?;
         let mut view_s = [None; 3];
         let mut shown = Vec::new();
         for (view_s, &followed) in view_s.iter_mut().zip(self.followed) {
             let method = ReconstructionMethod::Layered { followed };
             let timed = TimedViews::of_cube(&subject, &set, method, self.mirrors)?;
             *view_s = Some(timed.view_s);
-            shown.push(timed.middle()?.clone());
+            shown.push(mirrors::middle(&timed.views)?.clone());
         }
         let direct = TimedViews::drawn(&subject, self.lighting.parse()?)?;
         if self.scene == PICTURED {
-            report.pictures.push(picture_row(self, &shown, direct.middle()?)?);
+            report.pictures.push(picture_row(self, &shown, mirrors::middle(&direct.views)?)?);
         }
         Ok(Column {
             name: self.scene,
@@ -150,8 +150,12 @@ impl Views {
 }
 
 fn picture_row(views: &Views, shown: &[View], drawn: &View) -> anyhow::Result<PictureRow> {
-    let gathered = |way: &str| format!("{way} in {} directions", views.directions.count());
-    let captions = [gathered("gathered"), gathered("one ray, then gathered"), "seven rays".to_owned()];
+    let directions = views.directions.count();
+    let captions = [
+        format!("gathered in {directions} directions"),
+        format!("one ray, then gathered in {directions} directions"),
+        "seven rays".to_owned(),
+    ];
     let drawn = ("drawn directly".to_owned(), drawn);
     figures::row(6, "A teapot and spheres", captions.into_iter().zip(shown).chain([drawn]))
 }

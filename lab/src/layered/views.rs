@@ -1,13 +1,11 @@
 //! Views from cubes: errors, loads and time.
 
-use std::time::Instant;
-
 use depth_image::{View, ViewPlanes};
 use metrics::{PictureErrors, Rgb8Image, depth_errors};
 use reconstruction::{ReconstructRequest, ReconstructionMethod, SampleSet};
 
 use super::subject::Subject;
-use crate::statistics::median;
+use crate::statistics::median_seconds;
 
 pub const LAYERED: ReconstructionMethod = ReconstructionMethod::LAYERED;
 /// Times that a batch of views is made; the median counts.
@@ -42,13 +40,13 @@ pub fn of_cube(subject: &Subject<'_>, set: &SampleSet) -> anyhow::Result<Figures
 /// # Errors
 /// `make` fails.
 pub fn seconds_a_view(make: impl Fn() -> anyhow::Result<Vec<View>>) -> anyhow::Result<f64> {
-    make()?;
-    let run = |_| -> anyhow::Result<f64> {
-        let start = Instant::now();
+    let mut count = 1;
+    let batch_s = median_seconds(REPEATS, || {
         let views = make()?;
-        Ok(start.elapsed().as_secs_f64() / views.len().max(1) as f64)
-    };
-    Ok(median((0..REPEATS).map(run).collect::<anyhow::Result<_>>()?))
+        count = views.len().max(1);
+        Ok(views)
+    })?;
+    Ok(batch_s / count as f64)
 }
 
 /// Views of a subject by walking through a cube, with depth.

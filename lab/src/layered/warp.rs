@@ -25,9 +25,10 @@ pub fn warp(images: &[LayeredDepthImage], pyramids: &Pyramids<'_>, camera: &Pinh
         project(number, image, camera, &mut hits);
     }
     let is_hole: Vec<bool> = (0..hits.len()).map(|pixel| is_hole(&hits, camera, pixel)).collect();
-    let repair = |pixel| pyramids.trace(camera.ray(place(camera, pixel).as_vec2() + 0.5), camera.near_m);
     let holes: Vec<usize> = (0..hits.len()).filter(|&pixel| is_hole[pixel]).collect();
-    let repaired: Vec<(Option<Hit>, usize)> = holes.par_iter().map(|&pixel| repair(pixel)).collect();
+    let repaired =
+        holes.par_iter().map(|&pixel| pyramids.trace(camera.ray(place(camera, pixel).as_vec2() + 0.5), camera.near_m));
+    let repaired: Vec<(Option<Hit>, usize)> = repaired.collect();
     holes.iter().zip(&repaired).for_each(|(&pixel, (hit, _))| hits[pixel] = *hit);
     Warped { hits, is_hole, loads: repaired.iter().map(|(_, loads)| loads).sum() }
 }
@@ -66,12 +67,14 @@ fn is_hole(hits: &[Option<Hit>], camera: &PinholeCamera, pixel: usize) -> bool {
     let Some(own) = hits[pixel] else { return true };
     let size = camera.size_px.as_ivec2();
     let middle = place(camera, pixel);
-    let around = (-1..=1).flat_map(|y| (-1..=1).map(move |x| IVec2::new(x, y))).filter(|&offset| offset != IVec2::ZERO);
-    let is_inside = |at: &IVec2| at.cmpge(IVec2::ZERO).all() && at.cmplt(size).all();
-    let neighbours = around.map(|offset| middle + offset).filter(is_inside);
-    let is_nearer = |at: IVec2| hits[(at.y * size.x + at.x) as usize].is_some_and(|hit| hit.t * FARTHER < own.t);
-    let (count, nearer) =
-        neighbours.fold((0, 0), |(count, nearer), at| (count + 1, nearer + usize::from(is_nearer(at))));
+    let around = (-1..=1).flat_map(|y| (-1..=1).map(move |x| middle + IVec2::new(x, y))).filter(|&at| at != middle);
+    let mut count = 0;
+    let mut nearer = 0;
+    for at in around.filter(|at| at.cmpge(IVec2::ZERO).all() && at.cmplt(size).all()) {
+        let neighbour = hits[(at.y * size.x + at.x) as usize];
+        count += 1;
+        nearer += usize::from(neighbour.is_some_and(|hit| hit.t * FARTHER < own.t));
+    }
     2 * nearer > count
 }
 
@@ -80,7 +83,7 @@ mod tests {
     use glam::UVec2;
 
     use super::*;
-    use crate::layered::pyramid::{EPSILON_FACTOR, tests::image};
+    use crate::layered::pyramid::tests::image;
 
     fn view(size_px: UVec2) -> PinholeCamera {
         PinholeCamera::looking_at(Vec3::Z * 3.0, Vec3::ZERO, Vec3::Y, 2.0 * 0.24_f32.atan(), size_px)
@@ -89,7 +92,7 @@ mod tests {
     #[test]
     fn a_plane_fills_views_whose_pixels_are_larger_than_texels_and_rays_fill_the_others() {
         let images = [image(UVec2::new(64, 48), |_| vec![(4.0, Vec3::Z)])];
-        let pyramids = Pyramids::new(&images, EPSILON_FACTOR);
+        let pyramids = Pyramids::new(&images);
         for (size_px, has_holes) in [(UVec2::new(32, 24), false), (UVec2::new(128, 96), true)] {
             let warped = warp(&images, &pyramids, &view(size_px));
             assert!(warped.hits.iter().all(|hit| hit.is_some_and(|hit| (hit.t - 5.0).abs() < 1e-5)), "{size_px}");
@@ -101,7 +104,7 @@ mod tests {
     #[test]
     fn a_plane_shows_through_between_the_samples_of_one_in_front() {
         let images = [image(UVec2::new(64, 48), |_| vec![(4.0, Vec3::Z), (6.0, Vec3::Z)])];
-        let warped = warp(&images, &Pyramids::new(&images, EPSILON_FACTOR), &view(UVec2::new(128, 96)));
+        let warped = warp(&images, &Pyramids::new(&images), &view(UVec2::new(128, 96)));
         assert!(warped.hits.iter().flatten().any(|hit| hit.t > 6.0));
     }
 

@@ -12,7 +12,7 @@ use render::Lighting;
 use report::{Bar, Check, Report};
 
 use super::light::{DIRECT_RAYS, Light, LightRays};
-use super::measure::{Drawing, LightFront, LightRow, LitRows};
+use super::measure::{LightFront, LightRow, LitRows};
 use super::report::add_to;
 use super::subject::{OrbitViews, SetSize, Subject, VIEW_PX};
 use crate::failures::stand::Stand;
@@ -96,13 +96,13 @@ pub fn measure(stand: &Stand, wanted: &[LitWork], is_quick: bool, report: &mut R
 }
 
 fn checks(front: &LightFront) -> Vec<Check> {
-    let name = |what: &str| format!("{}: {what}", front.name());
+    let name = front.name();
     let not_finite = front.rows.iter().filter(|row| !is_finite(row)).count();
     let mut checks = vec![
-        Check::new(name("rows"), front.rows.len() as f64, "", Bar::Equal(ROWS as f64)),
-        Check::new(name("rows with a figure that is no number"), not_finite as f64, "", Bar::Equal(0.0)),
+        Check::new(format!("{name}: rows"), front.rows.len() as f64, "", Bar::Equal(ROWS as f64)),
+        Check::new(format!("{name}: rows with a figure that is no number"), not_finite as f64, "", Bar::Equal(0.0)),
         Check::maybe(
-            name("direct drawing, FLIP with the most rays over that with the fewest"),
+            format!("{name}: direct drawing, FLIP with the most rays over that with the fewest"),
             direct_ratio(front),
             "×",
             Bar::AtMost(MOST_DIRECT_RATIO),
@@ -110,16 +110,14 @@ fn checks(front: &LightFront) -> Vec<Check> {
         ),
     ];
     if front.is_interior {
-        let is_shared = |row: &&LightRow| matches!(row.drawing, Drawing::LightCache(_)) && front.is_on_front(row);
-        let shared = front.rows.iter().filter(is_shared).count() as f64;
+        let shared = front.rows.iter().filter(|row| row.is_shared() && front.is_on_front(row)).count() as f64;
         let least = match front.light {
             Light::Indirect => LEAST_INDIRECT_RATIO,
             Light::Occlusion => LEAST_OCCLUSION_RATIO,
         };
-        let dominance = "FLIP of direct drawing over that of `balanced` (S = 4, density 1) in the same time";
-        checks.push(Check::new(name("rows of light_cache on the front"), shared, "", Bar::AtLeast(1.0)));
+        checks.push(Check::new(format!("{name}: rows of light_cache on the front"), shared, "", Bar::AtLeast(1.0)));
         checks.push(Check::maybe(
-            name(dominance),
+            format!("{name}: FLIP of direct drawing over that of `balanced` (S = 4, density 1) in the same time"),
             equal_time_ratio(front),
             "×",
             Bar::AtLeast(least),
@@ -136,7 +134,7 @@ fn is_finite(row: &LightRow) -> bool {
 }
 
 fn direct_ratio(front: &LightFront) -> Option<f64> {
-    let mut direct = front.rows.iter().filter(|row| matches!(row.drawing, Drawing::Direct(_)));
+    let mut direct = front.rows.iter().filter(|row| row.is_direct());
     let fewest = direct.next()?;
     Some(direct.next_back()?.flip / fewest.flip)
 }
@@ -152,6 +150,7 @@ mod tests {
     use report::Outcome;
 
     use super::*;
+    use crate::lit::measure::Drawing;
 
     /// Direct drawing halves its error in twice the time; shared light has one time and one error.
     fn front(shared_ms: f64, shared_flip: f64) -> LightFront {

@@ -10,12 +10,12 @@ use render::Lighting;
 use report::{Bar, Check};
 
 use super::light::{DIRECT_RAYS, Light, SAMPLES_A_PIXEL};
-use super::measure::{Drawing, LightFront, LightRow, LitRows};
+use super::measure::{LightFront, LitRows};
 use super::report::add_to;
 use super::subject::{OrbitViews, SetSize, Subject, VIEW_PX};
 use crate::failures::stand::Stand;
 use crate::statistics::geometric_mean;
-use crate::study::{StudyArgs, is_named};
+use crate::study::{RunArgs, is_named};
 
 /// The lighting of samples and of views that use them, unless another is given.
 const LIGHTING: &str = "soft 16, occlusion 16";
@@ -52,7 +52,7 @@ const EXPENSIVE_SCENE: &str = "tree-terrain-500k";
   myriorama-lab study light_cache --lighting \"soft 16, indirect 64\" --views 1   the gain of sharing indirect light")]
 pub struct LightCacheArgs {
     #[command(flatten)]
-    study: StudyArgs,
+    study: RunArgs,
     /// A folder that has, or whose subfolders have, FlightHelmet, lamborghini, ingenuity and threejs-shaderball
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
@@ -108,7 +108,7 @@ pub fn run(args: &LightCacheArgs) -> anyhow::Result<Outcome> {
         Light::Occlusion => occlusion_checks(&fronts),
         Light::Indirect => fronts.iter().flat_map(indirect_checks).collect(),
     });
-    args.study.finish("light_cache", &report)
+    args.study.finish("out/study/light_cache", &report)
 }
 
 /// The scenes that are compared with direct drawing.
@@ -122,28 +122,33 @@ fn scene_names(light: Light, is_quick: bool) -> &'static [&'static str] {
 }
 
 fn occlusion_checks(fronts: &[LightFront]) -> Vec<Check> {
-    let flip = |quality: LightCacheQuality, most: f64| {
-        let flips = fronts.iter().filter_map(|front| Some(front.at_quality(quality)?.flip));
-        let name = format!("`{quality}`, {} scenes: greatest FLIP", fronts.len());
-        Check::maybe(name, flips.reduce(f64::max), "", Bar::AtMost(most), "no scene")
-    };
     let outside = fronts.iter().filter(|front| !front.is_interior);
     let gains: Vec<f64> = outside.map(best_gain).collect();
     let expensive = fronts.iter().find(|front| front.subject == EXPENSIVE_SCENE).map(best_gain);
-    let name = |what: &str| format!("gain of the best quality at equal FLIP, {what}");
+    let least = gains.iter().copied().reduce(f64::min);
     let missing = "no scene outside is measured";
-    vec![
-        flip(Balanced, 0.022),
-        flip(Fast, 0.033),
-        Check::maybe(name(EXPENSIVE_SCENE), expensive, "×", Bar::AtLeast(2.5), "the scene is not measured"),
-        Check::maybe(name("geometric mean"), geometric_mean(&gains), "×", Bar::AtLeast(1.0), missing),
-        Check::maybe(name("least"), gains.into_iter().reduce(f64::min), "×", Bar::AtLeast(0.8), missing),
+    let gained = [
+        (EXPENSIVE_SCENE, expensive, 2.5, "the scene is not measured"),
+        ("geometric mean", geometric_mean(&gains), 1.0, missing),
+        ("least", least, 0.8, missing),
     ]
+    .map(|(what, gain, bar, missing)| {
+        let name = format!("gain of the best quality at equal FLIP, {what}");
+        Check::maybe(name, gain, "×", Bar::AtLeast(bar), missing)
+    });
+    [(Balanced, 0.022), (Fast, 0.033)]
+        .into_iter()
+        .map(|(quality, most)| {
+            let flips = fronts.iter().filter_map(|front| Some(front.at_quality(quality)?.flip));
+            let name = format!("`{quality}`, {} scenes: greatest FLIP", fronts.len());
+            Check::maybe(name, flips.reduce(f64::max), "", Bar::AtMost(most), "no scene")
+        })
+        .chain(gained)
+        .collect()
 }
 
 fn best_gain(front: &LightFront) -> f64 {
-    let is_shared = |row: &&LightRow| matches!(row.drawing, Drawing::LightCache(_));
-    front.rows.iter().filter(is_shared).map(|row| front.gain(row)).fold(0.0, f64::max)
+    front.rows.iter().filter(|row| row.is_shared()).map(|row| front.gain(row)).fold(0.0, f64::max)
 }
 
 /// The gain of `balanced` in a scene with indirect light.

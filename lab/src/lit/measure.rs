@@ -6,7 +6,7 @@ use std::time::Instant;
 use depth_image::{Antialias, DepthImage, LightCacheQuality, PinholeCamera, View, ViewPlanes};
 use gpu::Turn;
 use metrics::PictureErrors;
-use reconstruction::{ReconstructRequest, ReconstructionMethod, SampleSet, SetDescription};
+use reconstruction::{ReconstructRequest, SampleSet};
 use render::Lighting;
 use report::Point;
 
@@ -16,7 +16,8 @@ use super::subject::{OrbitViews, SetSize, Stage, Subject};
 use crate::evaluation::mean_errors;
 use crate::failures::cached_light::{LitScene, unknown_share};
 use crate::failures::measures::mean;
-use crate::failures::stand::Stand;
+use crate::failures::stage::CARVE;
+use crate::failures::stand::{Stand, description};
 use crate::reference_views::encoded_and_decoded;
 use crate::statistics::median;
 use crate::study::measure_rows;
@@ -90,12 +91,6 @@ struct OpenRow<'s> {
     drawer: Drawer<'s>,
 }
 
-/// Decoded images of a set, and the time of sampling it.
-struct TimedImages {
-    images: Vec<DepthImage>,
-    sampling_s: f64,
-}
-
 impl LitRows {
     /// Measures all rows.
     ///
@@ -121,8 +116,7 @@ impl LitRows {
             rows.push(OpenRow { drawing: Drawing::Direct(rays), set: None, sampling_s: 0.0, drawer });
         }
         for &set in &self.sets {
-            let TimedImages { images, sampling_s } =
-                TimedImages::sample(stage, set, |cameras| stage.lit.samples(cameras))?;
+            let (images, sampling_s) = sampled(stage, set, |cameras| stage.lit.samples(cameras))?;
             let cached = stage.lit.with_samples(&images, LightCacheQuality::Balanced)?;
             rows.extend(self.qualities.iter().map(|&quality| OpenRow {
                 drawing: Drawing::LightCache(quality),
@@ -144,24 +138,22 @@ impl LightFront {
     }
 
     pub fn direct(&self) -> DirectCurve {
-        let direct = self.rows.iter().filter(|row| matches!(row.drawing, Drawing::Direct(_)));
+        let direct = self.rows.iter().filter(|row| row.is_direct());
         DirectCurve::new(direct.map(LightRow::point))
     }
 
     /// Whether every row that is as fast has a greater error.
     pub fn is_on_front(&self, row: &LightRow) -> bool {
-        let beats = |other: &LightRow| {
+        !self.rows.iter().any(|other| {
             let is_better = other.view_ms < row.view_ms || other.flip < row.flip;
             other.view_ms <= row.view_ms && other.flip <= row.flip && is_better
-        };
-        !self.rows.iter().any(beats)
+        })
     }
 
     /// The row of a quality with the default set.
     pub fn at_quality(&self, quality: LightCacheQuality) -> Option<&LightRow> {
-        let is_wanted =
-            |row: &&LightRow| row.drawing == Drawing::LightCache(quality) && row.set == Some(SetSize::DEFAULT);
-        self.rows.iter().find(is_wanted)
+        let mut rows = self.rows.iter();
+        rows.find(|row| row.drawing == Drawing::LightCache(quality) && row.set == Some(SetSize::DEFAULT))
     }
 
     /// The time of direct drawing with a row's FLIP over the row's, at least.
@@ -171,6 +163,15 @@ impl LightFront {
 }
 
 impl LightRow {
+    pub fn is_direct(&self) -> bool {
+        matches!(self.drawing, Drawing::Direct(_))
+    }
+
+    /// Whether light comes from samples.
+    pub fn is_shared(&self) -> bool {
+        matches!(self.drawing, Drawing::LightCache(_))
+    }
+
     /// The time of a view, and its FLIP.
     pub fn point(&self) -> Point {
         (self.view_ms, self.flip).into()
@@ -203,35 +204,24 @@ fn antialias() -> Antialias {
 
 fn joint_carve<'s>(stage: &Stage<'s>) -> anyhow::Result<OpenRow<'s>> {
     let set = SetSize::DEFAULT;
-    let TimedImages { images, sampling_s } =
-        TimedImages::sample(stage, set, |cameras| stage.lit.color_samples(cameras))?;
-    let description = SetDescription {
-        volume: stage.scene.bounds(),
-        background: stage.scene.background,
-        illumination: &stage.scene.illumination,
-        highlight: None,
-        environment: None,
-        mips: false,
-    };
-    let images = stage.stand.reconstructor().upload(&images, &description, Turn::default())?;
+    let (images, sampling_s) = sampled(stage, set, |cameras| stage.lit.color_samples(cameras))?;
+    let images = stage.stand.reconstructor().upload(&images, &description(&stage.scene, None), Turn::default())?;
     let drawer = Drawer::Images(stage.stand, Box::new(images));
     Ok(OpenRow { drawing: Drawing::JointCarve, set: Some(set), sampling_s, drawer })
 }
 
-impl TimedImages {
-    fn sample(
-        stage: &Stage<'_>,
-        set: SetSize,
-        sample: impl Fn(&[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>>,
-    ) -> anyhow::Result<Self> {
-        sample(&stage.sample_cameras(SetSize { density: WARM_UP_DENSITY, ..set }))?;
-        let cameras = stage.sample_cameras(set);
-        let start = Instant::now();
-        let images = sample(&cameras)?;
-        let sampling_s = start.elapsed().as_secs_f64();
-        let images = images.iter().map(encoded_and_decoded).collect::<anyhow::Result<_>>()?;
-        Ok(Self { images, sampling_s })
-    }
+/// Decoded images of a set, and the seconds of sampling it.
+fn sampled(
+    stage: &Stage<'_>,
+    set: SetSize,
+    sample: impl Fn(&[PinholeCamera]) -> anyhow::Result<Vec<DepthImage>>,
+) -> anyhow::Result<(Vec<DepthImage>, f64)> {
+    sample(&stage.sample_cameras(SetSize { density: WARM_UP_DENSITY, ..set }))?;
+    let cameras = stage.sample_cameras(set);
+    let start = Instant::now();
+    let images = sample(&cameras)?;
+    let sampling_s = start.elapsed().as_secs_f64();
+    Ok((images.iter().map(encoded_and_decoded).collect::<anyhow::Result<_>>()?, sampling_s))
 }
 
 impl Drawer<'_> {
@@ -240,8 +230,7 @@ impl Drawer<'_> {
         let mut views = match self {
             Self::Scene(lit) => lit.views(cameras, planes)?,
             Self::Images(stand, set) => {
-                let method = ReconstructionMethod::JointCarve { stop_level: 0 };
-                let request = ReconstructRequest::new(set, cameras, method);
+                let request = ReconstructRequest::new(set, cameras, CARVE);
                 stand.reconstructor().reconstruct(ReconstructRequest { planes, ..request })?
             }
         };

@@ -60,9 +60,8 @@ impl<'f> ComparedRow<'f> {
 fn chart(front: &LightFront) -> XyChart {
     let title = format!("FLIP against time, {}", front.name());
     let chart = XyChart::new(title, Axis::log("a view", "ms"), Axis::log("Foreground FLIP", ""));
-    let is_direct = |row: &&LightRow| matches!(row.drawing, Drawing::Direct(_));
-    let direct: Vec<Point> = front.rows.iter().filter(is_direct).map(point).collect();
-    let others: Vec<LightRow> = front.rows.iter().filter(|row| !is_direct(row)).cloned().collect();
+    let direct: Vec<Point> = front.rows.iter().filter(|row| row.is_direct()).map(point).collect();
+    let others: Vec<LightRow> = front.rows.iter().filter(|row| !row.is_direct()).cloned().collect();
     let chart = chart.with(Series::line("direct", direct));
     let mut chart = with_series(chart, &others, Mark::Points, |row| row.drawing.to_string(), point);
     chart = chart.with_front(Better::Low, Better::Low);

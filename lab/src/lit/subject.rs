@@ -110,21 +110,21 @@ impl Stage<'_> {
             images => self.cell.nested_cameras(images, self.corners[0].size_px),
         };
         let focal_px = self.views[0].focal_px.y * set.density;
-        let resized = |camera: PinholeCamera| {
+        let resized = cameras.into_iter().map(|camera| {
             let size_px = camera.size_px.as_vec2() * (focal_px / camera.focal_px.y);
             camera.resized(size_px.round().as_uvec2())
-        };
-        cameras.into_iter().map(resized).collect()
+        });
+        resized.collect()
     }
 }
 
 impl Inside {
     fn corners(&self, near_m: f32) -> anyhow::Result<Vec<PinholeCamera>> {
-        let camera = |eye: [f32; 3]| {
+        let cameras = self.eyes.map(|eye| {
             let target = Vec3::from(eye) + Vec3::from(self.towards);
             let aimed = PinholeCamera::looking_at(eye.into(), target, Vec3::Y, INSIDE_FOV_Y_RAD, VIEW_PX);
             PinholeCamera { near_m, ..aimed }
-        };
-        Ok(ViewCell::between(&self.eyes.map(camera)).context("a view cell")?.grid(2, 2, VIEW_PX))
+        });
+        Ok(ViewCell::between(&cameras).context("a view cell")?.grid(2, 2, VIEW_PX))
     }
 }

@@ -7,9 +7,11 @@ use app_core::delivery::{at_rate, open, request};
 use app_core::live::{Drive, Record, drive};
 use client::{Client, ClientError, LiveView, Session};
 use cluster::{DIRECT, PolicyChoice, SessionRequest};
-use depth_image::{PinholeCamera, ViewCell};
+use depth_image::PinholeCamera;
 use glam::UVec2;
 use tokio::task::JoinSet;
+
+use crate::processes::orbit;
 
 /// Poses of a path; at 10 a second it takes 24 s.
 const PATH_POSES: usize = 240;
@@ -60,8 +62,7 @@ impl Tour {
     pub async fn of(coordinator: &str, wanted: &Wanted, rate_hz: f64) -> anyhow::Result<Self> {
         let status = Client::connect(coordinator).await?.status().await?;
         let offer = status.offers.into_iter().next().context("the coordinator does not say what it shows")?;
-        let samples: Vec<_> = offer.sample_cameras.iter().map(|camera| *camera.reference()).collect();
-        let path = ViewCell::between(&samples).context("no sample cameras")?.orbit(PATH_POSES, wanted.size_px);
+        let path = orbit(&offer, PATH_POSES, wanted.size_px)?;
         let mut settings = offer.settings;
         settings.method = wanted.method.clone().or(settings.method);
         let is_direct = settings.method.as_deref() == Some(DIRECT);

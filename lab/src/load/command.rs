@@ -1,16 +1,13 @@
 //! `myriorama-lab bench load`: many clients on real processes.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
-use ::report::Report;
 use app_core::exit::Outcome;
 use app_core::process::runtime;
 use app_core::progress::bar;
 use app_core::sizes::SizePx;
 use clap::Args;
 use glam::UVec2;
-use gpu::DevicePreference;
 use render::Lighting;
 use scene::SceneSpec;
 
@@ -18,9 +15,11 @@ use super::clients::Wanted;
 use super::{phases, report};
 use crate::cpu_share::Hierarchy;
 use crate::processes::{Setting, Share};
+use crate::study::{RunArgs, new_report, number_within};
 
 /// Measures four loads, each on a coordinator and node processes of its own. Of views of 320×180, 8 clients
-/// ask for 10 frames a second, 16 for 15, 80 for 10, and 200 for none, unless options say otherwise.
+/// ask for 10 frames a second, 16 for 15, 80 for 10, and 200 for none, unless options say otherwise. With --quick each load
+/// takes half a minute.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: myriorama-lab bench load --minutes 10 --strict")]
 pub struct LoadArgs {
@@ -34,53 +33,29 @@ pub struct LoadArgs {
     #[arg(long, default_value_t = SizePx(UVec2::new(320, 180)), value_name = "WxH")]
     size: SizePx,
     /// Frames a second that each client asks for, in place of 10, 15 and 10
-    #[arg(long, value_name = "HZ", value_parser = hertz)]
+    #[arg(long, value_name = "HZ", value_parser = |text: &str| number_within(text, 0.01..=1000.0))]
     rate: Option<f64>,
     /// How views are made: a reconstruction method or direct [default: by the lighting]
     #[arg(long, value_name = "NAME")]
     method: Option<String>,
-    /// any (a GPU if there is one) or software
-    #[arg(long, default_value_t, value_name = "NAME", env = "MYRIORAMA_DEVICE")]
-    device: DevicePreference,
     /// The number of node processes, P
     #[arg(long, default_value_t = 1, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=64))]
     nodes: u16,
     /// Cores of each node, by a control group; 0 sets no limit. Without a limit, each node of a machine promises all of
     /// it [default: all cores but half a one, divided; no limit for one node, or without control groups]
-    #[arg(long, value_name = "CORES", value_parser = cores)]
+    #[arg(long, value_name = "CORES", value_parser = |text: &str| number_within(text, 0.0..=1024.0))]
     share: Option<f64>,
     /// The time of each load
-    #[arg(long, default_value_t = 10.0, value_name = "MIN", value_parser = minutes)]
+    #[arg(long, default_value_t = 10.0, value_name = "MIN",
+        value_parser = |text: &str| number_within(text, 0.1..=1440.0))]
     minutes: f64,
-    /// Half a minute for each load
-    #[arg(long)]
-    quick: bool,
-    /// Where the report goes
-    #[arg(long, default_value = "out/bench-load", value_name = "DIR")]
-    out: PathBuf,
-    /// Exit status 1 when a check falls short
-    #[arg(long)]
-    strict: bool,
-}
-
-fn cores(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|cores| (0.0..=1024.0).contains(cores)).ok_or_else(|| "expected 0 to 1024".to_owned())
-}
-
-fn hertz(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|hz| (0.01..=1000.0).contains(hz)).ok_or_else(|| "expected 0.01 to 1000".to_owned())
-}
-
-fn minutes(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|minutes| (0.1..=1440.0).contains(minutes))
-        .ok_or_else(|| "expected 0.1 to 1440".to_owned())
+    #[command(flatten)]
+    run: RunArgs,
 }
 
 impl LoadArgs {
     fn lasting(&self) -> Duration {
-        Duration::from_secs_f64(if self.quick { 30.0 } else { self.minutes * 60.0 })
+        Duration::from_secs_f64(if self.run.quick { 30.0 } else { self.minutes * 60.0 })
     }
 
     fn wanted(&self) -> Wanted {
@@ -91,14 +66,14 @@ impl LoadArgs {
         let coordinator =
             ["--scene".to_owned(), self.scene.to_string(), "--lighting".to_owned(), self.lighting.to_string()];
         let share = self.share_cores().map_or(Share::Whole, Share::Cores);
-        Setting { coordinator: coordinator.into(), device: self.device, nodes: self.nodes.into(), share }
+        Setting { coordinator: coordinator.into(), device: self.run.device.device, nodes: self.nodes.into(), share }
     }
 
     fn share_cores(&self) -> Option<f64> {
         let all = std::thread::available_parallelism().map_or(1.0, |cores| cores.get() as f64);
         let is_shared = self.nodes > 1 && Hierarchy::find().is_ok();
-        let equal = || is_shared.then(|| (all - 0.5) / f64::from(self.nodes));
-        self.share.or_else(equal).filter(|cores| *cores > 0.0)
+        let equal = is_shared.then(|| (all - 0.5) / f64::from(self.nodes));
+        self.share.or(equal).filter(|cores| *cores > 0.0)
     }
 }
 
@@ -110,8 +85,7 @@ pub fn run(args: &LoadArgs) -> anyhow::Result<Outcome> {
     let progress = bar("load", 4);
     let phases = runtime()?.block_on(phases::run(&args.setting(), &args.wanted(), args.lasting(), &progress))?;
     progress.finish_and_clear();
-    let mut report = Report::new("Myriorama bench load", phases.device.clone());
-    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    let mut report = new_report("Myriorama bench load", &phases.device);
     report.parameter("scene", args.scene.to_string());
     report.parameter("lighting", args.lighting.to_string());
     report.parameter("size", args.size.to_string());
@@ -122,7 +96,5 @@ pub fn run(args: &LoadArgs) -> anyhow::Result<Outcome> {
     report.parameter("each load", format!("{} s", args.lasting().as_secs()));
     report::add(&phases, &mut report)?;
     println!("{}\n", phases.device);
-    report.tables.iter().for_each(|table| println!("{}", table.to_markdown()));
-    let ok = report.finish(&args.out)?;
-    Ok(Outcome::of(ok || !args.strict))
+    args.run.finish("out/bench-load", &report)
 }

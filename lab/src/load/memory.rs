@@ -4,6 +4,7 @@ use report::{Axis, Cell, Series, Table, XyChart};
 
 use super::phases::{Idle, Load};
 use super::statistics::WARM_UP;
+use crate::statistics::mean_of;
 
 pub(super) fn memory(loads: &[Load]) -> anyhow::Result<Table> {
     let columns = [
@@ -16,8 +17,8 @@ pub(super) fn memory(loads: &[Load]) -> anyhow::Result<Table> {
     let mut table = Table::new("Memory", &columns);
     for load in loads {
         for (name, looks) in &load.memory {
-            let at = |look: Option<&(f64, f64)>| look.map_or(f64::NAN, |look| look.1);
-            let numbers = [at(looks.first()), at(looks.last()), slope_mib_per_s(steady(looks)) * 60.0];
+            let [first, last] = [looks.first(), looks.last()].map(|look| look.map_or(f64::NAN, |look| look.1));
+            let numbers = [first, last, slope_mib_per_s(steady(looks)) * 60.0];
             table.push([load.name.clone().into(), name.clone().into()].into_iter().chain(numbers.map(Cell::from)))?;
         }
     }
@@ -48,23 +49,21 @@ fn steady(looks: &[(f64, f64)]) -> &[(f64, f64)] {
 
 /// The slope by least squares.
 pub(super) fn slope_mib_per_s(looks: &[(f64, f64)]) -> f64 {
-    let count = looks.len() as f64;
-    let mean = |value: fn(&(f64, f64)) -> f64| looks.iter().map(value).sum::<f64>() / count;
-    let x = mean(|look| look.0);
-    let y = mean(|look| look.1);
+    let x = mean_of(looks, |look| look.0);
+    let y = mean_of(looks, |look| look.1);
     let above: f64 = looks.iter().map(|look| (look.0 - x) * (look.1 - y)).sum();
     above / looks.iter().map(|look| (look.0 - x).powi(2)).sum::<f64>()
 }
 
 /// The growth of the process that gains most, over the whole load, as a share of its memory.
 pub(super) fn growth(load: &Load) -> f64 {
-    let of = |(_, looks): &(String, Vec<(f64, f64)>)| {
-        let looks = steady(looks);
-        let mean = looks.iter().map(|look| look.1).sum::<f64>() / looks.len() as f64;
-        slope_mib_per_s(looks) * load.clients.lasting.as_secs_f64() / mean
-    };
     // The clients keep the times of every frame.
-    load.memory.iter().filter(|(name, _)| name != "clients").map(of).fold(f64::NAN, f64::max)
+    let servers = load.memory.iter().filter(|(name, _)| name != "clients");
+    let growths = servers.map(|(_, looks)| {
+        let looks = steady(looks);
+        slope_mib_per_s(looks) * load.clients.lasting.as_secs_f64() / mean_of(looks, |look| look.1)
+    });
+    growths.fold(f64::NAN, f64::max)
 }
 
 pub(super) fn memory_chart(load: &Load) -> XyChart {

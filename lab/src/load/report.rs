@@ -7,6 +7,8 @@ use report::{Axis, Bar, BarChart, Cell, Check, Report, Series, Table, XyChart};
 
 use super::memory::{growth, idle, memory, memory_chart};
 use super::phases::{Load, Phases};
+use crate::statistics::mean_of;
+use crate::study::{Column, table};
 
 /// The least share of frames that must come undegraded.
 const DELIVERED: f64 = 0.99;
@@ -17,9 +19,26 @@ const IDLE_MIB: f64 = 1.0;
 /// The most memory that a process may gain, as a share.
 const GROWTH: f64 = 0.05;
 
+const CLIENTS: [Column<Load>; 12] = [
+    Column::new("clients × frames/s", |load| load.name.as_str().into()),
+    Column::new("admitted", |load| load.served().count().into()),
+    Column::new("refused", |load| load.refused().into()),
+    Column::new("poses", |load| (load.posed() as usize).into()),
+    Column::new("frames", |load| load.shown().count().into()),
+    Column::new("frames a second, all clients", |load| {
+        (load.shown().count() as f64 / load.clients.lasting.as_secs_f64()).into()
+    }),
+    Column::with_unit("undegraded", "%", |load| (load.undegraded_share() * 100.0).into()),
+    Column::with_unit("degraded", "%", |load| (load.degraded() as f64 / load.posed() as f64 * 100.0).into()),
+    Column::with_unit("rate kept, worst client", "%", |load| (quantile(&load.rate_shares(), 0.0) * 100.0).into()),
+    Column::with_unit("rate kept, mean", "%", |load| (mean_of(&load.rate_shares(), |share| *share) * 100.0).into()),
+    Column::with_unit("age, median", "ms", |load| load.age_ms(0.5).into()),
+    Column::with_unit("age, 99 %", "ms", |load| load.age_ms(0.99).into()),
+];
+
 /// Adds tables, charts and checks.
 pub fn add(phases: &Phases, report: &mut Report) -> anyhow::Result<()> {
-    report.tables.push(clients(&phases.loads)?);
+    report.tables.push(table("Clients", &CLIENTS, &phases.loads)?);
     for load in &phases.loads {
         report.tables.push(latencies(&format!("From pose to picture, {}", load.name), load.shown())?);
     }
@@ -32,41 +51,6 @@ pub fn add(phases: &Phases, report: &mut Report) -> anyhow::Result<()> {
     report.charts.extend(phases.loads.first().map(|load| memory_chart(load).into()));
     report.checks.extend(checks(phases));
     Ok(())
-}
-
-fn clients(loads: &[Load]) -> anyhow::Result<Table> {
-    let columns = [
-        ("clients × frames/s", ""),
-        ("admitted", ""),
-        ("refused", ""),
-        ("poses", ""),
-        ("frames", ""),
-        ("frames a second, all clients", ""),
-        ("undegraded", "%"),
-        ("degraded", "%"),
-        ("rate kept, worst client", "%"),
-        ("rate kept, mean", "%"),
-        ("age, median", "ms"),
-        ("age, 99 %", "ms"),
-    ];
-    let mut table = Table::new("Clients", &columns);
-    for load in loads {
-        let shares = load.rate_shares();
-        let mean = shares.iter().sum::<f64>() / shares.len() as f64;
-        let counts = [load.served().count(), load.refused(), load.posed() as usize, load.shown().count()];
-        let numbers = [
-            load.shown().count() as f64 / load.clients.lasting.as_secs_f64(),
-            load.undegraded_share() * 100.0,
-            load.degraded() as f64 / load.posed() as f64 * 100.0,
-            quantile(&shares, 0.0) * 100.0,
-            mean * 100.0,
-            load.age_ms(0.5),
-            load.age_ms(0.99),
-        ];
-        let head = [Cell::from(load.name.clone())].into_iter().chain(counts.map(Cell::from));
-        table.push(head.chain(numbers.map(Cell::from)))?;
-    }
-    Ok(table)
 }
 
 /// Fallbacks, in the order of their first use.
@@ -110,11 +94,11 @@ fn ages(loads: &[Load]) -> XyChart {
 fn stages(loads: &[Load]) -> BarChart {
     let bars = loads.iter().map(|load| load.name.clone());
     let chart = BarChart::new("Where a frame's time goes, mean", Axis::linear("time", "ms"), bars);
-    let mean_ms = |load: &Load, stage: usize| {
-        load.shown().map(|shown| shown.stages_s[stage]).sum::<f64>() * 1e3 / load.shown().count() as f64
-    };
     STAGES.into_iter().enumerate().fold(chart, |chart, (stage, name)| {
-        chart.with(name, loads.iter().map(|load| mean_ms(load, stage)).collect::<Vec<_>>())
+        let means_ms = loads.iter().map(|load| {
+            load.shown().map(|shown| shown.stages_s[stage]).sum::<f64>() * 1e3 / load.shown().count() as f64
+        });
+        chart.with(name, means_ms.collect::<Vec<_>>())
     })
 }
 

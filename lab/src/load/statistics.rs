@@ -48,11 +48,11 @@ impl Load {
     pub(super) fn rate_shares(&self) -> Vec<f64> {
         let lasting_s = self.clients.lasting.as_secs_f64();
         let from_s = lasting_s * WARM_UP;
-        let of = |record: &Record| {
+        let shares = self.served().map(|record| {
             let count = record.shown.iter().filter(|shown| (from_s..lasting_s).contains(&shown.posed_s)).count();
             count as f64 / ((lasting_s - from_s) * self.clients.rate_hz)
-        };
-        let mut shares: Vec<f64> = self.served().map(of).collect();
+        });
+        let mut shares: Vec<f64> = shares.collect();
         shares.sort_by(f64::total_cmp);
         shares
     }

@@ -9,14 +9,14 @@ use super::sizes::{sizes, sizes_report};
 use super::subject::{SCENES, Subject};
 use super::tables::tables;
 use super::times::{times, times_report};
-use crate::study::StudyArgs;
+use crate::study::RunArgs;
 
 /// Samples a bird's nest, grass, a city and a tree from three viewpoints by every method. Reports redundant,
 /// disoccluded and useful samples, their availability in output frames, and the costs of sampling.
 #[derive(Debug, Args)]
 pub struct SamplingArgs {
     #[command(flatten)]
-    study: StudyArgs,
+    study: RunArgs,
     /// Only these scenes: bird-nest, grass, urban, tree
     #[arg(long = "scene", value_name = "NAME", value_parser = SCENES)]
     scenes: Vec<String>,
@@ -33,10 +33,11 @@ pub fn run(args: &SamplingArgs) -> anyhow::Result<Outcome> {
     report.parameter("sample images", format!("3 of {0}×{0}", extent.side_px));
     report.parameter("views between them", extent.views);
     report.parameter("seeded samples an image", extent.seeds);
-    let is_wanted = |name: &&&str| args.scenes.is_empty() || args.scenes.iter().any(|wanted| wanted == **name);
+    let wanted =
+        SCENES.into_iter().filter(|name| args.scenes.is_empty() || args.scenes.iter().any(|wanted| wanted == name));
     let mut rows = Vec::new();
     let mut costs = Vec::new();
-    for name in SCENES.iter().filter(is_wanted) {
+    for name in wanted {
         let subject = Subject::load(&engine, name)?;
         // Times come first: they need the machine as it is.
         costs.push((subject.name.clone(), times(&subject, extent)?));
@@ -45,5 +46,5 @@ pub fn run(args: &SamplingArgs) -> anyhow::Result<Outcome> {
     }
     tables(&rows, &mut report)?;
     times_report(&costs, extent, &mut report)?;
-    args.study.finish("sampling", &report)
+    args.study.finish("out/study/sampling", &report)
 }

@@ -4,7 +4,7 @@ use depth_image::DepthImage;
 use rayon::prelude::*;
 use sampling::SamplingMethod;
 
-use super::held::{Held, HeldSample, held_samples};
+use super::held::{Held, HeldSample, held_samples, is_held};
 use super::methods::METHODS;
 
 /// Samples of one image of one method, before dilation and hysteresis.
@@ -38,23 +38,22 @@ pub fn image_counts(sets: &[Vec<DepthImage>]) -> Vec<Vec<ImageCount>> {
 
 fn counts_of(method: SamplingMethod, set: &[DepthImage], conventional: &[Held<'_>]) -> Vec<ImageCount> {
     let held: Vec<Held<'_>> = set.iter().filter_map(Held::of).collect();
-    let count = |(number, image): (usize, &DepthImage)| {
+    let counts = set.iter().enumerate().map(|(number, image)| {
         let samples = held_samples(image);
-        let before = |sample: &&HeldSample| held[..number].iter().any(|other| other.has(sample));
         let beside = match method {
             SamplingMethod::DepthPeeling { .. } => conventional,
             _ => &conventional[number..=number],
         };
         let disoccluded: Vec<HeldSample> =
-            samples.par_iter().filter(|sample| !beside.iter().any(|other| other.has(sample))).copied().collect();
+            samples.par_iter().filter(|sample| !is_held(sample, beside)).copied().collect();
         ImageCount {
             samples: samples.len(),
-            redundant: samples.par_iter().filter(before).count(),
+            redundant: samples.par_iter().filter(|sample| is_held(sample, &held[..number])).count(),
             useful: vec![false; disoccluded.len()],
             disoccluded,
         }
-    };
-    set.iter().enumerate().map(count).collect()
+    });
+    counts.collect()
 }
 
 /// Marks samples that a frame needs: it shows their surface at the same pixel.

@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use depth_image::{Camera, DepthImage, PinholeCamera};
 use engine::GpuEngine;
-use glam::{UVec2, Vec3};
-use render::{DrawWork, Lighting, Refinement, SamplePlanes, Visibility};
+use glam::{Mat2, UVec2, Vec2, Vec3};
+use render::{DrawWork, Lighting, SamplePlanes, Visibility};
 use sampling::{Redundancy, SampleWork, Sampler, SamplingMethod};
 use scene::{Mesh, MeshPart, Scene, Vertex};
+
+use crate::failures::stand::work;
 
 const SIDE_PX: u32 = 64;
 const DISTANCE_M: f32 = 4.0;
@@ -25,14 +27,7 @@ pub fn found_redundant(engine: &Arc<GpuEngine>, leg_px: f32) -> anyhow::Result<[
     let name = format!("wall cut to {leg_px} px");
     engine.put_scene(&name, &wall(leg_px))?;
     let on_device = engine.scene(&name)?;
-    let draw = DrawWork {
-        scene: &on_device,
-        lighting: Lighting::UNLIT,
-        scene_time_s: 0.0,
-        visibility: Visibility::Measured,
-        refinement: Refinement::default(),
-        turn: Default::default(),
-    };
+    let draw = DrawWork { visibility: Visibility::Measured, ..work(&on_device, Lighting::UNLIT) };
     let mut found = [0.0; 3];
     for (found, test) in found.iter_mut().zip(TESTS) {
         let method = SamplingMethod::NonRedundant(test);
@@ -51,11 +46,10 @@ pub fn found_redundant(engine: &Arc<GpuEngine>, leg_px: f32) -> anyhow::Result<[
 }
 
 fn cameras() -> [Camera; 2] {
-    let camera = |x: f32| {
+    [0.0, BASELINE_M].map(|x| {
         let eye = Vec3::new(x, 0.11 * x, DISTANCE_M);
-        PinholeCamera::looking_at(eye, eye - Vec3::Z, Vec3::Y, 0.6, UVec2::splat(SIDE_PX))
-    };
-    [camera(0.0), camera(BASELINE_M)].map(Camera::Pinhole)
+        PinholeCamera::looking_at(eye, eye - Vec3::Z, Vec3::Y, 0.6, UVec2::splat(SIDE_PX)).into()
+    })
 }
 
 /// The share of dropped samples in the middle third, which the first image sees whole.
@@ -73,20 +67,18 @@ fn wall(leg_px: f32) -> Scene {
     let pixel_m = DISTANCE_M * (0.3f32).tan() * 2.0 / SIDE_PX as f32;
     let leg_m = leg_px * pixel_m;
     let half = ((0.75 * SIDE_PX as f32 * pixel_m) / leg_m).ceil().max(1.0) as i32;
-    let turn = glam::Mat2::from_angle(0.35);
+    let turn = Mat2::from_angle(0.35);
     let columns = (2 * half + 1) as u32;
-    let vertex = |x: i32, y: i32| {
-        let p = turn * (glam::Vec2::new(x as f32 + 0.31, y as f32 + 0.17) * leg_m);
+    let corners = (-half..=half).flat_map(|y| (-half..=half).map(move |x| Vec2::new(x as f32, y as f32)));
+    let vertices = corners.map(|corner| {
+        let p = turn * ((corner + Vec2::new(0.31, 0.17)) * leg_m);
         let position = [p.x, p.y, 0.0];
         Vertex { position, normal: [0.0, 0.0, 1.0], uv: [0.0; 2], color_srgba8: [200, 200, 200, 255], sway: 0.0 }
-    };
-    let vertices = (-half..=half).flat_map(|y| (-half..=half).map(move |x| vertex(x, y))).collect();
-    let square = |(x, y): (u32, u32)| {
-        let a = y * columns + x;
-        [a, a + 1, a + columns, a + columns, a + 1, a + columns + 1]
-    };
-    let indices: Vec<u32> =
-        (0..columns - 1).flat_map(|y| (0..columns - 1).map(move |x| (x, y))).flat_map(square).collect();
+    });
+    let vertices = vertices.collect();
+    let firsts = (0..columns - 1).flat_map(|y| (0..columns - 1).map(move |x| y * columns + x));
+    let squares = firsts.flat_map(|a| [a, a + 1, a + columns, a + columns, a + 1, a + columns + 1]);
+    let indices: Vec<u32> = squares.collect();
     let mut scene = fixtures::quad(Vec3::ZERO, 1.0, Vec3::Z, [200; 3]);
     let parts = vec![MeshPart { first_index: 0, index_count: indices.len() as u32, material: 0 }];
     scene.meshes = vec![Mesh { vertices, indices, parts, ..Mesh::default() }];

@@ -15,7 +15,6 @@ pub struct Extent {
 
 impl Extent {
     /// The paper's size, or a smaller one.
-    #[must_use]
     pub fn of(quick: bool) -> Self {
         if quick {
             Self { side_px: 256, views: 64, seeds: 512, sides: 2 }

@@ -27,7 +27,6 @@ pub struct HeldSample {
 
 impl<'a> Held<'a> {
     /// The surfaces of an image; `None` without surface ids.
-    #[must_use]
     pub fn of(image: &'a DepthImage) -> Option<Self> {
         let camera = image.camera.reference();
         let size = camera.size_px.as_vec2();
@@ -42,7 +41,6 @@ impl<'a> Held<'a> {
     }
 
     /// True if the image has a sample of the same triangle at the pixel where the point is seen (Xie, Algorithm 3).
-    #[must_use]
     pub fn has(&self, sample: &HeldSample) -> bool {
         let p = sample.point_in_world.extend(1.0);
         let [u, v, w] = self.homogeneous_pixel_from_world.map(|row| row.dot(p));
@@ -57,15 +55,19 @@ impl<'a> Held<'a> {
 }
 
 /// All samples of an image with surface ids, row by row.
-#[must_use]
 pub fn held_samples(image: &DepthImage) -> Vec<HeldSample> {
     let Some(ids) = &image.surface_id else { return Vec::new() };
     let width = image.size_px().x;
-    let sample = |(index, id): (usize, &SurfaceId)| {
+    let samples = ids.iter().enumerate().filter_map(|(index, id)| {
         let point_in_world = image.sample_in_world(index as u32 % width, index as u32 / width)?;
         Some(HeldSample { index, point_in_world, id: *id })
-    };
-    ids.iter().enumerate().filter_map(sample).collect()
+    });
+    samples.collect()
+}
+
+/// Whether one of some images has a sample.
+pub fn is_held(sample: &HeldSample, images: &[Held<'_>]) -> bool {
+    images.iter().any(|image| image.has(sample))
 }
 
 #[cfg(test)]

@@ -4,12 +4,12 @@ use glam::UVec2;
 use report::{Axis, Bar, Check, Report, Series, XyChart};
 use sampling::{Redundancy, SamplingMethod};
 
-use super::counts::{ImageCount, image_counts, mark_useful, percent};
+use super::counts::{image_counts, mark_useful, percent};
 use super::extent::Extent;
 use super::held::Held;
 use super::methods::{IMAGES, METHODS};
 use super::subject::{Subject, WITH_IDS};
-use super::visibility::{Seen, seen};
+use super::visibility::seen;
 use crate::study::{Column, measure_rows, table};
 
 const SIDES_PX: [u32; 4] = [256, 512, 1024, 2048];
@@ -79,21 +79,20 @@ impl SizeRow {
             frames.iter().filter_map(Held::of).for_each(|frame| mark_useful(&mut counts, &frame));
             Ok(())
         })?;
-        let counted = |place: usize, share: fn(&ImageCount) -> f64| mean_of_later(&counts[place], share);
-        let traced = |images: &[Seen], share: fn(&Seen) -> f64| 100.0 * mean_of_later(images, share);
+        let [conventional, by_pixel] = [&counts[0], &counts[1]];
         Ok(Self {
             side_px,
             redundant: [
-                counted(0, |image| percent(image.redundant, image.samples)),
-                traced(&redundant, |image| image.redundant.share),
+                mean_of_later(conventional, |image| percent(image.redundant, image.samples)),
+                100.0 * mean_of_later(&redundant, |image| image.redundant.share),
             ],
             disoccluded: [
-                counted(1, |image| percent(image.disoccluded.len(), image.samples)),
-                traced(&disoccluded, |image| image.disoccluded.share),
+                mean_of_later(by_pixel, |image| percent(image.disoccluded.len(), image.samples)),
+                100.0 * mean_of_later(&disoccluded, |image| image.disoccluded.share),
             ],
             useful: [
-                counted(1, |image| percent(image.useful_count(), image.disoccluded.len())),
-                traced(&disoccluded, |image| image.useful.share),
+                mean_of_later(by_pixel, |image| percent(image.useful_count(), image.disoccluded.len())),
+                100.0 * mean_of_later(&disoccluded, |image| image.useful.share),
             ],
         })
     }
@@ -112,19 +111,19 @@ pub fn sizes_report(scene: &str, rows: &[SizeRow], report: &mut Report) -> anyho
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(()) };
     report.tables.push(table(format!("Fig. 7, {scene}"), &COLUMNS, rows)?);
     for (what, of) in METRICS {
-        let chart = XyChart::new(
+        let mut chart = XyChart::new(
             format!("Fig. 7, {scene}: {what} samples"),
             Axis::log("side of images", "px"),
             Axis::linear(what, "%"),
         );
-        let line = |name: &str, place: usize| {
-            Series::line(name, rows.iter().map(move |row| (f64::from(row.side_px), of(row)[place])))
-        };
-        report.charts.push(chart.with(line("by pixel", 0)).with(line("by visibility", 1)).into());
-        let gap = |row: &SizeRow| (of(row)[0] - of(row)[1]).abs();
+        for (place, name) in ["by pixel", "by visibility"].into_iter().enumerate() {
+            chart = chart.with(Series::line(name, rows.iter().map(|row| (f64::from(row.side_px), of(row)[place]))));
+        }
+        report.charts.push(chart.into());
+        let [last_gap, first_gap] = [last, first].map(|row| (of(row)[0] - of(row)[1]).abs());
         let sides = format!("gap at {} px over that at {} px", last.side_px, first.side_px);
         let name = format!("{scene}: {what} by pixel and by visibility, {sides}");
-        report.checks.push(Check::new(name, gap(last) / gap(first), "×", Bar::AtMost(0.75)));
+        report.checks.push(Check::new(name, last_gap / first_gap, "×", Bar::AtMost(0.75)));
     }
     Ok(())
 }

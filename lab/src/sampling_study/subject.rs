@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use app_core::setup::SceneArgs;
-use depth_image::{Antialias, Camera, DepthImage, PinholeCamera};
+use depth_image::{Antialias, DepthImage, PinholeCamera};
 use engine::GpuEngine;
 use glam::{UVec2, Vec2, Vec3};
-use render::{DrawWork, GpuScene, Lighting, Refinement, SamplePlanes, Visibility};
+use render::{DrawWork, GpuScene, Lighting, SamplePlanes, Visibility};
 use sampling::{Rig, SampleWork, Sampler, SamplingMethod};
 
 use super::methods::IMAGES;
+use crate::failures::stand::{pinholes, work};
 
 /// The paper's scenes, as this project makes them.
 pub const SCENES: [&str; 4] = ["bird-nest", "grass", "urban", "tree"];
@@ -68,32 +69,24 @@ impl Subject {
     }
 
     /// The sample cameras of a method.
-    #[must_use]
     pub fn cameras(&self, method: SamplingMethod, size_px: UVec2) -> Vec<PinholeCamera> {
         method.cameras(CORNERS.iter().map(|&corner| self.rig.camera_at(corner, size_px)).collect())
     }
 
     /// Views spread over the triangle between the viewpoints (R2, folded).
-    #[must_use]
     pub fn between(&self, count: usize, size_px: UVec2) -> Vec<PinholeCamera> {
         const STEP: Vec2 = Vec2::new(0.754_877_7, 0.569_840_3);
-        let place = |i: usize| {
+        let cameras = (0..count).map(|i| {
             let p = (Vec2::splat(0.5) + STEP * i as f32).fract();
             let p = if p.x + p.y > 1.0 { Vec2::ONE - p } else { p };
-            CORNERS[0] + (CORNERS[1] - CORNERS[0]) * p.x + (CORNERS[2] - CORNERS[0]) * p.y
-        };
-        (0..count).map(|i| self.rig.camera_at(place(i), size_px)).collect()
+            let place = CORNERS[0] + (CORNERS[1] - CORNERS[0]) * p.x + (CORNERS[2] - CORNERS[0]) * p.y;
+            self.rig.camera_at(place, size_px)
+        });
+        cameras.collect()
     }
 
     pub(super) fn work(&self) -> DrawWork<'_> {
-        DrawWork {
-            scene: &self.scene,
-            lighting: Lighting::UNLIT,
-            scene_time_s: 0.0,
-            visibility: Visibility::Measured,
-            refinement: Refinement::default(),
-            turn: Default::default(),
-        }
+        DrawWork { visibility: Visibility::Measured, ..work(&self.scene, Lighting::UNLIT) }
     }
 
     /// Images of a method with the planes that are asked for.
@@ -106,7 +99,7 @@ impl Subject {
         size_px: UVec2,
         planes: SamplePlanes,
     ) -> anyhow::Result<Vec<DepthImage>> {
-        let cameras: Vec<Camera> = self.cameras(method, size_px).into_iter().map(Camera::Pinhole).collect();
+        let cameras = pinholes(&self.cameras(method, size_px));
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
         let work = SampleWork {
             draw: self.work(),
@@ -130,8 +123,7 @@ impl Subject {
     ) -> anyhow::Result<()> {
         let planes = SamplePlanes { surface_id: true, ..SamplePlanes::default() };
         for cameras in cameras.chunks(FRAMES_AT_ONCE) {
-            let cameras: Vec<Camera> = cameras.iter().copied().map(Camera::Pinhole).collect();
-            each(&self.engine.renderer.draw_depth_images(self.work(), &cameras, planes)?)?;
+            each(&self.engine.renderer.draw_depth_images(self.work(), &pinholes(cameras), planes)?)?;
         }
         Ok(())
     }

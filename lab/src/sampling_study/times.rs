@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use codec::{PlaneSet, encode_depth_image};
-use depth_image::DepthImage;
 use glam::UVec2;
 use render::SamplePlanes;
 use report::Report;
@@ -12,6 +11,7 @@ use sampling::SamplingMethod;
 use super::extent::Extent;
 use super::methods::{IMAGES, METHODS};
 use super::subject::Subject;
+use crate::failures::measures::samples;
 use crate::statistics::median;
 use crate::study::{Column, table};
 
@@ -74,13 +74,11 @@ fn of_method(subject: &Subject, method: SamplingMethod, size_px: UVec2) -> anyho
         subject.sample(method, size_px, planes)?;
         ms.push(start.elapsed().as_secs_f64() * 1e3);
     }
-    let bytes = |image: &DepthImage| anyhow::Ok(encode_depth_image(image, PlaneSet::DEPTH_COLOR)?.payload.len());
-    let samples = |image: &DepthImage| image.inverse_depth_per_m.iter().filter(|&&depth| depth > 0.0).count();
-    Ok(Times {
-        set_ms: median(ms),
-        bytes: images.iter().map(bytes).sum::<anyhow::Result<usize>>()?,
-        samples: images.iter().map(samples).sum(),
-    })
+    let mut bytes = 0;
+    for image in &images {
+        bytes += encode_depth_image(image, PlaneSet::DEPTH_COLOR)?.payload.len();
+    }
+    Ok(Times { set_ms: median(ms), bytes, samples: images.iter().map(samples).sum() })
 }
 
 /// Adds a table of all scenes, each with the costs of all methods.
@@ -88,14 +86,13 @@ fn of_method(subject: &Subject, method: SamplingMethod, size_px: UVec2) -> anyho
 /// # Errors
 /// A row does not fit its table.
 pub fn times_report(scenes: &[(String, Vec<Times>)], extent: Extent, report: &mut Report) -> anyhow::Result<()> {
-    let rows = scenes.iter().flat_map(|(scene, times)| {
-        let row = |(&method, &own): (&SamplingMethod, &Times)| TimesRow {
+    let rows = scenes.iter().flat_map(|(scene, all)| {
+        METHODS.into_iter().zip(all).map(|(method, &times)| TimesRow {
             scene: scene.clone(),
             method,
-            times: own,
-            conventional: times[0],
-        };
-        METHODS.iter().zip(times).map(row)
+            times,
+            conventional: all[0],
+        })
     });
     let rows: Vec<TimesRow> = rows.collect();
     report.tables.push(table(format!("Sampling, {0}×{0}", extent.side_px), &COLUMNS, &rows)?);

@@ -41,16 +41,14 @@ pub fn seen(
     views: &[PinholeCamera],
     seeds: usize,
 ) -> Vec<Seen> {
-    let own: Vec<PinholeCamera> = set.iter().map(pinhole).collect();
-    let image = |(number, image): (usize, &DepthImage)| {
+    let own: Vec<PinholeCamera> = set.iter().map(|image| *image.camera.reference()).collect();
+    let images = set.iter().enumerate().map(|(number, image)| {
         let samples = seeded(held_samples(image), seeds);
-        let footprint_m = |sample: &HeldSample| {
-            let depth = (sample.point_in_world - own[number].eye_in_world).dot(own[number].forward_in_world());
-            depth / own[number].focal_px.min_element()
-        };
+        // Whether one of some cameras sees a sample, too.
         let by = |sample: &HeldSample, cameras: &[PinholeCamera]| {
-            let seen = |camera| is_visibility_redundant(scene, sample.point_in_world, footprint_m(sample), camera);
-            cameras.iter().any(seen)
+            let depth = (sample.point_in_world - own[number].eye_in_world).dot(own[number].forward_in_world());
+            let footprint_m = depth / own[number].focal_px.min_element();
+            cameras.iter().any(|camera| is_visibility_redundant(scene, sample.point_in_world, footprint_m, camera))
         };
         // All that the shared viewpoint of peeled layers sees is in the first layer.
         let earlier = match method {
@@ -69,13 +67,8 @@ pub fn seen(
             disoccluded: Estimate::of(disoccluded.len(), samples.len()),
             useful: Estimate::of(useful, disoccluded.len()),
         }
-    };
-    set.iter().enumerate().map(image).collect()
-}
-
-fn pinhole(image: &DepthImage) -> PinholeCamera {
-    let camera = image.camera.reference();
-    *camera
+    });
+    images.collect()
 }
 
 /// The first `count` samples of a fixed permutation.

@@ -4,7 +4,7 @@ use cluster::PolicyChoice;
 use report::{Axis, Series, XyChart};
 
 use super::matrix::PAPER_VIEWS;
-use super::paper::{PaperRow, TABLE_1};
+use super::paper::TABLE_1;
 use super::results::Results;
 
 /// Policies of the legends.
@@ -12,7 +12,6 @@ const POLICIES: [PolicyChoice; 4] =
     [PolicyChoice::Pipeline, PolicyChoice::TimeShare, PolicyChoice::Auto, PolicyChoice::Direct];
 
 /// Both charts.
-#[must_use]
 pub fn charts(results: &Results) -> [XyChart; 2] {
     [
         chart("Fig. 7: speed-up at V = 1000", "speed-up", results, |nodes, efficiency| nodes * efficiency),
@@ -25,12 +24,11 @@ fn chart(name: &str, what: &str, results: &Results, value: fn(f64, f64) -> f64) 
     for policy in POLICIES {
         chart = chart.with(Series::line(policy.to_string(), by_nodes(results, policy, value)));
     }
-    let paper = |efficiency: fn(&PaperRow) -> f64| {
-        TABLE_1.iter().map(move |row| (row.nodes as f64, value(row.nodes as f64, efficiency(row))))
-    };
-    chart = chart
-        .with(Series::line("the paper, proposed", paper(|row| row.proposed)))
-        .with(Series::line("the paper, naive", paper(|row| row.naive)));
+    let proposed = TABLE_1.map(|row| (row.nodes as f64, row.proposed));
+    let naive = TABLE_1.map(|row| (row.nodes as f64, row.naive));
+    for (name, paper) in [("the paper, proposed", proposed), ("the paper, naive", naive)] {
+        chart = chart.with(Series::line(name, paper.map(|(nodes, efficiency)| (nodes, value(nodes, efficiency)))));
+    }
     chart.note =
         "`direct` is the paper's naive parallelisation, by the faster of triangles and rays; measured on the views \
                   that Table 1 says, whose time grows as V does."
@@ -40,12 +38,12 @@ fn chart(name: &str, what: &str, results: &Results, value: fn(f64, f64) -> f64) 
 
 /// A value of the efficiency of a policy at V = 1000, by P.
 fn by_nodes(results: &Results, policy: PolicyChoice, value: fn(f64, f64) -> f64) -> Vec<(f64, f64)> {
-    let at = |nodes: usize| {
+    let points = results.node_counts().into_iter().filter_map(|nodes| {
         let efficiency = match policy {
             PolicyChoice::Direct => results.naive(nodes).map(|(efficiency, _)| efficiency),
             _ => results.find(policy, nodes, PAPER_VIEWS).map(|point| results.efficiency(point)),
         };
         efficiency.map(|efficiency| (nodes as f64, value(nodes as f64, efficiency)))
-    };
-    results.node_counts().into_iter().filter_map(at).collect()
+    });
+    points.collect()
 }

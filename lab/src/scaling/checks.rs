@@ -14,23 +14,21 @@ const QUICK_S: f64 = 600.0;
 const NOT_MEASURED: &str = "it was not measured at eleven nodes and 1000 views";
 
 /// All checks of the measured points.
-#[must_use]
 pub fn checks(results: &Results, extent: Extent) -> Vec<Check> {
-    let at = |policy| results.find(policy, PAPER_NODES, PAPER_VIEWS);
-    let efficiency = |policy| at(policy).map(|point| results.efficiency(point));
+    let policies = [PolicyChoice::Pipeline, PolicyChoice::Auto];
+    let [pipeline, auto] = policies.map(|policy| results.find(policy, PAPER_NODES, PAPER_VIEWS));
+    let efficiencies = [pipeline, auto].map(|point| point.map(|point| results.efficiency(point)));
     let paper = table_1(PAPER_NODES).map_or(f64::NAN, |row| row.proposed);
-    let efficient = |policy: PolicyChoice| {
+    let efficient = policies.into_iter().zip(efficiencies).map(|(policy, efficiency)| {
         let name = format!("efficiency of {policy} at P = 11, V = 1000 (the paper's: {paper})");
-        Check::maybe(name, efficiency(policy), "", Bar::AtLeast(paper), NOT_MEASURED)
-    };
+        Check::maybe(name, efficiency, "", Bar::AtLeast(paper), NOT_MEASURED)
+    });
     let naive = results.naive(PAPER_NODES).map(|(efficiency, _)| efficiency);
-    let over_naive = efficiency(PolicyChoice::Pipeline).zip(naive).map(|(shared, naive)| shared / naive);
+    let over_naive = efficiencies[0].zip(naive).map(|(shared, naive)| shared / naive);
     let other_plans = results.points.iter().filter(|point| !point.prediction.same_plan).count();
-    let used = at(PolicyChoice::Auto).map(|point| point.window.used_share());
+    let used = auto.map(|point| point.window.used_share());
     let seconds = extent.quick.then_some(results.seconds);
-    vec![
-        efficient(PolicyChoice::Pipeline),
-        efficient(PolicyChoice::Auto),
+    let others = [
         Check::maybe(
             "pipeline over naive at P = 11, V = 1000, efficiency (the paper's: 7.5)",
             over_naive,
@@ -48,5 +46,6 @@ pub fn checks(results: &Results, extent: Extent) -> Vec<Check> {
             NOT_MEASURED,
         ),
         Check::maybe("time of the quick form", seconds, "s", Bar::AtMost(QUICK_S), "this was the full form"),
-    ]
+    ];
+    efficient.chain(others).collect()
 }

@@ -1,12 +1,11 @@
 //! `myriorama-lab bench scaling`.
 
 use std::fs::create_dir_all;
-use std::path::PathBuf;
 
 use anyhow::Context as _;
 use app_core::exit::Outcome;
 use app_core::process::runtime;
-use app_core::setup::{DeviceArgs, SceneArgs};
+use app_core::setup::SceneArgs;
 use clap::Args;
 use reconstruction::ReconstructionMethod;
 use render::Lighting;
@@ -16,11 +15,13 @@ use super::matrix::Extent;
 use super::measure::{Request, take};
 use super::report::{report, show};
 use super::subject::Subject;
+use crate::study::{RunArgs, number_within};
 
 /// Measures the time between two sample sets on a coordinator and P node processes, for P = 2…11 nodes, V = 10…1000
 /// views and every policy. Each node has an equal share of this machine's processors by control groups of Linux, so
 /// that eleven nodes fit two cores. The paper's figures and the predictions stand beside the results. A simulation
-/// around the same schedule is compared with them and goes on to 1,000 nodes.
+/// around the same schedule is compared with them and goes on to 1,000 nodes. With --quick a subset is measured in under
+/// ten minutes: P = 11 and 5.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  myriorama-lab bench scaling --quick\n  myriorama-lab bench scaling --out out/scaling"
@@ -35,8 +36,6 @@ pub struct ScalingArgs {
     /// How views are reconstructed
     #[arg(long, default_value_t, value_name = "NAME")]
     method: ReconstructionMethod,
-    #[command(flatten)]
-    device: DeviceArgs,
     /// The most nodes P
     #[arg(long, default_value_t = 11, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=64))]
     nodes: u16,
@@ -44,33 +43,25 @@ pub struct ScalingArgs {
     #[arg(long, default_value_t = 1000, value_name = "V", value_parser = clap::value_parser!(u32).range(10..=1000))]
     views: u32,
     /// Cores of each node [default: all but 0.35 for the client, in equal parts]
-    #[arg(long, value_name = "CORES", value_parser = cores)]
+    #[arg(long, value_name = "CORES", value_parser = |text: &str| number_within(text, 0.01..=64.0))]
     quota: Option<f64>,
     /// The most simulated nodes P
     #[arg(long, default_value_t = 1000, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=1000))]
     simulate_to: u16,
-    /// Where the report goes
-    #[arg(long, default_value = "out/bench-scaling", value_name = "DIR")]
-    out: PathBuf,
-    /// Measures a subset in under ten minutes: P = 11 and 5
-    #[arg(long)]
-    quick: bool,
-    /// Exit status 1 when a check falls short
-    #[arg(long)]
-    strict: bool,
+    #[command(flatten)]
+    run: RunArgs,
 }
 
-fn cores(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|cores| (0.01..=64.0).contains(cores)).ok_or_else(|| "expected 0.01 to 64".to_owned())
-}
+/// The usual folder of the report.
+const FOLDER: &str = "out/bench-scaling";
 
 impl ScalingArgs {
     fn request(&self) -> Request {
         Request {
-            device: self.device.device,
-            extent: Extent { quick: self.quick, nodes: usize::from(self.nodes), views: self.views as usize },
+            device: self.run.device.device,
+            extent: Extent { quick: self.run.quick, nodes: usize::from(self.nodes), views: self.views as usize },
             quota_cores: self.quota,
-            event_log: self.out.join("schedule.log"),
+            event_log: self.run.folder(FOLDER).join("schedule.log"),
         }
     }
 }
@@ -81,13 +72,13 @@ impl ScalingArgs {
 /// Input that cannot be used, no control groups, or a failure of the cluster.
 pub fn run(args: &ScalingArgs) -> anyhow::Result<Outcome> {
     let request = args.request();
-    create_dir_all(&args.out).with_context(|| format!("cannot write to {}", args.out.display()))?;
+    let folder = args.run.folder(FOLDER);
+    create_dir_all(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
     let scene = SceneArgs { method: Some(args.method), lighting: args.lighting, ..SceneArgs::new(args.scene.clone()) };
     let subject = Subject::load(&scene)?;
     let results = runtime()?.block_on(take(&request, &subject))?;
     println!("simulating up to {} nodes", args.simulate_to);
     let report = report(&results, request.extent, &args.scene.to_string(), usize::from(args.simulate_to))?;
-    show(&report, &args.out)?;
-    let ok = report.finish(&args.out)?;
-    Ok(Outcome::of(ok || !args.strict))
+    show(&report, folder)?;
+    args.run.write(FOLDER, &report)
 }

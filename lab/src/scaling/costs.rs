@@ -18,35 +18,34 @@ pub struct Timed {
 
 impl Timed {
     /// The mean over all nodes and times.
-    #[must_use]
     pub fn mean(&self) -> Costs {
         mean(&self.costs)
     }
 
     /// Costs of a view, and of a call to the device: both follow from calls of one view and of many.
-    #[must_use]
     pub fn by_view_and_call(&self) -> (Costs, Calls) {
         let costs = self.mean();
         let alone = mean(&self.alone);
-        let split = |alone_s: f64, of_many_s: f64| {
-            let many = f64::from(MEASURED_BATCH);
-            let view_s = ((many * of_many_s - alone_s) / (many - 1.0)).clamp(0.0, of_many_s);
-            (view_s, ((of_many_s - view_s) * many).max(0.0))
-        };
-        let (reconstruct_view_s, reconstruct_s) = split(alone.reconstruct_view_s, costs.reconstruct_view_s);
-        let (direct_view_s, direct_s) = split(alone.direct_view_s, costs.direct_view_s);
+        let [reconstruct_view_s, reconstruct_s] = view_and_call_s(alone.reconstruct_view_s, costs.reconstruct_view_s);
+        let [direct_view_s, direct_s] = view_and_call_s(alone.direct_view_s, costs.direct_view_s);
         (Costs { reconstruct_view_s, direct_view_s, ..costs }, Calls { reconstruct_s, direct_s })
     }
 }
 
+/// The time of a view and of a call, from that of one view alone and that of a view among many.
+fn view_and_call_s(alone_s: f64, of_many_s: f64) -> [f64; 2] {
+    let many = f64::from(MEASURED_BATCH);
+    let view_s = ((many * of_many_s - alone_s) / (many - 1.0)).clamp(0.0, of_many_s);
+    [view_s, ((of_many_s - view_s) * many).max(0.0)]
+}
+
 /// The mean of several measurements; zeros without any.
-#[must_use]
 pub fn mean(all: &[Costs]) -> Costs {
     let of = |cost: fn(&Costs) -> f64| all.iter().map(cost).sum::<f64>() / all.len().max(1) as f64;
-    let shares: Option<Vec<_>> = all.iter().map(|c| c.tiles?.row_shares).collect();
-    let mean = |shares: Vec<[f64; ROW_PARTS]>| {
+    let shares: Option<Vec<[f64; ROW_PARTS]>> = all.iter().map(|c| c.tiles?.row_shares).collect();
+    let row_shares: Option<[f64; ROW_PARTS]> = shares.map(|shares| {
         std::array::from_fn(|part| shares.iter().map(|shares| shares[part]).sum::<f64>() / shares.len().max(1) as f64)
-    };
+    });
     Costs {
         sample_image_s: of(|c| c.sample_image_s),
         direct_view_s: of(|c| c.direct_view_s),
@@ -54,7 +53,7 @@ pub fn mean(all: &[Costs]) -> Costs {
         load_set_s: of(|c| c.load_set_s),
         encode_view_s: of(|c| c.encode_view_s),
         in_order: all.iter().any(|c| c.in_order),
-        tiles: TileCosts::of_image(of(|c| c.sample_image_s), of(Costs::tile_overhead_s), shares.map(mean)),
+        tiles: TileCosts::of_image(of(|c| c.sample_image_s), of(Costs::tile_overhead_s), row_shares),
     }
 }
 
@@ -63,12 +62,12 @@ pub fn mean(all: &[Costs]) -> Costs {
 pub async fn measure(nodes: &Nodes, subject: &Subject, batch: u32) -> anyhow::Result<Vec<Costs>> {
     let count = nodes.count();
     let views = subject.views(count * MEASURED_BATCH as usize)?;
-    let of_node = |node| views.iter().skip(node).step_by(count).copied().collect();
-    nodes.measure((0..count).map(|node| subject.measurement(of_node(node), batch))).await
+    let requests =
+        (0..count).map(|node| subject.measurement(views.iter().skip(node).step_by(count).copied().collect(), batch));
+    nodes.measure(requests).await
 }
 
 /// (S·g_s + V·(c+e)) / (P·T): the work of one node over the time of P nodes.
-#[must_use]
 pub fn efficiency(costs: &Costs, images: usize, views: usize, nodes: usize, period_s: f64) -> f64 {
     let view_s = costs.reconstruct_view_s + costs.encode_view_s;
     (images as f64 * costs.sample_image_s + views as f64 * view_s) / (nodes as f64 * period_s)

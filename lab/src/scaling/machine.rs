@@ -20,7 +20,6 @@ pub struct MachineTime {
 
 impl MachineTime {
     /// The counters now; zeros where the system has none.
-    #[must_use]
     pub fn now() -> Self {
         let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
         let (busy_s, stolen_s) = all(&stat).unwrap_or_default();
@@ -28,7 +27,6 @@ impl MachineTime {
     }
 
     /// The difference of two readings.
-    #[must_use]
     pub fn since(&self, before: &Self) -> Self {
         Self {
             busy_s: self.busy_s - before.busy_s,
@@ -42,8 +40,9 @@ impl MachineTime {
 fn all(stat: &str) -> Option<(f64, f64)> {
     let line = stat.lines().find_map(|line| line.strip_prefix("cpu "))?;
     let ticks: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-    let sum = |which: &[usize]| which.iter().filter_map(|&i| ticks.get(i)).sum::<f64>() / TICKS_PER_S;
-    Some((sum(&[0, 1, 2, 5, 6]), sum(&[7])))
+    let [busy_s, stolen_s] = [&[0, 1, 2, 5, 6][..], &[7]]
+        .map(|places| places.iter().filter_map(|&place| ticks.get(place)).sum::<f64>() / TICKS_PER_S);
+    Some((busy_s, stolen_s))
 }
 
 #[cfg(test)]

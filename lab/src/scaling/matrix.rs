@@ -36,7 +36,6 @@ impl Extent {
     }
 
     /// The numbers of nodes P, from the greatest down: nodes are only ever ended.
-    #[must_use]
     pub fn node_counts(self) -> Vec<usize> {
         let all: &[usize] = if self.quick { &[11, 5] } else { &[11, 10, 9, 8, 7, 6, 5, 4, 3, 2] };
         let smaller = all.iter().copied().filter(|&nodes| nodes < self.nodes);
@@ -44,7 +43,6 @@ impl Extent {
     }
 
     /// Policies and numbers of views at a number of nodes.
-    #[must_use]
     pub fn points(self, nodes: usize) -> Vec<(PolicyChoice, usize)> {
         let all = if self.quick { self.quick_points(nodes) } else { full_points(nodes) };
         all.into_iter().filter(|(_, views)| *views <= self.views).collect()
@@ -73,7 +71,6 @@ fn full_points(nodes: usize) -> Vec<(PolicyChoice, usize)> {
 }
 
 /// The time between two sets that the schedule predicts for P equal nodes.
-#[must_use]
 pub fn predicted_s(costs: &Costs, images: usize, nodes: usize, policy: PolicyChoice, views: usize) -> f64 {
     let nodes = vec![NodeCosts { costs: *costs, transfer_image_s: None }; nodes];
     let load = Load { images, sets: 2, views, images_are_sequential: costs.in_order, ..Load::default() };
@@ -91,7 +88,6 @@ pub struct Planned {
 }
 
 /// The sets that count follow from the measured costs.
-#[must_use]
 pub fn planned(
     extent: Extent,
     costs: &Costs,

@@ -35,7 +35,6 @@ pub struct Request {
 }
 
 /// Cores of each of `nodes` nodes, which share all cores but the client's.
-#[must_use]
 pub fn default_quota(nodes: usize) -> f64 {
     let cores = std::thread::available_parallelism().map_or(1, usize::from) as f64;
     // The kernel takes thousandths.
@@ -156,11 +155,11 @@ fn in_words(point: &Point) -> String {
 
 /// By falling numbers of nodes, as nodes are only ever ended.
 fn all_points(extent: Extent, costs: &Costs, images: usize) -> Vec<Planned> {
-    let of = |nodes: usize| {
+    let points = extent.node_counts().into_iter().flat_map(|nodes| {
         let points = extent.points(nodes).into_iter();
         points.map(move |(policy, views)| planned(extent, costs, images, nodes, policy, views))
-    };
-    extent.node_counts().into_iter().flat_map(of).collect()
+    });
+    points.collect()
 }
 
 async fn point(

@@ -50,7 +50,6 @@ impl Nodes {
     }
 
     /// The number of nodes, P.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.processes.nodes.len()
     }

@@ -29,7 +29,6 @@ pub const TABLE_1: [PaperRow; 7] = [
 pub const HEADLINE_S: f64 = 2.61;
 
 /// The row of a number of nodes.
-#[must_use]
 pub fn table_1(nodes: usize) -> Option<&'static PaperRow> {
     TABLE_1.iter().find(|row| row.nodes == nodes)
 }

@@ -53,7 +53,6 @@ impl PointSettings {
     }
 
     /// The number of views that are waited for.
-    #[must_use]
     pub fn awaited_views(&self) -> usize {
         self.views * (1 + self.counted_sets as usize)
     }
@@ -61,13 +60,11 @@ impl PointSettings {
 
 impl Window {
     /// The share of the nodes' quotas that they used.
-    #[must_use]
     pub fn used_share(&self) -> f64 {
         self.nodes_s / self.quotas_s
     }
 
     /// Cores that other programs used meanwhile.
-    #[must_use]
     pub fn others_cores(&self) -> f64 {
         let own_s = self.nodes_s + self.machine.client_s;
         ((self.machine.busy_s + self.machine.stolen_s - own_s) / self.seconds).max(0.0)
@@ -76,13 +73,11 @@ impl Window {
 
 impl Point {
     /// The policy of the plan.
-    #[must_use]
     pub fn policy(&self) -> Policy {
         self.plan.assignment.policy
     }
 
     /// The number of samplers, K; 0 where nothing is sampled.
-    #[must_use]
     pub fn samplers(&self) -> usize {
         self.plan.sampler_count()
     }

@@ -35,12 +35,11 @@ pub struct Traffic {
 
 impl Traffic {
     /// The means over the points that show them.
-    #[must_use]
     pub fn of(points: &[Point]) -> Self {
         let fetched: Vec<_> = points.iter().filter_map(|point| point.fetched).collect();
-        let of_fetched = |sum: f64| sum / fetched.len().max(1) as f64;
-        let image_bytes = of_fetched(fetched.iter().map(|image| image.image_bytes).sum());
-        let image_s = of_fetched(fetched.iter().map(|image| image.image_s).sum());
+        let count = fetched.len().max(1) as f64;
+        let image_bytes = fetched.iter().map(|image| image.image_bytes).sum::<f64>() / count;
+        let image_s = fetched.iter().map(|image| image.image_s).sum::<f64>() / count;
         let views: f64 = points.iter().map(|point| point.settings.views as f64).sum();
         let frames: f64 = points.iter().map(|point| point.frame_bytes * point.settings.views as f64).sum();
         let bytes_per_s = if image_s > 0.0 { image_bytes / image_s } else { f64::INFINITY };
@@ -48,14 +47,13 @@ impl Traffic {
     }
 
     /// A cluster of `nodes` equal nodes.
-    #[must_use]
     pub fn cluster(&self, nodes: usize, machine: Machine, images: usize) -> Cluster {
-        Cluster::equal(nodes, machine, images, self.image_bytes, self.frame_bytes)
+        let Self { image_bytes, frame_bytes, .. } = *self;
+        Cluster { machines: vec![machine; nodes], images, image_bytes, frame_bytes }
     }
 }
 
 /// Predicts a point from the costs that as many nodes timed.
-#[must_use]
 pub fn predict(timed: &Timed, traffic: Traffic, images: usize, point: &Point) -> Prediction {
     let (costs, calls) = timed.by_view_and_call();
     let simulated = simulate(Machine { costs, calls, bytes_per_s: traffic.bytes_per_s }, &traffic, images, point);
@@ -83,13 +81,12 @@ fn simulate(machine: Machine, traffic: &Traffic, images: usize, point: &Point) -
     let settings = point.settings;
     let sets = settings.counted_sets + MORE_SETS;
     let demand = Demand { views: settings.views, sets, policy: settings.policy, tiles: None, nodes_report: false };
-    let planned = plan(&traffic.cluster(point.nodes, Machine::of(point.plan.costs), images), &demand).ok()?;
-    let roles = |plan: &cluster::Assignment| {
+    let planned = plan(&traffic.cluster(point.nodes, Machine::of(point.plan.costs), images), &demand)?;
+    let [simulated, real] = [&planned.assignment, &point.plan.assignment].map(|plan| {
         let images = plan.samplers.iter().map(|share| share.image_indices.len()).collect::<Vec<_>>();
         (plan.policy, images, plan.compositors.len())
-    };
-    let same = roles(&planned.assignment) == roles(&point.plan.assignment);
+    });
     let cluster = traffic.cluster(point.nodes, machine, images);
     let run = run(&cluster, &planned, settings.views, sets, Habits::default());
-    Some((run.period_s(settings.counted_sets as usize), same))
+    Some((run.period_s(settings.counted_sets as usize), simulated == real))
 }

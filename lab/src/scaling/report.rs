@@ -11,11 +11,11 @@ use super::matrix::{Extent, PAPER_NODES, PAPER_VIEWS};
 use super::results::Results;
 use super::tables::{costs_table, headline_table, paper_table, points_table};
 use super::{charts, sweep};
+use crate::study::{new_report, table};
 
 /// Makes the report of a run.
 pub fn report(results: &Results, extent: Extent, scene: &str, most_simulated: usize) -> anyhow::Result<Report> {
-    let mut report = Report::new("Myriorama bench: scaling", results.device.clone());
-    report.version("myriorama", env!("CARGO_PKG_VERSION"));
+    let mut report = new_report("Myriorama bench: scaling", &results.device);
     report.parameter("scene", scene);
     report.parameter("lighting", results.lighting.to_string());
     report.parameter("sample images S", results.images);
@@ -36,7 +36,8 @@ pub fn report(results: &Results, extent: Extent, scene: &str, most_simulated: us
     report.charts.extend(charts::charts(results).map(Into::into));
     let scenarios = sweep::scenarios(results);
     let simulated = sweep::sweep(results, &scenarios, most_simulated);
-    report.tables.extend([sweep::reach_table(&scenarios, &simulated)?, sweep::table(&simulated)?]);
+    report.tables.push(sweep::reach_table(&scenarios, &simulated)?);
+    report.tables.push(table(sweep::SWEEP_TABLE, &sweep::COLUMNS, &simulated)?);
     report.charts.push(sweep::chart(&scenarios, &simulated).into());
     report.summary = summary(results);
     report.checks = checks(results, extent);
@@ -45,13 +46,14 @@ pub fn report(results: &Results, extent: Extent, scene: &str, most_simulated: us
 
 fn summary(results: &Results) -> String {
     let nodes = results.node_counts().into_iter().max().unwrap_or(PAPER_NODES);
-    let of = |policy| results.find(policy, nodes, PAPER_VIEWS).map(|point| results.efficiency(point));
-    let text = |value: Option<f64>| value.map_or_else(|| "not measured".to_owned(), |value| format!("{value:.3}"));
+    let [pipeline, auto] = [PolicyChoice::Pipeline, PolicyChoice::Auto]
+        .map(|policy| results.find(policy, nodes, PAPER_VIEWS).map(|point| results.efficiency(point)));
+    let naive = results.naive(nodes).map(|(efficiency, _)| efficiency);
+    let [pipeline, auto, naive] = [pipeline, auto, naive]
+        .map(|value| value.map_or_else(|| "not measured".to_owned(), |value| format!("{value:.3}")));
     format!(
-        "Efficiency at P = {nodes}, V = 1000: pipeline {}, auto {}, naive {}. The paper's at eleven: 0.829 and 0.110.",
-        text(of(PolicyChoice::Pipeline)),
-        text(of(PolicyChoice::Auto)),
-        text(results.naive(nodes).map(|(efficiency, _)| efficiency)),
+        "Efficiency at P = {nodes}, V = 1000: pipeline {pipeline}, auto {auto}, naive {naive}. The paper's at eleven: \
+         0.829 and 0.110."
     )
 }
 
@@ -60,12 +62,12 @@ fn summary(results: &Results) -> String {
 /// # Errors
 /// The folder cannot be written.
 pub fn show(report: &Report, folder: &Path) -> anyhow::Result<()> {
-    let short = || report.tables.iter().filter(|table| table.name != sweep::SWEEP_TABLE);
-    short().for_each(|table| println!("\n{}", table.to_text()));
+    let short = report.tables.iter().filter(|table| table.name != sweep::SWEEP_TABLE);
+    short.clone().for_each(|table| println!("\n{}", table.to_text()));
     println!("\n{}", report.summary);
     std::fs::create_dir_all(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
     let path = folder.join("tables.md");
-    let text = short().map(Table::to_markdown).collect::<Vec<_>>().join("\n");
+    let text = short.map(Table::to_markdown).collect::<Vec<_>>().join("\n");
     std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     Ok(())
 }

@@ -36,25 +36,22 @@ pub struct Results {
 
 impl Results {
     /// Adds points with their predictions from the costs that as many nodes timed.
-    #[must_use]
     pub fn with_points(self, points: Vec<Point>) -> Self {
         let traffic = Traffic::of(&points);
-        let predicted = |point: Point| {
+        let predicted = points.into_iter().map(|point| {
             let timed = self.timed.iter().find(|timed| timed.nodes == point.nodes);
             let prediction = predict(timed.unwrap_or(&Timed::default()), traffic, self.images, &point);
             PredictedPoint { point, prediction }
-        };
-        Self { points: points.into_iter().map(predicted).collect(), traffic, ..self }
+        });
+        Self { points: predicted.collect(), traffic, ..self }
     }
 
     /// The mean of the costs at a number of nodes; zeros where there are none.
-    #[must_use]
     pub fn mean(&self, nodes: usize) -> Costs {
         self.timed.iter().find(|timed| timed.nodes == nodes).map_or_else(Costs::default, Timed::mean)
     }
 
     /// The efficiency (S·g_s + V·(c+e)) / (P·T) of a measured point.
-    #[must_use]
     pub fn efficiency(&self, point: &Point) -> f64 {
         efficiency(&self.mean(point.nodes), self.images, point.settings.views, point.nodes, point.period_s)
     }
@@ -64,14 +61,12 @@ impl Results {
     }
 
     /// The point of some settings.
-    #[must_use]
     pub fn find(&self, policy: PolicyChoice, nodes: usize, views: usize) -> Option<&Point> {
         self.measured()
             .find(|point| point.settings.policy == policy && point.nodes == nodes && point.settings.views == views)
     }
 
     /// The numbers of nodes P of all points, rising.
-    #[must_use]
     pub fn node_counts(&self) -> Vec<usize> {
         let mut counts: Vec<usize> = self.measured().map(|point| point.nodes).collect();
         counts.sort_unstable();
@@ -80,10 +75,10 @@ impl Results {
     }
 
     /// Efficiency of `direct` at V = 1000, from the point with most views: T grows as V does.
-    #[must_use]
     pub fn naive(&self, nodes: usize) -> Option<(f64, &Point)> {
-        let is_direct = |point: &&Point| point.settings.policy == PolicyChoice::Direct && point.nodes == nodes;
-        let point = self.measured().filter(is_direct).max_by_key(|point| point.settings.views)?;
+        let direct =
+            self.measured().filter(|point| point.settings.policy == PolicyChoice::Direct && point.nodes == nodes);
+        let point = direct.max_by_key(|point| point.settings.views)?;
         let period_s = point.period_s * PAPER_VIEWS as f64 / point.settings.views as f64;
         Some((efficiency(&self.mean(nodes), self.images, PAPER_VIEWS, nodes, period_s), point))
     }

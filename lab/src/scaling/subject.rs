@@ -33,7 +33,6 @@ impl Subject {
     }
 
     /// The number of sample images, S.
-    #[must_use]
     pub fn images(&self) -> usize {
         self.setup.samples.len()
     }
@@ -48,7 +47,6 @@ impl Subject {
     }
 
     /// A timeline of sets that no node has sampled yet.
-    #[must_use]
     pub fn fresh_timeline(&self, set_count: u32) -> Timeline {
         let first = self.sets_so_far.replace(self.sets_so_far.get() + set_count);
         Timeline { start_s: f64::from(first) * SET_STEP_S, step_s: SET_STEP_S, set_count }
@@ -70,7 +68,6 @@ impl Subject {
     }
 
     /// A measurement for a node: a new set, and views in calls of `batch_count`.
-    #[must_use]
     pub fn measurement(&self, typical_views: Vec<PinholeCamera>, batch_count: u32) -> MeasureCosts {
         let offer = &self.setup.offer;
         let workload = Workload {

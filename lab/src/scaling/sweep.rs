@@ -7,6 +7,7 @@ use simulation::{Cluster, Demand, Habits, Limit, Machine, plan, run, spread_spee
 
 use super::costs::{efficiency, mean};
 use super::results::Results;
+use crate::study::Column;
 
 /// Numbers of nodes, P.
 const NODES: [usize; 9] = [2, 5, 11, 20, 50, 100, 200, 500, 1000];
@@ -56,7 +57,6 @@ pub struct Simulated {
 }
 
 /// All scenarios, by this machine's costs without a limit.
-#[must_use]
 pub fn scenarios(results: &Results) -> Vec<Scenario> {
     let costs = mean(&results.unlimited);
     let mut all = Vec::new();
@@ -75,7 +75,6 @@ pub fn scenarios(results: &Results) -> Vec<Scenario> {
 }
 
 /// Simulates all scenarios at all P and V, many at the same time.
-#[must_use]
 pub fn sweep(results: &Results, scenarios: &[Scenario], most_nodes: usize) -> Vec<Simulated> {
     let points = scenarios.iter().flat_map(|scenario| {
         let nodes = NODES.into_iter().filter(move |&nodes| nodes <= most_nodes);
@@ -93,7 +92,7 @@ fn simulated(results: &Results, scenario: &Scenario, nodes: usize, views: usize)
     let machines = equal.machines.iter().zip(&speeds).map(|(machine, &speed)| machine.faster(speed)).collect();
     let cluster = Cluster { machines, ..equal };
     let demand = Demand { views, sets: SETS, policy: PolicyChoice::Auto, tiles: None, nodes_report: true };
-    let planned = plan(&cluster, &demand).ok()?;
+    let planned = plan(&cluster, &demand)?;
     let run = run(&cluster, &planned, views, SETS, Habits::default());
     let period_s = run.steady_period_s();
     let speed: f64 = speeds.iter().sum();
@@ -112,33 +111,17 @@ fn simulated(results: &Results, scenario: &Scenario, nodes: usize, views: usize)
 /// The name of the table of all points, which is too long for a terminal.
 pub const SWEEP_TABLE: &str = "Simulated points";
 
-/// A table of all simulated points.
-pub fn table(points: &[Simulated]) -> anyhow::Result<Table> {
-    let columns = [
-        ("scenario", ""),
-        ("V", ""),
-        ("P", ""),
-        ("policy", ""),
-        ("K", ""),
-        ("T", "s"),
-        ("efficiency", ""),
-        ("limit", ""),
-    ];
-    let mut table = Table::new(SWEEP_TABLE, &columns);
-    for point in points {
-        table.push([
-            point.scenario.as_str().into(),
-            point.views.into(),
-            point.nodes.into(),
-            point.policy.to_string().into(),
-            point.samplers.into(),
-            point.period_s.into(),
-            point.efficiency.into(),
-            point.limit.to_string().into(),
-        ])?;
-    }
-    Ok(table)
-}
+/// The columns of the table of all points.
+pub const COLUMNS: [Column<Simulated>; 8] = [
+    Column::new("scenario", |point| point.scenario.as_str().into()),
+    Column::new("V", |point| point.views.into()),
+    Column::new("P", |point| point.nodes.into()),
+    Column::new("policy", |point| point.policy.to_string().into()),
+    Column::new("K", |point| point.samplers.into()),
+    Column::with_unit("T", "s", |point| point.period_s.into()),
+    Column::new("efficiency", |point| point.efficiency.into()),
+    Column::new("limit", |point| point.limit.to_string().into()),
+];
 
 /// The number of nodes up to which each scenario scales, and the first point beyond with its limit.
 pub fn reach_table(scenarios: &[Scenario], points: &[Simulated]) -> anyhow::Result<Table> {
@@ -171,15 +154,14 @@ pub fn reach_table(scenarios: &[Scenario], points: &[Simulated]) -> anyhow::Resu
 }
 
 /// Efficiency by P of all scenarios.
-#[must_use]
 pub fn chart(scenarios: &[Scenario], points: &[Simulated]) -> XyChart {
     let name = format!("Simulated efficiency, V = {CHARTED_VIEWS}");
     let chart = XyChart::new(name, Axis::log("nodes P", ""), Axis::linear("efficiency", ""));
-    let series = |scenario: &Scenario| {
+    let series = scenarios.iter().map(|scenario| {
         let own = points.iter().filter(|point| point.scenario == scenario.name && point.views == CHARTED_VIEWS);
         Series::line(scenario.name.as_str(), own.map(|point| (point.nodes as f64, point.efficiency)))
-    };
-    let mut chart = scenarios.iter().map(series).fold(chart.with_limit("0.8", LEAST_EFFICIENCY), XyChart::with);
+    });
+    let mut chart = series.fold(chart.with_limit("0.8", LEAST_EFFICIENCY), XyChart::with);
     chart.note =
         "Simulated, not measured: plans of the real schedule, carried out by the simulation that stands beside the \
                   measured points."

@@ -1,13 +1,15 @@
 //! Tables of measured points.
 
-use cluster::{Costs, PolicyChoice};
+use cluster::PolicyChoice;
 use report::{Cell, Table};
 
 use super::costs::mean;
 use super::matrix::{FEW_NODES, HEADLINE_VIEWS, PAPER_VIEWS, predicted_s};
 use super::paper::{HEADLINE_S, table_1};
 use super::point::Point;
+use super::prediction::Prediction;
 use super::results::{PredictedPoint, Results};
+use crate::study::{Column, table};
 
 /// Table 1: efficiency at V = 1000, the paper's beside ours. `direct` is measured at fewer views.
 pub fn paper_table(results: &Results) -> anyhow::Result<Table> {
@@ -27,75 +29,69 @@ pub fn paper_table(results: &Results) -> anyhow::Result<Table> {
     ];
     let mut table = Table::new("Table 1: efficiency at V = 1000", &columns);
     for nodes in results.node_counts() {
-        let at = |policy| results.find(policy, nodes, PAPER_VIEWS);
-        let pipeline = at(PolicyChoice::Pipeline);
-        let auto = at(PolicyChoice::Auto);
+        let [pipeline, auto] =
+            [PolicyChoice::Pipeline, PolicyChoice::Auto].map(|policy| results.find(policy, nodes, PAPER_VIEWS));
         if pipeline.is_none() && auto.is_none() {
             continue;
         }
-        let of = |point: Option<&Point>| point.map(|point| results.efficiency(point));
-        let period = |point: Option<&Point>| point.map(|point| point.period_s);
         let direct = results.naive(nodes);
+        let efficiencies = [pipeline, auto].map(|point| point.map(|point| results.efficiency(point)));
+        let periods_s = [pipeline, auto, direct.map(|(_, point)| point)].map(|point| point.map(|point| point.period_s));
         table.push([
             nodes.into(),
             table_1(nodes).map(|row| row.proposed).into(),
-            of(pipeline).into(),
+            efficiencies[0].into(),
             pipeline.map(Point::samplers).into(),
-            period(pipeline).into(),
-            of(auto).into(),
+            periods_s[0].into(),
+            efficiencies[1].into(),
             auto.map(|point| point.policy().to_string()).into(),
-            period(auto).into(),
+            periods_s[1].into(),
             table_1(nodes).map(|row| row.naive).into(),
             direct.map(|(efficiency, _)| efficiency).into(),
             direct.map(|(_, point)| point.settings.views).into(),
-            period(direct.map(|(_, point)| point)).into(),
+            periods_s[2].into(),
         ])?;
     }
     Ok(table)
 }
 
+/// A point with its predictions and its efficiency.
+struct PointRow<'r> {
+    point: &'r Point,
+    prediction: &'r Prediction,
+    efficiency: f64,
+}
+
+fn point_columns<'r>() -> [Column<PointRow<'r>>; 16] {
+    [
+        Column::new("P", |row| row.point.nodes.into()),
+        Column::new("V", |row| row.point.settings.views.into()),
+        Column::new("asked for", |row| row.point.settings.policy.to_string().into()),
+        Column::new("policy", |row| row.point.policy().to_string().into()),
+        Column::new("K", |row| row.point.samplers().into()),
+        Column::new("sets counted", |row| row.point.settings.counted_sets.into()),
+        Column::with_unit("T", "s", |row| row.point.period_s.into()),
+        Column::with_unit("first set", "s", |row| row.point.fill_s.into()),
+        Column::new("efficiency", |row| row.efficiency.into()),
+        Column::with_unit("equation", "s", |row| row.prediction.equation_s.into()),
+        Column::with_unit("schedule", "s", |row| row.prediction.schedule_s.into()),
+        Column::with_unit("simulated", "s", |row| row.prediction.simulated_s.into()),
+        Column::new("simulated / T", |row| (row.prediction.simulated_s / row.point.period_s).into()),
+        Column::new("used of quotas", |row| row.point.window.used_share().into()),
+        Column::new("changes of plan", |row| (row.point.later_plans as f64).into()),
+        Column::with_unit("other programs", "cores", |row| row.point.window.others_cores().into()),
+    ]
+}
+
 /// A table of all points with their predictions.
 pub fn points_table(results: &Results) -> anyhow::Result<Table> {
-    let columns = [
-        ("P", ""),
-        ("V", ""),
-        ("asked for", ""),
-        ("policy", ""),
-        ("K", ""),
-        ("sets counted", ""),
-        ("T", "s"),
-        ("first set", "s"),
-        ("efficiency", ""),
-        ("equation", "s"),
-        ("schedule", "s"),
-        ("simulated", "s"),
-        ("simulated / T", ""),
-        ("used of quotas", ""),
-        ("changes of plan", ""),
-        ("other programs", "cores"),
-    ];
-    let mut table = Table::new(format!("All points, {}", results.lighting), &columns);
-    for PredictedPoint { point, prediction } in &results.points {
-        table.push([
-            point.nodes.into(),
-            point.settings.views.into(),
-            point.settings.policy.to_string().into(),
-            point.policy().to_string().into(),
-            point.samplers().into(),
-            point.settings.counted_sets.into(),
-            point.period_s.into(),
-            point.fill_s.into(),
-            results.efficiency(point).into(),
-            prediction.equation_s.into(),
-            prediction.schedule_s.into(),
-            prediction.simulated_s.into(),
-            (prediction.simulated_s / point.period_s).into(),
-            point.window.used_share().into(),
-            (point.later_plans as f64).into(),
-            point.window.others_cores().into(),
-        ])?;
-    }
-    Ok(table)
+    let rows = results.points.iter().map(|PredictedPoint { point, prediction }| PointRow {
+        point,
+        prediction,
+        efficiency: results.efficiency(point),
+    });
+    let rows: Vec<PointRow<'_>> = rows.collect();
+    table(format!("All points, {}", results.lighting), &point_columns(), &rows)
 }
 
 /// Costs of one operation, by share of the machine.
@@ -125,9 +121,9 @@ pub fn costs_table(results: &Results) -> anyhow::Result<Table> {
             costs.encode_view_s,
         ];
         let ratio = (costs.reconstruct_view_s + costs.encode_view_s) / costs.sample_image_s;
-        let c_ms = |costs: &Costs| costs.reconstruct_view_s * 1e3;
-        let least_ms = timings.iter().map(c_ms).fold(f64::INFINITY, f64::min);
-        let most_ms = timings.iter().map(c_ms).fold(0.0, f64::max);
+        let c_ms = timings.iter().map(|costs| costs.reconstruct_view_s * 1e3);
+        let least_ms = c_ms.clone().fold(f64::INFINITY, f64::min);
+        let most_ms = c_ms.fold(0.0, f64::max);
         let numbers = seconds.map(|seconds| seconds * 1e3).into_iter().chain([ratio, least_ms, most_ms]);
         let head = [nodes.into(), cores.into(), timings.len().into()];
         table.push(head.into_iter().chain(numbers.map(Cell::from)))?;

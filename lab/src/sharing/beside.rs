@@ -5,7 +5,7 @@ use cluster::{OfferStatus, PolicyChoice};
 use super::guests::Guest;
 use super::up::{Up, policies};
 use super::viewer::{Viewer, Watched};
-use crate::statistics::median;
+use crate::statistics::median_of;
 
 /// The figures of one repeat.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,7 +58,7 @@ async fn two_visits(coordinator: &str, guest: &Guest, offers: [&OfferStatus; 2])
 impl Row {
     /// The median of a figure of all repeats.
     pub(super) fn median(&self, figure: impl Fn(&Visit) -> f64) -> f64 {
-        median(self.visits.iter().map(figure).collect())
+        median_of(&self.visits, figure)
     }
 
     /// The longest gap of all repeats.

@@ -1,21 +1,19 @@
 //! `myriorama-lab bench sharing`: whether clients of one cluster leave each other alone.
 
-use std::path::PathBuf;
-
 use app_core::exit::Outcome;
 use app_core::process::runtime;
 use clap::{Args, ValueEnum};
-use gpu::DevicePreference;
 use render::Lighting;
 use scene::SceneSpec;
 
 use super::up::Up;
 use super::{beside, guests, killed_compositor, report};
-use crate::section::{self, Section, finish, measure_parts};
+use crate::section::{self, Section, measure_parts};
+use crate::study::RunArgs;
 
 /// Measures a live viewer of 320×180 at 10 poses a second beside batches of other clients: other sizes, lightings,
 /// codecs, scenes, moments, and views drawn directly. Each batch is measured alone, too. Then a node of one scene is killed
-/// while viewers of another scene look on.
+/// while viewers of another scene look on. --quick takes one repeat in place of three.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: myriorama-lab bench sharing --strict")]
 pub struct SharingArgs {
@@ -28,24 +26,14 @@ pub struct SharingArgs {
     /// How surfaces are lit
     #[arg(long, value_name = "TERMS", default_value = "soft 4, occlusion 4")]
     lighting: Lighting,
-    /// any (a GPU if there is one) or software
-    #[arg(long, default_value_t, value_name = "NAME", env = "MYRIORAMA_DEVICE")]
-    device: DevicePreference,
     /// Nodes P that share the device
     #[arg(long, default_value_t = 4, value_name = "P", value_parser = clap::value_parser!(u16).range(2..=64))]
     nodes: u16,
     /// Measures only this part of the report; may be repeated
     #[arg(long, value_name = "PART")]
     only: Vec<Part>,
-    /// One repeat in place of three
-    #[arg(long)]
-    quick: bool,
-    /// Where the report goes
-    #[arg(long, default_value = "out/bench-sharing", value_name = "DIR")]
-    out: PathBuf,
-    /// Exit status 1 when a check falls short
-    #[arg(long)]
-    strict: bool,
+    #[command(flatten)]
+    run: RunArgs,
 }
 
 /// A part of the report, which is measured by itself.
@@ -59,7 +47,7 @@ enum Part {
 
 impl SharingArgs {
     fn repeats(&self) -> usize {
-        if self.quick { 1 } else { 3 }
+        if self.run.quick { 1 } else { 3 }
     }
 
     /// Arguments of `myriorama up`.
@@ -72,7 +60,7 @@ impl SharingArgs {
             "--lighting".to_owned(),
             self.lighting.to_string(),
             "--device".to_owned(),
-            self.device.to_string(),
+            self.run.device.device.to_string(),
             "--nodes".to_owned(),
             self.nodes.to_string(),
         ]
@@ -95,13 +83,14 @@ pub fn run(args: &SharingArgs) -> anyhow::Result<Outcome> {
     }
     report.parameter("nodes P", u32::from(args.nodes));
     report.parameter("repeats", args.repeats());
-    finish(report, sections, &args.out, args.strict)
+    section::add(&mut report, sections);
+    args.run.finish("out/bench-sharing", &report)
 }
 
 async fn measure_part(args: &SharingArgs, part: Part) -> anyhow::Result<Section> {
     match part {
         Part::Guests => guests(&args.cluster(), args.repeats()).await,
-        Part::KilledCompositor => killed_compositor::measure(args.device).await,
+        Part::KilledCompositor => killed_compositor::measure(args.run.device.device).await,
     }
 }
 

@@ -7,7 +7,7 @@ use client::Client;
 use cluster::{DIRECT, OfferStatus, PolicyChoice, SessionRequest, Timeline};
 use glam::UVec2;
 
-use super::viewer::path;
+use crate::processes::orbit;
 
 /// A guest: a batch of views, which differs from the viewer's session in one respect.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,7 +60,7 @@ impl Guest {
     pub(super) async fn visit(&self, coordinator: &str, offers: [&OfferStatus; 2]) -> anyhow::Result<f64> {
         let start = Instant::now();
         let offer = offers[usize::from(self.difference == Difference::Scene)];
-        let views = path(offer, self.views, self.size_px)?;
+        let views = orbit(offer, self.views, self.size_px)?;
         let client = Client::connect(coordinator).await?;
         let request = request(offer.settings.clone(), PolicyChoice::Pipeline, &views)?;
         let session = open(&client, self.request(offer, request)).await?;

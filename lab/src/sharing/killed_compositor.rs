@@ -53,10 +53,11 @@ pub(super) async fn measure(device: DevicePreference) -> anyhow::Result<Section>
 fn victim(viewers: &[Viewer]) -> anyhow::Result<String> {
     let own = viewers[0].plan();
     let other = viewers[1].plan();
-    let names = || own.compositors.iter().map(|share| &share.node_name);
-    let serves_other =
-        |name: &str| other.composites(name) || other.samplers.iter().any(|share| share.node_name == name);
-    names().find(|name| !serves_other(name)).or_else(|| names().next()).cloned().context("the plan has no compositor")
+    let mut names = own.compositors.iter().map(|share| &share.node_name);
+    let only_here = names
+        .clone()
+        .find(|&name| !other.composites(name) && other.samplers.iter().all(|share| share.node_name != *name));
+    only_here.or_else(|| names.next()).cloned().context("the plan has no compositor")
 }
 
 fn section(watched: &[Watched], policies: &str, device: String) -> anyhow::Result<Section> {
@@ -64,9 +65,9 @@ fn section(watched: &[Watched], policies: &str, device: String) -> anyhow::Resul
     let mut table = Table::new("A compositor of courtyard is killed", &columns);
     let mut gaps_s = [0.0; 2];
     for (at, scene) in SCENES.into_iter().enumerate() {
-        let own = || watched.iter().skip(at).step_by(SCENES.len());
-        gaps_s[at] = own().map(|watched| watched.longest_gap_s).fold(0.0, f64::max);
-        let shown = own().map(|watched| watched.shown_share).fold(1.0, f64::min);
+        let own = watched.iter().skip(at).step_by(SCENES.len());
+        gaps_s[at] = own.clone().map(|watched| watched.longest_gap_s).fold(0.0, f64::max);
+        let shown = own.map(|watched| watched.shown_share).fold(1.0, f64::min);
         let numbers = [gaps_s[at], shown * 100.0].map(Cell::from);
         table.push([Cell::from(scene), policies.into()].into_iter().chain(numbers))?;
     }

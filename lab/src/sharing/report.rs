@@ -57,17 +57,20 @@ fn figures(row: &Row) -> [f64; 7] {
 /// A guest that could not be measured falls short of every bar. The time of one that shares the viewer's workload has a bar,
 /// for others take nodes of their own.
 fn checks(guest: &Guest, row: Option<&Row>) -> Vec<Check> {
-    let of = |figure: fn(&Row) -> f64, worst: f64| row.map_or(worst, figure);
-    let gap_s = of(|row| row.median(|visit| visit.watched.longest_gap_s), f64::INFINITY);
-    let shown = of(|row| row.median(|visit| visit.watched.shown_share), 0.0);
-    let times = of(|row| row.median(|visit| visit.beside_s / visit.alone_s), f64::INFINITY);
-    let named = |what: &str| format!("{}: {what}", guest.name);
+    let [gap_s, shown, times] = row.map_or([f64::INFINITY, 0.0, f64::INFINITY], |row| {
+        [
+            row.median(|visit| visit.watched.longest_gap_s),
+            row.median(|visit| visit.watched.shown_share),
+            row.median(|visit| visit.beside_s / visit.alone_s),
+        ]
+    });
+    let name = guest.name;
     let mut checks = vec![
-        Check::new(named("longest gap"), gap_s, "s", Bar::AtMost(LONGEST_GAP_S)),
-        Check::new(named("poses shown"), shown * 100.0, "%", Bar::AtLeast(SHOWN * 100.0)),
+        Check::new(format!("{name}: longest gap"), gap_s, "s", Bar::AtMost(LONGEST_GAP_S)),
+        Check::new(format!("{name}: poses shown"), shown * 100.0, "%", Bar::AtLeast(SHOWN * 100.0)),
     ];
     if guest.shares_workload() {
-        checks.push(Check::new(named("beside over alone"), times, "", Bar::AtMost(BESIDE_OVER_ALONE)));
+        checks.push(Check::new(format!("{name}: beside over alone"), times, "", Bar::AtMost(BESIDE_OVER_ALONE)));
     }
     checks
 }

@@ -8,9 +8,10 @@ use app_core::delivery::{at_rate, open, request};
 use app_core::live::{Drive, Record, drive};
 use client::{Client, Session};
 use cluster::{Assignment, OfferStatus, PolicyChoice, SessionRequest};
-use depth_image::{PinholeCamera, ViewCell};
 use glam::UVec2;
 use tokio::task::JoinHandle;
+
+use crate::processes::orbit;
 
 /// The size of the viewer's frames.
 const SIZE_PX: UVec2 = UVec2::new(320, 180);
@@ -52,19 +53,13 @@ pub(super) struct Viewer {
     stop: tokio::sync::oneshot::Sender<()>,
 }
 
-/// The views between the sample cameras of a scene.
-pub(super) fn path(offer: &OfferStatus, count: usize, size_px: UVec2) -> anyhow::Result<Vec<PinholeCamera>> {
-    let samples: Vec<_> = offer.sample_cameras.iter().map(|camera| *camera.reference()).collect();
-    Ok(ViewCell::between(&samples).context("no sample cameras")?.orbit(count, size_px))
-}
-
 impl Viewer {
     /// Opens a session and follows an orbit; returns when frames have come for a while.
     ///
     /// # Errors
     /// The coordinator refuses.
     pub(super) async fn start(coordinator: &str, offer: &OfferStatus, policy: PolicyChoice) -> anyhow::Result<Self> {
-        let path = path(offer, PATH_POSES, SIZE_PX)?;
+        let path = orbit(offer, PATH_POSES, SIZE_PX)?;
         let request = at_rate(request(offer.settings.clone(), policy, &path[..1])?, RATE_HZ);
         let request = SessionRequest { scene: Some(offer.name.clone()), ..request };
         let client = Client::connect(coordinator).await?;

@@ -14,7 +14,7 @@ use super::paths::{PATHS, Path, PathKind};
 use super::report::add_to;
 use super::still::differing_rows;
 use crate::fronts::subject::{Conditions, Subject};
-use crate::study::{StudyArgs, measure_rows};
+use crate::study::{RunArgs, measure_rows};
 
 /// Frames of a path, in the quick form and in the full one.
 const FRAMES: [usize; 2] = [16, 48];
@@ -28,7 +28,7 @@ const STILL_SCENE: &str = "tree-terrain-30k";
   myriorama-lab study stability --quick --path cells")]
 pub struct StabilityArgs {
     #[command(flatten)]
-    study: StudyArgs,
+    study: RunArgs,
     /// Only paths whose names contain this text
     #[arg(long = "path", value_name = "TEXT", default_value = "")]
     path: String,
@@ -53,7 +53,7 @@ pub fn run(args: &StabilityArgs) -> anyhow::Result<Outcome> {
     if args.path.is_empty() {
         report.checks.push(still(&engine)?);
     }
-    args.study.finish("stability", &report)
+    args.study.finish("out/study/stability", &report)
 }
 
 fn measured(engine: &Arc<GpuEngine>, kind: PathKind, frames: usize) -> anyhow::Result<Measured> {

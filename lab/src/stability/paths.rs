@@ -93,34 +93,30 @@ impl Path {
     /// The ladder lacks a representation, or the scene has no cells.
     pub fn new(kind: PathKind, planning: &Planning, count: usize) -> anyhow::Result<Self> {
         let usual = planning.representations[default_place(&planning.ladder, CAMERAS)?].clone();
-        let set = |time_s: f32, refinement: Refinement| SetOfPath { representation: usual.clone(), time_s, refinement };
-        let cameras = orbit(planning, kind.step_px, count);
-        let one_by = |of_frame: &dyn Fn(usize) -> usize| -> Vec<Frame> {
-            cameras.iter().enumerate().map(|(frame, &camera)| Frame { camera, set: of_frame(frame) }).collect()
-        };
-        let finished = Refinement::default();
-        let (sets, frames) = match kind.switch {
-            Switch::None => (vec![set(0.0, finished)], one_by(&|_| 0)),
+        let still = SetOfPath { representation: usual.clone(), time_s: 0.0, refinement: Refinement::default() };
+        let (sets, set_of_frames): (Vec<SetOfPath>, Vec<usize>) = match kind.switch {
+            Switch::None => (vec![still], vec![0; count]),
             Switch::Moment => {
-                let sets = (0..count).map(|frame| set(frame as f32 / FRAMES_PER_S, finished));
-                (sets.collect(), one_by(&|frame| frame))
+                let sets = (0..count).map(|frame| SetOfPath { time_s: frame as f32 / FRAMES_PER_S, ..still.clone() });
+                (sets.collect(), (0..count).collect())
             }
-            Switch::Cell => across_cells(planning, &usual, count)?,
+            Switch::Cell => {
+                let (sets, frames) = across_cells(planning, &usual, count)?;
+                return Ok(Self { kind, sets, frames });
+            }
             Switch::Representation => {
-                let replacement = Representation { method: REPLACEMENT.to_owned(), ..usual.clone() };
-                let sets = [usual.clone(), replacement].map(|representation| SetOfPath {
-                    representation,
-                    time_s: 0.0,
-                    refinement: finished,
-                });
-                (sets.to_vec(), one_by(&|frame| usize::from(frame >= count / 2)))
+                let representation = Representation { method: REPLACEMENT.to_owned(), ..usual };
+                let replacement = SetOfPath { representation, ..still.clone() };
+                (vec![still, replacement], (0..count).map(|frame| usize::from(frame >= count / 2)).collect())
             }
             Switch::Light => {
                 let steps = kind.lighting.parse::<Lighting>()?.refinement_steps();
-                let sets = (0..steps).map(|step| set(0.0, Refinement { step, steps }));
-                (sets.collect(), one_by(&|frame| frame.min(steps as usize - 1)))
+                let sets = (0..steps).map(|step| SetOfPath { refinement: Refinement { step, steps }, ..still.clone() });
+                (sets.collect(), (0..count).map(|frame| frame.min(steps as usize - 1)).collect())
             }
         };
+        let cameras = orbit(planning, kind.step_px, count).into_iter();
+        let frames = cameras.zip(set_of_frames).map(|(camera, set)| Frame { camera, set }).collect();
         Ok(Self { kind, sets, frames })
     }
 
@@ -146,8 +142,7 @@ fn orbit(planning: &Planning, step_px: f32, count: usize) -> Vec<PinholeCamera> 
     let distance_m = (planning.subject.volume.center() - middle.eye_in_world).length();
     let half_m = (cell.camera_at(Vec2::X, view_px).eye_in_world - middle.eye_in_world).length();
     let step = step_px * distance_m / (middle.focal_px.x * RADIUS * half_m);
-    let place = |frame: usize| Vec2::from_angle(step * frame as f32) * RADIUS;
-    (0..count).map(|frame| cell.camera_at(place(frame), view_px)).collect()
+    (0..count).map(|frame| cell.camera_at(Vec2::from_angle(step * frame as f32) * RADIUS, view_px)).collect()
 }
 
 /// A walk around the scene, in which view cells follow one another as the coordinator places them.
@@ -165,8 +160,9 @@ fn across_cells(
     let sample = usual.sample_cameras.first().context("no sample cameras")?.reference();
     let size_px: UVec2 = sample.size_px;
     let cells: Vec<Vec<PinholeCamera>> = groups.iter().map(|group| group.sample_cameras(size_px)).collect();
-    let cell_of = |camera: &PinholeCamera| nearest_set(camera, cells.clone(), volume).context("no view cell");
-    let of_frames = cameras.iter().map(cell_of).collect::<anyhow::Result<Vec<usize>>>()?;
+    let of_frames: Option<Vec<usize>> =
+        cameras.iter().map(|camera| nearest_set(camera, cells.clone(), volume)).collect();
+    let of_frames = of_frames.context("no view cell")?;
     // Sets follow one another, also where the walk comes back to a cell.
     let visits: Vec<&[usize]> = of_frames.chunk_by(|a, b| a == b).collect();
     let set_of_frames = visits.iter().enumerate().flat_map(|(set, visit)| std::iter::repeat_n(set, visit.len()));

@@ -65,10 +65,9 @@ impl Measured {
     fn chart(&self) -> XyChart {
         let title = format!("Error of changes, {}", self.path.kind.name);
         let error = Axis::linear("error of the change from the frame before", "of full scale");
-        let point = |(frame, figures): (usize, &Figures)| (frame as f64, figures.change_error);
-        let all: Vec<(f64, f64)> = self.frames().map(point).collect();
+        let all: Vec<(f64, f64)> = self.frames().map(|(frame, figures)| (frame as f64, figures.change_error)).collect();
         let switches: Vec<(f64, f64)> =
-            self.frames().filter(|(frame, _)| self.path.is_switch(*frame)).map(point).collect();
+            (1..).zip(&all).filter(|(frame, _)| self.path.is_switch(*frame)).map(|(_, point)| *point).collect();
         let chart = XyChart::new(title, Axis::linear("frame", ""), error).with(Series::line("foreground", all));
         if switches.is_empty() { chart } else { chart.with(Series::points("switch", switches)) }
     }

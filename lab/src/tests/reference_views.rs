@@ -43,7 +43,7 @@ fn views_from_samples_are_as_those_from_the_scene() {
     for scene in ["uv-sphere", "courtyard"] {
         let (_, _, _, reference) = reference(scene, 4);
         let row = reference.evaluate(ReconstructionMethod::default(), 1).unwrap();
-        assert!(row.psnr_db > 30.0, "{scene}: {row:?}");
+        assert!(row.whole.psnr_db > 30.0, "{scene}: {row:?}");
         assert!(row.wrong_hits < 0.05 && row.unknown < 0.1, "{scene}: {row:?}");
         assert!(row.ms_a_view > 0.0, "{scene}: {row:?}");
     }
@@ -56,7 +56,8 @@ fn the_comparison_sees_views_of_another_place() {
     let mut moved = ReferenceViews::draw(&engine, &setup, &args, views(&setup, 6).split_off(4)).unwrap();
     moved.views.clone_from(&reference.views);
     let row = moved.evaluate(ReconstructionMethod::default(), 1).unwrap();
-    assert!(row.psnr_db < own.psnr_db - 3.0 && row.flip > 2.0 * own.flip, "{row:?} {own:?}");
+    let [moved, own] = [row.whole, own.whole];
+    assert!(moved.psnr_db < own.psnr_db - 3.0 && moved.flip > 2.0 * own.flip, "{moved:?} {own:?}");
 }
 
 fn is_invalid(error: &EngineError, named: &str) -> bool {

@@ -1,40 +1,29 @@
 //! `myriorama-lab bench viewer`: the viewer in a real browser.
 
-use std::path::PathBuf;
-
 use app_core::exit::Outcome;
 use app_core::process::runtime;
 use clap::{Args, ValueEnum};
-use gpu::DevicePreference;
 use scene::SceneSpec;
 
 use super::stand::Ground;
 use super::{dragging, faults, first_picture, memory, rest, slow_link, walk};
-use crate::section::{Section, finish, measure_parts, report};
+use crate::section::{self, Section, measure_parts};
+use crate::study::RunArgs;
 
 /// Measures the viewer's page in Chromium, before a gateway, a coordinator and two nodes on the same machine: pictures of
-/// drags, stills, first pictures, a slow link, faults, a walk around the scene, and memory. Needs chromium.
+/// drags, stills, first pictures, a slow link, faults, a walk around the scene, and memory. Needs chromium. --quick takes one repeat in
+/// place of five, and one minute of memory in place of ten.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: myriorama-lab bench viewer --quick --only dragging --only rest")]
 pub struct ViewerBenchArgs {
     /// The scene
     #[arg(long, value_name = "SPEC", default_value = "courtyard")]
     scene: SceneSpec,
-    /// any (a GPU if there is one) or software
-    #[arg(long, default_value_t, value_name = "NAME", env = "MYRIORAMA_DEVICE")]
-    device: DevicePreference,
     /// Measures only this part of the report; may be repeated
     #[arg(long, value_name = "PART")]
     only: Vec<Part>,
-    /// One repeat in place of five, and one minute of memory in place of ten
-    #[arg(long)]
-    quick: bool,
-    /// Where the report goes
-    #[arg(long, default_value = "out/bench-viewer", value_name = "DIR")]
-    out: PathBuf,
-    /// Exit status 1 when a check falls short
-    #[arg(long)]
-    strict: bool,
+    #[command(flatten)]
+    run: RunArgs,
 }
 
 /// A part of the report, which is measured by itself.
@@ -58,9 +47,9 @@ enum Part {
 
 impl ViewerBenchArgs {
     fn ground(&self) -> Ground {
-        let repeats = if self.quick { 1 } else { 5 };
-        let memory_s = if self.quick { 60.0 } else { 600.0 };
-        Ground { scene: self.scene.to_string(), device: self.device, repeats, memory_s }
+        let repeats = if self.run.quick { 1 } else { 5 };
+        let memory_s = if self.run.quick { 60.0 } else { 600.0 };
+        Ground { scene: self.scene.to_string(), device: self.run.device.device, repeats, memory_s }
     }
 }
 
@@ -72,10 +61,11 @@ pub fn run(args: &ViewerBenchArgs) -> anyhow::Result<Outcome> {
     let ground = args.ground();
     let measure = measure_parts(&args.only, async |part| measure_part(&ground, *part).await);
     let sections = runtime()?.block_on(measure);
-    let mut report = report("Myriorama bench viewer", &sections);
+    let mut report = section::report("Myriorama bench viewer", &sections);
     report.parameter("scene", ground.scene.clone());
     report.parameter("repeats", ground.repeats);
-    finish(report, sections, &args.out, args.strict)
+    section::add(&mut report, sections);
+    args.run.finish("out/bench-viewer", &report)
 }
 
 async fn measure_part(ground: &Ground, part: Part) -> anyhow::Result<Section> {

@@ -3,13 +3,14 @@
 use std::time::Duration;
 
 use cluster::PolicyChoice;
-use report::{Bar, Cell, Check, Table};
+use report::{Bar, Check};
 
 use super::page::{Page, Picture};
 use super::stand::{Ground, Stand};
 use crate::memory::processor_s;
 use crate::section::Section;
-use crate::statistics::{median, quantile};
+use crate::statistics::{median, median_of, quantile};
+use crate::study::{Column, table};
 
 /// Seconds of a drag.
 const DRAG_S: f64 = 5.0;
@@ -45,12 +46,6 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
     drop(stand);
     let stand = Stand::start(ground, PolicyChoice::Auto).await?;
     let [auto_small, auto_large] = [drags(ground, &stand, SMALL).await?, drags(ground, &stand, LARGE).await?];
-    let rows = [
-        ("pipeline", SMALL, &small),
-        ("pipeline", LARGE, &large),
-        ("auto", SMALL, &auto_small),
-        ("auto", LARGE, &auto_large),
-    ];
     let mut checks = vec![
         Check::new("pictures a second at 320×180", small.per_s, "", Bar::AtLeast(20.0)),
         Check::new("pictures a second at 640×360", large.per_s, "", Bar::AtLeast(9.0)),
@@ -65,40 +60,36 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
         Check::new("a processor's time of the gateway for a picture", small.gateway_ms, "ms", Bar::AtMost(0.6)),
         Check::new("age over that of a client of gRPC", small.detour_ms, "ms", Bar::AtMost(8.0)),
     ];
-    let off_ms = rows.iter().map(|(.., drags)| drags.parts_off_ms).fold(0.0, f64::max);
+    let rows = [
+        ("pipeline", SMALL, small),
+        ("pipeline", LARGE, large),
+        ("auto", SMALL, auto_small),
+        ("auto", LARGE, auto_large),
+    ]
+    .map(|(policy, size_px, drags)| DragsRow { policy, size_px, drags });
+    let off_ms = rows.iter().map(|row| row.drags.parts_off_ms).fold(0.0, f64::max);
     checks.push(Check::new("an age beside the sum of its parts", off_ms, "ms", Bar::AtMost(2.0)));
-    Ok(Section { device, tables: vec![table(&rows)?], checks })
+    Ok(Section { device, tables: vec![table("Dragging", &COLUMNS, &rows)?], checks })
 }
 
-fn table(rows: &[(&str, [u32; 2], &Drags)]) -> anyhow::Result<Table> {
-    let columns = [
-        ("policy", ""),
-        ("canvas", ""),
-        ("pictures a second", ""),
-        ("age, median", "ms"),
-        ("age, 95 %", "ms"),
-        ("first move", "ms"),
-        ("picture", "kB"),
-        ("gateway's processor", "ms"),
-        ("network and gateway", "ms"),
-    ];
-    let mut table = Table::new("Dragging", &columns);
-    for (policy, [width, height], drags) in rows {
-        let [median_ms, late_ms] = drags.age_ms;
-        let figures = [
-            drags.per_s,
-            median_ms,
-            late_ms,
-            drags.first_move_ms,
-            drags.bytes / 1000.0,
-            drags.gateway_ms,
-            drags.detour_ms,
-        ];
-        let head = [Cell::from(*policy), format!("{width}×{height}").into()];
-        table.push(head.into_iter().chain(figures.map(Cell::from)))?;
-    }
-    Ok(table)
+/// The drags at a size under a policy.
+struct DragsRow {
+    policy: &'static str,
+    size_px: [u32; 2],
+    drags: Drags,
 }
+
+const COLUMNS: [Column<DragsRow>; 9] = [
+    Column::new("policy", |row| row.policy.into()),
+    Column::new("canvas", |row| format!("{}×{}", row.size_px[0], row.size_px[1]).into()),
+    Column::new("pictures a second", |row| row.drags.per_s.into()),
+    Column::with_unit("age, median", "ms", |row| row.drags.age_ms[0].into()),
+    Column::with_unit("age, 95 %", "ms", |row| row.drags.age_ms[1].into()),
+    Column::with_unit("first move", "ms", |row| row.drags.first_move_ms.into()),
+    Column::with_unit("picture", "kB", |row| (row.drags.bytes / 1000.0).into()),
+    Column::with_unit("gateway's processor", "ms", |row| row.drags.gateway_ms.into()),
+    Column::with_unit("network and gateway", "ms", |row| row.drags.detour_ms.into()),
+];
 
 /// Bytes of all files that the page loads.
 async fn page_bytes(stand: &Stand) -> anyhow::Result<f64> {
@@ -124,35 +115,33 @@ async fn drags(ground: &Ground, stand: &Stand, size_px: [u32; 2]) -> anyhow::Res
         moves.push(first.map_or(f64::INFINITY, |picture| picture.age_ms));
         all.push(one_drag(stand, &page).await?);
     }
-    let of = |figure: fn(&Drags) -> f64| median(all.iter().map(figure).collect());
     Ok(Drags {
-        per_s: of(|drags| drags.per_s),
-        age_ms: [of(|drags| drags.age_ms[0]), of(|drags| drags.age_ms[1])],
+        per_s: median_of(&all, |drags| drags.per_s),
+        age_ms: [0, 1].map(|place| median_of(&all, |drags| drags.age_ms[place])),
         parts_off_ms: all.iter().map(|drags| drags.parts_off_ms).fold(0.0, f64::max),
-        bytes: of(|drags| drags.bytes),
-        detour_ms: of(|drags| drags.detour_ms),
-        gateway_ms: of(|drags| drags.gateway_ms),
+        bytes: median_of(&all, |drags| drags.bytes),
+        detour_ms: median_of(&all, |drags| drags.detour_ms),
+        gateway_ms: median_of(&all, |drags| drags.gateway_ms),
         first_move_ms: median(moves),
         pose_bytes: page.browser.value("window.longestPose").await?,
     })
 }
 
 async fn one_drag(stand: &Stand, page: &Page) -> anyhow::Result<Drags> {
-    let used = || processor_s(stand.gateway.id()).unwrap_or(f64::NAN);
-    let before_s = used();
+    let before_s = processor_s(stand.gateway.id()).unwrap_or(f64::NAN);
     let start_ms = page.now_ms().await?;
     let pictures = page.drag(DRAG_S).await?;
-    let used_s = used() - before_s;
+    let used_s = processor_s(stand.gateway.id()).unwrap_or(f64::NAN) - before_s;
     let found: Vec<&Picture> = pictures.iter().filter(|picture| picture.painted_ms > start_ms + FOUND_MS).collect();
-    let of = |figure: fn(&&Picture) -> f64| found.iter().map(figure).collect::<Vec<_>>();
+    let ages_ms: Vec<f64> = found.iter().map(|picture| picture.age_ms).collect();
+    let parts_off_ms =
+        found.iter().map(|picture| (picture.age_ms - picture.parts_ms).abs().max(-picture.least_part_ms));
     Ok(Drags {
         per_s: found.len() as f64 / (DRAG_S - FOUND_MS / 1000.0),
-        age_ms: [0.5, 0.95].map(|share| quantile(of(|picture| picture.age_ms), share)),
-        parts_off_ms: of(|picture| (picture.age_ms - picture.parts_ms).abs().max(-picture.least_part_ms))
-            .into_iter()
-            .fold(0.0, f64::max),
-        bytes: median(of(|picture| picture.bytes)),
-        detour_ms: median(of(|picture| picture.detour_ms)),
+        age_ms: [0.5, 0.95].map(|share| quantile(ages_ms.clone(), share)),
+        parts_off_ms: parts_off_ms.fold(0.0, f64::max),
+        bytes: median_of(&found, |picture| picture.bytes),
+        detour_ms: median_of(&found, |picture| picture.detour_ms),
         gateway_ms: used_s * 1000.0 / pictures.len() as f64,
         first_move_ms: f64::NAN,
         pose_bytes: f64::NAN,

@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use cluster::PolicyChoice;
 use report::{Bar, Cell, Check, Table};
 
-use super::page::{Page, longest_gap_s};
+use super::page::longest_gap_s;
 use super::stand::{Ground, Stand};
 use crate::section::Section;
 
@@ -67,10 +67,7 @@ async fn killed_gateway(stand: &mut Stand) -> anyhow::Result<(f64, f64)> {
     let has_more = format!("window.myriorama.statistics.pictures.length > {index}");
     page.browser.wait_until(&has_more, WITHIN).await?;
     let picture = page.pictures_since(index).await?.into_iter().next().context("a picture")?;
-    let banner_ms = banner_at(&page).await?.unwrap_or(f64::INFINITY);
+    let banner_ms: Option<f64> = page.browser.value("window.bannerAt").await?;
+    let banner_ms = banner_ms.unwrap_or(f64::INFINITY);
     Ok(((banner_ms - killed_ms) / 1000.0, (picture.painted_ms - back_ms) / 1000.0))
-}
-
-async fn banner_at(page: &Page) -> anyhow::Result<Option<f64>> {
-    Ok(page.browser.value("window.bannerAt").await?)
 }

@@ -49,7 +49,7 @@ async fn cold(ground: &Ground) -> anyhow::Result<f64> {
     let device = ground.device.to_string();
     let mut up = Process::up_with_viewer(&["--scene", &ground.scene, "--device", &device])?;
     let _cluster = up.address()?;
-    page.open(&up.address()?).await?;
+    page.browser.open(&up.address()?).await?;
     page.browser.wait_until(HAS_PICTURE, WITHIN).await?;
     Ok(start.elapsed().as_secs_f64())
 }

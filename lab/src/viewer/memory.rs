@@ -37,10 +37,8 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
     );
     let mut checks = Vec::new();
     for (at, name) in ["the page's scripts", "the gateway"].into_iter().enumerate() {
-        let of = |reading: &[f64; 2]| reading[at];
-        let first = warm.first().map_or(f64::NAN, of);
-        let last = warm.last().map_or(f64::NAN, of);
-        let most = warm.iter().map(of).fold(0.0, f64::max);
+        let [first, last] = [warm.first(), warm.last()].map(|reading| reading.map_or(f64::NAN, |reading| reading[at]));
+        let most = warm.iter().map(|reading| reading[at]).fold(0.0, f64::max);
         table.push([Cell::from(name), first.into(), last.into(), most.into()])?;
         checks.push(Check::new(format!("memory of {name}: growth"), last - first, "MiB", Bar::AtMost(32.0)));
     }

@@ -67,10 +67,6 @@ impl Page {
         Ok(Self { browser, size_px })
     }
 
-    pub(super) async fn open(&self, url: &str) -> anyhow::Result<()> {
-        Ok(self.browser.open(url).await?)
-    }
-
     /// Waits until the newest pose's finished still is on the screen.
     pub(super) async fn wait_for_finished(&self, within: Duration) -> anyhow::Result<()> {
         Ok(self.browser.wait_until(IS_FINISHED, within).await?)
@@ -121,9 +117,8 @@ impl Page {
         let [width, height] = self.size_px.map(f64::from);
         let length = 2.0 * height * share;
         let steps = (seconds * 50.0).max(2.0) as usize;
-        let place = |step: usize| [width * 0.1 + length * step as f64 / steps as f64, height * 0.4];
         let interval = Duration::from_secs_f64(seconds / steps as f64);
-        let path = (0..=steps).map(place).collect();
+        let path = (0..=steps).map(|step| [width * 0.1 + length * step as f64 / steps as f64, height * 0.4]).collect();
         Ok(self.browser.drag(&Drag { interval, ..Drag::along(path) }).await?)
     }
 

@@ -29,9 +29,9 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
         let times_ms = stills(ground, &stand.page(SIZE_PX).await?).await?;
         let [median_ms, late_ms] = [0.5, 0.95].map(|share| quantile(times_ms.clone(), share));
         table.push([Cell::from(policy.to_string()), median_ms.into(), late_ms.into()])?;
-        let named = |what: &str| format!("last input to still, {policy}, {what}");
-        section.checks.push(Check::new(named("median"), median_ms, "ms", Bar::AtMost(450.0)));
-        section.checks.push(Check::new(named("95 %"), late_ms, "ms", Bar::AtMost(800.0)));
+        let name = format!("last input to still, {policy}");
+        section.checks.push(Check::new(format!("{name}, median"), median_ms, "ms", Bar::AtMost(450.0)));
+        section.checks.push(Check::new(format!("{name}, 95 %"), late_ms, "ms", Bar::AtMost(800.0)));
         section.device = stand.processes.device.clone();
     }
     section.tables.push(table);

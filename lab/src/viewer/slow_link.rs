@@ -9,7 +9,7 @@ use report::{Bar, Cell, Check, Table};
 use super::page::{Page, Picture};
 use super::stand::{Ground, Stand, authority};
 use crate::section::Section;
-use crate::statistics::median;
+use crate::statistics::median_of;
 
 const SIZE_PX: [u32; 2] = [640, 360];
 /// 1 Mbit/s each way, with a round trip of 80 ms.
@@ -30,7 +30,7 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
     let proxy = Proxy::to(&format!("http://{}", authority(&stand.url)), 1);
     proxy.set(LINK, LINK);
     let page = Page::start(SIZE_PX).await?;
-    page.open(&proxy.address).await?;
+    page.browser.open(&proxy.address).await?;
     page.wait_for_finished(WITHIN).await?;
     let start_ms = page.now_ms().await? + FOUND_S * 1000.0;
     let pictures = page.drag(DRAG_S).await?;
@@ -53,13 +53,12 @@ struct Slow {
 
 impl Slow {
     fn of(slow: &[Picture], freed: &[Picture], freed_ms: f64) -> Self {
-        let age_ms = |pictures: &[Picture]| median(pictures.iter().map(|picture| picture.age_ms).collect());
         let (first, second) = slow.split_at(slow.len() / 2);
         let full = freed.iter().find(|picture| picture.size_px[1] >= SIZE_PX[1]);
         Self {
             per_s: slow.len() as f64 / (DRAG_S - FOUND_S),
-            age_ms: age_ms(slow),
-            rise: age_ms(second) / age_ms(first),
+            age_ms: median_of(slow, |picture| picture.age_ms),
+            rise: median_of(second, |picture| picture.age_ms) / median_of(first, |picture| picture.age_ms),
             full_s: full.map_or(f64::INFINITY, |picture| (picture.painted_ms - freed_ms) / 1000.0),
         }
     }

@@ -64,7 +64,7 @@ impl Stand {
     /// There is no browser, or no picture.
     pub(super) async fn page(&self, size_px: [u32; 2]) -> anyhow::Result<Page> {
         let page = Page::start(size_px).await?;
-        page.open(&self.url).await?;
+        page.browser.open(&self.url).await?;
         page.wait_for_finished(FIRST_PICTURE).await?;
         Ok(page)
     }

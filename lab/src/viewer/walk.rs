@@ -40,9 +40,8 @@ pub(super) async fn measure(ground: &Ground) -> anyhow::Result<Section> {
     let per_s = pictures.len() as f64 * 1000.0 / (until_ms - since_ms);
     let gap_s = longest_gap_s(&pictures, since_ms, until_ms);
     let [foreground_db, psnr_db] = stills(&stand, &page).await?;
-    let least = |psnr_db: &[f64]| psnr_db.iter().copied().fold(f64::INFINITY, f64::min);
-    let least_foreground_db = least(&foreground_db);
-    let least_db = least(&psnr_db);
+    let [least_foreground_db, least_db] =
+        [&foreground_db, &psnr_db].map(|psnr_db| psnr_db.iter().copied().fold(f64::INFINITY, f64::min));
     let mut table = Table::new(
         "A walk of 360° in 24 s, and 24 stills beside direct drawing",
         &[

@@ -2,7 +2,7 @@
 
 use depth_image::{PinholeCamera, ProvenanceKind, View};
 use fixtures::quad;
-use glam::Vec3;
+use glam::{UVec2, Vec3};
 use scene::Scene;
 use scene::procedural::tree_terrain;
 
@@ -43,18 +43,22 @@ fn by_depth(stand: &Stand, depths_m: &[f64]) -> anyhow::Result<Rows> {
         let wall = quad(Vec3::new(2.0 * depth_m, 0.0, -depth_m), depth_m, Vec3::Z, [40, 90, 180]);
         scene.instances.push(scene::Instance { mesh: 1, ..wall.instances[0] });
         scene.meshes.extend(wall.meshes);
-        let camera = |x: f32, size_px| looking(Vec3::X * x, Vec3::new(x, 0.0, -1.0), 40.0, size_px);
-        let samples = [-0.1, 0.1].map(|x| camera(x, stand.sample_px));
-        covered_background(stand, &scene, &samples, camera(0.03, stand.view_px))
+        let places = [(-0.1, stand.sample_px), (0.1, stand.sample_px), (0.03, stand.view_px)];
+        let [left, right, view] =
+            places.map(|(x, size_px)| looking(Vec3::X * x, Vec3::new(x, 0.0, -1.0), 40.0, size_px));
+        covered_background(stand, &scene, &[left, right], view)
     })
 }
 
 fn by_distance(stand: &Stand, distances_m: &[f64]) -> anyhow::Result<Rows> {
-    let camera = |x: f32, size_px| looking(Vec3::new(x, 0.6, 2.5), Vec3::new(x, 0.6, 0.0), 45.0, size_px);
-    let samples = [0.0, 0.4].map(|x| camera(x, stand.sample_px));
+    let samples = [0.0, 0.4].map(|x| tree_camera(x, stand.sample_px));
     rows(distances_m, |distance_m| {
-        covered_background(stand, &tree_terrain(2000, 1), &samples, camera(distance_m as f32, stand.view_px))
+        covered_background(stand, &tree_terrain(2000, 1), &samples, tree_camera(distance_m as f32, stand.view_px))
     })
+}
+
+fn tree_camera(x_m: f32, size_px: UVec2) -> PinholeCamera {
+    looking(Vec3::new(x_m, 0.6, 2.5), Vec3::new(x_m, 0.6, 0.0), 45.0, size_px)
 }
 
 /// The share of the background's pixels, but for those beside a surface, that the carve does not leave empty.
@@ -67,15 +71,17 @@ fn covered_background(
     let stage = Stage::new(stand, scene, samples)?;
     let truth: &View = &stage.truth(&[camera])?[0];
     let view: &View = &stage.views(&[camera], CARVE)?[0];
-    let [columns, rows] = camera.size_px.to_array().map(|side| side as usize);
-    let is_background = |x: usize, y: usize| depths(truth)[y * columns + x] <= 0.0;
-    let is_open = |place: usize| {
-        let x = place % columns;
-        let y = place / columns;
-        let mut around =
-            (y.max(1) - 1..(y + 2).min(rows)).flat_map(|y| (x.max(1) - 1..(x + 2).min(columns)).map(move |x| (x, y)));
-        around.all(|(x, y)| is_background(x, y))
-    };
     let empty = is_kind(view, ProvenanceKind::Empty).enumerate();
-    Ok([share(empty.filter(|(place, _)| is_open(*place)).map(|(_, is_empty)| !is_empty))])
+    let open = empty.filter(|(place, _)| is_open(depths(truth), camera.size_px, *place));
+    Ok([share(open.map(|(_, is_empty)| !is_empty))])
+}
+
+/// Whether a pixel and all around it show the background.
+fn is_open(depths: &[f32], size_px: UVec2, place: usize) -> bool {
+    let [columns, rows] = size_px.to_array().map(|side| side as usize);
+    let x = place % columns;
+    let y = place / columns;
+    let mut around =
+        (y.max(1) - 1..(y + 2).min(rows)).flat_map(|y| (x.max(1) - 1..(x + 2).min(columns)).map(move |x| (x, y)));
+    around.all(|(x, y)| depths[y * columns + x] <= 0.0)
 }

@@ -5,7 +5,7 @@ use depth_image::{Aabb, CubeGrid, CubeImages, LayeredDepthImage, PinholeCamera, 
 use glam::{Vec2, Vec3};
 use gpu::Turn;
 use reconstruction::scalar::CubeTwin;
-use reconstruction::{ReconstructRequest, ReconstructionMethod, SetDescription};
+use reconstruction::{ReconstructRequest, ReconstructionMethod};
 use render::{LayerSelection, Lighting};
 use scene::{Limits, MissingTextures, SceneSpec};
 
@@ -14,7 +14,7 @@ use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::{foreground, not_held};
 use crate::failures::shape::Shape;
 use crate::failures::stage::looking;
-use crate::failures::stand::{Stand, work};
+use crate::failures::stand::{Stand, description, work};
 
 const TOWN: &str = "urban";
 const FOV_DEG: f32 = 45.0;
@@ -94,20 +94,11 @@ fn by_texel(stand: &Stand, sides_px: &[f64]) -> anyhow::Result<Rows> {
     let scene = TOWN.parse::<SceneSpec>()?.load(&Limits::default(), MissingTextures::Refuse)?;
     let on_device = stand.upload(&scene)?;
     let grid = CubeGrid::around(&scene.bounds(), TOWN_SIDES[usize::from(stand.is_small)])?;
-    let image = |axis| {
-        let renderer = &stand.engine().renderer;
-        renderer.draw_layers(work(&on_device, lighting), &grid.camera(axis), LayerSelection::Dominant)
-    };
-    let images = [image(0)?, image(1)?, image(2)?];
-    let description = SetDescription {
-        volume: scene.bounds(),
-        background: scene.background,
-        illumination: &scene.illumination,
-        highlight: lighting.highlight(),
-        environment: None,
-        mips: false,
-    };
-    let cube = CubeImages { grid, images, light_field: None };
+    let renderer = &stand.engine().renderer;
+    let [x, y, z] = [0, 1, 2]
+        .map(|axis| renderer.draw_layers(work(&on_device, lighting), &grid.camera(axis), LayerSelection::Dominant));
+    let description = description(&scene, lighting.highlight());
+    let cube = CubeImages { grid, images: [x?, y?, z?], light_field: None };
     let set = stand.reconstructor().upload_cube(&cube, &description, Turn::default())?;
     rows(sides_px, |side_px| {
         let pixel_m = grid.spacing_m / side_px as f32;
@@ -182,9 +173,8 @@ fn by_width(_: &Stand, widths: &[f64]) -> anyhow::Result<Rows> {
                 let from = leaf.normal + 1.7 * a * (leaf.at(Vec2::from_angle(std::f32::consts::TAU * b)) - leaf.middle);
                 let place = Vec2::new(2.0 * along - 1.0, 2.0 * across - 1.0);
                 let outside = Vec2::new(place.x * half_m.x, (half_m.y + 0.5 * place.y.abs()).copysign(place.y));
-                let met = |place| cubes::both(&twin, crossings, cubes::ray_to(leaf.at(place), from));
-                onto.push(met(place * half_m));
-                beside.push(met(outside));
+                onto.push(cubes::both(&twin, crossings, cubes::ray_to(leaf.at(place * half_m), from)));
+                beside.push(cubes::both(&twin, crossings, cubes::ray_to(leaf.at(outside), from)));
             }
         }
         Ok([missed(onto), met_wrongly(beside)])
@@ -226,9 +216,11 @@ fn ball(ray: Ray) -> Vec<Crossing> {
     let off = ray.origin_in_world - BALL_IN_WORLD;
     let towards = ray.direction_in_world;
     let [a, b, c] = [towards.length_squared(), off.dot(towards), off.length_squared() - RADIUS_M * RADIUS_M];
+    if b * b <= a * c {
+        return Vec::new();
+    }
     let root = (b * b - a * c).max(0.0).sqrt();
-    let at = |t: f32| Crossing { t, normal_in_world: (off + towards * t) / RADIUS_M };
-    if b * b > a * c { vec![at((-b - root) / a), at((-b + root) / a)] } else { Vec::new() }
+    [(-b - root) / a, (-b + root) / a].map(|t| Crossing { t, normal_in_world: (off + towards * t) / RADIUS_M }).into()
 }
 
 fn by_distance(_: &Stand, distances: &[f64]) -> anyhow::Result<Rows> {
@@ -236,15 +228,17 @@ fn by_distance(_: &Stand, distances: &[f64]) -> anyhow::Result<Rows> {
     rows(distances, |distance| {
         let rays = (0..RAYS).map(|seed| {
             let [around, turn, rise] = noise(seed);
-            let at = |turns: f32| Vec3::Y.any_orthonormal_pair().0.rotate_y(std::f32::consts::TAU * turns);
-            let origin_in_world = BALL_IN_WORLD.with_y(FLOOR_M) + at(around) * distance as f32;
+            let [off, along] =
+                [around, turn].map(|turns| Vec3::Y.any_orthonormal_pair().0.rotate_y(std::f32::consts::TAU * turns));
+            let origin_in_world = BALL_IN_WORLD.with_y(FLOOR_M) + off * distance as f32;
             let rise = 0.1 + 0.9 * rise;
-            Ray { origin_in_world, direction_in_world: at(turn) * (1.0 - rise * rise).sqrt() + Vec3::Y * rise }
+            Ray { origin_in_world, direction_in_world: along * (1.0 - rise * rise).sqrt() + Vec3::Y * rise }
         });
-        let from = |ray: Ray, above: f32| {
-            let near = above / ray.direction_in_world.y.max(LEAST_RISE);
-            (cubes::nearest(ray, ball), twin.walk(ray, near).map(|hit| hit.t))
-        };
-        Ok([START_SPACINGS, 0.0].map(|above| missed(rays.clone().map(|ray| from(ray, above)))))
+        Ok([START_SPACINGS, 0.0].map(|above| {
+            missed(rays.clone().map(|ray| {
+                let near = above / ray.direction_in_world.y.max(LEAST_RISE);
+                (cubes::nearest(ray, ball), twin.walk(ray, near).map(|hit| hit.t))
+            }))
+        }))
     })
 }

@@ -3,21 +3,20 @@
 use codec::{DecodeLimits, FrameCodec, decode_frame, encode_frame};
 use depth_image::{Antialias, PinholeCamera, View, ViewPlanes, linear_from_srgb8, srgb8_from_linear};
 use fixtures::poles;
-use glam::{UVec2, Vec2, Vec3};
+use glam::Vec2;
 use reconstruction::ReconstructRequest;
 use render::Lighting;
 
-use crate::failures::curve::{Curve, Rows, Series, X, rows};
+use crate::failures::curve::{Curve, FLIP, Rows, Series, X, rows};
 use crate::failures::measures::foreground;
 use crate::failures::shape::Shape;
-use crate::failures::stage::{CARVE, Cell, Stage};
+use crate::failures::stage::{CARVE, Cell, POLES, Stage};
 use crate::failures::stand::Stand;
 
-const POLES: Cell = Cell { eye: Vec3::new(0.0, 0.0, 4.0), target: Vec3::new(0.0, 0.0, -2.0), half_m: 0.2 };
+const NEAR_POLES: Cell = Cell { half_m: 0.2, ..POLES };
 const RADIUS_M: f32 = 0.06;
 /// Positions along each side of a pixel of the truth: 64 samples.
 const SIDE: usize = 8;
-const FLIP: [&str; 2] = ["FLIP of the foreground", ""];
 
 pub const CURVES: [Curve; 2] = [
     Curve {
@@ -47,7 +46,7 @@ pub const CURVES: [Curve; 2] = [
 fn by_quality(stand: &Stand, qualities: &[f64]) -> anyhow::Result<Rows> {
     // Ringing around a model would count as foreground, and lower its mean.
     let stage = Stage::new(stand, &poles(RADIUS_M), &[])?;
-    let cameras = POLES.views(stand.view_px);
+    let cameras = NEAR_POLES.views(stand.view_px);
     let truths = stage.truth(&cameras)?;
     rows(qualities, |quality| {
         let views = truths.iter().map(|truth| delivered(truth, FrameCodec::Jpeg { quality: quality as u8 }));
@@ -62,8 +61,8 @@ fn delivered(view: &View, codec: FrameCodec) -> anyhow::Result<View> {
 }
 
 fn by_samples(stand: &Stand, counts: &[f64]) -> anyhow::Result<Rows> {
-    let stage = Stage::new(stand, &poles(RADIUS_M), &POLES.samples(4, 2 * stand.sample_px))?;
-    let cameras = POLES.views(stand.view_px);
+    let stage = Stage::new(stand, &poles(RADIUS_M), &NEAR_POLES.samples(4, 2 * stand.sample_px))?;
+    let cameras = NEAR_POLES.views(stand.view_px);
     let truths =
         cameras.iter().map(|camera| supersampled(stand, &stage, camera)).collect::<anyhow::Result<Vec<_>>>()?;
     let set = stage.set()?;
@@ -81,14 +80,16 @@ fn by_samples(stand: &Stand, counts: &[f64]) -> anyhow::Result<Rows> {
 fn supersampled(stand: &Stand, stage: &Stage<'_>, camera: &PinholeCamera) -> anyhow::Result<View> {
     let fine = camera.resized(camera.size_px * SIDE as u32);
     let drawn = stand.views(&stage.scene, Lighting::default(), &[fine], ViewPlanes::COLOR)?.remove(0);
-    let UVec2 { x: width, y: height } = camera.size_px;
-    let mean = |x: usize, y: usize, channel: usize| {
-        let place = |i: usize| (y * SIDE + i / SIDE) * width as usize * SIDE + x * SIDE + i % SIDE;
-        let sum: f32 = (0..SIDE * SIDE).map(|i| linear_from_srgb8(drawn.srgb8[3 * place(i) + channel])).sum();
-        srgb8_from_linear(sum / (SIDE * SIDE) as f32)
-    };
-    let pixels = (0..height as usize).flat_map(|y| (0..width as usize).map(move |x| (x, y)));
-    let srgb8 = pixels.flat_map(|(x, y)| [0, 1, 2].map(|channel| mean(x, y, channel))).collect();
+    let [width, height] = camera.size_px.to_array().map(|side| side as usize);
+    let mut srgb8 = Vec::with_capacity(3 * width * height);
+    for pixel in 0..width * height {
+        let first = (pixel / width * width * SIDE + pixel % width) * SIDE;
+        for channel in 0..3 {
+            let places = (0..SIDE * SIDE).map(|i| first + i / SIDE * width * SIDE + i % SIDE);
+            let sum: f32 = places.map(|place| linear_from_srgb8(drawn.srgb8[3 * place + channel])).sum();
+            srgb8.push(srgb8_from_linear(sum / (SIDE * SIDE) as f32));
+        }
+    }
     let center = stage.truth(&[camera.with_offset(Vec2::ZERO)])?.remove(0);
     Ok(View { srgb8, ..center })
 }

@@ -7,13 +7,12 @@ use render::{GpuScene, Lighting, SamplePlanes};
 use scene::procedural::courtyard;
 use scene::{Instance, Scene};
 
-use crate::failures::curve::{Curve, Rows, Series, X, rows};
+use crate::failures::curve::{Curve, FLIP, Rows, Series, X, rows};
 use crate::failures::measures::{foreground, share};
 use crate::failures::shape::Shape;
-use crate::failures::stage::{CARVE, Cell, Stage, looking};
+use crate::failures::stage::{CARVE, Stage, YARD, looking};
 use crate::failures::stand::Stand;
 
-const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, half_m: 1.0 };
 /// Rays of the truth.
 const TRUE_RAYS: u32 = 512;
 
@@ -22,7 +21,7 @@ pub const CURVES: [Curve; 3] = [
         name: "Picture error against rays of light",
         subject: "a courtyard under a wide lamp, sampled and reconstructed",
         x: X::log("rays a pixel and lamp", "", &[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0]),
-        y: ["FLIP of the foreground", ""],
+        y: FLIP,
         series: &[Series::new("soft N, joint_carve", &[Shape::FallsThenFlat { least_fall: 0.01, tolerance: 0.003 }])],
         why: "Noise of samples falls with rays, until the reconstruction's own error is all that stays.",
         measure: by_rays,
@@ -97,11 +96,11 @@ fn image(stand: &Stand, scene: &GpuScene, lighting: Lighting, camera: &PinholeCa
 fn lit_points(image: &DepthImage) -> Vec<(Vec3, f32)> {
     let size_px = image.size_px();
     let places = (0..size_px.y).flat_map(|y| (0..size_px.x).map(move |x| (x, y)));
-    let lit = |(x, y): (u32, u32)| {
+    let lit = places.filter_map(|(x, y)| {
         let color = linear_from_rgb9e5(image.color_rgb9e5[(y * size_px.x + x) as usize]);
         Some((image.sample_in_world(x, y)?, color.y))
-    };
-    places.filter_map(lit).collect()
+    });
+    lit.collect()
 }
 
 fn by_rays(stand: &Stand, rays: &[f64]) -> anyhow::Result<Rows> {
@@ -136,9 +135,8 @@ fn by_segments(stand: &Stand, segments: &[f64]) -> anyhow::Result<Rows> {
     rows(segments, |segments| {
         let scene = Scene { illumination: sun(Vec3::new(1.0, 0.37, 0.21)), ..uv_sphere(1.0, segments as u32) };
         let scene = stand.upload(&scene)?;
-        let lit = |lighting: &str| anyhow::Ok(lit_points(&image(stand, &scene, lighting.parse()?, &camera)?));
-        let plain = lit("phong")?;
-        let shadowed = lit("shadows")?;
+        let plain = lit_points(&image(stand, &scene, "phong".parse()?, &camera)?);
+        let shadowed = lit_points(&image(stand, &scene, "shadows".parse()?, &camera)?);
         let facing = plain.iter().zip(&shadowed).filter(|((_, plain), _)| *plain > 0.0);
         Ok([share(facing.map(|(_, (_, shadowed))| *shadowed == 0.0))])
     })

@@ -10,7 +10,7 @@ use crate::failures::cached_light::{
 };
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::shape::Shape;
-use crate::failures::stage::Cell;
+use crate::failures::stage::YARD;
 use crate::failures::stand::Stand;
 
 const FLOOR_HALF_M: f32 = 2.5;
@@ -24,7 +24,6 @@ const VIEW_PLACE: Vec2 = Vec2::new(0.23, -0.31);
 const BARS_HEIGHT_M: f32 = 0.25;
 const BARS_APART_M: f32 = 0.5;
 const BARS_HALF_LENGTH_M: f32 = 1.0;
-const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, half_m: 1.0 };
 const DENSITIES: X = X::log("density of samples", "texels a pixel", &[0.125, 0.25, 0.5, 1.0]);
 const ERROR: [&str; 2] = ["mean difference of colours near by", "of 255"];
 
@@ -129,26 +128,20 @@ fn under_bars(stand: &Stand, widths: &[f64]) -> anyhow::Result<Rows> {
         let scene = floor_with(&bars, FLOOR_HALF_M, sun(Vec3::new(1.0, 1.0, 0.0)));
         let lit = LitScene::new(stand, &scene, "shadows")?;
         let images = lit.samples(&sample_cameras)?;
-        let contrast = |view: &View| shadow_contrast(&camera, view, width_m);
-        Ok([
-            contrast(&lit.cached(&images, Fast, camera)?),
-            contrast(&lit.cached(&images, Balanced, camera)?),
-            contrast(&lit.direct(camera)?),
-        ])
+        let fast = lit.cached(&images, Fast, camera)?;
+        let balanced = lit.cached(&images, Balanced, camera)?;
+        Ok([fast, balanced, lit.direct(camera)?].map(|view| shadow_contrast(&camera, &view, width_m)))
     })
 }
 
 /// How much darker the shadows of bars are than the floor beside the bars.
 fn shadow_contrast(camera: &PinholeCamera, view: &View, width_m: f32) -> f64 {
-    let on_floor = |p: Vec3| p.y.abs() < 1e-3;
-    let from_shadow_m = |p: Vec3| {
-        let across = p.x + BARS_HEIGHT_M;
-        (across - (across / BARS_APART_M).round().clamp(-1.0, 1.0) * BARS_APART_M).abs()
-    };
     let dark = pixels_where(camera, view, |p| {
-        on_floor(p) && p.z.abs() < BARS_HALF_LENGTH_M - 0.1 && from_shadow_m(p) < 0.4 * width_m
+        let across = p.x + BARS_HEIGHT_M;
+        let from_shadow_m = (across - (across / BARS_APART_M).round().clamp(-1.0, 1.0) * BARS_APART_M).abs();
+        p.y.abs() < 1e-3 && p.z.abs() < BARS_HALF_LENGTH_M - 0.1 && from_shadow_m < 0.4 * width_m
     });
-    let bright = pixels_where(camera, view, |p| on_floor(p) && p.x.abs() > 1.2);
+    let bright = pixels_where(camera, view, |p| p.y.abs() < 1e-3 && p.x.abs() > 1.2);
     1.0 - mean_light(view, &dark) / mean_light(view, &bright)
 }
 

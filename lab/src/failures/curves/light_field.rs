@@ -94,9 +94,8 @@ fn light_field(directions: LightDirections, card_height: f32) -> LayeredLightFie
 /// What a line up meets: the card, and the ceiling behind it.
 fn above(height: f32, ray: Ray) -> Vec<Lit> {
     let upwards = ray.direction_in_world.y;
-    let at = |height_m: f32| (height_m - HALF_M - ray.origin_in_world.y) / upwards;
-    let card = Lit { t: at(height * SPACING_M), light: 0.0 };
-    let ceiling = Lit { t: at(2.0 * HALF_M), light: 1.0 };
+    let [card, ceiling] = [(height * SPACING_M, 0.0), (2.0 * HALF_M, 1.0)]
+        .map(|(height_m, light)| Lit { t: (height_m - HALF_M - ray.origin_in_world.y) / upwards, light });
     let is_under_card = ray.at(card.t).dot(across_edge()) < 0.0;
     [is_under_card.then_some(card), Some(ceiling)].into_iter().flatten().filter(|_| upwards > 1e-3).collect()
 }
@@ -109,7 +108,7 @@ fn across_edge() -> Vec3 {
 /// The mean light of places whose mirrored ray passes the edge at a distance. An eye sees the floor head-on.
 fn beside_edge(field: &LayeredLightField, distance: f32) -> f64 {
     let along = across_edge().cross(Vec3::Y);
-    let light = |place: u32| {
+    let light = (0..PLACES).map(|place| {
         let along_m = 6.0 * (place as f32 / PLACES as f32 - 0.5);
         let floor = Reflecting {
             point_in_world: Vec3::NEG_Y * HALF_M + across_edge() * (distance * SPACING_M) + along * along_m,
@@ -118,6 +117,6 @@ fn beside_edge(field: &LayeredLightField, distance: f32) -> f64 {
             reflector: Reflector { reflectance_linear: Vec3::ONE, roughness: 0.0 },
         };
         f64::from(gathered_light(field, &floor, |_| Vec3::ONE).y)
-    };
-    mean((0..PLACES).map(light)).unwrap_or(f64::NAN)
+    });
+    mean(light).unwrap_or(f64::NAN)
 }

@@ -9,11 +9,10 @@ use scene::procedural::tree_terrain;
 use crate::failures::curve::{Curve, Rows, Series, X, rows};
 use crate::failures::measures::{depth_error, found};
 use crate::failures::shape::Shape;
-use crate::failures::stage::{Cell, HYBRID, MESH, Stage, merged};
+use crate::failures::stage::{Cell, HYBRID, MESH, Stage, TREE, merged};
 use crate::failures::stand::Stand;
 
 const SPHERE: Cell = Cell { eye: Vec3::new(0.4, 0.9, 3.6), target: Vec3::ZERO, half_m: 0.3 };
-const TREE: Cell = Cell { eye: Vec3::new(0.3, 2.2, 2.2), target: Vec3::new(0.0, 0.3, 0.0), half_m: 0.3 };
 const BOUNDS: X = X::log("bound", "px", &[0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0]);
 const FOUR_IMAGES: &str = "a sphere, four images";
 

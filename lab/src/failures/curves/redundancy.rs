@@ -3,6 +3,7 @@
 use depth_image::{DepthImage, PinholeCamera};
 use fixtures::{poles, quad};
 use glam::{Affine3A, Vec3};
+use render::GpuScene;
 use sampling::{Redundancy, SamplingMethod, scalar};
 use scene::Instance;
 use scene::procedural::courtyard;
@@ -113,38 +114,42 @@ fn by_tolerance(stand: &Stand, factors: &[f64]) -> anyhow::Result<Rows> {
     let rays = render::scalar::rays::Scene::of(&stand.upload(&scene)?, 0.0)?;
     let center = scene.bounds().center();
     let reach = scene.bounds().size().length();
-    let camera = |x: f32| {
+    let [middle, left, right] = [0.05, -0.15, 0.2].map(|x| {
         let eye = center + Vec3::new(x, 0.5, 0.9) * reach;
         PinholeCamera::looking_at(eye, center, Vec3::Y, 0.7, stand.view_px)
-    };
-    let view = scalar::sample(&rays, &[camera(0.05)], SamplingMethod::CONVENTIONAL).remove(0);
+    });
+    let view = scalar::sample(&rays, &[middle], SamplingMethod::CONVENTIONAL).remove(0);
     rows(factors, |factor| {
         let settings = scalar::Settings { allowed: factor as f32, ..scalar::Settings::default() };
-        let images = scalar::sample_with(&rays, &[camera(-0.15), camera(0.2)], TESTS[2], settings);
-        let lost = metrics::unheld_rate(&camera(0.05), &view.inverse_depth_per_m, &images)?;
+        let images = scalar::sample_with(&rays, &[left, right], TESTS[2], settings);
+        let lost = metrics::unheld_rate(&middle, &view.inverse_depth_per_m, &images)?;
         Ok([lost.unwrap_or(f64::NAN)])
     })
 }
 
 fn by_jitter(stand: &Stand, jitters_px: &[f64]) -> anyhow::Result<Rows> {
     let scene = stand.upload(&poles(0.05))?;
-    let camera =
-        |x: f32| PinholeCamera::looking_at(Vec3::new(x, 0.0, 4.0), Vec3::NEG_Z * 2.0, Vec3::Y, 0.8, stand.sample_px);
-    let texel_m = 6.0 / camera(0.0).focal_px.x;
-    let mask = |method, jitter_px: f64| -> anyhow::Result<Vec<bool>> {
-        let cameras = [camera(-0.4), camera(0.4 + jitter_px as f32 * texel_m)];
-        let second = stand.sample(&scene, &cameras, method)?.remove(1);
-        Ok(second.inverse_depth_per_m.iter().map(|&depth| depth > 0.0).collect())
-    };
+    let texel_m = 6.0 / camera_of_poles(stand, 0.0).focal_px.x;
     rows(jitters_px, |jitter_px| {
         let mut flips = [0.0; 3];
         for (flips, method) in flips.iter_mut().zip(TESTS) {
-            let still = mask(method, 0.0)?;
-            let moved = mask(method, jitter_px)?;
-            *flips = share(still.iter().zip(&moved).map(|(a, b)| a != b));
+            let still = second_image(stand, &scene, method, 0.0)?;
+            let moved = second_image(stand, &scene, method, jitter_px as f32 * texel_m)?;
+            let pairs = still.inverse_depth_per_m.iter().zip(&moved.inverse_depth_per_m);
+            *flips = share(pairs.map(|(a, b)| (*a > 0.0) != (*b > 0.0)));
         }
         Ok(flips)
     })
+}
+
+/// The second of two images, its camera moved.
+fn second_image(stand: &Stand, scene: &GpuScene, method: SamplingMethod, moved_m: f32) -> anyhow::Result<DepthImage> {
+    let cameras = [-0.4, 0.4 + moved_m].map(|x| camera_of_poles(stand, x));
+    Ok(stand.sample(scene, &cameras, method)?.remove(1))
+}
+
+fn camera_of_poles(stand: &Stand, x: f32) -> PinholeCamera {
+    PinholeCamera::looking_at(Vec3::new(x, 0.0, 4.0), Vec3::NEG_Z * 2.0, Vec3::Y, 0.8, stand.sample_px)
 }
 
 fn by_distance(stand: &Stand, distances_m: &[f64]) -> anyhow::Result<Rows> {
@@ -152,14 +157,13 @@ fn by_distance(stand: &Stand, distances_m: &[f64]) -> anyhow::Result<Rows> {
     scene.meshes.extend(quad(Vec3::new(0.0, 0.0, -2.0), 0.8, Vec3::X, [200, 40, 40]).meshes);
     scene.instances.push(Instance { mesh: 1, world_from_mesh: Affine3A::IDENTITY });
     let scene = stand.upload(&scene)?;
-    let of_wall = |image: &DepthImage| {
-        let ids = image.surface_id.iter().flatten();
-        image.inverse_depth_per_m.iter().zip(ids).filter(|(depth, id)| **depth > 0.0 && id.instance == 1).count()
-    };
     rows(distances_m, |x| {
         let eye = Vec3::new(x as f32, 0.0, 3.0);
         let camera = PinholeCamera::looking_at(eye, Vec3::NEG_Z * 2.0, Vec3::Y, 0.9, stand.sample_px);
         let images = stand.sample(&scene, &[camera; 4], SamplingMethod::DepthPeeling { layers: 4 })?;
-        Ok([images.iter().map(of_wall).sum::<usize>() as f64 / camera.pixel_count() as f64])
+        let texels =
+            images.iter().flat_map(|image| image.inverse_depth_per_m.iter().zip(image.surface_id.iter().flatten()));
+        let of_wall = texels.filter(|(depth, id)| **depth > 0.0 && id.instance == 1).count();
+        Ok([of_wall as f64 / camera.pixel_count() as f64])
     })
 }

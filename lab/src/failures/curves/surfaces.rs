@@ -6,14 +6,13 @@ use glam::Vec3;
 use reconstruction::ReconstructionMethod;
 use scene::procedural::tree_terrain;
 
-use crate::failures::curve::{Curve, Rows, Series, X, rows};
+use crate::failures::curve::{Curve, FLIP, Rows, Series, X, rows};
 use crate::failures::measures::{depths, foreground, is_kind, share, share_of_kind};
 use crate::failures::shape::Shape;
-use crate::failures::stage::{CARVE, Cell, HYBRID, MESH, Stage, looking, search};
+use crate::failures::stage::{CARVE, Cell, HYBRID, MESH, POLES, Stage, TREE, looking, search};
 use crate::failures::stand::Stand;
 
-const POLES: Cell = Cell { eye: Vec3::new(0.0, 0.0, 4.0), target: Vec3::new(0.0, 0.0, -2.0), half_m: 0.4 };
-const TREE: Cell = Cell { eye: Vec3::new(0.3, 2.2, 2.2), target: Vec3::new(0.0, 0.3, 0.0), half_m: 0.4 };
+const WIDE_TREE: Cell = Cell { half_m: 0.4, ..TREE };
 /// The distance of the poles, and one between them and the wall.
 const POLES_M: f32 = 5.0;
 const BETWEEN_M: f32 = 6.0;
@@ -21,7 +20,6 @@ const BETWEEN_M: f32 = 6.0;
 const RADIUS_M: f32 = 0.12;
 const POLES_SUBJECT: &str = "nine poles before a wall, four images";
 const TREE_SUBJECT: &str = "a tree over a terrain, four images from above";
-const FLIP: [&str; 2] = ["FLIP of the foreground", ""];
 const FINITE: &[Shape] = &[Shape::Bounded { least: 0.0, most: 1.0 }];
 const ALL_METHODS: &[Series] = &[
     Series::new("joint_carve", FINITE),
@@ -113,11 +111,14 @@ fn by_radius(stand: &Stand, radii_px: &[f64]) -> anyhow::Result<Rows> {
 
 /// The share of the poles' pixels at which a view has a hit about as near.
 fn recall_of_poles(truths: &[View], views: &[View]) -> f64 {
-    let is_pole = |inverse: &f32| *inverse > BETWEEN_M.recip();
     share(truths.iter().zip(views).flat_map(|(truth, view)| {
         let pixels = depths(truth).iter().zip(depths(view)).zip(is_kind(view, ProvenanceKind::Hit));
-        pixels.filter(move |((truth, _), _)| is_pole(truth)).map(move |((_, found), hit)| hit && is_pole(found))
+        pixels.filter(|((truth, _), _)| is_pole(**truth)).map(|((_, found), hit)| hit && is_pole(*found))
     }))
+}
+
+fn is_pole(inverse_depth_per_m: f32) -> bool {
+    inverse_depth_per_m > BETWEEN_M.recip()
 }
 
 fn stage_of_poles(stand: &Stand) -> anyhow::Result<Stage<'_>> {
@@ -131,8 +132,10 @@ fn by_steps(stand: &Stand, steps: &[f64]) -> anyhow::Result<Rows> {
 
 fn by_stop_level(stand: &Stand, levels: &[f64]) -> anyhow::Result<Rows> {
     let stage = stage_of_poles(stand)?;
-    let method = |level: f64| ReconstructionMethod::JointCarve { stop_level: level as u32 };
-    rows(levels, |level| stage.flips(&POLES.views(stand.view_px), [method(level)]))
+    rows(levels, |level| {
+        let method = ReconstructionMethod::JointCarve { stop_level: level as u32 };
+        stage.flips(&POLES.views(stand.view_px), [method])
+    })
 }
 
 fn by_range(stand: &Stand, ratios: &[f64]) -> anyhow::Result<Rows> {
@@ -142,10 +145,11 @@ fn by_range(stand: &Stand, ratios: &[f64]) -> anyhow::Result<Rows> {
         let near = quad(Vec3::new(-0.6, 0.0, -1.0), 0.3, Vec3::Z, [40, 90, 180]);
         scene.instances.push(scene::Instance { mesh: 1, ..near.instances[0] });
         scene.meshes.extend(near.meshes);
-        let camera = |x: f32, size_px| looking(Vec3::X * x, Vec3::new(x, 0.0, -1.0), 60.0, size_px);
-        let stage = Stage::new(stand, &scene, &[-0.1, 0.1].map(|x| camera(x, stand.sample_px)))?;
-        let view = [camera(0.02, stand.view_px)];
-        Ok([share_of_kind(&stage.views(&view, CARVE)?, ProvenanceKind::Hit)])
+        let places = [(-0.1, stand.sample_px), (0.1, stand.sample_px), (0.02, stand.view_px)];
+        let [left, right, view] =
+            places.map(|(x, size_px)| looking(Vec3::X * x, Vec3::new(x, 0.0, -1.0), 60.0, size_px));
+        let stage = Stage::new(stand, &scene, &[left, right])?;
+        Ok([share_of_kind(&stage.views(&[view], CARVE)?, ProvenanceKind::Hit)])
     })
 }
 
@@ -168,14 +172,14 @@ fn by_pitch(stand: &Stand, pitches_deg: &[f64]) -> anyhow::Result<Rows> {
 
 /// The error of each method, for a view at each x.
 fn errors_from(stand: &Stand, x: &[f64], camera: impl Fn(&Stage<'_>, f32) -> PinholeCamera) -> anyhow::Result<Rows> {
-    let stage = Stage::with_corners(stand, &tree_terrain(2000, 1), &TREE.samples(4, stand.sample_px))?;
+    let stage = Stage::with_corners(stand, &tree_terrain(2000, 1), &WIDE_TREE.samples(4, stand.sample_px))?;
     let cameras: Vec<PinholeCamera> = x.iter().map(|&x| camera(&stage, x as f32)).collect();
     let truths = stage.truth(&cameras)?;
     let views = [CARVE, search(64), MESH, HYBRID].map(|method| stage.views(&cameras, method));
     let views = views.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
-    let row = |place: usize| {
+    let rows = (0..x.len()).map(|place| {
         let one = place..=place;
         views.iter().map(|views| Ok(foreground(&truths[one.clone()], &views[one.clone()])?.flip)).collect()
-    };
-    (0..x.len()).map(row).collect()
+    });
+    rows.collect()
 }

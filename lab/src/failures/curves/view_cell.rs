@@ -1,24 +1,21 @@
 //! Sample sets and the views that they serve: places outside the cell, its width, the number of images and their size, and a
 //! yard that no camera sees.
 
-use depth_image::{PinholeCamera, ProvenanceKind, View};
+use depth_image::{ProvenanceKind, View};
 use fixtures::poles;
 use glam::{Vec2, Vec3};
 use metrics::unheld_rate;
 use scene::procedural::{courtyard, tree_terrain};
 
-use crate::failures::curve::{Curve, Rows, Series, X, rows};
+use crate::failures::cached_light::pixels_where;
+use crate::failures::curve::{Curve, FLIP, Rows, Series, X, rows};
 use crate::failures::measures::{depths, is_kind, mean};
 use crate::failures::shape::Shape;
-use crate::failures::stage::{CARVE, Cell, Stage, looking, search};
+use crate::failures::stage::{CARVE, Cell, POLES, Stage, TREE, YARD, looking, search};
 use crate::failures::stand::Stand;
 
-const TREE: Cell = Cell { eye: Vec3::new(0.3, 2.2, 2.2), target: Vec3::new(0.0, 0.3, 0.0), half_m: 0.3 };
-const POLES: Cell = Cell { eye: Vec3::new(0.0, 0.0, 4.0), target: Vec3::new(0.0, 0.0, -2.0), half_m: 0.4 };
-const YARD: Cell = Cell { eye: Vec3::new(2.0, 9.0, 9.0), target: Vec3::ZERO, half_m: 1.0 };
 const POLES_SUBJECT: &str = "nine poles before a wall, four images";
 const POLE_RADIUS_M: f32 = 0.12;
-const FLIP: [&str; 2] = ["FLIP of the foreground", ""];
 /// The height of the eyes of cameras that do not see the yard, below the walls' tops.
 const LOW_M: f32 = 1.7;
 /// The distance of all these eyes from the middle of the yard.
@@ -148,27 +145,19 @@ fn unseen_yard(stand: &Stand, heights_deg: &[f64]) -> anyhow::Result<Rows> {
         let (sin, cos) = f32::sin_cos((height_deg as f32).to_radians());
         let turn = Vec2::from_angle(0.6) * cos * DISTANCE_M;
         let camera = looking(Vec3::new(turn.x, sin * DISTANCE_M, turn.y), Vec3::ZERO, 35.0, stand.view_px);
-        let yard = yard(&camera, &stage.truth(&[camera])?[0]);
-        let seen = yard.iter().filter(|is| **is).count() as f64 / yard.len() as f64;
+        // The yard's floor and pillar: lower than the walls, inside them.
+        let yard = pixels_where(&camera, &stage.truth(&[camera])?[0], |point| {
+            point.x.abs() < 1.6 && point.z.abs() < 1.6 && point.y < 0.9
+        });
+        let seen = yard.len() as f64 / camera.pixel_count() as f64;
         let carved = share_unmarked(&yard, &stage.views(&[camera], CARVE)?[0]);
         let searched = share_unmarked(&yard, &stage.views(&[camera], search(64))?[0]);
         Ok([seen, carved, searched])
     })
 }
 
-/// The pixels of the yard's floor and pillar: lower than the walls, inside them.
-fn yard(camera: &PinholeCamera, truth: &View) -> Vec<bool> {
-    let is_inside = |(index, depth): (usize, &f32)| {
-        let width = camera.size_px.x as usize;
-        let pixel = Vec2::new((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
-        let point = camera.ray(pixel).at(depth.recip());
-        *depth > 0.0 && point.x.abs() < 1.6 && point.z.abs() < 1.6 && point.y < 0.9
-    };
-    depths(truth).iter().enumerate().map(is_inside).collect()
-}
-
 /// Of all pixels, those of the yard that are not marked as filled, although no camera saw them.
-fn share_unmarked(yard: &[bool], view: &View) -> f64 {
-    let unmarked = yard.iter().zip(is_kind(view, ProvenanceKind::Filled)).filter(|(yard, filled)| **yard && !*filled);
-    unmarked.count() as f64 / yard.len() as f64
+fn share_unmarked(yard: &[usize], view: &View) -> f64 {
+    let filled: Vec<bool> = is_kind(view, ProvenanceKind::Filled).collect();
+    yard.iter().filter(|&&pixel| !filled[pixel]).count() as f64 / filled.len() as f64
 }
