@@ -1,6 +1,6 @@
 //! Tables of rows, by columns that say what stands in their cells.
 
-use report::{Cell, Table, TableError};
+use report::{Cell, ReportError, Table};
 
 /// A column: its name, its unit, and its cell in a row.
 pub type Column<'n, R> = (&'n str, &'n str, fn(&R) -> Cell);
@@ -9,7 +9,7 @@ pub type Column<'n, R> = (&'n str, &'n str, fn(&R) -> Cell);
 ///
 /// # Errors
 /// A cell cannot be in a table.
-pub fn table<R>(name: impl Into<String>, rows: &[R], columns: &[Column<'_, R>]) -> Result<Table, TableError> {
+pub fn table<R>(name: impl Into<String>, rows: &[R], columns: &[Column<'_, R>]) -> Result<Table, ReportError> {
     let heads: Vec<_> = columns.iter().map(|&(name, unit, _)| (name, unit)).collect();
     let mut table = Table::new(name, &heads);
     for row in rows {

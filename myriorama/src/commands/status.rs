@@ -9,7 +9,7 @@ use app_core::print_line;
 use app_core::table::table;
 use clap::Args;
 use cluster::{ClusterStatus, NodeCondition, NodeStatus, SessionPlan, SharedLightCosts, Workload, WorkloadStatus};
-use report::{Cell, Table, TableError};
+use report::{Cell, ReportError, Table};
 
 /// Characters of a scene's hash that tell scenes apart.
 const SHORT_HASH: usize = 8;
@@ -62,7 +62,7 @@ fn text(status: &ClusterStatus) -> anyhow::Result<String> {
     Ok(parts.join("\n\n"))
 }
 
-fn workload_table(status: &ClusterStatus) -> Result<Table, TableError> {
+fn workload_table(status: &ClusterStatus) -> Result<Table, ReportError> {
     let headline = format!(
         "Plan {}: P = {} nodes, K = {} samplers, V = {} views a set of {} sessions",
         status.plan_epoch,

@@ -11,7 +11,7 @@ use image::imageops;
 use metrics::{PictureErrors, Rgb8Image, flip_map};
 use render::Lighting;
 use report::{
-    Axis, Picture, PictureRow, Point, Report, Series, Table, TableError, XyChart, comparison_row, contact_sheet,
+    Axis, Picture, PictureRow, Point, Report, ReportError, Series, Table, XyChart, comparison_row, contact_sheet,
 };
 
 /// The time for which direct drawing is timed; the time of more views is extended linearly.
@@ -168,7 +168,7 @@ pub(super) fn report(results: &[LightResult], report: &mut Report) -> anyhow::Re
     Ok(())
 }
 
-fn gains(results: &[LightResult]) -> Result<Table, TableError> {
+fn gains(results: &[LightResult]) -> Result<Table, ReportError> {
     table(
         "What sharing gains",
         results,
@@ -186,7 +186,7 @@ fn gains(results: &[LightResult]) -> Result<Table, TableError> {
     )
 }
 
-fn costs(results: &[LightResult]) -> Result<Table, TableError> {
+fn costs(results: &[LightResult]) -> Result<Table, ReportError> {
     table(
         "Costs of one operation, alone and warm",
         results,

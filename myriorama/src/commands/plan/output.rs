@@ -10,7 +10,7 @@ use app_core::setup::Setup;
 use app_core::table::table;
 use planner::{Budget, CHOICE_OF_BUDGETS, Choice, Metric, Outcome, Price, RowStatus, RowSummary};
 use probe::Representation;
-use report::{Table, TableError};
+use report::{ReportError, Table};
 use serde_json::Map;
 
 /// A plan that is made.
@@ -78,7 +78,7 @@ impl Output<'_> {
         lines
     }
 
-    fn table(&self, name: &str, lines: &[Line]) -> Result<Table, TableError> {
+    fn table(&self, name: &str, lines: &[Line]) -> Result<Table, ReportError> {
         let error = match self.budget.error().map(|term| term.metric()) {
             None | Some(Metric::Flip) => "FLIP of the foreground",
             Some(Metric::FlipWhole) => "FLIP",
