@@ -13,6 +13,8 @@ use tonic::Status;
 use wire::refuse_plan;
 use wire::rpc::Messages;
 
+use crate::latest::push_latest;
+
 /// The last plans of a workload that are remembered.
 const MAX_PLANS: usize = 8;
 
@@ -83,21 +85,18 @@ impl Plans {
         if plan_epoch <= self.forgotten_epoch {
             return Err(Status::failed_precondition(format!("plan_epoch {plan_epoch} was forgotten")));
         }
-        let is_later = |told: &&ApplyPlan| told.assignment.plan_epoch > plan_epoch;
-        if self.told.as_ref().filter(is_later).is_some_and(|told| told.has_ended(number)) {
+        let told = self.told.as_ref().filter(|told| told.assignment.plan_epoch > plan_epoch);
+        if told.is_some_and(|told| told.has_ended(number)) {
             return Err(Status::failed_precondition(format!("workload {number} has ended")));
         }
         let in_force = self.of(number).and_then(|workload| workload.in_force().cloned());
         let Some(in_force) = in_force else { return Ok(true) };
         let old = in_force.plan_epoch;
-        let new = assignment.plan_epoch;
-        match new > old {
-            false if new == old && *in_force == *assignment => Ok(false),
-            false => Err(Status::failed_precondition(format!(
-                "plan_epoch {new} of workload {number} does not replace {old}"
-            ))),
-            true => Ok(true),
+        if plan_epoch > old || *in_force == *assignment {
+            return Ok(plan_epoch > old);
         }
+        let reason = format!("plan_epoch {plan_epoch} of workload {number} does not replace {old}");
+        Err(Status::failed_precondition(reason))
     }
 
     /// Forgets the workloads that have ended by the time of this plan; gives their numbers.
@@ -106,8 +105,8 @@ impl Plans {
         if plan.open_workloads.is_empty() || plan.assignment.plan_epoch < told_epoch {
             return Vec::new();
         }
-        let ended = |workload: &mut WorkloadPlans| plan.has_ended(workload.number);
-        let ended = self.workloads.extract_if(.., ended).map(|workload| workload.number).collect();
+        let ended = self.workloads.extract_if(.., |workload| plan.has_ended(workload.number));
+        let ended = ended.map(|workload| workload.number).collect();
         self.told = Some(plan);
         ended
     }
@@ -120,11 +119,7 @@ impl Plans {
             if !workload.in_force().is_some_and(|before| goes_on(&before.workload, &assignment.workload)) {
                 workload.plans.clear();
             }
-            workload.plans.push_back(assignment);
-            while workload.plans.len() > MAX_PLANS {
-                workload.plans.pop_front();
-            }
-            return;
+            return push_latest(&mut workload.plans, assignment, MAX_PLANS);
         }
         if self.workloads.len() >= MAX_WORKLOADS {
             let unused = self.workloads.iter().enumerate().min_by_key(|(_, workload)| workload.last_use);
@@ -259,8 +254,8 @@ impl PlansInForce {
 /// Whether a set is made under a plan, in any of its view cells.
 #[must_use]
 pub fn has_set(plan: &Arc<Assignment>, content: &SetContent, set_index: u32) -> bool {
-    let of_cell = |cell: usize| CellPlan::of(plan, cell as u32).ok()?.set_content(set_index);
-    (0..plan.workload.cell_count()).any(|cell| of_cell(cell).as_ref() == Some(content))
+    let mut cells = (0..plan.workload.cell_count() as u32).filter_map(|cell| CellPlan::of(plan, cell).ok());
+    cells.any(|cell| cell.set_content(set_index).as_ref() == Some(content))
 }
 
 /// The plan of one cell, without the images of other cells. Clones share it.
@@ -284,8 +279,10 @@ impl CellPlan {
         if (cell, cell_count) == (0, 1) {
             return Ok(Self { plan: plan.clone(), cell, is_common });
         }
-        let beyond = || Status::invalid_argument(format!("cell_index {cell} is beyond {cell_count} cells"));
-        Ok(Self { plan: Arc::new(plan.of_cell(cell).ok_or_else(beyond)?), cell, is_common })
+        let Some(own) = plan.of_cell(cell) else {
+            return Err(Status::invalid_argument(format!("cell_index {cell} is beyond {cell_count} cells")));
+        };
+        Ok(Self { plan: Arc::new(own), cell, is_common })
     }
 
     /// The parts of `plan` for all common cells.

@@ -73,8 +73,8 @@ impl Telemetry {
     /// # Errors
     /// The listener's.
     pub async fn serve(self, listener: TcpListener, shutdown: CancellationToken) -> std::io::Result<()> {
-        let page = move || async move { ([(header::CONTENT_TYPE, CONTENT_TYPE)], self.page()) };
-        let router = Router::new().route("/metrics", get(page));
+        let page = get(move || async move { ([(header::CONTENT_TYPE, CONTENT_TYPE)], self.page()) });
+        let router = Router::new().route("/metrics", page);
         axum::serve(listener, router).with_graceful_shutdown(shutdown.cancelled_owned()).await
     }
 }
@@ -120,11 +120,15 @@ fn in_unit<M: Metric + Clone>(registry: &mut Registry, name: &str, help: &str, u
     metric
 }
 
+/// A histogram of times.
+fn seconds() -> Histogram {
+    Histogram::new(exponential_buckets(0.0005, 2.0, 16))
+}
+
 impl NodeMetrics {
     /// Registers all metrics, at zero.
     #[must_use]
     pub fn new(telemetry: &Telemetry) -> Self {
-        let seconds = || Histogram::new(exponential_buckets(0.0005, 2.0, 16));
         let counter = Counter::default;
         let gauge = Gauge::default;
         let to = &mut *telemetry.registry();

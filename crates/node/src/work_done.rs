@@ -118,11 +118,10 @@ impl WorkDone {
     pub(crate) fn take_reports(&self, plans: &PlansInForce) -> Vec<WorkReport> {
         let mut work = self.0.lock();
         let mut workloads = std::mem::take(&mut work.workloads);
-        let mut dropped_views = work.dropped_views;
         for workload_number in work.viewers.take_changed() {
             workloads.entry(workload_number).or_default();
         }
-        let report = |(workload_number, sums): (u64, Sums)| {
+        let reports = workloads.into_iter().filter_map(|(workload_number, sums)| {
             let plan = plans.in_force(workload_number)?;
             Some(WorkReport {
                 node_name: plans.node_name.to_string(),
@@ -131,32 +130,29 @@ impl WorkDone {
                 costs: sums.costs(),
                 busy_s: sums.busy_s,
                 views: sums.views,
-                dropped_views: std::mem::take(&mut dropped_views),
+                dropped_views: std::mem::take(&mut work.dropped_views),
                 viewpoints: work.viewers.of(workload_number),
                 audit: (!sums.audit.is_empty()).then_some(sums.audit),
             })
-        };
-        let reports = workloads.into_iter().filter_map(report).collect();
-        work.dropped_views = dropped_views;
-        reports
+        });
+        reports.collect()
     }
 }
 
 impl Sums {
     /// The mean time of each operation; `None` where it was not done.
     fn costs(&self) -> MeasuredCosts {
-        let mean = |operation: Operation| {
-            let (count, seconds) = self.operations[operation as usize];
-            quotient(count, seconds)
-        };
+        // In the order of the operations' variants.
+        let [sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s] =
+            self.operations.map(|(count, seconds)| quotient(count, seconds));
         let (images, bytes) = self.encoded;
         let (received, seconds) = self.transferred;
         MeasuredCosts {
-            sample_image_s: mean(Operation::SampleImage),
-            direct_view_s: mean(Operation::DirectView),
-            reconstruct_view_s: mean(Operation::ReconstructView),
-            load_set_s: mean(Operation::LoadSet),
-            encode_view_s: mean(Operation::EncodeView),
+            sample_image_s,
+            direct_view_s,
+            reconstruct_view_s,
+            load_set_s,
+            encode_view_s,
             transfer_bytes_per_s: quotient(seconds, received),
             image_bytes: quotient(images, bytes),
         }
