@@ -36,7 +36,6 @@ pub fn errors_of_part(
     let depth = truth.inverse_depth_per_m.as_deref().unwrap_or_default();
     let depth: Vec<f32> = depth.iter().zip(part).map(|(&inverse, &own)| if own { inverse } else { 0.0 }).collect();
     let unheld = unheld_rate(camera, &depth, sample_images)?.unwrap_or(0.0);
-    let count = |mask: &[bool]| mask.iter().filter(|&&own| own).count();
     let shown = count(&mask);
     let surfaces = depth.iter().filter(|&&inverse| inverse > 0.0).count();
     // An infinite ratio is an error of 0.
@@ -48,6 +47,10 @@ pub fn errors_of_part(
         mean_square,
         disoccluded_ratio: if shown == 0 { 0.0 } else { unheld * surfaces as f64 / shown as f64 },
     })
+}
+
+fn count(mask: &[bool]) -> usize {
+    mask.iter().filter(|&&own| own).count()
 }
 
 #[cfg(test)]
