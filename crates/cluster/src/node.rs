@@ -170,8 +170,7 @@ impl SharedLightCosts {
     /// For a share that is not from 0 to 1, and for times that are negative or not finite.
     pub fn validate(&self) -> Result<(), InvalidField> {
         check_seconds!(self; surfaces_s, look_up_s, unknown_s);
-        let is_ratio = (0.0..=1.0).contains(&self.known_ratio);
-        is_ratio.then_some(()).ok_or_else(|| InvalidField::out_of_range("known_ratio", self.known_ratio, "from 0 to 1"))
+        within(self.known_ratio, 0.0..=1.0, "known_ratio", "from 0 to 1")
     }
 }
 

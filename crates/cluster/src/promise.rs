@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::audit::AuditSummary;
-use crate::check::{InvalidField, nonempty, reason, text, within};
+use crate::check::{InvalidField, nonempty, reason, within};
 
 /// Fewer audits a second, ten an hour, find little.
 const BARELY_PER_S: f64 = 10.0 / 3600.0;
@@ -75,14 +75,6 @@ impl std::fmt::Display for Promise {
                 write!(f, "promise {budget}: {state}: {reason}")
             }
         }
-    }
-}
-
-impl BudgetRequest {
-    /// # Errors
-    /// For a text that is too long.
-    pub fn validate(&self) -> Result<(), InvalidField> {
-        text(self.budget.as_deref().unwrap_or_default(), "budget")
     }
 }
 
