@@ -38,19 +38,22 @@ where
 
 /// Both conversions of messages from one list: `Message = Type { fields that share a name; field: the message's }`. A field
 /// of the type may take several of the message: `field: one | two`. Errors name the message's field, or what follows `as`.
-/// `with` sets a field that the type has not. `first` checks or completes the message, `then` checks the result.
+/// `with` sets a field that the type has not. `first` checks or completes the message. `valid or Camera` validates the result,
+/// whose refusal is an `InvalidField::Camera` of the message's own field; `then` checks the result further.
 macro_rules! messages {
     ($($message:ident = $type:ident {
         $($same:ident $(as $same_name:literal)?),* $(; $($own:ident: $($wire:ident)|+ $(as $name:literal)?),+)?
-    } $(, with $fixed:ident = $value:expr)? $(, first $first:expr)? $(, then $then:expr)?;)+) => {$(
+    } $(, with $fixed:ident = $value:expr)? $(, first $first:expr)? $(, valid or $refusal:ident)? $(, then $then:expr)?;)+) => {$(
         #[allow(unused_mut, unused_parens, reason = "`first` may complete the message; one field is no tuple")]
+        #[allow(unused_variables, reason = "only `valid` needs the message's own field")]
         impl super::Convert<crate::proto::$message> for $type {
-            fn read(mut message: crate::proto::$message, _: &'static str) -> Result<Self, crate::error::WireError> {
+            fn read(mut message: crate::proto::$message, field: &'static str) -> Result<Self, crate::error::WireError> {
                 $(super::check(&mut message, $first)?;)?
                 let value = Self {
                     $($($own: super::Convert::read(($(message.$wire),+), name!($($wire)|+ $($name)?))?,)+)?
                     $($same: super::Convert::read(message.$same, name!($same $($same_name)?))?,)*
                 };
+                $(value.validate().map_err(|source| cluster::InvalidField::$refusal { field, source })?;)?
                 $(super::check(&value, $then)?;)?
                 Ok(value)
             }
@@ -86,21 +89,6 @@ macro_rules! nested {
 
             fn write(self) -> Option<crate::proto::$message> {
                 Some(super::Convert::write(self))
-            }
-        }
-    )+};
-}
-
-/// Messages with one field.
-macro_rules! wrappers {
-    ($($message:ident { $field:ident: $type:ident })+) => {$(
-        impl super::Convert<crate::proto::$message> for $type {
-            fn read(message: crate::proto::$message, _: &'static str) -> Result<Self, crate::error::WireError> {
-                super::Convert::read(message.$field, stringify!($field))
-            }
-
-            fn write(self) -> crate::proto::$message {
-                crate::proto::$message { $field: Some(super::Convert::write(self)) }
             }
         }
     )+};
@@ -294,8 +282,8 @@ impl Convert<i32> for ToneCurve {
 /// Samples a pixel; none said is one.
 impl Convert<u32> for Antialias {
     fn read(count: u32, _: &'static str) -> Result<Self, WireError> {
-        let refused = || InvalidField::out_of_range("antialias_sample_count", count, "1, 2, 4, 8 or 16");
-        Ok(Self::of(count.max(1)).ok_or_else(refused)?)
+        let antialias = Self::of(count.max(1));
+        antialias.ok_or_else(|| InvalidField::out_of_range("antialias_sample_count", count, "1, 2, 4, 8 or 16").into())
     }
 
     fn write(self) -> u32 {
