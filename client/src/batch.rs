@@ -60,9 +60,10 @@ impl Batch {
         due.chunk_by(|a, b| a.set_index == b.set_index).for_each(|run| batch.push(run));
         // In turns, a message each: no compositor takes the views of another that is about to begin.
         while (0..weights.len()).filter(|&compositor| batch.send_next(compositor)).count() > 0 {}
-        let is_asked = |compositor: usize| batch.queue.in_flight(compositor) > 0;
-        let messages =
-            receivers.into_iter().enumerate().map(|(at, sent)| is_asked(at).then(|| ReceiverStream::new(sent)));
+        let messages = receivers
+            .into_iter()
+            .enumerate()
+            .map(|(compositor, sent)| (batch.queue.in_flight(compositor) > 0).then(|| ReceiverStream::new(sent)));
         let messages = messages.collect();
         StartedBatch { batch: Arc::new(Mutex::new(batch)), messages }
     }

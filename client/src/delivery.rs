@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use cluster::RenderViews;
-use depth_image::PinholeCamera;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 use tokio_stream::wrappers::ReceiverStream;
@@ -31,7 +30,7 @@ pub(crate) async fn deliver(mut state: watch::Receiver<SessionState>, sink: Fram
     let mut retries = Retries::new(0);
     loop {
         let active = state.borrow_and_update().active.clone();
-        if sink.window().lock().is_complete() {
+        if sink.window.lock().is_complete() {
             return;
         }
         let failed = match call_all(&state, &active, &sink).await {
@@ -50,7 +49,7 @@ pub(crate) async fn deliver(mut state: watch::Receiver<SessionState>, sink: Fram
                 false => return,
             },
             Failure::OfPlan(error) => {
-                let received = sink.window().lock().received();
+                let received = sink.window.lock().received;
                 match retries.next_delay(Instant::now(), received) {
                     None => error,
                     Some(delay) => match wait_for_successor(&mut state, active.plan_epoch(), delay, error).await {
@@ -73,18 +72,19 @@ async fn call_all(
     let mut peers = active.trusted();
     let mut request = active.request();
     {
-        let mut window = sink.window().lock();
+        let mut window = sink.window.lock();
         // To make one view of a set, a compositor loads all of it.
         peers.truncate(window.most_views_of_a_set());
-        request.planes = window.planes();
+        request.planes = window.planes;
         if let Some(method) = &window.method {
             request.method.clone_from(method);
         }
     }
     let weights: Vec<u32> = peers.iter().map(|peer| peer.share.view_weight).collect();
     let plan = active.clone();
-    let cell_of = move |camera: &PinholeCamera| plan.plan.assignment.cell_of(camera);
-    let started = Batch::start(request, sink.window().clone(), &weights, active.plan.view_s(), cell_of);
+    let started = Batch::start(request, sink.window.clone(), &weights, active.plan.view_s(), move |camera| {
+        plan.plan.assignment.cell_of(camera)
+    });
     let mut calls = JoinSet::new();
     for (compositor, messages) in started.messages.into_iter().enumerate() {
         if let Some(messages) = messages {
@@ -146,8 +146,8 @@ pub(crate) async fn wait_for_successor(
     delay: Duration,
     error: ClientError,
 ) -> Result<(), ClientError> {
-    let is_later = |state: &SessionState| state.active.plan_epoch() > plan_epoch;
-    match tokio::time::timeout(delay, state.wait_for(is_later)).await {
+    let later = state.wait_for(|state| state.active.plan_epoch() > plan_epoch);
+    match tokio::time::timeout(delay, later).await {
         // The session was dropped.
         Ok(Err(_)) => Err(error),
         Ok(Ok(_)) | Err(_) => Ok(()),

@@ -95,7 +95,8 @@ type Received = Result<(Frame, FrameRoom), ClientError>;
 #[derive(Clone)]
 pub(crate) struct FrameSink {
     received: mpsc::Sender<Received>,
-    window: Arc<Mutex<Window>>,
+    /// The views that are due.
+    pub(crate) window: Arc<Mutex<Window>>,
     decoders: Arc<Semaphore>,
     room: Arc<Semaphore>,
     /// The room of the last frame.
@@ -103,11 +104,6 @@ pub(crate) struct FrameSink {
 }
 
 impl FrameSink {
-    /// The views that are due.
-    pub(crate) fn window(&self) -> &Arc<Mutex<Window>> {
-        &self.window
-    }
-
     /// Waits for room for a frame, encoded and decoded, before any of it is kept. A slow caller thereby holds up its
     /// compositors.
     ///

@@ -78,8 +78,8 @@ impl Client {
         progress: impl FnMut(&SessionEvent),
     ) -> Result<Session, ClientError> {
         let coordinator = self.coordinator.clone();
-        let invalid = |error| ClientError::Invalid { field: "codec", reason: format!("{error}") };
-        let codec: FrameCodec = request.codec.parse().map_err(invalid)?;
+        let codec = request.codec.parse::<FrameCodec>();
+        let codec = codec.map_err(|error| ClientError::Invalid { field: "codec", reason: error.to_string() })?;
         let mut events = coordinator.open_session(request.clone()).await.map_err(ClientError::coordinator)?;
         let Opened { session, promise, plan } = plan_of(&mut events, progress).await?;
         let (named_plans, to_follow) = mpsc::channel(NAMED_PLANS);
@@ -135,8 +135,8 @@ impl Session {
         let viewpoints = (!viewpoints.is_empty()).then_some(viewpoints);
         let message = ChangeSession { session, views_per_set, frames_per_s, viewpoints };
         let answer = self.coordinator.change_session(message).await;
-        let refuses = |status: &Status| [Code::InvalidArgument, Code::ResourceExhausted].contains(&status.code());
-        if !answer.as_ref().is_err_and(refuses) {
+        let code = answer.as_ref().map_or_else(Status::code, |()| Code::Ok);
+        if ![Code::InvalidArgument, Code::ResourceExhausted].contains(&code) {
             // The session is opened again with it when the coordinator comes back; a session has one view at least.
             let mut request = self.request.lock();
             change(&mut request);

@@ -54,11 +54,11 @@ impl<V: Copy> ViewQueue<V> {
     /// A queue for compositors of these weights, the heaviest first. A view is expected to take `view_s`.
     #[must_use]
     pub fn new(weights: &[u32], view_s: f64) -> Self {
-        let compositor = |&weight: &u32| {
+        let compositors = weights.iter().map(|&weight| {
             let weight = weight.max(1) as usize;
             Compositor { weight, pace: Pace::new(view_s), in_flight: 0, cell: None }
-        };
-        let compositors: Vec<Compositor> = weights.iter().map(compositor).collect();
+        });
+        let compositors: Vec<Compositor> = compositors.collect();
         let total_weight = compositors.iter().map(|compositor| compositor.weight).sum();
         Self { groups: VecDeque::new(), waiting: 0, due: 0, compositors, total_weight }
     }
@@ -119,13 +119,13 @@ impl<V: Copy> ViewQueue<V> {
     /// so that all compositors end together.
     fn room(&self, compositor: usize) -> Option<usize> {
         let Compositor { weight, pace, in_flight, .. } = self.compositors.get(compositor)?;
-        if *in_flight > pace.message_views() {
+        if *in_flight > pace.message_views {
             return None;
         }
         // A compositor that would make less than half a view meanwhile would be the last to end.
         let is_too_slow = compositor > 0 && 2 * self.due * weight < self.total_weight;
         let left = self.share(self.due, compositor).saturating_sub(*in_flight);
-        Some(left.min(pace.message_views())).filter(|&room| room > 0 && !is_too_slow)
+        Some(left.min(pace.message_views)).filter(|&room| room > 0 && !is_too_slow)
     }
 
     /// A compositor's part of some views by its weight, rounded up.

@@ -77,7 +77,7 @@ impl CompositorService {
     /// The sets on the device.
     #[must_use]
     pub fn memory(&self) -> Arc<dyn SetMemory> {
-        self.shared.sets.memory()
+        Arc::new(self.shared.sets.cached.clone())
     }
 
     /// Relays the images that this compositor fetches to other compositors.
