@@ -85,12 +85,12 @@ impl LiveStream {
 
     /// Streams from one compositor after the other, and from one plan after the other.
     async fn follow(&mut self) -> Result<(), ClientError> {
-        let mut tried = Tried::none(0);
+        let mut tried = Tried::default();
         loop {
             let active = self.state.borrow_and_update().active.clone();
             let plan_epoch = active.plan_epoch();
             if tried.plan_epoch != plan_epoch {
-                tried = Tried::none(plan_epoch);
+                tried = Tried { plan_epoch, ..Tried::default() };
             }
             let Some(peer) = tried.next(self.client_id, &active) else {
                 tried = self.wait_for_others(tried).await?;
@@ -120,7 +120,7 @@ impl LiveStream {
         }
         match timeout(RETRY, self.state.changed()).await {
             Ok(Err(_)) => Err(closed()),
-            _ => Ok(Tried::none(0)),
+            _ => Ok(Tried::default()),
         }
     }
 
@@ -161,7 +161,7 @@ impl LiveStream {
     fn is_still_with(&self, peer: &Peer) -> bool {
         let state = self.state.borrow();
         let CompositorShare { node_name, address, .. } = &peer.share;
-        let wanted = Tried::none(0).next(self.client_id, &state.active);
+        let wanted = Tried::default().next(self.client_id, &state.active);
         wanted.is_some_and(|wanted| wanted.share.node_name == *node_name && wanted.share.address == *address)
     }
 

@@ -12,7 +12,7 @@ use tokio::task::JoinSet;
 use tokio::time::Instant;
 use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
-use wire::rpc::{CoordinatorClient, Messages, connect};
+use wire::rpc::{CoordinatorClient, connect};
 
 use crate::active_plan::{ActivePlan, SessionState, follow_compositors, follow_coordinator};
 use crate::delivery::deliver;
@@ -75,13 +75,29 @@ impl Client {
     pub async fn open_session(
         &self,
         request: SessionRequest,
-        progress: impl FnMut(&SessionEvent),
+        mut progress: impl FnMut(&SessionEvent),
     ) -> Result<Session, ClientError> {
         let coordinator = self.coordinator.clone();
         let codec = request.codec.parse::<FrameCodec>();
         let codec = codec.map_err(|error| ClientError::Invalid { field: "codec", reason: error.to_string() })?;
         let mut events = coordinator.open_session(request.clone()).await.map_err(ClientError::coordinator)?;
-        let Opened { session, promise, plan } = plan_of(&mut events, progress).await?;
+        let mut session = 0;
+        let mut promise = None;
+        let plan = loop {
+            let Some(event) = events.next().await else {
+                return Err(ClientError::Coordinator {
+                    reason: "the session's stream ended before its plan".to_owned(),
+                });
+            };
+            let event = event.map_err(ClientError::coordinator)?;
+            progress(&event);
+            match event {
+                SessionEvent::Opened { session: number } => session = number,
+                SessionEvent::Progress { .. } => (),
+                SessionEvent::Promise(promised) => promise = Some(promised),
+                SessionEvent::Plan(plan) => break *plan,
+            }
+        };
         let (named_plans, to_follow) = mpsc::channel(NAMED_PLANS);
         let mut planes = request.planes;
         if request.auto_exposure {
@@ -236,30 +252,4 @@ impl Session {
     pub fn live_encoded(&self, client: ClientId) -> EncodedLiveView {
         EncodedLiveView::start(client, self.state.clone())
     }
-}
-
-/// The beginning of a session.
-struct Opened {
-    session: u64,
-    promise: Option<Promise>,
-    plan: SessionPlan,
-}
-
-async fn plan_of(
-    events: &mut Messages<SessionEvent>,
-    mut progress: impl FnMut(&SessionEvent),
-) -> Result<Opened, ClientError> {
-    let mut number = 0;
-    let mut promised = None;
-    while let Some(event) = events.next().await {
-        let event = event.map_err(ClientError::coordinator)?;
-        progress(&event);
-        match event {
-            SessionEvent::Opened { session } => number = session,
-            SessionEvent::Progress { .. } => (),
-            SessionEvent::Promise(promise) => promised = Some(promise),
-            SessionEvent::Plan(plan) => return Ok(Opened { session: number, promise: promised, plan: *plan }),
-        }
-    }
-    Err(ClientError::Coordinator { reason: "the session's stream ended before its plan".to_owned() })
 }

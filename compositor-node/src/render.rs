@@ -6,9 +6,7 @@ use std::time::{Duration, Instant};
 
 use codec::{StageTimes, encode_view};
 use depth_image::{PinholeCamera, View};
-use node::{
-    DirectWork, Engine, EngineError, NodeMetrics, Operation, Scenes, Turn, ViewWork, WorkClass, blocking, own_time,
-};
+use node::{DirectWork, Engine, EngineError, NodeMetrics, Operation, Turn, ViewWork, WorkClass, blocking, own_time};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::Status;
 
@@ -27,8 +25,6 @@ const PREVIEW_SHARE: f64 = 0.5;
 /// Makes views, and encodes them. Clones share the encoders.
 #[derive(Clone)]
 pub(crate) struct Rendering {
-    scenes: Arc<Scenes>,
-    metrics: NodeMetrics,
     times: Arc<ViewTimes>,
     encoders: Arc<Semaphore>,
     auditor: Arc<Auditor>,
@@ -37,7 +33,7 @@ pub(crate) struct Rendering {
 impl Rendering {
     pub(crate) fn new(auditor: Arc<Auditor>, times: Arc<ViewTimes>) -> Self {
         let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
-        Self { scenes: auditor.scenes.clone(), metrics: auditor.metrics.clone(), times, encoders, auditor }
+        Self { times, encoders, auditor }
     }
 
     /// Makes the views of one lane, until it is aborted.
@@ -55,7 +51,7 @@ impl Rendering {
             batch.retain(|view| {
                 let is_wanted = !view.reply.outbox().gone.is_cancelled();
                 if !is_wanted {
-                    self.metrics.drop_view("client gone");
+                    self.auditor.metrics.drop_view("client gone");
                 }
                 is_wanted
             });
@@ -74,7 +70,7 @@ impl Rendering {
     /// Gives the seconds that the views had the device.
     async fn render(&self, turn: Turn, batch: Vec<Waiting>, place: OwnedSemaphorePermit) -> f64 {
         let start = Instant::now();
-        let metrics = &self.metrics;
+        let metrics = &self.auditor.metrics;
         match self.make(turn, &batch).await {
             Ok((operation, views, busy_s)) => {
                 let batch_s = start.elapsed().as_secs_f64();
@@ -113,7 +109,7 @@ impl Rendering {
             Source::Sets(_) => Operation::ReconstructView,
             Source::Scene { .. } => Operation::DirectView,
         };
-        let making = self.scenes.on_device(&scene, move |engine| {
+        let making = self.auditor.scenes.on_device(&scene, move |engine| {
             let (views, busy_s) = own_time(engine, || views_of(engine, &source, &key, &cameras, turn));
             Ok((views?, busy_s))
         });
@@ -140,7 +136,7 @@ impl Rendering {
                 return;
             };
             let times = stage_times(&waiting, start, batch_s, count);
-            let metrics = self.metrics.clone();
+            let metrics = self.auditor.metrics.clone();
             encodings.spawn(async move {
                 encode_and_send(waiting, view, times, &metrics).await;
                 drop(encoder);

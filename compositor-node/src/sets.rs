@@ -74,13 +74,13 @@ pub(crate) struct ViewSets {
 /// The content of a set without its cameras: equal for the sets of all view cells at one moment.
 fn moment(plan: &Assignment, set_index: u32) -> Option<SetContent> {
     let workload = Workload { sample_cameras: Vec::new(), cell_first_indices: Vec::new(), ..plan.workload.clone() };
-    Assignment { workload, samplers: Vec::new(), ..plan.clone() }.set_content(set_index)
+    SetContent::of(&workload, set_index)
 }
 
 /// The content of a cell's sets without their time: equal for all moments.
 fn subject(plan: &Assignment) -> Option<SetContent> {
     let workload = Workload { timeline: Timeline::still(0.0), refinement_steps: 1, ..plan.workload.clone() };
-    Assignment { workload, samplers: Vec::new(), ..plan.clone() }.set_content(0)
+    SetContent::of(&workload, 0)
 }
 
 /// The sets of one compositor: the latest few moments of each cell, as long as memory has room.

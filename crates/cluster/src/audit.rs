@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::check::{InvalidField, at_most, finite_seconds, within};
 use crate::limits::MAX_PROBE_VIEWS;
-use crate::probing::ProbedView;
 
 /// The greatest share of a compositor's time that audits may take.
 pub const MAX_AUDIT_TIME_RATIO: f64 = 0.5;
@@ -63,6 +62,17 @@ pub struct AuditedView {
     pub is_part: bool,
 }
 
+/// Errors of a view, each from 0 to 1, as nodes measure them for budgets and audits; see `planner::ViewErrors`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "as there")]
+pub struct ProbedView {
+    pub foreground_ratio: f64,
+    pub flip: f64,
+    pub flip_whole: f64,
+    pub mean_square: f64,
+    pub disoccluded_ratio: f64,
+}
+
 /// The findings of the audits of a promise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct AuditSummary {
@@ -107,6 +117,20 @@ impl AuditOrder {
         }
         within(self.planned_pixel_count, 1..=MAX_PIXELS, "audit.planned_pixel_count", "from 1 to 2^28")?;
         finite_seconds(self.least_apart_m, "audit.least_apart_m")
+    }
+}
+
+impl ProbedView {
+    pub(crate) fn validate(&self) -> Result<(), InvalidField> {
+        let Self { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio } = *self;
+        let fields = [
+            (foreground_ratio, "foreground_ratio"),
+            (flip, "flip_ratio"),
+            (flip_whole, "flip_whole_ratio"),
+            (mean_square, "mean_square_ratio"),
+            (disoccluded_ratio, "disoccluded_ratio"),
+        ];
+        fields.into_iter().try_for_each(|(value, field)| within(value, 0.0..=1.0, field, "from 0 to 1"))
     }
 }
 

@@ -3,12 +3,11 @@
 use depth_image::{ExposureEv, PinholeCamera, ViewPlanes};
 use serde::{Deserialize, Serialize};
 
-use crate::audit::AuditReport;
+use crate::audit::{AuditReport, ProbedView};
 use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text, viewpoints, within};
 use crate::check_seconds;
 use crate::costs::{Costs, MeasuredCosts};
 use crate::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
-use crate::probing::ProbedView;
 use crate::scene::SceneRef;
 use crate::views::check_view_size;
 use crate::workload::{SamplePlanes, Workload};

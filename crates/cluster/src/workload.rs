@@ -347,7 +347,8 @@ struct Shown<'a> {
 
 impl SetContent {
     /// The content of a set; `None` beyond the timeline.
-    pub(crate) fn of(workload: &Workload, set_index: u32) -> Option<Self> {
+    #[must_use]
+    pub fn of(workload: &Workload, set_index: u32) -> Option<Self> {
         let time_s = workload.timeline.time_s(set_index)?;
         let refinement = workload.refinement(set_index);
         let shown = Shown {

@@ -30,14 +30,13 @@ pub struct PlansInForce {
 
 #[derive(Debug, Default)]
 struct Plans {
+    /// The one that was used last is the last.
     workloads: Vec<WorkloadPlans>,
     highest_epoch: u64,
     /// Plans of this epoch and of lower ones were forgotten together, and do not come back.
     forgotten_epoch: u64,
     /// The last plan that told which workloads are open.
     told: Option<ApplyPlan>,
-    /// Uses of all plans so far.
-    uses: u64,
 }
 
 #[derive(Debug)]
@@ -45,7 +44,6 @@ struct WorkloadPlans {
     number: u64,
     /// One at least; the last is in force, and the others were before it.
     plans: VecDeque<Arc<Assignment>>,
-    last_use: u64,
 }
 
 impl WorkloadPlans {
@@ -70,12 +68,11 @@ fn goes_on(before: &Workload, after: &Workload) -> bool {
 }
 
 impl Plans {
+    /// The plans of a workload. This is a use of them.
     fn of(&mut self, workload_number: u64) -> Option<&mut WorkloadPlans> {
-        self.uses += 1;
-        let uses = self.uses;
-        let workload = self.workloads.iter_mut().find(|workload| workload.number == workload_number)?;
-        workload.last_use = uses;
-        Some(workload)
+        let at = self.workloads.iter().position(|workload| workload.number == workload_number)?;
+        self.workloads[at..].rotate_left(1);
+        self.workloads.last_mut()
     }
 
     /// Whether a plan is new; an error where it may not replace the one in force.
@@ -122,10 +119,9 @@ impl Plans {
             return push_latest(&mut workload.plans, assignment, MAX_PLANS);
         }
         if self.workloads.len() >= MAX_WORKLOADS {
-            let unused = self.workloads.iter().enumerate().min_by_key(|(_, workload)| workload.last_use);
-            unused.map(|(at, _)| at).map(|at| self.workloads.swap_remove(at));
+            self.workloads.remove(0);
         }
-        self.workloads.push(WorkloadPlans { number, plans: [assignment].into(), last_use: self.uses });
+        self.workloads.push(WorkloadPlans { number, plans: [assignment].into() });
     }
 }
 

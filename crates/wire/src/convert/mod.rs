@@ -7,7 +7,7 @@ use cluster::{
 };
 use codec::{InverseDepthRange, SampleSetId};
 use depth_image::{Antialias, ExposureEv, PinholeCamera, ToneCurve, ToneMapping, ViewPlanes};
-use glam::{DVec3, UVec2};
+use glam::UVec2;
 use prost::bytes::Bytes;
 
 use crate::error::WireError;
@@ -175,10 +175,10 @@ absent_if_empty!(Vec<PinholeCamera> as Vec<proto::PinholeCamera>);
 
 /// Types whose fields are the message's own.
 macro_rules! flat {
-    ($($type:ident { $($own:ident: $wire:ty),+ })+) => {$(
+    ($($type:ident { $($own:ident $(as $name:literal)?: $wire:ty),+ })+) => {$(
         impl Convert<($($wire),+)> for $type {
             fn read(($($own),+): ($($wire),+), _: &'static str) -> Result<Self, WireError> {
-                Ok(Self { $($own: Convert::read($own, stringify!($own))?),+ })
+                Ok(Self { $($own: Convert::read($own, name!($own $($name)?))?),+ })
             }
 
             fn write(self) -> ($($wire),+) {
@@ -190,7 +190,7 @@ macro_rules! flat {
 
 flat! {
     UVec2 { x: u32, y: u32 }
-    DVec3 { x: f64, y: f64, z: f64 }
+    ToneMapping { exposure as "exposure_ev": f32, curve as "tone_curve": i32 }
     SamplePlanes { normals: bool, corner_inverse_depths: bool, light: bool }
     InverseDepthRange { least_per_m: f32, greatest_per_m: f32 }
     SampleSetId { plan_epoch: u64, index: u32 }
@@ -238,16 +238,6 @@ impl Convert<(u32, f32, i32, bool, bool)> for ViewPlanes {
         let Self { antialias, tone, inverse_depth, provenance } = self;
         let (exposure_ev, curve) = tone.write();
         (antialias.write(), exposure_ev, curve, inverse_depth, provenance)
-    }
-}
-
-impl Convert<(f32, i32)> for ToneMapping {
-    fn read((exposure_ev, curve): (f32, i32), _: &'static str) -> Result<Self, WireError> {
-        Ok(Self { exposure: Convert::read(exposure_ev, "exposure_ev")?, curve: Convert::read(curve, "tone_curve")? })
-    }
-
-    fn write(self) -> (f32, i32) {
-        (self.exposure.write(), self.curve.write())
     }
 }
 
