@@ -52,10 +52,14 @@ pub(crate) async fn deliver(mut state: watch::Receiver<SessionState>, sink: Fram
                 let received = sink.window.lock().received;
                 match retries.next_delay(Instant::now(), received) {
                     None => error,
-                    Some(delay) => match wait_for_successor(&mut state, active.plan_epoch(), delay, error).await {
-                        Ok(()) => continue,
-                        Err(error) => error,
-                    },
+                    Some(delay) => {
+                        let later = state.wait_for(|state| state.active.plan_epoch() > active.plan_epoch());
+                        match tokio::time::timeout(delay, later).await {
+                            // The session was dropped.
+                            Ok(Err(_)) => error,
+                            Ok(Ok(_)) | Err(_) => continue,
+                        }
+                    }
                 }
             }
         };
@@ -122,7 +126,7 @@ async fn receive_all(
     let mut decoding = JoinSet::new();
     while let Some((frame, room)) = frames.next_admitted(&peer, &sink, plan_epoch).await? {
         received(frame.header.stage_times.set_wait_s > SET_WAIT_S);
-        let Some(decoder) = sink.decoder().await else { break };
+        let Ok(decoder) = sink.decoders.clone().acquire_owned().await else { break };
         let peer = peer.clone();
         let sink = sink.clone();
         decoding.spawn(async move {
@@ -137,21 +141,6 @@ async fn receive_all(
         }
     }
     all(&mut decoding).await
-}
-
-/// Waits for a later plan for `delay`; gives an error where no plan is to be tried any more.
-pub(crate) async fn wait_for_successor(
-    state: &mut watch::Receiver<SessionState>,
-    plan_epoch: u64,
-    delay: Duration,
-    error: ClientError,
-) -> Result<(), ClientError> {
-    let later = state.wait_for(|state| state.active.plan_epoch() > plan_epoch);
-    match tokio::time::timeout(delay, later).await {
-        // The session was dropped.
-        Ok(Err(_)) => Err(error),
-        Ok(Ok(_)) | Err(_) => Ok(()),
-    }
 }
 
 /// Resolves when a later plan has no place for one of `peers`: it may be lost without a word.

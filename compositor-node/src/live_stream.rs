@@ -24,6 +24,7 @@ use crate::course::Course;
 use crate::outbox::Reply;
 use crate::queue::Viewer;
 use crate::quota::{Credit, closed};
+use crate::sets::RECENTLY;
 use crate::shared::ClientStream;
 
 /// Frames that may be in flight until the client acknowledges them: a third would only be older.
@@ -200,7 +201,7 @@ impl<'a> LiveStream<'a> {
             return;
         }
         if let Ok(plan) = CellPlan::of(plan, cell) {
-            self.aside = sets.load_ahead(&plan, set_index);
+            self.aside = sets.load_ahead(&plan, set_index, RECENTLY);
         }
     }
 

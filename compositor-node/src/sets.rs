@@ -32,7 +32,7 @@ const ATTEMPTS: usize = 16;
 /// The first of these, after which they take turns.
 const CALM_ATTEMPTS: usize = 3;
 /// A set that was used within this time is not evicted for that of another cell ahead: a viewer's next pose needs it.
-const RECENTLY: Duration = Duration::from_millis(500);
+pub(crate) const RECENTLY: Duration = Duration::from_millis(500);
 
 /// Sets that are fetched before views need them; where samplers take turns, one of each sampler. A timeline may have fewer.
 fn sets_ahead(plan: &Assignment) -> u32 {
@@ -245,7 +245,7 @@ impl Sets {
         for next in set_index.saturating_add(1)..=last.min(set_index.saturating_add(ahead)) {
             if of_cell.set_content(next) != of_cell.set_content(set_index) {
                 for cell in [of_cell].into_iter().chain(common.iter().map(|(_, cell)| cell)) {
-                    self.begin_to_load(cell, next, Duration::ZERO);
+                    self.load_ahead(cell, next, Duration::ZERO);
                 }
             }
         }
@@ -258,13 +258,14 @@ impl Sets {
         room.saturating_sub(SETS_IN_USE)
     }
 
-    /// Begins to load the set of a cell that no view needs yet, where it has room; gives its content if it is loaded or
-    /// being loaded.
-    pub(crate) fn load_ahead(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Option<SetContent> {
-        self.begin_to_load(plan, set_index, RECENTLY)
-    }
-
-    fn begin_to_load(self: &Arc<Self>, plan: &CellPlan, set_index: u32, recently: Duration) -> Option<SetContent> {
+    /// Begins to load the set of a cell that no view needs yet, where it has room beside sets that were used within `recently`;
+    /// gives its content if it is loaded or being loaded.
+    pub(crate) fn load_ahead(
+        self: &Arc<Self>,
+        plan: &CellPlan,
+        set_index: u32,
+        recently: Duration,
+    ) -> Option<SetContent> {
         let content = plan.set_content(set_index)?;
         let loading = self.loading(plan, set_index, content);
         self.cached.load_ahead(content, self.most_bytes(plan), recently, loading).then_some(content)
@@ -282,7 +283,7 @@ impl Sets {
         // It is about to be used: what is loaded beside it must not evict it.
         let _in_use = self.cached.loaded(&content);
         for (_, other) in beside {
-            self.begin_to_load(other, set_index, Duration::ZERO);
+            self.load_ahead(other, set_index, Duration::ZERO);
         }
         let load = || self.cached.get(content, self.most_bytes(plan), self.loading(plan, set_index, content));
         match load().await {

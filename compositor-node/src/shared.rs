@@ -14,7 +14,7 @@ use crate::batch::{BatchKey, Loaded, Place, Source, Waiting};
 use crate::outbox::Outbox;
 use crate::queue::{Arrivals, Lane};
 use crate::quota::NodeQuota;
-use crate::sets::{ReadySet, Sets, ViewSets};
+use crate::sets::{RECENTLY, ReadySet, Sets, ViewSets};
 use crate::view_times::{ViewKind, ViewTimes};
 
 /// A live view that takes longer has a lane beside that of others.
@@ -146,7 +146,7 @@ impl Shared {
             let common = CellPlan::of_common(plan);
             let plans = cells.map_while(|cell| CellPlan::of(plan, cell).ok()).enumerate();
             let plans = plans.take_while(|(ahead, plan)| *ahead <= self.sets.room_ahead(plan, &common));
-            plans.map_while(|(_, plan)| self.sets.load_ahead(&plan, set_index)).for_each(drop);
+            plans.map_while(|(_, plan)| self.sets.load_ahead(&plan, set_index, RECENTLY)).for_each(drop);
         }
     }
 

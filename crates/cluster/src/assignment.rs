@@ -82,13 +82,6 @@ impl ApplyPlan {
     }
 }
 
-impl From<Assignment> for ApplyPlan {
-    /// Of an unknown number of workloads.
-    fn from(assignment: Assignment) -> Self {
-        Self { assignment, open_workloads: Vec::new() }
-    }
-}
-
 impl Assignment {
     /// The cameras of all images that are sampled: of the set's images, or of their tiles.
     #[must_use]

@@ -81,8 +81,9 @@ impl Workload {
     /// time for steps: each set shows the last. So do views drawn directly.
     #[must_use]
     pub fn refinement(&self, set_index: u32) -> Refinement {
-        let last = Refinement::last_of(self.refinement_steps);
-        if self.timeline.moves() { last } else { Refinement { step: set_index.min(last.step), ..last } }
+        let last_step = self.refinement_steps.saturating_sub(1);
+        let step = if self.timeline.moves() { last_step } else { set_index.min(last_step) };
+        Refinement { step, steps: last_step + 1 }
     }
 
     /// Whether pictures of so many pixels find surfaces by rays; `None` where that was not measured.

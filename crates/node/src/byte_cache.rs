@@ -116,12 +116,6 @@ where
         self.0.max_bytes
     }
 
-    /// Bytes of loaded values, and of those that are being loaded.
-    #[must_use]
-    pub fn used_bytes(&self) -> usize {
-        self.0.state.lock().used_bytes
-    }
-
     /// A value that is loaded already.
     #[must_use]
     pub fn loaded(&self, key: &K) -> Option<Pinned<V>> {

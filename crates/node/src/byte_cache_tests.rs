@@ -23,6 +23,12 @@ struct Bench {
     loads: Arc<AtomicUsize>,
 }
 
+impl<K, V> ByteCache<K, V> {
+    fn used_bytes(&self) -> usize {
+        self.0.state.lock().used_bytes
+    }
+}
+
 impl Bench {
     fn new(max_bytes: usize) -> Self {
         Self { cache: ByteCache::new("blocks", max_bytes), existing: Arc::default(), loads: Arc::default() }

@@ -157,8 +157,7 @@ impl PlansInForce {
     ///
     /// # Errors
     /// As [`PlansInForce::admits`].
-    pub fn apply(&self, plan: impl Into<ApplyPlan>) -> Result<Vec<u64>, Status> {
-        let plan = plan.into();
+    pub fn apply(&self, plan: ApplyPlan) -> Result<Vec<u64>, Status> {
         // Compared under the lock: of two plans that were prepared at the same time the higher one stays.
         let mut plans = self.plans.lock();
         let is_new = plans.admits(&plan.assignment)?;
@@ -338,6 +337,11 @@ pub(crate) mod tests {
         Assignment { workload, policy: Policy::Direct, compositors: vec![share], ..plan }
     }
 
+    /// A plan that does not tell which workloads are open.
+    pub(crate) fn alone(assignment: Assignment) -> ApplyPlan {
+        ApplyPlan { assignment, open_workloads: Vec::new() }
+    }
+
     fn of_another_scene(plan: Assignment) -> Assignment {
         let scene = cluster::SceneRef { hash: cluster::SceneHash::of(b"another"), package_bytes: 7 };
         Assignment { workload: Workload { scene, ..plan.workload }, ..plan }
@@ -346,16 +350,16 @@ pub(crate) mod tests {
     #[tokio::test]
     async fn a_wait_ends_with_the_plan_that_it_waits_for() {
         let plans = PlansInForce::new("n");
-        plans.apply(plan(1, 3)).unwrap();
+        plans.apply(alone(plan(1, 3))).unwrap();
         let waiting = plans.clone();
         let is_late = |plan: Option<&Arc<Assignment>>| plan.is_some_and(|plan| plan.plan_epoch > 3);
         let waits = tokio::spawn(async move { waiting.until(1, is_late).await });
         for other in [plan(2, 9), plan(1, 3)] {
-            plans.apply(other).unwrap();
+            plans.apply(alone(other)).unwrap();
             tokio::task::yield_now().await;
             assert!(!waits.is_finished());
         }
-        plans.apply(plan(1, 10)).unwrap();
+        plans.apply(alone(plan(1, 10))).unwrap();
         waits.await.unwrap();
     }
 
@@ -363,14 +367,14 @@ pub(crate) mod tests {
     fn a_plan_with_a_lower_epoch_of_its_workload_is_refused() {
         let plans = PlansInForce::new("n");
         assert!(plans.require(1, 0).is_err(), "no plan yet");
-        plans.apply(plan(1, 3)).unwrap();
-        plans.apply(plan(1, 3)).unwrap();
+        plans.apply(alone(plan(1, 3))).unwrap();
+        plans.apply(alone(plan(1, 3))).unwrap();
         for refused in [plan(1, 2), moved(plan(1, 3))] {
             assert_eq!(plans.admits(&refused).unwrap_err().code(), Code::FailedPrecondition);
-            assert_eq!(plans.apply(refused).unwrap_err().code(), Code::FailedPrecondition);
+            assert_eq!(plans.apply(alone(refused)).unwrap_err().code(), Code::FailedPrecondition);
         }
-        plans.apply(plan(2, 1)).unwrap();
-        plans.apply(plan(1, 4)).unwrap();
+        plans.apply(alone(plan(2, 1))).unwrap();
+        plans.apply(alone(plan(1, 4))).unwrap();
         assert!(plans.require(1, 3).is_err() && plans.require(1, 5).is_err() && plans.require(2, 4).is_err());
         assert_eq!((plans.require(1, 4).unwrap().plan_epoch, plans.require(2, 1).unwrap().plan_epoch), (4, 1));
         assert_eq!(plans.epoch(), 4);
@@ -379,28 +383,28 @@ pub(crate) mod tests {
     #[test]
     fn plans_that_were_forgotten_together_do_not_come_back() {
         let plans = PlansInForce::new("n");
-        plans.apply(plan(1, 3)).unwrap();
+        plans.apply(alone(plan(1, 3))).unwrap();
         plans.forget_all();
         assert!(plans.in_force(1).is_none());
         for late in [plan(1, 3), plan(2, 2)] {
-            assert_eq!(plans.apply(late).unwrap_err().code(), Code::FailedPrecondition);
+            assert_eq!(plans.apply(alone(late)).unwrap_err().code(), Code::FailedPrecondition);
         }
-        plans.apply(plan(1, 4)).unwrap();
+        plans.apply(alone(plan(1, 4))).unwrap();
     }
 
     #[test]
     fn a_workload_that_goes_on_remembers_its_last_plans() {
         let plans = PlansInForce::new("n");
-        plans.apply(plan(1, 3)).unwrap();
-        plans.apply(moved(plan(1, 5))).unwrap();
+        plans.apply(alone(plan(1, 3))).unwrap();
+        plans.apply(alone(moved(plan(1, 5)))).unwrap();
         assert_eq!(plans.follow(1, 3).unwrap().plan_epoch, 5);
         assert_eq!(*plans.remembered(1, 3).unwrap(), plan(1, 3));
         assert!(plans.follow(1, 4).is_err() && plans.follow(1, 6).is_err() && plans.remembered(1, 4).is_err());
         let in_force = wire::plan_in_force(&plans.require(1, 3).unwrap_err());
         assert_eq!(in_force.map(|plan| plan.plan_epoch), Some(5), "the refusal names it");
-        (6..20).for_each(|epoch| drop(plans.apply(plan(1, epoch)).unwrap()));
+        (6..20).for_each(|epoch| drop(plans.apply(alone(plan(1, epoch))).unwrap()));
         assert!(plans.follow(1, 5).is_err() && plans.remembered(1, 11).is_err() && plans.follow(1, 12).is_ok());
-        plans.apply(of_another_scene(plan(1, 20))).unwrap();
+        plans.apply(alone(of_another_scene(plan(1, 20)))).unwrap();
         assert!(plans.follow(1, 19).is_err() && plans.remembered(1, 19).is_err(), "it shows something else");
     }
 
@@ -408,31 +412,31 @@ pub(crate) mod tests {
     fn the_workload_that_was_used_longest_ago_leaves() {
         let plans = PlansInForce::new("n");
         let most = MAX_WORKLOADS as u64;
-        (1..=most).for_each(|number| drop(plans.apply(plan(number, number)).unwrap()));
+        (1..=most).for_each(|number| drop(plans.apply(alone(plan(number, number))).unwrap()));
         assert!(plans.in_force(1).is_some(), "it was used now");
-        plans.apply(plan(most + 1, most + 1)).unwrap();
+        plans.apply(alone(plan(most + 1, most + 1))).unwrap();
         assert!(plans.in_force(2).is_none() && plans.in_force(1).is_some() && plans.in_force(most + 1).is_some());
     }
 
     #[test]
     fn workloads_that_have_ended_are_forgotten_whatever_comes_late() {
         let plans = PlansInForce::new("n");
-        [plan(1, 3), plan(2, 4), plan(5, 6)].into_iter().for_each(|plan| drop(plans.apply(plan).unwrap()));
+        [plan(1, 3), plan(2, 4), plan(5, 6)].into_iter().for_each(|plan| drop(plans.apply(alone(plan)).unwrap()));
         let telling =
-            |plan_epoch, open: &[u64]| ApplyPlan { open_workloads: open.to_vec(), ..plan(1, plan_epoch).into() };
+            |plan_epoch, open: &[u64]| ApplyPlan { open_workloads: open.to_vec(), ..alone(plan(1, plan_epoch)) };
         assert_eq!(plans.apply(telling(7, &[1, 5])).unwrap(), [2]);
         assert!(plans.in_force(2).is_none() && plans.in_force(5).is_some());
         assert!(plans.require(2, 4).unwrap_err().message().ends_with("none is"));
-        let late = plans.apply(plan(2, 5)).unwrap_err();
+        let late = plans.apply(alone(plan(2, 5))).unwrap_err();
         assert_eq!((late.code(), late.message()), (Code::FailedPrecondition, "workload 2 has ended"));
         assert_eq!(plans.apply(telling(9, &[1, 5, 8])).unwrap(), [0; 0]);
         assert!(plans.apply(telling(8, &[1])).is_err(), "a plan of before is refused");
         assert!(plans.in_force(5).is_some(), "and its list does not count");
-        plans.apply(plan(8, 8)).unwrap();
-        plans.apply(ApplyPlan { open_workloads: vec![1, 8], ..plan(8, 10).into() }).unwrap();
+        plans.apply(alone(plan(8, 8))).unwrap();
+        plans.apply(ApplyPlan { open_workloads: vec![1, 8], ..alone(plan(8, 10)) }).unwrap();
         let both = (plans.in_force(5).is_none(), plans.in_force(8).map(|plan| plan.plan_epoch));
         assert_eq!(both, (true, Some(10)));
-        assert_eq!(plans.apply(plan(1, 11)).unwrap(), [0; 0], "nothing is told");
+        assert_eq!(plans.apply(alone(plan(1, 11))).unwrap(), [0; 0], "nothing is told");
         let content = plan(1, 1).set_content(0).unwrap();
         assert!(plans.have_set(&content, 0));
     }
@@ -440,11 +444,11 @@ pub(crate) mod tests {
     #[tokio::test]
     async fn a_wait_ends_with_its_workload() {
         let plans = PlansInForce::new("n");
-        plans.apply(plan(1, 3)).unwrap();
+        plans.apply(alone(plan(1, 3))).unwrap();
         let waiting = plans.clone();
         let waits = tokio::spawn(async move { waiting.until(1, |plan| plan.is_none()).await });
         tokio::task::yield_now().await;
-        plans.apply(ApplyPlan { open_workloads: vec![2], ..plan(2, 4).into() }).unwrap();
+        plans.apply(ApplyPlan { open_workloads: vec![2], ..alone(plan(2, 4)) }).unwrap();
         waits.await.unwrap();
     }
 

@@ -170,7 +170,9 @@ mod tests {
 
     fn plans(workloads: u64) -> PlansInForce {
         let plans = PlansInForce::new("n");
-        (1..=workloads).for_each(|number| drop(plans.apply(crate::plan::tests::plan(number, 6 + number)).unwrap()));
+        (1..=workloads).for_each(|number| {
+            drop(plans.apply(crate::plan::tests::alone(crate::plan::tests::plan(number, 6 + number))).unwrap())
+        });
         plans
     }
 
