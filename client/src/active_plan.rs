@@ -110,6 +110,19 @@ pub(crate) struct SessionState {
     pub(crate) active: Arc<ActivePlan>,
 }
 
+/// The first thing that is found in a session's state as it changes. Nothing follows once the session has ended, which is
+/// waited for for ever.
+pub(crate) async fn first_in<T>(
+    mut state: watch::Receiver<SessionState>,
+    find: impl Fn(&SessionState) -> Option<T>,
+) -> T {
+    let found = state.wait_for(|state| find(state).is_some()).await.ok().and_then(|state| find(&state));
+    match found {
+        Some(found) => found,
+        None => std::future::pending().await,
+    }
+}
+
 /// Takes over plans that compositors name, until it is aborted.
 pub(crate) async fn follow_compositors(
     mut named_plans: mpsc::Receiver<Assignment>,
@@ -167,19 +180,15 @@ fn take_over(event: SessionEvent, state: &watch::Sender<SessionState>, is_new_se
             state.send_modify(|state| (state.session, state.promise) = (session, None));
         }
         SessionEvent::Progress { .. } => (),
-        SessionEvent::Plan(plan) => put_in_force(*plan, state, std::mem::take(is_new_session)),
+        // The coordinator sends a plan when its nodes have taken it: one that was replaced meanwhile may arrive last.
+        SessionEvent::Plan(plan) => drop(state.send_if_modified(|state| {
+            let is_new_session = std::mem::take(is_new_session);
+            let is_current = is_new_session || plan.assignment.plan_epoch >= state.active.plan_epoch();
+            if is_current {
+                state.active = Arc::new(state.active.replaced_by(*plan));
+            }
+            is_current
+        })),
         SessionEvent::Promise(promise) => state.send_modify(|state| state.promise = Some(promise)),
     }
-}
-
-/// Puts a plan in force, unless it is older than the one in force. The coordinator sends a plan when its nodes have taken
-/// it, so that one that was replaced meanwhile may arrive last.
-fn put_in_force(plan: SessionPlan, state: &watch::Sender<SessionState>, is_new_session: bool) {
-    state.send_if_modified(|state| {
-        let is_current = is_new_session || plan.assignment.plan_epoch >= state.active.plan_epoch();
-        if is_current {
-            state.active = Arc::new(state.active.replaced_by(plan));
-        }
-        is_current
-    });
 }

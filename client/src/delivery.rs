@@ -9,7 +9,7 @@ use tokio::task::JoinSet;
 use tokio_stream::wrappers::ReceiverStream;
 use wire::rpc::Backoff;
 
-use crate::active_plan::{ActivePlan, SessionState};
+use crate::active_plan::{ActivePlan, SessionState, first_in};
 use crate::batch::Batch;
 use crate::error::ClientError;
 use crate::frames::FrameSink;
@@ -145,19 +145,18 @@ async fn receive_all(
 
 /// Resolves when a later plan has no place for one of `peers`: it may be lost without a word.
 pub(crate) async fn wait_for_lost_peer(
-    mut state: watch::Receiver<SessionState>,
+    state: watch::Receiver<SessionState>,
     plan_epoch: u64,
     peers: &[Peer],
 ) -> ClientError {
-    let lost = |state: &SessionState| {
+    let lost = first_in(state, |state| {
         let plan = &state.active.plan.assignment;
         let lost = peers.iter().find(|peer| !plan.composites(&peer.share.node_name));
-        lost.filter(|_| plan.plan_epoch > plan_epoch).cloned()
-    };
-    let found = state.wait_for(|state| lost(state).is_some()).await.ok().and_then(|state| lost(&state));
-    let Some(peer) = found else { return std::future::pending().await };
+        lost.filter(|_| plan.plan_epoch > plan_epoch)
+    });
+    let lost = lost.await;
     tokio::time::sleep(LAST_WORK).await;
-    peer.error("is not of the plan any more")
+    lost.error("is not of the plan any more")
 }
 
 /// The retries of one request for frames.

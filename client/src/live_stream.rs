@@ -90,7 +90,8 @@ impl LiveStream {
             let active = self.state.borrow_and_update().active.clone();
             let plan_epoch = active.plan_epoch();
             if tried.plan_epoch != plan_epoch {
-                tried = Tried { plan_epoch, ..Tried::default() };
+                tried = Tried::default();
+                tried.plan_epoch = plan_epoch;
             }
             let Some(peer) = tried.next(self.client_id, &active) else {
                 tried = self.wait_for_others(tried).await?;

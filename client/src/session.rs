@@ -14,7 +14,7 @@ use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
 use wire::rpc::{CoordinatorClient, connect};
 
-use crate::active_plan::{ActivePlan, SessionState, follow_compositors, follow_coordinator};
+use crate::active_plan::{ActivePlan, SessionState, first_in, follow_compositors, follow_coordinator};
 use crate::delivery::deliver;
 use crate::error::ClientError;
 use crate::frames::Frames;
@@ -182,24 +182,15 @@ impl Session {
 
     /// Waits for another promise than this one.
     pub async fn another_promise(&self, promise: Option<&Promise>) -> Promise {
-        let mut state = self.state.clone();
-        let other = state.wait_for(|state| state.promise.is_some() && state.promise.as_ref() != promise).await;
-        match other.ok().and_then(|state| state.promise.clone()) {
-            Some(promise) => promise,
-            // The session has ended: no promise follows.
-            None => std::future::pending().await,
-        }
+        first_in(self.state.clone(), |state| state.promise.clone().filter(|other| Some(other) != promise)).await
     }
 
     /// Waits for a plan of another number.
     pub async fn another_plan(&self, plan_epoch: u64) -> SessionPlan {
-        let mut state = self.state.clone();
-        let other = state.wait_for(|state| state.active.plan_epoch() != plan_epoch).await;
-        match other.map(|state| state.active.plan.clone()) {
-            Ok(plan) => plan,
-            // The session has ended: no plan follows.
-            Err(_) => std::future::pending().await,
-        }
+        let other = first_in(self.state.clone(), |state| {
+            (state.active.plan_epoch() != plan_epoch).then(|| state.active.plan.clone())
+        });
+        other.await
     }
 
     /// Requests views by the method of the plan in force. Frames are received in the order they are ready. All

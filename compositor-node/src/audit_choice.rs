@@ -88,14 +88,11 @@ impl AuditChoice {
             return None;
         }
         let chosen = eligible.into_iter().min_by_key(|&place| views[place].random)?;
-        self.begin(kind.clone(), &views[chosen]);
-        Some(chosen)
-    }
-
-    fn begin(&mut self, kind: Kind, view: &Candidate) {
+        let Candidate { stream, set, camera, .. } = views[chosen];
         (self.is_auditing, self.other_at) = (true, None);
-        push_latest(&mut self.recent, view.stream, RECENT_STREAMS);
-        push_latest(&mut self.audited, (kind, view.set, view.camera), MAX_AUDITED);
+        push_latest(&mut self.recent, stream, RECENT_STREAMS);
+        push_latest(&mut self.audited, (kind.clone(), set, camera), MAX_AUDITED);
+        Some(chosen)
     }
 
     /// The audit has ended. Audits may take `share` of the time.
