@@ -258,7 +258,12 @@ impl Workload {
         if self.background.is_mapped {
             return Err(InvalidField::out_of_range("background", "a map", "a gradient"));
         }
-        validate_illumination(&self.illumination)?;
+        at_most(self.illumination.lights.len(), MAX_LIGHTS, "illumination.lights")?;
+        for light in &self.illumination.lights {
+            light.validate().map_err(|source| InvalidField::Light { field: "illumination.lights", source })?;
+        }
+        let environment = self.illumination.environment.validate();
+        environment.map_err(|source| InvalidField::Light { field: "illumination.environment", source })?;
         within(self.refinement_steps, 1..=MAX_REFINEMENT_STEPS, "refinement_step_count", "from 1 to 64")
     }
 
@@ -313,15 +318,6 @@ impl Workload {
         }
         Ok(())
     }
-}
-
-fn validate_illumination(illumination: &Illumination) -> Result<(), InvalidField> {
-    at_most(illumination.lights.len(), MAX_LIGHTS, "illumination.lights")?;
-    for light in &illumination.lights {
-        light.validate().map_err(|source| InvalidField::Light { field: "illumination.lights", source })?;
-    }
-    let environment = illumination.environment.validate();
-    environment.map_err(|source| InvalidField::Light { field: "illumination.environment", source })
 }
 
 /// The name of a sample set's content, of one cell. It is equal for equal scene, time, cameras, sampling, lighting,

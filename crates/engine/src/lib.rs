@@ -326,8 +326,8 @@ impl Engine for GpuEngine {
         Box::new(self.gpu.device_queue.live_stream())
     }
 
-    fn take_waited_s(&self) -> f64 {
-        gpu::take_waited_s()
+    fn waited_s(&self) -> f64 {
+        gpu::waited_s()
     }
 
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<SampleImage>, EngineError> {

@@ -144,8 +144,8 @@ impl Engine for DeviceMonitor {
         self.engine.live_stream()
     }
 
-    fn take_waited_s(&self) -> f64 {
-        self.engine.take_waited_s()
+    fn waited_s(&self) -> f64 {
+        self.engine.waited_s()
     }
 
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<SampleImage>, EngineError> {

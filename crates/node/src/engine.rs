@@ -78,8 +78,8 @@ pub trait Engine: Send + Sync + 'static {
     fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
         Box::new(())
     }
-    /// Seconds for which calls of this thread have waited for their turns since the last call of this function.
-    fn take_waited_s(&self) -> f64 {
+    /// Seconds for which calls of this thread have waited for their turns so far.
+    fn waited_s(&self) -> f64 {
         0.0
     }
     /// Samples the wanted images of a set, in their order.
@@ -129,11 +129,11 @@ pub(crate) fn set_of_view(
 
 /// The result of work on this thread, and the seconds that it took, without those for which it waited for others.
 pub fn own_time<T>(engine: &dyn Engine, work: impl FnOnce() -> T) -> (T, f64) {
-    // Earlier waits of this thread are of other work.
-    engine.take_waited_s();
+    let waited_before_s = engine.waited_s();
     let start = Instant::now();
     let done = work();
-    (done, (start.elapsed().as_secs_f64() - engine.take_waited_s()).max(0.0))
+    let waited_s = engine.waited_s() - waited_before_s;
+    (done, (start.elapsed().as_secs_f64() - waited_s).max(0.0))
 }
 
 /// A sample set on the device; the engine downcasts it to its own type.

@@ -1,9 +1,7 @@
 //! The errors and the costs of representations, measured on one device.
 
-use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use std::time::Instant;
 
 use codec::{
     DecodeError, DecodeLimits, EncodeError, EncodedImage, FrameCodec, FrameError, decode_depth_image,
@@ -83,8 +81,6 @@ pub struct Prober {
     sets: Sets,
     /// Shaders that are built: the first run of an operation is not timed.
     warm: BTreeSet<String>,
-    /// The time for which work has waited for other work, in s.
-    waited_s: Cell<f64>,
 }
 
 /// A camera's numbers, bit by bit.
@@ -94,8 +90,8 @@ impl Prober {
     /// A prober of a subject whose scene is loaded.
     #[must_use]
     pub fn new(engine: Arc<dyn Engine>, subject: Subject, turn: Turn) -> Self {
-        let (truths, sets, warm, waited_s) = Default::default();
-        Self { engine, subject, turn, truths, sets, warm, waited_s }
+        let warm = BTreeSet::new();
+        Self { engine, subject, turn, truths: BTreeMap::new(), sets: Sets::default(), warm }
     }
 
     /// The subject.
@@ -204,7 +200,7 @@ impl Prober {
         let batch = self.subject.direct_work(batch, Light::Session, planes);
         let (drawn, direct_s) = self.median_s(|engine, turn| engine.draw_direct(&batch, turn))?;
         let (encoded, encode_s) =
-            self.own_time(|| drawn.iter().try_for_each(|view| encode_view(view, codec).map(drop)));
+            own_time(self.engine.as_ref(), || drawn.iter().try_for_each(|view| encode_view(view, codec).map(drop)));
         encoded?;
         let views = drawn.len().max(1) as f64;
         Ok(DirectCosts { direct_view_s: direct_s / views, encode_view_s: encode_s / views })
@@ -234,7 +230,7 @@ impl Prober {
         if self.is_first(&format!("sample {} {:?} {}", work.sampling, work.planes, work.lighting)) {
             self.engine.sample(&self.fewest(work.clone())?, self.turn)?;
         }
-        let (encoded, seconds) = self.own_time(|| {
+        let (encoded, seconds) = own_time(self.engine.as_ref(), || {
             let images = self.engine.sample(work, self.turn)?;
             let encoded = images.iter().map(encode_sample_image);
             Ok::<_, ProbeError>(encoded.collect::<Result<Vec<_>, _>>()?)
@@ -301,36 +297,12 @@ impl Prober {
         if self.subject.lighting == self.subject.screening_lighting { Light::Session } else { light }
     }
 
-    /// The result of measurements, and the seconds that they took, without those for which they waited for other work.
-    pub(crate) fn busy<T>(&mut self, measure: impl FnOnce(&mut Self) -> T) -> (T, f64) {
-        self.engine.take_waited_s();
-        self.waited_s.set(0.0);
-        let start = Instant::now();
-        let measured = measure(self);
-        self.note_waits();
-        (measured, (start.elapsed().as_secs_f64() - self.waited_s.get()).max(0.0))
-    }
-
-    /// As [`node::own_time`], whose waits count for [`Prober::busy`].
-    fn own_time<T>(&self, work: impl FnOnce() -> T) -> (T, f64) {
-        self.note_waits();
-        let start = Instant::now();
-        let (done, own_s) = own_time(self.engine.as_ref(), work);
-        self.waited_s.set(self.waited_s.get() + start.elapsed().as_secs_f64() - own_s);
-        (done, own_s)
-    }
-
-    /// Adds the waits of this thread since they were last noted.
-    fn note_waits(&self) {
-        self.waited_s.set(self.waited_s.get() + self.engine.take_waited_s());
-    }
-
     fn is_first(&mut self, operation: &str) -> bool {
         self.warm.insert(operation.to_owned())
     }
 
     fn timed<T>(&self, run: impl FnOnce(&dyn Engine, Turn) -> Result<T, EngineError>) -> Result<(T, f64), ProbeError> {
-        let (done, seconds) = self.own_time(|| run(self.engine.as_ref(), self.turn));
+        let (done, seconds) = own_time(self.engine.as_ref(), || run(self.engine.as_ref(), self.turn));
         Ok((done?, seconds))
     }
 }

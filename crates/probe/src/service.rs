@@ -48,7 +48,7 @@ impl ViewProbes for Probers {
         // Work that arrives meanwhile goes between slices of a measurement that nobody waits for.
         let _cut = self.engine.live_stream();
         let mut prober = self.taken(&mut probers, subject_of(request, budget));
-        let (measured, busy_s) = prober.busy(|prober| measured(prober, request, budget));
+        let (measured, busy_s) = own_time(self.engine.as_ref(), || measured(&mut prober, request, budget));
         push_latest(&mut probers, prober, MAX_SUBJECTS);
         let (views, costs) = measured?;
         Ok(Measured { costs, views: views.into_iter().map(probed).collect(), busy_s, ..Measured::default() })
