@@ -22,7 +22,6 @@ use wire::rpc::Messages;
 use crate::batch::{Loaded, Place, Waiting};
 use crate::course::Course;
 use crate::outbox::Reply;
-use crate::queue::Viewer;
 use crate::quota::{Credit, closed};
 use crate::sets::RECENTLY;
 use crate::shared::ClientStream;
@@ -96,7 +95,8 @@ pub(crate) struct LiveStream<'a> {
     course: Course,
     /// The last set that was fetched without being waited for.
     aside: Option<SetContent>,
-    _viewer: Viewer,
+    /// Counts it as open.
+    _viewer: Arc<()>,
     /// The device cuts long work into slices meanwhile.
     _on_device: Box<dyn std::any::Any + Send + Sync>,
 }
@@ -118,7 +118,7 @@ impl<'a> LiveStream<'a> {
             previewed: None,
             course: Course::default(),
             aside: None,
-            _viewer: client.shared.arrivals.viewer(),
+            _viewer: client.shared.arrivals.viewers.clone(),
             _on_device: client.shared.sets.scenes.engine().live_stream(),
         }
     }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use parking_lot::Mutex;
 use tokio::sync::Notify;
@@ -46,8 +46,9 @@ impl Lane {
 #[derive(Default)]
 pub(crate) struct Arrivals {
     lanes: [WaitingLane; Lane::ALL.len()],
-    /// Live streams that are open, whether they wait or not: the next pose may come at any time.
-    viewers: AtomicUsize,
+    /// Each open live stream holds a clone, whether it waits or not: the next pose may come at any time. Batches are small
+    /// meanwhile.
+    pub(crate) viewers: Arc<()>,
     /// Batches of the lanes that follow the plan.
     served: AtomicU64,
 }
@@ -65,12 +66,6 @@ impl Arrivals {
         lane.added.notify_one();
     }
 
-    /// Counts a live stream as open: batches are small until the guard is dropped.
-    pub(crate) fn viewer(self: &Arc<Self>) -> Viewer {
-        self.viewers.fetch_add(1, Ordering::Relaxed);
-        Viewer(self.clone())
-    }
-
     /// Takes back a stream's views, oldest first.
     pub(crate) fn withdraw(&self, stream: u64) -> VecDeque<Waiting> {
         self.lanes.iter().flat_map(|lane| lane.queue.lock().withdraw(stream)).collect()
@@ -85,7 +80,7 @@ impl Arrivals {
     pub(crate) async fn next_batch(&self, number: Lane) -> Vec<Waiting> {
         let waiting = &self.lanes[number as usize];
         loop {
-            let has_viewers = self.viewers.load(Ordering::Relaxed) > 0;
+            let has_viewers = Arc::strong_count(&self.viewers) > 1;
             let most = if number == Lane::Direct { 1 } else { MAX_BATCH };
             let batch = waiting.queue.lock().take_batch(has_viewers, most);
             if !batch.is_empty() {
@@ -96,15 +91,6 @@ impl Arrivals {
             }
             waiting.added.notified().await;
         }
-    }
-}
-
-/// A live stream that is open.
-pub(crate) struct Viewer(Arc<Arrivals>);
-
-impl Drop for Viewer {
-    fn drop(&mut self) {
-        self.0.viewers.fetch_sub(1, Ordering::Relaxed);
     }
 }
 

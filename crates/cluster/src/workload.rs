@@ -325,43 +325,27 @@ impl Workload {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SetContent([u8; 32]);
 
-/// Everything that the content of a set depends on.
-#[derive(Serialize)]
-struct Shown<'a> {
-    scene: &'a str,
-    time_s: f32,
-    temporal_reference_s: f32,
-    sampling: &'a str,
-    lighting: &'a str,
-    planes: SamplePlanes,
-    volume: Aabb,
-    background: Environment,
-    refinement: [u32; 2],
-    traced_pixel_count: Option<u32>,
-    illumination: &'a Illumination,
-    sample_cameras: &'a [SampleCamera],
-}
-
 impl SetContent {
     /// The content of a set; `None` beyond the timeline.
     #[must_use]
     pub fn of(workload: &Workload, set_index: u32) -> Option<Self> {
         let time_s = workload.timeline.time_s(set_index)?;
         let refinement = workload.refinement(set_index);
-        let shown = Shown {
-            scene: workload.scene.hash.as_str(),
+        // Everything that the content of a set depends on.
+        let shown = (
+            workload.scene.hash.as_str(),
             time_s,
-            temporal_reference_s: workload.timeline.temporal_reference_s(set_index).unwrap_or(time_s),
-            sampling: &workload.sampling,
-            lighting: &workload.lighting,
-            planes: workload.planes,
-            volume: workload.volume,
-            background: workload.background,
-            refinement: [refinement.step, refinement.steps],
-            traced_pixel_count: workload.traced_pixel_count,
-            illumination: &workload.illumination,
-            sample_cameras: &workload.sample_cameras,
-        };
+            workload.timeline.temporal_reference_s(set_index).unwrap_or(time_s),
+            &workload.sampling,
+            &workload.lighting,
+            workload.planes,
+            workload.volume,
+            workload.background,
+            [refinement.step, refinement.steps],
+            workload.traced_pixel_count,
+            &workload.illumination,
+            &workload.sample_cameras,
+        );
         // Postcard prefixes lengths, so that no two sets have the same bytes. Writing to a hasher does not fail.
         let hash = postcard::to_io(&shown, blake3::Hasher::new()).ok()?;
         Some(Self(hash.finalize().into()))
