@@ -7,15 +7,14 @@ use cluster::{Assignment, CommonCell, DIRECT, Policy, SceneRef, SetContent, Time
 use codec::EncodedImage;
 use depth_image::{DepthImage, PinholeCamera, SampleCamera, nearest_set};
 use node::{
-    ByteCache, CellPlan, CommonSet, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet, Scenes,
-    SharedSet, Turn,
+    ByteCache, CellPlan, CommonSet, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Scenes, SharedSet, Turn,
 };
 use node::{WorkClass, beyond_timeline, depth_images_bytes, most_image_bytes, most_set_bytes, own_time, set_bytes};
 use tonic::{Code, Status};
 use wire::rpc::Messages;
 
 use crate::fetch::Fetcher;
-use crate::fetch_share::{FetchTimes, SetRequest};
+use crate::fetch_share::SetRequest;
 use crate::relay_buffer::{RelayBuffer, RelayBuffers};
 use crate::reports::Reports;
 
@@ -333,7 +332,10 @@ impl Sets {
         let relay = plan.relays(&self.plans.node_name).then(|| self.relays.of(content));
         let relay = relay.filter(|relay| !relay.has_failed());
         let request = SetRequest { plan: plan.clone(), set_index, relay: relay.clone() };
-        let (set, times) = self.fetch(&request).await?;
+        let (set, times) = self.fetcher.fetch(&request).await.map_err(|failed| {
+            self.reports.report(plan.plan_epoch, &failed);
+            failed.status
+        })?;
         let subject = subject(plan).ok_or_else(|| beyond_timeline(set_index))?;
         let latest = SETS_IN_USE + sets_ahead(plan) as usize + EARLIER_SETS;
         self.cached.keep_latest(latest - 1, |set| set.subject == subject);
@@ -359,13 +361,6 @@ impl Sets {
         let cell = plan.cell;
         let scene = plan.workload.scene.clone();
         Ok((ReadySet { set, scene, since, content, cell, moment, subject, cameras, sample_images, relay }, bytes))
-    }
-
-    async fn fetch(&self, request: &SetRequest) -> Result<(SampleSet, FetchTimes), Status> {
-        self.fetcher.fetch(request).await.map_err(|failed| {
-            self.reports.report(request.plan.plan_epoch, &failed);
-            failed.status
-        })
     }
 }
 

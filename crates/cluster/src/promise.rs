@@ -66,15 +66,12 @@ impl std::fmt::Display for Promise {
     /// One line: the budget, the state and the reason; while representations are measured, also the one in force.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { budget, state, representation, reason, .. } = self;
-        match state {
-            PromiseState::Measuring => write!(f, "promise {budget}: {state}, now {representation}: {reason}"),
-            PromiseState::Kept if self.is_barely_watched() => {
-                write!(f, "promise {budget}: {state} (barely watched): {reason}")
-            }
-            PromiseState::Kept | PromiseState::Broken | PromiseState::Unreachable => {
-                write!(f, "promise {budget}: {state}: {reason}")
-            }
-        }
+        let remark = match state {
+            PromiseState::Measuring => format!(", now {representation}"),
+            PromiseState::Kept if self.is_barely_watched() => " (barely watched)".to_owned(),
+            PromiseState::Kept | PromiseState::Broken | PromiseState::Unreachable => String::new(),
+        };
+        write!(f, "promise {budget}: {state}{remark}: {reason}")
     }
 }
 

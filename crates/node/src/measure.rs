@@ -22,8 +22,9 @@ const RUNS: usize = 3;
 const LONG_RUN_S: f64 = 0.5;
 /// Larger views are measured in this size: their time is in proportion to their pixels.
 const MOST_PIXELS: usize = 1 << 20;
-/// Images of light and views are measured with these parts of their sides, one after the other, before they are in full size.
-const QUICK_SIDE_RATIOS: [f32; 2] = [0.125, 0.25];
+/// Images of light and views are measured with these parts of their sides, one after the other, before they are in full size;
+/// each with the part that follows.
+const QUICK_SIDE_RATIOS: [(f32, f32); 2] = [(0.125, 0.25), (0.25, 1.0)];
 /// No image and no view is measured with fewer pixels: what each takes, however small, would count for all pixels.
 const LEAST_QUICK_PIXELS: f64 = 3_000.0;
 /// A measurement of light that would take longer is not repeated with larger sides: a client may wait for it.
@@ -152,8 +153,7 @@ impl Measurement<'_> {
     /// Costs in full size, or, of light that takes long, from smaller images and views.
     fn costs_in_steps(&self, request: &MeasureCosts, full: &Resized) -> Result<Measured, Status> {
         if self.engine.sample_planes(&request.method)?.light {
-            let next_ratios = QUICK_SIDE_RATIOS.into_iter().skip(1).chain([1.0]);
-            for (ratio, next_ratio) in QUICK_SIDE_RATIOS.into_iter().zip(next_ratios) {
+            for (ratio, next_ratio) in QUICK_SIDE_RATIOS {
                 let ratio = ratio.max(least_quick_ratio(request));
                 if ratio >= next_ratio {
                     continue;
