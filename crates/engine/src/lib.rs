@@ -176,11 +176,8 @@ impl GpuEngine {
     }
 
     /// Does work on the device on this thread, and turns faults of the device into errors.
-    fn catching<T, E>(&self, work: impl FnOnce() -> Result<T, E>) -> Result<T, EngineError>
-    where
-        Caught: From<E>,
-    {
-        self.gpu.catching(|| work().map_err(Caught::from)).map_err(|Caught(error)| error)
+    fn catching<T, E: Into<Caught>>(&self, work: impl FnOnce() -> Result<T, E>) -> Result<T, EngineError> {
+        self.gpu.catching(|| work().map_err(Into::into)).map_err(|Caught(error)| error)
     }
 
     /// A scene on the device.

@@ -98,11 +98,7 @@ impl<K, V> Clone for ByteCache<K, V> {
     }
 }
 
-impl<K, V> ByteCache<K, V>
-where
-    K: Clone + Eq + Hash + Send + Sync + 'static,
-    V: Send + Sync + 'static,
-{
+impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> ByteCache<K, V> {
     /// An empty cache of `max_bytes`; refusals name its values by `what`.
     #[must_use]
     pub fn new(what: &'static str, max_bytes: usize) -> Self {
@@ -311,11 +307,7 @@ where
     }
 }
 
-impl<K, V> SetMemory for ByteCache<K, V>
-where
-    K: Clone + Eq + Hash + Send + Sync + 'static,
-    V: Send + Sync + 'static,
-{
+impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> SetMemory for ByteCache<K, V> {
     fn free(&self) -> usize {
         let mut state = self.0.state.lock();
         let before = state.used_bytes;

@@ -14,7 +14,7 @@ mod service;
 mod sets;
 mod subject;
 
-pub use errors_of_views::{errors_of_part, view_errors};
+pub use errors_of_views::view_errors;
 pub use plan::{answer, plan};
 pub use prober::{DirectCosts, Measured, ProbeError, Prober};
 pub use service::Probers;

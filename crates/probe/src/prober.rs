@@ -115,7 +115,7 @@ impl Prober {
         let pairs: Vec<_> = cameras.iter().zip(&truths).zip(&measured.views).collect();
         let errors = pairs
             .into_par_iter()
-            .map(|((camera, truth), made)| view_errors(camera, truth, made, &measured.sample_images));
+            .map(|((camera, truth), made)| view_errors(camera, truth, made, &measured.sample_images, None));
         let errors = errors.collect::<Result<_, _>>()?;
         let sample_image_s = self.sample_image_s(of, light, measured.costs.sample_image_s)?;
         Ok((errors, RowCosts { sample_image_s, ..measured.costs }))

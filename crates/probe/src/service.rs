@@ -11,7 +11,7 @@ use parking_lot::Mutex;
 use planner::{RowCosts, ViewErrors};
 use tonic::Status;
 
-use crate::errors_of_views::errors_of_part;
+use crate::errors_of_views::view_errors;
 use crate::prober::{ProbeError, Prober};
 use crate::subject::{Light, Representation, Subject};
 
@@ -74,7 +74,7 @@ fn audited(engine: &dyn Engine, turn: Turn, audit: ViewAudit) -> Result<ViewErro
     let truths = engine.draw_direct(&direct, turn)?;
     let ([made], [truth]) = (&made[..], &truths[..]) else { return Err(not_one_view()) };
     let part: Vec<bool> = part.mask_within(&outer).collect();
-    Ok(errors_of_part(&camera, truth, made, &sample_images, &part)?)
+    Ok(view_errors(&camera, truth, made, &sample_images, Some(&part))?)
 }
 
 fn not_one_view() -> ProbeError {

@@ -56,7 +56,7 @@ impl MeasuredRow {
         let measured = prober.measure(representation, Light::Session, cameras, with_depth)?;
         let pairs: Vec<_> = cameras.iter().zip(&truths).zip(&measured.views).collect();
         let of_view = |((camera, truth), made): ((&PinholeCamera, &Arc<View>), &View)| {
-            let errors = view_errors(camera, truth, made, &measured.sample_images)?;
+            let errors = view_errors(camera, truth, made, &measured.sample_images, None)?;
             let depth = depth_errors(&known_depth(truth)?, &known_depth(made)?, None)?;
             anyhow::Ok((errors, depth))
         };
