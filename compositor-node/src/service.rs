@@ -94,7 +94,8 @@ impl Compositor for CompositorService {
         let place = self.shared.quota.stream()?;
         let stream = self.shared.stream_count.fetch_add(1, Ordering::Relaxed);
         let outbox = Outbox::new(stream, self.shared.metrics.clone());
-        let client = ClientStream::open(self.shared.clone(), stream, outbox.clone());
+        self.shared.metrics.streams.inc();
+        let client = ClientStream { shared: self.shared.clone(), stream, outbox: outbox.clone() };
         let requests = until_drained(requests, self.shutdown.clone());
         tokio::spawn(async move {
             client.run(requests).await;

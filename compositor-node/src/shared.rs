@@ -45,11 +45,6 @@ pub(crate) struct ClientStream {
 }
 
 impl ClientStream {
-    pub(crate) fn open(shared: Arc<Shared>, stream: u64, outbox: Arc<Outbox>) -> Self {
-        shared.metrics.streams.inc();
-        Self { shared, stream, outbox }
-    }
-
     /// Hands views over to the lanes of the device.
     pub(crate) fn queue(&self, is_live: bool, views: Vec<Waiting>) {
         let mut by_lane = BTreeMap::<Lane, Vec<Waiting>>::new();

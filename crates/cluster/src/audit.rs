@@ -122,15 +122,11 @@ impl AuditOrder {
 
 impl ProbedView {
     pub(crate) fn validate(&self) -> Result<(), InvalidField> {
-        let Self { foreground_ratio, flip, flip_whole, mean_square, disoccluded_ratio } = *self;
-        let fields = [
-            (foreground_ratio, "foreground_ratio"),
-            (flip, "flip_ratio"),
-            (flip_whole, "flip_whole_ratio"),
-            (mean_square, "mean_square_ratio"),
-            (disoccluded_ratio, "disoccluded_ratio"),
-        ];
-        fields.into_iter().try_for_each(|(value, field)| within(value, 0.0..=1.0, field, "from 0 to 1"))
+        within(self.foreground_ratio, 0.0..=1.0, "foreground_ratio", "from 0 to 1")?;
+        within(self.flip, 0.0..=1.0, "flip_ratio", "from 0 to 1")?;
+        within(self.flip_whole, 0.0..=1.0, "flip_whole_ratio", "from 0 to 1")?;
+        within(self.mean_square, 0.0..=1.0, "mean_square_ratio", "from 0 to 1")?;
+        within(self.disoccluded_ratio, 0.0..=1.0, "disoccluded_ratio", "from 0 to 1")
     }
 }
 
@@ -165,8 +161,7 @@ impl AuditSummary {
     pub fn validate(&self) -> Result<(), InvalidField> {
         finite_seconds(self.audits_per_s, "audit.audits_per_s")?;
         finite_seconds(self.busy_s, "audit.busy_s")?;
-        let ratios = self.error.map(|ErrorInterval { least, mean, greatest }| [least, mean, greatest]);
-        let mut ratios = ratios.into_iter().flatten();
-        ratios.try_for_each(|ratio| within(ratio, 0.0..=1.0, "audit.error", "from 0 to 1"))
+        let Some(ErrorInterval { least, mean, greatest }) = self.error else { return Ok(()) };
+        [least, mean, greatest].into_iter().try_for_each(|ratio| within(ratio, 0.0..=1.0, "audit.error", "from 0 to 1"))
     }
 }

@@ -285,21 +285,19 @@ impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> Byt
         let mut state = self.0.state.lock();
         state.used_bytes -= reserved_bytes;
         state.entries.remove(key);
-        let (outcome, evicted) = match loaded {
-            Ok((value, bytes)) => {
-                let evicted = state.make_room(bytes, self.0.max_bytes, Duration::ZERO).unwrap_or_else(|| {
-                    // It exists, larger than it was said to be: it counts, and others wait for it.
-                    state.used_bytes += bytes;
-                    Vec::new()
-                });
-                let held = Arc::new(Held { value, bytes, pins: AtomicUsize::new(0), freed: self.0.freed.clone() });
-                let pinned = Pinned::new(&held);
-                let last_use = state.next_use();
-                state.entries.insert(key.clone(), Entry::Loaded { held, last_use, used_at: Instant::now() });
-                (Ok(pinned), evicted)
+        let mut evicted = Vec::new();
+        let outcome = loaded.map(|(value, bytes)| {
+            match state.make_room(bytes, self.0.max_bytes, Duration::ZERO) {
+                Some(others) => evicted = others,
+                // It exists, larger than it was said to be: it counts, and others wait for it.
+                None => state.used_bytes += bytes,
             }
-            Err(status) => (Err(status), Vec::new()),
-        };
+            let held = Arc::new(Held { value, bytes, pins: AtomicUsize::new(0), freed: self.0.freed.clone() });
+            let pinned = Pinned::new(&held);
+            let last_use = state.next_use();
+            state.entries.insert(key.clone(), Entry::Loaded { held, last_use, used_at: Instant::now() });
+            pinned
+        });
         drop(state);
         drop(evicted);
         send.send_replace(Some(outcome));
