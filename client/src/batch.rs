@@ -77,7 +77,13 @@ impl Batch {
     /// Sends the next message, if there is room for one; ends the stream where none will follow.
     fn send_next(&mut self, compositor: usize) -> bool {
         let Some(messages) = self.messages[compositor].clone() else { return false };
-        self.refill();
+        while self.queue.waiting() < LEAST_AHEAD_VIEWS {
+            let run = self.window.lock().draw();
+            if run.is_empty() {
+                break;
+            }
+            self.push(&run);
+        }
         let next = self.queue.next_message(compositor);
         if let Some(message) = &next {
             let views =
@@ -89,16 +95,6 @@ impl Batch {
             self.messages[compositor] = None;
         }
         next.is_some()
-    }
-
-    fn refill(&mut self) {
-        while self.queue.waiting() < LEAST_AHEAD_VIEWS {
-            let run = self.window.lock().draw();
-            if run.is_empty() {
-                return;
-            }
-            self.push(&run);
-        }
     }
 
     fn push(&mut self, run: &[ViewRequest]) {

@@ -6,7 +6,7 @@ use cluster::{
     BudgetRequest, InvalidField, MeasuredCosts, NodeStatus, OfferSettings, SamplePlanes, SceneHash, at_most,
 };
 use codec::{InverseDepthRange, SampleSetId};
-use depth_image::{Antialias, ExposureEv, PinholeCamera, ToneCurve, ToneMapping, ViewPlanes};
+use depth_image::{Antialias, ExposureEv, PinholeCamera, ToneMapping, ViewPlanes};
 use glam::UVec2;
 use prost::bytes::Bytes;
 
@@ -94,13 +94,14 @@ macro_rules! nested {
     )+};
 }
 
-/// Enums whose variants are those of the message's enum of that name, without its zero.
+/// Enums whose variants are those of the message's enum of that name, without its zero, which may stand for one of them.
 macro_rules! enums {
-    ($($type:ident { $($variant:ident),+ })+) => {$(
+    ($($type:ident $(or $unspecified:ident)? { $($variant:ident),+ })+) => {$(
         impl super::Convert<i32> for $type {
             fn read(value: i32, field: &'static str) -> Result<Self, crate::error::WireError> {
                 match crate::proto::$type::try_from(value) {
                     $(Ok(crate::proto::$type::$variant) => Ok(Self::$variant),)+
+                    $(Ok(crate::proto::$type::Unspecified) => Ok(Self::$unspecified),)?
                     _ => Err(crate::error::WireError::UnknownEnum { field, value }),
                 }
             }
@@ -248,24 +249,6 @@ impl Convert<f32> for ExposureEv {
 
     fn write(self) -> f32 {
         self.ev()
-    }
-}
-
-/// A curve; none said is none.
-impl Convert<i32> for ToneCurve {
-    fn read(value: i32, field: &'static str) -> Result<Self, WireError> {
-        match proto::ToneCurve::try_from(value) {
-            Ok(proto::ToneCurve::Unspecified | proto::ToneCurve::None) => Ok(Self::None),
-            Ok(proto::ToneCurve::KhronosNeutral) => Ok(Self::KhronosNeutral),
-            Err(_) => Err(WireError::UnknownEnum { field, value }),
-        }
-    }
-
-    fn write(self) -> i32 {
-        match self {
-            Self::None => proto::ToneCurve::None.into(),
-            Self::KhronosNeutral => proto::ToneCurve::KhronosNeutral.into(),
-        }
     }
 }
 
