@@ -4,7 +4,7 @@
 use std::cmp::Reverse;
 use std::sync::Arc;
 
-use cluster::{Assignment, CompositorShare, Promise, RenderViews, SessionEvent, SessionPlan, SessionRequest};
+use cluster::{Assignment, Promise, RenderViews, SessionEvent, SessionPlan, SessionRequest};
 use parking_lot::Mutex;
 use tokio::sync::{mpsc, watch};
 use tokio_stream::StreamExt as _;
@@ -51,24 +51,23 @@ impl ActivePlan {
     /// The plan after this one. Connects to compositors when they are first asked: some that cannot be reached now may be
     /// back by then.
     pub(crate) fn replaced_by(&self, plan: SessionPlan) -> Self {
-        let peer = |share: &CompositorShare| {
-            connect_later(&share.address).map(|channel| Peer::new(share, channel, self.named_plans.clone()))
-        };
-        let peers = plan.assignment.compositors.iter().filter_map(|share| peer(share).ok()).collect();
+        let peers = plan.assignment.compositors.iter().filter_map(|share| {
+            let channel = connect_later(&share.address).ok()?;
+            Some(Peer::new(share, channel, self.named_plans.clone()))
+        });
+        let peers = peers.collect();
         Self { plan, peers, settings: self.settings.clone(), named_plans: self.named_plans.clone() }
     }
 
     /// The plan that a compositor names as the one in force, if it can be this session's.
-    pub(crate) fn succeeded_by(&self, assignment: &Assignment) -> Option<Self> {
+    pub(crate) fn succeeded_by(&self, new: &Assignment) -> Option<Self> {
         let old = &self.plan.assignment;
-        let new = assignment;
-        let is_later = new.plan_epoch > old.plan_epoch;
-        let shows_the_same = new.workload_number == old.workload_number
+        let can_follow = new.plan_epoch > old.plan_epoch
+            && new.workload_number == old.workload_number
             && new.workload.scene == old.workload.scene
             && new.workload.timeline == old.workload.timeline;
-        let plan =
-            || SessionPlan { assignment: new.clone(), reason: "as a compositor says".to_owned(), ..self.plan.clone() };
-        (is_later && shows_the_same).then(|| self.replaced_by(plan()))
+        let reason = "as a compositor says".to_owned();
+        can_follow.then(|| self.replaced_by(SessionPlan { assignment: new.clone(), reason, ..self.plan.clone() }))
     }
 
     /// All peers but those that failed lately; where that leaves none, all. Those of the greatest weight come first.
@@ -109,6 +108,19 @@ pub(crate) struct SessionState {
     /// The promise to it.
     pub(crate) promise: Option<Promise>,
     pub(crate) active: Arc<ActivePlan>,
+}
+
+/// The first thing that is found in a session's state as it changes. Nothing follows once the session has ended, which is
+/// waited for for ever.
+pub(crate) async fn first_in<T>(
+    mut state: watch::Receiver<SessionState>,
+    find: impl Fn(&SessionState) -> Option<T>,
+) -> T {
+    let found = state.wait_for(|state| find(state).is_some()).await.ok().and_then(|state| find(&state));
+    match found {
+        Some(found) => found,
+        None => std::future::pending().await,
+    }
 }
 
 /// Takes over plans that compositors name, until it is aborted.
@@ -168,19 +180,15 @@ fn take_over(event: SessionEvent, state: &watch::Sender<SessionState>, is_new_se
             state.send_modify(|state| (state.session, state.promise) = (session, None));
         }
         SessionEvent::Progress { .. } => (),
-        SessionEvent::Plan(plan) => put_in_force(*plan, state, std::mem::take(is_new_session)),
+        // The coordinator sends a plan when its nodes have taken it: one that was replaced meanwhile may arrive last.
+        SessionEvent::Plan(plan) => drop(state.send_if_modified(|state| {
+            let is_new_session = std::mem::take(is_new_session);
+            let is_current = is_new_session || plan.assignment.plan_epoch >= state.active.plan_epoch();
+            if is_current {
+                state.active = Arc::new(state.active.replaced_by(*plan));
+            }
+            is_current
+        })),
         SessionEvent::Promise(promise) => state.send_modify(|state| state.promise = Some(promise)),
     }
-}
-
-/// Puts a plan in force, unless it is older than the one in force. The coordinator sends a plan when its nodes have taken
-/// it, so that one that was replaced meanwhile may arrive last.
-fn put_in_force(plan: SessionPlan, state: &watch::Sender<SessionState>, is_new_session: bool) {
-    state.send_if_modified(|state| {
-        let is_current = is_new_session || plan.assignment.plan_epoch >= state.active.plan_epoch();
-        if is_current {
-            state.active = Arc::new(state.active.replaced_by(plan));
-        }
-        is_current
-    });
 }

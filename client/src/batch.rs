@@ -60,9 +60,10 @@ impl Batch {
         due.chunk_by(|a, b| a.set_index == b.set_index).for_each(|run| batch.push(run));
         // In turns, a message each: no compositor takes the views of another that is about to begin.
         while (0..weights.len()).filter(|&compositor| batch.send_next(compositor)).count() > 0 {}
-        let is_asked = |compositor: usize| batch.queue.in_flight(compositor) > 0;
-        let messages =
-            receivers.into_iter().enumerate().map(|(at, sent)| is_asked(at).then(|| ReceiverStream::new(sent)));
+        let messages = receivers
+            .into_iter()
+            .enumerate()
+            .map(|(compositor, sent)| (batch.queue.in_flight(compositor) > 0).then(|| ReceiverStream::new(sent)));
         let messages = messages.collect();
         StartedBatch { batch: Arc::new(Mutex::new(batch)), messages }
     }
@@ -76,7 +77,13 @@ impl Batch {
     /// Sends the next message, if there is room for one; ends the stream where none will follow.
     fn send_next(&mut self, compositor: usize) -> bool {
         let Some(messages) = self.messages[compositor].clone() else { return false };
-        self.refill();
+        while self.queue.waiting() < LEAST_AHEAD_VIEWS {
+            let run = self.window.lock().draw();
+            if run.is_empty() {
+                break;
+            }
+            self.push(&run);
+        }
         let next = self.queue.next_message(compositor);
         if let Some(message) = &next {
             let views =
@@ -88,16 +95,6 @@ impl Batch {
             self.messages[compositor] = None;
         }
         next.is_some()
-    }
-
-    fn refill(&mut self) {
-        while self.queue.waiting() < LEAST_AHEAD_VIEWS {
-            let run = self.window.lock().draw();
-            if run.is_empty() {
-                return;
-            }
-            self.push(&run);
-        }
     }
 
     fn push(&mut self, run: &[ViewRequest]) {

@@ -4,13 +4,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use cluster::RenderViews;
-use depth_image::PinholeCamera;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 use tokio_stream::wrappers::ReceiverStream;
 use wire::rpc::Backoff;
 
-use crate::active_plan::{ActivePlan, SessionState};
+use crate::active_plan::{ActivePlan, SessionState, first_in};
 use crate::batch::Batch;
 use crate::error::ClientError;
 use crate::frames::FrameSink;
@@ -31,7 +30,7 @@ pub(crate) async fn deliver(mut state: watch::Receiver<SessionState>, sink: Fram
     let mut retries = Retries::new(0);
     loop {
         let active = state.borrow_and_update().active.clone();
-        if sink.window().lock().is_complete() {
+        if sink.window.lock().is_complete() {
             return;
         }
         let failed = match call_all(&state, &active, &sink).await {
@@ -50,13 +49,17 @@ pub(crate) async fn deliver(mut state: watch::Receiver<SessionState>, sink: Fram
                 false => return,
             },
             Failure::OfPlan(error) => {
-                let received = sink.window().lock().received();
+                let received = sink.window.lock().received;
                 match retries.next_delay(Instant::now(), received) {
                     None => error,
-                    Some(delay) => match wait_for_successor(&mut state, active.plan_epoch(), delay, error).await {
-                        Ok(()) => continue,
-                        Err(error) => error,
-                    },
+                    Some(delay) => {
+                        let later = state.wait_for(|state| state.active.plan_epoch() > active.plan_epoch());
+                        match tokio::time::timeout(delay, later).await {
+                            // The session was dropped.
+                            Ok(Err(_)) => error,
+                            Ok(Ok(_)) | Err(_) => continue,
+                        }
+                    }
                 }
             }
         };
@@ -73,18 +76,19 @@ async fn call_all(
     let mut peers = active.trusted();
     let mut request = active.request();
     {
-        let mut window = sink.window().lock();
+        let mut window = sink.window.lock();
         // To make one view of a set, a compositor loads all of it.
         peers.truncate(window.most_views_of_a_set());
-        request.planes = window.planes();
+        request.planes = window.planes;
         if let Some(method) = &window.method {
             request.method.clone_from(method);
         }
     }
     let weights: Vec<u32> = peers.iter().map(|peer| peer.share.view_weight).collect();
     let plan = active.clone();
-    let cell_of = move |camera: &PinholeCamera| plan.plan.assignment.cell_of(camera);
-    let started = Batch::start(request, sink.window().clone(), &weights, active.plan.view_s(), cell_of);
+    let started = Batch::start(request, sink.window.clone(), &weights, active.plan.view_s(), move |camera| {
+        plan.plan.assignment.cell_of(camera)
+    });
     let mut calls = JoinSet::new();
     for (compositor, messages) in started.messages.into_iter().enumerate() {
         if let Some(messages) = messages {
@@ -122,7 +126,7 @@ async fn receive_all(
     let mut decoding = JoinSet::new();
     while let Some((frame, room)) = frames.next_admitted(&peer, &sink, plan_epoch).await? {
         received(frame.header.stage_times.set_wait_s > SET_WAIT_S);
-        let Some(decoder) = sink.decoder().await else { break };
+        let Ok(decoder) = sink.decoders.clone().acquire_owned().await else { break };
         let peer = peer.clone();
         let sink = sink.clone();
         decoding.spawn(async move {
@@ -139,36 +143,20 @@ async fn receive_all(
     all(&mut decoding).await
 }
 
-/// Waits for a later plan for `delay`; gives an error where no plan is to be tried any more.
-pub(crate) async fn wait_for_successor(
-    state: &mut watch::Receiver<SessionState>,
-    plan_epoch: u64,
-    delay: Duration,
-    error: ClientError,
-) -> Result<(), ClientError> {
-    let is_later = |state: &SessionState| state.active.plan_epoch() > plan_epoch;
-    match tokio::time::timeout(delay, state.wait_for(is_later)).await {
-        // The session was dropped.
-        Ok(Err(_)) => Err(error),
-        Ok(Ok(_)) | Err(_) => Ok(()),
-    }
-}
-
 /// Resolves when a later plan has no place for one of `peers`: it may be lost without a word.
 pub(crate) async fn wait_for_lost_peer(
-    mut state: watch::Receiver<SessionState>,
+    state: watch::Receiver<SessionState>,
     plan_epoch: u64,
     peers: &[Peer],
 ) -> ClientError {
-    let lost = |state: &SessionState| {
+    let lost = first_in(state, |state| {
         let plan = &state.active.plan.assignment;
         let lost = peers.iter().find(|peer| !plan.composites(&peer.share.node_name));
-        lost.filter(|_| plan.plan_epoch > plan_epoch).cloned()
-    };
-    let found = state.wait_for(|state| lost(state).is_some()).await.ok().and_then(|state| lost(&state));
-    let Some(peer) = found else { return std::future::pending().await };
+        lost.filter(|_| plan.plan_epoch > plan_epoch)
+    });
+    let lost = lost.await;
     tokio::time::sleep(LAST_WORK).await;
-    peer.error("is not of the plan any more")
+    lost.error("is not of the plan any more")
 }
 
 /// The retries of one request for frames.

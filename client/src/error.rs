@@ -42,6 +42,10 @@ impl ClientError {
         }
     }
 
+    pub(crate) fn ended(reason: &str) -> Self {
+        Self::Ended { reason: reason.to_owned() }
+    }
+
     pub(crate) fn compositor(share: &CompositorShare, reason: impl ToString) -> Self {
         let CompositorShare { node_name, address, .. } = share.clone();
         Self::Compositor { node_name, address, reason: reason.to_string() }

@@ -95,19 +95,16 @@ type Received = Result<(Frame, FrameRoom), ClientError>;
 #[derive(Clone)]
 pub(crate) struct FrameSink {
     received: mpsc::Sender<Received>,
-    window: Arc<Mutex<Window>>,
-    decoders: Arc<Semaphore>,
+    /// The views that are due.
+    pub(crate) window: Arc<Mutex<Window>>,
+    /// Room for frames that are being decoded.
+    pub(crate) decoders: Arc<Semaphore>,
     room: Arc<Semaphore>,
     /// The room of the last frame.
     frame_units: Arc<AtomicU32>,
 }
 
 impl FrameSink {
-    /// The views that are due.
-    pub(crate) fn window(&self) -> &Arc<Mutex<Window>> {
-        &self.window
-    }
-
     /// Waits for room for a frame, encoded and decoded, before any of it is kept. A slow caller thereby holds up its
     /// compositors.
     ///
@@ -128,11 +125,6 @@ impl FrameSink {
         self.frame_units.store(units(bytes), Ordering::Relaxed);
         let room = self.room.clone().acquire_many_owned(units(bytes)).await;
         room.map_err(|_| "sent a frame after the last".to_owned())
-    }
-
-    /// Room for one more frame that is decoded; `None` when the request has ended.
-    pub(crate) async fn decoder(&self) -> Option<OwnedSemaphorePermit> {
-        self.decoders.clone().acquire_owned().await.ok()
     }
 
     /// Passes a frame on; a frame that was received twice counts once.

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use cluster::{LiveRequest, RenderViews, RequestedView};
+use cluster::{CompositorShare, LiveRequest, RenderViews, RequestedView};
 use codec::WholeFrame;
 use tokio::sync::{mpsc, watch};
 use tokio::time::{Interval, MissedTickBehavior, interval, timeout};
@@ -67,31 +67,31 @@ struct Call {
 
 impl LiveStream {
     /// Streams until the session ends or the viewer leaves.
-    pub(crate) fn run(
-        ClientId(client_id): ClientId,
+    pub(crate) async fn run(
+        client: ClientId,
         state: watch::Receiver<SessionState>,
         newest: watch::Receiver<Newest>,
         frames: mpsc::Sender<Result<Encoded, ClientError>>,
-    ) -> impl Future<Output = ()> {
+    ) {
+        let client_id = client.0;
         let poses = Poses::default();
         let mut stream =
             Self { state, newest, client_id, frames, poses, plan_epoch: 0, opened_at: None, failing_since: None };
-        async move {
-            if let Err(error) = stream.follow().await {
-                // A failure to send means that the viewer has left.
-                let _ = stream.frames.send(Err(error)).await;
-            }
+        if let Err(error) = stream.follow().await {
+            // A failure to send means that the viewer has left.
+            let _ = stream.frames.send(Err(error)).await;
         }
     }
 
     /// Streams from one compositor after the other, and from one plan after the other.
     async fn follow(&mut self) -> Result<(), ClientError> {
-        let mut tried = Tried::none(0);
+        let mut tried = Tried::default();
         loop {
             let active = self.state.borrow_and_update().active.clone();
             let plan_epoch = active.plan_epoch();
             if tried.plan_epoch != plan_epoch {
-                tried = Tried::none(plan_epoch);
+                tried = Tried::default();
+                tried.plan_epoch = plan_epoch;
             }
             let Some(peer) = tried.next(self.client_id, &active) else {
                 tried = self.wait_for_others(tried).await?;
@@ -117,12 +117,11 @@ impl LiveStream {
     async fn wait_for_others(&mut self, tried: Tried) -> Result<Tried, ClientError> {
         let is_over = self.failing_since.get_or_insert_with(Instant::now).elapsed() > GIVE_UP_AFTER;
         if tried.is_exhausted() || is_over {
-            let no_compositor = || ClientError::Ended { reason: "the plan has no compositor".to_owned() };
-            return Err(tried.last.unwrap_or_else(no_compositor));
+            return Err(tried.last.unwrap_or_else(|| ClientError::ended("the plan has no compositor")));
         }
         match timeout(RETRY, self.state.changed()).await {
             Ok(Err(_)) => Err(closed()),
-            _ => Ok(Tried::none(0)),
+            _ => Ok(Tried::default()),
         }
     }
 
@@ -162,9 +161,9 @@ impl LiveStream {
     /// Whether the plan in force, which may be a new one, leaves this client where it is.
     fn is_still_with(&self, peer: &Peer) -> bool {
         let state = self.state.borrow();
-        let place = |peer: &Peer| (peer.share.node_name.clone(), peer.share.address.clone());
-        let wanted = Tried::none(0).next(self.client_id, &state.active).map(place);
-        wanted == Some(place(peer))
+        let CompositorShare { node_name, address, .. } = &peer.share;
+        let wanted = Tried::default().next(self.client_id, &state.active);
+        wanted.is_some_and(|wanted| wanted.share.node_name == *node_name && wanted.share.address == *address)
     }
 
     /// A request for the newest pose, if it was not sent, which acknowledges the frames that were taken.
@@ -208,9 +207,9 @@ impl LiveStream {
         }
         (self.plan_epoch, self.failing_since) = (plan_epoch, None);
         tracing::debug!(client = self.client_id, frame = number, set = %frame.header.sample_set_id, "received");
-        let too_many = |_| Failure::OfPlan(peer.error("sends more frames than are taken"));
         let encoded = Encoded { frame, answers, received: Instant::now(), peer: peer.clone() };
-        self.frames.try_send(Ok(encoded)).map_err(too_many)
+        let passed_on = self.frames.try_send(Ok(encoded));
+        passed_on.map_err(|_| Failure::OfPlan(peer.error("sends more frames than are taken")))
     }
 }
 
@@ -218,8 +217,10 @@ impl Call {
     async fn open(peer: Peer) -> Result<Self, Failure> {
         let (requests, outgoing) = mpsc::channel(1);
         let answer = timeout(CALL_TIMEOUT, peer.client.render_views(ReceiverStream::new(outgoing))).await;
-        let late = |_| Failure::OfPlan(peer.error(format!("no answer for {} s", CALL_TIMEOUT.as_secs())));
-        let parts = answer.map_err(late)?.map_err(|status| Failure::of_status(&peer, &status))?;
+        let Ok(answer) = answer else {
+            return Err(Failure::OfPlan(peer.error(format!("no answer for {} s", CALL_TIMEOUT.as_secs()))));
+        };
+        let parts = answer.map_err(|status| Failure::of_status(&peer, &status))?;
         let mut heartbeat = interval(HEARTBEAT);
         heartbeat.set_missed_tick_behavior(MissedTickBehavior::Delay);
         Ok(Self { peer, requests, frames: FrameStream::new(parts), heartbeat, is_due: true })
@@ -227,7 +228,7 @@ impl Call {
 }
 
 fn closed() -> ClientError {
-    ClientError::Ended { reason: "the session was closed".to_owned() }
+    ClientError::ended("the session was closed")
 }
 
 /// Decodes one frame after the other, so that they keep their order.

@@ -28,10 +28,12 @@ pub struct LiveView {
 #[derive(Debug)]
 pub struct EncodedLiveView {
     posing: Posing,
-    frames: mpsc::Receiver<Result<Encoded, ClientError>>,
+    frames: EncodedFrames,
     /// Dropped with the view: its stream then ends.
     _tasks: JoinSet<()>,
 }
+
+type EncodedFrames = mpsc::Receiver<Result<Encoded, ClientError>>;
 
 /// The poses of a view.
 #[derive(Debug)]
@@ -42,10 +44,12 @@ struct Posing {
 }
 
 impl Posing {
-    fn start(state: watch::Receiver<SessionState>, stream: impl FnOnce(watch::Receiver<Newest>)) -> Self {
+    /// Starts the stream of a client's view as one of `tasks`; gives its frames, too.
+    fn start(client: ClientId, state: watch::Receiver<SessionState>, tasks: &mut JoinSet<()>) -> (Self, EncodedFrames) {
         let (newest, to_send) = watch::channel(Newest::default());
-        stream(to_send);
-        Self { newest, state, last: 0 }
+        let (encoded, frames) = mpsc::channel(CREDITS);
+        tasks.spawn(LiveStream::run(client, state.clone(), to_send, encoded));
+        (Self { newest, state, last: 0 }, frames)
     }
 
     fn set(
@@ -55,7 +59,7 @@ impl Posing {
         quality: Option<PictureQuality>,
     ) -> Result<u64, ClientError> {
         let request = ViewRequest { frame: self.last + 1, set_index, camera };
-        request.check(&self.state.borrow().active.plan.assignment)?;
+        request.check(self.state.borrow().active.plan.assignment.workload.timeline.set_count)?;
         self.last = request.frame;
         let pose = Pose { request, quality, posed: Instant::now() };
         self.newest.send_modify(|newest| newest.pose = Some(pose));
@@ -68,19 +72,17 @@ impl Posing {
     }
 }
 
-fn over() -> ClientError {
-    ClientError::Ended { reason: "the view has ended".to_owned() }
+/// The next frame of a view, or the error that ends it.
+async fn next<F>(frames: &mut mpsc::Receiver<Result<F, ClientError>>) -> Result<F, ClientError> {
+    frames.recv().await.unwrap_or_else(|| Err(ClientError::ended("the view has ended")))
 }
 
 impl LiveView {
     pub(crate) fn start(state: watch::Receiver<SessionState>) -> Self {
-        let (encoded, to_decode) = mpsc::channel(CREDITS);
-        let (decoded, frames) = mpsc::channel(CREDITS);
         let mut tasks = JoinSet::new();
-        tasks.spawn(decode_all(to_decode, decoded));
-        let posing = Posing::start(state.clone(), |newest| {
-            tasks.spawn(LiveStream::run(ClientId::new(), state, newest, encoded));
-        });
+        let (posing, encoded) = Posing::start(ClientId::new(), state, &mut tasks);
+        let (decoded, frames) = mpsc::channel(CREDITS);
+        tasks.spawn(decode_all(encoded, decoded));
         Self { posing, frames, _tasks: tasks }
     }
 
@@ -100,7 +102,7 @@ impl LiveView {
     /// For an invalid request, no room anywhere, a session that has ended, and a plan without a compositor that answers.
     /// Nothing follows an error.
     pub async fn next(&mut self) -> Result<LiveFrame, ClientError> {
-        let frame = self.frames.recv().await.ok_or_else(over)??;
+        let frame = next(&mut self.frames).await?;
         let ViewRequest { frame: number, set_index, camera } = frame.frame.request;
         self.posing.taken(number);
         // A viewer that rests would see a neighbouring cell's picture for ever.
@@ -113,11 +115,8 @@ impl LiveView {
 
 impl EncodedLiveView {
     pub(crate) fn start(client: ClientId, state: watch::Receiver<SessionState>) -> Self {
-        let (encoded, frames) = mpsc::channel(CREDITS);
         let mut tasks = JoinSet::new();
-        let posing = Posing::start(state.clone(), |newest| {
-            tasks.spawn(LiveStream::run(client, state, newest, encoded));
-        });
+        let (posing, frames) = Posing::start(client, state, &mut tasks);
         Self { posing, frames, _tasks: tasks }
     }
 
@@ -140,7 +139,7 @@ impl EncodedLiveView {
     /// # Errors
     /// As [`LiveView::next`].
     pub async fn next(&mut self) -> Result<EncodedFrame, ClientError> {
-        Ok(self.frames.recv().await.ok_or_else(over)??.into_frame())
+        Ok(next(&mut self.frames).await?.into_frame())
     }
 
     /// All frames up to this number have been shown, or are of no use. Others come only then.

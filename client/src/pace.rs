@@ -15,7 +15,8 @@ const MOST_FIRST_VIEWS: usize = 64;
 /// The pace of one compositor, by what it has delivered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pace {
-    message_views: usize,
+    /// Most views of the next message.
+    pub(crate) message_views: usize,
     /// Begin of the current period of measuring.
     period_start_s: Option<f64>,
     /// Views received in the period.
@@ -31,11 +32,6 @@ impl Pace {
         // A cast saturates: views that take no time give the largest message.
         let message_views = (views as usize).max(least_views(view_s)).min(MOST_FIRST_VIEWS);
         Self { message_views, period_start_s: None, period_views: 0, has_waited_for_set: false }
-    }
-
-    /// Most views of the next message.
-    pub(crate) fn message_views(&self) -> usize {
-        self.message_views
     }
 
     /// Counts a view as received. A view that waited for its sample set does not show the compositor's speed.
@@ -81,12 +77,12 @@ mod tests {
                 let mut batches = 0;
                 while batches < 40 || now_s < 10.0 {
                     batches += 1;
-                    let message = pace.message_views();
+                    let message = pace.message_views;
                     now_s += message as f64 * view_s;
                     // A batch of the device.
                     (0..message).for_each(|_| pace.received(now_s, false));
                 }
-                let message_views = pace.message_views();
+                let message_views = pace.message_views;
                 let is_in_time = MESSAGE_S.contains(&(message_views as f64 * view_s));
                 assert!(message_views.abs_diff(views) <= 1 || is_in_time, "{view_s} {guess_s}: {message_views}");
             }
@@ -97,8 +93,8 @@ mod tests {
     fn a_view_that_waited_for_its_set_changes_nothing() {
         let mut pace = Pace::new(0.02);
         (1..=12).for_each(|view| pace.received(0.02 * f64::from(view), false));
-        assert_eq!(pace.message_views(), 12);
+        assert_eq!(pace.message_views, 12);
         (1..=12).for_each(|view| pace.received(60.0 + 0.02 * f64::from(view), true));
-        assert_eq!(pace.message_views(), 12, "the samples were late");
+        assert_eq!(pace.message_views, 12, "the samples were late");
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use cluster::{Assignment, CompositorShare};
-use codec::{DecodeLimits, FrameAssembly, FrameAssemblyError, FrameHeader, FramePart, WholeFrame, decode_view};
+use codec::{DecodeLimits, FrameAssembly, FrameHeader, FramePart, WholeFrame, decode_view};
 use depth_image::View;
 use parking_lot::Mutex;
 use tokio::sync::mpsc;
@@ -77,6 +77,11 @@ impl Failure {
         Self::OfPlan(error)
     }
 
+    /// What the peer sent, or did not send, is at fault.
+    fn of_fault(peer: &Peer, fault: impl ToString) -> Self {
+        Self::of_peer(peer, peer.error(fault))
+    }
+
     /// The failure that a status of the peer means.
     pub(crate) fn of_status(peer: &Peer, status: &Status) -> Self {
         let error = peer.error(status.message());
@@ -111,13 +116,12 @@ impl FrameStream {
 
     /// The next whole frame of `peer`; `None` at the stream's end. Can be dropped and called again without losing a frame.
     pub(crate) async fn next(&mut self, peer: &Peer) -> Result<Option<WholeFrame>, Failure> {
-        let corrupt = |error: FrameAssemblyError| Failure::of_peer(peer, peer.error(error));
         while let Some(part) = self.next_part(peer).await? {
-            if let Some(frame) = self.assembly.push(part).map_err(corrupt)? {
+            if let Some(frame) = self.assembly.push(part).map_err(|error| Failure::of_fault(peer, error))? {
                 return Ok(Some(frame));
             }
         }
-        self.assembly.finish().map_err(corrupt)?;
+        self.assembly.finish().map_err(|error| Failure::of_fault(peer, error))?;
         Ok(None)
     }
 
@@ -128,41 +132,35 @@ impl FrameStream {
         sink: &FrameSink,
         plan_epoch: u64,
     ) -> Result<Option<(WholeFrame, FrameRoom)>, Failure> {
-        let corrupt = |error: FrameAssemblyError| Failure::of_peer(peer, peer.error(error));
         let mut room = None;
         while let Some(part) = self.next_part(peer).await? {
             if let Some(header) = &part.header {
                 // Whoever waits for room has none: two compositors would wait for each other.
                 drop(room.take());
                 let admitted = sink.admit(part.frame, header, plan_epoch).await;
-                room = Some(admitted.map_err(|fault| Failure::of_peer(peer, peer.error(fault)))?);
+                room = Some(admitted.map_err(|fault| Failure::of_fault(peer, fault))?);
             }
-            if let Some(frame) = self.assembly.push(part).map_err(corrupt)? {
+            if let Some(frame) = self.assembly.push(part).map_err(|error| Failure::of_fault(peer, error))? {
                 return Ok(room.map(|room| (frame, room)));
             }
         }
-        self.assembly.finish().map_err(corrupt)?;
+        self.assembly.finish().map_err(|error| Failure::of_fault(peer, error))?;
         Ok(None)
     }
 
     async fn next_part(&mut self, peer: &Peer) -> Result<Option<FramePart>, Failure> {
         match tokio::time::timeout(MOST_WAIT, self.parts.next()).await {
             Ok(part) => part.transpose().map_err(|status| Failure::of_status(peer, &status)),
-            Err(_) => {
-                let reason = format!("no frame was received for {} s", MOST_WAIT.as_secs());
-                Err(Failure::of_peer(peer, peer.error(reason)))
-            }
+            Err(_) => Err(Failure::of_fault(peer, format!("no frame was received for {} s", MOST_WAIT.as_secs()))),
         }
     }
 }
 
 /// Decodes a frame of `peer` on a blocking thread.
 pub(crate) async fn decode(frame: WholeFrame, peer: &Peer) -> Result<(FrameHeader, View), ClientError> {
-    let decoding = move || decode_view(&frame, &DecodeLimits::VIEWS).map(|view| (frame.header, view));
-    match tokio::task::spawn_blocking(decoding).await {
-        Ok(decoded) => decoded.map_err(|error| peer.error(error)),
-        Err(error) => Err(peer.error(error)),
-    }
+    let decoded = tokio::task::spawn_blocking(move || (decode_view(&frame, &DecodeLimits::VIEWS), frame.header));
+    let (view, header) = decoded.await.map_err(|error| peer.error(error))?;
+    Ok((header, view.map_err(|error| peer.error(error))?))
 }
 
 #[cfg(test)]

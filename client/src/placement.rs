@@ -57,17 +57,13 @@ pub(crate) struct Tried {
     pub(crate) plan_epoch: u64,
     names: HashSet<String>,
     pub(crate) last: Option<ClientError>,
-    all_exhausted: bool,
+    /// One of them failed for another reason than that it had no room.
+    has_failed_with_room: bool,
 }
 
 impl Tried {
-    /// No compositor has been tried.
-    pub(crate) fn none(plan_epoch: u64) -> Self {
-        Self { plan_epoch, all_exhausted: true, ..Self::default() }
-    }
-
     pub(crate) fn add(&mut self, peer: &Peer, error: ClientError) {
-        self.all_exhausted &= matches!(error, ClientError::Exhausted { .. });
+        self.has_failed_with_room |= !matches!(error, ClientError::Exhausted { .. });
         self.names.insert(peer.share.node_name.clone());
         self.last = Some(error);
     }
@@ -80,7 +76,7 @@ impl Tried {
 
     /// Whether all compositors that were tried had no room.
     pub(crate) fn is_exhausted(&self) -> bool {
-        self.all_exhausted && !self.names.is_empty()
+        !self.has_failed_with_room && !self.names.is_empty()
     }
 }
 

@@ -12,9 +12,9 @@ use tokio::task::JoinSet;
 use tokio::time::Instant;
 use tokio_stream::StreamExt as _;
 use tonic::{Code, Status};
-use wire::rpc::{CoordinatorClient, Messages, connect};
+use wire::rpc::{CoordinatorClient, connect};
 
-use crate::active_plan::{ActivePlan, SessionState, follow_compositors, follow_coordinator};
+use crate::active_plan::{ActivePlan, SessionState, first_in, follow_compositors, follow_coordinator};
 use crate::delivery::deliver;
 use crate::error::ClientError;
 use crate::frames::Frames;
@@ -75,13 +75,29 @@ impl Client {
     pub async fn open_session(
         &self,
         request: SessionRequest,
-        progress: impl FnMut(&SessionEvent),
+        mut progress: impl FnMut(&SessionEvent),
     ) -> Result<Session, ClientError> {
         let coordinator = self.coordinator.clone();
-        let invalid = |error| ClientError::Invalid { field: "codec", reason: format!("{error}") };
-        let codec: FrameCodec = request.codec.parse().map_err(invalid)?;
+        let codec = request.codec.parse::<FrameCodec>();
+        let codec = codec.map_err(|error| ClientError::Invalid { field: "codec", reason: error.to_string() })?;
         let mut events = coordinator.open_session(request.clone()).await.map_err(ClientError::coordinator)?;
-        let Opened { session, promise, plan } = plan_of(&mut events, progress).await?;
+        let mut session = 0;
+        let mut promise = None;
+        let plan = loop {
+            let Some(event) = events.next().await else {
+                return Err(ClientError::Coordinator {
+                    reason: "the session's stream ended before its plan".to_owned(),
+                });
+            };
+            let event = event.map_err(ClientError::coordinator)?;
+            progress(&event);
+            match event {
+                SessionEvent::Opened { session: number } => session = number,
+                SessionEvent::Progress { .. } => (),
+                SessionEvent::Promise(promised) => promise = Some(promised),
+                SessionEvent::Plan(plan) => break *plan,
+            }
+        };
         let (named_plans, to_follow) = mpsc::channel(NAMED_PLANS);
         let mut planes = request.planes;
         if request.auto_exposure {
@@ -135,8 +151,8 @@ impl Session {
         let viewpoints = (!viewpoints.is_empty()).then_some(viewpoints);
         let message = ChangeSession { session, views_per_set, frames_per_s, viewpoints };
         let answer = self.coordinator.change_session(message).await;
-        let refuses = |status: &Status| [Code::InvalidArgument, Code::ResourceExhausted].contains(&status.code());
-        if !answer.as_ref().is_err_and(refuses) {
+        let code = answer.as_ref().map_or_else(Status::code, |()| Code::Ok);
+        if ![Code::InvalidArgument, Code::ResourceExhausted].contains(&code) {
             // The session is opened again with it when the coordinator comes back; a session has one view at least.
             let mut request = self.request.lock();
             change(&mut request);
@@ -166,24 +182,15 @@ impl Session {
 
     /// Waits for another promise than this one.
     pub async fn another_promise(&self, promise: Option<&Promise>) -> Promise {
-        let mut state = self.state.clone();
-        let other = state.wait_for(|state| state.promise.is_some() && state.promise.as_ref() != promise).await;
-        match other.ok().and_then(|state| state.promise.clone()) {
-            Some(promise) => promise,
-            // The session has ended: no promise follows.
-            None => std::future::pending().await,
-        }
+        first_in(self.state.clone(), |state| state.promise.clone().filter(|other| Some(other) != promise)).await
     }
 
     /// Waits for a plan of another number.
     pub async fn another_plan(&self, plan_epoch: u64) -> SessionPlan {
-        let mut state = self.state.clone();
-        let other = state.wait_for(|state| state.active.plan_epoch() != plan_epoch).await;
-        match other.map(|state| state.active.plan.clone()) {
-            Ok(plan) => plan,
-            // The session has ended: no plan follows.
-            Err(_) => std::future::pending().await,
-        }
+        let other = first_in(self.state.clone(), |state| {
+            (state.active.plan_epoch() != plan_epoch).then(|| state.active.plan.clone())
+        });
+        other.await
     }
 
     /// Requests views by the method of the plan in force. Frames are received in the order they are ready. All
@@ -236,30 +243,4 @@ impl Session {
     pub fn live_encoded(&self, client: ClientId) -> EncodedLiveView {
         EncodedLiveView::start(client, self.state.clone())
     }
-}
-
-/// The beginning of a session.
-struct Opened {
-    session: u64,
-    promise: Option<Promise>,
-    plan: SessionPlan,
-}
-
-async fn plan_of(
-    events: &mut Messages<SessionEvent>,
-    mut progress: impl FnMut(&SessionEvent),
-) -> Result<Opened, ClientError> {
-    let mut number = 0;
-    let mut promised = None;
-    while let Some(event) = events.next().await {
-        let event = event.map_err(ClientError::coordinator)?;
-        progress(&event);
-        match event {
-            SessionEvent::Opened { session } => number = session,
-            SessionEvent::Progress { .. } => (),
-            SessionEvent::Promise(promise) => promised = Some(promise),
-            SessionEvent::Plan(plan) => return Ok(Opened { session: number, promise: promised, plan: *plan }),
-        }
-    }
-    Err(ClientError::Coordinator { reason: "the session's stream ended before its plan".to_owned() })
 }

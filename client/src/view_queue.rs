@@ -44,8 +44,6 @@ pub struct ViewQueue<V> {
     groups: VecDeque<Group<V>>,
     /// Views of all groups.
     waiting: usize,
-    /// Views of all groups, and those in flight.
-    due: usize,
     compositors: Vec<Compositor>,
     total_weight: usize,
 }
@@ -54,20 +52,19 @@ impl<V: Copy> ViewQueue<V> {
     /// A queue for compositors of these weights, the heaviest first. A view is expected to take `view_s`.
     #[must_use]
     pub fn new(weights: &[u32], view_s: f64) -> Self {
-        let compositor = |&weight: &u32| {
+        let compositors = weights.iter().map(|&weight| {
             let weight = weight.max(1) as usize;
             Compositor { weight, pace: Pace::new(view_s), in_flight: 0, cell: None }
-        };
-        let compositors: Vec<Compositor> = weights.iter().map(compositor).collect();
+        });
+        let compositors: Vec<Compositor> = compositors.collect();
         let total_weight = compositors.iter().map(|compositor| compositor.weight).sum();
-        Self { groups: VecDeque::new(), waiting: 0, due: 0, compositors, total_weight }
+        Self { groups: VecDeque::new(), waiting: 0, compositors, total_weight }
     }
 
     /// Adds views of one set, each with its view cell.
     pub fn push(&mut self, set_index: u32, mut views: Vec<(u32, V)>) {
         views.sort_by_key(|(cell, _)| *cell);
         self.waiting += views.len();
-        self.due += views.len();
         for group in views.chunk_by(|(a, _), (b, _)| a == b) {
             let of_group = group.iter().map(|(_, view)| *view).collect();
             self.groups.push_back(Group { set_index, cell: group[0].0, set_views: views.len(), views: of_group });
@@ -108,10 +105,7 @@ impl<V: Copy> ViewQueue<V> {
     /// Counts a view as received. A view that waited for its sample set does not show its compositor's speed.
     pub fn received(&mut self, compositor: usize, now_s: f64, waited_for_set: bool) {
         let Some(compositor) = self.compositors.get_mut(compositor) else { return };
-        if let Some(in_flight) = compositor.in_flight.checked_sub(1) {
-            compositor.in_flight = in_flight;
-            self.due -= 1;
-        }
+        compositor.in_flight = compositor.in_flight.saturating_sub(1);
         compositor.pace.received(now_s, waited_for_set);
     }
 
@@ -119,13 +113,14 @@ impl<V: Copy> ViewQueue<V> {
     /// so that all compositors end together.
     fn room(&self, compositor: usize) -> Option<usize> {
         let Compositor { weight, pace, in_flight, .. } = self.compositors.get(compositor)?;
-        if *in_flight > pace.message_views() {
+        if *in_flight > pace.message_views {
             return None;
         }
+        let due = self.waiting + self.compositors.iter().map(|compositor| compositor.in_flight).sum::<usize>();
         // A compositor that would make less than half a view meanwhile would be the last to end.
-        let is_too_slow = compositor > 0 && 2 * self.due * weight < self.total_weight;
-        let left = self.share(self.due, compositor).saturating_sub(*in_flight);
-        Some(left.min(pace.message_views())).filter(|&room| room > 0 && !is_too_slow)
+        let is_too_slow = compositor > 0 && 2 * due * weight < self.total_weight;
+        let left = self.share(due, compositor).saturating_sub(*in_flight);
+        Some(left.min(pace.message_views)).filter(|&room| room > 0 && !is_too_slow)
     }
 
     /// A compositor's part of some views by its weight, rounded up.

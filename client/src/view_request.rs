@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use bytes::Bytes;
-use cluster::Assignment;
 use codec::{FrameCodec, FrameHeader};
 use depth_image::{Antialias, PinholeCamera, View, ViewPlanes};
 
@@ -46,22 +45,16 @@ pub struct ViewRequest {
 
 impl ViewRequest {
     /// # Errors
-    /// For a camera that cannot be used, and for a set beyond the plan's timeline.
-    pub(crate) fn check(&self, plan: &Assignment) -> Result<(), ClientError> {
-        self.check_within(plan.workload.timeline.set_count)
-    }
-
-    /// # Errors
-    /// For a camera that cannot be used, and for a set beyond `set_count`.
-    pub(crate) fn check_within(&self, set_count: u32) -> Result<(), ClientError> {
-        let invalid = |field, reason| Err(ClientError::Invalid { field, reason });
-        match self.camera.validate() {
-            Err(error) => invalid("camera", format!("frame {}: {error}", self.frame)),
+    /// For a camera that cannot be used, and for a set beyond the `set_count` sets of the timeline.
+    pub(crate) fn check(&self, set_count: u32) -> Result<(), ClientError> {
+        let (field, reason) = match self.camera.validate() {
+            Err(error) => ("camera", format!("frame {}: {error}", self.frame)),
             Ok(()) if self.set_index >= set_count => {
-                invalid("set_index", format!("{} is beyond the timeline", self.set_index))
+                ("set_index", format!("{} is beyond the timeline", self.set_index))
             }
-            Ok(()) => Ok(()),
-        }
+            Ok(()) => return Ok(()),
+        };
+        Err(ClientError::Invalid { field, reason })
     }
 }
 

@@ -24,12 +24,14 @@ pub(crate) struct Window {
     /// The number of the last frame that was drawn.
     last: Option<u64>,
     due: BTreeMap<u64, ViewRequest>,
-    received: u64,
+    /// Frames that were received so far.
+    pub(crate) received: u64,
     /// The request that cannot be met; those before it are.
     fault: Option<ClientError>,
     /// Sets of the timeline.
     set_count: u32,
-    planes: ViewPlanes,
+    /// The planes that all views have beside colour.
+    pub(crate) planes: ViewPlanes,
     /// The reconstruction method of all views; `None`: the session's.
     pub(crate) method: Option<String>,
 }
@@ -65,8 +67,8 @@ impl Window {
     pub(crate) fn draw(&mut self) -> Vec<ViewRequest> {
         let mut run: Vec<ViewRequest> = Vec::new();
         while let Some(source) = self.source.as_mut().filter(|_| run.len() < MAX_RUN_VIEWS) {
-            let is_of_run = |next: &ViewRequest| run.first().is_none_or(|first| first.set_index == next.set_index);
-            let Some(request) = source.next_if(is_of_run) else { break };
+            let next = source.next_if(|next| run.first().is_none_or(|first| first.set_index == next.set_index));
+            let Some(request) = next else { break };
             if let Err(error) = self.check(&request) {
                 (self.source, self.fault) = (None, Some(error));
                 break;
@@ -84,7 +86,7 @@ impl Window {
             let reason = format!("{} follows {last}: numbers must rise", request.frame);
             return Err(ClientError::Invalid { field: "frame", reason });
         }
-        request.check_within(self.set_count)
+        request.check(self.set_count)
     }
 
     /// The views that are due, in the order of their numbers.
@@ -100,11 +102,6 @@ impl Window {
         self.due().chunk_by(|a, b| a.set_index == b.set_index).map(<[ViewRequest]>::len).max().unwrap_or(0)
     }
 
-    /// Frames that were received so far.
-    pub(crate) fn received(&self) -> u64 {
-        self.received
-    }
-
     /// Whether all frames have been received.
     pub(crate) fn is_complete(&mut self) -> bool {
         self.due.is_empty() && self.source.as_mut().and_then(Peekable::peek).is_none()
@@ -116,11 +113,6 @@ impl Window {
             None => Some("was not requested or has been received".to_owned()),
             Some(request) => check_frame(request, self.planes, header).err(),
         }
-    }
-
-    /// The planes that all views have beside colour.
-    pub(crate) fn planes(&self) -> ViewPlanes {
-        self.planes
     }
 
     /// The decoded bytes of a frame that is due.

@@ -38,7 +38,7 @@ fn a_frame_is_accepted_once_and_from_its_own_set() {
     let mut window = window([request(4), request(7)]).unwrap();
     assert_eq!(window.fault_of(4, &header(0)), None);
     assert_eq!((window.decoded_bytes(4), window.decoded_bytes(5)), (64 * 3, 0));
-    assert_eq!((window.take(4), window.received()), (Some(request(4)), 1));
+    assert_eq!((window.take(4), window.received), (Some(request(4)), 1));
     let mut elsewhere = header(0);
     elsewhere.camera.eye_in_world.x += 0.1;
     for (frame, header, reason) in [

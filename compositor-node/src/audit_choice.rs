@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use cluster::{SetContent, is_one_place};
 use depth_image::PinholeCamera;
+use node::push_latest;
 
 /// Streams that were audited last, which wait for others.
 const RECENT_STREAMS: usize = 3;
@@ -72,10 +73,10 @@ impl AuditChoice {
         least_apart_m: f32,
     ) -> Option<usize> {
         let seen = self.audited.iter().filter(|(of, ..)| of == kind);
-        let is_new = |view: &Candidate| !seen.clone().any(|(_, set, camera)| is_near(set, camera, view, least_apart_m));
-        let is_other = |view: &Candidate| !self.recent.contains(&view.stream);
-        let new: Vec<usize> = (0..views.len()).filter(|&place| is_new(&views[place])).collect();
-        let mut eligible: Vec<usize> = new.iter().copied().filter(|&place| is_other(&views[place])).collect();
+        let mut new: Vec<usize> = (0..views.len()).collect();
+        new.retain(|&at| !seen.clone().any(|(_, set, camera)| is_near(set, camera, &views[at], least_apart_m)));
+        let mut eligible = new.clone();
+        eligible.retain(|&place| !self.recent.contains(&views[place].stream));
         if !eligible.is_empty() {
             self.other_at = Some(now);
         }
@@ -87,20 +88,11 @@ impl AuditChoice {
             return None;
         }
         let chosen = eligible.into_iter().min_by_key(|&place| views[place].random)?;
-        self.begin(kind.clone(), &views[chosen]);
-        Some(chosen)
-    }
-
-    fn begin(&mut self, kind: Kind, view: &Candidate) {
+        let Candidate { stream, set, camera, .. } = views[chosen];
         (self.is_auditing, self.other_at) = (true, None);
-        self.recent.push_back(view.stream);
-        if self.recent.len() > RECENT_STREAMS {
-            self.recent.pop_front();
-        }
-        self.audited.push_back((kind, view.set, view.camera));
-        if self.audited.len() > MAX_AUDITED {
-            self.audited.pop_front();
-        }
+        push_latest(&mut self.recent, stream, RECENT_STREAMS);
+        push_latest(&mut self.audited, (kind.clone(), set, camera), MAX_AUDITED);
+        Some(chosen)
     }
 
     /// The audit has ended. Audits may take `share` of the time.
@@ -118,10 +110,7 @@ impl AuditChoice {
             Some(busy_s) => random_pause(busy_s, share, random),
         };
         if is_first && busy_s.is_some() {
-            self.kinds.push_back(kind);
-            if self.kinds.len() > MAX_KINDS {
-                self.kinds.pop_front();
-            }
+            push_latest(&mut self.kinds, kind, MAX_KINDS);
         }
         self.due = Some(now + pause);
     }

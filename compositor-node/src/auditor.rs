@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cluster::{Assignment, AuditOrder, AuditedView, MOST_PLANNED_PIXELS, ProbedView};
-use depth_image::{PinholeCamera, ViewPart, ViewPlanes};
+use depth_image::{ViewPart, ViewPlanes};
 use glam::UVec2;
 use node::{DirectWork, NodeMetrics, Pinned, PlansInForce, Scenes, ViewAudit, ViewProbes, ViewWork, blocking};
 use parking_lot::Mutex;
@@ -35,9 +35,7 @@ pub(crate) struct Auditor {
 struct Chosen {
     plan: Arc<Assignment>,
     set: Pinned<ReadySet>,
-    stream: u64,
-    random: u64,
-    camera: PinholeCamera,
+    view: Candidate,
     scene_time_s: f32,
 }
 
@@ -47,14 +45,13 @@ impl Auditor {
         let Some(key) = made.first().map(|waiting| &waiting.key) else { return };
         let Some(plan) = self.plans.in_force(key.workload_number) else { return };
         let Some(order) = plan.audit.filter(|_| key.sample_set_id.plan_epoch == plan.plan_epoch) else { return };
-        let is_covered = |waiting: &&Waiting| match uncovered(&plan, &order, waiting) {
-            None => true,
-            Some(reason) => {
-                self.metrics.uncover_view(reason);
-                false
+        let mut covered = Vec::new();
+        for waiting in made {
+            match uncovered(&plan, &order, waiting) {
+                None => covered.push(waiting),
+                Some(reason) => self.metrics.uncover_view(reason),
             }
-        };
-        let covered: Vec<&Waiting> = made.iter().filter(is_covered).collect();
+        }
         let counts = [covered.len(), made.len() - covered.len()].map(|count| count as u64);
         self.metrics.done.covered(plan.workload_number, counts);
         if let Some(chosen) = self.choose(&plan, &order, &covered) {
@@ -67,28 +64,22 @@ impl Auditor {
         let first = covered.first()?;
         let Source::Sets(ViewSets { of_cell: set, .. }) = &first.source else { return None };
         let scene_time_s = plan.workload.timeline.time_s(set_index(&first.key))?;
-        let candidate = |waiting: &&Waiting| {
+        let candidates = covered.iter().map(|waiting| {
             let stream = waiting.reply.outbox().stream;
-            let camera = waiting.view.camera;
             let random = random([plan.plan_epoch, stream, waiting.view.frame]);
-            Candidate { stream, random, set: set.content, camera }
-        };
-        let candidates: Vec<Candidate> = covered.iter().map(candidate).collect();
+            Candidate { stream, random, set: set.content, camera: waiting.view.camera }
+        });
+        let candidates: Vec<Candidate> = candidates.collect();
         let mut choice = self.choice.lock();
         let place = choice.choose(Instant::now(), &kind_of(plan), &candidates, order.least_apart_m as f32)?;
-        let Candidate { stream, random, camera, .. } = candidates[place];
-        Some(Chosen { plan: plan.clone(), set: set.clone(), stream, random, camera, scene_time_s })
+        Some(Chosen { plan: plan.clone(), set: set.clone(), view: candidates[place], scene_time_s })
     }
 
     async fn audit(self: Arc<Self>, chosen: Chosen, order: AuditOrder) {
-        let Chosen { plan, stream, random, camera, .. } = &chosen;
-        let plan_epoch = plan.plan_epoch;
-        let workload_number = plan.workload_number;
-        let random = *random;
-        let kind = kind_of(plan);
+        let Candidate { stream, random, camera, .. } = chosen.view;
+        let Assignment { plan_epoch, workload_number, .. } = *chosen.plan;
+        let kind = kind_of(&chosen.plan);
         let part = audited_part(camera.size_px, &order, random);
-        let stream = *stream;
-        let camera = *camera;
         let is_part = part != ViewPart::whole(camera.size_px);
         let start = Instant::now();
         // Whatever becomes of the task, the next audit follows.
@@ -121,7 +112,7 @@ impl Auditor {
         order: AuditOrder,
         part: ViewPart,
     ) -> Result<(ProbedView, f64), Status> {
-        let Chosen { plan, set, camera, scene_time_s, .. } = chosen;
+        let Chosen { plan, set, view: Candidate { camera, .. }, scene_time_s } = chosen;
         let scene = &plan.workload.scene;
         if !self.scenes.engine().has_scene(scene.hash.as_str()) {
             // Loading may take minutes: the set is not kept for it.

@@ -55,11 +55,11 @@ impl<'a> BatchStream<'a> {
 
     /// A client that waits for frames is not idle.
     async fn next(&self, requests: &mut Messages<RenderViews>) -> Result<Option<RenderViews>, Status> {
-        let is_busy = || self.credits.available_permits() < STREAM_PIXELS as usize;
         loop {
-            match next_within(requests, self.client.shared.deadlines.idle, "views").await {
-                Err(status) if status.code() == Code::DeadlineExceeded && is_busy() => (),
-                next => return next,
+            let next = next_within(requests, self.client.shared.deadlines.idle, "views").await;
+            let is_late = next.as_ref().is_err_and(|status| status.code() == Code::DeadlineExceeded);
+            if !is_late || self.credits.available_permits() == STREAM_PIXELS as usize {
+                return next;
             }
         }
     }
@@ -68,8 +68,8 @@ impl<'a> BatchStream<'a> {
     async fn enqueue(&mut self, request: RenderViews) -> Result<(), Status> {
         let arrived = Instant::now();
         let shared = &self.client.shared;
-        let plan = shared
-            .of_compositor(shared.plans.require(request.workload_number, request.plan_epoch)?, &request.method)?;
+        let plan = shared.plans.require(request.workload_number, request.plan_epoch)?;
+        let plan = shared.of_compositor(plan, &request.method)?;
         shared.check_views(&plan, &request)?;
         let mut cells = BTreeMap::<u32, Vec<RequestedView>>::new();
         for view in &request.views {
@@ -113,10 +113,11 @@ impl<'a> BatchStream<'a> {
                 }
             };
             let (now, later) = left.split_at(credits.len());
-            let waiting = |(view, credit): (&RequestedView, Credit)| {
-                Waiting::new(request, *view, arrived, &loaded, self.reply.clone(), credit)
-            };
-            self.client.queue(false, now.iter().zip(credits).map(waiting).collect());
+            let waiting = now
+                .iter()
+                .zip(credits)
+                .map(|(view, credit)| Waiting::new(request, *view, arrived, &loaded, self.reply.clone(), credit));
+            self.client.queue(false, waiting.collect());
             (left, set) = (later, Some(loaded));
         }
         Ok(())

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use depth_image::PinholeCamera;
 use glam::Vec3;
+use node::push_latest;
 
 /// Poses that a course remembers.
 const MAX_POSES: usize = 16;
@@ -20,9 +21,8 @@ pub(crate) struct Course(VecDeque<(Instant, Vec3)>);
 impl Course {
     /// Adds a pose that arrived at `at`.
     pub(crate) fn add(&mut self, at: Instant, camera: &PinholeCamera) {
-        self.0.push_back((at, camera.eye_in_world));
-        let is_old = |first: &(Instant, Vec3)| at.saturating_duration_since(first.0) > HORIZON;
-        while self.0.len() > MAX_POSES || self.0.front().is_some_and(is_old) {
+        push_latest(&mut self.0, (at, camera.eye_in_world), MAX_POSES);
+        while self.0.front().is_some_and(|(first, _)| at.saturating_duration_since(*first) > HORIZON) {
             self.0.pop_front();
         }
     }

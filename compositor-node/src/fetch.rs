@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use cluster::limits::MAX_WORKLOADS;
 use cluster::{Assignment, SamplerShare, SetContent};
-use depth_image::{SampleCamera, SampleImage};
+use depth_image::SampleImage;
 use node::{CellPlan, Connections, Deadlines, PlansInForce, SampleSet, beyond_timeline, blocking, has_set};
 use parking_lot::Mutex;
 use tokio::task::JoinSet;
@@ -66,8 +66,10 @@ impl Fetcher {
         }
         let missing = self.requests_to_samplers(set, &gathered.images);
         self.fetch_all(set, missing, &mut gathered).await?;
-        let incomplete = || Status::data_loss(format!("sample set {} is not complete", set.set_index));
-        Ok((gathered.images.into_iter().collect::<Option<_>>().ok_or_else(incomplete)?, gathered.times))
+        let Some(images) = gathered.images.into_iter().collect() else {
+            return Err(Status::data_loss(format!("sample set {} is not complete", set.set_index)).into());
+        };
+        Ok((images, gathered.times))
     }
 
     /// A relay that refuses one set may relay the next.
@@ -98,24 +100,24 @@ impl Fetcher {
     /// The missing images, from their samplers.
     fn requests_to_samplers(&self, set: &SetRequest, images: &[Option<SampleImage>]) -> Vec<ShareRequest> {
         let Deadlines { work, chunk, .. } = self.deadlines;
-        let request = |share: &SamplerShare| {
-            let is_missing = |index: &u32| images.get(*index as usize).is_some_and(Option::is_none);
-            let image_indices = share.image_indices.iter().copied().filter(is_missing).collect();
-            let share = SamplerShare { image_indices, ..share.clone() };
+        let requests = set.plan.samplers_of(set.set_index).iter().map(|share| {
+            let mut share = share.clone();
+            share.image_indices.retain(|index| images.get(*index as usize).is_some_and(Option::is_none));
             ShareRequest { share, answer_within: chunk, first_within: work, chunk_within: chunk }
-        };
-        let requests = set.plan.samplers_of(set.set_index).iter().map(request);
+        });
         requests.filter(|request| !request.share.image_indices.is_empty()).collect()
     }
 
     /// Resolves when a plan is in force that has no such set, or no place for the node that it is fetched from: that node
     /// may be lost without a word. A set outlives every other plan.
     async fn in_vain(&self, set: &SetRequest, content: &SetContent, share: &SamplerShare) {
-        let goes_on = |plan: &Arc<Assignment>| {
-            plan.plan_epoch == set.plan.plan_epoch
-                || (has_place(plan, &share.node_name) && has_set(plan, content, set.set_index))
-        };
-        self.plans.until(set.plan.workload_number, |plan| !plan.is_some_and(goes_on)).await;
+        let ends = self.plans.until(set.plan.workload_number, |plan| {
+            plan.is_none_or(|plan| {
+                plan.plan_epoch != set.plan.plan_epoch
+                    && !(has_place(plan, &share.node_name) && has_set(plan, content, set.set_index))
+            })
+        });
+        ends.await;
     }
 
     /// Fetches all shares at the same time.
@@ -165,11 +167,11 @@ async fn join_tiles(plan: &CellPlan, sampled: Vec<SampleImage>) -> Result<Vec<Sa
     let plan = plan.clone();
     blocking(move || {
         let mut sampled = sampled.into_iter();
-        let mut joined = |camera: &SampleCamera| {
+        let images = plan.workload.sample_cameras.iter().map(|camera| {
             let tiles = sampled.by_ref().take(plan.tile_count as usize).collect();
             SampleImage::from_tiles(camera, tiles).map_err(|error| Status::data_loss(error.to_string()))
-        };
-        plan.workload.sample_cameras.iter().map(&mut joined).collect()
+        });
+        images.collect()
     })
     .await
 }

@@ -111,8 +111,7 @@ async fn fetch_once(
         let start = Instant::now();
         let image = decode(&cameras, whole).await?;
         chunks.times.decode_s += start.elapsed().as_secs_f64();
-        check_visibility(plan, index, &image)?;
-        check_light(plan, index, &image)?;
+        check_planes(plan, index, &image)?;
         set.relay.iter().for_each(|relay| relay.add(index, encoded.clone()));
         images.push((index, image));
     }
@@ -126,21 +125,17 @@ async fn fetch_once(
 
 async fn call(connections: &Connections, set: &SetRequest, request: &ShareRequest) -> Result<ChunkStream, Status> {
     let client = SamplerClient::new(connections.to(&request.share.address).await?);
-    let image_indices = request.share.image_indices.clone();
-    let plan = &set.plan;
-    let set_index = set.set_index;
     let images = FetchImages {
-        plan_epoch: plan.plan_epoch,
-        workload_number: plan.workload_number,
-        set_index,
-        cell: plan.cell,
-        image_indices,
+        plan_epoch: set.plan.plan_epoch,
+        workload_number: set.plan.workload_number,
+        set_index: set.set_index,
+        cell: set.plan.cell,
+        image_indices: request.share.image_indices.clone(),
     };
     let answer = tokio::time::timeout(request.answer_within, client.fetch_sample_images(images)).await;
     let chunks = answer.map_err(|_| Status::deadline_exceeded("no images in time"))??;
-    let first_within = Some(request.first_within);
-    let chunk_within = request.chunk_within;
-    Ok(ChunkStream { chunks, first_within, chunk_within, times: FetchTimes::default() })
+    let &ShareRequest { first_within, chunk_within, .. } = request;
+    Ok(ChunkStream { chunks, first_within: Some(first_within), chunk_within, times: FetchTimes::default() })
 }
 
 /// The chunks of one call, and their times.
@@ -182,48 +177,36 @@ fn check_image(
     Ok(())
 }
 
-/// Checks the planes of visibility. Highlights find a light's visibility by its place: there is a byte for every light, or
-/// none at all.
-fn check_visibility(plan: &Assignment, index: u32, image: &SampleImage) -> Result<(), Status> {
+/// Checks that images have light in place of colour where the plan says so, and nowhere else. A lamp's visibility, and its
+/// share of the light, are found by its place: there are planes for all lamps, or none at all.
+fn check_planes(plan: &Assignment, index: u32, image: &SampleImage) -> Result<(), Status> {
     let lights = plan.workload.illumination.lights.len();
-    let planes = image.specular().map_or(0, |specular| specular.visibility8.len());
-    if planes == 0 || planes == SpecularPlanes::visibility_planes(lights) {
-        return Ok(());
-    }
-    Err(Status::data_loss(format!("image {index} has {planes} planes of visibility for {lights} lights")))
-}
-
-/// Checks that images have light in place of colour where the plan says so, and nowhere else. A lamp's share is found by its
-/// place: there are shares of all lamps, or none at all.
-fn check_light(plan: &Assignment, index: u32, image: &SampleImage) -> Result<(), Status> {
+    let visibilities = image.specular().map_or(0, |specular| specular.visibility8.len());
     let light = match image {
         SampleImage::Depth(image) => image.light.as_ref(),
         SampleImage::Layered(_) | SampleImage::LightField(_) => None,
     };
-    match light {
-        Some(_) if !plan.workload.planes.light => {
-            Err(Status::data_loss(format!("image {index} has light where colour is needed")))
-        }
-        None if plan.workload.planes.light => {
-            Err(Status::data_loss(format!("image {index} has colour where light is needed")))
-        }
-        Some(light) => check_shares(plan, index, light.share8.len()),
-        None => Ok(()),
-    }
-}
-
-fn check_shares(plan: &Assignment, index: u32, planes: usize) -> Result<(), Status> {
-    let lights = plan.workload.illumination.lights.len();
-    if planes == 0 || planes == LightPlanes::share_planes(lights) {
+    let shares = light.map_or(0, |light| light.share8.len());
+    let fault = if ![0, SpecularPlanes::visibility_planes(lights)].contains(&visibilities) {
+        format!("{visibilities} planes of visibility for {lights} lights")
+    } else if light.is_some() && !plan.workload.planes.light {
+        "light where colour is needed".to_owned()
+    } else if light.is_none() && plan.workload.planes.light {
+        "colour where light is needed".to_owned()
+    } else if ![0, LightPlanes::share_planes(lights)].contains(&shares) {
+        format!("{shares} planes of shares for {lights} lamps")
+    } else {
         return Ok(());
-    }
-    Err(Status::data_loss(format!("image {index} has {planes} planes of shares for {lights} lamps")))
+    };
+    Err(Status::data_loss(format!("image {index} has {fault}")))
 }
 
 async fn decode(cameras: &[SampleCamera], whole: Reassembled) -> Result<SampleImage, Status> {
     let camera = cameras.get(whole.image_index as usize).copied();
     let camera = camera.ok_or_else(|| Status::data_loss(format!("image {} has no camera", whole.image_index)))?;
-    let decode =
-        move || decode_sample_image(&whole.image.header, &camera, &whole.image.payload, &DecodeLimits::default());
-    blocking(move || decode().map_err(|error| Status::data_loss(error.to_string()))).await
+    let decoding = blocking(move || {
+        let image = decode_sample_image(&whole.image.header, &camera, &whole.image.payload, &DecodeLimits::default());
+        image.map_err(|error| Status::data_loss(error.to_string()))
+    });
+    decoding.await
 }

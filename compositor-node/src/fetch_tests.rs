@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use cluster::{Assignment, FetchImages, SamplePlanes, Workload};
+use cluster::{ApplyPlan, Assignment, FetchImages, SamplePlanes, Workload};
 use codec::{Chunk, ChunkBody, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
 use depth_image::{Camera, DepthImage, Environment, Illumination, Light, LightPlanes, PinholeCamera, SpecularPlanes};
 use glam::{UVec2, Vec3};
@@ -105,7 +105,7 @@ async fn fetched_with_planes(planes: SamplePlanes, chunks: Vec<Chunk>, stays_ope
     let deadlines = Deadlines { chunk: Duration::from_millis(200), ..Deadlines::default() };
     let request = SetRequest { plan: CellPlan::of(&plan, 0).unwrap(), set_index: 0, relay: None };
     let plans = PlansInForce::new("n0");
-    plans.apply((*plan).clone()).unwrap();
+    plans.apply(ApplyPlan { assignment: (*plan).clone(), open_workloads: Vec::new() }).unwrap();
     let fetched = Arc::new(Fetcher::new(plans, deadlines)).fetch(&request).await;
     shutdown.cancel();
     let set = fetched.map(|(set, _)| set);

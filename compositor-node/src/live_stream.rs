@@ -22,8 +22,8 @@ use wire::rpc::Messages;
 use crate::batch::{Loaded, Place, Waiting};
 use crate::course::Course;
 use crate::outbox::Reply;
-use crate::queue::Viewer;
 use crate::quota::{Credit, closed};
+use crate::sets::RECENTLY;
 use crate::shared::ClientStream;
 
 /// Frames that may be in flight until the client acknowledges them: a third would only be older.
@@ -42,8 +42,7 @@ struct Pose {
 
 impl Pose {
     fn shows_set_of(&self, other: &Self) -> bool {
-        let set = |pose: &Self| (pose.plan_and_cell(), pose.request.set_index);
-        set(self) == set(other)
+        self.plan_and_cell() == other.plan_and_cell() && self.request.set_index == other.request.set_index
     }
 
     fn plan_and_cell(&self) -> (u64, u32) {
@@ -96,7 +95,8 @@ pub(crate) struct LiveStream<'a> {
     course: Course,
     /// The last set that was fetched without being waited for.
     aside: Option<SetContent>,
-    _viewer: Viewer,
+    /// Counts it as open.
+    _viewer: Arc<()>,
     /// The device cuts long work into slices meanwhile.
     _on_device: Box<dyn std::any::Any + Send + Sync>,
 }
@@ -118,8 +118,8 @@ impl<'a> LiveStream<'a> {
             previewed: None,
             course: Course::default(),
             aside: None,
-            _viewer: client.shared.arrivals.viewer(),
-            _on_device: client.shared.sets.live_stream(),
+            _viewer: client.shared.arrivals.viewers.clone(),
+            _on_device: client.shared.sets.scenes.engine().live_stream(),
         }
     }
 
@@ -197,11 +197,11 @@ impl<'a> LiveStream<'a> {
     /// Begins to fetch a set that is not waited for; one at a time, however fast a camera jumps.
     fn fetch_aside(&mut self, plan: &Arc<Assignment>, set_index: u32, cell: u32) {
         let sets = &self.client.shared.sets;
-        if self.aside.is_some_and(|aside| sets.is_loading(&aside)) {
+        if self.aside.is_some_and(|aside| sets.cached.is_loading(&aside)) {
             return;
         }
         if let Ok(plan) = CellPlan::of(plan, cell) {
-            self.aside = sets.load_ahead(&plan, set_index);
+            self.aside = sets.load_ahead(&plan, set_index, RECENTLY);
         }
     }
 
@@ -301,10 +301,9 @@ impl<'a> LiveStream<'a> {
         if let Some(credit) = self.replaced_credit(&pose).or_else(|| self.try_credit(&pose)) {
             return self.queue(pose, &set, credit);
         }
-        let same_size = |ready: &Ready| ready.pose.bytes() == pose.bytes();
-        let credit = match older.filter(same_size) {
-            Some(older) => older.credit,
-            None => self.credit(&pose),
+        let credit = match older {
+            Some(older) if older.pose.bytes() == pose.bytes() => older.credit,
+            _ => self.credit(&pose),
         };
         self.ready = Some(Ready { pose, place: set.place, wait_s: set.wait_s, credit });
     }
@@ -324,13 +323,14 @@ impl<'a> LiveStream<'a> {
     /// The time at which a pose has waited long enough for another cell; `None` where none waits, or no other set can serve.
     /// A viewer that stays in its cell waits for the next set there: another cell's would look worse.
     fn patience_ends(&self) -> Option<Instant> {
-        let may_show_other = |pose: &&Pose| match self.own {
+        let pose = self.waiting()?;
+        let may_show_other = match self.own {
             Some(own) => own != pose.plan_and_cell(),
             None => pose.plan.workload.planes.light,
         };
-        let in_motion = |pose: &&Pose| pose.request.live.is_some_and(|live| !live.waits_for_set);
-        let waits = self.waiting().filter(in_motion).filter(may_show_other).is_some() && !self.has_tried;
-        Some(self.without_set.filter(|_| waits)? + self.client.shared.deadlines.neighbour)
+        let in_motion = pose.request.live.is_some_and(|live| !live.waits_for_set);
+        let since = self.without_set.filter(|_| in_motion && may_show_other && !self.has_tried)?;
+        Some(since + self.client.shared.deadlines.neighbour)
     }
 
     /// Makes the newest pose's view where its own set is loaded while another is being fetched; gives whether it is.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use parking_lot::Mutex;
 use tokio::sync::Notify;
@@ -46,8 +46,9 @@ impl Lane {
 #[derive(Default)]
 pub(crate) struct Arrivals {
     lanes: [WaitingLane; Lane::ALL.len()],
-    /// Live streams that are open, whether they wait or not: the next pose may come at any time.
-    viewers: AtomicUsize,
+    /// Each open live stream holds a clone, whether it waits or not: the next pose may come at any time. Batches are small
+    /// meanwhile.
+    pub(crate) viewers: Arc<()>,
     /// Batches of the lanes that follow the plan.
     served: AtomicU64,
 }
@@ -65,12 +66,6 @@ impl Arrivals {
         lane.added.notify_one();
     }
 
-    /// Counts a live stream as open: batches are small until the guard is dropped.
-    pub(crate) fn viewer(self: &Arc<Self>) -> Viewer {
-        self.viewers.fetch_add(1, Ordering::Relaxed);
-        Viewer(self.clone())
-    }
-
     /// Takes back a stream's views, oldest first.
     pub(crate) fn withdraw(&self, stream: u64) -> VecDeque<Waiting> {
         self.lanes.iter().flat_map(|lane| lane.queue.lock().withdraw(stream)).collect()
@@ -85,11 +80,9 @@ impl Arrivals {
     pub(crate) async fn next_batch(&self, number: Lane) -> Vec<Waiting> {
         let waiting = &self.lanes[number as usize];
         loop {
-            let has_viewers = self.viewers.load(Ordering::Relaxed) > 0;
-            let batch = match number {
-                Lane::Direct => waiting.queue.lock().take_one(),
-                _ => waiting.queue.lock().take_batch(has_viewers),
-            };
+            let has_viewers = Arc::strong_count(&self.viewers) > 1;
+            let most = if number == Lane::Direct { 1 } else { MAX_BATCH };
+            let batch = waiting.queue.lock().take_batch(has_viewers, most);
             if !batch.is_empty() {
                 if number != Lane::Direct {
                     self.served.fetch_add(1, Ordering::Relaxed);
@@ -98,15 +91,6 @@ impl Arrivals {
             }
             waiting.added.notified().await;
         }
-    }
-}
-
-/// A live stream that is open.
-pub(crate) struct Viewer(Arc<Arrivals>);
-
-impl Drop for Viewer {
-    fn drop(&mut self) {
-        self.0.viewers.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
@@ -130,16 +114,16 @@ impl FairQueue {
         self.streams.remove(&stream).unwrap_or_default()
     }
 
-    /// The next stream's first view and those that can be made with it, one of each stream in turn, round by round. Streams
-    /// that had no part in it have the next turn.
-    fn take_batch(&mut self, has_viewers: bool) -> Vec<Waiting> {
+    /// The next stream's first view and those that can be made with it, one of each stream in turn, round by round, `most` at
+    /// most. Streams that had no part in it have the next turn.
+    fn take_batch(&mut self, has_viewers: bool, most: usize) -> Vec<Waiting> {
         let order = self.order();
         let first = order.first().and_then(|first| self.streams.get(first)?.front());
         let Some(wanted) = first.map(|view| view.key.clone()) else {
             return Vec::new();
         };
         // While live streams are open, a pose may arrive at any time.
-        let most = if has_viewers { shared(&wanted) } else { wanted.max_views() };
+        let most = most.min(if has_viewers { shared(&wanted) } else { wanted.max_views() });
         // The most views of each stream.
         let rounds = if order.len() == 1 { MAX_BATCH } else { shared(&wanted) };
         let first = self.take_round(&order, &wanted, most);
@@ -154,16 +138,6 @@ impl FairQueue {
             batch.extend(next.into_iter().map(|(_, view)| view));
         }
         batch
-    }
-
-    /// The next stream's first view.
-    fn take_one(&mut self) -> Vec<Waiting> {
-        let Some(&stream) = self.order().first() else { return Vec::new() };
-        let Some(wanted) = self.streams.get(&stream).and_then(|views| Some(views.front()?.key.clone())) else {
-            return Vec::new();
-        };
-        self.last = stream;
-        self.take(stream, &wanted).into_iter().collect()
     }
 
     /// All streams, from the one after the last that had its turn.
@@ -248,7 +222,7 @@ mod tests {
         queue.push(1, (0..200).map(|i| view(1, i, u64::from(i / 3 % 2), 64)).collect());
         let mut seen = Vec::new();
         loop {
-            let batch = queue.take_batch(false);
+            let batch = queue.take_batch(false, MAX_BATCH);
             assert!(batch.len() <= MAX_BATCH && batch.iter().all(|view| view.key == batch[0].key));
             assert!(batch.is_sorted_by_key(|view| view.view.frame));
             if batch.is_empty() {
@@ -269,7 +243,7 @@ mod tests {
         mapped[5].key.planes.tone.exposure = ExposureEv::new(1.0).unwrap();
         let mut queue = FairQueue::default();
         queue.push(1, mapped);
-        let sizes: Vec<usize> = (0..4).map(|_| queue.take_batch(false).len()).collect();
+        let sizes: Vec<usize> = (0..4).map(|_| queue.take_batch(false, MAX_BATCH).len()).collect();
         assert_eq!(sizes, [3, 2, 1, 0]);
     }
 
@@ -277,10 +251,10 @@ mod tests {
     fn large_views_make_small_batches() {
         let mut queue = FairQueue::default();
         queue.push(1, views(1, 8, 4096));
-        assert_eq!(queue.take_batch(false).len(), 4);
+        assert_eq!(queue.take_batch(false, MAX_BATCH).len(), 4);
         let mut queue = FairQueue::default();
         queue.push(1, views(1, 2, 16_384));
-        assert_eq!(queue.take_batch(false).len(), 1);
+        assert_eq!(queue.take_batch(false, MAX_BATCH).len(), 1);
     }
 
     #[test]
@@ -288,13 +262,13 @@ mod tests {
         let mut queue = FairQueue::default();
         queue.push(1, views(1, 5000, 64));
         (2..10).for_each(|stream| queue.push(stream, vec![view(stream, 0, 0, 64)]));
-        let batch = queue.take_batch(false);
+        let batch = queue.take_batch(false, MAX_BATCH);
         let of = |stream: u64| batch.iter().filter(|view| view.reply.outbox().stream == stream).count();
         assert_eq!(of(1), SHARED_VIEWS);
         assert!((2..10).all(|stream| of(stream) == 1), "views of one size go together");
-        assert_eq!(queue.take_batch(false).len(), MAX_BATCH, "alone, it has the device");
-        assert_eq!(queue.take_batch(true).len(), SHARED_VIEWS, "a pose may arrive at any time");
-        assert_eq!(queue.take_batch(false).len(), MAX_BATCH);
+        assert_eq!(queue.take_batch(false, MAX_BATCH).len(), MAX_BATCH, "alone, it has the device");
+        assert_eq!(queue.take_batch(true, MAX_BATCH).len(), SHARED_VIEWS, "a pose may arrive at any time");
+        assert_eq!(queue.take_batch(false, MAX_BATCH).len(), MAX_BATCH);
     }
 
     #[test]
@@ -307,7 +281,7 @@ mod tests {
                 let waiting = queue.withdraw(stream);
                 queue.push(stream, vec![waiting.into_iter().next().unwrap_or_else(|| view(stream, 0, 0, 64))]);
             });
-            let batch = queue.take_batch(true);
+            let batch = queue.take_batch(true, MAX_BATCH);
             assert_eq!(batch.len(), SHARED_VIEWS);
             batch.iter().for_each(|view| served[view.reply.outbox().stream as usize] += 1);
         }
@@ -319,7 +293,7 @@ mod tests {
         let mut queue = FairQueue::default();
         queue.push(1, views(1, 9, 1024));
         queue.push(2, vec![view(2, 0, 0, 64)]);
-        assert_eq!(queue.take_batch(false).len(), 1);
+        assert_eq!(queue.take_batch(false, MAX_BATCH).len(), 1);
     }
 
     #[test]
@@ -328,7 +302,7 @@ mod tests {
         queue.push(1, views(1, 100, 64));
         queue.push(2, views(2, 30, 32));
         queue.push(7, views(7, 30, 16));
-        let leaders: Vec<u64> = (0..6).map(|_| queue.take_batch(false)[0].reply.outbox().stream).collect();
+        let leaders: Vec<u64> = (0..6).map(|_| queue.take_batch(false, MAX_BATCH)[0].reply.outbox().stream).collect();
         assert_eq!(leaders, [1, 2, 7, 1, 2, 7]);
     }
 
@@ -340,8 +314,8 @@ mod tests {
         queue.push(5, Vec::new());
         assert_eq!(queue.withdraw(3).len(), 5);
         assert!(queue.withdraw(3).is_empty());
-        let batch = queue.take_batch(false);
+        let batch = queue.take_batch(false, MAX_BATCH);
         assert_eq!((batch.len(), batch[0].reply.outbox().stream), (1, 4));
-        assert!(queue.take_batch(false).is_empty() && queue.streams.is_empty());
+        assert!(queue.take_batch(false, MAX_BATCH).is_empty() && queue.streams.is_empty());
     }
 }

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use depth_image::{PinholeCamera, ViewPlanes};
 use node::Quotas;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::Status;
@@ -33,7 +32,7 @@ struct Pool {
 /// The room that a node has. The memory of all views has one bound: a part is for live views alone, a small part for
 /// batches alone, and the rest for both. Neither can starve the other.
 pub(crate) struct NodeQuota {
-    limits: Quotas,
+    pub(crate) limits: Quotas,
     streams: Arc<Semaphore>,
     views: Arc<Semaphore>,
     common: Pool,
@@ -68,9 +67,8 @@ impl Pool {
 impl NodeQuota {
     pub(crate) fn new(limits: Quotas) -> Self {
         let units = limits.view_bytes / UNIT;
-        let part = |share: f64| (units as f64 * share) as usize;
-        let live = part(LIVE_SHARE);
-        let batches = part(BATCH_SHARE);
+        let live = (units as f64 * LIVE_SHARE) as usize;
+        let batches = (units as f64 * BATCH_SHARE) as usize;
         Self {
             limits,
             streams: room(limits.streams),
@@ -81,23 +79,21 @@ impl NodeQuota {
         }
     }
 
-    /// Checks that a view can ever have room.
-    pub(crate) fn check_view(&self, camera: &PinholeCamera, planes: ViewPlanes) -> Result<(), Status> {
-        self.limits.check_view(camera, planes)
-    }
-
     /// Room for one more stream.
     pub(crate) fn stream(&self) -> Result<OwnedSemaphorePermit, Status> {
-        let refused = |_| self.exceeded("streams", self.limits.streams, "streams are open");
-        self.streams.clone().try_acquire_owned().map_err(refused)
+        let place = self.streams.clone().try_acquire_owned();
+        place.map_err(|_| self.exceeded("streams", self.limits.streams, "streams are open"))
     }
 
     /// Room for a view of a batch; an error while all room is taken.
     pub(crate) fn try_view(&self, bytes: usize) -> Result<NodeCredit, Status> {
-        let few = |_| self.exceeded("views", self.limits.views, "views are in flight");
-        let view = self.views.clone().try_acquire_owned().map_err(few)?;
-        let small = || self.exceeded("view-memory", self.limits.view_bytes, "bytes of views are in flight");
-        Ok(NodeCredit { _bytes: self.try_bytes(&self.batches, bytes).ok_or_else(small)?, _view: Some(view) })
+        let Ok(view) = self.views.clone().try_acquire_owned() else {
+            return Err(self.exceeded("views", self.limits.views, "views are in flight"));
+        };
+        match self.try_bytes(&self.batches, bytes) {
+            Some(bytes) => Ok(NodeCredit { _bytes: bytes, _view: Some(view) }),
+            None => Err(self.exceeded("view-memory", self.limits.view_bytes, "bytes of views are in flight")),
+        }
     }
 
     /// Waits for room for a view of a batch.
@@ -153,6 +149,7 @@ pub(crate) fn closed<E>(_: E) -> Status {
 
 #[cfg(test)]
 mod tests {
+    use depth_image::{PinholeCamera, ViewPlanes};
     use glam::{UVec2, Vec3};
     use tonic::Code;
 
@@ -166,8 +163,9 @@ mod tests {
     #[test]
     fn a_view_beyond_all_memory_is_refused_with_its_size() {
         let camera = PinholeCamera::looking_at(Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0, UVec2::new(160, 170));
-        assert!(quota().check_view(&camera, ViewPlanes::COLOR).is_ok());
-        let refused = quota().check_view(&camera, ViewPlanes::WITH_DEPTH).unwrap_err();
+        let limits = quota().limits;
+        assert!(limits.check_views(&[camera], ViewPlanes::COLOR).is_ok());
+        let refused = limits.check_views(&[camera], ViewPlanes::WITH_DEPTH).unwrap_err();
         assert_eq!(refused.code(), Code::InvalidArgument);
         assert!(refused.message().contains("a view of 160×170 takes 380800 bytes"), "{refused}");
     }

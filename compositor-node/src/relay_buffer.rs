@@ -81,8 +81,8 @@ impl RelayBuffer {
 
 /// The image at a place, or, at the place after the last one, the error that the images end with. Waits for it.
 async fn at(mut state: watch::Receiver<RelayState>, place: usize) -> Option<Result<(u32, EncodedImage), Status>> {
-    let is_known = |state: &RelayState| state.images.len() > place || state.ended.is_some();
-    let is_evicted = state.wait_for(is_known).await.is_err();
+    let known = state.wait_for(|state| state.images.len() > place || state.ended.is_some());
+    let is_evicted = known.await.is_err();
     let state = state.borrow();
     if let Some(image) = state.images.get(place) {
         return Some(Ok(image.clone()));

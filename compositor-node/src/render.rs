@@ -5,13 +5,13 @@ use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
 use codec::{StageTimes, encode_view};
-use depth_image::View;
-use node::{DirectWork, Engine, NodeMetrics, Operation, Scenes, Turn, ViewWork, WorkClass, blocking, own_time};
+use depth_image::{PinholeCamera, View};
+use node::{DirectWork, Engine, EngineError, NodeMetrics, Operation, Turn, ViewWork, WorkClass, blocking, own_time};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::Status;
 
 use crate::auditor::Auditor;
-use crate::batch::{Source, Waiting};
+use crate::batch::{BatchKey, Source, Waiting};
 use crate::outbox::Output;
 use crate::queue::{Arrivals, Lane};
 use crate::view_times::ViewTimes;
@@ -25,23 +25,15 @@ const PREVIEW_SHARE: f64 = 0.5;
 /// Makes views, and encodes them. Clones share the encoders.
 #[derive(Clone)]
 pub(crate) struct Rendering {
-    scenes: Arc<Scenes>,
-    metrics: NodeMetrics,
     times: Arc<ViewTimes>,
     encoders: Arc<Semaphore>,
     auditor: Arc<Auditor>,
-    /// The share of the time for views that are drawn from the scene while others are served.
-    direct_share: f64,
 }
 
 impl Rendering {
     pub(crate) fn new(auditor: Arc<Auditor>, times: Arc<ViewTimes>) -> Self {
-        let Auditor { scenes, metrics, direct_share, .. } = &*auditor;
-        let scenes = scenes.clone();
-        let metrics = metrics.clone();
-        let direct_share = *direct_share;
         let encoders = Arc::new(Semaphore::new(available_parallelism().map_or(1, usize::from)));
-        Self { scenes, metrics, times, encoders, auditor, direct_share }
+        Self { times, encoders, auditor }
     }
 
     /// Makes the views of one lane, until it is aborted.
@@ -59,7 +51,7 @@ impl Rendering {
             batch.retain(|view| {
                 let is_wanted = !view.reply.outbox().gone.is_cancelled();
                 if !is_wanted {
-                    self.metrics.drop_view("client gone");
+                    self.auditor.metrics.drop_view("client gone");
                 }
                 is_wanted
             });
@@ -67,7 +59,7 @@ impl Rendering {
                 let served = arrivals.served();
                 let busy_s = self.render(turn, batch, place).await;
                 if lane == Lane::Direct && arrivals.served() > served {
-                    tokio::time::sleep(pause(busy_s, self.direct_share)).await;
+                    tokio::time::sleep(pause(busy_s, self.auditor.direct_share)).await;
                 } else if lane == Lane::Preview {
                     tokio::time::sleep(pause(busy_s, PREVIEW_SHARE)).await;
                 }
@@ -78,7 +70,7 @@ impl Rendering {
     /// Gives the seconds that the views had the device.
     async fn render(&self, turn: Turn, batch: Vec<Waiting>, place: OwnedSemaphorePermit) -> f64 {
         let start = Instant::now();
-        let metrics = &self.metrics;
+        let metrics = &self.auditor.metrics;
         match self.make(turn, &batch).await {
             Ok((operation, views, busy_s)) => {
                 let batch_s = start.elapsed().as_secs_f64();
@@ -113,27 +105,15 @@ impl Rendering {
         let cameras: Vec<_> = batch.iter().map(|waiting| waiting.view.camera).collect();
         let count = cameras.len();
         let scene = source.scene().clone();
-        let make = move |engine: &dyn Engine| match &source {
-            Source::Sets(sets) => {
-                let work = ViewWork { cameras: cameras.clone(), method: key.method.clone(), planes: key.planes };
-                engine
-                    .reconstruct(sets.on_device.as_ref(), &work, turn)
-                    .map(|views| (Operation::ReconstructView, views))
-            }
-            Source::Scene { plan, scene_time_s } => {
-                let mut work = DirectWork::of(&plan.workload, cameras.clone(), key.planes);
-                work.scene_time_s = *scene_time_s;
-                if key.is_preview {
-                    work.lighting = engine.preview_lighting(&work.lighting)?;
-                }
-                engine.draw_direct(&work, turn).map(|views| (Operation::DirectView, views))
-            }
+        let operation = match &source {
+            Source::Sets(_) => Operation::ReconstructView,
+            Source::Scene { .. } => Operation::DirectView,
         };
-        let timed = move |engine: &dyn Engine| {
-            let (made, busy_s) = own_time(engine, || make(engine));
-            made.map(|made| (made, busy_s))
-        };
-        let ((operation, views), busy_s) = self.scenes.on_device(&scene, timed).await?;
+        let making = self.auditor.scenes.on_device(&scene, move |engine| {
+            let (views, busy_s) = own_time(engine, || views_of(engine, &source, &key, &cameras, turn));
+            Ok((views?, busy_s))
+        });
+        let (views, busy_s) = making.await?;
         if views.len() == count {
             Ok((operation, views, busy_s))
         } else {
@@ -156,7 +136,7 @@ impl Rendering {
                 return;
             };
             let times = stage_times(&waiting, start, batch_s, count);
-            let metrics = self.metrics.clone();
+            let metrics = self.auditor.metrics.clone();
             encodings.spawn(async move {
                 encode_and_send(waiting, view, times, &metrics).await;
                 drop(encoder);
@@ -164,6 +144,29 @@ impl Rendering {
         }
         while encodings.join_next().await.is_some() {}
         drop(place);
+    }
+}
+
+fn views_of(
+    engine: &dyn Engine,
+    source: &Source,
+    key: &BatchKey,
+    cameras: &[PinholeCamera],
+    turn: Turn,
+) -> Result<Vec<View>, EngineError> {
+    match source {
+        Source::Sets(sets) => {
+            let work = ViewWork { cameras: cameras.to_vec(), method: key.method.clone(), planes: key.planes };
+            engine.reconstruct(sets.on_device.as_ref(), &work, turn)
+        }
+        Source::Scene { plan, scene_time_s } => {
+            let mut work = DirectWork::of(&plan.workload, cameras.to_vec(), key.planes);
+            work.scene_time_s = *scene_time_s;
+            if key.is_preview {
+                work.lighting = engine.preview_lighting(&work.lighting)?;
+            }
+            engine.draw_direct(&work, turn)
+        }
     }
 }
 

@@ -62,14 +62,13 @@ impl Reports {
     /// Whether the same report was made just now.
     fn is_repeated(&self, plan_epoch: u64, sampler: &str) -> bool {
         let mut last = self.last.lock();
-        let is_repeated = |(epoch, name, at): &(u64, String, Instant)| {
-            *epoch == plan_epoch && name == sampler && at.elapsed() < REPEAT_AFTER
-        };
-        if last.as_ref().is_some_and(is_repeated) {
-            return true;
+        let is_repeated = last
+            .as_ref()
+            .is_some_and(|(epoch, name, at)| *epoch == plan_epoch && name == sampler && at.elapsed() < REPEAT_AFTER);
+        if !is_repeated {
+            *last = Some((plan_epoch, sampler.to_owned(), Instant::now()));
         }
-        *last = Some((plan_epoch, sampler.to_owned(), Instant::now()));
-        false
+        is_repeated
     }
 }
 

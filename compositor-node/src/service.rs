@@ -77,7 +77,7 @@ impl CompositorService {
     /// The sets on the device.
     #[must_use]
     pub fn memory(&self) -> Arc<dyn SetMemory> {
-        self.shared.sets.memory()
+        Arc::new(self.shared.sets.cached.clone())
     }
 
     /// Relays the images that this compositor fetches to other compositors.
@@ -94,7 +94,8 @@ impl Compositor for CompositorService {
         let place = self.shared.quota.stream()?;
         let stream = self.shared.stream_count.fetch_add(1, Ordering::Relaxed);
         let outbox = Outbox::new(stream, self.shared.metrics.clone());
-        let client = ClientStream::open(self.shared.clone(), stream, outbox.clone());
+        self.shared.metrics.streams.inc();
+        let client = ClientStream { shared: self.shared.clone(), stream, outbox: outbox.clone() };
         let requests = until_drained(requests, self.shutdown.clone());
         tokio::spawn(async move {
             client.run(requests).await;

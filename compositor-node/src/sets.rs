@@ -1,6 +1,5 @@
 //! Sample sets on the device: complete or absent.
 
-use std::pin::Pin;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -8,22 +7,19 @@ use cluster::{Assignment, CommonCell, DIRECT, Policy, SceneRef, SetContent, Time
 use codec::EncodedImage;
 use depth_image::{DepthImage, PinholeCamera, SampleCamera, nearest_set};
 use node::{
-    ByteCache, CellPlan, CommonSet, Engine, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, SampleSet,
-    Scenes, SetMemory, SharedSet, Turn,
+    ByteCache, CellPlan, CommonSet, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Scenes, SharedSet, Turn,
 };
 use node::{WorkClass, beyond_timeline, depth_images_bytes, most_image_bytes, most_set_bytes, own_time, set_bytes};
 use tonic::{Code, Status};
 use wire::rpc::Messages;
 
 use crate::fetch::Fetcher;
-use crate::fetch_share::{FetchTimes, SetRequest};
+use crate::fetch_share::SetRequest;
 use crate::relay_buffer::{RelayBuffer, RelayBuffers};
 use crate::reports::Reports;
 
 /// The set that is shown and one that late views still need, besides those that are fetched ahead.
 const SETS_IN_USE: usize = 2;
-
-type BoxFuture<T> = Pin<Box<dyn Future<Output = T> + Send>>;
 
 /// While one set is sent and loaded, samplers should have another to work on.
 const SETS_AHEAD: u32 = 2;
@@ -35,7 +31,7 @@ const ATTEMPTS: usize = 16;
 /// The first of these, after which they take turns.
 const CALM_ATTEMPTS: usize = 3;
 /// A set that was used within this time is not evicted for that of another cell ahead: a viewer's next pose needs it.
-const RECENTLY: Duration = Duration::from_millis(500);
+pub(crate) const RECENTLY: Duration = Duration::from_millis(500);
 
 /// Sets that are fetched before views need them; where samplers take turns, one of each sampler. A timeline may have fewer.
 fn sets_ahead(plan: &Assignment) -> u32 {
@@ -77,34 +73,29 @@ pub(crate) struct ViewSets {
 /// The content of a set without its cameras: equal for the sets of all view cells at one moment.
 fn moment(plan: &Assignment, set_index: u32) -> Option<SetContent> {
     let workload = Workload { sample_cameras: Vec::new(), cell_first_indices: Vec::new(), ..plan.workload.clone() };
-    Assignment { workload, samplers: Vec::new(), ..plan.clone() }.set_content(set_index)
+    SetContent::of(&workload, set_index)
 }
 
 /// The content of a cell's sets without their time: equal for all moments.
 fn subject(plan: &Assignment) -> Option<SetContent> {
     let workload = Workload { timeline: Timeline::still(0.0), refinement_steps: 1, ..plan.workload.clone() };
-    Assignment { workload, samplers: Vec::new(), ..plan.clone() }.set_content(0)
+    SetContent::of(&workload, 0)
 }
 
 /// The sets of one compositor: the latest few moments of each cell, as long as memory has room.
 pub(crate) struct Sets {
-    scenes: Arc<Scenes>,
+    pub(crate) scenes: Arc<Scenes>,
     fetcher: Arc<Fetcher>,
     metrics: NodeMetrics,
     plans: PlansInForce,
     reports: Reports,
-    cached: ByteCache<SetContent, ReadySet>,
+    pub(crate) cached: ByteCache<SetContent, ReadySet>,
     relays: RelayBuffers,
     /// Held by a view that could not have all of its sets at once.
     assembling: tokio::sync::Mutex<()>,
 }
 
 impl Sets {
-    /// The sets on the device.
-    pub(crate) fn memory(&self) -> Arc<dyn SetMemory> {
-        Arc::new(self.cached.clone())
-    }
-
     /// Checks that a plan's samples have the planes that a method needs, where there are samples.
     pub(crate) fn check_method(&self, plan: &Assignment, method: &str) -> Result<(), Status> {
         let needed = self.scenes.engine().sample_planes(method)?;
@@ -114,11 +105,6 @@ impl Sets {
         }
         let text = "needs planes that this workload does not sample; a session of this method does";
         Err(Status::invalid_argument(format!("reconstruction_method: {method} {text}")))
-    }
-
-    /// Counts a live stream as open on the device until the guard is dropped.
-    pub(crate) fn live_stream(&self) -> Box<dyn std::any::Any + Send + Sync> {
-        self.scenes.engine().live_stream()
     }
 
     pub(crate) fn new(scenes: Arc<Scenes>, plans: PlansInForce, config: &NodeConfig, metrics: NodeMetrics) -> Self {
@@ -226,23 +212,19 @@ impl Sets {
         common: &[(CommonCell, CellPlan)],
         set_index: u32,
     ) -> Result<Option<ViewSets>, Status> {
-        let loaded = |(cell, plan): &(CommonCell, CellPlan)| {
-            Some((cell.clone(), self.cached.loaded(&plan.set_content(set_index)?)?))
-        };
-        let common: Option<Vec<_>> = common.iter().map(loaded).collect();
-        let Some(common) = common else { return Ok(None) };
-        let sets: Vec<CommonSet> = common.iter().map(|(cell, ready)| (cell.clone(), ready.set.clone())).collect();
+        let mut sets: Vec<CommonSet> = Vec::new();
+        let mut in_use = Vec::new();
+        for (cell, plan) in common {
+            let ready = plan.set_content(set_index).and_then(|content| self.cached.loaded(&content));
+            let Some(ready) = ready else { return Ok(None) };
+            sets.push((cell.clone(), ready.set.clone()));
+            in_use.push(ready);
+        }
         let on_device = match sets.is_empty() {
             true => of_cell.set.clone(),
             false => self.scenes.engine().with_common(of_cell.set.clone(), sets)?,
         };
-        let common = common.into_iter().map(|(_, ready)| ready).collect();
-        Ok(Some(ViewSets { of_cell, on_device, _common: common }))
-    }
-
-    /// A set that is loaded already.
-    pub(crate) fn loaded(&self, content: &SetContent) -> Option<Pinned<ReadySet>> {
-        self.cached.loaded(content)
+        Ok(Some(ViewSets { of_cell, on_device, _common: in_use }))
     }
 
     /// The loaded set of the same moment whose cameras are nearest to a view.
@@ -262,7 +244,7 @@ impl Sets {
         for next in set_index.saturating_add(1)..=last.min(set_index.saturating_add(ahead)) {
             if of_cell.set_content(next) != of_cell.set_content(set_index) {
                 for cell in [of_cell].into_iter().chain(common.iter().map(|(_, cell)| cell)) {
-                    self.begin_to_load(cell, next, Duration::ZERO);
+                    self.load_ahead(cell, next, Duration::ZERO);
                 }
             }
         }
@@ -275,21 +257,17 @@ impl Sets {
         room.saturating_sub(SETS_IN_USE)
     }
 
-    /// Begins to load the set of a cell that no view needs yet, where it has room; gives its content if it is loaded or
-    /// being loaded.
-    pub(crate) fn load_ahead(self: &Arc<Self>, plan: &CellPlan, set_index: u32) -> Option<SetContent> {
-        self.begin_to_load(plan, set_index, RECENTLY)
-    }
-
-    fn begin_to_load(self: &Arc<Self>, plan: &CellPlan, set_index: u32, recently: Duration) -> Option<SetContent> {
+    /// Begins to load the set of a cell that no view needs yet, where it has room beside sets that were used within `recently`;
+    /// gives its content if it is loaded or being loaded.
+    pub(crate) fn load_ahead(
+        self: &Arc<Self>,
+        plan: &CellPlan,
+        set_index: u32,
+        recently: Duration,
+    ) -> Option<SetContent> {
         let content = plan.set_content(set_index)?;
         let loading = self.loading(plan, set_index, content);
         self.cached.load_ahead(content, self.most_bytes(plan), recently, loading).then_some(content)
-    }
-
-    /// Whether a set is being loaded.
-    pub(crate) fn is_loading(&self, content: &SetContent) -> bool {
-        self.cached.is_loading(content)
     }
 
     /// A load that another workload's plan began may end with that plan. This plan, if it is in force, then begins its own.
@@ -304,7 +282,7 @@ impl Sets {
         // It is about to be used: what is loaded beside it must not evict it.
         let _in_use = self.cached.loaded(&content);
         for (_, other) in beside {
-            self.begin_to_load(other, set_index, Duration::ZERO);
+            self.load_ahead(other, set_index, Duration::ZERO);
         }
         let load = || self.cached.get(content, self.most_bytes(plan), self.loading(plan, set_index, content));
         match load().await {
@@ -332,17 +310,15 @@ impl Sets {
         plan: &CellPlan,
         set_index: u32,
         content: SetContent,
-    ) -> impl FnOnce() -> BoxFuture<Result<(ReadySet, usize), Status>> + Send + 'static {
+    ) -> impl Future<Output = Result<(ReadySet, usize), Status>> + Send + 'static {
         let sets = self.clone();
         let plan = plan.clone();
-        move || {
-            Box::pin(async move {
-                let loaded = sets.fetch_and_upload(&plan, set_index, content).await;
-                if let Err(status) = &loaded {
-                    tracing::debug!(set_index, reason = status.message(), "a sample set was not loaded");
-                }
-                loaded
-            })
+        async move {
+            let loaded = sets.fetch_and_upload(&plan, set_index, content).await;
+            if let Err(status) = &loaded {
+                tracing::debug!(set_index, reason = status.message(), "a sample set was not loaded");
+            }
+            loaded
         }
     }
 
@@ -356,7 +332,10 @@ impl Sets {
         let relay = plan.relays(&self.plans.node_name).then(|| self.relays.of(content));
         let relay = relay.filter(|relay| !relay.has_failed());
         let request = SetRequest { plan: plan.clone(), set_index, relay: relay.clone() };
-        let (set, times) = self.fetch(&request).await?;
+        let (set, times) = self.fetcher.fetch(&request).await.map_err(|failed| {
+            self.reports.report(plan.plan_epoch, &failed);
+            failed.status
+        })?;
         let subject = subject(plan).ok_or_else(|| beyond_timeline(set_index))?;
         let latest = SETS_IN_USE + sets_ahead(plan) as usize + EARLIER_SETS;
         self.cached.keep_latest(latest - 1, |set| set.subject == subject);
@@ -366,11 +345,11 @@ impl Sets {
             set_bytes(&set.images) + depth_images_bytes(compared) + relay.as_ref().map_or(0, RelayBuffer::bytes);
         let fetched_s = start.elapsed().as_secs_f64();
         let set = Arc::new(set);
-        let upload = move |engine: &dyn Engine| {
+        let uploading = self.scenes.on_device(&plan.workload.scene, move |engine| {
             let (set, upload_s) = own_time(engine, || engine.upload(&set, Turn::of(WorkClass::Batch)));
-            set.map(|set| (set, upload_s))
-        };
-        let (set, upload_s) = self.scenes.on_device(&plan.workload.scene, upload).await?;
+            Ok((set?, upload_s))
+        });
+        let (set, upload_s) = uploading.await?;
         self.metrics.done.add(plan.workload_number, Operation::LoadSet, 1.0, times.decode_s + upload_s);
         self.metrics.done.transferred(plan.workload_number, times.bytes, times.transfer_s);
         self.metrics.sets_loaded.inc();
@@ -382,13 +361,6 @@ impl Sets {
         let cell = plan.cell;
         let scene = plan.workload.scene.clone();
         Ok((ReadySet { set, scene, since, content, cell, moment, subject, cameras, sample_images, relay }, bytes))
-    }
-
-    async fn fetch(&self, request: &SetRequest) -> Result<(SampleSet, FetchTimes), Status> {
-        self.fetcher.fetch(request).await.map_err(|failed| {
-            self.reports.report(request.plan.plan_epoch, &failed);
-            failed.status
-        })
     }
 }
 

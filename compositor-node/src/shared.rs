@@ -14,7 +14,7 @@ use crate::batch::{BatchKey, Loaded, Place, Source, Waiting};
 use crate::outbox::Outbox;
 use crate::queue::{Arrivals, Lane};
 use crate::quota::NodeQuota;
-use crate::sets::{ReadySet, Sets, ViewSets};
+use crate::sets::{RECENTLY, ReadySet, Sets, ViewSets};
 use crate::view_times::{ViewKind, ViewTimes};
 
 /// A live view that takes longer has a lane beside that of others.
@@ -45,11 +45,6 @@ pub(crate) struct ClientStream {
 }
 
 impl ClientStream {
-    pub(crate) fn open(shared: Arc<Shared>, stream: u64, outbox: Arc<Outbox>) -> Self {
-        shared.metrics.streams.inc();
-        Self { shared, stream, outbox }
-    }
-
     /// Hands views over to the lanes of the device.
     pub(crate) fn queue(&self, is_live: bool, views: Vec<Waiting>) {
         let mut by_lane = BTreeMap::<Lane, Vec<Waiting>>::new();
@@ -79,19 +74,21 @@ impl Shared {
         if key.is_preview {
             return Lane::Preview;
         }
-        let plan = || self.plans.in_force(key.workload_number);
-        if key.method == DIRECT && plan().is_some_and(|plan| plan.policy != Policy::Direct) {
+        if key.method == DIRECT
+            && self.plans.in_force(key.workload_number).is_some_and(|plan| plan.policy != Policy::Direct)
+        {
             return Lane::Direct;
         }
-        let is_long = |limit_s: f64| match self.times.predicted_s(&key.kind(), key.size_px) {
+        let limit_s = if is_live { LONG_LIVE_S } else { LONG_BATCH_S };
+        let is_long = match self.times.predicted_s(&key.kind(), key.size_px) {
             Some(seconds) => seconds > limit_s,
             None => key.size_px.element_product().saturating_mul(key.planes.antialias.samples()) > LONG_PIXELS,
         };
-        match is_live {
-            true if is_long(LONG_LIVE_S) => Lane::LongLive,
-            true => Lane::Live,
-            false if is_long(LONG_BATCH_S) => Lane::LongBatch,
-            false => Lane::Batch,
+        match (is_live, is_long) {
+            (true, true) => Lane::LongLive,
+            (true, false) => Lane::Live,
+            (false, true) => Lane::LongBatch,
+            (false, false) => Lane::Batch,
         }
     }
 
@@ -103,25 +100,23 @@ impl Shared {
         let Some(largest) = request.views.iter().map(|view| view.camera).max_by_key(PinholeCamera::pixel_count) else {
             return Ok(());
         };
-        self.quota.check_view(&largest, request.planes)?;
+        self.quota.limits.check_views(&[largest], request.planes)?;
         self.times.check(Instant::now(), &kind, largest.size_px)
     }
 
     /// The plan for views by a method, if this node makes views in it. Views that are drawn from the scene ignore the plan's
     /// policy.
     pub(crate) fn of_compositor(&self, plan: Arc<Assignment>, method: &str) -> Result<Arc<Assignment>, Status> {
-        if plan.composites(&self.plans.node_name) {
-            self.sets.check_method(&plan, method)?;
-            let is_as_planned = method != DIRECT || plan.policy == Policy::Direct;
-            return Ok(if is_as_planned {
-                plan
-            } else {
-                Arc::new(Assignment { policy: Policy::Direct, ..(*plan).clone() })
-            });
-        }
         let name = &self.plans.node_name;
-        let plan_epoch = plan.plan_epoch;
-        Err(Status::failed_precondition(format!("{name} makes no views in plan_epoch {plan_epoch}")))
+        if !plan.composites(name) {
+            let plan_epoch = plan.plan_epoch;
+            return Err(Status::failed_precondition(format!("{name} makes no views in plan_epoch {plan_epoch}")));
+        }
+        self.sets.check_method(&plan, method)?;
+        if method != DIRECT || plan.policy == Policy::Direct {
+            return Ok(plan);
+        }
+        Ok(Arc::new(Assignment { policy: Policy::Direct, ..(*plan).clone() }))
     }
 
     /// Waits for the source of a cell's set.
@@ -143,18 +138,17 @@ impl Shared {
     /// Begins to fetch the sets of cells, one after the other while memory has room.
     pub(crate) fn begin_to_load(&self, plan: &Arc<Assignment>, set_index: u32, cells: impl Iterator<Item = u32>) {
         if plan.policy != Policy::Direct {
-            let plans = cells.map_while(|cell| CellPlan::of(plan, cell).ok());
             let common = CellPlan::of_common(plan);
-            let has_room = |(ahead, plan): &(usize, CellPlan)| *ahead <= self.sets.room_ahead(plan, &common);
-            let plans = plans.enumerate().take_while(has_room);
-            plans.map_while(|(_, plan)| self.sets.load_ahead(&plan, set_index)).for_each(drop);
+            let plans = cells.map_while(|cell| CellPlan::of(plan, cell).ok()).enumerate();
+            let plans = plans.take_while(|(ahead, plan)| *ahead <= self.sets.room_ahead(plan, &common));
+            plans.map_while(|(_, plan)| self.sets.load_ahead(&plan, set_index, RECENTLY)).for_each(drop);
         }
     }
 
     /// The source of a place, if it is still there; it is not waited for.
     pub(crate) fn source_at(&self, plan: &Arc<Assignment>, set_index: u32, place: Place) -> Option<Source> {
         match place.content {
-            Some(content) => self.with_common(self.sets.loaded(&content)?, plan, set_index).map(Source::Sets),
+            Some(content) => self.with_common(self.sets.cached.loaded(&content)?, plan, set_index).map(Source::Sets),
             None => scene(plan, set_index).ok(),
         }
     }
@@ -162,7 +156,7 @@ impl Shared {
     /// The set of a cell, if it is loaded.
     pub(crate) fn loaded(&self, plan: &Arc<Assignment>, set_index: u32, cell: u32) -> Option<Loaded> {
         let id = plan.sample_set_id(set_index)?;
-        let set = self.sets.loaded(&CellPlan::of(plan, cell).ok()?.set_content(set_index)?)?;
+        let set = self.sets.cached.loaded(&CellPlan::of(plan, cell).ok()?.set_content(set_index)?)?;
         let place = Place { id, cell, is_neighbour: false, content: Some(set.content) };
         Some(Loaded { source: Source::Sets(self.with_common(set, plan, set_index)?), place, wait_s: 0.0 })
     }

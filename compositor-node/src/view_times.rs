@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use depth_image::Antialias;
 use glam::UVec2;
+use node::push_latest;
 use parking_lot::Mutex;
 use tonic::Status;
 
@@ -54,14 +55,8 @@ impl ViewTimes {
         let mut kinds = self.kinds.lock();
         let known = kinds.iter().position(|times| times.kind == *kind).and_then(|place| kinds.remove(place));
         let mut pixel_s = known.map(|times| times.pixel_s).unwrap_or_default();
-        pixel_s.push_back(seconds / pixels.max(LEAST_PIXELS) as f64);
-        if pixel_s.len() > REMEMBERED {
-            pixel_s.pop_front();
-        }
-        kinds.push_back(Times { kind: kind.clone(), pixel_s, learned_at: now });
-        if kinds.len() > MAX_KINDS {
-            kinds.pop_front();
-        }
+        push_latest(&mut pixel_s, seconds / pixels.max(LEAST_PIXELS) as f64, REMEMBERED);
+        push_latest(&mut kinds, Times { kind: kind.clone(), pixel_s, learned_at: now }, MAX_KINDS);
     }
 
     /// The seconds of one view; `None` for a kind that is not known yet.
@@ -72,16 +67,14 @@ impl ViewTimes {
     /// Checks that a view does not take too long. A view of a kind that is not known yet is admitted.
     pub(crate) fn check(&self, now: Instant, kind: &ViewKind, size_px: UVec2) -> Result<(), Status> {
         let most_s = self.max_view_s;
-        let is_refused = |(seconds, learned_at): &(f64, Instant)| {
-            *seconds > most_s && now.saturating_duration_since(*learned_at) < TRIED_AGAIN_AFTER
-        };
-        match self.known(kind, size_px).filter(is_refused) {
-            None => Ok(()),
-            Some((seconds, _)) => Err(Status::resource_exhausted(format!(
-                "max-view-s: a view of {}x{} by {} is predicted to take {seconds:.1} s here, and {most_s} s are allowed",
-                size_px.x, size_px.y, kind.method
-            ))),
+        let Some((seconds, learned_at)) = self.known(kind, size_px) else { return Ok(()) };
+        if seconds <= most_s || now.saturating_duration_since(learned_at) >= TRIED_AGAIN_AFTER {
+            return Ok(());
         }
+        Err(Status::resource_exhausted(format!(
+            "max-view-s: a view of {}x{} by {} is predicted to take {seconds:.1} s here, and {most_s} s are allowed",
+            size_px.x, size_px.y, kind.method
+        )))
     }
 
     /// The seconds of one view, and when its kind was learned from.

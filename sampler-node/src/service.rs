@@ -99,7 +99,7 @@ impl SamplerService {
         let number = plan.workload_number;
         let turn = self.turns.of(number);
         let plans = self.plans.clone();
-        let make = move || async move {
+        let make = async move {
             let _one = turn.lock().await;
             // A later plan may be in force by now: its sets must not wait for sets that no plan has any more.
             if !plans.have_set(&content, set_index) {
@@ -126,13 +126,15 @@ impl SamplerService {
         let (send, chunks) = mpsc::channel(CHUNKS_AHEAD);
         let wanted = request.image_indices;
         let stall = self.stall;
-        let send_all = async move |send: &mpsc::Sender<Result<Chunk, Status>>| match images.await {
-            Ok(images) => send_chunks(images, id, &wanted, send, stall).await,
-            Err(status) => drop(send.send_timeout(Err(status), stall).await),
-        };
         tokio::spawn(async move {
+            let send_all = async {
+                match images.await {
+                    Ok(images) => send_chunks(images, id, &wanted, &send, stall).await,
+                    Err(status) => drop(send.send_timeout(Err(status), stall).await),
+                }
+            };
             tokio::select! {
-                () = send_all(&send) => (),
+                () = send_all => (),
                 () = send.closed() => (),
             }
         });
@@ -232,11 +234,10 @@ fn pack(sampled: &Sampled, tiles: f64, workload_number: u64, metrics: &NodeMetri
         let message = format!("{} images were sampled for {} cameras", images.len(), camera_indices.len());
         return Err(Status::internal(message));
     }
-    let encode = |(index, image): (&u32, &_)| {
-        let encoded = encode_sample_image(image).map_err(|error| Status::internal(error.to_string()))?;
-        Ok((*index, encoded))
-    };
-    let encoded = camera_indices.iter().zip(images).map(encode).collect::<Result<Vec<_>, Status>>()?;
+    let mut encoded = Vec::with_capacity(images.len());
+    for (&index, image) in camera_indices.iter().zip(images) {
+        encoded.push((index, encode_sample_image(image).map_err(|error| Status::internal(error.to_string()))?));
+    }
     let whole_images = images.len() as f64 / tiles;
     let total_s = duration_s + encoding.elapsed().as_secs_f64();
     let image_s = total_s / whole_images.max(f64::MIN_POSITIVE);

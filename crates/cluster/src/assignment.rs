@@ -83,7 +83,7 @@ impl ApplyPlan {
 }
 
 impl From<Assignment> for ApplyPlan {
-    /// Of an unknown number of workloads.
+    /// A plan that does not tell which workloads are open.
     fn from(assignment: Assignment) -> Self {
         Self { assignment, open_workloads: Vec::new() }
     }
@@ -93,9 +93,8 @@ impl Assignment {
     /// The cameras of all images that are sampled: of the set's images, or of their tiles.
     #[must_use]
     pub fn sampled_cameras(&self) -> Vec<SampleCamera> {
-        let tiles =
-            |camera: &SampleCamera| (0..self.tile_count).map(|tile| camera.tile(tile, self.tile_count)).collect();
-        self.workload.sample_cameras.iter().flat_map(|camera| -> Vec<SampleCamera> { tiles(camera) }).collect()
+        let cameras = self.workload.sample_cameras.iter();
+        cameras.flat_map(|camera| (0..self.tile_count).map(move |tile| camera.tile(tile, self.tile_count))).collect()
     }
 
     /// The compositor that relays images to this one; `None` where it asks the samplers.
@@ -109,8 +108,8 @@ impl Assignment {
     /// Whether other compositors ask this node for images.
     #[must_use]
     pub fn relays(&self, node_name: &str) -> bool {
-        let asks = |share: &CompositorShare| self.relay_of(&share.node_name).is_some_and(|r| r.node_name == node_name);
-        self.compositors.iter().any(asks)
+        let mut relays = self.compositors.iter().filter_map(|share| self.relay_of(&share.node_name));
+        relays.any(|relay| relay.node_name == node_name)
     }
 
     /// The samplers of a set: all of them, or, where they take turns, the one whose turn it is.
@@ -138,15 +137,14 @@ impl Assignment {
     #[must_use]
     pub fn of_cell(&self, cell: u32) -> Option<Self> {
         let cameras = self.workload.cameras_of_cell(cell as usize)?;
-        let images = [cameras.start, cameras.end].map(|camera| camera as u32 * self.tile_count);
-        let own = |share: &SamplerShare| {
-            let of_cell = share.image_indices.iter().filter(|image| (images[0]..images[1]).contains(image));
-            SamplerShare { image_indices: of_cell.map(|image| image - images[0]).collect(), ..share.clone() }
-        };
-        let samplers = self.samplers.iter().map(own).filter(|share| !share.image_indices.is_empty()).collect();
+        let images = cameras.start as u32 * self.tile_count..cameras.end as u32 * self.tile_count;
+        let samplers = self.samplers.iter().map(|share| {
+            let of_cell = share.image_indices.iter().filter(|image| images.contains(image));
+            SamplerShare { image_indices: of_cell.map(|image| image - images.start).collect(), ..share.clone() }
+        });
         Some(Self {
             workload: self.workload.of_cell(cell as usize)?,
-            samplers,
+            samplers: samplers.filter(|share| !share.image_indices.is_empty()).collect(),
             compositors: self.compositors.clone(),
             method: self.method.clone(),
             ..*self
@@ -200,17 +198,15 @@ impl Assignment {
         let image_count = self.image_count();
         let mut sampled = vec![0u32; image_count];
         for &index in self.samplers.iter().flat_map(|share| &share.image_indices) {
-            *sampled
-                .get_mut(index as usize)
-                .ok_or_else(|| InvalidField::out_of_range("image_indices", index, "of an image or a tile"))? += 1;
+            match sampled.get_mut(index as usize) {
+                Some(times) => *times += 1,
+                None => return Err(InvalidField::out_of_range("image_indices", index, "of an image or a tile")),
+            }
         }
         let each = self.sets_at_once();
         if self.policy != Policy::Direct && (image_count == 0 || sampled.iter().any(|&times| times != each)) {
-            return Err(InvalidField::out_of_range(
-                "image_indices",
-                format!("{sampled:?} times"),
-                "each image once a set",
-            ));
+            let given = format!("{sampled:?} times");
+            return Err(InvalidField::out_of_range("image_indices", given, "each image once a set"));
         }
         if self.compositors.is_empty() { Err(InvalidField::Missing { field: "compositors" }) } else { Ok(()) }
     }

@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::check::{InvalidField, at_most, finite_seconds, within};
 use crate::limits::MAX_PROBE_VIEWS;
-use crate::probing::ProbedView;
 
 /// The greatest share of a compositor's time that audits may take.
 pub const MAX_AUDIT_TIME_RATIO: f64 = 0.5;
@@ -63,6 +62,17 @@ pub struct AuditedView {
     pub is_part: bool,
 }
 
+/// Errors of a view, each from 0 to 1, as nodes measure them for budgets and audits; see `planner::ViewErrors`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "as there")]
+pub struct ProbedView {
+    pub foreground_ratio: f64,
+    pub flip: f64,
+    pub flip_whole: f64,
+    pub mean_square: f64,
+    pub disoccluded_ratio: f64,
+}
+
 /// The findings of the audits of a promise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct AuditSummary {
@@ -110,6 +120,16 @@ impl AuditOrder {
     }
 }
 
+impl ProbedView {
+    pub(crate) fn validate(&self) -> Result<(), InvalidField> {
+        within(self.foreground_ratio, 0.0..=1.0, "foreground_ratio", "from 0 to 1")?;
+        within(self.flip, 0.0..=1.0, "flip_ratio", "from 0 to 1")?;
+        within(self.flip_whole, 0.0..=1.0, "flip_whole_ratio", "from 0 to 1")?;
+        within(self.mean_square, 0.0..=1.0, "mean_square_ratio", "from 0 to 1")?;
+        within(self.disoccluded_ratio, 0.0..=1.0, "disoccluded_ratio", "from 0 to 1")
+    }
+}
+
 impl AuditReport {
     /// Whether there is nothing to report.
     #[must_use]
@@ -141,8 +161,7 @@ impl AuditSummary {
     pub fn validate(&self) -> Result<(), InvalidField> {
         finite_seconds(self.audits_per_s, "audit.audits_per_s")?;
         finite_seconds(self.busy_s, "audit.busy_s")?;
-        let ratios = self.error.map(|ErrorInterval { least, mean, greatest }| [least, mean, greatest]);
-        let mut ratios = ratios.into_iter().flatten();
-        ratios.try_for_each(|ratio| within(ratio, 0.0..=1.0, "audit.error", "from 0 to 1"))
+        let Some(ErrorInterval { least, mean, greatest }) = self.error else { return Ok(()) };
+        [least, mean, greatest].into_iter().try_for_each(|ratio| within(ratio, 0.0..=1.0, "audit.error", "from 0 to 1"))
     }
 }

@@ -133,10 +133,8 @@ pub fn tile_count(count: u32) -> Result<(), InvalidField> {
 /// For more, and for a camera that cannot be used.
 pub fn viewpoints(viewpoints: &[PinholeCamera]) -> Result<(), InvalidField> {
     at_most(viewpoints.len(), MAX_VIEWPOINTS, "viewpoints")?;
-    let check = |camera: &PinholeCamera| {
-        camera.validate().map_err(|source| InvalidField::Camera { field: "viewpoints", source })
-    };
-    viewpoints.iter().try_for_each(check)
+    let mut checked = viewpoints.iter().map(PinholeCamera::validate);
+    checked.try_for_each(|camera| camera.map_err(|source| InvalidField::Camera { field: "viewpoints", source }))
 }
 
 /// Views are made from pinholes.

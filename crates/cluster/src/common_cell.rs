@@ -30,9 +30,10 @@ impl CommonCell {
     /// # Errors
     /// For too many mirrors or bases, and values that no peer may send.
     pub(crate) fn check_all(cells: &[Self]) -> Result<(), InvalidField> {
-        let count = |kind| cells.iter().filter(|cell| cell.kind == kind).count();
-        at_most(count(CommonKind::Mirrors), MAX_MIRROR_CELLS, "common_cells of mirrors")?;
-        at_most(count(CommonKind::Base), 1, "common_cells of a base")?;
+        let (mirrors, bases): (Vec<&Self>, Vec<&Self>) =
+            cells.iter().partition(|cell| cell.kind == CommonKind::Mirrors);
+        at_most(mirrors.len(), MAX_MIRROR_CELLS, "common_cells of mirrors")?;
+        at_most(bases.len(), 1, "common_cells of a base")?;
         for Self { bounds, sampling, .. } in cells {
             nonempty(sampling, "common_cells.sampling_method")?;
             if bounds.is_empty() || !bounds.min.is_finite() || !bounds.max.is_finite() {
@@ -47,8 +48,8 @@ impl CommonCell {
         if self.kind == CommonKind::Base {
             return check_cube(cameras, 0);
         }
-        let is_other = |camera: &&SampleCamera| camera.depth().is_none() || !camera.is_of_model(&cameras[0]);
-        cameras.iter().find(is_other).map_or(Ok(()), |other| {
+        let other = cameras.iter().find(|camera| camera.depth().is_none() || !camera.is_of_model(&cameras[0]));
+        other.map_or(Ok(()), |other| {
             let expected = "the model of the mirror cell's first camera";
             Err(InvalidField::out_of_range("sample_cameras.model", other.model_name(), expected))
         })

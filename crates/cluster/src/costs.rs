@@ -49,8 +49,8 @@ impl TileCosts {
     fn share_above(&self, height: f64) -> f64 {
         let Some(shares) = self.row_shares else { return height };
         let all: f64 = shares.iter().sum();
-        let covered = |part: usize| (height * ROW_PARTS as f64 - part as f64).clamp(0.0, 1.0);
-        shares.iter().enumerate().map(|(part, share)| share * covered(part)).sum::<f64>() / all
+        let rows = height * ROW_PARTS as f64;
+        shares.iter().enumerate().map(|(part, share)| share * (rows - part as f64).clamp(0.0, 1.0)).sum::<f64>() / all
     }
 }
 
@@ -68,8 +68,8 @@ impl Costs {
         let overhead_s = self.tile_overhead_s();
         let top = tile as f64 / tile_count as f64;
         let bottom = (tile + 1) as f64 / tile_count as f64;
-        let share_above = |height| self.tiles.unwrap_or_default().share_above(height);
-        overhead_s + (self.sample_image_s - overhead_s) * (share_above(bottom) - share_above(top))
+        let tiles = self.tiles.unwrap_or_default();
+        overhead_s + (self.sample_image_s - overhead_s) * (tiles.share_above(bottom) - tiles.share_above(top))
     }
 
     /// Seconds that every tile costs anew: those of the whole image where it is not tileable.
@@ -103,10 +103,10 @@ impl Costs {
         let Some(tiles) = self.tiles else { return Ok(()) };
         finite_seconds(tiles.overhead_s, "sample_overhead_s")?;
         let Some(shares) = tiles.row_shares else { return Ok(()) };
-        let is_valid =
-            shares.iter().all(|share| (0.0..=1.0).contains(share)) && shares.iter().any(|&share| share > 0.0);
-        let given = || format!("{shares:?}");
-        if is_valid { Ok(()) } else { Err(InvalidField::out_of_range("sample_row_shares", given(), "from 0 to 1")) }
+        if shares.iter().all(|share| (0.0..=1.0).contains(share)) && shares.iter().any(|&share| share > 0.0) {
+            return Ok(());
+        }
+        Err(InvalidField::out_of_range("sample_row_shares", format!("{shares:?}"), "from 0 to 1"))
     }
 }
 

@@ -13,7 +13,6 @@ mod costs;
 pub mod limits;
 mod node;
 mod policy;
-mod probing;
 mod promise;
 mod scene;
 mod session;
@@ -30,7 +29,7 @@ mod test_support;
 pub use assignment::{ApplyPlan, Assignment, CompositorShare, SamplerShare};
 pub use audit::{
     AuditOrder, AuditReport, AuditSummary, AuditedView, ErrorInterval, MAX_AUDIT_TIME_RATIO, MOST_PLANNED_PIXELS,
-    is_one_place,
+    ProbedView, is_one_place,
 };
 pub use check::{
     InvalidField, at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints,
@@ -42,7 +41,6 @@ pub use node::{
     Welcome, WorkReport,
 };
 pub use policy::{Policy, PolicyChoice, UnknownPolicy};
-pub use probing::ProbedView;
 pub use promise::{BudgetRequest, Promise, PromiseState};
 pub use scene::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, ScenePart, SceneRef};
 pub use session::{ChangeSession, Quality, SessionEvent, SessionPlan, SessionRequest, SessionStage};

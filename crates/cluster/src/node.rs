@@ -3,12 +3,11 @@
 use depth_image::{ExposureEv, PinholeCamera, ViewPlanes};
 use serde::{Deserialize, Serialize};
 
-use crate::audit::AuditReport;
+use crate::audit::{AuditReport, ProbedView};
 use crate::check::{InvalidField, at_most, finite_seconds, nonempty, reason, text, viewpoints, within};
 use crate::check_seconds;
 use crate::costs::{Costs, MeasuredCosts};
 use crate::limits::{MAX_BATCH, MAX_JOINING_EPOCH};
-use crate::probing::ProbedView;
 use crate::scene::SceneRef;
 use crate::views::check_view_size;
 use crate::workload::{SamplePlanes, Workload};
@@ -170,8 +169,7 @@ impl SharedLightCosts {
     /// For a share that is not from 0 to 1, and for times that are negative or not finite.
     pub fn validate(&self) -> Result<(), InvalidField> {
         check_seconds!(self; surfaces_s, look_up_s, unknown_s);
-        let is_ratio = (0.0..=1.0).contains(&self.known_ratio);
-        is_ratio.then_some(()).ok_or_else(|| InvalidField::out_of_range("known_ratio", self.known_ratio, "from 0 to 1"))
+        within(self.known_ratio, 0.0..=1.0, "known_ratio", "from 0 to 1")
     }
 }
 

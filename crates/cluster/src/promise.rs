@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::audit::AuditSummary;
-use crate::check::{InvalidField, nonempty, reason, text, within};
+use crate::check::{InvalidField, nonempty, reason, within};
 
 /// Fewer audits a second, ten an hour, find little.
 const BARELY_PER_S: f64 = 10.0 / 3600.0;
@@ -66,23 +66,12 @@ impl std::fmt::Display for Promise {
     /// One line: the budget, the state and the reason; while representations are measured, also the one in force.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { budget, state, representation, reason, .. } = self;
-        match state {
-            PromiseState::Measuring => write!(f, "promise {budget}: {state}, now {representation}: {reason}"),
-            PromiseState::Kept if self.is_barely_watched() => {
-                write!(f, "promise {budget}: {state} (barely watched): {reason}")
-            }
-            PromiseState::Kept | PromiseState::Broken | PromiseState::Unreachable => {
-                write!(f, "promise {budget}: {state}: {reason}")
-            }
-        }
-    }
-}
-
-impl BudgetRequest {
-    /// # Errors
-    /// For a text that is too long.
-    pub fn validate(&self) -> Result<(), InvalidField> {
-        text(self.budget.as_deref().unwrap_or_default(), "budget")
+        let remark = match state {
+            PromiseState::Measuring => format!(", now {representation}"),
+            PromiseState::Kept if self.is_barely_watched() => " (barely watched)".to_owned(),
+            PromiseState::Kept | PromiseState::Broken | PromiseState::Unreachable => String::new(),
+        };
+        write!(f, "promise {budget}: {state}{remark}: {reason}")
     }
 }
 

@@ -92,7 +92,7 @@ impl SessionRequest {
         at_most(self.fallbacks.len(), MAX_FALLBACKS, "fallbacks")?;
         self.fallbacks.iter().try_for_each(Quality::validate)?;
         self.forced_tile_count.map_or(Ok(()), tile_count)?;
-        self.budget.validate()?;
+        text(self.budget.budget.as_deref().unwrap_or_default(), "budget")?;
         viewpoints(&self.viewpoints)
     }
 }

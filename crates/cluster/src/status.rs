@@ -180,11 +180,8 @@ impl OfferStatus {
         self.scene.validate()?;
         at_most(self.sample_cameras.len(), MAX_SAMPLE_CAMERAS, "sample_cameras")?;
         let OfferSettings { method, sampling, lighting } = &self.settings;
-        for (setting, field) in
-            [(method, "reconstruction_method"), (sampling, "sampling_method"), (lighting, "lighting")]
-        {
-            text(setting.as_deref().unwrap_or_default(), field)?;
-        }
-        Ok(())
+        text(method.as_deref().unwrap_or_default(), "reconstruction_method")?;
+        text(sampling.as_deref().unwrap_or_default(), "sampling_method")?;
+        text(lighting.as_deref().unwrap_or_default(), "lighting")
     }
 }

@@ -71,18 +71,3 @@ impl Default for Refinement {
         Self { step: 0, steps: 1 }
     }
 }
-
-impl Refinement {
-    /// The last of `steps` steps; 0 counts as 1.
-    #[must_use]
-    pub const fn last_of(steps: u32) -> Self {
-        let step = steps.saturating_sub(1);
-        Self { step, steps: step + 1 }
-    }
-
-    /// Whether this is full quality.
-    #[must_use]
-    pub const fn is_last(&self) -> bool {
-        self.step + 1 >= self.steps
-    }
-}

@@ -81,8 +81,9 @@ impl Workload {
     /// time for steps: each set shows the last. So do views drawn directly.
     #[must_use]
     pub fn refinement(&self, set_index: u32) -> Refinement {
-        let last = Refinement::last_of(self.refinement_steps);
-        if self.timeline.moves() { last } else { Refinement { step: set_index.min(last.step), ..last } }
+        let last_step = self.refinement_steps.saturating_sub(1);
+        let step = if self.timeline.moves() { last_step } else { set_index.min(last_step) };
+        Refinement { step, steps: last_step + 1 }
     }
 
     /// Whether pictures of so many pixels find surfaces by rays; `None` where that was not measured.
@@ -120,8 +121,8 @@ impl Workload {
     #[must_use]
     pub fn cameras_of_cell(&self, cell: usize) -> Option<Range<usize>> {
         let firsts = if self.cell_first_indices.is_empty() { &[0][..] } else { &self.cell_first_indices };
-        let first = |cell: usize| firsts.get(cell).map(|&first| first as usize);
-        Some(first(cell)?..first(cell + 1).unwrap_or(self.sample_cameras.len()))
+        let end = firsts.get(cell + 1).map_or(self.sample_cameras.len(), |&next| next as usize);
+        Some(*firsts.get(cell)? as usize..end)
     }
 
     /// The workload of one cell alone, without common cells; `None` beyond the last.
@@ -155,11 +156,15 @@ impl Workload {
     /// The workload with other view cells, the cameras of each, and its own common cells.
     #[must_use]
     pub fn with_view_cells(self, cells: Vec<Vec<SampleCamera>>) -> Self {
-        let common = self.view_cell_count()..self.cell_count();
-        let cameras_of = |cell| Some((self.common_cell(cell)?.clone(), self.of_cell(cell)?.sample_cameras));
-        let common: Vec<_> = common.filter_map(cameras_of).collect();
-        let cell_first_indices = first_indices(&cells);
-        let sample_cameras = cells.concat();
+        let common = (self.view_cell_count()..self.cell_count())
+            .filter_map(|cell| Some((self.common_cell(cell)?.clone(), self.of_cell(cell)?.sample_cameras)))
+            .collect();
+        let mut cell_first_indices = Vec::new();
+        let mut sample_cameras = Vec::new();
+        for cameras in cells {
+            cell_first_indices.push(sample_cameras.len() as u32);
+            sample_cameras.extend(cameras);
+        }
         Self { sample_cameras, cell_first_indices, common_cells: Vec::new(), ..self }.with_common_cells(common)
     }
 
@@ -249,12 +254,16 @@ impl Workload {
             return Err(InvalidField::out_of_range("bounds", "empty", "min <= max on every axis"));
         }
         self.timeline.validate()?;
-        let refused = |source| InvalidField::Light { field: "background", source };
-        self.background.validate().map_err(refused)?;
+        self.background.validate().map_err(|source| InvalidField::Light { field: "background", source })?;
         if self.background.is_mapped {
             return Err(InvalidField::out_of_range("background", "a map", "a gradient"));
         }
-        validate_illumination(&self.illumination)?;
+        at_most(self.illumination.lights.len(), MAX_LIGHTS, "illumination.lights")?;
+        for light in &self.illumination.lights {
+            light.validate().map_err(|source| InvalidField::Light { field: "illumination.lights", source })?;
+        }
+        let environment = self.illumination.environment.validate();
+        environment.map_err(|source| InvalidField::Light { field: "illumination.environment", source })?;
         within(self.refinement_steps, 1..=MAX_REFINEMENT_STEPS, "refinement_step_count", "from 1 to 64")
     }
 
@@ -264,14 +273,12 @@ impl Workload {
         at_most(firsts.len(), MAX_CELLS + self.common_cells.len(), "cell_first_indices")?;
         at_most(self.sample_cameras.len(), MAX_SAMPLE_CAMERAS * self.cell_count(), "sample_cameras")?;
         let ends = firsts.iter().skip(1).copied().chain([self.sample_cameras.len() as u32]);
-        let is_cell = |(&first, end): (&u32, u32)| first < end && end - first <= MAX_SAMPLE_CAMERAS as u32;
-        if firsts.first().is_some_and(|&first| first > 0) || !firsts.iter().zip(ends).all(is_cell) {
+        let most = MAX_SAMPLE_CAMERAS as u32;
+        let are_cells = firsts.iter().zip(ends).all(|(&first, end)| first < end && end - first <= most);
+        if firsts.first().is_some_and(|&first| first > 0) || !are_cells {
             let given = format!("{firsts:?} of {} sample_cameras", self.sample_cameras.len());
-            return Err(InvalidField::out_of_range(
-                "cell_first_indices",
-                given,
-                "rising from 0, by 1 to 16 cameras each",
-            ));
+            let allowed = "rising from 0, by 1 to 16 cameras each";
+            return Err(InvalidField::out_of_range("cell_first_indices", given, allowed));
         }
         Ok(())
     }
@@ -305,30 +312,12 @@ impl Workload {
     fn check_common(&self) -> Result<(), InvalidField> {
         CommonCell::check_all(&self.common_cells)?;
         let common = self.common_cells.len();
-        match common > 0 && common >= self.cell_first_indices.len() {
-            true => {
-                let allowed = "fewer than cells: views have one at least";
-                Err(InvalidField::out_of_range("common_cells", common, allowed))
-            }
-            false => Ok(()),
+        if common > 0 && common >= self.cell_first_indices.len() {
+            let allowed = "fewer than cells: views have one at least";
+            return Err(InvalidField::out_of_range("common_cells", common, allowed));
         }
+        Ok(())
     }
-}
-
-/// The index of each cell's first camera.
-fn first_indices(cells: &[Vec<SampleCamera>]) -> Vec<u32> {
-    let first =
-        |next: &mut u32, cameras: &Vec<SampleCamera>| Some(std::mem::replace(next, *next + cameras.len() as u32));
-    cells.iter().scan(0, first).collect()
-}
-
-fn validate_illumination(illumination: &Illumination) -> Result<(), InvalidField> {
-    at_most(illumination.lights.len(), MAX_LIGHTS, "illumination.lights")?;
-    let light_error = |field| move |source| InvalidField::Light { field, source };
-    for light in &illumination.lights {
-        light.validate().map_err(light_error("illumination.lights"))?;
-    }
-    illumination.environment.validate().map_err(light_error("illumination.environment"))
 }
 
 /// The name of a sample set's content, of one cell. It is equal for equal scene, time, cameras, sampling, lighting,
@@ -336,42 +325,27 @@ fn validate_illumination(illumination: &Illumination) -> Result<(), InvalidField
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct SetContent([u8; 32]);
 
-/// Everything that the content of a set depends on.
-#[derive(Serialize)]
-struct Shown<'a> {
-    scene: &'a str,
-    time_s: f32,
-    temporal_reference_s: f32,
-    sampling: &'a str,
-    lighting: &'a str,
-    planes: SamplePlanes,
-    volume: Aabb,
-    background: Environment,
-    refinement: [u32; 2],
-    traced_pixel_count: Option<u32>,
-    illumination: &'a Illumination,
-    sample_cameras: &'a [SampleCamera],
-}
-
 impl SetContent {
     /// The content of a set; `None` beyond the timeline.
-    pub(crate) fn of(workload: &Workload, set_index: u32) -> Option<Self> {
+    #[must_use]
+    pub fn of(workload: &Workload, set_index: u32) -> Option<Self> {
         let time_s = workload.timeline.time_s(set_index)?;
         let refinement = workload.refinement(set_index);
-        let shown = Shown {
-            scene: workload.scene.hash.as_str(),
+        // Everything that the content of a set depends on.
+        let shown = (
+            workload.scene.hash.as_str(),
             time_s,
-            temporal_reference_s: workload.timeline.temporal_reference_s(set_index).unwrap_or(time_s),
-            sampling: &workload.sampling,
-            lighting: &workload.lighting,
-            planes: workload.planes,
-            volume: workload.volume,
-            background: workload.background,
-            refinement: [refinement.step, refinement.steps],
-            traced_pixel_count: workload.traced_pixel_count,
-            illumination: &workload.illumination,
-            sample_cameras: &workload.sample_cameras,
-        };
+            workload.timeline.temporal_reference_s(set_index).unwrap_or(time_s),
+            &workload.sampling,
+            &workload.lighting,
+            workload.planes,
+            workload.volume,
+            workload.background,
+            [refinement.step, refinement.steps],
+            workload.traced_pixel_count,
+            &workload.illumination,
+            &workload.sample_cameras,
+        );
         // Postcard prefixes lengths, so that no two sets have the same bytes. Writing to a hasher does not fail.
         let hash = postcard::to_io(&shown, blake3::Hasher::new()).ok()?;
         Some(Self(hash.finalize().into()))

@@ -57,10 +57,8 @@ fn append(whole: &mut View, band: View, rows: &Range<u32>) {
     let pixels = rows.start as usize * row..rows.end as usize * row;
     whole.srgb8.extend_from_slice(&band.srgb8[3 * pixels.start..3 * pixels.end]);
     if let Some(plane) = band.inverse_depth_per_m {
-        whole
-            .inverse_depth_per_m
-            .get_or_insert_with(|| Vec::with_capacity(all))
-            .extend_from_slice(&plane[pixels.clone()]);
+        let whole = whole.inverse_depth_per_m.get_or_insert_with(|| Vec::with_capacity(all));
+        whole.extend_from_slice(&plane[pixels.clone()]);
     }
     if let Some(plane) = band.provenance {
         whole.provenance.get_or_insert_with(|| Vec::with_capacity(all)).extend_from_slice(&plane[pixels]);
@@ -72,14 +70,14 @@ fn bands(camera: &PinholeCamera, most_pixels: usize) -> Vec<Band> {
     let UVec2 { x: columns, y: height } = camera.size_px;
     let rows_seen = (most_pixels as u32 / columns.max(1)).next_multiple_of(8);
     let rows = rows_seen.saturating_sub(2 * VIEW_REACH_PX).max(VIEW_REACH_PX);
-    let band = |first: u32| {
+    let bands = (0..height).step_by(rows as usize).map(|first| {
         let end = (first + rows).min(height);
         let top = first.saturating_sub(VIEW_REACH_PX);
         let bottom = (end + VIEW_REACH_PX).min(height);
         let part = ViewPart { first_px: UVec2::new(0, top), size_px: UVec2::new(columns, bottom - top) };
         Band { camera: camera.part(&part), rows: first - top..end - top }
-    };
-    (0..height).step_by(rows as usize).map(band).collect()
+    });
+    bands.collect()
 }
 
 #[cfg(test)]

@@ -88,7 +88,7 @@ impl UploadedSet for Uploaded {}
 impl Uploaded {
     /// The images of a set of images.
     fn images(set: &dyn UploadedSet) -> Result<&UploadedImages, EngineError> {
-        match (set as &dyn Any).downcast_ref().ok_or_else(of_another_device)? {
+        match Self::of_device(set)? {
             Self::Images(images) => Ok(images),
             Self::Light(_) => Err(invalid(
                 "common_cells",
@@ -96,10 +96,10 @@ impl Uploaded {
             )),
         }
     }
-}
 
-fn of_another_device() -> EngineError {
-    device("a sample set of another device")
+    fn of_device(set: &dyn UploadedSet) -> Result<&Self, EngineError> {
+        (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))
+    }
 }
 
 impl GpuEngine {
@@ -109,10 +109,10 @@ impl GpuEngine {
     /// There is no device, or a shader is broken.
     pub fn open(preference: DevicePreference) -> Result<Self, EngineError> {
         let gpu = Gpu::open(preference).map_err(device)?;
-        let renderer = Arc::new(sampling::renderer(&gpu).map_err(render_error)?);
+        let renderer = Arc::new(sampling::renderer(&gpu).map_err(|error| Caught::from(error).0)?);
         Ok(Self {
             sampler: Sampler::sharing(renderer.clone()),
-            reconstructor: Reconstructor::new(&gpu).map_err(reconstruction_error)?,
+            reconstructor: Reconstructor::new(&gpu).map_err(|error| Caught::from(error).0)?,
             renderer,
             gpu,
             preference,
@@ -171,13 +171,13 @@ impl GpuEngine {
         if self.has_scene(hash) {
             return Ok(());
         }
-        self.scenes.put(hash, self.catching(|| GpuScene::upload(&self.gpu, scene).map_err(render_error))?);
+        self.scenes.put(hash, self.catching(|| GpuScene::upload(&self.gpu, scene))?);
         Ok(())
     }
 
     /// Does work on the device on this thread, and turns faults of the device into errors.
-    fn catching<T>(&self, work: impl FnOnce() -> Result<T, EngineError>) -> Result<T, EngineError> {
-        self.gpu.catching(|| work().map_err(Caught)).map_err(|Caught(error)| error)
+    fn catching<T, E: Into<Caught>>(&self, work: impl FnOnce() -> Result<T, E>) -> Result<T, EngineError> {
+        self.gpu.catching(|| work().map_err(Into::into)).map_err(|Caught(error)| error)
     }
 
     /// A scene on the device.
@@ -197,15 +197,15 @@ impl GpuEngine {
         method: SamplingMethod,
     ) -> Result<Vec<SampleImage>, EngineError> {
         let wanted = request.wanted.iter().filter_map(|&wanted| request.cameras.get(wanted as usize));
-        let image = |camera: &SampleCamera| match camera {
+        let images = wanted.map(|camera| match camera {
             SampleCamera::Layered(camera) => self.sampler.sample_layers(draw, camera, method).map(SampleImage::Layered),
             SampleCamera::LightField(camera) => {
                 let draw = DrawWork { lighting: mirrored, ..draw };
                 self.sampler.sample_light_field(draw, camera).map(SampleImage::LightField)
             }
             SampleCamera::Depth(_) => Err(SamplingError::Lines { method: method.to_string() }),
-        };
-        self.catching(|| wanted.map(image).collect::<Result<_, _>>().map_err(sampling_error))
+        });
+        self.catching(|| images.collect::<Result<_, _>>())
     }
 
     fn upload_light(
@@ -216,8 +216,7 @@ impl GpuEngine {
         turn: gpu::Turn,
     ) -> Result<SharedSet, EngineError> {
         let scene = self.scene(&set.scene_hash)?;
-        let upload = || self.renderer.upload_light(&scene, lighting, images, turn).map_err(render_error);
-        let cache = self.catching(upload)?;
+        let cache = self.catching(|| self.renderer.upload_light(&scene, lighting, images, turn))?;
         Ok(Arc::new(Uploaded::Light(UploadedLight {
             cache,
             scene_hash: set.scene_hash.clone(),
@@ -250,8 +249,7 @@ impl GpuEngine {
         let pixels = work.cameras.first().map_or(0, PinholeCamera::pixel_count);
         let draw = draw_work(&scene, *lighting, *scene_time_s, light.by_rays(pixels), turn);
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
-            let make = || self.renderer.draw_cached_views(draw, cache, quality, cameras, work.planes);
-            self.catching(|| make().map_err(render_error))
+            self.catching(|| self.renderer.draw_cached_views(draw, cache, quality, cameras, work.planes))
         })
     }
 }
@@ -296,7 +294,7 @@ impl Engine for GpuEngine {
     }
 
     fn has_scene(&self, hash: &str) -> bool {
-        self.scenes.has(hash)
+        self.scenes.get(hash).is_some()
     }
 
     fn images_are_sequential(&self, sampling: &str) -> Result<bool, EngineError> {
@@ -327,8 +325,8 @@ impl Engine for GpuEngine {
         Box::new(self.gpu.device_queue.live_stream())
     }
 
-    fn take_waited_s(&self) -> f64 {
-        gpu::take_waited_s()
+    fn waited_s(&self) -> f64 {
+        gpu::waited_s()
     }
 
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<SampleImage>, EngineError> {
@@ -359,7 +357,7 @@ impl Engine for GpuEngine {
             planes: render::SamplePlanes { specular: true, normal, corners, light, ..Default::default() },
             temporal_reference_s: request.temporal_reference_s,
         };
-        let images = self.catching(|| self.sampler.sample(&work).map_err(sampling_error))?;
+        let images = self.catching(|| self.sampler.sample(&work))?;
         Ok(images.into_iter().map(SampleImage::Depth).collect())
     }
 
@@ -385,11 +383,10 @@ impl Engine for GpuEngine {
             mips: set.is_common,
         };
         let turn = device_turn(turn);
-        let upload = || match &set.images {
+        let set = self.catching(|| match &set.images {
             SampleImages::Depth(images) => self.reconstructor.upload(images, &description, turn),
             SampleImages::Cube(cube) => self.reconstructor.upload_cube(cube, &description, turn),
-        };
-        let set = self.catching(|| upload().map_err(reconstruction_error))?;
+        })?;
         Ok(Arc::new(Uploaded::Images(UploadedImages {
             set: Arc::new(set),
             reflections: lighting.reflections(),
@@ -416,7 +413,7 @@ impl Engine for GpuEngine {
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
-        let images = match (set as &dyn Any).downcast_ref().ok_or_else(of_another_device)? {
+        let images = match Uploaded::of_device(set)? {
             Uploaded::Images(images) => images,
             Uploaded::Light(light) => return self.draw_cached(light, method, work, turn),
         };
@@ -427,15 +424,9 @@ impl Engine for GpuEngine {
         let common = CommonSets { mirrors, base: base.as_deref() };
         let turn = device_turn(turn);
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
-            let make = || {
-                self.reconstructor.reconstruct(ReconstructRequest {
-                    common,
-                    turn,
-                    planes: work.planes,
-                    ..ReconstructRequest::new(set, cameras, method)
-                })
-            };
-            self.catching(|| make().map_err(reconstruction_error))
+            let request = ReconstructRequest::new(set, cameras, method);
+            let request = ReconstructRequest { common, turn, planes: work.planes, ..request };
+            self.catching(|| self.reconstructor.reconstruct(request))
         })
     }
 
@@ -451,13 +442,12 @@ impl Engine for GpuEngine {
         let views = self.draw_cached(light, method, &with_provenance, turn)?;
         let scene = self.scene(&light.scene_hash)?;
         let pixels = work.cameras.first().map_or(0, PinholeCamera::pixel_count);
-        let by_rays = light.by_rays(pixels);
-        let unlit = draw_work(&scene, Lighting::UNLIT, light.scene_time_s, by_rays, turn);
-        let surfaces = || self.renderer.draw_views(unlit, &work.cameras, work.planes).map_err(render_error);
+        let unlit = draw_work(&scene, Lighting::UNLIT, light.scene_time_s, light.by_rays(pixels), turn);
+        let draw = || self.renderer.draw_views(unlit, &work.cameras, work.planes);
         let draft = ReconstructionMethod::from(LightCacheQuality::Draft);
         Ok(Some(LightParts {
             known_ratio: known_ratio(&views),
-            surfaces_s: self.warm_time(|| self.catching(surfaces))?,
+            surfaces_s: self.warm_time(|| self.catching(draw))?,
             draft_s: self.warm_time(|| self.draw_cached(light, draft, work, turn))?,
         }))
     }
@@ -466,8 +456,7 @@ impl Engine for GpuEngine {
         let scene = self.scene(&work.scene_hash)?;
         let Some(camera) = work.cameras.first() else { return Ok(None) };
         let draw = draw_work(&scene, parsed("lighting", &work.lighting)?, work.scene_time_s, None, turn);
-        let count = || self.renderer.traced_pixel_count(draw, camera).map_err(render_error);
-        self.catching(count).map(Some)
+        self.catching(|| self.renderer.traced_pixel_count(draw, camera)).map(Some)
     }
 
     fn draw_direct(&self, work: &DirectWork, turn: Turn) -> Result<Vec<View>, EngineError> {
@@ -475,7 +464,7 @@ impl Engine for GpuEngine {
         let lighting = parsed("lighting", &work.lighting)?;
         let draw = draw_work(&scene, lighting, work.scene_time_s, work.surfaces_by_rays, turn);
         views_in_bands(&work.cameras, BAND_PIXELS, |cameras| {
-            self.catching(|| self.renderer.draw_views(draw, cameras, work.planes).map_err(render_error))
+            self.catching(|| self.renderer.draw_views(draw, cameras, work.planes))
         })
     }
 }
@@ -501,56 +490,59 @@ struct Caught(EngineError);
 
 impl From<GpuError> for Caught {
     fn from(error: GpuError) -> Self {
-        Self(gpu_error(error))
+        Self(match error {
+            GpuError::Lost(reason) => EngineError::Lost(reason),
+            GpuError::OutOfMemory(reason) => EngineError::OutOfMemory(reason),
+            _ => device(error),
+        })
     }
 }
 
-fn gpu_error(error: GpuError) -> EngineError {
-    match error {
-        GpuError::Lost(reason) => EngineError::Lost(reason),
-        GpuError::OutOfMemory(reason) => EngineError::OutOfMemory(reason),
-        _ => device(error),
+impl From<RenderError> for Caught {
+    fn from(error: RenderError) -> Self {
+        Self(match error {
+            RenderError::Camera { .. } | RenderError::Model { .. } => invalid("camera", error),
+            RenderError::Samples { .. } => invalid("sample_images", error),
+            RenderError::Gpu(error) => return error.into(),
+            RenderError::Shader(_) => device(error),
+        })
     }
 }
 
-fn render_error(error: RenderError) -> EngineError {
-    match error {
-        RenderError::Camera { .. } | RenderError::Model { .. } => invalid("camera", error),
-        RenderError::Samples { .. } => invalid("sample_images", error),
-        RenderError::Gpu(error) => gpu_error(error),
-        RenderError::Shader(_) => device(error),
+impl From<ReconstructionError> for Caught {
+    fn from(error: ReconstructionError) -> Self {
+        Self(match error {
+            ReconstructionError::Camera { .. } => invalid("camera", error),
+            ReconstructionError::Volume => invalid("volume", error),
+            ReconstructionError::NoSamples { .. } | ReconstructionError::NoScene { .. } => {
+                invalid("reconstruction_method", error)
+            }
+            ReconstructionError::Gpu(error) => return error.into(),
+            ReconstructionError::Shader(_) | ReconstructionError::MissingPlane { .. } => device(error),
+            ReconstructionError::MirrorCells(_) => invalid("common_cells of mirrors", error),
+            ReconstructionError::Reflections(_) => invalid("reflections", error),
+            ReconstructionError::Sample { .. }
+            | ReconstructionError::SampleCount(_)
+            | ReconstructionError::Model { .. }
+            | ReconstructionError::LightForColor { .. }
+            | ReconstructionError::CurvedSearch { .. }
+            | ReconstructionError::LightField { .. } => invalid("sample_images", error),
+        })
     }
 }
 
-fn reconstruction_error(error: ReconstructionError) -> EngineError {
-    match error {
-        ReconstructionError::Camera { .. } => invalid("camera", error),
-        ReconstructionError::Sample { .. } | ReconstructionError::SampleCount(_) => invalid("sample_images", error),
-        ReconstructionError::Volume => invalid("volume", error),
-        ReconstructionError::NoSamples { .. } | ReconstructionError::NoScene { .. } => {
-            invalid("reconstruction_method", error)
-        }
-        ReconstructionError::Gpu(error) => gpu_error(error),
-        ReconstructionError::Shader(_) | ReconstructionError::MissingPlane { .. } => device(error),
-        ReconstructionError::MirrorCells(_) => invalid("common_cells of mirrors", error),
-        ReconstructionError::Reflections(_) => invalid("reflections", error),
-        ReconstructionError::Model { .. }
-        | ReconstructionError::LightForColor { .. }
-        | ReconstructionError::CurvedSearch { .. }
-        | ReconstructionError::LightField { .. } => invalid("sample_images", error),
+impl From<SamplingError> for Caught {
+    fn from(error: SamplingError) -> Self {
+        Self(match error {
+            SamplingError::Render(error) => return error.into(),
+            SamplingError::Layer { .. } | SamplingError::Lines { .. } => invalid("sample_cameras", error),
+            SamplingError::Cameras { .. } | SamplingError::Positions { .. } => invalid("sampling_method", error),
+            SamplingError::Selection { .. } => invalid("image_indices", error),
+        })
     }
 }
 
 /// Parses a setting.
 fn parsed<T: FromStr<Err: ToString>>(field: &'static str, text: &str) -> Result<T, EngineError> {
     text.parse().map_err(|error: T::Err| invalid(field, error.to_string()))
-}
-
-fn sampling_error(error: SamplingError) -> EngineError {
-    match error {
-        SamplingError::Render(error) => render_error(error),
-        SamplingError::Layer { .. } | SamplingError::Lines { .. } => invalid("sample_cameras", error),
-        SamplingError::Cameras { .. } | SamplingError::Positions { .. } => invalid("sampling_method", error),
-        SamplingError::Selection { .. } => invalid("image_indices", error),
-    }
 }

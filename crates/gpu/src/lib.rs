@@ -32,6 +32,6 @@ pub use shader::{
     ResourceTraits, Shader, ShaderInterface, ShaderSource, ShaderVariant, Templates, WgslLiteral, source, sources,
     switches, uniform_elements, uniform_stride,
 };
-pub use sharing::{DeviceQueue, Job, JobLimit, LiveStream, SLICE_S, Turn, WorkClass, WorkKind, take_waited_s};
+pub use sharing::{DeviceQueue, Job, JobLimit, LiveStream, SLICE_S, Turn, WorkClass, WorkKind, waited_s};
 pub use table::{TABLE_WIDTH, Table, TablePool, texture_bytes};
 pub use tone::GpuTone;

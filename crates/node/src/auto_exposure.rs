@@ -2,12 +2,12 @@
 
 use cluster::Workload;
 use depth_image::{
-    ExposureEv, PinholeCamera, SampleCamera, ToneCurve, ToneMapping, View, ViewCell, ViewPlanes, linear_from_srgb8,
+    Aabb, ExposureEv, PinholeCamera, SampleCamera, ToneCurve, ToneMapping, View, ViewCell, ViewPlanes,
+    linear_from_srgb8,
 };
-use glam::{UVec2, Vec2};
+use glam::{UVec2, Vec2, Vec3};
 
 use crate::engine::{DirectWork, Engine, EngineError, Turn};
-use crate::outside::view_from_outside;
 
 /// The picture that is measured.
 const SIZE_PX: UVec2 = UVec2::splat(64);
@@ -47,8 +47,7 @@ fn exposure_of<E>(mut brightness_at: impl FnMut(ExposureEv) -> Result<Option<f32
     for _ in 0..MOST_PICTURES {
         let Some(brightness) = brightness_at(exposure)? else { return Ok(ExposureEv::ZERO) };
         let next = limited(exposure.ev() + step_ev(brightness));
-        let is_close = (next.ev() - exposure.ev()).abs() < 1.5 / STEPS_PER_EV;
-        if is_close {
+        if (next.ev() - exposure.ev()).abs() < 1.5 / STEPS_PER_EV {
             break;
         }
         exposure = next;
@@ -74,6 +73,14 @@ fn limited(ev: f32) -> ExposureEv {
 fn default_view(workload: &Workload) -> Option<PinholeCamera> {
     let cameras = workload.sample_cameras.get(workload.cameras_of_cell(0)?)?;
     Some(ViewCell::between(&SampleCamera::references(cameras))?.camera_at(Vec2::ZERO, SIZE_PX))
+}
+
+/// The view of a box from outside, slantwise from above, which depends on no viewer.
+pub(crate) fn view_from_outside(volume: &Aabb, size_px: UVec2) -> PinholeCamera {
+    let middle = volume.center();
+    let size_m = volume.size().length();
+    let eye = middle + size_m * Vec3::new(0.9, 0.7, 0.9);
+    PinholeCamera::looking_at(eye, middle, Vec3::Y, 0.8, size_px)
 }
 
 /// The percentile of the surfaces' brightest channels in linear light; `None` without surfaces. Light of one colour is cut

@@ -6,11 +6,9 @@ use tonic::Status;
 ///
 /// # Errors
 /// The work's own; `INTERNAL` where it panicked.
-pub async fn blocking<T, E>(work: impl FnOnce() -> Result<T, E> + Send + 'static) -> Result<T, Status>
-where
-    T: Send + 'static,
-    E: Into<Status> + Send + 'static,
-{
+pub async fn blocking<T: Send + 'static, E: Into<Status> + Send + 'static>(
+    work: impl FnOnce() -> Result<T, E> + Send + 'static,
+) -> Result<T, Status> {
     match tokio::task::spawn_blocking(work).await {
         Ok(result) => result.map_err(Into::into),
         Err(error) => Err(Status::internal(format!("work failed: {error}"))),

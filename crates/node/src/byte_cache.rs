@@ -51,6 +51,8 @@ impl<V> Deref for Pinned<V> {
     }
 }
 
+/// A value and its size, or why it cannot be loaded.
+type Loaded<V> = Result<(V, usize), Status>;
 /// The end of a load; `None` before it.
 type Outcome<V> = Option<Result<Pinned<V>, Status>>;
 
@@ -80,6 +82,12 @@ struct Inner<K, V> {
     freed: Arc<Notify>,
 }
 
+/// Sets that a role keeps in memory for later, and can give back.
+pub trait SetMemory: Send + Sync {
+    /// Evicts all sets that are not in use; gives their bytes.
+    fn free(&self) -> usize;
+}
+
 /// Values by key. The least recently used are evicted for new ones. A value that would exceed the bound while all others
 /// are in use waits. Clones share the values.
 pub struct ByteCache<K, V>(Arc<Inner<K, V>>);
@@ -90,11 +98,7 @@ impl<K, V> Clone for ByteCache<K, V> {
     }
 }
 
-impl<K, V> ByteCache<K, V>
-where
-    K: Clone + Eq + Hash + Send + Sync + 'static,
-    V: Send + Sync + 'static,
-{
+impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> ByteCache<K, V> {
     /// An empty cache of `max_bytes`; refusals name its values by `what`.
     #[must_use]
     pub fn new(what: &'static str, max_bytes: usize) -> Self {
@@ -106,12 +110,6 @@ where
     #[must_use]
     pub fn max_bytes(&self) -> usize {
         self.0.max_bytes
-    }
-
-    /// Bytes of loaded values, and of those that are being loaded.
-    #[must_use]
-    pub fn used_bytes(&self) -> usize {
-        self.0.state.lock().used_bytes
     }
 
     /// A value that is loaded already.
@@ -159,19 +157,17 @@ where
     }
 
     /// A value, loaded for the first that asks for it. A load that has begun goes on when those that wait for it leave, and a
-    /// failed one is forgotten. `load` gives the value and its size, which should be at most `most_bytes`.
+    /// failed one is forgotten. `load` gives the value and its size, which should be at most `most_bytes`; it is dropped
+    /// where another load serves.
     ///
     /// # Errors
     /// The load's own; `RESOURCE_EXHAUSTED` for a value beyond the bound.
-    pub async fn get<F>(
+    pub async fn get(
         &self,
         key: K,
         most_bytes: usize,
-        load: impl FnOnce() -> F + Send + 'static,
-    ) -> Result<Pinned<V>, Status>
-    where
-        F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
-    {
+        load: impl Future<Output = Loaded<V>> + Send + 'static,
+    ) -> Result<Pinned<V>, Status> {
         let mut outcome = {
             let mut state = self.0.state.lock();
             if let Some(value) = state.loaded(&key) {
@@ -193,16 +189,13 @@ where
 
     /// Begins to load a value ahead, where it has room at once: beside the values that were used within `recently`, and
     /// while none waits for room. Gives whether the value is loaded or being loaded.
-    pub fn load_ahead<F>(
+    pub fn load_ahead(
         &self,
         key: K,
         most_bytes: usize,
         recently: Duration,
-        load: impl FnOnce() -> F + Send + 'static,
-    ) -> bool
-    where
-        F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
-    {
+        load: impl Future<Output = Loaded<V>> + Send + 'static,
+    ) -> bool {
         let mut state = self.0.state.lock();
         let use_now = state.next_use();
         if let Some(entry) = state.entries.get_mut(&key) {
@@ -224,29 +217,14 @@ where
         true
     }
 
-    /// Evicts the values that are not in use; gives their bytes.
-    pub fn evict_unused(&self) -> usize {
-        let mut state = self.0.state.lock();
-        let before = state.used_bytes;
-        let unused = state.unused(Duration::ZERO);
-        let evicted = state.evict_until(0, &unused);
-        let freed = before - state.used_bytes;
-        drop(state);
-        drop(evicted);
-        self.0.freed.notify_waiters();
-        freed
-    }
-
     /// Loads when there is room, unless all that asked for it have left by then.
-    async fn load_with_room<F>(
+    async fn load_with_room(
         self,
         key: K,
         most_bytes: usize,
-        load: impl FnOnce() -> F + Send + 'static,
+        load: impl Future<Output = Loaded<V>> + Send + 'static,
         send: watch::Sender<Outcome<V>>,
-    ) where
-        F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
-    {
+    ) {
         self.0.state.lock().waiting += 1;
         let reserved = self.reserve(&key, most_bytes, &send).await;
         self.0.state.lock().waiting -= 1;
@@ -257,19 +235,18 @@ where
         }
     }
 
-    async fn load<F>(
+    async fn load(
         self,
         key: K,
         reserved_bytes: usize,
-        load: impl FnOnce() -> F + Send + 'static,
+        load: impl Future<Output = Loaded<V>> + Send + 'static,
         send: watch::Sender<Outcome<V>>,
-    ) where
-        F: Future<Output = Result<(V, usize), Status>> + Send + 'static,
-    {
+    ) {
         // A task of its own: a panic in it must give the room back.
-        let loaded = tokio::spawn(async move { load().await }).await;
-        let failed = |error| Err(Status::internal(format!("loading {} failed: {error}", self.0.what)));
-        self.end(&key, reserved_bytes, loaded.unwrap_or_else(failed), &send);
+        let loaded = tokio::spawn(load)
+            .await
+            .unwrap_or_else(|error| Err(Status::internal(format!("loading {} failed: {error}", self.0.what))));
+        self.end(&key, reserved_bytes, loaded, &send);
     }
 
     /// Waits for room of `bytes`, which then count as used. Gives up, and removes the entry, when all that asked have left.
@@ -304,35 +281,41 @@ where
     }
 
     /// Puts a loaded value in place of its room; a failed one leaves.
-    fn end(
-        &self,
-        key: &K,
-        reserved_bytes: usize,
-        loaded: Result<(V, usize), Status>,
-        send: &watch::Sender<Outcome<V>>,
-    ) {
+    fn end(&self, key: &K, reserved_bytes: usize, loaded: Loaded<V>, send: &watch::Sender<Outcome<V>>) {
         let mut state = self.0.state.lock();
         state.used_bytes -= reserved_bytes;
         state.entries.remove(key);
-        let (outcome, evicted) = match loaded {
-            Ok((value, bytes)) => {
-                let evicted = state.make_room(bytes, self.0.max_bytes, Duration::ZERO).unwrap_or_else(|| {
-                    // It exists, larger than it was said to be: it counts, and others wait for it.
-                    state.used_bytes += bytes;
-                    Vec::new()
-                });
-                let held = Arc::new(Held { value, bytes, pins: AtomicUsize::new(0), freed: self.0.freed.clone() });
-                let pinned = Pinned::new(&held);
-                let last_use = state.next_use();
-                state.entries.insert(key.clone(), Entry::Loaded { held, last_use, used_at: Instant::now() });
-                (Ok(pinned), evicted)
+        let mut evicted = Vec::new();
+        let outcome = loaded.map(|(value, bytes)| {
+            match state.make_room(bytes, self.0.max_bytes, Duration::ZERO) {
+                Some(others) => evicted = others,
+                // It exists, larger than it was said to be: it counts, and others wait for it.
+                None => state.used_bytes += bytes,
             }
-            Err(status) => (Err(status), Vec::new()),
-        };
+            let held = Arc::new(Held { value, bytes, pins: AtomicUsize::new(0), freed: self.0.freed.clone() });
+            let pinned = Pinned::new(&held);
+            let last_use = state.next_use();
+            state.entries.insert(key.clone(), Entry::Loaded { held, last_use, used_at: Instant::now() });
+            pinned
+        });
         drop(state);
         drop(evicted);
         send.send_replace(Some(outcome));
         self.0.freed.notify_waiters();
+    }
+}
+
+impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> SetMemory for ByteCache<K, V> {
+    fn free(&self) -> usize {
+        let mut state = self.0.state.lock();
+        let before = state.used_bytes;
+        let unused = state.unused(Duration::ZERO);
+        let evicted = state.evict_until(0, &unused);
+        let freed = before - state.used_bytes;
+        drop(state);
+        drop(evicted);
+        self.0.freed.notify_waiters();
+        freed
     }
 }
 
@@ -356,15 +339,15 @@ impl<K: Clone + Eq + Hash, V> State<K, V> {
     /// The values that are not in use and were not used within `recently`, the one that was used longest ago first; with
     /// their bytes.
     fn unused(&self, recently: Duration) -> Vec<(K, usize)> {
-        let unused = self.entries.iter().filter_map(|(key, entry)| match entry {
-            Entry::Loaded { held, last_use, used_at }
-                if held.pins.load(Ordering::Acquire) == 0 && used_at.elapsed() >= recently =>
+        let mut unused = Vec::new();
+        for (key, entry) in &self.entries {
+            if let Entry::Loaded { held, last_use, used_at } = entry
+                && held.pins.load(Ordering::Acquire) == 0
+                && used_at.elapsed() >= recently
             {
-                Some((*last_use, key.clone(), held.bytes))
+                unused.push((*last_use, key.clone(), held.bytes));
             }
-            _ => None,
-        });
-        let mut unused: Vec<_> = unused.collect();
+        }
         unused.sort_unstable_by_key(|(last_use, ..)| *last_use);
         unused.into_iter().map(|(_, key, bytes)| (key, bytes)).collect()
     }

@@ -23,6 +23,12 @@ struct Bench {
     loads: Arc<AtomicUsize>,
 }
 
+impl<K, V> ByteCache<K, V> {
+    fn used_bytes(&self) -> usize {
+        self.0.state.lock().used_bytes
+    }
+}
+
 impl Bench {
     fn new(max_bytes: usize) -> Self {
         Self { cache: ByteCache::new("blocks", max_bytes), existing: Arc::default(), loads: Arc::default() }
@@ -35,7 +41,7 @@ impl Bench {
     async fn get_sized(&self, key: u32, most_bytes: usize, bytes: usize) -> Result<Pinned<Block>, Status> {
         let existing = self.existing.clone();
         let loads = self.loads.clone();
-        let load = move || async move {
+        let load = async move {
             loads.fetch_add(1, Ordering::SeqCst);
             existing.fetch_add(bytes, Ordering::SeqCst);
             let block = Block { bytes, existing };
@@ -73,7 +79,7 @@ async fn a_value_is_loaded_once_for_all_and_goes_on_when_the_first_leaves() {
     let bench = Bench::new(100);
     let (open, opened) = watch::channel(false);
     let slow = |cache: ByteCache<u32, Block>, mut opened: watch::Receiver<bool>, bench: Bench| async move {
-        let load = move || async move {
+        let load = async move {
             bench.loads.fetch_add(1, Ordering::SeqCst);
             let _ = opened.wait_for(|open| *open).await;
             Ok((Block { bytes: 0, existing: bench.existing }, 10))
@@ -162,9 +168,9 @@ async fn a_load_that_nobody_waits_for_any_more_takes_no_room() {
 #[tokio::test]
 async fn failures_leave_and_give_their_room_back() {
     let bench = Bench::new(10);
-    let fail = || async { Err(Status::unavailable("lost")) };
+    let fail = async { Err(Status::unavailable("lost")) };
     assert_eq!(bench.cache.get(0, 10, fail).await.err().unwrap().message(), "lost");
-    let panicked = bench.cache.get(0, 10, || async { panic!("in a test") }).await.err().unwrap();
+    let panicked = bench.cache.get(0, 10, async { panic!("in a test") }).await.err().unwrap();
     assert!(panicked.message().contains("loading blocks failed"), "{panicked}");
     assert_eq!(bench.cache.used_bytes(), 0);
     let refused = bench.get(0, 11).await.err().unwrap();
@@ -196,7 +202,7 @@ async fn a_value_is_loaded_ahead_only_where_it_has_room_at_once() {
     let pinned = bench.get(0, 15).await.unwrap();
     let ahead = |key: u32, recently: Duration| {
         let existing = bench.existing.clone();
-        let load = move || async move {
+        let load = async move {
             existing.fetch_add(10, Ordering::SeqCst);
             Ok((Block { bytes: 10, existing }, 10))
         };
@@ -222,9 +228,12 @@ async fn nothing_is_loaded_ahead_of_those_that_wait_for_room() {
         let pinned = bench.get(0, 16).await.unwrap();
         let waiting = bench.wait_for(1, waiting_bytes);
         settle().await;
-        let load = || async { Err(Status::internal("it is not begun")) };
-        assert!(!bench.cache.load_ahead(2, 4, Duration::ZERO, load), "{waiting_bytes} bytes wait");
-        assert!(bench.cache.load_ahead(0, 16, Duration::ZERO, load), "it is there");
+        let load = |key, bytes| {
+            let load = async { Err(Status::internal("it is not begun")) };
+            bench.cache.load_ahead(key, bytes, Duration::ZERO, load)
+        };
+        assert!(!load(2, 4), "{waiting_bytes} bytes wait");
+        assert!(load(0, 16), "it is there");
         drop(pinned);
         waiting.await.unwrap();
     }
@@ -246,17 +255,17 @@ async fn evicted_values_are_dropped_outside_the_lock() {
     let dropped = Arc::<AtomicUsize>::default();
     let get = |key: u32, bytes: usize| {
         let value = Looking(cache.clone(), dropped.clone());
-        cache.get(key, bytes, move || async move { Ok((value, bytes)) })
+        cache.get(key, bytes, async move { Ok((value, bytes)) })
     };
     get(0, 10).await.unwrap();
     get(1, 10).await.unwrap();
     assert_eq!(dropped.load(Ordering::SeqCst), 1);
-    assert_eq!((cache.evict_unused(), cache.used_bytes(), dropped.load(Ordering::SeqCst)), (10, 0, 2));
+    assert_eq!((cache.free(), cache.used_bytes(), dropped.load(Ordering::SeqCst)), (10, 0, 2));
     let pinned = get(2, 4).await.unwrap();
     get(3, 4).await.unwrap();
-    assert_eq!((cache.evict_unused(), cache.used_bytes()), (4, 4), "one is in use");
+    assert_eq!((cache.free(), cache.used_bytes()), (4, 4), "one is in use");
     drop(pinned);
-    cache.evict_unused();
+    cache.free();
 }
 
 fn next(seed: &mut u64) -> u64 {

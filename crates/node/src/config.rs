@@ -99,16 +99,10 @@ pub fn view_bytes(camera: &PinholeCamera, planes: ViewPlanes) -> usize {
 }
 
 impl Quotas {
-    /// # Errors
-    /// `INVALID_ARGUMENT` for a view that takes more than all views together may.
-    pub fn check_view(&self, camera: &PinholeCamera, planes: ViewPlanes) -> Result<(), Status> {
-        self.check_views(std::slice::from_ref(camera), planes)
-    }
-
-    /// As [`Quotas::check_view`], for views that are made at once.
+    /// Checks that views that are made at once can ever have room.
     ///
     /// # Errors
-    /// Names the quota.
+    /// `INVALID_ARGUMENT` for views that take more than all views together may; it names the quota.
     pub fn check_views(&self, cameras: &[PinholeCamera], planes: ViewPlanes) -> Result<(), Status> {
         let bytes = cameras.iter().map(|camera| view_bytes(camera, planes)).fold(0, usize::saturating_add);
         let limit = self.view_bytes;

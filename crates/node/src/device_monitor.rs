@@ -9,11 +9,11 @@ use depth_image::{PinholeCamera, SampleImage, View};
 use parking_lot::Mutex;
 use tokio::sync::watch;
 
+use crate::byte_cache::SetMemory;
 use crate::engine::{
     CommonSet, DirectWork, Engine, EngineError, LightParts, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
     ViewWork,
 };
-use crate::set_memory::SetMemory;
 
 /// Calls that run out of memory one after the other, until the node leaves.
 const MAX_SHORTAGES: usize = 3;
@@ -73,17 +73,13 @@ impl DeviceMonitor {
         done
     }
 
-    /// Does work, and once more by `again` where memory ran out.
-    fn relieved<T>(
-        &self,
-        work: impl FnOnce() -> Result<T, EngineError>,
-        again: impl FnOnce() -> Result<T, EngineError>,
-    ) -> Result<T, EngineError> {
-        let done = match work() {
+    /// Does work, and once more where memory ran out; `work` is told whether this is the second try.
+    fn relieved<T>(&self, work: impl Fn(bool) -> Result<T, EngineError>) -> Result<T, EngineError> {
+        let done = match work(false) {
             Err(EngineError::OutOfMemory(reason)) => {
                 let freed_bytes = self.free();
                 tracing::warn!(reason, freed_bytes, "out of device memory: tried once more");
-                again()
+                work(true)
             }
             done => done,
         };
@@ -101,11 +97,13 @@ impl DeviceMonitor {
         cameras: &[PinholeCamera],
         make: impl Fn(&[PinholeCamera]) -> Result<Vec<View>, EngineError>,
     ) -> Result<Vec<View>, EngineError> {
-        let halves = || {
+        self.relieved(|in_halves| {
+            if !in_halves {
+                return make(cameras);
+            }
             let made = cameras.chunks(cameras.len().div_ceil(2).max(1)).map(&make);
             Ok(made.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
-        };
-        self.relieved(|| make(cameras), halves)
+        })
     }
 }
 
@@ -119,8 +117,7 @@ impl Engine for DeviceMonitor {
     }
 
     fn load_scene(&self, hash: &str, package: &[u8]) -> Result<(), EngineError> {
-        let load = || self.engine.load_scene(hash, package);
-        self.relieved(load, load)
+        self.relieved(|_| self.engine.load_scene(hash, package))
     }
 
     fn has_scene(&self, hash: &str) -> bool {
@@ -147,18 +144,16 @@ impl Engine for DeviceMonitor {
         self.engine.live_stream()
     }
 
-    fn take_waited_s(&self) -> f64 {
-        self.engine.take_waited_s()
+    fn waited_s(&self) -> f64 {
+        self.engine.waited_s()
     }
 
     fn sample(&self, request: &SampleWork, turn: Turn) -> Result<Vec<SampleImage>, EngineError> {
-        let sample = || self.engine.sample(request, turn);
-        self.relieved(sample, sample)
+        self.relieved(|_| self.engine.sample(request, turn))
     }
 
     fn upload(&self, set: &SampleSet, turn: Turn) -> Result<SharedSet, EngineError> {
-        let upload = || self.engine.upload(set, turn);
-        self.relieved(upload, upload)
+        self.relieved(|_| self.engine.upload(set, turn))
     }
 
     fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError> {

@@ -78,8 +78,8 @@ pub trait Engine: Send + Sync + 'static {
     fn live_stream(&self) -> Box<dyn Any + Send + Sync> {
         Box::new(())
     }
-    /// Seconds for which calls of this thread have waited for their turns since the last call of this function.
-    fn take_waited_s(&self) -> f64 {
+    /// Seconds for which calls of this thread have waited for their turns so far.
+    fn waited_s(&self) -> f64 {
         0.0
     }
     /// Samples the wanted images of a set, in their order.
@@ -121,19 +121,19 @@ pub(crate) fn set_of_view(
     sets: Vec<SharedSet>,
 ) -> Result<SharedSet, EngineError> {
     let mut sets = sets.into_iter();
-    let reason = || EngineError::InvalidArgument { field: "sample_cameras", reason: "a view has none".to_owned() };
-    let set = sets.next().ok_or_else(reason)?;
+    let reason = "a view has none".to_owned();
+    let set = sets.next().ok_or(EngineError::InvalidArgument { field: "sample_cameras", reason })?;
     let common: Vec<CommonSet> = workload.common_cells.iter().cloned().zip(sets).collect();
     if common.is_empty() { Ok(set) } else { engine.with_common(set, common) }
 }
 
 /// The result of work on this thread, and the seconds that it took, without those for which it waited for others.
 pub fn own_time<T>(engine: &dyn Engine, work: impl FnOnce() -> T) -> (T, f64) {
-    // Earlier waits of this thread are of other work.
-    engine.take_waited_s();
+    let waited_before_s = engine.waited_s();
     let start = Instant::now();
     let done = work();
-    (done, (start.elapsed().as_secs_f64() - engine.take_waited_s()).max(0.0))
+    let waited_s = engine.waited_s() - waited_before_s;
+    (done, (start.elapsed().as_secs_f64() - waited_s).max(0.0))
 }
 
 /// A sample set on the device; the engine downcasts it to its own type.
@@ -171,6 +171,7 @@ impl SampleWork {
     /// All images of the first set of a workload of one cell, finished at once.
     #[must_use]
     pub fn of(workload: &Workload) -> Self {
+        let pixel_count = workload.sample_cameras.first().map(SampleCamera::pixel_count);
         Self {
             scene_hash: workload.scene.hash.to_string(),
             cameras: workload.sample_cameras.clone(),
@@ -181,17 +182,9 @@ impl SampleWork {
             scene_time_s: workload.timeline.start_s as f32,
             temporal_reference_s: None,
             refinement: Refinement::default(),
-            surfaces_by_rays: surfaces_by_rays(
-                workload,
-                workload.sample_cameras.first().map(SampleCamera::pixel_count),
-            ),
+            surfaces_by_rays: pixel_count.and_then(|pixels| workload.finds_surfaces_by_rays(pixels)),
         }
     }
-}
-
-/// How all nodes find the surfaces of pictures of a size.
-fn surfaces_by_rays(workload: &Workload, pixels: Option<usize>) -> Option<bool> {
-    workload.finds_surfaces_by_rays(pixels?)
 }
 
 /// The images of one set.
@@ -279,13 +272,14 @@ impl DirectWork {
     /// Views of a workload's scene at its start.
     #[must_use]
     pub fn of(workload: &Workload, cameras: Vec<PinholeCamera>, planes: ViewPlanes) -> Self {
+        let pixel_count = cameras.first().map(PinholeCamera::pixel_count);
         Self {
-            surfaces_by_rays: surfaces_by_rays(workload, cameras.first().map(PinholeCamera::pixel_count)),
             scene_hash: workload.scene.hash.to_string(),
             cameras,
             lighting: workload.lighting.clone(),
             scene_time_s: workload.timeline.start_s as f32,
             planes,
+            surfaces_by_rays: pixel_count.and_then(|pixels| workload.finds_surfaces_by_rays(pixels)),
         }
     }
 }

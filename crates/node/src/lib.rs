@@ -9,16 +9,15 @@ mod config;
 mod connections;
 mod device_monitor;
 mod engine;
+mod latest;
 mod measure;
 mod membership;
-mod outside;
 mod plan;
 mod port;
 mod scenes;
 mod server;
 mod service;
 mod set_bytes;
-mod set_memory;
 mod streams;
 mod telemetry;
 mod view_probes;
@@ -26,7 +25,7 @@ mod viewers;
 mod work_done;
 
 pub use blocking::blocking;
-pub use byte_cache::{ByteCache, Pinned};
+pub use byte_cache::{ByteCache, Pinned, SetMemory};
 pub use config::{Deadlines, NodeConfig, Quotas, view_bytes};
 pub use connections::Connections;
 pub use device_monitor::DeviceMonitor;
@@ -34,6 +33,7 @@ pub use engine::{
     CommonSet, DirectWork, Engine, EngineError, LightParts, OpenEngine, SampleSet, SampleWork, SharedSet, Turn,
     UploadedSet, ViewWork, WorkClass, own_time,
 };
+pub use latest::push_latest;
 pub use membership::keep_membership;
 pub use plan::{CellPlan, PlansInForce, Relay, beyond_timeline, has_set};
 pub use port::Port;
@@ -41,7 +41,6 @@ pub use scenes::Scenes;
 pub use server::{DRAIN, MAX_STREAMS, ServeError, health, serve};
 pub use service::NodeService;
 pub use set_bytes::{depth_images_bytes, most_image_bytes, most_set_bytes, set_bytes};
-pub use set_memory::SetMemory;
 pub use streams::{next_within, until_drained, with_guard};
 pub use telemetry::{NodeMetrics, Reason, Telemetry, init_logging};
 pub use view_probes::{ViewAudit, ViewProbes};

@@ -22,8 +22,9 @@ const RUNS: usize = 3;
 const LONG_RUN_S: f64 = 0.5;
 /// Larger views are measured in this size: their time is in proportion to their pixels.
 const MOST_PIXELS: usize = 1 << 20;
-/// Images of light and views are measured with these parts of their sides, one after the other, before they are in full size.
-const QUICK_SIDE_RATIOS: [f32; 2] = [0.125, 0.25];
+/// Images of light and views are measured with these parts of their sides, one after the other, before they are in full size;
+/// each with the part that follows.
+const QUICK_SIDE_RATIOS: [(f32, f32); 2] = [(0.125, 0.25), (0.25, 1.0)];
 /// No image and no view is measured with fewer pixels: what each takes, however small, would count for all pixels.
 const LEAST_QUICK_PIXELS: f64 = 3_000.0;
 /// A measurement of light that would take longer is not repeated with larger sides: a client may wait for it.
@@ -84,28 +85,20 @@ impl Resized {
         for view in &mut resized.typical_views {
             *view = view.resized(scaled_size(view.size_px, view_side_ratio));
         }
-        let ratio = |full: usize, small: usize| full as f64 / small.max(1) as f64;
-        let texels = |request: &MeasureCosts| -> usize {
-            request.workload.sample_cameras.iter().map(SampleCamera::pixel_count).sum()
-        };
-        let pixels =
-            |request: &MeasureCosts| -> usize { request.typical_views.iter().map(PinholeCamera::pixel_count).sum() };
         Self {
-            texels_ratio: ratio(texels(request), texels(&resized)),
-            pixels_ratio: ratio(pixels(request), pixels(&resized)),
+            texels_ratio: texels(request) / texels(&resized).max(1.0),
+            pixels_ratio: view_pixels(request) / view_pixels(&resized).max(1.0),
             request: resized,
         }
-    }
-
-    fn view_pixels(&self) -> f64 {
-        self.request.typical_views.iter().map(PinholeCamera::pixel_count).sum::<usize>() as f64
     }
 
     /// Views of [`LARGER_SIDE_RATIO`], unless they are larger than full ones or than [`MOST_PIXELS`].
     fn with_larger_views(&self) -> Option<Self> {
         let larger = Self::new(&self.request, 1.0, LARGER_SIDE_RATIO);
-        let most_pixels = (self.view_pixels() * self.pixels_ratio).min(MOST_PIXELS as f64);
-        (self.view_pixels() < larger.view_pixels() && larger.view_pixels() <= most_pixels).then_some(larger)
+        let own_pixels = view_pixels(&self.request);
+        let larger_pixels = view_pixels(&larger.request);
+        let most_pixels = (own_pixels * self.pixels_ratio).min(MOST_PIXELS as f64);
+        (own_pixels < larger_pixels && larger_pixels <= most_pixels).then_some(larger)
     }
 
     fn in_full_size(&self, measured: Measured) -> Measured {
@@ -124,6 +117,18 @@ impl Resized {
         let shared_light = measured.shared_light.map(|light| light.scaled(self.pixels_ratio));
         Measured { costs, shared_light, ..measured }
     }
+}
+
+fn texels(request: &MeasureCosts) -> f64 {
+    request.workload.sample_cameras.iter().map(SampleCamera::pixel_count).sum::<usize>() as f64
+}
+
+fn view_pixels(request: &MeasureCosts) -> f64 {
+    request.typical_views.iter().map(PinholeCamera::pixel_count).sum::<usize>() as f64
+}
+
+fn view_work(request: &MeasureCosts, cameras: Vec<PinholeCamera>) -> ViewWork {
+    ViewWork { cameras, method: request.method.clone(), planes: request.planes }
 }
 
 /// The least part of the sides with which all images and views have [`LEAST_QUICK_PIXELS`].
@@ -148,8 +153,7 @@ impl Measurement<'_> {
     /// Costs in full size, or, of light that takes long, from smaller images and views.
     fn costs_in_steps(&self, request: &MeasureCosts, full: &Resized) -> Result<Measured, Status> {
         if self.engine.sample_planes(&request.method)?.light {
-            let next_ratios = QUICK_SIDE_RATIOS.into_iter().skip(1).chain([1.0]);
-            for (ratio, next_ratio) in QUICK_SIDE_RATIOS.into_iter().zip(next_ratios) {
+            for (ratio, next_ratio) in QUICK_SIDE_RATIOS {
                 let ratio = ratio.max(least_quick_ratio(request));
                 if ratio >= next_ratio {
                     continue;
@@ -172,28 +176,30 @@ impl Measurement<'_> {
         let planes = engine.sample_planes(&request.method)?;
         // Views are made from all of them: their own cell, and common cells.
         let cells = workload.cells();
-        let sample = |(number, cell): (usize, &Workload)| match workload.common_cell(number) {
+        let works = cells.iter().enumerate().map(|(number, cell)| match workload.common_cell(number) {
             Some(_) => SampleWork::of(cell),
             None => SampleWork { planes, ..SampleWork::of(cell) },
-        };
+        });
+        let works: Vec<SampleWork> = works.collect();
         let is_tileable = engine.images_are_independent(&workload.sampling)?;
-        let sampled = cells.iter().enumerate().map(|cell| self.sampled_timed(&sample(cell), is_tileable));
+        let sampled = works.iter().map(|work| self.sampled_timed(work, is_tileable));
         let (encoded, cells_s): (Vec<_>, Vec<f64>) = sampled.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
-        let upload = |(number, (cell, images)): (usize, (&Workload, &Vec<_>))| {
-            let is_common = workload.common_cell(number).is_some();
-            let set = SampleSet::of(cell, decoded(cell, images)?, is_common).map_err(codec)?;
-            Ok(engine.upload(&set, self.turn)?)
-        };
-        let upload_all = || cells.iter().zip(&encoded).enumerate().map(upload).collect::<Result<Vec<_>, Status>>();
-        let (sets, load_s) = self.timed(upload_all)?;
+        let (sets, load_s) = self.timed(|| {
+            let mut sets = Vec::new();
+            for (number, (cell, images)) in cells.iter().zip(&encoded).enumerate() {
+                let is_common = workload.common_cell(number).is_some();
+                let set = SampleSet::of(cell, decoded(cell, images)?, is_common).map_err(codec)?;
+                sets.push(engine.upload(&set, self.turn)?);
+            }
+            Ok(sets)
+        })?;
         let set = set_of_view(engine, workload, sets)?;
         let load_set_s = load_s / cells.len().max(1) as f64;
         let sample_image_s = cells_s.iter().sum::<f64>() / workload.sample_cameras.len().max(1) as f64;
-        let first = cells.first().zip(cells_s.first()).filter(|_| is_tileable);
-        let tile_costs = |(cell, cell_s): (&Workload, &f64)| {
-            self.tile_costs(&sample((0, cell)), cell_s / cell.sample_cameras.len().max(1) as f64)
+        let tiles = match works.first().zip(cells_s.first()) {
+            Some((work, cell_s)) if is_tileable => self.tile_costs(work, cell_s / work.cameras.len().max(1) as f64)?,
+            _ => None,
         };
-        let tiles = first.map(tile_costs).transpose()?.flatten();
         let (drawn, direct_view_s) = self.direct_view_s(request)?;
         let reconstruction = match request.method.as_str() {
             DIRECT => Reconstruction { made: drawn, view_s: direct_view_s, shared_light: None },
@@ -217,8 +223,8 @@ impl Measurement<'_> {
             return Ok(Reconstruction { made, view_s: small_s, shared_light });
         };
         let (_, larger_s) = self.reconstruct_view_s(set, &larger.request)?;
-        let small = TimedSize { pixels: resized.view_pixels(), seconds: small_s };
-        let larger_size = TimedSize { pixels: larger.view_pixels(), seconds: larger_s };
+        let small = TimedSize { pixels: view_pixels(&resized.request), seconds: small_s };
+        let larger_size = TimedSize { pixels: view_pixels(&larger.request), seconds: larger_s };
         let full_s = small.at_size(Some(larger_size), small.pixels * resized.pixels_ratio);
         let view_s = full_s / resized.pixels_ratio;
         let parts = self.shared_light(set, &larger.request, larger_s)?;
@@ -233,8 +239,7 @@ impl Measurement<'_> {
         request: &MeasureCosts,
         reconstruct_view_s: f64,
     ) -> Result<Option<SharedLightCosts>, Status> {
-        let work = ViewWork { cameras: request.views(1), method: request.method.clone(), planes: request.planes };
-        let parts = self.engine.light_parts(set, &work, self.turn)?;
+        let parts = self.engine.light_parts(set, &view_work(request, request.views(1)), self.turn)?;
         Ok(parts.map(|LightParts { known_ratio, surfaces_s, draft_s }| SharedLightCosts {
             known_ratio,
             surfaces_s,
@@ -284,16 +289,11 @@ impl Measurement<'_> {
         Ok(split_into_overhead_and_shares(sample_image_s, row_s, quarters_s))
     }
 
-    /// The cost of one view over all typical views, in calls of the batch's size; with some of the views. Of one typical view as many
-    /// are made as time allows, as of views that are drawn directly.
+    /// The cost of one view over all typical views, in calls of the batch's size; with some of the views.
     fn reconstruct_view_s(&self, set: &dyn UploadedSet, request: &MeasureCosts) -> Result<(Vec<View>, f64), Status> {
-        if request.typical_views.len() > 1 {
-            return self.reconstructed(set, request, request.batch_count.max(request.typical_views.len() as u32));
-        }
-        let (made, alone_s) = self.reconstructed(set, request, 1)?;
-        match views_in_time(alone_s, request.batch_count) {
-            1 => Ok((made, alone_s)),
-            views => self.reconstructed(set, request, views),
+        match request.typical_views.len() as u32 {
+            0..=1 => as_many_as_time_allows(request.batch_count, |views| self.reconstructed(set, request, views)),
+            views => self.reconstructed(set, request, request.batch_count.max(views)),
         }
     }
 
@@ -305,37 +305,31 @@ impl Measurement<'_> {
     ) -> Result<(Vec<View>, f64), Status> {
         let batch = request.batch_count as usize;
         let views = request.views(views);
-        let work = |cameras: &[PinholeCamera]| ViewWork {
-            cameras: cameras.to_vec(),
-            method: request.method.clone(),
-            planes: request.planes,
-        };
-        let calls: Vec<ViewWork> = views.chunks(batch.max(1)).map(work).collect();
-        let make = || calls.iter().try_fold(Vec::new(), |_, work| Ok(self.engine.reconstruct(set, work, self.turn)?));
-        let (made, seconds) = self.timed(make)?;
+        let calls = views.chunks(batch.max(1)).map(|cameras| view_work(request, cameras.to_vec()));
+        let calls: Vec<ViewWork> = calls.collect();
+        let (made, seconds) = self.timed(|| {
+            calls.iter().try_fold(Vec::new(), |_, work| Ok(self.engine.reconstruct(set, work, self.turn)?))
+        })?;
         Ok((made, seconds / views.len() as f64))
     }
 
-    /// Measured on as many views as time allows; with some of the views. Fixed costs are shared as in real batches where a
-    /// view is quick, and hardly matter where it is not.
+    /// The cost of one view; with some of the views.
     fn direct_view_s(&self, request: &MeasureCosts) -> Result<(Vec<View>, f64), Status> {
-        let work = |views: u32| DirectWork::of(&request.workload, request.views(views), request.planes);
-        let draw = |views: u32| Ok(self.engine.draw_direct(&work(views), self.turn)?);
-        let (drawn, alone_s) = self.timed(|| draw(1))?;
-        let views = views_in_time(alone_s, request.batch_count);
-        if views == 1 {
-            return Ok((drawn, alone_s));
-        }
-        let (drawn, direct_s) = self.timed(|| draw(views))?;
-        Ok((drawn, direct_s / f64::from(views)))
+        as_many_as_time_allows(request.batch_count, |views| {
+            let (drawn, direct_s) = self.timed(|| {
+                let work = DirectWork::of(&request.workload, request.views(views), request.planes);
+                Ok(self.engine.draw_direct(&work, self.turn)?)
+            })?;
+            Ok((drawn, direct_s / f64::from(views)))
+        })
     }
 
     /// The mean cost over all views of the batch. A single view ends within a time slice, in which a node with a CPU quota
     /// is as fast as any.
     fn encode_s(&self, made: &[View], codec_name: &str) -> Result<f64, Status> {
         let frame_codec: FrameCodec = codec_name.parse().map_err(codec)?;
-        let encode = || made.iter().try_for_each(|view| encode_view(view, frame_codec).map(drop).map_err(codec));
-        let ((), seconds) = self.timed(encode)?;
+        let ((), seconds) =
+            self.timed(|| made.iter().try_for_each(|view| encode_view(view, frame_codec).map(drop).map_err(codec)))?;
         Ok(seconds / made.len().max(1) as f64)
     }
 
@@ -349,8 +343,9 @@ impl Measurement<'_> {
     fn timed_warm<T>(&self, mut run: impl FnMut() -> Result<T, Status>) -> Result<(T, f64), Status> {
         let (result, first_s) = own_time(self.engine, &mut run);
         let result = result?;
+        let runs = if first_s > LONG_RUN_S { 1 } else { RUNS };
         let mut seconds = vec![first_s];
-        while seconds.len() < runs_after(first_s) {
+        while seconds.len() < runs {
             let (done, own_s) = own_time(self.engine, &mut run);
             done?;
             seconds.push(own_s);
@@ -371,6 +366,19 @@ fn codec(error: impl Display) -> Status {
     Status::internal(format!("codec: {error}"))
 }
 
+/// Views and the cost of one of them, by `make` for a number of views: as many, up to `most`, as time allows. Fixed costs
+/// are shared as in real batches where a view is quick, and hardly matter where it is not.
+fn as_many_as_time_allows(
+    most: u32,
+    make: impl Fn(u32) -> Result<(Vec<View>, f64), Status>,
+) -> Result<(Vec<View>, f64), Status> {
+    let (made, alone_s) = make(1)?;
+    match views_in_time(alone_s, most) {
+        1 => Ok((made, alone_s)),
+        views => make(views),
+    }
+}
+
 /// The number of views to make in one call, where one alone takes `alone_s`.
 fn views_in_time(alone_s: f64, most: u32) -> u32 {
     // A cast saturates: views that take no time give the largest batch.
@@ -379,15 +387,10 @@ fn views_in_time(alone_s: f64, most: u32) -> u32 {
 
 fn decoded(workload: &Workload, encoded: &[EncodedImage]) -> Result<Vec<SampleImage>, Status> {
     let limits = DecodeLimits::default();
-    let decode = |(image, camera): (&EncodedImage, &SampleCamera)| {
-        decode_sample_image(&image.header, camera, &image.payload, &limits).map_err(codec)
-    };
-    encoded.iter().zip(&workload.sample_cameras).map(decode).collect()
-}
-
-/// The number of runs, by the time of the first.
-fn runs_after(first_s: f64) -> usize {
-    if first_s > LONG_RUN_S { 1 } else { RUNS }
+    let images = encoded.iter().zip(&workload.sample_cameras);
+    images
+        .map(|(image, camera)| decode_sample_image(&image.header, camera, &image.payload, &limits).map_err(codec))
+        .collect()
 }
 
 #[cfg(test)]

@@ -14,9 +14,9 @@ use tokio_util::sync::CancellationToken;
 use tonic::Status;
 use wire::rpc::{Backoff, CoordinatorClient, connect};
 
+use crate::auto_exposure::view_from_outside;
 use crate::blocking::blocking;
 use crate::engine::{DirectWork, Engine, EngineError, SampleSet, SampleWork, Turn, ViewWork, WorkClass, set_of_view};
-use crate::outside::view_from_outside;
 use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
 use crate::work_done::WorkDone;
@@ -146,13 +146,12 @@ fn warm(engine: &dyn Engine, plan: &Assignment, method: String) -> Result<(), En
     if plan.policy == Policy::Direct {
         return engine.draw_direct(&DirectWork::of(&workload, vec![view], ViewPlanes::default()), turn).map(drop);
     }
-    let upload = |(number, cell): (usize, &Workload)| {
+    let mut sets = Vec::new();
+    for (number, cell) in workload.cells().iter().enumerate() {
         let images = engine.sample(&SampleWork::of(cell), turn)?;
-        let is_common = workload.common_cell(number).is_some();
-        let set = SampleSet::of(cell, images, is_common);
-        engine.upload(&set.map_err(|error| EngineError::Device(error.to_string()))?, turn)
-    };
-    let sets = workload.cells().iter().enumerate().map(upload).collect::<Result<Vec<_>, _>>()?;
+        let set = SampleSet::of(cell, images, workload.common_cell(number).is_some());
+        sets.push(engine.upload(&set.map_err(|error| EngineError::Device(error.to_string()))?, turn)?);
+    }
     let set = set_of_view(engine, &workload, sets)?;
     let work = ViewWork { cameras: vec![view], method, planes: ViewPlanes::default() };
     engine.reconstruct(set.as_ref(), &work, turn).map(drop)
@@ -164,19 +163,18 @@ const WARM_SIDE_PX: u32 = *LIGHT_FIELD_SIDES.start();
 
 fn small(workload: &Workload) -> Workload {
     let mut cube = CubeGrid::around(&workload.volume, SIZE_PX.x).into_iter().flat_map(|grid| grid.cameras());
-    let camera = |camera: &SampleCamera| match camera {
+    let sample_cameras = workload.sample_cameras.iter().map(|camera| match camera {
         SampleCamera::Layered(_) => cube.next().map_or(*camera, SampleCamera::from),
         SampleCamera::LightField(field) => LightFieldCamera::around(field.bounds, WARM_DIRECTIONS, WARM_SIDE_PX).into(),
         SampleCamera::Depth(_) => camera.resized(SIZE_PX),
-    };
-    let sample_cameras = workload.sample_cameras.iter().map(camera).collect();
-    Workload { sample_cameras, ..workload.clone() }
+    });
+    Workload { sample_cameras: sample_cameras.collect(), ..workload.clone() }
 }
 
 /// The view of the first sample camera, or one from outside.
 fn any_view(workload: &Workload) -> PinholeCamera {
-    let outside = || view_from_outside(&workload.volume, SIZE_PX);
-    SampleCamera::references(&workload.sample_cameras).first().copied().unwrap_or_else(outside)
+    let first = SampleCamera::references(&workload.sample_cameras).first().copied();
+    first.unwrap_or_else(|| view_from_outside(&workload.volume, SIZE_PX))
 }
 
 #[cfg(test)]

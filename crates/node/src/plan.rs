@@ -13,6 +13,8 @@ use tonic::Status;
 use wire::refuse_plan;
 use wire::rpc::Messages;
 
+use crate::latest::push_latest;
+
 /// The last plans of a workload that are remembered.
 const MAX_PLANS: usize = 8;
 
@@ -28,14 +30,13 @@ pub struct PlansInForce {
 
 #[derive(Debug, Default)]
 struct Plans {
+    /// The one that was used last is the last.
     workloads: Vec<WorkloadPlans>,
     highest_epoch: u64,
     /// Plans of this epoch and of lower ones were forgotten together, and do not come back.
     forgotten_epoch: u64,
     /// The last plan that told which workloads are open.
     told: Option<ApplyPlan>,
-    /// Uses of all plans so far.
-    uses: u64,
 }
 
 #[derive(Debug)]
@@ -43,7 +44,6 @@ struct WorkloadPlans {
     number: u64,
     /// One at least; the last is in force, and the others were before it.
     plans: VecDeque<Arc<Assignment>>,
-    last_use: u64,
 }
 
 impl WorkloadPlans {
@@ -68,12 +68,11 @@ fn goes_on(before: &Workload, after: &Workload) -> bool {
 }
 
 impl Plans {
+    /// The plans of a workload. This is a use of them.
     fn of(&mut self, workload_number: u64) -> Option<&mut WorkloadPlans> {
-        self.uses += 1;
-        let uses = self.uses;
-        let workload = self.workloads.iter_mut().find(|workload| workload.number == workload_number)?;
-        workload.last_use = uses;
-        Some(workload)
+        let at = self.workloads.iter().position(|workload| workload.number == workload_number)?;
+        self.workloads[at..].rotate_left(1);
+        self.workloads.last_mut()
     }
 
     /// Whether a plan is new; an error where it may not replace the one in force.
@@ -83,21 +82,18 @@ impl Plans {
         if plan_epoch <= self.forgotten_epoch {
             return Err(Status::failed_precondition(format!("plan_epoch {plan_epoch} was forgotten")));
         }
-        let is_later = |told: &&ApplyPlan| told.assignment.plan_epoch > plan_epoch;
-        if self.told.as_ref().filter(is_later).is_some_and(|told| told.has_ended(number)) {
+        let told = self.told.as_ref().filter(|told| told.assignment.plan_epoch > plan_epoch);
+        if told.is_some_and(|told| told.has_ended(number)) {
             return Err(Status::failed_precondition(format!("workload {number} has ended")));
         }
         let in_force = self.of(number).and_then(|workload| workload.in_force().cloned());
         let Some(in_force) = in_force else { return Ok(true) };
         let old = in_force.plan_epoch;
-        let new = assignment.plan_epoch;
-        match new > old {
-            false if new == old && *in_force == *assignment => Ok(false),
-            false => Err(Status::failed_precondition(format!(
-                "plan_epoch {new} of workload {number} does not replace {old}"
-            ))),
-            true => Ok(true),
+        if plan_epoch > old || *in_force == *assignment {
+            return Ok(plan_epoch > old);
         }
+        let reason = format!("plan_epoch {plan_epoch} of workload {number} does not replace {old}");
+        Err(Status::failed_precondition(reason))
     }
 
     /// Forgets the workloads that have ended by the time of this plan; gives their numbers.
@@ -106,8 +102,8 @@ impl Plans {
         if plan.open_workloads.is_empty() || plan.assignment.plan_epoch < told_epoch {
             return Vec::new();
         }
-        let ended = |workload: &mut WorkloadPlans| plan.has_ended(workload.number);
-        let ended = self.workloads.extract_if(.., ended).map(|workload| workload.number).collect();
+        let ended = self.workloads.extract_if(.., |workload| plan.has_ended(workload.number));
+        let ended = ended.map(|workload| workload.number).collect();
         self.told = Some(plan);
         ended
     }
@@ -120,17 +116,12 @@ impl Plans {
             if !workload.in_force().is_some_and(|before| goes_on(&before.workload, &assignment.workload)) {
                 workload.plans.clear();
             }
-            workload.plans.push_back(assignment);
-            while workload.plans.len() > MAX_PLANS {
-                workload.plans.pop_front();
-            }
-            return;
+            return push_latest(&mut workload.plans, assignment, MAX_PLANS);
         }
         if self.workloads.len() >= MAX_WORKLOADS {
-            let unused = self.workloads.iter().enumerate().min_by_key(|(_, workload)| workload.last_use);
-            unused.map(|(at, _)| at).map(|at| self.workloads.swap_remove(at));
+            self.workloads.remove(0);
         }
-        self.workloads.push(WorkloadPlans { number, plans: [assignment].into(), last_use: self.uses });
+        self.workloads.push(WorkloadPlans { number, plans: [assignment].into() });
     }
 }
 
@@ -166,8 +157,7 @@ impl PlansInForce {
     ///
     /// # Errors
     /// As [`PlansInForce::admits`].
-    pub fn apply(&self, plan: impl Into<ApplyPlan>) -> Result<Vec<u64>, Status> {
-        let plan = plan.into();
+    pub fn apply(&self, plan: ApplyPlan) -> Result<Vec<u64>, Status> {
         // Compared under the lock: of two plans that were prepared at the same time the higher one stays.
         let mut plans = self.plans.lock();
         let is_new = plans.admits(&plan.assignment)?;
@@ -259,8 +249,8 @@ impl PlansInForce {
 /// Whether a set is made under a plan, in any of its view cells.
 #[must_use]
 pub fn has_set(plan: &Arc<Assignment>, content: &SetContent, set_index: u32) -> bool {
-    let of_cell = |cell: usize| CellPlan::of(plan, cell as u32).ok()?.set_content(set_index);
-    (0..plan.workload.cell_count()).any(|cell| of_cell(cell).as_ref() == Some(content))
+    let mut cells = (0..plan.workload.cell_count() as u32).filter_map(|cell| CellPlan::of(plan, cell).ok());
+    cells.any(|cell| cell.set_content(set_index).as_ref() == Some(content))
 }
 
 /// The plan of one cell, without the images of other cells. Clones share it.
@@ -284,8 +274,10 @@ impl CellPlan {
         if (cell, cell_count) == (0, 1) {
             return Ok(Self { plan: plan.clone(), cell, is_common });
         }
-        let beyond = || Status::invalid_argument(format!("cell_index {cell} is beyond {cell_count} cells"));
-        Ok(Self { plan: Arc::new(plan.of_cell(cell).ok_or_else(beyond)?), cell, is_common })
+        let Some(own) = plan.of_cell(cell) else {
+            return Err(Status::invalid_argument(format!("cell_index {cell} is beyond {cell_count} cells")));
+        };
+        Ok(Self { plan: Arc::new(own), cell, is_common })
     }
 
     /// The parts of `plan` for all common cells.
@@ -345,6 +337,11 @@ pub(crate) mod tests {
         Assignment { workload, policy: Policy::Direct, compositors: vec![share], ..plan }
     }
 
+    /// A plan that does not tell which workloads are open.
+    pub(crate) fn alone(assignment: Assignment) -> ApplyPlan {
+        ApplyPlan { assignment, open_workloads: Vec::new() }
+    }
+
     fn of_another_scene(plan: Assignment) -> Assignment {
         let scene = cluster::SceneRef { hash: cluster::SceneHash::of(b"another"), package_bytes: 7 };
         Assignment { workload: Workload { scene, ..plan.workload }, ..plan }
@@ -353,16 +350,16 @@ pub(crate) mod tests {
     #[tokio::test]
     async fn a_wait_ends_with_the_plan_that_it_waits_for() {
         let plans = PlansInForce::new("n");
-        plans.apply(plan(1, 3)).unwrap();
+        plans.apply(alone(plan(1, 3))).unwrap();
         let waiting = plans.clone();
         let is_late = |plan: Option<&Arc<Assignment>>| plan.is_some_and(|plan| plan.plan_epoch > 3);
         let waits = tokio::spawn(async move { waiting.until(1, is_late).await });
         for other in [plan(2, 9), plan(1, 3)] {
-            plans.apply(other).unwrap();
+            plans.apply(alone(other)).unwrap();
             tokio::task::yield_now().await;
             assert!(!waits.is_finished());
         }
-        plans.apply(plan(1, 10)).unwrap();
+        plans.apply(alone(plan(1, 10))).unwrap();
         waits.await.unwrap();
     }
 
@@ -370,14 +367,14 @@ pub(crate) mod tests {
     fn a_plan_with_a_lower_epoch_of_its_workload_is_refused() {
         let plans = PlansInForce::new("n");
         assert!(plans.require(1, 0).is_err(), "no plan yet");
-        plans.apply(plan(1, 3)).unwrap();
-        plans.apply(plan(1, 3)).unwrap();
+        plans.apply(alone(plan(1, 3))).unwrap();
+        plans.apply(alone(plan(1, 3))).unwrap();
         for refused in [plan(1, 2), moved(plan(1, 3))] {
             assert_eq!(plans.admits(&refused).unwrap_err().code(), Code::FailedPrecondition);
-            assert_eq!(plans.apply(refused).unwrap_err().code(), Code::FailedPrecondition);
+            assert_eq!(plans.apply(alone(refused)).unwrap_err().code(), Code::FailedPrecondition);
         }
-        plans.apply(plan(2, 1)).unwrap();
-        plans.apply(plan(1, 4)).unwrap();
+        plans.apply(alone(plan(2, 1))).unwrap();
+        plans.apply(alone(plan(1, 4))).unwrap();
         assert!(plans.require(1, 3).is_err() && plans.require(1, 5).is_err() && plans.require(2, 4).is_err());
         assert_eq!((plans.require(1, 4).unwrap().plan_epoch, plans.require(2, 1).unwrap().plan_epoch), (4, 1));
         assert_eq!(plans.epoch(), 4);
@@ -386,28 +383,28 @@ pub(crate) mod tests {
     #[test]
     fn plans_that_were_forgotten_together_do_not_come_back() {
         let plans = PlansInForce::new("n");
-        plans.apply(plan(1, 3)).unwrap();
+        plans.apply(alone(plan(1, 3))).unwrap();
         plans.forget_all();
         assert!(plans.in_force(1).is_none());
         for late in [plan(1, 3), plan(2, 2)] {
-            assert_eq!(plans.apply(late).unwrap_err().code(), Code::FailedPrecondition);
+            assert_eq!(plans.apply(alone(late)).unwrap_err().code(), Code::FailedPrecondition);
         }
-        plans.apply(plan(1, 4)).unwrap();
+        plans.apply(alone(plan(1, 4))).unwrap();
     }
 
     #[test]
     fn a_workload_that_goes_on_remembers_its_last_plans() {
         let plans = PlansInForce::new("n");
-        plans.apply(plan(1, 3)).unwrap();
-        plans.apply(moved(plan(1, 5))).unwrap();
+        plans.apply(alone(plan(1, 3))).unwrap();
+        plans.apply(alone(moved(plan(1, 5)))).unwrap();
         assert_eq!(plans.follow(1, 3).unwrap().plan_epoch, 5);
         assert_eq!(*plans.remembered(1, 3).unwrap(), plan(1, 3));
         assert!(plans.follow(1, 4).is_err() && plans.follow(1, 6).is_err() && plans.remembered(1, 4).is_err());
         let in_force = wire::plan_in_force(&plans.require(1, 3).unwrap_err());
         assert_eq!(in_force.map(|plan| plan.plan_epoch), Some(5), "the refusal names it");
-        (6..20).for_each(|epoch| drop(plans.apply(plan(1, epoch)).unwrap()));
+        (6..20).for_each(|epoch| drop(plans.apply(alone(plan(1, epoch))).unwrap()));
         assert!(plans.follow(1, 5).is_err() && plans.remembered(1, 11).is_err() && plans.follow(1, 12).is_ok());
-        plans.apply(of_another_scene(plan(1, 20))).unwrap();
+        plans.apply(alone(of_another_scene(plan(1, 20)))).unwrap();
         assert!(plans.follow(1, 19).is_err() && plans.remembered(1, 19).is_err(), "it shows something else");
     }
 
@@ -415,31 +412,31 @@ pub(crate) mod tests {
     fn the_workload_that_was_used_longest_ago_leaves() {
         let plans = PlansInForce::new("n");
         let most = MAX_WORKLOADS as u64;
-        (1..=most).for_each(|number| drop(plans.apply(plan(number, number)).unwrap()));
+        (1..=most).for_each(|number| drop(plans.apply(alone(plan(number, number))).unwrap()));
         assert!(plans.in_force(1).is_some(), "it was used now");
-        plans.apply(plan(most + 1, most + 1)).unwrap();
+        plans.apply(alone(plan(most + 1, most + 1))).unwrap();
         assert!(plans.in_force(2).is_none() && plans.in_force(1).is_some() && plans.in_force(most + 1).is_some());
     }
 
     #[test]
     fn workloads_that_have_ended_are_forgotten_whatever_comes_late() {
         let plans = PlansInForce::new("n");
-        [plan(1, 3), plan(2, 4), plan(5, 6)].into_iter().for_each(|plan| drop(plans.apply(plan).unwrap()));
+        [plan(1, 3), plan(2, 4), plan(5, 6)].into_iter().for_each(|plan| drop(plans.apply(alone(plan)).unwrap()));
         let telling =
-            |plan_epoch, open: &[u64]| ApplyPlan { open_workloads: open.to_vec(), ..plan(1, plan_epoch).into() };
+            |plan_epoch, open: &[u64]| ApplyPlan { open_workloads: open.to_vec(), ..alone(plan(1, plan_epoch)) };
         assert_eq!(plans.apply(telling(7, &[1, 5])).unwrap(), [2]);
         assert!(plans.in_force(2).is_none() && plans.in_force(5).is_some());
         assert!(plans.require(2, 4).unwrap_err().message().ends_with("none is"));
-        let late = plans.apply(plan(2, 5)).unwrap_err();
+        let late = plans.apply(alone(plan(2, 5))).unwrap_err();
         assert_eq!((late.code(), late.message()), (Code::FailedPrecondition, "workload 2 has ended"));
         assert_eq!(plans.apply(telling(9, &[1, 5, 8])).unwrap(), [0; 0]);
         assert!(plans.apply(telling(8, &[1])).is_err(), "a plan of before is refused");
         assert!(plans.in_force(5).is_some(), "and its list does not count");
-        plans.apply(plan(8, 8)).unwrap();
-        plans.apply(ApplyPlan { open_workloads: vec![1, 8], ..plan(8, 10).into() }).unwrap();
+        plans.apply(alone(plan(8, 8))).unwrap();
+        plans.apply(ApplyPlan { open_workloads: vec![1, 8], ..alone(plan(8, 10)) }).unwrap();
         let both = (plans.in_force(5).is_none(), plans.in_force(8).map(|plan| plan.plan_epoch));
         assert_eq!(both, (true, Some(10)));
-        assert_eq!(plans.apply(plan(1, 11)).unwrap(), [0; 0], "nothing is told");
+        assert_eq!(plans.apply(alone(plan(1, 11))).unwrap(), [0; 0], "nothing is told");
         let content = plan(1, 1).set_content(0).unwrap();
         assert!(plans.have_set(&content, 0));
     }
@@ -447,11 +444,11 @@ pub(crate) mod tests {
     #[tokio::test]
     async fn a_wait_ends_with_its_workload() {
         let plans = PlansInForce::new("n");
-        plans.apply(plan(1, 3)).unwrap();
+        plans.apply(alone(plan(1, 3))).unwrap();
         let waiting = plans.clone();
         let waits = tokio::spawn(async move { waiting.until(1, |plan| plan.is_none()).await });
         tokio::task::yield_now().await;
-        plans.apply(ApplyPlan { open_workloads: vec![2], ..plan(2, 4).into() }).unwrap();
+        plans.apply(ApplyPlan { open_workloads: vec![2], ..alone(plan(2, 4)) }).unwrap();
         waits.await.unwrap();
     }
 

@@ -99,8 +99,7 @@ async fn protocol_of(stream: &TcpStream) -> io::Result<Option<Protocol>> {
         if REQUESTS.iter().any(|request| received.starts_with(request)) {
             return Ok(Some(Protocol::Http1));
         }
-        let can_become = |known: &&[u8]| known.starts_with(received);
-        if count == 0 || !(can_become(&PREFACE) || REQUESTS.iter().any(can_become)) {
+        if count == 0 || !REQUESTS.iter().chain([&PREFACE]).any(|known| known.starts_with(received)) {
             return Ok(None);
         }
         if count == PREFACE.len() {

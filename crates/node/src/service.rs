@@ -11,6 +11,7 @@ use wire::rpc;
 
 use crate::blocking::blocking;
 use crate::config::Quotas;
+use crate::latest::push_latest;
 use crate::measure::measure_costs;
 use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
@@ -69,7 +70,7 @@ impl rpc::Node for NodeService {
         if let Some(budget) = request.budget.clone() {
             return self.measure_for_budget(request, budget).await;
         }
-        request.typical_views.iter().try_for_each(|view| self.quotas.check_view(view, request.planes))?;
+        request.typical_views.chunks(1).try_for_each(|view| self.quotas.check_views(view, request.planes))?;
         let known =
             self.measured.lock().iter().find(|(known, _)| *known == request).map(|(_, measured)| measured.clone());
         // What is measured in the background was measured before, beside other work.
@@ -85,10 +86,7 @@ impl rpc::Node for NodeService {
         let request = MeasureCosts { in_background: false, ..request };
         let mut cached = self.measured.lock();
         cached.retain(|(known, _)| *known != request);
-        cached.push_back((request, measured.clone()));
-        while cached.len() > MAX_MEASURED {
-            cached.pop_front();
-        }
+        push_latest(&mut cached, (request, measured.clone()), MAX_MEASURED);
         Ok(measured)
     }
 

@@ -37,7 +37,7 @@ const EXPECTED_LAYERS: usize = 2;
 pub fn most_image_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -> usize {
     let visibility_bytes = 4 * SpecularPlanes::visibility_planes(illumination.lights.len());
     let share_bytes = 4 * LightPlanes::share_planes(illumination.lights.len());
-    let bytes = |camera: &SampleCamera| match camera {
+    let bytes = cameras.iter().map(|camera| match camera {
         SampleCamera::Depth(camera) => {
             let corners = (camera.size_px().x as usize + 1) * (camera.size_px().y as usize + 1);
             let with_color = camera.pixel_count() * (MOST_TEXEL_BYTES + visibility_bytes) + corners * CORNER_BYTES;
@@ -48,21 +48,21 @@ pub fn most_image_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -
             camera.pixel_count() * (LINE_BYTES + EXPECTED_LAYERS * (MOST_SAMPLE_BYTES + visibility_bytes))
         }
         SampleCamera::LightField(camera) => camera.line_count() * (LINE_BYTES + EXPECTED_LAYERS * LIGHT_SAMPLE_BYTES),
-    };
-    cameras.iter().map(bytes).sum()
+    });
+    bytes.sum()
 }
 
 /// The most bytes of a set on a device; of a cube, as [`most_image_bytes`] expects them.
 #[must_use]
 pub fn most_set_bytes(illumination: &Illumination, cameras: &[SampleCamera]) -> usize {
-    let search_bytes = |camera: &SampleCamera| match camera {
+    let search_bytes = cameras.iter().map(|camera| match camera {
         SampleCamera::Depth(camera) => camera.pixel_count() * PYRAMID_TEXEL_BYTES,
         SampleCamera::Layered(camera) => camera.pixel_count() * EXPECTED_LAYERS * CUBE_SAMPLE_BYTES,
         SampleCamera::LightField(camera) => camera.line_count() * LINE_BYTES,
-    };
+    });
     let parallel: Vec<_> = cameras.iter().filter_map(SampleCamera::layered).copied().collect();
     let cells = CubeGrid::of_cameras(&parallel).map_or(0, |grid| cell_bytes(grid.size));
-    most_image_bytes(illumination, cameras) + cameras.iter().map(search_bytes).sum::<usize>() + cells
+    most_image_bytes(illumination, cameras) + search_bytes.sum::<usize>() + cells
 }
 
 /// Bytes of images on a device, by the planes that they have.

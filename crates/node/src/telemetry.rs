@@ -25,6 +25,9 @@ use tracing_subscriber::util::SubscriberInitExt as _;
 use crate::work_done::WorkDone;
 
 const CONTENT_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+/// Help texts of metrics.
+const WANTED_FETCHES_ENDED: &str = "Sample sets that a live view waited for and that could not be fetched";
+const UNCOVERED_VIEWS: &str = "Views that a promise is not for, while it is audited";
 
 /// Starts logging. `RUST_LOG` names levels, such as `info` or `warn,coordinator=debug`; where it is not set, `default_levels`
 /// apply. A second call does nothing.
@@ -73,8 +76,8 @@ impl Telemetry {
     /// # Errors
     /// The listener's.
     pub async fn serve(self, listener: TcpListener, shutdown: CancellationToken) -> std::io::Result<()> {
-        let page = move || async move { ([(header::CONTENT_TYPE, CONTENT_TYPE)], self.page()) };
-        let router = Router::new().route("/metrics", get(page));
+        let page = get(move || async move { ([(header::CONTENT_TYPE, CONTENT_TYPE)], self.page()) });
+        let router = Router::new().route("/metrics", page);
         axum::serve(listener, router).with_graceful_shutdown(shutdown.cancelled_owned()).await
     }
 }
@@ -120,11 +123,15 @@ fn in_unit<M: Metric + Clone>(registry: &mut Registry, name: &str, help: &str, u
     metric
 }
 
+/// A histogram of times.
+fn seconds() -> Histogram {
+    Histogram::new(exponential_buckets(0.0005, 2.0, 16))
+}
+
 impl NodeMetrics {
     /// Registers all metrics, at zero.
     #[must_use]
     pub fn new(telemetry: &Telemetry) -> Self {
-        let seconds = || Histogram::new(exponential_buckets(0.0005, 2.0, 16));
         let counter = Counter::default;
         let gauge = Gauge::default;
         let to = &mut *telemetry.registry();
@@ -132,12 +139,7 @@ impl NodeMetrics {
             images_sampled: registered(to, "images_sampled", "Images sampled and encoded", counter()),
             image_s: in_unit(to, "image", "Sampling of one image", Unit::Seconds, seconds()),
             sets_loaded: registered(to, "sets_loaded", "Sample sets fetched and uploaded", counter()),
-            wanted_fetches_ended: registered(
-                to,
-                "wanted_fetches_ended",
-                "Sample sets that a live view waited for and that could not be fetched",
-                counter(),
-            ),
+            wanted_fetches_ended: registered(to, "wanted_fetches_ended", WANTED_FETCHES_ENDED, counter()),
             set_s: in_unit(to, "set_load", "Loading of one sample set", Unit::Seconds, seconds()),
             views: registered(to, "views", "Views made", counter()),
             view_s: in_unit(to, "view", "The device's time for one view", Unit::Seconds, seconds()),
@@ -146,12 +148,7 @@ impl NodeMetrics {
             dropped: registered(to, "dropped_views", "Views not made or not sent", Family::default()),
             audited_views: registered(to, "audited_views", "Views drawn directly as well, and compared", counter()),
             failed_audits: registered(to, "failed_audits", "Views that could not be compared", counter()),
-            uncovered_views: registered(
-                to,
-                "uncovered_views",
-                "Views that a promise is not for, while it is audited",
-                Family::default(),
-            ),
+            uncovered_views: registered(to, "uncovered_views", UNCOVERED_VIEWS, Family::default()),
             audit_s: in_unit(to, "audit", "Drawing and comparing for audits", Unit::Seconds, Counter::default()),
             streams: registered(to, "streams", "Clients' streams that are open", gauge()),
             plan_epoch: registered(to, "plan_epoch", "The newest plan in force", gauge()),

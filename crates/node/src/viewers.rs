@@ -45,23 +45,18 @@ impl Viewers {
 fn merged(cameras: &[PinholeCamera]) -> Vec<PinholeCamera> {
     let mut apart = 0.0;
     loop {
-        let kept = kept_apart(cameras, apart);
+        // The first cameras that are farther from each other than `apart`, until there are too many.
+        let mut kept = Vec::<PinholeCamera>::new();
+        for camera in cameras {
+            if kept.len() <= MAX_REPORTED && kept.iter().all(|other| distance(other, camera) > apart) {
+                kept.push(*camera);
+            }
+        }
         if kept.len() <= MAX_REPORTED {
             return kept;
         }
         apart = (2.0 * apart).max(LEAST_APART);
     }
-}
-
-/// The first cameras that are farther from each other than `apart`, until there are too many.
-fn kept_apart(cameras: &[PinholeCamera], apart: f32) -> Vec<PinholeCamera> {
-    let mut kept = Vec::<PinholeCamera>::new();
-    for camera in cameras {
-        if kept.len() <= MAX_REPORTED && kept.iter().all(|other| distance(other, camera) > apart) {
-            kept.push(*camera);
-        }
-    }
-    kept
 }
 
 /// Metres between eyes, and the difference of directions.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use cluster::limits::MAX_PROBE_VIEWS;
 use cluster::{AuditReport, AuditedView, MeasuredCosts, WorkReport};
 use depth_image::PinholeCamera;
-use parking_lot::Mutex;
+use parking_lot::{MappedMutexGuard, Mutex, MutexGuard};
 
 use crate::plan::PlansInForce;
 use crate::viewers::Viewers;
@@ -55,48 +55,45 @@ struct Sums {
 impl WorkDone {
     /// Adds `count` operations of a workload that took `seconds` together; the count may be a fraction.
     pub fn add(&self, workload_number: u64, operation: Operation, count: f64, seconds: f64) {
-        self.of(workload_number, |sums| {
-            let sum = &mut sums.operations[operation as usize];
-            *sum = (sum.0 + count, sum.1 + seconds);
-            sums.busy_s += seconds;
-            if matches!(operation, Operation::DirectView | Operation::ReconstructView) {
-                sums.views += count as u64;
-            }
-        });
+        let mut sums = self.of(workload_number);
+        let sum = &mut sums.operations[operation as usize];
+        *sum = (sum.0 + count, sum.1 + seconds);
+        sums.busy_s += seconds;
+        if matches!(operation, Operation::DirectView | Operation::ReconstructView) {
+            sums.views += count as u64;
+        }
     }
 
     /// Adds bytes that were received in `seconds`.
     pub fn transferred(&self, workload_number: u64, bytes: usize, seconds: f64) {
-        self.of(workload_number, |Sums { transferred, .. }| {
-            *transferred = (transferred.0 + bytes as f64, transferred.1 + seconds);
-        });
+        let transferred = &mut self.of(workload_number).transferred;
+        *transferred = (transferred.0 + bytes as f64, transferred.1 + seconds);
     }
 
     /// Adds whole images that were encoded to `bytes` together.
     pub fn encoded(&self, workload_number: u64, images: f64, bytes: usize) {
-        self.of(workload_number, |Sums { encoded, .. }| *encoded = (encoded.0 + images, encoded.1 + bytes as f64));
+        let encoded = &mut self.of(workload_number).encoded;
+        *encoded = (encoded.0 + images, encoded.1 + bytes as f64);
     }
 
     /// Adds views that were made while a promise is audited: those that it is for, and others.
     pub fn covered(&self, workload_number: u64, [covered, uncovered]: [u64; 2]) {
-        self.of(workload_number, |Sums { audit, .. }| {
-            audit.covered_views += covered;
-            audit.uncovered_views += uncovered;
-        });
+        let audit = &mut self.of(workload_number).audit;
+        audit.covered_views += covered;
+        audit.uncovered_views += uncovered;
     }
 
     /// Adds an audited view. The first ones of a report count where there are too many.
     pub fn audited(&self, workload_number: u64, view: AuditedView, seconds: f64) {
-        self.of(workload_number, |Sums { audit, .. }| {
-            audit.busy_s += seconds;
-            if audit.views.len() < MAX_PROBE_VIEWS {
-                audit.views.push(view);
-            }
-        });
+        let audit = &mut self.of(workload_number).audit;
+        audit.busy_s += seconds;
+        if audit.views.len() < MAX_PROBE_VIEWS {
+            audit.views.push(view);
+        }
     }
 
-    fn of(&self, workload_number: u64, add: impl FnOnce(&mut Sums)) {
-        add(self.0.lock().workloads.entry(workload_number).or_default());
+    fn of(&self, workload_number: u64) -> MappedMutexGuard<'_, Sums> {
+        MutexGuard::map(self.0.lock(), |work| work.workloads.entry(workload_number).or_default())
     }
 
     /// Counts a view that was not made or not sent.
@@ -118,11 +115,10 @@ impl WorkDone {
     pub(crate) fn take_reports(&self, plans: &PlansInForce) -> Vec<WorkReport> {
         let mut work = self.0.lock();
         let mut workloads = std::mem::take(&mut work.workloads);
-        let mut dropped_views = work.dropped_views;
         for workload_number in work.viewers.take_changed() {
             workloads.entry(workload_number).or_default();
         }
-        let report = |(workload_number, sums): (u64, Sums)| {
+        let reports = workloads.into_iter().filter_map(|(workload_number, sums)| {
             let plan = plans.in_force(workload_number)?;
             Some(WorkReport {
                 node_name: plans.node_name.to_string(),
@@ -131,32 +127,29 @@ impl WorkDone {
                 costs: sums.costs(),
                 busy_s: sums.busy_s,
                 views: sums.views,
-                dropped_views: std::mem::take(&mut dropped_views),
+                dropped_views: std::mem::take(&mut work.dropped_views),
                 viewpoints: work.viewers.of(workload_number),
                 audit: (!sums.audit.is_empty()).then_some(sums.audit),
             })
-        };
-        let reports = workloads.into_iter().filter_map(report).collect();
-        work.dropped_views = dropped_views;
-        reports
+        });
+        reports.collect()
     }
 }
 
 impl Sums {
     /// The mean time of each operation; `None` where it was not done.
     fn costs(&self) -> MeasuredCosts {
-        let mean = |operation: Operation| {
-            let (count, seconds) = self.operations[operation as usize];
-            quotient(count, seconds)
-        };
+        // In the order of the operations' variants.
+        let [sample_image_s, direct_view_s, reconstruct_view_s, load_set_s, encode_view_s] =
+            self.operations.map(|(count, seconds)| quotient(count, seconds));
         let (images, bytes) = self.encoded;
         let (received, seconds) = self.transferred;
         MeasuredCosts {
-            sample_image_s: mean(Operation::SampleImage),
-            direct_view_s: mean(Operation::DirectView),
-            reconstruct_view_s: mean(Operation::ReconstructView),
-            load_set_s: mean(Operation::LoadSet),
-            encode_view_s: mean(Operation::EncodeView),
+            sample_image_s,
+            direct_view_s,
+            reconstruct_view_s,
+            load_set_s,
+            encode_view_s,
             transfer_bytes_per_s: quotient(seconds, received),
             image_bytes: quotient(images, bytes),
         }
@@ -174,7 +167,9 @@ mod tests {
 
     fn plans(workloads: u64) -> PlansInForce {
         let plans = PlansInForce::new("n");
-        (1..=workloads).for_each(|number| drop(plans.apply(crate::plan::tests::plan(number, 6 + number)).unwrap()));
+        (1..=workloads).for_each(|number| {
+            drop(plans.apply(crate::plan::tests::alone(crate::plan::tests::plan(number, 6 + number))).unwrap())
+        });
         plans
     }
 

@@ -4,31 +4,20 @@ use depth_image::{DepthImage, PinholeCamera, View};
 use metrics::{MetricsError, Rgb8Image, flip_map, foreground, psnr_db, unheld_rate};
 use planner::ViewErrors;
 
-/// The errors of a view against the same view drawn from the scene, which has depth. The pixels that no sample camera sees
-/// are those of a surface that no sample image holds.
+/// The errors of a view against the same view drawn from the scene, which has depth; with a mask, those of the pixels in it.
+/// The pixels that no sample camera sees are those of a surface that no sample image holds.
 ///
 /// # Errors
-/// The views differ in size, or planes do not fit their cameras.
+/// The views or the mask differ in size, or planes do not fit their cameras.
 pub fn view_errors(
     camera: &PinholeCamera,
     truth: &View,
     view: &View,
     sample_images: &[DepthImage],
+    mask: Option<&[bool]>,
 ) -> Result<ViewErrors, MetricsError> {
-    errors_of_part(camera, truth, view, sample_images, &vec![true; camera.pixel_count()])
-}
-
-/// The same of the pixels in a mask.
-///
-/// # Errors
-/// As [`view_errors`]; or the mask has another size.
-pub fn errors_of_part(
-    camera: &PinholeCamera,
-    truth: &View,
-    view: &View,
-    sample_images: &[DepthImage],
-    part: &[bool],
-) -> Result<ViewErrors, MetricsError> {
+    let whole = vec![true; camera.pixel_count()];
+    let part = mask.unwrap_or(&whole);
     let expected = Rgb8Image::of_view(truth)?;
     let actual = Rgb8Image::of_view(view)?;
     let mask: Vec<bool> = foreground(truth, &actual)?.iter().zip(part).map(|(&shown, &own)| shown && own).collect();
@@ -36,7 +25,6 @@ pub fn errors_of_part(
     let depth = truth.inverse_depth_per_m.as_deref().unwrap_or_default();
     let depth: Vec<f32> = depth.iter().zip(part).map(|(&inverse, &own)| if own { inverse } else { 0.0 }).collect();
     let unheld = unheld_rate(camera, &depth, sample_images)?.unwrap_or(0.0);
-    let count = |mask: &[bool]| mask.iter().filter(|&&own| own).count();
     let shown = count(&mask);
     let surfaces = depth.iter().filter(|&&inverse| inverse > 0.0).count();
     // An infinite ratio is an error of 0.
@@ -48,6 +36,10 @@ pub fn errors_of_part(
         mean_square,
         disoccluded_ratio: if shown == 0 { 0.0 } else { unheld * surfaces as f64 / shown as f64 },
     })
+}
+
+fn count(mask: &[bool]) -> usize {
+    mask.iter().filter(|&&own| own).count()
 }
 
 #[cfg(test)]
@@ -86,7 +78,7 @@ mod tests {
     }
 
     fn errors(test: &View, images: &[DepthImage]) -> ViewErrors {
-        view_errors(&camera(), &view(100, 0), test, images).unwrap()
+        view_errors(&camera(), &view(100, 0), test, images, None).unwrap()
     }
 
     #[test]
@@ -118,11 +110,11 @@ mod tests {
         let truth = view(100, 0);
         let test = view(151, 9);
         let images = [image(2)];
-        let whole = view_errors(&camera(), &truth, &test, &images).unwrap();
+        let whole = view_errors(&camera(), &truth, &test, &images, None).unwrap();
         let mut sums = [0.0; 4];
         for first_row in [0, 4, 8, 12] {
             let part: Vec<bool> = (0..256).map(|pixel| (first_row..first_row + 4).contains(&(pixel / 16))).collect();
-            let own = errors_of_part(&camera(), &truth, &test, &images, &part).unwrap();
+            let own = view_errors(&camera(), &truth, &test, &images, Some(&part)).unwrap();
             let of = own.foreground_ratio;
             let parts = [of, of * own.flip, own.flip_whole, of * own.disoccluded_ratio];
             sums.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part / 4.0);
@@ -137,10 +129,12 @@ mod tests {
     #[test]
     fn a_view_of_nothing_has_no_error_and_one_of_another_size_is_refused() {
         let empty = View { srgb8: vec![0; 768], inverse_depth_per_m: Some(vec![0.0; 256]), ..view(0, 0) };
-        let errors = view_errors(&camera(), &empty, &empty, &[]).unwrap();
+        let errors = view_errors(&camera(), &empty, &empty, &[], None).unwrap();
         assert!(errors.validate().is_ok() && errors.foreground_ratio == 0.0 && errors.disoccluded_ratio == 0.0);
         let other = View { size_px: UVec2::splat(8), srgb8: vec![0; 192], ..empty.clone() };
-        assert!(view_errors(&camera(), &empty, &other, &[]).is_err());
-        assert!(view_errors(&camera(), &View { inverse_depth_per_m: None, ..empty.clone() }, &empty, &[]).is_err());
+        assert!(view_errors(&camera(), &empty, &other, &[], None).is_err());
+        assert!(
+            view_errors(&camera(), &View { inverse_depth_per_m: None, ..empty.clone() }, &empty, &[], None).is_err()
+        );
     }
 }

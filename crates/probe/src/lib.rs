@@ -10,14 +10,12 @@
 mod errors_of_views;
 mod plan;
 mod prober;
-mod representation;
 mod service;
 mod sets;
 mod subject;
 
-pub use errors_of_views::{errors_of_part, view_errors};
+pub use errors_of_views::view_errors;
 pub use plan::{answer, plan};
 pub use prober::{DirectCosts, Measured, ProbeError, Prober};
-pub use representation::Representation;
 pub use service::Probers;
-pub use subject::{Light, Subject, Viewpoints};
+pub use subject::{Light, Representation, Subject, Viewpoints};

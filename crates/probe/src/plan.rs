@@ -4,13 +4,11 @@ use std::time::Instant;
 
 use depth_image::PinholeCamera;
 use planner::{
-    Command, Event, Kept, Outcome, Planner, Pricing, ProbeId, Probed, Purpose, RowCosts, Timed, median_costs,
-    shortened_reason,
+    Command, Event, Kept, Outcome, Planner, Pricing, Probed, Purpose, RowCosts, Timed, median_costs, shortened_reason,
 };
 
 use crate::prober::{ProbeError, Prober};
-use crate::representation::Representation;
-use crate::subject::{Light, Viewpoints};
+use crate::subject::{Light, Representation, Viewpoints};
 
 /// Makes a plan from what earlier plans measured; `representations` are those of the ladder's rows, in order. `observe` sees
 /// the planner after every measurement. The result has the measurements for later plans.
@@ -70,7 +68,10 @@ pub fn answer(
         }
         Command::Keep(_) | Command::Conclude(_) | Command::Refuse(_) => return None,
     };
-    Some(measured.unwrap_or_else(|error| failed(id, &error, start.elapsed().as_secs_f64())))
+    Some(measured.unwrap_or_else(|error| {
+        let reason = shortened_reason(&error.to_string());
+        Event::Failed { id, reason, busy_s: start.elapsed().as_secs_f64() }
+    }))
 }
 
 /// The median costs of rows that are timed in turn.
@@ -88,8 +89,4 @@ fn time(
         }
     }
     Ok(costs.iter().map(|costs| median_costs(costs)).collect())
-}
-
-fn failed(id: ProbeId, error: &ProbeError, busy_s: f64) -> Event {
-    Event::Failed { id, reason: shortened_reason(&error.to_string()), busy_s }
 }

@@ -1,9 +1,7 @@
 //! The errors and the costs of representations, measured on one device.
 
-use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use std::time::Instant;
 
 use codec::{
     DecodeError, DecodeLimits, EncodeError, EncodedImage, FrameCodec, FrameError, decode_depth_image,
@@ -16,9 +14,8 @@ use planner::{RowCosts, ViewErrors, median};
 use rayon::prelude::*;
 
 use crate::errors_of_views::view_errors;
-use crate::representation::Representation;
 use crate::sets::{SampledSet, SetKey, Sets};
-use crate::subject::{Light, Subject, Viewpoints};
+use crate::subject::{Light, Representation, Subject, Viewpoints};
 
 /// Views that are timed at once, at least, unless they are large: a batch has fixed costs.
 const TIMED_VIEWS: usize = 16;
@@ -84,8 +81,6 @@ pub struct Prober {
     sets: Sets,
     /// Shaders that are built: the first run of an operation is not timed.
     warm: BTreeSet<String>,
-    /// The time for which work has waited for other work, in s.
-    waited_s: Cell<f64>,
 }
 
 /// A camera's numbers, bit by bit.
@@ -95,8 +90,8 @@ impl Prober {
     /// A prober of a subject whose scene is loaded.
     #[must_use]
     pub fn new(engine: Arc<dyn Engine>, subject: Subject, turn: Turn) -> Self {
-        let (truths, sets, warm, waited_s) = Default::default();
-        Self { engine, subject, turn, truths, sets, warm, waited_s }
+        let warm = BTreeSet::new();
+        Self { engine, subject, turn, truths: BTreeMap::new(), sets: Sets::default(), warm }
     }
 
     /// The subject.
@@ -120,7 +115,7 @@ impl Prober {
         let pairs: Vec<_> = cameras.iter().zip(&truths).zip(&measured.views).collect();
         let errors = pairs
             .into_par_iter()
-            .map(|((camera, truth), made)| view_errors(camera, truth, made, &measured.sample_images));
+            .map(|((camera, truth), made)| view_errors(camera, truth, made, &measured.sample_images, None));
         let errors = errors.collect::<Result<_, _>>()?;
         let sample_image_s = self.sample_image_s(of, light, measured.costs.sample_image_s)?;
         Ok((errors, RowCosts { sample_image_s, ..measured.costs }))
@@ -145,7 +140,7 @@ impl Prober {
         let mut seconds = 0.0;
         let timed = timed_cameras(cameras, views_a_call);
         for cameras in timed.chunks(views_a_call) {
-            let work = self.view_work(of, cameras.to_vec(), planes);
+            let work = ViewWork { cameras: cameras.to_vec(), method: of.method.clone(), planes };
             let (made, call_s) = self.timed(|engine, turn| engine.reconstruct(set.as_ref(), &work, turn))?;
             seconds += call_s;
             views.extend(made);
@@ -176,24 +171,19 @@ impl Prober {
     pub fn truths(&mut self, light: Light, cameras: &[PinholeCamera]) -> Result<Vec<Arc<View>>, ProbeError> {
         let light = self.same_light(light);
         let keys: Vec<_> = cameras.iter().map(|camera| (light, bits(camera))).collect();
-        let is_missing = |key: &&(Light, CameraBits)| !self.truths.contains_key(*key);
-        let missing: BTreeMap<_, _> = keys.iter().zip(cameras).filter(|(key, _)| is_missing(key)).collect();
-        let missing: Vec<_> = missing.into_iter().map(|(key, camera)| (key.clone(), *camera)).collect();
-        let bytes = |camera: &PinholeCamera| camera.pixel_count() * TRUTH_BYTES_PER_PIXEL;
-        let kept_bytes =
-            self.truths.values().map(|view| view.size_px.element_product() as usize * TRUTH_BYTES_PER_PIXEL);
-        if kept_bytes.sum::<usize>() + missing.iter().map(|(_, camera)| bytes(camera)).sum::<usize>() > MAX_TRUTH_BYTES
-        {
+        let mut missing: BTreeMap<_, _> = keys.iter().cloned().zip(cameras.iter().copied()).collect();
+        missing.retain(|key, _| !self.truths.contains_key(key));
+        let kept_pixels = self.truths.values().map(|view| view.size_px.element_product() as usize);
+        let pixels: usize = kept_pixels.chain(missing.values().map(PinholeCamera::pixel_count)).sum();
+        if pixels * TRUTH_BYTES_PER_PIXEL > MAX_TRUTH_BYTES {
             self.truths.retain(|key, _| keys.contains(key));
         }
-        if !missing.is_empty() {
-            let (missing, cameras) = missing.into_iter().unzip::<_, _, Vec<_>, Vec<_>>();
-            let planes = ViewPlanes { inverse_depth: true, ..self.subject.planes };
-            for (keys, cameras) in missing.chunks(TRUTHS_A_CALL).zip(cameras.chunks(TRUTHS_A_CALL)) {
-                let work = self.subject.direct_work(cameras.to_vec(), light, planes);
-                let drawn = self.engine.draw_direct(&work, self.turn)?;
-                self.truths.extend(keys.iter().cloned().zip(drawn.into_iter().map(Arc::new)));
-            }
+        let (missing, cameras): (Vec<_>, Vec<_>) = missing.into_iter().unzip();
+        let planes = ViewPlanes { inverse_depth: true, ..self.subject.planes };
+        for (keys, cameras) in missing.chunks(TRUTHS_A_CALL).zip(cameras.chunks(TRUTHS_A_CALL)) {
+            let work = self.subject.direct_work(cameras.to_vec(), light, planes);
+            let drawn = self.engine.draw_direct(&work, self.turn)?;
+            self.truths.extend(keys.iter().cloned().zip(drawn.into_iter().map(Arc::new)));
         }
         Ok(keys.iter().map(|key| self.truths[key].clone()).collect())
     }
@@ -203,16 +193,17 @@ impl Prober {
     /// # Errors
     /// The device fails.
     pub fn direct_costs(&mut self, viewpoints: &Viewpoints, codec: FrameCodec) -> Result<DirectCosts, ProbeError> {
-        let work =
-            |views: usize| self.subject.direct_work(viewpoints.first(views), Light::Session, self.subject.planes);
-        let (_, alone_s) = self.median_s(|engine, turn| engine.draw_direct(&work(1), turn))?;
-        let batch = work(views_of(CALL_S, alone_s, TIMED_VIEWS));
+        let planes = self.subject.planes;
+        let alone = self.subject.direct_work(viewpoints.first(1), Light::Session, planes);
+        let (_, alone_s) = self.median_s(|engine, turn| engine.draw_direct(&alone, turn))?;
+        let batch = viewpoints.first(views_of(CALL_S, alone_s, TIMED_VIEWS));
+        let batch = self.subject.direct_work(batch, Light::Session, planes);
         let (drawn, direct_s) = self.median_s(|engine, turn| engine.draw_direct(&batch, turn))?;
         let (encoded, encode_s) =
-            self.own_time(|| drawn.iter().try_for_each(|view| encode_view(view, codec).map(drop)));
+            own_time(self.engine.as_ref(), || drawn.iter().try_for_each(|view| encode_view(view, codec).map(drop)));
         encoded?;
-        let of_view = |seconds: f64| seconds / drawn.len().max(1) as f64;
-        Ok(DirectCosts { direct_view_s: of_view(direct_s), encode_view_s: of_view(encode_s) })
+        let views = drawn.len().max(1) as f64;
+        Ok(DirectCosts { direct_view_s: direct_s / views, encode_view_s: encode_s / views })
     }
 
     /// The median time of some runs after a warm-up, in which shaders are built.
@@ -230,16 +221,16 @@ impl Prober {
         if self.same_light(light) == Light::Session {
             return Ok(measured_s);
         }
-        let work = self.fewest(self.sample_work(of, Light::Session)?)?;
-        if self.is_first(&format!("sample {} {:?} {}", of.sampling, work.planes, work.lighting)) {
-            self.engine.sample(&work, self.turn)?;
-        }
+        let work = self.fewest(self.subject.sample_work(self.engine.as_ref(), of, Light::Session)?)?;
         Ok(self.encoded(&work)?.1)
     }
 
     /// Images as they leave a sampler, and g_s.
-    fn encoded(&self, work: &SampleWork) -> Result<(Vec<EncodedImage>, f64), ProbeError> {
-        let (encoded, seconds) = self.own_time(|| {
+    fn encoded(&mut self, work: &SampleWork) -> Result<(Vec<EncodedImage>, f64), ProbeError> {
+        if self.is_first(&format!("sample {} {:?} {}", work.sampling, work.planes, work.lighting)) {
+            self.engine.sample(&self.fewest(work.clone())?, self.turn)?;
+        }
+        let (encoded, seconds) = own_time(self.engine.as_ref(), || {
             let images = self.engine.sample(work, self.turn)?;
             let encoded = images.iter().map(encode_sample_image);
             Ok::<_, ProbeError>(encoded.collect::<Result<Vec<_>, _>>()?)
@@ -257,14 +248,11 @@ impl Prober {
 
     /// The set of a representation, at least.
     fn sampled(&mut self, of: &Representation, light: Light) -> Result<Arc<SampledSet>, ProbeError> {
-        let work = self.sample_work(of, light)?;
+        let work = self.subject.sample_work(self.engine.as_ref(), of, light)?;
         let key = SetKey { sampling: of.sampling.clone(), planes: work.planes, light: self.same_light(light) };
         let is_independent = self.engine.images_are_independent(&of.sampling)?;
         if let Some(set) = self.sets.find(&key, &of.sample_cameras, is_independent) {
             return Ok(set);
-        }
-        if self.is_first(&format!("sample {} {:?} {}", of.sampling, work.planes, work.lighting)) {
-            self.engine.sample(&self.fewest(work.clone())?, self.turn)?;
         }
         let (encoded, sample_image_s) = self.encoded(&work)?;
         let decoded = encoded.iter().zip(&of.sample_cameras).map(|(image, camera)| {
@@ -290,7 +278,7 @@ impl Prober {
         first: &[PinholeCamera],
     ) -> Result<(SharedSet, f64, f64), ProbeError> {
         let sample_set = self.subject.sample_set(images, light);
-        let one = self.view_work(of, first.to_vec(), planes);
+        let one = ViewWork { cameras: first.to_vec(), method: of.method.clone(), planes };
         if self.is_first(&format!("view {} {} {planes:?}", of.method, images.len())) {
             let set = self.engine.upload(&sample_set, self.turn)?;
             self.engine.reconstruct(set.as_ref(), &one, self.turn)?;
@@ -304,41 +292,9 @@ impl Prober {
         Ok((set, upload_s + (first_s - next_s).max(0.0), next_s))
     }
 
-    fn sample_work(&self, of: &Representation, light: Light) -> Result<SampleWork, ProbeError> {
-        Ok(self.subject.sample_work(self.engine.as_ref(), of, light)?)
-    }
-
-    fn view_work(&self, of: &Representation, cameras: Vec<PinholeCamera>, planes: ViewPlanes) -> ViewWork {
-        ViewWork { cameras, method: of.method.clone(), planes }
-    }
-
     /// Two lights of one text are one light.
     fn same_light(&self, light: Light) -> Light {
         if self.subject.lighting == self.subject.screening_lighting { Light::Session } else { light }
-    }
-
-    /// The result of measurements, and the seconds that they took, without those for which they waited for other work.
-    pub(crate) fn busy<T>(&mut self, measure: impl FnOnce(&mut Self) -> T) -> (T, f64) {
-        self.engine.take_waited_s();
-        self.waited_s.set(0.0);
-        let start = Instant::now();
-        let measured = measure(self);
-        self.note_waits();
-        (measured, (start.elapsed().as_secs_f64() - self.waited_s.get()).max(0.0))
-    }
-
-    /// As [`node::own_time`], whose waits count for [`Prober::busy`].
-    fn own_time<T>(&self, work: impl FnOnce() -> T) -> (T, f64) {
-        self.note_waits();
-        let start = Instant::now();
-        let (done, own_s) = own_time(self.engine.as_ref(), work);
-        self.waited_s.set(self.waited_s.get() + start.elapsed().as_secs_f64() - own_s);
-        (done, own_s)
-    }
-
-    /// Adds the waits of this thread since they were last noted.
-    fn note_waits(&self) {
-        self.waited_s.set(self.waited_s.get() + self.engine.take_waited_s());
     }
 
     fn is_first(&mut self, operation: &str) -> bool {
@@ -346,7 +302,7 @@ impl Prober {
     }
 
     fn timed<T>(&self, run: impl FnOnce(&dyn Engine, Turn) -> Result<T, EngineError>) -> Result<(T, f64), ProbeError> {
-        let (done, seconds) = self.own_time(|| run(self.engine.as_ref(), self.turn));
+        let (done, seconds) = own_time(self.engine.as_ref(), || run(self.engine.as_ref(), self.turn));
         Ok((done?, seconds))
     }
 }

@@ -6,15 +6,14 @@ use std::sync::Arc;
 use cluster::{BudgetMeasurement, Costs, MeasureCosts, Measured, ProbedView};
 use depth_image::{PinholeCamera, VIEW_REACH_PX, ViewPlanes};
 use metrics::FLIP_REACH_PX;
-use node::{Engine, EngineError, Turn, ViewAudit, ViewProbes, WorkClass, own_time};
+use node::{Engine, EngineError, Turn, ViewAudit, ViewProbes, WorkClass, own_time, push_latest};
 use parking_lot::Mutex;
 use planner::{RowCosts, ViewErrors};
 use tonic::Status;
 
-use crate::errors_of_views::errors_of_part;
+use crate::errors_of_views::view_errors;
 use crate::prober::{ProbeError, Prober};
-use crate::representation::Representation;
-use crate::subject::{Light, Subject};
+use crate::subject::{Light, Representation, Subject};
 
 /// A part of a view depends on so much around it. Views are made in tiles of 8 pixels a side, and parts begin with whole ones.
 const SURROUNDINGS_PX: u32 = (VIEW_REACH_PX + FLIP_REACH_PX).next_multiple_of(8);
@@ -49,11 +48,8 @@ impl ViewProbes for Probers {
         // Work that arrives meanwhile goes between slices of a measurement that nobody waits for.
         let _cut = self.engine.live_stream();
         let mut prober = self.taken(&mut probers, subject_of(request, budget));
-        let (measured, busy_s) = prober.busy(|prober| measured(prober, request, budget));
-        probers.push_back(prober);
-        while probers.len() > MAX_SUBJECTS {
-            probers.pop_front();
-        }
+        let (measured, busy_s) = own_time(self.engine.as_ref(), || measured(&mut prober, request, budget));
+        push_latest(&mut probers, prober, MAX_SUBJECTS);
         let (views, costs) = measured?;
         Ok(Measured { costs, views: views.into_iter().map(probed).collect(), busy_s, ..Measured::default() })
     }
@@ -78,7 +74,7 @@ fn audited(engine: &dyn Engine, turn: Turn, audit: ViewAudit) -> Result<ViewErro
     let truths = engine.draw_direct(&direct, turn)?;
     let ([made], [truth]) = (&made[..], &truths[..]) else { return Err(not_one_view()) };
     let part: Vec<bool> = part.mask_within(&outer).collect();
-    Ok(errors_of_part(&camera, truth, made, &sample_images, &part)?)
+    Ok(view_errors(&camera, truth, made, &sample_images, Some(&part))?)
 }
 
 fn not_one_view() -> ProbeError {
@@ -120,13 +116,11 @@ fn add(costs: &mut Costs, own: &RowCosts, share: f64) {
 fn representation(request: &MeasureCosts, cell: u32) -> Result<Representation, Status> {
     let workload = request.workload.of_cell(cell as usize);
     let workload = workload.ok_or_else(|| Status::invalid_argument(format!("views: there is no view cell {cell}")))?;
-    let of_views = || Status::invalid_argument("sample_cameras: budgets choose among depth images alone");
     let sample_cameras = workload.sample_cameras.iter().map(|camera| camera.depth().copied());
-    Ok(Representation {
-        sampling: workload.sampling,
-        method: request.method.clone(),
-        sample_cameras: sample_cameras.collect::<Option<_>>().ok_or_else(of_views)?,
-    })
+    let Some(sample_cameras) = sample_cameras.collect() else {
+        return Err(Status::invalid_argument("sample_cameras: budgets choose among depth images alone"));
+    };
+    Ok(Representation { sampling: workload.sampling, method: request.method.clone(), sample_cameras })
 }
 
 fn subject_of(request: &MeasureCosts, budget: &BudgetMeasurement) -> Subject {

@@ -39,22 +39,22 @@ pub(crate) struct Sets {
 impl Sets {
     /// The set of these cameras; of images that do not depend on each other also a larger set that begins with them.
     pub(crate) fn find(&self, key: &SetKey, cameras: &[Camera], is_independent: bool) -> Option<Arc<SampledSet>> {
-        let serves = |set: &SampledSet| {
+        let found = self.newest_last.iter().find(|(other, set)| {
             let count = set.images.len();
             let has_all = count == cameras.len() || (is_independent && count > cameras.len());
-            has_all && set.images.iter().zip(cameras).all(|(image, camera)| image.camera == *camera)
-        };
-        let found = self.newest_last.iter().find(|(other, set)| other == key && serves(set));
+            other == key && has_all && set.images.iter().zip(cameras).all(|(image, camera)| image.camera == *camera)
+        });
         found.map(|(_, set)| set.clone())
     }
 
     pub(crate) fn keep(&mut self, key: SetKey, set: Arc<SampledSet>) {
         self.newest_last.push((key, set));
-        let bytes = |sets: &[(SetKey, Arc<SampledSet>)]| {
-            sets.iter().map(|(_, set)| depth_images_bytes(&set.images)).sum::<usize>()
-        };
-        while self.newest_last.len() > 1 && bytes(&self.newest_last) > MAX_BYTES {
+        while self.newest_last.len() > 1 && self.bytes() > MAX_BYTES {
             self.newest_last.remove(0);
         }
+    }
+
+    fn bytes(&self) -> usize {
+        self.newest_last.iter().map(|(_, set)| depth_images_bytes(&set.images)).sum()
     }
 }

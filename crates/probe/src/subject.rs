@@ -2,13 +2,23 @@
 
 use cluster::Refinement;
 use depth_image::{
-    Aabb, DepthImage, Environment, Illumination, PinholeCamera, SampleCamera, SampleImages, ViewCell, ViewPlanes,
+    Aabb, Camera, DepthImage, Environment, Illumination, PinholeCamera, SampleCamera, SampleImages, ViewCell,
+    ViewPlanes,
 };
 use glam::{UVec2, Vec2};
 use node::{DirectWork, Engine, EngineError, SampleSet, SampleWork};
 use planner::ProbeView;
 
-use crate::representation::Representation;
+/// A row of a ladder, resolved for one scene and one size of views: how views are made, in terms that a node understands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Representation {
+    /// The sampling method with its setting, as on the command line.
+    pub sampling: String,
+    /// The reconstruction method with its setting, as on the command line.
+    pub method: String,
+    /// The sample cameras, in the order in which images are taken.
+    pub sample_cameras: Vec<Camera>,
+}
 
 /// A scene that is loaded on the device, and the way in which views of it are made.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,23 +53,17 @@ pub struct Viewpoints {
 }
 
 impl Viewpoints {
-    /// The camera of a view.
-    #[must_use]
-    pub fn camera(&self, view: ProbeView) -> PinholeCamera {
-        let [x, y, _] = view.place(self.seed);
-        self.cell.camera_at(Vec2::new(x as f32, y as f32) * 2.0 - 1.0, self.view_px)
-    }
-
     /// The cameras of views.
     #[must_use]
     pub fn cameras(&self, views: &[ProbeView]) -> Vec<PinholeCamera> {
-        views.iter().map(|&view| self.camera(view)).collect()
+        let places = views.iter().map(|view| view.place(self.seed));
+        places.map(|[x, y, _]| self.cell.camera_at(Vec2::new(x as f32, y as f32) * 2.0 - 1.0, self.view_px)).collect()
     }
 
     /// The cameras of the first common views.
     #[must_use]
     pub fn first(&self, count: usize) -> Vec<PinholeCamera> {
-        (0..count as u32).map(|number| self.camera(ProbeView::Screening(number))).collect()
+        self.cameras(&(0..count as u32).map(ProbeView::Screening).collect::<Vec<_>>())
     }
 }
 

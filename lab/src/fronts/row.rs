@@ -55,7 +55,7 @@ impl MeasuredRow {
         let measured = prober.measure(representation, Light::Session, cameras, with_depth)?;
         let pairs: Vec<_> = cameras.iter().zip(&truths).zip(&measured.views).collect();
         let of_views = pairs.into_par_iter().map(|((camera, truth), made)| {
-            let errors = view_errors(camera, truth, made, &measured.sample_images)?;
+            let errors = view_errors(camera, truth, made, &measured.sample_images, None)?;
             anyhow::Ok((errors, depth_errors(&known_depth(truth)?, &known_depth(made)?, None)?))
         });
         let of_views = of_views.collect::<anyhow::Result<Vec<_>>>()?;

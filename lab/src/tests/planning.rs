@@ -20,7 +20,7 @@ use planner::{
     Budget, Choice, Command, Event, Kept, Metric, Outcome, Planner, Price, Pricing as _, ProbeId, ProbeView,
     PromiseState, Purpose, Row, RowCosts,
 };
-use probe::{DirectCosts, Light, Prober, Probers, Representation, errors_of_part};
+use probe::{DirectCosts, Light, Prober, Probers, Representation, view_errors};
 
 const VIEW_PX: UVec2 = UVec2::new(64, 48);
 
@@ -249,7 +249,7 @@ fn an_audited_part_has_the_errors_of_its_pixels_in_the_whole_view() {
     for pixel in [UVec2::new(200, 150), UVec2::new(100, 150), UVec2::new(399, 200)] {
         let part = ViewPart::square_of(pixel, 128, camera.size_px);
         let mask: Vec<bool> = part.mask_within(&whole).collect();
-        let expected = errors_of_part(&camera, &truth, &made, &images, &mask).unwrap();
+        let expected = view_errors(&camera, &truth, &made, &images, Some(&mask)).unwrap();
         let audit = ViewAudit {
             set: Arc::clone(&set),
             sample_images: images.clone().into(),

@@ -8,6 +8,6 @@ mod rates;
 pub use fair_order::{Turn, WorkClass};
 pub use job_limit::{Job, JobLimit};
 pub(crate) use queue::Slot;
-pub use queue::{DeviceQueue, LiveStream, SLICE_S, take_waited_s};
+pub use queue::{DeviceQueue, LiveStream, SLICE_S, waited_s};
 pub(crate) use rates::Work;
 pub use rates::WorkKind;

@@ -21,10 +21,10 @@ thread_local! {
     static WAITED_S: Cell<f64> = const { Cell::new(0.0) };
 }
 
-/// Seconds for which this thread has waited for its turns since the last call. What remains of a call's time is its own.
+/// Seconds for which this thread has waited for its turns so far. What remains of a call's time is its own.
 #[must_use]
-pub fn take_waited_s() -> f64 {
-    WAITED_S.take()
+pub fn waited_s() -> f64 {
+    WAITED_S.get()
 }
 
 /// Counts time that this thread has waited since `start`.

@@ -4,9 +4,12 @@ use cluster::{
     InvalidField, LiveRequest, RenderViews, RequestedView, check_seconds, check_view_count, check_view_size,
 };
 use codec::{FrameCodec, FrameHeader, FramePart, MAX_FRAME_BYTES, StageTimes};
+use depth_image::ToneCurve;
 
 use super::Convert;
 use crate::error::WireError;
+
+enums! { ToneCurve or None { None, KhronosNeutral } }
 
 messages! {
     RenderViewsRequest = RenderViews {

@@ -19,9 +19,26 @@ messages! {
             true => Err(InvalidField::out_of_range("bounds", "empty", "min <= max on every axis")),
             false => Ok(()),
         };
+    PinholeCamera = PinholeCamera {
+        focal_px as "camera.focal_px", principal_px as "camera.principal_px", near_m;
+        eye_in_world: eye_in_world_m as "camera.eye_in_world_m",
+        world_from_camera: world_from_camera_unit as "camera.world_from_camera_unit", size_px: width_px | height_px
+    }, valid or Camera;
+    SinglePoleCamera = SinglePoleCamera {
+        reference as "camera.single_pole.reference", pole_px as "camera.single_pole.pole_px", distortion_px, farthest_m
+    }, valid or Camera, then check_pole;
+    ParallelCamera = ParallelCamera {
+        spacing_m, range_m; corner_in_world: corner_in_world_m as "camera.parallel.corner_in_world_m",
+        world_from_camera: world_from_camera_unit as "camera.parallel.world_from_camera_unit",
+        size_px: width_px | height_px
+    }, valid or Camera;
+    LightFieldCamera = LightFieldCamera {
+        bounds as "camera.light_field.bounds", side_px;
+        directions: direction_count as "camera.light_field", first_pair: first_pair_index, pairs: pair_count
+    }, valid or Camera;
 }
 
-nested!(Vec3 = Vec3, PinholeCamera = PinholeCamera);
+nested!(Vec3 = Vec3, Quaternion = Quat);
 
 impl Convert<proto::Vec3> for Vec3 {
     fn read(v: proto::Vec3, field: &'static str) -> Result<Self, WireError> {
@@ -34,60 +51,22 @@ impl Convert<proto::Vec3> for Vec3 {
     }
 }
 
-impl Convert<proto::PinholeCamera> for PinholeCamera {
-    fn read(camera: proto::PinholeCamera, field: &'static str) -> Result<Self, WireError> {
-        let eye = required(camera.eye_in_world_m, "camera.eye_in_world_m")?;
-        let turn = required(camera.world_from_camera_unit, "camera.world_from_camera_unit")?;
-        let camera = Self {
-            eye_in_world: Vec3::new(eye.x, eye.y, eye.z),
-            world_from_camera: Quat::from_xyzw(turn.x, turn.y, turn.z, turn.w),
-            focal_px: Convert::read(camera.focal_px, "camera.focal_px")?,
-            principal_px: Convert::read(camera.principal_px, "camera.principal_px")?,
-            size_px: UVec2::new(camera.width_px, camera.height_px),
-            near_m: camera.near_m,
-        };
-        camera.validate().map_err(|source| InvalidField::Camera { field, source })?;
-        Ok(camera)
+impl Convert<proto::Quaternion> for Quat {
+    fn read(q: proto::Quaternion, _: &'static str) -> Result<Self, WireError> {
+        Ok(Self::from_xyzw(q.x, q.y, q.z, q.w))
     }
 
-    fn write(self) -> proto::PinholeCamera {
-        proto::PinholeCamera {
-            eye_in_world_m: self.eye_in_world.write(),
-            world_from_camera_unit: Some(quaternion(self.world_from_camera)),
-            focal_px: self.focal_px.write(),
-            principal_px: self.principal_px.write(),
-            width_px: self.size_px.x,
-            height_px: self.size_px.y,
-            near_m: self.near_m,
-        }
+    fn write(self) -> proto::Quaternion {
+        proto::Quaternion { x: self.x, y: self.y, z: self.z, w: self.w }
     }
 }
 
-impl Convert<proto::SinglePoleCamera> for SinglePoleCamera {
-    fn read(camera: proto::SinglePoleCamera, field: &'static str) -> Result<Self, WireError> {
-        let reference = required(camera.reference, "camera.single_pole.reference")?;
-        let camera = Self {
-            reference: PinholeCamera::read(reference, "camera.single_pole.reference")?,
-            pole_px: Convert::read(camera.pole_px, "camera.single_pole.pole_px")?,
-            distortion_px: camera.distortion_px,
-            farthest_m: camera.farthest_m,
-        };
-        camera.validate().map_err(|source| InvalidField::Camera { field, source })?;
-        // Tiles, which do not hold the pole of their image, do not travel.
-        if !camera.reference.contains(camera.pole_px) {
-            return Err(InvalidField::out_of_range("camera.single_pole.pole_px", camera.pole_px, "in the image").into());
-        }
-        Ok(camera)
+/// Tiles, which do not hold the pole of their image, do not travel.
+fn check_pole(camera: &SinglePoleCamera) -> Result<(), InvalidField> {
+    if camera.reference.contains(camera.pole_px) {
+        return Ok(());
     }
-
-    fn write(self) -> proto::SinglePoleCamera {
-        proto::SinglePoleCamera {
-            reference: Some(self.reference.write()),
-            pole_px: self.pole_px.write(),
-            distortion_px: self.distortion_px,
-            farthest_m: self.farthest_m,
-        }
-    }
+    Err(InvalidField::out_of_range("camera.single_pole.pole_px", camera.pole_px, "in the image"))
 }
 
 impl Convert<proto::Camera> for Camera {
@@ -128,60 +107,14 @@ impl Convert<proto::Camera> for SampleCamera {
     }
 }
 
-impl Convert<proto::ParallelCamera> for ParallelCamera {
-    fn read(camera: proto::ParallelCamera, field: &'static str) -> Result<Self, WireError> {
-        let corner = required(camera.corner_in_world_m, "camera.parallel.corner_in_world_m")?;
-        let turn = required(camera.world_from_camera_unit, "camera.parallel.world_from_camera_unit")?;
-        let camera = Self {
-            corner_in_world: Vec3::new(corner.x, corner.y, corner.z),
-            world_from_camera: Quat::from_xyzw(turn.x, turn.y, turn.z, turn.w),
-            spacing_m: camera.spacing_m,
-            size_px: UVec2::new(camera.width_px, camera.height_px),
-            range_m: camera.range_m,
-        };
-        camera.validate().map_err(|source| InvalidField::Camera { field, source })?;
-        Ok(camera)
+impl Convert<u32> for LightDirections {
+    fn read(count: u32, field: &'static str) -> Result<Self, WireError> {
+        Ok(Self::of(count).map_err(|source| InvalidField::Camera { field, source })?)
     }
 
-    fn write(self) -> proto::ParallelCamera {
-        proto::ParallelCamera {
-            corner_in_world_m: self.corner_in_world.write(),
-            world_from_camera_unit: Some(quaternion(self.world_from_camera)),
-            spacing_m: self.spacing_m,
-            width_px: self.size_px.x,
-            height_px: self.size_px.y,
-            range_m: self.range_m,
-        }
+    fn write(self) -> u32 {
+        self.count()
     }
-}
-
-impl Convert<proto::LightFieldCamera> for LightFieldCamera {
-    fn read(camera: proto::LightFieldCamera, field: &'static str) -> Result<Self, WireError> {
-        let refused = |source| InvalidField::Camera { field, source };
-        let camera = Self {
-            bounds: Aabb::read(camera.bounds, "camera.light_field.bounds")?,
-            directions: LightDirections::of(camera.direction_count).map_err(refused)?,
-            side_px: camera.side_px,
-            first_pair: camera.first_pair_index,
-            pairs: camera.pair_count,
-        };
-        camera.validate().map_err(refused)?;
-        Ok(camera)
-    }
-
-    fn write(self) -> proto::LightFieldCamera {
-        proto::LightFieldCamera {
-            bounds: self.bounds.write(),
-            direction_count: self.directions.count(),
-            side_px: self.side_px,
-            first_pair_index: self.first_pair,
-            pair_count: self.pairs,
-        }
-    }
-}
-
-fn quaternion(q: Quat) -> proto::Quaternion {
-    proto::Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }
 }
 
 #[cfg(test)]

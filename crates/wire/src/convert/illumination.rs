@@ -1,7 +1,7 @@
 //! Lamps and environments.
 
 use cluster::{InvalidField, at_most};
-use depth_image::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
+use depth_image::{Environment, Illumination, Light, MAX_LIGHTS};
 use glam::Vec3;
 
 use super::{Convert, required};
@@ -14,11 +14,11 @@ messages! {
     Environment = Environment {
         is_mapped; zenith_linear: zenith_linear_rgb as "environment.zenith_linear_rgb",
         nadir_linear: nadir_linear_rgb as "environment.nadir_linear_rgb"
-    }, then |environment| environment.validate().map_err(refused("illumination.environment"));
+    }, then check_environment;
 }
 
-fn refused(field: &'static str) -> impl Fn(LightError) -> InvalidField {
-    move |source| InvalidField::Light { field, source }
+fn check_environment(environment: &Environment) -> Result<(), InvalidField> {
+    environment.validate().map_err(|source| InvalidField::Light { field: "illumination.environment", source })
 }
 
 /// Both conversions of lights from one list of the kinds, as `messages!` has it.
@@ -33,7 +33,7 @@ macro_rules! lights {
                         (Self::$kind { $($own),+ }, $name)
                     })+
                 };
-                light.validate().map_err(refused(name))?;
+                light.validate().map_err(|source| InvalidField::Light { field: name, source })?;
                 Ok(light)
             }
 

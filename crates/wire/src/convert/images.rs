@@ -8,7 +8,7 @@ use codec::{
 
 use super::{Convert, required};
 use crate::error::WireError;
-use crate::proto::chunk::Body;
+use crate::proto::{self, chunk::Body};
 
 /// One plane of each kind that a depth image with colour may have, which has the most; visibility may have more.
 const MAX_PLANES: usize = 7 + MAX_VISIBILITY_PLANES;
@@ -40,7 +40,15 @@ enums! {
     PlaneEncoding { SlopeTaggedLz4, DifferenceTaggedLz4, ChangeTaggedLz4, BitsLz4 }
 }
 
-wrappers! { FetchSampleImagesResponse { chunk: Chunk } }
+impl Convert<proto::FetchSampleImagesResponse> for Chunk {
+    fn read(response: proto::FetchSampleImagesResponse, _: &'static str) -> Result<Self, WireError> {
+        Convert::read(response.chunk, "chunk")
+    }
+
+    fn write(self) -> proto::FetchSampleImagesResponse {
+        proto::FetchSampleImagesResponse { chunk: self.write() }
+    }
+}
 
 impl Convert<Option<Body>> for ChunkBody {
     fn read(body: Option<Body>, field: &'static str) -> Result<Self, WireError> {

@@ -6,8 +6,8 @@ use cluster::{
     BudgetRequest, InvalidField, MeasuredCosts, NodeStatus, OfferSettings, SamplePlanes, SceneHash, at_most,
 };
 use codec::{InverseDepthRange, SampleSetId};
-use depth_image::{Antialias, ExposureEv, PinholeCamera, ToneCurve, ToneMapping, ViewPlanes};
-use glam::{DVec3, UVec2};
+use depth_image::{Antialias, ExposureEv, PinholeCamera, ToneMapping, ViewPlanes};
+use glam::UVec2;
 use prost::bytes::Bytes;
 
 use crate::error::WireError;
@@ -38,19 +38,22 @@ where
 
 /// Both conversions of messages from one list: `Message = Type { fields that share a name; field: the message's }`. A field
 /// of the type may take several of the message: `field: one | two`. Errors name the message's field, or what follows `as`.
-/// `with` sets a field that the type has not. `first` checks or completes the message, `then` checks the result.
+/// `with` sets a field that the type has not. `first` checks or completes the message. `valid or Camera` validates the result,
+/// whose refusal is an `InvalidField::Camera` of the message's own field; `then` checks the result further.
 macro_rules! messages {
     ($($message:ident = $type:ident {
         $($same:ident $(as $same_name:literal)?),* $(; $($own:ident: $($wire:ident)|+ $(as $name:literal)?),+)?
-    } $(, with $fixed:ident = $value:expr)? $(, first $first:expr)? $(, then $then:expr)?;)+) => {$(
+    } $(, with $fixed:ident = $value:expr)? $(, first $first:expr)? $(, valid or $refusal:ident)? $(, then $then:expr)?;)+) => {$(
         #[allow(unused_mut, unused_parens, reason = "`first` may complete the message; one field is no tuple")]
+        #[allow(unused_variables, reason = "only `valid` needs the message's own field")]
         impl super::Convert<crate::proto::$message> for $type {
-            fn read(mut message: crate::proto::$message, _: &'static str) -> Result<Self, crate::error::WireError> {
+            fn read(mut message: crate::proto::$message, field: &'static str) -> Result<Self, crate::error::WireError> {
                 $(super::check(&mut message, $first)?;)?
                 let value = Self {
                     $($($own: super::Convert::read(($(message.$wire),+), name!($($wire)|+ $($name)?))?,)+)?
                     $($same: super::Convert::read(message.$same, name!($same $($same_name)?))?,)*
                 };
+                $(value.validate().map_err(|source| cluster::InvalidField::$refusal { field, source })?;)?
                 $(super::check(&value, $then)?;)?
                 Ok(value)
             }
@@ -91,28 +94,14 @@ macro_rules! nested {
     )+};
 }
 
-/// Messages with one field.
-macro_rules! wrappers {
-    ($($message:ident { $field:ident: $type:ident })+) => {$(
-        impl super::Convert<crate::proto::$message> for $type {
-            fn read(message: crate::proto::$message, _: &'static str) -> Result<Self, crate::error::WireError> {
-                super::Convert::read(message.$field, stringify!($field))
-            }
-
-            fn write(self) -> crate::proto::$message {
-                crate::proto::$message { $field: Some(super::Convert::write(self)) }
-            }
-        }
-    )+};
-}
-
-/// Enums whose variants are those of the message's enum of that name, without its zero.
+/// Enums whose variants are those of the message's enum of that name, without its zero, which may stand for one of them.
 macro_rules! enums {
-    ($($type:ident { $($variant:ident),+ })+) => {$(
+    ($($type:ident $(or $unspecified:ident)? { $($variant:ident),+ })+) => {$(
         impl super::Convert<i32> for $type {
             fn read(value: i32, field: &'static str) -> Result<Self, crate::error::WireError> {
                 match crate::proto::$type::try_from(value) {
                     $(Ok(crate::proto::$type::$variant) => Ok(Self::$variant),)+
+                    $(Ok(crate::proto::$type::Unspecified) => Ok(Self::$unspecified),)?
                     _ => Err(crate::error::WireError::UnknownEnum { field, value }),
                 }
             }
@@ -187,10 +176,10 @@ absent_if_empty!(Vec<PinholeCamera> as Vec<proto::PinholeCamera>);
 
 /// Types whose fields are the message's own.
 macro_rules! flat {
-    ($($type:ident { $($own:ident: $wire:ty),+ })+) => {$(
+    ($($type:ident { $($own:ident $(as $name:literal)?: $wire:ty),+ })+) => {$(
         impl Convert<($($wire),+)> for $type {
             fn read(($($own),+): ($($wire),+), _: &'static str) -> Result<Self, WireError> {
-                Ok(Self { $($own: Convert::read($own, stringify!($own))?),+ })
+                Ok(Self { $($own: Convert::read($own, name!($own $($name)?))?),+ })
             }
 
             fn write(self) -> ($($wire),+) {
@@ -202,7 +191,7 @@ macro_rules! flat {
 
 flat! {
     UVec2 { x: u32, y: u32 }
-    DVec3 { x: f64, y: f64, z: f64 }
+    ToneMapping { exposure as "exposure_ev": f32, curve as "tone_curve": i32 }
     SamplePlanes { normals: bool, corner_inverse_depths: bool, light: bool }
     InverseDepthRange { least_per_m: f32, greatest_per_m: f32 }
     SampleSetId { plan_epoch: u64, index: u32 }
@@ -253,16 +242,6 @@ impl Convert<(u32, f32, i32, bool, bool)> for ViewPlanes {
     }
 }
 
-impl Convert<(f32, i32)> for ToneMapping {
-    fn read((exposure_ev, curve): (f32, i32), _: &'static str) -> Result<Self, WireError> {
-        Ok(Self { exposure: Convert::read(exposure_ev, "exposure_ev")?, curve: Convert::read(curve, "tone_curve")? })
-    }
-
-    fn write(self) -> (f32, i32) {
-        (self.exposure.write(), self.curve.write())
-    }
-}
-
 impl Convert<f32> for ExposureEv {
     fn read(ev: f32, field: &'static str) -> Result<Self, WireError> {
         Ok(Self::new(ev).map_err(|_| InvalidField::out_of_range(field, ev, "from -16 to 16"))?)
@@ -273,29 +252,11 @@ impl Convert<f32> for ExposureEv {
     }
 }
 
-/// A curve; none said is none.
-impl Convert<i32> for ToneCurve {
-    fn read(value: i32, field: &'static str) -> Result<Self, WireError> {
-        match proto::ToneCurve::try_from(value) {
-            Ok(proto::ToneCurve::Unspecified | proto::ToneCurve::None) => Ok(Self::None),
-            Ok(proto::ToneCurve::KhronosNeutral) => Ok(Self::KhronosNeutral),
-            Err(_) => Err(WireError::UnknownEnum { field, value }),
-        }
-    }
-
-    fn write(self) -> i32 {
-        match self {
-            Self::None => proto::ToneCurve::None.into(),
-            Self::KhronosNeutral => proto::ToneCurve::KhronosNeutral.into(),
-        }
-    }
-}
-
 /// Samples a pixel; none said is one.
 impl Convert<u32> for Antialias {
     fn read(count: u32, _: &'static str) -> Result<Self, WireError> {
-        let refused = || InvalidField::out_of_range("antialias_sample_count", count, "1, 2, 4, 8 or 16");
-        Ok(Self::of(count.max(1)).ok_or_else(refused)?)
+        let antialias = Self::of(count.max(1));
+        antialias.ok_or_else(|| InvalidField::out_of_range("antialias_sample_count", count, "1, 2, 4, 8 or 16").into())
     }
 
     fn write(self) -> u32 {

@@ -64,12 +64,18 @@ macro_rules! service {
             $($(#[$of_stream:meta])*
             $stream:ident($opening:ident as $wanted:ty) -> $stream_type:ident($part:ident as $item:ty);)*
         }
+        $(duplex {
+            $(#[$of_duplex:meta])*
+            $duplex:ident($sent:ident as $given:ty) -> $duplex_type:ident($received:ident as $taken:ty);
+        })?
     ) => {
         $(#[$about])*
         #[async_trait]
         pub trait $trait: Send + Sync + 'static {
             $($(#[$of_call])* async fn $call(&self, request: $asked) -> Result<$answer, Status>;)*
             $($(#[$of_stream])* async fn $stream(&self, request: $wanted) -> Result<Messages<$item>, Status>;)*
+            $($(#[$of_duplex])*
+            async fn $duplex(&self, requests: Messages<$given>) -> Result<Messages<$taken>, Status>;)?
         }
 
         #[doc = concat!("Adapts a [`", stringify!($trait), "`] to its messages.")]
@@ -92,6 +98,16 @@ macro_rules! service {
                 let items = self.0.$stream(checked(request.into_inner())?).await?;
                 Ok(Response::new(sent(items)))
             })*
+
+            $(type $duplex_type = Messages<proto::$received>;
+
+            async fn $duplex(
+                &self,
+                requests: Request<Streaming<proto::$sent>>,
+            ) -> Result<Response<Self::$duplex_type>, Status> {
+                let items = self.0.$duplex(each(requests.into_inner(), checked)).await?;
+                Ok(Response::new(sent(items)))
+            })?
         }
 
         /// The service, ready to be added to a server.
@@ -127,6 +143,18 @@ macro_rules! service {
                 let message: proto::$opening = request.write();
                 Ok(received(begun(self.0.clone().$stream(message)).await?.into_inner()))
             })*
+
+            $($(#[$of_duplex])*
+            ///
+            /// # Errors
+            /// The service's.
+            pub async fn $duplex(
+                &self,
+                requests: impl Stream<Item = $given> + Send + 'static,
+            ) -> Result<Messages<$taken>, Status> {
+                let requests = requests.map(Convert::<proto::$sent>::write);
+                Ok(received(begun(self.0.clone().$duplex(requests)).await?.into_inner()))
+            })?
         }
     };
 }
@@ -187,55 +215,14 @@ service! {
     }
 }
 
-/// Makes views.
-#[async_trait]
-pub trait Compositor: Send + Sync + 'static {
-    /// Poses in, frames out, in the order they are ready.
-    async fn render_views(&self, requests: Messages<RenderViews>) -> Result<Messages<FramePart>, Status>;
-}
-
-/// Adapts a [`Compositor`] to its messages.
-#[derive(Debug)]
-pub struct CompositorAdapter<C>(C);
-
-#[async_trait]
-impl<C: Compositor> CompositorService for CompositorAdapter<C> {
-    type RenderViewsStream = Messages<proto::RenderViewsResponse>;
-
-    async fn render_views(
-        &self,
-        request: Request<Streaming<proto::RenderViewsRequest>>,
-    ) -> Result<Response<Self::RenderViewsStream>, Status> {
-        let frames = self.0.render_views(each(request.into_inner(), checked)).await?;
-        Ok(Response::new(sent(frames)))
-    }
-}
-
-/// The service, ready to be added to a server.
-pub fn compositor_server<C: Compositor>(compositor: C) -> CompositorServiceServer<CompositorAdapter<C>> {
-    capped!(CompositorServiceServer::new(CompositorAdapter(compositor)))
-}
-
-/// Calls a [`Compositor`].
-#[derive(Debug, Clone)]
-pub struct CompositorClient(CompositorServiceClient<WatchedChannel>);
-
-impl CompositorClient {
-    /// Over a connection.
-    #[must_use]
-    pub fn new(channel: Channel) -> Self {
-        Self(capped!(CompositorServiceClient::new(WatchedChannel(channel))))
-    }
-
-    /// See [`Compositor::render_views`].
-    ///
-    /// # Errors
-    /// The compositor's.
-    pub async fn render_views(
-        &self,
-        requests: impl Stream<Item = RenderViews> + Send + 'static,
-    ) -> Result<Messages<FramePart>, Status> {
-        let requests = requests.map(Convert::<proto::RenderViewsRequest>::write);
-        Ok(received(begun(self.0.clone().render_views(requests)).await?.into_inner()))
+service! {
+    /// Makes views.
+    Compositor: CompositorService(CompositorServiceServer, CompositorServiceClient)
+        as compositor_server, CompositorAdapter, CompositorClient;
+    calls {}
+    streams {}
+    duplex {
+        /// Poses in, frames out, in the order they are ready.
+        render_views(RenderViewsRequest as RenderViews) -> RenderViewsStream(RenderViewsResponse as FramePart);
     }
 }
