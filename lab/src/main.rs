@@ -21,6 +21,7 @@ mod lit;
 mod load;
 mod memory;
 mod models;
+mod pareto;
 mod process;
 mod processes;
 mod reference_views;

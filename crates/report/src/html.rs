@@ -26,7 +26,7 @@ pub(crate) fn page(report: &Report, charts: &[String]) -> Result<String, ReportE
         charts => report.charts.iter().zip(charts).map(|(chart, svg)| context! {
             svg => Value::from_safe_string(svg.clone()),
             file => chart_path(chart),
-            note => chart.note(),
+            note => chart.note.as_str(),
         }).collect::<Vec<_>>(),
         tables => report.tables.iter().map(table).collect::<Vec<_>>(),
         pictures => report.pictures.iter().map(pictures).collect::<Vec<_>>(),

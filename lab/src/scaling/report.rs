@@ -33,12 +33,12 @@ pub fn report(results: &Results, extent: Extent, scene: &str, most_simulated: us
         costs_table(results)?,
         points_table(results)?,
     ]);
-    report.charts.extend(charts::charts(results).map(Into::into));
+    report.charts.extend(charts::charts(results));
     let scenarios = sweep::scenarios(results);
     let simulated = sweep::sweep(results, &scenarios, most_simulated);
     report.tables.push(sweep::reach_table(&scenarios, &simulated)?);
     report.tables.push(table(sweep::SWEEP_TABLE, &sweep::COLUMNS, &simulated)?);
-    report.charts.push(sweep::chart(&scenarios, &simulated).into());
+    report.charts.push(sweep::chart(&scenarios, &simulated));
     report.summary = summary(results);
     report.checks = checks(results, extent);
     Ok(report)

@@ -156,7 +156,7 @@ pub(super) fn report(results: &[LightResult], report: &mut Report) -> anyhow::Re
     report.summary = results.iter().map(LightResult::sentence).collect::<Vec<_>>().join(" ");
     report.tables.push(gains(results)?);
     report.tables.push(costs(results)?);
-    report.charts.push(total_time(results).into());
+    report.charts.push(total_time(results));
     for (index, result) in results.iter().enumerate() {
         report.pictures.push(all_views(result));
         let rows = ROWS[index.min(1)];
