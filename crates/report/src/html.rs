@@ -44,12 +44,12 @@ fn check(check: &Check) -> Value {
         Outcome::NotRun => "unrun",
     };
     context! {
-        name => check.name(),
+        name => check.name.as_str(),
         value => check.value_text(),
         bar => check.bar_text(),
         class,
         words => check.outcome().words().to_lowercase(),
-        reason => check.reason(),
+        reason => check.reason.as_deref(),
     }
 }
 

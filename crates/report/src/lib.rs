@@ -24,6 +24,6 @@ pub use chart::{Axis, Limit, Mark, Point, Scale, Series, XyChart};
 pub use check::{Bar, Check, Outcome};
 pub use error::ReportError;
 pub use paths::slug;
-pub use picture::{Legend, Picture, PictureRow, comparison_row, contact_sheet};
+pub use picture::{Legend, Picture, PictureRow};
 pub use report::{Report, SCHEMA_VERSION};
-pub use table::{Cell, Column, Table};
+pub use table::{Cell, Column, RowColumn, Table};

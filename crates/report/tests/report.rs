@@ -7,7 +7,7 @@ use std::path::Path;
 
 use image::RgbImage;
 use report::{
-    Axis, Bar, Cell, Check, Outcome, Picture, PictureRow, Point, Report, ReportError, Series, Table, XyChart,
+    Axis, Bar, Cell, Check, Limit, Outcome, Picture, PictureRow, Point, Report, ReportError, Series, Table, XyChart,
 };
 
 const HOSTILE: &str = "a<script>&\"b\"";
@@ -15,8 +15,8 @@ const HOSTILE: &str = "a<script>&\"b\"";
 fn lines() -> XyChart {
     let mut chart = XyChart::new("cost over views", Axis::log("views", ""), Axis::log("time", "ms"))
         .with(Series::line("joint carve", [(1.0, 2.0), (10.0, 3.0)]).then_extrapolated([(100.0, 9.0)]))
-        .with(Series::points(HOSTILE, [Point::labelled(2.0, 2.5, "S = 4")]))
-        .with_limit("budget", 5.0);
+        .with(Series::points(HOSTILE, [Point::labelled(2.0, 2.5, "S = 4")]));
+    chart.limits.push(Limit { name: "budget".to_owned(), y: 5.0 });
     chart.staircase = vec![(1.0, 2.0).into()];
     chart
 }

@@ -16,7 +16,7 @@ use crate::evaluation::Evaluation;
 use crate::models::models_of;
 use crate::pareto::{Better, with_front};
 use crate::reference_views::ReferenceViews;
-use crate::study::{Column, measure_rows, table};
+use crate::study::{Column, check_if_measured, measure_rows, table};
 
 /// A scene with gaps wide enough to count: in foliage, every pixel that no camera sees is a silhouette's.
 const GAPS: &str = "poles";
@@ -136,14 +136,14 @@ fn checks(name: &str, rows: &[Evaluation], default: ReconstructionMethod) -> [Ch
             "×",
             Bar::AtMost(1.0),
         ),
-        Check::maybe(
+        check_if_measured(
             format!("{name}: disoccluded coloured wrong, the carve's over the least of any search"),
             disoccluded,
             "×",
             Bar::AtMost(1.0),
             "no view has disocclusions",
         ),
-        Check::maybe(
+        check_if_measured(
             format!("{name}: settings that beat the default in time and FLIP"),
             better,
             "",

@@ -10,6 +10,7 @@ use app_core::setup::SceneArgs;
 use clap::Args;
 use report::{Bar, Check, Report};
 
+use crate::delivery::visibility;
 use crate::study::RunArgs;
 use timing::Times;
 
@@ -35,7 +36,7 @@ pub fn run(args: &LagesArgs) -> anyhow::Result<Outcome> {
     let experiment = Experiment::start(args.scene.clone(), args.scene.load()?, device, NODES)?;
     let times = timing::measure(&experiment, args.study.quick)?;
     let mut report = report(args, &experiment, &times)?;
-    report.parameter("direct finds surfaces by", experiment.visibility()?.to_string());
+    report.parameter("direct finds surfaces by", visibility(&experiment)?.to_string());
     experiment.stop()?;
     println!("{}", report.summary);
     args.study.finish("out/study/lages", &report)

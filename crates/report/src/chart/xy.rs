@@ -12,6 +12,7 @@ use super::marker::Marker;
 use super::ruler::Ruler;
 use super::{Axis, Limit, Mark, Palette, Point, Series};
 use crate::ReportError;
+use crate::table::heading;
 
 /// Series over two axes, written as `charts/{slug(name)}.svg`, optionally with limits to reach and a front of the best points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -60,13 +61,6 @@ impl XyChart {
         self
     }
 
-    /// The same chart with a horizontal line.
-    #[must_use]
-    pub fn with_limit(mut self, name: impl Into<String>, y: f64) -> Self {
-        self.limits.push(Limit { name: name.into(), y });
-        self
-    }
-
     /// The chart as SVG, in the palette's colours.
     pub(crate) fn draw(&self, palette: &Palette) -> Result<String, ReportError> {
         let legend: Vec<LegendEntry> = self.series.iter().flat_map(|series| legend_entries(series, palette)).collect();
@@ -102,8 +96,8 @@ impl XyChart {
     fn axes<'a>(&self, area: &Area<'a>, x: Range<f64>, y: Range<f64>) -> Result<Plot<'a>, String> {
         let x = Ruler::new(&self.x, x);
         let y = Ruler::new(&self.y, y);
-        let x_count = x.tick_count();
-        let y_count = y.tick_count();
+        let x_count = x.ticks.len();
+        let y_count = y.ticks.len();
         let mut plot = ChartBuilder::on(area)
             .margin_right(18)
             .margin_top(6)
@@ -114,7 +108,10 @@ impl XyChart {
             .build_cartesian_2d(x, y)
             .map_err(message)?;
         let mut mesh = plot.configure_mesh();
-        mesh.x_desc(self.x.description()).y_desc(self.y.description()).x_labels(x_count).y_labels(y_count);
+        mesh.x_desc(heading(&self.x.label, &self.x.unit))
+            .y_desc(heading(&self.y.label, &self.y.unit))
+            .x_labels(x_count)
+            .y_labels(y_count);
         mesh.axis_style(INK.mix(0.6)).bold_line_style(INK.mix(0.13)).light_line_style(TRANSPARENT);
         mesh.label_style(("sans-serif", 15).into_font().color(&INK));
         mesh.axis_desc_style(("sans-serif", TEXT_SIZE).into_font().color(&INK));
