@@ -17,15 +17,22 @@ use crate::schedule::{Command, Event, Recorder};
 /// A gauge for each value of its labels: names and values.
 type Gauges<const LABELS: usize> = Family<[(&'static str, String); LABELS], Gauge<f64, AtomicU64>>;
 
+/// A gauge: its name, its help, and its count in a status of the cluster.
+type CountGauge = (&'static str, &'static str, fn(&ClusterStatus) -> u64);
+
+const COUNTS: [CountGauge; 6] = [
+    ("cluster_nodes", "P: nodes that have joined", |status| status.nodes.len() as u64),
+    ("cluster_workloads", "Workloads that are open", |status| status.workloads.len() as u64),
+    ("cluster_samplers", "K: nodes that sample, of all workloads", |status| status.sampler_count() as u64),
+    ("cluster_sessions", "Sessions of all workloads", ClusterStatus::session_count),
+    ("cluster_views_per_set", "V: views of a sample set, of all workloads", ClusterStatus::views_per_set),
+    ("cluster_plan_epoch", "The last plan", |status| status.plan_epoch),
+];
+
 /// Registered gauges of the cluster's state, and counters of plans and measurements.
 #[derive(Debug, Clone)]
 pub struct CoordinatorMetrics {
-    nodes: Gauge,
-    workloads: Gauge,
-    samplers: Gauge,
-    sessions: Gauge,
-    views_per_set: Gauge,
-    plan_epoch: Gauge,
+    counts: [Gauge; COUNTS.len()],
     plans: Counter,
     promises: Family<[(&'static str, String); 1], Gauge>,
     view_probes: Counter,
@@ -45,12 +52,7 @@ impl CoordinatorMetrics {
     pub fn new(telemetry: &Telemetry) -> Self {
         let registry = &mut *telemetry.registry();
         Self {
-            nodes: registered(registry, "cluster_nodes", "P: nodes that have joined"),
-            workloads: registered(registry, "cluster_workloads", "Workloads that are open"),
-            samplers: registered(registry, "cluster_samplers", "K: nodes that sample, of all workloads"),
-            sessions: registered(registry, "cluster_sessions", "Sessions of all workloads"),
-            views_per_set: registered(registry, "cluster_views_per_set", "V: views of a sample set, of all workloads"),
-            plan_epoch: registered(registry, "cluster_plan_epoch", "The last plan"),
+            counts: COUNTS.map(|(name, help, _)| registered(registry, name, help)),
             plans: registered(registry, "cluster_plans", "Plans made"),
             promises: registered(registry, "cluster_promises", "Promises to the sessions of a workload"),
             view_probes: registered(registry, "cluster_view_probes", "Measurements for budgets"),
@@ -88,15 +90,8 @@ impl CoordinatorMetrics {
             let count = promises.filter(|promise| promise.state == state).count();
             self.promises.get_or_create(&[("state", state.to_string())]).set(count as i64);
         }
-        for (gauge, count) in [
-            (&self.nodes, status.nodes.len() as u64),
-            (&self.workloads, status.workloads.len() as u64),
-            (&self.samplers, status.sampler_count() as u64),
-            (&self.sessions, status.session_count()),
-            (&self.views_per_set, status.views_per_set()),
-            (&self.plan_epoch, status.plan_epoch),
-        ] {
-            gauge.set(i64::try_from(count).unwrap_or(i64::MAX));
+        for (gauge, (_, _, count)) in self.counts.iter().zip(COUNTS) {
+            gauge.set(i64::try_from(count(status)).unwrap_or(i64::MAX));
         }
     }
 

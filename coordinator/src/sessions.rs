@@ -11,7 +11,6 @@ use tonic::Status;
 const UNREAD_EVENTS: usize = 64;
 
 pub(crate) type EventSender = mpsc::Sender<Result<SessionEvent, Status>>;
-pub(crate) type EventReceiver = mpsc::Receiver<Result<SessionEvent, Status>>;
 
 /// Event streams by session.
 #[derive(Default)]
@@ -19,7 +18,11 @@ pub(crate) struct SessionRegistry(Mutex<HashMap<u64, EventSender>>);
 
 impl SessionRegistry {
     /// Admits one more session, before any work is done for it.
-    pub(crate) fn admit(&self, session: u64, most: usize) -> Result<(EventSender, EventReceiver), Status> {
+    pub(crate) fn admit(
+        &self,
+        session: u64,
+        most: usize,
+    ) -> Result<(EventSender, mpsc::Receiver<Result<SessionEvent, Status>>), Status> {
         let mut sessions = self.0.lock();
         if sessions.len() >= most {
             return Err(Status::resource_exhausted(format!("quota max_sessions: {most} sessions are open")));

@@ -79,7 +79,7 @@ mod tests {
         };
         let sections = measure_parts(&[], measure).await;
         assert_eq!((sections.len(), sections[0].checks.len()), (2, 0));
-        assert_eq!(sections[1].checks[0].name(), "bad: measured to the end");
+        assert_eq!(sections[1].checks[0].name, "bad: measured to the end");
         assert_eq!(measure_parts(&[Part::Good], measure).await.len(), 1);
     }
 }

@@ -12,7 +12,9 @@ use app_core::setup::DeviceArgs;
 use clap::Args;
 use engine::GpuEngine;
 use node::Engine as _;
-use report::{Cell, Mark, Point, Report, Series, Table, XyChart};
+use report::{Bar, Cell, Check, Mark, Point, Report, Series, Table, XyChart};
+
+use crate::markdown::markdown;
 
 /// Options of every bench and study.
 #[derive(Debug, Args)]
@@ -60,7 +62,7 @@ impl RunArgs {
     /// # Errors
     /// The folder cannot be written.
     pub fn finish(&self, usual_folder: &str, report: &Report) -> anyhow::Result<Outcome> {
-        report.tables.iter().for_each(|table| println!("{}", table.to_markdown()));
+        report.tables.iter().for_each(|table| println!("{}", markdown(table)));
         self.write(usual_folder, report)
     }
 
@@ -79,6 +81,20 @@ pub fn new_report(title: impl Into<String>, device: &str) -> Report {
     let mut report = Report::new(title, device);
     report.version("myriorama", env!("CARGO_PKG_VERSION"));
     report
+}
+
+/// Compares a value with the bar; without a value, the check was not run for `reason`.
+pub fn check_if_measured(
+    name: impl Into<String>,
+    value: Option<f64>,
+    unit: impl Into<String>,
+    bar: Bar,
+    reason: impl Into<String>,
+) -> Check {
+    match value {
+        Some(value) => Check::new(name, value, unit, bar),
+        None => Check::not_run(name, unit, bar, reason),
+    }
 }
 
 /// Parses a number within a range, for an option.

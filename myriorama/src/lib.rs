@@ -3,8 +3,8 @@
 //! Each of [`commands`] is one subcommand of [`cli`].
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-pub mod budget;
 pub mod cli;
 pub mod commands;
+pub mod serving;
 pub mod tone;
 pub mod viewer;

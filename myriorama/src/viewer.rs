@@ -13,7 +13,7 @@ use reconstruction::ReconstructionMethod;
 use render::Lighting;
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
-use tokio::task::JoinHandle;
+use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
 use crate::tone::ToneArgs;
@@ -46,12 +46,6 @@ pub struct NameArgs {
     pub origins: Vec<String>,
 }
 
-/// A viewer that runs.
-pub struct Viewer {
-    shutdown: CancellationToken,
-    served: JoinHandle<()>,
-}
-
 impl ViewerArgs {
     /// The port of a coordinator, and the browsers that come to it where there is a viewer.
     pub fn share(&self, listener: TcpListener) -> (Port, Option<Connections>) {
@@ -62,32 +56,21 @@ impl ViewerArgs {
         (Port { listener, browsers: Some(send) }, Some(browsers))
     }
 
-    /// Serves these browsers from the coordinator at this address until `shutdown`, and prints the link.
-    pub fn serve(
-        &self,
-        browsers: Option<Connections>,
-        coordinator: &str,
-        shutdown: CancellationToken,
-    ) -> Option<Viewer> {
+    /// Serves these browsers from the coordinator at this address until `shutdown`, and prints the link. The visits are the task
+    /// that is returned.
+    pub fn serve(&self, browsers: Option<Connections>, coordinator: &str, shutdown: CancellationToken) -> JoinSet<()> {
+        let mut visits = JoinSet::new();
+        let Some(browsers) = browsers else { return visits };
         let request_of = request_of(PolicyChoice::Auto, self.tone);
         let config = GatewayConfig {
             hosts: self.names.hosts.clone(),
             origins: self.names.origins.clone(),
             ..GatewayConfig::new(coordinator, request_of, shared_light_methods())
         };
-        let served = tokio::spawn(gateway::serve(browsers?, config, shutdown.clone()));
+        visits.spawn(gateway::serve(browsers, config, shutdown));
         // Whoever started this may read no more than the address.
         let _ = writeln!(std::io::stdout(), "Open {coordinator}/");
-        Some(Viewer { shutdown, served })
-    }
-}
-
-impl Viewer {
-    /// Ends the visits, before the cluster that makes their pictures.
-    pub async fn end(self) {
-        self.shutdown.cancel();
-        // A viewer that has failed has ended, too.
-        let _ = self.served.await;
+        visits
     }
 }
 

@@ -1,24 +1,21 @@
 //! A scene, a cluster in this process, and a client of it.
 
-use std::cell::Cell;
 use std::sync::Arc;
 
 use anyhow::Context as _;
 use client::{Client, Frame};
-use cluster::{PolicyChoice, SessionPlan, SessionRequest, Timeline};
+use cluster::{SessionPlan, SessionRequest};
 use coordinator::CoordinatorConfig;
 use depth_image::{PinholeCamera, SampleCamera, ViewCell};
 use engine::GpuEngine;
 use glam::UVec2;
 use gpu::DevicePreference;
 use node::{NodeConfig, most_image_bytes, most_set_bytes};
-use reconstruction::ReconstructionMethod;
-use render::{Choice, Lighting};
 use tokio::runtime::Runtime;
 
 use crate::addresses::listen;
 use crate::cluster::Cluster;
-use crate::delivery::{open, receive, request};
+use crate::delivery::{open, receive};
 use crate::process::runtime;
 use crate::setup::{SceneArgs, Setup};
 
@@ -26,23 +23,6 @@ use crate::setup::{SceneArgs, Setup};
 pub const PAPER_VIEWS: usize = 290;
 /// The size of every view, unless cameras are given.
 pub const VIEW_SIZE_PX: UVec2 = UVec2::new(200, 150);
-/// Scene time between runs: far less than any motion, but a new sample set, which no node has kept.
-const RUN_STEP_S: f64 = 1e-4;
-
-/// Settings of one delivery.
-#[derive(Debug, Clone, Copy)]
-pub struct DeliverySettings {
-    /// How surfaces are lit.
-    pub lighting: Lighting,
-    /// Whether views are reconstructed or drawn directly.
-    pub policy: PolicyChoice,
-    /// How views are reconstructed.
-    pub method: ReconstructionMethod,
-    /// The number of views a set.
-    pub views: usize,
-    /// Sample sets of one moment, each with all views.
-    pub sets: u32,
-}
 
 /// Delivered views.
 #[derive(Debug)]
@@ -72,7 +52,6 @@ pub struct Experiment {
     runtime: Runtime,
     cluster: Cluster,
     client: Client,
-    runs: Cell<u32>,
 }
 
 impl Experiment {
@@ -99,7 +78,7 @@ impl Experiment {
             let client = cluster.client().await?;
             anyhow::Ok((cluster, client))
         })?;
-        Ok(Self { engine, setup, args, runtime, cluster, client, runs: Cell::new(0) })
+        Ok(Self { engine, setup, args, runtime, cluster, client })
     }
 
     /// `count` views, spread between the sample cameras.
@@ -109,28 +88,6 @@ impl Experiment {
     pub fn views(&self, count: usize) -> anyhow::Result<Vec<PinholeCamera>> {
         let cell = ViewCell::between(&self.setup.around).context("no sample cameras")?;
         Ok(cell.spread(count, VIEW_SIZE_PX))
-    }
-
-    /// Settings for `views` of one set, with everything else from the scene's arguments.
-    #[must_use]
-    pub fn delivery(&self, policy: PolicyChoice, views: usize) -> DeliverySettings {
-        DeliverySettings { lighting: self.args.lighting, policy, method: self.args.method(), views, sets: 1 }
-    }
-
-    /// Delivers views of a new sample set. The time excludes the coordinator's measurements.
-    ///
-    /// # Errors
-    /// The cluster fails.
-    pub fn deliver(&self, settings: DeliverySettings, arrived: impl FnMut(Frame)) -> anyhow::Result<Delivered> {
-        let run = self.runs.replace(self.runs.get() + 1);
-        let views = self.views(settings.views)?;
-        let request = SessionRequest {
-            method: settings.method.to_string(),
-            lighting: settings.lighting.to_string(),
-            timeline: Timeline { set_count: settings.sets, ..Timeline::still(f64::from(run) * RUN_STEP_S) },
-            ..request(self.setup.offer.settings.clone(), settings.policy, &views)?
-        };
-        self.receive(request, &views, arrived)
     }
 
     /// Delivers views as a request says. The time excludes the coordinator's measurements.
@@ -152,16 +109,6 @@ impl Experiment {
             let seconds = receive(&session, views, received).await?;
             Ok(Delivered { plan: session.plan(), seconds })
         })
-    }
-
-    /// The renderer's choice between triangles and rays for views of this size.
-    ///
-    /// # Errors
-    /// The scene has left the device.
-    pub fn visibility(&self) -> anyhow::Result<Choice> {
-        let view = self.views(1)?;
-        let scene = self.engine.scene(self.setup.offer.hash.as_str())?;
-        Ok(self.engine.renderer.choice(&scene, &view[0], 0.0)?)
     }
 
     /// Drains the cluster.

@@ -5,7 +5,7 @@
 //! [`quality`] is the quality of shared light. [`delivery`] opens sessions and receives views, and [`live`] follows a path with a moving camera. [`camera_file`]
 //! reads camera files, and [`camera_record`] writes those of views. [`ladder`] has the representations among which budgets
 //! choose, [`planning`] the terms of a plan, and [`plan_files`] the measurements of plans. [`addresses`] are those of the command line, and [`exit`] defines
-//! the exit status. [`table`] makes tables of rows.
+//! the exit status.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod addresses;
@@ -17,7 +17,7 @@ pub mod exit;
 pub mod experiment;
 pub mod ladder;
 pub mod live;
-pub mod memory;
+pub mod node_limits;
 pub mod plan_files;
 pub mod planning;
 pub mod process;
@@ -26,8 +26,6 @@ pub mod quality;
 pub mod scenes;
 pub mod setup;
 pub mod sizes;
-pub mod table;
-pub mod view_limits;
 
 /// Prints a line on standard output. A reader that has gone, as in `up | head -1`, ends nothing.
 #[macro_export]

@@ -13,19 +13,6 @@ pub fn runtime() -> anyhow::Result<Runtime> {
     tokio::runtime::Builder::new_multi_thread().enable_all().build().context("no runtime")
 }
 
-/// Waits for ctrl-c or SIGTERM.
-///
-/// # Errors
-/// Signals cannot be received.
-pub async fn stop_signal() -> anyhow::Result<()> {
-    let mut terminate = signal(SignalKind::terminate())?;
-    tokio::select! {
-        ended = tokio::signal::ctrl_c() => ended?,
-        _ = terminate.recv() => (),
-    }
-    Ok(())
-}
-
 /// Ctrl-c or SIGTERM, once and again.
 #[derive(Debug, Clone, Default)]
 pub struct StopSignals {
@@ -54,13 +41,4 @@ impl StopSignals {
         });
         Ok(signals)
     }
-}
-
-/// Cancels `shutdown` at ctrl-c or SIGTERM. Without signals, the caller can still kill the process.
-pub fn cancel_at_signal(shutdown: CancellationToken) {
-    tokio::spawn(async move {
-        if stop_signal().await.is_ok() {
-            shutdown.cancel();
-        }
-    });
 }

@@ -65,19 +65,20 @@ impl Outcome {
 /// A value against a bar.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Check {
-    name: String,
+    /// The name of the check.
+    pub name: String,
     /// The value; `null` where not run, or not finite.
-    value: Option<f64>,
+    pub value: Option<f64>,
     unit: String,
     bar: Bar,
     /// The same figure over the pixels that show a surface, where the value is a whole picture's. No bar is stated for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    foreground: Option<f64>,
+    pub foreground: Option<f64>,
     /// The outcome; `null` where not run.
     holds: Option<bool>,
     /// The reason why the check was not run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    reason: Option<String>,
+    pub reason: Option<String>,
 }
 
 impl Check {
@@ -100,45 +101,6 @@ impl Check {
     #[must_use]
     pub fn not_run(name: impl Into<String>, unit: impl Into<String>, bar: Bar, reason: impl Into<String>) -> Self {
         Self { holds: None, reason: Some(reason.into()), ..Self::new(name, f64::NAN, unit, bar) }
-    }
-
-    /// Compares a value with the bar; without a value, the check was not run for `reason`.
-    #[must_use]
-    pub fn maybe(
-        name: impl Into<String>,
-        value: Option<f64>,
-        unit: impl Into<String>,
-        bar: Bar,
-        reason: impl Into<String>,
-    ) -> Self {
-        match value {
-            Some(value) => Self::new(name, value, unit, bar),
-            None => Self::not_run(name, unit, bar, reason),
-        }
-    }
-
-    /// Names the same figure over the foreground beside the whole picture's, which is compared with the bar.
-    #[must_use]
-    pub fn with_foreground(self, value: f64) -> Self {
-        Self { foreground: Some(value).filter(|value| value.is_finite()), ..self }
-    }
-
-    /// The name of the check.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// The measured value, if it is finite.
-    #[must_use]
-    pub fn value(&self) -> Option<f64> {
-        self.value
-    }
-
-    /// The reason why the check was not run.
-    #[must_use]
-    pub fn reason(&self) -> Option<&str> {
-        self.reason.as_deref()
     }
 
     /// The outcome.
@@ -189,11 +151,11 @@ mod tests {
 
     #[test]
     fn the_foregrounds_figure_comes_first_and_decides_nothing() {
-        let check = Check::new("FLIP", 0.04, "", Bar::AtMost(0.05)).with_foreground(0.09);
+        let check = Check { foreground: Some(0.09), ..Check::new("FLIP", 0.04, "", Bar::AtMost(0.05)) };
         assert_eq!(check.outcome(), Outcome::Holds);
         assert_eq!(check.value_text(), "foreground 0.09, whole 0.04");
         assert_eq!(serde_json::to_value(&check).unwrap()["foreground"], 0.09);
-        assert_eq!(check.with_foreground(f64::NAN).value_text(), "0.04");
+        assert_eq!(Check { foreground: None, ..check }.value_text(), "0.04");
     }
 
     #[test]

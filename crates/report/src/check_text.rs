@@ -13,11 +13,11 @@ pub(crate) fn checks_text(checks: &[Check]) -> String {
 }
 
 fn row(check: &Check) -> [String; 4] {
-    let outcome = match check.reason() {
+    let outcome = match &check.reason {
         Some(reason) => format!("{}: {reason}", check.outcome().words()),
         None => check.outcome().words().into(),
     };
-    [check.name().into(), check.value_text(), check.bar_text(), outcome]
+    [check.name.clone(), check.value_text(), check.bar_text(), outcome]
 }
 
 /// Names are aligned left, values right, the rest left.

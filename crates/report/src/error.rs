@@ -18,9 +18,6 @@ pub enum ReportError {
     /// The CSV writer failed.
     #[error("cannot write a table: {0}")]
     Csv(#[from] csv::Error),
-    /// The values of a stage and the bars of its chart differ in number.
-    #[error("stage {stage:?} of chart {chart:?} has {values} values, its bars are {bars}")]
-    StageLength { chart: String, stage: String, values: usize, bars: usize },
     /// The chart library failed.
     #[error("cannot draw chart {chart:?}: {message}")]
     Draw { chart: String, message: String },

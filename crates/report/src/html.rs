@@ -26,7 +26,7 @@ pub(crate) fn page(report: &Report, charts: &[String]) -> Result<String, ReportE
         charts => report.charts.iter().zip(charts).map(|(chart, svg)| context! {
             svg => Value::from_safe_string(svg.clone()),
             file => chart_path(chart),
-            note => chart.note(),
+            note => chart.note.as_str(),
         }).collect::<Vec<_>>(),
         tables => report.tables.iter().map(table).collect::<Vec<_>>(),
         pictures => report.pictures.iter().map(pictures).collect::<Vec<_>>(),
@@ -44,12 +44,12 @@ fn check(check: &Check) -> Value {
         Outcome::NotRun => "unrun",
     };
     context! {
-        name => check.name(),
+        name => check.name.as_str(),
         value => check.value_text(),
         bar => check.bar_text(),
         class,
         words => check.outcome().words().to_lowercase(),
-        reason => check.reason(),
+        reason => check.reason.as_deref(),
     }
 }
 

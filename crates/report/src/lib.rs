@@ -1,6 +1,6 @@
 //! Reports of measurements, as `demo`, `bench` and `study` write them.
 //!
-//! A caller gathers numbers into a [`Report`]: tables, [`Check`]s against a bar, [`Chart`]s, pictures.
+//! A caller gathers numbers into a [`Report`]: tables, [`Check`]s against a bar, [`XyChart`]s, pictures.
 //! [`Report::write`] makes files of them, and [`Report::finish`] also prints the checks. Nothing here measures, and
 //! nothing draws on a GPU: data in, files out. The format is described in `docs/report-format.md`.
 //!
@@ -20,10 +20,10 @@ mod report;
 mod table;
 mod write;
 
-pub use chart::{Axis, BarChart, Better, Chart, Limit, Mark, Point, Scale, Series, Stage, XyChart, pareto_front};
+pub use chart::{Axis, Limit, Mark, Point, Scale, Series, XyChart};
 pub use check::{Bar, Check, Outcome};
 pub use error::ReportError;
 pub use paths::slug;
-pub use picture::{Legend, Picture, PictureRow, comparison_row, contact_sheet};
+pub use picture::{Legend, Picture, PictureRow};
 pub use report::{Report, SCHEMA_VERSION};
-pub use table::{Cell, Column, Table};
+pub use table::{Cell, Column, RowColumn, Table};

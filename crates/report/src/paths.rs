@@ -1,10 +1,10 @@
 //! Paths of a report's files, relative to its folder, and file names from names.
 
-use crate::chart::Chart;
+use crate::chart::XyChart;
 use crate::table::Table;
 
-pub(crate) fn chart_path(chart: &Chart) -> String {
-    format!("charts/{}.svg", slug(chart.name()))
+pub(crate) fn chart_path(chart: &XyChart) -> String {
+    format!("charts/{}.svg", slug(&chart.name))
 }
 
 pub(crate) fn table_path(table: &Table) -> String {

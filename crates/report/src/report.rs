@@ -3,11 +3,10 @@
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-use crate::table::{Cell, Table};
-
-use crate::chart::Chart;
+use crate::chart::XyChart;
 use crate::check::{Check, Outcome};
 use crate::picture::{Picture, PictureRow};
+use crate::table::{Cell, Table};
 
 /// The version of `report.json`; raised when a field changes its meaning.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -38,7 +37,7 @@ pub struct Report {
     pub checks: Vec<Check>,
     /// Charts, with their data.
     #[serde(default)]
-    pub charts: Vec<Chart>,
+    pub charts: Vec<XyChart>,
     /// Pictures, by labelled rows.
     #[serde(default)]
     pub pictures: Vec<PictureRow>,

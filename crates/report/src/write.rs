@@ -5,7 +5,7 @@ use std::fs;
 use std::io::{self, Cursor, Write as _};
 use std::path::Path;
 
-use crate::chart::{Chart, Palette};
+use crate::chart::Palette;
 use crate::check_text::checks_text;
 use crate::error::ReportError;
 use crate::html;
@@ -22,7 +22,8 @@ impl Report {
     pub fn write(&self, folder: &Path) -> Result<(), ReportError> {
         // Everything is validated and drawn before the first file is written.
         self.validate()?;
-        let palette = Palette::for_names(self.charts.iter().flat_map(Chart::series_names));
+        let palette =
+            Palette::for_names(self.charts.iter().flat_map(|chart| &chart.series).map(|series| series.name.as_str()));
         let charts = self.charts.iter().map(|chart| chart.draw(&palette)).collect::<Result<Vec<_>, _>>()?;
         let page = html::page(self, &charts)?;
         for (chart, drawing) in self.charts.iter().zip(&charts) {
@@ -55,7 +56,7 @@ impl Report {
     fn validate(&self) -> Result<(), ReportError> {
         self.tables.iter().try_for_each(Table::validate)?;
         expect_distinct("tables", self.tables.iter().map(|table| table.name.as_str()))?;
-        expect_distinct("charts", self.charts.iter().map(Chart::name))?;
+        expect_distinct("charts", self.charts.iter().map(|chart| chart.name.as_str()))?;
         expect_distinct("pictures", self.all_pictures().map(|picture| picture.name.as_str()))
     }
 }

@@ -8,14 +8,15 @@ use app_core::setup::SceneArgs;
 use depth_image::ViewCell;
 use engine::GpuEngine;
 use reconstruction::ReconstructionMethod;
-use report::{Axis, Bar, Better, Check, Point, Report, Series, XyChart};
+use report::{Axis, Bar, Check, Point, Report, Series, XyChart};
 use scene::SceneSpec;
 
 use super::args::BenchArgs;
 use crate::evaluation::Evaluation;
 use crate::models::models_of;
+use crate::pareto::{Better, with_front};
 use crate::reference_views::ReferenceViews;
-use crate::study::{Column, measure_rows, table};
+use crate::study::{Column, check_if_measured, measure_rows, table};
 
 /// A scene with gaps wide enough to count: in foliage, every pixel that no camera sees is a silhouette's.
 const GAPS: &str = "poles";
@@ -58,7 +59,7 @@ pub fn compare(name: &str, reference: &ReferenceViews, args: &BenchArgs, report:
         reference.evaluate(method, args.runs())
     })?;
     report.tables.push(table(format!("Error against time, {name}"), &COLUMNS, &rows)?);
-    report.charts.push(chart(name, &rows).into());
+    report.charts.push(chart(name, &rows));
     report.checks.extend(checks(name, &rows, args.scene.method()));
     Ok(())
 }
@@ -103,10 +104,10 @@ fn chart(name: &str, rows: &[Evaluation]) -> XyChart {
     });
     let x = Axis::log("time a view", "ms");
     let y = Axis::linear("foreground FLIP", "");
-    XyChart::new(format!("Foreground FLIP against time, {name}"), x, y)
+    let chart = XyChart::new(format!("Foreground FLIP against time, {name}"), x, y)
         .with(Series::line("light_field_search", searches))
-        .with(Series::line("joint_carve", carves))
-        .with_front(Better::Low, Better::Low)
+        .with(Series::line("joint_carve", carves));
+    with_front(chart, [Better::Low, Better::Low])
 }
 
 fn setting_point(row: &Evaluation, setting: u32) -> Point {
@@ -135,14 +136,14 @@ fn checks(name: &str, rows: &[Evaluation], default: ReconstructionMethod) -> [Ch
             "×",
             Bar::AtMost(1.0),
         ),
-        Check::maybe(
+        check_if_measured(
             format!("{name}: disoccluded coloured wrong, the carve's over the least of any search"),
             disoccluded,
             "×",
             Bar::AtMost(1.0),
             "no view has disocclusions",
         ),
-        Check::maybe(
+        check_if_measured(
             format!("{name}: settings that beat the default in time and FLIP"),
             better,
             "",

@@ -1,11 +1,12 @@
 //! The cost of light, and the gain of sharing it: every lighting with its parts alone, and delivered to a client.
 
-use app_core::experiment::{DeliverySettings, Experiment, PAPER_VIEWS};
+use app_core::experiment::{Experiment, PAPER_VIEWS};
 use cluster::{Costs, PolicyChoice};
 use render::Lighting;
 use report::{Bar, Check, Report};
 
 use super::args::BenchArgs;
+use crate::delivery::{DeliverySettings, deliver};
 use crate::study::{Column, measure_rows, table};
 
 /// The lighting of the checks.
@@ -60,14 +61,16 @@ fn row(experiment: &Experiment, lighting: Lighting, views: &[usize]) -> anyhow::
     let mut pipelines = Vec::with_capacity(views.len());
     let mut costs = Costs::default();
     for &count in views {
-        let settings = DeliverySettings { lighting, ..experiment.delivery(PolicyChoice::Pipeline, count) };
-        let delivered = experiment.deliver(settings, drop)?;
+        let settings =
+            DeliverySettings { lighting, ..DeliverySettings::new(experiment, PolicyChoice::Pipeline, count) };
+        let delivered = deliver(experiment, settings, drop)?;
         pipelines.push((count, delivered.seconds));
         costs = delivered.plan.costs;
     }
     let direct_views = ((DIRECT_S / costs.direct_view_s) as usize).clamp(4, 48);
-    let settings = DeliverySettings { lighting, ..experiment.delivery(PolicyChoice::Direct, direct_views) };
-    let direct = experiment.deliver(settings, drop)?;
+    let settings =
+        DeliverySettings { lighting, ..DeliverySettings::new(experiment, PolicyChoice::Direct, direct_views) };
+    let direct = deliver(experiment, settings, drop)?;
     Ok(Row {
         lighting,
         costs,
@@ -135,10 +138,13 @@ fn checks(gains: &[Gain<'_>]) -> Vec<Check> {
 /// Measures a second set of a still scene: only c and e are spent on it.
 fn still(args: &BenchArgs, experiment: &Experiment, report: &mut Report) -> anyhow::Result<()> {
     let views = if args.run.quick { QUICK_VIEWS } else { PAPER_VIEWS };
-    let settings =
-        DeliverySettings { lighting: FINE.parse()?, sets: 2, ..experiment.delivery(PolicyChoice::Pipeline, views) };
+    let settings = DeliverySettings {
+        lighting: FINE.parse()?,
+        sets: 2,
+        ..DeliverySettings::new(experiment, PolicyChoice::Pipeline, views)
+    };
     let mut waited_s = 0.0_f64;
-    let delivered = experiment.deliver(settings, |frame| {
+    let delivered = deliver(experiment, settings, |frame| {
         if frame.request.set_index == 1 {
             waited_s = waited_s.max(frame.header.stage_times.set_wait_s);
         }

@@ -197,7 +197,7 @@ mod tests {
         assert_eq!(text(0, 8), "a part");
         assert_eq!([text(2, 1), text(2, 8)], ["ply", "no faces"]);
         let check = refused(&models);
-        assert_eq!((check.outcome(), check.value()), (report::Outcome::FallsShort, Some(1.0)));
+        assert_eq!((check.outcome(), check.value), (report::Outcome::FallsShort, Some(1.0)));
         assert_eq!(refused(&models[..2]).outcome(), report::Outcome::Holds);
     }
 

@@ -3,13 +3,13 @@
 use app_core::exit::Outcome;
 use app_core::experiment::Experiment;
 use node::Engine as _;
-use report::{Bar, Check, Report};
+use report::{Bar, Report};
 
 use super::args::{BenchArgs, Part};
 use super::{errors, light, loaded, throughput};
 use crate::memory::peak_memory_mb;
 use crate::reference_views::ReferenceViews;
-use crate::study::new_report;
+use crate::study::{check_if_measured, new_report};
 use crate::{load, scaling, sharing, viewer};
 
 /// Measures everything, or one part, and writes the report.
@@ -42,7 +42,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<Outcome> {
     loaded::measure(args, &engine, &mut report)?;
     errors::models(args, &engine, &mut report)?;
     let memory = peak_memory_mb().filter(|_| engine.is_software());
-    report.checks.push(Check::maybe(
+    report.checks.push(check_if_measured(
         "peak memory on the software device",
         memory,
         "MB",

@@ -9,6 +9,7 @@ use node::{Engine as _, Turn, WorkClass};
 use report::{Report, Table};
 
 use super::args::BenchArgs;
+use crate::delivery::{DeliverySettings, deliver};
 use crate::reference_views::{ReferenceViews, direct_work};
 use crate::statistics::{median, median_seconds};
 
@@ -23,11 +24,13 @@ pub fn delivered(args: &BenchArgs, experiment: &Experiment, report: &mut Report)
     let mut direct = Vec::new();
     let mut reason = String::new();
     for _ in 0..args.runs() {
-        let run = experiment.deliver(experiment.delivery(PolicyChoice::Pipeline, PAPER_VIEWS), drop)?;
+        let settings = DeliverySettings::new(experiment, PolicyChoice::Pipeline, PAPER_VIEWS);
+        let run = deliver(experiment, settings, drop)?;
         reason = run.plan.reason;
         pipeline.push(PAPER_VIEWS as f64 / run.seconds);
         progress.inc(1);
-        let run = experiment.deliver(experiment.delivery(PolicyChoice::Direct, DIRECT_VIEWS), drop)?;
+        let settings = DeliverySettings::new(experiment, PolicyChoice::Direct, DIRECT_VIEWS);
+        let run = deliver(experiment, settings, drop)?;
         direct.push(DIRECT_VIEWS as f64 / run.seconds);
         progress.inc(1);
     }

@@ -1,9 +1,10 @@
 //! BD-time: the mean ratio of the times of two fronts, over the errors that both reach (Bjøntegaard 2001, "Calculation of
 //! Average PSNR Differences between RD-curves", VCEG-M33; interpolation as in the JCT-VC's sheets).
 
-use report::{Better, Point, pareto_front};
+use report::Point;
 
 use super::pchip::Pchip;
+use crate::pareto::{Better, pareto_front};
 
 /// The times of the new points over those of the old, less 1: −0.1 is 10 % less. Points have the time as x, above 0, and the
 /// error as y; those that are not on their front do not count. `None` where a front has fewer than two points, or the

@@ -31,7 +31,7 @@ impl Result {
 /// A row that does not fit the table.
 pub fn add_to(report: &mut Report, results: &[Result]) -> anyhow::Result<()> {
     report.tables.push(table(results)?);
-    report.charts.extend(results.iter().filter_map(chart).map(Into::into));
+    report.charts.extend(results.iter().filter_map(chart));
     let lost = results.iter().flat_map(Result::reasons).flatten().count();
     report.checks.push(Check::new("shapes that do not hold", lost as f64, "", Bar::Equal(0.0)));
     Ok(())

@@ -1,10 +1,11 @@
 //! Tables and charts of fronts.
 
 use planner::{Choice, Metric};
-use report::{Axis, Better, Cell, Point, Report, Series, XyChart};
+use report::{Axis, Cell, Point, Report, Series, XyChart};
 
 use super::measure::{Front, Planned};
 use super::row::MeasuredRow;
+use crate::pareto::{Better, with_front};
 use crate::study::{Column, table};
 
 /// The beginning of the names of tables of rows, and their columns that other commands read.
@@ -109,7 +110,7 @@ pub fn add_to(report: &mut Report, front: &Front) -> anyhow::Result<()> {
     let plans = front.planned.iter().map(|planned| PlanRow { planned, cheapest_s: cheapest_s(front, planned) });
     let plans: Vec<PlanRow<'_>> = plans.collect();
     report.tables.extend([rows, table(format!("Plans, {name}"), &plan_columns(), &plans)?]);
-    report.charts.extend(FIGURES.iter().map(|figure| chart(front, figure).into()));
+    report.charts.extend(FIGURES.iter().map(|figure| chart(front, figure)));
     Ok(())
 }
 
@@ -138,7 +139,7 @@ fn chart(front: &Front, figure: &Figure) -> XyChart {
         let y = figure.planned.map(|of| of(planned)).or_else(|| row.map(figure.of))?;
         Some(Point::labelled(planned.price.node_s * 1e3, y, planned.budget.to_string()))
     });
-    chart = chart.with(Series::points("chosen by the planner", taken)).with_front(Better::Low, figure.better);
+    chart = with_front(chart.with(Series::points("chosen by the planner", taken)), [Better::Low, figure.better]);
     chart.note = format!("Direct drawing costs {:.2} ms a view.", front.direct.node_s * 1e3);
     chart
 }

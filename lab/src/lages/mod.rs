@@ -1,6 +1,7 @@
 //! `myriorama-lab study lages`: the experiment of Lages et al., with their Figures 5 and 6.
 
 mod charts;
+mod stages;
 mod timing;
 
 use app_core::exit::Outcome;
@@ -9,6 +10,7 @@ use app_core::setup::SceneArgs;
 use clap::Args;
 use report::{Bar, Check, Report};
 
+use crate::delivery::visibility;
 use crate::study::RunArgs;
 use timing::Times;
 
@@ -34,7 +36,7 @@ pub fn run(args: &LagesArgs) -> anyhow::Result<Outcome> {
     let experiment = Experiment::start(args.scene.clone(), args.scene.load()?, device, NODES)?;
     let times = timing::measure(&experiment, args.study.quick)?;
     let mut report = report(args, &experiment, &times)?;
-    report.parameter("direct finds surfaces by", experiment.visibility()?.to_string());
+    report.parameter("direct finds surfaces by", visibility(&experiment)?.to_string());
     experiment.stop()?;
     println!("{}", report.summary);
     args.study.finish("out/study/lages", &report)
@@ -49,7 +51,8 @@ fn report(args: &LagesArgs, experiment: &Experiment, times: &Times) -> anyhow::R
     report.parameter("lighting", args.scene.lighting.to_string());
     report.parameter("method", args.scene.method().to_string());
     timing::tables(times, &mut report)?;
-    report.charts.extend([charts::total_time(times).into(), charts::stages(times).into()]);
+    report.tables.push(stages::stages(times)?);
+    report.charts.push(charts::total_time(times));
     report.summary = timing::summary(times);
     report.checks.push(Check::new("chosen K off the formula's", times.headline_k_off_formula(), "", Bar::Equal(0.0)));
     Ok(report)

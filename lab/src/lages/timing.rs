@@ -1,6 +1,6 @@
 //! Delivery times against the number of views, by method.
 
-use app_core::experiment::{Delivered, DeliverySettings, Experiment, PAPER_VIEWS};
+use app_core::experiment::{Delivered, Experiment, PAPER_VIEWS};
 use app_core::progress::bar;
 use cluster::{Costs, PolicyChoice, SessionPlan};
 use coordinator::schedule::k_fd;
@@ -10,6 +10,7 @@ use reconstruction::ReconstructionMethod;
 use report::{Cell, Report, Table};
 
 use crate::balance::{brute_force_k, k_fd_printed};
+use crate::delivery::{self, DeliverySettings};
 use crate::study::{Column, table};
 
 /// The paper's method, with its 100 steps.
@@ -90,8 +91,8 @@ fn deliver(
     let progress = bar(format!("{views} views by {name}"), views);
     let mut set_wait_s = 0.0_f64;
     let mut frames = Vec::new();
-    let settings = DeliverySettings { method, ..experiment.delivery(policy, views) };
-    let delivered = experiment.deliver(settings, |frame| {
+    let settings = DeliverySettings { method, ..DeliverySettings::new(experiment, policy, views) };
+    let delivered = delivery::deliver(experiment, settings, |frame| {
         set_wait_s = set_wait_s.max(frame.header.stage_times.set_wait_s);
         progress.inc(1);
         if views == COMPARED_VIEWS {

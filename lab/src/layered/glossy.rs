@@ -4,7 +4,7 @@ use depth_image::{LightDirections, PinholeCamera, View, ViewPlanes};
 use glam::Vec3;
 use reconstruction::Mirrors;
 use render::{LayerSelection, Lighting};
-use report::{Axis, Bar, Better, Check, Mark, PictureRow, Point, Report, XyChart};
+use report::{Axis, Bar, Check, Mark, PictureRow, Point, Report, XyChart};
 
 use super::figures;
 use super::mirrors::{self, TimedViews, VIEW_PX, errors};
@@ -12,6 +12,7 @@ use super::subject::Subject;
 use super::views::LAYERED;
 use crate::failures::stand::Stand;
 use crate::impostors::changed;
+use crate::pareto::{Better, with_front};
 use crate::study::{Column, table, with_series};
 
 pub const SCENE: &str = "teapot-floor";
@@ -109,7 +110,7 @@ pub fn measure(stand: &Stand, is_quick: bool, report: &mut Report) -> anyhow::Re
     }
     let title = format!("Glossy pixels of {SCENE}, against {MOST_RAYS} rays drawn directly");
     report.tables.push(table(&title, &COLUMNS, &rows)?);
-    report.charts.push(chart(&rows).into());
+    report.charts.push(chart(&rows));
     report.checks.extend(check(&rows));
     report.pictures.push(picture_row(&rows, mirrors::middle(&truths)?)?);
     Ok(())
@@ -125,7 +126,7 @@ fn chart(rows: &[GlossyRow]) -> XyChart {
         |row| row.way.kind().to_owned(),
         |row| Point::labelled(row.view_s * 1e3, row.psnr_db, row.way.count().to_string()),
     );
-    let mut chart = chart.with_front(Better::Low, Better::High);
+    let mut chart = with_front(chart, [Better::Low, Better::High]);
     chart.note = "Numbers of rays a pixel and of directions stand beside the points.".to_owned();
     chart
 }

@@ -16,6 +16,7 @@ use super::measure::{LightFront, LightRow, LitRows};
 use super::report::add_to;
 use super::subject::{OrbitViews, SetSize, Subject, VIEW_PX};
 use crate::failures::stand::Stand;
+use crate::study::check_if_measured;
 
 /// Two interiors, and two subjects that are seen from outside; the quick ones come first.
 const SUBJECTS: [&str; 4] = ["courtyard, inside", "urban, inside", "tree-terrain-500k", "FlightHelmet"];
@@ -101,7 +102,7 @@ fn checks(front: &LightFront) -> Vec<Check> {
     let mut checks = vec![
         Check::new(format!("{name}: rows"), front.rows.len() as f64, "", Bar::Equal(ROWS as f64)),
         Check::new(format!("{name}: rows with a figure that is no number"), not_finite as f64, "", Bar::Equal(0.0)),
-        Check::maybe(
+        check_if_measured(
             format!("{name}: direct drawing, FLIP with the most rays over that with the fewest"),
             direct_ratio(front),
             "×",
@@ -116,7 +117,7 @@ fn checks(front: &LightFront) -> Vec<Check> {
             Light::Occlusion => LEAST_OCCLUSION_RATIO,
         };
         checks.push(Check::new(format!("{name}: rows of light_cache on the front"), shared, "", Bar::AtLeast(1.0)));
-        checks.push(Check::maybe(
+        checks.push(check_if_measured(
             format!("{name}: FLIP of direct drawing over that of `balanced` (S = 4, density 1) in the same time"),
             equal_time_ratio(front),
             "×",

@@ -15,7 +15,7 @@ use super::report::add_to;
 use super::subject::{OrbitViews, SetSize, Subject, VIEW_PX};
 use crate::failures::stand::Stand;
 use crate::statistics::geometric_mean;
-use crate::study::{RunArgs, is_named};
+use crate::study::{RunArgs, check_if_measured, is_named};
 
 /// The lighting of samples and of views that use them, unless another is given.
 const LIGHTING: &str = "soft 16, occlusion 16";
@@ -134,14 +134,14 @@ fn occlusion_checks(fronts: &[LightFront]) -> Vec<Check> {
     ]
     .map(|(what, gain, bar, missing)| {
         let name = format!("gain of the best quality at equal FLIP, {what}");
-        Check::maybe(name, gain, "×", Bar::AtLeast(bar), missing)
+        check_if_measured(name, gain, "×", Bar::AtLeast(bar), missing)
     });
     [(Balanced, 0.022), (Fast, 0.033)]
         .into_iter()
         .map(|(quality, most)| {
             let flips = fronts.iter().filter_map(|front| Some(front.at_quality(quality)?.flip));
             let name = format!("`{quality}`, {} scenes: greatest FLIP", fronts.len());
-            Check::maybe(name, flips.reduce(f64::max), "", Bar::AtMost(most), "no scene")
+            check_if_measured(name, flips.reduce(f64::max), "", Bar::AtMost(most), "no scene")
         })
         .chain(gained)
         .collect()

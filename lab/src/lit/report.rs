@@ -1,8 +1,9 @@
 //! The table and the chart of a subject.
 
-use report::{Axis, Better, Cell, Mark, Point, Report, Series, XyChart};
+use report::{Axis, Cell, Mark, Point, Report, Series, XyChart};
 
 use super::measure::{Drawing, LightFront, LightRow};
+use crate::pareto::{Better, with_front};
 use crate::study::{Column, table, with_series};
 
 /// A row beside direct drawing.
@@ -39,7 +40,7 @@ pub fn add_to(report: &mut Report, front: &LightFront) -> anyhow::Result<()> {
     report.parameter(format!("{}: truth", front.name()), front.truth.as_str());
     let rows: Vec<ComparedRow<'_>> = front.rows.iter().map(|row| ComparedRow::new(front, row)).collect();
     report.tables.push(table(format!("Expensive light, {}", front.name()), &columns(), &rows)?);
-    report.charts.push(chart(front).into());
+    report.charts.push(chart(front));
     Ok(())
 }
 
@@ -64,7 +65,7 @@ fn chart(front: &LightFront) -> XyChart {
     let others: Vec<LightRow> = front.rows.iter().filter(|row| !row.is_direct()).cloned().collect();
     let chart = chart.with(Series::line("direct", direct));
     let mut chart = with_series(chart, &others, Mark::Points, |row| row.drawing.to_string(), point);
-    chart = chart.with_front(Better::Low, Better::Low);
+    chart = with_front(chart, [Better::Low, Better::Low]);
     chart.note =
         "Sampling is not part of the time of a view. Labels: rays of occlusion or of indirect light a position, in \
         direct drawing."

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use app_core::live::{STAGES, latencies, quantile};
-use report::{Axis, Bar, BarChart, Cell, Check, Report, Series, Table, XyChart};
+use app_core::live::{latencies, quantile};
+use report::{Axis, Bar, Cell, Check, Report, Series, Table, XyChart};
 
 use super::memory::{growth, idle, memory, memory_chart};
 use super::phases::{Load, Phases};
@@ -46,9 +46,8 @@ pub fn add(phases: &Phases, report: &mut Report) -> anyhow::Result<()> {
     report.tables.push(drops(&phases.loads)?);
     report.tables.push(memory(&phases.loads)?);
     report.tables.push(idle(&phases.idle)?);
-    report.charts.push(ages(&phases.loads).into());
-    report.charts.push(stages(&phases.loads).into());
-    report.charts.extend(phases.loads.first().map(|load| memory_chart(load).into()));
+    report.charts.push(ages(&phases.loads));
+    report.charts.extend(phases.loads.first().map(memory_chart));
     report.checks.extend(checks(phases));
     Ok(())
 }
@@ -88,17 +87,6 @@ fn ages(loads: &[Load]) -> XyChart {
     loads.iter().fold(XyChart::new("Age of frames", x, y), |chart, load| {
         let points = (0..=100).map(|percent| (load.age_ms(f64::from(percent) / 100.0), f64::from(percent)));
         chart.with(Series::line(load.name.clone(), points))
-    })
-}
-
-fn stages(loads: &[Load]) -> BarChart {
-    let bars = loads.iter().map(|load| load.name.clone());
-    let chart = BarChart::new("Where a frame's time goes, mean", Axis::linear("time", "ms"), bars);
-    STAGES.into_iter().enumerate().fold(chart, |chart, (stage, name)| {
-        let means_ms = loads.iter().map(|load| {
-            load.shown().map(|shown| shown.stages_s[stage]).sum::<f64>() * 1e3 / load.shown().count() as f64
-        });
-        chart.with(name, means_ms.collect::<Vec<_>>())
     })
 }
 

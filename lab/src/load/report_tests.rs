@@ -62,6 +62,6 @@ fn a_report_has_all_of_it() {
     assert!((phases.idle.each_mib() - 0.05).abs() < 1e-9);
     assert_eq!(report.checks.len(), 7);
     assert!(!report.exit_ok(), "a quarter of the frames is missing");
-    let text = report.tables[0].to_markdown();
+    let text = crate::markdown::markdown(&report.tables[0]);
     assert_eq!(text.lines().count(), 7, "{text}");
 }

@@ -119,7 +119,7 @@ pub fn sizes_report(scene: &str, rows: &[SizeRow], report: &mut Report) -> anyho
         for (place, name) in ["by pixel", "by visibility"].into_iter().enumerate() {
             chart = chart.with(Series::line(name, rows.iter().map(|row| (f64::from(row.side_px), of(row)[place]))));
         }
-        report.charts.push(chart.into());
+        report.charts.push(chart);
         let [last_gap, first_gap] = [last, first].map(|row| (of(row)[0] - of(row)[1]).abs());
         let sides = format!("gap at {} px over that at {} px", last.side_px, first.side_px);
         let name = format!("{scene}: {what} by pixel and by visibility, {sides}");

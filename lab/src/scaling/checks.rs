@@ -6,6 +6,7 @@ use report::{Bar, Check};
 use super::matrix::{Extent, PAPER_NODES, PAPER_VIEWS};
 use super::paper::table_1;
 use super::results::Results;
+use crate::study::check_if_measured;
 
 /// The share of their processor time that nodes must use, at the most nodes and views.
 const USED: f64 = 0.9;
@@ -21,7 +22,7 @@ pub fn checks(results: &Results, extent: Extent) -> Vec<Check> {
     let paper = table_1(PAPER_NODES).map_or(f64::NAN, |row| row.proposed);
     let efficient = policies.into_iter().zip(efficiencies).map(|(policy, efficiency)| {
         let name = format!("efficiency of {policy} at P = 11, V = 1000 (the paper's: {paper})");
-        Check::maybe(name, efficiency, "", Bar::AtLeast(paper), NOT_MEASURED)
+        check_if_measured(name, efficiency, "", Bar::AtLeast(paper), NOT_MEASURED)
     });
     let naive = results.naive(PAPER_NODES).map(|(efficiency, _)| efficiency);
     let over_naive = efficiencies[0].zip(naive).map(|(shared, naive)| shared / naive);
@@ -29,7 +30,7 @@ pub fn checks(results: &Results, extent: Extent) -> Vec<Check> {
     let used = auto.map(|point| point.window.used_share());
     let seconds = extent.quick.then_some(results.seconds);
     let others = [
-        Check::maybe(
+        check_if_measured(
             "pipeline over naive at P = 11, V = 1000, efficiency (the paper's: 7.5)",
             over_naive,
             "×",
@@ -38,14 +39,14 @@ pub fn checks(results: &Results, extent: Extent) -> Vec<Check> {
         ),
         Check::new("points that the simulated schedule plans otherwise", other_plans as f64, "", Bar::Equal(0.0)),
         // Compositors wait for their quota alone; otherwise nodes delay each other.
-        Check::maybe(
+        check_if_measured(
             "share of their quotas that nodes used, auto, P = 11, V = 1000",
             used,
             "",
             Bar::AtLeast(USED),
             NOT_MEASURED,
         ),
-        Check::maybe("time of the quick form", seconds, "s", Bar::AtMost(QUICK_S), "this was the full form"),
+        check_if_measured("time of the quick form", seconds, "s", Bar::AtMost(QUICK_S), "this was the full form"),
     ];
     efficient.chain(others).collect()
 }

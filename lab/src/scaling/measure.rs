@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use app_core::process::stop_signal;
+use app_core::process::StopSignals;
 use app_core::progress::bar;
 use cluster::Costs;
 use gpu::DevicePreference;
@@ -46,12 +46,10 @@ pub fn default_quota(nodes: usize) -> f64 {
 /// # Errors
 /// Processes or groups are not to be had, a point cannot be measured, or a signal came.
 pub async fn take(request: &Request, subject: &Subject) -> anyhow::Result<Results> {
+    let signals = StopSignals::listen()?;
     tokio::select! {
         results = take_undisturbed(request, subject) => results,
-        signal = stop_signal() => {
-            signal?;
-            anyhow::bail!("stopped by a signal")
-        }
+        () = signals.first.cancelled() => anyhow::bail!("stopped by a signal"),
     }
 }
 

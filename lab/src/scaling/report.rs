@@ -4,13 +4,14 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use cluster::PolicyChoice;
-use report::{Report, Table};
+use report::Report;
 
 use super::checks::checks;
 use super::matrix::{Extent, PAPER_NODES, PAPER_VIEWS};
 use super::results::Results;
 use super::tables::{costs_table, headline_table, paper_table, points_table};
 use super::{charts, sweep};
+use crate::markdown::markdown;
 use crate::study::{new_report, table};
 
 /// Makes the report of a run.
@@ -33,12 +34,12 @@ pub fn report(results: &Results, extent: Extent, scene: &str, most_simulated: us
         costs_table(results)?,
         points_table(results)?,
     ]);
-    report.charts.extend(charts::charts(results).map(Into::into));
+    report.charts.extend(charts::charts(results));
     let scenarios = sweep::scenarios(results);
     let simulated = sweep::sweep(results, &scenarios, most_simulated);
     report.tables.push(sweep::reach_table(&scenarios, &simulated)?);
     report.tables.push(table(sweep::SWEEP_TABLE, &sweep::COLUMNS, &simulated)?);
-    report.charts.push(sweep::chart(&scenarios, &simulated).into());
+    report.charts.push(sweep::chart(&scenarios, &simulated));
     report.summary = summary(results);
     report.checks = checks(results, extent);
     Ok(report)
@@ -67,7 +68,7 @@ pub fn show(report: &Report, folder: &Path) -> anyhow::Result<()> {
     println!("\n{}", report.summary);
     std::fs::create_dir_all(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
     let path = folder.join("tables.md");
-    let text = short.map(Table::to_markdown).collect::<Vec<_>>().join("\n");
+    let text = short.map(markdown).collect::<Vec<_>>().join("\n");
     std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     Ok(())
 }

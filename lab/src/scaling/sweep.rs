@@ -161,7 +161,8 @@ pub fn chart(scenarios: &[Scenario], points: &[Simulated]) -> XyChart {
         let own = points.iter().filter(|point| point.scenario == scenario.name && point.views == CHARTED_VIEWS);
         Series::line(scenario.name.as_str(), own.map(|point| (point.nodes as f64, point.efficiency)))
     });
-    let mut chart = series.fold(chart.with_limit("0.8", LEAST_EFFICIENCY), XyChart::with);
+    let mut chart = series.fold(chart, XyChart::with);
+    chart.limits.push(report::Limit { name: "0.8".to_owned(), y: LEAST_EFFICIENCY });
     chart.note =
         "Simulated, not measured: plans of the real schedule, carried out by the simulation that stands beside the \
                   measured points."

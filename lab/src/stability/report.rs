@@ -79,6 +79,6 @@ impl Measured {
 /// A row that does not fit its table.
 pub fn add_to(report: &mut Report, paths: &[Measured]) -> anyhow::Result<()> {
     report.tables.push(table("Paths", &COLUMNS, paths)?);
-    report.charts.extend(paths.iter().map(|path| path.chart().into()));
+    report.charts.extend(paths.iter().map(|path| path.chart()));
     Ok(())
 }

@@ -5,19 +5,17 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use app_core::addresses::{InsecureArgs, MetricsArgs, listen, listen_address, loopback_of};
+use app_core::addresses::{MetricsArgs, listen, listen_address, loopback_of};
 use app_core::exit::Outcome;
 use app_core::print_line;
-use app_core::process::cancel_at_signal;
+use app_core::process::StopSignals;
 use app_core::scenes::ScenesArgs;
 use clap::Args;
 use coordinator::schedule::Recorder;
 use coordinator::{CoordinatorConfig, CoordinatorMetrics, EventLog, Observers};
 use node::Telemetry;
-use tokio_util::sync::CancellationToken;
 
-use crate::budget::BudgetArgs;
-use crate::viewer::ViewerArgs;
+use crate::serving::ServingArgs;
 
 /// Serves a scene and plans the work of the nodes that join. A coordinator draws nothing and needs no device.
 #[derive(Debug, Args)]
@@ -38,11 +36,7 @@ pub struct CoordinatorArgs {
         value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=64))]
     max_workloads: usize,
     #[command(flatten)]
-    insecure: InsecureArgs,
-    #[command(flatten)]
-    budget: BudgetArgs,
-    #[command(flatten)]
-    viewer: ViewerArgs,
+    serving: ServingArgs,
 }
 
 /// Runs until a signal.
@@ -50,32 +44,26 @@ pub struct CoordinatorArgs {
 /// # Errors
 /// The scene cannot be used, or the port is taken.
 pub async fn run(args: CoordinatorArgs) -> anyhow::Result<Outcome> {
-    let (scenes, offers) = args.scenes.load(args.budget.is_given())?;
-    args.budget.check(&offers)?;
-    let listener = listen(args.listen, args.insecure.insecure_bind).await?;
+    let ServingArgs { insecure, viewer, .. } = &args.serving;
+    let (scenes, offers) = args.serving.load(&args.scenes)?;
+    let listener = listen(args.listen, insecure.insecure_bind).await?;
     let address = listener.local_addr()?;
     for (scene, offer) in scenes.iter().zip(offers.iter()) {
         print_line!("{}: {}, offered at http://{address}", offer.name, scene.contents());
     }
     drop(scenes);
-    let shutdown = CancellationToken::new();
-    let config = args.budget.configure(CoordinatorConfig {
-        insecure_bind: args.insecure.insecure_bind,
-        max_workloads: args.max_workloads,
-        ..CoordinatorConfig::default()
-    });
+    let shutdown = StopSignals::listen()?.first;
+    let config = CoordinatorConfig { max_workloads: args.max_workloads, ..args.serving.config() };
     let log = args.record.as_deref().map(event_log).transpose()?;
     let telemetry = Telemetry::default();
     let metrics = CoordinatorMetrics::new(&telemetry);
-    args.metrics.serve(args.insecure, telemetry, shutdown.clone()).await?;
-    cancel_at_signal(shutdown.clone());
+    args.metrics.serve(*insecure, telemetry, shutdown.clone()).await?;
     let own_address = format!("http://{}", loopback_of(&listener)?);
-    let (port, browsers) = args.viewer.share(listener);
-    let viewer = args.viewer.serve(browsers, &own_address, shutdown.child_token());
-    coordinator::serve(port, config, offers, Observers { metrics, log }, shutdown).await?;
-    if let Some(viewer) = viewer {
-        viewer.end().await;
-    }
+    let (port, browsers) = viewer.share(listener);
+    let mut visits = viewer.serve(browsers, &own_address, shutdown.clone());
+    coordinator::serve(port, config, offers, Observers { metrics, log }, shutdown.clone()).await?;
+    shutdown.cancel();
+    while visits.join_next().await.is_some() {}
     Ok(Outcome::Done)
 }
 

@@ -1,6 +1,7 @@
 //! `myriorama demo`: one scene in expensive and in plain light, by a whole cluster in this process.
 
 mod args;
+mod contact_sheet;
 mod first_page;
 mod page_layout;
 mod shared_light;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use app_core::addresses::{CoordinatorArgs, InsecureArgs, address_towards, listen, listen_address};
 use app_core::exit::{BadInput, Outcome};
 use app_core::print_line;
-use app_core::process::cancel_at_signal;
+use app_core::process::StopSignals;
 use app_core::quality::quality;
 use app_core::sizes::SizePx;
 use clap::Args;
@@ -14,7 +14,6 @@ use cluster::PolicyChoice;
 use depth_image::LightCacheQuality;
 use gateway::{GatewayConfig, Token, tls_config};
 use glam::UVec2;
-use tokio_util::sync::CancellationToken;
 
 use crate::tone::ToneArgs;
 use crate::viewer::{NameArgs, request_of, shared_light_methods};
@@ -76,9 +75,7 @@ pub async fn run(args: GatewayArgs) -> anyhow::Result<Outcome> {
         quality: args.quality,
         ..GatewayConfig::new(&args.coordinator.coordinator, request_of(args.policy, args.tone), shared_light_methods())
     };
-    let shutdown = CancellationToken::new();
-    cancel_at_signal(shutdown.clone());
-    gateway::serve(gateway::accept(listener), config, shutdown).await;
+    gateway::serve(gateway::accept(listener), config, StopSignals::listen()?.first).await;
     Ok(Outcome::Done)
 }
 

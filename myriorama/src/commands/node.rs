@@ -5,15 +5,13 @@ use std::path::PathBuf;
 
 use app_core::addresses::{CoordinatorArgs, InsecureArgs, MetricsArgs, address_towards, listen, listen_address};
 use app_core::exit::Outcome;
-use app_core::memory::MemoryArgs;
+use app_core::node_limits::NodeLimitArgs;
 use app_core::print_line;
-use app_core::process::cancel_at_signal;
+use app_core::process::StopSignals;
 use app_core::setup::DeviceArgs;
-use app_core::view_limits::ViewLimitArgs;
 use clap::Args;
 use engine::GpuEngine;
-use node::{Engine as _, NodeConfig, NodeMetrics, Quotas, Telemetry};
-use tokio_util::sync::CancellationToken;
+use node::{Engine as _, NodeConfig, NodeMetrics, Telemetry};
 
 /// Joins a coordinator, and samples and composites by its plan. Joins again when the coordinator comes back.
 #[derive(Debug, Args)]
@@ -35,11 +33,9 @@ pub struct NodeArgs {
     #[command(flatten)]
     device: DeviceArgs,
     #[command(flatten)]
-    memory: MemoryArgs,
+    limits: NodeLimitArgs,
     #[command(flatten)]
     metrics: MetricsArgs,
-    #[command(flatten)]
-    limits: ViewLimitArgs,
     #[command(flatten)]
     insecure: InsecureArgs,
 }
@@ -53,7 +49,7 @@ pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
     let listener = listen(args.listen, args.insecure.insecure_bind).await?;
     let address = listener.local_addr()?;
     let engine = GpuEngine::shared(args.device.device)?;
-    let memory = args.memory.set_memory_bytes(engine.is_software());
+    let memory = args.limits.set_memory_bytes(engine.is_software());
     engine.bound_scenes(memory);
     let name = args.name.unwrap_or_else(|| name_of(address));
     let advertise = args.advertise.or_else(|| own_address(&coordinator, address));
@@ -62,15 +58,12 @@ pub async fn run(args: NodeArgs) -> anyhow::Result<Outcome> {
         scene_folder: args.scene_folder,
         advertised_address: advertise,
         insecure_bind: args.insecure.insecure_bind,
-        set_memory_bytes: memory,
-        quotas: Quotas { view_bytes: args.memory.view_memory, ..Quotas::default() },
-        ..args.limits.within(NodeConfig::new(name, coordinator))
+        ..args.limits.within(memory, NodeConfig::new(name, coordinator))
     };
-    let shutdown = CancellationToken::new();
+    let shutdown = StopSignals::listen()?.first;
     let telemetry = Telemetry::default();
     let metrics = NodeMetrics::new(&telemetry);
     args.metrics.serve(args.insecure, telemetry, shutdown.clone()).await?;
-    cancel_at_signal(shutdown.clone());
     node_host::serve(listener, config, engine.opener(), metrics, shutdown).await?;
     Ok(Outcome::Done)
 }

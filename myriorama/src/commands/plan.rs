@@ -22,7 +22,7 @@ use output::Output;
 use planner::{Budget, Kept, Planner, Pricing as _, PromiseState, device_name};
 use probe::Prober;
 
-use crate::budget::PlansArgs;
+use crate::serving::PlansArgs;
 
 /// Finds the cheapest representation of a scene that keeps a budget: how it is sampled, from how many cameras, in images of
 /// which size, and how views are reconstructed. Prints the choice, the reason, the front of cost against error, and the

@@ -6,10 +6,9 @@ use std::time::Duration;
 use app_core::addresses::CoordinatorArgs;
 use app_core::exit::Outcome;
 use app_core::print_line;
-use app_core::table::table;
 use clap::Args;
 use cluster::{ClusterStatus, NodeCondition, NodeStatus, SessionPlan, SharedLightCosts, Workload, WorkloadStatus};
-use report::{Cell, ReportError, Table};
+use report::{Cell, Table};
 
 /// Characters of a scene's hash that tell scenes apart.
 const SHORT_HASH: usize = 8;
@@ -31,7 +30,7 @@ pub struct StatusArgs {
 pub async fn run(args: &StatusArgs) -> anyhow::Result<Outcome> {
     let client = args.coordinator.connect().await?;
     loop {
-        let text = text(&client.status().await?)?;
+        let text = text(&client.status().await?);
         let Some(seconds) = args.watch else {
             print_line!("{text}");
             return Ok(Outcome::Done);
@@ -45,11 +44,9 @@ pub async fn run(args: &StatusArgs) -> anyhow::Result<Outcome> {
 }
 
 /// The workloads, then the nodes of each.
-fn text(status: &ClusterStatus) -> anyhow::Result<String> {
-    let mut parts = vec![workload_table(status)?.to_text()];
-    for workload in &status.workloads {
-        parts.push(workload_text(workload, &status.nodes)?);
-    }
+fn text(status: &ClusterStatus) -> String {
+    let mut parts = vec![workload_table(status).to_text()];
+    parts.extend(status.workloads.iter().map(|workload| workload_text(workload, &status.nodes)));
     let mut idle = Vec::new();
     for node in &status.nodes {
         if !status.workloads.iter().any(|workload| condition(workload, node).is_some()) {
@@ -59,10 +56,10 @@ fn text(status: &ClusterStatus) -> anyhow::Result<String> {
     if !idle.is_empty() {
         parts.push(format!("Nodes without a workload: {}.", idle.join(", ")));
     }
-    Ok(parts.join("\n\n"))
+    parts.join("\n\n")
 }
 
-fn workload_table(status: &ClusterStatus) -> Result<Table, ReportError> {
+fn workload_table(status: &ClusterStatus) -> Table {
     let headline = format!(
         "Plan {}: P = {} nodes, K = {} samplers, V = {} views a set of {} sessions",
         status.plan_epoch,
@@ -71,7 +68,7 @@ fn workload_table(status: &ClusterStatus) -> Result<Table, ReportError> {
         status.views_per_set(),
         status.session_count()
     );
-    table(
+    Table::of_rows(
         headline,
         &status.workloads,
         &[
@@ -105,14 +102,14 @@ struct NodeRow<'a> {
 }
 
 /// The nodes of a workload, its plan's reason, and what it achieves.
-fn workload_text(workload: &WorkloadStatus, nodes: &[NodeStatus]) -> anyhow::Result<String> {
+fn workload_text(workload: &WorkloadStatus, nodes: &[NodeStatus]) -> String {
     let mut rows = Vec::new();
     for node in nodes {
         if let Some(condition) = condition(workload, node) {
             rows.push(NodeRow { node, condition, roles: roles(workload, &node.node_name) });
         }
     }
-    let table = table(
+    let table = Table::of_rows(
         format!("Workload {}", workload.number),
         &rows,
         &[
@@ -129,10 +126,10 @@ fn workload_text(workload: &WorkloadStatus, nodes: &[NodeStatus]) -> anyhow::Res
             ("dropped", "", |row| (row.condition.dropped_views as f64).into()),
             ("device", "", |row| row.node.device_name.clone().into()),
         ],
-    )?;
+    );
     let why = workload.plan.as_ref().map_or("No plan: no node can serve it now.", |plan| &plan.reason);
     let promise = workload.promise.as_ref().map_or_else(String::new, |promise| format!("\n{promise}"));
-    Ok(format!("{}\n\n{why}{promise}\n{}", table.to_text(), achieved(workload)))
+    format!("{}\n\n{why}{promise}\n{}", table.to_text(), achieved(workload))
 }
 
 /// Times that policies achieved, the load of the nodes, and where the time of a view with shared light goes.

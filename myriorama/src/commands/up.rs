@@ -2,23 +2,19 @@
 
 use std::net::SocketAddr;
 
-use app_core::addresses::{InsecureArgs, listen, listen_address};
+use app_core::addresses::{listen, listen_address};
 use app_core::cluster::Cluster;
 use app_core::exit::Outcome;
-use app_core::memory::MemoryArgs;
+use app_core::node_limits::NodeLimitArgs;
 use app_core::print_line;
-use app_core::process::stop_signal;
+use app_core::process::StopSignals;
 use app_core::scenes::ScenesArgs;
 use app_core::setup::DeviceArgs;
-use app_core::view_limits::ViewLimitArgs;
 use clap::Args;
-use coordinator::CoordinatorConfig;
 use engine::GpuEngine;
-use node::{Engine as _, NodeConfig, Quotas};
-use tokio_util::sync::CancellationToken;
+use node::Engine as _;
 
-use crate::budget::BudgetArgs;
-use crate::viewer::ViewerArgs;
+use crate::serving::ServingArgs;
 
 /// Serves until ctrl-c or SIGTERM, then drains for at most 10 s.
 #[derive(Debug, Args)]
@@ -31,9 +27,7 @@ pub struct UpArgs {
     #[command(flatten)]
     device: DeviceArgs,
     #[command(flatten)]
-    memory: MemoryArgs,
-    #[command(flatten)]
-    limits: ViewLimitArgs,
+    limits: NodeLimitArgs,
     /// Nodes P that share the device
     #[arg(long, default_value_t = 5, value_name = "P", value_parser = clap::value_parser!(u16).range(1..=256))]
     nodes: u16,
@@ -41,11 +35,7 @@ pub struct UpArgs {
     #[arg(long, default_value = "127.0.0.1:7420", value_name = "HOST:PORT", value_parser = listen_address)]
     listen: SocketAddr,
     #[command(flatten)]
-    insecure: InsecureArgs,
-    #[command(flatten)]
-    budget: BudgetArgs,
-    #[command(flatten)]
-    viewer: ViewerArgs,
+    serving: ServingArgs,
 }
 
 /// Runs until a signal.
@@ -53,11 +43,10 @@ pub struct UpArgs {
 /// # Errors
 /// The scene cannot be used, there is no device, or the port is taken.
 pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
-    let (scenes, offers) = args.scenes.load(args.budget.is_given())?;
-    args.budget.check(&offers)?;
-    let listener = listen(args.listen, args.insecure.insecure_bind).await?;
+    let (scenes, offers) = args.serving.load(&args.scenes)?;
+    let listener = listen(args.listen, args.serving.insecure.insecure_bind).await?;
     let engine = GpuEngine::shared(args.device.device)?;
-    let memory = args.memory.set_memory_bytes(engine.is_software());
+    let memory = args.limits.set_memory_bytes(engine.is_software());
     let nodes = usize::from(args.nodes);
     engine.bound_scenes(memory);
     for (scene, offer) in scenes.iter().zip(offers.iter()) {
@@ -66,34 +55,28 @@ pub async fn run(args: UpArgs) -> anyhow::Result<Outcome> {
     }
     // The device and the packages hold the scenes now; the third copy is dropped.
     drop(scenes);
-    let view_bytes = args.memory.view_memory;
     let device_name = engine.device_name();
-    let (port, browsers) = args.viewer.share(listener);
-    let config = CoordinatorConfig { insecure_bind: args.insecure.insecure_bind, ..CoordinatorConfig::default() };
-    let config = args.budget.configure(config);
+    let (port, browsers) = args.serving.viewer.share(listener);
     let mut cluster = Cluster::start(
-        |config| NodeConfig {
-            set_memory_bytes: memory / nodes,
-            quotas: Quotas { view_bytes, ..config.quotas },
-            ..args.limits.within(config)
-        },
+        |config| args.limits.within(memory / nodes, config),
         port,
-        config,
+        args.serving.config(),
         offers,
         engine.opener(),
         nodes,
     )
     .await?;
     print_line!("{nodes} nodes on {device_name}, at {}", cluster.address);
-    let viewer = args.viewer.serve(browsers, &cluster.address, CancellationToken::new());
+    let shutdown = StopSignals::listen()?.first;
+    let mut visits = args.serving.viewer.serve(browsers, &cluster.address, shutdown.clone());
     tokio::select! {
-        stopped = stop_signal() => stopped?,
+        () = shutdown.cancelled() => (),
         failed = cluster.failed() => failed?,
     }
     print_line!("draining");
-    if let Some(viewer) = viewer {
-        viewer.end().await;
-    }
+    // Visits end before the cluster that makes their pictures.
+    shutdown.cancel();
+    while visits.join_next().await.is_some() {}
     cluster.drain().await?;
     Ok(Outcome::Done)
 }

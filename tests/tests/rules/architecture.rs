@@ -39,7 +39,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("browser", &[]),
     ("network-proxy", &[]),
     ("simulation", &["client", "coordinator", "cluster", "depth-image"]),
-    ("report", &["metrics", "pictures"]),
+    ("report", &["pictures"]),
     ("probe", &["planner", "metrics", "node", "cluster", "codec", "depth-image"]),
     ("engine", &["node", "reconstruction", "sampling", "render", "gpu", "scene", "cluster", "depth-image"]),
     (

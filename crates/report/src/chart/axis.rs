@@ -7,8 +7,6 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::table::heading;
-
 /// The scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -48,11 +46,6 @@ impl Axis {
     #[must_use]
     pub fn log(label: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { scale: Scale::Log, ..Self::linear(label, unit) }
-    }
-
-    /// `label (unit)`.
-    pub(super) fn description(&self) -> String {
-        heading(&self.label, &self.unit)
     }
 
     /// A value's place in axis space; `None` where the axis cannot show it.

@@ -1,12 +1,11 @@
 //! The frame of all charts: a title, a legend above the data, and ink that follows the page.
 
-use plotters::chart::MeshStyle;
 use plotters::coord::Shift;
-use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::Mark;
 use super::marker::Marker;
 use crate::ReportError;
 
@@ -16,9 +15,10 @@ pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// Charts are drawn at this width and may be scaled.
 pub(super) const WIDTH_PX: u32 = 700;
 /// Size of texts in the chart library's unit, 1.24 of a CSS pixel.
-const TEXT_SIZE: i32 = 16;
+pub(super) const TEXT_SIZE: i32 = 16;
 /// About the width of a sans-serif letter at that size.
 const LETTER_WIDTH_PX: f64 = 7.4;
+const PLOT_HEIGHT_PX: u32 = 390;
 const TITLE_HEIGHT_PX: i32 = 30;
 const LEGEND_ROW_PX: i32 = 22;
 const MARGIN_PX: i32 = 14;
@@ -29,37 +29,26 @@ const GLYPH_WIDTH_PX: i32 = 34;
 pub(super) const INK: RGBColor = RGBColor(1, 2, 3);
 const INK_IN_SVG: &str = "#010203";
 
-/// The glyph of a legend's entry.
-pub(super) enum Glyph {
-    /// A block of colour.
-    Swatch(RGBColor),
-    /// A point alone.
-    Point(Marker),
-    /// A line through a point.
-    Line(Marker),
-    /// A broken line through a point.
-    Dashes(Marker),
-}
-
 /// An entry of a legend.
 pub(super) struct LegendEntry {
     pub(super) text: String,
-    pub(super) glyph: Glyph,
+    /// A measured point's marker is filled, and an extrapolated line is dashed.
+    pub(super) marker: Marker,
+    pub(super) mark: Mark,
 }
 
-/// Draws title and legend, and the rest by `plot` in an area `plot_height_px` high below them. The SVG has no paper, and the ink of
+/// Draws title and legend, and the rest by `plot` in the area below them. The SVG has no paper, and the ink of
 /// the page that it is on.
 pub(super) fn draw(
     name: &str,
     legend: &[LegendEntry],
-    plot_height_px: u32,
     plot: impl FnOnce(&Area) -> Result<(), String>,
 ) -> Result<String, ReportError> {
     let rows = legend_rows(legend);
     let header_px = TITLE_HEIGHT_PX + LEGEND_ROW_PX * rows.len() as i32 + 4;
     let mut svg = String::new();
     {
-        let area = SVGBackend::with_string(&mut svg, (WIDTH_PX, header_px as u32 + plot_height_px)).into_drawing_area();
+        let area = SVGBackend::with_string(&mut svg, (WIDTH_PX, header_px as u32 + PLOT_HEIGHT_PX)).into_drawing_area();
         let (header, below) = area.split_vertically(header_px);
         let drawn = draw_header(&header, name, &rows)
             .and_then(|()| plot(&below))
@@ -78,19 +67,6 @@ pub(super) fn message(error: impl std::error::Error) -> String {
 /// Text in the page's ink.
 pub(super) fn text_style(horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
     TextStyle::from(("sans-serif", TEXT_SIZE).into_font()).color(&INK).pos(Pos::new(horizontal, vertical))
-}
-
-/// Thin lines at the ticks, texts in the page's ink.
-pub(super) fn style_mesh<'b, X, Y>(mesh: &mut MeshStyle<'_, 'b, X, Y, SVGBackend<'_>>)
-where
-    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
-    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
-{
-    mesh.axis_style(INK.mix(0.6))
-        .bold_line_style(INK.mix(0.13))
-        .light_line_style(TRANSPARENT)
-        .label_style(("sans-serif", 15).into_font().color(&INK))
-        .axis_desc_style(("sans-serif", TEXT_SIZE).into_font().color(&INK));
 }
 
 /// The width of a text, about.
@@ -129,20 +105,13 @@ fn draw_header(area: &Area, name: &str, rows: &[Vec<(i32, &LegendEntry)>]) -> Re
 fn draw_entry(area: &Area, x: i32, y: i32, entry: &LegendEntry) -> Result<(), String> {
     let line = [(x, y), (x + GLYPH_WIDTH_PX - 8, y)];
     let middle_x = x + GLYPH_WIDTH_PX / 2 - 4;
-    match &entry.glyph {
-        Glyph::Swatch(color) => {
-            area.draw(&Rectangle::new([(x + 10, y - 6), (x + 24, y + 6)], color.filled())).map_err(message)?
-        }
-        Glyph::Point(marker) => marker.draw(area, middle_x, y)?,
-        Glyph::Line(marker) => {
-            area.draw(&PathElement::new(line.to_vec(), marker.color.stroke_width(2))).map_err(message)?;
-            marker.draw(area, middle_x, y)?;
-        }
-        Glyph::Dashes(marker) => {
-            area.draw(&DashedPathElement::new(line, 5, 4, marker.color.stroke_width(2))).map_err(message)?;
-            marker.draw(area, middle_x, y)?;
-        }
+    let style = entry.marker.color.stroke_width(2);
+    match (entry.mark, entry.marker.filled) {
+        (Mark::Points, _) => (),
+        (Mark::Line, true) => area.draw(&PathElement::new(line.to_vec(), style)).map_err(message)?,
+        (Mark::Line, false) => area.draw(&DashedPathElement::new(line, 5, 4, style)).map_err(message)?,
     }
+    entry.marker.draw(area, middle_x, y)?;
     let text = Text::new(entry.text.clone(), (x + GLYPH_WIDTH_PX, y), text_style(HPos::Left, VPos::Center));
     area.draw(&text).map_err(message)
 }

@@ -26,7 +26,7 @@ const BASELINE: (&str, RGBColor) = ("direct", RGBColor(133, 141, 150));
 ///
 /// A name prefers a colour by its own letters, so that other reports have it, too. Where two names prefer one colour,
 /// the later name takes the next free one.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct Palette {
     slots: HashMap<String, usize>,
 }
@@ -34,21 +34,17 @@ pub(crate) struct Palette {
 impl Palette {
     /// Colours for names in order of their first appearance.
     pub fn for_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
-        let mut palette = Self::default();
+        let mut slots: HashMap<String, usize> = HashMap::new();
         for name in names {
-            palette.add(name);
+            if name == BASELINE.0 || slots.contains_key(name) {
+                continue;
+            }
+            let preferred = preferred_slot(name);
+            let mut probes = (0..COLORS.len()).map(|step| (preferred + step) % COLORS.len());
+            let free = probes.find(|slot| !slots.values().any(|taken| taken == slot));
+            slots.insert(name.into(), free.unwrap_or(preferred));
         }
-        palette
-    }
-
-    fn add(&mut self, name: &str) {
-        if name == BASELINE.0 || self.slots.contains_key(name) {
-            return;
-        }
-        let preferred = preferred_slot(name);
-        let probes = (0..COLORS.len()).map(|step| (preferred + step) % COLORS.len());
-        let free = probes.into_iter().find(|slot| !self.slots.values().any(|taken| taken == slot));
-        self.slots.insert(name.into(), free.unwrap_or(preferred));
+        Self { slots }
     }
 
     /// The colour of a name, known or not.

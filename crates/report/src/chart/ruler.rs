@@ -12,16 +12,12 @@ use crate::table::format_number;
 pub(super) struct Ruler {
     axis: Axis,
     range: Range<f64>,
-    ticks: Vec<f64>,
+    pub(super) ticks: Vec<f64>,
 }
 
 impl Ruler {
     pub(super) fn new(axis: &Axis, range: Range<f64>) -> Self {
         Self { ticks: axis.ticks(&range), axis: axis.clone(), range }
-    }
-
-    pub(super) fn tick_count(&self) -> usize {
-        self.ticks.len()
     }
 }
 

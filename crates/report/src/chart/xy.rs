@@ -7,16 +7,16 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 use serde::{Deserialize, Serialize};
 
-use super::canvas::{self, Area, Glyph, INK, LegendEntry, WIDTH_PX, message, style_mesh, text_style, text_width_px};
+use super::canvas::{self, Area, INK, LegendEntry, TEXT_SIZE, WIDTH_PX, message, text_style, text_width_px};
 use super::marker::Marker;
 use super::ruler::Ruler;
-use super::{Axis, Better, Limit, Mark, Palette, Point, Series, pareto_front};
+use super::{Axis, Limit, Mark, Palette, Point, Series};
 use crate::ReportError;
+use crate::table::heading;
 
-const PLOT_HEIGHT_PX: u32 = 390;
-
-/// Series over two axes, optionally with limits to reach and the front of the best points.
+/// Series over two axes, written as `charts/{slug(name)}.svg`, optionally with limits to reach and a front of the best points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename = "xy")]
 pub struct XyChart {
     /// The title, unique in the report.
     pub name: String,
@@ -32,9 +32,9 @@ pub struct XyChart {
     /// Horizontal lines.
     #[serde(default)]
     pub limits: Vec<Limit>,
-    /// The better ends of x and y: draws the Pareto front of all measured points.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub front: Option<[Better; 2]>,
+    /// Points that a staircase joins from left to right, such as a Pareto front.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub staircase: Vec<Point>,
 }
 
 type Plot<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Ruler, Ruler>>;
@@ -43,7 +43,15 @@ impl XyChart {
     /// A chart without series.
     #[must_use]
     pub fn new(name: impl Into<String>, x: Axis, y: Axis) -> Self {
-        Self { name: name.into(), note: String::new(), x, y, series: Vec::new(), limits: Vec::new(), front: None }
+        Self {
+            name: name.into(),
+            note: String::new(),
+            x,
+            y,
+            series: Vec::new(),
+            limits: Vec::new(),
+            staircase: Vec::new(),
+        }
     }
 
     /// The same chart with one more series.
@@ -53,26 +61,10 @@ impl XyChart {
         self
     }
 
-    /// The same chart with a horizontal line.
-    #[must_use]
-    pub fn with_limit(mut self, name: impl Into<String>, y: f64) -> Self {
-        self.limits.push(Limit { name: name.into(), y });
-        self
-    }
-
-    /// The same chart with the front of the best points.
-    #[must_use]
-    pub fn with_front(mut self, x: Better, y: Better) -> Self {
-        self.front = Some([x, y]);
-        self
-    }
-
-    pub(super) fn draw(&self, palette: &Palette) -> Result<String, ReportError> {
-        canvas::draw(&self.name, &self.legend(palette), PLOT_HEIGHT_PX, |area| self.draw_plot(area, palette))
-    }
-
-    fn legend(&self, palette: &Palette) -> Vec<LegendEntry> {
-        self.series.iter().flat_map(|series| legend_entries(series, palette)).collect()
+    /// The chart as SVG, in the palette's colours.
+    pub(crate) fn draw(&self, palette: &Palette) -> Result<String, ReportError> {
+        let legend: Vec<LegendEntry> = self.series.iter().flat_map(|series| legend_entries(series, palette)).collect();
+        canvas::draw(&self.name, &legend, |area| self.draw_plot(area, palette))
     }
 
     fn draw_plot(&self, area: &Area, palette: &Palette) -> Result<(), String> {
@@ -81,7 +73,8 @@ impl XyChart {
         for limit in &self.limits {
             self.draw_limit(&mut plot, limit, &x_range)?;
         }
-        self.draw_front(&mut plot)?;
+        let corners = staircase(&self.staircase.iter().filter_map(|point| self.place(point)).collect::<Vec<_>>());
+        draw_path(&mut plot, corners, INK.mix(0.35).stroke_width(2), false)?;
         self.series.iter().try_for_each(|series| self.draw_series(&mut plot, series, palette))?;
         self.draw_labels(&mut plot, &x_range)
     }
@@ -103,8 +96,8 @@ impl XyChart {
     fn axes<'a>(&self, area: &Area<'a>, x: Range<f64>, y: Range<f64>) -> Result<Plot<'a>, String> {
         let x = Ruler::new(&self.x, x);
         let y = Ruler::new(&self.y, y);
-        let x_count = x.tick_count();
-        let y_count = y.tick_count();
+        let x_count = x.ticks.len();
+        let y_count = y.ticks.len();
         let mut plot = ChartBuilder::on(area)
             .margin_right(18)
             .margin_top(6)
@@ -115,8 +108,13 @@ impl XyChart {
             .build_cartesian_2d(x, y)
             .map_err(message)?;
         let mut mesh = plot.configure_mesh();
-        mesh.x_desc(self.x.description()).y_desc(self.y.description()).x_labels(x_count).y_labels(y_count);
-        style_mesh(&mut mesh);
+        mesh.x_desc(heading(&self.x.label, &self.x.unit))
+            .y_desc(heading(&self.y.label, &self.y.unit))
+            .x_labels(x_count)
+            .y_labels(y_count);
+        mesh.axis_style(INK.mix(0.6)).bold_line_style(INK.mix(0.13)).light_line_style(TRANSPARENT);
+        mesh.label_style(("sans-serif", 15).into_font().color(&INK));
+        mesh.axis_desc_style(("sans-serif", TEXT_SIZE).into_font().color(&INK));
         mesh.draw().map_err(message)?;
         Ok(plot)
     }
@@ -128,16 +126,6 @@ impl XyChart {
         let text = EmptyElement::at((x.end, y))
             + Text::new(limit.name.clone(), (-4, -3), text_style(HPos::Right, VPos::Bottom));
         plot.draw_series([text]).map(drop).map_err(message)
-    }
-
-    fn draw_front(&self, plot: &mut Plot) -> Result<(), String> {
-        let Some(better) = self.front else { return Ok(()) };
-        let all =
-            self.series.iter().flat_map(|series| series.points.iter().enumerate().map(move |point| (series, point)));
-        let measured = all.filter(|(series, (index, _))| !series.is_extrapolated(*index)).map(|(_, (_, point))| point);
-        let front = pareto_front(measured.filter(|point| self.place(point).is_some()), better);
-        let corners = staircase(&front.iter().filter_map(|point| self.place(point)).collect::<Vec<_>>());
-        draw_path(plot, corners, INK.mix(0.35).stroke_width(2), false)
     }
 
     fn draw_series(&self, plot: &mut Plot, series: &Series, palette: &Palette) -> Result<(), String> {
@@ -184,14 +172,10 @@ fn marker(series: &Series, palette: &Palette, filled: bool) -> Marker {
 fn legend_entries(series: &Series, palette: &Palette) -> Vec<LegendEntry> {
     let measured = (series.extrapolated_from != Some(0)).then(|| (series.name.clone(), true));
     let extrapolated = series.extrapolated_from.map(|_| (format!("{}, extrapolated", series.name), false));
-    let entries = measured.into_iter().chain(extrapolated).map(|(text, filled)| {
-        let marker = marker(series, palette, filled);
-        let glyph = match (series.mark, filled) {
-            (Mark::Points, _) => Glyph::Point(marker),
-            (Mark::Line, true) => Glyph::Line(marker),
-            (Mark::Line, false) => Glyph::Dashes(marker),
-        };
-        LegendEntry { text, glyph }
+    let entries = measured.into_iter().chain(extrapolated).map(|(text, filled)| LegendEntry {
+        text,
+        marker: marker(series, palette, filled),
+        mark: series.mark,
     });
     entries.collect()
 }

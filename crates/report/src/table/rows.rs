@@ -27,6 +27,9 @@ pub(crate) fn heading(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") }
 }
 
+/// A column of a table of rows: its name, its unit, and its cell in a row.
+pub type RowColumn<'n, R> = (&'n str, &'n str, fn(&R) -> Cell);
+
 /// A table, written as `{slug(name)}.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Table {
@@ -44,6 +47,14 @@ impl Table {
     pub fn new(name: impl Into<String>, columns: &[(&str, &str)]) -> Self {
         let columns = columns.iter().map(|&(name, unit)| Column { name: name.into(), unit: unit.into() });
         Self { name: name.into(), columns: columns.collect(), rows: Vec::new() }
+    }
+
+    /// A table of rows.
+    #[must_use]
+    pub fn of_rows<R>(name: impl Into<String>, rows: &[R], columns: &[RowColumn<'_, R>]) -> Self {
+        let heads: Vec<(&str, &str)> = columns.iter().map(|&(name, unit, _)| (name, unit)).collect();
+        let rows = rows.iter().map(|row| columns.iter().map(|(.., cell)| cell(row)).collect());
+        Self { rows: rows.collect(), ..Self::new(name, &heads) }
     }
 
     /// Adds a row.
@@ -98,19 +109,6 @@ impl Table {
         });
         format!("{}\n{}", self.name, lines.collect::<Vec<_>>().join("\n"))
     }
-
-    /// The table as Markdown, with numbers as in [`Cell::display`].
-    #[must_use]
-    pub fn to_markdown(&self) -> String {
-        let heads = markdown_row(self.columns.iter().map(Column::heading));
-        let rule = format!("|{}\n", "---|".repeat(self.columns.len()));
-        let rows: String = self.rows.iter().map(|row| markdown_row(row.iter().map(Cell::display))).collect();
-        format!("**{}**\n\n{heads}{rule}{rows}", self.name)
-    }
-}
-
-fn markdown_row(cells: impl Iterator<Item = String>) -> String {
-    format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
 }
 
 #[cfg(test)]
@@ -124,13 +122,6 @@ mod tests {
         table.push(["none".into(), f64::NAN.into()]).unwrap();
         let text = String::from_utf8(table.to_csv().unwrap()).unwrap();
         assert_eq!(text, "what,time (ms)\n\"a, \"\"b\"\"\",1.2345678\nnone,\n");
-    }
-
-    #[test]
-    fn tables_read_as_markdown() {
-        let mut table = Table::new("Times", &[("P", ""), ("T", "s")]);
-        table.push([2_u32.into(), 1.5.into()]).unwrap();
-        assert_eq!(table.to_markdown(), "**Times**\n\n| P | T (s) |\n|---|---|\n| 2 | 1.5 |\n");
     }
 
     #[test]

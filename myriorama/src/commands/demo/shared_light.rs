@@ -3,16 +3,15 @@
 use anyhow::Context as _;
 use app_core::delivery::request;
 use app_core::experiment::{Delivered, Experiment};
-use app_core::table::table;
 use cluster::{Costs, OfferSettings, PolicyChoice, SessionPlan, SessionRequest};
 use coordinator::schedule::k_fd;
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use image::imageops;
 use metrics::{PictureErrors, Rgb8Image, flip_map};
 use render::Lighting;
-use report::{
-    Axis, Picture, PictureRow, Point, Report, ReportError, Series, Table, XyChart, comparison_row, contact_sheet,
-};
+use report::{Axis, Picture, PictureRow, Point, Report, Series, Table, XyChart};
+
+use super::contact_sheet::contact_sheet;
 
 /// The time for which direct drawing is timed; the time of more views is extended linearly.
 const DIRECT_S: f64 = 2.0;
@@ -154,9 +153,9 @@ fn deliver(
 /// A view is not of its size.
 pub(super) fn report(results: &[LightResult], report: &mut Report) -> anyhow::Result<()> {
     report.summary = results.iter().map(LightResult::sentence).collect::<Vec<_>>().join(" ");
-    report.tables.push(gains(results)?);
-    report.tables.push(costs(results)?);
-    report.charts.push(total_time(results).into());
+    report.tables.push(gains(results));
+    report.tables.push(costs(results));
+    report.charts.push(total_time(results));
     for (index, result) in results.iter().enumerate() {
         report.pictures.push(all_views(result));
         let rows = ROWS[index.min(1)];
@@ -168,8 +167,8 @@ pub(super) fn report(results: &[LightResult], report: &mut Report) -> anyhow::Re
     Ok(())
 }
 
-fn gains(results: &[LightResult]) -> Result<Table, ReportError> {
-    table(
+fn gains(results: &[LightResult]) -> Table {
+    Table::of_rows(
         "What sharing gains",
         results,
         &[
@@ -186,8 +185,8 @@ fn gains(results: &[LightResult]) -> Result<Table, ReportError> {
     )
 }
 
-fn costs(results: &[LightResult]) -> Result<Table, ReportError> {
-    table(
+fn costs(results: &[LightResult]) -> Table {
+    Table::of_rows(
         "Costs of one operation, alone and warm",
         results,
         &[
@@ -237,8 +236,18 @@ fn all_views(result: &LightResult) -> PictureRow {
 fn compared_row(title: &str, compared: &ComparedView) -> anyhow::Result<PictureRow> {
     let ComparedView { direct, reconstructed, .. } = compared;
     let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(reconstructed)?)?;
-    let [direct_image, reconstructed_image] =
-        [direct, reconstructed].map(|view| pictures::rgb(view).context("a view is not of its size"));
-    let provenance = pictures::provenance(reconstructed, 0);
-    Ok(comparison_row(title, direct_image?, reconstructed_image?, &flip, provenance))
+    let images = [
+        ("direct", pictures::rgb(direct)),
+        ("reconstructed", pictures::rgb(reconstructed)),
+        ("error map (FLIP, 0 to 1)", Some(pictures::error_map(&flip))),
+    ];
+    let mut pictures = Vec::with_capacity(4);
+    for (what, image) in images {
+        let image = image.context("a view is not of its size")?;
+        pictures.push(Picture::new(format!("{title} {what}"), what, image));
+    }
+    if let Some((image, legend)) = pictures::provenance(reconstructed, 0) {
+        pictures.push(Picture { legend, ..Picture::new(format!("{title} provenance"), "provenance", image) });
+    }
+    Ok(PictureRow { title: title.to_owned(), pictures })
 }

@@ -7,10 +7,9 @@ use app_core::camera_record::{self, NamedCamera};
 use app_core::planning::Planning;
 use app_core::print_line;
 use app_core::setup::Setup;
-use app_core::table::table;
 use planner::{Budget, CHOICE_OF_BUDGETS, Choice, Metric, Outcome, Price, RowStatus, RowSummary};
 use probe::Representation;
-use report::{ReportError, Table};
+use report::Table;
 use serde_json::Map;
 
 /// A plan that is made.
@@ -38,10 +37,10 @@ impl Output<'_> {
         let out = self.out;
         std::fs::create_dir_all(out).with_context(|| format!("cannot create {}", out.display()))?;
         let csv = out.join("rows.csv");
-        let all = self.table("all rows", &lines)?.to_csv()?;
+        let all = self.table("all rows", &lines).to_csv()?;
         std::fs::write(&csv, all).with_context(|| format!("cannot write {}", csv.display()))?;
         print_line!("{}\n{CHOICE_OF_BUDGETS}\n", self.outcome.reason);
-        print_line!("{}", self.table("Front of cost against error", &front(&lines))?.to_text());
+        print_line!("{}", self.table("Front of cost against error", &front(&lines)).to_text());
         if let Choice::Row(row) = self.outcome.choice {
             let chosen = &self.planning.representations[row];
             let cameras = out.join("samples.json");
@@ -78,14 +77,14 @@ impl Output<'_> {
         lines
     }
 
-    fn table(&self, name: &str, lines: &[Line]) -> Result<Table, ReportError> {
+    fn table(&self, name: &str, lines: &[Line]) -> Table {
         let error = match self.budget.error().map(|term| term.metric()) {
             None | Some(Metric::Flip) => "FLIP of the foreground",
             Some(Metric::FlipWhole) => "FLIP",
             Some(Metric::Psnr) => "mean squared error",
             Some(Metric::Disocclusion) => "disocclusion",
         };
-        table(
+        Table::of_rows(
             name,
             lines,
             &[

@@ -1,20 +1,27 @@
-//! The budget of a coordinator's sessions.
+//! Arguments of commands with a coordinator: the budget of its sessions, and its viewer.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use app_core::addresses::InsecureArgs;
 use app_core::exit::BadInput;
 use app_core::plan_files::PlanFiles;
 use app_core::planning::screening_light;
+use app_core::scenes::ScenesArgs;
 use app_core::sizes::within;
 use clap::Args;
 use cluster::MAX_AUDIT_TIME_RATIO;
 use coordinator::{CoordinatorConfig, PlanStore, SceneOffers};
 use planner::Budget;
+use scene::Scene;
 
-/// Arguments of commands with a coordinator.
+use crate::viewer::ViewerArgs;
+
+/// Arguments of commands with a coordinator, beside its scenes and its address.
 #[derive(Debug, Clone, Args)]
-pub struct BudgetArgs {
+pub struct ServingArgs {
+    #[command(flatten)]
+    pub(crate) insecure: InsecureArgs,
     /// The budget of sessions that state none: the most error, and the most time of a view, as in "flip 0.05" or "flip p95
     /// 0.06, time 8ms" (see `myriorama plan --help`). The cluster chooses what is sampled, and how views are reconstructed,
     /// as far as a session does not name it. None is kept with a layered cube as --sampling or --base [default: none]
@@ -26,6 +33,8 @@ pub struct BudgetArgs {
     audit: f64,
     #[command(flatten)]
     plans: PlansArgs,
+    #[command(flatten)]
+    pub(crate) viewer: ViewerArgs,
 }
 
 /// Where measurements are kept.
@@ -37,31 +46,35 @@ pub struct PlansArgs {
     plans: Option<PathBuf>,
 }
 
-impl BudgetArgs {
-    /// Whether there is a budget.
-    pub fn is_given(&self) -> bool {
-        self.budget.is_some()
-    }
-
+impl ServingArgs {
+    /// The scenes, and their offers.
+    ///
     /// # Errors
-    /// None can be kept for an offered scene: it is sampled as a layered cube, or has one beside its samples.
-    pub fn check(&self, offers: &SceneOffers) -> Result<(), BadInput> {
-        let Some(budget) = self.budget else { return Ok(()) };
+    /// A scene cannot be used, or the budget cannot be kept for it: it is sampled as a layered cube, or has one beside its samples.
+    pub fn load(&self, scenes: &ScenesArgs) -> anyhow::Result<(Vec<Scene>, SceneOffers)> {
+        let (scenes, offers) = scenes.load(self.budget.is_some())?;
+        let Some(budget) = self.budget else { return Ok((scenes, offers)) };
         for offer in offers.iter() {
             let cube = match (&offer.cube, &offer.base) {
                 (Some(cube), _) => format!("--sampling {}", cube.sampling),
                 (None, Some((base, _))) => format!("--base {}", base.sampling),
                 (None, None) => continue,
             };
-            return Err(BadInput(format!("--budget {budget}: none can be kept with {cube}")));
+            return Err(BadInput(format!("--budget {budget}: none can be kept with {cube}")).into());
         }
-        Ok(())
+        Ok((scenes, offers))
     }
 
-    /// A coordinator's configuration with this budget.
-    pub fn configure(&self, config: CoordinatorConfig) -> CoordinatorConfig {
-        let plans = self.plans.files().map(|files| Arc::new(files) as Arc<dyn PlanStore>);
-        CoordinatorConfig { budget: self.budget, audit_time_ratio: self.audit, plans, screening_light, ..config }
+    /// The configuration of the coordinator.
+    pub fn config(&self) -> CoordinatorConfig {
+        CoordinatorConfig {
+            insecure_bind: self.insecure.insecure_bind,
+            budget: self.budget,
+            audit_time_ratio: self.audit,
+            plans: self.plans.files().map(|files| Arc::new(files) as Arc<dyn PlanStore>),
+            screening_light,
+            ..CoordinatorConfig::default()
+        }
     }
 }
 

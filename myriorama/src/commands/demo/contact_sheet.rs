@@ -7,8 +7,7 @@ const GAP_COLOR: Rgb<u8> = Rgb([28, 30, 34]);
 
 /// Lays images out in rows, in cells as large as the largest image, with `gap_px` between cells and around all. No
 /// images make an empty sheet; 0 columns count as 1.
-#[must_use]
-pub fn contact_sheet(images: &[RgbImage], columns: u32, gap_px: u32) -> RgbImage {
+pub(super) fn contact_sheet(images: &[RgbImage], columns: u32, gap_px: u32) -> RgbImage {
     let count = images.len() as u32;
     let columns = columns.clamp(1, count.max(1));
     let rows = count.div_ceil(columns);

@@ -1,28 +1,46 @@
-//! The memory for sample sets: its size on the command line, and the size without it.
+//! The limits of a node: its memory, on the command line or by default, and the time of its views.
 
 use std::fs;
 
 use clap::Args;
+use node::{NodeConfig, Quotas};
+
+use crate::sizes::within;
 
 /// On a GPU, whose free memory is not known.
 const GPU_BYTES: usize = 2 << 30;
 /// Where the system does not tell how much memory is available.
 const UNKNOWN_AVAILABLE_BYTES: usize = 8 << 30;
 
-/// The memory for sample sets, and as much again for scenes on the device.
+/// The limits of a node.
 #[derive(Debug, Clone, Copy, Args)]
-pub struct MemoryArgs {
+pub struct NodeLimitArgs {
     /// The most memory for sample sets, in bytes or with K, M, G or T: half for sets on the device, half for packed
     /// images. Scenes on the device have as much again. [default: a quarter of the available memory; 2G on a GPU]
     #[arg(long, value_name = "SIZE", value_parser = bytes_of)]
-    pub set_memory: Option<usize>,
+    set_memory: Option<usize>,
     /// The most memory of a node for views that are queued or not sent yet, with their frames; a larger view is refused
     #[arg(long, value_name = "SIZE", value_parser = bytes_of, default_value = "2G")]
-    pub view_memory: usize,
+    view_memory: usize,
+    /// The share of the time that views of the method direct may take while others are served
+    #[arg(long, value_name = "SHARE", default_value_t = 0.1, value_parser = within(0.01..=1.0))]
+    direct_share: f64,
+    /// The most seconds of one view; a view that is predicted to take longer is refused
+    #[arg(long, value_name = "SECONDS", default_value_t = 120.0, value_parser = within(0.001..=86_400.0))]
+    max_view_s: f64,
 }
 
-impl MemoryArgs {
-    /// The bytes that were given, or else the default for a device.
+impl NodeLimitArgs {
+    /// A configuration with these limits, and with this memory for sample sets.
+    #[must_use]
+    pub fn within(self, set_memory_bytes: usize, config: NodeConfig) -> NodeConfig {
+        let quotas = Quotas { view_bytes: self.view_memory, ..config.quotas };
+        let Self { direct_share, max_view_s, .. } = self;
+        NodeConfig { set_memory_bytes, quotas, direct_share, max_view_s, ..config }
+    }
+
+    /// The memory for sample sets, and as much again for scenes on the device: the bytes that were given, or else the default for
+    /// a device.
     #[must_use]
     pub fn set_memory_bytes(self, is_software: bool) -> usize {
         self.set_memory.unwrap_or_else(|| if is_software { available_bytes() / 4 } else { GPU_BYTES })
@@ -78,7 +96,7 @@ mod tests {
         assert_eq!(available_of("MemTotal: 9 kB\nMemAvailable:   23620420 kB\n"), Some(23_620_420 << 10));
         assert_eq!(available_of("MemTotal: 9 kB\n"), None);
         assert!(available_bytes() > 0);
-        let of = |set_memory| MemoryArgs { set_memory, view_memory: 1 };
+        let of = |set_memory| NodeLimitArgs { set_memory, view_memory: 1, direct_share: 0.1, max_view_s: 120.0 };
         assert_eq!((of(Some(7)).set_memory_bytes(true), of(Some(7)).set_memory_bytes(false)), (7, 7));
         assert_eq!(of(None).set_memory_bytes(false), 2 << 30);
     }
