@@ -98,17 +98,6 @@ export function pivotAt(state, point) {
   return fromCamera({ eye, target: point, fov_y_deg: state.fovY }, state.size, true);
 }
 
-/** The state at a share of the way between two. */
-export function between(from, to, share) {
-  const mix = (a, b) => a + (b - a) * share;
-  const turns = Math.round((to.yaw - from.yaw) / (2 * Math.PI));
-  const yaw = mix(from.yaw, to.yaw - turns * 2 * Math.PI);
-  const mixed = { ...to, yaw, pitch: mix(from.pitch, to.pitch), distance: mix(from.distance, to.distance) };
-  const last = eyeOf(to);
-  const eye = eyeOf(from).map((v, i) => mix(v, last[i]));
-  return { ...mixed, target: add(eye, scale(backward(mixed), -mixed.distance)) };
-}
-
 /** One key press, or the same state for other keys. */
 export function press(state, key) {
   const steps = { ArrowLeft: [-STEP, 0], ArrowRight: [STEP, 0], ArrowUp: [0, STEP], ArrowDown: [0, -STEP] };

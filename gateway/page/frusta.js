@@ -1,7 +1,7 @@
 // The sample cameras of the plan as frusta, each with its number.
 
 import { $, on, press, say } from "./dom.js";
-import { requestJson } from "./api.js";
+import { Newest, requestJson } from "./api.js";
 import { add, length, scale } from "./camera.js";
 
 const OWN = "#6cb6ff";
@@ -25,6 +25,7 @@ export class Frusta {
   /** `plan()` gives the scene and the moment whose cameras are drawn. */
   constructor(marks, plan, sceneSize, ownCell) {
     Object.assign(this, { marks, plan, sceneSize, ownCell });
+    this.asked = new Newest();
     this.frames = [];
     this.isOn = false;
     marks.add((pen) => this.isOn && this.draw(pen));
@@ -37,7 +38,7 @@ export class Frusta {
     this.marks.redraw();
     if (this.isOn) return this.load();
     clearTimeout(this.timer);
-    this.asked?.abort();
+    this.asked.cancel();
     say("Cameras are hidden.");
   }
 
@@ -47,18 +48,13 @@ export class Frusta {
     if (this.isOn) this.load();
   }
 
-  async load() {
+  load() {
     clearTimeout(this.timer);
-    this.asked?.abort();
-    const { signal } = (this.asked = new AbortController());
-    try {
-      const { frames } = await requestJson("cameras.json", new URLSearchParams(this.plan()), signal);
+    this.asked.ask((signal) => requestJson("cameras.json", new URLSearchParams(this.plan()), signal), ({ frames }) => {
       this.frames = frames;
       say(`${frames.length} sample cameras are shown.`);
       this.marks.redraw();
-    } catch {
-      if (!signal.aborted && this.isOn) this.timer = setTimeout(() => this.isOn && this.load(), RETRY_MS);
-    }
+    }, () => (this.timer = setTimeout(() => this.load(), RETRY_MS)));
   }
 
   draw(pen) {

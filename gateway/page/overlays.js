@@ -1,7 +1,7 @@
 // Provenance and depth of a view that rests, above its picture, with their legend.
 
 import { $, element, on, press, say, tell } from "./dom.js";
-import { queryOf, request } from "./api.js";
+import { Newest, queryOf, request } from "./api.js";
 
 const NAMES = { provenance: "Provenance", depth: "Depth" };
 
@@ -19,6 +19,7 @@ export class Overlays {
   /** `restView()` gives the view that rests on the screen, or null. */
   constructor(restView) {
     this.restView = restView;
+    this.asked = new Newest();
     /** The kind that is on; null for none. */
     this.kind = null;
     for (const kind of Object.keys(NAMES)) on(kind, () => this.toggle(kind));
@@ -51,24 +52,22 @@ export class Overlays {
   }
 
   hide() {
-    this.asked?.abort();
+    this.asked.cancel();
     $("overlay").hidden = true;
   }
 
-  async rested() {
-    const view = this.restView();
-    if (!this.kind || !view) return;
-    this.asked?.abort();
-    const { signal } = (this.asked = new AbortController());
+  rested() {
+    const [view, kind] = [this.restView(), this.kind];
+    if (!kind || !view) return;
     tell("legend-state", "Loading…");
-    try {
-      await this.load(view, this.kind, signal);
-    } catch (error) {
-      if (signal.aborted) return;
+    this.asked.ask((signal) => this.load(view, kind, signal), ({ image, legend }) => {
+      this.show(image, legend);
+      say(`${NAMES[kind]} is shown.`);
+    }, (error) => {
       $("overlay").hidden = true;
       tell("legend-state", error.message);
       say(error.message);
-    }
+    });
   }
 
   async load(view, kind, signal) {
@@ -78,9 +77,7 @@ export class Overlays {
     const image = new Image();
     image.src = url;
     await image.decode().finally(() => URL.revokeObjectURL(url));
-    if (signal.aborted) return;
-    this.show(image, legend);
-    say(`${NAMES[kind]} is shown.`);
+    return { image, legend };
   }
 
   show(image, legend) {

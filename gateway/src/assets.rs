@@ -24,8 +24,8 @@ macro_rules! files {
 const FILES: &[(&str, &str, &str)] = files! {
     "html" "text/html": index status;
     "css" "text/css": style;
-    "js" "text/javascript": api camera chart compare dom frusta input link main marks measure notices overlays panels pictures
-        pivot playback poses projection screen statistics status;
+    "js" "text/javascript": api camera compare dom frusta input link main marks measure notices overlays panels pictures
+        playback poses screen statistics status;
 };
 
 /// The answer to a request for a file; without a body where the browser has it already.
