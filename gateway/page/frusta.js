@@ -71,7 +71,7 @@ export class Frusta {
     const sides = corners.map((corner) => [eye, corner]);
     const edges = corners.map((corner, i) => [corner, corners[(i + 1) % 4]]);
     // A frustum around the visitor would hide the picture.
-    const nearness = length(add(eye, scale(pen.view.eye, -1))) / (3 * depth);
+    const nearness = length(add(eye, scale(pen.eye, -1))) / (3 * depth);
     pen.context.globalAlpha = (isOwn ? 1 : 0.5) * Math.min(1, Math.max(0.15, nearness));
     pen.lines([...sides, ...edges], color, isOwn ? 1.5 : 1);
     const place = pen.place(eye);

@@ -22,7 +22,6 @@ const COMMANDS = {
   r: "reset", f: "fit", v: "mode", s: "show-statistics", h: "show-keys", p: "provenance", d: "depth", o: "cameras", m: "measure",
   c: "compare", " ": "play",
 };
-const version = document.querySelector("meta[name=version]").content;
 
 let welcome = null;
 let plan = null;
@@ -56,7 +55,7 @@ const compare = new Compare(restView, () => playback.pause());
 const measure = new Measure(marks, view);
 const pivot = new Newest();
 const frusta = new Frusta(marks, () => ({ scene: welcome.scene, moment: poses.moment ?? 0 }), () => poses.state.size, () => shown?.header.cell);
-const panels = new Panels(() => statistics.rows(performance.now(), plan, welcome?.light_steps ?? 1), () => statistics.csv());
+new Panels(() => statistics.rows(performance.now(), plan, welcome?.light_steps ?? 1));
 const isFlying = () => poses.state?.isFlying ?? false;
 new Input($("picture"), {
   change: steer, command, click: (place) => measure.take(place), doubleClick: (place) => measure.isOn || movePivot(place), isFlying,
@@ -82,10 +81,6 @@ function heard(message) {
 }
 
 function begin(message) {
-  if (message.version !== version) {
-    if (mayReload(message.version)) return location.reload();
-    toast(`This page is of version ${version}, its server of ${message.version}.`);
-  }
   const isNew = welcome?.scene !== message.scene;
   welcome = message;
   document.title = `${message.scene} – Myriorama`;
@@ -98,18 +93,6 @@ function begin(message) {
   settled = null;
   pictures.restart();
   poses.restart();
-}
-
-/** Whether the page may load itself again for a server of another version: once. */
-function mayReload(server) {
-  try {
-    if (sessionStorage.getItem("reloaded") === server) return false;
-    sessionStorage.setItem("reloaded", server);
-    return true;
-  } catch {
-    // Without storage, the page would load itself for ever.
-    return false;
-  }
 }
 
 /** A link to one of several scenes names it. */

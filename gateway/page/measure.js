@@ -131,7 +131,7 @@ export class Measure {
 
   /** The centre of the window, which Enter measures. */
   cross(pen) {
-    const [x, y] = pen.middle();
+    const [x, y] = pen.size.map((side) => side / 2);
     pen.context.globalAlpha = 0.6;
     pen.stroke((context) => {
       context.moveTo(x - CROSS_PX, y);

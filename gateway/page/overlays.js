@@ -5,16 +5,6 @@ import { Newest, queryOf, request } from "./api.js";
 
 const NAMES = { provenance: "Provenance", depth: "Depth" };
 
-/** The entries of a legend's header: [text, colour]; none where the header is missing or broken. */
-export function legendOf(header) {
-  try {
-    const entries = JSON.parse(header ?? "[]");
-    return entries.filter(([text, color]) => typeof text === "string" && /^#[0-9a-f]{6}$/i.test(color));
-  } catch {
-    return [];
-  }
-}
-
 export class Overlays {
   /** `restView()` gives the view that rests on the screen, or null. */
   constructor(restView) {
@@ -72,7 +62,7 @@ export class Overlays {
 
   async load(view, kind, signal) {
     const answer = await request("view.png", queryOf(view, { show: kind }), signal);
-    const legend = legendOf(answer.headers.get("Myriorama-Legend"));
+    const legend = JSON.parse(answer.headers.get("Myriorama-Legend") ?? "[]");
     const url = URL.createObjectURL(await answer.blob());
     const image = new Image();
     image.src = url;

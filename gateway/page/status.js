@@ -114,14 +114,9 @@ function policyTable({ policies, policy }) {
   return table("Time of one sample set and its views", heads, rows, (i) => policies[i].policy === policy);
 }
 
-/** Rows of costs, whatever their names: times end in _s, and groups have names of their own. */
-function costRows(costs, before = "") {
-  return Object.entries(costs).flatMap(([name, value]) => {
-    const label = `${before}${name.replace(/_s$/, "").replaceAll("_", " ")}`;
-    if (value !== null && typeof value === "object") return costRows(value, `${label}: `);
-    const isTime = name.endsWith("_s") && typeof value === "number";
-    return [[label, isTime ? time(value) : String(value ?? UNKNOWN)]];
-  });
+/** Rows of costs, whatever their names, which end in _s. */
+function costRows(costs) {
+  return Object.entries(costs).map(([name, value]) => [name.replace(/_s$/, "").replaceAll("_", " "), time(value)]);
 }
 
 /** Says whether the figures are of now; unchanged words are not spoken again. */
