@@ -40,7 +40,7 @@ pub(crate) struct KeptSession {
     pub(crate) timeline: Timeline,
     /// Places of single views that are made.
     pub(crate) single_views: Semaphore,
-    state: watch::Receiver<SessionState>,
+    pub(crate) state: watch::Receiver<SessionState>,
     failures: mpsc::Sender<Arc<Session>>,
     /// Ends with the session.
     _keeper: JoinSet<()>,
@@ -63,13 +63,6 @@ impl KeptSession {
         Self { visits, light_steps, timeline, single_views, state, failures, _keeper: tasks }
     }
 
-    /// The session's states, the present one first.
-    pub(crate) fn states(&self) -> watch::Receiver<SessionState> {
-        let mut states = self.state.clone();
-        states.mark_changed();
-        states
-    }
-
     /// The session, once it is open.
     pub(crate) async fn opened(&self) -> Result<Arc<Session>, Refusal> {
         let mut state = self.state.clone();
@@ -82,10 +75,6 @@ impl KeptSession {
                 Err(Refusal(StatusCode::SERVICE_UNAVAILABLE, reason))
             }
         }
-    }
-
-    pub(crate) fn is_open(&self) -> bool {
-        self.state.borrow().is_ok()
     }
 
     /// Has a session opened again that delivers nothing any more.

@@ -78,7 +78,7 @@ impl Scenes {
     /// A scene by its name; the first on offer where there is none. A name that is not on offer is refused as not found.
     pub(crate) async fn visit(&self, name: Option<&str>) -> Result<Arc<SceneSessions>, Refusal> {
         // A scene whose session is not open may be on offer no more.
-        if let Some(scene) = self.find(name).filter(|scene| scene.shown.is_open()) {
+        if let Some(scene) = self.find(name).filter(|scene| scene.shown.state.borrow().is_ok()) {
             return Ok(scene);
         }
         self.add(name, false).await

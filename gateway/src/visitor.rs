@@ -112,7 +112,7 @@ struct Visitor<'a> {
     /// Whether the last picture was drawn from the scene.
     is_drawn: bool,
     stills: Stills,
-    newest: Option<Pose>,
+    newest: Option<(Pose, PinholeCamera)>,
     /// The number of the last picture.
     sent: u64,
     /// The last plans that the page was told of, the newest first: pictures may still come under the one before.
@@ -132,7 +132,7 @@ impl Visitor<'_> {
         let scene = self.scene.clone();
         loop {
             let kept = self.kept(&scene);
-            let mut states = kept.states();
+            let mut states = kept.state.clone();
             while self.is_at(kept) {
                 let state = states.borrow_and_update().clone();
                 let session = match state {
@@ -219,7 +219,7 @@ impl Visitor<'_> {
                 changed = states.changed() => return changed.map(|()| None).map_err(|_| End::Gone),
                 plan = session.another_plan(self.plan_epoch()) => {
                     self.tell_plan(page, &plan)?;
-                    if self.is_outdated(&plan.assignment)? {
+                    if self.is_outdated(&plan.assignment) {
                         self.ask(Antialias::NONE, &mut motion, &mut still)?;
                     }
                 }
@@ -269,9 +269,9 @@ impl Visitor<'_> {
                     return Err(End::Refused(format!("moment: {} must be below {moments}", pose.moment)));
                 }
                 let canvas_px = UVec2::from_array(pose.canvas_px);
-                self.scene.space.camera(&pose.camera, canvas_px).map_err(End::Refused)?;
+                let camera = self.scene.space.camera(&pose.camera, canvas_px).map_err(End::Refused)?;
                 self.rate.fit(canvas_px);
-                self.newest = Some(pose);
+                self.newest = Some((pose, camera));
                 self.stills.quality = pose.quality.unwrap_or(self.scene.quality);
                 self.limit_rate();
                 page.stills.end();
@@ -286,7 +286,7 @@ impl Visitor<'_> {
     /// Asks for the picture of the newest pose. The first still has one sample a pixel, so that it comes soon: more samples
     /// follow once its light is finished.
     fn ask(&self, still_samples: Antialias, motion: &mut PictureStream, still: &mut PictureStream) -> Result<(), End> {
-        let Some(pose) = self.newest else { return Ok(()) };
+        let Some((pose, camera)) = self.newest else { return Ok(()) };
         let canvas_px = UVec2::from_array(pose.canvas_px);
         let chosen = self.rate.chosen();
         let (stream, size_px, codec) = if pose.still {
@@ -294,7 +294,6 @@ impl Visitor<'_> {
         } else {
             (motion, chosen.size_px(canvas_px), FrameCodec::Jpeg { quality: chosen.jpeg_quality() })
         };
-        let camera = self.scene.space.camera(&pose.camera, canvas_px).map_err(End::Refused)?.resized(size_px);
         let samples = if pose.still { still_samples } else { Antialias::NONE };
         let light = match self.planned {
             Some(planned) if pose.still => self.stills.light(planned, samples),
@@ -302,7 +301,7 @@ impl Visitor<'_> {
             _ => PictureLight::Session,
         };
         let set_index = if self.is_moving { pose.moment } else { self.light_step };
-        self.ask_for(pose, camera, codec, Wanted { set_index, samples, light }, stream)
+        self.ask_for(pose, camera.resized(size_px), codec, Wanted { set_index, samples, light }, stream)
     }
 
     fn ask_for(
@@ -410,7 +409,7 @@ impl Visitor<'_> {
     }
 
     fn newest_number(&self) -> u64 {
-        self.newest.map_or(0, |newest| newest.number)
+        self.newest.map_or(0, |(pose, _)| pose.number)
     }
 
     /// Whether a picture that was made with these cameras is to be sent.
@@ -437,16 +436,15 @@ impl Visitor<'_> {
     }
 
     /// Whether a new plan has a view cell that is nearer to a visitor who rests: the still is then asked for again.
-    fn is_outdated(&mut self, plan: &Assignment) -> Result<bool, End> {
-        let Some(pose) = self.newest.filter(|pose| pose.still && pose.number == self.sent) else { return Ok(false) };
-        let canvas_px = UVec2::from_array(pose.canvas_px);
-        let camera = self.scene.space.camera(&pose.camera, canvas_px).map_err(End::Refused)?;
+    fn is_outdated(&mut self, plan: &Assignment) -> bool {
+        let shown = self.newest.filter(|(pose, _)| pose.still && pose.number == self.sent);
+        let Some((_, camera)) = shown else { return false };
         // What is on its way goes on under the new plan, and what was drawn from the scene is the same under any.
         let is_renewed = !self.is_drawn && cell_cameras(plan, plan.workload.cell_of(&camera)) != self.made_with;
         if is_renewed && self.is_finished {
             self.light_step = 0;
         }
-        Ok(is_renewed)
+        is_renewed
     }
 
     fn tell_plan(&mut self, page: &Page, plan: &SessionPlan) -> Result<(), End> {
