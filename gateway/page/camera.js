@@ -18,7 +18,7 @@ export const dot = (a, b) => a.reduce((sum, v, i) => sum + v * b[i], 0);
 const clamp = (v, low, high) => Math.min(high, Math.max(low, v));
 
 /** The unit vector from the target to the eye. */
-export function backward({ yaw, pitch }) {
+function backward({ yaw, pitch }) {
   return [Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch), Math.cos(yaw) * Math.cos(pitch)];
 }
 

@@ -11,7 +11,7 @@ const LENGTH = 0.035;
 const RETRY_MS = 2000;
 
 /** The eye and the four corners of a frame of a transforms.json, at a planar depth. */
-export function frustumOf(frame, depth) {
+function frustumOf(frame, depth) {
   const column = (i) => frame.transform_matrix.slice(0, 3).map((row) => row[i]);
   const [x, y, back, eye] = [0, 1, 2, 3].map(column);
   const corner = (columnPx, rowPx) => {

@@ -44,7 +44,7 @@ export class Marks {
 }
 
 /** Draws points, lines and texts of the scene. Each has a dark edge, so that it is seen on any picture. */
-export class Pen {
+class Pen {
   /** The window shows a camera's state; its size is in CSS pixels. */
   constructor(context, state, size) {
     const focalPx = (0.5 * size[1]) / Math.tan((state.fovY * Math.PI) / 360);

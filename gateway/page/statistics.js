@@ -6,7 +6,7 @@ const PARTS = ["page", "network", "to_send", "cluster_network", "set", "credit",
   "decode", "paint"];
 
 /** The parts of a picture's age: what neither the page nor the gateway accounts for is the network's. All in ms. */
-export function partsOf(picture) {
+function partsOf(picture) {
   const { header, posedAt, sentAt, receivedAt, decodedAt, paintedAt } = picture;
   const times = header.times_ms;
   const parts = { ...times, page: sentAt - posedAt, decode: decodedAt - receivedAt, paint: paintedAt - decodedAt };
@@ -15,7 +15,7 @@ export function partsOf(picture) {
   return parts;
 }
 
-export function quantile(values, share) {
+function quantile(values, share) {
   const sorted = [...values].sort((a, b) => a - b);
   return sorted.length ? sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))] : NaN;
 }
