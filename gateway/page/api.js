@@ -24,6 +24,25 @@ export async function requestJson(name, query, signal) {
   return (await request(name, query, signal)).json();
 }
 
+/** Requests of which only the newest counts. */
+export class Newest {
+  cancel() {
+    this.controller?.abort();
+  }
+
+  /** Cancels the request before, and makes `request(signal)`. One of the others hears of it, unless it is cancelled, too. */
+  async ask(request, answered, failed) {
+    this.cancel();
+    const { signal } = (this.controller = new AbortController());
+    try {
+      const answer = await request(signal);
+      if (!signal.aborted) answered(answer);
+    } catch (error) {
+      if (!signal.aborted) failed(error);
+    }
+  }
+}
+
 /**
  * The gateway's reason not to let this page in; null where it lets it in, or does not answer in time. A POST, since browsers send no
  * Origin with a GET of the page's own server, and a proxy may have changed Host: a page that is let in gets "method not allowed".

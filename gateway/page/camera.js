@@ -18,21 +18,14 @@ export const dot = (a, b) => a.reduce((sum, v, i) => sum + v * b[i], 0);
 const clamp = (v, low, high) => Math.min(high, Math.max(low, v));
 
 /** The unit vector from the target to the eye. */
-export function backward({ yaw, pitch }) {
+function backward({ yaw, pitch }) {
   return [Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch), Math.cos(yaw) * Math.cos(pitch)];
 }
 
 /** The unit vectors of a camera: rightwards, upwards, and from the target to the eye. */
-export function axesOf(state) {
-  return [right(state), up(state), backward(state)];
-}
-
-function right({ yaw }) {
-  return [Math.cos(yaw), 0, -Math.sin(yaw)];
-}
-
-function up({ yaw, pitch }) {
-  return [-Math.sin(yaw) * Math.sin(pitch), Math.cos(pitch), -Math.cos(yaw) * Math.sin(pitch)];
+export function axesOf({ yaw, pitch }) {
+  const up = [-Math.sin(yaw) * Math.sin(pitch), Math.cos(pitch), -Math.cos(yaw) * Math.sin(pitch)];
+  return [[Math.cos(yaw), 0, -Math.sin(yaw)], up, backward({ yaw, pitch })];
 }
 
 export function eyeOf(state) {
@@ -61,7 +54,8 @@ export function turn(state, byYaw, byPitch) {
 /** Moves the picture by pixels of a canvas of this height: the pivot's plane follows the pointer. */
 export function pan(state, columns, rows, heightPx) {
   const perPixel = (2 * state.distance * Math.tan((state.fovY * Math.PI) / 360)) / heightPx;
-  const moved = add(scale(right(state), -columns * perPixel), scale(up(state), rows * perPixel));
+  const [right, up] = axesOf(state);
+  const moved = add(scale(right, -columns * perPixel), scale(up, rows * perPixel));
   return { ...state, target: add(state.target, moved) };
 }
 
@@ -75,7 +69,8 @@ export function dolly(state, factor) {
 /** Flies along its own axes: rightwards, upwards, forwards, each -1 to 1, for some seconds. */
 export function fly(state, [x, y, z], seconds, isFast) {
   const share = SHARE_PER_SECOND * (isFast ? FASTER : 1) * seconds * state.size;
-  const moved = add(add(scale(right(state), x * share), [0, y * share, 0]), scale(backward(state), -z * share));
+  const [right, , back] = axesOf(state);
+  const moved = add(add(scale(right, x * share), [0, y * share, 0]), scale(back, -z * share));
   return { ...state, target: add(state.target, moved) };
 }
 
@@ -96,17 +91,6 @@ export function pivotAt(state, point) {
   if (distance < NEAREST * state.size) return state;
   if (!state.isFlying) return { ...state, target: point, distance };
   return fromCamera({ eye, target: point, fov_y_deg: state.fovY }, state.size, true);
-}
-
-/** The state at a share of the way between two. */
-export function between(from, to, share) {
-  const mix = (a, b) => a + (b - a) * share;
-  const turns = Math.round((to.yaw - from.yaw) / (2 * Math.PI));
-  const yaw = mix(from.yaw, to.yaw - turns * 2 * Math.PI);
-  const mixed = { ...to, yaw, pitch: mix(from.pitch, to.pitch), distance: mix(from.distance, to.distance) };
-  const last = eyeOf(to);
-  const eye = eyeOf(from).map((v, i) => mix(v, last[i]));
-  return { ...mixed, target: add(eye, scale(backward(mixed), -mixed.distance)) };
 }
 
 /** One key press, or the same state for other keys. */

@@ -1,7 +1,7 @@
 // The view from samples beside the view drawn directly, with the measures of their difference.
 
 import { $, element, on, press, say, tell } from "./dom.js";
-import { queryOf, requestJson } from "./api.js";
+import { Newest, queryOf, requestJson } from "./api.js";
 
 const PICTURES = { "compare-view": "view", "compare-direct": "direct", "compare-flip": "flip_map" };
 
@@ -9,6 +9,7 @@ export class Compare {
   /** `restView()` gives the view that rests on the screen, or null; `pause()` stops the time. */
   constructor(restView, pause) {
     Object.assign(this, { restView, pause });
+    this.asked = new Newest();
     on("compare", () => (this.isOpen ? this.close() : this.open()));
     on("compare-close", () => this.close());
     on("flip", () => this.showsFlip($("compare-flip").hidden));
@@ -33,8 +34,7 @@ export class Compare {
   /** Any motion of the camera closes it, too. */
   close() {
     if (!this.isOpen) return;
-    this.asked?.abort();
-    this.asked = null;
+    this.asked.cancel();
     const hadFocus = $("comparison").contains(document.activeElement);
     $("comparison").hidden = true;
     $("compare").setAttribute("aria-expanded", "false");
@@ -47,18 +47,12 @@ export class Compare {
     if (text) say(text);
   }
 
-  async rested() {
+  rested() {
     const view = this.restView();
     if (!this.isOpen || this.isDone || !view) return;
     this.isDone = true;
-    const { signal } = (this.asked = new AbortController());
     this.tell("Both pictures are being made…");
-    try {
-      const result = await requestJson("compare.json", queryOf(view), signal);
-      if (!signal.aborted) this.show(result);
-    } catch (error) {
-      if (!signal.aborted) this.tell(error.message);
-    }
+    this.asked.ask((signal) => requestJson("compare.json", queryOf(view), signal), (result) => this.show(result), (error) => this.tell(error.message));
   }
 
   show(result) {

@@ -1,7 +1,7 @@
 // The sample cameras of the plan as frusta, each with its number.
 
 import { $, on, press, say } from "./dom.js";
-import { requestJson } from "./api.js";
+import { Newest, requestJson } from "./api.js";
 import { add, length, scale } from "./camera.js";
 
 const OWN = "#6cb6ff";
@@ -11,7 +11,7 @@ const LENGTH = 0.035;
 const RETRY_MS = 2000;
 
 /** The eye and the four corners of a frame of a transforms.json, at a planar depth. */
-export function frustumOf(frame, depth) {
+function frustumOf(frame, depth) {
   const column = (i) => frame.transform_matrix.slice(0, 3).map((row) => row[i]);
   const [x, y, back, eye] = [0, 1, 2, 3].map(column);
   const corner = (columnPx, rowPx) => {
@@ -25,6 +25,7 @@ export class Frusta {
   /** `plan()` gives the scene and the moment whose cameras are drawn. */
   constructor(marks, plan, sceneSize, ownCell) {
     Object.assign(this, { marks, plan, sceneSize, ownCell });
+    this.asked = new Newest();
     this.frames = [];
     this.isOn = false;
     marks.add((pen) => this.isOn && this.draw(pen));
@@ -37,7 +38,7 @@ export class Frusta {
     this.marks.redraw();
     if (this.isOn) return this.load();
     clearTimeout(this.timer);
-    this.asked?.abort();
+    this.asked.cancel();
     say("Cameras are hidden.");
   }
 
@@ -47,18 +48,13 @@ export class Frusta {
     if (this.isOn) this.load();
   }
 
-  async load() {
+  load() {
     clearTimeout(this.timer);
-    this.asked?.abort();
-    const { signal } = (this.asked = new AbortController());
-    try {
-      const { frames } = await requestJson("cameras.json", new URLSearchParams(this.plan()), signal);
+    this.asked.ask((signal) => requestJson("cameras.json", new URLSearchParams(this.plan()), signal), ({ frames }) => {
       this.frames = frames;
       say(`${frames.length} sample cameras are shown.`);
       this.marks.redraw();
-    } catch {
-      if (!signal.aborted && this.isOn) this.timer = setTimeout(() => this.isOn && this.load(), RETRY_MS);
-    }
+    }, () => (this.timer = setTimeout(() => this.load(), RETRY_MS)));
   }
 
   draw(pen) {
@@ -75,7 +71,7 @@ export class Frusta {
     const sides = corners.map((corner) => [eye, corner]);
     const edges = corners.map((corner, i) => [corner, corners[(i + 1) % 4]]);
     // A frustum around the visitor would hide the picture.
-    const nearness = length(add(eye, scale(pen.view.eye, -1))) / (3 * depth);
+    const nearness = length(add(eye, scale(pen.eye, -1))) / (3 * depth);
     pen.context.globalAlpha = (isOwn ? 1 : 0.5) * Math.min(1, Math.max(0.15, nearness));
     pen.lines([...sides, ...edges], color, isOwn ? 1.5 : 1);
     const place = pen.place(eye);

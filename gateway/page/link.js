@@ -8,15 +8,10 @@ const LONGEST_DELAY_MS = 4000;
 const SILENCE_MS = 20000;
 
 /** Splits a binary message into its header, which a further part of a picture lacks, and its bytes. */
-export function parsePart(buffer) {
+function parsePart(buffer) {
   const headerBytes = new DataView(buffer).getUint32(0, true);
   const header = headerBytes ? JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, headerBytes))) : null;
   return { header, data: new Uint8Array(buffer, 4 + headerBytes) };
-}
-
-/** The delay before the n-th attempt to connect again, with jitter, in milliseconds. */
-export function delayBefore(attempt, random = Math.random()) {
-  return Math.min(LONGEST_DELAY_MS, FIRST_DELAY_MS * 2 ** attempt) * (0.75 + 0.5 * random);
 }
 
 export class Link {
@@ -85,7 +80,8 @@ export class Link {
     // Another scene may have been chosen meanwhile.
     if (socket !== this.socket) return;
     if (reason) return this.listeners.message({ type: "refused", reason });
-    this.timer = setTimeout(() => this.connect(), delayBefore(this.attempt));
+    const delayMs = Math.min(LONGEST_DELAY_MS, FIRST_DELAY_MS * 2 ** this.attempt);
+    this.timer = setTimeout(() => this.connect(), delayMs * (0.75 + 0.5 * Math.random()));
     this.attempt += 1;
   }
 

@@ -1,6 +1,6 @@
 // The page: a camera, a connection, a canvas, and what is laid over it.
 
-import { within } from "./api.js";
+import { Newest, within } from "./api.js";
 import * as camera from "./camera.js";
 import { Compare } from "./compare.js";
 import { $, copied, download, on, press, say, toast, writeAddress } from "./dom.js";
@@ -8,12 +8,11 @@ import { Frusta } from "./frusta.js";
 import { Input } from "./input.js";
 import { Link } from "./link.js";
 import { Marks } from "./marks.js";
-import { Measure } from "./measure.js";
+import { Measure, pointAt } from "./measure.js";
 import { Notices } from "./notices.js";
 import { Overlays } from "./overlays.js";
 import { Panels } from "./panels.js";
 import { Pictures } from "./pictures.js";
-import { Pivot } from "./pivot.js";
 import { Playback } from "./playback.js";
 import { Poses } from "./poses.js";
 import { Screen } from "./screen.js";
@@ -23,7 +22,6 @@ const COMMANDS = {
   r: "reset", f: "fit", v: "mode", s: "show-statistics", h: "show-keys", p: "provenance", d: "depth", o: "cameras", m: "measure",
   c: "compare", " ": "play",
 };
-const version = document.querySelector("meta[name=version]").content;
 
 let welcome = null;
 let plan = null;
@@ -55,12 +53,12 @@ const marks = new Marks($("marks"), () => shown?.header, () => poses.state.size)
 const overlays = new Overlays(restView);
 const compare = new Compare(restView, () => playback.pause());
 const measure = new Measure(marks, view);
-const pivot = new Pivot(poses, view);
+const pivot = new Newest();
 const frusta = new Frusta(marks, () => ({ scene: welcome.scene, moment: poses.moment ?? 0 }), () => poses.state.size, () => shown?.header.cell);
-const panels = new Panels(() => statistics.rows(performance.now(), plan, welcome?.light_steps ?? 1), () => statistics.csv());
+new Panels(() => statistics.rows(performance.now(), plan, welcome?.light_steps ?? 1));
 const isFlying = () => poses.state?.isFlying ?? false;
 new Input($("picture"), {
-  change: steer, command, click: (place) => measure.take(place), doubleClick: (place) => measure.isOn || pivot.at(place), isFlying,
+  change: steer, command, click: (place) => measure.take(place), doubleClick: (place) => measure.isOn || movePivot(place), isFlying,
 });
 // For tests and for the curious.
 window.myriorama = {
@@ -83,10 +81,6 @@ function heard(message) {
 }
 
 function begin(message) {
-  if (message.version !== version) {
-    if (mayReload(message.version)) return location.reload();
-    toast(`This page is of version ${version}, its server of ${message.version}.`);
-  }
   const isNew = welcome?.scene !== message.scene;
   welcome = message;
   document.title = `${message.scene} – Myriorama`;
@@ -99,18 +93,6 @@ function begin(message) {
   settled = null;
   pictures.restart();
   poses.restart();
-}
-
-/** Whether the page may load itself again for a server of another version: once. */
-function mayReload(server) {
-  try {
-    if (sessionStorage.getItem("reloaded") === server) return false;
-    sessionStorage.setItem("reloaded", server);
-    return true;
-  } catch {
-    // Without storage, the page would load itself for ever.
-    return false;
-  }
 }
 
 /** A link to one of several scenes names it. */
@@ -151,6 +133,17 @@ function quality() {
 function steer(update, eventTime) {
   pivot.cancel();
   poses.change(update, eventTime);
+}
+
+/** Makes the surface under a double click the pivot. */
+function movePivot(place) {
+  const seen = view();
+  if (!seen) return;
+  pivot.ask((signal) => pointAt(seen, place, signal), ({ point }) => {
+    if (!point) return toast("Nothing there.");
+    poses.change((state) => camera.pivotAt(state, point));
+    toast("The pivot has moved.");
+  }, (error) => toast(error.message));
 }
 
 function moved() {

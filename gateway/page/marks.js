@@ -1,7 +1,9 @@
 // The canvas above the picture: marks of the scene's points, drawn with the camera of the picture below.
 
-import { fromCamera } from "./camera.js";
-import { project, projectLine, viewOf } from "./projection.js";
+import { add, axesOf, dot, eyeOf, fromCamera, scale } from "./camera.js";
+
+/** Nothing nearer than this share of the scene's size is drawn. */
+const NEAR = 1e-4;
 
 export class Marks {
   /** `shown()` gives the view on the screen, `sceneSize()` the diagonal of the scene. */
@@ -36,24 +38,49 @@ export class Marks {
     context.clearRect(0, 0, ...size);
     const shown = this.shown();
     if (!shown || !size[1]) return;
-    const pen = new Pen(context, viewOf(fromCamera(shown.camera, this.sceneSize()), size));
+    const pen = new Pen(context, fromCamera(shown.camera, this.sceneSize()), size);
     for (const layer of this.layers) layer(pen);
   }
 }
 
 /** Draws points, lines and texts of the scene. Each has a dark edge, so that it is seen on any picture. */
-export class Pen {
-  constructor(context, view) {
-    this.context = context;
-    this.view = view;
+class Pen {
+  /** The window shows a camera's state; its size is in CSS pixels. */
+  constructor(context, state, size) {
+    const focalPx = (0.5 * size[1]) / Math.tan((state.fovY * Math.PI) / 360);
+    Object.assign(this, { context, size, focalPx, eye: eyeOf(state), axes: axesOf(state), near: NEAR * state.size });
     context.lineCap = "round";
     context.font = "600 12px system-ui, sans-serif";
     context.textBaseline = "middle";
   }
 
+  /** A point in the camera's axes: rightwards, upwards, and the planar depth. */
+  inCamera(point) {
+    const offset = add(point, scale(this.eye, -1));
+    return [dot(offset, this.axes[0]), dot(offset, this.axes[1]), -dot(offset, this.axes[2])];
+  }
+
+  onWindow([x, y, planarDepth]) {
+    return [this.size[0] / 2 + (this.focalPx * x) / planarDepth, this.size[1] / 2 - (this.focalPx * y) / planarDepth];
+  }
+
   /** The place of a point in the window; null behind the camera. */
   place(point) {
-    return project(this.view, point);
+    const seen = this.inCamera(point);
+    return seen[2] > this.near ? this.onWindow(seen) : null;
+  }
+
+  /** The two ends of a line in the window, cut where it passes the camera; null behind the camera. */
+  ends(from, to) {
+    const [a, b] = [this.inCamera(from), this.inCamera(to)];
+    if (a[2] <= this.near && b[2] <= this.near) return null;
+    return [this.onWindow(this.cut(a, b)), this.onWindow(this.cut(b, a))];
+  }
+
+  cut(end, other) {
+    if (end[2] > this.near) return end;
+    const share = (this.near * 1.001 - end[2]) / (other[2] - end[2]);
+    return end.map((v, i) => v + (other[i] - v) * share);
   }
 
   /** Strokes a path, given by a function of the context. */
@@ -69,7 +96,7 @@ export class Pen {
 
   /** Lines between pairs of points of the scene. */
   lines(pairs, color, width) {
-    const ends = pairs.map(([from, to]) => projectLine(this.view, from, to)).filter(Boolean);
+    const ends = pairs.map(([from, to]) => this.ends(from, to)).filter(Boolean);
     this.stroke((context) => ends.forEach(([from, to]) => {
       context.moveTo(...from);
       context.lineTo(...to);
@@ -84,10 +111,5 @@ export class Pen {
     this.context.strokeText(text, x, y);
     this.context.fillStyle = color;
     this.context.fillText(text, x, y);
-  }
-
-  /** The middle of the window. */
-  middle() {
-    return this.view.size.map((side) => side / 2);
   }
 }

@@ -1,7 +1,7 @@
 // Points of the scene's surface: their coordinates, the distance of two, and the cameras that saw them.
 
 import { $, element, on, press, say, tell } from "./dom.js";
-import { queryOf, requestJson } from "./api.js";
+import { Newest, queryOf, requestJson } from "./api.js";
 import { add, length, scale } from "./camera.js";
 
 const COLORS = ["#ffd166", "#7ee2a8"];
@@ -35,6 +35,7 @@ export class Measure {
   /** `view()` gives the view on the screen. */
   constructor(marks, view) {
     Object.assign(this, { marks, view });
+    this.asked = new Newest();
     this.isOn = false;
     this.results = [];
     marks.add((pen) => this.isOn && this.draw(pen));
@@ -52,29 +53,23 @@ export class Measure {
   leave() {
     if (!this.isOn) return;
     this.isOn = false;
-    this.asked?.abort();
+    this.asked.cancel();
     this.results = [];
     this.show("Measuring has ended.");
   }
 
   clear() {
     if (!this.isOn) return;
-    this.asked?.abort();
+    this.asked.cancel();
     this.results = [];
     this.show("No points.");
   }
 
-  async take(place) {
+  take(place) {
     const view = this.view();
     if (!this.isOn || !view) return;
-    this.asked?.abort();
-    const { signal } = (this.asked = new AbortController());
     tell("measure-state", "Loading…");
-    try {
-      this.taken(await pointAt(view, place, signal));
-    } catch (error) {
-      if (!signal.aborted) this.show(error.message);
-    }
+    this.asked.ask((signal) => pointAt(view, place, signal), (result) => this.taken(result), (error) => this.show(error.message));
   }
 
   taken(result) {
@@ -136,7 +131,7 @@ export class Measure {
 
   /** The centre of the window, which Enter measures. */
   cross(pen) {
-    const [x, y] = pen.middle();
+    const [x, y] = pen.size.map((side) => side / 2);
     pen.context.globalAlpha = 0.6;
     pen.stroke((context) => {
       context.moveTo(x - CROSS_PX, y);

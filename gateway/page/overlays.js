@@ -1,24 +1,15 @@
 // Provenance and depth of a view that rests, above its picture, with their legend.
 
 import { $, element, on, press, say, tell } from "./dom.js";
-import { queryOf, request } from "./api.js";
+import { Newest, queryOf, request } from "./api.js";
 
 const NAMES = { provenance: "Provenance", depth: "Depth" };
-
-/** The entries of a legend's header: [text, colour]; none where the header is missing or broken. */
-export function legendOf(header) {
-  try {
-    const entries = JSON.parse(header ?? "[]");
-    return entries.filter(([text, color]) => typeof text === "string" && /^#[0-9a-f]{6}$/i.test(color));
-  } catch {
-    return [];
-  }
-}
 
 export class Overlays {
   /** `restView()` gives the view that rests on the screen, or null. */
   constructor(restView) {
     this.restView = restView;
+    this.asked = new Newest();
     /** The kind that is on; null for none. */
     this.kind = null;
     for (const kind of Object.keys(NAMES)) on(kind, () => this.toggle(kind));
@@ -51,36 +42,32 @@ export class Overlays {
   }
 
   hide() {
-    this.asked?.abort();
+    this.asked.cancel();
     $("overlay").hidden = true;
   }
 
-  async rested() {
-    const view = this.restView();
-    if (!this.kind || !view) return;
-    this.asked?.abort();
-    const { signal } = (this.asked = new AbortController());
+  rested() {
+    const [view, kind] = [this.restView(), this.kind];
+    if (!kind || !view) return;
     tell("legend-state", "Loading…");
-    try {
-      await this.load(view, this.kind, signal);
-    } catch (error) {
-      if (signal.aborted) return;
+    this.asked.ask((signal) => this.load(view, kind, signal), ({ image, legend }) => {
+      this.show(image, legend);
+      say(`${NAMES[kind]} is shown.`);
+    }, (error) => {
       $("overlay").hidden = true;
       tell("legend-state", error.message);
       say(error.message);
-    }
+    });
   }
 
   async load(view, kind, signal) {
     const answer = await request("view.png", queryOf(view, { show: kind }), signal);
-    const legend = legendOf(answer.headers.get("Myriorama-Legend"));
+    const legend = JSON.parse(answer.headers.get("Myriorama-Legend") ?? "[]");
     const url = URL.createObjectURL(await answer.blob());
     const image = new Image();
     image.src = url;
     await image.decode().finally(() => URL.revokeObjectURL(url));
-    if (signal.aborted) return;
-    this.show(image, legend);
-    say(`${NAMES[kind]} is shown.`);
+    return { image, legend };
   }
 
   show(image, legend) {

@@ -1,6 +1,6 @@
 // Panels that a button opens: statistics, keys, and further actions in a narrow window.
 
-import { $, download, element, on } from "./dom.js";
+import { $, element, on } from "./dom.js";
 
 const REFRESH_MS = 500;
 
@@ -40,12 +40,11 @@ function giveBackFocus(event) {
 
 export class Panels {
   /** `rows()` gives the statistics' rows: [name, value, kind]. */
-  constructor(rows, csv) {
+  constructor(rows) {
     this.rows = rows;
     panel("statistics", () => this.refresh());
     panel("keys");
     on("more", (button) => button.setAttribute("aria-expanded", String(button.getAttribute("aria-expanded") === "false")));
-    on("export", () => download(new Blob([csv()], { type: "text/csv" }), "pictures.csv"));
     document.querySelector(".docks").addEventListener("click", giveBackFocus);
     document.querySelector("footer").addEventListener("click", keepFocus);
   }

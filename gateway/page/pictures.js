@@ -39,7 +39,7 @@ export class Pictures {
     const askedAt = times.receivedAt - header.times_ms.gateway;
     const { posedAt, sentAt } = pose ?? { posedAt: askedAt, sentAt: askedAt };
     const shown = { header, bytes, isRepeat: !pose, posedAt, sentAt, ...times, paintedAt: performance.now() };
-    const age = drop ? this.statistics.dropped(drop, shown) : this.statistics.add(shown);
+    const age = this.statistics.add(shown, drop);
     // A picture that is dropped gives back its credit, too.
     this.link.send({ type: "shown", number: header.number, age_ms: Math.max(0, age) });
     if (drop) return;

@@ -1,4 +1,4 @@
-// The times of pictures: a table of the last seconds, and all of them as CSV.
+// The times of pictures: a table of the last seconds. Benchmarks read all of them.
 
 const KEPT = 20000;
 const WINDOW_MS = 5000;
@@ -6,7 +6,7 @@ const PARTS = ["page", "network", "to_send", "cluster_network", "set", "credit",
   "decode", "paint"];
 
 /** The parts of a picture's age: what neither the page nor the gateway accounts for is the network's. All in ms. */
-export function partsOf(picture) {
+function partsOf(picture) {
   const { header, posedAt, sentAt, receivedAt, decodedAt, paintedAt } = picture;
   const times = header.times_ms;
   const parts = { ...times, page: sentAt - posedAt, decode: decodedAt - receivedAt, paint: paintedAt - decodedAt };
@@ -15,7 +15,7 @@ export function partsOf(picture) {
   return parts;
 }
 
-export function quantile(values, share) {
+function quantile(values, share) {
   const sorted = [...values].sort((a, b) => a - b);
   return sorted.length ? sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))] : NaN;
 }
@@ -74,20 +74,14 @@ export class Statistics {
     this.drops = { late: 0, undecoded: 0 };
   }
 
-  /** A picture on the screen. */
-  add(picture) {
+  /** A picture on the screen, or one that is not shown, for a reason. Returns its age. */
+  add(picture, dropReason) {
     const age = picture.paintedAt - picture.posedAt;
     this.replaced += picture.header.replaced;
-    this.pictures.push({ ...picture, age, parts: partsOf(picture) });
+    if (dropReason) this.drops[dropReason] += 1;
+    else this.pictures.push({ ...picture, age, parts: partsOf(picture) });
     if (this.pictures.length > KEPT) this.pictures.shift();
     return age;
-  }
-
-  /** A picture that is not shown, for a reason. */
-  dropped(reason, picture) {
-    this.replaced += picture.header.replaced;
-    this.drops[reason] += 1;
-    return picture.paintedAt - picture.posedAt;
   }
 
   /** Rows of name and value; a third entry says that a row is a "part" of the one above, or a "text". */
@@ -104,17 +98,5 @@ export class Statistics {
       ["pictures not decoded", this.drops.undecoded, "part"],
       ...planRows(plan),
     ];
-  }
-
-  csv() {
-    const names = [
-      "number", "still", "repeat", "width_px", "height_px", "jpeg_quality", "bytes", "rtt_ms", "age_ms",
-      ...PARTS.map((part) => `${part}_ms`),
-    ];
-    const row = ({ header, isRepeat, bytes, age, parts }) => [
-      header.number, header.still, isRepeat, ...header.size_px, header.jpeg_quality ?? "", bytes,
-      header.rtt_ms?.toFixed(3) ?? "", age.toFixed(3), ...PARTS.map((part) => parts[part].toFixed(3)),
-    ];
-    return [names, ...this.pictures.map(row)].map((fields) => fields.join(",")).join("\n") + "\n";
   }
 }

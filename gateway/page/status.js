@@ -1,7 +1,6 @@
 // The status of the cluster, asked for once a second. Whatever the gateway leaves out is shown as a dash.
 
 import { requestJson } from "./api.js";
-import { Chart } from "./chart.js";
 import { $, element } from "./dom.js";
 
 const POLL_MS = 1000;
@@ -10,7 +9,6 @@ const UNKNOWN = "–";
 const whole = (value) => (Number.isFinite(value) ? String(Math.round(value)) : UNKNOWN);
 const percent = (value) => (Number.isFinite(value) ? `${(100 * value).toFixed(0)} %` : UNKNOWN);
 const list = (values) => (values?.length ? values.join(", ") : UNKNOWN);
-const sum = (values) => values.filter(Number.isFinite).reduce((total, value) => total + value, 0);
 
 /** A duration with its unit. */
 function time(seconds) {
@@ -18,22 +16,6 @@ function time(seconds) {
   if (seconds === 0) return "0 s";
   if (seconds < 1) return `${(1000 * seconds).toPrecision(3)} ms`;
   return seconds < 120 ? `${seconds.toPrecision(3)} s` : `${(seconds / 60).toFixed(0)} min`;
-}
-
-const charts = [
-  [new Chart("Visitors", whole, 4), (status) => status.visitors],
-  [new Chart("Viewers", whole, 4), (status) => viewers(status.workloads)],
-  [new Chart("Utilisation", percent, 1), (status) => mostUsed(status.workloads ?? [])],
-];
-$("charts").append(...charts.map(([chart]) => chart.figure));
-
-function viewers(workloads) {
-  return workloads ? sum(workloads.map((workload) => workload.viewers)) : null;
-}
-
-function mostUsed(workloads) {
-  const known = workloads.map((workload) => workload.utilisation).filter(Number.isFinite);
-  return known.length ? Math.max(...known) : null;
 }
 
 function figures(pairs) {
@@ -80,7 +62,6 @@ function show(status) {
     return [table(rows.length ? "" : "No node has joined.", ["Node", "Device", "Roles", "Busy"], rows)];
   });
   draw("workloads", workloads ?? [], () => (workloads ?? []).map(workloadSection));
-  for (const [chart, value] of charts) chart.add(value(status));
 }
 
 function workloadSection(workload) {
@@ -133,14 +114,9 @@ function policyTable({ policies, policy }) {
   return table("Time of one sample set and its views", heads, rows, (i) => policies[i].policy === policy);
 }
 
-/** Rows of costs, whatever their names: times end in _s, and groups have names of their own. */
-function costRows(costs, before = "") {
-  return Object.entries(costs).flatMap(([name, value]) => {
-    const label = `${before}${name.replace(/_s$/, "").replaceAll("_", " ")}`;
-    if (value !== null && typeof value === "object") return costRows(value, `${label}: `);
-    const isTime = name.endsWith("_s") && typeof value === "number";
-    return [[label, isTime ? time(value) : String(value ?? UNKNOWN)]];
-  });
+/** Rows of costs, whatever their names, which end in _s. */
+function costRows(costs) {
+  return Object.entries(costs).map(([name, value]) => [name.replace(/_s$/, "").replaceAll("_", " "), time(value)]);
 }
 
 /** Says whether the figures are of now; unchanged words are not spoken again. */
@@ -158,7 +134,6 @@ async function poll() {
     show(await requestJson("status.json", "", AbortSignal.timeout(10 * POLL_MS)));
     tell("Now, every second.", false);
   } catch (error) {
-    for (const [chart] of charts) chart.add(null);
     tell(error.name === "TimeoutError" ? "The gateway does not answer." : error.message, true);
   }
   clearTimeout(timer);

@@ -1,11 +1,10 @@
 //! The page's files, as they are in `page/`.
 
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 
-/// The program's version, which the page names, too.
+/// The program's version.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
-const VERSION_PLACE: &str = "{version}";
 /// Only files of this server are loaded and connected to.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
     connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -24,8 +23,8 @@ macro_rules! files {
 const FILES: &[(&str, &str, &str)] = files! {
     "html" "text/html": index status;
     "css" "text/css": style;
-    "js" "text/javascript": api camera chart compare dom frusta input link main marks measure notices overlays panels pictures
-        pivot playback poses projection screen statistics status;
+    "js" "text/javascript": api camera compare dom frusta input link main marks measure notices overlays panels pictures
+        playback poses screen statistics status;
 };
 
 /// The answer to a request for a file; without a body where the browser has it already.
@@ -33,22 +32,18 @@ pub(crate) fn answer(name: &str, headers: &HeaderMap) -> Response {
     let Some((_, media_type, text)) = FILES.iter().find(|(known, ..)| *known == name) else {
         return (StatusCode::NOT_FOUND, "no such page\n").into_response();
     };
-    let text = text.replace(VERSION_PLACE, VERSION);
     let etag = format!("\"{}\"", &blake3::hash(text.as_bytes()).to_hex()[..32]);
     let has_it = headers.get(header::IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == etag.as_bytes());
-    let mut response = if has_it { StatusCode::NOT_MODIFIED.into_response() } else { text.into_response() };
+    let body = if has_it { StatusCode::NOT_MODIFIED.into_response() } else { (*text).into_response() };
     let fields = [
-        (header::CONTENT_TYPE, media_type.parse()),
-        (header::ETAG, etag.parse()),
-        (header::CACHE_CONTROL, "no-cache".parse()),
-        (header::CONTENT_SECURITY_POLICY, POLICY.parse()),
-        (header::X_CONTENT_TYPE_OPTIONS, "nosniff".parse()),
-        (header::REFERRER_POLICY, "no-referrer".parse()),
+        (header::CONTENT_TYPE, *media_type),
+        (header::ETAG, &etag),
+        (header::CACHE_CONTROL, "no-cache"),
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
     ];
-    for (name, value) in fields {
-        response.headers_mut().insert(name, value.unwrap_or(HeaderValue::from_static("")));
-    }
-    response
+    (fields, body).into_response()
 }
 
 #[cfg(test)]
@@ -76,9 +71,8 @@ mod tests {
     }
 
     #[test]
-    fn the_page_names_its_version_and_no_address() {
+    fn the_page_names_no_address() {
         let all: String = FILES.iter().map(|(.., text)| *text).collect();
-        assert!(all.contains(VERSION_PLACE));
         for absolute in ["http://", "https://", "href=\"/", "src=\"/"] {
             assert!(!all.contains(absolute), "{absolute}");
         }

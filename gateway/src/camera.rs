@@ -24,17 +24,9 @@ pub(crate) struct PageCamera {
     pub(crate) fov_y_deg: f64,
 }
 
-/// A camera or a size that cannot be used.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{field} is {value}, must be {allowed}")]
-pub(crate) struct BadView {
-    field: &'static str,
-    value: String,
-    allowed: &'static str,
-}
-
-fn bad(field: &'static str, value: impl std::fmt::Debug, allowed: &'static str) -> BadView {
-    BadView { field, value: format!("{value:?}"), allowed }
+/// Why a camera or a size cannot be used.
+fn bad(field: &str, value: impl std::fmt::Debug, allowed: &str) -> String {
+    format!("{field} is {value:?}, must be {allowed}")
 }
 
 /// The world of a scene on offer, as views need it.
@@ -52,8 +44,8 @@ impl ViewSpace {
     /// The camera of a view of this size.
     ///
     /// # Errors
-    /// For numbers that are not finite or out of range.
-    pub(crate) fn camera(&self, page: &PageCamera, size_px: UVec2) -> Result<PinholeCamera, BadView> {
+    /// For numbers that are not finite or out of range, a sentence that begins with the field.
+    pub(crate) fn camera(&self, page: &PageCamera, size_px: UVec2) -> Result<PinholeCamera, String> {
         if !(1.0..=170.0).contains(&page.fov_y_deg) {
             return Err(bad("fov_y_deg", page.fov_y_deg, "from 1 to 170"));
         }
@@ -68,7 +60,7 @@ impl ViewSpace {
         Ok(camera)
     }
 
-    fn point(&self, field: &'static str, point: [f64; 3]) -> Result<Vec3, BadView> {
+    fn point(&self, field: &str, point: [f64; 3]) -> Result<Vec3, String> {
         let in_world = self.source_space.world_from_source(DVec3::from_array(point));
         let is_near = point.iter().all(|v| v.abs() <= FARTHEST) && in_world.abs().max_element() <= FARTHEST as f32;
         let allowed = "within ±1e12, and not further from the model for its size";
@@ -128,7 +120,10 @@ pub(crate) mod tests {
     #[test]
     fn numbers_out_of_range_are_refused_by_name() {
         let size_px = UVec2::new(64, 32);
-        let refused = |camera: PageCamera, size_px| space().camera(&camera, size_px).unwrap_err().field;
+        let refused = |camera: PageCamera, size_px| {
+            let error = space().camera(&camera, size_px).unwrap_err();
+            error.split(' ').next().unwrap().to_owned()
+        };
         assert_eq!(refused(PageCamera { eye: [f64::NAN; 3], ..CAMERA }, size_px), "eye");
         assert_eq!(refused(PageCamera { target: [1e300; 3], ..CAMERA }, size_px), "target");
         assert_eq!(refused(PageCamera { fov_y_deg: 180.0, ..CAMERA }, size_px), "fov_y_deg");

@@ -16,8 +16,7 @@ use serde_json::{Value, json};
 
 use crate::gateway::Gateway;
 use crate::responses::{Refusal, held};
-use crate::single_views::SingleView;
-use crate::views::{ViewQuery, Visited};
+use crate::views::{SingleView, ViewQuery, Visited};
 
 /// `compare.json`: one at a time.
 pub(crate) async fn compare(
@@ -25,20 +24,18 @@ pub(crate) async fn compare(
     Query(query): Query<ViewQuery>,
 ) -> Result<Response, Refusal> {
     let visited = Visited::of(&gateway, &query).await?;
-    let shown = visited.shown();
     // Those that wait for a session hold up no other comparison.
-    let session = shown.opened().await?;
+    let session = visited.shown().opened().await?;
     let _place = gateway.comparison.try_acquire().map_err(|_| {
         Refusal(StatusCode::TOO_MANY_REQUESTS, "another view is being compared: try again later".to_owned())
     })?;
     // As finished stills are.
-    let planes = ViewPlanes { antialias: Antialias::MOST, tone: session.tone(), ..ViewPlanes::COLOR };
+    let planes = ViewPlanes { antialias: Antialias::MOST, ..ViewPlanes::COLOR };
     let with_depth = ViewPlanes { inverse_depth: true, ..planes };
-    let Visited { camera, moment, .. } = visited;
     let method = visited.method(&gateway, &session);
-    let SingleView { frame: view, place, .. } = gateway.draw(shown, camera, planes, method, moment).await?;
+    let SingleView { frame: view, place, .. } = visited.draw_by(&gateway, session.clone(), planes, method).await?;
     let direct = Some(DIRECT.to_owned());
-    let SingleView { frame: direct, .. } = gateway.draw(shown, camera, with_depth, direct, moment).await?;
+    let SingleView { frame: direct, .. } = visited.draw_by(&gateway, session, with_depth, direct).await?;
     let compared = tokio::task::spawn_blocking(move || compared(&view, &direct));
     let compared = compared.await.map_err(Refusal::internal)?;
     let compared = compared.ok_or_else(|| Refusal::internal("the views cannot be compared"))?;

@@ -1,14 +1,13 @@
 //! State that all requests share.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
 
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 use crate::config::GatewayConfig;
 use crate::scenes::Scenes;
-use crate::single_views;
+use crate::views::PLACES;
 
 /// Pages that wait for a place.
 const MAX_WAITING: usize = 64;
@@ -26,7 +25,6 @@ pub(crate) struct Gateway {
     pub(crate) single_views: Arc<Semaphore>,
     /// The place of a view that is compared.
     pub(crate) comparison: Semaphore,
-    pub(crate) last_visitor: AtomicU64,
 }
 
 impl Gateway {
@@ -35,9 +33,8 @@ impl Gateway {
             scenes: Scenes::new(config.clone()),
             visitors: Semaphore::new(config.max_visitors),
             pages: Arc::new(Semaphore::new(config.max_visitors + MAX_WAITING)),
-            single_views: Arc::new(Semaphore::new(single_views::PLACES)),
+            single_views: Arc::new(Semaphore::new(PLACES)),
             comparison: Semaphore::new(1),
-            last_visitor: AtomicU64::default(),
             config,
             shutdown,
         }

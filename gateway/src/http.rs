@@ -14,12 +14,12 @@ use crate::assets;
 use crate::compare::compare;
 use crate::gateway::Gateway;
 use crate::origin;
+use crate::page::with_page;
 use crate::protocol::{MAX_MESSAGE_BYTES, SUBPROTOCOL};
 use crate::responses::Refusal;
 use crate::status::{cameras, status};
-use crate::token::Admission;
 use crate::views::{depth, picture, point};
-use crate::visitor::visit;
+use crate::visitor::serve;
 
 /// All requests that are answered.
 pub(crate) fn router(gateway: Arc<Gateway>) -> Router {
@@ -41,16 +41,12 @@ pub(crate) fn router(gateway: Arc<Gateway>) -> Router {
 async fn admitted(State(gateway): State<Arc<Gateway>>, request: Request, next: Next) -> Response {
     let config = &gateway.config;
     if let Err(stranger) = origin::check(request.headers(), &config.hosts, &config.origins) {
-        return Refusal(StatusCode::FORBIDDEN, stranger.to_string()).into_response();
+        return Refusal(StatusCode::FORBIDDEN, stranger).into_response();
     }
-    let Some(token) = &config.token else { return next.run(request).await };
-    match token.admit(request.uri(), request.headers()) {
-        Admission::Granted => next.run(request).await,
-        Admission::Link => token.redirect(request.uri(), gateway.config.tls.is_some()),
-        Admission::Refused => {
-            let reason = "the token is missing: open the link that the gateway printed, or send it as a bearer token";
-            Refusal(StatusCode::UNAUTHORIZED, reason.to_owned()).into_response()
-        }
+    let token = config.token.as_ref();
+    match token.and_then(|token| token.intercept(request.uri(), request.headers(), config.tls.is_some())) {
+        Some(answer) => answer,
+        None => next.run(request).await,
     }
 }
 
@@ -65,7 +61,7 @@ async fn socket(State(gateway): State<Arc<Gateway>>, upgrade: WebSocketUpgrade) 
     let upgrade =
         upgrade.protocols([SUBPROTOCOL]).max_message_size(MAX_MESSAGE_BYTES).max_frame_size(MAX_MESSAGE_BYTES);
     upgrade.on_upgrade(|socket| async move {
-        visit(socket, gateway).await;
+        with_page(socket, &gateway, async |page| serve(page, &gateway).await).await;
         drop(place);
     })
 }

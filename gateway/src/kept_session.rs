@@ -9,6 +9,7 @@ use cluster::{SessionEvent, SessionRequest, SessionStage, Timeline};
 use tokio::sync::{Semaphore, mpsc, watch};
 use tokio::task::JoinSet;
 
+use crate::protocol::Waiting;
 use crate::responses::Refusal;
 use crate::visits::Visits;
 
@@ -27,19 +28,8 @@ const OPEN_WITHIN: Duration = Duration::from_secs(60);
 /// Single views that are made at a time: slow ones hold up no other session's.
 const SINGLE_VIEWS: usize = 4;
 
-/// The state of a kept session.
-#[derive(Debug, Clone)]
-pub(crate) enum SessionState {
-    /// It is being opened.
-    Waiting {
-        /// As in [`crate::protocol::ToPage::Waiting`].
-        stage: &'static str,
-        /// A sentence.
-        detail: String,
-    },
-    /// It is open.
-    Open(Arc<Session>),
-}
+/// A kept session, or why it is not open.
+pub(crate) type SessionState = Result<Arc<Session>, Waiting>;
 
 /// A session that all visitors of a scene share.
 pub(crate) struct KeptSession {
@@ -50,61 +40,41 @@ pub(crate) struct KeptSession {
     pub(crate) timeline: Timeline,
     /// Places of single views that are made.
     pub(crate) single_views: Semaphore,
-    state: watch::Receiver<SessionState>,
+    pub(crate) state: watch::Receiver<SessionState>,
     failures: mpsc::Sender<Arc<Session>>,
     /// Ends with the session.
     _keeper: JoinSet<()>,
 }
 
-/// The occasion on which a session is opened for the first time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum FirstOpened {
-    /// At once: its costs are then known before anybody comes.
-    AtOnce,
-    /// At its first visit.
-    AtVisit,
-}
-
 impl KeptSession {
-    pub(crate) fn start(coordinator: &str, request: SessionRequest, first: FirstOpened) -> Self {
-        let waiting = SessionState::Waiting { stage: "connecting", detail: "the gateway connects".to_owned() };
-        let (changes, state) = watch::channel(waiting);
+    /// The session is opened at its first visit, or `at_once`: its costs are then known before anybody comes.
+    pub(crate) fn start(coordinator: &str, request: SessionRequest, at_once: bool) -> Self {
+        let waiting = Waiting { stage: "connecting", detail: "the gateway connects".to_owned() };
+        let (changes, state) = watch::channel(Err(waiting));
         let (failures, failed) = mpsc::channel(16);
         let light_steps = request.refinement_steps.max(1);
         let timeline = request.timeline;
         let visits = Arc::new(Visits::default());
         let coordinator = coordinator.to_owned();
-        let usual_rate = request.frames_per_s;
-        let keeper = Keeper { coordinator, request, usual_rate, visits: visits.clone(), changes, failed };
+        let keeper = Keeper { coordinator, request, visits: visits.clone(), changes, failed };
         let mut tasks = JoinSet::new();
-        tasks.spawn(keeper.run(first));
+        tasks.spawn(keeper.run(at_once));
         let single_views = Semaphore::new(SINGLE_VIEWS);
         Self { visits, light_steps, timeline, single_views, state, failures, _keeper: tasks }
-    }
-
-    /// The session's states, the present one first.
-    pub(crate) fn states(&self) -> watch::Receiver<SessionState> {
-        let mut states = self.state.clone();
-        states.mark_changed();
-        states
     }
 
     /// The session, once it is open.
     pub(crate) async fn opened(&self) -> Result<Arc<Session>, Refusal> {
         let mut state = self.state.clone();
-        let opened = state.wait_for(|state| matches!(state, SessionState::Open(_)));
+        let opened = state.wait_for(Result::is_ok);
         let _ = tokio::time::timeout(OPEN_WITHIN, opened).await;
         match &*self.state.borrow() {
-            SessionState::Open(session) => Ok(session.clone()),
-            SessionState::Waiting { stage, detail } => {
+            Ok(session) => Ok(session.clone()),
+            Err(Waiting { stage, detail }) => {
                 let reason = format!("the scene's session is not open yet: {stage}: {detail}");
                 Err(Refusal(StatusCode::SERVICE_UNAVAILABLE, reason))
             }
         }
-    }
-
-    pub(crate) fn is_open(&self) -> bool {
-        matches!(&*self.state.borrow(), SessionState::Open(_))
     }
 
     /// Has a session opened again that delivers nothing any more.
@@ -121,16 +91,15 @@ impl KeptSession {
 struct Keeper {
     coordinator: String,
     request: SessionRequest,
-    usual_rate: Option<f64>,
     visits: Arc<Visits>,
     changes: watch::Sender<SessionState>,
     failed: mpsc::Receiver<Arc<Session>>,
 }
 
 impl Keeper {
-    async fn run(mut self, first: FirstOpened) {
+    async fn run(mut self, mut is_wanted: bool) {
+        let usual_rate = self.request.frames_per_s;
         let mut delay = FIRST_DELAY;
-        let mut is_wanted = first == FirstOpened::AtOnce;
         loop {
             if !is_wanted {
                 self.visits.somebody().await;
@@ -141,11 +110,11 @@ impl Keeper {
                 Ok(session) => {
                     let opened_at = Instant::now();
                     let session = Arc::new(session);
-                    self.changes.send_replace(SessionState::Open(session.clone()));
+                    let _ = self.changes.send_replace(Ok(session.clone()));
                     if self.follow(&session).await {
                         self.wait("preparing", "the scene's session is opened");
                         is_wanted = false;
-                        self.request.frames_per_s = self.usual_rate;
+                        self.request.frames_per_s = usual_rate;
                         continue;
                     }
                     self.wait("reconnecting", "the session is opened again");
@@ -172,15 +141,13 @@ impl Keeper {
     }
 
     fn wait(&self, stage: &'static str, detail: &str) {
-        self.changes.send_replace(SessionState::Waiting { stage, detail: detail.to_owned() });
+        let _ = self.changes.send_replace(Err(Waiting { stage, detail: detail.to_owned() }));
     }
 
     /// Warns of a failure once, however often it is met.
     fn tell_failure(&self, error: &ClientError) {
         let detail = error.to_string();
-        let is_known =
-            matches!(&*self.changes.borrow(), SessionState::Waiting { detail: known, .. } if *known == detail);
-        if !is_known {
+        if !matches!(&*self.changes.borrow(), Err(known) if known.detail == detail) {
             tracing::warn!(scene = self.request.scene, %error, "no session");
         }
         self.wait("connecting", &detail);

@@ -21,7 +21,6 @@ mod rate;
 mod responses;
 mod scenes;
 mod server;
-mod single_views;
 mod status;
 mod still;
 mod tls;

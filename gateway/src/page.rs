@@ -11,7 +11,7 @@ use tokio::task::JoinSet;
 
 use crate::gateway::Gateway;
 use crate::parts::Parts;
-use crate::protocol::{self, FromPage, ToPage};
+use crate::protocol::{self, FromPage, ToPage, Waiting};
 
 /// The first message is due by then.
 const OPENED_WITHIN: Duration = Duration::from_secs(10);
@@ -28,7 +28,7 @@ const MAX_BURST: f64 = 4.0 * MAX_MESSAGES_PER_S;
 /// Messages on their way to the page. Pictures among them are bounded by their credits, and parts of stills by the link.
 const OUTGOING: usize = 96;
 /// The delay before a view that has failed is begun anew.
-const AFTER_FAILURE: Duration = Duration::from_millis(250);
+pub(crate) const AFTER_FAILURE: Duration = Duration::from_millis(250);
 
 /// Why a visit ends.
 pub(crate) enum End {
@@ -49,7 +49,8 @@ pub(crate) struct Page {
     pub(crate) started: Instant,
     /// The least round trip so far.
     pub(crate) rtt_s: Option<f64>,
-    stills: Parts,
+    /// Its parts end with the next pose.
+    pub(crate) stills: Parts,
     pings: tokio::time::Interval,
 }
 
@@ -148,21 +149,13 @@ impl Page {
         Ok(())
     }
 
-    /// Sends a picture in motion, which ends a still that is on its way.
-    pub(crate) fn send_moving(&mut self, message: Bytes) -> Result<(), End> {
+    /// Sends a picture, which ends a still that is on its way. A still is sent in parts, until a pose ends it.
+    pub(crate) fn send_picture(&mut self, mut message: Bytes, is_still: bool) -> Result<(), End> {
         self.stills.end();
+        if is_still {
+            message = self.stills.begin(message, Instant::now());
+        }
         self.send(Message::Binary(message))
-    }
-
-    /// Sends a still in parts, until a pose ends it.
-    pub(crate) fn send_still(&mut self, message: Bytes) -> Result<(), End> {
-        let first = self.stills.begin(message, Instant::now());
-        self.send(Message::Binary(first))
-    }
-
-    /// A still that is on its way is of an earlier pose.
-    pub(crate) fn end_still(&mut self) {
-        self.stills.end();
     }
 
     fn count(&mut self, now: Instant) -> Result<(), End> {
@@ -194,24 +187,14 @@ impl Page {
         }
     }
 
-    /// Lets a moment pass before another attempt; `hear` takes the messages of that time.
-    pub(crate) async fn pause(&mut self, hear: impl FnMut(&mut Self, FromPage) -> Result<(), End>) -> Result<(), End> {
-        self.hearing(tokio::time::sleep(AFTER_FAILURE), hear).await
-    }
-
-    /// Awaits something else; `hear` takes the messages of that time.
-    pub(crate) async fn hearing<T>(
-        &mut self,
-        other: impl Future<Output = T>,
-        mut hear: impl FnMut(&mut Self, FromPage) -> Result<(), End>,
-    ) -> Result<T, End> {
+    /// Awaits something else, and drops the messages of that time.
+    pub(crate) async fn until<T>(&mut self, other: impl Future<Output = T>) -> Result<T, End> {
         tokio::pin!(other);
         loop {
-            let message = tokio::select! {
+            tokio::select! {
                 output = &mut other => return Ok(output),
-                message = self.next() => message?,
-            };
-            hear(self, message)?;
+                message = self.next() => drop(message?),
+            }
         }
     }
 
@@ -222,7 +205,7 @@ impl Page {
 
     /// Says why there are no pictures.
     pub(crate) fn wait(&self, stage: &'static str, detail: &str) -> Result<(), End> {
-        self.tell(&ToPage::Waiting { stage, detail: detail.to_owned() })
+        self.tell(&ToPage::Waiting(Waiting { stage, detail: detail.to_owned() }))
     }
 
     /// A page that reads nothing has no room after a while.

@@ -15,7 +15,7 @@ const FIRST_WINDOW: usize = 4;
 const QUEUED_S: f64 = 0.1;
 
 /// The parts of a page's stills.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Parts {
     /// The bytes that were not sent.
     rest: Bytes,
@@ -25,18 +25,12 @@ pub(crate) struct Parts {
     window: usize,
 }
 
-impl Default for Parts {
-    fn default() -> Self {
-        Self { rest: Bytes::new(), sent: VecDeque::new(), window: WINDOW[0] }
-    }
-}
-
 impl Parts {
     /// The first part of a still's message, with its header.
     pub(crate) fn begin(&mut self, mut message: Bytes, now: Instant) -> Bytes {
         let first = message.split_to(message.len().min(PART_BYTES));
         self.rest = message;
-        self.window = self.window.min(FIRST_WINDOW);
+        self.window = self.window.clamp(WINDOW[0], FIRST_WINDOW);
         if !self.rest.is_empty() {
             self.sent.push_back(now);
         }

@@ -154,7 +154,10 @@ impl PictureStream {
             light_step: about.light_step,
             samples: header.antialias.samples(),
             neighbour: !about.is_own_cell,
-            quality: asked.light.quality().filter(|_| !about.is_direct),
+            quality: match asked.light {
+                PictureLight::Shared(quality) if !about.is_direct => Some(quality.name()),
+                _ => None,
+            },
             direct: about.is_direct,
             more: about.more,
             compositor: frame.node_name.clone(),

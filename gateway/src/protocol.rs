@@ -67,7 +67,7 @@ pub(crate) fn quality<'de, D: Deserializer<'de>>(text: D) -> Result<Option<Light
 pub(crate) enum ToPage {
     /// The first message.
     Welcome {
-        /// The program's version: a page of another version loads itself again.
+        /// The program's version.
         version: &'static str,
         /// Names of the scenes on offer.
         scenes: Vec<String>,
@@ -93,12 +93,7 @@ pub(crate) enum ToPage {
     /// The connection is alive, from time to time.
     Alive,
     /// Why there are no pictures at the moment.
-    Waiting {
-        /// `full`, `connecting`, `measuring`, `planning`, `preparing` or `reconnecting`.
-        stage: &'static str,
-        /// A sentence.
-        detail: String,
-    },
+    Waiting(Waiting),
     /// The plan in force: pictures come.
     Plan {
         /// Its number.
@@ -117,6 +112,15 @@ pub(crate) enum ToPage {
         /// A sentence that names the field.
         reason: String,
     },
+}
+
+/// Why there are no pictures, or no session.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Waiting {
+    /// `full`, `connecting`, `measuring`, `planning`, `preparing` or `reconnecting`.
+    pub(crate) stage: &'static str,
+    /// A sentence.
+    pub(crate) detail: String,
 }
 
 /// The header of a picture.

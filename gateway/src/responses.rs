@@ -9,8 +9,6 @@ use futures_util::stream;
 use serde_json::Value;
 use tokio::sync::OwnedSemaphorePermit;
 
-use crate::scenes::SceneError;
-
 const CHUNK_BYTES: usize = 64 << 10;
 
 /// The refusal of a request: a status and a sentence.
@@ -22,6 +20,11 @@ impl Refusal {
         Self(StatusCode::BAD_REQUEST, reason.to_string())
     }
 
+    /// The cluster does not serve what is asked for.
+    pub(crate) fn unserved(error: impl ToString) -> Self {
+        Self(StatusCode::BAD_GATEWAY, error.to_string())
+    }
+
     pub(crate) fn internal(error: impl ToString) -> Self {
         Self(StatusCode::INTERNAL_SERVER_ERROR, error.to_string())
     }
@@ -31,22 +34,6 @@ impl IntoResponse for Refusal {
     fn into_response(self) -> Response {
         let fields = [(header::CONTENT_TYPE, "text/plain; charset=utf-8"), (header::CACHE_CONTROL, "no-store")];
         (self.0, fields, self.1 + "\n").into_response()
-    }
-}
-
-impl From<SceneError> for Refusal {
-    fn from(error: SceneError) -> Self {
-        let status = match error {
-            SceneError::Unknown { .. } => StatusCode::NOT_FOUND,
-            SceneError::Away(_) | SceneError::Invalid(_) => StatusCode::BAD_GATEWAY,
-        };
-        Self(status, error.to_string())
-    }
-}
-
-impl From<client::ClientError> for Refusal {
-    fn from(error: client::ClientError) -> Self {
-        Self(StatusCode::BAD_GATEWAY, error.to_string())
     }
 }
 

@@ -4,15 +4,17 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use axum::http::StatusCode;
 use client::{Client, ClientError};
 use cluster::{ClusterStatus, OfferStatus, SessionRequest, Timeline};
 use depth_image::LightCacheQuality;
 use glam::UVec2;
 use parking_lot::Mutex;
 
-use crate::camera::{BadView, PageCamera, ViewSpace};
+use crate::camera::{PageCamera, ViewSpace};
 use crate::config::GatewayConfig;
-use crate::kept_session::{FIRST_DELAY, FirstOpened, KeptSession, LONGEST_DELAY};
+use crate::kept_session::{FIRST_DELAY, KeptSession, LONGEST_DELAY};
+use crate::responses::Refusal;
 
 /// The size of pictures in motion that costs are measured on.
 pub(crate) const TYPICAL_PX: UVec2 = UVec2::new(640, 360);
@@ -37,25 +39,6 @@ struct Known {
     /// The names on offer, in their order.
     names: Vec<String>,
     scenes: BTreeMap<String, Arc<SceneSessions>>,
-}
-
-/// Why a scene cannot be visited.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum SceneError {
-    /// No scene has the name.
-    #[error("scene {name:?} is not on offer: {offered}")]
-    Unknown {
-        /// As asked for.
-        name: String,
-        /// All names.
-        offered: String,
-    },
-    /// The coordinator does not answer.
-    #[error("the coordinator does not answer: {0}")]
-    Away(#[from] ClientError),
-    /// The scene on offer has no camera in front of it.
-    #[error("the scene cannot be viewed: {0}")]
-    Invalid(#[from] BadView),
 }
 
 /// A scene, and its sessions.
@@ -92,29 +75,32 @@ impl Scenes {
         self.known.lock().names.clone()
     }
 
-    /// A scene by its name; the first on offer where there is none.
-    pub(crate) async fn visit(&self, name: Option<&str>) -> Result<Arc<SceneSessions>, SceneError> {
+    /// A scene by its name; the first on offer where there is none. A name that is not on offer is refused as not found.
+    pub(crate) async fn visit(&self, name: Option<&str>) -> Result<Arc<SceneSessions>, Refusal> {
         // A scene whose session is not open may be on offer no more.
-        if let Some(scene) = self.find(name).filter(|scene| scene.shown.is_open()) {
+        if let Some(scene) = self.find(name).filter(|scene| scene.shown.state.borrow().is_ok()) {
             return Ok(scene);
         }
-        self.add(name, FirstOpened::AtVisit).await
+        self.add(name, false).await
     }
 
-    async fn add(&self, name: Option<&str>, first: FirstOpened) -> Result<Arc<SceneSessions>, SceneError> {
-        let offers = &self.status().await?.offers;
+    async fn add(&self, name: Option<&str>, at_once: bool) -> Result<Arc<SceneSessions>, Refusal> {
+        let status = self.status().await;
+        let offers =
+            &status.map_err(|error| Refusal::unserved(format!("the coordinator does not answer: {error}")))?.offers;
         let names: Vec<String> = offers.iter().map(|offer| offer.name.clone()).collect();
         let offered = names.join(", ");
         self.known.lock().names = names;
-        let offer = offers
-            .iter()
-            .find(|offer| name.is_none_or(|name| name == offer.name))
-            .ok_or_else(|| SceneError::Unknown { name: name.unwrap_or("(the first)").to_owned(), offered })?;
+        let offer = offers.iter().find(|offer| name.is_none_or(|name| name == offer.name)).ok_or_else(|| {
+            let name = name.unwrap_or("(the first)");
+            Refusal(StatusCode::NOT_FOUND, format!("scene {name:?} is not on offer: {offered}"))
+        })?;
         let mut known = self.known.lock();
         if let Some(scene) = known.scenes.get(&offer.name).filter(|scene| scene.offer == *offer) {
             return Ok(scene.clone());
         }
-        let scene = Arc::new(SceneSessions::start(offer.clone(), &self.config, first)?);
+        let scene = SceneSessions::start(offer.clone(), &self.config, at_once);
+        let scene = Arc::new(scene.map_err(|error| Refusal::unserved(format!("the scene cannot be viewed: {error}")))?);
         known.scenes.insert(offer.name.clone(), scene.clone());
         Ok(scene)
     }
@@ -128,8 +114,8 @@ impl Scenes {
     /// Opens the first scene's session as soon as the coordinator answers.
     pub(crate) async fn prepare(&self) {
         let mut delay = FIRST_DELAY;
-        while let Err(error) = self.add(None, FirstOpened::AtOnce).await {
-            tracing::debug!(%error, "no scene yet");
+        while let Err(error) = self.add(None, true).await {
+            tracing::debug!(error = error.1, "no scene yet");
             tokio::time::sleep(delay).await;
             delay = (delay * 2).min(LONGEST_DELAY);
         }
@@ -137,7 +123,7 @@ impl Scenes {
 }
 
 impl SceneSessions {
-    fn start(offer: OfferStatus, config: &GatewayConfig, first: FirstOpened) -> Result<Self, BadView> {
+    fn start(offer: OfferStatus, config: &GatewayConfig, at_once: bool) -> Result<Self, String> {
         let space = ViewSpace::of(&offer);
         let home = space.home(&offer);
         let shown = (config.request_of)(&offer, space.camera(&home, TYPICAL_PX)?);
@@ -145,8 +131,8 @@ impl SceneSessions {
         let offered = offer.settings.method.as_deref().and_then(config.methods.quality_of);
         let quality = config.quality.or(offered).unwrap_or(LightCacheQuality::Fine);
         Ok(Self {
-            shown: KeptSession::start(&config.coordinator, shown, first),
-            moving: moving.map(|request| KeptSession::start(&config.coordinator, request, FirstOpened::AtVisit)),
+            shown: KeptSession::start(&config.coordinator, shown, at_once),
+            moving: moving.map(|request| KeptSession::start(&config.coordinator, request, false)),
             offer,
             space,
             home,

@@ -45,7 +45,7 @@ pub(crate) async fn cameras(
 
 /// `status.json`.
 pub(crate) async fn status(State(gateway): State<Arc<Gateway>>) -> Result<Response, Refusal> {
-    let status = gateway.scenes.status().await?;
+    let status = gateway.scenes.status().await.map_err(Refusal::unserved)?;
     let visitors = gateway.config.max_visitors - gateway.visitors.available_permits();
     Ok(as_json(&described(&status, visitors)))
 }

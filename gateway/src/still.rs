@@ -23,16 +23,6 @@ pub(crate) enum PictureLight {
     Drawn,
 }
 
-impl PictureLight {
-    /// The quality of shared light.
-    pub(crate) fn quality(self) -> Option<&'static str> {
-        match self {
-            Self::Shared(quality) => Some(quality.name()),
-            Self::Session | Self::Drawn => None,
-        }
-    }
-}
-
 /// The light of a plan's views.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlannedLight {

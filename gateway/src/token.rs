@@ -3,6 +3,8 @@
 use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse as _, Response};
 
+use crate::responses::Refusal;
+
 /// The first part of the cookie's name.
 const COOKIE: &str = "myriorama_";
 const QUERY: &str = "token=";
@@ -11,17 +13,6 @@ const BYTES: usize = 16;
 /// A secret, compared in constant time. It is in no log.
 #[derive(Clone)]
 pub struct Token(String);
-
-/// The answer to a request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Admission {
-    /// The request needs no token, or brings it.
-    Granted,
-    /// The request opens the link.
-    Link,
-    /// The token is missing.
-    Refused,
-}
 
 impl Token {
     /// A random token.
@@ -40,25 +31,26 @@ impl Token {
         format!("?{QUERY}{}", self.0)
     }
 
-    /// The page itself is no secret: only what is below `/api/` is. A cookie that is set by a link in another page is not sent
-    /// with the redirect that follows.
-    pub(crate) fn admit(&self, uri: &Uri, headers: &HeaderMap) -> Admission {
+    /// The answer to a request that opens the link or lacks the token; `None` where it needs no token or brings it. The page itself
+    /// is no secret: only what is below `/api/` is. A cookie that is set by a link in another page is not sent with the redirect
+    /// that follows.
+    pub(crate) fn intercept(&self, uri: &Uri, headers: &HeaderMap, is_secure: bool) -> Option<Response> {
         let link = uri.query().and_then(|query| query.split('&').find_map(|part| part.strip_prefix(QUERY)));
         if link.is_some_and(|given| self.is(given)) {
-            return Admission::Link;
+            return Some(self.redirect(uri, is_secure));
         }
         let bearer = headers.get(header::AUTHORIZATION).and_then(|value| value.to_str().ok()?.strip_prefix("Bearer "));
         let is_open = !uri.path().starts_with("/api/");
         if is_open || bearer.is_some_and(|given| self.is(given)) || self.cookies(headers).any(|given| self.is(given)) {
-            Admission::Granted
-        } else {
-            Admission::Refused
+            return None;
         }
+        let reason = "the token is missing: open the link that the gateway printed, or send it as a bearer token";
+        Some(Refusal(StatusCode::UNAUTHORIZED, reason.to_owned()).into_response())
     }
 
     /// The answer to the link: a cookie, and the same address without the token. It is relative, so that the page may be under
     /// any path.
-    pub(crate) fn redirect(&self, uri: &Uri, is_secure: bool) -> Response {
+    fn redirect(&self, uri: &Uri, is_secure: bool) -> Response {
         let secure = if is_secure { "; Secure" } else { "" };
         let cookie = format!("{}={}; HttpOnly; SameSite=Strict{secure}", self.cookie(), self.0);
         let fields = [
@@ -105,31 +97,31 @@ fn without_token(uri: &Uri) -> String {
 mod tests {
     use super::*;
 
-    fn admitted(path: &str, name: header::HeaderName, value: &str) -> Admission {
+    fn intercepted(path: &str, name: header::HeaderName, value: &str) -> Option<StatusCode> {
         let token = Token("secret".to_owned());
         let mut headers = HeaderMap::new();
         headers.insert(name, value.parse().unwrap());
-        token.admit(&path.parse().unwrap(), &headers)
+        token.intercept(&path.parse().unwrap(), &headers, false).map(|answer| answer.status())
     }
 
     #[test]
     fn a_cookie_or_a_bearer_token_opens_the_api() {
         let path = "/api/v1/view.png?size=8x8";
         let name = Token("secret".to_owned()).cookie();
-        assert_eq!(admitted(path, header::COOKIE, &format!("a=b; {name}=secret")), Admission::Granted);
-        assert_eq!(admitted(path, header::AUTHORIZATION, "Bearer secret"), Admission::Granted);
-        assert_eq!(admitted(path, header::AUTHORIZATION, "Basic secret"), Admission::Refused);
-        assert_eq!(admitted(path, header::COOKIE, &format!("{name}=secre")), Admission::Refused);
+        assert_eq!(intercepted(path, header::COOKIE, &format!("a=b; {name}=secret")), None);
+        assert_eq!(intercepted(path, header::AUTHORIZATION, "Bearer secret"), None);
+        assert_eq!(intercepted(path, header::AUTHORIZATION, "Basic secret"), Some(StatusCode::UNAUTHORIZED));
+        assert_eq!(intercepted(path, header::COOKIE, &format!("{name}=secre")), Some(StatusCode::UNAUTHORIZED));
         let other = Token("other".to_owned()).cookie();
-        assert_eq!(admitted(path, header::COOKIE, &format!("{other}=secret")), Admission::Refused);
-        assert_eq!(admitted(path, header::COOKIE, &format!("{other}=other; {name}=secret")), Admission::Granted);
+        assert_eq!(intercepted(path, header::COOKIE, &format!("{other}=secret")), Some(StatusCode::UNAUTHORIZED));
+        assert_eq!(intercepted(path, header::COOKIE, &format!("{other}=other; {name}=secret")), None);
     }
 
     #[test]
     fn the_page_is_open_and_its_link_sets_the_cookie() {
-        assert_eq!(admitted("/main.js", header::ACCEPT, "*/*"), Admission::Granted);
-        assert_eq!(admitted("/?token=secret", header::ACCEPT, "*/*"), Admission::Link);
-        assert_eq!(admitted("/api/v1/socket?token=wrong", header::ACCEPT, "*/*"), Admission::Refused);
+        assert_eq!(intercepted("/main.js", header::ACCEPT, "*/*"), None);
+        assert_eq!(intercepted("/?token=secret", header::ACCEPT, "*/*"), Some(StatusCode::SEE_OTHER));
+        assert_eq!(intercepted("/api/v1/socket?token=wrong", header::ACCEPT, "*/*"), Some(StatusCode::UNAUTHORIZED));
         for (link, location) in [
             ("/?token=secret", "./"),
             ("/status?token=secret", "./status"),

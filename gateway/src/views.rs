@@ -5,14 +5,15 @@ use std::sync::Arc;
 use axum::extract::{Path, Query, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode};
 use axum::response::Response;
-use client::{Frame, Session};
-use cluster::DIRECT;
+use client::{ClientError, Frame, Session, ViewRequest};
+use cluster::{DIRECT, SessionPlan};
 use codec::{FrameCodec, encode_frame};
 use depth_image::{Antialias, LightCacheQuality, PinholeCamera, PixelDepth, ProvenanceKind, View, ViewPlanes};
 use glam::{UVec2, Vec2};
 use pictures::Legend;
 use serde::Deserialize;
 use serde_json::{Value, json};
+use tokio::sync::OwnedSemaphorePermit;
 
 use crate::camera::PageCamera;
 use crate::gateway::Gateway;
@@ -20,10 +21,11 @@ use crate::kept_session::KeptSession;
 use crate::protocol;
 use crate::responses::{Refusal, as_json, held};
 use crate::scenes::SceneSessions;
-use crate::single_views::SingleView;
 use crate::still::PlannedLight;
 use crate::visits::Visit;
 
+/// Views that are made, wait, or are read.
+pub(crate) const PLACES: usize = 68;
 /// The size of a view that names none.
 const SIZE_PX: UVec2 = UVec2::new(640, 360);
 /// The JPEG quality of views.
@@ -136,12 +138,81 @@ impl Visited {
 
     /// The view, drawn directly where no view cell is near: cells follow visitors, not single requests.
     async fn draw(&self, gateway: &Gateway, planes: ViewPlanes) -> Result<SingleView, Refusal> {
-        let shown = self.shown();
-        let session = shown.opened().await?;
+        let session = self.shown().opened().await?;
         let is_near = session.plan().assignment.workload.has_cell_near(&self.camera);
-        let planes = ViewPlanes { tone: session.tone(), ..planes };
         let method = if is_near { self.method(gateway, &session) } else { Some(DIRECT.to_owned()) };
-        gateway.draw(shown, self.camera, planes, method, self.moment).await
+        self.draw_by(gateway, session, planes, method).await
+    }
+
+    /// The view of a moment of a scene that moves, else in its finished light. By a method of the session's samples where one is
+    /// named. Some views of each session are made at a time, and others wait.
+    pub(crate) async fn draw_by(
+        &self,
+        gateway: &Gateway,
+        session: Arc<Session>,
+        planes: ViewPlanes,
+        method: Option<String>,
+    ) -> Result<SingleView, Refusal> {
+        let place = gateway.single_views.clone().try_acquire_owned().map_err(|_| {
+            let reason = format!("{PLACES} views are under way already: try again later");
+            Refusal(StatusCode::TOO_MANY_REQUESTS, reason)
+        })?;
+        let shown = self.shown();
+        let _made = shown.single_views.acquire().await.map_err(Refusal::internal)?;
+        match self.frame(&session, planes, method).await {
+            Ok((frame, plan)) => Ok(SingleView { frame, plan, place }),
+            Err(error) => {
+                let refusal = match error {
+                    ClientError::Invalid { .. } => Refusal::bad(&error),
+                    _ => Refusal::unserved(&error),
+                };
+                // Pages judge a session that they watch: one request ends it for nobody.
+                if !shown.visits.has_pages() {
+                    shown.has_failed(session, &error);
+                }
+                Err(refusal)
+            }
+        }
+    }
+
+    async fn frame(
+        &self,
+        session: &Session,
+        planes: ViewPlanes,
+        method: Option<String>,
+    ) -> Result<(Frame, Option<SessionPlan>), ClientError> {
+        let plan = session.plan();
+        let timeline = plan.assignment.workload.timeline;
+        let set_index = if timeline.moves() { self.moment } else { timeline.set_count - 1 };
+        let request = ViewRequest { frame: 1, set_index, camera: self.camera };
+        let planes = ViewPlanes { tone: session.tone(), ..planes };
+        let frames = session.render_views_with(planes, method, [request])?.all().await?;
+        let frame = frames.into_iter().next();
+        let frame = frame.ok_or_else(|| ClientError::Ended { reason: "no frame was received".to_owned() })?;
+        let plan_epoch = frame.header.sample_set_id.plan_epoch;
+        let plan = [plan, session.plan()].into_iter().find(|plan| plan.assignment.plan_epoch == plan_epoch);
+        Ok((frame, plan))
+    }
+}
+
+/// A view, and the plan that it was made under.
+pub(crate) struct SingleView {
+    pub(crate) frame: Frame,
+    /// `None` where the plan has changed twice meanwhile.
+    plan: Option<SessionPlan>,
+    /// Kept until the answer has been read.
+    pub(crate) place: OwnedSemaphorePermit,
+}
+
+impl SingleView {
+    /// The number of the first sample camera of its view cell.
+    fn first_camera(&self) -> Result<usize, Refusal> {
+        let plan = self
+            .plan
+            .as_ref()
+            .ok_or_else(|| Refusal(StatusCode::SERVICE_UNAVAILABLE, "the plan has changed: try again".to_owned()))?;
+        let cameras = plan.assignment.workload.cameras_of_cell(self.frame.header.cell as usize);
+        Ok(cameras.map_or(0, |cameras| cameras.start))
     }
 }
 

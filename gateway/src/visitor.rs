@@ -6,9 +6,8 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
-use axum::extract::ws::WebSocket;
+use axum::http::StatusCode;
 use client::{ClientError, ClientId, EncodedFrame, PictureQuality, Session};
 use cluster::{Assignment, DIRECT, Policy, Promise, SessionPlan};
 use codec::FrameCodec;
@@ -17,15 +16,16 @@ use glam::UVec2;
 use tokio::sync::watch;
 
 use crate::camera::still_size;
-use crate::config::SharedLightMethods;
 use crate::gateway::Gateway;
 use crate::kept_session::{KeptSession, SessionState};
-use crate::page::{End, Page, with_page};
+use crate::page::{AFTER_FAILURE, End, Page};
 use crate::picture_stream::{About, Asked, PictureStream, Wanted};
 use crate::protocol::{FromPage, Pose, ToPage};
 use crate::rate::{Rate, Shown};
-use crate::scenes::{SceneError, SceneSessions};
+use crate::responses::Refusal;
+use crate::scenes::SceneSessions;
 use crate::still::{PictureLight, PlannedLight, Still, Stills, fewer};
+use crate::visits::Visit;
 
 /// The longest age that says something of the link: a page may have been hidden.
 const MAX_AGE_MS: f64 = 10_000.0;
@@ -33,11 +33,7 @@ const MAX_AGE_MS: f64 = 10_000.0;
 const PLANS: usize = 2;
 
 /// Serves a page until it leaves.
-pub(crate) async fn visit(socket: WebSocket, gateway: Arc<Gateway>) {
-    with_page(socket, &gateway, async |page| serve(page, &gateway).await).await;
-}
-
-async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
+pub(crate) async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
     let name = page.opened().await?;
     let _place = admitted(page, gateway).await?;
     let scene = found(page, gateway, name.as_deref()).await?;
@@ -55,7 +51,8 @@ async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
         bounds: [scene.offer.volume.min, scene.offer.volume.max].map(|corner| scene.space.in_source(corner)),
     })?;
     let mut visitor = Visitor {
-        number: gateway.last_visitor.fetch_add(1, Ordering::Relaxed),
+        gateway,
+        visit: scene.session_of(0).visits.begin(),
         is_moving: false,
         light_step: 0,
         made_with: None,
@@ -68,8 +65,6 @@ async fn serve(page: &mut Page, gateway: &Gateway) -> Result<(), End> {
             light_steps: scene.shown.light_steps,
         },
         scene,
-        max_still_px: gateway.config.max_still_px,
-        methods: gateway.config.methods,
         newest: None,
         sent: 0,
         plans: VecDeque::new(),
@@ -87,23 +82,24 @@ async fn admitted<'a>(page: &mut Page, gateway: &'a Gateway) -> Result<tokio::sy
         return Ok(place);
     }
     page.wait("full", "all places are taken: this page is let in when there is room")?;
-    page.hearing(gateway.visitors.acquire(), |_, _| Ok(())).await?.map_err(|_| End::Gone)
+    page.until(gateway.visitors.acquire()).await?.map_err(|_| End::Gone)
 }
 
 /// The scene that a page asks for, once the coordinator answers.
 async fn found(page: &mut Page, gateway: &Gateway, name: Option<&str>) -> Result<Arc<SceneSessions>, End> {
     loop {
-        match page.hearing(gateway.scenes.visit(name), |_, _| Ok(())).await? {
+        match page.until(gateway.scenes.visit(name)).await? {
             Ok(scene) => return Ok(scene),
-            Err(error @ SceneError::Unknown { .. }) => return Err(End::Refused(error.to_string())),
-            Err(error) => page.wait("connecting", &error.to_string())?,
+            Err(Refusal(StatusCode::NOT_FOUND, reason)) => return Err(End::Refused(reason)),
+            Err(Refusal(_, reason)) => page.wait("connecting", &reason)?,
         }
-        page.pause(|_, _| Ok(())).await?;
+        page.until(tokio::time::sleep(AFTER_FAILURE)).await?;
     }
 }
 
-struct Visitor {
-    number: u64,
+struct Visitor<'a> {
+    gateway: &'a Gateway,
+    visit: Visit,
     scene: Arc<SceneSessions>,
     /// Whether the scene moves for the visitor.
     is_moving: bool,
@@ -116,9 +112,7 @@ struct Visitor {
     /// Whether the last picture was drawn from the scene.
     is_drawn: bool,
     stills: Stills,
-    max_still_px: UVec2,
-    methods: SharedLightMethods,
-    newest: Option<Pose>,
+    newest: Option<(Pose, PinholeCamera)>,
     /// The number of the last picture.
     sent: u64,
     /// The last plans that the page was told of, the newest first: pictures may still come under the one before.
@@ -132,41 +126,37 @@ struct Visitor {
     rate: Rate,
 }
 
-impl Drop for Visitor {
-    fn drop(&mut self) {
-        self.kept(&self.scene).visits.left(self.number);
-    }
-}
-
-impl Visitor {
+impl Visitor<'_> {
     /// Serves from one session after the other.
     async fn follow(&mut self, page: &mut Page) -> Result<(), End> {
         let scene = self.scene.clone();
         loop {
             let kept = self.kept(&scene);
-            let _visit = kept.visits.begin();
-            let mut states = kept.states();
+            let mut states = kept.state.clone();
             while self.is_at(kept) {
                 let state = states.borrow_and_update().clone();
                 let session = match state {
-                    SessionState::Open(session) => session,
-                    SessionState::Waiting { stage, detail } => {
-                        page.wait(stage, &detail)?;
-                        self.wait_for_change(page, kept, &mut states).await?;
+                    Ok(session) => session,
+                    Err(waiting) => {
+                        page.tell(&ToPage::Waiting(waiting))?;
+                        if let Some(Err(_)) = self.hear_until(states.changed(), page, kept).await? {
+                            return Err(End::Gone);
+                        }
                         continue;
                     }
                 };
                 let Some(error) = self.serve_from(page, kept, &session, &mut states).await? else { continue };
                 page.wait("reconnecting", &error.to_string())?;
                 kept.has_failed(session, &error);
-                page.pause(|page, message| self.hear(page, message)).await?;
+                self.hear_until(tokio::time::sleep(AFTER_FAILURE), page, kept).await?;
             }
-            kept.visits.left(self.number);
+            self.visit = self.kept(&scene).visits.begin();
+            self.visit.moved(page.heard);
         }
     }
 
     /// The session of the visitor's moment.
-    fn kept<'a>(&self, scene: &'a SceneSessions) -> &'a KeptSession {
+    fn kept<'s>(&self, scene: &'s SceneSessions) -> &'s KeptSession {
         scene.session_of(u32::from(self.is_moving))
     }
 
@@ -175,22 +165,21 @@ impl Visitor {
         std::ptr::eq(self.kept(&self.scene), kept)
     }
 
-    /// Takes poses until a session is open, or is another one.
-    async fn wait_for_change(
+    /// Takes poses while something else is awaited; `None` when they need another session.
+    async fn hear_until<T>(
         &mut self,
+        other: impl Future<Output = T>,
         page: &mut Page,
         kept: &KeptSession,
-        states: &mut watch::Receiver<SessionState>,
-    ) -> Result<(), End> {
-        loop {
+    ) -> Result<Option<T>, End> {
+        tokio::pin!(other);
+        while self.is_at(kept) {
             tokio::select! {
-                changed = states.changed() => return changed.map_err(|_| End::Gone),
+                output = &mut other => return Ok(Some(output)),
                 message = page.next() => self.hear(page, message?)?,
             }
-            if !self.is_at(kept) {
-                return Ok(());
-            }
         }
+        Ok(None)
     }
 
     /// Serves from a session until it fails; `None` when the visitor needs another one, or there is another.
@@ -201,7 +190,12 @@ impl Visitor {
         session: &Session,
         states: &mut watch::Receiver<SessionState>,
     ) -> Result<Option<ClientError>, End> {
-        self.begin(page, session)?;
+        // Nothing of this session has been sent yet.
+        self.plans.clear();
+        self.is_finished = false;
+        self.is_drawn = false;
+        self.promise = session.promise();
+        self.tell_plan(page, &session.plan())?;
         let client = ClientId::new();
         let mut motion = PictureStream::new(session, client);
         let mut still = PictureStream::new(session, client);
@@ -225,7 +219,9 @@ impl Visitor {
                 changed = states.changed() => return changed.map(|()| None).map_err(|_| End::Gone),
                 plan = session.another_plan(self.plan_epoch()) => {
                     self.tell_plan(page, &plan)?;
-                    self.renew_still(&plan, &mut motion, &mut still)?;
+                    if self.is_outdated(&plan.assignment) {
+                        self.ask(Antialias::NONE, &mut motion, &mut still)?;
+                    }
                 }
                 promise = session.another_promise(self.promise.as_ref()) => {
                     self.promise = Some(promise);
@@ -258,14 +254,6 @@ impl Visitor {
         Antialias::NONE
     }
 
-    /// Nothing of a session has been sent yet.
-    fn begin(&mut self, page: &Page, session: &Session) -> Result<(), End> {
-        self.plans.clear();
-        (self.is_finished, self.is_drawn) = (false, false);
-        self.promise = session.promise();
-        self.tell_plan(page, &session.plan())
-    }
-
     /// Takes a pose.
     fn hear(&mut self, page: &mut Page, message: FromPage) -> Result<(), End> {
         match message {
@@ -281,16 +269,15 @@ impl Visitor {
                     return Err(End::Refused(format!("moment: {} must be below {moments}", pose.moment)));
                 }
                 let canvas_px = UVec2::from_array(pose.canvas_px);
-                let checked = self.scene.space.camera(&pose.camera, canvas_px);
-                checked.map_err(|error| End::Refused(error.to_string()))?;
+                let camera = self.scene.space.camera(&pose.camera, canvas_px).map_err(End::Refused)?;
                 self.rate.fit(canvas_px);
-                self.newest = Some(pose);
+                self.newest = Some((pose, camera));
                 self.stills.quality = pose.quality.unwrap_or(self.scene.quality);
                 self.limit_rate();
-                page.end_still();
+                page.stills.end();
                 // A scene that moves passes its first moment, too.
                 self.is_moving = pose.moment > 0 || self.is_moving && !pose.still;
-                self.kept(&self.scene).visits.moved(self.number, page.heard);
+                self.visit.moved(page.heard);
                 Ok(())
             }
         }
@@ -299,16 +286,14 @@ impl Visitor {
     /// Asks for the picture of the newest pose. The first still has one sample a pixel, so that it comes soon: more samples
     /// follow once its light is finished.
     fn ask(&self, still_samples: Antialias, motion: &mut PictureStream, still: &mut PictureStream) -> Result<(), End> {
-        let Some(pose) = self.newest else { return Ok(()) };
+        let Some((pose, camera)) = self.newest else { return Ok(()) };
         let canvas_px = UVec2::from_array(pose.canvas_px);
         let chosen = self.rate.chosen();
         let (stream, size_px, codec) = if pose.still {
-            (still, still_size(canvas_px, self.max_still_px), FrameCodec::Png)
+            (still, still_size(canvas_px, self.gateway.config.max_still_px), FrameCodec::Png)
         } else {
             (motion, chosen.size_px(canvas_px), FrameCodec::Jpeg { quality: chosen.jpeg_quality() })
         };
-        let camera = self.scene.space.camera(&pose.camera, canvas_px).map(|camera| camera.resized(size_px));
-        let camera = camera.map_err(|error| End::Refused(error.to_string()))?;
         let samples = if pose.still { still_samples } else { Antialias::NONE };
         let light = match self.planned {
             Some(planned) if pose.still => self.stills.light(planned, samples),
@@ -316,7 +301,7 @@ impl Visitor {
             _ => PictureLight::Session,
         };
         let set_index = if self.is_moving { pose.moment } else { self.light_step };
-        self.ask_for(pose, camera, codec, Wanted { set_index, samples, light }, stream)
+        self.ask_for(pose, camera.resized(size_px), codec, Wanted { set_index, samples, light }, stream)
     }
 
     fn ask_for(
@@ -329,7 +314,7 @@ impl Visitor {
     ) -> Result<(), End> {
         let method = match wanted.light {
             PictureLight::Session => None,
-            PictureLight::Shared(quality) => Some((self.methods.of_quality)(quality)),
+            PictureLight::Shared(quality) => Some((self.gateway.config.methods.of_quality)(quality)),
             PictureLight::Drawn => Some(DIRECT.to_owned()),
         };
         let quality = PictureQuality { codec, antialias: wanted.samples, method, waits_for_set: pose.still };
@@ -363,7 +348,10 @@ impl Visitor {
             || !pose.still
             || plan.policy == Policy::Direct
             || plan.workload.has_cell_near(&frame.request.camera);
-        let shown = self.light_step_of(&plan, &frame);
+        // Views that are drawn directly show the last step of light, and so do scenes that move.
+        let last = self.stills.light_steps - 1;
+        let is_last = self.is_moving || plan.policy == Policy::Direct;
+        let shown = if is_last { last } else { frame.request.set_index.min(last) };
         if pose.still && plan.policy != Policy::Direct && !self.is_moving {
             // Another cell's light begins anew.
             self.light_step = if is_own_cell { self.light_step.max(shown) } else { 0 };
@@ -384,11 +372,7 @@ impl Visitor {
             rtt_s: page.rtt_s,
         };
         let message = stream.message(&frame, &asked, about);
-        if pose.still {
-            page.send_still(message)?
-        } else {
-            page.send_moving(message)?
-        }
+        page.send_picture(message, pose.still)?;
         if is_newest {
             (self.made_with, self.is_finished) = (cameras, next.is_none());
             self.is_drawn = is_drawn;
@@ -425,7 +409,7 @@ impl Visitor {
     }
 
     fn newest_number(&self) -> u64 {
-        self.newest.map_or(0, |newest| newest.number)
+        self.newest.map_or(0, |(pose, _)| pose.number)
     }
 
     /// Whether a picture that was made with these cameras is to be sent.
@@ -451,31 +435,16 @@ impl Visitor {
         cell_cameras(self.plans.iter().find(|plan| plan.plan_epoch == plan_epoch)?, frame.header.cell)
     }
 
-    /// A new plan may have a view cell that is nearer to a visitor who rests: the still is then asked for again.
-    fn renew_still(
-        &mut self,
-        plan: &SessionPlan,
-        motion: &mut PictureStream,
-        still: &mut PictureStream,
-    ) -> Result<(), End> {
-        let Some(pose) = self.newest.filter(|pose| pose.still && pose.number == self.sent) else { return Ok(()) };
-        let camera = self.scene.space.camera(&pose.camera, UVec2::from_array(pose.canvas_px));
-        let camera = camera.map_err(|error| End::Refused(error.to_string()))?;
+    /// Whether a new plan has a view cell that is nearer to a visitor who rests: the still is then asked for again.
+    fn is_outdated(&mut self, plan: &Assignment) -> bool {
+        let shown = self.newest.filter(|(pose, _)| pose.still && pose.number == self.sent);
+        let Some((_, camera)) = shown else { return false };
         // What is on its way goes on under the new plan, and what was drawn from the scene is the same under any.
-        let own_cell = plan.assignment.workload.cell_of(&camera);
-        if self.is_drawn || cell_cameras(&plan.assignment, own_cell) == self.made_with {
-            return Ok(());
-        }
-        if self.is_finished {
+        let is_renewed = !self.is_drawn && cell_cameras(plan, plan.workload.cell_of(&camera)) != self.made_with;
+        if is_renewed && self.is_finished {
             self.light_step = 0;
         }
-        self.ask(Antialias::NONE, motion, still)
-    }
-
-    /// The step of a picture's light, from 0. Views that are drawn directly show the last, and so do scenes that move.
-    fn light_step_of(&self, plan: &Assignment, frame: &EncodedFrame) -> u32 {
-        let last = self.stills.light_steps - 1;
-        if self.is_moving || plan.policy == Policy::Direct { last } else { frame.request.set_index.min(last) }
+        is_renewed
     }
 
     fn tell_plan(&mut self, page: &Page, plan: &SessionPlan) -> Result<(), End> {
@@ -485,7 +454,7 @@ impl Visitor {
         }
         let planned = PlannedLight::from(plan);
         self.planned = Some(planned);
-        self.fallback = plan.fallback.and_then(|_| (self.methods.quality_of)(&plan.method));
+        self.fallback = plan.fallback.and_then(|_| (self.gateway.config.methods.quality_of)(&plan.method));
         self.limit_rate();
         page.tell(&ToPage::Plan {
             epoch: self.plan_epoch(),
