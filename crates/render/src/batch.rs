@@ -1,16 +1,18 @@
 //! One submission's work: a few pictures of a scene.
 
-use std::{ops::Range, sync::Arc};
+use std::{hash::Hash, ops::Range, sync::Arc};
 
 use bytemuck::Zeroable;
 use depth_image::{Antialias, Camera, ToneMapping};
 use glam::Vec2;
-use gpu::{BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVariant, WorkKind};
+use gpu::{
+    Binding, BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, PooledBuffer, ShaderVariant, WorkKind,
+};
 
 use crate::accumulation::{Key, Sums};
 use crate::pixel_camera::{PixelCamera, uniform};
+use crate::{RenderError, rays::Traced, stages::Stages, work::DrawWork};
 use crate::{known_samples::ImageSequence, light_samples::CachedLight, pieces::Piece, planes::Output};
-use crate::{rays::Traced, work::DrawWork};
 
 /// The share of the scene's diagonal within which occlusion is looked for, where a lighting names no radius.
 const OCCLUSION_OF_DIAGONAL: f32 = 0.05;
@@ -60,6 +62,13 @@ pub(crate) struct Recording<'a> {
     pub cameras: wgpu::Buffer,
     pub sums: Sums,
     pub frame: Frame<'a>,
+}
+
+/// A pass with its resources.
+pub(crate) struct BoundPass {
+    pass: Arc<ComputePass>,
+    groups: Vec<BoundGroup>,
+    kind: WorkKind,
 }
 
 /// A position within the pixels.
@@ -176,7 +185,12 @@ impl<'a> Batch<'a> {
         self.uniform(gpu, pieces, sums, &Rays { shadow, lamps: 0..self.lamps(), ambient })
     }
 
-    /// A uniform for each part of `rays`, for a list with room for `capacity` points.
+    /// Rays of each pixel's sequences that the sums are to hold: to lamps, and of ambient light.
+    pub fn wanted_rays(&self) -> [u32; 2] {
+        self.light_rays().map(|rays| self.work.refinement.share_of(rays))
+    }
+
+    /// The parts of a list of points, of which there are at most `capacity`.
     pub fn parts_of_points(&self, gpu: &Gpu, rays: &[Range<u32>; 2], capacity: u32) -> Vec<Part> {
         let list = PixelCamera { pixel_count: capacity, ..PixelCamera::zeroed() };
         let parts = parts_of(rays, self.lamps(), self.rays_around()).into_iter().map(|part| {
@@ -184,6 +198,23 @@ impl<'a> Batch<'a> {
             Part { counts: part.counts(), cameras }
         });
         parts.collect()
+    }
+
+    /// A recording over `count` listed points, and the parts of their rays.
+    pub fn record_points<'r>(
+        &'r self,
+        stages: &'r Stages,
+        label: &'static str,
+        sums: PooledBuffer,
+        count: u32,
+    ) -> (Recording<'r>, Vec<Part>) {
+        let Stages { gpu, passes, .. } = stages;
+        let rays = self.wanted_rays().map(|rays| 0..rays);
+        let parts = self.parts_of_points(gpu, &rays, count);
+        let cameras = parts[0].cameras.clone();
+        let sums = Sums { buffer: sums, rays };
+        let frame = Frame::begin(gpu, label, self.work.turn);
+        (Recording { gpu, passes, batch: self, pieces: Vec::new(), cameras, sums, frame }, parts)
     }
 
     /// A camera with these rays, and those that its sums hold afterwards.
@@ -234,36 +265,41 @@ impl Recording<'_> {
         self.pieces.iter().copied().filter(|piece| piece.camera == camera).collect()
     }
 
-    /// The kind of the passes of a variant over pixels.
-    pub fn kind_of(&self, variant: &impl ShaderVariant) -> WorkKind {
-        WorkKind::new(self.batch.family(), &variant.name())
+    /// Binds a pass to resources of its own, and to those of the batch and the scene where none of its own has their name. The
+    /// time of a unit of its work depends on the variant and on `detail`.
+    pub fn bind<'r>(
+        &'r self,
+        variant: &impl ShaderVariant,
+        detail: impl Hash,
+        own: impl IntoIterator<Item = Binding<'r>>,
+    ) -> Result<BoundPass, RenderError> {
+        let Batch { work, traced, .. } = self.batch;
+        let pass = self.passes.get(variant)?;
+        let mut bindings: Vec<Binding<'r>> = own.into_iter().collect();
+        bindings.extend([Binding::buffer("camera", &self.cameras), Binding::buffer("sums", &self.sums.buffer)]);
+        bindings.extend(work.scene.bindings());
+        bindings.extend(traced.iter().flat_map(|traced| traced.bindings()));
+        let groups = pass.bind_all(&bindings)?;
+        Ok(BoundPass { pass, groups, kind: WorkKind::new(self.batch.family(), &(variant.name(), detail)) })
     }
 
     /// Records a dispatch of a pass over all pixels of a picture.
-    pub fn dispatch(
-        &mut self,
-        variant: &impl ShaderVariant,
-        pass: &ComputePass,
-        groups: &[&BoundGroup],
-        camera: usize,
-    ) {
-        let kind = self.kind_of(variant);
+    pub fn dispatch(&mut self, bound: &BoundPass, camera: usize) {
         for piece in self.pieces_of(camera) {
-            self.dispatch_piece(kind, pass, groups, piece, piece.size());
+            self.dispatch_piece(bound, piece, piece.size());
         }
     }
 
     /// Records a dispatch of this size for a piece of a picture.
-    pub fn dispatch_piece(
-        &mut self,
-        kind: WorkKind,
-        pass: &ComputePass,
-        groups: &[&BoundGroup],
-        piece: Piece,
-        size: DispatchSize<'_>,
-    ) {
-        pass.dispatch_each(&mut self.frame, groups, piece.element..piece.element + 1, size);
-        self.frame.cut(kind, piece.pixel_count().into());
+    pub fn dispatch_piece(&mut self, bound: &BoundPass, piece: Piece, size: DispatchSize<'_>) {
+        self.dispatch_element(bound, piece.element, piece.pixel_count(), size);
+    }
+
+    /// Records a dispatch that sees an element of the cameras' buffer.
+    pub fn dispatch_element(&mut self, bound: &BoundPass, element: u32, units: u32, size: DispatchSize<'_>) {
+        let groups: Vec<&BoundGroup> = bound.groups.iter().collect();
+        bound.pass.dispatch_each(&mut self.frame, &groups, element..element + 1, size);
+        self.frame.cut(bound.kind, units.into());
     }
 }
 

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Aabb, Highlight, MAX_LIGHTS};
 use glam::{Affine3A, Mat3, Vec3};
-use gpu::{Gpu, GpuEnvironment, GpuError, switches};
+use gpu::{Binding, Gpu, GpuEnvironment, GpuError, switches};
 use indexmap::IndexSet;
 use scene::{Material, Scene, Texture, TextureUse, VertexDetail, Wind};
 use wgpu::BufferUsages;
@@ -191,6 +191,13 @@ impl GpuScene {
         let of_textures: u64 = textures.into_iter().map(gpu::texture_bytes).sum();
         let environment = self.environment.as_deref().map_or(0, GpuEnvironment::bytes);
         buffers.map(wgpu::Buffer::size).iter().sum::<u64>() + of_textures + environment + self.rays.bytes() + posed
+    }
+
+    /// What shaders of light read of the scene.
+    pub(crate) fn bindings(&self) -> impl Iterator<Item = Binding<'_>> {
+        let light =
+            [Binding::buffer("background", &self.background), Binding::buffer("illumination", &self.illumination)];
+        light.into_iter().chain(self.environment.iter().flat_map(|map| map.bindings()))
     }
 
     /// Lamps that take rays: those of the scene, and the bright texels of its environment map, which only rays find.

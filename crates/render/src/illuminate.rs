@@ -1,7 +1,7 @@
 //! Light of lamps and the environment, summed over rays.
 
 use depth_image::Highlight;
-use gpu::{Binding, BoundGroup, GpuEnvironment, ResourceTraits, ShaderVariant, WorkKind, highlight_name, switches};
+use gpu::{Binding, ResourceTraits, ShaderVariant, highlight_name, switches};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
@@ -157,29 +157,22 @@ pub(crate) fn record(
     lists: Option<&[PixelList]>,
 ) -> Result<(), RenderError> {
     let batch = recording.batch;
-    let lighting = batch.work.lighting;
-    let traced = batch.traced.as_deref().filter(|_| lighting.is_traced());
     for (number, part) in parts.iter().enumerate() {
         let continued = number > 0 || recording.sums.rays.iter().any(|rays| rays.start > 0);
         let of_batch = Illuminate::of(batch);
         let knows_ambient = batch.cached.is_some() && of_batch.ambient == AmbientRays::Indirect;
         let variant = Illuminate { listed: lists.is_some(), knows_ambient, continued, ..of_batch };
-        let pass = recording.passes.get(&variant)?;
-        let rays = traced.map(|traced| pass.bind(1, traced.bindings())).transpose()?;
-        let kind = WorkKind::new(batch.family(), &(variant.name(), part.counts));
-        let map = batch.work.scene.environment.as_deref();
         for (camera, target) in (first..).zip(surfaces) {
-            let buffers = [&part.cameras, &batch.work.scene.illumination, &recording.sums.buffer];
-            let lists_of_pieces = lists.map_or(vec![None], |lists| lists.iter().map(Some).collect());
-            let own = lists_of_pieces.iter().map(|list| {
-                let listed = list.iter().flat_map(|list| list.bindings());
-                pass.bind(0, bindings(buffers, map).chain(target.bindings()).chain(listed))
-            });
-            let own = own.collect::<Result<Vec<_>, _>>()?;
-            for (place, piece) in recording.pieces_of(camera).into_iter().enumerate() {
-                let (own, size) = lists.map_or((&own[0], piece.size()), |lists| (&own[place], lists[place].size()));
-                let groups: Vec<&BoundGroup> = std::iter::once(own).chain(&rays).collect();
-                recording.dispatch_piece(kind, &pass, &groups, piece, size);
+            let Some(lists) = lists else {
+                let own = [Binding::buffer("camera", &part.cameras)].into_iter().chain(target.bindings());
+                let bound = recording.bind(&variant, part.counts, own)?;
+                recording.dispatch(&bound, camera);
+                continue;
+            };
+            for (piece, list) in recording.pieces_of(camera).into_iter().zip(lists) {
+                let own = [Binding::buffer("camera", &part.cameras)].into_iter().chain(target.bindings());
+                let bound = recording.bind(&variant, part.counts, own.chain(list.bindings()))?;
+                recording.dispatch_piece(&bound, piece, list.size());
             }
         }
     }
@@ -190,63 +183,16 @@ pub(crate) fn record(
 pub(crate) fn record_points(
     recording: &mut Recording<'_>,
     parts: &[Part],
-    points: Rays<'_>,
+    points: &Rays,
     sums: &Buffer,
 ) -> Result<(), RenderError> {
-    let batch = recording.batch;
-    let tree = batch.traced.as_deref();
     for (number, part) in parts.iter().enumerate() {
-        let variant = Illuminate { by_rays: false, bounces: true, continued: number > 0, ..Illuminate::of(batch) };
-        let pass = recording.passes.get(&variant)?;
-        let buffers = [&part.cameras, &batch.work.scene.illumination, sums];
-        let own = bindings(buffers, batch.work.scene.environment.as_deref()).chain(points.bindings());
-        let own = pass.bind(0, own)?;
-        let tree = tree.map(|tree| pass.bind(1, tree.bindings())).transpose()?;
-        let groups: Vec<&BoundGroup> = std::iter::once(&own).chain(&tree).collect();
-        points.dispatch(recording, &variant, part.counts, &pass, &groups);
+        let of_batch = Illuminate::of(recording.batch);
+        let variant = Illuminate { by_rays: false, bounces: true, continued: number > 0, ..of_batch };
+        let own = [Binding::buffer("camera", &part.cameras), Binding::buffer("sums", sums)];
+        let own = own.into_iter().chain(points.bindings());
+        let bound = recording.bind(&variant, (part.counts, points.generation), own)?;
+        points.dispatch(recording, &bound);
     }
     Ok(())
-}
-
-/// Those of all variants.
-fn bindings<'r>(
-    [camera, illumination, sums]: [&'r Buffer; 3],
-    map: Option<&'r GpuEnvironment>,
-) -> impl Iterator<Item = Binding<'r>> {
-    let buffers = [("camera", camera), ("illumination", illumination), ("sums", sums)];
-    let buffers = buffers.into_iter().map(|(name, buffer)| Binding::buffer(name, buffer));
-    buffers.chain(map.into_iter().flat_map(GpuEnvironment::bindings))
-}
-
-#[cfg(test)]
-mod tests {
-    use gpu::BufferPool;
-
-    use super::*;
-    use crate::{reflections::bounces::BounceList, test_support::TestStage};
-
-    #[test]
-    fn every_variant_is_bound_by_its_names() {
-        let stage = TestStage::new();
-        let traced = stage.scene.rays.at(0.0).expect("a tree");
-        let buffer = &stage.buffer;
-        let list = PixelList::new(&stage.gpu, &BufferPool::new(&stage.gpu), 1);
-        let bounces = BounceList::new(&stage.gpu, 1);
-        let points = Rays { bounces: buffer, list: &bounces, generation: 1 };
-        for variant in Illuminate::all() {
-            let target = stage.surfaces(variant.by_rays, false);
-            let map = variant.environment_map.then_some(&stage.environment);
-            let mut own: Vec<Binding<'_>> = bindings([buffer; 3], map).collect();
-            if variant.bounces {
-                own.extend(points.bindings());
-            } else {
-                own.extend(target.bindings());
-                own.extend(variant.listed.then(|| list.bindings()).into_iter().flatten());
-            }
-            stage.check(&variant, 0, &own);
-            if variant.traversal.is_some() {
-                stage.check(&variant, 1, &traced.bindings());
-            }
-        }
-    }
 }

@@ -30,10 +30,8 @@ pub(crate) fn record(
     target: &Surfaces,
     held: &wgpu::TextureView,
 ) -> Result<(), RenderError> {
-    let variant = Keep { by_rays: recording.batch.by_rays };
-    let pass = recording.passes.get(&variant)?;
-    let own = [Binding::buffer("camera", &recording.cameras), Binding::texture("held", held)];
-    let bound = pass.bind(0, own.into_iter().chain(target.bindings()))?;
-    recording.dispatch(&variant, &pass, &[&bound], camera);
+    let own = [Binding::texture("held", held)].into_iter().chain(target.bindings());
+    let bound = recording.bind(&Keep { by_rays: recording.batch.by_rays }, (), own)?;
+    recording.dispatch(&bound, camera);
     Ok(())
 }

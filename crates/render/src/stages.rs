@@ -89,7 +89,7 @@ impl Stages {
         let refinement = batch.work.refinement;
         let bytes = batch.bytes(if lighting.is_lit() { batch.output.sums.count() } else { 0 });
         self.gpu.check_storage_bytes("the light of a batch (bytes)", bytes)?;
-        let wanted = batch.light_rays().map(|rays| refinement.share_of(rays));
+        let wanted = batch.wanted_rays();
         let kept = (refinement.steps > 1).then(|| self.accumulations.take(&batch.key(), wanted)).flatten();
         Ok(kept.unwrap_or_else(|| {
             let buffer = self.pool.lend_storage("light", bytes.max(4));

@@ -54,16 +54,6 @@ pub(crate) struct SurfaceViews {
     first_surfaces: Option<wgpu::TextureView>,
 }
 
-impl SurfaceViews {
-    pub fn first_surface_binding(&self) -> Option<Binding<'_>> {
-        self.first_surfaces.as_ref().map(|surfaces| Binding::texture("first_surfaces", surfaces))
-    }
-
-    pub fn triangle_normal_binding(&self) -> Option<Binding<'_>> {
-        self.triangle_normals.as_ref().map(|normals| Binding::texture("triangle_normals", normals))
-    }
-}
-
 /// Lends textures; they come back when dropped.
 pub(crate) struct SurfacePool {
     gpu: Arc<Gpu>,
@@ -111,10 +101,13 @@ impl SurfacePool {
 
 impl Surfaces {
     /// The variables of `surfaces.wgsl`.
-    pub fn bindings(&self) -> [Binding<'_>; 2] {
-        [
-            Binding::texture("surfaces", &self.views.surfaces),
-            Binding::texture("reversed_depth", &self.views.reversed_depth),
-        ]
+    pub fn bindings(&self) -> impl Iterator<Item = Binding<'_>> {
+        let SurfaceViews { surfaces, reversed_depth, front_depth, triangle_normals, first_surfaces, .. } = &*self.views;
+        let always = [("surfaces", surfaces), ("reversed_depth", reversed_depth), ("front_depth", front_depth)];
+        let ids = self.surface_ids.as_ref().map(|view| ("surface_ids", view));
+        let normals = triangle_normals.as_ref().map(|view| ("triangle_normals", view));
+        let first = first_surfaces.as_ref().map(|view| ("first_surfaces", view));
+        let views = always.into_iter().chain(ids).chain(normals).chain(first);
+        views.map(|(name, view)| Binding::texture(name, view))
     }
 }

@@ -123,11 +123,10 @@ pub(super) fn warm(
 }
 
 fn empty_group(gpu: &Gpu, shader: &Shader, number: u32, forms: &[Form]) -> BoundGroup {
-    let mut resources: Vec<&Resource> = shader.interface.groups[number as usize].iter().collect();
-    resources.sort_by_key(|resource| resource.layout.binding);
+    let resources = &shader.interface.groups[number as usize];
     let empty: Vec<Empty> =
         resources.iter().zip(forms).map(|(resource, &form)| Empty::of(gpu, resource, form)).collect();
-    shader.bind_in_order(number, resources.into_iter().zip(empty.iter().map(Empty::resource)).collect())
+    shader.bind_in_order(number, resources.iter().zip(empty.iter().map(Empty::resource)).collect())
 }
 
 #[cfg(test)]
