@@ -125,8 +125,14 @@ impl Gpu {
     /// # Errors
     /// Names the buffer, its size and the limit.
     pub fn check_storage_bytes(&self, what: &str, bytes: u64) -> Result<(), GpuError> {
+        GpuError::check_limit(what, bytes, self.most_storage_bytes())
+    }
+
+    /// The bytes of the largest storage buffer that the device can bind.
+    #[must_use]
+    pub fn most_storage_bytes(&self) -> u64 {
         let limits = self.device.limits();
-        GpuError::check_limit(what, bytes, limits.max_storage_buffer_binding_size.min(limits.max_buffer_size))
+        limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
     }
 
     /// A buffer of zeros.

@@ -40,15 +40,6 @@ struct Timer {
     host: wgpu::Buffer,
 }
 
-/// Work whose recording has ended.
-struct Recorded<'g> {
-    gpu: &'g Gpu,
-    label: &'static str,
-    pieces: VecDeque<Piece>,
-    timer: Option<Timer>,
-    reads: Vec<PooledBuffer>,
-}
-
 /// Work whose last slice is under way. It holds the device until it is waited for or dropped: a thread that has it asks for
 /// no other turn. While a live stream is open, it has ended: no work of the host lies between the device's end and others'
 /// turns.
@@ -149,31 +140,17 @@ impl<'g> Frame<'g> {
     /// # Errors
     /// When the device is lost.
     pub fn submit(self) -> Result<Submitted<'g>, GpuError> {
-        let gpu = self.gpu;
-        let turn = self.turn;
-        let recorded = self.end();
-        let slot = gpu.device_queue.wait(turn, predicted_s(gpu, &recorded.pieces));
-        recorded.submit_in(slot)
+        self.submit_in(None)
     }
 
-    /// Sends work of one piece to the device, which was waited for before.
-    pub(crate) fn submit_in(self, slot: Slot<'g>) -> Result<Submitted<'g>, GpuError> {
-        self.end().submit_in(slot)
-    }
-
-    fn end(self) -> Recorded<'g> {
-        let Self { gpu, label, mut encoder, work, ended: mut pieces, timer, reads, .. } = self;
+    /// Sends the work to the device as [`Frame::submit`] does, the first slice in a slot that was waited for before.
+    pub(crate) fn submit_in(self, slot: Option<Slot<'g>>) -> Result<Submitted<'g>, GpuError> {
+        let Self { gpu, label, turn, mut encoder, work, ended: mut pieces, timer, reads } = self;
         if let Some(timer) = &timer {
             timer.finish(&mut encoder);
         }
         pieces.push_back(Piece { commands: encoder.finish(), work });
-        Recorded { gpu, label, pieces, timer, reads }
-    }
-}
-
-impl<'g> Recorded<'g> {
-    fn submit_in(self, mut slot: Slot<'g>) -> Result<Submitted<'g>, GpuError> {
-        let Self { gpu, label, mut pieces, timer, reads } = self;
+        let mut slot = slot.unwrap_or_else(|| gpu.device_queue.wait(turn, predicted_s(gpu, &pieces)));
         gpu.faults.check_injected()?;
         let mut earlier_s = 0.0;
         let last = loop {

@@ -134,7 +134,7 @@ impl TablePool {
         frame.encoder.copy_buffer_to_texture(from, texture.as_image_copy(), texture.size());
         frame.count(work);
         staging.belt.finish();
-        let filled = frame.submit_in(slot);
+        let filled = frame.submit_in(Some(slot));
         staging.belt.recall();
         // Nobody waits for it but the work on views that comes after it, unless that is to be short.
         if queue.cuts() { filled?.wait().map(drop) } else { filled.map(drop) }

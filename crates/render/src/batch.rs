@@ -9,7 +9,7 @@ use gpu::{
     Binding, BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, PooledBuffer, ShaderVariant, WorkKind,
 };
 
-use crate::accumulation::{Key, Sums};
+use crate::accumulation::Sums;
 use crate::pixel_camera::{PixelCamera, uniform};
 use crate::{RenderError, rays::Traced, stages::Stages, work::DrawWork};
 use crate::{known_samples::ImageSequence, light_samples::CachedLight, pieces::Piece, planes::Output};
@@ -24,6 +24,7 @@ const CAMERAS_A_SUBMISSION: usize = 32;
 const UNKNOWN_SLICE_RAYS: u64 = 1 << 14;
 
 /// One submission's work, once it is known how surfaces are found.
+#[derive(Clone)]
 pub(crate) struct Batch<'a> {
     pub work: DrawWork<'a>,
     /// All of one model.
@@ -80,11 +81,11 @@ pub(crate) struct Position {
 }
 
 impl<'a> Batch<'a> {
-    /// A batch of points, which no camera sees.
-    pub fn of_points(work: DrawWork<'a>, traced: Option<Arc<Traced>>, output: Output) -> Self {
+    /// Work without cameras, as that over points is, that is not traced.
+    pub fn new(work: DrawWork<'a>, output: Output) -> Self {
         let position = Position::default();
         let tone = ToneMapping::NONE;
-        Self { work, cameras: &[], by_rays: false, traced, output, tone, sequence: None, cached: None, position }
+        Self { work, cameras: &[], by_rays: false, traced: None, output, tone, sequence: None, cached: None, position }
     }
 
     /// All positions within the pixels, and the cameras whose pixels' centres are there. The centre of a depth image comes first;
@@ -136,15 +137,10 @@ impl<'a> Batch<'a> {
     }
 
     /// Equal keys are the same light of the same pixels.
-    pub fn key(&self) -> Key {
+    pub fn key(&self) -> String {
         let DrawWork { scene, lighting, scene_time_s, .. } = self.work;
-        // The samples of a sequence's image depend on all cameras of its set, and on its place among them.
-        let set = self.sequence.map_or(&[][..], |sequence| &sequence.known.cameras);
-        let cameras = set.iter().copied().map(Camera::from).chain(self.cameras.iter().copied()).collect();
-        let redundancy = self.sequence.map(|sequence| sequence.known.variant(sequence.first));
-        let by_rays = self.by_rays;
-        let output = self.output;
-        Key { scene: scene.identity, lighting, scene_time_s, cameras, by_rays, output, redundancy }
+        let set = self.sequence.map(|sequence| (&sequence.known.cameras, sequence.known.variant(sequence.first)));
+        format!("{:?}", (scene.identity, lighting, scene_time_s, set, self.cameras, self.by_rays, self.output))
     }
 
     /// The family of the passes over pixels, whose costs are learned.
@@ -190,7 +186,7 @@ impl<'a> Batch<'a> {
         self.light_rays().map(|rays| self.work.refinement.share_of(rays))
     }
 
-    /// The parts of a list of points, of which there are at most `capacity`.
+    /// A uniform for each part of `rays`, for a list with room for `capacity` points.
     pub fn parts_of_points(&self, gpu: &Gpu, rays: &[Range<u32>; 2], capacity: u32) -> Vec<Part> {
         let list = PixelCamera { pixel_count: capacity, ..PixelCamera::zeroed() };
         let parts = parts_of(rays, self.lamps(), self.rays_around()).into_iter().map(|part| {

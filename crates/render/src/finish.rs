@@ -4,10 +4,7 @@ use std::collections::HashSet;
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Antialias, Highlight};
-use gpu::{
-    Binding, BufferPool, Gpu, GpuEnvironment, GpuTone, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name,
-    switches,
-};
+use gpu::{Binding, BufferPool, Gpu, GpuTone, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, switches};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 

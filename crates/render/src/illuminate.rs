@@ -7,7 +7,7 @@ use wgpu::Buffer;
 
 use crate::rays::Traversal;
 use crate::{
-    Ambient, Direct, RenderError,
+    Direct, RenderError,
     batch::{Batch, Part, Recording},
     pixel_camera::CAMERA_TRAITS,
     pixel_list::PixelList,
@@ -15,28 +15,6 @@ use crate::{
     sums::SumPlanes,
     surfaces::Surfaces,
 };
-
-/// The rays to a lamp that a shader is written for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-enum ShadowRays {
-    #[default]
-    None,
-    /// One, to the middle.
-    One,
-    /// As many as the uniform says, spread over the lamp.
-    Many,
-}
-
-/// The rays of ambient light that a shader is written for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-enum AmbientRays {
-    #[default]
-    None,
-    /// They look for surfaces that occlude the environment.
-    Occlusion,
-    /// They bring what surfaces send back.
-    Indirect,
-}
 
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Illuminate {
@@ -48,8 +26,14 @@ pub(crate) struct Illuminate {
     knows_ambient: bool,
     /// Lit are listed points, such as those where mirrored rays end, not pixels.
     bounces: bool,
-    shadow_rays: ShadowRays,
-    ambient: AmbientRays,
+    /// Lamps have rays: one to the middle.
+    shadows: bool,
+    /// As many rays as the uniform says are spread over each lamp.
+    soft: bool,
+    /// Rays look for surfaces that occlude the environment.
+    ambient: bool,
+    /// They bring what surfaces send back, too.
+    indirect: bool,
     /// Light is added to sums of earlier rays.
     continued: bool,
     sums: SumPlanes,
@@ -65,20 +49,11 @@ impl ShaderVariant for Illuminate {
 
     fn context(&self) -> Value {
         let Self { by_rays, single_pole, listed, knows_ambient, bounces, continued, environment_map, .. } = *self;
+        let Self { shadows, soft, ambient, indirect, .. } = *self;
         context! {
-            by_rays, single_pole, listed, knows_ambient, bounces, continued, environment_map,
-            shadow_rays => match self.shadow_rays {
-                ShadowRays::None => "none",
-                ShadowRays::One => "one",
-                ShadowRays::Many => "many",
-            },
-            ambient => match self.ambient {
-                AmbientRays::None => "none",
-                AmbientRays::Occlusion => "occlusion",
-                AmbientRays::Indirect => "indirect",
-            },
+            by_rays, single_pole, listed, knows_ambient, bounces, continued, environment_map, shadows, soft, ambient, indirect,
             traced => self.traversal.is_some(),
-            primary => self.ambient == AmbientRays::Indirect,
+            primary => indirect,
             from_eye => false,
             shading => highlight_name(Highlight::Ggx),
             ..merge_maps([self.sums.context(), self.traversal.map(Traversal::context).unwrap_or_default()])
@@ -87,36 +62,27 @@ impl ShaderVariant for Illuminate {
 
     fn all() -> Vec<Self> {
         let mut lit = Vec::new();
-        for [by_rays, listed, bounces, continued, environment_map] in switches() {
-            for shadow_rays in [ShadowRays::None, ShadowRays::One, ShadowRays::Many] {
-                for ambient in [AmbientRays::None, AmbientRays::Occlusion, AmbientRays::Indirect] {
-                    let plain = Self { by_rays, listed, bounces, continued, environment_map, ..Self::default() };
-                    lit.push(Self { shadow_rays, ambient, ..plain });
-                }
-            }
+        for [by_rays, listed, bounces, continued, environment_map, shadows, soft, ambient, indirect] in switches() {
+            let plain = Self { by_rays, listed, bounces, continued, environment_map, ..Self::default() };
+            lit.push(Self { shadows, soft, ambient, indirect, ..plain });
         }
         // Points have a list of their own, and indirect light is that of lamps with rays.
         lit.retain(|variant| !(variant.bounces && (variant.by_rays || variant.listed)));
-        lit.retain(|variant| variant.rays() != (ShadowRays::None, AmbientRays::Indirect));
-        let many_indirect = (ShadowRays::Many, AmbientRays::Indirect);
-        let indirect = lit.iter().filter(|variant| variant.listed && variant.rays() == many_indirect);
+        lit.retain(|variant| variant.shadows || !(variant.soft || variant.indirect));
+        lit.retain(|variant| variant.ambient || !variant.indirect);
+        let indirect = lit.iter().filter(|variant| variant.listed && variant.soft && variant.indirect);
         let indirect = indirect.map(|variant| Self { knows_ambient: true, ..*variant });
-        let kinds = [(ShadowRays::None, AmbientRays::None), (ShadowRays::Many, AmbientRays::Occlusion)];
         let bent = lit.iter().filter(|variant| variant.by_rays && !variant.continued && !variant.environment_map);
-        let bent = bent.filter(|variant| kinds.contains(&variant.rays()));
+        let bent = bent.filter(|variant| !variant.indirect && [variant.shadows, variant.soft] == [variant.ambient; 2]);
         let bent = bent.map(|variant| Self { single_pole: true, ..*variant });
         lit.iter().copied().chain(indirect).chain(bent).flat_map(Self::with_all_sums).collect()
     }
 }
 
 impl Illuminate {
-    fn rays(&self) -> (ShadowRays, AmbientRays) {
-        (self.shadow_rays, self.ambient)
-    }
-
     /// With each kind of sums, and with each traversal where rays are traced.
     fn with_all_sums(self) -> impl Iterator<Item = Self> {
-        let is_traced = self.rays() != (ShadowRays::None, AmbientRays::None);
+        let is_traced = self.shadows || self.ambient;
         SumPlanes::all().flat_map(move |sums| {
             Traversal::ALL.map(|traversal| Self { sums, traversal: is_traced.then_some(traversal), ..self })
         })
@@ -129,19 +95,13 @@ impl Illuminate {
         Self {
             by_rays: batch.by_rays,
             single_pole: batch.is_single_pole(),
-            shadow_rays: match lighting.direct {
-                Direct::Unlit | Direct::Phong => ShadowRays::None,
-                Direct::Shadows => ShadowRays::One,
-                Direct::Soft(_) => ShadowRays::Many,
-            },
-            ambient: match lighting.ambient {
-                None => AmbientRays::None,
-                Some(Ambient::Occlusion(..)) => AmbientRays::Occlusion,
-                Some(Ambient::Indirect(_)) => AmbientRays::Indirect,
-            },
+            shadows: lighting.shadow_rays() > 0,
+            soft: matches!(lighting.direct, Direct::Soft(_)),
+            ambient: lighting.ambient.is_some(),
+            indirect: lighting.is_indirect(),
             sums: batch.output.sums,
             environment_map: batch.work.scene.environment.is_some(),
-            traversal: traced.map(Traversal::of),
+            traversal: traced.map(|traced| traced.traversal),
             ..Self::default()
         }
     }
@@ -160,7 +120,7 @@ pub(crate) fn record(
     for (number, part) in parts.iter().enumerate() {
         let continued = number > 0 || recording.sums.rays.iter().any(|rays| rays.start > 0);
         let of_batch = Illuminate::of(batch);
-        let knows_ambient = batch.cached.is_some() && of_batch.ambient == AmbientRays::Indirect;
+        let knows_ambient = batch.cached.is_some() && of_batch.indirect;
         let variant = Illuminate { listed: lists.is_some(), knows_ambient, continued, ..of_batch };
         for (camera, target) in (first..).zip(surfaces) {
             let Some(lists) = lists else {

@@ -87,12 +87,7 @@ impl ShaderVariant for LookUp {
             lamp_vectors => lamps_with_shares + usize::from(bright_traced),
             sample_texels => sample_texels(share_words),
             light_slots => light_slots(sums.light_count),
-            positions => match self.positions {
-                Positions::Only => "only",
-                Positions::First => "first",
-                Positions::Later => "later",
-                Positions::Asked => "asked",
-            },
+            positions => format!("{:?}", self.positions),
         };
         merge_maps([own, sums.context()])
     }

@@ -57,10 +57,8 @@ impl Stages {
         let mirrored = mirrored.transpose()?;
         let cameras = batch.uniform_of_all(gpu, &pieces, &sums);
         let shifted = batch.positions();
-        let positions = shifted.iter().map(|(position, cameras)| {
-            let position = *position;
-            Batch { cameras, traced: batch.traced.clone(), position, ..*batch }
-        });
+        let positions =
+            shifted.iter().map(|(position, cameras)| Batch { cameras, position: *position, ..batch.clone() });
         let positions: Vec<Batch<'_>> = positions.collect();
         let frame = Frame::begin(gpu, "draw", turn);
         let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, frame };

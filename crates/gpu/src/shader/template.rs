@@ -28,21 +28,10 @@ pub trait WgslLiteral: Debug + Copy {
     }
 }
 
-impl WgslLiteral for u16 {
-    const SUFFIX: char = 'u';
+macro_rules! wgsl_literals {
+    ($($number:ty = $suffix:literal),*) => { $(impl WgslLiteral for $number { const SUFFIX: char = $suffix; })* };
 }
-
-impl WgslLiteral for u32 {
-    const SUFFIX: char = 'u';
-}
-
-impl WgslLiteral for i32 {
-    const SUFFIX: char = 'i';
-}
-
-impl WgslLiteral for f32 {
-    const SUFFIX: char = 'f';
-}
+wgsl_literals! { u16 = 'u', u32 = 'u', i32 = 'i', f32 = 'f' }
 
 /// The names and literals of constants.
 #[macro_export]

@@ -15,6 +15,8 @@ use super::compiled::Shader;
 use super::interface::Resource;
 use crate::device::{DevicePreference, Gpu};
 use crate::error::GpuError;
+use crate::frame::Frame;
+use crate::sharing::WorkKind;
 
 /// The forms that a pass remembers; all are forgotten when there are more.
 const MOST_FORMS: usize = 1024;
@@ -73,8 +75,14 @@ impl Empty {
 }
 
 impl FirstUses {
-    /// Has `make_ready` done once for resources of these forms. Whether this is the first use, or was when it began to wait.
-    pub fn make_ready(&self, groups: &[&BoundGroup], make_ready: impl FnOnce()) -> bool {
+    /// Warms a shader at its first use with resources of these forms, of which the frame is told.
+    pub fn make_ready(
+        &self,
+        frame: &mut Frame<'_>,
+        shader: &Shader,
+        groups: &[&BoundGroup],
+        use_it: impl FnOnce(&Gpu, Shader, &[BoundGroup]) -> Result<(), GpuError>,
+    ) {
         let mut hasher = DefaultHasher::new();
         groups.iter().for_each(|bound| bound.forms.hash(&mut hasher));
         let mut uses = self.0.lock();
@@ -83,16 +91,18 @@ impl FirstUses {
         }
         let first_use = uses.entry(hasher.finish()).or_insert_with(|| Arc::new(Once::new())).clone();
         drop(uses);
-        let is_first = !first_use.is_completed();
+        // A thread that waits for another's first use has waited, too.
+        if !first_use.is_completed() {
+            frame.count((WorkKind::FIRST_USE, 1));
+        }
         // Where an earlier thread panicked, the pass goes on without.
-        first_use.call_once_force(|_| make_ready());
-        is_first
+        first_use.call_once_force(|_| warm(frame.gpu, shader, groups, use_it));
     }
 }
 
 /// Has the second device use a shader with resources of these forms, where the device compiles at the first use and others
 /// would wait for it.
-pub(super) fn warm(
+fn warm(
     gpu: &Gpu,
     shader: &Shader,
     groups: &[&BoundGroup],
@@ -134,7 +144,6 @@ mod tests {
     use wgpu::TextureFormat;
 
     use super::*;
-    use crate::frame::Frame;
     use crate::shader::{Binding, ComputePass, DispatchSize, ResourceTrait};
     use crate::sharing::Turn;
 

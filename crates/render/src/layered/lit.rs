@@ -58,7 +58,7 @@ pub(super) fn light(
 ) -> Result<Light, RenderError> {
     let traced = work.lighting.is_traced().then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
     let output = Output { samples: true, ..Output::of(work, work.highlight().is_some()) };
-    let batch = Batch::of_points(work, traced, output);
+    let batch = Batch { traced, ..Batch::new(work, output) };
     let points = Points::of(camera, first);
     let mut light = Light { visibility8: vec![Vec::new(); output.sums.visibility_words()], ..Light::default() };
     let a_list = points_a_list(stages, output);
@@ -73,8 +73,7 @@ pub(super) fn light(
 
 /// Surfaces for which no buffer is larger than the device binds.
 fn points_a_list(stages: &Stages, output: Output) -> usize {
-    let limits = stages.gpu.device.limits();
-    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) as usize;
+    let bytes = stages.gpu.most_storage_bytes() as usize;
     let planes = output.sums.count().max(1 + output.sums.visibility_words()).max(size_of::<GpuBounce>() / 4);
     POINTS_A_LIST.min(bytes / (4 * planes)).max(1)
 }

@@ -83,7 +83,7 @@ pub(crate) fn record(
 ) -> Result<(), RenderError> {
     let batch = recording.batch;
     let variant = Primary {
-        traversal: Traversal::of(traced),
+        traversal: traced.traversal,
         shading: batch.work.lighting.highlight(),
         surface_id: surfaces.iter().any(|target| target.surface_ids.is_some()),
         triangle_normal: batch.output.triangle_normal,

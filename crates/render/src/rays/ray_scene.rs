@@ -15,7 +15,7 @@ use wgpu::TextureFormat;
 
 use super::bvh::{Bvh, MAX_DEPTH};
 use super::flat::{CORNER_FLAGS, FlatDetail, FlatScene, FlatTriangle, FlatVertex, MAX_VERTICES, OrderedMesh};
-use super::material_switches::MaterialSwitches;
+use super::traversal::Traversal;
 use crate::material::{normal_scale, phong_reflector};
 use crate::{few_cores::on_free_cores, motion::Motion, texture};
 
@@ -44,7 +44,7 @@ pub struct RayScene {
     flat: FlatScene,
     materials: Vec<[u32; 4]>,
     texels: Vec<[u8; 4]>,
-    switches: MaterialSwitches,
+    traversal: Traversal,
     state: Mutex<Option<Built>>,
 }
 
@@ -65,7 +65,7 @@ const TABLES: [&str; 7] =
 pub struct Traced {
     /// In the order of [`TABLES`].
     tables: [Arc<Table>; 7],
-    pub(crate) switches: MaterialSwitches,
+    pub(crate) traversal: Traversal,
     /// The making of the tree.
     pub report: AccelerationReport,
 }
@@ -100,9 +100,9 @@ impl RayScene {
             texture::mips(texture).for_each(|level| texels.extend(level.srgba8.as_chunks::<4>().0));
         }
         let materials = scene.materials.iter().flat_map(|material| material_texels(material, &places)).collect();
-        let switches = MaterialSwitches::of(scene);
-        let flat = FlatScene::of(scene, ordered, motion, switches.mapped);
-        Self { gpu: gpu.clone(), flat, materials, texels, switches, state: Mutex::default() }
+        let traversal = Traversal::new(scene);
+        let flat = FlatScene::of(scene, ordered, motion, traversal.mapped);
+        Self { gpu: gpu.clone(), flat, materials, texels, traversal, state: Mutex::default() }
     }
 
     /// Triangles and the tree over them at a scene time. A tree of another time is refitted where that costs less
@@ -211,7 +211,7 @@ impl RayScene {
         };
         tracing::debug!(?report, "rays are ready");
         let tables = [nodes, corners, vertices, details, triangles, materials, texels];
-        Ok(Arc::new(Traced { tables, switches: self.switches, report }))
+        Ok(Arc::new(Traced { tables, traversal: self.traversal.with_depth(bvh.depth), report }))
     }
 
     /// Three texels a triangle in the order of the tree's leaves: a corner's position, and its number with the

@@ -63,7 +63,7 @@ impl Rays {
         [Binding::buffer("next_bounces", &self.bounces), Binding::buffer("next", &self.arguments)]
     }
 
-    /// Records a pass over them.
+    /// Records a pass over them, bound with their generation: each mirror on the way leaves fewer rays.
     pub fn dispatch(&self, recording: &mut Recording<'_>, bound: &BoundPass) {
         recording.dispatch_element(bound, 0, self.units, DispatchSize::Indirect(&self.arguments, 0));
     }

@@ -27,7 +27,7 @@ impl ShaderVariant for Follow {
 /// Records the pass over the rays off one mirror.
 pub(super) fn record(recording: &mut Recording<'_>, rays: &Rays) -> Result<(), RenderError> {
     let Some(traced) = recording.batch.traced.as_deref() else { return Ok(()) };
-    let bound = recording.bind(&Follow { traversal: Traversal::of(traced) }, rays.generation, rays.bindings())?;
+    let bound = recording.bind(&Follow { traversal: traced.traversal }, rays.generation, rays.bindings())?;
     rays.dispatch(recording, &bound);
     Ok(())
 }

@@ -52,7 +52,6 @@ pub(super) fn record(
 ) -> Result<(), RenderError> {
     let batch = recording.batch;
     let variant = Lobe { by_rays: batch.by_rays, plane_count: batch.output.layout().count, first: ray == 0 };
-    // What rays off mirrors do not show is theirs.
     let whole = u32::from(batch.work.lighting.reflections.is_none());
     let ray_count = batch.glossy_rays();
     let first_ray = batch.position.number * ray_count;

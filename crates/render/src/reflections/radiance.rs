@@ -24,7 +24,7 @@ impl<'a> RadianceWork<'a> {
     /// No surfaces as yet. The lighting has shadows.
     pub fn of(stages: &'a Stages, work: DrawWork<'a>) -> Result<Self, RenderError> {
         let traced = Some(work.scene.rays.at(work.scene_time_s)?);
-        let batch = Batch::of_points(work, traced, Output { mirrors: true, ..Output::of(work, true) });
+        let batch = Batch { traced, ..Batch::new(work, Output { mirrors: true, ..Output::of(work, true) }) };
         Ok(Self { stages, batch, points: Vec::new(), lit: Vec::new() })
     }
 

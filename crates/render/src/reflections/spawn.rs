@@ -55,7 +55,7 @@ pub(super) fn record(
     let batch = recording.batch;
     let Some(traced) = batch.traced.as_deref() else { return Ok(()) };
     let plane_count = batch.output.layout().count;
-    let variant = Spawn { by_rays: batch.by_rays, plane_count, traversal: Traversal::of(traced) };
+    let variant = Spawn { by_rays: batch.by_rays, plane_count, traversal: traced.traversal };
     let bound = recording.bind(&variant, (), target.bindings().chain(next.next_bindings()))?;
     recording.dispatch_piece(&bound, piece, piece.size());
     Ok(())
