@@ -18,7 +18,7 @@ pub struct Frame<'g> {
     /// The commands of the piece that is being recorded, to which passes add theirs.
     pub encoder: wgpu::CommandEncoder,
     /// The work of that piece.
-    work: Vec<Work>,
+    pub(crate) work: Vec<Work>,
     ended: VecDeque<Piece>,
     timer: Option<Timer>,
     reads: Vec<PooledBuffer>,
@@ -82,16 +82,10 @@ impl<'g> Frame<'g> {
         Self { gpu, label, turn, encoder, work: Vec::new(), ended: VecDeque::new(), timer, reads: Vec::new() }
     }
 
-    /// The place of this work in the device's order.
-    #[must_use]
-    pub fn turn(&self) -> Turn {
-        self.turn
-    }
-
     /// Says what was recorded since the last cut: so many units of a kind. While a live stream is open, other work may go
     /// between this and what is recorded next.
     pub fn cut(&mut self, kind: WorkKind, units: u64) {
-        self.count((kind, units));
+        self.work.push((kind, units));
         if self.gpu.device_queue.cuts() {
             let next = encoder(self.gpu, self.label);
             let commands = std::mem::replace(&mut self.encoder, next).finish();
@@ -121,11 +115,6 @@ impl<'g> Frame<'g> {
             depth_stencil_attachment: Some(RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }),
             ..Default::default()
         })
-    }
-
-    /// Says what was recorded, without a cut.
-    pub(crate) fn count(&mut self, work: Work) {
-        self.work.push(work);
     }
 
     /// Copies `range` (multiples of 4) of `source` to host memory that `host` lends.

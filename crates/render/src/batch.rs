@@ -165,8 +165,7 @@ impl<'a> Batch<'a> {
     /// rays, bright texels of an environment map take as many.
     fn rays_around(&self) -> u32 {
         let DrawWork { scene, lighting, .. } = self.work;
-        let has_bright = scene.environment.as_deref().is_some_and(|map| map.has_bright_texels);
-        if lighting.is_indirect() || has_bright && lighting.shadow_rays() == 0 { 2 } else { 1 }
+        if lighting.is_indirect() || scene.has_bright_texels() && lighting.shadow_rays() == 0 { 2 } else { 1 }
     }
 
     /// A uniform of the pieces with their cameras' places in the batch's planes, for each part of the rays.

@@ -4,15 +4,15 @@ use std::collections::HashSet;
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Antialias, Highlight};
-use gpu::{Binding, BufferPool, Gpu, GpuTone, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, switches};
+use gpu::{Binding, BufferPool, Gpu, GpuTone, PooledBuffer, ShaderVariant, highlight_name, switches};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
 use crate::batch::{Batch, Recording};
+use crate::known_samples::view_cell_m;
 use crate::planes::{Output, PlaneLayout};
 use crate::{
-    RenderError, lamp_shares::GpuLampShares, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest,
-    sums::SumPlanes, surfaces::Surfaces,
+    RenderError, lamp_shares::GpuLampShares, redundancy_test::RedundancyTest, sums::SumPlanes, surfaces::Surfaces,
 };
 
 /// Inverse depths within a texel differ by this share at most where they are of one surface.
@@ -84,7 +84,6 @@ impl Finish {
 
 impl ShaderVariant for Finish {
     const TEMPLATE: &'static str = "finish.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         let Self { by_rays, single_pole, lit, environment_map, output } = *self;
@@ -162,7 +161,7 @@ pub(crate) fn record(
     let batch = recording.batch;
     let variant = Finish::of(batch);
     let finish = GpuFinish {
-        view_cell_m: batch.sequence.map_or(0.0, |sequence| sequence.known.view_cell_m),
+        view_cell_m: batch.sequence.map_or(0.0, |sequence| view_cell_m(&sequence.known.cameras)),
         position: batch.position.number,
         position_count: batch.output.antialias.samples(),
         padding: 0,

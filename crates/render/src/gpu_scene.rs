@@ -200,10 +200,14 @@ impl GpuScene {
         light.into_iter().chain(self.environment.iter().flat_map(|map| map.bindings()))
     }
 
+    /// Whether a map has bright texels.
+    pub(crate) fn has_bright_texels(&self) -> bool {
+        self.environment.as_deref().is_some_and(|map| map.has_bright_texels)
+    }
+
     /// Lamps that take rays: those of the scene, and the bright texels of its environment map, which only rays find.
     pub(crate) fn traced_lamps(&self, lighting: Lighting) -> u32 {
-        let has_bright = self.environment.as_deref().is_some_and(|map| map.has_bright_texels);
-        self.light_count as u32 + u32::from(has_bright && lighting.shadow_rays() > 0)
+        self.light_count as u32 + u32::from(self.has_bright_texels() && lighting.shadow_rays() > 0)
     }
 
     /// Whether some surface has highlights.

@@ -1,7 +1,7 @@
 //! Light of lamps and the environment, summed over rays.
 
 use depth_image::Highlight;
-use gpu::{Binding, ResourceTraits, ShaderVariant, highlight_name, switches};
+use gpu::{Binding, ShaderVariant, highlight_name, switches};
 use minijinja::{Value, context, value::merge_maps};
 use wgpu::Buffer;
 
@@ -9,7 +9,6 @@ use crate::rays::Traversal;
 use crate::{
     Direct, RenderError,
     batch::{Batch, Part, Recording},
-    pixel_camera::CAMERA_TRAITS,
     pixel_list::PixelList,
     reflections::bounces::Rays,
     sums::SumPlanes,
@@ -45,7 +44,6 @@ pub(crate) struct Illuminate {
 
 impl ShaderVariant for Illuminate {
     const TEMPLATE: &'static str = "illuminate.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         let Self { by_rays, single_pole, listed, knows_ambient, bounces, continued, environment_map, .. } = *self;

@@ -1,9 +1,9 @@
 //! Keeps the samples of an image for redundancy tests of those after it.
 
-use gpu::{Binding, ResourceTraits, ShaderVariant};
+use gpu::{Binding, ShaderVariant};
 use minijinja::{Value, context};
 
-use crate::{RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
+use crate::{RenderError, batch::Recording, surfaces::Surfaces};
 
 #[derive(Debug)]
 pub(crate) struct Keep {
@@ -12,7 +12,6 @@ pub(crate) struct Keep {
 
 impl ShaderVariant for Keep {
     const TEMPLATE: &'static str = "keep.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         context! { by_rays => self.by_rays, single_pole => false }

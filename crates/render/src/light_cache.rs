@@ -1,14 +1,13 @@
 //! The look-up of light in samples, at the surfaces of views.
 
 use depth_image::{Antialias, MAX_LAMP_SHARES, ProvenanceKind};
-use gpu::{Binding, ResourceTraits, ShaderVariant, light_slots, switches};
-use minijinja::{Value, context, value::merge_maps};
+use gpu::{Binding, ShaderVariant, switches};
+use minijinja::{Value, context};
 
 use crate::batch::{Batch, Recording};
 use crate::finish::Planes;
 use crate::lamp_shares::shares_of_lamps;
 use crate::light_samples::{CachedLight, LightCache, sample_texels};
-use crate::pixel_camera::CAMERA_TRAITS;
 use crate::pixel_list::PixelList;
 use crate::{RenderError, sums::SumPlanes, surfaces::Surfaces};
 
@@ -73,23 +72,21 @@ impl LookUp {
 
 impl ShaderVariant for LookUp {
     const TEMPLATE: &'static str = "light_cache.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         let Self { by_rays, environment_map, bright_traced, indirect, sums, share_words, .. } = *self;
         let Self { camera_count, plane_count, provenance_plane, .. } = *self;
         let lamps_with_shares = shares_of_lamps(sums.light_count);
-        let own = context! {
+        context! {
             by_rays, environment_map, bright_traced, indirect, share_words, camera_count, plane_count, provenance_plane,
             lamps_with_shares,
             single_pole => false,
             max_lamp_shares => MAX_LAMP_SHARES,
             lamp_vectors => lamps_with_shares + usize::from(bright_traced),
             sample_texels => sample_texels(share_words),
-            light_slots => light_slots(sums.light_count),
             positions => format!("{:?}", self.positions),
-        };
-        merge_maps([own, sums.context()])
+            ..sums.context()
+        }
     }
 
     fn all() -> Vec<Self> {

@@ -6,8 +6,8 @@ use bytemuck::{Pod, Zeroable};
 use depth_image::{Highlight, ParallelCamera, PinholeCamera};
 use glam::{UVec2, Vec4};
 use gpu::{
-    Binding, BoundGroup, DrawPass, DrawState, DrawVariant, Frame, Gpu, PassCache, ResourceTrait, ResourceTraits,
-    ShaderVariant, Templates, WorkKind, highlight_name, switches, uniform_stride,
+    Binding, BoundGroup, DrawPass, DrawState, DrawVariant, Frame, Gpu, PassCache, ShaderVariant, Templates, WorkKind,
+    highlight_name, switches, uniform_stride,
 };
 use minijinja::{Value, context};
 use scene::{Vertex, VertexDetail};
@@ -94,16 +94,6 @@ impl RasterVariant {
 
 impl ShaderVariant for RasterVariant {
     const TEMPLATE: &'static str = "raster.wgsl";
-    const TRAITS: ResourceTraits = &[
-        ("camera", ResourceTrait::DynamicOffset),
-        ("object", ResourceTrait::DynamicOffset),
-        (TEXTURES[0].0, ResourceTrait::Filterable),
-        (TEXTURES[1].0, ResourceTrait::Filterable),
-        (TEXTURES[2].0, ResourceTrait::Filterable),
-        (TEXTURES[3].0, ResourceTrait::Filterable),
-        (TEXTURES[4].0, ResourceTrait::Filterable),
-    ];
-
     fn context(&self) -> Value {
         let Self { material, shading, surface_id, triangle_normal, depth_only, wind, redundancy, appended } = *self;
         let MaterialTraits { double_sided, alpha_tested, textured, coat_textured, unlit, specular, mapped } = material;

@@ -7,7 +7,7 @@ use depth_image::{
     LightPlanes, ParallelCamera, PinholeCamera, ProvenanceKind, View, ViewPlanes,
 };
 use glam::UVec2;
-use gpu::{Gpu, GpuError, TablePool, Templates, Turn, WorkClass};
+use gpu::{Gpu, GpuError, Pool, TablePool, Templates, Turn, WorkClass};
 use parking_lot::Mutex;
 
 use crate::batch::{Batch, batches};
@@ -18,7 +18,12 @@ use crate::planes::{self, Output};
 use crate::smooth_light::smoothed;
 use crate::visibility::{Choice, Costs, Visibility};
 use crate::work::{DrawWork, LayerSelection, Refinement, SamplePlanes};
-use crate::{GpuScene, Lighting, RenderError, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages};
+use crate::{
+    GpuScene, Lighting, RenderError,
+    layers::{self, LayerKind, Layers},
+    redundancy_test::RedundancyTest,
+    stages::Stages,
+};
 
 /// Pixels in one submission: bounds the memory for surfaces, light and read-back.
 const PIXELS_A_SUBMISSION: usize = 1 << 20;
@@ -34,7 +39,7 @@ pub struct Renderer {
     gpu: Arc<Gpu>,
     stages: Stages,
     tables: TablePool,
-    layer_cache: LayerCache,
+    layers: Pool<LayerKind, Layers>,
     /// By scene; the one that was measured first is at the front.
     costs: Mutex<VecDeque<(u64, Costs)>>,
 }
@@ -45,7 +50,7 @@ impl Renderer {
     pub fn new(gpu: &Arc<Gpu>, templates: Templates) -> Self {
         let stages = Stages::new(gpu, &Arc::new(templates));
         let tables = TablePool::new(gpu);
-        Self { gpu: gpu.clone(), stages, tables, layer_cache: LayerCache::default(), costs: Mutex::default() }
+        Self { gpu: gpu.clone(), stages, tables, layers: layers::pool(gpu), costs: Mutex::default() }
     }
 
     /// The device.
@@ -194,11 +199,11 @@ impl Renderer {
         let all = pinholes(cameras, "redundancy tests")?;
         self.check(cameras)?;
         let own: Vec<Camera> = wanted.iter().map(|&number| cameras[number as usize]).collect();
-        let samples = KnownSamples::of(&self.gpu, &self.layer_cache, &all, test, reference)?;
+        let samples = KnownSamples::of(&self.gpu, &self.layers, &all, test, reference)?;
         let sequence = ImageSequence { known: &samples, wanted, first: 0, kept: all.len().saturating_sub(1) };
         // Where pixels are compared with the same pixel, corners are compared with corners.
         let corners = (planes.corners && test.from_one_place).then(|| corner_cameras(&all));
-        let corners = corners.map(|cameras| KnownSamples::of(&self.gpu, &self.layer_cache, &cameras, test, None));
+        let corners = corners.map(|cameras| KnownSamples::of(&self.gpu, &self.layers, &cameras, test, None));
         let corners = corners.transpose()?;
         let of_corners = match &corners {
             Some(known) => ImageSequence { known, ..sequence },
@@ -220,7 +225,7 @@ impl Renderer {
         let work = work.unlit();
         let pinholes = pinholes(cameras, "redundancy tests")?;
         self.check(cameras)?;
-        let known = KnownSamples::of(&self.gpu, &self.layer_cache, &pinholes, test, None)?;
+        let known = KnownSamples::of(&self.gpu, &self.layers, &pinholes, test, None)?;
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
         let sequence = ImageSequence { known: &known, wanted: &wanted, first: 0, kept: cameras.len() };
         self.images(work, cameras, SamplePlanes::default(), Some(test), [Some(sequence), None])?;

@@ -3,7 +3,7 @@
 use std::{slice, sync::Arc};
 
 use depth_image::Antialias;
-use gpu::{BufferPool, Frame, FrameResult, Gpu, JobLimit, PassCache, Readback, Templates};
+use gpu::{BufferPool, Frame, FrameResult, Gpu, JobLimit, PassCache, Pool, Readback, Templates};
 
 use crate::accumulation::{Accumulations, Sums};
 use crate::batch::{Batch, Recording};
@@ -12,7 +12,7 @@ use crate::known_samples::{ImageSequence, Predecessors};
 use crate::light_cache::{self, Picture};
 use crate::pieces::Piece;
 use crate::reflections::{self, Reflections};
-use crate::surfaces::{SurfaceKind, SurfacePool, Surfaces};
+use crate::surfaces::{MOST_FREE_BYTES, SurfaceKind, SurfaceViews, Surfaces};
 use crate::{RenderError, finish, illuminate, keep, pixel_list::PixelList, raster::Raster};
 use crate::{rays::primary, redundancy_test::Evidence};
 
@@ -23,7 +23,7 @@ const BATCHES_OF_A_CLASS: usize = 2;
 pub(crate) struct Stages {
     pub gpu: Arc<Gpu>,
     pub pool: BufferPool,
-    surfaces: SurfacePool,
+    surfaces: Pool<SurfaceKind, SurfaceViews>,
     accumulations: Accumulations,
     pub raster: Raster,
     pub passes: PassCache,
@@ -35,7 +35,7 @@ impl Stages {
         Self {
             gpu: gpu.clone(),
             pool: BufferPool::new(gpu),
-            surfaces: SurfacePool::new(gpu),
+            surfaces: Pool::of_device(gpu, MOST_FREE_BYTES, SurfaceKind::bytes),
             accumulations: Accumulations::default(),
             raster: Raster::new(gpu, templates),
             passes: PassCache::new(gpu, templates),
@@ -158,10 +158,9 @@ impl Stages {
             first_surface: batch.cached.is_some() && batch.output.antialias > Antialias::NONE,
             front: batch.sequence.is_some_and(|sequence| sequence.number(place) > 0),
         };
-        match batch.sequence.and_then(|sequence| sequence.layer(place, Evidence::SurfaceIds)) {
-            Some((ids, size_px)) => self.surfaces.lend(SurfaceKind { size_px, surface_id: false, ..kind }, Some(ids)),
-            None => self.surfaces.lend(kind, None),
-        }
+        let own = batch.sequence.and_then(|sequence| sequence.layer(place, Evidence::SurfaceIds));
+        let kind = own.map_or(kind, |(_, size_px)| SurfaceKind { size_px, surface_id: false, ..kind });
+        Surfaces::lend(&self.gpu, &self.surfaces, kind, own.map(|(ids, _)| ids))
     }
 
     /// Records the light that arrives at surfaces: rays for all pixels, or a look-up in samples and rays for the pixels that no

@@ -26,7 +26,7 @@ impl Shader {
     /// Compiles `wgsl`.
     ///
     /// # Errors
-    /// WGSL that cannot be parsed, or a trait of a resource that is not declared.
+    /// WGSL that cannot be parsed, or a variable of a type that is not supported.
     pub fn new(gpu: &Gpu, label: &str, wgsl: &str, traits: ResourceTraits) -> Result<Self, ShaderError> {
         let interface = ShaderInterface::of(label, wgsl, traits)?;
         let device = gpu.device.clone();

@@ -50,6 +50,7 @@ impl DrawPass {
             compilation_options: Default::default(),
             targets: &targets,
         });
+        let depth_compare = if state.nearest_only { CompareFunction::Greater } else { CompareFunction::Always };
         let buffers: Vec<_> = state.vertices.iter().cloned().map(Some).collect();
         let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(&shader.interface.shader),
@@ -64,11 +65,7 @@ impl DrawPass {
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: Self::DEPTH_FORMAT,
                 depth_write_enabled: Some(state.nearest_only),
-                depth_compare: Some(if state.nearest_only {
-                    CompareFunction::Greater
-                } else {
-                    CompareFunction::Always
-                }),
+                depth_compare: Some(depth_compare),
                 stencil: Default::default(),
                 bias: Default::default(),
             }),

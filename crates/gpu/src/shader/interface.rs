@@ -57,17 +57,8 @@ impl<'r> Binding<'r> {
     }
 }
 
-/// A property of a resource that WGSL does not say.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ResourceTrait {
-    /// One element of a buffer, chosen by each dispatch or draw.
-    DynamicOffset,
-    /// A texture of floats that a sampler filters.
-    Filterable,
-}
-
-/// Names of resources with their traits.
-pub type ResourceTraits = &'static [(&'static str, ResourceTrait)];
+/// Names of uniforms that have an element for each dispatch or draw, which sees its own at a dynamic offset.
+pub type ResourceTraits = &'static [&'static str];
 
 /// A resource at its binding.
 #[derive(Debug, Clone)]
@@ -94,7 +85,7 @@ impl ShaderInterface {
     /// Reads `wgsl`.
     ///
     /// # Errors
-    /// WGSL that cannot be parsed, or a trait of a resource that is not declared.
+    /// WGSL that cannot be parsed, or a variable of a type that is not supported.
     pub fn of(shader: &str, wgsl: &str, traits: ResourceTraits) -> Result<Self, ShaderError> {
         let mut options = Options::new();
         options.capabilities = Capabilities::all();
@@ -108,11 +99,16 @@ impl ShaderInterface {
         };
         let computes = interface.stages.contains(ShaderStages::COMPUTE);
         let visibility = if computes { ShaderStages::COMPUTE } else { ShaderStages::VERTEX_FRAGMENT };
+        // Textures beside a sampler are filtered.
+        let variables = module.global_variables.iter().map(|(_, variable)| variable);
+        let samplers =
+            variables.filter(|variable| matches!(module.types[variable.ty].inner, TypeInner::Sampler { .. }));
+        let filtered: Vec<u32> = samplers.filter_map(|sampler| Some(sampler.binding.as_ref()?.group)).collect();
         for (_, variable) in module.global_variables.iter() {
             let Some(place) = variable.binding else { continue };
             let name = variable.name.clone().unwrap_or_default();
-            let has_dynamic_offset = traits.contains(&(name.as_str(), ResourceTrait::DynamicOffset));
-            let is_filterable = traits.contains(&(name.as_str(), ResourceTrait::Filterable));
+            let has_dynamic_offset = traits.contains(&name.as_str());
+            let is_filterable = filtered.contains(&place.group);
             let ty = binding_type(&module, variable, has_dynamic_offset, is_filterable)
                 .ok_or_else(|| invalid(shader, format!("{name} has a type that is not supported")))?;
             let bytes = module.types[variable.ty].inner.try_size(module.to_ctx());
@@ -127,11 +123,7 @@ impl ShaderInterface {
             interface.groups[place.group as usize].push(Resource { name, layout, element_bytes });
         }
         interface.groups.iter_mut().for_each(|group| group.sort_by_key(|resource| resource.layout.binding));
-        let mut names = traits.iter().map(|(name, _)| name);
-        match names.find(|name| !interface.groups.iter().flatten().any(|resource| resource.name == **name)) {
-            Some(name) => Err(invalid(shader, format!("{name} has a trait but is not declared"))),
-            None => Ok(interface),
-        }
+        Ok(interface)
     }
 
     /// The bytes from one element to the next of each dynamic resource of a group.
@@ -237,7 +229,7 @@ mod tests {
         @group(1) @binding(0) var<storage, read_write> words: array<u32>;
         @compute @workgroup_size(8, 4) fn main() { words[0] = u32(camera.near); }
     ";
-    const CAMERA: ResourceTraits = &[("camera", ResourceTrait::DynamicOffset)];
+    const CAMERA: ResourceTraits = &["camera"];
 
     fn interface() -> ShaderInterface {
         ShaderInterface::of("test", WGSL, CAMERA).expect("an interface")
@@ -270,9 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trait_of_an_undeclared_resource_and_invalid_wgsl_are_errors() {
-        let unknown = ShaderInterface::of("test", WGSL, &[("cameras", ResourceTrait::DynamicOffset)]);
-        assert!(matches!(unknown, Err(ShaderError::Invalid { .. })));
+    fn invalid_wgsl_is_an_error() {
         assert!(matches!(ShaderInterface::of("test", "fn f( {", &[]), Err(ShaderError::Invalid { .. })));
     }
 }

@@ -9,12 +9,15 @@ use std::{collections::HashMap, fmt::Debug};
 use depth_image::{LOBE_ROUGHNESS, LOBE_SIZE_PX};
 use minijinja::{Environment, UndefinedBehavior, Value};
 
+use super::interface::ResourceTraits;
 use crate::{error::ShaderError, table::TABLE_WIDTH_LOG2};
 
 /// Shader texts by name.
 pub struct Templates {
     environment: Environment<'static>,
     declared: Vec<(&'static str, String)>,
+    /// Uniforms with dynamic offsets in all templates.
+    pub(super) traits: ResourceTraits,
 }
 
 /// A number that WGSL has a literal for.
@@ -70,7 +73,7 @@ impl Templates {
                 .add_template(name, text)
                 .map_err(|source| ShaderError::Template { name: name.to_owned(), source })?;
         }
-        Ok(Self { environment, declared: Vec::new() })
+        Ok(Self { environment, declared: Vec::new(), traits: &[] })
     }
 
     /// Adds values for `{{ NAME }}` in all templates, such as those of [`wgsl_constants!`](crate::wgsl_constants).
@@ -78,6 +81,12 @@ impl Templates {
     pub fn with_constants(mut self, constants: impl IntoIterator<Item = (&'static str, impl Into<Value>)>) -> Self {
         constants.into_iter().for_each(|(name, value)| self.environment.add_global(name, value));
         self
+    }
+
+    /// Gives uniforms of these names dynamic offsets, in all variants that name none of their own.
+    #[must_use]
+    pub fn with_traits(self, traits: ResourceTraits) -> Self {
+        Self { traits, ..self }
     }
 
     /// Declares numbers of [`wgsl_constants!`](crate::wgsl_constants) in all texts that name them. A template cannot declare

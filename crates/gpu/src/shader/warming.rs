@@ -37,18 +37,15 @@ enum Empty {
 }
 
 impl Empty {
-    fn of(gpu: &Gpu, resource: &Resource, form: Form) -> Self {
+    fn of(gpu: &Gpu, resource: &Resource, form: Option<Form>) -> Self {
         let (dimension, usage) = match resource.layout.ty {
             BindingType::Sampler(_) => return Self::Sampler(gpu.texture_sampler([wgpu::AddressMode::Repeat; 2])),
-            BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, .. } => {
-                return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM));
-            }
             BindingType::StorageTexture { view_dimension, .. } => (view_dimension, TextureUsages::STORAGE_BINDING),
             BindingType::Texture { view_dimension, .. } => (view_dimension, TextureUsages::TEXTURE_BINDING),
-            _ => return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::STORAGE)),
+            _ => return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM | BufferUsages::STORAGE)),
         };
-        let Form::Texture { format, is_power_of_two, has_mips } = form else {
-            return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::STORAGE));
+        let Some(Form { format, is_power_of_two, has_mips }) = form else {
+            return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM | BufferUsages::STORAGE));
         };
         let [width, height] = is_power_of_two.map(|is| SIDES_PX[usize::from(is)]);
         let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -93,7 +90,7 @@ impl FirstUses {
         drop(uses);
         // A thread that waits for another's first use has waited, too.
         if !first_use.is_completed() {
-            frame.count((WorkKind::FIRST_USE, 1));
+            frame.work.push((WorkKind::FIRST_USE, 1));
         }
         // Where an earlier thread panicked, the pass goes on without.
         first_use.call_once_force(|_| warm(frame.gpu, shader, groups, use_it));
@@ -132,7 +129,7 @@ fn warm(
     }
 }
 
-fn empty_group(gpu: &Gpu, shader: &Shader, number: u32, forms: &[Form]) -> BoundGroup {
+fn empty_group(gpu: &Gpu, shader: &Shader, number: u32, forms: &[Option<Form>]) -> BoundGroup {
     let resources = &shader.interface.groups[number as usize];
     let empty: Vec<Empty> =
         resources.iter().zip(forms).map(|(resource, &form)| Empty::of(gpu, resource, form)).collect();
@@ -144,7 +141,7 @@ mod tests {
     use wgpu::TextureFormat;
 
     use super::*;
-    use crate::shader::{Binding, ComputePass, DispatchSize, ResourceTrait};
+    use crate::shader::{Binding, ComputePass, DispatchSize};
     use crate::sharing::Turn;
 
     const WGSL: &str = "
@@ -163,8 +160,7 @@ mod tests {
             sums[id.x] = camera.near + color.x + f32(word);
         }
     ";
-    const TRAITS: crate::ResourceTraits =
-        &[("camera", ResourceTrait::DynamicOffset), ("colors", ResourceTrait::Filterable)];
+    const TRAITS: crate::ResourceTraits = &["camera"];
 
     fn texture(gpu: &Gpu, size: [u32; 3], format: TextureFormat, dimension: wgpu::TextureViewDimension) -> TextureView {
         let usage = TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING;

@@ -3,12 +3,11 @@
 use bytemuck::Zeroable;
 use depth_image::{ParallelCamera, PixelDepth};
 use glam::{UVec2, Vec2};
-use gpu::{Binding, ResourceTraits, ShaderVariant};
+use gpu::{Binding, ShaderVariant};
 use minijinja::{Value, context};
 
 use super::crossings::Crossing;
 use crate::batch::Batch;
-use crate::pixel_camera::CAMERA_TRAITS;
 use crate::planes::Output;
 use crate::reflections::bounces::{GpuBounce, Rays};
 use crate::{RenderError, illuminate, stages::Stages, sums::SumPlanes, work::DrawWork};
@@ -29,7 +28,6 @@ pub(crate) struct Lit {
 
 impl ShaderVariant for Lit {
     const TEMPLATE: &'static str = "layered/lit.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         context! { single_pole => false, lit => self.lit, ..self.sums.context() }

@@ -1,21 +1,19 @@
 //! Surfaces by one ray a pixel.
 
 use depth_image::Highlight;
-use gpu::{ResourceTraits, ShaderVariant, highlight_name, switches};
+use gpu::{ShaderVariant, highlight_name, switches};
 use minijinja::{Value, context, value::merge_maps};
 
 use super::{ray_scene::Traced, traversal::Traversal};
 use crate::known_samples::{Predecessors, RedundancyVariant};
-use crate::{
-    RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest, surfaces::Surfaces,
-};
+use crate::{RenderError, batch::Recording, redundancy_test::RedundancyTest, surfaces::Surfaces};
 
 /// The redundant surfaces that one ray passes before it is given up: the software device ends long loops.
 pub const MOST_LAYERS: u32 = 64;
 /// The group of known samples.
 const KNOWN_GROUP: u32 = 2;
 
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Primary {
     traversal: Traversal,
     /// `None` shows colours as they are.
@@ -28,22 +26,19 @@ pub(crate) struct Primary {
 }
 
 impl Primary {
-    /// Redundancy is tested between pinholes alone.
-    fn pinholes() -> impl Iterator<Item = Self> {
-        Self::all().into_iter().filter(|variant| !variant.single_pole)
-    }
-
     /// The variants with each redundancy test.
     pub fn with_tests(tests: &[RedundancyTest]) -> impl Iterator<Item = Self> {
         RedundancyVariant::all(tests).into_iter().flat_map(|redundancy| {
-            Self::pinholes().map(move |variant| Self { redundancy: Some(redundancy), ..variant })
+            Self::all()
+                .into_iter()
+                .filter(|variant| !variant.single_pole)
+                .map(move |variant| Self { redundancy: Some(redundancy), ..variant })
         })
     }
 }
 
 impl ShaderVariant for Primary {
     const TEMPLATE: &'static str = "rays/primary.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         let Self { traversal, shading, surface_id, triangle_normal, single_pole, redundancy } = *self;
@@ -58,14 +53,8 @@ impl ShaderVariant for Primary {
         let mut all = Vec::new();
         for shading in [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)] {
             for [surface_id, triangle_normal, single_pole] in switches() {
-                all.extend(Traversal::ALL.map(|traversal| Self {
-                    traversal,
-                    shading,
-                    surface_id,
-                    triangle_normal,
-                    single_pole,
-                    redundancy: None,
-                }));
+                let plain = Self { shading, surface_id, triangle_normal, single_pole, ..Self::default() };
+                all.extend(Traversal::ALL.map(|traversal| Self { traversal, ..plain }));
             }
         }
         all

@@ -11,7 +11,7 @@ pub(crate) const BOX_SLACK: f32 = 1.000_001;
 pub(crate) const EDGE_ROUNDINGS: f32 = 4e-7;
 
 /// The switches of a traversal.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub(crate) struct Traversal {
     /// Room for unvisited nodes, in steps, so that pipelines are shared.
     pub stack: u32,

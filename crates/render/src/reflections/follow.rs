@@ -1,6 +1,6 @@
 //! The surfaces where mirrored rays end.
 
-use gpu::{ResourceTraits, ShaderVariant};
+use gpu::ShaderVariant;
 use minijinja::Value;
 
 use super::bounces::Rays;
@@ -13,7 +13,6 @@ pub(crate) struct Follow {
 
 impl ShaderVariant for Follow {
     const TEMPLATE: &'static str = "reflections/follow.wgsl";
-    const TRAITS: ResourceTraits = &[];
 
     fn context(&self) -> Value {
         self.traversal.context_of_mirrored_rays()

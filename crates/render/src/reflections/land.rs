@@ -1,12 +1,12 @@
 //! The light from the ends of mirrored rays, added to the pixels, and the rays off mirrors among those ends.
 
 use depth_image::Highlight;
-use gpu::{Binding, ResourceTraits, ShaderVariant, highlight_name, switches};
+use gpu::{Binding, ShaderVariant, highlight_name, switches};
 use minijinja::{Value, context};
 use wgpu::Buffer;
 
 use super::bounces::Rays;
-use crate::{RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, sums::SumPlanes};
+use crate::{RenderError, batch::Recording, sums::SumPlanes};
 
 #[derive(Debug)]
 pub(crate) struct Land {
@@ -18,7 +18,6 @@ pub(crate) struct Land {
 
 impl ShaderVariant for Land {
     const TEMPLATE: &'static str = "reflections/land.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         let Self { mirrors, environment_map, sums } = *self;

@@ -1,13 +1,13 @@
 //! Rays into the lobes of what a picture shows, pass by pass one of each pixel.
 
 use bytemuck::{Pod, Zeroable};
-use gpu::{Binding, ResourceTraits, ShaderVariant, switches};
+use gpu::{Binding, ShaderVariant, switches};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
 use super::bounces::Rays;
 use super::spawn::{self, VIEW_PLANES};
-use crate::{RenderError, batch::Recording, pieces::Piece, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
+use crate::{RenderError, batch::Recording, pieces::Piece, surfaces::Surfaces};
 
 /// `Lobe` of the shader.
 #[repr(C)]
@@ -30,7 +30,6 @@ pub(crate) struct Lobe {
 
 impl ShaderVariant for Lobe {
     const TEMPLATE: &'static str = "reflections/lobe.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         context! { first => self.first, ..spawn::context(self.by_rays, self.plane_count) }

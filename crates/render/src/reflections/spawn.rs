@@ -1,13 +1,11 @@
 //! Rays off the mirrors that a picture shows.
 
 use depth_image::Highlight;
-use gpu::{ResourceTraits, ShaderVariant, highlight_name, light_slots};
+use gpu::{ShaderVariant, highlight_name};
 use minijinja::{Value, context, value::merge_maps};
 
 use super::bounces::Rays;
-use crate::{
-    RenderError, batch::Recording, pieces::Piece, pixel_camera::CAMERA_TRAITS, rays::Traversal, surfaces::Surfaces,
-};
+use crate::{RenderError, batch::Recording, pieces::Piece, rays::Traversal, sums::SumPlanes, surfaces::Surfaces};
 
 /// Planes of a view: colour and depth.
 pub(super) const VIEW_PLANES: usize = 2;
@@ -22,7 +20,6 @@ pub(crate) struct Spawn {
 
 impl ShaderVariant for Spawn {
     const TEMPLATE: &'static str = "reflections/spawn.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         merge_maps([context(self.by_rays, self.plane_count), self.traversal.context_of_mirrored_rays()])
@@ -41,7 +38,7 @@ pub(super) fn context(by_rays: bool, plane_count: usize) -> Value {
     context! {
         single_pole => false, by_rays, plane_count,
         highlight => highlight_name(Highlight::Ggx), mirrors => true, environment_map => false,
-        light_count => 0, light_slots => light_slots(0), visibility_words => 0,
+        ..SumPlanes::default().context()
     }
 }
 
