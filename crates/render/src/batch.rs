@@ -139,6 +139,7 @@ impl<'a> Batch<'a> {
     /// Equal keys are the same light of the same pixels.
     pub fn key(&self) -> String {
         let DrawWork { scene, lighting, scene_time_s, .. } = self.work;
+        // The samples of a sequence's image depend on all cameras of its set, and on its place among them.
         let set = self.sequence.map(|sequence| (&sequence.known.cameras, sequence.known.variant(sequence.first)));
         format!("{:?}", (scene.identity, lighting, scene_time_s, set, self.cameras, self.by_rays, self.output))
     }

@@ -4,8 +4,8 @@ use glam::UVec2;
 use gpu::{Gpu, Pool};
 use wgpu::{TextureFormat, TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension};
 
-/// The most bytes of free layers: a set of 16 images of 2048×2048 samples.
-const MOST_FREE_BYTES: u64 = 1 << 30;
+/// The most bytes of free layers: a set of 16 images of 1920×1080 samples.
+const MOST_FREE_BYTES: u64 = 512 << 20;
 
 pub(crate) struct Layers {
     all: wgpu::Texture,
