@@ -1,5 +1,7 @@
 //! Work on a device whose faults are caught: they end the work with an error, not the process.
 
+use std::sync::atomic::Ordering;
+
 use crate::{device::Gpu, error::GpuError, frame::notice_loss};
 
 impl Gpu {
@@ -45,7 +47,7 @@ impl Gpu {
 
     /// For tests: the next frame that is submitted runs out of memory.
     pub fn inject_out_of_memory(&self) {
-        self.faults.inject();
+        self.faults.injected.store(true, Ordering::Release);
     }
 }
 

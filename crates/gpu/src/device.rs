@@ -21,11 +21,9 @@ pub enum DevicePreference {
 impl FromStr for DevicePreference {
     type Err = GpuError;
     fn from_str(text: &str) -> Result<Self, GpuError> {
-        match text {
-            "any" => Ok(Self::Any),
-            "software" => Ok(Self::Software),
-            other => Err(GpuError::UnknownPreference(other.to_owned())),
-        }
+        let preferences = [Self::Any, Self::Software];
+        let named = preferences.into_iter().find(|preference| preference.to_string() == text);
+        named.ok_or_else(|| GpuError::UnknownPreference(text.to_owned()))
     }
 }
 
@@ -96,7 +94,9 @@ impl Gpu {
         let faults = Arc::new(Faults::default());
         device.set_device_lost_callback({
             let faults = faults.clone();
-            move |cause, reason| faults.lose(format!("{cause:?}: {reason}"))
+            move |cause, reason| {
+                faults.lost.lock().get_or_insert(format!("{cause:?}: {reason}"));
+            }
         });
         let (device_queue, compiled_outside) = Default::default();
         Ok(Arc::new(Self { device, queue, info, device_queue, faults, timestamp_period_ns, compiled_outside }))
@@ -125,8 +125,14 @@ impl Gpu {
     /// # Errors
     /// Names the buffer, its size and the limit.
     pub fn check_storage_bytes(&self, what: &str, bytes: u64) -> Result<(), GpuError> {
+        GpuError::check_limit(what, bytes, self.most_storage_bytes())
+    }
+
+    /// The bytes of the largest storage buffer that the device can bind.
+    #[must_use]
+    pub fn most_storage_bytes(&self) -> u64 {
         let limits = self.device.limits();
-        GpuError::check_limit(what, bytes, limits.max_storage_buffer_binding_size.min(limits.max_buffer_size))
+        limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
     }
 
     /// A buffer of zeros.

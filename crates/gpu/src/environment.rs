@@ -7,11 +7,12 @@ use wgpu::TextureFormat;
 
 use crate::{Binding, Gpu, GpuError, Table, texture_bytes};
 
+const TABLES: [&str; 3] = ["environment_texels", "environment_lobes", "bright_texels"];
+
 /// The map, its means over lobes, and its bright texels.
 pub struct GpuEnvironment {
-    texels: Table,
-    lobes: Table,
-    bright_texels: Table,
+    /// Of the variables [`TABLES`].
+    tables: [Table; 3],
     /// Bright texels are traced like a lamp.
     pub has_bright_texels: bool,
 }
@@ -30,9 +31,11 @@ impl GpuEnvironment {
         let listed = light.bright_texels.iter().map(|&texel| bytemuck::cast(texel));
         let words: Vec<[u32; 4]> = std::iter::once(header).chain(listed).collect();
         Ok(Self {
-            texels: Table::new(gpu, "environment texels", TextureFormat::R32Uint, map.texels_rgb9e5())?,
-            lobes: Table::new(gpu, "environment lobes", TextureFormat::Rgba32Float, &light.lobes)?,
-            bright_texels: Table::new(gpu, "bright texels", TextureFormat::Rgba32Uint, &words)?,
+            tables: [
+                Table::new(gpu, "environment texels", TextureFormat::R32Uint, map.texels_rgb9e5())?,
+                Table::new(gpu, "environment lobes", TextureFormat::Rgba32Float, &light.lobes)?,
+                Table::new(gpu, "bright texels", TextureFormat::Rgba32Uint, &words)?,
+            ],
             has_bright_texels: count > 0,
         })
     }
@@ -40,16 +43,12 @@ impl GpuEnvironment {
     /// The resources of `environment.wgsl`.
     #[must_use]
     pub fn bindings(&self) -> [Binding<'_>; 3] {
-        [
-            Binding::texture("environment_texels", &self.texels),
-            Binding::texture("environment_lobes", &self.lobes),
-            Binding::texture("bright_texels", &self.bright_texels),
-        ]
+        std::array::from_fn(|number| Binding::texture(TABLES[number], &self.tables[number]))
     }
 
     /// The bytes of its tables.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        [&self.texels, &self.lobes, &self.bright_texels].map(|table| texture_bytes(table.texture())).iter().sum()
+        self.tables.iter().map(|table| texture_bytes(table.texture())).sum()
     }
 }

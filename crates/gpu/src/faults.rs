@@ -11,8 +11,10 @@ use crate::error::GpuError;
 pub(crate) struct Faults {
     /// Times that memory ran out. What was lent before the last is not lent again: it may be without memory.
     shortages: AtomicU64,
-    lost: Mutex<Option<String>>,
-    injected: AtomicBool,
+    /// The first reason of the device's loss.
+    pub lost: Mutex<Option<String>>,
+    /// The next check fails, as a test wants it.
+    pub injected: AtomicBool,
 }
 
 impl Faults {
@@ -20,19 +22,9 @@ impl Faults {
         self.shortages.load(Ordering::Acquire)
     }
 
-    /// Notes the loss of the device; the first reason stays.
-    pub fn lose(&self, reason: String) {
-        self.lost.lock().get_or_insert(reason);
-    }
-
     /// Notes that memory ran out.
     pub fn run_short(&self) {
         self.shortages.fetch_add(1, Ordering::AcqRel);
-    }
-
-    /// The next check fails, as a test wants it.
-    pub fn inject(&self) {
-        self.injected.store(true, Ordering::Release);
     }
 
     /// Fails when the device is lost.

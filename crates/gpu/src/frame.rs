@@ -18,7 +18,7 @@ pub struct Frame<'g> {
     /// The commands of the piece that is being recorded, to which passes add theirs.
     pub encoder: wgpu::CommandEncoder,
     /// The work of that piece.
-    work: Vec<Work>,
+    pub(crate) work: Vec<Work>,
     ended: VecDeque<Piece>,
     timer: Option<Timer>,
     reads: Vec<PooledBuffer>,
@@ -38,15 +38,6 @@ struct Timer {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
     host: wgpu::Buffer,
-}
-
-/// Work whose recording has ended.
-struct Recorded<'g> {
-    gpu: &'g Gpu,
-    label: &'static str,
-    pieces: VecDeque<Piece>,
-    timer: Option<Timer>,
-    reads: Vec<PooledBuffer>,
 }
 
 /// Work whose last slice is under way. It holds the device until it is waited for or dropped: a thread that has it asks for
@@ -91,16 +82,10 @@ impl<'g> Frame<'g> {
         Self { gpu, label, turn, encoder, work: Vec::new(), ended: VecDeque::new(), timer, reads: Vec::new() }
     }
 
-    /// The place of this work in the device's order.
-    #[must_use]
-    pub fn turn(&self) -> Turn {
-        self.turn
-    }
-
     /// Says what was recorded since the last cut: so many units of a kind. While a live stream is open, other work may go
     /// between this and what is recorded next.
     pub fn cut(&mut self, kind: WorkKind, units: u64) {
-        self.count((kind, units));
+        self.work.push((kind, units));
         if self.gpu.device_queue.cuts() {
             let next = encoder(self.gpu, self.label);
             let commands = std::mem::replace(&mut self.encoder, next).finish();
@@ -132,11 +117,6 @@ impl<'g> Frame<'g> {
         })
     }
 
-    /// Says what was recorded, without a cut.
-    pub(crate) fn count(&mut self, work: Work) {
-        self.work.push(work);
-    }
-
     /// Copies `range` (multiples of 4) of `source` to host memory that `host` lends.
     pub fn read_back(&mut self, source: &wgpu::Buffer, range: Range<u64>, host: PooledBuffer) -> Readback {
         self.encoder.copy_buffer_to_buffer(source, range.start, &host, 0, range.end - range.start);
@@ -149,31 +129,17 @@ impl<'g> Frame<'g> {
     /// # Errors
     /// When the device is lost.
     pub fn submit(self) -> Result<Submitted<'g>, GpuError> {
-        let gpu = self.gpu;
-        let turn = self.turn;
-        let recorded = self.end();
-        let slot = gpu.device_queue.wait(turn, predicted_s(gpu, &recorded.pieces));
-        recorded.submit_in(slot)
+        self.submit_in(None)
     }
 
-    /// Sends work of one piece to the device, which was waited for before.
-    pub(crate) fn submit_in(self, slot: Slot<'g>) -> Result<Submitted<'g>, GpuError> {
-        self.end().submit_in(slot)
-    }
-
-    fn end(self) -> Recorded<'g> {
-        let Self { gpu, label, mut encoder, work, ended: mut pieces, timer, reads, .. } = self;
+    /// Sends the work to the device as [`Frame::submit`] does, the first slice in a slot that was waited for before.
+    pub(crate) fn submit_in(self, slot: Option<Slot<'g>>) -> Result<Submitted<'g>, GpuError> {
+        let Self { gpu, label, turn, mut encoder, work, ended: mut pieces, timer, reads } = self;
         if let Some(timer) = &timer {
             timer.finish(&mut encoder);
         }
         pieces.push_back(Piece { commands: encoder.finish(), work });
-        Recorded { gpu, label, pieces, timer, reads }
-    }
-}
-
-impl<'g> Recorded<'g> {
-    fn submit_in(self, mut slot: Slot<'g>) -> Result<Submitted<'g>, GpuError> {
-        let Self { gpu, label, mut pieces, timer, reads } = self;
+        let mut slot = slot.unwrap_or_else(|| gpu.device_queue.wait(turn, predicted_s(gpu, &pieces)));
         gpu.faults.check_injected()?;
         let mut earlier_s = 0.0;
         let last = loop {

@@ -40,21 +40,14 @@ pub fn background_bytes(background: &Environment) -> [f32; 8] {
     [r, g, b, 0.0, nadir[0], nadir[1], nadir[2], 0.0]
 }
 
-/// A light without colour or place, the same in all directions.
-const NOTHING: GpuLight = GpuLight {
-    middle_in_world: [0.0; 3],
-    kind: ROUND,
-    color_linear: [0.0; 3],
-    extent: 0.0,
-    axis_in_world: [0.0; 3],
-    outer_cosine: -1.0,
-    next_edge_in_world: [0.0; 3],
-    cone_scale: 1.0,
-};
-
 impl GpuLight {
+    /// A light without colour or place, the same in all directions.
+    fn dark() -> Self {
+        Self { kind: ROUND, outer_cosine: -1.0, cone_scale: 1.0, ..Self::zeroed() }
+    }
+
     fn round(middle: Vec3, color: Vec3, extent: f32) -> Self {
-        Self { middle_in_world: middle.to_array(), color_linear: color.to_array(), extent, ..NOTHING }
+        Self { middle_in_world: middle.to_array(), color_linear: color.to_array(), extent, ..Self::dark() }
     }
 }
 
@@ -116,6 +109,6 @@ pub fn illumination_bytes(illumination: &Illumination) -> Vec<u8> {
         padding: 0,
     };
     let mut lights: Vec<GpuLight> = illumination.lights.iter().map(GpuLight::from).collect();
-    lights.resize(light_slots(lights.len()), NOTHING);
+    lights.resize(light_slots(lights.len()), GpuLight::dark());
     [bytemuck::bytes_of(&head), bytemuck::cast_slice(&lights)].concat()
 }

@@ -28,9 +28,9 @@ pub use frame::{Frame, FrameResult, Readback, Submitted};
 pub use illumination::{background_bytes, highlight_name, illumination_bytes, light_slots};
 pub use pool::{BufferPool, Lent, Pool, PooledBuffer};
 pub use shader::{
-    Binding, BoundGroup, ComputePass, DispatchSize, DrawPass, DrawState, DrawVariant, Pass, PassCache, ResourceTrait,
-    ResourceTraits, Shader, ShaderInterface, ShaderSource, ShaderVariant, Templates, WgslLiteral, source, sources,
-    switches, uniform_elements, uniform_stride,
+    Binding, BoundGroup, ComputePass, DispatchSize, DrawPass, DrawState, DrawVariant, Pass, PassCache, ResourceTraits,
+    Shader, ShaderInterface, ShaderSource, ShaderVariant, Templates, WgslLiteral, source, sources, switches,
+    uniform_elements, uniform_stride,
 };
 pub use sharing::{DeviceQueue, Job, JobLimit, LiveStream, SLICE_S, Turn, WorkClass, WorkKind, waited_s};
 pub use table::{TABLE_WIDTH, Table, TablePool, texture_bytes};

@@ -132,9 +132,9 @@ impl TablePool {
         let from = wgpu::TexelCopyBufferInfo { buffer: chunk.buffer(), layout: row_by_row(row_bytes, chunk.offset()) };
         let mut frame = Frame::begin(&self.gpu, "fill a table", turn);
         frame.encoder.copy_buffer_to_texture(from, texture.as_image_copy(), texture.size());
-        frame.count(work);
+        frame.work.push(work);
         staging.belt.finish();
-        let filled = frame.submit_in(slot);
+        let filled = frame.submit_in(Some(slot));
         staging.belt.recall();
         // Nobody waits for it but the work on views that comes after it, unless that is to be short.
         if queue.cuts() { filled?.wait().map(drop) } else { filled.map(drop) }

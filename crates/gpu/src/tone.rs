@@ -1,7 +1,7 @@
 //! Exposure and tone curve as `tone.wgsl` reads them.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::{ToneCurve, ToneMapping};
+use depth_image::ToneMapping;
 
 /// `Tone` of `tone.wgsl`, a part of the uniforms of passes that encode colours.
 #[repr(C)]
@@ -15,10 +15,6 @@ pub struct GpuTone {
 
 impl From<ToneMapping> for GpuTone {
     fn from(ToneMapping { exposure, curve }: ToneMapping) -> Self {
-        let curve = match curve {
-            ToneCurve::None => 0,
-            ToneCurve::KhronosNeutral => 1,
-        };
-        Self { exposure_factor: exposure.factor(), curve, padding: [0; 2] }
+        Self { exposure_factor: exposure.factor(), curve: curve as u32, padding: [0; 2] }
     }
 }

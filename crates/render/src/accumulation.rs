@@ -2,27 +2,11 @@
 
 use std::{array, collections::VecDeque, ops::Range};
 
-use depth_image::Camera;
 use gpu::PooledBuffer;
 use parking_lot::Mutex;
 
-use crate::{Lighting, known_samples::RedundancyVariant, planes::Output};
-
 /// Sums that are kept; the oldest go first.
 const KEPT: usize = 16;
-
-/// The scene, light and pixels of sums.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Key {
-    pub scene: u64,
-    pub lighting: Lighting,
-    pub scene_time_s: f32,
-    pub cameras: Vec<Camera>,
-    pub by_rays: bool,
-    pub output: Output,
-    /// The first image's.
-    pub redundancy: Option<RedundancyVariant>,
-}
 
 /// Sums over the first rays of every pixel's sequences.
 pub(crate) struct Sums {
@@ -31,12 +15,13 @@ pub(crate) struct Sums {
     pub rays: [Range<u32>; 2],
 }
 
+/// The last sums, by their scene, light and pixels ([`crate::batch::Batch::key`]).
 #[derive(Default)]
-pub(crate) struct Accumulations(Mutex<VecDeque<(Key, Sums)>>);
+pub(crate) struct Accumulations(Mutex<VecDeque<(String, Sums)>>);
 
 impl Accumulations {
     /// Sums with no more rays than `wanted`, which are now to be reached.
-    pub fn take(&self, key: &Key, wanted: [u32; 2]) -> Option<Sums> {
+    pub fn take(&self, key: &str, wanted: [u32; 2]) -> Option<Sums> {
         let mut kept = self.0.lock();
         let at = kept.iter().position(|(other, sums)| {
             other == key && sums.rays.iter().zip(wanted).all(|(rays, wanted)| rays.end <= wanted)
@@ -46,7 +31,7 @@ impl Accumulations {
     }
 
     /// Keeps sums whose rays have been traced.
-    pub fn put(&self, key: Key, sums: Sums) {
+    pub fn put(&self, key: String, sums: Sums) {
         let mut kept = self.0.lock();
         kept.push_back((key, sums));
         if kept.len() > KEPT {

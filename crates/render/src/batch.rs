@@ -1,16 +1,18 @@
 //! One submission's work: a few pictures of a scene.
 
-use std::{ops::Range, sync::Arc};
+use std::{hash::Hash, ops::Range, sync::Arc};
 
 use bytemuck::Zeroable;
 use depth_image::{Antialias, Camera, ToneMapping};
 use glam::Vec2;
-use gpu::{BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, ShaderVariant, WorkKind};
+use gpu::{
+    Binding, BoundGroup, ComputePass, DispatchSize, Frame, Gpu, PassCache, PooledBuffer, ShaderVariant, WorkKind,
+};
 
-use crate::accumulation::{Key, Sums};
+use crate::accumulation::Sums;
 use crate::pixel_camera::{PixelCamera, uniform};
+use crate::{RenderError, rays::Traced, stages::Stages, work::DrawWork};
 use crate::{known_samples::ImageSequence, light_samples::CachedLight, pieces::Piece, planes::Output};
-use crate::{rays::Traced, work::DrawWork};
 
 /// The share of the scene's diagonal within which occlusion is looked for, where a lighting names no radius.
 const OCCLUSION_OF_DIAGONAL: f32 = 0.05;
@@ -22,6 +24,7 @@ const CAMERAS_A_SUBMISSION: usize = 32;
 const UNKNOWN_SLICE_RAYS: u64 = 1 << 14;
 
 /// One submission's work, once it is known how surfaces are found.
+#[derive(Clone)]
 pub(crate) struct Batch<'a> {
     pub work: DrawWork<'a>,
     /// All of one model.
@@ -62,6 +65,13 @@ pub(crate) struct Recording<'a> {
     pub frame: Frame<'a>,
 }
 
+/// A pass with its resources.
+pub(crate) struct BoundPass {
+    pass: Arc<ComputePass>,
+    groups: Vec<BoundGroup>,
+    kind: WorkKind,
+}
+
 /// A position within the pixels.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Position {
@@ -71,11 +81,11 @@ pub(crate) struct Position {
 }
 
 impl<'a> Batch<'a> {
-    /// A batch of points, which no camera sees.
-    pub fn of_points(work: DrawWork<'a>, traced: Option<Arc<Traced>>, output: Output) -> Self {
+    /// Work without cameras, as that over points is, that is not traced.
+    pub fn new(work: DrawWork<'a>, output: Output) -> Self {
         let position = Position::default();
         let tone = ToneMapping::NONE;
-        Self { work, cameras: &[], by_rays: false, traced, output, tone, sequence: None, cached: None, position }
+        Self { work, cameras: &[], by_rays: false, traced: None, output, tone, sequence: None, cached: None, position }
     }
 
     /// All positions within the pixels, and the cameras whose pixels' centres are there. The centre of a depth image comes first;
@@ -127,15 +137,11 @@ impl<'a> Batch<'a> {
     }
 
     /// Equal keys are the same light of the same pixels.
-    pub fn key(&self) -> Key {
+    pub fn key(&self) -> String {
         let DrawWork { scene, lighting, scene_time_s, .. } = self.work;
         // The samples of a sequence's image depend on all cameras of its set, and on its place among them.
-        let set = self.sequence.map_or(&[][..], |sequence| &sequence.known.cameras);
-        let cameras = set.iter().copied().map(Camera::from).chain(self.cameras.iter().copied()).collect();
-        let redundancy = self.sequence.map(|sequence| sequence.known.variant(sequence.first));
-        let by_rays = self.by_rays;
-        let output = self.output;
-        Key { scene: scene.identity, lighting, scene_time_s, cameras, by_rays, output, redundancy }
+        let set = self.sequence.map(|sequence| (&sequence.known.cameras, sequence.known.variant(sequence.first)));
+        format!("{:?}", (scene.identity, lighting, scene_time_s, set, self.cameras, self.by_rays, self.output))
     }
 
     /// The family of the passes over pixels, whose costs are learned.
@@ -160,8 +166,7 @@ impl<'a> Batch<'a> {
     /// rays, bright texels of an environment map take as many.
     fn rays_around(&self) -> u32 {
         let DrawWork { scene, lighting, .. } = self.work;
-        let has_bright = scene.environment.as_deref().is_some_and(|map| map.has_bright_texels);
-        if lighting.is_indirect() || has_bright && lighting.shadow_rays() == 0 { 2 } else { 1 }
+        if lighting.is_indirect() || scene.has_bright_texels() && lighting.shadow_rays() == 0 { 2 } else { 1 }
     }
 
     /// A uniform of the pieces with their cameras' places in the batch's planes, for each part of the rays.
@@ -176,6 +181,11 @@ impl<'a> Batch<'a> {
         self.uniform(gpu, pieces, sums, &Rays { shadow, lamps: 0..self.lamps(), ambient })
     }
 
+    /// Rays of each pixel's sequences that the sums are to hold: to lamps, and of ambient light.
+    pub fn wanted_rays(&self) -> [u32; 2] {
+        self.light_rays().map(|rays| self.work.refinement.share_of(rays))
+    }
+
     /// A uniform for each part of `rays`, for a list with room for `capacity` points.
     pub fn parts_of_points(&self, gpu: &Gpu, rays: &[Range<u32>; 2], capacity: u32) -> Vec<Part> {
         let list = PixelCamera { pixel_count: capacity, ..PixelCamera::zeroed() };
@@ -184,6 +194,23 @@ impl<'a> Batch<'a> {
             Part { counts: part.counts(), cameras }
         });
         parts.collect()
+    }
+
+    /// A recording over `count` listed points, and the parts of their rays.
+    pub fn record_points<'r>(
+        &'r self,
+        stages: &'r Stages,
+        label: &'static str,
+        sums: PooledBuffer,
+        count: u32,
+    ) -> (Recording<'r>, Vec<Part>) {
+        let Stages { gpu, passes, .. } = stages;
+        let rays = self.wanted_rays().map(|rays| 0..rays);
+        let parts = self.parts_of_points(gpu, &rays, count);
+        let cameras = parts[0].cameras.clone();
+        let sums = Sums { buffer: sums, rays };
+        let frame = Frame::begin(gpu, label, self.work.turn);
+        (Recording { gpu, passes, batch: self, pieces: Vec::new(), cameras, sums, frame }, parts)
     }
 
     /// A camera with these rays, and those that its sums hold afterwards.
@@ -234,36 +261,41 @@ impl Recording<'_> {
         self.pieces.iter().copied().filter(|piece| piece.camera == camera).collect()
     }
 
-    /// The kind of the passes of a variant over pixels.
-    pub fn kind_of(&self, variant: &impl ShaderVariant) -> WorkKind {
-        WorkKind::new(self.batch.family(), &variant.name())
+    /// Binds a pass to resources of its own, and to those of the batch and the scene where none of its own has their name. The
+    /// time of a unit of its work depends on the variant and on `detail`.
+    pub fn bind<'r>(
+        &'r self,
+        variant: &impl ShaderVariant,
+        detail: impl Hash,
+        own: impl IntoIterator<Item = Binding<'r>>,
+    ) -> Result<BoundPass, RenderError> {
+        let Batch { work, traced, .. } = self.batch;
+        let pass = self.passes.get(variant)?;
+        let mut bindings: Vec<Binding<'r>> = own.into_iter().collect();
+        bindings.extend([Binding::buffer("camera", &self.cameras), Binding::buffer("sums", &self.sums.buffer)]);
+        bindings.extend(work.scene.bindings());
+        bindings.extend(traced.iter().flat_map(|traced| traced.bindings()));
+        let groups = pass.bind_all(&bindings)?;
+        Ok(BoundPass { pass, groups, kind: WorkKind::new(self.batch.family(), &(variant.name(), detail)) })
     }
 
     /// Records a dispatch of a pass over all pixels of a picture.
-    pub fn dispatch(
-        &mut self,
-        variant: &impl ShaderVariant,
-        pass: &ComputePass,
-        groups: &[&BoundGroup],
-        camera: usize,
-    ) {
-        let kind = self.kind_of(variant);
+    pub fn dispatch(&mut self, bound: &BoundPass, camera: usize) {
         for piece in self.pieces_of(camera) {
-            self.dispatch_piece(kind, pass, groups, piece, piece.size());
+            self.dispatch_piece(bound, piece, piece.size());
         }
     }
 
     /// Records a dispatch of this size for a piece of a picture.
-    pub fn dispatch_piece(
-        &mut self,
-        kind: WorkKind,
-        pass: &ComputePass,
-        groups: &[&BoundGroup],
-        piece: Piece,
-        size: DispatchSize<'_>,
-    ) {
-        pass.dispatch_each(&mut self.frame, groups, piece.element..piece.element + 1, size);
-        self.frame.cut(kind, piece.pixel_count().into());
+    pub fn dispatch_piece(&mut self, bound: &BoundPass, piece: Piece, size: DispatchSize<'_>) {
+        self.dispatch_element(bound, piece.element, piece.pixel_count(), size);
+    }
+
+    /// Records a dispatch that sees an element of the cameras' buffer.
+    pub fn dispatch_element(&mut self, bound: &BoundPass, element: u32, units: u32, size: DispatchSize<'_>) {
+        let groups: Vec<&BoundGroup> = bound.groups.iter().collect();
+        bound.pass.dispatch_each(&mut self.frame, &groups, element..element + 1, size);
+        self.frame.cut(bound.kind, units.into());
     }
 }
 

@@ -4,18 +4,15 @@ use std::collections::HashSet;
 
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Antialias, Highlight};
-use gpu::{
-    Binding, BufferPool, Gpu, GpuEnvironment, GpuTone, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name,
-    switches,
-};
+use gpu::{Binding, BufferPool, Gpu, GpuTone, PooledBuffer, ShaderVariant, highlight_name, switches};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
 use crate::batch::{Batch, Recording};
+use crate::known_samples::view_cell_m;
 use crate::planes::{Output, PlaneLayout};
 use crate::{
-    RenderError, lamp_shares::GpuLampShares, pixel_camera::CAMERA_TRAITS, redundancy_test::RedundancyTest,
-    sums::SumPlanes, surfaces::Surfaces,
+    RenderError, lamp_shares::GpuLampShares, redundancy_test::RedundancyTest, sums::SumPlanes, surfaces::Surfaces,
 };
 
 /// Inverse depths within a texel differ by this share at most where they are of one surface.
@@ -87,7 +84,6 @@ impl Finish {
 
 impl ShaderVariant for Finish {
     const TEMPLATE: &'static str = "finish.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         let Self { by_rays, single_pole, lit, environment_map, output } = *self;
@@ -131,7 +127,7 @@ pub(crate) struct Planes {
     pub words: PooledBuffer,
     position_sums: Option<PooledBuffer>,
     /// The pixels whose light is that of their first position, where light is looked up.
-    pub kept: Option<PooledBuffer>,
+    kept: Option<PooledBuffer>,
 }
 
 impl Planes {
@@ -147,6 +143,12 @@ impl Planes {
         let kept = shares_light.then(|| pool.lend_storage("kept light", batch.bytes(1).max(4)));
         Ok(Self { words: pool.lend_storage("planes", bytes.max(4)), position_sums: sums, kept })
     }
+
+    pub fn bindings(&self) -> impl Iterator<Item = Binding<'_>> {
+        let position_sums = self.position_sums.as_ref().map(|sums| Binding::buffer("position_sums", sums));
+        let kept = self.kept.as_ref().map(|kept| Binding::buffer("kept", kept));
+        [Binding::buffer("words", &self.words)].into_iter().chain(position_sums).chain(kept)
+    }
 }
 
 /// Records one dispatch for each camera.
@@ -156,77 +158,22 @@ pub(crate) fn record(
     planes: &Planes,
     reflected: Option<&Buffer>,
 ) -> Result<(), RenderError> {
-    let Recording { passes, gpu, batch, .. } = recording;
+    let batch = recording.batch;
     let variant = Finish::of(batch);
-    let pass = passes.get(&variant)?;
     let finish = GpuFinish {
-        view_cell_m: batch.sequence.map_or(0.0, |sequence| sequence.known.view_cell_m),
+        view_cell_m: batch.sequence.map_or(0.0, |sequence| view_cell_m(&sequence.known.cameras)),
         position: batch.position.number,
         position_count: batch.output.antialias.samples(),
         padding: 0,
         tone: batch.tone.into(),
         shares: batch.work.scene.lamp_shares,
     };
-    let finish = gpu.buffer_with("finish", &[finish], BufferUsages::UNIFORM);
+    let finish = recording.gpu.buffer_with("finish", &[finish], BufferUsages::UNIFORM);
     for (camera, target) in surfaces.iter().enumerate() {
-        let Recording { batch, cameras, sums, .. } = recording;
-        let scene = batch.work.scene;
-        let buffers: [&Buffer; 8] = [
-            cameras,
-            &planes.words,
-            &sums.buffer,
-            &finish,
-            &scene.background,
-            &scene.illumination,
-            planes.position_sums.as_deref().unwrap_or(&planes.words),
-            reflected.unwrap_or(&planes.words),
-        ];
-        let own = pass.bind(0, bindings(&variant, buffers, target, scene.environment.as_deref()))?;
-        recording.dispatch(&variant, &pass, &[&own], camera);
+        let reflected = reflected.map(|reflected| Binding::buffer("reflected", reflected));
+        let own = [Binding::buffer("finish", &finish)].into_iter().chain(reflected);
+        let bound = recording.bind(&variant, (), own.chain(planes.bindings()).chain(target.bindings()))?;
+        recording.dispatch(&bound, camera);
     }
     Ok(())
-}
-
-fn bindings<'r>(
-    variant: &Finish,
-    [camera, words, sums, finish, background, illumination, position_sums, reflected]: [&'r Buffer; 8],
-    target: &'r Surfaces,
-    map: Option<&'r GpuEnvironment>,
-) -> Vec<Binding<'r>> {
-    let mut bindings = vec![
-        Binding::buffer("camera", camera),
-        Binding::buffer("words", words),
-        Binding::buffer("sums", sums),
-        Binding::buffer("finish", finish),
-    ];
-    match map {
-        Some(map) => bindings.extend(map.bindings()),
-        None => bindings.push(Binding::buffer("background", background)),
-    }
-    bindings.extend(target.bindings());
-    bindings.extend(variant.output.highlight.map(|_| Binding::buffer("illumination", illumination)));
-    bindings.extend(variant.output.mirrors.then(|| Binding::buffer("reflected", reflected)));
-    let is_averaged = variant.output.antialias > Antialias::NONE;
-    bindings.extend(is_averaged.then(|| Binding::buffer("position_sums", position_sums)));
-    let ids = target.surface_ids.as_ref().filter(|_| variant.output.surface_id);
-    bindings.extend(ids.map(|ids| Binding::texture("surface_ids", ids)));
-    bindings.extend(target.views.triangle_normal_binding().filter(|_| variant.output.light));
-    bindings.extend(variant.output.passed.then(|| Binding::texture("front_depth", &target.views.front_depth)));
-    bindings
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::test_support::TestStage;
-
-    #[test]
-    fn every_variant_is_bound_by_its_names() {
-        let stage = TestStage::new();
-        for variant in Finish::all() {
-            let target = stage.surfaces(variant.by_rays, variant.output.surface_id);
-            let map = variant.environment_map.then_some(&stage.environment);
-            stage.check(&variant, 0, &bindings(&variant, [&stage.buffer; 8], &target, map));
-        }
-    }
 }

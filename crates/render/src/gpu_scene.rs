@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Aabb, Highlight, MAX_LIGHTS};
 use glam::{Affine3A, Mat3, Vec3};
-use gpu::{Gpu, GpuEnvironment, GpuError, switches};
+use gpu::{Binding, Gpu, GpuEnvironment, GpuError, switches};
 use indexmap::IndexSet;
 use scene::{Material, Scene, Texture, TextureUse, VertexDetail, Wind};
 use wgpu::BufferUsages;
@@ -193,10 +193,21 @@ impl GpuScene {
         buffers.map(wgpu::Buffer::size).iter().sum::<u64>() + of_textures + environment + self.rays.bytes() + posed
     }
 
+    /// What shaders of light read of the scene.
+    pub(crate) fn bindings(&self) -> impl Iterator<Item = Binding<'_>> {
+        let light =
+            [Binding::buffer("background", &self.background), Binding::buffer("illumination", &self.illumination)];
+        light.into_iter().chain(self.environment.iter().flat_map(|map| map.bindings()))
+    }
+
+    /// Whether a map has bright texels.
+    pub(crate) fn has_bright_texels(&self) -> bool {
+        self.environment.as_deref().is_some_and(|map| map.has_bright_texels)
+    }
+
     /// Lamps that take rays: those of the scene, and the bright texels of its environment map, which only rays find.
     pub(crate) fn traced_lamps(&self, lighting: Lighting) -> u32 {
-        let has_bright = self.environment.as_deref().is_some_and(|map| map.has_bright_texels);
-        self.light_count as u32 + u32::from(has_bright && lighting.shadow_rays() > 0)
+        self.light_count as u32 + u32::from(self.has_bright_texels() && lighting.shadow_rays() > 0)
     }
 
     /// Whether some surface has highlights.

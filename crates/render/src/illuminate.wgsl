@@ -1,7 +1,7 @@
 // Light that arrives at each pixel's surface from every lamp and from the environment, with rays where they are asked for.
 // The sums are such that later rays can be added.
 {% include "camera.wgsl" %}
-{% if ambient == "indirect" %}
+{% if indirect %}
 {% include "packed_surface.wgsl" %}
 {% else %}
 {% include "color.wgsl" %}
@@ -77,19 +77,19 @@ fn arrival_of(incident: Incident, spot: Spot) -> Arrival {
 
 // The light of one lamp: the sum over its rays.
 fn from_lamp(number: u32, spot: Spot) -> Arrival {
-{% if shadow_rays == "none" and continued %}
+{% if not shadows and continued %}
     // Known at once, and in the sums already.
     return Arrival(vec3f(0.0), 0.0);
-{% elif shadow_rays == "none" %}
+{% elif not shadows %}
     let incident = incident_of(number, spot, vec2f(0.5));
     return Arrival(incident.irradiance_linear * max(dot(spot.normal, incident.towards), 0.0), 1.0);
 {% else %}
     var arrival = Arrival(vec3f(0.0), 0.0);
     for (var i = 0u; i < camera.shadow_rays; i++) {
-{% if shadow_rays == "one" and environment_map %}
+{% if not soft and environment_map %}
         // Bright texels have no middle.
         let place = select(vec2f(0.5), point_of(camera.first_shadow_ray + i, hashed(spot.seed + number)), is_bright(number));
-{% elif shadow_rays == "one" %}
+{% elif not soft %}
         let place = vec2f(0.5);
 {% else %}
         let place = point_of(camera.first_shadow_ray + i, hashed(spot.seed + number));
@@ -102,14 +102,14 @@ fn from_lamp(number: u32, spot: Spot) -> Arrival {
 {% endif %}
 }
 
-{% if ambient == "indirect" %}
+{% if indirect %}
 
 {% include "indirect.wgsl" %}
 {% endif %}
 
 // With indirect light, what surfaces send back is part of it.
 fn from_environment(spot: Spot, ambient_rays: u32) -> Arrival {
-{% if ambient != "none" %}
+{% if ambient %}
     let around = tangents_of(spot.normal);
     var arrival = Arrival(vec3f(0.0), 0.0);
     for (var i = 0u; i < ambient_rays; i++) {
@@ -117,7 +117,7 @@ fn from_environment(spot: Spot, ambient_rays: u32) -> Arrival {
         let disc = disc_from_square(point_of(number, hashed(spot.seed + 0x5bd1e995u)));
         let up = sqrt(max(1.0 - dot(disc, disc), 0.0));
         let towards = around.tangent * disc.x + around.bitangent * disc.y + spot.normal * up;
-{% if ambient == "indirect" %}
+{% if indirect %}
         let ray = indirect_ray(spot, towards, number);
         arrival.linear += ray.linear;
         arrival.open += ray.open;
@@ -128,7 +128,7 @@ fn from_environment(spot: Spot, ambient_rays: u32) -> Arrival {
         arrival.open += open;
     }
 {% endif %}
-{% if environment_map and shadow_rays == "none" %}
+{% if environment_map and not shadows %}
     // Lamps have no rays: bright texels take as many as there are of occlusion.
     for (var i = 0u; i < ambient_rays && has_bright_texels(); i++) {
         let place = point_of(camera.first_ambient_ray + i, hashed(spot.seed + illumination.light_count));
@@ -138,7 +138,7 @@ fn from_environment(spot: Spot, ambient_rays: u32) -> Arrival {
     return arrival;
 {% elif continued %}
     return Arrival(vec3f(0.0), 0.0);
-{% elif environment_map and shadow_rays != "none" %}
+{% elif environment_map and shadows %}
     return Arrival(environment_base_diffuse(spot.normal), 1.0);
 {% else %}
     return Arrival(environment_diffuse(spot.normal), 1.0);

@@ -1,9 +1,9 @@
 //! Keeps the samples of an image for redundancy tests of those after it.
 
-use gpu::{Binding, ResourceTraits, ShaderVariant};
+use gpu::{Binding, ShaderVariant};
 use minijinja::{Value, context};
 
-use crate::{RenderError, batch::Recording, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
+use crate::{RenderError, batch::Recording, surfaces::Surfaces};
 
 #[derive(Debug)]
 pub(crate) struct Keep {
@@ -12,7 +12,6 @@ pub(crate) struct Keep {
 
 impl ShaderVariant for Keep {
     const TEMPLATE: &'static str = "keep.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         context! { by_rays => self.by_rays, single_pole => false }
@@ -30,10 +29,8 @@ pub(crate) fn record(
     target: &Surfaces,
     held: &wgpu::TextureView,
 ) -> Result<(), RenderError> {
-    let variant = Keep { by_rays: recording.batch.by_rays };
-    let pass = recording.passes.get(&variant)?;
-    let own = [Binding::buffer("camera", &recording.cameras), Binding::texture("held", held)];
-    let bound = pass.bind(0, own.into_iter().chain(target.bindings()))?;
-    recording.dispatch(&variant, &pass, &[&bound], camera);
+    let own = [Binding::texture("held", held)].into_iter().chain(target.bindings());
+    let bound = recording.bind(&Keep { by_rays: recording.batch.by_rays }, (), own)?;
+    recording.dispatch(&bound, camera);
     Ok(())
 }

@@ -5,11 +5,11 @@ use std::{collections::HashSet, sync::Arc};
 use bytemuck::{Pod, Zeroable};
 use depth_image::PinholeCamera;
 use glam::{DMat4, DVec4, UVec2, Vec2};
-use gpu::{Binding, Gpu, GpuError};
+use gpu::{Binding, Gpu, GpuError, Lent, Pool};
 use minijinja::{Value, context};
 use wgpu::{BufferUsages, TextureFormat, TextureView};
 
-use crate::layers::{LayerCache, Layers};
+use crate::layers::{LayerKind, Layers};
 use crate::pixel_camera::PixelCamera;
 use crate::redundancy_test::{Evidence, RedundancyTest};
 use crate::surfaces::SURFACE_ID_FORMAT;
@@ -38,20 +38,17 @@ pub(crate) struct KnownCamera {
 /// The switches of `known_samples.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct RedundancyVariant {
-    shader: &'static str,
-    traces_rays: bool,
+    test: RedundancyTest,
     temporal_reference: bool,
-    /// The number of images before.
+    /// Images before.
     earlier: usize,
 }
 
 /// The cameras of a set and, where a test consults them, the samples of their images.
 pub(crate) struct KnownSamples {
-    /// The greatest distance between two of the viewpoints.
-    pub view_cell_m: f32,
     pub cameras: Vec<PinholeCamera>,
     pub test: RedundancyTest,
-    layers: Arc<Layers>,
+    layers: Arc<Lent<LayerKind, Layers>>,
     /// Another moment of the same set.
     reference: Option<TemporalReference>,
 }
@@ -60,7 +57,7 @@ pub(crate) struct KnownSamples {
 #[derive(Clone)]
 pub struct TemporalReference {
     cameras: Vec<PinholeCamera>,
-    layers: Arc<Layers>,
+    layers: Arc<Lent<LayerKind, Layers>>,
 }
 
 /// The images of a set that are drawn one after the other; each omits the samples that those before it hold.
@@ -89,8 +86,7 @@ impl RedundancyVariant {
         for test in tests {
             for earlier in [1, 3, 15] {
                 for temporal_reference in [false, test.consults == Evidence::Samples] {
-                    let shader = test.shader;
-                    all.insert(Self { shader, traces_rays: test.traces_rays(), temporal_reference, earlier });
+                    all.insert(Self { test: *test, temporal_reference, earlier });
                 }
             }
         }
@@ -100,8 +96,8 @@ impl RedundancyVariant {
     /// The values of `known_samples.wgsl`, whose resources are in `group`.
     pub fn context(variant: Option<Self>, group: u32) -> Value {
         context! {
-            redundancy_test => variant.map(|variant| variant.shader),
-            test_traces_rays => variant.is_some_and(|variant| variant.traces_rays),
+            redundancy_test => variant.map(|variant| variant.test.shader),
+            test_traces_rays => variant.is_some_and(|variant| variant.test.traces_rays()),
             temporal_reference => variant.is_some_and(|variant| variant.temporal_reference),
             earlier => variant.map_or(0, |variant| variant.earlier),
             known_group => group,
@@ -113,7 +109,7 @@ impl KnownSamples {
     /// Layers for the images of a set, which hold nothing yet.
     pub fn of(
         gpu: &Gpu,
-        cache: &LayerCache,
+        pool: &Pool<LayerKind, Layers>,
         cameras: &[PinholeCamera],
         test: RedundancyTest,
         reference: Option<&TemporalReference>,
@@ -126,11 +122,11 @@ impl KnownSamples {
         let size_px = if test.traces_rays() { UVec2::ONE } else { largest };
         let by_id = test.consults == Evidence::SurfaceIds;
         let format = if by_id { SURFACE_ID_FORMAT } else { TextureFormat::Rgba32Uint };
+        let size = [size_px.x, size_px.y, cameras.len().max(1) as u32];
         Ok(Self {
-            view_cell_m: view_cell_m(cameras),
             cameras: cameras.to_vec(),
             test,
-            layers: cache.of(gpu, [size_px.x, size_px.y, cameras.len().max(1) as u32], format),
+            layers: Arc::new(pool.lend((size, format), |&(size, format)| Layers::new(gpu, size, format))),
             reference: reference.cloned(),
         })
     }
@@ -142,12 +138,7 @@ impl KnownSamples {
 
     /// The switches of tests for an image after `earlier` others.
     pub fn variant(&self, earlier: usize) -> RedundancyVariant {
-        RedundancyVariant {
-            shader: self.test.shader,
-            traces_rays: self.test.traces_rays(),
-            temporal_reference: self.reference.is_some(),
-            earlier,
-        }
+        RedundancyVariant { test: self.test, temporal_reference: self.reference.is_some(), earlier }
     }
 
     /// The first `earlier` images, for the next one, whose camera is `own`.

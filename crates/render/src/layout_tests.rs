@@ -3,7 +3,7 @@
 use std::mem::offset_of;
 
 use bytemuck::Zeroable as _;
-use gpu::{GpuTone, ShaderVariant as _};
+use gpu::{GpuTone, ShaderVariant as _, Templates};
 use naga::front::wgsl::{Frontend, Options};
 use naga::{TypeInner, valid::Capabilities};
 
@@ -15,11 +15,22 @@ use crate::known_samples::KnownCamera;
 use crate::lamp_shares::GpuLampShares;
 use crate::layered::{Crossing, GpuLines};
 use crate::light_cache::LookUp;
-use crate::light_samples::{GpuCache, GpuCacheCamera};
+use crate::light_samples::{GpuCache, GpuCacheCamera, LookUpTests};
 use crate::pixel_camera::PixelCamera;
 use crate::raster::{RasterCamera, RasterVariant};
+use crate::redundancy_test::{Evidence, RedundancyTest};
 use crate::reflections::{Lobe, Spawn, bounces::GpuBounce, lobe::GpuLobe};
-use crate::test_support::{TEST, test_templates};
+use crate::shaders::templates;
+
+const NEVER: &str = "fn is_redundant_with(c: Candidate, number: u32, camera: KnownCamera) -> bool { return false; }";
+
+/// A test that finds nothing redundant.
+const TEST: RedundancyTest =
+    RedundancyTest { shader: "never.wgsl", consults: Evidence::Samples, from_one_place: false, usefulness: None };
+
+fn test_templates() -> Templates {
+    templates(&[(TEST.shader, NEVER)]).expect("templates")
+}
 
 /// Fields with their offsets, and the size of the whole.
 #[derive(Debug, PartialEq, Eq)]
@@ -208,8 +219,10 @@ fn the_light_cache_has_the_wgsl_layout() {
         padding
     });
     assert_eq!(shader(&module, "CacheCamera"), camera);
-    let cache = host!(GpuCache { shares, least_coverage, plane_footprints, least_cosine, most_difference, cameras });
+    let cache = host!(GpuCache { shares, tests, cameras });
     assert_eq!(shader(&module, "Cache"), cache);
+    let tests = host!(LookUpTests { least_coverage, plane_footprints, least_cosine, most_difference });
+    assert_eq!(shader(&module, "LookUpTests"), tests);
 }
 
 #[test]
@@ -222,4 +235,58 @@ fn a_swapped_field_is_detected() {
         b: [f32; 4],
     }
     assert_ne!(shader(&other, "Other"), host!(Other { a, b }));
+}
+
+/// The variables of passes that `Recording::bind` gives resources.
+const BOUND: &[&str] = &[
+    "asked",
+    "asked_pixels",
+    "background",
+    "bounces",
+    "bright_texels",
+    "bvh_nodes",
+    "cache",
+    "camera",
+    "environment_lobes",
+    "environment_texels",
+    "finish",
+    "first_surfaces",
+    "flat_details",
+    "flat_triangles",
+    "flat_vertices",
+    "front_depth",
+    "held",
+    "illumination",
+    "kept",
+    "list",
+    "listed_pixels",
+    "lobe",
+    "materials",
+    "next",
+    "next_bounces",
+    "position_sums",
+    "reflected",
+    "reversed_depth",
+    "samples",
+    "sums",
+    "surface_ids",
+    "surfaces",
+    "texels",
+    "triangle_corners",
+    "triangle_normals",
+    "weights",
+    "words",
+];
+
+#[test]
+fn every_variable_of_a_pass_has_a_resource() {
+    let templates = test_templates();
+    let sources = crate::shader_sources(&templates, &[]).map(|source| source.expect("a text"));
+    for source in sources.filter(|source| source.template != "raster.wgsl") {
+        let declared = source.wgsl.lines().filter_map(|line| line.trim().strip_prefix("@group("));
+        for line in declared {
+            let name = line.split(':').next().and_then(|named| named.rsplit(' ').next()).unwrap_or_default();
+            assert!(BOUND.contains(&name), "{}: {line}", source.name);
+        }
+    }
 }

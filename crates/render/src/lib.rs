@@ -41,8 +41,6 @@ mod smooth_light;
 mod stages;
 mod sums;
 mod surfaces;
-#[cfg(test)]
-mod test_support;
 mod texture;
 mod visibility;
 mod work;

@@ -33,8 +33,8 @@ struct CacheCamera {
     size_px: vec2u,
 }
 
-struct Cache {
-    shares: LampShares,
+// When samples know the light of a point.
+struct LookUpTests {
     // The coverage by one image's texels from which light is known.
     least_coverage: f32,
     // From the plane of a texel's triangle, at most.
@@ -43,8 +43,9 @@ struct Cache {
     least_cosine: f32,
     // Between the luminances of texels, at most, relative to the greatest.
     most_difference: f32,
-    cameras: array<CacheCamera, MAX_CACHE_CAMERAS>,
 }
+
+struct Cache { shares: LampShares, tests: LookUpTests, cameras: array<CacheCamera, MAX_CACHE_CAMERAS> }
 
 @group(0) var<uniform> illumination: Illumination;
 @group(0) var<uniform> cache: Cache;
@@ -58,15 +59,15 @@ struct Cache {
 {%- if provenance_plane %}
 @group(0) var<storage, read_write> words: array<u32>;
 {%- endif %}
-{%- if positions == "asked" %}
+{%- if positions == "Asked" %}
 // Pixels whose light is looked up.
 struct Asked { workgroups: u32, y: u32, z: u32, count: u32, last_count: u32 }
 @group(0) var<storage, read> asked_pixels: array<u32>;
 @group(0) var<storage, read> asked: Asked;
-{%- elif positions != "only" %}
+{%- elif positions != "Only" %}
 // The surface of a pixel at its first position: its plane's distance from the eye, the normals of its triangle and of shading, and
 // its provenance.
-@group(0) var first_surfaces: {{ "texture_storage_2d<rgba32uint, write>" if positions == "first" else "texture_2d<u32>" }};
+@group(0) var first_surfaces: {{ "texture_storage_2d<rgba32uint, write>" if positions == "First" else "texture_2d<u32>" }};
 // 1 for pixels whose sums are still those of the first position.
 @group(0) var<storage, read_write> kept: array<u32>;
 {%- endif %}
@@ -82,7 +83,7 @@ const LEAST_WEIGHT: f32 = 0.02;
 // Differences are relative to no less light than this.
 const LEAST_LUMINANCE: f32 = 0.05;
 const MOST_RATIO: f32 = 4.0;
-{%- if positions == "later" %}
+{%- if positions == "Later" %}
 // Surfaces at two positions within a pixel have one light: cosines between their normals, and the distance from one plane.
 const ALIKE_TRIANGLES: f32 = 0.98;
 const ALIKE_NORMALS: f32 = 0.9995;
@@ -205,7 +206,7 @@ fn texel_beside(sight: Sight, first: u32, direction: vec3f, weight: f32, point: 
     let from_texel_m = dot(normal, sight.offset) - depth_m * along_texel;
     let from_point_m = sight.along_normal - depth_m * along_point;
     let step_m = half_step * depth_m;
-    let is_turned_alike = cosine > 0.0 && cosine * cosine >= cache.least_cosine * cache.least_cosine * squared;
+    let is_turned_alike = cosine > 0.0 && cosine * cosine >= cache.tests.least_cosine * cache.tests.least_cosine * squared;
     let is_in_plane = abs(from_texel_m) <= plane_m * sqrt(squared) + step_m * abs(along_texel)
         && abs(from_point_m) <= plane_m + step_m * abs(along_point);
     let counts = inverse_depth_per_m > 0.0 && is_turned_alike && is_in_plane;
@@ -242,7 +243,7 @@ fn consult(image: CacheCamera, number: u32, point: Point, known: ptr<function, K
             image.column_in_world * center.x + image.row_in_world * center.y + image.corner_in_world,
         );
         let texel_m = depth_m * image.footprint;
-        let plane_m = cache.plane_footprints * max(texel_m, point.footprint_m);
+        let plane_m = cache.tests.plane_footprints * max(texel_m, point.footprint_m);
         let half_step = image.half_step_per_m * depth_m;
         let facing = max(-sight.along_normal, 0.0) * inverseSqrt(max(dot(offset, offset), 1e-30));
         let closeness = border * (facing + GRAZING_SHARE) / (texel_m * texel_m);
@@ -305,8 +306,8 @@ fn add_texel(texel: Texel, certainty: f32, point: Point, own: ptr<function, Cach
 
 fn is_known(known: Known) -> bool {
     let difference = known.greatest_luminance - known.least_luminance;
-    let agrees = difference <= cache.most_difference * max(known.greatest_luminance, LEAST_LUMINANCE);
-    return known.light.weight > 0.0 && known.coverage >= cache.least_coverage && agrees;
+    let agrees = difference <= cache.tests.most_difference * max(known.greatest_luminance, LEAST_LUMINANCE);
+    return known.light.weight > 0.0 && known.coverage >= cache.tests.least_coverage && agrees;
 }
 
 fn put(plane: u32, place: u32, value: f32) { sums[camera.first_sum + plane * camera.pixel_count + place] = value; }
@@ -337,7 +338,7 @@ fn put_other_lamps(light: CachedLight, place: u32) {
 }
 {%- endif %}
 
-{%- if positions == "later" %}
+{%- if positions == "Later" %}
 
 // Whether a point of a later position is on the plane of the first position's surface and turned alike: then it has its light.
 fn is_like_first(point: Point, first: vec4u) -> bool {
@@ -396,7 +397,7 @@ fn put_origin(place: u32, origin: u32) {
 {%- endif %}
 }
 
-{%- if positions == "asked" %}
+{%- if positions == "Asked" %}
 
 @compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -419,7 +420,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let needs_light = met && (surface.x & SHOWN_AS_IT_IS) == 0u;
     let point = point_at(pixel, camera.near_m / max(depth, 1e-30), surface);
     var origin = select(PROVENANCE_EMPTY, PROVENANCE_HIT, met);
-{%- if positions == "later" %}
+{%- if positions == "Later" %}
     let kept_place = camera.first_word / {{ plane_count }}u + place;
     let first = textureLoad(first_surfaces, pixel, 0);
     let is_kept = kept[kept_place] == 1u && is_like_first(point, first);
@@ -431,7 +432,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 {%- else %}
     if needs_light { origin = look_up(point, place); }
 {%- endif %}
-{%- if positions == "first" %}
+{%- if positions == "First" %}
     let is_answered = needs_light && origin != PROVENANCE_LIT_HERE;
     kept[camera.first_word / {{ plane_count }}u + place] = select(0u, 1u, is_answered);
     let from_eye_m = dot(point.triangle_normal, point.offset);

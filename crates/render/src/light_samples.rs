@@ -36,8 +36,9 @@ pub(crate) struct CachedLight<'a> {
     pub tests: LookUpTests,
 }
 
-/// The tests of one quality: when samples know the light of a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// `LookUpTests` of the shader, those of one quality: when samples know the light of a point.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct LookUpTests {
     pub least_coverage: f32,
     pub plane_footprints: f32,
@@ -67,10 +68,7 @@ pub(crate) struct GpuCacheCamera {
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct GpuCache {
     pub shares: GpuLampShares,
-    pub least_coverage: f32,
-    pub plane_footprints: f32,
-    pub least_cosine: f32,
-    pub most_difference: f32,
+    pub tests: LookUpTests,
     pub cameras: [GpuCacheCamera; MAX_CACHE_CAMERAS as usize],
 }
 
@@ -81,7 +79,7 @@ impl LookUpTests {
             least_coverage: f32::MIN_POSITIVE,
             plane_footprints: 1.0,
             least_cosine: 30_f32.to_radians().cos(),
-            most_difference: f32::INFINITY,
+            most_difference: f32::MAX,
         };
         let surrounded =
             Self { least_coverage: 0.75, plane_footprints: 0.25, least_cosine: 23_f32.to_radians().cos(), ..any };
@@ -154,15 +152,7 @@ impl LightCache {
         for (camera, image) in cameras.iter_mut().zip(&self.images) {
             *camera = image.seen_from(view.reference().eye_in_world);
         }
-        let LookUpTests { least_coverage, plane_footprints, least_cosine, most_difference } = tests;
-        let cache = GpuCache {
-            shares: scene.lamp_shares,
-            least_coverage,
-            plane_footprints,
-            least_cosine,
-            most_difference: most_difference.min(f32::MAX),
-            cameras,
-        };
+        let cache = GpuCache { shares: scene.lamp_shares, tests, cameras };
         gpu.buffer_with("light cache", &[cache], BufferUsages::UNIFORM)
     }
 }

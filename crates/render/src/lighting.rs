@@ -61,12 +61,8 @@ pub enum UnknownLighting {
         "unknown lighting {0:?}, expected terms of unlit, phong, shadows, soft N, occlusion N, occlusion N RADIUSm, indirect N, reflections N and glossy N with commas between them"
     )]
     Term(String),
-    #[error("lighting {0:?}: rays must be from 1 to {MAX_RAYS}")]
-    Rays(String),
-    #[error("lighting {0:?}: reflections must be from 1 to {MAX_REFLECTIONS}")]
-    Reflections(String),
-    #[error("lighting {0:?}: rays of glossy must be from 1 to {MAX_GLOSSY_RAYS}")]
-    Glossy(String),
+    #[error("lighting {0:?}: {1} must be from 1 to {2}")]
+    Count(String, &'static str, u32),
     #[error("lighting {0:?}: the radius must be a positive number")]
     Radius(String),
     #[error("lighting {0:?}: {1}")]
@@ -190,11 +186,7 @@ impl Lighting {
     /// Steps in which a static scene's light grows from one ray to all: each doubles what was there.
     #[must_use]
     pub fn refinement_steps(&self) -> u32 {
-        let most = match self.direct {
-            Direct::Soft(rays) => rays.get().max(self.ambient_rays()),
-            _ => self.ambient_rays(),
-        };
-        most.max(1).next_power_of_two().ilog2() + 1
+        self.shadow_rays().max(self.ambient_rays()).max(1).next_power_of_two().ilog2() + 1
     }
 }
 
@@ -211,20 +203,19 @@ impl FromStr for Lighting {
                 ["unlit"] => direct.replace(Direct::Unlit).is_some(),
                 ["phong"] => direct.replace(Direct::Phong).is_some(),
                 ["shadows"] => direct.replace(Direct::Shadows).is_some(),
-                ["soft", n] => direct.replace(Direct::Soft(rays(text, n)?)).is_some(),
-                ["occlusion", n] => ambient.replace(Ambient::Occlusion(rays(text, n)?, None)).is_some(),
+                ["soft", n] => direct.replace(Direct::Soft(count(text, n, "rays", MAX_RAYS)?)).is_some(),
+                ["occlusion", n] => {
+                    ambient.replace(Ambient::Occlusion(count(text, n, "rays", MAX_RAYS)?, None)).is_some()
+                }
                 ["occlusion", n, radius] => {
                     let radius_m = radius.strip_suffix('m').unwrap_or(radius).parse().ok();
                     let radius_m = radius_m.filter(|radius_m: &f32| radius_m.is_finite() && *radius_m > 0.0);
                     let radius_m = radius_m.ok_or_else(|| UnknownLighting::Radius(text.to_owned()))?;
-                    ambient.replace(Ambient::Occlusion(rays(text, n)?, Some(radius_m))).is_some()
+                    ambient.replace(Ambient::Occlusion(count(text, n, "rays", MAX_RAYS)?, Some(radius_m))).is_some()
                 }
-                ["indirect", n] => ambient.replace(Ambient::Indirect(rays(text, n)?)).is_some(),
-                ["reflections", n] => {
-                    let mirrors = count(text, n, MAX_REFLECTIONS, UnknownLighting::Reflections)?;
-                    reflections.replace(mirrors).is_some()
-                }
-                ["glossy", n] => glossy.replace(count(text, n, MAX_GLOSSY_RAYS, UnknownLighting::Glossy)?).is_some(),
+                ["indirect", n] => ambient.replace(Ambient::Indirect(count(text, n, "rays", MAX_RAYS)?)).is_some(),
+                ["reflections", n] => reflections.replace(count(text, n, "reflections", MAX_REFLECTIONS)?).is_some(),
+                ["glossy", n] => glossy.replace(count(text, n, "rays of glossy", MAX_GLOSSY_RAYS)?).is_some(),
                 _ => return Err(UnknownLighting::Term(term.to_owned())),
             };
             if again {
@@ -251,19 +242,9 @@ impl FromStr for Lighting {
     }
 }
 
-fn rays(text: &str, number: &str) -> Result<NonZeroU32, UnknownLighting> {
-    count(text, number, MAX_RAYS, UnknownLighting::Rays)
-}
-
-/// A number from 1 to `most`.
-fn count(
-    text: &str,
-    number: &str,
-    most: u32,
-    error: fn(String) -> UnknownLighting,
-) -> Result<NonZeroU32, UnknownLighting> {
+fn count(text: &str, number: &str, what: &'static str, most: u32) -> Result<NonZeroU32, UnknownLighting> {
     let count = number.parse().ok().filter(|count: &NonZeroU32| count.get() <= most);
-    count.ok_or_else(|| error(text.to_owned()))
+    count.ok_or_else(|| UnknownLighting::Count(text.to_owned(), what, most))
 }
 
 /// A quarter of a number of rays, at least one.
@@ -323,18 +304,18 @@ mod tests {
 
     #[test]
     fn invalid_lightings_are_refused_with_the_reason() {
-        use UnknownLighting::{Conflict, Glossy, Radius, Rays, Reflections, Term};
+        use UnknownLighting::{Conflict, Count, Radius, Term};
         let parsed = |text: &str| text.parse::<Lighting>().expect_err(text);
         for text in
             ["soft 0", "soft -1", "soft 4097", "soft many", "occlusion 0", "soft 99999999999", "soft 4, indirect 0"]
         {
-            assert!(matches!(parsed(text), Rays(_)), "{text}");
+            assert!(matches!(parsed(text), Count(_, "rays", MAX_RAYS)), "{text}");
         }
         for text in ["shadows, reflections 0", "shadows, reflections 9", "shadows, reflections -1"] {
-            assert!(matches!(parsed(text), Reflections(_)), "{text}");
+            assert!(matches!(parsed(text), Count(_, "reflections", MAX_REFLECTIONS)), "{text}");
         }
         for text in ["shadows, glossy 0", "shadows, glossy 257", "shadows, glossy -1"] {
-            assert!(matches!(parsed(text), Glossy(_)), "{text}");
+            assert!(matches!(parsed(text), Count(_, "rays of glossy", MAX_GLOSSY_RAYS)), "{text}");
         }
         for text in [
             "",

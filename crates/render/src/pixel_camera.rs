@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use depth_image::Camera;
 use glam::{Vec2, Vec3};
-use gpu::{Gpu, ResourceTrait, ResourceTraits, uniform_elements};
+use gpu::{Gpu, uniform_elements};
 use wgpu::BufferUsages;
 
 /// One camera of a batch.
@@ -42,9 +42,6 @@ pub(crate) struct PixelCamera {
     pub farthest_m: f32,
     pub padding: [u32; 3],
 }
-
-/// The trait of `camera` in all shaders that include `camera.wgsl`.
-pub(crate) const CAMERA_TRAITS: ResourceTraits = &[("camera", ResourceTrait::DynamicOffset)];
 
 impl PixelCamera {
     /// `camera` looks through a position within its pixels, this far from their centres.

@@ -6,8 +6,8 @@ use bytemuck::{Pod, Zeroable};
 use depth_image::{Highlight, ParallelCamera, PinholeCamera};
 use glam::{UVec2, Vec4};
 use gpu::{
-    Binding, BoundGroup, DrawPass, DrawState, DrawVariant, Frame, Gpu, PassCache, ResourceTrait, ResourceTraits,
-    ShaderVariant, Templates, WorkKind, highlight_name, switches, uniform_stride,
+    Binding, BoundGroup, DrawPass, DrawState, DrawVariant, Frame, Gpu, PassCache, ShaderVariant, Templates, WorkKind,
+    highlight_name, switches, uniform_stride,
 };
 use minijinja::{Value, context};
 use scene::{Vertex, VertexDetail};
@@ -76,7 +76,8 @@ impl RasterVariant {
     /// The variants of one material with each redundancy test that needs no rays.
     pub fn with_tests(tests: &[RedundancyTest]) -> impl Iterator<Item = Self> {
         let tests: Vec<_> = tests.iter().copied().filter(|test| !test.traces_rays()).collect();
-        let bases: Vec<_> = Self::all().into_iter().filter(|variant| !variant.depth_only).rev().take(4).collect();
+        let bases: Vec<_> =
+            Self::all().into_iter().filter(|variant| !variant.depth_only && !variant.appended).rev().take(4).collect();
         let tests = RedundancyVariant::all(&tests).into_iter();
         tests.flat_map(move |test| bases.clone().into_iter().map(move |base| Self { redundancy: Some(test), ..base }))
     }
@@ -93,16 +94,6 @@ impl RasterVariant {
 
 impl ShaderVariant for RasterVariant {
     const TEMPLATE: &'static str = "raster.wgsl";
-    const TRAITS: ResourceTraits = &[
-        ("camera", ResourceTrait::DynamicOffset),
-        ("object", ResourceTrait::DynamicOffset),
-        (TEXTURES[0].0, ResourceTrait::Filterable),
-        (TEXTURES[1].0, ResourceTrait::Filterable),
-        (TEXTURES[2].0, ResourceTrait::Filterable),
-        (TEXTURES[3].0, ResourceTrait::Filterable),
-        (TEXTURES[4].0, ResourceTrait::Filterable),
-    ];
-
     fn context(&self) -> Value {
         let Self { material, shading, surface_id, triangle_normal, depth_only, wind, redundancy, appended } = *self;
         let MaterialTraits { double_sided, alpha_tested, textured, coat_textured, unlit, specular, mapped } = material;
@@ -116,23 +107,18 @@ impl ShaderVariant for RasterVariant {
     }
 
     fn all() -> Vec<Self> {
-        let mut nearest = Vec::new();
+        let mut all = Vec::new();
         for shading in [None, Some(Highlight::BlinnPhong), Some(Highlight::Ggx)] {
             for material in MaterialTraits::all() {
                 let plain = Self { material, shading, ..Self::default() };
-                nearest.extend(switches().map(|[surface_id, depth_only, wind]| Self {
-                    surface_id,
-                    depth_only,
-                    wind,
-                    ..plain
-                }));
+                for [surface_id, wind, triangle_normal, depth_only, appended] in switches() {
+                    all.push(Self { surface_id, wind, triangle_normal, depth_only, appended, ..plain });
+                }
             }
         }
-        let appended = nearest.iter().filter(|variant| !variant.surface_id && !variant.depth_only);
-        let appended: Vec<Self> = appended.map(|variant| Self { appended: true, ..*variant }).collect();
-        let with_normals = nearest.iter().filter(|variant| !variant.depth_only);
-        let with_normals: Vec<Self> = with_normals.map(|variant| Self { triangle_normal: true, ..*variant }).collect();
-        [nearest, appended, with_normals].concat()
+        all.retain(|variant| !(variant.triangle_normal && (variant.depth_only || variant.appended)));
+        all.retain(|variant| !(variant.appended && (variant.depth_only || variant.surface_id)));
+        all
     }
 }
 

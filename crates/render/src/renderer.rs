@@ -4,13 +4,13 @@ use std::{collections::VecDeque, sync::Arc};
 
 use depth_image::{
     Antialias, Camera, DepthImage, LayeredDepthImage, LayeredLightField, LightCacheQuality, LightFieldCamera,
-    LightPlanes, ParallelCamera, PinholeCamera, ProvenanceKind, ToneMapping, View, ViewPlanes,
+    LightPlanes, ParallelCamera, PinholeCamera, ProvenanceKind, View, ViewPlanes,
 };
 use glam::UVec2;
-use gpu::{Gpu, GpuError, TablePool, Templates, Turn, WorkClass};
+use gpu::{Gpu, GpuError, Pool, TablePool, Templates, Turn, WorkClass};
 use parking_lot::Mutex;
 
-use crate::batch::{Batch, Position, batches};
+use crate::batch::{Batch, batches};
 use crate::known_samples::{ImageSequence, KnownSamples, TemporalReference};
 use crate::layered;
 use crate::light_samples::{CachedLight, LightCache, LookUpTests};
@@ -18,7 +18,12 @@ use crate::planes::{self, Output};
 use crate::smooth_light::smoothed;
 use crate::visibility::{Choice, Costs, Visibility};
 use crate::work::{DrawWork, LayerSelection, Refinement, SamplePlanes};
-use crate::{GpuScene, Lighting, RenderError, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages};
+use crate::{
+    GpuScene, Lighting, RenderError,
+    layers::{self, LayerKind, Layers},
+    redundancy_test::RedundancyTest,
+    stages::Stages,
+};
 
 /// Pixels in one submission: bounds the memory for surfaces, light and read-back.
 const PIXELS_A_SUBMISSION: usize = 1 << 20;
@@ -29,30 +34,14 @@ const LEAST_TIMED_PX: usize = 256 * 256;
 /// Scenes whose costs are remembered.
 const MOST_SCENES: usize = 64;
 
-/// Pictures of one kind, in one light.
-#[derive(Clone, Copy)]
-struct DrawRequest<'a> {
-    work: DrawWork<'a>,
-    output: Output,
-    tone: ToneMapping,
-    sequence: Option<ImageSequence<'a>>,
-    cached: Option<CachedLight<'a>>,
-}
-
 /// Draws on one device.
 pub struct Renderer {
     gpu: Arc<Gpu>,
     stages: Stages,
     tables: TablePool,
-    layer_cache: LayerCache,
+    layers: Pool<LayerKind, Layers>,
     /// By scene; the one that was measured first is at the front.
     costs: Mutex<VecDeque<(u64, Costs)>>,
-}
-
-impl<'a> DrawRequest<'a> {
-    fn new(work: DrawWork<'a>, output: Output) -> Self {
-        Self { work, output, tone: ToneMapping::NONE, sequence: None, cached: None }
-    }
 }
 
 impl Renderer {
@@ -61,7 +50,7 @@ impl Renderer {
     pub fn new(gpu: &Arc<Gpu>, templates: Templates) -> Self {
         let stages = Stages::new(gpu, &Arc::new(templates));
         let tables = TablePool::new(gpu);
-        Self { gpu: gpu.clone(), stages, tables, layer_cache: LayerCache::default(), costs: Mutex::default() }
+        Self { gpu: gpu.clone(), stages, tables, layers: layers::pool(gpu), costs: Mutex::default() }
     }
 
     /// The device.
@@ -140,7 +129,7 @@ impl Renderer {
             provenance: cached.is_some() && planes.provenance,
             ..views_output(work)
         };
-        let request = DrawRequest { tone: planes.tone, cached, ..DrawRequest::new(work, output) };
+        let request = Batch { tone: planes.tone, cached, ..Batch::new(work, output) };
         self.draw(request, &cameras, |words, cameras| planes::views(words, output, cameras, planes, lit))
     }
 
@@ -210,11 +199,11 @@ impl Renderer {
         let all = pinholes(cameras, "redundancy tests")?;
         self.check(cameras)?;
         let own: Vec<Camera> = wanted.iter().map(|&number| cameras[number as usize]).collect();
-        let samples = KnownSamples::of(&self.gpu, &self.layer_cache, &all, test, reference)?;
+        let samples = KnownSamples::of(&self.gpu, &self.layers, &all, test, reference)?;
         let sequence = ImageSequence { known: &samples, wanted, first: 0, kept: all.len().saturating_sub(1) };
         // Where pixels are compared with the same pixel, corners are compared with corners.
         let corners = (planes.corners && test.from_one_place).then(|| corner_cameras(&all));
-        let corners = corners.map(|cameras| KnownSamples::of(&self.gpu, &self.layer_cache, &cameras, test, None));
+        let corners = corners.map(|cameras| KnownSamples::of(&self.gpu, &self.layers, &cameras, test, None));
         let corners = corners.transpose()?;
         let of_corners = match &corners {
             Some(known) => ImageSequence { known, ..sequence },
@@ -236,7 +225,7 @@ impl Renderer {
         let work = work.unlit();
         let pinholes = pinholes(cameras, "redundancy tests")?;
         self.check(cameras)?;
-        let known = KnownSamples::of(&self.gpu, &self.layer_cache, &pinholes, test, None)?;
+        let known = KnownSamples::of(&self.gpu, &self.layers, &pinholes, test, None)?;
         let wanted: Vec<u32> = (0..cameras.len() as u32).collect();
         let sequence = ImageSequence { known: &known, wanted: &wanted, first: 0, kept: cameras.len() };
         self.images(work, cameras, SamplePlanes::default(), Some(test), [Some(sequence), None])?;
@@ -254,7 +243,7 @@ impl Renderer {
     ) -> Result<Vec<DepthImage>, RenderError> {
         let corners = planes.corners.then(|| pinholes(cameras, "depths at corners")).transpose()?;
         let output = images_output(work, planes, test);
-        let request = DrawRequest { sequence, ..DrawRequest::new(work, output) };
+        let request = Batch { sequence, ..Batch::new(work, output) };
         let mut images = self.draw(request, cameras, |words, cameras| planes::depth_images(words, output, cameras))?;
         if let Some(pinholes) = corners {
             let cameras = as_cameras(&corner_cameras(&pinholes));
@@ -270,14 +259,14 @@ impl Renderer {
     /// Batch after batch; `read` makes pictures of the words of one.
     fn draw<T>(
         &self,
-        request: DrawRequest<'_>,
+        request: Batch<'_>,
         cameras: &[Camera],
         read: impl Fn(&[u32], &[Camera]) -> Vec<T>,
     ) -> Result<Vec<T>, RenderError> {
         let mut pictures = Vec::with_capacity(cameras.len());
         for cameras in batches(cameras, self.most_pixels(request.output)) {
             let sequence = request.sequence.map(|sequence| ImageSequence { first: pictures.len(), ..sequence });
-            let batch = self.batch(DrawRequest { sequence, ..request }, cameras)?;
+            let batch = self.batch(Batch { sequence, ..request.clone() }, cameras)?;
             let (result, words) = self.stages.draw(&batch)?;
             result.with(words, |words: &[u32]| pictures.extend(read(words, cameras)))?;
         }
@@ -356,7 +345,7 @@ impl Renderer {
         self.check(&cameras)?;
         let mut least_s = f64::INFINITY;
         for number in 0..4 {
-            let batch = self.batch(DrawRequest::new(work, views_output(work)), &cameras)?;
+            let batch = self.batch(Batch::new(work, views_output(work)), &cameras)?;
             // Waiting for turns does not count.
             let device_s = self.stages.draw(&batch)?.0.device_s;
             // Pipelines and trees are made by the first; of the others the quickest was disturbed least.
@@ -377,8 +366,8 @@ impl Renderer {
         Ok(())
     }
 
-    fn batch<'a>(&self, request: DrawRequest<'a>, cameras: &'a [Camera]) -> Result<Batch<'a>, RenderError> {
-        let DrawRequest { work, output, tone, sequence, cached } = request;
+    fn batch<'a>(&self, request: Batch<'a>, cameras: &'a [Camera]) -> Result<Batch<'a>, RenderError> {
+        let Batch { work, sequence, .. } = request;
         let by_rays = match work.visibility {
             // Triangles are drawn through one eye.
             _ if cameras[0].pinhole().is_none() => true,
@@ -390,14 +379,12 @@ impl Renderer {
         };
         let needs_tree = by_rays || work.lighting.is_traced();
         let traced = needs_tree.then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
-        let position = Position::default();
-        Ok(Batch { work, cameras, by_rays, traced, output, tone, sequence, cached, position })
+        Ok(Batch { cameras, by_rays, traced, ..request })
     }
 
     /// The pixels for which no buffer of a batch is larger than the device binds.
     fn most_pixels(&self, output: Output) -> usize {
-        let limits = self.gpu.device.limits();
-        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) as usize;
+        let bytes = self.gpu.most_storage_bytes() as usize;
         PIXELS_A_SUBMISSION.min(bytes / (4 * output.layout().count.max(output.sums.count())))
     }
 }

@@ -1,6 +1,6 @@
 //! The shader templates of this crate, the numbers that they share with Rust, and all their variants.
 
-use gpu::{ShaderError, ShaderSource, Templates, source, wgsl_constants, wgsl_files};
+use gpu::{ResourceTraits, ShaderError, ShaderSource, Templates, source, wgsl_constants, wgsl_files};
 
 use crate::known_samples::{LEAST_FACING, REFERENCE_FOOTPRINTS};
 use crate::rays::flat::{ALPHA_HASHED, ALPHA_TESTED, DOUBLE_SIDED, SPECULAR, UNLIT, VERTEX};
@@ -31,17 +31,20 @@ const MAX_LAMP_SHARES: u32 = depth_image::MAX_LAMP_SHARES as u32;
 pub const SHADERS: &[(&str, &str)] = &wgsl_files! {
     "raster.wgsl", "append.wgsl", "layered/lit.wgsl", "packed_surface.wgsl", "surfaces.wgsl", "albedo.wgsl", "camera.wgsl", "single_pole.wgsl", "sums.wgsl",
     "illuminate.wgsl", "indirect.wgsl", "light_cache.wgsl", "lamp_shares.wgsl", "pixel_list.wgsl", "triangle_normal.wgsl", "finish.wgsl", "known_samples.wgsl", "keep.wgsl", "footprint.wgsl", "hashed_alpha.wgsl",
-    "rise.wgsl", "spot.wgsl", "shaded.wgsl", "visibility.wgsl", "reflections/bounce.wgsl", "reflections/bounce_off.wgsl", "reflections/curvature.wgsl",
+    "rise.wgsl", "spot.wgsl", "shaded.wgsl", "visibility.wgsl", "reflections/bounce.wgsl", "reflections/bounce_off.wgsl", "reflections/ends.wgsl", "reflections/curvature.wgsl",
     "reflections/spawn.wgsl", "reflections/follow.wgsl", "reflections/land.wgsl", "reflections/lobe.wgsl",
     "rays/traverse.wgsl", "rays/material.wgsl", "rays/primary.wgsl"
 };
+
+/// Cameras and objects have an element for each dispatch or draw.
+const TRAITS: ResourceTraits = &["camera", "object"];
 
 /// [`SHADERS`] and templates of redundancy tests, each with its name.
 ///
 /// # Errors
 /// When a text is not a template.
 pub fn templates(tests: &[(&'static str, &'static str)]) -> Result<Templates, ShaderError> {
-    Ok(Templates::new(&[SHADERS, tests].concat())?.declaring(wgsl_constants! {
+    Ok(Templates::new(&[SHADERS, tests].concat())?.with_traits(TRAITS).declaring(wgsl_constants! {
         ALPHA_HASHED, ALPHA_TESTED, BIAS_FOOTPRINTS, BIAS_ROUNDINGS, BOX_SLACK, CLAMP, COLOR_SUMS, DOUBLE_SIDED, EDGE_ROUNDINGS, LEAST_FACING, LIST_WORKGROUP, MATERIAL_TEXELS, MAX_CACHE_CAMERAS, MAX_LAMP_SHARES, MIRROR, MOST_LAYERS,
         NOTHING, PROVENANCE_EMPTY, PROVENANCE_HIT, PROVENANCE_LIT_HERE, REFERENCE_FOOTPRINTS, SAME_SURFACE, SPECULAR, UNLIT, VERTEX
     }))

@@ -34,21 +34,16 @@ impl Surface {
 #[must_use]
 pub fn smoothed(image: &DepthImage) -> DepthImage {
     let mut smooth = image.clone();
-    if let Some(light) = &mut smooth.light {
-        light.environment_rgb9e5 = smoothed_ambient(image, &light.environment_rgb9e5);
-    }
-    smooth
-}
-
-fn smoothed_ambient(image: &DepthImage, words: &[u32]) -> Vec<u32> {
-    let size_px = image.size_px();
+    let Some(light) = &mut smooth.light else { return smooth };
+    let words = &light.environment_rgb9e5;
     let surfaces: Vec<Option<Surface>> = (0..words.len()).into_par_iter().map(|place| surface(image, place)).collect();
     let mut linear: Vec<Vec3> = words.iter().map(|&word| linear_from_rgb9e5(word)).collect();
     for step_px in STEPS_PX {
-        let places = (0..words.len()).into_par_iter();
-        linear = places.map(|place| mean_around(&surfaces, &linear, size_px, place, step_px)).collect();
+        let places = (0..linear.len()).into_par_iter();
+        linear = places.map(|place| mean_around(&surfaces, &linear, image.size_px(), place, step_px)).collect();
     }
-    linear.into_iter().map(rgb9e5_from_linear).collect()
+    light.environment_rgb9e5 = linear.into_iter().map(rgb9e5_from_linear).collect();
+    smooth
 }
 
 /// The mean over a texel and the eight around it that are on its surface, by a binomial kernel.

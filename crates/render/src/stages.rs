@@ -3,7 +3,7 @@
 use std::{slice, sync::Arc};
 
 use depth_image::Antialias;
-use gpu::{BufferPool, Frame, FrameResult, Gpu, JobLimit, PassCache, Readback, Templates};
+use gpu::{BufferPool, Frame, FrameResult, Gpu, JobLimit, PassCache, Pool, Readback, Templates};
 
 use crate::accumulation::{Accumulations, Sums};
 use crate::batch::{Batch, Recording};
@@ -12,7 +12,7 @@ use crate::known_samples::{ImageSequence, Predecessors};
 use crate::light_cache::{self, Picture};
 use crate::pieces::Piece;
 use crate::reflections::{self, Reflections};
-use crate::surfaces::{SurfaceKind, SurfacePool, Surfaces};
+use crate::surfaces::{MOST_FREE_BYTES, SurfaceKind, SurfaceViews, Surfaces};
 use crate::{RenderError, finish, illuminate, keep, pixel_list::PixelList, raster::Raster};
 use crate::{rays::primary, redundancy_test::Evidence};
 
@@ -23,7 +23,7 @@ const BATCHES_OF_A_CLASS: usize = 2;
 pub(crate) struct Stages {
     pub gpu: Arc<Gpu>,
     pub pool: BufferPool,
-    surfaces: SurfacePool,
+    surfaces: Pool<SurfaceKind, SurfaceViews>,
     accumulations: Accumulations,
     pub raster: Raster,
     pub passes: PassCache,
@@ -35,7 +35,7 @@ impl Stages {
         Self {
             gpu: gpu.clone(),
             pool: BufferPool::new(gpu),
-            surfaces: SurfacePool::new(gpu),
+            surfaces: Pool::of_device(gpu, MOST_FREE_BYTES, SurfaceKind::bytes),
             accumulations: Accumulations::default(),
             raster: Raster::new(gpu, templates),
             passes: PassCache::new(gpu, templates),
@@ -57,10 +57,8 @@ impl Stages {
         let mirrored = mirrored.transpose()?;
         let cameras = batch.uniform_of_all(gpu, &pieces, &sums);
         let shifted = batch.positions();
-        let positions = shifted.iter().map(|(position, cameras)| {
-            let position = *position;
-            Batch { cameras, traced: batch.traced.clone(), position, ..*batch }
-        });
+        let positions =
+            shifted.iter().map(|(position, cameras)| Batch { cameras, position: *position, ..batch.clone() });
         let positions: Vec<Batch<'_>> = positions.collect();
         let frame = Frame::begin(gpu, "draw", turn);
         let mut recording = Recording { gpu, passes, batch, pieces, cameras, sums, frame };
@@ -89,7 +87,7 @@ impl Stages {
         let refinement = batch.work.refinement;
         let bytes = batch.bytes(if lighting.is_lit() { batch.output.sums.count() } else { 0 });
         self.gpu.check_storage_bytes("the light of a batch (bytes)", bytes)?;
-        let wanted = batch.light_rays().map(|rays| refinement.share_of(rays));
+        let wanted = batch.wanted_rays();
         let kept = (refinement.steps > 1).then(|| self.accumulations.take(&batch.key(), wanted)).flatten();
         Ok(kept.unwrap_or_else(|| {
             let buffer = self.pool.lend_storage("light", bytes.max(4));
@@ -160,10 +158,9 @@ impl Stages {
             first_surface: batch.cached.is_some() && batch.output.antialias > Antialias::NONE,
             front: batch.sequence.is_some_and(|sequence| sequence.number(place) > 0),
         };
-        match batch.sequence.and_then(|sequence| sequence.layer(place, Evidence::SurfaceIds)) {
-            Some((ids, size_px)) => self.surfaces.lend(SurfaceKind { size_px, surface_id: false, ..kind }, Some(ids)),
-            None => self.surfaces.lend(kind, None),
-        }
+        let own = batch.sequence.and_then(|sequence| sequence.layer(place, Evidence::SurfaceIds));
+        let kind = own.map_or(kind, |(_, size_px)| SurfaceKind { size_px, surface_id: false, ..kind });
+        Surfaces::lend(&self.gpu, &self.surfaces, kind, own.map(|(ids, _)| ids))
     }
 
     /// Records the light that arrives at surfaces: rays for all pixels, or a look-up in samples and rays for the pixels that no

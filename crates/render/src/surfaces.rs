@@ -1,7 +1,5 @@
 //! The surfaces of one camera: textures that `raster` or `primary` draws into, and that light is computed from.
 
-use std::sync::Arc;
-
 use glam::UVec2;
 use gpu::{Binding, DrawPass, Gpu, Lent, Pool};
 use wgpu::{TextureFormat, TextureUsages};
@@ -18,7 +16,7 @@ pub(crate) const TRIANGLE_NORMAL_FORMAT: TextureFormat = TextureFormat::R32Uint;
 pub(crate) const NOTHING: u32 = u32::MAX;
 
 /// The most bytes of free textures: those of a few batches.
-const MOST_FREE_BYTES: u64 = 128 << 20;
+pub(crate) const MOST_FREE_BYTES: u64 = 128 << 20;
 
 /// The textures that are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -34,7 +32,7 @@ pub(crate) struct SurfaceKind {
 }
 
 impl SurfaceKind {
-    fn bytes(&self) -> u64 {
+    pub fn bytes(&self) -> u64 {
         let floats = 1 + u64::from(self.front) + u64::from(self.triangle_normal);
         let pixel = 16 * (1 + u64::from(self.first_surface)) + 4 * floats + 8 * u64::from(self.surface_id);
         pixel * u64::from(self.size_px.x) * u64::from(self.size_px.y)
@@ -54,22 +52,6 @@ pub(crate) struct SurfaceViews {
     first_surfaces: Option<wgpu::TextureView>,
 }
 
-impl SurfaceViews {
-    pub fn first_surface_binding(&self) -> Option<Binding<'_>> {
-        self.first_surfaces.as_ref().map(|surfaces| Binding::texture("first_surfaces", surfaces))
-    }
-
-    pub fn triangle_normal_binding(&self) -> Option<Binding<'_>> {
-        self.triangle_normals.as_ref().map(|normals| Binding::texture("triangle_normals", normals))
-    }
-}
-
-/// Lends textures; they come back when dropped.
-pub(crate) struct SurfacePool {
-    gpu: Arc<Gpu>,
-    surfaces: Pool<SurfaceKind, SurfaceViews>,
-}
-
 /// Textures on loan; contents are whatever the last borrower left.
 pub(crate) struct Surfaces {
     pub views: Lent<SurfaceKind, SurfaceViews>,
@@ -77,28 +59,18 @@ pub(crate) struct Surfaces {
     pub surface_ids: Option<wgpu::TextureView>,
 }
 
-impl SurfacePool {
-    pub fn new(gpu: &Arc<Gpu>) -> Self {
-        Self { gpu: gpu.clone(), surfaces: Pool::of_device(gpu, MOST_FREE_BYTES, SurfaceKind::bytes) }
-    }
-
-    /// Surface ids are drawn into `own_ids`, which are not lent, where there are any.
-    pub fn lend(&self, kind: SurfaceKind, own_ids: Option<&wgpu::TextureView>) -> Surfaces {
-        let views = self.surfaces.lend(kind, |&kind| self.make(kind));
-        Surfaces { surface_ids: own_ids.or(views.surface_ids.as_ref()).cloned(), views }
-    }
-
-    fn make(&self, kind: SurfaceKind) -> SurfaceViews {
+impl SurfaceViews {
+    fn new(gpu: &Gpu, kind: SurfaceKind) -> Self {
         let written = if kind.by_rays { TextureUsages::STORAGE_BINDING } else { TextureUsages::RENDER_ATTACHMENT };
         let [width, height] = kind.size_px.to_array();
         let view_for = |format, written| {
             let usage = written | TextureUsages::TEXTURE_BINDING;
-            self.gpu.texture("surfaces", [width, height, 1], format, usage).create_view(&Default::default())
+            gpu.texture("surfaces", [width, height, 1], format, usage).create_view(&Default::default())
         };
         let view = |format| view_for(format, written);
         let depth = if kind.by_rays { TextureFormat::R32Float } else { DrawPass::DEPTH_FORMAT };
         let reversed_depth = view(depth);
-        SurfaceViews {
+        Self {
             surfaces: view(SURFACE_FORMAT),
             front_depth: if kind.front { view(depth) } else { reversed_depth.clone() },
             reversed_depth,
@@ -110,11 +82,25 @@ impl SurfacePool {
 }
 
 impl Surfaces {
+    /// Surface ids are drawn into `own_ids`, which are not lent, where there are any.
+    pub fn lend(
+        gpu: &Gpu,
+        pool: &Pool<SurfaceKind, SurfaceViews>,
+        kind: SurfaceKind,
+        own_ids: Option<&wgpu::TextureView>,
+    ) -> Self {
+        let views = pool.lend(kind, |&kind| SurfaceViews::new(gpu, kind));
+        Self { surface_ids: own_ids.or(views.surface_ids.as_ref()).cloned(), views }
+    }
+
     /// The variables of `surfaces.wgsl`.
-    pub fn bindings(&self) -> [Binding<'_>; 2] {
-        [
-            Binding::texture("surfaces", &self.views.surfaces),
-            Binding::texture("reversed_depth", &self.views.reversed_depth),
-        ]
+    pub fn bindings(&self) -> impl Iterator<Item = Binding<'_>> {
+        let SurfaceViews { surfaces, reversed_depth, front_depth, triangle_normals, first_surfaces, .. } = &*self.views;
+        let always = [("surfaces", surfaces), ("reversed_depth", reversed_depth), ("front_depth", front_depth)];
+        let ids = self.surface_ids.as_ref().map(|view| ("surface_ids", view));
+        let normals = triangle_normals.as_ref().map(|view| ("triangle_normals", view));
+        let first = first_surfaces.as_ref().map(|view| ("first_surfaces", view));
+        let views = always.into_iter().chain(ids).chain(normals).chain(first);
+        views.map(|(name, view)| Binding::texture(name, view))
     }
 }

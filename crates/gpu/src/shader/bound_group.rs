@@ -8,31 +8,28 @@ use wgpu::{BindGroup, BindingResource, TextureFormat};
 pub struct BoundGroup {
     pub(super) group: BindGroup,
     /// Of each resource in the order of the group's layout.
-    pub(super) forms: Vec<Form>,
+    pub(super) forms: Vec<Option<Form>>,
 }
 
-/// The properties of a resource that are part of compiled code.
+/// The properties of a texture that are part of compiled code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) enum Form {
-    /// A buffer or sampler: its layout says all.
-    OfLayout,
-    Texture {
-        format: TextureFormat,
-        /// Whether columns and rows are powers of two.
-        is_power_of_two: [bool; 2],
-        has_mips: bool,
-    },
+pub(super) struct Form {
+    pub format: TextureFormat,
+    /// Whether columns and rows are powers of two.
+    pub is_power_of_two: [bool; 2],
+    pub has_mips: bool,
 }
 
 impl Form {
-    pub(super) fn of(resource: &BindingResource<'_>) -> Self {
-        let BindingResource::TextureView(view) = resource else { return Self::OfLayout };
+    /// `None` for a buffer or sampler, whose layout says all.
+    pub fn of(resource: &BindingResource<'_>) -> Option<Self> {
+        let BindingResource::TextureView(view) = resource else { return None };
         let texture = view.texture();
-        Self::Texture {
+        Some(Self {
             format: texture.format(),
             is_power_of_two: [texture.width(), texture.height()].map(u32::is_power_of_two),
             has_mips: texture.mip_level_count() > 1,
-        }
+        })
     }
 }
 

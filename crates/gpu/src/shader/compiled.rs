@@ -26,7 +26,7 @@ impl Shader {
     /// Compiles `wgsl`.
     ///
     /// # Errors
-    /// WGSL that cannot be parsed, or a trait of a resource that is not declared.
+    /// WGSL that cannot be parsed, or a variable of a type that is not supported.
     pub fn new(gpu: &Gpu, label: &str, wgsl: &str, traits: ResourceTraits) -> Result<Self, ShaderError> {
         let interface = ShaderInterface::of(label, wgsl, traits)?;
         let device = gpu.device.clone();
@@ -51,21 +51,26 @@ impl Shader {
         Self::new(gpu, &self.interface.shader, &self.wgsl, self.traits)
     }
 
-    /// Binds resources to all variables of a group.
+    /// Binds resources to all variables of a group by name. Of several resources of one name, the first counts.
     ///
     /// # Errors
-    /// A name that is missing, not in the group, or there twice.
+    /// A group that is not declared, or a variable that has no resource.
     pub fn bind<'r>(
         &self,
         group: u32,
         bindings: impl IntoIterator<Item = Binding<'r>>,
     ) -> Result<BoundGroup, ShaderError> {
         let bindings: Vec<Binding<'r>> = bindings.into_iter().collect();
-        let resources = self.interface.matched(group, bindings.iter().map(|binding| binding.name))?;
-        let bound = bindings.into_iter().map(|binding| binding.resource);
-        let mut in_order: Vec<_> = resources.into_iter().zip(bound).collect();
-        in_order.sort_by_key(|(resource, _)| resource.layout.binding);
-        Ok(self.bind_in_order(group, in_order))
+        Ok(self.bind_in_order(group, self.interface.matched(group, &bindings)?))
+    }
+
+    /// Binds resources to the variables of all groups, as [`Shader::bind`] does.
+    ///
+    /// # Errors
+    /// A variable that has no resource.
+    pub fn bind_all(&self, bindings: &[Binding<'_>]) -> Result<Vec<BoundGroup>, ShaderError> {
+        let groups = 0..self.groups.len() as u32;
+        groups.map(|group| Ok(self.bind_in_order(group, self.interface.matched(group, bindings)?))).collect()
     }
 
     /// Binds to all variables of a group, which are in the order of its layout.

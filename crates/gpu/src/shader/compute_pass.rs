@@ -5,8 +5,8 @@ use std::ops::{Deref, Range};
 use super::bound_group::BoundGroup;
 use super::compiled::Shader;
 use super::variant::{Pass, ShaderVariant};
-use super::warming::{FirstUses, warm};
-use crate::sharing::{Turn, WorkKind};
+use super::warming::FirstUses;
+use crate::sharing::Turn;
 use crate::{device::Gpu, error::GpuError, frame::Frame};
 
 /// A compute pipeline with its layout. The shader's entry point is `main`.
@@ -56,9 +56,7 @@ impl ComputePass {
         elements: Range<u32>,
         size: DispatchSize<'_>,
     ) {
-        if self.first_uses.make_ready(groups, || warm(frame.gpu, &self.shader, groups, use_without_work)) {
-            frame.count((WorkKind::FIRST_USE, 1));
-        }
+        self.first_uses.make_ready(frame, &self.shader, groups, use_without_work);
         let interface = &self.shader.interface;
         let label = Some(interface.shader.as_str());
         let mut pass = frame.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes: None });

@@ -7,8 +7,8 @@ use wgpu::{BufferUsages, CompareFunction, RenderPipeline, ShaderStages, TextureF
 use super::bound_group::BoundGroup;
 use super::compiled::Shader;
 use super::variant::{Pass, ShaderVariant};
-use super::warming::{FirstUses, warm};
-use crate::sharing::{Turn, WorkKind};
+use super::warming::FirstUses;
+use crate::sharing::Turn;
 use crate::{device::Gpu, error::GpuError, frame::Frame};
 
 /// A render pipeline with its layout. The shader's entry points are `vertex` and, unless it draws depth alone, `fragment`.
@@ -50,6 +50,7 @@ impl DrawPass {
             compilation_options: Default::default(),
             targets: &targets,
         });
+        let depth_compare = if state.nearest_only { CompareFunction::Greater } else { CompareFunction::Always };
         let buffers: Vec<_> = state.vertices.iter().cloned().map(Some).collect();
         let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(&shader.interface.shader),
@@ -64,11 +65,7 @@ impl DrawPass {
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: Self::DEPTH_FORMAT,
                 depth_write_enabled: Some(state.nearest_only),
-                depth_compare: Some(if state.nearest_only {
-                    CompareFunction::Greater
-                } else {
-                    CompareFunction::Always
-                }),
+                depth_compare: Some(depth_compare),
                 stencil: Default::default(),
                 bias: Default::default(),
             }),
@@ -83,14 +80,9 @@ impl DrawPass {
     /// Says that a pass of the frame will draw with this pipeline and these groups: all, from 0. It has to be said before the
     /// pass begins.
     pub fn announce(&self, frame: &mut Frame<'_>, groups: &[&BoundGroup]) {
-        let is_first_use = self.first_uses.make_ready(groups, || {
-            warm(frame.gpu, &self.shader, groups, |gpu, shader, groups| {
-                Self::new(gpu, shader, self.state.clone()).draw_nothing(gpu, groups)
-            });
+        self.first_uses.make_ready(frame, &self.shader, groups, |gpu, shader, groups| {
+            Self::new(gpu, shader, self.state.clone()).draw_nothing(gpu, groups)
         });
-        if is_first_use {
-            frame.count((WorkKind::FIRST_USE, 1));
-        }
     }
 
     /// Draws one triangle of no extent, for which the device compiles the shader.

@@ -57,17 +57,8 @@ impl<'r> Binding<'r> {
     }
 }
 
-/// A property of a resource that WGSL does not say.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ResourceTrait {
-    /// One element of a buffer, chosen by each dispatch or draw.
-    DynamicOffset,
-    /// A texture of floats that a sampler filters.
-    Filterable,
-}
-
-/// Names of resources with their traits.
-pub type ResourceTraits = &'static [(&'static str, ResourceTrait)];
+/// Names of uniforms that have an element for each dispatch or draw, which sees its own at a dynamic offset.
+pub type ResourceTraits = &'static [&'static str];
 
 /// A resource at its binding.
 #[derive(Debug, Clone)]
@@ -94,7 +85,7 @@ impl ShaderInterface {
     /// Reads `wgsl`.
     ///
     /// # Errors
-    /// WGSL that cannot be parsed, or a trait of a resource that is not declared.
+    /// WGSL that cannot be parsed, or a variable of a type that is not supported.
     pub fn of(shader: &str, wgsl: &str, traits: ResourceTraits) -> Result<Self, ShaderError> {
         let mut options = Options::new();
         options.capabilities = Capabilities::all();
@@ -108,11 +99,16 @@ impl ShaderInterface {
         };
         let computes = interface.stages.contains(ShaderStages::COMPUTE);
         let visibility = if computes { ShaderStages::COMPUTE } else { ShaderStages::VERTEX_FRAGMENT };
+        // Textures beside a sampler are filtered.
+        let variables = module.global_variables.iter().map(|(_, variable)| variable);
+        let samplers =
+            variables.filter(|variable| matches!(module.types[variable.ty].inner, TypeInner::Sampler { .. }));
+        let filtered: Vec<u32> = samplers.filter_map(|sampler| Some(sampler.binding.as_ref()?.group)).collect();
         for (_, variable) in module.global_variables.iter() {
             let Some(place) = variable.binding else { continue };
             let name = variable.name.clone().unwrap_or_default();
-            let has_dynamic_offset = traits.contains(&(name.as_str(), ResourceTrait::DynamicOffset));
-            let is_filterable = traits.contains(&(name.as_str(), ResourceTrait::Filterable));
+            let has_dynamic_offset = traits.contains(&name.as_str());
+            let is_filterable = filtered.contains(&place.group);
             let ty = binding_type(&module, variable, has_dynamic_offset, is_filterable)
                 .ok_or_else(|| invalid(shader, format!("{name} has a type that is not supported")))?;
             let bytes = module.types[variable.ty].inner.try_size(module.to_ctx());
@@ -126,11 +122,8 @@ impl ShaderInterface {
             let layout = wgpu::BindGroupLayoutEntry { binding: place.binding, visibility, ty, count: None };
             interface.groups[place.group as usize].push(Resource { name, layout, element_bytes });
         }
-        let mut names = traits.iter().map(|(name, _)| name);
-        match names.find(|name| !interface.groups.iter().flatten().any(|resource| resource.name == **name)) {
-            Some(name) => Err(invalid(shader, format!("{name} has a trait but is not declared"))),
-            None => Ok(interface),
-        }
+        interface.groups.iter_mut().for_each(|group| group.sort_by_key(|resource| resource.layout.binding));
+        Ok(interface)
     }
 
     /// The bytes from one element to the next of each dynamic resource of a group.
@@ -139,35 +132,21 @@ impl ShaderInterface {
         resources.filter_map(|resource| resource.element_bytes).map(uniform_stride)
     }
 
-    /// Checks that bindings name all variables of a group, each once.
-    ///
-    /// # Errors
-    /// A name that is missing, not in the group, or there twice.
-    pub fn check(&self, group: u32, bindings: &[Binding<'_>]) -> Result<(), ShaderError> {
-        self.matched(group, bindings.iter().map(|binding| binding.name)).map(|_| ())
-    }
-
-    /// The resources of a group that `names` are bound to, in their order; fails as [`ShaderInterface::check`] does.
-    pub(crate) fn matched<'n>(
+    /// The variables of a group in the order of its layout, each with the first resource of its name. Resources that no
+    /// variable names are left out.
+    pub(crate) fn matched<'r>(
         &self,
         group: u32,
-        names: impl Iterator<Item = &'n str>,
-    ) -> Result<Vec<&Resource>, ShaderError> {
-        let resources =
-            self.groups.get(group as usize).ok_or_else(|| self.misbound(group, "the group", "is not declared"))?;
-        let mut matched: Vec<&Resource> = Vec::with_capacity(resources.len());
-        for name in names {
-            let resource = resources.iter().find(|resource| resource.name == name);
-            let resource = resource.ok_or_else(|| self.misbound(group, name, "is bound, but is not declared"))?;
-            if matched.iter().any(|other| other.name == name) {
-                return Err(self.misbound(group, name, "is bound twice"));
-            }
-            matched.push(resource);
-        }
-        match resources.iter().find(|resource| !matched.iter().any(|other| other.name == resource.name)) {
-            Some(Resource { name, .. }) => Err(self.misbound(group, name, "is not bound")),
-            None => Ok(matched),
-        }
+        bindings: &[Binding<'r>],
+    ) -> Result<Vec<(&Resource, BindingResource<'r>)>, ShaderError> {
+        let variables = self.groups.get(group as usize);
+        let variables = variables.ok_or_else(|| self.misbound(group, "the group", "is not declared"))?;
+        let matched = variables.iter().map(|variable| {
+            let binding = bindings.iter().find(|binding| binding.name == variable.name);
+            let binding = binding.ok_or_else(|| self.misbound(group, &variable.name, "is not bound"))?;
+            Ok((variable, binding.resource.clone()))
+        });
+        matched.collect()
     }
 
     fn misbound(&self, group: u32, name: &str, fault: &'static str) -> ShaderError {
@@ -241,6 +220,7 @@ fn texture_format(format: StorageFormat) -> Option<TextureFormat> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::{DevicePreference, Gpu};
 
     const WGSL: &str = "
         struct Camera { eye: vec3f, near: f32 }
@@ -249,14 +229,10 @@ mod tests {
         @group(1) @binding(0) var<storage, read_write> words: array<u32>;
         @compute @workgroup_size(8, 4) fn main() { words[0] = u32(camera.near); }
     ";
-    const CAMERA: ResourceTraits = &[("camera", ResourceTrait::DynamicOffset)];
+    const CAMERA: ResourceTraits = &["camera"];
 
     fn interface() -> ShaderInterface {
         ShaderInterface::of("test", WGSL, CAMERA).expect("an interface")
-    }
-
-    fn fault(group: u32, names: &[&str]) -> String {
-        interface().matched(group, names.iter().copied()).map(|_| ()).expect_err("a fault").to_string()
     }
 
     #[test]
@@ -267,24 +243,26 @@ mod tests {
         let storage = BufferBindingType::Storage { read_only: false };
         let words = BindingType::Buffer { ty: storage, has_dynamic_offset: false, min_binding_size: None };
         assert_eq!(interface.groups[1][0].layout.ty, words);
-        let found = interface.matched(0, ["depth", "camera"].into_iter()).expect("both names");
-        assert_eq!(found.len(), 2);
     }
 
     #[test]
-    fn a_missing_an_extra_and_a_repeated_name_are_errors() {
-        assert_eq!(fault(0, &["camera"]), "shader test, group 0: depth is not bound");
-        let extra = fault(0, &["camera", "depth", "words"]);
-        assert_eq!(extra, "shader test, group 0: words is bound, but is not declared");
-        let twice = fault(0, &["camera", "depth", "depth"]);
-        assert_eq!(twice, "shader test, group 0: depth is bound twice");
-        assert_eq!(fault(2, &[]), "shader test, group 2: the group is not declared");
+    fn variables_take_the_first_resource_of_their_name_and_a_missing_one_is_an_error() {
+        let gpu = Gpu::open(DevicePreference::Software).expect("a software device");
+        let buffers = [(); 2].map(|()| gpu.buffer("test", 16, wgpu::BufferUsages::UNIFORM));
+        let named = ["words", "depth", "camera"].map(|name| Binding::buffer(name, &buffers[0]));
+        let all = [&named[..], &[Binding::buffer("camera", &buffers[1])]].concat();
+        let interface = interface();
+        let matched = interface.matched(0, &all).expect("both names");
+        assert_eq!(matched.iter().map(|(variable, _)| &variable.name).collect::<Vec<_>>(), ["camera", "depth"]);
+        assert!(matches!(&matched[0].1, BindingResource::Buffer(binding) if *binding.buffer == buffers[0]));
+        let unbound = interface.matched(0, &named[2..]).expect_err("a fault");
+        assert_eq!(unbound.to_string(), "shader test, group 0: depth is not bound");
+        let unknown = interface.matched(2, &all).expect_err("a fault");
+        assert_eq!(unknown.to_string(), "shader test, group 2: the group is not declared");
     }
 
     #[test]
-    fn a_trait_of_an_undeclared_resource_and_invalid_wgsl_are_errors() {
-        let unknown = ShaderInterface::of("test", WGSL, &[("cameras", ResourceTrait::DynamicOffset)]);
-        assert!(matches!(unknown, Err(ShaderError::Invalid { .. })));
+    fn invalid_wgsl_is_an_error() {
         assert!(matches!(ShaderInterface::of("test", "fn f( {", &[]), Err(ShaderError::Invalid { .. })));
     }
 }

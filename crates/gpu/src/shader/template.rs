@@ -9,12 +9,15 @@ use std::{collections::HashMap, fmt::Debug};
 use depth_image::{LOBE_ROUGHNESS, LOBE_SIZE_PX};
 use minijinja::{Environment, UndefinedBehavior, Value};
 
+use super::interface::ResourceTraits;
 use crate::{error::ShaderError, table::TABLE_WIDTH_LOG2};
 
 /// Shader texts by name.
 pub struct Templates {
     environment: Environment<'static>,
     declared: Vec<(&'static str, String)>,
+    /// Uniforms with dynamic offsets in all templates.
+    pub(super) traits: ResourceTraits,
 }
 
 /// A number that WGSL has a literal for.
@@ -28,21 +31,10 @@ pub trait WgslLiteral: Debug + Copy {
     }
 }
 
-impl WgslLiteral for u16 {
-    const SUFFIX: char = 'u';
+macro_rules! wgsl_literals {
+    ($($number:ty = $suffix:literal),*) => { $(impl WgslLiteral for $number { const SUFFIX: char = $suffix; })* };
 }
-
-impl WgslLiteral for u32 {
-    const SUFFIX: char = 'u';
-}
-
-impl WgslLiteral for i32 {
-    const SUFFIX: char = 'i';
-}
-
-impl WgslLiteral for f32 {
-    const SUFFIX: char = 'f';
-}
+wgsl_literals! { u16 = 'u', u32 = 'u', i32 = 'i', f32 = 'f' }
 
 /// The names and literals of constants.
 #[macro_export]
@@ -81,7 +73,7 @@ impl Templates {
                 .add_template(name, text)
                 .map_err(|source| ShaderError::Template { name: name.to_owned(), source })?;
         }
-        Ok(Self { environment, declared: Vec::new() })
+        Ok(Self { environment, declared: Vec::new(), traits: &[] })
     }
 
     /// Adds values for `{{ NAME }}` in all templates, such as those of [`wgsl_constants!`](crate::wgsl_constants).
@@ -89,6 +81,12 @@ impl Templates {
     pub fn with_constants(mut self, constants: impl IntoIterator<Item = (&'static str, impl Into<Value>)>) -> Self {
         constants.into_iter().for_each(|(name, value)| self.environment.add_global(name, value));
         self
+    }
+
+    /// Gives uniforms of these names dynamic offsets, in all variants that name none of their own.
+    #[must_use]
+    pub fn with_traits(self, traits: ResourceTraits) -> Self {
+        Self { traits, ..self }
     }
 
     /// Declares numbers of [`wgsl_constants!`](crate::wgsl_constants) in all texts that name them. A template cannot declare

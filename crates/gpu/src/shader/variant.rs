@@ -11,7 +11,7 @@ use crate::{device::Gpu, error::ShaderError};
 pub trait ShaderVariant: Debug {
     /// The template, which is also the label of its passes.
     const TEMPLATE: &'static str;
-    /// Properties of resources that WGSL does not say.
+    /// Uniforms with dynamic offsets; where there are none, those of the templates have them.
     const TRAITS: ResourceTraits = &[];
 
     /// The values that the template uses.
@@ -97,7 +97,8 @@ macro_rules! shader_sources {
 /// A template that is broken.
 pub fn source<V: ShaderVariant>(templates: &Templates, variant: &V) -> Result<ShaderSource, ShaderError> {
     let wgsl = templates.render(V::TEMPLATE, variant.context())?;
-    Ok(ShaderSource { name: variant.name(), template: V::TEMPLATE, wgsl, traits: V::TRAITS })
+    let traits = if V::TRAITS.is_empty() { templates.traits } else { V::TRAITS };
+    Ok(ShaderSource { name: variant.name(), template: V::TEMPLATE, wgsl, traits })
 }
 
 /// Every position of `N` switches.

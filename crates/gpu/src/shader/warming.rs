@@ -15,6 +15,8 @@ use super::compiled::Shader;
 use super::interface::Resource;
 use crate::device::{DevicePreference, Gpu};
 use crate::error::GpuError;
+use crate::frame::Frame;
+use crate::sharing::WorkKind;
 
 /// The forms that a pass remembers; all are forgotten when there are more.
 const MOST_FORMS: usize = 1024;
@@ -35,18 +37,15 @@ enum Empty {
 }
 
 impl Empty {
-    fn of(gpu: &Gpu, resource: &Resource, form: Form) -> Self {
+    fn of(gpu: &Gpu, resource: &Resource, form: Option<Form>) -> Self {
         let (dimension, usage) = match resource.layout.ty {
             BindingType::Sampler(_) => return Self::Sampler(gpu.texture_sampler([wgpu::AddressMode::Repeat; 2])),
-            BindingType::Buffer { ty: wgpu::BufferBindingType::Uniform, .. } => {
-                return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM));
-            }
             BindingType::StorageTexture { view_dimension, .. } => (view_dimension, TextureUsages::STORAGE_BINDING),
             BindingType::Texture { view_dimension, .. } => (view_dimension, TextureUsages::TEXTURE_BINDING),
-            _ => return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::STORAGE)),
+            _ => return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM | BufferUsages::STORAGE)),
         };
-        let Form::Texture { format, is_power_of_two, has_mips } = form else {
-            return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::STORAGE));
+        let Some(Form { format, is_power_of_two, has_mips }) = form else {
+            return Self::Buffer(gpu.buffer("empty", BUFFER_BYTES, BufferUsages::UNIFORM | BufferUsages::STORAGE));
         };
         let [width, height] = is_power_of_two.map(|is| SIDES_PX[usize::from(is)]);
         let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -73,8 +72,14 @@ impl Empty {
 }
 
 impl FirstUses {
-    /// Has `make_ready` done once for resources of these forms. Whether this is the first use, or was when it began to wait.
-    pub fn make_ready(&self, groups: &[&BoundGroup], make_ready: impl FnOnce()) -> bool {
+    /// Warms a shader at its first use with resources of these forms, of which the frame is told.
+    pub fn make_ready(
+        &self,
+        frame: &mut Frame<'_>,
+        shader: &Shader,
+        groups: &[&BoundGroup],
+        use_it: impl FnOnce(&Gpu, Shader, &[BoundGroup]) -> Result<(), GpuError>,
+    ) {
         let mut hasher = DefaultHasher::new();
         groups.iter().for_each(|bound| bound.forms.hash(&mut hasher));
         let mut uses = self.0.lock();
@@ -83,16 +88,18 @@ impl FirstUses {
         }
         let first_use = uses.entry(hasher.finish()).or_insert_with(|| Arc::new(Once::new())).clone();
         drop(uses);
-        let is_first = !first_use.is_completed();
+        // A thread that waits for another's first use has waited, too.
+        if !first_use.is_completed() {
+            frame.work.push((WorkKind::FIRST_USE, 1));
+        }
         // Where an earlier thread panicked, the pass goes on without.
-        first_use.call_once_force(|_| make_ready());
-        is_first
+        first_use.call_once_force(|_| warm(frame.gpu, shader, groups, use_it));
     }
 }
 
 /// Has the second device use a shader with resources of these forms, where the device compiles at the first use and others
 /// would wait for it.
-pub(super) fn warm(
+fn warm(
     gpu: &Gpu,
     shader: &Shader,
     groups: &[&BoundGroup],
@@ -122,12 +129,11 @@ pub(super) fn warm(
     }
 }
 
-fn empty_group(gpu: &Gpu, shader: &Shader, number: u32, forms: &[Form]) -> BoundGroup {
-    let mut resources: Vec<&Resource> = shader.interface.groups[number as usize].iter().collect();
-    resources.sort_by_key(|resource| resource.layout.binding);
+fn empty_group(gpu: &Gpu, shader: &Shader, number: u32, forms: &[Option<Form>]) -> BoundGroup {
+    let resources = &shader.interface.groups[number as usize];
     let empty: Vec<Empty> =
         resources.iter().zip(forms).map(|(resource, &form)| Empty::of(gpu, resource, form)).collect();
-    shader.bind_in_order(number, resources.into_iter().zip(empty.iter().map(Empty::resource)).collect())
+    shader.bind_in_order(number, resources.iter().zip(empty.iter().map(Empty::resource)).collect())
 }
 
 #[cfg(test)]
@@ -135,8 +141,7 @@ mod tests {
     use wgpu::TextureFormat;
 
     use super::*;
-    use crate::frame::Frame;
-    use crate::shader::{Binding, ComputePass, DispatchSize, ResourceTrait};
+    use crate::shader::{Binding, ComputePass, DispatchSize};
     use crate::sharing::Turn;
 
     const WGSL: &str = "
@@ -155,8 +160,7 @@ mod tests {
             sums[id.x] = camera.near + color.x + f32(word);
         }
     ";
-    const TRAITS: crate::ResourceTraits =
-        &[("camera", ResourceTrait::DynamicOffset), ("colors", ResourceTrait::Filterable)];
+    const TRAITS: crate::ResourceTraits = &["camera"];
 
     fn texture(gpu: &Gpu, size: [u32; 3], format: TextureFormat, dimension: wgpu::TextureViewDimension) -> TextureView {
         let usage = TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING;

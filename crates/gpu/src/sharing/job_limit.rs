@@ -11,8 +11,8 @@ use super::queue::count_waited;
 /// Bounds the jobs of each class. A job of one class never waits for one of another.
 pub struct JobLimit {
     most: usize,
-    classes: [Mutex<Jobs>; WorkClass::COUNT],
-    ended: [Condvar; WorkClass::COUNT],
+    /// Each with a signal that one of its jobs has ended or begun.
+    classes: [(Mutex<Jobs>, Condvar); WorkClass::COUNT],
 }
 
 #[derive(Default)]
@@ -23,41 +23,39 @@ struct Jobs {
 }
 
 /// A job that counts until it is dropped.
-pub struct Job<'l> {
-    limit: &'l JobLimit,
-    class: WorkClass,
-}
+pub struct Job<'l>(&'l (Mutex<Jobs>, Condvar));
 
 impl JobLimit {
     /// At most so many jobs of each class.
     #[must_use]
     pub fn of(most: usize) -> Self {
-        Self { most: most.max(1), classes: Default::default(), ended: Default::default() }
+        Self { most: most.max(1), classes: Default::default() }
     }
 
     /// Waits until there is room for one more.
     pub fn begin(&self, class: WorkClass) -> Job<'_> {
-        let mut jobs = self.classes[class as usize].lock();
+        let class = &self.classes[class as usize];
+        let mut jobs = class.0.lock();
         jobs.last_ticket += 1;
         let ticket = jobs.last_ticket;
         jobs.waiting.push_back(ticket);
         let start = Instant::now();
         while jobs.running >= self.most || jobs.waiting.front() != Some(&ticket) {
-            self.ended[class as usize].wait(&mut jobs);
+            class.1.wait(&mut jobs);
         }
         count_waited(start);
         jobs.waiting.pop_front();
         jobs.running += 1;
         // The next may have room, too.
-        self.ended[class as usize].notify_all();
-        Job { limit: self, class }
+        class.1.notify_all();
+        Job(class)
     }
 }
 
 impl Drop for Job<'_> {
     fn drop(&mut self) {
-        self.limit.classes[self.class as usize].lock().running -= 1;
-        self.limit.ended[self.class as usize].notify_all();
+        self.0.0.lock().running -= 1;
+        self.0.1.notify_all();
     }
 }
 
@@ -81,7 +79,7 @@ mod tests {
                     let _job = limit.begin(WorkClass::Batch);
                     sender.send(number).expect("a receiver");
                 });
-                while limit.classes[1].lock().waiting.len() <= number {
+                while limit.classes[1].0.lock().waiting.len() <= number {
                     thread::yield_now();
                 }
             }

@@ -75,8 +75,7 @@ pub(super) fn met(
 impl LayerWork<'_> {
     /// Draws some rows, in halves where there is no room for all that they meet.
     fn draw_rows(&self, rows: Range<u32>, crossings: &mut Vec<Crossing>) -> Result<(), RenderError> {
-        let limits = self.stages.gpu.device.limits();
-        let most_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size).min(MOST_BYTES);
+        let most_bytes = self.stages.gpu.most_storage_bytes().min(MOST_BYTES);
         let most = most_bytes / size_of::<Crossing>() as u64 - SIDES;
         let size_px = UVec2::new(self.camera.size_px.x, rows.len() as u32);
         let part = self.camera.part(&ViewPart { first_px: UVec2::new(0, rows.start), size_px });

@@ -3,15 +3,13 @@
 use bytemuck::Zeroable;
 use depth_image::{ParallelCamera, PixelDepth};
 use glam::{UVec2, Vec2};
-use gpu::{Binding, Frame, ResourceTraits, ShaderVariant};
+use gpu::{Binding, ShaderVariant};
 use minijinja::{Value, context};
 
 use super::crossings::Crossing;
-use crate::accumulation::Sums;
-use crate::batch::{Batch, Recording};
-use crate::pixel_camera::CAMERA_TRAITS;
+use crate::batch::Batch;
 use crate::planes::Output;
-use crate::reflections::bounces::{BounceList, GpuBounce, Rays};
+use crate::reflections::bounces::{GpuBounce, Rays};
 use crate::{RenderError, illuminate, stages::Stages, sums::SumPlanes, work::DrawWork};
 
 /// Surfaces that are lit together: bounds their memory.
@@ -30,7 +28,6 @@ pub(crate) struct Lit {
 
 impl ShaderVariant for Lit {
     const TEMPLATE: &'static str = "layered/lit.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         context! { single_pole => false, lit => self.lit, ..self.sums.context() }
@@ -59,7 +56,7 @@ pub(super) fn light(
 ) -> Result<Light, RenderError> {
     let traced = work.lighting.is_traced().then(|| work.scene.rays.at(work.scene_time_s)).transpose()?;
     let output = Output { samples: true, ..Output::of(work, work.highlight().is_some()) };
-    let batch = Batch::of_points(work, traced, output);
+    let batch = Batch { traced, ..Batch::new(work, output) };
     let points = Points::of(camera, first);
     let mut light = Light { visibility8: vec![Vec::new(); output.sums.visibility_words()], ..Light::default() };
     let a_list = points_a_list(stages, output);
@@ -74,43 +71,33 @@ pub(super) fn light(
 
 /// Surfaces for which no buffer is larger than the device binds.
 fn points_a_list(stages: &Stages, output: Output) -> usize {
-    let limits = stages.gpu.device.limits();
-    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) as usize;
+    let bytes = stages.gpu.most_storage_bytes() as usize;
     let planes = output.sums.count().max(1 + output.sums.visibility_words()).max(size_of::<GpuBounce>() / 4);
     POINTS_A_LIST.min(bytes / (4 * planes)).max(1)
 }
 
 /// Lights one list of surfaces.
 fn light_list(stages: &Stages, batch: &Batch<'_>, bounces: &[GpuBounce], light: &mut Light) -> Result<(), RenderError> {
-    let Stages { gpu, pool, passes, .. } = stages;
+    let Stages { gpu, pool, .. } = stages;
     let count = bounces.len() as u32;
-    let sum_planes = batch.output.sums.count();
     let plane_bytes = 4 * u64::from(count);
     let _one = stages.batches.begin(batch.work.turn.class);
-    let rays = batch.light_rays().map(|rays| 0..batch.work.refinement.share_of(rays));
-    let sums = pool.lend_storage("light of layers", plane_bytes * sum_planes as u64);
+    let sums = pool.lend_storage("light of layers", plane_bytes * batch.output.sums.count() as u64);
     let memory = pool.lend_storage("surfaces of layers", size_of_val(bounces) as u64);
     gpu.queue.write_buffer(&memory, 0, bytemuck::cast_slice(bounces));
-    let planes = 1 + batch.output.sums.visibility_words();
-    let words = pool.lend_storage("colours of layers", plane_bytes * planes as u64);
-    let parts = batch.parts_of_points(gpu, &rays, count);
-    let list = BounceList::of(gpu, count);
-    let points = Rays { bounces: &memory, list: &list, generation: 1 };
-    let frame = Frame::begin(gpu, "light of layers", batch.work.turn);
-    let sum_buffer = (*sums).clone();
-    let cameras = parts[0].cameras.clone();
-    let sums = Sums { buffer: sums, rays };
-    let mut recording = Recording { gpu, passes, batch, pieces: Vec::new(), cameras, sums, frame };
+    let bytes = plane_bytes * (1 + batch.output.sums.visibility_words()) as u64;
+    let words = pool.lend_storage("colours of layers", bytes);
+    let points = Rays::of_points(gpu, &memory, count, 1);
+    let (mut recording, parts) = batch.record_points(stages, "light of layers", sums, count);
     let lit = batch.work.lighting.is_lit();
     if lit {
-        illuminate::record_points(&mut recording, &parts, points, &sum_buffer)?;
+        let sums = (*recording.sums.buffer).clone();
+        illuminate::record_points(&mut recording, &parts, &points, &sums)?;
     }
-    let variant = Lit { lit, sums: batch.output.sums };
-    let pass = passes.get(&variant)?;
-    let own = pass.bind(0, bindings([&parts[0].cameras, &sum_buffer, &words], &points))?;
-    points.dispatch(&mut recording, &variant, [0; 3], &pass, &[&own]);
+    let own = [Binding::buffer("words", &words)].into_iter().chain(points.bindings());
+    let bound = recording.bind(&Lit { lit, sums: batch.output.sums }, points.generation, own)?;
+    points.dispatch(&mut recording, &bound);
     let mut frame = recording.frame;
-    let bytes = plane_bytes * planes as u64;
     let read = frame.read_back(&words, 0..bytes, pool.lend_host("colours of layers", bytes));
     let result = frame.submit()?.wait()?;
     result.with(read, |words: &[u32]| {
@@ -119,11 +106,6 @@ fn light_list(stages: &Stages, batch: &Batch<'_>, bounces: &[GpuBounce], light: 
         light.visibility8.iter_mut().zip(planes).for_each(|(plane, own)| plane.extend_from_slice(own));
     })?;
     Ok(())
-}
-
-fn bindings<'r>([camera, sums, words]: [&'r wgpu::Buffer; 3], points: &'r Rays<'r>) -> Vec<Binding<'r>> {
-    let buffers = [("camera", camera), ("sums", sums), ("words", words)];
-    buffers.into_iter().map(|(name, buffer)| Binding::buffer(name, buffer)).chain(points.bindings()).collect()
 }
 
 /// The surfaces of an image as points to be lit.
@@ -169,20 +151,4 @@ pub(super) fn mixed(word: u32) -> u32 {
     let a = (word ^ word >> 16).wrapping_mul(0x7feb_352d);
     let b = (a ^ a >> 15).wrapping_mul(0x846c_a68b);
     b ^ b >> 16
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::test_support::TestStage;
-
-    #[test]
-    fn every_variant_is_bound_by_its_names() {
-        let stage = TestStage::new();
-        let list = BounceList::new(&stage.gpu, 1);
-        let points = Rays { bounces: &stage.buffer, list: &list, generation: 1 };
-        for variant in Lit::all() {
-            stage.check(&variant, 0, &bindings([&stage.buffer; 3], &points));
-        }
-    }
 }

@@ -2,18 +2,10 @@
 {% include "camera.wgsl" %}
 {% include "color.wgsl" %}
 {% include "albedo.wgsl" %}
-{% include "reflections/bounce.wgsl" %}
+{% include "reflections/ends.wgsl" %}
 
-@group(0) var<storage, read> bounces: array<Bounce>;
-@group(0) var<storage, read> list: BounceList;
-@group(0) var<storage, read> sums: array<f32>;
 // Plane by plane: colour, and words of visibility.
 @group(0) var<storage, read_write> words: array<u32>;
-{% include "sums.wgsl" %}
-{% if visibility %}
-
-{% include "visibility.wgsl" %}
-{% endif %}
 
 @compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {

@@ -2,7 +2,6 @@
 
 mod bvh;
 pub(crate) mod flat;
-mod material_switches;
 pub(crate) mod primary;
 pub(crate) mod ray_scene;
 pub(crate) mod traversal;

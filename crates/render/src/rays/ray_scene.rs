@@ -7,15 +7,14 @@ use std::time::{Duration, Instant};
 use bytemuck::NoUninit;
 use glam::{Vec3, Vec4};
 use gpu::{Binding, Gpu, GpuError, Table};
-use obvhs::cwbvh::node::CwBvhNode;
 use parking_lot::Mutex;
 use rayon::prelude::*;
 use scene::{Material, Scene, Texture, TextureUse};
 use wgpu::TextureFormat;
 
 use super::bvh::{Bvh, MAX_DEPTH};
-use super::flat::{CORNER_FLAGS, FlatDetail, FlatScene, FlatTriangle, FlatVertex, MAX_VERTICES, OrderedMesh};
-use super::material_switches::MaterialSwitches;
+use super::flat::{CORNER_FLAGS, FlatScene, FlatTriangle, MAX_VERTICES, OrderedMesh};
+use super::traversal::Traversal;
 use crate::material::{normal_scale, phong_reflector};
 use crate::{few_cores::on_free_cores, motion::Motion, texture};
 
@@ -24,14 +23,8 @@ use crate::{few_cores::on_free_cores, motion::Motion, texture};
 pub struct AccelerationReport {
     /// Boxes were moved, not made anew.
     pub refitted: bool,
-    /// On the host.
-    pub build_s: f64,
-    /// To the device.
-    pub upload_s: f64,
     /// Expected visits and tests of a random ray through the scene's box.
     pub cost: f32,
-    /// Nodes of up to eight children.
-    pub nodes: usize,
     /// Instances counted each.
     pub triangles: usize,
     /// Nodes from the root to the deepest.
@@ -41,15 +34,15 @@ pub struct AccelerationReport {
 /// The part of a scene that rays are traced against. Trees stand for one scene time, the last that was asked for.
 pub struct RayScene {
     gpu: Arc<Gpu>,
-    flat: FlatScene,
-    materials: Vec<[u32; 4]>,
-    texels: Vec<[u8; 4]>,
-    switches: MaterialSwitches,
-    state: Mutex<Option<Built>>,
+    pub(crate) flat: FlatScene,
+    pub(crate) materials: Vec<[u32; 4]>,
+    pub(crate) texels: Vec<[u8; 4]>,
+    traversal: Traversal,
+    pub(crate) state: Mutex<Option<Built>>,
 }
 
-struct Built {
-    bvh: Bvh,
+pub(crate) struct Built {
+    pub bvh: Bvh,
     scene_time_s: f32,
     traced: Arc<Traced>,
     last_refit: Option<Duration>,
@@ -65,22 +58,9 @@ const TABLES: [&str; 7] =
 pub struct Traced {
     /// In the order of [`TABLES`].
     tables: [Arc<Table>; 7],
-    pub(crate) switches: MaterialSwitches,
+    pub(crate) traversal: Traversal,
     /// The making of the tree.
     pub report: AccelerationReport,
-}
-
-/// The tables of a scene time on the host, with triangles in the order of the tree's leaves.
-#[derive(Debug, Clone)]
-pub(crate) struct HostTables {
-    pub nodes: Vec<CwBvhNode>,
-    /// Corners, and their numbers with the triangle's flags.
-    pub corners: Vec<[[u32; 4]; 3]>,
-    pub triangles: Vec<FlatTriangle>,
-    pub vertices: Vec<FlatVertex>,
-    pub details: Vec<FlatDetail>,
-    pub materials: Vec<[u32; 4]>,
-    pub texels: Vec<[u8; 4]>,
 }
 
 impl RayScene {
@@ -100,9 +80,9 @@ impl RayScene {
             texture::mips(texture).for_each(|level| texels.extend(level.srgba8.as_chunks::<4>().0));
         }
         let materials = scene.materials.iter().flat_map(|material| material_texels(material, &places)).collect();
-        let switches = MaterialSwitches::of(scene);
-        let flat = FlatScene::of(scene, ordered, motion, switches.mapped);
-        Self { gpu: gpu.clone(), flat, materials, texels, switches, state: Mutex::default() }
+        let traversal = Traversal::new(scene);
+        let flat = FlatScene::of(scene, ordered, motion, traversal.mapped);
+        Self { gpu: gpu.clone(), flat, materials, texels, traversal, state: Mutex::default() }
     }
 
     /// Triangles and the tree over them at a scene time. A tree of another time is refitted where that costs less
@@ -121,7 +101,7 @@ impl RayScene {
         state.and_then(|state| state.as_ref().map(|built| built.traced.bytes())).unwrap_or(0)
     }
 
-    fn moved_to<'s>(&self, scene_time_s: f32, state: &'s mut Option<Built>) -> Result<&'s Built, GpuError> {
+    pub(crate) fn moved_to<'s>(&self, scene_time_s: f32, state: &'s mut Option<Built>) -> Result<&'s Built, GpuError> {
         let next = match state.take() {
             Some(built) if !self.flat.moves() || built.scene_time_s == scene_time_s => built,
             // Whichever took less time when it was last done.
@@ -133,7 +113,7 @@ impl RayScene {
         Ok(state.insert(next))
     }
 
-    fn corners_in_world(&self, scene_time_s: f32) -> Vec<[Vec3; 3]> {
+    pub(crate) fn corners_in_world(&self, scene_time_s: f32) -> Vec<[Vec3; 3]> {
         let positions = self.flat.positions_in_world(scene_time_s);
         self.flat.corners.par_iter().map(|corners| corners.map(|i| positions[i as usize])).collect()
     }
@@ -154,7 +134,7 @@ impl RayScene {
             Arc::new(Table::new(&self.gpu, "texels", TextureFormat::R32Uint, &self.texels)?),
         ];
         let attributes = self.attributes(scene_time_s)?;
-        let traced = self.traced(&bvh, &corners, attributes, fixed, took, false)?;
+        let traced = self.traced(&bvh, &corners, attributes, fixed, false)?;
         Ok(Built { bvh, scene_time_s, traced, last_refit: None, last_build: took })
     }
 
@@ -171,7 +151,7 @@ impl RayScene {
         let took = start.elapsed();
         let [_, _, vertices, details, fixed @ ..] = built.traced.tables.clone();
         let attributes = if self.flat.turns() { self.attributes(scene_time_s)? } else { [vertices, details] };
-        let traced = self.traced(&built.bvh, &corners, attributes, fixed, took, true)?;
+        let traced = self.traced(&built.bvh, &corners, attributes, fixed, true)?;
         Ok(Built { scene_time_s, traced, last_refit: Some(took), ..built })
     }
 
@@ -194,29 +174,20 @@ impl RayScene {
         corners_in_world: &[[Vec3; 3]],
         [vertices, details]: [Arc<Table>; 2],
         [triangles, materials, texels]: [Arc<Table>; 3],
-        took: Duration,
         refitted: bool,
     ) -> Result<Arc<Traced>, GpuError> {
-        let start = Instant::now();
         let nodes = self.table("nodes", &bvh.tree.nodes)?;
         let corners = self.table("triangles", &self.corner_texels(bvh, corners_in_world))?;
-        let report = AccelerationReport {
-            refitted,
-            build_s: took.as_secs_f64(),
-            upload_s: start.elapsed().as_secs_f64(),
-            cost: bvh.cost,
-            nodes: bvh.tree.nodes.len(),
-            triangles: corners_in_world.len(),
-            depth: bvh.depth,
-        };
+        let report =
+            AccelerationReport { refitted, cost: bvh.cost, triangles: corners_in_world.len(), depth: bvh.depth };
         tracing::debug!(?report, "rays are ready");
         let tables = [nodes, corners, vertices, details, triangles, materials, texels];
-        Ok(Arc::new(Traced { tables, switches: self.switches, report }))
+        Ok(Arc::new(Traced { tables, traversal: self.traversal.with_depth(bvh.depth), report }))
     }
 
     /// Three texels a triangle in the order of the tree's leaves: a corner's position, and its number with the
     /// triangle's flags.
-    fn corner_texels(&self, bvh: &Bvh, corners_in_world: &[[Vec3; 3]]) -> Vec<[[u32; 4]; 3]> {
+    pub(crate) fn corner_texels(&self, bvh: &Bvh, corners_in_world: &[[Vec3; 3]]) -> Vec<[[u32; 4]; 3]> {
         let triangles = bvh.tree.primitive_indices.par_iter().map(|&triangle| {
             let triangle = triangle as usize;
             let points = corners_in_world[triangle];
@@ -230,22 +201,7 @@ impl RayScene {
         triangles.collect()
     }
 
-    /// The tables of a scene time, as they are put on the device.
-    pub(crate) fn host_tables(&self, scene_time_s: f32) -> Result<HostTables, GpuError> {
-        let mut state = self.state.lock();
-        let Built { bvh, .. } = self.moved_to(scene_time_s, &mut state)?;
-        Ok(HostTables {
-            nodes: bvh.tree.nodes.clone(),
-            corners: self.corner_texels(bvh, &self.corners_in_world(scene_time_s)),
-            triangles: self.triangles_of_leaves(bvh),
-            vertices: self.flat.vertices_at(scene_time_s).into_owned(),
-            details: self.flat.details_at(scene_time_s).into_owned(),
-            materials: self.materials.clone(),
-            texels: self.texels.clone(),
-        })
-    }
-
-    fn triangles_of_leaves(&self, bvh: &Bvh) -> Vec<FlatTriangle> {
+    pub(crate) fn triangles_of_leaves(&self, bvh: &Bvh) -> Vec<FlatTriangle> {
         bvh.tree.primitive_indices.iter().map(|&triangle| self.flat.triangles[triangle as usize]).collect()
     }
 }

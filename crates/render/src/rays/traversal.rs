@@ -3,8 +3,7 @@
 use depth_image::Highlight;
 use gpu::highlight_name;
 use minijinja::{Value, context};
-
-use super::{material_switches::MaterialSwitches, ray_scene::Traced};
+use scene::{Material, Scene, Wrap};
 
 /// Boxes are left a little later than they are: what rounding takes off must not open a gap.
 pub(crate) const BOX_SLACK: f32 = 1.000_001;
@@ -12,28 +11,43 @@ pub(crate) const BOX_SLACK: f32 = 1.000_001;
 pub(crate) const EDGE_ROUNDINGS: f32 = 4e-7;
 
 /// The switches of a traversal.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub(crate) struct Traversal {
-    /// Room for unvisited nodes.
-    stack: u32,
-    materials: MaterialSwitches,
+    /// Room for unvisited nodes, in steps, so that pipelines are shared.
+    pub stack: u32,
+    /// Triangles may have holes where their texture is transparent.
+    pub alpha_tested: bool,
+    /// Some material needs more than the first coordinates of two repeated textures.
+    pub mapped: bool,
 }
 
 impl Traversal {
-    pub const ALL: [Self; 3] = [Self::with(false, false), Self::with(true, false), Self::with(true, true)];
+    pub const ALL: [Self; 3] = [
+        Self { stack: 16, alpha_tested: false, mapped: false },
+        Self { stack: 16, alpha_tested: true, mapped: false },
+        Self { stack: 16, alpha_tested: true, mapped: true },
+    ];
 
-    const fn with(alpha_tested: bool, mapped: bool) -> Self {
-        Self { stack: 16, materials: MaterialSwitches { alpha_tested, mapped } }
+    /// The switches of a scene, without a stack as yet.
+    pub fn new(scene: &Scene) -> Self {
+        Self {
+            stack: 0,
+            alpha_tested: scene.materials.iter().any(Material::is_alpha_tested),
+            mapped: scene.materials.iter().any(|material| {
+                let mut textures = material.textures().into_iter().flatten();
+                material.is_mapped() || textures.any(|texture| texture.wrap != [Wrap::Repeat; 2])
+            }),
+        }
     }
 
-    /// Room on the stack comes in steps, so that pipelines are shared.
-    pub fn of(traced: &Traced) -> Self {
-        Self { stack: traced.report.depth.next_multiple_of(8).max(1), materials: traced.switches }
+    /// The switches for a tree with so many levels.
+    pub fn with_depth(self, depth: u32) -> Self {
+        Self { stack: depth.next_multiple_of(8).max(1), ..self }
     }
 
     pub fn context(self) -> Value {
-        let MaterialSwitches { alpha_tested, mapped } = self.materials;
-        context! { stack => self.stack, alpha_tested, mapped }
+        let Self { stack, alpha_tested, mapped } = self;
+        context! { stack, alpha_tested, mapped }
     }
 
     /// The values of shaders that follow rays off mirrors.

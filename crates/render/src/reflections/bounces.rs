@@ -1,10 +1,11 @@
 //! Lists of rays off mirrors.
 
 use bytemuck::{Pod, Zeroable};
-use gpu::{Binding, BoundGroup, ComputePass, DispatchSize, Gpu, ShaderVariant, WorkKind};
+use gpu::{Binding, DispatchSize, Gpu};
 use wgpu::{Buffer, BufferUsages};
 
-use crate::{batch::Recording, pixel_list::LIST_WORKGROUP};
+use crate::batch::{BoundPass, Recording};
+use crate::pixel_list::LIST_WORKGROUP;
 
 /// `Bounce` of `reflections/bounce.wgsl`.
 #[repr(C)]
@@ -26,61 +27,44 @@ pub(crate) struct GpuBounce {
     pub padding: [u32; 2],
 }
 
-/// The arguments of the dispatches over the rays of one piece off one mirror.
-pub(crate) struct BounceList {
+/// Rays off mirrors, or points, of one piece.
+pub(crate) struct Rays {
+    bounces: Buffer,
+    /// Workgroups along x, y and z, and the list's length.
     arguments: Buffer,
     /// Pixels of the piece.
     pub units: u32,
-}
-
-impl BounceList {
-    /// An empty list, for a piece of so many pixels.
-    pub fn new(gpu: &Gpu, units: u32) -> Self {
-        // Workgroups along x, y and z, and the list's length.
-        Self { arguments: arguments(gpu, "mirrored rays", [0, 1, 1, 0]), units }
-    }
-
-    /// The list of `count` points.
-    pub fn of(gpu: &Gpu, count: u32) -> Self {
-        let workgroups = count.div_ceil(LIST_WORKGROUP);
-        Self { arguments: arguments(gpu, "listed points", [workgroups, 1, 1, count]), units: count }
-    }
-
-    pub fn binding(&self, name: &'static str) -> Binding<'_> {
-        Binding::buffer(name, &self.arguments)
-    }
-}
-
-fn arguments(gpu: &Gpu, label: &str, words: [u32; 4]) -> Buffer {
-    gpu.buffer_with(label, &words, BufferUsages::STORAGE | BufferUsages::INDIRECT)
-}
-
-/// The rays of a piece off one mirror.
-#[derive(Clone, Copy)]
-pub(crate) struct Rays<'r> {
-    pub bounces: &'r Buffer,
-    pub list: &'r BounceList,
     /// Mirrors on the way so far; counted from [`depth_image::MAX_REFLECTIONS`] on where the first is a glossy surface.
     pub generation: u32,
 }
 
-impl Rays<'_> {
-    pub fn bindings(&self) -> [Binding<'_>; 2] {
-        [Binding::buffer("bounces", self.bounces), self.list.binding("list")]
+impl Rays {
+    /// An empty list in this memory, for a piece of so many pixels.
+    pub fn new(gpu: &Gpu, bounces: &Buffer, units: u32, generation: u32) -> Self {
+        Self::with(gpu, bounces, [0, 1, 1, 0], units, generation)
     }
 
-    /// Records a pass over them. `counts` are those of the rays of light that it traces.
-    pub fn dispatch(
-        &self,
-        recording: &mut Recording<'_>,
-        variant: &impl ShaderVariant,
-        counts: [u32; 3],
-        pass: &ComputePass,
-        groups: &[&BoundGroup],
-    ) {
-        pass.dispatch(&mut recording.frame, groups, DispatchSize::Indirect(&self.list.arguments, 0));
-        // Each mirror on the way leaves fewer rays.
-        let kind = WorkKind::new(recording.batch.family(), &(variant.name(), counts, self.generation));
-        recording.frame.cut(kind, self.list.units.into());
+    /// The list of the first `count` points of this memory.
+    pub fn of_points(gpu: &Gpu, bounces: &Buffer, count: u32, generation: u32) -> Self {
+        Self::with(gpu, bounces, [count.div_ceil(LIST_WORKGROUP), 1, 1, count], count, generation)
+    }
+
+    fn with(gpu: &Gpu, bounces: &Buffer, arguments: [u32; 4], units: u32, generation: u32) -> Self {
+        let arguments = gpu.buffer_with("list", &arguments, BufferUsages::STORAGE | BufferUsages::INDIRECT);
+        Self { bounces: bounces.clone(), arguments, units, generation }
+    }
+
+    pub fn bindings(&self) -> [Binding<'_>; 2] {
+        [Binding::buffer("bounces", &self.bounces), Binding::buffer("list", &self.arguments)]
+    }
+
+    /// The bindings of a pass that fills the list.
+    pub fn next_bindings(&self) -> [Binding<'_>; 2] {
+        [Binding::buffer("next_bounces", &self.bounces), Binding::buffer("next", &self.arguments)]
+    }
+
+    /// Records a pass over them, bound with their generation: each mirror on the way leaves fewer rays.
+    pub fn dispatch(&self, recording: &mut Recording<'_>, bound: &BoundPass) {
+        recording.dispatch_element(bound, 0, self.units, DispatchSize::Indirect(&self.arguments, 0));
     }
 }

@@ -9,22 +9,14 @@
 {% include "light.wgsl" %}
 {% include "sequence.wgsl" %}
 {% include "highlight.wgsl" %}
-{% include "reflections/bounce.wgsl" %}
+{% include "reflections/ends.wgsl" %}
 {% if mirrors %}
 {% include "reflections/bounce_off.wgsl" %}
 {% endif %}
 
 @group(0) var<uniform> illumination: Illumination;
-@group(0) var<storage, read> bounces: array<Bounce>;
-@group(0) var<storage, read> list: BounceList;
-@group(0) var<storage, read> sums: array<f32>;
 // Red, green and blue of each pixel: linear light that mirrored rays bring.
 @group(0) var<storage, read_write> reflected: array<f32>;
-{% include "sums.wgsl" %}
-{% if visibility %}
-
-{% include "visibility.wgsl" %}
-{% endif %}
 
 @compute @workgroup_size(LIST_WORKGROUP)
 fn main(@builtin(global_invocation_id) id: vec3u) {

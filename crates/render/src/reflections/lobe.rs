@@ -1,13 +1,13 @@
 //! Rays into the lobes of what a picture shows, pass by pass one of each pixel.
 
 use bytemuck::{Pod, Zeroable};
-use gpu::{Binding, ResourceTraits, ShaderVariant, switches};
+use gpu::{Binding, ShaderVariant, switches};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
-use super::bounces::BounceList;
+use super::bounces::Rays;
 use super::spawn::{self, VIEW_PLANES};
-use crate::{RenderError, batch::Recording, pieces::Piece, pixel_camera::CAMERA_TRAITS, surfaces::Surfaces};
+use crate::{RenderError, batch::Recording, pieces::Piece, surfaces::Surfaces};
 
 /// `Lobe` of the shader.
 #[repr(C)]
@@ -30,7 +30,6 @@ pub(crate) struct Lobe {
 
 impl ShaderVariant for Lobe {
     const TEMPLATE: &'static str = "reflections/lobe.wgsl";
-    const TRAITS: ResourceTraits = CAMERA_TRAITS;
 
     fn context(&self) -> Value {
         context! { first => self.first, ..spawn::context(self.by_rays, self.plane_count) }
@@ -48,45 +47,18 @@ pub(super) fn record(
     weights: &Buffer,
     piece: Piece,
     target: &Surfaces,
-    next_bounces: &Buffer,
-    next: &BounceList,
+    next: &Rays,
 ) -> Result<(), RenderError> {
     let batch = recording.batch;
     let variant = Lobe { by_rays: batch.by_rays, plane_count: batch.output.layout().count, first: ray == 0 };
-    let pass = recording.passes.get(&variant)?;
     let whole = u32::from(batch.work.lighting.reflections.is_none());
     let ray_count = batch.glossy_rays();
     let first_ray = batch.position.number * ray_count;
     let lobe = GpuLobe { first_ray, ray: first_ray + ray, ray_count, whole };
     let lobe = recording.gpu.buffer_with("lobe", &[lobe], BufferUsages::UNIFORM);
-    let buffers = [&recording.cameras, &batch.work.scene.illumination, &lobe, weights, next_bounces];
-    let own = pass.bind(0, bindings(buffers, next, target))?;
-    recording.dispatch_piece(recording.kind_of(&variant), &pass, &[&own], piece, piece.size());
+    let own = [Binding::buffer("lobe", &lobe), Binding::buffer("weights", weights)];
+    let own = own.into_iter().chain(next.next_bindings()).chain(target.bindings());
+    let bound = recording.bind(&variant, (), own)?;
+    recording.dispatch_piece(&bound, piece, piece.size());
     Ok(())
-}
-
-fn bindings<'r>(
-    [camera, illumination, lobe, weights, next_bounces]: [&'r Buffer; 5],
-    next: &'r BounceList,
-    target: &'r Surfaces,
-) -> Vec<Binding<'r>> {
-    let mut bindings = spawn::bindings([camera, illumination, next_bounces], next, target);
-    bindings.extend([Binding::buffer("lobe", lobe), Binding::buffer("weights", weights)]);
-    bindings
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::test_support::TestStage;
-
-    #[test]
-    fn every_variant_is_bound_by_its_names() {
-        let stage = TestStage::new();
-        let list = BounceList::new(&stage.gpu, 1);
-        for variant in Lobe::all() {
-            let target = stage.surfaces(variant.by_rays, false);
-            stage.check(&variant, 0, &bindings([&stage.buffer; 5], &list, &target));
-        }
-    }
 }

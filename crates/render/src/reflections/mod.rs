@@ -8,8 +8,6 @@ pub(crate) mod lobe;
 pub(crate) mod radiance;
 mod spawn;
 
-use std::ops::RangeInclusive;
-
 use depth_image::MAX_REFLECTIONS;
 use gpu::{BufferPool, Gpu, PooledBuffer};
 
@@ -18,7 +16,7 @@ pub(crate) use land::Land;
 pub(crate) use lobe::Lobe;
 pub(crate) use spawn::Spawn;
 
-use self::bounces::{BounceList, GpuBounce, Rays};
+use self::bounces::{GpuBounce, Rays};
 use crate::batch::{Batch, Part, Recording};
 use crate::pieces::Piece;
 use crate::surfaces::Surfaces;
@@ -95,53 +93,54 @@ impl Reflections {
         target: &Surfaces,
     ) -> Result<(), RenderError> {
         let mirrors = recording.batch.work.lighting.reflections();
-        let memories = self.bounces.each_ref();
         if mirrors > 0 {
-            let first = BounceList::new(recording.gpu, piece.pixel_count());
-            spawn::record(recording, piece, target, memories[0], &first)?;
-            self.record_rays(recording, parts, memories, first, 1..=mirrors)?;
+            let first = self.rays(recording.gpu, piece.pixel_count(), 1);
+            spawn::record(recording, piece, target, &first)?;
+            self.record_rays(recording, parts, first, mirrors)?;
         }
-        // Costs are learned by generation, and are others than those of rays off mirrors.
-        let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + mirrors.max(1);
         for ray in 0..recording.batch.glossy_rays() {
-            let first = BounceList::new(recording.gpu, piece.pixel_count());
-            lobe::record(recording, ray, &self.lobe_weights, piece, target, memories[0], &first)?;
-            self.record_rays(recording, parts, memories, first, generations.clone())?;
+            // Costs are learned by generation, and are others than those of rays off mirrors.
+            let first = self.rays(recording.gpu, piece.pixel_count(), MAX_REFLECTIONS + 1);
+            lobe::record(recording, ray, &self.lobe_weights, piece, target, &first)?;
+            self.record_rays(recording, parts, first, MAX_REFLECTIONS + mirrors.max(1))?;
         }
         Ok(())
     }
 
-    /// Mirror after mirror: the rays of a list, in the first of two memories, are followed, their ends are lit, and what is seen there
-    /// is added to the pixels.
+    /// An empty list. Generations take turns in two memories.
+    fn rays(&self, gpu: &Gpu, units: u32, generation: u32) -> Rays {
+        Rays::new(gpu, &self.bounces[generation as usize % 2], units, generation)
+    }
+
+    /// Mirror after mirror: rays are followed, their ends are lit, and what is seen there is added to the pixels, up to the `last`
+    /// generation.
     fn record_rays(
         &self,
         recording: &mut Recording<'_>,
         parts: &[Part],
-        [mut from, mut to]: [&PooledBuffer; 2],
-        mut list: BounceList,
-        generations: RangeInclusive<u32>,
+        first: Rays,
+        last: u32,
     ) -> Result<(), RenderError> {
-        for generation in generations.clone() {
-            let rays = Rays { bounces: from, list: &list, generation };
-            follow::record(recording, rays)?;
-            list = self.record_ends(recording, parts, rays, (generation < *generations.end()).then_some(to))?;
-            std::mem::swap(&mut from, &mut to);
+        let mut next = Some(first);
+        while let Some(rays) = next {
+            follow::record(recording, &rays)?;
+            next = self.record_ends(recording, parts, &rays, last)?;
         }
         Ok(())
     }
 
-    /// Lights the ends of rays, and adds what they send to the pixels. Gives the rays off mirrors among them, if they are to be followed.
+    /// Lights the ends of rays, and adds what they send to the pixels. Gives the rays off mirrors among them, unless these rays are the
+    /// `last` generation.
     fn record_ends(
         &self,
         recording: &mut Recording<'_>,
         parts: &[Part],
-        ends: Rays<'_>,
-        onward: Option<&PooledBuffer>,
-    ) -> Result<BounceList, RenderError> {
+        ends: &Rays,
+        last: u32,
+    ) -> Result<Option<Rays>, RenderError> {
         illuminate::record_points(recording, parts, ends, &self.sums)?;
-        let next = BounceList::new(recording.gpu, ends.list.units);
-        let onward = onward.map(|memory| (&**memory, &next));
-        land::record(recording, [&parts[0].cameras, &self.sums, &self.reflected], ends, onward)?;
+        let next = (ends.generation < last).then(|| self.rays(recording.gpu, ends.units, ends.generation + 1));
+        land::record(recording, [&parts[0].cameras, &self.sums, &self.reflected], ends, next.as_ref())?;
         Ok(next)
     }
 }

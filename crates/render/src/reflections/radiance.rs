@@ -1,12 +1,10 @@
 //! The light that listed surfaces send towards one direction each, with what their mirrors show.
 
 use glam::Vec3;
-use gpu::Frame;
 
 use super::Reflections;
-use super::bounces::{BounceList, GpuBounce, Rays};
-use crate::accumulation::Sums;
-use crate::batch::{Batch, Recording};
+use super::bounces::{GpuBounce, Rays};
+use crate::batch::Batch;
 use crate::planes::Output;
 use crate::{RenderError, stages::Stages, work::DrawWork};
 
@@ -26,7 +24,7 @@ impl<'a> RadianceWork<'a> {
     /// No surfaces as yet. The lighting has shadows.
     pub fn of(stages: &'a Stages, work: DrawWork<'a>) -> Result<Self, RenderError> {
         let traced = Some(work.scene.rays.at(work.scene_time_s)?);
-        let batch = Batch::of_points(work, traced, Output { mirrors: true, ..Output::of(work, true) });
+        let batch = Batch { traced, ..Batch::new(work, Output { mirrors: true, ..Output::of(work, true) }) };
         Ok(Self { stages, batch, points: Vec::new(), lit: Vec::new() })
     }
 
@@ -51,27 +49,22 @@ impl<'a> RadianceWork<'a> {
     }
 
     fn light(&mut self) -> Result<(), RenderError> {
-        let Self { stages: Stages { gpu, pool, passes, batches, .. }, batch, points, lit } = self;
+        let Self { stages, batch, points, lit } = self;
+        let Stages { gpu, pool, batches, .. } = stages;
         let count = points.len() as u32;
         let plane_bytes = 4 * u64::from(count);
-        let work = batch.work;
-        let _one = batches.begin(work.turn.class);
+        let _one = batches.begin(batch.work.turn.class);
         let memory = Reflections::lend(gpu, pool, batch, count, plane_bytes)?;
         gpu.queue.write_buffer(&memory.bounces[0], 0, bytemuck::cast_slice(points));
-        let rays = batch.light_rays().map(|rays| 0..work.refinement.share_of(rays));
-        let parts = batch.parts_of_points(gpu, &rays, count);
-        let cameras = parts[0].cameras.clone();
-        let sums = Sums { buffer: pool.lend_storage("no sums", 4), rays };
-        let frame = Frame::begin(gpu, "light of a light field", work.turn);
-        let mut recording = Recording { gpu, passes, batch, pieces: Vec::new(), cameras, sums, frame };
+        let ends = Rays::of_points(gpu, &memory.bounces[0], count, 0);
+        let no_sums = pool.lend_storage("no sums", 4);
+        let (mut recording, parts) = batch.record_points(stages, "light of a light field", no_sums, count);
         recording.frame.encoder.clear_buffer(&memory.reflected, 0, None);
         // Whoever gathers them has met one mirror before.
-        let mirrors = work.lighting.reflections().saturating_sub(1);
-        let list = BounceList::of(gpu, count);
-        let [first, second] = memory.bounces.each_ref();
-        let ends = Rays { bounces: first, list: &list, generation: 0 };
-        let next = memory.record_ends(&mut recording, &parts, ends, (mirrors > 0).then_some(second))?;
-        memory.record_rays(&mut recording, &parts, [second, first], next, 1..=mirrors)?;
+        let mirrors = batch.work.lighting.reflections().saturating_sub(1);
+        if let Some(next) = memory.record_ends(&mut recording, &parts, &ends, mirrors)? {
+            memory.record_rays(&mut recording, &parts, next, mirrors)?;
+        }
         let mut frame = recording.frame;
         let read = frame.read_back(&memory.reflected, 0..3 * plane_bytes, pool.lend_host("radiance", 3 * plane_bytes));
         let result = frame.submit()?.wait()?;

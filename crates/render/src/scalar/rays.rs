@@ -8,10 +8,25 @@ use obvhs::cwbvh::node::CwBvhNode;
 use scene::Wrap;
 
 use super::hashed_alpha::hashed_cutoff;
-use crate::rays::flat::{ALPHA_HASHED, ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatTriangle, SPECULAR, UNLIT};
-use crate::rays::ray_scene::{HostTables, MATERIAL_TEXELS};
+use crate::rays::flat::{
+    ALPHA_HASHED, ALPHA_TESTED, CORNER_FLAGS, DOUBLE_SIDED, FlatDetail, FlatTriangle, FlatVertex, SPECULAR, UNLIT,
+};
+use crate::rays::ray_scene::MATERIAL_TEXELS;
 use crate::rays::traversal::{BOX_SLACK, EDGE_ROUNDINGS};
 use crate::{GpuScene, RenderError, pixel_camera::PixelCamera};
+
+/// The tables of a scene time on the host, with triangles in the order of the tree's leaves.
+#[derive(Debug, Clone)]
+struct HostTables {
+    nodes: Vec<CwBvhNode>,
+    /// Corners, and their numbers with the triangle's flags.
+    corners: Vec<[[u32; 4]; 3]>,
+    triangles: Vec<FlatTriangle>,
+    vertices: Vec<FlatVertex>,
+    details: Vec<FlatDetail>,
+    materials: Vec<[u32; 4]>,
+    texels: Vec<[u8; 4]>,
+}
 
 /// The tables that a device has of a scene at one time.
 #[derive(Debug, Clone)]
@@ -110,7 +125,19 @@ impl Scene {
     /// # Errors
     /// When the device's textures are too small for the scene.
     pub fn of(scene: &GpuScene, scene_time_s: f32) -> Result<Self, RenderError> {
-        Ok(Self { tables: scene.rays.host_tables(scene_time_s)?, footprint: 0.0 })
+        let rays = &scene.rays;
+        let mut state = rays.state.lock();
+        let bvh = &rays.moved_to(scene_time_s, &mut state)?.bvh;
+        let tables = HostTables {
+            nodes: bvh.tree.nodes.clone(),
+            corners: rays.corner_texels(bvh, &rays.corners_in_world(scene_time_s)),
+            triangles: rays.triangles_of_leaves(bvh),
+            vertices: rays.flat.vertices_at(scene_time_s).into_owned(),
+            details: rays.flat.details_at(scene_time_s).into_owned(),
+            materials: rays.materials.clone(),
+            texels: rays.texels.clone(),
+        };
+        Ok(Self { tables, footprint: 0.0 })
     }
 
     /// The nearest triangle beyond `near`; backs of single-sided ones are not there.

@@ -136,8 +136,6 @@ fn trees_of_a_skinned_model_are_refitted_from_frame_to_frame() {
     let moving = upload(&scene);
     let mut refitted = 0;
     let mut worst = 0.0f32;
-    let mut refit_s = 0.0;
-    let mut build_s = 0.0;
     for frame in 0..60u32 {
         let scene_time_s = frame as f32 / 30.0;
         let report = moving.acceleration(scene_time_s).expect("a tree");
@@ -146,10 +144,9 @@ fn trees_of_a_skinned_model_are_refitted_from_frame_to_frame() {
         if frame % 6 == 5 {
             let built = upload(&scene).acceleration(scene_time_s).expect("a tree");
             worst = worst.max(report.cost / built.cost);
-            (refit_s, build_s) = (refit_s + report.build_s + report.upload_s, build_s + built.build_s + built.upload_s);
         }
     }
-    println!("{refitted} of 60 refitted; cost at most {worst} × a new tree's; {:.2} × its time", refit_s / build_s);
+    println!("{refitted} of 60 refitted; cost at most {worst} × a new tree's");
     assert!(refitted >= 48, "{refitted}");
     assert!(worst < 1.5, "{worst}");
 }
