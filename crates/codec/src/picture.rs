@@ -1,11 +1,8 @@
 //! Pictures of file formats by the libraries, with the size checked against the frame's: baseline JPEG, and PNG in its fastest
 //! compression.
 
-use std::io::Cursor;
-
 use glam::UVec2;
-use image::codecs::jpeg::JpegDecoder;
-use image::codecs::png::{CompressionType, FilterType, PngDecoder, PngEncoder};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::error::{ParameterError, ParameterErrorKind};
 use image::{ColorType, ExtendedColorType, ImageDecoder, ImageEncoder as _, ImageError, ImageResult, Limits};
 
@@ -13,16 +10,13 @@ use crate::FrameError;
 
 /// Packs three bytes a pixel as JPEG.
 pub(crate) fn encode_jpeg(width: u32, height: u32, rgb: &[u8], quality: u8) -> Result<Vec<u8>, FrameError> {
-    if !(1..=100).contains(&quality) {
-        return Err(FrameError::Quality(quality));
-    }
     let (Ok(columns), Ok(rows)) = (u16::try_from(width), u16::try_from(height)) else {
         return Err(FrameError::Size { width, height, rgb_bytes: rgb.len() });
     };
     let mut data = Vec::new();
     jpeg_encoder::Encoder::new(&mut data, quality)
         .encode(rgb, columns, rows, jpeg_encoder::ColorType::Rgb)
-        .map_err(|error| FrameError::Jpeg(error.to_string()))?;
+        .map_err(|error| FrameError::Picture { format: "JPEG", reason: error.to_string() })?;
     Ok(data)
 }
 
@@ -31,20 +25,18 @@ pub(crate) fn encode_png(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>,
     let mut data = Vec::new();
     PngEncoder::new_with_quality(&mut data, CompressionType::Fast, FilterType::Adaptive)
         .write_image(rgb, width, height, ExtendedColorType::Rgb8)
-        .map_err(|error| FrameError::Png(error.to_string()))?;
+        .map_err(|error| FrameError::Picture { format: "PNG", reason: error.to_string() })?;
     Ok(data)
 }
 
-/// Unpacks a JPEG that must be of the given size, which the caller has checked against its limits.
-pub(crate) fn decode_jpeg(size_px: UVec2, data: &[u8]) -> Result<Vec<u8>, FrameError> {
-    let decoded = JpegDecoder::new(Cursor::new(data)).and_then(|decoder| decode_rgb(decoder, size_px));
-    decoded.map_err(|error| FrameError::Jpeg(error.to_string()))
-}
-
-/// Unpacks a PNG that must be of the given size, which the caller has checked against its limits.
-pub(crate) fn decode_png(size_px: UVec2, data: &[u8]) -> Result<Vec<u8>, FrameError> {
-    let decoded = PngDecoder::new(Cursor::new(data)).and_then(|decoder| decode_rgb(decoder, size_px));
-    decoded.map_err(|error| FrameError::Png(error.to_string()))
+/// Unpacks a picture that must be of the given size, which the caller has checked against its limits.
+pub(crate) fn decode_picture<D: ImageDecoder>(
+    format: &'static str,
+    decoder: ImageResult<D>,
+    size_px: UVec2,
+) -> Result<Vec<u8>, FrameError> {
+    let decoded = decoder.and_then(|decoder| decode_rgb(decoder, size_px));
+    decoded.map_err(|error| FrameError::Picture { format, reason: error.to_string() })
 }
 
 fn decode_rgb(mut decoder: impl ImageDecoder, size_px: UVec2) -> ImageResult<Vec<u8>> {
