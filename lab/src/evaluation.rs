@@ -70,7 +70,7 @@ struct Errors {
 impl Errors {
     fn of(reference: &View, view: &View, classes: &[PixelClass]) -> anyhow::Result<Self> {
         let pictures = PictureErrors::of(reference, &Rgb8Image::of_view(view)?)?;
-        let depth = depth_errors(&known_depth(reference)?, &known_depth(view)?, None)?;
+        let depth = depth_errors(&known_depth(reference)?, &known_depth(view)?)?;
         let mut errors = Self { pictures, depth, disoccluded: 0, disoccluded_wrong: 0, disoccluded_unmarked: 0 };
         let provenance = view.provenance.as_ref().context("a view without provenance")?;
         let colors = reference.srgb8.as_chunks::<3>().0.iter().zip(view.srgb8.as_chunks::<3>().0);

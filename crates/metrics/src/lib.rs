@@ -34,7 +34,7 @@ pub use change_error::change_error_map;
 pub use classes::{PixelClass, classify, unheld_rate};
 pub use depth_error::{DepthErrors, WRONG_HIT_RELATIVE, depth_errors};
 pub use error::MetricsError;
-pub use flip::{FLIP_PIXELS_PER_DEGREE, FLIP_REACH_PX, flip_map, flip_map_at};
+pub use flip::{FLIP_REACH_PX, flip_map};
 pub use foreground::{PictureErrors, foreground};
 pub use image::Rgb8Image;
 pub use pdiff::pdiff_map;

@@ -67,7 +67,7 @@ pub fn figures(truths: &[View], views: &[View], view_s: f64) -> anyhow::Result<F
     for (truth, view) in truths.iter().zip(views) {
         let [foreground, _] = PictureErrors::of(truth, &Rgb8Image::of_view(view)?)?;
         let depths = [truth, view].map(|view| view.inverse_depth_per_m.as_deref().unwrap_or_default());
-        let depth = depth_errors(depths[0], depths[1], None)?;
+        let depth = depth_errors(depths[0], depths[1])?;
         let share = 1.0 / truths.len() as f64;
         all.psnr_db += share * foreground.psnr_db;
         all.flip += share * foreground.flip;
