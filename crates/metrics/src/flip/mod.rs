@@ -6,13 +6,14 @@
 
 mod kernels;
 
-use depth_image::linear_from_srgb8;
+use depth_image::{View, linear_from_srgb8};
 use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::color::{REC_709, WhiteRelative, convert_pixels};
 use crate::convolution::{Edge, Plane};
-use crate::{MetricsError, Rgb8Image, ScoreMap};
+use crate::image::expect_same_size;
+use crate::{MetricsError, ScoreMap};
 use kernels::{ACHROMATIC, BLUE_YELLOW, FeatureKernels, RED_GREEN, Sensitivity};
 
 /// The greatest distance between a pixel and another that its error depends on, in pixels.
@@ -28,17 +29,16 @@ const KNEE_OUTPUT: f32 = 0.95;
 ///
 /// # Errors
 /// Images differ in size.
-pub fn flip_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<ScoreMap, MetricsError> {
-    reference.expect_same_size(test)?;
+pub fn flip_map(reference: &View, test: &View) -> Result<ScoreMap, MetricsError> {
+    expect_same_size(reference, test)?;
     let space = WhiteRelative::new(REC_709);
     let [reference_ycxcz, test_ycxcz] = [reference, test]
         .map(|image| convert_pixels(image, linear_from_srgb8, |linear| space.ycxcz_from_linear(linear)));
-    let width = reference.width_px() as usize;
+    let width = reference.size_px.x as usize;
     let color = color_difference(&reference_ycxcz, &test_ycxcz, width);
     let feature = feature_difference(&reference_ycxcz, &test_ycxcz, width);
     let values = color.par_iter().zip(&feature).map(|(color, feature)| color.powf(1.0 - feature)).collect();
-    let (width_px, height_px) = reference.size_px();
-    Ok(ScoreMap { width_px, height_px, border_px: 0, values })
+    Ok(ScoreMap { size_px: reference.size_px, border_px: 0, values })
 }
 
 /// The colour difference of every pixel, 0 to 1 (§4.1): filter by contrast sensitivity, then measure in Hunt-adjusted
@@ -125,10 +125,12 @@ impl Features {
 
 #[cfg(test)]
 mod tests {
+    use glam::UVec2;
+
     use super::*;
 
-    fn flat(rgb: [u8; 3]) -> Rgb8Image<'static> {
-        Rgb8Image::new(5, 4, rgb.repeat(20)).unwrap()
+    fn flat(rgb: [u8; 3]) -> View {
+        View::from_srgb8(UVec2::new(5, 4), rgb.repeat(20))
     }
 
     #[test]
@@ -154,7 +156,7 @@ mod tests {
         let images = [1, 5].map(|seed| (0..3 * SIDE * SIDE).map(|index| byte(index, seed)).collect::<Vec<u8>>());
         let map = |first: usize| {
             let side = (SIDE - 2 * first) as u32;
-            let [a, b] = [0, 1].map(|image| Rgb8Image::new(side, side, crop(&images[image], first)).unwrap());
+            let [a, b] = [0, 1].map(|image| View::from_srgb8(UVec2::splat(side), crop(&images[image], first)));
             flip_map(&a, &b).unwrap().values
         };
         let whole = map(0);

@@ -8,7 +8,7 @@ use cluster::{Costs, OfferSettings, PolicyChoice, SessionPlan, SessionRequest};
 use coordinator::schedule::k_fd;
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use image::imageops;
-use metrics::{PictureErrors, Rgb8Image, flip_map};
+use metrics::{PictureErrors, flip_map};
 use render::Lighting;
 use report::{
     Axis, Picture, PictureRow, Point, Report, ReportError, Series, Table, XyChart, comparison_row, contact_sheet,
@@ -35,7 +35,7 @@ struct ComparedView {
 
 impl ComparedView {
     fn new(direct: View, reconstructed: View) -> anyhow::Result<Self> {
-        let [errors, _] = PictureErrors::of(&direct, &Rgb8Image::of_view(&reconstructed)?)?;
+        let [errors, _] = PictureErrors::of(&direct, &reconstructed)?;
         Ok(Self { direct, reconstructed, errors })
     }
 }
@@ -236,7 +236,7 @@ fn all_views(result: &LightResult) -> PictureRow {
 /// The row *direct | reconstructed | error map | provenance*.
 fn compared_row(title: &str, compared: &ComparedView) -> anyhow::Result<PictureRow> {
     let ComparedView { direct, reconstructed, .. } = compared;
-    let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(reconstructed)?)?;
+    let flip = flip_map(direct, reconstructed)?;
     let [direct_image, reconstructed_image] =
         [direct, reconstructed].map(|view| pictures::rgb(view).context("a view is not of its size"));
     let provenance = pictures::provenance(reconstructed, 0);
