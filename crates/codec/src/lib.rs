@@ -20,7 +20,6 @@ mod image_header;
 mod layered_codec;
 mod layered_image_codec;
 mod lz4;
-mod picture;
 mod quantise;
 mod reassembler;
 mod runs;
