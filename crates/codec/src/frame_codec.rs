@@ -95,15 +95,16 @@ pub fn decode_frame(
 ) -> Result<Vec<u8>, FrameError> {
     let pixels = limits.texels(size_px.x, size_px.y)?;
     check_limit("frame data", data.len() as u64, limits.max_payload_bytes as u64)?;
-    match codec {
+    let (format, decoded) = match codec {
         FrameCodec::Lz4 => {
             let mut rgb = expand_lz4(data, pixels * 3, "frame")?;
             unfilter(&mut rgb);
-            Ok(rgb)
+            return Ok(rgb);
         }
-        FrameCodec::Png => decode_picture("PNG", PngDecoder::new(Cursor::new(data)), size_px),
-        FrameCodec::Jpeg { .. } => decode_picture("JPEG", JpegDecoder::new(Cursor::new(data)), size_px),
-    }
+        FrameCodec::Png => ("PNG", decode_rgb(PngDecoder::new(Cursor::new(data)), size_px)),
+        FrameCodec::Jpeg { .. } => ("JPEG", decode_rgb(JpegDecoder::new(Cursor::new(data)), size_px)),
+    };
+    decoded.map_err(|error| FrameError::Picture { format, reason: error.to_string() })
 }
 
 /// Packs three bytes a pixel as JPEG.
@@ -127,17 +128,9 @@ fn encode_png(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>, FrameError
     Ok(data)
 }
 
-/// Unpacks a picture of a library that must be of the given size, which the caller has checked against its limits.
-fn decode_picture<D: ImageDecoder>(
-    format: &'static str,
-    decoder: ImageResult<D>,
-    size_px: UVec2,
-) -> Result<Vec<u8>, FrameError> {
-    let decoded = decoder.and_then(|decoder| decode_rgb(decoder, size_px));
-    decoded.map_err(|error| FrameError::Picture { format, reason: error.to_string() })
-}
-
-fn decode_rgb(mut decoder: impl ImageDecoder, size_px: UVec2) -> ImageResult<Vec<u8>> {
+/// Unpacks a picture that must be of the given size, which the caller has checked against its limits.
+fn decode_rgb(decoder: ImageResult<impl ImageDecoder>, size_px: UVec2) -> ImageResult<Vec<u8>> {
+    let mut decoder = decoder?;
     let [width, height] = size_px.to_array();
     if decoder.dimensions() != (width, height) || decoder.color_type() != ColorType::Rgb8 {
         let reason = format!("not an RGB picture of {width}×{height}");
