@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use cluster::{ApplyPlan, Assignment, FetchImages, SamplePlanes, Workload};
-use codec::{Chunk, ChunkBody, PlaneSet, SampleSetId, encode_depth_image, split_into_chunks};
+use codec::{Chunk, ChunkBody, SampleSetId, encode_depth_image, split_into_chunks};
 use depth_image::{Camera, DepthImage, Environment, Illumination, Light, LightPlanes, PinholeCamera, SpecularPlanes};
 use glam::{UVec2, Vec3};
 use tokio::net::TcpListener;
@@ -64,7 +64,7 @@ fn lit(shares: usize) -> DepthImage {
 
 /// Chunks of two images of set 0 of plan 5.
 fn chunks_of(image: &DepthImage) -> Vec<Chunk> {
-    let encoded = encode_depth_image(image, PlaneSet::ALL).unwrap();
+    let encoded = encode_depth_image(image).unwrap();
     let id = SampleSetId { plan_epoch: 5, index: 0 };
     (0..2).flat_map(|index| split_into_chunks(id, index, encoded.clone())).collect()
 }

@@ -11,7 +11,7 @@ use client::Frame;
 use cluster::DIRECT;
 use codec::{FrameCodec, encode_frame};
 use depth_image::{Antialias, View, ViewPlanes};
-use metrics::{PictureErrors, Rgb8Image, flip_map};
+use metrics::{PictureErrors, flip_map};
 use serde_json::{Value, json};
 
 use crate::gateway::Gateway;
@@ -43,10 +43,8 @@ pub(crate) async fn compare(
 }
 
 fn compared(frame: &Frame, direct: &Frame) -> Option<Value> {
-    let test = Rgb8Image::of_view(&frame.view).ok()?;
-    let reference = Rgb8Image::of_view(&direct.view).ok()?;
-    let [foreground, whole] = PictureErrors::of(&direct.view, &test).ok()?;
-    let flip = flip_map(&reference, &test).ok()?;
+    let [foreground, whole] = PictureErrors::of(&direct.view, &frame.view).ok()?;
+    let flip = flip_map(&direct.view, &frame.view).ok()?;
     let flip_image = View { srgb8: pictures::error_map(&flip).into_raw(), ..frame.view.clone() };
     let [view_s, direct_s] = [frame, direct].map(|frame| frame.header.stage_times.batch_s);
     Some(json!({

@@ -2,7 +2,7 @@
 
 use anyhow::Context as _;
 use depth_image::{Provenance, ProvenanceKind, View, ViewPlanes};
-use metrics::{DepthErrors, PictureErrors, PixelClass, Rgb8Image, depth_errors};
+use metrics::{DepthErrors, PictureErrors, PixelClass, depth_errors};
 use rayon::prelude::*;
 use reconstruction::ReconstructionMethod;
 
@@ -69,8 +69,8 @@ struct Errors {
 
 impl Errors {
     fn of(reference: &View, view: &View, classes: &[PixelClass]) -> anyhow::Result<Self> {
-        let pictures = PictureErrors::of(reference, &Rgb8Image::of_view(view)?)?;
-        let depth = depth_errors(&known_depth(reference)?, &known_depth(view)?, None)?;
+        let pictures = PictureErrors::of(reference, view)?;
+        let depth = depth_errors(&known_depth(reference)?, &known_depth(view)?)?;
         let mut errors = Self { pictures, depth, disoccluded: 0, disoccluded_wrong: 0, disoccluded_unmarked: 0 };
         let provenance = view.provenance.as_ref().context("a view without provenance")?;
         let colors = reference.srgb8.as_chunks::<3>().0.iter().zip(view.srgb8.as_chunks::<3>().0);
@@ -114,7 +114,7 @@ fn evaluation(method: ReconstructionMethod, ms_a_view: f64, errors: &[Errors]) -
 /// Views differ in size, or a reference has no depth.
 pub fn mean_errors(references: &[View], tests: &[View]) -> anyhow::Result<[PictureErrors; 2]> {
     let pairs = references.par_iter().zip(tests);
-    let errors = pairs.map(|(reference, test)| PictureErrors::of(reference, &Rgb8Image::of_view(test)?));
+    let errors = pairs.map(|(reference, test)| PictureErrors::of(reference, test));
     Ok(mean_pictures(&errors.collect::<Result<Vec<_>, _>>()?))
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use anyhow::Context as _;
 use app_core::setup::{SceneArgs, Setup};
-use codec::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
+use codec::{DecodeLimits, decode_depth_image, encode_depth_image};
 use depth_image::{DepthImage, PinholeCamera, SampleImage, View, ViewPlanes};
 use engine::GpuEngine;
 use metrics::{PixelClass, classify};
@@ -108,7 +108,7 @@ pub(crate) fn sample(engine: &GpuEngine, setup: &Setup, args: &SceneArgs) -> any
 }
 
 pub(crate) fn encoded_and_decoded(image: &DepthImage) -> anyhow::Result<DepthImage> {
-    let encoded = encode_depth_image(image, PlaneSet::ALL)?;
+    let encoded = encode_depth_image(image)?;
     Ok(decode_depth_image(&encoded.header, image.camera, &encoded.payload, &DecodeLimits::default())?)
 }
 

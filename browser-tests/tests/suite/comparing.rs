@@ -10,7 +10,7 @@ use cluster::Refinement;
 use cluster_tests::scalar_engine::{FLOOR_LINEAR, SKY_LINEAR, ball_linear, srgb8};
 use codec::{DecodeLimits, FrameCodec, decode_frame};
 use glam::UVec2;
-use metrics::{Rgb8Image, flip_map, psnr_db, ssim_map};
+use metrics::{flip_map, psnr_db, ssim_map};
 use serde::Deserialize;
 
 use crate::scene::gateway;
@@ -49,9 +49,8 @@ fn decoded(url: &str) -> Vec<u8> {
 
 /// PSNR, SSIM and FLIP of two pictures.
 fn errors(view: &[u8], direct: &[u8]) -> [f64; 3] {
-    let image = |srgb8| Rgb8Image::new(COMPARED_PX[0], COMPARED_PX[1], srgb8).unwrap();
-    let test = image(view);
-    let reference = image(direct);
+    let [test, reference] =
+        [view, direct].map(|srgb8| depth_image::View::from_srgb8(COMPARED_PX.into(), srgb8.to_vec()));
     let psnr_db = psnr_db(&reference, &test, None).unwrap().unwrap();
     let mean = |map: metrics::ScoreMap| map.mean(None).unwrap().unwrap();
     [psnr_db, mean(ssim_map(&reference, &test).unwrap()), mean(flip_map(&reference, &test).unwrap())]

@@ -9,8 +9,7 @@
 use std::{error::Error, hint::black_box, time::Instant};
 
 use codec::{
-    DecodeLimits, FrameCodec, InverseDepthRange, PlaneSet, decode_depth_image, decode_frame, encode_depth_image,
-    encode_frame,
+    DecodeLimits, FrameCodec, InverseDepthRange, decode_depth_image, decode_frame, encode_depth_image, encode_frame,
 };
 use depth_image::{Camera, DepthImage, PinholeCamera, SpecularPlanes, rgb9e5_from_linear};
 use glam::{UVec2, Vec3};
@@ -62,7 +61,7 @@ fn report(name: &str, plane: &[f32], width: u32, height: u32) -> Result<(), Box<
 /// The depths of a black image, whose colours take next to no time.
 fn report_depth(name: &str, plane: &[f32], width: u32, height: u32) -> Result<(), Box<dyn Error>> {
     let image = black(plane, width, height);
-    let header = encode_depth_image(&image, PlaneSet::ALL)?.header;
+    let header = encode_depth_image(&image)?.header;
     let codes = plane.iter().map(|&inverse| code_of(inverse, header.inverse_depth_range));
     let raw: Vec<u8> = codes.flat_map(u16::to_le_bytes).collect();
     let (_, encode_s, decode_s) = image_costs(&image)?;
@@ -85,7 +84,7 @@ fn report_color(name: &str, plane: &[f32], colors: &[Vec3], width: u32, height: 
     let color_rgb9e5 = colors.iter().map(|&color| rgb9e5_from_linear(color)).collect();
     let black = black(plane, width, height);
     let image = DepthImage { color_rgb9e5, ..black.clone() };
-    let header = encode_depth_image(&image, PlaneSet::ALL)?.header;
+    let header = encode_depth_image(&image)?.header;
     let without = image_costs(&black)?;
     let with = image_costs(&image)?;
     let raw: Vec<u8> = image.color_rgb9e5.iter().flat_map(|color| color.to_le_bytes()).collect();
@@ -147,10 +146,10 @@ fn report_words(name: &str, plane: &[f32], words: Vec<u32>, width: u32, height: 
 /// Bytes, and seconds to encode and decode.
 fn image_costs(image: &DepthImage) -> Result<(usize, f64, f64), Box<dyn Error>> {
     let limits = DecodeLimits::default();
-    let encoded = encode_depth_image(image, PlaneSet::ALL)?;
+    let encoded = encode_depth_image(image)?;
     let decode = || decode_depth_image(&encoded.header, image.camera, &encoded.payload, &limits);
     decode()?;
-    let encode_s = median_secs(|| drop(black_box(encode_depth_image(image, PlaneSet::ALL))));
+    let encode_s = median_secs(|| drop(black_box(encode_depth_image(image))));
     Ok((encoded.payload.len(), encode_s, median_secs(|| drop(black_box(decode())))))
 }
 

@@ -27,15 +27,9 @@ pub enum FrameError {
     /// The slice has not three bytes a pixel.
     #[error("{rgb_bytes} bytes of RGB for a frame of {width}×{height}")]
     Size { width: u32, height: u32, rgb_bytes: usize },
-    /// JPEG qualities go from 1 to 100.
-    #[error("JPEG quality {0}, must be 1 to 100")]
-    Quality(u8),
-    /// The JPEG library refuses.
-    #[error("JPEG: {0}")]
-    Jpeg(String),
-    /// The PNG library refuses.
-    #[error("PNG: {0}")]
-    Png(String),
+    /// The library of a file format, JPEG or PNG, refuses.
+    #[error("{format}: {reason}")]
+    Picture { format: &'static str, reason: String },
     /// Size over the limits, or data that does not decode.
     #[error(transparent)]
     Decode(#[from] DecodeError),
@@ -50,8 +44,6 @@ pub enum FrameError {
 /// Limits that a decoder checks before it allocates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DecodeLimits {
-    /// Longest side of an image.
-    pub max_side_px: u32,
     /// Texels of one image.
     pub max_texels: usize,
     /// Packed bytes of one image, all planes.
@@ -64,23 +56,13 @@ impl Default for DecodeLimits {
     /// 16 million texels, 256 MiB packed: some fifty times the needs of the largest planned sample image. 1 GiB unpacked:
     /// the visibility of all lights at 1920×1080 takes half of that.
     fn default() -> Self {
-        Self {
-            max_side_px: MAX_IMAGE_SIDE_PX,
-            max_texels: 1 << 24,
-            max_payload_bytes: 256 << 20,
-            max_image_bytes: 1 << 30,
-        }
+        Self { max_texels: 1 << 24, max_payload_bytes: 256 << 20, max_image_bytes: 1 << 30 }
     }
 }
 
 impl DecodeLimits {
     /// Those of views: 67 million pixels, as of 8192×8192.
-    pub const VIEWS: Self = Self {
-        max_side_px: MAX_IMAGE_SIDE_PX,
-        max_texels: 1 << 26,
-        max_payload_bytes: 1 << 30,
-        max_image_bytes: 1 << 30,
-    };
+    pub const VIEWS: Self = Self { max_texels: 1 << 26, max_payload_bytes: 1 << 30, max_image_bytes: 1 << 30 };
 
     /// Texels of an image that is within the limits.
     ///
@@ -90,8 +72,8 @@ impl DecodeLimits {
         if width == 0 || height == 0 {
             return Err(DecodeError::Header { field: "size", reason: "zero" });
         }
-        check_limit("width", u64::from(width), u64::from(self.max_side_px))?;
-        check_limit("height", u64::from(height), u64::from(self.max_side_px))?;
+        check_limit("width", u64::from(width), u64::from(MAX_IMAGE_SIDE_PX))?;
+        check_limit("height", u64::from(height), u64::from(MAX_IMAGE_SIDE_PX))?;
         let texels = u64::from(width) * u64::from(height);
         check_limit("texels", texels, self.max_texels as u64)?;
         Ok(texels as usize)

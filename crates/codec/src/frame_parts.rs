@@ -71,7 +71,7 @@ impl FrameAssembly {
     /// # Errors
     /// For parts out of order, repeated, beyond the announced size or with a wrong checksum.
     pub fn push(&mut self, part: FramePart) -> Result<Option<WholeFrame>, FrameAssemblyError> {
-        let (frame, header, data) = match (self.open.take(), part.header) {
+        let (frame, header, mut data) = match (self.open.take(), part.header) {
             (None, Some(header)) if part.data.len() as u64 == header.total_bytes() => {
                 return whole(part.frame, header, part.data).map(Some);
             }
@@ -80,25 +80,15 @@ impl FrameAssembly {
             (None, None) => return Err(FrameAssemblyError::NoHeader),
             (Some((open, ..)), _) => return Err(FrameAssemblyError::CutOff { open, next: part.frame }),
         };
-        self.extend(frame, header, data, part.offset_bytes, &part.data)
-    }
-
-    fn extend(
-        &mut self,
-        frame: u64,
-        header: FrameHeader,
-        mut data: Vec<u8>,
-        offset_bytes: u64,
-        piece: &[u8],
-    ) -> Result<Option<WholeFrame>, FrameAssemblyError> {
-        if offset_bytes != data.len() as u64 {
-            return Err(FrameAssemblyError::Offset { frame, offset_bytes, expected: data.len() as u64 });
+        let expected = data.len() as u64;
+        if part.offset_bytes != expected {
+            return Err(FrameAssemblyError::Offset { frame, offset_bytes: part.offset_bytes, expected });
         }
-        let count = (data.len() + piece.len()) as u64;
+        let count = expected + part.data.len() as u64;
         if count > header.total_bytes() {
             return Err(FrameAssemblyError::TooLong { frame, count, limit: header.total_bytes() });
         }
-        data.extend_from_slice(piece);
+        data.extend_from_slice(&part.data);
         if count == header.total_bytes() {
             return whole(frame, header, data.into()).map(Some);
         }

@@ -1,17 +1,16 @@
 //! A depth image to header and payload, and back.
 
 use bytes::Bytes;
-use depth_image::{Camera, DepthImage, DepthImageError, LightPlanes, SpecularPlanes, SurfaceId};
+use depth_image::{Camera, DepthImage, LightPlanes, SampleImageError, SpecularPlanes, SurfaceId};
 use glam::UVec2;
 
-use crate::color_codec::{pack_colors, unpack_colors};
 use crate::depth_codec::{decode_depth, encode_depth};
 use crate::image_header::wrong_kinds;
 use crate::lz4::expand_lz4;
 use crate::runs::Runs;
 use crate::tagged::{take, take_array};
 use crate::words_codec::{WordLayout, pack_words, unpack_words};
-use crate::{DecodeError, DecodeLimits, ImageHeader, InverseDepthRange, PlaneHeader, PlaneKind, PlaneSet};
+use crate::{DecodeError, DecodeLimits, ImageHeader, InverseDepthRange, LayeredCounts, PlaneHeader, PlaneKind};
 
 /// An encoded sample image, without its camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,68 +27,58 @@ pub struct EncodedImage {
 ///
 /// # Errors
 /// Planes that do not form an image; planes of highlights without normals.
-pub fn encode_depth_image(image: &DepthImage, planes: PlaneSet) -> Result<EncodedImage, DepthImageError> {
+pub fn encode_depth_image(image: &DepthImage) -> Result<EncodedImage, SampleImageError> {
     image.validate()?;
+    if image.specular.is_some() && image.normal_oct16.is_none() {
+        return Err(SampleImageError::Size { plane: "normal", len: 0, expected: image.inverse_depth_per_m.len() });
+    }
     let depth = encode_depth(&image.inverse_depth_per_m);
     let mut packer = Packer::default();
     packer.push(PlaneKind::InverseDepth, &depth.bytes);
     match &image.light {
         Some(light) => pack_light(image, light, &depth.runs, &mut packer),
-        None => pack_color(image, planes, &depth.runs, &mut packer)?,
+        None => pack_color(image, &depth.runs, &mut packer),
     }
     if let Some(passed) = &image.passed {
         packer.push(PlaneKind::Passed1, &pack_bits(passed));
     }
-    if let Some(corners) = image.corner_inverse_depth_per_m.as_ref().filter(|_| planes.corners) {
+    if let Some(corners) = &image.corner_inverse_depth_per_m {
         packer.push(PlaneKind::CornerInverseDepth, &pack_corners(corners));
     }
-    let size_px = image.size_px();
-    Ok(EncodedImage {
-        header: ImageHeader {
-            width: size_px.x,
-            height: size_px.y,
-            inverse_depth_range: depth.range,
-            layered: None,
-            planes: packer.planes,
-        },
-        payload: packer.payload.into(),
-    })
+    Ok(packer.finish(image.size_px(), depth.range, None))
 }
 
 /// Packs colour, and what a method or highlights need beside it.
-fn pack_color(image: &DepthImage, planes: PlaneSet, runs: &Runs, packer: &mut Packer) -> Result<(), DepthImageError> {
-    let specular = image.specular.as_ref().filter(|_| planes.specular);
-    if specular.is_some() && image.normal_oct16.is_none() {
-        return Err(DepthImageError::Size { plane: "normal", len: 0, expected: image.inverse_depth_per_m.len() });
+fn pack_color(image: &DepthImage, runs: &Runs, packer: &mut Packer) {
+    packer.push_words(PlaneKind::ColorRgb9e5, &runs.gather(&image.color_rgb9e5));
+    if let Some(normals) = &image.normal_oct16 {
+        packer.push_words(PlaneKind::NormalOct16, &runs.gather(normals));
     }
-    packer.write(PlaneKind::ColorRgb9e5, |out| pack_colors(&runs.gather(&image.color_rgb9e5), out));
-    if let Some(normals) = image.normal_oct16.as_ref().filter(|_| planes.normal || specular.is_some()) {
-        packer.write(PlaneKind::NormalOct16, |out| pack_words(&runs.gather(normals), WordLayout::Halves, out));
-    }
-    if let Some(ids) = image.surface_id.as_ref().filter(|_| planes.surface_id) {
+    if let Some(ids) = &image.surface_id {
         packer.write(PlaneKind::SurfaceId, |out| pack_surface_ids(&runs.gather(ids), out));
     }
-    if let Some(specular) = specular {
-        let mut write = |kind, plane: &[u32]| {
-            packer.write(kind, |out| pack_words(&runs.gather(plane), WordLayout::Bytes, out));
-        };
-        write(PlaneKind::ReflectanceRoughness8, &specular.reflectance_srgb8_roughness8);
-        specular.visibility8.iter().for_each(|visibility| write(PlaneKind::Visibility8, visibility));
+    for (kind, plane) in image.specular.iter().flat_map(specular_planes) {
+        packer.push_words(kind, &runs.gather(plane));
     }
-    Ok(())
 }
 
 /// Packs light and both normals, of an image that has passed its validation.
 fn pack_light(image: &DepthImage, light: &LightPlanes, runs: &Runs, packer: &mut Packer) {
-    packer.write(PlaneKind::TriangleNormalOct16, |out| pack_colors(&runs.gather(&light.triangle_normal_oct16), out));
+    packer.push_words(PlaneKind::TriangleNormalOct16, &runs.gather(&light.triangle_normal_oct16));
     if let Some(normals) = &image.normal_oct16 {
-        packer.write(PlaneKind::NormalOct16, |out| pack_words(&runs.gather(normals), WordLayout::Halves, out));
+        packer.push_words(PlaneKind::NormalOct16, &runs.gather(normals));
     }
-    packer.write(PlaneKind::LampsRgb9e5, |out| pack_colors(&runs.gather(&light.lamps_rgb9e5), out));
-    packer.write(PlaneKind::EnvironmentRgb9e5, |out| pack_colors(&runs.gather(&light.environment_rgb9e5), out));
+    packer.push_words(PlaneKind::LampsRgb9e5, &runs.gather(&light.lamps_rgb9e5));
+    packer.push_words(PlaneKind::EnvironmentRgb9e5, &runs.gather(&light.environment_rgb9e5));
     for share in &light.share8 {
-        packer.write(PlaneKind::LightShare8, |out| pack_words(&runs.gather(share), WordLayout::Bytes, out));
+        packer.push_words(PlaneKind::LightShare8, &runs.gather(share));
     }
+}
+
+/// The planes of highlights, in the order of the payload.
+pub(crate) fn specular_planes(specular: &SpecularPlanes) -> impl Iterator<Item = (PlaneKind, &Vec<u32>)> {
+    let visibilities = specular.visibility8.iter().map(|plane| (PlaneKind::Visibility8, plane));
+    std::iter::once((PlaneKind::ReflectanceRoughness8, &specular.reflectance_srgb8_roughness8)).chain(visibilities)
 }
 
 /// Unpacks an image. The camera must have passed its own validation.
@@ -131,12 +120,12 @@ pub fn decode_depth_image(
 /// Planes that are packed one after another.
 #[derive(Default)]
 pub(crate) struct Packer {
-    pub planes: Vec<PlaneHeader>,
-    pub payload: Vec<u8>,
+    planes: Vec<PlaneHeader>,
+    payload: Vec<u8>,
 }
 
 impl Packer {
-    pub fn push(&mut self, kind: PlaneKind, raw: &[u8]) {
+    fn push(&mut self, kind: PlaneKind, raw: &[u8]) {
         let packed = lz4_flex::block::compress(raw);
         self.payload.extend_from_slice(&packed);
         self.planes.push(PlaneHeader {
@@ -147,10 +136,22 @@ impl Packer {
         });
     }
 
+    /// Packs a plane of words.
+    pub fn push_words(&mut self, kind: PlaneKind, words: &[u32]) {
+        self.write(kind, |out| kind.pack_words(words, out));
+    }
+
     pub fn write(&mut self, kind: PlaneKind, write: impl FnOnce(&mut Vec<u8>)) {
         let mut raw = Vec::new();
         write(&mut raw);
         self.push(kind, &raw);
+    }
+
+    /// The image of the planes.
+    pub fn finish(self, size_px: UVec2, range: InverseDepthRange, layered: Option<LayeredCounts>) -> EncodedImage {
+        let [width, height] = size_px.to_array();
+        let header = ImageHeader { width, height, inverse_depth_range: range, layered, planes: self.planes };
+        EncodedImage { header, payload: self.payload.into() }
     }
 }
 
@@ -200,24 +201,12 @@ fn decode_plane(
     image: &mut DepthImage,
 ) -> Result<(), DecodeError> {
     let samples = runs.sample_count();
-    let words = |input: &mut &[u8], layout| -> Result<Vec<u32>, DecodeError> {
-        Ok(runs.scatter(&unpack_words(input, samples, layout)?, 0))
-    };
     match kind {
         PlaneKind::InverseDepth => {}
-        PlaneKind::ColorRgb9e5 => image.color_rgb9e5 = runs.scatter(&unpack_colors(input, samples)?, 0),
-        PlaneKind::NormalOct16 => image.normal_oct16 = Some(words(input, WordLayout::Halves)?),
         PlaneKind::SurfaceId => {
             let nothing = SurfaceId { instance: 0, primitive: 0 };
             image.surface_id = Some(runs.scatter(&unpack_surface_ids(input, samples)?, nothing));
         }
-        PlaneKind::ReflectanceRoughness8 | PlaneKind::Visibility8 => {
-            put_specular(&mut image.specular, kind, words(input, WordLayout::Bytes)?);
-        }
-        PlaneKind::TriangleNormalOct16 | PlaneKind::LampsRgb9e5 | PlaneKind::EnvironmentRgb9e5 => {
-            put_light(&mut image.light, kind, runs.scatter(&unpack_colors(input, samples)?, 0));
-        }
-        PlaneKind::LightShare8 => put_light(&mut image.light, kind, words(input, WordLayout::Bytes)?),
         PlaneKind::Passed1 => {
             let texels = image.inverse_depth_per_m.len();
             let bits = take(input, texels.div_ceil(8))?;
@@ -229,8 +218,22 @@ fn decode_plane(
         PlaneKind::LayerCount8 | PlaneKind::LayerDepth | PlaneKind::PlaneNormalOct8 => {
             return Err(wrong_kinds("of layered images alone"));
         }
+        _ => put_words(image, kind, runs.scatter(&kind.unpack_words(input, samples)?, 0)),
     }
     Ok(())
+}
+
+/// Adds a plane of words.
+fn put_words(image: &mut DepthImage, kind: PlaneKind, words: Vec<u32>) {
+    match kind {
+        PlaneKind::ColorRgb9e5 => image.color_rgb9e5 = words,
+        PlaneKind::NormalOct16 => image.normal_oct16 = Some(words),
+        PlaneKind::ReflectanceRoughness8 | PlaneKind::Visibility8 => put_specular(&mut image.specular, kind, words),
+        PlaneKind::TriangleNormalOct16 => image.light.get_or_insert_default().triangle_normal_oct16 = words,
+        PlaneKind::LampsRgb9e5 => image.light.get_or_insert_default().lamps_rgb9e5 = words,
+        PlaneKind::EnvironmentRgb9e5 => image.light.get_or_insert_default().environment_rgb9e5 = words,
+        _ => image.light.get_or_insert_default().share8.push(words),
+    }
 }
 
 /// Adds a plane of inputs of highlights.
@@ -239,17 +242,6 @@ pub(crate) fn put_specular(specular: &mut Option<SpecularPlanes>, kind: PlaneKin
     match kind {
         PlaneKind::ReflectanceRoughness8 => specular.reflectance_srgb8_roughness8 = words,
         _ => specular.visibility8.push(words),
-    }
-}
-
-/// Adds a plane of light.
-fn put_light(light: &mut Option<LightPlanes>, kind: PlaneKind, words: Vec<u32>) {
-    let light = light.get_or_insert_default();
-    match kind {
-        PlaneKind::TriangleNormalOct16 => light.triangle_normal_oct16 = words,
-        PlaneKind::LampsRgb9e5 => light.lamps_rgb9e5 = words,
-        PlaneKind::EnvironmentRgb9e5 => light.environment_rgb9e5 = words,
-        _ => light.share8.push(words),
     }
 }
 

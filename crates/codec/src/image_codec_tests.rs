@@ -77,7 +77,7 @@ fn decode(image: &EncodedImage) -> Result<DepthImage, DecodeError> {
 fn an_image_survives() {
     for size in [(1, 1), (7, 3), (160, 120)] {
         let image = image(size.0, size.1);
-        let encoded = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+        let encoded = encode_depth_image(&image).expect("consistent planes");
         let back = decode(&encoded).expect("own encoding");
         let half_step = encoded.header.inverse_depth_range.step_per_m() as f32 * 0.505;
         for (&was, &is) in image.inverse_depth_per_m.iter().zip(&back.inverse_depth_per_m) {
@@ -100,7 +100,7 @@ fn apart(width: u32, height: u32) -> DepthImage {
 fn passed_bits_and_corners_survive() {
     for (width, height) in [(1, 1), (7, 3), (160, 120)] {
         let image = apart(width, height);
-        let encoded = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+        let encoded = encode_depth_image(&image).expect("consistent planes");
         let back = decode(&encoded).expect("own encoding");
         assert_eq!(back.passed, image.passed);
         let corners = |image: &DepthImage| image.corner_inverse_depth_per_m.clone().expect("corners");
@@ -108,15 +108,12 @@ fn passed_bits_and_corners_survive() {
         let is = corners(&back);
         assert_eq!(was.len(), is.len());
         assert!(was.iter().zip(&is).all(|(was, is)| (was - is).abs() < 1e-4 && (*was > 0.0 || was == is)));
-        let without = encode_depth_image(&image, PlaneSet::DEPTH_COLOR).expect("consistent planes");
-        let back = decode(&without).expect("own encoding");
-        assert!(back.corner_inverse_depth_per_m.is_none() && back.passed == image.passed);
     }
 }
 
 #[test]
 fn damaged_planes_of_images_apart_are_refused() {
-    let good = encode_depth_image(&apart(48, 32), PlaneSet::ALL).expect("consistent planes");
+    let good = encode_depth_image(&apart(48, 32)).expect("consistent planes");
     type Damage = fn(&mut Vec<PlaneHeader>);
     let cases: [(&str, Damage); 5] = [
         ("repeated or out of order", |p| p.swap(4, 5)),
@@ -148,7 +145,7 @@ fn images_with_light_survive_with_all_of_their_planes() {
     for (width, height, shares) in [(1, 1, 1), (7, 3, 0), (160, 120, 2), (20, 20, MAX_LIGHT_SHARE_PLANES)] {
         let passed = apart(width, height).passed;
         for image in [lit(width, height, shares), DepthImage { passed, ..lit(width, height, shares) }] {
-            let encoded = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+            let encoded = encode_depth_image(&image).expect("consistent planes");
             let back = decode(&encoded).expect("own encoding");
             let half_step = encoded.header.inverse_depth_range.step_per_m() as f32 * 0.505;
             for (&was, &is) in image.inverse_depth_per_m.iter().zip(&back.inverse_depth_per_m) {
@@ -159,42 +156,26 @@ fn images_with_light_survive_with_all_of_their_planes() {
             // All of their planes are needed, but for surface keys, which stay with the sampler.
             let id = SurfaceId { instance: 1, primitive: 2 };
             let with_keys = DepthImage { surface_id: Some(vec![id; image.inverse_depth_per_m.len()]), ..image };
-            assert_eq!(encode_depth_image(&with_keys, PlaneSet::DEPTH_COLOR), Ok(encoded));
+            assert_eq!(encode_depth_image(&with_keys), Ok(encoded));
         }
     }
 }
 
 #[test]
-fn planes_are_encoded_only_on_request() {
-    let encoded = encode_depth_image(&image(20, 20), PlaneSet::DEPTH_COLOR).expect("consistent planes");
-    let back = decode(&encoded).expect("own encoding");
-    assert_eq!((encoded.header.planes.len(), back.normal_oct16, back.surface_id), (2, None, None));
-}
-
-#[test]
-fn planes_of_highlights_survive_and_bring_normals() {
-    let specular_only = PlaneSet { specular: true, ..PlaneSet::DEPTH_COLOR };
+fn planes_of_highlights_survive() {
     for visibilities in [0, 1, 2, 64] {
         let image = shiny(20, 20, visibilities);
-        let encoded = encode_depth_image(&image, specular_only).expect("consistent planes");
-        let back = decode(&encoded).expect("own encoding");
-        assert_eq!((back.normal_oct16, back.surface_id), (image.normal_oct16.clone(), None));
-        assert_eq!(back.specular, image.specular);
-        assert_eq!(decode(&encode_depth_image(&image, PlaneSet::ALL).unwrap()).unwrap().specular, image.specular);
-        let unwanted = PlaneSet { specular: false, ..PlaneSet::ALL };
-        let plain = encode_depth_image(&image, unwanted).unwrap();
-        assert_eq!((plain.header.planes.len(), decode(&plain).unwrap().specular), (4, None));
+        let back = decode(&encode_depth_image(&image).expect("consistent planes")).expect("own encoding");
+        assert_eq!((back.normal_oct16, back.specular), (image.normal_oct16, image.specular));
     }
-    let dull = encode_depth_image(&image(20, 20), PlaneSet::ALL).expect("consistent planes");
+    let dull = encode_depth_image(&image(20, 20)).expect("consistent planes");
     assert_eq!((dull.header.planes.len(), decode(&dull).expect("own encoding").specular), (4, None));
-    let dull = encode_depth_image(&image(20, 20), specular_only).expect("consistent planes");
-    assert_eq!(dull.header.planes.len(), 2);
 }
 
 #[test]
 fn only_samples_are_encoded() {
     let mut image = shiny(20, 20, 1);
-    let good = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+    let good = encode_depth_image(&image).expect("consistent planes");
     let empty: Vec<_> = (0..400).filter(|&i| image.inverse_depth_per_m[i] <= 0.0).collect();
     assert!(empty.len() > 10);
     let specular = image.specular.as_mut().expect("made so");
@@ -202,24 +183,23 @@ fn only_samples_are_encoded() {
         specular.reflectance_srgb8_roughness8[at] = u32::MAX;
         specular.visibility8[0][at] = u32::MAX;
     }
-    assert_eq!(encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes"), good);
+    assert_eq!(encode_depth_image(&image).expect("consistent planes"), good);
 }
 
 #[test]
 fn inconsistent_planes_are_refused() {
     let mut bad = image(20, 20);
     bad.color_rgb9e5.pop();
-    assert!(encode_depth_image(&bad, PlaneSet::ALL).is_err());
+    assert!(encode_depth_image(&bad).is_err());
     let mut bad = shiny(20, 20, 2);
     bad.specular.as_mut().expect("made so").visibility8[1].pop();
-    assert!(encode_depth_image(&bad, PlaneSet::ALL).is_err());
+    assert!(encode_depth_image(&bad).is_err());
     let bad = DepthImage { color_rgb9e5: vec![0; 400], ..lit(20, 20, 2) };
-    let error = encode_depth_image(&bad, PlaneSet::ALL).expect_err("colour and light").to_string();
+    let error = encode_depth_image(&bad).expect_err("colour and light").to_string();
     assert!(error.contains("has the plane color"), "{error}");
     let bad = DepthImage { normal_oct16: None, ..shiny(20, 20, 2) };
-    let error = encode_depth_image(&bad, PlaneSet::ALL).expect_err("no normals").to_string();
+    let error = encode_depth_image(&bad).expect_err("no normals").to_string();
     assert!(error.contains("plane normal has 0"), "{error}");
-    assert!(encode_depth_image(&bad, PlaneSet::DEPTH_COLOR).is_ok(), "then nothing needs them");
 }
 
 /// Damaged images may decode to something, but never to nonsense.
@@ -234,7 +214,7 @@ fn assert_sound(result: Result<DepthImage, DecodeError>) {
 fn damaged_payloads_never_panic() {
     let mut random = Random::new(10);
     for image in [shiny(48, 32, 2), lit(48, 32, 2)] {
-        let good = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+        let good = encode_depth_image(&image).expect("consistent planes");
         for _ in 0..6000 {
             let mut bad = good.clone();
             let mut payload = good.payload.to_vec();
@@ -286,7 +266,7 @@ fn damaged_words_behind_a_sound_lz4_never_panic() {
 fn cut_and_random_payloads_are_refused() {
     let mut random = Random::new(12);
     for image in [shiny(48, 32, 2), lit(48, 32, 2)] {
-        let good = encode_depth_image(&image, PlaneSet::ALL).expect("consistent planes");
+        let good = encode_depth_image(&image).expect("consistent planes");
         for length in 0..good.payload.len() {
             assert!(decode(&EncodedImage { payload: good.payload.slice(..length), ..good.clone() }).is_err());
         }
@@ -299,7 +279,7 @@ fn cut_and_random_payloads_are_refused() {
 
 #[test]
 fn damaged_headers_are_refused_by_field() {
-    let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
+    let good = encode_depth_image(&image(48, 32)).expect("consistent planes");
     type Damage = fn(&mut ImageHeader);
     let cases: [(&str, Damage); 13] = [
         ("size", |h| h.width = 0),
@@ -326,7 +306,7 @@ fn damaged_headers_are_refused_by_field() {
 
 #[test]
 fn planes_of_highlights_out_of_order_are_refused() {
-    let good = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
+    let good = encode_depth_image(&shiny(48, 32, 2)).expect("consistent planes");
     let kinds = |header: &ImageHeader| header.planes.iter().map(|plane| plane.kind).collect::<Vec<_>>();
     assert_eq!(
         kinds(&good.header)[2..],
@@ -360,7 +340,7 @@ fn planes_of_highlights_out_of_order_are_refused() {
 
 #[test]
 fn planes_of_light_out_of_order_are_refused() {
-    let good = encode_depth_image(&lit(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
+    let good = encode_depth_image(&lit(48, 32, 2)).expect("consistent planes");
     let kinds: Vec<_> = good.header.planes.iter().map(|plane| plane.kind).collect();
     assert_eq!(
         kinds,
@@ -374,7 +354,7 @@ fn planes_of_light_out_of_order_are_refused() {
             PlaneKind::LightShare8
         ]
     );
-    let other = encode_depth_image(&shiny(48, 32, 2), PlaneSet::ALL).expect("consistent planes");
+    let other = encode_depth_image(&shiny(48, 32, 2)).expect("consistent planes");
     let color_and_highlights = [1, 4, 5].map(|place: usize| other.header.planes[place]);
     type Damage = fn(&mut Vec<PlaneHeader>, &[PlaneHeader; 3]);
     let cases: [(&str, Damage); 15] = [
@@ -408,7 +388,7 @@ fn planes_of_light_out_of_order_are_refused() {
 
 #[test]
 fn planes_of_light_claim_bounded_memory() {
-    let mut bad = encode_depth_image(&lit(48, 32, MAX_LIGHT_SHARE_PLANES), PlaneSet::ALL).expect("consistent planes");
+    let mut bad = encode_depth_image(&lit(48, 32, MAX_LIGHT_SHARE_PLANES)).expect("consistent planes");
     (bad.header.width, bad.header.height) = (4096, 4096);
     let limits = DecodeLimits { max_image_bytes: 37 << 24, ..DecodeLimits::default() };
     let result = decode_depth_image(&bad.header, camera(4096, 4096), &bad.payload, &limits);
@@ -417,7 +397,7 @@ fn planes_of_light_claim_bounded_memory() {
 
 #[test]
 fn planes_that_pack_well_claim_bounded_memory() {
-    let mut bad = encode_depth_image(&shiny(48, 32, 64), PlaneSet::ALL).expect("consistent planes");
+    let mut bad = encode_depth_image(&shiny(48, 32, 64)).expect("consistent planes");
     (bad.header.width, bad.header.height) = (4096, 4096);
     let result = decode_depth_image(&bad.header, camera(4096, 4096), &bad.payload, &DecodeLimits::default());
     assert!(matches!(result, Err(DecodeError::Limit { field: "image_bytes", .. })), "{result:?}");
@@ -425,14 +405,14 @@ fn planes_that_pack_well_claim_bounded_memory() {
 
 #[test]
 fn a_camera_of_another_size_than_the_image_is_refused() {
-    let good = encode_depth_image(&image(48, 32), PlaneSet::ALL).expect("consistent planes");
+    let good = encode_depth_image(&image(48, 32)).expect("consistent planes");
     let result = decode_depth_image(&good.header, camera(32, 48), &good.payload, &DecodeLimits::default());
     assert!(matches!(result, Err(DecodeError::CameraSize { .. })));
 }
 
 #[test]
 fn a_small_payload_claims_no_large_buffer() {
-    let mut bad = encode_depth_image(&image(200, 200), PlaneSet::DEPTH_COLOR).expect("consistent planes");
+    let mut bad = encode_depth_image(&image(200, 200)).expect("consistent planes");
     bad.header.planes[0].packed_bytes = 2;
     bad.header.planes[1].packed_bytes = 2;
     bad.payload = Bytes::from_static(&[0xff, 0xff, 0xff, 0xff]);

@@ -4,11 +4,11 @@ use std::hash::Hasher;
 
 use depth_image::{LightPlanes, MAX_LAYERS, MAX_LIGHTS, SpecularPlanes};
 
-use crate::color_codec::max_colors_bytes;
+use crate::color_codec::{max_colors_bytes, pack_colors, unpack_colors};
 use crate::depth_codec::max_unpacked_bytes;
 use crate::error::check_limit;
 use crate::tagged::max_packed_bytes;
-use crate::words_codec::{WordLayout, max_words_bytes};
+use crate::words_codec::{WordLayout, max_words_bytes, pack_words, unpack_words};
 use crate::{DecodeError, DecodeLimits, InverseDepthRange};
 
 /// Planes of visibility of one sample image: one byte for the environment and each light.
@@ -81,17 +81,36 @@ impl PlaneKind {
         match self {
             Self::InverseDepth | Self::CornerInverseDepth | Self::LayerDepth => PlaneEncoding::SlopeTaggedLz4,
             Self::Passed1 => PlaneEncoding::BitsLz4,
+            _ if self.word_layout().is_none() => PlaneEncoding::ChangeTaggedLz4,
+            _ => PlaneEncoding::DifferenceTaggedLz4,
+        }
+    }
+
+    /// The parts of the words of a plane; `None` for words that are packed as colours.
+    const fn word_layout(self) -> Option<WordLayout> {
+        match self {
             // Normals of triangles change as seldom as unlit colours do.
-            Self::ColorRgb9e5 | Self::TriangleNormalOct16 | Self::LampsRgb9e5 | Self::EnvironmentRgb9e5 => {
-                PlaneEncoding::ChangeTaggedLz4
-            }
-            Self::NormalOct16
-            | Self::SurfaceId
-            | Self::ReflectanceRoughness8
-            | Self::Visibility8
-            | Self::LayerCount8
-            | Self::PlaneNormalOct8
-            | Self::LightShare8 => PlaneEncoding::DifferenceTaggedLz4,
+            Self::ColorRgb9e5 | Self::TriangleNormalOct16 | Self::LampsRgb9e5 | Self::EnvironmentRgb9e5 => None,
+            Self::NormalOct16 => Some(WordLayout::Halves),
+            Self::PlaneNormalOct8 => Some(WordLayout::TwoBytes),
+            Self::ReflectanceRoughness8 | Self::Visibility8 | Self::LightShare8 => Some(WordLayout::Bytes),
+            _ => Some(WordLayout::Whole),
+        }
+    }
+
+    /// Appends the words of a plane of this kind to `out`.
+    pub(crate) fn pack_words(self, words: &[u32], out: &mut Vec<u8>) {
+        match self.word_layout() {
+            Some(layout) => pack_words(words, layout, out),
+            None => pack_colors(words, out),
+        }
+    }
+
+    /// Reads `count` words of a plane of this kind from the front of `input`.
+    pub(crate) fn unpack_words(self, input: &mut &[u8], count: usize) -> Result<Vec<u32>, DecodeError> {
+        match self.word_layout() {
+            Some(layout) => unpack_words(input, count, layout),
+            None => unpack_colors(input, count),
         }
     }
 
@@ -126,20 +145,9 @@ impl PlaneKind {
         match self {
             Self::InverseDepth | Self::CornerInverseDepth | Self::PlaneNormalOct8 => 2,
             Self::Passed1 => 1,
-            Self::ColorRgb9e5 | Self::NormalOct16 | Self::ReflectanceRoughness8 | Self::Visibility8 => 4,
-            Self::TriangleNormalOct16 | Self::LampsRgb9e5 | Self::EnvironmentRgb9e5 | Self::LightShare8 => 4,
             Self::SurfaceId => 8,
-            // The first sample's number and the depth, unpacked.
-            Self::LayerCount8 | Self::LayerDepth => 4,
-        }
-    }
-
-    /// The number of values of a plane.
-    const fn values(self, counts: Counts) -> usize {
-        match self {
-            Self::CornerInverseDepth => counts.corners,
-            Self::LayerCount8 => counts.lines,
-            _ => counts.samples,
+            // Words; the first sample's number and the depth of a layered image, unpacked.
+            _ => 4,
         }
     }
 
@@ -147,29 +155,16 @@ impl PlaneKind {
     const fn max_raw_bytes(self, values: usize) -> usize {
         match self {
             Self::InverseDepth => max_unpacked_bytes(values),
-            Self::ColorRgb9e5 | Self::TriangleNormalOct16 | Self::LampsRgb9e5 | Self::EnvironmentRgb9e5 => {
-                max_colors_bytes(values)
-            }
-            Self::NormalOct16 => max_words_bytes(values, WordLayout::Halves),
-            Self::SurfaceId => 2 * max_words_bytes(values, WordLayout::Whole),
-            Self::ReflectanceRoughness8 | Self::Visibility8 | Self::LightShare8 => {
-                max_words_bytes(values, WordLayout::Bytes)
-            }
-            Self::Passed1 => values.div_ceil(8),
             Self::CornerInverseDepth => CORNER_RANGE_BYTES + max_unpacked_bytes(values),
+            Self::SurfaceId => 2 * max_words_bytes(values, WordLayout::Whole),
+            Self::Passed1 => values.div_ceil(8),
             Self::LayerCount8 | Self::LayerDepth => max_packed_bytes(values),
-            Self::PlaneNormalOct8 => max_words_bytes(values, WordLayout::TwoBytes),
+            _ => match self.word_layout() {
+                Some(layout) => max_words_bytes(values, layout),
+                None => max_colors_bytes(values),
+            },
         }
     }
-}
-
-/// Values of an image's planes, by what they belong to.
-#[derive(Clone, Copy)]
-struct Counts {
-    /// Texels of a depth image; samples of a layered one.
-    samples: usize,
-    corners: usize,
-    lines: usize,
 }
 
 /// The samples of a layered image.
@@ -194,29 +189,8 @@ pub struct PlaneHeader {
     pub packed_bytes: u32,
 }
 
-/// The planes that are encoded besides inverse depth and colour. Images with light are encoded with all of their planes but
-/// surface keys, whatever the set says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct PlaneSet {
-    /// Octahedral normals, where the image has them.
-    pub normal: bool,
-    /// Surface keys, where the image has them.
-    pub surface_id: bool,
-    /// Planes of highlights, where the image has them. Normals are then encoded, too.
-    pub specular: bool,
-    /// Depths at texels' corners, where the image has them.
-    pub corners: bool,
-}
-
 /// Bytes of a plane of corners before its codes.
 const CORNER_RANGE_BYTES: usize = 8;
-
-impl PlaneSet {
-    /// Inverse depth and colour only, and the bits of passed surfaces, without which depths would be misread.
-    pub const DEPTH_COLOR: Self = Self { normal: false, surface_id: false, specular: false, corners: false };
-    /// All planes that the image has.
-    pub const ALL: Self = Self { normal: true, surface_id: true, specular: true, corners: true };
-}
 
 /// Size, planes and range of an encoded sample image. The camera is sent apart.
 #[derive(Debug, Clone, PartialEq)]
@@ -247,13 +221,16 @@ impl ImageHeader {
         }
         let samples = self.layered.map_or(texels, |layered| layered.sample_count as usize);
         check_limit("sample_count", samples as u64, texels as u64 * u64::from(MAX_LAYERS))?;
-        let counts = Counts { samples, corners: self.corners(), lines: texels };
         let mut image_bytes = 0;
         for plane in &self.planes {
             if plane.encoding != plane.kind.encoding() {
                 return Err(DecodeError::Header { field: "planes.encoding", reason: "not the encoding of this kind" });
             }
-            let values = plane.kind.values(counts);
+            let values = match plane.kind {
+                PlaneKind::CornerInverseDepth => self.corners(),
+                PlaneKind::LayerCount8 => texels,
+                _ => samples,
+            };
             check_limit("planes.raw_bytes", u64::from(plane.raw_bytes), plane.kind.max_raw_bytes(values) as u64)?;
             image_bytes += values as u64 * plane.kind.texel_bytes() as u64;
         }

@@ -1,6 +1,6 @@
 //! Round trips, and thousands of damaged headers and payloads.
 
-use depth_image::{SpecularPlanes, rgb9e5_from_linear};
+use depth_image::{Aabb, LightDirections, SpecularPlanes, rgb9e5_from_linear};
 use glam::{Quat, UVec2, Vec3};
 
 use super::*;
@@ -140,5 +140,60 @@ fn damaged_headers_are_refused_by_field() {
 #[test]
 fn highlights_without_normals_are_refused() {
     let bad = LayeredDepthImage { normal_oct16: None, ..image(4, 4, true) };
-    assert!(matches!(encode_layered_image(&bad), Err(LayeredError::Plane { plane: "normal", .. })));
+    assert!(matches!(encode_layered_image(&bad), Err(SampleImageError::Plane { plane: "normal", .. })));
+}
+
+fn field() -> LayeredLightField {
+    let mut random = Random::new(24);
+    let bounds = Aabb { min: Vec3::ZERO, max: Vec3::new(2.0, 1.0, 3.0) };
+    let camera = LightFieldCamera { pairs: 2, ..LightFieldCamera::around(bounds, LightDirections::D66, 16) };
+    let mut first = vec![0u32];
+    let mut planar_depth_m = Vec::new();
+    for _ in 0..camera.line_count() {
+        let mut depths: Vec<f32> = (0..random.below(5)).map(|_| random.unit() * camera.range_m()).collect();
+        depths.sort_by(f32::total_cmp);
+        planar_depth_m.extend(depths);
+        first.push(planar_depth_m.len() as u32);
+    }
+    let radiance_rgb9e5 = planar_depth_m.iter().map(|_| random.next_u32()).collect();
+    LayeredLightField { camera, first, planar_depth_m, radiance_rgb9e5 }
+}
+
+#[test]
+fn light_fields_survive_but_for_half_a_code_of_depth() {
+    let field = field();
+    let EncodedImage { header, payload } = encode_light_field(&field).unwrap();
+    let back = decode_light_field(&header, field.camera, &payload, &DecodeLimits::default()).unwrap();
+    let most_m = 0.51 * field.camera.range_m() / f32::from(u16::MAX);
+    let gap_m = |(a, b): (&f32, &f32)| (a - b).abs();
+    assert!(field.planar_depth_m.iter().zip(&back.planar_depth_m).map(gap_m).all(|gap_m| gap_m <= most_m));
+    assert_eq!(LayeredLightField { planar_depth_m: field.planar_depth_m.clone(), ..back }, field);
+}
+
+#[test]
+fn planes_of_other_images_and_damaged_ones_are_refused() {
+    let field = field();
+    let EncodedImage { header, payload } = encode_light_field(&field).unwrap();
+    let limits = DecodeLimits::default();
+    let decode = |header: &ImageHeader, payload: &[u8]| decode_light_field(header, field.camera, payload, &limits);
+    let with = |change: fn(&mut ImageHeader)| {
+        let mut other = header.clone();
+        change(&mut other);
+        decode(&other, &payload)
+    };
+    assert!(with(|header| header.layered = None).is_err());
+    assert!(with(|header| header.layered.as_mut().unwrap().truncated = true).is_err());
+    assert!(with(|header| header.height += 1).is_err());
+    assert!(with(|header| header.planes.swap(0, 1)).is_err());
+    assert!(with(|header| header.planes.truncate(2)).is_err());
+    assert!(with(|header| header.planes[1].kind = PlaneKind::PlaneNormalOct8).is_err());
+    assert!(decode(&header, &payload[..payload.len() - 1]).is_err());
+    let mut random = Random::new(25);
+    for _ in 0..500 {
+        let mut damaged = payload.to_vec();
+        let at = random.below(damaged.len());
+        damaged[at] ^= 1 << random.below(8);
+        let decoded = decode(&header, &damaged);
+        assert!(decoded.is_err() || decoded.is_ok_and(|field| field.validate().is_ok()));
+    }
 }

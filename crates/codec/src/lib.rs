@@ -19,9 +19,7 @@ mod image_codec;
 mod image_header;
 mod layered_codec;
 mod layered_image_codec;
-mod light_field_codec;
 mod lz4;
-mod picture;
 mod quantise;
 mod reassembler;
 mod runs;
@@ -40,11 +38,9 @@ pub use frame_parts::{FrameAssembly, FrameAssemblyError, FramePart, WholeFrame};
 pub use image_codec::{EncodedImage, decode_depth_image, encode_depth_image};
 pub use image_header::{
     ImageHeader, LayeredCounts, MAX_LIGHT_SHARE_PLANES, MAX_VISIBILITY_PLANES, PlaneEncoding, PlaneHeader, PlaneKind,
-    PlaneSet,
 };
-pub use layered_image_codec::{decode_layered_image, encode_layered_image};
-pub use light_field_codec::{decode_light_field, encode_light_field};
+pub use layered_image_codec::{decode_layered_image, decode_light_field, encode_layered_image, encode_light_field};
 pub use quantise::InverseDepthRange;
 pub use reassembler::{ChunkError, Reassembled, Reassembler};
-pub use sample_image_codec::{EncodeError, decode_sample_image, encode_sample_image};
+pub use sample_image_codec::{decode_sample_image, encode_sample_image};
 pub use view_codec::{EncodedView, decode_view, encode_view};

@@ -19,7 +19,7 @@ const STEPS: f64 = (u16::MAX - FIRST_SAMPLE_CODE) as f64;
 const ROUND_TO_INTEGER: f64 = (1u64 << 52) as f64;
 
 /// The inverse depths that the codes of an image span. Both are 0 in an image without samples.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct InverseDepthRange {
     /// Inverse depth of the least code of a sample, per metre.
     pub least_per_m: f32,

@@ -55,8 +55,6 @@ pub struct Reassembler {
 struct UnderWay {
     sample_set_id: SampleSetId,
     image_index: u32,
-    next_sequence: u32,
-    chunk_count: u32,
     header: ImageHeader,
     pieces: Vec<Bytes>,
 }
@@ -77,11 +75,7 @@ impl Reassembler {
             return Err(ChunkError::StaleSet { got: chunk.sample_set_id, oldest: self.oldest });
         }
         self.check_sequence(&chunk)?;
-        let result = self.accept(chunk);
-        if result.is_err() {
-            self.under_way = None;
-        }
-        result
+        self.accept(chunk)
     }
 
     /// A header of a later set may cut off an image; no other chunk may be out of turn.
@@ -90,7 +84,7 @@ impl Reassembler {
         let Some(image) = &self.under_way else { return Ok(()) };
         let sample_set_id = image.sample_set_id;
         let image_index = image.image_index;
-        let expected = image.next_sequence;
+        let expected = image.pieces.len() as u32 + 1;
         if (chunk.sample_set_id, chunk.image_index) == (sample_set_id, image_index) && got <= expected {
             return if got == expected { Ok(()) } else { Err(ChunkError::Duplicate { got, expected }) };
         }
@@ -101,55 +95,43 @@ impl Reassembler {
         Err(ChunkError::Missing { sample_set_id, image_index, got, expected })
     }
 
+    /// Drops the image under way where the chunk is refused.
     fn accept(&mut self, chunk: Chunk) -> Result<Option<Reassembled>, ChunkError> {
-        let Chunk { sample_set_id, image_index, sequence, chunk_count, .. } = chunk;
+        let Chunk { sample_set_id, image_index, sequence, .. } = chunk;
+        let under_way = self.under_way.take();
         if chunk.body.crc32() != chunk.crc32 {
             return Err(ChunkError::Checksum { sequence });
         }
-        match (sequence, chunk.body, &mut self.under_way) {
-            (0, ChunkBody::Header(header), under_way) => {
-                check_header(&header, chunk_count, &self.limits)?;
-                let pieces = Vec::new();
-                *under_way =
-                    Some(UnderWay { sample_set_id, image_index, next_sequence: 1, chunk_count, header, pieces });
+        let (mut image, data) = match (sequence, chunk.body, under_way) {
+            (0, ChunkBody::Header(header), _) => {
+                // Before memory for the payload is allocated.
+                header.validate(&self.limits)?;
+                (UnderWay { sample_set_id, image_index, header, pieces: Vec::new() }, None)
             }
-            (1.., ChunkBody::Data(data), Some(image)) => image.append(sequence, chunk_count, data)?,
+            (1.., ChunkBody::Data(data), Some(image)) => (image, Some(data)),
             (1.., ChunkBody::Data(_), None) => return Err(ChunkError::NoHeader { image_index, got: sequence }),
             _ => return Err(ChunkError::Malformed { sequence, field: "body" }),
-        }
-        Ok(self.under_way.take_if(|image| image.next_sequence == image.chunk_count).map(UnderWay::finish))
-    }
-}
-
-/// Checks the header against the limits before memory for the payload is allocated.
-fn check_header(header: &ImageHeader, count: u32, limits: &DecodeLimits) -> Result<(), ChunkError> {
-    header.validate(limits)?;
-    if u64::from(count) == chunk_count(header.payload_bytes()) {
-        return Ok(());
-    }
-    Err(ChunkError::Malformed { sequence: 0, field: "chunk_count" })
-}
-
-impl UnderWay {
-    fn append(&mut self, sequence: u32, chunk_count: u32, data: Bytes) -> Result<(), ChunkError> {
-        if chunk_count != self.chunk_count {
+        };
+        let payload_bytes = image.header.payload_bytes();
+        if u64::from(chunk.chunk_count) != chunk_count(payload_bytes) {
             return Err(ChunkError::Malformed { sequence, field: "chunk_count" });
         }
-        let before = (u64::from(sequence) - 1) * MAX_CHUNK_BYTES as u64;
-        let left = self.header.payload_bytes().saturating_sub(before);
-        if data.len() as u64 != left.min(MAX_CHUNK_BYTES as u64) {
-            return Err(ChunkError::Malformed { sequence, field: "data length" });
+        if let Some(data) = data {
+            let left = payload_bytes.saturating_sub(image.pieces.len() as u64 * MAX_CHUNK_BYTES as u64);
+            if data.len() as u64 != left.min(MAX_CHUNK_BYTES as u64) {
+                return Err(ChunkError::Malformed { sequence, field: "data length" });
+            }
+            image.pieces.push(data);
         }
-        self.pieces.push(data);
-        self.next_sequence += 1;
-        Ok(())
-    }
-
-    fn finish(self) -> Reassembled {
+        if image.pieces.len() as u64 + 1 < chunk_count(payload_bytes) {
+            self.under_way = Some(image);
+            return Ok(None);
+        }
         // A payload in one chunk is kept as it is.
-        let payload = <[Bytes; 1]>::try_from(self.pieces).map_or_else(|pieces| pieces.concat().into(), |[whole]| whole);
-        let image = EncodedImage { header: self.header, payload };
-        Reassembled { sample_set_id: self.sample_set_id, image_index: self.image_index, image }
+        let payload = <[Bytes; 1]>::try_from(image.pieces);
+        let payload = payload.map_or_else(|pieces| pieces.concat().into(), |[whole]| whole);
+        let image = EncodedImage { header: image.header, payload };
+        Ok(Some(Reassembled { sample_set_id, image_index, image }))
     }
 }
 

@@ -1,29 +1,18 @@
 //! A sample image of any kind to header and payload, and back.
 
-use depth_image::{DepthImageError, LayeredError, SampleCamera, SampleImage};
+use depth_image::{SampleCamera, SampleImage, SampleImageError};
 
 use crate::image_codec::{decode_depth_image, encode_depth_image};
-use crate::layered_image_codec::{decode_layered_image, encode_layered_image};
-use crate::light_field_codec::{decode_light_field, encode_light_field};
-use crate::{DecodeError, DecodeLimits, EncodedImage, ImageHeader, PlaneSet};
-
-/// Planes that do not belong together.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "self-naming variants")]
-pub enum EncodeError {
-    #[error(transparent)]
-    Depth(#[from] DepthImageError),
-    #[error(transparent)]
-    Layered(#[from] LayeredError),
-}
+use crate::layered_image_codec::{decode_layered_image, decode_light_field, encode_layered_image, encode_light_field};
+use crate::{DecodeError, DecodeLimits, EncodedImage, ImageHeader};
 
 /// Packs an image with all of its planes.
 ///
 /// # Errors
 /// Planes that do not form an image; planes of highlights without normals.
-pub fn encode_sample_image(image: &SampleImage) -> Result<EncodedImage, EncodeError> {
+pub fn encode_sample_image(image: &SampleImage) -> Result<EncodedImage, SampleImageError> {
     Ok(match image {
-        SampleImage::Depth(image) => encode_depth_image(image, PlaneSet::ALL)?,
+        SampleImage::Depth(image) => encode_depth_image(image)?,
         SampleImage::Layered(image) => encode_layered_image(image)?,
         SampleImage::LightField(image) => encode_light_field(image)?,
     })

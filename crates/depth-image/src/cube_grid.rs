@@ -2,7 +2,7 @@
 
 use glam::{Mat3A, Quat, UVec2, UVec3, Vec2, Vec3};
 
-use crate::projection::{check_finite, check_range};
+use crate::projection::{check_finite, check_range, check_unit};
 use crate::{Aabb, CameraError, ParallelCamera, PixelDepth};
 
 /// A box of cubic cells. Through the middle of each row of cells, along each of the three axes, runs a line on which a scene is
@@ -49,10 +49,12 @@ impl CubeGrid {
     /// # Errors
     /// The first field that is not finite or out of range.
     pub fn validate(&self) -> Result<(), CameraError> {
-        let length = f64::from(self.world_from_cube.length());
         let side = self.size.max_element();
-        check_finite("corner_in_world or world_from_cube", self.corner_in_world.is_finite() && length.is_finite())?;
-        check_range("world_from_cube", length, (length - 1.0).abs() < 1e-3, "of unit length")?;
+        check_finite(
+            "corner_in_world or world_from_cube",
+            self.corner_in_world.is_finite() && self.world_from_cube.length().is_finite(),
+        )?;
+        check_unit("world_from_cube", self.world_from_cube)?;
         check_range("size", side, side <= *CUBE_SIDES.end(), "at most 4096")?;
         (0..3).try_for_each(|axis| self.camera(axis).validate())
     }

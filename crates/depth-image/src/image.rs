@@ -2,7 +2,7 @@
 
 use glam::{UVec2, Vec3};
 
-use crate::{Camera, PinholeCamera, PixelDepth};
+use crate::{Camera, PinholeCamera, PixelDepth, SampleImageError};
 
 /// Marks a texel *without a sample*: its ray's surfaces are unknown.
 pub const HOLE_INVERSE_DEPTH: f32 = -1.0;
@@ -90,24 +90,12 @@ impl LightPlanes {
     }
 }
 
-/// Planes that do not form a depth image.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs, reason = "self-naming fields")]
-pub enum DepthImageError {
-    /// A plane of another size than the camera's; `len` is 0 for a required plane that is missing.
-    #[error("depth image plane {plane} has {len} texels, the camera {expected}")]
-    Size { plane: &'static str, len: usize, expected: usize },
-    /// A plane of colour, highlights or corners in an image with light.
-    #[error("a depth image with light has the plane {plane}, which belongs to images with colour")]
-    BesideLight { plane: &'static str },
-}
-
 impl DepthImage {
     /// Checks that all planes have the camera's size, and that an image has either colour or light.
     ///
     /// # Errors
     /// The first plane that is missing, unexpected or of another size.
-    pub fn validate(&self) -> Result<(), DepthImageError> {
+    pub fn validate(&self) -> Result<(), SampleImageError> {
         let [texels, corners] = [self.size_px(), self.size_px() + 1].map(|size| size.element_product() as usize);
         let planes = [
             ("inverse_depth", Some(self.inverse_depth_per_m.len())),
@@ -124,7 +112,7 @@ impl DepthImage {
         }
     }
 
-    fn validate_color(&self, texels: usize, corners: usize) -> Result<(), DepthImageError> {
+    fn validate_color(&self, texels: usize, corners: usize) -> Result<(), SampleImageError> {
         check_size("color", self.color_rgb9e5.len(), texels)?;
         if let Some(specular) = &self.specular {
             check_size("reflectance", specular.reflectance_srgb8_roughness8.len(), texels)?;
@@ -134,14 +122,14 @@ impl DepthImage {
         check_size("corner_inverse_depth", corner_plane.map_or(corners, Vec::len), corners)
     }
 
-    fn validate_light(&self, light: &LightPlanes, texels: usize) -> Result<(), DepthImageError> {
+    fn validate_light(&self, light: &LightPlanes, texels: usize) -> Result<(), SampleImageError> {
         let of_color = [
             ("color", !self.color_rgb9e5.is_empty()),
             ("reflectance", self.specular.is_some()),
             ("corner_inverse_depth", self.corner_inverse_depth_per_m.is_some()),
         ];
         if let Some((plane, _)) = of_color.into_iter().find(|(_, is_present)| *is_present) {
-            return Err(DepthImageError::BesideLight { plane });
+            return Err(SampleImageError::BesideLight { plane });
         }
         check_size("normal", self.normal_oct16.as_ref().map_or(0, Vec::len), texels)?;
         check_size("triangle_normal", light.triangle_normal_oct16.len(), texels)?;
@@ -187,8 +175,8 @@ impl DepthImage {
     }
 }
 
-fn check_size(plane: &'static str, len: usize, expected: usize) -> Result<(), DepthImageError> {
-    if len == expected { Ok(()) } else { Err(DepthImageError::Size { plane, len, expected }) }
+fn check_size(plane: &'static str, len: usize, expected: usize) -> Result<(), SampleImageError> {
+    if len == expected { Ok(()) } else { Err(SampleImageError::Size { plane, len, expected }) }
 }
 
 #[cfg(test)]
@@ -228,23 +216,23 @@ mod tests {
         for (plane, damage) in cases {
             let mut bad = lit();
             damage(bad.light.as_mut().unwrap());
-            assert_eq!(bad.validate(), Err(DepthImageError::Size { plane, len: 11, expected: 12 }));
+            assert_eq!(bad.validate(), Err(SampleImageError::Size { plane, len: 11, expected: 12 }));
         }
         let without_normals = DepthImage { normal_oct16: None, ..lit() };
-        let missing = DepthImageError::Size { plane: "normal", len: 0, expected: 12 };
+        let missing = SampleImageError::Size { plane: "normal", len: 0, expected: 12 };
         assert_eq!(without_normals.validate(), Err(missing));
     }
 
     #[test]
     fn an_image_has_either_colour_or_light() {
-        let beside = |plane| Err(DepthImageError::BesideLight { plane });
+        let beside = |plane| Err(SampleImageError::BesideLight { plane });
         assert_eq!(DepthImage { color_rgb9e5: vec![0; 12], ..lit() }.validate(), beside("color"));
         let specular = Some(SpecularPlanes::default());
         assert_eq!(DepthImage { specular, ..lit() }.validate(), beside("reflectance"));
         let corner_inverse_depth_per_m = Some(vec![0.0; 20]);
         assert_eq!(DepthImage { corner_inverse_depth_per_m, ..lit() }.validate(), beside("corner_inverse_depth"));
         let neither = DepthImage { light: None, ..lit() };
-        assert_eq!(neither.validate(), Err(DepthImageError::Size { plane: "color", len: 0, expected: 12 }));
+        assert_eq!(neither.validate(), Err(SampleImageError::Size { plane: "color", len: 0, expected: 12 }));
     }
 
     #[test]

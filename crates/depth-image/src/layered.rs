@@ -1,11 +1,8 @@
 //! Layered depth images: all surfaces on each line of a parallel camera, not only the first.
 
-use glam::{UVec2, Vec3};
+use glam::Vec3;
 
-use crate::{CameraError, ParallelCamera, SpecularPlanes};
-
-/// The most samples of one line; what lies behind them is not held.
-pub const MAX_LAYERS: u32 = 255;
+use crate::{MAX_LAYERS, ParallelCamera, SampleImageError, SpecularPlanes};
 
 /// The samples of a parallel camera: line after line, from the first to the last surface of each (Lischinski §3.1). The planes are
 /// samples long.
@@ -29,38 +26,12 @@ pub struct LayeredDepthImage {
     pub truncated: bool,
 }
 
-/// Samples that are not those of a camera's lines.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "self-naming fields")]
-pub enum LayeredError {
-    #[error("the camera of a layered image: {0}")]
-    Camera(#[from] CameraError),
-    #[error("layered image plane {plane} has {len} values, must have {expected}")]
-    Plane { plane: &'static str, len: usize, expected: usize },
-    #[error(
-        "line {line} of a layered image begins at sample {first}, must begin at {least} or later, the first line at 0, and none after {samples}"
-    )]
-    First { line: usize, first: u32, least: u32, samples: usize },
-    #[error("line {line} of a layered image has {layers} layers, must have at most {MAX_LAYERS}")]
-    Layers { line: usize, layers: u32 },
-    #[error(
-        "sample {layer} of line {line} of a layered image has depth {depth_m} m, must not be nearer than the one before, nor beyond {range_m} m"
-    )]
-    Depth { line: usize, layer: usize, depth_m: f32, range_m: f32 },
-    #[error("tile {tile} of a layered image has {given} lines, the image's has {expected}")]
-    Tile { tile: usize, given: UVec2, expected: UVec2 },
-    #[error("tile {tile} of a light field has other lines than that part of the whole")]
-    LightFieldTile { tile: usize },
-    #[error("tiles of a layered image have visibility of different lamps")]
-    MixedTiles,
-}
-
 impl LayeredDepthImage {
     /// Checks the camera, the sizes of all planes, the prefix sums, and the order of depths.
     ///
     /// # Errors
     /// The first fault.
-    pub fn validate(&self) -> Result<(), LayeredError> {
+    pub fn validate(&self) -> Result<(), SampleImageError> {
         self.camera.validate()?;
         let samples = self.planar_depth_m.len();
         check_plane("first", self.first.len(), self.camera.pixel_count() + 1)?;
@@ -99,35 +70,40 @@ impl LayeredDepthImage {
     }
 }
 
-pub(crate) fn check_plane(plane: &'static str, len: usize, expected: usize) -> Result<(), LayeredError> {
-    if len == expected { Ok(()) } else { Err(LayeredError::Plane { plane, len, expected }) }
+pub(crate) fn check_plane(plane: &'static str, len: usize, expected: usize) -> Result<(), SampleImageError> {
+    if len == expected { Ok(()) } else { Err(SampleImageError::Plane { plane, len, expected }) }
 }
 
 /// Checks the prefix sums of lines, and that depths rise along each.
-pub(crate) fn check_lines(first: &[u32], planar_depth_m: &[f32], range_m: f32) -> Result<(), LayeredError> {
+pub(crate) fn check_lines(first: &[u32], planar_depth_m: &[f32], range_m: f32) -> Result<(), SampleImageError> {
     let samples = planar_depth_m.len();
     let ends = &first[1..];
     let mut least = 0;
     for (line, &first) in first.iter().enumerate() {
         if first < least || first as usize > samples || (line == 0 && first != 0) {
-            return Err(LayeredError::First { line, first, least, samples });
+            return Err(SampleImageError::First { line, first, least, samples });
         }
         least = first;
     }
     if ends.last().is_some_and(|&end| end as usize != samples) {
-        return Err(LayeredError::First { line: ends.len(), first: least, least: samples as u32, samples });
+        return Err(SampleImageError::First { line: ends.len(), first: least, least: samples as u32, samples });
     }
     (0..ends.len()).try_for_each(|line| check_line(line, [first[line], first[line + 1]], planar_depth_m, range_m))
 }
 
-fn check_line(line: usize, [first, end]: [u32; 2], planar_depth_m: &[f32], range_m: f32) -> Result<(), LayeredError> {
+fn check_line(
+    line: usize,
+    [first, end]: [u32; 2],
+    planar_depth_m: &[f32],
+    range_m: f32,
+) -> Result<(), SampleImageError> {
     if end - first > MAX_LAYERS {
-        return Err(LayeredError::Layers { line, layers: end - first });
+        return Err(SampleImageError::Layers { line, layers: end - first });
     }
     let mut nearest_m = 0.0;
     for (layer, &depth_m) in planar_depth_m[first as usize..end as usize].iter().enumerate() {
         if !(nearest_m..=range_m).contains(&depth_m) {
-            return Err(LayeredError::Depth { line, layer, depth_m, range_m });
+            return Err(SampleImageError::Depth { line, layer, depth_m, range_m });
         }
         nearest_m = depth_m;
     }
@@ -136,7 +112,7 @@ fn check_line(line: usize, [first, end]: [u32; 2], planar_depth_m: &[f32], range
 
 #[cfg(test)]
 mod tests {
-    use glam::Quat;
+    use glam::{Quat, UVec2};
 
     use super::*;
 
@@ -171,19 +147,19 @@ mod tests {
     fn faults_are_named() {
         let good = image();
         let first = |first: [u32; 4]| LayeredDepthImage { first: first.to_vec(), ..good.clone() }.validate();
-        assert!(matches!(first([0, 2, 1, 3]), Err(LayeredError::First { line: 2, first: 1, least: 2, .. })));
-        assert!(matches!(first([0, 4, 4, 4]), Err(LayeredError::First { line: 1, first: 4, samples: 3, .. })));
-        assert!(matches!(first([1, 2, 2, 3]), Err(LayeredError::First { line: 0, first: 1, .. })));
-        assert!(matches!(first([0, 1, 1, 2]), Err(LayeredError::First { line: 3, first: 2, .. })));
+        assert!(matches!(first([0, 2, 1, 3]), Err(SampleImageError::First { line: 2, first: 1, least: 2, .. })));
+        assert!(matches!(first([0, 4, 4, 4]), Err(SampleImageError::First { line: 1, first: 4, samples: 3, .. })));
+        assert!(matches!(first([1, 2, 2, 3]), Err(SampleImageError::First { line: 0, first: 1, .. })));
+        assert!(matches!(first([0, 1, 1, 2]), Err(SampleImageError::First { line: 3, first: 2, .. })));
         let depths =
             |depths: [f32; 3]| LayeredDepthImage { planar_depth_m: depths.to_vec(), ..good.clone() }.validate();
-        assert!(matches!(depths([1.5, 1.0, 2.0]), Err(LayeredError::Depth { line: 0, layer: 1, .. })));
-        assert!(matches!(depths([1.0, f32::NAN, 2.0]), Err(LayeredError::Depth { line: 0, layer: 1, .. })));
-        assert!(matches!(depths([1.0, 1.5, 4.1]), Err(LayeredError::Depth { line: 2, layer: 0, .. })));
+        assert!(matches!(depths([1.5, 1.0, 2.0]), Err(SampleImageError::Depth { line: 0, layer: 1, .. })));
+        assert!(matches!(depths([1.0, f32::NAN, 2.0]), Err(SampleImageError::Depth { line: 0, layer: 1, .. })));
+        assert!(matches!(depths([1.0, 1.5, 4.1]), Err(SampleImageError::Depth { line: 2, layer: 0, .. })));
         let short = LayeredDepthImage { color_rgb9e5: vec![0; 2], ..good.clone() };
-        assert!(matches!(short.validate(), Err(LayeredError::Plane { plane: "color", len: 2, expected: 3 })));
+        assert!(matches!(short.validate(), Err(SampleImageError::Plane { plane: "color", len: 2, expected: 3 })));
         let short = LayeredDepthImage { first: vec![0, 3], ..good.clone() };
-        assert!(matches!(short.validate(), Err(LayeredError::Plane { plane: "first", len: 2, expected: 4 })));
+        assert!(matches!(short.validate(), Err(SampleImageError::Plane { plane: "first", len: 2, expected: 4 })));
         let deep = LayeredDepthImage {
             first: vec![0, 256, 256, 256],
             planar_depth_m: vec![1.0; 256],
@@ -191,6 +167,6 @@ mod tests {
             color_rgb9e5: vec![0; 256],
             ..good
         };
-        assert!(matches!(deep.validate(), Err(LayeredError::Layers { line: 0, layers: 256 })));
+        assert!(matches!(deep.validate(), Err(SampleImageError::Layers { line: 0, layers: 256 })));
     }
 }

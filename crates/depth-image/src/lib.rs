@@ -26,6 +26,7 @@ mod pinhole;
 mod projection;
 mod sample_camera;
 mod sample_image;
+mod sample_image_error;
 mod scalar;
 mod single_pole;
 mod source_space;
@@ -48,10 +49,9 @@ pub use environment_light::{BrightTexel, EnvironmentLight, LOBE_ROUGHNESS, LOBE_
 pub use environment_map::{EnvironmentMap, EnvironmentMapError, MAX_ENVIRONMENT_SIZE_PX};
 pub use highlight::{Highlight, MAX_MIRROR_CELLS, MAX_REFLECTIONS, ROUGHEST_MIRROR, Reflector};
 pub use image::{
-    BACKGROUND_INVERSE_DEPTH, DepthImage, DepthImageError, HOLE_INVERSE_DEPTH, LightPlanes, MAX_LAMP_SHARES,
-    SpecularPlanes, SurfaceId,
+    BACKGROUND_INVERSE_DEPTH, DepthImage, HOLE_INVERSE_DEPTH, LightPlanes, MAX_LAMP_SHARES, SpecularPlanes, SurfaceId,
 };
-pub use layered::{LayeredDepthImage, LayeredError, MAX_LAYERS};
+pub use layered::LayeredDepthImage;
 pub use light::{Environment, Illumination, Light, LightError, MAX_LIGHTS};
 pub use light_cache::LightCacheQuality;
 pub use light_directions::{LightDirection, LightDirections};
@@ -61,14 +61,14 @@ pub use parallel::ParallelCamera;
 pub use pinhole::PinholeCamera;
 pub use projection::{CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray};
 pub use sample_camera::SampleCamera;
-pub use sample_image::{CubeImages, SampleImage, SampleImageError, SampleImages};
+pub use sample_image::{CubeImages, SampleImage, SampleImages};
+pub use sample_image_error::{MAX_LAYERS, SampleImageError};
 pub use scalar::{
     Incident, Texel, disc_from_square, environment_highlight_linear, environment_reflectance_linear, highlight_linear,
     tangents_of, unit_from_oct16,
 };
 pub use single_pole::SinglePoleCamera;
 pub use source_space::SourceSpace;
-pub use tiles::TileError;
 pub use tone::{Exposure, ExposureEv, ToneCurve, ToneError, ToneMapping};
 pub use view::{Provenance, ProvenanceKind, View, ViewPlanes};
 pub use view_cell::{ViewCell, nested_places};

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::layered::{check_lines, check_plane};
 use crate::projection::{check_finite, check_range};
-use crate::{Aabb, CameraError, LayeredError, LightDirections, ParallelCamera, ViewPart};
+use crate::{Aabb, CameraError, LightDirections, ParallelCamera, SampleImageError, ViewPart};
 
 /// Lines along each side of the square of a direction.
 pub const LIGHT_FIELD_SIDES: std::ops::RangeInclusive<u32> = 16..=90;
@@ -122,7 +122,7 @@ impl LayeredLightField {
     ///
     /// # Errors
     /// The first fault.
-    pub fn validate(&self) -> Result<(), LayeredError> {
+    pub fn validate(&self) -> Result<(), SampleImageError> {
         self.camera.validate()?;
         let samples = self.planar_depth_m.len();
         check_plane("first", self.first.len(), self.camera.line_count() + 1)?;
@@ -203,10 +203,10 @@ mod tests {
         };
         assert_eq!((image.validate(), lines), (Ok(()), 66 * 16 * 16));
         let short = LayeredLightField { radiance_rgb9e5: vec![0], ..image.clone() };
-        assert!(matches!(short.validate(), Err(LayeredError::Plane { plane: "radiance", len: 1, expected: 0 })));
+        assert!(matches!(short.validate(), Err(SampleImageError::Plane { plane: "radiance", len: 1, expected: 0 })));
         let mut first = image.first.clone();
         *first.last_mut().unwrap() = 1;
         let deep = LayeredLightField { first, planar_depth_m: vec![8.0], radiance_rgb9e5: vec![0], ..image };
-        assert!(matches!(deep.validate(), Err(LayeredError::Depth { layer: 0, .. })));
+        assert!(matches!(deep.validate(), Err(SampleImageError::Depth { layer: 0, .. })));
     }
 }

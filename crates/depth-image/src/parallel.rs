@@ -3,8 +3,8 @@
 use glam::{Mat3A, Quat, UVec2, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::projection::{check_finite, check_range};
-use crate::{CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray, ViewPart};
+use crate::projection::{check_finite, check_range, check_sides, check_unit};
+use crate::{CameraError, PixelDepth, Ray, ViewPart};
 
 /// A camera of parallel lines. Planar depth is the distance from its reference plane; planes are linear in depth, not in inverse
 /// depth.
@@ -32,14 +32,11 @@ impl ParallelCamera {
         check_finite("world_from_camera", self.world_from_camera.is_finite())?;
         check_finite("spacing_m", self.spacing_m.is_finite())?;
         check_finite("range_m", self.range_m.is_finite())?;
-        let length = f64::from(self.world_from_camera.length());
-        check_range("world_from_camera", length, (length - 1.0).abs() < 1e-3, "of unit length")?;
+        check_unit("world_from_camera", self.world_from_camera)?;
         for (field, metres) in [("spacing_m", self.spacing_m), ("range_m", self.range_m)] {
             check_range(field, metres, (1e-9..=1e9).contains(&f64::from(metres)), "from 1e-9 to 1e9")?;
         }
-        let [least_side, side] = [self.size_px.min_element(), self.size_px.max_element()];
-        check_range("size_px", least_side, least_side >= 1, "at least 1")?;
-        check_range("size_px", side, side <= MAX_IMAGE_SIDE_PX, "at most 16384")
+        check_sides(self.size_px)
     }
 
     /// The direction in which columns, rows and depths rise: unit vectors.

@@ -3,8 +3,8 @@
 use glam::{Mat3A, Quat, UVec2, Vec2, Vec3, Vec3A, Vec4};
 use serde::{Deserialize, Serialize};
 
-use crate::projection::{check_finite, check_range};
-use crate::{CameraError, MAX_IMAGE_SIDE_PX, PixelDepth, Ray};
+use crate::projection::{check_finite, check_range, check_sides, check_unit};
+use crate::{CameraError, PixelDepth, Ray};
 
 /// A pinhole camera; the principal point may lie anywhere (lens shift).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -52,17 +52,14 @@ impl PinholeCamera {
         check_finite("focal_px", self.focal_px.is_finite())?;
         check_finite("principal_px", self.principal_px.is_finite())?;
         check_finite("near_m", self.near_m.is_finite())?;
-        let length = f64::from(self.world_from_camera.length());
-        check_range("world_from_camera", length, (length - 1.0).abs() < 1e-3, "of unit length")?;
+        check_unit("world_from_camera", self.world_from_camera)?;
         let focal = f64::from(self.focal_px.min_element());
         let is_focal = focal > 1e-3 && self.focal_px.max_element() < 1e7;
         check_range("focal_px", focal, is_focal, "above 0.001 and below 1e7")?;
         let principal = self.principal_px.abs().max_element();
         check_range("principal_px", principal, principal < 1e6, "within a million pixels")?;
         check_range("near_m", self.near_m, self.near_m > 0.0, "above 0")?;
-        let [least_side, side] = [self.size_px.min_element(), self.size_px.max_element()];
-        check_range("size_px", least_side, least_side >= 1, "at least 1")?;
-        check_range("size_px", side, side <= MAX_IMAGE_SIDE_PX, "at most 16384")
+        check_sides(self.size_px)
     }
 
     /// The same field of view in another size.

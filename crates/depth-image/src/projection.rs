@@ -1,6 +1,6 @@
 //! What all camera models speak of: rays, positions with depth, and why a camera cannot be used.
 
-use glam::{Vec2, Vec3};
+use glam::{Quat, UVec2, Vec2, Vec3};
 
 /// The largest image side that any part of the system accepts.
 pub const MAX_IMAGE_SIDE_PX: u32 = 16_384;
@@ -53,4 +53,17 @@ pub(crate) fn check_range(
     allowed: &'static str,
 ) -> Result<(), CameraError> {
     if is_allowed { Ok(()) } else { Err(CameraError::OutOfRange { field, value: value.into(), allowed }) }
+}
+
+/// Refuses a rotation that is not a unit quaternion.
+pub(crate) fn check_unit(field: &'static str, rotation: Quat) -> Result<(), CameraError> {
+    let length = f64::from(rotation.length());
+    check_range(field, length, (length - 1.0).abs() < 1e-3, "of unit length")
+}
+
+/// Refuses an image without pixels, and one with too long a side.
+pub(crate) fn check_sides(size_px: UVec2) -> Result<(), CameraError> {
+    let [least_side, side] = [size_px.min_element(), size_px.max_element()];
+    check_range("size_px", least_side, least_side >= 1, "at least 1")?;
+    check_range("size_px", side, side <= MAX_IMAGE_SIDE_PX, "at most 16384")
 }

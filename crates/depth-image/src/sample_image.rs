@@ -1,8 +1,8 @@
 //! The images of a sample set: depth images of views, or layered images of a cube and a light field.
 
 use crate::{
-    CubeGrid, DepthImage, LayeredDepthImage, LayeredError, LayeredLightField, ParallelCamera, SampleCamera,
-    SpecularPlanes, TileError,
+    CubeGrid, DepthImage, LayeredDepthImage, LayeredLightField, ParallelCamera, SampleCamera, SampleImageError,
+    SpecularPlanes,
 };
 
 /// An image of a sample set.
@@ -15,20 +15,6 @@ pub enum SampleImage {
     Layered(LayeredDepthImage),
     /// All light on the lines of many directions.
     LightField(LayeredLightField),
-}
-
-/// Why images do not form what they are for.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "self-naming fields")]
-pub enum SampleImageError {
-    #[error(transparent)]
-    Depth(#[from] TileError),
-    #[error(transparent)]
-    Layered(#[from] LayeredError),
-    #[error("depth images and layered images do not go together, nor two light fields")]
-    Mixed,
-    #[error("{images} layered images are not the three of one cube")]
-    NoCube { images: usize },
 }
 
 /// All images of a sample set.

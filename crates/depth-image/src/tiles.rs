@@ -3,22 +3,9 @@
 use glam::UVec2;
 
 use crate::{
-    Camera, DepthImage, DepthImageError, LayeredDepthImage, LayeredError, LayeredLightField, LightFieldCamera,
-    LightPlanes, ParallelCamera, SampleCamera, SpecularPlanes, ViewPart,
+    Camera, DepthImage, LayeredDepthImage, LayeredLightField, LightFieldCamera, LightPlanes, ParallelCamera,
+    SampleCamera, SampleImageError, SpecularPlanes, ViewPart,
 };
-
-/// Tiles that do not form an image; `tile` counts from the top.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs, reason = "self-naming fields")]
-pub enum TileError {
-    #[error("tile {tile} has {given} pixels, the image's has {expected}")]
-    Size { tile: usize, given: UVec2, expected: UVec2 },
-    #[error("tile {tile}: {source}")]
-    Planes { tile: usize, source: DepthImageError },
-    /// A plane without a default value for tiles that lack it.
-    #[error("some tiles have the plane {plane}, and some have not")]
-    Mixed { plane: &'static str },
-}
 
 impl Camera {
     /// The camera of tile number `tile`, from the top, of `count`. With fewer rows than tiles, some tiles are empty.
@@ -52,11 +39,11 @@ impl LayeredDepthImage {
     ///
     /// # Errors
     /// Tiles of other sizes, and planes that are not those of their lines.
-    pub fn from_tiles(camera: ParallelCamera, tiles: &[Self]) -> Result<Self, LayeredError> {
+    pub fn from_tiles(camera: ParallelCamera, tiles: &[Self]) -> Result<Self, SampleImageError> {
         for (number, tile) in tiles.iter().enumerate() {
             let expected = part(camera.size_px, number as u32, tiles.len() as u32).size_px;
             if tile.camera.size_px != expected {
-                return Err(LayeredError::Tile { tile: number, given: tile.camera.size_px, expected });
+                return Err(SampleImageError::TileLines { tile: number, given: tile.camera.size_px, expected });
             }
             tile.validate()?;
         }
@@ -68,7 +55,7 @@ impl LayeredDepthImage {
             plane_normal_oct8: concat(tiles, |tile| &tile.plane_normal_oct8),
             color_rgb9e5: concat(tiles, |tile| &tile.color_rgb9e5),
             normal_oct16: filled(tiles, Self::sample_count, |tile| tile.normal_oct16.as_deref()),
-            specular: specular.ok_or(LayeredError::MixedTiles)?,
+            specular: specular.ok_or(SampleImageError::MixedTiles)?,
             truncated: tiles.iter().any(|tile| tile.truncated),
         })
     }
@@ -79,12 +66,12 @@ impl LayeredLightField {
     ///
     /// # Errors
     /// Tiles of other directions, and planes that are not those of their lines.
-    pub fn from_tiles(camera: LightFieldCamera, tiles: &[Self]) -> Result<Self, LayeredError> {
+    pub fn from_tiles(camera: LightFieldCamera, tiles: &[Self]) -> Result<Self, SampleImageError> {
         let size_px = camera.size_px();
         for (number, tile) in tiles.iter().enumerate() {
             let expected = camera.part(&part(size_px, number as u32, tiles.len() as u32));
             if tile.camera != expected {
-                return Err(LayeredError::LightFieldTile { tile: number });
+                return Err(SampleImageError::LightFieldTile { tile: number });
             }
             tile.validate()?;
         }
@@ -112,14 +99,14 @@ impl DepthImage {
     ///
     /// # Errors
     /// Tiles of other sizes, and planes that only some of them have.
-    pub fn from_tiles(camera: Camera, tiles: Vec<Self>) -> Result<Self, TileError> {
+    pub fn from_tiles(camera: Camera, tiles: Vec<Self>) -> Result<Self, SampleImageError> {
         let count = tiles.len() as u32;
         for (number, tile) in tiles.iter().enumerate() {
             let expected = camera.tile(number as u32, count).size_px();
             if tile.size_px() != expected {
-                return Err(TileError::Size { tile: number, given: tile.size_px(), expected });
+                return Err(SampleImageError::TileSize { tile: number, given: tile.size_px(), expected });
             }
-            tile.validate().map_err(|source| TileError::Planes { tile: number, source })?;
+            tile.validate().map_err(|source| SampleImageError::TilePlanes { tile: number, source: source.into() })?;
         }
         let corners = joined(&tiles, "corner_inverse_depth", |tile| tile.corner_inverse_depth_per_m.as_deref())?;
         let surface_id = joined(&tiles, "surface_id", |tile| tile.surface_id.as_deref())?;
@@ -131,7 +118,7 @@ impl DepthImage {
             surface_id,
             normal_oct16: filled(&tiles, texel_count, |tile| tile.normal_oct16.as_deref()),
             passed: filled(&tiles, texel_count, |tile| tile.passed.as_deref()),
-            specular: specular.ok_or(TileError::Mixed { plane: "visibility" })?,
+            specular: specular.ok_or(SampleImageError::MixedPlane { plane: "visibility" })?,
             corner_inverse_depth_per_m: corners.map(|_| shared_corners(&tiles)),
             light: light(&tiles)?,
         })
@@ -148,12 +135,12 @@ fn joined<T: Copy>(
     tiles: &[DepthImage],
     name: &'static str,
     plane: impl Fn(&DepthImage) -> Option<&[T]>,
-) -> Result<Option<Vec<T>>, TileError> {
+) -> Result<Option<Vec<T>>, SampleImageError> {
     let have = tiles.iter().filter(|tile| plane(tile).is_some()).count();
     match have {
         0 => Ok(None),
         _ if have == tiles.len() => Ok(Some(tiles.iter().filter_map(&plane).flatten().copied().collect())),
-        _ => Err(TileError::Mixed { plane: name }),
+        _ => Err(SampleImageError::MixedPlane { plane: name }),
     }
 }
 
@@ -174,15 +161,15 @@ fn texel_count(tile: &DepthImage) -> usize {
 }
 
 /// Joins the planes of light. No tile has colour beside another's light, and all have shares of the same lamps.
-fn light(tiles: &[DepthImage]) -> Result<Option<LightPlanes>, TileError> {
+fn light(tiles: &[DepthImage]) -> Result<Option<LightPlanes>, SampleImageError> {
     let lights: Vec<&LightPlanes> = tiles.iter().filter_map(|tile| tile.light.as_ref()).collect();
     let Some(first) = lights.first() else { return Ok(None) };
     if lights.len() < tiles.len() {
-        return Err(TileError::Mixed { plane: "light" });
+        return Err(SampleImageError::MixedPlane { plane: "light" });
     }
     let share_count = first.share8.len();
     if lights.iter().any(|light| light.share8.len() != share_count) {
-        return Err(TileError::Mixed { plane: "share" });
+        return Err(SampleImageError::MixedPlane { plane: "share" });
     }
     Ok(Some(LightPlanes {
         triangle_normal_oct16: concat(&lights, |light| &light.triangle_normal_oct16),

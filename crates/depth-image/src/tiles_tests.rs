@@ -67,13 +67,13 @@ fn tiles_that_mix_light_and_colour_or_numbers_of_lamps_are_refused() {
     let mut mixed = tiles();
     mixed[1] = image(camera().tile(1, 3));
     mixed[1].corner_inverse_depth_per_m = None;
-    assert_eq!(DepthImage::from_tiles(camera(), mixed), Err(TileError::Mixed { plane: "light" }));
+    assert_eq!(DepthImage::from_tiles(camera(), mixed), Err(SampleImageError::MixedPlane { plane: "light" }));
     let mut of_fewer_lamps = tiles();
     of_fewer_lamps[2].light.as_mut().unwrap().share8.pop();
-    assert_eq!(DepthImage::from_tiles(camera(), of_fewer_lamps), Err(TileError::Mixed { plane: "share" }));
+    assert_eq!(DepthImage::from_tiles(camera(), of_fewer_lamps), Err(SampleImageError::MixedPlane { plane: "share" }));
     let mut broken = tiles();
     broken[1].light.as_mut().unwrap().lamps_rgb9e5.pop();
-    assert!(matches!(DepthImage::from_tiles(camera(), broken), Err(TileError::Planes { tile: 1, .. })));
+    assert!(matches!(DepthImage::from_tiles(camera(), broken), Err(SampleImageError::TilePlanes { tile: 1, .. })));
 }
 
 #[test]
@@ -103,13 +103,13 @@ fn tiles_that_do_not_fit_are_refused_by_number() {
     let tiles = || (0..3).map(|tile| image(camera().tile(tile, 3))).collect::<Vec<_>>();
     let mut swapped = tiles();
     swapped.swap(0, 2);
-    assert!(matches!(DepthImage::from_tiles(camera(), swapped), Err(TileError::Size { tile: 0, .. })));
+    assert!(matches!(DepthImage::from_tiles(camera(), swapped), Err(SampleImageError::TileSize { tile: 0, .. })));
     let mut broken = tiles();
     broken[1].color_rgb9e5.pop();
-    assert!(matches!(DepthImage::from_tiles(camera(), broken), Err(TileError::Planes { tile: 1, .. })));
+    assert!(matches!(DepthImage::from_tiles(camera(), broken), Err(SampleImageError::TilePlanes { tile: 1, .. })));
     let mut mixed = tiles();
     mixed[2].corner_inverse_depth_per_m = None;
-    assert!(matches!(DepthImage::from_tiles(camera(), mixed), Err(TileError::Mixed { .. })));
+    assert!(matches!(DepthImage::from_tiles(camera(), mixed), Err(SampleImageError::MixedPlane { .. })));
 }
 
 /// Lines of one to three samples, each of which encodes its line.
@@ -167,7 +167,7 @@ fn layered_tiles_that_do_not_fit_are_refused_and_missing_highlights_are_zeros() 
     let mut swapped = layered_tiles(4);
     swapped.swap(0, 3);
     let joined = LayeredDepthImage::from_tiles(parallel_camera(), &swapped);
-    assert!(matches!(joined, Err(LayeredError::Tile { tile: 0, .. })));
+    assert!(matches!(joined, Err(SampleImageError::TileLines { tile: 0, .. })));
     let mut tiles = layered_tiles(3);
     (tiles[0].specular, tiles[0].normal_oct16, tiles[0].truncated) = (None, None, true);
     let joined = LayeredDepthImage::from_tiles(parallel_camera(), &tiles).unwrap();
@@ -176,5 +176,5 @@ fn layered_tiles_that_do_not_fit_are_refused_and_missing_highlights_are_zeros() 
     let of_first = tiles[0].sample_count();
     assert!(specular.visibility8[1][..of_first].iter().all(|&visibility| visibility == 0));
     tiles[1].specular.as_mut().unwrap().visibility8.pop();
-    assert_eq!(LayeredDepthImage::from_tiles(parallel_camera(), &tiles), Err(LayeredError::MixedTiles));
+    assert_eq!(LayeredDepthImage::from_tiles(parallel_camera(), &tiles), Err(SampleImageError::MixedTiles));
 }

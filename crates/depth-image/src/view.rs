@@ -72,6 +72,14 @@ pub struct View {
     pub provenance: Option<Vec<Provenance>>,
 }
 
+impl View {
+    /// A view of colour alone.
+    #[must_use]
+    pub fn from_srgb8(size_px: UVec2, srgb8: Vec<u8>) -> Self {
+        Self { size_px, srgb8, inverse_depth_per_m: None, provenance: None }
+    }
+}
+
 /// The requested planes of a view: how its colour is sampled, and what comes with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub struct ViewPlanes {

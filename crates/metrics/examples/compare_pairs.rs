@@ -8,7 +8,9 @@ mod pairs;
 
 use std::path::Path;
 
-use metrics::{Rgb8Image, flip_map, pdiff_map, psnr_db, ssim_map};
+use depth_image::View;
+use glam::UVec2;
+use metrics::{flip_map, pdiff_map, psnr_db, ssim_map};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -28,13 +30,13 @@ fn write_pairs(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
         };
         write("reference", &pair.reference)?;
         write("test", &pair.test)?;
-        let image = |pixels| Rgb8Image::new(pair.width as u32, pair.height as u32, pixels);
-        print_comparison(pair.name, &image(pair.reference)?, &image(pair.test)?)?;
+        let image = |pixels| View::from_srgb8(UVec2::new(pair.width as u32, pair.height as u32), pixels);
+        print_comparison(pair.name, &image(pair.reference), &image(pair.test))?;
     }
     Ok(())
 }
 
-fn print_comparison(name: &str, reference: &Rgb8Image, test: &Rgb8Image) -> Result<(), Box<dyn std::error::Error>> {
+fn print_comparison(name: &str, reference: &View, test: &View) -> Result<(), Box<dyn std::error::Error>> {
     let psnr_db = psnr_db(reference, test, None)?;
     let ssim = ssim_map(reference, test)?.mean(None)?;
     let flip = flip_map(reference, test)?.mean(None)?;
@@ -46,7 +48,7 @@ fn print_comparison(name: &str, reference: &Rgb8Image, test: &Rgb8Image) -> Resu
 }
 
 /// The header must be as this program writes it: three lines, no comments.
-fn read_ppm(path: &str) -> Result<Rgb8Image<'static>, Box<dyn std::error::Error>> {
+fn read_ppm(path: &str) -> Result<View, Box<dyn std::error::Error>> {
     let bytes = std::fs::read(path)?;
     let mut lines = bytes.splitn(4, |&byte| byte == b'\n');
     let mut line = || lines.next().ok_or("short file");
@@ -55,5 +57,5 @@ fn read_ppm(path: &str) -> Result<Rgb8Image<'static>, Box<dyn std::error::Error>
     let _maximum = line()?;
     let pixels = line()?;
     let (width, height) = std::str::from_utf8(size)?.split_once(' ').ok_or("no size")?;
-    Ok(Rgb8Image::new(width.parse()?, height.parse()?, pixels.to_vec())?)
+    Ok(View::from_srgb8(UVec2::new(width.parse()?, height.parse()?), pixels.to_vec()))
 }

@@ -1,9 +1,10 @@
 //! Colour spaces of the perceptual metrics: linear Rec. 709 RGB, CIE XYZ relative to D65, CIE L*a*b*, and
 //! the linearised YCxCz that FLIP filters in.
 
+use depth_image::View;
 use glam::{DMat3, DVec3, Vec3};
 
-use crate::Rgb8Image;
+use crate::image::pixels;
 
 /// XYZ of linear Rec. 709 RGB, D65: IEC 61966-2-1, unrounded.
 pub(crate) const REC_709: DMat3 = DMat3::from_cols(
@@ -63,9 +64,9 @@ pub(crate) fn lab_from_relative_xyz(xyz: Vec3) -> Vec3 {
 }
 
 /// Every pixel through a curve from 8 bits to linear, then through `convert`.
-pub(crate) fn convert_pixels<T>(image: &Rgb8Image, curve: impl Fn(u8) -> f32, convert: impl Fn(Vec3) -> T) -> Vec<T> {
+pub(crate) fn convert_pixels<T>(image: &View, curve: impl Fn(u8) -> f32, convert: impl Fn(Vec3) -> T) -> Vec<T> {
     let table: Vec<f32> = (0..=255).map(curve).collect();
-    image.pixels().map(|rgb| convert(Vec3::from(rgb.map(|channel| table[usize::from(channel)])))).collect()
+    pixels(image).iter().map(|rgb| convert(Vec3::from(rgb.map(|channel| table[usize::from(channel)])))).collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Errors of reconstructed depth, and the rate of pixels without an answer.
 
-use crate::{MetricsError, error::expect_len, error::expect_mask};
+use crate::{MetricsError, error::expect_len};
 
 /// The relative depth error above which a hit is wrong.
 pub const WRONG_HIT_RELATIVE: f64 = 0.01;
@@ -14,8 +14,6 @@ pub struct DepthErrors {
     pub foreground_px: usize,
     /// Test pixels with a depth.
     pub hit_px: usize,
-    /// Test pixels that are certain to show nothing.
-    pub miss_px: usize,
     /// Test pixels without an answer, which count in no error below.
     pub unknown_px: usize,
     /// Hits off by more than 1 % in depth, and hits where the reference has nothing.
@@ -26,18 +24,14 @@ pub struct DepthErrors {
     pub wrong_hit_rate: Option<f64>,
 }
 
-/// Compares planes of inverse planar depth, per metre, of one camera, over all pixels or those of a mask.
+/// Compares planes of inverse planar depth, per metre, of one camera.
 ///
 /// # Errors
-/// Planes or mask differ in size.
-pub fn depth_errors(reference: &[f32], test: &[f32], mask: Option<&[bool]>) -> Result<DepthErrors, MetricsError> {
+/// Planes differ in size.
+pub fn depth_errors(reference: &[f32], test: &[f32]) -> Result<DepthErrors, MetricsError> {
     expect_len("test depth", test.len(), reference.len())?;
-    expect_mask(mask, reference.len())?;
-    let pairs = reference.iter().zip(test).enumerate();
-    let mut errors = DepthErrors::default();
-    for (_, (&reference, &test)) in pairs.filter(|(index, _)| mask.is_none_or(|mask| mask[*index])) {
-        errors.add(reference, test);
-    }
+    let mut errors = DepthErrors { pixels: reference.len(), ..DepthErrors::default() };
+    reference.iter().zip(test).for_each(|(&reference, &test)| errors.add(reference, test));
     errors.wrong_hit_rate = (errors.hit_px > 0).then(|| errors.wrong_hit_px as f64 / errors.hit_px as f64);
     Ok(errors)
 }
@@ -45,7 +39,6 @@ pub fn depth_errors(reference: &[f32], test: &[f32], mask: Option<&[bool]>) -> R
 impl DepthErrors {
     fn add(&mut self, reference: f32, test: f32) {
         let is_surface = reference > 0.0;
-        self.pixels += 1;
         self.foreground_px += usize::from(is_surface);
         if test > 0.0 {
             self.hit_px += 1;
@@ -53,7 +46,6 @@ impl DepthErrors {
             let relative = (f64::from(reference) / f64::from(test) - 1.0).abs();
             self.wrong_hit_px += usize::from(!is_surface || relative > WRONG_HIT_RELATIVE);
         } else if test == 0.0 {
-            self.miss_px += 1;
             self.wrong_miss_px += usize::from(is_surface);
         } else {
             self.unknown_px += 1;
@@ -69,31 +61,29 @@ mod tests {
     fn every_outcome_is_counted_once() {
         let reference = [0.5, 0.5, 0.5, 0.5, 0.0, 0.0, 0.0];
         let test = [0.5, 0.4, 0.0, -1.0, 0.3, 0.0, f32::NAN];
-        let errors = depth_errors(&reference, &test, None).unwrap();
+        let errors = depth_errors(&reference, &test).unwrap();
         assert_eq!((errors.pixels, errors.foreground_px), (7, 4));
-        assert_eq!((errors.hit_px, errors.miss_px, errors.unknown_px), (3, 2, 2));
+        assert_eq!((errors.hit_px, errors.unknown_px), (3, 2));
         assert_eq!((errors.wrong_hit_px, errors.wrong_miss_px), (2, 1));
     }
 
     #[test]
     fn hits_of_more_than_a_hundredth_are_wrong() {
         let test: Vec<f32> = (1..=100).map(|i| 1.0 / (1.0 + i as f32 * 1e-3)).collect();
-        let errors = depth_errors(&[1.0; 100], &test, None).unwrap();
+        let errors = depth_errors(&[1.0; 100], &test).unwrap();
         assert_eq!(errors.wrong_hit_px, 90, "those of more than 1 %, the tenth being on the bound or beside it");
     }
 
     #[test]
-    fn identical_has_no_error_and_an_empty_mask_no_rates() {
+    fn identical_has_no_error_and_no_pixels_have_no_rate() {
         let depth = [0.5, 0.0];
-        let errors = depth_errors(&depth, &depth, None).unwrap();
+        let errors = depth_errors(&depth, &depth).unwrap();
         assert_eq!(errors.wrong_hit_rate, Some(0.0));
-        let none = depth_errors(&depth, &depth, Some(&[false, false])).unwrap();
-        assert_eq!(none, DepthErrors::default());
+        assert_eq!(depth_errors(&[], &[]), Ok(DepthErrors::default()));
     }
 
     #[test]
     fn sizes_must_agree() {
-        assert!(depth_errors(&[0.5], &[0.5, 0.5], None).is_err());
-        assert!(depth_errors(&[0.5], &[0.5], Some(&[])).is_err());
+        assert!(depth_errors(&[0.5], &[0.5, 0.5]).is_err());
     }
 }

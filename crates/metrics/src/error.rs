@@ -2,7 +2,7 @@
 
 /// Data that cannot be compared.
 #[allow(missing_docs, reason = "self-naming fields")]
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MetricsError {
     /// A buffer's length does not follow from its width and height.
     #[error("{what} holds {len} values, its size calls for {expected}")]
@@ -16,12 +16,9 @@ pub enum MetricsError {
     /// The image is smaller than one window of the metric.
     #[error("image of {size_px:?} pixels is smaller than the window of {window_px}")]
     SmallerThanWindow { size_px: (u32, u32), window_px: u32 },
-    /// A setting is outside the range of the metric.
-    #[error("{what} must be finite and above 0")]
-    Setting { what: &'static str },
     /// The planes of a sample image do not fit its camera.
     #[error("sample image {index}: {source}")]
-    SampleImage { index: usize, source: depth_image::DepthImageError },
+    SampleImage { index: usize, source: depth_image::SampleImageError },
 }
 
 /// Fails unless `len` is what is expected.

@@ -2,7 +2,8 @@
 
 use depth_image::View;
 
-use crate::{MetricsError, PSNR_CAP_DB, Rgb8Image, error::expect_len, flip_map, psnr_db, ssim_map};
+use crate::image::{expect_same_size, pixels};
+use crate::{MetricsError, PSNR_CAP_DB, error::expect_len, flip_map, psnr_db, ssim_map};
 
 /// PSNR, SSIM and FLIP of a picture, over some of its pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,13 +22,12 @@ impl PictureErrors {
     ///
     /// # Errors
     /// The pictures differ in size, or the reference has no depth.
-    pub fn of(reference: &View, test: &Rgb8Image<'_>) -> Result<[Self; 2], MetricsError> {
+    pub fn of(reference: &View, test: &View) -> Result<[Self; 2], MetricsError> {
         let foreground = foreground(reference, test)?;
-        let picture = Rgb8Image::of_view(reference)?;
-        let ssim = ssim_map(&picture, test)?;
-        let flip = flip_map(&picture, test)?;
+        let ssim = ssim_map(reference, test)?;
+        let flip = flip_map(reference, test)?;
         let over = |mask: Option<&[bool]>| {
-            let errors = (psnr_db(&picture, test, mask)?, ssim.mean(mask)?, flip.mean(mask)?);
+            let errors = (psnr_db(reference, test, mask)?, ssim.mean(mask)?, flip.mean(mask)?);
             let (Some(psnr_db), Some(ssim), Some(flip)) = errors else { return Ok(None) };
             Ok::<_, MetricsError>(Some(Self { psnr_db: psnr_db.min(PSNR_CAP_DB), ssim, flip }))
         };
@@ -41,13 +41,12 @@ impl PictureErrors {
 ///
 /// # Errors
 /// The pictures differ in size, or the reference has no depth.
-pub fn foreground(reference: &View, test: &Rgb8Image<'_>) -> Result<Vec<bool>, MetricsError> {
-    let picture = Rgb8Image::of_view(reference)?;
-    picture.expect_same_size(test)?;
+pub fn foreground(reference: &View, test: &View) -> Result<Vec<bool>, MetricsError> {
+    expect_same_size(reference, test)?;
     let depth = reference.inverse_depth_per_m.as_ref().ok_or(MetricsError::Empty { what: "plane of depth" })?;
-    expect_len("plane of depth", depth.len(), picture.pixel_count())?;
-    let pixels = picture.pixels().zip(test.pixels());
-    Ok(depth.iter().zip(pixels).map(|(&inverse, (a, b))| inverse > 0.0 || a != b).collect())
+    expect_len("plane of depth", depth.len(), pixels(reference).len())?;
+    let pairs = pixels(reference).iter().zip(pixels(test));
+    Ok(depth.iter().zip(pairs).map(|(&inverse, (a, b))| inverse > 0.0 || a != b).collect())
 }
 
 #[cfg(test)]
@@ -67,8 +66,8 @@ mod tests {
         }
     }
 
-    fn picture(srgb8: Vec<u8>) -> Rgb8Image<'static> {
-        Rgb8Image::new(16, 16, srgb8).unwrap()
+    fn picture(srgb8: Vec<u8>) -> View {
+        View::from_srgb8(UVec2::splat(16), srgb8)
     }
 
     #[test]
@@ -94,7 +93,7 @@ mod tests {
     fn a_view_without_depth_or_of_another_size_is_refused() {
         let without = View { inverse_depth_per_m: None, ..view() };
         assert!(foreground(&without, &picture(vec![0; 768])).is_err());
-        assert!(foreground(&view(), &Rgb8Image::new(8, 8, vec![0; 192]).unwrap()).is_err());
+        assert!(foreground(&view(), &View::from_srgb8(UVec2::splat(8), vec![0; 192])).is_err());
         let short = View { inverse_depth_per_m: Some(vec![1.0; 2]), ..view() };
         assert!(PictureErrors::of(&short, &picture(vec![0; 768])).is_err());
     }

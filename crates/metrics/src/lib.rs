@@ -1,6 +1,6 @@
 //! Image, depth and visibility error.
 //!
-//! All numbers of charts and checks are made here, from 8-bit sRGB images and planes of inverse depth. Each image
+//! All numbers of charts and checks are made here, from views with 8-bit sRGB and planes of inverse depth. Each image
 //! metric gives a map first and a mean second, so that it can be split by [`PixelClass`].
 //!
 //! | metric | what it is | agrees with |
@@ -34,9 +34,8 @@ pub use change_error::change_error_map;
 pub use classes::{PixelClass, classify, unheld_rate};
 pub use depth_error::{DepthErrors, WRONG_HIT_RELATIVE, depth_errors};
 pub use error::MetricsError;
-pub use flip::{FLIP_PIXELS_PER_DEGREE, FLIP_REACH_PX, flip_map, flip_map_at};
+pub use flip::{FLIP_REACH_PX, flip_map};
 pub use foreground::{PictureErrors, foreground};
-pub use image::Rgb8Image;
 pub use pdiff::pdiff_map;
 pub use psnr::{PSNR_CAP_DB, psnr_db};
 pub use score_map::ScoreMap;

@@ -1,6 +1,9 @@
 //! Peak signal-to-noise ratio on 8-bit sRGB.
 
-use crate::{MetricsError, Rgb8Image, error::expect_mask};
+use depth_image::View;
+
+use crate::image::{expect_same_size, pixels};
+use crate::{MetricsError, error::expect_mask};
 
 /// The PSNR of equal images in reports: JSON has no infinity. A value above is written as this one, which reads "at
 /// least".
@@ -11,13 +14,13 @@ pub const PSNR_CAP_DB: f64 = 99.99;
 ///
 /// # Errors
 /// Images or mask differ in size.
-pub fn psnr_db(reference: &Rgb8Image, test: &Rgb8Image, mask: Option<&[bool]>) -> Result<Option<f64>, MetricsError> {
-    reference.expect_same_size(test)?;
-    expect_mask(mask, reference.pixel_count())?;
-    let pairs = reference.pixels().zip(test.pixels()).enumerate();
+pub fn psnr_db(reference: &View, test: &View, mask: Option<&[bool]>) -> Result<Option<f64>, MetricsError> {
+    expect_same_size(reference, test)?;
+    expect_mask(mask, pixels(reference).len())?;
+    let pairs = pixels(reference).iter().zip(pixels(test)).enumerate();
     let selected = pairs.filter(|(index, _)| mask.is_none_or(|mask| mask[*index]));
     let (sum, pixels) = selected
-        .fold((0_u64, 0_u64), |(sum, pixels), (_, (a, b))| (sum + u64::from(squared_distance(a, b)), pixels + 1));
+        .fold((0_u64, 0_u64), |(sum, pixels), (_, (a, b))| (sum + u64::from(squared_distance(*a, *b)), pixels + 1));
     let mean = sum as f64 / (3 * pixels) as f64;
     let db = if mean > 0.0 { 10.0 * (255.0 * 255.0 / mean).log10() } else { f64::INFINITY };
     Ok((pixels > 0).then_some(db))
@@ -29,10 +32,12 @@ fn squared_distance(a: [u8; 3], b: [u8; 3]) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use glam::UVec2;
+
     use super::*;
 
-    fn flat(value: u8) -> Rgb8Image<'static> {
-        Rgb8Image::new(4, 3, vec![value; 36]).unwrap()
+    fn flat(value: u8) -> View {
+        View::from_srgb8(UVec2::new(4, 3), vec![value; 36])
     }
 
     #[test]
@@ -52,7 +57,7 @@ mod tests {
     fn a_mask_selects() {
         let mut bytes = vec![50; 36];
         bytes[0] = 60;
-        let test = Rgb8Image::new(4, 3, bytes).unwrap();
+        let test = View::from_srgb8(UVec2::new(4, 3), bytes);
         let mut first = [false; 12];
         first[0] = true;
         let psnr = psnr_db(&flat(50), &test, Some(&first)).unwrap().unwrap();
@@ -61,7 +66,7 @@ mod tests {
 
     #[test]
     fn sizes_must_agree() {
-        let other = Rgb8Image::new(3, 4, vec![0; 36]).unwrap();
+        let other = View::from_srgb8(UVec2::new(3, 4), vec![0; 36]);
         assert!(matches!(psnr_db(&flat(0), &other, None), Err(MetricsError::SizesDiffer { .. })));
         assert!(matches!(psnr_db(&flat(0), &flat(0), Some(&[true])), Err(MetricsError::BufferSize { .. })));
     }

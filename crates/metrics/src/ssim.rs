@@ -4,9 +4,11 @@
 //!
 //! Window sums of 8-bit values are whole numbers, so they are exact here.
 
+use depth_image::View;
 use rayon::prelude::*;
 
-use crate::{MetricsError, Rgb8Image, ScoreMap};
+use crate::image::expect_same_size;
+use crate::{MetricsError, ScoreMap};
 
 /// Side of the window.
 pub const SSIM_WINDOW_PX: u32 = 7;
@@ -20,18 +22,17 @@ const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 ///
 /// # Errors
 /// Images differ in size, or are smaller than the window.
-pub fn ssim_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<ScoreMap, MetricsError> {
-    reference.expect_same_size(test)?;
-    let (width_px, height_px) = reference.size_px();
-    if width_px.min(height_px) < SSIM_WINDOW_PX {
-        return Err(MetricsError::SmallerThanWindow { size_px: (width_px, height_px), window_px: SSIM_WINDOW_PX });
+pub fn ssim_map(reference: &View, test: &View) -> Result<ScoreMap, MetricsError> {
+    expect_same_size(reference, test)?;
+    let size_px = reference.size_px;
+    if size_px.min_element() < SSIM_WINDOW_PX {
+        return Err(MetricsError::SmallerThanWindow { size_px: size_px.into(), window_px: SSIM_WINDOW_PX });
     }
-    let width = width_px as usize;
-    let height = height_px as usize;
+    let [width, height] = size_px.to_array().map(|side| side as usize);
     let mut values = vec![0.0; width * height];
     let interior = values.par_chunks_exact_mut(width).enumerate().take(height - RADIUS).skip(RADIUS);
     interior.for_each(|(y, row)| fill_row(row, y, reference, test));
-    Ok(ScoreMap { width_px, height_px, border_px: RADIUS as u32, values })
+    Ok(ScoreMap { size_px, border_px: RADIUS as u32, values })
 }
 
 /// The first and second moments of a window, times its samples: `a`, `b`, `aa`, `bb`, `ab`.
@@ -65,7 +66,7 @@ fn covariance(product: i64, x: i64, y: i64) -> f64 {
 }
 
 /// One row of the map.
-fn fill_row(row: &mut [f32], y: usize, reference: &Rgb8Image, test: &Rgb8Image) {
+fn fill_row(row: &mut [f32], y: usize, reference: &View, test: &View) {
     let width = row.len();
     for channel in 0..3 {
         let columns: Vec<Sums> = (0..width).map(|x| column_sums(x, y, channel, reference, test)).collect();
@@ -79,29 +80,31 @@ fn fill_row(row: &mut [f32], y: usize, reference: &Rgb8Image, test: &Rgb8Image) 
 }
 
 /// The sums down the part of a column that the window around row `y` covers.
-fn column_sums(x: usize, y: usize, channel: usize, reference: &Rgb8Image, test: &Rgb8Image) -> Sums {
-    let width = reference.width_px() as usize;
+fn column_sums(x: usize, y: usize, channel: usize, reference: &View, test: &View) -> Sums {
+    let width = reference.size_px.x as usize;
     (y - RADIUS..=y + RADIUS).fold(Sums::default(), |sum, row| {
         let index = (row * width + x) * 3 + channel;
-        sum.plus(Sums::of(reference.srgb8()[index], test.srgb8()[index]), 1)
+        sum.plus(Sums::of(reference.srgb8[index], test.srgb8[index]), 1)
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::UVec2;
+
     use super::*;
 
     #[test]
     fn identical_is_one() {
         let bytes: Vec<u8> = (0..9 * 8 * 3).map(|i| (i * 37 % 251) as u8).collect();
-        let image = Rgb8Image::new(9, 8, bytes).unwrap();
+        let image = View::from_srgb8(UVec2::new(9, 8), bytes);
         let map = ssim_map(&image, &image).unwrap();
         assert!((map.mean(None).unwrap().unwrap() - 1.0).abs() < 1e-7);
     }
 
     #[test]
     fn flat_images_differ_by_luminance_alone() {
-        let flat = |value| Rgb8Image::new(7, 7, vec![value; 147]).unwrap();
+        let flat = |value| View::from_srgb8(UVec2::splat(7), vec![value; 147]);
         let expected = (2.0 * 100.0 * 120.0 + C1) / (100.0_f64.powi(2) + 120.0_f64.powi(2) + C1);
         let mean = ssim_map(&flat(100), &flat(120)).unwrap().mean(None).unwrap().unwrap();
         assert!((mean - expected).abs() < 1e-7);
@@ -109,7 +112,7 @@ mod tests {
 
     #[test]
     fn an_image_below_the_window_is_refused() {
-        let small = Rgb8Image::new(6, 9, vec![0; 162]).unwrap();
+        let small = View::from_srgb8(UVec2::new(6, 9), vec![0; 162]);
         assert!(matches!(ssim_map(&small, &small), Err(MetricsError::SmallerThanWindow { window_px: 7, .. })));
     }
 }

@@ -19,52 +19,35 @@ const CAMERAS: [[u8; 3]; 8] = [
     [153, 213, 148],
 ];
 
-/// A class of pixels that share a colour, in the order of legends.
+/// Pixels that share a colour: their place in legends, name and colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Source {
-    /// One sample camera, by number.
-    Sample(u8),
-    /// Several sample cameras.
-    Blend,
-    /// The scene.
-    Direct,
-    /// A layered depth cube of the whole scene.
-    Base,
-    /// A surface of the scene that was lit in this view.
-    LitHere,
-    /// The surroundings of a hole.
-    Fill,
-    /// A mirror of which some ray ends where no camera sees.
-    Guess,
-    Background,
+struct Source {
+    /// The number of the sample camera of the view cell; larger for other sources.
+    place: usize,
+    /// The name of a sample camera lacks its number.
+    name: &'static str,
+    color: [u8; 3],
 }
+
+/// The places of sources from here on are no sample cameras.
+const FIRST_OTHER_PLACE: usize = 32;
 
 impl Source {
     fn of(provenance: &Provenance) -> Self {
-        match (provenance.kind(), provenance.camera_mask()) {
-            (ProvenanceKind::Empty, _) => Self::Background,
-            (ProvenanceKind::Filled, _) => Self::Fill,
-            (ProvenanceKind::Guessed, _) => Self::Guess,
-            (ProvenanceKind::Base, _) => Self::Base,
-            (ProvenanceKind::LitHere, _) => Self::LitHere,
-            (ProvenanceKind::Hit, 0) => Self::Direct,
-            (ProvenanceKind::Hit, mask) if mask.is_power_of_two() => Self::Sample(mask.trailing_zeros() as u8),
-            (ProvenanceKind::Hit, _) => Self::Blend,
-        }
-    }
-
-    /// Name and colour; the name of a sample camera lacks its number.
-    fn name_and_color(self) -> (&'static str, [u8; 3]) {
-        match self {
-            Self::Sample(camera) => ("camera", CAMERAS[usize::from(camera) % CAMERAS.len()]),
-            Self::Blend => ("blended", [255, 255, 255]),
-            Self::Direct => ("drawn directly", [150, 150, 160]),
-            Self::Base => ("from the base", [120, 90, 220]),
-            Self::LitHere => ("lit here", [150, 90, 40]),
-            Self::Fill => ("filled", [255, 60, 60]),
-            Self::Guess => ("reflection, guessed", [255, 60, 220]),
-            Self::Background => ("background", [40, 44, 52]),
-        }
+        let (order, name, color) = match (provenance.kind(), provenance.camera_mask()) {
+            (ProvenanceKind::Hit, mask) if mask.is_power_of_two() => {
+                let place = mask.trailing_zeros() as usize;
+                return Self { place, name: "camera", color: CAMERAS[place % CAMERAS.len()] };
+            }
+            (ProvenanceKind::Hit, 0) => (1, "drawn directly", [150, 150, 160]),
+            (ProvenanceKind::Hit, _) => (0, "blended", [255, 255, 255]),
+            (ProvenanceKind::Base, _) => (2, "from the base", [120, 90, 220]),
+            (ProvenanceKind::LitHere, _) => (3, "lit here", [150, 90, 40]),
+            (ProvenanceKind::Filled, _) => (4, "filled", [255, 60, 60]),
+            (ProvenanceKind::Guessed, _) => (5, "reflection, guessed", [255, 60, 220]),
+            (ProvenanceKind::Empty, _) => (6, "background", [40, 44, 52]),
+        };
+        Self { place: FIRST_OTHER_PLACE + order, name, color }
     }
 }
 
@@ -73,11 +56,11 @@ impl Source {
 #[must_use]
 pub fn provenance(view: &View, first_camera: usize) -> Option<(RgbImage, Legend)> {
     let sources: Vec<Source> = view.provenance.as_ref()?.iter().map(Source::of).collect();
-    let pixels = sources.iter().flat_map(|source| source.name_and_color().1).collect();
+    let pixels = sources.iter().flat_map(|source| source.color).collect();
     let image = RgbImage::from_raw(view.size_px.x, view.size_px.y, pixels)?;
-    let legend = BTreeSet::from_iter(sources).into_iter().map(|source| match (source, source.name_and_color()) {
-        (Source::Sample(camera), (name, color)) => (format!("{name} {}", first_camera + usize::from(camera)), color),
-        (_, (name, color)) => (name.to_owned(), color),
+    let legend = BTreeSet::from_iter(sources).into_iter().map(|Source { place, name, color }| {
+        let name = if place < FIRST_OTHER_PLACE { format!("{name} {}", first_camera + place) } else { name.to_owned() };
+        (name, color)
     });
     Some((image, legend.collect()))
 }
@@ -107,8 +90,10 @@ mod tests {
         let (_, legend) = provenance(&view(vec![lit, sample, lit]), 0).unwrap();
         let names: Vec<&str> = legend.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["camera 0", "lit here"]);
-        let others = [Source::Blend, Source::Direct, Source::Base, Source::Fill, Source::Guess, Source::Background];
-        let colors = others.map(|source| source.name_and_color().1);
+        let [hit, base, guessed] = [ProvenanceKind::Hit, ProvenanceKind::Base, ProvenanceKind::Guessed];
+        let [fill, empty] = [ProvenanceKind::Filled, ProvenanceKind::Empty];
+        let others = [(hit, 3), (hit, 0), (base, 0), (fill, 0), (guessed, 0), (empty, 0)];
+        let colors = others.map(|(kind, mask)| Source::of(&Provenance::new(kind, mask)).color);
         assert!(!CAMERAS.iter().chain(&colors).any(|color| *color == legend[1].1));
     }
 

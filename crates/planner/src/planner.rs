@@ -2,17 +2,13 @@
 
 mod certification;
 mod conclusion;
-mod finalists;
 mod measurements;
-mod pruning;
 mod reason;
 mod remembering;
-mod row_state;
 mod screening;
-mod stage;
+mod state;
 
-use row_state::RowState;
-use stage::{Round, Stage, Work};
+use state::{Round, RowState, Stage, Work};
 
 use crate::budget::{Budget, ErrorTerm};
 use crate::command::{Command, Purpose};

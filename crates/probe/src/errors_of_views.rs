@@ -1,7 +1,7 @@
 //! Errors of a view in the terms of budgets.
 
 use depth_image::{DepthImage, PinholeCamera, View};
-use metrics::{MetricsError, Rgb8Image, flip_map, foreground, psnr_db, unheld_rate};
+use metrics::{MetricsError, flip_map, foreground, psnr_db, unheld_rate};
 use planner::ViewErrors;
 
 /// The errors of a view against the same view drawn from the scene, which has depth; with a mask, those of the pixels in it.
@@ -18,17 +18,15 @@ pub fn view_errors(
 ) -> Result<ViewErrors, MetricsError> {
     let whole = vec![true; camera.pixel_count()];
     let part = mask.unwrap_or(&whole);
-    let expected = Rgb8Image::of_view(truth)?;
-    let actual = Rgb8Image::of_view(view)?;
-    let mask: Vec<bool> = foreground(truth, &actual)?.iter().zip(part).map(|(&shown, &own)| shown && own).collect();
-    let flip = flip_map(&expected, &actual)?;
+    let mask: Vec<bool> = foreground(truth, view)?.iter().zip(part).map(|(&shown, &own)| shown && own).collect();
+    let flip = flip_map(truth, view)?;
     let depth = truth.inverse_depth_per_m.as_deref().unwrap_or_default();
     let depth: Vec<f32> = depth.iter().zip(part).map(|(&inverse, &own)| if own { inverse } else { 0.0 }).collect();
     let unheld = unheld_rate(camera, &depth, sample_images)?.unwrap_or(0.0);
     let shown = count(&mask);
     let surfaces = depth.iter().filter(|&&inverse| inverse > 0.0).count();
     // An infinite ratio is an error of 0.
-    let mean_square = psnr_db(&expected, &actual, Some(&mask))?.map_or(0.0, |db| 10_f64.powf(-db / 10.0));
+    let mean_square = psnr_db(truth, view, Some(&mask))?.map_or(0.0, |db| 10_f64.powf(-db / 10.0));
     Ok(ViewErrors {
         foreground_ratio: shown as f64 / count(part).max(1) as f64,
         flip: flip.mean(Some(&mask))?.unwrap_or(0.0),

@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use codec::{
-    DecodeError, DecodeLimits, EncodeError, EncodedImage, FrameCodec, FrameError, decode_depth_image,
-    encode_sample_image, encode_view,
+    DecodeError, DecodeLimits, EncodedImage, FrameCodec, FrameError, decode_depth_image, encode_sample_image,
+    encode_view,
 };
-use depth_image::{DepthImage, PinholeCamera, View, ViewPlanes};
+use depth_image::{DepthImage, PinholeCamera, SampleImageError, View, ViewPlanes};
 use metrics::MetricsError;
 use node::{Engine, EngineError, SampleWork, SharedSet, Turn, ViewWork, own_time};
 use planner::{RowCosts, ViewErrors, median};
@@ -40,7 +40,7 @@ pub enum ProbeError {
     #[error(transparent)]
     Engine(#[from] EngineError),
     #[error("a sample image cannot be encoded: {0}")]
-    Encode(#[from] EncodeError),
+    Encode(#[from] SampleImageError),
     #[error("a sample image cannot be decoded: {0}")]
     Decode(#[from] DecodeError),
     #[error("codec: {0}")]

@@ -20,7 +20,7 @@ pub enum ReconstructionError {
     Sample { index: usize, reason: String },
     #[error("the light field: {reason}")]
     LightField { reason: String },
-    /// A sample image lacks a plane, named as in [`depth_image::DepthImageError`].
+    /// A sample image lacks a plane, named as in [`depth_image::SampleImageError`].
     #[error("sample image {index} has no plane {plane}, which the reconstruction method needs")]
     MissingPlane { index: usize, plane: &'static str },
     /// The method, or rays off mirrors, show the colour of samples; `index` is the image's place in the set.

@@ -4,7 +4,7 @@ use anyhow::Context as _;
 use depth_image::{Aabb, Antialias, Camera, DepthImage, Highlight, PinholeCamera, ProvenanceKind, View, ViewPlanes};
 use glam::{UVec2, Vec3};
 use gpu::Turn;
-use metrics::{Rgb8Image, flip_map, psnr_db};
+use metrics::{flip_map, psnr_db};
 use reconstruction::{MirrorCell, Mirrors, ReconstructRequest, SampleSet, SetDescription};
 use render::{GpuScene, Lighting, SamplePlanes};
 use sampling::Impostors;
@@ -168,14 +168,12 @@ impl<'s> Hall<'s> {
 }
 
 fn errors_of_view(subject: &Subject, view: &View, pixels: &[bool]) -> anyhow::Result<Errors> {
-    let reference = Rgb8Image::of_view(&subject.truth)?;
-    let picture = Rgb8Image::of_view(view)?;
     let kinds = view.provenance.as_ref().context("provenance")?.iter().map(|provenance| provenance.kind());
     let guessed = kinds.zip(pixels).filter(|(kind, is)| **is && *kind == ProvenanceKind::Guessed).count();
     let count = pixels.iter().filter(|is| **is).count();
     Ok(Errors {
-        flip: flip_map(&reference, &picture)?.mean(Some(pixels))?.context("mirrored pixels")?,
-        psnr_db: psnr_db(&reference, &picture, Some(pixels))?.context("mirrored pixels")?,
+        flip: flip_map(&subject.truth, view)?.mean(Some(pixels))?.context("mirrored pixels")?,
+        psnr_db: psnr_db(&subject.truth, view, Some(pixels))?.context("mirrored pixels")?,
         guessed_ratio: guessed as f64 / count as f64,
     })
 }

@@ -5,7 +5,7 @@ use app_core::progress::bar;
 use cluster::{Costs, PolicyChoice, SessionPlan};
 use coordinator::schedule::k_fd;
 use depth_image::View;
-use metrics::{Rgb8Image, flip_map, pdiff_map, psnr_db};
+use metrics::{flip_map, pdiff_map, psnr_db};
 use reconstruction::ReconstructionMethod;
 use report::{Cell, Report, Table};
 
@@ -156,10 +156,9 @@ impl Errors {
     fn new(direct: &[View], made: &[View]) -> anyhow::Result<Self> {
         let mut sums = Self::default();
         for (direct, view) in direct.iter().zip(made) {
-            let [direct, view] = [Rgb8Image::of_view(direct)?, Rgb8Image::of_view(view)?];
-            sums.psnr_db += psnr_db(&direct, &view, None)?.unwrap_or(f64::NAN);
-            sums.flip += flip_map(&direct, &view)?.mean(None)?.unwrap_or(f64::NAN);
-            sums.different_px += pdiff_map(&direct, &view)?.into_iter().filter(|&differs| differs).count() as f64;
+            sums.psnr_db += psnr_db(direct, view, None)?.unwrap_or(f64::NAN);
+            sums.flip += flip_map(direct, view)?.mean(None)?.unwrap_or(f64::NAN);
+            sums.different_px += pdiff_map(direct, view)?.into_iter().filter(|&differs| differs).count() as f64;
         }
         let count = made.len() as f64;
         let Self { psnr_db, flip, different_px } = sums;

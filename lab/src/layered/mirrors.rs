@@ -3,7 +3,7 @@
 use anyhow::Context as _;
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use glam::{UVec2, Vec3};
-use metrics::{Rgb8Image, flip_map, psnr_db};
+use metrics::{flip_map, psnr_db};
 use reconstruction::{Mirrors, ReconstructRequest, ReconstructionMethod, SampleSet};
 use render::Lighting;
 
@@ -76,9 +76,8 @@ pub fn middle(views: &[View]) -> anyhow::Result<&View> {
 pub fn errors(truths: &[View], views: &[View], pixels: &[Vec<bool>]) -> anyhow::Result<[f64; 2]> {
     let mut sums = [0.0; 2];
     for ((truth, view), pixels) in truths.iter().zip(views).zip(pixels) {
-        let [reference, picture] = [Rgb8Image::of_view(truth)?, Rgb8Image::of_view(view)?];
-        sums[0] += psnr_db(&reference, &picture, Some(pixels))?.context("pixels that reflect")?;
-        sums[1] += flip_map(&reference, &picture)?.mean(Some(pixels))?.context("pixels that reflect")?;
+        sums[0] += psnr_db(truth, view, Some(pixels))?.context("pixels that reflect")?;
+        sums[1] += flip_map(truth, view)?.mean(Some(pixels))?.context("pixels that reflect")?;
     }
     Ok(sums.map(|sum| sum / truths.len() as f64))
 }

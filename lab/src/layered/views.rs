@@ -1,7 +1,7 @@
 //! Views from cubes: errors, loads and time.
 
 use depth_image::{View, ViewPlanes};
-use metrics::{PictureErrors, Rgb8Image, depth_errors};
+use metrics::{PictureErrors, depth_errors};
 use reconstruction::{ReconstructRequest, ReconstructionMethod, SampleSet};
 
 use super::subject::Subject;
@@ -65,9 +65,9 @@ pub fn made(subject: &Subject<'_>, set: &SampleSet) -> anyhow::Result<Vec<View>>
 pub fn figures(truths: &[View], views: &[View], view_s: f64) -> anyhow::Result<Figures> {
     let mut all = Figures { psnr_db: 0.0, flip: 0.0, wrong_hits: 0.0, missed: 0.0, loads: None, view_s };
     for (truth, view) in truths.iter().zip(views) {
-        let [foreground, _] = PictureErrors::of(truth, &Rgb8Image::of_view(view)?)?;
+        let [foreground, _] = PictureErrors::of(truth, view)?;
         let depths = [truth, view].map(|view| view.inverse_depth_per_m.as_deref().unwrap_or_default());
-        let depth = depth_errors(depths[0], depths[1], None)?;
+        let depth = depth_errors(depths[0], depths[1])?;
         let share = 1.0 / truths.len() as f64;
         all.psnr_db += share * foreground.psnr_db;
         all.flip += share * foreground.flip;

@@ -1,7 +1,7 @@
 //! The errors of frames, and of their changes.
 
 use depth_image::View;
-use metrics::{MetricsError, Rgb8Image, change_error_map, flip_map, foreground};
+use metrics::{MetricsError, change_error_map, flip_map, foreground};
 
 /// A frame as it is delivered, and the same view drawn from the scene, with depth.
 #[derive(Debug, Clone, Copy)]
@@ -24,11 +24,10 @@ impl Figures {
     /// # Errors
     /// The views differ in size.
     pub fn new(before: Compared<'_>, frame: Compared<'_>) -> Result<Self, MetricsError> {
-        let [r0, r1] = [Rgb8Image::of_view(before.truth)?, Rgb8Image::of_view(frame.truth)?];
-        let [t0, t1] = [Rgb8Image::of_view(before.view)?, Rgb8Image::of_view(frame.view)?];
-        let mask = foreground(frame.truth, &t1)?;
-        let change_error = change_error_map([&r0, &r1], [&t0, &t1])?.mean(Some(&mask))?;
-        let flip = flip_map(&r1, &t1)?.mean(Some(&mask))?;
+        let mask = foreground(frame.truth, frame.view)?;
+        let change_error =
+            change_error_map([before.truth, frame.truth], [before.view, frame.view])?.mean(Some(&mask))?;
+        let flip = flip_map(frame.truth, frame.view)?.mean(Some(&mask))?;
         Ok(Self { flip: flip.unwrap_or(0.0), change_error: change_error.unwrap_or(0.0) })
     }
 }

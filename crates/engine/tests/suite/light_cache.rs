@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use cluster::{CommonCell, CommonKind, SamplePlanes};
-use codec::{DecodeLimits, PlaneSet, decode_depth_image, encode_depth_image};
+use codec::{DecodeLimits, decode_depth_image, encode_depth_image};
 use depth_image::{
     Antialias, Camera, CubeGrid, DepthImage, PinholeCamera, SampleCamera, SampleImages, View, ViewPlanes,
 };
@@ -58,7 +58,7 @@ fn decoded_set() -> SampleSet {
 }
 
 fn sent(image: &DepthImage) -> DepthImage {
-    let encoded = encode_depth_image(image, PlaneSet::ALL).expect("encoded");
+    let encoded = encode_depth_image(image).expect("encoded");
     decode_depth_image(&encoded.header, image.camera, &encoded.payload, &DecodeLimits::default()).expect("decoded")
 }
 

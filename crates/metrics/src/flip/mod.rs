@@ -6,18 +6,17 @@
 
 mod kernels;
 
-use depth_image::linear_from_srgb8;
+use depth_image::{View, linear_from_srgb8};
 use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::color::{REC_709, WhiteRelative, convert_pixels};
 use crate::convolution::{Edge, Plane};
-use crate::{MetricsError, Rgb8Image, ScoreMap};
+use crate::image::expect_same_size;
+use crate::{MetricsError, ScoreMap};
 use kernels::{ACHROMATIC, BLUE_YELLOW, FeatureKernels, RED_GREEN, Sensitivity};
 
-/// The paper's viewer: 0.7 m from a display 0.7 m wide with 3840 columns, 0.7 · 3840 / 0.7 · π / 180.
-pub const FLIP_PIXELS_PER_DEGREE: f32 = 67.020_64;
-/// The greatest distance between a pixel and another that its error depends on, in pixels, for the default viewer.
+/// The greatest distance between a pixel and another that its error depends on, in pixels.
 pub const FLIP_REACH_PX: u32 = 10;
 /// Differences are compressed by this power.
 const POWER: f32 = 0.7;
@@ -26,58 +25,45 @@ const KNEE: f32 = 0.4;
 /// …are spread over this share of the output.
 const KNEE_OUTPUT: f32 = 0.95;
 
-/// FLIP's error of every pixel, 0 to 1, for the default viewer.
+/// FLIP's error of every pixel, 0 to 1, for the paper's viewer.
 ///
 /// # Errors
 /// Images differ in size.
-pub fn flip_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<ScoreMap, MetricsError> {
-    flip_map_at(reference, test, FLIP_PIXELS_PER_DEGREE)
-}
-
-/// FLIP's error of every pixel, 0 to 1, for a viewer with this many pixels a degree.
-///
-/// # Errors
-/// Images of different sizes, or no such viewer.
-pub fn flip_map_at(reference: &Rgb8Image, test: &Rgb8Image, pixels_per_degree: f32) -> Result<ScoreMap, MetricsError> {
-    reference.expect_same_size(test)?;
-    if !(pixels_per_degree.is_finite() && pixels_per_degree > 0.0) {
-        return Err(MetricsError::Setting { what: "pixels per degree" });
-    }
+pub fn flip_map(reference: &View, test: &View) -> Result<ScoreMap, MetricsError> {
+    expect_same_size(reference, test)?;
     let space = WhiteRelative::new(REC_709);
     let [reference_ycxcz, test_ycxcz] = [reference, test]
         .map(|image| convert_pixels(image, linear_from_srgb8, |linear| space.ycxcz_from_linear(linear)));
-    let width = reference.width_px() as usize;
-    let color = color_difference(&reference_ycxcz, &test_ycxcz, width, pixels_per_degree);
-    let feature = feature_difference(&reference_ycxcz, &test_ycxcz, width, pixels_per_degree);
+    let width = reference.size_px.x as usize;
+    let color = color_difference(&reference_ycxcz, &test_ycxcz, width);
+    let feature = feature_difference(&reference_ycxcz, &test_ycxcz, width);
     let values = color.par_iter().zip(&feature).map(|(color, feature)| color.powf(1.0 - feature)).collect();
-    let (width_px, height_px) = reference.size_px();
-    Ok(ScoreMap { width_px, height_px, border_px: 0, values })
+    Ok(ScoreMap { size_px: reference.size_px, border_px: 0, values })
 }
 
 /// The colour difference of every pixel, 0 to 1 (§4.1): filter by contrast sensitivity, then measure in Hunt-adjusted
 /// L*a*b*.
-fn color_difference(reference_ycxcz: &[Vec3], test_ycxcz: &[Vec3], width: usize, pixels_per_degree: f32) -> Vec<f32> {
+fn color_difference(reference_ycxcz: &[Vec3], test_ycxcz: &[Vec3], width: usize) -> Vec<f32> {
     let space = WhiteRelative::new(REC_709);
-    let [reference, test] =
-        [reference_ycxcz, test_ycxcz].map(|image| perceived(image, width, pixels_per_degree, &space));
+    let [reference, test] = [reference_ycxcz, test_ycxcz].map(|image| perceived(image, width, &space));
     // Green against blue is the greatest difference that a display can show.
     let greatest = hyab(hunt_adjusted(&space, Vec3::Y), hunt_adjusted(&space, Vec3::Z)).powf(POWER);
     reference.par_iter().zip(&test).map(|(a, b)| remapped(hyab(*a, *b).powf(POWER), greatest)).collect()
 }
 
 /// Hunt-adjusted L*a*b* of what the eye resolves.
-fn perceived(ycxcz: &[Vec3], width: usize, pixels_per_degree: f32, space: &WhiteRelative) -> Vec<Vec3> {
+fn perceived(ycxcz: &[Vec3], width: usize, space: &WhiteRelative) -> Vec<Vec3> {
     let channels = [0, 1, 2].map(|channel| Plane { width, values: ycxcz.iter().map(|color| color[channel]).collect() });
-    let y = filtered(&channels[0], &[ACHROMATIC], pixels_per_degree);
-    let cx = filtered(&channels[1], &[RED_GREEN], pixels_per_degree);
-    let cz = filtered(&channels[2], &BLUE_YELLOW, pixels_per_degree);
+    let y = filtered(&channels[0], &[ACHROMATIC]);
+    let cx = filtered(&channels[1], &[RED_GREEN]);
+    let cz = filtered(&channels[2], &BLUE_YELLOW);
     let pixels = y.par_iter().zip(&cx).zip(&cz).map(|((&y, &cx), &cz)| Vec3::new(y, cx, cz));
     pixels.map(|ycxcz| hunt_adjusted(space, space.linear_from_ycxcz(ycxcz).clamp(Vec3::ZERO, Vec3::ONE))).collect()
 }
 
 /// The plane convolved with a sum of sensitivities that together weigh 1.
-fn filtered(plane: &Plane, sensitivities: &[Sensitivity], pixels_per_degree: f32) -> Vec<f32> {
-    let kernels: Vec<_> = sensitivities.iter().map(|one| one.kernel(pixels_per_degree)).collect();
+fn filtered(plane: &Plane, sensitivities: &[Sensitivity]) -> Vec<f32> {
+    let kernels: Vec<_> = sensitivities.iter().map(|one| one.kernel()).collect();
     let total: f32 = kernels.iter().map(|(_, volume)| volume).sum();
     let mut sum = vec![0.0; plane.values.len()];
     for (kernel, volume) in &kernels {
@@ -110,8 +96,8 @@ fn remapped(difference: f32, greatest: f32) -> f32 {
 }
 
 /// The feature difference of every pixel, 0 to 1 (§4.2): edges and points that only one image has.
-fn feature_difference(reference_ycxcz: &[Vec3], test_ycxcz: &[Vec3], width: usize, pixels_per_degree: f32) -> Vec<f32> {
-    let kernels = FeatureKernels::new(pixels_per_degree);
+fn feature_difference(reference_ycxcz: &[Vec3], test_ycxcz: &[Vec3], width: usize) -> Vec<f32> {
+    let kernels = FeatureKernels::new();
     let [reference, test] = [reference_ycxcz, test_ycxcz].map(|image| Features::of(image, width, &kernels));
     let edges = reference.edge.par_iter().zip(&test.edge).map(|(a, b)| (a - b).abs());
     let points = reference.point.par_iter().zip(&test.point).map(|(a, b)| (a - b).abs());
@@ -139,10 +125,12 @@ impl Features {
 
 #[cfg(test)]
 mod tests {
+    use glam::UVec2;
+
     use super::*;
 
-    fn flat(rgb: [u8; 3]) -> Rgb8Image<'static> {
-        Rgb8Image::new(5, 4, rgb.repeat(20)).unwrap()
+    fn flat(rgb: [u8; 3]) -> View {
+        View::from_srgb8(UVec2::new(5, 4), rgb.repeat(20))
     }
 
     #[test]
@@ -168,7 +156,7 @@ mod tests {
         let images = [1, 5].map(|seed| (0..3 * SIDE * SIDE).map(|index| byte(index, seed)).collect::<Vec<u8>>());
         let map = |first: usize| {
             let side = (SIDE - 2 * first) as u32;
-            let [a, b] = [0, 1].map(|image| Rgb8Image::new(side, side, crop(&images[image], first)).unwrap());
+            let [a, b] = [0, 1].map(|image| View::from_srgb8(UVec2::splat(side), crop(&images[image], first)));
             flip_map(&a, &b).unwrap().values
         };
         let whole = map(0);
@@ -184,12 +172,5 @@ mod tests {
             }
         }
         assert!(differs_nearer, "the border matters");
-    }
-
-    #[test]
-    fn an_impossible_viewer_is_refused() {
-        for pixels_per_degree in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            assert!(flip_map_at(&flat([0; 3]), &flat([0; 3]), pixels_per_degree).is_err());
-        }
     }
 }

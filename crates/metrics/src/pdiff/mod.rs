@@ -9,12 +9,14 @@
 
 mod vision;
 
+use depth_image::View;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use crate::MetricsError;
 use crate::color::{ADOBE_RGB, WhiteRelative, convert_pixels, lab_from_relative_xyz};
 use crate::convolution::{Edge, Plane};
-use crate::{MetricsError, Rgb8Image};
+use crate::image::expect_same_size;
 use vision::{FrequencyBands, LEVELS, threshold_vs_intensity};
 
 /// Burt and Adelson's generating kernel.
@@ -36,9 +38,9 @@ const WHITE_CD_M2: f32 = 100.0;
 ///
 /// # Errors
 /// Images differ in size.
-pub fn pdiff_map(reference: &Rgb8Image, test: &Rgb8Image) -> Result<Vec<bool>, MetricsError> {
-    reference.expect_same_size(test)?;
-    let bands = FrequencyBands::new(reference.width_px(), FIELD_OF_VIEW_DEG);
+pub fn pdiff_map(reference: &View, test: &View) -> Result<Vec<bool>, MetricsError> {
+    expect_same_size(reference, test)?;
+    let bands = FrequencyBands::new(reference.size_px.x, FIELD_OF_VIEW_DEG);
     let [reference, test] = [reference, test].map(Seen::new);
     let pixels = (0..reference.ab.len()).into_par_iter();
     Ok(pixels.map(|index| fails(&reference, &test, &bands, index)).collect())
@@ -53,7 +55,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn new(image: &Rgb8Image) -> Self {
+    fn new(image: &View) -> Self {
         let space = WhiteRelative::new(ADOBE_RGB);
         let xyz: Vec<Vec3> = convert_pixels(
             image,
@@ -63,7 +65,7 @@ impl Seen {
         let luminance = xyz.iter().map(|xyz| xyz.y * WHITE_CD_M2).collect();
         let lab = xyz.iter().map(|&xyz| lab_from_relative_xyz(xyz));
         Self {
-            pyramid: pyramid(Plane { width: image.width_px() as usize, values: luminance }),
+            pyramid: pyramid(Plane { width: image.size_px.x as usize, values: luminance }),
             ab: lab.map(|lab| Vec2::new(lab.y, lab.z)).collect(),
         }
     }
@@ -103,10 +105,12 @@ fn contrast(images: [&Seen; 2], index: usize, band: usize) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use glam::UVec2;
+
     use super::*;
 
-    fn flat(rgb: [u8; 3]) -> Rgb8Image<'static> {
-        Rgb8Image::new(64, 48, rgb.repeat(64 * 48)).unwrap()
+    fn flat(rgb: [u8; 3]) -> View {
+        View::from_srgb8(UVec2::new(64, 48), rgb.repeat(64 * 48))
     }
 
     fn failing(a: [u8; 3], b: [u8; 3]) -> usize {

@@ -1,14 +1,16 @@
 //! All image metrics on one pair of patterns.
 
-use metrics::{MetricsError, Rgb8Image, flip_map, pdiff_map, psnr_db, ssim_map};
+use depth_image::View;
+use glam::UVec2;
+use metrics::{MetricsError, flip_map, pdiff_map, psnr_db, ssim_map};
 
-fn pattern(shift: usize) -> Rgb8Image<'static> {
+fn pattern(shift: usize) -> View {
     let bytes = (0..24 * 16).flat_map(|i| {
         let x = (i % 24 + shift) / 4;
         let y = i / 24 / 4;
         [((x * 67 + y * 31) % 256) as u8, ((x * 151 + y * 83) % 256) as u8, ((x * 29 + y * 197) % 256) as u8]
     });
-    Rgb8Image::new(24, 16, bytes.collect::<Vec<u8>>()).unwrap()
+    View::from_srgb8(UVec2::new(24, 16), bytes.collect())
 }
 
 #[test]
@@ -49,7 +51,7 @@ fn masks_add_up_and_an_empty_mask_has_no_means() {
 
 #[test]
 fn sizes_must_agree() {
-    let small = Rgb8Image::new(3, 2, vec![5; 18]).unwrap();
+    let small = View::from_srgb8(UVec2::new(3, 2), vec![5; 18]);
     let large = pattern(0);
     let differ = |error| matches!(error, MetricsError::SizesDiffer { .. });
     assert!(differ(psnr_db(&small, &large, None).unwrap_err()));

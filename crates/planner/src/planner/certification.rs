@@ -3,7 +3,7 @@
 //! Rows are tested in a fixed sequence, from the safest to the cheapest, and the first failure ends it. All certificates of
 //! a sequence hold together: this is fixed-sequence testing (Angelopoulos et al. 2021, "Learn then Test").
 
-use super::stage::{Round, Work};
+use super::state::{Round, Work};
 use super::{Planner, TOLERANCE};
 use crate::bounds::{ERROR_RATE, MAX_ROUNDS, round_error_rate};
 use crate::costs::Pricing;

@@ -1,6 +1,6 @@
 //! Answers to measurements: they must be what was asked for.
 
-use super::stage::{Stage, Work};
+use super::state::{Stage, Work};
 use super::{Planner, TIMED_REPEATS, TIMED_VIEWS};
 use crate::cost_model::{CostModel, TimedRow};
 use crate::costs::{Price, Pricing, RowCosts};

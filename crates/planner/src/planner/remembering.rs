@@ -1,8 +1,7 @@
 //! Measurements of earlier plans, and for later ones.
 
 use super::Planner;
-use super::row_state::RowState;
-use super::stage::Stage;
+use super::state::{RowState, Stage};
 use crate::budget::Budget;
 use crate::costs::Pricing;
 use crate::invalid::InvalidField;

@@ -14,7 +14,7 @@ pub(crate) struct CornerPlanes {
 }
 
 impl CornerPlanes {
-    /// The first image that lacks a plane, and the plane's name in [`depth_image::DepthImageError`].
+    /// The first image that lacks a plane, and the plane's name in [`depth_image::SampleImageError`].
     pub fn missing(images: &[DepthImage]) -> Option<(usize, &'static str)> {
         images.iter().enumerate().find_map(|(index, image)| {
             let normal = image.normal_oct16.is_none().then_some("normal");

@@ -6,7 +6,7 @@ use depth_image::{
 use fixtures::{mirror_box, quad};
 use glam::{Affine3A, Quat, UVec2, Vec3};
 use gpu::Turn;
-use metrics::{Rgb8Image, psnr_db};
+use metrics::psnr_db;
 use reconstruction::scalar::CubeTwin;
 use reconstruction::{
     Mirrors, ReconstructRequest, ReconstructionError, ReconstructionMethod, SampleSet, SetDescription,
@@ -110,10 +110,7 @@ fn mirrors_show_what_direct_drawing_shows() {
         });
         views.expect("a view").remove(0)
     };
-    let psnr = |a: &View, b: &View| {
-        let [a, b] = [a, b].map(|view| Rgb8Image::of_view(view).expect("a picture"));
-        psnr_db(&a, &b, None).expect("of one size").expect("pixels")
-    };
+    let psnr = |a: &View, b: &View| psnr_db(a, b, None).expect("of one size").expect("pixels");
     let direct =
         |lighting: &str| renderer().draw_views(lit(lighting), &[camera], ViewPlanes::ALL).expect("a view").remove(0);
     let [none, one, all] = [direct("shadows"), direct("shadows, reflections 1"), direct("shadows, reflections 7")];

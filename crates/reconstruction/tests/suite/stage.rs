@@ -7,7 +7,6 @@ use depth_image::{
 };
 use glam::{UVec2, Vec3};
 use gpu::{DevicePreference, Gpu, Turn};
-use metrics::Rgb8Image;
 use reconstruction::{
     ReconstructRequest, ReconstructionError, ReconstructionMethod, Reconstructor, SampleSet, SetDescription,
 };
@@ -237,8 +236,7 @@ fn depths_agree(a: &View, b: &View, index: usize) -> bool {
 
 /// Over the pixels of a mask.
 pub fn psnr_db(reference: &View, test: &View, mask: &[bool]) -> f64 {
-    let picture = |view: &View| Rgb8Image::new(view.size_px.x, view.size_px.y, view.srgb8.clone()).expect("a picture");
-    metrics::psnr_db(&picture(reference), &picture(test), Some(mask)).expect("equal sizes").expect("pixels")
+    metrics::psnr_db(reference, test, Some(mask)).expect("equal sizes").expect("pixels")
 }
 
 /// Every plane of a view is a picture: finite depths, not negative.

@@ -12,7 +12,7 @@ use engine::GpuEngine;
 use glam::UVec2;
 use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use metrics::{PictureErrors, Rgb8Image, flip_map};
+use metrics::{PictureErrors, flip_map};
 use node::{DirectWork, Engine as _, SampleSet, Turn, ViewWork, WorkClass};
 use probe::{Light, Representation};
 use render::Lighting;
@@ -191,9 +191,8 @@ struct FlipError {
 
 impl FlipError {
     fn new(reference: &TimedView, timed: &TimedView) -> anyhow::Result<Self> {
-        let picture = Rgb8Image::of_view(&timed.view)?;
-        let [foreground, _] = PictureErrors::of(&reference.view, &picture)?;
-        let map = pictures::error_map(&flip_map(&Rgb8Image::of_view(&reference.view)?, &picture)?);
+        let [foreground, _] = PictureErrors::of(&reference.view, &timed.view)?;
+        let map = pictures::error_map(&flip_map(&reference.view, &timed.view)?);
         Ok(Self { mean: foreground.flip, map })
     }
 

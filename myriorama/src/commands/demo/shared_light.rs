@@ -7,7 +7,7 @@ use cluster::{Costs, OfferSettings, PolicyChoice, SessionPlan, SessionRequest};
 use coordinator::schedule::k_fd;
 use depth_image::{PinholeCamera, View, ViewPlanes};
 use image::imageops;
-use metrics::{PictureErrors, Rgb8Image, flip_map};
+use metrics::{PictureErrors, flip_map};
 use render::Lighting;
 use report::{Axis, Picture, PictureRow, Point, Report, Series, Table, XyChart};
 
@@ -34,7 +34,7 @@ struct ComparedView {
 
 impl ComparedView {
     fn new(direct: View, reconstructed: View) -> anyhow::Result<Self> {
-        let [errors, _] = PictureErrors::of(&direct, &Rgb8Image::of_view(&reconstructed)?)?;
+        let [errors, _] = PictureErrors::of(&direct, &reconstructed)?;
         Ok(Self { direct, reconstructed, errors })
     }
 }
@@ -235,7 +235,7 @@ fn all_views(result: &LightResult) -> PictureRow {
 /// The row *direct | reconstructed | error map | provenance*.
 fn compared_row(title: &str, compared: &ComparedView) -> anyhow::Result<PictureRow> {
     let ComparedView { direct, reconstructed, .. } = compared;
-    let flip = flip_map(&Rgb8Image::of_view(direct)?, &Rgb8Image::of_view(reconstructed)?)?;
+    let flip = flip_map(direct, reconstructed)?;
     let images = [
         ("direct", pictures::rgb(direct)),
         ("reconstructed", pictures::rgb(reconstructed)),

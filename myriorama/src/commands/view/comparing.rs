@@ -8,7 +8,7 @@ use app_core::print_line;
 use client::Frame;
 use cluster::{BudgetRequest, DIRECT, PolicyChoice, SessionRequest};
 use depth_image::{View, ViewPlanes};
-use metrics::{PictureErrors, Rgb8Image};
+use metrics::PictureErrors;
 use report::{Cell, Table};
 
 use super::args::ViewArgs;
@@ -72,7 +72,7 @@ fn table(mut rows: Vec<(usize, Row)>) -> anyhow::Result<Table> {
 /// PSNR, SSIM and FLIP of a written picture, against a view with depth.
 fn row(truth: &View, written: &Path) -> anyhow::Result<Row> {
     let picture = image::open(written).with_context(|| format!("cannot read {}", written.display()))?.into_rgb8();
-    let test = Rgb8Image::new(picture.width(), picture.height(), picture.as_raw().as_slice())?;
+    let test = View::from_srgb8(picture.dimensions().into(), picture.into_raw());
     let [foreground, whole] = PictureErrors::of(truth, &test)?;
     Ok([foreground.psnr_db, foreground.ssim, foreground.flip, whole.psnr_db, whole.ssim, whole.flip])
 }

@@ -3,7 +3,9 @@
 
 mod pairs;
 
-use metrics::{Rgb8Image, flip_map, psnr_db, ssim_map};
+use depth_image::View;
+use glam::UVec2;
+use metrics::{flip_map, psnr_db, ssim_map};
 use pairs::Pair;
 
 struct Expected {
@@ -25,12 +27,12 @@ const EXPECTED: [Expected; 6] = [
     Expected { name: "step", psnr_db: 48.141771317933255, ssim: 0.9994636693173401, flip: 0.037994664162397385, flip_at_third: 0.035_729_1 },
 ];
 
-fn images(pair: &Pair) -> [Rgb8Image<'_>; 2] {
-    let image = |pixels| Rgb8Image::new(pair.width as u32, pair.height as u32, pixels).unwrap();
-    [&pair.reference, &pair.test].map(|pixels| image(pixels.as_slice()))
+fn images(pair: &Pair) -> [View; 2] {
+    let size_px = UVec2::new(pair.width as u32, pair.height as u32);
+    [&pair.reference, &pair.test].map(|pixels| View::from_srgb8(size_px, pixels.clone()))
 }
 
-fn for_each_pair(check: impl Fn(&Expected, [Rgb8Image; 2])) {
+fn for_each_pair(check: impl Fn(&Expected, [View; 2])) {
     let pairs = pairs::all();
     assert_eq!(pairs.len(), EXPECTED.len());
     for (pair, expected) in pairs.iter().zip(&EXPECTED) {
@@ -64,7 +66,7 @@ fn flip_agrees() {
     for_each_pair(|expected, [reference, test]| {
         let map = flip_map(&reference, &test).unwrap();
         expect_near("FLIP", expected, map.mean(None).unwrap().unwrap(), expected.flip, 2e-5);
-        let at = reference.pixel_count() / 2 + reference.width_px() as usize / 3;
+        let at = map.values.len() / 2 + reference.size_px.x as usize / 3;
         expect_near("FLIP at a pixel", expected, f64::from(map.values[at]), f64::from(expected.flip_at_third), 1e-4);
     });
 }
