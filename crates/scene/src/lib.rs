@@ -32,7 +32,7 @@ pub use animation::{
 pub use depth_image::{Environment, EnvironmentMap, Illumination, Light, LightError, SourceSpace};
 pub use error::{SceneError, SceneErrorKind};
 pub use import::{ImportOptions, MissingTextures, MissingTexturesError, load_environment, load_file};
-pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError, LightSpecErrorKind};
+pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError};
 pub use limits::{Limits, MAX_COORDINATE_M};
 pub use model::*;
 pub use package::{pack, unpack};

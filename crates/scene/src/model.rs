@@ -286,17 +286,6 @@ impl Material {
         ]
     }
 
-    /// The same, to be changed.
-    pub fn textures_mut(&mut self) -> [&mut Option<TextureUse>; 5] {
-        [
-            &mut self.base_color_texture,
-            &mut self.metallic_roughness_texture,
-            &mut self.normal_texture,
-            &mut self.emissive_texture,
-            &mut self.occlusion_texture,
-        ]
-    }
-
     /// Returns whether alpha decides where the surface is.
     #[must_use]
     pub fn is_alpha_tested(&self) -> bool {

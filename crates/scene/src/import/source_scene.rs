@@ -6,11 +6,11 @@ use glam::{Affine3A, DAffine3, DVec3};
 
 use super::extent::{Box3, DRAWABLE_MESH_EXTENT, recentring_offset, scale_to_drawable, source_space};
 use crate::animation::{Animation, Influence, MovingInstance};
-use crate::error::{Fault, at_most};
-use crate::light_rig::{DEFAULT_BACKGROUND, position_mut, scale_to_metres};
+use crate::error::Fault;
+use crate::light_rig::{DEFAULT_BACKGROUND, SourceLight};
 use crate::{
-    Environment, Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, SourceSpace,
-    Texture, Vertex, VertexDetail,
+    Environment, Illumination, Instance, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, SourceSpace, Texture,
+    Vertex, VertexDetail,
 };
 
 /// The result of an importer.
@@ -50,12 +50,6 @@ pub(crate) struct SourceInstance {
     pub source_from_mesh: DAffine3,
 }
 
-/// A light whose position is outside of `light`, where it is unset.
-pub(crate) struct SourceLight {
-    pub light: Light,
-    pub position_in_source: DVec3,
-}
-
 pub(crate) struct PlacedCamera {
     pub name: String,
     pub source_from_camera: DAffine3,
@@ -70,11 +64,10 @@ pub(crate) fn plain_vertex() -> Vertex {
 impl SourceScene {
     /// Checks, re-centres, un-mirrors, converts to `f32`, and validates.
     pub(crate) fn finish(mut self, limits: &Limits) -> Result<Scene, Fault> {
-        self.check_sizes(limits)?;
         self.normalise_meshes()?;
         let source_space = source_space(self.bounds_in_source(), self.animation.is_some())?;
         self.unmirror();
-        let lights = self.lights.iter().map(|l| l.placed_in(source_space)).collect();
+        let lights = self.lights.into_iter().map(|l| l.placed_in(source_space)).collect();
         let SourceSpace { origin_in_source, metres_per_unit } = source_space;
         let world_from_source =
             DAffine3::from_scale(DVec3::splat(metres_per_unit)) * DAffine3::from_translation(-origin_in_source);
@@ -106,17 +99,6 @@ impl SourceScene {
         };
         scene.check(limits)?;
         Ok(scene)
-    }
-
-    fn check_sizes(&self, limits: &Limits) -> Result<(), Fault> {
-        at_most("instances", self.instances.len() as u64, limits.instances)?;
-        let triangles = self.instances.iter().map(|i| self.meshes[i.mesh].indices.len() as u64 / 3);
-        let triangles = triangles.fold(0, u64::saturating_add);
-        at_most("triangles of all instances", triangles, limits.triangles)?;
-        if triangles == 0 {
-            return Err(Fault::malformed("scene", "it has no triangles"));
-        }
-        Ok(())
     }
 
     /// Moves a mesh that is far from its own origin there, and scales one whose extent `f32` cannot draw; its instances take
@@ -243,17 +225,6 @@ impl SourceMesh {
             vertex.position = position.as_vec3().to_array();
         }
         Mesh { vertices: self.vertices, details: self.details, indices: self.indices, parts: self.parts }
-    }
-}
-
-impl SourceLight {
-    fn placed_in(&self, source_space: SourceSpace) -> Light {
-        let mut light = self.light;
-        if let Some(position) = position_mut(&mut light) {
-            *position = source_space.world_from_source(self.position_in_source);
-        }
-        scale_to_metres(&mut light, source_space.metres_per_unit);
-        light
     }
 }
 
