@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::super::Import;
 use super::super::source_scene::plain_vertex;
-use super::super::vertex_colors::{bytes, scale_to_bytes};
+use super::super::vertex_colors::{ColorRange, Colors};
 use super::super::warnings::Warnings;
 use super::text::Line;
 use crate::error::{Fault, at_most};
@@ -21,7 +21,7 @@ pub(super) struct Attributes {
     /// Not finite where the file has no numbers.
     pub positions_in_source: Vec<DVec3>,
     /// One for each position once any position has one.
-    colors: Vec<[f32; 3]>,
+    colors: Vec<[f32; 4]>,
     /// The colours of ZBrush, in the order of positions.
     mrgb_srgb8: Vec<[u8; 3]>,
     uvs: Vec<[f32; 2]>,
@@ -39,8 +39,8 @@ impl Attributes {
             import.warnings.count("vertices without three finite coordinates", line);
         }
         if let [Some(r), Some(g), Some(b)] = [a, g, b] {
-            self.colors.resize(self.positions_in_source.len(), [f32::NAN; 3]);
-            self.colors.push([r, g, b].map(|c| c as f32));
+            self.colors.resize(self.positions_in_source.len(), [f32::NAN; 4]);
+            self.colors.push([r, g, b, f64::NAN].map(|c| c as f32));
         }
         let weight = a.filter(|weight| g.is_none() && weight.is_finite() && *weight != 0.0);
         self.positions_in_source.push(weight.map_or(position, |weight| position / weight));
@@ -77,11 +77,11 @@ impl Attributes {
         }
     }
 
-    /// Drops the parts of a corner that are not there; `None` without a position.
-    pub(super) fn existing(&self, [position, uv, normal]: Corner) -> Option<Corner> {
+    /// A corner without the parts that are not there.
+    pub(super) fn existing(&self, [position, uv, normal]: Corner) -> Corner {
         let uv = if (uv as usize) < self.uvs.len() { uv } else { NONE };
         let normal = if (normal as usize) < self.normals.len() { normal } else { NONE };
-        ((position as usize) < self.positions_in_source.len()).then_some([position, uv, normal])
+        [position, uv, normal]
     }
 
     /// How many elements of each kind there are so far: negative numbers count back from here.
@@ -90,12 +90,11 @@ impl Attributes {
     }
 
     /// Colours of all positions, in bytes; shorter where some have none.
-    pub(super) fn colors_srgba8(&self) -> Vec<[u8; 4]> {
+    pub(super) fn colors_srgba8(&mut self) -> Vec<[u8; 4]> {
         if self.colors.is_empty() {
             return self.mrgb_srgb8.iter().map(|[r, g, b]| [*r, *g, *b, 255]).collect();
         }
-        let scale = scale_to_bytes(self.colors.iter().flatten().copied());
-        self.colors.iter().map(|&[r, g, b]| bytes([r, g, b, f32::NAN], scale)).collect()
+        Colors { range: ColorRange::Floats, values: std::mem::take(&mut self.colors) }.srgba8()
     }
 
     /// A vertex without its colour. An element that is not there has its default.

@@ -3,19 +3,14 @@
 
 use std::collections::HashMap;
 
-use glam::DVec3;
-
 use super::super::Import;
-use super::super::normals;
-use super::super::polygons::{NOT_FINITE, PolygonCutter, TOO_COSTLY, TOO_SHORT};
+use super::super::polygons::{self, PolygonMesh, TOO_SHORT, UNKNOWN_VERTEX};
 use super::super::source_scene::SourceMesh;
-use super::super::warnings::Warnings;
 use super::attributes::{Attributes, Corner, NONE};
 use super::map::UvTransform;
 use super::text::Line;
 use crate::error::{Fault, at_most};
 
-const UNREADABLE: &str = "faces with a corner that is no vertex of the file are left out";
 const TEXTURE_WITHOUT_COORDINATES: &str = "textures without coordinates show one texel";
 const WITHOUT_ATTRIBUTES: &str = "texture coordinates and normals that the file does not have are dropped";
 
@@ -78,7 +73,7 @@ impl Faces {
         let count = self.corners.len() - start;
         if !is_readable || count < 3 {
             self.corners.truncate(start);
-            import.warnings.count(if is_readable { TOO_SHORT } else { UNREADABLE }, line);
+            import.warnings.count(if is_readable { TOO_SHORT } else { UNKNOWN_VERTEX }, line);
             return Ok(());
         }
         if self.current_material.is_none() {
@@ -94,118 +89,45 @@ impl Faces {
 
     pub(super) fn into_mesh(
         self,
-        attributes: &Attributes,
+        mut attributes: Attributes,
         materials: &[MaterialUse],
         import: &Import,
     ) -> Result<SourceMesh, Fault> {
-        let mut builder = Builder {
-            attributes,
-            colors_srgba8: attributes.colors_srgba8(),
-            mesh: SourceMesh::default(),
-            triangles: vec![Triangles::default(); self.material_names.len()],
-            vertex_of_corner: HashMap::new(),
-            cutter: PolygonCutter::new(),
-            polygon_in_source: Vec::new(),
-            vertices: Vec::new(),
-        };
+        let colors_srgba8 = attributes.colors_srgba8();
+        let mut mesh = PolygonMesh::new(&attributes.positions_in_source, materials.len(), import);
         let mut start = 0;
         for face in &self.faces {
             let corners = &self.corners[start..face.end];
             start = face.end;
-            builder.add(face, corners, materials[face.material as usize], &import.warnings);
-            let vertices = builder.mesh.vertices.len() as u64;
-            at_most(format_args!("line {} (f)", face.line), vertices, import.limits.vertices)?;
-        }
-        let mut mesh = builder.mesh;
-        let mut is_flat = Vec::new();
-        for (triangles, material) in builder.triangles.into_iter().zip(materials) {
-            if !triangles.indices.is_empty() {
-                mesh.push_part(triangles.indices, material.number);
-                is_flat.extend(triangles.is_flat);
+            let place = format_args!("line {} (f)", face.line);
+            let Some(polygon) = mesh.polygon(corners.iter().map(|corner| corner[0]), place) else { continue };
+            let material = materials[face.material as usize];
+            let mut in_mesh = Vec::with_capacity(corners.len());
+            let mut has_all = true;
+            let mut have_uvs = true;
+            for corner in corners {
+                let existing @ [position, uv, normal] = attributes.existing(*corner);
+                has_all &= existing == *corner;
+                have_uvs &= uv != NONE;
+                in_mesh.push(mesh.vertex(position, [uv, normal, material.placement_number], || {
+                    let mut vertex = attributes.vertex(existing);
+                    vertex.color_srgba8 = colors_srgba8.get(position as usize).copied().unwrap_or(vertex.color_srgba8);
+                    if material.placement != UvTransform::IDENTITY {
+                        vertex.uv = material.placement.apply(vertex.uv);
+                    }
+                    vertex
+                }));
             }
-        }
-        if mesh.indices.len() > u32::MAX as usize {
-            return Err(Fault::unsupported("faces", "more than 2^32 corners"));
-        }
-        if mesh.indices.is_empty() {
-            let fault = import.warnings.no_triangles([UNREADABLE, NOT_FINITE, TOO_SHORT]);
-            return Err(fault.unwrap_or_else(|| Fault::malformed("scene", "it has no triangles")));
-        }
-        normals::fill(&mut mesh, |triangle| is_flat[triangle]);
-        Ok(mesh)
-    }
-}
-
-/// Makes vertices of corners and triangles of faces.
-struct Builder<'a> {
-    attributes: &'a Attributes,
-    colors_srgba8: Vec<[u8; 4]>,
-    mesh: SourceMesh,
-    /// The triangles of each material.
-    triangles: Vec<Triangles>,
-    /// The key is a corner and the number of its placement.
-    vertex_of_corner: HashMap<(Corner, u32), u32>,
-    cutter: PolygonCutter,
-    polygon_in_source: Vec<DVec3>,
-    vertices: Vec<u32>,
-}
-
-#[derive(Default, Clone)]
-struct Triangles {
-    indices: Vec<u32>,
-    /// Whether each triangle was listed after `s off`.
-    is_flat: Vec<bool>,
-}
-
-impl Builder<'_> {
-    fn add(&mut self, face: &Face, corners: &[Corner], material: MaterialUse, warnings: &Warnings) {
-        let place = format_args!("line {} (f)", face.line);
-        self.polygon_in_source.clear();
-        for corner in corners {
-            let position = self.attributes.positions_in_source.get(corner[0] as usize);
-            self.polygon_in_source.extend(position);
-        }
-        if self.polygon_in_source.len() < corners.len() {
-            return warnings.count(UNREADABLE, place);
-        }
-        if !self.polygon_in_source.iter().all(|p| p.is_finite()) {
-            return warnings.count(NOT_FINITE, place);
-        }
-        self.vertices.clear();
-        let mut has_all = true;
-        let mut have_uvs = true;
-        for corner in corners {
-            let existing = self.attributes.existing(*corner).unwrap_or(*corner);
-            has_all &= existing == *corner;
-            have_uvs &= existing[1] != NONE;
-            let vertex = self.vertex(existing, material);
-            self.vertices.push(vertex);
-        }
-        if !has_all {
-            warnings.count(WITHOUT_ATTRIBUTES, place);
-        }
-        if material.has_texture && !have_uvs {
-            warnings.count(TEXTURE_WITHOUT_COORDINATES, place);
-        }
-        let triangles = self.cutter.triangles(&self.polygon_in_source, || warnings.count(TOO_COSTLY, place));
-        let into = &mut self.triangles[face.material as usize];
-        into.indices.extend(triangles.iter().map(|&corner| self.vertices[corner as usize]));
-        into.is_flat.resize(into.indices.len() / 3, face.is_flat);
-    }
-
-    fn vertex(&mut self, corner: Corner, material: MaterialUse) -> u32 {
-        let next = self.mesh.vertices.len() as u32;
-        let number = *self.vertex_of_corner.entry((corner, material.placement_number)).or_insert(next);
-        if number == next {
-            let mut vertex = self.attributes.vertex(corner);
-            vertex.color_srgba8 = self.colors_srgba8.get(corner[0] as usize).copied().unwrap_or(vertex.color_srgba8);
-            if material.placement != UvTransform::IDENTITY {
-                vertex.uv = material.placement.apply(vertex.uv);
+            if !has_all {
+                import.warnings.count(WITHOUT_ATTRIBUTES, place);
             }
-            self.mesh.positions_in_mesh.push(self.attributes.positions_in_source[corner[0] as usize]);
-            self.mesh.vertices.push(vertex);
+            if material.has_texture && !have_uvs {
+                import.warnings.count(TEXTURE_WITHOUT_COORDINATES, place);
+            }
+            let is_flat = face.is_flat;
+            mesh.push(&polygons::Face { place, polygon, material: face.material as usize, is_flat }, &in_mesh)?;
         }
-        number
+        mesh.finish(materials.iter().map(|material| material.number))
     }
 }
 

@@ -32,7 +32,7 @@ pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> 
     let mut scene = SourceScene::default();
     let libraries = materials::read_libraries(&file.libraries, import)?;
     let materials = materials::read_materials(&libraries, &file.faces.material_names, import, &mut scene)?;
-    scene.meshes.push(file.faces.into_mesh(&file.attributes, &materials, import)?);
+    scene.meshes.push(file.faces.into_mesh(file.attributes, &materials, import)?);
     scene.instances.push(SourceInstance { mesh: 0, source_from_mesh: DAffine3::IDENTITY });
     Ok(scene)
 }

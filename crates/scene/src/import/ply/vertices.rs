@@ -1,23 +1,40 @@
 //! The vertices of a PLY file, of which the surface takes those that its faces use.
 
 use glam::DVec3;
+use serde::Deserialize;
 
 use super::super::source_scene::plain_vertex;
-use super::super::vertex_colors::{bytes, scale_to_bytes};
+use super::super::vertex_colors::{ColorRange, Colors};
 use super::super::warnings::Warnings;
-use super::header::ColorRange;
-use super::rows::VertexRow;
 use crate::Vertex;
+
+/// A vertex of numbers of any type. Position and colour come first, and no field has an alias, so that `serde-ply`
+/// reads common rows by offset instead of by name. The header has shown that there is a position.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct VertexRow {
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+    red: Option<f32>,
+    green: Option<f32>,
+    blue: Option<f32>,
+    alpha: Option<f32>,
+    pub nx: f32,
+    pub ny: f32,
+    pub nz: f32,
+    pub s: Option<f32>,
+    pub t: Option<f32>,
+}
 
 #[derive(Default)]
 pub(super) struct Vertices {
     /// Not finite where the file has no numbers.
     pub positions_in_source: Vec<DVec3>,
-    pub colors: ColorRange,
     pub has_uvs: bool,
-    vertices: Vec<Vertex>,
-    /// The colours of a file that has numbers of an unknown range.
-    float_colors: Vec<[f32; 4]>,
+    /// Without their colours.
+    pub vertices: Vec<Vertex>,
+    pub colors: Colors,
 }
 
 impl Vertices {
@@ -38,29 +55,13 @@ impl Vertices {
         if !uv.iter().all(|c| c.is_finite()) {
             warnings.count("texture coordinates that are not finite count as 0", place);
         }
-        let plain = plain_vertex();
-        let color_srgba8 = match self.colors {
-            ColorRange::None => plain.color_srgba8,
-            ColorRange::Bytes => bytes(row.color(), 1.0),
-            ColorRange::Words => bytes(row.color(), 255.0 / 65_535.0),
-            ColorRange::Floats => {
-                self.float_colors.push(row.color());
-                plain.color_srgba8
-            }
-        };
+        if self.colors.range != ColorRange::None {
+            let channels = [row.red, row.green, row.blue, row.alpha];
+            self.colors.values.push(channels.map(|channel| channel.unwrap_or(f32::NAN)));
+        }
         self.positions_in_source.push(position);
         let normal = normal.unwrap_or(DVec3::ZERO).as_vec3().to_array();
-        self.vertices.push(Vertex { normal, uv: v_downwards(uv), color_srgba8, ..plain });
-    }
-
-    /// The vertices with their colours.
-    pub(super) fn colored(&self) -> Vec<Vertex> {
-        let scale = scale_to_bytes(self.float_colors.iter().flatten().copied());
-        let mut vertices = self.vertices.clone();
-        for (vertex, color) in vertices.iter_mut().zip(&self.float_colors) {
-            vertex.color_srgba8 = bytes(*color, scale);
-        }
-        vertices
+        self.vertices.push(Vertex { normal, uv: v_downwards(uv), ..plain_vertex() });
     }
 }
 
