@@ -1,13 +1,12 @@
 //! The moving part of a scene: instances below nodes that clips move, and skinned meshes.
 
-use glam::DAffine3;
+use glam::{DAffine3, Mat4};
 use gltf::json::{Index, Node as JsonNode, skin::Skin};
 
 use super::super::source_scene::{SourceMesh, SourceScene};
 use super::document::Document;
-use super::nodes::{NodeTree, PlacedNode};
-use super::transforms::{parent_from_node, parts_of};
-use super::{channels, degenerate, skins};
+use super::nodes::{NodeTree, PlacedNode, affine_from, parent_from_node, parts_of};
+use super::{channels, degenerate};
 use crate::animation::{
     Animation, Clip, Influence, Joint, MovingInstance, Node, NodeTransform, TransformParts, is_invertible,
 };
@@ -55,9 +54,9 @@ impl Placements {
                 // A mesh without joints is rigid.
                 let skin = document.root.nodes[node.number].skin.filter(|_| !mesh.influences.is_empty());
                 if let Some(skin) = skin {
-                    let Skinned { joints, influences } = skins.skinned(skin, mesh, node, place)?;
-                    instance.source_from_mesh = at_rest(tree, &joints, &format!("skin {}", skin.value()))?;
-                    placements.moving.push(MovingInstance { instance: number as u32, joints, influences });
+                    let moving = skins.skinned(skin, mesh, node, place)?;
+                    instance.source_from_mesh = at_rest(tree, &moving.joints, &format!("skin {}", skin.value()))?;
+                    placements.moving.push(MovingInstance { instance: number as u32, ..moving });
                 } else if moves[place as usize] {
                     // A clip may grow what has no size at rest: only the place at rest is left.
                     let at_rest = &mut instance.source_from_mesh;
@@ -73,12 +72,6 @@ impl Placements {
         }
         Ok(placements)
     }
-}
-
-/// What a skinned mesh follows.
-struct Skinned {
-    joints: Vec<Joint>,
-    influences: Vec<Influence>,
 }
 
 /// Reads skins. What all skinned meshes take is counted, for a small file may place one mesh often.
@@ -97,7 +90,7 @@ impl<'d> Skins<'d> {
         Self { document, place_in_tree, joints_left: document.limits.nodes, influences_left: document.limits.vertices }
     }
 
-    /// The joints of a skin and of each vertex of a mesh. Vertices without weights follow the mesh's own node, which is then
+    /// The joints of a skin and of each vertex of a mesh, for some instance of it. Vertices without weights follow the mesh's own node, which is then
     /// the last joint; `place` is its place in the tree.
     fn skinned(
         &mut self,
@@ -105,7 +98,7 @@ impl<'d> Skins<'d> {
         mesh: &SourceMesh,
         node: &PlacedNode,
         place: u32,
-    ) -> Result<Skinned, Fault> {
+    ) -> Result<MovingInstance, Fault> {
         let node = format!("node {}", node.number);
         let skin = self.document.root.get(index);
         let skin = skin.ok_or_else(|| Fault::malformed(&node, format!("skin {} does not exist", index.value())))?;
@@ -116,7 +109,7 @@ impl<'d> Skins<'d> {
         self.joints_left -= joint_count;
         self.influences_left -= vertices;
         let element = format!("skin {}", index.value());
-        let matrices = skins::bind_matrices(self.document, skin, &element)?;
+        let matrices = bind_matrices(self.document, skin, &element)?;
         for (vertex, influence) in mesh.influences.iter().enumerate() {
             if let Some((joint, _)) = influence.shares().find(|(joint, _)| *joint >= skin.joints.len()) {
                 let why = format!("joint {joint} is beyond the skin's {}", skin.joints.len());
@@ -141,7 +134,7 @@ impl<'d> Skins<'d> {
         if is_rigid_somewhere {
             joints.push(Joint { node: place, joint_from_mesh: DAffine3::IDENTITY });
         }
-        Ok(Skinned { joints, influences })
+        Ok(MovingInstance { instance: 0, joints, influences })
     }
 }
 
@@ -208,4 +201,31 @@ fn rest_of(node: &JsonNode, is_target: bool, element: &str) -> Result<NodeTransf
     let parts = if node.matrix.is_some() { TransformParts::of(&parent_from_node) } else { parts_of(node) };
     // Its length has been checked.
     Ok(NodeTransform::Parts(TransformParts { rotation: parts.rotation.normalize(), ..parts }))
+}
+
+/// The inverse bind matrices of a skin, one for each of its joints. Those without an inverse hide their vertices.
+fn bind_matrices(document: &Document, skin: &Skin, element: &str) -> Result<Vec<DAffine3>, Fault> {
+    at_most(format_args!("{element}, joints"), skin.joints.len() as u64, u64::from(u16::MAX))?;
+    if skin.joints.is_empty() {
+        return Err(Fault::malformed(element, "it has no joints"));
+    }
+    let Some(index) = skin.inverse_bind_matrices else { return Ok(vec![DAffine3::IDENTITY; skin.joints.len()]) };
+    let element = format!("{element}, inverseBindMatrices");
+    at_most(format_args!("{element}, matrices"), document.layout(index, &element)?.count, u64::from(u16::MAX))?;
+    let matrices = document.floats::<16>(index, &element)?;
+    if matrices.len() < skin.joints.len() {
+        let why = format!("{} matrices for {} joints", matrices.len(), skin.joints.len());
+        return Err(Fault::malformed(element, why));
+    }
+    let mut transforms = Vec::with_capacity(skin.joints.len());
+    for (number, matrix) in matrices.iter().take(skin.joints.len()).enumerate() {
+        let place = format_args!("{element}, matrix {number}");
+        let transform = affine_from(Mat4::from_cols_array(matrix).as_dmat4()).filter(DAffine3::is_finite);
+        let transform = transform.ok_or_else(|| Fault::malformed(place, "it is not finite, or not affine"))?;
+        if transform.matrix3.determinant() == 0.0 {
+            document.warnings.count("bind matrices without an inverse hide their vertices", place);
+        }
+        transforms.push(transform);
+    }
+    Ok(transforms)
 }

@@ -23,17 +23,14 @@ mod degenerate;
 mod document;
 mod draco;
 mod extensions;
-mod instancing;
 mod json;
 mod lights;
 mod materials;
 mod meshes;
 mod nodes;
 mod primitives;
-mod skins;
 mod texture_coordinates;
 mod textures;
-mod transforms;
 
 use std::borrow::Cow;
 

@@ -12,7 +12,6 @@
 mod attributes;
 mod faces;
 mod map;
-mod masks;
 mod materials;
 mod mtl;
 mod text;

@@ -18,9 +18,8 @@ use serde_ply::{PlyReader, RowVisitor};
 
 use super::Import;
 use super::listing::decoded;
-use super::picture::Content;
+use super::picture::{Content, TextureFiles, TextureReference};
 use super::source_scene::{SourceInstance, SourceScene};
-use super::texture_files::{TextureFiles, TextureReference};
 use super::vertex_colors::ColorRange;
 use crate::error::{Fault, at_most};
 use crate::{Material, TextureUse};
