@@ -2,8 +2,7 @@
 
 use glam::Vec3;
 
-use super::geometry::{MeshBuilder, matt};
-use super::pieces::{ball, checked, checks, mirror};
+use super::geometry::{MeshBuilder, ball, checked, checks, matt, mirror};
 use super::teapot::{Teapot, teapot};
 use crate::Scene;
 

@@ -9,7 +9,6 @@
 //! flat after `s off`. Axes are kept. Points, lines and free-form
 //! curves are left out with a warning.
 
-mod attributes;
 mod faces;
 mod map;
 mod materials;
@@ -21,8 +20,7 @@ use glam::DAffine3;
 use super::Import;
 use super::source_scene::{SourceInstance, SourceScene};
 use crate::error::Fault;
-use attributes::Attributes;
-use faces::Faces;
+use faces::{Attributes, Faces};
 use text::{Line, for_each_line, without_byte_order_mark};
 
 pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> {

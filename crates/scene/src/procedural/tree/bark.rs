@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::super::geometry::{MeshBuilder, vertex};
 use super::super::random::{Noise, mix};
-use super::skeleton::{Branch, LEVELS, Skeleton};
+use super::{Branch, LEVELS, Skeleton};
 use crate::Vertex;
 
 /// Rings along and sides around a branch of each level, at detail 1.
