@@ -4,7 +4,7 @@ use depth_image::{Environment, EnvironmentMap, Illumination, SourceSpace};
 use glam::{Affine3A, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::animation::{Animation, MovingInstance, UnknownClip};
+use crate::{Animation, MovingInstance, UnknownClip};
 
 /// A renderable scene. All indices of a scene from this crate are valid. Serde leaves out the large arrays, which
 /// [`pack`](crate::pack) copies.

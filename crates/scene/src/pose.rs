@@ -3,9 +3,7 @@
 use glam::{Affine3A, DAffine3, Mat3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
-use crate::animation::{Influence, MovingInstance};
-use crate::limits::MAX_COORDINATE_M;
-use crate::model::{Mesh, Scene, Vertex, VertexDetail};
+use crate::{Influence, MAX_COORDINATE_M, Mesh, MovingInstance, Scene, Vertex, VertexDetail};
 
 impl Scene {
     /// The scene as it is at a moment, without motion by nodes: each moving instance has a mesh of its own, in the world.

@@ -5,9 +5,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::error::{Fault, at_most};
 use crate::procedural::{self, GrassDensity, grass, tree_terrain};
-use crate::{ImportOptions, Limits, Scene, SceneError, load_file};
+use crate::{Fault, ImportOptions, Limits, Scene, SceneError, at_most, load_file};
 
 /// Names of the built-in scenes. A `tree-terrain-…` may have the suffix `-wind`, and `grass` a `:` with a
 /// [density](GrassDensity). A file of such a name is reached as `./name`.

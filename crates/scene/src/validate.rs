@@ -5,11 +5,10 @@ use std::collections::HashSet;
 use depth_image::LightError;
 use glam::{Affine3A, Quat, Vec3};
 
-use crate::error::{Fault, at_most};
-use crate::limits::MAX_COORDINATE_M;
 use crate::{
-    Animation, Channel, Influence, Light, Limits, Material, Mesh, MeshPart, MovingInstance, Node, NodeTransform,
-    Property, Scene, SceneError, SourceCamera, Texture, TextureUse, TransformParts, Vertex, VertexDetail, Wind,
+    Animation, Channel, Fault, Influence, Light, Limits, MAX_COORDINATE_M, Material, Mesh, MeshPart, MovingInstance,
+    Node, NodeTransform, Property, Scene, SceneError, SourceCamera, Texture, TextureUse, TransformParts, Vertex,
+    VertexDetail, Wind, at_most,
 };
 
 /// Smallest determinant relative to the cube of the largest column that counts as invertible.

@@ -9,9 +9,8 @@ use std::path::{Component, Path, PathBuf};
 use percent_encoding::percent_decode_str;
 
 use super::folder::{Folder, existing};
-use super::listing::decoded;
-use super::warnings::Warnings;
-use crate::error::{Fault, shortened};
+use super::{Warnings, decoded};
+use crate::{Fault, shortened};
 
 /// The result of a search.
 pub(crate) enum Found {

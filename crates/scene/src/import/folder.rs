@@ -8,8 +8,7 @@ use std::path::{Component, Path, PathBuf};
 use std::rc::Rc;
 
 use super::listing::Listing;
-use crate::error::{Fault, at_most};
-use crate::{Limits, SceneErrorKind};
+use crate::{Fault, Limits, SceneErrorKind, at_most};
 
 /// A scene's folder. No file outside it is read, and the bytes of all files together are limited.
 pub(crate) struct Folder {

@@ -13,7 +13,6 @@ mod picture;
 mod ply;
 mod polygons;
 mod source_scene;
-mod tangents;
 mod vertex_colors;
 mod warnings;
 
@@ -25,7 +24,8 @@ use crate::error::Fault;
 use crate::{Limits, Scene, SceneError};
 pub use environment::load_environment;
 use folder::Folder;
-use source_scene::SourceScene;
+use listing::decoded;
+use source_scene::{PlacedCamera, SourceInstance, SourceMesh, SourceScene, plain_vertex};
 use warnings::Warnings;
 
 /// Reads a scene from a `.gltf`, `.glb`, `.obj` or `.ply` file. Files that it refers to are read only

@@ -8,10 +8,8 @@ use image::{ImageFormat, ImageReader};
 use rayon::prelude::*;
 
 use super::file_search::{Found, search};
-use super::listing::decoded;
-use super::{Import, MissingTextures, ktx2};
-use crate::error::{Fault, at_most, shortened};
-use crate::{Limits, SceneErrorKind, Texture};
+use super::{Import, MissingTextures, decoded, ktx2};
+use crate::{Fault, Limits, SceneErrorKind, Texture, at_most, shortened};
 
 /// The meaning of a picture's channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -55,6 +53,9 @@ pub(crate) fn decode_all(
     let files: Vec<String> = pictures.iter().filter(|p| p.bytes.is_none()).map(|p| p.file.clone()).collect();
     if !files.is_empty() && missing == MissingTextures::Refuse {
         return Err(Fault::new("textures", SceneErrorKind::MissingFiles(files)));
+    } else if !files.is_empty() {
+        let names = shortened(files.join(", "));
+        tracing::warn!("{} textures are missing, and grey takes their place: {names}", files.len());
     }
     let mut decoded_bytes = 0u64;
     for picture in pictures {
@@ -162,14 +163,7 @@ impl TextureFiles {
 
     /// Decodes all files, in the order of their numbers.
     pub(crate) fn decode(&self, import: &Import) -> Result<Vec<Texture>, Fault> {
-        let missing = import.options.missing_textures;
-        let missing_files = self.pictures.iter().filter(|picture| picture.bytes.is_none());
-        let grey: Vec<&str> = missing_files.map(|picture| &*picture.file).collect();
-        if !grey.is_empty() && missing == MissingTextures::Grey {
-            let names = shortened(grey.join(", "));
-            tracing::warn!("{} textures are missing, and grey takes their place: {names}", grey.len());
-        }
-        decode_all(&self.pictures, import.limits, missing)
+        decode_all(&self.pictures, import.limits, import.options.missing_textures)
     }
 }
 

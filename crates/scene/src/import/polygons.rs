@@ -11,10 +11,8 @@ use std::hash::Hash;
 use earcut::Earcut;
 use glam::{DVec2, DVec3};
 
-use super::source_scene::SourceMesh;
-use super::{Import, normals};
-use crate::Vertex;
-use crate::error::{Fault, at_most};
+use super::{Import, SourceMesh, normals};
+use crate::{Fault, Vertex, at_most};
 
 /// The most corners of a polygon that is cut. An outline that crosses itself may take cubic time: `earcut` then tries all
 /// diagonals against all edges.
@@ -129,6 +127,14 @@ impl<'a, K: Copy + Eq + Hash> PolygonMesh<'a, K> {
         normals::fill(&mut mesh, |triangle| is_flat[triangle]);
         Ok(mesh)
     }
+}
+
+/// The triangles of a strip. Every other triangle is reversed; those that repeat a vertex only connect parts of the
+/// strip.
+pub(crate) fn triangles_of_strip(indices: &[u32]) -> impl Iterator<Item = [u32; 3]> {
+    let windows = indices.windows(3).enumerate();
+    let turned = windows.map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] });
+    turned.filter(|[a, b, c]| a != b && b != c && a != c)
 }
 
 /// Cuts the polygons of a file into triangles; keeps its memory from one to the next.

@@ -5,12 +5,10 @@ use std::ops::RangeInclusive;
 
 use glam::{Affine3A, BVec3, DAffine3, DVec3};
 
-use crate::animation::{Animation, Influence, MovingInstance};
-use crate::error::Fault;
 use crate::light_rig::{DEFAULT_BACKGROUND, SourceLight};
 use crate::{
-    Environment, Illumination, Instance, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, SourceSpace, Texture,
-    Vertex, VertexDetail,
+    Animation, Environment, Fault, Illumination, Influence, Instance, Limits, Material, Mesh, MeshPart, MovingInstance,
+    Scene, SourceCamera, SourceSpace, Texture, Vertex, VertexDetail,
 };
 
 /// The result of an importer.

@@ -3,9 +3,8 @@
 
 use glam::{Affine3A, Vec2, Vec3};
 
-use super::geometry::{MeshBuilder, matt, vertex};
-use super::random::{Noise, Rng, lerp, mix, smoothstep};
-use super::tree::{TreePlan, tree_mesh};
+use super::parts::{MeshBuilder, Noise, Rng, TreePlan, lerp, matt, mix, tree_mesh, vertex};
+use super::random::smoothstep;
 use crate::light_rig::SOFT_SUN_RAD;
 use crate::{Environment, Illumination, Instance, Light, Material, Mesh, Scene, Wind};
 

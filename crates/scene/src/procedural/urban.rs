@@ -2,8 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::geometry::{MeshBuilder, matt};
-use super::random::{Noise, Rng, mix};
+use super::parts::{MeshBuilder, Noise, Rng, matt, mix};
 use crate::{Environment, Scene};
 
 const SEED: u64 = 1950;

@@ -12,12 +12,10 @@ use gltf::json::{Index, Root};
 
 use super::super::file_search::read_uri;
 use super::super::folder::Folder;
-use super::super::warnings::Warnings;
-use super::super::{Import, MissingTextures};
+use super::super::{Import, MissingTextures, Warnings};
 use super::compressed;
 use super::draco::{self, DecodedAccessor};
-use crate::error::{Fault, at_most};
-use crate::{Limits, SceneErrorKind};
+use crate::{Fault, Limits, SceneErrorKind, at_most};
 
 /// The parsed JSON, the bytes of all buffers, and what else their reading takes.
 pub(super) struct Document<'a> {

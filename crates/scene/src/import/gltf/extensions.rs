@@ -6,7 +6,7 @@ use gltf::json::Root;
 
 use super::super::Import;
 use super::{compressed, draco, lights};
-use crate::error::Fault;
+use crate::Fault;
 
 /// Extensions that are read. Textures in AVIF and DDS have a warning of their own where a file has them in no other format.
 const READ: [&str; 18] = [

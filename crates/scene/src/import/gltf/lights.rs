@@ -9,13 +9,11 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 use serde::Deserialize;
 
-use super::super::source_scene::SourceScene;
-use super::document::Document;
-use super::json::parsed;
+use super::super::SourceScene;
 use super::nodes::{Place, chosen_scene};
-use crate::error::Fault;
+use super::{Document, parsed};
 use crate::light_rig::{SourceLight, color, color_mut, scaled};
-use crate::{Environment, Illumination, Light};
+use crate::{Environment, Fault, Illumination, Light};
 
 /// Range of the largest channel of irradiance at the middle of a scene that is not exposed: two stops to either side of
 /// white.

@@ -6,16 +6,14 @@ use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 use serde::Deserialize;
 
+use super::super::SourceScene;
 use super::super::picture::decode_all;
-use super::super::source_scene::SourceScene;
-use super::document::Document;
-use super::json::parsed;
 use super::texture_coordinates::Coordinates;
 use super::textures::{
     BASE_COLOR, EMISSIVE, METALLIC_ROUGHNESS, Means, NORMAL, OCCLUSION, Pictures, Uses, number_shown,
 };
-use crate::error::Fault;
-use crate::{DIELECTRIC_REFLECTANCE, Material};
+use super::{Document, parsed};
+use crate::{DIELECTRIC_REFLECTANCE, Fault, Material};
 
 /// Fills the scene's materials, one more than the file's (its default), and its textures. Returns the coordinates that the
 /// vertices of each material have.

@@ -6,12 +6,12 @@ use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Mesh as JsonMesh, Node};
 
-use super::super::source_scene::{SourceMesh, SourceScene};
-use super::document::Document;
+use super::super::{SourceMesh, SourceScene};
+use super::Document;
 use super::primitives::{Geometry, PrimitiveReader};
 use super::texture_coordinates::Coordinates;
 use super::textures::material_number;
-use crate::error::{Fault, at_most};
+use crate::{Fault, at_most};
 
 /// The scene's numbers of the file's meshes.
 pub(super) struct Meshes {

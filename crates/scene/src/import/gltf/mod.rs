@@ -19,7 +19,6 @@
 mod animation;
 mod channels;
 mod compressed;
-mod degenerate;
 mod document;
 mod draco;
 mod extensions;
@@ -36,10 +35,10 @@ use std::borrow::Cow;
 
 use gltf::binary::Glb;
 
-use super::Import;
-use super::source_scene::SourceScene;
-use crate::error::{Fault, at_most};
+use super::{Import, SourceScene};
+use crate::{Fault, at_most};
 use document::Document;
+use json::parsed;
 
 const GLB_MAGIC: &[u8] = b"glTF";
 const GLB_HEADER_BYTES: u32 = 12;

@@ -8,13 +8,10 @@ use gltf::json::accessor::Accessor;
 use gltf::json::{Index, Node, Root, Scene as JsonScene};
 use serde::Deserialize;
 
-use super::super::source_scene::{PlacedCamera, SourceInstance, SourceScene};
-use super::document::Document;
-use super::json::parsed;
-use super::lights;
+use super::super::{PlacedCamera, SourceInstance, SourceScene};
 use super::meshes::Meshes;
-use crate::animation::{TransformParts, is_invertible};
-use crate::error::{Fault, at_most};
+use super::{Document, lights, parsed};
+use crate::{Fault, TransformParts, at_most, is_invertible};
 
 /// Walks the default scene, else the first, else all nodes without a parent. A node reached twice is in a cycle or has
 /// two parents; glTF allows neither.

@@ -7,14 +7,12 @@ use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
-use super::super::normals;
-use super::super::source_scene::{SourceMesh, plain_vertex};
-use super::super::tangents;
-use super::document::{Document, same_count};
+use super::super::polygons::triangles_of_strip;
+use super::super::{SourceMesh, normals, plain_vertex};
+use super::Document;
+use super::document::same_count;
 use super::texture_coordinates::{Coordinates, UvSource};
-use crate::animation::Influence;
-use crate::error::{Fault, at_most};
-use crate::{Vertex, VertexDetail};
+use crate::{Fault, Influence, Vertex, VertexDetail, at_most};
 
 /// A primitive's triangles.
 pub(super) struct Geometry {
@@ -71,7 +69,7 @@ impl PrimitiveReader<'_> {
             // Tangents without normals do not count (glTF 2.0, 3.7.2.1).
             let has_tangents = has_normals && self.index(Semantic::Tangents).is_some();
             if let Some(second_uv) = coordinates.tangents_along_second.filter(|_| !has_tangents) {
-                tangents::generate(&mut mesh, second_uv)
+                normals::generate_tangents(&mut mesh, second_uv)
                     .map_err(|error| Fault::malformed(element, format!("its tangents cannot be computed: {error}")))?;
             }
         }
@@ -166,7 +164,7 @@ impl PrimitiveReader<'_> {
             return Err(Fault::malformed(self.element, format!("index {bad} is beyond its {vertex_count} vertices")));
         }
         match mode {
-            Mode::TriangleStrip => Ok(from_strip(&indices)),
+            Mode::TriangleStrip => Ok(triangles_of_strip(&indices).flatten().collect()),
             Mode::TriangleFan => Ok(from_fan(&indices)),
             _ if indices.len().is_multiple_of(3) => Ok(indices),
             _ => Err(Fault::malformed(self.element, format!("{} indices are not whole triangles", indices.len()))),
@@ -224,14 +222,6 @@ fn drop_unused(mesh: &mut SourceMesh) {
 fn srgba8_from_linear([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {
     let [r, g, b] = [r, g, b].map(srgb8_from_linear);
     [r, g, b, (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
-}
-
-/// The triangles of a strip. Every other triangle is reversed; those that repeat a vertex only connect parts of the
-/// strip.
-fn from_strip(indices: &[u32]) -> Vec<u32> {
-    let windows = indices.windows(3).enumerate();
-    let turned = windows.map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] });
-    turned.filter(|[a, b, c]| a != b && b != c && a != c).flatten().collect()
 }
 
 fn from_fan(indices: &[u32]) -> Vec<u32> {
@@ -303,10 +293,14 @@ fn influence(shares: &mut [(f32, f32)]) -> Result<Influence, String> {
 mod tests {
     use super::*;
 
+    fn from_strip(indices: &[u32]) -> Vec<[u32; 3]> {
+        triangles_of_strip(indices).collect()
+    }
+
     #[test]
     fn strips_alternate_and_fans_share_their_hub() {
-        assert_eq!(from_strip(&[0, 1, 2, 3]), [0, 1, 2, 2, 1, 3]);
-        assert_eq!(from_strip(&[0, 1, 2, 2, 3, 3, 4, 5]), [0, 1, 2, 4, 3, 5]);
+        assert_eq!(from_strip(&[0, 1, 2, 3]), [[0, 1, 2], [2, 1, 3]]);
+        assert_eq!(from_strip(&[0, 1, 2, 2, 3, 3, 4, 5]), [[0, 1, 2], [4, 3, 5]]);
         assert_eq!(from_fan(&[0, 1, 2, 3]), [0, 1, 2, 0, 2, 3]);
         assert!(from_strip(&[0, 1]).is_empty() && from_fan(&[]).is_empty());
     }

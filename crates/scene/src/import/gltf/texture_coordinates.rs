@@ -7,9 +7,9 @@ use gltf::json::material::Material as JsonMaterial;
 use gltf::json::texture::{Info, Texture as JsonTexture};
 use gltf::json::{Index, Value};
 
-use super::json::parsed;
 use super::materials::SpecularGlossiness;
-use crate::error::Fault;
+use super::parsed;
+use crate::Fault;
 
 const TRANSFORM: &str = "KHR_texture_transform";
 

@@ -12,11 +12,10 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
 use super::super::picture::{Content, EncodedPicture};
-use super::document::Document;
+use super::Document;
 use super::materials::SpecularGlossiness;
 use super::texture_coordinates::{Coordinates, maps_of};
-use crate::error::{Fault, at_most};
-use crate::{Texture, TextureUse, Wrap};
+use crate::{Fault, Texture, TextureUse, Wrap, at_most};
 
 /// The scene's number of a primitive's material.
 pub(super) fn material_number(root: &Root, material: Option<Index<JsonMaterial>>, element: &str) -> Result<u32, Fault> {

@@ -6,15 +6,12 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::super::Import;
 use super::super::polygons::{self, PolygonMesh, TOO_SHORT, UNKNOWN_VERTEX};
-use super::super::source_scene::{SourceMesh, plain_vertex};
 use super::super::vertex_colors::{ColorRange, Colors};
-use super::super::warnings::Warnings;
+use super::super::{Import, SourceMesh, Warnings, plain_vertex};
 use super::map::UvTransform;
 use super::text::Line;
-use crate::error::{Fault, at_most};
-use crate::{Limits, Vertex};
+use crate::{Fault, Limits, Vertex, at_most};
 
 const TEXTURE_WITHOUT_COORDINATES: &str = "textures without coordinates show one texel";
 const WITHOUT_ATTRIBUTES: &str = "texture coordinates and normals that the file does not have are dropped";

@@ -5,17 +5,14 @@ use std::path::Path;
 
 use glam::UVec2;
 
-use super::super::Import;
 use super::super::file_search::{Found, search};
-use super::super::listing::decoded;
 use super::super::picture::{Content, TextureFiles, TextureReference};
-use super::super::source_scene::SourceScene;
+use super::super::{Import, SourceScene, decoded};
 use super::faces::MaterialUse;
 use super::map::{Channel, TextureMap, UvTransform, spellings};
 use super::mtl::{Entry, folded_name, parse};
 use super::text::words;
-use crate::error::{Fault, at_most};
-use crate::{Limits, Material, Texture, TextureUse, Wrap};
+use crate::{Fault, Limits, Material, Texture, TextureUse, Wrap, at_most};
 
 const UNKNOWN_MATERIALS: &str = "materials that no library has are white";
 const MISSING_LIBRARIES: &str = "material libraries are missing";

@@ -17,9 +17,8 @@ mod text;
 
 use glam::DAffine3;
 
-use super::Import;
-use super::source_scene::{SourceInstance, SourceScene};
-use crate::error::Fault;
+use super::{Import, SourceInstance, SourceScene};
+use crate::Fault;
 use faces::{Attributes, Faces};
 use text::{Line, for_each_line, without_byte_order_mark};
 

@@ -4,13 +4,10 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::super::Import;
-use super::super::listing::decoded;
-use super::super::warnings::Warnings;
+use super::super::{Import, Warnings, decoded};
 use super::map::TextureMap;
 use super::text::{Line, finite, for_each_line, without_byte_order_mark, without_comment};
-use crate::Material;
-use crate::error::{Fault, at_most};
+use crate::{Fault, Material, at_most};
 
 /// Statements that are not read and change little of what is seen: ambient light, the index of refraction, and the filters
 /// of reflections and textures.

@@ -4,10 +4,9 @@ use std::borrow::Cow;
 
 use serde_ply::{ElementDef, PlyFormat, PlyHeader, PropertyType, ScalarType};
 
-use super::super::listing::decoded;
+use super::super::decoded;
 use super::super::vertex_colors::ColorRange;
-use crate::Limits;
-use crate::error::{Fault, at_most};
+use crate::{Fault, Limits, at_most};
 
 /// The longest header: that of a file of many textures has some kilobytes.
 const MAX_HEADER_BYTES: usize = 1 << 20;

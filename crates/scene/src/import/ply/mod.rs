@@ -7,7 +7,6 @@
 
 mod header;
 mod surface;
-mod vertices;
 
 use std::io::{BufRead, Read};
 use std::path::Path;
@@ -16,16 +15,12 @@ use glam::DAffine3;
 use serde::{Deserialize, de::MapAccess};
 use serde_ply::{PlyReader, RowVisitor};
 
-use super::Import;
-use super::listing::decoded;
 use super::picture::{Content, TextureFiles, TextureReference};
-use super::source_scene::{SourceInstance, SourceScene};
 use super::vertex_colors::ColorRange;
-use crate::error::{Fault, at_most};
-use crate::{Material, TextureUse};
+use super::{Import, SourceInstance, SourceScene, decoded};
+use crate::{Fault, Material, TextureUse, at_most};
 use header::{PlyText, color_range};
-use surface::{FaceRow, Surface};
-use vertices::{VertexRow, Vertices};
+use surface::{FaceRow, Surface, VertexRow, Vertices};
 
 pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> {
     let text = PlyText::parse(bytes)?;

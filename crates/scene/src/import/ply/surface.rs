@@ -1,15 +1,12 @@
-//! The faces of a PLY file, and their triangles by texture.
+//! The vertices of a PLY file, its faces, and their triangles by texture.
 
+use glam::DVec3;
 use serde::Deserialize;
 
-use super::super::Import;
-use super::super::polygons::{self, PolygonMesh, TOO_SHORT};
-use super::super::source_scene::SourceMesh;
+use super::super::polygons::{self, PolygonMesh, TOO_SHORT, triangles_of_strip};
 use super::super::vertex_colors::{ColorRange, Colors};
-use super::super::warnings::Warnings;
-use super::vertices::{Vertices, v_downwards};
-use crate::Vertex;
-use crate::error::Fault;
+use super::super::{Import, SourceMesh, Warnings, plain_vertex};
+use crate::{Fault, Vertex};
 
 /// The number of a vertex that no file has.
 const NO_VERTEX: u32 = u32::MAX;
@@ -71,19 +68,16 @@ impl Surface {
         self.triangle_count += count as u64 - 2;
     }
 
-    /// Adds the triangles of strips; −1 ends a strip. Every second triangle is turned round.
+    /// Adds the triangles of strips; −1 ends a strip.
     pub(super) fn push_strips(&mut self, vertices: &[i64]) {
         let mut row = self.faces.len() as u64;
         for strip in vertices.split(|vertex| *vertex < 0) {
-            for (number, triangle) in strip.windows(3).enumerate() {
-                let [a, b, c] = [0, 1, 2].map(|i| u32::try_from(triangle[i]).unwrap_or(NO_VERTEX));
-                // A vertex that is there twice leads from one strip to the next.
-                if a != b && b != c && c != a {
-                    self.corners.extend(if number % 2 == 0 { [a, b, c] } else { [b, a, c] });
-                    self.faces.push(Face { row, texture: 0, end: self.corners.len() });
-                    self.triangle_count += 1;
-                    row += 1;
-                }
+            let strip: Vec<u32> = strip.iter().map(|&vertex| u32::try_from(vertex).unwrap_or(NO_VERTEX)).collect();
+            for triangle in triangles_of_strip(&strip) {
+                self.corners.extend(triangle);
+                self.faces.push(Face { row, texture: 0, end: self.corners.len() });
+                self.triangle_count += 1;
+                row += 1;
             }
         }
     }
@@ -128,4 +122,67 @@ impl Surface {
         }
         mesh.finish(0..=textures)
     }
+}
+
+/// A vertex of numbers of any type. Position and colour come first, and no field has an alias, so that `serde-ply`
+/// reads common rows by offset instead of by name. The header has shown that there is a position.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+pub(super) struct VertexRow {
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+    red: Option<f32>,
+    green: Option<f32>,
+    blue: Option<f32>,
+    alpha: Option<f32>,
+    pub nx: f32,
+    pub ny: f32,
+    pub nz: f32,
+    pub s: Option<f32>,
+    pub t: Option<f32>,
+}
+
+#[derive(Default)]
+pub(super) struct Vertices {
+    /// Not finite where the file has no numbers.
+    pub positions_in_source: Vec<DVec3>,
+    pub has_uvs: bool,
+    /// Without their colours.
+    vertices: Vec<Vertex>,
+    pub colors: Colors,
+}
+
+impl Vertices {
+    pub(super) fn push(&mut self, row: &VertexRow, warnings: &Warnings) {
+        let number = self.vertices.len();
+        let place = format_args!("vertex {number}");
+        let position = DVec3::new(row.x, row.y, row.z);
+        if !position.is_finite() {
+            warnings.count("vertices that are not finite", place);
+        }
+        // A normal of length 0 is computed from the faces.
+        let given_normal = DVec3::new(row.nx.into(), row.ny.into(), row.nz.into());
+        let normal = given_normal.try_normalize();
+        if normal.is_none() && given_normal != DVec3::ZERO {
+            warnings.count("normals that are not finite are computed", place);
+        }
+        let uv = [row.s.unwrap_or(0.0), row.t.unwrap_or(0.0)];
+        if !uv.iter().all(|c| c.is_finite()) {
+            warnings.count("texture coordinates that are not finite count as 0", place);
+        }
+        if self.colors.range != ColorRange::None {
+            let channels = [row.red, row.green, row.blue, row.alpha];
+            self.colors.values.push(channels.map(|channel| channel.unwrap_or(f32::NAN)));
+        }
+        self.positions_in_source.push(position);
+        let normal = normal.unwrap_or(DVec3::ZERO).as_vec3().to_array();
+        self.vertices.push(Vertex { normal, uv: v_downwards(uv), ..plain_vertex() });
+    }
+}
+
+/// PLY's v runs upwards. Coordinates that are not finite are 0.
+fn v_downwards(uv: [f32; 2]) -> [f32; 2] {
+    let [u, v] = uv.map(|c| if c.is_finite() { c } else { 0.0 });
+    [u, 1.0 - v]
 }

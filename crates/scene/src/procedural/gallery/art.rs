@@ -4,8 +4,7 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3};
 
-use super::super::geometry::{MeshBuilder, Station, star, vertex};
-use super::super::random::{Noise, mix};
+use super::super::parts::{MeshBuilder, Noise, Station, mix, star, vertex};
 use super::{HALF_LENGTH_M, HALF_WIDTH_M};
 
 const PLINTH: Vec3 = Vec3::new(214.0, 210.0, 202.0);

@@ -4,9 +4,7 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 
-use super::super::geometry::{MeshBuilder, star, vertex};
-use super::super::random::Rng;
-use super::super::teapot::{Teapot, teapot};
+use super::super::parts::{MeshBuilder, Rng, Teapot, star, teapot, vertex};
 use super::{HALF_LENGTH_M, HEIGHT_M};
 
 const OAK: Vec3 = Vec3::new(168.0, 124.0, 82.0);

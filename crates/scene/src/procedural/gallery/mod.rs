@@ -7,8 +7,7 @@ mod furniture;
 use depth_image::{Environment, Illumination, Light};
 use glam::{Affine3A, Mat3, Vec3};
 
-use super::geometry::{MeshBuilder, matt};
-use super::random::Rng;
+use super::parts::{MeshBuilder, Rng, matt};
 use crate::{Material, Scene, SourceCamera};
 
 /// From the middle of the floor to the walls, and the height, in metres.

@@ -4,8 +4,7 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 
-use super::super::geometry::{MeshBuilder, vertex};
-use super::super::random::{Noise, mix};
+use super::super::parts::{MeshBuilder, Noise, mix, vertex};
 use super::{Branch, LEVELS, Skeleton};
 use crate::Vertex;
 

@@ -2,8 +2,7 @@
 
 use glam::Vec3;
 
-use super::super::geometry::{MeshBuilder, vertex};
-use super::super::random::{Noise, Rng, lerp, mix};
+use super::super::parts::{MeshBuilder, Noise, Rng, lerp, mix, vertex};
 use super::{Branch, LEVELS, Skeleton};
 use crate::Vertex;
 

@@ -9,8 +9,7 @@ mod leaves;
 use depth_image::Aabb;
 use glam::{Quat, Vec3};
 
-use super::geometry::MeshBuilder;
-use super::random::{Rng, lerp};
+use super::parts::{MeshBuilder, Rng, lerp};
 use crate::Mesh;
 
 /// Greatest share of the triangles for the bark; leaves take the rest.
