@@ -6,7 +6,6 @@ mod file_search;
 mod folder;
 mod gltf;
 mod ktx2;
-mod listing;
 mod normals;
 mod obj;
 mod picture;
@@ -23,8 +22,7 @@ use std::str::FromStr;
 use crate::error::Fault;
 use crate::{Limits, Scene, SceneError};
 pub use environment::load_environment;
-use folder::Folder;
-use listing::decoded;
+use folder::{Folder, decoded};
 use source_scene::{PlacedCamera, SourceInstance, SourceMesh, SourceScene, plain_vertex};
 use warnings::Warnings;
 
