@@ -4,8 +4,7 @@ use depth_image::Aabb;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::animation::{Animation, MovingInstance};
-use crate::model::{Instance, Mesh, Scene};
+use crate::{Animation, Instance, Mesh, MovingInstance, Scene};
 
 /// Most moments at which a clip is sampled.
 const MOST_MOMENTS: usize = 2048;

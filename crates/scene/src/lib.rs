@@ -25,14 +25,16 @@ mod spec;
 mod up_axis;
 mod validate;
 
+use animation::is_invertible;
 pub use animation::{
     Animation, Channel, Clip, Influence, Interpolation, Joint, MovingInstance, Node, NodeTransform, Property,
     TransformParts, UnknownClip,
 };
 pub use depth_image::{Environment, EnvironmentMap, Illumination, Light, LightError, SourceSpace};
+use error::{Fault, at_most, shortened};
 pub use error::{SceneError, SceneErrorKind};
 pub use import::{ImportOptions, MissingTextures, MissingTexturesError, load_environment, load_file};
-pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError, LightSpecErrorKind};
+pub use light_spec::{EnvironmentSpec, LightSpec, LightSpecError};
 pub use limits::{Limits, MAX_COORDINATE_M};
 pub use model::*;
 pub use package::{pack, unpack};

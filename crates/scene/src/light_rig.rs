@@ -1,8 +1,8 @@
 //! Default lights, replaced lights, and the common parts of all kinds of lights.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
-use crate::{Environment, EnvironmentMap, Illumination, Light, Scene};
+use crate::{Environment, EnvironmentMap, Illumination, Light, Scene, SourceSpace};
 
 /// Angular radius of default suns: 2°, so that soft shadows are visible. The real sun's 0.27° blurs a shadow's edge by
 /// a hundredth of the distance to its caster, a pixel or two in a view of a whole scene.
@@ -55,14 +55,9 @@ impl Scene {
     /// [`Scene::validate`] checks the lights.
     #[must_use]
     pub fn lit_by(mut self, lights: Option<Vec<Light>>, environment: Option<Environment>) -> Self {
-        if let Some(mut lights) = lights {
-            for light in &mut lights {
-                if let Some(position) = position_mut(light) {
-                    *position = self.source_space.world_from_source(position.as_dvec3());
-                }
-                scale_to_metres(light, self.source_space.metres_per_unit);
-            }
-            self.illumination.lights = lights;
+        if let Some(lights) = lights {
+            let lights = lights.into_iter().map(|light| SourceLight::new(light).placed_in(self.source_space));
+            self.illumination.lights = lights.collect();
         }
         if let Some(environment) = environment {
             (self.illumination.environment, self.environment_map) = (environment, None);
@@ -93,17 +88,35 @@ pub(crate) fn color(mut light: Light) -> Vec3 {
     *color_mut(&mut light)
 }
 
-/// Scales the lengths of a light, and its intensity, which is that at a distance of one unit.
-pub(crate) fn scale_to_metres(light: &mut Light, metres_per_unit: f64) {
-    match light {
-        Light::Directional { .. } => {}
-        Light::Point { intensity_linear, radius_m, .. } | Light::Spot { intensity_linear, radius_m, .. } => {
-            *intensity_linear = scaled(*intensity_linear, metres_per_unit * metres_per_unit);
-            *radius_m = (f64::from(*radius_m) * metres_per_unit) as f32;
+/// A light in the coordinates of a source, whose position counts in double precision.
+pub(crate) struct SourceLight {
+    pub light: Light,
+    pub position_in_source: DVec3,
+}
+
+impl SourceLight {
+    pub(crate) fn new(mut light: Light) -> Self {
+        let position_in_source = position_mut(&mut light).map_or(DVec3::ZERO, |position| position.as_dvec3());
+        Self { light, position_in_source }
+    }
+
+    /// The light in the world: lengths are scaled, and with them the intensity, which is that at a distance of one unit.
+    pub(crate) fn placed_in(mut self, space: SourceSpace) -> Light {
+        if let Some(position) = position_mut(&mut self.light) {
+            *position = space.world_from_source(self.position_in_source);
         }
-        Light::Rectangle { half_edges_in_world, .. } => {
-            *half_edges_in_world = half_edges_in_world.map(|edge| scaled(edge, metres_per_unit));
+        let metres_per_unit = space.metres_per_unit;
+        match &mut self.light {
+            Light::Directional { .. } => {}
+            Light::Point { intensity_linear, radius_m, .. } | Light::Spot { intensity_linear, radius_m, .. } => {
+                *intensity_linear = scaled(*intensity_linear, metres_per_unit * metres_per_unit);
+                *radius_m = (f64::from(*radius_m) * metres_per_unit) as f32;
+            }
+            Light::Rectangle { half_edges_in_world, .. } => {
+                *half_edges_in_world = half_edges_in_world.map(|edge| scaled(edge, metres_per_unit));
+            }
         }
+        self.light
     }
 }
 
@@ -113,7 +126,7 @@ pub(crate) fn scaled(v: Vec3, factor: f64) -> Vec3 {
 }
 
 /// Position of a light; `None` for parallel light.
-pub(crate) fn position_mut(light: &mut Light) -> Option<&mut Vec3> {
+fn position_mut(light: &mut Light) -> Option<&mut Vec3> {
     match light {
         Light::Directional { .. } => None,
         Light::Point { position_in_world: position, .. }

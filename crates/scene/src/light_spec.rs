@@ -34,36 +34,15 @@ pub enum EnvironmentSpec {
 
 /// A text that is no light or environment. Display reads `field: reason`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{field}: {kind}")]
+#[error("{field}: {reason}")]
 pub struct LightSpecError {
     /// The field's name in the text.
     pub field: String,
-    /// The reason; Display includes it, so it is no source.
-    pub kind: LightSpecErrorKind,
+    /// The reason for which the field is refused.
+    pub reason: String,
 }
 
-/// The reason for which a field is refused.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum LightSpecErrorKind {
-    /// The kind or field does not exist.
-    #[error("unknown; known are {}", .0.join(", "))]
-    Unknown(&'static [&'static str]),
-    /// The field occurs twice.
-    #[error("given twice")]
-    Repeated,
-    /// A required field is missing.
-    #[error("missing")]
-    Missing,
-    /// The text has another form than expected.
-    #[error("{text:?} is not {expected}")]
-    #[allow(missing_docs, reason = "self-naming fields")]
-    Malformed { text: String, expected: &'static str },
-    /// The value is out of range for a light.
-    #[error("{0}")]
-    Invalid(&'static str),
-}
-
-const KINDS: &[&str] = &["sun", "point", "spot", "rectangle"];
+const MISSING: &str = "missing";
 /// Angular radius of the real sun.
 const SUN_RADIUS_DEG: f64 = 0.27;
 /// Default cones of `KHR_lights_punctual`.
@@ -71,61 +50,53 @@ const SPOT_CONES_DEG: [f64; 2] = [0.0, 45.0];
 /// Vectors whose squared length is this close to 1 stay unchanged, so that a normalised vector keeps its bits.
 const UNIT_TOLERANCE: f64 = 1e-6;
 
-/// Makes one kind of light from its fields.
-type Read = fn(&Fields) -> Result<Light, LightSpecError>;
-
 impl FromStr for LightSpec {
     type Err = LightSpecError;
 
     fn from_str(text: &str) -> Result<Self, LightSpecError> {
         let mut words = text.split_ascii_whitespace();
-        let kind = words.next().ok_or_else(|| wrong("light", LightSpecErrorKind::Missing))?;
-        let (read, known): (Read, &[&str]) = match kind {
-            "sun" => (sun, &["towards", "irradiance", "angle"]),
-            "point" => (point, &["at", "intensity", "radius"]),
-            "spot" => (spot, &["at", "towards", "intensity", "inner", "outer", "radius"]),
-            "rectangle" => (rectangle, &["at", "u", "v", "radiance"]),
-            other => return Err(wrong(other, LightSpecErrorKind::Unknown(KINDS))),
+        let kind = words.next().ok_or_else(|| wrong("light", MISSING))?;
+        let light = match kind {
+            "sun" => {
+                let fields = Fields::read(words, &["towards", "irradiance", "angle"])?;
+                Light::Directional {
+                    towards_light_in_world: fields.direction("towards")?,
+                    irradiance_linear: fields.color("irradiance")?,
+                    angular_radius_rad: fields.angle_rad("angle", SUN_RADIUS_DEG)?,
+                }
+            }
+            "point" => {
+                let fields = Fields::read(words, &["at", "intensity", "radius"])?;
+                Light::Point {
+                    position_in_world: fields.vector("at")?.as_vec3(),
+                    intensity_linear: fields.color("intensity")?,
+                    radius_m: fields.number("radius", 0.0)? as f32,
+                }
+            }
+            "spot" => {
+                let fields = Fields::read(words, &["at", "towards", "intensity", "inner", "outer", "radius"])?;
+                Light::Spot {
+                    position_in_world: fields.vector("at")?.as_vec3(),
+                    forward_in_world: fields.direction("towards")?,
+                    intensity_linear: fields.color("intensity")?,
+                    inner_cone_rad: fields.angle_rad("inner", SPOT_CONES_DEG[0])?,
+                    outer_cone_rad: fields.angle_rad("outer", SPOT_CONES_DEG[1])?,
+                    radius_m: fields.number("radius", 0.0)? as f32,
+                }
+            }
+            "rectangle" => {
+                let fields = Fields::read(words, &["at", "u", "v", "radiance"])?;
+                Light::Rectangle {
+                    center_in_world: fields.vector("at")?.as_vec3(),
+                    half_edges_in_world: [fields.vector("u")?.as_vec3(), fields.vector("v")?.as_vec3()],
+                    radiance_linear: fields.color("radiance")?,
+                }
+            }
+            other => return Err(unknown(other, &["sun", "point", "spot", "rectangle"])),
         };
-        let light = read(&Fields::read(words, known)?)?;
         light.validate().map_err(|e| invalid(&e))?;
         Ok(Self(light))
     }
-}
-
-fn sun(fields: &Fields) -> Result<Light, LightSpecError> {
-    Ok(Light::Directional {
-        towards_light_in_world: fields.direction("towards")?,
-        irradiance_linear: fields.color("irradiance")?,
-        angular_radius_rad: fields.angle_rad("angle", SUN_RADIUS_DEG)?,
-    })
-}
-
-fn point(fields: &Fields) -> Result<Light, LightSpecError> {
-    Ok(Light::Point {
-        position_in_world: fields.vector("at")?.as_vec3(),
-        intensity_linear: fields.color("intensity")?,
-        radius_m: fields.radius_m()?,
-    })
-}
-
-fn spot(fields: &Fields) -> Result<Light, LightSpecError> {
-    Ok(Light::Spot {
-        position_in_world: fields.vector("at")?.as_vec3(),
-        forward_in_world: fields.direction("towards")?,
-        intensity_linear: fields.color("intensity")?,
-        inner_cone_rad: fields.angle_rad("inner", SPOT_CONES_DEG[0])?,
-        outer_cone_rad: fields.angle_rad("outer", SPOT_CONES_DEG[1])?,
-        radius_m: fields.radius_m()?,
-    })
-}
-
-fn rectangle(fields: &Fields) -> Result<Light, LightSpecError> {
-    Ok(Light::Rectangle {
-        center_in_world: fields.vector("at")?.as_vec3(),
-        half_edges_in_world: [fields.vector("u")?.as_vec3(), fields.vector("v")?.as_vec3()],
-        radiance_linear: fields.color("radiance")?,
-    })
 }
 
 impl FromStr for EnvironmentSpec {
@@ -154,15 +125,15 @@ impl FromStr for EnvironmentSpec {
 struct Fields<'a>(Vec<(&'a str, &'a str)>);
 
 impl<'a> Fields<'a> {
-    fn read(words: impl Iterator<Item = &'a str>, known: &'static [&'static str]) -> Result<Self, LightSpecError> {
+    fn read(words: impl Iterator<Item = &'a str>, known: &[&str]) -> Result<Self, LightSpecError> {
         let mut fields: Vec<(&str, &str)> = Vec::new();
         for word in words {
             let (name, value) = word.split_once('=').unwrap_or((word, ""));
             if !known.contains(&name) {
-                return Err(wrong(name, LightSpecErrorKind::Unknown(known)));
+                return Err(unknown(name, known));
             }
             if fields.iter().any(|(other, _)| *other == name) {
-                return Err(wrong(name, LightSpecErrorKind::Repeated));
+                return Err(wrong(name, "given twice"));
             }
             fields.push((name, value));
         }
@@ -174,7 +145,7 @@ impl<'a> Fields<'a> {
     }
 
     fn vector(&self, name: &str) -> Result<DVec3, LightSpecError> {
-        let text = self.get(name).ok_or_else(|| wrong(name, LightSpecErrorKind::Missing))?;
+        let text = self.get(name).ok_or_else(|| wrong(name, MISSING))?;
         numbers(text).map(DVec3::from).ok_or_else(|| malformed(name, text, "three finite numbers X,Y,Z"))
     }
 
@@ -184,7 +155,7 @@ impl<'a> Fields<'a> {
             return Ok(vector.as_vec3());
         }
         let unit = vector.try_normalize().map(|unit| unit.as_vec3());
-        unit.ok_or_else(|| wrong(name, LightSpecErrorKind::Invalid("it has no length")))
+        unit.ok_or_else(|| wrong(name, "it has no length"))
     }
 
     fn color(&self, name: &str) -> Result<Vec3, LightSpecError> {
@@ -193,10 +164,6 @@ impl<'a> Fields<'a> {
 
     fn angle_rad(&self, name: &str, default_deg: f64) -> Result<f32, LightSpecError> {
         Ok(self.number(name, default_deg)?.to_radians() as f32)
-    }
-
-    fn radius_m(&self) -> Result<f32, LightSpecError> {
-        Ok(self.number("radius", 0.0)? as f32)
     }
 
     fn number(&self, name: &str, default: f64) -> Result<f64, LightSpecError> {
@@ -218,7 +185,7 @@ fn color_from(field: &str, text: &str) -> Result<Vec3, LightSpecError> {
     let color = srgb_color(text).or(linear.map(|color| color.as_vec3()));
     let color = color.ok_or_else(|| malformed(field, text, "a number, three numbers R,G,B or #rrggbb"))?;
     let is_light = color.min_element() >= 0.0;
-    if is_light { Ok(color) } else { Err(wrong(field, LightSpecErrorKind::Invalid("negative"))) }
+    if is_light { Ok(color) } else { Err(wrong(field, "negative")) }
 }
 
 fn srgb_color(text: &str) -> Option<Vec3> {
@@ -227,12 +194,16 @@ fn srgb_color(text: &str) -> Option<Vec3> {
     Some(Vec3::from([r, g, b].map(linear_from_srgb8)))
 }
 
-fn wrong(field: &str, kind: LightSpecErrorKind) -> LightSpecError {
-    LightSpecError { field: field.to_owned(), kind }
+fn wrong(field: &str, reason: impl Into<String>) -> LightSpecError {
+    LightSpecError { field: field.to_owned(), reason: reason.into() }
 }
 
-fn malformed(field: &str, text: &str, expected: &'static str) -> LightSpecError {
-    wrong(field, LightSpecErrorKind::Malformed { text: text.to_owned(), expected })
+fn unknown(field: &str, known: &[&str]) -> LightSpecError {
+    wrong(field, format!("unknown; known are {}", known.join(", ")))
+}
+
+fn malformed(field: &str, text: &str, expected: &str) -> LightSpecError {
+    wrong(field, format!("{text:?} is not {expected}"))
 }
 
 /// Renames a field of the model to its name in the text.
@@ -246,5 +217,5 @@ fn invalid(error: &LightError) -> LightSpecError {
         "half_edges" => "u, v",
         same => same,
     };
-    wrong(field, LightSpecErrorKind::Invalid(error.reason))
+    wrong(field, error.reason)
 }

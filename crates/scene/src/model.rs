@@ -4,7 +4,7 @@ use depth_image::{Environment, EnvironmentMap, Illumination, SourceSpace};
 use glam::{Affine3A, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::animation::{Animation, MovingInstance, UnknownClip};
+use crate::{Animation, MovingInstance, UnknownClip};
 
 /// A renderable scene. All indices of a scene from this crate are valid. Serde leaves out the large arrays, which
 /// [`pack`](crate::pack) copies.
@@ -283,17 +283,6 @@ impl Material {
             self.normal_texture,
             self.emissive_texture,
             self.occlusion_texture,
-        ]
-    }
-
-    /// The same, to be changed.
-    pub fn textures_mut(&mut self) -> [&mut Option<TextureUse>; 5] {
-        [
-            &mut self.base_color_texture,
-            &mut self.metallic_roughness_texture,
-            &mut self.normal_texture,
-            &mut self.emissive_texture,
-            &mut self.occlusion_texture,
         ]
     }
 

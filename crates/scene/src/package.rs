@@ -13,8 +13,7 @@ use bytemuck::{Pod, cast_slice};
 use depth_image::{EnvironmentMap, MAX_ENVIRONMENT_SIZE_PX};
 use glam::UVec2;
 
-use crate::error::{Fault, at_most};
-use crate::{Limits, Scene, SceneError};
+use crate::{Fault, Limits, Scene, SceneError, at_most};
 
 #[cfg(target_endian = "big")]
 compile_error!("packages hold arrays as they are in memory, which must be little-endian");

@@ -3,9 +3,7 @@
 use glam::{Affine3A, DAffine3, Mat3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
-use crate::animation::{Influence, MovingInstance};
-use crate::limits::MAX_COORDINATE_M;
-use crate::model::{Mesh, Scene, Vertex, VertexDetail};
+use crate::{Influence, MAX_COORDINATE_M, Mesh, MovingInstance, Scene, Vertex, VertexDetail};
 
 impl Scene {
     /// The scene as it is at a moment, without motion by nodes: each moving instance has a mesh of its own, in the world.
@@ -33,29 +31,28 @@ impl MovingInstance {
     /// Every coordinate is finite and at most [`MAX_COORDINATE_M`].
     #[must_use]
     pub fn posed(&self, rest: &[Vertex], world_from_nodes: &[DAffine3]) -> Vec<Vertex> {
-        let world_from_mesh = self.world_from_mesh(world_from_nodes);
-        let Some(first) = world_from_mesh.first() else { return rest.to_vec() };
-        if self.influences.is_empty() {
-            let normals = normals_from(first.matrix3);
-            return rest.par_iter().map(|vertex| placed(first, normals, vertex)).collect();
-        }
-        let posed = rest.par_iter().zip(&self.influences).map(|(vertex, influence)| {
-            let blended = blended(&world_from_mesh, influence);
-            placed(&blended, normals_from(blended.matrix3), vertex)
-        });
-        posed.collect()
+        self.moved(rest, world_from_nodes, placed)
     }
 
     /// As [`Self::posed`], the details of vertices: tangents turn.
     #[must_use]
     pub fn posed_details(&self, rest: &[VertexDetail], world_from_nodes: &[DAffine3]) -> Vec<VertexDetail> {
+        self.moved(rest, world_from_nodes, turned)
+    }
+
+    fn moved<T: Copy + Send + Sync>(
+        &self,
+        rest: &[T],
+        world_from_nodes: &[DAffine3],
+        moved: fn(&Affine3A, &T) -> T,
+    ) -> Vec<T> {
         let world_from_mesh = self.world_from_mesh(world_from_nodes);
         let Some(first) = world_from_mesh.first() else { return rest.to_vec() };
         if self.influences.is_empty() {
-            return rest.par_iter().map(|detail| turned(first, detail)).collect();
+            return rest.par_iter().map(|item| moved(first, item)).collect();
         }
         let influenced = rest.par_iter().zip(&self.influences);
-        influenced.map(|(detail, influence)| turned(&blended(&world_from_mesh, influence), detail)).collect()
+        influenced.map(|(item, influence)| moved(&blended(&world_from_mesh, influence), item)).collect()
     }
 
     /// The mesh's placement in the world by each joint.
@@ -86,9 +83,11 @@ fn blended(world_from_mesh: &[Affine3A], influence: &Influence) -> Affine3A {
     })
 }
 
-fn placed(world_from_mesh: &Affine3A, normals: Mat3A, vertex: &Vertex) -> Vertex {
+fn placed(world_from_mesh: &Affine3A, vertex: &Vertex) -> Vertex {
     let point = world_from_mesh.transform_point3a(Vec3A::from(vertex.position)).to_array();
-    let normal = (normals * Vec3A::from(vertex.normal)).try_normalize().map_or(Vec3::Y, Vec3::from);
+    let normal = (normals_from(world_from_mesh.matrix3) * Vec3A::from(vertex.normal))
+        .try_normalize()
+        .map_or(Vec3::Y, Vec3::from);
     Vertex { position: point.map(|c| bounded(c.into())), normal: normal.to_array(), ..*vertex }
 }
 

@@ -5,9 +5,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::error::{Fault, at_most};
 use crate::procedural::{self, GrassDensity, grass, tree_terrain};
-use crate::{ImportOptions, Limits, Scene, SceneError, load_file};
+use crate::{Fault, ImportOptions, Limits, Scene, SceneError, at_most, load_file};
 
 /// Names of the built-in scenes. A `tree-terrain-…` may have the suffix `-wind`, and `grass` a `:` with a
 /// [density](GrassDensity). A file of such a name is reached as `./name`.
@@ -81,20 +80,10 @@ pub enum SceneSpec {
     File(PathBuf),
 }
 
-/// A text that names no scene.
+/// A text that names no scene: the density of its meadow is no number, or out of range.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum SceneSpecError {
-    /// The density is not a number.
-    #[error("grass: the density {0:?} is not a number")]
-    DensityMalformed(String),
-    /// The density is out of range.
-    #[error(
-        "grass: the density {0:?} is not between {min} and {max}",
-        min = GrassDensity::MIN,
-        max = GrassDensity::MAX
-    )]
-    DensityOutOfRange(String),
-}
+#[error("grass: {0:?} is no density from {min} to {max}", min = GrassDensity::MIN, max = GrassDensity::MAX)]
+pub struct SceneSpecError(String);
 
 impl SceneSpec {
     /// Makes or reads the scene. A file without light gets default lights.
@@ -166,8 +155,8 @@ fn grass_density(text: &str) -> Result<Option<GrassDensity>, SceneSpecError> {
         return Ok(Some(GrassDensity::ONE));
     }
     let Some(density) = text.strip_prefix(GRASS).and_then(|rest| rest.strip_prefix(':')) else { return Ok(None) };
-    let number = density.parse().map_err(|_| SceneSpecError::DensityMalformed(density.into()))?;
-    GrassDensity::new(number).map(Some).ok_or_else(|| SceneSpecError::DensityOutOfRange(density.into()))
+    let number = density.parse().ok().and_then(GrassDensity::new);
+    number.map(Some).ok_or_else(|| SceneSpecError(density.into()))
 }
 
 fn tree_triangles(base: &str) -> Option<u32> {
@@ -265,13 +254,10 @@ mod tests {
 
     #[test]
     fn invalid_densities_are_refused() {
-        for text in ["", "x", "1,5", " 2", "2x", "16:1"] {
-            let expected = SceneSpecError::DensityMalformed(text.into());
-            assert_eq!(format!("grass:{text}").parse::<SceneSpec>(), Err(expected));
-        }
-        for text in ["0", "-1", "nan", "inf", "-inf", "1e-9", "1001", "1e40"] {
-            let expected = SceneSpecError::DensityOutOfRange(text.into());
-            assert_eq!(format!("grass:{text}").parse::<SceneSpec>(), Err(expected));
+        let malformed = ["", "x", "1,5", " 2", "2x", "16:1"];
+        let out_of_range = ["0", "-1", "nan", "inf", "-inf", "1e-9", "1001", "1e40"];
+        for text in malformed.into_iter().chain(out_of_range) {
+            assert_eq!(format!("grass:{text}").parse::<SceneSpec>(), Err(SceneSpecError(text.into())));
         }
     }
 

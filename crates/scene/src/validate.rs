@@ -5,11 +5,10 @@ use std::collections::HashSet;
 use depth_image::LightError;
 use glam::{Affine3A, Quat, Vec3};
 
-use crate::error::{Fault, at_most};
-use crate::limits::MAX_COORDINATE_M;
 use crate::{
-    Animation, Channel, Influence, Light, Limits, Material, Mesh, MeshPart, MovingInstance, Node, NodeTransform,
-    Property, Scene, SceneError, SourceCamera, Texture, TextureUse, TransformParts, Vertex, VertexDetail, Wind,
+    Animation, Channel, Fault, Influence, Light, Limits, MAX_COORDINATE_M, Material, Mesh, MeshPart, MovingInstance,
+    Node, NodeTransform, Property, Scene, SceneError, SourceCamera, Texture, TextureUse, TransformParts, Vertex,
+    VertexDetail, Wind, at_most,
 };
 
 /// Smallest determinant relative to the cube of the largest column that counts as invertible.
@@ -114,13 +113,10 @@ impl Scene {
             return Ok(());
         }
         let vertices = self.mesh_of(moving).map_or(0, |mesh| mesh.vertices.len());
-        ensure(vertices == moving.influences.len(), || {
-            format!("it has joints of {} vertices, its mesh {vertices}", moving.influences.len())
-        })?;
-        match moving.influences.iter().position(|influence| !is_influence_valid(influence, moving.joints.len())) {
-            Some(bad) => Err(format!("vertex {bad}: its joints are out of range, or their weights")),
-            None => Ok(()),
-        }
+        let influences = moving.influences.len();
+        ensure(vertices == influences, || format!("it has joints of {influences} vertices, its mesh {vertices}"))?;
+        let bad = moving.influences.iter().position(|influence| !is_influence_valid(influence, moving.joints.len()));
+        bad.map_or(Ok(()), |bad| Err(format!("vertex {bad}: its joints are out of range, or their weights")))
     }
 }
 
@@ -141,15 +137,14 @@ fn check_mesh(mesh: &Mesh, material_count: usize) -> Result<(), String> {
     if let Some(bad) = mesh.vertices.iter().position(|v| !is_vertex_valid(v)) {
         return Err(format!("vertex {bad} is not finite, out of range or without a unit normal"));
     }
+    let vertices = mesh.vertices.len();
     let details = mesh.details.len();
-    ensure(details == 0 || details == mesh.vertices.len(), || {
-        format!("{details} vertex details for {} vertices", mesh.vertices.len())
-    })?;
+    ensure(details == 0 || details == vertices, || format!("{details} vertex details for {vertices} vertices"))?;
     if let Some(bad) = mesh.details.iter().position(|d| !is_detail_valid(d)) {
         return Err(format!("the detail of vertex {bad} is not finite or without a unit tangent"));
     }
-    if let Some(bad) = mesh.indices.iter().find(|&&i| i as usize >= mesh.vertices.len()) {
-        return Err(format!("index {bad} is beyond its {} vertices", mesh.vertices.len()));
+    if let Some(bad) = mesh.indices.iter().find(|&&i| i as usize >= vertices) {
+        return Err(format!("index {bad} is beyond its {vertices} vertices"));
     }
     check_parts(&mesh.parts, mesh.indices.len(), material_count)
 }
@@ -159,9 +154,8 @@ fn check_parts(parts: &[MeshPart], index_count: usize, material_count: usize) ->
     for (i, part) in parts.iter().enumerate() {
         ensure(part.index_count.is_multiple_of(3), || format!("part {i} does not hold whole triangles"))?;
         ensure(u64::from(part.first_index) == covered, || format!("part {i} does not follow the one before"))?;
-        ensure((part.material as usize) < material_count, || {
-            format!("part {i} has material {}, which does not exist", part.material)
-        })?;
+        let material = part.material;
+        ensure((material as usize) < material_count, || format!("part {i}: material {material} does not exist"))?;
         covered += u64::from(part.index_count);
     }
     ensure(covered == index_count as u64, || format!("parts cover {covered} of {index_count} indices"))
@@ -189,8 +183,7 @@ fn is_detail_valid(detail: &VertexDetail) -> bool {
 
 fn check_transform(world_from_mesh: &Affine3A) -> Result<(), String> {
     ensure(world_from_mesh.is_finite(), || "its transform is not finite".into())?;
-    let columns = [world_from_mesh.matrix3.x_axis, world_from_mesh.matrix3.y_axis, world_from_mesh.matrix3.z_axis];
-    let largest = columns.iter().fold(0f32, |most, c| most.max(c.length()));
+    let largest = (0..3).fold(0f32, |most, column| most.max(world_from_mesh.matrix3.col(column).length()));
     let relative = (world_from_mesh.matrix3 * largest.recip()).determinant();
     ensure(relative.abs() > MIN_RELATIVE_DETERMINANT, || "its transform is singular".into())?;
     ensure(relative > 0.0, || "its transform mirrors; the mesh must be mirrored instead".into())?;
@@ -226,9 +219,8 @@ fn check_texture(texture: &Texture, limits: &Limits) -> Result<(), String> {
     ensure(texture.width_px.min(texture.height_px) > 0, || "it has no texels".into())?;
     ensure(side <= limits.texture_side_px, || format!("side {side} px is over {}", limits.texture_side_px))?;
     let expected = u64::from(texture.width_px) * u64::from(texture.height_px) * 4;
-    ensure(texture.srgba8.len() as u64 == expected, || {
-        format!("{} bytes where its size needs {expected}", texture.srgba8.len())
-    })
+    let bytes = texture.srgba8.len() as u64;
+    ensure(bytes == expected, || format!("{bytes} bytes where its size needs {expected}"))
 }
 
 fn check_light(light: &Light) -> Result<(), LightError> {
@@ -295,10 +287,9 @@ fn check_channel(channel: &Channel, nodes: &[Node]) -> Result<(), String> {
     ensure(has_parts, || format!("node {} does not exist, or is fixed", channel.node))?;
     check_times(&channel.times_s)?;
     let stride = channel.interpolation.values_a_key();
+    let count = channel.values.len();
     let expected = channel.times_s.len() * stride;
-    ensure(channel.values.len() == expected, || {
-        format!("{} values where its keys need {expected}", channel.values.len())
-    })?;
+    ensure(count == expected, || format!("{count} values where its keys need {expected}"))?;
     for (number, value) in channel.values.iter().enumerate() {
         ensure(value.is_finite(), || format!("value {number} is not finite"))?;
     }

@@ -9,8 +9,7 @@ use image::ImageDecoder as _;
 use image::codecs::hdr::HdrDecoder;
 
 use super::folder::Folder;
-use crate::error::Fault;
-use crate::{Limits, SceneError};
+use crate::{Fault, Limits, SceneError};
 
 /// Larger files are refused; those above [`MAX_ENVIRONMENT_SIZE_PX`] are reduced.
 const MAX_FILE_SIZE_PX: UVec2 = UVec2::new(8192, 4096);

@@ -9,9 +9,8 @@ use std::path::{Component, Path, PathBuf};
 use percent_encoding::percent_decode_str;
 
 use super::folder::{Folder, existing};
-use super::listing::decoded;
-use super::warnings::Warnings;
-use crate::error::{Fault, shortened};
+use super::{Warnings, decoded};
+use crate::{Fault, shortened};
 
 /// The result of a search.
 pub(crate) enum Found {
@@ -29,18 +28,33 @@ pub(crate) fn search(folder: &Folder, bases: &[&Path], names: &[&[u8]], warnings
     let bases = &distinct(bases);
     let names = &distinct(names);
     let mut outside = None;
-    for matching in [Matching::Exact, Matching::Loose] {
-        for name in names.iter().map(|name| ReferredName::parse(name)) {
-            for base in bases.iter().filter(|_| !name.is_absolute) {
-                match resolved(folder, base, &name.parts, matching) {
+    for (by_last_part, matching) in
+        [(false, Matching::Exact), (false, Matching::Loose), (true, Matching::Exact), (true, Matching::Loose)]
+    {
+        for name in names {
+            let ReferredName { mut parts, is_absolute } = ReferredName::parse(name);
+            if by_last_part {
+                parts.drain(..parts.len().saturating_sub(1));
+                parts.retain(|last| *last != b".." && !last.contains(&0));
+            } else if is_absolute {
+                continue;
+            }
+            for base in bases {
+                match resolved(folder, base, &parts, matching) {
+                    Found::File(path) if by_last_part => {
+                        let name = shortened(decoded(name).into_owned());
+                        let warning = "missing files are replaced by files of the same name in other folders";
+                        warnings.list(warning, format_args!("{name} by {}", path.display()));
+                        return Found::File(path);
+                    }
                     Found::File(path) => return Found::File(path),
-                    Found::Outside(reason) => outside = outside.or(Some(reason)),
-                    Found::Missing => {}
+                    Found::Outside(reason) if !by_last_part => outside = outside.or(Some(reason)),
+                    Found::Outside(_) | Found::Missing => {}
                 }
             }
         }
     }
-    by_last_part(folder, bases, names, warnings).unwrap_or(outside.map_or(Found::Missing, Found::Outside))
+    outside.map_or(Found::Missing, Found::Outside)
 }
 
 fn distinct<T: PartialEq + Copy>(items: &[T]) -> Vec<T> {
@@ -67,37 +81,11 @@ pub(crate) fn read_uri(folder: &Folder, element: &str, uri: &str) -> Result<Opti
     if let Some(bytes) = existing(folder.read_name(element, &path))? {
         return Ok(Some(bytes));
     }
-    let found = in_any_case(folder, path.as_bytes());
-    found.map_or(Ok(None), |found| existing(folder.read_relative(element, &found)))
-}
-
-/// The file of this name relative to the scene's folder, in any case and encoding.
-fn in_any_case(folder: &Folder, name: &[u8]) -> Option<PathBuf> {
-    let name = ReferredName::parse(name);
+    let name = ReferredName::parse(path.as_bytes());
     match resolved(folder, Path::new(""), &name.parts, Matching::Loose) {
-        Found::File(path) if !name.is_absolute => Some(path),
-        _ => None,
+        Found::File(path) if !name.is_absolute => existing(folder.read_relative(element, &path)),
+        _ => Ok(None),
     }
-}
-
-fn by_last_part(folder: &Folder, bases: &[&Path], names: &[&[u8]], warnings: &Warnings) -> Option<Found> {
-    for matching in [Matching::Exact, Matching::Loose] {
-        for name in names {
-            let parts = ReferredName::parse(name).parts;
-            let Some(last) = parts.last().filter(|last| **last != b".." && !last.contains(&0)) else { continue };
-            for base in bases {
-                if let Found::File(path) = resolved(folder, base, &[last], matching) {
-                    let name = shortened(decoded(name).into_owned());
-                    warnings.list(
-                        "missing files are replaced by files of the same name in other folders",
-                        format_args!("{name} by {}", path.display()),
-                    );
-                    return Some(Found::File(path));
-                }
-            }
-        }
-    }
-    None
 }
 
 /// A name in parts, without the root of another computer.

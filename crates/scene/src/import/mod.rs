@@ -2,32 +2,28 @@
 //! common steps: re-centring, mirrored placements, limits, validation.
 
 mod environment;
-mod extent;
 mod file_search;
 mod folder;
 mod gltf;
 mod ktx2;
-mod listing;
 mod normals;
 mod obj;
-mod options;
 mod picture;
 mod ply;
 mod polygons;
 mod source_scene;
-mod tangents;
-mod texture_files;
 mod vertex_colors;
 mod warnings;
 
+use std::fmt;
 use std::path::Path;
+use std::str::FromStr;
 
 use crate::error::Fault;
 use crate::{Limits, Scene, SceneError};
 pub use environment::load_environment;
-use folder::Folder;
-pub use options::{ImportOptions, MissingTextures, MissingTexturesError};
-use source_scene::SourceScene;
+use folder::{Folder, decoded};
+use source_scene::{PlacedCamera, SourceInstance, SourceMesh, SourceScene, plain_vertex};
 use warnings::Warnings;
 
 /// Reads a scene from a `.gltf`, `.glb`, `.obj` or `.ply` file. Files that it refers to are read only
@@ -72,4 +68,49 @@ fn read_source(path: &Path, limits: &Limits, options: &ImportOptions) -> Result<
     import.warnings.log();
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     Ok(SourceScene { name, ..source? })
+}
+
+/// Options of [`load_file`].
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct ImportOptions {
+    /// What is done about missing textures.
+    pub missing_textures: MissingTextures,
+    /// Names of glTF extensions that a file may require although they are not read.
+    pub ignore_required: Vec<String>,
+}
+
+impl From<MissingTextures> for ImportOptions {
+    fn from(missing_textures: MissingTextures) -> Self {
+        Self { missing_textures, ..Self::default() }
+    }
+}
+
+/// What is done about missing textures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MissingTextures {
+    /// The scene is refused, and all missing files are named.
+    #[default]
+    Refuse,
+    /// A grey texel takes the place of each.
+    Grey,
+}
+
+/// A text that names no choice.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0:?} is neither refuse nor grey")]
+pub struct MissingTexturesError(String);
+
+impl FromStr for MissingTextures {
+    type Err = MissingTexturesError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let named = [Self::Refuse, Self::Grey].into_iter().find(|choice| choice.to_string() == text);
+        named.ok_or_else(|| MissingTexturesError(text.to_owned()))
+    }
+}
+
+impl fmt::Display for MissingTextures {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if *self == Self::Refuse { "refuse" } else { "grey" })
+    }
 }

@@ -1,11 +1,12 @@
-//! Normals for sources without normals. A corner's normal is the angle-weighted mean of the faces around it that bend
+//! Normals and tangents for sources without them. A corner's normal is the angle-weighted mean of the faces around it that bend
 //! away by less than a crease angle. Corners that disagree get separate vertices.
 
 use std::collections::HashMap;
 
 use glam::DVec3;
+use meshoptimizer_rs::{Error, Positions, TANGENT_COMPATIBLE, Workspace};
 
-use super::source_scene::SourceMesh;
+use super::SourceMesh;
 use crate::Vertex;
 
 /// Smooth, with edges sharper than 60° kept, for formats without shading information.
@@ -249,6 +250,37 @@ fn groups_by_position(positions: &[DVec3]) -> Vec<u32> {
         *group_of.entry((*p + DVec3::ZERO).to_array().map(f64::to_bits)).or_insert(next)
     });
     groups.collect()
+}
+
+/// Sets the tangents of all corners, as MikkTSpace has them (Mikkelsen 2008), with which normal maps are baked. Corners of one vertex whose tangents differ get separate vertices. The mesh has
+/// normals and details; `second_uv` says on which pair of coordinates the normal map lies.
+pub(crate) fn generate_tangents(mesh: &mut SourceMesh, second_uv: bool) -> Result<(), Error> {
+    let positions: Vec<[f32; 3]> = mesh.positions_in_mesh.iter().map(|p| p.as_vec3().to_array()).collect();
+    let normals: Vec<[f32; 3]> = mesh.vertices.iter().map(|v| v.normal).collect();
+    let uvs: Vec<[f32; 2]> = match second_uv {
+        false => mesh.vertices.iter().map(|v| v.uv).collect(),
+        true => mesh.details.iter().map(|d| d.uv).collect(),
+    };
+    let positions = Positions::from_packed(&positions);
+    let indices = Some(&*mesh.indices);
+    let workspace = &mut Workspace::default();
+    let count = mesh.indices.len();
+    let tangents =
+        meshoptimizer_rs::generate_tangents(indices, count, positions, &normals, &uvs, TANGENT_COMPATIBLE, workspace)?;
+    let mut number_of = HashMap::new();
+    let mut is_set = vec![false; mesh.vertices.len()];
+    for (corner, [x, y, z, sign]) in tangents.into_iter().enumerate() {
+        // MikkTSpace's bitangent points along v; that of glTF, whose v points down, against it.
+        let tangent = [x, y, z, -sign];
+        let vertex = mesh.indices[corner];
+        let key = (vertex, tangent.map(f32::to_bits));
+        let number = *number_of.entry(key).or_insert_with(|| {
+            if std::mem::replace(&mut is_set[vertex as usize], true) { mesh.copy_of(vertex) } else { vertex }
+        });
+        mesh.details[number as usize].tangent = tangent;
+        mesh.indices[corner] = number;
+    }
+    Ok(())
 }
 
 #[cfg(test)]

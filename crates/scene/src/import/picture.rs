@@ -1,14 +1,15 @@
-//! Textures from encoded images; sizes are checked before a texel is decoded.
+//! Textures from encoded images, and the texture files of OBJ and PLY models; sizes are checked before a texel is decoded.
 
+use std::collections::HashMap;
 use std::io::Cursor;
+use std::path::Path;
 
 use image::{ImageFormat, ImageReader};
 use rayon::prelude::*;
 
-use super::ktx2;
-use super::options::MissingTextures;
-use crate::error::{Fault, at_most};
-use crate::{Limits, SceneErrorKind, Texture};
+use super::file_search::{Found, search};
+use super::{Import, MissingTextures, decoded, ktx2};
+use crate::{Fault, Limits, SceneErrorKind, Texture, at_most, shortened};
 
 /// The meaning of a picture's channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -52,6 +53,9 @@ pub(crate) fn decode_all(
     let files: Vec<String> = pictures.iter().filter(|p| p.bytes.is_none()).map(|p| p.file.clone()).collect();
     if !files.is_empty() && missing == MissingTextures::Refuse {
         return Err(Fault::new("textures", SceneErrorKind::MissingFiles(files)));
+    } else if !files.is_empty() {
+        let names = shortened(files.join(", "));
+        tracing::warn!("{} textures are missing, and grey takes their place: {names}", files.len());
     }
     let mut decoded_bytes = 0u64;
     for picture in pictures {
@@ -111,6 +115,56 @@ fn decode(picture: &EncodedPicture, limits: &Limits) -> Result<Texture, Fault> {
     let pixels = reader.decode().map_err(|e| Fault::malformed(&picture.element, e.to_string()))?.into_rgba8();
     let (width_px, height_px) = pixels.dimensions();
     Ok(Texture { width_px, height_px, is_srgb, srgba8: pixels.into_raw() })
+}
+
+/// The texture files of a model, each read once.
+#[derive(Default)]
+pub(crate) struct TextureFiles {
+    pictures: Vec<EncodedPicture>,
+    number_of: HashMap<(String, Content), u32>,
+}
+
+/// A reference to a texture file.
+pub(crate) struct TextureReference<'n> {
+    /// The statement that refers to the file, in messages.
+    pub element: String,
+    /// Spellings of the file's name. The last one is that of messages.
+    pub names: Vec<&'n [u8]>,
+    /// A folder relative to the scene's folder, in which the file is looked for before that.
+    pub base: &'n Path,
+    pub content: Content,
+}
+
+impl TextureFiles {
+    /// Reads the file unless it is known, and returns its number.
+    pub(crate) fn number_of(&mut self, reference: TextureReference, import: &Import) -> Result<u32, Fault> {
+        let TextureReference { element, names, base, content } = reference;
+        let name = names.last().map(|name| decoded(name).into_owned()).unwrap_or_default();
+        let (file, bytes) = match search(&import.folder, &[base, Path::new("")], &names, &import.warnings) {
+            Found::File(path) => {
+                let file = path.display().to_string();
+                if let Some(&number) = self.number_of.get(&(file.clone(), content)) {
+                    return Ok(number);
+                }
+                (file, Some(import.folder.read_relative(&element, &path)?))
+            }
+            Found::Outside(reason) if import.options.missing_textures == MissingTextures::Refuse => {
+                return Err(Fault::forbidden(element, &name, reason));
+            }
+            Found::Outside(_) | Found::Missing => (name, None),
+        };
+        let next = self.pictures.len() as u32;
+        let number = *self.number_of.entry((file.clone(), content)).or_insert(next);
+        if number == next {
+            self.pictures.push(EncodedPicture { element, file, bytes, content });
+        }
+        Ok(number)
+    }
+
+    /// Decodes all files, in the order of their numbers.
+    pub(crate) fn decode(&self, import: &Import) -> Result<Vec<Texture>, Fault> {
+        decode_all(&self.pictures, import.limits, import.options.missing_textures)
+    }
 }
 
 #[cfg(test)]

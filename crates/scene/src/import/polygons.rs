@@ -1,10 +1,18 @@
-//! Triangles of polygons: concave ones, ones with bridges to holes, and ones that are not plane.
+//! Meshes of polygons, as OBJ and PLY have them, and triangles of polygons: concave ones, ones with bridges to holes, and
+//! ones that are not plane.
 //!
 //! A polygon is seen along its Newell normal, the mean normal of its outline. Where its first corner sees all others, as in
 //! every convex polygon, a fan is right and cheap. All others are cut by `earcut`.
 
+use std::collections::HashMap;
+use std::fmt::Arguments;
+use std::hash::Hash;
+
 use earcut::Earcut;
 use glam::{DVec2, DVec3};
+
+use super::{Import, SourceMesh, normals};
+use crate::{Fault, Vertex, at_most};
 
 /// The most corners of a polygon that is cut. An outline that crosses itself may take cubic time: `earcut` then tries all
 /// diagonals against all edges.
@@ -14,11 +22,123 @@ const MAX_CORNERS_CUT: usize = 1024;
 const MAX_COST: u64 = 1 << 36;
 // Warnings of polygons that are left out, and of those that are not cut.
 pub(crate) const TOO_SHORT: &str = "faces of fewer than three corners are left out";
-pub(crate) const NOT_FINITE: &str = "faces with a vertex that is not finite are left out";
-pub(crate) const TOO_COSTLY: &str = "faces of too many corners to be cut are shown as if they were convex";
+pub(crate) const UNKNOWN_VERTEX: &str = "faces with a corner that is no vertex of the file are left out";
+const NOT_FINITE: &str = "faces with a vertex that is not finite are left out";
+const TOO_COSTLY: &str = "faces of too many corners to be cut are shown as if they were convex";
+
+/// Makes vertices of the corners of faces, and triangles of the faces. Corners at one position share a vertex if their `K`,
+/// which stands for all else that they have, is equal.
+pub(crate) struct PolygonMesh<'a, K> {
+    import: &'a Import<'a>,
+    positions_in_source: &'a [DVec3],
+    mesh: SourceMesh,
+    triangles_of_material: Vec<Triangles>,
+    /// The first corner at each position, with its vertex.
+    first: Vec<Option<(K, u32)>>,
+    /// The vertices of corners that differ from the first one at their position.
+    others: HashMap<(u32, K), u32>,
+    cutter: PolygonCutter,
+}
+
+#[derive(Default, Clone)]
+struct Triangles {
+    indices: Vec<u32>,
+    /// Whether each triangle has a flat normal where it has no other.
+    is_flat: Vec<bool>,
+}
+
+/// A face whose corners are at known positions.
+pub(crate) struct Face<'p> {
+    /// The face in messages.
+    pub place: Arguments<'p>,
+    pub polygon: Vec<DVec3>,
+    /// The number of the face's material among those of the mesh.
+    pub material: usize,
+    pub is_flat: bool,
+}
+
+impl<'a, K: Copy + Eq + Hash> PolygonMesh<'a, K> {
+    pub(crate) fn new(positions_in_source: &'a [DVec3], materials: usize, import: &'a Import<'a>) -> Self {
+        Self {
+            import,
+            positions_in_source,
+            mesh: SourceMesh::default(),
+            triangles_of_material: vec![Triangles::default(); materials],
+            first: vec![None; positions_in_source.len()],
+            others: HashMap::new(),
+            cutter: PolygonCutter::new(),
+        }
+    }
+
+    /// The outline of a face; `None`, with a warning, for a face that is left out.
+    pub(crate) fn polygon(&self, positions: impl Iterator<Item = u32>, place: Arguments) -> Option<Vec<DVec3>> {
+        let polygon: Option<Vec<DVec3>> =
+            positions.map(|position| self.positions_in_source.get(position as usize).copied()).collect();
+        if polygon.is_none() {
+            self.import.warnings.count(UNKNOWN_VERTEX, place);
+        }
+        let is_finite = polygon.iter().flatten().all(|p| p.is_finite());
+        if !is_finite {
+            self.import.warnings.count(NOT_FINITE, place);
+        }
+        polygon.filter(|_| is_finite)
+    }
+
+    /// The vertex of a corner at a known position, which `make` makes unless there is one.
+    pub(crate) fn vertex(&mut self, position: u32, key: K, make: impl FnOnce() -> Vertex) -> u32 {
+        let next = self.mesh.vertices.len() as u32;
+        let number = match &mut self.first[position as usize] {
+            Some((first, number)) if *first == key => *number,
+            Some(_) => *self.others.entry((position, key)).or_insert(next),
+            first => first.insert((key, next)).1,
+        };
+        if number == next {
+            self.mesh.positions_in_mesh.push(self.positions_in_source[position as usize]);
+            self.mesh.vertices.push(make());
+        }
+        number
+    }
+
+    /// Adds the triangles of a face, whose corners have `vertices`.
+    pub(crate) fn push(&mut self, face: &Face, vertices: &[u32]) -> Result<(), Fault> {
+        let Import { limits, warnings, .. } = self.import;
+        at_most(face.place, self.mesh.vertices.len() as u64, limits.vertices)?;
+        let triangles = self.cutter.triangles(&face.polygon, || warnings.count(TOO_COSTLY, face.place));
+        let into = &mut self.triangles_of_material[face.material];
+        into.indices.extend(triangles.iter().map(|&corner| vertices[corner as usize]));
+        into.is_flat.resize(into.indices.len() / 3, face.is_flat);
+        Ok(())
+    }
+
+    /// The mesh with a part for each material that is used, and with normals. `numbers` are the materials' in the scene.
+    pub(crate) fn finish(self, numbers: impl IntoIterator<Item = u32>) -> Result<SourceMesh, Fault> {
+        let mut mesh = self.mesh;
+        let mut is_flat = Vec::new();
+        for (triangles, number) in self.triangles_of_material.into_iter().zip(numbers) {
+            if !triangles.indices.is_empty() {
+                mesh.push_part(triangles.indices, number);
+                is_flat.extend(triangles.is_flat);
+            }
+        }
+        if mesh.indices.is_empty() {
+            let fault = self.import.warnings.no_triangles([UNKNOWN_VERTEX, NOT_FINITE, TOO_SHORT]);
+            return Err(fault.unwrap_or_else(|| Fault::malformed("scene", "it has no triangles")));
+        }
+        normals::fill(&mut mesh, |triangle| is_flat[triangle]);
+        Ok(mesh)
+    }
+}
+
+/// The triangles of a strip. Every other triangle is reversed; those that repeat a vertex only connect parts of the
+/// strip.
+pub(crate) fn triangles_of_strip(indices: &[u32]) -> impl Iterator<Item = [u32; 3]> {
+    let windows = indices.windows(3).enumerate();
+    let turned = windows.map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] });
+    turned.filter(|[a, b, c]| a != b && b != c && a != c)
+}
 
 /// Cuts the polygons of a file into triangles; keeps its memory from one to the next.
-pub(crate) struct PolygonCutter {
+struct PolygonCutter {
     cost_left: u64,
     earcut: Earcut<f64>,
     outline: Vec<DVec2>,
@@ -26,13 +146,13 @@ pub(crate) struct PolygonCutter {
 }
 
 impl PolygonCutter {
-    pub(crate) fn new() -> Self {
+    fn new() -> Self {
         Self { cost_left: MAX_COST, earcut: Earcut::new(), outline: Vec::new(), corners: Vec::new() }
     }
 
     /// The triangles of a polygon as numbers of its corners, three a triangle, in the polygon's own direction. Fewer than three
     /// corners have none. Calls `warn_of_cost` where the polygon is too costly to be cut: its triangles are then a fan.
-    pub(crate) fn triangles(&mut self, polygon: &[DVec3], warn_of_cost: impl FnOnce()) -> &[u32] {
+    fn triangles(&mut self, polygon: &[DVec3], warn_of_cost: impl FnOnce()) -> &[u32] {
         self.corners.clear();
         self.outline.clear();
         let normal = if polygon.len() > 3 { newell_normal(polygon).try_normalize() } else { None };

@@ -1,16 +1,14 @@
 //! A scene in the source's own coordinates, in double precision, and its conversion to a [`Scene`].
 
 use std::collections::HashMap;
+use std::ops::RangeInclusive;
 
-use glam::{Affine3A, DAffine3, DVec3};
+use glam::{Affine3A, BVec3, DAffine3, DVec3};
 
-use super::extent::{Box3, DRAWABLE_MESH_EXTENT, recentring_offset, scale_to_drawable, source_space};
-use crate::animation::{Animation, Influence, MovingInstance};
-use crate::error::{Fault, at_most};
-use crate::light_rig::{DEFAULT_BACKGROUND, position_mut, scale_to_metres};
+use crate::light_rig::{DEFAULT_BACKGROUND, SourceLight};
 use crate::{
-    Environment, Illumination, Instance, Light, Limits, Material, Mesh, MeshPart, Scene, SourceCamera, SourceSpace,
-    Texture, Vertex, VertexDetail,
+    Animation, Environment, Fault, Illumination, Influence, Instance, Limits, Material, Mesh, MeshPart, MovingInstance,
+    Scene, SourceCamera, SourceSpace, Texture, Vertex, VertexDetail,
 };
 
 /// The result of an importer.
@@ -50,12 +48,6 @@ pub(crate) struct SourceInstance {
     pub source_from_mesh: DAffine3,
 }
 
-/// A light whose position is outside of `light`, where it is unset.
-pub(crate) struct SourceLight {
-    pub light: Light,
-    pub position_in_source: DVec3,
-}
-
 pub(crate) struct PlacedCamera {
     pub name: String,
     pub source_from_camera: DAffine3,
@@ -70,11 +62,10 @@ pub(crate) fn plain_vertex() -> Vertex {
 impl SourceScene {
     /// Checks, re-centres, un-mirrors, converts to `f32`, and validates.
     pub(crate) fn finish(mut self, limits: &Limits) -> Result<Scene, Fault> {
-        self.check_sizes(limits)?;
         self.normalise_meshes()?;
         let source_space = source_space(self.bounds_in_source(), self.animation.is_some())?;
         self.unmirror();
-        let lights = self.lights.iter().map(|l| l.placed_in(source_space)).collect();
+        let lights = self.lights.into_iter().map(|l| l.placed_in(source_space)).collect();
         let SourceSpace { origin_in_source, metres_per_unit } = source_space;
         let world_from_source =
             DAffine3::from_scale(DVec3::splat(metres_per_unit)) * DAffine3::from_translation(-origin_in_source);
@@ -106,17 +97,6 @@ impl SourceScene {
         };
         scene.check(limits)?;
         Ok(scene)
-    }
-
-    fn check_sizes(&self, limits: &Limits) -> Result<(), Fault> {
-        at_most("instances", self.instances.len() as u64, limits.instances)?;
-        let triangles = self.instances.iter().map(|i| self.meshes[i.mesh].indices.len() as u64 / 3);
-        let triangles = triangles.fold(0, u64::saturating_add);
-        at_most("triangles of all instances", triangles, limits.triangles)?;
-        if triangles == 0 {
-            return Err(Fault::malformed("scene", "it has no triangles"));
-        }
-        Ok(())
     }
 
     /// Moves a mesh that is far from its own origin there, and scales one whose extent `f32` cannot draw; its instances take
@@ -246,18 +226,95 @@ impl SourceMesh {
     }
 }
 
-impl SourceLight {
-    fn placed_in(&self, source_space: SourceSpace) -> Light {
-        let mut light = self.light;
-        if let Some(position) = position_mut(&mut light) {
-            *position = source_space.world_from_source(self.position_in_source);
-        }
-        scale_to_metres(&mut light, source_space.metres_per_unit);
-        light
-    }
-}
-
 fn in_f32(transform: &DAffine3) -> Affine3A {
     let [x, y, z] = [0, 1, 2].map(|i| transform.matrix3.col(i).as_vec3());
     Affine3A::from_cols(x.into(), y.into(), z.into(), transform.translation.as_vec3().into())
+}
+
+/// Distance from the origin beyond which `f32` loses a millimetre.
+const FAR_M: f64 = 1e4;
+/// The extents of a scene that is drawn in the unit of its file. Others are scaled to about a metre, because shaders multiply
+/// four lengths in `f32`.
+const DRAWABLE_EXTENT_M: RangeInclusive<f64> = 1e-3..=1e6;
+/// The extents of a scene that is shown at all: that of a model is far within, and that of a damaged file is not.
+const POSSIBLE_EXTENT: RangeInclusive<f64> = 1e-30..=1e12;
+/// The extents of a mesh that is kept in its own unit, for the same reason.
+const DRAWABLE_MESH_EXTENT: RangeInclusive<f64> = 1e-6..=1e8;
+/// Distance in diagonals beyond which `f32` loses a hundred-thousandth of the model.
+const FAR_IN_DIAGONALS: f64 = 1e3;
+
+/// The space of a source with these bounds. A source that moves may be in one point at rest.
+fn source_space(bounds: Box3, is_animated: bool) -> Result<SourceSpace, Fault> {
+    let extent = bounds.extent();
+    if !(bounds.min.is_finite() && bounds.max.is_finite()) {
+        return Err(Fault::malformed("scene", "its bounds are not finite"));
+    }
+    if extent == 0.0 && !is_animated {
+        return Err(Fault::malformed("scene", "it has no extent: all its triangles are in one point"));
+    }
+    if extent != 0.0 && !POSSIBLE_EXTENT.contains(&extent) {
+        return Err(Fault::malformed("scene", format!("its extent of {extent:e} is out of range")));
+    }
+    let metres_per_unit = scale_to_drawable(extent, &DRAWABLE_EXTENT_M);
+    Ok(SourceSpace { origin_in_source: recentring_offset(bounds, metres_per_unit), metres_per_unit })
+}
+
+/// The factor that brings an extent to 1…2, or 1 for one that is drawable or 0. It is a power of two: scaling is exact.
+fn scale_to_drawable(extent: f64, drawable: &RangeInclusive<f64>) -> f64 {
+    if extent == 0.0 || !extent.is_finite() || drawable.contains(&extent) {
+        1.0
+    } else {
+        (-extent.log2().floor()).exp2()
+    }
+}
+
+/// Offset that moves `bounds` to the origin, in whole units unless the bounds are too small or will be scaled.
+fn recentring_offset(bounds: Box3, scale: f64) -> DVec3 {
+    if bounds.is_empty() {
+        return DVec3::ZERO;
+    }
+    let centre = bounds.center();
+    let diagonal = bounds.diagonal();
+    let distance = centre.length();
+    if distance * scale <= FAR_M && distance <= FAR_IN_DIAGONALS * diagonal {
+        DVec3::ZERO
+    } else if diagonal > 10.0 && scale == 1.0 {
+        centre.round()
+    } else {
+        centre
+    }
+}
+
+#[derive(Clone, Copy)]
+pub(crate) struct Box3 {
+    min: DVec3,
+    max: DVec3,
+}
+
+impl Box3 {
+    fn around(points: impl Iterator<Item = DVec3>) -> Self {
+        let empty = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+        points.fold(empty, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
+    }
+
+    pub(crate) fn center(&self) -> DVec3 {
+        (self.min + self.max) * 0.5
+    }
+
+    pub(crate) fn diagonal(&self) -> f64 {
+        (self.max - self.min).length()
+    }
+
+    /// The longest side; 0 for the empty box.
+    fn extent(&self) -> f64 {
+        (self.max - self.min).max_element().max(0.0)
+    }
+
+    fn is_empty(&self) -> bool {
+        self.min.cmpgt(self.max).any()
+    }
+
+    fn corners(&self) -> [DVec3; 8] {
+        std::array::from_fn(|i| DVec3::select(BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), self.max, self.min))
+    }
 }

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use std::collections::HashSet;
 use std::fmt::Display;
 
-use crate::error::{Fault, shortened};
+use crate::{Fault, shortened};
 
 /// Most names that a warning lists.
 const MAX_NAMES: usize = 8;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::geometry::MeshBuilder;
+use super::parts::MeshBuilder;
 use crate::{Material, Scene};
 
 const HALF_WIDTH_M: f32 = 2.0;

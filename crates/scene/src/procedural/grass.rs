@@ -5,8 +5,7 @@ use std::fmt;
 
 use glam::{Vec2, Vec3};
 
-use super::geometry::{MeshBuilder, matt, vertex};
-use super::random::{Noise, Rng, lerp, mix};
+use super::parts::{MeshBuilder, Noise, Rng, lerp, matt, mix, vertex};
 use crate::{Environment, Material, Scene, Vertex};
 
 /// Number of triangles at density 1, that of the model in the paper's table 1.
@@ -42,17 +41,24 @@ impl GrassDensity {
         (Self::MIN..=Self::MAX).contains(&density).then_some(Self(density))
     }
 
+    /// Squares of ground a side, and blades.
+    fn plan(self) -> [u32; 2] {
+        let triangles = (TRIANGLES * f64::from(self.0)).round() as u32;
+        let cells = f64::from(triangles / GROUND_SHARE / 2).sqrt().round().max(1.0) as u32;
+        [cells, triangles.saturating_sub(2 * cells * cells) / TRIANGLES_OF_BLADE]
+    }
+
     /// Number of triangles of the meadow, before it is made.
     #[must_use]
     pub fn triangles(self) -> u64 {
-        let Plan { cells, blades } = Plan::of(self);
+        let [cells, blades] = self.plan();
         u64::from(2 * cells * cells) + u64::from(blades) * u64::from(TRIANGLES_OF_BLADE)
     }
 
     /// Number of vertices of the meadow, before it is made.
     #[must_use]
     pub fn vertices(self) -> u64 {
-        let Plan { cells, blades } = Plan::of(self);
+        let [cells, blades] = self.plan();
         u64::from((cells + 1) * (cells + 1)) + u64::from(blades) * u64::from(TRIANGLES_OF_BLADE + 2)
     }
 }
@@ -63,35 +69,21 @@ impl fmt::Display for GrassDensity {
     }
 }
 
-struct Plan {
-    /// Squares of ground a side.
-    cells: u32,
-    blades: u32,
-}
-
-impl Plan {
-    fn of(density: GrassDensity) -> Self {
-        let triangles = (TRIANGLES * f64::from(density.0)).round() as u32;
-        let cells = f64::from(triangles / GROUND_SHARE / 2).sqrt().round().max(1.0) as u32;
-        Self { cells, blades: triangles.saturating_sub(2 * cells * cells) / TRIANGLES_OF_BLADE }
-    }
-}
-
 /// Bent, two-sided blades of grass on an undulating patch of 4 m × 4 m around the origin: 56,000 triangles times
 /// `density`. Twice as many blades are each half as wide and equally high. They cover the same share of the ground at
 /// every density, only finer.
 #[must_use]
 pub fn grass(density: GrassDensity) -> Scene {
-    let plan = Plan::of(density);
+    let [cells, blades] = density.plan();
     let meadow = Meadow { noise: Noise::new(SEED), width_m: BLADE_WIDTH_M / density.0 };
     let mut builder = MeshBuilder::default();
-    meadow.add_ground(&mut builder, plan.cells);
+    meadow.add_ground(&mut builder, cells);
     builder.finish_part(0);
     let mut rng = Rng::new(SEED, 1);
-    (0..plan.blades).for_each(|i| meadow.add_blade(&mut builder, spread(i), &mut rng));
+    (0..blades).for_each(|i| meadow.add_blade(&mut builder, spread(i), &mut rng));
     builder.finish_part(1);
-    let blades = Material { double_sided: true, ..matt("blades") };
-    let scene = builder.into_scene_of("grass", vec![matt("ground"), blades]);
+    let materials = vec![matt("ground"), Material { double_sided: true, ..matt("blades") }];
+    let scene = builder.into_scene_of("grass", materials);
     Scene { background: Environment::uniform(Vec3::new(0.46, 0.60, 0.80)), ..scene }
 }
 

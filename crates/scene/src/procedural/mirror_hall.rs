@@ -2,9 +2,7 @@
 
 use glam::Vec3;
 
-use super::geometry::{MeshBuilder, matt};
-use super::pieces::{ball, checked, checks, mirror};
-use super::teapot::{Teapot, teapot};
+use super::parts::{MeshBuilder, Teapot, ball, checked, checks, matt, mirror, teapot};
 use crate::Scene;
 
 const HALL_HALF_SIDE_M: u32 = 4;

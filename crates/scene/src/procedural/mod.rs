@@ -7,11 +7,9 @@ mod gallery;
 mod geometry;
 mod grass;
 mod mirror_hall;
-mod pieces;
 mod random;
 mod snake;
 mod teapot;
-mod terrain;
 mod tree;
 mod tree_terrain;
 mod urban;
@@ -26,8 +24,7 @@ pub use urban::urban;
 
 /// What procedural scenes are made of, for the scenes of laboratory and tests in the crate `fixtures`.
 pub mod parts {
-    pub use super::geometry::{MeshBuilder, Station, matt, vertex};
-    pub use super::pieces::{ball, checked, checks, mirror, star};
+    pub use super::geometry::{MeshBuilder, Station, ball, checked, checks, matt, mirror, star, vertex};
     pub use super::random::{Noise, Rng, lerp, mix, mixed};
     pub use super::teapot::{Teapot, teapot};
     pub use super::tree::{TreePlan, tree_mesh};

@@ -5,7 +5,7 @@ use std::f32::consts::{PI, TAU};
 use depth_image::Environment;
 use glam::{Affine3A, DAffine3, Quat, Vec3};
 
-use super::geometry::{MeshBuilder, matt, vertex};
+use super::parts::{MeshBuilder, matt, vertex};
 use crate::{
     Animation, Channel, Clip, Influence, Instance, Interpolation, Joint, Mesh, MovingInstance, Node, NodeTransform,
     Property, Scene, TransformParts,

@@ -5,7 +5,7 @@ use std::array;
 
 use glam::{Vec2, Vec3};
 
-use super::geometry::{MeshBuilder, vertex};
+use super::parts::{MeshBuilder, vertex};
 
 /// The side of the pattern's cubes, metres.
 const PATTERN_M: f32 = 0.5;

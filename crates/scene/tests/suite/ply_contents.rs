@@ -133,7 +133,7 @@ fn rows_that_cannot_be_used_are_left_out_and_counted() {
     let (scene, warnings) = loaded_with_warnings(&Sample::new("a.ply", text.as_bytes()));
     assert_eq!((scene.triangle_count(), warnings.lines().count()), (2, 2), "{warnings}");
     assert!(warnings.contains("three corners are left out: 3, the first: face 1"), "{warnings}");
-    assert!(warnings.contains("vertex that is not there are left out: 2, the first: face 3"), "{warnings}");
+    assert!(warnings.contains("corner that is no vertex of the file are left out: 2, the first: face 3"), "{warnings}");
 }
 
 #[test]

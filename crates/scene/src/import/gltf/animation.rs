@@ -1,23 +1,22 @@
-//! The moving part of a scene: instances below nodes that clips move, and skinned meshes.
+//! The moving part of a scene: instances below nodes that clips move, and skinned meshes. Placements without an inverse: those
+//! that flatten a mesh, and those that leave no area of it.
 
-use glam::DAffine3;
+use glam::{DAffine3, DMat3, DVec3, Mat4};
 use gltf::json::{Index, Node as JsonNode, skin::Skin};
 
-use super::super::source_scene::{SourceMesh, SourceScene};
-use super::document::Document;
-use super::nodes::{NodeTree, PlacedNode};
-use super::transforms::{parent_from_node, parts_of};
-use super::{channels, degenerate, skins};
-use crate::animation::{
-    Animation, Clip, Influence, Joint, MovingInstance, Node, NodeTransform, TransformParts, is_invertible,
+use super::super::{SourceMesh, SourceScene};
+use super::nodes::{NodeTree, PlacedNode, affine_from, parent_from_node, parts_of};
+use super::{Document, channels};
+use crate::{
+    Animation, Clip, Fault, Influence, Joint, Limits, MovingInstance, Node, NodeTransform, TransformParts, at_most,
+    is_invertible,
 };
-use crate::error::{Fault, at_most};
 
 /// Reads clips and skins. A scene in which no mesh follows them has no animation.
 pub(super) fn read(document: &Document, tree: &NodeTree, scene: &mut SourceScene) -> Result<(), Fault> {
     let clips = channels::read(document)?;
     let mut placements = Placements::read(document, tree, &clips, scene)?;
-    degenerate::settle(&mut placements, scene, document.limits)?;
+    settle(&mut placements, scene, document.limits)?;
     let moving = placements.moving;
     if moving.is_empty() {
         return Ok(());
@@ -31,11 +30,11 @@ pub(super) fn read(document: &Document, tree: &NodeTree, scene: &mut SourceScene
 
 /// The placements of meshes that need more than a transform.
 #[derive(Default)]
-pub(super) struct Placements {
+struct Placements {
     /// All instances that move or are skinned. `Joint::node` is the node's place in the tree.
-    pub moving: Vec<MovingInstance>,
+    moving: Vec<MovingInstance>,
     /// The numbers of instances that stand still and whose transform has no inverse.
-    pub degenerate: Vec<usize>,
+    degenerate: Vec<usize>,
 }
 
 impl Placements {
@@ -55,9 +54,9 @@ impl Placements {
                 // A mesh without joints is rigid.
                 let skin = document.root.nodes[node.number].skin.filter(|_| !mesh.influences.is_empty());
                 if let Some(skin) = skin {
-                    let Skinned { joints, influences } = skins.skinned(skin, mesh, node, place)?;
-                    instance.source_from_mesh = at_rest(tree, &joints, &format!("skin {}", skin.value()))?;
-                    placements.moving.push(MovingInstance { instance: number as u32, joints, influences });
+                    let moving = skins.skinned(skin, mesh, node, place)?;
+                    instance.source_from_mesh = at_rest(tree, &moving.joints, &format!("skin {}", skin.value()))?;
+                    placements.moving.push(MovingInstance { instance: number as u32, ..moving });
                 } else if moves[place as usize] {
                     // A clip may grow what has no size at rest: only the place at rest is left.
                     let at_rest = &mut instance.source_from_mesh;
@@ -73,12 +72,6 @@ impl Placements {
         }
         Ok(placements)
     }
-}
-
-/// What a skinned mesh follows.
-struct Skinned {
-    joints: Vec<Joint>,
-    influences: Vec<Influence>,
 }
 
 /// Reads skins. What all skinned meshes take is counted, for a small file may place one mesh often.
@@ -97,7 +90,7 @@ impl<'d> Skins<'d> {
         Self { document, place_in_tree, joints_left: document.limits.nodes, influences_left: document.limits.vertices }
     }
 
-    /// The joints of a skin and of each vertex of a mesh. Vertices without weights follow the mesh's own node, which is then
+    /// The joints of a skin and of each vertex of a mesh, for some instance of it. Vertices without weights follow the mesh's own node, which is then
     /// the last joint; `place` is its place in the tree.
     fn skinned(
         &mut self,
@@ -105,7 +98,7 @@ impl<'d> Skins<'d> {
         mesh: &SourceMesh,
         node: &PlacedNode,
         place: u32,
-    ) -> Result<Skinned, Fault> {
+    ) -> Result<MovingInstance, Fault> {
         let node = format!("node {}", node.number);
         let skin = self.document.root.get(index);
         let skin = skin.ok_or_else(|| Fault::malformed(&node, format!("skin {} does not exist", index.value())))?;
@@ -116,7 +109,7 @@ impl<'d> Skins<'d> {
         self.joints_left -= joint_count;
         self.influences_left -= vertices;
         let element = format!("skin {}", index.value());
-        let matrices = skins::bind_matrices(self.document, skin, &element)?;
+        let matrices = bind_matrices(self.document, skin, &element)?;
         for (vertex, influence) in mesh.influences.iter().enumerate() {
             if let Some((joint, _)) = influence.shares().find(|(joint, _)| *joint >= skin.joints.len()) {
                 let why = format!("joint {joint} is beyond the skin's {}", skin.joints.len());
@@ -141,7 +134,7 @@ impl<'d> Skins<'d> {
         if is_rigid_somewhere {
             joints.push(Joint { node: place, joint_from_mesh: DAffine3::IDENTITY });
         }
-        Ok(Skinned { joints, influences })
+        Ok(MovingInstance { instance: 0, joints, influences })
     }
 }
 
@@ -208,4 +201,108 @@ fn rest_of(node: &JsonNode, is_target: bool, element: &str) -> Result<NodeTransf
     let parts = if node.matrix.is_some() { TransformParts::of(&parent_from_node) } else { parts_of(node) };
     // Its length has been checked.
     Ok(NodeTransform::Parts(TransformParts { rotation: parts.rotation.normalize(), ..parts }))
+}
+
+/// The inverse bind matrices of a skin, one for each of its joints. Those without an inverse hide their vertices.
+fn bind_matrices(document: &Document, skin: &Skin, element: &str) -> Result<Vec<DAffine3>, Fault> {
+    at_most(format_args!("{element}, joints"), skin.joints.len() as u64, u64::from(u16::MAX))?;
+    if skin.joints.is_empty() {
+        return Err(Fault::malformed(element, "it has no joints"));
+    }
+    let Some(index) = skin.inverse_bind_matrices else { return Ok(vec![DAffine3::IDENTITY; skin.joints.len()]) };
+    let element = format!("{element}, inverseBindMatrices");
+    at_most(format_args!("{element}, matrices"), document.layout(index, &element)?.count, u64::from(u16::MAX))?;
+    let matrices = document.floats::<16>(index, &element)?;
+    if matrices.len() < skin.joints.len() {
+        let why = format!("{} matrices for {} joints", matrices.len(), skin.joints.len());
+        return Err(Fault::malformed(element, why));
+    }
+    let mut transforms = Vec::with_capacity(skin.joints.len());
+    for (number, matrix) in matrices.iter().take(skin.joints.len()).enumerate() {
+        let place = format_args!("{element}, matrix {number}");
+        let transform = affine_from(Mat4::from_cols_array(matrix).as_dmat4()).filter(DAffine3::is_finite);
+        let transform = transform.ok_or_else(|| Fault::malformed(place, "it is not finite, or not affine"))?;
+        if transform.matrix3.determinant() == 0.0 {
+            document.warnings.count("bind matrices without an inverse hide their vertices", place);
+        }
+        transforms.push(transform);
+    }
+    Ok(transforms)
+}
+
+/// The area of a figure, relative to the square of its longest side, from which on it counts as more than a line.
+const LEAST_RELATIVE_AREA: f64 = 1e-9;
+
+/// Gives each placement that flattens its mesh a flat mesh of its own, and removes the others, whose meshes have no area.
+/// Moving instances keep to their placements. The limits are checked before the first mesh is copied.
+fn settle(placements: &mut Placements, scene: &mut SourceScene, limits: &Limits) -> Result<(), Fault> {
+    let Placements { moving, degenerate } = placements;
+    let (flat, without_area): (Vec<usize>, Vec<usize>) =
+        degenerate.iter().partition(|&&number| has_area(&scene.instances[number].source_from_mesh.matrix3));
+    check_sizes(&flat, scene, limits)?;
+    for number in flat {
+        let instance = scene.instances[number];
+        let flat = flattened(&scene.meshes[instance.mesh], &instance.source_from_mesh);
+        scene.instances[number].mesh = scene.meshes.len();
+        scene.instances[number].source_from_mesh = DAffine3::IDENTITY;
+        scene.meshes.push(flat);
+    }
+    let mut is_removed = vec![false; scene.instances.len()];
+    without_area.into_iter().for_each(|number| is_removed[number] = true);
+    let kept = is_removed.iter().scan(0u32, |kept, is_removed| {
+        let number = *kept;
+        *kept += u32::from(!is_removed);
+        Some(number)
+    });
+    let new_number: Vec<u32> = kept.collect();
+    moving.iter_mut().for_each(|moving| moving.instance = new_number[moving.instance as usize]);
+    let mut is_removed = is_removed.into_iter();
+    scene.instances.retain(|_| !is_removed.next().unwrap_or(false));
+    Ok(())
+}
+
+/// Counts what the flat meshes will have: a small file may place one large mesh many times.
+fn check_sizes(flat: &[usize], scene: &SourceScene, limits: &Limits) -> Result<(), Fault> {
+    let mut vertices: u64 = scene.meshes.iter().map(|mesh| mesh.vertices.len() as u64).sum();
+    let mut triangles = 0u64;
+    for &number in flat {
+        let mesh = &scene.meshes[scene.instances[number].mesh];
+        vertices = vertices.saturating_add(mesh.vertices.len() as u64);
+        at_most("vertices of flattened meshes", vertices, limits.vertices)?;
+        triangles = triangles.saturating_add(mesh.indices.len() as u64 / 3);
+        at_most("triangles of flattened meshes", triangles, limits.triangles)?;
+    }
+    Ok(())
+}
+
+/// Whether a transform leaves some triangles an area.
+fn has_area(linear: &DMat3) -> bool {
+    let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
+    let longest = x.length_squared().max(y.length_squared()).max(z.length_squared());
+    let areas = [x.cross(y), y.cross(z), z.cross(x)].map(|cross| cross.length());
+    longest > 0.0 && areas.into_iter().any(|area| area > LEAST_RELATIVE_AREA * longest)
+}
+
+/// The mesh where its placement puts it.
+fn flattened(mesh: &SourceMesh, source_from_mesh: &DAffine3) -> SourceMesh {
+    let mut flat = mesh.clone();
+    flat.influences.clear();
+    flat.positions_in_mesh.iter_mut().for_each(|position| *position = source_from_mesh.transform_point3(*position));
+    let [x, y, z] = [0, 1, 2].map(|column| source_from_mesh.matrix3.col(column));
+    let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+    let largest = [0, 1, 2].map(|column| cofactors.col(column).length()).into_iter().fold(0.0, f64::max);
+    // Faces that lose their area have no normal; they are not seen.
+    let plane = [0, 1, 2].map(|column| cofactors.col(column)).into_iter().find(|normal| normal.length() >= largest);
+    let fallback = plane.and_then(DVec3::try_normalize).unwrap_or(DVec3::Y);
+    for vertex in &mut flat.vertices {
+        let normal = cofactors * DVec3::from(vertex.normal.map(f64::from)) / largest;
+        vertex.normal = normal.normalize_or(fallback).as_vec3().to_array();
+    }
+    for detail in &mut flat.details {
+        let [tangent_x, tangent_y, tangent_z, sign] = detail.tangent;
+        let tangent = DVec3::new(tangent_x.into(), tangent_y.into(), tangent_z.into());
+        let tangent = (source_from_mesh.matrix3 * tangent).normalize_or(fallback.any_orthonormal_vector());
+        detail.tangent = tangent.as_vec3().extend(sign).to_array();
+    }
+    flat
 }

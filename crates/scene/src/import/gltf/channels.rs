@@ -8,10 +8,9 @@ use gltf::json::animation::{
 };
 use gltf::json::validation::Checked;
 
-use super::document::Document;
-use crate::animation::{Channel, Clip, Interpolation, Property};
-use crate::error::{Fault, at_most};
+use super::Document;
 use crate::validate::check_times;
+use crate::{Channel, Clip, Fault, Interpolation, Property, at_most};
 
 /// All clips of a file. `Channel::node` is the file's number of the node.
 pub(super) fn read(document: &Document) -> Result<Vec<Clip>, Fault> {

@@ -11,9 +11,8 @@ use meshoptimizer_rs::codec::{
 use meshoptimizer_rs::{Error, Limits, Workspace};
 use serde::Deserialize;
 
-use super::document::Document;
-use super::json::parsed;
-use crate::error::{Fault, at_most};
+use super::{Document, parsed};
+use crate::{Fault, at_most};
 
 /// The names of the extension. Their JSON is the same.
 pub(super) const NAMES: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];

@@ -10,15 +10,12 @@ use gltf::json::buffer::View;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
-use super::super::Import;
 use super::super::file_search::read_uri;
 use super::super::folder::Folder;
-use super::super::options::MissingTextures;
-use super::super::warnings::Warnings;
+use super::super::{Import, MissingTextures, Warnings};
 use super::compressed;
 use super::draco::{self, DecodedAccessor};
-use crate::error::{Fault, at_most};
-use crate::{Limits, SceneErrorKind};
+use crate::{Fault, Limits, SceneErrorKind, at_most};
 
 /// The parsed JSON, the bytes of all buffers, and what else their reading takes.
 pub(super) struct Document<'a> {

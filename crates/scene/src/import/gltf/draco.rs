@@ -13,9 +13,8 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 use serde::Deserialize;
 
-use super::document::Document;
-use super::json::parsed;
-use crate::error::{Fault, at_most};
+use super::{Document, parsed};
+use crate::{Fault, at_most};
 
 /// The name of the extension.
 pub(super) const NAME: &str = "KHR_draco_mesh_compression";

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use gltf::json::Root;
 
 use super::super::Import;
-use super::{compressed, draco, scene_extension};
-use crate::error::Fault;
+use super::{compressed, draco, lights};
+use crate::Fault;
 
 /// Extensions that are read. Textures in AVIF and DDS have a warning of their own where a file has them in no other format.
 const READ: [&str; 18] = [
@@ -27,7 +27,7 @@ const READ: [&str; 18] = [
     "KHR_texture_basisu",
     "KHR_texture_transform",
     "MSFT_texture_dds",
-    scene_extension::NAME,
+    lights::SCENE_EXTENSION,
 ];
 
 /// Beginnings of the names of extensions that leave all geometry in place: materials, textures, lights, motion, sound,

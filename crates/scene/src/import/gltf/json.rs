@@ -8,9 +8,8 @@ use std::mem::take;
 use gltf::json::{Root, Value, deserialize};
 use serde::de::DeserializeOwned;
 
-use super::super::warnings::Warnings;
-use crate::Limits;
-use crate::error::{Fault, at_most};
+use super::super::Warnings;
+use crate::{Fault, Limits, at_most};
 
 const BYTE_ORDER_MARK: &str = "\u{feff}";
 /// Values of the JSON for each object of it that [`Limits`] admits.

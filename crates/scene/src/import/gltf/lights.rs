@@ -1,20 +1,19 @@
-//! `KHR_lights_punctual`.
+//! `KHR_lights_punctual`, and `MYRIORAMA_scene`, whose lamps take the place of those of nodes.
 
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4};
 use std::ops::RangeInclusive;
 
-use depth_image::LightError;
 use glam::{DVec3, Vec3};
-use gltf::json::Index;
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Spot, Type};
 use gltf::json::validation::Checked;
+use gltf::json::{Index, Root};
+use serde::Deserialize;
 
-use super::super::source_scene::{SourceLight, SourceScene};
-use super::document::Document;
-use super::nodes::Place;
-use crate::Light;
-use crate::error::Fault;
-use crate::light_rig::{color as color_of, color_mut, scaled};
+use super::super::SourceScene;
+use super::nodes::{Place, chosen_scene};
+use super::{Document, parsed};
+use crate::light_rig::{SourceLight, color, color_mut, scaled};
+use crate::{Environment, Fault, Illumination, Light};
 
 /// Range of the largest channel of irradiance at the middle of a scene that is not exposed: two stops to either side of
 /// white.
@@ -47,11 +46,11 @@ pub(super) fn placed(
     let Checked::Valid(kind) = json.type_ else {
         return Err(Fault::malformed(element, "unknown type"));
     };
-    let wrong = |e| Fault::light(&element, &e);
     if json.intensity < 0.0 || json.color.iter().any(|channel| *channel < 0.0) {
         return left_out("of negative strength");
     }
-    let color = color(json).map_err(wrong)?;
+    // From lux and candela: a white surface reflects 1/π of them into each direction.
+    let color = Vec3::from(json.color) * json.intensity * FRAC_1_PI;
     let backwards = (source_from_node.matrix3 * DVec3::Z).try_normalize().map(|v| v.as_vec3());
     if backwards.is_none() && kind != Type::Point {
         return left_out("whose node's transform leaves no direction");
@@ -62,38 +61,26 @@ pub(super) fn placed(
             Light::Directional { towards_light_in_world: backwards, irradiance_linear: color, angular_radius_rad: 0.0 }
         }
         Type::Point => Light::Point { position_in_world: Vec3::ZERO, intensity_linear: color, radius_m: 0.0 },
-        Type::Spot => spot(json, color, -backwards).map_err(wrong)?,
+        Type::Spot => {
+            let default = Spot { inner_cone_angle: 0.0, outer_cone_angle: FRAC_PI_4 };
+            let spot = json.spot.as_ref().unwrap_or(&default);
+            Light::Spot {
+                position_in_world: Vec3::ZERO,
+                forward_in_world: -backwards,
+                intensity_linear: color,
+                inner_cone_rad: at_most_right_angle(spot.inner_cone_angle),
+                outer_cone_rad: at_most_right_angle(spot.outer_cone_angle),
+                radius_m: 0.0,
+            }
+        }
     };
-    light.validate().map_err(wrong)?;
+    light.validate().map_err(|e| Fault::light(&element, &e))?;
     Ok(Some(SourceLight { light, position_in_source: source_from_node.translation }))
 }
 
-/// Conversion from lux and candela: a white surface reflects 1/π of them into each direction.
-fn color(light: &JsonLight) -> Result<Vec3, LightError> {
-    let color = Vec3::from(light.color);
-    require(color.min_element() >= 0.0 && color.is_finite(), "color", "negative or not finite")?;
-    require(light.intensity >= 0.0 && light.intensity.is_finite(), "intensity", "negative or not finite")?;
-    Ok(color * light.intensity * FRAC_1_PI)
-}
-
-fn spot(light: &JsonLight, intensity_linear: Vec3, forward_in_world: Vec3) -> Result<Light, LightError> {
-    let default = Spot { inner_cone_angle: 0.0, outer_cone_angle: std::f32::consts::FRAC_PI_4 };
-    let Spot { inner_cone_angle: inner, outer_cone_angle: outer } = *light.spot.as_ref().unwrap_or(&default);
-    let is_outer_valid = (0.0..FRAC_PI_2 + ANGLE_ROUNDING_RAD).contains(&outer);
-    require(is_outer_valid, "spot.outerConeAngle", "not from 0 to 90 degrees")?;
-    require((0.0..=outer).contains(&inner), "spot.innerConeAngle", "not from 0 to the outer cone's")?;
-    Ok(Light::Spot {
-        position_in_world: Vec3::ZERO,
-        forward_in_world,
-        intensity_linear,
-        inner_cone_rad: inner.min(FRAC_PI_2),
-        outer_cone_rad: outer.min(FRAC_PI_2),
-        radius_m: 0.0,
-    })
-}
-
-fn require(holds: bool, field: &'static str, reason: &'static str) -> Result<(), LightError> {
-    if holds { Ok(()) } else { Err(LightError { field, reason }) }
+fn at_most_right_angle(angle_rad: f32) -> f32 {
+    let is_rounded = (FRAC_PI_2..FRAC_PI_2 + ANGLE_ROUNDING_RAD).contains(&angle_rad);
+    if is_rounded { FRAC_PI_2 } else { angle_rad }
 }
 
 /// Applies an exposure, which a file lacks; see [`super`].
@@ -103,7 +90,7 @@ pub(super) fn expose(scene: &mut SourceScene) {
     let least = if diagonal > 0.0 { diagonal * LEAST_DISTANCE_IN_DIAGONALS } else { LEAST_DISTANCE_FROM_POINT };
     // Unoccluded irradiance, with spots aimed at the middle.
     let arriving = scene.lights.iter().map(|SourceLight { light, position_in_source }| {
-        let color = color_of(*light).as_dvec3();
+        let color = color(*light).as_dvec3();
         let distance = position_in_source.distance(bounds.center()).max(least);
         if matches!(light, Light::Directional { .. }) { color } else { color / (distance * distance) }
     });
@@ -115,4 +102,38 @@ pub(super) fn expose(scene: &mut SourceScene) {
             *color = scaled(*color, most.recip());
         }
     }
+}
+
+/// The name of an extension of a glTF scene for what glTF has no words for: lamps with a size, light from all around, the
+/// background, and Phong's highlights. `myriorama-lab scene` writes it.
+pub(super) const SCENE_EXTENSION: &str = "MYRIORAMA_scene";
+
+#[derive(Deserialize)]
+struct SceneExtension {
+    illumination: Illumination,
+    background: Environment,
+    /// Strength and exponent of each of the file's materials.
+    phong: Vec<[f32; 2]>,
+}
+
+/// Returns whether the scene has the extension.
+pub(super) fn read_extension(root: &Root, scene: &mut SourceScene) -> Result<bool, Fault> {
+    let json = chosen_scene(root).and_then(|number| root.get(number));
+    let extensions = json.and_then(|json| json.extensions.as_ref());
+    let Some(value) = extensions.and_then(|extensions| extensions.others.get(SCENE_EXTENSION)) else {
+        return Ok(false);
+    };
+    let extension: SceneExtension = parsed(value, SCENE_EXTENSION)?;
+    if extension.phong.len() != root.materials.len() {
+        let reason = format!("phong is that of {} materials, of {}", extension.phong.len(), root.materials.len());
+        return Err(Fault::malformed(SCENE_EXTENSION, reason));
+    }
+    scene.lights = extension.illumination.lights.into_iter().map(SourceLight::new).collect();
+    scene.environment = extension.illumination.environment;
+    scene.background = Some(extension.background);
+    for (material, [strength, exponent]) in scene.materials.iter_mut().zip(extension.phong) {
+        material.phong_specular = strength;
+        material.phong_exponent = exponent;
+    }
+    Ok(true)
 }

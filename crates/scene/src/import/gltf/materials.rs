@@ -2,20 +2,22 @@
 
 use glam::{Vec3, Vec4};
 use gltf::json::material::{AlphaMode, Material as JsonMaterial};
+use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
+use serde::Deserialize;
 
+use super::super::SourceScene;
 use super::super::picture::decode_all;
-use super::super::source_scene::SourceScene;
-use super::document::Document;
-use super::specular_glossiness::{self, SpecularGlossiness};
+use super::texture_coordinates::Coordinates;
 use super::textures::{
-    BASE_COLOR, EMISSIVE, METALLIC_ROUGHNESS, Means, NORMAL, OCCLUSION, Pictures, Uses, keep_referred_to,
+    BASE_COLOR, EMISSIVE, METALLIC_ROUGHNESS, Means, NORMAL, OCCLUSION, Pictures, Uses, number_shown,
 };
-use crate::error::Fault;
-use crate::{DIELECTRIC_REFLECTANCE, Material};
+use super::{Document, parsed};
+use crate::{DIELECTRIC_REFLECTANCE, Fault, Material};
 
-/// Fills the scene's materials, one more than the file's (its default), and its textures.
-pub(super) fn read(document: &Document, scene: &mut SourceScene) -> Result<(), Fault> {
+/// Fills the scene's materials, one more than the file's (its default), and its textures. Returns the coordinates that the
+/// vertices of each material have.
+pub(super) fn read(document: &Document, scene: &mut SourceScene) -> Result<Vec<Coordinates>, Fault> {
     let materials = &document.root.materials;
     let mut pictures = Pictures::new(document);
     let mut uses = Vec::with_capacity(materials.len());
@@ -23,15 +25,18 @@ pub(super) fn read(document: &Document, scene: &mut SourceScene) -> Result<(), F
         uses.push(Uses::of(material, &mut pictures, &format!("material {number}"))?);
     }
     let encoded = pictures.encoded()?;
-    let textures = decode_all(&encoded, document.limits, document.missing_textures)?;
+    let mut textures = decode_all(&encoded, document.limits, document.missing_textures)?;
+    let is_shown = number_shown(&mut uses, textures.len());
     let means = &Means::of(&textures);
     for (number, (material, uses)) in materials.iter().zip(&uses).enumerate() {
         let reader = MaterialReader { material, uses, means, element: format!("material {number}") };
         scene.materials.push(reader.material()?);
     }
     scene.materials.push(Material { name: "default".into(), ..Material::default() });
-    scene.textures = keep_referred_to(textures, &mut scene.materials);
-    Ok(())
+    let mut is_shown = is_shown.into_iter();
+    textures.retain(|_| is_shown.next() == Some(true));
+    scene.textures = textures;
+    Ok(uses.iter().map(|uses| uses.coordinates).chain([Coordinates::default()]).collect())
 }
 
 /// A material of the file with its textures.
@@ -60,11 +65,10 @@ impl MaterialReader<'_> {
         let Checked::Valid(alpha_mode) = material.alpha_mode else {
             return Err(Fault::malformed(element, "unknown alphaMode"));
         };
-        let Surface { base_color, reflectance, factors, mean_factors } =
-            match specular_glossiness::of(material, element)? {
-                Some(json) => self.specular_glossiness_surface(&json)?,
-                None => self.metallic_roughness_surface()?,
-            };
+        let Surface { base_color, reflectance, factors, mean_factors } = match &uses.specular_glossiness {
+            Some(json) => self.specular_glossiness_surface(json)?,
+            None => self.metallic_roughness_surface()?,
+        };
         let [metallic, roughness] = mean_factors;
         let mean_reflectance = reflectance.element_sum() / 3.0;
         let (phong_specular, phong_exponent) =
@@ -110,14 +114,11 @@ impl MaterialReader<'_> {
         let reflectance = self.dielectric_reflectance()?;
         let metallic = self.clamped("metallic", pbr.metallic_factor.0, 1.0)?;
         let roughness = self.clamped("roughness", pbr.roughness_factor.0, 1.0)?;
-        let factors = [metallic, roughness];
-        let Some(place) = self.uses.place(METALLIC_ROUGHNESS) else {
-            return Ok(Surface { base_color, reflectance, factors, mean_factors: factors });
-        };
-        let of_texture = self.means.linear(place);
+        let place = self.uses.place(METALLIC_ROUGHNESS);
+        let of_texture = place.map_or(Vec4::ONE, |place| self.means.linear(place));
         let mean_factors = [metallic * of_texture.z, roughness * of_texture.y];
-        let has_texture = self.uses.texture(METALLIC_ROUGHNESS).is_some();
-        let factors = if has_texture { factors } else { mean_factors };
+        let is_mean = self.uses.without_coordinates(METALLIC_ROUGHNESS).is_some();
+        let factors = if is_mean { mean_factors } else { [metallic, roughness] };
         Ok(Surface { base_color, reflectance, factors, mean_factors })
     }
 
@@ -125,7 +126,7 @@ impl MaterialReader<'_> {
         let [r, g, b, alpha] = self.all_clamped("diffuse colour", json.diffuse_factor.unwrap_or([1.0; 4]), 1.0)?;
         let specular = self.all_clamped("specular colour", json.specular_factor.unwrap_or([1.0; 3]), 1.0)?;
         let glossiness = self.clamped("glossiness", json.glossiness_factor.unwrap_or(1.0), 1.0)?;
-        let of_texture = self.uses.specular_glossiness.map_or(Vec4::ONE, |place| self.means.linear(place));
+        let of_texture = self.uses.specular_glossiness_texture.map_or(Vec4::ONE, |place| self.means.linear(place));
         let reflectance = Vec3::from(specular) * of_texture.truncate();
         let factors = [0.0, 1.0 - glossiness * of_texture.w];
         // What is reflected is not scattered.
@@ -186,5 +187,30 @@ impl MaterialReader<'_> {
             *value = self.clamped(name, *value, most)?;
         }
         Ok(values)
+    }
+}
+
+/// The JSON of `KHR_materials_pbrSpecularGlossiness`, the older description of a surface. Factors that are not there are 1.
+///
+/// A surface without metal has the same two parts in both descriptions: a diffuse colour, and a reflectance at normal
+/// incidence of any colour. The texture of specular colour and glossiness counts by its mean.
+#[derive(Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct SpecularGlossiness {
+    pub diffuse_factor: Option<[f32; 4]>,
+    pub diffuse_texture: Option<Info>,
+    pub specular_factor: Option<[f32; 3]>,
+    pub glossiness_factor: Option<f32>,
+    pub specular_glossiness_texture: Option<Info>,
+}
+
+impl SpecularGlossiness {
+    /// The description of a material; `None` where it has none, or has the newer one with a texture of its own.
+    pub(super) fn of(material: &JsonMaterial, element: &str) -> Result<Option<Self>, Fault> {
+        const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
+        let extension = material.extensions.as_ref().and_then(|extensions| extensions.others.get(NAME));
+        let has_newer = material.pbr_metallic_roughness.metallic_roughness_texture.is_some();
+        let Some(extension) = extension.filter(|_| !has_newer) else { return Ok(None) };
+        parsed(extension, format_args!("{element}: {NAME}")).map(Some)
     }
 }

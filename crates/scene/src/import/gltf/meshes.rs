@@ -6,12 +6,12 @@ use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Mesh as JsonMesh, Node};
 
-use super::super::source_scene::{SourceMesh, SourceScene};
-use super::document::Document;
+use super::super::{SourceMesh, SourceScene};
+use super::Document;
 use super::primitives::{Geometry, PrimitiveReader};
 use super::texture_coordinates::Coordinates;
 use super::textures::material_number;
-use crate::error::{Fault, at_most};
+use crate::{Fault, at_most};
 
 /// The scene's numbers of the file's meshes.
 pub(super) struct Meshes {
@@ -34,9 +34,9 @@ fn bits(weights: &[f32]) -> Vec<u32> {
 }
 
 /// Mesh `i` of the file becomes mesh `i` of the scene; a mesh of lines alone stays empty.
-pub(super) fn read(document: &Document, scene: &mut SourceScene) -> Result<Meshes, Fault> {
+pub(super) fn read(document: &Document, coordinates: &[Coordinates], scene: &mut SourceScene) -> Result<Meshes, Fault> {
     let json = &document.root.meshes;
-    let mut reader = MeshReader { document, scene, bright_materials: HashMap::new() };
+    let mut reader = MeshReader { document, coordinates, scene, bright_materials: HashMap::new() };
     for (number, mesh) in json.iter().enumerate() {
         reader.add(number, mesh, mesh.weights.as_deref().unwrap_or_default())?;
     }
@@ -60,6 +60,8 @@ pub(super) fn read(document: &Document, scene: &mut SourceScene) -> Result<Meshe
 /// Adds meshes to a scene whose materials have been read.
 struct MeshReader<'a> {
     document: &'a Document<'a>,
+    /// Those of each material of the file, and of the default one.
+    coordinates: &'a [Coordinates],
     scene: &'a mut SourceScene,
     /// Copies of materials for vertex colours above 1, which a vertex has no room for: the material takes over their
     /// scale. The key is a material and the bits of the scale.
@@ -72,11 +74,11 @@ impl MeshReader<'_> {
         let mut merged = SourceMesh::default();
         for (part, primitive) in mesh.primitives.iter().enumerate() {
             let element = format!("mesh {number}, primitive {part}");
-            let coordinates = Coordinates::of_material(root, primitive.material)?;
             let material = material_number(root, primitive.material, &element)?;
+            let coordinates = &self.coordinates[material as usize];
             let reader = PrimitiveReader { document: self.document, primitive, weights, element: &element };
-            let Some(Geometry { mesh, color_scale }) = reader.read(&coordinates)? else { continue };
-            self.warn_of_missing_coordinates(primitive, &coordinates, material, &element);
+            let Some(Geometry { mesh, color_scale }) = reader.read(coordinates)? else { continue };
+            self.warn_of_missing_coordinates(primitive, coordinates, material, &element);
             at_most("materials", self.scene.materials.len() as u64, limits.attributes.saturating_add(1))?;
             let material = self.bright_material(material, color_scale);
             let color = self.scene.materials[material as usize].base_color_linear;

@@ -19,33 +19,26 @@
 mod animation;
 mod channels;
 mod compressed;
-mod degenerate;
 mod document;
 mod draco;
 mod extensions;
-mod instancing;
 mod json;
 mod lights;
 mod materials;
 mod meshes;
 mod nodes;
 mod primitives;
-mod scene_extension;
-mod skins;
-mod sources;
-mod specular_glossiness;
 mod texture_coordinates;
 mod textures;
-mod transforms;
 
 use std::borrow::Cow;
 
 use gltf::binary::Glb;
 
-use super::Import;
-use super::source_scene::SourceScene;
-use crate::error::{Fault, at_most};
+use super::{Import, SourceScene};
+use crate::{Fault, at_most};
 use document::Document;
+use json::parsed;
 
 const GLB_MAGIC: &[u8] = b"glTF";
 const GLB_HEADER_BYTES: u32 = 12;
@@ -60,15 +53,15 @@ pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> 
     at_most("images", root.images.len() as u64, import.limits.attributes)?;
     let document = Document::open(&root, binary_chunk, import)?;
     let mut scene = SourceScene::default();
-    materials::read(&document, &mut scene)?;
-    let meshes = meshes::read(&document, &mut scene)?;
+    let coordinates = materials::read(&document, &mut scene)?;
+    let meshes = meshes::read(&document, &coordinates, &mut scene)?;
     let tree = nodes::read(&document, &meshes, &mut scene)?;
     animation::read(&document, &tree, &mut scene)?;
     if scene.instances.is_empty() {
         let number = nodes::chosen_scene(&root).map_or(0, |scene| scene.value());
         return Err(Fault::malformed("scene", format!("it has no triangles in scene {number}")));
     }
-    if !scene_extension::read(&root, &mut scene)? {
+    if !lights::read_extension(&root, &mut scene)? {
         lights::expose(&mut scene);
     }
     Ok(scene)

@@ -1,18 +1,17 @@
 //! The node tree: the places of meshes, lights and cameras.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, DVec4, Mat4, Quat, Vec3};
+use gltf::json::accessor::Accessor;
 use gltf::json::{Index, Node, Root, Scene as JsonScene};
+use serde::Deserialize;
 
-use super::super::source_scene::{PlacedCamera, SourceInstance, SourceScene};
-use super::document::Document;
+use super::super::{PlacedCamera, SourceInstance, SourceScene};
 use super::meshes::Meshes;
-use super::transforms::parent_from_node;
-use super::{instancing, lights};
-use crate::animation::is_invertible;
-use crate::error::{Fault, at_most};
+use super::{Document, lights, parsed};
+use crate::{Fault, TransformParts, at_most, is_invertible};
 
 /// Walks the default scene, else the first, else all nodes without a parent. A node reached twice is in a cycle or has
 /// two parents; glTF allows neither.
@@ -133,7 +132,7 @@ fn place_mesh(
         return Ok(());
     }
     let left = document.limits.instances.saturating_sub(scene.instances.len() as u64);
-    for node_from_instance in instancing::placements(document, node, &place.element, left)? {
+    for node_from_instance in placements(document, node, &place.element, left)? {
         let source_from_mesh = place.source_from_node * node_from_instance;
         if !source_from_mesh.is_finite() {
             return Err(Fault::malformed(&place.element, "its transform is not finite"));
@@ -170,4 +169,85 @@ fn placed_camera(document: &Document, node: &Node, place: &Place) -> Result<Opti
         source_from_camera: DAffine3::from_mat3_translation(rotation, place.source_from_node.translation),
         fov_y_rad: perspective.yfov,
     }))
+}
+
+/// A node's transform to its parent. It need not have an inverse.
+pub(super) fn parent_from_node(node: &Node, element: &str) -> Result<DAffine3, Fault> {
+    let transform = match node.matrix {
+        Some(matrix) => affine_from(Mat4::from_cols_array(&matrix).as_dmat4()),
+        None => {
+            let parts = parts_of(node);
+            let length = parts.rotation.as_dquat().length();
+            (length > 1e-6 && length.is_finite()).then(|| parts.parent_from_node())
+        }
+    };
+    let transform = transform.filter(DAffine3::is_finite);
+    transform.ok_or_else(|| Fault::malformed(element, "its transform is not finite, not affine, or has no rotation"))
+}
+
+/// `None` for a matrix that is not affine. Exporters write zeros alone to hide something.
+pub(super) fn affine_from(matrix: DMat4) -> Option<DAffine3> {
+    if matrix == DMat4::ZERO {
+        return Some(DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO });
+    }
+    let is_affine = (matrix.row(3) - DVec4::W).abs().max_element() < 1e-6;
+    is_affine.then(|| DAffine3::from_mat4(matrix))
+}
+
+/// The parts of a node's transform as in the file; a rotation may have any length.
+pub(super) fn parts_of(node: &Node) -> TransformParts {
+    TransformParts {
+        translation: node.translation.map_or(Vec3::ZERO, Vec3::from),
+        rotation: node.rotation.map_or(Quat::IDENTITY, |r| Quat::from_array(r.0)),
+        scale: node.scale.map_or(Vec3::ONE, Vec3::from),
+    }
+}
+
+const INSTANCING: &str = "EXT_mesh_gpu_instancing";
+
+/// The JSON of `EXT_mesh_gpu_instancing`, by which a node places its mesh many times. Further attributes are of applications.
+#[derive(Deserialize)]
+struct Instancing {
+    attributes: BTreeMap<String, Index<Accessor>>,
+}
+
+/// The transforms from each placement to its node; the identity alone for a node without the extension. `element` names the
+/// node. At most `limit` are read.
+fn placements(document: &Document, node: &Node, element: &str, limit: u64) -> Result<Vec<DAffine3>, Fault> {
+    let extension = node.extensions.as_ref().and_then(|extensions| extensions.others.get(INSTANCING));
+    let Some(extension) = extension else { return Ok(vec![DAffine3::IDENTITY]) };
+    let element = format!("{element}, {INSTANCING}");
+    let Instancing { attributes } = parsed(extension, &element)?;
+    let parts = ["TRANSLATION", "ROTATION", "SCALE"].map(|name| attributes.get(name).copied());
+    let Some(&first) = parts.iter().flatten().next() else { return Ok(vec![DAffine3::IDENTITY]) };
+    let count = document.layout(first, &element)?.count;
+    at_most(format_args!("{element}: instances"), count, limit)?;
+    let translations = values(document, parts[0], [0.0; 3], count, &element)?;
+    let scales = values(document, parts[2], [1.0; 3], count, &element)?;
+    let rotations = values(document, parts[1], Quat::IDENTITY.to_array(), count, &element)?;
+    if translations.len() != rotations.len() || rotations.len() != scales.len() {
+        return Err(Fault::malformed(element, "its attributes have different counts"));
+    }
+    let places = translations.into_iter().zip(rotations).zip(scales).map(|((translation, rotation), scale)| {
+        let rotation = Quat::from_array(rotation).as_dquat();
+        let unit = if rotation.length() > 1e-6 { rotation.normalize() } else { DQuat::IDENTITY };
+        let [scale, translation] = [scale, translation].map(|v| Vec3::from(v).as_dvec3());
+        DAffine3::from_scale_rotation_translation(scale, unit, translation)
+    });
+    let places: Vec<DAffine3> = places.collect();
+    match places.iter().position(|place| !place.is_finite()) {
+        Some(bad) => Err(Fault::malformed(element, format!("instance {bad} is not finite"))),
+        None => Ok(places),
+    }
+}
+
+/// The values of an attribute; `count` times the default for an attribute that is not there.
+fn values<const N: usize>(
+    document: &Document,
+    index: Option<Index<Accessor>>,
+    default: [f32; N],
+    count: u64,
+    element: &str,
+) -> Result<Vec<[f32; N]>, Fault> {
+    index.map_or_else(|| Ok(vec![default; count as usize]), |index| document.floats(index, element))
 }

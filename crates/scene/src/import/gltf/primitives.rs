@@ -7,28 +7,18 @@ use gltf::json::accessor::{Accessor, ComponentType};
 use gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
-use super::super::normals;
-use super::super::source_scene::{SourceMesh, plain_vertex};
-use super::super::tangents;
-use super::document::{Document, same_count};
-use super::skins;
+use super::super::polygons::triangles_of_strip;
+use super::super::{SourceMesh, normals, plain_vertex};
+use super::Document;
+use super::document::same_count;
 use super::texture_coordinates::{Coordinates, UvSource};
-use crate::error::{Fault, at_most};
-use crate::{Vertex, VertexDetail};
+use crate::{Fault, Influence, Vertex, VertexDetail, at_most};
 
 /// A primitive's triangles.
 pub(super) struct Geometry {
     pub mesh: SourceMesh,
     /// Factor of the vertex colours: 1 unless some are above 1, which a vertex has no room for.
     pub color_scale: f32,
-}
-
-/// The vertices of a primitive without their positions.
-struct Corners {
-    vertices: Vec<Vertex>,
-    has_normals: bool,
-    /// See [`Geometry::color_scale`].
-    color_scale: f32,
 }
 
 /// Reads the attributes of a primitive.
@@ -62,10 +52,12 @@ impl PrimitiveReader<'_> {
         let mut positions = document.floats::<3>(position, element)?;
         self.morph(|target| target.positions, &mut positions)?;
         let indices = self.triangles(mode, positions.len())?;
-        let Corners { vertices, has_normals, color_scale } = self.corners(positions.len(), &coordinates.first)?;
+        let mut vertices = vec![plain_vertex(); positions.len()];
+        let color_scale = self.fill(&mut vertices, &coordinates.first)?;
+        let has_normals = self.index(Semantic::Normals).is_some();
         let details = self.details(positions.len(), coordinates)?;
         let positions_in_mesh: Vec<_> = positions.iter().map(|p| Vec3::from(*p).as_dvec3()).collect();
-        let influences = skins::influences(self, &indices, positions.len())?;
+        let influences = influences(self, &indices, positions.len())?;
         let mut mesh = SourceMesh { vertices, details, positions_in_mesh, indices, parts: Vec::new(), influences };
         drop_unused(&mut mesh);
         if mesh.positions_in_mesh.iter().all(|p| p.is_finite()) {
@@ -77,14 +69,14 @@ impl PrimitiveReader<'_> {
             // Tangents without normals do not count (glTF 2.0, 3.7.2.1).
             let has_tangents = has_normals && self.index(Semantic::Tangents).is_some();
             if let Some(second_uv) = coordinates.tangents_along_second.filter(|_| !has_tangents) {
-                tangents::generate(&mut mesh, second_uv)
+                normals::generate_tangents(&mut mesh, second_uv)
                     .map_err(|error| Fault::malformed(element, format!("its tangents cannot be computed: {error}")))?;
             }
         }
         Ok(Some(Geometry { mesh, color_scale }))
     }
 
-    pub(super) fn index(&self, semantic: Semantic) -> Option<Index<Accessor>> {
+    fn index(&self, semantic: Semantic) -> Option<Index<Accessor>> {
         self.primitive.attributes.get(&Checked::Valid(semantic)).copied()
     }
 
@@ -118,8 +110,9 @@ impl PrimitiveReader<'_> {
         Ok(())
     }
 
-    fn corners(&self, count: usize, uv: &UvSource) -> Result<Corners, Fault> {
-        let mut vertices = vec![plain_vertex(); count];
+    /// Sets coordinates, colours and normals. Returns [`Geometry::color_scale`].
+    fn fill(&self, vertices: &mut [Vertex], uv: &UvSource) -> Result<f32, Fault> {
+        let count = vertices.len();
         let mut color_scale = 1.0;
         for (v, at) in vertices.iter_mut().zip(self.floats(Semantic::TexCoords(uv.set), count)?.unwrap_or_default()) {
             v.uv = uv.apply(at);
@@ -135,14 +128,14 @@ impl PrimitiveReader<'_> {
             }
         }
         let Some(mut normals) = self.floats::<3>(Semantic::Normals, count)? else {
-            return Ok(Corners { vertices, has_normals: false, color_scale });
+            return Ok(color_scale);
         };
         self.morph(|target| target.normals, &mut normals)?;
         if normals.iter().any(|n| !Vec3::from(*n).is_finite()) {
             return Err(Fault::malformed(self.element, "a normal is not finite"));
         }
         vertices.iter_mut().zip(normals).for_each(|(v, normal)| v.normal = normal);
-        Ok(Corners { vertices, has_normals: true, color_scale })
+        Ok(color_scale)
     }
 
     fn linear_colors(&self, index: Index<Accessor>) -> Result<Vec<[f32; 4]>, Fault> {
@@ -171,7 +164,7 @@ impl PrimitiveReader<'_> {
             return Err(Fault::malformed(self.element, format!("index {bad} is beyond its {vertex_count} vertices")));
         }
         match mode {
-            Mode::TriangleStrip => Ok(from_strip(&indices)),
+            Mode::TriangleStrip => Ok(triangles_of_strip(&indices).flatten().collect()),
             Mode::TriangleFan => Ok(from_fan(&indices)),
             _ if indices.len().is_multiple_of(3) => Ok(indices),
             _ => Err(Fault::malformed(self.element, format!("{} indices are not whole triangles", indices.len()))),
@@ -205,21 +198,24 @@ fn unit_tangent([x, y, z, sign]: [f32; 4]) -> [f32; 4] {
     unit.extend(if sign < 0.0 { -1.0 } else { 1.0 }).to_array()
 }
 
+/// The new number of a vertex that no triangle uses.
+const UNUSED: u32 = u32::MAX;
+
+fn retain_used<T>(items: &mut Vec<T>, new_number: &[u32]) {
+    let mut at = new_number.iter();
+    items.retain(|_| at.next() != Some(&UNUSED));
+}
+
 /// Keeps the vertices that the triangles use: primitives may share one large set.
 fn drop_unused(mesh: &mut SourceMesh) {
-    const UNUSED: u32 = u32::MAX;
     let mut new_number = vec![UNUSED; mesh.vertices.len()];
     mesh.indices.iter().for_each(|&i| new_number[i as usize] = 0);
     let used = new_number.iter_mut().filter(|number| **number != UNUSED);
     used.zip(0..).for_each(|(number, kept)| *number = kept);
-    let mut at = new_number.iter();
-    mesh.vertices.retain(|_| at.next() != Some(&UNUSED));
-    let mut at = new_number.iter();
-    mesh.details.retain(|_| at.next() != Some(&UNUSED));
-    let mut at = new_number.iter();
-    mesh.positions_in_mesh.retain(|_| at.next() != Some(&UNUSED));
-    let mut at = new_number.iter();
-    mesh.influences.retain(|_| at.next() != Some(&UNUSED));
+    retain_used(&mut mesh.vertices, &new_number);
+    retain_used(&mut mesh.details, &new_number);
+    retain_used(&mut mesh.positions_in_mesh, &new_number);
+    retain_used(&mut mesh.influences, &new_number);
     mesh.indices.iter_mut().for_each(|i| *i = new_number[*i as usize]);
 }
 
@@ -228,27 +224,83 @@ fn srgba8_from_linear([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {
     [r, g, b, (alpha.clamp(0.0, 1.0) * 255.0 + 0.5) as u8]
 }
 
-/// The triangles of a strip. Every other triangle is reversed; those that repeat a vertex only connect parts of the
-/// strip.
-fn from_strip(indices: &[u32]) -> Vec<u32> {
-    let windows = indices.windows(3).enumerate();
-    let turned = windows.map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] });
-    turned.filter(|[a, b, c]| a != b && b != c && a != c).flatten().collect()
-}
-
 fn from_fan(indices: &[u32]) -> Vec<u32> {
     let rim = indices.get(1..).unwrap_or_default();
     rim.windows(2).flat_map(|edge| [indices[0], edge[0], edge[1]]).collect()
+}
+
+/// A vertex whose weights have a lesser sum has none.
+const LEAST_SUM: f32 = 1e-6;
+/// Four joints each; files with more sets are not known.
+const MOST_SETS: u32 = 4;
+
+/// Joints and weights of each vertex; empty for a primitive without. Of more than four joints the strongest four count, and
+/// weights are made to sum to 1. A vertex without weights has [`Influence::NONE`]. Vertices that no triangle uses are not
+/// checked.
+fn influences(reader: &PrimitiveReader, indices: &[u32], vertices: usize) -> Result<Vec<Influence>, Fault> {
+    let PrimitiveReader { document, element, .. } = reader;
+    let mut shares: Vec<Vec<(f32, f32)>> = Vec::new();
+    for set in 0..MOST_SETS {
+        let joints = reader.index(Semantic::Joints(set));
+        let weights = reader.index(Semantic::Weights(set));
+        let (Some(joints), Some(weights)) = (joints, weights) else { break };
+        let joints = same_count(document.floats::<4>(joints, element)?, vertices, "JOINTS", element)?;
+        let weights = same_count(document.floats::<4>(weights, element)?, vertices, "WEIGHTS", element)?;
+        shares.resize(vertices, Vec::new());
+        for (shares, (joints, weights)) in shares.iter_mut().zip(joints.into_iter().zip(weights)) {
+            shares.extend(joints.into_iter().zip(weights));
+        }
+    }
+    if shares.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut influences = vec![Influence::NONE; vertices];
+    for &vertex in indices {
+        let vertex = vertex as usize;
+        if influences[vertex] == Influence::NONE {
+            influences[vertex] = influence(&mut shares[vertex])
+                .map_err(|why| Fault::malformed(format_args!("{element}, vertex {vertex}"), why))?;
+        }
+    }
+    Ok(influences)
+}
+
+fn influence(shares: &mut [(f32, f32)]) -> Result<Influence, String> {
+    if let Some((_, weight)) = shares.iter().find(|(_, weight)| !(weight.is_finite() && *weight >= 0.0)) {
+        return Err(format!("the weight {weight} is negative or not finite"));
+    }
+    // The sort is stable: equal weights stay in the file's order.
+    shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let strongest = &shares[..shares.len().min(4)];
+    let kept: f32 = strongest.iter().map(|(_, weight)| weight).sum();
+    let mut influence = Influence::NONE;
+    if kept < LEAST_SUM {
+        return Ok(influence);
+    }
+    if !kept.is_finite() {
+        return Err("the sum of its weights is not finite".into());
+    }
+    for (place, &(joint, weight)) in strongest.iter().enumerate().filter(|(_, (_, weight))| *weight > 0.0) {
+        let is_number = joint.fract() == 0.0 && (0.0..=f32::from(u16::MAX)).contains(&joint);
+        influence.joints[place] =
+            if is_number { Ok(joint as u16) } else { Err(format!("joint {joint} is no number")) }?;
+        influence.weights[place] = weight / kept;
+    }
+    Ok(influence)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn from_strip(indices: &[u32]) -> Vec<[u32; 3]> {
+        triangles_of_strip(indices).collect()
+    }
+
     #[test]
     fn strips_alternate_and_fans_share_their_hub() {
-        assert_eq!(from_strip(&[0, 1, 2, 3]), [0, 1, 2, 2, 1, 3]);
-        assert_eq!(from_strip(&[0, 1, 2, 2, 3, 3, 4, 5]), [0, 1, 2, 4, 3, 5]);
+        assert_eq!(from_strip(&[0, 1, 2, 3]), [[0, 1, 2], [2, 1, 3]]);
+        assert_eq!(from_strip(&[0, 1, 2, 2, 3, 3, 4, 5]), [[0, 1, 2], [4, 3, 5]]);
         assert_eq!(from_fan(&[0, 1, 2, 3]), [0, 1, 2, 0, 2, 3]);
         assert!(from_strip(&[0, 1]).is_empty() && from_fan(&[]).is_empty());
     }

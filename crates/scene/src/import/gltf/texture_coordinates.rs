@@ -5,11 +5,11 @@
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::material::Material as JsonMaterial;
 use gltf::json::texture::{Info, Texture as JsonTexture};
-use gltf::json::{Index, Root, Value};
+use gltf::json::{Index, Value};
 
-use super::json::parsed;
-use super::specular_glossiness;
-use crate::error::Fault;
+use super::materials::SpecularGlossiness;
+use super::parsed;
+use crate::Fault;
 
 const TRANSFORM: &str = "KHR_texture_transform";
 
@@ -73,7 +73,11 @@ impl Map {
 }
 
 /// The textures of a material in the order of [`crate::Material::textures`].
-pub(super) fn maps_of(material: &JsonMaterial, element: &str) -> Result<[Option<Map>; 5], Fault> {
+pub(super) fn maps_of(
+    material: &JsonMaterial,
+    specular_glossiness: Option<&SpecularGlossiness>,
+    element: &str,
+) -> Result<[Option<Map>; 5], Fault> {
     let pbr = &material.pbr_metallic_roughness;
     let normal = material.normal_texture.as_ref().map(|t| {
         let transform = t.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM));
@@ -83,8 +87,7 @@ pub(super) fn maps_of(material: &JsonMaterial, element: &str) -> Result<[Option<
         let transform = t.extensions.as_ref().and_then(|e| e.others.get(TRANSFORM));
         Map::unparsed(t.index, t.tex_coord, transform, element)
     });
-    let specular_glossiness = specular_glossiness::of(material, element)?;
-    let base_color = match &specular_glossiness {
+    let base_color = match specular_glossiness {
         Some(specular_glossiness) => specular_glossiness.diffuse_texture.as_ref(),
         None => pbr.base_color_texture.as_ref(),
     };
@@ -115,13 +118,6 @@ impl Coordinates {
         let mut coordinates = Self { first, second, tangents_along_second: None };
         coordinates.tangents_along_second = maps[2].and_then(|normal| coordinates.is_second(&normal.source));
         coordinates
-    }
-
-    pub(super) fn of_material(root: &Root, material: Option<Index<JsonMaterial>>) -> Result<Self, Fault> {
-        let Some((index, json)) = material.and_then(|index| Some((index, root.get(index)?))) else {
-            return Ok(Self::default());
-        };
-        maps_of(json, &format!("material {}", index.value())).map(|maps| Self::of(&maps))
     }
 
     /// Whether these coordinates are the second pair; `None` where vertices have no room for them.

@@ -12,11 +12,10 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 
 use super::super::picture::{Content, EncodedPicture};
-use super::document::Document;
+use super::Document;
+use super::materials::SpecularGlossiness;
 use super::texture_coordinates::{Coordinates, maps_of};
-use super::{sources, specular_glossiness};
-use crate::error::{Fault, at_most};
-use crate::{Material, Texture, TextureUse, Wrap};
+use crate::{Fault, Texture, TextureUse, Wrap, at_most};
 
 /// The scene's number of a primitive's material.
 pub(super) fn material_number(root: &Root, material: Option<Index<JsonMaterial>>, element: &str) -> Result<u32, Fault> {
@@ -45,7 +44,7 @@ impl<'a> Pictures<'a> {
         let Some(json) = self.document.root.get(index) else {
             return Err(Fault::malformed(element, format!("texture {number} does not exist")));
         };
-        let image = match sources::image_of(self.document, json) {
+        let image = match image_of(self.document, json) {
             Ok(image) => image,
             Err(reason) => {
                 let name = json.name.as_deref().unwrap_or("no name");
@@ -93,18 +92,21 @@ struct Used {
 
 /// The textures of a material.
 pub(super) struct Uses {
-    /// The textures that vertices have coordinates for, in the order of [`Material::textures`].
+    /// The textures that vertices have coordinates for, in the order of [`crate::Material::textures`].
     maps: [Option<Used>; 5],
+    pub coordinates: Coordinates,
+    pub specular_glossiness: Option<SpecularGlossiness>,
     /// Places of textures that count by their mean.
     pub specular: Option<usize>,
     pub specular_color: Option<usize>,
-    pub specular_glossiness: Option<usize>,
+    pub specular_glossiness_texture: Option<usize>,
 }
 
 impl Uses {
     pub(super) fn of(material: &JsonMaterial, pictures: &mut Pictures, element: &str) -> Result<Self, Fault> {
         use Content::{Colors, Data, Normals};
-        let maps = maps_of(material, element)?;
+        let specular_glossiness = SpecularGlossiness::of(material, element)?;
+        let maps = maps_of(material, specular_glossiness.as_ref(), element)?;
         let coordinates = Coordinates::of(&maps);
         let contents = [Colors, Data, Normals, Colors, Data].into_iter();
         let mut uses = [const { None }; 5];
@@ -117,17 +119,18 @@ impl Uses {
             *used = Some(Used { place, texture });
         }
         let specular = material.extensions.as_ref().and_then(|e| e.specular.as_ref());
-        let specular_glossiness = specular_glossiness::of(material, element)?;
-        let specular_glossiness = specular_glossiness.as_ref().and_then(|s| s.specular_glossiness_texture.as_ref());
+        let glossiness = specular_glossiness.as_ref().and_then(|s| s.specular_glossiness_texture.as_ref());
         let mut place = |info: Option<&Info>, content| match info {
             Some(info) => pictures.place(info.index, content, element),
             None => Ok(None),
         };
         Ok(Self {
             maps: uses,
+            coordinates,
             specular: place(specular.and_then(|s| s.specular_texture.as_ref()), Data)?,
             specular_color: place(specular.and_then(|s| s.specular_color_texture.as_ref()), Colors)?,
-            specular_glossiness: place(specular_glossiness, Colors)?,
+            specular_glossiness_texture: place(glossiness, Colors)?,
+            specular_glossiness,
         })
     }
 
@@ -202,13 +205,83 @@ fn mean_linear(texture: &Texture) -> Vec4 {
     Vec4::from(sum.map(|s| (s / texels) as f32))
 }
 
-/// Drops textures that served for their mean alone, and renumbers the others.
-pub(super) fn keep_referred_to(textures: Vec<Texture>, materials: &mut [Material]) -> Vec<Texture> {
-    let mut kept = vec![false; textures.len()];
-    let used = materials.iter().flat_map(Material::textures).flatten();
-    used.for_each(|used| kept[used.texture as usize] = true);
-    for used in materials.iter_mut().flat_map(Material::textures_mut).flatten() {
-        used.texture = kept[..used.texture as usize].iter().filter(|&&is_kept| is_kept).count() as u32;
+/// Numbers the textures that materials show, and says which these are: the others served for their mean alone.
+pub(super) fn number_shown(uses: &mut [Uses], textures: usize) -> Vec<bool> {
+    let used = uses.iter_mut().flat_map(|uses| &mut uses.maps).flatten();
+    let used: Vec<&mut TextureUse> = used.filter_map(|used| used.texture.as_mut()).collect();
+    let mut is_shown = vec![false; textures];
+    used.iter().for_each(|used| is_shown[used.texture as usize] = true);
+    for used in used {
+        used.texture = is_shown[..used.texture as usize].iter().filter(|&&is_shown| is_shown).count() as u32;
     }
-    textures.into_iter().zip(&kept).filter(|(_, kept)| **kept).map(|(texture, _)| texture).collect()
+    is_shown
+}
+
+/// A format of pictures that is not read.
+struct UnreadFormat {
+    name: &'static str,
+    extension: &'static str,
+    mime_type: &'static str,
+    file_ending: &'static str,
+    /// The command line that converts a file, as the end of a sentence.
+    advice: &'static str,
+}
+
+const UNREAD: [UnreadFormat; 2] = [
+    UnreadFormat {
+        name: "AVIF",
+        extension: "EXT_texture_avif",
+        mime_type: "image/avif",
+        file_ending: ".avif",
+        advice: "; `npx @gltf-transform/cli png IN OUT` converts the file",
+    },
+    UnreadFormat {
+        name: "DDS",
+        extension: "MSFT_texture_dds",
+        mime_type: "image/vnd-ms.dds",
+        file_ending: ".dds",
+        advice: "",
+    },
+];
+
+/// The image of a texture: in WebP, where the file has it in another format, too; in KTX2 where it has no other. The error is
+/// the reason for which there is none, with advice.
+pub(super) fn image_of(document: &Document, texture: &JsonTexture) -> Result<Index<Image>, String> {
+    let extensions = texture.extensions.as_ref().map(|extensions| &extensions.others);
+    let of_extension = |name: &str| {
+        let source = extensions?.get(name)?.get("source")?.as_u64()?;
+        u32::try_from(source).ok().map(Index::new)
+    };
+    let sources = [of_extension("EXT_texture_webp"), Some(texture.source), of_extension("KHR_texture_basisu")];
+    let mut by_content = None;
+    for index in sources.into_iter().flatten() {
+        let image = document.root.get(index);
+        if image.is_some_and(|image| image.uri.is_some() || image.buffer_view.is_some()) {
+            match unread_format(document, index) {
+                None => return Ok(index),
+                format => by_content = by_content.or(format),
+            }
+        }
+    }
+    let format = by_content.or_else(|| UNREAD.iter().find(|format| of_extension(format.extension).is_some()));
+    let Some(UnreadFormat { name, extension, advice, .. }) = format else {
+        return Err("textures without a picture: materials show their factors".into());
+    };
+    Err(format!("pictures in {name} ({extension}), which are not read: materials show their factors{advice}"))
+}
+
+/// The format of an image, by what the file says of it and by its first bytes.
+fn unread_format(document: &Document, image: Index<Image>) -> Option<&'static UnreadFormat> {
+    let json = document.root.get(image)?;
+    let mime_type = json.mime_type.as_ref().map(|mime_type| mime_type.0.as_str());
+    let uri = json.uri.as_ref().map(|uri| uri.to_ascii_lowercase());
+    let start = json.buffer_view.and_then(|view| document.view(view, "image").ok()).map(|(_, bytes)| bytes);
+    let is_avif = start.and_then(|bytes| bytes.get(4..12)) == Some(b"ftypavif");
+    UNREAD.iter().find(|format| {
+        let is_named = uri.as_ref().is_some_and(|uri| {
+            let path = uri.split('?').next().unwrap_or(uri);
+            path.ends_with(format.file_ending) || uri.starts_with(&format!("data:{}", format.mime_type))
+        });
+        mime_type == Some(format.mime_type) || is_named || (is_avif && format.name == "AVIF")
+    })
 }

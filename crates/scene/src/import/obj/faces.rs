@@ -1,21 +1,18 @@
-//! Faces as the file lists them, and indexed triangles of them once the whole file is known: a face may stand before its
+//! The numbered elements of a file, which are positions with colours, texture coordinates and normals; faces as the file lists
+//! them, and indexed triangles of them once the whole file is known: a face may stand before its
 //! vertices.
 
 use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::super::Import;
-use super::super::normals;
-use super::super::polygons::{NOT_FINITE, PolygonCutter, TOO_COSTLY, TOO_SHORT};
-use super::super::source_scene::SourceMesh;
-use super::super::warnings::Warnings;
-use super::attributes::{Attributes, Corner, NONE};
+use super::super::polygons::{self, PolygonMesh, TOO_SHORT, UNKNOWN_VERTEX};
+use super::super::vertex_colors::{ColorRange, Colors};
+use super::super::{Import, SourceMesh, Warnings, plain_vertex};
 use super::map::UvTransform;
 use super::text::Line;
-use crate::error::{Fault, at_most};
+use crate::{Fault, Limits, Vertex, at_most};
 
-const UNREADABLE: &str = "faces with a corner that is no vertex of the file are left out";
 const TEXTURE_WITHOUT_COORDINATES: &str = "textures without coordinates show one texel";
 const WITHOUT_ATTRIBUTES: &str = "texture coordinates and normals that the file does not have are dropped";
 
@@ -78,7 +75,7 @@ impl Faces {
         let count = self.corners.len() - start;
         if !is_readable || count < 3 {
             self.corners.truncate(start);
-            import.warnings.count(if is_readable { TOO_SHORT } else { UNREADABLE }, line);
+            import.warnings.count(if is_readable { TOO_SHORT } else { UNKNOWN_VERTEX }, line);
             return Ok(());
         }
         if self.current_material.is_none() {
@@ -94,118 +91,45 @@ impl Faces {
 
     pub(super) fn into_mesh(
         self,
-        attributes: &Attributes,
+        mut attributes: Attributes,
         materials: &[MaterialUse],
         import: &Import,
     ) -> Result<SourceMesh, Fault> {
-        let mut builder = Builder {
-            attributes,
-            colors_srgba8: attributes.colors_srgba8(),
-            mesh: SourceMesh::default(),
-            triangles: vec![Triangles::default(); self.material_names.len()],
-            vertex_of_corner: HashMap::new(),
-            cutter: PolygonCutter::new(),
-            polygon_in_source: Vec::new(),
-            vertices: Vec::new(),
-        };
+        let colors_srgba8 = attributes.colors_srgba8();
+        let mut mesh = PolygonMesh::new(&attributes.positions_in_source, materials.len(), import);
         let mut start = 0;
         for face in &self.faces {
             let corners = &self.corners[start..face.end];
             start = face.end;
-            builder.add(face, corners, materials[face.material as usize], &import.warnings);
-            let vertices = builder.mesh.vertices.len() as u64;
-            at_most(format_args!("line {} (f)", face.line), vertices, import.limits.vertices)?;
-        }
-        let mut mesh = builder.mesh;
-        let mut is_flat = Vec::new();
-        for (triangles, material) in builder.triangles.into_iter().zip(materials) {
-            if !triangles.indices.is_empty() {
-                mesh.push_part(triangles.indices, material.number);
-                is_flat.extend(triangles.is_flat);
+            let place = format_args!("line {} (f)", face.line);
+            let Some(polygon) = mesh.polygon(corners.iter().map(|corner| corner[0]), place) else { continue };
+            let material = materials[face.material as usize];
+            let mut in_mesh = Vec::with_capacity(corners.len());
+            let mut has_all = true;
+            let mut have_uvs = true;
+            for corner in corners {
+                let existing @ [position, uv, normal] = attributes.existing(*corner);
+                has_all &= existing == *corner;
+                have_uvs &= uv != NONE;
+                in_mesh.push(mesh.vertex(position, [uv, normal, material.placement_number], || {
+                    let mut vertex = attributes.vertex(existing);
+                    vertex.color_srgba8 = colors_srgba8.get(position as usize).copied().unwrap_or(vertex.color_srgba8);
+                    if material.placement != UvTransform::IDENTITY {
+                        vertex.uv = material.placement.apply(vertex.uv);
+                    }
+                    vertex
+                }));
             }
-        }
-        if mesh.indices.len() > u32::MAX as usize {
-            return Err(Fault::unsupported("faces", "more than 2^32 corners"));
-        }
-        if mesh.indices.is_empty() {
-            let fault = import.warnings.no_triangles([UNREADABLE, NOT_FINITE, TOO_SHORT]);
-            return Err(fault.unwrap_or_else(|| Fault::malformed("scene", "it has no triangles")));
-        }
-        normals::fill(&mut mesh, |triangle| is_flat[triangle]);
-        Ok(mesh)
-    }
-}
-
-/// Makes vertices of corners and triangles of faces.
-struct Builder<'a> {
-    attributes: &'a Attributes,
-    colors_srgba8: Vec<[u8; 4]>,
-    mesh: SourceMesh,
-    /// The triangles of each material.
-    triangles: Vec<Triangles>,
-    /// The key is a corner and the number of its placement.
-    vertex_of_corner: HashMap<(Corner, u32), u32>,
-    cutter: PolygonCutter,
-    polygon_in_source: Vec<DVec3>,
-    vertices: Vec<u32>,
-}
-
-#[derive(Default, Clone)]
-struct Triangles {
-    indices: Vec<u32>,
-    /// Whether each triangle was listed after `s off`.
-    is_flat: Vec<bool>,
-}
-
-impl Builder<'_> {
-    fn add(&mut self, face: &Face, corners: &[Corner], material: MaterialUse, warnings: &Warnings) {
-        let place = format_args!("line {} (f)", face.line);
-        self.polygon_in_source.clear();
-        for corner in corners {
-            let position = self.attributes.positions_in_source.get(corner[0] as usize);
-            self.polygon_in_source.extend(position);
-        }
-        if self.polygon_in_source.len() < corners.len() {
-            return warnings.count(UNREADABLE, place);
-        }
-        if !self.polygon_in_source.iter().all(|p| p.is_finite()) {
-            return warnings.count(NOT_FINITE, place);
-        }
-        self.vertices.clear();
-        let mut has_all = true;
-        let mut have_uvs = true;
-        for corner in corners {
-            let existing = self.attributes.existing(*corner).unwrap_or(*corner);
-            has_all &= existing == *corner;
-            have_uvs &= existing[1] != NONE;
-            let vertex = self.vertex(existing, material);
-            self.vertices.push(vertex);
-        }
-        if !has_all {
-            warnings.count(WITHOUT_ATTRIBUTES, place);
-        }
-        if material.has_texture && !have_uvs {
-            warnings.count(TEXTURE_WITHOUT_COORDINATES, place);
-        }
-        let triangles = self.cutter.triangles(&self.polygon_in_source, || warnings.count(TOO_COSTLY, place));
-        let into = &mut self.triangles[face.material as usize];
-        into.indices.extend(triangles.iter().map(|&corner| self.vertices[corner as usize]));
-        into.is_flat.resize(into.indices.len() / 3, face.is_flat);
-    }
-
-    fn vertex(&mut self, corner: Corner, material: MaterialUse) -> u32 {
-        let next = self.mesh.vertices.len() as u32;
-        let number = *self.vertex_of_corner.entry((corner, material.placement_number)).or_insert(next);
-        if number == next {
-            let mut vertex = self.attributes.vertex(corner);
-            vertex.color_srgba8 = self.colors_srgba8.get(corner[0] as usize).copied().unwrap_or(vertex.color_srgba8);
-            if material.placement != UvTransform::IDENTITY {
-                vertex.uv = material.placement.apply(vertex.uv);
+            if !has_all {
+                import.warnings.count(WITHOUT_ATTRIBUTES, place);
             }
-            self.mesh.positions_in_mesh.push(self.attributes.positions_in_source[corner[0] as usize]);
-            self.mesh.vertices.push(vertex);
+            if material.has_texture && !have_uvs {
+                import.warnings.count(TEXTURE_WITHOUT_COORDINATES, place);
+            }
+            let is_flat = face.is_flat;
+            mesh.push(&polygons::Face { place, polygon, material: face.material as usize, is_flat }, &in_mesh)?;
         }
-        number
+        mesh.finish(materials.iter().map(|material| material.number))
     }
 }
 
@@ -227,4 +151,102 @@ fn resolved(field: &[u8], count: usize) -> Option<u32> {
     let number: i64 = std::str::from_utf8(field).ok()?.parse().ok()?;
     let from_zero = if number < 0 { number.checked_add(count as i64) } else { number.checked_sub(1) };
     Some(from_zero.and_then(|n| u32::try_from(n).ok()).unwrap_or(NONE).min(NONE - 1))
+}
+
+/// The number of an element that a corner does not have.
+const NONE: u32 = u32::MAX;
+
+/// Positions, coordinates and normals are numbered separately; a vertex is a triple of these numbers.
+type Corner = [u32; 3];
+
+#[derive(Default)]
+pub(super) struct Attributes {
+    /// Not finite where the file has no numbers.
+    positions_in_source: Vec<DVec3>,
+    /// One for each position once any position has one.
+    colors: Vec<[f32; 4]>,
+    /// The colours of ZBrush, in the order of positions.
+    mrgb_srgb8: Vec<[u8; 3]>,
+    uvs: Vec<[f32; 2]>,
+    /// Zero where they must be computed.
+    normals: Vec<[f32; 3]>,
+}
+
+impl Attributes {
+    /// `v x y z`, optionally followed by a weight or a colour, as several programs write it.
+    pub(super) fn push_position(&mut self, line: &Line, import: &Import) -> Result<(), Fault> {
+        at_most(line, self.positions_in_source.len() as u64 + 1, import.limits.vertices)?;
+        let [x, y, z, a, g, b] = line.numbers();
+        let position = DVec3::from([x, y, z].map(|c| c.unwrap_or(f64::NAN)));
+        if !position.is_finite() {
+            import.warnings.count("vertices without three finite coordinates", line);
+        }
+        if let [Some(r), Some(g), Some(b)] = [a, g, b] {
+            self.colors.resize(self.positions_in_source.len(), [f32::NAN; 4]);
+            self.colors.push([r, g, b, f64::NAN].map(|c| c as f32));
+        }
+        let weight = a.filter(|weight| g.is_none() && weight.is_finite() && *weight != 0.0);
+        self.positions_in_source.push(weight.map_or(position, |weight| position / weight));
+        Ok(())
+    }
+
+    pub(super) fn push_uv(&mut self, line: &Line, warnings: &Warnings) {
+        let [u, v] = line.numbers();
+        // OBJ's v runs upwards.
+        let uv = [u, v].map(|c| c.unwrap_or(0.0) as f32);
+        if u.is_none() || !uv.iter().all(|c| c.is_finite()) {
+            warnings.count("texture coordinates that are not finite count as 0", line);
+        }
+        let [u, v] = uv.map(|c| if c.is_finite() { c } else { 0.0 });
+        self.uvs.push([u, 1.0 - v]);
+    }
+
+    pub(super) fn push_normal(&mut self, line: &Line, warnings: &Warnings) {
+        let normal = line.numbers::<3>().map(|c| c.unwrap_or(f64::NAN));
+        let direction = DVec3::from(normal).try_normalize();
+        if direction.is_none() && normal != [0.0; 3] {
+            warnings.count("normals that are not finite are computed", line);
+        }
+        self.normals.push(direction.unwrap_or(DVec3::ZERO).as_vec3().to_array());
+    }
+
+    /// `#MRGB` and up to 64 colours of eight digits: a mask, red, green, blue.
+    pub(super) fn push_mrgb(&mut self, line: &Line, limits: &Limits) {
+        for digits in line.rest.chunks_exact(8) {
+            let number = std::str::from_utf8(digits).ok().and_then(|digits| u32::from_str_radix(digits, 16).ok());
+            let Some(number) = number.filter(|_| (self.mrgb_srgb8.len() as u64) < limits.vertices) else { return };
+            let [_, r, g, b] = number.to_be_bytes();
+            self.mrgb_srgb8.push([r, g, b]);
+        }
+    }
+
+    /// A corner without the parts that are not there.
+    fn existing(&self, [position, uv, normal]: Corner) -> Corner {
+        let uv = if (uv as usize) < self.uvs.len() { uv } else { NONE };
+        let normal = if (normal as usize) < self.normals.len() { normal } else { NONE };
+        [position, uv, normal]
+    }
+
+    /// How many elements of each kind there are so far: negative numbers count back from here.
+    fn counts(&self) -> [usize; 3] {
+        [self.positions_in_source.len(), self.uvs.len(), self.normals.len()]
+    }
+
+    /// Colours of all positions, in bytes; shorter where some have none.
+    fn colors_srgba8(&mut self) -> Vec<[u8; 4]> {
+        if self.colors.is_empty() {
+            return self.mrgb_srgb8.iter().map(|[r, g, b]| [*r, *g, *b, 255]).collect();
+        }
+        Colors { range: ColorRange::Floats, values: std::mem::take(&mut self.colors) }.srgba8()
+    }
+
+    /// A vertex without its colour. An element that is not there has its default.
+    fn vertex(&self, [_, uv, normal]: Corner) -> Vertex {
+        let plain = plain_vertex();
+        Vertex {
+            uv: self.uvs.get(uv as usize).copied().unwrap_or(plain.uv),
+            normal: self.normals.get(normal as usize).copied().unwrap_or(plain.normal),
+            ..plain
+        }
+    }
 }

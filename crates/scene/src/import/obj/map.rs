@@ -2,8 +2,7 @@
 
 use glam::DVec2;
 
-use super::super::listing::decoded;
-use super::super::warnings::Warnings;
+use super::super::{Warnings, decoded};
 use super::text::{Line, finite, without_comment};
 
 /// A texture map as a material names it.

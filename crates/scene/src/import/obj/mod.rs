@@ -9,21 +9,17 @@
 //! flat after `s off`. Axes are kept. Points, lines and free-form
 //! curves are left out with a warning.
 
-mod attributes;
 mod faces;
 mod map;
-mod masks;
 mod materials;
 mod mtl;
 mod text;
 
 use glam::DAffine3;
 
-use super::Import;
-use super::source_scene::{SourceInstance, SourceScene};
-use crate::error::Fault;
-use attributes::Attributes;
-use faces::Faces;
+use super::{Import, SourceInstance, SourceScene};
+use crate::Fault;
+use faces::{Attributes, Faces};
 use text::{Line, for_each_line, without_byte_order_mark};
 
 pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> {
@@ -32,7 +28,7 @@ pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> 
     let mut scene = SourceScene::default();
     let libraries = materials::read_libraries(&file.libraries, import)?;
     let materials = materials::read_materials(&libraries, &file.faces.material_names, import, &mut scene)?;
-    scene.meshes.push(file.faces.into_mesh(&file.attributes, &materials, import)?);
+    scene.meshes.push(file.faces.into_mesh(file.attributes, &materials, import)?);
     scene.instances.push(SourceInstance { mesh: 0, source_from_mesh: DAffine3::IDENTITY });
     Ok(scene)
 }

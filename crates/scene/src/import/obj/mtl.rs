@@ -4,13 +4,10 @@ use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 
-use super::super::Import;
-use super::super::listing::decoded;
-use super::super::warnings::Warnings;
+use super::super::{Import, Warnings, decoded};
 use super::map::TextureMap;
 use super::text::{Line, finite, for_each_line, without_byte_order_mark, without_comment};
-use crate::Material;
-use crate::error::{Fault, at_most};
+use crate::{Fault, Material, at_most};
 
 /// Statements that are not read and change little of what is seen: ambient light, the index of refraction, and the filters
 /// of reflections and textures.
@@ -42,16 +39,14 @@ pub(super) fn parse(
     import: &Import,
     entries: &mut Vec<Entry>,
 ) -> Result<(), Fault> {
-    let mut is_first = true;
+    let first = entries.len();
     for_each_line(&without_byte_order_mark(bytes), element, |line| {
         if line.is("newmtl") {
-            is_first = false;
             entries.push(Entry { name: line.rest.to_owned(), folder: folder.to_owned(), ..Entry::default() });
             return at_most(element, entries.len() as u64, import.limits.attributes);
         }
-        let is_usable =
-            entries.last_mut().filter(|_| !is_first).is_none_or(|entry| entry.read_line(line, &import.warnings));
-        if !is_usable {
+        let entry = entries[first..].last_mut();
+        if entry.is_some_and(|entry| entry.read_line(line, &import.warnings).is_none()) {
             import.warnings.count("statements of materials without usable numbers are left out", line);
         }
         Ok(())
@@ -59,29 +54,25 @@ pub(super) fn parse(
 }
 
 impl Entry {
-    /// Returns whether the statement is usable or unknown.
-    fn read_line(&mut self, line: &Line, warnings: &Warnings) -> bool {
+    /// `None` for a statement without usable numbers.
+    fn read_line(&mut self, line: &Line, warnings: &Warnings) -> Option<()> {
         let material = &mut self.material;
         if line.is("Kd") {
-            let Some(color) = color(line) else { return false };
-            let [r, g, b] = color.to_array();
+            let [r, g, b] = color(line)?.to_array();
             material.base_color_linear = [r, g, b, 1.0];
         } else if line.is("Ks") {
-            let Some(color) = color(line) else { return false };
-            material.phong_specular = color.element_sum() / 3.0;
+            material.phong_specular = color(line)?.element_sum() / 3.0;
         } else if line.is("Ke") {
-            let Some(color) = color(line) else { return false };
-            material.emissive_linear = color;
+            material.emissive_linear = color(line)?;
         } else if line.is("Ns") {
-            let Some(exponent) = non_negative(line) else { return false };
-            material.phong_exponent = exponent;
-            material.roughness = Material::roughness_from_phong_exponent(exponent);
+            material.phong_exponent = non_negative(line)?;
+            material.roughness = Material::roughness_from_phong_exponent(material.phong_exponent);
         } else if line.is("d") {
             self.opacity = non_negative(line);
-            return self.opacity.is_some();
+            self.opacity?;
         } else if line.is("Tr") {
             self.transparency = non_negative(line);
-            return self.transparency.is_some();
+            self.transparency?;
         } else if line.is("illum") {
             self.model = non_negative(line).map(|model| model as u32);
         } else if line.is("map_Kd") {
@@ -91,7 +82,7 @@ impl Entry {
         } else if !HARMLESS.iter().any(|keyword| line.is(keyword)) {
             warnings.list("statements of materials that are not shown", decoded(line.keyword));
         }
-        true
+        Some(())
     }
 
     /// The material without its textures.

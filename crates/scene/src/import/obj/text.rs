@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt;
 
-use super::super::listing::decoded;
+use super::super::decoded;
 
 /// A line as keyword and rest, trimmed.
 pub(super) struct Line<'a> {

@@ -4,9 +4,9 @@ use std::borrow::Cow;
 
 use serde_ply::{ElementDef, PlyFormat, PlyHeader, PropertyType, ScalarType};
 
-use super::super::listing::decoded;
-use crate::Limits;
-use crate::error::{Fault, at_most};
+use super::super::decoded;
+use super::super::vertex_colors::ColorRange;
+use crate::{Fault, Limits, at_most};
 
 /// The longest header: that of a file of many textures has some kilobytes.
 const MAX_HEADER_BYTES: usize = 1 << 20;
@@ -147,18 +147,6 @@ pub(super) fn check(header: &PlyHeader, file_bytes: u64, limits: &Limits) -> Res
 }
 
 /// The encoding of an element's colours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum ColorRange {
-    #[default]
-    None,
-    /// Integers of 8 bits, or larger ones with the values of bytes.
-    Bytes,
-    /// Integers of 16 bits.
-    Words,
-    /// Numbers of 0…1 or 0…255.
-    Floats,
-}
-
 pub(super) fn color_range(element: &ElementDef) -> ColorRange {
     match element.get_property("red").map(|p| &p.property_type) {
         Some(PropertyType::Scalar(ScalarType::F32 | ScalarType::F64)) => ColorRange::Floats,

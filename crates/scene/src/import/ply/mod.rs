@@ -6,9 +6,7 @@
 //! from both sides. Missing normals are smooth up to creases of 60°. Axes are kept. Other elements are skipped.
 
 mod header;
-mod rows;
 mod surface;
-mod vertices;
 
 use std::io::{BufRead, Read};
 use std::path::Path;
@@ -17,18 +15,12 @@ use glam::DAffine3;
 use serde::{Deserialize, de::MapAccess};
 use serde_ply::{PlyReader, RowVisitor};
 
-use super::Import;
-use super::listing::decoded;
-use super::normals;
-use super::picture::Content;
-use super::source_scene::{SourceInstance, SourceScene};
-use super::texture_files::{TextureFiles, TextureReference};
-use crate::error::{Fault, at_most};
-use crate::{Material, TextureUse};
-use header::{ColorRange, PlyText, color_range};
-use rows::{FaceRow, SkippedRow, VertexRow};
-use surface::Surface;
-use vertices::Vertices;
+use super::picture::{Content, TextureFiles, TextureReference};
+use super::vertex_colors::ColorRange;
+use super::{Import, SourceInstance, SourceScene, decoded};
+use crate::{Fault, Material, TextureUse, at_most};
+use header::{PlyText, color_range};
+use surface::{FaceRow, Surface, VertexRow, Vertices};
 
 pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> {
     let text = PlyText::parse(bytes)?;
@@ -47,9 +39,7 @@ pub(super) fn read(bytes: &[u8], import: &Import) -> Result<SourceScene, Fault> 
     let textured_count = scene.materials.len() as u32;
     let white = Material { name: "vertex colours".into(), double_sided: true, ..Material::default() };
     scene.materials.push(white);
-    let mut mesh = surface.into_mesh(&vertices, textured_count, import)?;
-    normals::fill(&mut mesh, |_| false);
-    scene.meshes.push(mesh);
+    scene.meshes.push(surface.into_mesh(&vertices, textured_count, import)?);
     scene.instances.push(SourceInstance { mesh: 0, source_from_mesh: DAffine3::IDENTITY });
     Ok(scene)
 }
@@ -80,7 +70,7 @@ fn read_elements(mut reader: PlyReader<impl BufRead>, import: &Import) -> Result
         let name = element.name.clone();
         match name.as_str() {
             "vertex" => {
-                vertices.colors = color_range(element);
+                vertices.colors.range = color_range(element);
                 vertices.has_uvs = element.has_property("s");
                 each_row(&mut reader, |row: VertexRow| vertices.push(&row, warnings))
                     .map_err(|why| Fault::malformed(format!("vertex {}", vertices.positions_in_source.len()), why))?;
@@ -88,7 +78,7 @@ fn read_elements(mut reader: PlyReader<impl BufRead>, import: &Import) -> Result
             "face" | "tristrips" => {
                 let are_strips = name == "tristrips";
                 let range = color_range(element);
-                surface.color_range = if range == ColorRange::None { surface.color_range } else { range };
+                surface.colors.range = if range == ColorRange::None { surface.colors.range } else { range };
                 let mut row_number = 0u64;
                 let read = each_row(&mut reader, |row: FaceRow| {
                     // A file over the limit is refused below: further rows would only take memory.
@@ -108,6 +98,10 @@ fn read_elements(mut reader: PlyReader<impl BufRead>, import: &Import) -> Result
     }
     Ok((vertices, surface))
 }
+
+/// A row of an element that scenes do not use.
+#[derive(Deserialize)]
+struct SkippedRow {}
 
 /// Passes the rows of the reader's next element to `take`.
 fn each_row<'de, R: BufRead, T: Deserialize<'de>>(

@@ -4,10 +4,8 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3};
 
-use super::super::geometry::{MeshBuilder, Station, vertex};
-use super::super::pieces::star;
-use super::super::random::{Noise, mix};
-use super::room::{HALF_LENGTH_M, HALF_WIDTH_M};
+use super::super::parts::{MeshBuilder, Noise, Station, mix, star, vertex};
+use super::{HALF_LENGTH_M, HALF_WIDTH_M};
 
 const PLINTH: Vec3 = Vec3::new(214.0, 210.0, 202.0);
 

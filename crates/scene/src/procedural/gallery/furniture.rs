@@ -4,11 +4,8 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 
-use super::super::geometry::{MeshBuilder, vertex};
-use super::super::pieces::star;
-use super::super::random::Rng;
-use super::super::teapot::{Teapot, teapot};
-use super::room::{HALF_LENGTH_M, HEIGHT_M};
+use super::super::parts::{MeshBuilder, Rng, Teapot, star, teapot, vertex};
+use super::{HALF_LENGTH_M, HEIGHT_M};
 
 const OAK: Vec3 = Vec3::new(168.0, 124.0, 82.0);
 const DARK: Vec3 = Vec3::new(64.0, 56.0, 52.0);

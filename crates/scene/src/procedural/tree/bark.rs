@@ -4,9 +4,8 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 
-use super::super::geometry::{MeshBuilder, vertex};
-use super::super::random::{Noise, mix};
-use super::skeleton::{Branch, LEVELS, Skeleton};
+use super::super::parts::{MeshBuilder, Noise, mix, vertex};
+use super::{Branch, LEVELS, Skeleton};
 use crate::Vertex;
 
 /// Rings along and sides around a branch of each level, at detail 1.

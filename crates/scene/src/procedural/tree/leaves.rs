@@ -2,9 +2,8 @@
 
 use glam::Vec3;
 
-use super::super::geometry::{MeshBuilder, vertex};
-use super::super::random::{Noise, Rng, lerp, mix};
-use super::skeleton::{Branch, LEVELS, Skeleton};
+use super::super::parts::{MeshBuilder, Noise, Rng, lerp, mix, vertex};
+use super::{Branch, LEVELS, Skeleton};
 use crate::Vertex;
 
 /// Area of one side of all leaves, for a tree of this size: about four layers over the crown.
