@@ -68,6 +68,26 @@ impl Shader {
         Ok(self.bind_in_order(group, in_order))
     }
 
+    /// Binds, of resources for many shaders, those that a group declares; of several with one name the first.
+    ///
+    /// # Errors
+    /// A variable of the group that none of them is for.
+    pub fn bind_declared<'r>(
+        &self,
+        group: u32,
+        bindings: impl IntoIterator<Item = Binding<'r>>,
+    ) -> Result<BoundGroup, ShaderError> {
+        let declared = self.interface.groups.get(group as usize).map_or(&[][..], Vec::as_slice);
+        let mut bound: Vec<Binding<'r>> = Vec::with_capacity(declared.len());
+        for binding in bindings {
+            let is_declared = declared.iter().any(|resource| resource.name == binding.name);
+            if is_declared && bound.iter().all(|other| other.name != binding.name) {
+                bound.push(binding);
+            }
+        }
+        self.bind(group, bound)
+    }
+
     /// Binds to all variables of a group, which are in the order of its layout.
     pub(super) fn bind_in_order(&self, group: u32, bound: Vec<(&Resource, BindingResource<'_>)>) -> BoundGroup {
         let forms = bound.iter().map(|(_, resource)| Form::of(resource)).collect();
