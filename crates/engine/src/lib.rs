@@ -46,14 +46,6 @@ pub struct GpuEngine {
     loading: Mutex<()>,
 }
 
-/// A sample set on this engine's device.
-enum Uploaded {
-    /// Surfaces and colours.
-    Images(UploadedImages),
-    /// Light of surfaces of the scene.
-    Light(UploadedLight),
-}
-
 /// Samples of light, with the scene that they are of.
 struct UploadedLight {
     cache: LightCache,
@@ -83,23 +75,17 @@ struct UploadedImages {
     /// What tells where its images leave anything unknown.
     base: Option<Arc<reconstruction::SampleSet>>,
 }
-impl UploadedSet for Uploaded {}
 
-impl Uploaded {
-    /// The images of a set of images.
-    fn images(set: &dyn UploadedSet) -> Result<&UploadedImages, EngineError> {
-        match Self::of_device(set)? {
-            Self::Images(images) => Ok(images),
-            Self::Light(_) => Err(invalid(
-                "common_cells",
-                "views that take light from samples have neither mirror cells nor a base; leave out --base",
-            )),
-        }
-    }
+impl UploadedSet for UploadedImages {}
+impl UploadedSet for UploadedLight {}
 
-    fn of_device(set: &dyn UploadedSet) -> Result<&Self, EngineError> {
-        (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))
+/// The images of a set of images.
+fn images(set: &dyn UploadedSet) -> Result<&UploadedImages, EngineError> {
+    if (set as &dyn Any).is::<UploadedLight>() {
+        let reason = "views that take light from samples have neither mirror cells nor a base; leave out --base";
+        return Err(invalid("common_cells", reason));
     }
+    (set as &dyn Any).downcast_ref().ok_or_else(|| device("a sample set of another device"))
 }
 
 impl GpuEngine {
@@ -109,10 +95,10 @@ impl GpuEngine {
     /// There is no device, or a shader is broken.
     pub fn open(preference: DevicePreference) -> Result<Self, EngineError> {
         let gpu = Gpu::open(preference).map_err(device)?;
-        let renderer = Arc::new(sampling::renderer(&gpu).map_err(|error| Caught::from(error).0)?);
+        let renderer = Arc::new(sampling::renderer(&gpu).map_err(Caught::from)?);
         Ok(Self {
             sampler: Sampler::sharing(renderer.clone()),
-            reconstructor: Reconstructor::new(&gpu).map_err(|error| Caught::from(error).0)?,
+            reconstructor: Reconstructor::new(&gpu).map_err(Caught::from)?,
             renderer,
             gpu,
             preference,
@@ -175,9 +161,9 @@ impl GpuEngine {
         Ok(())
     }
 
-    /// Does work on the device on this thread, and turns faults of the device into errors.
+    /// Does work on the device on this thread, and turns its errors and faults of the device into errors of engines.
     fn catching<T, E: Into<Caught>>(&self, work: impl FnOnce() -> Result<T, E>) -> Result<T, EngineError> {
-        self.gpu.catching(|| work().map_err(Into::into)).map_err(|Caught(error)| error)
+        self.gpu.catching(|| work().map_err(Into::<Caught>::into)).map_err(EngineError::from)
     }
 
     /// A scene on the device.
@@ -198,14 +184,18 @@ impl GpuEngine {
     ) -> Result<Vec<SampleImage>, EngineError> {
         let wanted = request.wanted.iter().filter_map(|&wanted| request.cameras.get(wanted as usize));
         let images = wanted.map(|camera| match camera {
-            SampleCamera::Layered(camera) => self.sampler.sample_layers(draw, camera, method).map(SampleImage::Layered),
+            SampleCamera::Layered(camera) => {
+                let kept = method.layer_selection();
+                let kept = kept.ok_or_else(|| SamplingError::Cameras { method: method.to_string() })?;
+                Ok(SampleImage::Layered(self.renderer.draw_layers(draw, camera, kept)?))
+            }
             SampleCamera::LightField(camera) => {
                 let draw = DrawWork { lighting: mirrored, ..draw };
-                self.sampler.sample_light_field(draw, camera).map(SampleImage::LightField)
+                Ok(SampleImage::LightField(self.renderer.draw_light_field(draw, camera)?))
             }
             SampleCamera::Depth(_) => Err(SamplingError::Lines { method: method.to_string() }),
         });
-        self.catching(|| images.collect::<Result<_, _>>())
+        self.catching(|| images.collect())
     }
 
     fn upload_light(
@@ -217,13 +207,13 @@ impl GpuEngine {
     ) -> Result<SharedSet, EngineError> {
         let scene = self.scene(&set.scene_hash)?;
         let cache = self.catching(|| self.renderer.upload_light(&scene, lighting, images, turn))?;
-        Ok(Arc::new(Uploaded::Light(UploadedLight {
+        Ok(Arc::new(UploadedLight {
             cache,
             scene_hash: set.scene_hash.clone(),
             lighting,
             scene_time_s: set.scene_time_s,
             traced_pixel_count: set.traced_pixel_count,
-        })))
+        }))
     }
 
     /// The seconds of work on this thread that has been done once before.
@@ -387,37 +377,35 @@ impl Engine for GpuEngine {
             SampleImages::Depth(images) => self.reconstructor.upload(images, &description, turn),
             SampleImages::Cube(cube) => self.reconstructor.upload_cube(cube, &description, turn),
         })?;
-        Ok(Arc::new(Uploaded::Images(UploadedImages {
+        Ok(Arc::new(UploadedImages {
             set: Arc::new(set),
             reflections: lighting.reflections(),
             glossy_rays: lighting.glossy_rays(),
             mirrors: Vec::new(),
             base: None,
-        })))
+        }))
     }
 
     fn with_common(&self, set: SharedSet, common: Vec<CommonSet>) -> Result<SharedSet, EngineError> {
-        let &UploadedImages { ref set, reflections, glossy_rays, .. } = Uploaded::images(set.as_ref())?;
+        let &UploadedImages { ref set, reflections, glossy_rays, .. } = images(set.as_ref())?;
         let mut mirrors = Vec::new();
         let mut base = None;
         for (cell, common) in common {
-            let common = Uploaded::images(common.as_ref())?.set.clone();
+            let common = images(common.as_ref())?.set.clone();
             match cell.kind {
                 CommonKind::Mirrors => mirrors.push((cell.bounds, common)),
                 CommonKind::Base => base = Some(common),
             }
         }
-        let images = UploadedImages { set: set.clone(), reflections, glossy_rays, mirrors, base };
-        Ok(Arc::new(Uploaded::Images(images)))
+        Ok(Arc::new(UploadedImages { set: set.clone(), reflections, glossy_rays, mirrors, base }))
     }
 
     fn reconstruct(&self, set: &dyn UploadedSet, work: &ViewWork, turn: Turn) -> Result<Vec<View>, EngineError> {
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
-        let images = match Uploaded::of_device(set)? {
-            Uploaded::Images(images) => images,
-            Uploaded::Light(light) => return self.draw_cached(light, method, work, turn),
-        };
-        let UploadedImages { set, reflections, glossy_rays, mirrors, base } = images;
+        if let Some(light) = (set as &dyn Any).downcast_ref() {
+            return self.draw_cached(light, method, work, turn);
+        }
+        let UploadedImages { set, reflections, glossy_rays, mirrors, base } = images(set)?;
         let cells = mirrors.iter().map(|(bounds, shown)| MirrorCell { bounds: *bounds, surroundings: shown });
         let cells: Vec<MirrorCell<'_>> = cells.collect();
         let mirrors = Mirrors { cells: &cells, reflections: *reflections, glossy_rays: *glossy_rays };
@@ -436,13 +424,14 @@ impl Engine for GpuEngine {
         work: &ViewWork,
         turn: Turn,
     ) -> Result<Option<LightParts>, EngineError> {
-        let Some(Uploaded::Light(light)) = (set as &dyn Any).downcast_ref() else { return Ok(None) };
+        let Some(light) = (set as &dyn Any).downcast_ref::<UploadedLight>() else { return Ok(None) };
         let method: ReconstructionMethod = parsed("reconstruction_method", &work.method)?;
         let with_provenance = ViewWork { planes: ViewPlanes { provenance: true, ..work.planes }, ..work.clone() };
         let views = self.draw_cached(light, method, &with_provenance, turn)?;
         let scene = self.scene(&light.scene_hash)?;
         let pixels = work.cameras.first().map_or(0, PinholeCamera::pixel_count);
-        let unlit = draw_work(&scene, Lighting::UNLIT, light.scene_time_s, light.by_rays(pixels), turn);
+        let by_rays = light.by_rays(pixels);
+        let unlit = draw_work(&scene, Lighting::UNLIT, light.scene_time_s, by_rays, turn);
         let draw = || self.renderer.draw_views(unlit, &work.cameras, work.planes);
         let draft = ReconstructionMethod::from(LightCacheQuality::Draft);
         Ok(Some(LightParts {
@@ -488,6 +477,12 @@ fn invalid(field: &'static str, reason: impl ToString) -> EngineError {
 /// An error of work that is done while faults of the device are caught.
 struct Caught(EngineError);
 
+impl From<Caught> for EngineError {
+    fn from(Caught(error): Caught) -> Self {
+        error
+    }
+}
+
 impl From<GpuError> for Caught {
     fn from(error: GpuError) -> Self {
         Self(match error {
@@ -511,34 +506,35 @@ impl From<RenderError> for Caught {
 
 impl From<ReconstructionError> for Caught {
     fn from(error: ReconstructionError) -> Self {
-        Self(match error {
-            ReconstructionError::Camera { .. } => invalid("camera", error),
-            ReconstructionError::Volume => invalid("volume", error),
-            ReconstructionError::NoSamples { .. } | ReconstructionError::NoScene { .. } => {
-                invalid("reconstruction_method", error)
-            }
-            ReconstructionError::Gpu(error) => return error.into(),
-            ReconstructionError::Shader(_) | ReconstructionError::MissingPlane { .. } => device(error),
-            ReconstructionError::MirrorCells(_) => invalid("common_cells of mirrors", error),
-            ReconstructionError::Reflections(_) => invalid("reflections", error),
-            ReconstructionError::Sample { .. }
-            | ReconstructionError::SampleCount(_)
-            | ReconstructionError::Model { .. }
-            | ReconstructionError::LightForColor { .. }
-            | ReconstructionError::CurvedSearch { .. }
-            | ReconstructionError::LightField { .. } => invalid("sample_images", error),
-        })
+        use ReconstructionError as Error;
+        let field = match error {
+            Error::Gpu(error) => return error.into(),
+            Error::Shader(_) | Error::MissingPlane { .. } => return Self(device(error)),
+            Error::Camera { .. } => "camera",
+            Error::Volume => "volume",
+            Error::NoSamples { .. } | Error::NoScene { .. } => "reconstruction_method",
+            Error::MirrorCells(_) => "common_cells of mirrors",
+            Error::Reflections(_) => "reflections",
+            Error::Sample { .. }
+            | Error::SampleCount(_)
+            | Error::Model { .. }
+            | Error::LightForColor { .. }
+            | Error::CurvedSearch { .. }
+            | Error::LightField { .. } => "sample_images",
+        };
+        Self(invalid(field, error))
     }
 }
 
 impl From<SamplingError> for Caught {
     fn from(error: SamplingError) -> Self {
-        Self(match error {
+        let field = match error {
             SamplingError::Render(error) => return error.into(),
-            SamplingError::Layer { .. } | SamplingError::Lines { .. } => invalid("sample_cameras", error),
-            SamplingError::Cameras { .. } | SamplingError::Positions { .. } => invalid("sampling_method", error),
-            SamplingError::Selection { .. } => invalid("image_indices", error),
-        })
+            SamplingError::Layer { .. } | SamplingError::Lines { .. } => "sample_cameras",
+            SamplingError::Cameras { .. } | SamplingError::Positions { .. } => "sampling_method",
+            SamplingError::Selection { .. } => "image_indices",
+        };
+        Self(invalid(field, error))
     }
 }
 

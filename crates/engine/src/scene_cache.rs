@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use parking_lot::Mutex;
+use parking_lot::{Mutex, MutexGuard};
 use render::GpuScene;
 
 /// Scenes by hash. The least recently used are evicted when others come or grow, but none that is in use: the bound is
@@ -42,9 +42,7 @@ impl<S> SceneCache<S> {
         let scene = found.1.clone();
         scenes.push(found);
         // Scenes grow after they were put, by the tree that rays need.
-        let evicted = self.evict(&mut scenes);
-        drop(scenes);
-        drop(evicted);
+        self.evict(scenes);
         Some(scene)
     }
 
@@ -52,13 +50,12 @@ impl<S> SceneCache<S> {
     pub fn put(&self, hash: &str, scene: S) {
         let mut scenes = self.scenes.lock();
         scenes.push((hash.to_owned(), Arc::new(scene)));
-        let evicted = self.evict(&mut scenes);
-        drop(scenes);
-        drop(evicted);
+        self.evict(scenes);
     }
 
-    /// Takes out the least recently used that are idle, until the others are within the bound. The last one stays.
-    fn evict(&self, scenes: &mut Scenes<S>) -> Scenes<S> {
+    /// Takes out the least recently used that are idle, until the others are within the bound. The last one stays. Evicted scenes
+    /// are dropped once the others are free to use.
+    fn evict(&self, mut scenes: MutexGuard<'_, Scenes<S>>) {
         let bytes: u64 = scenes.iter().map(|(_, scene)| (self.bytes)(scene)).sum();
         let mut beyond = bytes.saturating_sub(self.max_bytes());
         let last = scenes.len().saturating_sub(1);
@@ -67,7 +64,9 @@ impl<S> SceneCache<S> {
             beyond = if leaves { beyond.saturating_sub((self.bytes)(scene)) } else { beyond };
             leaves
         });
-        evicted.collect()
+        let evicted: Scenes<S> = evicted.collect();
+        drop(scenes);
+        drop(evicted);
     }
 }
 

@@ -1,6 +1,6 @@
 //! The colour that a pixel shows: the mean over its positions in linear light, as sRGB.
 
-use gpu::{Binding, ResourceTraits, ShaderVariant};
+use gpu::{ResourceTraits, ShaderVariant, switches};
 use minijinja::{Value, context};
 
 use crate::view_work::{ONE_VIEW, SetVariant};
@@ -41,10 +41,9 @@ impl ShaderVariant for Shown {
     fn all() -> Vec<Self> {
         let mut all = Vec::new();
         for set in SetVariant::all().into_iter().filter(|set| !set.holes).chain([SetVariant::CUBE]) {
-            for environment_map in [false, true] {
-                let whole = [Sums::None, Sums::Begun, Sums::Continued, Sums::Read];
-                all.extend(whole.map(|sums| Self { set, sums, listed: false, environment_map }));
-                all.push(Self { set, sums: Sums::Continued, listed: true, environment_map });
+            for [listed, environment_map] in switches() {
+                let sums = [Sums::None, Sums::Begun, Sums::Continued, Sums::Read];
+                all.extend(sums.map(|sums| Self { set, sums, listed, environment_map }));
             }
         }
         all
@@ -61,14 +60,5 @@ pub(crate) fn record(
     let set = SetVariant { holes: false, ..recording.set.variant() };
     let environment_map = recording.set.environment.is_some();
     let variant = Shown { set, sums, listed: listed.is_some(), environment_map };
-    let batch = &recording.batch;
-    let mut bindings = recording.view_bindings();
-    bindings.extend(recording.set.background_bindings());
-    bindings.push(Binding::buffer("color", &batch.color));
-    bindings.push(Binding::buffer("inverse_depth", &batch.inverse_depth_per_m));
-    bindings.extend(batch.sums.as_ref().filter(|_| sums != Sums::None).map(|sums| Binding::buffer("sums", sums)));
-    bindings.extend(listed.into_iter().flat_map(PixelList::bindings));
-    let pass = recording.bind(&variant, bindings)?;
-    recording.dispatch_pixels(&pass, listed);
-    Ok(())
+    recording.dispatch_pixels(&variant, [], listed)
 }

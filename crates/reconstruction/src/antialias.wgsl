@@ -27,21 +27,10 @@ fn shown_linear(index: u32, place: vec2u) -> vec3f {
     return linear;
 }
 
-{% if listed %}
-{% include "pixel_list.wgsl" %}
-{% endif %}
 
 @compute @workgroup_size({{ "LIST_WORKGROUP" if listed else "TILE_PX, TILE_PX" }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
-{% if listed %}
-    if id.x >= lists[work.view.number].count { return; }
-    let index = listed_pixels[first_listed() + id.x];
-    let place = place_of(index);
-{% else %}
-    let place = pixel_at(id);
-    if any(place >= work.view.size_px) { return; }
-    let index = work.view.first_pixel + place.y * work.view.size_px.x + place.x;
-{% endif %}
+{% include "at_pixel.wgsl" %}
 {% if sums == "None" %}
     color[index] = pack4x8unorm(vec4f(srgb_from_linear(shown_from_mean(shown_linear(index, place), work.tone)), 1.0));
 {% elif sums == "Read" %}

@@ -1,13 +1,14 @@
 //! Rays into the lobes of the rough surfaces that a view shows: each surface is listed once, and sends one ray after another.
 
 use bytemuck::{Pod, Zeroable};
-use depth_image::Highlight;
-use gpu::{Binding, ResourceTraits, ShaderVariant, highlight_name, light_slots, shader_variant};
-use minijinja::{Value, context};
+use gpu::{Binding, ResourceTraits, ShaderVariant, shader_variant};
+use minijinja::Value;
 use wgpu::{Buffer, BufferUsages};
 
 use crate::bounce::{Bounces, RayLists};
 use crate::pixel_list::empty_lists;
+use crate::reflectors::Reflection;
+use crate::view_work::SetVariant;
 use crate::{device::Device, error::ReconstructionError, recording::Recording};
 
 /// How a surface's lobe is lit, beside the rays off mirrors.
@@ -71,7 +72,7 @@ pub(crate) struct GlossyList<'b> {
     surfaces: &'b Buffer,
     /// Of their pixels, from all of their rays.
     pub light: &'b Buffer,
-    list: Buffer,
+    pub list: Buffer,
     /// Rays of each.
     pub rays: u32,
     count: Buffer,
@@ -87,11 +88,12 @@ impl<'b> GlossyList<'b> {
         Some(Self { surfaces, light, list, rays, count: uniform(recording.device, rays, 0) })
     }
 
-    /// The resources of passes that list surfaces.
-    pub fn bindings(&self) -> [Binding<'_>; 4] {
+    /// The resources of passes that list surfaces, and of those that send their rays.
+    pub fn bindings(&self) -> [Binding<'_>; 5] {
         [
             Binding::buffer("lobe_rays", &self.count),
             Binding::buffer("glossy_surfaces", self.surfaces),
+            Binding::buffer("glossy", self.surfaces),
             Binding::buffer("glossy_list", &self.list),
             Binding::buffer("lobe_light", self.light),
         ]
@@ -111,14 +113,7 @@ impl ShaderVariant for Lobe {
     const TRAITS: ResourceTraits = &[];
 
     fn context(&self) -> Value {
-        context! {
-            highlight => highlight_name(Highlight::Ggx),
-            mirrors => true,
-            mirror_cells => 1,
-            environment_map => false,
-            light_slots => light_slots(0),
-            visibility_words => 0,
-        }
+        Reflection { mirror_cells: Some(1), ..Reflection::default() }.context(SetVariant::CUBE)
     }
 
     fn all() -> Vec<Self> {
@@ -135,30 +130,12 @@ pub(crate) fn record(
     illumination: &Buffer,
 ) -> Result<RayLists, ReconstructionError> {
     let lists = bounces.next(recording.device, None);
-    let own = uniform(recording.device, glossy.rays, number);
-    let mut bindings = vec![
-        Binding::buffer("illumination", illumination),
-        Binding::buffer("lobe_rays", &own),
-        Binding::buffer("glossy", glossy.surfaces),
-        Binding::buffer("glossy_list", &glossy.list),
-    ];
-    bindings.extend(bounces.spawn_bindings(&lists));
-    let pass = recording.bind(&Lobe, bindings)?;
-    recording.dispatch_listed(&pass, &glossy.list, 0, ());
+    let count = uniform(recording.device, glossy.rays, number);
+    let own = [Binding::buffer("illumination", illumination), Binding::buffer("lobe_rays", &count)];
+    let own = own.into_iter().chain(glossy.bindings()).chain(bounces.spawn_bindings(&lists));
+    recording.dispatch_listed(&Lobe, own, &glossy.list, 0, ())?;
     Ok(lists)
 }
 
+// Adds the light of all rays to the pixels.
 shader_variant!(LobeSum, "bounce/lobe_sum.wgsl", &[]);
-
-/// Records the pass that adds the light of all rays to the pixels.
-pub(crate) fn record_sum(recording: &mut Recording<'_>, glossy: &GlossyList<'_>) -> Result<(), ReconstructionError> {
-    let bindings = [
-        Binding::buffer("glossy", glossy.surfaces),
-        Binding::buffer("glossy_list", &glossy.list),
-        Binding::buffer("lobe_light", glossy.light),
-        Binding::buffer("out_color", &recording.batch.color),
-    ];
-    let pass = recording.bind(&LobeSum, bindings)?;
-    recording.dispatch_listed(&pass, &glossy.list, 0, ());
-    Ok(())
-}

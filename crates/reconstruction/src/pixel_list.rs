@@ -35,6 +35,11 @@ impl PixelList {
         Self { pixels, lists: empty_lists(gpu, "lists of undecided pixels", pieces) }
     }
 
+    /// As a pass writes it: `found.wgsl`.
+    pub fn written_bindings(&self) -> [Binding<'_>; 2] {
+        [Binding::buffer("undecided_pixels", &self.pixels), Binding::buffer("undecided", &self.lists)]
+    }
+
     /// As the next pass reads it.
     pub fn bindings(&self) -> [Binding<'_>; 2] {
         [Binding::buffer("listed_pixels", &self.pixels), Binding::buffer("lists", &self.lists)]

@@ -3,21 +3,20 @@
 
 use std::sync::Arc;
 
-use depth_image::{Antialias, CubeImages, DepthImage, PinholeCamera, View, ViewPlanes};
+use depth_image::{Antialias, PinholeCamera, View, ViewPlanes};
 use glam::Vec2;
-use gpu::{BufferPool, Gpu, JobLimit, PassCache, TablePool, Turn, WorkKind};
+use gpu::{BufferPool, Gpu, JobLimit, PassCache, Submitted, TablePool, Turn, WorkKind};
 
 use crate::antialias::{self, Sums};
-use crate::bounce::{self, Bounces, CellRays, CurvedSearch, Mirrors, RayLists};
+use crate::bounce::{self, Bounces, CurvedSearch, Mirrors, RayLists};
 use crate::cube::Cube;
-use crate::in_flight::InFlight;
-use crate::lobes::GlossyList;
+use crate::in_flight::{BatchViews, submit};
+use crate::lobes::{GlossyList, LobeLight};
 use crate::methods::layered::{self, Ends, Walked};
 use crate::pixel_list::PixelList;
 use crate::quads::{self, Mesh, MeshStatistics, Quad, QuadDrawing};
 use crate::recording::{MIRRORED_PIXELS_A_BATCH, MIRRORED_PIXELS_A_SLICE, PIXELS_A_BATCH, Recording, batches};
 use crate::sample_set::SampleSet;
-use crate::set_description::SetDescription;
 use crate::{device::Device, error::ReconstructionError, methods::ReconstructionMethod};
 use crate::{fill, shaders::templates, specular, tile_start};
 
@@ -27,7 +26,7 @@ const CALLS_OF_A_CLASS: usize = 4;
 /// Passes for every method and number of cameras that has been asked for.
 pub struct Reconstructor {
     pub(crate) device: Device,
-    tables: TablePool,
+    pub(crate) tables: TablePool,
     drawing: QuadDrawing,
     calls: JobLimit,
 }
@@ -77,9 +76,8 @@ impl<'r> ReconstructRequest<'r> {
 #[derive(Clone, Copy)]
 struct Prepared<'r> {
     request: ReconstructRequest<'r>,
-    mirrors: Mirrors<'r>,
-    /// Rays into lobes that are walked in the base, with those off the mirrors that they meet.
-    lobes: Mirrors<'r>,
+    /// Rays off mirrors, and those into lobes that are walked in the base, with those off the mirrors that they meet.
+    followed: [Mirrors<'r>; 2],
     base: Option<&'r Cube>,
     /// The memory for rays off mirrors, and for those into lobes, while a batch is recorded.
     bounces: [Option<&'r Bounces<'r>>; 2],
@@ -102,32 +100,6 @@ impl Reconstructor {
         })
     }
 
-    /// Puts a sample set on the device.
-    ///
-    /// # Errors
-    /// Images, cameras or a volume that cannot be used, or the device's limits.
-    pub fn upload(
-        &self,
-        images: &[DepthImage],
-        set: &SetDescription<'_>,
-        turn: Turn,
-    ) -> Result<SampleSet, ReconstructionError> {
-        SampleSet::upload(&self.tables, images, set, turn)
-    }
-
-    /// Puts a layered depth cube on the device, with its light field if it has one.
-    ///
-    /// # Errors
-    /// Images that are not those of the grid's lines, a light field or a volume that cannot be used, or the device's limits.
-    pub fn upload_cube(
-        &self,
-        cube: &CubeImages,
-        set: &SetDescription<'_>,
-        turn: Turn,
-    ) -> Result<SampleSet, ReconstructionError> {
-        SampleSet::upload_cube(&self.tables, cube, set, turn)
-    }
-
     /// One view a camera, in their order.
     ///
     /// # Errors
@@ -144,14 +116,13 @@ impl Reconstructor {
             true => (Mirrors { cells: &[], ..mirrors }, Some(set), None),
             false => (mirrors, base, base.map(cube_of_base).transpose()?),
         };
-        let [mirrors, lobes] = mirrors.checked_for(set, cube)?.split(base.is_some());
-        let cells = [mirrors, lobes].map(|of| of.cells_with(cube));
-        let mirrors = Mirrors { cells: &cells[0], ..mirrors };
-        let lobes = Mirrors { cells: &cells[1], ..lobes };
+        let followed = mirrors.checked_for(set, cube)?.split(base.is_some());
+        let cells = followed.map(|mirrors| mirrors.cells_with(cube));
+        let followed = [0, 1].map(|of| Mirrors { cells: &cells[of], ..followed[of] });
         let _call = self.calls.begin(turn.class);
         // First of all: a batch in flight holds the device, and cutting a mesh would wait for it.
         let mesh = method.mesh(&self.device, set, turn)?;
-        let prepared = Prepared { request, mirrors, lobes, base, bounces: [None; 2], mesh: mesh.as_deref() };
+        let prepared = Prepared { request, followed, base, bounces: [None; 2], mesh: mesh.as_deref() };
         // Rays off mirrors take memory, and are followed at once beside live streams.
         let most_pixels = match (cells.iter().all(Vec::is_empty), self.device.gpu.device_queue.cuts()) {
             (true, _) => PIXELS_A_BATCH,
@@ -159,20 +130,19 @@ impl Reconstructor {
             (false, true) => MIRRORED_PIXELS_A_SLICE,
         };
         let mut views = Vec::with_capacity(cameras.len());
-        let mut in_flight: Option<InFlight<'_>> = None;
+        let mut in_flight: Option<(Submitted<'_>, BatchViews)> = None;
         // The device works on one batch while the host takes the one before apart.
-        for batch in batches(cameras, most_pixels) {
-            let recording = self.record(prepared, batch)?;
+        for batch in batches(cameras, most_pixels).map(Some).chain([None]) {
+            let recording = batch.map(|batch| self.record(prepared, batch)).transpose()?;
             // Whoever holds the device asks for no other turn.
-            let done = in_flight.take().map(InFlight::wait).transpose()?;
-            in_flight = Some(InFlight::submit(recording)?);
+            let done = match in_flight.take() {
+                Some((submitted, batch)) => Some((submitted.wait()?, batch)),
+                None => None,
+            };
+            in_flight = recording.map(submit).transpose()?;
             if let Some((result, batch)) = done {
                 batch.unpack(&result, &mut views)?;
             }
-        }
-        if let Some(last) = in_flight {
-            let (result, batch) = last.wait()?;
-            batch.unpack(&result, &mut views)?;
         }
         Ok(views)
     }
@@ -183,13 +153,11 @@ impl Reconstructor {
         prepared: Prepared<'r>,
         cameras: &[PinholeCamera],
     ) -> Result<Recording<'r>, ReconstructionError> {
-        let Prepared { request, mirrors, lobes, .. } = prepared;
-        let ReconstructRequest { set, method, planes, turn, .. } = request;
-        let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), mirrors.cells.len()));
+        let Prepared { request: ReconstructRequest { set, method, planes, turn, .. }, followed, .. } = prepared;
+        let family = WorkKind::family(&("reconstruct", method, set.cameras.len(), followed[0].cells.len()));
         let mut recording = Recording::begin(&self.device, set, cameras, planes, family, turn)?;
         let rays = recording.batch.plane_bytes as usize / 4;
-        let [mirrors, lobes] =
-            [mirrors, lobes].map(|of| Bounces::lend(&self.device, of, rays, CurvedSearch::default()));
+        let [mirrors, lobes] = followed.map(|of| Bounces::lend(&self.device, of, rays, CurvedSearch::default()));
         let bounces = [mirrors?, lobes?];
         let prepared = Prepared { bounces: bounces.each_ref().map(Option::as_ref), ..prepared };
         self.record_positions(prepared, &mut recording)?;
@@ -260,7 +228,10 @@ impl Reconstructor {
         let first = mirrored.as_ref().map(|(bounces, first)| (*bounces, first));
         let glossy = lobes.and_then(|lobes| GlossyList::of(recording, lobes));
         let unknown = match base {
-            Some(base) => layered::record_left(recording, base, &unknown, first, glossy.as_ref())?,
+            Some(base) => {
+                let lobe = glossy.as_ref().map(|_| LobeLight::sent(first.is_some()));
+                layered::walk_pixels(recording, base, Some(&unknown), first, lobe, glossy.as_ref())?
+            }
             None => unknown,
         };
         fill::record(recording, &unknown)?;
@@ -308,26 +279,17 @@ fn record_mirrored(
     first: RayLists,
     base: Option<&Cube>,
 ) -> Result<(), ReconstructionError> {
-    let mut lists = first;
-    for reflection in 1..=bounces.reflections {
-        let next = (reflection < bounces.reflections).then(|| bounces.next(recording.device, Some(&lists)));
-        for (number, cell) in bounces.cells.iter().enumerate() {
-            let rays = CellRays { lists: &lists, next: next.as_ref(), cell: number, reflection };
-            if !cell.is_cube() {
-                bounce::follow(recording, bounces, rays)?;
-            }
-            if let Some(base) = base {
-                let walked = if cell.is_cube() { Walked::Bounced } else { Walked::LeftBounced };
-                layered::follow(recording, base, bounces, rays, walked, Ends::default())?;
-            }
-            if !cell.is_cube() {
-                bounce::land(recording, bounces, rays)?;
-            }
+    bounces.each_mirror(recording, first, 1..=bounces.reflections, |recording, rays| {
+        let is_cube = bounces.cells[rays.cell].is_cube();
+        if !is_cube {
+            bounce::follow(recording, bounces, rays)?;
         }
-        let Some(next) = next else { break };
-        lists = next;
-    }
-    Ok(())
+        if let Some(base) = base {
+            let walked = if is_cube { Walked::Bounced } else { Walked::LeftBounced };
+            layered::follow(recording, base, bounces, rays, walked, Ends::default())?;
+        }
+        if is_cube { Ok(()) } else { bounce::land(recording, bounces, rays) }
+    })
 }
 
 fn cube_of_base(base: &SampleSet) -> Result<&Cube, ReconstructionError> {

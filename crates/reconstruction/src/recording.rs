@@ -38,14 +38,6 @@ pub(crate) struct Recording<'r> {
     family: u64,
 }
 
-/// A pass with its resources.
-pub(crate) struct BoundPass {
-    pass: Arc<ComputePass>,
-    bound: BoundGroup,
-    /// The shader and its switches, by which costs are learned.
-    name: String,
-}
-
 /// Some rows of a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Piece {
@@ -164,64 +156,92 @@ impl<'r> Recording<'r> {
         PixelList::empty(&self.device.gpu, (**pixels).clone(), self.batch.pieces.count())
     }
 
-    /// The resources of `view_work.wgsl`.
-    pub fn view_bindings(&self) -> Vec<Binding<'_>> {
-        let nodes = (!self.set.cameras.is_empty()).then(|| Binding::texture("nodes", &self.set.nodes));
-        std::iter::once(Binding::buffer("work", &self.batch.works)).chain(nodes).collect()
-    }
-
-    /// The resources of `view_work.wgsl` and `cell.wgsl`.
-    pub fn cell_bindings(&self) -> Vec<Binding<'_>> {
-        let mut bindings = self.view_bindings();
-        bindings.push(Binding::texture("cell_codes", &self.set.cell_codes));
+    /// The resources of the batch and of its set: each shader declares some of them.
+    fn bindings(&self) -> Vec<Binding<'_>> {
+        let Self { set, batch, .. } = self;
+        let mut bindings = set.image_bindings();
+        bindings.extend(plane_bindings([&batch.color, &batch.inverse_depth_per_m, &batch.provenance]));
+        bindings.extend([Binding::buffer("work", &batch.works), Binding::buffer("background", &set.background)]);
+        bindings.extend(set.environment.iter().flat_map(|map| map.bindings()));
+        bindings.extend(batch.sums.iter().map(|sums| Binding::buffer("sums", sums)));
+        bindings.extend(batch.tile_start_m.iter().map(|starts| Binding::buffer("tile_start_m", starts)));
+        bindings.extend(batch.targets.iter().flat_map(|drawn| drawn.bindings()));
         bindings
     }
 
-    /// A pass of `variant`, with its resources.
-    pub fn bind<'b>(
+    /// A pass of `variant`. Its shader is bound to its `own` resources, and to those of the batch.
+    fn bind<'b>(
         &self,
         variant: &impl ShaderVariant,
-        bindings: impl IntoIterator<Item = Binding<'b>>,
-    ) -> Result<BoundPass, ReconstructionError> {
+        own: impl IntoIterator<Item = Binding<'b>>,
+    ) -> Result<(Arc<ComputePass>, BoundGroup), ReconstructionError> {
         let pass = self.device.passes.get(variant)?;
+        let mut bindings: Vec<Binding<'_>> = own.into_iter().collect();
+        bindings.extend(self.bindings());
         let bound = pass.bind(0, bindings)?;
-        Ok(BoundPass { pass, bound, name: variant.name() })
+        Ok((pass, bound))
     }
 
-    /// One dispatch a piece, over its listed pixels or over all.
-    pub fn dispatch_pixels(&mut self, pass: &BoundPass, listed: Option<&PixelList>) {
+    /// Records a pass over the listed pixels of each piece, or over all.
+    pub fn dispatch_pixels<'b>(
+        &mut self,
+        variant: &impl ShaderVariant,
+        own: impl IntoIterator<Item = Binding<'b>>,
+        listed: Option<&'b PixelList>,
+    ) -> Result<(), ReconstructionError> {
         let all = [self.batch.size_px.x, self.batch.pieces.rows, 1];
-        self.dispatch(pass, |first| match listed {
+        let own = own.into_iter().chain(listed.into_iter().flat_map(PixelList::bindings));
+        self.dispatch(variant, own, |first| match listed {
             Some(listed) => DispatchSize::Indirect(&listed.lists, first),
             None => DispatchSize::Invocations(all),
-        });
+        })
     }
 
-    /// One dispatch over the `number`-th of some lists, of rays of any of the batch's pixels. Equal `what` cost the same.
-    pub fn dispatch_listed(&mut self, pass: &BoundPass, lists: &wgpu::Buffer, number: usize, what: impl Hash) {
-        let size = DispatchSize::Indirect(lists, number as u32);
-        pass.pass.dispatch(&mut self.frame, &[&pass.bound], size);
-        self.frame.cut(WorkKind::new(self.family, &(&pass.name, what)), self.batch.plane_bytes / 4);
+    /// Records a pass over the `number`-th of some lists, of rays of any of the batch's pixels. Equal `what` cost the same.
+    pub fn dispatch_listed<'b>(
+        &mut self,
+        variant: &impl ShaderVariant,
+        own: impl IntoIterator<Item = Binding<'b>>,
+        lists: &wgpu::Buffer,
+        number: usize,
+        what: impl Hash,
+    ) -> Result<(), ReconstructionError> {
+        let (pass, bound) = self.bind(variant, own)?;
+        pass.dispatch(&mut self.frame, &[&bound], DispatchSize::Indirect(lists, number as u32));
+        self.frame.cut(WorkKind::new(self.family, &(variant.name(), what)), self.batch.plane_bytes / 4);
+        Ok(())
     }
 
-    /// One dispatch a piece, of a size that may depend on the first piece.
-    pub fn dispatch<'b>(&mut self, pass: &BoundPass, size: impl Fn(u32) -> DispatchSize<'b>) {
-        let kind = WorkKind::new(self.family, &pass.name);
+    /// Records one dispatch a piece, of a size that may depend on the first piece.
+    pub fn dispatch<'b, 's>(
+        &mut self,
+        variant: &impl ShaderVariant,
+        own: impl IntoIterator<Item = Binding<'b>>,
+        size: impl Fn(u32) -> DispatchSize<'s>,
+    ) -> Result<(), ReconstructionError> {
+        let (pass, bound) = self.bind(variant, own)?;
+        let kind = WorkKind::new(self.family, &variant.name());
         let piece_px = u64::from(self.batch.size_px.x) * u64::from(self.batch.pieces.rows);
         for slice in self.batch.pieces.slices() {
             let count = slice.len() as u64;
             let size = size(slice.start);
-            pass.pass.dispatch_each(&mut self.frame, &[&pass.bound], slice, size);
+            pass.dispatch_each(&mut self.frame, &[&bound], slice, size);
             self.frame.cut(kind, count * piece_px);
         }
+        Ok(())
     }
 }
 
-impl Batch {
-    /// Colours, inverse depths and provenance of all pixels.
-    pub fn pixel_planes(&self) -> [&wgpu::Buffer; 3] {
-        [&self.color, &self.inverse_depth_per_m, &self.provenance]
-    }
+/// Colours, inverse depths and provenance of pixels or rays, under the names of passes that find them and of those that go on.
+pub(crate) fn plane_bindings([color, inverse_depth, provenance]: [&wgpu::Buffer; 3]) -> [Binding<'_>; 6] {
+    [
+        Binding::buffer("color", color),
+        Binding::buffer("out_color", color),
+        Binding::buffer("inverse_depth", inverse_depth),
+        Binding::buffer("out_inverse_depth", inverse_depth),
+        Binding::buffer("provenance", provenance),
+        Binding::buffer("out_provenance", provenance),
+    ]
 }
 
 impl Pieces {

@@ -1,10 +1,13 @@
 //! The light that the samples of a set reflect towards a viewer, on the device.
 
 use depth_image::{DepthImage, Highlight, Illumination, LayeredDepthImage, ROUGHEST_MIRROR, SpecularPlanes};
-use gpu::{GpuError, Table, TablePool, Turn, illumination_bytes};
+use gpu::{Binding, GpuError, Table, TablePool, Turn, highlight_name, illumination_bytes, light_slots};
+use minijinja::{Value, context};
 use wgpu::{BufferUsages, TextureFormat};
 
-use crate::{error::ReconstructionError, set_description::SetDescription};
+use crate::bounce::MAX_RAY_LISTS;
+use crate::view_work::SetVariant;
+use crate::{error::ReconstructionError, lobes::LobeLight, set_description::SetDescription};
 
 /// A normal and a reflector stand before the words of visibility.
 const WORDS_BEFORE_VISIBILITY: usize = 2;
@@ -17,32 +20,25 @@ pub(crate) struct Reflectors {
     pub visibility_words: usize,
     /// Some sample is smooth enough to mirror the scene.
     pub has_mirrors: bool,
-    pub samples: Table,
+    samples: Table,
     pub illumination: wgpu::Buffer,
 }
 
 impl Reflectors {
-    /// `None` where no highlights are asked for or nothing reflects.
+    /// `None` where no highlights are asked for or nothing reflects. The samples are in the order of `places` in their images, image
+    /// after image, or as they are.
     pub fn upload(
         tables: &TablePool,
-        images: &[DepthImage],
-        set: &SetDescription<'_>,
-        turn: Turn,
-    ) -> Result<Option<Self>, ReconstructionError> {
-        let planes: Vec<Planes<'_>> = images.iter().map(Planes::of_image).collect();
-        Self::of_planes(tables, &planes, None, set, turn)
-    }
-
-    /// The samples are in the order of `places` in their images, image after image, or as they are.
-    fn of_planes(
-        tables: &TablePool,
-        planes: &[Planes<'_>],
+        planes: &[ReflectingPlanes<'_>],
         places: Option<&[u32]>,
         set: &SetDescription<'_>,
         turn: Turn,
     ) -> Result<Option<Self>, ReconstructionError> {
         check(planes, set.illumination)?;
-        let Some(highlight) = set.highlight.filter(|_| planes.iter().any(Planes::reflects)) else { return Ok(None) };
+        let Some(highlight) = set.highlight.filter(|_| planes.iter().any(|image| image.has_sample(|word| word != 0)))
+        else {
+            return Ok(None);
+        };
         let gpu = &tables.gpu;
         let bytes = illumination_bytes(set.illumination);
         let limit = gpu.device.limits().max_uniform_buffer_binding_size;
@@ -55,64 +51,134 @@ impl Reflectors {
             highlight,
             lights: set.illumination.lights.len(),
             visibility_words,
-            has_mirrors: planes.iter().any(Planes::has_mirrors),
+            has_mirrors: planes.iter().any(|image| image.has_sample(is_mirror)),
             samples: tables.upload("reflectors", TextureFormat::Rgba32Uint, &words, turn)?,
             illumination: gpu.buffer_with("illumination", &bytes, BufferUsages::UNIFORM),
         }))
     }
 
-    /// As [`Reflectors::upload`], of a layered cube: its samples are in the order of `places` in their images, image after image.
-    pub fn of_cube(
-        tables: &TablePool,
-        images: &[LayeredDepthImage; 3],
-        places: &[u32],
-        set: &SetDescription<'_>,
-        turn: Turn,
-    ) -> Result<Option<Self>, ReconstructionError> {
-        let planes = images.each_ref().map(Planes::of_layers);
-        Self::of_planes(tables, &planes, Some(places), set, turn)
+    /// What samples reflect, and of which light.
+    pub fn bindings(&self) -> [Binding<'_>; 2] {
+        [Binding::texture("samples", &self.samples), Binding::buffer("illumination", &self.illumination)]
     }
 }
 
 /// Texels that a sample's words take.
-pub(crate) const fn sample_texels(visibility_words: usize) -> usize {
+const fn sample_texels(visibility_words: usize) -> usize {
     (WORDS_BEFORE_VISIBILITY + visibility_words).div_ceil(4)
 }
 
+/// The switches of shaders that show what samples reflect: `highlight.wgsl`, `gathered.wgsl`, and those that list the rays off
+/// mirrors and the rough surfaces that send rays.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Reflection {
+    /// The formula of highlights, where samples have any.
+    pub highlight: Option<Highlight>,
+    pub lights: usize,
+    /// The words that say which lights a sample sees; 0 where all samples see all.
+    pub visibility_words: usize,
+    /// The environment is a map.
+    pub environment_map: bool,
+    /// Mirrors list the rays off them; the number of lists.
+    pub mirror_cells: Option<usize>,
+    /// The light of lobes, beside the rays off mirrors.
+    pub lobe: Option<LobeLight>,
+}
+
+impl Reflection {
+    /// Mirrors and lobes are those of GGX surfaces; Blinn-Phong surfaces mirror lamps only.
+    pub fn of(
+        reflectors: Option<&Reflectors>,
+        mirror_cells: Option<usize>,
+        lobe: Option<LobeLight>,
+        has_map: bool,
+    ) -> Self {
+        let Some(Reflectors { highlight, lights, visibility_words, .. }) = reflectors else { return Self::default() };
+        let without_mirrors = Self {
+            highlight: Some(*highlight),
+            lights: *lights,
+            visibility_words: *visibility_words,
+            ..Self::default()
+        };
+        match highlight {
+            Highlight::BlinnPhong => without_mirrors,
+            Highlight::Ggx => Self { environment_map: has_map, mirror_cells, lobe, ..without_mirrors },
+        }
+    }
+
+    pub fn context(self, set: SetVariant) -> Value {
+        context! {
+            reflects => self.highlight.is_some(),
+            highlight => highlight_name(self.highlight.unwrap_or(Highlight::Ggx)),
+            light_slots => light_slots(self.lights),
+            visibility_words => self.visibility_words,
+            sample_texels => sample_texels(self.visibility_words),
+            environment_map => self.environment_map,
+            mirrors => self.mirror_cells.is_some() || self.lobe.is_some(),
+            spawns => self.mirror_cells.is_some(),
+            mirror_cells => self.mirror_cells.unwrap_or(0),
+            gathers => self.lobe.is_some_and(|lobe| !lobe.is_sent()),
+            lists_glossy => self.lobe.is_some_and(LobeLight::is_sent),
+            lobe_share => self.lobe.map_or("0.0", LobeLight::share),
+            glossy => self.lobe.is_some_and(|lobe| lobe != LobeLight::GatheredMirrors),
+            ..set.context()
+        }
+    }
+
+    /// Those that stand for all, without lobes.
+    pub fn all() -> Vec<Self> {
+        let mut all = [false, true].map(|environment_map| Self { environment_map, ..Self::default() }).to_vec();
+        for (lights, visibility_words) in [(0, 0), (3, 0), (3, 1), (255, 64)] {
+            let plain = Self { lights, visibility_words, ..Self::default() };
+            all.push(Self { highlight: Some(Highlight::BlinnPhong), ..plain });
+            for environment_map in [false, true] {
+                let ggx = Self { highlight: Some(Highlight::Ggx), environment_map, ..plain };
+                all.extend([None, Some(1), Some(MAX_RAY_LISTS)].map(|mirror_cells| Self { mirror_cells, ..ggx }));
+            }
+        }
+        all
+    }
+
+    /// This one, and those with lobes where surfaces may have any.
+    pub fn with_lobes(self, lobes: &[LobeLight]) -> Vec<Self> {
+        let lobes = if self.highlight == Some(Highlight::Ggx) { lobes } else { &[] };
+        std::iter::once(None).chain(lobes.iter().copied().map(Some)).map(|lobe| Self { lobe, ..self }).collect()
+    }
+}
+
 /// The planes of an image from which compositors compute highlights.
-struct Planes<'i> {
+pub(crate) struct ReflectingPlanes<'i> {
     samples: usize,
     normal_oct16: Option<&'i [u32]>,
     specular: Option<&'i SpecularPlanes>,
 }
 
-impl<'i> Planes<'i> {
-    fn of_image(image: &'i DepthImage) -> Self {
+impl<'i> From<&'i DepthImage> for ReflectingPlanes<'i> {
+    fn from(image: &'i DepthImage) -> Self {
         let normal_oct16 = image.normal_oct16.as_deref();
-        let specular = image.specular.as_ref();
-        Self { samples: image.color_rgb9e5.len(), normal_oct16, specular }
+        Self { samples: image.color_rgb9e5.len(), normal_oct16, specular: image.specular.as_ref() }
     }
+}
 
-    fn of_layers(image: &'i LayeredDepthImage) -> Self {
+impl<'i> From<&'i LayeredDepthImage> for ReflectingPlanes<'i> {
+    fn from(image: &'i LayeredDepthImage) -> Self {
         let normal_oct16 = image.normal_oct16.as_deref();
-        let specular = image.specular.as_ref();
-        Self { samples: image.sample_count(), normal_oct16, specular }
+        Self { samples: image.sample_count(), normal_oct16, specular: image.specular.as_ref() }
     }
+}
 
-    fn reflects(&self) -> bool {
-        self.has_sample(|word| word != 0)
-    }
-
-    fn has_mirrors(&self) -> bool {
-        self.has_sample(|word| word != 0 && ((word >> 24) as f32) < ROUGHEST_MIRROR * 255.0)
-    }
-
+impl ReflectingPlanes<'_> {
     fn has_sample(&self, is_meant: impl Fn(u32) -> bool) -> bool {
         self.specular.is_some_and(|planes| planes.reflectance_srgb8_roughness8.iter().any(|&word| is_meant(word)))
     }
 }
 
-fn check(images: &[Planes<'_>], illumination: &Illumination) -> Result<(), ReconstructionError> {
+fn is_mirror(reflectance_srgb8_roughness8: u32) -> bool {
+    let is_smooth = ((reflectance_srgb8_roughness8 >> 24) as f32) < ROUGHEST_MIRROR * 255.0;
+    reflectance_srgb8_roughness8 != 0 && is_smooth
+}
+
+fn check(images: &[ReflectingPlanes<'_>], illumination: &Illumination) -> Result<(), ReconstructionError> {
     let expected = SpecularPlanes::visibility_planes(illumination.lights.len());
     for (index, image) in images.iter().enumerate() {
         let Some(planes) = image.specular else { continue };
@@ -129,7 +195,7 @@ fn check(images: &[Planes<'_>], illumination: &Illumination) -> Result<(), Recon
 }
 
 /// The words of samples, image after image, in the order of `places` in their images.
-fn ordered(words: &[u32], images: &[Planes<'_>], places: &[u32]) -> Vec<u32> {
+fn ordered(words: &[u32], images: &[ReflectingPlanes<'_>], places: &[u32]) -> Vec<u32> {
     let stride = words.len() / places.len().max(1);
     let mut places = places.iter();
     let mut ordered = Vec::with_capacity(words.len());
@@ -144,7 +210,7 @@ fn ordered(words: &[u32], images: &[Planes<'_>], places: &[u32]) -> Vec<u32> {
 }
 
 /// Sample after sample, image after image; those of images without highlights reflect nothing.
-fn sample_words(images: &[Planes<'_>], visibility_words: usize) -> Vec<u32> {
+fn sample_words(images: &[ReflectingPlanes<'_>], visibility_words: usize) -> Vec<u32> {
     let stride = 4 * sample_texels(visibility_words);
     let mut words = Vec::with_capacity(images.iter().map(|image| image.samples).sum::<usize>() * stride);
     for image in images {

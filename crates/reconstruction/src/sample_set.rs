@@ -12,9 +12,11 @@ use wgpu::{BufferUsages, TextureFormat};
 use crate::bounce::mips::{mip_texels, mips};
 use crate::cube::Cube;
 use crate::pyramid::{CodedDepth, Pyramid, is_among_holes};
+use crate::reconstructor::Reconstructor;
+use crate::reflectors::{ReflectingPlanes, Reflectors};
 use crate::single_pole::{GpuPole, poles};
 use crate::view_work::{GpuSampleCamera, GpuVolume, MAX_SAMPLE_CAMERAS, SetVariant};
-use crate::{error::ReconstructionError, quads::SetMeshes, reflectors::Reflectors, set_description::SetDescription};
+use crate::{error::ReconstructionError, quads::SetMeshes, set_description::SetDescription};
 
 /// The padding of the volume, in parts of its longest edge. All cameras must still enter a surface on the very face of the
 /// volume, although their samples of a slope are steps.
@@ -49,36 +51,15 @@ impl SampleSet {
         SetVariant { cameras: self.cameras.len(), holes: self.uncertain.contains(&true) }
     }
 
-    /// The resources of `background.wgsl`.
-    pub(crate) fn background_bindings(&self) -> Vec<Binding<'_>> {
-        match &self.environment {
-            Some(map) => map.bindings().into_iter().collect(),
-            None => vec![Binding::buffer("background", &self.background)],
-        }
-    }
-
-    /// Builds pyramids and uploads everything. Fails for too many images, planes or cameras that do not fit, images with
-    /// light in place of colour, or a set beyond the device's limits.
-    pub(crate) fn upload(
-        tables: &TablePool,
-        images: &[DepthImage],
-        set: &SetDescription<'_>,
-        turn: Turn,
-    ) -> Result<Self, ReconstructionError> {
-        check(tables, images, set)?;
-        Self::of_images(tables, images, set, turn)
-    }
-
-    /// A layered depth cube, without any other image.
-    pub(crate) fn upload_cube(
-        tables: &TablePool,
-        cube: &CubeImages,
-        set: &SetDescription<'_>,
-        turn: Turn,
-    ) -> Result<Self, ReconstructionError> {
-        check_volume(&set.volume)?;
-        let without_images = Self::of_images(tables, &[], set, turn)?;
-        Ok(Self { cube: Some(Arc::new(Cube::upload(tables, cube, set, turn)?)), ..without_images })
+    /// The tables of its images, and what these reflect.
+    pub(crate) fn image_bindings(&self) -> Vec<Binding<'_>> {
+        let mut bindings = vec![
+            Binding::texture("nodes", &self.nodes),
+            Binding::texture("cell_codes", &self.cell_codes),
+            Binding::texture("cell_colors", &self.cell_colors),
+        ];
+        bindings.extend(self.reflectors.iter().flat_map(Reflectors::bindings));
+        bindings
     }
 
     /// A set of images that were checked, of which there may be none.
@@ -122,6 +103,7 @@ impl SampleSet {
             texels.resize(texels.len().max(1), [0; 2]);
         }
         let searched = searched_volume(&set.volume, images);
+        let reflecting: Vec<ReflectingPlanes<'_>> = images.iter().map(ReflectingPlanes::from).collect();
         let background = gpu::background_bytes(&set.background);
         Ok(Self {
             cameras,
@@ -136,11 +118,42 @@ impl SampleSet {
             nodes: tables.upload("depth pyramids", TextureFormat::Rg32Uint, &nodes, turn)?,
             cell_codes: tables.upload("cells", TextureFormat::Rg32Uint, &codes, turn)?,
             cell_colors: tables.upload("sample colours", TextureFormat::Rg32Uint, &colors, turn)?,
-            reflectors: Reflectors::upload(tables, images, set, turn)?,
+            reflectors: Reflectors::upload(tables, &reflecting, None, set, turn)?,
             environment: set.environment.cloned(),
             meshes: SetMeshes::upload(tables, images, turn)?,
             cube: None,
         })
+    }
+}
+
+impl Reconstructor {
+    /// Puts a sample set on the device: builds pyramids and uploads everything.
+    ///
+    /// # Errors
+    /// Too many images, images, cameras or a volume that cannot be used, light in place of colour, or the device's limits.
+    pub fn upload(
+        &self,
+        images: &[DepthImage],
+        set: &SetDescription<'_>,
+        turn: Turn,
+    ) -> Result<SampleSet, ReconstructionError> {
+        check(&self.tables, images, set)?;
+        SampleSet::of_images(&self.tables, images, set, turn)
+    }
+
+    /// Puts a layered depth cube on the device, with its light field if it has one.
+    ///
+    /// # Errors
+    /// Images that are not those of the grid's lines, a light field or a volume that cannot be used, or the device's limits.
+    pub fn upload_cube(
+        &self,
+        cube: &CubeImages,
+        set: &SetDescription<'_>,
+        turn: Turn,
+    ) -> Result<SampleSet, ReconstructionError> {
+        check_volume(&set.volume)?;
+        let without_images = SampleSet::of_images(&self.tables, &[], set, turn)?;
+        Ok(SampleSet { cube: Some(Arc::new(Cube::upload(&self.tables, cube, set, turn)?)), ..without_images })
     }
 }
 

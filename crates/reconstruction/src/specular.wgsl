@@ -3,10 +3,7 @@
 //
 // The samples around the point tell what a surface reflects: those of the contributing camera that is nearest to
 // the view. A filled pixel shows no surface that a camera saw, and gets no highlight.
-{% include "color.wgsl" %}
-{% include "normal.wgsl" %}
-{% include "light.wgsl" %}
-{% include "highlight.wgsl" %}
+{% include "reflection.wgsl" %}
 {% include "view_work.wgsl" %}
 {% include "cell.wgsl" %}
 
@@ -14,12 +11,8 @@
 @group(0) var<storage, read_write> out_color: array<u32>;
 @group(0) var<storage, read> inverse_depth: array<f32>;
 @group(0) var<storage, read> provenance: array<u32>;
-@group(0) var<uniform> illumination: Illumination;
 {% include "gathered.wgsl" %}
 
-{% if listed %}
-{% include "pixel_list.wgsl" %}
-{% endif %}
 {%- if spawns %}
 {% include "bounce/ray.wgsl" %}
 {% include "bounce/spawn.wgsl" %}
@@ -30,25 +23,17 @@
 
 @compute @workgroup_size({{ "LIST_WORKGROUP" if listed else "TILE_PX, TILE_PX" }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
-{% if listed %}
-    if id.x >= lists[work.view.number].count { return; }
-    let index = listed_pixels[first_listed() + id.x];
-    let pixel = place_of(index);
-{% else %}
-    let pixel = pixel_at(id);
-    if any(pixel >= work.view.size_px) { return; }
-    let index = work.view.first_pixel + pixel.y * work.view.size_px.x + pixel.x;
-{% endif %}
+{% include "at_pixel.wgsl" %}
     let origin = provenance[index];
     if (origin & 0xffu) != PROVENANCE_HIT { return; }
-    let center = vec2f(pixel) + 0.5;
+    let center = vec2f(place) + 0.5;
     let direction = work.view.column_in_world * center.x + work.view.row_in_world * center.y + work.view.corner_in_world;
     let point_in_world = work.view.eye_in_world + direction / inverse_depth[index];
 {% include "gather_at.wgsl" %}
     if around.reflecting <= 0.0 { return; }
     let towards_eye = unit_or_zero(-direction);
-{%- if mirrors %}
     var added = highlight(point_in_world, around.normal, towards_eye, around.reflector, around.visibility) * around.reflecting;
+{%- if mirrors %}
     let mirror = Mirror(point_in_world, around.normal, towards_eye, unpack_reflector(around.reflector));
     let open = {{ "unpack4x8unorm(around.visibility[0]).x" if visibility_words > 0 else "1.0" }};
     let side_m = 1.0 / (inverse_depth[index] * work.view.focal_px);
@@ -63,9 +48,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let rest = around.reflecting * ({{ lobe_share }});
     for (var lists = rest > 0.0; lists; lists = false) { list_glossy(mirror, index, vec3f(rest), open); }
 {%- endif %}
-    out_color[index] = rgb9e5_from_linear(linear_from_rgb9e5(out_color[index]) + added);
-{%- else %}
-    let added = highlight(point_in_world, around.normal, towards_eye, around.reflector, around.visibility);
-    out_color[index] = rgb9e5_from_linear(linear_from_rgb9e5(out_color[index]) + added * around.reflecting);
 {%- endif %}
+    out_color[index] = rgb9e5_from_linear(linear_from_rgb9e5(out_color[index]) + added);
 }

@@ -1,7 +1,6 @@
 //! The vote of all cameras on a point: `surface.wgsl`, the common part of passes that find surfaces.
 
 use gpu::{Binding, ShaderVariant};
-use wgpu::Buffer;
 
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
@@ -25,62 +24,15 @@ pub(crate) const WHOLE: f32 = 0.999;
 /// Where provenance says how two cameras share a colour.
 pub(crate) const SPLIT_SHIFT: u32 = 24;
 
-/// The pixels that a pass finds surfaces for, and where their rays begin.
-#[derive(Clone, Copy)]
-pub(crate) enum Rays<'l> {
-    /// All, from where their tiles start.
-    All,
-    /// Some, from where their tiles start.
-    Listed(&'l PixelList),
-    /// What the pass before left, from where it got.
-    Left(&'l PixelList),
-}
-
-impl<'l> Rays<'l> {
-    pub fn list(self) -> Option<&'l PixelList> {
-        match self {
-            Self::All => None,
-            Self::Listed(list) | Self::Left(list) => Some(list),
-        }
-    }
-}
-
-/// Records a pass that finds surfaces, with its own resources. Gives the pixels that it leaves undecided.
+/// Records a pass that finds the surfaces of listed pixels or of all, with its own resources. Gives the pixels that it leaves
+/// undecided.
 pub(crate) fn record(
     recording: &mut Recording<'_>,
     variant: &impl ShaderVariant,
-    rays: Rays<'_>,
+    listed: Option<&PixelList>,
     own: &[Binding<'_>],
 ) -> Result<PixelList, ReconstructionError> {
     let undecided = recording.empty_list();
-    let batch = &recording.batch;
-    let mut bindings = bindings(recording, &undecided);
-    let starts = batch.tile_start_m.as_ref().filter(|_| !matches!(rays, Rays::Left(_)));
-    bindings.extend(starts.map(|starts| Binding::buffer("tile_start_m", starts)));
-    bindings.extend(batch.targets.iter().flat_map(|drawn| drawn.bindings()));
-    bindings.extend(rays.list().into_iter().flat_map(PixelList::bindings));
-    bindings.extend(own.iter().cloned());
-    let pass = recording.bind(variant, bindings)?;
-    recording.dispatch_pixels(&pass, rays.list());
+    recording.dispatch_pixels(variant, undecided.written_bindings().into_iter().chain(own.iter().cloned()), listed)?;
     Ok(undecided)
-}
-
-/// The resources of `surface.wgsl`.
-pub(crate) fn bindings<'b>(recording: &'b Recording<'_>, undecided: &'b PixelList) -> Vec<Binding<'b>> {
-    let mut bindings = recording.cell_bindings();
-    bindings.push(Binding::texture("cell_colors", &recording.set.cell_colors));
-    bindings.extend(found_bindings(recording.batch.pixel_planes(), undecided));
-    bindings
-}
-
-/// The resources of `found.wgsl`: colours, inverse depths and provenance of what is found, and what stays undecided.
-pub(crate) fn found_bindings<'b>(planes: [&'b Buffer; 3], undecided: &'b PixelList) -> [Binding<'b>; 5] {
-    let [color, inverse_depth, provenance] = planes;
-    [
-        Binding::buffer("out_color", color),
-        Binding::buffer("out_inverse_depth", inverse_depth),
-        Binding::buffer("out_provenance", provenance),
-        Binding::buffer("undecided_pixels", &undecided.pixels),
-        Binding::buffer("undecided", &undecided.lists),
-    ]
 }

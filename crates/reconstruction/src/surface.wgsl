@@ -1,4 +1,7 @@
 // The vote of all cameras on a point: the surfaces that their samples describe around it.
+{% include "color.wgsl" %}
+{% include "view_work.wgsl" %}
+{% include "cell.wgsl" %}
 
 // RGB9E5 of each texel and of the one below it: half the bytes of all four corners of each cell.
 @group(0) var cell_colors: texture_2d<u32>;

@@ -20,10 +20,9 @@ pub(crate) fn record(recording: &mut Recording<'_>) -> Result<(), Reconstruction
     let [across, down] = tiles_of(recording.batch.size_px).to_array();
     let bytes = 4 * u64::from(across * down) * recording.batch.cameras.len() as u64;
     let starts = recording.device.buffers.lend_storage("tile starts", bytes);
-    let own = Binding::buffer("tile_start_m", &starts);
+    let own = [Binding::buffer("tile_start_m", &starts)];
     let variant = TileStart(recording.set.variant());
-    let pass = recording.bind(&variant, recording.view_bindings().into_iter().chain([own]))?;
-    recording.dispatch(&pass, |_| DispatchSize::Invocations([across, rows.div_ceil(TILE_PX), 1]));
+    recording.dispatch(&variant, own, |_| DispatchSize::Invocations([across, rows.div_ceil(TILE_PX), 1]))?;
     recording.batch.tile_start_m = Some(starts);
     Ok(())
 }

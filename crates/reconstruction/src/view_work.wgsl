@@ -66,6 +66,9 @@ struct ViewWork {
 }
 
 @group(0) var<uniform> work: ViewWork;
+{%- if listed is defined and listed %}
+{% include "pixel_list.wgsl" %}
+{%- endif %}
 {%- if cameras > 0 %}
 // Nodes of the pyramids: a range (nearest code low, farthest high), and the nearest code of 2 × 2 nodes.
 @group(0) var nodes: texture_2d<u32>;

@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use depth_image::{
-    Antialias, Camera, DepthImage, LayeredDepthImage, LayeredLightField, LightFieldCamera, ParallelCamera,
-};
+use depth_image::{Antialias, Camera, DepthImage};
 use gpu::Gpu;
 use render::{DrawWork, RenderError, Renderer, SamplePlanes};
 
@@ -62,34 +60,6 @@ impl Sampler {
         let reference = self.hysteresis.reference(&self.renderer, work, test)?;
         let SampleWork { draw, cameras, wanted, planes, .. } = *work;
         Ok(self.renderer.draw_image_sequence(draw, cameras, wanted, planes, test, reference.as_ref())?)
-    }
-
-    /// The layered image of a cube's lines.
-    ///
-    /// # Errors
-    /// A method that has none, a camera that is not valid, or the device.
-    pub fn sample_layers(
-        &self,
-        draw: DrawWork<'_>,
-        camera: &ParallelCamera,
-        method: SamplingMethod,
-    ) -> Result<LayeredDepthImage, SamplingError> {
-        let Some(kept) = method.layer_selection() else {
-            return Err(SamplingError::Cameras { method: method.to_string() });
-        };
-        Ok(self.renderer.draw_layers(draw, camera, kept)?)
-    }
-
-    /// The light field of a scene, under a lighting that follows mirrors.
-    ///
-    /// # Errors
-    /// A camera that is not valid, or the device.
-    pub fn sample_light_field(
-        &self,
-        draw: DrawWork<'_>,
-        camera: &LightFieldCamera,
-    ) -> Result<LayeredLightField, SamplingError> {
-        Ok(self.renderer.draw_light_field(draw, camera)?)
     }
 }
 

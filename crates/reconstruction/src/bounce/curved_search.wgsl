@@ -1,8 +1,5 @@
 // Mirrored rays in images of single-pole cameras, where they are curves: the walk of Rosen et al., section 3.2, in coarse steps,
 // and in fine ones where a coarse step may meet the surface.
-{% include "color.wgsl" %}
-{% include "view_work.wgsl" %}
-{% include "cell.wgsl" %}
 {% include "surface.wgsl" %}
 {% include "pixel_list.wgsl" %}
 {% include "bounce/ray.wgsl" %}

@@ -1,9 +1,6 @@
 // Adds the light at the ends of mirrored rays to the pixels that show the mirrors, and lists the rays off mirrors among
 // those ends.
-{% include "color.wgsl" %}
-{% include "normal.wgsl" %}
-{% include "light.wgsl" %}
-{% include "highlight.wgsl" %}
+{% include "reflection.wgsl" %}
 {% include "view_work.wgsl" %}
 {% include "cell.wgsl" %}
 {% include "bounce/ray.wgsl" %}
@@ -21,7 +18,6 @@
 @group(0) var<storage, read> ray_color: array<u32>;
 @group(0) var<storage, read> inverse_depth: array<f32>;
 @group(0) var<storage, read> provenance: array<u32>;
-@group(0) var<uniform> illumination: Illumination;
 {% if reflects %}
 {% include "gathered.wgsl" %}
 {% endif %}

@@ -1,8 +1,5 @@
 // One ray into the lobe of each rough surface that is listed.
-{% include "color.wgsl" %}
-{% include "normal.wgsl" %}
-{% include "light.wgsl" %}
-{% include "highlight.wgsl" %}
+{% include "reflection.wgsl" %}
 {% include "sequence.wgsl" %}
 {% include "lobe.wgsl" %}
 {% include "bounce/ray.wgsl" %}
@@ -10,7 +7,6 @@
 {% include "bounce/glossy.wgsl" %}
 {% include "bounce/lobe_rays.wgsl" %}
 
-@group(0) var<uniform> illumination: Illumination;
 @group(0) var<storage, read> glossy: array<GlossySurface>;
 struct GlossyList { workgroups: u32, y: u32, z: u32, count: u32 }
 @group(0) var<storage, read> glossy_list: GlossyList;

@@ -1,7 +1,5 @@
+{% set bounced = true -%}
 // The march of mirrored rays, from image to image around the mirror; what it leaves goes to joint_carve.wgsl.
-{% include "color.wgsl" %}
-{% include "view_work.wgsl" %}
-{% include "cell.wgsl" %}
 {% include "surface.wgsl" %}
 {% include "pixel_list.wgsl" %}
 {% include "bounce/ray.wgsl" %}

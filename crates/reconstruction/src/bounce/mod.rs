@@ -5,12 +5,11 @@ mod curved_search;
 pub(crate) mod mips;
 mod mirror_cells;
 
+use std::ops::RangeInclusive;
+
 use bytemuck::{Pod, Zeroable};
 use depth_image::{Highlight, MAX_MIRROR_CELLS};
-use gpu::{
-    Binding, GpuEnvironment, GpuError, PooledBuffer, ResourceTraits, ShaderVariant, highlight_name, light_slots,
-    uniform_elements,
-};
+use gpu::{Binding, GpuError, PooledBuffer, ResourceTraits, ShaderVariant, shader_variant, uniform_elements};
 use minijinja::{Value, context};
 use wgpu::{Buffer, BufferUsages};
 
@@ -21,10 +20,9 @@ pub use mirror_cells::{MirrorCell, Mirrors};
 
 use crate::methods::joint_carve::Carve;
 use crate::pixel_list::{GpuPixelList, LIST_WORKGROUP, PixelList, empty_lists};
-use crate::recording::nearest_first;
-use crate::reflectors::sample_texels;
+use crate::recording::{nearest_first, plane_bindings};
+use crate::reflectors::Reflection;
 use crate::single_pole::GpuPole;
-use crate::surface::found_bindings;
 use crate::view_work::{GpuSampleCamera, GpuViewCamera, GpuViewWork, ONE_VIEW, SetVariant};
 use crate::{device::Device, error::ReconstructionError, recording::Recording};
 
@@ -182,6 +180,26 @@ impl<'s> Bounces<'s> {
         RayLists { lists, memory: before.map_or(0, |before| 1 - before.memory) }
     }
 
+    /// Records what follows the rays of each cell, and those off the mirrors that they meet, mirror after mirror.
+    pub fn each_mirror(
+        &self,
+        recording: &mut Recording<'_>,
+        first: RayLists,
+        reflections: RangeInclusive<u32>,
+        mut follow: impl FnMut(&mut Recording<'_>, CellRays<'_>) -> Result<(), ReconstructionError>,
+    ) -> Result<(), ReconstructionError> {
+        let mut lists = first;
+        for reflection in reflections.clone() {
+            let next = (reflection < *reflections.end()).then(|| self.next(recording.device, Some(&lists)));
+            for cell in 0..self.cells.len() {
+                follow(recording, CellRays { lists: &lists, next: next.as_ref(), cell, reflection })?;
+            }
+            let Some(next) = next else { break };
+            lists = next;
+        }
+        Ok(())
+    }
+
     /// The resources of `bounce/list.wgsl`.
     pub fn spawn_bindings<'b>(&'b self, next: &'b RayLists) -> [Binding<'b>; 4] {
         [
@@ -218,62 +236,31 @@ impl<'s> Bounces<'s> {
         ]
     }
 
-    /// The images of a cell: the resources of `view_work.wgsl`, `cell.wgsl`, `colors.wgsl` and `single_pole.wgsl`.
-    fn image_bindings(&self, cell: usize) -> Vec<Binding<'_>> {
-        let set = self.cells[cell].surroundings;
-        let mut bindings = vec![
-            Binding::buffer("work", &self.works[cell]),
-            Binding::texture("nodes", &set.nodes),
-            Binding::texture("cell_codes", &set.cell_codes),
-            Binding::texture("cell_colors", &set.cell_colors),
-        ];
-        bindings.extend(self.poles[cell].as_ref().map(|poles| Binding::buffer("poles", poles)));
-        bindings
-    }
-
     /// A list of rays that one pass leaves to the next, in the memory of this number.
     fn left(&self, device: &Device, memory: usize) -> PixelList {
         PixelList::empty(&device.gpu, (*self.listed[memory]).clone(), self.cells.len())
     }
 
-    /// The resources of `surface.wgsl` for the rays of a cell, which leave some to a list.
-    fn search_bindings<'b>(&'b self, cell: usize, left: &'b PixelList) -> Vec<Binding<'b>> {
-        let mut bindings = self.image_bindings(cell);
-        bindings.extend(found_bindings(self.planes.each_ref().map(|plane| &**plane), left));
+    /// The listed rays of a cell, and its images.
+    fn cell_bindings<'b>(&'b self, rays: &CellRays<'b>) -> Vec<Binding<'b>> {
+        let mut bindings = self.cells[rays.cell].surroundings.image_bindings();
+        bindings.push(Binding::buffer("work", &self.works[rays.cell]));
+        bindings.extend(self.poles[rays.cell].as_ref().map(|poles| Binding::buffer("poles", poles)));
+        bindings.extend(self.list_bindings(rays.lists));
         bindings
     }
 }
 
-/// The switches of `bounce/march.wgsl`.
-#[derive(Debug)]
-pub(crate) struct BounceMarch(SetVariant);
-
-impl ShaderVariant for BounceMarch {
-    const TEMPLATE: &'static str = "bounce/march.wgsl";
-    const TRAITS: ResourceTraits = ONE_VIEW;
-
-    fn context(&self) -> Value {
-        context! { bounced => true, ..self.0.context() }
-    }
-
-    fn all() -> Vec<Self> {
-        SetVariant::all().into_iter().map(Self).collect()
-    }
-}
+shader_variant!(BounceMarch(SetVariant), "bounce/march.wgsl", ONE_VIEW);
 
 /// The switches of `bounce/land.wgsl`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(crate) struct Land {
     set: SetVariant,
-    /// Mirrors among the ends of rays list the next rays; the number of lists.
-    next_cells: Option<usize>,
-    /// The cell's images have reflectors.
-    reflects: bool,
     /// The cell's images are those of single-pole cameras.
     single_pole: bool,
-    lights: usize,
-    environment_map: bool,
-    visibility_words: usize,
+    /// Of the cell's images, under the light of the view.
+    reflection: Reflection,
 }
 
 impl ShaderVariant for Land {
@@ -281,40 +268,17 @@ impl ShaderVariant for Land {
     const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
-        context! {
-            highlight => highlight_name(Highlight::Ggx),
-            mirrors => self.next_cells.is_some(),
-            mirror_cells => self.next_cells.unwrap_or(0),
-            reflects => self.reflects,
-            single_pole => self.single_pole,
-            light_slots => light_slots(self.lights),
-            environment_map => self.environment_map,
-            visibility_words => self.visibility_words,
-            sample_texels => sample_texels(self.visibility_words),
-            ..self.set.context()
-        }
+        context! { single_pole => self.single_pole, ..self.reflection.context(self.set) }
     }
 
     fn all() -> Vec<Self> {
-        let cells = [(None, false), (None, true), (Some(1), true), (Some(MAX_RAY_LISTS), true)];
         let mut all = Vec::new();
         for set in SetVariant::all() {
-            for (next_cells, reflects) in cells {
-                for (lights, visibility_words) in [(0, 0), (3, 1), (255, 64)] {
-                    all.extend([false, true].map(|environment_map| Self {
-                        set,
-                        next_cells,
-                        reflects,
-                        single_pole: false,
-                        lights,
-                        environment_map,
-                        visibility_words,
-                    }));
-                }
+            let all_lit = Reflection::all().into_iter();
+            for reflection in all_lit.filter(|lit| lit.highlight != Some(Highlight::BlinnPhong)) {
+                all.extend([false, true].map(|single_pole| Self { set, single_pole, reflection }));
             }
         }
-        let single_poles = all.clone().into_iter().filter(|land| land.lights == 3 && !land.environment_map);
-        all.extend(single_poles.map(|land| Self { single_pole: true, ..land }));
         all
     }
 }
@@ -339,22 +303,18 @@ pub(crate) fn follow(
     let CellRays { lists, cell, reflection, .. } = rays;
     let set = bounces.cells[cell].surroundings.variant();
     let unknown = bounces.left(recording.device, 3);
-    let mut bindings = bounces.search_bindings(cell, &unknown);
+    let mut own = bounces.cell_bindings(&rays);
+    own.extend(plane_bindings(bounces.planes.each_ref().map(|plane| &**plane)));
+    let found = unknown.written_bindings().into_iter().chain(own.iter().cloned());
     if bounces.poles[cell].is_some() {
-        bindings.extend(bounces.list_bindings(lists));
-        let walk = recording.bind(&CurvedWalk(set), bindings)?;
-        recording.dispatch_listed(&walk, &lists.lists, cell, (cell, reflection));
-        return Ok(());
+        return recording.dispatch_listed(&CurvedWalk(set), found, &lists.lists, cell, (cell, reflection));
     }
     let left = bounces.left(recording.device, 2);
-    let march_bindings = bounces.search_bindings(cell, &left).into_iter().chain(bounces.list_bindings(lists));
-    let march = recording.bind(&BounceMarch(set), march_bindings)?;
-    recording.dispatch_listed(&march, &lists.lists, cell, (cell, reflection));
-    bindings.push(Binding::buffer("rays", &bounces.rays[lists.memory]));
-    bindings.extend(left.bindings());
-    let carve = recording.bind(&Carve { set, stop_level: 0, bounced: true }, bindings)?;
-    recording.dispatch_listed(&carve, &left.lists, cell, (cell, reflection));
-    Ok(())
+    let marched = left.written_bindings().into_iter().chain(own.iter().cloned());
+    recording.dispatch_listed(&BounceMarch(set), marched, &lists.lists, cell, (cell, reflection))?;
+    let carved = left.bindings().into_iter().chain(found);
+    let carve = Carve { set, stop_level: 0, bounced: true };
+    recording.dispatch_listed(&carve, carved, &left.lists, cell, (cell, reflection))
 }
 
 /// Adds what the rays of a cell found to their pixels.
@@ -363,7 +323,7 @@ pub(crate) fn land(
     bounces: &Bounces<'_>,
     rays: CellRays<'_>,
 ) -> Result<(), ReconstructionError> {
-    let CellRays { lists, next, cell, reflection } = rays;
+    let CellRays { lists, next, cell, .. } = rays;
     let set = bounces.cells[cell].surroundings;
     // Rays come from reflectors: of the view's images, or of the base alone.
     let base = bounces.cells.last().and_then(|cell| reflectors_of_cube(cell.surroundings));
@@ -371,34 +331,25 @@ pub(crate) fn land(
     let reflectors = set.reflectors.as_ref().filter(|reflectors| {
         reflectors.highlight == view_reflectors.highlight && reflectors.lights == view_reflectors.lights
     });
-    let environment = recording.set.environment.as_deref();
-    let variant = Land {
-        set: set.variant(),
-        next_cells: next.filter(|_| reflectors.is_some()).map(|_| bounces.cells.len()),
-        reflects: reflectors.is_some(),
-        single_pole: !set.poles.is_empty(),
+    let has_map = recording.set.environment.is_some();
+    let mirror_cells = next.map(|_| bounces.cells.len());
+    let reflection = Reflection {
         lights: view_reflectors.lights,
-        environment_map: environment.is_some(),
-        visibility_words: reflectors.map_or(0, |reflectors| reflectors.visibility_words),
+        environment_map: has_map,
+        ..Reflection::of(reflectors, mirror_cells, None, has_map)
     };
+    let variant = Land { set: set.variant(), single_pole: !set.poles.is_empty(), reflection };
     let [ray_color, inverse_depth, provenance] = &bounces.planes;
-    let mut bindings = bounces.image_bindings(cell);
-    bindings.extend([
-        Binding::buffer("out_color", &recording.batch.color),
-        Binding::buffer("out_provenance", &recording.batch.provenance),
+    let mut own = vec![
         Binding::buffer("ray_color", ray_color),
         Binding::buffer("inverse_depth", inverse_depth),
         Binding::buffer("provenance", provenance),
+        // Before that of the cell's images.
         Binding::buffer("illumination", &view_reflectors.illumination),
-    ]);
-    bindings.extend(reflectors.map(|reflectors| Binding::texture("samples", &reflectors.samples)));
-    bindings.extend(environment.into_iter().flat_map(GpuEnvironment::bindings));
-    bindings.extend(bounces.list_bindings(lists));
-    let next = next.filter(|_| variant.next_cells.is_some());
-    bindings.extend(next.into_iter().flat_map(|next| bounces.spawn_bindings(next)));
-    let pass = recording.bind(&variant, bindings)?;
-    recording.dispatch_listed(&pass, &lists.lists, cell, (cell, reflection));
-    Ok(())
+    ];
+    own.extend(bounces.cell_bindings(&rays));
+    own.extend(next.into_iter().flat_map(|next| bounces.spawn_bindings(next)));
+    recording.dispatch_listed(&variant, own, &lists.lists, cell, (cell, rays.reflection))
 }
 
 /// `Poles` of `single_pole.wgsl`, in the order of the cell's `cameras`; `None` of pinholes.

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use depth_image::{LayeredLightField, LightDirection, LightDirections, LightFieldCamera};
 use glam::{IVec3, Vec3};
-use gpu::{Binding, Table, TablePool, Turn};
+use gpu::{Table, TablePool, Turn};
 use rayon::prelude::*;
 use wgpu::{BufferUsages, TextureFormat};
 
@@ -52,11 +52,9 @@ impl GpuLightField {
 
 /// A light field, ready to be gathered in.
 pub(crate) struct LightField {
-    own: wgpu::Buffer,
-    directions: Table,
-    orders: Table,
-    lines: Table,
-    samples: Table,
+    pub own: wgpu::Buffer,
+    /// With their names in `cube/gather.wgsl`.
+    pub tables: [(&'static str, Table); 4],
 }
 
 impl LightField {
@@ -77,24 +75,19 @@ impl LightField {
         let mut samples: Vec<[u32; 2]> = samples.map(|(depth_m, &radiance)| [depth_m.to_bits(), radiance]).collect();
         // A table has one texel at least.
         samples.resize(samples.len().max(1), [0; 2]);
+        let orders = orders(camera.directions);
         Ok(Self {
             own: tables.gpu.buffer_with("light field", &[GpuLightField::of(camera)], BufferUsages::UNIFORM),
-            directions: tables.upload("directions of a light field", TextureFormat::Rgba32Uint, &rows, turn)?,
-            orders: tables.upload("orders of directions", TextureFormat::R32Uint, &orders(camera.directions), turn)?,
-            lines: tables.upload("lines of a light field", TextureFormat::Rg32Uint, &lines, turn)?,
-            samples: tables.upload("samples of a light field", TextureFormat::Rg32Uint, &samples, turn)?,
+            tables: [
+                (
+                    "light_directions",
+                    tables.upload("directions of a light field", TextureFormat::Rgba32Uint, &rows, turn)?,
+                ),
+                ("light_orders", tables.upload("orders of directions", TextureFormat::R32Uint, &orders, turn)?),
+                ("light_lines", tables.upload("lines of a light field", TextureFormat::Rg32Uint, &lines, turn)?),
+                ("light_samples", tables.upload("samples of a light field", TextureFormat::Rg32Uint, &samples, turn)?),
+            ],
         })
-    }
-
-    /// The resources of `cube/gather.wgsl`.
-    pub fn bindings(&self) -> [Binding<'_>; 5] {
-        [
-            Binding::buffer("light_field", &self.own),
-            Binding::texture("light_directions", &self.directions),
-            Binding::texture("light_orders", &self.orders),
-            Binding::texture("light_lines", &self.lines),
-            Binding::texture("light_samples", &self.samples),
-        ]
     }
 }
 

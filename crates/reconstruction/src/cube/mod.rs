@@ -19,7 +19,8 @@ pub(crate) use links::links;
 pub(crate) use samples::{CubeSamples, Links};
 
 use self::bricks::Bricks;
-use crate::{error::ReconstructionError, reflectors::Reflectors, set_description::SetDescription};
+use crate::reflectors::{ReflectingPlanes, Reflectors};
+use crate::{error::ReconstructionError, set_description::SetDescription};
 
 /// A ray steps this far into the next box, in spacings: more than the rounding of coordinates within the largest cube.
 pub(crate) const WALK_NUDGE: f32 = 2e-3;
@@ -48,11 +49,8 @@ pub(crate) struct GpuCube {
 /// A layered depth cube, ready to be walked through.
 pub(crate) struct Cube {
     own: wgpu::Buffer,
-    cells: Table,
-    bricks: Table,
-    leaves: Table,
-    entries: Table,
-    samples: Table,
+    /// With their names in shaders.
+    tables: [(&'static str, Table); 5],
     /// A ray straight off a surface meets nothing nearer.
     pub start_m: f32,
     /// Some line has met more surfaces than it holds.
@@ -81,6 +79,7 @@ impl Cube {
         let samples = CubeSamples::of(grid, images);
         let bricks = Bricks::of(&samples);
         let words = samples.words(&links(&samples));
+        let reflecting = images.each_ref().map(ReflectingPlanes::from);
         let start_m = START_SPACINGS * grid.spacing_m;
         let cube = GpuCube {
             cube_from_world: cube_from_world(grid),
@@ -92,28 +91,29 @@ impl Cube {
         };
         Ok(Self {
             own: tables.gpu.buffer_with("cube", &[cube], BufferUsages::UNIFORM),
-            cells: tables.upload("cells of a cube", TextureFormat::R32Uint, &bricks.cells, turn)?,
-            bricks: tables.upload("bricks of a cube", TextureFormat::Rgba32Uint, &bricks.bricks, turn)?,
-            leaves: tables.upload("leaves of a cube", TextureFormat::Rgba32Uint, &bricks.leaves, turn)?,
-            entries: tables.upload("entries of a cube", TextureFormat::Rgba32Uint, &bricks.entries, turn)?,
-            samples: tables.upload("samples of a cube", TextureFormat::Rgba32Uint, &words, turn)?,
-            reflectors: Reflectors::of_cube(tables, images, &samples.place, set, turn)?,
+            tables: [
+                ("cube_cells", tables.upload("cells of a cube", TextureFormat::R32Uint, &bricks.cells, turn)?),
+                ("cube_bricks", tables.upload("bricks of a cube", TextureFormat::Rgba32Uint, &bricks.bricks, turn)?),
+                ("cube_leaves", tables.upload("leaves of a cube", TextureFormat::Rgba32Uint, &bricks.leaves, turn)?),
+                ("cube_entries", tables.upload("entries of a cube", TextureFormat::Rgba32Uint, &bricks.entries, turn)?),
+                ("cube_samples", tables.upload("samples of a cube", TextureFormat::Rgba32Uint, &words, turn)?),
+            ],
+            reflectors: Reflectors::upload(tables, &reflecting, Some(&samples.place), set, turn)?,
             start_m,
             light_field: light_field.as_ref().map(|field| LightField::upload(tables, field, turn)).transpose()?,
             truncated: images.iter().any(|image| image.truncated),
         })
     }
 
-    /// The resources of `cube/walk.wgsl` and `cube/colors.wgsl`.
-    pub fn bindings(&self) -> [Binding<'_>; 6] {
-        [
-            Binding::buffer("cube", &self.own),
-            Binding::texture("cube_cells", &self.cells),
-            Binding::texture("cube_bricks", &self.bricks),
-            Binding::texture("cube_leaves", &self.leaves),
-            Binding::texture("cube_entries", &self.entries),
-            Binding::texture("cube_samples", &self.samples),
-        ]
+    /// The resources of passes that walk through it, show what its samples reflect, or gather in its light field.
+    pub fn bindings(&self) -> Vec<Binding<'_>> {
+        let mut bindings = vec![Binding::buffer("cube", &self.own)];
+        let field = self.light_field.as_ref();
+        bindings.extend(field.map(|field| Binding::buffer("light_field", &field.own)));
+        let tables = self.tables.iter().chain(field.into_iter().flat_map(|field| &field.tables));
+        bindings.extend(tables.map(|(name, table)| Binding::texture(name, table)));
+        bindings.extend(self.reflectors.iter().flat_map(Reflectors::bindings));
+        bindings
     }
 }
 

@@ -7,9 +7,8 @@ use gpu::{ResourceTraits, ShaderVariant};
 use minijinja::{Value, context};
 
 use self::march::{MARCHES, March};
-use crate::surface::{self, Rays};
 use crate::view_work::{ONE_VIEW, SetVariant};
-use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, surface};
 
 pub(super) const MAX_STOP_LEVEL: u32 = 8;
 /// Moves of a ray after its marches.
@@ -58,10 +57,9 @@ pub(super) fn record(
     let set = recording.set.variant();
     let mut undecided: Option<PixelList> = None;
     for camera in 0..MARCHES.min(recording.set.cameras.len()) {
-        let rays = undecided.as_ref().map(Rays::Left).or(listed.map(Rays::Listed)).unwrap_or(Rays::All);
-        let march = March { set, camera, listed: rays.list().is_some() };
-        undecided = Some(surface::record(recording, &march, rays, &[])?);
+        let listed = undecided.as_ref().or(listed);
+        let march = March { set, camera, listed: listed.is_some() };
+        undecided = Some(surface::record(recording, &march, listed, &[])?);
     }
-    let left = undecided.as_ref().map_or(Rays::All, Rays::Left);
-    surface::record(recording, &Carve { set, stop_level, bounced: false }, left, &[])
+    surface::record(recording, &Carve { set, stop_level, bounced: false }, undecided.as_ref(), &[])
 }

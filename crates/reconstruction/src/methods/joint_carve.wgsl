@@ -6,9 +6,6 @@
 // be farther away proves the way to the node's edge empty, and t moves there. Where all cameras show
 // everything nearer, nothing is known, and t moves on. Else a finer level decides; at the finest the ray
 // meets the patches between samples.
-{% include "color.wgsl" %}
-{% include "view_work.wgsl" %}
-{% include "cell.wgsl" %}
 {% include "surface.wgsl" %}
 {% include "pixel_list.wgsl" %}
 {%- if bounced %}

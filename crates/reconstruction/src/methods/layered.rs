@@ -3,22 +3,20 @@
 use std::ops::RangeInclusive;
 
 use depth_image::{Highlight, MAX_REFLECTIONS};
-use gpu::{Binding, GpuEnvironment, ResourceTraits, ShaderVariant, highlight_name, light_slots, switches};
+use gpu::{Binding, ResourceTraits, ShaderVariant};
 use minijinja::{Value, context};
 
-use crate::bounce::{Bounces, CellRays, MAX_RAY_LISTS, RayLists};
-use crate::cube::{Cube, LightField};
-use crate::lobes::{self, GlossyList, LobeLight};
-use crate::reflectors::sample_texels;
-use crate::surface::found_bindings;
+use crate::bounce::{Bounces, CellRays, RayLists};
+use crate::cube::Cube;
+use crate::lobes::{self, GlossyList, LobeLight, LobeSum};
+use crate::reflectors::Reflection;
 use crate::view_work::{ONE_VIEW, SetVariant};
 use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
 /// The rays that are walked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Walked {
     /// Those of all pixels.
-    #[default]
     Pixels,
     /// Those of pixels that another method leaves: the cube is the base beside its images.
     LeftPixels,
@@ -31,6 +29,18 @@ pub(crate) enum Walked {
 }
 
 impl Walked {
+    const ALL: [Self; 5] = [Self::Pixels, Self::LeftPixels, Self::Bounced, Self::IntoLobes, Self::LeftBounced];
+
+    /// Of those that stand for all, the ways to light the lobes that the rays meet.
+    fn lobes(self) -> &'static [LobeLight] {
+        match self {
+            Self::Pixels => &LobeLight::ALL,
+            Self::LeftPixels => &[LobeLight::SentRest, LobeLight::Sent],
+            Self::Bounced => &[LobeLight::GatheredMirrors],
+            Self::IntoLobes | Self::LeftBounced => &[],
+        }
+    }
+
     fn is_bounced(self) -> bool {
         matches!(self, Self::Bounced | Self::IntoLobes | Self::LeftBounced)
     }
@@ -41,7 +51,7 @@ impl Walked {
 }
 
 /// The switches of `layered.wgsl`.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug)]
 pub(crate) struct Walk {
     set: SetVariant,
     rays: Walked,
@@ -49,14 +59,7 @@ pub(crate) struct Walk {
     in_base: bool,
     /// What a ray does not meet may be a surface that the cube does not hold.
     truncated: bool,
-    /// The formula of highlights, where samples have any.
-    highlight: Option<Highlight>,
-    /// Mirrors list the rays off them; the number of lists.
-    mirror_cells: Option<usize>,
-    lobe: Option<LobeLight>,
-    lights: usize,
-    environment_map: bool,
-    visibility_words: usize,
+    reflection: Reflection,
 }
 
 impl Walk {
@@ -67,54 +70,16 @@ impl Walk {
         spawning: Option<&Bounces<'_>>,
         lobe: Option<LobeLight>,
     ) -> Self {
-        let reflectors = cube.reflectors.as_ref();
-        let highlight = reflectors.map(|reflectors| reflectors.highlight);
+        let has_map = recording.set.environment.is_some();
         let in_base = recording.set.cube.is_none();
-        // Blinn-Phong surfaces mirror lamps only.
-        let is_mapped =
-            (highlight == Some(Highlight::Ggx) || in_base && rays.is_bounced()) && recording.set.environment.is_some();
+        let mirror_cells = spawning.map(|bounces| bounces.cells.len());
+        // Mirrors of a matt base are not in it.
+        let of_cube = Reflection::of(cube.reflectors.as_ref(), mirror_cells, lobe, has_map);
+        let environment_map = of_cube.environment_map || in_base && rays.is_bounced() && has_map;
         // Rays off mirrors see no image of the view's set.
         let set = if rays.is_bounced() { SetVariant::CUBE } else { recording.set.variant() };
-        Self {
-            set,
-            rays,
-            in_base,
-            truncated: cube.truncated,
-            highlight,
-            // Mirrors of a matt base are not in it.
-            mirror_cells: spawning.filter(|_| highlight == Some(Highlight::Ggx)).map(|bounces| bounces.cells.len()),
-            lobe: lobe.filter(|_| highlight == Some(Highlight::Ggx)),
-            lights: reflectors.map_or(0, |reflectors| reflectors.lights),
-            environment_map: is_mapped,
-            visibility_words: reflectors.map_or(0, |reflectors| reflectors.visibility_words),
-        }
-    }
-
-    /// The same in a base, beside four images.
-    fn of_base(self) -> Vec<Self> {
-        let mirror_cells = self.mirror_cells.map(|_| MAX_RAY_LISTS);
-        let base = Self { in_base: true, mirror_cells, ..self };
-        match self.rays {
-            Walked::Pixels | Walked::LeftPixels => {
-                vec![Self { rays: Walked::LeftPixels, set: SetVariant { cameras: 4, ..self.set }, ..base }]
-            }
-            Walked::Bounced | Walked::LeftBounced => {
-                [Walked::Bounced, Walked::LeftBounced].map(|rays| Self { rays, ..base }).to_vec()
-            }
-            Walked::IntoLobes => vec![Self { in_base: true, ..self }],
-        }
-    }
-
-    /// The same with all ways to light lobes.
-    fn with_lobes(self) -> impl Iterator<Item = Self> {
-        let may_gather = self.rays != Walked::IntoLobes;
-        let shows_all = !self.rays.is_bounced();
-        let lobes = LobeLight::ALL.into_iter();
-        let lobes = lobes.filter(move |&lobe| may_gather && (shows_all || lobe == LobeLight::GatheredMirrors));
-        lobes.map(move |lobe| {
-            let follows = matches!(lobe, LobeLight::GatheredRest | LobeLight::SentRest);
-            Self { mirror_cells: follows.then_some(1), lobe: Some(lobe), ..self }
-        })
+        let reflection = Reflection { environment_map, ..of_cube };
+        Self { set, rays, in_base, truncated: cube.truncated, reflection }
     }
 }
 
@@ -126,48 +91,26 @@ impl ShaderVariant for Walk {
         context! {
             bounced => self.rays.is_bounced(),
             left => self.rays.is_left(),
+            listed => self.rays != Walked::Pixels,
             in_base => self.in_base,
             into_lobes => self.rays == Walked::IntoLobes,
             truncated => self.truncated,
-            reflects => self.highlight.is_some(),
-            highlight => highlight_name(self.highlight.unwrap_or(Highlight::Ggx)),
-            mirrors => self.mirror_cells.is_some() || self.lobe.is_some(),
-            spawns => self.mirror_cells.is_some(),
-            gathers => self.lobe.is_some_and(|lobe| !lobe.is_sent()),
-            lists_glossy => self.lobe.is_some_and(LobeLight::is_sent),
-            lobe_share => self.lobe.map_or("0.0", LobeLight::share),
-            glossy => self.lobe.is_some_and(|lobe| lobe != LobeLight::GatheredMirrors),
-            mirror_cells => self.mirror_cells.unwrap_or(0),
-            light_slots => light_slots(self.lights),
-            environment_map => self.environment_map,
-            visibility_words => self.visibility_words,
-            sample_texels => sample_texels(self.visibility_words),
-            single_pole => false,
-            ..self.set.context()
+            ..self.reflection.context(self.set)
         }
     }
 
     fn all() -> Vec<Self> {
-        let mut all = [false, true].map(|truncated| Self { truncated, ..Self::default() }).to_vec();
-        for (lights, visibility_words) in [(0, 0), (3, 1), (255, 64)] {
-            for [truncated, environment_map] in switches() {
-                let with = Self { truncated, lights, visibility_words, ..Self::default() };
-                for rays in [Walked::Pixels, Walked::Bounced, Walked::IntoLobes] {
-                    let ggx = Self { rays, highlight: Some(Highlight::Ggx), environment_map, ..with };
-                    all.extend([ggx, Self { mirror_cells: Some(1), ..ggx }]);
-                    all.extend(ggx.with_lobes());
+        let mut all = Vec::new();
+        for rays in Walked::ALL {
+            let set = SetVariant { cameras: if rays == Walked::LeftPixels { 4 } else { 0 }, holes: false };
+            let all_lit = Reflection::all().into_iter();
+            for reflection in all_lit.filter(|lit| !rays.is_bounced() || lit.highlight != Some(Highlight::BlinnPhong)) {
+                for reflection in reflection.with_lobes(rays.lobes()) {
+                    for truncated in [false, true] {
+                        all.push(Self { set, rays, in_base: truncated || rays.is_left(), truncated, reflection });
+                    }
                 }
-                let blinn_phong = Self { highlight: Some(Highlight::BlinnPhong), ..with };
-                all.extend((!environment_map).then_some(blinn_phong));
             }
-        }
-        let left = all.iter().filter(|walk| walk.lights <= 3 && walk.lobe.is_none()).flat_map(|walk| walk.of_base());
-        let left: Vec<Self> = left.collect();
-        all.extend(left);
-        for [truncated, environment_map] in switches() {
-            let without_reflectors = Self { in_base: true, truncated, environment_map, ..Self::default() };
-            let bounced = [Walked::Bounced, Walked::IntoLobes, Walked::LeftBounced];
-            all.extend(bounced.map(|rays| Self { rays, ..without_reflectors }));
         }
         all
     }
@@ -214,7 +157,7 @@ pub(crate) fn follow_lobes(
         let generations = MAX_REFLECTIONS + 1..=MAX_REFLECTIONS + bounces.reflections.max(1);
         follow_mirrors(recording, cube, bounces, first, Ends { gathered: None, lobes: Some(glossy) }, generations)?;
     }
-    lobes::record_sum(recording, glossy)
+    recording.dispatch_listed(&LobeSum, glossy.bindings(), &glossy.list, 0, ())
 }
 
 /// Records the walk of listed rays, and of those off the mirrors that they meet; what the last mirrors show may be gathered.
@@ -222,36 +165,20 @@ fn follow_mirrors(
     recording: &mut Recording<'_>,
     cube: &Cube,
     bounces: &Bounces<'_>,
-    mut lists: RayLists,
+    first: RayLists,
     ends: Ends<'_>,
     generations: RangeInclusive<u32>,
 ) -> Result<(), ReconstructionError> {
     let walked = if ends.lobes.is_some() { Walked::IntoLobes } else { Walked::Bounced };
-    for generation in generations.clone() {
-        let next = (generation < *generations.end()).then(|| bounces.next(recording.device, Some(&lists)));
-        let gathered = ends.gathered.filter(|_| next.is_none());
-        let rays = CellRays { lists: &lists, next: next.as_ref(), cell: 0, reflection: generation };
-        follow(recording, cube, bounces, rays, walked, Ends { gathered, ..ends })?;
-        let Some(next) = next else { break };
-        lists = next;
-    }
-    Ok(())
+    bounces.each_mirror(recording, first, generations, |recording, rays| {
+        let gathered = ends.gathered.filter(|_| rays.next.is_none());
+        follow(recording, cube, bounces, rays, walked, Ends { gathered, ..ends })
+    })
 }
 
-/// Records the walk of pixels that another method leaves, in the cube beside its images. Mirrors list the rays off them, and rough
-/// surfaces are listed where their lobes are sent rays. Gives those that stay unknown.
-pub(crate) fn record_left(
-    recording: &mut Recording<'_>,
-    base: &Cube,
-    left: &PixelList,
-    mirrored: Option<(&Bounces<'_>, &RayLists)>,
-    glossy: Option<&GlossyList<'_>>,
-) -> Result<PixelList, ReconstructionError> {
-    let lobe = glossy.map(|_| LobeLight::sent(mirrored.is_some()));
-    walk_pixels(recording, base, Some(left), mirrored, lobe, glossy)
-}
-
-fn walk_pixels(
+/// Records the walk of all pixels or, in the cube beside its images, of those that another method leaves. Mirrors list the rays
+/// off them, and rough surfaces are listed where their lobes are sent rays. Gives the pixels that stay unknown.
+pub(crate) fn walk_pixels(
     recording: &mut Recording<'_>,
     cube: &Cube,
     listed: Option<&PixelList>,
@@ -262,15 +189,11 @@ fn walk_pixels(
     let undecided = recording.empty_list();
     let rays = if listed.is_some() { Walked::LeftPixels } else { Walked::Pixels };
     let variant = Walk::of(recording, cube, rays, mirrored.map(|(bounces, _)| bounces), lobe);
-    let mut bindings = recording.view_bindings();
-    bindings.extend(shared_bindings(recording, cube, &variant));
-    bindings.extend(found_bindings(recording.batch.pixel_planes(), &undecided));
-    bindings.extend(listed.into_iter().flat_map(PixelList::bindings));
-    let spawning = mirrored.filter(|_| variant.mirror_cells.is_some());
-    bindings.extend(spawning.into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
-    bindings.extend(sent.filter(|_| variant.lobe.is_some()).into_iter().flat_map(GlossyList::bindings));
-    let pass = recording.bind(&variant, bindings)?;
-    recording.dispatch_pixels(&pass, listed);
+    let mut own = cube.bindings();
+    own.extend(undecided.written_bindings());
+    own.extend(mirrored.into_iter().flat_map(|(bounces, next)| bounces.spawn_bindings(next)));
+    own.extend(sent.into_iter().flat_map(GlossyList::bindings));
+    recording.dispatch_pixels(&variant, own, listed)?;
     Ok(undecided)
 }
 
@@ -293,33 +216,11 @@ pub(crate) fn follow(
     ends: Ends<'_>,
 ) -> Result<(), ReconstructionError> {
     let variant = Walk::of(recording, cube, walked, rays.next.map(|_| bounces), ends.gathered);
-    let mut bindings = shared_bindings(recording, cube, &variant);
     let [_, _, ray_provenance] = &bounces.planes;
-    bindings.extend([
-        Binding::buffer("work", &bounces.works[rays.cell]),
-        ends.lobes.map_or(Binding::buffer("out_color", &recording.batch.color), |glossy| {
-            Binding::buffer("lobe_light", glossy.light)
-        }),
-        Binding::buffer("out_provenance", &recording.batch.provenance),
-    ]);
-    bindings.extend(walked.is_left().then(|| Binding::buffer("ray_provenance", ray_provenance)));
-    bindings.extend(bounces.list_bindings(rays.lists));
-    let next = rays.next.filter(|_| variant.mirror_cells.is_some());
-    bindings.extend(next.into_iter().flat_map(|next| bounces.spawn_bindings(next)));
-    let pass = recording.bind(&variant, bindings)?;
-    recording.dispatch_listed(&pass, &rays.lists.lists, rays.cell, (rays.cell, rays.reflection));
-    Ok(())
-}
-
-fn shared_bindings<'b>(recording: &'b Recording<'_>, cube: &'b Cube, variant: &Walk) -> Vec<Binding<'b>> {
-    let mut bindings: Vec<Binding<'b>> = cube.bindings().into_iter().collect();
-    let light_field = cube.light_field.as_ref().filter(|_| variant.lobe.is_some_and(|lobe| !lobe.is_sent()));
-    bindings.extend(light_field.into_iter().flat_map(LightField::bindings));
-    // A base may be too coarse to hold the mirrors of the view's images, or anything that reflects.
-    let lit = cube.reflectors.as_ref().or(recording.set.reflectors.as_ref().filter(|_| variant.rays.is_bounced()));
-    bindings.extend(lit.map(|reflectors| Binding::buffer("illumination", &reflectors.illumination)));
-    bindings.extend(cube.reflectors.as_ref().map(|reflectors| Binding::texture("samples", &reflectors.samples)));
-    let map = recording.set.environment.as_deref().filter(|_| variant.environment_map);
-    bindings.extend(map.into_iter().flat_map(GpuEnvironment::bindings));
-    bindings
+    let mut own = cube.bindings();
+    own.extend([Binding::buffer("work", &bounces.works[rays.cell]), Binding::buffer("ray_provenance", ray_provenance)]);
+    own.extend(bounces.list_bindings(rays.lists));
+    own.extend(rays.next.into_iter().flat_map(|next| bounces.spawn_bindings(next)));
+    own.extend(ends.lobes.into_iter().flat_map(GlossyList::bindings));
+    recording.dispatch_listed(&variant, own, &rays.lists.lists, rays.cell, (rays.cell, rays.reflection))
 }

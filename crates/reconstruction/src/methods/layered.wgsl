@@ -29,9 +29,6 @@
 {%- if gathers %}
 {% include "cube/gather.wgsl" %}
 {%- endif %}
-{%- if bounced or left %}
-{% include "pixel_list.wgsl" %}
-{%- endif %}
 {%- if spawns or bounced %}
 {% include "bounce/ray.wgsl" %}
 {%- endif %}
@@ -119,16 +116,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 }
 {%- else %}
 
-@compute @workgroup_size({{ "LIST_WORKGROUP" if left else "TILE_PX, TILE_PX" }})
+@compute @workgroup_size({{ "LIST_WORKGROUP" if listed else "TILE_PX, TILE_PX" }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
-{%- if left %}
-    if id.x >= lists[work.view.number].count { return; }
-    let pixel = pixel_of(place_of(listed_pixels[first_listed() + id.x]));
-{%- else %}
-    let at = pixel_at(id);
-    if any(at >= work.view.size_px) { return; }
-    let pixel = pixel_of(at);
-{%- endif %}
+{% include "at_pixel.wgsl" %}
+    let pixel = pixel_of(place);
     let hit = walk(cube_ray(work.view.eye_in_world, pixel.direction), work.view.near_m);
     var shown = vec3f(0.0);
     for (var met = hit.met; met; met = false) {

@@ -3,9 +3,8 @@
 use gpu::{Binding, shader_variant};
 use wgpu::BufferUsages;
 
-use crate::surface::{self, Rays};
 use crate::view_work::{ONE_VIEW, SetVariant};
-use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, surface};
 
 /// As in the paper.
 pub(super) const DEFAULT_STEPS: u32 = 100;
@@ -19,5 +18,5 @@ shader_variant!(Search(SetVariant), "light_field_search.wgsl", ONE_VIEW);
 pub(super) fn record(recording: &mut Recording<'_>, steps: u32) -> Result<PixelList, ReconstructionError> {
     let steps = recording.device.gpu.buffer_with("steps", &[steps], BufferUsages::UNIFORM);
     let search = Search(recording.set.variant());
-    surface::record(recording, &search, Rays::All, &[Binding::buffer("steps", &steps)])
+    surface::record(recording, &search, None, &[Binding::buffer("steps", &steps)])
 }

@@ -1,8 +1,5 @@
 // Lages §4.2: a linear search along the view ray, refined by bisection. A surface is entered where the point is inside for
 // every camera that sees it. The colour comes from the most conservative camera, the one whose surface is closest.
-{% include "color.wgsl" %}
-{% include "view_work.wgsl" %}
-{% include "cell.wgsl" %}
 {% include "surface.wgsl" %}
 
 @group(0) var<storage, read> tile_start_m: array<f32>;

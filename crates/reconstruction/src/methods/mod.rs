@@ -7,22 +7,18 @@ pub(crate) mod hybrid_mesh;
 pub(crate) mod joint_carve;
 pub(crate) mod layered;
 pub(crate) mod light_field_search;
-mod mesh;
+pub(crate) mod mesh;
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use depth_image::{LightCacheQuality, MAX_REFLECTIONS, NamedMethod, Setting, named_methods};
-use gpu::{ShaderError, ShaderSource, Templates, Turn, shader_sources, wgsl_constants, wgsl_files};
+use gpu::{Turn, wgsl_files};
 
-use self::hybrid_mesh::{CutTexels, GREATEST_SLOPE};
-use self::joint_carve::march::{EYE_SHARE, MAX_COARSE_MOVES, MAX_FINE_MOVES, March, NUDGE_PX, START_LEVEL};
-use self::joint_carve::smooth::{FAINT_HIGHLIGHT, OPEN_SHARE, SMOOTH_FOOTPRINTS, Smooth};
-use self::joint_carve::{BLIND_MOVE, Carve, LEAST_MOVE, MAX_MOVES, MAX_MOVES_TO_HIT, MAX_STOP_LEVEL};
-use self::light_field_search::{BISECTIONS, DEFAULT_STEPS, MAX_STEPS, Search};
-use self::{layered::Walk, mesh::CutBetweenSamples};
+use self::joint_carve::MAX_STOP_LEVEL;
+use self::light_field_search::{DEFAULT_STEPS, MAX_STEPS};
 use crate::bounce::Bounces;
-use crate::quads::{self, ErrorBound, Mesh as QuadMesh, QuadDrawing};
+use crate::quads::{self, Cut, ErrorBound, Mesh as QuadMesh, QuadDrawing, QuadVertices};
 use crate::{device::Device, error::ReconstructionError, pixel_list::PixelList};
 use crate::{recording::Recording, sample_set::SampleSet};
 
@@ -124,19 +120,6 @@ const LADDER_BOUND_PX: f64 = 0.5;
 pub(crate) const SHADERS: [(&str, &str); 8] = wgsl_files! {
     "joint_carve.wgsl", "joint_carve/march.wgsl", "joint_carve/march_image.wgsl", "joint_carve/smooth.wgsl", "light_field_search.wgsl", "mesh.wgsl", "hybrid_mesh.wgsl", "layered.wgsl"
 };
-
-/// The numbers that methods share with their shaders.
-pub(crate) fn constants() -> [(&'static str, String); 14] {
-    wgsl_constants! {
-        BISECTIONS, BLIND_MOVE, EYE_SHARE, FAINT_HIGHLIGHT, GREATEST_SLOPE, LEAST_MOVE, MAX_COARSE_MOVES, MAX_FINE_MOVES, MAX_MOVES,
-        MAX_MOVES_TO_HIT, NUDGE_PX, OPEN_SHARE, SMOOTH_FOOTPRINTS, START_LEVEL
-    }
-}
-
-/// The texts of all variants of all methods' passes.
-pub(crate) fn sources(templates: &Templates) -> impl Iterator<Item = Result<ShaderSource, ShaderError>> {
-    shader_sources!(templates, March, Smooth, Carve, Search, Walk, CutBetweenSamples, CutTexels)
-}
 
 named_methods!(ReconstructionMethod, UnknownMethod, "reconstruction method");
 
@@ -240,11 +223,12 @@ impl ReconstructionMethod {
         set: &SampleSet,
         turn: Turn,
     ) -> Result<Option<Arc<QuadMesh>>, ReconstructionError> {
-        match self {
-            LightFieldSearch { .. } | JointCarve { .. } | Layered { .. } | LightCache { .. } => Ok(None),
-            Mesh => mesh::mesh(device, set, turn).map(Some),
-            HybridMesh { merged } => hybrid_mesh::mesh(device, set, merged, turn).map(Some),
-        }
+        let cut = match self {
+            LightFieldSearch { .. } | JointCarve { .. } | Layered { .. } | LightCache { .. } => return Ok(None),
+            Mesh => Cut { vertices: QuadVertices::AtSamples, merged: None },
+            HybridMesh { merged } => Cut { vertices: QuadVertices::AtTexelCorners, merged },
+        };
+        quads::mesh(device, set, cut, turn).map(Some)
     }
 
     /// The setting as users spell it; `None` where the name alone says it.

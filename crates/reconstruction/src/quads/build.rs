@@ -7,23 +7,22 @@ use glam::{UVec2, Vec2, Vec3};
 use gpu::{Frame, Readback, Turn};
 
 use super::cut::ImageCut;
-use super::list;
 use super::mesh::{Cut, INDICES_A_QUAD, MAX_MESHES, Mesh, MeshStatistics, Quad, QuadVertices};
+use super::{list, merge};
+use crate::methods::{hybrid_mesh::CutTexels, mesh::CutBetweenSamples};
 use crate::{device::Device, error::ReconstructionError, sample_set::SampleSet};
 
-/// The set's mesh of a cut, made when it is first asked for; `record` records the passes that cut one image.
-pub(crate) fn mesh(
-    device: &Device,
-    set: &SampleSet,
-    cut: Cut,
-    turn: Turn,
-    record: impl Fn(&mut Frame<'_>, &ImageCut<'_>) -> Result<(), ReconstructionError>,
-) -> Result<Arc<Mesh>, ReconstructionError> {
+/// The set's mesh of a cut, made when it is first asked for.
+pub(crate) fn mesh(device: &Device, set: &SampleSet, cut: Cut, turn: Turn) -> Result<Arc<Mesh>, ReconstructionError> {
+    let missing = set.meshes.planes.as_ref().err().filter(|_| cut.vertices == QuadVertices::AtTexelCorners);
+    if let Some(&(index, plane)) = missing {
+        return Err(ReconstructionError::MissingPlane { index, plane });
+    }
     if let Some(mesh) = kept(&set.meshes.meshes.lock(), cut) {
         return Ok(mesh);
     }
     // Not under the lock: a live view would wait for the turn of a batch.
-    let mesh = Arc::new(build(device, set, cut, turn, record)?);
+    let mesh = Arc::new(build(device, set, cut, turn)?);
     let mut meshes = set.meshes.meshes.lock();
     if let Some(mesh) = kept(&meshes, cut) {
         return Ok(mesh);
@@ -40,19 +39,21 @@ fn kept(meshes: &[Arc<Mesh>], cut: Cut) -> Option<Arc<Mesh>> {
 }
 
 /// Quads are listed in the order of their samples, so that the same set gives the same list.
-fn build(
-    device: &Device,
-    set: &SampleSet,
-    cut: Cut,
-    turn: Turn,
-    record: impl Fn(&mut Frame<'_>, &ImageCut<'_>) -> Result<(), ReconstructionError>,
-) -> Result<Mesh, ReconstructionError> {
+fn build(device: &Device, set: &SampleSet, cut: Cut, turn: Turn) -> Result<Mesh, ReconstructionError> {
     let mut frame = Frame::begin(&device.gpu, "cut meshes", turn);
     let mut images = Vec::new();
     let mut reads = Vec::new();
     for number in 0..set.cameras.len() {
         let image = ImageCut::new(device, set, number, cut)?;
-        record(&mut frame, &image)?;
+        match cut.vertices {
+            QuadVertices::AtSamples => {
+                image.dispatch(&mut frame, &CutBetweenSamples, image.work(), image.size_px.to_array())?;
+            }
+            QuadVertices::AtTexelCorners => {
+                image.dispatch(&mut frame, &CutTexels, image.work(), image.size_px.to_array())?;
+            }
+        }
+        cut.merged.map_or(Ok(()), |bound| merge::record(&mut frame, &image, bound))?;
         list::record(&mut frame, &image, cut.vertices)?;
         reads.push([&image.quads.draw, &image.report].map(|buffer| read_back(device, &mut frame, buffer)));
         images.push(image.quads);
@@ -70,31 +71,26 @@ fn build(
 
 /// The quads of a mesh, image after image.
 pub(crate) fn read(device: &Device, mesh: &Mesh, set: &SampleSet) -> Result<Vec<Quad>, ReconstructionError> {
+    let mut frame = Frame::begin(&device.gpu, "read quads", Turn::default());
+    let buffers = mesh.images.iter().map(|image| [&image.inverse_depths, &image.indices, &image.draw]);
+    let reads: Vec<_> = buffers.map(|buffers| buffers.map(|buffer| read_back(device, &mut frame, buffer))).collect();
+    let done = frame.submit()?.wait()?;
+    let vertices = mesh.cut.vertices;
     let mut quads = Vec::new();
-    for number in 0..mesh.images.len() {
-        quads.extend(read_image(device, mesh, set, number)?);
+    for (image, [depths, indices, draw]) in reads.into_iter().enumerate() {
+        let count = done.with(draw, |words: &[u32]| words[0] as usize)?;
+        let indices = done.with(indices, |words: &[u32]| words[..count].to_vec())?;
+        let depths = done.with(depths, <[f32]>::to_vec)?;
+        let camera = &set.meshes.cameras[image];
+        quads.extend(indices.chunks_exact(INDICES_A_QUAD as usize).map(|quad| {
+            let corners = [quad[0], quad[1], quad[2], quad[3]];
+            let samples = [quad[0], quad[3]].map(|vertex| vertex / vertices.per_sample());
+            let corners_in_world =
+                corners.map(|vertex| vertex_in_world(camera, vertices, vertex, depths[vertex as usize]));
+            Quad { image, corners_in_world, samples }
+        }));
     }
     Ok(quads)
-}
-
-fn read_image(device: &Device, mesh: &Mesh, set: &SampleSet, number: usize) -> Result<Vec<Quad>, ReconstructionError> {
-    let image = &mesh.images[number];
-    let mut frame = Frame::begin(&device.gpu, "read quads", Turn::default());
-    let buffers = [&image.inverse_depths, &image.indices, &image.draw];
-    let [depths, indices, draw] = buffers.map(|buffer| read_back(device, &mut frame, buffer));
-    let done = frame.submit()?.wait()?;
-    let count = done.with(draw, |words: &[u32]| words[0] as usize)?;
-    let indices = done.with(indices, |words: &[u32]| words[..count].to_vec())?;
-    let depths = done.with(depths, <[f32]>::to_vec)?;
-    let camera = &set.meshes.cameras[number];
-    let vertices = mesh.cut.vertices;
-    let quads = indices.chunks_exact(INDICES_A_QUAD as usize).map(|quad| {
-        let corners = [quad[0], quad[1], quad[2], quad[3]];
-        let samples = [quad[0], quad[3]].map(|vertex| vertex / vertices.per_sample());
-        let corners_in_world = corners.map(|vertex| vertex_in_world(camera, vertices, vertex, depths[vertex as usize]));
-        Quad { image: number, corners_in_world, samples }
-    });
-    Ok(quads.collect())
 }
 
 fn read_back(device: &Device, frame: &mut Frame<'_>, buffer: &wgpu::Buffer) -> Readback {

@@ -10,7 +10,7 @@ use crate::view_work::{GpuSampleCamera, GpuViewCamera};
 use crate::{device::Device, error::ReconstructionError, sample_set::SampleSet};
 
 /// Samples that one thread counts and lists.
-pub(super) const CHUNK: u32 = 64;
+pub(crate) const CHUNK: u32 = 64;
 const BYTES_OF_DRAW: u64 = 20;
 /// Bits of the greatest error, and quads before merging.
 const BYTES_OF_REPORT: u64 = 8;
@@ -48,7 +48,9 @@ pub(crate) struct ImageCut<'s> {
     pub size_px: UVec2,
     pub quads: ImageQuads,
     /// See `extent_of` in the shaders.
-    pub extents: PooledBuffer,
+    extents: PooledBuffer,
+    /// The quads of each chunk; later the places where they begin.
+    counts: PooledBuffer,
     pub report: wgpu::Buffer,
 }
 
@@ -66,7 +68,9 @@ impl<'s> ImageCut<'s> {
         // New buffers are zero, as the report's sums need.
         let report = storage(&device.gpu, "mesh report", BYTES_OF_REPORT, BufferUsages::empty())?;
         let extents = device.buffers.lend_storage("extents of quads", 4 * samples);
-        Ok(Self { device, set, number, size_px, quads, extents, report })
+        let chunks = u64::from(size_px.element_product().div_ceil(CHUNK));
+        let counts = device.buffers.lend_storage("quads of chunks", 4 * chunks);
+        Ok(Self { device, set, number, size_px, quads, extents, counts, report })
     }
 
     pub fn chunks(&self) -> u32 {
@@ -92,23 +96,33 @@ impl<'s> ImageCut<'s> {
         }
     }
 
-    /// The corners and extents of quads, as passes that cut and merge write them.
-    pub fn quad_bindings(&self) -> [Binding<'_>; 2] {
-        [Binding::buffer("inverse_depths", &self.quads.inverse_depths), Binding::buffer("extents", &self.extents)]
+    /// The resources of all passes that cut, merge and list: each shader declares some of them.
+    fn bindings(&self) -> Vec<Binding<'_>> {
+        let mut bindings = vec![
+            Binding::buffer("inverse_depths", &self.quads.inverse_depths),
+            Binding::buffer("extents", &self.extents),
+            Binding::buffer("counts", &self.counts),
+            Binding::buffer("report", &self.report),
+            Binding::buffer("draw", &self.quads.draw),
+            Binding::buffer("indices", &self.quads.indices),
+            Binding::texture("cell_codes", &self.set.cell_codes),
+        ];
+        let planes = self.set.meshes.planes.as_ref().ok();
+        bindings.extend(planes.map(|planes| Binding::texture("planes", &planes.texels)));
+        bindings
     }
 
-    /// Records one dispatch of a shader that includes `cut.wgsl`, with its own resources.
+    /// Records one dispatch of a shader that includes `cut.wgsl`.
     pub fn dispatch(
         &self,
         frame: &mut Frame<'_>,
         variant: &impl ShaderVariant,
         work: GpuCutWork,
-        own: &[Binding<'_>],
         [x, y]: [u32; 2],
     ) -> Result<(), ReconstructionError> {
         let pass = self.device.passes.get(variant)?;
         let work = self.device.gpu.buffer_with("cut", &[work], BufferUsages::UNIFORM);
-        let bound = pass.bind(0, own.iter().cloned().chain([Binding::buffer("work", &work)]))?;
+        let bound = pass.bind(0, self.bindings().into_iter().chain([Binding::buffer("work", &work)]))?;
         pass.dispatch(frame, &[&bound], DispatchSize::Invocations([x, y, 1]));
         let kind = WorkKind::new(WorkKind::family(&"cut meshes"), &variant.name());
         frame.cut(kind, self.size_px.element_product().into());

@@ -2,8 +2,8 @@
 {% include "cut.wgsl" %}
 
 @group(0) var<storage, read> extents: array<u32>;
-// Where each chunk's quads begin.
-@group(0) var<storage, read> places: array<u32>;
+// By now the places where the quads of each chunk begin.
+@group(0) var<storage, read> counts: array<u32>;
 @group(0) var<storage, read_write> indices: array<u32>;
 
 // Vertices: upper left, upper right, lower left, lower right.
@@ -23,7 +23,7 @@ fn corners_of(index: u32, extent: vec2u) -> vec4u {
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= work.chunks { return; }
     let end = min((id.x + 1u) * CHUNK, work.size_px.x * work.size_px.y);
-    var place = places[id.x] * INDICES_A_QUAD;
+    var place = counts[id.x] * INDICES_A_QUAD;
     for (var i = id.x * CHUNK; i < end; i++) {
         let word = extents[i];
         if word == 0u { continue; }

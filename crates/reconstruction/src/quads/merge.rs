@@ -1,7 +1,7 @@
 //! Merges quads into rectangles where no corner moves by more than a bound.
 
 use glam::UVec2;
-use gpu::{Binding, Frame, shader_variant};
+use gpu::{Frame, shader_variant};
 
 use super::cut::{GpuCutWork, ImageCut};
 use super::mesh::ErrorBound;
@@ -22,9 +22,7 @@ pub(crate) fn record(
     for (axis, segment) in (0..).zip(GREATEST_EXTENT.to_array()) {
         let [length, lines] = [axis, 1 - axis].map(|axis| image.size_px[axis]);
         let work = GpuCutWork { axis: axis as u32, segment, bound_px: bound.px(), ..image.work() };
-        let [depths, extents] = image.quad_bindings();
-        let own = [depths, extents, Binding::buffer("report", &image.report)];
-        image.dispatch(frame, &Merge, work, &own, [lines, length.div_ceil(segment)])?;
+        image.dispatch(frame, &Merge, work, [lines, length.div_ceil(segment)])?;
     }
     Ok(())
 }

@@ -4,9 +4,8 @@ use gpu::shader_variant;
 
 use super::draw::{self, QuadDrawing};
 use super::mesh::Mesh;
-use crate::surface::{self, Rays};
 use crate::view_work::{ONE_VIEW, SetVariant};
-use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, surface};
 
 shader_variant!(Resolve(SetVariant), "resolve.wgsl", ONE_VIEW);
 
@@ -19,5 +18,5 @@ pub(crate) fn record(
     let mesh = mesh.expect("methods that draw are handed their mesh");
     draw::record(drawing, recording, mesh)?;
     let resolve = Resolve(recording.set.variant());
-    surface::record(recording, &resolve, Rays::All, &[])
+    surface::record(recording, &resolve, None, &[])
 }

@@ -1,8 +1,5 @@
 // Gives the pixels of a drawn view their colour: the depth says where the surface is, and all cameras vote on the point.
 // Where none knows it, the drawn sample's own colour stands.
-{% include "color.wgsl" %}
-{% include "view_work.wgsl" %}
-{% include "cell.wgsl" %}
 {% include "surface.wgsl" %}
 
 // A layer for each view of the batch.

@@ -2,7 +2,6 @@
 
 use depth_image::{Camera, PinholeCamera};
 use glam::{Mat3, Quat, Vec3};
-use gpu::wgsl_constants;
 use render::{Evidence, RedundancyTest};
 
 use crate::error::SamplingError;
@@ -13,14 +12,12 @@ pub const SAME_LAYER: f32 = 1e-6;
 const MAX_LAYERS: u32 = 16;
 pub(super) const DEFAULT_LAYERS: u32 = 4;
 
-pub(super) const SHADER: (&str, &str) = ("depth_peeling.wgsl", include_str!("depth_peeling.wgsl"));
-
-pub(super) const TEST: RedundancyTest =
-    RedundancyTest { shader: SHADER.0, consults: Evidence::Samples, from_one_place: true, usefulness: None };
-
-pub(super) fn constants() -> [(&'static str, String); 1] {
-    wgsl_constants![SAME_LAYER]
-}
+pub(super) const TEST: RedundancyTest = RedundancyTest {
+    shader: "depth_peeling.wgsl",
+    consults: Evidence::Samples,
+    from_one_place: true,
+    usefulness: None,
+};
 
 pub(super) fn parse_layers(text: &str) -> Option<u32> {
     text.parse().ok().filter(|layers| (1..=MAX_LAYERS).contains(layers))

@@ -12,9 +12,14 @@ use depth_image::{
     Aabb, Antialias, Camera, CameraError, CubeGrid, LightFieldCamera, NamedMethod, PinholeCamera, Setting,
     named_methods,
 };
-use gpu::{ShaderError, Templates};
+use gpu::{ShaderError, Templates, wgsl_constants, wgsl_files};
 use render::{LayerSelection, RedundancyTest};
 
+use self::depth_peeling::SAME_LAYER;
+use self::non_redundant::{
+    CLEARLY, CLEARLY_SAME_FACING, COARSER, DEPTH_FOOTPRINTS, SAME_DEPTH, SAME_FACING, SAME_FOOTPRINTS, SLOPE_PX,
+};
+use self::useful::{BLOCKER_FOOTPRINTS, RING};
 use crate::error::SamplingError;
 pub use layered_cube::{LayeredCube, LightFieldSize};
 pub use non_redundant::Redundancy;
@@ -89,8 +94,14 @@ pub const METHODS: [NamedMethod<SamplingMethod>; 5] = [
 /// # Errors
 /// When a text is not a template.
 pub fn templates() -> Result<Templates, ShaderError> {
-    let own = [&non_redundant::SHADERS[..], &[useful::SHADER, depth_peeling::SHADER]].concat();
-    let constants = [&non_redundant::constants()[..], &useful::constants(), &depth_peeling::constants()].concat();
+    let own = wgsl_files! {
+        "non_redundant/pixel.wgsl", "non_redundant/visibility.wgsl", "non_redundant/tolerance.wgsl", "useful.wgsl",
+        "depth_peeling.wgsl"
+    };
+    let constants = wgsl_constants! {
+        BLOCKER_FOOTPRINTS, CLEARLY, CLEARLY_SAME_FACING, COARSER, DEPTH_FOOTPRINTS, RING, SAME_DEPTH, SAME_FACING,
+        SAME_FOOTPRINTS, SAME_LAYER, SLOPE_PX
+    };
     Ok(render::templates(&own)?.declaring(constants))
 }
 
@@ -113,15 +124,11 @@ impl SamplingMethod {
     /// first method has the same samples. Samples that depend on the planned views serve no others, and are not among them, nor are
     /// cubes, which have no sample cameras near the views.
     pub fn ladder() -> impl Iterator<Item = (&'static str, u32)> {
-        METHODS.into_iter().filter_map(|row| row.method.least_images().map(|images| (row.name, images)))
-    }
-
-    fn least_images(self) -> Option<u32> {
-        match self {
-            Conventional(_) => Some(1),
-            NonRedundant(_) | DepthPeeling { .. } => Some(2),
+        METHODS.into_iter().filter_map(|row| match row.method {
+            Conventional(_) => Some((row.name, 1)),
+            NonRedundant(_) | DepthPeeling { .. } => Some((row.name, 2)),
             Useful(_) | Cube(_) => None,
-        }
+        })
     }
 
     /// The number of images of a set, where it is part of the method.

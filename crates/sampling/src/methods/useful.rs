@@ -1,7 +1,6 @@
 //! Samples behind redundant ones that some viewpoint between the sample cameras can see past their blockers: the ring test of
 //! effective depth peeling.
 
-use gpu::wgsl_constants;
 use render::RedundancyTest;
 
 use super::Redundancy;
@@ -11,12 +10,6 @@ pub const RING: u32 = 16;
 /// Depths within this many footprints belong to the blocker.
 pub const BLOCKER_FOOTPRINTS: f32 = 4.0;
 
-pub(super) const SHADER: (&str, &str) = ("useful.wgsl", include_str!("useful.wgsl"));
-
-pub(super) fn constants() -> [(&'static str, String); 2] {
-    wgsl_constants![RING, BLOCKER_FOOTPRINTS]
-}
-
 pub(super) const fn test(redundancy: Redundancy) -> RedundancyTest {
-    RedundancyTest { usefulness: Some(SHADER.0), ..redundancy.test() }
+    RedundancyTest { usefulness: Some("useful.wgsl"), ..redundancy.test() }
 }

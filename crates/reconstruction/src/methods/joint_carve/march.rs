@@ -33,7 +33,7 @@ impl ShaderVariant for March {
     const TRAITS: ResourceTraits = ONE_VIEW;
 
     fn context(&self) -> Value {
-        context! { march_camera => self.camera, listed => self.listed, bounced => false, ..self.set.context() }
+        context! { march_camera => self.camera, listed => self.listed, ..self.set.context() }
     }
 
     fn all() -> Vec<Self> {

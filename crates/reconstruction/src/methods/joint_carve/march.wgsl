@@ -1,12 +1,10 @@
+{% set bounced = false -%}
 // The first passes of the joint carve: march in the image of one sample camera alone, then ask all cameras
 // about the point found. Most pixels end with the nearest camera and most others with the second nearest;
 // what is left goes to joint_carve.wgsl.
 //
 // In the camera's image the ray is a straight line. Columns, rows and the depth code are linear along it in one parameter
 // s, so that a step needs no division.
-{% include "color.wgsl" %}
-{% include "view_work.wgsl" %}
-{% include "cell.wgsl" %}
 {% include "surface.wgsl" %}
 
 const CAMERA: u32 = {{ march_camera }}u;
@@ -15,20 +13,11 @@ const CAMERA: u32 = {{ march_camera }}u;
 {% if march_camera == 0 %}
 @group(0) var<storage, read> tile_start_m: array<f32>;
 {% endif %}
-{% if listed %}
-{% include "pixel_list.wgsl" %}
-{% endif %}
 
 @compute @workgroup_size({{ "LIST_WORKGROUP" if listed else "TILE_PX, TILE_PX" }})
 fn main(@builtin(global_invocation_id) id: vec3u) {
-{% if listed %}
-    if id.x >= lists[work.view.number].count { return; }
-    let pixel = pixel_of(place_of(listed_pixels[first_listed() + id.x]));
-{% else %}
-    let place = pixel_at(id);
-    if any(place >= work.view.size_px) { return; }
+{% include "at_pixel.wgsl" %}
     let pixel = pixel_of(place);
-{% endif %}
     let span = span_in_volume(work.view.eye_in_world, pixel.direction, work.view.near_m);
     // The marches after the first go on where the one before ended.
     let begin = {{ "max(span.near, tile_start_m[pixel.tile])" if march_camera == 0 else "out_inverse_depth[pixel.index]" }};

@@ -2,11 +2,11 @@
 
 use depth_image::Antialias;
 use glam::Vec2;
-use gpu::{Binding, ResourceTraits, ShaderVariant};
+use gpu::{ResourceTraits, ShaderVariant};
 use minijinja::{Value, context};
 
 use crate::view_work::{ONE_VIEW, SetVariant};
-use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording, surface};
+use crate::{error::ReconstructionError, pixel_list::PixelList, recording::Recording};
 
 /// A surface is smooth where its depth lies this close to the middle of its neighbours' on both sides, in the pixel's
 /// footprints.
@@ -64,12 +64,6 @@ pub(crate) fn record(recording: &mut Recording<'_>) -> Result<PixelList, Reconst
         environment_map: set.environment.is_some(),
     };
     let rough = recording.rough_list();
-    let mut bindings = surface::bindings(recording, &rough);
-    bindings.extend(set.background_bindings());
-    bindings.extend(recording.batch.sums.as_ref().map(|sums| Binding::buffer("sums", sums)));
-    let starts = recording.batch.tile_start_m.as_ref();
-    bindings.extend(starts.map(|starts| Binding::buffer("tile_start_m", starts)));
-    let pass = recording.bind(&variant, bindings)?;
-    recording.dispatch_pixels(&pass, None);
+    recording.dispatch_pixels(&variant, rough.written_bindings(), None)?;
     Ok(rough)
 }

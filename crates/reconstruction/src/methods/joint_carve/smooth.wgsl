@@ -1,9 +1,6 @@
 // The light of all positions within the pixels around which the first position found one smooth surface, or only background.
 // No ray is followed there: the surface goes on between neighbours, and the same cameras show it. The sums of other pixels
 // begin with the first position; they are left to the marches of each further one.
-{% include "color.wgsl" %}
-{% include "view_work.wgsl" %}
-{% include "cell.wgsl" %}
 {% include "surface.wgsl" %}
 {% if environment_map %}
 {% include "environment.wgsl" %}

@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use gpu::wgsl_constants;
 use render::{Evidence, RedundancyTest};
 
 /// When a sample is redundant with an image before it.
@@ -17,16 +16,6 @@ pub enum Redundancy {
 }
 
 pub(super) const FORM: &str = "TEST (pixel, visibility or tolerance)";
-
-const PIXEL: &str = "non_redundant/pixel.wgsl";
-const VISIBILITY: &str = "non_redundant/visibility.wgsl";
-const TOLERANCE: &str = "non_redundant/tolerance.wgsl";
-
-pub(super) const SHADERS: [(&str, &str); 3] = [
-    (PIXEL, include_str!("pixel.wgsl")),
-    (VISIBILITY, include_str!("visibility.wgsl")),
-    (TOLERANCE, include_str!("tolerance.wgsl")),
-];
 
 /// Visibility: the share of its depth that a point may be off by.
 pub const SAME_DEPTH: f32 = 2e-5;
@@ -45,12 +34,6 @@ pub const CLEARLY: f32 = 0.8;
 /// Tolerance: the cosine of 20 degrees, for samples of the temporal reference.
 pub const CLEARLY_SAME_FACING: f32 = 0.939_692_6;
 
-pub(super) fn constants() -> [(&'static str, String); 8] {
-    wgsl_constants! {
-        SAME_DEPTH, SAME_FOOTPRINTS, DEPTH_FOOTPRINTS, SLOPE_PX, SAME_FACING, COARSER, CLEARLY, CLEARLY_SAME_FACING
-    }
-}
-
 pub(super) fn parse(text: &str) -> Option<Redundancy> {
     Redundancy::ALL.into_iter().find(|redundancy| redundancy.to_string() == text)
 }
@@ -60,9 +43,9 @@ impl Redundancy {
 
     pub(super) const fn test(self) -> RedundancyTest {
         let (shader, consults) = match self {
-            Self::Pixel => (PIXEL, Evidence::SurfaceIds),
-            Self::Visibility => (VISIBILITY, Evidence::Scene),
-            Self::Tolerance => (TOLERANCE, Evidence::Samples),
+            Self::Pixel => ("non_redundant/pixel.wgsl", Evidence::SurfaceIds),
+            Self::Visibility => ("non_redundant/visibility.wgsl", Evidence::Scene),
+            Self::Tolerance => ("non_redundant/tolerance.wgsl", Evidence::Samples),
         };
         RedundancyTest { shader, consults, from_one_place: false, usefulness: None }
     }
