@@ -51,7 +51,7 @@ impl Rendering {
             batch.retain(|view| {
                 let is_wanted = !view.reply.outbox().gone.is_cancelled();
                 if !is_wanted {
-                    self.auditor.metrics.drop_view("client gone");
+                    self.auditor.node.metrics.drop_view("client gone");
                 }
                 is_wanted
             });
@@ -59,7 +59,7 @@ impl Rendering {
                 let served = arrivals.served();
                 let busy_s = self.render(turn, batch, place).await;
                 if lane == Lane::Direct && arrivals.served() > served {
-                    tokio::time::sleep(pause(busy_s, self.auditor.direct_share)).await;
+                    tokio::time::sleep(pause(busy_s, self.auditor.node.config.direct_share)).await;
                 } else if lane == Lane::Preview {
                     tokio::time::sleep(pause(busy_s, PREVIEW_SHARE)).await;
                 }
@@ -70,7 +70,7 @@ impl Rendering {
     /// Gives the seconds that the views had the device.
     async fn render(&self, turn: Turn, batch: Vec<Waiting>, place: OwnedSemaphorePermit) -> f64 {
         let start = Instant::now();
-        let metrics = &self.auditor.metrics;
+        let metrics = &self.auditor.node.metrics;
         match self.make(turn, &batch).await {
             Ok((operation, views, busy_s)) => {
                 let batch_s = start.elapsed().as_secs_f64();
@@ -109,7 +109,7 @@ impl Rendering {
             Source::Sets(_) => Operation::ReconstructView,
             Source::Scene { .. } => Operation::DirectView,
         };
-        let making = self.auditor.scenes.on_device(&scene, move |engine| {
+        let making = self.auditor.node.scenes.on_device(&scene, move |engine| {
             let (views, busy_s) = own_time(engine, || views_of(engine, &source, &key, &cameras, turn));
             Ok((views?, busy_s))
         });
@@ -136,7 +136,7 @@ impl Rendering {
                 return;
             };
             let times = stage_times(&waiting, start, batch_s, count);
-            let metrics = self.auditor.metrics.clone();
+            let metrics = self.auditor.node.metrics.clone();
             encodings.spawn(async move {
                 encode_and_send(waiting, view, times, &metrics).await;
                 drop(encoder);

@@ -6,10 +6,8 @@ use std::time::{Duration, Instant};
 use cluster::{Assignment, CommonCell, DIRECT, Policy, SceneRef, SetContent, Timeline, Workload};
 use codec::EncodedImage;
 use depth_image::{DepthImage, PinholeCamera, SampleCamera, nearest_set};
-use node::{
-    ByteCache, CellPlan, CommonSet, NodeConfig, NodeMetrics, Operation, Pinned, PlansInForce, Scenes, SharedSet, Turn,
-};
-use node::{WorkClass, beyond_timeline, depth_images_bytes, most_image_bytes, most_set_bytes, own_time, set_bytes};
+use node::{ByteCache, CellPlan, CommonSet, NodeParts, Operation, Pinned, SharedSet, Turn, WorkClass};
+use node::{beyond_timeline, depth_images_bytes, most_image_bytes, most_set_bytes, own_time, set_bytes};
 use tonic::{Code, Status};
 use wire::rpc::Messages;
 
@@ -84,10 +82,8 @@ fn subject(plan: &Assignment) -> Option<SetContent> {
 
 /// The sets of one compositor: the latest few moments of each cell, as long as memory has room.
 pub(crate) struct Sets {
-    pub(crate) scenes: Arc<Scenes>,
+    node: Arc<NodeParts>,
     fetcher: Arc<Fetcher>,
-    metrics: NodeMetrics,
-    plans: PlansInForce,
     reports: Reports,
     pub(crate) cached: ByteCache<SetContent, ReadySet>,
     relays: RelayBuffers,
@@ -98,7 +94,7 @@ pub(crate) struct Sets {
 impl Sets {
     /// Checks that a plan's samples have the planes that a method needs, where there are samples.
     pub(crate) fn check_method(&self, plan: &Assignment, method: &str) -> Result<(), Status> {
-        let needed = self.scenes.engine().sample_planes(method)?;
+        let needed = self.node.scenes.engine().sample_planes(method)?;
         let is_drawn = plan.policy == Policy::Direct || method == DIRECT;
         if is_drawn || plan.workload.planes.contain(needed) {
             return Ok(());
@@ -107,15 +103,13 @@ impl Sets {
         Err(Status::invalid_argument(format!("reconstruction_method: {method} {text}")))
     }
 
-    pub(crate) fn new(scenes: Arc<Scenes>, plans: PlansInForce, config: &NodeConfig, metrics: NodeMetrics) -> Self {
+    pub(crate) fn new(node: Arc<NodeParts>) -> Self {
         Self {
-            scenes,
-            fetcher: Arc::new(Fetcher::new(plans.clone(), config.deadlines)),
-            metrics,
-            plans,
-            reports: Reports::new(config),
+            fetcher: Arc::new(Fetcher::new(node.plans.clone(), node.config.deadlines)),
+            reports: Reports::new(&node.config),
             // The other half is for packed images.
-            cached: ByteCache::new("sample sets", config.set_memory_bytes / 2),
+            cached: ByteCache::new("sample sets", node.config.set_memory_bytes / 2),
+            node,
             relays: RelayBuffers::default(),
             assembling: tokio::sync::Mutex::default(),
         }
@@ -222,7 +216,7 @@ impl Sets {
         }
         let on_device = match sets.is_empty() {
             true => of_cell.set.clone(),
-            false => self.scenes.engine().with_common(of_cell.set.clone(), sets)?,
+            false => self.node.scenes.engine().with_common(of_cell.set.clone(), sets)?,
         };
         Ok(Some(ViewSets { of_cell, on_device, _common: in_use }))
     }
@@ -292,12 +286,12 @@ impl Sets {
     }
 
     fn is_in_force(&self, plan: &CellPlan) -> bool {
-        self.plans.in_force(plan.workload_number).is_some_and(|in_force| in_force.plan_epoch == plan.plan_epoch)
+        self.node.plans.in_force(plan.workload_number).is_some_and(|in_force| in_force.plan_epoch == plan.plan_epoch)
     }
 
     /// The most bytes of a cell's set, with its images for others.
     fn most_bytes(&self, plan: &CellPlan) -> usize {
-        let relayed = plan.relays(&self.plans.node_name);
+        let relayed = plan.relays(&self.node.plans.node_name);
         let illumination = &plan.workload.illumination;
         let cameras = &*plan.workload.sample_cameras;
         let packed = if relayed { most_image_bytes(illumination, cameras) } else { 0 };
@@ -329,7 +323,7 @@ impl Sets {
         content: SetContent,
     ) -> Result<(ReadySet, usize), Status> {
         let start = Instant::now();
-        let relay = plan.relays(&self.plans.node_name).then(|| self.relays.of(content));
+        let relay = plan.relays(&self.node.plans.node_name).then(|| self.relays.of(content));
         let relay = relay.filter(|relay| !relay.has_failed());
         let request = SetRequest { plan: plan.clone(), set_index, relay: relay.clone() };
         let (set, times) = self.fetcher.fetch(&request).await.map_err(|failed| {
@@ -345,15 +339,15 @@ impl Sets {
             set_bytes(&set.images) + depth_images_bytes(compared) + relay.as_ref().map_or(0, RelayBuffer::bytes);
         let fetched_s = start.elapsed().as_secs_f64();
         let set = Arc::new(set);
-        let uploading = self.scenes.on_device(&plan.workload.scene, move |engine| {
+        let uploading = self.node.scenes.on_device(&plan.workload.scene, move |engine| {
             let (set, upload_s) = own_time(engine, || engine.upload(&set, Turn::of(WorkClass::Batch)));
             Ok((set?, upload_s))
         });
         let (set, upload_s) = uploading.await?;
-        self.metrics.done.add(plan.workload_number, Operation::LoadSet, 1.0, times.decode_s + upload_s);
-        self.metrics.done.transferred(plan.workload_number, times.bytes, times.transfer_s);
-        self.metrics.sets_loaded.inc();
-        self.metrics.set_s.observe(start.elapsed().as_secs_f64());
+        self.node.metrics.done.add(plan.workload_number, Operation::LoadSet, 1.0, times.decode_s + upload_s);
+        self.node.metrics.done.transferred(plan.workload_number, times.bytes, times.transfer_s);
+        self.node.metrics.sets_loaded.inc();
+        self.node.metrics.set_s.observe(start.elapsed().as_secs_f64());
         tracing::debug!(set_index, fetched_s, total_s = start.elapsed().as_secs_f64(), "sample set ready");
         let moment = moment(plan, set_index).filter(|_| !plan.is_common);
         let cameras = SampleCamera::references(&plan.workload.sample_cameras);

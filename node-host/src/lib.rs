@@ -7,8 +7,8 @@ use std::time::Duration;
 use cluster::NodeStatus;
 use compositor_node::CompositorService;
 use node::{
-    DeviceMonitor, Engine, EngineError, NodeConfig, NodeMetrics, NodeService, OpenEngine, PlansInForce, Scenes,
-    ServeError, health, keep_membership,
+    DeviceMonitor, Engine, EngineError, NodeConfig, NodeMetrics, NodeParts, NodeService, OpenEngine, ServeError,
+    health, keep_membership,
 };
 use probe::Probers;
 use sampler_node::SamplerService;
@@ -96,46 +96,24 @@ async fn serve_on(
 ) -> Result<Option<String>, ServeError> {
     let monitor = DeviceMonitor::new(engine);
     let engine: Arc<dyn Engine> = Arc::new(monitor.clone());
-    let plans = PlansInForce::new(&config.node_name);
-    let scenes = Arc::new(Scenes::new(engine.clone(), config));
+    let node = NodeParts::new(engine.clone(), config, metrics, shutdown.clone());
     let address = listener.local_addr()?;
-    let left = plans.clone();
     let status = NodeStatus {
         node_name: config.node_name.clone(),
         address: config.advertised_address.clone().unwrap_or_else(|| format!("http://{address}")),
         device_name: engine.device_name(),
         is_software: engine.is_software(),
     };
-    let probers = Arc::new(Probers::new(engine.clone()));
-    let compositor = CompositorService::new(
-        scenes.clone(),
-        plans.clone(),
-        config,
-        metrics.clone(),
-        probers.clone(),
-        shutdown.clone(),
-    );
-    let relay = compositor.relay();
-    let done = metrics.done.clone();
-    let sampler = SamplerService::new(scenes.clone(), plans.clone(), config, relay, metrics.clone(), shutdown.clone());
+    let probers = Arc::new(Probers::new(engine));
+    let compositor = CompositorService::new(node.clone(), probers.clone());
+    let sampler = SamplerService::new(node.clone(), compositor.relay());
     monitor.set_memory(vec![compositor.memory(), sampler.memory()]);
-    let service = NodeService::new(plans.clone(), scenes.clone(), config.quotas, metrics, probers);
+    let service = NodeService::new(node.clone(), probers);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))
         .add_service(compositor_server(compositor));
-    let coordinator = config.coordinator.clone();
-    let away = config.deadlines.away;
-    let ends = shutdown.clone();
-    let membership = tokio::spawn(stay_while_memory_lasts(
-        move || {
-            let plans = plans.clone();
-            keep_membership(status.clone(), coordinator.clone(), plans, scenes.clone(), done.clone(), ends.clone())
-        },
-        monitor.clone(),
-        left,
-        away,
-    ));
+    let membership = tokio::spawn(stay_while_memory_lasts(node, status, monitor.clone()));
     let mut serving = pin!(node::serve(listener, routes, config.insecure_bind, shutdown.clone()));
     let served = tokio::select! {
         served = &mut serving => served.map(|()| None),
@@ -150,23 +128,19 @@ async fn serve_on(
 }
 
 /// A member leaves when its device has no memory left, and begins again without plans and sets.
-async fn stay_while_memory_lasts<F: Future<Output = ()>>(
-    member: impl Fn() -> F,
-    monitor: DeviceMonitor,
-    plans: PlansInForce,
-    away: Duration,
-) {
+async fn stay_while_memory_lasts(node: Arc<NodeParts>, status: NodeStatus, monitor: DeviceMonitor) {
+    let away = node.config.deadlines.away;
     loop {
         tokio::select! {
-            () = member() => return,
+            () = keep_membership(node.clone(), status.clone()) => return,
             () = monitor.exhausted() => (),
         }
         tracing::error!(
-            node = &*plans.node_name,
+            node = &*node.plans.node_name,
             away_s = away.as_secs_f64(),
             "out of device memory: leaves for a while"
         );
-        plans.forget_all();
+        node.plans.forget_all();
         tokio::time::sleep(away).await;
         monitor.begin_anew();
     }

@@ -36,15 +36,16 @@ pub use check::{
 };
 pub use common_cell::{CommonCell, CommonKind};
 pub use costs::{Costs, MeasuredCosts, ROW_PARTS, TileCosts, TimedSize};
+pub use depth_image::Refinement;
 pub use node::{
     BudgetMeasurement, JoinCluster, MeasureCosts, Measured, NodeStatus, Ready, SamplerReport, SharedLightCosts,
     Welcome, WorkReport,
 };
 pub use policy::{Policy, PolicyChoice, UnknownPolicy};
 pub use promise::{BudgetRequest, Promise, PromiseState};
-pub use scene::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, ScenePart, SceneRef};
+pub use scene::{FetchScene, SceneHash, ScenePart, SceneRef};
 pub use session::{ChangeSession, Quality, SessionEvent, SessionPlan, SessionRequest, SessionStage};
 pub use status::{AchievedTime, ClusterStatus, NodeCondition, OfferSettings, OfferStatus, WorkloadStatus};
-pub use timeline::{Refinement, Timeline};
+pub use timeline::Timeline;
 pub use views::{DIRECT, FetchImages, LiveRequest, RenderViews, RequestedView, check_view_count, check_view_size};
 pub use workload::{SamplePlanes, SetContent, Workload, has_indirect_light};

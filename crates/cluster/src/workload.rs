@@ -2,14 +2,16 @@
 
 use std::ops::Range;
 
-use depth_image::{Aabb, Environment, Illumination, MAX_LIGHTS, PinholeCamera, SampleCamera, ViewGroup, nearest_set};
+use depth_image::{
+    Aabb, Environment, Illumination, MAX_LIGHTS, PinholeCamera, Refinement, SampleCamera, ViewGroup, nearest_set,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::check::{InvalidField, at_most, nonempty, pinholes, within};
 use crate::common_cell::{CommonCell, CommonKind, check_cube};
 use crate::limits::{MAX_CELLS, MAX_COMMON_CELLS, MAX_REFINEMENT_STEPS, MAX_SAMPLE_CAMERAS};
 use crate::scene::SceneRef;
-use crate::timeline::{Refinement, Timeline};
+use crate::timeline::Timeline;
 
 /// Everything that samples depend on. Methods are text, as on the command line: nodes parse them, so that a new method
 /// changes nothing here. The reconstruction method, the codec, planes, sizes and rate of views belong to requests.

@@ -2,12 +2,12 @@
 
 use cluster::Workload;
 use depth_image::{
-    Aabb, ExposureEv, PinholeCamera, SampleCamera, ToneCurve, ToneMapping, View, ViewCell, ViewPlanes,
+    Aabb, ExposureEv, PinholeCamera, SampleCamera, ToneCurve, ToneMapping, Turn, View, ViewCell, ViewPlanes,
     linear_from_srgb8,
 };
 use glam::{UVec2, Vec2, Vec3};
 
-use crate::engine::{DirectWork, Engine, EngineError, Turn};
+use crate::engine::{DirectWork, Engine, EngineError};
 
 /// The picture that is measured.
 const SIZE_PX: UVec2 = UVec2::splat(64);

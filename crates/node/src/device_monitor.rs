@@ -5,14 +5,13 @@ use std::any::Any;
 use std::sync::Arc;
 
 use cluster::SamplePlanes;
-use depth_image::{PinholeCamera, SampleImage, View};
+use depth_image::{PinholeCamera, SampleImage, Turn, View};
 use parking_lot::Mutex;
 use tokio::sync::watch;
 
 use crate::byte_cache::SetMemory;
 use crate::engine::{
-    CommonSet, DirectWork, Engine, EngineError, LightParts, SampleSet, SampleWork, SharedSet, Turn, UploadedSet,
-    ViewWork,
+    CommonSet, DirectWork, Engine, EngineError, LightParts, SampleSet, SampleWork, SharedSet, UploadedSet, ViewWork,
 };
 
 /// Calls that run out of memory one after the other, until the node leaves.

@@ -6,14 +6,13 @@ use std::fmt::Display;
 use cluster::{Costs, DIRECT, MeasureCosts, Measured, ROW_PARTS, SharedLightCosts, TileCosts, TimedSize, Workload};
 use codec::{DecodeLimits, EncodedImage, FrameCodec};
 use codec::{decode_sample_image, encode_sample_image, encode_view};
-use depth_image::{PinholeCamera, SampleCamera, SampleImage, View};
+use depth_image::{PinholeCamera, SampleCamera, SampleImage, Turn, View, WorkClass};
 use glam::UVec2;
 use tonic::Status;
 
 use crate::auto_exposure::auto_exposure;
 use crate::engine::{
-    DirectWork, Engine, LightParts, SampleSet, SampleWork, Turn, UploadedSet, ViewWork, WorkClass, own_time,
-    set_of_view,
+    DirectWork, Engine, LightParts, SampleSet, SampleWork, UploadedSet, ViewWork, own_time, set_of_view,
 };
 
 /// Runs of one operation after a warm-up, in which shaders are built.

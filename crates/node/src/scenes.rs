@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use std::{fs, io};
 
-use cluster::{FetchScene, SceneAssembly, SceneAssemblyError, SceneHash, SceneRef};
+use cluster::{FetchScene, SceneHash, ScenePart, SceneRef};
 use tokio::sync::Mutex;
 use tonic::Status;
 use wire::rpc::{CoordinatorClient, connect};
@@ -25,8 +25,7 @@ pub struct Scenes {
 
 impl Scenes {
     /// The scenes of one node.
-    #[must_use]
-    pub fn new(engine: Arc<dyn Engine>, config: &NodeConfig) -> Self {
+    pub(crate) fn new(engine: Arc<dyn Engine>, config: &NodeConfig) -> Self {
         Self { engine, config: config.clone(), loading: Mutex::new(()) }
     }
 
@@ -98,23 +97,50 @@ impl Scenes {
         // A channel of its own: bulk must not hold up membership.
         let client = CoordinatorClient::new(connect(&self.config.coordinator).await?);
         let mut parts = client.fetch_scene(FetchScene { hash: scene.hash.clone(), offset_bytes: 0 }).await?;
-        let mut assembly = SceneAssembly::new(scene.clone());
+        // No more is allocated than has been received.
+        let mut package = Vec::new();
         while let Some(part) = next_within(&mut parts, self.config.deadlines.chunk, "scene").await? {
-            assembly.push(&part).map_err(spoilt)?;
+            append(&mut package, &part, scene.package_bytes)?;
         }
         let folder = self.config.scene_folder.clone();
-        let hash = scene.hash.clone();
+        let scene = scene.clone();
         blocking(move || {
-            let package = assembly.finish().map_err(spoilt)?;
-            store(folder.as_deref(), &hash, &package);
+            check_package(&package, &scene)?;
+            store(folder.as_deref(), &scene.hash, &package);
             Ok::<_, Status>(package)
         })
         .await
     }
 }
 
-fn spoilt(error: SceneAssemblyError) -> Status {
-    Status::data_loss(error.to_string())
+/// Adds the next part of a package, unless it is out of order or beyond the announced size.
+fn append(package: &mut Vec<u8>, part: &ScenePart, package_bytes: u64) -> Result<(), Status> {
+    let have = package.len() as u64;
+    if part.offset_bytes != have {
+        let offset = part.offset_bytes;
+        return Err(Status::data_loss(format!(
+            "offset_bytes is {offset}, must be {have}: where the part before ended"
+        )));
+    }
+    let count = have + part.data.len() as u64;
+    if count > package_bytes {
+        return Err(Status::data_loss(format!("data has {count}, at most {package_bytes} are allowed")));
+    }
+    package.extend_from_slice(&part.data);
+    Ok(())
+}
+
+/// Checks that a package is whole and has its hash.
+fn check_package(package: &[u8], scene: &SceneRef) -> Result<(), Status> {
+    if package.len() as u64 != scene.package_bytes {
+        let count = package.len();
+        let expected = scene.package_bytes;
+        return Err(Status::data_loss(format!("scene is truncated: {count} of {expected} bytes were received")));
+    }
+    if SceneHash::of(package) != scene.hash {
+        return Err(Status::data_loss("scene is corrupt: the bytes do not have the hash"));
+    }
+    Ok(())
 }
 
 fn file_of(folder: &Path, hash: &SceneHash) -> PathBuf {
@@ -148,6 +174,20 @@ fn store(folder: Option<&Path>, hash: &SceneHash, package: &[u8]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn packages_are_whole_and_in_order() {
+        let part = |offset_bytes, data: &'static [u8]| ScenePart { offset_bytes, data: data.into() };
+        let scene = SceneRef { hash: SceneHash::of(b"abcdef"), package_bytes: 6 };
+        let mut package = Vec::new();
+        append(&mut package, &part(0, b"abc"), 6).unwrap();
+        assert!(append(&mut package, &part(0, b"abc"), 6).is_err(), "twice");
+        assert!(append(&mut package, &part(3, b"defg"), 6).is_err(), "too long");
+        assert!(check_package(&package, &scene).is_err(), "truncated");
+        append(&mut package, &part(3, b"def"), 6).unwrap();
+        assert_eq!((&*package, check_package(&package, &scene).is_ok()), (&b"abcdef"[..], true));
+        assert!(check_package(b"abcdeg", &scene).unwrap_err().message().contains("hash"));
+    }
 
     #[test]
     fn a_file_without_its_hash_counts_as_absent() {

@@ -17,8 +17,10 @@ use crate::light_samples::{CachedLight, LightCache, LookUpTests};
 use crate::planes::{self, Output};
 use crate::smooth_light::smoothed;
 use crate::visibility::{Choice, Costs, Visibility};
-use crate::work::{DrawWork, LayerSelection, Refinement, SamplePlanes};
-use crate::{GpuScene, Lighting, RenderError, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages};
+use crate::work::{DrawWork, LayerSelection, SamplePlanes};
+use crate::{
+    GpuScene, Lighting, Refinement, RenderError, layers::LayerCache, redundancy_test::RedundancyTest, stages::Stages,
+};
 
 /// Pixels in one submission: bounds the memory for surfaces, light and read-back.
 const PIXELS_A_SUBMISSION: usize = 1 << 20;
