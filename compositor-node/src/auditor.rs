@@ -58,7 +58,7 @@ impl Auditor {
     /// The views are of one set, as views that are made together are.
     fn choose(&self, plan: &Arc<Assignment>, order: &AuditOrder, covered: &[&Waiting]) -> Option<Chosen> {
         let first = covered.first()?;
-        let Source::Sets(ViewSets { of_cell: set, .. }) = &first.source else { return None };
+        let Source::Sets(ViewSets { of_cell: set, .. }) = &first.set.source else { return None };
         let scene_time_s = plan.workload.timeline.time_s(set_index(&first.key))?;
         let candidates = covered.iter().map(|waiting| {
             let stream = waiting.reply.outbox().stream;
@@ -150,12 +150,12 @@ fn audited_part(view_px: UVec2, order: &AuditOrder, random: u64) -> ViewPart {
 /// Why a promise is not for a view; `None` where it is.
 fn uncovered(plan: &Assignment, order: &AuditOrder, waiting: &Waiting) -> Option<&'static str> {
     let key = &waiting.key;
-    let Source::Sets(ViewSets { of_cell: set, .. }) = &waiting.source else { return Some("drawn directly") };
+    let Source::Sets(ViewSets { of_cell: set, .. }) = &waiting.set.source else { return Some("drawn directly") };
     let pixels = f64::from(key.size_px.element_product()) / f64::from(order.planned_pixel_count);
     let refinement = plan.workload.refinement(set_index(key));
     let reasons = [
         (Some(&key.method) != plan.method.as_ref(), "another method"),
-        (waiting.place.is_neighbour, "another view cell's set"),
+        (waiting.set.place.is_neighbour, "another view cell's set"),
         (refinement.step + 1 < refinement.steps, "unfinished light"),
         (key.planes.antialias != order.antialias, "other samples a pixel"),
         (!(MOST_PLANNED_PIXELS.recip()..=MOST_PLANNED_PIXELS).contains(&pixels), "another size"),

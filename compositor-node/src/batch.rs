@@ -112,12 +112,10 @@ pub(crate) struct Loaded {
 /// A view that waits for the device, with the way back to its client.
 pub(crate) struct Waiting {
     pub(crate) key: BatchKey,
-    pub(crate) place: Place,
-    pub(crate) source: Source,
+    pub(crate) set: Loaded,
     pub(crate) view: RequestedView,
     pub(crate) codec: FrameCodec,
     pub(crate) arrived: Instant,
-    pub(crate) set_wait_s: f64,
     /// The time at which it was ready for the device.
     pub(crate) queued: Instant,
     pub(crate) reply: Reply,
@@ -143,15 +141,11 @@ impl Waiting {
             size_px: view.camera.size_px,
             is_preview: set.place.is_preview(),
         };
-        let source = set.source.clone();
-        let codec = request.codec;
-        let set_wait_s = set.wait_s;
-        let queued = Instant::now();
-        Self { key, place: set.place, source, view, codec, arrived, set_wait_s, queued, reply, credit }
+        Self { key, set: set.clone(), view, codec: request.codec, arrived, queued: Instant::now(), reply, credit }
     }
 
     /// The wait for room, before it was ready.
     pub(crate) fn credit_wait_s(&self) -> f64 {
-        (self.queued.saturating_duration_since(self.arrived).as_secs_f64() - self.set_wait_s).max(0.0)
+        (self.queued.saturating_duration_since(self.arrived).as_secs_f64() - self.set.wait_s).max(0.0)
     }
 }

@@ -178,7 +178,7 @@ mod tests {
     use tokio::sync::Semaphore;
 
     use super::*;
-    use crate::batch::{Place, Source};
+    use crate::batch::{Loaded, Place, Source};
     use crate::outbox::{Outbox, Reply};
     use crate::quota::{Credit, NodeQuota};
     use crate::test_support::assignment;
@@ -198,14 +198,13 @@ mod tests {
         let node = NodeQuota::new(Quotas::default()).try_view(1).unwrap();
         let now = Instant::now();
         let place = Place { id: key.sample_set_id, cell: 0, is_neighbour: false, content: None };
+        let source = Source::Scene { plan: Arc::new(assignment()), scene_time_s: 0.0 };
         Waiting {
             key,
-            place,
-            source: Source::Scene { plan: Arc::new(assignment()), scene_time_s: 0.0 },
+            set: Loaded { source, place, wait_s: 0.0 },
             view: RequestedView { frame: number.into(), camera },
             codec: FrameCodec::Lz4,
             arrived: now,
-            set_wait_s: 0.0,
             queued: now,
             reply: Reply::new(Outbox::new(stream, NodeMetrics::default())),
             credit: Credit { stream: permit, _node: node },

@@ -100,7 +100,7 @@ impl Rendering {
 
     /// Makes the views of a batch, which has one at least; with the seconds that they had the device.
     async fn make(&self, turn: Turn, batch: &[Waiting]) -> Result<(Operation, Vec<View>, f64), Status> {
-        let source = batch[0].source.clone();
+        let source = batch[0].set.source.clone();
         let key = batch[0].key.clone();
         let cameras: Vec<_> = batch.iter().map(|waiting| waiting.view.camera).collect();
         let count = cameras.len();
@@ -178,12 +178,12 @@ fn pause(busy_s: f64, share: f64) -> Duration {
 /// The stage times of a view in a batch of `count` views that was begun at `start`.
 fn stage_times(waiting: &Waiting, start: Instant, batch_s: f64, count: usize) -> StageTimes {
     let times = StageTimes {
-        set_wait_s: waiting.set_wait_s,
+        set_wait_s: waiting.set.wait_s,
         credit_wait_s: waiting.credit_wait_s(),
         queue_s: start.saturating_duration_since(waiting.queued).as_secs_f64(),
         batch_s,
         reconstruct_s: batch_s / count as f64,
-        set_age_s: waiting.source.age_s(start),
+        set_age_s: waiting.set.source.age_s(start),
         batch_count: count as u32,
         ..StageTimes::default()
     };
@@ -195,7 +195,7 @@ fn stage_times(waiting: &Waiting, start: Instant, batch_s: f64, count: usize) ->
 }
 
 async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes, metrics: &NodeMetrics) {
-    let Waiting { key, place, view: requested, codec, arrived, reply, credit, .. } = waiting;
+    let Waiting { key, set, view: requested, codec, arrived, reply, credit, .. } = waiting;
     let encoded = blocking(move || {
         let start = Instant::now();
         let encoded = encode_view(&view, codec).map_err(|error| Status::internal(format!("encoding: {error}")))?;
@@ -205,6 +205,7 @@ async fn encode_and_send(waiting: Waiting, view: View, mut times: StageTimes, me
         times.encode_s = encode_s;
         metrics.done.add(key.workload_number, Operation::EncodeView, 1.0, encode_s);
         metrics.frame_bytes.inc_by(encoded.data.len() as u64);
+        let place = set.place;
         let header =
             encoded.header(key.sample_set_id, place.cell, place.is_neighbour, requested.camera, key.planes, times);
         Output { frame: requested.frame, header, data: encoded.data, arrived, credit }
