@@ -22,7 +22,7 @@ use wire::rpc::Messages;
 use crate::batch::{Loaded, Place, Waiting};
 use crate::course::Course;
 use crate::outbox::Reply;
-use crate::quota::{Credit, closed};
+use crate::quota::{Credit, closed, wait_for};
 use crate::sets::RECENTLY;
 use crate::shared::ClientStream;
 
@@ -145,7 +145,7 @@ impl<'a> LiveStream<'a> {
                     Err(status) => self.not_loaded(status)?,
                 },
                 credit = wait_for(self.ready.as_mut().map(|ready| &mut ready.credit)) => self.credited(credit?),
-                () = until(patience) => self.show_neighbour(),
+                () = wait_for(patience.map(|time| tokio::time::sleep_until(time.into()))) => self.show_neighbour(),
             }
         }
         Ok(())
@@ -405,21 +405,5 @@ impl<'a> LiveStream<'a> {
             let stream = credits.acquire_owned().await.map_err(closed)?;
             Ok(Credit { stream, _node: shared.quota.live_view(bytes).await? })
         })
-    }
-}
-
-/// Waits for the work; without any, waits for ever.
-async fn wait_for<T>(work: Option<&mut Pending<T>>) -> Result<T, Status> {
-    match work {
-        Some(work) => work.await,
-        None => std::future::pending().await,
-    }
-}
-
-/// Waits for a time; without any, waits for ever.
-async fn until(time: Option<Instant>) {
-    match time {
-        Some(time) => tokio::time::sleep_until(time.into()).await,
-        None => std::future::pending().await,
     }
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use cluster::RenderViews;
 use codec::FramePart;
-use node::{CellPlan, NodeParts, Relay, SetMemory, ViewProbes, next_within, until_drained};
+use node::{CellPlan, NodeParts, Relay, ViewProbes, next_within, until_drained};
 use parking_lot::Mutex;
 use tokio::task::JoinSet;
 use tonic::{Status, async_trait};
@@ -42,15 +42,10 @@ impl CompositorService {
             rendering.spawn(renderer.clone().run(arrivals.clone(), lane));
         }
         let sets = Arc::new(Sets::new(node.clone()));
+        node.monitor.add_memory(sets.cached.clone());
         let quota = NodeQuota::new(node.config.quotas);
         let shared = Shared { node, sets, arrivals, quota, times, stream_count: AtomicU64::new(1) };
         Self { shared: Arc::new(shared), _rendering: rendering }
-    }
-
-    /// The sets on the device.
-    #[must_use]
-    pub fn memory(&self) -> Arc<dyn SetMemory> {
-        Arc::new(self.shared.sets.cached.clone())
     }
 
     /// Relays the images that this compositor fetches to other compositors.

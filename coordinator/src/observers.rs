@@ -7,74 +7,42 @@ use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use cluster::{ClusterStatus, ErrorInterval, PromiseState};
-use node::Telemetry;
 use parking_lot::Mutex;
 use prometheus_client::metrics::{counter::Counter, family::Family, gauge::Gauge};
-use prometheus_client::registry::{Metric, Registry, Unit};
+use prometheus_client::registry::Unit;
 
 use crate::schedule::{Command, Event, Recorder};
 
 /// A gauge for each value of its labels: names and values.
 type Gauges<const LABELS: usize> = Family<[(&'static str, String); LABELS], Gauge<f64, AtomicU64>>;
 
-/// Registered gauges of the cluster's state, and counters of plans and measurements.
-#[derive(Debug, Clone)]
-pub struct CoordinatorMetrics {
-    nodes: Gauge,
-    workloads: Gauge,
-    samplers: Gauge,
-    sessions: Gauge,
-    views_per_set: Gauge,
-    plan_epoch: Gauge,
-    plans: Counter,
-    promises: Family<[(&'static str, String); 1], Gauge>,
-    view_probes: Counter,
-    /// The bounds of each workload's audited error, and its mean.
-    audit_errors: Gauges<2>,
-    known_light: Gauges<1>,
-    /// The parts of a view of each workload whose views take their light from samples.
-    view_parts_s: Gauges<2>,
-    broken: Counter,
-    /// Workloads whose promise is broken now.
-    broken_workloads: Arc<Mutex<BTreeSet<u64>>>,
+node::metrics! {
+    /// Registered gauges of the cluster's state, and counters of plans and measurements.
+    pub struct CoordinatorMetrics {
+        nodes: Gauge, "cluster_nodes", "P: nodes that have joined";
+        workloads: Gauge, "cluster_workloads", "Workloads that are open";
+        samplers: Gauge, "cluster_samplers", "K: nodes that sample, of all workloads";
+        sessions: Gauge, "cluster_sessions", "Sessions of all workloads";
+        views_per_set: Gauge, "cluster_views_per_set", "V: views of a sample set, of all workloads";
+        plan_epoch: Gauge, "cluster_plan_epoch", "The last plan";
+        plans: Counter, "cluster_plans", "Plans made";
+        promises: Family<[(&'static str, String); 1], Gauge>, "cluster_promises",
+            "Promises to the sessions of a workload";
+        view_probes: Counter, "cluster_view_probes", "Measurements for budgets";
+        audit_errors: Gauges<2>, "cluster_audit_error_ratio",
+            "The error of a workload's audited views: the interval that has it with 95 % confidence, and the mean";
+        known_light: Gauges<1>, "cluster_known_light_ratio",
+            "The share of a view's surface points whose light samples know, as measured";
+        view_parts_s: Gauges<2>, "cluster_view_part" in Seconds,
+            "Parts of a view whose light comes from samples, as measured";
+        broken: Counter, "cluster_promises_broken", "Promises that audits have found broken";
+    } beside {
+        /// Workloads whose promise is broken now.
+        broken_workloads: Arc<Mutex<BTreeSet<u64>>>
+    }
 }
 
 impl CoordinatorMetrics {
-    /// Registered, all at zero.
-    #[must_use]
-    pub fn new(telemetry: &Telemetry) -> Self {
-        let registry = &mut *telemetry.registry();
-        Self {
-            nodes: registered(registry, "cluster_nodes", "P: nodes that have joined"),
-            workloads: registered(registry, "cluster_workloads", "Workloads that are open"),
-            samplers: registered(registry, "cluster_samplers", "K: nodes that sample, of all workloads"),
-            sessions: registered(registry, "cluster_sessions", "Sessions of all workloads"),
-            views_per_set: registered(registry, "cluster_views_per_set", "V: views of a sample set, of all workloads"),
-            plan_epoch: registered(registry, "cluster_plan_epoch", "The last plan"),
-            plans: registered(registry, "cluster_plans", "Plans made"),
-            promises: registered(registry, "cluster_promises", "Promises to the sessions of a workload"),
-            view_probes: registered(registry, "cluster_view_probes", "Measurements for budgets"),
-            audit_errors: registered(
-                registry,
-                "cluster_audit_error_ratio",
-                "The error of a workload's audited views: the interval that has it with 95 % confidence, and the mean",
-            ),
-            known_light: registered(
-                registry,
-                "cluster_known_light_ratio",
-                "The share of a view's surface points whose light samples know, as measured",
-            ),
-            view_parts_s: {
-                let parts_s = Gauges::default();
-                let help = "Parts of a view whose light comes from samples, as measured";
-                registry.register_with_unit("cluster_view_part", help, Unit::Seconds, parts_s.clone());
-                parts_s
-            },
-            broken: registered(registry, "cluster_promises_broken", "Promises that audits have found broken"),
-            broken_workloads: Arc::default(),
-        }
-    }
-
     /// Shows the cluster's state, and counts what the schedule has ordered.
     pub fn show(&self, status: &ClusterStatus, commands: &[Command]) {
         let plans = commands.iter().filter(|command| matches!(command, Command::Apply { .. })).count();
@@ -136,18 +104,6 @@ impl CoordinatorMetrics {
     }
 }
 
-fn registered<M: Metric + Clone + Default>(registry: &mut Registry, name: &str, help: &str) -> M {
-    let metric = M::default();
-    registry.register(name, help, metric.clone());
-    metric
-}
-
-impl Default for CoordinatorMetrics {
-    fn default() -> Self {
-        Self::new(&Telemetry::default())
-    }
-}
-
 /// A log of all events of the schedule.
 pub type EventLog = Recorder<Box<dyn Write + Send>>;
 
@@ -173,6 +129,7 @@ impl Observers {
 #[cfg(test)]
 mod tests {
     use cluster::{SharedLightCosts, WorkloadStatus};
+    use node::Telemetry;
 
     use super::*;
 

@@ -7,8 +7,8 @@ use std::time::Duration;
 use cluster::NodeStatus;
 use compositor_node::CompositorService;
 use node::{
-    DeviceMonitor, Engine, EngineError, NodeConfig, NodeMetrics, NodeParts, NodeService, OpenEngine, ServeError,
-    health, keep_membership,
+    Engine, EngineError, NodeConfig, NodeMetrics, NodeParts, NodeService, OpenEngine, ServeError, health,
+    keep_membership,
 };
 use probe::Probers;
 use sampler_node::SamplerService;
@@ -94,9 +94,8 @@ async fn serve_on(
     metrics: NodeMetrics,
     shutdown: CancellationToken,
 ) -> Result<Option<String>, ServeError> {
-    let monitor = DeviceMonitor::new(engine);
-    let engine: Arc<dyn Engine> = Arc::new(monitor.clone());
-    let node = NodeParts::new(engine.clone(), config, metrics, shutdown.clone());
+    let node = NodeParts::new(engine, config, metrics, shutdown.clone());
+    let engine = node.scenes.engine();
     let address = listener.local_addr()?;
     let status = NodeStatus {
         node_name: config.node_name.clone(),
@@ -107,17 +106,16 @@ async fn serve_on(
     let probers = Arc::new(Probers::new(engine));
     let compositor = CompositorService::new(node.clone(), probers.clone());
     let sampler = SamplerService::new(node.clone(), compositor.relay());
-    monitor.set_memory(vec![compositor.memory(), sampler.memory()]);
     let service = NodeService::new(node.clone(), probers);
     let routes = Routes::new(health(&["node", "sampler", "compositor"]).await)
         .add_service(node_server(service))
         .add_service(sampler_server(sampler))
         .add_service(compositor_server(compositor));
-    let membership = tokio::spawn(stay_while_memory_lasts(node, status, monitor.clone()));
+    let membership = tokio::spawn(stay_while_memory_lasts(node.clone(), status));
     let mut serving = pin!(node::serve(listener, routes, config.insecure_bind, shutdown.clone()));
     let served = tokio::select! {
         served = &mut serving => served.map(|()| None),
-        reason = monitor.lost() => {
+        reason = node.monitor.lost() => {
             shutdown.cancel();
             serving.await.map(|()| Some(reason))
         }
@@ -128,12 +126,12 @@ async fn serve_on(
 }
 
 /// A member leaves when its device has no memory left, and begins again without plans and sets.
-async fn stay_while_memory_lasts(node: Arc<NodeParts>, status: NodeStatus, monitor: DeviceMonitor) {
+async fn stay_while_memory_lasts(node: Arc<NodeParts>, status: NodeStatus) {
     let away = node.config.deadlines.away;
     loop {
         tokio::select! {
             () = keep_membership(node.clone(), status.clone()) => return,
-            () = monitor.exhausted() => (),
+            () = node.monitor.exhausted() => (),
         }
         tracing::error!(
             node = &*node.plans.node_name,
@@ -142,6 +140,6 @@ async fn stay_while_memory_lasts(node: Arc<NodeParts>, status: NodeStatus, monit
         );
         node.plans.forget_all();
         tokio::time::sleep(away).await;
-        monitor.begin_anew();
+        node.monitor.begin_anew();
     }
 }

@@ -8,8 +8,7 @@ use cluster::{Assignment, FetchImages, SetContent};
 use codec::{Chunk, EncodedImage, SampleSetId, encode_sample_image, split_into_chunks};
 use depth_image::SampleImage;
 use node::{
-    ByteCache, CellPlan, Engine, EngineError, NodeMetrics, NodeParts, Operation, Pinned, Relay, SampleWork, SetMemory,
-    Turn,
+    ByteCache, CellPlan, Engine, EngineError, NodeMetrics, NodeParts, Operation, Pinned, Relay, SampleWork, Turn,
 };
 use node::{WorkClass, beyond_timeline, blocking, most_image_bytes, own_time, until_drained, with_guard};
 use parking_lot::Mutex;
@@ -57,13 +56,8 @@ impl SamplerService {
     pub fn new(node: Arc<NodeParts>, relay: Relay) -> Self {
         // The other half is for sets on the device.
         let cache = ByteCache::new("packed sample images", node.config.set_memory_bytes / 2);
+        node.monitor.add_memory(cache.clone());
         Self { node, cache, turns: Turns::default(), relay }
-    }
-
-    /// The packed images.
-    #[must_use]
-    pub fn memory(&self) -> Arc<dyn SetMemory> {
-        Arc::new(self.cache.clone())
     }
 
     /// All of this node's images of a set, made for the first request in one submission.

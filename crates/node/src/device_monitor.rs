@@ -29,14 +29,13 @@ pub struct DeviceMonitor {
 
 impl DeviceMonitor {
     /// Monitors an engine.
-    #[must_use]
-    pub fn new(engine: Arc<dyn Engine>) -> Self {
+    pub(crate) fn new(engine: Arc<dyn Engine>) -> Self {
         Self { engine, lost: watch::Sender::new(None), shortages: watch::Sender::new(0), memory: Arc::default() }
     }
 
-    /// The sets to free where the device runs out of memory.
-    pub fn set_memory(&self, memory: Vec<Arc<dyn SetMemory>>) {
-        *self.memory.lock() = memory;
+    /// Adds sets to free where the device runs out of memory.
+    pub fn add_memory(&self, memory: impl SetMemory + 'static) {
+        self.memory.lock().push(Arc::new(memory));
     }
 
     /// Frees the sets that are not in use; gives their bytes.

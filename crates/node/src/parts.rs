@@ -5,6 +5,7 @@ use std::sync::Arc;
 use tokio_util::sync::CancellationToken;
 
 use crate::config::NodeConfig;
+use crate::device_monitor::DeviceMonitor;
 use crate::engine::Engine;
 use crate::plan::PlansInForce;
 use crate::scenes::Scenes;
@@ -16,7 +17,9 @@ pub struct NodeParts {
     pub config: NodeConfig,
     /// The plans in force on it.
     pub plans: PlansInForce,
-    /// Its scenes, and their device.
+    /// Its device.
+    pub monitor: DeviceMonitor,
+    /// Its scenes on the device.
     pub scenes: Scenes,
     /// Its metrics.
     pub metrics: NodeMetrics,
@@ -33,7 +36,9 @@ impl NodeParts {
         metrics: NodeMetrics,
         shutdown: CancellationToken,
     ) -> Arc<Self> {
+        let monitor = DeviceMonitor::new(engine);
+        let scenes = Scenes::new(Arc::new(monitor.clone()), config);
         let plans = PlansInForce::new(&config.node_name);
-        Arc::new(Self { config: config.clone(), plans, scenes: Scenes::new(engine, config), metrics, shutdown })
+        Arc::new(Self { config: config.clone(), plans, monitor, scenes, metrics, shutdown })
     }
 }
