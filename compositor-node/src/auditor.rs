@@ -4,10 +4,10 @@ use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::Arc;
 use std::time::Instant;
 
-use cluster::{Assignment, AuditOrder, AuditedView, MOST_PLANNED_PIXELS, ProbedView};
+use cluster::{Assignment, AuditOrder, AuditedView, MOST_PLANNED_PIXELS, ViewErrors};
 use depth_image::{ViewPart, ViewPlanes};
 use glam::UVec2;
-use node::{DirectWork, NodeParts, Pinned, ViewAudit, ViewProbes, ViewWork, blocking};
+use node::{DirectWork, NodeParts, Pinned, Reason, ViewAudit, ViewProbes, ViewWork, blocking};
 use parking_lot::Mutex;
 use tonic::Status;
 
@@ -45,7 +45,9 @@ impl Auditor {
         for waiting in made {
             match uncovered(&plan, &order, waiting) {
                 None => covered.push(waiting),
-                Some(reason) => self.node.metrics.uncover_view(reason),
+                Some(reason) => {
+                    self.node.metrics.uncovered_views.get_or_create(&Reason { reason }).inc();
+                }
             }
         }
         let counts = [covered.len(), made.len() - covered.len()].map(|count| count as u64);
@@ -107,7 +109,7 @@ impl Auditor {
         chosen: Chosen,
         order: AuditOrder,
         part: ViewPart,
-    ) -> Result<(ProbedView, f64), Status> {
+    ) -> Result<(ViewErrors, f64), Status> {
         let Chosen { plan, set, view: Candidate { camera, .. }, scene_time_s } = chosen;
         let scene = &plan.workload.scene;
         if !self.node.scenes.engine().has_scene(scene.hash.as_str()) {

@@ -71,14 +71,6 @@ impl Source {
             Self::Scene { plan, .. } => &plan.workload.scene,
         }
     }
-
-    /// The age of the set at `now`; 0 where views are drawn from the scene.
-    pub(crate) fn age_s(&self, now: Instant) -> f64 {
-        match self {
-            Self::Sets(sets) => now.saturating_duration_since(sets.of_cell.since).as_secs_f64(),
-            Self::Scene { .. } => 0.0,
-        }
-    }
 }
 
 /// The name of a view's source.
@@ -142,10 +134,5 @@ impl Waiting {
             is_preview: set.place.is_preview(),
         };
         Self { key, set: set.clone(), view, codec: request.codec, arrived, queued: Instant::now(), reply, credit }
-    }
-
-    /// The wait for room, before it was ready.
-    pub(crate) fn credit_wait_s(&self) -> f64 {
-        (self.queued.saturating_duration_since(self.arrived).as_secs_f64() - self.set.wait_s).max(0.0)
     }
 }

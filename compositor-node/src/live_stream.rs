@@ -159,7 +159,9 @@ impl<'a> LiveStream<'a> {
         let Some(&view) = request.views.first() else {
             return Ok(());
         };
-        self.check_number(view.frame)?;
+        if let Some(last) = self.last_frame.replace(view.frame).filter(|last| view.frame <= *last) {
+            return Err(Status::invalid_argument(format!("views.frame_number: {} comes after {last}", view.frame)));
+        }
         self.client.shared.check_views(&plan, &request)?;
         let cell = plan.cell_of(&view.camera);
         let pose = Pose { request, view, plan, cell, arrived: Instant::now() };
@@ -218,15 +220,6 @@ impl<'a> LiveStream<'a> {
         match self.loading.as_mut().and_then(|fetch| fetch.pose.as_mut()) {
             Some(loading) if loading.shows_set_of(&pose) => Some(std::mem::replace(loading, pose)),
             _ => self.newest.replace(pose),
-        }
-    }
-
-    fn check_number(&mut self, frame: u64) -> Result<(), Status> {
-        match self.last_frame.replace(frame) {
-            Some(last) if frame <= last => {
-                Err(Status::invalid_argument(format!("views.frame_number: {frame} comes after {last}")))
-            }
-            _ => Ok(()),
         }
     }
 

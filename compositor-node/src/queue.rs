@@ -36,10 +36,6 @@ pub(crate) enum Lane {
 impl Lane {
     pub(crate) const ALL: [Self; 6] =
         [Self::Live, Self::LongLive, Self::Batch, Self::LongBatch, Self::Direct, Self::Preview];
-
-    pub(crate) fn is_live(self) -> bool {
-        matches!(self, Self::Live | Self::LongLive | Self::Preview)
-    }
 }
 
 /// The views of all streams that wait for the device. Bounded: each view that waits holds a credit.

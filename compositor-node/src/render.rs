@@ -40,7 +40,8 @@ impl Rendering {
     pub(crate) async fn run(self, arrivals: Arc<Arrivals>, lane: Lane) {
         let behind = Arc::new(Semaphore::new(BATCHES_BEHIND));
         // Lanes of a class share the device evenly: long views delay others by a slice each.
-        let class = if lane.is_live() { WorkClass::Live } else { WorkClass::Batch };
+        let is_live = matches!(lane, Lane::Live | Lane::LongLive | Lane::Preview);
+        let class = if is_live { WorkClass::Live } else { WorkClass::Batch };
         let turn = Turn { class, flow: Turn::next_flow() };
         loop {
             // Before the batch is chosen: views that arrive while frames wait for encoders are newer.
@@ -179,11 +180,15 @@ fn pause(busy_s: f64, share: f64) -> Duration {
 fn stage_times(waiting: &Waiting, start: Instant, batch_s: f64, count: usize) -> StageTimes {
     let times = StageTimes {
         set_wait_s: waiting.set.wait_s,
-        credit_wait_s: waiting.credit_wait_s(),
+        credit_wait_s: (waiting.queued.saturating_duration_since(waiting.arrived).as_secs_f64() - waiting.set.wait_s)
+            .max(0.0),
         queue_s: start.saturating_duration_since(waiting.queued).as_secs_f64(),
         batch_s,
         reconstruct_s: batch_s / count as f64,
-        set_age_s: waiting.set.source.age_s(start),
+        set_age_s: match &waiting.set.source {
+            Source::Sets(sets) => start.saturating_duration_since(sets.of_cell.since).as_secs_f64(),
+            Source::Scene { .. } => 0.0,
+        },
         batch_count: count as u32,
         ..StageTimes::default()
     };

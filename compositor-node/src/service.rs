@@ -42,7 +42,8 @@ impl CompositorService {
             rendering.spawn(renderer.clone().run(arrivals.clone(), lane));
         }
         let sets = Arc::new(Sets::new(node.clone()));
-        node.monitor.add_memory(sets.cached.clone());
+        let cached = sets.cached.clone();
+        node.monitor.add_memory(move || cached.free());
         let quota = NodeQuota::new(node.config.quotas);
         let shared = Shared { node, sets, arrivals, quota, times, stream_count: AtomicU64::new(1) };
         Self { shared: Arc::new(shared), _rendering: rendering }

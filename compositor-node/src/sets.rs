@@ -280,13 +280,14 @@ impl Sets {
         }
         let load = || self.cached.get(content, self.most_bytes(plan), self.loading(plan, set_index, content));
         match load().await {
-            Err(status) if status.code() == Code::FailedPrecondition && self.is_in_force(plan) => load().await,
+            Err(status)
+                if status.code() == Code::FailedPrecondition
+                    && self.node.plans.require(plan.workload_number, plan.plan_epoch).is_ok() =>
+            {
+                load().await
+            }
             loaded => loaded,
         }
-    }
-
-    fn is_in_force(&self, plan: &CellPlan) -> bool {
-        self.node.plans.in_force(plan.workload_number).is_some_and(|in_force| in_force.plan_epoch == plan.plan_epoch)
     }
 
     /// The most bytes of a cell's set, with its images for others.

@@ -78,8 +78,8 @@ impl CoordinatorMetrics {
         self.audit_errors.clear();
         for workload in &status.workloads {
             let audit = workload.promise.as_ref().and_then(|promise| promise.audit);
-            let Some(ErrorInterval { least, mean, greatest }) = audit.and_then(|audit| audit.error) else { continue };
-            for (value, ratio) in [("low", least), ("mean", mean), ("high", greatest)] {
+            let Some(ErrorInterval { low, mean, high }) = audit.and_then(|audit| audit.error) else { continue };
+            for (value, ratio) in [("low", low), ("mean", mean), ("high", high)] {
                 let labels = [("workload", workload.number.to_string()), ("value", value.to_owned())];
                 self.audit_errors.get_or_create(&labels).set(ratio);
             }

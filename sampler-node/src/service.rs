@@ -56,7 +56,8 @@ impl SamplerService {
     pub fn new(node: Arc<NodeParts>, relay: Relay) -> Self {
         // The other half is for sets on the device.
         let cache = ByteCache::new("packed sample images", node.config.set_memory_bytes / 2);
-        node.monitor.add_memory(cache.clone());
+        let cached = cache.clone();
+        node.monitor.add_memory(move || cached.free());
         Self { node, cache, turns: Turns::default(), relay }
     }
 

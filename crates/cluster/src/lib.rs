@@ -28,8 +28,7 @@ mod test_support;
 
 pub use assignment::{ApplyPlan, Assignment, CompositorShare, SamplerShare};
 pub use audit::{
-    AuditOrder, AuditReport, AuditSummary, AuditedView, ErrorInterval, MAX_AUDIT_TIME_RATIO, MOST_PLANNED_PIXELS,
-    ProbedView, is_one_place,
+    AuditOrder, AuditReport, AuditSummary, AuditedView, MAX_AUDIT_TIME_RATIO, MOST_PLANNED_PIXELS, is_one_place,
 };
 pub use check::{
     InvalidField, at_most, finite_seconds, frame_rate, nonempty, ratio, reason, text, tile_count, viewpoints,
@@ -41,6 +40,7 @@ pub use node::{
     BudgetMeasurement, JoinCluster, MeasureCosts, Measured, NodeStatus, Ready, SamplerReport, SharedLightCosts,
     Welcome, WorkReport,
 };
+pub use planner::{Interval as ErrorInterval, ViewErrors};
 pub use policy::{Policy, PolicyChoice, UnknownPolicy};
 pub use promise::{BudgetRequest, Promise, PromiseState};
 pub use scene::{FetchScene, SceneHash, ScenePart, SceneRef};

@@ -46,7 +46,8 @@ fn exposure_of<E>(mut brightness_at: impl FnMut(ExposureEv) -> Result<Option<f32
     let mut exposure = ExposureEv::ZERO;
     for _ in 0..MOST_PICTURES {
         let Some(brightness) = brightness_at(exposure)? else { return Ok(ExposureEv::ZERO) };
-        let next = limited(exposure.ev() + step_ev(brightness));
+        let next_ev = (exposure.ev() + step_ev(brightness)).clamp(-MOST_EV, MOST_EV);
+        let next = ExposureEv::new((next_ev * STEPS_PER_EV).round() / STEPS_PER_EV).unwrap_or_default();
         if (next.ev() - exposure.ev()).abs() < 1.5 / STEPS_PER_EV {
             break;
         }
@@ -62,11 +63,6 @@ fn step_ev(brightness: f32) -> f32 {
         coarse if coarse <= COARSE => BRIGHTER_EV,
         known => (TARGET / known).log2(),
     }
-}
-
-fn limited(ev: f32) -> ExposureEv {
-    let rounded = (ev.clamp(-MOST_EV, MOST_EV) * STEPS_PER_EV).round() / STEPS_PER_EV;
-    ExposureEv::new(rounded).unwrap_or_default()
 }
 
 /// The view in the middle of the first view cell.

@@ -89,12 +89,6 @@ struct Inner<K, V> {
     freed: Arc<Notify>,
 }
 
-/// Sets that a role keeps in memory for later, and can give back.
-pub trait SetMemory: Send + Sync {
-    /// Evicts all sets that are not in use; gives their bytes.
-    fn free(&self) -> usize;
-}
-
 /// Values by key. The least recently used are evicted for new ones. A value that would exceed the bound while all others
 /// are in use waits. Clones share the values.
 pub struct ByteCache<K, V>(Arc<Inner<K, V>>);
@@ -150,6 +144,18 @@ impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> Byt
         drop(state);
         drop(evicted);
         self.0.freed.notify_waiters();
+    }
+
+    /// Evicts all values that are not in use; gives their bytes.
+    pub fn free(&self) -> usize {
+        let mut state = self.0.state.lock();
+        let unused = state.unused(Duration::ZERO);
+        let evicted = state.evict_until(0, unused);
+        drop(state);
+        let freed = evicted.iter().map(|held| held.bytes).sum();
+        drop(evicted);
+        self.0.freed.notify_waiters();
+        freed
     }
 
     /// A value, loaded for the first that asks for it. A load that has begun goes on when those that wait for it leave, and a
@@ -296,19 +302,6 @@ impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> Byt
         drop(evicted);
         send.send_replace(Some(outcome));
         self.0.freed.notify_waiters();
-    }
-}
-
-impl<K: Clone + Eq + Hash + Send + Sync + 'static, V: Send + Sync + 'static> SetMemory for ByteCache<K, V> {
-    fn free(&self) -> usize {
-        let mut state = self.0.state.lock();
-        let unused = state.unused(Duration::ZERO);
-        let evicted = state.evict_until(0, unused);
-        drop(state);
-        let freed = evicted.iter().map(|held| held.bytes).sum();
-        drop(evicted);
-        self.0.freed.notify_waiters();
-        freed
     }
 }
 

@@ -9,7 +9,6 @@ use depth_image::{PinholeCamera, SampleImage, Turn, View};
 use parking_lot::Mutex;
 use tokio::sync::watch;
 
-use crate::byte_cache::SetMemory;
 use crate::engine::{
     CommonSet, DirectWork, Engine, EngineError, LightParts, SampleSet, SampleWork, SharedSet, UploadedSet, ViewWork,
 };
@@ -24,7 +23,8 @@ pub struct DeviceMonitor {
     lost: watch::Sender<Option<String>>,
     /// Calls that have run out of memory since the last that did not.
     shortages: watch::Sender<usize>,
-    memory: Arc<Mutex<Vec<Arc<dyn SetMemory>>>>,
+    /// Each frees the sets of a cache that are not in use, and gives their bytes.
+    memory: Arc<Mutex<Vec<Arc<dyn Fn() -> usize + Send + Sync>>>>,
 }
 
 impl DeviceMonitor {
@@ -34,14 +34,14 @@ impl DeviceMonitor {
     }
 
     /// Adds sets to free where the device runs out of memory.
-    pub fn add_memory(&self, memory: impl SetMemory + 'static) {
-        self.memory.lock().push(Arc::new(memory));
+    pub fn add_memory(&self, free: impl Fn() -> usize + Send + Sync + 'static) {
+        self.memory.lock().push(Arc::new(free));
     }
 
     /// Frees the sets that are not in use; gives their bytes.
     fn free(&self) -> usize {
         let memory = self.memory.lock().clone();
-        memory.iter().map(|memory| memory.free()).sum()
+        memory.iter().map(|free| free()).sum()
     }
 
     /// Resolves when the device is lost, with the reason.

@@ -26,7 +26,7 @@ mod viewers;
 mod work_done;
 
 pub use blocking::blocking;
-pub use byte_cache::{ByteCache, Pinned, SetMemory};
+pub use byte_cache::{ByteCache, Pinned};
 pub use config::{Deadlines, NodeConfig, Quotas, view_bytes};
 pub use connections::Connections;
 pub use depth_image::{Turn, WorkClass};

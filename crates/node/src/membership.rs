@@ -101,25 +101,24 @@ fn preload(welcome: Welcome, parts: Arc<NodeParts>) {
 
 /// Does a little of the work of every plan in force, so that the next finds the node warm. No other node waits for it.
 async fn warm_up(client: &CoordinatorClient, parts: &NodeParts) {
+    // A node that has had a plan is warm.
+    if parts.plans.epoch() > 0 {
+        return;
+    }
     let start = Instant::now();
-    match tokio::time::timeout(WARM_UP_TIMEOUT, do_a_little(client, parts)).await {
+    let warming = async {
+        for served in client.get_status(()).await?.workloads.into_iter().filter_map(|workload| workload.plan) {
+            parts.scenes.ensure(&served.assignment.workload.scene).await?;
+            let engine = parts.scenes.engine();
+            blocking(move || warm(engine.as_ref(), &served.assignment, served.method)).await?;
+        }
+        Ok::<_, Status>(())
+    };
+    match tokio::time::timeout(WARM_UP_TIMEOUT, warming).await {
         Ok(Ok(())) => tracing::debug!(seconds = start.elapsed().as_secs_f64(), "warm"),
         Ok(Err(status)) => tracing::warn!(reason = status.message(), "joins cold"),
         Err(_) => tracing::warn!(reason = "it took too long", "joins cold"),
     }
-}
-
-async fn do_a_little(client: &CoordinatorClient, parts: &NodeParts) -> Result<(), Status> {
-    // A node that has had a plan is warm.
-    if parts.plans.epoch() > 0 {
-        return Ok(());
-    }
-    for served in client.get_status(()).await?.workloads.into_iter().filter_map(|workload| workload.plan) {
-        parts.scenes.ensure(&served.assignment.workload.scene).await?;
-        let engine = parts.scenes.engine();
-        blocking(move || warm(engine.as_ref(), &served.assignment, served.method)).await?;
-    }
-    Ok(())
 }
 
 /// Makes one small picture of each kind that the plan has, its views by `method`.

@@ -43,7 +43,10 @@ impl Scenes {
             return Ok(0.0);
         }
         let start = Instant::now();
-        let package = match self.read_folder(&scene.hash).await? {
+        let folder = self.config.scene_folder.clone();
+        let hash = scene.hash.clone();
+        let stored = blocking(move || folder.map_or(Ok(None), |folder| read_verified(&folder, &hash)));
+        let package = match stored.await? {
             Some(package) => package,
             None => self.fetch(scene).await?,
         };
@@ -83,14 +86,6 @@ impl Scenes {
             }
             done => Ok(done?),
         }
-    }
-
-    async fn read_folder(&self, hash: &SceneHash) -> Result<Option<Vec<u8>>, Status> {
-        let Some(folder) = self.config.scene_folder.clone() else {
-            return Ok(None);
-        };
-        let hash = hash.clone();
-        blocking(move || read_verified(&folder, &hash)).await
     }
 
     async fn fetch(&self, scene: &SceneRef) -> Result<Vec<u8>, Status> {

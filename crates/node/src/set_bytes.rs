@@ -1,8 +1,7 @@
 //! The sizes of sample sets in memory, before they are allocated and afterwards.
 
 use depth_image::{
-    CubeGrid, DepthImage, Illumination, LayeredDepthImage, LayeredLightField, LightPlanes, SampleCamera, SampleImages,
-    SpecularPlanes,
+    CubeGrid, DepthImage, Illumination, LayeredDepthImage, LightPlanes, SampleCamera, SampleImages, SpecularPlanes,
 };
 use glam::UVec3;
 
@@ -72,7 +71,12 @@ pub fn set_bytes(images: &SampleImages) -> usize {
         SampleImages::Depth(images) => depth_images_bytes(images),
         SampleImages::Cube(cube) => {
             let images = cube.images.iter().map(layered_bytes).sum::<usize>();
-            cell_bytes(cube.grid.size) + images + cube.light_field.as_ref().map_or(0, light_field_bytes)
+            // The first sample of a line, and its end.
+            let light = cube
+                .light_field
+                .as_ref()
+                .map_or(0, |field| 2 * field.first.len() * LINE_BYTES + field.sample_count() * LIGHT_SAMPLE_BYTES);
+            cell_bytes(cube.grid.size) + images + light
         }
     }
 }
@@ -97,11 +101,6 @@ fn layered_bytes(image: &LayeredDepthImage) -> usize {
     let samples = image.sample_count();
     let words = image.normal_oct16.as_ref().map_or(0, Vec::len) + image.specular.as_ref().map_or(0, specular_words);
     samples * CUBE_SAMPLE_BYTES + 4 * words
-}
-
-fn light_field_bytes(field: &LayeredLightField) -> usize {
-    // The first sample of a line, and its end.
-    2 * field.first.len() * LINE_BYTES + field.sample_count() * LIGHT_SAMPLE_BYTES
 }
 
 fn image_bytes(image: &DepthImage) -> usize {

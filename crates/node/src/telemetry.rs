@@ -173,11 +173,6 @@ fn seconds() -> Histogram {
 }
 
 impl NodeMetrics {
-    /// Counts a view that a promise is not for.
-    pub fn uncover_view(&self, reason: &'static str) {
-        self.uncovered_views.get_or_create(&Reason { reason }).inc();
-    }
-
     /// Counts a view that was not made or not sent.
     pub fn drop_view(&self, reason: &'static str) {
         self.dropped.get_or_create(&Reason { reason }).inc();
